@@ -1,0 +1,268 @@
+//! The top level: the blocks wired up, seen from the pins.
+//!
+//! The one law: a clock goes sample, safety, storage, LEDs, in this order; so a fault in a clock undoes
+//! whatever the same clock would have completed.
+
+use crate::frames::Frames;
+use crate::leds::{Leds, Lines};
+use crate::order::OrderTable;
+use crate::raw::RawCapture;
+use crate::registers::Registers;
+use crate::safety::{Clock, Safety};
+use crate::settings::Settings;
+use crate::source::{AdcSample, Source};
+use crate::window::Window;
+use nirspi_wire::register::{FaultCode, Register, control, status};
+
+/// What becomes of the samples of a run.
+#[derive(Debug, Clone)]
+enum Capture {
+    Frames(Window),
+    Raw(RawCapture),
+}
+
+/// A run or raw burst under way.
+#[derive(Debug, Clone)]
+struct Run {
+    settings: Settings,
+    source: Source,
+    leds: Leds,
+    capture: Capture,
+}
+
+/// The FPGA.
+///
+/// `Default` is the state after power-up: registers at reset, interlock open, LEDs off.
+#[derive(Debug, Clone)]
+pub struct Gateware {
+    /// Clocks since reset.
+    clock: u64,
+    /// High word of the clock as of the last read of the low one.
+    clock_high: u32,
+    registers: Registers,
+    table: OrderTable,
+    config_error: bool,
+    write_refused: bool,
+    run: Option<Run>,
+    safety: Safety,
+    frames: Frames,
+    raw: Option<Vec<u8>>,
+}
+
+impl Default for Gateware {
+    fn default() -> Self {
+        Self {
+            clock: 0,
+            clock_high: 0,
+            registers: Registers::new(),
+            table: OrderTable::new(),
+            config_error: false,
+            write_refused: false,
+            run: None,
+            safety: Safety::new(),
+            frames: Frames::new(),
+            raw: None,
+        }
+    }
+}
+
+impl Gateware {
+    /// The state after power-up.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Reads a register or an entry of the order table; `None` where there is neither.
+    pub fn read(&mut self, address: u16) -> Option<u32> {
+        self.safety.feed();
+        let Some(register) = Register::at(address) else {
+            return self.table.at(address);
+        };
+        Some(match register {
+            Register::Control => 0,
+            Register::Status => self.status(),
+            Register::Fault => self.safety.fault() as u32,
+            Register::FramesMade => self.frames.made(),
+            Register::FramesLost => self.frames.lost(),
+            Register::ClockLow => {
+                self.clock_high = (self.clock >> 32) as u32;
+                self.clock as u32
+            }
+            Register::ClockHigh => self.clock_high,
+            constant_or_stored => self.registers.get(constant_or_stored),
+        })
+    }
+
+    /// Writes a register or an entry of the order table; false where there is neither. True says only
+    /// that the address exists: writes to read-only registers, and to the order table during a run, are
+    /// ignored.
+    pub fn write(&mut self, address: u16, value: u32) -> bool {
+        self.safety.feed();
+        match Register::at(address) {
+            Some(Register::Control) => self.control(value),
+            Some(register) => self.registers.set(register, value),
+            None if self.table.at(address).is_none() => return false,
+            None if self.running() => self.write_refused = true,
+            None => self.table.write(address, value),
+        }
+        true
+    }
+
+    /// What drives the LED array during the current clock.
+    #[must_use]
+    pub fn lines(&self) -> Lines {
+        // The last gate before the pins asks again, though a trip has already ended the run.
+        match &self.run {
+            Some(run) if self.safety.permits() => run.leds.lines(),
+            _ => Lines::default(),
+        }
+    }
+
+    /// Ends the current clock, for which the ADC delivers `sample`.
+    #[inline]
+    pub fn tick(&mut self, sample: AdcSample) {
+        let now = self.clock;
+        self.clock = now.wrapping_add(1);
+        self.safety.enter(now);
+        let Some(run) = &mut self.run else { return };
+
+        let sample = run.source.sample(sample);
+        let over_range = match &mut run.capture {
+            Capture::Frames(window) => window.take(&run.settings, sample),
+            Capture::Raw(raw) => raw.take(sample),
+        };
+        let clock = Clock { half_arrays: run.leds.half_arrays(), over_range };
+        if self.safety.step(&run.settings, clock) {
+            self.run = None;
+            return;
+        }
+        let over = match &mut run.capture {
+            Capture::Frames(window) => window.step(&run.settings, &mut self.frames, now),
+            Capture::Raw(raw) => {
+                self.raw = raw.complete(&run.settings);
+                self.raw.is_some()
+            }
+        };
+        if over {
+            self.run = None;
+        } else {
+            run.leds.step(&run.settings, &self.table);
+        }
+    }
+
+    /// Whether a run or raw burst is under way.
+    #[must_use]
+    pub fn running(&self) -> bool {
+        self.run.is_some()
+    }
+
+    /// Level of the `frame ready` pin.
+    #[must_use]
+    pub fn frame_ready(&self) -> bool {
+        self.frames.ready()
+    }
+
+    /// The delivered frame as it crosses the host port, laid out as in [`nirspi_wire::fpga`]. It stays
+    /// until `RELEASE` or the next start.
+    pub fn frame(&mut self) -> Option<&[u8]> {
+        self.safety.feed();
+        self.frames.bytes()
+    }
+
+    /// Level of the `raw ready` pin.
+    #[must_use]
+    pub fn raw_ready(&self) -> bool {
+        self.raw.is_some()
+    }
+
+    /// The raw burst: little-endian words, bit 15 set where the sample was over range. It stays until
+    /// `RELEASE` or the next start.
+    pub fn raw(&mut self) -> Option<&[u8]> {
+        self.safety.feed();
+        self.raw.as_deref()
+    }
+
+    /// Level of the interlock input; open after power-up. Opening it during a run is a fault.
+    pub fn set_interlock(&mut self, closed: bool) {
+        if self.safety.set_interlock(closed, self.running()) {
+            self.run = None;
+        }
+    }
+
+    fn status(&self) -> u32 {
+        [
+            (self.running(), status::RUNNING),
+            (self.frames.ready(), status::FRAME_READY),
+            (self.raw_ready(), status::RAW_READY),
+            (self.lines().enable, status::LEDS_ON),
+            (self.safety.fault() != FaultCode::None, status::FAULT),
+            (self.safety.interlock_closed(), status::INTERLOCK_CLOSED),
+            (self.config_error, status::CONFIG_ERROR),
+            (self.write_refused, status::WRITE_REFUSED),
+        ]
+        .into_iter()
+        .filter(|(set, _)| *set)
+        .fold(0, |word, (_, bit)| word | bit)
+    }
+
+    fn control(&mut self, word: u32) {
+        if word & control::STOP != 0 {
+            self.run = None;
+        }
+        // Never takes a fault from under a run: a latched fault has ended it.
+        if word & control::CLEAR_FAULT != 0 {
+            self.safety.clear();
+        }
+        if word & control::RELEASE != 0 {
+            self.frames.release();
+            self.raw = None;
+        }
+        if word & control::START != 0 {
+            self.start(|settings, now| Capture::Frames(Window::start(settings, now)));
+        }
+        if word & control::START_RAW != 0 {
+            self.start(|settings, _| {
+                settings.frames = 0;
+                Capture::Raw(RawCapture::start(settings))
+            });
+        }
+    }
+
+    fn start(&mut self, capture: impl FnOnce(&mut Settings, u64) -> Capture) {
+        if self.running() || !self.safety.permits() {
+            return;
+        }
+        let Some(mut settings) = Settings::copy(&self.registers) else {
+            self.config_error = true;
+            return;
+        };
+        let capture = capture(&mut settings, self.clock);
+        self.config_error = false;
+        self.write_refused = false;
+        self.frames.restart();
+        self.raw = None;
+        self.run = Some(Run {
+            source: Source::new(settings.test_source),
+            leds: Leds::start(&settings, &self.table),
+            capture,
+            settings,
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 2^32 clocks are 34 s of the instrument: too many to tick.
+    #[test]
+    fn both_words_of_the_clock_belong_to_one_moment() {
+        let mut gateware = Gateware { clock: (7 << 32) - 1, ..Gateware::new() };
+        assert_eq!(gateware.read(Register::ClockLow.address()), Some(u32::MAX));
+        gateware.tick(AdcSample::default());
+        assert_eq!(gateware.read(Register::ClockHigh.address()), Some(6));
+        assert_eq!(gateware.read(Register::ClockLow.address()), Some(0));
+        assert_eq!(gateware.read(Register::ClockHigh.address()), Some(7));
+    }
+}

@@ -1,0 +1,102 @@
+//! Drives the LED lines from the sequencer's slot.
+//!
+//! The one law: lines change only at a slot's first clock and are all 0 once the last slot is over.
+
+use crate::order::OrderTable;
+use crate::sequencer::{Ended, Sequencer};
+use crate::settings::Settings;
+use nirspi_wire::{SIDE, walsh};
+
+/// Pins of the LED array.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Lines {
+    /// Bit `r` is the line of row `r`.
+    pub rows: u32,
+    /// Bit `c` is the line of column `c`.
+    pub columns: u32,
+    /// Without it all LEDs are off.
+    pub enable: bool,
+}
+
+impl Lines {
+    /// Whether the LED at this row and column is lit.
+    #[must_use]
+    pub const fn lit(&self, row: u8, column: u8) -> bool {
+        self.enable && walsh::lit(self.rows, self.columns, row, column)
+    }
+}
+
+/// The 32 Walsh functions as words of sign lines: a ROM.
+static WALSH: [u32; SIDE as usize] = {
+    let mut words = [0; SIDE as usize];
+    let mut k = 0;
+    while k < SIDE {
+        words[k as usize] = walsh::lines(k);
+        k += 1;
+    }
+    words
+};
+
+/// Half-arrays that a pattern lights: all Walsh functions but the first are balanced.
+fn half_arrays(pattern: u16, complement: bool) -> u32 {
+    match (pattern, complement) {
+        (0, false) => 2,
+        (0, true) => 0,
+        _ => 1,
+    }
+}
+
+/// The lines and the sequencer behind them.
+#[derive(Debug, Clone)]
+pub(crate) struct Leds {
+    sequencer: Sequencer,
+    lines: Lines,
+    half_arrays: u32,
+}
+
+impl Leds {
+    /// Shows the first slot.
+    pub(crate) fn start(settings: &Settings, table: &OrderTable) -> Self {
+        let mut leds =
+            Self { sequencer: Sequencer::default(), lines: Lines::default(), half_arrays: 0 };
+        leds.show(settings, table);
+        leds
+    }
+
+    /// The lines during this clock.
+    pub(crate) fn lines(&self) -> Lines {
+        self.lines
+    }
+
+    /// Half-arrays lit during this clock.
+    #[inline]
+    pub(crate) fn half_arrays(&self) -> u32 {
+        self.half_arrays
+    }
+
+    /// Goes on to the next clock.
+    #[inline]
+    pub(crate) fn step(&mut self, settings: &Settings, table: &OrderTable) {
+        if !self.lines.enable {
+            return;
+        }
+        match self.sequencer.step(settings) {
+            Ended::Clock => {}
+            Ended::Slot | Ended::Frame => self.show(settings, table),
+            Ended::Run => {
+                self.lines = Lines::default();
+                self.half_arrays = 0;
+            }
+        }
+    }
+
+    fn show(&mut self, settings: &Settings, table: &OrderTable) {
+        let pattern = table.pattern(settings.order, self.sequencer.index());
+        let complement = self.sequencer.complement();
+        let side = u16::from(SIDE);
+        let rows = WALSH[usize::from(pattern / side)];
+        let columns = WALSH[usize::from(pattern % side)];
+        self.lines = Lines { rows: if complement { !rows } else { rows }, columns, enable: true };
+        self.half_arrays = half_arrays(pattern, complement);
+    }
+}

@@ -1,0 +1,81 @@
+//! The chain of counters clock, complement, pattern, sweep, frame.
+//!
+//! The gateware has it twice: one drives the LEDs, one attributes samples `Latency` clocks later. The one
+//! law: both count alike, so a sample can only ever land in the slot whose light it saw.
+
+use crate::settings::Settings;
+
+/// Where in a run a clock lies.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Sequencer {
+    /// Clock of the slot.
+    clock: u16,
+    complement: bool,
+    index: u16,
+    sweep: u32,
+    frame: u32,
+}
+
+/// The longest that ended with a clock.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Ended {
+    Clock,
+    Slot,
+    Frame,
+    Run,
+}
+
+impl Sequencer {
+    /// Clock of the slot, from 0.
+    #[inline]
+    pub(crate) fn clock(&self) -> u16 {
+        self.clock
+    }
+
+    /// Whether the slot shows a complement.
+    pub(crate) fn complement(&self) -> bool {
+        self.complement
+    }
+
+    /// Place of the slot's pattern in the order.
+    pub(crate) fn index(&self) -> u16 {
+        self.index
+    }
+
+    /// Whether the sweep is the first of its frame.
+    pub(crate) fn first_sweep(&self) -> bool {
+        self.sweep == 0
+    }
+
+    /// Goes on to the next clock.
+    #[inline]
+    pub(crate) fn step(&mut self, settings: &Settings) -> Ended {
+        self.clock += 1;
+        if self.clock < settings.dwell {
+            return Ended::Clock;
+        }
+        self.clock = 0;
+        if settings.differential && !self.complement {
+            self.complement = true;
+            return Ended::Slot;
+        }
+        self.complement = false;
+        self.index += 1;
+        if self.index < settings.patterns {
+            return Ended::Slot;
+        }
+        self.index = 0;
+        self.sweep += 1;
+        if self.sweep < settings.sweeps {
+            return Ended::Slot;
+        }
+        self.sweep = 0;
+        // Wraps to 0 after 2^32 frames of a run without end, which has no end to miss.
+        self.frame = self.frame.wrapping_add(1);
+        if settings.frames == 0 || self.frame != settings.frames {
+            Ended::Frame
+        } else {
+            Ended::Run
+        }
+    }
+}

@@ -1,0 +1,73 @@
+//! The copy of the settings that a run works with.
+//!
+//! The one law: a copy exists only with every setting in its range, so no block behind it has to check.
+
+use crate::order::Order;
+use crate::registers::Registers;
+use nirspi_wire::{
+    PATTERNS,
+    register::{DUTY_LIMIT_MAX, LATENCY_MAX, RAW_SAMPLES_MAX, Register, WATCHDOG_MAX, mode},
+};
+use std::ops::RangeInclusive;
+
+/// Settings of one run, all in range.
+#[derive(Debug, Clone)]
+pub(crate) struct Settings {
+    pub(crate) order: Order,
+    pub(crate) differential: bool,
+    pub(crate) test_source: bool,
+    pub(crate) patterns: u16,
+    /// In clocks.
+    pub(crate) dwell: u16,
+    /// In clocks, below `dwell`.
+    pub(crate) blank: u16,
+    /// In clocks.
+    pub(crate) latency: u8,
+    pub(crate) sweeps: u32,
+    /// 0: until stopped.
+    pub(crate) frames: u32,
+    pub(crate) raw_length: u16,
+    /// In clocks.
+    pub(crate) watchdog: u32,
+    /// In half-arrays lit for a clock.
+    pub(crate) duty_limit: u32,
+    /// 0: never.
+    pub(crate) over_range_trip: u32,
+}
+
+impl Settings {
+    /// Copies the registers; `None` if one is out of range.
+    pub(crate) fn copy(registers: &Registers) -> Option<Self> {
+        let bits = registers.get(Register::Mode);
+        let defined =
+            mode::DIFFERENTIAL | mode::ORDER_SEQUENCY | mode::ORDER_TABLE | mode::TEST_SOURCE;
+        if bits & !defined != 0 {
+            return None;
+        }
+        let within = |register, range: RangeInclusive<u32>| {
+            Some(registers.get(register)).filter(|value| range.contains(value))
+        };
+        let dwell = within(Register::Dwell, 1..=u16::MAX.into())?;
+        Some(Self {
+            order: if bits & mode::ORDER_TABLE != 0 {
+                Order::Table
+            } else if bits & mode::ORDER_SEQUENCY != 0 {
+                Order::Sequency
+            } else {
+                Order::Natural
+            },
+            differential: bits & mode::DIFFERENTIAL != 0,
+            test_source: bits & mode::TEST_SOURCE != 0,
+            patterns: within(Register::Patterns, 1..=PATTERNS.into())? as u16,
+            dwell: dwell as u16,
+            blank: within(Register::Blank, 0..=dwell - 1)? as u16,
+            latency: within(Register::Latency, 0..=LATENCY_MAX.into())? as u8,
+            sweeps: within(Register::Sweeps, 1..=u32::MAX)?,
+            frames: registers.get(Register::Frames),
+            raw_length: within(Register::RawLength, 1..=RAW_SAMPLES_MAX.into())? as u16,
+            watchdog: within(Register::Watchdog, 1..=WATCHDOG_MAX)?,
+            duty_limit: within(Register::DutyLimit, 0..=DUTY_LIMIT_MAX)?,
+            over_range_trip: registers.get(Register::OverRangeTrip),
+        })
+    }
+}

@@ -1,0 +1,314 @@
+//! The photon budget: from watts, apertures and distance to electrons per ADC sample.
+//!
+//! Law: **a detector cannot collect more than its etendue**. A collector of area A that sees the
+//! field's solid angle W needs a detector of area at least `A W / (pi NA^2)`; where the detector is
+//! smaller, the smaller area counts. For the paper's FGA015 (0.15 mm) behind a collector that sees
+//! the whole field this, not the lens, is what limits the light.
+//!
+//! One LED on a white target, one sample:
+//! `P_LED * projected * A / (pi D^2) * T * QE * t / (h c / lambda)`, with a Lambertian target facing
+//! the camera, so that its on-axis radiance is `rho / pi` times its irradiance.
+//!
+//! Daylight takes the same way back: `E * filter * rho / pi * A W * T * QE * t / (h c / lambda)`.
+//! The detector's field of view is taken to be the projected field, the smallest that loses nothing.
+
+use std::f64::consts::PI;
+
+use thiserror::Error;
+
+use crate::{LEDS, Projector, ProjectorError};
+
+/// Planck constant in J s (SI, exact).
+const PLANCK_J_S: f64 = 6.626_070_15e-34;
+
+/// Speed of light in m/s (SI, exact).
+const LIGHT_M_PER_S: f64 = 299_792_458.0;
+
+/// Spectral irradiance of daylight at 1550 nm per illuminance, in W m^-2 nm^-1 klx^-1.
+///
+/// From ASTM G173-03, global tilt: 0.2699 W m^-2 nm^-1 at 1550 nm (the mean over 1500 to 1600 nm is
+/// 0.2552, 5 % less) in a spectrum whose 280 to 4000 nm weighted by 683 lm/W times the CIE 1931 luminosity function
+/// (the fit of Wyman, Sloan and Shirley, JCGT 2(2), 2013) is 109.6 klx. Assumes that haze and cloud
+/// dim 1550 nm as they dim visible light; liquid water in cloud dims 1550 nm more, so that the
+/// paper's half-cloudy 15 klx is, if anything, overstated.
+const DAYLIGHT_W_PER_M2_NM_KLX: f64 = 0.2699 / 109.6;
+
+/// Why there is no budget.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum BudgetError {
+    /// A setting is outside its physical range.
+    #[error("photon budget: {name} is {value}, expected {expected}")]
+    Setting {
+        /// The setting.
+        name: &'static str,
+        /// The value found.
+        value: f64,
+        /// What it may be.
+        expected: &'static str,
+    },
+    /// The projector or the distance is not physical.
+    #[error(transparent)]
+    Projector(#[from] ProjectorError),
+}
+
+/// What the budget rests on. Each default says where it comes from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BudgetSettings {
+    /// Optical power of one lit LED, in mW. A packaged 1550 nm LED gives a few mW at its full
+    /// current; with half of the array lit, 4 mW of light from about 60 mW of electricity each is
+    /// what the paper's 45 W (Fig. 2) leaves room for.
+    pub led_power_mw: f64,
+    /// Angle off its axis at which an LED's radiant intensity has halved, in degrees. 5 degrees is
+    /// what the etendue of a 0.15 mm chip allows a 2 mm emitter: asin(0.15 / 2) = 4.3 degrees. A
+    /// field lens on the array points every LED at the projection lens.
+    pub led_half_angle_deg: f64,
+    /// Wavelength, in nm (paper, 2.A).
+    pub wavelength_nm: f64,
+    /// Diameter of the collecting optics, in mm: a 25 mm lens, the common size. With the default
+    /// detector the etendue leaves 1.7 mm of it in use; a larger detector uses more.
+    pub collector_aperture_mm: f64,
+    /// Diameter of the detector's active area, in mm: Thorlabs FGA015 (paper, 2.B).
+    pub detector_diameter_mm: f64,
+    /// Numerical aperture of the light on the detector. 1 is a compound parabolic concentrator; an
+    /// aspheric lens reaches about 0.6, and 0.36 times the light.
+    pub detector_na: f64,
+    /// Transmission of everything from LED to detector: 0.76 of the LED's spectrum (100 nm wide at
+    /// half height, Gaussian) passes the filter, and 0.8 is left for the glass.
+    pub optics_transmission: f64,
+    /// Electrons per photon: 0.9 (paper, 2.D).
+    pub quantum_efficiency: f64,
+    /// Time of one ADC sample, in ns: 8 at 125 MS/s (paper, 2.D).
+    pub sample_ns: f64,
+    /// Illuminance on the target, in klx: 15, half-cloudy (paper, Tables 3 and 4).
+    pub ambient_klx: f64,
+    /// Width of the collector's band-pass filter around the wavelength, in nm.
+    pub filter_width_nm: f64,
+}
+
+impl Default for BudgetSettings {
+    fn default() -> Self {
+        Self {
+            led_power_mw: 4.0,
+            led_half_angle_deg: 5.0,
+            wavelength_nm: 1550.0,
+            collector_aperture_mm: 25.0,
+            detector_diameter_mm: 0.15,
+            detector_na: 1.0,
+            optics_transmission: 0.6,
+            quantum_efficiency: 0.9,
+            sample_ns: 8.0,
+            ambient_klx: 15.0,
+            filter_width_nm: 100.0,
+        }
+    }
+}
+
+impl BudgetSettings {
+    fn validate(&self) -> Result<(), BudgetError> {
+        let positive = [
+            ("wavelength_nm", self.wavelength_nm),
+            ("collector_aperture_mm", self.collector_aperture_mm),
+            ("detector_diameter_mm", self.detector_diameter_mm),
+            ("sample_ns", self.sample_ns),
+        ];
+        for (name, value) in positive {
+            ensure(value.is_finite() && value > 0.0, name, value, "more than 0")?;
+        }
+        let not_negative = [
+            ("led_power_mw", self.led_power_mw),
+            ("ambient_klx", self.ambient_klx),
+            ("filter_width_nm", self.filter_width_nm),
+        ];
+        for (name, value) in not_negative {
+            ensure(value.is_finite() && value >= 0.0, name, value, "0 or more")?;
+        }
+        let fractions = [
+            ("detector_na", self.detector_na),
+            ("optics_transmission", self.optics_transmission),
+            ("quantum_efficiency", self.quantum_efficiency),
+        ];
+        for (name, value) in fractions {
+            ensure(value > 0.0 && value <= 1.0, name, value, "more than 0 and at most 1")?;
+        }
+        let angle = self.led_half_angle_deg;
+        let expected = "0.1 to 60 (a Lambertian LED)";
+        ensure((0.1..=60.0).contains(&angle), "led_half_angle_deg", angle, expected)
+    }
+
+    /// Electrons in one sample from one watt on the collector.
+    fn electrons_per_watt(&self) -> f64 {
+        let photon_j = PLANCK_J_S * LIGHT_M_PER_S / (self.wavelength_nm * 1e-9);
+        self.optics_transmission * self.quantum_efficiency * self.sample_ns * 1e-9 / photon_j
+    }
+
+    /// Part of an LED's light that enters the projection lens: for an intensity cos^m of the angle,
+    /// `1 - cos^(m+1)` of the angle that the lens's edge is seen under.
+    fn projected_fraction(&self, projector: &Projector) -> f64 {
+        let m = 0.5_f64.ln() / self.led_half_angle_deg.to_radians().cos().ln();
+        let edge = (projector.aperture_mm / 2.0 / projector.array_distance_mm()).atan();
+        1.0 - edge.cos().powf(m + 1.0)
+    }
+}
+
+fn ensure(
+    holds: bool,
+    name: &'static str,
+    value: f64,
+    expected: &'static str,
+) -> Result<(), BudgetError> {
+    if holds { Ok(()) } else { Err(BudgetError::Setting { name, value, expected }) }
+}
+
+/// Electrons per ADC sample at one distance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Budget {
+    /// From one lit LED whose whole spot falls on a target of reflectance 1.
+    pub electrons_per_led: f64,
+    /// From daylight on a field of reflectance 1.
+    pub ambient_electrons_white: f64,
+    /// Diameter of the collector that counts, in mm: its own, or what the detector's etendue allows.
+    pub effective_collector_mm: f64,
+}
+
+impl Budget {
+    /// The budget of a target at `distance_mm`.
+    ///
+    /// # Errors
+    /// [`BudgetError`] naming the setting, projector length or distance that is not physical.
+    pub fn new(
+        settings: &BudgetSettings,
+        projector: &Projector,
+        distance_mm: f64,
+    ) -> Result<Self, BudgetError> {
+        settings.validate()?;
+        projector.validate()?;
+        let expected = "a positive length";
+        let reachable = distance_mm.is_finite() && distance_mm > 0.0;
+        ensure(reachable, "distance_mm", distance_mm, expected)?;
+
+        let field_sr = (projector.field_mm(distance_mm) / distance_mm).powi(2);
+        let effective_collector_mm = settings
+            .collector_aperture_mm
+            .min(settings.detector_diameter_mm * settings.detector_na * (PI / field_sr).sqrt());
+        let area_m2 = PI / 4.0 * (effective_collector_mm * 1e-3).powi(2);
+
+        let on_target_w = settings.led_power_mw * 1e-3 * settings.projected_fraction(projector);
+        let collected = area_m2 / (PI * (distance_mm * 1e-3).powi(2));
+        let daylight_w_per_m2 =
+            settings.ambient_klx * DAYLIGHT_W_PER_M2_NM_KLX * settings.filter_width_nm;
+        Ok(Self {
+            electrons_per_led: on_target_w * collected * settings.electrons_per_watt(),
+            ambient_electrons_white: daylight_w_per_m2 / PI
+                * area_m2
+                * field_sr
+                * settings.electrons_per_watt(),
+            effective_collector_mm,
+        })
+    }
+
+    /// Daylight from a field of this mean reflectance ([`crate::Footprint::mean`]), in electrons
+    /// per sample.
+    pub fn ambient_electrons(&self, mean_reflectance: f64) -> f64 {
+        self.ambient_electrons_white * mean_reflectance
+    }
+
+    /// The most light that can come: all LEDs and daylight on a white target, in electrons per
+    /// sample.
+    pub fn brightest_electrons(&self) -> f64 {
+        self.electrons_per_led * LEDS as f64 + self.ambient_electrons_white
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(distance_mm: f64, settings: BudgetSettings) -> Budget {
+        Budget::new(&settings, &Projector::default(), distance_mm).unwrap()
+    }
+
+    fn assert_close(found: f64, expected: f64) {
+        assert!((found / expected - 1.0).abs() < 1e-9, "{found} against {expected}");
+    }
+
+    #[test]
+    fn led_light_falls_with_the_square_of_the_distance_and_daylight_does_not() {
+        let (near, far) = (at(300.0, Default::default()), at(900.0, Default::default()));
+        assert_close(near.electrons_per_led, 9.0 * far.electrons_per_led);
+        assert_close(near.ambient_electrons_white, far.ambient_electrons_white);
+    }
+
+    #[test]
+    fn light_is_proportional_to_power_and_daylight_to_illuminance() {
+        let one = at(300.0, Default::default());
+        let brighter = at(
+            300.0,
+            BudgetSettings { led_power_mw: 8.0, ambient_klx: 45.0, ..Default::default() },
+        );
+        assert_close(brighter.electrons_per_led, 2.0 * one.electrons_per_led);
+        assert_close(brighter.ambient_electrons_white, 3.0 * one.ambient_electrons_white);
+    }
+
+    #[test]
+    fn a_larger_collector_helps_only_until_the_detector_is_full() {
+        let with = |collector_aperture_mm, detector_diameter_mm| {
+            let settings = BudgetSettings {
+                collector_aperture_mm,
+                detector_diameter_mm,
+                ..Default::default()
+            };
+            at(300.0, settings)
+        };
+        assert_close(with(1.0, 0.15).electrons_per_led * 2.25, with(1.5, 0.15).electrons_per_led);
+        assert_close(with(25.0, 0.15).electrons_per_led, with(50.0, 0.15).electrons_per_led);
+        assert_close(with(25.0, 0.15).electrons_per_led * 4.0, with(25.0, 0.3).electrons_per_led);
+        // 0.15 mm * sqrt(pi) / 0.16 rad
+        assert_close(with(25.0, 0.15).effective_collector_mm, 0.15 * PI.sqrt() / 0.16);
+    }
+
+    #[test]
+    fn a_lambertian_led_sends_the_sine_squared_of_the_edge_angle_into_the_lens() {
+        let settings = BudgetSettings { led_half_angle_deg: 60.0, ..Default::default() };
+        let edge = (10.0_f64 / 600.0).atan();
+        assert_close(settings.projected_fraction(&Projector::default()), edge.sin().powi(2));
+    }
+
+    #[test]
+    fn the_default_budget_agrees_with_one_worked_by_hand() {
+        // P 4 mW; m = ln 0.5 / ln cos 5 deg = 181.81; edge atan(1/60): 2.510 % projected;
+        // A = pi/4 (1.6617 mm)^2 = 2.1686 mm^2; A / pi D^2 = 7.670e-6; T QE = 0.54;
+        // 8 ns / 0.80 eV (1.2816e-19 J) = 6.2423e10 per W.
+        let budget = at(300.0, Default::default());
+        assert!((budget.electrons_per_led / 25.96 - 1.0).abs() < 2e-3, "{budget:?}");
+        // 15 klx * 2.4626e-3 * 100 nm = 3.6939 W/m^2; / pi * A * 0.0256 sr = 6.5278e-8 W.
+        assert!((budget.ambient_electrons_white / 2200.4 - 1.0).abs() < 2e-3, "{budget:?}");
+    }
+
+    #[test]
+    fn settings_that_are_not_physical_are_named() {
+        let default = BudgetSettings::default();
+        let cases = [
+            ("led_power_mw", BudgetSettings { led_power_mw: -1.0, ..default }),
+            ("led_half_angle_deg", BudgetSettings { led_half_angle_deg: 0.0, ..default }),
+            ("wavelength_nm", BudgetSettings { wavelength_nm: f64::NAN, ..default }),
+            ("collector_aperture_mm", BudgetSettings { collector_aperture_mm: 0.0, ..default }),
+            ("detector_diameter_mm", BudgetSettings { detector_diameter_mm: -0.1, ..default }),
+            ("detector_na", BudgetSettings { detector_na: 1.1, ..default }),
+            ("optics_transmission", BudgetSettings { optics_transmission: 2.0, ..default }),
+            ("quantum_efficiency", BudgetSettings { quantum_efficiency: 0.0, ..default }),
+            ("sample_ns", BudgetSettings { sample_ns: f64::INFINITY, ..default }),
+            ("ambient_klx", BudgetSettings { ambient_klx: f64::NAN, ..default }),
+            ("filter_width_nm", BudgetSettings { filter_width_nm: -1.0, ..default }),
+        ];
+        for (field, settings) in cases {
+            let error = Budget::new(&settings, &Projector::default(), 300.0).unwrap_err();
+            assert!(matches!(error, BudgetError::Setting { name, .. } if name == field), "{error}");
+        }
+        assert!(Budget::new(&default, &Projector::default(), 0.0).is_err());
+        let flat = Projector { aperture_mm: 0.0, ..Default::default() };
+        assert!(matches!(
+            Budget::new(&default, &flat, 300.0),
+            Err(BudgetError::Projector(ProjectorError::Length { name: "aperture_mm", .. }))
+        ));
+    }
+}

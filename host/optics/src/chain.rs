@@ -1,0 +1,350 @@
+//! The receiver: LED edge, photodiode, amplifier and 14-bit ADC, one sample a clock.
+//!
+//! Law: what comes out at clock n depends on the light up to clock n - latency, the settings and the
+//! seed, and on nothing else; with [`ChainSettings::ideal`] it is that light exactly, rounded.
+//!
+//! In order: the LEDs follow their lines with a first-order edge; daylight is added; the amplifier's
+//! pole smooths both; shot noise (variance = electrons collected in the sample) and amplifier noise
+//! are added; the ADC divides by its gain, adds its baseline, rounds and clips; its pipeline delays
+//! the result. Light is constant within a clock, and a sample is the signal at the clock's end, so
+//! the two poles are stepped exactly, not approximated.
+//!
+//! Simplifications: one Gaussian stands for shot and amplifier noise (where electrons are too few
+//! for that, amplifier noise outweighs them), and noise is white from sample to sample: a 60 MHz
+//! pole leaves a correlation of exp(-3.0) = 5 % between neighbours 8 ns apart.
+
+use rand::{RngExt, SeedableRng};
+use rand_distr::StandardNormal;
+use rand_pcg::Pcg64Mcg;
+use thiserror::Error;
+
+use crate::Budget;
+
+/// Largest ADC code: 14 bit (paper, 2.D).
+pub const FULL_SCALE_COUNTS: u16 = (1 << 14) - 1;
+
+/// Longest ADC pipeline that can be set, in clocks.
+pub const MAX_ADC_LATENCY_CLOCKS: u8 = 63;
+
+/// The steps of the switchable amplifier gain, in electrons per ADC count: two steps an octave.
+pub const GAINS_ELECTRONS_PER_COUNT: [f64; 32] = gains();
+
+/// Noise that the gain and the baseline leave room for, in standard deviations. Six are passed once
+/// in a thousand million samples, so that noise alone does not trip the LEDs.
+const HEADROOM_SIGMA: f64 = 6.0;
+
+const fn gains() -> [f64; 32] {
+    let mut steps = [0.0; 32];
+    let (mut octave, mut i) = (0.125, 0);
+    while i < steps.len() {
+        steps[i] = octave;
+        steps[i + 1] = octave * 1.5;
+        octave *= 2.0;
+        i += 2;
+    }
+    steps
+}
+
+/// Why there is no receiver with these settings.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum ChainError {
+    /// A setting is outside its range.
+    #[error("receiver: {name} is {value}, expected {expected}")]
+    Setting {
+        /// The setting.
+        name: &'static str,
+        /// The value found.
+        value: f64,
+        /// What it may be.
+        expected: &'static str,
+    },
+    /// No gain keeps light and noise within the ADC's range.
+    #[error(
+        "receiver: no gain fits {brightest_electrons:.0} electrons a sample with \
+         {noise_electrons:.0} of noise; reduce the light"
+    )]
+    NoGain {
+        /// The most light that can come, in electrons per sample.
+        brightest_electrons: f64,
+        /// Noise at that light, in electrons rms.
+        noise_electrons: f64,
+    },
+}
+
+/// The receiver's settings.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ChainSettings {
+    /// ADC clock period, in ns: 8 at 125 MS/s (paper, 2.D).
+    pub sample_ns: f64,
+    /// LED rise and fall time from 10 to 90 %, in ns. Fast 1550 nm LEDs take 10 to 20.
+    pub led_edge_ns: f64,
+    /// Amplifier bandwidth at -3 dB, in Hz; infinite for none. The default is just under the ADC's
+    /// Nyquist frequency.
+    pub amplifier_bandwidth_hz: f64,
+    /// Daylight, in electrons per sample ([`Budget::ambient_electrons`]).
+    pub ambient_electrons: f64,
+    /// Whether photons arrive at random.
+    pub shot_noise: bool,
+    /// Noise of the amplifier, in electrons rms per sample ([`amplifier_noise_electrons`]).
+    pub amplifier_noise_electrons: f64,
+    /// Gain: electrons per ADC count ([`ChainSettings::auto_gain`]).
+    pub electrons_per_count: f64,
+    /// What the ADC reads in the dark: room for noise to go below it.
+    pub adc_offset_counts: u16,
+    /// ADC pipeline: clocks from the end of a sample to its code, 0 to 63.
+    pub adc_latency_clocks: u8,
+}
+
+impl Default for ChainSettings {
+    fn default() -> Self {
+        let (sample_ns, amplifier_bandwidth_hz) = (8.0, 60e6);
+        Self {
+            sample_ns,
+            led_edge_ns: 15.0,
+            amplifier_bandwidth_hz,
+            ambient_electrons: 0.0,
+            shot_noise: true,
+            // 1.1 pA/sqrt(Hz): 0.87 from a 22 kilohm feedback resistor (sqrt(4kT/R)) and about 0.65
+            // from 1 nV/sqrt(Hz) of a fast op-amp across 3 pF at 60 MHz (2 pi B C e / sqrt(3)).
+            amplifier_noise_electrons: amplifier_noise_electrons(
+                1.1,
+                amplifier_bandwidth_hz,
+                sample_ns,
+            ),
+            electrons_per_count: 3.0,
+            adc_offset_counts: 2048,
+            adc_latency_clocks: 6,
+        }
+    }
+}
+
+/// Amplifier noise in electrons rms per sample, from its input current noise density: over the
+/// `pi/2 * bandwidth` that a single pole passes, `i * sqrt(pi/2 * B) * t / e`.
+pub fn amplifier_noise_electrons(pa_per_sqrt_hz: f64, bandwidth_hz: f64, sample_ns: f64) -> f64 {
+    const ELECTRON_C: f64 = 1.602_176_634e-19;
+    let amperes = pa_per_sqrt_hz * 1e-12 * (std::f64::consts::FRAC_PI_2 * bandwidth_hz).sqrt();
+    amperes * sample_ns * 1e-9 / ELECTRON_C
+}
+
+impl ChainSettings {
+    /// A receiver without noise, settling, daylight or latency, one electron a count: the exact
+    /// chain that integration tests compare with.
+    pub fn ideal() -> Self {
+        Self {
+            led_edge_ns: 0.0,
+            amplifier_bandwidth_hz: f64::INFINITY,
+            ambient_electrons: 0.0,
+            shot_noise: false,
+            amplifier_noise_electrons: 0.0,
+            electrons_per_count: 1.0,
+            adc_latency_clocks: 0,
+            ..Self::default()
+        }
+    }
+
+    /// The most sensitive gain (fewest electrons per count of [`GAINS_ELECTRONS_PER_COUNT`]) at
+    /// which neither the brightest scene of `budget` nor darkness leaves the ADC's range, with six
+    /// standard deviations of noise.
+    ///
+    /// # Errors
+    /// [`ChainError`] if a setting is out of range or no gain is coarse enough.
+    pub fn auto_gain(&self, budget: &Budget) -> Result<f64, ChainError> {
+        self.validate()?;
+        let brightest_electrons = budget.brightest_electrons();
+        let noise_electrons = self.noise_electrons(brightest_electrons);
+        let offset = f64::from(self.adc_offset_counts);
+        let above = f64::from(FULL_SCALE_COUNTS) - offset;
+        let dark_electrons = HEADROOM_SIGMA * self.noise_electrons(0.0);
+        let bright_electrons = brightest_electrons + HEADROOM_SIGMA * noise_electrons;
+        GAINS_ELECTRONS_PER_COUNT
+            .into_iter()
+            .find(|gain| bright_electrons <= above * gain && dark_electrons <= offset * gain)
+            .ok_or(ChainError::NoGain { brightest_electrons, noise_electrons })
+    }
+
+    /// Noise of one sample that collected `electrons`, in electrons rms.
+    fn noise_electrons(&self, electrons: f64) -> f64 {
+        let shot = if self.shot_noise { electrons } else { 0.0 };
+        (shot + self.amplifier_noise_electrons.powi(2)).sqrt()
+    }
+
+    /// Part of a step of light that sample `n` after it shows: 0 is the clock in which the lines
+    /// changed. The analytic response of the two poles, without the ADC's latency.
+    pub fn settling(&self, n: u32) -> f64 {
+        let t = (f64::from(n) + 1.0) * self.sample_ns;
+        let (led, amplifier) = (self.led_tau_ns(), self.amplifier_tau_ns());
+        1.0 - decay(t, amplifier) - shared_decay(t, led, amplifier)
+    }
+
+    /// Checks the settings.
+    ///
+    /// # Errors
+    /// [`ChainError::Setting`] naming the one that is out of range.
+    pub fn validate(&self) -> Result<(), ChainError> {
+        let more = "more than 0";
+        ensure(
+            self.sample_ns.is_finite() && self.sample_ns > 0.0,
+            "sample_ns",
+            self.sample_ns,
+            more,
+        )?;
+        let bandwidth = self.amplifier_bandwidth_hz;
+        ensure(bandwidth > 0.0, "amplifier_bandwidth_hz", bandwidth, more)?;
+        let gain = self.electrons_per_count;
+        ensure(gain.is_finite() && gain > 0.0, "electrons_per_count", gain, more)?;
+        let not_negative = [
+            ("led_edge_ns", self.led_edge_ns),
+            ("ambient_electrons", self.ambient_electrons),
+            ("amplifier_noise_electrons", self.amplifier_noise_electrons),
+        ];
+        for (name, value) in not_negative {
+            ensure(value.is_finite() && value >= 0.0, name, value, "0 or more")?;
+        }
+        let offset = self.adc_offset_counts;
+        ensure(offset <= FULL_SCALE_COUNTS, "adc_offset_counts", offset.into(), "0 to 16383")?;
+        let latency = self.adc_latency_clocks;
+        ensure(latency <= MAX_ADC_LATENCY_CLOCKS, "adc_latency_clocks", latency.into(), "0 to 63")
+    }
+
+    /// Time constant of the LEDs: a first-order edge takes ln 9 of them from 10 to 90 %.
+    fn led_tau_ns(&self) -> f64 {
+        self.led_edge_ns / 9.0_f64.ln()
+    }
+
+    fn amplifier_tau_ns(&self) -> f64 {
+        1e9 / (std::f64::consts::TAU * self.amplifier_bandwidth_hz)
+    }
+}
+
+fn ensure(
+    holds: bool,
+    name: &'static str,
+    value: f64,
+    expected: &'static str,
+) -> Result<(), ChainError> {
+    if holds { Ok(()) } else { Err(ChainError::Setting { name, value, expected }) }
+}
+
+/// exp(-t / tau); a pole with no time constant has forgotten everything.
+fn decay(t: f64, tau: f64) -> f64 {
+    if tau > 0.0 { (-t / tau).exp() } else { 0.0 }
+}
+
+/// What is left in a pole `second` at `t` of a unit that was in the pole `first` before it at 0:
+/// `first / (first - second) * (exp(-t / first) - exp(-t / second))`.
+fn shared_decay(t: f64, first: f64, second: f64) -> f64 {
+    let difference = first - second;
+    if first == 0.0 {
+        0.0
+    } else if difference.abs() < 1e-6 * first {
+        t / first * decay(t, first)
+    } else {
+        first / difference * (decay(t, first) - decay(t, second))
+    }
+}
+
+/// One word from the ADC.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct AdcSample {
+    /// The code, 0 to 16383.
+    pub counts: u16,
+    /// The input was above full scale.
+    pub over_range: bool,
+}
+
+/// The receiver, stepped once per ADC clock.
+#[derive(Debug, Clone)]
+pub struct Chain {
+    settings: ChainSettings,
+    led_decay: f64,
+    amplifier_decay: f64,
+    /// What one clock leaves in the amplifier of a difference in the LEDs.
+    led_into_amplifier: f64,
+    counts_per_electron: f64,
+    offset_counts: f64,
+    amplifier_variance: f64,
+    led_electrons: f64,
+    amplified_electrons: f64,
+    rng: Pcg64Mcg,
+    pipeline: [AdcSample; MAX_ADC_LATENCY_CLOCKS as usize],
+    pipeline_at: usize,
+}
+
+impl Chain {
+    /// A receiver that has been in the dark (and daylight) for long. The same settings, seed and
+    /// light give the same samples.
+    ///
+    /// # Errors
+    /// [`ChainError::Setting`] naming the setting that is out of range.
+    pub fn new(settings: ChainSettings, seed: u64) -> Result<Self, ChainError> {
+        settings.validate()?;
+        let (t, led, amplifier) =
+            (settings.sample_ns, settings.led_tau_ns(), settings.amplifier_tau_ns());
+        let mut chain = Self {
+            settings,
+            led_decay: decay(t, led),
+            amplifier_decay: decay(t, amplifier),
+            led_into_amplifier: shared_decay(t, led, amplifier),
+            counts_per_electron: settings.electrons_per_count.recip(),
+            offset_counts: f64::from(settings.adc_offset_counts),
+            amplifier_variance: settings.amplifier_noise_electrons.powi(2),
+            led_electrons: 0.0,
+            amplified_electrons: 0.0,
+            rng: Pcg64Mcg::seed_from_u64(seed),
+            pipeline: [AdcSample { counts: 0, over_range: false }; _],
+            pipeline_at: 0,
+        };
+        let dark = chain.convert(settings.ambient_electrons);
+        chain.pipeline.fill(dark);
+        Ok(chain)
+    }
+
+    /// The settings it was made with.
+    pub fn settings(&self) -> &ChainSettings {
+        &self.settings
+    }
+
+    /// One ADC clock, during which the LEDs are driven to give `light_electrons` per sample once
+    /// settled ([`crate::LedArray::light`]). Light below 0, or NaN, counts as none.
+    #[inline]
+    pub fn sample(&mut self, light_electrons: f32) -> AdcSample {
+        let light =
+            if light_electrons > 0.0 { f64::from(light_electrons.min(f32::MAX)) } else { 0.0 };
+        let led_off_by = self.led_electrons - light;
+        let amplifier_off_by = self.amplified_electrons - light;
+        self.amplified_electrons =
+            light + amplifier_off_by * self.amplifier_decay + led_off_by * self.led_into_amplifier;
+        self.led_electrons = light + led_off_by * self.led_decay;
+
+        let electrons = self.amplified_electrons + self.settings.ambient_electrons;
+        let shot_variance = if self.settings.shot_noise { electrons.max(0.0) } else { 0.0 };
+        let variance = shot_variance + self.amplifier_variance;
+        let noise = if variance > 0.0 {
+            let normal: f64 = self.rng.sample(StandardNormal);
+            variance.sqrt() * normal
+        } else {
+            0.0
+        };
+        let converted = self.convert(electrons + noise);
+        self.delay(converted)
+    }
+
+    fn convert(&self, electrons: f64) -> AdcSample {
+        let code = (electrons * self.counts_per_electron + self.offset_counts + 0.5).floor();
+        let over_range = code > f64::from(FULL_SCALE_COUNTS);
+        AdcSample { counts: code.clamp(0.0, FULL_SCALE_COUNTS.into()) as u16, over_range }
+    }
+
+    fn delay(&mut self, converted: AdcSample) -> AdcSample {
+        let latency = usize::from(self.settings.adc_latency_clocks);
+        if latency == 0 {
+            return converted;
+        }
+        let out = std::mem::replace(&mut self.pipeline[self.pipeline_at], converted);
+        self.pipeline_at += 1;
+        if self.pipeline_at == latency {
+            self.pipeline_at = 0;
+        }
+        out
+    }
+}

@@ -1,0 +1,56 @@
+//! Optics of the virtual camera: what the detector would see, and what the ADC would say about it.
+//!
+//! The light takes one path through this crate, and each module is one stage of it:
+//!
+//! | module | from | to |
+//! |---|---|---|
+//! | [`scene`] | a picture | reflectance on a target plane, in millimetres |
+//! | [`projector`] | scene and distance | [`Footprint`]: the reflectance that each LED's spot sees |
+//! | [`budget`] | watts, apertures, distance | electrons per ADC sample for one LED, and for daylight |
+//! | [`mod@array`] | 32 row and 32 column lines | electrons per ADC sample for the LEDs they light |
+//! | [`chain`] | electrons, one clock at a time | 14-bit ADC samples with noise, settling and latency |
+//! | [`depth`] | distance | an 8 x 8 time-of-flight reading |
+//!
+//! The law of the crate: light is counted in **electrons per ADC sample** from [`budget`] on, and
+//! nothing is rescaled to look good. A weak signal stays weak; the gain that shows it is a setting.
+//!
+//! ```
+//! use nirspi_optics::{Budget, BudgetSettings, Chain, ChainSettings, LedArray, Projector, Scene};
+//!
+//! let scene = Scene::new(vec![1.0; 64 * 64], 64, 43.0)?;
+//! let projector = Projector::default();
+//! let distance_mm = 300.0;
+//! let footprint = projector.footprint(&scene, distance_mm)?;
+//! let budget = Budget::new(&BudgetSettings::default(), &projector, distance_mm)?;
+//!
+//! let mut settings = ChainSettings::default();
+//! settings.electrons_per_count = settings.auto_gain(&budget)?;
+//! settings.ambient_electrons = budget.ambient_electrons(footprint.mean());
+//! let mut chain = Chain::new(settings, 1)?;
+//! let mut leds = LedArray::new(&footprint, budget.electrons_per_led);
+//!
+//! let all_lit = leds.light(0, 0, true);
+//! let sample = chain.sample(all_lit);
+//! assert!(!sample.over_range);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+pub mod array;
+pub mod budget;
+pub mod chain;
+pub mod depth;
+pub mod projector;
+pub mod scene;
+
+pub use array::LedArray;
+pub use budget::{Budget, BudgetError, BudgetSettings};
+pub use chain::{AdcSample, Chain, ChainError, ChainSettings};
+pub use depth::{DepthError, SimulatedDepth};
+pub use projector::{Footprint, Projector, ProjectorError};
+pub use scene::{Scene, SceneError};
+
+/// LEDs along one side of the array (paper, section 2.A).
+pub const SIDE: usize = 32;
+
+/// LEDs in the array.
+pub const LEDS: usize = SIDE * SIDE;

@@ -1,0 +1,251 @@
+//! The projector: which part of the target each LED lights.
+//!
+//! A thin lens images the LED array onto the focus plane. On that plane each LED is a sharp square;
+//! in front of it and behind it the cone of light from the aperture meets the target as a disc, so
+//! that the spot is the magnified emitter convolved with that disc.
+//!
+//! Law: a spot is a *weighted mean* of reflectance (its weights sum to 1), so the footprint is linear
+//! in the scene, and a target of one reflectance gives that reflectance at every LED at any distance.
+//! How much light a spot carries is the business of [`crate::budget`].
+
+use thiserror::Error;
+
+use crate::{LEDS, SIDE, Scene};
+
+/// Grid points a LED pitch on which spots are integrated.
+const SAMPLES_PER_PITCH: usize = 8;
+
+/// A blur disc wider than this many fields leaves no pattern on the target (and would need an
+/// absurdly large grid to say so).
+const MAX_BLUR_FIELDS: f64 = 4.0;
+
+/// Why nothing can be projected.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum ProjectorError {
+    /// A length is not positive and finite.
+    #[error("projector: {name} is {value_mm} mm, expected a positive length")]
+    Length {
+        /// The setting or argument.
+        name: &'static str,
+        /// The value found, in millimetres.
+        value_mm: f64,
+    },
+    /// Emitters would overlap.
+    #[error("projector: emitter_mm {emitter_mm} is wider than led_pitch_mm {led_pitch_mm}")]
+    Emitter {
+        /// Emitter width found, in millimetres.
+        emitter_mm: f64,
+        /// LED pitch, in millimetres.
+        led_pitch_mm: f64,
+    },
+    /// The lens has no real image there.
+    #[error(
+        "projector: focus_distance_mm {focus_distance_mm} must be more than \
+         focal_length_mm {focal_length_mm}"
+    )]
+    NoRealImage {
+        /// Focus distance found, in millimetres.
+        focus_distance_mm: f64,
+        /// Focal length, in millimetres.
+        focal_length_mm: f64,
+    },
+    /// The blur is so much wider than the field that no pattern is left.
+    #[error(
+        "projector: at {distance_mm} mm the blur of {blur_mm:.1} mm washes out the field of \
+         {field_mm:.1} mm; move nearer to the focus"
+    )]
+    WashedOut {
+        /// Distance asked for, in millimetres.
+        distance_mm: f64,
+        /// Diameter of the defocus disc there, in millimetres.
+        blur_mm: f64,
+        /// Side of the field there, in millimetres.
+        field_mm: f64,
+    },
+}
+
+/// The LED array behind its lens. All lengths in millimetres.
+///
+/// The defaults are a camera that behaves like the paper's. The focal length is the paper's (Fig. 2).
+/// Pitch, focus and aperture are not printed there and were chosen so that the 43 mm letters of
+/// Fig. 6 fill the 48 mm field at 0.3 m, and so that the blur disc grows as the resolution of
+/// Table 4 does: 0, 20 and 47 mm at 0.3, 0.6 and 1 m against 5, 25 and 45 mm. (At 0.3 m the pitch
+/// on the target, 1.5 mm, sets the resolution.)
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Projector {
+    /// Distance between neighbouring LEDs.
+    pub led_pitch_mm: f64,
+    /// Width of the square that one LED emits from.
+    pub emitter_mm: f64,
+    /// Focal length of the lens.
+    pub focal_length_mm: f64,
+    /// Distance from the lens to the plane on which the LEDs are sharp.
+    pub focus_distance_mm: f64,
+    /// Diameter of the lens.
+    pub aperture_mm: f64,
+}
+
+impl Default for Projector {
+    fn default() -> Self {
+        Self {
+            led_pitch_mm: 3.0,
+            emitter_mm: 2.0,
+            focal_length_mm: 200.0,
+            focus_distance_mm: 300.0,
+            aperture_mm: 20.0,
+        }
+    }
+}
+
+impl Projector {
+    /// Checks the settings.
+    ///
+    /// # Errors
+    /// [`ProjectorError`] naming the setting that is not physical.
+    pub fn validate(&self) -> Result<(), ProjectorError> {
+        positive("led_pitch_mm", self.led_pitch_mm)?;
+        positive("emitter_mm", self.emitter_mm)?;
+        positive("focal_length_mm", self.focal_length_mm)?;
+        positive("focus_distance_mm", self.focus_distance_mm)?;
+        positive("aperture_mm", self.aperture_mm)?;
+        let Self { led_pitch_mm, emitter_mm, focal_length_mm, focus_distance_mm, .. } = *self;
+        if emitter_mm > led_pitch_mm {
+            return Err(ProjectorError::Emitter { emitter_mm, led_pitch_mm });
+        }
+        if focus_distance_mm <= focal_length_mm {
+            return Err(ProjectorError::NoRealImage { focus_distance_mm, focal_length_mm });
+        }
+        Ok(())
+    }
+
+    /// Distance from the array to the lens that focuses it: `1 / (1/f - 1/focus)`, in millimetres.
+    pub fn array_distance_mm(&self) -> f64 {
+        1.0 / (1.0 / self.focal_length_mm - 1.0 / self.focus_distance_mm)
+    }
+
+    /// Size on the target over size on the array, for a target at `distance_mm`.
+    pub fn magnification(&self, distance_mm: f64) -> f64 {
+        distance_mm / self.array_distance_mm()
+    }
+
+    /// Side of the square that the 32 x 32 LEDs cover at `distance_mm`, in millimetres.
+    pub fn field_mm(&self, distance_mm: f64) -> f64 {
+        SIDE as f64 * self.led_pitch_mm * self.magnification(distance_mm)
+    }
+
+    /// Diameter of the defocus disc at `distance_mm`, in millimetres: the cone from the aperture to
+    /// a point on the focus plane, cut by the target, `aperture * |1 - D / focus|`.
+    pub fn blur_mm(&self, distance_mm: f64) -> f64 {
+        self.aperture_mm * (1.0 - distance_mm / self.focus_distance_mm).abs()
+    }
+
+    /// The mean reflectance that each LED's spot sees on a scene at `distance_mm`, centred on the
+    /// axis. LED row 0 is the top of the scene and column 0 its left; the lens turns the picture
+    /// over, and the array is wired so that this undoes it.
+    ///
+    /// # Errors
+    /// [`ProjectorError`] if a setting or the distance is not physical, or if the target is so far
+    /// out of focus that no pattern is left on it.
+    pub fn footprint(&self, scene: &Scene, distance_mm: f64) -> Result<Footprint, ProjectorError> {
+        self.validate()?;
+        positive("distance_mm", distance_mm)?;
+        let (field_mm, blur_mm) = (self.field_mm(distance_mm), self.blur_mm(distance_mm));
+        if blur_mm > MAX_BLUR_FIELDS * field_mm {
+            return Err(ProjectorError::WashedOut { distance_mm, blur_mm, field_mm });
+        }
+
+        let step_mm = field_mm / (SIDE * SAMPLES_PER_PITCH) as f64;
+        let radius = blur_mm / 2.0 / step_mm;
+        let sharp = SharpGrid::new(scene, step_mm, self.emitter_mm / self.led_pitch_mm, radius);
+        let mut weights = Vec::with_capacity(LEDS);
+        for row in 0..SIDE {
+            for column in 0..SIDE {
+                weights.push(sharp.mean_over_disc(row, column, radius) as f32);
+            }
+        }
+        Ok(Footprint { weights })
+    }
+}
+
+fn positive(name: &'static str, value_mm: f64) -> Result<(), ProjectorError> {
+    if value_mm.is_finite() && value_mm > 0.0 {
+        Ok(())
+    } else {
+        Err(ProjectorError::Length { name, value_mm })
+    }
+}
+
+/// The scene seen through one sharp emitter, sampled on a grid of [`SAMPLES_PER_PITCH`] points a
+/// pitch that has a point on every LED's axis; kept as running sums along rows, so that a disc is
+/// one difference a row.
+struct SharpGrid {
+    running: Vec<f64>,
+    stride: usize,
+    margin: usize,
+}
+
+impl SharpGrid {
+    fn new(scene: &Scene, step_mm: f64, fill: f64, radius: f64) -> Self {
+        let margin = radius.ceil() as usize + 1;
+        let points = (SIDE - 1) * SAMPLES_PER_PITCH + 1 + 2 * margin;
+        let emitter_mm = fill * SAMPLES_PER_PITCH as f64 * step_mm;
+        let at_mm = |i: usize| (i as f64 - (points - 1) as f64 / 2.0) * step_mm;
+        let stride = points + 1;
+        let mut running = vec![0.0; points * stride];
+        for (row, sums) in running.chunks_exact_mut(stride).enumerate() {
+            let mut sum = 0.0;
+            for column in 0..points {
+                sum += scene.mean_over_square(at_mm(column), at_mm(row), emitter_mm);
+                sums[column + 1] = sum;
+            }
+        }
+        Self { running, stride, margin }
+    }
+
+    /// Mean over the disc of `radius` grid steps around LED (`row`, `column`).
+    fn mean_over_disc(&self, row: usize, column: usize, radius: f64) -> f64 {
+        let x = (self.margin + column * SAMPLES_PER_PITCH) as f64 + 0.5;
+        let y = self.margin + row * SAMPLES_PER_PITCH;
+        if radius < 0.5 {
+            // Finer than the grid: the emitter's own width hides a disc this small.
+            return self.sum_to(y, x + 0.5) - self.sum_to(y, x - 0.5);
+        }
+        let reach = radius.floor() as usize;
+        let (mut sum, mut length) = (0.0, 0.0);
+        for line in y - reach..=y + reach {
+            let dy = line.abs_diff(y) as f64;
+            let half = (radius * radius - dy * dy).sqrt();
+            sum += self.sum_to(line, x + half) - self.sum_to(line, x - half);
+            length += 2.0 * half;
+        }
+        sum / length
+    }
+
+    /// Integral along grid row `line` up to `x`, where grid point i covers [i, i + 1].
+    fn sum_to(&self, line: usize, x: f64) -> f64 {
+        let whole = x as usize;
+        let sums = &self.running[line * self.stride..(line + 1) * self.stride];
+        let next = sums[(whole + 1).min(self.stride - 1)];
+        sums[whole] + (next - sums[whole]) * (x - whole as f64)
+    }
+}
+
+/// The mean reflectance in [0, 1] under the spot of each LED, 32 x 32, row-major.
+///
+/// This is the image that an ideal camera of this resolution would reconstruct.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Footprint {
+    weights: Vec<f32>,
+}
+
+impl Footprint {
+    /// The 1024 reflectances, row-major, row 0 at the top of the scene.
+    pub fn weights(&self) -> &[f32] {
+        &self.weights
+    }
+
+    /// Reflectance under all LEDs together.
+    pub fn mean(&self) -> f64 {
+        self.weights.iter().map(|&w| f64::from(w)).sum::<f64>() / LEDS as f64
+    }
+}

@@ -1,0 +1,87 @@
+//! What the LED array promises: light that follows the lines.
+
+#![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
+
+use nirspi_optics::{Footprint, LEDS, LedArray, Projector, SIDE, Scene};
+use proptest::prelude::*;
+
+/// A footprint in which every LED sees something of its own.
+fn footprint() -> Footprint {
+    let pixels = (0..LEDS).map(|i| (i * 7919 % 1000) as f32 / 1000.0).collect();
+    let scene = Scene::new(pixels, SIDE, 48.0).unwrap();
+    Projector::default().footprint(&scene, 300.0).unwrap()
+}
+
+#[test]
+fn nothing_is_lit_unless_enabled() {
+    let mut leds = LedArray::new(&footprint(), 100.0);
+    assert!(leds.light(0, 0, true) > 0.0);
+    assert_eq!(leds.light(0, 0, false), 0.0);
+}
+
+#[test]
+fn lines_light_the_leds_of_the_walsh_pattern_they_stand_for() {
+    let footprint = footprint();
+    let mut leds = LedArray::new(&footprint, 1.0);
+    for k in [0_usize, 1, 31, 32, 33, 500, 777, 1023] {
+        // DESIGN section 3: sign = (-1)^(popcount(k_hi & r) + popcount(k_lo & c))
+        let parity = |k: usize, i: usize| (k & i).count_ones() & 1;
+        let line = |k: usize| (0..SIDE).fold(0_u32, |lines, i| lines | parity(k, i) << i);
+        let mut expected = 0.0;
+        for (i, &w) in footprint.weights().iter().enumerate() {
+            if (parity(k / SIDE, i / SIDE) + parity(k % SIDE, i % SIDE)) % 2 == 0 {
+                expected += f64::from(w);
+            }
+        }
+        let found = f64::from(leds.light(line(k / SIDE), line(k % SIDE), true));
+        assert!((found - expected).abs() < 1e-3, "pattern {k}: {found} against {expected}");
+    }
+}
+
+proptest! {
+    #[test]
+    fn a_pattern_and_its_complement_light_every_led_once(rows: u32, cols: u32) {
+        let mut leds = LedArray::new(&footprint(), 26.0);
+        let all = leds.light(0, 0, true);
+        let both = leds.light(rows, cols, true) + leds.light(!rows, cols, true);
+        prop_assert!((both / all - 1.0).abs() < 1e-6, "{both} of {all}");
+        // Inverting both sides of every XOR changes nothing.
+        prop_assert_eq!(leds.light(rows, cols, true), leds.light(!rows, !cols, true));
+    }
+
+    #[test]
+    fn remembering_a_state_never_changes_its_light(states in prop::collection::vec(any::<(u8, u8)>(), 1..200)) {
+        let footprint = footprint();
+        let mut remembering = LedArray::new(&footprint, 26.0);
+        for (rows, cols) in states {
+            let (rows, cols) = (u32::from(rows).pow(3), u32::from(cols).pow(3));
+            let fresh = LedArray::new(&footprint, 26.0).light(rows, cols, true);
+            prop_assert_eq!(remembering.light(rows, cols, true), fresh);
+        }
+    }
+}
+
+#[test]
+fn states_that_differ_in_one_line_are_remembered_apart() {
+    let footprint = footprint();
+    let mut remembering = LedArray::new(&footprint, 26.0);
+    let lines = |bit: u32| if bit < 32 { (1 << bit, 0) } else { (0, 1 << (bit - 32)) };
+    for (rows, cols) in (0..64).map(lines) {
+        remembering.light(rows, cols, true);
+    }
+    for (rows, cols) in (0..64).map(lines) {
+        let fresh = LedArray::new(&footprint, 26.0).light(rows, cols, true);
+        assert_eq!(remembering.light(rows, cols, true), fresh, "{rows:#x} {cols:#x}");
+    }
+}
+
+#[test]
+fn more_states_than_are_remembered_are_still_right() {
+    let footprint = footprint();
+    let mut leds = LedArray::new(&footprint, 26.0);
+    for rows in 0..5000 {
+        leds.light(rows, 5, true);
+    }
+    let fresh = LedArray::new(&footprint, 26.0).light(17, 5, true);
+    assert_eq!(leds.light(17, 5, true), fresh);
+}

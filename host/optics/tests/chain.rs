@@ -1,0 +1,292 @@
+//! What the receiver promises: exact settling, delay and range; noise of the right size.
+
+#![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
+
+use nirspi_optics::chain::{
+    FULL_SCALE_COUNTS, GAINS_ELECTRONS_PER_COUNT, MAX_ADC_LATENCY_CLOCKS, amplifier_noise_electrons,
+};
+use nirspi_optics::{
+    AdcSample, Budget, BudgetSettings, Chain, ChainError, ChainSettings, Projector,
+};
+use proptest::prelude::*;
+
+fn chain(settings: ChainSettings, seed: u64) -> Chain {
+    Chain::new(settings, seed).unwrap()
+}
+
+fn budget(distance_mm: f64) -> Budget {
+    Budget::new(&BudgetSettings::default(), &Projector::default(), distance_mm).unwrap()
+}
+
+/// Mean and variance of settled samples, in counts.
+fn statistics(settings: ChainSettings, light: f32, samples: u32) -> (f64, f64) {
+    let mut chain = chain(settings, 11);
+    for _ in 0..200 {
+        chain.sample(light);
+    }
+    let (mut sum, mut squares) = (0.0, 0.0);
+    for _ in 0..samples {
+        let counts = f64::from(chain.sample(light).counts);
+        sum += counts;
+        squares += counts * counts;
+    }
+    let mean = sum / f64::from(samples);
+    (mean, squares / f64::from(samples) - mean * mean)
+}
+
+#[test]
+fn the_ideal_chain_rounds_the_light_of_the_same_clock() {
+    let settings = ChainSettings { electrons_per_count: 4.0, ..ChainSettings::ideal() };
+    let mut chain = chain(settings, 0);
+    let offset = settings.adc_offset_counts;
+    for (light, counts) in [(0.0, 0), (4.0, 1), (5.9, 1), (6.0, 2), (40_000.0, 10_000), (1.0, 0)] {
+        assert_eq!(chain.sample(light).counts, offset + counts, "{light} electrons");
+    }
+    assert_eq!(chain.settings().settling(0), 1.0);
+}
+
+#[test]
+fn over_range_is_set_only_above_full_scale() {
+    let settings = ChainSettings { adc_offset_counts: 1000, ..ChainSettings::ideal() };
+    let mut chain = chain(settings, 0);
+    let full = f32::from(FULL_SCALE_COUNTS - 1000);
+    let at = |counts, over_range| AdcSample { counts, over_range };
+    assert_eq!(chain.sample(full - 1.0), at(FULL_SCALE_COUNTS - 1, false));
+    assert_eq!(chain.sample(full), at(FULL_SCALE_COUNTS, false));
+    assert_eq!(chain.sample(full + 1.0), at(FULL_SCALE_COUNTS, true));
+    assert_eq!(chain.sample(f32::INFINITY), at(FULL_SCALE_COUNTS, true));
+    assert_eq!(chain.sample(0.0), at(1000, false));
+}
+
+#[test]
+fn noise_below_the_range_clips_to_zero_and_is_not_over_range() {
+    let settings = ChainSettings {
+        adc_offset_counts: 0,
+        amplifier_noise_electrons: 500.0,
+        ..ChainSettings::ideal()
+    };
+    let mut chain = chain(settings, 5);
+    let samples: Vec<_> = (0..1000).map(|_| chain.sample(0.0)).collect();
+    assert!(samples.iter().filter(|s| s.counts == 0).count() > 400);
+    assert!(samples.iter().all(|s| !s.over_range));
+}
+
+#[test]
+fn light_that_is_no_number_counts_as_none_and_is_forgotten() {
+    let mut chain = chain(ChainSettings::ideal(), 0);
+    let offset = chain.settings().adc_offset_counts;
+    for light in [f32::NAN, -5.0, f32::NEG_INFINITY] {
+        assert_eq!(chain.sample(light).counts, offset);
+        assert_eq!(chain.sample(7.0).counts, offset + 7);
+    }
+}
+
+#[test]
+fn the_delay_is_exact_at_every_latency() {
+    for latency in 0..=MAX_ADC_LATENCY_CLOCKS {
+        let settings = ChainSettings {
+            adc_latency_clocks: latency,
+            ambient_electrons: 30.0,
+            ..ChainSettings::ideal()
+        };
+        let mut chain = chain(settings, 0);
+        let dark = settings.adc_offset_counts + 30;
+        let latency = u16::from(latency);
+        for clock in 0..200_u16 {
+            let light = 100 + clock;
+            let expected = if clock < latency { dark } else { dark + light - latency };
+            assert_eq!(chain.sample(f32::from(light)).counts, expected, "clock {clock}");
+        }
+    }
+}
+
+#[test]
+fn the_same_seed_gives_the_same_samples_and_another_does_not() {
+    let run = |seed| -> Vec<_> {
+        let mut chain = chain(ChainSettings::default(), seed);
+        (0..500_u16).map(|i| chain.sample(f32::from(i % 40 * 100))).collect()
+    };
+    assert_eq!(run(1), run(1));
+    assert_ne!(run(1), run(2));
+}
+
+#[test]
+fn shot_noise_has_the_variance_of_its_mean() {
+    // 200 000 samples know a variance to sqrt(2 / 200 000) = 0.32 %; four of those.
+    for light in [200.0_f32, 1_000.0, 10_000.0] {
+        let settings = ChainSettings { shot_noise: true, ..ChainSettings::ideal() };
+        let (mean, variance) = statistics(settings, light, 200_000);
+        let (offset, rounding) = (f64::from(settings.adc_offset_counts), 1.0 / 12.0);
+        let light = f64::from(light);
+        let error_of_mean = (light / 200_000.0).sqrt();
+        assert!((mean - offset - light).abs() < 4.0 * error_of_mean, "{mean}");
+        assert!(((variance - rounding) / light - 1.0).abs() < 0.013, "{variance} at {light}");
+    }
+}
+
+#[test]
+fn daylight_adds_its_mean_and_its_noise() {
+    let settings =
+        ChainSettings { shot_noise: true, ambient_electrons: 4_000.0, ..ChainSettings::ideal() };
+    let (mean, variance) = statistics(settings, 1_000.0, 200_000);
+    assert!((mean - 2048.0 - 5_000.0).abs() < 1.0, "{mean}");
+    assert!((variance / 5_000.0 - 1.0).abs() < 0.013, "{variance}");
+}
+
+#[test]
+fn amplifier_noise_is_as_large_as_set_whatever_the_light() {
+    for light in [0.0, 8_000.0] {
+        let settings = ChainSettings { amplifier_noise_electrons: 300.0, ..ChainSettings::ideal() };
+        let (_, variance) = statistics(settings, light, 200_000);
+        assert!((variance / 90_000.0 - 1.0).abs() < 0.013, "{variance}");
+    }
+}
+
+#[test]
+fn amplifier_noise_follows_from_its_current_density() {
+    // 1 pA/sqrt(Hz) over pi/2 * 60 MHz = 9.708 nA; times 8 ns / e = 484.7 electrons.
+    assert!((amplifier_noise_electrons(1.0, 60e6, 8.0) - 484.7).abs() < 0.1);
+}
+
+#[test]
+fn leds_settle_as_fast_as_their_data_sheet_says() {
+    // FACTS.md: a 10 ns LED leaves 3 % after 16 ns, a 20 ns one 7 % after 24 ns.
+    for (led_edge_ns, clocks, left) in [(10.0, 2, 0.030), (20.0, 3, 0.072)] {
+        let settings = ChainSettings { led_edge_ns, ..ChainSettings::ideal() };
+        assert!((1.0 - settings.settling(clocks - 1) - left).abs() < 0.001);
+    }
+}
+
+#[test]
+fn a_dark_receiver_is_never_over_range_at_the_gain_it_chooses() {
+    for distance_mm in [300.0, 1000.0] {
+        let mut settings = ChainSettings::default();
+        settings.electrons_per_count = settings.auto_gain(&budget(distance_mm)).unwrap();
+        let mut chain = chain(settings, 2);
+        for _ in 0..500_000 {
+            let sample = chain.sample(0.0);
+            assert!(!sample.over_range && sample.counts > 0);
+        }
+    }
+}
+
+#[test]
+fn the_gain_chosen_holds_a_white_target_in_daylight_and_uses_the_range() {
+    for distance_mm in [200.0, 300.0, 600.0, 1000.0] {
+        let budget = budget(distance_mm);
+        let mut settings = ChainSettings {
+            ambient_electrons: budget.ambient_electrons(1.0),
+            ..ChainSettings::default()
+        };
+        let gain = settings.auto_gain(&budget).unwrap();
+        settings.electrons_per_count = gain;
+        let mut bright = chain(settings, 3);
+        let all_lit = (budget.electrons_per_led * 1024.0) as f32;
+        assert!((0..200_000).all(|_| !bright.sample(all_lit).over_range), "{distance_mm} mm");
+
+        // The next finer gain does not fit.
+        let steps = GAINS_ELECTRONS_PER_COUNT;
+        let step = steps.iter().position(|&s| s == gain).unwrap();
+        let counts = |electrons: f64| electrons / steps[step - 1];
+        let noise = settings.amplifier_noise_electrons;
+        let top = counts(budget.brightest_electrons() + 6.0 * noise.hypot(170.0)) + 2048.0;
+        assert!(top > 16383.0 || counts(6.0 * noise) > 2048.0, "{distance_mm} mm: {top}");
+    }
+}
+
+#[test]
+fn a_white_target_at_the_focus_fills_most_of_the_adc() {
+    let budget = budget(300.0);
+    let settings = ChainSettings::default();
+    let gain = settings.auto_gain(&budget).unwrap();
+    assert_eq!(gain, settings.electrons_per_count, "the default is the gain for 0.3 m");
+    let counts = 2048.0 + budget.brightest_electrons() / gain;
+    assert!((0.6..0.95).contains(&(counts / 16383.0)), "{counts}");
+}
+
+#[test]
+fn light_that_fits_no_gain_is_refused() {
+    let blinding = Budget { electrons_per_led: 1e9, ..budget(300.0) };
+    let error = ChainSettings::default().auto_gain(&blinding).unwrap_err();
+    assert!(matches!(error, ChainError::NoGain { .. }), "{error}");
+}
+
+#[test]
+fn gains_rise_by_half_octaves() {
+    for pair in GAINS_ELECTRONS_PER_COUNT.windows(2) {
+        assert!((1.3..=1.5).contains(&(pair[1] / pair[0])), "{pair:?}");
+    }
+}
+
+#[test]
+fn settings_out_of_range_are_named() {
+    let default = ChainSettings::default();
+    let cases = [
+        ("sample_ns", ChainSettings { sample_ns: 0.0, ..default }),
+        ("led_edge_ns", ChainSettings { led_edge_ns: -1.0, ..default }),
+        ("amplifier_bandwidth_hz", ChainSettings { amplifier_bandwidth_hz: f64::NAN, ..default }),
+        ("ambient_electrons", ChainSettings { ambient_electrons: f64::INFINITY, ..default }),
+        ("amplifier_noise_electrons", ChainSettings { amplifier_noise_electrons: -1.0, ..default }),
+        ("electrons_per_count", ChainSettings { electrons_per_count: 0.0, ..default }),
+        ("adc_offset_counts", ChainSettings { adc_offset_counts: 16384, ..default }),
+        ("adc_latency_clocks", ChainSettings { adc_latency_clocks: 64, ..default }),
+    ];
+    for (field, settings) in cases {
+        let ChainError::Setting { name, .. } = Chain::new(settings, 0).unwrap_err() else {
+            panic!("{field}: another error");
+        };
+        assert_eq!(name, field);
+    }
+}
+
+proptest! {
+    #[test]
+    fn a_step_settles_as_the_analytic_response_says(
+        led_edge_ns in prop_oneof![Just(0.0), 0.5..40.0],
+        bandwidth_mhz in prop_oneof![Just(f64::INFINITY), 5.0..500.0],
+        light in 1_000.0_f32..14_000.0,
+    ) {
+        let settings = ChainSettings {
+            led_edge_ns,
+            amplifier_bandwidth_hz: bandwidth_mhz * 1e6,
+            ..ChainSettings::ideal()
+        };
+        let mut chain = chain(settings, 0);
+        let offset = f64::from(settings.adc_offset_counts);
+        // up, then down again: the response is linear and has a memory
+        for n in 0..40 {
+            let expected = f64::from(light) * settings.settling(n) + offset;
+            let found = f64::from(chain.sample(light).counts);
+            prop_assert!((found - expected).abs() <= 0.501, "rise {n}: {found}, {expected}");
+        }
+        for n in 0..40 {
+            let left = settings.settling(n + 40) - settings.settling(n);
+            let expected = f64::from(light) * left + offset;
+            let found = f64::from(chain.sample(0.0).counts);
+            prop_assert!((found - expected).abs() <= 0.501, "fall {n}: {found}, {expected}");
+        }
+    }
+
+    #[test]
+    fn equal_poles_settle_like_nearly_equal_ones(edge_ns in 1.0..40.0) {
+        let bandwidth_of = |tau_ns: f64| 1e9 / (std::f64::consts::TAU * tau_ns);
+        let tau_ns = edge_ns / 9.0_f64.ln();
+        let with = |tau_ns| ChainSettings {
+            led_edge_ns: edge_ns,
+            amplifier_bandwidth_hz: bandwidth_of(tau_ns),
+            ..ChainSettings::ideal()
+        };
+        for n in 0..10 {
+            let (equal, near) = (with(tau_ns).settling(n), with(tau_ns * 1.0001).settling(n));
+            prop_assert!((equal - near).abs() < 1e-4);
+        }
+    }
+
+    #[test]
+    fn counts_are_fourteen_bits_whatever_the_light(light: f32, seed: u64) {
+        let mut chain = chain(ChainSettings::default(), seed);
+        for _ in 0..20 {
+            prop_assert!(chain.sample(light).counts <= FULL_SCALE_COUNTS);
+        }
+    }
+}

@@ -1,0 +1,134 @@
+use crate::testing::{Noise, correlation_of, readings, scene, side};
+use crate::{Measurements, reconstruct};
+use proptest::prelude::*;
+
+fn natural(n: u64) -> Vec<i64> {
+    (0..(n * n) as i64).collect()
+}
+
+/// Raw readings of a scene with a dark level, a drifting lamp and noise.
+fn recorded(n: u64, kind: u8, dark: f64, noise: Noise) -> (Vec<i64>, Vec<f64>) {
+    let rows = natural(n);
+    let mut y = readings(side(n), &rows, &scene(side(n), kind));
+    let total = y[0];
+    let count = y.len() as f64;
+    for (i, y) in y.iter_mut().enumerate() {
+        let lamp = 1.0 - 0.2 * (i as f64 / count);
+        *y = noise.of(*y * lamp / total, i as u64) + dark;
+    }
+    (rows, y)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn nothing_is_called_a_dropout_in_a_whole_recording(
+        kind in 0_u8..5, dark in 0.0..0.5, seed: u64, sigma in 0.0..0.3
+    ) {
+        let (rows, y) = recorded(32, kind, dark, Noise::Normal { sigma, seed });
+        let (measured, dropouts) = Measurements::from_pairs(side(32), &rows, &y).unwrap();
+        prop_assert_eq!(dropouts, vec![]);
+        prop_assert_eq!(measured.rows().len(), rows.len());
+    }
+
+    #[test]
+    fn photons_arriving_one_by_one_are_no_dropouts(
+        kind in 0_u8..5, photons in 0.2..200.0, seed: u64
+    ) {
+        let (rows, y) = recorded(32, kind, 0.0, Noise::Poisson { photons, seed });
+        let (_, dropouts) = Measurements::from_pairs(side(32), &rows, &y).unwrap();
+        prop_assert_eq!(dropouts, vec![]);
+    }
+
+    #[test]
+    fn a_run_is_found_where_it_is_and_the_image_survives(
+        kind in 0_u8..3,
+        dark in 0.0..0.3,
+        length in prop_oneof![1_usize..6, 6_usize..=200],
+        place in prop_oneof![Just(0.0), Just(1.0), 0.0..1.0],
+        to_zero: bool,
+        partial in 0.05..0.95,
+        seed: u64,
+    ) {
+        let (rows, whole) = recorded(32, kind, dark, Noise::Normal { sigma: 1e-4, seed });
+        // The first pair is the all-ones pattern: its complement is dark and cannot be missed.
+        let start = 2 + (place * (whole.len() - 2 - length) as f64) as usize;
+        let mut y = whole.clone();
+        let floor = if to_zero { 0.0 } else { dark };
+        y[start..start + length].fill(floor);
+        // The readings beside the run are down by part of their integration time.
+        let (mut first, mut end) = (start, start + length);
+        if start > 2 {
+            first -= 1;
+            y[first] = floor + (whole[first] - floor) * partial;
+        }
+        if end < y.len() {
+            y[end] = floor + (whole[end] - floor) * partial;
+            end += 1;
+        }
+        let (measured, dropouts) = Measurements::from_pairs(side(32), &rows, &y).unwrap();
+        prop_assert_eq!(dropouts.len(), 1);
+        let found = &dropouts[0];
+        prop_assert!(found.start <= start && found.start + found.length >= start + length, "{:?}", found);
+        prop_assert!(found.start + 2 >= first && found.start + found.length <= end + 2, "{:?}", found);
+        for row in &found.rows {
+            prop_assert!(!measured.rows().contains(row));
+        }
+        let (full, _) = Measurements::from_pairs(side(32), &rows, &whole).unwrap();
+        let kept = Measurements::from_differential(
+            side(32),
+            &measured.rows().iter().map(|&r| i64::from(r)).collect::<Vec<_>>(),
+            &measured.rows().iter().map(|&r| full.values()[r as usize]).collect::<Vec<_>>(),
+        ).unwrap();
+        // What is left is what it would have been, except readings a fraction of which leaked in.
+        let worst = measured.values().iter().zip(kept.values()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        prop_assert!(worst < 0.02, "{}", worst);
+        let (a, b) = (reconstruct::hadamard(&measured), reconstruct::hadamard(&kept));
+        prop_assert!(correlation_of(&a, &b) > 0.99);
+    }
+}
+
+#[test]
+fn short_runs_hardly_change_the_image() {
+    let (rows, whole) = recorded(32, 1, 0.1, Noise::Normal { sigma: 1e-4, seed: 1 });
+    let (full, _) = Measurements::from_pairs(side(32), &rows, &whole).unwrap();
+    for start in [301, 700, 1501, 2020] {
+        let mut y = whole.clone();
+        y[start..start + 20].fill(0.0);
+        let (measured, dropouts) = Measurements::from_pairs(side(32), &rows, &y).unwrap();
+        assert_eq!((dropouts[0].start, dropouts[0].length), (start, 20));
+        let (a, b) = (reconstruct::hadamard(&measured), reconstruct::hadamard(&full));
+        assert!(correlation_of(&a, &b) > 0.99, "run at {start}: {}", correlation_of(&a, &b));
+        // The same run left in stripes the image where it cuts a pair in two (whole pairs become zeros).
+        let d: Vec<f64> = y.as_chunks::<2>().0.iter().map(|[p, m]| p - m).collect();
+        let striped = Measurements::from_differential(side(32), &rows, &d).unwrap();
+        let striped = correlation_of(&reconstruct::hadamard(&striped), &b);
+        assert!(
+            start % 2 == 0 || striped < correlation_of(&a, &b) - 0.01,
+            "run at {start}: {striped}"
+        );
+    }
+}
+
+#[test]
+fn two_runs_are_two_and_a_dimming_lamp_is_none() {
+    let (rows, mut y) = recorded(16, 0, 0.0, Noise::Normal { sigma: 1e-3, seed: 5 });
+    y[100..120].iter_mut().for_each(|y| *y *= 0.7);
+    let (_, none) = Measurements::from_pairs(side(16), &rows, &y).unwrap();
+    assert_eq!(none, vec![]);
+    y[31..36].fill(0.0);
+    y[400] = 0.0;
+    let (_, two) = Measurements::from_pairs(side(16), &rows, &y).unwrap();
+    let found: Vec<_> = two.iter().map(|d| (d.start, d.length, d.rows.clone())).collect();
+    assert_eq!(found, [(31, 5, vec![15, 16, 17]), (400, 1, vec![200])]);
+}
+
+#[test]
+fn a_detector_of_negative_polarity_is_the_same_upside_down() {
+    let (rows, mut y) = recorded(16, 0, 0.0, Noise::Normal { sigma: 1e-3, seed: 5 });
+    y[60..70].fill(0.0);
+    y.iter_mut().for_each(|y| *y = -*y);
+    let (_, dropouts) = Measurements::from_pairs(side(16), &rows, &y).unwrap();
+    assert_eq!((dropouts[0].start, dropouts[0].length), (60, 10));
+}

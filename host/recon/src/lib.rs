@@ -1,0 +1,53 @@
+//! Single-pixel reconstruction: from measurements to an image.
+//!
+//! The one law: everything here is a pure function of its arguments. No file, no clock, no thread pool,
+//! no randomness but from a seed that is an argument or a constant.
+//!
+//! | module | turns | into |
+//! |---|---|---|
+//! | [`leak`] | readings that bleed into their neighbours | readings |
+//! | [`Measurements`] | readings or differences, with dropouts found | one number a Hadamard row |
+//! | [`order`] | the name of an order | rows |
+//! | [`fwht`](mod@fwht) | an image | its Hadamard measurements, and back |
+//! | [`basis`] | an image | coefficients, most of them nearly zero |
+//! | [`omp`] | measurements and a dictionary | few coefficients that explain them |
+//! | [`reconstruct`] | measurements | an image |
+//! | [`metrics`] | two images | how alike they are |
+//!
+//! ```
+//! use nirspi_recon::{Measurements, Order, Side, reconstruct};
+//!
+//! let side = Side::new(8)?;
+//! // A scene, and what the instrument measures of it.
+//! let mut d: Vec<f64> = (0..64).map(|p| if p % 8 > 3 { 1.0 } else { 0.0 }).collect();
+//! nirspi_recon::fwht(&mut d)?;
+//! let all = Measurements::from_differential(side, &(0..64).collect::<Vec<_>>(), &d)?;
+//! // A quarter of the patterns are enough for so coarse a scene, if they are the coarse ones.
+//! let quarter = all.take(Some(&Order::CakeCutting), 0.25)?;
+//! let image = reconstruct::hadamard(&quarter);
+//! assert!((image.pixels()[3]).abs() < 1e-6 && (image.pixels()[4] - 1.0).abs() < 1e-6);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+pub mod basis;
+mod dropout;
+pub mod fwht;
+mod image;
+pub mod leak;
+mod measurements;
+pub mod metrics;
+pub mod omp;
+pub mod order;
+pub mod reconstruct;
+mod side;
+#[cfg(test)]
+mod testing;
+
+pub use basis::{Basis, ParseBasisError};
+pub use dropout::Dropout;
+pub use fwht::{FwhtLengthError, fwht};
+pub use image::Image;
+pub use leak::{Leak, LeakError, Sweep};
+pub use measurements::{MeasurementError, Measurements};
+pub use order::{Order, OrderError, ParseOrderError};
+pub use side::{Side, SideError};

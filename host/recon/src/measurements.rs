@@ -1,0 +1,243 @@
+//! Measurements: one number a Hadamard row, with everything of the instrument undone.
+//!
+//! The one law: a [`Measurements`] is always consistent (one finite value for each of its rows, every row
+//! one that its side has, none twice), whatever it was built from.
+
+use crate::dropout::{self, Dropout};
+use crate::{Order, OrderError, Side};
+use thiserror::Error;
+
+/// Signed measurements `value[k] = sum over pixels of H[row[k], p] * x[p]`, in the order in which they
+/// were taken. Rows are those of the natural-order (Sylvester) Hadamard matrix of order `side^2`, each
+/// at most once; values are finite. Rows that were not measured, or were left out, are absent.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Measurements {
+    side: Side,
+    rows: Vec<u32>,
+    values: Vec<f64>,
+}
+
+/// What is wrong with a set of measurements. The caller adds which file they came from.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum MeasurementError {
+    /// Two lists that belong together differ in length.
+    #[error("{field} holds {found} values, expected {expected}")]
+    Length {
+        /// Which list.
+        field: &'static str,
+        /// Its length.
+        found: usize,
+        /// The length the others call for.
+        expected: usize,
+    },
+    /// No measurement at all.
+    #[error("no measurement at all, expected at least one")]
+    Empty,
+    /// A value is NaN or infinite.
+    #[error("{field}[{index}] is {found}, expected a finite number")]
+    NotFinite {
+        /// Which list.
+        field: &'static str,
+        /// Where.
+        index: usize,
+        /// What was found.
+        found: f64,
+    },
+    /// A Hadamard row that this side does not have.
+    #[error("h_row[{index}] is {found}, expected 0 to {last}")]
+    RowOutOfRange {
+        /// Where.
+        index: usize,
+        /// What was found.
+        found: i64,
+        /// The last row there is.
+        last: usize,
+    },
+    /// The same Hadamard row twice.
+    #[error("h_row[{index}] repeats row {row}, first at h_row[{first}]")]
+    RowRepeated {
+        /// Where the second stands.
+        index: usize,
+        /// Where the first stands.
+        first: usize,
+        /// The row.
+        row: u32,
+    },
+    /// A share of the patterns that is none.
+    #[error("a sampling of {found}, expected more than 0 and at most 1")]
+    Fraction {
+        /// What was asked for.
+        found: f64,
+    },
+    /// An order that is no permutation of the rows.
+    #[error(transparent)]
+    Order(#[from] OrderError),
+}
+
+impl Measurements {
+    /// From differences that are already formed: `d[k]` is the reading of pattern `rows[k]` less that of its
+    /// complement (or any signed measurement of that row). Fewer than `side^2` rows are a partial sampling.
+    ///
+    /// # Errors
+    /// [`MeasurementError`] names the list (`d` or `h_row`), the position and what was found.
+    pub fn from_differential(
+        side: Side,
+        rows: &[i64],
+        d: &[f64],
+    ) -> Result<Self, MeasurementError> {
+        expect_length("d", d.len(), rows.len())?;
+        let rows = checked_rows(side, rows)?;
+        expect_finite("d", d)?;
+        Ok(Self { side, rows, values: d.to_vec() })
+    }
+
+    /// From raw readings in time order, a pattern and then its complement: `y = [+, -, +, -, ...]`,
+    /// `2 * rows.len()` of them. A constant dark level cancels in each difference.
+    ///
+    /// Where the detector or its logger fell out for a while ([`Dropout`]), the pairs it touched are absent
+    /// from the result, and named in the list.
+    ///
+    /// # Errors
+    /// [`MeasurementError`] names the list (`y` or `h_row`), the position and what was found; it is
+    /// [`Empty`](MeasurementError::Empty) too if no pair survives.
+    pub fn from_pairs(
+        side: Side,
+        rows: &[i64],
+        y: &[f64],
+    ) -> Result<(Self, Vec<Dropout>), MeasurementError> {
+        expect_length("y", y.len(), 2 * rows.len())?;
+        let rows = checked_rows(side, rows)?;
+        expect_finite("y", y)?;
+        let dropouts = dropout::find(&rows, y);
+        let mut lost = vec![false; rows.len()];
+        for dropout in &dropouts {
+            lost[dropout.pairs()].fill(true);
+        }
+        let (mut kept, mut values) = (Vec::new(), Vec::new());
+        for ((&row, pair), _) in
+            rows.iter().zip(y.as_chunks::<2>().0).zip(&lost).filter(|(_, lost)| !**lost)
+        {
+            kept.push(row);
+            values.push(pair[0] - pair[1]);
+        }
+        if kept.is_empty() {
+            return Err(MeasurementError::Empty);
+        }
+        Ok((Self { side, rows: kept, values }, dropouts))
+    }
+
+    /// From readings of the positive patterns alone (light where `H` is +1): `d[k] = 2 y[k] - S`, where `S`
+    /// is the reading of the all-ones pattern, row 0.
+    ///
+    /// Without row 0 in `rows`, `S` is estimated as twice the mean reading, because the other rows of a
+    /// scene average to nearly zero (exactly so over all of them only if pixel 0 is dark). Row 0 itself
+    /// stays absent then: the image's mean is not known. A dark level, which cannot cancel here,
+    /// must have been subtracted before.
+    ///
+    /// # Errors
+    /// [`MeasurementError`] names the list (`y` or `h_row`), the position and what was found.
+    pub fn from_single(side: Side, rows: &[i64], y: &[f64]) -> Result<Self, MeasurementError> {
+        expect_length("y", y.len(), rows.len())?;
+        let rows = checked_rows(side, rows)?;
+        expect_finite("y", y)?;
+        let all_ones = match rows.iter().position(|&row| row == 0) {
+            Some(k) => y[k],
+            None => 2.0 * y.iter().sum::<f64>() / y.len() as f64,
+        };
+        Ok(Self { side, rows, values: y.iter().map(|y| 2.0 * y - all_ones).collect() })
+    }
+
+    /// The part of these measurements that a shorter sweep would have taken: the first
+    /// `M = round(fraction * side^2)` (halves up, at least 1) of the patterns in the recorded order, or,
+    /// with `order`, the first `M` of that order among the rows that were measured. Fewer than `M` are
+    /// returned only where fewer were measured.
+    ///
+    /// # Errors
+    /// [`MeasurementError::Fraction`] unless `0 < fraction <= 1`; [`MeasurementError::Order`] if the order is
+    /// a table that is no permutation.
+    pub fn take(&self, order: Option<&Order>, fraction: f64) -> Result<Self, MeasurementError> {
+        if !(fraction > 0.0 && fraction <= 1.0) {
+            return Err(MeasurementError::Fraction { found: fraction });
+        }
+        let asked = ((fraction * self.side.area() as f64).round() as usize).max(1);
+        let positions: Vec<usize> = match order {
+            None => (0..self.rows.len()).take(asked).collect(),
+            Some(order) => {
+                let mut position = vec![None; self.side.area()];
+                for (k, &row) in self.rows.iter().enumerate() {
+                    position[row as usize] = Some(k);
+                }
+                let shown = order.rows(self.side)?;
+                shown.into_iter().filter_map(|row| position[row as usize]).take(asked).collect()
+            }
+        };
+        Ok(self.subset(positions))
+    }
+
+    /// The measurements at these positions, in that order.
+    pub(crate) fn subset(&self, positions: impl IntoIterator<Item = usize>) -> Self {
+        let (rows, values) = positions.into_iter().map(|k| (self.rows[k], self.values[k])).unzip();
+        Self { side: self.side, rows, values }
+    }
+
+    /// Side of the image that was measured.
+    #[must_use]
+    pub fn side(&self) -> Side {
+        self.side
+    }
+
+    /// Natural-order Hadamard rows in the order taken, each at most once.
+    #[must_use]
+    pub fn rows(&self) -> &[u32] {
+        &self.rows
+    }
+
+    /// Signed measurements, one for each of [`rows`](Self::rows).
+    #[must_use]
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+}
+
+fn expect_length(
+    field: &'static str,
+    found: usize,
+    expected: usize,
+) -> Result<(), MeasurementError> {
+    if found == expected {
+        Ok(())
+    } else {
+        Err(MeasurementError::Length { field, found, expected })
+    }
+}
+
+fn expect_finite(field: &'static str, values: &[f64]) -> Result<(), MeasurementError> {
+    match values.iter().position(|v| !v.is_finite()) {
+        Some(index) => Err(MeasurementError::NotFinite { field, index, found: values[index] }),
+        None => Ok(()),
+    }
+}
+
+fn checked_rows(side: Side, rows: &[i64]) -> Result<Vec<u32>, MeasurementError> {
+    if rows.is_empty() {
+        return Err(MeasurementError::Empty);
+    }
+    let last = side.area() - 1;
+    let mut first_at = vec![None; side.area()];
+    let mut checked = Vec::with_capacity(rows.len());
+    for (index, &found) in rows.iter().enumerate() {
+        let row = usize::try_from(found)
+            .ok()
+            .filter(|&row| row <= last)
+            .ok_or(MeasurementError::RowOutOfRange { index, found, last })?;
+        if let Some(first) = first_at[row].replace(index) {
+            return Err(MeasurementError::RowRepeated { index, first, row: row as u32 });
+        }
+        checked.push(row as u32);
+    }
+    Ok(checked)
+}
+
+#[cfg(test)]
+mod tests;

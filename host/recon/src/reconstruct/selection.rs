@@ -1,0 +1,150 @@
+//! How many atoms, and how far to trust what they predict: asked of measurements that were held back.
+//!
+//! The one law: a prediction is judged only on rows it has not seen.
+
+use super::Problem;
+use crate::omp::OmpError;
+use crate::{Order, Side};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+/// What cross-validation chose.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Choice {
+    pub atoms: usize,
+    /// Factor on the prediction for rows that were not measured.
+    pub trust: f32,
+}
+
+/// Factors that are tried. A coarse grid: the error is flat around its minimum.
+const TRUST: [f32; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
+/// Numbers of atoms that are tried, evenly spaced in their logarithm.
+const SPARSITIES: usize = 10;
+/// Splits the measurements into folds; the split is part of the result, so it never changes.
+const SPLIT_SEED: u64 = 0x5eed;
+
+/// Absolute prediction error of each number of atoms and each trust.
+type Errors = Vec<[f64; TRUST.len()]>;
+
+/// The number of atoms, up to `most` and a quarter of the measurements, and the trust with the least
+/// sum of *absolute* errors over `folds` held-back parts. (Squares would let a few large coefficients decide.)
+pub(super) fn choose(problem: &Problem, most: usize, folds: usize) -> Result<Choice, OmpError> {
+    let count = problem.rows.len();
+    let largest = most.min(count / 4).max(1);
+    let sparsities = geometric(largest);
+    let fold_of = split(problem, folds);
+    let parts: Vec<(Vec<usize>, Vec<usize>)> = (0..folds)
+        .map(|fold| (0..count).partition(|&k| fold_of[k] != Some(fold)))
+        .filter(|(kept, held): &(Vec<_>, Vec<_>)| !kept.is_empty() && !held.is_empty())
+        .collect();
+    if parts.is_empty() {
+        return Ok(Choice { atoms: largest, trust: 0.0 });
+    }
+    let results: Vec<Result<Errors, OmpError>> = std::thread::scope(|scope| {
+        let workers: Vec<_> = parts
+            .iter()
+            .map(|(kept, held)| scope.spawn(|| fold_errors(problem, kept, held, &sparsities)))
+            .collect();
+        workers
+            .into_iter()
+            .map(|w| w.join().unwrap_or_else(|p| std::panic::resume_unwind(p)))
+            .collect()
+    });
+    let mut total: Errors = vec![[0.0; TRUST.len()]; sparsities.len()];
+    for errors in results {
+        for (total, errors) in total.iter_mut().zip(errors?) {
+            for (total, error) in total.iter_mut().zip(errors) {
+                *total += error;
+            }
+        }
+    }
+    let mut best = (Choice { atoms: sparsities[0], trust: 0.0 }, total[0][0]);
+    for (&atoms, errors) in sparsities.iter().zip(&total) {
+        for (&trust, &error) in TRUST.iter().zip(errors) {
+            if error < best.1 {
+                best = (Choice { atoms, trust }, error);
+            }
+        }
+    }
+    Ok(best.0)
+}
+
+fn fold_errors(
+    problem: &Problem,
+    kept: &[usize],
+    held: &[usize],
+    sparsities: &[usize],
+) -> Result<Errors, OmpError> {
+    let largest = sparsities.iter().copied().max().unwrap_or(0);
+    let (path, gram) = problem.pursue(kept, largest)?;
+    let error_of = |&atoms: &usize| {
+        let predicted =
+            gram.predict(&path.support[..atoms.min(path.support.len())], &path.coefficients(atoms));
+        TRUST.map(|trust| {
+            let error = |&k: &usize| {
+                let row = problem.rows[k] as usize;
+                f64::from((problem.values[k] - trust * predicted[row]).abs())
+            };
+            held.iter().map(error).sum()
+        })
+    };
+    Ok(sparsities.iter().map(error_of).collect())
+}
+
+/// Which fold holds each measurement back; none for the all-ones row, the mean, which nothing else can predict.
+/// Neighbours in sequency go to different folds, so that each fold misses rows of every scale.
+fn split(problem: &Problem, folds: usize) -> Vec<Option<usize>> {
+    let mut random = Pcg64::seed_from_u64(SPLIT_SEED);
+    let mut fold_of = vec![None; problem.rows.len()];
+    let by_sequency = positions_by_sequency(problem.side, problem.rows);
+    for group in by_sequency.chunks(folds) {
+        let mut free: Vec<usize> = (0..folds).collect();
+        for &k in group {
+            fold_of[k] = Some(free.swap_remove(random.random_range(..free.len())));
+        }
+    }
+    fold_of
+}
+
+/// Positions of the rows but the all-ones one, in ascending sequency (along the zig-zag).
+fn positions_by_sequency(side: Side, rows: &[u32]) -> Vec<usize> {
+    let mut rank = vec![0; side.area()];
+    // A named order always exists.
+    for (k, row) in Order::ZigZag.rows(side).unwrap_or_default().into_iter().enumerate() {
+        rank[row as usize] = k;
+    }
+    let mut positions: Vec<usize> = (0..rows.len()).filter(|&k| rows[k] != 0).collect();
+    positions.sort_by_key(|&k| rank[rows[k] as usize]);
+    positions
+}
+
+/// Standard deviations of a normal distribution in its median magnitude.
+const SIGMAS_PER_MEDIAN: f32 = 1.4826;
+
+/// Noise of `f32` transforms, in units of the largest measurement: simulated scenes may have no other.
+const ROUNDING: f32 = 1e-6;
+
+/// Noise of a measurement: the median magnitude over the quarter of the rows (at least eight) of highest
+/// sequency. Detail of the scene is in there too: what it returns is the level under which a coefficient cannot
+/// be told from its neighbours, an upper bound of the noise.
+pub(super) fn noise_level(side: Side, rows: &[u32], values: &[f32]) -> f32 {
+    let positions = positions_by_sequency(side, rows);
+    let count = (positions.len() / 4).max(8).min(positions.len());
+    let mut magnitudes: Vec<f32> =
+        positions[positions.len() - count..].iter().map(|&k| values[k].abs()).collect();
+    if magnitudes.is_empty() {
+        return 0.0;
+    }
+    let middle = count / 2;
+    let median = *magnitudes.select_nth_unstable_by(middle, f32::total_cmp).1;
+    (SIGMAS_PER_MEDIAN * median).max(ROUNDING)
+}
+
+/// Numbers from 1 to `largest`, evenly spaced in their logarithm, each once.
+fn geometric(largest: usize) -> Vec<usize> {
+    let step = (largest as f64).ln() / (SPARSITIES - 1) as f64;
+    let mut numbers: Vec<usize> =
+        (0..SPARSITIES).map(|i| (step * i as f64).exp().round() as usize).collect();
+    numbers.dedup();
+    numbers
+}

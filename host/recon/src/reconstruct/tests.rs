@@ -1,0 +1,161 @@
+use super::*;
+use crate::testing::{array, correlation_of, measured, real_data, scene, side};
+
+fn opar() -> Option<Measurements> {
+    let mut file = real_data("opar_ala1.npz")?;
+    let rows: Vec<i64> = array::<i32>(&mut file, "h_row").into_iter().map(i64::from).collect();
+    let y: Vec<f64> = array::<f32>(&mut file, "y").into_iter().map(f64::from).collect();
+    let (measurements, dropouts) = Measurements::from_pairs(side(64), &rows, &y).unwrap();
+    assert_eq!(dropouts, vec![], "its own description says that nothing dropped out");
+    Some(measurements)
+}
+
+fn car(detector: usize) -> Option<Measurements> {
+    let mut file = real_data("scheidt_car.npz")?;
+    let rows: Vec<i64> = array::<i32>(&mut file, "h_row").into_iter().map(i64::from).collect();
+    let d: Vec<f64> = array::<i32>(&mut file, "d").into_iter().map(f64::from).collect();
+    let d = &d[detector * 1024..(detector + 1) * 1024];
+    Some(Measurements::from_differential(side(32), &rows, d).unwrap())
+}
+
+/// Correlations with the full image: zero filling, then OMP.
+fn against_full(all: &Measurements, part: &Measurements, basis: Basis) -> (f64, f64) {
+    let full = hadamard(all);
+    let settings = OmpSettings { basis, ..OmpSettings::default() };
+    let sparse = omp(part, &settings).unwrap();
+    (correlation_of(&hadamard(part), &full), correlation_of(&sparse.image, &full))
+}
+
+#[test]
+fn the_public_wing_comes_out_as_its_authors_have_it() {
+    let Some(all) = opar() else { return };
+    let mut file = real_data("opar_ala1.npz").unwrap();
+    let recon = Image::new(side(64), array::<f32>(&mut file, "recon"));
+    assert!(correlation_of(&hadamard(&all), &recon) > 0.9999);
+    let shown = Order::ZigZag.rows(side(64)).unwrap();
+    assert_eq!(shown, all.rows(), "our zig-zag is its order");
+}
+
+#[test]
+fn omp_beats_zero_filling_on_real_measurements() {
+    if let Some(all) = opar() {
+        let (zero, sparse) = against_full(&all, &all.take(None, 0.3).unwrap(), Basis::Dct);
+        assert!(sparse > zero + 0.015, "wing, DCT: {sparse} against {zero}");
+        let (zero, sparse) = against_full(&all, &all.take(None, 0.3).unwrap(), Basis::Haar);
+        assert!(sparse > zero - 0.002, "wing, Haar: {sparse} against {zero}");
+    }
+    if let Some(all) = car(0) {
+        let order = default_selection(all.rows());
+        let part = all.take(order.as_ref(), 0.3).unwrap();
+        let (zero, sparse) = against_full(&all, &part, Basis::Dct);
+        assert!(sparse > zero, "car, DCT: {sparse} against {zero}");
+        let (zero, sparse) = against_full(&all, &part, Basis::Haar);
+        assert!(sparse > zero - 0.002, "car, Haar: {sparse} against {zero}");
+    }
+}
+
+#[test]
+fn only_a_natural_recording_is_reordered() {
+    let natural: Vec<u32> = (0..64).filter(|r| *r != 20).collect();
+    assert_eq!(default_selection(&natural), Some(Order::ZigZag));
+    for order in [Order::ZigZag, Order::Sequency, Order::Random(1)] {
+        assert_eq!(default_selection(&order.rows(side(8)).unwrap()), None);
+    }
+    assert_eq!(default_selection(&[]), None);
+}
+
+#[test]
+fn a_full_sweep_is_inverted_exactly_by_every_method() {
+    let image = scene(side(16), 1);
+    let all = measured(side(16), &image);
+    let exact = Image::new(side(16), image.iter().map(|&v| v as f32).collect());
+    for found in [hadamard(&all), omp(&all, &OmpSettings::default()).unwrap().image] {
+        for (a, b) in found.pixels().iter().zip(exact.pixels()) {
+            assert!((a - b).abs() < 1e-4);
+        }
+    }
+}
+
+#[test]
+fn what_was_measured_is_kept_and_any_side_and_share_gives_an_image() {
+    for n in [2, 8, 16, 32] {
+        let all = measured(side(n), &scene(side(n), 2));
+        for share in [0.01, 0.05, 0.3, 0.9, 1.0] {
+            for order in [Order::ZigZag, Order::Random(4)] {
+                let part = all.take(Some(&order), share).unwrap();
+                for basis in [Basis::Dct, Basis::Haar, Basis::Pixel] {
+                    let settings = OmpSettings { basis, ..OmpSettings::default() };
+                    let found = omp(&part, &settings).unwrap();
+                    assert!(found.image.pixels().iter().all(|p| p.is_finite()));
+                    let mut back: Vec<f64> =
+                        found.image.pixels().iter().map(|&p| p.into()).collect();
+                    fwht(&mut back).unwrap();
+                    for (&row, value) in part.rows().iter().zip(part.values()) {
+                        assert!((back[row as usize] - value).abs() < 1e-3 * n as f64);
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_sparse_image_is_recovered_from_a_random_half() {
+    let side = side(16);
+    let transform = Transform::new(Basis::Dct, side);
+    let mut coefficients = vec![0.0_f32; 256];
+    for (atom, value) in [(3, 6.0), (37, 4.0), (39, -3.0), (18, 2.5), (121, 2.0)] {
+        coefficients[atom] = value;
+    }
+    transform.synthesise(&mut coefficients);
+    let image: Vec<f64> = coefficients.iter().map(|&v| v.into()).collect();
+    let part = measured(side, &image).take(Some(&Order::Random(3)), 0.5).unwrap();
+    let found = omp(&part, &OmpSettings::as_printed(Basis::Dct, 5)).unwrap();
+    for (a, b) in found.image.pixels().iter().zip(&coefficients) {
+        assert!((a - b).abs() < 1e-3);
+    }
+    assert!(found.residual < 1e-3);
+}
+
+#[test]
+fn units_do_not_matter() {
+    let image = scene(side(16), 1);
+    let volts = measured(side(16), &image).take(Some(&Order::CakeCutting), 0.3).unwrap();
+    let settings = OmpSettings::default();
+    let found = omp(&volts, &settings).unwrap();
+    for factor in [1e-15, 1e15] {
+        let rows: Vec<i64> = volts.rows().iter().map(|&r| r.into()).collect();
+        let values: Vec<f64> = volts.values().iter().map(|v| v * factor).collect();
+        let other = Measurements::from_differential(side(16), &rows, &values).unwrap();
+        let other = omp(&other, &settings).unwrap();
+        assert_eq!((other.sparsity, other.trust), (found.sparsity, found.trust));
+        assert!((other.noise / factor / found.noise - 1.0).abs() < 1e-5);
+        for (a, b) in other.image.pixels().iter().zip(found.image.pixels()) {
+            assert!((f64::from(*a) / factor - f64::from(*b)).abs() < 1e-5);
+        }
+    }
+}
+
+#[test]
+fn darkness_reconstructs_to_darkness() {
+    let part = measured(side(8), &[0.0; 64]).take(None, 0.5).unwrap();
+    for settings in [OmpSettings::default(), OmpSettings::as_printed(Basis::Haar, 9)] {
+        let found = omp(&part, &settings).unwrap();
+        assert!(found.image.pixels().iter().all(|&p| p == 0.0));
+        assert_eq!((found.residual, found.trust * 0.0), (0.0, 0.0));
+    }
+}
+
+#[test]
+fn settings_that_make_no_sense_are_named() {
+    let part = measured(side(8), &scene(side(8), 0));
+    let sound = OmpSettings::default();
+    let refused = |settings: OmpSettings| omp(&part, &settings).unwrap_err().to_string();
+    assert!(refused(OmpSettings { falloff: f64::NAN, ..sound }).starts_with("falloff is NaN"));
+    assert!(refused(OmpSettings { visibility: 1.0, ..sound }).starts_with("visibility is 1"));
+    assert!(refused(OmpSettings { residual: -1.0, ..sound }).contains("residual limit of -1"));
+    let noise = NoiseLevel::Known(-0.5);
+    assert!(refused(OmpSettings { noise, ..sound }).starts_with("noise is -0.5"));
+    let sparsity = Sparsity::CrossValidated { most: 5, folds: 1 };
+    assert!(refused(OmpSettings { sparsity, ..sound }).starts_with("folds is 1"));
+}

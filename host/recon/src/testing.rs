@@ -1,0 +1,120 @@
+//! Scenes, instruments and yardsticks that several test modules share.
+
+use crate::{Image, Measurements, Side, fwht};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use std::path::PathBuf;
+
+pub(crate) fn side(n: u64) -> Side {
+    Side::new(n).unwrap()
+}
+
+/// 0 random, 1 blobs and an edge, 2 a letter-like figure, 3 a point, 4 flat.
+pub(crate) fn scene(side: Side, kind: u8) -> Vec<f64> {
+    let n = side.pixels();
+    let mut random = Pcg64::seed_from_u64(7);
+    (0..side.area())
+        .map(|p| {
+            let (r, c) = ((p / n) as f64 / n as f64, (p % n) as f64 / n as f64);
+            match kind {
+                0 => random.random::<f64>(),
+                1 => {
+                    let blob = (-((r - 0.3).powi(2) + (c - 0.6).powi(2)) / 0.02).exp();
+                    0.1 + blob + if c + 0.5 * r < 0.45 { 0.4 } else { 0.0 }
+                }
+                2 => {
+                    let stem = (0.2..0.8).contains(&r) && (0.3..0.42).contains(&c);
+                    let bar = (0.2..0.32).contains(&r) && (0.3..0.75).contains(&c);
+                    0.05 + if stem || bar { 0.9 } else { 0.0 }
+                }
+                3 => f64::from(p == side.area() / 3),
+                _ => 0.5,
+            }
+        })
+        .collect()
+}
+
+/// What a perfect detector reads: pattern, complement, pattern, ...
+pub(crate) fn readings(side: Side, rows: &[i64], scene: &[f64]) -> Vec<f64> {
+    let total: f64 = scene.iter().sum();
+    let mut d = scene.to_vec();
+    assert_eq!(d.len(), side.area());
+    fwht(&mut d).unwrap();
+    rows.iter()
+        .flat_map(|&r| [(total + d[r as usize]) / 2.0, (total - d[r as usize]) / 2.0])
+        .collect()
+}
+
+/// All of a scene's measurements, in natural order.
+pub(crate) fn measured(side: Side, scene: &[f64]) -> Measurements {
+    let rows: Vec<i64> = (0..side.area() as i64).collect();
+    let mut d = scene.to_vec();
+    fwht(&mut d).unwrap();
+    Measurements::from_differential(side, &rows, &d).unwrap()
+}
+
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Noise {
+    /// In units of the brightest reading.
+    Normal { sigma: f64, seed: u64 },
+    /// Photons in the brightest reading.
+    Poisson { photons: f64, seed: u64 },
+}
+
+impl Noise {
+    /// Reading `index`, of this mean, with its noise.
+    pub(crate) fn of(self, mean: f64, index: u64) -> f64 {
+        match self {
+            Self::Normal { sigma, seed } => mean + sigma * normal(&mut stream(seed, index)),
+            Self::Poisson { photons, seed } => {
+                let mut random = stream(seed, index);
+                let (mut product, mut count) = (1.0, -1.0);
+                let limit = (-photons * mean).exp();
+                while product >= limit {
+                    product *= random.random::<f64>();
+                    count += 1.0;
+                }
+                count
+            }
+        }
+    }
+}
+
+fn stream(seed: u64, index: u64) -> Pcg64 {
+    Pcg64::new(u128::from(seed) << 64 | u128::from(index), 1)
+}
+
+/// A standard normal number (Box and Muller).
+pub(crate) fn normal(random: &mut Pcg64) -> f64 {
+    let (u, v): (f64, f64) = (1.0 - random.random::<f64>(), random.random());
+    (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()
+}
+
+pub(crate) fn correlation_of(a: &Image, b: &Image) -> f64 {
+    let n = a.side().pixels();
+    crate::metrics::correlation(a.pixels(), b.pixels(), n, n).unwrap()
+}
+
+/// A file of real measurements, or `None` (said aloud) where this machine has none.
+pub(crate) fn real_data(
+    name: &str,
+) -> Option<npyz::npz::NpzArchive<std::io::BufReader<std::fs::File>>> {
+    let root = std::env::var_os("NIRSPI_DATA").map_or_else(
+        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"),
+        PathBuf::from,
+    );
+    let path = root.join("spi").join(name);
+    if !path.exists() {
+        eprintln!("skipped: no data ({} not found)", path.display());
+        return None;
+    }
+    Some(npyz::npz::NpzArchive::open(path).unwrap())
+}
+
+/// One array of such a file, row-major.
+pub(crate) fn array<T: npyz::Deserialize>(
+    archive: &mut npyz::npz::NpzArchive<std::io::BufReader<std::fs::File>>,
+    name: &str,
+) -> Vec<T> {
+    archive.by_name(name).unwrap().unwrap().into_vec().unwrap()
+}

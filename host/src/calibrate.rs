@@ -1,0 +1,260 @@
+//! ADC latency and settling response, measured from a raw burst.
+//!
+//! All LEDs go on and off every [`HALF_PERIOD`] ADC clocks (pattern 0 and its complement). The mean of the
+//! periods is the camera's step response `s[n]`, `n` clocks after the step: 0 before the light has passed
+//! LEDs, amplifier and ADC, 1 when all has settled. The clock at which it leaves 0 is the latency. What a
+//! pattern leaves in the slots after it (the leak) follows for any dwell and blanking.
+
+use crate::session::{Listener, Session, SessionError};
+use crate::setup::MeasurementSetup;
+use nirspi_recon::{Leak, LeakError};
+use nirspi_wire::register::RAW_SAMPLES_MAX;
+use nirspi_wire::{Command, DeviceMessage, PacketError, Raw};
+use serde::{Deserialize, Serialize};
+use std::time::{Duration, Instant};
+use thiserror::Error;
+
+/// Clocks that the LEDs stay on, and off, in the calibration burst: 1 us.
+pub const HALF_PERIOD: u16 = 128;
+/// The step must stand out of the noise of its mean by this factor.
+const MIN_STEP_TO_NOISE: f64 = 20.0;
+/// The response has left zero when it is above this share of the step.
+const ONSET: f64 = 0.05;
+/// The response has settled where the mean of this many samples is within its noise of 1.
+const SETTLED_SAMPLES: usize = 4;
+/// Bursts that are averaged: 2 ms of light bring the taps' noise to about a thousandth.
+pub const BURSTS: usize = 64;
+
+/// The measured response of LEDs, amplifier and ADC.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Settling {
+    /// Whole clocks from light to sample.
+    pub adc_latency: u8,
+    /// Step response by clock, from the first sample that shows the step to where it has settled at 1.
+    pub response: Vec<f64>,
+    /// All LEDs on, less all off.
+    pub step_counts: f64,
+    /// Standard deviation of one sample.
+    pub noise_counts: f64,
+}
+
+/// Why a burst gives no calibration.
+#[derive(Debug, Error)]
+pub enum CalibrationError {
+    /// The conversation ended.
+    #[error(transparent)]
+    Session(#[from] SessionError),
+    /// Not all of the burst came.
+    #[error("only {found} of {expected} samples of the calibration burst came")]
+    Incomplete {
+        /// Samples received.
+        found: usize,
+        /// Samples asked for.
+        expected: usize,
+    },
+    /// No light, no step.
+    #[error(
+        "no step in the calibration burst: {step_counts:.1} ADC counts with a noise of {noise_counts:.1}"
+    )]
+    NoStep {
+        /// All LEDs on, less all off.
+        step_counts: f64,
+        /// Standard deviation of one sample.
+        noise_counts: f64,
+    },
+    /// The response is not one that can be undone.
+    #[error(transparent)]
+    Leak(#[from] LeakError),
+}
+
+/// The setup under which the burst is taken.
+fn burst_setup() -> MeasurementSetup {
+    MeasurementSetup {
+        order: "calibration".to_owned(),
+        rows: vec![0],
+        differential: true,
+        clocks_per_pattern: HALF_PERIOD,
+        blanked: 0,
+        adc_latency: 0,
+        sweeps: 1,
+    }
+}
+
+struct BurstListener<'l> {
+    samples: Vec<Option<u16>>,
+    inner: &'l mut dyn Listener,
+}
+
+impl Listener for BurstListener<'_> {
+    fn packet(&mut self, raw: &[u8], content: &Result<DeviceMessage<'_>, PacketError>) {
+        self.inner.packet(raw, content);
+        if let Ok(DeviceMessage::Raw(Raw { first_clock, samples, .. })) = content {
+            let places = self.samples.iter_mut().skip(usize::from(*first_clock));
+            for (place, sample) in places.zip(samples.iter()) {
+                *place = Some(sample & nirspi_wire::ADC_MAX);
+            }
+        }
+    }
+}
+
+/// Takes raw bursts and evaluates their mean. The camera must be idle or configured; it is left configured for the
+/// burst.
+///
+/// # Errors
+/// [`CalibrationError`]; with [`NoStep`](CalibrationError::NoStep) a measurement is still possible.
+pub fn calibrate(
+    session: &mut Session,
+    listener: &mut dyn Listener,
+) -> Result<Settling, CalibrationError> {
+    let expected = usize::from(RAW_SAMPLES_MAX);
+    burst_setup().with_configuration(|c| session.command(Command::Configure(c), listener))?;
+    let mut samples = Vec::with_capacity(BURSTS * expected);
+    for _ in 0..BURSTS {
+        let mut burst = BurstListener { samples: vec![None; expected], inner: listener };
+        session.command(Command::RawBurst { samples: RAW_SAMPLES_MAX }, &mut burst)?;
+        let deadline = Instant::now() + Duration::from_secs(2);
+        while burst.samples.iter().any(Option::is_none) && Instant::now() < deadline {
+            session.listen(Duration::from_millis(50), &mut burst)?;
+        }
+        let before = samples.len();
+        samples.extend(burst.samples.iter().flatten().map(|&s| f64::from(s)));
+        let found = samples.len() - before;
+        if found < expected {
+            return Err(CalibrationError::Incomplete { found, expected });
+        }
+    }
+    evaluate(&samples)
+}
+
+/// Mean over all periods but the first of each burst, then step response and latency.
+fn evaluate(samples: &[f64]) -> Result<Settling, CalibrationError> {
+    let half = usize::from(HALF_PERIOD);
+    let period = 2 * half;
+    // The first period of a burst starts from dark and unsettled.
+    let bursts = samples.chunks_exact(usize::from(RAW_SAMPLES_MAX));
+    let periods: Vec<&[f64]> =
+        bursts.flat_map(|burst| burst.chunks_exact(period).skip(1)).collect();
+    let count = periods.len() as f64;
+    let mean: Vec<f64> =
+        (0..period).map(|n| periods.iter().map(|p| p[n]).sum::<f64>() / count).collect();
+    let variance =
+        periods.iter().flat_map(|p| p.iter().zip(&mean).map(|(s, m)| (s - m).powi(2))).sum::<f64>()
+            / ((count - 1.0) * period as f64);
+    let noise_counts = variance.sqrt();
+
+    // The response is periodic, so its extremes are the settled levels wherever the latency puts them.
+    let settled = 16;
+    let level = |from: usize| -> f64 {
+        (0..settled).map(|n| mean[(from + n) % period]).sum::<f64>() / settled as f64
+    };
+    let high = (0..period).map(level).fold(f64::NEG_INFINITY, f64::max);
+    let low = (0..period).map(level).fold(f64::INFINITY, f64::min);
+    let step_counts = high - low;
+    let noise_of_mean = (noise_counts / count.sqrt()).max(0.5 / count.sqrt());
+    if step_counts < MIN_STEP_TO_NOISE * noise_of_mean {
+        return Err(CalibrationError::NoStep { step_counts, noise_counts });
+    }
+
+    // On and off must mirror each other in a linear chain; their mean halves the noise.
+    let response_at = |n: usize| {
+        let on = (mean[n % period] - low) / step_counts;
+        let off = (mean[(n + half) % period] - low) / step_counts;
+        f64::midpoint(on, 1.0 - off)
+    };
+    let onset = ONSET.max(5.0 * noise_of_mean / step_counts);
+    let latency = (0..half)
+        .find(|&n| response_at(n) > onset && response_at((n + period - 1) % period) <= onset)
+        .unwrap_or(0);
+    let mut response: Vec<f64> = (0..half).map(|n| response_at(latency + n)).collect();
+    // Past the point where it has settled, a response is noise: every tap made of that would add to the image's.
+    let noise_of_response = noise_of_mean / step_counts / std::f64::consts::SQRT_2;
+    let noise_of_window = noise_of_response / (SETTLED_SAMPLES as f64).sqrt();
+    let settled = response.windows(SETTLED_SAMPLES).position(|window| {
+        let mean = window.iter().sum::<f64>() / SETTLED_SAMPLES as f64;
+        (1.0 - mean).abs() < 2.0 * noise_of_window
+    });
+    if let Some(settled) = settled {
+        response.truncate(settled);
+    }
+    Ok(Settling { adc_latency: latency as u8, response, step_counts, noise_counts })
+}
+
+impl Settling {
+    /// Share of a slot's light that is read in its own slot and in each one after it.
+    ///
+    /// # Errors
+    /// If nothing, or next to nothing, of a slot's light is read in its own slot.
+    pub fn leak(&self, clocks_per_pattern: u16, blanked: u16) -> Result<Leak, LeakError> {
+        let dwell = i64::from(clocks_per_pattern);
+        let step = |n: i64| -> f64 {
+            match usize::try_from(n) {
+                Err(_) => 0.0,
+                Ok(n) => self.response.get(n).copied().unwrap_or(1.0),
+            }
+        };
+        let window = i64::from(blanked)..dwell;
+        let samples = (window.end - window.start) as f64;
+        let slots = self.response.len() as i64 / dwell + 1;
+        let mut taps: Vec<f64> = (0..=slots + 1)
+            .map(|slot| {
+                let passed = |n: i64| step(n + slot * dwell) - step(n + (slot - 1) * dwell);
+                window.clone().map(passed).sum::<f64>() / samples
+            })
+            .collect();
+        // The slots after the response's last sample hold nothing.
+        while taps.len() > 1 && taps.last() == Some(&0.0) {
+            taps.pop();
+        }
+        Leak::new(taps)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A chain of two poles behind a delay, in ADC counts.
+    fn burst(latency: usize, step: f64, pole: f64) -> Vec<f64> {
+        let (mut led, mut amplifier) = (0.0, 0.0);
+        let light = |n: usize| if n / usize::from(HALF_PERIOD) % 2 == 0 { step } else { 0.0 };
+        let settled: Vec<f64> = (0..usize::from(RAW_SAMPLES_MAX))
+            .map(|n| {
+                led += (light(n) - led) * pole;
+                amplifier += (led - amplifier) * pole;
+                200.0 + amplifier
+            })
+            .collect();
+        let mut samples = vec![200.0; latency];
+        samples.extend(&settled[..settled.len() - latency]);
+        samples
+    }
+
+    #[test]
+    fn latency_and_response_of_a_known_chain_are_found() {
+        for latency in [0, 1, 7, 30, 63] {
+            let settling = evaluate(&burst(latency, 9000.0, 0.8)).unwrap();
+            assert_eq!(usize::from(settling.adc_latency), latency);
+            assert!((settling.step_counts - 9000.0).abs() < 1.0);
+            let expected = 0.8 * 0.8;
+            assert!(
+                (settling.response[0] - expected).abs() < 1e-6,
+                "{:?}",
+                &settling.response[..4]
+            );
+        }
+    }
+
+    #[test]
+    fn the_taps_share_out_all_of_the_light() {
+        let settling = evaluate(&burst(5, 9000.0, 0.5)).unwrap();
+        let leak = settling.leak(5, 2).unwrap();
+        assert!((leak.taps().iter().sum::<f64>() - 1.0).abs() < 1e-4, "{:?}", leak.taps());
+        assert!(leak.taps()[1] > 0.01);
+    }
+
+    #[test]
+    fn darkness_is_no_step() {
+        let error = evaluate(&vec![200.0; usize::from(RAW_SAMPLES_MAX)]).unwrap_err();
+        assert!(matches!(error, CalibrationError::NoStep { .. }));
+    }
+}

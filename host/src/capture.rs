@@ -1,0 +1,315 @@
+//! Capture: greet, calibrate, configure, start, and account for every frame until the run ends.
+//!
+//! The one law: whatever ends a capture (its length, the user, the camera, the link), what has come is kept
+//! and the counters say what has not.
+
+use crate::account::{LossAccount, LossCounters};
+use crate::calibrate::{CalibrationError, Settling, calibrate};
+use crate::integrate::Integrated;
+use crate::recording::Recorder;
+use crate::session::{ANSWER_TIMEOUT, Deaf, Listener, Session, SessionError};
+use crate::setup::MeasurementSetup;
+use nirspi_wire::{
+    Answer, Command, DeviceMessage, EventKind, Fault, Frame, PacketError, Reply, RunLength, State,
+    Status,
+};
+use std::io;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+use thiserror::Error;
+
+/// How often the camera hears from a host that has nothing to say.
+const KEEP_ALIVE: Duration = Duration::from_secs(1);
+/// A camera that says it has stopped, and sends nothing more for this long, has stopped.
+const QUIET: Duration = Duration::from_secs(1);
+
+/// What to capture.
+#[derive(Debug, Clone)]
+pub struct CaptureOptions {
+    /// The measurement. Its latency is replaced by the one that calibration finds.
+    pub setup: MeasurementSetup,
+    /// Frames to make; `None` goes on until stopped.
+    pub frames: Option<u32>,
+    /// Whether to measure latency and settling first.
+    pub calibrate: bool,
+    /// Where to record.
+    pub record: Option<PathBuf>,
+}
+
+/// How far a capture has come.
+#[derive(Debug, Clone, Copy)]
+pub struct Progress {
+    /// The counters so far.
+    pub counters: LossCounters,
+    /// Since the start of the run.
+    pub elapsed: Duration,
+}
+
+/// What ended a capture.
+#[derive(Debug)]
+pub enum Ended {
+    /// All frames asked for were made.
+    Complete,
+    /// The user has stopped it.
+    Stopped,
+    /// The camera switched its LEDs off.
+    Fault(Fault),
+    /// The camera went away. What it made after the last frame that came is not known.
+    LinkLost(SessionError),
+}
+
+/// What a capture brought.
+#[derive(Debug)]
+pub struct Capture {
+    /// The setup as measured.
+    pub setup: MeasurementSetup,
+    /// The camera's response, where it was measured.
+    pub settling: Option<Settling>,
+    /// Why it could not be.
+    pub calibration_problem: Option<CalibrationError>,
+    /// The sum of all frames received.
+    pub integrated: Integrated,
+    /// The four counters.
+    pub counters: LossCounters,
+    /// Damaged packets of any kind.
+    pub damaged_packets: u64,
+    /// Frames that came twice.
+    pub repeated: u64,
+    /// The camera's own view at the end.
+    pub status: Option<Status>,
+    /// What ended it.
+    pub ended: Ended,
+    /// From start to end of the run.
+    pub elapsed: Duration,
+}
+
+/// Why a capture brought nothing at all.
+#[derive(Debug, Error)]
+pub enum CaptureError {
+    /// The camera would not talk or not measure.
+    #[error(transparent)]
+    Session(#[from] SessionError),
+    /// The recording cannot be written.
+    #[error("{path}: {source}")]
+    Recording {
+        /// Which file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+}
+
+/// Takes the stream apart while it comes.
+struct Run {
+    number: u16,
+    account: LossAccount,
+    integrated: Integrated,
+    recorder: Option<Recorder>,
+    recorder_error: Option<io::Error>,
+    fault: Option<Fault>,
+    run_ended: bool,
+    status: Option<Status>,
+    last_packet: Instant,
+}
+
+impl Run {
+    /// Writes to the recording, if there is one and it has not failed before.
+    fn record(&mut self, write: impl FnOnce(&mut Recorder) -> io::Result<()>) {
+        if let Some(recorder) = &mut self.recorder
+            && self.recorder_error.is_none()
+        {
+            self.recorder_error = write(recorder).err();
+        }
+    }
+
+    fn frame(&mut self, frame: &Frame<'_>) {
+        if frame.run != self.number {
+            return;
+        }
+        let arrival = self.account.frame(frame.sequence);
+        if arrival == crate::account::Arrival::Received && self.integrated.add(frame).is_err() {
+            // Intact, yet not of this setup: its content is as lost as if it had been damaged.
+            self.account.damaged();
+        }
+    }
+}
+
+impl Listener for Run {
+    fn packet(&mut self, raw: &[u8], content: &Result<DeviceMessage<'_>, PacketError>) {
+        self.last_packet = Instant::now();
+        self.record(|recorder| recorder.packet(raw));
+        match content {
+            Ok(DeviceMessage::Frame(frame)) => self.frame(frame),
+            Ok(DeviceMessage::Event(event)) => match event.kind {
+                EventKind::RunEnded { run, frames_made, .. } if run == self.number => {
+                    self.account.made(frames_made);
+                    self.run_ended = true;
+                }
+                EventKind::Fault(fault) => self.fault = Some(fault),
+                _ => {}
+            },
+            Ok(DeviceMessage::Reply(Reply { outcome: Ok(Answer::Status(status)), .. })) => {
+                self.status = Some(*status);
+            }
+            Ok(_) => {}
+            Err(_) => self.account.damaged(),
+        }
+    }
+}
+
+/// Runs one capture. `watch` is called at least ten times a second and breaks to stop.
+///
+/// # Errors
+/// [`CaptureError`] where nothing was captured; a run that started always gives a [`Capture`], unless its
+/// recording failed.
+pub fn capture(
+    session: &mut Session,
+    options: &CaptureOptions,
+    watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+) -> Result<Capture, CaptureError> {
+    let mut setup = options.setup.clone();
+    let (settling, calibration_problem) =
+        match options.calibrate.then(|| calibrate(session, &mut Deaf)) {
+            None => (None, None),
+            Some(Ok(settling)) => {
+                setup.adc_latency = settling.adc_latency;
+                (Some(settling), None)
+            }
+            Some(Err(CalibrationError::Session(error))) => return Err(error.into()),
+            Some(Err(problem)) => (None, Some(problem)),
+        };
+    setup.with_configuration(|c| session.command(Command::Configure(c), &mut Deaf))?;
+    let before = session.status(&mut Deaf)?;
+
+    let recorder = match &options.record {
+        None => None,
+        Some(path) => Some(
+            Recorder::create(path, session.identity(), &setup, settling.as_ref())
+                .map_err(|source| recording_error(path, source))?,
+        ),
+    };
+    let now = Instant::now();
+    let mut run = Run {
+        number: before.run.wrapping_add(1),
+        account: LossAccount::new(),
+        integrated: Integrated::new(&setup),
+        recorder,
+        recorder_error: None,
+        fault: None,
+        run_ended: false,
+        status: None,
+        last_packet: now,
+    };
+    let ended = match stream(session, options.frames, &mut run, now, watch) {
+        Ok(ended) => ended,
+        Err(error @ (SessionError::Closed { .. } | SessionError::Link(_))) => {
+            Ended::LinkLost(error)
+        }
+        Err(error) => {
+            discard_empty(options.record.as_deref(), run);
+            return Err(error.into());
+        }
+    };
+    let counters = run.account.counters();
+    let recorded = match (run.recorder_error.take(), run.recorder.take()) {
+        (Some(error), _) => Err(error),
+        (None, Some(recorder)) => recorder.finish(&counters),
+        (None, None) => Ok(()),
+    };
+    if let (Err(source), Some(path)) = (recorded, &options.record) {
+        return Err(recording_error(path, source));
+    }
+    Ok(Capture {
+        setup,
+        settling,
+        calibration_problem,
+        integrated: run.integrated,
+        counters,
+        damaged_packets: run.account.damaged_packets(),
+        repeated: run.account.repeated(),
+        status: run.status,
+        ended,
+        elapsed: now.elapsed(),
+    })
+}
+
+/// Whether the camera went away, rather than said something unexpected.
+fn is_lost(error: &SessionError) -> bool {
+    matches!(
+        error,
+        SessionError::Closed { .. } | SessionError::Link(_) | SessionError::NoAnswer { .. }
+    )
+}
+
+fn recording_error(path: &Path, source: io::Error) -> CaptureError {
+    CaptureError::Recording { path: path.to_owned(), source }
+}
+
+/// A run that never started leaves no recording behind.
+fn discard_empty(path: Option<&Path>, run: Run) {
+    drop(run.recorder);
+    if let Some(path) = path {
+        // It was made a moment ago and holds no packet; where it cannot be removed it does no harm.
+        let _ = std::fs::remove_file(path);
+    }
+}
+
+fn stream(
+    session: &mut Session,
+    frames: Option<u32>,
+    run: &mut Run,
+    started: Instant,
+    watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+) -> Result<Ended, SessionError> {
+    let length = frames.map_or(RunLength::Continuous, RunLength::Frames);
+    session.command(Command::Start(length), run)?;
+    let mut stopped = false;
+    let mut kept_alive = Instant::now();
+    let mut watched = Instant::now();
+    while !run.run_ended {
+        session.listen(Duration::from_millis(50), run)?;
+        if watched.elapsed() > Duration::from_millis(50) {
+            watched = Instant::now();
+            run.record(Recorder::flush_if_due);
+            let progress =
+                Progress { counters: run.account.counters(), elapsed: started.elapsed() };
+            let wants_stop = watch(&progress).is_break() || run.recorder_error.is_some();
+            if wants_stop && !stopped && !run.run_ended {
+                stopped = true;
+                match session.command(Command::Stop, run) {
+                    // It had ended by itself meanwhile.
+                    Err(SessionError::Refused { .. }) | Ok(()) => {}
+                    Err(error) => return Err(error),
+                }
+            }
+        }
+        if run.last_packet.elapsed() > ANSWER_TIMEOUT {
+            return Err(SessionError::NoAnswer { command: "Status" });
+        }
+        if kept_alive.elapsed() > KEEP_ALIVE {
+            kept_alive = Instant::now();
+            session.keep_alive()?;
+            // The end of the run may have been the one packet that was damaged.
+            if let Some(status) = run.status
+                && status.state != State::Running
+                && status.run == run.number
+                && run.last_packet.elapsed() > QUIET
+            {
+                run.account.made(status.frames_made);
+                run.run_ended = true;
+            }
+        }
+    }
+    match session.status(run) {
+        // All that was made is accounted for: that the link went down after it changes nothing.
+        Ok(_) => {}
+        Err(error) if is_lost(&error) => {}
+        Err(error) => return Err(error),
+    }
+    Ok(match (run.fault, stopped) {
+        (Some(fault), _) => Ended::Fault(fault),
+        (None, true) => Ended::Stopped,
+        (None, false) => Ended::Complete,
+    })
+}

@@ -1,0 +1,148 @@
+//! Arguments that say which camera, in front of what, measuring how.
+
+use super::Usage;
+use anyhow::{Context, Result};
+use clap::Args;
+use nirspi::files::order_table::read_order_table;
+use nirspi::link::{Link, TcpLink};
+use nirspi::scene::{SceneMap, SceneSource};
+use nirspi::session::Session;
+use nirspi::setup::MeasurementSetup;
+use nirspi::virtual_camera::{MemoryLink, VirtualOptics};
+use nirspi_optics::{Projector, Scene};
+use nirspi_recon::Order;
+use std::path::Path;
+use std::str::FromStr;
+
+/// Edge of the reflectance map that a scene is drawn on.
+const SCENE_PX: usize = 256;
+
+/// What stands before a virtual camera.
+#[derive(Debug, Clone, Args)]
+pub struct SceneArgs {
+    /// What the virtual camera looks at: letter:R (43 mm, bright on dark) or a PNG file (fills the field)
+    #[arg(long, value_name = "SCENE", default_value = "letter:R")]
+    pub scene: String,
+    /// Distance from the virtual camera to the target, in metres
+    #[arg(long, value_name = "M", default_value_t = 0.3)]
+    pub distance_m: f64,
+    /// Seed of the simulated noise: the same seed gives the same bytes
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+}
+
+impl SceneArgs {
+    /// The scene and the optics before it.
+    pub fn optics(&self) -> Result<(SceneMap, VirtualOptics)> {
+        let distance_mm = self.distance_m * 1e3;
+        if !(distance_mm.is_finite() && distance_mm > 0.0) {
+            let found = self.distance_m;
+            return Err(Usage(format!(
+                "--distance-m is {found}, expected a positive number of metres"
+            ))
+            .into());
+        }
+        let source = SceneSource::from_str(&self.scene).map_err(|e| Usage(e.to_string()))?;
+        let map = source.load(SCENE_PX)?;
+        let side_mm = map.side_mm.unwrap_or_else(|| Projector::default().field_mm(distance_mm));
+        let scene = Scene::new(map.reflectance.clone(), map.size_px, side_mm)?;
+        let optics = VirtualOptics::new(scene, distance_mm)
+            .with_context(|| format!("--distance-m {}", self.distance_m))?;
+        Ok((map, optics))
+    }
+}
+
+/// How to measure.
+#[derive(Debug, Clone, Args)]
+pub struct SetupArgs {
+    /// Order of the patterns: natural, sequency, zig-zag, cake-cutting, russian-dolls, total-variation, random:SEED,
+    /// or table:FILE (numbers, entry k the natural-order Hadamard row shown k-th)
+    #[arg(long, value_name = "ORDER", default_value = "cake-cutting")]
+    pub order: String,
+    /// Share of the 1024 patterns to show, the first of the order [default: demo 0.5, capture 1]
+    #[arg(long, value_name = "0..1")]
+    pub sampling: Option<f64>,
+    /// Sweeps summed into one frame
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub sweeps: u32,
+    /// ADC clocks (8 ns) that each pattern is shown: 5 is 25 MHz
+    #[arg(long, value_name = "N", default_value_t = 5)]
+    pub clocks_per_pattern: u16,
+    /// ADC samples left out at the start of each pattern
+    #[arg(long, value_name = "N", default_value_t = 2)]
+    pub blanked: u16,
+    /// Show patterns alone, without their complements
+    #[arg(long)]
+    pub non_differential: bool,
+}
+
+impl SetupArgs {
+    /// The setup asked for.
+    pub fn setup(&self, default_sampling: f64) -> Result<MeasurementSetup> {
+        let order = parse_order(&self.order)?;
+        let sampling = self.sampling.unwrap_or(default_sampling);
+        check_sampling(sampling)?;
+        let mut setup = MeasurementSetup::new(&order, sampling)
+            .with_context(|| format!("--order {}", self.order))?;
+        setup.sweeps = self.sweeps;
+        setup.clocks_per_pattern = self.clocks_per_pattern;
+        setup.blanked = self.blanked;
+        setup.differential = !self.non_differential;
+        Ok(setup)
+    }
+}
+
+/// An order by name, or a user's own from a file.
+pub fn parse_order(name: &str) -> Result<Order> {
+    if let Some(path) = name.strip_prefix("table:") {
+        return Ok(Order::Table(read_order_table(Path::new(path))?));
+    }
+    Order::from_str(name).map_err(|error| Usage(format!("--order {name:?}: {error}")).into())
+}
+
+/// A share of patterns is more than 0 and at most 1.
+pub fn check_sampling(sampling: f64) -> Result<()> {
+    if sampling > 0.0 && sampling <= 1.0 {
+        return Ok(());
+    }
+    Err(Usage(format!("--sampling is {sampling}, expected more than 0 and at most 1")).into())
+}
+
+/// Which camera to use.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum CameraAddress {
+    /// The one in this process.
+    Virtual,
+    /// One behind a TCP address.
+    Tcp(String),
+}
+
+impl FromStr for CameraAddress {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.split_once(':') {
+            None if text == "virtual" => Ok(Self::Virtual),
+            Some(("tcp", address)) if address.contains(':') => Ok(Self::Tcp(address.to_owned())),
+            _ => Err("expected virtual or tcp:HOST:PORT".to_owned()),
+        }
+    }
+}
+
+impl CameraAddress {
+    /// Opens a conversation with the camera. `scene` is what a virtual one looks at.
+    pub fn open(&self, scene: &SceneArgs) -> Result<Session> {
+        let link: Box<dyn Link> = match self {
+            Self::Virtual => {
+                let (_, optics) = scene.optics()?;
+                Box::new(MemoryLink::new(optics.camera(scene.seed)?))
+            }
+            Self::Tcp(address) => {
+                let link = TcpLink::connect(address)
+                    .with_context(|| format!("no camera at tcp:{address}"))?;
+                Box::new(link)
+            }
+        };
+        Ok(Session::open(link)?)
+    }
+}

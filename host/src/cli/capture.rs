@@ -1,0 +1,176 @@
+//! `nirspi capture`: record a camera, with every frame accounted for.
+
+use super::camera::{CameraAddress, SceneArgs, SetupArgs};
+use super::{Usage, print, serve_virtual::stop_on_signal};
+use anyhow::Result;
+use indicatif::{ProgressBar, ProgressStyle};
+use nirspi::account::LossCounters;
+use nirspi::capture::{Capture, CaptureOptions, Ended, Progress, capture};
+use nirspi::session::CameraIdentity;
+use serde::Serialize;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::atomic::Ordering;
+
+/// Record frames of a camera into an MCAP file
+///
+/// Ctrl-C ends the recording and keeps it. Example:
+/// nirspi capture --camera tcp:127.0.0.1:1550 --frames 1000 --out rec.mcap
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Which camera: virtual, or tcp:HOST:PORT
+    #[arg(long, value_name = "CAMERA", default_value = "virtual")]
+    camera: CameraAddress,
+    /// Frames to record; without it, until Ctrl-C
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    frames: Option<u32>,
+    /// File to record into; default: the first free one of capture-1.mcap, capture-2.mcap ...
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Replace the file if it is there
+    #[arg(long)]
+    overwrite: bool,
+    /// Do not measure ADC latency and settling first
+    #[arg(long)]
+    no_calibration: bool,
+    /// ADC clocks from light to sample, where they are not measured
+    #[arg(long, value_name = "N", default_value_t = 0, requires = "no_calibration")]
+    adc_latency: u8,
+    #[command(flatten)]
+    setup: SetupArgs,
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Print a JSON report
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Serialize)]
+struct Report<'r> {
+    camera: &'r CameraIdentity,
+    recording: &'r Path,
+    bytes: u64,
+    frames: LossCounters,
+    made: u64,
+    damaged_packets: u64,
+    repeated: u64,
+    ended: String,
+    complete: bool,
+    seconds: f64,
+    frames_per_s: f64,
+    adc_latency_clocks: u8,
+    calibrated: bool,
+}
+
+pub fn run(args: &Args) -> Result<ExitCode> {
+    let mut setup = args.setup.setup(1.0)?;
+    setup.adc_latency = args.adc_latency;
+    let path = recording_path(args)?;
+    let stop = stop_on_signal()?;
+    let mut session = args.camera.open(&args.scene)?;
+    let options = CaptureOptions {
+        setup,
+        frames: args.frames,
+        calibrate: !args.no_calibration,
+        record: Some(path.clone()),
+    };
+    let bar = progress_bar(args.frames);
+    let captured = capture(&mut session, &options, &mut |progress: &Progress| {
+        bar.set_position(progress.counters.total());
+        bar.set_message(progress.counters.to_string());
+        if stop.load(Ordering::Relaxed) {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    });
+    bar.finish_and_clear();
+    let captured = captured?;
+    report(args, session.identity(), &path, &captured)
+}
+
+/// The file to record into, which is not there yet.
+fn recording_path(args: &Args) -> Result<PathBuf> {
+    match &args.out {
+        Some(path) if path.exists() && !args.overwrite => {
+            let path = path.display();
+            Err(Usage(format!(
+                "--out {path} is there already: choose another name or add --overwrite"
+            ))
+            .into())
+        }
+        Some(path) => Ok(path.clone()),
+        None => (1u32..)
+            .map(|n| PathBuf::from(format!("capture-{n}.mcap")))
+            .find(|path| !path.exists())
+            .ok_or_else(|| Usage("no free name for the recording: use --out".to_owned()).into()),
+    }
+}
+
+fn progress_bar(frames: Option<u32>) -> ProgressBar {
+    let template = match frames {
+        Some(_) => "{bar:30} {pos}/{len} frames  {per_sec}  {msg}",
+        None => "{spinner} {pos} frames  {per_sec}  {msg}",
+    };
+    let style =
+        ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+    ProgressBar::new(frames.map_or(0, u64::from)).with_style(style)
+}
+
+fn report(
+    args: &Args,
+    camera: &CameraIdentity,
+    path: &Path,
+    captured: &Capture,
+) -> Result<ExitCode> {
+    let counters = captured.counters;
+    let seconds = captured.elapsed.as_secs_f64();
+    let (ended, failed) = match &captured.ended {
+        Ended::Complete => ("all frames made".to_owned(), false),
+        Ended::Stopped => ("stopped by the user".to_owned(), false),
+        Ended::Fault(fault) => (format!("the camera switched its LEDs off: {fault:?}"), true),
+        Ended::LinkLost(error) => {
+            (format!("{error}; what it made after the last frame is not known"), true)
+        }
+    };
+    let report = Report {
+        camera,
+        recording: path,
+        bytes: std::fs::metadata(path)?.len(),
+        frames: counters,
+        made: counters.total(),
+        damaged_packets: captured.damaged_packets,
+        repeated: captured.repeated,
+        ended,
+        complete: !failed && counters.is_complete(),
+        seconds,
+        frames_per_s: counters.received as f64 / seconds,
+        adc_latency_clocks: captured.setup.adc_latency,
+        calibrated: captured.settling.is_some(),
+    };
+    if args.json {
+        print::json(&report)?;
+    } else {
+        if let Some(problem) = &captured.calibration_problem {
+            print::line(format_args!("not calibrated: {problem}"))?;
+        }
+        print::line(format_args!("{counters}: {} frames made", report.made))?;
+        print::line(format_args!(
+            "{:.0} frames/s over {seconds:.2} s, {:.1} MB in {}",
+            report.frames_per_s,
+            report.bytes as f64 / 1e6,
+            path.display()
+        ))?;
+    }
+    if failed {
+        print::complain(format_args!(
+            "nirspi: {}; {} received frames are kept in {}",
+            report.ended,
+            counters.received,
+            path.display()
+        ));
+        return Ok(ExitCode::FAILURE);
+    }
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,311 @@
+//! `nirspi demo`: the whole camera on a simulated scene, from light to picture.
+
+use super::camera::{SceneArgs, SetupArgs};
+use super::method::{self, MethodArgs, Solved, solve};
+use super::print;
+use super::quality::{Quality, compare};
+use super::reconstruct::enlarged_png;
+use super::report::StageTimes;
+use anyhow::{Result, bail};
+use indicatif::{ProgressBar, ProgressStyle};
+use nirspi::account::LossCounters;
+use nirspi::capture::{CaptureOptions, Ended, Progress, capture};
+use nirspi::files::image::{encode_grey, encode_rgb};
+use nirspi::files::npy;
+use nirspi::files::output::OutputDir;
+use nirspi::picture::{Panel, Range, SideBySide};
+use nirspi::scene::SceneMap;
+use nirspi::session::{CameraIdentity, Session};
+use nirspi::virtual_camera::{MemoryLink, VirtualOptics};
+use nirspi_nets::upscale_2x;
+use nirspi_recon::{Image, Side, reconstruct};
+use serde::Serialize;
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Show what the camera does, without a camera: capture a simulated scene and reconstruct it
+///
+/// An optics simulator lights the gateware's model; the real firmware logic drives it and speaks the real wire
+/// protocol; the host calibrates, captures, counts and reconstructs. Writes scene, raw reconstruction and result as
+/// PNG and NPY, side_by_side.png and report.json.
+/// Example: nirspi demo --scene letter:R --out demo/
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    scene: SceneArgs,
+    #[command(flatten)]
+    setup: SetupArgs,
+    /// Frames to capture; their sum is reconstructed
+    #[arg(long, value_name = "N", default_value_t = DEFAULT_FRAMES,
+          value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    frames: u32,
+    #[command(flatten)]
+    method: MethodArgs,
+    /// Folder for the results
+    #[arg(long, value_name = "DIR", default_value = "demo")]
+    out: PathBuf,
+    /// Print the report as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// As many single sweeps as the paper's camera fits into its 20 ms before reconstruction (Table 1, T_pre).
+const DEFAULT_FRAMES: u32 = 244;
+
+/// Half of the patterns: enough to read a letter, and few enough to see what OMP adds.
+const DEFAULT_SAMPLING: f64 = 0.5;
+
+#[derive(Debug, Serialize)]
+struct Report {
+    scene: String,
+    simulated: bool,
+    distance_m: f64,
+    seed: u64,
+    field_mm: f64,
+    defocus_mm: f64,
+    electrons_per_led_and_sample: f64,
+    electrons_per_adc_count: f64,
+    camera: CameraIdentity,
+    patterns: usize,
+    order: String,
+    differential: bool,
+    acquisition_ms: f64,
+    frames: LossCounters,
+    adc_latency_clocks: u8,
+    leak_taps: Vec<f64>,
+    /// Plain inverse transform, leak left in.
+    raw: Quality,
+    /// The result, against what a perfect 32 x 32 camera would see.
+    reconstruction: Quality,
+    quality_note: &'static str,
+    #[serde(flatten)]
+    method: method::Report,
+    notes: Vec<String>,
+    stage_ms: StageTimes,
+}
+
+/// The images of the report's stages.
+struct Images {
+    truth: Image,
+    raw: Vec<f32>,
+    result: Image,
+    fitted: Vec<f32>,
+    upscaled: Vec<f32>,
+}
+
+pub fn run(args: &Args) -> Result<ExitCode> {
+    args.method.check()?;
+    let setup = args.setup.setup(DEFAULT_SAMPLING)?;
+    let mut times = StageTimes::default();
+    let (map, optics) = times.time("scene", || args.scene.optics())?;
+    let link = MemoryLink::new(optics.camera(args.scene.seed)?);
+    let mut session = Session::open(Box::new(link))?;
+    let camera = session.identity().clone();
+
+    let options =
+        CaptureOptions { setup, frames: Some(args.frames), calibrate: true, record: None };
+    let bar = ProgressBar::new(u64::from(args.frames)).with_style(
+        ProgressStyle::with_template("capture {bar:30} {pos}/{len} frames")
+            .unwrap_or_else(|_| ProgressStyle::default_bar()),
+    );
+    let mut watch = |progress: &Progress| {
+        bar.set_position(progress.counters.total());
+        ControlFlow::Continue(())
+    };
+    let captured = times.time("capture", || capture(&mut session, &options, &mut watch))?;
+    bar.finish_and_clear();
+    match &captured.ended {
+        Ended::Complete | Ended::Stopped => {}
+        Ended::Fault(fault) => bail!("the virtual camera switched its LEDs off: {fault:?}"),
+        Ended::LinkLost(error) => bail!("{error}"),
+    }
+
+    let notes: Vec<String> =
+        captured.calibration_problem.iter().map(|p| format!("not calibrated: {p}")).collect();
+    let setup = &captured.setup;
+    let leak = match &captured.settling {
+        Some(settling) => Some(settling.leak(setup.clocks_per_pattern, setup.blanked)?),
+        None => None,
+    };
+    let raw = captured.integrated.measurements(setup, None)?;
+    let raw = times.time("inverse_transform", || reconstruct::hadamard(&raw));
+    let measurements = captured.integrated.measurements(setup, leak.as_ref())?;
+    let Solved { image, report: method } =
+        times.time("reconstruct", || solve(&args.method, &measurements))?;
+
+    let truth = optics.focused_footprint()?.weights().to_vec();
+    let raw = compare(&raw, &truth)?;
+    let fitted = compare(&image, &truth)?;
+    let side = image.side().pixels();
+    let upscaled = times.time("upscale", || upscale_2x(&fitted.values, 1, side, side))?;
+    let images = Images {
+        truth: Image::new(Side::INSTRUMENT, truth),
+        raw: raw.values,
+        result: image,
+        fitted: fitted.values,
+        upscaled,
+    };
+    let report = Report {
+        scene: map.name.clone(),
+        simulated: true,
+        distance_m: args.scene.distance_m,
+        seed: args.scene.seed,
+        field_mm: optics.field_mm(),
+        defocus_mm: optics.blur_mm(),
+        electrons_per_led_and_sample: optics.budget().electrons_per_led,
+        electrons_per_adc_count: optics.chain().electrons_per_count,
+        camera,
+        patterns: setup.rows.len(),
+        order: setup.order.clone(),
+        differential: setup.differential,
+        acquisition_ms: setup.frame_ns() * f64::from(args.frames) * 1e-6,
+        frames: captured.counters,
+        adc_latency_clocks: setup.adc_latency,
+        leak_taps: leak.map(|leak| leak.taps().to_vec()).unwrap_or_default(),
+        raw: raw.quality,
+        reconstruction: fitted.quality,
+        quality_note: "against the scene on the 32 x 32 LED grid without defocus, after the gain and offset of \
+                       least squares",
+        method,
+        notes,
+        stage_ms: times,
+    };
+    write(args, &map, &optics, &images, &report)?;
+    if args.json {
+        print::json(&report)?;
+    } else {
+        say(args, &report)?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn write(
+    args: &Args,
+    map: &SceneMap,
+    optics: &VirtualOptics,
+    images: &Images,
+    report: &Report,
+) -> Result<()> {
+    let side = images.result.side().pixels();
+    let grid = [side, side];
+    let mut out = OutputDir::create(&args.out)?;
+    let scene = &map.reflectance;
+    out.write("scene.png", &encode_grey(map.size_px, map.size_px, scene))?;
+    out.write("scene.npy", &npy::encode(&[map.size_px, map.size_px], scene))?;
+    out.write("truth.npy", &npy::encode(&grid, images.truth.pixels()))?;
+    let raw = Image::new(Side::INSTRUMENT, images.raw.clone());
+    out.write("raw.png", &enlarged_png(&raw))?;
+    out.write("raw.npy", &npy::encode(&grid, &images.raw))?;
+    let result = Image::new(Side::INSTRUMENT, images.fitted.clone());
+    out.write("reconstruction.png", &enlarged_png(&result))?;
+    out.write("reconstruction.npy", &npy::encode(&grid, &images.fitted))?;
+    out.write("upscaled.png", &encode_grey(2 * side, 2 * side, &images.upscaled))?;
+    out.write("upscaled.npy", &npy::encode(&[2 * side, 2 * side], &images.upscaled))?;
+    out.write(
+        "side_by_side.png",
+        &encode_rgb(&side_by_side(map, optics, images, report).render()),
+    )?;
+    out.write("report.json", format!("{}\n", serde_json::to_string_pretty(report)?).as_bytes())?;
+    out.commit()?;
+    Ok(())
+}
+
+fn side_by_side(
+    map: &SceneMap,
+    optics: &VirtualOptics,
+    images: &Images,
+    report: &Report,
+) -> SideBySide {
+    let side = images.result.side().pixels();
+    let panel = |title: &str, width, values: &[f32], caption: Vec<String>| Panel {
+        title: title.to_owned(),
+        width,
+        height: width,
+        values: values.to_vec(),
+        range: Range::Unit,
+        caption,
+    };
+    let metrics = |q: &Quality| format!("PSNR {:.1} dB  SSIM {:.2}", q.psnr_db, q.ssim);
+    SideBySide {
+        header: format!(
+            "{} at {} m, seen with one pixel",
+            capitalised(&report.scene),
+            report.distance_m
+        ),
+        panels: vec![
+            panel(
+                "scene",
+                map.size_px,
+                &map.reflectance,
+                vec![map.side_mm.map_or_else(
+                    || format!("fills the field, {:.0} mm", optics.field_mm()),
+                    |mm| format!("{mm:.0} mm target in a field of {:.0} mm", optics.field_mm()),
+                )],
+            ),
+            panel(
+                "what 32 x 32 LEDs can show",
+                side,
+                images.truth.pixels(),
+                vec!["the reference, no defocus, no noise".to_owned()],
+            ),
+            panel(
+                "raw reconstruction",
+                side,
+                &images.raw,
+                vec![
+                    metrics(&report.raw),
+                    format!("inverse transform, {} patterns", report.patterns),
+                ],
+            ),
+            panel(
+                "result",
+                side,
+                &images.fitted,
+                vec![metrics(&report.reconstruction), report.method.short()],
+            ),
+            panel(
+                "result, 64 x 64",
+                2 * side,
+                &images.upscaled,
+                vec!["Lanczos upscaling".to_owned()],
+            ),
+        ],
+        footer: format!(
+            "simulated: virtual camera, seed {}; {} frames of {} patterns, {:.1} ms of light; {} lost, {} corrupt, {} late",
+            report.seed,
+            report.frames.received,
+            report.patterns,
+            report.acquisition_ms,
+            report.frames.lost,
+            report.frames.corrupt,
+            report.frames.late
+        ),
+    }
+}
+
+fn capitalised(text: &str) -> String {
+    let mut characters = text.chars();
+    characters
+        .next()
+        .map_or_else(String::new, |first| first.to_uppercase().chain(characters).collect())
+}
+
+fn say(args: &Args, report: &Report) -> Result<()> {
+    print::line(format_args!(
+        "{} at {} m, {} frames of {} patterns in {:.1} ms of (simulated) light",
+        report.scene, report.distance_m, args.frames, report.patterns, report.acquisition_ms
+    ))?;
+    print::line(format_args!("frames: {}", report.frames))?;
+    print::line(format_args!("raw:    {}", quality_line(&report.raw)))?;
+    print::line(format_args!("result: {}", quality_line(&report.reconstruction)))?;
+    print::line(format_args!("{}", report.method))?;
+    for note in &report.notes {
+        print::line(format_args!("note: {note}"))?;
+    }
+    print::line(format_args!("look at {}", args.out.join("side_by_side.png").display()))
+}
+
+fn quality_line(quality: &Quality) -> String {
+    format!("PSNR {:.2} dB, SSIM {:.3}", quality.psnr_db, quality.ssim)
+}

@@ -1,0 +1,160 @@
+//! Arguments that say how to make an image from measurements, and what the report says of it.
+
+use super::Usage;
+use anyhow::Result;
+use clap::{Args, ValueEnum};
+use nirspi_recon::omp::Stop;
+use nirspi_recon::reconstruct::{self, Completion, OmpSettings, Sparsity};
+use nirspi_recon::{Basis, Image, Measurements};
+use serde::Serialize;
+use std::fmt;
+use std::str::FromStr;
+
+/// How to invert.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Method {
+    /// Inverse Walsh-Hadamard transform; patterns that were not measured count as zero
+    Hadamard,
+    /// Orthogonal matching pursuit (the paper's Algorithm 1) in a sparsifying basis
+    Omp,
+}
+
+/// What becomes of patterns that were measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Keep {
+    /// They keep their values, the others are predicted
+    Measured,
+    /// All are the sparse representation's
+    Sparse,
+}
+
+/// How to make the image.
+#[derive(Debug, Clone, Args)]
+pub struct MethodArgs {
+    /// How to make the image
+    #[arg(long, value_enum, default_value_t = Method::Omp)]
+    pub method: Method,
+    /// Basis in which the image is sparse: dct, haar, pixel
+    #[arg(long, value_name = "BASIS", default_value = "dct")]
+    pub basis: String,
+    /// Atoms to choose; without it, the number that predicts held-back measurements best
+    #[arg(long, value_name = "K")]
+    pub sparsity: Option<usize>,
+    /// Stop when the residual's norm is this share of the measurements'
+    #[arg(long, value_name = "0..1", default_value_t = 0.0)]
+    pub residual: f64,
+    /// What becomes of patterns that were measured
+    #[arg(long, value_enum, default_value_t = Keep::Measured)]
+    pub keep: Keep,
+}
+
+impl MethodArgs {
+    /// Finds mistakes before any file is opened.
+    pub fn check(&self) -> Result<()> {
+        self.basis()?;
+        if !(0.0..1.0).contains(&self.residual) {
+            let found = self.residual;
+            return Err(Usage(format!("--residual is {found}, expected 0 or more, below 1")).into());
+        }
+        if self.sparsity == Some(0) {
+            return Err(Usage("--sparsity is 0, expected at least 1".to_owned()).into());
+        }
+        Ok(())
+    }
+
+    fn basis(&self) -> Result<Basis> {
+        Basis::from_str(&self.basis)
+            .map_err(|error| Usage(format!("--basis {:?}: {error}", self.basis)).into())
+    }
+}
+
+/// What was done and found.
+#[derive(Debug, Serialize)]
+pub struct Report {
+    method: Method,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    omp: Option<OmpReport>,
+}
+
+#[derive(Debug, Serialize)]
+struct OmpReport {
+    basis: String,
+    sparsity: usize,
+    keep: Keep,
+    stop: &'static str,
+    relative_residual: f64,
+    unseen_atoms: usize,
+    trust_in_prediction: f64,
+    noise_of_a_measurement: f64,
+}
+
+impl Report {
+    /// In a few words, for a caption.
+    pub fn short(&self) -> String {
+        match &self.omp {
+            None => "inverse Hadamard transform".to_owned(),
+            Some(omp) => format!("OMP, {} atoms of the {} basis", omp.sparsity, omp.basis),
+        }
+    }
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Some(omp) = &self.omp else { return f.write_str("inverse Hadamard transform") };
+        let OmpReport { basis, sparsity, stop, relative_residual, unseen_atoms, .. } = omp;
+        write!(
+            f,
+            "OMP: {sparsity} atoms of the {basis} basis, relative residual {relative_residual:.3}, {unseen_atoms} \
+             atoms not seen, stopped: {stop}"
+        )
+    }
+}
+
+/// An image and how it came about.
+pub struct Solved {
+    /// In the measurements' units.
+    pub image: Image,
+    /// What was done.
+    pub report: Report,
+}
+
+/// Makes the image.
+pub fn solve(args: &MethodArgs, measurements: &Measurements) -> Result<Solved> {
+    if args.method == Method::Hadamard {
+        let image = reconstruct::hadamard(measurements);
+        return Ok(Solved { image, report: Report { method: args.method, omp: None } });
+    }
+    let keep = args.keep;
+    let mut settings = OmpSettings {
+        basis: args.basis()?,
+        residual: args.residual,
+        completion: match keep {
+            Keep::Measured => Completion::Measured,
+            Keep::Sparse => Completion::Sparse,
+        },
+        ..OmpSettings::default()
+    };
+    if let Some(atoms) = args.sparsity {
+        settings.sparsity = Sparsity::Fixed(atoms);
+    }
+    let found = reconstruct::omp(measurements, &settings)?;
+    let omp = OmpReport {
+        basis: settings.basis.to_string(),
+        sparsity: found.sparsity,
+        keep,
+        stop: match found.stop {
+            Stop::Sparsity if args.sparsity.is_some() => "as many atoms as asked for",
+            Stop::Sparsity => "more atoms predict no better",
+            Stop::Residual => "residual reached",
+            Stop::NoAtomLeft => "no atom left that explains more",
+            Stop::Dependent => "atoms left are combinations of those chosen",
+        },
+        relative_residual: found.residual,
+        unseen_atoms: found.unseen_atoms,
+        trust_in_prediction: found.trust,
+        noise_of_a_measurement: found.noise,
+    };
+    Ok(Solved { image: found.image, report: Report { method: args.method, omp: Some(omp) } })
+}

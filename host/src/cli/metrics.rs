@@ -1,0 +1,90 @@
+//! `nirspi metrics`: how alike two stacks of images are.
+
+use super::print;
+use anyhow::{Context, Result, bail};
+use nirspi::files::npy::{Stack, read_stack};
+use nirspi_recon::metrics;
+use serde::Serialize;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Compare two .npy stacks of images: PSNR and SSIM, data range 1
+///
+/// Both hold (N, H, W) or (H, W) numbers in [0, 1]; nothing is scaled or fitted. Example:
+/// nirspi metrics reference.npy demo/reconstruction.npy
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The images as they should be
+    reference: PathBuf,
+    /// The images to judge
+    test: PathBuf,
+}
+
+#[derive(Debug, Serialize)]
+struct ImageMetrics {
+    psnr_db: Option<f64>,
+    ssim: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct Report {
+    images: usize,
+    height: usize,
+    width: usize,
+    /// `null`: all images are identical.
+    mean_psnr_db: Option<f64>,
+    mean_ssim: f64,
+    each: Vec<ImageMetrics>,
+}
+
+pub fn run(args: &Args) -> Result<ExitCode> {
+    let reference = load(&args.reference)?;
+    let test = load(&args.test)?;
+    let shape = |s: &Stack| (s.count, s.height, s.width);
+    if shape(&reference) != shape(&test) {
+        bail!(
+            "{}: shape {:?}, expected {:?} as in {}",
+            args.test.display(),
+            shape(&test),
+            shape(&reference),
+            args.reference.display()
+        );
+    }
+    let (height, width) = (reference.height, reference.width);
+    let mut each = Vec::with_capacity(reference.count);
+    let pairs = reference.values.chunks_exact(height * width);
+    for (a, b) in pairs.zip(test.values.chunks_exact(height * width)) {
+        let psnr = metrics::psnr(a, b, width, height, 1.0)?;
+        each.push(ImageMetrics {
+            // Identical images have no finite one, and JSON no infinity.
+            psnr_db: psnr.is_finite().then_some(psnr),
+            ssim: metrics::ssim(a, b, width, height, 1.0)?,
+        });
+    }
+    let n = each.len() as f64;
+    let finite: Vec<f64> = each.iter().filter_map(|image| image.psnr_db).collect();
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    let report = Report {
+        images: reference.count,
+        height,
+        width,
+        mean_psnr_db: (!finite.is_empty()).then(|| mean(&finite)),
+        mean_ssim: each.iter().map(|image| image.ssim).sum::<f64>() / n,
+        each,
+    };
+    print::json(&report)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// A stack of images in `[0, 1]`.
+fn load(path: &std::path::Path) -> Result<Stack> {
+    let stack = read_stack(path)?;
+    let outside = stack.values.iter().position(|v| !(0.0..=1.0).contains(v));
+    if let Some(at) = outside {
+        bail!("{}: value {at} is {}, expected 0 to 1", path.display(), stack.values[at]);
+    }
+    if stack.count == 0 {
+        return Err(anyhow::anyhow!("no images")).with_context(|| path.display().to_string());
+    }
+    Ok(stack)
+}

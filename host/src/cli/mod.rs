@@ -1,0 +1,113 @@
+//! Commands. Each module reads its arguments, calls the library, and says what came of it.
+//!
+//! Exit codes: 0 done, 1 failed (one line on stderr says why), 2 used wrongly.
+
+mod camera;
+mod capture;
+mod demo;
+mod devices;
+mod method;
+mod metrics;
+mod print;
+mod quality;
+mod reconstruct;
+mod report;
+mod serve_virtual;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// An open near-infrared single-pixel camera: capture, virtual camera, reconstruction.
+#[derive(Debug, Parser)]
+#[command(name = "nirspi", version, arg_required_else_help = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Demo(demo::Args),
+    Reconstruct(reconstruct::Args),
+    Capture(capture::Args),
+    Virtual(serve_virtual::Args),
+    Devices(devices::Args),
+    Metrics(metrics::Args),
+}
+
+/// A mistake in how the program was called, rather than in what it was given.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+struct Usage(String);
+
+/// Runs the command line of this process.
+pub fn run() -> ExitCode {
+    let command = match Cli::try_parse() {
+        Ok(cli) => cli.command,
+        Err(answer) if is_help(&answer) => {
+            // Nobody to read it is no reason to fail.
+            let _ = answer.print();
+            return ExitCode::from(answer.exit_code() as u8);
+        }
+        Err(mistake) => {
+            print::complain(mistake_in_one_line(&mistake.render().to_string()));
+            return ExitCode::from(2);
+        }
+    };
+    let result = match command {
+        Command::Demo(args) => demo::run(&args),
+        Command::Reconstruct(args) => reconstruct::run(&args),
+        Command::Capture(args) => capture::run(&args),
+        Command::Virtual(args) => serve_virtual::run(&args),
+        Command::Devices(args) => devices::run(&args),
+        Command::Metrics(args) => metrics::run(&args),
+    };
+    match result {
+        Ok(code) => code,
+        Err(error) => {
+            print::complain(one_line(&error));
+            ExitCode::from(if error.is::<Usage>() { 2 } else { 1 })
+        }
+    }
+}
+
+fn is_help(error: &clap::Error) -> bool {
+    use clap::error::ErrorKind;
+    matches!(
+        error.kind(),
+        ErrorKind::DisplayHelp
+            | ErrorKind::DisplayVersion
+            | ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand
+    )
+}
+
+/// clap's message of several paragraphs without its usage and its pointer to --help.
+fn mistake_in_one_line(message: &str) -> String {
+    let mut line = String::new();
+    let told = |text: &&str| !text.starts_with("Usage:") && !text.starts_with("For more");
+    for part in message.lines().map(str::trim).take_while(told).filter(|part| !part.is_empty()) {
+        match line.chars().last() {
+            None => {}
+            Some(':') => line.push(' '),
+            Some(_) => line.push_str("; "),
+        }
+        line.push_str(part.strip_prefix("error: ").unwrap_or(part));
+    }
+    line
+}
+
+/// The error and its causes in one line; causes that only repeat what was said are left out.
+fn one_line(error: &anyhow::Error) -> String {
+    let mut line = String::new();
+    for cause in error.chain() {
+        let text = cause.to_string();
+        if line.contains(&text) {
+            continue;
+        }
+        if !line.is_empty() {
+            line.push_str(": ");
+        }
+        line.push_str(&text);
+    }
+    line.replace('\n', " ")
+}

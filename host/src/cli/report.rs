@@ -1,0 +1,20 @@
+//! Pieces that several reports share.
+
+use serde::Serialize;
+use std::time::Instant;
+
+/// How long each stage took, in the order in which they ran.
+#[derive(Debug, Default, Serialize)]
+#[serde(transparent)]
+pub struct StageTimes(serde_json::Map<String, serde_json::Value>);
+
+impl StageTimes {
+    /// Runs a stage and notes its time in milliseconds.
+    pub fn time<T>(&mut self, stage: &str, work: impl FnOnce() -> T) -> T {
+        let start = Instant::now();
+        let result = work();
+        let ms = start.elapsed().as_secs_f64() * 1e3;
+        self.0.insert(stage.to_owned(), serde_json::json!((ms * 1e3).round() / 1e3));
+        result
+    }
+}

@@ -1,0 +1,97 @@
+//! `nirspi virtual`: the virtual camera behind a TCP port.
+
+use super::camera::SceneArgs;
+use super::print;
+use anyhow::{Context, Result};
+use nirspi::virtual_camera::{
+    PrecomputedFpga, ServeOptions, ServerEvent, SimulatedFpga, VirtualCamera, serve,
+};
+use std::net::TcpListener;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Serve the virtual camera over TCP, for `capture --camera tcp:ADDR` in another process
+///
+/// Example: nirspi virtual --listen 127.0.0.1:1550 --scene letter:R
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Where to listen
+    #[arg(long, value_name = "ADDR", default_value = super::devices::DEFAULT_TCP)]
+    listen: String,
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Compute this many frames of each run, then repeat them at full speed (for load tests)
+    #[arg(long, value_name = "N")]
+    precompute: Option<usize>,
+    /// End when the first host has gone
+    #[arg(long)]
+    once: bool,
+    /// Drop frames, as a real camera must, when the host is too slow; otherwise simulated time waits for it
+    #[arg(long)]
+    drop_when_full: bool,
+}
+
+pub fn run(args: &Args) -> Result<ExitCode> {
+    let (map, optics) = args.scene.optics()?;
+    let listener = TcpListener::bind(&args.listen)
+        .with_context(|| format!("--listen {}: cannot listen there", args.listen))?;
+    let stop = stop_on_signal()?;
+    let address = listener.local_addr()?;
+    print::line(format_args!(
+        "virtual camera on tcp:{address}: {} at {} m (simulated), seed {}",
+        map.name, args.scene.distance_m, args.scene.seed
+    ))?;
+    let options = ServeOptions { once: args.once, drop_when_full: args.drop_when_full };
+    let fpga = optics.fpga(args.scene.seed)?;
+    let depth = optics.depth(args.scene.seed)?;
+    let serial = format!("virtual-{}", args.scene.seed);
+    match args.precompute {
+        Some(frames) => {
+            let fpga = PrecomputedFpga::new(fpga, frames);
+            run_server(&listener, VirtualCamera::new(fpga, depth, &serial), options, &stop)
+        }
+        None => run_server(&listener, VirtualCamera::new(fpga, depth, &serial), options, &stop),
+    }?;
+    print::line("stopped")?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn run_server<F: SimulatedFpga>(
+    listener: &TcpListener,
+    mut camera: VirtualCamera<F>,
+    options: ServeOptions,
+    stop: &AtomicBool,
+) -> Result<()> {
+    serve(listener, &mut camera, options, stop, &mut |event| {
+        let told = match event {
+            ServerEvent::Connected(host) => print::line(format_args!("{host} connected")),
+            ServerEvent::TurnedAway(host) => {
+                print::line(format_args!("{host} turned away: one host at a time"))
+            }
+            ServerEvent::Disconnected(host, None) => {
+                print::line(format_args!("{host} has gone, LEDs off"))
+            }
+            ServerEvent::Disconnected(host, Some(error)) => {
+                print::line(format_args!("{host} was cut off ({error}), LEDs off"))
+            }
+        };
+        // A camera does not stop because its log cannot be written.
+        told.unwrap_or_default();
+    })?;
+    Ok(())
+}
+
+/// A flag that Ctrl-C and a polite kill set.
+pub fn stop_on_signal() -> Result<Arc<AtomicBool>> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&stop);
+    ctrlc::set_handler(move || {
+        // The second time nobody waits any more.
+        if flag.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    })
+    .context("signals cannot be caught")?;
+    Ok(stop)
+}

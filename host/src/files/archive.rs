@@ -1,0 +1,143 @@
+//! A NumPy `.npz` archive: a zip file with one `.npy` array a member.
+//!
+//! The law: a member is opened only when its field is asked for, so whatever else a file holds
+//! (text, pickled objects, large images) costs nothing; one that is opened is read to its end, so
+//! its checksum holds.
+
+use super::FileError;
+use super::array::{ArrayError, Header, MAGIC, shape_text};
+use std::fs::File;
+use std::io::{BufReader, Read, Seek};
+use std::path::{Path, PathBuf};
+use zip::ZipArchive;
+
+/// What a path is expected to lead to.
+const EXPECTED: &str = "a NumPy .npz archive";
+/// What NumPy appends to the name of an array.
+const MEMBER_SUFFIX: &str = ".npy";
+/// The largest field taken into memory: a 256 x 256 sweep of raw pairs in float64 is 1 MiB, this is
+/// 256 of them.
+const MAX_FIELD_BYTES: u64 = 256 << 20;
+
+/// An open archive.
+pub(super) struct Archive {
+    path: PathBuf,
+    zip: ZipArchive<BufReader<File>>,
+    names: Vec<String>,
+}
+
+/// A field of numbers in C order.
+#[derive(Debug)]
+pub(super) struct Numbers {
+    pub(super) shape: Vec<usize>,
+    pub(super) values: Vec<f64>,
+}
+
+/// Opens a plain file, naming the path in every refusal.
+pub(super) fn open_file(path: &Path, expected: &'static str) -> Result<(File, u64), FileError> {
+    let read = |error| FileError::io(path, "read", error);
+    // Asked before opening: opening a named pipe would wait for a writer.
+    let metadata = std::fs::metadata(path).map_err(read)?;
+    if metadata.is_dir() {
+        return Err(FileError::kind(path, "a folder", expected));
+    }
+    if !metadata.is_file() {
+        return Err(FileError::kind(path, "a device or pipe", expected));
+    }
+    if metadata.len() == 0 {
+        return Err(FileError::kind(path, "an empty file", expected));
+    }
+    Ok((File::open(path).map_err(read)?, metadata.len()))
+}
+
+/// What a file is by its first bytes, for a message that tells a user which file was taken by
+/// mistake.
+pub(super) fn kind_by_start(start: &[u8]) -> &'static str {
+    const KINDS: [(&[u8], &str); 8] = [
+        (b"PK", "a zip archive"),
+        (MAGIC, "a single NumPy array (.npy)"),
+        (b"\x89PNG", "a PNG image"),
+        (b"\xff\xd8\xff", "a JPEG image"),
+        (b"\x89HDF", "an HDF5 file"),
+        (b"\x89MCAP", "a recording (MCAP)"),
+        (b"MATLAB", "a MATLAB file"),
+        (b"\x1f\x8b", "a gzip file"),
+    ];
+    KINDS
+        .iter()
+        .find(|(magic, _)| start.starts_with(magic))
+        .map_or("a file of another kind", |&(_, kind)| kind)
+}
+
+impl Archive {
+    pub(super) fn open(path: &Path) -> Result<Self, FileError> {
+        let (mut file, _) = open_file(path, EXPECTED)?;
+        let mut start = Vec::new();
+        file.by_ref()
+            .take(8)
+            .read_to_end(&mut start)
+            .and_then(|_| file.rewind())
+            .map_err(|error| FileError::io(path, "read", error))?;
+        if !start.starts_with(b"PK") {
+            return Err(FileError::kind(path, kind_by_start(&start), EXPECTED));
+        }
+        let zip = ZipArchive::new(BufReader::new(file))
+            .map_err(|error| damaged(path, error.to_string()))?;
+        // A name that is no text is no field of ours.
+        let members = zip.file_names().flatten();
+        let mut names: Vec<String> = members
+            .filter_map(|name| name.strip_suffix(MEMBER_SUFFIX).map(str::to_owned))
+            .collect();
+        names.sort_unstable();
+        Ok(Self { path: path.to_owned(), zip, names })
+    }
+
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Names of all fields, sorted.
+    pub(super) fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    pub(super) fn holds(&self, field: &str) -> bool {
+        self.names.iter().any(|name| name == field)
+    }
+
+    /// Reads a field whose shape `accept` finds good; what it returns otherwise is the shape that
+    /// was expected.
+    pub(super) fn numbers(
+        &mut self,
+        field: &'static str,
+        accept: impl FnOnce(&[u64]) -> Result<(), String>,
+    ) -> Result<Numbers, FileError> {
+        let path = &self.path;
+        let mut member = self
+            .zip
+            .by_name(&format!("{field}{MEMBER_SUFFIX}"))
+            .map_err(|error| damaged(path, format!("`{field}`: {error}")))?;
+        let refuse =
+            |found, expected| FileError::Field { path: path.clone(), field, found, expected };
+        let explain = |error| match error {
+            // A failed checksum and a torn deflate stream arrive as I/O errors too.
+            ArrayError::Damaged(what) => damaged(path, format!("`{field}`: {what}")),
+            ArrayError::Io(error) => damaged(path, format!("`{field}`: {error}")),
+            ArrayError::Dtype(found) => refuse(found, "real numbers of up to 8 bytes".to_owned()),
+            ArrayError::TooLarge { shape, limit_bytes } => refuse(
+                format!("claims shape {}", shape_text(&shape)),
+                format!("at most {} MiB", limit_bytes >> 20),
+            ),
+        };
+        let header = Header::read(&mut member).map_err(explain)?;
+        accept(header.shape()).map_err(|expected| {
+            refuse(format!("has shape {}", shape_text(header.shape())), expected)
+        })?;
+        let values = header.read_data(&mut member, MAX_FIELD_BYTES).map_err(explain)?;
+        Ok(Numbers { shape: header.shape().iter().map(|&axis| axis as usize).collect(), values })
+    }
+}
+
+fn damaged(path: &Path, found: String) -> FileError {
+    FileError::Damaged { path: path.to_owned(), found, expected: EXPECTED }
+}

@@ -1,0 +1,323 @@
+//! One NumPy array (`.npy` format 1.0 to 3.0) from a stream of bytes, as numbers in C order.
+//!
+//! The law: no claim of the header is believed before it was checked; memory grows with the bytes
+//! that came.
+//!
+//! The header is a Python dictionary literal with three known keys, so it is read here by a scanner
+//! without recursion: a general literal parser can be made to overflow its stack by nested
+//! brackets. Format: <https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html>.
+
+use super::error::Shown;
+use std::io::{self, Read};
+
+/// What an `.npy` file starts with.
+pub(super) const MAGIC: &[u8; 6] = b"\x93NUMPY";
+/// NumPy itself refuses headers over 10 000 characters; this leaves room for other writers.
+const MAX_HEADER_BYTES: u32 = 65_536;
+
+/// Why an array could not be read; [`super::FileError`] adds file and field.
+#[derive(Debug)]
+pub(super) enum ArrayError {
+    /// The bytes are no whole array.
+    Damaged(String),
+    /// An array, but not of numbers that are read here.
+    Dtype(String),
+    /// An array that claims more than the reader allows.
+    TooLarge { shape: Vec<u64>, limit_bytes: u64 },
+    /// The stream failed.
+    Io(io::Error),
+}
+
+/// Real numbers that NumPy stores: `|b1`, `i1..i8`, `u1..u8`, `f2..f8`, either byte order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Dtype {
+    kind: Kind,
+    size: usize,
+    big_endian: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Bool,
+    Signed,
+    Unsigned,
+    Float,
+}
+
+/// A number that array elements are turned into.
+pub(super) trait Sample: Copy {
+    fn from_f64(value: f64) -> Self;
+}
+
+impl Sample for f64 {
+    fn from_f64(value: f64) -> Self {
+        value
+    }
+}
+
+impl Sample for f32 {
+    fn from_f64(value: f64) -> Self {
+        value as f32
+    }
+}
+
+/// What the header of an array says: enough to refuse it before its data is read.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Header {
+    dtype: Dtype,
+    fortran_order: bool,
+    shape: Vec<u64>,
+    /// Bytes of the header, data start after them.
+    pub(super) header_bytes: u64,
+}
+
+impl Header {
+    /// Reads magic, version and dictionary; leaves the stream at the first element.
+    pub(super) fn read(stream: &mut impl Read) -> Result<Self, ArrayError> {
+        let mut start = [0; 8];
+        fill(stream, &mut start, "its header")?;
+        if start[..6] != *MAGIC {
+            return Err(ArrayError::Damaged("it does not start as a NumPy array does".to_owned()));
+        }
+        let (length_bytes, length) = match start[6] {
+            1 => {
+                let mut bytes = [0; 2];
+                fill(stream, &mut bytes, "its header")?;
+                (2, u32::from(u16::from_le_bytes(bytes)))
+            }
+            2 | 3 => {
+                let mut bytes = [0; 4];
+                fill(stream, &mut bytes, "its header")?;
+                (4, u32::from_le_bytes(bytes))
+            }
+            major => {
+                return Err(ArrayError::Damaged(format!(
+                    "NumPy format {major}.{}, known are 1 to 3",
+                    start[7]
+                )));
+            }
+        };
+        if length > MAX_HEADER_BYTES {
+            return Err(ArrayError::Damaged(format!("a header of {length} bytes")));
+        }
+        let mut text = vec![0; length as usize];
+        fill(stream, &mut text, "its header")?;
+        let (dtype, fortran_order, shape) = parse_dictionary(&String::from_utf8_lossy(&text))?;
+        Ok(Self { dtype, fortran_order, shape, header_bytes: 8 + length_bytes + u64::from(length) })
+    }
+
+    /// Sizes of the axes as claimed; empty for a single number.
+    pub(super) fn shape(&self) -> &[u64] {
+        &self.shape
+    }
+
+    /// Bytes of data that belong to this header, if that is at most `limit_bytes`.
+    pub(super) fn data_bytes(&self, limit_bytes: u64) -> Result<u64, ArrayError> {
+        self.shape
+            .iter()
+            // An axis of length 0 makes the array empty however large the others are.
+            .try_fold(self.dtype.size as u64, |product, &axis| product.checked_mul(axis))
+            .or_else(|| self.shape.contains(&0).then_some(0))
+            .filter(|&bytes| bytes <= limit_bytes)
+            .ok_or_else(|| ArrayError::TooLarge { shape: self.shape.clone(), limit_bytes })
+    }
+
+    /// Reads the elements in C order. The stream must end with them: in an archive its checksum is
+    /// known good only then.
+    pub(super) fn read_data<T: Sample>(
+        &self,
+        stream: &mut impl Read,
+        limit_bytes: u64,
+    ) -> Result<Vec<T>, ArrayError> {
+        let expected = self.data_bytes(limit_bytes)?;
+        let mut bytes = Vec::new();
+        stream.by_ref().take(expected).read_to_end(&mut bytes).map_err(ArrayError::Io)?;
+        if (bytes.len() as u64) < expected {
+            return Err(ArrayError::Damaged(format!(
+                "{} of {expected} bytes of data",
+                bytes.len()
+            )));
+        }
+        if stream.read(&mut [0]).map_err(ArrayError::Io)? != 0 {
+            return Err(ArrayError::Damaged(format!(
+                "more than the {expected} bytes of data of its header"
+            )));
+        }
+        let values = self.dtype.decode(&bytes);
+        // Both fit: their product was multiplied out above and is the length of `bytes`.
+        let shape: Vec<usize> = self.shape.iter().map(|&axis| axis as usize).collect();
+        let reorder = self.fortran_order && shape.len() > 1 && !values.is_empty();
+        Ok(if reorder { to_c_order(&values, &shape) } else { values })
+    }
+}
+
+/// `(4, 3)` the way Python writes it, for messages.
+pub(super) fn shape_text(shape: &[u64]) -> String {
+    match shape {
+        [one] => format!("({one},)"),
+        axes => format!("({})", axes.iter().map(u64::to_string).collect::<Vec<_>>().join(", ")),
+    }
+}
+
+fn fill(stream: &mut impl Read, buffer: &mut [u8], part: &str) -> Result<(), ArrayError> {
+    stream.read_exact(buffer).map_err(|error| match error.kind() {
+        io::ErrorKind::UnexpectedEof => ArrayError::Damaged(format!("it ends inside {part}")),
+        _ => ArrayError::Io(error),
+    })
+}
+
+/// The three values of `{'descr': '<f8', 'fortran_order': False, 'shape': (3, 4), }`, keys in any
+/// order.
+fn parse_dictionary(text: &str) -> Result<(Dtype, bool, Vec<u64>), ArrayError> {
+    let damaged = |what: &str| ArrayError::Damaged(format!("{what} in its header"));
+    let value = |key: &str| -> Result<&str, ArrayError> {
+        [format!("'{key}'"), format!("\"{key}\"")]
+            .iter()
+            .find_map(|quoted| text.split_once(quoted.as_str()))
+            .and_then(|(_, after)| after.trim_start().strip_prefix(':'))
+            .map(str::trim_start)
+            .ok_or_else(|| damaged(&format!("no '{key}'")))
+    };
+
+    let order = value("fortran_order")?;
+    let fortran_order = match () {
+        () if order.starts_with("True") => true,
+        () if order.starts_with("False") => false,
+        () => return Err(damaged("no truth value for 'fortran_order'")),
+    };
+
+    let axes = value("shape")?
+        .strip_prefix('(')
+        .and_then(|inside| inside.split_once(')'))
+        .map(|(inside, _)| inside.trim())
+        .ok_or_else(|| damaged("no tuple for 'shape'"))?;
+    let shape = match axes.strip_suffix(',').unwrap_or(axes) {
+        "" => Vec::new(),
+        axes => axes
+            .split(',')
+            // Python 2 wrote long integers as `3L`.
+            .map(|axis| {
+                axis.trim()
+                    .trim_end_matches('L')
+                    .parse()
+                    .map_err(|_| damaged("no sizes for 'shape'"))
+            })
+            .collect::<Result<_, _>>()?,
+    };
+    Ok((Dtype::parse(value("descr")?)?, fortran_order, shape))
+}
+
+impl Dtype {
+    /// Parses a value that starts with a quoted type string such as `'<f8'`.
+    fn parse(value: &str) -> Result<Self, ArrayError> {
+        let Some(quote @ ('\'' | '"')) = value.chars().next() else {
+            // A list of fields: a structured array.
+            return Err(ArrayError::Dtype("is a structured array".to_owned()));
+        };
+        let Some((descr, _)) = value[1..].split_once(quote) else {
+            return Err(ArrayError::Damaged("no end of 'descr' in its header".to_owned()));
+        };
+        let unknown = || ArrayError::Dtype(format!("is of type '{}'", Shown::text(descr)));
+        let mut chars = descr.chars();
+        let big_endian = match chars.next() {
+            Some('>') => true,
+            Some('<' | '|') => false,
+            Some('=') => cfg!(target_endian = "big"),
+            _ => return Err(unknown()),
+        };
+        let kind = match chars.next() {
+            Some('b') => Kind::Bool,
+            Some('i') => Kind::Signed,
+            Some('u') => Kind::Unsigned,
+            Some('f') => Kind::Float,
+            _ => return Err(unknown()),
+        };
+        let size = match (kind, chars.as_str()) {
+            (Kind::Bool | Kind::Signed | Kind::Unsigned, "1") => 1,
+            (Kind::Signed | Kind::Unsigned | Kind::Float, "2") => 2,
+            (Kind::Signed | Kind::Unsigned | Kind::Float, "4") => 4,
+            (Kind::Signed | Kind::Unsigned | Kind::Float, "8") => 8,
+            _ => return Err(unknown()),
+        };
+        Ok(Self { kind, size, big_endian })
+    }
+
+    fn decode<T: Sample>(self, bytes: &[u8]) -> Vec<T> {
+        match (self.kind, self.size) {
+            (Kind::Bool, _) => self.each(bytes, |[b]| f64::from(u8::from(b != 0))),
+            (Kind::Signed, 1) => self.each(bytes, |b| f64::from(i8::from_le_bytes(b))),
+            (Kind::Signed, 2) => self.each(bytes, |b| f64::from(i16::from_le_bytes(b))),
+            (Kind::Signed, 4) => self.each(bytes, |b| f64::from(i32::from_le_bytes(b))),
+            (Kind::Signed, _) => self.each(bytes, |b| i64::from_le_bytes(b) as f64),
+            (Kind::Unsigned, 1) => self.each(bytes, |b| f64::from(u8::from_le_bytes(b))),
+            (Kind::Unsigned, 2) => self.each(bytes, |b| f64::from(u16::from_le_bytes(b))),
+            (Kind::Unsigned, 4) => self.each(bytes, |b| f64::from(u32::from_le_bytes(b))),
+            (Kind::Unsigned, _) => self.each(bytes, |b| u64::from_le_bytes(b) as f64),
+            (Kind::Float, 2) => self.each(bytes, |b| half_to_f64(u16::from_le_bytes(b))),
+            (Kind::Float, 4) => self.each(bytes, |b| f64::from(f32::from_le_bytes(b))),
+            (Kind::Float, _) => self.each(bytes, f64::from_le_bytes),
+        }
+    }
+
+    /// Turns each `N` bytes, put into little-endian order, into a sample.
+    fn each<T: Sample, const N: usize>(
+        self,
+        bytes: &[u8],
+        number: impl Fn([u8; N]) -> f64,
+    ) -> Vec<T> {
+        let (elements, _) = bytes.as_chunks::<N>();
+        elements
+            .iter()
+            .map(|&element| {
+                let mut element = element;
+                if self.big_endian {
+                    element.reverse();
+                }
+                T::from_f64(number(element))
+            })
+            .collect()
+    }
+}
+
+/// IEEE 754 binary16: 1 sign, 5 exponent (bias 15), 10 fraction bits.
+fn half_to_f64(bits: u16) -> f64 {
+    let sign = if bits >> 15 == 0 { 1.0 } else { -1.0 };
+    let exponent = i32::from(bits >> 10 & 0x1f);
+    let fraction = f64::from(bits & 0x3ff) / 1024.0;
+    sign * match exponent {
+        0 => fraction * 2f64.powi(-14),
+        31 if fraction == 0.0 => f64::INFINITY,
+        31 => f64::NAN,
+        _ => (1.0 + fraction) * 2f64.powi(exponent - 15),
+    }
+}
+
+/// Reorders elements stored with the first axis fastest, so that the last is.
+fn to_c_order<T: Sample>(values: &[T], shape: &[usize]) -> Vec<T> {
+    let mut index = vec![0; shape.len()];
+    let strides: Vec<usize> = shape
+        .iter()
+        .scan(1, |product, &axis| {
+            let stride = *product;
+            *product *= axis;
+            Some(stride)
+        })
+        .collect();
+    (0..values.len())
+        .map(|_| {
+            let value =
+                values[index.iter().zip(&strides).map(|(i, stride)| i * stride).sum::<usize>()];
+            for axis in (0..shape.len()).rev() {
+                index[axis] += 1;
+                if index[axis] < shape[axis] {
+                    break;
+                }
+                index[axis] = 0;
+            }
+            value
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,128 @@
+//! Grey pictures as PNG: scenes in, results out.
+//!
+//! The law: a grey level *is* the value, v / 255 (or / 65 535), in both directions; nothing is
+//! linearised. That is the convention of the field's test scenes and data sets, it makes a written
+//! file read back as what was written, and metrics against a user's own file come out in the user's
+//! numbers. A photograph's tone curve could be undone, but that would not make it a reflectance at
+//! 1550 nm: what a surface reflects there is not in a visible picture.
+
+use super::FileError;
+use super::archive::{kind_by_start, open_file};
+use ::image::codecs::png::PngEncoder;
+use ::image::{
+    ColorType, DynamicImage, ExtendedColorType, ImageEncoder, ImageFormat, ImageReader, Limits,
+    RgbImage,
+};
+use std::io::{BufRead, BufReader, Seek};
+use std::path::Path;
+
+const EXPECTED: &str = "a PNG image";
+/// Largest edge that is read; a scene is later averaged down to hundreds of pixels.
+const MAX_EDGE_PX: u32 = 16_384;
+/// Largest decoded picture that is read: 8192 x 8192 in 16-bit RGBA.
+const MAX_DECODED_BYTES: u64 = 512 << 20;
+
+/// A square map of reflectance in `[0, 1]`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reflectance {
+    /// Edge in pixels, at least 1.
+    pub size_px: usize,
+    /// `size_px * size_px` values, row-major.
+    pub values: Vec<f32>,
+}
+
+/// Reads a PNG of any kind (grey, RGB, palette, with or without alpha, up to 16 bit) as
+/// reflectance.
+///
+/// Colour becomes Rec. 709 luma (0.2126 R + 0.7152 G + 0.0722 B of the stored values), transparency
+/// shows a black ground, and what is not square is cropped to its centre.
+///
+/// # Errors
+/// [`FileError`], one line that names file, what was found and what was expected.
+pub fn read_reflectance(path: &Path) -> Result<Reflectance, FileError> {
+    let (file, _) = open_file(path, EXPECTED)?;
+    let read = |error| FileError::io(path, "read", error);
+    let mut stream = BufReader::new(file);
+    let start = stream.fill_buf().map_err(read)?;
+    if ::image::guess_format(start).ok() != Some(ImageFormat::Png) {
+        return Err(FileError::kind(path, kind_by_start(start), EXPECTED));
+    }
+    stream.rewind().map_err(read)?;
+
+    let mut reader = ImageReader::with_format(stream, ImageFormat::Png);
+    let mut limits = Limits::default();
+    limits.max_image_width = Some(MAX_EDGE_PX);
+    limits.max_image_height = Some(MAX_EDGE_PX);
+    limits.max_alloc = Some(MAX_DECODED_BYTES);
+    reader.limits(limits);
+    let picture = reader.decode().map_err(|error| match error {
+        ::image::ImageError::Limits(_) => FileError::kind(
+            path,
+            "a PNG image that is too large",
+            "at most 16384 pixels an edge and 512 MiB when decoded",
+        ),
+        error => FileError::Damaged {
+            path: path.to_owned(),
+            found: error.to_string(),
+            expected: EXPECTED,
+        },
+    })?;
+    Ok(to_reflectance(&picture))
+}
+
+fn to_reflectance(picture: &DynamicImage) -> Reflectance {
+    let (width, height) = (picture.width(), picture.height());
+    let edge = width.min(height);
+    let square = picture.crop_imm((width - edge) / 2, (height - edge) / 2, edge, edge);
+    let values = match square.color() {
+        // Grey as it stands: no rounding on the way through colour.
+        ColorType::L8 | ColorType::L16 => square.to_luma32f().into_raw(),
+        _ => square
+            .to_rgba32f()
+            .pixels()
+            .map(|pixel| {
+                let [r, g, b, alpha] = pixel.0;
+                ((0.2126 * r + 0.7152 * g + 0.0722 * b) * alpha).clamp(0.0, 1.0)
+            })
+            .collect(),
+    };
+    Reflectance { size_px: edge as usize, values }
+}
+
+/// The bytes of an 8-bit grey PNG of values in `[0, 1]`, row-major; what lies outside is clipped,
+/// NaN is black.
+///
+/// # Panics
+/// If there are not `width * height` values, or none: the caller made both.
+#[must_use]
+pub fn encode_grey(width: usize, height: usize, values: &[f32]) -> Vec<u8> {
+    assert_eq!(width * height, values.len(), "values of a {width} x {height} picture");
+    let levels: Vec<u8> = values.iter().map(|&value| to_level(value)).collect();
+    encode(&levels, width as u32, height as u32, ExtendedColorType::L8)
+}
+
+/// The bytes of an 8-bit colour PNG.
+///
+/// # Panics
+/// If the picture has no pixel: the caller made it.
+#[must_use]
+pub fn encode_rgb(picture: &RgbImage) -> Vec<u8> {
+    encode(picture.as_raw(), picture.width(), picture.height(), ExtendedColorType::Rgb8)
+}
+
+/// The 8-bit grey level of a value in `[0, 1]`; NaN is black.
+#[must_use]
+pub fn to_level(value: f32) -> u8 {
+    (value.clamp(0.0, 1.0) * 255.0).round() as u8
+}
+
+fn encode(levels: &[u8], width: u32, height: u32, color: ExtendedColorType) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    PngEncoder::new(&mut bytes)
+        .write_image(levels, width, height, color)
+        .expect("a picture of at least one pixel encodes into memory");
+    bytes
+}
+
+#[cfg(test)]
+mod tests;

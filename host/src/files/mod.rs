@@ -1,0 +1,20 @@
+//! Files that come in and files that go out.
+//!
+//! The law: what comes in is either whole and checked, or refused with one line that names the
+//! file, the field, what was found and what was expected ([`FileError`]); what goes out is either
+//! whole or not there ([`output`]). A file can claim any size: memory is taken for data that
+//! arrived, never for a claim.
+
+pub mod image;
+pub mod npy;
+pub mod npz;
+pub mod order_table;
+pub mod output;
+
+mod archive;
+mod array;
+mod error;
+#[cfg(test)]
+mod testing;
+
+pub use error::FileError;

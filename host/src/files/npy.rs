@@ -1,0 +1,118 @@
+//! Images as NumPy `.npy` files: a stack `(N, H, W)` in, any shape of float32 out.
+//!
+//! The law: [`encode`] then [`read_stack`] gives back the same bits.
+
+use super::FileError;
+use super::archive::{kind_by_start, open_file};
+use super::array::{ArrayError, Header, MAGIC, shape_text};
+use std::io::{BufReader, Read, Seek};
+use std::path::Path;
+
+const EXPECTED: &str = "a NumPy array (.npy) of images, (N, H, W) or (H, W)";
+const FIELD: &str = "array";
+
+/// Images of one size, row-major, one after another.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stack {
+    /// Images in the stack, at least 1.
+    pub count: usize,
+    /// Rows of an image, at least 1.
+    pub height: usize,
+    /// Columns of an image, at least 1.
+    pub width: usize,
+    /// `count * height * width` finite values.
+    pub values: Vec<f32>,
+}
+
+/// Reads a `.npy` file of shape `(N, H, W)`, or `(H, W)` as a stack of one; any real dtype,
+/// converted to float32.
+///
+/// # Errors
+/// [`FileError`], one line that names file, what was found and what was expected.
+pub fn read_stack(path: &Path) -> Result<Stack, FileError> {
+    let (file, file_bytes) = open_file(path, EXPECTED)?;
+    let mut stream = BufReader::new(file);
+    let mut start = Vec::new();
+    stream
+        .by_ref()
+        .take(MAGIC.len() as u64)
+        .read_to_end(&mut start)
+        .and_then(|_| stream.rewind())
+        .map_err(|error| FileError::io(path, "read", error))?;
+    if !MAGIC.starts_with(&start) {
+        return Err(FileError::kind(path, kind_by_start(&start), EXPECTED));
+    }
+
+    let refuse = |found, expected: &str| FileError::Field {
+        path: path.to_owned(),
+        field: FIELD,
+        found,
+        expected: expected.to_owned(),
+    };
+    let damaged = |found| FileError::Damaged { path: path.to_owned(), found, expected: EXPECTED };
+    let explain = |error| match error {
+        ArrayError::Damaged(found) => damaged(found),
+        ArrayError::Dtype(found) => refuse(found, "real numbers of up to 8 bytes"),
+        ArrayError::Io(error) => FileError::io(path, "read", error),
+        ArrayError::TooLarge { shape, limit_bytes } => {
+            damaged(format!("shape {} with {limit_bytes} bytes of data", shape_text(&shape)))
+        }
+    };
+    let header = Header::read(&mut stream).map_err(explain)?;
+    let (count, height, width) = match *header.shape() {
+        [count, height, width] if count.min(height).min(width) > 0 => (count, height, width),
+        [height, width] if height.min(width) > 0 => (1, height, width),
+        ref other => {
+            return Err(refuse(format!("has shape {}", shape_text(other)), "(N, H, W) or (H, W)"));
+        }
+    };
+    // The file cannot hold more than its own length, so that is the most that is taken into memory.
+    let limit_bytes = file_bytes.saturating_sub(header.header_bytes);
+    let values: Vec<f32> = header.read_data(&mut stream, limit_bytes).map_err(explain)?;
+    // Fit: their product is the length of `values`.
+    let (count, height, width) = (count as usize, height as usize, width as usize);
+    if let Some(flat) = values.iter().position(|value| !value.is_finite()) {
+        let (image, pixel) = (flat / (height * width), flat % (height * width));
+        let found =
+            format!("is {} at [{image}, {}, {}]", values[flat], pixel / width, pixel % width);
+        return Err(refuse(found, "finite numbers"));
+    }
+    Ok(Stack { count, height, width, values })
+}
+
+/// The bytes of a `.npy` file (format 1.0, little-endian float32, C order) for an array of this
+/// shape.
+///
+/// # Panics
+/// If the product of `shape` is not the number of values, or there are more than a hundred axes:
+/// the caller made both.
+#[must_use]
+pub fn encode(shape: &[usize], values: &[f32]) -> Vec<u8> {
+    /// Data start at a multiple of this, so that NumPy can map the file.
+    const ALIGNMENT: usize = 64;
+    assert_eq!(
+        shape.iter().product::<usize>(),
+        values.len(),
+        "values of an array of shape {shape:?}"
+    );
+    let axes: Vec<u64> = shape.iter().map(|&axis| axis as u64).collect();
+    let mut header =
+        format!("{{'descr': '<f4', 'fortran_order': False, 'shape': {}, }}", shape_text(&axes))
+            .into_bytes();
+    let before = MAGIC.len() + 4;
+    let end = (before + header.len() + 1).next_multiple_of(ALIGNMENT);
+    header.resize(end - before - 1, b' ');
+    header.push(b'\n');
+    let length = u16::try_from(header.len()).expect("a header of fewer than a hundred axes");
+
+    let mut bytes = Vec::with_capacity(end + 4 * values.len());
+    bytes.extend_from_slice(MAGIC);
+    bytes.extend_from_slice(&[1, 0]);
+    bytes.extend_from_slice(&length.to_le_bytes());
+    bytes.extend_from_slice(&header);
+    bytes.extend(values.iter().flat_map(|value| value.to_le_bytes()));
+    bytes
+}
+
+#[cfg(test)]
+mod tests;

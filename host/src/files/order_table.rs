@@ -1,0 +1,71 @@
+//! A user's own order of patterns: a text file of numbers, entry k the natural-order Hadamard row shown k-th.
+//!
+//! The law: every number in the file is an entry; whatever is neither a number, blank, comma nor comment (`#` to
+//! the end of the line) is an error that names its line.
+
+use super::FileError;
+use super::archive::open_file;
+use std::io::Read;
+use std::path::Path;
+
+const EXPECTED: &str = "a text file of pattern numbers";
+/// A table of 256 x 256 entries of five digits is 0.4 MB.
+const MAX_BYTES: u64 = 4 << 20;
+
+/// Reads a table. Whether it is a permutation is for [`Order::rows`](nirspi_recon::Order::rows) to say, which knows
+/// the side.
+///
+/// # Errors
+/// [`FileError`], one line that names file, line, what was found and what was expected.
+pub fn read_order_table(path: &Path) -> Result<Vec<u32>, FileError> {
+    let (file, _) = open_file(path, EXPECTED)?;
+    let mut bytes = Vec::new();
+    file.take(MAX_BYTES + 1)
+        .read_to_end(&mut bytes)
+        .map_err(|error| FileError::io(path, "read", error))?;
+    let text = match String::from_utf8(bytes) {
+        Ok(text) if text.len() as u64 <= MAX_BYTES => text,
+        Ok(_) => return Err(FileError::kind(path, "more than 4 MiB", EXPECTED)),
+        Err(_) => return Err(FileError::kind(path, "a binary file", EXPECTED)),
+    };
+    let mut table = Vec::new();
+    for (line, content) in (1..).zip(text.lines()) {
+        let numbers = content.split('#').next().unwrap_or("");
+        for word in numbers.split([' ', '\t', ',', ';']).filter(|word| !word.is_empty()) {
+            table.push(word.parse().map_err(|_| FileError::Field {
+                path: path.to_owned(),
+                field: "order table",
+                found: format!("has {word:?} in line {line}"),
+                expected: "whole numbers from 0".to_owned(),
+            })?);
+        }
+    }
+    Ok(table)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::files::testing::{file, line};
+
+    #[test]
+    fn numbers_are_read_however_they_are_separated() {
+        let (_folder, path) = file("order.txt", b"# mine\n3, 1\t2\r\n\n0 # last\n");
+        assert_eq!(read_order_table(&path).unwrap(), [3, 1, 2, 0]);
+    }
+
+    #[test]
+    fn what_is_no_table_is_refused_in_one_line_that_names_the_place() {
+        for (content, found) in [
+            (&b"0 1\n2 x\n"[..], "\"x\" in line 2"),
+            (b"0 -1", "\"-1\" in line 1"),
+            (b"0 1.5", "\"1.5\" in line 1"),
+            (b"\xff\xfe", "a binary file"),
+            (b"", "an empty file"),
+        ] {
+            let (_folder, path) = file("order.txt", content);
+            let message = line(&read_order_table(&path).unwrap_err(), "order.txt");
+            assert!(message.contains(found), "{message}");
+        }
+    }
+}

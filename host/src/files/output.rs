@@ -1,0 +1,291 @@
+//! Results on disk: whole, or not there.
+//!
+//! The law: a file appears under its name only when it is complete and safely on the disk, and a
+//! run that fails leaves everything as it was, down to the folders it made.
+
+use super::FileError;
+use std::fs;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use tempfile::NamedTempFile;
+
+/// Start of the names of files that are still being written, beside their final place.
+const STAGED_PREFIX: &str = ".nirspi-";
+
+/// A folder that receives all the results of a run at once.
+///
+/// [`create`](Self::create) makes the folder, [`write`](Self::write) stages files in it under
+/// hidden names and [`commit`](Self::commit) renames them into place, replacing older ones of the
+/// same name. Dropped without `commit`, it removes what it staged and every folder that it made.
+#[derive(Debug)]
+pub struct OutputDir {
+    path: PathBuf,
+    /// Before `made`, so that the files are gone when the folders go.
+    staged: Vec<(NamedTempFile, PathBuf)>,
+    made: MadeFolders,
+}
+
+impl OutputDir {
+    /// Opens the folder, making it and its parents where they are missing.
+    ///
+    /// # Errors
+    /// [`FileError`] if the path is a file, or the system refuses; nothing is left behind.
+    pub fn create(path: &Path) -> Result<Self, FileError> {
+        let mut made = MadeFolders(Vec::new());
+        // `--out name/` and `--out name` are the same folder, and an empty path is the current one.
+        let missing: Vec<&Path> = path
+            .ancestors()
+            .take_while(|p| !p.as_os_str().is_empty() && fs::symlink_metadata(p).is_err())
+            .collect();
+        for folder in missing.into_iter().rev() {
+            match fs::create_dir(folder) {
+                Ok(()) => made.0.push(folder.to_owned()),
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+                Err(error) if error.kind() == io::ErrorKind::NotADirectory => {
+                    let file = folder.parent().unwrap_or(folder);
+                    return Err(FileError::kind(file, "a file", "a folder for the results"));
+                }
+                Err(error) => return Err(FileError::io(folder, "create", error)),
+            }
+        }
+        let path = if path.as_os_str().is_empty() { PathBuf::from(".") } else { path.to_owned() };
+        match fs::metadata(&path) {
+            Ok(metadata) if metadata.is_dir() => Ok(Self { path, staged: Vec::new(), made }),
+            Ok(_) => Err(FileError::kind(&path, "a file", "a folder for the results")),
+            Err(error) => Err(FileError::io(&path, "create", error)),
+        }
+    }
+
+    /// The folder.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Stages a file named `name` (a plain file name) in the folder.
+    ///
+    /// # Errors
+    /// [`FileError`] names the file and what the system said.
+    pub fn write(&mut self, name: &str, bytes: &[u8]) -> Result<(), FileError> {
+        let target = self.path.join(name);
+        let staged = stage(&self.path, &target, bytes)?;
+        self.staged.push((staged, target));
+        Ok(())
+    }
+
+    /// Renames every staged file into place and returns their paths in the order written.
+    ///
+    /// # Errors
+    /// [`FileError`] names the first file that could not be placed. New files placed before it are
+    /// removed again; older files that were already replaced stay replaced, whole.
+    pub fn commit(mut self) -> Result<Vec<PathBuf>, FileError> {
+        let mut placed: Vec<(PathBuf, bool)> = Vec::new();
+        for (staged, target) in self.staged.drain(..) {
+            let replaces = target.exists();
+            if let Err(error) = place(staged, &target) {
+                for (new, _) in placed.iter().filter(|(_, replaced)| !replaced) {
+                    // The first error is the one to report; this one says nothing more.
+                    let _ = fs::remove_file(new);
+                }
+                return Err(error);
+            }
+            placed.push((target, replaces));
+        }
+        self.made.0.clear();
+        Ok(placed.into_iter().map(|(path, _)| path).collect())
+    }
+}
+
+/// Writes one file: it is whole under its name, or not there.
+///
+/// # Errors
+/// [`FileError`] if the folder is missing, the path is a folder, or the system refuses.
+pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
+    let folder = match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    place(stage(folder, path, bytes)?, path)
+}
+
+/// Folders that go again when a run fails, outermost first.
+#[derive(Debug)]
+struct MadeFolders(Vec<PathBuf>);
+
+impl Drop for MadeFolders {
+    fn drop(&mut self) {
+        for folder in self.0.iter().rev() {
+            // Fails where someone else put a file meanwhile: then the folder is theirs.
+            let _ = fs::remove_dir(folder);
+        }
+    }
+}
+
+fn stage(folder: &Path, target: &Path, bytes: &[u8]) -> Result<NamedTempFile, FileError> {
+    if target.is_dir() {
+        return Err(FileError::kind(target, "a folder", "a file to write"));
+    }
+    // A missing folder is what is wrong, not the hidden file in it.
+    if let Err(error) = fs::metadata(folder) {
+        return Err(FileError::io(folder, "write to", error));
+    }
+    let write = |error: io::Error| FileError::io(target, "write", error);
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(STAGED_PREFIX);
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        // Results are for others to read, as far as the user's umask lets them; a temporary file is
+        // not.
+        builder.permissions(fs::Permissions::from_mode(0o666));
+    }
+    let mut staged = builder.tempfile_in(folder).map_err(|error| write(without_path(error)))?;
+    staged
+        .write_all(bytes)
+        .and_then(|()| staged.as_file().sync_all())
+        .map_err(|error| write(without_path(error)))?;
+    Ok(staged)
+}
+
+fn place(staged: NamedTempFile, target: &Path) -> Result<(), FileError> {
+    staged.persist(target).map(drop).map_err(|error| FileError::io(target, "write", error.error))
+}
+
+/// `tempfile` puts the hidden file's path into its errors; the user asked for another one.
+fn without_path(error: io::Error) -> io::Error {
+    error.raw_os_error().map_or_else(|| error.kind().into(), io::Error::from_raw_os_error)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let mut names: Vec<String> = fs::read_dir(folder)
+            .unwrap()
+            .map(|e| e.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        names
+    }
+
+    fn line(error: &FileError) -> String {
+        let line = error.to_string();
+        assert!(!line.contains('\n'), "{line}");
+        line
+    }
+
+    #[test]
+    fn files_appear_only_at_commit() {
+        let root = tempfile::tempdir().unwrap();
+        let out = root.path().join("a/b/out");
+        let mut dir = OutputDir::create(&out).unwrap();
+        dir.write("image.npy", b"123").unwrap();
+        dir.write("report.json", b"{}").unwrap();
+        assert!(!out.join("image.npy").exists() && !out.join("report.json").exists());
+        let paths = dir.commit().unwrap();
+        assert_eq!(paths, [out.join("image.npy"), out.join("report.json")]);
+        assert_eq!(names(&out), ["image.npy", "report.json"]);
+        assert_eq!(fs::read(out.join("image.npy")).unwrap(), b"123");
+    }
+
+    #[test]
+    fn a_run_that_fails_leaves_nothing_of_its_own() {
+        let root = tempfile::tempdir().unwrap();
+        let mut dir = OutputDir::create(&root.path().join("a/b/out")).unwrap();
+        dir.write("image.npy", b"123").unwrap();
+        drop(dir);
+        assert!(names(root.path()).is_empty(), "{:?}", names(root.path()));
+    }
+
+    #[test]
+    fn a_run_without_results_keeps_its_folder() {
+        let root = tempfile::tempdir().unwrap();
+        let out = root.path().join("out");
+        assert!(OutputDir::create(&out).unwrap().commit().unwrap().is_empty());
+        assert!(out.is_dir());
+    }
+
+    #[test]
+    fn a_run_that_fails_leaves_what_was_there() {
+        let root = tempfile::tempdir().unwrap();
+        fs::write(root.path().join("image.npy"), b"old").unwrap();
+        let mut dir = OutputDir::create(root.path()).unwrap();
+        dir.write("image.npy", b"new").unwrap();
+        drop(dir);
+        assert_eq!(names(root.path()), ["image.npy"]);
+        assert_eq!(fs::read(root.path().join("image.npy")).unwrap(), b"old");
+    }
+
+    #[test]
+    fn a_failing_commit_takes_its_new_files_back() {
+        let root = tempfile::tempdir().unwrap();
+        let out = root.path().join("out");
+        let mut dir = OutputDir::create(&out).unwrap();
+        dir.write("first.npy", b"1").unwrap();
+        dir.write("second.npy", b"2").unwrap();
+        fs::create_dir(out.join("second.npy")).unwrap();
+        let error = dir.commit().unwrap_err();
+        assert!(line(&error).contains("second.npy: cannot write it"), "{error}");
+        assert_eq!(names(&out), ["second.npy"]);
+    }
+
+    #[test]
+    fn a_file_where_the_folder_should_be_is_named() {
+        let root = tempfile::tempdir().unwrap();
+        let file = root.path().join("taken");
+        fs::write(&file, b"x").unwrap();
+        let error = OutputDir::create(&file).unwrap_err();
+        assert!(
+            line(&error).ends_with("taken: found a file, expected a folder for the results"),
+            "{error}"
+        );
+        let error = OutputDir::create(&file.join("sub/out")).unwrap_err();
+        assert!(
+            line(&error).ends_with("taken: found a file, expected a folder for the results"),
+            "{error}"
+        );
+        assert_eq!(names(root.path()), ["taken"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn results_can_be_read_by_others_as_far_as_the_umask_says() {
+        use std::os::unix::fs::PermissionsExt;
+        let root = tempfile::tempdir().unwrap();
+        let (plain, ours) = (root.path().join("plain"), root.path().join("ours"));
+        fs::write(&plain, b"x").unwrap();
+        write_atomic(&ours, b"x").unwrap();
+        let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode();
+        assert_eq!(mode(&ours), mode(&plain));
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_folder_that_takes_no_files_is_named_with_the_reason() {
+        // No file can be made in /proc, not even by root.
+        let error = write_atomic(Path::new("/proc/image.npy"), b"x").unwrap_err();
+        assert!(line(&error).starts_with("/proc/image.npy: cannot write it: "), "{error}");
+        assert!(!error.to_string().contains(STAGED_PREFIX), "{error}");
+        let error = OutputDir::create(Path::new("/proc/out")).unwrap_err();
+        assert!(line(&error).starts_with("/proc/out: cannot create it: "), "{error}");
+    }
+
+    #[test]
+    fn one_file_is_whole_or_not_there() {
+        let root = tempfile::tempdir().unwrap();
+        let path = root.path().join("rec.npy");
+        write_atomic(&path, b"abc").unwrap();
+        write_atomic(&path, b"defg").unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"defg");
+        assert_eq!(names(root.path()), ["rec.npy"]);
+
+        let error = write_atomic(&root.path().join("none/rec.npy"), b"x").unwrap_err();
+        assert!(
+            line(&error).ends_with("none: cannot write to it: no such file or folder"),
+            "{error}"
+        );
+        let error = write_atomic(root.path(), b"x").unwrap_err();
+        assert!(line(&error).contains("found a folder, expected a file to write"), "{error}");
+    }
+}

@@ -1,0 +1,173 @@
+//! One character as a test target: as large as it goes, anti-aliased, bold.
+//!
+//! The law: the drawn strokes, thickening included, touch the edges of a centred square of the
+//! asked size and never leave it.
+
+use super::text::Font;
+use ab_glyph::{Font as _, GlyphId, PxScale, point};
+
+/// Samples a pixel along each edge for anti-aliasing.
+const OVERSAMPLING: usize = 4;
+/// The font's strokes are thin for a target that a 32 x 32 camera must resolve: each edge of a
+/// stroke is moved outwards by this part of the target.
+const THICKENING: f32 = 0.028;
+
+/// Whether the font draws something for this character: not for blanks, nor for what it does not
+/// know.
+pub(crate) fn has_shape(character: char) -> bool {
+    let font = Font::sans();
+    let id = font.glyph_id(character);
+    id != GlyphId(0) && font.outline(id).is_some()
+}
+
+/// The character in `[0, 1]`, bright on dark, `size_px * size_px` row-major: its longer side is
+/// `fill` of the edge. None if the font has no shape for it.
+pub(crate) fn render(character: char, size_px: usize, fill: f32) -> Option<Vec<f32>> {
+    if !has_shape(character) {
+        return None;
+    }
+    let fine_px = size_px * OVERSAMPLING;
+    let edge = fine_px as f32;
+    let radius = THICKENING * edge;
+    let thin = outline_mask(character, fine_px, fill * edge - 2.0 * radius)?;
+    Some(average(&thicken(&thin, fine_px, radius), size_px))
+}
+
+/// Which fine pixels the character covers when its longer side has `longer_px`, centred.
+fn outline_mask(character: char, fine_px: usize, longer_px: f32) -> Option<Vec<bool>> {
+    let font = Font::sans();
+    let id = font.glyph_id(character);
+    let unscaled = font.outline(id)?.bounds;
+    let longer =
+        (unscaled.max.x - unscaled.min.x).abs().max((unscaled.max.y - unscaled.min.y).abs());
+    if longer <= 0.0 {
+        return None;
+    }
+    // `PxScale` is the height from descent to ascent in pixels.
+    let scale = PxScale::from(longer_px.max(1.0) / longer * font.height_unscaled());
+    let at_origin = font.outline_glyph(id.with_scale(scale))?.px_bounds();
+    let centre = fine_px as f32 / 2.0;
+    let shift = point(
+        centre - (at_origin.min.x + at_origin.max.x) / 2.0,
+        centre - (at_origin.min.y + at_origin.max.y) / 2.0,
+    );
+    let outlined = font.outline_glyph(id.with_scale_and_position(scale, shift))?;
+    let bounds = outlined.px_bounds();
+    let mut mask = vec![false; fine_px * fine_px];
+    outlined.draw(|x, y, coverage| {
+        let (x, y) = (bounds.min.x as i64 + i64::from(x), bounds.min.y as i64 + i64::from(y));
+        let inside = 0..fine_px as i64;
+        if coverage >= 0.5 && inside.contains(&x) && inside.contains(&y) {
+            mask[y as usize * fine_px + x as usize] = true;
+        }
+    });
+    Some(mask)
+}
+
+/// Every pixel within `radius` of a covered one: the rows of a disc, each as a running count along
+/// the row.
+fn thicken(mask: &[bool], edge: usize, radius: f32) -> Vec<bool> {
+    let mut thick = vec![false; mask.len()];
+    let reach = radius.floor() as isize;
+    // covered[y][x]: covered pixels of row y left of x.
+    let covered: Vec<u32> = mask
+        .chunks_exact(edge)
+        .flat_map(|row| {
+            let mut count = 0;
+            std::iter::once(0).chain(row.iter().map(move |&pixel| {
+                count += u32::from(pixel);
+                count
+            }))
+        })
+        .collect();
+    for dy in -reach..=reach {
+        let half = (radius * radius - (dy * dy) as f32).max(0.0).sqrt().floor() as usize;
+        for (y, row) in thick.chunks_exact_mut(edge).enumerate() {
+            let Some(from) = y.checked_add_signed(dy).filter(|&from| from < edge) else { continue };
+            let counts = &covered[from * (edge + 1)..(from + 1) * (edge + 1)];
+            for (x, pixel) in row.iter_mut().enumerate() {
+                *pixel |= counts[(x + half + 1).min(edge)] > counts[x.saturating_sub(half)];
+            }
+        }
+    }
+    thick
+}
+
+fn average(mask: &[bool], size_px: usize) -> Vec<f32> {
+    let fine_px = size_px * OVERSAMPLING;
+    let mut counts = vec![0u32; size_px * size_px];
+    for (at, _) in mask.iter().enumerate().filter(|&(_, &covered)| covered) {
+        counts[at / fine_px / OVERSAMPLING * size_px + at % fine_px / OVERSAMPLING] += 1;
+    }
+    counts.into_iter().map(|count| count as f32 / (OVERSAMPLING * OVERSAMPLING) as f32).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZE_PX: usize = 200;
+    const FILL: f32 = 0.9;
+
+    /// Smallest rows and columns that hold everything brighter than a half: left, right, top,
+    /// bottom.
+    fn extent(map: &[f32]) -> [usize; 4] {
+        let lit = || {
+            map.iter()
+                .enumerate()
+                .filter(|(_, value)| **value > 0.5)
+                .map(|(at, _)| (at % SIZE_PX, at / SIZE_PX))
+        };
+        [
+            lit().map(|(x, _)| x).min().unwrap(),
+            lit().map(|(x, _)| x + 1).max().unwrap(),
+            lit().map(|(_, y)| y).min().unwrap(),
+            lit().map(|(_, y)| y + 1).max().unwrap(),
+        ]
+    }
+
+    #[test]
+    fn every_printable_ascii_character_fills_the_target_and_is_centred() {
+        for character in '!'..='~' {
+            let map = render(character, SIZE_PX, FILL).unwrap();
+            assert!(map.iter().all(|value| (0.0..=1.0).contains(value)));
+            let [left, right, top, bottom] = extent(&map);
+            let longer = (right - left).max(bottom - top) as f32 / SIZE_PX as f32;
+            assert!((longer - FILL).abs() < 0.015, "{character}: {longer}");
+            assert!(
+                (left + right).abs_diff(SIZE_PX) <= 2,
+                "{character}: columns {left} to {right}"
+            );
+            assert!((top + bottom).abs_diff(SIZE_PX) <= 2, "{character}: rows {top} to {bottom}");
+        }
+    }
+
+    #[test]
+    fn strokes_of_a_capital_are_wide_enough_for_32_pixels() {
+        // The bar of I, which is one stroke, against 2 of the camera's 32 pixels.
+        let [left, right, ..] = extent(&render('I', SIZE_PX, FILL).unwrap());
+        assert!((right - left) as f32 / SIZE_PX as f32 > 2.0 / 32.0, "{}", right - left);
+    }
+
+    #[test]
+    fn edges_are_smooth() {
+        let map = render('O', SIZE_PX, FILL).unwrap();
+        let between = map.iter().filter(|value| (0.05..0.95).contains(*value)).count();
+        assert!(between > SIZE_PX, "{between} pixels between dark and bright");
+    }
+
+    #[test]
+    fn blanks_and_unknown_characters_have_no_shape() {
+        for character in [' ', '\n', '\0', '\u{200b}', '漢', '\u{10ffff}'] {
+            assert!(!has_shape(character), "{character:?}");
+            assert_eq!(render(character, 16, FILL), None);
+        }
+    }
+
+    #[test]
+    fn a_target_of_few_pixels_is_drawn_too() {
+        for size_px in 1..8 {
+            assert_eq!(render('R', size_px, FILL).unwrap().len(), size_px * size_px);
+        }
+    }
+}

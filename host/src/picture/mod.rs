@@ -1,0 +1,12 @@
+//! Pictures for people: images side by side with titles, figures and a note of where they come
+//! from.
+//!
+//! The law: all text stays inside its panel, whatever its length, and nothing (font or library) is
+//! asked of the system.
+
+pub(crate) mod glyph;
+
+mod layout;
+mod text;
+
+pub use layout::{Panel, Range, SideBySide};

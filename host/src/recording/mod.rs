@@ -1,0 +1,27 @@
+//! Recordings: an MCAP file with every wire packet as it came, and what is needed to understand them.
+//!
+//! Channel `/wire` holds the packets (COBS, delimiter included), intact ones and damaged ones alike; the
+//! message encoding names the protocol version. Metadata records hold the camera's identity, the setup, the
+//! calibration and, at the end, the account of the run, each as one JSON text. Times are nanoseconds of the
+//! host's clock. The one law: what is on disk is whole chunks, so a capture that is killed keeps everything up
+//! to its last flush, half a second before at most.
+
+mod reader;
+mod writer;
+
+pub use reader::{Recording, RecordingError, read};
+pub use writer::Recorder;
+
+/// MCAP profile of our files.
+pub const PROFILE: &str = "nirspi";
+/// Topic of the packets.
+pub const TOPIC: &str = "/wire";
+/// Message encoding of the packets; the version is the wire protocol's.
+pub const ENCODING: &str = "nirspi-wire-v1";
+
+const IDENTITY: &str = "nirspi.identity";
+const SETUP: &str = "nirspi.setup";
+const SETTLING: &str = "nirspi.settling";
+const ACCOUNT: &str = "nirspi.account";
+/// The one key of each metadata record.
+const JSON: &str = "json";

@@ -1,0 +1,211 @@
+//! What the virtual camera looks at: a letter target, or a picture.
+//!
+//! The law: a scene is a square map of reflectance in `[0, 1]`, 1 bright, row-major, top row first.
+
+use crate::files::FileError;
+use crate::files::image::{Reflectance, read_reflectance};
+use crate::picture::glyph;
+use image::imageops::{self, FilterType};
+use image::{ImageBuffer, Luma};
+use std::fmt;
+use std::path::PathBuf;
+use std::str::FromStr;
+use thiserror::Error;
+
+/// Edge of the paper's letter target: 43 mm x 43 mm (Fig. 6 and Section 5).
+pub const LETTER_SIDE_MM: f64 = 43.0;
+/// Part of the target's edge that the glyph's longer side fills.
+const GLYPH_FILL: f32 = 0.9;
+/// How a letter scene is written on the command line.
+const LETTER_PREFIX: &str = "letter:";
+
+/// Where a scene comes from: `letter:R`, or the path of a PNG.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum SceneSource {
+    /// One bright character on a dark target.
+    Letter(char),
+    /// A PNG, whose grey levels are taken as reflectance.
+    File(PathBuf),
+}
+
+/// A scene ready to be put before the camera.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SceneMap {
+    /// For titles and reports: `letter R`, or the file's name.
+    pub name: String,
+    /// Edge in pixels, at least 1.
+    pub size_px: usize,
+    /// `size_px * size_px` reflectances in `[0, 1]`, row-major.
+    pub reflectance: Vec<f32>,
+    /// Edge of the target in millimetres; a picture has none and fills the field of view.
+    pub side_mm: Option<f64>,
+}
+
+/// Why there is no such scene. `Display` is one line.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum SceneError {
+    /// No scene was named.
+    #[error("scene: found nothing, expected letter:R or the path of a PNG image")]
+    Empty,
+    /// `letter:` was followed by none or several characters.
+    #[error(
+        "scene {scene:?}: found {found} characters after `letter:`, expected one, as in letter:R"
+    )]
+    NotOneCharacter {
+        /// What was asked for.
+        scene: String,
+        /// How many characters it has.
+        found: usize,
+    },
+    /// The embedded font does not draw this character.
+    #[error(
+        "scene letter:{}: the font has no shape for it, expected a letter, digit or sign",
+        character.escape_debug()
+    )]
+    NoShape {
+        /// The character.
+        character: char,
+    },
+    /// The picture could not be read.
+    #[error(transparent)]
+    File(#[from] FileError),
+}
+
+impl FromStr for SceneSource {
+    type Err = SceneError;
+
+    fn from_str(scene: &str) -> Result<Self, SceneError> {
+        if scene.is_empty() {
+            return Err(SceneError::Empty);
+        }
+        let Some(text) = scene.strip_prefix(LETTER_PREFIX) else {
+            return Ok(Self::File(scene.into()));
+        };
+        let mut characters = text.chars();
+        match (characters.next(), characters.next()) {
+            (Some(character), None) if glyph::has_shape(character) => Ok(Self::Letter(character)),
+            (Some(character), None) => Err(SceneError::NoShape { character }),
+            _ => Err(SceneError::NotOneCharacter {
+                scene: scene.to_owned(),
+                found: text.chars().count(),
+            }),
+        }
+    }
+}
+
+impl fmt::Display for SceneSource {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Letter(character) => write!(f, "{LETTER_PREFIX}{character}"),
+            Self::File(path) => write!(f, "{}", path.display()),
+        }
+    }
+}
+
+impl SceneSource {
+    /// Draws or reads the scene. A letter is `size_px` pixels an edge; a larger picture is averaged
+    /// down to that, a smaller one stays as it is.
+    ///
+    /// # Errors
+    /// [`SceneError`] if the font lacks the character or the file cannot be read.
+    pub fn load(&self, size_px: usize) -> Result<SceneMap, SceneError> {
+        match self {
+            Self::Letter(character) => {
+                let reflectance = glyph::render(*character, size_px, GLYPH_FILL)
+                    .ok_or(SceneError::NoShape { character: *character })?;
+                let name = format!("letter {character}");
+                Ok(SceneMap { name, size_px, reflectance, side_mm: Some(LETTER_SIDE_MM) })
+            }
+            Self::File(path) => {
+                let Reflectance { size_px, values: reflectance } =
+                    shrink(read_reflectance(path)?, size_px);
+                let name =
+                    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+                Ok(SceneMap { name, size_px, reflectance, side_mm: None })
+            }
+        }
+    }
+}
+
+/// Averages a picture down to `size_px`. The triangle filter spans two target pixels, so detail
+/// that does not fit is blurred instead of folded back as false detail, and averages stay in `[0,
+/// 1]`.
+fn shrink(map: Reflectance, size_px: usize) -> Reflectance {
+    if map.size_px <= size_px {
+        return map;
+    }
+    let edge = map.size_px as u32;
+    let picture: ImageBuffer<Luma<f32>, _> = ImageBuffer::from_raw(edge, edge, map.values)
+        .expect("a square map has its edge squared values");
+    let small = imageops::resize(&picture, size_px as u32, size_px as u32, FilterType::Triangle);
+    Reflectance {
+        size_px,
+        values: small.into_raw().into_iter().map(|value| value.clamp(0.0, 1.0)).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::files::image::encode_grey;
+
+    fn line(scene: &str) -> String {
+        let line = scene.parse::<SceneSource>().unwrap_err().to_string();
+        assert!(!line.contains('\n'), "{line:?}");
+        line
+    }
+
+    #[test]
+    fn a_letter_is_a_43_mm_target_bright_on_dark() {
+        let scene = "letter:R".parse::<SceneSource>().unwrap();
+        assert_eq!((&scene, scene.to_string().as_str()), (&SceneSource::Letter('R'), "letter:R"));
+        let map = scene.load(64).unwrap();
+        assert_eq!((map.name.as_str(), map.size_px, map.side_mm), ("letter R", 64, Some(43.0)));
+        assert_eq!(map.reflectance.len(), 64 * 64);
+        // R: a stem on the left, open ground on the right below the bowl, dark corners.
+        let at = |x: usize, y: usize| map.reflectance[y * 64 + x];
+        assert!(at(20, 32) == 1.0 && at(60, 40) == 0.0);
+        assert!([at(0, 0), at(63, 0), at(0, 63), at(63, 63)] == [0.0; 4]);
+    }
+
+    #[test]
+    fn scenes_that_do_not_exist_get_a_line() {
+        assert_eq!(line(""), "scene: found nothing, expected letter:R or the path of a PNG image");
+        assert_eq!(
+            line("letter:"),
+            "scene \"letter:\": found 0 characters after `letter:`, expected one, as in letter:R"
+        );
+        assert_eq!(
+            line("letter:A\nB"),
+            "scene \"letter:A\\nB\": \
+             found 3 characters after `letter:`, expected one, as in letter:R"
+        );
+        assert_eq!(
+            line("letter:漢"),
+            "scene letter:漢: the font has no shape for it, expected a letter, digit or sign"
+        );
+        assert!(line("letter: ").contains("no shape"));
+        let error = "none.png".parse::<SceneSource>().unwrap().load(64).unwrap_err();
+        assert_eq!(error.to_string(), "none.png: cannot read it: no such file or folder");
+    }
+
+    #[test]
+    fn a_large_picture_is_averaged_down_and_a_small_one_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("stripes.png");
+        // Stripes of one pixel: too fine for 8 pixels, so they must become grey, not false bands.
+        let stripes: Vec<f32> = (0..64 * 64).map(|at| (at % 2) as f32).collect();
+        std::fs::write(&path, encode_grey(64, 64, &stripes)).unwrap();
+        let scene = path.to_str().unwrap().parse::<SceneSource>().unwrap();
+        let small = scene.load(8).unwrap();
+        assert_eq!((small.name.as_str(), small.size_px, small.side_mm), ("stripes.png", 8, None));
+        assert!(
+            small.reflectance.iter().all(|value| (value - 0.5).abs() < 0.07),
+            "{:?}",
+            small.reflectance
+        );
+        let kept = scene.load(256).unwrap();
+        assert_eq!((kept.size_px, kept.reflectance), (64, stripes));
+    }
+}

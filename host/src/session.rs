@@ -1,0 +1,357 @@
+//! A conversation with a camera: greeting, commands and their answers, the stream in between.
+//!
+//! The one law: nothing of the stream is skipped while waiting for an answer; every packet goes to the
+//! listener as it came, damaged ones too.
+
+use crate::link::{Link, Received};
+use nirspi_wire::packet::{MAX_DEVICE_PACKET, MAX_HOST_PACKET};
+use nirspi_wire::{
+    Answer, Command, Deframed, Deframer, DeviceMessage, Identity, PROTOCOL_VERSION, PacketError,
+    Refusal, Reply, Request, SelfTestReport, Status, Version, encode, open,
+};
+use serde::{Deserialize, Serialize};
+use std::time::{Duration, Instant};
+use thiserror::Error;
+
+/// A camera answers a command within this, or something is wrong.
+pub(crate) const ANSWER_TIMEOUT: Duration = Duration::from_secs(5);
+
+/// Who a camera is: the wire's [`Identity`], owned.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct CameraIdentity {
+    /// Protocol version it speaks.
+    pub protocol: u16,
+    /// Firmware version.
+    pub firmware: String,
+    /// Gateware version.
+    pub gateware: String,
+    /// Board name.
+    pub board: String,
+    /// Serial number.
+    pub serial: String,
+    /// Rate of the ADC.
+    pub adc_hz: u32,
+    /// Resolution of the ADC.
+    pub adc_bits: u8,
+    /// Wavelength of the LEDs.
+    pub wavelength_nm: u16,
+}
+
+impl From<&Identity<'_>> for CameraIdentity {
+    fn from(identity: &Identity<'_>) -> Self {
+        Self {
+            protocol: identity.protocol,
+            firmware: identity.firmware.to_string(),
+            gateware: identity.gateware.to_string(),
+            board: identity.board.to_owned(),
+            serial: identity.serial.to_owned(),
+            adc_hz: identity.adc_hz,
+            adc_bits: identity.adc_bits,
+            wavelength_nm: identity.wavelength_nm,
+        }
+    }
+}
+
+/// Why a conversation ended.
+#[derive(Debug, Error)]
+pub enum SessionError {
+    /// The link failed.
+    #[error("the link to the camera failed: {0}")]
+    Link(#[from] std::io::Error),
+    /// The camera has gone.
+    #[error("the camera closed the link{}", if *.mid_packet { " in the middle of a packet" } else { "" })]
+    Closed {
+        /// Whether part of a packet had come.
+        mid_packet: bool,
+    },
+    /// The camera has gone before it said who it is.
+    #[error("the link was closed instead of a greeting: another host has the camera, or this is none")]
+    TurnedAway,
+    /// The two sides speak different versions.
+    #[error(
+        "the camera speaks protocol version {camera}, this program version {PROTOCOL_VERSION}: update {}",
+        if *.camera > PROTOCOL_VERSION { "this program" } else { "the camera's firmware" }
+    )]
+    Version {
+        /// The camera's.
+        camera: u16,
+    },
+    /// The camera would not do it.
+    #[error("the camera refused {command}: {}", refusal_in_words(.refusal))]
+    Refused {
+        /// What it was asked to do.
+        command: &'static str,
+        /// Why not.
+        refusal: Refusal,
+    },
+    /// No answer.
+    #[error("no answer to {command} within {} s: is this a nirspi camera?", ANSWER_TIMEOUT.as_secs())]
+    NoAnswer {
+        /// What was asked.
+        command: &'static str,
+    },
+    /// An answer that belongs to another command.
+    #[error("the camera answered {command} with something else")]
+    WrongAnswer {
+        /// What was asked.
+        command: &'static str,
+    },
+}
+
+fn refusal_in_words(refusal: &Refusal) -> String {
+    use nirspi_wire::ConfigProblem;
+    match refusal {
+        Refusal::Protocol { device } => format!("it speaks protocol version {device}"),
+        Refusal::State(state) => format!("it is {state:?}"),
+        Refusal::Configuration(ConfigProblem::OutOfRange { field, found, min, max }) => {
+            format!("{field:?} is {found}, expected {min} to {max}")
+        }
+        Refusal::Configuration(ConfigProblem::OrderEntry { index, found }) => {
+            format!("entry {index} of the order, {found}, is repeated or no pattern")
+        }
+        Refusal::Fault(fault) => format!("a fault stands, {fault:?}"),
+        Refusal::NoSuchRegister { address } => format!("there is no register {address:#06x}"),
+        Refusal::RawLength { max } => format!("a raw burst has 1 to {max} samples"),
+        Refusal::GatewareOffset { expected } => format!("it expected the piece at {expected}"),
+        Refusal::GatewareCrc => "the gateware's checksum is wrong".to_owned(),
+        Refusal::Unsupported => "this board cannot do that".to_owned(),
+        Refusal::Bus => "its FPGA does not answer".to_owned(),
+    }
+}
+
+/// Hears every packet of a session.
+pub trait Listener {
+    /// A packet came. `raw` is as it stood on the wire, delimiter included.
+    fn packet(&mut self, raw: &[u8], content: &Result<DeviceMessage<'_>, PacketError>);
+}
+
+/// Hears nothing.
+#[derive(Debug, Default)]
+pub struct Deaf;
+
+impl Listener for Deaf {
+    fn packet(&mut self, _: &[u8], _: &Result<DeviceMessage<'_>, PacketError>) {}
+}
+
+/// An answer without borrowed parts.
+#[derive(Debug, Clone, PartialEq)]
+enum OwnedAnswer {
+    Hello(CameraIdentity),
+    Done,
+    Status(Status),
+    SelfTest(SelfTestReport),
+    Register(u32),
+    Gateware,
+}
+
+impl From<&Answer<'_>> for OwnedAnswer {
+    fn from(answer: &Answer<'_>) -> Self {
+        match answer {
+            Answer::Hello(identity) => Self::Hello(identity.into()),
+            Answer::Done => Self::Done,
+            Answer::Status(status) => Self::Status(*status),
+            Answer::SelfTest(report) => Self::SelfTest(*report),
+            Answer::Register(value) => Self::Register(*value),
+            Answer::Gateware { .. } => Self::Gateware,
+        }
+    }
+}
+
+/// A camera that has answered the greeting.
+pub struct Session {
+    link: Box<dyn Link>,
+    incoming: Incoming,
+    next_id: u16,
+    identity: CameraIdentity,
+}
+
+/// Bytes on their way to packets.
+struct Incoming {
+    deframer: Box<Deframer<MAX_DEVICE_PACKET>>,
+    chunk: Vec<u8>,
+    raw: Vec<u8>,
+}
+
+impl Incoming {
+    /// Cuts `chunk[..length]` into packets; returns the last reply among them.
+    fn take(
+        &mut self,
+        length: usize,
+        listener: &mut dyn Listener,
+    ) -> Option<(u16, Result<OwnedAnswer, Refusal>)> {
+        let mut reply = None;
+        let mut bytes = self.chunk.get(..length).unwrap_or(&[]);
+        while let Some(found) = self.deframer.next(&mut bytes) {
+            self.raw.clear();
+            let content = match found {
+                Deframed::TooLong => Err(PacketError::TooLong),
+                Deframed::Packet(packet) => {
+                    self.raw.extend_from_slice(packet);
+                    open::<DeviceMessage<'_>>(packet)
+                }
+            };
+            self.raw.push(0);
+            listener.packet(&self.raw, &content);
+            if let Ok(DeviceMessage::Reply(Reply { id, outcome })) = &content {
+                reply = Some((*id, outcome.as_ref().map(OwnedAnswer::from).map_err(|&r| r)));
+            }
+        }
+        reply
+    }
+}
+
+impl Session {
+    /// Greets the camera behind `link`.
+    ///
+    /// # Errors
+    /// [`SessionError::Version`] where the two cannot talk; the others where nothing sensible answers.
+    pub fn open(mut link: Box<dyn Link>) -> Result<Self, SessionError> {
+        // Cuts off whatever an earlier session may have left half sent.
+        link.send(&[0])?;
+        let mut session = Self {
+            link,
+            incoming: Incoming {
+                deframer: Box::default(),
+                chunk: vec![0; 1 << 18],
+                raw: Vec::with_capacity(MAX_DEVICE_PACKET + 1),
+            },
+            next_id: 0,
+            identity: CameraIdentity::from(&Identity {
+                protocol: 0,
+                firmware: Version(0, 0, 0),
+                gateware: Version(0, 0, 0),
+                board: "",
+                serial: "",
+                side: 0,
+                adc_hz: 0,
+                adc_bits: 0,
+                wavelength_nm: 0,
+            }),
+        };
+        let hello = Command::Hello { protocol: PROTOCOL_VERSION };
+        match session.ask("Hello", hello, &mut Deaf) {
+            Ok(OwnedAnswer::Hello(identity)) if identity.protocol == PROTOCOL_VERSION => {
+                session.identity = identity;
+                Ok(session)
+            }
+            Ok(OwnedAnswer::Hello(identity)) => {
+                Err(SessionError::Version { camera: identity.protocol })
+            }
+            Ok(_) => Err(SessionError::WrongAnswer { command: "Hello" }),
+            Err(SessionError::Closed { mid_packet: false }) => Err(SessionError::TurnedAway),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Who answered.
+    #[must_use]
+    pub fn identity(&self) -> &CameraIdentity {
+        &self.identity
+    }
+
+    fn send(&mut self, command: Command<'_>) -> Result<u16, SessionError> {
+        let id = self.next_id;
+        self.next_id = id.wrapping_add(1);
+        let mut packet = vec![0; MAX_HOST_PACKET];
+        let packet = encode(&Request { id, command }, &mut packet)
+            .map_err(|error| std::io::Error::new(std::io::ErrorKind::InvalidInput, error))?;
+        match self.link.send(packet) {
+            Ok(()) => Ok(id),
+            Err(error) if crate::link::is_hangup(&error) => Err(self.closed()),
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    fn closed(&self) -> SessionError {
+        SessionError::Closed { mid_packet: self.incoming.deframer.pending() > 0 }
+    }
+
+    /// Listens for up to `timeout`, or until something has come; gives every packet to `listener`.
+    ///
+    /// # Errors
+    /// When the link ends.
+    pub fn listen(
+        &mut self,
+        timeout: Duration,
+        listener: &mut dyn Listener,
+    ) -> Result<(), SessionError> {
+        self.pump(timeout, listener).map(|_| ())
+    }
+
+    fn pump(
+        &mut self,
+        timeout: Duration,
+        listener: &mut dyn Listener,
+    ) -> Result<Option<(u16, Result<OwnedAnswer, Refusal>)>, SessionError> {
+        match self.link.receive(&mut self.incoming.chunk, timeout)? {
+            Received::Bytes(length) => Ok(self.incoming.take(length, listener)),
+            Received::Nothing => Ok(None),
+            Received::Closed => Err(self.closed()),
+        }
+    }
+
+    fn ask(
+        &mut self,
+        name: &'static str,
+        command: Command<'_>,
+        listener: &mut dyn Listener,
+    ) -> Result<OwnedAnswer, SessionError> {
+        let id = self.send(command)?;
+        let deadline = Instant::now() + ANSWER_TIMEOUT;
+        while let Some(left) = deadline.checked_duration_since(Instant::now()) {
+            match self.pump(left.min(Duration::from_millis(100)), listener)? {
+                Some((answered, Ok(answer))) if answered == id => return Ok(answer),
+                Some((answered, Err(Refusal::Protocol { device }))) if answered == id => {
+                    return Err(SessionError::Version { camera: device });
+                }
+                Some((answered, Err(refusal))) if answered == id => {
+                    return Err(SessionError::Refused { command: name, refusal });
+                }
+                _ => {}
+            }
+        }
+        Err(SessionError::NoAnswer { command: name })
+    }
+
+    /// Carries out a command whose answer is "done": `Configure`, `Start`, `Stop`, `RawBurst`.
+    ///
+    /// # Errors
+    /// [`SessionError::Refused`] with the camera's reason, or when the link ends.
+    pub fn command(
+        &mut self,
+        command: Command<'_>,
+        listener: &mut dyn Listener,
+    ) -> Result<(), SessionError> {
+        let name = match command {
+            Command::Configure(_) => "Configure",
+            Command::Start(_) => "Start",
+            Command::Stop => "Stop",
+            Command::RawBurst { .. } => "RawBurst",
+            Command::Reboot(_) => "Reboot",
+            _ => "the command",
+        };
+        match self.ask(name, command, listener)? {
+            OwnedAnswer::Done => Ok(()),
+            _ => Err(SessionError::WrongAnswer { command: name }),
+        }
+    }
+
+    /// How the camera is.
+    ///
+    /// # Errors
+    /// As [`command`](Self::command).
+    pub fn status(&mut self, listener: &mut dyn Listener) -> Result<Status, SessionError> {
+        match self.ask("Status", Command::Status, listener)? {
+            OwnedAnswer::Status(status) => Ok(status),
+            _ => Err(SessionError::WrongAnswer { command: "Status" }),
+        }
+    }
+
+    /// Asks for the camera's status without waiting for it: tells the camera that the host is alive.
+    ///
+    /// # Errors
+    /// When the link ends.
+    pub fn keep_alive(&mut self) -> Result<(), SessionError> {
+        self.send(Command::Status).map(|_| ())
+    }
+}

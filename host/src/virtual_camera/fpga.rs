@@ -1,0 +1,93 @@
+//! The golden model of the gateware, with light in front of it, as the firmware's FPGA bus.
+
+use nirspi_hdl::{AdcSample, Gateware};
+use nirspi_mcu::{BusError, FpgaBus};
+use nirspi_optics::{Chain, LedArray};
+
+/// An FPGA whose time the virtual camera moves.
+pub trait SimulatedFpga: FpgaBus + Send {
+    /// Lets ADC clocks pass.
+    fn advance(&mut self, clocks: u32);
+    /// ADC clocks since power-up.
+    fn clock(&self) -> u64;
+    /// Whether LEDs are or may be lit: a run or raw burst is under way.
+    fn running(&self) -> bool;
+    /// Opens or closes the interlock input.
+    fn set_interlock(&mut self, closed: bool);
+}
+
+/// The gateware's golden model between an LED array and a photodiode's ADC.
+pub struct OpticalFpga {
+    gateware: Gateware,
+    array: LedArray,
+    chain: Chain,
+    clock: u64,
+}
+
+impl OpticalFpga {
+    /// Powers up in front of a scene, with the interlock closed.
+    #[must_use]
+    pub fn new(array: LedArray, chain: Chain) -> Self {
+        let mut gateware = Gateware::new();
+        gateware.set_interlock(true);
+        Self { gateware, array, chain, clock: 0 }
+    }
+}
+
+impl SimulatedFpga for OpticalFpga {
+    fn advance(&mut self, clocks: u32) {
+        self.clock += u64::from(clocks);
+        for _ in 0..clocks {
+            // Nobody looks at the ADC outside a run, and drawing its noise is most of the work.
+            let sample = if self.gateware.running() {
+                let lines = self.gateware.lines();
+                let light = self.array.light(lines.rows, lines.columns, lines.enable);
+                let sample = self.chain.sample(light);
+                AdcSample { code: sample.counts, over_range: sample.over_range }
+            } else {
+                AdcSample { code: 0, over_range: false }
+            };
+            self.gateware.tick(sample);
+        }
+    }
+
+    fn clock(&self) -> u64 {
+        self.clock
+    }
+
+    fn running(&self) -> bool {
+        self.gateware.running()
+    }
+
+    fn set_interlock(&mut self, closed: bool) {
+        self.gateware.set_interlock(closed);
+    }
+}
+
+impl FpgaBus for OpticalFpga {
+    fn read(&mut self, address: u16) -> Result<u32, BusError> {
+        // As on the real port, an address without a register reads as zero.
+        Ok(self.gateware.read(address).unwrap_or(0))
+    }
+
+    fn write(&mut self, address: u16, value: u32) -> Result<(), BusError> {
+        self.gateware.write(address, value);
+        Ok(())
+    }
+
+    fn frame_ready(&mut self) -> bool {
+        self.gateware.frame_ready()
+    }
+
+    fn raw_ready(&mut self) -> bool {
+        self.gateware.raw_ready()
+    }
+
+    fn frame(&mut self) -> Result<Option<&[u8]>, BusError> {
+        Ok(self.gateware.frame())
+    }
+
+    fn raw(&mut self) -> Result<Option<&[u8]>, BusError> {
+        Ok(self.gateware.raw())
+    }
+}

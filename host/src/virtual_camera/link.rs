@@ -1,0 +1,49 @@
+//! The virtual camera as a link in memory: its time passes while the host listens.
+
+use super::{SimulatedFpga, VirtualCamera};
+use crate::link::{Link, Received};
+use std::io;
+use std::time::Duration;
+
+/// Clocks between two looks of the firmware while waiting: 8 us.
+const STEP_CLOCKS: u32 = 1000;
+/// Simulated time that one call may spend in vain, so that the host keeps getting its turn.
+const PATIENCE_CLOCKS: u32 = 2_500_000;
+
+/// A camera in the same process. Single-threaded and deterministic.
+pub struct MemoryLink<F> {
+    camera: VirtualCamera<F>,
+}
+
+impl<F: SimulatedFpga> MemoryLink<F> {
+    /// Plugs the camera in.
+    #[must_use]
+    pub fn new(camera: VirtualCamera<F>) -> Self {
+        Self { camera }
+    }
+}
+
+impl<F: SimulatedFpga> Link for MemoryLink<F> {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.camera.receive(bytes);
+        Ok(())
+    }
+
+    fn receive(&mut self, buffer: &mut [u8], _timeout: Duration) -> io::Result<Received> {
+        let mut spent = 0;
+        while self.camera.outbox().waiting().is_empty() {
+            if spent >= PATIENCE_CLOCKS {
+                return Ok(Received::Nothing);
+            }
+            self.camera.step(STEP_CLOCKS);
+            spent += STEP_CLOCKS;
+        }
+        let outbox = self.camera.outbox();
+        let length = outbox.waiting().len().min(buffer.len());
+        if let (Some(to), Some(from)) = (buffer.get_mut(..length), outbox.waiting().get(..length)) {
+            to.copy_from_slice(from);
+        }
+        outbox.sent(length);
+        Ok(Received::Bytes(length))
+    }
+}

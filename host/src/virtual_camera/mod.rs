@@ -1,0 +1,196 @@
+//! The virtual camera: an optics simulator in front of the gateware's golden model, driven by the real
+//! firmware logic, speaking the real wire protocol.
+//!
+//! ```text
+//! scene -> projector -> LED lines <- gateware model <-> firmware logic <-> packets <-> host
+//!              '-> light -> LED edges, amplifier, noise, ADC -^
+//! ```
+//!
+//! The one law: nothing here decides anything that the firmware or the gateware decides. Time is the ADC
+//! clock of the model, so a seed gives the same bytes on any machine, at any speed.
+
+mod fpga;
+mod link;
+mod optics;
+mod precomputed;
+mod server;
+
+pub use fpga::{OpticalFpga, SimulatedFpga};
+pub use link::MemoryLink;
+pub use optics::{VirtualOptics, VirtualOpticsError};
+pub use precomputed::PrecomputedFpga;
+pub use server::{ServeOptions, ServerEvent, serve};
+
+use nirspi_mcu::{BoardInfo, Camera, Inputs, Limits, Micros, NoLoader, PacketSink, Ports};
+use nirspi_optics::SimulatedDepth;
+use nirspi_wire::Version;
+
+/// Bytes that wait for the host before the link counts as full: what a real device's USB stack holds.
+const OUTBOX_BYTES: usize = 1 << 18;
+/// Device time between depth maps: 15 Hz, as 8 x 8 time-of-flight sensors give.
+const DEPTH_PERIOD: Micros = Micros(66_667);
+/// Zones along one edge of the depth map.
+const DEPTH_SIDE: u8 = 8;
+
+/// Packets on their way to the host.
+#[derive(Debug, Default)]
+pub struct Outbox {
+    bytes: Vec<u8>,
+    committed: usize,
+    sent: usize,
+}
+
+impl PacketSink for Outbox {
+    fn claim(&mut self, length: usize) -> Option<&mut [u8]> {
+        if self.committed - self.sent + length > OUTBOX_BYTES {
+            return None;
+        }
+        let end = self.committed + length;
+        if self.bytes.len() < end {
+            self.bytes.resize(end, 0);
+        }
+        self.bytes.get_mut(self.committed..end)
+    }
+
+    fn commit(&mut self, length: usize) {
+        self.committed += length;
+    }
+}
+
+impl Outbox {
+    /// What waits to be sent.
+    #[must_use]
+    pub fn waiting(&self) -> &[u8] {
+        self.bytes.get(self.sent..self.committed).unwrap_or(&[])
+    }
+
+    /// Whether a frame would find no room.
+    #[must_use]
+    pub fn is_full(&self) -> bool {
+        self.waiting().len() + nirspi_wire::packet::MAX_DEVICE_PACKET > OUTBOX_BYTES
+    }
+
+    /// The first `length` bytes that waited have been sent.
+    pub fn sent(&mut self, length: usize) {
+        self.sent += length;
+        if self.sent >= self.committed {
+            self.sent = 0;
+            self.committed = 0;
+        } else if self.sent > OUTBOX_BYTES {
+            self.bytes.copy_within(self.sent..self.committed, 0);
+            self.committed -= self.sent;
+            self.sent = 0;
+        }
+    }
+
+    fn clear(&mut self) {
+        self.sent = 0;
+        self.committed = 0;
+    }
+}
+
+/// A camera without silicon. `F` is what stands in for the FPGA and everything in front of it.
+pub struct VirtualCamera<F> {
+    camera: Camera,
+    fpga: F,
+    inbox: Vec<u8>,
+    outbox: Outbox,
+    depth: SimulatedDepth,
+    next_depth: Micros,
+    inputs: Inputs,
+}
+
+impl<F: SimulatedFpga> VirtualCamera<F> {
+    /// Powers up.
+    #[must_use]
+    pub fn new(fpga: F, depth: SimulatedDepth, serial: &str) -> Self {
+        let info = BoardInfo::new("virtual", serial, crate_version());
+        Self {
+            camera: Camera::new(info, Limits::default()),
+            fpga,
+            inbox: Vec::new(),
+            outbox: Outbox::default(),
+            depth,
+            next_depth: Micros(0),
+            inputs: Inputs { interlock_closed: true, temperature_centi_celsius: Some(2500) },
+        }
+    }
+
+    /// Bytes from the host. Those that the firmware does not take now are offered again with each step.
+    pub fn receive(&mut self, bytes: &[u8]) {
+        self.inbox.extend_from_slice(bytes);
+        let now = self.now();
+        let ports =
+            &mut Ports { bus: &mut self.fpga, sink: &mut self.outbox, loader: &mut NoLoader };
+        let taken = self.camera.receive(now, &self.inbox, &self.inputs, ports);
+        self.inbox.drain(..taken);
+    }
+
+    /// Lets `clocks` ADC clocks pass, then the firmware look once; whether it found something to do.
+    pub fn step(&mut self, clocks: u32) -> bool {
+        self.fpga.advance(clocks);
+        let now = self.now();
+        let ports =
+            &mut Ports { bus: &mut self.fpga, sink: &mut self.outbox, loader: &mut NoLoader };
+        // Before the poll, which judges how long the host has been silent.
+        if !self.inbox.is_empty() {
+            let taken = self.camera.receive(now, &self.inbox, &self.inputs, ports);
+            self.inbox.drain(..taken);
+        }
+        let worked = self.camera.poll(now, &self.inputs, ports).worked;
+        if now >= self.next_depth {
+            self.next_depth = Micros(now.0 + DEPTH_PERIOD.0);
+            if self.camera.state() == nirspi_wire::State::Running {
+                self.camera.depth(now, DEPTH_SIDE, &self.depth.reading(), ports);
+            }
+        }
+        worked
+    }
+
+    /// Packets that wait for the host.
+    pub fn outbox(&mut self) -> &mut Outbox {
+        &mut self.outbox
+    }
+
+    /// The host has gone.
+    pub fn link_closed(&mut self) {
+        let now = self.now();
+        let ports =
+            &mut Ports { bus: &mut self.fpga, sink: &mut self.outbox, loader: &mut NoLoader };
+        self.camera.link_closed(now, ports);
+        self.inbox.clear();
+        self.outbox.clear();
+    }
+
+    /// Opens or closes the enclosure.
+    pub fn set_interlock(&mut self, closed: bool) {
+        self.inputs.interlock_closed = closed;
+        self.fpga.set_interlock(closed);
+    }
+
+    /// Heats or cools the LED array; `None` unplugs its sensor.
+    pub fn set_temperature(&mut self, centi_celsius: Option<i16>) {
+        self.inputs.temperature_centi_celsius = centi_celsius;
+    }
+
+    /// Device time.
+    #[must_use]
+    pub fn now(&self) -> Micros {
+        Micros(self.fpga.clock() / u64::from(nirspi_wire::ADC_HZ / 1_000_000))
+    }
+
+    /// What stands in for the FPGA.
+    #[must_use]
+    pub fn fpga(&self) -> &F {
+        &self.fpga
+    }
+}
+
+fn crate_version() -> Version {
+    let part = |text: &str| text.parse().unwrap_or(0);
+    Version(
+        part(env!("CARGO_PKG_VERSION_MAJOR")),
+        part(env!("CARGO_PKG_VERSION_MINOR")),
+        part(env!("CARGO_PKG_VERSION_PATCH")),
+    )
+}

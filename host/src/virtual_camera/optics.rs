@@ -1,0 +1,159 @@
+//! What stands in front of the virtual camera: scene, projector, photon budget, receiver.
+
+use super::{OpticalFpga, VirtualCamera};
+use nirspi_optics::{
+    Budget, BudgetError, BudgetSettings, Chain, ChainError, ChainSettings, DepthError, Footprint,
+    LedArray, Projector, ProjectorError, Scene, SimulatedDepth,
+};
+use thiserror::Error;
+
+/// Noise of the simulated time-of-flight sensor: a few millimetres, as such sensors state indoors.
+const DEPTH_NOISE_MM: f64 = 4.0;
+
+/// Everything that light meets on its way, at one distance.
+#[derive(Debug, Clone)]
+pub struct VirtualOptics {
+    scene: Scene,
+    projector: Projector,
+    distance_mm: f64,
+    footprint: Footprint,
+    budget: Budget,
+    chain: ChainSettings,
+}
+
+/// Optics that cannot be.
+#[derive(Debug, Error)]
+pub enum VirtualOpticsError {
+    /// Distance or lens.
+    #[error(transparent)]
+    Projector(#[from] ProjectorError),
+    /// Light.
+    #[error(transparent)]
+    Budget(#[from] BudgetError),
+    /// Receiver.
+    #[error(transparent)]
+    Chain(#[from] ChainError),
+    /// Distance.
+    #[error(transparent)]
+    Depth(#[from] DepthError),
+}
+
+impl VirtualOptics {
+    /// The default camera in front of `scene`, its gain set for a white target at that distance.
+    ///
+    /// # Errors
+    /// A distance that no light covers.
+    pub fn new(scene: Scene, distance_mm: f64) -> Result<Self, VirtualOpticsError> {
+        Self::with_settings(
+            scene,
+            distance_mm,
+            Projector::default(),
+            &BudgetSettings::default(),
+            ChainSettings::default(),
+        )
+    }
+
+    /// As [`new`](Self::new), with everything given. The gain and the daylight in `chain` are replaced by
+    /// those that follow from the budget.
+    ///
+    /// # Errors
+    /// A setting that is not physical.
+    pub fn with_settings(
+        scene: Scene,
+        distance_mm: f64,
+        projector: Projector,
+        budget: &BudgetSettings,
+        mut chain: ChainSettings,
+    ) -> Result<Self, VirtualOpticsError> {
+        let footprint = projector.footprint(&scene, distance_mm)?;
+        let budget = Budget::new(budget, &projector, distance_mm)?;
+        chain.electrons_per_count = chain.auto_gain(&budget)?;
+        chain.ambient_electrons = budget.ambient_electrons(footprint.mean());
+        Ok(Self { scene, projector, distance_mm, footprint, budget, chain })
+    }
+
+    /// Replaces the receiver by an exact one: no noise, no settling, no daylight, no latency. For tests
+    /// that compare bits.
+    #[must_use]
+    pub fn ideal(mut self) -> Self {
+        let electrons_per_count = self.chain.electrons_per_count;
+        self.chain = ChainSettings { electrons_per_count, ..ChainSettings::ideal() };
+        self
+    }
+
+    /// Mean reflectance that each LED sees, row-major.
+    #[must_use]
+    pub fn footprint(&self) -> &Footprint {
+        &self.footprint
+    }
+
+    /// What a perfect camera of 32 x 32 pixels would see: the scene without blur by defocus, as if the
+    /// lens were focused at the target.
+    ///
+    /// # Errors
+    /// Never for optics that could be made: the same scene at the same distance.
+    pub fn focused_footprint(&self) -> Result<Footprint, ProjectorError> {
+        let perfect = Projector {
+            aperture_mm: 1e-3,
+            emitter_mm: self.projector.led_pitch_mm,
+            ..self.projector
+        };
+        perfect.footprint(&self.scene, self.distance_mm)
+    }
+
+    /// Distance of the target.
+    #[must_use]
+    pub fn distance_mm(&self) -> f64 {
+        self.distance_mm
+    }
+
+    /// Side of the field that the LEDs light, on the target.
+    #[must_use]
+    pub fn field_mm(&self) -> f64 {
+        self.projector.field_mm(self.distance_mm)
+    }
+
+    /// Diameter of the defocus disc on the target.
+    #[must_use]
+    pub fn blur_mm(&self) -> f64 {
+        self.projector.blur_mm(self.distance_mm)
+    }
+
+    /// Electrons per ADC sample.
+    #[must_use]
+    pub fn budget(&self) -> &Budget {
+        &self.budget
+    }
+
+    /// The receiver.
+    #[must_use]
+    pub fn chain(&self) -> &ChainSettings {
+        &self.chain
+    }
+
+    /// Puts gateware and ADC behind the optics.
+    ///
+    /// # Errors
+    /// A receiver setting out of range.
+    pub fn fpga(&self, seed: u64) -> Result<OpticalFpga, ChainError> {
+        let array = LedArray::new(&self.footprint, self.budget.electrons_per_led);
+        Ok(OpticalFpga::new(array, Chain::new(self.chain, seed)?))
+    }
+
+    /// The time-of-flight sensor beside the camera.
+    ///
+    /// # Errors
+    /// A distance that it cannot read.
+    pub fn depth(&self, seed: u64) -> Result<SimulatedDepth, DepthError> {
+        SimulatedDepth::new(self.distance_mm, DEPTH_NOISE_MM, 0, seed)
+    }
+
+    /// The whole camera.
+    ///
+    /// # Errors
+    /// A setting out of range.
+    pub fn camera(&self, seed: u64) -> Result<VirtualCamera<OpticalFpga>, VirtualOpticsError> {
+        let serial = format!("virtual-{seed}");
+        Ok(VirtualCamera::new(self.fpga(seed)?, self.depth(seed)?, &serial))
+    }
+}

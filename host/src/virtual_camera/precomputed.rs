@@ -1,0 +1,194 @@
+//! Frames computed beforehand, for load tests of everything after the FPGA.
+//!
+//! The simulator makes some hundred frames a second, the instrument up to 24 414. Here the first frames of a
+//! run go through the simulator once; then they are offered again and again, as fast as the firmware
+//! takes them, each with its own sequence number, clock and checksum. Firmware logic, protocol, link and host
+//! see nothing but a camera at full speed. Everything but frames (registers, raw bursts) is the model's.
+
+use super::fpga::SimulatedFpga;
+use nirspi_mcu::{BusError, FpgaBus};
+use nirspi_wire::crc32;
+use nirspi_wire::fpga::{CRC_BYTES, FpgaFrame, HEADER_BYTES, Header};
+use nirspi_wire::register::{Register, control, status};
+
+/// Clocks after which a frame that the model owes is given up.
+const PATIENCE_CLOCKS: u64 = 1 << 32;
+
+/// An FPGA that repeats its first frames.
+pub struct PrecomputedFpga<F> {
+    model: F,
+    /// Frames of each run that the model computes.
+    count: usize,
+    run: Option<Run>,
+    /// Clocks of the frames offered so far, in all runs.
+    repeated_clocks: u64,
+}
+
+/// A run of repeated frames.
+struct Run {
+    frames: Vec<Vec<u8>>,
+    frame_clocks: u64,
+    /// Sequence number of the frame on offer.
+    sequence: u32,
+    /// Frames of the run; 0 goes on until stopped.
+    length: u32,
+    ended: bool,
+    first_clock: u64,
+    /// Whether the bytes on offer carry this sequence number already.
+    stamped: bool,
+}
+
+impl Run {
+    fn offers(&self) -> bool {
+        !self.ended && (self.length == 0 || self.sequence < self.length)
+    }
+
+    fn slot(&self) -> usize {
+        self.sequence as usize % self.frames.len()
+    }
+
+    /// Gives the frame on offer its own header and checksum.
+    fn stamp(&mut self) -> Option<&[u8]> {
+        let slot = self.slot();
+        let frame = self.frames.get_mut(slot)?;
+        if !self.stamped {
+            let header = FpgaFrame::parse_header(frame)?;
+            let clock = self.first_clock + u64::from(self.sequence) * self.frame_clocks;
+            let header = Header { sequence: self.sequence, lost: 0, clock, ..header };
+            frame.get_mut(..HEADER_BYTES)?.copy_from_slice(&header.to_bytes());
+            let (covered, crc) = frame.split_last_chunk_mut::<CRC_BYTES>()?;
+            *crc = crc32(covered).to_le_bytes();
+            self.stamped = true;
+        }
+        Some(frame)
+    }
+}
+
+impl<F: SimulatedFpga> PrecomputedFpga<F> {
+    /// Repeats the first `count` frames of every run of `model`.
+    #[must_use]
+    pub fn new(model: F, count: usize) -> Self {
+        Self { model, count: count.max(1), run: None, repeated_clocks: 0 }
+    }
+
+    /// Starts the model and takes its first frames, then stops it. If it refuses, its registers say why.
+    fn start(&mut self) -> Result<(), BusError> {
+        let length = self.model.read(Register::Frames.address())?;
+        self.model.write(Register::Frames.address(), 0)?;
+        self.model.write(Register::Control.address(), control::START)?;
+        let first_clock = self.clock();
+        let begun = self.model.clock();
+        let mut frames = Vec::new();
+        while frames.len() < self.count
+            && self.model.read(Register::Status.address())? & status::RUNNING != 0
+            && self.model.clock() - begun < PATIENCE_CLOCKS
+        {
+            self.model.advance(64);
+            if self.model.frame_ready() {
+                frames.extend(self.model.frame()?.map(<[u8]>::to_vec));
+                self.model.write(Register::Control.address(), control::RELEASE)?;
+            }
+        }
+        self.model.write(Register::Control.address(), control::STOP)?;
+        self.model.write(Register::Frames.address(), length)?;
+        self.run = None;
+        if let Some(frame_clocks) = frame_clocks(&frames) {
+            self.run = Some(Run {
+                frames,
+                frame_clocks,
+                sequence: 0,
+                length,
+                ended: false,
+                first_clock,
+                stamped: false,
+            });
+        }
+        Ok(())
+    }
+}
+
+/// Clocks from one frame to the next, of frames in sequence.
+fn frame_clocks(frames: &[Vec<u8>]) -> Option<u64> {
+    let clock = |frame: &Vec<u8>| FpgaFrame::parse_header(frame).map(|header| header.clock);
+    match frames {
+        [] => None,
+        [_] => Some(0),
+        [first, second, ..] => Some(clock(second)? - clock(first)?),
+    }
+}
+
+impl<F: SimulatedFpga> SimulatedFpga for PrecomputedFpga<F> {
+    fn advance(&mut self, clocks: u32) {
+        // During a run time is that of the frames offered.
+        if !self.run.as_ref().is_some_and(Run::offers) {
+            self.model.advance(clocks);
+        }
+    }
+
+    fn clock(&self) -> u64 {
+        self.model.clock() + self.repeated_clocks
+    }
+
+    fn running(&self) -> bool {
+        self.run.as_ref().is_some_and(Run::offers) || self.model.running()
+    }
+
+    fn set_interlock(&mut self, closed: bool) {
+        self.model.set_interlock(closed);
+    }
+}
+
+impl<F: SimulatedFpga> FpgaBus for PrecomputedFpga<F> {
+    fn read(&mut self, address: u16) -> Result<u32, BusError> {
+        let value = self.model.read(address)?;
+        let Some(run) = &self.run else { return Ok(value) };
+        Ok(match Register::at(address) {
+            Some(Register::FramesMade) => run.sequence,
+            Some(Register::FramesLost) => 0,
+            Some(Register::Status) if run.offers() => {
+                value | status::RUNNING | status::LEDS_ON | status::FRAME_READY
+            }
+            _ => value,
+        })
+    }
+
+    fn write(&mut self, address: u16, value: u32) -> Result<(), BusError> {
+        if Register::at(address) != Some(Register::Control) {
+            return self.model.write(address, value);
+        }
+        if let Some(run) = &mut self.run {
+            if value & control::RELEASE != 0 && run.offers() {
+                run.sequence += 1;
+                run.stamped = false;
+                self.repeated_clocks += run.frame_clocks;
+            }
+            if value & control::STOP != 0 {
+                run.ended = true;
+            }
+        }
+        if value & control::START_RAW != 0 {
+            self.run = None;
+        }
+        self.model.write(address, value & !control::START)?;
+        if value & control::START != 0 {
+            self.start()?;
+        }
+        Ok(())
+    }
+
+    fn frame_ready(&mut self) -> bool {
+        self.run.as_ref().is_some_and(Run::offers)
+    }
+
+    fn raw_ready(&mut self) -> bool {
+        self.model.raw_ready()
+    }
+
+    fn frame(&mut self) -> Result<Option<&[u8]>, BusError> {
+        Ok(self.run.as_mut().filter(|run| run.offers()).and_then(Run::stamp))
+    }
+
+    fn raw(&mut self) -> Result<Option<&[u8]>, BusError> {
+        self.model.raw()
+    }
+}

@@ -1,0 +1,172 @@
+//! The FPGA by the names of its registers.
+//!
+//! The one law: what is read back is believed, what was written is not.
+
+use crate::configure::Setup;
+use crate::{BusError, FpgaBus, Limits};
+use nirspi_wire::register::{FaultCode, IDENTITY, ORDER_TABLE, Register, control, status};
+use nirspi_wire::samples::Words;
+use nirspi_wire::{Fault, Version};
+
+pub(crate) fn read(bus: &mut impl FpgaBus, register: Register) -> Result<u32, BusError> {
+    bus.read(register.address())
+}
+
+pub(crate) fn write(
+    bus: &mut impl FpgaBus,
+    register: Register,
+    value: u32,
+) -> Result<(), BusError> {
+    bus.write(register.address(), value)
+}
+
+pub(crate) fn control(bus: &mut impl FpgaBus, bits: u32) -> Result<(), BusError> {
+    write(bus, Register::Control, bits)
+}
+
+/// Fault of an FPGA that does not answer at all.
+pub(crate) const SILENT: Fault = Fault::FpgaAbsent { identity: 0 };
+
+/// Whether the FPGA is there.
+pub(crate) fn identify(bus: &mut impl FpgaBus) -> Result<(), Fault> {
+    match read(bus, Register::Identity) {
+        Ok(IDENTITY) => Ok(()),
+        Ok(identity) => Err(Fault::FpgaAbsent { identity }),
+        Err(_) => Err(SILENT),
+    }
+}
+
+/// Status of an FPGA that is there and has no fault latched.
+pub(crate) fn health(bus: &mut impl FpgaBus) -> Result<u32, Fault> {
+    identify(bus)?;
+    let status = read(bus, Register::Status).map_err(|_| SILENT)?;
+    if status & status::FAULT == 0 {
+        return Ok(status);
+    }
+    let code = read(bus, Register::Fault).map_err(|_| SILENT)?;
+    Err(match FaultCode::from_register(code) {
+        Some(FaultCode::Watchdog) => Fault::FpgaWatchdog,
+        Some(FaultCode::Duty) => Fault::Duty,
+        Some(FaultCode::OverRange) => Fault::OverRange,
+        Some(FaultCode::Interlock) => Fault::Interlock,
+        // A fault that this firmware has no name for: not the gateware it was written for.
+        Some(FaultCode::None) | None => Fault::FpgaAbsent { identity: IDENTITY },
+    })
+}
+
+/// Version of the gateware; 0.0.0 where none answers.
+pub(crate) fn version(bus: &mut impl FpgaBus) -> Version {
+    match (identify(bus), read(bus, Register::Version)) {
+        (Ok(()), Ok(word)) => {
+            let [_, major, minor, patch] = word.to_be_bytes();
+            Version(major, minor, patch)
+        }
+        _ => Version(0, 0, 0),
+    }
+}
+
+/// Clocks since the FPGA's reset.
+pub(crate) fn clock(bus: &mut impl FpgaBus) -> Result<u64, BusError> {
+    let low = read(bus, Register::ClockLow)?;
+    let high = read(bus, Register::ClockHigh)?;
+    Ok(u64::from(high) << 32 | u64::from(low))
+}
+
+/// What was written did not arrive.
+#[derive(Debug)]
+pub(crate) struct NotTaken;
+
+impl From<BusError> for NotTaken {
+    fn from(_: BusError) -> Self {
+        Self
+    }
+}
+
+/// Ends whatever runs, and looks that the LEDs are off.
+pub(crate) fn go_dark(bus: &mut impl FpgaBus) -> Result<(), NotTaken> {
+    control(bus, control::STOP)?;
+    let lit = read(bus, Register::Status)? & (status::RUNNING | status::LEDS_ON);
+    if lit == 0 { Ok(()) } else { Err(NotTaken) }
+}
+
+/// Stops, and clears the latched fault; what still stands against a start.
+pub(crate) fn acknowledge(bus: &mut impl FpgaBus) -> Result<(), Fault> {
+    identify(bus)?;
+    control(bus, control::STOP | control::CLEAR_FAULT).map_err(|_| SILENT)?;
+    if health(bus)? & status::INTERLOCK_CLOSED == 0 {
+        return Err(Fault::Interlock);
+    }
+    Ok(())
+}
+
+fn settings(setup: &Setup, limits: &Limits) -> [(Register, u32); 9] {
+    [
+        (Register::Mode, setup.mode),
+        (Register::Patterns, u32::from(setup.patterns)),
+        (Register::Dwell, u32::from(setup.dwell)),
+        (Register::Blank, u32::from(setup.blank)),
+        (Register::Latency, u32::from(setup.latency)),
+        (Register::Sweeps, setup.sweeps),
+        (Register::OverRangeTrip, setup.over_range_trip),
+        (Register::Watchdog, limits.watchdog_clocks),
+        (Register::DutyLimit, limits.duty_budget()),
+    ]
+}
+
+/// Writes all settings of a run but its length, and reads them back.
+pub(crate) fn set(bus: &mut impl FpgaBus, setup: &Setup, limits: &Limits) -> Result<(), NotTaken> {
+    for (register, value) in settings(setup, limits) {
+        write(bus, register, value)?;
+    }
+    verify(bus, setup, limits)
+}
+
+/// Whether the settings still stand: an FPGA that has been reset has forgotten them.
+pub(crate) fn verify(
+    bus: &mut impl FpgaBus,
+    setup: &Setup,
+    limits: &Limits,
+) -> Result<(), NotTaken> {
+    for (register, value) in settings(setup, limits) {
+        if read(bus, register)? != value {
+            return Err(NotTaken);
+        }
+    }
+    Ok(())
+}
+
+/// Writes the order table and reads it back: one wrong entry would scramble images without a trace.
+pub(crate) fn set_table(bus: &mut impl FpgaBus, table: &Words<'_>) -> Result<(), NotTaken> {
+    for (address, entry) in (ORDER_TABLE..).zip(table.iter()) {
+        bus.write(address, u32::from(entry))?;
+    }
+    for (address, entry) in (ORDER_TABLE..).zip(table.iter()) {
+        if bus.read(address)? != u32::from(entry) {
+            return Err(NotTaken);
+        }
+    }
+    Ok(())
+}
+
+/// Starts a run (`control::START`) or raw burst (`control::START_RAW`); whether the FPGA took it.
+pub(crate) fn start(bus: &mut impl FpgaBus, command: u32) -> Result<Started, Fault> {
+    control(bus, command).map_err(|_| SILENT)?;
+    let status = health(bus)?;
+    if status & status::RUNNING != 0 {
+        Ok(Started::Running)
+    } else if status & status::CONFIG_ERROR != 0 {
+        Err(Fault::FpgaConfiguration)
+    } else if status & status::INTERLOCK_CLOSED == 0 {
+        Err(Fault::Interlock)
+    } else {
+        Ok(Started::OverAlready)
+    }
+}
+
+/// What a start has led to by the time its status is read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Started {
+    Running,
+    /// Not running, and no reason against it: a few frames take less time than a register read.
+    OverAlready,
+}

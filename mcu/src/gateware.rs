@@ -1,0 +1,76 @@
+//! A bitstream on its way to the FPGA, piece by piece.
+//!
+//! The one law: the loader is told to finish only when every byte has come, in order, and the checksum over
+//! all of them is right.
+
+use crate::{GatewareLoader, LoadError};
+use nirspi_wire::{Crc32, GatewareChunk, Refusal};
+
+/// A bitstream of which the beginning has come.
+#[derive(Debug)]
+pub(crate) struct Loading {
+    total: u32,
+    crc: u32,
+    next_offset: u32,
+    received: Crc32,
+}
+
+/// Takes a piece; returns where the next one belongs. A piece at 0 starts over. A refused piece leaves what
+/// came before as it was; a loader's error or a wrong checksum forgets it.
+pub(crate) fn take(
+    loading: &mut Option<Loading>,
+    chunk: &GatewareChunk<'_>,
+    loader: &mut impl GatewareLoader,
+) -> Result<u32, Refusal> {
+    let expected = match loading {
+        Some(Loading { total, crc, next_offset, .. })
+            if (*total, *crc) == (chunk.total, chunk.crc) =>
+        {
+            *next_offset
+        }
+        _ => 0,
+    };
+    let end = u32::try_from(chunk.data.len()).ok().and_then(|n| chunk.offset.checked_add(n));
+    let end = match end {
+        Some(end) if end <= chunk.total && (chunk.offset == 0 || chunk.offset == expected) => end,
+        _ => return Err(Refusal::GatewareOffset { expected }),
+    };
+    let progress = step(loading, chunk, end, loader);
+    if progress.is_err() || end == chunk.total {
+        *loading = None;
+    }
+    progress.map(|()| end)
+}
+
+fn step(
+    loading: &mut Option<Loading>,
+    chunk: &GatewareChunk<'_>,
+    end: u32,
+    loader: &mut impl GatewareLoader,
+) -> Result<(), Refusal> {
+    if chunk.offset == 0 {
+        loader.begin(chunk.total).map_err(refusal)?;
+        let &GatewareChunk { total, crc, .. } = chunk;
+        *loading = Some(Loading { total, crc, next_offset: 0, received: Crc32::new() });
+    }
+    let Some(loading) = loading else {
+        return Err(Refusal::GatewareOffset { expected: 0 });
+    };
+    loader.write(chunk.data).map_err(refusal)?;
+    loading.received.update(chunk.data);
+    loading.next_offset = end;
+    if end < chunk.total {
+        return Ok(());
+    }
+    if loading.received.value() != chunk.crc {
+        return Err(Refusal::GatewareCrc);
+    }
+    loader.finish().map_err(refusal)
+}
+
+fn refusal(error: LoadError) -> Refusal {
+    match error {
+        LoadError::Unsupported => Refusal::Unsupported,
+        LoadError::Device => Refusal::Bus,
+    }
+}

@@ -1,0 +1,67 @@
+//! Firmware logic of the nirspi camera: every decision, no hardware.
+//!
+//! A board owns the peripherals and a loop; [`Camera`] owns everything that a test would want to see. The
+//! board hands it bytes from the host ([`Camera::receive`]) and calls [`Camera::poll`] as often as it can,
+//! with the time, its sensors and its [`Ports`]. Neither call waits, allocates, panics or reads a clock.
+//!
+//! ```
+//! use nirspi_mcu::{Camera, FpgaBus, GatewareLoader, Inputs, Micros, PacketSink, Ports, Progress};
+//!
+//! /// One turn of a board's loop; `inbox` holds what came from the host and was not taken yet.
+//! fn turn<B: FpgaBus, S: PacketSink, G: GatewareLoader>(
+//!     camera: &mut Camera,
+//!     now: Micros,
+//!     inputs: &Inputs,
+//!     inbox: &mut Vec<u8>,
+//!     ports: &mut Ports<'_, B, S, G>,
+//! ) -> Progress {
+//!     let taken = camera.receive(now, inbox, inputs, ports);
+//!     inbox.drain(..taken);
+//!     camera.poll(now, inputs, ports)
+//! }
+//! ```
+//!
+//! One idea a module: `safety` (sensors), `configure` (checks), `fpga` (registers), `session` (commands), `run`
+//! and `burst` (data), `selftest`, `gateware`, `outbox` (what waits for the link), `camera` (who is asked when).
+#![no_std]
+#![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+#![deny(clippy::arithmetic_side_effects)]
+#![cfg_attr(
+    test,
+    allow(
+        clippy::indexing_slicing,
+        clippy::unwrap_used,
+        clippy::expect_used,
+        clippy::panic,
+        clippy::arithmetic_side_effects
+    )
+)]
+
+#[cfg(test)]
+extern crate std;
+
+mod burst;
+mod camera;
+mod configure;
+mod fpga;
+mod gateware;
+mod limits;
+mod outbox;
+mod ports;
+mod run;
+mod safety;
+mod selftest;
+mod session;
+mod time;
+
+#[cfg(test)]
+mod tests;
+
+pub use burst::RAW_PIECE_SAMPLES;
+pub use camera::Camera;
+pub use limits::Limits;
+pub use ports::{
+    BoardInfo, BusError, FpgaBus, GatewareLoader, Inputs, LoadError, NAME_BYTES, NoLoader,
+    PacketSink, Ports, Progress,
+};
+pub use time::{CLOCKS_PER_MICRO, Micros};

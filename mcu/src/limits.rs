@@ -1,0 +1,85 @@
+//! Limits that protect people, LEDs and the measurement.
+//!
+//! The one law: a limit is a number of the board, set when it is built; no command changes one.
+
+use crate::time::Micros;
+use nirspi_wire::message::HOST_SILENCE_US;
+use nirspi_wire::{ADC_HZ, register};
+
+/// Limits of one board.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Limits {
+    /// Longest time without a valid command while LEDs are on.
+    pub host_silence: Micros,
+    /// Largest share of the array lit, in thousandths, over any of the FPGA's duty windows.
+    pub duty_permille_max: u16,
+    /// At and above this the LEDs go off.
+    pub trip_centi_celsius: i16,
+    /// An over-temperature can be acknowledged at and below this.
+    pub release_centi_celsius: i16,
+    /// Readings below this mean a broken sensor.
+    pub plausible_min_centi_celsius: i16,
+    /// Readings above this mean a broken sensor.
+    pub plausible_max_centi_celsius: i16,
+    /// A run has stalled when no frame came for this many times a frame's duration...
+    pub stall_frames: u32,
+    /// ...and for at least this long, which short frames need.
+    pub stall_min: Micros,
+    /// How often the FPGA's identity, status and fault are looked at during a run.
+    pub running_check: Micros,
+    /// The same while LEDs are off.
+    pub resting_check: Micros,
+    /// The FPGA ends a run after this many clocks of 8 ns without an access from the firmware; 1 to
+    /// [`register::WATCHDOG_MAX`], and longer than `running_check`.
+    pub watchdog_clocks: u32,
+}
+
+impl Default for Limits {
+    /// For the reference board:
+    ///
+    /// | limit | value | because |
+    /// |---|---|---|
+    /// | host silence | 5 s | [`HOST_SILENCE_US`], which hosts count on; ours asks for `Status` every second |
+    /// | duty | 625 per mille | what the gateware allows at most, [`register::DUTY_LIMIT_MAX`] |
+    /// | trip, release | 60, 50 °C | below the 70 to 85 °C that InGaAsP LEDs are commonly rated for, as air, not junction |
+    /// | plausible | -40 to 125 °C | range of common digital sensors; an open line reads far outside |
+    /// | stall | 8 frames, at least 250 ms | longer than any pause of a board that is well, and than the watchdog |
+    /// | checks | 1 ms, 100 ms | two reads each: under 1 % of the bus |
+    /// | watchdog | 200 ms | the gateware's own reset value |
+    fn default() -> Self {
+        Self {
+            host_silence: Micros(HOST_SILENCE_US),
+            duty_permille_max: 625,
+            trip_centi_celsius: 6_000,
+            release_centi_celsius: 5_000,
+            plausible_min_centi_celsius: -4_000,
+            plausible_max_centi_celsius: 12_500,
+            stall_frames: 8,
+            stall_min: Micros(250_000),
+            running_check: Micros(1_000),
+            resting_check: Micros(100_000),
+            watchdog_clocks: ADC_HZ / 5,
+        }
+    }
+}
+
+impl Limits {
+    /// Light that the FPGA lets pass in each window: the full array lit costs 2 a clock.
+    pub(crate) fn duty_budget(&self) -> u32 {
+        let full = 2 * u64::from(register::DUTY_WINDOW);
+        let budget = full.saturating_mul(self.duty_permille_max.into()) / 1000;
+        u32::try_from(budget).unwrap_or(u32::MAX).min(register::DUTY_LIMIT_MAX)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_default_duty_is_the_most_that_the_gateware_takes() {
+        assert_eq!(Limits::default().duty_budget(), register::DUTY_LIMIT_MAX);
+        let half = Limits { duty_permille_max: 500, ..Limits::default() };
+        assert_eq!(half.duty_budget(), register::DUTY_WINDOW);
+    }
+}

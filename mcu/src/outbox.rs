@@ -1,0 +1,123 @@
+//! Replies and events that wait for room on the link.
+//!
+//! The one law: what is put in comes out once, in order. A command is taken only while there is
+//! [room](Outbox::has_room_for_a_command) for its reply and for all that can follow it on its own accord.
+
+use crate::{BoardInfo, PacketSink};
+use heapless::Deque;
+use nirspi_wire::packet::{encode, overhead};
+use nirspi_wire::{
+    ADC_BITS, ADC_HZ, Answer, DeviceMessage, Event, Identity, PROTOCOL_VERSION, Refusal, Reply,
+    SIDE, Version,
+};
+
+/// Wavelength of the LEDs (paper, section 2.A).
+const WAVELENGTH_NM: u16 = 1550;
+
+/// A command's outcome that borrows nothing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Outcome {
+    /// The rest of the identity is filled in when it is sent.
+    Hello {
+        gateware: Version,
+    },
+    Other(Result<Answer<'static>, Refusal>),
+}
+
+impl Outcome {
+    pub const DONE: Self = Self::Other(Ok(Answer::Done));
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Notice {
+    Reply { id: u16, outcome: Outcome },
+    Event(Event),
+}
+
+/// Notices that wait.
+const CAPACITY: usize = 16;
+
+/// The most that one command can lead to before the next one is taken: its reply, a fault, the end of a
+/// run (or the loss of a raw burst).
+const NOTICES_OF_A_COMMAND: usize = 3;
+
+/// Bytes of postcard of the longest notice: an identity with two full names is 91 at most.
+const NOTICE_BYTES: usize = 128;
+
+#[derive(Debug, Default)]
+pub(crate) struct Outbox(Deque<Notice, CAPACITY>);
+
+impl Outbox {
+    pub fn push(&mut self, notice: Notice) {
+        let pushed = self.0.push_back(notice);
+        debug_assert!(pushed.is_ok(), "a command was taken without room for what it leads to");
+    }
+
+    pub fn has_room_for_a_command(&self) -> bool {
+        CAPACITY.saturating_sub(self.0.len()) >= NOTICES_OF_A_COMMAND
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    pub fn clear(&mut self) {
+        self.0.clear();
+    }
+
+    /// Sends what the link has room for; whether that was anything.
+    pub fn flush(&mut self, info: &BoardInfo, sink: &mut impl PacketSink) -> bool {
+        let mut worked = false;
+        while let Some(notice) = self.0.front() {
+            if !send(&message(notice, info), NOTICE_BYTES, sink) {
+                break;
+            }
+            self.0.pop_front();
+            worked = true;
+        }
+        worked
+    }
+}
+
+fn message<'m>(notice: &Notice, info: &'m BoardInfo) -> DeviceMessage<'m> {
+    match *notice {
+        Notice::Event(event) => DeviceMessage::Event(event),
+        Notice::Reply { id, outcome: Outcome::Other(outcome) } => {
+            DeviceMessage::Reply(Reply { id, outcome })
+        }
+        Notice::Reply { id, outcome: Outcome::Hello { gateware } } => {
+            let identity = Identity {
+                protocol: PROTOCOL_VERSION,
+                firmware: info.firmware,
+                gateware,
+                board: &info.board,
+                serial: &info.serial,
+                side: SIDE,
+                adc_hz: ADC_HZ,
+                adc_bits: ADC_BITS,
+                wavelength_nm: WAVELENGTH_NM,
+            };
+            DeviceMessage::Reply(Reply { id, outcome: Ok(Answer::Hello(identity)) })
+        }
+    }
+}
+
+/// Bytes of postcard around the samples of a frame, a raw burst or a depth map, at most.
+pub(crate) const STREAM_HEADER_BYTES: usize = 64;
+
+/// Sends a message of at most `payload` bytes of postcard; `false`: the link has no room for it.
+pub(crate) fn send(
+    message: &DeviceMessage<'_>,
+    payload: usize,
+    sink: &mut impl PacketSink,
+) -> bool {
+    let Some(room) = sink.claim(payload.saturating_add(overhead(payload))) else {
+        return false;
+    };
+    let Ok(packet) = encode(message, room) else {
+        return false;
+    };
+    let length = packet.len();
+    sink.commit(length);
+    true
+}

@@ -1,0 +1,161 @@
+//! Checks of the device without any optics.
+//!
+//! The one law: a self-test leaves the configuration as it found it, and lights the array for no more than
+//! one sweep, which is 82 microseconds.
+//!
+//! The FPGA drives the LEDs in every run, so the test frame cannot be dark: it is one sweep at the fastest
+//! rate, each pattern followed by its complement, so every LED is lit for half of 82 microseconds. It is
+//! left out (not in [`SelfTestReport::ran`]) where a fault stands, a sensor objects, or the bus has failed.
+
+use crate::camera::{Activity, Machine};
+use crate::configure::Setup;
+use crate::outbox::Outcome;
+use crate::{BusError, FpgaBus, Inputs, Limits, Micros, fpga, safety};
+use nirspi_wire::fpga::{FpgaFrame, Sums};
+use nirspi_wire::register::{Register, TEST_SEED, control, mode, status, test_sample};
+use nirspi_wire::{Answer, CLOCKS_PER_PATTERN, FrameFlags, PATTERNS, SelfTestReport};
+
+/// Longest time that the test frame may take: it needs 82 microseconds and a transfer.
+const TEST_PATIENCE: Micros = Micros(100_000);
+
+/// Every pattern and its complement, so that every accumulator of the FPGA takes part.
+const TEST_SETUP: Setup = Setup {
+    mode: mode::DIFFERENTIAL | mode::TEST_SOURCE,
+    patterns: PATTERNS,
+    dwell: CLOCKS_PER_PATTERN,
+    blank: 2,
+    latency: 3,
+    sweeps: 1,
+    over_range_trip: 0,
+    duty_permille: 500,
+};
+
+const TEST_FLAGS: FrameFlags = FrameFlags::TEST_SOURCE.with(FrameFlags::DIFFERENTIAL);
+
+/// A test frame under way.
+#[derive(Debug)]
+pub(crate) struct TestFrame {
+    id: u16,
+    report: SelfTestReport,
+    since: Micros,
+}
+
+/// Checks that are done at once.
+fn examine(bus: &mut impl FpgaBus, inputs: &Inputs, limits: &Limits) -> SelfTestReport {
+    let mut report = SelfTestReport::default();
+    note(&mut report, SelfTestReport::FPGA_IDENTITY, fpga::identify(bus).is_ok());
+    note(&mut report, SelfTestReport::FPGA_BUS, every_bit_holds(bus).unwrap_or(false));
+    let dark = fpga::read(bus, Register::Status)
+        .is_ok_and(|status| status & (status::LEDS_ON | status::RUNNING) == 0);
+    note(&mut report, SelfTestReport::LEDS_OFF, dark);
+    let reading = inputs.temperature_centi_celsius;
+    let plausible = reading.is_some_and(|reading| safety::plausible(reading, limits));
+    note(&mut report, SelfTestReport::TEMPERATURE, plausible);
+    note(&mut report, SelfTestReport::INTERLOCK, inputs.interlock_closed);
+    report
+}
+
+fn note(report: &mut SelfTestReport, check: u32, passed: bool) {
+    report.ran |= check;
+    if !passed {
+        report.failed |= check;
+    }
+}
+
+/// Walks a 1 through zeros and a 0 through ones.
+fn every_bit_holds(bus: &mut impl FpgaBus) -> Result<bool, BusError> {
+    for bit in 0..u32::BITS {
+        for word in [1 << bit, !(1 << bit)] {
+            fpga::write(bus, Register::Scratch, word)?;
+            if fpga::read(bus, Register::Scratch)? != word {
+                return Ok(false);
+            }
+        }
+    }
+    Ok(true)
+}
+
+/// The sums of the test frame.
+pub(crate) fn expected_sums() -> impl Iterator<Item = Sums> {
+    let mut state = TEST_SEED;
+    let mut sample = move || {
+        let this = state;
+        state = test_sample(state);
+        u64::from(this)
+    };
+    // What is sampled before the first light arrives belongs to nothing.
+    for _ in 0..TEST_SETUP.latency {
+        sample();
+    }
+    let mut slot = move || {
+        let blanked = (0..TEST_SETUP.blank).map(|_| sample()).map(|_| 0);
+        let blanked: u64 = blanked.sum();
+        (TEST_SETUP.blank..TEST_SETUP.dwell).fold(blanked, |sum, _| sum.saturating_add(sample()))
+    };
+    (0..TEST_SETUP.patterns).map(move |_| Sums { positive: slot(), negative: slot() })
+}
+
+fn is_the_test_frame(bytes: &[u8]) -> bool {
+    FpgaFrame::parse(bytes).is_ok_and(|frame| {
+        frame.header.sweeps == TEST_SETUP.sweeps
+            && frame.header.flags == TEST_FLAGS
+            && frame.sums().eq(expected_sums())
+    })
+}
+
+impl Machine {
+    /// `SelfTest`; the reply comes when the test frame is through.
+    pub(crate) fn self_test(
+        &mut self,
+        id: u16,
+        now: Micros,
+        inputs: &Inputs,
+        bus: &mut impl FpgaBus,
+    ) {
+        let report = examine(bus, inputs, &self.limits);
+        let may_light = report.failed == 0
+            && self.fault.is_none()
+            && safety::objection(inputs, &self.limits, None).is_none();
+        if !may_light {
+            return self.reply(id, Outcome::Other(Ok(Answer::SelfTest(report))));
+        }
+        let test = TestFrame { id, report, since: now };
+        let begun = fpga::set(bus, &TEST_SETUP, &self.limits).is_ok()
+            && fpga::write(bus, Register::Frames, 1).is_ok()
+            && fpga::start(bus, control::START).is_ok();
+        self.activity = Activity::TestFrame(test);
+        self.release_pending = false;
+        if !begun {
+            self.finish_test(false, bus);
+        }
+    }
+
+    /// Takes the test frame if it has come.
+    pub(crate) fn step_test(&mut self, now: Micros, bus: &mut impl FpgaBus) -> bool {
+        let Activity::TestFrame(test) = &self.activity else { return false };
+        let late = now.since(test.since) > TEST_PATIENCE;
+        let passed = match bus.frame_ready().then(|| bus.frame().map(|b| b.map(is_the_test_frame)))
+        {
+            None | Some(Ok(None)) if !late => return false,
+            Some(Ok(Some(passed))) => passed,
+            _ => false,
+        };
+        self.finish_test(passed, bus);
+        true
+    }
+
+    /// LEDs off, the configuration back in place, and the reply.
+    pub(crate) fn finish_test(&mut self, passed: bool, bus: &mut impl FpgaBus) {
+        let Activity::TestFrame(TestFrame { id, mut report, .. }) = self.activity else { return };
+        note(&mut report, SelfTestReport::TEST_FRAME, passed);
+        self.activity = Activity::Resting;
+        self.leds_off(bus);
+        self.release_pending = fpga::control(bus, control::RELEASE).is_err();
+        if let Some(setup) = self.setup
+            && fpga::set(bus, &setup, &self.limits).is_err()
+        {
+            self.setup = None;
+        }
+        self.reply(id, Outcome::Other(Ok(Answer::SelfTest(report))));
+    }
+}

@@ -1,0 +1,276 @@
+//! An FPGA that does what a test says: its registers, one frame, and every way to fail.
+
+use crate::{BusError, FpgaBus};
+use nirspi_wire::fpga::{Header, Sums};
+use nirspi_wire::register::{
+    DUTY_LIMIT_MAX, FaultCode, IDENTITY, ORDER_TABLE, Register, TEST_SEED, control, mode, status,
+    test_sample,
+};
+use nirspi_wire::{FrameFlags, crc32};
+use std::collections::BTreeMap;
+use std::vec::Vec;
+
+/// Register file and frame buffer; runs make frames only when the test says so.
+pub struct FakeFpga {
+    pub registers: BTreeMap<u16, u32>,
+    pub identity: u32,
+    pub interlock_closed: bool,
+    pub fault: FaultCode,
+    pub running: bool,
+    pub made: u32,
+    pub lost: u32,
+    pub clock: u64,
+    pub frame: Option<Vec<u8>>,
+    pub raw: Option<Vec<u8>>,
+    /// A start runs all of its frames before the next register read.
+    pub instant: bool,
+    /// Calls of `frame` and `raw` that find the transfer still under way.
+    pub transfer_polls: u32,
+    /// Every access fails.
+    pub dead: bool,
+    /// Writes that are lost on the bus, without an error.
+    pub deaf: bool,
+    /// Writes to this address are lost.
+    pub lost_address: Option<u16>,
+    /// Bits of the data bus that always read 1.
+    pub stuck_ones: u32,
+    pub accesses: u32,
+    config_error: bool,
+    after_loss: bool,
+}
+
+impl Default for FakeFpga {
+    fn default() -> Self {
+        let registers = Register::ALL.iter().map(|r| (r.address(), r.reset())).collect();
+        Self {
+            registers,
+            identity: IDENTITY,
+            interlock_closed: true,
+            fault: FaultCode::None,
+            running: false,
+            made: 0,
+            lost: 0,
+            clock: 0,
+            frame: None,
+            raw: None,
+            instant: false,
+            transfer_polls: 0,
+            dead: false,
+            deaf: false,
+            lost_address: None,
+            stuck_ones: 0,
+            accesses: 0,
+            config_error: false,
+            after_loss: false,
+        }
+    }
+}
+
+impl FakeFpga {
+    pub fn get(&self, register: Register) -> u32 {
+        self.registers[&register.address()]
+    }
+
+    pub fn leds_on(&self) -> bool {
+        self.running && self.interlock_closed && self.fault == FaultCode::None
+    }
+
+    /// Latches a fault, which ends the run.
+    pub fn trip(&mut self, fault: FaultCode) {
+        self.fault = fault;
+        self.running = false;
+    }
+
+    /// Loses its configuration: everything as after power-up.
+    pub fn reset(&mut self) {
+        *self = Self { accesses: self.accesses, ..Self::default() };
+    }
+
+    /// Sums of frame `sequence`; of the test generator where the mode says so.
+    pub fn sums(&self, sequence: u32) -> Vec<Sums> {
+        let patterns = self.get(Register::Patterns) as usize;
+        if self.get(Register::Mode) & mode::TEST_SOURCE != 0 {
+            return self.test_sums(patterns);
+        }
+        (0..patterns as u64)
+            .map(|k| Sums { positive: 1000 * u64::from(sequence) + k, negative: 7 })
+            .collect()
+    }
+
+    /// By the definition: the sample of clock t belongs to what was shown at t - latency.
+    fn test_sums(&self, patterns: usize) -> Vec<Sums> {
+        let dwell = self.get(Register::Dwell) as usize;
+        let (blank, latency) = (self.get(Register::Blank), self.get(Register::Latency) as usize);
+        let mut state = TEST_SEED;
+        let mut sums = std::vec![Sums::default(); patterns];
+        for t in 0..latency + 2 * patterns * dwell {
+            if let Some(shown) = t.checked_sub(latency) {
+                let (slot, clock) = (shown / dwell, shown % dwell);
+                if clock >= blank as usize {
+                    let sum = &mut sums[slot / 2];
+                    let half = if slot % 2 == 0 { &mut sum.positive } else { &mut sum.negative };
+                    *half += u64::from(state);
+                }
+            }
+            state = test_sample(state);
+        }
+        sums
+    }
+
+    /// The run completes a frame.
+    pub fn make_frame(&mut self) {
+        if !self.running {
+            return;
+        }
+        let sequence = self.made;
+        self.made = self.made.wrapping_add(1);
+        if self.frame.is_some() {
+            self.lost += 1;
+            self.after_loss = true;
+        } else {
+            let flags = if std::mem::take(&mut self.after_loss) {
+                FrameFlags::AFTER_LOSS
+            } else {
+                FrameFlags::default()
+            };
+            self.frame = Some(self.frame_bytes(sequence, flags));
+        }
+        if self.made == self.get(Register::Frames) {
+            self.running = false;
+        }
+    }
+
+    fn frame_bytes(&self, sequence: u32, mut flags: FrameFlags) -> Vec<u8> {
+        let mode = self.get(Register::Mode);
+        if mode & mode::TEST_SOURCE != 0 {
+            flags = flags.with(FrameFlags::TEST_SOURCE);
+        }
+        if mode & mode::DIFFERENTIAL != 0 {
+            flags = flags.with(FrameFlags::DIFFERENTIAL);
+        }
+        let header = Header {
+            patterns: self.get(Register::Patterns) as u16,
+            flags,
+            sequence,
+            sweeps: self.get(Register::Sweeps),
+            over_range: 0,
+            lost: self.lost,
+            clock: self.clock,
+        };
+        let mut bytes = header.to_bytes().to_vec();
+        for sum in self.sums(sequence) {
+            bytes.extend(sum.to_bytes());
+        }
+        bytes.extend(crc32(&bytes).to_le_bytes());
+        bytes
+    }
+
+    fn status(&self) -> u32 {
+        let bits = [
+            (self.running, status::RUNNING),
+            (self.frame.is_some(), status::FRAME_READY),
+            (self.raw.is_some(), status::RAW_READY),
+            (self.leds_on(), status::LEDS_ON),
+            (self.fault != FaultCode::None, status::FAULT),
+            (self.interlock_closed, status::INTERLOCK_CLOSED),
+            (self.config_error, status::CONFIG_ERROR),
+        ];
+        bits.iter().filter(|(set, _)| *set).map(|(_, bit)| bit).sum()
+    }
+
+    fn control(&mut self, bits: u32) {
+        if bits & control::STOP != 0 {
+            self.running = false;
+        }
+        if bits & control::CLEAR_FAULT != 0 && !self.running {
+            self.fault = FaultCode::None;
+        }
+        if bits & control::RELEASE != 0 {
+            self.frame = None;
+        }
+        if bits & (control::START | control::START_RAW) != 0 {
+            self.start(bits & control::START_RAW != 0);
+        }
+    }
+
+    fn start(&mut self, raw: bool) {
+        if self.running || self.fault != FaultCode::None || !self.interlock_closed {
+            return;
+        }
+        self.config_error = self.get(Register::Blank) >= self.get(Register::Dwell)
+            || self.get(Register::DutyLimit) > DUTY_LIMIT_MAX;
+        if self.config_error {
+            return;
+        }
+        (self.made, self.lost, self.frame, self.raw) = (0, 0, None, None);
+        self.after_loss = false;
+        if raw {
+            let samples = self.get(Register::RawLength) as u16;
+            self.raw = Some((0..samples).flat_map(|s| (s % 16_384).to_le_bytes()).collect());
+            return;
+        }
+        self.running = true;
+        if self.instant {
+            for _ in 0..self.get(Register::Frames) {
+                self.make_frame();
+            }
+        }
+    }
+}
+
+impl FpgaBus for FakeFpga {
+    fn read(&mut self, address: u16) -> Result<u32, BusError> {
+        self.accesses += 1;
+        if self.dead {
+            return Err(BusError::Timeout);
+        }
+        let value = match Register::at(address) {
+            Some(Register::Identity) => self.identity,
+            Some(Register::Status) => self.status(),
+            Some(Register::Fault) => self.fault as u32,
+            Some(Register::FramesMade) => self.made,
+            Some(Register::FramesLost) => self.lost,
+            Some(Register::ClockLow) => self.clock as u32,
+            Some(Register::ClockHigh) => (self.clock >> 32) as u32,
+            Some(Register::Control) => 0,
+            _ => self.registers.get(&address).copied().unwrap_or(0),
+        };
+        Ok(value | self.stuck_ones)
+    }
+
+    fn write(&mut self, address: u16, value: u32) -> Result<(), BusError> {
+        self.accesses += 1;
+        if self.dead {
+            return Err(BusError::Timeout);
+        }
+        if self.deaf || self.lost_address == Some(address) {
+            return Ok(());
+        }
+        if address == Register::Control.address() {
+            self.control(value);
+        } else if address >= ORDER_TABLE || Register::at(address).is_some() {
+            self.registers.insert(address, value);
+        }
+        Ok(())
+    }
+
+    fn frame_ready(&mut self) -> bool {
+        self.frame.is_some()
+    }
+
+    fn raw_ready(&mut self) -> bool {
+        self.raw.is_some()
+    }
+
+    fn frame(&mut self) -> Result<Option<&[u8]>, BusError> {
+        if self.transfer_polls > 0 {
+            self.transfer_polls -= 1;
+            return Ok(None);
+        }
+        if self.dead { Err(BusError::Timeout) } else { Ok(self.frame.as_deref()) }
+    }
+
+    fn raw(&mut self) -> Result<Option<&[u8]>, BusError> {
+        if self.dead { Err(BusError::Timeout) } else { Ok(self.raw.as_deref()) }
+    }
+}

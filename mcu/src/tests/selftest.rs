@@ -1,0 +1,126 @@
+//! Each check of the self-test passes on a good device and fails on one that is broken in just that way.
+
+use super::support::*;
+use nirspi_wire::register::{Register, mode};
+use nirspi_wire::{
+    Answer, Command, EventKind, Fault, Refusal, RunLength, SelfTestReport as Report, State,
+};
+
+const ALL: u32 = 0b11_1111;
+
+fn self_test(bench: &mut Bench) -> Report {
+    bench.fpga.instant = true;
+    match bench.ask(Command::SelfTest) {
+        Ok(Answer::SelfTest(report)) => report,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn a_good_device_passes_everything_in_any_resting_state() {
+    let mut idle = Bench::open();
+    assert_eq!(self_test(&mut idle), Report { ran: ALL, failed: 0 });
+    assert_eq!(idle.camera.state(), State::Idle);
+
+    let mut bench = Bench::configured();
+    assert_eq!(self_test(&mut bench), Report { ran: ALL, failed: 0 });
+    assert_eq!(bench.camera.state(), State::Configured);
+    assert_eq!(bench.fpga.get(Register::Mode), mode::DIFFERENTIAL, "the configuration is back");
+    assert_eq!(bench.fpga.get(Register::Patterns), 4);
+    bench.fpga.instant = false;
+    assert_eq!(bench.ask(Command::Start(RunLength::Continuous)), Ok(Answer::Done));
+}
+
+#[test]
+fn the_test_frame_is_one_sweep_and_nothing_is_taken_meanwhile() {
+    let mut bench = Bench::open();
+    bench.send(Command::SelfTest);
+    assert_eq!(bench.camera.state(), State::Running, "LEDs are on");
+    assert_eq!((bench.fpga.get(Register::Frames), bench.fpga.get(Register::Sweeps)), (1, 1));
+    assert_eq!(bench.receive(&packet(9, Command::Status)), 0);
+    bench.fpga.make_frame();
+    bench.poll();
+    assert_eq!(bench.camera.state(), State::Idle);
+    assert_eq!(bench.heard().len(), 1);
+}
+
+#[test]
+fn a_wrong_sum_fails_the_test_frame() {
+    let mut bench = Bench::configured();
+    bench.send(Command::SelfTest);
+    // One clock of latency too many: intact, yet wrong.
+    bench.fpga.registers.insert(Register::Latency.address(), 4);
+    bench.fpga.make_frame();
+    bench.poll();
+    let Ok(Answer::SelfTest(report)) = (match bench.heard()[0] {
+        nirspi_wire::DeviceMessage::Reply(reply) => reply.outcome,
+        ref other => panic!("{other:?}"),
+    }) else {
+        panic!("refused");
+    };
+    assert_eq!(report, Report { ran: ALL, failed: Report::TEST_FRAME });
+    assert_eq!(bench.fpga.get(Register::Latency), 3, "the configuration is back");
+}
+
+#[test]
+fn a_test_frame_that_does_not_come_fails_and_leds_go_off() {
+    let mut bench = Bench::open();
+    bench.send(Command::SelfTest);
+    bench.after(100_000);
+    assert!(bench.heard().is_empty());
+    bench.after(1);
+    assert!(!bench.fpga.leds_on());
+    assert_eq!(bench.heard().len(), 1);
+}
+
+#[test]
+fn a_fault_in_mid_test_fails_it_and_is_reported() {
+    let mut bench = Bench::open();
+    bench.send(Command::SelfTest);
+    bench.inputs.interlock_closed = false;
+    bench.poll();
+    assert!(!bench.fpga.leds_on());
+    let heard = bench.heard();
+    assert_eq!(heard.len(), 2);
+    assert_eq!(events(&heard), [EventKind::Fault(Fault::Interlock)]);
+}
+
+#[test]
+fn a_bit_of_the_bus_that_is_stuck_is_found_without_light() {
+    let mut bench = Bench::configured();
+    bench.fpga.stuck_ones = 1 << 18;
+    let report = self_test(&mut bench);
+    assert_eq!(report.ran, ALL & !Report::TEST_FRAME);
+    assert_eq!(report.failed, Report::FPGA_IDENTITY | Report::FPGA_BUS);
+    let mut bench = Bench::configured();
+    bench.fpga.deaf = true;
+    assert_eq!(self_test(&mut bench).failed, Report::FPGA_BUS);
+}
+
+#[test]
+fn sensors_are_told_apart() {
+    let mut bench = Bench::open();
+    bench.inputs.interlock_closed = false;
+    assert_eq!(self_test(&mut bench).failed, Report::INTERLOCK);
+    bench.inputs.temperature_centi_celsius = None;
+    assert_eq!(self_test(&mut bench).failed, Report::INTERLOCK | Report::TEMPERATURE);
+}
+
+#[test]
+fn leds_that_are_on_at_rest_are_found() {
+    let mut bench = Bench::open();
+    bench.fpga.running = true;
+    assert_eq!(self_test(&mut bench).failed, Report::LEDS_OFF);
+}
+
+#[test]
+fn a_standing_fault_forbids_the_light_of_the_test_frame() {
+    let mut bench = Bench::open();
+    bench.inputs.temperature_centi_celsius = Some(7_000);
+    bench.poll();
+    bench.inputs = GOOD_INPUTS;
+    assert_eq!(self_test(&mut bench), Report { ran: ALL & !Report::TEST_FRAME, failed: 0 });
+    let standing = Fault::OverTemperature { centi_celsius: 7_000 };
+    let refused = bench.ask(Command::Start(RunLength::Continuous));
+    assert_eq!(refused, Err(Refusal::Fault(standing)));
+}

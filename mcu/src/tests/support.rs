@@ -1,0 +1,251 @@
+//! A link with as much room as a test gives, and a camera between it and a fake FPGA.
+
+use super::fake_fpga::FakeFpga;
+use crate::{
+    BoardInfo, Camera, GatewareLoader, Inputs, Limits, LoadError, Micros, PacketSink, Ports,
+    Progress,
+};
+use nirspi_wire::packet::{MAX_HOST_PACKET, encode, open};
+use nirspi_wire::{
+    Answer, Command, Configuration, DeviceMessage, Event, EventKind, Frame, PROTOCOL_VERSION,
+    PatternOrder, Refusal, Reply, Request, RunLength, SampleSource, Status, Version,
+};
+use std::boxed::Box;
+use std::vec::Vec;
+
+/// Takes `room` more packets.
+pub struct Link {
+    pub room: usize,
+    /// Claims that find no room before the next one does.
+    pub refusals: u32,
+    pub packets: Vec<Vec<u8>>,
+    staging: Vec<u8>,
+}
+
+impl Default for Link {
+    fn default() -> Self {
+        Self { room: usize::MAX, refusals: 0, packets: Vec::new(), staging: Vec::new() }
+    }
+}
+
+impl PacketSink for Link {
+    fn claim(&mut self, length: usize) -> Option<&mut [u8]> {
+        if self.refusals > 0 {
+            self.refusals -= 1;
+            return None;
+        }
+        if self.room == 0 {
+            return None;
+        }
+        self.staging.resize(length, 0xAA);
+        Some(&mut self.staging[..length])
+    }
+
+    fn commit(&mut self, length: usize) {
+        self.room -= 1;
+        self.packets.push(self.staging[..length].to_vec());
+    }
+}
+
+/// Keeps what it was given.
+#[derive(Default)]
+pub struct Loader {
+    pub unsupported: bool,
+    pub data: Vec<u8>,
+    pub finished: u32,
+}
+
+impl GatewareLoader for Loader {
+    fn begin(&mut self, _total: u32) -> Result<(), LoadError> {
+        self.data.clear();
+        if self.unsupported { Err(LoadError::Unsupported) } else { Ok(()) }
+    }
+
+    fn write(&mut self, data: &[u8]) -> Result<(), LoadError> {
+        self.data.extend(data);
+        Ok(())
+    }
+
+    fn finish(&mut self) -> Result<(), LoadError> {
+        self.finished += 1;
+        Ok(())
+    }
+}
+
+/// A camera with everything around it.
+pub struct Bench {
+    pub camera: Camera,
+    pub fpga: FakeFpga,
+    pub link: Link,
+    pub loader: Loader,
+    pub inputs: Inputs,
+    pub now: Micros,
+    pub next_id: u16,
+}
+
+pub const GOOD_INPUTS: Inputs =
+    Inputs { interlock_closed: true, temperature_centi_celsius: Some(2500) };
+
+/// Four patterns, differential, one sweep.
+pub const SMALL: Configuration<'static> = Configuration {
+    order: PatternOrder::Natural,
+    patterns: 4,
+    differential: true,
+    clocks_per_pattern: 5,
+    blanked: 2,
+    adc_latency: 3,
+    sweeps: 1,
+    source: SampleSource::Detector,
+    over_range_trip: 100,
+};
+
+impl Bench {
+    /// After power-up and the first poll.
+    pub fn new() -> Self {
+        let info = BoardInfo::new("bench", "0001", Version(1, 2, 3));
+        let mut bench = Self {
+            camera: Camera::new(info, Limits::default()),
+            fpga: FakeFpga::default(),
+            link: Link::default(),
+            loader: Loader::default(),
+            inputs: GOOD_INPUTS,
+            now: Micros(1_000),
+            next_id: 1,
+        };
+        bench.poll();
+        bench
+    }
+
+    /// With a session.
+    pub fn open() -> Self {
+        let mut bench = Self::new();
+        let answer = bench.ask(Command::Hello { protocol: PROTOCOL_VERSION });
+        assert!(matches!(answer, Ok(Answer::Hello(_))), "{answer:?}");
+        bench
+    }
+
+    /// With a configuration.
+    pub fn configured() -> Self {
+        let mut bench = Self::open();
+        assert_eq!(bench.ask(Command::Configure(SMALL)), Ok(Answer::Done));
+        bench
+    }
+
+    /// With LEDs on.
+    pub fn running(length: RunLength) -> Self {
+        let mut bench = Self::configured();
+        assert_eq!(bench.ask(Command::Start(length)), Ok(Answer::Done));
+        assert!(bench.fpga.leds_on());
+        bench
+    }
+
+    pub fn receive(&mut self, bytes: &[u8]) -> usize {
+        let mut ports =
+            Ports { bus: &mut self.fpga, sink: &mut self.link, loader: &mut self.loader };
+        self.camera.receive(self.now, bytes, &self.inputs, &mut ports)
+    }
+
+    pub fn poll(&mut self) -> Progress {
+        let mut ports =
+            Ports { bus: &mut self.fpga, sink: &mut self.link, loader: &mut self.loader };
+        self.camera.poll(self.now, &self.inputs, &mut ports)
+    }
+
+    pub fn close_link(&mut self) {
+        let mut ports =
+            Ports { bus: &mut self.fpga, sink: &mut self.link, loader: &mut self.loader };
+        self.camera.link_closed(self.now, &mut ports);
+    }
+
+    pub fn depth(&mut self, side: u8, distances_mm: &[u16]) {
+        let mut ports =
+            Ports { bus: &mut self.fpga, sink: &mut self.link, loader: &mut self.loader };
+        self.camera.depth(self.now, side, distances_mm, &mut ports);
+    }
+
+    /// Lets time pass, then polls.
+    pub fn after(&mut self, micros: u64) -> Progress {
+        self.now.0 += micros;
+        self.poll()
+    }
+
+    /// Sends a command whole; returns its id.
+    pub fn send(&mut self, command: Command<'_>) -> u16 {
+        let id = self.next_id;
+        self.next_id += 1;
+        let bytes = packet(id, command);
+        assert_eq!(self.receive(&bytes), bytes.len(), "not taken: {command:?}");
+        id
+    }
+
+    /// Sends a command and polls until its reply comes; what comes before it stays on the link.
+    pub fn ask(&mut self, command: Command<'_>) -> Result<Answer<'static>, Refusal> {
+        let id = self.send(command);
+        for _ in 0..10 {
+            let replies = self.link.packets.iter().map(|packet| message(packet));
+            let place = replies.enumerate().find_map(|(place, message)| match message {
+                DeviceMessage::Reply(Reply { id: found, outcome }) if found == id => {
+                    Some((place, outcome))
+                }
+                _ => None,
+            });
+            if let Some((place, outcome)) = place {
+                self.link.packets.remove(place);
+                return outcome;
+            }
+            self.poll();
+        }
+        panic!("no reply to {command:?}");
+    }
+
+    pub fn status(&mut self) -> Status {
+        match self.ask(Command::Status) {
+            Ok(Answer::Status(status)) => status,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    /// Takes what the link has carried.
+    pub fn heard(&mut self) -> Vec<DeviceMessage<'static>> {
+        self.link.packets.drain(..).map(|packet| message(&packet)).collect()
+    }
+
+    pub fn heard_events(&mut self) -> Vec<EventKind> {
+        events(&self.heard())
+    }
+
+    /// The FPGA completes a frame, and the camera looks once.
+    pub fn frame(&mut self) {
+        self.fpga.make_frame();
+        self.after(100);
+    }
+}
+
+pub fn packet(id: u16, command: Command<'_>) -> Vec<u8> {
+    let mut room = std::vec![0; MAX_HOST_PACKET + 1];
+    encode(&Request { id, command }, &mut room).unwrap().to_vec()
+}
+
+/// Opens a packet; it stays in memory for the rest of the test.
+pub fn message(packet: &[u8]) -> DeviceMessage<'static> {
+    let (0, encoded) = packet.split_last().map(|(&last, rest)| (last, rest)).unwrap() else {
+        panic!("no delimiter");
+    };
+    open(Box::leak(encoded.to_vec().into_boxed_slice())).unwrap()
+}
+
+pub fn events(messages: &[DeviceMessage<'_>]) -> Vec<EventKind> {
+    let kind = |message: &DeviceMessage<'_>| match message {
+        DeviceMessage::Event(Event { kind, .. }) => Some(*kind),
+        _ => None,
+    };
+    messages.iter().filter_map(kind).collect()
+}
+
+pub fn frames(messages: &[DeviceMessage<'static>]) -> Vec<Frame<'static>> {
+    let frame = |message: &DeviceMessage<'static>| match message {
+        DeviceMessage::Frame(frame) => Some(*frame),
+        _ => None,
+    };
+    messages.iter().filter_map(frame).collect()
+}

@@ -1,0 +1,66 @@
+//! The contract of the camera: what crosses a boundary between two machines, and nothing else.
+//!
+//! * [`message`]: commands of the host, replies and stream of the device (protocol version
+//!   [`PROTOCOL_VERSION`]),
+//! * [`packet`]: how a message becomes bytes on a link: postcard, CRC-32, COBS, a zero byte,
+//! * [`samples`]: the integrated ADC samples of a frame,
+//! * [`register`]: the register map of the FPGA, its fault codes and bits,
+//! * [`fpga`]: the layout of a frame as the FPGA's host port delivers it,
+//! * [`walsh`]: which sign of which Hadamard row an LED shows,
+//! * [`usb`]: identity on the bus.
+//!
+//! The one law: firmware, gateware model, host and tests all take these from here; no number of this
+//! crate is written a second time anywhere else. `no_std`, no allocation, no feature flags.
+//!
+//! # Versions
+//! [`PROTOCOL_VERSION`] changes whenever the bytes of any message change. The bytes of every message of
+//! a released version are frozen in `tests/v1.rs`. `Hello`, the first field of its answer and
+//! [`Refusal::Protocol`] never change, in no version: so two sides that cannot talk can still say so, naming
+//! both versions.
+#![no_std]
+
+#[cfg(test)]
+extern crate std;
+
+pub mod fpga;
+pub mod message;
+pub mod packet;
+pub mod register;
+pub mod samples;
+pub mod usb;
+pub mod walsh;
+
+mod crc32;
+
+pub use crc32::{Crc32, crc32};
+pub use message::{
+    Answer, Command, ConfigField, ConfigProblem, Configuration, Depth, DeviceMessage, Event,
+    EventKind, Fault, Frame, FrameFlags, GatewareChunk, Identity, PatternOrder, Raw, RebootInto,
+    Refusal, Reply, Request, RunLength, SampleSource, SelfTestReport, State, Status, Version,
+};
+pub use packet::{Deframed, Deframer, PacketError, encode, open};
+pub use samples::Samples;
+
+/// Version of the wire protocol that this crate speaks.
+pub const PROTOCOL_VERSION: u16 = 1;
+
+/// LEDs along one edge of the array (paper, section 2.A).
+pub const SIDE: u8 = 32;
+
+/// Hadamard patterns of a full sweep, `SIDE * SIDE`.
+pub const PATTERNS: u16 = SIDE as u16 * SIDE as u16;
+
+/// ADC sample rate and FPGA sequencer clock (paper, section 2.D).
+pub const ADC_HZ: u32 = 125_000_000;
+
+/// Fastest pattern rate (paper, section 2.D).
+pub const PATTERN_HZ: u32 = 25_000_000;
+
+/// ADC samples in one pattern at the fastest rate: `F = F_ADC / F_patterns` (Eq. 4).
+pub const CLOCKS_PER_PATTERN: u16 = (ADC_HZ / PATTERN_HZ) as u16;
+
+/// Resolution of the ADC.
+pub const ADC_BITS: u8 = 14;
+
+/// Largest ADC code.
+pub const ADC_MAX: u16 = (1 << ADC_BITS) - 1;

@@ -1,0 +1,527 @@
+//! Protocol version 1: commands of the host, replies and stream of the device.
+//!
+//! The one law: these types *are* the format. Adding, removing or reordering a variant or a field changes
+//! bytes, and so the protocol version (see the crate's page and `tests/v1.rs`).
+
+use crate::samples::{Block, Samples, Words};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+/// A host that sends no valid command for this long while LEDs are on is taken for dead, and they go off.
+pub const HOST_SILENCE_US: u64 = 5_000_000;
+/// Most bytes of a [`GatewareChunk`].
+pub const GATEWARE_CHUNK_MAX: usize = 2048;
+
+/// Major, minor, patch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct Version(pub u8, pub u8, pub u8);
+
+impl core::fmt::Display for Version {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "{}.{}.{}", self.0, self.1, self.2)
+    }
+}
+
+/// Host to device: a command with a number that its reply repeats.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Request<'a> {
+    /// Chosen by the host.
+    pub id: u16,
+    /// What to do.
+    #[serde(borrow)]
+    pub command: Command<'a>,
+}
+
+/// What a host can ask for.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum Command<'a> {
+    /// First command of a session. Its bytes never change.
+    Hello {
+        /// Protocol version of the host.
+        protocol: u16,
+    },
+    /// Sets up a measurement; also acknowledges a fault whose cause is gone.
+    #[serde(borrow)]
+    Configure(Configuration<'a>),
+    /// Starts frames. LEDs go on.
+    Start(RunLength),
+    /// Ends frames. LEDs go off.
+    Stop,
+    /// Asks for [`Status`]; any command resets [`HOST_SILENCE_US`].
+    Status,
+    /// Checks the device without any optics.
+    SelfTest,
+    /// Reads one FPGA register, for diagnosis.
+    ReadRegister {
+        /// Register address.
+        address: u16,
+    },
+    /// One piece of an FPGA bitstream, in order.
+    LoadGateware(GatewareChunk<'a>),
+    /// Records a burst of plain ADC samples from the first clock of a sweep, for calibration.
+    RawBurst {
+        /// Number of samples, at most [`RAW_SAMPLES_MAX`](crate::register::RAW_SAMPLES_MAX).
+        samples: u16,
+    },
+    /// Restarts the device.
+    Reboot(RebootInto),
+}
+
+/// How long to run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum RunLength {
+    /// Until `Stop`.
+    Continuous,
+    /// This many frames, at least one.
+    Frames(u32),
+}
+
+/// What to run after a restart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum RebootInto {
+    /// The camera application.
+    Application,
+    /// The chip's own boot loader.
+    Bootloader,
+}
+
+/// Where samples come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum SampleSource {
+    /// The photodiode's ADC.
+    Detector,
+    /// The FPGA's test generator (see [`register::test_sample`](crate::register::test_sample)).
+    TestPattern,
+}
+
+/// Which pattern is shown k-th.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum PatternOrder<'a> {
+    /// Pattern k.
+    Natural,
+    /// Pattern [`walsh::sequency`](crate::walsh::sequency)`(k)`.
+    Sequency,
+    /// The k-th entry of a table with one entry a pattern shown, each a pattern number, none twice.
+    #[serde(borrow)]
+    Table(Words<'a>),
+}
+
+/// One measurement setup. Dwell, blanking and latency are in ADC clocks of 8 ns.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Configuration<'a> {
+    /// Order of the patterns.
+    #[serde(borrow)]
+    pub order: PatternOrder<'a>,
+    /// Patterns of a sweep: the first this many of the order, 1 to 1024.
+    pub patterns: u16,
+    /// Shows each pattern's complement after it and subtracts.
+    pub differential: bool,
+    /// Clocks that each pattern is shown: 5 is 25 MHz.
+    pub clocks_per_pattern: u16,
+    /// Samples left out at the start of each pattern, while LEDs and amplifier settle.
+    pub blanked: u16,
+    /// Clocks from light to sample, 0 to 63.
+    pub adc_latency: u8,
+    /// Sweeps summed into one frame, at least 1.
+    pub sweeps: u32,
+    /// Where samples come from.
+    pub source: SampleSource,
+    /// Over-range samples in one frame that switch the LEDs off; 0 only flags them.
+    pub over_range_trip: u32,
+}
+
+/// A piece of a bitstream.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct GatewareChunk<'a> {
+    /// Where it belongs: pieces come in order, the first at 0.
+    pub offset: u32,
+    /// Length of the whole bitstream.
+    pub total: u32,
+    /// CRC-32 of the whole bitstream.
+    pub crc: u32,
+    /// The piece, at most [`GATEWARE_CHUNK_MAX`] bytes.
+    #[serde(borrow, with = "block")]
+    pub data: &'a [u8],
+}
+
+/// Bytes as one block in a field that is a plain slice.
+mod block {
+    use super::{Block, Deserialize, Deserializer, Serialize, Serializer};
+
+    pub fn serialize<S: Serializer>(bytes: &[u8], serializer: S) -> Result<S::Ok, S::Error> {
+        Block(bytes).serialize(serializer)
+    }
+
+    pub fn deserialize<'de: 'a, 'a, D>(deserializer: D) -> Result<&'a [u8], D::Error>
+    where
+        D: Deserializer<'de>,
+    {
+        Block::deserialize(deserializer).map(|Block(bytes)| bytes)
+    }
+}
+
+/// Device to host.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum DeviceMessage<'a> {
+    /// Answer to a command.
+    #[serde(borrow)]
+    Reply(Reply<'a>),
+    /// One integrated measurement of all patterns.
+    Frame(Frame<'a>),
+    /// A piece of a raw burst.
+    Raw(Raw<'a>),
+    /// A time-of-flight depth map.
+    Depth(Depth<'a>),
+    /// Something happened.
+    Event(Event),
+}
+
+/// Answer to the command of the same id.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Reply<'a> {
+    /// The request's number.
+    pub id: u16,
+    /// What came of it.
+    #[serde(borrow)]
+    pub outcome: Result<Answer<'a>, Refusal>,
+}
+
+/// A command that was carried out.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum Answer<'a> {
+    /// Who the device is. The first field never moves.
+    #[serde(borrow)]
+    Hello(Identity<'a>),
+    /// `Configure`, `Start`, `Stop`, `RawBurst`, `Reboot`: done or under way.
+    Done,
+    /// To `Status`.
+    Status(Status),
+    /// To `SelfTest`.
+    SelfTest(SelfTestReport),
+    /// To `ReadRegister`.
+    Register(u32),
+    /// To `LoadGateware`: bytes taken so far.
+    Gateware {
+        /// Where the next piece belongs.
+        next_offset: u32,
+    },
+}
+
+/// Who the device is.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Identity<'a> {
+    /// Protocol version of the device. First in every version.
+    pub protocol: u16,
+    /// Firmware version.
+    pub firmware: Version,
+    /// Gateware version; 0.0.0 where no gateware answers.
+    pub gateware: Version,
+    /// Board name, as of its folder under `boards/`, or `virtual`.
+    pub board: &'a str,
+    /// Serial number, unique to the device.
+    pub serial: &'a str,
+    /// LEDs along one edge.
+    pub side: u8,
+    /// ADC sample rate.
+    pub adc_hz: u32,
+    /// ADC resolution.
+    pub adc_bits: u8,
+    /// Wavelength of the LEDs.
+    pub wavelength_nm: u16,
+}
+
+/// Why a command was not carried out; nothing has changed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Refusal {
+    /// The device speaks another protocol version.
+    Protocol {
+        /// The device's.
+        device: u16,
+    },
+    /// Not in this state.
+    State(State),
+    /// The configuration cannot be shown.
+    Configuration(ConfigProblem),
+    /// A fault stands whose cause is not gone.
+    Fault(Fault),
+    /// The FPGA has no such register.
+    NoSuchRegister {
+        /// The address asked for.
+        address: u16,
+    },
+    /// More raw samples than the FPGA holds, or none.
+    RawLength {
+        /// The most there are.
+        max: u16,
+    },
+    /// This piece of bitstream was not expected here.
+    GatewareOffset {
+        /// The one that was.
+        expected: u32,
+    },
+    /// The bitstream's checksum is wrong; start over.
+    GatewareCrc,
+    /// The board cannot do this.
+    Unsupported,
+    /// The FPGA did not answer on its bus.
+    Bus,
+}
+
+/// A part of [`Configuration`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum ConfigField {
+    /// `patterns`
+    Patterns,
+    /// `clocks_per_pattern`
+    ClocksPerPattern,
+    /// `blanked`
+    Blanked,
+    /// `adc_latency`
+    AdcLatency,
+    /// `sweeps`
+    Sweeps,
+    /// Length of the order table.
+    OrderLength,
+    /// Mean share of LEDs lit, in thousandths.
+    DutyPermille,
+    /// Frames of a run, in `Start`.
+    Frames,
+}
+
+/// What is wrong with a configuration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum ConfigProblem {
+    /// A number outside its range.
+    OutOfRange {
+        /// Which.
+        field: ConfigField,
+        /// As received.
+        found: u32,
+        /// Least allowed.
+        min: u32,
+        /// Most allowed.
+        max: u32,
+    },
+    /// An order table that repeats a pattern or names one that does not exist.
+    OrderEntry {
+        /// Where in the table.
+        index: u16,
+        /// What stands there.
+        found: u16,
+    },
+}
+
+/// What the device is doing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum State {
+    /// Nothing configured.
+    Idle,
+    /// Ready to start.
+    Configured,
+    /// LEDs on, frames or a raw burst under way.
+    Running,
+    /// LEDs off until the cause is gone and `Configure` acknowledges it.
+    Fault,
+}
+
+/// Why the LEDs were switched off.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Fault {
+    /// The enclosure's interlock is open.
+    Interlock,
+    /// The LED array is too hot.
+    OverTemperature {
+        /// Hundredths of a degree Celsius.
+        centi_celsius: i16,
+    },
+    /// The temperature sensor is broken or out of its range.
+    TemperatureSensor,
+    /// More light over time than the array stands.
+    Duty,
+    /// Too many over-range samples.
+    OverRange,
+    /// The firmware did not look after the FPGA in time.
+    FpgaWatchdog,
+    /// The FPGA does not answer, or with another identity.
+    FpgaAbsent {
+        /// What the identity register read.
+        identity: u32,
+    },
+    /// The FPGA refused a configuration that the firmware had let pass.
+    FpgaConfiguration,
+    /// No frame came for many times its duration.
+    FpgaStalled,
+    /// The host fell silent while LEDs were on.
+    HostSilent,
+}
+
+/// Bits that say what happened to a frame; the same in the FPGA's header and on the wire.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct FrameFlags(pub u16);
+
+impl FrameFlags {
+    /// A sample was outside the ADC's range.
+    pub const OVER_RANGE: Self = Self(1 << 0);
+    /// A 48-bit accumulator has wrapped.
+    pub const OVERFLOW: Self = Self(1 << 1);
+    /// The FPGA lost at least one frame directly before this one.
+    pub const AFTER_LOSS: Self = Self(1 << 2);
+    /// Samples come from the test generator.
+    pub const TEST_SOURCE: Self = Self(1 << 3);
+    /// Samples are differences of a pattern and its complement.
+    pub const DIFFERENTIAL: Self = Self(1 << 4);
+
+    /// Whether all bits of `other` are set.
+    #[must_use]
+    pub const fn contains(self, other: Self) -> bool {
+        self.0 & other.0 == other.0
+    }
+
+    /// Bits of both.
+    #[must_use]
+    pub const fn with(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+}
+
+/// One integrated measurement: `samples[k]` belongs to the pattern shown k-th.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Frame<'a> {
+    /// Number of the run since power-up, modulo 2^16: tells a straggler of an earlier run from this one's.
+    pub run: u16,
+    /// Number of the frame since `Start`, counted in the FPGA, so a gap is a loss. Wraps at 2^32: after two
+    /// days at the fastest rate.
+    pub sequence: u32,
+    /// Device time of its first pattern.
+    pub device_time_us: u64,
+    /// Sweeps summed.
+    pub sweeps: u32,
+    /// What happened to it.
+    pub flags: FrameFlags,
+    /// Summed ADC counts, one a pattern shown.
+    #[serde(borrow)]
+    pub samples: Samples<'a>,
+}
+
+/// A piece of a burst of plain ADC samples.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Raw<'a> {
+    /// Clock of the first sample, counted from the burst's first pattern.
+    pub first_clock: u16,
+    /// Samples of the whole burst.
+    pub total: u16,
+    /// ADC codes; bit 15 is the over-range bit.
+    #[serde(borrow)]
+    pub samples: Words<'a>,
+}
+
+/// A time-of-flight depth map, row-major.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Depth<'a> {
+    /// Device time of the measurement.
+    pub device_time_us: u64,
+    /// Zones along one edge.
+    pub side: u8,
+    /// Distance of each zone in mm; 0 where there is none.
+    #[serde(borrow)]
+    pub distances_mm: Words<'a>,
+}
+
+/// Something happened.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Event {
+    /// When.
+    pub device_time_us: u64,
+    /// What.
+    pub kind: EventKind,
+}
+
+/// What happened.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum EventKind {
+    /// The LEDs went off for this reason.
+    Fault(Fault),
+    /// A run has ended, by its length, `Stop` or a fault; comes after its last frame.
+    RunEnded {
+        /// Which run.
+        run: u16,
+        /// Frames that the FPGA has completed: sequence numbers 0 to this less one.
+        frames_made: u32,
+        /// Those of them that the link had no room for.
+        frames_dropped: u32,
+        /// Those of them that were lost in the FPGA: the firmware was too slow.
+        fpga_frames_lost: u32,
+        /// Those of them that were damaged between FPGA and firmware.
+        fpga_frames_corrupt: u32,
+    },
+    /// A raw burst could not be sent whole: the link had no room.
+    RawDropped,
+    /// Bytes from the host that were no command.
+    CommandDamaged,
+}
+
+/// How the device is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Status {
+    /// What it is doing.
+    pub state: State,
+    /// The fault that stands.
+    pub fault: Option<Fault>,
+    /// Time since power-up: the clock of every `device_time_us`.
+    pub uptime_us: u64,
+    /// Number of this run or the last one.
+    pub run: u16,
+    /// Frames completed by the FPGA in this run or the last one.
+    pub frames_made: u32,
+    /// Frames given to the link.
+    pub frames_sent: u32,
+    /// Frames dropped whole: the link had no room.
+    pub frames_dropped: u32,
+    /// Frames lost in the FPGA: the firmware was too slow.
+    pub fpga_frames_lost: u32,
+    /// Frames damaged between FPGA and firmware.
+    pub fpga_frames_corrupt: u32,
+    /// Packets from the host that were no command, since power-up.
+    pub commands_damaged: u32,
+    /// LED array, hundredths of a degree Celsius; `i16::MIN` where the sensor does not answer.
+    pub temperature_centi_celsius: i16,
+    /// Mean share of LEDs lit by the configuration.
+    pub duty_permille: u16,
+    /// Whether the FPGA drives LEDs now.
+    pub leds_on: bool,
+    /// Whether the interlock is closed.
+    pub interlock_closed: bool,
+}
+
+/// Outcome of the device's checks, one bit each.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct SelfTestReport {
+    /// Checks that ran.
+    pub ran: u32,
+    /// Checks that failed.
+    pub failed: u32,
+}
+
+impl SelfTestReport {
+    /// The FPGA's identity register reads right.
+    pub const FPGA_IDENTITY: u32 = 1 << 0;
+    /// Every bit of the scratch register holds 0 and 1 alone.
+    pub const FPGA_BUS: u32 = 1 << 1;
+    /// LEDs are off while not running.
+    pub const LEDS_OFF: u32 = 1 << 2;
+    /// A frame of the test generator has exactly the sums that it must.
+    pub const TEST_FRAME: u32 = 1 << 3;
+    /// Temperature is in a plausible range.
+    pub const TEMPERATURE: u32 = 1 << 4;
+    /// The interlock is closed.
+    pub const INTERLOCK: u32 = 1 << 5;
+
+    /// Name of every check, by bit.
+    pub const NAMES: [(u32, &'static str); 6] = [
+        (Self::FPGA_IDENTITY, "FPGA identity"),
+        (Self::FPGA_BUS, "FPGA bus"),
+        (Self::LEDS_OFF, "LEDs off at rest"),
+        (Self::TEST_FRAME, "test frame"),
+        (Self::TEMPERATURE, "temperature sensor"),
+        (Self::INTERLOCK, "interlock"),
+    ];
+}

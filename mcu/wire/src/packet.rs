@@ -1,0 +1,183 @@
+//! How a message becomes bytes on a link, the same on USB bulk, UART and TCP.
+//!
+//! `packet = COBS( postcard(message) ++ CRC-32 little-endian ) ++ 0x00`
+//!
+//! The one law: a receiver that joins anywhere, or meets damage, is in step again after the next zero
+//! byte, and damaged bytes never become a message. Empty packets are allowed and mean nothing, so a
+//! sender may put a zero first to cut off whatever an earlier session left half sent.
+
+use crate::crc32::{self, crc32};
+use cobs::CobsEncoder;
+use postcard::ser_flavors::Flavor;
+use serde::{Deserialize, Serialize};
+
+/// Bytes that CRC, COBS and the delimiter add to `payload` bytes of postcard, at most.
+#[must_use]
+pub const fn overhead(payload: usize) -> usize {
+    let framed = payload + 4;
+    4 + framed / 254 + 1 + 1
+}
+
+/// Largest packet that a device sends: a frame of all patterns, with room for its header.
+pub const MAX_DEVICE_PACKET: usize = {
+    let payload = 4 * crate::PATTERNS as usize + 64;
+    payload + overhead(payload)
+};
+
+/// Largest packet that a host sends: a configuration with its own order table.
+pub const MAX_HOST_PACKET: usize = {
+    let payload = 2 * crate::PATTERNS as usize + 64;
+    payload + overhead(payload)
+};
+
+/// Why bytes are not a message.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PacketError {
+    /// The caller's buffer is too small for the message.
+    BufferTooSmall,
+    /// No delimiter came within the longest packet there is.
+    TooLong,
+    /// The COBS code points outside the packet.
+    Cobs,
+    /// The checksum does not match: bytes were damaged.
+    Crc,
+    /// The checksum is right, yet no message of this version: the sender speaks another one.
+    Message,
+}
+
+impl core::fmt::Display for PacketError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::BufferTooSmall => "the buffer is too small for the message",
+            Self::TooLong => "no delimiter within the longest packet",
+            Self::Cobs => "broken COBS code",
+            Self::Crc => "wrong CRC-32",
+            Self::Message => "intact, but no message of this protocol version",
+        })
+    }
+}
+
+impl core::error::Error for PacketError {}
+
+/// postcard's output, checksummed and COBS-encoded on its way into the caller's buffer.
+struct PacketWriter<'b> {
+    cobs: CobsEncoder<'b>,
+    digest: crc32::Digest,
+}
+
+impl Flavor for PacketWriter<'_> {
+    type Output = usize;
+
+    fn try_extend(&mut self, data: &[u8]) -> postcard::Result<()> {
+        self.digest.update(data);
+        self.cobs.push(data).map_err(|_| postcard::Error::SerializeBufferFull)
+    }
+
+    fn try_push(&mut self, data: u8) -> postcard::Result<()> {
+        self.try_extend(&[data])
+    }
+
+    fn finalize(mut self) -> postcard::Result<usize> {
+        let crc = self.digest.finalize().to_le_bytes();
+        self.cobs.push(&crc).map_err(|_| postcard::Error::SerializeBufferFull)?;
+        Ok(self.cobs.finalize())
+    }
+}
+
+/// Encodes `message` into `out`; returns the packet, delimiter included.
+///
+/// # Errors
+/// [`PacketError::BufferTooSmall`].
+pub fn encode<'b, T: Serialize>(message: &T, out: &'b mut [u8]) -> Result<&'b [u8], PacketError> {
+    if out.is_empty() {
+        return Err(PacketError::BufferTooSmall);
+    }
+    let writer = PacketWriter { cobs: CobsEncoder::new(out), digest: crc32::digest() };
+    let length = postcard::serialize_with_flavor(message, writer)
+        .map_err(|_| PacketError::BufferTooSmall)?;
+    *out.get_mut(length).ok_or(PacketError::BufferTooSmall)? = 0;
+    Ok(&out[..=length])
+}
+
+/// Opens one packet, without its delimiter, in place; the message borrows from it.
+///
+/// # Errors
+/// [`PacketError::Cobs`], [`Crc`](PacketError::Crc), [`Message`](PacketError::Message).
+pub fn open<'p, T: Deserialize<'p>>(packet: &'p mut [u8]) -> Result<T, PacketError> {
+    let length = cobs::decode_in_place(packet).map_err(|_| PacketError::Cobs)?;
+    let framed = packet.get(..length).ok_or(PacketError::Cobs)?;
+    let (payload, crc) = framed.split_last_chunk::<4>().ok_or(PacketError::Crc)?;
+    if crc32(payload) != u32::from_le_bytes(*crc) {
+        return Err(PacketError::Crc);
+    }
+    match postcard::take_from_bytes(payload) {
+        Ok((message, [])) => Ok(message),
+        _ => Err(PacketError::Message),
+    }
+}
+
+/// Cuts a byte stream into packets. `N` is the longest packet, delimiter not counted.
+#[derive(Debug, Clone)]
+pub struct Deframer<const N: usize> {
+    bytes: [u8; N],
+    length: usize,
+    /// The packet has outgrown the buffer: skip to its delimiter.
+    skipping: bool,
+}
+
+/// What a [`Deframer`] found.
+#[derive(Debug, PartialEq, Eq)]
+pub enum Deframed<'d> {
+    /// The bytes between two delimiters, still encoded.
+    Packet(&'d mut [u8]),
+    /// More bytes without a delimiter than any packet has; they are gone.
+    TooLong,
+}
+
+impl<const N: usize> Default for Deframer<N> {
+    fn default() -> Self {
+        Self { bytes: [0; N], length: 0, skipping: false }
+    }
+}
+
+impl<const N: usize> Deframer<N> {
+    /// A receiver that has heard nothing yet.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Takes bytes from the front of `input` up to and with the next delimiter. `None`: all was taken and
+    /// no packet is complete.
+    pub fn next<'d>(&'d mut self, input: &mut &[u8]) -> Option<Deframed<'d>> {
+        while !input.is_empty() {
+            let end = input.iter().position(|&byte| byte == 0);
+            let taken = end.unwrap_or(input.len());
+            let (part, rest) = input.split_at(taken);
+            *input = rest.get(usize::from(end.is_some())..).unwrap_or(&[]);
+            match self.bytes.get_mut(self.length..self.length + part.len()) {
+                Some(room) if !self.skipping => {
+                    room.copy_from_slice(part);
+                    self.length += part.len();
+                }
+                _ => self.skipping = true,
+            }
+            if end.is_some() {
+                let length = core::mem::take(&mut self.length);
+                if core::mem::take(&mut self.skipping) {
+                    return Some(Deframed::TooLong);
+                }
+                if length > 0 {
+                    return self.bytes.get_mut(..length).map(Deframed::Packet);
+                }
+            }
+        }
+        None
+    }
+
+    /// Bytes of a packet whose delimiter has not come: a link that ends now ends in mid-packet.
+    #[must_use]
+    pub fn pending(&self) -> usize {
+        if self.skipping { N } else { self.length }
+    }
+}

@@ -1,0 +1,249 @@
+//! The FPGA's register map: 16-bit addresses, 32-bit values. The gateware is checked against this table.
+//!
+//! How the gateware behaves, in terms of these registers:
+//!
+//! * A *slot* is the time one pattern or complement is shown: [`Register::Dwell`] clocks. A sweep has
+//!   [`Register::Patterns`] slots, twice as many if differential (pattern, complement, next pattern...).
+//!   [`Register::Sweeps`] sweeps are a frame. Slots, sweeps and frames follow each other without a gap.
+//! * The sample of clock `t` belongs to what was shown at clock `t - Latency`. It is summed unless its
+//!   clock within that slot is below [`Register::Blank`].
+//! * Settings are copied when a run starts: writes while it runs hold for the next one. The order table is
+//!   not copied: writes to it while running are refused and set [`status::WRITE_REFUSED`].
+//! * A frame that is complete while the one before has not been released is lost: counted in
+//!   [`Register::FramesLost`], and the next frame delivered carries `AFTER_LOSS`.
+//! * LEDs are on only while a run or raw burst is under way, no fault is latched and the interlock input is
+//!   closed. A fault ends the run at once, discards the unfinished frame and latches its first code.
+
+/// Whether a register can be written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Access {
+    /// Writes are ignored.
+    ReadOnly,
+    /// Reads give what was written.
+    ReadWrite,
+    /// Reads give 0; a written 1 acts once.
+    Command,
+}
+
+macro_rules! registers {
+    ($($(#[$doc:meta])* $name:ident = $address:literal, $access:ident, $reset:expr;)*) => {
+        /// A register of the FPGA.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        pub enum Register { $($(#[$doc])* $name,)* }
+
+        impl Register {
+            /// All registers, by address.
+            pub const ALL: &'static [Self] = &[$(Self::$name,)*];
+
+            /// Address on the host port.
+            #[must_use]
+            pub const fn address(self) -> u16 {
+                match self { $(Self::$name => $address,)* }
+            }
+
+            /// Whether it can be written.
+            #[must_use]
+            pub const fn access(self) -> Access {
+                match self { $(Self::$name => Access::$access,)* }
+            }
+
+            /// Value after reset.
+            #[must_use]
+            pub const fn reset(self) -> u32 {
+                match self { $(Self::$name => $reset,)* }
+            }
+
+            /// The register at this address, if there is one.
+            #[must_use]
+            pub const fn at(address: u16) -> Option<Self> {
+                match address { $($address => Some(Self::$name),)* _ => None }
+            }
+        }
+    };
+}
+
+registers! {
+    /// Always [`IDENTITY`].
+    Identity = 0x00, ReadOnly, IDENTITY;
+    /// Gateware version, `major << 16 | minor << 8 | patch`.
+    Version = 0x01, ReadOnly, 0x0000_0100;
+    /// Holds what was written, for bus tests.
+    Scratch = 0x02, ReadWrite, 0;
+    /// See [`control`].
+    Control = 0x03, Command, 0;
+    /// See [`status`].
+    Status = 0x04, ReadOnly, 0;
+    /// Latched reason for LEDs off, see [`FaultCode`].
+    Fault = 0x05, ReadOnly, 0;
+    /// See [`mode`].
+    Mode = 0x08, ReadWrite, 0;
+    /// Patterns of a sweep, 1 to 1024.
+    Patterns = 0x09, ReadWrite, 1024;
+    /// Clocks a slot lasts, 1 to 65 535.
+    Dwell = 0x0A, ReadWrite, crate::CLOCKS_PER_PATTERN as u32;
+    /// Samples left out at the start of a slot, below `Dwell`.
+    Blank = 0x0B, ReadWrite, 2;
+    /// Clocks from light to sample, 0 to 63.
+    Latency = 0x0C, ReadWrite, 0;
+    /// Sweeps of a frame, at least 1.
+    Sweeps = 0x0D, ReadWrite, 1;
+    /// Frames of a run; 0 runs until stopped.
+    Frames = 0x0E, ReadWrite, 0;
+    /// Samples of a raw burst, 1 to [`RAW_SAMPLES_MAX`].
+    RawLength = 0x0F, ReadWrite, RAW_SAMPLES_MAX as u32;
+    /// Clocks without any access to the host port after which a run is ended, 1 to [`WATCHDOG_MAX`].
+    Watchdog = 0x10, ReadWrite, crate::ADC_HZ / 5;
+    /// Light budget in each window of [`DUTY_WINDOW`] clocks, in half-arrays lit for a clock: a slot of
+    /// pattern 0 costs 2 a clock, its complement 0, any other pattern or complement 1. At most
+    /// [`DUTY_LIMIT_MAX`]. Windows are fixed, one begins whenever the clock since reset is a multiple of their
+    /// length, so that no sequence of starts gets around the limit.
+    DutyLimit = 0x11, ReadWrite, DUTY_LIMIT_MAX;
+    /// Over-range samples, summed or not, within one frame or raw burst that end the run; 0 never does.
+    OverRangeTrip = 0x12, ReadWrite, 4096;
+    /// Frames completed in this run, lost ones too.
+    FramesMade = 0x13, ReadOnly, 0;
+    /// Frames of this run that were lost because the one before was not released.
+    FramesLost = 0x14, ReadOnly, 0;
+    /// Clocks since reset, low word; reading it holds the high word for the next read.
+    ClockLow = 0x15, ReadOnly, 0;
+    /// Clocks since reset, high word as of the last read of the low one.
+    ClockHigh = 0x16, ReadOnly, 0;
+}
+
+/// `"NSPI"` in ASCII.
+pub const IDENTITY: u32 = 0x4E53_5049;
+/// Address of the order table's first entry; entry `i` is at `ORDER_TABLE + i`, read and write, 10 bits.
+pub const ORDER_TABLE: u16 = 0x0400;
+/// Most samples that a raw burst can have.
+pub const RAW_SAMPLES_MAX: u16 = 4096;
+/// Largest watchdog setting: one second. There is no way to switch it off.
+pub const WATCHDOG_MAX: u32 = crate::ADC_HZ;
+/// Clocks of a duty window: 8.4 ms.
+pub const DUTY_WINDOW: u32 = 1 << 20;
+/// Largest duty limit, and the one after reset: 62.5 % of the array lit on average.
+pub const DUTY_LIMIT_MAX: u32 = DUTY_WINDOW / 4 * 5;
+/// Largest latency setting.
+pub const LATENCY_MAX: u8 = 63;
+
+/// Bits of [`Register::Control`]. More than one at a time act in the order listed.
+pub mod control {
+    /// Ends a run or raw burst; the unfinished frame is discarded.
+    pub const STOP: u32 = 1 << 0;
+    /// Forgets a latched fault. Ignored while running.
+    pub const CLEAR_FAULT: u32 = 1 << 1;
+    /// Gives the delivered frame's buffer back.
+    pub const RELEASE: u32 = 1 << 2;
+    /// Starts a run, unless one is under way, a fault is latched, the interlock is open or a setting is
+    /// out of range (then [`status::CONFIG_ERROR`](super::status::CONFIG_ERROR) is set). Resets the frame
+    /// counters, drops undelivered frames and raw samples.
+    pub const START: u32 = 1 << 3;
+    /// Like `START`, for one raw burst: the sweep of the settings, from its first slot on, with every
+    /// sample stored from clock 0, none summed, no latency or blanking applied.
+    pub const START_RAW: u32 = 1 << 4;
+}
+
+/// Bits of [`Register::Status`].
+pub mod status {
+    /// A run or raw burst is under way.
+    pub const RUNNING: u32 = 1 << 0;
+    /// A frame can be read.
+    pub const FRAME_READY: u32 = 1 << 1;
+    /// A raw burst can be read.
+    pub const RAW_READY: u32 = 1 << 2;
+    /// LEDs are driven.
+    pub const LEDS_ON: u32 = 1 << 3;
+    /// A fault is latched.
+    pub const FAULT: u32 = 1 << 4;
+    /// The interlock input is closed.
+    pub const INTERLOCK_CLOSED: u32 = 1 << 5;
+    /// The last start was refused for a setting out of range; the next accepted start clears it.
+    pub const CONFIG_ERROR: u32 = 1 << 6;
+    /// The order table was written while running; the next accepted start clears it.
+    pub const WRITE_REFUSED: u32 = 1 << 7;
+}
+
+/// Bits of [`Register::Mode`].
+pub mod mode {
+    /// Shows complements too and keeps a negative half.
+    pub const DIFFERENTIAL: u32 = 1 << 0;
+    /// Sequency order without a table.
+    pub const ORDER_SEQUENCY: u32 = 1 << 1;
+    /// Order from the table; wins over `ORDER_SEQUENCY`.
+    pub const ORDER_TABLE: u32 = 1 << 2;
+    /// Samples from the test generator instead of the ADC.
+    pub const TEST_SOURCE: u32 = 1 << 3;
+}
+
+/// Reason latched in [`Register::Fault`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub enum FaultCode {
+    /// None.
+    None = 0,
+    /// No access to the host port for [`Register::Watchdog`] clocks while running.
+    Watchdog = 1,
+    /// [`Register::DutyLimit`] exceeded.
+    Duty = 2,
+    /// [`Register::OverRangeTrip`] reached.
+    OverRange = 3,
+    /// The interlock opened while running.
+    Interlock = 4,
+}
+
+impl FaultCode {
+    /// The code with this number.
+    #[must_use]
+    pub const fn from_register(value: u32) -> Option<Self> {
+        match value {
+            0 => Some(Self::None),
+            1 => Some(Self::Watchdog),
+            2 => Some(Self::Duty),
+            3 => Some(Self::OverRange),
+            4 => Some(Self::Interlock),
+            _ => None,
+        }
+    }
+}
+
+/// The test generator's state at the first clock of a run.
+pub const TEST_SEED: u16 = 1;
+
+/// The test generator's next state, which is also its next sample: a 14-bit Fibonacci shift register,
+/// `x^14 + x^5 + x^3 + x + 1`, of period 2^14 - 1. The sample of a run's clock 0 is [`TEST_SEED`]. It stands
+/// in for the ADC, so latency and blanking act on it as on any sample.
+#[must_use]
+pub const fn test_sample(state: u16) -> u16 {
+    let bit = (state >> 13) ^ (state >> 4) ^ (state >> 2) ^ state;
+    ((state << 1) | (bit & 1)) & crate::ADC_MAX
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_register_is_found_at_its_address_and_none_elsewhere() {
+        for address in 0..=u16::MAX {
+            if let Some(register) = Register::at(address) {
+                assert_eq!(register.address(), address);
+                assert!(address < ORDER_TABLE);
+            }
+        }
+        let found = (0..=u16::MAX).filter_map(Register::at).count();
+        assert_eq!(found, Register::ALL.len());
+    }
+
+    #[test]
+    fn the_test_generator_visits_every_code_but_zero() {
+        let mut state = TEST_SEED;
+        let mut period = 0u32;
+        loop {
+            state = test_sample(state);
+            period += 1;
+            if state == TEST_SEED {
+                break;
+            }
+        }
+        assert_eq!(period, (1 << 14) - 1);
+    }
+}

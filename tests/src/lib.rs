@@ -1,0 +1,25 @@
+//! Shared pieces of the end-to-end tests.
+
+pub mod tamper;
+
+use std::path::{Path, PathBuf};
+
+/// Root of the repository.
+#[must_use]
+pub fn root() -> &'static Path {
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
+}
+
+/// Folder of real measurements: `$NIRSPI_DATA`, else `../shared/data`; `None` (said aloud) where neither is there.
+#[must_use]
+pub fn data() -> Option<PathBuf> {
+    let given = std::env::var_os("NIRSPI_DATA").map(PathBuf::from);
+    let found = given.unwrap_or_else(|| root().join("../shared/data"));
+    if found.is_dir() {
+        return Some(found);
+    }
+    // Past the test harness's capture, so that a skipped test is seen.
+    use std::io::Write;
+    let _ = writeln!(std::io::stderr(), "skipped: no data");
+    None
+}

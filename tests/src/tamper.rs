@@ -1,0 +1,104 @@
+//! A link that damages what passes, one packet at a time.
+
+use nirspi::link::{Link, Received};
+use std::io;
+use std::time::Duration;
+
+/// What happens to a packet on its way to the host.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fate {
+    /// It arrives.
+    Pass,
+    /// It vanishes.
+    Drop,
+    /// One bit of the byte at this share of its length (in 256ths) flips.
+    Flip(u8),
+    /// It arrives after the next one.
+    Delay,
+    /// The link ends in its middle.
+    Unplug,
+}
+
+/// Decides the fate of a packet from its number and length.
+pub type Judge = Box<dyn FnMut(usize, usize) -> Fate + Send>;
+
+/// A link whose packets meet a [`Fate`].
+pub struct Tampered {
+    inner: Box<dyn Link>,
+    judge: Judge,
+    count: usize,
+    partial: Vec<u8>,
+    delayed: Vec<u8>,
+    ready: Vec<u8>,
+    unplugged: bool,
+}
+
+impl Tampered {
+    /// Puts `judge` between host and camera.
+    pub fn new(
+        inner: Box<dyn Link>,
+        judge: impl FnMut(usize, usize) -> Fate + Send + 'static,
+    ) -> Self {
+        Self {
+            inner,
+            judge: Box::new(judge),
+            count: 0,
+            partial: Vec::new(),
+            delayed: Vec::new(),
+            ready: Vec::new(),
+            unplugged: false,
+        }
+    }
+
+    fn pass(&mut self, mut packet: Vec<u8>) {
+        let fate = (self.judge)(self.count, packet.len());
+        self.count += 1;
+        match fate {
+            Fate::Drop => return,
+            Fate::Delay => return self.delayed.append(&mut packet),
+            Fate::Pass => {}
+            Fate::Flip(share) => {
+                let at = usize::from(share) * (packet.len() - 1) / 256;
+                // Never into a delimiter: that is two packets' damage, and has a test of its own.
+                packet[at] ^= if packet[at] == 1 { 2 } else { 1 };
+            }
+            Fate::Unplug => {
+                packet.truncate(packet.len() / 2);
+                self.unplugged = true;
+            }
+        }
+        self.ready.append(&mut packet);
+        self.ready.append(&mut self.delayed);
+    }
+}
+
+impl Link for Tampered {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.inner.send(bytes)
+    }
+
+    fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<Received> {
+        if self.ready.is_empty() && !self.unplugged {
+            let mut chunk = vec![0; 1 << 16];
+            match self.inner.receive(&mut chunk, timeout)? {
+                Received::Bytes(length) => {
+                    for &byte in &chunk[..length] {
+                        self.partial.push(byte);
+                        if byte == 0 && !self.unplugged {
+                            let packet = std::mem::take(&mut self.partial);
+                            self.pass(packet);
+                        }
+                    }
+                }
+                other => return Ok(other),
+            }
+        }
+        if self.ready.is_empty() {
+            return Ok(if self.unplugged { Received::Closed } else { Received::Nothing });
+        }
+        let length = self.ready.len().min(buffer.len());
+        buffer[..length].copy_from_slice(&self.ready[..length]);
+        self.ready.drain(..length);
+        Ok(Received::Bytes(length))
+    }
+}

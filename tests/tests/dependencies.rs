@@ -1,0 +1,92 @@
+//! The table of docs/architecture.md is what `cargo metadata` says.
+
+use nirspi_tests::root;
+use serde_json::Value;
+use std::collections::{BTreeMap, BTreeSet};
+use std::process::Command;
+
+/// What one crate may use.
+struct Allowed {
+    ours: BTreeSet<String>,
+    /// `None`: any crate from outside.
+    outside: Option<BTreeSet<String>>,
+}
+
+fn table() -> BTreeMap<String, Allowed> {
+    let page = std::fs::read_to_string(root().join("docs/architecture.md")).unwrap();
+    let names = |cell: &str| -> BTreeSet<String> {
+        cell.split(',').map(|name| name.trim().to_owned()).filter(|name| !name.is_empty()).collect()
+    };
+    page.lines()
+        .filter_map(|line| line.strip_prefix("| `nirspi")?.strip_suffix(" |"))
+        .map(|row| {
+            let cells: Vec<&str> = row.split('|').collect();
+            let [name, ours, outside] = cells[..] else { panic!("three cells in {row:?}") };
+            let name = format!("nirspi{}", name.trim().trim_end_matches('`'));
+            let outside = (outside.trim() != "any").then(|| names(outside));
+            (name, Allowed { ours: names(ours), outside })
+        })
+        .collect()
+}
+
+fn metadata(folder: &str) -> Vec<Value> {
+    let output = Command::new(env!("CARGO"))
+        .args(["metadata", "--format-version", "1", "--no-deps", "--offline"])
+        .current_dir(root().join(folder))
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let mut metadata: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let Value::Array(packages) = metadata["packages"].take() else { panic!("no packages") };
+    packages
+}
+
+/// Every dependency that the table does not allow, as `user -> used`.
+fn violations(packages: &[Value], table: &BTreeMap<String, Allowed>) -> Vec<String> {
+    let mut found = Vec::new();
+    for package in packages {
+        let user = package["name"].as_str().unwrap();
+        let Some(allowed) = table.get(user) else {
+            found.push(format!("{user} is not in the table"));
+            continue;
+        };
+        for dependency in package["dependencies"].as_array().unwrap() {
+            // Tests may use what they like of the outside world, yet none of our upper layers either.
+            let is_dev = dependency["kind"] == "dev";
+            let used = dependency["name"].as_str().unwrap();
+            let fine = if used.starts_with("nirspi") {
+                allowed.ours.contains(used)
+            } else {
+                is_dev || allowed.outside.as_ref().is_none_or(|outside| outside.contains(used))
+            };
+            if !fine {
+                found.push(format!("{user} -> {used}"));
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn crates_use_what_the_architecture_page_allows_and_nothing_else() {
+    let table = table();
+    let packages = metadata(".");
+    assert_eq!(packages.len(), table.len(), "one row a crate");
+    let found = violations(&packages, &table);
+    assert!(found.is_empty(), "docs/architecture.md does not allow: {found:#?}");
+}
+
+#[test]
+fn a_forbidden_dependency_is_found() {
+    let mut packages = metadata(".");
+    for package in &mut packages {
+        if package["name"] == "nirspi-mcu" {
+            package["dependencies"].as_array_mut().unwrap().extend([
+                serde_json::json!({"name": "nirspi-recon", "kind": null}),
+                serde_json::json!({"name": "embassy-executor", "kind": null}),
+            ]);
+        }
+    }
+    let found = violations(&packages, &table());
+    assert_eq!(found, ["nirspi-mcu -> nirspi-recon", "nirspi-mcu -> embassy-executor"]);
+}

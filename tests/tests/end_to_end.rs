@@ -1,0 +1,323 @@
+//! From light to image, through gateware model, firmware logic, wire protocol and host, and what happens
+//! when something in between goes wrong.
+
+use nirspi::capture::{Capture, CaptureOptions, Ended, capture};
+use nirspi::link::Link;
+use nirspi::session::{Session, SessionError};
+use nirspi::setup::MeasurementSetup;
+use nirspi::virtual_camera::{MemoryLink, SimulatedFpga, VirtualCamera, VirtualOptics};
+use nirspi_hdl::{AdcSample, Gateware};
+use nirspi_mcu::{BusError, FpgaBus};
+use nirspi_optics::{Chain, LedArray, Scene};
+use nirspi_recon::{Order, Side, fwht, metrics, reconstruct};
+use nirspi_tests::tamper::{Fate, Tampered};
+use nirspi_wire::{Fault, walsh};
+use std::ops::ControlFlow;
+
+const FRAMES: u32 = 6;
+const PX: usize = 64;
+
+/// A disc on a rough ground: every one of the 1024 patterns has something to say about it.
+fn scene() -> Scene {
+    let mut state = 1u32;
+    let rough: Vec<f32> = (0..1024)
+        .map(|_| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 16) as f32 / 65_536.0
+        })
+        .collect();
+    let reflectance = (0..PX * PX)
+        .map(|p| {
+            let (r, c) = (p / PX, p % PX);
+            let disc = (r as f32 - 40.0).hypot(c as f32 - 20.0) < 10.0;
+            0.5 * rough[r / 2 * 32 + c / 2] + if disc { 0.4 } else { 0.1 }
+        })
+        .collect();
+    Scene::new(reflectance, PX, 48.0).unwrap()
+}
+
+fn optics() -> VirtualOptics {
+    VirtualOptics::new(scene(), 300.0).unwrap()
+}
+
+fn options(order: &Order, calibrate: bool) -> CaptureOptions {
+    let setup = MeasurementSetup::new(order, 1.0).unwrap();
+    CaptureOptions { setup, frames: Some(FRAMES), calibrate, record: None }
+}
+
+fn run(link: Box<dyn Link>, options: &CaptureOptions) -> Capture {
+    let mut session = Session::open(link).unwrap();
+    capture(&mut session, options, &mut |_| ControlFlow::Continue(())).unwrap()
+}
+
+fn ideal_link() -> Box<dyn Link> {
+    Box::new(MemoryLink::new(optics().ideal().camera(1).unwrap()))
+}
+
+/// What a capture of the ideal camera must give: all frames, and every measurement to within the rounding of its
+/// two readings to whole ADC counts.
+fn check(captured: &Capture) -> Result<(), String> {
+    let counters = captured.counters;
+    if !counters.is_complete() || counters.total() != u64::from(FRAMES) {
+        return Err(format!("counters: {counters}"));
+    }
+    let optics = optics().ideal();
+    let counts = optics.budget().electrons_per_led / optics.chain().electrons_per_count;
+    let mut expected: Vec<f64> =
+        optics.footprint().weights().iter().map(|&w| f64::from(w) * counts).collect();
+    fwht(&mut expected).unwrap();
+    let measurements = captured.integrated.measurements(&captured.setup, None).unwrap();
+    for (&row, value) in measurements.rows().iter().zip(measurements.values()) {
+        let off = (value - expected[row as usize]).abs();
+        if off > 1.01 {
+            return Err(format!("row {row} is {off:.1} ADC counts off"));
+        }
+    }
+    let image = reconstruct::hadamard(&measurements);
+    let side = Side::INSTRUMENT.pixels();
+    let correlation =
+        metrics::correlation(optics.footprint().weights(), image.pixels(), side, side).unwrap();
+    if correlation < 0.9999 { Err(format!("correlation {correlation}")) } else { Ok(()) }
+}
+
+#[test]
+fn the_scene_comes_through_exactly_in_any_order() {
+    for order in [Order::Natural, Order::Sequency, Order::CakeCutting, Order::Random(7)] {
+        let captured = run(ideal_link(), &options(&order, false));
+        assert!(matches!(captured.ended, Ended::Complete));
+        check(&captured).unwrap_or_else(|reason| panic!("{order}: {reason}"));
+    }
+}
+
+/// The number of the first packet of a run that is a frame: greeting, answers come before.
+fn only_frames(
+    mut judge: impl FnMut(usize) -> Fate + Send + 'static,
+) -> impl FnMut(usize, usize) -> Fate + Send {
+    let mut frame = 0;
+    move |_, length| {
+        // Nothing else that the device sends is nearly as long.
+        if length < 3000 {
+            return Fate::Pass;
+        }
+        frame += 1;
+        judge(frame - 1)
+    }
+}
+
+#[test]
+fn a_dropped_frame_is_counted_once_and_fails_the_check() {
+    let judge = only_frames(|frame| if frame == 2 { Fate::Drop } else { Fate::Pass });
+    let link = Tampered::new(ideal_link(), judge);
+    let captured = run(Box::new(link), &options(&Order::Natural, false));
+    assert_eq!((captured.counters.received, captured.counters.lost), (5, 1));
+    assert!(check(&captured).is_err());
+}
+
+#[test]
+fn the_last_frame_dropped_is_counted_too() {
+    let judge = only_frames(|frame| if frame == 5 { Fate::Drop } else { Fate::Pass });
+    let captured =
+        run(Box::new(Tampered::new(ideal_link(), judge)), &options(&Order::Natural, false));
+    assert_eq!((captured.counters.received, captured.counters.lost), (5, 1));
+}
+
+#[test]
+fn a_flipped_bit_anywhere_is_a_corrupt_frame_and_fails_the_check() {
+    for share in [0, 1, 60, 128, 255] {
+        let judge =
+            only_frames(move |frame| if frame == 3 { Fate::Flip(share) } else { Fate::Pass });
+        let link = Tampered::new(ideal_link(), judge);
+        let captured = run(Box::new(link), &options(&Order::Natural, false));
+        let counters = captured.counters;
+        assert_eq!((counters.received, counters.corrupt, counters.lost), (5, 1, 0), "{share}");
+        assert!(check(&captured).is_err());
+    }
+}
+
+#[test]
+fn a_frame_that_is_overtaken_is_late() {
+    let judge = only_frames(|frame| if frame == 1 { Fate::Delay } else { Fate::Pass });
+    let captured =
+        run(Box::new(Tampered::new(ideal_link(), judge)), &options(&Order::Natural, false));
+    assert_eq!((captured.counters.received, captured.counters.late), (5, 1));
+}
+
+#[test]
+fn an_unplugged_link_keeps_what_came_and_says_so() {
+    let judge = only_frames(|frame| if frame == 3 { Fate::Unplug } else { Fate::Pass });
+    let captured =
+        run(Box::new(Tampered::new(ideal_link(), judge)), &options(&Order::Natural, false));
+    assert_eq!(captured.integrated.frames(), 3);
+    let Ended::LinkLost(SessionError::Closed { mid_packet: true }) = captured.ended else {
+        panic!("{:?}", captured.ended);
+    };
+}
+
+/// The ideal camera, whose array shows pattern 700 with the wrong sign: its complement first, then itself.
+struct WrongSign {
+    gateware: Gateware,
+    array: LedArray,
+    chain: Chain,
+    clock: u64,
+}
+
+impl WrongSign {
+    fn new(optics: &VirtualOptics) -> Self {
+        let mut gateware = Gateware::new();
+        gateware.set_interlock(true);
+        let array = LedArray::new(optics.footprint(), optics.budget().electrons_per_led);
+        let chain = Chain::new(*optics.chain(), 1).unwrap();
+        Self { gateware, array, chain, clock: 0 }
+    }
+}
+
+impl FpgaBus for WrongSign {
+    fn read(&mut self, address: u16) -> Result<u32, BusError> {
+        Ok(self.gateware.read(address).unwrap_or(0))
+    }
+    fn write(&mut self, address: u16, value: u32) -> Result<(), BusError> {
+        self.gateware.write(address, value);
+        Ok(())
+    }
+    fn frame_ready(&mut self) -> bool {
+        self.gateware.frame_ready()
+    }
+    fn raw_ready(&mut self) -> bool {
+        self.gateware.raw_ready()
+    }
+    fn frame(&mut self) -> Result<Option<&[u8]>, BusError> {
+        Ok(self.gateware.frame())
+    }
+    fn raw(&mut self) -> Result<Option<&[u8]>, BusError> {
+        Ok(self.gateware.raw())
+    }
+}
+
+impl SimulatedFpga for WrongSign {
+    fn advance(&mut self, clocks: u32) {
+        self.clock += u64::from(clocks);
+        for _ in 0..clocks {
+            let lines = self.gateware.lines();
+            let wrong = [walsh::pattern(700, false), walsh::pattern(700, true)]
+                .contains(&(lines.rows, lines.columns));
+            let rows = if wrong { !lines.rows } else { lines.rows };
+            let sample = self.chain.sample(self.array.light(rows, lines.columns, lines.enable));
+            self.gateware.tick(AdcSample { code: sample.counts, over_range: sample.over_range });
+        }
+    }
+    fn clock(&self) -> u64 {
+        self.clock
+    }
+    fn running(&self) -> bool {
+        self.gateware.running()
+    }
+    fn set_interlock(&mut self, closed: bool) {
+        self.gateware.set_interlock(closed);
+    }
+}
+
+#[test]
+fn one_inverted_sign_of_1024_fails_the_check() {
+    let optics = optics().ideal();
+    let camera = VirtualCamera::new(WrongSign::new(&optics), optics.depth(1).unwrap(), "wrong");
+    let captured = run(Box::new(MemoryLink::new(camera)), &options(&Order::CakeCutting, false));
+    assert!(captured.counters.is_complete());
+    let reason = check(&captured).unwrap_err();
+    assert!(reason.contains("ADC counts off"), "{reason}");
+}
+
+#[test]
+fn two_patterns_taken_for_each_other_fail_the_check() {
+    let mut captured = run(ideal_link(), &options(&Order::CakeCutting, false));
+    check(&captured).unwrap();
+    captured.setup.rows.swap(100, 101);
+    assert!(check(&captured).is_err());
+}
+
+#[test]
+fn calibration_finds_latency_and_leak_and_undoing_them_helps() {
+    let noiseless = || {
+        let mut chain = nirspi_optics::ChainSettings::default();
+        (chain.shot_noise, chain.amplifier_noise_electrons) = (false, 0.0);
+        VirtualOptics::with_settings(
+            scene(),
+            300.0,
+            nirspi_optics::Projector::default(),
+            &nirspi_optics::BudgetSettings::default(),
+            chain,
+        )
+        .unwrap()
+    };
+    let link = Box::new(MemoryLink::new(noiseless().camera(3).unwrap()));
+    let captured = run(link, &options(&Order::CakeCutting, true));
+    assert!(captured.calibration_problem.is_none(), "{:?}", captured.calibration_problem);
+    assert_eq!(captured.setup.adc_latency, noiseless().chain().adc_latency_clocks);
+
+    let leak = captured.settling.as_ref().unwrap().leak(5, 2).unwrap();
+    assert!(leak.taps()[1] > 0.01, "the default chain leaks: {:?}", leak.taps());
+    let footprint = noiseless().footprint().weights().to_vec();
+    let side = Side::INSTRUMENT.pixels();
+    let distance = |leak| {
+        let measurements = captured.integrated.measurements(&captured.setup, leak).unwrap();
+        let image = reconstruct::hadamard(&measurements);
+        1.0 - metrics::correlation(&footprint, image.pixels(), side, side).unwrap()
+    };
+    let (with, without) = (distance(None), distance(Some(&leak)));
+    // What is left is the rounding to whole ADC counts.
+    assert!(
+        without < with / 8.0,
+        "1 - correlation: {with:.2e} with the leak, {without:.2e} without"
+    );
+}
+
+#[test]
+fn the_same_seed_gives_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let record = |name: &str, seed| {
+        let path = folder.path().join(name);
+        let options =
+            CaptureOptions { record: Some(path.clone()), ..options(&Order::CakeCutting, true) };
+        run(Box::new(MemoryLink::new(optics().camera(seed).unwrap())), &options);
+        let mut packets = Vec::new();
+        nirspi::recording::read(&path, |packet, _| packets.push(packet.to_vec())).unwrap();
+        packets
+    };
+    let first = record("a.mcap", 5);
+    assert!(first.len() > FRAMES as usize);
+    assert_eq!(first, record("b.mcap", 5));
+    assert_ne!(first, record("c.mcap", 6));
+}
+
+#[test]
+fn an_interlock_that_opens_ends_the_capture_with_the_reason() {
+    let mut camera = optics().camera(1).unwrap();
+    camera.set_interlock(false);
+    let mut session = Session::open(Box::new(MemoryLink::new(camera))).unwrap();
+    let error =
+        capture(&mut session, &options(&Order::Natural, false), &mut |_| ControlFlow::Continue(()));
+    // Opened before the start, it refuses; the words name the interlock.
+    let message = match error {
+        Ok(captured) => match captured.ended {
+            Ended::Fault(fault @ Fault::Interlock) => format!("{fault:?}"),
+            other => panic!("{other:?}"),
+        },
+        Err(error) => error.to_string(),
+    };
+    assert!(message.contains("Interlock"), "{message}");
+}
+
+#[test]
+fn stopping_keeps_what_has_come() {
+    let mut session = Session::open(ideal_link()).unwrap();
+    let options = CaptureOptions { frames: None, ..options(&Order::Natural, false) };
+    let captured = capture(&mut session, &options, &mut |progress| {
+        if progress.counters.received >= 3 {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    })
+    .unwrap();
+    assert!(matches!(captured.ended, Ended::Stopped));
+    assert!(captured.counters.received >= 3 && captured.counters.is_complete());
+}
