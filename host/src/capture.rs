@@ -22,7 +22,7 @@ use thiserror::Error;
 /// How often the camera hears from a host that has nothing to say.
 const KEEP_ALIVE: Duration = Duration::from_secs(1);
 /// A camera that says it has stopped, and sends nothing more for this long, has stopped.
-const QUIET: Duration = Duration::from_secs(1);
+const QUIET: Duration = Duration::from_millis(500);
 
 /// What to capture.
 #[derive(Debug, Clone)]
@@ -55,7 +55,7 @@ pub enum Ended {
     Stopped,
     /// The camera switched its LEDs off.
     Fault(Fault),
-    /// The camera went away. What it made after the last frame that came is not known.
+    /// The camera went away or fell silent. What it made after the last frame that came is not known.
     LinkLost(SessionError),
 }
 
@@ -91,7 +91,7 @@ pub enum CaptureError {
     #[error(transparent)]
     Session(#[from] SessionError),
     /// The recording cannot be written.
-    #[error("{path}: {source}")]
+    #[error("{path}: cannot record: {source}")]
     Recording {
         /// Which file.
         path: PathBuf,
@@ -121,6 +121,11 @@ impl Run {
         {
             self.recorder_error = write(recorder).err();
         }
+    }
+
+    /// Whether anything of the run, whole or damaged, has come.
+    fn brought_something(&self) -> bool {
+        self.account.accounted() > 0 || self.account.damaged_packets() > 0
     }
 
     fn frame(&mut self, frame: &Frame<'_>) {
@@ -203,9 +208,7 @@ pub fn capture(
     };
     let ended = match stream(session, options.frames, &mut run, now, watch) {
         Ok(ended) => ended,
-        Err(error @ (SessionError::Closed { .. } | SessionError::Link(_))) => {
-            Ended::LinkLost(error)
-        }
+        Err(error) if run.brought_something() => Ended::LinkLost(error),
         Err(error) => {
             discard_empty(options.record.as_deref(), run);
             return Err(error.into());
@@ -234,14 +237,6 @@ pub fn capture(
     })
 }
 
-/// Whether the camera went away, rather than said something unexpected.
-fn is_lost(error: &SessionError) -> bool {
-    matches!(
-        error,
-        SessionError::Closed { .. } | SessionError::Link(_) | SessionError::NoAnswer { .. }
-    )
-}
-
 fn recording_error(path: &Path, source: io::Error) -> CaptureError {
     CaptureError::Recording { path: path.to_owned(), source }
 }
@@ -249,7 +244,8 @@ fn recording_error(path: &Path, source: io::Error) -> CaptureError {
 /// A run that never started leaves no recording behind.
 fn discard_empty(path: Option<&Path>, run: Run) {
     drop(run.recorder);
-    if let Some(path) = path {
+    // Not a device that the user records into.
+    if let Some(path) = path.filter(|path| path.is_file()) {
         // It was made a moment ago and holds no packet; where it cannot be removed it does no harm.
         let _ = std::fs::remove_file(path);
     }
@@ -301,12 +297,9 @@ fn stream(
             }
         }
     }
-    match session.status(run) {
-        // All that was made is accounted for: that the link went down after it changes nothing.
-        Ok(_) => {}
-        Err(error) if is_lost(&error) => {}
-        Err(error) => return Err(error),
-    }
+    // The camera's own view, for the record. All that it made is accounted for: if it cannot be asked any
+    // more, nothing is lost.
+    let _ = session.status(run);
     Ok(match (run.fault, stopped) {
         (Some(fault), _) => Ended::Fault(fault),
         (None, true) => Ended::Stopped,

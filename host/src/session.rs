@@ -157,6 +157,9 @@ impl From<&Answer<'_>> for OwnedAnswer {
     }
 }
 
+/// Which request was answered, and how.
+type Answered = (u16, Result<OwnedAnswer, Refusal>);
+
 /// A camera that has answered the greeting.
 pub struct Session {
     link: Box<dyn Link>,
@@ -178,7 +181,7 @@ impl Incoming {
         &mut self,
         length: usize,
         listener: &mut dyn Listener,
-    ) -> Option<(u16, Result<OwnedAnswer, Refusal>)> {
+    ) -> Option<Answered> {
         let mut reply = None;
         let mut bytes = self.chunk.get(..length).unwrap_or(&[]);
         while let Some(found) = self.deframer.next(&mut bytes) {
@@ -282,7 +285,7 @@ impl Session {
         &mut self,
         timeout: Duration,
         listener: &mut dyn Listener,
-    ) -> Result<Option<(u16, Result<OwnedAnswer, Refusal>)>, SessionError> {
+    ) -> Result<Option<Answered>, SessionError> {
         match self.link.receive(&mut self.incoming.chunk, timeout)? {
             Received::Bytes(length) => Ok(self.incoming.take(length, listener)),
             Received::Nothing => Ok(None),

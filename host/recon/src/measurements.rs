@@ -124,6 +124,7 @@ impl Measurements {
         if kept.is_empty() {
             return Err(MeasurementError::Empty);
         }
+        expect_finite("d", &values)?; // readings near the end of f64's range may differ by more
         Ok((Self { side, rows: kept, values }, dropouts))
     }
 
@@ -145,7 +146,9 @@ impl Measurements {
             Some(k) => y[k],
             None => 2.0 * y.iter().sum::<f64>() / y.len() as f64,
         };
-        Ok(Self { side, rows, values: y.iter().map(|y| 2.0 * y - all_ones).collect() })
+        let values: Vec<f64> = y.iter().map(|y| 2.0 * y - all_ones).collect();
+        expect_finite("d", &values)?;
+        Ok(Self { side, rows, values })
     }
 
     /// The part of these measurements that a shorter sweep would have taken: the first

@@ -15,7 +15,7 @@
 //!    images (D. J. Field, *Relations between the statistics of natural images and the response properties of cortical
 //!    cells*, 1987), and measurements to carry the noise estimated from them; see [`crate::omp::sampled`].
 //! 3. **Cross-validation**: the number of atoms and how far to trust the prediction (a factor from 0, zero filling, to
-//!    1) are those with the least absolute error on rows that were measured but held back.
+//!    1) are those with the least error on rows that were measured but held back.
 //!
 #![doc = include_str!("reconstruct/study.md")]
 

@@ -4,7 +4,7 @@ use super::Usage;
 use anyhow::{Context, Result};
 use clap::Args;
 use nirspi::files::order_table::read_order_table;
-use nirspi::link::{Link, TcpLink};
+use nirspi::link::TcpLink;
 use nirspi::scene::{SceneMap, SceneSource};
 use nirspi::session::Session;
 use nirspi::setup::MeasurementSetup;
@@ -24,7 +24,7 @@ pub struct SceneArgs {
     #[arg(long, value_name = "SCENE", default_value = "letter:R")]
     pub scene: String,
     /// Distance from the virtual camera to the target, in metres
-    #[arg(long, value_name = "M", default_value_t = 0.3)]
+    #[arg(long, value_name = "M", default_value_t = 0.3, allow_negative_numbers = true)]
     pub distance_m: f64,
     /// Seed of the simulated noise: the same seed gives the same bytes
     #[arg(long, value_name = "N", default_value_t = 1)]
@@ -47,7 +47,9 @@ impl SceneArgs {
         let side_mm = map.side_mm.unwrap_or_else(|| Projector::default().field_mm(distance_mm));
         let scene = Scene::new(map.reflectance.clone(), map.size_px, side_mm)?;
         let optics = VirtualOptics::new(scene, distance_mm)
-            .with_context(|| format!("--distance-m {}", self.distance_m))?;
+            // The depth sensor has a range of its own.
+            .and_then(|optics| optics.depth(self.seed).map(|_| optics).map_err(Into::into))
+            .map_err(|error| Usage(format!("--distance-m {}: {error}", self.distance_m)))?;
         Ok((map, optics))
     }
 }
@@ -60,13 +62,15 @@ pub struct SetupArgs {
     #[arg(long, value_name = "ORDER", default_value = "cake-cutting")]
     pub order: String,
     /// Share of the 1024 patterns to show, the first of the order [default: demo 0.5, capture 1]
-    #[arg(long, value_name = "0..1")]
+    #[arg(long, value_name = "0..1", allow_negative_numbers = true)]
     pub sampling: Option<f64>,
     /// Sweeps summed into one frame
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1,
+          value_parser = clap::value_parser!(u32).range(1..))]
     pub sweeps: u32,
     /// ADC clocks (8 ns) that each pattern is shown: 5 is 25 MHz
-    #[arg(long, value_name = "N", default_value_t = 5)]
+    #[arg(long, value_name = "N", default_value_t = 5,
+          value_parser = clap::value_parser!(u16).range(1..))]
     pub clocks_per_pattern: u16,
     /// ADC samples left out at the start of each pattern
     #[arg(long, value_name = "N", default_value_t = 2)]
@@ -80,6 +84,13 @@ impl SetupArgs {
     /// The setup asked for.
     pub fn setup(&self, default_sampling: f64) -> Result<MeasurementSetup> {
         let order = parse_order(&self.order)?;
+        if self.blanked >= self.clocks_per_pattern {
+            let (blanked, clocks) = (self.blanked, self.clocks_per_pattern);
+            return Err(Usage(format!(
+                "--blanked is {blanked}, expected less than the {clocks} of --clocks-per-pattern"
+            ))
+            .into());
+        }
         let sampling = self.sampling.unwrap_or(default_sampling);
         check_sampling(sampling)?;
         let mut setup = MeasurementSetup::new(&order, sampling)
@@ -97,7 +108,7 @@ pub fn parse_order(name: &str) -> Result<Order> {
     if let Some(path) = name.strip_prefix("table:") {
         return Ok(Order::Table(read_order_table(Path::new(path))?));
     }
-    Order::from_str(name).map_err(|error| Usage(format!("--order {name:?}: {error}")).into())
+    Order::from_str(name).map_err(|error| Usage(format!("--order: {error} or table:FILE")).into())
 }
 
 /// A share of patterns is more than 0 and at most 1.
@@ -132,17 +143,16 @@ impl FromStr for CameraAddress {
 impl CameraAddress {
     /// Opens a conversation with the camera. `scene` is what a virtual one looks at.
     pub fn open(&self, scene: &SceneArgs) -> Result<Session> {
-        let link: Box<dyn Link> = match self {
+        match self {
             Self::Virtual => {
                 let (_, optics) = scene.optics()?;
-                Box::new(MemoryLink::new(optics.camera(scene.seed)?))
+                Ok(Session::open(Box::new(MemoryLink::new(optics.camera(scene.seed)?)))?)
             }
             Self::Tcp(address) => {
                 let link = TcpLink::connect(address)
                     .with_context(|| format!("no camera at tcp:{address}"))?;
-                Box::new(link)
+                Session::open(Box::new(link)).with_context(|| format!("tcp:{address}"))
             }
-        };
-        Ok(Session::open(link)?)
+        }
     }
 }

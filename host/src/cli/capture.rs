@@ -15,9 +15,10 @@ use std::sync::atomic::Ordering;
 
 /// Record frames of a camera into an MCAP file
 ///
-/// Ctrl-C ends the recording and keeps it. Example:
-/// nirspi capture --camera tcp:127.0.0.1:1550 --frames 1000 --out rec.mcap
+/// Ctrl-C ends the recording and keeps it.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n\
+    \x20 nirspi capture --camera tcp:127.0.0.1:1550 --frames 1000 --out rec.mcap")]
 pub struct Args {
     /// Which camera: virtual, or tcp:HOST:PORT
     #[arg(long, value_name = "CAMERA", default_value = "virtual")]
@@ -52,7 +53,8 @@ struct Report<'r> {
     recording: &'r Path,
     bytes: u64,
     frames: LossCounters,
-    made: u64,
+    /// As the camera counted them; `null` where it went away before it could say.
+    made: Option<u64>,
     damaged_packets: u64,
     repeated: u64,
     ended: String,
@@ -61,6 +63,8 @@ struct Report<'r> {
     frames_per_s: f64,
     adc_latency_clocks: u8,
     calibrated: bool,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    calibration_problem: Option<String>,
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
@@ -139,7 +143,7 @@ fn report(
         recording: path,
         bytes: std::fs::metadata(path)?.len(),
         frames: counters,
-        made: counters.total(),
+        made: (!matches!(captured.ended, Ended::LinkLost(_))).then(|| counters.total()),
         damaged_packets: captured.damaged_packets,
         repeated: captured.repeated,
         ended,
@@ -148,14 +152,18 @@ fn report(
         frames_per_s: counters.received as f64 / seconds,
         adc_latency_clocks: captured.setup.adc_latency,
         calibrated: captured.settling.is_some(),
+        calibration_problem: captured.calibration_problem.as_ref().map(ToString::to_string),
     };
     if args.json {
         print::json(&report)?;
     } else {
-        if let Some(problem) = &captured.calibration_problem {
+        if let Some(problem) = &report.calibration_problem {
             print::line(format_args!("not calibrated: {problem}"))?;
         }
-        print::line(format_args!("{counters}: {} frames made", report.made))?;
+        match report.made {
+            Some(made) => print::line(format_args!("{counters}: {made} frames made"))?,
+            None => print::line(counters)?,
+        }
         print::line(format_args!(
             "{:.0} frames/s over {seconds:.2} s, {:.1} MB in {}",
             report.frames_per_s,
@@ -165,7 +173,7 @@ fn report(
     }
     if failed {
         print::complain(format_args!(
-            "nirspi: {}; {} received frames are kept in {}",
+            "{}; {} received frames are kept in {}",
             report.ended,
             counters.received,
             path.display()

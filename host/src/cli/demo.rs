@@ -29,8 +29,9 @@ use std::process::ExitCode;
 /// An optics simulator lights the gateware's model; the real firmware logic drives it and speaks the real wire
 /// protocol; the host calibrates, captures, counts and reconstructs. Writes scene, raw reconstruction and result as
 /// PNG and NPY, side_by_side.png and report.json.
-/// Example: nirspi demo --scene letter:R --out demo/
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n\
+    \x20 nirspi demo --scene letter:R --out demo/")]
 pub struct Args {
     #[command(flatten)]
     scene: SceneArgs,
@@ -134,7 +135,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let Solved { image, report: method } =
         times.time("reconstruct", || solve(&args.method, &measurements))?;
 
-    let truth = optics.focused_footprint()?.weights().to_vec();
+    // Rounding leaves a black scene a hair under 0; a reflectance is none.
+    let truth: Vec<f32> =
+        optics.focused_footprint()?.weights().iter().map(|w| w.clamp(0.0, 1.0)).collect();
     let raw = compare(&raw, &truth)?;
     let fitted = compare(&image, &truth)?;
     let side = image.side().pixels();

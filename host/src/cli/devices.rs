@@ -14,8 +14,10 @@ pub const DEFAULT_TCP: &str = "127.0.0.1:1550";
 /// List the cameras that can be used
 ///
 /// Looks at the TCP addresses given and at the default one of `nirspi virtual`. The virtual camera inside this
-/// program is always there. Example: nirspi devices --tcp 192.168.0.7:1550
+/// program is always there.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n\
+    \x20 nirspi devices --tcp 192.168.0.7:1550")]
 pub struct Args {
     /// Also look here; may be repeated
     #[arg(long, value_name = "HOST:PORT")]
@@ -34,24 +36,31 @@ struct Device {
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let mut devices = vec![Device { camera: "virtual".to_owned(), identity: None, problem: None }];
     let default = (!args.tcp.iter().any(|a| a == DEFAULT_TCP)).then_some(DEFAULT_TCP);
     let asked = args.tcp.iter().map(|address| (address.as_str(), true));
-    for (address, named) in asked.chain(default.map(|address| (address, false))) {
-        match identify(address) {
-            Ok(identity) => devices.push(Device {
-                camera: format!("tcp:{address}"),
-                identity: Some(identity),
-                problem: None,
-            }),
+    let addresses: Vec<(&str, bool)> =
+        asked.chain(default.map(|address| (address, false))).collect();
+    // All at once: an address where nobody answers takes its time.
+    let answers: Vec<_> = std::thread::scope(|scope| {
+        let asking: Vec<_> =
+            addresses.iter().map(|(address, _)| scope.spawn(|| identify(address))).collect();
+        asking.into_iter().map(std::thread::ScopedJoinHandle::join).collect()
+    });
+
+    let mut devices = vec![Device { camera: "virtual".to_owned(), identity: None, problem: None }];
+    for ((address, named), answer) in addresses.into_iter().zip(answers) {
+        let camera = format!("tcp:{address}");
+        match answer.map_err(|_| anyhow::anyhow!("asking {address} failed"))? {
+            Ok(identity) => {
+                devices.push(Device { camera, identity: Some(identity), problem: None });
+            }
             // Nobody at the default address is no news.
             Err(SessionError::Link(error))
                 if !named && error.kind() == io::ErrorKind::ConnectionRefused => {}
-            Err(error) => devices.push(Device {
-                camera: format!("tcp:{address}"),
-                identity: None,
-                problem: Some(error.to_string()),
-            }),
+            Err(error) => {
+                let problem = Some(error.to_string());
+                devices.push(Device { camera, identity: None, problem });
+            }
         }
     }
     if args.json {

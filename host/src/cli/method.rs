@@ -43,7 +43,7 @@ pub struct MethodArgs {
     #[arg(long, value_name = "K")]
     pub sparsity: Option<usize>,
     /// Stop when the residual's norm is this share of the measurements'
-    #[arg(long, value_name = "0..1", default_value_t = 0.0)]
+    #[arg(long, value_name = "0..1", default_value_t = 0.0, allow_negative_numbers = true)]
     pub residual: f64,
     /// What becomes of patterns that were measured
     #[arg(long, value_enum, default_value_t = Keep::Measured)]
@@ -66,7 +66,7 @@ impl MethodArgs {
 
     fn basis(&self) -> Result<Basis> {
         Basis::from_str(&self.basis)
-            .map_err(|error| Usage(format!("--basis {:?}: {error}", self.basis)).into())
+            .map_err(|error| Usage(format!("--basis: {error}")).into())
     }
 }
 

@@ -10,14 +10,18 @@ use std::process::ExitCode;
 
 /// Compare two .npy stacks of images: PSNR and SSIM, data range 1
 ///
-/// Both hold (N, H, W) or (H, W) numbers in [0, 1]; nothing is scaled or fitted. Example:
-/// nirspi metrics reference.npy demo/reconstruction.npy
+/// Both hold (N, H, W) or (H, W) numbers in [0, 1]; nothing is scaled or fitted.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n\
+    \x20 nirspi metrics demo/truth.npy demo/reconstruction.npy")]
 pub struct Args {
     /// The images as they should be
     reference: PathBuf,
     /// The images to judge
     test: PathBuf,
+    /// Print JSON, as it does anyway
+    #[arg(long)]
+    json: bool,
 }
 
 #[derive(Debug, Serialize)]
@@ -81,7 +85,10 @@ fn load(path: &std::path::Path) -> Result<Stack> {
     let stack = read_stack(path)?;
     let outside = stack.values.iter().position(|v| !(0.0..=1.0).contains(v));
     if let Some(at) = outside {
-        bail!("{}: value {at} is {}, expected 0 to 1", path.display(), stack.values[at]);
+        let (image, pixel) = (at / (stack.height * stack.width), at % (stack.height * stack.width));
+        let (row, column) = (pixel / stack.width, pixel % stack.width);
+        let found = stack.values[at];
+        bail!("{}: {found} at [{image}, {row}, {column}], expected 0 to 1", path.display());
     }
     if stack.count == 0 {
         return Err(anyhow::anyhow!("no images")).with_context(|| path.display().to_string());

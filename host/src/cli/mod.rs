@@ -15,11 +15,15 @@ mod report;
 mod serve_virtual;
 
 use clap::{Parser, Subcommand};
+use nirspi::files::FileError;
+use nirspi::scene::SceneError;
 use std::process::ExitCode;
 
 /// An open near-infrared single-pixel camera: capture, virtual camera, reconstruction.
 #[derive(Debug, Parser)]
 #[command(name = "nirspi", version, arg_required_else_help = true)]
+#[command(after_help = "Example, with no camera at hand:\n\
+    \x20 nirspi demo --out demo/")]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -66,7 +70,9 @@ pub fn run() -> ExitCode {
         Ok(code) => code,
         Err(error) => {
             print::complain(one_line(&error));
-            ExitCode::from(if error.is::<Usage>() { 2 } else { 1 })
+            let used_wrongly = error.is::<Usage>()
+                || matches!(error.downcast_ref(), Some(FileError::Choice { .. }));
+            ExitCode::from(if used_wrongly { 2 } else { 1 })
         }
     }
 }
@@ -101,13 +107,16 @@ fn one_line(error: &anyhow::Error) -> String {
     let mut line = String::new();
     for cause in error.chain() {
         let text = cause.to_string();
-        if line.contains(&text) {
-            continue;
+        if !line.contains(&text) {
+            if !line.is_empty() {
+                line.push_str(": ");
+            }
+            line.push_str(&text);
         }
-        if !line.is_empty() {
-            line.push_str(": ");
+        // It has told its cause, in its own words.
+        if cause.is::<FileError>() || cause.is::<SceneError>() {
+            break;
         }
-        line.push_str(&text);
     }
     line.replace('\n', " ")
 }

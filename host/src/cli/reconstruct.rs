@@ -22,17 +22,18 @@ use std::process::ExitCode;
 
 /// Make an image from a measurement file (.npz) or a recording (.mcap)
 ///
-/// Writes image.npy (float32, n x n), image.png and report.json. Examples:
-/// nirspi reconstruct wing.npz --method hadamard --out out/
-/// nirspi reconstruct wing.npz --method omp --sampling 0.3 --basis dct --out out/
+/// Writes image.npy (float32, n x n), image.png and report.json.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n\
+    \x20 nirspi reconstruct wing.npz --method hadamard --out out/\n\
+    \x20 nirspi reconstruct wing.npz --method omp --sampling 0.3 --basis dct --out out/")]
 pub struct Args {
     /// Measurement file or recording
     input: PathBuf,
     #[command(flatten)]
     method: MethodArgs,
     /// Use only this share of all n x n patterns
-    #[arg(long, value_name = "0..1", default_value_t = 1.0)]
+    #[arg(long, value_name = "0..1", default_value_t = 1.0, allow_negative_numbers = true)]
     sampling: f64,
     /// Which patterns come first when sampling: recorded, or an order's name; default: recorded, unless that is the
     /// natural order, whose first part cannot resolve an image

@@ -13,8 +13,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Serve the virtual camera over TCP, for `capture --camera tcp:ADDR` in another process
 ///
-/// Example: nirspi virtual --listen 127.0.0.1:1550 --scene letter:R
+/// One host at a time. Port 0 takes a free one; the first line says which.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n\
+    \x20 nirspi virtual --listen 127.0.0.1:1550 --scene letter:R")]
 pub struct Args {
     /// Where to listen
     #[arg(long, value_name = "ADDR", default_value = super::devices::DEFAULT_TCP)]

@@ -1,4 +1,4 @@
-use crate::testing::{Noise, correlation_of, readings, scene, side};
+use crate::testing::{Noise, array, correlation_of, readings, real_data, scene, side};
 use crate::{Measurements, reconstruct};
 use proptest::prelude::*;
 
@@ -131,4 +131,28 @@ fn a_detector_of_negative_polarity_is_the_same_upside_down() {
     y.iter_mut().for_each(|y| *y = -*y);
     let (_, dropouts) = Measurements::from_pairs(side(16), &rows, &y).unwrap();
     assert_eq!((dropouts[0].start, dropouts[0].length), (60, 10));
+}
+
+#[test]
+fn runs_cut_into_the_real_recording_are_found() {
+    let Some(mut file) = real_data("opar_ala1.npz") else { return };
+    let rows: Vec<i64> = array::<i32>(&mut file, "h_row").into_iter().map(i64::from).collect();
+    let whole: Vec<f64> = array::<f32>(&mut file, "y").into_iter().map(f64::from).collect();
+    let (full, none) = Measurements::from_pairs(side(64), &rows, &whole).unwrap();
+    assert_eq!(none, vec![]);
+    for length in [1, 2, 3, 7, 20, 101, 200] {
+        for start in [2, 5, 900, 3333, 7000, whole.len() - length] {
+            let mut y = whole.clone();
+            y[start..start + length].fill(0.0);
+            let (measured, dropouts) = Measurements::from_pairs(side(64), &rows, &y).unwrap();
+            let found: Vec<_> = dropouts.iter().map(|d| (d.start, d.length)).collect();
+            assert_eq!(found, [(start, length)]);
+            let alike =
+                correlation_of(&reconstruct::hadamard(&measured), &reconstruct::hadamard(&full));
+            // What is lost is lost: the coarsest patterns come first in its order, and a hundred
+            // of the next ones are worth more than a hundredth.
+            let least = if length > 101 { 0.98 } else { 0.99 };
+            assert!(alike > least || start < 200, "{length} from {start}: {alike}");
+        }
+    }
 }

@@ -46,6 +46,8 @@ fn each_fault_is_named() {
     assert!(matches!(d(&[0, 1], &[0.0, f64::NAN]), E::NotFinite { field: "d", index: 1, .. }));
     let pairs = Measurements::from_pairs(side(2), &[0, 1], &[1.0; 3]).unwrap_err();
     assert_eq!(pairs, E::Length { field: "y", found: 3, expected: 4 });
+    let huge = Measurements::from_pairs(side(2), &[0], &[f64::MAX, -f64::MAX]).unwrap_err();
+    assert_eq!(huge, E::NotFinite { field: "d", index: 0, found: f64::INFINITY });
     let single = Measurements::from_single(side(2), &[0], &[f64::INFINITY]).unwrap_err();
     assert_eq!(single, E::NotFinite { field: "y", index: 0, found: f64::INFINITY });
 }

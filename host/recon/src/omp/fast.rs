@@ -35,7 +35,7 @@ impl DenseGram {
     /// `dictionary^T * dictionary` of a `measurements x atoms` dictionary.
     #[must_use]
     pub fn new(dictionary: &DMatrix<f32>) -> Self {
-        let gram = dictionary.tr_mul(dictionary);
+        let gram = dictionary.transpose() * dictionary; // a blocked product; tr_mul is one dot at a time
         let diagonal = gram.diagonal().as_slice().to_vec();
         Self { gram, diagonal }
     }

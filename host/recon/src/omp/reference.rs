@@ -26,7 +26,7 @@ pub fn solve(dictionary: &DMatrix<f64>, y: &[f64], limits: &Limits) -> Result<So
 
     let energy = y.norm_squared();
     let p0 = phi.tr_mul(&y); // lines 2 and 3
-    let gram = phi.tr_mul(&phi);
+    let gram = phi.transpose() * &phi;
     let mut p = p0.clone();
     let mut epsilon = energy;
     let mut delta_before = 0.0;

@@ -23,11 +23,31 @@ const SPARSITIES: usize = 10;
 /// Splits the measurements into folds; the split is part of the result, so it never changes.
 const SPLIT_SEED: u64 = 0x5eed;
 
-/// Absolute prediction error of each number of atoms and each trust.
-type Errors = Vec<[f64; TRUST.len()]>;
+/// How far a prediction is from what was held back.
+#[derive(Debug, Clone, Copy, Default)]
+struct Miss {
+    absolute: f64,
+    squared: f64,
+}
+
+impl Miss {
+    fn add(&mut self, other: Self) {
+        self.absolute += other.absolute;
+        self.squared += other.squared;
+    }
+
+    /// Relative to zero filling's, each kind counting alike: 2 is as bad as that.
+    fn relative_to(self, zero: Self) -> f64 {
+        self.absolute / zero.absolute + self.squared / zero.squared
+    }
+}
+
+/// The miss of each number of atoms and each trust.
+type Misses = Vec<[Miss; TRUST.len()]>;
 
 /// The number of atoms, up to `most` and a quarter of the measurements, and the trust with the least
-/// sum of *absolute* errors over `folds` held-back parts. (Squares would let a few large coefficients decide.)
+/// error over `folds` held-back parts: absolute and squared error together, each relative to zero filling's. Squares
+/// alone would let the few large coefficients decide, absolute values alone the many small ones.
 pub(super) fn choose(problem: &Problem, most: usize, folds: usize) -> Result<Choice, OmpError> {
     let count = problem.rows.len();
     let largest = most.min(count / 4).max(1);
@@ -40,55 +60,57 @@ pub(super) fn choose(problem: &Problem, most: usize, folds: usize) -> Result<Cho
     if parts.is_empty() {
         return Ok(Choice { atoms: largest, trust: 0.0 });
     }
-    let results: Vec<Result<Errors, OmpError>> = std::thread::scope(|scope| {
+    let results: Vec<Result<Misses, OmpError>> = std::thread::scope(|scope| {
         let workers: Vec<_> = parts
             .iter()
-            .map(|(kept, held)| scope.spawn(|| fold_errors(problem, kept, held, &sparsities)))
+            .map(|(kept, held)| scope.spawn(|| fold_misses(problem, kept, held, &sparsities)))
             .collect();
         workers
             .into_iter()
             .map(|w| w.join().unwrap_or_else(|p| std::panic::resume_unwind(p)))
             .collect()
     });
-    let mut total: Errors = vec![[0.0; TRUST.len()]; sparsities.len()];
-    for errors in results {
-        for (total, errors) in total.iter_mut().zip(errors?) {
-            for (total, error) in total.iter_mut().zip(errors) {
-                *total += error;
-            }
+    let mut total: Misses = vec![Default::default(); sparsities.len()];
+    for misses in results {
+        for (total, misses) in total.iter_mut().flatten().zip(misses?.into_iter().flatten()) {
+            total.add(misses);
         }
     }
-    let mut best = (Choice { atoms: sparsities[0], trust: 0.0 }, total[0][0]);
-    for (&atoms, errors) in sparsities.iter().zip(&total) {
-        for (&trust, &error) in TRUST.iter().zip(errors) {
-            if error < best.1 {
-                best = (Choice { atoms, trust }, error);
+    let zero_filling = total[0][0];
+    let mut best = (Choice { atoms: sparsities[0], trust: 0.0 }, 2.0);
+    for (&atoms, misses) in sparsities.iter().zip(&total) {
+        for (&trust, miss) in TRUST.iter().zip(misses) {
+            let relative = miss.relative_to(zero_filling);
+            if relative < best.1 {
+                best = (Choice { atoms, trust }, relative);
             }
         }
     }
     Ok(best.0)
 }
 
-fn fold_errors(
+fn fold_misses(
     problem: &Problem,
     kept: &[usize],
     held: &[usize],
     sparsities: &[usize],
-) -> Result<Errors, OmpError> {
+) -> Result<Misses, OmpError> {
     let largest = sparsities.iter().copied().max().unwrap_or(0);
     let (path, gram) = problem.pursue(kept, largest)?;
-    let error_of = |&atoms: &usize| {
-        let predicted =
-            gram.predict(&path.support[..atoms.min(path.support.len())], &path.coefficients(atoms));
+    let misses_of = |&atoms: &usize| {
+        let chosen = &path.support[..atoms.min(path.support.len())];
+        let predicted = gram.predict(chosen, &path.coefficients(atoms));
         TRUST.map(|trust| {
-            let error = |&k: &usize| {
+            let mut miss = Miss::default();
+            for &k in held {
                 let row = problem.rows[k] as usize;
-                f64::from((problem.values[k] - trust * predicted[row]).abs())
-            };
-            held.iter().map(error).sum()
+                let error = f64::from(problem.values[k] - trust * predicted[row]);
+                miss.add(Miss { absolute: error.abs(), squared: error * error });
+            }
+            miss
         })
     };
-    Ok(sparsities.iter().map(error_of).collect())
+    Ok(sparsities.iter().map(misses_of).collect())
 }
 
 /// Which fold holds each measurement back; none for the all-ones row, the mean, which nothing else can predict.
