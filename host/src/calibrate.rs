@@ -216,7 +216,8 @@ mod tests {
     /// A chain of two poles behind a delay, in ADC counts.
     fn burst(latency: usize, step: f64, pole: f64) -> Vec<f64> {
         let (mut led, mut amplifier) = (0.0, 0.0);
-        let light = |n: usize| if (n / usize::from(HALF_PERIOD)).is_multiple_of(2) { step } else { 0.0 };
+        let light =
+            |n: usize| if (n / usize::from(HALF_PERIOD)).is_multiple_of(2) { step } else { 0.0 };
         let settled: Vec<f64> = (0..usize::from(RAW_SAMPLES_MAX))
             .map(|n| {
                 led += (light(n) - led) * pole;

@@ -90,13 +90,25 @@ pub enum CaptureError {
     /// The camera would not talk or not measure.
     #[error(transparent)]
     Session(#[from] SessionError),
-    /// The recording cannot be written.
+    /// The recording cannot be started.
     #[error("{path}: cannot record: {source}")]
     Recording {
         /// Which file.
         path: PathBuf,
         /// Why.
         source: io::Error,
+    },
+    /// The recording cannot be continued: the disk is full or gone.
+    #[error(
+        "{path}: cannot record any more: {source}; what was written before is kept ({counters} so far)"
+    )]
+    RecordingCut {
+        /// Which file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+        /// The account of the run, of which the last frames are not in the file.
+        counters: LossCounters,
     },
 }
 
@@ -191,7 +203,7 @@ pub fn capture(
         None => None,
         Some(path) => Some(
             Recorder::create(path, session.identity(), &setup, settling.as_ref())
-                .map_err(|source| recording_error(path, source))?,
+                .map_err(|source| CaptureError::Recording { path: path.clone(), source })?,
         ),
     };
     let now = Instant::now();
@@ -220,8 +232,8 @@ pub fn capture(
         (None, Some(recorder)) => recorder.finish(&counters),
         (None, None) => Ok(()),
     };
-    if let (Err(source), Some(path)) = (recorded, &options.record) {
-        return Err(recording_error(path, source));
+    if let (Err(source), Some(path)) = (recorded, options.record.clone()) {
+        return Err(CaptureError::RecordingCut { path, source, counters });
     }
     Ok(Capture {
         setup,
@@ -235,10 +247,6 @@ pub fn capture(
         ended,
         elapsed: now.elapsed(),
     })
-}
-
-fn recording_error(path: &Path, source: io::Error) -> CaptureError {
-    CaptureError::Recording { path: path.to_owned(), source }
 }
 
 /// A run that never started leaves no recording behind.

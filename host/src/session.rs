@@ -4,7 +4,7 @@
 //! listener as it came, damaged ones too.
 
 use crate::link::{Link, Received};
-use nirspi_wire::packet::{MAX_DEVICE_PACKET, MAX_HOST_PACKET};
+use nirspi_wire::packet::{MAX_DEVICE_PACKET, MAX_HOST_PACKET, hello_of_any_version};
 use nirspi_wire::{
     Answer, Command, Deframed, Deframer, DeviceMessage, Identity, PROTOCOL_VERSION, PacketError,
     Refusal, Reply, Request, SelfTestReport, Status, Version, encode, open,
@@ -15,6 +15,9 @@ use thiserror::Error;
 
 /// A camera answers a command within this, or something is wrong.
 pub(crate) const ANSWER_TIMEOUT: Duration = Duration::from_secs(5);
+
+/// The first command of a conversation.
+const HELLO: &str = "Hello";
 
 /// Who a camera is: the wire's [`Identity`], owned.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -65,7 +68,9 @@ pub enum SessionError {
         mid_packet: bool,
     },
     /// The camera has gone before it said who it is.
-    #[error("the link was closed instead of a greeting: another host has the camera, or this is none")]
+    #[error(
+        "the link was closed instead of a greeting: another host has the camera, or this is none"
+    )]
     TurnedAway,
     /// The two sides speak different versions.
     #[error(
@@ -85,7 +90,11 @@ pub enum SessionError {
         refusal: Refusal,
     },
     /// No answer.
-    #[error("no answer to {command} within {} s: is this a nirspi camera?", ANSWER_TIMEOUT.as_secs())]
+    #[error(
+        "no answer to {command} within {} s{}",
+        ANSWER_TIMEOUT.as_secs(),
+        if *.command == HELLO { ": is this a nirspi camera?" } else { "" }
+    )]
     NoAnswer {
         /// What was asked.
         command: &'static str,
@@ -177,11 +186,7 @@ struct Incoming {
 
 impl Incoming {
     /// Cuts `chunk[..length]` into packets; returns the last reply among them.
-    fn take(
-        &mut self,
-        length: usize,
-        listener: &mut dyn Listener,
-    ) -> Option<Answered> {
+    fn take(&mut self, length: usize, listener: &mut dyn Listener) -> Option<Answered> {
         let mut reply = None;
         let mut bytes = self.chunk.get(..length).unwrap_or(&[]);
         while let Some(found) = self.deframer.next(&mut bytes) {
@@ -195,8 +200,18 @@ impl Incoming {
             };
             self.raw.push(0);
             listener.packet(&self.raw, &content);
-            if let Ok(DeviceMessage::Reply(Reply { id, outcome })) = &content {
-                reply = Some((*id, outcome.as_ref().map(OwnedAnswer::from).map_err(|&r| r)));
+            match &content {
+                Ok(DeviceMessage::Reply(Reply { id, outcome })) => {
+                    reply = Some((*id, outcome.as_ref().map(OwnedAnswer::from).map_err(|&r| r)));
+                }
+                // Perhaps the greeting of a version that says more than ours.
+                Err(PacketError::Message) => {
+                    self.raw.pop();
+                    if let Some((id, device)) = hello_of_any_version(&mut self.raw) {
+                        reply = Some((id, Err(Refusal::Protocol { device })));
+                    }
+                }
+                _ => {}
             }
         }
         reply
@@ -232,7 +247,7 @@ impl Session {
             }),
         };
         let hello = Command::Hello { protocol: PROTOCOL_VERSION };
-        match session.ask("Hello", hello, &mut Deaf) {
+        match session.ask(HELLO, hello, &mut Deaf) {
             Ok(OwnedAnswer::Hello(identity)) if identity.protocol == PROTOCOL_VERSION => {
                 session.identity = identity;
                 Ok(session)
@@ -240,7 +255,7 @@ impl Session {
             Ok(OwnedAnswer::Hello(identity)) => {
                 Err(SessionError::Version { camera: identity.protocol })
             }
-            Ok(_) => Err(SessionError::WrongAnswer { command: "Hello" }),
+            Ok(_) => Err(SessionError::WrongAnswer { command: HELLO }),
             Err(SessionError::Closed { mid_packet: false }) => Err(SessionError::TurnedAway),
             Err(error) => Err(error),
         }

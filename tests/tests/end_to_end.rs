@@ -1,6 +1,8 @@
 //! From light to image, through gateware model, firmware logic, wire protocol and host, and what happens
 //! when something in between goes wrong.
 
+#![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
+
 use nirspi::capture::{Capture, CaptureOptions, Ended, capture};
 use nirspi::link::Link;
 use nirspi::session::{Session, SessionError};

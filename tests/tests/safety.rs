@@ -1,5 +1,7 @@
 //! LEDs go off when they must: real firmware logic, golden model of the gateware, requests as a host sends them.
 
+#![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
+
 use nirspi::virtual_camera::{OpticalFpga, SimulatedFpga, VirtualCamera, VirtualOptics};
 use nirspi_optics::Scene;
 use nirspi_wire::packet::MAX_DEVICE_PACKET;

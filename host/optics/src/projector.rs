@@ -160,7 +160,9 @@ impl Projector {
         let mut weights = Vec::with_capacity(LEDS);
         for row in 0..SIDE {
             for column in 0..SIDE {
-                weights.push(sharp.mean_over_disc(row, column, radius) as f32);
+                // Differences of running sums leave the last bit on either side of the range.
+                let mean = sharp.mean_over_disc(row, column, radius);
+                weights.push(mean.clamp(0.0, 1.0) as f32);
             }
         }
         Ok(Footprint { weights })

@@ -1,6 +1,6 @@
 //! Single-pixel reconstruction: from measurements to an image.
 //!
-//! The one law: everything here is a pure function of its arguments. No file, no clock, no thread pool,
+//! The one law: everything here is a pure function of its arguments. No file, no clock, no thread that outlives a call,
 //! no randomness but from a seed that is an argument or a constant.
 //!
 //! | module | turns | into |

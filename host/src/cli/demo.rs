@@ -135,9 +135,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let Solved { image, report: method } =
         times.time("reconstruct", || solve(&args.method, &measurements))?;
 
-    // Rounding leaves a black scene a hair under 0; a reflectance is none.
-    let truth: Vec<f32> =
-        optics.focused_footprint()?.weights().iter().map(|w| w.clamp(0.0, 1.0)).collect();
+    let truth = optics.focused_footprint()?.weights().to_vec();
     let raw = compare(&raw, &truth)?;
     let fitted = compare(&image, &truth)?;
     let side = image.side().pixels();

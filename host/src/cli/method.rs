@@ -65,8 +65,7 @@ impl MethodArgs {
     }
 
     fn basis(&self) -> Result<Basis> {
-        Basis::from_str(&self.basis)
-            .map_err(|error| Usage(format!("--basis: {error}")).into())
+        Basis::from_str(&self.basis).map_err(|error| Usage(format!("--basis: {error}")).into())
     }
 }
 

@@ -58,11 +58,12 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let mut each = Vec::with_capacity(reference.count);
     let pairs = reference.values.chunks_exact(height * width);
     for (a, b) in pairs.zip(test.values.chunks_exact(height * width)) {
-        let psnr = metrics::psnr(a, b, width, height, 1.0)?;
+        let named = || args.test.display().to_string();
+        let psnr = metrics::psnr(a, b, width, height, 1.0).with_context(named)?;
         each.push(ImageMetrics {
             // Identical images have no finite one, and JSON no infinity.
             psnr_db: psnr.is_finite().then_some(psnr),
-            ssim: metrics::ssim(a, b, width, height, 1.0)?,
+            ssim: metrics::ssim(a, b, width, height, 1.0).with_context(named)?,
         });
     }
     let n = each.len() as f64;

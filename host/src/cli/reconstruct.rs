@@ -6,6 +6,7 @@ use super::method::{MethodArgs, Solved, solve};
 use super::print;
 use super::report::StageTimes;
 use anyhow::{Context, Result, bail};
+use indicatif::ProgressBar;
 use nirspi::account::{LossAccount, LossCounters};
 use nirspi::files::npz::{self, Readings, Selection};
 use nirspi::files::output::OutputDir;
@@ -19,6 +20,7 @@ use serde::Serialize;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::time::Duration;
 
 /// Make an image from a measurement file (.npz) or a recording (.mcap)
 ///
@@ -104,8 +106,15 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         .measurements
         .take(order.as_ref(), args.sampling)
         .with_context(|| args.input.display().to_string())?;
-    let Solved { image, report: method } =
-        times.time("reconstruct", || solve(&args.method, &used))?;
+    // Thousands of patterns take OMP seconds.
+    let spinner = ProgressBar::new_spinner().with_message("reconstructing");
+    spinner.enable_steady_tick(Duration::from_millis(100));
+    let solved = times.time("reconstruct", || solve(&args.method, &used));
+    spinner.finish_and_clear();
+    let Solved { image, report: method } = solved?;
+    if !image.pixels().iter().all(|pixel| pixel.is_finite()) {
+        bail!("{}: the readings are too large for an image of 32-bit floats", args.input.display());
+    }
 
     let side = image.side().pixels();
     let correlation = source.reference.as_ref().and_then(|reference| {
@@ -214,7 +223,7 @@ fn from_recording(args: &Args) -> Result<Source> {
     }
     let mut notes = Vec::new();
     if let Some(reason) = cut_short {
-        notes.push(format!("the recording is cut short: {reason}"));
+        notes.push(format!("the recording is cut short or damaged: {reason}"));
     }
     if account.is_some_and(|account| account != counters) {
         notes.push("the frames found are not those that the capture counted".to_owned());

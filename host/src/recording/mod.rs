@@ -3,8 +3,10 @@
 //! Channel `/wire` holds the packets (COBS, delimiter included), intact ones and damaged ones alike; the
 //! message encoding names the protocol version. Metadata records hold the camera's identity, the setup, the
 //! calibration and, at the end, the account of the run, each as one JSON text. Times are nanoseconds of the
-//! host's clock. The one law: what is on disk is whole chunks, so a capture that is killed keeps everything up
-//! to its last flush, half a second before at most.
+//! host's clock. Records follow each other plainly, in no chunks: a file that ends anywhere, or is damaged in one
+//! packet, loses no other, and the crate's chunk reader, which panics on some damage, is never used.
+//!
+//! The one law: a capture that is killed keeps everything up to its last flush, half a second before at most.
 
 mod reader;
 mod writer;

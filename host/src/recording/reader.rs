@@ -5,7 +5,8 @@ use crate::account::LossCounters;
 use crate::calibrate::Settling;
 use crate::session::CameraIdentity;
 use crate::setup::MeasurementSetup;
-use mcap::records::{Metadata, Record};
+use mcap::McapError;
+use mcap::records::{Metadata, Record, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use serde::de::DeserializeOwned;
 use std::fs::File;
@@ -29,7 +30,7 @@ pub struct Recording {
     pub account: Option<LossCounters>,
     /// Packets read.
     pub packets: u64,
-    /// Where the file ends in the middle: what is wrong there. All before it was read.
+    /// Where the file ends in the middle or is damaged: what is wrong there. All before it was read.
     pub cut_short: Option<String>,
 }
 
@@ -96,7 +97,10 @@ pub fn read(path: &Path, mut packet: impl FnMut(&[u8], u64)) -> Result<Recording
     let mut file = File::open(path).map_err(io_error)?;
     let mut reader = LinearReader::new_with_options(
         LinearReaderOptions::default()
-            .with_validate_chunk_crcs(true)
+            // Each packet has a checksum of its own; that of the whole data section covers what is said about them.
+            .with_validate_data_section_crc(true)
+            // Whole, they are refused below: the crate panics on some damaged chunks (0.26, found by fuzzing).
+            .with_emit_chunks(true)
             .with_record_length_limit(LONGEST_RECORD),
     );
     let mut parts = Parts::default();
@@ -110,7 +114,15 @@ pub fn read(path: &Path, mut packet: impl FnMut(&[u8], u64)) -> Result<Recording
                 reader.notify_read(read);
                 continue;
             }
-            Ok(LinearReadEvent::Record { opcode, data }) => mcap::parse_record(opcode, data),
+            // Only what we write is looked at: the crate panics on some damaged attachments (0.26, found by fuzzing).
+            Ok(LinearReadEvent::Record {
+                opcode: opcode @ (op::HEADER | op::CHANNEL | op::MESSAGE | op::METADATA),
+                data,
+            }) => mcap::parse_record(opcode, data),
+            Ok(LinearReadEvent::Record { opcode: op::CHUNK, .. }) => {
+                return Err(not_ours("records in chunks, as other tools write them,".to_owned()));
+            }
+            Ok(LinearReadEvent::Record { .. }) => continue,
             Err(error) => Err(error),
         };
         match record {
@@ -120,7 +132,7 @@ pub fn read(path: &Path, mut packet: impl FnMut(&[u8], u64)) -> Result<Recording
             }
             Ok(Record::Channel(channel)) => {
                 if channel.topic != TOPIC || channel.message_encoding != ENCODING {
-                    let found = format!("{} {}", channel.topic, channel.message_encoding);
+                    let found = format!("{:?} {:?}", channel.topic, channel.message_encoding);
                     return Err(RecordingError::Version { path: path.to_owned(), found });
                 }
             }
@@ -130,9 +142,13 @@ pub fn read(path: &Path, mut packet: impl FnMut(&[u8], u64)) -> Result<Recording
             }
             Ok(Record::Metadata(metadata)) => parts.keep(path, &metadata)?,
             Ok(_) => {}
-            Err(error) if !ours => return Err(not_ours(error.to_string())),
+            Err(McapError::UnexpectedEof) if !ours => {
+                return Err(not_ours("an empty or cut file".to_owned()));
+            }
+            Err(McapError::BadMagic) => return Err(not_ours("a file of another kind".to_owned())),
+            Err(error) if !ours => return Err(not_ours(one_line(&error))),
             Err(error) => {
-                cut_short = Some(error.to_string());
+                cut_short = Some(one_line(&error));
                 break;
             }
         }
@@ -152,6 +168,13 @@ pub fn read(path: &Path, mut packet: impl FnMut(&[u8], u64)) -> Result<Recording
         packets,
         cut_short,
     })
+}
+
+/// The parser's messages are drawings of several lines.
+fn one_line(error: &McapError) -> String {
+    let text = error.to_string();
+    let words: Vec<&str> = text.split_whitespace().take(16).collect();
+    words.join(" ")
 }
 
 #[derive(Default)]
@@ -259,6 +282,21 @@ mod tests {
             }
         }
         assert!(most > 200, "only {most} packets of a file that is nearly whole");
+    }
+
+    #[test]
+    fn a_damaged_record_of_a_kind_that_we_do_not_write_is_passed_over() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.mcap");
+        recording(&path, 3);
+        // An attachment of two zero bytes, right after magic and header, which end at the header's length.
+        let mut bytes = std::fs::read(&path).unwrap();
+        let header = 8 + 9 + u64::from_le_bytes(bytes[9..17].try_into().unwrap()) as usize;
+        bytes.splice(header..header, [op::ATTACHMENT, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
+        std::fs::write(&path, bytes).unwrap();
+        let mut count = 0;
+        read(&path, |_, _| count += 1).unwrap();
+        assert_eq!(count, 3);
     }
 
     #[test]

@@ -39,7 +39,7 @@ impl Recorder {
     /// Creates the file and writes who is recorded, doing what.
     ///
     /// # Errors
-    /// When the file cannot be created or written.
+    /// When the file cannot be created or written; it is not left behind then.
     pub fn create(
         path: &Path,
         identity: &CameraIdentity,
@@ -47,7 +47,13 @@ impl Recorder {
         settling: Option<&Settling>,
     ) -> io::Result<Self> {
         let file = BufWriter::with_capacity(1 << 20, File::create(path)?);
-        Self::with_file(file, identity, setup, settling).map_err(to_io)
+        Self::with_file(file, identity, setup, settling).map_err(|error| {
+            // Not a device that the user records into. What cannot be removed is empty.
+            if path.is_file() {
+                let _ = std::fs::remove_file(path);
+            }
+            to_io(error)
+        })
     }
 
     fn with_file(
@@ -56,8 +62,7 @@ impl Recorder {
         setup: &MeasurementSetup,
         settling: Option<&Settling>,
     ) -> McapResult<Self> {
-        // Without seeking a chunk is written whole, with its final header: nothing torn on disk but the last.
-        let options = WriteOptions::new().compression(None).profile(PROFILE).disable_seeking(true);
+        let options = WriteOptions::new().use_chunks(false).profile(PROFILE).disable_seeking(true);
         let mut writer = options.create(NoSeek::new(file))?;
         let channel = writer.add_channel(0, TOPIC, ENCODING, &BTreeMap::new())?;
         let epoch = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos();

@@ -116,6 +116,22 @@ pub fn open<'p, T: Deserialize<'p>>(packet: &'p mut [u8]) -> Result<T, PacketErr
     }
 }
 
+/// The parts of an answer to `Hello` that no version changes: the request's number and the device's protocol
+/// version. For a packet that [`open`] calls [`PacketError::Message`]; it is opened here in place.
+#[must_use]
+pub fn hello_of_any_version(packet: &mut [u8]) -> Option<(u16, u16)> {
+    let length = cobs::decode_in_place(packet).ok()?;
+    let (payload, crc) = packet.get(..length)?.split_last_chunk::<4>()?;
+    if crc32(payload) != u32::from_le_bytes(*crc) {
+        return None;
+    }
+    // DeviceMessage::Reply, its id, Ok, Answer::Hello, and the first field of Identity.
+    match postcard::take_from_bytes::<(u8, u16, u8, u8, u16)>(payload) {
+        Ok(((0, id, 0, 0, protocol), _)) => Some((id, protocol)),
+        _ => None,
+    }
+}
+
 /// Cuts a byte stream into packets. `N` is the longest packet, delimiter not counted.
 #[derive(Debug, Clone)]
 pub struct Deframer<const N: usize> {

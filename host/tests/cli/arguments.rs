@@ -1,0 +1,108 @@
+//! Arguments, help, and where the output goes.
+
+use crate::bench::{Bench, first_bytes};
+use std::process::{Command, Stdio};
+
+const COMMANDS: [&str; 6] = ["demo", "reconstruct", "capture", "virtual", "devices", "metrics"];
+
+#[test]
+fn every_command_explains_itself_with_an_example() {
+    let bench = Bench::new();
+    for command in COMMANDS {
+        let help = bench.run(&[command, "--help"]).succeeded().stdout;
+        assert!(
+            help.contains("Example") && help.contains(&format!("\n  nirspi {command} ")),
+            "{help}"
+        );
+    }
+    let help = bench.run(&["--help"]).succeeded().stdout;
+    assert!(COMMANDS.iter().all(|command| help.contains(command)), "{help}");
+    let version = bench.run(&["--version"]).succeeded().stdout;
+    assert_eq!(version, format!("nirspi {}\n", env!("CARGO_PKG_VERSION")));
+}
+
+#[test]
+fn mistakes_in_the_arguments_get_one_line_and_code_2() {
+    let bench = Bench::new();
+    let mistakes: &[(&[&str], &[&str])] = &[
+        (&["demo", "--bogus"], &["--bogus"]),
+        (&["bogus"], &["bogus"]),
+        (&["reconstruct"], &["<INPUT>"]),
+        (&["demo", "--sampling", "0"], &["--sampling is 0", "more than 0"]),
+        (&["demo", "--sampling", "1.5"], &["--sampling is 1.5", "at most 1"]),
+        (&["demo", "--sampling", "nan"], &["--sampling is NaN"]),
+        (&["demo", "--sampling", "-0.1"], &["--sampling is -0.1"]),
+        (&["demo", "--sampling", "x"], &["--sampling", "'x'"]),
+        (&["reconstruct", "in.npz", "--sampling", "-1"], &["--sampling is -1"]),
+        (&["demo", "--method", "magic"], &["--method", "hadamard, omp"]),
+        (&["demo", "--basis", "magic"], &["--basis", "magic", "dct"]),
+        (&["demo", "--order", "magic"], &["--order", "magic", "cake-cutting", "table:FILE"]),
+        (&["demo", "--sparsity", "0"], &["--sparsity is 0"]),
+        (&["demo", "--residual", "1"], &["--residual is 1"]),
+        (&["demo", "--frames", "0"], &["--frames", "'0'"]),
+        (&["demo", "--sweeps", "0"], &["--sweeps", "'0'"]),
+        (&["demo", "--blanked", "5"], &["--blanked is 5", "--clocks-per-pattern"]),
+        (&["capture", "--camera", "usb"], &["--camera", "tcp:HOST:PORT"]),
+        (&["capture", "--camera", "tcp:nowhere"], &["--camera", "tcp:HOST:PORT"]),
+        (&["virtual", "--distance-m", "0"], &["--distance-m is 0"]),
+    ];
+    for (arguments, words) in mistakes {
+        let outcome = bench.run(arguments).failed(2, words);
+        assert!(outcome.stdout.is_empty(), "{outcome:?}");
+    }
+    assert!(bench.names().is_empty(), "{:?}", bench.names());
+}
+
+#[test]
+fn an_order_table_that_is_no_permutation_is_refused() {
+    let bench = Bench::new();
+    let table = |change: &dyn Fn(&mut Vec<u32>)| {
+        let mut rows: Vec<u32> = (0..1024).rev().collect();
+        change(&mut rows);
+        let text: Vec<String> = rows.iter().map(u32::to_string).collect();
+        bench.write("order.txt", text.join("\n").as_bytes());
+        bench.run(&["demo", "--frames", "1", "--order", "table:order.txt", "--out", "demo"])
+    };
+    table(&|rows| rows[5] = 0).failed(1, &["order.txt", "repeats row 0"]);
+    table(&|rows| rows[5] = 1024).failed(1, &["order.txt", "1024", "0 to 1023"]);
+    table(&|rows| rows.truncate(1000)).failed(1, &["order.txt", "1000 entries", "1024"]);
+    assert_eq!(bench.names(), ["order.txt"]);
+    table(&|_| {}).succeeded();
+}
+
+#[test]
+fn a_reader_that_stops_reading_is_no_failure() {
+    let bench = Bench::new();
+    let demo = bench.path("demo");
+    let mut child = Command::new(env!("CARGO_BIN_EXE_nirspi"))
+        .args(["demo", "--frames", "1", "--json", "--out"])
+        .arg(&demo)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    // Closed before anything was written.
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
+    assert!(demo.join("report.json").exists());
+
+    let mut child = Command::new(env!("CARGO_BIN_EXE_nirspi"))
+        .arg("--help")
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    assert_eq!(first_bytes(&mut child.stdout.take().unwrap(), 2), b"An");
+    assert!(child.wait().unwrap().success());
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn output_that_cannot_be_written_is_a_failure() {
+    let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let output =
+        Command::new(env!("CARGO_BIN_EXE_nirspi")).arg("devices").stdout(full).output().unwrap();
+    assert_eq!(output.status.code(), Some(1), "{output:?}");
+    let line = String::from_utf8(output.stderr).unwrap();
+    assert!(line.lines().count() == 1 && line.contains("cannot write to stdout"), "{line}");
+}

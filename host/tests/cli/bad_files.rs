@@ -1,0 +1,130 @@
+//! Files that are not what they should be: one line, no result, nothing left behind.
+
+use crate::bench::{Bench, Measured};
+
+/// Reconstructs a file of these bytes, which must fail and leave nothing behind.
+#[track_caller]
+fn refused(bench: &Bench, name: &str, bytes: &[u8], words: &[&str]) {
+    bench.write(name, bytes);
+    let outcome =
+        bench.run(&["reconstruct", name, "--out", "out"]).failed(1, &[&[name], words].concat());
+    assert!(outcome.stdout.is_empty(), "{outcome:?}");
+    assert!(!bench.path("out").exists(), "{:?}", bench.names());
+}
+
+#[test]
+fn a_measurement_file_cut_anywhere_is_refused() {
+    let (bench, whole) = (Bench::new(), Measured::new(8).npz());
+    for cut in (0..whole.len()).step_by(whole.len() / 40).chain([1, 4, whole.len() - 1]) {
+        refused(&bench, "cut.npz", &whole[..cut], &["expected a NumPy .npz archive"]);
+    }
+}
+
+#[test]
+fn a_field_that_is_wrong_is_named_with_what_was_found_and_expected() {
+    let bench = Bench::new();
+    let measured = Measured::new(8);
+    let rows = |change: &dyn Fn(&mut Vec<f32>)| {
+        let mut rows = measured.h_row.clone();
+        change(&mut rows);
+        measured.npz_with("h_row", Some((&[rows.len()], &rows)))
+    };
+    let readings = |change: &dyn Fn(&mut Vec<f32>)| {
+        let mut y = measured.y.clone();
+        change(&mut y);
+        measured.npz_with("y", Some((&[y.len()], &y)))
+    };
+    let cases: &[(Vec<u8>, &[&str])] = &[
+        (measured.npz_with("n", None), &["no `n`", "`h_row`, `y`"]),
+        (measured.npz_with("h_row", None), &["no `h_row`"]),
+        (measured.npz_with("y", None), &["y (raw readings) or d (differential)"]),
+        (measured.npz_with("n", Some((&[], &[63.0]))), &["`n` is 63", "power of two"]),
+        (measured.npz_with("n", Some((&[2], &[8.0, 8.0]))), &["`n` has shape (2,)", "one number"]),
+        (rows(&|rows| rows[5] = 64.0), &["`h_row` is 64 at [5]", "0 to 63"]),
+        (rows(&|rows| rows[5] = -1.0), &["`h_row` is -1 at [5]"]),
+        (rows(&|rows| rows[5] = 0.5), &["`h_row` is 0.5 at [5]", "whole number"]),
+        (rows(&|rows| rows[5] = rows[3]), &["`h_row` repeats row", "[5]", "first at [3]"]),
+        (rows(&|rows| rows.truncate(63)), &["`y` has shape (128,)", "expected (126,)"]),
+        (readings(&|y| y[7] = f32::NAN), &["`y` is NaN at [7]", "finite"]),
+        (readings(&|y| y[7] = f32::INFINITY), &["`y` is inf at [7]", "finite"]),
+        (readings(&|y| y.truncate(127)), &["`y` has shape (127,)", "expected (128,)"]),
+    ];
+    for (bytes, words) in cases {
+        refused(&bench, "wrong.npz", bytes, words);
+    }
+}
+
+#[test]
+fn readings_too_large_for_the_image_are_refused() {
+    let (bench, measured) = (Bench::new(), Measured::new(2));
+    // Each reading is finite; their differences are not in 32 bits.
+    let y = [f32::MAX, -f32::MAX].repeat(4);
+    let bytes = measured.npz_with("y", Some((&[8], &y)));
+    refused(&bench, "large.npz", &bytes, &["too large"]);
+}
+
+#[test]
+fn files_of_another_kind_are_refused() {
+    let bench = Bench::new();
+    refused(&bench, "empty.npz", b"", &["an empty file"]);
+    refused(&bench, "text.npz", b"hello, world", &["another kind"]);
+    refused(&bench, "empty.mcap", b"", &["nirspi recording"]);
+    refused(&bench, "text.mcap", b"hello, world, this is no recording", &["another kind"]);
+    bench.run(&["reconstruct", "none.npz"]).failed(1, &["none.npz", "no such file"]);
+    bench.run(&["reconstruct", "."]).failed(1, &["a folder"]);
+}
+
+#[test]
+fn a_recording_cut_anywhere_gives_what_is_before_the_cut_or_says_what_is_missing() {
+    let bench = Bench::new();
+    bench.run(&["capture", "--frames", "150", "--out", "whole.mcap"]).succeeded();
+    let whole = std::fs::read(bench.path("whole.mcap")).unwrap();
+    let mut kept = 0;
+    for cut in (0..whole.len()).step_by(whole.len() / 12).chain([1, 20, 300, 3000]) {
+        bench.write("cut.mcap", &whole[..cut]);
+        let outcome = bench.run(&["reconstruct", "cut.mcap", "--method", "hadamard", "--json"]);
+        if outcome.code == Some(0) {
+            kept += 1;
+            let report = outcome.json();
+            assert!(report["notes"][0].as_str().unwrap().contains("cut short"), "{report}");
+            assert!(report["frames"]["received"].as_u64().unwrap() > 0, "{report}");
+        } else {
+            outcome.failed(1, &["cut.mcap"]);
+        }
+    }
+    assert!(kept > 0, "nothing of the recording was saved");
+}
+
+#[test]
+fn a_damaged_packet_in_a_recording_costs_one_frame() {
+    let bench = Bench::new();
+    bench.run(&["capture", "--frames", "600", "--out", "rec.mcap"]).succeeded();
+    let mut bytes = std::fs::read(bench.path("rec.mcap")).unwrap();
+    let early = bytes.len() / 5;
+    bytes[early] ^= 0x10;
+    bench.write("rec.mcap", &bytes);
+    let outcome = bench.run(&["reconstruct", "rec.mcap", "--method", "hadamard", "--json"]);
+    let report = outcome.succeeded().json();
+    assert_eq!(report["frames"]["received"], 599, "{report}");
+    assert_eq!(report["frames"]["corrupt"], 1, "{report}");
+    assert!(report["notes"][0].as_str().unwrap().contains("damaged"), "{report}");
+}
+
+#[test]
+fn a_recording_that_is_there_is_not_written_over() {
+    let bench = Bench::new();
+    bench.write("rec.mcap", b"precious");
+    let capture = |more: &[&str]| {
+        bench.run(&[&["capture", "--frames", "2", "--out", "rec.mcap"], more].concat())
+    };
+    capture(&[]).failed(2, &["rec.mcap is there already", "--overwrite"]);
+    assert_eq!(std::fs::read(bench.path("rec.mcap")).unwrap(), b"precious");
+    capture(&["--overwrite"]).succeeded();
+    bench.run(&["reconstruct", "rec.mcap"]).succeeded();
+    let into = |path: &str| bench.run(&["capture", "--frames", "2", "--out", path]);
+    into("none/rec.mcap").failed(1, &["none/rec.mcap", "cannot record"]);
+    #[cfg(target_os = "linux")]
+    bench
+        .run(&["capture", "--frames", "2", "--overwrite", "--out", "/dev/full"])
+        .failed(1, &["/dev/full", "No space left"]);
+}

@@ -1,0 +1,215 @@
+//! `nirspi virtual` in one process, `nirspi capture` in another, and what becomes of each when the other goes.
+
+use crate::bench::{Bench, Process};
+use std::io::{Read, Write};
+use std::net::{TcpListener, TcpStream};
+
+/// Serves the virtual camera on a free port.
+fn serve(bench: &Bench, more: &[&str]) -> (Process, String) {
+    let mut server = bench.start(&[&["virtual", "--listen", "127.0.0.1:0"], more].concat());
+    let line = server.says("virtual camera on tcp:");
+    let address = line.split_whitespace().find_map(|word| word.strip_prefix("tcp:")).unwrap();
+    (server, format!("tcp:{}", address.trim_end_matches(':')))
+}
+
+/// Frames of a recording, by `reconstruct`.
+fn frames(bench: &Bench, recording: &str, counter: &str) -> u64 {
+    let arguments = ["reconstruct", recording, "--method", "hadamard", "--json"];
+    let report = bench.run(&arguments).succeeded().json();
+    report["frames"][counter].as_u64().unwrap()
+}
+
+#[test]
+fn a_thousand_frames_are_captured_recorded_and_reconstructed() {
+    let bench = Bench::new();
+    let (_server, camera) = serve(&bench, &["--once"]);
+    let capture =
+        ["capture", "--camera", &camera, "--frames", "1000", "--out", "rec.mcap", "--json"];
+    let report = bench.run(&capture).succeeded().json();
+    assert_eq!(report["made"], 1000);
+    let counters = &report["frames"];
+    let count = |name: &str| counters[name].as_u64().unwrap();
+    assert_eq!(count("received") + count("lost") + count("corrupt") + count("late"), 1000);
+    // The simulated camera waits for a slow host.
+    assert_eq!(count("received"), 1000);
+    assert_eq!((&report["complete"], &report["calibrated"]), (&true.into(), &true.into()));
+    assert_eq!(frames(&bench, "rec.mcap", "received"), 1000);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_capture_that_is_stopped_keeps_what_it_has_and_succeeds() {
+    let bench = Bench::new();
+    let (server, camera) = serve(&bench, &[]);
+    for signal in ["INT", "TERM"] {
+        let out = format!("{signal}.mcap");
+        let arguments = ["capture", "--camera", &camera, "--out", &out, "--json"];
+        let mut capture = bench.start(&arguments);
+        capture.has_written(&bench.path(&out), 100_000);
+        capture.signal(signal);
+        let report = capture.wait().succeeded().json();
+        let received = report["frames"]["received"].as_u64().unwrap();
+        assert!(received > 10 && report["made"] == received, "{report}");
+        assert_eq!(frames(&bench, &out, "received"), received);
+    }
+    server.signal("TERM");
+    let said = server.wait().succeeded();
+    assert!(said.stdout.ends_with("stopped\n"), "{said:?}");
+}
+
+#[test]
+fn a_killed_capture_leaves_a_readable_recording_and_a_camera_for_the_next() {
+    let bench = Bench::new();
+    let (mut server, camera) = serve(&bench, &[]);
+    // Long frames, a few a second: what is on disk is there because it was flushed, not because a buffer ran over.
+    let slow = ["--sweeps", "1000", "--out", "rec.mcap"];
+    let mut capture = bench.start(&[&["capture", "--camera", &camera][..], &slow].concat());
+    capture.has_written(&bench.path("rec.mcap"), 24_000);
+    capture.kill();
+    drop(capture);
+    server.says("LEDs off");
+    assert!(frames(&bench, "rec.mcap", "received") > 2);
+    let next = ["capture", "--camera", &camera, "--frames", "5", "--out", "next.mcap"];
+    let said = bench.run(&next).succeeded();
+    assert!(said.stdout.starts_with("5 received, 0 lost, 0 corrupt, 0 late"), "{said:?}");
+}
+
+#[test]
+fn a_camera_for_one_host_ends_with_it() {
+    let bench = Bench::new();
+    let (server, camera) = serve(&bench, &["--once"]);
+    let mut capture = bench.start(&["capture", "--camera", &camera, "--out", "rec.mcap"]);
+    capture.has_written(&bench.path("rec.mcap"), 10_000);
+    drop(capture);
+    assert!(server.wait().succeeded().stdout.ends_with("stopped\n"));
+}
+
+#[test]
+fn a_killed_camera_ends_the_capture_which_keeps_what_has_come() {
+    let bench = Bench::new();
+    let (mut server, camera) = serve(&bench, &[]);
+    let mut capture = bench.start(&["capture", "--camera", &camera, "--out", "rec.mcap", "--json"]);
+    capture.has_written(&bench.path("rec.mcap"), 100_000);
+    server.kill();
+    let outcome = capture.wait().failed(1, &["the camera closed the link", "kept in rec.mcap"]);
+    let report = outcome.json();
+    assert!(report["made"].is_null() && report["complete"] == false, "{report}");
+    let received = report["frames"]["received"].as_u64().unwrap();
+    assert_eq!(frames(&bench, "rec.mcap", "received"), received);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_camera_that_falls_silent_ends_the_capture() {
+    let bench = Bench::new();
+    let (server, camera) = serve(&bench, &[]);
+    let mut capture = bench.start(&["capture", "--camera", &camera, "--out", "rec.mcap"]);
+    capture.has_written(&bench.path("rec.mcap"), 100_000);
+    server.signal("STOP");
+    capture.wait().failed(1, &["no answer to Status within 5 s", "kept in rec.mcap"]);
+    assert!(frames(&bench, "rec.mcap", "received") > 10);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_second_host_is_told_that_the_camera_is_taken() {
+    let bench = Bench::new();
+    let (mut server, camera) = serve(&bench, &[]);
+    let mut first = bench.start(&["capture", "--camera", &camera, "--out", "first.mcap"]);
+    first.has_written(&bench.path("first.mcap"), 10_000);
+    let second = ["capture", "--camera", &camera, "--frames", "5", "--out", "second.mcap"];
+    bench.run(&second).failed(1, &[&camera, "another host"]);
+    assert_eq!(bench.names(), ["first.mcap"]);
+    server.says("turned away");
+    first.signal("INT");
+    first.wait().succeeded();
+    // Right behind it, before the server may have noticed that the first has gone.
+    bench.run(&second).succeeded();
+}
+
+#[test]
+fn devices_lists_the_camera_that_answers_and_says_why_another_does_not() {
+    let bench = Bench::new();
+    let (_server, camera) = serve(&bench, &["--seed", "42"]);
+    let nobody = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();
+    let address = camera.strip_prefix("tcp:").unwrap();
+    let outcome = bench.run(&["devices", "--json", "--tcp", address, "--tcp", &nobody]);
+    assert_eq!(outcome.code, Some(1), "{outcome:?}");
+    let devices = outcome.json();
+    assert_eq!(devices[0]["camera"], "virtual");
+    assert_eq!(devices[1]["camera"], camera);
+    assert_eq!(devices[1]["identity"]["serial"], "virtual-42");
+    assert!(devices[2]["problem"].as_str().unwrap().contains("refused"), "{devices}");
+}
+
+/// Stands between camera and host, and hands what the camera says to `tamper`, which returns `false` to hang up.
+fn tampered(camera: &str, mut tamper: impl FnMut(&mut Vec<u8>) -> bool + Send + 'static) -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap();
+    let mut camera = TcpStream::connect(camera.strip_prefix("tcp:").unwrap()).unwrap();
+    std::thread::spawn(move || {
+        let (mut host, _) = listener.accept().unwrap();
+        let (mut commands, mut to_camera) =
+            (host.try_clone().unwrap(), camera.try_clone().unwrap());
+        std::thread::spawn(move || {
+            // Ends with either side.
+            let _ = std::io::copy(&mut commands, &mut to_camera);
+            let _ = to_camera.shutdown(std::net::Shutdown::Both);
+        });
+        let mut buffer = vec![0; 1 << 14];
+        while let Ok(length @ 1..) = camera.read(&mut buffer) {
+            let mut bytes = buffer[..length].to_vec();
+            let goes_on = tamper(&mut bytes);
+            if host.write_all(&bytes).is_err() || !goes_on {
+                break;
+            }
+        }
+        let _ = host.shutdown(std::net::Shutdown::Both);
+        let _ = camera.shutdown(std::net::Shutdown::Both);
+    });
+    format!("tcp:{address}")
+}
+
+/// Without calibration, so that nearly all bytes are frames'.
+fn capture_through(bench: &Bench, camera: &str) -> crate::bench::Outcome {
+    let plain = ["--no-calibration", "--frames", "100", "--out", "rec.mcap", "--json"];
+    bench.run(&[&["capture", "--camera", camera][..], &plain].concat())
+}
+
+#[test]
+fn a_byte_changed_on_the_way_costs_one_frame() {
+    let bench = Bench::new();
+    let (_server, camera) = serve(&bench, &[]);
+    let mut passed = 0;
+    let camera = tampered(&camera, move |bytes| {
+        // In the middle of a frame of 4 KB or so, and never the zero between two.
+        let at = 102_000usize.wrapping_sub(passed);
+        if let Some(byte) = bytes.get_mut(at) {
+            *byte = if *byte == 1 { 2 } else { *byte ^ 1 };
+        }
+        passed += bytes.len();
+        true
+    });
+    let report = capture_through(&bench, &camera).succeeded().json();
+    assert_eq!((&report["made"], &report["complete"]), (&100.into(), &false.into()), "{report}");
+    assert_eq!(report["frames"]["received"], 99, "{report}");
+    assert_eq!(report["frames"]["corrupt"], 1, "{report}");
+    assert_eq!(frames(&bench, "rec.mcap", "corrupt"), 1);
+}
+
+#[test]
+fn a_link_that_closes_in_the_middle_of_a_frame_ends_the_capture() {
+    let bench = Bench::new();
+    let (_server, camera) = serve(&bench, &[]);
+    let mut left = 102_000;
+    let camera = tampered(&camera, move |bytes| {
+        bytes.truncate(left);
+        left -= bytes.len();
+        left > 0
+    });
+    let outcome = capture_through(&bench, &camera);
+    let report = outcome.failed(1, &["in the middle of a packet", "kept in rec.mcap"]).json();
+    let received = report["frames"]["received"].as_u64().unwrap();
+    assert!((10..100).contains(&received), "{report}");
+    assert_eq!(frames(&bench, "rec.mcap", "received"), received);
+}

@@ -1,0 +1,15 @@
+//! The program as its users meet it: the real binary, real processes, real sockets, real files.
+//!
+//! The one law: every wait is bounded, and no process outlives its test.
+
+#![allow(clippy::unwrap_used)] // helpers of tests are tests
+
+mod arguments;
+mod bad_files;
+mod bench;
+mod capture_tcp;
+mod demo;
+mod foreign_devices;
+mod metrics;
+mod real_data;
+mod reconstruct;

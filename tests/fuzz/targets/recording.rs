@@ -1,0 +1,15 @@
+//! Any file that claims to be a recording: read as far as it goes, or refused in one line.
+//!
+//! Run with `-- -malloc_limit_mb=8192`: the mcap crate reserves (never touches) what a string in a record claims.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use std::io::Write;
+
+fuzz_target!(|bytes: &[u8]| {
+    let mut file = tempfile::NamedTempFile::new().expect("a temporary file");
+    file.write_all(bytes).expect("written");
+    if let Err(error) = nirspi::recording::read(file.path(), |_, _| {}) {
+        assert_eq!(error.to_string().lines().count(), 1);
+    }
+});
