@@ -123,6 +123,8 @@ struct Run {
     run_ended: bool,
     status: Option<Status>,
     last_packet: Instant,
+    /// The camera's time of the newest frame.
+    device_time_us: u64,
 }
 
 impl Run {
@@ -144,6 +146,7 @@ impl Run {
         if frame.run != self.number {
             return;
         }
+        self.device_time_us = self.device_time_us.max(frame.device_time_us);
         let arrival = self.account.frame(frame.sequence);
         if arrival == crate::account::Arrival::Received && self.integrated.add(frame).is_err() {
             // Intact, yet not of this setup: its content is as lost as if it had been damaged.
@@ -217,6 +220,7 @@ pub fn capture(
         run_ended: false,
         status: None,
         last_packet: now,
+        device_time_us: 0,
     };
     let ended = match stream(session, options.frames, &mut run, now, watch) {
         Ok(ended) => ended,
@@ -270,6 +274,7 @@ fn stream(
     session.command(Command::Start(length), run)?;
     let mut stopped = false;
     let mut kept_alive = Instant::now();
+    let mut kept_alive_us = 0;
     let mut watched = Instant::now();
     while !run.run_ended {
         session.listen(Duration::from_millis(50), run)?;
@@ -291,8 +296,11 @@ fn stream(
         if run.last_packet.elapsed() > ANSWER_TIMEOUT {
             return Err(SessionError::NoAnswer { command: "Status" });
         }
-        if kept_alive.elapsed() > KEEP_ALIVE {
+        // A simulated camera's time may outrun ours, and it is the camera that counts our silence.
+        let device_age = Duration::from_micros(run.device_time_us.saturating_sub(kept_alive_us));
+        if kept_alive.elapsed() > KEEP_ALIVE || device_age > KEEP_ALIVE {
             kept_alive = Instant::now();
+            kept_alive_us = run.device_time_us;
             session.keep_alive()?;
             // The end of the run may have been the one packet that was damaged.
             if let Some(status) = run.status
