@@ -3,14 +3,15 @@
 //! The one law: whatever ends a capture (its length, the user, the camera, the link), what has come is kept
 //! and the counters say what has not.
 
-use crate::account::{LossAccount, LossCounters};
+use crate::account::LossCounters;
 use crate::calibrate::{CalibrationError, Settling, calibrate};
 use crate::integrate::Integrated;
 use crate::recording::Recorder;
 use crate::session::{ANSWER_TIMEOUT, Deaf, Listener, Session, SessionError};
 use crate::setup::MeasurementSetup;
+use crate::tally::Tally;
 use nirspi_wire::{
-    Answer, Command, DeviceMessage, EventKind, Fault, Frame, PacketError, Reply, RunLength, State,
+    Answer, Command, DeviceMessage, Event, EventKind, Fault, PacketError, Reply, RunLength, State,
     Status,
 };
 use std::io;
@@ -115,16 +116,12 @@ pub enum CaptureError {
 /// Takes the stream apart while it comes.
 struct Run {
     number: u16,
-    account: LossAccount,
-    integrated: Integrated,
+    tally: Tally,
     recorder: Option<Recorder>,
     recorder_error: Option<io::Error>,
     fault: Option<Fault>,
-    run_ended: bool,
     status: Option<Status>,
     last_packet: Instant,
-    /// The camera's time of the newest frame.
-    device_time_us: u64,
 }
 
 impl Run {
@@ -136,44 +133,21 @@ impl Run {
             self.recorder_error = write(recorder).err();
         }
     }
-
-    /// Whether anything of the run, whole or damaged, has come.
-    fn brought_something(&self) -> bool {
-        self.account.accounted() > 0 || self.account.damaged_packets() > 0
-    }
-
-    fn frame(&mut self, frame: &Frame<'_>) {
-        if frame.run != self.number {
-            return;
-        }
-        self.device_time_us = self.device_time_us.max(frame.device_time_us);
-        let arrival = self.account.frame(frame.sequence);
-        if arrival == crate::account::Arrival::Received && self.integrated.add(frame).is_err() {
-            // Intact, yet not of this setup: its content is as lost as if it had been damaged.
-            self.account.damaged();
-        }
-    }
 }
 
 impl Listener for Run {
     fn packet(&mut self, raw: &[u8], content: &Result<DeviceMessage<'_>, PacketError>) {
         self.last_packet = Instant::now();
         self.record(|recorder| recorder.packet(raw));
+        self.tally.packet(content);
         match content {
-            Ok(DeviceMessage::Frame(frame)) => self.frame(frame),
-            Ok(DeviceMessage::Event(event)) => match event.kind {
-                EventKind::RunEnded { run, frames_made, .. } if run == self.number => {
-                    self.account.made(frames_made);
-                    self.run_ended = true;
-                }
-                EventKind::Fault(fault) => self.fault = Some(fault),
-                _ => {}
-            },
+            Ok(DeviceMessage::Event(Event { kind: EventKind::Fault(fault), .. })) => {
+                self.fault = Some(*fault);
+            }
             Ok(DeviceMessage::Reply(Reply { outcome: Ok(Answer::Status(status)), .. })) => {
                 self.status = Some(*status);
             }
-            Ok(_) => {}
-            Err(_) => self.account.damaged(),
+            _ => {}
         }
     }
 }
@@ -212,25 +186,22 @@ pub fn capture(
     let now = Instant::now();
     let mut run = Run {
         number: before.run.wrapping_add(1),
-        account: LossAccount::new(),
-        integrated: Integrated::new(&setup),
+        tally: Tally::new(&setup, Some(before.run.wrapping_add(1))),
         recorder,
         recorder_error: None,
         fault: None,
-        run_ended: false,
         status: None,
         last_packet: now,
-        device_time_us: 0,
     };
     let ended = match stream(session, options.frames, &mut run, now, watch) {
         Ok(ended) => ended,
-        Err(error) if run.brought_something() => Ended::LinkLost(error),
+        Err(error) if run.tally.has_begun() => Ended::LinkLost(error),
         Err(error) => {
             discard_empty(options.record.as_deref(), run);
             return Err(error.into());
         }
     };
-    let counters = run.account.counters();
+    let counters = run.tally.account().counters();
     let recorded = match (run.recorder_error.take(), run.recorder.take()) {
         (Some(error), _) => Err(error),
         (None, Some(recorder)) => recorder.finish(&counters),
@@ -243,10 +214,10 @@ pub fn capture(
         setup,
         settling,
         calibration_problem,
-        integrated: run.integrated,
+        integrated: run.tally.integrated().clone(),
         counters,
-        damaged_packets: run.account.damaged_packets(),
-        repeated: run.account.repeated(),
+        damaged_packets: run.tally.account().damaged_packets(),
+        repeated: run.tally.account().repeated(),
         status: run.status,
         ended,
         elapsed: now.elapsed(),
@@ -276,15 +247,15 @@ fn stream(
     let mut kept_alive = Instant::now();
     let mut kept_alive_us = 0;
     let mut watched = Instant::now();
-    while !run.run_ended {
+    while !run.tally.has_ended() {
         session.listen(Duration::from_millis(50), run)?;
         if watched.elapsed() > Duration::from_millis(50) {
             watched = Instant::now();
             run.record(Recorder::flush_if_due);
             let progress =
-                Progress { counters: run.account.counters(), elapsed: started.elapsed() };
+                Progress { counters: run.tally.account().counters(), elapsed: started.elapsed() };
             let wants_stop = watch(&progress).is_break() || run.recorder_error.is_some();
-            if wants_stop && !stopped && !run.run_ended {
+            if wants_stop && !stopped && !run.tally.has_ended() {
                 stopped = true;
                 match session.command(Command::Stop, run) {
                     // It had ended by itself meanwhile.
@@ -297,10 +268,11 @@ fn stream(
             return Err(SessionError::NoAnswer { command: "Status" });
         }
         // A simulated camera's time may outrun ours, and it is the camera that counts our silence.
-        let device_age = Duration::from_micros(run.device_time_us.saturating_sub(kept_alive_us));
+        let device_age =
+            Duration::from_micros(run.tally.device_time_us().saturating_sub(kept_alive_us));
         if kept_alive.elapsed() > KEEP_ALIVE || device_age > KEEP_ALIVE {
             kept_alive = Instant::now();
-            kept_alive_us = run.device_time_us;
+            kept_alive_us = run.tally.device_time_us();
             session.keep_alive()?;
             // The end of the run may have been the one packet that was damaged.
             if let Some(status) = run.status
@@ -308,8 +280,7 @@ fn stream(
                 && status.run == run.number
                 && run.last_packet.elapsed() > QUIET
             {
-                run.account.made(status.frames_made);
-                run.run_ended = true;
+                run.tally.end(status.frames_made);
             }
         }
     }

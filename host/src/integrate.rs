@@ -13,16 +13,6 @@ pub struct Integrated {
     flags: FrameFlags,
 }
 
-/// A frame that does not belong to the setup.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("a frame of {found} samples, expected {expected} as configured")]
-pub struct ForeignFrame {
-    /// Samples of the frame.
-    pub found: usize,
-    /// Patterns of the setup.
-    pub expected: usize,
-}
-
 impl Integrated {
     /// Nothing summed yet.
     #[must_use]
@@ -31,22 +21,20 @@ impl Integrated {
         Self { sums, frames: 0, sweeps: 0, flags: FrameFlags::default() }
     }
 
-    /// Adds one frame.
-    ///
-    /// # Errors
-    /// [`ForeignFrame`] if it has another number of samples; nothing is added then.
-    pub fn add(&mut self, frame: &Frame<'_>) -> Result<(), ForeignFrame> {
-        let (found, expected) = (frame.samples.len(), self.sums.len());
-        if found != expected {
-            return Err(ForeignFrame { found, expected });
-        }
+    /// Whether a frame has the setup's number of samples.
+    #[must_use]
+    pub fn fits(&self, frame: &Frame<'_>) -> bool {
+        frame.samples.len() == self.sums.len()
+    }
+
+    /// Adds one frame that [fits](Self::fits).
+    pub fn add(&mut self, frame: &Frame<'_>) {
         for (sum, sample) in self.sums.iter_mut().zip(frame.samples.iter()) {
             *sum = sum.saturating_add(sample);
         }
         self.frames += 1;
         self.sweeps += u64::from(frame.sweeps);
         self.flags = self.flags.with(frame.flags);
-        Ok(())
     }
 
     /// Frames summed.
@@ -55,10 +43,27 @@ impl Integrated {
         self.frames
     }
 
-    /// Flags that any of the frames had.
+    /// What the frames' flags say against them, a line each.
     #[must_use]
-    pub fn flags(&self) -> FrameFlags {
-        self.flags
+    pub fn warnings(&self) -> Vec<&'static str> {
+        [
+            (
+                FrameFlags::OVER_RANGE,
+                "some samples were outside the ADC's range: too much light, or gain",
+            ),
+            (
+                FrameFlags::OVERFLOW,
+                "a sum has overflowed: fewer sweeps a frame, or shorter patterns",
+            ),
+            (
+                FrameFlags::TEST_SOURCE,
+                "the samples are those of the test generator, not of the detector",
+            ),
+        ]
+        .into_iter()
+        .filter(|(flag, _)| self.flags.contains(*flag))
+        .map(|(_, warning)| warning)
+        .collect()
     }
 
     /// Mean ADC counts of one sample, for each pattern in the order shown; 0 where nothing was summed.

@@ -4,7 +4,7 @@
 //!
 //! * [`link`] moves bytes, [`session`] talks to a camera, [`account`] counts what became of every frame,
 //! * [`calibrate`] measures latency and settling, [`capture`] runs a measurement, [`recording`] keeps it,
-//! * [`integrate`] turns frames into measurements; `nirspi-recon` turns those into an image,
+//! * [`tally`] and [`integrate`] turn frames into measurements; `nirspi-recon` turns those into an image,
 //! * [`files`], [`picture`] and [`scene`] are what people see and hand over,
 //! * [`virtual_camera`] is a camera without silicon: optics simulator, gateware model, real firmware logic.
 
@@ -19,4 +19,5 @@ pub mod recording;
 pub mod scene;
 pub mod session;
 pub mod setup;
+pub mod tally;
 pub mod virtual_camera;

@@ -7,13 +7,15 @@ use nirspi::capture::{Capture, CaptureOptions, Ended, capture};
 use nirspi::link::Link;
 use nirspi::session::{Session, SessionError};
 use nirspi::setup::MeasurementSetup;
+use nirspi::tally::{Tally, tally_recording};
 use nirspi::virtual_camera::{MemoryLink, SimulatedFpga, VirtualCamera, VirtualOptics};
 use nirspi_hdl::{AdcSample, Gateware};
 use nirspi_mcu::{BusError, FpgaBus};
 use nirspi_optics::{Chain, LedArray, Scene};
 use nirspi_recon::{Order, Side, fwht, metrics, reconstruct};
 use nirspi_tests::tamper::{Fate, Tampered};
-use nirspi_wire::{Fault, walsh};
+use nirspi_wire::packet::MAX_DEVICE_PACKET;
+use nirspi_wire::{DeviceMessage, Fault, Frame, FrameFlags, Samples, encode, open, walsh};
 use std::ops::ControlFlow;
 
 const FRAMES: u32 = 6;
@@ -270,6 +272,48 @@ fn calibration_finds_latency_and_leak_and_undoing_them_helps() {
         without < with / 8.0,
         "1 - correlation: {with:.2e} with the leak, {without:.2e} without"
     );
+}
+
+#[test]
+fn a_recording_gives_the_same_tally_as_the_capture_that_made_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mcap");
+    let options =
+        CaptureOptions { record: Some(path.clone()), ..options(&Order::CakeCutting, false) };
+    let judge = only_frames(|frame| match frame {
+        1 => Fate::Drop,
+        2 => Fate::Delay,
+        4 => Fate::Flip(99),
+        _ => Fate::Pass,
+    });
+    let captured = run(Box::new(Tampered::new(ideal_link(), judge)), &options);
+    let counters = captured.counters;
+    let (received, lost) = (counters.received, counters.lost);
+    assert_eq!((received, lost, counters.corrupt, counters.late), (3, 1, 1, 1));
+    let (integrated, recounted) = tally_recording(&path, &captured.setup).unwrap();
+    assert_eq!(recounted, counters);
+    assert_eq!(integrated.means(&captured.setup), captured.integrated.means(&captured.setup));
+}
+
+#[test]
+fn an_intact_frame_of_another_setup_is_corrupt() {
+    let captured = run(ideal_link(), &options(&Order::CakeCutting, false));
+    let mut tally = Tally::new(&captured.setup, None);
+    let frame = |sequence, words: usize, buffer: &mut [u8]| {
+        let samples = Samples::pack(vec![1i64; words].into_iter(), buffer).unwrap();
+        let (run, flags) = (0, FrameFlags::default());
+        let frame = Frame { run, sequence, device_time_us: 0, sweeps: 1, flags, samples };
+        let mut packet = vec![0; MAX_DEVICE_PACKET + 1];
+        let length = encode(&DeviceMessage::Frame(frame), &mut packet).unwrap().len();
+        packet.truncate(length - 1);
+        packet
+    };
+    let mut buffer = [0; 4096];
+    for (sequence, words) in [(0, 1024), (1, 1000), (2, 1024)] {
+        tally.packet(&open(&mut frame(sequence, words, &mut buffer)));
+    }
+    let counters = tally.account().counters();
+    assert_eq!((counters.received, counters.corrupt, counters.lost), (2, 1, 0));
 }
 
 #[test]

@@ -122,8 +122,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         Ended::LinkLost(error) => bail!("{error}"),
     }
 
-    let notes: Vec<String> =
+    let mut notes: Vec<String> =
         captured.calibration_problem.iter().map(|p| format!("not calibrated: {p}")).collect();
+    notes.extend(captured.integrated.warnings().into_iter().map(str::to_owned));
     let setup = &captured.setup;
     let leak = match &captured.settling {
         Some(settling) => Some(settling.leak(setup.clocks_per_pattern, setup.blanked)?),

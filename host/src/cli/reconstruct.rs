@@ -7,18 +7,16 @@ use super::print;
 use super::report::StageTimes;
 use anyhow::{Context, Result, bail};
 use indicatif::ProgressBar;
-use nirspi::account::{LossAccount, LossCounters};
+use nirspi::account::LossCounters;
 use nirspi::files::npz::{self, Readings, Selection};
 use nirspi::files::output::OutputDir;
 use nirspi::files::{image::encode_grey, npy};
-use nirspi::integrate::Integrated;
 use nirspi::recording::{self, Recording};
-use nirspi::setup::MeasurementSetup;
+use nirspi::tally::tally_recording;
 use nirspi_recon::{Dropout, Image, Measurements, Order, metrics, reconstruct};
-use nirspi_wire::{DeviceMessage, EventKind, open};
 use serde::Serialize;
 use std::io::Read;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -217,11 +215,11 @@ fn from_recording(args: &Args) -> Result<Source> {
     let path = &args.input;
     // The setup stands at the start of the file; packets are summed in a second pass.
     let Recording { setup, settling, cut_short, account, .. } = recording::read(path, |_, _| {})?;
-    let (integrated, counters) = sum_frames(path, &setup)?;
+    let (integrated, counters) = tally_recording(path, &setup)?;
     if integrated.frames() == 0 {
         bail!("{}: no intact frame in the recording, expected at least one", path.display());
     }
-    let mut notes = Vec::new();
+    let mut notes: Vec<String> = integrated.warnings().into_iter().map(str::to_owned).collect();
     if let Some(reason) = cut_short {
         notes.push(format!("the recording is cut short or damaged: {reason}"));
     }
@@ -248,37 +246,6 @@ fn from_recording(args: &Args) -> Result<Source> {
         frames: Some(counters),
         notes,
     })
-}
-
-fn sum_frames(path: &Path, setup: &MeasurementSetup) -> Result<(Integrated, LossCounters)> {
-    let mut integrated = Integrated::new(setup);
-    let mut account = LossAccount::new();
-    let mut scratch = Vec::new();
-    let mut run = None;
-    recording::read(path, |packet, _| {
-        scratch.clear();
-        scratch.extend_from_slice(packet.strip_suffix(&[0]).unwrap_or(packet));
-        match open::<DeviceMessage<'_>>(&mut scratch) {
-            Ok(DeviceMessage::Frame(frame)) if *run.get_or_insert(frame.run) == frame.run => {
-                let arrival = account.frame(frame.sequence);
-                let in_order = arrival == nirspi::account::Arrival::Received;
-                if in_order && integrated.add(&frame).is_err() {
-                    account.damaged();
-                }
-            }
-            Ok(DeviceMessage::Event(event)) => match event.kind {
-                EventKind::RunEnded { frames_made, run: ended, .. }
-                    if run.is_none_or(|run| run == ended) =>
-                {
-                    account.made(frames_made);
-                }
-                _ => {}
-            },
-            Ok(_) => {}
-            Err(_) => account.damaged(),
-        }
-    })?;
-    Ok((integrated, account.counters()))
 }
 
 fn write(args: &Args, image: &Image, report: &Report) -> Result<()> {

@@ -1,0 +1,116 @@
+//! The tally of one run: packets in, the sum of its frames and their account out, live or from a recording.
+//!
+//! The one law: a recording gives the same tally as the capture that made it.
+
+use crate::account::{Arrival, LossAccount, LossCounters};
+use crate::integrate::Integrated;
+use crate::recording::{self, RecordingError};
+use crate::setup::MeasurementSetup;
+use nirspi_wire::{DeviceMessage, EventKind, Frame, PacketError, open};
+use std::path::Path;
+
+/// What a run's packets amount to.
+#[derive(Debug, Clone)]
+pub struct Tally {
+    /// The run that counts; `None`: that of the first frame.
+    run: Option<u16>,
+    account: LossAccount,
+    integrated: Integrated,
+    ended: bool,
+    device_time_us: u64,
+}
+
+impl Tally {
+    /// Nothing has come. Frames of another run than `run` are stragglers of earlier ones, and do not count; `None`
+    /// counts the run of the first frame that comes.
+    #[must_use]
+    pub fn new(setup: &MeasurementSetup, run: Option<u16>) -> Self {
+        let integrated = Integrated::new(setup);
+        Self { run, account: LossAccount::new(), integrated, ended: false, device_time_us: 0 }
+    }
+
+    /// A packet has come.
+    pub fn packet(&mut self, content: &Result<DeviceMessage<'_>, PacketError>) {
+        match content {
+            Ok(DeviceMessage::Frame(frame)) => self.frame(frame),
+            Ok(DeviceMessage::Event(event)) => match event.kind {
+                EventKind::RunEnded { run, frames_made, .. }
+                    if self.run.is_none_or(|own| own == run) =>
+                {
+                    self.end(frames_made);
+                }
+                _ => {}
+            },
+            Ok(_) => {}
+            Err(_) => self.account.damaged(),
+        }
+    }
+
+    fn frame(&mut self, frame: &Frame<'_>) {
+        if *self.run.get_or_insert(frame.run) != frame.run {
+            return;
+        }
+        self.device_time_us = self.device_time_us.max(frame.device_time_us);
+        if !self.integrated.fits(frame) {
+            // Intact, yet not of this setup: as lost as if it had been damaged.
+            self.account.damaged();
+        } else if self.account.frame(frame.sequence) == Arrival::Received {
+            self.integrated.add(frame);
+        }
+    }
+
+    /// The camera says that the run is over, and how many frames it has made.
+    pub fn end(&mut self, frames_made: u32) {
+        self.account.made(frames_made);
+        self.ended = true;
+    }
+
+    /// Whether the camera has said that the run is over.
+    #[must_use]
+    pub fn has_ended(&self) -> bool {
+        self.ended
+    }
+
+    /// Whether anything of the run, whole or damaged, has come.
+    #[must_use]
+    pub fn has_begun(&self) -> bool {
+        self.account.accounted() > 0 || self.account.damaged_packets() > 0
+    }
+
+    /// The camera's time of the newest frame.
+    #[must_use]
+    pub fn device_time_us(&self) -> u64 {
+        self.device_time_us
+    }
+
+    /// What became of each frame.
+    #[must_use]
+    pub fn account(&self) -> &LossAccount {
+        &self.account
+    }
+
+    /// The sum of the frames received in order.
+    #[must_use]
+    pub fn integrated(&self) -> &Integrated {
+        &self.integrated
+    }
+}
+
+/// Counts a recording again.
+///
+/// # Errors
+/// [`RecordingError`] where the file cannot be read.
+pub fn tally_recording(
+    path: &Path,
+    setup: &MeasurementSetup,
+) -> Result<(Integrated, LossCounters), RecordingError> {
+    let mut tally = Tally::new(setup, None);
+    let mut scratch = Vec::new();
+    recording::read(path, |packet, _| {
+        scratch.clear();
+        scratch.extend_from_slice(packet.strip_suffix(&[0]).unwrap_or(packet));
+        tally.packet(&open(&mut scratch));
+    })?;
+    let counters = tally.account.counters();
+    Ok((tally.integrated, counters))
+}
