@@ -32,6 +32,8 @@ pub struct Settling {
     pub adc_latency: u8,
     /// Step response by clock, from the first sample that shows the step to where it has settled at 1.
     pub response: Vec<f64>,
+    /// What a sample reads with all LEDs off: daylight and the ADC's offset.
+    pub dark_counts: f64,
     /// All LEDs on, less all off.
     pub step_counts: f64,
     /// Standard deviation of one sample.
@@ -176,7 +178,8 @@ fn evaluate(samples: &[f64]) -> Result<Settling, CalibrationError> {
     if let Some(settled) = settled {
         response.truncate(settled);
     }
-    Ok(Settling { adc_latency: latency as u8, response, step_counts, noise_counts })
+    let adc_latency = latency as u8;
+    Ok(Settling { adc_latency, response, dark_counts: low, step_counts, noise_counts })
 }
 
 impl Settling {
@@ -236,6 +239,7 @@ mod tests {
             let settling = evaluate(&burst(latency, 9000.0, 0.8)).unwrap();
             assert_eq!(usize::from(settling.adc_latency), latency);
             assert!((settling.step_counts - 9000.0).abs() < 1.0);
+            assert!((settling.dark_counts - 200.0).abs() < 0.1);
             let expected = 0.8 * 0.8;
             assert!(
                 (settling.response[0] - expected).abs() < 1e-6,

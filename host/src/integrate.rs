@@ -1,7 +1,8 @@
 //! Frames -> measurements: sums the frames of a run, undoes the settling leak, names the rows.
 
+use crate::calibrate::Settling;
 use crate::setup::MeasurementSetup;
-use nirspi_recon::{Leak, MeasurementError, Measurements, Side, Sweep};
+use nirspi_recon::{LeakError, MeasurementError, Measurements, Side, Sweep};
 use nirspi_wire::{Frame, FrameFlags};
 
 /// The sum of the frames of one run, in ADC counts.
@@ -74,26 +75,49 @@ impl Integrated {
         self.sums.iter().map(|&sum| sum as f64 * scale).collect()
     }
 
-    /// Measurements in ADC counts, with what leaked from slot to slot put back where a leak is given.
+    /// Measurements in ADC counts. With the camera's response the dark level of single readings is subtracted, and what
+    /// leaked from slot to slot is put back unless `keep_leak`; without it the dark level is estimated.
     ///
     /// # Errors
-    /// [`MeasurementError`] where the setup's rows are not ones of the instrument.
+    /// [`IntegrateError`] where the setup's rows are not ones of the instrument, or the response cannot be undone.
     pub fn measurements(
         &self,
         setup: &MeasurementSetup,
-        leak: Option<&Leak>,
-    ) -> Result<Measurements, MeasurementError> {
+        settling: Option<&Settling>,
+        keep_leak: bool,
+    ) -> Result<Measurements, IntegrateError> {
         let rows: Vec<i64> = setup.rows.iter().map(|&row| i64::from(row)).collect();
         let mut values = self.means(setup);
-        match leak {
-            Some(leak) if setup.differential => leak.correct_differential(&mut values),
-            Some(leak) => leak.correct_single(&mut values, Sweep::Repeating),
-            None => {}
-        }
+        let leak = settling
+            .filter(|_| !keep_leak)
+            .map(|settling| settling.leak(setup.clocks_per_pattern, setup.blanked))
+            .transpose()?;
         if setup.differential {
-            Measurements::from_differential(Side::INSTRUMENT, &rows, &values)
-        } else {
-            Measurements::from_single(Side::INSTRUMENT, &rows, &values)
+            if let Some(leak) = &leak {
+                leak.correct_differential(&mut values);
+            }
+            return Ok(Measurements::from_differential(Side::INSTRUMENT, &rows, &values)?);
         }
+        let dark = settling.map_or(0.0, |settling| settling.dark_counts);
+        values.iter_mut().for_each(|value| *value -= dark);
+        if let Some(leak) = &leak {
+            leak.correct_single(&mut values, Sweep::Repeating);
+        }
+        let mut measurements = Measurements::from_single(Side::INSTRUMENT, &rows, &values)?;
+        if settling.is_none() {
+            measurements.remove_dark_level();
+        }
+        Ok(measurements)
     }
+}
+
+/// Why a sum of frames gives no measurements.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum IntegrateError {
+    /// The setup.
+    #[error(transparent)]
+    Measurements(#[from] MeasurementError),
+    /// The camera's response.
+    #[error(transparent)]
+    Leak(#[from] LeakError),
 }

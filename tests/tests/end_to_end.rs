@@ -70,7 +70,7 @@ fn check(captured: &Capture) -> Result<(), String> {
     let mut expected: Vec<f64> =
         optics.footprint().weights().iter().map(|&w| f64::from(w) * counts).collect();
     fwht(&mut expected).unwrap();
-    let measurements = captured.integrated.measurements(&captured.setup, None).unwrap();
+    let measurements = captured.integrated.measurements(&captured.setup, None, true).unwrap();
     for (&row, value) in measurements.rows().iter().zip(measurements.values()) {
         let off = (value - expected[row as usize]).abs();
         if off > 1.01 {
@@ -257,16 +257,18 @@ fn calibration_finds_latency_and_leak_and_undoing_them_helps() {
     assert!(captured.calibration_problem.is_none(), "{:?}", captured.calibration_problem);
     assert_eq!(captured.setup.adc_latency, noiseless().chain().adc_latency_clocks);
 
-    let leak = captured.settling.as_ref().unwrap().leak(5, 2).unwrap();
+    let settling = captured.settling.as_ref();
+    let leak = settling.unwrap().leak(5, 2).unwrap();
     assert!(leak.taps()[1] > 0.01, "the default chain leaks: {:?}", leak.taps());
     let footprint = noiseless().footprint().weights().to_vec();
     let side = Side::INSTRUMENT.pixels();
-    let distance = |leak| {
-        let measurements = captured.integrated.measurements(&captured.setup, leak).unwrap();
+    let distance = |keep_leak| {
+        let setup = &captured.setup;
+        let measurements = captured.integrated.measurements(setup, settling, keep_leak).unwrap();
         let image = reconstruct::hadamard(&measurements);
         1.0 - metrics::correlation(&footprint, image.pixels(), side, side).unwrap()
     };
-    let (with, without) = (distance(None), distance(Some(&leak)));
+    let (with, without) = (distance(true), distance(false));
     // What is left is the rounding to whole ADC counts.
     assert!(
         without < with / 8.0,
@@ -314,6 +316,23 @@ fn an_intact_frame_of_another_setup_is_corrupt() {
     }
     let counters = tally.account().counters();
     assert_eq!((counters.received, counters.corrupt, counters.lost), (2, 1, 0));
+}
+
+#[test]
+fn patterns_without_complements_show_the_scene_too() {
+    let mut options = options(&Order::CakeCutting, true);
+    options.setup.differential = false;
+    options.setup.sweeps = 16;
+    let captured = run(Box::new(MemoryLink::new(optics().camera(2).unwrap())), &options);
+    let footprint = optics().footprint().weights().to_vec();
+    // With the calibrated dark level, and with none but the estimate.
+    for settling in [captured.settling.as_ref(), None] {
+        let measurements =
+            captured.integrated.measurements(&captured.setup, settling, false).unwrap();
+        let image = reconstruct::hadamard(&measurements);
+        let correlation = metrics::correlation(&footprint, image.pixels(), 32, 32).unwrap();
+        assert!(correlation > 0.8, "{correlation}");
+    }
 }
 
 #[test]

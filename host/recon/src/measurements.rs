@@ -4,7 +4,7 @@
 //! one that its side has, none twice), whatever it was built from.
 
 use crate::dropout::{self, Dropout};
-use crate::{Order, OrderError, Side};
+use crate::{Order, OrderError, Side, order};
 use thiserror::Error;
 
 /// Signed measurements `value[k] = sum over pixels of H[row[k], p] * x[p]`, in the order in which they
@@ -133,8 +133,8 @@ impl Measurements {
     ///
     /// Without row 0 in `rows`, `S` is estimated as twice the mean reading, because the other rows of a
     /// scene average to nearly zero (exactly so over all of them only if pixel 0 is dark). Row 0 itself
-    /// stays absent then: the image's mean is not known. A dark level, which cannot cancel here,
-    /// must have been subtracted before.
+    /// stays absent then: the image's mean is not known. A dark level, which does not cancel against row 0, must
+    /// have been subtracted before, or be [removed](Self::remove_dark_level) after.
     ///
     /// # Errors
     /// [`MeasurementError`] names the list (`y` or `h_row`), the position and what was found.
@@ -149,6 +149,30 @@ impl Measurements {
         let values: Vec<f64> = y.iter().map(|y| 2.0 * y - all_ones).collect();
         expect_finite("d", &values)?;
         Ok(Self { side, rows, values })
+    }
+
+    /// Removes what a dark level in every reading (ambient light, an ADC's offset) has left in measurements
+    /// [of patterns alone](Self::from_single): the same constant in each, which would stand as one bright spot in
+    /// the image's first pixel. Returns it.
+    ///
+    /// It is estimated as the mean of the middle half of the values over the half of the rows with the highest
+    /// sequency, where a scene's own measurements scatter around zero; one within four standard errors of zero is left alone, as `None`.
+    pub fn remove_dark_level(&mut self) -> Option<f64> {
+        let fine = order::positions_by_sequency(self.side, &self.rows);
+        let mut values: Vec<f64> =
+            fine[fine.len() / 2..].iter().map(|&position| self.values[position]).collect();
+        values.sort_unstable_by(f64::total_cmp);
+        // A few large measurements of the scene must not pass for a level, nor two heaps of equal ones.
+        let middle = &values[values.len() / 4..values.len() - values.len() / 4];
+        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
+        let level = mean(middle);
+        let spread: Vec<f64> = values.iter().map(|value| (value - level).powi(2)).collect();
+        let error = (mean(&spread) / values.len().max(1) as f64).sqrt();
+        if level.abs() <= 4.0 * error {
+            return None;
+        }
+        self.values.iter_mut().for_each(|value| *value -= level);
+        Some(level)
     }
 
     /// The part of these measurements that a shorter sweep would have taken: the first

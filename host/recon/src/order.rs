@@ -175,6 +175,18 @@ impl Pattern {
     }
 }
 
+/// Positions of the rows but the all-ones one, in ascending sequency (along the zig-zag).
+pub(crate) fn positions_by_sequency(side: Side, rows: &[u32]) -> Vec<usize> {
+    let mut rank = vec![0; side.area()];
+    // A named order always exists.
+    for (k, row) in Order::ZigZag.rows(side).unwrap_or_default().into_iter().enumerate() {
+        rank[row as usize] = k;
+    }
+    let mut positions: Vec<usize> = (0..rows.len()).filter(|&k| rows[k] != 0).collect();
+    positions.sort_by_key(|&k| rank[rows[k] as usize]);
+    positions
+}
+
 /// Natural row of the Walsh function of that sequency, among `count` (a power of two).
 fn walsh_row(sequency: u32, count: u32) -> u32 {
     let gray = sequency ^ (sequency >> 1);

@@ -126,13 +126,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         captured.calibration_problem.iter().map(|p| format!("not calibrated: {p}")).collect();
     notes.extend(captured.integrated.warnings().into_iter().map(str::to_owned));
     let setup = &captured.setup;
-    let leak = match &captured.settling {
-        Some(settling) => Some(settling.leak(setup.clocks_per_pattern, setup.blanked)?),
-        None => None,
-    };
-    let raw = captured.integrated.measurements(setup, None)?;
+    let settling = captured.settling.as_ref();
+    let leak = settling.map(|s| s.leak(setup.clocks_per_pattern, setup.blanked)).transpose()?;
+    let raw = captured.integrated.measurements(setup, settling, true)?;
     let raw = times.time("inverse_transform", || reconstruct::hadamard(&raw));
-    let measurements = captured.integrated.measurements(setup, leak.as_ref())?;
+    let measurements = captured.integrated.measurements(setup, settling, false)?;
     let Solved { image, report: method } =
         times.time("reconstruct", || solve(&args.method, &measurements))?;
 

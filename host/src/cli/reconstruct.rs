@@ -192,22 +192,22 @@ fn from_npz(args: &Args) -> Result<Source> {
     let file = npz::read(&args.input, selection)?;
     let named = || args.input.display().to_string();
     let rows = &file.h_row;
+    let mut notes = file.notes;
     let (measurements, dropouts) = match &file.readings {
         Readings::Pairs(y) => Measurements::from_pairs(file.side, rows, y).with_context(named)?,
         Readings::Differential(d) => {
             (Measurements::from_differential(file.side, rows, d).with_context(named)?, Vec::new())
         }
         Readings::Single(y) => {
-            (Measurements::from_single(file.side, rows, y).with_context(named)?, Vec::new())
+            let mut measurements =
+                Measurements::from_single(file.side, rows, y).with_context(named)?;
+            if let Some(level) = measurements.remove_dark_level() {
+                notes.push(format!("a dark level of {level:.4} was found in `y` and removed"));
+            }
+            (measurements, Vec::new())
         }
     };
-    Ok(Source {
-        measurements,
-        dropouts,
-        reference: file.reference,
-        frames: None,
-        notes: file.notes,
-    })
+    Ok(Source { measurements, dropouts, reference: file.reference, frames: None, notes })
 }
 
 /// Sums the frames of a recording, counting again what became of each.
@@ -226,18 +226,11 @@ fn from_recording(args: &Args) -> Result<Source> {
     if account.is_some_and(|account| account != counters) {
         notes.push("the frames found are not those that the capture counted".to_owned());
     }
-    let leak = match &settling {
-        Some(settling) if !args.keep_leak => {
-            Some(settling.leak(setup.clocks_per_pattern, setup.blanked)?)
-        }
-        Some(_) => None,
-        None => {
-            notes.push("no calibration in the recording: the settling leak stays".to_owned());
-            None
-        }
-    };
+    if settling.is_none() {
+        notes.push("no calibration in the recording: the settling leak stays".to_owned());
+    }
     let measurements = integrated
-        .measurements(&setup, leak.as_ref())
+        .measurements(&setup, settling.as_ref(), args.keep_leak)
         .with_context(|| path.display().to_string())?;
     Ok(Source {
         measurements,

@@ -1,5 +1,5 @@
 use super::*;
-use crate::testing::{readings, scene, side};
+use crate::testing::{correlation_of, measured, readings, scene, side};
 use proptest::prelude::*;
 
 fn natural(n: u64) -> Vec<i64> {
@@ -50,6 +50,36 @@ fn each_fault_is_named() {
     assert_eq!(huge, E::NotFinite { field: "d", index: 0, found: f64::INFINITY });
     let single = Measurements::from_single(side(2), &[0], &[f64::INFINITY]).unwrap_err();
     assert_eq!(single, E::NotFinite { field: "y", index: 0, found: f64::INFINITY });
+}
+
+#[test]
+fn a_dark_level_under_single_readings_is_found_and_removed() {
+    let side = side(32);
+    for kind in 0..3 {
+        let scene = scene(side, kind);
+        let rows = natural(32);
+        // Light of the positive patterns: every other reading of the pairs.
+        let light: Vec<f64> = readings(side, &rows, &scene).into_iter().step_by(2).collect();
+        let clean = Measurements::from_single(side, &rows, &light).unwrap();
+        let dark = 0.7 * light[0];
+        let lifted: Vec<f64> = light.iter().map(|y| y + dark).collect();
+        let mut found = Measurements::from_single(side, &rows, &lifted).unwrap();
+        let level = found.remove_dark_level().unwrap();
+        assert!((level / dark - 1.0).abs() < 0.01, "scene {kind}: {level} for {dark}");
+        let images = [&clean, &found].map(crate::reconstruct::hadamard);
+        assert!(correlation_of(&images[0], &images[1]) > 0.999, "scene {kind}");
+    }
+}
+
+#[test]
+fn where_there_is_no_dark_level_nothing_is_changed() {
+    let side = side(32);
+    for kind in 0..5 {
+        let all = measured(side, &scene(side, kind));
+        let mut same = all.clone();
+        assert_eq!(same.remove_dark_level(), None, "scene {kind}");
+        assert_eq!(same, all);
+    }
 }
 
 #[test]

@@ -4,7 +4,7 @@
 
 use super::Problem;
 use crate::omp::OmpError;
-use crate::{Order, Side};
+use crate::{Side, order};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -118,7 +118,7 @@ fn fold_misses(
 fn split(problem: &Problem, folds: usize) -> Vec<Option<usize>> {
     let mut random = Pcg64::seed_from_u64(SPLIT_SEED);
     let mut fold_of = vec![None; problem.rows.len()];
-    let by_sequency = positions_by_sequency(problem.side, problem.rows);
+    let by_sequency = order::positions_by_sequency(problem.side, problem.rows);
     for group in by_sequency.chunks(folds) {
         let mut free: Vec<usize> = (0..folds).collect();
         for &k in group {
@@ -126,18 +126,6 @@ fn split(problem: &Problem, folds: usize) -> Vec<Option<usize>> {
         }
     }
     fold_of
-}
-
-/// Positions of the rows but the all-ones one, in ascending sequency (along the zig-zag).
-fn positions_by_sequency(side: Side, rows: &[u32]) -> Vec<usize> {
-    let mut rank = vec![0; side.area()];
-    // A named order always exists.
-    for (k, row) in Order::ZigZag.rows(side).unwrap_or_default().into_iter().enumerate() {
-        rank[row as usize] = k;
-    }
-    let mut positions: Vec<usize> = (0..rows.len()).filter(|&k| rows[k] != 0).collect();
-    positions.sort_by_key(|&k| rank[rows[k] as usize]);
-    positions
 }
 
 /// Standard deviations of a normal distribution in its median magnitude.
@@ -150,7 +138,7 @@ const ROUNDING: f32 = 1e-6;
 /// sequency. Detail of the scene is in there too: what it returns is the level under which a coefficient cannot
 /// be told from its neighbours, an upper bound of the noise.
 pub(super) fn noise_level(side: Side, rows: &[u32], values: &[f32]) -> f32 {
-    let positions = positions_by_sequency(side, rows);
+    let positions = order::positions_by_sequency(side, rows);
     let count = (positions.len() / 4).max(8).min(positions.len());
     let mut magnitudes: Vec<f32> =
         positions[positions.len() - count..].iter().map(|&k| values[k].abs()).collect();
