@@ -1,0 +1,31 @@
+/// The order table, twice: the host reads one copy while the sequencer reads the other.
+///
+/// The one law: both copies are written together. It is all 0 after power-up.
+module nirspi_order_table (
+    input  var logic          clk         ,
+    input  var logic          write       ,
+    input  var logic [10-1:0] host_address,
+    input  var logic [10-1:0] host_data   ,
+    output var logic [10-1:0] host_entry  , /// One clock after its address
+    input  var logic [10-1:0] index       ,
+    output var logic [10-1:0] entry        /// Two clocks after its index
+);
+    logic [10-1:0] host_copy [1024];
+    logic [10-1:0] copy      [1024];
+    logic [10-1:0] fetched         ;
+
+    always_ff @ (posedge clk) begin
+        if (write) begin
+            host_copy[host_address] <= host_data;
+        end
+        host_entry <= host_copy[host_address];
+    end
+
+    always_ff @ (posedge clk) begin
+        if (write) begin
+            copy[host_address] <= host_data;
+        end
+        fetched <= copy[index];
+        entry   <= fetched;
+    end
+endmodule

@@ -1,0 +1,184 @@
+/// The register bank, the settings copied from it, and what the host reads.
+///
+/// The one law: reads give what was written, whatever it was; what it means is checked at a start. The map is
+/// `register_map`, made from `mcu/wire`.
+module nirspi_registers
+    import nirspi_register_map::*;
+(
+    input  var logic                           clk        ,
+    input  var logic                           rst        ,
+    input  var logic                  [16-1:0] address    , /// Stands long before `write` or `read`
+    input  var logic                  [32-1:0] data       ,
+    input  var logic                           write      ,
+    input  var logic                           read       ,
+    input  var logic                           copy       , /// A run begins: takes the settings over
+    input  var logic                           copy_raw   , /// It is a raw burst
+    output var logic                           in_range   , /// Every setting is
+    output var nirspi_types::Settings          settings   ,
+    input  var logic                  [32-1:0] status     ,
+    input  var logic                  [3-1:0]  fault      ,
+    input  var logic                  [32-1:0] frames_made,
+    input  var logic                  [32-1:0] frames_lost,
+    input  var logic                  [64-1:0] clock_now  ,
+    input  var logic                  [10-1:0] table_entry,
+    output var logic                  [32-1:0] value       /// Two clocks after `read`
+);
+
+
+    logic [32-1:0] scratch   ;
+    logic [32-1:0] mode      ;
+    logic [32-1:0] patterns  ;
+    logic [32-1:0] dwell     ;
+    logic [32-1:0] blank     ;
+    logic [32-1:0] latency   ;
+    logic [32-1:0] sweeps    ;
+    logic [32-1:0] frames    ;
+    logic [32-1:0] raw_length;
+    logic [32-1:0] watchdog  ;
+    logic [32-1:0] duty_limit;
+    logic [32-1:0] trip      ;
+
+    always_ff @ (posedge clk) begin
+        if (rst) begin
+            scratch    <= RESET_SCRATCH;
+            mode       <= RESET_MODE;
+            patterns   <= RESET_PATTERNS;
+            dwell      <= RESET_DWELL;
+            blank      <= RESET_BLANK;
+            latency    <= RESET_LATENCY;
+            sweeps     <= RESET_SWEEPS;
+            frames     <= RESET_FRAMES;
+            raw_length <= RESET_RAW_LENGTH;
+            watchdog   <= RESET_WATCHDOG;
+            duty_limit <= RESET_DUTY_LIMIT;
+            trip       <= RESET_OVER_RANGE_TRIP;
+        end else if (write) begin
+            case (32'(address)) inside
+                ADDRESS_SCRATCH        : scratch    <= data;
+                ADDRESS_MODE           : mode       <= data;
+                ADDRESS_PATTERNS       : patterns   <= data;
+                ADDRESS_DWELL          : dwell      <= data;
+                ADDRESS_BLANK          : blank      <= data;
+                ADDRESS_LATENCY        : latency    <= data;
+                ADDRESS_SWEEPS         : sweeps     <= data;
+                ADDRESS_FRAMES         : frames     <= data;
+                ADDRESS_RAW_LENGTH     : raw_length <= data;
+                ADDRESS_WATCHDOG       : watchdog   <= data;
+                ADDRESS_DUTY_LIMIT     : duty_limit <= data;
+                ADDRESS_OVER_RANGE_TRIP: trip       <= data;
+                default                : begin
+                end
+            endcase
+        end
+    end
+
+    // The verdict stands a few clocks after a write, long before the next access can ask for it.
+    localparam logic [32-1:0] DEFINED = MODE_DIFFERENTIAL | MODE_ORDER_SEQUENCY | MODE_ORDER_TABLE | MODE_TEST_SOURCE;
+    logic [10-1:0] good   ;
+
+    always_ff @ (posedge clk) begin
+        if (rst) begin
+            good     <= 0;
+            in_range <= 0;
+        end else begin
+            good[0]  <= (mode & ~DEFINED) == 0;
+            good[1]  <= patterns != 0 && patterns <= PATTERNS;
+            good[2]  <= dwell != 0 && dwell[31:16] == 0;
+            good[3]  <= blank < dwell;
+            good[4]  <= latency <= LATENCY_MAX;
+            good[5]  <= sweeps != 0;
+            good[6]  <= raw_length != 0 && raw_length <= RAW_SAMPLES_MAX;
+            good[7]  <= watchdog != 0;
+            good[8]  <= watchdog <= WATCHDOG_MAX;
+            good[9]  <= duty_limit <= DUTY_LIMIT_MAX;
+            in_range <= &good;
+        end
+    end
+
+    // Worked out ahead of the copy, for the same reason.
+    nirspi_types::Settings next;
+
+    always_ff @ (posedge clk) begin
+        next.raw              <= 0;
+        next.order_table      <= (mode & MODE_ORDER_TABLE) != 0;
+        next.order_sequency   <= (mode & MODE_ORDER_SEQUENCY) != 0;
+        next.differential     <= (mode & MODE_DIFFERENTIAL) != 0;
+        next.test_source      <= (mode & MODE_TEST_SOURCE) != 0;
+        next.patterns         <= patterns[10:0];
+        next.patterns_less_1  <= patterns[9:0] - 1;
+        next.single_pattern   <= patterns == 1;
+        next.dwell_less_1     <= dwell[15:0] - 1;
+        next.single_clock     <= dwell == 1;
+        next.blank            <= blank[15:0];
+        next.unblanked        <= blank == 0;
+        next.latency          <= latency[5:0];
+        next.sweeps           <= sweeps;
+        next.sweeps_less_1    <= sweeps - 1;
+        next.single_sweep     <= sweeps == 1;
+        next.frames_less_1    <= frames - 1;
+        next.single_frame     <= frames == 1;
+        next.endless          <= frames == 0;
+        next.raw_less_1       <= raw_length[11:0] - 1;
+        next.watchdog_less_1  <= watchdog[26:0] - 1;
+        next.duty_limit       <= duty_limit[20:0];
+        next.trips_over_range <= trip != 0;
+        next.over_range_trip  <= trip;
+    end
+
+    always_ff @ (posedge clk) begin
+        if (rst) begin
+            settings <= nirspi_types::Settings'(0);
+        end else if (copy) begin
+            settings         <= next;
+            settings.raw     <= copy_raw;
+            settings.endless <= next.endless || copy_raw;
+        end
+    end
+
+    // What changes by itself is held as of the clock of the read; the rest is still there one later.
+    logic [32-1:0] clock_high;
+    logic [32-1:0] live      ;
+
+    always_ff @ (posedge clk) begin
+        if (read) begin
+            case (32'(address)) inside
+                ADDRESS_STATUS     : live <= status;
+                ADDRESS_FAULT      : live <= 32'(fault);
+                ADDRESS_FRAMES_MADE: live <= frames_made;
+                ADDRESS_FRAMES_LOST: live <= frames_lost;
+                ADDRESS_CLOCK_LOW  : live <= clock_now[31:0];
+                default            : live <= 0;
+            endcase
+        end
+        case (32'(address)) inside
+            ADDRESS_IDENTITY       : value <= RESET_IDENTITY;
+            ADDRESS_VERSION        : value <= RESET_VERSION;
+            ADDRESS_SCRATCH        : value <= scratch;
+            ADDRESS_MODE           : value <= mode;
+            ADDRESS_PATTERNS       : value <= patterns;
+            ADDRESS_DWELL          : value <= dwell;
+            ADDRESS_BLANK          : value <= blank;
+            ADDRESS_LATENCY        : value <= latency;
+            ADDRESS_SWEEPS         : value <= sweeps;
+            ADDRESS_FRAMES         : value <= frames;
+            ADDRESS_RAW_LENGTH     : value <= raw_length;
+            ADDRESS_WATCHDOG       : value <= watchdog;
+            ADDRESS_DUTY_LIMIT     : value <= duty_limit;
+            ADDRESS_OVER_RANGE_TRIP: value <= trip;
+            ADDRESS_CLOCK_HIGH     : value <= clock_high;
+            default                : value <= ((address[15:10] == ORDER_TABLE[15:10]) ? (
+                32'(table_entry)
+            ) : (
+                live
+            ));
+        endcase
+    end
+
+    always_ff @ (posedge clk) begin
+        if (rst) begin
+            clock_high <= 0;
+        end else if (read && 32'(address) == ADDRESS_CLOCK_LOW) begin
+            clock_high <= clock_now[63:32];
+        end
+    end
+endmodule
