@@ -260,6 +260,7 @@ module nirspi_engine
         .rst              (rst                                                          ),
         .settings         (settings                                                     ),
         .window_first     (window_first                                                 ),
+        .begins           (begins                                                       ),
         .arrives          (arrives                                                      ),
         .running          (running                                                      ),
         .feed             (access                                                       ),

@@ -7,6 +7,7 @@ module nirspi_safety (
     input  var logic                          rst             ,
     input  var nirspi_types::Settings         settings        ,
     input  var logic                          window_first    , /// This clock is the first of a duty window
+    input  var logic                          begins          , /// A run is accepted
     input  var logic                          arrives         , /// The next clock is the first of a run
     input  var logic                          running         , /// This clock is one of a run
     input  var logic                          feed            , /// An access comes before this clock
@@ -24,6 +25,7 @@ module nirspi_safety (
     logic counts  ;
     logic exceeded;
     logic barks   ;
+    logic dropped ;
 
     nirspi_duty budget (
         .clk          (clk         ),
@@ -48,7 +50,18 @@ module nirspi_safety (
         opens  = running && !interlock_closed;
         counts = running && !opens && !stop;
         trips  = counts && (over_range || exceeded || barks);
-        permit = interlock_now && fault == 0 && !opens && !trips;
+        permit = interlock_now && !dropped && fault == 0 && !opens && !trips;
+    end
+
+    // An interlock that closes again does not light up what is left of its run.
+    always_ff @ (posedge clk) begin
+        if (rst) begin
+            dropped <= 1;
+        end else if (!interlock_now) begin
+            dropped <= 1;
+        end else if (begins) begin
+            dropped <= 0;
+        end
     end
 
     always_ff @ (posedge clk) begin

@@ -1,0 +1,410 @@
+//! The RTL and the golden model side by side: the same pins, the same accesses, compared every clock.
+//!
+//! The one law: the model is never asked what the RTL does; it runs `DEPTH` clocks behind and is given only
+//! what the pins were given, at the moment that the `access` pin says an access took effect.
+//!
+//! What `hdl/src/lib.rs` lets the RTL take a few clocks more for is bounded here: [`STOP_CLOCKS`],
+//! [`TRIP_CLOCKS`] and the start, which follows its access by [`START_CLOCKS`]. Everything else is exact:
+//! LED lines at every clock, both ready pins, every register read, every byte of a frame or burst.
+
+use crate::pins::Pins;
+use crate::project::Project;
+use nirspi_hdl::{AdcSample, Gateware, Lines};
+use nirspi_wire::{
+    host_port,
+    register::{Register, control},
+};
+use std::collections::VecDeque;
+
+/// Clocks from the choice of a slot to the end of what it sets off: `types::DEPTH`.
+const DEPTH: u64 = 13;
+/// Clocks from the choice of a slot to its lines at the pins, and so to its light's sample at the pins.
+const TO_PINS: u64 = 6;
+/// Clocks from the interlock pin to the end of what it sets off: two to be in step, and those of a run.
+const INTERLOCK: u64 = 2 + 1 + DEPTH;
+/// Clocks from the interlock pin to the pins of the LEDs, past everything else.
+const TO_DARK: u64 = 3;
+/// Clocks from a start's access to clock 0 of the run.
+const START_CLOCKS: u64 = DEPTH + 1;
+/// Clocks that LEDs may be lit longer than in the model after a stop or an opened interlock.
+const STOP_CLOCKS: u64 = 9;
+/// The same after any other trip and a raw burst.
+const TRIP_CLOCKS: u64 = 7;
+
+/// What the host asks for.
+#[derive(Debug, Clone, Copy)]
+enum Access {
+    Write(u16, u32),
+    Read(u16),
+    Frame,
+    Raw,
+}
+
+/// What the model answers.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum Answer {
+    Value(u32),
+    Bytes(Vec<u8>),
+}
+
+/// How the host drives its port.
+#[derive(Debug, Clone, Copy)]
+pub struct Port {
+    /// Period of its clock; the ADC's is 8000.
+    pub host_ps: u64,
+    /// Clocks of the host port in half a period of `sck`, and how many more when it is high.
+    pub half: u32,
+    pub quad: bool,
+}
+
+pub struct Rig {
+    pins: Pins,
+    pub model: Gateware,
+    pub port: Port,
+    seed: u64,
+    /// Over-range samples in 256.
+    pub over_range_rate: u8,
+    clock: u64,
+    next_adc_ps: u64,
+    next_host_ps: u64,
+    seen: VecDeque<Seen>,
+    interlock: VecDeque<(u64, bool)>,
+    /// Clocks in which the level of the interlock pin keeps the LEDs out.
+    dark: std::ops::Range<u64>,
+    /// It has, and no run has begun since.
+    put_out: bool,
+    asked: Option<Access>,
+    answer: Option<Answer>,
+    start: Option<(u64, u32)>,
+    grace: u64,
+    /// What the model was last told, for the report of a difference.
+    told: VecDeque<String>,
+    pub mismatch: Option<String>,
+}
+
+/// The pins in one clock.
+#[derive(Debug, Clone, Copy)]
+struct Seen {
+    sample: AdcSample,
+    leds: Lines,
+    /// The interlock pin may have put the LEDs out.
+    put_out: bool,
+}
+
+/// The sample at the pins in a clock.
+fn sample(seed: u64, rate: u8, clock: u64) -> AdcSample {
+    let mut z = seed ^ clock.wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    z ^= z >> 31;
+    AdcSample { code: (z & 0x3FFF) as u16, over_range: (z >> 56) < rate.into() }
+}
+
+impl Rig {
+    pub fn new(project: &Project, seed: u64) -> Self {
+        Self {
+            pins: Pins::new(project),
+            model: Gateware::new(),
+            port: Port { host_ps: 10_000, half: 3, quad: true },
+            seed,
+            over_range_rate: 0,
+            clock: 0,
+            next_adc_ps: 0,
+            next_host_ps: 1,
+            seen: VecDeque::new(),
+            interlock: VecDeque::new(),
+            dark: 0..u64::MAX,
+            put_out: true,
+            asked: None,
+            answer: None,
+            start: None,
+            grace: 0,
+            told: VecDeque::new(),
+            mismatch: None,
+        }
+    }
+
+    /// Notes the first difference; all later ones follow from it.
+    fn expect<T: PartialEq + std::fmt::Debug>(&mut self, what: &str, rtl: &T, model: &T) {
+        if rtl != model && self.mismatch.is_none() {
+            let told = Vec::from(self.told.clone()).join("\n  ");
+            self.mismatch =
+                Some(format!("clock {}: {what}: {rtl:?}, model {model:?}\n  {told}", self.clock));
+        }
+    }
+
+    fn tell(&mut self, what: String) {
+        self.told.push_back(what);
+        if self.told.len() > 12 {
+            self.told.pop_front();
+        }
+    }
+
+    /// One clock of the ADC.
+    fn adc_clock(&mut self) {
+        let now = self.clock;
+        // Samples of a clock's light are at the pins with its lines.
+        let sample = sample(self.seed, self.over_range_rate, now);
+        self.pins.sample(sample);
+        let leds = self.pins.leds();
+        if self.dark.contains(&now) {
+            self.expect("LEDs with the interlock open", &leds, &Lines::default());
+            self.put_out = true;
+        }
+        self.seen.push_back(Seen { sample, leds, put_out: self.put_out });
+        if self.seen.len() as u64 > DEPTH - TO_PINS + 1 {
+            self.seen.pop_front();
+        }
+        let access = self.pins.access();
+        if now >= DEPTH {
+            self.model_clock(now - DEPTH, access);
+        }
+        self.pins.adc_edge();
+        self.clock += 1;
+    }
+
+    /// Clock `t` of the model, with which the RTL is done now.
+    fn model_clock(&mut self, t: u64, access: bool) {
+        if self.start.is_none() {
+            let ready = self.pins.ready();
+            let expected = (self.model.frame_ready(), self.model.raw_ready());
+            self.expect("ready pins", &ready, &expected);
+        }
+        let was_lit = self.model.lines().enable;
+        while self.interlock.front().is_some_and(|&(at, _)| at == t) {
+            let (_, closed) = self.interlock.pop_front().unwrap();
+            self.model.set_interlock(closed);
+            self.tell(format!("clock {t}: interlock {closed}"));
+        }
+        if access {
+            match self.asked.take() {
+                Some(asked) => self.access(t, asked),
+                None => self.expect("accesses", &1, &0),
+            }
+        }
+        if let Some((at, bits)) = self.start
+            && at == t
+        {
+            self.start = None;
+            self.model.write(Register::Control.address(), bits);
+            self.tell(format!("clock {t}: started {}", self.model.running()));
+        }
+        if was_lit && !self.model.lines().enable {
+            self.grace = STOP_CLOCKS;
+        }
+        let Seen { sample, leds, put_out } = self.seen[0];
+        let expected = self.model.lines();
+        if self.grace > 0 && !expected.enable {
+            self.grace -= 1;
+            if !leds.enable {
+                self.grace = 0;
+                self.expect("LED lines going out", &leds, &expected);
+            }
+        } else if !(put_out && leds == Lines::default()) {
+            self.expect("LED lines", &leds, &expected);
+        }
+        let lit = self.model.lines().enable;
+        let running = self.model.running();
+        self.model.tick(sample);
+        // A run that ends by itself has put its LEDs out already, unless its latency is 0.
+        if lit && running && !self.model.running() {
+            self.grace = TRIP_CLOCKS;
+        }
+    }
+
+    fn access(&mut self, t: u64, access: Access) {
+        const STARTS: u32 = control::START | control::START_RAW;
+        self.tell(format!("clock {t}: {access:x?}, running {}", self.model.running()));
+        let answer = match access {
+            Access::Write(address, value) => {
+                let control = address == Register::Control.address();
+                if control && value & STARTS != 0 {
+                    self.model.write(address, value & !STARTS);
+                    if self.model.running() {
+                        self.model.write(address, value & STARTS);
+                    } else {
+                        self.start = Some((t + START_CLOCKS, value & STARTS));
+                        self.put_out = self.dark.contains(&self.clock);
+                    }
+                } else {
+                    self.model.write(address, value);
+                }
+                return;
+            }
+            Access::Read(address) => Answer::Value(self.model.read(address).unwrap_or(0)),
+            Access::Frame => Answer::Bytes(self.model.frame().unwrap_or_default().to_vec()),
+            Access::Raw => Answer::Bytes(self.model.raw().unwrap_or_default().to_vec()),
+        };
+        self.answer = Some(answer);
+    }
+
+    /// One clock of the host port, and those of the ADC before it.
+    fn host_clock(&mut self) {
+        while self.next_adc_ps <= self.next_host_ps {
+            self.next_adc_ps += 8000;
+            self.adc_clock();
+        }
+        self.next_host_ps += self.port.host_ps;
+        self.pins.host_edge();
+    }
+
+    pub fn wait(&mut self, host_clocks: u32) {
+        for _ in 0..host_clocks {
+            self.host_clock();
+        }
+    }
+
+    pub fn wait_adc(&mut self, clocks: u64) {
+        let end = self.clock + clocks;
+        while self.clock < end {
+            self.host_clock();
+        }
+    }
+
+    /// Clocks of the ADC since reset.
+    pub fn clock(&self) -> u64 {
+        self.clock
+    }
+
+    pub fn interlock(&mut self, closed: bool) {
+        self.pins.interlock(closed);
+        let at = self.clock + INTERLOCK - DEPTH;
+        // A level that no clock has seen was never there.
+        if self.interlock.back().is_some_and(|&(last, _)| last == at) {
+            self.interlock.pop_back();
+        }
+        self.interlock.push_back((at, closed));
+        if closed {
+            self.dark.end = self.dark.end.min(self.clock + TO_DARK);
+        } else {
+            self.dark = self.clock + TO_DARK..u64::MAX;
+        }
+    }
+
+    /// One period of `sck`; what the FPGA drives as the host samples it.
+    fn sck(&mut self, lines: u8) -> (u8, u8) {
+        self.pins.drive(lines);
+        self.pins.sck(false);
+        self.wait(self.port.half);
+        let driven = self.pins.driven();
+        self.pins.sck(true);
+        self.wait(self.port.half);
+        driven
+    }
+
+    /// Sends the lowest `bits` of a word, quad or on `io0`.
+    fn send(&mut self, word: u32, bits: u32, quad: bool) {
+        let step = if quad { 4 } else { 1 };
+        for shift in (0..bits).step_by(step as usize).map(|sent| bits - step - sent) {
+            // Lines that do not matter are noise.
+            let noise = self.clock as u8 & 0xE;
+            let value = (word >> shift) as u8;
+            let (_, drive) = self.sck(if quad { value & 0xF } else { value & 1 | noise });
+            self.expect("lines driven while the host drives them", &drive, &0);
+        }
+    }
+
+    fn receive(&mut self, bits: u32) -> u32 {
+        let mut word = 0;
+        let quad = self.port.quad;
+        for _ in 0..if quad { bits / 4 } else { bits } {
+            let (lines, drive) = self.sck(self.clock as u8 & 0xD);
+            self.expect("lines driven", &drive, &if quad { 0xF } else { 2 });
+            word = if quad { word << 4 | u32::from(lines) } else { word << 1 | u32::from(lines >> 1 & 1) };
+        }
+        word
+    }
+
+    fn begin(&mut self, opcode: u8, address: u16) {
+        self.pins.sck(false);
+        self.pins.select(true);
+        let quad = self.port.quad;
+        self.send((opcode | if quad { host_port::QUAD } else { 0 }).into(), 8, false);
+        self.send(address.into(), 16, quad);
+    }
+
+    fn end(&mut self) {
+        self.pins.sck(false);
+        self.wait(self.port.half);
+        self.pins.select(false);
+        let (_, drive) = self.pins.driven();
+        self.expect("lines driven by a port not selected", &drive, &0);
+        self.wait(4);
+    }
+
+    fn dummy(&mut self) {
+        for _ in 0..host_port::DUMMY_CYCLES {
+            self.sck(0);
+        }
+    }
+
+    /// Waits out what an access still sets off.
+    fn settled(&mut self) {
+        for _ in 0..40 {
+            if self.asked.is_none() {
+                return;
+            }
+            self.host_clock();
+        }
+        self.expect("accesses that came through", &0, &1);
+        self.asked = None;
+    }
+
+    pub fn write(&mut self, address: u16, value: u32) {
+        self.asked = Some(Access::Write(address, value));
+        self.begin(host_port::WRITE_REGISTER, address);
+        let quad = self.port.quad;
+        self.send(value, 32, quad);
+        self.end();
+        self.settled();
+    }
+
+    /// A write given up before its last bit.
+    pub fn write_cut_short(&mut self, address: u16, value: u32) {
+        self.begin(host_port::WRITE_REGISTER, address);
+        let quad = self.port.quad;
+        self.send(value >> 4, 28, quad);
+        self.end();
+        self.wait(50);
+    }
+
+    pub fn set(&mut self, register: Register, value: u32) {
+        self.write(register.address(), value);
+    }
+
+    pub fn read(&mut self, address: u16) -> u32 {
+        self.asked = Some(Access::Read(address));
+        self.begin(host_port::READ_REGISTER, address);
+        self.dummy();
+        let value = self.receive(32);
+        self.end();
+        self.settled();
+        let answer = self.answer.take();
+        self.expect(&format!("register {address:#x}"), &Some(Answer::Value(value)), &answer);
+        value
+    }
+
+    /// Reads the frame or burst: all of it and some beyond, or its first bytes only.
+    pub fn stream(&mut self, raw: bool, at_most: usize) {
+        let (access, opcode) = if raw {
+            (Access::Raw, host_port::READ_RAW)
+        } else {
+            (Access::Frame, host_port::READ_FRAME)
+        };
+        self.asked = Some(access);
+        self.begin(opcode, 0);
+        self.dummy();
+        self.settled();
+        let Some(Answer::Bytes(mut expected)) = self.answer.take() else {
+            return self.expect("a stream begun", &0, &1);
+        };
+        expected.extend([0; 3]);
+        expected.truncate(at_most);
+        let bytes: Vec<u8> = expected.iter().map(|_| self.receive(8) as u8).collect();
+        self.end();
+        if let Some(at) = (0..bytes.len()).find(|&at| bytes[at] != expected[at]) {
+            let what = format!("byte {at} of {} ({})", bytes.len(), if raw { "raw" } else { "frame" });
+            self.expect(&what, &bytes[at], &expected[at]);
+        }
+    }
+}
