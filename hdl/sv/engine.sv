@@ -268,6 +268,7 @@ module nirspi_engine
         .clear            (clear                                                        ),
         .interlock_closed (interlocks[13]                                               ),
         .interlock_now    (interlock                                                    ),
+        .ends             (ends                                                         ),
         .over_range       (over_trips                                                   ),
         .half_arrays      ({full_late[6], lit_late[6] && !full_late[6] && !dark_late[6]}),
         .fault            (fault                                                        ),

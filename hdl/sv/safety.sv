@@ -15,6 +15,7 @@ module nirspi_safety (
     input  var logic                          clear           , /// It forgets the fault
     input  var logic                          interlock_closed, /// As of this clock
     input  var logic                          interlock_now   , /// At the pin
+    input  var logic                          ends            , /// This clock is the last of a run
     input  var logic                          over_range      , /// The trip is reached with this clock
     input  var logic                  [2-1:0] half_arrays     , /// Lit in this clock
     output var logic                  [3-1:0] fault           , /// Code as of before this clock
@@ -46,12 +47,10 @@ module nirspi_safety (
         .barks    (barks   )
     );
 
-    always_comb begin
-        opens  = running && !interlock_closed;
-        counts = running && !opens && !stop;
-        trips  = counts && (over_range || exceeded || barks);
-        permit = interlock_now && !dropped && fault == 0 && !opens && !trips;
-    end
+    always_comb opens  = running && !interlock_closed;
+    always_comb counts = running && !opens && !stop;
+    always_comb trips  = counts && (over_range || exceeded || barks);
+    always_comb permit = interlock_now && !dropped && fault == 0 && !opens && !trips && !(running && ends);
 
     // An interlock that closes again does not light up what is left of its run.
     always_ff @ (posedge clk) begin

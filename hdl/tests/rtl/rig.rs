@@ -11,6 +11,8 @@ use crate::pins::Pins;
 use crate::project::Project;
 use nirspi_hdl::{AdcSample, Gateware, Lines};
 use nirspi_wire::{
+    FrameFlags, crc32,
+    fpga::{FpgaFrame, Sums},
     host_port,
     register::{Register, control},
 };
@@ -80,6 +82,42 @@ pub struct Rig {
     /// What the model was last told, for the report of a difference.
     told: VecDeque<String>,
     pub mismatch: Option<String>,
+    pub variant: Variant,
+    clock_held: u64,
+    pub seen_so_far: Tally,
+}
+
+/// What of the RTL was built differently, to see in seconds what takes hours.
+#[derive(Debug, Clone, Copy)]
+pub struct Variant {
+    /// Bits of a sum.
+    pub sum_bits: u32,
+    /// Clock of the RTL less that of the model: a multiple of the duty window.
+    pub clock_ahead: u64,
+    /// Clock of the model when the RTL leaves reset.
+    pub begins_at: u64,
+}
+
+impl Default for Variant {
+    fn default() -> Self {
+        Self { sum_bits: 48, clock_ahead: 0, begins_at: 0 }
+    }
+}
+
+/// What has been compared, to know that scenarios reach what they are for.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Tally {
+    pub lit_clocks: u64,
+    pub frames: u64,
+    pub frames_over_range: u64,
+    pub frames_overflow: u64,
+    pub frames_after_loss: u64,
+    pub bursts: u64,
+    pub starts: u64,
+    pub starts_refused: u64,
+    pub stops: u64,
+    /// By fault code.
+    pub faults: [u64; 5],
 }
 
 /// The pins in one clock.
@@ -121,6 +159,65 @@ impl Rig {
             grace: 0,
             told: VecDeque::new(),
             mismatch: None,
+            variant: Variant::default(),
+            clock_held: 0,
+            seen_so_far: Tally::default(),
+        }
+    }
+
+    /// The same for an RTL built differently.
+    pub fn of_variant(project: &Project, seed: u64, variant: Variant) -> Self {
+        let half = format!("param HALF: u32 = {}", variant.sum_bits / 2);
+        let clock = variant.begins_at.wrapping_add(variant.clock_ahead);
+        let reset = format!("clock_now    = 64'd{clock} - (types::DEPTH as 64);");
+        let project = project
+            .with("accumulators", "param HALF: u32 = 24", &half)
+            .with("engine", "clock_now    = -(types::DEPTH as 64);", &reset);
+        let mut rig = Self { variant, ..Self::new(&project, seed) };
+        for _ in 0..variant.begins_at {
+            rig.model.tick(AdcSample::default());
+        }
+        rig
+    }
+
+    /// A frame of the model as this variant delivers it.
+    fn frame_of_variant(&mut self, bytes: &[u8]) -> Vec<u8> {
+        let Ok(frame) = FpgaFrame::parse(bytes) else { return Vec::new() };
+        let mut header = frame.header;
+        header.clock = header.clock.wrapping_add(self.variant.clock_ahead);
+        let modulus = 1u64 << self.variant.sum_bits;
+        if frame.sums().any(|sums| sums.positive.max(sums.negative) >= modulus) {
+            header.flags = header.flags.with(FrameFlags::OVERFLOW);
+        }
+        let tally = &mut self.seen_so_far;
+        tally.frames += 1;
+        tally.frames_over_range += u64::from(header.flags.contains(FrameFlags::OVER_RANGE));
+        tally.frames_overflow += u64::from(header.flags.contains(FrameFlags::OVERFLOW));
+        tally.frames_after_loss += u64::from(header.flags.contains(FrameFlags::AFTER_LOSS));
+        let mut bytes = header.to_bytes().to_vec();
+        for sums in frame.sums() {
+            let (positive, negative) = (sums.positive % modulus, sums.negative % modulus);
+            bytes.extend(Sums { positive, negative }.to_bytes());
+        }
+        bytes.extend(crc32(&bytes).to_le_bytes());
+        bytes
+    }
+
+    /// What the model reads, of its clock as of this variant.
+    fn read_of_variant(&mut self, address: u16) -> u32 {
+        let value = self.model.read(address).unwrap_or(0);
+        match Register::at(address) {
+            Some(Register::ClockLow) => {
+                let high = self.model.read(Register::ClockHigh.address()).unwrap_or(0);
+                self.clock_held = (u64::from(high) << 32 | u64::from(value)) + self.variant.clock_ahead;
+                self.clock_held as u32
+            }
+            Some(Register::ClockHigh) => (self.clock_held >> 32) as u32,
+            Some(Register::Fault) => {
+                self.seen_so_far.faults[value as usize] += 1;
+                value
+            }
+            _ => value,
         }
     }
 
@@ -187,10 +284,14 @@ impl Rig {
         {
             self.start = None;
             self.model.write(Register::Control.address(), bits);
-            self.tell(format!("clock {t}: started {}", self.model.running()));
+            let running = self.model.running();
+            self.tell(format!("clock {t}: started {running}"));
+            self.seen_so_far.starts += u64::from(running);
+            self.seen_so_far.starts_refused += u64::from(!running);
         }
         if was_lit && !self.model.lines().enable {
             self.grace = STOP_CLOCKS;
+            self.seen_so_far.stops += 1;
         }
         let Seen { sample, leds, put_out } = self.seen[0];
         let expected = self.model.lines();
@@ -204,6 +305,7 @@ impl Rig {
             self.expect("LED lines", &leds, &expected);
         }
         let lit = self.model.lines().enable;
+        self.seen_so_far.lit_clocks += u64::from(lit);
         let running = self.model.running();
         self.model.tick(sample);
         // A run that ends by itself has put its LEDs out already, unless its latency is 0.
@@ -231,9 +333,16 @@ impl Rig {
                 }
                 return;
             }
-            Access::Read(address) => Answer::Value(self.model.read(address).unwrap_or(0)),
-            Access::Frame => Answer::Bytes(self.model.frame().unwrap_or_default().to_vec()),
-            Access::Raw => Answer::Bytes(self.model.raw().unwrap_or_default().to_vec()),
+            Access::Read(address) => Answer::Value(self.read_of_variant(address)),
+            Access::Frame => {
+                let bytes = self.model.frame().unwrap_or_default().to_vec();
+                Answer::Bytes(self.frame_of_variant(&bytes))
+            }
+            Access::Raw => {
+                let bytes = self.model.raw().unwrap_or_default().to_vec();
+                self.seen_so_far.bursts += u64::from(!bytes.is_empty());
+                Answer::Bytes(bytes)
+            }
         };
         self.answer = Some(answer);
     }

@@ -31,7 +31,7 @@ impl Dice {
         self.next().is_multiple_of(n)
     }
 
-    fn pick<T: Copy>(&mut self, from: &[T]) -> T {
+    pub fn pick<T: Copy>(&mut self, from: &[T]) -> T {
         from[self.range(0, from.len() as u64 - 1) as usize]
     }
 }
@@ -166,4 +166,49 @@ pub fn run(rig: &mut Rig, seed: u64) {
     }
     rig.stream(false, usize::MAX);
     rig.stream(true, 100);
+}
+
+/// Frames of one or two patterns with sums of about `2^sum_bits`.
+pub fn long_sums(rig: &mut Rig, seed: u64) {
+    let dice = &mut Dice::new(seed);
+    rig.interlock(true);
+    rig.set(R::Watchdog, 1_000_000);
+    rig.set(R::OverRangeTrip, 0);
+    let dwell = dice.pick(&[1, 1, 2, 7, 300]);
+    let samples = dice.range(1, (2 << rig.variant.sum_bits) / 8192);
+    let differential = dice.once_in(2);
+    rig.set(R::Dwell, dwell as u32);
+    rig.set(R::Blank, 0);
+    rig.set(R::Sweeps, samples.div_ceil(dwell) as u32);
+    rig.set(R::Patterns, dice.range(1, 2) as u32);
+    rig.set(R::Mode, if differential { mode::DIFFERENTIAL | mode::ORDER_TABLE } else { mode::ORDER_TABLE });
+    rig.set(R::Latency, dice.range(0, 63) as u32);
+    rig.set(R::Frames, 3);
+    rig.set(R::DutyLimit, DUTY_LIMIT_MAX);
+    rig.write(ORDER_TABLE, 5);
+    rig.write(ORDER_TABLE + 1, 6);
+    rig.set(R::Control, control::STOP | control::CLEAR_FAULT | control::RELEASE | control::START);
+    for _ in 0..3 {
+        rig.wait_adc(4 * samples * if differential { 2 } else { 1 } / 2 + 300);
+        rig.stream(false, usize::MAX);
+        rig.set(R::Control, control::RELEASE);
+    }
+}
+
+/// A run with a light budget that is spent about when a duty window ends.
+pub fn across_a_window(rig: &mut Rig, seed: u64) {
+    let dice = &mut Dice::new(seed);
+    rig.interlock(true);
+    rig.set(R::Watchdog, 1_000_000);
+    rig.set(R::Patterns, dice.range(1, 5) as u32);
+    rig.set(R::Mode, if dice.once_in(2) { mode::DIFFERENTIAL } else { 0 });
+    rig.set(R::DutyLimit, dice.range(200, 3000) as u32);
+    for _ in 0..dice.range(3, 8) {
+        rig.set(R::Control, control::STOP | control::CLEAR_FAULT | control::START);
+        rig.wait_adc(dice.range(0, 1500));
+        rig.read(R::Fault.address());
+        rig.read(R::ClockLow.address());
+        rig.read(R::ClockHigh.address());
+        rig.stream(false, usize::MAX);
+    }
 }
