@@ -66,6 +66,8 @@ pub struct Rig {
     seed: u64,
     /// Over-range samples in 256.
     pub over_range_rate: u8,
+    /// Codes fade to an eighth and come back; the logarithm of a quarter of the period, in clocks.
+    pub fade: u32,
     clock: u64,
     next_adc_ps: u64,
     next_host_ps: u64,
@@ -125,7 +127,7 @@ pub struct Tally {
 struct Seen {
     sample: AdcSample,
     leds: Lines,
-    /// The interlock pin may have put the LEDs out.
+    /// The interlock pin has put the LEDs out.
     put_out: bool,
 }
 
@@ -146,6 +148,7 @@ impl Rig {
             port: Port { host_ps: 10_000, half: 3, quad: true },
             seed,
             over_range_rate: 0,
+            fade: 63,
             clock: 0,
             next_adc_ps: 0,
             next_host_ps: 1,
@@ -170,9 +173,11 @@ impl Rig {
         let half = format!("param HALF: u32 = {}", variant.sum_bits / 2);
         let clock = variant.begins_at.wrapping_add(variant.clock_ahead);
         let reset = format!("clock_now    = 64'd{clock} - (types::DEPTH as 64);");
-        let project = project
-            .with("accumulators", "param HALF: u32 = 24", &half)
-            .with("engine", "clock_now    = -(types::DEPTH as 64);", &reset);
+        let project = project.with("accumulators", "param HALF: u32 = 24", &half).with(
+            "engine",
+            "clock_now    = -(types::DEPTH as 64);",
+            &reset,
+        );
         let mut rig = Self { variant, ..Self::new(&project, seed) };
         for _ in 0..variant.begins_at {
             rig.model.tick(AdcSample::default());
@@ -209,7 +214,8 @@ impl Rig {
         match Register::at(address) {
             Some(Register::ClockLow) => {
                 let high = self.model.read(Register::ClockHigh.address()).unwrap_or(0);
-                self.clock_held = (u64::from(high) << 32 | u64::from(value)) + self.variant.clock_ahead;
+                self.clock_held =
+                    (u64::from(high) << 32 | u64::from(value)) + self.variant.clock_ahead;
                 self.clock_held as u32
             }
             Some(Register::ClockHigh) => (self.clock_held >> 32) as u32,
@@ -241,12 +247,13 @@ impl Rig {
     fn adc_clock(&mut self) {
         let now = self.clock;
         // Samples of a clock's light are at the pins with its lines.
-        let sample = sample(self.seed, self.over_range_rate, now);
+        let mut sample = sample(self.seed, self.over_range_rate, now);
+        sample.code >>= (now >> self.fade) & 3;
         self.pins.sample(sample);
         let leds = self.pins.leds();
-        if self.dark.contains(&now) {
-            self.expect("LEDs with the interlock open", &leds, &Lines::default());
-            self.put_out = true;
+        self.put_out |= self.dark.contains(&now);
+        if self.put_out {
+            self.expect("LEDs after the interlock opened", &leds, &Lines::default());
         }
         self.seen.push_back(Seen { sample, leds, put_out: self.put_out });
         if self.seen.len() as u64 > DEPTH - TO_PINS + 1 {
@@ -301,7 +308,7 @@ impl Rig {
                 self.grace = 0;
                 self.expect("LED lines going out", &leds, &expected);
             }
-        } else if !(put_out && leds == Lines::default()) {
+        } else if !put_out {
             self.expect("LED lines", &leds, &expected);
         }
         let lit = self.model.lines().enable;
@@ -370,11 +377,6 @@ impl Rig {
         }
     }
 
-    /// Clocks of the ADC since reset.
-    pub fn clock(&self) -> u64 {
-        self.clock
-    }
-
     pub fn interlock(&mut self, closed: bool) {
         self.pins.interlock(closed);
         let at = self.clock + INTERLOCK - DEPTH;
@@ -419,7 +421,11 @@ impl Rig {
         for _ in 0..if quad { bits / 4 } else { bits } {
             let (lines, drive) = self.sck(self.clock as u8 & 0xD);
             self.expect("lines driven", &drive, &if quad { 0xF } else { 2 });
-            word = if quad { word << 4 | u32::from(lines) } else { word << 1 | u32::from(lines >> 1 & 1) };
+            word = if quad {
+                word << 4 | u32::from(lines)
+            } else {
+                word << 1 | u32::from(lines >> 1 & 1)
+            };
         }
         word
     }
@@ -512,7 +518,8 @@ impl Rig {
         let bytes: Vec<u8> = expected.iter().map(|_| self.receive(8) as u8).collect();
         self.end();
         if let Some(at) = (0..bytes.len()).find(|&at| bytes[at] != expected[at]) {
-            let what = format!("byte {at} of {} ({})", bytes.len(), if raw { "raw" } else { "frame" });
+            let what =
+                format!("byte {at} of {} ({})", bytes.len(), if raw { "raw" } else { "frame" });
             self.expect(&what, &bytes[at], &expected[at]);
         }
     }
