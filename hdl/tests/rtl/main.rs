@@ -3,6 +3,7 @@
 
 mod bench;
 mod equivalence;
+mod host;
 mod map;
 mod modules;
 mod mutation;
