@@ -84,6 +84,7 @@ module nirspi_engine
     logic         trips        ;
     logic         ends         ;
     logic         permit       ;
+    logic         permitted    ;
 
     nirspi_control command (
         .clk           (clk                         ),
@@ -142,6 +143,7 @@ module nirspi_engine
         .start       (go         ),
         .halt        (halt       ),
         .permit      (permit     ),
+        .permitted   (permitted  ),
         .table_index (table_index),
         .table_entry (table_entry),
         .rows        (rows       ),
@@ -280,7 +282,8 @@ module nirspi_engine
         .fault            (fault                                                        ),
         .opens            (opens                                                        ),
         .trips            (trips                                                        ),
-        .permit           (permit                                                       )
+        .permit           (permit                                                       ),
+        .permitted        (permitted                                                    )
     );
 
     logic                [32-1:0] frames_made;
