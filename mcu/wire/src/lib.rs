@@ -6,6 +6,7 @@
 //! * [`samples`]: the integrated ADC samples of a frame,
 //! * [`register`]: the register map of the FPGA, its fault codes and bits,
 //! * [`fpga`]: the layout of a frame as the FPGA's host port delivers it,
+//! * [`host_port`]: how accesses cross the host port,
 //! * [`walsh`]: which sign of which Hadamard row an LED shows,
 //! * [`usb`]: identity on the bus.
 //!
@@ -23,6 +24,7 @@
 extern crate std;
 
 pub mod fpga;
+pub mod host_port;
 pub mod message;
 pub mod packet;
 pub mod register;

@@ -1,0 +1,176 @@
+/// The FPGA but for what is special to a board: PLL, pin cells, LVDS receivers.
+///
+/// Two clocks: `clk_adc`, 125 MHz, for LEDs and samples alike; `clk_host` for the host port, which samples its
+/// pins with it. Resets are synchronous, each to its own clock, high.
+module nirspi_core (
+    input var logic clk_adc ,
+    input var logic rst_adc ,
+    input var logic clk_host,
+    input var logic rst_host,
+    // ADC, in step with `clk_adc`.
+    input var logic [14-1:0] adc_code      ,
+    input var logic          adc_over_range,
+    // LED array.
+    output var logic [32-1:0] led_rows   ,
+    output var logic [32-1:0] led_columns,
+    output var logic          led_enable ,
+    // Interlock loop, closed when high; in step with nothing.
+    input var logic interlock,
+    // Host port.
+    input  var logic         spi_sck    ,
+    input  var logic         spi_cs_n   ,
+    input  var logic [4-1:0] spi_in     ,
+    output var logic [4-1:0] spi_out    ,
+    output var logic [4-1:0] spi_drive  , /// Line by line; none while `spi_cs_n` is high
+    output var logic         frame_ready,
+    output var logic         raw_ready  ,
+    output var logic         access      /// An access of the host takes effect: for an activity LED
+);
+    // Pins to the clocks that look at them.
+    logic         closed  ;
+    logic         sck     ;
+    logic         cs_n    ;
+    logic [4-1:0] lines_in;
+
+    nirspi_synchroniser to_closed (
+        .clk  (clk_adc  ),
+        .rst  (rst_adc  ),
+        .from (interlock),
+        .to   (closed   )
+    );
+    nirspi_synchroniser to_sck (
+        .clk  (clk_host),
+        .rst  (rst_host),
+        .from (spi_sck ),
+        .to   (sck     )
+    );
+    nirspi_synchroniser to_cs_n (
+        .clk  (clk_host),
+        .rst  (rst_host),
+        .from (spi_cs_n),
+        .to   (cs_n    )
+    );
+    for (genvar i = 0; i < 4; i++) begin :g_line
+        nirspi_synchroniser to_line (
+            .clk  (clk_host   ),
+            .rst  (rst_host   ),
+            .from (spi_in[i]  ),
+            .to   (lines_in[i])
+        );
+    end
+
+    // Host port.
+    logic          send        ;
+    logic [2-1:0]  operation_in;
+    logic [16-1:0] address_in  ;
+    logic [32-1:0] data_in     ;
+    logic          back        ;
+    logic [32-1:0] value_out   ;
+    logic          epoch_host  ;
+    logic          empty       ;
+    logic          pop         ;
+    logic [9-1:0]  pop_data    ;
+    logic [4-1:0]  drive       ;
+
+    nirspi_spi_slave port (
+        .clk       (clk_host    ),
+        .rst       (rst_host    ),
+        .sck       (sck         ),
+        .selected  (!cs_n       ),
+        .lines_in  (lines_in    ),
+        .lines_out (spi_out     ),
+        .drive     (drive       ),
+        .send      (send        ),
+        .operation (operation_in),
+        .address   (address_in  ),
+        .data      (data_in     ),
+        .back      (back        ),
+        .value     (value_out   ),
+        .epoch     (epoch_host  ),
+        .empty     (empty       ),
+        .fifo_data (pop_data    ),
+        .pop       (pop         )
+    );
+    // The lines are let go with the pin, not some clocks later.
+
+    always_comb spi_drive = drive & {4{~spi_cs_n}};
+
+    logic          request  ;
+    logic [2-1:0]  operation;
+    logic [16-1:0] address  ;
+    logic [32-1:0] data     ;
+    logic          epoch    ;
+    logic          answered ;
+    logic [32-1:0] value    ;
+
+    nirspi_crossing bridge (
+        .clk_host     (clk_host    ),
+        .rst_host     (rst_host    ),
+        .clk_adc      (clk_adc     ),
+        .rst_adc      (rst_adc     ),
+        .send         (send        ),
+        .operation_in (operation_in),
+        .address_in   (address_in  ),
+        .data_in      (data_in     ),
+        .back         (back        ),
+        .value_out    (value_out   ),
+        .epoch_host   (epoch_host  ),
+        .request      (request     ),
+        .operation    (operation   ),
+        .address      (address     ),
+        .data         (data        ),
+        .epoch_adc    (epoch       ),
+        .answered     (answered    ),
+        .value        (value       )
+    );
+
+    logic [8-1:0] octet     ;
+    logic         byte_valid;
+    logic         full      ;
+    logic         tag       ;
+
+    // A byte belongs to the epoch whose access made it, not to one that is still on its way.
+    always_ff @ (posedge clk_adc) begin
+        if (rst_adc) begin
+            tag <= 0;
+        end else if (access) begin
+            tag <= epoch;
+        end
+    end
+
+    nirspi_byte_fifo bytes (
+        .clk_write (clk_adc     ),
+        .rst_write (rst_adc     ),
+        .push      (byte_valid  ),
+        .push_data ({tag, octet}),
+        .full      (full        ),
+        .clk_read  (clk_host    ),
+        .rst_read  (rst_host    ),
+        .pop       (pop         ),
+        .empty     (empty       ),
+        .pop_data  (pop_data    )
+    );
+
+    nirspi_engine machine (
+        .clk         (clk_adc       ),
+        .rst         (rst_adc       ),
+        .code        (adc_code      ),
+        .over_range  (adc_over_range),
+        .interlock   (closed        ),
+        .rows        (led_rows      ),
+        .columns     (led_columns   ),
+        .enable      (led_enable    ),
+        .frame_ready (frame_ready   ),
+        .raw_ready   (raw_ready     ),
+        .access      (access        ),
+        .request     (request       ),
+        .operation   (operation     ),
+        .address     (address       ),
+        .data        (data          ),
+        .answered    (answered      ),
+        .value       (value         ),
+        .octet       (octet         ),
+        .byte_valid  (byte_valid    ),
+        .byte_taken  (!full         )
+    );
+endmodule

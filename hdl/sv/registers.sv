@@ -1,0 +1,197 @@
+/// The register bank, the settings copied from it, and what the host reads.
+///
+/// The one law: reads give what was written, whatever it was; what it means is checked at a start. The map is
+/// `register_map`, made from `mcu/wire`.
+module nirspi_registers
+    import nirspi_register_map::*;
+(
+    input  var logic                           clk        ,
+    input  var logic                           rst        ,
+    input  var logic                  [16-1:0] address    , /// Stands long before `write` or `read`
+    input  var logic                  [32-1:0] data       ,
+    input  var logic                           write      ,
+    input  var logic                           read       ,
+    input  var logic                           copy       , /// A run begins: takes the settings over
+    input  var logic                           copy_raw   , /// It is a raw burst
+    output var logic                           in_range   , /// Every setting is
+    output var nirspi_types::Settings          settings   ,
+    input  var logic                  [32-1:0] status     ,
+    input  var logic                  [3-1:0]  fault      ,
+    input  var logic                  [32-1:0] frames_made,
+    input  var logic                  [32-1:0] frames_lost,
+    input  var logic                  [64-1:0] clock_now  ,
+    input  var logic                  [10-1:0] table_entry,
+    output var logic                  [32-1:0] value       /// Two clocks after `read`, and from then on
+);
+
+
+    logic [32-1:0] scratch   ;
+    logic [32-1:0] mode      ;
+    logic [32-1:0] patterns  ;
+    logic [32-1:0] dwell     ;
+    logic [32-1:0] blank     ;
+    logic [32-1:0] latency   ;
+    logic [32-1:0] sweeps    ;
+    logic [32-1:0] frames    ;
+    logic [32-1:0] raw_length;
+    logic [32-1:0] watchdog  ;
+    logic [32-1:0] duty_limit;
+    logic [32-1:0] trip      ;
+
+    always_ff @ (posedge clk) begin
+        if (rst) begin
+            scratch    <= RESET_SCRATCH;
+            mode       <= RESET_MODE;
+            patterns   <= RESET_PATTERNS;
+            dwell      <= RESET_DWELL;
+            blank      <= RESET_BLANK;
+            latency    <= RESET_LATENCY;
+            sweeps     <= RESET_SWEEPS;
+            frames     <= RESET_FRAMES;
+            raw_length <= RESET_RAW_LENGTH;
+            watchdog   <= RESET_WATCHDOG;
+            duty_limit <= RESET_DUTY_LIMIT;
+            trip       <= RESET_OVER_RANGE_TRIP;
+        end else if (write) begin
+            case (32'(address)) inside
+                ADDRESS_SCRATCH        : scratch    <= data;
+                ADDRESS_MODE           : mode       <= data;
+                ADDRESS_PATTERNS       : patterns   <= data;
+                ADDRESS_DWELL          : dwell      <= data;
+                ADDRESS_BLANK          : blank      <= data;
+                ADDRESS_LATENCY        : latency    <= data;
+                ADDRESS_SWEEPS         : sweeps     <= data;
+                ADDRESS_FRAMES         : frames     <= data;
+                ADDRESS_RAW_LENGTH     : raw_length <= data;
+                ADDRESS_WATCHDOG       : watchdog   <= data;
+                ADDRESS_DUTY_LIMIT     : duty_limit <= data;
+                ADDRESS_OVER_RANGE_TRIP: trip       <= data;
+                default                : begin
+                end
+            endcase
+        end
+    end
+
+    // The verdict stands a few clocks after a write, long before the next access can ask for it.
+    localparam logic [32-1:0] DEFINED = MODE_DIFFERENTIAL | MODE_ORDER_SEQUENCY | MODE_ORDER_TABLE | MODE_TEST_SOURCE;
+    logic [10-1:0] good   ;
+
+    always_ff @ (posedge clk) begin
+        if (rst) begin
+            good     <= 0;
+            in_range <= 0;
+        end else begin
+            good[0]  <= (mode & ~DEFINED) == 0;
+            good[1]  <= patterns != 0 && patterns <= PATTERNS;
+            good[2]  <= dwell != 0 && dwell[31:16] == 0;
+            good[3]  <= blank < dwell;
+            good[4]  <= latency <= LATENCY_MAX;
+            good[5]  <= sweeps != 0;
+            good[6]  <= raw_length != 0 && raw_length <= RAW_SAMPLES_MAX;
+            good[7]  <= watchdog != 0;
+            good[8]  <= watchdog <= WATCHDOG_MAX;
+            good[9]  <= duty_limit <= DUTY_LIMIT_MAX;
+            in_range <= &good;
+        end
+    end
+
+    // Worked out ahead of the copy, for the same reason.
+    nirspi_types::Settings next;
+
+    always_ff @ (posedge clk) begin
+        next.raw              <= 0;
+        next.order_table      <= (mode & MODE_ORDER_TABLE) != 0;
+        next.order_sequency   <= (mode & MODE_ORDER_SEQUENCY) != 0;
+        next.differential     <= (mode & MODE_DIFFERENTIAL) != 0;
+        next.test_source      <= (mode & MODE_TEST_SOURCE) != 0;
+        next.patterns         <= patterns[10:0];
+        next.patterns_less_1  <= patterns[9:0] - 1;
+        next.single_pattern   <= patterns == 1;
+        next.dwell_less_1     <= dwell[15:0] - 1;
+        next.single_clock     <= dwell == 1;
+        next.blank            <= blank[15:0];
+        next.unblanked        <= blank == 0;
+        next.latency          <= latency[5:0];
+        next.sweeps           <= sweeps;
+        next.sweeps_less_1    <= sweeps - 1;
+        next.single_sweep     <= sweeps == 1;
+        next.frames_less_1    <= frames - 1;
+        next.single_frame     <= frames == 1;
+        next.endless          <= frames == 0;
+        next.raw_less_1       <= raw_length[11:0] - 1;
+        next.watchdog_less_1  <= watchdog[26:0] - 1;
+        next.duty_limit       <= duty_limit[20:0];
+        next.trips_over_range <= trip != 0;
+        next.over_range_trip  <= trip;
+    end
+
+    always_ff @ (posedge clk) begin
+        if (rst) begin
+            settings <= nirspi_types::Settings'(0);
+        end else if (copy) begin
+            settings         <= next;
+            settings.raw     <= copy_raw;
+            settings.endless <= next.endless || copy_raw;
+        end
+    end
+
+    // Which word is asked for, worked out while the access waits.
+    logic [15-1:0] asked      ;
+    logic [5-1:0]  asked_live ;
+    logic          asked_table;
+
+    always_ff @ (posedge clk) begin
+        asked[0]      <= 32'(address) == ADDRESS_IDENTITY;
+        asked[1]      <= 32'(address) == ADDRESS_VERSION;
+        asked[2]      <= 32'(address) == ADDRESS_SCRATCH;
+        asked[3]      <= 32'(address) == ADDRESS_MODE;
+        asked[4]      <= 32'(address) == ADDRESS_PATTERNS;
+        asked[5]      <= 32'(address) == ADDRESS_DWELL;
+        asked[6]      <= 32'(address) == ADDRESS_BLANK;
+        asked[7]      <= 32'(address) == ADDRESS_LATENCY;
+        asked[8]      <= 32'(address) == ADDRESS_SWEEPS;
+        asked[9]      <= 32'(address) == ADDRESS_FRAMES;
+        asked[10]     <= 32'(address) == ADDRESS_RAW_LENGTH;
+        asked[11]     <= 32'(address) == ADDRESS_WATCHDOG;
+        asked[12]     <= 32'(address) == ADDRESS_DUTY_LIMIT;
+        asked[13]     <= 32'(address) == ADDRESS_OVER_RANGE_TRIP;
+        asked[14]     <= 32'(address) == ADDRESS_CLOCK_HIGH;
+        asked_live[0] <= 32'(address) == ADDRESS_STATUS;
+        asked_live[1] <= 32'(address) == ADDRESS_FAULT;
+        asked_live[2] <= 32'(address) == ADDRESS_FRAMES_MADE;
+        asked_live[3] <= 32'(address) == ADDRESS_FRAMES_LOST;
+        asked_live[4] <= 32'(address) == ADDRESS_CLOCK_LOW;
+        asked_table   <= address[15:10] == ORDER_TABLE[15:10];
+    end
+
+    // What changes by itself is held as of the clock of the read; the rest stands.
+    logic [32-1:0] clock_high;
+    logic [32-1:0] live      ;
+    logic [32-1:0] stored_0  ;
+    logic [32-1:0] stored_1  ;
+    logic [32-1:0] entry     ;
+
+    always_ff @ (posedge clk) begin
+        if (read) begin
+            live <= (status & {32{asked_live[0]}}) | (32'(fault) & {32{asked_live[1]}})
+                | (frames_made & {32{asked_live[2]}}) | (frames_lost & {32{asked_live[3]}})
+                | (clock_now[31:0] & {32{asked_live[4]}});
+        end
+        stored_0 <= (RESET_IDENTITY & {32{asked[0]}}) | (RESET_VERSION & {32{asked[1]}}) | (scratch & {32{asked[2]}})
+            | (mode & {32{asked[3]}}) | (patterns & {32{asked[4]}}) | (dwell & {32{asked[5]}})
+            | (blank & {32{asked[6]}}) | (latency & {32{asked[7]}});
+        stored_1 <= (sweeps & {32{asked[8]}}) | (frames & {32{asked[9]}}) | (raw_length & {32{asked[10]}})
+            | (watchdog & {32{asked[11]}}) | (duty_limit & {32{asked[12]}}) | (trip & {32{asked[13]}})
+            | (clock_high & {32{asked[14]}});
+        entry <= 32'(table_entry) & {32{asked_table}};
+        value <= live | stored_0 | stored_1 | entry;
+    end
+
+    always_ff @ (posedge clk) begin
+        if (rst) begin
+            clock_high <= 0;
+        end else if (read && 32'(address) == ADDRESS_CLOCK_LOW) begin
+            clock_high <= clock_now[63:32];
+        end
+    end
+endmodule

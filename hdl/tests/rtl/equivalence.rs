@@ -1,0 +1,120 @@
+//! Random scenarios through RTL and model.
+//!
+//! The one law: what is compared is counted, and a kind of event that never came up fails the test.
+
+use crate::project::Project;
+use crate::rig::{Rig, Tally, Variant};
+use crate::scenario;
+use nirspi_wire::register::{DUTY_WINDOW, Register, control, mode};
+
+/// Scenarios that one simulated FPGA lives through, one after the other.
+const SCENARIOS: u64 = 64;
+
+/// A set of scenarios: what to build, what to do.
+struct Suite {
+    variant: Variant,
+    scenario: fn(&mut Rig, u64),
+    rigs: u64,
+    scenarios: u64,
+}
+
+impl Suite {
+    fn run(&self, project: &Project, first_seed: u64) -> Result<Vec<Tally>, String> {
+        let mut tallies = Vec::new();
+        for first in (first_seed..).step_by(self.scenarios as usize).take(self.rigs as usize) {
+            let mut rig = Rig::of_variant(project, first, self.variant);
+            for seed in first..first + self.scenarios {
+                (self.scenario)(&mut rig, seed);
+                if let Some(mismatch) = rig.mismatch {
+                    return Err(format!("scenario {seed}: {mismatch}"));
+                }
+            }
+            tallies.push(rig.seen_so_far);
+        }
+        Ok(tallies)
+    }
+}
+
+fn scenarios(rigs: u64) -> Suite {
+    Suite { variant: Variant::default(), scenario: scenario::run, rigs, scenarios: SCENARIOS }
+}
+
+/// Sums of 24 bits wrap within a thousandth of a second.
+fn long_sums() -> Suite {
+    let variant = Variant { sum_bits: 24, ..Variant::default() };
+    Suite { variant, scenario: scenario::long_sums, rigs: 1, scenarios: 30 }
+}
+
+/// The RTL's clock passes 2^32, the model's a duty window, soon after reset.
+fn windows() -> Suite {
+    let window = u64::from(DUTY_WINDOW);
+    let variant =
+        Variant { begins_at: window - 4000, clock_ahead: (1 << 32) - window, ..Variant::default() };
+    Suite { variant, scenario: scenario::across_a_window, rigs: 8, scenarios: 1 }
+}
+
+/// The first difference that any scenario shows.
+pub fn difference(project: &Project) -> Option<String> {
+    [scenarios(4), long_sums(), windows()].iter().find_map(|suite| suite.run(project, 0).err())
+}
+
+fn count(tallies: &[Tally], of: impl Fn(&Tally) -> u64) -> u64 {
+    tallies.iter().map(of).sum()
+}
+
+/// `NIRSPI_RTL_SCENARIOS` asks for more of them.
+#[test]
+fn random_scenarios_agree_bit_for_bit() {
+    let asked = std::env::var("NIRSPI_RTL_SCENARIOS").ok().and_then(|n| n.parse().ok());
+    let asked: u64 = asked.unwrap_or(4 * SCENARIOS);
+    let tallies = scenarios(asked.div_ceil(SCENARIOS)).run(&Project::read(), 0);
+    let tallies = tallies.unwrap_or_else(|difference| panic!("{difference}"));
+    println!("{tallies:#?}");
+    for (what, seen) in [
+        ("lit clocks", count(&tallies, |t| t.lit_clocks)),
+        ("frames", count(&tallies, |t| t.frames)),
+        ("frames with over-range samples", count(&tallies, |t| t.frames_over_range)),
+        ("frames after a loss", count(&tallies, |t| t.frames_after_loss)),
+        ("raw bursts", count(&tallies, |t| t.bursts)),
+        ("starts", count(&tallies, |t| t.starts)),
+        ("starts refused", count(&tallies, |t| t.starts_refused)),
+        ("runs stopped", count(&tallies, |t| t.stops)),
+        ("watchdog trips", count(&tallies, |t| t.faults[1])),
+        ("duty trips", count(&tallies, |t| t.faults[2])),
+        ("over-range trips", count(&tallies, |t| t.faults[3])),
+        ("interlock trips", count(&tallies, |t| t.faults[4])),
+    ] {
+        assert!(seen >= 5, "only {seen} {what}");
+    }
+}
+
+#[test]
+fn sums_that_wrap_say_so_in_their_own_frame_only() {
+    let tallies = long_sums().run(&Project::read(), 0).unwrap_or_else(|d| panic!("{d}"));
+    let (frames, overflow) =
+        (count(&tallies, |t| t.frames), count(&tallies, |t| t.frames_overflow));
+    assert!(overflow >= 5 && frames - overflow >= 5, "{overflow} of {frames} frames overflowed");
+}
+
+#[test]
+fn duty_windows_and_both_words_of_the_clock_agree() {
+    let tallies = windows().run(&Project::read(), 0).unwrap_or_else(|d| panic!("{d}"));
+    assert!(count(&tallies, |t| t.faults[2]) >= 5 && count(&tallies, |t| t.faults[0]) >= 5);
+}
+
+/// What the instrument is for: 1024 patterns and complements of 5 clocks, once, read by four lines.
+#[test]
+fn a_whole_differential_sweep_agrees() {
+    let mut rig = Rig::new(&Project::read(), 1);
+    rig.interlock(true);
+    rig.wait_adc(100);
+    rig.set(Register::Mode, mode::DIFFERENTIAL | mode::ORDER_SEQUENCY);
+    rig.set(Register::Frames, 1);
+    let started = std::time::Instant::now();
+    rig.set(Register::Control, control::START);
+    rig.wait_adc(2 * 1024 * 5 + 100);
+    rig.stream(false, usize::MAX);
+    println!("simulated and read out in {:?}", started.elapsed());
+    assert_eq!(rig.mismatch, None);
+    assert_eq!((rig.seen_so_far.frames, rig.seen_so_far.lit_clocks), (1, 2 * 1024 * 5));
+}

@@ -1,0 +1,246 @@
+//! Random runs of the camera: settings, deeds of the host, accidents.
+//!
+//! The one law: a seed gives the same scenario for ever, whatever the RTL answers.
+
+use crate::rig::{Port, Rig};
+use nirspi_wire::register::{DUTY_LIMIT_MAX, ORDER_TABLE, Register as R, control, mode};
+
+/// Random numbers (SplitMix64).
+pub struct Dice(u64);
+
+impl Dice {
+    pub fn new(seed: u64) -> Self {
+        Self(seed)
+    }
+
+    pub fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ (z >> 31)
+    }
+
+    /// From `low` to `high`, both included.
+    pub fn range(&mut self, low: u64, high: u64) -> u64 {
+        low + self.next() % (high - low + 1)
+    }
+
+    /// True once in `n`.
+    pub fn once_in(&mut self, n: u64) -> bool {
+        self.next().is_multiple_of(n)
+    }
+
+    pub fn pick<T: Copy>(&mut self, from: &[T]) -> T {
+        from[self.range(0, from.len() as u64 - 1) as usize]
+    }
+}
+
+/// Clocks of the ADC that a frame may take at most.
+const FRAME_CLOCKS: u64 = 6000;
+
+/// Writes settings, a valid set but for once in sixteen; gives the clocks of a frame.
+fn set_up(rig: &mut Rig, dice: &mut Dice) -> u64 {
+    let patterns = match dice.range(0, 9) {
+        0..=3 => dice.range(1, 3),
+        4..=8 => dice.range(1, 24),
+        _ => dice.range(1, 1024),
+    };
+    let dwell = if dice.once_in(3) { 1 } else { dice.range(1, 9) };
+    let dwell = if dice.once_in(12) { dice.range(1, FRAME_CLOCKS / patterns) } else { dwell };
+    let dwell = dwell.min(FRAME_CLOCKS / patterns).max(1);
+    let sweeps = dice.range(1, (FRAME_CLOCKS / (patterns * dwell)).clamp(1, 5));
+    let differential = dice.once_in(2);
+    let mut bits = if differential { mode::DIFFERENTIAL } else { 0 };
+    bits |= match dice.range(0, 3) {
+        0 => 0,
+        1 => mode::ORDER_SEQUENCY,
+        2 => mode::ORDER_TABLE,
+        _ => mode::ORDER_TABLE | mode::ORDER_SEQUENCY,
+    };
+    bits |= if dice.once_in(8) { mode::TEST_SOURCE } else { 0 };
+    if bits & mode::ORDER_TABLE != 0 {
+        for i in 0..patterns.min(24) {
+            let entry = if dice.once_in(8) { 0 } else { dice.next() as u32 };
+            rig.write(ORDER_TABLE + i as u16, entry);
+        }
+    }
+    rig.set(R::Mode, bits);
+    rig.set(R::Patterns, patterns as u32);
+    rig.set(R::Dwell, dwell as u32);
+    rig.set(R::Blank, if dice.once_in(3) { 0 } else { dice.range(0, dwell - 1) as u32 });
+    rig.set(
+        R::Latency,
+        if dice.once_in(4) { dice.pick(&[0, 1, 63]) } else { dice.range(0, 63) as u32 },
+    );
+    rig.set(R::Sweeps, sweeps as u32);
+    rig.set(R::Frames, if dice.once_in(3) { 0 } else { dice.range(1, 20) as u32 });
+    rig.set(R::RawLength, if dice.once_in(8) { 4096 } else { dice.range(1, 200) as u32 });
+    let frame = patterns * dwell * sweeps * if differential { 2 } else { 1 };
+    let watchdog = if dice.once_in(6) { dice.range(1, 3000) as u32 } else { 20_000 };
+    rig.set(R::Watchdog, watchdog);
+    let spent = dice.range(0, 2 * frame) as u32;
+    rig.set(
+        R::DutyLimit,
+        if dice.once_in(6) { dice.pick(&[0, 1, 2, spent]) } else { DUTY_LIMIT_MAX },
+    );
+    let trip = dice.range(1, 40) as u32;
+    rig.set(R::OverRangeTrip, if dice.once_in(4) { trip } else { 0 });
+    if dice.once_in(16) {
+        let (register, value) = dice.pick(&[
+            (R::Mode, 1 << 4),
+            (R::Patterns, 1025),
+            (R::Patterns, 0),
+            (R::Dwell, 0),
+            (R::Dwell, 1 << 16),
+            (R::Blank, dwell as u32),
+            (R::Latency, 64),
+            (R::Sweeps, 0),
+            (R::RawLength, 4097),
+            (R::RawLength, 0),
+            (R::Watchdog, 0),
+            (R::Watchdog, 125_000_001),
+            (R::DutyLimit, DUTY_LIMIT_MAX + 1),
+        ]);
+        rig.set(register, value);
+    }
+    frame
+}
+
+/// Something that the host, or the world, does to a running camera.
+fn deed(rig: &mut Rig, dice: &mut Dice, frame: u64) {
+    match dice.range(0, 25) {
+        0..=3 => rig.wait_adc(dice.range(0, 2 * frame + 100)),
+        4 => rig.wait_adc(dice.range(0, 100)),
+        5..=9 => {
+            rig.stream(false, usize::MAX);
+            if !dice.once_in(5) {
+                rig.set(R::Control, control::RELEASE);
+            }
+        }
+        10 => rig.stream(false, dice.range(1, 60) as usize),
+        11 => rig.stream(true, if dice.once_in(3) { usize::MAX } else { 40 }),
+        12..=14 => {
+            let register = dice.pick(R::ALL);
+            rig.read(register.address());
+        }
+        15 => {
+            rig.read(dice.pick(&[
+                ORDER_TABLE,
+                ORDER_TABLE + 3,
+                ORDER_TABLE + 1023,
+                0x800,
+                0x17,
+                6,
+            ]));
+        }
+        16 => rig.set(R::Control, dice.range(0, 31) as u32),
+        17 => rig.set(R::Control, control::RELEASE),
+        18 => rig.write(ORDER_TABLE + dice.range(0, 5) as u16, dice.next() as u32),
+        19 => {
+            let register =
+                dice.pick(&[R::Patterns, R::Dwell, R::Blank, R::Sweeps, R::Mode, R::Latency]);
+            rig.set(register, dice.range(0, 8) as u32);
+        }
+        20 => rig.write_cut_short(R::Control.address(), control::STOP),
+        21 if dice.once_in(3) => {
+            rig.interlock(false);
+            rig.wait(dice.range(0, 60) as u32);
+            rig.interlock(true);
+            rig.wait(dice.range(0, 60) as u32);
+        }
+        21 => rig.write(dice.pick(&[0, 1, 2, 5, 0x800, 0xFFFF]), dice.next() as u32),
+        22 | 23 => rig.set(R::Control, control::START),
+        _ => rig.set(R::Control, control::CLEAR_FAULT | control::START),
+    }
+}
+
+/// One configuration, started, lived through and read out.
+pub fn run(rig: &mut Rig, seed: u64) {
+    let dice = &mut Dice::new(seed);
+    rig.port = Port {
+        host_ps: dice.pick(&[10_000, 8_000, 7_000, 13_000]),
+        half: dice.pick(&[3, 3, 4]),
+        quad: !dice.once_in(8),
+    };
+    rig.over_range_rate = dice.pick(&[0, 1, 8, 64, 255]);
+    rig.interlock(!dice.once_in(32));
+    let frame = set_up(rig, dice);
+    let start = if dice.once_in(5) { control::START_RAW } else { control::START };
+    rig.set(R::Control, control::STOP | control::CLEAR_FAULT | start);
+    for _ in 0..dice.range(1, 12) {
+        deed(rig, dice, frame);
+        if rig.mismatch.is_some() {
+            return;
+        }
+    }
+    rig.interlock(true);
+    rig.wait_adc(dice.range(0, frame + 100));
+    for register in [R::Status, R::Fault, R::FramesMade, R::FramesLost, R::ClockLow, R::ClockHigh] {
+        rig.read(register.address());
+    }
+    rig.stream(false, usize::MAX);
+    rig.stream(true, 100);
+}
+
+/// Patterns, dwell and complements that bring a sum back after 1 to 6 clocks and after many.
+const RETURNS: [(u64, u64, bool); 10] = [
+    (1, 1, false),
+    (2, 1, false),
+    (1, 1, true),
+    (1, 2, false),
+    (3, 1, false),
+    (2, 1, true),
+    (5, 1, false),
+    (3, 1, true),
+    (7, 1, false),
+    (2, 300, true),
+];
+
+/// Frames of few patterns with sums of about `2^sum_bits`.
+pub fn long_sums(rig: &mut Rig, seed: u64) {
+    let dice = &mut Dice::new(seed);
+    rig.interlock(true);
+    rig.fade = 13;
+    rig.set(R::Watchdog, 1_000_000);
+    rig.set(R::OverRangeTrip, 0);
+    let (patterns, dwell, differential) = RETURNS[(seed % RETURNS.len() as u64) as usize];
+    let samples = dice.range(1, (5 << rig.variant.sum_bits) / 8192);
+    rig.set(R::Dwell, dwell as u32);
+    rig.set(R::Blank, 0);
+    rig.set(R::Sweeps, samples.div_ceil(dwell) as u32);
+    rig.set(R::Patterns, patterns as u32);
+    rig.set(
+        R::Mode,
+        if differential { mode::DIFFERENTIAL | mode::ORDER_TABLE } else { mode::ORDER_TABLE },
+    );
+    rig.set(R::Latency, dice.range(0, 63) as u32);
+    rig.set(R::Frames, 3);
+    rig.set(R::DutyLimit, DUTY_LIMIT_MAX);
+    rig.write(ORDER_TABLE, 5);
+    rig.write(ORDER_TABLE + 1, 6);
+    rig.set(R::Control, control::STOP | control::CLEAR_FAULT | control::RELEASE | control::START);
+    for _ in 0..3 {
+        rig.wait_adc(dice.range(2, 9) * samples + 300);
+        rig.stream(false, usize::MAX);
+        rig.set(R::Control, control::RELEASE);
+    }
+}
+
+/// A run with a light budget that is spent about when a duty window ends.
+pub fn across_a_window(rig: &mut Rig, seed: u64) {
+    let dice = &mut Dice::new(seed);
+    rig.interlock(true);
+    rig.set(R::Watchdog, 1_000_000);
+    rig.set(R::Patterns, dice.range(1, 5) as u32);
+    rig.set(R::Mode, if dice.once_in(2) { mode::DIFFERENTIAL } else { 0 });
+    rig.set(R::DutyLimit, dice.range(200, 3000) as u32);
+    for _ in 0..dice.range(3, 8) {
+        rig.set(R::Control, control::STOP | control::CLEAR_FAULT | control::START);
+        rig.wait_adc(dice.range(0, 1500));
+        rig.read(R::Fault.address());
+        rig.read(R::ClockLow.address());
+        rig.read(R::ClockHigh.address());
+        rig.stream(false, usize::MAX);
+    }
+}
