@@ -1,8 +1,8 @@
 /// Accesses of the host and what they set off: starts, stops, releases.
 ///
-/// The one law: an access takes effect `DEPTH` clocks after it came in, when what was begun before it has
-/// gone through the machine; so it finds everything as the model has it at its moment. A start is followed by
-/// its first clock, which in turn is done with `DEPTH` clocks later; the next access waits for that.
+/// The one law: an access takes effect between two clocks of those being done with, on all of the machine's
+/// state at once; so it finds everything as the model has it at its moment. A start is followed by clock 0 of
+/// its run, which in turn is done with `DEPTH` clocks later; the next access waits for that.
 module nirspi_control
     import nirspi_register_map::*;
 (
@@ -39,7 +39,7 @@ module nirspi_control
 );
 
 
-    localparam int unsigned ANSWER = 2 * nirspi_types::DEPTH + 6;
+    localparam int unsigned ANSWER = nirspi_types::DEPTH + 6;
 
     // The age of the access under way.
     logic [6-1:0] age ;
@@ -52,7 +52,7 @@ module nirspi_control
             access   <= 0;
             answered <= 0;
         end else begin
-            access   <= busy && age == 6'((nirspi_types::DEPTH - 2));
+            access   <= busy && age == 0;
             answered <= busy && age == 6'(ANSWER);
             if (request) begin
                 busy <= 1;

@@ -4,17 +4,16 @@
 /// limit leaves is kept beside it, with its signs after 0, 1 and 2 more worked out a clock before they are
 /// asked for.
 module nirspi_duty (
-    input  var logic                          clk         ,
-    input  var logic                          rst         ,
-    input  var nirspi_types::Settings         settings    ,
-    input  var logic                          window_first, /// This clock is the first of a window
-    input  var logic                          running     ,
-    input  var logic                          spends      , /// This clock is one of a run and counts
-    input  var logic                  [2-1:0] half_arrays , /// Lit in this clock: 0, 1 or 2
-    output var logic                          exceeded     /// With this clock, were it to count
+    input  var logic          clk         ,
+    input  var logic          rst         ,
+    input  var logic [21-1:0] limit       , /// Changes only between runs
+    input  var logic          window_first, /// This clock is the first of a window
+    input  var logic          running     ,
+    input  var logic          spends      , /// This clock is one of a run and counts
+    input  var logic [2-1:0]  half_arrays , /// Lit in this clock: 0, 1 or 2
+    output var logic          exceeded     /// With this clock, were it to count
 );
     logic [22-1:0] spent  ;
-    logic [22-1:0] limit  ;
     logic [22-1:0] rest   ; // two's complement
     logic          below_0;
     logic          below_1;
@@ -25,11 +24,9 @@ module nirspi_duty (
     logic [22-1:0] base   ;
     logic [22-1:0] cost   ;
 
-    always_comb limit = 22'(settings.duty_limit);
-
     always_comb begin
         if (window_first) begin
-            exceeded = 22'(half_arrays) > limit;
+            exceeded = 21'(half_arrays) > limit;
         end else if (half_arrays[1]) begin
             exceeded = below_2;
         end else if (half_arrays[0]) begin
@@ -41,7 +38,7 @@ module nirspi_duty (
 
     always_comb begin
         // A limit set anew is taken between runs, from what is spent by then.
-        base   = ((window_first || !running) ? ( limit ) : ( rest ));
+        base   = ((window_first || !running) ? ( 22'(limit) ) : ( rest ));
         cost   = ((running) ? ( 22'(half_arrays) ) : ( (((window_first) ? ( 0 ) : ( spent ))) ));
         after  = base - cost;
         less_1 = after - 1;

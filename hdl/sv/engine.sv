@@ -218,14 +218,15 @@ module nirspi_engine
         .host_word    (raw_word  )
     );
     nirspi_over_counter over (
-        .clk      (clk                           ),
-        .rst      (rst                           ),
-        .settings (settings                      ),
-        .counts   (place.active || raw_active    ),
-        .first    (place.frame_first || raw_first),
-        .over     (sample.over_range             ),
-        .count    (over_count                    ),
-        .reached  (over_trips                    )
+        .clk     (clk                           ),
+        .rst     (rst                           ),
+        .trips   (settings.trips_over_range     ),
+        .trip    (settings.over_range_trip      ),
+        .counts  (place.active || raw_active    ),
+        .first   (place.frame_first || raw_first),
+        .over    (sample.over_range             ),
+        .count   (over_count                    ),
+        .reached (over_trips                    )
     );
 
     // Done with.

@@ -3,14 +3,15 @@
 /// The one law: the count is that of the frame's samples so far, this one included, and stops at its largest
 /// value. Stage 0 is the clock of the sample; count and comparison are ready in stage 5.
 module nirspi_over_counter (
-    input  var logic                           clk     ,
-    input  var logic                           rst     ,
-    input  var nirspi_types::Settings          settings,
-    input  var logic                           counts  , /// Stage 0: light has arrived
-    input  var logic                           first   , /// Stage 0: first sample of the frame or burst
-    input  var logic                           over    , /// Stage 0
-    output var logic                  [32-1:0] count   , /// Stage 5
-    output var logic                           reached  /// Stage 5: the trip
+    input  var logic          clk    ,
+    input  var logic          rst    ,
+    input  var logic          trips  , /// There is a trip
+    input  var logic [32-1:0] trip   ,
+    input  var logic          counts , /// Stage 0: light has arrived
+    input  var logic          first  , /// Stage 0: first sample of the frame or burst
+    input  var logic          over   , /// Stage 0
+    output var logic [32-1:0] count  , /// Stage 5
+    output var logic          reached /// Stage 5: the trip
 );
     logic [3-1:0]  counts_1;
     logic [2-1:0]  first_1 ;
@@ -31,7 +32,7 @@ module nirspi_over_counter (
             reached  <= 0;
         end else begin
             counts_1 <= {counts_1[1:0], counts};
-            hit_4    <= counts_1[2] && settings.trips_over_range && fits >= settings.over_range_trip;
+            hit_4    <= counts_1[2] && trips && fits >= trip;
             reached  <= hit_4;
         end
     end

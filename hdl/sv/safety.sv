@@ -29,22 +29,22 @@ module nirspi_safety (
     logic dropped ;
 
     nirspi_duty budget (
-        .clk          (clk         ),
-        .rst          (rst         ),
-        .settings     (settings    ),
-        .window_first (window_first),
-        .running      (running     ),
-        .spends       (counts      ),
-        .half_arrays  (half_arrays ),
-        .exceeded     (exceeded    )
+        .clk          (clk                ),
+        .rst          (rst                ),
+        .limit        (settings.duty_limit),
+        .window_first (window_first       ),
+        .running      (running            ),
+        .spends       (counts             ),
+        .half_arrays  (half_arrays        ),
+        .exceeded     (exceeded           )
     );
     nirspi_watchdog dog (
-        .clk      (clk     ),
-        .rst      (rst     ),
-        .settings (settings),
-        .arrives  (arrives ),
-        .feed     (feed    ),
-        .barks    (barks   )
+        .clk     (clk                     ),
+        .rst     (rst                     ),
+        .less_1  (settings.watchdog_less_1),
+        .arrives (arrives                 ),
+        .feed    (feed                    ),
+        .barks   (barks                   )
     );
 
     always_comb opens  = running && !interlock_closed;

@@ -2,12 +2,12 @@
 ///
 /// The one law: only clocks of a run count, and any access starts the count again.
 module nirspi_watchdog (
-    input  var logic                  clk     ,
-    input  var logic                  rst     ,
-    input  var nirspi_types::Settings settings,
-    input  var logic                  arrives , /// The next clock is the first of a run
-    input  var logic                  feed    , /// An access comes before this clock
-    output var logic                  barks    /// With this clock, if it is one of a run
+    input  var logic          clk    ,
+    input  var logic          rst    ,
+    input  var logic [27-1:0] less_1 , /// The setting less 1; changes only between runs
+    input  var logic          arrives, /// The next clock is the first of a run
+    input  var logic          feed   , /// An access comes before this clock
+    output var logic          barks   /// With this clock, if it is one of a run
 );
     logic [27-1:0] left   ;
     logic          last   ;
@@ -27,9 +27,9 @@ module nirspi_watchdog (
             at_once <= 0;
         end else begin
             first   <= arrives;
-            at_once <= settings.watchdog_less_1 == 0;
-            left    <= (((renewed) ? ( settings.watchdog_less_1 ) : ( left ))) - 1;
-            last    <= (((renewed) ? ( settings.watchdog_less_1 ) : ( left ))) == 1;
+            at_once <= less_1 == 0;
+            left    <= (((renewed) ? ( less_1 ) : ( left ))) - 1;
+            last    <= (((renewed) ? ( less_1 ) : ( left ))) == 1;
         end
     end
 endmodule

@@ -42,7 +42,7 @@ fn scenarios(rigs: u64) -> Suite {
 /// Sums of 24 bits wrap within a thousandth of a second.
 fn long_sums() -> Suite {
     let variant = Variant { sum_bits: 24, ..Variant::default() };
-    Suite { variant, scenario: scenario::long_sums, rigs: 1, scenarios: 12 }
+    Suite { variant, scenario: scenario::long_sums, rigs: 1, scenarios: 30 }
 }
 
 /// The RTL's clock passes 2^32, the model's a duty window, soon after reset.
@@ -91,7 +91,8 @@ fn random_scenarios_agree_bit_for_bit() {
 #[test]
 fn sums_that_wrap_say_so_in_their_own_frame_only() {
     let tallies = long_sums().run(&Project::read(), 0).unwrap_or_else(|d| panic!("{d}"));
-    let (frames, overflow) = (count(&tallies, |t| t.frames), count(&tallies, |t| t.frames_overflow));
+    let (frames, overflow) =
+        (count(&tallies, |t| t.frames), count(&tallies, |t| t.frames_overflow));
     assert!(overflow >= 5 && frames - overflow >= 5, "{overflow} of {frames} frames overflowed");
 }
 

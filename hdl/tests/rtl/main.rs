@@ -1,11 +1,14 @@
 //! The RTL against the golden model.
 #![expect(clippy::unwrap_used, reason = "a failed unwrap in a helper fails its test")]
 
+mod bench;
 mod equivalence;
+mod host;
 mod map;
+mod modules;
+mod mutation;
 mod pins;
 mod project;
 mod rig;
 mod scenario;
 mod stale;
-

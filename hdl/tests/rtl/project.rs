@@ -56,7 +56,8 @@ impl Project {
         let mut parsed = Vec::new();
         for (name, text) in &self.0 {
             let path = folder("rtl").join(format!("{name}.veryl"));
-            let parser = Parser::parse(text, &path).unwrap_or_else(|e| panic!("{name}: {:?}", miette::Report::from(e)));
+            let parser = Parser::parse(text, &path)
+                .unwrap_or_else(|e| panic!("{name}: {:?}", miette::Report::from(e)));
             errors.extend(analyzer.analyze_pass1("nirspi", &parser.veryl));
             parsed.push((name.as_str(), text.as_str(), parser));
         }

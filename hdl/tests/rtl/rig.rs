@@ -13,7 +13,6 @@ use nirspi_hdl::{AdcSample, Gateware, Lines};
 use nirspi_wire::{
     FrameFlags, crc32,
     fpga::{FpgaFrame, Sums},
-    host_port,
     register::{Register, control},
 };
 use std::collections::VecDeque;
@@ -35,7 +34,7 @@ const TRIP_CLOCKS: u64 = 7;
 
 /// What the host asks for.
 #[derive(Debug, Clone, Copy)]
-enum Access {
+pub(crate) enum Access {
     Write(u16, u32),
     Read(u16),
     Frame,
@@ -44,7 +43,7 @@ enum Access {
 
 /// What the model answers.
 #[derive(Debug, Clone, PartialEq, Eq)]
-enum Answer {
+pub(crate) enum Answer {
     Value(u32),
     Bytes(Vec<u8>),
 }
@@ -60,13 +59,15 @@ pub struct Port {
 }
 
 pub struct Rig {
-    pins: Pins,
+    pub(crate) pins: Pins,
     pub model: Gateware,
     pub port: Port,
     seed: u64,
     /// Over-range samples in 256.
     pub over_range_rate: u8,
-    clock: u64,
+    /// Codes fade to an eighth and come back; the logarithm of a quarter of the period, in clocks.
+    pub fade: u32,
+    pub(crate) clock: u64,
     next_adc_ps: u64,
     next_host_ps: u64,
     seen: VecDeque<Seen>,
@@ -75,8 +76,8 @@ pub struct Rig {
     dark: std::ops::Range<u64>,
     /// It has, and no run has begun since.
     put_out: bool,
-    asked: Option<Access>,
-    answer: Option<Answer>,
+    pub(crate) asked: Option<Access>,
+    pub(crate) answer: Option<Answer>,
     start: Option<(u64, u32)>,
     grace: u64,
     /// What the model was last told, for the report of a difference.
@@ -125,7 +126,7 @@ pub struct Tally {
 struct Seen {
     sample: AdcSample,
     leds: Lines,
-    /// The interlock pin may have put the LEDs out.
+    /// The interlock pin has put the LEDs out.
     put_out: bool,
 }
 
@@ -146,6 +147,7 @@ impl Rig {
             port: Port { host_ps: 10_000, half: 3, quad: true },
             seed,
             over_range_rate: 0,
+            fade: 63,
             clock: 0,
             next_adc_ps: 0,
             next_host_ps: 1,
@@ -170,9 +172,11 @@ impl Rig {
         let half = format!("param HALF: u32 = {}", variant.sum_bits / 2);
         let clock = variant.begins_at.wrapping_add(variant.clock_ahead);
         let reset = format!("clock_now    = 64'd{clock} - (types::DEPTH as 64);");
-        let project = project
-            .with("accumulators", "param HALF: u32 = 24", &half)
-            .with("engine", "clock_now    = -(types::DEPTH as 64);", &reset);
+        let project = project.with("accumulators", "param HALF: u32 = 24", &half).with(
+            "engine",
+            "clock_now    = -(types::DEPTH as 64);",
+            &reset,
+        );
         let mut rig = Self { variant, ..Self::new(&project, seed) };
         for _ in 0..variant.begins_at {
             rig.model.tick(AdcSample::default());
@@ -209,7 +213,8 @@ impl Rig {
         match Register::at(address) {
             Some(Register::ClockLow) => {
                 let high = self.model.read(Register::ClockHigh.address()).unwrap_or(0);
-                self.clock_held = (u64::from(high) << 32 | u64::from(value)) + self.variant.clock_ahead;
+                self.clock_held =
+                    (u64::from(high) << 32 | u64::from(value)) + self.variant.clock_ahead;
                 self.clock_held as u32
             }
             Some(Register::ClockHigh) => (self.clock_held >> 32) as u32,
@@ -222,7 +227,12 @@ impl Rig {
     }
 
     /// Notes the first difference; all later ones follow from it.
-    fn expect<T: PartialEq + std::fmt::Debug>(&mut self, what: &str, rtl: &T, model: &T) {
+    pub(crate) fn expect<T: PartialEq + std::fmt::Debug>(
+        &mut self,
+        what: &str,
+        rtl: &T,
+        model: &T,
+    ) {
         if rtl != model && self.mismatch.is_none() {
             let told = Vec::from(self.told.clone()).join("\n  ");
             self.mismatch =
@@ -241,12 +251,13 @@ impl Rig {
     fn adc_clock(&mut self) {
         let now = self.clock;
         // Samples of a clock's light are at the pins with its lines.
-        let sample = sample(self.seed, self.over_range_rate, now);
+        let mut sample = sample(self.seed, self.over_range_rate, now);
+        sample.code >>= (now >> self.fade) & 3;
         self.pins.sample(sample);
         let leds = self.pins.leds();
-        if self.dark.contains(&now) {
-            self.expect("LEDs with the interlock open", &leds, &Lines::default());
-            self.put_out = true;
+        self.put_out |= self.dark.contains(&now);
+        if self.put_out {
+            self.expect("LEDs after the interlock opened", &leds, &Lines::default());
         }
         self.seen.push_back(Seen { sample, leds, put_out: self.put_out });
         if self.seen.len() as u64 > DEPTH - TO_PINS + 1 {
@@ -301,7 +312,7 @@ impl Rig {
                 self.grace = 0;
                 self.expect("LED lines going out", &leds, &expected);
             }
-        } else if !(put_out && leds == Lines::default()) {
+        } else if !put_out {
             self.expect("LED lines", &leds, &expected);
         }
         let lit = self.model.lines().enable;
@@ -348,7 +359,7 @@ impl Rig {
     }
 
     /// One clock of the host port, and those of the ADC before it.
-    fn host_clock(&mut self) {
+    pub(crate) fn host_clock(&mut self) {
         while self.next_adc_ps <= self.next_host_ps {
             self.next_adc_ps += 8000;
             self.adc_clock();
@@ -370,11 +381,6 @@ impl Rig {
         }
     }
 
-    /// Clocks of the ADC since reset.
-    pub fn clock(&self) -> u64 {
-        self.clock
-    }
-
     pub fn interlock(&mut self, closed: bool) {
         self.pins.interlock(closed);
         let at = self.clock + INTERLOCK - DEPTH;
@@ -387,133 +393,6 @@ impl Rig {
             self.dark.end = self.dark.end.min(self.clock + TO_DARK);
         } else {
             self.dark = self.clock + TO_DARK..u64::MAX;
-        }
-    }
-
-    /// One period of `sck`; what the FPGA drives as the host samples it.
-    fn sck(&mut self, lines: u8) -> (u8, u8) {
-        self.pins.drive(lines);
-        self.pins.sck(false);
-        self.wait(self.port.half);
-        let driven = self.pins.driven();
-        self.pins.sck(true);
-        self.wait(self.port.half);
-        driven
-    }
-
-    /// Sends the lowest `bits` of a word, quad or on `io0`.
-    fn send(&mut self, word: u32, bits: u32, quad: bool) {
-        let step = if quad { 4 } else { 1 };
-        for shift in (0..bits).step_by(step as usize).map(|sent| bits - step - sent) {
-            // Lines that do not matter are noise.
-            let noise = self.clock as u8 & 0xE;
-            let value = (word >> shift) as u8;
-            let (_, drive) = self.sck(if quad { value & 0xF } else { value & 1 | noise });
-            self.expect("lines driven while the host drives them", &drive, &0);
-        }
-    }
-
-    fn receive(&mut self, bits: u32) -> u32 {
-        let mut word = 0;
-        let quad = self.port.quad;
-        for _ in 0..if quad { bits / 4 } else { bits } {
-            let (lines, drive) = self.sck(self.clock as u8 & 0xD);
-            self.expect("lines driven", &drive, &if quad { 0xF } else { 2 });
-            word = if quad { word << 4 | u32::from(lines) } else { word << 1 | u32::from(lines >> 1 & 1) };
-        }
-        word
-    }
-
-    fn begin(&mut self, opcode: u8, address: u16) {
-        self.pins.sck(false);
-        self.pins.select(true);
-        let quad = self.port.quad;
-        self.send((opcode | if quad { host_port::QUAD } else { 0 }).into(), 8, false);
-        self.send(address.into(), 16, quad);
-    }
-
-    fn end(&mut self) {
-        self.pins.sck(false);
-        self.wait(self.port.half);
-        self.pins.select(false);
-        let (_, drive) = self.pins.driven();
-        self.expect("lines driven by a port not selected", &drive, &0);
-        self.wait(4);
-    }
-
-    fn dummy(&mut self) {
-        for _ in 0..host_port::DUMMY_CYCLES {
-            self.sck(0);
-        }
-    }
-
-    /// Waits out what an access still sets off.
-    fn settled(&mut self) {
-        for _ in 0..40 {
-            if self.asked.is_none() {
-                return;
-            }
-            self.host_clock();
-        }
-        self.expect("accesses that came through", &0, &1);
-        self.asked = None;
-    }
-
-    pub fn write(&mut self, address: u16, value: u32) {
-        self.asked = Some(Access::Write(address, value));
-        self.begin(host_port::WRITE_REGISTER, address);
-        let quad = self.port.quad;
-        self.send(value, 32, quad);
-        self.end();
-        self.settled();
-    }
-
-    /// A write given up before its last bit.
-    pub fn write_cut_short(&mut self, address: u16, value: u32) {
-        self.begin(host_port::WRITE_REGISTER, address);
-        let quad = self.port.quad;
-        self.send(value >> 4, 28, quad);
-        self.end();
-        self.wait(50);
-    }
-
-    pub fn set(&mut self, register: Register, value: u32) {
-        self.write(register.address(), value);
-    }
-
-    pub fn read(&mut self, address: u16) -> u32 {
-        self.asked = Some(Access::Read(address));
-        self.begin(host_port::READ_REGISTER, address);
-        self.dummy();
-        let value = self.receive(32);
-        self.end();
-        self.settled();
-        let answer = self.answer.take();
-        self.expect(&format!("register {address:#x}"), &Some(Answer::Value(value)), &answer);
-        value
-    }
-
-    /// Reads the frame or burst: all of it and some beyond, or its first bytes only.
-    pub fn stream(&mut self, raw: bool, at_most: usize) {
-        let (access, opcode) = if raw {
-            (Access::Raw, host_port::READ_RAW)
-        } else {
-            (Access::Frame, host_port::READ_FRAME)
-        };
-        self.asked = Some(access);
-        self.begin(opcode, 0);
-        self.dummy();
-        self.settled();
-        let Some(Answer::Bytes(mut expected)) = self.answer.take() else {
-            return self.expect("a stream begun", &0, &1);
-        };
-        expected.extend([0; 3]);
-        expected.truncate(at_most);
-        let bytes: Vec<u8> = expected.iter().map(|_| self.receive(8) as u8).collect();
-        self.end();
-        if let Some(at) = (0..bytes.len()).find(|&at| bytes[at] != expected[at]) {
-            let what = format!("byte {at} of {} ({})", bytes.len(), if raw { "raw" } else { "frame" });
-            self.expect(&what, &bytes[at], &expected[at]);
         }
     }
 }

@@ -69,7 +69,10 @@ fn set_up(rig: &mut Rig, dice: &mut Dice) -> u64 {
     rig.set(R::Patterns, patterns as u32);
     rig.set(R::Dwell, dwell as u32);
     rig.set(R::Blank, if dice.once_in(3) { 0 } else { dice.range(0, dwell - 1) as u32 });
-    rig.set(R::Latency, if dice.once_in(4) { dice.pick(&[0, 1, 63]) } else { dice.range(0, 63) as u32 });
+    rig.set(
+        R::Latency,
+        if dice.once_in(4) { dice.pick(&[0, 1, 63]) } else { dice.range(0, 63) as u32 },
+    );
     rig.set(R::Sweeps, sweeps as u32);
     rig.set(R::Frames, if dice.once_in(3) { 0 } else { dice.range(1, 20) as u32 });
     rig.set(R::RawLength, if dice.once_in(8) { 4096 } else { dice.range(1, 200) as u32 });
@@ -77,7 +80,10 @@ fn set_up(rig: &mut Rig, dice: &mut Dice) -> u64 {
     let watchdog = if dice.once_in(6) { dice.range(1, 3000) as u32 } else { 20_000 };
     rig.set(R::Watchdog, watchdog);
     let spent = dice.range(0, 2 * frame) as u32;
-    rig.set(R::DutyLimit, if dice.once_in(6) { dice.pick(&[0, 1, 2, spent]) } else { DUTY_LIMIT_MAX });
+    rig.set(
+        R::DutyLimit,
+        if dice.once_in(6) { dice.pick(&[0, 1, 2, spent]) } else { DUTY_LIMIT_MAX },
+    );
     let trip = dice.range(1, 40) as u32;
     rig.set(R::OverRangeTrip, if dice.once_in(4) { trip } else { 0 });
     if dice.once_in(16) {
@@ -103,7 +109,7 @@ fn set_up(rig: &mut Rig, dice: &mut Dice) -> u64 {
 
 /// Something that the host, or the world, does to a running camera.
 fn deed(rig: &mut Rig, dice: &mut Dice, frame: u64) {
-    match dice.range(0, 22) {
+    match dice.range(0, 25) {
         0..=3 => rig.wait_adc(dice.range(0, 2 * frame + 100)),
         4 => rig.wait_adc(dice.range(0, 100)),
         5..=9 => {
@@ -119,13 +125,21 @@ fn deed(rig: &mut Rig, dice: &mut Dice, frame: u64) {
             rig.read(register.address());
         }
         15 => {
-            rig.read(dice.pick(&[ORDER_TABLE, ORDER_TABLE + 3, ORDER_TABLE + 1023, 0x800, 0x17, 6]));
+            rig.read(dice.pick(&[
+                ORDER_TABLE,
+                ORDER_TABLE + 3,
+                ORDER_TABLE + 1023,
+                0x800,
+                0x17,
+                6,
+            ]));
         }
         16 => rig.set(R::Control, dice.range(0, 31) as u32),
         17 => rig.set(R::Control, control::RELEASE),
         18 => rig.write(ORDER_TABLE + dice.range(0, 5) as u16, dice.next() as u32),
         19 => {
-            let register = dice.pick(&[R::Patterns, R::Dwell, R::Blank, R::Sweeps, R::Mode, R::Latency]);
+            let register =
+                dice.pick(&[R::Patterns, R::Dwell, R::Blank, R::Sweeps, R::Mode, R::Latency]);
             rig.set(register, dice.range(0, 8) as u32);
         }
         20 => rig.write_cut_short(R::Control.address(), control::STOP),
@@ -136,7 +150,8 @@ fn deed(rig: &mut Rig, dice: &mut Dice, frame: u64) {
             rig.wait(dice.range(0, 60) as u32);
         }
         21 => rig.write(dice.pick(&[0, 1, 2, 5, 0x800, 0xFFFF]), dice.next() as u32),
-        _ => rig.set(R::Control, control::START),
+        22 | 23 => rig.set(R::Control, control::START),
+        _ => rig.set(R::Control, control::CLEAR_FAULT | control::START),
     }
 }
 
@@ -168,20 +183,37 @@ pub fn run(rig: &mut Rig, seed: u64) {
     rig.stream(true, 100);
 }
 
-/// Frames of one or two patterns with sums of about `2^sum_bits`.
+/// Patterns, dwell and complements that bring a sum back after 1 to 6 clocks and after many.
+const RETURNS: [(u64, u64, bool); 10] = [
+    (1, 1, false),
+    (2, 1, false),
+    (1, 1, true),
+    (1, 2, false),
+    (3, 1, false),
+    (2, 1, true),
+    (5, 1, false),
+    (3, 1, true),
+    (7, 1, false),
+    (2, 300, true),
+];
+
+/// Frames of few patterns with sums of about `2^sum_bits`.
 pub fn long_sums(rig: &mut Rig, seed: u64) {
     let dice = &mut Dice::new(seed);
     rig.interlock(true);
+    rig.fade = 13;
     rig.set(R::Watchdog, 1_000_000);
     rig.set(R::OverRangeTrip, 0);
-    let dwell = dice.pick(&[1, 1, 2, 7, 300]);
-    let samples = dice.range(1, (2 << rig.variant.sum_bits) / 8192);
-    let differential = dice.once_in(2);
+    let (patterns, dwell, differential) = RETURNS[(seed % RETURNS.len() as u64) as usize];
+    let samples = dice.range(1, (5 << rig.variant.sum_bits) / 8192);
     rig.set(R::Dwell, dwell as u32);
     rig.set(R::Blank, 0);
     rig.set(R::Sweeps, samples.div_ceil(dwell) as u32);
-    rig.set(R::Patterns, dice.range(1, 2) as u32);
-    rig.set(R::Mode, if differential { mode::DIFFERENTIAL | mode::ORDER_TABLE } else { mode::ORDER_TABLE });
+    rig.set(R::Patterns, patterns as u32);
+    rig.set(
+        R::Mode,
+        if differential { mode::DIFFERENTIAL | mode::ORDER_TABLE } else { mode::ORDER_TABLE },
+    );
     rig.set(R::Latency, dice.range(0, 63) as u32);
     rig.set(R::Frames, 3);
     rig.set(R::DutyLimit, DUTY_LIMIT_MAX);
@@ -189,7 +221,7 @@ pub fn long_sums(rig: &mut Rig, seed: u64) {
     rig.write(ORDER_TABLE + 1, 6);
     rig.set(R::Control, control::STOP | control::CLEAR_FAULT | control::RELEASE | control::START);
     for _ in 0..3 {
-        rig.wait_adc(4 * samples * if differential { 2 } else { 1 } / 2 + 300);
+        rig.wait_adc(dice.range(2, 9) * samples + 300);
         rig.stream(false, usize::MAX);
         rig.set(R::Control, control::RELEASE);
     }

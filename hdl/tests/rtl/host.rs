@@ -1,0 +1,141 @@
+//! The host's side of the port, as `nirspi_wire::host_port` lays it down.
+//!
+//! The one law: what the FPGA drives is looked at on every rising edge of `sck`, and compared with what the
+//! model answered to the same access.
+
+use crate::rig::{Access, Answer, Rig};
+use nirspi_wire::{host_port, register::Register};
+
+impl Rig {
+    /// One period of `sck`; what the FPGA drives as the host samples it.
+    fn sck(&mut self, lines: u8) -> (u8, u8) {
+        self.pins.drive(lines);
+        self.pins.sck(false);
+        self.wait(self.port.half);
+        let driven = self.pins.driven();
+        self.pins.sck(true);
+        self.wait(self.port.half);
+        driven
+    }
+
+    /// Sends the lowest `bits` of a word, quad or on `io0`.
+    fn send(&mut self, word: u32, bits: u32, quad: bool) {
+        let step = if quad { 4 } else { 1 };
+        for shift in (0..bits).step_by(step as usize).map(|sent| bits - step - sent) {
+            // Lines that do not matter are noise.
+            let noise = self.clock as u8 & 0xE;
+            let value = (word >> shift) as u8;
+            let (_, drive) = self.sck(if quad { value & 0xF } else { value & 1 | noise });
+            self.expect("lines driven while the host drives them", &drive, &0);
+        }
+    }
+
+    fn receive(&mut self, bits: u32) -> u32 {
+        let mut word = 0;
+        let quad = self.port.quad;
+        for _ in 0..if quad { bits / 4 } else { bits } {
+            let (lines, drive) = self.sck(self.clock as u8 & 0xD);
+            self.expect("lines driven", &drive, &if quad { 0xF } else { 2 });
+            word = if quad {
+                word << 4 | u32::from(lines)
+            } else {
+                word << 1 | u32::from(lines >> 1 & 1)
+            };
+        }
+        word
+    }
+
+    fn begin(&mut self, opcode: u8, address: u16) {
+        self.pins.sck(false);
+        self.pins.select(true);
+        let quad = self.port.quad;
+        self.send((opcode | if quad { host_port::QUAD } else { 0 }).into(), 8, false);
+        self.send(address.into(), 16, quad);
+    }
+
+    fn end(&mut self) {
+        self.pins.sck(false);
+        self.wait(self.port.half);
+        self.pins.select(false);
+        let (_, drive) = self.pins.driven();
+        self.expect("lines driven by a port not selected", &drive, &0);
+        self.wait(4);
+    }
+
+    fn dummy(&mut self) {
+        for _ in 0..host_port::DUMMY_CYCLES {
+            self.sck(0);
+        }
+    }
+
+    /// Waits out what an access still sets off.
+    fn settled(&mut self) {
+        for _ in 0..40 {
+            if self.asked.is_none() {
+                return;
+            }
+            self.host_clock();
+        }
+        self.expect("accesses that came through", &0, &1);
+        self.asked = None;
+    }
+
+    pub fn write(&mut self, address: u16, value: u32) {
+        self.asked = Some(Access::Write(address, value));
+        self.begin(host_port::WRITE_REGISTER, address);
+        let quad = self.port.quad;
+        self.send(value, 32, quad);
+        self.end();
+        self.settled();
+    }
+
+    /// A write given up before its last bit.
+    pub fn write_cut_short(&mut self, address: u16, value: u32) {
+        self.begin(host_port::WRITE_REGISTER, address);
+        let quad = self.port.quad;
+        self.send(value >> 4, 28, quad);
+        self.end();
+        self.wait(50);
+    }
+
+    pub fn set(&mut self, register: Register, value: u32) {
+        self.write(register.address(), value);
+    }
+
+    pub fn read(&mut self, address: u16) -> u32 {
+        self.asked = Some(Access::Read(address));
+        self.begin(host_port::READ_REGISTER, address);
+        self.dummy();
+        let value = self.receive(32);
+        self.end();
+        self.settled();
+        let answer = self.answer.take();
+        self.expect(&format!("register {address:#x}"), &Some(Answer::Value(value)), &answer);
+        value
+    }
+
+    /// Reads the frame or burst: all of it and some beyond, or its first bytes only.
+    pub fn stream(&mut self, raw: bool, at_most: usize) {
+        let (access, opcode) = if raw {
+            (Access::Raw, host_port::READ_RAW)
+        } else {
+            (Access::Frame, host_port::READ_FRAME)
+        };
+        self.asked = Some(access);
+        self.begin(opcode, 0);
+        self.dummy();
+        self.settled();
+        let Some(Answer::Bytes(mut expected)) = self.answer.take() else {
+            return self.expect("a stream begun", &0, &1);
+        };
+        expected.extend([0; 3]);
+        expected.truncate(at_most);
+        let bytes: Vec<u8> = expected.iter().map(|_| self.receive(8) as u8).collect();
+        self.end();
+        if let Some(at) = (0..bytes.len()).find(|&at| bytes[at] != expected[at]) {
+            let what =
+                format!("byte {at} of {} ({})", bytes.len(), if raw { "raw" } else { "frame" });
+            self.expect(&what, &bytes[at], &expected[at]);
+        }
+    }
+}

@@ -1,0 +1,114 @@
+//! Deliberate faults in the RTL, each of which the equivalence runs must see.
+//!
+//! The one law: a fault is one substitution of text that still passes the analyser; a fault that nobody sees
+//! fails the test.
+
+use crate::equivalence;
+use crate::project::Project;
+
+/// What is broken, in which file, what stands there, what stands there instead.
+type Fault = (&'static str, &'static str, &'static str, &'static str);
+
+/// The faults.
+#[rustfmt::skip]
+const FAULTS: &[Fault] = &[
+    ("a slot is a clock short", "registers", "next.dwell_less_1     = dwell[15:0] - 1;", "next.dwell_less_1     = dwell[15:0] - 2;"),
+    ("dwell 1 is not known", "registers", "next.single_clock     = dwell == 1;", "next.single_clock     = 0;"),
+    ("the window opens a clock early", "sequencer", "counts     = counts || skip_left == 1;", "counts     = counts || skip_left == 2;"),
+    ("the first sample of an unblanked slot is left out", "registers", "next.unblanked        = blank == 0;", "next.unblanked        = 0;"),
+    ("latency is one clock less", "window", "assign arrives = waiting && left == 0;", "assign arrives = waiting && (left == 1 || settings.latency == 0);"),
+    ("latency drops its top bit", "registers", "next.latency          = latency[5:0];", "next.latency          = {1'b0, latency[4:0]};"),
+    ("the sample is taken a clock late", "source", "sample = pins;", "sample.code = pins.code + 0; sample.over_range = over_range;"),
+    ("complements are not inverted", "leds", "sign_lines(pattern[9:5]) ^ {inverted[2] repeat 32}", "sign_lines(pattern[9:5])"),
+    ("complements invert a clock late", "leds", "{inverted[2] repeat 32}", "{inverted[3] repeat 32}"),
+    ("rows and columns are swapped", "leds", "sign_lines(pattern[4:0]);", "sign_lines(pattern[9:5]);"),
+    ("sequency order is not Gray", "leds", "gray = index_2 ^ (index_2 >> 1);", "gray = index_2;"),
+    ("sequency wins over the table", "leds", "if settings.order_table {", "if settings.order_table && !settings.order_sequency {"),
+    ("the halves are swapped", "formatter", "assign sum_address = {negative, index};", "assign sum_address = {~negative, index};"),
+    ("the banks are swapped for the host", "accumulators", "host_word = if filling ? word[0] : word[1];", "host_word = if filling ? word[1] : word[0];"),
+    ("the first sweep adds to the last frame", "accumulators", "if first_2 {", "if 1'b0 {"),
+    ("a first sweep takes what an older slot left", "accumulators", "&& address[d + 1] == address[1] && !first_1;", "&& address[d + 1] == address[1];"),
+    ("no forwarding from 1 clock ago, low", "accumulators", "if again_3[1] ? low_4[HALF - 1:0] : low_3", "if 1'b0 ? low_4[HALF - 1:0] : low_3"),
+    ("no forwarding from 1 clock ago, high", "accumulators", "if again_4 ? high_5 : high_4", "if 1'b0 ? high_5 : high_4"),
+    ("no forwarding from 2 clocks ago, low", "accumulators", "{high_3, low_3} = {high_5, low_4[HALF - 1:0]};", "{high_3, low_3} = fetched;"),
+    ("no forwarding from 2 clocks ago, high", "accumulators", "high_4 = if again_3[2] ? high_5 : high_3;", "high_4 = high_3;"),
+    ("no forwarding from 3 clocks ago", "accumulators", "{high_3, low_3} = {high_5, low_5};", "{high_3, low_3} = fetched;"),
+    ("no forwarding from 4 clocks ago", "accumulators", "{high_3, low_3} = word_6;", "{high_3, low_3} = fetched;"),
+    ("no forwarding from 5 clocks ago", "accumulators", "{high_3, low_3} = word_7;", "{high_3, low_3} = fetched;"),
+    ("the carry between the halves is lost", "accumulators", "sum_4 as CARRY + low_4[HALF] as CARRY;", "sum_4 as CARRY;"),
+    ("overflow is not seen", "accumulators", "wrapped = total[HALF];", "wrapped = 0;"),
+    ("overflow sticks to the next frame", "frames", "            wrapped = 0;\n            made    = made + 1;", "            made    = made + 1;"),
+    ("a slot's sum goes on into the next", "window", "(if place.slot_first ? 0 : sum)", "sum"),
+    ("one sweep too many", "registers", "next.sweeps_less_1    = sweeps - 1;", "next.sweeps_less_1    = sweeps;"),
+    ("a run has a frame too many", "registers", "next.frames_less_1    = frames - 1;", "next.frames_less_1    = frames;"),
+    ("one pattern too many", "sequencer", "index_last = if index_last ? settings.single_pattern : index_left == 1;", "index_last = if index_last ? settings.single_pattern : index_left == 0;"),
+    ("a held frame is overwritten", "frames", "assign held = ready && !give_back;", "assign held = 0;"),
+    ("a lost frame is not counted", "frames", "lost       = lost + 1;", "lost       = lost;"),
+    ("no frame says that one was lost", "frames", "                after_loss = 1;", "                after_loss = 0;"),
+    ("counters of the last run stay", "frames", "            ready      = 0;\n            made       = 0;\n            lost       = 0;\n            wrapped    = 0;\n            after_loss = 0;\n        } else if done", "            ready      = 0;\n            lost       = 0;\n            wrapped    = 0;\n            after_loss = 0;\n        } else if done"),
+    ("a frame of the last run stays", "frames", "} else if restart {\n            ready      = 0;", "} else if restart {\n            ready      = held;"),
+    ("the time of a frame is off by one", "engine", "clock_now + 64'd2 - settings.latency", "clock_now + 64'd1 - settings.latency"),
+    ("the high word of the clock is not held", "registers", "clock_high = clock_now[63:32];", "clock_high = clock_now[31:0];"),
+    ("over-range samples of the whole run are counted", "over_counter", "assign so_far = if first_1[1] ? 0 : count_3;", "assign so_far = count_3;"),
+    ("over-range samples before the light count", "engine", "counts : place.active || raw_active    ,", "counts : 1'b1,"),
+    ("over-range trips one late", "over_counter", "fits >= trip", "fits >: trip"),
+    ("over-range never trips", "over_counter", "hit_4    = counts_1[2] && trips", "hit_4    = 1'b0 && trips"),
+    ("the watchdog is one clock late", "registers", "next.watchdog_less_1  = watchdog[26:0] - 1;", "next.watchdog_less_1  = watchdog[26:0];"),
+    ("reads do not feed the watchdog", "engine", "feed            : access ", "feed            : write "),
+    ("the watchdog never barks", "watchdog", "assign barks   = if renewed ? at_once : last;", "assign barks   = 0;"),
+    ("pattern 0 costs as any other", "engine", "{full_late[6], lit_late[6] && !full_late[6]", "{1'b0, lit_late[6]"),
+    ("a dark complement costs light", "engine", "&& !full_late[6] && !dark_late[6]}", "&& !full_late[6]}"),
+    ("a start renews the light budget", "duty", "cost   = if running ? half_arrays as 22 : (if window_first ? 0 : spent);", "cost   = if running ? half_arrays as 22 : 0;"),
+    ("duty windows never end", "duty", "spent   = (if window_first ? 0 : spent)", "spent   = spent"),
+    ("the duty limit may be used up to one more", "duty", "below_1 = less_1[21];", "below_1 = after[21];"),
+    ("an open interlock does not put the LEDs out at once", "safety", "assign permit = interlock_now && !dropped && ", "assign permit = "),
+    ("an open interlock ends no run", "safety", "assign opens  = running && !interlock_closed;", "assign opens  = 0;"),
+    ("a closed interlock lights a run up again", "safety", "interlock_now && !dropped &&", "interlock_now &&"),
+    ("over-range is latched as duty", "safety", "fault = register_map::FAULT_OVER_RANGE as 3;", "fault = register_map::FAULT_DUTY as 3;"),
+    ("a fault does not end the run", "control", "} else if stop || opens || trips || ends {", "} else if stop || opens || ends {"),
+    ("a fault may be cleared by the wrong bit", "control", "(data & CONTROL_CLEAR_FAULT) != 0", "(data & CONTROL_RELEASE) != 0"),
+    ("a start is accepted with a fault latched", "control", "&& (clear || fault == 0 && !opens)", ""),
+    ("settings out of range are accepted", "control", "begins      = wanted && in_range;", "begins      = wanted;"),
+    ("blanking may be as long as the slot", "registers", "blank <: dwell", "blank <= dwell"),
+    ("a setting counts in the run under way", "registers", "} else if copy {", "} else if copy || write {"),
+    ("the table can be written in a run", "control", "table_write = access && to_table && !running;", "table_write = access && to_table;"),
+    ("a refused write is not reported", "control", "write_refused = 1;", "write_refused = 0;"),
+    ("a stop ends no run", "control", "(data & CONTROL_STOP) != 0", "1'b0"),
+    ("a release gives nothing back", "control", "(data & CONTROL_RELEASE) != 0", "1'b0"),
+    ("the test generator has another polynomial", "source", "generator[13] ^ generator[4]", "generator[13] ^ generator[5]"),
+    ("a burst is a sample short", "raw_capture", "is_last = left == 1;", "is_last = left == 2;"),
+    ("a burst loses its over-range flag", "raw_capture", "host_word = {fetched[14],", "host_word = {1'b0,"),
+    ("the checksum leaves the header out", "formatter", "covered    = open_frame;", "covered    = 0;"),
+    ("the checksum has another polynomial", "crc32", "32'hEDB88320", "32'hEDB88321"),
+    ("without complements the negative half is what was there", "formatter", "negative && !settings.differential", "1'b0"),
+    ("an abandoned transfer goes on in the next", "spi_slave", "assign stale    = !empty && fifo_data[8] != epoch;", "assign stale    = 0;"),
+    ("the FIFO overruns", "byte_fifo", "assign full  = written_gray == (taken_there ^ 5'b11000);", "assign full  = 0;"),
+    ("a write cut short is carried out", "spi_slave", "left  = if quad ? 7 : 31;", "left  = if quad ? 6 : 27;"),
+    ("one dummy cycle too few", "spi_slave", "left  = (HOST_DUMMY_CYCLES - 1) as 6;", "left  = (HOST_DUMMY_CYCLES - 2) as 6;"),
+];
+
+/// Text of the report: what is broken, what saw it.
+fn report(fault: &Fault, seen: Option<&str>) -> String {
+    let (what, file, ..) = fault;
+    let first = seen.and_then(|difference| difference.lines().next());
+    format!("| {what} | `{file}` | {} |", first.unwrap_or("**not seen**"))
+}
+
+/// Minutes: `.ci/run` asks for it.
+#[test]
+#[ignore = "a minute or two; .ci/run does it"]
+fn every_deliberate_fault_is_seen() {
+    let project = Project::read();
+    let only = std::env::var("NIRSPI_FAULT").unwrap_or_default();
+    let mut missed = Vec::new();
+    println!("| fault | module | seen as |\n|---|---|---|");
+    for fault in FAULTS.iter().filter(|(what, ..)| what.contains(&only)) {
+        let (what, file, from, to) = fault;
+        let difference = equivalence::difference(&project.with(file, from, to));
+        println!("{}", report(fault, difference.as_deref()));
+        if difference.is_none() {
+            missed.push(what);
+        }
+    }
+    assert!(missed.is_empty(), "{missed:?}");
+}
