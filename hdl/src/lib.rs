@@ -39,6 +39,14 @@
 //! The RTL may take a few clocks more than the model from the last sample of a frame to `FRAME_READY`, and
 //! from a pin or the host port to its effect; lines, attribution of samples and bytes of frames are exact.
 //!
+//! # The RTL
+//! `rtl/` has the gateware in Veryl, `sv/` the SystemVerilog made from it; `tests/rtl` runs it in Veryl's
+//! simulator beside this model, pin by pin and clock by clock. What it takes more than the model, bounded
+//! there: clock 0 of a run comes 14 clocks after the access that starts it; LEDs are lit up to 9 clocks longer
+//! after a stop and 7 after a trip; they go out 3 clocks after the interlock pin opens. Its lines are at the
+//! pins 6 clocks after a slot is chosen, and `Latency` counts from there: 0 is a sample at the ADC's pins in
+//! the clock that its light is at the LEDs'.
+//!
 //! ```
 //! use nirspi_hdl::{AdcSample, Gateware};
 //! use nirspi_wire::{fpga::FpgaFrame, register::{Register, control}};

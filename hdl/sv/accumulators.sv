@@ -133,7 +133,10 @@ module nirspi_accumulators #(
         word_6 <= {high_5, low_5};
         word_7 <= word_6;
     end
-    always_comb total = CARRY'((((again_4) ? ( high_5 ) : ( high_4 )))) + CARRY'(sum_4) + CARRY'(low_4[HALF]);
+    // One carry chain: the carry of the low half comes in by a bit below.
+    logic [(HALF + 2)-1:0] total_below;
+    always_comb total_below = {1'b0, ((again_4) ? ( high_5 ) : ( high_4 )), 1'b1} + {CARRY'(sum_4), low_4[HALF]};
+    always_comb total       = total_below[HALF + 1:1];
 
     logic wrapped;
     always_ff @ (posedge clk) begin

@@ -33,17 +33,20 @@ module nirspi_engine
 
     // Time since reset, of the clock that is being done with.
     logic [64-1:0] clock_now   ;
+    logic [64-1:0] to_light    ;
     logic [64-1:0] light_next  ;
     logic          window_first;
 
     always_ff @ (posedge clk) begin
         if (rst) begin
             clock_now    <= -(64'(nirspi_types::DEPTH));
+            to_light     <= 0;
             light_next   <= 0;
             window_first <= 0;
         end else begin
             clock_now    <= clock_now + 1;
-            light_next   <= clock_now + 64'd2 - 64'(settings.latency);
+            to_light     <= 64'd2 - 64'(settings.latency);
+            light_next   <= clock_now + to_light;
             window_first <= clock_now[19:0] == 20'hFFFFF;
         end
     end
@@ -81,6 +84,7 @@ module nirspi_engine
     logic         trips        ;
     logic         ends         ;
     logic         permit       ;
+    logic         permitted    ;
 
     nirspi_control command (
         .clk           (clk                         ),
@@ -139,6 +143,7 @@ module nirspi_engine
         .start       (go         ),
         .halt        (halt       ),
         .permit      (permit     ),
+        .permitted   (permitted  ),
         .table_index (table_index),
         .table_entry (table_entry),
         .rows        (rows       ),
@@ -169,6 +174,7 @@ module nirspi_engine
     logic                         raw_first ;
     logic                         raw_last  ;
     logic                [32-1:0] over_count;
+    logic                         over_any  ;
     logic                         over_trips;
     logic                [11-1:0] sum_at    ;
     logic                [48-1:0] sum_word  ;
@@ -226,6 +232,7 @@ module nirspi_engine
         .first   (place.frame_first || raw_first),
         .over    (sample.over_range             ),
         .count   (over_count                    ),
+        .any     (over_any                      ),
         .reached (over_trips                    )
     );
 
@@ -275,7 +282,8 @@ module nirspi_engine
         .fault            (fault                                                        ),
         .opens            (opens                                                        ),
         .trips            (trips                                                        ),
-        .permit           (permit                                                       )
+        .permit           (permit                                                       ),
+        .permitted        (permitted                                                    )
     );
 
     logic                [32-1:0] frames_made;
@@ -293,6 +301,7 @@ module nirspi_engine
         .first      (first      ),
         .done       (frame_done ),
         .over_range (over_count ),
+        .over_any   (over_any   ),
         .overflow   (overflow   ),
         .counts     (counts     ),
         .filling    (filling    ),

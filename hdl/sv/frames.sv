@@ -12,6 +12,7 @@ module nirspi_frames (
     input  var logic                           first     , /// This clock is the first of a run
     input  var logic                           done      , /// This clock completes a frame
     input  var logic                  [32-1:0] over_range, /// Over-range samples of the frame
+    input  var logic                           over_any  , /// There are some
     input  var logic                           overflow  , /// A sum wraps with this clock
     input  var logic                           counts    , /// This clock is one of a run
     output var logic                           filling   ,
@@ -30,7 +31,7 @@ module nirspi_frames (
 
     always_comb begin
         flags = 0;
-        if (over_range != 0) begin
+        if (over_any) begin
             flags |= 16'(nirspi_register_map::FLAG_OVER_RANGE);
         end
         if (wrapped || overflow) begin

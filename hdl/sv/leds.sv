@@ -1,7 +1,8 @@
 /// Drives the LED lines from the sequencer's slot, six clocks after it was chosen.
 ///
 /// The one law: lines change only at a slot's first clock and are all 0 outside a run. The last stage asks
-/// for the permission once more, whatever the stages before it say.
+/// for the permission once more, whatever the stages before it say: `enable` falls in the clock after it is
+/// withdrawn, the other lines, which light nothing without it, a clock later.
 module nirspi_leds (
     input  var logic                           clk        ,
     input  var logic                           rst        ,
@@ -9,6 +10,7 @@ module nirspi_leds (
     input  var logic                           start      , /// The next clock of the sequencer is the first
     input  var logic                           halt       ,
     input  var logic                           permit     , /// LEDs may be lit in the next clock
+    input  var logic                           permitted  , /// As `permit`, but for what withdraws it in this very clock
     output var logic                  [10-1:0] table_index,
     input  var logic                  [10-1:0] table_entry, /// Two clocks after `table_index`
     output var logic                  [32-1:0] rows       ,
@@ -87,7 +89,7 @@ module nirspi_leds (
 
     // Stage 5: the registers at the pins.
     logic shown;
-    always_comb shown = active[3] && permit && !halt;
+    always_comb shown = active[3] && permitted && !halt;
 
     always_ff @ (posedge clk) begin
         if (rst) begin
@@ -100,7 +102,7 @@ module nirspi_leds (
         end else begin
             rows    <= ((shown) ? ( next_rows ) : ( 0 ));
             columns <= ((shown) ? ( next_columns ) : ( 0 ));
-            enable  <= shown;
+            enable  <= shown && permit;
             lit     <= active[3];
             full    <= active[3] && zero && !inverted[3];
             dark    <= active[3] && zero && inverted[3];

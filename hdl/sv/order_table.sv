@@ -6,19 +6,21 @@ module nirspi_order_table (
     input  var logic          write       ,
     input  var logic [10-1:0] host_address,
     input  var logic [10-1:0] host_data   ,
-    output var logic [10-1:0] host_entry  , /// One clock after its address
+    output var logic [10-1:0] host_entry  , /// Two clocks after its address
     input  var logic [10-1:0] index       ,
     output var logic [10-1:0] entry        /// Two clocks after its index
 );
     logic [10-1:0] host_copy [1024];
     logic [10-1:0] copy      [1024];
+    logic [10-1:0] host_read       ;
     logic [10-1:0] fetched         ;
 
     always_ff @ (posedge clk) begin
         if (write) begin
             host_copy[host_address] <= host_data;
         end
-        host_entry <= host_copy[host_address];
+        host_read  <= host_copy[host_address];
+        host_entry <= host_read;
     end
 
     always_ff @ (posedge clk) begin

@@ -11,6 +11,7 @@ module nirspi_over_counter (
     input  var logic          first  , /// Stage 0: first sample of the frame or burst
     input  var logic          over   , /// Stage 0
     output var logic [32-1:0] count  , /// Stage 5
+    output var logic          any    , /// Stage 5: it is not 0
     output var logic          reached /// Stage 5: the trip
 );
     logic [3-1:0]  counts_1;
@@ -18,6 +19,7 @@ module nirspi_over_counter (
     logic [2-1:0]  over_1  ;
     logic [33-1:0] count_3 ; // the top bit: one more than fits
     logic [32-1:0] count_4 ;
+    logic          any_4   ;
     logic          hit_4   ;
     logic [33-1:0] so_far  ;
     logic [32-1:0] fits    ;
@@ -43,5 +45,7 @@ module nirspi_over_counter (
         count_3 <= so_far + 33'((counts_1[1] && over_1[1] && !so_far[32]));
         count_4 <= fits;
         count   <= count_4;
+        any_4   <= fits != 0;
+        any     <= any_4;
     end
 endmodule

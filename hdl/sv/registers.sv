@@ -21,7 +21,7 @@ module nirspi_registers
     input  var logic                  [32-1:0] frames_lost,
     input  var logic                  [64-1:0] clock_now  ,
     input  var logic                  [10-1:0] table_entry,
-    output var logic                  [32-1:0] value       /// Two clocks after `read`
+    output var logic                  [32-1:0] value       /// Two clocks after `read`, and from then on
 );
 
 
@@ -135,43 +135,56 @@ module nirspi_registers
         end
     end
 
-    // What changes by itself is held as of the clock of the read; the rest is still there one later.
+    // Which word is asked for, worked out while the access waits.
+    logic [15-1:0] asked      ;
+    logic [5-1:0]  asked_live ;
+    logic          asked_table;
+
+    always_ff @ (posedge clk) begin
+        asked[0]      <= 32'(address) == ADDRESS_IDENTITY;
+        asked[1]      <= 32'(address) == ADDRESS_VERSION;
+        asked[2]      <= 32'(address) == ADDRESS_SCRATCH;
+        asked[3]      <= 32'(address) == ADDRESS_MODE;
+        asked[4]      <= 32'(address) == ADDRESS_PATTERNS;
+        asked[5]      <= 32'(address) == ADDRESS_DWELL;
+        asked[6]      <= 32'(address) == ADDRESS_BLANK;
+        asked[7]      <= 32'(address) == ADDRESS_LATENCY;
+        asked[8]      <= 32'(address) == ADDRESS_SWEEPS;
+        asked[9]      <= 32'(address) == ADDRESS_FRAMES;
+        asked[10]     <= 32'(address) == ADDRESS_RAW_LENGTH;
+        asked[11]     <= 32'(address) == ADDRESS_WATCHDOG;
+        asked[12]     <= 32'(address) == ADDRESS_DUTY_LIMIT;
+        asked[13]     <= 32'(address) == ADDRESS_OVER_RANGE_TRIP;
+        asked[14]     <= 32'(address) == ADDRESS_CLOCK_HIGH;
+        asked_live[0] <= 32'(address) == ADDRESS_STATUS;
+        asked_live[1] <= 32'(address) == ADDRESS_FAULT;
+        asked_live[2] <= 32'(address) == ADDRESS_FRAMES_MADE;
+        asked_live[3] <= 32'(address) == ADDRESS_FRAMES_LOST;
+        asked_live[4] <= 32'(address) == ADDRESS_CLOCK_LOW;
+        asked_table   <= address[15:10] == ORDER_TABLE[15:10];
+    end
+
+    // What changes by itself is held as of the clock of the read; the rest stands.
     logic [32-1:0] clock_high;
     logic [32-1:0] live      ;
+    logic [32-1:0] stored_0  ;
+    logic [32-1:0] stored_1  ;
+    logic [32-1:0] entry     ;
 
     always_ff @ (posedge clk) begin
         if (read) begin
-            case (32'(address)) inside
-                ADDRESS_STATUS     : live <= status;
-                ADDRESS_FAULT      : live <= 32'(fault);
-                ADDRESS_FRAMES_MADE: live <= frames_made;
-                ADDRESS_FRAMES_LOST: live <= frames_lost;
-                ADDRESS_CLOCK_LOW  : live <= clock_now[31:0];
-                default            : live <= 0;
-            endcase
+            live <= (status & {32{asked_live[0]}}) | (32'(fault) & {32{asked_live[1]}})
+                | (frames_made & {32{asked_live[2]}}) | (frames_lost & {32{asked_live[3]}})
+                | (clock_now[31:0] & {32{asked_live[4]}});
         end
-        case (32'(address)) inside
-            ADDRESS_IDENTITY       : value <= RESET_IDENTITY;
-            ADDRESS_VERSION        : value <= RESET_VERSION;
-            ADDRESS_SCRATCH        : value <= scratch;
-            ADDRESS_MODE           : value <= mode;
-            ADDRESS_PATTERNS       : value <= patterns;
-            ADDRESS_DWELL          : value <= dwell;
-            ADDRESS_BLANK          : value <= blank;
-            ADDRESS_LATENCY        : value <= latency;
-            ADDRESS_SWEEPS         : value <= sweeps;
-            ADDRESS_FRAMES         : value <= frames;
-            ADDRESS_RAW_LENGTH     : value <= raw_length;
-            ADDRESS_WATCHDOG       : value <= watchdog;
-            ADDRESS_DUTY_LIMIT     : value <= duty_limit;
-            ADDRESS_OVER_RANGE_TRIP: value <= trip;
-            ADDRESS_CLOCK_HIGH     : value <= clock_high;
-            default                : value <= ((address[15:10] == ORDER_TABLE[15:10]) ? (
-                32'(table_entry)
-            ) : (
-                live
-            ));
-        endcase
+        stored_0 <= (RESET_IDENTITY & {32{asked[0]}}) | (RESET_VERSION & {32{asked[1]}}) | (scratch & {32{asked[2]}})
+            | (mode & {32{asked[3]}}) | (patterns & {32{asked[4]}}) | (dwell & {32{asked[5]}})
+            | (blank & {32{asked[6]}}) | (latency & {32{asked[7]}});
+        stored_1 <= (sweeps & {32{asked[8]}}) | (frames & {32{asked[9]}}) | (raw_length & {32{asked[10]}})
+            | (watchdog & {32{asked[11]}}) | (duty_limit & {32{asked[12]}}) | (trip & {32{asked[13]}})
+            | (clock_high & {32{asked[14]}});
+        entry <= 32'(table_entry) & {32{asked_table}};
+        value <= live | stored_0 | stored_1 | entry;
     end
 
     always_ff @ (posedge clk) begin

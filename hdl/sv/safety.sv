@@ -21,7 +21,8 @@ module nirspi_safety (
     output var logic                  [3-1:0] fault           , /// Code as of before this clock
     output var logic                          opens           , /// The interlock ends the run before this clock
     output var logic                          trips           , /// This clock ends the run
-    output var logic                          permit           /// LEDs may be lit in the next clock
+    output var logic                          permit          , /// LEDs may be lit in the next clock
+    output var logic                          permitted        /// As `permit`, but for what withdraws it in this very clock
 );
     logic counts  ;
     logic exceeded;
@@ -47,10 +48,11 @@ module nirspi_safety (
         .barks   (barks                   )
     );
 
-    always_comb opens  = running && !interlock_closed;
-    always_comb counts = running && !opens && !stop;
-    always_comb trips  = counts && (over_range || exceeded || barks);
-    always_comb permit = interlock_now && !dropped && fault == 0 && !opens && !trips && !(running && ends);
+    always_comb opens     = running && !interlock_closed;
+    always_comb counts    = running && !opens && !stop;
+    always_comb trips     = counts && (over_range || exceeded || barks);
+    always_comb permitted = interlock_now && !dropped && fault == 0;
+    always_comb permit    = permitted && !opens && !trips && !(running && ends);
 
     // An interlock that closes again does not light up what is left of its run.
     always_ff @ (posedge clk) begin

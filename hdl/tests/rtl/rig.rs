@@ -80,6 +80,8 @@ pub struct Rig {
     pub(crate) answer: Option<Answer>,
     start: Option<(u64, u32)>,
     grace: u64,
+    /// LEDs were enabled in the clock before.
+    just_lit: bool,
     /// What the model was last told, for the report of a difference.
     told: VecDeque<String>,
     pub mismatch: Option<String>,
@@ -159,6 +161,7 @@ impl Rig {
             answer: None,
             start: None,
             grace: 0,
+            just_lit: false,
             told: VecDeque::new(),
             mismatch: None,
             variant: Variant::default(),
@@ -254,7 +257,15 @@ impl Rig {
         let mut sample = sample(self.seed, self.over_range_rate, now);
         sample.code >>= (now >> self.fade) & 3;
         self.pins.sample(sample);
-        let leds = self.pins.leds();
+        let mut leds = self.pins.leds();
+        // Without `enable` the other lines light nothing: they may follow a clock later.
+        if !leds.enable {
+            if !std::mem::take(&mut self.just_lit) {
+                self.expect("lines without enable", &leds, &Lines::default());
+            }
+            leds = Lines::default();
+        }
+        self.just_lit |= leds.enable;
         self.put_out |= self.dark.contains(&now);
         if self.put_out {
             self.expect("LEDs after the interlock opened", &leds, &Lines::default());
