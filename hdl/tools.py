@@ -9,7 +9,8 @@ import venv
 from pathlib import Path
 
 HDL = Path(__file__).resolve().parent
-TARGET = HDL.parent / "target" / "gateware"
+ROOT = HDL.parent
+TARGET = ROOT / "target" / "gateware"
 
 
 def tool(name: str) -> str:

@@ -2,7 +2,7 @@
 ///
 /// `prove.py` cuts memories and host-written registers loose first: they may then have any value in any
 /// clock, so what is proven holds whatever the host writes and whenever. Assertions named `invariant_...` are
-/// there to make the others provable by induction.
+/// there only to make the others provable by induction.
 module safety (
     input logic        clk,
     input logic        rst,
@@ -83,12 +83,16 @@ module safety (
         lines_low_when_dark:   assert (enable || rows == 0 && columns == 0);
         fault_latched:         assert (fault_before == 0 || dut.fault == fault_before || forgotten);
 
+`ifdef INDUCTION
         // What makes them inductive.
+        invariant_opened:      assert (opened == dut.guard.dropped);
         invariant_lit_stages:  assert (!((dut.array.counters.active || dut.array.active != 0) && !dut.running && !coming && !dut.halt));
         invariant_no_run_in_fault: assert (!(dut.running && dut.fault != 0));
         for (int i = 0; i < 15; i++) begin
-            invariant_coming: assert (!dut.command.going[i] || silent == 30'(i + 1) && dut.command.busy);
+            assert (!dut.command.going[i] || silent == 30'(i + 1) && dut.command.busy && dut.command.age == 6'(i + 2));
         end
+        invariant_access:      assert (!access || dut.command.busy && dut.command.age == 1);
+        invariant_alone:       assert (dut.command.going[DEPTH - 1:0] == 0 || !dut.running && dut.fault == 0);
         invariant_first:       assert (dut.guard.dog.first == dut.command.going[DEPTH]);
         invariant_busy:        assert (!dut.command.busy || dut.command.age <= 6'(dut.command.ANSWER));
         invariant_fresh:       assert (silent <= unfed + DEPTH + 1 || !dut.running);
@@ -97,5 +101,6 @@ module safety (
                 && dut.guard.dog.left == 27'(dut.settings.watchdog_less_1 - 27'(unfed))
                 && dut.guard.dog.last == (dut.guard.dog.left == 0));
         invariant_at_once:     assert (!dut.running || dut.guard.dog.at_once == (dut.settings.watchdog_less_1 == 0));
+`endif
     end
 endmodule
