@@ -103,7 +103,7 @@ FAULTS = (
         "no fault gate, and a start is accepted in a fault",
         "dark_in_fault",
         (
-            ("safety", "!dropped && fault == 0 &&", "!dropped &&"),
+            ("safety", "!dropped && fault == 0;", "!dropped;"),
             ("control", "(clear || fault == 0 && !opens)", "(clear || !opens)"),
         ),
     ),
@@ -111,7 +111,7 @@ FAULTS = (
         SAFETY,
         "no interlock",
         "dark_when_open",
-        (("safety", "permit = interlock_now && ", "permit = "),),
+        (("safety", "permitted = interlock_now && ", "permitted = "),),
     ),
     Fault(
         SAFETY,

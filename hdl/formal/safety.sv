@@ -48,12 +48,14 @@ module safety (
     logic        was_reset;
     logic [2:0]  fault_before;
     logic        forgotten;
+    logic        lines_were_up_in_the_dark;
 
     always_ff @(posedge clk) begin
         was_open     <= !interlock;
         was_reset    <= rst;
         fault_before <= dut.fault;
         forgotten    <= rst || dut.clear;
+        lines_were_up_in_the_dark <= !enable && (rows != 0 || columns != 0);
         if (rst) begin
             silent <= EVER;
             unfed  <= EVER;
@@ -80,7 +82,7 @@ module safety (
         dark_until_restarted:  assert (!(enable && opened));
         dark_without_run:      assert (!(enable && !dut.running && !coming && !dut.halt));
         dark_when_host_silent: assert (!(enable && silent > limit + DEPTH));
-        lines_low_when_dark:   assert (enable || rows == 0 && columns == 0);
+        lines_low_when_dark:   assert (enable || !lines_were_up_in_the_dark || rows == 0 && columns == 0);
         fault_latched:         assert (fault_before == 0 || dut.fault == fault_before || forgotten);
 
 `ifdef INDUCTION
