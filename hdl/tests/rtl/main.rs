@@ -7,8 +7,8 @@ mod host;
 mod map;
 mod modules;
 mod mutation;
-mod pins;
-mod project;
 mod rig;
 mod scenario;
 mod stale;
+
+use nirspi_hdl_sim::{pins, project};

@@ -13,14 +13,20 @@ use veryl_parser::Parser;
 use veryl_simulator::{Config, Simulator, ir};
 
 /// Texts of the sources, by file name without extension.
-#[derive(Clone)]
+#[derive(Debug, Clone)]
 pub struct Project(pub BTreeMap<String, String>);
 
+/// A folder of `hdl/`.
+#[must_use]
 pub fn folder(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join(name)
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(name)
 }
 
-/// Name without extension and text of every file in a folder.
+/// Name without extension and text of every file in a folder; none where there is no folder.
+///
+/// # Panics
+/// On a file that is no text.
+#[must_use]
 pub fn files(folder: &Path) -> BTreeMap<String, String> {
     let mut texts = BTreeMap::new();
     let Ok(entries) = std::fs::read_dir(folder) else { return texts };
@@ -34,11 +40,19 @@ pub fn files(folder: &Path) -> BTreeMap<String, String> {
 
 impl Project {
     /// As committed.
+    ///
+    /// # Panics
+    /// On a file that is no text.
+    #[must_use]
     pub fn read() -> Self {
         Self(files(&folder("rtl")))
     }
 
     /// With `from`, which must be there once, replaced by `to` in one file.
+    ///
+    /// # Panics
+    /// If it is not there once.
+    #[must_use]
     pub fn with(&self, file: &str, from: &str, to: &str) -> Self {
         let mut changed = self.clone();
         let text = changed.0.get_mut(file).unwrap_or_else(|| panic!("no {file}.veryl"));
@@ -75,6 +89,10 @@ impl Project {
     }
 
     /// The SystemVerilog of every file.
+    ///
+    /// # Panics
+    /// On anything that parser or analyser object to.
+    #[must_use]
     pub fn emit(&self) -> BTreeMap<String, String> {
         let (metadata, parsed, _) = self.analyse();
         parsed
@@ -92,6 +110,10 @@ impl Project {
     }
 
     /// One module, ready to be clocked.
+    ///
+    /// # Panics
+    /// On anything that parser, analyser or simulator object to.
+    #[must_use]
     pub fn simulate(&self, top: &str) -> Simulator {
         let (_, _, ir) = self.analyse();
         let config = Config { use_jit: true, ..Config::default() };

@@ -3,6 +3,7 @@
 //! The one law: pins change between clock edges, and edges come in the order of their time.
 
 use crate::project::Project;
+use crate::trace::{Edge, Levels, Trace};
 use nirspi_hdl::{AdcSample, Lines};
 use veryl_analyzer::ir::{VarId, VarPath};
 use veryl_analyzer::value::Value;
@@ -15,6 +16,8 @@ pub struct Pins {
     host: Event,
     inputs: Inputs,
     outputs: Outputs,
+    trace: Option<Trace>,
+    levels: Levels,
 }
 
 struct Inputs {
@@ -38,7 +41,12 @@ struct Outputs {
 }
 
 impl Pins {
-    /// After reset; interlock open, port idle.
+    /// After reset; interlock open, port idle. `$NIRSPI_PIN_TRACE` names a folder for a record of all that
+    /// happens at the pins, which another simulator can repeat.
+    ///
+    /// # Panics
+    /// If the core does not build, or has no such ports.
+    #[must_use]
     pub fn new(project: &Project) -> Self {
         let mut sim = project.simulate("core");
         let adc = sim.get_clock("clk_adc").unwrap();
@@ -65,13 +73,35 @@ impl Pins {
         let reset_adc = sim.get_reset("rst_adc").unwrap();
         let reset_host = sim.get_reset("rst_host").unwrap();
         sim.step(&Event::Initial);
-        let mut pins = Self { sim, adc, host, inputs, outputs };
+        let (trace, levels) = (Trace::asked_for(), Levels::default());
+        let mut pins = Self { sim, adc, host, inputs, outputs, trace, levels };
         pins.select(false);
         for _ in 0..4 {
             pins.sim.step_reset(&pins.adc, &reset_adc);
+            pins.record(Edge::AdcReset);
             pins.sim.step_reset(&pins.host, &reset_host);
+            pins.record(Edge::HostReset);
         }
         pins
+    }
+
+    /// Notes an edge, with the inputs before it and the outputs after it.
+    fn record(&mut self, edge: Edge) {
+        if let Some(mut trace) = self.trace.take() {
+            let outputs = self.levels_out();
+            trace.edge(edge, self.levels, outputs);
+            self.trace = Some(trace);
+        }
+    }
+
+    /// All outputs; layout as in `trace.rs`.
+    fn levels_out(&mut self) -> [u32; 3] {
+        let Lines { rows, columns, enable } = self.leds();
+        let (lines, drive) = self.driven();
+        let (frame, raw) = self.ready();
+        let flags = [enable, frame, raw, self.access()];
+        let flags = flags.iter().rev().fold(0, |word, &flag| word << 1 | u32::from(flag));
+        [rows, columns, flags | u32::from(lines) << 4 | u32::from(drive) << 8]
     }
 
     fn set(&mut self, port: VarId, value: u64, width: usize) {
@@ -84,32 +114,46 @@ impl Pins {
         value.to_u64().expect("undefined")
     }
 
+    /// A rising edge of the ADC's clock.
     pub fn adc_edge(&mut self) {
         self.sim.step(&self.adc);
+        self.record(Edge::Adc);
     }
 
+    /// A rising edge of the host port's clock.
     pub fn host_edge(&mut self) {
         self.sim.step(&self.host);
+        self.record(Edge::Host);
     }
 
+    /// What the ADC puts out.
     pub fn sample(&mut self, sample: AdcSample) {
+        self.levels.sample = sample;
         self.set(self.inputs.code, sample.code.into(), 14);
         self.set(self.inputs.over_range, sample.over_range.into(), 1);
     }
 
+    /// The interlock loop.
     pub fn interlock(&mut self, closed: bool) {
+        self.levels.interlock = closed;
         self.set(self.inputs.interlock, closed.into(), 1);
     }
 
+    /// `cs_n`, low when selected.
     pub fn select(&mut self, selected: bool) {
+        self.levels.selected = selected;
         self.set(self.inputs.cs_n, (!selected).into(), 1);
     }
 
+    /// The host port's `sck`.
     pub fn sck(&mut self, high: bool) {
+        self.levels.sck = high;
         self.set(self.inputs.sck, high.into(), 1);
     }
 
+    /// What the host drives on the four lines.
     pub fn drive(&mut self, lines: u8) {
+        self.levels.lines = lines;
         self.set(self.inputs.lines, lines.into(), 4);
     }
 
@@ -118,6 +162,7 @@ impl Pins {
         (self.get(|o| &o.lines) as u8, self.get(|o| &o.drive) as u8)
     }
 
+    /// The LED lines.
     pub fn leds(&mut self) -> Lines {
         Lines {
             rows: self.get(|o| &o.rows) as u32,
@@ -131,6 +176,7 @@ impl Pins {
         self.get(|o| &o.access) != 0
     }
 
+    /// `frame_ready` and `raw_ready`.
     pub fn ready(&mut self) -> (bool, bool) {
         (self.get(|o| &o.frame_ready) != 0, self.get(|o| &o.raw_ready) != 0)
     }
