@@ -5,7 +5,7 @@
 use crate::project::Project;
 use crate::rig::{Rig, Tally, Variant};
 use crate::scenario;
-use nirspi_wire::register::DUTY_WINDOW;
+use nirspi_wire::register::{DUTY_WINDOW, Register, control, mode};
 
 /// Scenarios that one simulated FPGA lives through, one after the other.
 const SCENARIOS: u64 = 64;
@@ -100,4 +100,21 @@ fn sums_that_wrap_say_so_in_their_own_frame_only() {
 fn duty_windows_and_both_words_of_the_clock_agree() {
     let tallies = windows().run(&Project::read(), 0).unwrap_or_else(|d| panic!("{d}"));
     assert!(count(&tallies, |t| t.faults[2]) >= 5 && count(&tallies, |t| t.faults[0]) >= 5);
+}
+
+/// What the instrument is for: 1024 patterns and complements of 5 clocks, once, read by four lines.
+#[test]
+fn a_whole_differential_sweep_agrees() {
+    let mut rig = Rig::new(&Project::read(), 1);
+    rig.interlock(true);
+    rig.wait_adc(100);
+    rig.set(Register::Mode, mode::DIFFERENTIAL | mode::ORDER_SEQUENCY);
+    rig.set(Register::Frames, 1);
+    let started = std::time::Instant::now();
+    rig.set(Register::Control, control::START);
+    rig.wait_adc(2 * 1024 * 5 + 100);
+    rig.stream(false, usize::MAX);
+    println!("simulated and read out in {:?}", started.elapsed());
+    assert_eq!(rig.mismatch, None);
+    assert_eq!((rig.seen_so_far.frames, rig.seen_so_far.lit_clocks), (1, 2 * 1024 * 5));
 }
