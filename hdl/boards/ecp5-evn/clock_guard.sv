@@ -1,6 +1,6 @@
 /// Watches a clock with another that needs nothing from outside.
 ///
-/// The one law: `alive` falls within 35 clocks of `clk` after the last edge of `watched`, whatever state
+/// The one law: `alive` falls within 36 clocks of `clk` after the last edge of `watched`, whatever state
 /// that one stopped in. It also starts the PLL anew while there is no lock: the ADC may come up later than the FPGA.
 module clock_guard (
     input  logic clk,
@@ -9,7 +9,7 @@ module clock_guard (
     output logic alive   = 1'b0,
     output logic restart = 1'b1
 );
-    // A beat of an eighth of the watched clock's edges: 64 ns at 125 MHz.
+    // A beat every eight clocks of the watched one: 64 ns at 125 MHz.
     logic [3:0] divided = '0;
     always_ff @(posedge watched) divided <= divided + 1;
 
