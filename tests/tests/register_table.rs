@@ -10,7 +10,9 @@ fn every_register_stands_in_the_gateware_page_and_no_other() {
         page.lines().filter(|line| line.starts_with("| `") && line.contains("` | 0x")).collect();
     let expected: Vec<String> = Register::ALL
         .iter()
-        .map(|r| format!("| `{r:?}` | {:#04X} | {:?} |", r.address(), r.access()).replace("0X", "0x"))
+        .map(|r| {
+            format!("| `{r:?}` | {:#04X} | {:?} |", r.address(), r.access()).replace("0X", "0x")
+        })
         .collect();
     assert_eq!(rows, expected);
 }

@@ -21,8 +21,8 @@ use std::time::Duration;
 use tap::{Log, Tap};
 
 const PX: usize = 64;
-/// What both sum banks hold, so that even a slow bus loses none.
-const BOTH_BANKS: u32 = 2;
+/// A bus of 16.7 MHz takes longer to read a frame than the FPGA to make one: only the first of a run is sure to come.
+const FRAMES: u32 = 1;
 
 /// A ring on rough ground: every one of the 1024 patterns has something to say about it.
 fn scene() -> Scene {
@@ -96,7 +96,7 @@ fn check(captured: &Capture) {
     let mut expected: Vec<f64> =
         optics.footprint().weights().iter().map(|&w| f64::from(w) * counts).collect();
     fwht(&mut expected).unwrap();
-    let measurements = captured.integrated.measurements(&captured.setup, None).unwrap();
+    let measurements = captured.integrated.measurements(&captured.setup, None, true).unwrap();
     assert_eq!(measurements.rows().len(), captured.setup.rows.len());
     for (&row, value) in measurements.rows().iter().zip(measurements.values()) {
         let off = (value - expected[row as usize]).abs();
@@ -114,10 +114,10 @@ fn check(captured: &Capture) {
 #[test]
 fn a_scene_comes_through_the_rtl_exactly_and_bit_for_bit_as_through_the_golden_model() {
     let setup = MeasurementSetup::new(&Order::Natural, 1.0).unwrap();
-    let captured = both(&ideal(), &setup, BOTH_BANKS);
+    let captured = both(&ideal(), &setup, FRAMES);
     check(&captured);
     assert!(captured.counters.is_complete());
-    let each = captured.elapsed / BOTH_BANKS;
+    let each = captured.elapsed / FRAMES;
     println!("one sweep of 1024 patterns and complements, shown, read and sent: {each:.2?}");
 }
 
@@ -125,7 +125,7 @@ fn a_scene_comes_through_the_rtl_exactly_and_bit_for_bit_as_through_the_golden_m
 fn an_order_table_and_a_part_of_the_patterns_come_through_too() {
     let mut setup = MeasurementSetup::new(&Order::Random(7), 0.1).unwrap();
     setup.sweeps = 3;
-    let captured = both(&ideal(), &setup, BOTH_BANKS);
+    let captured = both(&ideal(), &setup, FRAMES);
     assert!(captured.counters.is_complete());
     check(&captured);
 }
@@ -135,7 +135,7 @@ fn slow_leds_and_a_late_adc_give_the_same_bytes_with_the_same_latency() {
     let optics = noiseless();
     let mut setup = MeasurementSetup::new(&Order::Natural, 0.25).unwrap();
     setup.adc_latency = optics.chain().adc_latency_clocks;
-    both(&optics, &setup, BOTH_BANKS);
+    both(&optics, &setup, FRAMES);
 }
 
 /// What calibration works on: the same burst, so the same latency and leak.
@@ -165,12 +165,12 @@ fn a_calibration_burst_through_the_rtl_is_that_of_the_golden_model() {
 
 #[test]
 fn frames_that_a_slow_bus_loses_are_counted_and_spoil_no_other() {
-    let frames = 40;
+    let frames = 200;
     let setup = MeasurementSetup::new(&Order::Natural, 0.1).unwrap();
     let (fpga, log) = Tap::new(RtlFpga::new(&ideal(), 1));
     let captured = run(&mut session(&ideal(), fpga), &setup, frames);
     let counters = captured.counters;
-    assert_eq!(counters.total(), frames.into());
+    assert_eq!(counters.total(), u64::from(frames));
     assert!(counters.lost > 0 && counters.received > 2, "{counters}");
     check(&captured);
 
