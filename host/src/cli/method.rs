@@ -45,6 +45,9 @@ pub struct MethodArgs {
     /// Stop when the residual's norm is this share of the measurements'
     #[arg(long, value_name = "0..1", default_value_t = 0.0, allow_negative_numbers = true)]
     pub residual: f64,
+    /// The paper's Algorithm 1 as printed: no prior, no cross-validation, an exactly sparse image
+    #[arg(long, requires = "sparsity", conflicts_with = "keep")]
+    pub as_printed: bool,
     /// What becomes of patterns that were measured
     #[arg(long, value_enum, default_value_t = Keep::Measured)]
     pub keep: Keep,
@@ -125,7 +128,7 @@ pub fn solve(args: &MethodArgs, measurements: &Measurements) -> Result<Solved> {
         let image = reconstruct::hadamard(measurements);
         return Ok(Solved { image, report: Report { method: args.method, omp: None } });
     }
-    let keep = args.keep;
+    let keep = if args.as_printed { Keep::Sparse } else { args.keep };
     let mut settings = OmpSettings {
         basis: args.basis()?,
         residual: args.residual,
@@ -137,6 +140,10 @@ pub fn solve(args: &MethodArgs, measurements: &Measurements) -> Result<Solved> {
     };
     if let Some(atoms) = args.sparsity {
         settings.sparsity = Sparsity::Fixed(atoms);
+        if args.as_printed {
+            let printed = OmpSettings::as_printed(settings.basis, atoms);
+            settings = OmpSettings { residual: args.residual, ..printed };
+        }
     }
     let found = reconstruct::omp(measurements, &settings)?;
     let omp = OmpReport {

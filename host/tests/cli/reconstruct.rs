@@ -25,6 +25,16 @@ fn a_measurement_comes_back_as_the_image_it_was_made_from() {
 }
 
 #[test]
+fn the_printed_algorithm_chooses_as_many_atoms_as_asked_and_keeps_no_measurement() {
+    let (bench, measured) = (Bench::new(), Measured::new(32));
+    bench.write("in.npz", &measured.npz());
+    bench.run(&["reconstruct", "in.npz", "--as-printed", "--sparsity", "7"]).succeeded();
+    let report = bench.json("out/report.json");
+    assert_eq!((&report["omp"]["sparsity"], &report["omp"]["keep"]), (&7.into(), &"sparse".into()));
+    bench.run(&["reconstruct", "in.npz", "--as-printed"]).failed(2, &["--sparsity"]);
+}
+
+#[test]
 fn omp_predicts_what_was_not_measured_better_than_zero_does() {
     let (bench, measured) = (Bench::new(), Measured::new(32));
     bench.write("in.npz", &measured.npz());
