@@ -8,6 +8,7 @@ use std::{
 };
 use veryl_analyzer::{Analyzer, Context, attribute_table, ir as air, symbol_table};
 use veryl_emitter::Emitter;
+use veryl_formatter::Formatter;
 use veryl_metadata::Metadata;
 use veryl_parser::Parser;
 use veryl_simulator::{Config, Simulator, ir};
@@ -107,6 +108,21 @@ impl Project {
                 (name.to_owned(), lines.map(|line| format!("{}\n", line.trim_end())).collect())
             })
             .collect()
+    }
+
+    /// Every file as `veryl fmt` has it.
+    ///
+    /// # Panics
+    /// On anything that parser or analyser object to.
+    #[must_use]
+    pub fn format(&self) -> BTreeMap<String, String> {
+        let (metadata, parsed, _) = self.analyse();
+        let format = |(name, text, parser): (&str, &str, Parser)| {
+            let mut formatter = Formatter::new(&metadata);
+            formatter.format(&parser.veryl, text);
+            (name.to_owned(), formatter.as_str().to_owned())
+        };
+        parsed.into_iter().map(format).collect()
     }
 
     /// One module, ready to be clocked.

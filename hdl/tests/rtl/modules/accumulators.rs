@@ -1,0 +1,129 @@
+//! The two banks of sums.
+
+use super::bundles::Place;
+use crate::bench::Bench;
+use crate::project::Project;
+use crate::scenario::Dice;
+
+laws![
+    every_slot_is_added_once_however_soon_it_comes_again,
+    a_word_wraps_at_48_bits_and_says_so_in_that_clock,
+    the_host_reads_the_bank_that_is_not_being_filled,
+];
+
+/// The place of a slot's last sample, as a number.
+fn last_sample(index: u64, complement: bool, sweep_first: bool) -> u64 {
+    let place = Place { slot_last: true, index, complement, sweep_first, ..Place::default() };
+    Place::fields(Some(place)).iter().fold(0, |word, &(value, width)| word << width | value)
+}
+
+/// The sums of the accumulators' bank 0, in which everything was summed.
+struct Accumulators {
+    bench: Bench,
+    /// The sum comes a clock after its slot.
+    sum: u64,
+    overflows: usize,
+}
+
+impl Accumulators {
+    fn new(project: &Project) -> Self {
+        let mut bench = Bench::new(project, "accumulators");
+        bench.set("filling", false);
+        Self { bench, sum: 0, overflows: 0 }
+    }
+
+    fn clock(&mut self, place: u64, sum: u64) {
+        self.bench.set("place", place);
+        self.bench.set("sum", self.sum);
+        self.sum = sum;
+        self.overflows += self.bench.get("overflow") as usize;
+        self.bench.tick();
+    }
+
+    fn read(&mut self, index: u64, complement: bool) -> u64 {
+        for _ in 0..8 {
+            self.clock(0, 0);
+        }
+        self.bench.set("filling", true);
+        self.bench.set("host_address", u64::from(complement) << 10 | index);
+        for _ in 0..3 {
+            self.bench.tick();
+        }
+        let word = self.bench.get("host_word");
+        self.bench.set("filling", false);
+        word
+    }
+}
+
+fn every_slot_is_added_once_however_soon_it_comes_again(project: &Project) {
+    let mut sums = Accumulators::new(project);
+    let dice = &mut Dice::new(5);
+    let mut expected = [[0u64; 2]; 1024];
+    for (index, pair) in expected.iter_mut().enumerate() {
+        for (complement, sum) in [false, true].into_iter().zip(pair) {
+            *sum = dice.range(0, (1 << 30) - 1);
+            sums.clock(last_sample(index as u64, complement, true), *sum);
+        }
+    }
+    // Of few addresses, so that they come back after 1, 2, 3... clocks; with clocks between.
+    for round in 0..30_000 {
+        if dice.once_in(3) {
+            sums.clock(0, dice.range(0, (1 << 30) - 1));
+        }
+        let index = dice.range(0, 1 + round / 5000);
+        let complement = dice.once_in(2);
+        let sum = dice.range(0, (1 << 30) - 1);
+        let first = dice.once_in(50);
+        let so_far = &mut expected[index as usize][usize::from(complement)];
+        *so_far = if first { sum } else { *so_far + sum };
+        sums.clock(last_sample(index, complement, first), sum);
+    }
+    for index in [0, 1, 2, 3, 4, 5, 6, 7, 511, 512, 1023] {
+        for complement in [false, true] {
+            let expected = expected[index as usize][usize::from(complement)];
+            assert_eq!(sums.read(index, complement), expected, "{index} {complement}");
+        }
+    }
+    assert_eq!(sums.overflows, 0);
+}
+
+fn a_word_wraps_at_48_bits_and_says_so_in_that_clock(project: &Project) {
+    let mut sums = Accumulators::new(project);
+    const LARGEST: u64 = (1 << 30) - 1;
+    let mut exact = 0;
+    for slot in 0..1 << 18 {
+        sums.clock(last_sample(7, true, slot == 0), LARGEST);
+        exact += LARGEST;
+    }
+    let short_of_it = (1 << 48) - 1 - exact;
+    sums.clock(last_sample(7, true, false), short_of_it);
+    assert_eq!(sums.read(7, true), (1 << 48) - 1);
+    assert_eq!(sums.overflows, 0);
+    sums.clock(last_sample(7, true, false), 5);
+    assert_eq!(sums.read(7, true), 4);
+    assert_eq!(sums.overflows, 1);
+}
+
+fn the_host_reads_the_bank_that_is_not_being_filled(project: &Project) {
+    let mut sums = Accumulators::new(project);
+    // One bank, then the other, each with sums of its own.
+    for (bank, offset) in [(false, 100), (true, 200)] {
+        sums.bench.set("filling", bank);
+        for index in 0..1024 {
+            sums.clock(last_sample(index, true, true), offset + index);
+        }
+        for _ in 0..8 {
+            sums.clock(0, 0);
+        }
+    }
+    for (filling, offset) in [(true, 100), (false, 200)] {
+        sums.bench.set("filling", filling);
+        for index in [0, 1, 700, 1023] {
+            sums.bench.set("host_address", 1 << 10 | index);
+            for _ in 0..3 {
+                sums.clock(0, 0);
+            }
+            assert_eq!(sums.bench.get("host_word"), offset + index);
+        }
+    }
+}

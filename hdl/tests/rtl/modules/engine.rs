@@ -1,0 +1,277 @@
+//! Everything on the ADC's clock, at its edge: accesses, light, samples, bytes.
+
+use super::bundles::{Place, Settings};
+use crate::bench::Bench;
+use crate::project::Project;
+use crate::scenario::Dice;
+use nirspi_wire::fpga::FpgaFrame;
+use nirspi_wire::host_port::{READ_FRAME, READ_REGISTER, WRITE_REGISTER};
+use nirspi_wire::register::{FaultCode, Register as R, control, mode};
+
+/// Clocks from the access that starts a run to the lines of its first slot.
+const TO_LIGHT: u64 = 7;
+/// Clocks that LEDs are lit after the one whose sample or cost ends their run: it is done with seven clocks later.
+const TO_DARK: u64 = 7;
+
+laws![
+    a_sample_is_summed_with_what_was_lit_latency_clocks_before,
+    a_frame_says_when_its_first_slot_was_lit,
+    over_range_counts_from_the_first_light_on,
+    leds_are_lit_for_the_watchdogs_clocks_after_any_access,
+    light_costs_what_the_register_map_says,
+];
+
+/// The engine, its host and a count of its clocks.
+struct Engine {
+    bench: Bench,
+    clock: u64,
+    /// Of the last access that took effect.
+    accessed: u64,
+    /// The ADC: code by clock.
+    code: fn(u64) -> u64,
+}
+
+impl Engine {
+    /// After reset, interlock closed.
+    fn new(project: &Project) -> Self {
+        let mut engine =
+            Self { bench: Bench::new(project, "engine"), clock: 0, accessed: 0, code: |_| 0 };
+        engine.reset();
+        engine
+    }
+
+    fn reset(&mut self) {
+        self.bench.reset("clk", "rst");
+        self.bench.set("interlock", true);
+        self.bench.set("byte_taken", false);
+        self.clock = 0;
+        // The interlock goes through as many stages as a run.
+        self.clocks(20);
+    }
+
+    fn tick(&mut self) {
+        self.bench.set("code", (self.code)(self.clock));
+        if self.bench.is("access") {
+            self.accessed = self.clock;
+        }
+        self.bench.tick();
+        self.clock += 1;
+    }
+
+    fn clocks(&mut self, count: u64) {
+        for _ in 0..count {
+            self.tick();
+        }
+    }
+
+    fn access(&mut self, opcode: u8, address: u16, data: u32) -> u32 {
+        self.bench.set("operation", opcode & 3);
+        self.bench.set("address", address);
+        self.bench.set("data", data);
+        self.bench.set("request", true);
+        self.tick();
+        self.bench.set("request", false);
+        while !self.bench.is("answered") {
+            self.tick();
+        }
+        let value = self.bench.get("value") as u32;
+        self.tick();
+        value
+    }
+
+    fn set(&mut self, register: R, value: u64) {
+        self.access(WRITE_REGISTER, register.address(), value as u32);
+    }
+
+    fn read(&mut self, register: R) -> u32 {
+        self.access(READ_REGISTER, register.address(), 0)
+    }
+
+    /// Writes settings and begins a run; gives the clock of its first light.
+    fn start(&mut self, settings: &Settings) -> u64 {
+        let mode = if settings.differential { mode::DIFFERENTIAL } else { 0 };
+        for (register, value) in [
+            (R::Mode, mode.into()),
+            (R::Patterns, settings.patterns),
+            (R::Dwell, settings.dwell),
+            (R::Blank, settings.blank),
+            (R::Latency, settings.latency),
+            (R::Sweeps, settings.sweeps),
+            (R::Frames, settings.frames),
+            (R::Watchdog, settings.watchdog),
+            (R::DutyLimit, settings.duty_limit),
+            (R::OverRangeTrip, settings.over_range_trip),
+        ] {
+            self.set(register, value);
+        }
+        self.bench.set("operation", WRITE_REGISTER & 3);
+        self.bench.set("address", R::Control.address());
+        self.bench.set("data", control::START);
+        self.bench.set("request", true);
+        self.tick();
+        self.bench.set("request", false);
+        while !self.bench.is("enable") {
+            self.tick();
+        }
+        assert_eq!(self.clock, self.accessed + TO_LIGHT, "first light");
+        self.clock
+    }
+
+    /// Clocks until it is dark, with the light of this clock.
+    fn lit_clocks(&mut self) -> u64 {
+        let from = self.clock;
+        while self.bench.is("enable") {
+            self.tick();
+            assert!(self.clock - from < 5000, "never dark");
+        }
+        self.clock - from
+    }
+
+    /// Reads the delivered frame and gives it back.
+    fn frame(&mut self) -> Vec<u8> {
+        while !self.bench.is("frame_ready") {
+            self.tick();
+        }
+        self.access(READ_FRAME, 0, 0);
+        self.bench.set("byte_taken", true);
+        let mut bytes = Vec::new();
+        for _ in 0..4000 {
+            if self.bench.is("byte_valid") {
+                bytes.push(self.bench.get("octet") as u8);
+            }
+            self.tick();
+        }
+        self.bench.set("byte_taken", false);
+        self.set(R::Control, control::RELEASE.into());
+        bytes
+    }
+}
+
+fn noise(clock: u64) -> u64 {
+    Dice::new(clock).range(0, 0x3FFF)
+}
+
+fn random(dice: &mut Dice) -> Settings {
+    Settings { frames: 1, ..Settings::random(dice) }
+}
+
+fn a_sample_is_summed_with_what_was_lit_latency_clocks_before(project: &Project) {
+    let mut engine = Engine::new(project);
+    engine.code = noise;
+    let dice = &mut Dice::new(38);
+    for _ in 0..25 {
+        let settings = random(dice);
+        let light = engine.start(&settings);
+        let bytes = engine.frame();
+        let frame = FpgaFrame::parse(&bytes).unwrap();
+        let mut expected = vec![[0; 2]; settings.patterns as usize];
+        for t in 0..settings.frame_clocks() {
+            let place = Place::of(&settings, t).unwrap();
+            if place.counts {
+                let code = noise(light + t + settings.latency);
+                expected[place.index as usize][usize::from(place.complement)] += code;
+            }
+        }
+        let seen: Vec<_> = frame.sums().map(|sums| [sums.positive, sums.negative]).collect();
+        assert_eq!(seen, expected, "{settings:?}");
+    }
+}
+
+fn a_frame_says_when_its_first_slot_was_lit(project: &Project) {
+    let mut engine = Engine::new(project);
+    let dice = &mut Dice::new(39);
+    for _ in 0..15 {
+        // The second frame has to wait for nothing: the first is read long after both were made, and
+        // so is lost unless it is given back in time.
+        let settings = Settings { patterns: 60, dwell: 9, blank: 0, frames: 2, ..random(dice) };
+        let light = engine.start(&settings);
+        let mut shown = Vec::new();
+        while shown.len() < 2 {
+            while !engine.bench.is("frame_ready") {
+                engine.tick();
+            }
+            engine.access(READ_FRAME, 0, 0);
+            engine.bench.set("byte_taken", true);
+            let mut header = Vec::new();
+            while header.len() < 32 {
+                if engine.bench.is("byte_valid") {
+                    header.push(engine.bench.get("octet") as u8);
+                }
+                engine.tick();
+            }
+            engine.bench.set("byte_taken", false);
+            engine.set(R::Control, control::RELEASE.into());
+            shown.push(FpgaFrame::parse_header(&header).unwrap().clock);
+        }
+        assert_eq!(shown[1] - shown[0], settings.frame_clocks(), "{settings:?}");
+        // The clock that the host reads is that of the access; the run's came one clock more than its depth later.
+        engine.read(R::ClockLow);
+        let read_at = engine.accessed;
+        let now = u64::from(engine.read(R::ClockLow)) - (engine.accessed - read_at);
+        assert_eq!(now - shown[0], read_at - (light - TO_LIGHT) - 14, "{settings:?}");
+        engine.clocks(100);
+    }
+}
+
+fn over_range_counts_from_the_first_light_on(project: &Project) {
+    let mut engine = Engine::new(project);
+    let dice = &mut Dice::new(40);
+    for _ in 0..20 {
+        engine.reset();
+        let trip = dice.range(1, 40);
+        let settings =
+            Settings { patterns: 10, dwell: 9, frames: 0, over_range_trip: trip, ..random(dice) };
+        engine.bench.set("over_range", true);
+        engine.start(&settings);
+        assert_eq!(engine.lit_clocks(), settings.latency + trip + TO_DARK, "{settings:?}");
+        assert_eq!(engine.read(R::Fault), FaultCode::OverRange as u32);
+    }
+}
+
+fn leds_are_lit_for_the_watchdogs_clocks_after_any_access(project: &Project) {
+    let mut engine = Engine::new(project);
+    let dice = &mut Dice::new(41);
+    for _ in 0..10 {
+        engine.reset();
+        let watchdog = dice.range(60, 400);
+        engine.start(&Settings { watchdog, frames: 0, ..random(dice) });
+        for _ in 0..12 {
+            engine.clocks(dice.range(0, watchdog - 30));
+            match dice.range(0, 2) {
+                0 => drop(engine.read(R::Status)),
+                1 => engine.set(R::Scratch, 1),
+                // Where there is nothing.
+                _ => drop(engine.access(READ_REGISTER, 0x900, 0)),
+            }
+            assert!(engine.bench.is("enable"), "dark though fed, watchdog {watchdog}");
+        }
+        engine.lit_clocks();
+        assert_eq!(engine.clock - engine.accessed, watchdog, "dark");
+        assert_eq!(engine.read(R::Fault), FaultCode::Watchdog as u32);
+    }
+}
+
+fn light_costs_what_the_register_map_says(project: &Project) {
+    let mut engine = Engine::new(project);
+    let dice = &mut Dice::new(42);
+    for _ in 0..25 {
+        engine.reset();
+        let limit = dice.range(0, 60);
+        let settings =
+            Settings { patterns: dice.range(1, 3), frames: 0, duty_limit: limit, ..random(dice) };
+        engine.start(&settings);
+        // Natural order: index 0 is pattern 0, which lights all, and its complement none.
+        let cost = |t| match Place::of(&settings, t).unwrap() {
+            Place { index: 0, complement: false, .. } => 2,
+            Place { index: 0, complement: true, .. } => 0,
+            _ => 1,
+        };
+        let mut spent = 0;
+        let trips = (0..).find(|&t| {
+            spent += cost(t);
+            spent > limit
+        });
+        assert_eq!(engine.lit_clocks(), trips.unwrap() + 1 + TO_DARK, "{settings:?}");
+        assert_eq!(engine.read(R::Fault), FaultCode::Duty as u32);
+    }
+}
