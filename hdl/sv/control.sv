@@ -78,11 +78,11 @@ module nirspi_control
 
     logic wanted;
     always_comb begin
-        write       = access && is_write;
-        stop        = access && to_control && (data & CONTROL_STOP) != 0;
-        clear       = access && to_control && (data & CONTROL_CLEAR_FAULT) != 0;
-        give_back   = access && to_control && (data & CONTROL_RELEASE) != 0;
-        wanted      = access && to_control && starts && interlock_now && !(running && !stop && !opens)
+        write     = access && is_write;
+        stop      = access && to_control && (data & CONTROL_STOP) != 0;
+        clear     = access && to_control && (data & CONTROL_CLEAR_FAULT) != 0;
+        give_back = access && to_control && (data & CONTROL_RELEASE) != 0;
+        wanted    = access && to_control && starts && interlock_now && !(running && !stop && !opens)
             && (clear || fault == 0 && !opens);
         begins      = wanted && in_range;
         begins_raw  = (data & CONTROL_START) == 0;

@@ -61,7 +61,7 @@ module nirspi_spi_slave
     always_comb byte_now = ((empty || stale) ? ( 0 ) : ( fifo_data[7:0] ));
     always_comb takes    = rises && selected && streams
         && (phase == Phase_Dummy && left == 0 || phase == Phase_Answer && out_left == 0);
-    always_comb pop      = stale || takes;
+    always_comb pop = stale || takes;
 
     always_comb lines_out = ((quad) ? ( out[31:28] ) : ( {2'b0, out[31], 1'b0} ));
 

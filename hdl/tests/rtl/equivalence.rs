@@ -53,9 +53,10 @@ fn windows() -> Suite {
     Suite { variant, scenario: scenario::across_a_window, rigs: 8, scenarios: 1 }
 }
 
-/// The first difference that any scenario shows.
+/// A difference that some scenario shows; those of one FPGA show nearly all that there are.
 pub fn difference(project: &Project) -> Option<String> {
-    [scenarios(4), long_sums(), windows()].iter().find_map(|suite| suite.run(project, 0).err())
+    let suites = [(scenarios(1), 0), (long_sums(), 0), (windows(), 0), (scenarios(3), SCENARIOS)];
+    suites.iter().find_map(|(suite, first)| suite.run(project, *first).err())
 }
 
 fn count(tallies: &[Tally], of: impl Fn(&Tally) -> u64) -> u64 {

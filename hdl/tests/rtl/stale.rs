@@ -24,6 +24,11 @@ fn check(folder: &Path, extension: &str, fresh: &BTreeMap<String, String>, whole
 }
 
 #[test]
+fn every_source_is_formatted() {
+    check(&folder("rtl"), "veryl", &Project::read().format(), true);
+}
+
+#[test]
 fn the_register_map_and_the_emitted_systemverilog_are_fresh() {
     let package = BTreeMap::from([("register_map".to_owned(), map::package())]);
     check(&folder("rtl"), "veryl", &package, false);

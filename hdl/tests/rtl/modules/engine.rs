@@ -4,7 +4,7 @@ use super::bundles::{Place, Settings};
 use crate::bench::Bench;
 use crate::project::Project;
 use crate::scenario::Dice;
-use nirspi_wire::fpga::FpgaFrame;
+use nirspi_wire::fpga::{FpgaFrame, HEADER_BYTES, frame_bytes};
 use nirspi_wire::host_port::{READ_FRAME, READ_REGISTER, WRITE_REGISTER};
 use nirspi_wire::register::{FaultCode, Register as R, control, mode};
 
@@ -64,6 +64,15 @@ impl Engine {
         }
     }
 
+    /// Ticks until a port is set.
+    fn until(&mut self, port: &str) {
+        let from = self.clock;
+        while !self.bench.is(port) {
+            self.tick();
+            assert!(self.clock - from < 5000, "{port} never comes");
+        }
+    }
+
     fn access(&mut self, opcode: u8, address: u16, data: u32) -> u32 {
         self.bench.set("operation", opcode & 3);
         self.bench.set("address", address);
@@ -71,9 +80,7 @@ impl Engine {
         self.bench.set("request", true);
         self.tick();
         self.bench.set("request", false);
-        while !self.bench.is("answered") {
-            self.tick();
-        }
+        self.until("answered");
         let value = self.bench.get("value") as u32;
         self.tick();
         value
@@ -110,9 +117,7 @@ impl Engine {
         self.bench.set("request", true);
         self.tick();
         self.bench.set("request", false);
-        while !self.bench.is("enable") {
-            self.tick();
-        }
+        self.until("enable");
         assert_eq!(self.clock, self.accessed + TO_LIGHT, "first light");
         self.clock
     }
@@ -127,20 +132,19 @@ impl Engine {
         self.clock - from
     }
 
-    /// Reads the delivered frame and gives it back.
-    fn frame(&mut self) -> Vec<u8> {
-        while !self.bench.is("frame_ready") {
-            self.tick();
-        }
+    /// The first bytes of the next frame, which is then given back.
+    fn frame(&mut self, count: usize) -> Vec<u8> {
+        self.until("frame_ready");
         self.access(READ_FRAME, 0, 0);
-        self.bench.set("byte_taken", true);
-        let mut bytes = Vec::new();
-        for _ in 0..4000 {
-            if self.bench.is("byte_valid") {
-                bytes.push(self.bench.get("octet") as u8);
-            }
-            self.tick();
-        }
+        let byte = |engine: &mut Self| {
+            engine.bench.set("byte_taken", false);
+            engine.until("byte_valid");
+            engine.bench.set("byte_taken", true);
+            let byte = engine.bench.get("octet") as u8;
+            engine.tick();
+            byte
+        };
+        let bytes = (0..count).map(|_| byte(self)).collect();
         self.bench.set("byte_taken", false);
         self.set(R::Control, control::RELEASE.into());
         bytes
@@ -162,7 +166,7 @@ fn a_sample_is_summed_with_what_was_lit_latency_clocks_before(project: &Project)
     for _ in 0..25 {
         let settings = random(dice);
         let light = engine.start(&settings);
-        let bytes = engine.frame();
+        let bytes = engine.frame(frame_bytes(settings.patterns as u16));
         let frame = FpgaFrame::parse(&bytes).unwrap();
         let mut expected = vec![[0; 2]; settings.patterns as usize];
         for t in 0..settings.frame_clocks() {
@@ -181,30 +185,15 @@ fn a_frame_says_when_its_first_slot_was_lit(project: &Project) {
     let mut engine = Engine::new(project);
     let dice = &mut Dice::new(39);
     for _ in 0..15 {
-        // The second frame has to wait for nothing: the first is read long after both were made, and
-        // so is lost unless it is given back in time.
+        // Frames that take longer than a header is read.
         let settings = Settings { patterns: 60, dwell: 9, blank: 0, frames: 2, ..random(dice) };
         let light = engine.start(&settings);
-        let mut shown = Vec::new();
-        while shown.len() < 2 {
-            while !engine.bench.is("frame_ready") {
-                engine.tick();
-            }
-            engine.access(READ_FRAME, 0, 0);
-            engine.bench.set("byte_taken", true);
-            let mut header = Vec::new();
-            while header.len() < 32 {
-                if engine.bench.is("byte_valid") {
-                    header.push(engine.bench.get("octet") as u8);
-                }
-                engine.tick();
-            }
-            engine.bench.set("byte_taken", false);
-            engine.set(R::Control, control::RELEASE.into());
-            shown.push(FpgaFrame::parse_header(&header).unwrap().clock);
-        }
+        let shown = [(); 2].map(|()| {
+            let header = engine.frame(HEADER_BYTES);
+            FpgaFrame::parse_header(&header).unwrap().clock
+        });
         assert_eq!(shown[1] - shown[0], settings.frame_clocks(), "{settings:?}");
-        // The clock that the host reads is that of the access; the run's came one clock more than its depth later.
+        // The host reads the clock as of its access; a run begins 14 clocks after its own.
         engine.read(R::ClockLow);
         let read_at = engine.accessed;
         let now = u64::from(engine.read(R::ClockLow)) - (engine.accessed - read_at);
