@@ -28,7 +28,7 @@ package nirspi_types;
         logic [32-1:0] over_range_trip ;
     } Settings;
 
-    /// Where a clock lies in a run. All of it is 0 outside.
+    /// Where a clock lies in a run. Outside, `index`, `complement` and `sweep_first` mean nothing; the rest is 0.
     typedef struct packed {
         logic          active     ;
         logic          slot_first ;
