@@ -8,6 +8,7 @@ use crate::modules::{self, Law};
 use crate::project::Project;
 use std::panic::{catch_unwind, set_hook, take_hook};
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread::ScopedJoinHandle;
 
 /// What is broken, in which file, what stands there, what stands there instead.
 type Fault = (&'static str, &'static str, &'static str, &'static str);
@@ -150,7 +151,7 @@ fn every_deliberate_fault_is_seen() {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let seen: Vec<_> = std::thread::scope(|scope| {
         let workers: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
-        workers.into_iter().map(|worker| worker.join()).collect()
+        workers.into_iter().map(ScopedJoinHandle::join).collect()
     });
     set_hook(hook);
 

@@ -56,9 +56,9 @@ impl Rig {
             let others = dice.range(1, at_most);
             for edge in 0..=others {
                 if (edge == 0) == host_is_slow {
-                    self.host_edge()
+                    self.host_edge();
                 } else {
-                    self.adc_edge()
+                    self.adc_edge();
                 }
                 if let Some(access) = stands {
                     assert_eq!(self.at_engine(), access);

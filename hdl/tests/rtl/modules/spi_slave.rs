@@ -87,7 +87,7 @@ impl Rig {
             *periods -= 1;
             // On lines that do not matter, noise.
             let noise = if quad { 0 } else { 0xE };
-            let value = word >> (bits - sent) & (1 << step) - 1;
+            let value = (word >> (bits - sent)) & if quad { 0xF } else { 1 };
             let [_, drive] = self.sck(value | noise);
             assert_eq!(drive, 0, "driven against the host");
         }
