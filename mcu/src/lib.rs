@@ -22,7 +22,7 @@
 //! ```
 //!
 //! One idea a module: `safety` (sensors), `configure` (checks), `fpga` (registers), `session` (commands), `run`
-//! and `burst` (data), `selftest`, `gateware`, `outbox` (what waits for the link), `camera` (who is asked when).
+//! and `burst` (data), `host_port` (which bytes a board moves), `selftest`, `gateware`, `outbox` (what waits for the link), `camera` (who is asked when).
 #![no_std]
 #![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 #![deny(clippy::arithmetic_side_effects)]
@@ -43,9 +43,12 @@ extern crate std;
 mod burst;
 mod camera;
 mod configure;
+mod crash;
 mod fpga;
 mod gateware;
+mod host_port;
 mod limits;
+mod merge;
 mod outbox;
 mod ports;
 mod run;
@@ -59,7 +62,10 @@ mod tests;
 
 pub use burst::RAW_PIECE_SAMPLES;
 pub use camera::Camera;
+pub use crash::{CRASH_TEXT_BYTES, CRASH_WORDS, Crash};
+pub use host_port::{HostPort, PortBus};
 pub use limits::Limits;
+pub use merge::Merger;
 pub use ports::{
     BoardInfo, BusError, FpgaBus, GatewareLoader, Inputs, LoadError, NAME_BYTES, NoLoader,
     PacketSink, Ports, Progress,

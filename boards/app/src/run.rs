@@ -1,0 +1,127 @@
+//! The camera's loop.
+//!
+//! The one law: it comes round at least every millisecond, but for a transfer of the longest frame; and whenever it
+//! waits, the tasks that serve the host run.
+
+use crate::link::CameraEnd;
+use crate::{Board, DEPTH_SIDE, DepthMap, DepthSensor, FpgaPort};
+use core::future::pending;
+use embassy_futures::select::select3;
+use embassy_futures::yield_now;
+use embassy_sync::blocking_mutex::raw::NoopRawMutex;
+use embassy_sync::signal::Signal;
+use embassy_time::{Duration, Instant, Timer};
+use nirspi_mcu::{
+    BoardInfo, Camera, Crash, FpgaBus, GatewareLoader, Limits, Micros, PortBus, Ports,
+};
+use nirspi_wire::fpga::MAX_FRAME_BYTES;
+use nirspi_wire::{State, Version};
+
+/// The longest sleep: safety is looked at that often.
+const TICK: Duration = Duration::from_millis(1);
+
+/// The promise of a restart is given this long to get to the host.
+const FAREWELL: Duration = Duration::from_millis(100);
+
+/// Depth maps on their way from [`measure_depth`] to [`run`]; the newest only.
+pub type DepthMailbox = Signal<NoopRawMutex, DepthMap>;
+
+/// All that makes a board a camera.
+pub struct Device<'b, B, P, G> {
+    /// Pins and sensors.
+    pub board: B,
+    /// The FPGA.
+    pub port: P,
+    /// Memory for one frame, where the port's DMA can reach it.
+    pub frame: &'b mut [u8; MAX_FRAME_BYTES],
+    /// Where bitstreams go.
+    pub loader: G,
+    /// Who it is: [`board_info`].
+    pub info: BoardInfo,
+    /// What protects people and LEDs.
+    pub limits: Limits,
+    /// From [`crash::take`](crate::crash::take).
+    pub crash: Option<Crash>,
+}
+
+/// Identity of a board by the name of its folder, with this firmware's version.
+#[must_use]
+pub fn board_info(board: &str, serial: &str) -> BoardInfo {
+    let part = |text: &str| text.parse().unwrap_or(0);
+    let version = Version(
+        part(env!("CARGO_PKG_VERSION_MAJOR")),
+        part(env!("CARGO_PKG_VERSION_MINOR")),
+        part(env!("CARGO_PKG_VERSION_PATCH")),
+    );
+    BoardInfo::new(board, serial, version)
+}
+
+/// Measures depth for ever, so that [`run`] never waits for the sensor.
+pub async fn measure_depth(mut sensor: impl DepthSensor, mailbox: &DepthMailbox) -> ! {
+    loop {
+        match sensor.next().await {
+            Some(map) => mailbox.signal(map),
+            None => Timer::after_secs(1).await,
+        }
+    }
+}
+
+fn now() -> Micros {
+    Micros(Instant::now().as_micros())
+}
+
+/// Runs the camera for ever.
+pub async fn run<B: Board, P: FpgaPort, G: GatewareLoader>(
+    device: Device<'_, B, P, G>,
+    mut link: CameraEnd<'_>,
+    depth: &DepthMailbox,
+) -> ! {
+    let Device { mut board, port, frame, mut loader, info, limits, crash } = device;
+    let mut bus = PortBus::new(port, frame);
+    let mut camera = Camera::new(info, limits);
+    let _ = crash;
+    loop {
+        board.feed_watchdog();
+        let inputs = board.inputs();
+        let has_gone = link.has_gone();
+        let (bytes, sink) = link.both();
+        let mut ports = Ports { bus: &mut bus, sink, loader: &mut loader };
+        let taken = if has_gone {
+            camera.link_closed(now(), &mut ports);
+            0
+        } else {
+            camera.receive(now(), bytes, &inputs, &mut ports)
+        };
+        let progress = camera.poll(now(), &inputs, &mut ports);
+        if let Some(map) = depth.try_take()
+            && camera.state() == State::Running
+        {
+            camera.depth(now(), DEPTH_SIDE, &map, &mut ports);
+        }
+        board.enable_leds(matches!(camera.state(), State::Configured | State::Running));
+        if has_gone {
+            link.clear();
+        }
+        link.taken(taken);
+        if let Some(into) = progress.reboot {
+            link.flush(FAREWELL).await;
+            board.restart(into);
+        }
+        if let Some((port, opcode, bytes)) = bus.wanted() {
+            let done = port.read_bytes(opcode, bytes).await;
+            bus.transferred(done);
+        } else if progress.worked || taken > 0 {
+            yield_now().await;
+        } else {
+            rest(&mut bus, &mut link).await;
+        }
+    }
+}
+
+/// Sleeps until there may be something to do.
+async fn rest<P: FpgaPort>(bus: &mut PortBus<'_, P>, link: &mut CameraEnd<'_>) {
+    // A line that is high already has not led to any work: the camera is waiting for something else.
+    let is_ready = bus.frame_ready() || bus.raw_ready();
+    let ready = async { if is_ready { pending().await } else { bus.port().ready().await } };
+    select3(link.news(), ready, Timer::after(TICK)).await;
+}
