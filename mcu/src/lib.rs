@@ -44,17 +44,20 @@ mod burst;
 mod camera;
 mod configure;
 mod crash;
+pub mod ecp5;
 mod fpga;
 mod gateware;
 mod host_port;
 mod limits;
 mod merge;
+pub mod ntc;
 mod outbox;
 mod ports;
 mod run;
 mod safety;
 mod selftest;
 mod session;
+pub mod staging;
 mod time;
 
 #[cfg(test)]
@@ -62,7 +65,7 @@ mod tests;
 
 pub use burst::RAW_PIECE_SAMPLES;
 pub use camera::Camera;
-pub use crash::{CRASH_TEXT_BYTES, CRASH_WORDS, Crash};
+pub use crash::{CRASH_WORDS, Crash};
 pub use host_port::{HostPort, PortBus};
 pub use limits::Limits;
 pub use merge::Merger;

@@ -2,6 +2,7 @@
 //!
 //! The one law: no call waits. What is not done yet says so, and is asked again on a later poll.
 
+use crate::Micros;
 use heapless::String;
 use nirspi_wire::{RebootInto, Version};
 
@@ -50,6 +51,12 @@ pub trait FpgaBus {
     /// # Errors
     /// [`BusError`]; the burst is then given up.
     fn raw(&mut self) -> Result<Option<&[u8]>, BusError>;
+
+    /// The memory that frames are transferred into, for the self-test to overwrite; what was held there is given
+    /// up. `None` where there is none of its own.
+    fn memory(&mut self) -> Option<&mut [u8]> {
+        None
+    }
 }
 
 /// The link towards the host: whole packets or nothing.
@@ -90,6 +97,12 @@ pub trait GatewareLoader {
     /// # Errors
     /// [`LoadError`].
     fn finish(&mut self) -> Result<(), LoadError>;
+
+    /// Goes on with what `finish` began, for a millisecond at most; whether there is more to do. The camera is not
+    /// to be polled until there is not: meanwhile there is no FPGA to talk to, and none that lights anything.
+    fn step(&mut self, _now: Micros) -> bool {
+        false
+    }
 }
 
 /// The loader of a board that has none.

@@ -1,10 +1,15 @@
 //! The camera against a scripted FPGA and a scripted link.
 
 mod commands;
+mod configuring;
+mod crash;
+mod fake_ecp5;
 mod fake_fpga;
 mod frames;
+mod host_port;
 mod laws;
 mod loading;
+mod merge;
 mod safety;
 mod selftest;
 mod support;

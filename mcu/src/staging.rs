@@ -1,0 +1,93 @@
+//! A bitstream is gathered in memory, and goes to the FPGA when all of it has come and is right.
+//!
+//! The one law: the FPGA keeps what it runs until there is a whole bitstream to replace it, and is not touched at
+//! all if that is the one it runs.
+
+use crate::ecp5::{Configuration, ConfigureError, IDCODE_LFE5UM5G_85F, SlaveSpi, must_load};
+use crate::{GatewareLoader, LoadError, Micros};
+use nirspi_wire::Crc32;
+
+/// Loads gateware by way of memory that is as long as the longest bitstream it takes.
+#[derive(Debug)]
+pub struct StagingLoader<'m, P> {
+    port: P,
+    memory: &'m mut [u8],
+    filled: usize,
+    crc: Crc32,
+    /// CRC-32 of the bitstream that the FPGA runs, if this firmware knows.
+    running: Option<u32>,
+    under_way: Option<Configuration>,
+    failure: Option<ConfigureError>,
+}
+
+impl<'m, P: SlaveSpi> StagingLoader<'m, P> {
+    /// With what the FPGA is known to run.
+    #[must_use]
+    pub fn new(port: P, memory: &'m mut [u8], running: Option<u32>) -> Self {
+        let crc = Crc32::new();
+        Self { port, memory, filled: 0, crc, running, under_way: None, failure: None }
+    }
+
+    /// CRC-32 of the bitstream that the FPGA runs, if this firmware knows.
+    #[must_use]
+    pub const fn running(&self) -> Option<u32> {
+        self.running
+    }
+
+    /// Why the last bitstream was not taken; once.
+    pub fn take_failure(&mut self) -> Option<ConfigureError> {
+        self.failure.take()
+    }
+}
+
+impl<P: SlaveSpi> GatewareLoader for StagingLoader<'_, P> {
+    fn begin(&mut self, total: u32) -> Result<(), LoadError> {
+        self.filled = 0;
+        self.crc = Crc32::new();
+        let fits = usize::try_from(total).is_ok_and(|total| total <= self.memory.len());
+        if fits { Ok(()) } else { Err(LoadError::Unsupported) }
+    }
+
+    fn write(&mut self, data: &[u8]) -> Result<(), LoadError> {
+        let end = self.filled.saturating_add(data.len());
+        let room = self.memory.get_mut(self.filled..end).ok_or(LoadError::Unsupported)?;
+        room.copy_from_slice(data);
+        self.crc.update(data);
+        self.filled = end;
+        Ok(())
+    }
+
+    fn finish(&mut self) -> Result<(), LoadError> {
+        if must_load(self.port.done(), self.running, self.crc.value()) {
+            self.running = None;
+            self.failure = None;
+            self.under_way = Some(Configuration::new(IDCODE_LFE5UM5G_85F));
+        }
+        Ok(())
+    }
+
+    fn step(&mut self, now: Micros) -> bool {
+        let Some(configuration) = &mut self.under_way else { return false };
+        let bitstream = self.memory.get(..self.filled).unwrap_or(&[]);
+        let Some(result) = configuration.poll(now, &mut self.port, bitstream) else { return true };
+        match result {
+            Ok(()) => self.running = Some(self.crc.value()),
+            Err(failure) => self.failure = Some(failure),
+        }
+        self.under_way = None;
+        false
+    }
+}
+
+/// A bitstream ends with bytes of 0xFF, whose clocks the FPGA needs to wake up, as does erased flash memory: so
+/// many are taken after the last other byte.
+const TRAILER_BYTES: usize = 32;
+
+/// The bitstream at the beginning of a region of flash memory whose rest is erased; `None` if there is none.
+/// Bitstream files begin with a comment (0xFF, 0x00) or with the preamble (0xFF, 0xFF, 0xBD, 0xB3).
+#[must_use]
+pub fn stored(region: &[u8]) -> Option<&[u8]> {
+    let begins = region.starts_with(&[0xFF, 0x00]) || region.starts_with(&[0xFF, 0xFF, 0xBD, 0xB3]);
+    let end = region.iter().rposition(|&byte| byte != 0xFF)?.saturating_add(TRAILER_BYTES);
+    Some(region.get(..end).unwrap_or(region)).filter(|_| begins)
+}
