@@ -12,8 +12,8 @@ use crate::run::{Counters, Run, SAMPLE_BYTES};
 use crate::selftest::TestFrame;
 use crate::session::Session;
 use crate::{
-    BoardInfo, FpgaBus, GatewareLoader, Inputs, Limits, Micros, PacketSink, Ports, Progress, fpga,
-    safety,
+    BoardInfo, Crash, FpgaBus, GatewareLoader, Inputs, Limits, Micros, PacketSink, Ports, Progress,
+    fpga, safety,
 };
 use nirspi_wire::packet::{MAX_HOST_PACKET, PacketError, open};
 use nirspi_wire::register::{Register, control, status};
@@ -35,6 +35,13 @@ impl Camera {
     #[must_use]
     pub fn new(info: BoardInfo, limits: Limits) -> Self {
         Self { deframer: Deframer::new(), machine: Machine::new(info, limits) }
+    }
+
+    /// The firmware has restarted after this crash: the first host is told, after the answer to its `Hello`.
+    #[must_use]
+    pub fn after_crash(mut self, crash: Option<Crash>) -> Self {
+        self.machine.crash = crash;
+        self
     }
 
     /// Takes bytes from the host, in any pieces; returns how many were taken. The rest is to be offered
@@ -61,7 +68,7 @@ impl Camera {
                 Ok(request) => machine.carry_out(now, &request, inputs, ports),
                 Err(_) => machine.count_damage(now),
             }
-            machine.outbox.flush(&machine.info, ports.sink);
+            machine.flush(ports.sink);
         }
         bytes.len().saturating_sub(rest.len())
     }
@@ -141,6 +148,8 @@ pub(crate) struct Machine {
     pub counters: Counters,
     pub loading: Option<Loading>,
     pub reboot: Option<RebootInto>,
+    /// Of the last start, not reported yet.
+    pub crash: Option<Crash>,
     pub commands_damaged: u32,
     pub last_command: Micros,
     last_check: Option<Micros>,
@@ -165,6 +174,7 @@ impl Machine {
             counters: Counters::default(),
             loading: None,
             reboot: None,
+            crash: None,
             commands_damaged: 0,
             last_command: Micros(0),
             last_check: None,
@@ -210,17 +220,21 @@ impl Machine {
             self.release_pending = fpga::control(*bus, control::RELEASE).is_err();
         }
 
-        let mut worked = self.outbox.flush(&self.info, *sink);
+        let mut worked = self.flush(*sink);
         worked |= match self.activity {
             Activity::Resting => false,
             Activity::Run(_) => self.step_run(now, *bus, *sink),
             Activity::Burst(_) => self.step_burst(now, *bus, *sink),
             Activity::TestFrame(_) => self.step_test(now, *bus),
         };
-        worked |= self.outbox.flush(&self.info, *sink);
+        worked |= self.flush(*sink);
 
         let done = matches!(self.activity, Activity::Resting) && self.outbox.is_empty();
         Progress { worked, reboot: self.reboot.filter(|_| done) }
+    }
+
+    fn flush(&mut self, sink: &mut impl PacketSink) -> bool {
+        self.outbox.flush(&self.info, &mut self.crash, sink)
     }
 
     pub fn guard_sensors(&mut self, now: Micros, inputs: &Inputs, bus: &mut impl FpgaBus) {

@@ -5,12 +5,10 @@
 use crate::Micros;
 use heapless::String;
 use nirspi_wire::Crc32;
-
-/// Most bytes of the text of a crash.
-pub const CRASH_TEXT_BYTES: usize = 128;
+use nirspi_wire::message::CRASH_TEXT_MAX;
 
 /// Words of memory that a record takes, where a restart does not clear them.
-pub const CRASH_WORDS: usize = HEAD_WORDS + CRASH_TEXT_BYTES / 4 + 1;
+pub const CRASH_WORDS: usize = HEAD_WORDS + CRASH_TEXT_MAX / 4 + 1;
 
 /// Magic, uptime, length of the text.
 const HEAD_WORDS: usize = 4;
@@ -24,7 +22,7 @@ pub struct Crash {
     /// When, since power-up.
     pub uptime: Micros,
     /// Where and why.
-    pub text: String<CRASH_TEXT_BYTES>,
+    pub text: String<CRASH_TEXT_MAX>,
 }
 
 impl Crash {
@@ -70,7 +68,7 @@ impl Crash {
             return None;
         }
         let bytes = text.iter().flat_map(|word| word.to_le_bytes());
-        let mut kept = heapless::Vec::<u8, CRASH_TEXT_BYTES>::new();
+        let mut kept = heapless::Vec::<u8, CRASH_TEXT_MAX>::new();
         for byte in bytes.take(usize::try_from(length).ok()?) {
             kept.push(byte).ok()?;
         }
@@ -89,7 +87,7 @@ fn checksum(words: &[u32; CRASH_WORDS]) -> u32 {
 }
 
 /// Takes what there is room for.
-struct Cut(String<CRASH_TEXT_BYTES>);
+struct Cut(String<CRASH_TEXT_MAX>);
 
 impl core::fmt::Write for Cut {
     fn write_str(&mut self, text: &str) -> core::fmt::Result {

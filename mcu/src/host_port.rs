@@ -202,4 +202,9 @@ impl<P: HostPort> FpgaBus for PortBus<'_, P> {
     fn raw(&mut self) -> Result<Option<&[u8]>, BusError> {
         self.data(Data::Raw)
     }
+
+    fn memory(&mut self) -> Option<&mut [u8]> {
+        self.transfer = Transfer::None;
+        Some(self.buffer)
+    }
 }

@@ -3,12 +3,13 @@
 //! The one law: what is put in comes out once, in order. A command is taken only while there is
 //! [room](Outbox::has_room_for_a_command) for its reply and for all that can follow it on its own accord.
 
-use crate::{BoardInfo, PacketSink};
+use crate::{BoardInfo, Crash, PacketSink};
 use heapless::Deque;
+use nirspi_wire::message::CRASH_TEXT_MAX;
 use nirspi_wire::packet::{encode, overhead};
 use nirspi_wire::{
-    ADC_BITS, ADC_HZ, Answer, DeviceMessage, Event, Identity, PROTOCOL_VERSION, Refusal, Reply,
-    SIDE, Version,
+    ADC_BITS, ADC_HZ, Answer, CrashReport, DeviceMessage, Event, Identity, PROTOCOL_VERSION,
+    Refusal, Reply, SIDE, Version,
 };
 
 /// Wavelength of the LEDs (paper, section 2.A).
@@ -30,19 +31,24 @@ impl Outcome {
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Notice {
-    Reply { id: u16, outcome: Outcome },
+    Reply {
+        id: u16,
+        outcome: Outcome,
+    },
     Event(Event),
+    /// Of the last start.
+    Crash,
 }
 
 /// Notices that wait.
 const CAPACITY: usize = 16;
 
 /// The most that one command can lead to before the next one is taken: its reply, a fault, the end of a
-/// run (or the loss of a raw burst).
-const NOTICES_OF_A_COMMAND: usize = 3;
+/// run (or the loss of a raw burst), a crash report.
+const NOTICES_OF_A_COMMAND: usize = 4;
 
-/// Bytes of postcard of the longest notice: an identity with two full names is 91 at most.
-const NOTICE_BYTES: usize = 128;
+/// Bytes of postcard of the longest notice, a crash report; an identity with two full names is 91 at most.
+const NOTICE_BYTES: usize = 16 + CRASH_TEXT_MAX;
 
 #[derive(Debug, Default)]
 pub(crate) struct Outbox(Deque<Notice, CAPACITY>);
@@ -66,11 +72,21 @@ impl Outbox {
     }
 
     /// Sends what the link has room for; whether that was anything.
-    pub fn flush(&mut self, info: &BoardInfo, sink: &mut impl PacketSink) -> bool {
+    pub fn flush(
+        &mut self,
+        info: &BoardInfo,
+        crash: &mut Option<Crash>,
+        sink: &mut impl PacketSink,
+    ) -> bool {
         let mut worked = false;
         while let Some(notice) = self.0.front() {
-            if !send(&message(notice, info), NOTICE_BYTES, sink) {
+            let sent = message(notice, info, crash.as_ref())
+                .is_none_or(|message| send(&message, NOTICE_BYTES, sink));
+            if !sent {
                 break;
+            }
+            if *notice == Notice::Crash {
+                *crash = None;
             }
             self.0.pop_front();
             worked = true;
@@ -79,8 +95,17 @@ impl Outbox {
     }
 }
 
-fn message<'m>(notice: &Notice, info: &'m BoardInfo) -> DeviceMessage<'m> {
-    match *notice {
+/// `None`: a crash that has been reported already.
+fn message<'m>(
+    notice: &Notice,
+    info: &'m BoardInfo,
+    crash: Option<&'m Crash>,
+) -> Option<DeviceMessage<'m>> {
+    Some(match *notice {
+        Notice::Crash => {
+            let Crash { uptime, text } = crash?;
+            DeviceMessage::Crash(CrashReport { uptime_us: uptime.0, text })
+        }
         Notice::Event(event) => DeviceMessage::Event(event),
         Notice::Reply { id, outcome: Outcome::Other(outcome) } => {
             DeviceMessage::Reply(Reply { id, outcome })
@@ -99,7 +124,7 @@ fn message<'m>(notice: &Notice, info: &'m BoardInfo) -> DeviceMessage<'m> {
             };
             DeviceMessage::Reply(Reply { id, outcome: Ok(Answer::Hello(identity)) })
         }
-    }
+    })
 }
 
 /// Bytes of postcard around the samples of a frame, a raw burst or a depth map, at most.

@@ -52,6 +52,9 @@ fn examine(bus: &mut impl FpgaBus, inputs: &Inputs, limits: &Limits) -> SelfTest
     let plausible = reading.is_some_and(|reading| safety::plausible(reading, limits));
     note(&mut report, SelfTestReport::TEMPERATURE, plausible);
     note(&mut report, SelfTestReport::INTERLOCK, inputs.interlock_closed);
+    if let Some(memory) = bus.memory() {
+        note(&mut report, SelfTestReport::MEMORY, memory_holds(memory));
+    }
     report
 }
 
@@ -73,6 +76,27 @@ fn every_bit_holds(bus: &mut impl FpgaBus) -> Result<bool, BusError> {
         }
     }
     Ok(true)
+}
+
+/// Every bit as 0 and as 1 between neighbours of either kind, and every byte by its own address.
+fn memory_holds(memory: &mut [u8]) -> bool {
+    let same = |byte: u8| move |_: usize| byte;
+    // An odd factor above 256: bytes that a stuck address line would confuse differ.
+    let address = |at: usize| (at.wrapping_mul(0x9E37) >> 8) as u8;
+    holds(memory, same(0x00))
+        && holds(memory, same(0xFF))
+        && holds(memory, same(0x55))
+        && holds(memory, same(0xAA))
+        && holds(memory, address)
+}
+
+fn holds(memory: &mut [u8], pattern: impl Fn(usize) -> u8) -> bool {
+    for (at, byte) in memory.iter_mut().enumerate() {
+        *byte = pattern(at);
+    }
+    // Without it the compiler knows what stands there, and reads nothing.
+    let memory = core::hint::black_box(memory);
+    memory.iter().enumerate().all(|(at, &byte)| byte == pattern(at))
 }
 
 /// The sums of the test frame.

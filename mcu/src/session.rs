@@ -5,7 +5,7 @@
 //! ([`Refusal::Bus`]), which leaves nothing configured.
 
 use crate::camera::{Activity, Machine};
-use crate::outbox::Outcome;
+use crate::outbox::{Notice, Outcome};
 use crate::{
     FpgaBus, GatewareLoader, Inputs, Micros, PacketSink, Ports, configure, fpga, gateware, safety,
 };
@@ -72,6 +72,9 @@ impl Machine {
         let gateware = fpga::version(bus);
         self.stop(id, now, bus, Outcome::Hello { gateware });
         self.session = if protocol == PROTOCOL_VERSION { Session::Open } else { Session::Foreign };
+        if self.session == Session::Open && self.crash.is_some() {
+            self.outbox.push(Notice::Crash);
+        }
     }
 
     /// LEDs off. The reply comes when no frame of the run is left, and `RunEnded` follows it.

@@ -78,8 +78,7 @@ pub async fn run<B: Board, P: FpgaPort, G: GatewareLoader>(
 ) -> ! {
     let Device { mut board, port, frame, mut loader, info, limits, crash } = device;
     let mut bus = PortBus::new(port, frame);
-    let mut camera = Camera::new(info, limits);
-    let _ = crash;
+    let mut camera = Camera::new(info, limits).after_crash(crash);
     loop {
         board.feed_watchdog();
         let inputs = board.inputs();

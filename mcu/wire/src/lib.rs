@@ -7,6 +7,7 @@
 //! * [`register`]: the register map of the FPGA, its fault codes and bits,
 //! * [`fpga`]: the layout of a frame as the FPGA's host port delivers it,
 //! * [`host_port`]: how accesses cross the host port,
+//! * [`tunnel`]: how the same accesses cross a serial line to a simulator,
 //! * [`walsh`]: which sign of which Hadamard row an LED shows,
 //! * [`usb`]: identity on the bus.
 //!
@@ -29,6 +30,7 @@ pub mod message;
 pub mod packet;
 pub mod register;
 pub mod samples;
+pub mod tunnel;
 pub mod usb;
 pub mod walsh;
 
@@ -36,9 +38,10 @@ mod crc32;
 
 pub use crc32::{Crc32, crc32};
 pub use message::{
-    Answer, Command, ConfigField, ConfigProblem, Configuration, Depth, DeviceMessage, Event,
-    EventKind, Fault, Frame, FrameFlags, GatewareChunk, Identity, PatternOrder, Raw, RebootInto,
-    Refusal, Reply, Request, RunLength, SampleSource, SelfTestReport, State, Status, Version,
+    Answer, Command, ConfigField, ConfigProblem, Configuration, CrashReport, Depth, DeviceMessage,
+    Event, EventKind, Fault, Frame, FrameFlags, GatewareChunk, Identity, PatternOrder, Raw,
+    RebootInto, Refusal, Reply, Request, RunLength, SampleSource, SelfTestReport, State, Status,
+    Version,
 };
 pub use packet::{Deframed, Deframer, PacketError, encode, open};
 pub use samples::Samples;

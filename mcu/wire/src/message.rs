@@ -8,6 +8,8 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// A host that sends no valid command for this long while LEDs are on is taken for dead, and they go off.
 pub const HOST_SILENCE_US: u64 = 5_000_000;
+/// Most bytes of the text of a [`CrashReport`].
+pub const CRASH_TEXT_MAX: usize = 128;
 /// Most bytes of a [`GatewareChunk`].
 pub const GATEWARE_CHUNK_MAX: usize = 2048;
 
@@ -173,6 +175,9 @@ pub enum DeviceMessage<'a> {
     Depth(Depth<'a>),
     /// Something happened.
     Event(Event),
+    /// The firmware had crashed before this start; once, after the first `Hello`.
+    #[serde(borrow)]
+    Crash(CrashReport<'a>),
 }
 
 /// Answer to the command of the same id.
@@ -426,6 +431,15 @@ pub struct Depth<'a> {
     pub distances_mm: Words<'a>,
 }
 
+/// What a crash of the firmware has left behind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct CrashReport<'a> {
+    /// When, on the clock of the start that ended with it.
+    pub uptime_us: u64,
+    /// Where and why, at most [`CRASH_TEXT_MAX`] bytes.
+    pub text: &'a str,
+}
+
 /// Something happened.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Event {
@@ -514,14 +528,17 @@ impl SelfTestReport {
     pub const TEMPERATURE: u32 = 1 << 4;
     /// The interlock is closed.
     pub const INTERLOCK: u32 = 1 << 5;
+    /// The memory that frames pass through holds every pattern.
+    pub const MEMORY: u32 = 1 << 6;
 
     /// Name of every check, by bit.
-    pub const NAMES: [(u32, &'static str); 6] = [
+    pub const NAMES: [(u32, &'static str); 7] = [
         (Self::FPGA_IDENTITY, "FPGA identity"),
         (Self::FPGA_BUS, "FPGA bus"),
         (Self::LEDS_OFF, "LEDs off at rest"),
         (Self::TEST_FRAME, "test frame"),
         (Self::TEMPERATURE, "temperature sensor"),
         (Self::INTERLOCK, "interlock"),
+        (Self::MEMORY, "frame memory"),
     ];
 }

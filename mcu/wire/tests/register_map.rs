@@ -97,6 +97,7 @@ fn bits_codes_and_limits_are_these() {
         "8 test frame",
         "16 temperature sensor",
         "32 interlock",
+        "64 frame memory",
     ];
     assert_eq!(checks, expected);
     assert_eq!(register::ORDER_TABLE, 0x0400);

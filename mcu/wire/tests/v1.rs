@@ -11,10 +11,10 @@
 mod variants;
 
 use nirspi_wire::{
-    Answer, Command, ConfigField, ConfigProblem, Configuration, Depth, DeviceMessage, Event,
-    EventKind, Fault, Frame, FrameFlags, GatewareChunk, Identity, PROTOCOL_VERSION, PatternOrder,
-    Raw, RebootInto, Refusal, Reply, Request, RunLength, SampleSource, Samples, SelfTestReport,
-    State, Status, Version, encode, open, samples::Words,
+    Answer, Command, ConfigField, ConfigProblem, Configuration, CrashReport, Depth, DeviceMessage,
+    Event, EventKind, Fault, Frame, FrameFlags, GatewareChunk, Identity, PROTOCOL_VERSION,
+    PatternOrder, Raw, RebootInto, Refusal, Reply, Request, RunLength, SampleSource, Samples,
+    SelfTestReport, State, Status, Version, encode, open, samples::Words,
 };
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -482,6 +482,10 @@ fn device_messages() -> Vec<(DeviceMessage<'static>, &'static str)> {
         (
             DeviceMessage::Event(Event { device_time_us: 4_000, kind: EventKind::CommandDamaged }),
             "04 a0 1f 03",
+        ),
+        (
+            DeviceMessage::Crash(CrashReport { uptime_us: 5_000, text: "hard fault" }),
+            "05 88 27 0a 68 61 72 64 20 66 61 75 6c 74",
         ),
     ]
 }

@@ -3,10 +3,10 @@
 //! Messages borrow; here they borrow from leaked memory, a few megabytes in a test run.
 
 use nirspi_wire::{
-    Answer, Command, ConfigField, ConfigProblem, Configuration, Depth, DeviceMessage, Event,
-    EventKind, Fault, Frame, FrameFlags, GatewareChunk, Identity, PatternOrder, Raw, RebootInto,
-    Refusal, Reply, Request, RunLength, SampleSource, Samples, SelfTestReport, State, Status,
-    Version, message::GATEWARE_CHUNK_MAX, samples::Words,
+    Answer, Command, ConfigField, ConfigProblem, Configuration, CrashReport, Depth, DeviceMessage,
+    Event, EventKind, Fault, Frame, FrameFlags, GatewareChunk, Identity, PatternOrder, Raw,
+    RebootInto, Refusal, Reply, Request, RunLength, SampleSource, Samples, SelfTestReport, State,
+    Status, Version, message::GATEWARE_CHUNK_MAX, samples::Words,
 };
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -229,5 +229,7 @@ pub fn device_message() -> impl Strategy<Value = DeviceMessage<'static>> {
         }),
         1 => (any::<u64>(), event())
             .prop_map(|(device_time_us, kind)| DeviceMessage::Event(Event { device_time_us, kind })),
+        1 => (any::<u64>(), text())
+            .prop_map(|(uptime_us, text)| DeviceMessage::Crash(CrashReport { uptime_us, text })),
     ]
 }

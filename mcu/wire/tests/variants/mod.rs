@@ -33,7 +33,7 @@ variants! {
     sample_source: SampleSource { Detector, TestPattern }
     run_length: RunLength { Continuous, Frames }
     reboot_into: RebootInto { Application, Bootloader }
-    device_message: DeviceMessage { Reply, Frame, Raw, Depth, Event }
+    device_message: DeviceMessage { Reply, Frame, Raw, Depth, Event, Crash }
     answer: Answer { Hello, Done, Status, SelfTest, Register, Gateware }
     refusal: Refusal {
         Protocol, State, Configuration, Fault, NoSuchRegister, RawLength, GatewareOffset, GatewareCrc,
@@ -85,7 +85,10 @@ pub fn of_device_message(message: &DeviceMessage, seen: &mut Seen) {
             Err(given) => of_refusal(given, seen),
         },
         DeviceMessage::Event(event) => event_kind(&event.kind, seen),
-        DeviceMessage::Frame(_) | DeviceMessage::Raw(_) | DeviceMessage::Depth(_) => {}
+        DeviceMessage::Frame(_)
+        | DeviceMessage::Raw(_)
+        | DeviceMessage::Depth(_)
+        | DeviceMessage::Crash(_) => {}
     }
 }
 

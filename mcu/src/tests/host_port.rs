@@ -1,0 +1,257 @@
+//! The host port as a bus: the right length, the same bytes until the release, and never an older frame.
+
+use super::fake_fpga::FakeFpga;
+use super::support::*;
+use crate::{
+    BoardInfo, BusError, Camera, FpgaBus, HostPort, Limits, Micros, NoLoader, PortBus, Ports,
+};
+use nirspi_wire::fpga::{MAX_FRAME_BYTES, frame_bytes};
+use nirspi_wire::host_port::{READ_FRAME, READ_RAW};
+use nirspi_wire::register::{Register, control};
+use nirspi_wire::{
+    Answer, Command, DeviceMessage, EventKind, PROTOCOL_VERSION, Reply, RunLength, SelfTestReport,
+};
+use std::boxed::Box;
+use std::vec::Vec;
+
+/// An FPGA whose data takes a transfer to get.
+#[derive(Default)]
+struct Port {
+    fpga: FakeFpga,
+    /// Opcode and length of every transfer.
+    transfers: Vec<(u8, usize)>,
+    /// Transfers that fail before the next succeeds.
+    failures: u32,
+}
+
+impl HostPort for Port {
+    fn write(&mut self, address: u16, value: u32) -> Result<(), BusError> {
+        self.fpga.write(address, value)
+    }
+
+    fn read(&mut self, address: u16) -> Result<u32, BusError> {
+        self.fpga.read(address)
+    }
+
+    fn frame_ready(&mut self) -> bool {
+        self.fpga.frame_ready()
+    }
+
+    fn raw_ready(&mut self) -> bool {
+        self.fpga.raw_ready()
+    }
+}
+
+impl Port {
+    /// Beyond the end of what there is, zeros, as the FPGA gives.
+    fn transfer(&mut self, opcode: u8, into: &mut [u8]) -> Result<(), BusError> {
+        self.transfers.push((opcode, into.len()));
+        if self.failures > 0 {
+            self.failures -= 1;
+            return Err(BusError::Transfer);
+        }
+        let there = match opcode {
+            READ_FRAME => self.fpga.frame.clone().unwrap_or_default(),
+            READ_RAW => self.fpga.raw.clone().unwrap_or_default(),
+            other => panic!("opcode {other:#x}"),
+        };
+        into.fill(0);
+        let length = into.len().min(there.len());
+        into[..length].copy_from_slice(&there[..length]);
+        Ok(())
+    }
+}
+
+fn bus() -> PortBus<'static, Port> {
+    PortBus::new(Port::default(), Box::leak(Box::new([0; MAX_FRAME_BYTES])))
+}
+
+/// What a board does between two polls; whether there was anything to do.
+fn serve(bus: &mut PortBus<'_, Port>) -> bool {
+    let Some((port, opcode, bytes)) = bus.wanted() else { return false };
+    let done = port.transfer(opcode, bytes);
+    bus.transferred(done);
+    true
+}
+
+fn start(bus: &mut PortBus<'_, Port>, patterns: u16) {
+    bus.write(Register::Patterns.address(), patterns.into()).unwrap();
+    control(bus, control::START);
+}
+
+fn control(bus: &mut PortBus<'_, Port>, bits: u32) {
+    bus.write(Register::Control.address(), bits).unwrap();
+}
+
+/// Sequence number in a frame's header.
+fn sequence(frame: &[u8]) -> u8 {
+    frame[8]
+}
+
+#[test]
+fn a_frame_is_transferred_once_and_given_until_it_is_released() {
+    let mut bus = bus();
+    start(&mut bus, 3);
+    bus.port().fpga.make_frame();
+    assert!(bus.wanted().is_none(), "nobody has asked");
+    assert_eq!(bus.frame(), Ok(None));
+    assert_eq!(bus.frame(), Ok(None));
+    assert!(serve(&mut bus));
+    let first = bus.frame().unwrap().unwrap().to_vec();
+    assert_eq!(first, bus.port().fpga.frame.clone().unwrap());
+    assert_eq!(bus.frame().unwrap().unwrap(), first);
+    assert!(!serve(&mut bus));
+    assert_eq!(bus.port().transfers, [(READ_FRAME, frame_bytes(3))]);
+}
+
+#[test]
+fn after_a_release_an_older_frame_is_never_given() {
+    let mut bus = bus();
+    start(&mut bus, 2);
+    for number in 0..3 {
+        bus.port().fpga.make_frame();
+        assert_eq!(bus.frame(), Ok(None), "frame {number} is to be transferred first");
+        serve(&mut bus);
+        assert_eq!(sequence(bus.frame().unwrap().unwrap()), number);
+        control(&mut bus, control::RELEASE);
+    }
+}
+
+#[test]
+fn a_transfer_that_is_wanted_no_more_is_forgotten() {
+    let mut bus = bus();
+    start(&mut bus, 2);
+    bus.port().fpga.make_frame();
+    assert_eq!(bus.frame(), Ok(None));
+    control(&mut bus, control::RELEASE);
+    assert!(!serve(&mut bus));
+    // Its end, should the board report it late, belongs to nothing.
+    bus.transferred(Ok(()));
+    assert_eq!(bus.frame(), Ok(None));
+}
+
+/// The FPGA copies its settings when it starts.
+#[test]
+fn a_frame_is_as_long_as_the_run_was_started_with() {
+    let mut bus = bus();
+    start(&mut bus, 4);
+    bus.write(Register::Patterns.address(), 9).unwrap();
+    assert_eq!(bus.frame(), Ok(None));
+    assert_eq!(bus.wanted().unwrap().2.len(), frame_bytes(4));
+    start(&mut bus, 9);
+    assert_eq!(bus.frame(), Ok(None));
+    assert_eq!(bus.wanted().unwrap().2.len(), frame_bytes(9));
+    start(&mut bus, u16::MAX);
+    assert_eq!(bus.frame(), Ok(None));
+    assert_eq!(bus.wanted().unwrap().2.len(), MAX_FRAME_BYTES, "and never beyond the buffer");
+}
+
+#[test]
+fn a_burst_is_as_long_as_asked_for_and_outlives_a_release() {
+    let mut bus = bus();
+    bus.write(Register::RawLength.address(), 5).unwrap();
+    control(&mut bus, control::START_RAW);
+    assert_eq!(bus.raw(), Ok(None));
+    serve(&mut bus);
+    assert_eq!(bus.raw().unwrap().unwrap().len(), 10);
+    control(&mut bus, control::RELEASE);
+    assert_eq!(bus.raw().unwrap().unwrap().len(), 10);
+    control(&mut bus, control::START_RAW);
+    assert_eq!(bus.raw(), Ok(None));
+    assert_eq!(bus.port().transfers, [(READ_RAW, 10)]);
+}
+
+#[test]
+fn a_failed_transfer_is_tried_again_and_given_up_after_three() {
+    let mut bus = bus();
+    start(&mut bus, 2);
+    bus.port().fpga.make_frame();
+    bus.port().failures = 2;
+    assert_eq!(bus.frame(), Ok(None));
+    while serve(&mut bus) {}
+    assert_eq!(sequence(bus.frame().unwrap().unwrap()), 0);
+    control(&mut bus, control::RELEASE);
+
+    bus.port().fpga.make_frame();
+    bus.port().failures = 3;
+    assert_eq!(bus.frame(), Ok(None));
+    while serve(&mut bus) {}
+    assert_eq!(bus.frame(), Err(BusError::Transfer));
+    assert_eq!(bus.frame(), Ok(None), "told once; then it is asked for anew");
+}
+
+/// The camera over a host port, polled as a board does.
+struct Device {
+    camera: Camera,
+    bus: PortBus<'static, Port>,
+    link: Link,
+    now: Micros,
+}
+
+impl Device {
+    fn new() -> Self {
+        let info = BoardInfo::new("bench", "0001", nirspi_wire::Version(1, 2, 3));
+        let camera = Camera::new(info, Limits::default());
+        let mut device = Self { camera, bus: bus(), link: Link::default(), now: Micros(1_000) };
+        device.ask(Command::Hello { protocol: PROTOCOL_VERSION });
+        device
+    }
+
+    fn turn(&mut self, bytes: &[u8]) {
+        self.now.0 += 100;
+        let ports = &mut Ports { bus: &mut self.bus, sink: &mut self.link, loader: &mut NoLoader };
+        let taken = self.camera.receive(self.now, bytes, &GOOD_INPUTS, ports);
+        assert_eq!(taken, bytes.len());
+        self.camera.poll(self.now, &GOOD_INPUTS, ports);
+        serve(&mut self.bus);
+    }
+
+    fn ask(&mut self, command: Command<'_>) -> Vec<DeviceMessage<'static>> {
+        self.turn(&packet(1, command));
+        self.turn(&[]);
+        self.turn(&[]);
+        self.heard()
+    }
+
+    fn heard(&mut self) -> Vec<DeviceMessage<'static>> {
+        self.link.packets.drain(..).map(|packet| message(&packet)).collect()
+    }
+}
+
+#[test]
+fn the_camera_streams_over_the_port_and_counts_what_could_not_be_read() {
+    let mut device = Device::new();
+    device.ask(Command::Configure(SMALL));
+    device.ask(Command::Start(RunLength::Frames(5)));
+    let mut heard = Vec::new();
+    for number in 0..5 {
+        device.bus.port().failures = if number == 2 { 3 } else { 0 };
+        device.bus.port().fpga.make_frame();
+        for _ in 0..6 {
+            device.turn(&[]);
+        }
+        heard.extend(device.heard());
+    }
+    let sequences: Vec<u32> = frames(&heard).iter().map(|frame| frame.sequence).collect();
+    assert_eq!(sequences, [0, 1, 3, 4]);
+    let ended = EventKind::RunEnded {
+        run: 1,
+        frames_made: 5,
+        frames_dropped: 0,
+        fpga_frames_lost: 0,
+        fpga_frames_corrupt: 1,
+    };
+    assert_eq!(events(&heard), [ended]);
+}
+
+#[test]
+fn the_self_test_tries_the_frame_memory_too() {
+    let mut device = Device::new();
+    device.bus.port().fpga.instant = true;
+    let heard = device.ask(Command::SelfTest);
+    let [DeviceMessage::Reply(Reply { outcome: Ok(Answer::SelfTest(report)), .. })] = heard[..]
+    else {
+        panic!("{heard:?}");
+    };
+    assert_eq!(report, SelfTestReport { ran: 0b111_1111, failed: 0 });
+}

@@ -1,0 +1,57 @@
+//! Transfers of one length, from packets of any.
+
+use crate::Merger;
+use proptest::prelude::*;
+use std::vec::Vec;
+
+const N: usize = 8;
+
+/// What a reader on the other side gets: transfers, and the bytes of each bulk read that one ended.
+fn send(packets: &[Vec<u8>]) -> (Vec<Vec<u8>>, Vec<Vec<u8>>) {
+    let mut merger = Merger::<N>::new();
+    let mut transfers = Vec::new();
+    for packet in packets {
+        let mut rest = &packet[..];
+        while !rest.is_empty() {
+            let taken = merger.take(rest);
+            rest = &rest[taken..];
+            if merger.is_full() {
+                transfers.push(merger.transfer().to_vec());
+            }
+        }
+    }
+    while !merger.is_done() {
+        transfers.push(merger.transfer().to_vec());
+    }
+    let reads = transfers.split_inclusive(|t| t.len() < N).map(<[_]>::concat).collect();
+    (transfers, reads)
+}
+
+proptest! {
+    #[test]
+    fn every_byte_goes_out_once_in_order_and_only_the_last_transfer_is_short(
+        packets in proptest::collection::vec(proptest::collection::vec(any::<u8>(), 1..30), 1..10),
+    ) {
+        let (transfers, reads) = send(&packets);
+        prop_assert_eq!(transfers.concat(), packets.concat());
+        let (last, full) = transfers.split_last().unwrap();
+        prop_assert!(full.iter().all(|transfer| transfer.len() == N));
+        prop_assert!(last.len() < N, "the reader is told the end");
+        prop_assert_eq!(reads.len(), 1);
+    }
+}
+
+#[test]
+fn bytes_that_end_with_a_full_transfer_are_followed_by_an_empty_one() {
+    let (transfers, _) = send(&[Vec::from([7; 16])]);
+    assert_eq!(transfers.iter().map(Vec::len).collect::<Vec<_>>(), [8, 8, 0]);
+}
+
+#[test]
+fn nothing_is_sent_where_nothing_was() {
+    assert!(Merger::<N>::new().is_done());
+    let mut merger = Merger::<N>::new();
+    merger.take(&[1]);
+    assert_eq!(merger.transfer(), [1]);
+    assert!(merger.is_done(), "a short transfer has ended the read already");
+}

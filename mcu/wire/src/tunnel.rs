@@ -1,0 +1,159 @@
+//! The FPGA's host port through a serial line: how firmware on an emulated board reaches a simulated FPGA.
+//!
+//! One access a request, one reply a request, in turn; numbers are little-endian.
+//!
+//! | request | bytes | reply | bytes |
+//! |---|---|---|---|
+//! | opcode of [`host_port`](crate::host_port), or [`LOOK`] | 1 | [`Request::number`] again | 1 |
+//! | [`Request::number`] | 1 | bits of [`Lines`] | 1 |
+//! | address | 2 | temperature, hundredths of a degree Celsius | 2 |
+//! | argument: value to write, or bytes to read | 4 | value or bytes that were read | [`Request::reply_data`] |
+//! | CRC-32 of all before | 4 | CRC-32 of all before | 4 |
+//!
+//! The one law: an access takes effect once, if its request is whole; a request that is not is never answered.
+
+use crate::crc32;
+use crate::host_port::{READ_FRAME, READ_RAW, READ_REGISTER, WRITE_REGISTER};
+
+/// Opcode that accesses nothing: time passes, and the reply says what the lines are.
+pub const LOOK: u8 = 0x00;
+/// Bytes of a request.
+pub const REQUEST_BYTES: usize = 12;
+/// Bytes of a reply before its data.
+pub const REPLY_HEAD_BYTES: usize = 4;
+/// Bytes of the checksum.
+pub const CRC_BYTES: usize = 4;
+
+/// One access.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Request {
+    /// What to do.
+    pub opcode: u8,
+    /// Chosen by the firmware; its reply repeats it, so that a late one is told from the one waited for.
+    pub number: u8,
+    /// Address of the register; 0 for frames and bursts.
+    pub address: u16,
+    /// Value to write, or bytes of a frame or burst to read.
+    pub argument: u32,
+}
+
+impl Request {
+    /// As it goes over the line.
+    #[must_use]
+    pub fn to_bytes(self) -> [u8; REQUEST_BYTES] {
+        let [a0, a1] = self.address.to_le_bytes();
+        let [v0, v1, v2, v3] = self.argument.to_le_bytes();
+        let head = [self.opcode, self.number, a0, a1, v0, v1, v2, v3];
+        let [c0, c1, c2, c3] = crc32(&head).to_le_bytes();
+        [self.opcode, self.number, a0, a1, v0, v1, v2, v3, c0, c1, c2, c3]
+    }
+
+    /// `None`: not a request.
+    #[must_use]
+    pub fn from_bytes(bytes: &[u8; REQUEST_BYTES]) -> Option<Self> {
+        let (head, crc) = bytes.split_last_chunk::<CRC_BYTES>()?;
+        let known = matches!(
+            head.first()?,
+            &LOOK | &WRITE_REGISTER | &READ_REGISTER | &READ_FRAME | &READ_RAW
+        );
+        if !known || crc32(head) != u32::from_le_bytes(*crc) {
+            return None;
+        }
+        let &[opcode, number, a0, a1, v0, v1, v2, v3, ..] = bytes;
+        let (address, argument) =
+            (u16::from_le_bytes([a0, a1]), u32::from_le_bytes([v0, v1, v2, v3]));
+        Some(Self { opcode, number, address, argument })
+    }
+
+    /// Bytes of data in its reply.
+    #[must_use]
+    pub const fn reply_data(self) -> usize {
+        match self.opcode {
+            READ_REGISTER => 4,
+            READ_FRAME | READ_RAW => self.argument as usize,
+            _ => 0,
+        }
+    }
+}
+
+/// What the microcontroller's other pins see: lines of the FPGA, and the sensors that a simulator stands in for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Lines {
+    /// The FPGA's line of that name.
+    pub frame_ready: bool,
+    /// The FPGA's line of that name.
+    pub raw_ready: bool,
+    /// The enclosure's interlock.
+    pub interlock_closed: bool,
+    /// LED array, hundredths of a degree Celsius; `None`: the sensor does not answer.
+    pub temperature_centi_celsius: Option<i16>,
+}
+
+const FRAME_READY: u8 = 1 << 0;
+const RAW_READY: u8 = 1 << 1;
+const INTERLOCK_CLOSED: u8 = 1 << 2;
+const TEMPERATURE: u8 = 1 << 3;
+
+impl Lines {
+    /// Beginning of the reply to request `number`.
+    #[must_use]
+    pub fn to_reply_head(self, number: u8) -> [u8; REPLY_HEAD_BYTES] {
+        let bit = |is_set: bool, bit: u8| if is_set { bit } else { 0 };
+        let bits = bit(self.frame_ready, FRAME_READY)
+            | bit(self.raw_ready, RAW_READY)
+            | bit(self.interlock_closed, INTERLOCK_CLOSED)
+            | bit(self.temperature_centi_celsius.is_some(), TEMPERATURE);
+        let [t0, t1] = self.temperature_centi_celsius.unwrap_or(0).to_le_bytes();
+        [number, bits, t0, t1]
+    }
+
+    /// Number of the request, and the lines.
+    #[must_use]
+    pub fn from_reply_head(head: [u8; REPLY_HEAD_BYTES]) -> (u8, Self) {
+        let [number, bits, t0, t1] = head;
+        let temperature = i16::from_le_bytes([t0, t1]);
+        let lines = Self {
+            frame_ready: bits & FRAME_READY != 0,
+            raw_ready: bits & RAW_READY != 0,
+            interlock_closed: bits & INTERLOCK_CLOSED != 0,
+            temperature_centi_celsius: (bits & TEMPERATURE != 0).then_some(temperature),
+        };
+        (number, lines)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_request_comes_back_and_no_damaged_one_does(
+            number: u8, address: u16, argument: u32,
+            opcode in prop::sample::select(&[LOOK, WRITE_REGISTER, READ_REGISTER, READ_FRAME, READ_RAW][..]),
+            at in 0..REQUEST_BYTES, flip in 1u8..,
+        ) {
+            let request = Request { opcode, number, address, argument };
+            let mut bytes = request.to_bytes();
+            prop_assert_eq!(Request::from_bytes(&bytes), Some(request));
+            bytes[at] ^= flip;
+            prop_assert_eq!(Request::from_bytes(&bytes), None);
+        }
+
+        #[test]
+        fn lines_come_back(
+            number: u8,
+            (frame_ready, raw_ready, interlock_closed) in any::<(bool, bool, bool)>(),
+            temperature_centi_celsius: Option<i16>,
+        ) {
+            let lines = Lines { frame_ready, raw_ready, interlock_closed, temperature_centi_celsius };
+            prop_assert_eq!(Lines::from_reply_head(lines.to_reply_head(number)), (number, lines));
+        }
+    }
+
+    #[test]
+    fn a_zeroed_line_is_no_request() {
+        assert_eq!(Request::from_bytes(&[0; REQUEST_BYTES]), None);
+    }
+}
