@@ -22,5 +22,7 @@ pub const ENDPOINT_OUT: u8 = 0x01;
 pub const ENDPOINT_IN: u8 = 0x81;
 /// `bMS_VendorCode` of the Microsoft OS 2.0 descriptor set.
 pub const MS_OS_VENDOR_CODE: u8 = 0x20;
+/// `bVendorCode` of WebUSB's platform capability.
+pub const WEB_USB_VENDOR_CODE: u8 = 0x21;
 /// `DeviceInterfaceGUIDs` under which Windows lists the camera.
 pub const DEVICE_INTERFACE_GUID: &str = "{6E697273-7069-4E49-8001-00001550A032}";

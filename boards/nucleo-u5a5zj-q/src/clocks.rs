@@ -1,0 +1,54 @@
+//! Clocks: 160 MHz for core and buses, from the board's 16 MHz crystal, which USB High-Speed needs.
+
+use embassy_stm32::Config;
+use embassy_stm32::pac::{FLASH, ICACHE, PWR};
+use embassy_stm32::rcc::{
+    Hse, HseMode, Pll, PllDiv, PllMul, PllPreDiv, PllSource, Sysclk, VoltageScale, mux,
+};
+use embassy_stm32::time::Hertz;
+
+/// Core, AHB and OCTOSPI.
+pub const SYSTEM_HZ: u32 = 160_000_000;
+
+pub fn config() -> Config {
+    let mut config = Config::default();
+    let rcc = &mut config.rcc;
+    rcc.hse = Some(Hse { freq: Hertz(16_000_000), mode: HseMode::Oscillator });
+    rcc.pll1 = Some(Pll {
+        source: PllSource::HSE,
+        prediv: PllPreDiv::DIV1,
+        mul: PllMul::MUL10,
+        divp: None,
+        divq: None,
+        divr: Some(PllDiv::DIV1),
+    });
+    rcc.sys = Sysclk::PLL1_R;
+    rcc.voltage_range = VoltageScale::RANGE1;
+    rcc.mux.octospisel = mux::Octospisel::SYS;
+    rcc.mux.otghssel = mux::Otghssel::HSE;
+    config
+}
+
+/// Code comes from flash at four wait states: with the cache, mostly at none (RM0456, 8).
+pub fn enable_cache() {
+    ICACHE.cr().modify(|cache| cache.set_en(true));
+}
+
+/// Watches the supply: below 2.8 V the LED drivers and the FPGA's levels are not to be trusted any more.
+pub fn watch_supply() {
+    use embassy_stm32::pac::flash::vals::BorLev;
+    use embassy_stm32::pac::pwr::vals::Pvdls;
+    PWR.svmcr().modify(|monitor| {
+        monitor.set_pvdls(Pvdls::V28);
+        monitor.set_pvde(true);
+    });
+    if FLASH.optr().read().bor_lev() == BorLev::LEVEL0 {
+        defmt::warn!("brown-out reset at 1.7 V: set the option byte BOR_LEV to 4 (2.8 V)");
+    }
+}
+
+/// The supply is below 2.8 V.
+pub fn supply_is_low() -> bool {
+    use embassy_stm32::pac::pwr::vals::Pvdo;
+    PWR.svmsr().read().pvdo() == Pvdo::BELOW
+}

@@ -1,0 +1,73 @@
+//! The 8 x 8 time-of-flight sensor: VL53L5CX or VL53L8CX, told apart by the driver (`vl53-8x8`: no C, no heap).
+//!
+//! The driver sends ST's firmware to the sensor at each start: 86 KB of this board's flash, about 2 s at 400 kHz. All of
+//! that happens in a task of its own; the camera does not wait for it.
+
+use embassy_stm32::i2c::{Config, I2c, Master};
+use embassy_stm32::mode::Async;
+use embassy_stm32::time::Hertz;
+use embassy_time::{Delay, Duration, with_timeout};
+use nirspi_app::{DepthMap, DepthSensor};
+use vl53_8x8::{Resolution, Sensor};
+
+/// Fastest that the sensor measures 64 zones.
+const RATE_HZ: u8 = 15;
+
+/// The sensor has died if no map comes for this long.
+const PATIENCE: Duration = Duration::from_millis(500);
+
+/// Bus settings.
+pub fn config() -> Config {
+    let mut config = Config::default();
+    config.frequency = Hertz(400_000);
+    config
+}
+
+type Bus = I2c<'static, Async, Master>;
+
+/// The sensor, started when it is asked first, and again when it has stopped answering.
+pub struct Depth {
+    sensor: Sensor<Bus, Delay>,
+    started: bool,
+}
+
+impl Depth {
+    pub fn new(bus: Bus) -> Self {
+        Self { sensor: Sensor::new(bus, Delay), started: false }
+    }
+
+    async fn start(&mut self) -> Option<()> {
+        self.sensor.init().await.ok()?;
+        self.sensor.set_resolution(Resolution::Res8x8).await.ok()?;
+        self.sensor.set_ranging_frequency_hz(RATE_HZ).await.ok()?;
+        self.sensor.start_ranging().await.ok()?;
+        defmt::info!("depth: {}", defmt::Debug2Format(&self.sensor.variant()));
+        Some(())
+    }
+
+    async fn measure(&mut self) -> Option<DepthMap> {
+        with_timeout(PATIENCE, self.sensor.poll_data_ready()).await.ok()?.ok()?;
+        let data = self.sensor.get_ranging_data().await.ok()?;
+        let mut map = [0; _];
+        for (to, (distance_mm, status)) in
+            map.iter_mut().zip(data.distance_mm.iter().zip(&data.target_status))
+        {
+            // 5 and 9 are the statuses of a measurement that is good (UM2884, 5.5).
+            let good = matches!(status, 5 | 9);
+            *to = u16::try_from(*distance_mm).unwrap_or(0) * u16::from(good);
+        }
+        Some(map)
+    }
+}
+
+impl DepthSensor for Depth {
+    async fn next(&mut self) -> Option<DepthMap> {
+        if !self.started {
+            self.start().await?;
+            self.started = true;
+        }
+        let map = self.measure().await;
+        self.started = map.is_some();
+        map
+    }
+}

@@ -1,0 +1,57 @@
+//! Every pin of this board that the camera uses: the one table, for the code and for whoever wires it.
+//!
+//! `name: pin => place on the Nucleo, where the wire goes;` `README.md` shows the same table, which a test compares.
+//! Places are those of ST's Zio connectors (UM2861) by their Arduino-style numbers.
+
+use embassy_stm32::{Peri, pac, peripherals};
+
+macro_rules! pin_table {
+    (($d:tt) $($name:ident: $pin:ident => $place:literal, $wire:literal;)*) => {
+        /// The pins by what they do.
+        pub struct Pins {
+            $(#[doc = concat!($place, " to ", $wire)] pub $name: Peri<'static, peripherals::$pin>,)*
+        }
+
+        /// Takes the table's pins out of the peripherals.
+        macro_rules! take_pins {
+            ($d peripherals:ident) => {
+                $crate::pins::Pins { $($name: $d peripherals.$pin,)* }
+            };
+        }
+        pub(crate) use take_pins;
+    };
+}
+
+pin_table! { ($)
+    // The FPGA's host port, OCTOSPI1.
+    fpga_sck: PE10 => "CN10 D40", "FPGA J6.6 (D13) spi_sck";
+    fpga_cs_n: PE11 => "CN10 D5", "FPGA J6.3 (D10) spi_cs_n";
+    fpga_io0: PE12 => "CN10 D39", "FPGA J6.4 (D11) spi_io0";
+    fpga_io1: PE13 => "CN10 D3", "FPGA J6.5 (D12) spi_io1";
+    fpga_io2: PE14 => "CN10 D38", "FPGA J6.2 (D9) spi_io2";
+    fpga_io3: PE15 => "CN10 D37", "FPGA J6.1 (D8) spi_io3";
+    frame_ready: PE9 => "CN10 D6", "FPGA J3.8 (D7) frame_ready";
+    raw_ready: PF13 => "CN10 D7", "FPGA J3.7 (D6) raw_ready";
+    // Light.
+    led_enable: PF14 => "CN10 D4", "LED array, second input of the enable's AND gate, 2.2 kilohm to ground";
+    interlock: PF15 => "CN10 D2", "interlock loop, 3.3 V when closed; the FPGA's J3.3 (D2) is on the same loop";
+    thermistor: PA3 => "CN9 A0", "NTC 10 kilohm at the LED array to ground, 10 kilohm to AVDD";
+    // The ECP5's configuration port, SPI1.
+    config_sck: PA5 => "CN7 D13", "ECP5 CCLK";
+    config_mosi: PA7 => "CN7 D11", "ECP5 SI (MOSI)";
+    config_miso: PA6 => "CN7 D12", "ECP5 SO (MISO)";
+    config_cs_n: PD14 => "CN7 D10", "ECP5 SN";
+    config_program_n: PD15 => "CN7 D9", "ECP5 PROGRAMN";
+    config_done: PF12 => "CN7 D8", "ECP5 DONE";
+    // The time-of-flight sensor, I2C1.
+    tof_scl: PB8 => "CN7 D15", "VL53L5CX or VL53L8CX SCL";
+    tof_sda: PB9 => "CN7 D14", "VL53L5CX or VL53L8CX SDA";
+    // The connector of the board.
+    usb_dp: PA12 => "CN15 USB-C", "host D+";
+    usb_dm: PA11 => "CN15 USB-C", "host D-";
+}
+
+/// `led_enable` low, whatever else is going on: it needs nothing but the port.
+pub fn leds_off() {
+    pac::GPIOF.bsrr().write(|bits| bits.set_br(14, true));
+}

@@ -1,0 +1,103 @@
+//! The gateware loader of a board, with the memory of what the FPGA runs.
+//!
+//! The one law: what the FPGA is known to run outlasts a restart of the firmware, and is forgotten with the power.
+
+use core::sync::atomic::{AtomicU32, Ordering};
+use embassy_futures::yield_now;
+use nirspi_mcu::ecp5::{Configuration, IDCODE_LFE5UM5G_85F, SlaveSpi, must_load};
+use nirspi_mcu::staging::StagingLoader;
+use nirspi_mcu::{GatewareLoader, LoadError, Micros};
+use nirspi_wire::crc32;
+
+/// A CRC-32, and its complement to tell it from memory that was never written.
+#[expect(unsafe_code, reason = "a section is chosen by an attribute that is unsafe to use")]
+#[unsafe(link_section = ".uninit.gateware")]
+static RUNNING: [AtomicU32; 2] = [const { AtomicU32::new(0) }; 2];
+
+fn recall() -> Option<u32> {
+    let [crc, complement] = RUNNING.each_ref().map(|word| word.load(Ordering::Relaxed));
+    (crc == !complement).then_some(crc)
+}
+
+fn remember(running: Option<u32>) {
+    let [crc, complement] = &RUNNING;
+    // Equal words are no record.
+    let words = running.map_or((0, 0), |running| (running, !running));
+    crc.store(words.0, Ordering::Relaxed);
+    complement.store(words.1, Ordering::Relaxed);
+}
+
+/// Loads what is stored on the board, if the FPGA does not run it already. To be awaited before the camera starts;
+/// the watchdog is fed meanwhile.
+pub async fn load_stored(
+    port: &mut impl SlaveSpi,
+    stored: &[u8],
+    is_nirspi: bool,
+    mut feed_watchdog: impl FnMut(),
+) {
+    let wanted = crc32(stored);
+    if !must_load(port.done() && is_nirspi, recall(), wanted) {
+        defmt::info!("gateware {=u32:08x} runs already", wanted);
+        return;
+    }
+    remember(None);
+    let mut configuration = Configuration::new(IDCODE_LFE5UM5G_85F);
+    let result = loop {
+        feed_watchdog();
+        if let Some(result) = configuration.poll(now(), port, stored) {
+            break result;
+        }
+        yield_now().await;
+    };
+    match result {
+        Ok(()) => {
+            remember(Some(wanted));
+            defmt::info!("gateware {=u32:08x} loaded, {=usize} bytes", wanted, stored.len());
+        }
+        Err(error) => defmt::error!("no gateware: {}", defmt::Debug2Format(&error)),
+    }
+}
+
+fn now() -> Micros {
+    Micros(embassy_time::Instant::now().as_micros())
+}
+
+/// [`StagingLoader`] that remembers.
+pub struct Loader<'m, P>(StagingLoader<'m, P>);
+
+impl<'m, P: SlaveSpi> Loader<'m, P> {
+    /// Takes bitstreams as long as the memory.
+    #[must_use]
+    pub fn new(port: P, memory: &'m mut [u8]) -> Self {
+        Self(StagingLoader::new(port, memory, recall()))
+    }
+}
+
+impl<P: SlaveSpi> GatewareLoader for Loader<'_, P> {
+    fn begin(&mut self, total: u32) -> Result<(), LoadError> {
+        self.0.begin(total)
+    }
+
+    fn write(&mut self, data: &[u8]) -> Result<(), LoadError> {
+        self.0.write(data)
+    }
+
+    fn finish(&mut self) -> Result<(), LoadError> {
+        self.0.finish()?;
+        remember(self.0.running());
+        Ok(())
+    }
+
+    fn step(&mut self, now: Micros) -> bool {
+        if self.0.step(now) {
+            return true;
+        }
+        if let Some(error) = self.0.take_failure() {
+            defmt::error!("no gateware: {}", defmt::Debug2Format(&error));
+        }
+        if self.0.running() != recall() {
+            remember(self.0.running());
+        }
+        false
+    }
+}

@@ -1,0 +1,34 @@
+//! Restarts, and the way into the chip's own boot loader.
+//!
+//! The one law: the boot loader is entered with the chip as after a reset: the wish is left in memory that a
+//! restart does not clear, and granted before anything else is done.
+
+use core::sync::atomic::{AtomicU32, Ordering};
+use cortex_m::peripheral::SCB;
+use nirspi_wire::RebootInto;
+
+/// `"BOOT"` in ASCII.
+const WISH: u32 = 0x424F_4F54;
+
+#[expect(unsafe_code, reason = "a section is chosen by an attribute that is unsafe to use")]
+#[unsafe(link_section = ".uninit.restart")]
+static WISHED: AtomicU32 = AtomicU32::new(0);
+
+/// Restarts the chip.
+pub fn restart(into: RebootInto) -> ! {
+    let wish = if into == RebootInto::Bootloader { WISH } else { 0 };
+    WISHED.store(wish, Ordering::Relaxed);
+    SCB::sys_reset()
+}
+
+/// Enters the boot loader whose vector table is at this address, if that was the wish. First thing in `main`.
+pub fn enter_bootloader_if_wished(vectors: usize) {
+    if WISHED.swap(0, Ordering::Relaxed) == WISH {
+        #[expect(unsafe_code, reason = "jumps into code that is not ours")]
+        // SAFETY: the chip is as after a reset, and its reference manual gives the address of its boot loader,
+        // whose vector table begins with a stack pointer and an entry.
+        unsafe {
+            cortex_m::asm::bootload(vectors as *const u32)
+        }
+    }
+}

@@ -1,0 +1,215 @@
+//! The camera as a USB device: one vendor interface with a bulk endpoint each way, no driver on any system.
+//!
+//! ```text
+//! device ── Microsoft OS 2.0: WINUSB, interface GUID; BOS: WebUSB
+//!  └ interface 0: class 0xFF, protocol = version of the wire protocol
+//!     ├ bulk OUT 0x01, 512 bytes: commands
+//!     └ bulk IN  0x81, 512 bytes: replies, events, frames, merged into full packets
+//! ```
+//!
+//! The one law: the session lasts as long as the configuration; reset, another configuration, suspend (which is what a
+//! pulled cable looks like to a board that has its own supply) end it, and with it the light.
+
+use embassy_futures::select::select3;
+use embassy_sync::blocking_mutex::raw::NoopRawMutex;
+use embassy_sync::signal::Signal;
+use embassy_usb::descriptor::capability_type;
+use embassy_usb::driver::{Driver, EndpointAddress, EndpointIn, EndpointOut};
+use embassy_usb::msos::{self, PropertyData};
+use embassy_usb::{Builder, Config, Handler, UsbDevice};
+use nirspi_app::link::{HostIn, HostOut};
+use nirspi_wire::{Version, usb};
+
+/// Bytes of a high-speed bulk packet (USB 2.0, 5.8.3).
+pub const PACKET_BYTES: usize = 512;
+
+/// Bytes that the driver needs for packets from the host: a bulk and a control packet.
+pub const OUT_BUFFER_BYTES: usize = PACKET_BYTES + CONTROL_BYTES;
+
+const CONTROL_BYTES: usize = 64;
+
+/// `bcdUSB` and the rest in one place; on a full-speed bus the packet size above is not allowed, so hosts refuse it.
+fn identity(serial: &'static str, firmware: Version) -> Config<'static> {
+    let mut config = Config::new(usb::VENDOR_ID, usb::PRODUCT_ID);
+    config.manufacturer = Some(usb::MANUFACTURER);
+    config.product = Some(usb::PRODUCT);
+    config.serial_number = Some(serial);
+    config.device_release = bcd(firmware);
+    // One interface, which says itself what it is.
+    config.device_class = 0;
+    config.device_sub_class = 0;
+    config.device_protocol = 0;
+    config.composite_with_iads = false;
+    config.max_packet_size_0 = CONTROL_BYTES as u8;
+    config.self_powered = true;
+    config
+}
+
+/// `bcdDevice`: two digits of the major version, one each of minor and patch.
+fn bcd(Version(major, minor, patch): Version) -> u16 {
+    let major = u16::from(major / 10 % 10) << 4 | u16::from(major % 10);
+    major << 8 | u16::from(minor.min(9)) << 4 | u16::from(patch.min(9))
+}
+
+/// Platform capability of WebUSB 1.0 (WebUSB, 5.1), with no landing page.
+const WEB_USB: [u8; 21] = {
+    // {3408b638-09a9-47a0-8bfd-a0768815b665}, after a reserved byte.
+    let uuid = [
+        0x00, 0x38, 0xB6, 0x08, 0x34, 0xA9, 0x09, 0xA0, 0x47, 0x8B, 0xFD, 0xA0, 0x76, 0x88, 0x15,
+        0xB6, 0x65,
+    ];
+    let mut capability = [0; 21];
+    let (head, tail) = capability.split_at_mut(uuid.len());
+    head.copy_from_slice(&uuid);
+    tail.copy_from_slice(&[0x00, 0x01, usb::WEB_USB_VENDOR_CODE, 0]);
+    capability
+};
+
+/// Memory of the device, for as long as it exists.
+pub struct Memory {
+    configuration: [u8; 64],
+    bos: [u8; 96],
+    msos: [u8; 192],
+    control: [u8; CONTROL_BYTES],
+    watch: Watch,
+}
+
+impl Memory {
+    /// Empty.
+    #[must_use]
+    pub const fn new(presence: &'static Presence) -> Self {
+        Self {
+            configuration: [0; 64],
+            bos: [0; 96],
+            msos: [0; 192],
+            control: [0; CONTROL_BYTES],
+            watch: Watch { presence, session: 0, configured: false, suspended: false },
+        }
+    }
+}
+
+/// Number of the session that the host may have now, if any: each configuration and each waking up is another.
+pub type Presence = Signal<NoopRawMutex, Option<u32>>;
+
+struct Watch {
+    presence: &'static Presence,
+    session: u32,
+    configured: bool,
+    suspended: bool,
+}
+
+impl Watch {
+    fn tell(&mut self) {
+        let there = self.configured && !self.suspended;
+        self.session = self.session.wrapping_add(1);
+        defmt::info!("usb: host {=str}", if there { "there" } else { "gone" });
+        self.presence.signal(there.then_some(self.session));
+    }
+}
+
+impl Handler for Watch {
+    fn enabled(&mut self, _enabled: bool) {
+        self.configured = false;
+        self.suspended = false;
+        self.tell();
+    }
+
+    fn reset(&mut self) {
+        self.configured = false;
+        self.suspended = false;
+        self.tell();
+    }
+
+    fn configured(&mut self, configured: bool) {
+        self.configured = configured;
+        self.tell();
+    }
+
+    fn suspended(&mut self, suspended: bool) {
+        self.suspended = suspended;
+        self.tell();
+    }
+}
+
+/// The endpoints, to be served by [`serve`].
+pub struct Endpoints<D: Driver<'static>> {
+    from_host: D::EndpointOut,
+    to_host: D::EndpointIn,
+    presence: &'static Presence,
+}
+
+/// Builds the device; `run` of the first is to be awaited, and [`serve`] of the second.
+pub fn device<D: Driver<'static>>(
+    driver: D,
+    serial: &'static str,
+    firmware: Version,
+    memory: &'static mut Memory,
+) -> (UsbDevice<'static, D>, Endpoints<D>) {
+    let Memory { configuration, bos, msos, control, watch } = memory;
+    let presence = watch.presence;
+    let config = identity(serial, firmware);
+    let mut builder = Builder::new(driver, config, configuration, bos, msos, control);
+    builder.msos_descriptor(msos::windows_version::WIN8_1, usb::MS_OS_VENDOR_CODE);
+    builder.msos_feature(msos::CompatibleIdFeatureDescriptor::new("WINUSB", ""));
+    builder.msos_feature(msos::RegistryPropertyFeatureDescriptor::new(
+        "DeviceInterfaceGUIDs",
+        PropertyData::RegMultiSz(&[usb::DEVICE_INTERFACE_GUID]),
+    ));
+    builder.handler(watch);
+
+    let [class, subclass, protocol] =
+        [usb::INTERFACE_CLASS, usb::INTERFACE_SUBCLASS, usb::INTERFACE_PROTOCOL];
+    let mut function = builder.function(class, subclass, protocol);
+    let mut interface = function.interface();
+    let mut setting = interface.alt_setting(class, subclass, protocol, None);
+    setting.bos_capability(capability_type::PLATFORM, &WEB_USB);
+    let address = |address: u8| Some(EndpointAddress::from(address));
+    let packet_bytes = PACKET_BYTES as u16;
+    let from_host = setting.endpoint_bulk_out(address(usb::ENDPOINT_OUT), packet_bytes);
+    let to_host = setting.endpoint_bulk_in(address(usb::ENDPOINT_IN), packet_bytes);
+    drop(function);
+    (builder.build(), Endpoints { from_host, to_host, presence })
+}
+
+/// Serves one host after the other.
+pub async fn serve<D: Driver<'static>>(
+    endpoints: Endpoints<D>,
+    mut commands: HostIn<'_>,
+    mut packets: HostOut<'_, PACKET_BYTES>,
+) -> ! {
+    let Endpoints { mut from_host, mut to_host, presence } = endpoints;
+    let mut session = None;
+    loop {
+        while session.is_none() {
+            session = presence.wait().await;
+        }
+        let news = select3(
+            listen(&mut from_host, &mut commands),
+            talk(&mut to_host, &mut packets),
+            presence.wait(),
+        );
+        let next = match news.await {
+            embassy_futures::select::Either3::Third(next) => next,
+            // An endpoint is gone: so is the host, or it is about to be.
+            _ => None,
+        };
+        commands.closed().await;
+        packets.discard();
+        session = next;
+    }
+}
+
+/// Returns when the endpoint is disabled.
+async fn listen(endpoint: &mut impl EndpointOut, commands: &mut HostIn<'_>) {
+    let mut bytes = [0; PACKET_BYTES];
+    endpoint.wait_enabled().await;
+    while let Ok(length) = endpoint.read(&mut bytes).await {
+        commands.received(bytes.get(..length).unwrap_or(&[])).await;
+    }
+}
+
+/// Returns when the endpoint is disabled.
+async fn talk(endpoint: &mut impl EndpointIn, packets: &mut HostOut<'_, PACKET_BYTES>) {
+    endpoint.wait_enabled().await;
+    while endpoint.write(packets.transfer().await).await.is_ok() {}
+}
