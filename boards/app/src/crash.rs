@@ -2,6 +2,7 @@
 //!
 //! The one law: writing it needs no other part of the firmware to be sound: no lock, no wait, no allocation.
 
+use core::panic::PanicInfo;
 use core::sync::atomic::{AtomicU32, Ordering};
 use nirspi_mcu::{CRASH_WORDS, Crash, Micros};
 
@@ -21,6 +22,16 @@ pub fn store(text: core::fmt::Arguments<'_>) {
     let uptime = Micros(embassy_time::Instant::now().as_micros());
     for (to, word) in RECORD.iter().zip(Crash::new(uptime, text).to_words()) {
         to.store(word, Ordering::Relaxed);
+    }
+}
+
+/// Leaves a record of a panic: where, and what it said.
+pub fn store_panic(info: &PanicInfo<'_>) {
+    match info.location() {
+        Some(place) => {
+            store(format_args!("{}:{}: {}", place.file(), place.line(), info.message()));
+        }
+        None => store(format_args!("{}", info.message())),
     }
 }
 

@@ -1,0 +1,131 @@
+//! The FPGA behind a tunnel: one request and one reply over a UART for each access of its host port.
+//!
+//! The one law: lines and sensors are what the last reply said. Simulated time passes with accesses alone, so nothing
+//! has changed since.
+
+use crate::uart::Uart;
+use core::cell::Cell;
+use embassy_time::{Duration, with_timeout};
+use nirspi_app::FpgaPort;
+use nirspi_mcu::{BusError, HostPort};
+use nirspi_wire::Crc32;
+use nirspi_wire::host_port::{READ_REGISTER, WRITE_REGISTER};
+use nirspi_wire::tunnel::{CRC_BYTES, LOOK, Lines, REPLY_HEAD_BYTES, Request};
+
+/// A register access takes a simulator of the RTL some milliseconds.
+const PATIENCE: Duration = Duration::from_secs(1);
+/// A frame takes it some seconds.
+const DATA_PATIENCE: Duration = Duration::from_secs(30);
+/// After an access that failed: what is late has come by then.
+const SILENCE: Duration = Duration::from_millis(20);
+
+/// The tunnel's end.
+pub struct Tunnel<'b> {
+    uart: &'static Uart,
+    lines: &'b Cell<Lines>,
+    number: u8,
+}
+
+impl<'b> Tunnel<'b> {
+    /// Over this UART; tells the board's sensors where they are looked for.
+    pub fn new(uart: &'static Uart, lines: &'b Cell<Lines>) -> Self {
+        // What a crash has left half said.
+        uart.quieten(SILENCE);
+        let mut tunnel = Self { uart, lines, number: 0 };
+        let look = tunnel.next(LOOK, 0, 0);
+        // Without an answer there is no FPGA, no interlock and no sensor, which is what the camera then finds.
+        let _ = tunnel.access(look, &mut []);
+        tunnel
+    }
+
+    fn next(&mut self, opcode: u8, address: u16, argument: u32) -> Request {
+        self.number = self.number.wrapping_add(1);
+        Request { opcode, number: self.number, address, argument }
+    }
+
+    /// Takes the lines of a reply that is right.
+    fn check(
+        &mut self,
+        request: Request,
+        head: [u8; REPLY_HEAD_BYTES],
+        data: &[u8],
+        crc: [u8; CRC_BYTES],
+    ) -> Result<(), BusError> {
+        let mut expected = Crc32::new();
+        expected.update(&head);
+        expected.update(data);
+        let (number, lines) = Lines::from_reply_head(head);
+        if number != request.number || expected.value() != u32::from_le_bytes(crc) {
+            return self.failed(BusError::Transfer);
+        }
+        self.lines.set(lines);
+        Ok(())
+    }
+
+    fn failed(&mut self, error: BusError) -> Result<(), BusError> {
+        self.uart.quieten(SILENCE);
+        self.lines.set(Lines { frame_ready: false, raw_ready: false, ..self.lines.get() });
+        Err(error)
+    }
+
+    fn access(&mut self, request: Request, data: &mut [u8]) -> Result<(), BusError> {
+        self.uart.write_blocking(&request.to_bytes());
+        let (mut head, mut crc) = ([0; REPLY_HEAD_BYTES], [0; CRC_BYTES]);
+        for part in [&mut head[..], data, &mut crc[..]] {
+            if self.uart.read_blocking(part, PATIENCE).is_err() {
+                return self.failed(BusError::Timeout);
+            }
+        }
+        self.check(request, head, data, crc)
+    }
+
+    async fn long_access(&mut self, request: Request, data: &mut [u8]) -> Result<(), BusError> {
+        let (mut head, mut crc) = ([0; REPLY_HEAD_BYTES], [0; CRC_BYTES]);
+        let answer = async {
+            self.uart.write(&request.to_bytes()).await;
+            for part in [&mut head[..], data, &mut crc[..]] {
+                self.uart.read_exact(part).await;
+            }
+        };
+        if with_timeout(DATA_PATIENCE, answer).await.is_err() {
+            return self.failed(BusError::Timeout);
+        }
+        self.check(request, head, data, crc)
+    }
+}
+
+impl HostPort for Tunnel<'_> {
+    fn write(&mut self, address: u16, value: u32) -> Result<(), BusError> {
+        let request = self.next(WRITE_REGISTER, address, value);
+        self.access(request, &mut [])
+    }
+
+    fn read(&mut self, address: u16) -> Result<u32, BusError> {
+        let request = self.next(READ_REGISTER, address, 0);
+        let mut value = [0; 4];
+        self.access(request, &mut value)?;
+        Ok(u32::from_le_bytes(value))
+    }
+
+    fn frame_ready(&mut self) -> bool {
+        self.lines.get().frame_ready
+    }
+
+    fn raw_ready(&mut self) -> bool {
+        self.lines.get().raw_ready
+    }
+}
+
+impl FpgaPort for Tunnel<'_> {
+    async fn read_bytes(&mut self, opcode: u8, into: &mut [u8]) -> Result<(), BusError> {
+        let length = u32::try_from(into.len()).map_err(|_| BusError::Transfer)?;
+        let request = self.next(opcode, 0, length);
+        self.long_access(request, into).await
+    }
+
+    async fn ready(&mut self) {
+        let request = self.next(LOOK, 0, 0);
+        // A simulator that does not answer is noticed by the next register access.
+        let _ = self.long_access(request, &mut []).await;
+    }
+}

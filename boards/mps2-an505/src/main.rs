@@ -1,0 +1,184 @@
+//! The camera's firmware on QEMU's `mps2-an505`: everything but the silicon.
+//!
+//! UART0 is the host link, UART1 the FPGA's bus on its way to a simulator, SysTick the time. There is no pin, so the
+//! interlock and the temperature are what the simulator says, and the LED enable pin is nowhere.
+//!
+//! The one law: nothing here is told to the application that another board would not tell it.
+#![no_std]
+#![no_main]
+
+mod clock;
+mod emulator;
+mod executor;
+mod fpga;
+mod uart;
+
+use core::cell::Cell;
+use core::panic::PanicInfo;
+use cortex_m::Peripherals;
+use cortex_m::peripheral::{NVIC, SCB};
+use cortex_m_rt::{ExceptionFrame, entry, exception};
+use embassy_executor::Spawner;
+use embassy_futures::join::join;
+use fpga::Tunnel;
+use nirspi_app::link::{CameraEnd, HostIn, HostOut, Link, Packet};
+use nirspi_app::{Board, DepthMailbox, Device, board_info, crash};
+use nirspi_mcu::{Inputs, Limits, NoLoader};
+use nirspi_wire::RebootInto;
+use nirspi_wire::fpga::MAX_FRAME_BYTES;
+use nirspi_wire::tunnel::Lines;
+use static_cell::{ConstStaticCell, StaticCell};
+use uart::Uart;
+
+/// UART0 and UART1 by their secure aliases (Arm AN505, chapter 3).
+static HOST: Uart = Uart::at(0x5020_0000);
+static FPGA: Uart = Uart::at(0x5020_1000);
+
+/// Frames on their way to the host: 32 ms of them at 1000 a second.
+const PACKETS: usize = 32;
+
+/// Bytes that go to the host at once.
+const TRANSFER_BYTES: usize = 512;
+
+/// Expansion interrupts of the AN505 image follow the 32 of the IoT kit: receive and transmit of each UART in turn.
+#[derive(Clone, Copy)]
+#[repr(u16)]
+enum Irq {
+    HostReceive = 32,
+    HostTransmit = 33,
+    FpgaReceive = 34,
+    FpgaTransmit = 35,
+}
+
+#[expect(unsafe_code, reason = "the numbers are a matter of the chip")]
+// SAFETY: each is another number, and within those that the chip has.
+unsafe impl cortex_m::interrupt::InterruptNumber for Irq {
+    fn number(self) -> u16 {
+        self as u16
+    }
+}
+
+#[exception]
+// Not `expect`: the macro repeats it where nothing is unsafe.
+#[allow(unsafe_code, reason = "the form of this handler")]
+unsafe fn DefaultHandler(number: i16) {
+    match number {
+        32 => HOST.on_receive(),
+        33 => HOST.on_transmit(),
+        34 => FPGA.on_receive(),
+        35 => FPGA.on_transmit(),
+        _ => panic!("interrupt {number}"),
+    }
+}
+
+#[exception]
+fn SysTick() {
+    clock::on_tick();
+}
+
+#[exception]
+// Not `expect`: the macro repeats it where nothing is unsafe.
+#[allow(unsafe_code, reason = "the form of this handler")]
+unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
+    crash::store(format_args!("hard fault at {:#010x}, from {:#010x}", frame.pc(), frame.lr()));
+    SCB::sys_reset()
+}
+
+#[panic_handler]
+fn panic(info: &PanicInfo<'_>) -> ! {
+    crash::store_panic(info);
+    SCB::sys_reset()
+}
+
+/// A board without pins.
+struct Emulated {
+    lines: &'static Cell<Lines>,
+}
+
+impl Board for Emulated {
+    fn inputs(&mut self) -> Inputs {
+        let Lines { interlock_closed, temperature_centi_celsius, .. } = self.lines.get();
+        Inputs { interlock_closed, temperature_centi_celsius }
+    }
+
+    fn enable_leds(&mut self, _enabled: bool) {}
+
+    fn feed_watchdog(&mut self) {}
+
+    /// There is no boot loader either.
+    fn restart(&mut self, _into: RebootInto) -> ! {
+        SCB::sys_reset()
+    }
+}
+
+#[embassy_executor::task]
+async fn camera(board: Emulated, link: CameraEnd<'static>) -> ! {
+    static FRAME: ConstStaticCell<[u8; MAX_FRAME_BYTES]> =
+        ConstStaticCell::new([0; MAX_FRAME_BYTES]);
+    static DEPTH: StaticCell<DepthMailbox> = StaticCell::new();
+    let device = Device {
+        port: Tunnel::new(&FPGA, board.lines),
+        board,
+        frame: FRAME.take(),
+        loader: NoLoader,
+        info: board_info("mps2-an505", "QEMU"),
+        limits: Limits::default(),
+        crash: crash::take(),
+    };
+    nirspi_app::run(device, link, DEPTH.init(DepthMailbox::new())).await
+}
+
+/// A UART is never closed: a host that begins says `Hello`.
+#[embassy_executor::task]
+async fn host(mut from: HostIn<'static>, mut to: HostOut<'static, TRANSFER_BYTES>) {
+    let receive = async {
+        let mut bytes = [0; 64];
+        loop {
+            let length = HOST.read(&mut bytes).await;
+            from.received(bytes.get(..length).unwrap_or(&[])).await;
+        }
+    };
+    let send = async {
+        loop {
+            HOST.write(to.transfer().await).await;
+        }
+    };
+    let ((), ()) = join(receive, send).await;
+}
+
+#[entry]
+fn main() -> ! {
+    static PLACES: ConstStaticCell<[Packet; PACKETS]> =
+        ConstStaticCell::new([Packet::EMPTY; PACKETS]);
+    static LINK: StaticCell<Link<'static>> = StaticCell::new();
+    static LINES: StaticCell<Cell<Lines>> = StaticCell::new();
+
+    if let Some(mut peripherals) = Peripherals::take() {
+        clock::start(&mut peripherals);
+    }
+    emulator::prepare();
+    HOST.enable();
+    FPGA.enable();
+    for irq in [Irq::HostReceive, Irq::HostTransmit, Irq::FpgaReceive, Irq::FpgaTransmit] {
+        #[expect(
+            unsafe_code,
+            reason = "interrupts are enabled by the one who knows their handlers"
+        )]
+        // SAFETY: outside of any critical section, and the handlers are those above.
+        unsafe {
+            NVIC::unmask(irq);
+        }
+    }
+    let link = LINK.init(Link::new(PLACES.take()));
+    let lines = LINES.init(Cell::new(Lines::default()));
+    let (camera_end, from_host, to_host) = link.split();
+    executor::run(|spawner: Spawner| {
+        // Each is spawned once, so there is room.
+        if let (Ok(camera), Ok(host)) =
+            (camera(Emulated { lines }, camera_end), host(from_host, to_host))
+        {
+            spawner.spawn(camera);
+            spawner.spawn(host);
+        }
+    })
+}
