@@ -5,6 +5,7 @@
 
 use crate::uart::Uart;
 use core::cell::Cell;
+use core::future::pending;
 use embassy_time::{Duration, with_timeout};
 use nirspi_app::FpgaPort;
 use nirspi_mcu::{BusError, HostPort};
@@ -24,6 +25,14 @@ pub struct Tunnel<'b> {
     uart: &'static Uart,
     lines: &'b Cell<Lines>,
     number: u8,
+    look: Option<Look>,
+}
+
+/// A look whose reply has not come whole: who waited for it may have gone, the reply comes all the same.
+struct Look {
+    request: Request,
+    reply: [u8; REPLY_HEAD_BYTES + CRC_BYTES],
+    filled: usize,
 }
 
 impl<'b> Tunnel<'b> {
@@ -31,10 +40,10 @@ impl<'b> Tunnel<'b> {
     pub fn new(uart: &'static Uart, lines: &'b Cell<Lines>) -> Self {
         // What a crash has left half said.
         uart.quieten(SILENCE);
-        let mut tunnel = Self { uart, lines, number: 0 };
-        let look = tunnel.next(LOOK, 0, 0);
+        let mut tunnel = Self { uart, lines, number: 0, look: None };
+        tunnel.begin_look();
         // Without an answer there is no FPGA, no interlock and no sensor, which is what the camera then finds.
-        let _ = tunnel.access(look, &mut []);
+        let _ = tunnel.end_look();
         tunnel
     }
 
@@ -68,7 +77,27 @@ impl<'b> Tunnel<'b> {
         Err(error)
     }
 
+    fn begin_look(&mut self) {
+        if self.look.is_none() {
+            let request = self.next(LOOK, 0, 0);
+            self.uart.write_blocking(&request.to_bytes());
+            self.look = Some(Look { request, reply: [0; _], filled: 0 });
+        }
+    }
+
+    /// Waits for the reply that is still to come, if any.
+    fn end_look(&mut self) -> Result<(), BusError> {
+        let Some(Look { request, mut reply, filled }) = self.look.take() else { return Ok(()) };
+        let rest = reply.get_mut(filled..).unwrap_or_default();
+        if self.uart.read_blocking(rest, PATIENCE).is_err() {
+            return self.failed(BusError::Timeout);
+        }
+        let [h0, h1, h2, h3, crc @ ..] = reply;
+        self.check(request, [h0, h1, h2, h3], &[], crc)
+    }
+
     fn access(&mut self, request: Request, data: &mut [u8]) -> Result<(), BusError> {
+        self.end_look()?;
         self.uart.write_blocking(&request.to_bytes());
         let (mut head, mut crc) = ([0; REPLY_HEAD_BYTES], [0; CRC_BYTES]);
         for part in [&mut head[..], data, &mut crc[..]] {
@@ -80,6 +109,7 @@ impl<'b> Tunnel<'b> {
     }
 
     async fn long_access(&mut self, request: Request, data: &mut [u8]) -> Result<(), BusError> {
+        self.end_look()?;
         let (mut head, mut crc) = ([0; REPLY_HEAD_BYTES], [0; CRC_BYTES]);
         let answer = async {
             self.uart.write(&request.to_bytes()).await;
@@ -123,9 +153,18 @@ impl FpgaPort for Tunnel<'_> {
         self.long_access(request, into).await
     }
 
+    /// One look: simulated time passes by it. The next one is the application's next turn.
     async fn ready(&mut self) {
-        let request = self.next(LOOK, 0, 0);
+        self.begin_look();
+        while let Some(look) = &mut self.look
+            && let rest @ [_, ..] = look.reply.get_mut(look.filled..).unwrap_or_default()
+        {
+            look.filled += self.uart.read(rest).await;
+        }
         // A simulator that does not answer is noticed by the next register access.
-        let _ = self.long_access(request, &mut []).await;
+        let _ = self.end_look();
+        if !self.frame_ready() && !self.raw_ready() {
+            pending::<()>().await;
+        }
     }
 }

@@ -1,0 +1,73 @@
+//! The firmware's ELF and the emulator: found, built, or said to be missing.
+//!
+//! The one law: what is not there is said aloud; what is there and does not work fails.
+
+use nirspi_tests::root;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+
+const TARGET: &str = "thumbv8m.main-none-eabihf";
+const BOARD: &str = "nirspi-mps2-an505";
+
+/// Past the test harness's capture, so that a skipped test is seen.
+fn skipped(reason: &str) {
+    let _ = writeln!(std::io::stderr(), "skipped: {reason}");
+}
+
+/// QEMU: `$NIRSPI_QEMU`, or `qemu-system-arm` on the `PATH`, or what `install-qemu.sh` has unpacked.
+pub fn qemu() -> Option<PathBuf> {
+    let unpacked = root().join("target/qemu/qemu-system-arm");
+    let candidates = [
+        std::env::var_os("NIRSPI_QEMU").map(PathBuf::from),
+        Some("qemu-system-arm".into()),
+        Some(unpacked),
+    ];
+    let found = candidates.into_iter().flatten().find(|program| {
+        let version = Command::new(program).arg("--version").output();
+        version.is_ok_and(|output| output.status.success())
+    });
+    if found.is_none() {
+        skipped("no qemu");
+    }
+    found
+}
+
+/// The firmware: `$NIRSPI_FIRMWARE_ELF`, or built here.
+pub fn elf() -> Option<&'static Path> {
+    static ELF: OnceLock<Option<PathBuf>> = OnceLock::new();
+    ELF.get_or_init(|| {
+        if let Some(given) = std::env::var_os("NIRSPI_FIRMWARE_ELF") {
+            return Some(given.into());
+        }
+        if !has_target() {
+            skipped("no thumbv8m target");
+            return None;
+        }
+        Some(build())
+    })
+    .as_deref()
+}
+
+/// Whether the compiler has the target's core library. One that has not would be fetched, which takes a network.
+fn has_target() -> bool {
+    let output =
+        Command::new("rustc").args(["--print", "target-libdir", "--target", TARGET]).output();
+    let Ok(output) = output else { return false };
+    let folder = String::from_utf8_lossy(&output.stdout);
+    output.status.success() && Path::new(folder.trim()).is_dir()
+}
+
+fn build() -> PathBuf {
+    let target = root().join("boards/target");
+    let status = Command::new("cargo")
+        .args(["build", "--release", "--locked", "--quiet", "--target-dir"])
+        .arg(&target)
+        .current_dir(root().join("boards/mps2-an505"))
+        .env_remove("CARGO_TARGET_DIR")
+        .status()
+        .unwrap();
+    assert!(status.success(), "boards/mps2-an505 does not build");
+    target.join(TARGET).join("release").join(BOARD)
+}
