@@ -12,7 +12,6 @@ mod configuration;
 mod depth;
 mod fpga;
 mod pins;
-mod stack;
 
 use board::Nucleo;
 use configuration::ConfigurationPort;
@@ -88,7 +87,6 @@ async fn depth_sensor(sensor: Depth, mailbox: &'static DepthMailbox) -> ! {
 #[embassy_executor::main]
 async fn main(spawner: Spawner) {
     restart::enter_bootloader_if_wished(board::BOOTLOADER);
-    stack::guard();
     let p = embassy_stm32::init(clocks::config());
     let pins = pins::take_pins!(p);
     let led_enable = Output::new(pins.led_enable, Level::Low, Speed::Low);

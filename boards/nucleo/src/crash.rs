@@ -5,6 +5,9 @@
 //!
 //! The one law: nothing comes before the LEDs, and nothing here waits or needs the stack that may be the trouble.
 
+#[cfg(feature = "terse")]
+mod trace;
+
 use core::cell::Cell;
 use core::fmt::Arguments;
 use core::panic::PanicInfo;
@@ -28,9 +31,16 @@ fn die(text: Arguments<'_>) -> ! {
     SCB::sys_reset()
 }
 
+#[cfg(not(feature = "terse"))]
 #[panic_handler]
 fn panic(info: &PanicInfo<'_>) -> ! {
     die(format_args!("{info}"))
+}
+
+#[cfg(feature = "terse")]
+#[panic_handler]
+fn panic(_info: &PanicInfo<'_>) -> ! {
+    die(format_args!("panic{}", trace::Callers))
 }
 
 #[expect(unsafe_code, reason = "an exception handler that must not touch the stack it finds")]

@@ -4,7 +4,7 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 use embassy_futures::yield_now;
-use nirspi_mcu::ecp5::{Configuration, IDCODE_LFE5UM5G_85F, SlaveSpi, must_load};
+use nirspi_mcu::ecp5::{Configuration, ConfigureError, IDCODE_LFE5UM5G_85F, SlaveSpi, must_load};
 use nirspi_mcu::staging::StagingLoader;
 use nirspi_mcu::{GatewareLoader, LoadError, Micros};
 use nirspi_wire::crc32;
@@ -54,7 +54,20 @@ pub async fn load_stored(
             remember(Some(wanted));
             defmt::info!("gateware {=u32:08x} loaded, {=usize} bytes", wanted, stored.len());
         }
-        Err(error) => defmt::error!("no gateware: {}", defmt::Debug2Format(&error)),
+        Err(error) => report(error),
+    }
+}
+
+fn report(error: ConfigureError) {
+    match error {
+        ConfigureError::Bus(_) => defmt::error!("no gateware: transfer failed"),
+        ConfigureError::WrongDevice { found } => {
+            defmt::error!("no gateware: no LFE5UM5G-85F in slave SPI mode but {=u32:#010x}", found);
+        }
+        ConfigureError::Stuck => defmt::error!("no gateware: the FPGA stays busy"),
+        ConfigureError::Refused { status } => {
+            defmt::error!("no gateware: refused, status {=u32:#010x}", status);
+        }
     }
 }
 
@@ -93,7 +106,7 @@ impl<P: SlaveSpi> GatewareLoader for Loader<'_, P> {
             return true;
         }
         if let Some(error) = self.0.take_failure() {
-            defmt::error!("no gateware: {}", defmt::Debug2Format(&error));
+            report(error);
         }
         if self.0.running() != recall() {
             remember(self.0.running());

@@ -1,0 +1,65 @@
+//! Sensors, LED enable, watchdog, restart.
+
+use crate::clocks;
+use embassy_stm32::adc::{Adc, AdcConfig, AnyAdcChannel, Averaging, SampleTime};
+use embassy_stm32::gpio::{Input, Output};
+use embassy_stm32::peripherals::{ADC1, IWDG};
+use embassy_stm32::wdg::IndependentWatchdog;
+use embassy_time::{Duration, Instant};
+use nirspi_app::Board;
+use nirspi_mcu::{Inputs, ntc};
+use nirspi_nucleo::restart::restart;
+use nirspi_wire::RebootInto;
+
+/// The system memory's boot loader (AN2606, STM32H7Rx and H7Sx).
+pub const BOOTLOADER: usize = 0x1FF1_8000;
+
+/// The firmware is restarted after this long without a sign of life; the FPGA has ended the run by then.
+pub const WATCHDOG_US: u32 = 500_000;
+
+/// A thermistor is slow, and a conversion takes 32 us.
+const TEMPERATURE_PERIOD: Duration = Duration::from_millis(10);
+
+/// 12 bits, the mean of 16 conversions.
+pub fn adc_config() -> AdcConfig {
+    AdcConfig { averaging: Some(Averaging::Samples16), ..AdcConfig::default() }
+}
+
+/// The board's own parts.
+pub struct Nucleo {
+    pub led_enable: Output<'static>,
+    pub interlock: Input<'static>,
+    pub adc: Adc<'static, ADC1>,
+    pub thermistor: AnyAdcChannel<'static, ADC1>,
+    pub temperature: Option<i16>,
+    pub temperature_due: Instant,
+    pub watchdog: IndependentWatchdog<'static, IWDG>,
+}
+
+impl Board for Nucleo {
+    fn inputs(&mut self) -> Inputs {
+        assert!(!clocks::supply_is_low(), "the supply is below 2.85 V");
+        if Instant::now() >= self.temperature_due {
+            let reading = self.adc.blocking_read(&mut self.thermistor, SampleTime::CYCLES47_5);
+            self.temperature = ntc::centi_celsius(reading << 4);
+            self.temperature_due = Instant::now() + TEMPERATURE_PERIOD;
+        }
+        Inputs {
+            interlock_closed: self.interlock.is_high(),
+            temperature_centi_celsius: self.temperature,
+        }
+    }
+
+    fn enable_leds(&mut self, enabled: bool) {
+        self.led_enable.set_level(enabled.into());
+    }
+
+    fn feed_watchdog(&mut self) {
+        self.watchdog.pet();
+    }
+
+    fn restart(&mut self, into: RebootInto) -> ! {
+        self.led_enable.set_low();
+        restart(into)
+    }
+}

@@ -1,0 +1,67 @@
+//! Clocks: 600 MHz for the core and 300 MHz for buses, from the board's 24 MHz crystal, which USB High-Speed needs.
+
+use embassy_stm32::Config;
+use embassy_stm32::pac::{FLASH, PWR};
+use embassy_stm32::rcc::{
+    AHBPrescaler, APBPrescaler, HSIPrescaler, Hse, HseMode, Pll, PllDiv, PllMul, PllPreDiv,
+    PllSource, Sysclk, VoltageScale, mux,
+};
+use embassy_stm32::time::Hertz;
+
+/// AHB and XSPI.
+pub const BUS_HZ: u32 = 300_000_000;
+
+pub fn config() -> Config {
+    let mut config = Config::default();
+    let rcc = &mut config.rcc;
+    rcc.hse = Some(Hse { freq: Hertz(24_000_000), mode: HseMode::Oscillator });
+    rcc.pll1 = Some(Pll {
+        source: PllSource::HSE,
+        prediv: PllPreDiv::DIV12,
+        mul: PllMul::MUL300,
+        divp: Some(PllDiv::DIV1),
+        divq: None,
+        divr: None,
+        divs: None,
+        divt: None,
+    });
+    rcc.sys = Sysclk::PLL1_P;
+    rcc.ahb_pre = AHBPrescaler::DIV2;
+    rcc.apb1_pre = APBPrescaler::DIV2;
+    rcc.apb2_pre = APBPrescaler::DIV2;
+    rcc.apb4_pre = APBPrescaler::DIV2;
+    rcc.apb5_pre = APBPrescaler::DIV2;
+    rcc.voltage_scale = VoltageScale::HIGH;
+    rcc.mux.usbphycsel = mux::Usbphycsel::HSE;
+    rcc.mux.xspi1sel = mux::Xspisel::HCLK5;
+    // The converter runs on the internal oscillator, at 32 MHz.
+    rcc.hsi = Some(HSIPrescaler::DIV2);
+    rcc.mux.adcsel = mux::Adcsel::PER;
+    config
+}
+
+/// Code comes from flash at several wait states. The data cache stays off: what DMA writes is read as it is.
+pub fn enable_cache() {
+    if let Some(mut core) = cortex_m::Peripherals::take() {
+        core.SCB.enable_icache();
+    }
+}
+
+/// Watches the supply: below 2.85 V the LED drivers and the FPGA's levels are not to be trusted any more.
+pub fn watch_supply() {
+    use embassy_stm32::pac::flash::vals::BorLev;
+    use embassy_stm32::pac::pwr::vals::Pls;
+    PWR.cr1().modify(|monitor| {
+        monitor.set_pls(Pls::LEVEL7);
+        monitor.set_pvde(true);
+    });
+    if FLASH.obw1sr().read().bor_lev() == BorLev::DISABLED {
+        defmt::warn!("no brown-out reset: set the option byte BOR_LEV to 3 (2.7 V)");
+    }
+}
+
+/// The supply is below 2.85 V.
+pub fn supply_is_low() -> bool {
+    use embassy_stm32::pac::pwr::vals::Pvdo;
+    PWR.sr1().read().pvdo() == Pvdo::BELOW
+}

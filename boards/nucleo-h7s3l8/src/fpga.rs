@@ -1,0 +1,85 @@
+//! The FPGA's host port on XSPI1, and its two ready lines.
+//!
+//! Opcode by one line, all else by four, eight dummy cycles before what is read: `nirspi_wire::host_port`. The
+//! peripheral makes its own clock and waits for nobody, so an access always ends, whatever the FPGA does.
+
+use crate::clocks::BUS_HZ;
+use embassy_futures::select::select;
+use embassy_stm32::exti::ExtiInput;
+use embassy_stm32::mode::Async;
+use embassy_stm32::peripherals::XSPI1;
+use embassy_stm32::xspi::{
+    AddressSize, Config, DummyCycles, MemorySize, MemoryType, TransferConfig, Xspi, XspiError,
+    XspiWidth,
+};
+use nirspi_app::FpgaPort;
+use nirspi_mcu::{BusError, HostPort};
+use nirspi_nucleo::port::prescaler;
+use nirspi_wire::host_port::{QUAD, READ_REGISTER, WRITE_REGISTER};
+
+/// How the peripheral is set up. It wants to know the size of a memory: addresses and lengths must lie within.
+pub fn config() -> Config {
+    Config {
+        memory_type: MemoryType::Standard,
+        device_size: MemorySize::_1MiB,
+        clock_prescaler: prescaler(BUS_HZ),
+        ..Config::default()
+    }
+}
+
+fn access(opcode: u8, address: u16, dummy: DummyCycles) -> TransferConfig {
+    TransferConfig {
+        iwidth: XspiWidth::SING,
+        instruction: Some((opcode | QUAD).into()),
+        adwidth: XspiWidth::QUAD,
+        address: Some(address.into()),
+        adsize: AddressSize::_16bit,
+        dwidth: XspiWidth::QUAD,
+        dummy,
+        ..TransferConfig::default()
+    }
+}
+
+fn failed(error: XspiError) -> BusError {
+    defmt::warn!("fpga port: {}", error);
+    BusError::Transfer
+}
+
+/// The port.
+pub struct Fpga {
+    pub xspi: Xspi<'static, XSPI1, Async>,
+    pub frame_ready: ExtiInput<'static, Async>,
+    pub raw_ready: ExtiInput<'static, Async>,
+}
+
+impl HostPort for Fpga {
+    fn write(&mut self, address: u16, value: u32) -> Result<(), BusError> {
+        let access = access(WRITE_REGISTER, address, DummyCycles::_0);
+        self.xspi.blocking_write(&value.to_be_bytes(), access).map_err(failed)
+    }
+
+    fn read(&mut self, address: u16) -> Result<u32, BusError> {
+        let mut bytes = [0; 4];
+        let access = access(READ_REGISTER, address, DummyCycles::_8);
+        self.xspi.blocking_read(&mut bytes, access).map_err(failed)?;
+        Ok(u32::from_be_bytes(bytes))
+    }
+
+    fn frame_ready(&mut self) -> bool {
+        self.frame_ready.is_high()
+    }
+
+    fn raw_ready(&mut self) -> bool {
+        self.raw_ready.is_high()
+    }
+}
+
+impl FpgaPort for Fpga {
+    async fn read_bytes(&mut self, opcode: u8, into: &mut [u8]) -> Result<(), BusError> {
+        self.xspi.read(into, access(opcode, 0, DummyCycles::_8)).await.map_err(failed)
+    }
+
+    async fn ready(&mut self) {
+        select(self.frame_ready.wait_for_high(), self.raw_ready.wait_for_high()).await;
+    }
+}

@@ -1,0 +1,54 @@
+//! Every pin of this board that the camera uses: the one table, for the code and for whoever wires it.
+//!
+//! `name: pin => place on the Nucleo, where the wire goes;` `README.md` shows the same table, which a test compares.
+//! Places are those of ST's Zio connectors (UM3276) and, for the host port, of the chip's ports P and O by their Arduino-style numbers.
+
+use embassy_stm32::{Peri, pac, peripherals};
+
+macro_rules! pin_table {
+    (($d:tt) $($name:ident: $pin:ident => $place:literal, $wire:literal;)*) => {
+        /// The pins by what they do.
+        pub struct Pins {
+            $(#[doc = concat!($place, " to ", $wire)] pub $name: Peri<'static, peripherals::$pin>,)*
+        }
+
+        /// Takes the table's pins out of the peripherals.
+        macro_rules! take_pins {
+            ($d peripherals:ident) => {
+                $crate::pins::Pins { $($name: $d peripherals.$pin,)* }
+            };
+        }
+        pub(crate) use take_pins;
+    };
+}
+
+pin_table! { ($)
+    // The FPGA's host port, XSPI1.
+    fpga_sck: PO4 => "XSPIM_P1_CLK", "FPGA J6.6 (D13) spi_sck";
+    fpga_cs_n: PO0 => "XSPIM_P1_NCS1", "FPGA J6.3 (D10) spi_cs_n";
+    fpga_io0: PP0 => "XSPIM_P1_IO0", "FPGA J6.4 (D11) spi_io0";
+    fpga_io1: PP1 => "XSPIM_P1_IO1", "FPGA J6.5 (D12) spi_io1";
+    fpga_io2: PP2 => "XSPIM_P1_IO2", "FPGA J6.2 (D9) spi_io2";
+    fpga_io3: PP3 => "XSPIM_P1_IO3", "FPGA J6.1 (D8) spi_io3";
+    frame_ready: PE9 => "CN10 D6", "FPGA J3.8 (D7) frame_ready";
+    raw_ready: PF4 => "CN10 D7", "FPGA J3.7 (D6) raw_ready";
+    // Light.
+    led_enable: PF3 => "CN10 D4", "LED array, second input of the enable's AND gate, 2.2 kilohm to ground";
+    interlock: PF15 => "CN10 D2", "interlock loop, 3.3 V when closed; the FPGA's J3.3 (D2) is on the same loop";
+    thermistor: PA3 => "CN9 A0", "NTC 10 kilohm at the LED array to ground, 10 kilohm to AVDD";
+    // The ECP5's configuration port, SPI1.
+    config_sck: PA5 => "CN7 D13", "ECP5 CCLK";
+    config_mosi: PB5 => "CN7 D11", "ECP5 SI (MOSI)";
+    config_miso: PA6 => "CN7 D12", "ECP5 SO (MISO)";
+    config_cs_n: PD14 => "CN7 D10", "ECP5 SN";
+    config_program_n: PD15 => "CN7 D9", "ECP5 PROGRAMN";
+    config_done: PF5 => "CN7 D8", "ECP5 DONE";
+    // The connector of the board.
+    usb_dp: PM6 => "USB-C", "host D+";
+    usb_dm: PM5 => "USB-C", "host D-";
+}
+
+/// `led_enable` low, whatever else is going on: it needs nothing but the port.
+pub fn leds_off() {
+    pac::GPIOF.bsrr().write(|bits| bits.set_br(3, true));
+}
