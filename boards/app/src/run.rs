@@ -81,6 +81,11 @@ pub async fn run<B: Board, P: FpgaPort, G: GatewareLoader>(
     let mut camera = Camera::new(info, limits).after_crash(crash);
     loop {
         board.feed_watchdog();
+        if loader.step(now()) {
+            board.enable_leds(false);
+            yield_now().await;
+            continue;
+        }
         let inputs = board.inputs();
         let has_gone = link.has_gone();
         let (bytes, sink) = link.both();

@@ -45,8 +45,8 @@ bind_interrupts!(struct Interrupts {
 
 type UsbDriver = Driver<'static, USB_OTG_HS>;
 
-/// Packets on their way to the host: 12 full frames.
-const PLACES: usize = 12;
+/// Packets on their way to the host: 6 full frames.
+const PLACES: usize = 6;
 
 static PACKETS: ConstStaticCell<[Packet; PLACES]> = ConstStaticCell::new([Packet::EMPTY; PLACES]);
 static LINK: StaticCell<Link<'static>> = StaticCell::new();
