@@ -13,7 +13,9 @@ pub enum Fate {
     Drop,
     /// One bit of the byte at this share of its length (in 256ths) flips.
     Flip(u8),
-    /// It arrives after the next one.
+    /// The byte at this share of its length (in 256ths) vanishes.
+    Lose(u8),
+    /// It arrives after the next one of its kind: one that is at least half as long.
     Delay,
     /// The link ends in its middle.
     Unplug,
@@ -62,13 +64,19 @@ impl Tampered {
                 // Never into a delimiter: that is two packets' damage, and has a test of its own.
                 packet[at] ^= if packet[at] == 1 { 2 } else { 1 };
             }
+            Fate::Lose(share) => {
+                packet.remove(usize::from(share) * (packet.len() - 1) / 256);
+            }
             Fate::Unplug => {
                 packet.truncate(packet.len() / 2);
                 self.unplugged = true;
             }
         }
+        let overtakes = 2 * packet.len() >= self.delayed.len();
         self.ready.append(&mut packet);
-        self.ready.append(&mut self.delayed);
+        if overtakes {
+            self.ready.append(&mut self.delayed);
+        }
     }
 }
 

@@ -13,8 +13,10 @@ use nirspi_wire::Crc32;
 use nirspi_wire::host_port::{READ_REGISTER, WRITE_REGISTER};
 use nirspi_wire::tunnel::{CRC_BYTES, LOOK, Lines, REPLY_HEAD_BYTES, Request};
 
-/// A register access takes a simulator of the RTL some milliseconds.
+/// A register access takes a simulator of the RTL some milliseconds...
 const PATIENCE: Duration = Duration::from_secs(1);
+/// ...and after one that got no answer, so long, that the host is not kept waiting for an FPGA that is gone.
+const IMPATIENCE: Duration = Duration::from_millis(50);
 /// A frame takes it some seconds.
 const DATA_PATIENCE: Duration = Duration::from_secs(30);
 /// After an access that failed: what is late has come by then.
@@ -26,6 +28,7 @@ pub struct Tunnel<'b> {
     lines: &'b Cell<Lines>,
     number: u8,
     look: Option<Look>,
+    patience: Duration,
 }
 
 /// A look whose reply has not come whole: who waited for it may have gone, the reply comes all the same.
@@ -40,7 +43,7 @@ impl<'b> Tunnel<'b> {
     pub fn new(uart: &'static Uart, lines: &'b Cell<Lines>) -> Self {
         // What a crash has left half said.
         uart.quieten(SILENCE);
-        let mut tunnel = Self { uart, lines, number: 0, look: None };
+        let mut tunnel = Self { uart, lines, number: 0, look: None, patience: PATIENCE };
         tunnel.begin_look();
         // Without an answer there is no FPGA, no interlock and no sensor, which is what the camera then finds.
         let _ = tunnel.end_look();
@@ -68,11 +71,13 @@ impl<'b> Tunnel<'b> {
             return self.failed(BusError::Transfer);
         }
         self.lines.set(lines);
+        self.patience = PATIENCE;
         Ok(())
     }
 
     fn failed(&mut self, error: BusError) -> Result<(), BusError> {
         self.uart.quieten(SILENCE);
+        self.patience = IMPATIENCE;
         self.lines.set(Lines { frame_ready: false, raw_ready: false, ..self.lines.get() });
         Err(error)
     }
@@ -89,7 +94,7 @@ impl<'b> Tunnel<'b> {
     fn end_look(&mut self) -> Result<(), BusError> {
         let Some(Look { request, mut reply, filled }) = self.look.take() else { return Ok(()) };
         let rest = reply.get_mut(filled..).unwrap_or_default();
-        if self.uart.read_blocking(rest, PATIENCE).is_err() {
+        if self.uart.read_blocking(rest, self.patience).is_err() {
             return self.failed(BusError::Timeout);
         }
         let [h0, h1, h2, h3, crc @ ..] = reply;
@@ -101,7 +106,7 @@ impl<'b> Tunnel<'b> {
         self.uart.write_blocking(&request.to_bytes());
         let (mut head, mut crc) = ([0; REPLY_HEAD_BYTES], [0; CRC_BYTES]);
         for part in [&mut head[..], data, &mut crc[..]] {
-            if self.uart.read_blocking(part, PATIENCE).is_err() {
+            if self.uart.read_blocking(part, self.patience).is_err() {
                 return self.failed(BusError::Timeout);
             }
         }

@@ -7,7 +7,6 @@ use nirspi::link::{Link, TcpLink};
 use nirspi::virtual_camera::SimulatedFpga;
 use std::io::{Read, Write};
 use std::net::{Shutdown, TcpListener, TcpStream};
-use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -17,6 +16,7 @@ use std::thread;
 pub struct Emulated {
     qemu: Child,
     host: String,
+    fpga_line: TcpStream,
     interlock_closed: Arc<AtomicBool>,
 }
 
@@ -55,15 +55,20 @@ impl Emulated {
             .unwrap();
         let (host_line, fpga_line) = (accept(&host_line), accept(&fpga_line));
         let interlock_closed = Arc::new(AtomicBool::new(true));
-        let interlock = Arc::clone(&interlock_closed);
-        thread::spawn(move || simulator::serve(fpga_line, fpga, &interlock));
+        let (line, interlock) = (fpga_line.try_clone().unwrap(), Arc::clone(&interlock_closed));
+        thread::spawn(move || simulator::serve(line, fpga, &interlock));
         let host = relay(host_line);
-        Some(Self { qemu: child, host, interlock_closed })
+        Some(Self { qemu: child, host, fpga_line, interlock_closed })
     }
 
     /// A link to the camera: a new session each time, on the same line.
     pub fn link(&self) -> Box<dyn Link> {
         Box::new(TcpLink::connect(&self.host).unwrap())
+    }
+
+    /// Cuts the FPGA off.
+    pub fn unplug_fpga(&self) {
+        self.fpga_line.shutdown(Shutdown::Both).unwrap();
     }
 
     /// Opens or closes the enclosure.

@@ -5,21 +5,29 @@
 //! frames, bit for bit. Device times differ: the two have different clocks.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap in a helper fails its test")]
 
+#[path = "../co_simulation/board.rs"]
+mod board;
+mod debugger;
 mod emulated;
 mod firmware;
+#[path = "../co_simulation/fpga.rs"]
+mod fpga;
 mod simulator;
 
 use emulated::Emulated;
+use fpga::RtlFpga;
 use nirspi::capture::{Capture, CaptureOptions, Ended, capture};
 use nirspi::link::{Link, Received};
-use nirspi::session::Session;
+use nirspi::session::{Deaf, Session, SessionError};
 use nirspi::setup::MeasurementSetup;
 use nirspi::virtual_camera::{MemoryLink, VirtualOptics};
 use nirspi_optics::Scene;
 use nirspi_recon::{Order, Side, metrics, reconstruct};
 use nirspi_tests::tamper::{Fate, Tampered};
 use nirspi_wire::packet::MAX_DEVICE_PACKET;
-use nirspi_wire::{Deframed, Deframer, DeviceMessage, FrameFlags, open};
+use nirspi_wire::{
+    Command, Deframed, Deframer, DeviceMessage, Fault, Frame, FrameFlags, Refusal, open,
+};
 use std::io;
 use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex};
@@ -53,19 +61,65 @@ struct Shot {
     samples: Vec<i64>,
 }
 
-/// A link that keeps what came from the camera.
+/// A camera's line, of which everything that came is kept.
 struct Tapped {
-    inner: Box<dyn Link>,
+    line: Option<Box<dyn Link>>,
     came: Arc<Mutex<Vec<u8>>>,
 }
 
-impl Link for Tapped {
+impl Tapped {
+    fn new(line: Box<dyn Link>) -> Self {
+        Self { line: Some(line), came: Arc::default() }
+    }
+
+    /// The line, once.
+    fn link(&mut self) -> Box<dyn Link> {
+        Box::new(Tap { line: self.line.take().unwrap(), came: Arc::clone(&self.came) })
+    }
+
+    /// What `of` finds in the messages that came whole.
+    fn find<T>(&self, of: impl Fn(&DeviceMessage<'_>) -> Option<T>) -> Vec<T> {
+        let came = self.came.lock().unwrap();
+        let mut deframer: Box<Deframer<MAX_DEVICE_PACKET>> = Box::default();
+        let (mut rest, mut all) = (&came[..], Vec::new());
+        while let Some(found) = deframer.next(&mut rest) {
+            if let Deframed::Packet(packet) = found
+                && let Ok(message) = open::<DeviceMessage<'_>>(packet)
+            {
+                all.extend(of(&message));
+            }
+        }
+        all
+    }
+
+    fn shots(&self) -> Vec<Shot> {
+        self.find(|message| {
+            let DeviceMessage::Frame(frame) = message else { return None };
+            let &Frame { run, sequence, sweeps, flags, ref samples, .. } = frame;
+            Some(Shot { run, sequence, sweeps, flags, samples: samples.iter().collect() })
+        })
+    }
+
+    fn crashes(&self) -> Vec<String> {
+        self.find(|message| {
+            let DeviceMessage::Crash(report) = message else { return None };
+            Some(report.text.to_owned())
+        })
+    }
+}
+
+struct Tap {
+    line: Box<dyn Link>,
+    came: Arc<Mutex<Vec<u8>>>,
+}
+
+impl Link for Tap {
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
-        self.inner.send(bytes)
+        self.line.send(bytes)
     }
 
     fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<Received> {
-        let received = self.inner.receive(buffer, timeout)?;
+        let received = self.line.receive(buffer, timeout)?;
         if let Received::Bytes(length) = received {
             self.came.lock().unwrap().extend_from_slice(&buffer[..length]);
         }
@@ -73,43 +127,27 @@ impl Link for Tapped {
     }
 }
 
-fn shots(bytes: &[u8]) -> Vec<Shot> {
-    let mut deframer: Box<Deframer<MAX_DEVICE_PACKET>> = Box::default();
-    let mut rest = bytes;
-    let mut shots = Vec::new();
-    while let Some(found) = deframer.next(&mut rest) {
-        let Deframed::Packet(packet) = found else { continue };
-        if let Ok(DeviceMessage::Frame(frame)) = open::<DeviceMessage<'_>>(packet) {
-            shots.push(Shot {
-                run: frame.run,
-                sequence: frame.sequence,
-                sweeps: frame.sweeps,
-                flags: frame.flags,
-                samples: frame.samples.iter().collect(),
-            });
-        }
-    }
-    shots
-}
-
-fn run(link: Box<dyn Link>, setup: &MeasurementSetup, frames: u32) -> (Capture, Vec<Shot>) {
-    let came = Arc::new(Mutex::new(Vec::new()));
-    let mut session =
-        Session::open(Box::new(Tapped { inner: link, came: Arc::clone(&came) })).unwrap();
+fn measure(session: &mut Session, setup: &MeasurementSetup, frames: u32) -> Capture {
     let setup = setup.clone();
     let options = CaptureOptions { setup, frames: Some(frames), calibrate: false, record: None };
-    let captured =
-        capture(&mut session, &options, &mut |_| ControlFlow::Continue(())).unwrap();
-    let came = came.lock().unwrap();
-    (captured, shots(&came))
+    capture(session, &options, &mut |_| ControlFlow::Continue(())).unwrap()
+}
+
+fn run(line: Box<dyn Link>, setup: &MeasurementSetup, frames: u32) -> (Capture, Vec<Shot>) {
+    let mut tapped = Tapped::new(line);
+    let mut session = Session::open(tapped.link()).unwrap();
+    let captured = measure(&mut session, setup, frames);
+    (captured, tapped.shots())
 }
 
 fn in_process() -> Box<dyn Link> {
     Box::new(MemoryLink::new(optics().camera(SEED).unwrap()))
 }
 
+/// The natural order, with the latency of the simulated receiver.
 fn natural() -> MeasurementSetup {
-    MeasurementSetup::new(&Order::Natural, 1.0).unwrap()
+    let adc_latency = optics().chain().adc_latency_clocks;
+    MeasurementSetup { adc_latency, ..MeasurementSetup::new(&Order::Natural, 1.0).unwrap() }
 }
 
 #[test]
@@ -130,10 +168,172 @@ fn frames_from_the_emulated_board_are_those_of_the_virtual_camera_bit_for_bit() 
     };
     assert_eq!(image(&captured).pixels(), image(&reference).pixels());
     let side = Side::INSTRUMENT.pixels();
-    let footprint = optics();
-    let seen = image(&captured);
-    let correlation =
-        metrics::correlation(footprint.footprint().weights(), seen.pixels(), side, side).unwrap();
-    println!("correlation with the scene: {correlation:.4}");
-    assert!(correlation > 0.9, "correlation {correlation}");
+    let optics = optics();
+    let weights = optics.footprint().weights();
+    let correlation = metrics::correlation(weights, image(&captured).pixels(), side, side).unwrap();
+    println!("{frames} frames in {:.2?}, correlation {correlation:.4}", captured.elapsed);
+    assert!(correlation > 0.6, "correlation {correlation}");
+}
+
+#[test]
+fn an_order_table_several_sweeps_and_a_second_run_come_through_too() {
+    let mut setup = MeasurementSetup::new(&Order::Random(7), 0.1).unwrap();
+    setup.sweeps = 3;
+    let Some(board) = Emulated::start(optics().fpga(SEED).unwrap()) else { return };
+    let mut virtual_camera = Tapped::new(in_process());
+    let mut emulated = Tapped::new(board.link());
+    for tapped in [&mut virtual_camera, &mut emulated] {
+        let mut session = Session::open(tapped.link()).unwrap();
+        for frames in [9, 4] {
+            let captured = measure(&mut session, &setup, frames);
+            assert!(captured.counters.is_complete(), "{}", captured.counters);
+        }
+    }
+    let shots = emulated.shots();
+    assert_eq!(shots.len(), 13);
+    assert_eq!((shots[0].run, shots[12].run), (1, 2));
+    assert!(shots == virtual_camera.shots());
+}
+
+/// Firmware as machine code and gateware as RTL: the camera with everything but the silicon.
+#[test]
+fn frames_of_the_rtl_come_through_the_emulated_board_as_the_golden_models_do() {
+    let optics = optics().ideal();
+    let setup = MeasurementSetup::new(&Order::Natural, 1.0).unwrap();
+    let Some(board) = Emulated::start(RtlFpga::new(&optics, SEED)) else { return };
+    let (captured, shots) = run(board.link(), &setup, 1);
+    assert!(matches!(captured.ended, Ended::Complete), "{:?}", captured.ended);
+    let golden = MemoryLink::new(optics.camera(SEED).unwrap());
+    let (_, expected) = run(Box::new(golden), &setup, 1);
+    assert_eq!(shots.len(), 1);
+    assert!(shots == expected, "the frames differ");
+    println!(
+        "one sweep of 1024 patterns and complements through RTL and firmware: {:.2?}",
+        captured.elapsed
+    );
+}
+
+#[test]
+fn frames_that_the_rtl_makes_faster_than_the_board_reads_them_are_counted_and_spoil_no_other() {
+    let frames = 400;
+    let optics = optics().ideal();
+    let setup = MeasurementSetup::new(&Order::Natural, 0.05).unwrap();
+    let Some(board) = Emulated::start(RtlFpga::new(&optics, SEED)) else { return };
+    let (captured, shots) = run(board.link(), &setup, frames);
+    assert_eq!(captured.counters.total(), u64::from(frames), "{}", captured.counters);
+    assert!(captured.counters.lost > 0 && captured.counters.received > 1, "{}", captured.counters);
+    let golden = MemoryLink::new(optics.camera(SEED).unwrap());
+    let (_, expected) = run(Box::new(golden), &setup, frames);
+    for shot in shots {
+        // Without noise every frame has the same samples.
+        assert_eq!(
+            shot.samples, expected[shot.sequence as usize].samples,
+            "frame {}",
+            shot.sequence
+        );
+    }
+}
+
+/// Nothing else that the device sends is nearly as long as a frame.
+fn of_frames(
+    mut judge: impl FnMut(usize) -> Fate + Send + 'static,
+) -> impl FnMut(usize, usize) -> Fate + Send {
+    let mut frame = 0;
+    move |_, length| {
+        if length < 3000 {
+            return Fate::Pass;
+        }
+        frame += 1;
+        judge(frame - 1)
+    }
+}
+
+#[test]
+fn on_a_bad_line_every_frame_is_accounted_for_and_none_that_arrives_differs() {
+    let frames = 9;
+    let Some(board) = Emulated::start(optics().fpga(SEED).unwrap()) else { return };
+    let judge = of_frames(|frame| match frame {
+        1 => Fate::Drop,
+        2 => Fate::Flip(99),
+        4 => Fate::Delay,
+        6 => Fate::Lose(200),
+        _ => Fate::Pass,
+    });
+    let (captured, shots) = run(Box::new(Tampered::new(board.link(), judge)), &natural(), frames);
+    let counters = captured.counters;
+    assert_eq!(
+        (counters.received, counters.lost, counters.corrupt, counters.late),
+        (5, 1, 2, 1),
+        "{counters}"
+    );
+    let status = captured.status.unwrap();
+    assert_eq!((status.frames_made, status.frames_sent), (frames, frames), "the device sent all");
+    let (_, expected) = run(in_process(), &natural(), frames);
+    let arrived: Vec<u32> = shots.iter().map(|shot| shot.sequence).collect();
+    assert_eq!(arrived, [0, 3, 5, 4, 7, 8]);
+    for shot in shots {
+        assert_eq!(shot, expected[shot.sequence as usize]);
+    }
+}
+
+#[test]
+fn an_open_interlock_keeps_the_emulated_board_dark() {
+    let Some(board) = Emulated::start(optics().fpga(SEED).unwrap()) else { return };
+    let mut session = Session::open(board.link()).unwrap();
+    board.set_interlock(false);
+    let refused = natural()
+        .with_configuration(|c| session.command(Command::Configure(c), &mut Deaf))
+        .unwrap_err();
+    let SessionError::Refused { refusal: Refusal::Fault(Fault::Interlock), .. } = refused else {
+        panic!("{refused}");
+    };
+    board.set_interlock(true);
+    while !session.status(&mut Deaf).unwrap().interlock_closed {}
+    assert!(measure(&mut session, &natural(), 1).counters.is_complete(), "closed, it measures");
+}
+
+#[test]
+fn an_fpga_that_falls_silent_is_a_fault_that_the_host_is_told() {
+    let Some(board) = Emulated::start(optics().fpga(SEED).unwrap()) else { return };
+    let mut session = Session::open(board.link()).unwrap();
+    assert_eq!(session.identity().board, "mps2-an505");
+    assert_eq!(session.status(&mut Deaf).unwrap().fault, None);
+    board.unplug_fpga();
+    let mut fault = None;
+    for _ in 0..100 {
+        fault = session.status(&mut Deaf).unwrap().fault;
+        if fault.is_some() {
+            break;
+        }
+    }
+    assert_eq!(fault, Some(Fault::FpgaAbsent { identity: 0 }));
+}
+
+/// Nothing is there: an instruction fetch ends in a hard fault.
+const NOWHERE: u32 = 0x2FF0_0000;
+
+#[test]
+fn firmware_that_crashes_starts_again_and_tells_the_next_host_once() {
+    let debugger = debugger::Waiting::new();
+    let arguments = debugger.arguments();
+    let fpga = optics().fpga(SEED).unwrap();
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let Some(board) = Emulated::start_with(fpga, &arguments) else { return };
+    let mut debugger = debugger.attach();
+    debugger.go();
+    drop(Session::open(board.link()).unwrap());
+
+    debugger.derail(NOWHERE);
+    let hear = || {
+        let mut tapped = Tapped::new(board.link());
+        let mut session = Session::open(tapped.link()).unwrap();
+        session.status(&mut Deaf).unwrap();
+        let captured = measure(&mut session, &natural(), 1);
+        assert!(captured.counters.is_complete(), "it measures again");
+        tapped.crashes()
+    };
+    let told = hear();
+    assert_eq!(told.len(), 1, "{told:?}");
+    assert!(told[0].contains("hard fault at 0x2ff00000"), "{told:?}");
+    assert!(hear().is_empty());
 }

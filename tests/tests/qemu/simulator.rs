@@ -21,7 +21,11 @@ const LOOK_STEPS: u32 = 50;
 const CENTI_CELSIUS: i16 = 2500;
 
 /// Serves accesses until the board goes away.
-pub fn serve(mut line: TcpStream, mut fpga: impl SimulatedFpga, interlock_closed: &Arc<AtomicBool>) {
+pub fn serve(
+    mut line: TcpStream,
+    mut fpga: impl SimulatedFpga,
+    interlock_closed: &Arc<AtomicBool>,
+) {
     let mut buffer = Vec::new();
     let mut chunk = [0; 4096];
     loop {
