@@ -223,14 +223,10 @@ fn frames_that_the_rtl_makes_faster_than_the_board_reads_them_are_counted_and_sp
     assert_eq!(captured.counters.total(), u64::from(frames), "{}", captured.counters);
     assert!(captured.counters.lost > 0 && captured.counters.received > 1, "{}", captured.counters);
     let golden = MemoryLink::new(optics.camera(SEED).unwrap());
-    let (_, expected) = run(Box::new(golden), &setup, frames);
+    let (_, expected) = run(Box::new(golden), &setup, 1);
     for shot in shots {
         // Without noise every frame has the same samples.
-        assert_eq!(
-            shot.samples, expected[shot.sequence as usize].samples,
-            "frame {}",
-            shot.sequence
-        );
+        assert!(shot.samples == expected[0].samples, "frame {}", shot.sequence);
     }
 }
 

@@ -1,0 +1,225 @@
+//! How many instructions a frame costs: the streaming path alone, with memory in place of the buses.
+//!
+//! Run under `-icount shift=0`, where one instruction is one nanosecond of the emulated clock, so SysTick's 20 MHz
+//! count fifties of them. They are instructions, not cycles: QEMU has no pipeline and no wait states.
+//!
+//! The one law: what is measured is the code of the firmware as it is linked into it, with nothing left out.
+#![no_std]
+#![no_main]
+
+use core::panic::PanicInfo;
+use cortex_m::Peripherals;
+use cortex_m::peripheral::SYST;
+use cortex_m::peripheral::syst::SystClkSource;
+use cortex_m_rt::entry;
+use cortex_m_semihosting::debug::{EXIT_FAILURE, EXIT_SUCCESS, exit};
+use cortex_m_semihosting::hprintln;
+use nirspi_mcu::{
+    BoardInfo, BusError, Camera, HostPort, Inputs, Limits, Merger, Micros, NoLoader, PacketSink,
+    PortBus, Ports,
+};
+use nirspi_wire::fpga::{Header, MAX_FRAME_BYTES, Sums, frame_bytes};
+use nirspi_wire::packet::{MAX_DEVICE_PACKET, MAX_HOST_PACKET, encode};
+use nirspi_wire::register::{IDENTITY, Register, control, status};
+use nirspi_wire::{
+    Command, Configuration, FrameFlags, PATTERNS, PROTOCOL_VERSION, PatternOrder, Request,
+    RunLength, SampleSource, Version, crc32,
+};
+use static_cell::ConstStaticCell;
+
+const FRAMES: u32 = 16;
+/// Instructions in a count of SysTick.
+const GRAIN: u32 = 50;
+const TRANSFER_BYTES: usize = 512;
+
+/// Registers in memory, and a frame that is always ready while a run is on.
+struct Memory {
+    registers: [u32; 32],
+    running: bool,
+    sequence: u32,
+}
+
+impl Memory {
+    fn slot(&mut self, address: u16) -> Option<&mut u32> {
+        self.registers.get_mut(usize::from(address))
+    }
+
+    /// The frame that is ready now.
+    fn frame(&self, into: &mut [u8]) {
+        let header = Header {
+            patterns: PATTERNS,
+            flags: FrameFlags::DIFFERENTIAL,
+            sequence: self.sequence,
+            sweeps: 1,
+            over_range: 0,
+            lost: 0,
+            clock: u64::from(self.sequence) * 10_240,
+        };
+        let mut bytes = header.to_bytes().into_iter().chain(
+            (0..PATTERNS)
+                .flat_map(|k| Sums { positive: 8_000 + u64::from(k), negative: 7_500 }.to_bytes()),
+        );
+        let Some((body, crc)) = into.split_last_chunk_mut::<4>() else { return };
+        body.fill_with(|| bytes.next().unwrap_or(0));
+        *crc = crc32(body).to_le_bytes();
+    }
+}
+
+impl HostPort for Memory {
+    fn write(&mut self, address: u16, value: u32) -> Result<(), BusError> {
+        if address == Register::Control.address() {
+            self.running |= value & control::START != 0;
+            if value & control::RELEASE != 0 {
+                self.sequence += 1;
+            }
+        } else if let Some(slot) = self.slot(address) {
+            *slot = value;
+        }
+        Ok(())
+    }
+
+    fn read(&mut self, address: u16) -> Result<u32, BusError> {
+        let running = if self.running { status::RUNNING | status::LEDS_ON } else { 0 };
+        Ok(match Register::at(address) {
+            Some(Register::Identity) => IDENTITY,
+            Some(Register::Status) => status::INTERLOCK_CLOSED | running,
+            Some(Register::FramesMade) => self.sequence,
+            _ => self.slot(address).map_or(0, |slot| *slot),
+        })
+    }
+
+    fn frame_ready(&mut self) -> bool {
+        self.running
+    }
+
+    fn raw_ready(&mut self) -> bool {
+        false
+    }
+}
+
+/// Room for one packet.
+struct OnePacket {
+    bytes: [u8; MAX_DEVICE_PACKET],
+    length: usize,
+}
+
+impl PacketSink for OnePacket {
+    fn claim(&mut self, length: usize) -> Option<&mut [u8]> {
+        self.bytes.get_mut(..length)
+    }
+
+    fn commit(&mut self, length: usize) {
+        self.length = length;
+    }
+}
+
+const CONFIGURATION: Configuration<'static> = Configuration {
+    order: PatternOrder::Natural,
+    patterns: PATTERNS,
+    differential: true,
+    clocks_per_pattern: 5,
+    blanked: 2,
+    adc_latency: 3,
+    sweeps: 1,
+    source: SampleSource::Detector,
+    over_range_trip: 0,
+};
+
+const INPUTS: Inputs = Inputs { interlock_closed: true, temperature_centi_celsius: Some(2500) };
+
+/// Counts of SysTick that `work` takes.
+fn counts(work: impl FnOnce()) -> u32 {
+    let before = SYST::get_current();
+    work();
+    // It counts down, in 24 bits.
+    before.wrapping_sub(SYST::get_current()) & 0x00FF_FFFF
+}
+
+#[entry]
+fn main() -> ! {
+    static BUFFER: ConstStaticCell<[u8; MAX_FRAME_BYTES]> =
+        ConstStaticCell::new([0; MAX_FRAME_BYTES]);
+    static SINK: ConstStaticCell<OnePacket> =
+        ConstStaticCell::new(OnePacket { bytes: [0; MAX_DEVICE_PACKET], length: 0 });
+    static PACKET: ConstStaticCell<[u8; MAX_HOST_PACKET]> =
+        ConstStaticCell::new([0; MAX_HOST_PACKET]);
+
+    if let Some(mut peripherals) = Peripherals::take() {
+        peripherals.SYST.set_clock_source(SystClkSource::Core);
+        peripherals.SYST.set_reload(0x00FF_FFFF);
+        peripherals.SYST.clear_current();
+        peripherals.SYST.enable_counter();
+    }
+    let sink = SINK.take();
+    let packet = PACKET.take();
+    let memory = Memory { registers: [0; 32], running: false, sequence: 0 };
+    let mut bus = PortBus::new(memory, BUFFER.take());
+    let mut camera =
+        Camera::new(BoardInfo::new("counted", "", Version(0, 0, 0)), Limits::default());
+    let mut now = Micros(0);
+
+    for command in [
+        Command::Hello { protocol: PROTOCOL_VERSION },
+        Command::Configure(CONFIGURATION),
+        Command::Start(RunLength::Continuous),
+    ] {
+        let Ok(bytes) = encode(&Request { id: 0, command }, packet) else { panic!("encode") };
+        let ports = &mut Ports { bus: &mut bus, sink, loader: &mut NoLoader };
+        let _ = camera.receive(now, bytes, &INPUTS, ports);
+    }
+
+    let (mut poll, mut merge, mut bytes) = (0, 0, 0);
+    let mut merger = Merger::<TRANSFER_BYTES>::new();
+    for _ in 0..FRAMES {
+        // 1000 frames a second: the FPGA is looked at once for each.
+        now.0 += 1_000;
+        let mut step = |bus: &mut PortBus<'_, Memory>, sink: &mut OnePacket| {
+            counts(|| {
+                let ports = &mut Ports { bus, sink, loader: &mut NoLoader };
+                camera.poll(now, &INPUTS, ports);
+            })
+        };
+        sink.length = 0;
+        poll += step(&mut bus, sink);
+        if let Some((port, _, into)) = bus.wanted() {
+            port.frame(into);
+            bus.transferred(Ok(()));
+        }
+        poll += step(&mut bus, sink);
+        bytes += sink.length as u32;
+        merge += counts(|| {
+            let mut rest = sink.bytes.get(..sink.length).unwrap_or(&[]);
+            while !rest.is_empty() {
+                let taken = merger.take(rest);
+                rest = rest.get(taken..).unwrap_or(&[]);
+                if merger.is_full() {
+                    core::hint::black_box(merger.transfer());
+                }
+            }
+        });
+    }
+    let crc = counts(|| {
+        if let Some((_, _, into)) = bus.wanted() {
+            core::hint::black_box(into);
+        }
+        core::hint::black_box(crc32(core::hint::black_box(&sink.bytes)));
+    });
+    if bytes < FRAMES * 4 * u32::from(PATTERNS) {
+        hprintln!("no frames came: {} bytes", bytes);
+        exit(EXIT_FAILURE);
+    }
+    hprintln!("fpga_bytes {}", frame_bytes(PATTERNS));
+    hprintln!("link_bytes {}", bytes / FRAMES);
+    hprintln!("firmware {}", poll * GRAIN / FRAMES);
+    hprintln!("merging {}", merge * GRAIN / FRAMES);
+    hprintln!("crc_per_1000_bytes {}", crc * GRAIN * 10 / (MAX_DEVICE_PACKET as u32 / 100));
+    exit(EXIT_SUCCESS);
+    panic!("the emulator goes on after its exit");
+}
+
+#[panic_handler]
+fn panic(info: &PanicInfo<'_>) -> ! {
+    hprintln!("{}", info);
+    exit(EXIT_FAILURE);
+    loop {}
+}
