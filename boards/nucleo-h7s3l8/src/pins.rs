@@ -44,8 +44,8 @@ pin_table! { ($)
     config_program_n: PD15 => "CN7 D9", "ECP5 PROGRAMN";
     config_done: PF5 => "CN7 D8", "ECP5 DONE";
     // The connector of the board.
-    usb_dp: PM6 => "USB-C", "host D+";
-    usb_dm: PM5 => "USB-C", "host D-";
+    usb_dp: PM6 => "user USB-C", "host D+";
+    usb_dm: PM5 => "user USB-C", "host D-";
 }
 
 /// `led_enable` low, whatever else is going on: it needs nothing but the port.

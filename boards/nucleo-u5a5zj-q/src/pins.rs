@@ -47,8 +47,8 @@ pin_table! { ($)
     tof_scl: PB8 => "CN7 D15", "VL53L5CX or VL53L8CX SCL";
     tof_sda: PB9 => "CN7 D14", "VL53L5CX or VL53L8CX SDA";
     // The connector of the board.
-    usb_dp: PA12 => "CN15 USB-C", "host D+";
-    usb_dm: PA11 => "CN15 USB-C", "host D-";
+    usb_dp: PA12 => "user USB-C", "host D+";
+    usb_dm: PA11 => "user USB-C", "host D-";
 }
 
 /// `led_enable` low, whatever else is going on: it needs nothing but the port.
