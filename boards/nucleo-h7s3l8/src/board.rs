@@ -8,6 +8,7 @@ use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_time::{Duration, Instant};
 use nirspi_app::Board;
 use nirspi_mcu::{Inputs, ntc};
+use nirspi_nucleo::crash;
 use nirspi_nucleo::restart::restart;
 use nirspi_wire::RebootInto;
 
@@ -38,7 +39,9 @@ pub struct Nucleo {
 
 impl Board for Nucleo {
     fn inputs(&mut self) -> Inputs {
-        assert!(!clocks::supply_is_low(), "the supply is below 2.85 V");
+        if clocks::supply_is_low() {
+            crash::die(format_args!("the supply is below 2.85 V"));
+        }
         if Instant::now() >= self.temperature_due {
             let reading = self.adc.blocking_read(&mut self.thermistor, SampleTime::CYCLES47_5);
             self.temperature = ntc::centi_celsius(reading << 4);

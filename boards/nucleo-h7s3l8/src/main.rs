@@ -31,8 +31,8 @@ use fpga::Fpga;
 use nirspi_app::link::{HostIn, HostOut, Link, Packet};
 use nirspi_app::{DepthMailbox, Device, board_info, run};
 use nirspi_mcu::Limits;
-use nirspi_nucleo::usb::{Endpoints, Memory, OUT_BUFFER_BYTES, PACKET_BYTES, Presence, serve};
 use nirspi_nucleo::{crash, gateware, restart};
+use nirspi_usb::{Endpoints, Memory, OUT_BUFFER_BYTES, PACKET_BYTES, Presence, serve};
 use nirspi_wire::fpga::MAX_FRAME_BYTES;
 use static_cell::{ConstStaticCell, StaticCell};
 
@@ -135,7 +135,7 @@ async fn main(spawner: Spawner) {
     );
     let presence = PRESENCE.init(Presence::new());
     let memory = USB_MEMORY.init(Memory::new(presence));
-    let (device, endpoints) = nirspi_nucleo::usb::device(driver, serial, info.firmware, memory);
+    let (device, endpoints) = nirspi_usb::device(driver, serial, info.firmware, memory);
     let (camera, commands, packets) = LINK.init(Link::new(PACKETS.take())).split();
     // No depth sensor: the firmware that it needs is larger than this chip's flash.
     let mailbox = MAILBOX.init(DepthMailbox::new());

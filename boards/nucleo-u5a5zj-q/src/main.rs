@@ -34,8 +34,8 @@ use fpga::Fpga;
 use nirspi_app::link::{HostIn, HostOut, Link, Packet};
 use nirspi_app::{Board, DepthMailbox, Device, board_info, measure_depth, run};
 use nirspi_mcu::{HostPort, Limits};
-use nirspi_nucleo::usb::{Endpoints, Memory, OUT_BUFFER_BYTES, PACKET_BYTES, Presence, serve};
 use nirspi_nucleo::{crash, gateware, restart};
+use nirspi_usb::{Endpoints, Memory, OUT_BUFFER_BYTES, PACKET_BYTES, Presence, serve};
 use nirspi_wire::fpga::MAX_FRAME_BYTES;
 use nirspi_wire::register::{IDENTITY, Register};
 use static_cell::{ConstStaticCell, StaticCell};
@@ -153,7 +153,7 @@ async fn main(spawner: Spawner) {
     );
     let presence = PRESENCE.init(Presence::new());
     let memory = USB_MEMORY.init(Memory::new(presence));
-    let (device, endpoints) = nirspi_nucleo::usb::device(driver, serial, info.firmware, memory);
+    let (device, endpoints) = nirspi_usb::device(driver, serial, info.firmware, memory);
     let (camera, commands, packets) = LINK.init(Link::new(PACKETS.take())).split();
     let mailbox = &*MAILBOX.init(DepthMailbox::new());
     let bus = I2c::new(

@@ -14,14 +14,17 @@ use core::panic::PanicInfo;
 use cortex_m::peripheral::SCB;
 use critical_section::Mutex;
 
-static LEDS_OFF: Mutex<Cell<Option<fn()>>> = Mutex::new(Cell::new(None));
+type Action = Option<fn()>;
+
+static LEDS_OFF: Mutex<Cell<Action>> = Mutex::new(Cell::new(None));
 
 /// Says how to turn the LEDs off. To be called before anything can turn them on.
 pub fn on_crash(leds_off: fn()) {
     critical_section::with(|token| LEDS_OFF.borrow(token).set(Some(leds_off)));
 }
 
-fn die(text: Arguments<'_>) -> ! {
+/// Ends it here and now.
+pub fn die(text: Arguments<'_>) -> ! {
     cortex_m::interrupt::disable();
     if let Some(leds_off) = critical_section::with(|token| LEDS_OFF.borrow(token).get()) {
         leds_off();

@@ -1,4 +1,4 @@
-//! What the camera's Nucleo boards do alike, without a HAL: the USB device, gateware that is remembered over a
+//! What the camera's Nucleo boards do alike, without a HAL: gateware that is remembered over a
 //! restart, the end after a crash, the way into the chip's boot loader.
 //!
 //! The one law: nothing here knows a pin or a register of one chip; what it needs of them is an argument.
@@ -8,4 +8,3 @@ pub mod crash;
 pub mod gateware;
 pub mod port;
 pub mod restart;
-pub mod usb;

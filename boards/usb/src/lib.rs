@@ -9,8 +9,15 @@
 //!
 //! The one law: the session lasts as long as the configuration; reset, another configuration, suspend (which is what a
 //! pulled cable looks like to a board that has its own supply) end it, and with it the light.
+#![no_std]
 
-use embassy_futures::select::select3;
+#[cfg(test)]
+extern crate std;
+
+#[cfg(test)]
+mod tests;
+
+use embassy_futures::select::{Either3, select3};
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_usb::descriptor::capability_type;
@@ -102,7 +109,6 @@ impl Watch {
     fn tell(&mut self) {
         let there = self.configured && !self.suspended;
         self.session = self.session.wrapping_add(1);
-        defmt::info!("usb: host {=str}", if there { "there" } else { "gone" });
         self.presence.signal(there.then_some(self.session));
     }
 }
@@ -189,7 +195,7 @@ pub async fn serve<D: Driver<'static>>(
             presence.wait(),
         );
         let next = match news.await {
-            embassy_futures::select::Either3::Third(next) => next,
+            Either3::Third(next) => next,
             // An endpoint is gone: so is the host, or it is about to be.
             _ => None,
         };
