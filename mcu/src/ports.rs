@@ -98,6 +98,9 @@ pub trait GatewareLoader {
     /// [`LoadError`].
     fn finish(&mut self) -> Result<(), LoadError>;
 
+    /// The FPGA does not answer: it does not run what was loaded last.
+    fn forget(&mut self) {}
+
     /// Goes on with what `finish` began, for a millisecond at most; whether there is more to do. The camera is not
     /// to be polled until there is not: meanwhile there is no FPGA to talk to, and none that lights anything.
     fn step(&mut self, _now: Micros) -> bool {

@@ -54,7 +54,7 @@ impl Machine {
             },
             Command::ReadRegister { address } => read_register(address, *bus).map(Answer::Register),
             Command::LoadGateware(chunk) => self
-                .load_gateware(&chunk, *loader)
+                .load_gateware(&chunk, *bus, *loader)
                 .map(|next_offset| Answer::Gateware { next_offset }),
             Command::RawBurst { samples } => {
                 self.start_burst(now, samples, *bus).map(|()| Answer::Done)
@@ -149,10 +149,14 @@ impl Machine {
     fn load_gateware(
         &mut self,
         chunk: &GatewareChunk<'_>,
+        bus: &mut impl FpgaBus,
         loader: &mut impl GatewareLoader,
     ) -> Result<u32, Refusal> {
         if self.state() == State::Running {
             return Err(Refusal::State(State::Running));
+        }
+        if chunk.offset == 0 && fpga::identify(bus).is_err() {
+            loader.forget();
         }
         let next_offset = gateware::take(&mut self.loading, chunk, loader)?;
         // The FPGA forgets its settings with the first piece.

@@ -66,6 +66,10 @@ impl<P: SlaveSpi> GatewareLoader for StagingLoader<'_, P> {
         Ok(())
     }
 
+    fn forget(&mut self) {
+        self.running = None;
+    }
+
     fn step(&mut self, now: Micros) -> bool {
         let Some(configuration) = &mut self.under_way else { return false };
         let bitstream = self.memory.get(..self.filled).unwrap_or(&[]);

@@ -11,8 +11,11 @@ mod trace;
 use core::cell::Cell;
 use core::fmt::Arguments;
 use core::panic::PanicInfo;
+use core::sync::atomic::{AtomicBool, Ordering};
 use cortex_m::peripheral::SCB;
 use critical_section::Mutex;
+
+static DYING: AtomicBool = AtomicBool::new(false);
 
 type Action = Option<fn()>;
 
@@ -28,6 +31,10 @@ pub fn die(text: Arguments<'_>) -> ! {
     cortex_m::interrupt::disable();
     if let Some(leds_off) = critical_section::with(|token| LEDS_OFF.borrow(token).get()) {
         leds_off();
+    }
+    // A crash of what comes below, as of a logger that was interrupted, ends here.
+    if DYING.swap(true, Ordering::Relaxed) {
+        SCB::sys_reset();
     }
     nirspi_app::crash::store(text);
     defmt::error!("{}", defmt::Display2Format(&text));

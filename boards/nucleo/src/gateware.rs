@@ -101,6 +101,10 @@ impl<P: SlaveSpi> GatewareLoader for Loader<'_, P> {
         Ok(())
     }
 
+    fn forget(&mut self) {
+        self.0.forget();
+    }
+
     fn step(&mut self, now: Micros) -> bool {
         if self.0.step(now) {
             return true;

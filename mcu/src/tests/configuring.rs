@@ -111,6 +111,15 @@ fn a_staged_bitstream_goes_to_the_chip_once() {
 }
 
 #[test]
+fn what_an_fpga_that_does_not_answer_runs_is_not_known() {
+    let mut memory = vec![0; 4_000];
+    let mut loader = StagingLoader::new(FakeEcp5::default(), &mut memory, None);
+    load(&mut loader, &bitstream(3_000));
+    loader.forget();
+    assert!(load(&mut loader, &bitstream(3_000)) > 0, "loaded again");
+}
+
+#[test]
 fn a_half_sent_bitstream_does_not_reach_the_chip() {
     let mut memory = vec![0; 4_000];
     let mut loader = StagingLoader::new(FakeEcp5::default(), &mut memory, Some(5));

@@ -122,3 +122,16 @@ fn a_configuration_gives_up_a_bitstream_half_way() {
     let rest = bench.ask(Command::LoadGateware(chunk(&data, 500, 500)));
     assert_eq!(rest, Err(Refusal::GatewareOffset { expected: 0 }));
 }
+
+#[test]
+fn the_same_bitstream_is_loaded_again_where_the_fpga_does_not_answer() {
+    let data = bitstream();
+    let mut bench = Bench::open();
+    bench.ask(Command::LoadGateware(chunk(&data, 0, 500))).unwrap();
+    assert_eq!(bench.loader.forgotten, 0);
+    bench.fpga.identity = 0;
+    bench.ask(Command::LoadGateware(chunk(&data, 500, 500))).unwrap();
+    assert_eq!(bench.loader.forgotten, 0, "it may be half loaded");
+    bench.ask(Command::LoadGateware(chunk(&data, 0, 500))).unwrap();
+    assert_eq!(bench.loader.forgotten, 1);
+}

@@ -53,6 +53,7 @@ pub struct Loader {
     pub unsupported: bool,
     pub data: Vec<u8>,
     pub finished: u32,
+    pub forgotten: u32,
 }
 
 impl GatewareLoader for Loader {
@@ -69,6 +70,10 @@ impl GatewareLoader for Loader {
     fn finish(&mut self) -> Result<(), LoadError> {
         self.finished += 1;
         Ok(())
+    }
+
+    fn forget(&mut self) {
+        self.forgotten += 1;
     }
 }
 
