@@ -134,8 +134,10 @@ impl Sums {
     }
 }
 
-fn sum48(bytes: &[u8]) -> u64 {
-    bytes.iter().rev().fold(0, |sum, &byte| sum << 8 | u64::from(byte))
+/// Of two loads: a byte at a time it was a third of what a frame costs the firmware.
+fn sum48(&[b0, b1, b2, b3, b4, b5]: &[u8; 6]) -> u64 {
+    let (low, high) = (u32::from_le_bytes([b0, b1, b2, b3]), u16::from_le_bytes([b4, b5]));
+    u64::from(high) << 32 | u64::from(low)
 }
 
 /// A frame whose length, magic and checksum are right.
@@ -172,9 +174,12 @@ impl<'a> FpgaFrame<'a> {
 
     /// The sums of each pattern, in the order shown.
     pub fn sums(&self) -> impl ExactSizeIterator<Item = Sums> + Clone + use<'a> {
-        self.sums
-            .chunks_exact(PATTERN_BYTES)
-            .map(|b| Sums { positive: sum48(&b[..6]), negative: sum48(&b[6..]) })
+        let (patterns, _) = self.sums.as_chunks::<PATTERN_BYTES>();
+        patterns.iter().map(|bytes| {
+            let (halves, _) = bytes.as_chunks();
+            let half = |i: usize| halves.get(i).map_or(0, sum48);
+            Sums { positive: half(0), negative: half(1) }
+        })
     }
 }
 

@@ -6,8 +6,8 @@
 //! byte, and damaged bytes never become a message. Empty packets are allowed and mean nothing, so a
 //! sender may put a zero first to cut off whatever an earlier session left half sent.
 
-use crate::crc32::{self, crc32};
-use cobs::CobsEncoder;
+use crate::stuffing::Stuffer;
+use crate::{Crc32, crc32};
 use postcard::ser_flavors::Flavor;
 use serde::{Deserialize, Serialize};
 
@@ -61,15 +61,15 @@ impl core::error::Error for PacketError {}
 
 /// postcard's output, checksummed and COBS-encoded on its way into the caller's buffer.
 struct PacketWriter<'b> {
-    cobs: CobsEncoder<'b>,
-    digest: crc32::Digest,
+    cobs: Stuffer<'b>,
+    crc: Crc32,
 }
 
 impl Flavor for PacketWriter<'_> {
     type Output = usize;
 
     fn try_extend(&mut self, data: &[u8]) -> postcard::Result<()> {
-        self.digest.update(data);
+        self.crc.update(data);
         self.cobs.push(data).map_err(|_| postcard::Error::SerializeBufferFull)
     }
 
@@ -78,9 +78,9 @@ impl Flavor for PacketWriter<'_> {
     }
 
     fn finalize(mut self) -> postcard::Result<usize> {
-        let crc = self.digest.finalize().to_le_bytes();
+        let crc = self.crc.value().to_le_bytes();
         self.cobs.push(&crc).map_err(|_| postcard::Error::SerializeBufferFull)?;
-        Ok(self.cobs.finalize())
+        self.cobs.finish().map_err(|_| postcard::Error::SerializeBufferFull)
     }
 }
 
@@ -92,7 +92,7 @@ pub fn encode<'b, T: Serialize>(message: &T, out: &'b mut [u8]) -> Result<&'b [u
     if out.is_empty() {
         return Err(PacketError::BufferTooSmall);
     }
-    let writer = PacketWriter { cobs: CobsEncoder::new(out), digest: crc32::digest() };
+    let writer = PacketWriter { cobs: Stuffer::new(out), crc: Crc32::new() };
     let length = postcard::serialize_with_flavor(message, writer)
         .map_err(|_| PacketError::BufferTooSmall)?;
     *out.get_mut(length).ok_or(PacketError::BufferTooSmall)? = 0;

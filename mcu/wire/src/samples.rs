@@ -33,19 +33,22 @@ impl<'a> Samples<'a> {
     {
         let buffer = buffer.get_mut(..4 * values.len()).ok_or(SamplesError)?;
         let mut magnitude = 0u64;
-        for value in values.clone() {
+        // Nearly always they fit as they are, and one pass is all.
+        for (word, value) in buffer.chunks_exact_mut(4).zip(values.clone()) {
             // Folds negative values so that i32::MIN and i32::MAX ask for the same width.
             magnitude |= (value ^ (value >> 63)) as u64;
+            word.copy_from_slice(&(value as i32).to_le_bytes());
         }
         let mut shift = (64 - magnitude.leading_zeros()).saturating_sub(31) as u8;
-        let half = |shift: u8| if shift == 0 { 0 } else { 1i64 << (shift - 1) };
-        // Rounding up may carry into one bit more.
-        if shift > 0 && values.clone().any(|v| i32::try_from((v + half(shift)) >> shift).is_err()) {
-            shift += 1;
-        }
-        for (word, value) in buffer.chunks_exact_mut(4).zip(values) {
-            let rounded = (value + half(shift)) >> shift;
-            word.copy_from_slice(&(rounded as i32).to_le_bytes());
+        if shift > 0 {
+            let rounded = |value: i64, shift: u8| (value + (1i64 << (shift - 1))) >> shift;
+            // Rounding up may carry into one bit more.
+            if values.clone().any(|value| i32::try_from(rounded(value, shift)).is_err()) {
+                shift += 1;
+            }
+            for (word, value) in buffer.chunks_exact_mut(4).zip(values) {
+                word.copy_from_slice(&(rounded(value, shift) as i32).to_le_bytes());
+            }
         }
         Self::from_parts(shift, buffer)
     }
