@@ -3,10 +3,12 @@
 //! The driver sends ST's firmware to the sensor at each start: 86 KB of this board's flash, about 2 s at 400 kHz. All of
 //! that happens in a task of its own; the camera does not wait for it.
 
-use embassy_stm32::i2c::{Config, I2c, Master};
+use embassy_stm32::i2c::{Config, Error, I2c, Master};
 use embassy_stm32::mode::Async;
+use embassy_stm32::pac;
 use embassy_stm32::time::Hertz;
-use embassy_time::{Delay, Duration, with_timeout};
+use embassy_time::{Delay, Duration, Instant, with_timeout};
+use embedded_hal_async::i2c::{self, ErrorType, Operation};
 use nirspi_app::{DepthMap, DepthSensor};
 use vl53_8x8::{Resolution, Sensor};
 
@@ -20,10 +22,48 @@ const PATIENCE: Duration = Duration::from_millis(500);
 pub fn config() -> Config {
     let mut config = Config::default();
     config.frequency = Hertz(400_000);
+    // The longest transfer, 32 KB of the sensor's firmware, takes 0.74 s.
+    config.timeout = Duration::from_secs(1);
     config
 }
 
-type Bus = I2c<'static, Async, Master>;
+/// The end of a transfer takes a few bits; a bus that is busy for longer is stuck.
+const SETTLING: Duration = Duration::from_micros(200);
+
+/// I2C1 that never keeps the processor waiting. The driver below waits by itself for a bus that is busy, for up to
+/// a second, which is longer than the watchdog allows; a bus is busy for ever where the sensor has no supply.
+struct Bus(I2c<'static, Async, Master>);
+
+impl Bus {
+    fn make_ready() {
+        let patience = Instant::now() + SETTLING;
+        let is_busy = || pac::I2C1.isr().read().busy() || pac::I2C1.cr2().read().start();
+        while is_busy() {
+            if Instant::now() > patience {
+                // Gives up whatever is under way (RM0456, I2C software reset).
+                pac::I2C1.cr1().modify(|control| control.set_pe(false));
+                while pac::I2C1.cr1().read().pe() {}
+                pac::I2C1.cr1().modify(|control| control.set_pe(true));
+                return;
+            }
+        }
+    }
+}
+
+impl ErrorType for Bus {
+    type Error = Error;
+}
+
+impl i2c::I2c for Bus {
+    async fn transaction(
+        &mut self,
+        address: u8,
+        operations: &mut [Operation<'_>],
+    ) -> Result<(), Error> {
+        Self::make_ready();
+        i2c::I2c::transaction(&mut self.0, address, operations).await
+    }
+}
 
 /// The sensor, started when it is asked first, and again when it has stopped answering.
 pub struct Depth {
@@ -32,8 +72,8 @@ pub struct Depth {
 }
 
 impl Depth {
-    pub fn new(bus: Bus) -> Self {
-        Self { sensor: Sensor::new(bus, Delay), started: false }
+    pub fn new(bus: I2c<'static, Async, Master>) -> Self {
+        Self { sensor: Sensor::new(Bus(bus), Delay), started: false }
     }
 
     async fn start(&mut self) -> Option<()> {
