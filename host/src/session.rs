@@ -5,6 +5,7 @@
 
 use crate::link::{Link, Received};
 use nirspi_wire::packet::{MAX_DEVICE_PACKET, MAX_HOST_PACKET, hello_of_any_version};
+use nirspi_wire::register::Register;
 use nirspi_wire::{
     Answer, Command, Deframed, Deframer, DeviceMessage, Identity, PROTOCOL_VERSION, PacketError,
     Refusal, Reply, Request, SelfTestReport, Status, Version, encode, open,
@@ -362,6 +363,36 @@ impl Session {
         match self.ask("Status", Command::Status, listener)? {
             OwnedAnswer::Status(status) => Ok(status),
             _ => Err(SessionError::WrongAnswer { command: "Status" }),
+        }
+    }
+
+    /// What the device's checks of itself say.
+    ///
+    /// # Errors
+    /// As [`command`](Self::command).
+    pub fn self_test(
+        &mut self,
+        listener: &mut dyn Listener,
+    ) -> Result<SelfTestReport, SessionError> {
+        match self.ask("SelfTest", Command::SelfTest, listener)? {
+            OwnedAnswer::SelfTest(report) => Ok(report),
+            _ => Err(SessionError::WrongAnswer { command: "SelfTest" }),
+        }
+    }
+
+    /// The value of an FPGA register.
+    ///
+    /// # Errors
+    /// As [`command`](Self::command).
+    pub fn register(
+        &mut self,
+        register: Register,
+        listener: &mut dyn Listener,
+    ) -> Result<u32, SessionError> {
+        let command = Command::ReadRegister { address: register.address() };
+        match self.ask("ReadRegister", command, listener)? {
+            OwnedAnswer::Register(value) => Ok(value),
+            _ => Err(SessionError::WrongAnswer { command: "ReadRegister" }),
         }
     }
 

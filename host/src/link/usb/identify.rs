@@ -1,0 +1,254 @@
+//! Which devices on the bus are cameras, and which of them is meant: decided from descriptors alone.
+//!
+//! The one law: nothing here touches the bus, so all of it is tested without one.
+
+use nirspi_wire::PROTOCOL_VERSION;
+use nirspi_wire::usb::{INTERFACE_CLASS, INTERFACE_SUBCLASS, PRODUCT, PRODUCT_ID, VENDOR_ID};
+use std::fmt;
+use std::io;
+use thiserror::Error;
+
+/// An interface, as its descriptor says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct InterfaceId {
+    /// `bInterfaceNumber`.
+    pub number: u8,
+    /// `bInterfaceClass`.
+    pub class: u8,
+    /// `bInterfaceSubClass`.
+    pub subclass: u8,
+    /// `bInterfaceProtocol`.
+    pub protocol: u8,
+}
+
+impl InterfaceId {
+    /// Whether this is a camera's interface, of whatever protocol version.
+    #[must_use]
+    pub fn is_camera(&self) -> bool {
+        (self.class, self.subclass) == (INTERFACE_CLASS, INTERFACE_SUBCLASS)
+    }
+}
+
+/// What the system knows of a device without opening it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DeviceId {
+    /// `idVendor`.
+    pub vendor: u16,
+    /// `idProduct`.
+    pub product: u16,
+    /// `iProduct`.
+    pub name: Option<String>,
+    /// `iSerialNumber`.
+    pub serial: Option<String>,
+    /// Interfaces of the active configuration. Windows lists none before the device is open.
+    pub interfaces: Vec<InterfaceId>,
+}
+
+/// A camera on the bus that has not been opened.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct UsbCamera {
+    /// Serial number.
+    pub serial: Option<String>,
+    /// Protocol version, where the system shows the interface before the device is open.
+    pub protocol: Option<u16>,
+}
+
+impl fmt::Display for UsbCamera {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.serial {
+            Some(serial) => write!(f, "usb:{serial}"),
+            None => f.write_str("usb (without a serial number)"),
+        }
+    }
+}
+
+/// The camera that this device is, if it is one. Vendor and product id are lent for testing and shared by others, so
+/// the name must match too, and the interface where it can be seen.
+#[must_use]
+pub fn recognise(device: &DeviceId) -> Option<UsbCamera> {
+    let ours = (device.vendor, device.product) == (VENDOR_ID, PRODUCT_ID)
+        && device.name.as_deref() == Some(PRODUCT);
+    let interface = device.interfaces.iter().find(|interface| interface.is_camera());
+    if !ours || (interface.is_none() && !device.interfaces.is_empty()) {
+        return None;
+    }
+    let protocol = interface.map(|interface| u16::from(interface.protocol));
+    Some(UsbCamera { serial: device.serial.clone(), protocol })
+}
+
+/// Of the cameras listed the one that is meant: that with `serial`, or the only one.
+///
+/// # Errors
+/// [`UsbError::None`] or [`UsbError::Several`], naming what is there.
+pub fn choose<'c, T>(
+    cameras: &'c [(UsbCamera, T)],
+    serial: Option<&str>,
+) -> Result<&'c (UsbCamera, T), UsbError> {
+    let there = || cameras.iter().map(|(camera, _)| camera.to_string()).collect();
+    let none = || UsbError::None { wanted: serial.map(str::to_owned), there: there() };
+    match (serial, cameras) {
+        (None, [] | [_]) => cameras.first().ok_or_else(none),
+        (None, _) => Err(UsbError::Several { there: there() }),
+        (Some(wanted), _) => cameras
+            .iter()
+            .find(|(camera, _)| camera.serial.as_deref() == Some(wanted))
+            .ok_or_else(none),
+    }
+}
+
+/// Whether the two sides can talk, by the version in the interface's descriptor. It has 8 bits, so versions are
+/// compared modulo 256; the greeting compares them whole.
+///
+/// # Errors
+/// [`UsbError::Version`].
+pub fn check_version(protocol: u16) -> Result<(), UsbError> {
+    if protocol == PROTOCOL_VERSION & 0xFF {
+        Ok(())
+    } else {
+        Err(UsbError::Version { camera: protocol })
+    }
+}
+
+/// Why a USB camera cannot be used.
+#[derive(Debug, Error)]
+pub enum UsbError {
+    /// Not there.
+    #[error("{}", none(.wanted.as_deref(), .there))]
+    None {
+        /// The serial number asked for.
+        wanted: Option<String>,
+        /// The cameras that are there.
+        there: Vec<String>,
+    },
+    /// More than one, and none was named.
+    #[error("{} cameras on USB: name one of {}", .there.len(), .there.join(", "))]
+    Several {
+        /// The cameras that are there.
+        there: Vec<String>,
+    },
+    /// The two sides speak different versions.
+    #[error(
+        "the camera's USB descriptor says protocol version {camera}, this program speaks {PROTOCOL_VERSION}: update {}",
+        if *.camera > PROTOCOL_VERSION { "this program" } else { "the camera's firmware (nirspi flash)" }
+    )]
+    Version {
+        /// The camera's.
+        camera: u16,
+    },
+    /// The system does not let this user.
+    #[error("no permission to open {camera}{}", permission_hint(cfg!(target_os = "linux")))]
+    Permission {
+        /// Which camera.
+        camera: String,
+    },
+    /// Another program has it.
+    #[error("{camera} is in use by another program")]
+    Busy {
+        /// Which camera.
+        camera: String,
+    },
+    /// It has the names of a camera, and not its endpoints.
+    #[error("{camera} has no camera interface: is its firmware ours?")]
+    NoInterface {
+        /// Which camera.
+        camera: String,
+    },
+    /// The system's USB gave up.
+    #[error("USB: {0}")]
+    Io(#[from] io::Error),
+}
+
+fn none(wanted: Option<&str>, there: &[String]) -> String {
+    match (wanted, there) {
+        (Some(serial), []) => format!("no camera on USB, so none with serial number {serial}"),
+        (Some(serial), there) => {
+            format!("no camera on USB with serial number {serial}; there is {}", there.join(", "))
+        }
+        (None, _) => "no camera on USB: is it plugged in, powered and flashed?".to_owned(),
+    }
+}
+
+/// What to do about a missing permission.
+fn permission_hint(linux: bool) -> &'static str {
+    if linux {
+        ": sudo cp boards/<board>/70-nirspi.rules /etc/udev/rules.d/ && sudo udevadm control --reload && sudo udevadm \
+         trigger"
+    } else {
+        ""
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn camera(serial: &str) -> DeviceId {
+        DeviceId {
+            vendor: VENDOR_ID,
+            product: PRODUCT_ID,
+            name: Some(PRODUCT.to_owned()),
+            serial: Some(serial.to_owned()),
+            interfaces: vec![InterfaceId {
+                number: 0,
+                class: INTERFACE_CLASS,
+                subclass: INTERFACE_SUBCLASS,
+                protocol: nirspi_wire::usb::INTERFACE_PROTOCOL,
+            }],
+        }
+    }
+
+    #[test]
+    fn a_camera_is_known_by_ids_name_and_interface_together() {
+        let found = recognise(&camera("A1")).unwrap();
+        assert_eq!(found.serial.as_deref(), Some("A1"));
+        assert_eq!(found.protocol, Some(PROTOCOL_VERSION));
+        let changes: [&dyn Fn(&mut DeviceId); 6] = [
+            &|device| device.vendor ^= 1,
+            &|device| device.product ^= 1,
+            &|device| device.name = Some("someone's test device".to_owned()),
+            &|device| device.name = None,
+            &|device| device.interfaces[0].class = 3,
+            &|device| device.interfaces[0].subclass ^= 1,
+        ];
+        for (number, change) in changes.iter().enumerate() {
+            let mut device = camera("A1");
+            change(&mut device);
+            assert_eq!(recognise(&device), None, "change {number}");
+        }
+    }
+
+    #[test]
+    fn where_the_system_shows_no_interface_the_names_are_enough_and_the_version_is_open() {
+        let device = DeviceId { interfaces: Vec::new(), ..camera("A1") };
+        assert_eq!(recognise(&device).unwrap().protocol, None);
+    }
+
+    #[test]
+    fn of_several_cameras_one_must_be_named() {
+        let cameras = ["A1", "B2"].map(|serial| (recognise(&camera(serial)).unwrap(), serial));
+        assert_eq!(choose(&cameras, Some("B2")).unwrap().1, "B2");
+        assert_eq!(choose(&cameras[..1], None).unwrap().1, "A1");
+        let message = choose(&cameras, None).unwrap_err().to_string();
+        assert!(message.contains("usb:A1, usb:B2"), "{message}");
+        let message = choose(&cameras, Some("C3")).unwrap_err().to_string();
+        assert!(message.contains("C3") && message.contains("usb:B2"), "{message}");
+        let message = choose::<()>(&[], None).unwrap_err().to_string();
+        assert!(message.contains("plugged in"), "{message}");
+    }
+
+    #[test]
+    fn a_version_mismatch_says_which_side_to_update() {
+        check_version(PROTOCOL_VERSION).unwrap();
+        let newer = check_version(PROTOCOL_VERSION + 1).unwrap_err().to_string();
+        assert!(newer.contains("update this program"), "{newer}");
+        let older = check_version(PROTOCOL_VERSION - 1).unwrap_err().to_string();
+        assert!(older.contains("nirspi flash"), "{older}");
+    }
+
+    #[test]
+    fn a_missing_permission_names_the_udev_rule() {
+        assert!(permission_hint(true).contains("70-nirspi.rules"));
+        let error = UsbError::Permission { camera: "usb:A1".to_owned() }.to_string();
+        assert!(error.starts_with("no permission to open usb:A1"), "{error}");
+    }
+}
