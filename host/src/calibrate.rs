@@ -19,7 +19,7 @@ pub const HALF_PERIOD: u16 = 128;
 /// The step must stand out of the noise of its mean by this factor.
 const MIN_STEP_TO_NOISE: f64 = 20.0;
 /// The response has left zero when it is above this share of the step.
-const ONSET: f64 = 0.05;
+pub(crate) const ONSET: f64 = 0.05;
 /// The response has settled where the mean of this many samples is within its noise of 1.
 const SETTLED_SAMPLES: usize = 4;
 /// Bursts that are averaged: 2 ms of light bring the taps' noise to about a thousandth.

@@ -28,14 +28,25 @@ const QUIET: Duration = Duration::from_millis(500);
 /// What to capture.
 #[derive(Debug, Clone)]
 pub struct CaptureOptions {
-    /// The measurement. Its latency is replaced by the one that calibration finds.
+    /// The measurement. Its latency is replaced by that of the calibration, where there is one.
     pub setup: MeasurementSetup,
     /// Frames to make; `None` goes on until stopped.
     pub frames: Option<u32>,
-    /// Whether to measure latency and settling first.
-    pub calibrate: bool,
+    /// Where latency and settling come from.
+    pub calibration: Calibration,
     /// Where to record.
     pub record: Option<PathBuf>,
+}
+
+/// Where a capture's latency and settling come from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Calibration {
+    /// Nowhere: the setup's latency is right, and the leak is not known.
+    None,
+    /// They are measured first.
+    Measure,
+    /// They were measured before.
+    Kept(Settling),
 }
 
 /// How far a capture has come.
@@ -65,7 +76,7 @@ pub enum Ended {
 pub struct Capture {
     /// The setup as measured.
     pub setup: MeasurementSetup,
-    /// The camera's response, where it was measured.
+    /// The camera's response, where it is known.
     pub settling: Option<Settling>,
     /// Why it could not be.
     pub calibration_problem: Option<CalibrationError>,
@@ -163,16 +174,18 @@ pub fn capture(
     watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<Capture, CaptureError> {
     let mut setup = options.setup.clone();
-    let (settling, calibration_problem) =
-        match options.calibrate.then(|| calibrate(session, &mut Deaf)) {
-            None => (None, None),
-            Some(Ok(settling)) => {
-                setup.adc_latency = settling.adc_latency;
-                (Some(settling), None)
-            }
-            Some(Err(CalibrationError::Session(error))) => return Err(error.into()),
-            Some(Err(problem)) => (None, Some(problem)),
-        };
+    let (settling, calibration_problem) = match &options.calibration {
+        Calibration::None => (None, None),
+        Calibration::Kept(settling) => (Some(settling.clone()), None),
+        Calibration::Measure => match calibrate(session, &mut Deaf) {
+            Ok(settling) => (Some(settling), None),
+            Err(CalibrationError::Session(error)) => return Err(error.into()),
+            Err(problem) => (None, Some(problem)),
+        },
+    };
+    if let Some(settling) = &settling {
+        setup.adc_latency = settling.adc_latency;
+    }
     setup.with_configuration(|c| session.command(Command::Configure(c), &mut Deaf))?;
     let before = session.status(&mut Deaf)?;
 

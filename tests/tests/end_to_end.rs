@@ -3,15 +3,13 @@
 
 #![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
 
-use nirspi::capture::{Capture, CaptureOptions, Ended, capture};
+use nirspi::capture::{Calibration, Capture, CaptureOptions, Ended, capture};
 use nirspi::link::Link;
 use nirspi::session::{Session, SessionError};
 use nirspi::setup::MeasurementSetup;
 use nirspi::tally::{Tally, tally_recording};
-use nirspi::virtual_camera::{MemoryLink, SimulatedFpga, VirtualCamera, VirtualOptics};
-use nirspi_hdl::{AdcSample, Gateware};
-use nirspi_mcu::{BusError, FpgaBus};
-use nirspi_optics::{Chain, LedArray, Scene};
+use nirspi::virtual_camera::{MemoryLink, VirtualCamera, VirtualOptics};
+use nirspi_optics::Scene;
 use nirspi_recon::{Order, Side, fwht, metrics, reconstruct};
 use nirspi_tests::tamper::{Fate, Tampered};
 use nirspi_wire::packet::MAX_DEVICE_PACKET;
@@ -46,7 +44,8 @@ fn optics() -> VirtualOptics {
 
 fn options(order: &Order, calibrate: bool) -> CaptureOptions {
     let setup = MeasurementSetup::new(order, 1.0).unwrap();
-    CaptureOptions { setup, frames: Some(FRAMES), calibrate, record: None }
+    let calibration = if calibrate { Calibration::Measure } else { Calibration::None };
+    CaptureOptions { setup, frames: Some(FRAMES), calibration, record: None }
 }
 
 fn run(link: Box<dyn Link>, options: &CaptureOptions) -> Capture {
@@ -157,73 +156,17 @@ fn an_unplugged_link_keeps_what_came_and_says_so() {
     };
 }
 
-/// The ideal camera, whose array shows pattern 700 with the wrong sign: its complement first, then itself.
-struct WrongSign {
-    gateware: Gateware,
-    array: LedArray,
-    chain: Chain,
-    clock: u64,
-}
-
-impl WrongSign {
-    fn new(optics: &VirtualOptics) -> Self {
-        let mut gateware = Gateware::new();
-        gateware.set_interlock(true);
-        let array = LedArray::new(optics.footprint(), optics.budget().electrons_per_led);
-        let chain = Chain::new(*optics.chain(), 1).unwrap();
-        Self { gateware, array, chain, clock: 0 }
-    }
-}
-
-impl FpgaBus for WrongSign {
-    fn read(&mut self, address: u16) -> Result<u32, BusError> {
-        Ok(self.gateware.read(address).unwrap_or(0))
-    }
-    fn write(&mut self, address: u16, value: u32) -> Result<(), BusError> {
-        self.gateware.write(address, value);
-        Ok(())
-    }
-    fn frame_ready(&mut self) -> bool {
-        self.gateware.frame_ready()
-    }
-    fn raw_ready(&mut self) -> bool {
-        self.gateware.raw_ready()
-    }
-    fn frame(&mut self) -> Result<Option<&[u8]>, BusError> {
-        Ok(self.gateware.frame())
-    }
-    fn raw(&mut self) -> Result<Option<&[u8]>, BusError> {
-        Ok(self.gateware.raw())
-    }
-}
-
-impl SimulatedFpga for WrongSign {
-    fn advance(&mut self, clocks: u32) {
-        self.clock += u64::from(clocks);
-        for _ in 0..clocks {
-            let lines = self.gateware.lines();
-            let wrong = [walsh::pattern(700, false), walsh::pattern(700, true)]
-                .contains(&(lines.rows, lines.columns));
-            let rows = if wrong { !lines.rows } else { lines.rows };
-            let sample = self.chain.sample(self.array.light(rows, lines.columns, lines.enable));
-            self.gateware.tick(AdcSample { code: sample.counts, over_range: sample.over_range });
-        }
-    }
-    fn clock(&self) -> u64 {
-        self.clock
-    }
-    fn running(&self) -> bool {
-        self.gateware.running()
-    }
-    fn set_interlock(&mut self, closed: bool) {
-        self.gateware.set_interlock(closed);
-    }
-}
-
 #[test]
 fn one_inverted_sign_of_1024_fails_the_check() {
     let optics = optics().ideal();
-    let camera = VirtualCamera::new(WrongSign::new(&optics), optics.depth(1).unwrap(), "wrong");
+    // Shows pattern 700 with the wrong sign: its complement first, then itself.
+    let shown = [walsh::pattern(700, false), walsh::pattern(700, true)];
+    let fpga = optics.fpga(1).unwrap().wired(move |array, lines| {
+        let wrong = shown.contains(&(lines.rows, lines.columns));
+        let rows = if wrong { !lines.rows } else { lines.rows };
+        array.light(rows, lines.columns, lines.enable)
+    });
+    let camera = VirtualCamera::new(fpga, optics.depth(1).unwrap(), "wrong");
     let captured = run(Box::new(MemoryLink::new(camera)), &options(&Order::CakeCutting, false));
     assert!(captured.counters.is_complete());
     let reason = check(&captured).unwrap_err();

@@ -5,7 +5,7 @@ use super::{Usage, print, serve_virtual::stop_on_signal};
 use anyhow::Result;
 use indicatif::{ProgressBar, ProgressStyle};
 use nirspi::account::LossCounters;
-use nirspi::capture::{Capture, CaptureOptions, Ended, Progress, capture};
+use nirspi::capture::{Calibration, Capture, CaptureOptions, Ended, Progress, capture};
 use nirspi::session::CameraIdentity;
 use serde::Serialize;
 use std::ops::ControlFlow;
@@ -76,7 +76,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let options = CaptureOptions {
         setup,
         frames: args.frames,
-        calibrate: !args.no_calibration,
+        calibration: if args.no_calibration { Calibration::None } else { Calibration::Measure },
         record: Some(path.clone()),
     };
     let bar = progress_bar(args.frames);

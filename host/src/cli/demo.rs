@@ -9,7 +9,7 @@ use super::report::StageTimes;
 use anyhow::{Result, bail};
 use indicatif::{ProgressBar, ProgressStyle};
 use nirspi::account::LossCounters;
-use nirspi::capture::{CaptureOptions, Ended, Progress, capture};
+use nirspi::capture::{Calibration, CaptureOptions, Ended, Progress, capture};
 use nirspi::files::image::{encode_grey, encode_rgb};
 use nirspi::files::npy;
 use nirspi::files::output::OutputDir;
@@ -104,8 +104,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let mut session = Session::open(Box::new(link))?;
     let camera = session.identity().clone();
 
-    let options =
-        CaptureOptions { setup, frames: Some(args.frames), calibrate: true, record: None };
+    let calibration = Calibration::Measure;
+    let options = CaptureOptions { setup, frames: Some(args.frames), calibration, record: None };
     let bar = ProgressBar::new(u64::from(args.frames)).with_style(
         ProgressStyle::with_template("capture {bar:30} {pos}/{len} frames")
             .unwrap_or_else(|_| ProgressStyle::default_bar()),

@@ -1,6 +1,6 @@
 //! The golden model of the gateware, with light in front of it, as the firmware's FPGA bus.
 
-use nirspi_hdl::{AdcSample, Gateware};
+use nirspi_hdl::{AdcSample, Gateware, Lines};
 use nirspi_mcu::{BusError, FpgaBus};
 use nirspi_optics::{Chain, LedArray};
 
@@ -16,10 +16,15 @@ pub trait SimulatedFpga: FpgaBus + Send {
     fn set_interlock(&mut self, closed: bool);
 }
 
+/// What the lines from the FPGA make of the LED array: its settled light in electrons a sample. Sound wiring gives
+/// [`LedArray::light`] of the lines as they are; tests give a camera with a fault.
+pub type Wiring = Box<dyn FnMut(&mut LedArray, Lines) -> f32 + Send>;
+
 /// The gateware's golden model between an LED array and a photodiode's ADC.
 pub struct OpticalFpga {
     gateware: Gateware,
     array: LedArray,
+    wiring: Option<Wiring>,
     chain: Chain,
     clock: u64,
 }
@@ -30,7 +35,13 @@ impl OpticalFpga {
     pub fn new(array: LedArray, chain: Chain) -> Self {
         let mut gateware = Gateware::new();
         gateware.set_interlock(true);
-        Self { gateware, array, chain, clock: 0 }
+        Self { gateware, array, wiring: None, chain, clock: 0 }
+    }
+
+    /// The same camera with this between FPGA and LEDs.
+    #[must_use]
+    pub fn wired(self, wiring: impl FnMut(&mut LedArray, Lines) -> f32 + Send + 'static) -> Self {
+        Self { wiring: Some(Box::new(wiring)), ..self }
     }
 }
 
@@ -41,7 +52,10 @@ impl SimulatedFpga for OpticalFpga {
             // Nobody looks at the ADC outside a run, and drawing its noise is most of the work.
             let sample = if self.gateware.running() {
                 let lines = self.gateware.lines();
-                let light = self.array.light(lines.rows, lines.columns, lines.enable);
+                let light = match &mut self.wiring {
+                    None => self.array.light(lines.rows, lines.columns, lines.enable),
+                    Some(wiring) => wiring(&mut self.array, lines),
+                };
                 let sample = self.chain.sample(light);
                 AdcSample { code: sample.counts, over_range: sample.over_range }
             } else {

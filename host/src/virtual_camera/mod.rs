@@ -15,7 +15,7 @@ mod optics;
 mod precomputed;
 mod server;
 
-pub use fpga::{OpticalFpga, SimulatedFpga};
+pub use fpga::{OpticalFpga, SimulatedFpga, Wiring};
 pub use link::MemoryLink;
 pub use optics::{VirtualOptics, VirtualOpticsError};
 pub use precomputed::PrecomputedFpga;

@@ -9,7 +9,7 @@ mod fpga;
 mod tap;
 
 use fpga::RtlFpga;
-use nirspi::capture::{Capture, CaptureOptions, Ended, capture};
+use nirspi::capture::{Calibration, Capture, CaptureOptions, Ended, capture};
 use nirspi::session::{Deaf, Session};
 use nirspi::setup::MeasurementSetup;
 use nirspi::virtual_camera::{MemoryLink, SimulatedFpga, VirtualCamera, VirtualOptics};
@@ -61,7 +61,8 @@ fn session<F: SimulatedFpga + 'static>(optics: &VirtualOptics, fpga: F) -> Sessi
 
 fn run(session: &mut Session, setup: &MeasurementSetup, frames: u32) -> Capture {
     let setup = setup.clone();
-    let options = CaptureOptions { setup, frames: Some(frames), calibrate: false, record: None };
+    let calibration = Calibration::None;
+    let options = CaptureOptions { setup, frames: Some(frames), calibration, record: None };
     capture(session, &options, &mut |_| ControlFlow::Continue(())).unwrap()
 }
 
@@ -196,7 +197,8 @@ fn an_open_interlock_keeps_the_rtl_dark_and_the_host_is_told() {
     camera.set_interlock(false);
     let mut session = Session::open(Box::new(MemoryLink::new(camera))).unwrap();
     let setup = MeasurementSetup::new(&Order::Natural, 1.0).unwrap();
-    let options = CaptureOptions { setup, frames: Some(1), calibrate: false, record: None };
+    let calibration = Calibration::None;
+    let options = CaptureOptions { setup, frames: Some(1), calibration, record: None };
     match capture(&mut session, &options, &mut |_| ControlFlow::Continue(())) {
         Ok(captured) => assert!(matches!(captured.ended, Ended::Fault(Fault::Interlock))),
         Err(error) => assert!(error.to_string().contains("Interlock"), "{error}"),

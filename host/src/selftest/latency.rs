@@ -1,0 +1,97 @@
+//! The ADC's latency, found by stepping the FPGA's setting.
+//!
+//! All LEDs go on and off, [`HALF_PERIOD`] clocks each, and of each slot only the last clock counts. Set to less than
+//! the true latency, the FPGA takes a sample of light that has settled for the last clock's; set to more, it takes one
+//! from behind the change, and the difference of on and off begins to fall. The last setting at which nothing has
+//! fallen is the latency. The raw burst, which passes by this setting, must say the same.
+
+use super::check::{Check, Limit};
+use super::stream::shots;
+use crate::calibrate::{HALF_PERIOD, ONSET};
+use crate::session::{Session, SessionError};
+use nirspi_wire::register::LATENCY_MAX;
+use nirspi_wire::{Configuration, PatternOrder, SampleSource};
+
+/// Name of the check.
+pub const NAME: &str = "ADC latency by stepping";
+
+/// Sweeps of each step: 131 microseconds.
+const SWEEPS: u32 = 64;
+/// Frames of each step. The last one's last sample is of the dark after the run, whatever the setting.
+const FRAMES: u32 = 2;
+
+/// Steps through all settings. `from_burst` is what the raw burst says.
+pub fn check(session: &mut Session, from_burst: u8) -> Result<Check, SessionError> {
+    let mut differences = Vec::with_capacity(usize::from(LATENCY_MAX) + 1);
+    for adc_latency in 0..=LATENCY_MAX {
+        let configuration = Configuration {
+            order: PatternOrder::Natural,
+            patterns: 1,
+            differential: true,
+            clocks_per_pattern: HALF_PERIOD,
+            blanked: HALF_PERIOD - 1,
+            adc_latency,
+            sweeps: SWEEPS,
+            source: SampleSource::Detector,
+            over_range_trip: 0,
+        };
+        let found = shots(session, configuration, FRAMES)?;
+        let Some(sample) = found.first().and_then(|shot| shot.samples.first()) else {
+            return Ok(Check::told(NAME, false, &format!("no frame at setting {adc_latency}")));
+        };
+        differences.push(*sample as f64);
+    }
+    Ok(match edge(&differences) {
+        None => Check::told(NAME, false, "no edge at any setting: the light does not follow it"),
+        Some(latency) => {
+            let limit = Limit::Exactly(from_burst.into());
+            let check = Check::measured(NAME, latency.into(), "clocks", limit);
+            if latency == from_burst {
+                check.noting("as the raw burst says")
+            } else {
+                check.noting("the raw burst says otherwise: the FPGA's latency setting is off")
+            }
+        }
+    })
+}
+
+/// The last setting before the difference of on and off falls. `None` where it does not fall as one.
+fn edge(differences: &[f64]) -> Option<u8> {
+    let full = differences.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let fallen: Vec<bool> =
+        differences.iter().map(|difference| (1.0 - difference / full) / 2.0 > ONSET).collect();
+    let first = fallen.iter().position(|&fallen| fallen)?;
+    let falls_once = fallen.iter().skip(first).all(|&fallen| fallen);
+    (full > 0.0 && falls_once).then(|| first.checked_sub(1)).flatten().map(|last| last as u8)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Differences around a true latency, of light that keeps this share of a change to itself each clock.
+    fn differences(latency: usize, rest: f64) -> Vec<f64> {
+        let fallen = |past: usize| 1.0 - rest.powi(past as i32);
+        (0..=usize::from(LATENCY_MAX))
+            .map(|setting| 5000.0 * (1.0 - 2.0 * fallen(setting.saturating_sub(latency))))
+            .collect()
+    }
+
+    #[test]
+    fn the_edge_is_found_wherever_it_is() {
+        for latency in [0, 1, 6, 40, 62] {
+            for rest in [0.0, 0.5, 0.9] {
+                assert_eq!(edge(&differences(latency, rest)), Some(latency as u8), "{rest}");
+            }
+        }
+    }
+
+    #[test]
+    fn no_light_or_light_that_does_not_follow_has_no_edge() {
+        assert_eq!(edge(&[5000.0; 64]), None);
+        assert_eq!(edge(&[0.0; 64]), None);
+        let mut twice = differences(20, 0.1);
+        twice[50] = 5000.0;
+        assert_eq!(edge(&twice), None);
+    }
+}

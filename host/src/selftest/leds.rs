@@ -1,0 +1,135 @@
+//! The LEDs, by the light they bring to the detector: there is no other sensor of their current.
+//!
+//! All patterns are shown slowly, once alone (`P`) and once with their complements (`P - N`). Then
+//!
+//! * the inverse Hadamard transform of the differences is the light of each LED, and its sums along rows and columns
+//!   are the light that follows each *line*. A line that is stuck or broken leaves the light of its LEDs in pattern and
+//!   complement alike, or adds it to another line's, and its own sum is gone;
+//! * pattern and complement together light every LED once, so `P + N` must be the same for every pattern. Pattern 0
+//!   lights all at once, every other one half: if the LEDs' supply gives way, the halves add up to more.
+
+use super::check::{Check, Limit};
+use super::stream::shots;
+use crate::session::{Session, SessionError};
+use nirspi_recon::fwht;
+use nirspi_wire::{Configuration, PATTERNS, PatternOrder, SIDE, SampleSource};
+
+/// Names of the checks.
+pub const NAMES: [&str; 2] = [LINES, SUMS];
+/// Name of the check of the lines.
+pub const LINES: &str = "LED lines";
+const SUMS: &str = "LED supply";
+
+/// Clocks of a pattern, long enough for any light to settle in the blanked ones.
+const CLOCKS: u16 = 64;
+const BLANKED: u16 = 32;
+const SWEEPS: u32 = 16;
+const FRAMES: u32 = 2;
+/// Samples of each reading.
+const SAMPLES: f64 = (FRAMES * SWEEPS * (CLOCKS - BLANKED) as u32) as f64;
+/// Least light of a line, of the mean line's. On an evenly lit target an array's lines differ far less.
+const MIN_LINE_SHARE: f64 = 0.05;
+/// Most that pattern and complement together may differ from pattern 0: what the supply may give way, twice the
+/// deviation that would show in an image of 8 bits, noise apart.
+const MAX_DEVIATION: f64 = 0.02;
+/// Noise of this many standard deviations is allowed for: passed once in ten thousand self-tests, over 1023 patterns.
+const SIGMAS: f64 = 5.0;
+
+fn configuration(differential: bool, adc_latency: u8) -> Configuration<'static> {
+    Configuration {
+        order: PatternOrder::Natural,
+        patterns: PATTERNS,
+        differential,
+        clocks_per_pattern: CLOCKS,
+        blanked: BLANKED,
+        adc_latency,
+        sweeps: SWEEPS,
+        source: SampleSource::Detector,
+        over_range_trip: 0,
+    }
+}
+
+/// Mean ADC counts of a sample, by pattern; `None` if no frame came.
+fn means(
+    session: &mut Session,
+    differential: bool,
+    adc_latency: u8,
+) -> Result<Option<Vec<f64>>, SessionError> {
+    let found = shots(session, configuration(differential, adc_latency), FRAMES)?;
+    let whole: Vec<_> =
+        found.iter().filter(|shot| shot.samples.len() == usize::from(PATTERNS)).collect();
+    if whole.is_empty() {
+        return Ok(None);
+    }
+    let samples = whole.len() as f64 * f64::from(SWEEPS) * f64::from(CLOCKS - BLANKED);
+    let sum = |pattern: usize| -> f64 {
+        whole.iter().filter_map(|shot| shot.samples.get(pattern)).map(|&s| s as f64).sum()
+    };
+    Ok(Some((0..usize::from(PATTERNS)).map(|pattern| sum(pattern) / samples).collect()))
+}
+
+/// Both checks, at the latency setting that puts the windows right. `noise_counts` is that of one sample.
+pub fn check(
+    session: &mut Session,
+    latency: u8,
+    noise_counts: f64,
+) -> Result<Vec<Check>, SessionError> {
+    let (Some(single), Some(pairs)) =
+        (means(session, false, latency)?, means(session, true, latency)?)
+    else {
+        return Ok(NAMES.map(|name| Check::told(name, false, "no frame came")).to_vec());
+    };
+    let dead = dead_lines(&pairs);
+    let lines = Check::measured(LINES, dead.len() as f64, "without light", Limit::Exactly(0.0));
+    if !dead.is_empty() {
+        let note = format!("{}: stuck, broken, or the target is dark there", dead.join(", "));
+        return Ok(vec![lines.noting(&note), Check::skipped(SUMS, "needs all lines")]);
+    }
+    // Four readings twice or as a difference: P and P - N, of the pattern and of pattern 0.
+    let noise = noise_counts * (12.0 / SAMPLES).sqrt();
+    Ok(vec![lines.noting("64 lines follow their patterns"), supply(&single, &pairs, noise)])
+}
+
+/// Lines whose LEDs' light does not follow them.
+fn dead_lines(pairs: &[f64]) -> Vec<String> {
+    let side = usize::from(SIDE);
+    let mut leds = pairs.to_vec();
+    if fwht(&mut leds).is_err() {
+        return Vec::new();
+    }
+    let row = |r: usize| -> f64 { leds.iter().skip(r * side).take(side).sum() };
+    let column = |c: usize| -> f64 { leds.iter().skip(c).step_by(side).sum() };
+    let least = MIN_LINE_SHARE * leds.iter().sum::<f64>() / side as f64;
+    let rows = (0..side).filter(|&r| row(r) < least).map(|r| format!("row line {r}"));
+    let columns = (0..side).filter(|&c| column(c) < least).map(|c| format!("column line {c}"));
+    rows.chain(columns).collect()
+}
+
+/// Whether pattern and complement together give the light of pattern 0. `noise` is that of their sum, in counts.
+fn supply(single: &[f64], pairs: &[f64], noise: f64) -> Check {
+    let (Some(&lit), Some(&total)) = (single.first(), pairs.first()) else {
+        return Check::told(SUMS, false, "no frame came");
+    };
+    // The complement of pattern 0 lights nothing.
+    let dark = lit - total;
+    let deviation = |(reading, difference): (&f64, &f64)| {
+        (2.0 * reading - difference - 2.0 * dark) / total - 1.0
+    };
+    let deviations: Vec<f64> = single.iter().zip(pairs).skip(1).map(deviation).collect();
+    let mean = deviations.iter().sum::<f64>() / deviations.len() as f64;
+    let (pattern, worst) = (1..)
+        .zip(&deviations)
+        .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
+        .map_or((0, f64::NAN), |(pattern, worst)| (pattern, *worst));
+    let limit = MAX_DEVIATION + SIGMAS * noise / total;
+    let note = if worst.abs() <= limit {
+        format!("mean {:+.2} %", mean * 100.0)
+    } else if mean > limit / 2.0 {
+        format!("halves of the array give {:+.1} % on average: the supply gives way", mean * 100.0)
+    } else {
+        format!("pattern {pattern}, with its complement; mean {:+.2} %", mean * 100.0)
+    };
+    let percent = |share: f64| (share * 1e4).round() / 100.0;
+    let limit = Limit::AtMost(percent(limit));
+    Check::measured(SUMS, percent(worst.abs()), "% off pattern 0", limit).noting(&note)
+}

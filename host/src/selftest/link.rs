@@ -1,0 +1,63 @@
+//! The link: how many frames a second it carries, and that it loses none at a pace that it can keep.
+
+use super::LinkDemands;
+use super::check::{Check, Limit};
+use super::stream::stream;
+use crate::session::{Session, SessionError};
+use crate::setup::MeasurementSetup;
+use nirspi_wire::{CLOCKS_PER_PATTERN, PATTERNS};
+
+/// Name of the check of the losses.
+pub const LOSSES: &str = "link losses";
+const SPEED: &str = "link throughput";
+
+/// Share of its top speed at which a link must lose nothing.
+const PACE: f64 = 0.8;
+
+fn setup(sweeps: u32) -> MeasurementSetup {
+    MeasurementSetup {
+        order: "natural".to_owned(),
+        rows: (0..PATTERNS).collect(),
+        differential: true,
+        clocks_per_pattern: CLOCKS_PER_PATTERN,
+        blanked: 2,
+        adc_latency: 0,
+        sweeps,
+    }
+}
+
+/// Runs as fast as it goes, then at [`PACE`] of that.
+pub fn check(session: &mut Session, demands: LinkDemands) -> Result<Vec<Check>, SessionError> {
+    let fastest = stream(session, &setup(1), demands.duration)?;
+    let seconds = fastest.elapsed.as_secs_f64();
+    let frames_per_s = fastest.tally.account().counters().received as f64 / seconds;
+    let megabytes_per_s = fastest.bytes as f64 / seconds / 1e6;
+    let speed = Check::measured(
+        SPEED,
+        frames_per_s.round(),
+        "frames/s",
+        Limit::AtLeast(demands.min_frames_per_s),
+    )
+    .noting(&format!("{megabytes_per_s:.2} MB/s"));
+
+    let sweeps_per_s = 1e9 / setup(1).frame_ns();
+    let sweeps = (sweeps_per_s / (PACE * frames_per_s).max(0.1)).ceil().max(1.0) as u32;
+    let paced = stream(session, &setup(sweeps), demands.duration)?;
+    let counters = paced.tally.account().counters();
+    let missing = counters.total() - counters.received;
+    let status = paced.status;
+    let made_per_s = counters.total() as f64 / paced.elapsed.as_secs_f64();
+    let mut note = format!("of {} at {made_per_s:.0} frames/s", counters.total());
+    if missing > 0 {
+        let (fpga, firmware) = (status.fpga_frames_lost, status.frames_dropped);
+        let bus = status.fpga_frames_corrupt;
+        note += &format!(
+            ": {fpga} lost in the FPGA, {bus} damaged on its bus, {firmware} dropped by the firmware, {} on the link",
+            missing.saturating_sub(u64::from(fpga) + u64::from(bus) + u64::from(firmware))
+        );
+    }
+    let losses = Check::measured(LOSSES, missing as f64, "frames", Limit::Exactly(0.0));
+    let losses =
+        if counters.total() == 0 { Check::told(LOSSES, false, "no frame came") } else { losses };
+    Ok(vec![speed, losses.noting(&note)])
+}

@@ -1,0 +1,210 @@
+//! The self-test: does this camera measure what it says, all the way to the host?
+//!
+//! Stages, each building on those before: the device's checks of itself; test frames of the FPGA's generator through
+//! the whole chain; settling and latency from raw bursts; latency again, by stepping the FPGA's setting; the LEDs, by
+//! the light that each line and each pattern brings to the detector; the link, by its speed and its losses. Point the
+//! camera at something bright and evenly lit, such as white paper: what reflects nothing shows nothing.
+//!
+//! The one law: a verdict follows from a measured value and a limit, and both are shown.
+
+mod check;
+mod generator;
+mod latency;
+mod leds;
+mod link;
+mod stream;
+
+pub use check::{Check, Limit, Verdict};
+
+use crate::calibrate::{CalibrationError, Settling, calibrate};
+use crate::session::{Deaf, Session, SessionError};
+use nirspi_wire::{ADC_MAX, CLOCKS_PER_PATTERN, SelfTestReport};
+use std::time::Duration;
+
+/// A share of the light that all LEDs together must bring, of the ADC's range. With less, a single LED moves a
+/// reading by under a sixth of a count.
+const MIN_STEP_SHARE: f64 = 0.01;
+/// Blanked samples of the fastest setting, for which the leak is shown.
+const BLANKED: u16 = 2;
+/// Least share of a slot's light to be read in its own slot at the fastest setting. With less, undoing the leak more
+/// than doubles the noise.
+const MIN_OWN_SHARE: f64 = 0.5;
+
+/// What is asked of a link.
+#[derive(Debug, Clone, Copy)]
+pub struct LinkDemands {
+    /// Frames of 1024 patterns in a second; 0 where any speed will do.
+    pub min_frames_per_s: f64,
+    /// How long each of the two measurements takes.
+    pub duration: Duration,
+}
+
+/// Stages, in order, for people who wait.
+pub const STAGES: [&str; 6] =
+    ["device", "test frames", "settling", "ADC latency", "LEDs", "link throughput"];
+
+/// What a self-test has found.
+#[derive(Debug)]
+pub struct SelfTest {
+    /// Every check, in order.
+    pub checks: Vec<Check>,
+    /// The calibration to keep, if it could be measured and the latency is beyond doubt.
+    pub settling: Option<Settling>,
+}
+
+impl SelfTest {
+    /// Whether no check has failed.
+    #[must_use]
+    pub fn passed(&self) -> bool {
+        self.checks.iter().all(|check| check.verdict() != Verdict::Failed)
+    }
+}
+
+/// Runs all stages. `begin` hears the number of each stage in [`STAGES`] as it begins.
+///
+/// # Errors
+/// When the camera goes away. What it refuses is a failed check.
+pub fn run(
+    session: &mut Session,
+    demands: LinkDemands,
+    begin: &mut dyn FnMut(usize),
+) -> Result<SelfTest, SessionError> {
+    let mut checks = Vec::new();
+    begin(0);
+    checks.extend(device(session.self_test(&mut Deaf)?));
+    begin(1);
+    checks.push(unless_refused(generator::NAME, generator::check(session))?);
+    begin(2);
+    let settling = match calibrate(session, &mut Deaf) {
+        Ok(settling) => Ok(settling),
+        Err(CalibrationError::Session(SessionError::Refused { command, refusal })) => {
+            Err(SessionError::Refused { command, refusal }.to_string())
+        }
+        Err(CalibrationError::Session(error)) => return Err(error),
+        Err(problem) => Err(problem.to_string()),
+    };
+    checks.extend(light_and_settling(settling.as_ref()));
+    let settling = settling.ok();
+    let usable = settling.as_ref().filter(|settling| settling.step_counts >= min_step_counts());
+    begin(3);
+    let latency = match usable {
+        Some(settling) => {
+            unless_refused(latency::NAME, latency::check(session, settling.adc_latency))?
+        }
+        None => Check::skipped(latency::NAME, "too little light"),
+    };
+    let agrees = latency.verdict() == Verdict::Passed;
+    // Where burst and stepping disagree, it is the stepped setting that puts the windows right.
+    let setting = latency.value();
+    checks.push(latency);
+    begin(4);
+    match (usable, setting) {
+        (Some(settling), Some(setting)) => {
+            match leds::check(session, setting as u8, settling.noise_counts) {
+                Ok(found) => checks.extend(found),
+                Err(error @ SessionError::Refused { .. }) => {
+                    checks.push(Check::told(leds::LINES, false, &error.to_string()));
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        (Some(_), None) => {
+            checks.extend(leds::NAMES.map(|name| Check::skipped(name, "needs the ADC latency")));
+        }
+        (None, _) => {
+            checks.extend(leds::NAMES.map(|name| Check::skipped(name, "too little light")))
+        }
+    }
+    begin(5);
+    match link::check(session, demands) {
+        Ok(found) => checks.extend(found),
+        Err(error @ SessionError::Refused { .. }) => {
+            checks.push(Check::told(link::LOSSES, false, &error.to_string()));
+        }
+        Err(error) => return Err(error),
+    }
+    Ok(SelfTest { checks, settling: settling.filter(|_| agrees) })
+}
+
+/// What the camera refuses, it fails.
+fn unless_refused(name: &str, outcome: Result<Check, SessionError>) -> Result<Check, SessionError> {
+    match outcome {
+        Err(error @ SessionError::Refused { .. }) => {
+            Ok(Check::told(name, false, &error.to_string()))
+        }
+        other => other,
+    }
+}
+
+fn min_step_counts() -> f64 {
+    (MIN_STEP_SHARE * f64::from(ADC_MAX)).round()
+}
+
+/// One check a bit of the device's report, named as the protocol names it. A bit of a newer device has no name here.
+fn device(report: SelfTestReport) -> Vec<Check> {
+    let named = |bit: u32| SelfTestReport::NAMES.iter().find(|(mask, _)| *mask == 1 << bit);
+    (0..u32::BITS)
+        .filter_map(|bit| {
+            let name = match named(bit) {
+                Some((_, name)) => format!("device: {name}"),
+                None if report.ran >> bit & 1 != 0 => format!("device: check {bit}"),
+                None => return None,
+            };
+            Some(match (report.ran >> bit & 1 != 0, report.failed >> bit & 1 != 0) {
+                (false, _) => Check::skipped(&name, "left out by the device"),
+                (true, failed) => Check::told(&name, !failed, ""),
+            })
+        })
+        .collect()
+}
+
+/// What the raw bursts say.
+fn light_and_settling(settling: Result<&Settling, &String>) -> Vec<Check> {
+    const STEP: &str = "light of all LEDs";
+    const OWN: &str = "settling at 25 MHz";
+    let settling = match settling {
+        Err(problem) => {
+            return vec![
+                Check::told(STEP, false, problem),
+                Check::skipped(OWN, "no calibration burst"),
+            ];
+        }
+        Ok(settling) => settling,
+    };
+    let noise = format!("noise {:.1} counts a sample", settling.noise_counts);
+    let step =
+        Check::measured(STEP, settling.step_counts, "counts", Limit::AtLeast(min_step_counts()))
+            .noting(&noise);
+    let own = match settling.leak(CLOCKS_PER_PATTERN, BLANKED) {
+        Ok(leak) => {
+            let own = leak.taps().first().copied().unwrap_or(0.0);
+            let after = settling.response.len();
+            Check::measured(
+                OWN,
+                own * 100.0,
+                "% in its slot",
+                Limit::AtLeast(MIN_OWN_SHARE * 100.0),
+            )
+            .noting(&format!("settled after {after} clocks of 8 ns"))
+        }
+        Err(problem) => Check::told(OWN, false, &problem.to_string()),
+    };
+    vec![step, own]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bit_that_only_a_newer_device_knows_is_shown_by_its_number() {
+        let report = SelfTestReport { ran: 1 << 30 | 1, failed: 1 << 30 };
+        let checks = device(report);
+        let verdict = |name: &str| {
+            checks.iter().find(|check| check.name() == name).map(Check::verdict).unwrap()
+        };
+        assert_eq!(verdict("device: FPGA identity"), Verdict::Passed);
+        assert_eq!(verdict("device: FPGA bus"), Verdict::Skipped);
+        assert_eq!(verdict("device: check 30"), Verdict::Failed);
+    }
+}

@@ -1,0 +1,139 @@
+//! Short runs whose every frame is looked at, and runs that only count.
+
+use crate::session::{ANSWER_TIMEOUT, Deaf, Listener, Session, SessionError};
+use crate::setup::MeasurementSetup;
+use crate::tally::Tally;
+use nirspi_wire::{
+    Command, Configuration, DeviceMessage, EventKind, PacketError, RunLength, Status,
+};
+use std::time::{Duration, Instant};
+
+/// How often the camera hears from a host that only listens.
+const KEEP_ALIVE: Duration = Duration::from_secs(1);
+
+/// A frame that came.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Shot {
+    /// Its number in the run.
+    pub sequence: u32,
+    /// Summed ADC counts, one a pattern shown.
+    pub samples: Vec<i64>,
+}
+
+struct Collector {
+    run: u16,
+    shots: Vec<Shot>,
+    ended: bool,
+    last_packet: Instant,
+}
+
+impl Listener for Collector {
+    fn packet(&mut self, _: &[u8], content: &Result<DeviceMessage<'_>, PacketError>) {
+        self.last_packet = Instant::now();
+        match content {
+            Ok(DeviceMessage::Frame(frame)) if frame.run == self.run => {
+                let samples = frame.samples.iter().collect();
+                self.shots.push(Shot { sequence: frame.sequence, samples });
+            }
+            Ok(DeviceMessage::Event(event)) => {
+                self.ended |=
+                    matches!(event.kind, EventKind::RunEnded { run, .. } if run == self.run);
+            }
+            _ => {}
+        }
+    }
+}
+
+/// The frames of a run of `count` that came; some may be missing.
+pub fn shots(
+    session: &mut Session,
+    configuration: Configuration<'_>,
+    count: u32,
+) -> Result<Vec<Shot>, SessionError> {
+    session.command(Command::Configure(configuration), &mut Deaf)?;
+    let run = session.status(&mut Deaf)?.run.wrapping_add(1);
+    let mut collector =
+        Collector { run, shots: Vec::new(), ended: false, last_packet: Instant::now() };
+    session.command(Command::Start(RunLength::Frames(count)), &mut collector)?;
+    while !collector.ended && collector.shots.len() < count as usize {
+        session.listen(Duration::from_millis(50), &mut collector)?;
+        if collector.last_packet.elapsed() > ANSWER_TIMEOUT {
+            break;
+        }
+    }
+    // A run whose end was not heard of is ended for sure. One that has ended refuses, and that is well.
+    if !collector.ended {
+        match session.command(Command::Stop, &mut collector) {
+            Ok(()) | Err(SessionError::Refused { .. }) => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(collector.shots)
+}
+
+/// What a run brought that only counted.
+#[derive(Debug)]
+pub struct Stream {
+    /// Every frame's fate.
+    pub tally: Tally,
+    /// Bytes of all packets, as they crossed the link.
+    pub bytes: u64,
+    /// From the start to the stop.
+    pub elapsed: Duration,
+    /// The camera's own view of the run.
+    pub status: Status,
+}
+
+struct Counter {
+    tally: Tally,
+    bytes: u64,
+    last_packet: Instant,
+}
+
+impl Listener for Counter {
+    fn packet(&mut self, raw: &[u8], content: &Result<DeviceMessage<'_>, PacketError>) {
+        self.last_packet = Instant::now();
+        self.bytes += raw.len() as u64;
+        self.tally.packet(content);
+    }
+}
+
+/// Lets the camera run for `duration`, and counts.
+pub fn stream(
+    session: &mut Session,
+    setup: &MeasurementSetup,
+    duration: Duration,
+) -> Result<Stream, SessionError> {
+    setup.with_configuration(|c| session.command(Command::Configure(c), &mut Deaf))?;
+    let run = session.status(&mut Deaf)?.run.wrapping_add(1);
+    let started = Instant::now();
+    let tally = Tally::new(setup, Some(run));
+    let mut counter = Counter { tally, bytes: 0, last_packet: started };
+    session.command(Command::Start(RunLength::Continuous), &mut counter)?;
+    let (mut kept_alive, mut kept_alive_us) = (started, 0);
+    while started.elapsed() < duration && !counter.tally.has_ended() {
+        session.listen(Duration::from_millis(20), &mut counter)?;
+        // A simulated camera's time may outrun ours, and it is the camera that counts our silence.
+        let device_us = counter.tally.device_time_us();
+        let device_age = Duration::from_micros(device_us.saturating_sub(kept_alive_us));
+        if kept_alive.elapsed() > KEEP_ALIVE || device_age > KEEP_ALIVE {
+            (kept_alive, kept_alive_us) = (Instant::now(), device_us);
+            session.keep_alive()?;
+        }
+    }
+    let (elapsed, bytes) = (started.elapsed(), counter.bytes);
+    match session.command(Command::Stop, &mut counter) {
+        // It had ended by itself, by a fault.
+        Ok(()) | Err(SessionError::Refused { .. }) => {}
+        Err(error) => return Err(error),
+    }
+    while !counter.tally.has_ended() && counter.last_packet.elapsed() < ANSWER_TIMEOUT {
+        session.listen(Duration::from_millis(20), &mut counter)?;
+    }
+    let status = session.status(&mut counter)?;
+    // The end of the run may have been the packet that was lost.
+    if !counter.tally.has_ended() {
+        counter.tally.end(status.frames_made);
+    }
+    Ok(Stream { tally: counter.tally, bytes, elapsed, status })
+}
