@@ -3,17 +3,24 @@
 //! Data flows one way: bytes -> frames -> measurements -> image -> picture.
 //!
 //! * [`link`] moves bytes, [`session`] talks to a camera, [`account`] counts what became of every frame,
-//! * [`calibrate`] measures latency and settling, [`selftest`] checks a camera, [`capture`] runs a measurement,
-//!   [`recording`] keeps it,
+//! * [`versions`] says whether camera and program belong together, [`events`] what a camera reports unasked,
+//! * [`calibrate`] measures latency and settling, [`selftest`] checks a camera, [`kept_calibration`] remembers,
+//! * [`capture`] runs a measurement, [`recording`] keeps it,
 //! * [`tally`] and [`integrate`] turn frames into measurements; `nirspi-recon` turns those into an image,
 //! * [`files`], [`picture`] and [`scene`] are what people see and hand over,
+//! * [`boards`] lists the boards that firmware is for; with the feature `flash`, `flash` programs them,
 //! * [`virtual_camera`] is a camera without silicon: optics simulator, gateware model, real firmware logic.
 
 pub mod account;
+pub mod boards;
 pub mod calibrate;
 pub mod capture;
+pub mod events;
 pub mod files;
+#[cfg(feature = "flash")]
+pub mod flash;
 pub mod integrate;
+pub mod kept_calibration;
 pub mod link;
 pub mod picture;
 pub mod recording;
@@ -22,4 +29,5 @@ pub mod selftest;
 pub mod session;
 pub mod setup;
 pub mod tally;
+pub mod versions;
 pub mod virtual_camera;

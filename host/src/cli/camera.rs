@@ -1,14 +1,12 @@
-//! Arguments that say which camera, in front of what, measuring how.
+//! Arguments that say what a virtual camera looks at, and how to measure.
 
 use super::Usage;
 use anyhow::{Context, Result};
 use clap::Args;
 use nirspi::files::order_table::read_order_table;
-use nirspi::link::TcpLink;
 use nirspi::scene::{SceneMap, SceneSource};
-use nirspi::session::Session;
 use nirspi::setup::MeasurementSetup;
-use nirspi::virtual_camera::{MemoryLink, VirtualOptics};
+use nirspi::virtual_camera::VirtualOptics;
 use nirspi_optics::{Projector, Scene};
 use nirspi_recon::Order;
 use std::path::Path;
@@ -117,42 +115,4 @@ pub fn check_sampling(sampling: f64) -> Result<()> {
         return Ok(());
     }
     Err(Usage(format!("--sampling is {sampling}, expected more than 0 and at most 1")).into())
-}
-
-/// Which camera to use.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum CameraAddress {
-    /// The one in this process.
-    Virtual,
-    /// One behind a TCP address.
-    Tcp(String),
-}
-
-impl FromStr for CameraAddress {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text.split_once(':') {
-            None if text == "virtual" => Ok(Self::Virtual),
-            Some(("tcp", address)) if address.contains(':') => Ok(Self::Tcp(address.to_owned())),
-            _ => Err("expected virtual or tcp:HOST:PORT".to_owned()),
-        }
-    }
-}
-
-impl CameraAddress {
-    /// Opens a conversation with the camera. `scene` is what a virtual one looks at.
-    pub fn open(&self, scene: &SceneArgs) -> Result<Session> {
-        match self {
-            Self::Virtual => {
-                let (_, optics) = scene.optics()?;
-                Ok(Session::open(Box::new(MemoryLink::new(optics.camera(scene.seed)?)))?)
-            }
-            Self::Tcp(address) => {
-                let link = TcpLink::connect(address)
-                    .with_context(|| format!("no camera at tcp:{address}"))?;
-                Session::open(Box::new(link)).with_context(|| format!("tcp:{address}"))
-            }
-        }
-    }
 }

@@ -1,12 +1,15 @@
 //! `nirspi capture`: record a camera, with every frame accounted for.
 
-use super::camera::{CameraAddress, SceneArgs, SetupArgs};
+use super::address::CameraAddress;
+use super::camera::{SceneArgs, SetupArgs};
 use super::{Usage, print, serve_virtual::stop_on_signal};
 use anyhow::Result;
 use indicatif::{ProgressBar, ProgressStyle};
 use nirspi::account::LossCounters;
 use nirspi::capture::{Calibration, Capture, CaptureOptions, Ended, Progress, capture};
+use nirspi::kept_calibration::{KeptCalibration, path_of};
 use nirspi::session::CameraIdentity;
+use nirspi::setup::MeasurementSetup;
 use serde::Serialize;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -15,12 +18,14 @@ use std::sync::atomic::Ordering;
 
 /// Record frames of a camera into an MCAP file
 ///
-/// Ctrl-C ends the recording and keeps it.
+/// ADC latency and settling are those that `nirspi selftest` has kept for this camera; without such, they are measured
+/// first. Ctrl-C ends the recording and keeps it.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n\
+#[command(after_help = "Examples:\n\
+    \x20 nirspi capture --camera usb --frames 1000 --out rec.mcap\n\
     \x20 nirspi capture --camera tcp:127.0.0.1:1550 --frames 1000 --out rec.mcap")]
 pub struct Args {
-    /// Which camera: virtual, or tcp:HOST:PORT
+    /// Which camera: virtual, usb, usb:SERIAL, tcp:HOST:PORT or serial:PATH[:BAUD]
     #[arg(long, value_name = "CAMERA", default_value = "virtual")]
     camera: CameraAddress,
     /// Frames to record; without it, until Ctrl-C
@@ -32,8 +37,14 @@ pub struct Args {
     /// Replace the file if it is there
     #[arg(long)]
     overwrite: bool,
-    /// Do not measure ADC latency and settling first
+    /// Measure ADC latency and settling first, whatever calibration is kept
     #[arg(long)]
+    calibrate: bool,
+    /// Use this calibration, written by `nirspi selftest`, rather than the one kept for the camera
+    #[arg(long, value_name = "FILE", conflicts_with = "calibrate")]
+    calibration: Option<PathBuf>,
+    /// Use no calibration, and measure none
+    #[arg(long, conflicts_with_all = ["calibrate", "calibration"])]
     no_calibration: bool,
     /// ADC clocks from light to sample, where they are not measured
     #[arg(long, value_name = "N", default_value_t = 0, requires = "no_calibration")]
@@ -63,8 +74,70 @@ struct Report<'r> {
     frames_per_s: f64,
     adc_latency_clocks: u8,
     calibrated: bool,
+    /// When and where the kept calibration was measured; `null` where none was used.
+    calibration: Option<Origin>,
     #[serde(skip_serializing_if = "Option::is_none")]
     calibration_problem: Option<String>,
+}
+
+/// A kept calibration.
+#[derive(Debug, Clone, Serialize)]
+struct Origin {
+    measured: String,
+    file: PathBuf,
+}
+
+/// Where this capture's calibration comes from, and what is to be said about it.
+struct Choice {
+    calibration: Calibration,
+    origin: Option<Origin>,
+    note: Option<String>,
+}
+
+impl Choice {
+    fn plain(calibration: Calibration) -> Self {
+        Self { calibration, origin: None, note: None }
+    }
+
+    fn kept(kept: KeptCalibration, file: PathBuf) -> Self {
+        let origin = Some(Origin { measured: kept.measured().to_owned(), file });
+        Self { calibration: Calibration::Kept(kept.settling), origin, note: None }
+    }
+}
+
+fn choose_calibration(
+    args: &Args,
+    setup: &MeasurementSetup,
+    camera: &CameraIdentity,
+) -> Result<Choice> {
+    if args.no_calibration {
+        return Ok(Choice::plain(Calibration::None));
+    }
+    if let Some(file) = &args.calibration {
+        if !setup.differential {
+            return Err(Usage(
+                "--calibration with --non-differential: patterns without complements need the dark level of the \
+                 moment, use --calibrate"
+                    .to_owned(),
+            )
+            .into());
+        }
+        return Ok(Choice::kept(KeptCalibration::read(file, camera)?, file.clone()));
+    }
+    if args.calibrate || !setup.differential {
+        return Ok(Choice::plain(Calibration::Measure));
+    }
+    // No home, no calibration kept in it.
+    let Some(file) = path_of(&camera.serial).ok().filter(|file| file.exists()) else {
+        return Ok(Choice::plain(Calibration::Measure));
+    };
+    Ok(match KeptCalibration::read(&file, camera) {
+        Ok(kept) => Choice::kept(kept, file),
+        Err(problem) => {
+            let note = Some(format!("kept calibration not used, measured afresh: {problem}"));
+            Choice { note, ..Choice::plain(Calibration::Measure) }
+        }
+    })
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
@@ -73,10 +146,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let path = recording_path(args)?;
     let stop = stop_on_signal()?;
     let mut session = args.camera.open(&args.scene)?;
+    let choice = choose_calibration(args, &setup, session.identity())?;
     let options = CaptureOptions {
         setup,
         frames: args.frames,
-        calibration: if args.no_calibration { Calibration::None } else { Calibration::Measure },
+        calibration: choice.calibration.clone(),
         record: Some(path.clone()),
     };
     let bar = progress_bar(args.frames);
@@ -91,7 +165,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     });
     bar.finish_and_clear();
     let captured = captured?;
-    report(args, session.identity(), &path, &captured)
+    report(args, session.identity(), &path, &choice, &captured)
 }
 
 /// The file to record into, which is not there yet.
@@ -126,6 +200,7 @@ fn report(
     args: &Args,
     camera: &CameraIdentity,
     path: &Path,
+    choice: &Choice,
     captured: &Capture,
 ) -> Result<ExitCode> {
     let counters = captured.counters;
@@ -152,11 +227,18 @@ fn report(
         frames_per_s: counters.received as f64 / seconds,
         adc_latency_clocks: captured.setup.adc_latency,
         calibrated: captured.settling.is_some(),
+        calibration: choice.origin.clone(),
         calibration_problem: captured.calibration_problem.as_ref().map(ToString::to_string),
     };
     if args.json {
         print::json(&report)?;
     } else {
+        if let Some(note) = &choice.note {
+            print::line(note)?;
+        }
+        if let Some(Origin { measured, file }) = &choice.origin {
+            print::line(format_args!("calibration of {measured}, {}", file.display()))?;
+        }
         if let Some(problem) = &report.calibration_problem {
             print::line(format_args!("not calibrated: {problem}"))?;
         }

@@ -2,10 +2,12 @@
 
 use super::print;
 use anyhow::Result;
-use nirspi::link::TcpLink;
+use nirspi::link::usb::{self, UsbCamera, identify::check_version};
+use nirspi::link::{TcpLink, serial_ports};
 use nirspi::session::{CameraIdentity, Session, SessionError};
 use serde::Serialize;
 use std::io;
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Where `nirspi virtual` listens unless told otherwise.
@@ -13,8 +15,8 @@ pub const DEFAULT_TCP: &str = "127.0.0.1:1550";
 
 /// List the cameras that can be used
 ///
-/// Looks at the TCP addresses given and at the default one of `nirspi virtual`. The virtual camera inside this
-/// program is always there.
+/// Looks at USB, at the TCP addresses given and at the default one of `nirspi virtual`. Serial ports are listed and not
+/// asked: who knows what else listens there. The virtual camera inside this program is always there.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n\
     \x20 nirspi devices --tcp 192.168.0.7:1550")]
@@ -32,7 +34,22 @@ pub struct Args {
 struct Device {
     camera: String,
     identity: Option<CameraIdentity>,
+    /// Of a USB camera that was not asked.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    protocol: Option<u16>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    note: Option<String>,
     problem: Option<String>,
+}
+
+impl Device {
+    fn new(camera: String) -> Self {
+        Self { camera, identity: None, protocol: None, note: None, problem: None }
+    }
+
+    fn noting(self, note: &str) -> Self {
+        Self { note: Some(note.to_owned()), ..self }
+    }
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
@@ -47,22 +64,27 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         asking.into_iter().map(std::thread::ScopedJoinHandle::join).collect()
     });
 
-    let mut devices = vec![Device { camera: "virtual".to_owned(), identity: None, problem: None }];
+    let mut devices = vec![
+        Device::new("virtual".to_owned())
+            .noting("built in: optics simulator, gateware model, real firmware logic"),
+    ];
     for ((address, named), answer) in addresses.into_iter().zip(answers) {
         let camera = format!("tcp:{address}");
         match answer.map_err(|_| anyhow::anyhow!("asking {address} failed"))? {
             Ok(identity) => {
-                devices.push(Device { camera, identity: Some(identity), problem: None });
+                devices.push(Device { identity: Some(identity), ..Device::new(camera) });
             }
             // Nobody at the default address is no news.
             Err(SessionError::Link(error))
                 if !named && error.kind() == io::ErrorKind::ConnectionRefused => {}
             Err(error) => {
                 let problem = Some(error.to_string());
-                devices.push(Device { camera, identity: None, problem });
+                devices.push(Device { problem, ..Device::new(camera) });
             }
         }
     }
+    devices.extend(on_usb());
+    devices.extend(on_serial_ports());
     if args.json {
         print::json(&devices)?;
     } else {
@@ -75,19 +97,49 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 }
 
 fn describe(device: &Device) -> String {
-    match (&device.identity, &device.problem) {
-        (Some(id), _) => format!(
+    match (&device.identity, &device.problem, &device.note) {
+        (Some(id), _, _) => format!(
             "{} {}, firmware {}, gateware {}, protocol {}",
             id.board, id.serial, id.firmware, id.gateware, id.protocol
         ),
-        (None, Some(problem)) => problem.clone(),
-        (None, None) => {
-            "built in: optics simulator, gateware model, real firmware logic".to_owned()
-        }
+        (None, Some(text), _) | (None, None, Some(text)) => text.clone(),
+        (None, None, None) => String::new(),
     }
 }
 
 fn identify(address: &str) -> Result<CameraIdentity, SessionError> {
     let link = TcpLink::connect(address)?;
     Ok(Session::open(Box::new(link))?.identity().clone())
+}
+
+/// Cameras on USB, by their descriptors. A system without USB has none.
+fn on_usb() -> Vec<Device> {
+    let cameras = match usb::usb_cameras() {
+        Ok(cameras) => cameras,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
+        Err(error) => {
+            return vec![Device::new("usb".to_owned()).noting(&format!("not listed: {error}"))];
+        }
+    };
+    let device = |camera: UsbCamera| {
+        let said = match camera.protocol.map(|protocol| (protocol, check_version(protocol))) {
+            None => "protocol not known before it is opened".to_owned(),
+            Some((protocol, Ok(()))) => format!("protocol {protocol}"),
+            Some((_, Err(problem))) => problem.to_string(),
+        };
+        let protocol = camera.protocol;
+        Device { protocol, ..Device::new(camera.to_string()).noting(&said) }
+    };
+    cameras.into_iter().map(device).collect()
+}
+
+/// Serial ports. A system that does not list them has none.
+fn on_serial_ports() -> Vec<Device> {
+    let ports = serial_ports().unwrap_or_default();
+    let device = |port: PathBuf| {
+        let camera = format!("serial:{}", port.display());
+        let note = format!("a serial port, not asked: nirspi info --camera {camera}");
+        Device::new(camera).noting(&note)
+    };
+    ports.into_iter().map(device).collect()
 }

@@ -2,16 +2,20 @@
 //!
 //! Exit codes: 0 done, 1 failed (one line on stderr says why), 2 used wrongly.
 
+mod address;
 mod camera;
 mod capture;
 mod demo;
 mod devices;
+mod flash;
+mod info;
 mod method;
 mod metrics;
 mod print;
 mod quality;
 mod reconstruct;
 mod report;
+mod selftest;
 mod serve_virtual;
 
 use clap::{Parser, Subcommand};
@@ -36,6 +40,9 @@ enum Command {
     Capture(capture::Args),
     Virtual(serve_virtual::Args),
     Devices(devices::Args),
+    Info(info::Args),
+    Selftest(selftest::Args),
+    Flash(flash::Args),
     Metrics(metrics::Args),
 }
 
@@ -64,6 +71,9 @@ pub fn run() -> ExitCode {
         Command::Capture(args) => capture::run(&args),
         Command::Virtual(args) => serve_virtual::run(&args),
         Command::Devices(args) => devices::run(&args),
+        Command::Info(args) => info::run(&args),
+        Command::Selftest(args) => selftest::run(&args),
+        Command::Flash(args) => flash::run(&args),
         Command::Metrics(args) => metrics::run(&args),
     };
     match result {

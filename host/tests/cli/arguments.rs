@@ -3,7 +3,17 @@
 use crate::bench::{Bench, first_bytes};
 use std::process::{Command, Stdio};
 
-const COMMANDS: [&str; 6] = ["demo", "reconstruct", "capture", "virtual", "devices", "metrics"];
+const COMMANDS: [&str; 9] = [
+    "demo",
+    "reconstruct",
+    "capture",
+    "virtual",
+    "devices",
+    "info",
+    "selftest",
+    "flash",
+    "metrics",
+];
 
 #[test]
 fn every_command_explains_itself_with_an_example() {
@@ -42,7 +52,17 @@ fn mistakes_in_the_arguments_get_one_line_and_code_2() {
         (&["demo", "--frames", "0"], &["--frames", "'0'"]),
         (&["demo", "--sweeps", "0"], &["--sweeps", "'0'"]),
         (&["demo", "--blanked", "5"], &["--blanked is 5", "--clocks-per-pattern"]),
-        (&["capture", "--camera", "usb"], &["--camera", "tcp:HOST:PORT"]),
+        (&["capture", "--camera", "fax"], &["--camera", "tcp:HOST:PORT"]),
+        (&["capture", "--camera", "serial:"], &["--camera", "serial:PATH[:BAUD]"]),
+        (&["capture", "--calibrate", "--no-calibration"], &["--calibrate", "--no-calibration"]),
+        (
+            &["capture", "--calibration", "c.json", "--non-differential"],
+            &["--calibration", "dark level", "--calibrate"],
+        ),
+        (&["info", "--camera", "usb:"], &["--camera", "usb:SERIAL"]),
+        (&["flash"], &["--board"]),
+        (&["flash", "--board", "toaster"], &["toaster", "nucleo-u5a5zj-q, nucleo-h7s3l8"]),
+        (&["flash", "--board", "mps2-an505"], &["mps2-an505", "QEMU"]),
         (&["capture", "--camera", "tcp:nowhere"], &["--camera", "tcp:HOST:PORT"]),
         (&["virtual", "--distance-m", "0"], &["--distance-m is 0"]),
     ];

@@ -24,12 +24,12 @@ impl Bench {
         self.folder.path().join(name)
     }
 
-    /// What lies in the folder, logs of processes left out.
+    /// What lies in the folder, logs of processes and calibrations kept left out.
     pub fn names(&self) -> Vec<String> {
         let entries = fs::read_dir(self.folder.path()).unwrap();
         let mut names: Vec<String> = entries
             .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-            .filter(|name| !name.starts_with("log-"))
+            .filter(|name| !name.starts_with("log-") && name != "data")
             .collect();
         names.sort();
         names
@@ -60,6 +60,8 @@ impl Bench {
         let child = Command::new(env!("CARGO_BIN_EXE_nirspi"))
             .args(arguments)
             .current_dir(self.folder.path())
+            // Calibrations that the user keeps are none of ours, nor ours his.
+            .env("XDG_DATA_HOME", self.path("data"))
             .stdin(Stdio::null())
             .stdout(stdout)
             .stderr(File::create(&err).unwrap())

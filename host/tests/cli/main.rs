@@ -13,3 +13,7 @@ mod foreign_devices;
 mod metrics;
 mod real_data;
 mod reconstruct;
+mod selftest;
+#[cfg(unix)]
+mod serial;
+mod versions;

@@ -1,0 +1,107 @@
+//! `nirspi flash`: programs a board through a debug probe.
+
+use super::Usage;
+use anyhow::Result;
+use nirspi::boards::{BOARDS, Board};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Program a board with its firmware, through a debug probe
+///
+/// Nothing else has to be installed: an ELF file of a release is enough. Needs a build with the feature `flash`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n\
+    \x20 nirspi flash --board nucleo-u5a5zj-q\n\
+    \x20 nirspi flash --list")]
+pub struct Args {
+    /// Which board: nucleo-u5a5zj-q or nucleo-h7s3l8
+    #[arg(long, value_name = "NAME", required_unless_present = "list")]
+    board: Option<String>,
+    /// Firmware to write; default: the board's release build under boards/target
+    #[arg(long, value_name = "FILE")]
+    elf: Option<PathBuf>,
+    /// Which probe, where there are several: VID:PID:SERIAL as --list shows it
+    #[arg(long, value_name = "PROBE")]
+    probe: Option<String>,
+    /// List the debug probes that are plugged in
+    #[arg(long, conflicts_with_all = ["board", "elf", "probe"])]
+    list: bool,
+}
+
+pub fn run(args: &Args) -> Result<ExitCode> {
+    let board = args.board.as_deref().map(board).transpose()?;
+    act(args, board)
+}
+
+/// The board of this name that can be flashed.
+fn board(name: &str) -> Result<(&'static Board, &'static str)> {
+    let found = Board::named(name);
+    if let Some((board, chip)) = found.and_then(|board| Some((board, board.chip?))) {
+        return Ok((board, chip));
+    }
+    if found.is_some() {
+        return Err(
+            Usage(format!("--board {name}: runs in QEMU, there is no chip to flash")).into()
+        );
+    }
+    let known: Vec<&str> =
+        BOARDS.iter().filter(|board| board.chip.is_some()).map(|board| board.name).collect();
+    Err(Usage(format!("--board is {name:?}, expected one of {}", known.join(", "))).into())
+}
+
+#[cfg(not(feature = "flash"))]
+fn act(_: &Args, _: Option<(&'static Board, &'static str)>) -> Result<ExitCode> {
+    anyhow::bail!(
+        "this build cannot flash: cargo run --release --features flash -- flash ... (minutes to build), or flash with \
+         probe-rs run from the board's folder"
+    )
+}
+
+#[cfg(feature = "flash")]
+fn act(args: &Args, board: Option<(&'static Board, &'static str)>) -> Result<ExitCode> {
+    use super::print;
+    use anyhow::Context;
+    use indicatif::{ProgressBar, ProgressStyle};
+    use nirspi::flash::{Step, choose, flash, probes};
+
+    let found = probes();
+    let Some((board, chip)) = board else {
+        if found.is_empty() {
+            print::line("no debug probe: plug in the board's ST-LINK connector")?;
+        }
+        for probe in &found {
+            print::line(probe)?;
+        }
+        return Ok(ExitCode::SUCCESS);
+    };
+    let elf = args.elf.clone().unwrap_or_else(|| board.elf());
+    let firmware = std::fs::read(&elf).with_context(|| {
+        let hint = if args.elf.is_none() {
+            format!(": build it first, cd boards/{} && cargo build --release", board.name)
+        } else {
+            String::new()
+        };
+        format!("{}{hint}", elf.display())
+    })?;
+    let probe = choose(&found, args.probe.as_deref())?;
+    let bar = ProgressBar::new(0).with_style(
+        ProgressStyle::with_template("{msg:9} {bar:30} {bytes}/{total_bytes}")
+            .unwrap_or_else(|_| ProgressStyle::default_bar()),
+    );
+    let written = flash(probe, chip, &firmware, &mut |step| match step {
+        Step::Begins { what, bytes } => {
+            bar.reset();
+            bar.set_message(what);
+            bar.set_length(bytes);
+        }
+        Step::Done { bytes } => bar.inc(bytes),
+    });
+    bar.finish_and_clear();
+    written.with_context(|| format!("{} through {probe}", elf.display()))?;
+    print::line(format_args!(
+        "{} written to {} and verified; it is running",
+        elf.display(),
+        board.name
+    ))?;
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,137 @@
+//! `nirspi info`: who a camera is, whether it and this program belong together, and what to update.
+
+use super::address::CameraAddress;
+use super::camera::SceneArgs;
+use super::print;
+use anyhow::Result;
+use nirspi::events;
+use nirspi::session::{CameraIdentity, Listener, Session, SessionError};
+use nirspi::versions::{Part, compare};
+use nirspi_wire::register::{IDENTITY, Register};
+use nirspi_wire::{DeviceMessage, PacketError, Status};
+use serde::Serialize;
+use std::process::ExitCode;
+use std::time::Duration;
+
+/// What a camera has to report unasked, it reports right after the greeting.
+const REPORTS: Duration = Duration::from_millis(100);
+
+/// Show a camera's identity and versions, and what to update
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n\
+    \x20 nirspi info --camera usb\n\
+    \x20 nirspi info --camera serial:/dev/ttyACM0 --json")]
+pub struct Args {
+    /// Which camera: virtual, usb, usb:SERIAL, tcp:HOST:PORT or serial:PATH[:BAUD]
+    #[arg(long, value_name = "CAMERA", default_value = "virtual")]
+    camera: CameraAddress,
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Serialize)]
+struct Report<'r> {
+    camera: &'r CameraIdentity,
+    parts: Vec<Part>,
+    fpga_answers: bool,
+    state: String,
+    uptime_s: f64,
+    /// `null` where the sensor does not answer.
+    temperature_celsius: Option<f64>,
+    interlock_closed: bool,
+    events: Vec<String>,
+}
+
+/// Keeps what the camera reports unasked.
+#[derive(Default)]
+struct Events(Vec<String>);
+
+impl Listener for Events {
+    fn packet(&mut self, _: &[u8], content: &Result<DeviceMessage<'_>, PacketError>) {
+        match content {
+            Ok(DeviceMessage::Event(event)) => self.0.push(events::in_words(&event.kind)),
+            // An event of a newer protocol, perhaps.
+            Err(PacketError::Message) => {
+                self.0.push(
+                    "the camera reports something that this program does not know".to_owned(),
+                );
+            }
+            _ => {}
+        }
+    }
+}
+
+pub fn run(args: &Args) -> Result<ExitCode> {
+    let mut session = args.camera.open(&args.scene)?;
+    let mut events = Events::default();
+    session.listen(REPORTS, &mut events)?;
+    let (identity_register, map) = registers(&mut session, &mut events)?;
+    let status = session.status(&mut events)?;
+    let fpga_answers = identity_register == Some(IDENTITY);
+    let camera = session.identity();
+    let parts = compare(camera, map.filter(|_| fpga_answers));
+    let report = Report {
+        camera,
+        parts,
+        fpga_answers,
+        state: match status.fault {
+            Some(fault) => format!("{:?}: {fault:?}", status.state),
+            None => format!("{:?}", status.state),
+        },
+        uptime_s: status.uptime_us as f64 * 1e-6,
+        temperature_celsius: temperature(&status),
+        interlock_closed: status.interlock_closed,
+        events: events.0,
+    };
+    if args.json {
+        print::json(&report)?;
+    } else {
+        say(&report)?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// What the FPGA's identity and version registers read; nothing where it does not answer.
+fn registers(
+    session: &mut Session,
+    events: &mut Events,
+) -> Result<(Option<u32>, Option<u32>), SessionError> {
+    let mut read = |register| match session.register(register, events) {
+        Ok(value) => Ok(Some(value)),
+        Err(SessionError::Refused { .. }) => Ok(None),
+        Err(error) => Err(error),
+    };
+    Ok((read(Register::Identity)?, read(Register::Version)?))
+}
+
+fn temperature(status: &Status) -> Option<f64> {
+    let reading = status.temperature_centi_celsius;
+    (reading != i16::MIN).then(|| f64::from(reading) / 100.0)
+}
+
+fn say(report: &Report<'_>) -> Result<()> {
+    let camera = report.camera;
+    print::line(format_args!("{} {}", camera.board, camera.serial))?;
+    print::line(format_args!(
+        "ADC {} MS/s, {} bit; LEDs {} nm",
+        camera.adc_hz / 1_000_000,
+        camera.adc_bits,
+        camera.wavelength_nm
+    ))?;
+    let sensor = report
+        .temperature_celsius
+        .map_or_else(|| "no temperature sensor".to_owned(), |celsius| format!("{celsius:.1} °C"));
+    let interlock = if report.interlock_closed { "closed" } else { "open" };
+    print::line(format_args!("{}, {sensor}, interlock {interlock}", report.state))?;
+    for Part { name, camera, expected, advice, .. } in &report.parts {
+        let verdict = advice.as_deref().unwrap_or("as expected");
+        print::line(format_args!("{name:<13} {camera:<9} expected {expected:<9} {verdict}"))?;
+    }
+    if !report.fpga_answers {
+        print::line("the FPGA does not answer: is it powered, and is its gateware loaded?")?;
+    }
+    report.events.iter().try_for_each(print::line)
+}

@@ -1,0 +1,126 @@
+//! `nirspi selftest`: checks a camera end to end, and keeps its calibration.
+
+use super::address::CameraAddress;
+use super::camera::SceneArgs;
+use super::print;
+use anyhow::Result;
+use indicatif::{ProgressBar, ProgressStyle};
+use nirspi::kept_calibration::{KeptCalibration, path_of};
+use nirspi::selftest::{Check, LinkDemands, STAGES, SelfTest, Verdict, run as test};
+use nirspi::session::CameraIdentity;
+use serde::Serialize;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::{Duration, SystemTime};
+
+/// Of each of the two measurements of the link.
+const LINK_DURATION: Duration = Duration::from_secs(1);
+
+/// Check a camera from its LEDs to this program, and keep its calibration
+///
+/// Point it at something bright and evenly lit, such as white paper. `nirspi capture` then uses the calibration. Exit
+/// code 1 if a check has failed.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n\
+    \x20 nirspi selftest --camera usb\n\
+    \x20 nirspi selftest --camera virtual --json")]
+pub struct Args {
+    /// Which camera: virtual, usb, usb:SERIAL, tcp:HOST:PORT or serial:PATH[:BAUD]
+    #[arg(long, value_name = "CAMERA", default_value = "virtual")]
+    camera: CameraAddress,
+    /// Keep the calibration in this file, rather than under the camera's serial number in the user's data directory
+    #[arg(long, value_name = "FILE")]
+    calibration: Option<PathBuf>,
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Print a JSON report
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Serialize)]
+struct Report<'r> {
+    camera: &'r CameraIdentity,
+    passed: bool,
+    checks: &'r [Check],
+    /// Where the calibration is kept; `null` where there was none to keep.
+    calibration: Option<PathBuf>,
+    measured: Option<String>,
+}
+
+pub fn run(args: &Args) -> Result<ExitCode> {
+    let mut session = args.camera.open(&args.scene)?;
+    let camera = session.identity().clone();
+    let style = ProgressStyle::with_template("{spinner} {pos}/{len} {msg}")
+        .unwrap_or_else(|_| ProgressStyle::default_bar());
+    let bar = ProgressBar::new(STAGES.len() as u64).with_style(style);
+    bar.enable_steady_tick(Duration::from_millis(100));
+    let demands =
+        LinkDemands { min_frames_per_s: args.camera.min_frames_per_s(), duration: LINK_DURATION };
+    let found = test(&mut session, demands, &mut |stage| {
+        bar.set_position(stage as u64 + 1);
+        bar.set_message(STAGES.get(stage).copied().unwrap_or_default());
+    });
+    bar.finish_and_clear();
+    let found = found?;
+    let kept = keep(args, &camera, &found)?;
+    let report = Report {
+        camera: &camera,
+        passed: found.passed(),
+        checks: &found.checks,
+        measured: kept.as_ref().map(|(kept, _)| kept.measured().to_owned()),
+        calibration: kept.map(|(_, path)| path),
+    };
+    if args.json {
+        print::json(&report)?;
+    } else {
+        say(&report)?;
+    }
+    Ok(if report.passed { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// Keeps the calibration, if there is one to keep.
+fn keep(
+    args: &Args,
+    camera: &CameraIdentity,
+    found: &SelfTest,
+) -> Result<Option<(KeptCalibration, PathBuf)>> {
+    let Some(settling) = found.settling.clone() else { return Ok(None) };
+    let path = match &args.calibration {
+        Some(path) => path.clone(),
+        None => path_of(&camera.serial)?,
+    };
+    let now = SystemTime::now();
+    let kept = KeptCalibration::new(camera.clone(), settling, found.checks.clone(), now);
+    kept.write(&path)?;
+    Ok(Some((kept, path)))
+}
+
+fn say(report: &Report<'_>) -> Result<()> {
+    print::line(format_args!("{} {}", report.camera.board, report.camera.serial))?;
+    let widest = |column: &dyn Fn(&Check) -> usize| report.checks.iter().map(column).max();
+    let name = widest(&|check| check.name().chars().count()).unwrap_or(0);
+    let value = widest(&|check| check.value_in_words().chars().count()).unwrap_or(0);
+    let limit = widest(&|check| check.limit_in_words().chars().count()).unwrap_or(0);
+    for check in report.checks {
+        let verdict = match check.verdict() {
+            Verdict::Passed => "ok",
+            Verdict::Failed => "FAIL",
+            Verdict::Skipped => "-",
+        };
+        let line = format!(
+            "{verdict:<4}  {:<name$}  {:<value$}  {:<limit$}  {}",
+            check.name(),
+            check.value_in_words(),
+            check.limit_in_words(),
+            check.note(),
+        );
+        print::line(line.trim_end())?;
+    }
+    match (&report.calibration, &report.measured) {
+        (Some(path), Some(measured)) => {
+            print::line(format_args!("calibration of {measured} kept in {}", path.display()))
+        }
+        _ => print::line("no calibration kept"),
+    }
+}

@@ -1,0 +1,203 @@
+//! Programs a board's flash through a debug probe, with the probe-rs library (feature `flash`).
+//!
+//! The one law: a firmware that was written is read back and compared before it is started.
+
+use probe_rs::flashing::{
+    DownloadOptions, FileDownloadError, FlashError, FlashProgress, ProgressEvent,
+    ProgressOperation, image_format,
+};
+use probe_rs::probe::list::{Accessibility, Lister, ProbeListItem};
+use probe_rs::probe::{DebugProbeError, DebugProbeInfo};
+use probe_rs::{Permissions, Session};
+use std::fmt;
+use std::io::Cursor;
+use thiserror::Error;
+
+/// A debug probe that is plugged in.
+#[derive(Debug, Clone)]
+pub struct Probe {
+    info: DebugProbeInfo,
+    permitted: bool,
+}
+
+impl From<ProbeListItem> for Probe {
+    fn from(item: ProbeListItem) -> Self {
+        Self { info: item.info, permitted: item.accessibility == Accessibility::Accessible }
+    }
+}
+
+impl Probe {
+    /// `VID:PID:SERIAL`, which names it among others.
+    fn selector(&self) -> String {
+        let DebugProbeInfo { vendor_id, product_id, serial_number, .. } = &self.info;
+        format!("{vendor_id:04x}:{product_id:04x}:{}", serial_number.as_deref().unwrap_or(""))
+    }
+}
+
+impl fmt::Display for Probe {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}  {}", self.selector(), self.info.identifier)?;
+        if self.permitted { Ok(()) } else { f.write_str("  (no permission)") }
+    }
+}
+
+/// Why a board was not flashed.
+#[derive(Debug, Error)]
+pub enum FlashingError {
+    /// No probe at all.
+    #[error(
+        "no debug probe: is the board's ST-LINK connector plugged in, with a cable that carries data?"
+    )]
+    NoProbe,
+    /// None of that name.
+    #[error("no debug probe {wanted}; there is {there}")]
+    NoSuchProbe {
+        /// What was asked for.
+        wanted: String,
+        /// What is there.
+        there: String,
+    },
+    /// More than one.
+    #[error("several debug probes, name one with --probe: {0}")]
+    SeveralProbes(String),
+    /// The system does not let this user.
+    #[error(
+        "no permission to use debug probe {0}: on Linux install probe-rs' udev rules, \
+         https://probe.rs/docs/getting-started/probe-setup"
+    )]
+    Permission(String),
+    /// The probe does not work.
+    #[error("the debug probe cannot be used: {0}")]
+    Probe(#[from] DebugProbeError),
+    /// The chip does not answer, or is another one.
+    #[error("no {chip} answers: is the board powered, and is it this board? {source}")]
+    Attach {
+        /// The chip looked for.
+        chip: String,
+        /// What probe-rs says.
+        source: Box<probe_rs::Error>,
+    },
+    /// Not firmware of this chip.
+    #[error("not firmware for this chip: {0}")]
+    Image(#[from] FileDownloadError),
+    /// Erasing, writing or comparing failed.
+    #[error("not written: {0}; flash it again before use")]
+    Write(#[from] FlashError),
+    /// It was written and could not be started.
+    #[error("written and verified, but not started: {0}; press the board's reset button")]
+    Reset(Box<probe_rs::Error>),
+}
+
+/// How far flashing has come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Step {
+    /// Something begins that goes over this many bytes.
+    Begins {
+        /// What, in a word.
+        what: &'static str,
+        /// Bytes in all.
+        bytes: u64,
+    },
+    /// So many bytes more are done.
+    Done {
+        /// How many.
+        bytes: u64,
+    },
+}
+
+/// The debug probes that are plugged in.
+#[must_use]
+pub fn probes() -> Vec<Probe> {
+    Lister::new().list_all_with_access().into_iter().map(Probe::from).collect()
+}
+
+/// The probe that is meant: that of `VID:PID:SERIAL` or serial number `wanted`, or the only one.
+///
+/// # Errors
+/// [`FlashingError`] naming what is there.
+pub fn choose<'p>(probes: &'p [Probe], wanted: Option<&str>) -> Result<&'p Probe, FlashingError> {
+    let there = || probes.iter().map(Probe::selector).collect::<Vec<_>>().join(", ");
+    let meant = |probe: &&Probe| {
+        wanted.is_none_or(|wanted| {
+            probe.selector() == wanted.to_lowercase()
+                || probe.selector() == wanted
+                || probe.info.serial_number.as_deref() == Some(wanted)
+        })
+    };
+    let mut candidates = probes.iter().filter(meant);
+    let chosen = match (candidates.next(), candidates.next(), wanted) {
+        (Some(probe), None, _) => probe,
+        (Some(_), Some(_), _) => return Err(FlashingError::SeveralProbes(there())),
+        (None, _, Some(wanted)) if !probes.is_empty() => {
+            return Err(FlashingError::NoSuchProbe { wanted: wanted.to_owned(), there: there() });
+        }
+        (None, ..) => return Err(FlashingError::NoProbe),
+    };
+    if chosen.permitted { Ok(chosen) } else { Err(FlashingError::Permission(chosen.selector())) }
+}
+
+/// Writes `elf` into the chip behind `probe`, compares, and starts it.
+///
+/// # Errors
+/// [`FlashingError`], which says what to do about it.
+pub fn flash(
+    probe: &Probe,
+    chip: &str,
+    elf: &[u8],
+    tell: &mut dyn FnMut(Step),
+) -> Result<(), FlashingError> {
+    let mut session = attach(probe, chip)?;
+    let mut loader = session.target().flash_loader();
+    let format = image_format("elf")
+        .ok_or(FileDownloadError::Object("this build of probe-rs reads no ELF files"))?;
+    loader.load_image(&mut session, &mut Cursor::new(elf), format.create_loader(None), None)?;
+    let mut options = DownloadOptions::new();
+    options.verify = true;
+    options.progress = FlashProgress::new(|event| {
+        tell_step(&event).into_iter().for_each(&mut *tell);
+    });
+    loader.commit(&mut session, options)?;
+    let reset = session.core(0).and_then(|mut core| core.reset());
+    reset.map_err(|error| FlashingError::Reset(Box::new(error)))
+}
+
+/// Attaches; under reset if the firmware that runs now does not let the probe in.
+fn attach(probe: &Probe, chip: &str) -> Result<Session, FlashingError> {
+    match probe.info.open()?.attach(chip, Permissions::default()) {
+        Ok(session) => Ok(session),
+        Err(_) => {
+            probe.info.open()?.attach_under_reset(chip, Permissions::default()).map_err(|source| {
+                FlashingError::Attach { chip: chip.to_owned(), source: Box::new(source) }
+            })
+        }
+    }
+}
+
+fn tell_step(event: &ProgressEvent) -> Option<Step> {
+    match event {
+        ProgressEvent::AddProgressBar { operation, total } => {
+            let what = match operation {
+                ProgressOperation::Fill => "reading",
+                ProgressOperation::Erase => "erasing",
+                ProgressOperation::Program => "writing",
+                ProgressOperation::Verify => "comparing",
+            };
+            Some(Step::Begins { what, bytes: total.unwrap_or(0) })
+        }
+        ProgressEvent::Progress { size, .. } => Some(Step::Done { bytes: *size }),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn without_a_probe_there_is_one_line_on_what_to_check() {
+        for wanted in [None, Some("0483:374e:1")] {
+            let message = choose(&[], wanted).unwrap_err().to_string();
+            assert!(message.contains("ST-LINK") && message.lines().count() == 1, "{message}");
+        }
+    }
+}

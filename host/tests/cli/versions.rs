@@ -1,0 +1,49 @@
+//! `nirspi info` and `nirspi devices`: who is there, and whether it fits.
+
+use crate::bench::Bench;
+
+#[test]
+fn the_virtual_camera_is_of_this_version_and_needs_nothing() {
+    let bench = Bench::new();
+    let report = bench.run(&["info", "--camera", "virtual", "--json"]).succeeded().json();
+    assert_eq!(report["camera"]["firmware"], env!("CARGO_PKG_VERSION"));
+    let parts = report["parts"].as_array().unwrap();
+    let names: Vec<_> = parts.iter().map(|part| part["name"].as_str().unwrap()).collect();
+    assert_eq!(names, ["protocol", "firmware", "gateware", "register map"]);
+    assert!(parts.iter().all(|part| part["compared"] == "same"), "{report}");
+    assert_eq!(
+        (&report["fpga_answers"], &report["interlock_closed"]),
+        (&true.into(), &true.into())
+    );
+
+    let said = bench.run(&["info"]).succeeded().stdout;
+    assert!(said.starts_with("virtual virtual-1\n") && said.contains("interlock closed"), "{said}");
+    assert_eq!(said.matches("as expected").count(), 4, "{said}");
+}
+
+#[test]
+fn a_camera_that_is_not_on_usb_is_one_line() {
+    let bench = Bench::new();
+    let camera = "usb:no-such-serial-number";
+    // Words that hold with no USB at all, too.
+    bench.run(&["capture", "--camera", camera, "--frames", "1"]).failed(1, &["USB"]);
+    assert!(bench.names().is_empty());
+}
+
+#[cfg(not(feature = "flash"))]
+#[test]
+fn a_build_that_cannot_flash_says_how_to_get_one_that_can() {
+    let bench = Bench::new();
+    let words = ["--features flash", "probe-rs run"];
+    bench.run(&["flash", "--board", "nucleo-u5a5zj-q"]).failed(1, &words);
+    bench.run(&["flash", "--list"]).failed(1, &words);
+}
+
+#[cfg(feature = "flash")]
+#[test]
+fn a_missing_firmware_file_says_how_to_build_it() {
+    let bench = Bench::new();
+    let flash = ["flash", "--board", "nucleo-u5a5zj-q"];
+    bench.run(&flash).failed(1, &["boards/target", "cd boards/nucleo-u5a5zj-q && cargo build"]);
+    bench.run(&["flash", "--list"]).succeeded();
+}
