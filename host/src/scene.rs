@@ -1,4 +1,4 @@
-//! What the virtual camera looks at: a letter target, or a picture.
+//! What the virtual camera looks at: a letter target, a white sheet, or a picture.
 //!
 //! The law: a scene is a square map of reflectance in `[0, 1]`, 1 bright, row-major, top row first.
 
@@ -18,12 +18,18 @@ pub const LETTER_SIDE_MM: f64 = 43.0;
 const GLYPH_FILL: f32 = 0.9;
 /// How a letter scene is written on the command line.
 const LETTER_PREFIX: &str = "letter:";
+/// How a white sheet is written.
+const WHITE: &str = "white";
+/// White paper at 1550 nm reflects about this much.
+const WHITE_REFLECTANCE: f32 = 0.9;
 
-/// Where a scene comes from: `letter:R`, or the path of a PNG.
+/// Where a scene comes from: `letter:R`, `white`, or the path of a PNG.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum SceneSource {
     /// One bright character on a dark target.
     Letter(char),
+    /// A sheet that fills the field of view, for self-tests.
+    White,
     /// A PNG, whose grey levels are taken as reflectance.
     File(PathBuf),
 }
@@ -37,7 +43,7 @@ pub struct SceneMap {
     pub size_px: usize,
     /// `size_px * size_px` reflectances in `[0, 1]`, row-major.
     pub reflectance: Vec<f32>,
-    /// Edge of the target in millimetres; a picture has none and fills the field of view.
+    /// Edge of the target in millimetres; a sheet or picture has none and fills the field of view.
     pub side_mm: Option<f64>,
 }
 
@@ -46,7 +52,7 @@ pub struct SceneMap {
 #[non_exhaustive]
 pub enum SceneError {
     /// No scene was named.
-    #[error("scene: found nothing, expected letter:R or the path of a PNG image")]
+    #[error("scene: found nothing, expected letter:R, white or the path of a PNG image")]
     Empty,
     /// `letter:` was followed by none or several characters.
     #[error(
@@ -79,6 +85,9 @@ impl FromStr for SceneSource {
         if scene.is_empty() {
             return Err(SceneError::Empty);
         }
+        if scene == WHITE {
+            return Ok(Self::White);
+        }
         let Some(text) = scene.strip_prefix(LETTER_PREFIX) else {
             return Ok(Self::File(scene.into()));
         };
@@ -98,6 +107,7 @@ impl fmt::Display for SceneSource {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Letter(character) => write!(f, "{LETTER_PREFIX}{character}"),
+            Self::White => f.write_str(WHITE),
             Self::File(path) => write!(f, "{}", path.display()),
         }
     }
@@ -117,6 +127,12 @@ impl SceneSource {
                 let name = format!("letter {character}");
                 Ok(SceneMap { name, size_px, reflectance, side_mm: Some(LETTER_SIDE_MM) })
             }
+            Self::White => Ok(SceneMap {
+                name: WHITE.to_owned(),
+                size_px,
+                reflectance: vec![WHITE_REFLECTANCE; size_px * size_px],
+                side_mm: None,
+            }),
             Self::File(path) => {
                 let Reflectance { size_px, values: reflectance } =
                     shrink(read_reflectance(path)?, size_px);
@@ -160,6 +176,8 @@ mod tests {
     fn a_letter_is_a_43_mm_target_bright_on_dark() {
         let scene = "letter:R".parse::<SceneSource>().unwrap();
         assert_eq!((&scene, scene.to_string().as_str()), (&SceneSource::Letter('R'), "letter:R"));
+        let sheet = "white".parse::<SceneSource>().unwrap();
+        assert_eq!((&sheet, sheet.to_string().as_str()), (&SceneSource::White, "white"));
         let map = scene.load(64).unwrap();
         assert_eq!((map.name.as_str(), map.size_px, map.side_mm), ("letter R", 64, Some(43.0)));
         assert_eq!(map.reflectance.len(), 64 * 64);
@@ -171,7 +189,10 @@ mod tests {
 
     #[test]
     fn scenes_that_do_not_exist_get_a_line() {
-        assert_eq!(line(""), "scene: found nothing, expected letter:R or the path of a PNG image");
+        assert_eq!(
+            line(""),
+            "scene: found nothing, expected letter:R, white or the path of a PNG image"
+        );
         assert_eq!(
             line("letter:"),
             "scene \"letter:\": found 0 characters after `letter:`, expected one, as in letter:R"

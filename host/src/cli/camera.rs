@@ -18,7 +18,7 @@ const SCENE_PX: usize = 256;
 /// What stands before a virtual camera.
 #[derive(Debug, Clone, Args)]
 pub struct SceneArgs {
-    /// What the virtual camera looks at: letter:R (43 mm, bright on dark) or a PNG file (fills the field)
+    /// What the virtual camera looks at: letter:R (43 mm, bright on dark), white (a sheet) or a PNG file (fills the field)
     #[arg(long, value_name = "SCENE", default_value = "letter:R")]
     pub scene: String,
     /// Distance from the virtual camera to the target, in metres

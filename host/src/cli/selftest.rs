@@ -21,6 +21,7 @@ const LINK_DURATION: Duration = Duration::from_secs(1);
 /// Point it at something bright and evenly lit, such as white paper. `nirspi capture` then uses the calibration. Exit
 /// code 1 if a check has failed.
 #[derive(Debug, clap::Args)]
+#[command(mut_arg("scene", |scene| scene.default_value("white")))]
 #[command(after_help = "Examples:\n\
     \x20 nirspi selftest --camera usb\n\
     \x20 nirspi selftest --camera virtual --json")]

@@ -11,8 +11,9 @@
 use super::check::{Check, Limit};
 use super::stream::shots;
 use crate::session::{Session, SessionError};
-use nirspi_recon::fwht;
+use nirspi_recon::{FwhtLengthError, fwht};
 use nirspi_wire::{Configuration, PATTERNS, PatternOrder, SIDE, SampleSource};
+use std::fmt;
 
 /// Names of the checks.
 pub const NAMES: [&str; 2] = [LINES, SUMS];
@@ -79,10 +80,13 @@ pub fn check(
     else {
         return Ok(NAMES.map(|name| Check::told(name, false, "no frame came")).to_vec());
     };
-    let dead = dead_lines(&pairs);
-    let lines = Check::measured(LINES, dead.len() as f64, "without light", Limit::Exactly(0.0));
-    if !dead.is_empty() {
-        let note = format!("{}: stuck, broken, or the target is dark there", dead.join(", "));
+    // Means are of all patterns, a power of two.
+    let Ok(dead) = dead_lines(&pairs) else {
+        return Ok(NAMES.map(|name| Check::told(name, false, "not all patterns came")).to_vec());
+    };
+    let lines = Check::measured(LINES, dead.count() as f64, "without light", Limit::Exactly(0.0));
+    if dead.count() > 0 {
+        let note = format!("{dead}: stuck, broken, or the target is dark there");
         return Ok(vec![lines.noting(&note), Check::skipped(SUMS, "needs all lines")]);
     }
     // Four readings twice or as a difference: P and P - N, of the pattern and of pattern 0.
@@ -90,19 +94,59 @@ pub fn check(
     Ok(vec![lines.noting("64 lines follow their patterns"), supply(&single, &pairs, noise)])
 }
 
-/// Lines whose LEDs' light does not follow them.
-fn dead_lines(pairs: &[f64]) -> Vec<String> {
+fn dead_lines(pairs: &[f64]) -> Result<DeadLines, FwhtLengthError> {
     let side = usize::from(SIDE);
     let mut leds = pairs.to_vec();
-    if fwht(&mut leds).is_err() {
-        return Vec::new();
-    }
+    fwht(&mut leds)?;
     let row = |r: usize| -> f64 { leds.iter().skip(r * side).take(side).sum() };
     let column = |c: usize| -> f64 { leds.iter().skip(c).step_by(side).sum() };
     let least = MIN_LINE_SHARE * leds.iter().sum::<f64>() / side as f64;
-    let rows = (0..side).filter(|&r| row(r) < least).map(|r| format!("row line {r}"));
-    let columns = (0..side).filter(|&c| column(c) < least).map(|c| format!("column line {c}"));
-    rows.chain(columns).collect()
+    let rows: Vec<usize> = (0..side).filter(|&r| row(r) < least).collect();
+    let columns: Vec<usize> = (0..side).filter(|&c| column(c) < least).collect();
+    Ok(DeadLines { rows, columns })
+}
+
+/// Lines whose LEDs' light does not follow them.
+#[derive(Debug, PartialEq, Eq)]
+struct DeadLines {
+    rows: Vec<usize>,
+    columns: Vec<usize>,
+}
+
+impl DeadLines {
+    fn count(&self) -> usize {
+        self.rows.len() + self.columns.len()
+    }
+}
+
+impl fmt::Display for DeadLines {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let kinds = [("row", &self.rows), ("column", &self.columns)];
+        let named: Vec<String> = kinds
+            .iter()
+            .filter(|(_, lines)| !lines.is_empty())
+            .map(|(kind, lines)| {
+                let plural = if lines.len() == 1 { "" } else { "s" };
+                format!("{kind} line{plural} {}", ranges(lines))
+            })
+            .collect();
+        f.write_str(&named.join(", "))
+    }
+}
+
+/// `0-2, 29` of 0, 1, 2, 29.
+fn ranges(ascending: &[usize]) -> String {
+    let mut runs: Vec<(usize, usize)> = Vec::new();
+    for &line in ascending {
+        match runs.last_mut() {
+            Some((_, last)) if *last + 1 == line => *last = line,
+            _ => runs.push((line, line)),
+        }
+    }
+    let run = |&(first, last): &(usize, usize)| {
+        if first == last { first.to_string() } else { format!("{first}-{last}") }
+    };
+    runs.iter().map(run).collect::<Vec<_>>().join(", ")
 }
 
 /// Whether pattern and complement together give the light of pattern 0. `noise` is that of their sum, in counts.
@@ -132,4 +176,44 @@ fn supply(single: &[f64], pairs: &[f64], noise: f64) -> Check {
     let percent = |share: f64| (share * 1e4).round() / 100.0;
     let limit = Limit::AtMost(percent(limit));
     Check::measured(SUMS, percent(worst.abs()), "% off pattern 0", limit).noting(&note)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nirspi_wire::walsh::{lit, pattern};
+
+    /// Differences of an evenly lit array whose lines are changed by `wiring`.
+    fn pairs(wiring: impl Fn(u32, u32) -> (u32, u32)) -> Vec<f64> {
+        let light = |k: u16, complement: bool| -> f64 {
+            let (rows, columns) = pattern(k, complement);
+            let (rows, columns) = wiring(rows, columns);
+            let leds = (0..SIDE).flat_map(|r| (0..SIDE).map(move |c| (r, c)));
+            leds.filter(|&(r, c)| lit(rows, columns, r, c)).count() as f64
+        };
+        (0..PATTERNS).map(|k| light(k, false) - light(k, true)).collect()
+    }
+
+    #[test]
+    fn each_line_is_missed_when_it_is_stuck_and_no_other() {
+        assert_eq!(dead_lines(&pairs(|r, c| (r, c))).unwrap().count(), 0);
+        for line in [0, 1, 16, 31] {
+            for stuck in [0, 1] {
+                let hold = |lines: u32| lines & !(1 << line) | stuck << line;
+                let dead = dead_lines(&pairs(|r, c| (hold(r), c))).unwrap();
+                assert_eq!(dead.to_string(), format!("row line {line}"), "stuck at {stuck}");
+                // Column line 0 never changes: held where it is, nothing is wrong.
+                let dead = dead_lines(&pairs(|r, c| (r, hold(c)))).unwrap();
+                let expected = if (line, stuck) == (0, 0) { vec![] } else { vec![line] };
+                assert!(expected.iter().all(|line| dead.columns.contains(line)), "{dead:?}");
+                assert!(dead.rows.is_empty() && dead.columns.len() <= 2, "{dead:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn many_lines_are_named_in_ranges() {
+        let dead = DeadLines { rows: vec![0, 1, 2, 29], columns: vec![7] };
+        assert_eq!(dead.to_string(), "row lines 0-2, 29, column line 7");
+    }
 }
