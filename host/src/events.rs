@@ -1,16 +1,12 @@
-//! What a camera reports unasked, in words.
+//! What befell a camera while nobody listened, in words: it reports that right after the greeting.
 
 use nirspi_wire::EventKind;
 
-/// One event, as people read it.
+/// One such event, as people read it; `None` for what an earlier host has left behind.
 #[must_use]
-pub fn in_words(kind: &EventKind) -> String {
+pub fn at_greeting(kind: &EventKind) -> Option<String> {
     match kind {
-        EventKind::Fault(fault) => format!("the camera switched its LEDs off: {fault:?}"),
-        EventKind::RunEnded { run, frames_made, .. } => {
-            format!("run {run} has ended after {frames_made} frames")
-        }
-        EventKind::RawDropped => "a raw burst was dropped: the link had no room".to_owned(),
-        EventKind::CommandDamaged => "the camera got bytes that were no command".to_owned(),
+        EventKind::Fault(fault) => Some(format!("the camera switched its LEDs off: {fault:?}")),
+        EventKind::RunEnded { .. } | EventKind::RawDropped | EventKind::CommandDamaged => None,
     }
 }

@@ -266,7 +266,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.json");
         kept().write(&path).unwrap();
-        let changes: [(&str, &dyn Fn(&mut CameraIdentity)); 4] = [
+        type Change<'c> = (&'c str, &'c dyn Fn(&mut CameraIdentity));
+        let changes: [Change<'_>; 4] = [
             ("serial number A 1", &|camera| camera.serial = "B2".into()),
             ("board virtual", &|camera| camera.board = "nucleo".into()),
             ("gateware 0.1.0", &|camera| camera.gateware = "0.2.0".into()),

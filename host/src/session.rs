@@ -3,6 +3,11 @@
 //! The one law: nothing of the stream is skipped while waiting for an answer; every packet goes to the
 //! listener as it came, damaged ones too.
 
+mod error;
+
+pub use error::SessionError;
+
+use crate::events;
 use crate::link::{Link, Received};
 use nirspi_wire::packet::{MAX_DEVICE_PACKET, MAX_HOST_PACKET, hello_of_any_version};
 use nirspi_wire::register::Register;
@@ -12,7 +17,6 @@ use nirspi_wire::{
 };
 use serde::{Deserialize, Serialize};
 use std::time::{Duration, Instant};
-use thiserror::Error;
 
 /// A camera answers a command within this, or something is wrong.
 pub(crate) const ANSWER_TIMEOUT: Duration = Duration::from_secs(5);
@@ -56,79 +60,6 @@ impl From<&Identity<'_>> for CameraIdentity {
     }
 }
 
-/// Why a conversation ended.
-#[derive(Debug, Error)]
-pub enum SessionError {
-    /// The link failed.
-    #[error("the link to the camera failed: {0}")]
-    Link(#[from] std::io::Error),
-    /// The camera has gone.
-    #[error("the camera closed the link{}", if *.mid_packet { " in the middle of a packet" } else { "" })]
-    Closed {
-        /// Whether part of a packet had come.
-        mid_packet: bool,
-    },
-    /// The camera has gone before it said who it is.
-    #[error(
-        "the link was closed instead of a greeting: another host has the camera, or this is none"
-    )]
-    TurnedAway,
-    /// The two sides speak different versions.
-    #[error(
-        "the camera speaks protocol version {camera}, this program version {PROTOCOL_VERSION}: update {}",
-        if *.camera > PROTOCOL_VERSION { "this program" } else { "the camera's firmware" }
-    )]
-    Version {
-        /// The camera's.
-        camera: u16,
-    },
-    /// The camera would not do it.
-    #[error("the camera refused {command}: {}", refusal_in_words(.refusal))]
-    Refused {
-        /// What it was asked to do.
-        command: &'static str,
-        /// Why not.
-        refusal: Refusal,
-    },
-    /// No answer.
-    #[error(
-        "no answer to {command} within {} s{}",
-        ANSWER_TIMEOUT.as_secs(),
-        if *.command == HELLO { ": is this a nirspi camera?" } else { "" }
-    )]
-    NoAnswer {
-        /// What was asked.
-        command: &'static str,
-    },
-    /// An answer that belongs to another command.
-    #[error("the camera answered {command} with something else")]
-    WrongAnswer {
-        /// What was asked.
-        command: &'static str,
-    },
-}
-
-fn refusal_in_words(refusal: &Refusal) -> String {
-    use nirspi_wire::ConfigProblem;
-    match refusal {
-        Refusal::Protocol { device } => format!("it speaks protocol version {device}"),
-        Refusal::State(state) => format!("it is {state:?}"),
-        Refusal::Configuration(ConfigProblem::OutOfRange { field, found, min, max }) => {
-            format!("{field:?} is {found}, expected {min} to {max}")
-        }
-        Refusal::Configuration(ConfigProblem::OrderEntry { index, found }) => {
-            format!("entry {index} of the order, {found}, is repeated or no pattern")
-        }
-        Refusal::Fault(fault) => format!("a fault stands, {fault:?}"),
-        Refusal::NoSuchRegister { address } => format!("there is no register {address:#06x}"),
-        Refusal::RawLength { max } => format!("a raw burst has 1 to {max} samples"),
-        Refusal::GatewareOffset { expected } => format!("it expected the piece at {expected}"),
-        Refusal::GatewareCrc => "the gateware's checksum is wrong".to_owned(),
-        Refusal::Unsupported => "this board cannot do that".to_owned(),
-        Refusal::Bus => "its FPGA does not answer".to_owned(),
-    }
-}
-
 /// Hears every packet of a session.
 pub trait Listener {
     /// A packet came. `raw` is as it stood on the wire, delimiter included.
@@ -141,6 +72,24 @@ pub struct Deaf;
 
 impl Listener for Deaf {
     fn packet(&mut self, _: &[u8], _: &Result<DeviceMessage<'_>, PacketError>) {}
+}
+
+/// Keeps what a camera reports with its greeting, in words.
+#[derive(Debug, Default)]
+pub struct Reports(pub Vec<String>);
+
+impl Listener for Reports {
+    fn packet(&mut self, _: &[u8], content: &Result<DeviceMessage<'_>, PacketError>) {
+        match content {
+            Ok(DeviceMessage::Event(event)) => self.0.extend(events::at_greeting(&event.kind)),
+            // Intact, and yet no message: of a version that has more to say.
+            Err(PacketError::Message) => self.0.push(
+                "the camera reported something that this program does not know: update it"
+                    .to_owned(),
+            ),
+            _ => {}
+        }
+    }
 }
 
 /// An answer without borrowed parts.
@@ -176,6 +125,7 @@ pub struct Session {
     incoming: Incoming,
     next_id: u16,
     identity: CameraIdentity,
+    reports: Vec<String>,
 }
 
 /// Bytes on their way to packets.
@@ -246,11 +196,14 @@ impl Session {
                 adc_bits: 0,
                 wavelength_nm: 0,
             }),
+            reports: Vec::new(),
         };
+        let mut reports = Reports::default();
         let hello = Command::Hello { protocol: PROTOCOL_VERSION };
-        match session.ask(HELLO, hello, &mut Deaf) {
+        match session.ask(HELLO, hello, &mut reports) {
             Ok(OwnedAnswer::Hello(identity)) if identity.protocol == PROTOCOL_VERSION => {
                 session.identity = identity;
+                session.reports = reports.0;
                 Ok(session)
             }
             Ok(OwnedAnswer::Hello(identity)) => {
@@ -266,6 +219,24 @@ impl Session {
     #[must_use]
     pub fn identity(&self) -> &CameraIdentity {
         &self.identity
+    }
+
+    /// What the camera has reported with its greeting: what befell it while nobody listened, in words.
+    #[must_use]
+    pub fn reports(&self) -> &[String] {
+        &self.reports
+    }
+
+    /// Waits until all that the camera had to report with its greeting has come.
+    ///
+    /// # Errors
+    /// As [`command`](Self::command).
+    pub fn await_reports(&mut self) -> Result<&[String], SessionError> {
+        // Reports come before the answer to the next command.
+        let mut reports = Reports(std::mem::take(&mut self.reports));
+        let answered = self.status(&mut reports);
+        self.reports = reports.0;
+        answered.map(|_| self.reports())
     }
 
     fn send(&mut self, command: Command<'_>) -> Result<u16, SessionError> {
@@ -404,3 +375,6 @@ impl Session {
         self.send(Command::Status).map(|_| ())
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,6 +1,7 @@
 //! `--camera`: which camera is meant, and how to reach it.
 
 use super::camera::SceneArgs;
+use super::print;
 use anyhow::{Context, Result};
 use nirspi::link::{DEFAULT_BAUD, Link, SerialLink, TcpLink, UsbLink};
 use nirspi::session::Session;
@@ -61,8 +62,18 @@ impl fmt::Display for CameraAddress {
 }
 
 impl CameraAddress {
-    /// Opens a conversation with the camera. `scene` is what a virtual one looks at.
+    /// Opens a conversation with the camera, and says on stderr what befell it while nobody listened. `scene` is what
+    /// a virtual one looks at.
     pub fn open(&self, scene: &SceneArgs) -> Result<Session> {
+        let mut session = self.open_quietly(scene)?;
+        for report in session.await_reports().with_context(|| self.to_string())? {
+            print::complain(format_args!("before this, {report}"));
+        }
+        Ok(session)
+    }
+
+    /// The same without a word.
+    pub fn open_quietly(&self, scene: &SceneArgs) -> Result<Session> {
         let link: Box<dyn Link> = match self {
             Self::Virtual => {
                 let (_, optics) = scene.optics()?;

@@ -4,17 +4,12 @@ use super::address::CameraAddress;
 use super::camera::SceneArgs;
 use super::print;
 use anyhow::Result;
-use nirspi::events;
-use nirspi::session::{CameraIdentity, Listener, Session, SessionError};
+use nirspi::session::{CameraIdentity, Reports, Session, SessionError};
 use nirspi::versions::{Part, compare};
+use nirspi_wire::Status;
 use nirspi_wire::register::{IDENTITY, Register};
-use nirspi_wire::{DeviceMessage, PacketError, Status};
 use serde::Serialize;
 use std::process::ExitCode;
-use std::time::Duration;
-
-/// What a camera has to report unasked, it reports right after the greeting.
-const REPORTS: Duration = Duration::from_millis(100);
 
 /// Show a camera's identity and versions, and what to update
 #[derive(Debug, clap::Args)]
@@ -42,34 +37,15 @@ struct Report<'r> {
     /// `null` where the sensor does not answer.
     temperature_celsius: Option<f64>,
     interlock_closed: bool,
-    events: Vec<String>,
-}
-
-/// Keeps what the camera reports unasked.
-#[derive(Default)]
-struct Events(Vec<String>);
-
-impl Listener for Events {
-    fn packet(&mut self, _: &[u8], content: &Result<DeviceMessage<'_>, PacketError>) {
-        match content {
-            Ok(DeviceMessage::Event(event)) => self.0.push(events::in_words(&event.kind)),
-            // An event of a newer protocol, perhaps.
-            Err(PacketError::Message) => {
-                self.0.push(
-                    "the camera reports something that this program does not know".to_owned(),
-                );
-            }
-            _ => {}
-        }
-    }
+    /// What befell the camera while nobody listened.
+    reports: Vec<String>,
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let mut session = args.camera.open(&args.scene)?;
-    let mut events = Events::default();
-    session.listen(REPORTS, &mut events)?;
-    let (identity_register, map) = registers(&mut session, &mut events)?;
-    let status = session.status(&mut events)?;
+    let mut session = args.camera.open_quietly(&args.scene)?;
+    let mut reports = Reports(session.reports().to_vec());
+    let (identity_register, map) = registers(&mut session, &mut reports)?;
+    let status = session.status(&mut reports)?;
     let fpga_answers = identity_register == Some(IDENTITY);
     let camera = session.identity();
     let parts = compare(camera, map.filter(|_| fpga_answers));
@@ -84,7 +60,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         uptime_s: status.uptime_us as f64 * 1e-6,
         temperature_celsius: temperature(&status),
         interlock_closed: status.interlock_closed,
-        events: events.0,
+        reports: reports.0,
     };
     if args.json {
         print::json(&report)?;
@@ -97,9 +73,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 /// What the FPGA's identity and version registers read; nothing where it does not answer.
 fn registers(
     session: &mut Session,
-    events: &mut Events,
+    reports: &mut Reports,
 ) -> Result<(Option<u32>, Option<u32>), SessionError> {
-    let mut read = |register| match session.register(register, events) {
+    let mut read = |register| match session.register(register, reports) {
         Ok(value) => Ok(Some(value)),
         Err(SessionError::Refused { .. }) => Ok(None),
         Err(error) => Err(error),
@@ -133,5 +109,5 @@ fn say(report: &Report<'_>) -> Result<()> {
     if !report.fpga_answers {
         print::line("the FPGA does not answer: is it powered, and is its gateware loaded?")?;
     }
-    report.events.iter().try_for_each(print::line)
+    report.reports.iter().try_for_each(print::line)
 }

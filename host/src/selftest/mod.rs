@@ -112,7 +112,7 @@ pub fn run(
             checks.extend(leds::NAMES.map(|name| Check::skipped(name, "needs the ADC latency")));
         }
         (None, _) => {
-            checks.extend(leds::NAMES.map(|name| Check::skipped(name, "too little light")))
+            checks.extend(leds::NAMES.map(|name| Check::skipped(name, "too little light")));
         }
     }
     begin(5);

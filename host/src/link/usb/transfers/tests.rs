@@ -188,8 +188,7 @@ fn a_stall_in_the_middle_of_a_transfer_keeps_its_bytes() {
 #[test]
 fn an_endpoint_that_keeps_stalling_is_an_error() {
     let stall = Ends::Badly(vec![], TransferProblem::Stalled);
-    let mut script = Script::default();
-    script.steps = vec![stall; 64].into();
+    let script = Script { steps: vec![stall; 64].into(), ..Script::default() };
     // One transfer, so that every stall is a stall of its own.
     let mut stream = InStream::new(script, buffers(1));
     let (all, end) = drain(&mut stream, 64);
