@@ -17,6 +17,7 @@ mod reconstruct;
 mod report;
 mod selftest;
 mod serve_virtual;
+mod setup;
 
 use clap::{Parser, Subcommand};
 use nirspi::files::FileError;
@@ -43,6 +44,7 @@ enum Command {
     Info(info::Args),
     Selftest(selftest::Args),
     Flash(flash::Args),
+    Setup(setup::Args),
     Metrics(metrics::Args),
 }
 
@@ -74,6 +76,7 @@ pub fn run() -> ExitCode {
         Command::Info(args) => info::run(&args),
         Command::Selftest(args) => selftest::run(&args),
         Command::Flash(args) => flash::run(&args),
+        Command::Setup(args) => setup::run(&args),
         Command::Metrics(args) => metrics::run(&args),
     };
     match result {

@@ -30,6 +30,20 @@ fn a_camera_that_is_not_on_usb_is_one_line() {
     assert!(bench.names().is_empty());
 }
 
+#[cfg(target_os = "linux")]
+#[test]
+fn the_udev_rule_is_installed_checked_and_removed() {
+    let bench = Bench::new();
+    std::fs::create_dir(bench.path("rules.d")).unwrap();
+    let setup = |more: &[&str]| bench.run(&[&["setup", "--rules-dir", "rules.d"], more].concat());
+    assert_eq!(setup(&["--check"]).code, Some(1));
+    setup(&[]).succeeded();
+    setup(&["--check"]).succeeded();
+    assert!(bench.path("rules.d/60-nirspi.rules").exists());
+    setup(&["--uninstall"]).succeeded();
+    assert_eq!(setup(&["--check"]).code, Some(1));
+}
+
 #[cfg(not(feature = "flash"))]
 #[test]
 fn a_build_that_cannot_flash_says_how_to_get_one_that_can() {

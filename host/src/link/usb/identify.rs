@@ -171,8 +171,7 @@ fn none(wanted: Option<&str>, there: &[String]) -> String {
 /// What to do about a missing permission.
 fn permission_hint(linux: bool) -> &'static str {
     if linux {
-        ": sudo cp boards/<board>/70-nirspi.rules /etc/udev/rules.d/ && sudo udevadm control --reload && sudo udevadm \
-         trigger"
+        ": sudo nirspi setup, which installs the udev rule (boards/<board>/60-nirspi.rules)"
     } else {
         ""
     }
@@ -247,7 +246,7 @@ mod tests {
 
     #[test]
     fn a_missing_permission_names_the_udev_rule() {
-        assert!(permission_hint(true).contains("70-nirspi.rules"));
+        assert!(permission_hint(true).contains("60-nirspi.rules"));
         let error = UsbError::Permission { camera: "usb:A1".to_owned() }.to_string();
         assert!(error.starts_with("no permission to open usb:A1"), "{error}");
     }

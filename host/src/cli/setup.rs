@@ -1,0 +1,82 @@
+//! `nirspi setup`: what a machine needs before a camera on USB can be used.
+
+use super::{Usage, print};
+use anyhow::Result;
+use nirspi::udev::{Installed, RULE_NAME, RULES_DIR, RuleError, check, install, uninstall};
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode, Stdio};
+
+/// Let this machine's users use cameras on USB
+///
+/// On Linux this installs a udev rule, once, and needs root. Nothing has to be done on other systems.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n\
+    \x20 nirspi setup --check\n\
+    \x20 sudo nirspi setup")]
+pub struct Args {
+    /// Only say whether the rule is installed; exit code 1 if not
+    #[arg(long)]
+    check: bool,
+    /// Remove the rule
+    #[arg(long, conflicts_with = "check")]
+    uninstall: bool,
+    /// Where udev rules lie
+    #[arg(long, value_name = "DIR", default_value = RULES_DIR)]
+    rules_dir: PathBuf,
+}
+
+pub fn run(args: &Args) -> Result<ExitCode> {
+    if !cfg!(target_os = "linux") {
+        print::line("nothing to set up: this system needs no rule for USB")?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let folder = &args.rules_dir;
+    if !folder.is_dir() {
+        return Err(Usage(format!("--rules-dir {}: no such folder", folder.display())).into());
+    }
+    let path = folder.join(RULE_NAME);
+    let path = path.display();
+    if args.check {
+        let (text, code) = match check(folder)? {
+            Installed::Yes => (format!("{path} is installed"), ExitCode::SUCCESS),
+            Installed::Other => {
+                (format!("{path} is of another version: sudo nirspi setup"), ExitCode::FAILURE)
+            }
+            Installed::No => {
+                (format!("{path} is not installed: sudo nirspi setup"), ExitCode::FAILURE)
+            }
+        };
+        print::line(text)?;
+        return Ok(code);
+    }
+    let (changed, said) = if args.uninstall {
+        (uninstall(folder).map_err(explain)?, ["removed", "was not there"])
+    } else {
+        (install(folder).map_err(explain)?, ["installed", "was installed already"])
+    };
+    print::line(format_args!("{path} {}", said[usize::from(!changed)]))?;
+    if changed && folder == Path::new(RULES_DIR) && !reload() {
+        print::line("udev was not told: plug the camera in again, or restart the machine")?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// What to do about a missing permission.
+fn explain(error: RuleError) -> anyhow::Error {
+    if !error.is_permission() {
+        return error.into();
+    }
+    // Root's PATH may not have it.
+    let program = std::env::current_exe().unwrap_or_else(|_| PathBuf::from("nirspi"));
+    anyhow::anyhow!("{error}: sudo {} setup", program.display())
+}
+
+/// Has udev read its rules again and look at what is plugged in.
+fn reload() -> bool {
+    let udevadm = |arguments: &[&str]| {
+        let mut command = Command::new("udevadm");
+        let command = command.args(arguments).stdout(Stdio::null()).stderr(Stdio::null());
+        command.status().is_ok_and(|status| status.success())
+    };
+    udevadm(&["control", "--reload"]) && udevadm(&["trigger", "--subsystem-match=usb"])
+}

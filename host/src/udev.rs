@@ -1,0 +1,174 @@
+//! Linux: the udev rule that lets whoever sits at the machine use a camera on USB.
+//!
+//! The one law: a file that is not ours is neither replaced nor removed.
+
+use crate::files::FileError;
+use crate::files::output::write_atomic;
+use nirspi_wire::usb::{PRODUCT, PRODUCT_ID, VENDOR_ID};
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// Where the system's own rules of this machine lie.
+pub const RULES_DIR: &str = "/etc/udev/rules.d";
+/// Name of the rule. `uaccess` acts in `73-seat-late.rules`, so the number must be lower.
+pub const RULE_NAME: &str = "60-nirspi.rules";
+/// Begins every version of the rule.
+const OURS: &str = "# The nirspi camera";
+
+/// The rule.
+#[must_use]
+pub fn rule() -> String {
+    format!(
+        "{OURS} (mcu/wire/src/usb.rs): whoever sits at this machine may use it. 60: before 73-seat-late.rules.\n\
+         SUBSYSTEM==\"usb\", ATTR{{idVendor}}==\"{VENDOR_ID:04x}\", ATTR{{idProduct}}==\"{PRODUCT_ID:04x}\", \
+         ATTR{{product}}==\"{PRODUCT}\", TAG+=\"uaccess\"\n"
+    )
+}
+
+/// Whether the rule stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Installed {
+    /// As this version writes it.
+    Yes,
+    /// As another version wrote it.
+    Other,
+    /// Not at all.
+    No,
+}
+
+/// Why the rule was not changed.
+#[derive(Debug, Error)]
+pub enum RuleError {
+    /// Someone else's file has its name.
+    #[error("{0}: not written by nirspi, so left as it is")]
+    Foreign(PathBuf),
+    /// It cannot be read or removed.
+    #[error("{path}: {source}")]
+    Io {
+        /// Which file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// It cannot be written.
+    #[error(transparent)]
+    Write(#[from] FileError),
+}
+
+impl RuleError {
+    /// Whether more rights would help.
+    #[must_use]
+    pub fn is_permission(&self) -> bool {
+        let source = match self {
+            Self::Foreign(_) => return false,
+            Self::Io { source, .. } => Some(source),
+            Self::Write(error) => std::error::Error::source(error)
+                .and_then(|source| source.downcast_ref::<io::Error>()),
+        };
+        source.is_some_and(|source| source.kind() == io::ErrorKind::PermissionDenied)
+    }
+}
+
+/// Whether the rule stands in `folder`.
+///
+/// # Errors
+/// When another file has its name, or it cannot be read.
+pub fn check(folder: &Path) -> Result<Installed, RuleError> {
+    let path = folder.join(RULE_NAME);
+    match fs::read_to_string(&path) {
+        Ok(text) if text == rule() => Ok(Installed::Yes),
+        Ok(text) if text.starts_with(OURS) => Ok(Installed::Other),
+        Ok(_) => Err(RuleError::Foreign(path)),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Installed::No),
+        Err(source) => Err(RuleError::Io { path, source }),
+    }
+}
+
+/// Writes the rule into `folder`; whether anything had to be done.
+///
+/// # Errors
+/// As [`check`], and when it cannot be written.
+pub fn install(folder: &Path) -> Result<bool, RuleError> {
+    if check(folder)? == Installed::Yes {
+        return Ok(false);
+    }
+    write_atomic(&folder.join(RULE_NAME), rule().as_bytes())?;
+    Ok(true)
+}
+
+/// Removes the rule from `folder`; whether there was one.
+///
+/// # Errors
+/// As [`check`], and when it cannot be removed.
+pub fn uninstall(folder: &Path) -> Result<bool, RuleError> {
+    if check(folder)? == Installed::No {
+        return Ok(false);
+    }
+    let path = folder.join(RULE_NAME);
+    fs::remove_file(&path).map_err(|source| RuleError::Io { path, source })?;
+    Ok(true)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::boards::BOARDS;
+    use std::io::Write;
+
+    #[test]
+    fn the_rule_is_installed_once_replaced_when_old_and_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        let folder = folder.path();
+        assert_eq!(check(folder).unwrap(), Installed::No);
+        assert!(install(folder).unwrap());
+        assert!(!install(folder).unwrap());
+        assert_eq!(check(folder).unwrap(), Installed::Yes);
+        fs::write(folder.join(RULE_NAME), format!("{OURS} as of long ago\n")).unwrap();
+        assert_eq!(check(folder).unwrap(), Installed::Other);
+        assert!(install(folder).unwrap());
+        assert!(uninstall(folder).unwrap());
+        assert!(!uninstall(folder).unwrap());
+        assert_eq!(fs::read_dir(folder).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn a_file_of_someone_else_is_left_as_it_is() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(RULE_NAME);
+        fs::write(&path, "# mine\n").unwrap();
+        for error in [install(folder.path()).unwrap_err(), uninstall(folder.path()).unwrap_err()] {
+            assert!(matches!(error, RuleError::Foreign(_)), "{error}");
+        }
+        assert_eq!(fs::read_to_string(&path).unwrap(), "# mine\n");
+    }
+
+    #[test]
+    fn a_missing_permission_is_told_from_other_trouble() {
+        let error = |kind: io::ErrorKind| {
+            RuleError::Write(FileError::Io {
+                path: PathBuf::from("/etc/udev/rules.d"),
+                attempt: "write",
+                source: kind.into(),
+            })
+        };
+        assert!(error(io::ErrorKind::PermissionDenied).is_permission());
+        assert!(!error(io::ErrorKind::StorageFull).is_permission());
+        assert!(!RuleError::Foreign(PathBuf::new()).is_permission());
+    }
+
+    /// Each board's folder has the rule too, for those who install it by hand.
+    #[test]
+    fn the_rule_is_that_of_the_boards_folders() {
+        for board in BOARDS.iter().filter(|board| board.chip.is_some()) {
+            let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../boards");
+            let path = path.join(board.name).join(RULE_NAME);
+            match fs::read_to_string(&path) {
+                Ok(text) => assert_eq!(text, rule(), "{}", path.display()),
+                // Past the test harness's capture, so that a skipped test is seen.
+                Err(_) => drop(writeln!(io::stderr(), "skipped: no {}", path.display())),
+            }
+        }
+    }
+}
