@@ -42,7 +42,7 @@ const SETTINGS: [Configuration<'static>; 2] = [
 ];
 
 /// Takes the test frames.
-pub fn check(session: &mut Session) -> Result<Check, SessionError> {
+pub fn check(session: &mut Session) -> Result<Vec<Check>, SessionError> {
     let mut compared = 0u32;
     let mut wrong = Vec::new();
     for configuration in SETTINGS {
@@ -53,11 +53,11 @@ pub fn check(session: &mut Session) -> Result<Check, SessionError> {
     }
     let all = FRAMES * SETTINGS.len() as u32;
     let check = Check::measured(NAME, wrong.len() as f64, "frames differ", Limit::Exactly(0.0));
-    Ok(match (compared, wrong.first()) {
+    Ok(vec![match (compared, wrong.first()) {
         (0, _) => Check::told(NAME, false, "no test frame came"),
         (_, Some(first)) => check.noting(first),
         (_, None) => check.noting(&format!("{compared} of {all} came, and were compared")),
-    })
+    }])
 }
 
 /// Where a frame first differs from what it must be.

@@ -21,7 +21,7 @@ const SWEEPS: u32 = 64;
 const FRAMES: u32 = 2;
 
 /// Steps through all settings. `from_burst` is what the raw burst says.
-pub fn check(session: &mut Session, from_burst: u8) -> Result<Check, SessionError> {
+pub fn check(session: &mut Session, from_burst: u8) -> Result<Vec<Check>, SessionError> {
     let mut differences = Vec::with_capacity(usize::from(LATENCY_MAX) + 1);
     for adc_latency in 0..=LATENCY_MAX {
         let configuration = Configuration {
@@ -37,11 +37,12 @@ pub fn check(session: &mut Session, from_burst: u8) -> Result<Check, SessionErro
         };
         let found = shots(session, configuration, FRAMES)?;
         let Some(sample) = found.first().and_then(|shot| shot.samples.first()) else {
-            return Ok(Check::told(NAME, false, &format!("no frame at setting {adc_latency}")));
+            let problem = format!("no frame at setting {adc_latency}");
+            return Ok(vec![Check::told(NAME, false, &problem)]);
         };
         differences.push(*sample as f64);
     }
-    Ok(match edge(&differences) {
+    Ok(vec![match edge(&differences) {
         None => Check::told(NAME, false, "no edge at any setting: the light does not follow it"),
         Some(latency) => {
             let limit = Limit::Exactly(from_burst.into());
@@ -52,7 +53,7 @@ pub fn check(session: &mut Session, from_burst: u8) -> Result<Check, SessionErro
                 check.noting("the raw burst says otherwise: the FPGA's latency setting is off")
             }
         }
-    })
+    }])
 }
 
 /// The last setting before the difference of on and off falls. `None` where it does not fall as one.

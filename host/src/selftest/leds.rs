@@ -15,11 +15,10 @@ use nirspi_recon::{FwhtLengthError, fwht};
 use nirspi_wire::{Configuration, PATTERNS, PatternOrder, SIDE, SampleSource};
 use std::fmt;
 
-/// Names of the checks.
-pub const NAMES: [&str; 2] = [LINES, SUMS];
 /// Name of the check of the lines.
 pub const LINES: &str = "LED lines";
-const SUMS: &str = "LED supply";
+/// Name of the check of the supply.
+pub const SUPPLY: &str = "LED supply";
 
 /// Clocks of a pattern, long enough for any light to settle in the blanked ones.
 const CLOCKS: u16 = 64;
@@ -78,16 +77,18 @@ pub fn check(
     let (Some(single), Some(pairs)) =
         (means(session, false, latency)?, means(session, true, latency)?)
     else {
-        return Ok(NAMES.map(|name| Check::told(name, false, "no frame came")).to_vec());
+        return Ok([LINES, SUPPLY].map(|name| Check::told(name, false, "no frame came")).to_vec());
     };
     // Means are of all patterns, a power of two.
     let Ok(dead) = dead_lines(&pairs) else {
-        return Ok(NAMES.map(|name| Check::told(name, false, "not all patterns came")).to_vec());
+        return Ok([LINES, SUPPLY]
+            .map(|name| Check::told(name, false, "not all patterns came"))
+            .to_vec());
     };
     let lines = Check::measured(LINES, dead.count() as f64, "without light", Limit::Exactly(0.0));
     if dead.count() > 0 {
         let note = format!("{dead}: stuck, broken, or the target is dark there");
-        return Ok(vec![lines.noting(&note), Check::skipped(SUMS, "needs all lines")]);
+        return Ok(vec![lines.noting(&note), Check::skipped(SUPPLY, "needs all lines")]);
     }
     // Four readings twice or as a difference: P and P - N, of the pattern and of pattern 0.
     let noise = noise_counts * (12.0 / SAMPLES).sqrt();
@@ -152,7 +153,7 @@ fn ranges(ascending: &[usize]) -> String {
 /// Whether pattern and complement together give the light of pattern 0. `noise` is that of their sum, in counts.
 fn supply(single: &[f64], pairs: &[f64], noise: f64) -> Check {
     let (Some(&lit), Some(&total)) = (single.first(), pairs.first()) else {
-        return Check::told(SUMS, false, "no frame came");
+        return Check::told(SUPPLY, false, "no frame came");
     };
     // The complement of pattern 0 lights nothing.
     let dark = lit - total;
@@ -175,7 +176,7 @@ fn supply(single: &[f64], pairs: &[f64], noise: f64) -> Check {
     };
     let percent = |share: f64| (share * 1e4).round() / 100.0;
     let limit = Limit::AtMost(percent(limit));
-    Check::measured(SUMS, percent(worst.abs()), "% off pattern 0", limit).noting(&note)
+    Check::measured(SUPPLY, percent(worst.abs()), "% off pattern 0", limit).noting(&note)
 }
 
 #[cfg(test)]

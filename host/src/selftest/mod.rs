@@ -21,8 +21,8 @@ use crate::session::{Deaf, Session, SessionError};
 use nirspi_wire::{ADC_MAX, CLOCKS_PER_PATTERN, SelfTestReport};
 use std::time::Duration;
 
-/// A share of the light that all LEDs together must bring, of the ADC's range. With less, a single LED moves a
-/// reading by under a sixth of a count.
+/// Least step of all LEDs together, as a share of the ADC's range. With less, a single LED moves a reading by under a
+/// sixth of a count.
 const MIN_STEP_SHARE: f64 = 0.01;
 /// Blanked samples of the fastest setting, for which the leak is shown.
 const BLANKED: u16 = 2;
@@ -69,70 +69,63 @@ pub fn run(
     demands: LinkDemands,
     begin: &mut dyn FnMut(usize),
 ) -> Result<SelfTest, SessionError> {
-    let mut checks = Vec::new();
     begin(0);
-    checks.extend(device(session.self_test(&mut Deaf)?));
+    let mut checks = device(session.self_test(&mut Deaf)?);
     begin(1);
-    checks.push(unless_refused(generator::NAME, generator::check(session))?);
+    checks.extend(unless_refused(&[generator::NAME], generator::check(session))?);
     begin(2);
     let settling = match calibrate(session, &mut Deaf) {
         Ok(settling) => Ok(settling),
-        Err(CalibrationError::Session(SessionError::Refused { command, refusal })) => {
-            Err(SessionError::Refused { command, refusal }.to_string())
-        }
-        Err(CalibrationError::Session(error)) => return Err(error),
+        Err(CalibrationError::Session(error)) => Err(refusal_in_words(error)?),
         Err(problem) => Err(problem.to_string()),
     };
     checks.extend(light_and_settling(settling.as_ref()));
     let settling = settling.ok();
-    let usable = settling.as_ref().filter(|settling| settling.step_counts >= min_step_counts());
-    begin(3);
-    let latency = match usable {
+    let (mut agrees, stages) = (false, [latency::NAME, leds::LINES, leds::SUPPLY]);
+    match settling.as_ref().filter(|settling| settling.step_counts >= min_step_counts()) {
+        None => checks.extend(stages.map(|name| Check::skipped(name, "too little light"))),
         Some(settling) => {
-            unless_refused(latency::NAME, latency::check(session, settling.adc_latency))?
-        }
-        None => Check::skipped(latency::NAME, "too little light"),
-    };
-    let agrees = latency.verdict() == Verdict::Passed;
-    // Where burst and stepping disagree, it is the stepped setting that puts the windows right.
-    let setting = latency.value();
-    checks.push(latency);
-    begin(4);
-    match (usable, setting) {
-        (Some(settling), Some(setting)) => {
-            match leds::check(session, setting as u8, settling.noise_counts) {
-                Ok(found) => checks.extend(found),
-                Err(error @ SessionError::Refused { .. }) => {
-                    checks.push(Check::told(leds::LINES, false, &error.to_string()));
+            begin(3);
+            let stepped = latency::check(session, settling.adc_latency);
+            let stepped = unless_refused(&stages[..1], stepped)?;
+            agrees = stepped.iter().all(|check| check.verdict() == Verdict::Passed);
+            // Where burst and stepping disagree, it is the stepped setting that puts the windows right.
+            let setting = stepped.iter().find_map(Check::value);
+            checks.extend(stepped);
+            begin(4);
+            checks.extend(match setting {
+                None => stages[1..]
+                    .iter()
+                    .map(|name| Check::skipped(name, "needs the ADC latency"))
+                    .collect(),
+                Some(setting) => {
+                    let lit = leds::check(session, setting as u8, settling.noise_counts);
+                    unless_refused(&stages[1..], lit)?
                 }
-                Err(error) => return Err(error),
-            }
-        }
-        (Some(_), None) => {
-            checks.extend(leds::NAMES.map(|name| Check::skipped(name, "needs the ADC latency")));
-        }
-        (None, _) => {
-            checks.extend(leds::NAMES.map(|name| Check::skipped(name, "too little light")));
+            });
         }
     }
     begin(5);
-    match link::check(session, demands) {
-        Ok(found) => checks.extend(found),
-        Err(error @ SessionError::Refused { .. }) => {
-            checks.push(Check::told(link::LOSSES, false, &error.to_string()));
-        }
-        Err(error) => return Err(error),
-    }
+    checks.extend(unless_refused(&[link::SPEED, link::LOSSES], link::check(session, demands))?);
     Ok(SelfTest { checks, settling: settling.filter(|_| agrees) })
 }
 
-/// What the camera refuses, it fails.
-fn unless_refused(name: &str, outcome: Result<Check, SessionError>) -> Result<Check, SessionError> {
-    match outcome {
-        Err(error @ SessionError::Refused { .. }) => {
-            Ok(Check::told(name, false, &error.to_string()))
-        }
-        other => other,
+/// What a stage has found. What the camera refuses, it fails.
+fn unless_refused(
+    names: &[&str],
+    outcome: Result<Vec<Check>, SessionError>,
+) -> Result<Vec<Check>, SessionError> {
+    outcome.or_else(|error| {
+        let refusal = refusal_in_words(error)?;
+        Ok(names.iter().map(|name| Check::told(name, false, &refusal)).collect())
+    })
+}
+
+/// The camera's refusal; any other error stays one.
+fn refusal_in_words(error: SessionError) -> Result<String, SessionError> {
+    match error {
+        SessionError::Refused { .. } => Ok(error.to_string()),
+        other => Err(other),
     }
 }
 
