@@ -76,6 +76,9 @@ struct Report<'r> {
     calibrated: bool,
     /// When and where the kept calibration was measured; `null` where none was used.
     calibration: Option<Origin>,
+    /// Why a calibration that is kept was not used.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    calibration_note: Option<&'r str>,
     #[serde(skip_serializing_if = "Option::is_none")]
     calibration_problem: Option<String>,
 }
@@ -228,6 +231,7 @@ fn report(
         adc_latency_clocks: captured.setup.adc_latency,
         calibrated: captured.settling.is_some(),
         calibration: choice.origin.clone(),
+        calibration_note: choice.note.as_deref(),
         calibration_problem: captured.calibration_problem.as_ref().map(ToString::to_string),
     };
     if args.json {
