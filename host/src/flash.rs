@@ -153,8 +153,9 @@ pub fn flash(
     loader.load_image(&mut session, &mut Cursor::new(elf), format.create_loader(None), None)?;
     let mut options = DownloadOptions::new();
     options.verify = true;
+    let mut plan = Plan::default();
     options.progress = FlashProgress::new(|event| {
-        tell_step(&event).into_iter().for_each(&mut *tell);
+        plan.step(&event).into_iter().for_each(&mut *tell);
     });
     loader.commit(&mut session, options)?;
     let reset = session.core(0).and_then(|mut core| core.reset());
@@ -173,19 +174,35 @@ fn attach(probe: &Probe, chip: &str) -> Result<Session, FlashingError> {
     }
 }
 
-fn tell_step(event: &ProgressEvent) -> Option<Step> {
-    match event {
-        ProgressEvent::AddProgressBar { operation, total } => {
-            let what = match operation {
-                ProgressOperation::Fill => "reading",
-                ProgressOperation::Erase => "erasing",
-                ProgressOperation::Program => "writing",
-                ProgressOperation::Verify => "comparing",
-            };
-            Some(Step::Begins { what, bytes: total.unwrap_or(0) })
+/// Bytes of each operation that probe-rs has announced: all are, before the first starts.
+#[derive(Debug, Default)]
+struct Plan([u64; 4]);
+
+impl Plan {
+    fn step(&mut self, event: &ProgressEvent) -> Option<Step> {
+        match *event {
+            ProgressEvent::AddProgressBar { operation, total } => {
+                let (slot, _) = place(operation);
+                self.0[slot] = total.unwrap_or(0);
+                None
+            }
+            ProgressEvent::Started(operation) => {
+                let (slot, what) = place(operation);
+                Some(Step::Begins { what, bytes: self.0[slot] })
+            }
+            ProgressEvent::Progress { size, .. } => Some(Step::Done { bytes: size }),
+            _ => None,
         }
-        ProgressEvent::Progress { size, .. } => Some(Step::Done { bytes: *size }),
-        _ => None,
+    }
+}
+
+/// Where an operation stands in the plan, and a word for it.
+fn place(operation: ProgressOperation) -> (usize, &'static str) {
+    match operation {
+        ProgressOperation::Fill => (0, "reading"),
+        ProgressOperation::Erase => (1, "erasing"),
+        ProgressOperation::Program => (2, "writing"),
+        ProgressOperation::Verify => (3, "comparing"),
     }
 }
 
@@ -199,5 +216,23 @@ mod tests {
             let message = choose(&[], wanted).unwrap_err().to_string();
             assert!(message.contains("ST-LINK") && message.lines().count() == 1, "{message}");
         }
+    }
+
+    #[test]
+    fn each_operation_begins_with_the_bytes_announced_for_it() {
+        use ProgressOperation::{Erase, Program};
+        let mut plan = Plan::default();
+        let announced = [(Erase, 4096), (Program, 1500)];
+        for (operation, bytes) in announced {
+            let event = ProgressEvent::AddProgressBar { operation, total: Some(bytes) };
+            assert_eq!(plan.step(&event), None);
+        }
+        for ((operation, bytes), what) in announced.into_iter().zip(["erasing", "writing"]) {
+            let begins = plan.step(&ProgressEvent::Started(operation));
+            assert_eq!(begins, Some(Step::Begins { what, bytes }));
+        }
+        let time = std::time::Duration::ZERO;
+        let done = plan.step(&ProgressEvent::Progress { operation: Program, size: 256, time });
+        assert_eq!(done, Some(Step::Done { bytes: 256 }));
     }
 }

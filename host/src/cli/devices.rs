@@ -116,7 +116,6 @@ fn identify(address: &str) -> Result<CameraIdentity, SessionError> {
 fn on_usb() -> Vec<Device> {
     let cameras = match usb::usb_cameras() {
         Ok(cameras) => cameras,
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
         Err(error) => {
             return vec![Device::new("usb".to_owned()).noting(&format!("not listed: {error}"))];
         }

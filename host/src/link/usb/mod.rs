@@ -24,7 +24,15 @@ const FIRST_PAUSE: Duration = Duration::from_millis(50);
 
 /// The cameras on USB that are plugged in, with the devices that they are.
 fn listed() -> io::Result<Vec<(UsbCamera, DeviceInfo)>> {
-    let devices = nusb::list_devices().wait()?;
+    /// "No such file or folder": the kernel, or the container, has no USB.
+    const ENOENT: u32 = 2;
+    let devices = match nusb::list_devices().wait() {
+        Ok(devices) => devices,
+        Err(error) if cfg!(target_os = "linux") && error.os_error() == Some(ENOENT) => {
+            return Ok(Vec::new());
+        }
+        Err(error) => return Err(error.into()),
+    };
     Ok(devices.filter_map(|device| Some((recognise(&device_id(&device))?, device))).collect())
 }
 
