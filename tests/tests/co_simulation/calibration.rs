@@ -2,7 +2,7 @@
 
 use crate::fpga::RtlFpga;
 use crate::{check_image, noiseless, session};
-use nirspi::capture::{Capture, CaptureOptions, Ended, capture};
+use nirspi::capture::{Calibration, Capture, CaptureOptions, Ended, capture};
 use nirspi::session::Session;
 use nirspi::setup::MeasurementSetup;
 use nirspi_recon::Order;
@@ -11,7 +11,8 @@ use std::ops::ControlFlow;
 /// One frame by an instrument that has found out its latency and leak itself.
 fn calibrated(mut session: Session) -> Capture {
     let setup = MeasurementSetup::new(&Order::Natural, 1.0).unwrap();
-    let options = CaptureOptions { setup, frames: Some(1), calibrate: true, record: None };
+    let options =
+        CaptureOptions { setup, frames: Some(1), calibration: Calibration::Measure, record: None };
     let captured = capture(&mut session, &options, &mut |_| ControlFlow::Continue(())).unwrap();
     assert!(matches!(captured.ended, Ended::Complete), "{:?}", captured.ended);
     captured

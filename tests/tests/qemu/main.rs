@@ -16,7 +16,7 @@ mod simulator;
 
 use emulated::Emulated;
 use fpga::RtlFpga;
-use nirspi::capture::{Capture, CaptureOptions, Ended, capture};
+use nirspi::capture::{Calibration, Capture, CaptureOptions, Ended, capture};
 use nirspi::link::{Link, Received};
 use nirspi::session::{Deaf, Session, SessionError};
 use nirspi::setup::MeasurementSetup;
@@ -129,7 +129,12 @@ impl Link for Tap {
 
 fn measure(session: &mut Session, setup: &MeasurementSetup, frames: u32) -> Capture {
     let setup = setup.clone();
-    let options = CaptureOptions { setup, frames: Some(frames), calibrate: false, record: None };
+    let options = CaptureOptions {
+        setup,
+        frames: Some(frames),
+        calibration: Calibration::None,
+        record: None,
+    };
     capture(session, &options, &mut |_| ControlFlow::Continue(())).unwrap()
 }
 
