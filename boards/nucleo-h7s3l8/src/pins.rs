@@ -1,7 +1,8 @@
 //! Every pin of this board that the camera uses: the one table, for the code and for whoever wires it.
 //!
 //! `name: pin => place on the Nucleo, where the wire goes;` `README.md` shows the same table, which a test compares.
-//! Places are those of ST's Zio connectors (UM3276) and, for the host port, of the chip's ports P and O by their Arduino-style numbers.
+//! Places are those of ST's Zio connectors (UM3276) by their Arduino-style numbers and, for the host port, signals
+//! of the chip's ports P and O.
 
 use embassy_stm32::{Peri, pac, peripherals};
 

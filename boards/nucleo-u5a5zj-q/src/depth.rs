@@ -1,7 +1,7 @@
 //! The 8 x 8 time-of-flight sensor: VL53L5CX or VL53L8CX, told apart by the driver (`vl53-8x8`: no C, no heap).
 //!
-//! The driver sends ST's firmware to the sensor at each start: 86 KB of this board's flash, about 2 s at 400 kHz. All of
-//! that happens in a task of its own; the camera does not wait for it.
+//! The driver sends ST's firmware to the sensor at each start: 86 KB of this board's flash, about 2 s at 400 kHz.
+//! All of that happens in a task of its own; the camera does not wait for it.
 
 use embassy_stm32::i2c::{Config, Error, I2c, Master};
 use embassy_stm32::mode::Async;
