@@ -38,10 +38,8 @@ impl Camera {
     }
 
     /// The firmware has restarted after this crash: the first host is told, after the answer to its `Hello`.
-    #[must_use]
-    pub fn after_crash(mut self, crash: Option<Crash>) -> Self {
-        self.machine.crash = crash;
-        self
+    pub fn restarted_after(&mut self, crash: Crash) {
+        self.machine.crash = Some(crash);
     }
 
     /// Takes bytes from the host, in any pieces; returns how many were taken. The rest is to be offered

@@ -1,5 +1,7 @@
 //! Shared pieces of the end-to-end tests.
 
+pub mod elf;
+pub mod pages;
 pub mod tamper;
 
 use std::path::{Path, PathBuf};

@@ -78,7 +78,10 @@ pub async fn run<B: Board, P: FpgaPort, G: GatewareLoader>(
 ) -> ! {
     let Device { mut board, port, frame, mut loader, info, limits, crash } = device;
     let mut bus = PortBus::new(port, frame);
-    let mut camera = Camera::new(info, limits).after_crash(crash);
+    let mut camera = Camera::new(info, limits);
+    if let Some(crash) = crash {
+        camera.restarted_after(crash);
+    }
     loop {
         board.feed_watchdog();
         if loader.step(now()) {

@@ -69,6 +69,25 @@ impl Debugger {
         String::from_utf8(text).unwrap()
     }
 
+    fn halt(&mut self) {
+        self.line.write_all(&[0x03]).unwrap();
+        let stopped = self.receive();
+        assert!(stopped.starts_with(['S', 'T']), "{stopped}");
+    }
+
+    /// Stops the processor and reads memory.
+    pub fn read(&mut self, start: u64, end: u64) -> Vec<u8> {
+        const PIECE: u64 = 1024;
+        self.halt();
+        let mut bytes = Vec::new();
+        for at in (start..end).step_by(PIECE as usize) {
+            let digits = self.ask(&format!("m{at:x},{:x}", PIECE.min(end - at)));
+            let pairs = digits.as_bytes().chunks(2).map(|pair| std::str::from_utf8(pair).unwrap());
+            bytes.extend(pairs.map(|pair| u8::from_str_radix(pair, 16).unwrap()));
+        }
+        bytes
+    }
+
     /// Lets the processor run.
     pub fn go(&mut self) {
         self.send("c");
@@ -76,9 +95,7 @@ impl Debugger {
 
     /// Stops the processor, makes it go on at `address`.
     pub fn derail(&mut self, address: u32) {
-        self.line.write_all(&[0x03]).unwrap();
-        let stopped = self.receive();
-        assert!(stopped.starts_with(['S', 'T']), "{stopped}");
+        self.halt();
         // Register 15, its bytes in the target's order.
         assert_eq!(self.ask(&format!("Pf={:08x}", address.swap_bytes())), "OK");
         self.go();

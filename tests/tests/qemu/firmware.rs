@@ -9,7 +9,7 @@ use std::process::Command;
 use std::sync::OnceLock;
 
 const TARGET: &str = "thumbv8m.main-none-eabihf";
-const BOARD: &str = "nirspi-mps2-an505";
+const BOARD: &str = "mps2-an505";
 
 /// Past the test harness's capture, so that a skipped test is seen.
 fn skipped(reason: &str) {

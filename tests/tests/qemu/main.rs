@@ -23,10 +23,13 @@ use nirspi::setup::MeasurementSetup;
 use nirspi::virtual_camera::{MemoryLink, VirtualOptics};
 use nirspi_optics::Scene;
 use nirspi_recon::{Order, Side, metrics, reconstruct};
+use nirspi_tests::elf::Firmware;
+use nirspi_tests::pages::{page, table};
 use nirspi_tests::tamper::{Fate, Tampered};
 use nirspi_wire::packet::MAX_DEVICE_PACKET;
 use nirspi_wire::{
-    Command, Deframed, Deframer, DeviceMessage, Fault, Frame, FrameFlags, Refusal, open,
+    Command, Deframed, Deframer, DeviceMessage, Fault, Frame, FrameFlags, GatewareChunk, Refusal,
+    RunLength, State, open,
 };
 use std::io;
 use std::ops::ControlFlow;
@@ -337,4 +340,69 @@ fn firmware_that_crashes_starts_again_and_tells_the_next_host_once() {
     assert_eq!(told.len(), 1, "{told:?}");
     assert!(told[0].contains("hard fault at 0x2ff00000"), "{told:?}");
     assert!(hear().is_empty());
+}
+
+/// cortex-m-rt paints the stack with it before it calls `main`.
+const PAINT: u8 = 0xCC;
+
+#[test]
+fn the_stack_is_never_deeper_than_three_quarters_of_its_limit() {
+    let Some(elf) = firmware::elf() else { return };
+    let elf = Firmware::read(elf).unwrap();
+    let (end, start) = (elf.symbol("_stack_end").unwrap(), elf.symbol("_stack_start").unwrap());
+
+    let debugger = debugger::Waiting::new();
+    let arguments = debugger.arguments();
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let Some(board) = Emulated::start_with(optics().fpga(SEED).unwrap(), &arguments) else {
+        return;
+    };
+    let mut debugger = debugger.attach();
+    debugger.go();
+    // Everything that a host can ask for, refused commands too.
+    let mut session = Session::open(board.link()).unwrap();
+    let _ = session.command(Command::Start(RunLength::Continuous), &mut Deaf);
+    let _ = session.command(Command::RawBurst { samples: 0 }, &mut Deaf);
+    let piece = GatewareChunk { offset: 0, total: 4, crc: 0, data: &[1, 2] };
+    let _ = session.command(Command::LoadGateware(piece), &mut Deaf);
+    let _ = session.command(Command::SelfTest, &mut Deaf);
+    let table = MeasurementSetup::new(&Order::Random(1), 1.0).unwrap();
+    for setup in [natural(), table] {
+        assert!(measure(&mut session, &setup, 2).counters.is_complete());
+    }
+    session.command(Command::RawBurst { samples: 4096 }, &mut Deaf).unwrap();
+    while session.status(&mut Deaf).unwrap().state == State::Running {}
+
+    let stack = debugger.read(end, start);
+    let untouched = stack.iter().take_while(|&&byte| byte == PAINT).count();
+    let (deepest, limit) = (stack.len() - untouched, stack.len());
+    println!("deepest stack: {deepest} of {limit} bytes");
+    assert!(untouched > 0, "painted");
+    assert!(4 * deepest < 3 * limit, "{deepest} of {limit} bytes");
+}
+
+/// One instruction is one nanosecond of the emulated clock, so this does not depend on the machine.
+#[test]
+fn a_frame_costs_no_more_instructions_than_budgeted() {
+    let (Some(qemu), Some(elf)) = (firmware::qemu(), firmware::elf()) else { return };
+    let output = std::process::Command::new(qemu)
+        .args(["-M", "mps2-an505", "-display", "none", "-monitor", "none", "-serial", "none"])
+        .args(["-icount", "shift=0", "-semihosting-config", "enable=on,target=native"])
+        .arg("-kernel")
+        .arg(elf.with_file_name("instructions"))
+        .output()
+        .unwrap();
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "{text}");
+    print!("{text}");
+    let counted = |name: &str| -> u32 {
+        let line = text.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(' '));
+        line.and_then(|number| number.parse().ok()).unwrap_or_else(|| panic!("no {name}: {text}"))
+    };
+    let rows = table(&page("docs/firmware.md"), "### Instructions");
+    assert!(rows.len() >= 5);
+    for row in rows {
+        let budget: u32 = row[2].replace(' ', "").parse().unwrap();
+        assert!(counted(&row[0]) <= budget, "{}: {} of {budget}", row[0], counted(&row[0]));
+    }
 }

@@ -1,0 +1,150 @@
+//! What a firmware's ELF says of itself: how much memory it takes, and which of its functions can panic.
+//!
+//! The one law: it is read from the machine code as it was linked, not from anything that the build said.
+
+use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, SymbolKind, elf};
+use std::collections::{BTreeMap, BTreeSet};
+use std::io;
+use std::path::Path;
+
+/// A firmware, as linked for an Arm Cortex-M.
+pub struct Firmware {
+    /// Bytes of the image in flash: vectors, code, constants, and the initial values of variables.
+    pub flash_bytes: u64,
+    /// Bytes of static variables, those that a restart does not clear too.
+    pub static_bytes: u64,
+    symbols: BTreeMap<String, u64>,
+    functions: Vec<Function>,
+    text: Vec<(u64, Vec<u8>)>,
+}
+
+struct Function {
+    name: String,
+    start: u64,
+    length: u64,
+}
+
+impl Firmware {
+    /// Reads an ELF.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or is no ELF.
+    pub fn read(path: &Path) -> io::Result<Self> {
+        let bytes = std::fs::read(path)?;
+        let invalid = |error| io::Error::new(io::ErrorKind::InvalidData, error);
+        let file = object::File::parse(&bytes[..]).map_err(invalid)?;
+        let (mut flash_bytes, mut static_bytes, mut text) = (0, 0, Vec::new());
+        for section in file.sections() {
+            let SectionFlags::Elf { sh_flags, .. } = section.flags() else { continue };
+            let has = |flag: u32| sh_flags & u64::from(flag) != 0;
+            if !has(elf::SHF_ALLOC) {
+                continue;
+            }
+            let is_filled = section.file_range().is_some();
+            flash_bytes += if is_filled { section.size() } else { 0 };
+            static_bytes += if has(elf::SHF_WRITE) { section.size() } else { 0 };
+            if has(elf::SHF_EXECINSTR) {
+                text.push((section.address(), section.data().map_err(invalid)?.to_vec()));
+            }
+        }
+        let named = |symbol: &object::Symbol<'_, '_>| symbol.name().map(str::to_owned).ok();
+        let symbols = file.symbols().filter_map(|s| Some((named(&s)?, s.address()))).collect();
+        let functions = file
+            .symbols()
+            .filter(|symbol| symbol.kind() == SymbolKind::Text && symbol.size() > 0)
+            .filter_map(|symbol| {
+                // Bit 0 of an address says Thumb.
+                let (start, length) = (symbol.address() & !1, symbol.size());
+                Some(Function { name: plain(&named(&symbol)?), start, length })
+            })
+            .collect();
+        Ok(Self { flash_bytes, static_bytes, symbols, functions, text })
+    }
+
+    /// Address of a symbol.
+    #[must_use]
+    pub fn symbol(&self, name: &str) -> Option<u64> {
+        self.symbols.get(name).copied()
+    }
+
+    /// Names, as mangled, that contain any of `parts`.
+    #[must_use]
+    pub fn symbols_with(&self, parts: &[&str]) -> Vec<&str> {
+        let wanted = |name: &&str| parts.iter().any(|part| name.contains(part));
+        self.symbols.keys().map(String::as_str).filter(wanted).collect()
+    }
+
+    /// Pairs of a function and one that it calls by a branch to a fixed address, where both names satisfy their
+    /// condition. Rust's panics are called in no other way.
+    #[must_use]
+    pub fn calls(
+        &self,
+        is_caller: impl Fn(&str) -> bool,
+        is_called: impl Fn(&str) -> bool,
+    ) -> BTreeSet<(&str, &str)> {
+        let called: BTreeMap<u64, &str> = self
+            .functions
+            .iter()
+            .filter(|function| is_called(&function.name))
+            .map(|function| (function.start, function.name.as_str()))
+            .collect();
+        let callers = self.functions.iter().filter(|function| is_caller(&function.name));
+        callers
+            .flat_map(|caller| self.branches(caller).map(|target| (caller.name.as_str(), target)))
+            .filter_map(|(caller, target)| Some((caller, *called.get(&target)?)))
+            .collect()
+    }
+
+    /// Where the 32-bit branches of a function lead. Constants between instructions may look like one; that one of
+    /// them leads to the first byte of a function by chance is as good as impossible.
+    fn branches(&self, function: &Function) -> impl Iterator<Item = u64> {
+        let words = |address: u64| {
+            self.text.iter().find_map(|(base, bytes)| {
+                let at = usize::try_from(address.checked_sub(*base)?).ok()?;
+                let half = |at: usize| Some(u16::from_le_bytes(*bytes.get(at..)?.first_chunk()?));
+                Some((half(at)?, half(at + 2)?))
+            })
+        };
+        let steps = (function.start..function.start + function.length).step_by(2);
+        steps.filter_map(move |address| branch(address, words(address)?))
+    }
+}
+
+/// A name without the hash of its crate's build.
+fn plain(mangled: &str) -> String {
+    format!("{:#}", rustc_demangle::demangle(mangled))
+}
+
+/// Target of a `BL` (T1) or `B.W` (T4) at this address, Armv8-M Architecture Reference Manual, C2.4.
+fn branch(address: u64, (first, second): (u16, u16)) -> Option<u64> {
+    let is_branch = first & 0xF800 == 0xF000 && second & 0x9000 == 0x9000;
+    if !is_branch {
+        return None;
+    }
+    let bit = |word: u16, at: u16| u32::from(word >> at & 1);
+    let sign = bit(first, 10);
+    let i1 = u32::from(bit(second, 13) == sign);
+    let i2 = u32::from(bit(second, 11) == sign);
+    let offset = sign << 24
+        | i1 << 23
+        | i2 << 22
+        | u32::from(first & 0x3FF) << 12
+        | u32::from(second & 0x7FF) << 1;
+    let offset = (offset << 7) as i32 >> 7;
+    Some((address + 4).wrapping_add_signed(i64::from(offset)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::branch;
+
+    /// As disassembled by others: `bl` forwards and back, and what is none.
+    #[test]
+    fn branches_lead_where_a_disassembler_says() {
+        assert_eq!(branch(0x1000_AB1E, (0xF000, 0xFB9F)), Some(0x1000_B260));
+        assert_eq!(branch(0x0800_1000, (0xF7FF, 0xFFFE)), Some(0x0800_1000));
+        assert_eq!(branch(0, (0x4770, 0xBF00)), None);
+        // A conditional branch reaches less far, and no panic.
+        assert_eq!(branch(0, (0xF000, 0x8001)), None);
+    }
+}
