@@ -11,11 +11,17 @@
 //! suspended only where it says `await`.
 #![no_std]
 
+#[cfg(test)]
+extern crate std;
+
 pub mod crash;
 pub mod link;
 
 mod ports;
 mod run;
+
+#[cfg(test)]
+mod tests;
 
 pub use ports::{Board, DEPTH_SIDE, DepthMap, DepthSensor, FpgaPort};
 pub use run::{DepthMailbox, Device, board_info, measure_depth, run};
