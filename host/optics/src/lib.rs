@@ -39,8 +39,10 @@ pub mod array;
 pub mod budget;
 pub mod chain;
 pub mod depth;
+pub mod mie;
 pub mod projector;
 pub mod scene;
+pub mod water;
 
 pub use array::LedArray;
 pub use budget::{Budget, BudgetError, BudgetSettings};

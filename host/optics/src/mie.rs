@@ -1,0 +1,141 @@
+//! Scattering by one homogeneous sphere (Lorenz-Mie theory).
+//!
+//! The solver is the crate `scatrs`; this module gives it the units and names of the rest of the crate and refuses what
+//! was not checked. Definitions are those of Bohren and Huffman, *Absorption and Scattering of Light by Small
+//! Particles* (1983), chapter 4: size parameter `x = pi D / wavelength`, refractive index `n + ik` with k >= 0 for
+//! a sphere that absorbs, efficiencies as cross section over `pi D^2 / 4`.
+//!
+//! Law: energy is neither made nor lost. `extinction = scattering + absorption`, absorption is exactly 0 for a real
+//! index, and a phase function has a mean of 1 over the sphere.
+
+use num_complex::Complex64;
+use scatrs::mie::{MieOptions, MieSolution, Normalization, PhaseBuffers};
+use std::ops::RangeInclusive;
+use thiserror::Error;
+
+/// Size parameters accepted: what `tests/mie.rs` and `scripts/mie_reference.py` hold against other codes, which reaches
+/// from Rayleigh scattering to an 8 mm drop in violet light.
+pub const SIZE_PARAMETERS: RangeInclusive<f64> = 1e-3..=6e4;
+
+/// Real parts of the refractive index accepted.
+pub const REAL_INDICES: RangeInclusive<f64> = 0.1..=10.0;
+
+/// Imaginary parts of the refractive index accepted.
+pub const IMAGINARY_INDICES: RangeInclusive<f64> = 0.0..=10.0;
+
+/// Why a sphere cannot be solved.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum MieError {
+    /// A number is outside what was checked.
+    #[error("Mie: {name} is {value}, expected {} to {}", allowed.start(), allowed.end())]
+    Range {
+        /// Which.
+        name: &'static str,
+        /// The value found.
+        value: f64,
+        /// What it may be.
+        allowed: RangeInclusive<f64>,
+    },
+    /// The solver refused.
+    #[error("Mie: {0}")]
+    Solver(String),
+}
+
+impl From<scatrs::Error> for MieError {
+    fn from(error: scatrs::Error) -> Self {
+        Self::Solver(error.to_string())
+    }
+}
+
+/// A complex refractive index `n + ik`, relative to the medium around the sphere.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Index {
+    /// n.
+    pub real: f64,
+    /// k, 0 or more; positive absorbs.
+    pub imaginary: f64,
+}
+
+/// What a sphere does to light, per geometric cross section.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Efficiencies {
+    /// Q_ext: taken out of the beam.
+    pub extinction: f64,
+    /// Q_sca: sent elsewhere.
+    pub scattering: f64,
+    /// Q_abs: turned into heat.
+    pub absorption: f64,
+    /// Q_back: 4 pi times what is scattered straight back into a unit solid angle.
+    pub backscatter: f64,
+    /// g: mean cosine of the scattering angle.
+    pub asymmetry: f64,
+}
+
+/// A solver that keeps its memory from one sphere to the next.
+#[derive(Debug, Clone, Default)]
+pub struct Mie {
+    workspace: scatrs::mie::Mie<f64>,
+}
+
+impl Mie {
+    /// A solver.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Solves the sphere of size parameter `x`.
+    ///
+    /// # Errors
+    /// [`MieError::Range`] naming the number that is not in [`SIZE_PARAMETERS`], [`REAL_INDICES`] or
+    /// [`IMAGINARY_INDICES`].
+    pub fn sphere(&mut self, x: f64, index: Index) -> Result<Sphere<'_>, MieError> {
+        ensure("size parameter x", x, &SIZE_PARAMETERS)?;
+        ensure("refractive index n", index.real, &REAL_INDICES)?;
+        ensure("refractive index k", index.imaginary, &IMAGINARY_INDICES)?;
+        // `scatrs` states its accuracy up to x = 20 000; beyond that it is our own comparison that vouches for it.
+        let options = MieOptions::new().with_allow_unvalidated(true);
+        let m = Complex64::new(index.real, index.imaginary);
+        Ok(Sphere { solution: self.workspace.compute(x, m, &options)? })
+    }
+}
+
+fn ensure(name: &'static str, value: f64, allowed: &RangeInclusive<f64>) -> Result<(), MieError> {
+    if allowed.contains(&value) {
+        Ok(())
+    } else {
+        Err(MieError::Range { name, value, allowed: allowed.clone() })
+    }
+}
+
+/// A solved sphere.
+#[derive(Debug, Clone, Copy)]
+pub struct Sphere<'a> {
+    solution: MieSolution<'a, f64>,
+}
+
+impl Sphere<'_> {
+    /// Efficiencies and asymmetry.
+    pub fn efficiencies(&self) -> Efficiencies {
+        let q = self.solution.efficiencies();
+        Efficiencies {
+            extinction: q.q_ext,
+            scattering: q.q_sca,
+            absorption: q.q_abs,
+            backscatter: q.q_back,
+            asymmetry: q.g,
+        }
+    }
+
+    /// The phase function of unpolarised light at cosines of the scattering angle, one value for each: mean 1 over
+    /// the sphere, so that a value over 4 pi is the share of scattered light per steradian.
+    ///
+    /// # Errors
+    /// [`MieError::Solver`] if a cosine is not in [-1, 1].
+    pub fn phase(&self, cosines: &[f64]) -> Result<Vec<f64>, MieError> {
+        let mut f11 = vec![0.0; cosines.len()];
+        let [mut f12, mut f33, mut f34] = [f11.clone(), f11.clone(), f11.clone()];
+        let out = PhaseBuffers { f11: &mut f11, f12: &mut f12, f33: &mut f33, f34: &mut f34 };
+        self.solution.phase_matrix(cosines, Normalization::Normalized, out)?;
+        Ok(f11)
+    }
+}
