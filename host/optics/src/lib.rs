@@ -41,6 +41,7 @@ pub mod chain;
 pub mod depth;
 pub mod mie;
 pub mod projector;
+pub mod rain;
 pub mod scene;
 pub mod water;
 

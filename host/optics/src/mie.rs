@@ -15,7 +15,7 @@ use thiserror::Error;
 
 /// Size parameters accepted: what `tests/mie.rs` and `scripts/mie_reference.py` hold against other codes, which reaches
 /// from Rayleigh scattering to an 8 mm drop in violet light.
-pub const SIZE_PARAMETERS: RangeInclusive<f64> = 1e-3..=6e4;
+pub const SIZE_PARAMETERS: RangeInclusive<f64> = 0.01..=65_000.0;
 
 /// Real parts of the refractive index accepted.
 pub const REAL_INDICES: RangeInclusive<f64> = 0.1..=10.0;

@@ -28,7 +28,7 @@ fn spheres_agree_with_miepython_and_scattnlay_to_a_millionth() {
         let close = |name: &str, ours: f64, theirs: f64, scale: f64| {
             // miepython's series ends too early for light straight back; scattnlay's word counts there.
             let truncated = code == "miepython" && ["Q_back", "p(180)"].contains(&name);
-            let beyond = if x <= 12_000.0 { 1e-6 } else { 1e-5 };
+            let beyond = if x <= 12_000.0 { 1e-6 } else { 2e-5 };
             let tolerance = if truncated { 1e-4 } else { beyond };
             let off = (ours - theirs).abs() / scale;
             // What a code does not give is NaN.
@@ -86,7 +86,7 @@ fn a_large_drop_takes_twice_its_shadow_at_any_wavelength() {
 fn spheres_that_were_not_checked_are_refused_by_name_and_range() {
     let water = Index { real: 1.33, imaginary: 0.0 };
     let refuse = |x, index| Mie::new().sphere(x, index).map(|_| ()).unwrap_err();
-    for x in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-4, 1e5] {
+    for x in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-3, 1e5] {
         assert!(matches!(refuse(x, water), MieError::Range { name: "size parameter x", .. }));
     }
     let message = refuse(1.0, Index { imaginary: -0.1, ..water }).to_string();

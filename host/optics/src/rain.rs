@@ -1,0 +1,65 @@
+//! Rain and fog: what is in the air, and what it does to light.
+//!
+//! | module | from | to |
+//! |---|---|---|
+//! | [`drops`] | a rain rate, a law of sizes | drops per cubic metre, by diameter |
+//! | [`fall`] | diameter, air density | fall speed, time constant, share of an exposure |
+//! | [`medium`] | drops, wavelength | extinction, scattering, absorption, scattering angles |
+//! | [`blur`] | scattering angles, distance | where forward-scattered light lands on the target |
+//! | [`veil`] | medium, geometry | light that comes back without having seen the target |
+//! | [`falling`] | drops, distance, seed | single drops that cross the LEDs' beams, from frame to frame |
+//! | [`radar`] | drops | differential reflectivity, an input of the paper's Algorithm 2 |
+//!
+//! Law: everything is a sum over the same list of drops ([`Drops`]), so that two results can only differ by physics,
+//! never by what it was assumed to rain. `docs/physics.md` in the repository derives and cites each formula.
+
+pub mod blur;
+pub mod drops;
+pub mod fall;
+pub mod falling;
+pub mod medium;
+pub mod radar;
+pub mod veil;
+
+pub use blur::ForwardBlur;
+pub use drops::{DropClass, Drops};
+pub use falling::{BeamShadows, FallingDrops};
+pub use medium::{Medium, ScatteringAngles};
+pub use veil::Veil;
+
+use crate::mie::MieError;
+use crate::water::WavelengthError;
+use thiserror::Error;
+
+/// Why it cannot rain like this.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum RainError {
+    /// A number is outside its physical or checked range.
+    #[error("rain: {name} is {value}, expected {expected}")]
+    Setting {
+        /// Which.
+        name: &'static str,
+        /// The value found.
+        value: f64,
+        /// What it may be.
+        expected: &'static str,
+    },
+    /// A measured distribution without drops.
+    #[error("rain: no drop sizes given, expected at least one")]
+    NoDrops,
+    /// A drop that the Mie solver was not checked for.
+    #[error(transparent)]
+    Mie(#[from] MieError),
+    /// A wavelength without an index of water.
+    #[error(transparent)]
+    Wavelength(#[from] WavelengthError),
+}
+
+pub(crate) fn ensure(
+    holds: bool,
+    name: &'static str,
+    value: f64,
+    expected: &'static str,
+) -> Result<(), RainError> {
+    if holds { Ok(()) } else { Err(RainError::Setting { name, value, expected }) }
+}
