@@ -137,8 +137,11 @@ impl BudgetSettings {
 
     /// Electrons in one sample from one watt on the collector.
     fn electrons_per_watt(&self) -> f64 {
-        let photon_j = PLANCK_J_S * LIGHT_M_PER_S / (self.wavelength_nm * 1e-9);
-        self.optics_transmission * self.quantum_efficiency * self.sample_ns * 1e-9 / photon_j
+        self.optics_transmission * self.quantum_efficiency * self.sample_ns * 1e-9 / self.photon_j()
+    }
+
+    fn photon_j(&self) -> f64 {
+        PLANCK_J_S * LIGHT_M_PER_S / (self.wavelength_nm * 1e-9)
     }
 
     /// Part of an LED's light that enters the projection lens: for an intensity cos^m of the angle,
@@ -168,6 +171,31 @@ pub struct Budget {
     pub ambient_electrons_white: f64,
     /// Diameter of the collector that counts, in mm: its own, or what the detector's etendue allows.
     pub effective_collector_mm: f64,
+    /// How these came about.
+    pub terms: BudgetTerms,
+}
+
+/// The factors of a [`Budget`], in the order in which light meets them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BudgetTerms {
+    /// Light of one LED, in mW.
+    pub led_power_mw: f64,
+    /// Part of it that enters the projection lens.
+    pub projected: f64,
+    /// Part of a white target's light that the collector takes: its area over `pi D^2`.
+    pub collected: f64,
+    /// Part of that which filter and glass let through.
+    pub transmitted: f64,
+    /// Energy of a photon, in J.
+    pub photon_j: f64,
+    /// Electrons per photon.
+    pub quantum_efficiency: f64,
+    /// Time of a sample, in ns.
+    pub sample_ns: f64,
+    /// Daylight on the target within the filter, in W/m^2.
+    pub daylight_w_per_m2: f64,
+    /// Solid angle of the field, in sr.
+    pub field_sr: f64,
 }
 
 impl Budget {
@@ -203,6 +231,17 @@ impl Budget {
                 * field_sr
                 * settings.electrons_per_watt(),
             effective_collector_mm,
+            terms: BudgetTerms {
+                led_power_mw: settings.led_power_mw,
+                projected: settings.projected_fraction(projector),
+                collected,
+                transmitted: settings.optics_transmission,
+                photon_j: settings.photon_j(),
+                quantum_efficiency: settings.quantum_efficiency,
+                sample_ns: settings.sample_ns,
+                daylight_w_per_m2,
+                field_sr,
+            },
         })
     }
 

@@ -11,6 +11,16 @@
 //! | [`chain`] | electrons, one clock at a time | 14-bit ADC samples with noise, settling and latency |
 //! | [`depth`] | distance | an 8 x 8 time-of-flight reading |
 //!
+//! What is between camera and target, and what follows from it:
+//!
+//! | module | from | to |
+//! |---|---|---|
+//! | [`water`], [`mie`] | wavelength, size | water's refractive index; what one sphere does to light |
+//! | [`rain`] | rain rate, drop sizes, distance | extinction, blur, veil, single drops in the beams |
+//! | [`pixel`] | budget, weather, exposure | signal and noise of one pixel, term by term |
+//! | [`range`] | all of these | how far the camera sees (the paper's Algorithm 2) |
+//! | [`rig`] | collected volumes, nozzles | uniformity of a rain simulator |
+//!
 //! The law of the crate: light is counted in **electrons per ADC sample** from [`budget`] on, and
 //! nothing is rescaled to look good. A weak signal stays weak; the gain that shows it is a setting.
 //!
@@ -40,13 +50,17 @@ pub mod budget;
 pub mod chain;
 pub mod depth;
 pub mod mie;
+pub mod pixel;
 pub mod projector;
 pub mod rain;
+pub mod range;
+pub mod rig;
 pub mod scene;
+
 pub mod water;
 
 pub use array::LedArray;
-pub use budget::{Budget, BudgetError, BudgetSettings};
+pub use budget::{Budget, BudgetError, BudgetSettings, BudgetTerms};
 pub use chain::{AdcSample, Chain, ChainError, ChainSettings};
 pub use depth::{DepthError, SimulatedDepth};
 pub use projector::{Footprint, Projector, ProjectorError};

@@ -8,6 +8,7 @@
 //! | [`blur`] | scattering angles, distance | where forward-scattered light lands on the target |
 //! | [`veil`] | medium, geometry | light that comes back without having seen the target |
 //! | [`falling`] | drops, distance, seed | single drops that cross the LEDs' beams, from frame to frame |
+//! | [`weather`] | drops, wavelength | all of these, at any distance |
 //! | [`radar`] | drops | differential reflectivity, an input of the paper's Algorithm 2 |
 //!
 //! Law: everything is a sum over the same list of drops ([`Drops`]), so that two results can only differ by physics,
@@ -20,12 +21,14 @@ pub mod falling;
 pub mod medium;
 pub mod radar;
 pub mod veil;
+pub mod weather;
 
 pub use blur::ForwardBlur;
 pub use drops::{DropClass, Drops};
 pub use falling::{BeamShadows, FallingDrops};
 pub use medium::{Medium, ScatteringAngles};
 pub use veil::Veil;
+pub use weather::Weather;
 
 use crate::mie::MieError;
 use crate::water::WavelengthError;
