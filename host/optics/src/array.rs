@@ -19,6 +19,8 @@ const MEMO_LIMIT: usize = 4 * LEDS;
 pub struct LedArray {
     /// Electrons per ADC sample from each LED when lit, row-major.
     electrons: Vec<f32>,
+    /// What each row gives where its line is 0 and where it is 1, by the column lines: a sweep has few of those.
+    rows: HashMap<u32, [[f64; 2]; SIDE]>,
     /// Bit r of the rows in the high half, bit c of the columns in the low half.
     memo: HashMap<u64, f32>,
     last: Option<(u64, f32)>,
@@ -30,7 +32,23 @@ impl LedArray {
     pub fn new(footprint: &Footprint, electrons_per_led: f64) -> Self {
         let electrons =
             footprint.weights().iter().map(|&w| (f64::from(w) * electrons_per_led) as f32);
-        Self { electrons: electrons.collect(), memo: HashMap::new(), last: None }
+        Self {
+            electrons: electrons.collect(),
+            rows: HashMap::new(),
+            memo: HashMap::new(),
+            last: None,
+        }
+    }
+
+    /// The same array once something has changed in front of it: `reflectance` is what each LED's spot now sees, 32 x 32,
+    /// row-major.
+    pub fn relight(&mut self, reflectance: &[f32], electrons_per_led: f64) {
+        for (electrons, &seen) in self.electrons.iter_mut().zip(reflectance) {
+            *electrons = (f64::from(seen) * electrons_per_led) as f32;
+        }
+        self.rows.clear();
+        self.memo.clear();
+        self.last = None;
     }
 
     /// Settled light in electrons per ADC sample. Bit r of `rows` and bit c of `cols` are the lines
@@ -47,22 +65,26 @@ impl LedArray {
         }
         if self.memo.len() >= MEMO_LIMIT {
             self.memo.clear();
+            self.rows.clear();
         }
-        let electrons = &self.electrons;
-        let light = *self.memo.entry(lines).or_insert_with(|| sum_lit(electrons, rows, cols));
+        let (electrons, by_row) = (&self.electrons, &mut self.rows);
+        let light = *self.memo.entry(lines).or_insert_with(|| {
+            let sums = by_row.entry(cols).or_insert_with(|| row_sums(electrons, cols));
+            let lit = sums.iter().enumerate().map(|(row, sum)| sum[(rows >> row & 1) as usize]);
+            lit.sum::<f64>() as f32
+        });
         self.last = Some((lines, light));
         light
     }
 }
 
-fn sum_lit(electrons: &[f32], rows: u32, cols: u32) -> f32 {
-    let mut sum = 0.0_f64;
-    for (row, leds) in electrons.chunks_exact(SIDE).enumerate() {
+/// Light of each row where its line is 0, which lights the columns at 0, and where it is 1.
+fn row_sums(electrons: &[f32], cols: u32) -> [[f64; 2]; SIDE] {
+    let mut sums = [[0.0; 2]; SIDE];
+    for (sum, leds) in sums.iter_mut().zip(electrons.chunks_exact(SIDE)) {
         for (column, &led) in leds.iter().enumerate() {
-            if (rows >> row ^ cols >> column) & 1 == 0 {
-                sum += f64::from(led);
-            }
+            sum[(cols >> column & 1) as usize] += f64::from(led);
         }
     }
-    sum as f32
+    sums
 }

@@ -20,6 +20,7 @@
 //! | [`pixel`] | budget, weather, exposure | signal and noise of one pixel, term by term |
 //! | [`range`] | all of these | how far the camera sees (the paper's Algorithm 2) |
 //! | [`rig`] | collected volumes, nozzles | uniformity of a rain simulator |
+//! | [`visible`] | scene, daylight, drops | what an ordinary camera sees |
 //!
 //! The law of the crate: light is counted in **electrons per ADC sample** from [`budget`] on, and
 //! nothing is rescaled to look good. A weak signal stays weak; the gain that shows it is a setting.
@@ -56,6 +57,7 @@ pub mod rain;
 pub mod range;
 pub mod rig;
 pub mod scene;
+pub mod visible;
 
 pub mod water;
 

@@ -9,6 +9,7 @@
 //! | [`veil`] | medium, geometry | light that comes back without having seen the target |
 //! | [`falling`] | drops, distance, seed | single drops that cross the LEDs' beams, from frame to frame |
 //! | [`weather`] | drops, wavelength | all of these, at any distance |
+//! | [`spots`] | weather, scene, seed | what each LED's spot shows as drops fall |
 //! | [`radar`] | drops | differential reflectivity, an input of the paper's Algorithm 2 |
 //!
 //! Law: everything is a sum over the same list of drops ([`Drops`]), so that two results can only differ by physics,
@@ -20,6 +21,7 @@ pub mod fall;
 pub mod falling;
 pub mod medium;
 pub mod radar;
+pub mod spots;
 pub mod veil;
 pub mod weather;
 
@@ -27,6 +29,7 @@ pub use blur::ForwardBlur;
 pub use drops::{DropClass, Drops};
 pub use falling::{BeamShadows, FallingDrops};
 pub use medium::{Medium, ScatteringAngles};
+pub use spots::RainySpots;
 pub use veil::Veil;
 pub use weather::Weather;
 

@@ -2,11 +2,12 @@
 
 use super::Usage;
 use anyhow::{Context, Result};
-use clap::Args;
+use clap::{Args, ValueEnum};
 use nirspi::files::order_table::read_order_table;
 use nirspi::scene::{SceneMap, SceneSource};
 use nirspi::setup::MeasurementSetup;
 use nirspi::virtual_camera::VirtualOptics;
+use nirspi_optics::rain::{Drops, RainError};
 use nirspi_optics::{Projector, Scene};
 use nirspi_recon::Order;
 use std::path::Path;
@@ -24,9 +25,36 @@ pub struct SceneArgs {
     /// Distance from the virtual camera to the target, in metres
     #[arg(long, value_name = "M", default_value_t = 0.3, allow_negative_numbers = true)]
     pub distance_m: f64,
+    /// What falls between the virtual camera and the target, as in the paper's Table 2: light is 1.93 mm/h of 0.5 mm drops,
+    /// heavy 5.6 mm/h of 2 mm drops
+    #[arg(long, value_enum, default_value_t = Rain::None)]
+    pub rain: Rain,
     /// Seed of the simulated noise: the same seed gives the same bytes
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
+}
+
+/// The paper's rain (Table 2).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Rain {
+    /// Dry air.
+    None,
+    /// 1.93 mm/h, 0.5 mm.
+    Light,
+    /// 5.6 mm/h, 2 mm.
+    Heavy,
+}
+
+impl Rain {
+    /// Its drops; none in dry air.
+    pub fn drops(self) -> Result<Option<Drops>, RainError> {
+        match self {
+            Self::None => Ok(None),
+            Self::Light => Drops::monodisperse(1.93, 0.5).map(Some),
+            Self::Heavy => Drops::monodisperse(5.6, 2.0).map(Some),
+        }
+    }
 }
 
 impl SceneArgs {
@@ -48,6 +76,12 @@ impl SceneArgs {
             // The depth sensor has a range of its own.
             .and_then(|optics| optics.depth(self.seed).map(|_| optics).map_err(Into::into))
             .map_err(|error| Usage(format!("--distance-m {}: {error}", self.distance_m)))?;
+        let optics = match self.rain.drops()? {
+            Some(drops) => optics.in_rain(drops).map_err(|error| {
+                Usage(format!("--rain at --distance-m {}: {error}", self.distance_m))
+            })?,
+            None => optics,
+        };
         Ok((map, optics))
     }
 }

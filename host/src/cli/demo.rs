@@ -1,6 +1,6 @@
 //! `nirspi demo`: the whole camera on a simulated scene, from light to picture.
 
-use super::camera::{SceneArgs, SetupArgs};
+use super::camera::{Rain, SceneArgs, SetupArgs};
 use super::method::{self, MethodArgs, Solved, solve};
 use super::print;
 use super::quality::{Quality, compare};
@@ -62,6 +62,7 @@ struct Report {
     scene: String,
     simulated: bool,
     distance_m: f64,
+    rain: Rain,
     seed: u64,
     field_mm: f64,
     defocus_mm: f64,
@@ -150,6 +151,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         scene: map.name.clone(),
         simulated: true,
         distance_m: args.scene.distance_m,
+        rain: args.scene.rain,
         seed: args.scene.seed,
         field_mm: optics.field_mm(),
         defocus_mm: optics.blur_mm(),

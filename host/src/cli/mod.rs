@@ -13,6 +13,8 @@ mod method;
 mod metrics;
 mod print;
 mod quality;
+mod rain;
+mod range;
 mod reconstruct;
 mod report;
 mod selftest;
@@ -46,6 +48,8 @@ enum Command {
     Flash(flash::Args),
     Setup(setup::Args),
     Metrics(metrics::Args),
+    Rain(rain::Args),
+    Range(range::Args),
 }
 
 /// A mistake in how the program was called, rather than in what it was given.
@@ -78,6 +82,8 @@ pub fn run() -> ExitCode {
         Command::Flash(args) => flash::run(&args),
         Command::Setup(args) => setup::run(&args),
         Command::Metrics(args) => metrics::run(&args),
+        Command::Rain(args) => rain::run(&args),
+        Command::Range(args) => range::run(&args),
     };
     match result {
         Ok(code) => code,

@@ -6,7 +6,9 @@
 
 pub(crate) mod glyph;
 
+mod chart;
 mod layout;
 mod text;
 
+pub use chart::{Axis, Chart, Line};
 pub use layout::{Panel, Range, SideBySide};

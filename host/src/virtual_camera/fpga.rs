@@ -2,7 +2,11 @@
 
 use nirspi_hdl::{AdcSample, Gateware, Lines};
 use nirspi_mcu::{BusError, FpgaBus};
+use nirspi_optics::rain::RainySpots;
 use nirspi_optics::{Chain, LedArray};
+
+/// ADC clocks after which drops are looked at again: a differential sweep, in which a 2 mm drop falls half a millimetre.
+const WEATHER_CLOCKS: u64 = 10_240;
 
 /// An FPGA whose time the virtual camera moves.
 pub trait SimulatedFpga: FpgaBus + Send {
@@ -27,6 +31,15 @@ pub struct OpticalFpga {
     wiring: Option<Wiring>,
     chain: Chain,
     clock: u64,
+    rain: Option<Rain>,
+}
+
+/// Rain between the array and the scene.
+struct Rain {
+    spots: RainySpots,
+    electrons_per_led: f64,
+    /// When the drops were looked at last.
+    seen: u64,
 }
 
 impl OpticalFpga {
@@ -35,7 +48,7 @@ impl OpticalFpga {
     pub fn new(array: LedArray, chain: Chain) -> Self {
         let mut gateware = Gateware::new();
         gateware.set_interlock(true);
-        Self { gateware, array, wiring: None, chain, clock: 0 }
+        Self { gateware, array, wiring: None, chain, clock: 0, rain: None }
     }
 
     /// The same camera with this between FPGA and LEDs.
@@ -43,14 +56,37 @@ impl OpticalFpga {
     pub fn wired(self, wiring: impl FnMut(&mut LedArray, Lines) -> f32 + Send + 'static) -> Self {
         Self { wiring: Some(Box::new(wiring)), ..self }
     }
+
+    /// The same with rain in front of it; an LED on a white target in dry air gives `electrons_per_led`.
+    #[must_use]
+    pub fn in_rain(mut self, spots: RainySpots, electrons_per_led: f64) -> Self {
+        self.array.relight(&spots.reflectance(), electrons_per_led);
+        self.rain = Some(Rain { spots, electrons_per_led, seen: 0 });
+        self
+    }
+
+    /// Lets the drops fall to where they are at `clock`, if they have not been looked at for long.
+    fn look_at_the_rain(&mut self, clock: u64) {
+        let Some(rain) = self.rain.as_mut().filter(|rain| clock - rain.seen >= WEATHER_CLOCKS)
+        else {
+            return;
+        };
+        rain.spots.advance((clock - rain.seen) as f64 / f64::from(nirspi_wire::ADC_HZ));
+        rain.seen = clock;
+        self.array.relight(&rain.spots.reflectance(), rain.electrons_per_led);
+    }
 }
 
 impl SimulatedFpga for OpticalFpga {
     fn advance(&mut self, clocks: u32) {
+        let begun = self.clock;
         self.clock += u64::from(clocks);
-        for _ in 0..clocks {
+        for passed in 0..clocks {
             // Nobody looks at the ADC outside a run, and drawing its noise is most of the work.
             let sample = if self.gateware.running() {
+                if self.rain.is_some() {
+                    self.look_at_the_rain(begun + u64::from(passed));
+                }
                 let lines = self.gateware.lines();
                 let light = match &mut self.wiring {
                     None => self.array.light(lines.rows, lines.columns, lines.enable),

@@ -1,6 +1,9 @@
 //! What stands in front of the virtual camera: scene, projector, photon budget, receiver.
 
 use super::{OpticalFpga, VirtualCamera};
+use nirspi_optics::pixel::Instrument;
+use nirspi_optics::rain::{BeamShadows, Drops, RainError, RainySpots, Weather};
+use nirspi_optics::water::Water;
 use nirspi_optics::{
     Budget, BudgetError, BudgetSettings, Chain, ChainError, ChainSettings, DepthError, Footprint,
     LedArray, Projector, ProjectorError, Scene, SimulatedDepth,
@@ -19,6 +22,8 @@ pub struct VirtualOptics {
     footprint: Footprint,
     budget: Budget,
     chain: ChainSettings,
+    wavelength_nm: f64,
+    weather: Option<Weather>,
 }
 
 /// Optics that cannot be.
@@ -36,6 +41,9 @@ pub enum VirtualOpticsError {
     /// Distance.
     #[error(transparent)]
     Depth(#[from] DepthError),
+    /// Weather.
+    #[error(transparent)]
+    Rain(#[from] RainError),
 }
 
 impl VirtualOptics {
@@ -66,10 +74,43 @@ impl VirtualOptics {
         mut chain: ChainSettings,
     ) -> Result<Self, VirtualOpticsError> {
         let footprint = projector.footprint(&scene, distance_mm)?;
+        let wavelength_nm = budget.wavelength_nm;
         let budget = Budget::new(budget, &projector, distance_mm)?;
         chain.electrons_per_count = chain.auto_gain(&budget)?;
         chain.ambient_electrons = budget.ambient_electrons(footprint.mean());
-        Ok(Self { scene, projector, distance_mm, footprint, budget, chain })
+        let weather = None;
+        Ok(Self { scene, projector, distance_mm, footprint, budget, chain, wavelength_nm, weather })
+    }
+
+    /// Lets these drops fall between camera and scene. Daylight is dimmed and scattered as they do on average; what they
+    /// do to the LEDs' light is followed drop by drop.
+    ///
+    /// # Errors
+    /// Air too dense, or too many drops to be followed.
+    pub fn in_rain(mut self, drops: Drops) -> Result<Self, VirtualOpticsError> {
+        let weather = Weather::new(drops, self.wavelength_nm, Water::Segelstein)?;
+        let baseline_mm = Instrument::default().baseline_mm;
+        let veil = weather.veil(&self.projector, self.distance_mm, baseline_mm)?;
+        let returned = weather.blur(self.distance_mm)?.returned(self.field_mm() / self.distance_mm);
+        self.chain.ambient_electrons = self.budget.ambient_electrons(self.footprint.mean())
+            * returned
+            + self.budget.ambient_electrons_white * veil.airlight;
+        self.weather = Some(weather);
+        // Whether the drops can be followed shows now rather than when the camera is made.
+        self.spots(0)?;
+        Ok(self)
+    }
+
+    /// What the LEDs' spots show in the rain; none in dry air.
+    fn spots(&self, seed: u64) -> Result<Option<RainySpots>, RainError> {
+        let Some(weather) = &self.weather else { return Ok(None) };
+        let beams = BeamShadows {
+            projector: self.projector,
+            distance_mm: self.distance_mm,
+            baseline_mm: Instrument::default().baseline_mm,
+            collector_mm: self.budget.effective_collector_mm,
+        };
+        RainySpots::new(weather, &self.footprint, beams, seed).map(Some)
     }
 
     /// Replaces the receiver by an exact one: no noise, no settling, no daylight, no latency. For tests
@@ -135,9 +176,14 @@ impl VirtualOptics {
     ///
     /// # Errors
     /// A receiver setting out of range.
-    pub fn fpga(&self, seed: u64) -> Result<OpticalFpga, ChainError> {
-        let array = LedArray::new(&self.footprint, self.budget.electrons_per_led);
-        Ok(OpticalFpga::new(array, Chain::new(self.chain, seed)?))
+    pub fn fpga(&self, seed: u64) -> Result<OpticalFpga, VirtualOpticsError> {
+        let electrons_per_led = self.budget.electrons_per_led;
+        let array = LedArray::new(&self.footprint, electrons_per_led);
+        let fpga = OpticalFpga::new(array, Chain::new(self.chain, seed)?);
+        Ok(match self.spots(seed)? {
+            Some(spots) => fpga.in_rain(spots, electrons_per_led),
+            None => fpga,
+        })
     }
 
     /// The time-of-flight sensor beside the camera.

@@ -48,13 +48,14 @@ impl BeamShadows {
         self.collector_mm / 2.0 * (1.0 - part) + self.out_radius_mm(self.distance_mm) * part
     }
 
-    /// Multiplies into `kept` (32 x 32) what a drop at (x, y, z) leaves of each LED's light.
-    fn shade(&self, drop: &Drop, kept: &mut [f32]) {
+    /// Multiplies into `kept` (32 x 32) what a drop leaves of each LED's light on the ways asked for.
+    fn shade(&self, drop: &Drop, ways: Ways, kept: &mut [f32]) {
         let part = drop.z_mm / self.distance_mm;
         let pitch = self.projector.field_mm(self.distance_mm) / SIDE as f64 * part;
         let out = (0.0, self.out_radius_mm(drop.z_mm));
         let back = (self.baseline_mm * (1.0 - part), self.back_radius_mm(drop.z_mm));
-        for (offset, beam) in [out, back] {
+        let both = [out, back];
+        for &(offset, beam) in if ways == Ways::Both { &both[..] } else { &both[1..] } {
             let reach = beam + drop.radius_mm;
             let (x, y) = ((drop.x_mm - offset) / pitch, drop.y_mm / pitch);
             let centre = (SIDE as f64 - 1.0) / 2.0;
@@ -74,6 +75,15 @@ impl BeamShadows {
             }
         }
     }
+}
+
+/// Which of an LED's light a drop can stand in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Ways {
+    /// From the projector and back to the collector.
+    Both,
+    /// Back to the collector alone: a camera in daylight.
+    Back,
 }
 
 /// Area that two discs share whose centres are `apart`.
@@ -175,9 +185,18 @@ impl FallingDrops {
 
     /// Share of each LED's light that the drops leave on both ways, 32 x 32, row-major.
     pub fn kept(&self) -> Vec<f32> {
+        self.left(Ways::Both)
+    }
+
+    /// The same on the way back alone: what drops leave of each spot's view, for a camera that needs no LEDs.
+    pub fn seen(&self) -> Vec<f32> {
+        self.left(Ways::Back)
+    }
+
+    fn left(&self, ways: Ways) -> Vec<f32> {
         let mut kept = vec![1.0; LEDS];
         for drop in &self.drops {
-            self.beams.shade(drop, &mut kept);
+            self.beams.shade(drop, ways, &mut kept);
         }
         kept
     }
@@ -213,7 +232,7 @@ mod tests {
         let drop =
             Drop { x_mm: 6.73, y_mm: -8.22, z_mm: 299.0, radius_mm: 0.7, speed_mm_per_s: 0.0 };
         let mut kept = vec![1.0; LEDS];
-        beams.shade(&drop, &mut kept);
+        beams.shade(&drop, Ways::Both, &mut kept);
         assert!(kept[10 * SIDE + 20] < 0.1, "{}", kept[10 * SIDE + 20]);
         assert_eq!(kept.iter().filter(|&&k| k < 1.0).count(), 1);
     }

@@ -1,0 +1,79 @@
+//! What each LED's spot shows while it rains: the target between drops, light scattered from around, and the veil.
+//!
+//! Law: on average over time a white target gives what [`super::ForwardBlur`] says; from frame to frame it is single
+//! drops that make the difference. Where droplets are too many to be followed (fog), there is the average alone.
+
+use super::drops::SMALLEST_RAINDROP_MM;
+use super::{BeamShadows, FallingDrops, RainError, Weather};
+use crate::Footprint;
+
+/// The 32 x 32 spots of one scene in rain, as time goes by.
+#[derive(Debug, Clone)]
+pub struct RainySpots {
+    dry: Vec<f32>,
+    /// Scattered light of each spot and the veil, in units of a white target.
+    added: Vec<f32>,
+    /// What is left on average without single drops' shadows.
+    kept: f64,
+    falling: Option<FallingDrops>,
+}
+
+impl RainySpots {
+    /// `footprint` seen through `beams` in this weather. The same seed gives the same rain.
+    ///
+    /// # Errors
+    /// [`RainError`] for air too dense for single scattering or too many drops.
+    pub fn new(
+        weather: &Weather,
+        footprint: &Footprint,
+        beams: BeamShadows,
+        seed: u64,
+    ) -> Result<Self, RainError> {
+        let BeamShadows { projector, distance_mm, baseline_mm, .. } = beams;
+        let blur = weather.blur(distance_mm)?;
+        let pitch_mm = projector.field_mm(distance_mm) / crate::SIDE as f64;
+        let kernel = blur.kernel(pitch_mm);
+        let returned = blur.returned(projector.field_mm(distance_mm) / distance_mm);
+        let drops = weather.drops();
+        let rains = drops
+            .classes()
+            .iter()
+            .any(|class| class.diameter_mm >= SMALLEST_RAINDROP_MM && class.per_m3 > 0.0);
+        // Followed drops take their shadow; their diffraction, as much again, stays in the spot and is not taken at all.
+        let shadow = if rains { (-drops.shadow_per_m() * distance_mm * 1e-3).exp() } else { 1.0 };
+        let (kernel, kept) = if rains {
+            (kernel.without_own(1.0 - shadow), returned / shadow)
+        } else {
+            let own = kernel.unscattered + kernel.scattered(0, 0);
+            (kernel.without_own(f64::INFINITY), own * returned)
+        };
+        let veil = weather.veil(&projector, distance_mm, baseline_mm)?;
+        let halo = kernel.halo(footprint.weights());
+        Ok(Self {
+            dry: footprint.weights().to_vec(),
+            added: halo.iter().map(|h| (h * returned + veil.backscatter) as f32).collect(),
+            kept,
+            falling: if rains { Some(FallingDrops::new(drops, beams, seed)?) } else { None },
+        })
+    }
+
+    /// Lets time pass.
+    pub fn advance(&mut self, seconds: f64) {
+        if let Some(falling) = &mut self.falling {
+            falling.advance(seconds);
+        }
+    }
+
+    /// What each LED's spot shows now, 32 x 32, row-major: reflectances as a camera in dry air would see them.
+    pub fn reflectance(&self) -> Vec<f32> {
+        let kept = self.kept as f32;
+        let spots = self.dry.iter().zip(&self.added);
+        match &self.falling {
+            None => spots.map(|(dry, added)| dry * kept + added).collect(),
+            Some(falling) => {
+                let shadows = falling.kept();
+                spots.zip(shadows).map(|((dry, added), share)| dry * kept * share + added).collect()
+            }
+        }
+    }
+}

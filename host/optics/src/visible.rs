@@ -1,0 +1,127 @@
+//! An ordinary camera in daylight, for comparison: the visible ("VIS") rows of the paper's tables.
+//!
+//! The same field, grid of 32 x 32, distance, daylight and drops as the single-pixel camera has, so that what differs is
+//! the light and not the geometry. The paper does not say which camera it used; this is a small industrial one, focused
+//! on the target.
+//!
+//! A drop before a pixel shows a wide view of the surroundings instead of what is behind it, 0.94 as bright as they are on
+//! average (Garg and Nayar, Int. J. Comput. Vis. 75, 3, 2007). The surroundings are a sky as bright as a white target.
+
+use crate::rain::{BeamShadows, Drops, FallingDrops, RainError};
+use crate::{LEDS, Projector, ProjectorError, Scene};
+use rand::{RngExt, SeedableRng};
+use rand_distr::StandardNormal;
+use rand_pcg::Pcg64Mcg;
+use thiserror::Error;
+
+/// Brightness of a drop over that of its surroundings.
+const DROP_BRIGHTNESS: f64 = 0.94;
+
+/// Energy of a photon at 555 nm, where a watt is 683 lumen, in J.
+const PHOTON_J: f64 = 3.579e-19;
+
+/// Lumen per watt at 555 nm (SI, exact).
+const LUMEN_PER_WATT: f64 = 683.0;
+
+/// Looks at the drops during one exposure.
+const LOOKS: usize = 8;
+
+/// Why there is no picture.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum VisibleError {
+    /// Scene or distance.
+    #[error(transparent)]
+    Projector(#[from] ProjectorError),
+    /// Weather.
+    #[error(transparent)]
+    Rain(#[from] RainError),
+}
+
+/// A camera.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct VisibleCamera {
+    /// Diameter of the lens, in mm.
+    pub aperture_mm: f64,
+    /// f-number.
+    pub f_number: f64,
+    /// Edge of a sensor pixel, in um.
+    pub pixel_um: f64,
+    /// Electrons per photon.
+    pub quantum_efficiency: f64,
+    /// Electrons that a white target is exposed for, of a full well of about 10 000.
+    pub white_electrons: f64,
+    /// Read noise, in electrons rms.
+    pub read_noise_electrons: f64,
+    /// Illuminance, in klx (paper: 15).
+    pub daylight_klx: f64,
+}
+
+impl Default for VisibleCamera {
+    fn default() -> Self {
+        Self {
+            aperture_mm: 2.9,
+            f_number: 2.8,
+            pixel_um: 5.0,
+            quantum_efficiency: 0.6,
+            white_electrons: 7000.0,
+            read_noise_electrons: 5.0,
+            daylight_klx: 15.0,
+        }
+    }
+}
+
+impl VisibleCamera {
+    /// Exposure that a white target needs, in s: illuminance on the sensor is `E / (4 N^2)` (glass of 0.9).
+    pub fn exposure_s(&self) -> f64 {
+        let on_sensor_lx = self.daylight_klx * 1e3 * 0.9 / (4.0 * self.f_number.powi(2));
+        let photons_per_m2_s = on_sensor_lx / LUMEN_PER_WATT / PHOTON_J;
+        let area_m2 = (self.pixel_um * 1e-6).powi(2);
+        self.white_electrons / (photons_per_m2_s * area_m2 * self.quantum_efficiency)
+    }
+
+    /// A picture of `scene` at `distance_mm` in this rain, 32 x 32 over the field of `projector`: reflectance as the camera
+    /// would report it, white being 1. Seeded.
+    ///
+    /// # Errors
+    /// [`VisibleError`] for a distance or rain that cannot be.
+    pub fn picture(
+        &self,
+        scene: &Scene,
+        projector: &Projector,
+        distance_mm: f64,
+        drops: &Drops,
+        seed: u64,
+    ) -> Result<Vec<f32>, VisibleError> {
+        // Sharp where the projector is out of focus: it is focused on the target.
+        let sharp =
+            Projector { aperture_mm: 1e-3, emitter_mm: projector.led_pitch_mm, ..*projector };
+        let footprint = sharp.footprint(scene, distance_mm)?;
+        let beams = BeamShadows {
+            projector: sharp,
+            distance_mm,
+            baseline_mm: 1e-3,
+            collector_mm: self.aperture_mm,
+        };
+        let mut falling = FallingDrops::new(drops, beams, seed)?;
+        let mut seen = vec![0.0; LEDS];
+        for _ in 0..LOOKS {
+            falling.advance(self.exposure_s() / LOOKS as f64);
+            for (sum, look) in seen.iter_mut().zip(falling.seen()) {
+                *sum += f64::from(look) / LOOKS as f64;
+            }
+        }
+        let mut rng = Pcg64Mcg::seed_from_u64(seed ^ 0x5EED);
+        Ok(footprint
+            .weights()
+            .iter()
+            .zip(seen)
+            .map(|(&reflectance, seen)| {
+                let light = f64::from(reflectance) * seen + DROP_BRIGHTNESS * (1.0 - seen);
+                let electrons = light * self.white_electrons;
+                let noise = (electrons + self.read_noise_electrons.powi(2)).sqrt();
+                let found = electrons + noise * rng.sample::<f64, _>(StandardNormal);
+                (found / self.white_electrons) as f32
+            })
+            .collect())
+    }
+}
