@@ -7,7 +7,7 @@
 //! * [`calibrate`] measures latency and settling, [`selftest`] checks a camera, [`kept_calibration`] remembers,
 //! * [`capture`] runs a measurement, [`recording`] keeps it,
 //! * [`tally`] and [`integrate`] turn frames into measurements; `nirspi-recon` turns those into an image,
-//! * [`files`], [`picture`] and [`scene`] are what people see and hand over,
+//! * [`files`], [`picture`] and [`scene`] are what people see and hand over, [`resolution`] says how fine it is,
 //! * [`udev`] lets users use cameras on USB; [`boards`] lists the boards that firmware is for; with the feature `flash`, `flash` programs them,
 //! * [`virtual_camera`] is a camera without silicon: optics simulator, gateware model, real firmware logic.
 
@@ -24,6 +24,7 @@ pub mod kept_calibration;
 pub mod link;
 pub mod picture;
 pub mod recording;
+pub mod resolution;
 pub mod scene;
 pub mod selftest;
 pub mod session;

@@ -7,6 +7,7 @@ mod camera;
 mod capture;
 mod demo;
 mod devices;
+mod eval;
 mod flash;
 mod info;
 mod method;
@@ -50,6 +51,7 @@ enum Command {
     Metrics(metrics::Args),
     Rain(rain::Args),
     Range(range::Args),
+    Eval(eval::EvalArgs),
 }
 
 /// A mistake in how the program was called, rather than in what it was given.
@@ -84,6 +86,7 @@ pub fn run() -> ExitCode {
         Command::Metrics(args) => metrics::run(&args),
         Command::Rain(args) => rain::run(&args),
         Command::Range(args) => range::run(&args),
+        Command::Eval(args) => eval::run(&args),
     };
     match result {
         Ok(code) => code,

@@ -1,0 +1,76 @@
+//! One picture taken with the virtual camera, from light to image, and one with an ordinary camera.
+
+use crate::cli::camera::Rain;
+use anyhow::{Result, bail};
+use indicatif::{ProgressBar, ProgressStyle};
+use nirspi::capture::{CaptureOptions, Ended, Progress, capture};
+use nirspi::session::Session;
+use nirspi::setup::MeasurementSetup;
+use nirspi::virtual_camera::{MemoryLink, VirtualOptics};
+use nirspi_optics::rain::Drops;
+use nirspi_optics::visible::VisibleCamera;
+use nirspi_optics::{Projector, Scene};
+use nirspi_recon::{Image, Order, Side, reconstruct};
+use std::ops::ControlFlow;
+
+/// Conditions of a table.
+#[derive(Debug, Clone, Copy)]
+pub struct Conditions {
+    pub distance_m: f64,
+    pub rain: Rain,
+    /// Differential sweeps that are summed.
+    pub frames: u32,
+}
+
+/// All 1024 patterns and their complements: 244 times is 20 ms, the paper's T_pre (Table 1).
+pub const FRAMES: u32 = 244;
+
+/// What both cameras give of one scene.
+pub struct Shots {
+    /// What a perfect camera of 32 x 32 pixels would see.
+    pub truth: Vec<f32>,
+    pub nir_spi: Image,
+    pub vis: Image,
+}
+
+/// A progress bar for `total` shots.
+pub fn progress(total: usize, what: &str) -> ProgressBar {
+    let template = format!("{what} {{bar:30}} {{pos}}/{{len}} pictures, {{eta}} left");
+    let style =
+        ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar());
+    ProgressBar::new(total as u64).with_style(style)
+}
+
+/// Takes `scene` with both cameras.
+pub fn shoot(scene: Scene, conditions: Conditions, seed: u64) -> Result<Shots> {
+    let distance_mm = conditions.distance_m * 1e3;
+    let drops = conditions.rain.drops()?;
+    let visible = VisibleCamera::default().picture(
+        &scene,
+        &Projector::default(),
+        distance_mm,
+        drops.as_ref().unwrap_or(&Drops::none()),
+        seed,
+    )?;
+    let mut optics = VirtualOptics::new(scene, distance_mm)?;
+    if let Some(drops) = drops {
+        optics = optics.in_rain(drops)?;
+    }
+    let truth = optics.focused_footprint()?.weights().to_vec();
+    let mut session = Session::open(Box::new(MemoryLink::new(optics.camera(seed)?)))?;
+    let options = CaptureOptions {
+        setup: MeasurementSetup::new(&Order::Natural, 1.0)?,
+        frames: Some(conditions.frames),
+        calibrate: true,
+        record: None,
+    };
+    let mut watch = |_: &Progress| ControlFlow::Continue(());
+    let captured = capture(&mut session, &options, &mut watch)?;
+    if let Ended::Fault(fault) = &captured.ended {
+        bail!("the virtual camera switched its LEDs off: {fault:?}");
+    }
+    let measurements =
+        captured.integrated.measurements(&captured.setup, captured.settling.as_ref(), false)?;
+    let vis = Image::new(Side::INSTRUMENT, visible);
+    Ok(Shots { truth, nir_spi: reconstruct::hadamard(&measurements), vis })
+}
