@@ -1,14 +1,13 @@
-//! Orthogonal matching pursuit on one frame: N = 1024 atoms, M = 512 measurements, K = 64 atoms chosen.
+//! Orthogonal matching pursuit over N = 1024 atoms: one frame with everything prepared, and the preparation.
 //!
-//! `cargo bench -p nirspi-recon --bench omp`
-//!
-//! The Gram matrix is computed beforehand where the name does not say otherwise, as the paper does it.
-use divan::{Bencher, black_box};
-use nalgebra::{DMatrix, DVector};
+//! `cargo bench -p nirspi-recon --bench omp`; against other programs: `benches/peers.py` beside this file.
+use divan::{Bencher, black_box, counter::ItemsCount};
+use nalgebra::DMatrix;
 use nirspi_recon::basis::Transform;
-use nirspi_recon::omp::fast::{DenseGram, pursue};
 use nirspi_recon::omp::sampled::{Prior, SampledHadamard};
-use nirspi_recon::omp::{Limits, fast, reference};
+use nirspi_recon::omp::{
+    Backend, DenseDictionary, Dictionary, Limits, Problem, Scalar, Solver, reference, solve_batch,
+};
 use nirspi_recon::reconstruct::{OmpSettings, omp};
 use nirspi_recon::{Basis, Measurements, Order, Side};
 use rand::{RngExt, SeedableRng};
@@ -16,60 +15,79 @@ use rand_pcg::Pcg64;
 
 const ATOMS: usize = 1024;
 const MEASUREMENTS: usize = 512;
-const LIMITS: Limits = Limits { sparsity: 64, residual: 0.0 };
+const SPARSITY: usize = 64;
 
 fn main() {
     divan::main();
 }
 
-fn problem() -> (DMatrix<f32>, Vec<f32>) {
+fn dictionary<T: Scalar>(measurements: usize) -> DMatrix<T> {
     let mut random = Pcg64::seed_from_u64(1);
-    let dictionary =
-        DMatrix::from_fn(MEASUREMENTS, ATOMS, |_, _| random.random_range(-1.0..1.0_f32));
-    let y = (0..MEASUREMENTS).map(|_| random.random_range(-1.0..1.0_f32)).collect();
-    (dictionary, y)
+    DMatrix::from_fn(measurements, ATOMS, |_, _| T::from_f64(random.random_range(-1.0..1.0)))
+}
+
+fn frames<T: Scalar>(measurements: usize, count: usize) -> Vec<T> {
+    let mut random = Pcg64::seed_from_u64(2);
+    (0..measurements * count).map(|_| T::from_f64(random.random_range(-1.0..1.0))).collect()
+}
+
+#[divan::bench(types = [f32, f64])]
+fn one_frame<T: Scalar>(bencher: Bencher) {
+    let dictionary = DenseDictionary::<T>::new(&dictionary(MEASUREMENTS));
+    let y = frames(MEASUREMENTS, 1);
+    let Ok(mut solver) = Solver::new(&dictionary, &Limits::atoms(SPARSITY)) else { return };
+    bencher.bench_local(|| solver.solve(black_box(&y)).map(|path| path.coefficients(SPARSITY)));
+}
+
+#[divan::bench(args = [(256, 16), (256, 64), (512, 16), (512, 256), (1024, 64), (1024, 256)])]
+fn one_frame_of_m_and_k(bencher: Bencher, (measurements, sparsity): (usize, usize)) {
+    let dictionary = DenseDictionary::<f32>::new(&dictionary(measurements));
+    let y = frames(measurements, 1);
+    let Ok(mut solver) = Solver::new(&dictionary, &Limits::atoms(sparsity)) else { return };
+    bencher.bench_local(|| solver.solve(black_box(&y)).map(|path| path.coefficients(sparsity)));
 }
 
 #[divan::bench]
-fn fast_f32_gram_given(bencher: Bencher) {
-    let (dictionary, y) = problem();
-    let gram = DenseGram::new(&dictionary);
-    let y = DVector::from_vec(y);
-    bencher.bench_local(|| {
-        let p0 = dictionary.tr_mul(black_box(&y));
-        let energy = f64::from(y.norm_squared());
-        pursue(&gram, p0.as_slice(), energy, &LIMITS).map(|path| path.coefficients(LIMITS.sparsity))
-    });
+fn projection_of_one_frame(bencher: Bencher) {
+    let dictionary = DenseDictionary::<f32>::new(&dictionary(MEASUREMENTS));
+    let (y, mut p0) = (frames(MEASUREMENTS, 1), vec![0.0; ATOMS]);
+    bencher.bench_local(|| dictionary.project(black_box(&y), &mut p0));
 }
 
-#[divan::bench]
-fn fast_f32_with_its_gram(bencher: Bencher) {
-    let (dictionary, y) = problem();
-    bencher.bench_local(|| fast::solve(&dictionary, black_box(&y), &LIMITS));
+#[divan::bench(types = [f32, f64])]
+fn batch_of_256<T: Scalar>(bencher: Bencher) {
+    let dictionary = DenseDictionary::<T>::new(&dictionary(MEASUREMENTS));
+    let y = frames(MEASUREMENTS, 256);
+    let problem = Problem { dictionary: &dictionary, limits: Limits::atoms(SPARSITY) };
+    bencher
+        .counter(ItemsCount::new(256_usize))
+        .bench_local(|| solve_batch(&problem, black_box(&y), Backend::Cpu));
+}
+
+#[divan::bench(types = [f32, f64])]
+fn preparation<T: Scalar>(bencher: Bencher) {
+    let matrix = dictionary::<T>(MEASUREMENTS);
+    bencher.bench_local(|| DenseDictionary::new(black_box(&matrix)));
 }
 
 #[divan::bench(sample_count = 10)]
-fn reference_f64_with_its_gram(bencher: Bencher) {
-    let (dictionary, y) = problem();
-    let dictionary = dictionary.map(f64::from);
-    let y: Vec<f64> = y.into_iter().map(f64::from).collect();
-    bencher.bench_local(|| reference::solve(&dictionary, black_box(&y), &LIMITS));
+fn reference_with_its_gram(bencher: Bencher) {
+    let dictionary = dictionary::<f64>(MEASUREMENTS);
+    let y = frames::<f64>(MEASUREMENTS, 1);
+    let limits = Limits::atoms(SPARSITY);
+    bencher.bench_local(|| reference::solve(&dictionary, black_box(&y), &limits));
 }
 
-#[divan::bench(args = [Basis::Dct, Basis::Haar])]
-fn fast_f32_gram_by_transforms(bencher: Bencher, basis: Basis) {
+#[divan::bench(args = Basis::ALL)]
+fn one_frame_by_transforms(bencher: Bencher, basis: Basis) {
     let Ok(mut rows) = Order::Random(1).rows(Side::INSTRUMENT) else { return };
     rows.truncate(MEASUREMENTS);
-    let mut grid = vec![0.0; ATOMS];
-    rows.iter().zip(problem().1).for_each(|(&row, y)| grid[row as usize] = y);
-    let energy = grid.iter().map(|&v| f64::from(v * v)).sum();
+    let y = frames(MEASUREMENTS, 1);
     let transform = Transform::new(basis, Side::INSTRUMENT);
     let prior = Prior::none(ATOMS);
-    let gram = SampledHadamard::new(&transform, &rows, &prior);
-    bencher.bench_local(|| {
-        let p0 = gram.project(black_box(&grid).clone());
-        pursue(&gram, &p0, energy, &LIMITS).map(|path| path.coefficients(LIMITS.sparsity))
-    });
+    let dictionary = SampledHadamard::new(&transform, &rows, &prior);
+    let Ok(mut solver) = Solver::new(&dictionary, &Limits::atoms(SPARSITY)) else { return };
+    bencher.bench_local(|| solver.solve(black_box(&y)).map(|path| path.coefficients(SPARSITY)));
 }
 
 /// The whole of [`omp`] with its defaults (cross-validation and all) on 30 % of a frame.

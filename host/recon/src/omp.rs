@@ -3,9 +3,14 @@
 //! The one law: after every atom the coefficients are the least-squares solution over the support, so the
 //! residual is orthogonal to every atom chosen and its norm never grows.
 //!
-//! [`mod@reference`] is the paper's Algorithm 1 line by line, in `f64`; [`fast`] finds the same support and
-//! coefficients in `f32` from columns of the Gram matrix; [`sampled`] supplies those columns for Hadamard
-//! measurements of an image by fast transforms, without storing a matrix.
+//! | module | holds |
+//! |---|---|
+//! | [`mod@reference`] | the paper's Algorithm 1 line by line, in `f64`: what the others are checked against |
+//! | [`Solver`] | the same support and coefficients, fast, in `f32` or `f64`, one measurement at a time |
+//! | [`solve_batch`] | many measurements of one [`Problem`], on a [`Backend`] chosen at run time |
+//! | [`Dictionary`] | what both ask of the atoms: projections, and columns of the Gram matrix |
+//! | [`DenseDictionary`] | a dictionary that is a matrix |
+//! | [`sampled`] | Hadamard measurements of an image, by fast transforms, without storing a matrix |
 //!
 //! What the algorithm as printed leaves open, and both paths settle alike:
 //! - It assumes atoms of unit norm. Atoms are normalised for the choice, coefficients are those of the atoms given.
@@ -16,9 +21,21 @@
 //!   the search ends there ([`Stop::Dependent`]).
 //! - Equal correlations: the lower atom is chosen.
 
-pub mod fast;
+mod batch;
+mod dense;
+mod dictionary;
+mod kernel;
+mod panels;
+mod pursuit;
 pub mod reference;
 pub mod sampled;
+mod scalar;
+
+pub use batch::{Backend, ParseBackendError, Problem, solve_batch};
+pub use dense::DenseDictionary;
+pub use dictionary::{Atoms, Dictionary, padded};
+pub use pursuit::{Path, Solver, error_bound};
+pub use scalar::Scalar;
 
 use thiserror::Error;
 
@@ -29,6 +46,17 @@ pub struct Limits {
     pub sparsity: usize,
     /// Norm of the residual, relative to the measurement's, at which enough is explained; 0 never is.
     pub residual: f64,
+    /// Standard deviation of a measured number's noise, in its own unit: a residual that is no longer than noise
+    /// alone would be, `noise * sqrt(measurements)`, is explained enough.
+    pub noise: f64,
+}
+
+impl Limits {
+    /// This many atoms, however small the residual.
+    #[must_use]
+    pub fn atoms(sparsity: usize) -> Self {
+        Self { sparsity, residual: 0.0, noise: 0.0 }
+    }
 }
 
 /// Why the search stopped.
@@ -73,50 +101,57 @@ pub enum OmpError {
     /// A number is NaN or infinite.
     #[error("{field}[{index}] is {found}, expected a finite number")]
     NotFinite {
-        /// `dictionary` (column-major) or `measurement`.
+        /// `dictionary` (column-major), `measurement`, or `projection` of one onto the other.
         field: &'static str,
         /// Where.
         index: usize,
         /// What was found.
         found: f64,
     },
-    /// The residual to stop at is negative or NaN.
-    #[error("a residual limit of {found}, expected 0 or more")]
-    Residual {
+    /// A limit is negative or NaN.
+    #[error("a {limit} limit of {found}, expected 0 or more")]
+    Limit {
+        /// `residual` or `noise`.
+        limit: &'static str,
         /// What was asked for.
         found: f64,
     },
+    /// A pursuit is to start from an atom that there is not.
+    #[error("a start from atom {found} of a dictionary of {atoms}")]
+    Start {
+        /// The atom.
+        found: usize,
+        /// How many there are.
+        atoms: usize,
+    },
 }
 
-/// An atom this much weaker than the strongest one (norm squared) is not seen.
-const UNSEEN: f64 = 1e-9;
 /// A pivot under this share of its atom's norm squared is rounding (of `f32`, so that both paths agree).
 const DEPENDENT: f64 = 1e-5;
 /// A correlation under this share of the first one is rounding (likewise).
 const ROUNDING: f64 = 1e-5;
 
-fn check<T: Copy + Into<f64>>(
-    rows: usize,
-    dictionary: &[T],
-    y: &[T],
-    limits: &Limits,
-) -> Result<(), OmpError> {
-    if y.len() != rows {
-        return Err(OmpError::Length { found: y.len(), expected: rows });
+fn finite<T: Copy + Into<f64>>(field: &'static str, values: &[T]) -> Result<(), OmpError> {
+    let finite = |v: &T| Into::<f64>::into(*v).is_finite();
+    match values.iter().position(|v| !finite(v)) {
+        Some(index) => Err(OmpError::NotFinite { field, index, found: values[index].into() }),
+        None => Ok(()),
     }
-    for (field, values) in [("dictionary", dictionary), ("measurement", y)] {
-        let values = values.iter().map(|&v| v.into());
-        if let Some((index, found)) = values.enumerate().find(|(_, v): &(_, f64)| !v.is_finite()) {
-            return Err(OmpError::NotFinite { field, index, found });
-        }
-    }
-    limits.check()
 }
 
 impl Limits {
     fn check(&self) -> Result<(), OmpError> {
-        let sound = self.residual >= 0.0;
-        if sound { Ok(()) } else { Err(OmpError::Residual { found: self.residual }) }
+        for (limit, found) in [("residual", self.residual), ("noise", self.noise)] {
+            if !(found >= 0.0) {
+                return Err(OmpError::Limit { limit, found });
+            }
+        }
+        Ok(())
+    }
+
+    /// Energy of the residual at which enough of a measurement's is explained.
+    fn enough(&self, energy: f64, measurements: usize) -> f64 {
+        (self.residual.powi(2) * energy).max(self.noise.powi(2) * measurements as f64)
     }
 }
 

@@ -22,9 +22,8 @@
 mod selection;
 
 use crate::basis::{Basis, Transform};
-use crate::omp::fast::pursue;
 use crate::omp::sampled::{Prior, SampledHadamard, visible_energy};
-use crate::omp::{Limits, OmpError, Stop};
+use crate::omp::{Limits, OmpError, Path, Solver, Stop};
 use crate::{Image, Measurements, Order, Side, fwht};
 use thiserror::Error;
 
@@ -268,17 +267,13 @@ impl<'a> Problem<'a> {
         &self,
         positions: &[usize],
         atoms: usize,
-    ) -> Result<(crate::omp::fast::Path, SampledHadamard<'_>), OmpError> {
+    ) -> Result<(Path<f32>, SampledHadamard<'_>), OmpError> {
         let rows: Vec<u32> = positions.iter().map(|&k| self.rows[k]).collect();
-        let mut grid = vec![0.0; self.side.area()];
-        for &k in positions {
-            grid[self.rows[k] as usize] = self.values[k];
-        }
-        let energy = positions.iter().map(|&k| f64::from(self.values[k]).powi(2)).sum();
-        let gram = SampledHadamard::new(&self.transform, &rows, &self.prior);
-        let limits = Limits { sparsity: atoms, residual: self.residual };
-        let path = pursue(&gram, &gram.project(grid), energy, &limits)?;
-        Ok((path, gram))
+        let values: Vec<f32> = positions.iter().map(|&k| self.values[k]).collect();
+        let dictionary = SampledHadamard::new(&self.transform, &rows, &self.prior);
+        let limits = Limits { residual: self.residual, ..Limits::atoms(atoms) };
+        let path = Solver::new(&dictionary, &limits)?.solve(&values)?;
+        Ok((path, dictionary))
     }
 }
 
@@ -292,9 +287,9 @@ fn prior_scale(transform: &Transform, rows: &[u32], values: &[f32], falloff: f64
     if falloff == 0.0 {
         return scale;
     }
-    let mut measured = vec![false; side.area()];
+    let mut measured = vec![0.0; side.area()];
     for &row in rows {
-        measured[row as usize] = true;
+        measured[row as usize] = 1.0;
     }
     let energy: f32 =
         rows.iter().zip(values).filter(|(row, _)| **row != 0).map(|(_, v)| v * v).sum();

@@ -2,16 +2,22 @@
 //!
 //! The one law: clarity over speed. Symbols are the paper's; line numbers are those of its listing.
 
-use super::{DEPENDENT, Limits, OmpError, ROUNDING, Solution, Stop, UNSEEN, check};
+use super::dictionary::UNSEEN;
+use super::{DEPENDENT, Limits, OmpError, ROUNDING, Solution, Stop, finite};
 use nalgebra::{DMatrix, DVector};
 
 /// Finds a sparse `x` with `dictionary * x` near `y`. The dictionary is `measurements x atoms`, of any
 /// column norms.
 ///
 /// # Errors
-/// [`OmpError`] if shapes differ, a number is not finite or the residual limit is negative.
+/// [`OmpError`] if shapes differ, a number is not finite or a limit is negative.
 pub fn solve(dictionary: &DMatrix<f64>, y: &[f64], limits: &Limits) -> Result<Solution, OmpError> {
-    check(dictionary.nrows(), dictionary.as_slice(), y, limits)?;
+    if y.len() != dictionary.nrows() {
+        return Err(OmpError::Length { found: y.len(), expected: dictionary.nrows() });
+    }
+    finite("dictionary", dictionary.as_slice())?;
+    finite("measurement", y)?;
+    limits.check()?;
     let norms: Vec<f64> = dictionary.column_iter().map(|atom| atom.norm()).collect();
     let strongest = norms.iter().copied().fold(0.0, f64::max);
     let unseen: Vec<usize> =
@@ -25,6 +31,7 @@ pub fn solve(dictionary: &DMatrix<f64>, y: &[f64], limits: &Limits) -> Result<So
     let y = DVector::from_column_slice(y);
 
     let energy = y.norm_squared();
+    let enough = limits.enough(energy, y.len());
     let p0 = phi.tr_mul(&y); // lines 2 and 3
     let gram = phi.transpose() * &phi;
     let mut p = p0.clone();
@@ -36,7 +43,7 @@ pub fn solve(dictionary: &DMatrix<f64>, y: &[f64], limits: &Limits) -> Result<So
     let mut residual_norms = vec![if energy > 0.0 { 1.0 } else { 0.0 }];
 
     let stop = loop {
-        if epsilon <= limits.residual.powi(2) * energy {
+        if epsilon <= enough {
             break Stop::Residual; // line 4
         }
         if support.len() >= limits.sparsity {

@@ -3,8 +3,14 @@
 //! The one law: everything is in orthonormal units. With `W = H / n` the measurements are `b = W x` (a recorded
 //! difference over the side `n`) and atoms have unit norm, of which the rows that were measured see a part.
 //!
-//! A column of the Gram matrix is one atom shown, measured and seen back through the rows that were measured:
-//! two basis transforms and two Walsh-Hadamard transforms, `O(n^3)` instead of `n^4` numbers in memory.
+//! A column of the Gram matrix is one atom shown, measured and seen back through the rows that were measured. What that
+//! takes depends on the basis:
+//!
+//! | basis | a column | because |
+//! |---|---|---|
+//! | pixel | a copy | the Gram matrix is dyadic, `G[i, j] = g[i xor j]`, and `g` is one Walsh transform of the mask |
+//! | DCT | about `n^3 / 1.5` products | atoms are separable, and 1-D cosines have few Walsh coefficients |
+//! | wavelets | two basis and two Walsh transforms | |
 //!
 //! # A prior
 //! Atoms that the rows barely see fit anything with a huge coefficient. The [`Prior`]'s scale `s[j]` of each
@@ -14,9 +20,15 @@
 //! Algorithm 1 needs no change: its Gram matrix is `diag(s) A^T A diag(s) + noise^2 I`, and an atom whose visible
 //! part is under the noise no longer looks attractive.
 
-use super::fast::Gram;
-use crate::basis::{Basis, Transform, product};
+use super::dictionary::{Atoms, Dictionary, padded};
+use crate::basis::{Basis, Transform};
 use crate::fwht;
+use walsh::WalshCosines;
+
+pub(crate) use visible::visible_energy;
+
+mod visible;
+mod walsh;
 
 /// What is expected of the coefficients and of the measurements, in orthonormal units.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,9 +53,21 @@ impl Prior {
 #[derive(Debug, Clone)]
 pub struct SampledHadamard<'a> {
     transform: &'a Transform,
-    measured: Vec<bool>,
+    rows: Vec<u32>,
+    /// 1 at rows that were measured, else 0.
+    mask: Vec<f32>,
     prior: &'a Prior,
-    diagonal: Vec<f32>,
+    atoms: Atoms<f32>,
+    structure: Structure,
+}
+
+/// How columns of the Gram matrix are found.
+#[derive(Debug, Clone)]
+enum Structure {
+    /// `g` of `G[i, j] = g[i xor j]`.
+    Dyadic(Vec<f32>),
+    Cosines(WalshCosines),
+    Transforms,
 }
 
 impl<'a> SampledHadamard<'a> {
@@ -56,26 +80,26 @@ impl<'a> SampledHadamard<'a> {
     pub fn new(transform: &'a Transform, rows: &[u32], prior: &'a Prior) -> Self {
         let area = transform.side().area();
         assert_eq!(prior.scale.len(), area, "one scale an atom");
-        let mut measured = vec![false; area];
+        let mut mask = vec![0.0; area];
         for &row in rows {
-            measured[row as usize] = true;
+            mask[row as usize] = 1.0;
         }
-        let mut diagonal = visible_energy(transform, &measured);
-        for (d, s) in diagonal.iter_mut().zip(&prior.scale) {
-            *d = if *d < prior.visibility { 0.0 } else { s * s * *d + prior.noise.powi(2) };
+        let mut energies = visible_energy(transform, &mask);
+        for (energy, s) in energies.iter_mut().zip(&prior.scale) {
+            let seen = *energy >= prior.visibility;
+            *energy = if seen { s * s * *energy + prior.noise.powi(2) } else { 0.0 };
         }
-        Self { transform, measured, prior, diagonal }
-    }
-
-    /// The initial projection of measurements placed at their rows of a zero-filled `n^2` grid, in orthonormal units.
-    #[must_use]
-    pub fn project(&self, mut grid: Vec<f32>) -> Vec<f32> {
-        self.mask(&mut grid, 1.0);
-        self.see_back(&mut grid);
-        for (p, s) in grid.iter_mut().zip(&self.prior.scale) {
-            *p *= s;
-        }
-        grid
+        let structure = match transform.basis() {
+            Basis::Pixel => {
+                let mut g = mask.clone();
+                fwht::transform(&mut g);
+                g.iter_mut().for_each(|g| *g /= area as f32);
+                Structure::Dyadic(g)
+            }
+            Basis::Dct => Structure::Cosines(WalshCosines::new(transform.side())),
+            Basis::Haar | Basis::Daubechies4 => Structure::Transforms,
+        };
+        Self { transform, rows: rows.to_vec(), mask, prior, atoms: Atoms::new(energies), structure }
     }
 
     /// The measurement of every row, seen or not, that these coefficients predict, in orthonormal units. `z` are
@@ -93,14 +117,11 @@ impl<'a> SampledHadamard<'a> {
         grid
     }
 
-    fn mask(&self, grid: &mut [f32], factor: f32) {
-        for (value, &measured) in grid.iter_mut().zip(&self.measured) {
-            *value *= if measured { factor } else { 0.0 };
-        }
-    }
-
-    /// `Psi^T W` of a grid.
+    /// `Psi^T W` of a grid of measurements.
     fn see_back(&self, grid: &mut [f32]) {
+        if let Structure::Cosines(cosines) = &self.structure {
+            return cosines.see_back(grid);
+        }
         fwht::transform(grid);
         self.transform.analyse(grid);
         let n = self.transform.side().pixels() as f32;
@@ -108,83 +129,56 @@ impl<'a> SampledHadamard<'a> {
     }
 }
 
-impl Gram for SampledHadamard<'_> {
-    fn diagonal(&self) -> &[f32] {
-        &self.diagonal
+impl Dictionary<f32> for SampledHadamard<'_> {
+    fn measurements(&self) -> usize {
+        self.rows.len()
     }
 
-    fn column(&self, atom: usize, out: &mut [f32]) {
-        out.fill(0.0);
-        out[atom] = self.prior.scale[atom];
-        self.transform.synthesise(out);
-        fwht::transform(out);
-        self.mask(out, 1.0 / self.transform.side().pixels() as f32);
-        self.see_back(out);
+    fn atoms(&self) -> &Atoms<f32> {
+        &self.atoms
+    }
+
+    fn project(&self, y: &[f32], p0: &mut [f32]) {
+        p0.fill(0.0);
+        for (&row, y) in self.rows.iter().zip(y) {
+            p0[row as usize] = *y;
+        }
+        let p0 = &mut p0[..self.mask.len()];
+        self.see_back(p0);
+        for (p, s) in p0.iter_mut().zip(&self.prior.scale) {
+            *p *= s;
+        }
+    }
+
+    fn gram_column<'b>(&'b self, atom: usize, scratch: &'b mut [f32]) -> &'b [f32] {
+        let area = self.mask.len();
+        debug_assert_eq!(scratch.len(), padded(area));
+        scratch[area..].fill(0.0);
+        let out = &mut scratch[..area];
+        match &self.structure {
+            Structure::Dyadic(g) => {
+                for (j, out) in out.iter_mut().enumerate() {
+                    *out = g[j ^ atom];
+                }
+            }
+            Structure::Cosines(cosines) => {
+                cosines.show(atom, &self.mask, out);
+                cosines.see_back(out);
+            }
+            Structure::Transforms => {
+                out.fill(0.0);
+                out[atom] = 1.0 / self.transform.side().pixels() as f32;
+                self.transform.synthesise(out);
+                fwht::transform(out);
+                out.iter_mut().zip(&self.mask).for_each(|(v, mask)| *v *= mask);
+                self.see_back(out);
+            }
+        }
+        let own = self.prior.scale[atom];
         for (value, s) in out.iter_mut().zip(&self.prior.scale) {
-            *value *= s;
+            *value *= own * s;
         }
         out[atom] += self.prior.noise.powi(2);
+        scratch
     }
-}
-
-/// Share of each atom's energy that the measured rows see.
-pub(crate) fn visible_energy(transform: &Transform, measured: &[bool]) -> Vec<f32> {
-    let n = transform.side().pixels();
-    match transform.basis() {
-        // Every pixel puts 1 / n^2 of its energy into every row.
-        Basis::Pixel => {
-            let seen = measured.iter().filter(|&&m| m).count();
-            vec![seen as f32 / measured.len() as f32; measured.len()]
-        }
-        // Atoms are separable: with t the Walsh transform of the 1-D atoms, the energy of atom (u, v) in row (a, b)
-        // is t[a, u]^2 t[b, v]^2, and the sum over measured rows is two matrix products.
-        Basis::Dct => {
-            let squared = squared_walsh_of_cosines(transform);
-            let transposed: Vec<f32> = (0..n * n).map(|p| squared[(p % n) * n + p / n]).collect();
-            let mask: Vec<f32> = measured.iter().map(|&m| f32::from(u8::from(m))).collect();
-            let (mut half, mut energy) = (vec![0.0; n * n], vec![0.0; n * n]);
-            product(n, &transposed, &mask, &mut half);
-            product(n, &half, &squared, &mut energy);
-            energy
-        }
-        // A wavelet moved by its own width changes signs of its Walsh transform, no magnitude (a shift by
-        // exclusive or): one atom of each scale and direction stands for all.
-        Basis::Haar => {
-            let mut class_energy = std::collections::HashMap::new();
-            (0..n * n)
-                .map(|atom| {
-                    *class_energy.entry(haar_class(n, atom)).or_insert_with(|| {
-                        let mut x = vec![0.0; n * n];
-                        x[atom] = 1.0;
-                        transform.synthesise(&mut x);
-                        fwht::transform(&mut x);
-                        let seen = x.iter().zip(measured).filter(|(_, m)| **m);
-                        seen.map(|(x, _)| x * x).sum::<f32>() / (n * n) as f32
-                    })
-                })
-                .collect()
-        }
-    }
-}
-
-/// Energy of 1-D cosine `u` in Walsh function `a`, at `n * a + u`.
-fn squared_walsh_of_cosines(transform: &Transform) -> Vec<f32> {
-    let n = transform.side().pixels();
-    let mut squared = vec![0.0; n * n];
-    for u in 0..n {
-        let mut column: Vec<f64> = (0..n).map(|pixel| crate::basis::cosine(n, u, pixel)).collect();
-        fwht::transform(&mut column);
-        for (a, value) in column.iter().enumerate() {
-            squared[n * a + u] = (value * value / n as f64) as f32;
-        }
-    }
-    squared
-}
-
-/// Scale of a Haar atom, and whether it varies down and across.
-fn haar_class(n: usize, atom: usize) -> (u32, bool, bool) {
-    let (u, v) = (atom / n, atom % n);
-    let scale = u.max(v).checked_ilog2().map_or(0, |octave| octave + 1);
-    let fine = |index: usize| scale > 0 && index >= 1 << (scale - 1);
-    (scale, fine(u), fine(v))
 }

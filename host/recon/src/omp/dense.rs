@@ -1,0 +1,79 @@
+//! A dictionary that is a matrix.
+//!
+//! The one law: what does not depend on a measurement is computed once, and only as much of it as memory was given for.
+
+use super::dictionary::{Atoms, Dictionary};
+use super::panels::Panels;
+use super::scalar::Scalar;
+use nalgebra::DMatrix;
+use pulp::Arch;
+
+/// A `measurements x atoms` matrix of any column norms, ready for any number of measurements.
+#[derive(Debug, Clone)]
+pub struct DenseDictionary<T> {
+    panels: Panels<T>,
+    atoms: Atoms<T>,
+    /// The whole Gram matrix, rows of `padded(atoms)`; empty: columns are computed as they are asked for.
+    gram: Vec<T>,
+    width: usize,
+    arch: Arch,
+}
+
+impl<T: Scalar> DenseDictionary<T> {
+    /// Memory that the Gram matrix may take by default: 8192 atoms in `f32`.
+    pub const GRAM_BYTES: usize = 256 << 20;
+
+    /// Prepares `matrix`: copies it and, where it fits [`GRAM_BYTES`](Self::GRAM_BYTES), multiplies out its Gram matrix.
+    #[must_use]
+    pub fn new(matrix: &DMatrix<T>) -> Self {
+        Self::with_gram_within(matrix, Self::GRAM_BYTES)
+    }
+
+    /// Prepares `matrix`; columns of a Gram matrix larger than `bytes` are multiplied out when an atom is chosen,
+    /// `measurements * atoms` products each.
+    #[must_use]
+    pub fn with_gram_within(matrix: &DMatrix<T>, bytes: usize) -> Self {
+        Self::on(Arch::new(), matrix, bytes)
+    }
+
+    pub(super) fn on(arch: Arch, matrix: &DMatrix<T>, bytes: usize) -> Self {
+        let panels = Panels::new(matrix);
+        let width = super::padded(matrix.ncols());
+        let fits = width.saturating_mul(width).saturating_mul(size_of::<T>()) <= bytes;
+        let gram = if fits { panels.gram(arch) } else { Vec::new() };
+        let energies = (0..matrix.ncols())
+            .map(|atom| match gram.get(atom * width + atom) {
+                Some(&energy) => energy,
+                // In the order in which the Gram matrix is summed: the same bits.
+                None => matrix.column(atom).iter().fold(T::default(), |sum, &v| sum + v * v),
+            })
+            .collect();
+        Self { panels, atoms: Atoms::new(energies), gram, width, arch }
+    }
+}
+
+impl<T: Scalar> Dictionary<T> for DenseDictionary<T> {
+    fn measurements(&self) -> usize {
+        self.panels.measurements()
+    }
+
+    fn atoms(&self) -> &Atoms<T> {
+        &self.atoms
+    }
+
+    fn project(&self, y: &[T], p0: &mut [T]) {
+        self.panels.products(self.arch, y, p0);
+    }
+
+    fn project_all(&self, y: &[T], p0: &mut [T]) {
+        self.panels.products(self.arch, y, p0);
+    }
+
+    fn gram_column<'a>(&'a self, atom: usize, scratch: &'a mut [T]) -> &'a [T] {
+        if self.gram.is_empty() {
+            self.panels.products(self.arch, &self.panels.column(atom), scratch);
+            return scratch;
+        }
+        &self.gram[atom * self.width..(atom + 1) * self.width]
+    }
+}

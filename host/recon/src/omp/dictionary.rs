@@ -1,0 +1,87 @@
+//! What a pursuit asks of a dictionary.
+//!
+//! The one law: a dictionary is its measurements' inner products. Whoever can project a measurement onto all atoms
+//! and supply a column of the Gram matrix on demand, from a matrix or by fast transforms, is one; a backend that wants the
+//! whole Gram matrix on a device asks for its columns once.
+
+use super::kernel::PANEL;
+use super::scalar::Scalar;
+
+/// An atom this much weaker than the strongest one (norm squared) is not seen.
+pub(super) const UNSEEN: f64 = 1e-9;
+
+/// Lengths of all atoms, as the choice needs them.
+#[derive(Debug, Clone)]
+pub struct Atoms<T> {
+    energies: Vec<T>,
+    /// Padded to whole panels with zeros, which are never chosen.
+    inverse_norms: Vec<T>,
+    unseen: Vec<usize>,
+}
+
+impl<T: Scalar> Atoms<T> {
+    /// From the squared norm of each atom, the diagonal of the Gram matrix.
+    #[must_use]
+    pub fn new(energies: Vec<T>) -> Self {
+        let strongest = energies.iter().fold(0.0, |most, &e| f64::max(most, e.into()));
+        let visible = |e: T| e.into() > UNSEEN * strongest;
+        let unseen = (0..energies.len()).filter(|&k| !visible(energies[k])).collect();
+        let inverse =
+            |&e: &T| if visible(e) { T::from_f64(e.into().sqrt().recip()) } else { T::default() };
+        let mut inverse_norms: Vec<T> = energies.iter().map(inverse).collect();
+        inverse_norms.resize(padded(energies.len()), T::default());
+        Self { energies, inverse_norms, unseen }
+    }
+
+    /// How many there are.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.energies.len()
+    }
+
+    /// Squared norm of each.
+    #[must_use]
+    pub fn energies(&self) -> &[T] {
+        &self.energies
+    }
+
+    /// Atoms that the measurement does not see.
+    #[must_use]
+    pub fn unseen(&self) -> &[usize] {
+        &self.unseen
+    }
+
+    pub(super) fn inverse_norms(&self) -> &[T] {
+        &self.inverse_norms
+    }
+}
+
+/// Atoms, as their inner products with measurements and with each other. Vectors over the atoms are
+/// [`padded`], zero past the last atom.
+pub trait Dictionary<T: Scalar>: Sync {
+    /// Length of a measurement.
+    fn measurements(&self) -> usize;
+
+    /// Lengths of the atoms.
+    fn atoms(&self) -> &Atoms<T>;
+
+    /// The initial projection: inner product of the measurement `y` with each atom.
+    fn project(&self, y: &[T], p0: &mut [T]);
+
+    /// [`project`](Self::project) of several measurements of equal length, one after another; the same numbers.
+    fn project_all(&self, y: &[T], p0: &mut [T]) {
+        let width = padded(self.atoms().count());
+        for (y, p0) in y.chunks_exact(self.measurements()).zip(p0.chunks_exact_mut(width)) {
+            self.project(y, p0);
+        }
+    }
+
+    /// Column `atom` of the Gram matrix: its inner products with every atom. Written to `scratch` unless it is at hand.
+    fn gram_column<'a>(&'a self, atom: usize, scratch: &'a mut [T]) -> &'a [T];
+}
+
+/// Length of a vector over this many atoms: whole panels of 64.
+#[must_use]
+pub fn padded(atoms: usize) -> usize {
+    atoms.next_multiple_of(PANEL)
+}

@@ -1,0 +1,107 @@
+//! What orthogonal matching pursuit promises, whoever carries it out.
+
+use super::*;
+
+/// Reference, `f32` and `f64`, each with the tolerance that its rounding asks for.
+fn all_paths(problem: &Problem, limits: &Limits) -> [(Solution, f64); 3] {
+    [
+        (solve_exactly(problem, limits), 1e-8),
+        (solve::<f32>(problem, limits), 1e-4),
+        (solve::<f64>(problem, limits), 1e-8),
+    ]
+}
+
+proptest! {
+    #[test]
+    fn what_remains_is_orthogonal_to_the_support_and_never_grows(problem in problems()) {
+        let length = DVector::from_column_slice(&problem.y).norm();
+        for (solution, tolerance) in all_paths(&problem, &Limits::atoms(10)) {
+            prop_assert!(solution.residual_norms.is_sorted_by(|a, b| a >= b));
+            let left = residual(&problem, &solution.support, &solution.coefficients);
+            for &k in &solution.support {
+                let atom = problem.dictionary.column(k);
+                prop_assert!(atom.dot(&left).abs() <= tolerance * atom.norm() * length);
+            }
+            let stated = *solution.residual_norms.last().unwrap() * length;
+            prop_assert!((left.norm() - stated).abs() <= 1e-3 * length, "{} stated {}", left.norm(), stated);
+            prop_assert!(solution.coefficients.iter().all(|c| c.is_finite()));
+        }
+    }
+
+    /// J. Tropp, *Greed is good* (2004), Theorem B: fewer than (1 + 1 / coherence) / 2 atoms are found, all and only they.
+    #[test]
+    fn under_the_coherence_bound_recovery_is_exact(seed: u64, count in 1_usize..8) {
+        // Spikes and Walsh functions: coherence 1 / sqrt(256), so up to 8 atoms of the 512.
+        let mut random = Pcg64::seed_from_u64(seed);
+        let sign = |i: usize, j: usize| if (i & j).count_ones() % 2 == 0 { 1.0 } else { -1.0 };
+        let dictionary = DMatrix::from_fn(256, 512, |m, k| match k.checked_sub(256) {
+            None => f64::from(u8::from(m == k)),
+            Some(k) => sign(m, k) / 16.0,
+        });
+        let mut sparse: Vec<(usize, f64)> = Vec::new();
+        while sparse.len() < count {
+            let (atom, size) = (random.random_range(0..512), random.random_range(0.5..2.0_f32));
+            if sparse.iter().all(|(a, _)| *a != atom) {
+                sparse.push((atom, if random.random() { size.into() } else { -f64::from(size) }));
+            }
+        }
+        sparse.sort_unstable_by_key(|(atom, _)| *atom);
+        let mut y = DVector::zeros(256);
+        sparse.iter().for_each(|(atom, value)| y += dictionary.column(*atom) * *value);
+        let y = y.iter().copied().collect();
+        let problem = Problem { recipe: String::new(), dictionary, y, sparse };
+        for (solution, tolerance) in all_paths(&problem, &Limits { residual: 1e-3, ..Limits::atoms(20) }) {
+            let mut found: Vec<(usize, f64)> =
+                solution.support.iter().copied().zip(solution.coefficients).collect();
+            found.sort_unstable_by_key(|(atom, _)| *atom);
+            prop_assert_eq!(found.len(), count);
+            for ((a, x), (b, truth)) in found.iter().zip(&problem.sparse) {
+                prop_assert_eq!(a, b);
+                prop_assert!((x - truth).abs() <= tolerance);
+            }
+        }
+    }
+
+    #[test]
+    fn a_start_from_the_same_atoms_ends_with_the_same_coefficients(problem in problems()) {
+        let limits = Limits { residual: 2e-3, ..Limits::atoms(10) };
+        let (dictionary, y) = dense::<f64>(&problem);
+        let mut solver = Solver::new(&dictionary, &limits).unwrap();
+        let cold = solver.solve(&y).unwrap().solution();
+        let warm = solver.solve_from(&y, &cold.support).unwrap().solution();
+        prop_assert_eq!(&warm.support, &cold.support);
+        prop_assert_eq!(&warm.coefficients, &cold.coefficients);
+        // In another order: the same least squares.
+        let backwards: Vec<usize> = cold.support.iter().rev().copied().collect();
+        let warm = solver.solve_from(&y, &backwards).unwrap().solution();
+        let left = |s: &Solution| residual(&problem, &s.support, &s.coefficients).norm();
+        let length = DVector::from_column_slice(&problem.y).norm();
+        prop_assert!(left(&warm) <= left(&cold) + 1e-6 * length);
+    }
+}
+
+#[test]
+fn a_start_spares_choices_in_a_video_and_keeps_to_the_laws() {
+    let before = problem(Kind::Sparse, 128, 256, 12, 3);
+    let (dictionary, y) = dense::<f32>(&before);
+    let limits = Limits { residual: 1e-3, ..Limits::atoms(40) };
+    let mut solver = Solver::new(&dictionary, &limits).unwrap();
+    let first = solver.solve(&y).unwrap().solution();
+    // The next frame: every coefficient a little different, and one atom more.
+    let next: Vec<f32> = y
+        .iter()
+        .zip(before.dictionary.column(200).iter())
+        .map(|(y, a)| 1.1 * y + 0.2 * *a as f32)
+        .collect();
+    let warm = solver.solve_from(&next, &first.support).unwrap().solution();
+    assert_eq!(warm.stop, Stop::Residual);
+    assert_eq!(warm.support[..first.support.len()], first.support);
+    assert_eq!(warm.support.len(), first.support.len() + 1);
+    assert!(warm.residual_norms.is_sorted_by(|a, b| a >= b));
+    // An atom that is not seen, or said twice, is passed over.
+    let blind = problem(Kind::Blind, 32, 64, 3, 1);
+    let (dictionary, y) = dense::<f32>(&blind);
+    let mut solver = Solver::new(&dictionary, &Limits::atoms(3)).unwrap();
+    let found = solver.solve_from(&y, &[0, 7, 9, 9]).unwrap();
+    assert_eq!((found.support[0], found.support.len()), (9, 3));
+}

@@ -1,0 +1,103 @@
+//! Hadamard measurements of an image against the dictionary written out.
+
+use super::{Problem, agreeing};
+use crate::basis::{Basis, Transform};
+use crate::omp::sampled::{Prior, SampledHadamard};
+use crate::omp::{Dictionary, Limits, Solver, padded, reference};
+use crate::testing::{normal, side};
+use crate::{Order, fwht};
+use nalgebra::DMatrix;
+use proptest::prelude::*;
+use rand::SeedableRng;
+use rand_pcg::Pcg64;
+
+/// The dictionary that [`SampledHadamard`] stands for, prior and all, written out in `f64`.
+fn written_out(transform: &Transform, rows: &[u32], prior: &Prior) -> DMatrix<f64> {
+    let area = transform.side().area();
+    let n = transform.side().pixels() as f64;
+    let mut dictionary = DMatrix::zeros(rows.len() + area, area);
+    for atom in 0..area {
+        let mut image = vec![0.0_f32; area];
+        image[atom] = 1.0;
+        transform.synthesise(&mut image);
+        let mut seen: Vec<f64> = image.into_iter().map(f64::from).collect();
+        fwht(&mut seen).unwrap();
+        let scale = f64::from(prior.scale[atom]);
+        for (m, &row) in rows.iter().enumerate() {
+            dictionary[(m, atom)] = seen[row as usize] / n * scale;
+        }
+        dictionary[(rows.len() + atom, atom)] = f64::from(prior.noise);
+    }
+    dictionary
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    #[test]
+    fn fast_transforms_stand_for_the_dictionary_and_its_prior(
+        basis in prop::sample::select(Basis::ALL.to_vec()),
+        random_rows: bool,
+        with_prior: bool,
+        share in 0.1..1.0,
+        seed: u64,
+    ) {
+        let side = side(8);
+        let order = if random_rows { Order::Random(seed) } else { Order::ZigZag };
+        let mut rows = order.rows(side).unwrap();
+        rows.truncate((share * 64.0) as usize);
+        let mut random = Pcg64::seed_from_u64(seed);
+        let transform = Transform::new(basis, side);
+        let mut prior = Prior::none(64);
+        if with_prior {
+            let frequencies = basis.frequencies(side);
+            prior.scale = frequencies.iter().map(|f| 1.0 / f.max(1.0)).collect();
+            prior.noise = 0.1;
+        }
+        let gram = SampledHadamard::new(&transform, &rows, &prior);
+        let dictionary = written_out(&transform, &rows, &prior);
+        let dense = dictionary.tr_mul(&dictionary);
+        let mut column = vec![0.0; padded(64)];
+        for atom in 0..64 {
+            for (k, value) in gram.gram_column(atom, &mut column).iter().enumerate() {
+                prop_assert!((f64::from(*value) - dense[(k, atom)]).abs() < 1e-5);
+            }
+            let energy = f64::from(gram.atoms().energies()[atom]);
+            prop_assert!((energy - dense[(atom, atom)]).abs() < 1e-5);
+        }
+
+        let measured: Vec<f32> = rows.iter().map(|_| normal(&mut random) as f32).collect();
+        let mut y: Vec<f64> = measured.iter().map(|&y| y.into()).collect();
+        y.resize(rows.len() + 64, 0.0);
+        let limits = Limits { residual: 0.05, ..Limits::atoms(rows.len() / 4) };
+        let path = Solver::new(&gram, &limits).unwrap().solve(&measured).unwrap().solution();
+        let exact = reference::solve(&dictionary, &y, &limits).unwrap();
+        prop_assert_eq!(&path.unseen, &exact.unseen);
+        let problem = Problem { recipe: String::new(), dictionary, y, sparse: vec![] };
+        let same = agreeing(&problem, &exact, &path, 1e-5);
+        if same == exact.support.len() && same == path.support.len() {
+            for (a, b) in exact.coefficients.iter().zip(&path.coefficients) {
+                prop_assert!((a - b).abs() < 1e-3 * a.abs().max(1.0), "{} and {}", a, b);
+            }
+        }
+    }
+}
+
+#[test]
+fn dct_atoms_that_a_random_half_does_not_see_are_left_out() {
+    let side = side(32);
+    let mut rows = Order::Random(1).rows(side).unwrap();
+    rows.truncate(512);
+    let transform = Transform::new(Basis::Dct, side);
+    let prior = Prior::none(1024);
+    let gram = SampledHadamard::new(&transform, &rows, &prior);
+    let y: Vec<f32> = (0..512).map(|m| (m as f32).sin()).collect();
+    let limits = Limits { residual: 1e-2, ..Limits::atoms(500) };
+    let found = Solver::new(&gram, &limits).unwrap().solve(&y).unwrap().solution();
+    let missed: Vec<usize> = (0..1024).filter(|&k| gram.atoms().energies()[k] < 1e-9).collect();
+    // Atoms of a few Walsh functions only; the mean is one of them.
+    assert_eq!(missed, [0, 520, 528, 536]);
+    assert_eq!(found.unseen, missed);
+    assert!(found.coefficients.iter().all(|c| c.is_finite()));
+    assert!(found.support.iter().all(|k| !missed.contains(k)));
+}
