@@ -69,11 +69,11 @@ impl<T: Scalar> Dictionary<T> for DenseDictionary<T> {
         self.panels.products(self.arch, y, p0);
     }
 
-    fn gram_column<'a>(&'a self, atom: usize, scratch: &'a mut [T]) -> &'a [T] {
-        if self.gram.is_empty() {
-            self.panels.products(self.arch, &self.panels.column(atom), scratch);
-            return scratch;
-        }
-        &self.gram[atom * self.width..(atom + 1) * self.width]
+    fn gram_column(&self, atom: usize, out: &mut [T]) {
+        self.panels.products(self.arch, &self.panels.column(atom), out);
+    }
+
+    fn stored_gram_column(&self, atom: usize) -> Option<&[T]> {
+        self.gram.get(atom * self.width..(atom + 1) * self.width)
     }
 }

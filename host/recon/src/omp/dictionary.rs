@@ -76,8 +76,13 @@ pub trait Dictionary<T: Scalar>: Sync {
         }
     }
 
-    /// Column `atom` of the Gram matrix: its inner products with every atom. Written to `scratch` unless it is at hand.
-    fn gram_column<'a>(&'a self, atom: usize, scratch: &'a mut [T]) -> &'a [T];
+    /// Writes column `atom` of the Gram matrix: its inner products with every atom.
+    fn gram_column(&self, atom: usize, out: &mut [T]);
+
+    /// The same column where it is stored.
+    fn stored_gram_column(&self, _atom: usize) -> Option<&[T]> {
+        None
+    }
 }
 
 /// Length of a vector over this many atoms: whole panels of 64.

@@ -4,8 +4,9 @@
 //! rounded before they are added (no fused multiply-add), and sums run over rows in one order; so SSE2, AVX2, AVX-512
 //! and NEON give the same bits, and a recording reconstructs alike everywhere.
 //!
-//! Atoms are dealt out in panels of [`PANEL`]. A panel's accumulators stay in registers (16 of SSE2's, 8 of AVX2's, 4 of
-//! AVX-512's for `f32`) while the rows before it stream by once, contiguously.
+//! Atoms are dealt out in panels of [`PANEL`], whose sums stay in registers while the rows before them stream by once,
+//! contiguously. What limits the loop is the second-level cache, so a row that is read serves two columns: the one
+//! chosen, and the one that is most likely next.
 
 use super::scalar::Scalar;
 use pulp::{Arch, Simd, WithSimd};
@@ -13,43 +14,41 @@ use pulp::{Arch, Simd, WithSimd};
 /// Atoms worked on together.
 pub(crate) const PANEL: usize = 64;
 
-/// Rows that are allocated together: memory grows with the atoms chosen, not with the most that might be.
-const SLAB: usize = 32;
-
-/// Orthogonalised columns of a Gram matrix, as rows: `[slab][panel][row of the slab][atom of the panel]`.
+/// Orthogonalised columns of a Gram matrix, as rows: for each panel of atoms, row after row.
 #[derive(Debug, Clone)]
 pub(super) struct Rows<T> {
-    slabs: Vec<Vec<T>>,
-    panels: usize,
+    panels: Vec<Vec<[T; PANEL]>>,
     len: usize,
 }
 
 impl<T: Scalar> Rows<T> {
     /// None yet, of `panels * PANEL` atoms.
     pub(super) fn new(panels: usize) -> Self {
-        Self { slabs: Vec::new(), panels, len: 0 }
+        Self { panels: vec![Vec::new(); panels], len: 0 }
     }
 
     /// Forgets the rows, keeps their memory.
     pub(super) fn clear(&mut self) {
+        self.panels.iter_mut().for_each(Vec::clear);
         self.len = 0;
     }
 
-    /// Entries of every row for one atom, appended to `out`.
-    pub(super) fn of_atom(&self, atom: usize, out: &mut Vec<T>) {
-        let start = atom / PANEL * SLAB * PANEL + atom % PANEL;
-        let entries =
-            self.slabs.iter().flat_map(|slab| slab[start..].iter().step_by(PANEL).take(SLAB));
-        out.extend(entries.take(self.len));
+    /// Entries of the rows from `first` on for one atom, appended to `out`.
+    pub(super) fn of_atom(&self, atom: usize, first: usize, out: &mut Vec<T>) {
+        out.extend(self.panels[atom / PANEL][first..].iter().map(|row| row[atom % PANEL]));
     }
 }
 
-/// What one chosen atom does to all atoms: see [`Step::run`].
+/// What one chosen atom does to all atoms.
 pub(super) struct Step<'a, T> {
-    /// Column of the Gram matrix of the atom chosen.
+    /// Its column of the Gram matrix, with the rows before `first` taken out.
     pub column: &'a [T],
-    /// What the rows before say of that atom.
+    /// Rows that are taken out already.
+    pub first: usize,
+    /// What the rows from `first` on say of the atom.
     pub weights: &'a [T],
+    /// Another column, to take all rows out of in passing.
+    pub next: Option<Next<'a, T>>,
     /// One over the root of the pivot.
     pub scale: T,
     /// The atom's share in the measurement.
@@ -58,98 +57,154 @@ pub(super) struct Step<'a, T> {
     pub inverse_norms: &'a [T],
 }
 
-impl<T: Scalar> Step<'_, T> {
+/// A column that is not a row yet.
+pub(super) struct Next<'a, T> {
+    /// A column of the Gram matrix.
+    pub column: &'a [T],
+    /// What the rows say of its atom.
+    pub weights: &'a [T],
+    /// Gets the column without the rows.
+    pub out: &'a mut [T],
+}
+
+impl<T: Scalar> Rows<T> {
     /// Adds the row `(column - sum_i weights[i] * row[i]) * scale`, takes `step` times it from the projection `p`, and
-    /// leaves each panel's largest `|p| * inverse_norm` in `best`.
-    pub(super) fn run(self, arch: Arch, rows: &mut Rows<T>, p: &mut [T], best: &mut [T]) {
-        if rows.len == rows.slabs.len() * SLAB {
-            rows.slabs.push(vec![T::default(); rows.panels * SLAB * PANEL]);
-        }
-        arch.dispatch(EveryPanel { step: self, rows, p, best });
-        rows.len += 1;
-    }
-
-    #[inline(always)]
-    fn panel<const LANES: usize>(&self, rows: &mut Rows<T>, panel: usize, p: &mut [T]) -> T {
-        let mut best = T::default();
-        for start in (0..PANEL).step_by(LANES) {
-            let atoms = panel * PANEL + start..panel * PANEL + start + LANES;
-            let mut row: [T; LANES] = lanes(&self.column[atoms.clone()]);
-            for (slab, weights) in rows.slabs.iter().zip(self.weights.chunks(SLAB)) {
-                let before = slab[panel * SLAB * PANEL..].as_chunks::<PANEL>().0;
-                for (before, weight) in before.iter().zip(weights) {
-                    let before: &[T; LANES] = lanes_of(&before[start..start + LANES]);
-                    for (row, before) in row.iter_mut().zip(before) {
-                        *row -= *weight * *before;
-                    }
-                }
-            }
-            let at = (panel * SLAB + rows.len % SLAB) * PANEL + start;
-            let out = &mut rows.slabs[rows.len / SLAB][at..at + LANES];
-            let mut scores = [T::default(); LANES];
-            let atoms_p = p[atoms.clone()].iter_mut().zip(&self.inverse_norms[atoms]);
-            for (((out, row), (p, norm)), score) in
-                out.iter_mut().zip(row).zip(atoms_p).zip(&mut scores)
-            {
-                *out = row * self.scale;
-                *p -= self.step * *out;
-                *score = p.magnitude() * *norm;
-            }
-            best = larger(best, largest(&mut scores));
-        }
-        best
+    /// leaves each panel's [`Best`].
+    pub(super) fn push(
+        &mut self,
+        arch: Arch,
+        step: Step<'_, T>,
+        p: &mut [T],
+        best: &mut [Best<T>],
+    ) {
+        arch.dispatch(Push { panels: &mut self.panels, step, p, best });
+        self.len += 1;
     }
 }
 
-/// [`Step::run`] as `pulp` wants it: what is inlined into [`WithSimd::with_simd`] is compiled for each vector width.
-struct EveryPanel<'a, T> {
+/// [`Rows::push`] as `pulp` wants it: what is inlined into [`WithSimd::with_simd`] is compiled for each vector width.
+struct Push<'a, T> {
+    panels: &'a mut [Vec<[T; PANEL]>],
     step: Step<'a, T>,
-    rows: &'a mut Rows<T>,
     p: &'a mut [T],
-    best: &'a mut [T],
+    best: &'a mut [Best<T>],
 }
 
-impl<T: Scalar> WithSimd for EveryPanel<'_, T> {
+impl<T: Scalar> WithSimd for Push<'_, T> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        let Self { step, rows, p, best } = self;
-        for (panel, best) in best.iter_mut().enumerate() {
-            // f64 needs twice the registers: half a panel at a time.
-            *best = if size_of::<T>() == 4 {
-                step.panel::<PANEL>(rows, panel, p)
+    fn with_simd<S: Simd>(self, simd: S) {
+        if S::F32_LANES == 1 {
+            // No vectors known: four at a time is what baseline x86-64 has, and no loss elsewhere.
+            self.run(pulp::Scalar128b);
+        } else {
+            self.run(simd);
+        }
+    }
+}
+
+impl<T: Scalar> Push<'_, T> {
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) {
+        let Self { panels, mut step, p, best } = self;
+        for (panel, (rows, best)) in panels.iter_mut().zip(best).enumerate() {
+            let atoms = panel * PANEL..(panel + 1) * PANEL;
+            let mut row = [T::default(); PANEL];
+            let column = &step.column[atoms.clone()];
+            if let Some(next) = &mut step.next {
+                let columns = [column, &next.column[atoms.clone()]];
+                let out = [&mut row[..], &mut next.out[atoms.clone()]];
+                // All rows for the next column: the chosen one has had none either.
+                take_out::<T, S, 2, 4>(simd, rows, columns, [step.weights, next.weights], out);
             } else {
-                step.panel::<{ PANEL / 2 }>(rows, panel, p)
-            };
+                let (rows, row) = (&rows[step.first..], [&mut row[..]]);
+                // Eight sums hide the latency of an addition, where a panel has so many.
+                if 8 * size_of::<T::Vector<S>>() <= PANEL * size_of::<T>() {
+                    take_out::<T, S, 1, 8>(simd, rows, [column], [step.weights], row);
+                } else {
+                    take_out::<T, S, 1, 4>(simd, rows, [column], [step.weights], row);
+                }
+            }
+            let p_of: &mut [T; PANEL] = &mut p[atoms].as_chunks_mut().0[0];
+            for lane in 0..PANEL {
+                row[lane] = row[lane] * step.scale;
+                p_of[lane] -= step.step * row[lane];
+            }
+            rows.push(row);
+            *best = best_of(panel, p, step.inverse_norms);
         }
     }
 }
 
-/// Leaves each panel's largest `|p| * inverse_norm` in `best`.
-pub(super) fn score<T: Scalar>(p: &[T], inverse_norms: &[T], best: &mut [T]) {
-    let panels = p.as_chunks::<PANEL>().0.iter().zip(inverse_norms.as_chunks::<PANEL>().0);
-    for ((p, norms), best) in panels.zip(best) {
-        let mut scores = [T::default(); PANEL];
-        for ((p, norm), score) in p.iter().zip(norms).zip(&mut scores) {
-            *score = p.magnitude() * *norm;
-        }
-        *best = largest(&mut scores);
-    }
-}
-
-/// The largest, by halving: lanes against lanes.
+/// `out[c] = columns[c] - sum_i weights[c][i] * rows[i]`.
 #[inline(always)]
-fn largest<T: Scalar, const LANES: usize>(scores: &mut [T; LANES]) -> T {
-    let mut width = LANES / 2;
-    while width > 0 {
-        let (low, high) = scores.split_at_mut(width);
-        for (low, high) in low.iter_mut().zip(high) {
-            *low = larger(*low, *high);
+fn take_out<T: Scalar, S: Simd, const COLUMNS: usize, const VECTORS: usize>(
+    simd: S,
+    rows: &[[T; PANEL]],
+    columns: [&[T]; COLUMNS],
+    weights: [&[T]; COLUMNS],
+    out: [&mut [T]; COLUMNS],
+) {
+    let columns = columns.map(T::vectors::<S>);
+    let weights = weights.map(|weights| &weights[..rows.len()]);
+    let out = out.map(T::vectors_mut::<S>);
+    for start in (0..columns[0].len()).step_by(VECTORS) {
+        let mut sums: [[T::Vector<S>; VECTORS]; COLUMNS] =
+            std::array::from_fn(|c| *first_of(&columns[c][start..]));
+        for (i, row) in rows.iter().enumerate() {
+            let row: &[T::Vector<S>; VECTORS] = first_of(&T::vectors::<S>(row)[start..]);
+            for c in 0..COLUMNS {
+                let weight = T::splat(simd, T::default() - weights[c][i]);
+                for v in 0..VECTORS {
+                    sums[c][v] = T::accumulate(simd, sums[c][v], weight, row[v]);
+                }
+            }
         }
-        width /= 2;
+        for c in 0..COLUMNS {
+            out[c][start..start + VECTORS].copy_from_slice(&sums[c]);
+        }
     }
-    scores[0]
+}
+
+/// Lanes in which the largest scores are kept: to the end of a panel, one is not compared with its neighbour.
+const SCORES: usize = 16;
+
+/// The largest `|p| * inverse_norm` of a panel's atoms, of every sixteenth atom apart.
+pub(super) type Best<T> = [T; SCORES];
+
+#[inline(always)]
+fn best_of<T: Scalar>(panel: usize, p: &[T], inverse_norms: &[T]) -> Best<T> {
+    let atoms = panel * PANEL..(panel + 1) * PANEL;
+    let mut best = [T::default(); SCORES];
+    let p = p[atoms.clone()].as_chunks::<SCORES>().0;
+    for (p, norms) in p.iter().zip(inverse_norms[atoms].as_chunks::<SCORES>().0) {
+        for lane in 0..SCORES {
+            best[lane] = larger(best[lane], p[lane].magnitude() * norms[lane]);
+        }
+    }
+    best
+}
+
+/// Leaves each panel's [`Best`].
+pub(super) fn score<T: Scalar>(p: &[T], inverse_norms: &[T], best: &mut [Best<T>]) {
+    for (panel, best) in best.iter_mut().enumerate() {
+        *best = best_of(panel, p, inverse_norms);
+    }
+}
+
+/// The largest of all but one panel, and the first panel that has it.
+pub(super) fn largest<T: Scalar>(best: &[Best<T>], but: Option<usize>) -> (usize, T) {
+    let others = || best.iter().enumerate().filter(|(panel, _)| Some(*panel) != but);
+    let mut lanes = [T::default(); SCORES];
+    for (_, best) in others() {
+        for (lane, best) in lanes.iter_mut().zip(best) {
+            *lane = larger(*lane, *best);
+        }
+    }
+    let largest = lanes.into_iter().fold(T::default(), larger);
+    let has_it = others().find(|(_, best)| best.contains(&largest));
+    (has_it.map_or(0, |(panel, _)| panel), largest)
 }
 
 #[inline(always)]
@@ -157,13 +212,8 @@ fn larger<T: Scalar>(a: T, b: T) -> T {
     if b > a { b } else { a }
 }
 
+/// The first `COUNT` values.
 #[inline(always)]
-fn lanes<T: Scalar, const LANES: usize>(values: &[T]) -> [T; LANES] {
-    *lanes_of(values)
-}
-
-#[inline(always)]
-pub(super) fn lanes_of<T: Scalar, const LANES: usize>(values: &[T]) -> &[T; LANES] {
-    let (chunk, _) = values.as_chunks::<LANES>();
-    &chunk[0]
+pub(super) fn first_of<V, const COUNT: usize>(values: &[V]) -> &[V; COUNT] {
+    &values.as_chunks::<COUNT>().0[0]
 }

@@ -4,7 +4,7 @@
 //! computes it; a batch gives each frame the bits that it would get alone.
 
 use super::dictionary::padded;
-use super::kernel::{PANEL, lanes_of};
+use super::kernel::{PANEL, first_of};
 use super::scalar::Scalar;
 use nalgebra::DMatrix;
 use pulp::{Arch, Simd, WithSimd};
@@ -131,42 +131,52 @@ struct Product<'a, T, const FRAMES: usize> {
 impl<T: Scalar, const FRAMES: usize> WithSimd for Product<'_, T, FRAMES> {
     type Output = [[T; PANEL]; FRAMES];
 
-    /// Tiles of two vectors' width, as high as the registers allow; of one frame, as wide.
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> Self::Output {
+    fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
         let mut out = [[T::default(); PANEL]; FRAMES];
-        let many_registers = S::REGISTER_COUNT >= 32;
-        match (FRAMES, S::F32_LANES * 4 / size_of::<T>()) {
-            (1, 4..) if size_of::<T>() == 4 => self.tiles::<1, 64>(&mut out),
-            (1, _) => self.tiles::<1, 32>(&mut out),
-            (_, 16..) => self.tiles::<8, 32>(&mut out),
-            (_, 8..) if many_registers => self.tiles::<8, 16>(&mut out),
-            (_, 8..) => self.tiles::<4, 16>(&mut out),
-            (_, 4..) if many_registers => self.tiles::<8, 8>(&mut out),
-            (_, 4..) => self.tiles::<4, 8>(&mut out),
-            _ => self.tiles::<4, 4>(&mut out),
+        if FRAMES == 1 {
+            self.alone(&mut out[0]);
+        } else if S::F32_LANES == 1 {
+            // No vectors known: four at a time is what baseline x86-64 has, and no loss elsewhere.
+            self.tiles::<_, 4>(pulp::Scalar128b, &mut out);
+        } else if S::REGISTER_COUNT >= 32 {
+            self.tiles::<S, 8>(simd, &mut out);
+        } else {
+            self.tiles::<S, 4>(simd, &mut out);
         }
         out
     }
 }
 
 impl<T: Scalar, const FRAMES: usize> Product<'_, T, FRAMES> {
+    /// One frame: the panel streams by once, its sums stay in registers.
     #[inline(always)]
-    fn tiles<const HIGH: usize, const WIDE: usize>(&self, out: &mut [[T; PANEL]; FRAMES]) {
+    fn alone(&self, sums: &mut [T; PANEL]) {
+        for (y, atoms) in self.packed.iter().zip(self.panel) {
+            for (sum, atom) in sums.iter_mut().zip(atoms) {
+                *sum += y[0] * *atom;
+            }
+        }
+    }
+
+    /// Tiles two vectors wide and `HIGH` frames high, which with their operands fill the registers.
+    #[inline(always)]
+    fn tiles<S: Simd, const HIGH: usize>(&self, simd: S, out: &mut [[T; PANEL]; FRAMES]) {
+        let vectors = T::vectors::<S>(&self.panel[0]).len();
         for top in (0..FRAMES).step_by(HIGH) {
-            for left in (0..PANEL).step_by(WIDE) {
-                let mut sums = [[T::default(); WIDE]; HIGH];
+            for left in (0..vectors).step_by(2) {
+                let mut sums = [[T::splat(simd, T::default()); 2]; HIGH];
                 for (y, atoms) in self.packed.iter().zip(self.panel) {
-                    let atoms: &[T; WIDE] = lanes_of(&atoms[left..]);
-                    let y: &[T; HIGH] = lanes_of(&y[top..]);
-                    for (sums, y) in sums.iter_mut().zip(y) {
-                        for (sum, atom) in sums.iter_mut().zip(atoms) {
-                            *sum += *y * *atom;
-                        }
+                    let atoms = &T::vectors::<S>(atoms)[left..left + 2];
+                    let y: &[T; HIGH] = first_of(&y[top..top + HIGH]);
+                    for f in 0..HIGH {
+                        let y = T::splat(simd, y[f]);
+                        sums[f][0] = T::accumulate(simd, sums[f][0], y, atoms[0]);
+                        sums[f][1] = T::accumulate(simd, sums[f][1], y, atoms[1]);
                     }
                 }
-                for (out, sums) in out[top..].iter_mut().zip(sums) {
-                    out[left..left + WIDE].copy_from_slice(&sums);
+                for (out, sums) in out[top..top + HIGH].iter_mut().zip(&sums) {
+                    T::vectors_mut::<S>(out)[left..left + 2].copy_from_slice(sums);
                 }
             }
         }

@@ -19,7 +19,7 @@
 //! the largest, they err by at most [`error_bound`].
 
 use super::dictionary::{Dictionary, padded};
-use super::kernel::{PANEL, Rows, Step, score};
+use super::kernel::{Best, Next, PANEL, Rows, Step, largest, score};
 use super::scalar::Scalar;
 use super::{DEPENDENT, Limits, OmpError, ROUNDING, Solution, Stop, finite};
 use pulp::Arch;
@@ -59,8 +59,15 @@ pub struct Solver<'d, T, D: ?Sized> {
     p: Vec<T>,
     /// One over the norm of every atom that may still be chosen, 0 for the others.
     inverse_norms: Vec<T>,
-    best: Vec<T>,
+    best: Vec<Best<T>>,
     rows: Rows<T>,
+    /// The atom that was the second best when a column was last taken from the Gram matrix.
+    ahead: Option<Ahead>,
+    /// Its column without the rows that there were then.
+    ahead_column: Vec<T>,
+    /// And what those rows say of it.
+    ahead_weights: Vec<T>,
+    /// The chosen atom's entries in the rows.
     weights: Vec<T>,
     scratch: Vec<T>,
 }
@@ -83,8 +90,11 @@ impl<'d, T: Scalar, D: Dictionary<T> + ?Sized> Solver<'d, T, D> {
             arch,
             p: vec![T::default(); width],
             inverse_norms: Vec::with_capacity(width),
-            best: vec![T::default(); width / PANEL],
+            best: vec![Best::default(); width / PANEL],
             rows: Rows::new(width / PANEL),
+            ahead: None,
+            ahead_column: vec![T::default(); width],
+            ahead_weights: Vec::new(),
             weights: Vec::new(),
             scratch: vec![T::default(); width],
         })
@@ -129,6 +139,7 @@ impl<'d, T: Scalar, D: Dictionary<T> + ?Sized> Solver<'d, T, D> {
             return Err(OmpError::Start { found, atoms: atoms.count() });
         }
         self.rows.clear();
+        self.ahead = None;
         self.inverse_norms.clear();
         self.inverse_norms.extend_from_slice(atoms.inverse_norms());
         score(&self.p, &self.inverse_norms, &mut self.best);
@@ -170,22 +181,21 @@ impl<'d, T: Scalar, D: Dictionary<T> + ?Sized> Solver<'d, T, D> {
 
     /// The atom of largest score, the lowest of equals, and that score.
     fn choose(&self) -> (usize, f64) {
-        let mut best = (0, T::default());
-        for (panel, &score) in self.best.iter().enumerate() {
-            if score > best.1 {
-                best = (panel, score);
-            }
-        }
-        let (panel, score) = best;
+        let (panel, score) = largest(&self.best, None);
+        (self.atom_of(panel, score), score.into())
+    }
+
+    /// The first atom of a panel that has this score.
+    fn atom_of(&self, panel: usize, score: T) -> usize {
         let atoms = panel * PANEL..((panel + 1) * PANEL).min(self.p.len());
         let is_best = |&k: &usize| self.p[k].magnitude() * self.inverse_norms[k] == score;
-        (atoms.clone().find(is_best).unwrap_or(atoms.start), score.into())
+        atoms.clone().find(is_best).unwrap_or(atoms.start)
     }
 
     /// Adds an atom to the path, unless it is in the span of those chosen.
     fn take(&mut self, atom: usize, path: &mut Path<T>, remaining: &mut f64, energy: f64) -> bool {
         self.weights.clear();
-        self.rows.of_atom(atom, &mut self.weights);
+        self.rows.of_atom(atom, 0, &mut self.weights);
         let own: f64 = self.dictionary.atoms().energies()[atom].into();
         let pivot = own - squares(&self.weights);
         if !(pivot > DEPENDENT * own) {
@@ -195,14 +205,7 @@ impl<'d, T: Scalar, D: Dictionary<T> + ?Sized> Solver<'d, T, D> {
         let scale = T::from_f64(root.recip());
         let step = self.p[atom] * scale;
         self.inverse_norms[atom] = T::default();
-        let step_of_all = Step {
-            column: self.dictionary.gram_column(atom, &mut self.scratch),
-            weights: &self.weights,
-            scale,
-            step,
-            inverse_norms: &self.inverse_norms,
-        };
-        step_of_all.run(self.arch, &mut self.rows, &mut self.p, &mut self.best);
+        self.push(atom, scale, step);
         path.factor.extend_from_slice(&self.weights);
         path.factor.push(T::from_f64(root));
         path.steps.push(step);
@@ -211,6 +214,55 @@ impl<'d, T: Scalar, D: Dictionary<T> + ?Sized> Solver<'d, T, D> {
         path.residual_norms.push((remaining.max(0.0) / energy).sqrt());
         true
     }
+
+    /// Makes the atom's column of the Gram matrix, orthogonal to all rows, the next row.
+    ///
+    /// A pass over the rows takes hardly longer for two columns than for one, and the next atom is often the second
+    /// best of now: its column is brought as far as the rows go, and needs only the rows since when it is chosen. That
+    /// changes the order in which the work is done, and no bit of the result.
+    fn push(&mut self, atom: usize, scale: T, step: T) {
+        let dictionary = self.dictionary;
+        let taken_before = self.ahead.take_if(|ahead| ahead.atom == atom);
+        let (column, first, next) = if let Some(Ahead { rows, .. }) = taken_before {
+            std::mem::swap(&mut self.scratch, &mut self.ahead_column);
+            (&self.scratch[..], rows, None)
+        } else if let Some(column) = dictionary.stored_gram_column(atom) {
+            (column, 0, self.look_ahead(atom))
+        } else {
+            dictionary.gram_column(atom, &mut self.scratch);
+            (&self.scratch[..], 0, None)
+        };
+        let next = next.map(|column| Next {
+            column,
+            weights: &self.ahead_weights,
+            out: &mut self.ahead_column,
+        });
+        let inverse_norms = &self.inverse_norms;
+        let weights = &self.weights[first..];
+        let step = Step { column, first, weights, next, scale, step, inverse_norms };
+        self.rows.push(self.arch, step, &mut self.p, &mut self.best);
+    }
+
+    /// Chooses the best atom of the other panels to go along; returns its column.
+    fn look_ahead(&mut self, atom: usize) -> Option<&'d [T]> {
+        let (panel, score) = largest(&self.best, Some(atom / PANEL));
+        if !(score > T::default()) {
+            self.ahead = None;
+            return None;
+        }
+        let ahead = self.atom_of(panel, score);
+        self.ahead_weights.clear();
+        self.rows.of_atom(ahead, 0, &mut self.ahead_weights);
+        self.ahead = Some(Ahead { atom: ahead, rows: self.ahead_weights.len() });
+        self.dictionary.stored_gram_column(ahead)
+    }
+}
+
+/// A column without the first rows.
+#[derive(Debug)]
+struct Ahead {
+    atom: usize,
+    rows: usize,
 }
 
 /// Squared norm of a measurement.

@@ -150,11 +150,11 @@ impl Dictionary<f32> for SampledHadamard<'_> {
         }
     }
 
-    fn gram_column<'b>(&'b self, atom: usize, scratch: &'b mut [f32]) -> &'b [f32] {
+    fn gram_column(&self, atom: usize, out: &mut [f32]) {
         let area = self.mask.len();
-        debug_assert_eq!(scratch.len(), padded(area));
-        scratch[area..].fill(0.0);
-        let out = &mut scratch[..area];
+        debug_assert_eq!(out.len(), padded(area));
+        let (out, rest) = out.split_at_mut(area);
+        rest.fill(0.0);
         match &self.structure {
             Structure::Dyadic(g) => {
                 for (j, out) in out.iter_mut().enumerate() {
@@ -179,6 +179,5 @@ impl Dictionary<f32> for SampledHadamard<'_> {
             *value *= own * s;
         }
         out[atom] += self.prior.noise.powi(2);
-        scratch
     }
 }

@@ -3,6 +3,7 @@
 //! The one law: an algorithm says nothing about the type but its rounding, so `f32` and `f64` choose alike
 //! wherever rounding does not decide.
 
+use pulp::Simd;
 use std::ops::{AddAssign, Mul, SubAssign};
 
 /// `f32` or `f64`.
@@ -18,6 +19,10 @@ pub trait Scalar:
     + AddAssign
     + SubAssign
 {
+    /// As many numbers as a vector of the machine holds.
+    #[doc(hidden)]
+    type Vector<S: Simd>: Copy;
+
     /// Distance from 1 to the next number.
     const EPSILON: f64;
 
@@ -27,11 +32,28 @@ pub trait Scalar:
     fn magnitude(self) -> Self;
     /// Square root.
     fn root(self) -> Self;
+
+    #[doc(hidden)]
+    fn splat<S: Simd>(simd: S, value: Self) -> Self::Vector<S>;
+    /// `sum + a * b`, rounded twice.
+    #[doc(hidden)]
+    fn accumulate<S: Simd>(
+        simd: S,
+        sum: Self::Vector<S>,
+        a: Self::Vector<S>,
+        b: Self::Vector<S>,
+    ) -> Self::Vector<S>;
+    #[doc(hidden)]
+    fn vectors<S: Simd>(values: &[Self]) -> &[Self::Vector<S>];
+    #[doc(hidden)]
+    fn vectors_mut<S: Simd>(values: &mut [Self]) -> &mut [Self::Vector<S>];
 }
 
 macro_rules! scalar {
-    ($type:ident) => {
+    ($type:ident, $vector:ident, $splat:ident, $add:ident, $mul:ident, $view:ident, $view_mut:ident) => {
         impl Scalar for $type {
+            type Vector<S: Simd> = S::$vector;
+
             const EPSILON: f64 = $type::EPSILON as f64;
 
             #[inline(always)]
@@ -48,9 +70,34 @@ macro_rules! scalar {
             fn root(self) -> Self {
                 self.sqrt()
             }
+
+            #[inline(always)]
+            fn splat<S: Simd>(simd: S, value: Self) -> S::$vector {
+                simd.$splat(value)
+            }
+
+            #[inline(always)]
+            fn accumulate<S: Simd>(
+                simd: S,
+                sum: S::$vector,
+                a: S::$vector,
+                b: S::$vector,
+            ) -> S::$vector {
+                simd.$add(sum, simd.$mul(a, b))
+            }
+
+            #[inline(always)]
+            fn vectors<S: Simd>(values: &[Self]) -> &[S::$vector] {
+                S::$view(values).0
+            }
+
+            #[inline(always)]
+            fn vectors_mut<S: Simd>(values: &mut [Self]) -> &mut [S::$vector] {
+                S::$view_mut(values).0
+            }
         }
     };
 }
 
-scalar!(f32);
-scalar!(f64);
+scalar!(f32, f32s, splat_f32s, add_f32s, mul_f32s, as_simd_f32s, as_mut_simd_f32s);
+scalar!(f64, f64s, splat_f64s, add_f64s, mul_f64s, as_simd_f64s, as_mut_simd_f64s);
