@@ -10,6 +10,7 @@
 //! | [`solve_batch`] | many measurements of one [`Problem`], on a [`Backend`] chosen at run time |
 //! | [`Dictionary`] | what both ask of the atoms: projections, and columns of the Gram matrix |
 //! | [`DenseDictionary`] | a dictionary that is a matrix |
+//! | [`MixedDictionary`] | the same in `f32`, and in `f64` where `f32` cannot tell two atoms apart |
 //! | [`sampled`] | Hadamard measurements of an image, by fast transforms, without storing a matrix |
 //!
 //! What the algorithm as printed leaves open, and both paths settle alike:
@@ -18,13 +19,15 @@
 //!   half of the rows) would divide by zero. It is left out and counted.
 //! - An atom in the span of the support would put a zero on the diagonal of the Cholesky factor. Whatever has
 //!   the largest correlation with the residual cannot be in that span, unless all that is left is rounding:
-//!   the search ends there ([`Stop::Dependent`]).
+//!   the search ends there ([`Stop::Dependent`]). What is rounding depends on the number type: under 1e-5 of an atom's norm
+//!   squared in `f32`, 1e-10 in `f64`.
 //! - Equal correlations: the lower atom is chosen.
 
 mod batch;
 mod dense;
 mod dictionary;
 mod kernel;
+mod mixed;
 mod panels;
 mod pursuit;
 pub mod reference;
@@ -34,6 +37,7 @@ mod scalar;
 pub use batch::{Backend, ParseBackendError, Problem, solve_batch};
 pub use dense::DenseDictionary;
 pub use dictionary::{Atoms, Dictionary, padded};
+pub use mixed::MixedDictionary;
 pub use pursuit::{Path, Solver, error_bound};
 pub use scalar::Scalar;
 
@@ -125,11 +129,6 @@ pub enum OmpError {
         atoms: usize,
     },
 }
-
-/// A pivot under this share of its atom's norm squared is rounding (of `f32`, so that both paths agree).
-const DEPENDENT: f64 = 1e-5;
-/// A correlation under this share of the first one is rounding (likewise).
-const ROUNDING: f64 = 1e-5;
 
 fn finite<T: Copy + Into<f64>>(field: &'static str, values: &[T]) -> Result<(), OmpError> {
     let finite = |v: &T| Into::<f64>::into(*v).is_finite();

@@ -4,7 +4,7 @@
 //! number of threads.
 
 use super::dictionary::{Dictionary, padded};
-use super::pursuit::{Solver, energy};
+use super::pursuit::{Path, Solver, energy};
 use super::scalar::Scalar;
 use super::{Limits, OmpError, Solution, finite};
 use rayon::prelude::*;
@@ -73,6 +73,15 @@ pub fn solve_batch<T: Scalar, D: Dictionary<T> + ?Sized>(
     y: &[T],
     backend: Backend,
 ) -> Result<Vec<Solution>, OmpError> {
+    Ok(solve_batch_paths(problem, y, backend)?.into_iter().map(Path::solution).collect())
+}
+
+/// [`solve_batch`] with what the pursuits know besides.
+pub(super) fn solve_batch_paths<T: Scalar, D: Dictionary<T> + ?Sized>(
+    problem: &Problem<'_, D>,
+    y: &[T],
+    backend: Backend,
+) -> Result<Vec<Path<T>>, OmpError> {
     let Problem { dictionary, limits } = *problem;
     let expected = dictionary.measurements();
     if expected == 0 || !y.len().is_multiple_of(expected) {
@@ -89,11 +98,11 @@ fn on_all_cores<T: Scalar, D: Dictionary<T> + ?Sized>(
     dictionary: &D,
     limits: &Limits,
     y: &[T],
-) -> Result<Vec<Solution>, OmpError> {
+) -> Result<Vec<Path<T>>, OmpError> {
     let expected = dictionary.measurements();
     let width = padded(dictionary.atoms().count());
     // A solver's memory is a thread's, and stays warm from group to group.
-    let groups: Result<Vec<Vec<Solution>>, OmpError> = y
+    let groups: Result<Vec<Vec<Path<T>>>, OmpError> = y
         .par_chunks(TOGETHER * expected)
         .map_init(
             || (Solver::new(dictionary, limits), vec![T::default(); TOGETHER * width]),
@@ -104,7 +113,7 @@ fn on_all_cores<T: Scalar, D: Dictionary<T> + ?Sized>(
                 dictionary.project_all(y, p0);
                 frames
                     .zip(p0.chunks_exact(width))
-                    .map(|(y, p0)| Ok(solver.solve_projected(p0, energy(y))?.solution()))
+                    .map(|(y, p0)| solver.solve_projected(p0, energy(y)))
                     .collect()
             },
         )

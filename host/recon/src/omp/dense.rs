@@ -36,6 +36,14 @@ impl<T: Scalar> DenseDictionary<T> {
         Self::on(Arch::new(), matrix, bytes)
     }
 
+    /// The same dictionary, with atoms chosen by their inner products with the residual as they are, as programs do that
+    /// expect atoms of unit norm.
+    #[must_use]
+    pub fn unnormalised(mut self) -> Self {
+        self.atoms = self.atoms.unnormalised();
+        self
+    }
+
     pub(super) fn on(arch: Arch, matrix: &DMatrix<T>, bytes: usize) -> Self {
         let panels = Panels::new(matrix);
         let width = super::padded(matrix.ncols());

@@ -33,6 +33,15 @@ impl<T: Scalar> Atoms<T> {
         Self { energies, inverse_norms, unseen }
     }
 
+    /// The same atoms, chosen by their inner products with the residual as they are: longer atoms are more attractive.
+    #[must_use]
+    pub fn unnormalised(mut self) -> Self {
+        for norm in self.inverse_norms.iter_mut().filter(|norm| **norm != T::default()) {
+            *norm = T::from_f64(1.0);
+        }
+        self
+    }
+
     /// How many there are.
     #[must_use]
     pub fn count(&self) -> usize {

@@ -21,7 +21,7 @@
 use super::dictionary::{Dictionary, padded};
 use super::kernel::{Best, Next, PANEL, Rows, Step, largest, score};
 use super::scalar::Scalar;
-use super::{DEPENDENT, Limits, OmpError, ROUNDING, Solution, Stop, finite};
+use super::{Limits, OmpError, Solution, Stop, finite};
 use pulp::Arch;
 
 /// How far the coefficients of `atoms` atoms may be off, relative to the norm of all of them, where `condition` is the
@@ -44,6 +44,9 @@ pub struct Path<T> {
     pub stop: Stop,
     /// Atoms that the measurement does not see.
     pub unseen: Vec<usize>,
+    /// Least lead of a chosen atom over the best other one: difference of their correlations with the residual, relative
+    /// to the measurement's norm. Rounding may have decided where it is no more than some tens of epsilons.
+    pub least_lead: f64,
     /// Lower-triangular factor of the support's Gram matrix, row after row.
     factor: Vec<T>,
     /// The initial projection, orthogonalised along with the atoms.
@@ -60,6 +63,8 @@ pub struct Solver<'d, T, D: ?Sized> {
     /// One over the norm of every atom that may still be chosen, 0 for the others.
     inverse_norms: Vec<T>,
     best: Vec<Best<T>>,
+    /// The second best panel when an atom was last chosen, and its best score.
+    second: (usize, T),
     rows: Rows<T>,
     /// The atom that was the second best when a column was last taken from the Gram matrix.
     ahead: Option<Ahead>,
@@ -91,6 +96,7 @@ impl<'d, T: Scalar, D: Dictionary<T> + ?Sized> Solver<'d, T, D> {
             p: vec![T::default(); width],
             inverse_norms: Vec::with_capacity(width),
             best: vec![Best::default(); width / PANEL],
+            second: (0, T::default()),
             rows: Rows::new(width / PANEL),
             ahead: None,
             ahead_column: vec![T::default(); width],
@@ -148,13 +154,14 @@ impl<'d, T: Scalar, D: Dictionary<T> + ?Sized> Solver<'d, T, D> {
             residual_norms: vec![if energy > 0.0 { 1.0 } else { 0.0 }],
             stop: Stop::Sparsity,
             unseen: atoms.unseen().to_vec(),
+            least_lead: f64::INFINITY,
             factor: Vec::new(),
             steps: Vec::new(),
         };
         let enough = self.limits.enough(energy, self.dictionary.measurements());
         let mut remaining = energy;
         let mut start = start.iter();
-        let rounding = ROUNDING * self.choose().1;
+        let rounding = T::ROUNDING * self.choose().score;
         path.stop = loop {
             if remaining <= enough {
                 break Stop::Residual;
@@ -168,10 +175,11 @@ impl<'d, T: Scalar, D: Dictionary<T> + ?Sized> Solver<'d, T, D> {
                 }
                 continue;
             }
-            let (atom, score) = self.choose();
+            let Choice { atom, score, lead } = self.choose();
             if score <= rounding {
                 break Stop::NoAtomLeft;
             }
+            path.least_lead = path.least_lead.min(lead / energy.sqrt());
             if !self.take(atom, &mut path, &mut remaining, energy) {
                 break Stop::Dependent;
             }
@@ -179,10 +187,17 @@ impl<'d, T: Scalar, D: Dictionary<T> + ?Sized> Solver<'d, T, D> {
         Ok(path)
     }
 
-    /// The atom of largest score, the lowest of equals, and that score.
-    fn choose(&self) -> (usize, f64) {
+    /// The atom of largest score, the lowest of equals.
+    fn choose(&mut self) -> Choice {
         let (panel, score) = largest(&self.best, None);
-        (self.atom_of(panel, score), score.into())
+        let atom = self.atom_of(panel, score);
+        self.second = largest(&self.best, Some(panel));
+        let rivals = (panel * PANEL..(panel + 1) * PANEL).filter(|&k| k != atom);
+        let rival = rivals.fold(self.second.1, |most, k| {
+            let score = self.p[k].magnitude() * self.inverse_norms[k];
+            if score > most { score } else { most }
+        });
+        Choice { atom, score: score.into(), lead: score.into() - rival.into() }
     }
 
     /// The first atom of a panel that has this score.
@@ -198,7 +213,7 @@ impl<'d, T: Scalar, D: Dictionary<T> + ?Sized> Solver<'d, T, D> {
         self.rows.of_atom(atom, 0, &mut self.weights);
         let own: f64 = self.dictionary.atoms().energies()[atom].into();
         let pivot = own - squares(&self.weights);
-        if !(pivot > DEPENDENT * own) {
+        if !(pivot > T::DEPENDENT * own) {
             return false;
         }
         let root = pivot.sqrt();
@@ -245,8 +260,8 @@ impl<'d, T: Scalar, D: Dictionary<T> + ?Sized> Solver<'d, T, D> {
 
     /// Chooses the best atom of the other panels to go along; returns its column.
     fn look_ahead(&mut self, atom: usize) -> Option<&'d [T]> {
-        let (panel, score) = largest(&self.best, Some(atom / PANEL));
-        if !(score > T::default()) {
+        let (panel, score) = self.second;
+        if panel == atom / PANEL || !(score > T::default()) {
             self.ahead = None;
             return None;
         }
@@ -256,6 +271,13 @@ impl<'d, T: Scalar, D: Dictionary<T> + ?Sized> Solver<'d, T, D> {
         self.ahead = Some(Ahead { atom: ahead, rows: self.ahead_weights.len() });
         self.dictionary.stored_gram_column(ahead)
     }
+}
+
+/// An atom, its score, and by how much that is the largest.
+struct Choice {
+    atom: usize,
+    score: f64,
+    lead: f64,
 }
 
 /// A column without the first rows.

@@ -3,7 +3,7 @@
 //! The one law: clarity over speed. Symbols are the paper's; line numbers are those of its listing.
 
 use super::dictionary::UNSEEN;
-use super::{DEPENDENT, Limits, OmpError, ROUNDING, Solution, Stop, finite};
+use super::{Limits, OmpError, Scalar, Solution, Stop, finite};
 use nalgebra::{DMatrix, DVector};
 
 /// Finds a sparse `x` with `dictionary * x` near `y`. The dictionary is `measurements x atoms`, of any
@@ -50,14 +50,14 @@ pub fn solve(dictionary: &DMatrix<f64>, y: &[f64], limits: &Limits) -> Result<So
             break Stop::Sparsity;
         }
         let Some(k) = largest(&p, &support) else { break Stop::NoAtomLeft }; // line 5
-        if p[k].abs() <= ROUNDING * p0.amax() {
+        if p[k].abs() <= f64::ROUNDING * p0.amax() {
             break Stop::NoAtomLeft;
         }
         let chosen = support.len();
         let g = DVector::from_iterator(chosen, support.iter().map(|&j| gram[(j, k)]));
         let w = forward(&l, &g); // line 7
         let pivot = 1.0 - w.norm_squared();
-        if pivot <= DEPENDENT {
+        if pivot <= f64::DEPENDENT {
             break Stop::Dependent;
         }
         l = l.insert_row(chosen, 0.0).insert_column(chosen, 0.0); // line 8

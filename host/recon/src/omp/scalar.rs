@@ -26,6 +26,13 @@ pub trait Scalar:
     /// Distance from 1 to the next number.
     const EPSILON: f64;
 
+    /// A pivot under this share of its atom's norm squared is rounding.
+    #[doc(hidden)]
+    const DEPENDENT: f64;
+    /// A correlation under this share of the first one is rounding.
+    #[doc(hidden)]
+    const ROUNDING: f64;
+
     /// The nearest number of this type.
     fn from_f64(value: f64) -> Self;
     /// Magnitude.
@@ -50,11 +57,13 @@ pub trait Scalar:
 }
 
 macro_rules! scalar {
-    ($type:ident, $vector:ident, $splat:ident, $add:ident, $mul:ident, $view:ident, $view_mut:ident) => {
+    ($type:ident, $rounding:literal, $vector:ident, $splat:ident, $add:ident, $mul:ident, $view:ident, $view_mut:ident) => {
         impl Scalar for $type {
             type Vector<S: Simd> = S::$vector;
 
             const EPSILON: f64 = $type::EPSILON as f64;
+            const DEPENDENT: f64 = $rounding;
+            const ROUNDING: f64 = $rounding;
 
             #[inline(always)]
             fn from_f64(value: f64) -> Self {
@@ -99,5 +108,5 @@ macro_rules! scalar {
     };
 }
 
-scalar!(f32, f32s, splat_f32s, add_f32s, mul_f32s, as_simd_f32s, as_mut_simd_f32s);
-scalar!(f64, f64s, splat_f64s, add_f64s, mul_f64s, as_simd_f64s, as_mut_simd_f64s);
+scalar!(f32, 1e-5, f32s, splat_f32s, add_f32s, mul_f32s, as_simd_f32s, as_mut_simd_f32s);
+scalar!(f64, 1e-10, f64s, splat_f64s, add_f64s, mul_f64s, as_simd_f64s, as_mut_simd_f64s);

@@ -16,7 +16,8 @@ proptest! {
     fn what_remains_is_orthogonal_to_the_support_and_never_grows(problem in problems()) {
         let length = DVector::from_column_slice(&problem.y).norm();
         for (solution, tolerance) in all_paths(&problem, &Limits::atoms(10)) {
-            prop_assert!(solution.residual_norms.is_sorted_by(|a, b| a >= b));
+            // The reference's energies are differences of numbers near 1: their roots are good to 1e-7.
+            prop_assert!(solution.residual_norms.is_sorted_by(|a, b| a + 1e-7 >= *b));
             let left = residual(&problem, &solution.support, &solution.coefficients);
             for &k in &solution.support {
                 let atom = problem.dictionary.column(k);

@@ -1,0 +1,82 @@
+//! Single precision where it is enough, double where it is not.
+//!
+//! The one law: the support is that of double precision. A choice whose lead over the next best atom is within the rounding
+//! of `f32` is not believed, nor is an end that only `f32` sees; such measurements, few in a thousand, are solved again.
+
+use super::batch::{Backend, Problem, solve_batch_paths};
+use super::dense::DenseDictionary;
+use super::pursuit::Path;
+use super::{Limits, OmpError, Solution, Stop, solve_batch};
+use nalgebra::DMatrix;
+use std::sync::OnceLock;
+
+/// Leads over the next best atom, relative to the measurement's norm, that are believed: 32 epsilons of `f32`, ten times
+/// what its projections were seen to err by.
+const BELIEVED: f64 = 32.0 * f32::EPSILON as f64;
+
+/// A dictionary in both precisions; the double one is prepared when it is first needed.
+#[derive(Debug)]
+pub struct MixedDictionary {
+    single: DenseDictionary<f32>,
+    matrix: DMatrix<f64>,
+    double: OnceLock<DenseDictionary<f64>>,
+    normalised: bool,
+}
+
+impl MixedDictionary {
+    /// Prepares a `measurements x atoms` matrix. Atoms are chosen by their correlations with the residual, or with
+    /// `normalised` false by their inner products as they are.
+    #[must_use]
+    pub fn new(matrix: DMatrix<f64>, normalised: bool) -> Self {
+        let single = DenseDictionary::new(&matrix.map(|v| v as f32));
+        let single = if normalised { single } else { single.unnormalised() };
+        Self { single, matrix, double: OnceLock::new(), normalised }
+    }
+
+    /// The dictionary in double precision.
+    pub fn double(&self) -> &DenseDictionary<f64> {
+        self.double.get_or_init(|| {
+            let double = DenseDictionary::new(&self.matrix);
+            if self.normalised { double } else { double.unnormalised() }
+        })
+    }
+
+    /// The dictionary in single precision.
+    #[must_use]
+    pub fn single(&self) -> &DenseDictionary<f32> {
+        &self.single
+    }
+
+    /// [`solve_batch`], and how many of the measurements were solved in double precision.
+    ///
+    /// # Errors
+    /// Those of [`solve_batch`].
+    pub fn solve_batch(
+        &self,
+        limits: &Limits,
+        y: &[f64],
+        backend: Backend,
+    ) -> Result<(Vec<Solution>, usize), OmpError> {
+        super::finite("measurement", y)?;
+        let single: Vec<f32> = y.iter().map(|&y| y as f32).collect();
+        let problem = Problem { dictionary: &self.single, limits: *limits };
+        let paths = solve_batch_paths(&problem, &single, backend)?;
+        let measurements = self.matrix.nrows();
+        let doubtful: Vec<usize> = (0..paths.len()).filter(|&i| is_doubtful(&paths[i])).collect();
+        let mut solutions: Vec<Solution> = paths.into_iter().map(Path::solution).collect();
+        if !doubtful.is_empty() {
+            let frame = |i: &usize| &y[i * measurements..(i + 1) * measurements];
+            let again: Vec<f64> = doubtful.iter().flat_map(frame).copied().collect();
+            let problem = Problem { dictionary: self.double(), limits: *limits };
+            for (i, solution) in doubtful.iter().zip(solve_batch(&problem, &again, backend)?) {
+                solutions[*i] = solution;
+            }
+        }
+        Ok((solutions, doubtful.len()))
+    }
+}
+
+fn is_doubtful(path: &Path<f32>) -> bool {
+    let ended_by_rounding = matches!(path.stop, Stop::Dependent | Stop::NoAtomLeft);
+    path.least_lead < BELIEVED || ended_by_rounding
+}

@@ -1,0 +1,53 @@
+//! Single precision checked by itself.
+
+use super::*;
+
+/// Two atoms whose correlations with the measurement differ by less than `f32` can tell, in either order.
+fn nearly_tied(lead: f64) -> (DMatrix<f64>, Vec<f64>) {
+    let mut dictionary = DMatrix::identity(8, 70);
+    dictionary.column_mut(69).copy_from_slice(&[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.6, 0.8]);
+    let mut y = vec![0.0; 8];
+    (y[2], y[6], y[7]) = (1.0, 0.6, 0.8 + lead);
+    (dictionary, y)
+}
+
+#[test]
+fn a_lead_that_single_precision_cannot_see_decides_all_the_same() {
+    for lead in [1e-9, -1e-9] {
+        let (matrix, y) = nearly_tied(lead);
+        let limits = Limits::atoms(1);
+        let exact = reference::solve(&matrix, &y, &limits).unwrap();
+        assert_eq!(exact.support, [if lead > 0.0 { 69 } else { 2 }]);
+        let dictionary = MixedDictionary::new(matrix, true);
+        let (found, again) = dictionary.solve_batch(&limits, &y, Backend::Cpu).unwrap();
+        assert_eq!((&found[0].support, again), (&exact.support, 1));
+    }
+}
+
+#[test]
+fn few_of_many_frames_need_double_precision_and_all_have_its_support() {
+    let problem = problem(Kind::Noisy, 64, 256, 8, 11);
+    let mut random = Pcg64::seed_from_u64(4);
+    let y: Vec<f64> = (0..64 * 300).map(|_| normal(&mut random)).collect();
+    let dictionary = MixedDictionary::new(problem.dictionary.clone(), true);
+    let limits = Limits::atoms(16);
+    let (found, again) = dictionary.solve_batch(&limits, &y, Backend::Cpu).unwrap();
+    assert!(again < 30, "{again} of 300");
+    for (y, found) in y.chunks_exact(64).zip(&found) {
+        let exact = reference::solve(&problem.dictionary, y, &limits).unwrap();
+        assert_eq!(found.support, exact.support);
+    }
+}
+
+#[test]
+fn atoms_as_they_are_are_chosen_by_their_inner_products() {
+    // The second atom is longer, the first fits better.
+    let matrix = DMatrix::from_row_slice(2, 2, &[1.0, 3.0, 0.0, 3.0]);
+    let first = |normalised| {
+        let dictionary = MixedDictionary::new(matrix.clone(), normalised);
+        let limits = Limits::atoms(1);
+        let (found, _) = dictionary.solve_batch(&limits, &[1.0, 0.1], Backend::Cpu).unwrap();
+        found[0].support[0]
+    };
+    assert_eq!((first(true), first(false)), (0, 1));
+}
