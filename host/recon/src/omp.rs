@@ -37,7 +37,7 @@ mod scalar;
 pub use batch::{Backend, ParseBackendError, Problem, solve_batch};
 pub use dense::DenseDictionary;
 pub use dictionary::{Atoms, Dictionary, padded};
-pub use mixed::MixedDictionary;
+pub use mixed::{MixedDictionary, MixedSolver};
 pub use pursuit::{Path, Solver, error_bound};
 pub use scalar::Scalar;
 

@@ -1,5 +1,6 @@
-//! `nirspi eval`: the paper's tables, ours beside them.
+//! `nirspi eval`: how good results are: the paper's tables, ours beside them, and what less sampling costs.
 
+mod sampling;
 mod shot;
 mod table3;
 mod table4;
@@ -10,11 +11,12 @@ use clap::{Args, Subcommand};
 use serde::Serialize;
 use std::process::ExitCode;
 
-/// The paper's tables, ours beside them; all of ours simulated
+/// The paper's tables, ours beside them (ours simulated); what less sampling costs
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi eval table2\n\
-    \x20 nirspi eval table3 --scenes 200 --out table3/")]
+    \x20 nirspi eval table3 --scenes 200 --out table3/\n\
+    \x20 nirspi eval sampling wing.npz --out sampling/")]
 pub struct EvalArgs {
     #[command(subcommand)]
     table: Table,
@@ -26,6 +28,7 @@ enum Table {
     Table2(range::Args),
     Table3(table3::Args),
     Table4(table4::Args),
+    Sampling(sampling::Args),
 }
 
 pub fn run(args: &EvalArgs) -> Result<ExitCode> {
@@ -33,6 +36,7 @@ pub fn run(args: &EvalArgs) -> Result<ExitCode> {
         Table::Table2(args) => range::run(args),
         Table::Table3(args) => table3::run(args),
         Table::Table4(args) => table4::run(args),
+        Table::Sampling(args) => sampling::run(args),
     }
 }
 

@@ -3,6 +3,7 @@
 //! Exit codes: 0 done, 1 failed (one line on stderr says why), 2 used wrongly.
 
 mod address;
+mod bench;
 mod camera;
 mod capture;
 mod demo;
@@ -51,6 +52,7 @@ enum Command {
     Metrics(metrics::Args),
     Rain(rain::Args),
     Range(range::Args),
+    Bench(bench::Args),
     Eval(eval::EvalArgs),
 }
 
@@ -86,6 +88,7 @@ pub fn run() -> ExitCode {
         Command::Metrics(args) => metrics::run(&args),
         Command::Rain(args) => rain::run(&args),
         Command::Range(args) => range::run(&args),
+        Command::Bench(args) => bench::run(&args),
         Command::Eval(args) => eval::run(&args),
     };
     match result {

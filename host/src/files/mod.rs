@@ -10,6 +10,7 @@ pub mod npy;
 pub mod npz;
 pub mod order_table;
 pub mod output;
+pub mod problem;
 
 mod archive;
 mod array;

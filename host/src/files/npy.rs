@@ -1,4 +1,4 @@
-//! Images as NumPy `.npy` files: a stack `(N, H, W)` in, any shape of float32 out.
+//! Images as NumPy `.npy` files: a stack `(N, H, W)` in, any shape of numbers out.
 //!
 //! The law: [`encode`] then [`read_stack`] gives back the same bits.
 
@@ -80,14 +80,44 @@ pub fn read_stack(path: &Path) -> Result<Stack, FileError> {
     Ok(Stack { count, height, width, values })
 }
 
-/// The bytes of a `.npy` file (format 1.0, little-endian float32, C order) for an array of this
-/// shape.
+/// A number that arrays are written of.
+pub trait Element: Copy + private::Sealed {
+    /// Its name in a header.
+    #[doc(hidden)]
+    const DESCR: &'static str;
+    /// Appends its little-endian bytes.
+    #[doc(hidden)]
+    fn append(self, bytes: &mut Vec<u8>);
+}
+
+mod private {
+    pub trait Sealed {}
+}
+
+macro_rules! element {
+    ($type:ty, $descr:literal) => {
+        impl private::Sealed for $type {}
+        impl Element for $type {
+            const DESCR: &'static str = $descr;
+
+            fn append(self, bytes: &mut Vec<u8>) {
+                bytes.extend_from_slice(&self.to_le_bytes());
+            }
+        }
+    };
+}
+
+element!(f32, "<f4");
+element!(f64, "<f8");
+element!(i64, "<i8");
+
+/// The bytes of a `.npy` file (format 1.0, little-endian, C order) for an array of this shape.
 ///
 /// # Panics
 /// If the product of `shape` is not the number of values, or there are more than a hundred axes:
 /// the caller made both.
 #[must_use]
-pub fn encode(shape: &[usize], values: &[f32]) -> Vec<u8> {
+pub fn encode<T: Element>(shape: &[usize], values: &[T]) -> Vec<u8> {
     /// Data start at a multiple of this, so that NumPy can map the file.
     const ALIGNMENT: usize = 64;
     assert_eq!(
@@ -96,21 +126,24 @@ pub fn encode(shape: &[usize], values: &[f32]) -> Vec<u8> {
         "values of an array of shape {shape:?}"
     );
     let axes: Vec<u64> = shape.iter().map(|&axis| axis as u64).collect();
-    let mut header =
-        format!("{{'descr': '<f4', 'fortran_order': False, 'shape': {}, }}", shape_text(&axes))
-            .into_bytes();
+    let mut header = format!(
+        "{{'descr': '{}', 'fortran_order': False, 'shape': {}, }}",
+        T::DESCR,
+        shape_text(&axes)
+    )
+    .into_bytes();
     let before = MAGIC.len() + 4;
     let end = (before + header.len() + 1).next_multiple_of(ALIGNMENT);
     header.resize(end - before - 1, b' ');
     header.push(b'\n');
     let length = u16::try_from(header.len()).expect("a header of fewer than a hundred axes");
 
-    let mut bytes = Vec::with_capacity(end + 4 * values.len());
+    let mut bytes = Vec::with_capacity(end + size_of_val(values));
     bytes.extend_from_slice(MAGIC);
     bytes.extend_from_slice(&[1, 0]);
     bytes.extend_from_slice(&length.to_le_bytes());
     bytes.extend_from_slice(&header);
-    bytes.extend(values.iter().flat_map(|value| value.to_le_bytes()));
+    values.iter().for_each(|value| value.append(&mut bytes));
     bytes
 }
 

@@ -60,7 +60,7 @@ pub struct Problem<'d, D: ?Sized> {
     pub limits: Limits,
 }
 
-/// Measurements whose projections are computed together: enough to share each read of the dictionary.
+/// Most measurements whose projections are computed together: enough to share each read of the dictionary.
 const TOGETHER: usize = 16;
 
 /// Finds a sparse representation of each measurement in `y`, `measurements` numbers each, one after another.
@@ -100,12 +100,18 @@ fn on_all_cores<T: Scalar, D: Dictionary<T> + ?Sized>(
     y: &[T],
 ) -> Result<Vec<Path<T>>, OmpError> {
     let expected = dictionary.measurements();
+    let frames = y.len() / expected;
+    if frames == 1 {
+        // To wake another thread takes as long as to solve it.
+        return Ok(vec![Solver::new(dictionary, limits)?.solve(y)?]);
+    }
     let width = padded(dictionary.atoms().count());
+    let together = frames.div_ceil(rayon::current_num_threads()).clamp(1, TOGETHER);
     // A solver's memory is a thread's, and stays warm from group to group.
     let groups: Result<Vec<Vec<Path<T>>>, OmpError> = y
-        .par_chunks(TOGETHER * expected)
+        .par_chunks(together * expected)
         .map_init(
-            || (Solver::new(dictionary, limits), vec![T::default(); TOGETHER * width]),
+            || (Solver::new(dictionary, limits), vec![T::default(); together * width]),
             |(solver, p0), y| {
                 let solver = solver.as_mut().map_err(|error| error.clone())?;
                 let frames = y.chunks_exact(expected);

@@ -5,7 +5,7 @@
 
 use super::batch::{Backend, Problem, solve_batch_paths};
 use super::dense::DenseDictionary;
-use super::pursuit::Path;
+use super::pursuit::{Path, Solver};
 use super::{Limits, OmpError, Solution, Stop, solve_batch};
 use nalgebra::DMatrix;
 use std::sync::OnceLock;
@@ -47,6 +47,15 @@ impl MixedDictionary {
         &self.single
     }
 
+    /// For one measurement after another, without delay.
+    ///
+    /// # Errors
+    /// [`OmpError`] if a limit is negative or NaN.
+    pub fn solver(&self, limits: &Limits) -> Result<MixedSolver<'_>, OmpError> {
+        let single = Solver::new(&self.single, limits)?;
+        Ok(MixedSolver { dictionary: self, limits: *limits, single, double: None, y: Vec::new() })
+    }
+
     /// [`solve_batch`], and how many of the measurements were solved in double precision.
     ///
     /// # Errors
@@ -73,6 +82,36 @@ impl MixedDictionary {
             }
         }
         Ok((solutions, doubtful.len()))
+    }
+}
+
+/// A [`Solver`] in both precisions, with memory of its own.
+#[derive(Debug)]
+pub struct MixedSolver<'d> {
+    dictionary: &'d MixedDictionary,
+    limits: Limits,
+    single: Solver<'d, f32, DenseDictionary<f32>>,
+    double: Option<Solver<'d, f64, DenseDictionary<f64>>>,
+    y: Vec<f32>,
+}
+
+impl MixedSolver<'_> {
+    /// The sparse representation of `y`, and whether it took double precision.
+    ///
+    /// # Errors
+    /// [`OmpError`] if `y` does not fit the dictionary or is not finite.
+    pub fn solve(&mut self, y: &[f64]) -> Result<(Solution, bool), OmpError> {
+        self.y.clear();
+        self.y.extend(y.iter().map(|&y| y as f32));
+        let path = self.single.solve(&self.y)?;
+        if !is_doubtful(&path) {
+            return Ok((path.solution(), false));
+        }
+        let double = match self.double.take() {
+            Some(double) => double,
+            None => Solver::new(self.dictionary.double(), &self.limits)?,
+        };
+        Ok((self.double.insert(double).solve(y)?.solution(), true))
     }
 }
 
