@@ -1,0 +1,201 @@
+"""Orthogonal matching pursuit: nirspi beside other programs, on the same problems, in the same run.
+
+    python3 -m venv peers && peers/bin/pip install numpy scikit-learn spams-bin batched-omp
+    cargo build --release -p nirspi
+    peers/bin/python host/recon/benches/peers.py [--nirspi target/release/nirspi] [--grid] [--rounds 7]
+
+Every problem is solved by each program in turn, round after round, so that other load falls on all alike; medians of all
+runs are compared. `nirspi` runs in a process of its own and times itself; its supports come back through a file.
+
+What is timed: the solution of all frames from `D` and `Y` in memory. scikit-learn gets the Gram matrix and the initial
+projections for nothing, as its `orthogonal_mp_gram` wants them. nirspi gets its Gram matrix (`prepare` says what that
+costs, once for a dictionary), and projects. SPAMS and batched-omp get `D`: SPAMS multiplies out the Gram matrix of a batch
+within its time, of one frame it does without one; batched-omp gets it from us. The row `nirspi, Gram within` adds nirspi's
+preparation to its time.
+"""
+
+import argparse
+import json
+import os
+import statistics
+import subprocess
+import tempfile
+import time
+import warnings
+
+import numpy as np
+
+warnings.simplefilter("ignore")
+
+
+def problem(kind, m, n, k, frames, seed):
+    """A dictionary with columns of unit norm, and frames that are sums of k of them with noise.
+
+    `random`: normal numbers. `camera`: random rows of a Hadamard matrix see cosines of an image; some of these look the same to
+    the rows that happen to be there, and which of two equal atoms is chosen is then left to rounding.
+    """
+    rng = np.random.default_rng(seed)
+    if kind == "camera":
+        d = cosines_by_hadamard_rows(rng, m, n)
+    else:
+        d = rng.standard_normal((m, n))
+    d /= np.linalg.norm(d, axis=0)
+    y = np.empty((frames, m))
+    for f in range(frames):
+        y[f] = d[:, rng.choice(n, k, replace=False)] @ rng.standard_normal(k)
+    y += 0.05 * np.std(y) * rng.standard_normal(y.shape)
+    return d, y
+
+
+def cosines_by_hadamard_rows(rng, m, n):
+    side = int(round(n**0.5))
+    i = np.arange(side)
+    cosines = np.cos(np.pi * (2 * i[None, :] + 1) * i[:, None] / (2 * side)) * np.sqrt(2 / side)
+    cosines[0] /= np.sqrt(2)
+    walsh = np.array([[(-1.0) ** bin(a & b).count("1") for b in range(n)] for a in rng.permutation(n)[:m]])
+    d = walsh @ np.kron(cosines, cosines).T / side
+    norms = np.linalg.norm(d, axis=0)
+    # Atoms that the rows do not see: noise of unit norm instead, since the others divide by their norms.
+    unseen = norms < 1e-6
+    d[:, unseen] = rng.standard_normal((m, unseen.sum()))
+    return d
+
+
+class Nirspi:
+    def __init__(self, binary, precision, d, y, k, folder):
+        self.path, self.out = os.path.join(folder, "problem.npz"), os.path.join(folder, "solution.npz")
+        np.savez(self.path, D=d, Y=y, k=k)
+        self.command = [binary, "bench", "omp", "--input", self.path, "--out", self.out,
+                        "--precision", precision, "--repeats", "15"]
+        self.prepare = []
+
+    def __call__(self):
+        report = json.loads(subprocess.run(self.command, check=True, capture_output=True).stdout)
+        self.prepare.append(report["prepare_ms"])
+        with np.load(self.out) as solution:
+            self.support = solution["support"]
+        return report["median_ms"], self.support
+
+
+def timed(run, repeats):
+    """Median of a few runs, in milliseconds, and what the last returned."""
+    times = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        found = run()
+        times.append(1e3 * (time.perf_counter() - start))
+    return statistics.median(times), found
+
+
+def scikit(d, y, k, repeats):
+    from sklearn.linear_model import orthogonal_mp_gram
+
+    gram, xy = d.T @ d, (y @ d).T.copy()
+
+    def run():
+        # It works on the Gram matrix in place and puts it back in order only for itself: a fresh one each time, not timed.
+        return orthogonal_mp_gram(np.asfortranarray(gram_copy), xy, n_nonzero_coefs=k, copy_Gram=False,
+                                  copy_Xy=True, return_path=False)
+
+    times = []
+    for _ in range(repeats):
+        gram_copy = gram.copy(order="F")
+        start = time.perf_counter()
+        coefficients = run()
+        times.append(1e3 * (time.perf_counter() - start))
+    return statistics.median(times), np.atleast_2d(coefficients.T)
+
+
+def spams_omp(d, y, k, dtype, threads, repeats):
+    import spams
+
+    d, y = np.asfortranarray(d, dtype=dtype), np.asfortranarray(y.T, dtype=dtype)
+    ms, found = timed(lambda: spams.omp(y, d, L=k, eps=0.0, lambda1=None, numThreads=threads), repeats)
+    return ms, found.T.toarray()
+
+
+def batched(d, y, k, repeats):
+    import torch
+    from orthogonal_matching_pursuit_gpu import omp_v0
+
+    x, yt = torch.from_numpy(d.astype(np.float32)), torch.from_numpy(y.astype(np.float32))
+    gram = x.T @ x
+    ms, found = timed(lambda: omp_v0(x, yt, gram, n_nonzero_coefs=k), repeats)
+    sets, values = found[0], found[1]
+    return ms, (sets, values)
+
+
+def sets_of(found):
+    """Support of each frame as a set, from a support array or dense coefficients."""
+    if isinstance(found, tuple):
+        return [set(np.asarray(row).tolist()) for row in found[0]]
+    found = np.asarray(found)
+    if np.issubdtype(found.dtype, np.integer):
+        return [set(row[row >= 0].tolist()) for row in found]
+    return [set(np.flatnonzero(row).tolist()) for row in found]
+
+
+def compare(args, kind, m, n, k, frames):
+    d, y = problem(kind, m, n, k, frames, seed=1)
+    repeats = 9 if frames == 1 else 1
+    with tempfile.TemporaryDirectory() as folder:
+        ours = Nirspi(args.nirspi, "auto", d, y, k, folder)
+        programs = {
+            "nirspi": ours,
+            "scikit-learn gram": lambda: scikit(d, y, k, repeats),
+        }
+        for dtype in (np.float64, np.float32):
+            for threads in (1, 2):
+                name = f"SPAMS {dtype.__name__}, {threads} thread{'s' * (threads > 1)}"
+                programs[name] = lambda dtype=dtype, threads=threads: spams_omp(d, y, k, dtype, threads, repeats)
+        programs["batched-omp v0"] = lambda: batched(d, y, k, repeats)
+        times, found = {name: [] for name in programs}, {}
+        for _ in range(args.rounds):
+            for name, run in programs.items():
+                try:
+                    ms, found[name] = run()
+                    times[name].append(ms)
+                except Exception as error:  # a peer that fails is reported, not hidden
+                    found[name] = f"failed: {error}"[:70]
+    medians = {name: statistics.median(t) for name, t in times.items() if t}
+    within = medians["nirspi"] + statistics.median(ours.prepare)
+    reference = sets_of(found["nirspi"])
+    print(f"\n{kind} dictionary, N = {n}, M = {m}, K = {k}, {frames} frame{'s' * (frames > 1)} (prepare {within - medians['nirspi']:.1f} ms)")
+    print(f"{'program':26} {'median ms':>10} {'of nirspi':>10} {'with Gram':>10}  same supports")
+    for name in programs:
+        if name not in medians:
+            print(f"{name:26} {found[name]}")
+            continue
+        same = sum(a == b for a, b in zip(reference, sets_of(found[name])))
+        ms = medians[name]
+        print(f"{name:26} {ms:10.3f} {ms / medians['nirspi']:9.1f}x {ms / within:9.1f}x  {same} of {frames}")
+    spams_best = min(ms for name, ms in medians.items() if name.startswith("SPAMS"))
+    return {"dictionary": kind, "m": m, "n": n, "k": k, "frames": frames, "prepare_ms": within - medians["nirspi"],
+            "median_ms": medians, "of_spams_best": spams_best / medians["nirspi"],
+            "of_scikit": medians["scikit-learn gram"] / medians["nirspi"]}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--nirspi", default="target/release/nirspi")
+    parser.add_argument("--rounds", type=int, default=7)
+    parser.add_argument("--grid", action="store_true", help="also K = 16, 64, 256 by M = 256, 512, 1024")
+    parser.add_argument("--json", help="write all medians here")
+    args = parser.parse_args()
+    kinds = ("random", "camera")
+    results = [compare(args, kind, 512, 1024, 64, frames) for kind in kinds for frames in (1, 256)]
+    if args.grid:
+        for m in (256, 512, 1024):
+            for k in (16, 64, 256):
+                if k <= m // 2 and (m, k) != (512, 64):
+                    results += [compare(args, "random", m, 1024, k, frames) for frames in (1, 64)]
+    print("\ndictionary     N     M    K frames  SPAMS's best   scikit-learn   (times nirspi's median)")
+    for r in results:
+        print(f"{r['dictionary']:10} {r['n']:5} {r['m']:5} {r['k']:4} {r['frames']:6} {r['of_spams_best']:12.1f}x {r['of_scikit']:13.1f}x")
+    if args.json:
+        with open(args.json, "w") as file:
+            json.dump(results, file, indent=1)
+
+
+if __name__ == "__main__":
+    main()
