@@ -19,7 +19,10 @@
 //!
 #![doc = include_str!("reconstruct/study.md")]
 
+mod regularised;
 mod selection;
+
+pub use regularised::{Penalty, Regularised, RegularisedSettings, Strength, regularised};
 
 use crate::basis::{Basis, Transform};
 use crate::omp::sampled::{Prior, SampledHadamard, visible_energy};
@@ -68,6 +71,8 @@ pub enum Sparsity {
     },
     /// This many, and their whole prediction.
     Fixed(usize),
+    /// As many as it takes to leave no more of the measurements than noise, and their whole prediction.
+    Noise,
 }
 
 /// What becomes of rows that were measured.
@@ -195,39 +200,44 @@ pub fn omp(
     let problem = Problem::new(measurements, settings);
     let choice = match settings.sparsity {
         Sparsity::Fixed(atoms) => selection::Choice { atoms, trust: 1.0 },
+        Sparsity::Noise => selection::Choice { atoms: problem.rows.len(), trust: 1.0 },
         Sparsity::CrossValidated { most, folds } => selection::choose(&problem, most, folds)?,
     };
     let every: Vec<usize> = (0..problem.rows.len()).collect();
     let (path, gram) = problem.pursue(&every, choice.atoms)?;
     let predicted = gram.predict(&path.support, &path.coefficients(choice.atoms));
 
-    let left =
-        |k: usize| f64::from(problem.values[k] - predicted[problem.rows[k] as usize]).powi(2);
-    let left: f64 = every.iter().map(|&k| left(k)).sum();
-    let energy: f64 = problem.values.iter().map(|&v| f64::from(v).powi(2)).sum();
-    let residual = if energy > 0.0 { (left / energy).sqrt() } else { 0.0 };
-    let mut grid: Vec<f32> = match settings.completion {
-        Completion::Sparse => predicted,
-        Completion::Measured => predicted.iter().map(|v| v * choice.trust).collect(),
-    };
-    if settings.completion == Completion::Measured {
-        for (&row, &value) in problem.rows.iter().zip(&problem.values) {
-            grid[row as usize] = value;
-        }
-    }
-    let side = measurements.side();
-    let n = side.pixels() as f32;
-    fwht::transform(&mut grid);
-    let pixels = grid.iter().map(|v| (f64::from(v / n) * problem.unit) as f32).collect();
+    let residual = problem.residual_of(&predicted);
+    let image = image_of(&problem, predicted, settings.completion, choice.trust);
     Ok(OmpReconstruction {
-        image: Image::new(side, pixels),
+        image,
         sparsity: path.support.len(),
         stop: path.stop,
         residual,
         unseen_atoms: path.unseen.len(),
         trust: f64::from(choice.trust),
-        noise: f64::from(problem.prior.noise * n) * problem.unit,
+        noise: problem.noise_in_units(),
     })
+}
+
+/// The image of a prediction of all rows, in the measurements' units.
+fn image_of(
+    problem: &Problem<'_>,
+    predicted: Vec<f32>,
+    completion: Completion,
+    trust: f32,
+) -> Image {
+    let mut grid = predicted;
+    if completion == Completion::Measured {
+        grid.iter_mut().for_each(|v| *v *= trust);
+        for (&row, &value) in problem.rows.iter().zip(&problem.values) {
+            grid[row as usize] = value;
+        }
+    }
+    let n = problem.side.pixels() as f32;
+    fwht::transform(&mut grid);
+    let pixels = grid.iter().map(|v| (f64::from(v / n) * problem.unit) as f32).collect();
+    Image::new(problem.side, pixels)
 }
 
 /// Measurements and prior in orthonormal units, the largest measurement being 1: picoamperes and ADC sums
@@ -240,11 +250,14 @@ struct Problem<'a> {
     unit: f64,
     transform: Transform,
     prior: Prior,
+    /// Norm of the residual, relative to the measurements', at which a pursuit ends.
     residual: f64,
+    /// Whether it ends at the noise as well.
+    to_noise: bool,
 }
 
 impl<'a> Problem<'a> {
-    fn new(measurements: &'a Measurements, settings: &OmpSettings) -> Self {
+    fn of(measurements: &'a Measurements, basis: Basis, falloff: f64, noise: NoiseLevel) -> Self {
         let side = measurements.side();
         let rows = measurements.rows();
         let n = side.pixels() as f64;
@@ -252,14 +265,35 @@ impl<'a> Problem<'a> {
         let unit = if largest > 0.0 { largest / n } else { 1.0 };
         let values: Vec<f32> =
             measurements.values().iter().map(|v| (v / n / unit) as f32).collect();
-        let transform = Transform::new(settings.basis, side);
-        let noise = match settings.noise {
+        let transform = Transform::new(basis, side);
+        let noise = match noise {
             NoiseLevel::Known(sigma) => (sigma / n / unit) as f32,
             NoiseLevel::Estimated => selection::noise_level(side, rows, &values),
         };
-        let scale = prior_scale(&transform, rows, &values, settings.falloff);
-        let prior = Prior { scale, noise, visibility: settings.visibility as f32 };
-        Self { side, rows, values, unit, transform, prior, residual: settings.residual }
+        let scale = prior_scale(&transform, rows, &values, falloff);
+        let prior = Prior { scale, noise, visibility: 0.0 };
+        Self { side, rows, values, unit, transform, prior, residual: 0.0, to_noise: false }
+    }
+
+    fn new(measurements: &'a Measurements, settings: &OmpSettings) -> Self {
+        let mut problem = Self::of(measurements, settings.basis, settings.falloff, settings.noise);
+        problem.prior.visibility = settings.visibility as f32;
+        problem.residual = settings.residual;
+        problem.to_noise = settings.sparsity == Sparsity::Noise;
+        problem
+    }
+
+    /// Norm of what a prediction of all rows leaves of the measurements, relative to theirs.
+    fn residual_of(&self, predicted: &[f32]) -> f64 {
+        let left = |(&row, value): (&u32, &f32)| f64::from(value - predicted[row as usize]).powi(2);
+        let left: f64 = self.rows.iter().zip(&self.values).map(left).sum();
+        let energy: f64 = self.values.iter().map(|&v| f64::from(v).powi(2)).sum();
+        if energy > 0.0 { (left / energy).sqrt() } else { 0.0 }
+    }
+
+    /// Noise of a measurement in the measurements' units.
+    fn noise_in_units(&self) -> f64 {
+        f64::from(self.prior.noise * self.side.pixels() as f32) * self.unit
     }
 
     /// Chooses up to `atoms` atoms for the measurements at these positions.
@@ -271,7 +305,8 @@ impl<'a> Problem<'a> {
         let rows: Vec<u32> = positions.iter().map(|&k| self.rows[k]).collect();
         let values: Vec<f32> = positions.iter().map(|&k| self.values[k]).collect();
         let dictionary = SampledHadamard::new(&self.transform, &rows, &self.prior);
-        let limits = Limits { residual: self.residual, ..Limits::atoms(atoms) };
+        let noise = if self.to_noise { f64::from(self.prior.noise) } else { 0.0 };
+        let limits = Limits { sparsity: atoms, residual: self.residual, noise };
         let path = Solver::new(&dictionary, &limits)?.solve(&values)?;
         Ok((path, dictionary))
     }
@@ -311,16 +346,9 @@ impl OmpSettings {
     fn check(&self) -> Result<(), ReconstructError> {
         let refuse =
             |setting, found, expected| Err(ReconstructError::Setting { setting, found, expected });
-        if !(self.falloff >= 0.0 && self.falloff <= 8.0) {
-            return refuse("falloff", self.falloff, "0 to 8");
-        }
+        check_prior(self.falloff, self.noise)?;
         if !(self.visibility >= 0.0 && self.visibility < 1.0) {
             return refuse("visibility", self.visibility, "0 or more and less than 1");
-        }
-        if let NoiseLevel::Known(sigma) = self.noise
-            && !(sigma >= 0.0 && sigma.is_finite())
-        {
-            return refuse("noise", sigma, "a finite number, 0 or more");
         }
         if let Sparsity::CrossValidated { folds, .. } = self.sparsity
             && folds < 2
@@ -328,6 +356,20 @@ impl OmpSettings {
             return refuse("folds", folds as f64, "2 or more");
         }
         Ok(())
+    }
+}
+
+fn check_prior(falloff: f64, noise: NoiseLevel) -> Result<(), ReconstructError> {
+    let refuse =
+        |setting, found, expected| Err(ReconstructError::Setting { setting, found, expected });
+    if !(0.0..=8.0).contains(&falloff) {
+        return refuse("falloff", falloff, "0 to 8");
+    }
+    match noise {
+        NoiseLevel::Known(sigma) if !(sigma >= 0.0 && sigma.is_finite()) => {
+            refuse("noise", sigma, "a finite number, 0 or more")
+        }
+        _ => Ok(()),
     }
 }
 

@@ -7,6 +7,7 @@ use crate::omp::OmpError;
 use crate::{Side, order};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
+use rayon::prelude::*;
 
 /// What cross-validation chose.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,7 +18,7 @@ pub(super) struct Choice {
 }
 
 /// Factors that are tried. A coarse grid: the error is flat around its minimum.
-const TRUST: [f32; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
+pub(super) const TRUST: [f32; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
 /// Numbers of atoms that are tried, evenly spaced in their logarithm.
 const SPARSITIES: usize = 10;
 /// Splits the measurements into folds; the split is part of the result, so it never changes.
@@ -52,54 +53,62 @@ pub(super) fn choose(problem: &Problem, most: usize, folds: usize) -> Result<Cho
     let count = problem.rows.len();
     let largest = most.min(count / 4).max(1);
     let sparsities = geometric(largest);
+    let found = choose_among(problem, sparsities.len(), folds, |kept| {
+        let (path, dictionary) = problem.pursue(kept, largest)?;
+        let predict = |&atoms: &usize| {
+            let chosen = &path.support[..atoms.min(path.support.len())];
+            dictionary.predict(chosen, &path.coefficients(atoms))
+        };
+        Ok(sparsities.iter().map(predict).collect())
+    })?;
+    Ok(match found {
+        None => Choice { atoms: largest, trust: 0.0 },
+        Some((at, trust)) => Choice { atoms: sparsities[at], trust },
+    })
+}
+
+/// Which of `count` predictions, and how much of it, has the least error over `folds` held-back parts; none if there is
+/// nothing to hold back. `predict` makes all of them, every row of each, from the measurements at some positions.
+pub(super) fn choose_among(
+    problem: &Problem<'_>,
+    count: usize,
+    folds: usize,
+    predict: impl Fn(&[usize]) -> Result<Vec<Vec<f32>>, OmpError> + Sync,
+) -> Result<Option<(usize, f32)>, OmpError> {
     let fold_of = split(problem, folds);
     let parts: Vec<(Vec<usize>, Vec<usize>)> = (0..folds)
-        .map(|fold| (0..count).partition(|&k| fold_of[k] != Some(fold)))
+        .map(|fold| (0..problem.rows.len()).partition(|&k| fold_of[k] != Some(fold)))
         .filter(|(kept, held): &(Vec<_>, Vec<_>)| !kept.is_empty() && !held.is_empty())
         .collect();
     if parts.is_empty() {
-        return Ok(Choice { atoms: largest, trust: 0.0 });
+        return Ok(None);
     }
-    let results: Vec<Result<Misses, OmpError>> = std::thread::scope(|scope| {
-        let workers: Vec<_> = parts
-            .iter()
-            .map(|(kept, held)| scope.spawn(|| fold_misses(problem, kept, held, &sparsities)))
-            .collect();
-        workers
-            .into_iter()
-            .map(|w| w.join().unwrap_or_else(|p| std::panic::resume_unwind(p)))
-            .collect()
-    });
-    let mut total: Misses = vec![Default::default(); sparsities.len()];
-    for misses in results {
-        for (total, misses) in total.iter_mut().flatten().zip(misses?.into_iter().flatten()) {
+    let results: Result<Vec<Misses>, OmpError> = parts
+        .par_iter()
+        .map(|(kept, held)| Ok(misses_of(problem, &predict(kept)?, held)))
+        .collect();
+    let mut total: Misses = vec![Default::default(); count];
+    for misses in results? {
+        for (total, misses) in total.iter_mut().flatten().zip(misses.into_iter().flatten()) {
             total.add(misses);
         }
     }
     let zero_filling = total[0][0];
-    let mut best = (Choice { atoms: sparsities[0], trust: 0.0 }, 2.0);
-    for (&atoms, misses) in sparsities.iter().zip(&total) {
+    let mut best = ((0, 0.0), 2.0);
+    for (at, misses) in total.iter().enumerate() {
         for (&trust, miss) in TRUST.iter().zip(misses) {
             let relative = miss.relative_to(zero_filling);
             if relative < best.1 {
-                best = (Choice { atoms, trust }, relative);
+                best = ((at, trust), relative);
             }
         }
     }
-    Ok(best.0)
+    Ok(Some(best.0))
 }
 
-fn fold_misses(
-    problem: &Problem,
-    kept: &[usize],
-    held: &[usize],
-    sparsities: &[usize],
-) -> Result<Misses, OmpError> {
-    let largest = sparsities.iter().copied().max().unwrap_or(0);
-    let (path, gram) = problem.pursue(kept, largest)?;
-    let misses_of = |&atoms: &usize| {
-        let chosen = &path.support[..atoms.min(path.support.len())];
-        let predicted = gram.predict(chosen, &path.coefficients(atoms));
+/// How far each prediction, and each share of it, is from what was held back.
+fn misses_of(problem: &Problem<'_>, predictions: &[Vec<f32>], held: &[usize]) -> Misses {
+    let miss_of = |predicted: &Vec<f32>| {
         TRUST.map(|trust| {
             let mut miss = Miss::default();
             for &k in held {
@@ -110,7 +119,7 @@ fn fold_misses(
             miss
         })
     };
-    Ok(sparsities.iter().map(misses_of).collect())
+    predictions.iter().map(miss_of).collect()
 }
 
 /// Which fold holds each measurement back; none for the all-ones row, the mean, which nothing else can predict.

@@ -1,0 +1,205 @@
+//! Reconstruction by a penalty on the image: Tikhonov, total variation, sparse coefficients.
+//!
+//! The one law: one number decides, the strength of the penalty relative to what noise and prior call for, and it is
+//! chosen on measurements that were held back unless the caller gives it.
+//!
+//! In orthonormal units, with `A` the measured rows of the scene's coefficients `c` (or pixels `x`), `sigma` the noise and
+//! `s[j]` the expected size of coefficient `j` ([`OmpSettings`](super::OmpSettings)'s prior, amplitudes as one over
+//! frequency), what is minimised is, at strength 1:
+//!
+//! | penalty | over | maximum a posteriori for |
+//! |---|---|---|
+//! | Tikhonov | `abs(b - A c)^2 / 2 + sigma^2 / 2 sum_j (c[j] / s[j])^2` | independent normal coefficients: a covariance prior |
+//! | sparse | `abs(b - A c)^2 / 2 + sigma^2 sqrt 2 sum_j abs(c[j]) / s[j]` | independent Laplacian coefficients |
+//! | total variation | `abs(b - A x)^2 / 2 + sigma sum of abs(gradient of x)` | flat regions with edges |
+
+mod fista;
+mod tikhonov;
+mod total_variation;
+
+use super::selection::{self, TRUST};
+use super::{Completion, NoiseLevel, Problem, ReconstructError, image_of};
+use crate::basis::Basis;
+use crate::{Image, Measurements, fwht};
+
+/// What is held against an image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Penalty {
+    /// Energy of the coefficients, weighted by what is expected of each (A. N. Tikhonov, 1963), by conjugate gradients.
+    Tikhonov,
+    /// Magnitudes of the coefficients, by FISTA (A. Beck and M. Teboulle, *A fast iterative shrinkage-thresholding
+    /// algorithm for linear inverse problems*, 2009).
+    Sparse,
+    /// Total variation (L. Rudin et al., 1992), by A. Chambolle and T. Pock, *A first-order primal-dual algorithm for
+    /// convex problems*, 2011. Needs no basis.
+    TotalVariation,
+}
+
+/// How strong a penalty is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Strength {
+    /// The one of five, a factor of about three apart, that predicts measurements best that were held back in this many
+    /// parts: 2 or more.
+    CrossValidated {
+        /// Parts.
+        folds: usize,
+    },
+    /// This, relative to what noise and prior call for.
+    Fixed(f64),
+}
+
+/// Settings of [`regularised`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RegularisedSettings {
+    /// What is held against an image.
+    pub penalty: Penalty,
+    /// Basis of the coefficients.
+    pub basis: Basis,
+    /// How strong the penalty is.
+    pub strength: Strength,
+    /// Power of the frequency by which coefficients are expected to fall.
+    pub falloff: f64,
+    /// Noise of the measurements.
+    pub noise: NoiseLevel,
+    /// What becomes of rows that were measured.
+    pub completion: Completion,
+    /// Most iterations of the method.
+    pub iterations: usize,
+}
+
+impl RegularisedSettings {
+    /// The settings that this module's tests and tables are made with.
+    #[must_use]
+    pub fn new(penalty: Penalty) -> Self {
+        Self {
+            penalty,
+            basis: Basis::Dct,
+            strength: Strength::CrossValidated { folds: 4 },
+            falloff: 1.0,
+            noise: NoiseLevel::Estimated,
+            completion: Completion::Measured,
+            iterations: 200,
+        }
+    }
+
+    fn check(&self) -> Result<(), ReconstructError> {
+        let refuse =
+            |setting, found, expected| Err(ReconstructError::Setting { setting, found, expected });
+        match self.strength {
+            Strength::Fixed(found) if !(found > 0.0 && found <= 1e6) => {
+                return refuse("strength", found, "more than 0, at most 1e6");
+            }
+            Strength::CrossValidated { folds } if folds < 2 => {
+                return refuse("folds", folds as f64, "2 or more");
+            }
+            _ => {}
+        }
+        if self.iterations == 0 {
+            return refuse("iterations", 0.0, "1 or more");
+        }
+        super::check_prior(self.falloff, self.noise)
+    }
+}
+
+/// What [`regularised`] found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Regularised {
+    /// The image, in the measurements' units.
+    pub image: Image,
+    /// Strength of the penalty, relative to what noise and prior call for.
+    pub strength: f64,
+    /// Share of the prediction that was used for rows not measured, 0 (zero filling) to 1.
+    pub trust: f64,
+    /// Norm of what the prediction leaves of the measurements, relative to theirs.
+    pub residual: f64,
+    /// Noise of a measurement, estimated or given, in the measurements' units.
+    pub noise: f64,
+}
+
+/// Strengths that are tried, from the strongest on: each starts where the one before it ended.
+const STRENGTHS: [f32; 5] = [10.0, 3.0, 1.0, 0.3, 0.1];
+
+/// Reconstructs an image from partial measurements by a penalty.
+///
+/// # Errors
+/// [`ReconstructError`] if a setting is out of range.
+pub fn regularised(
+    measurements: &Measurements,
+    settings: &RegularisedSettings,
+) -> Result<Regularised, ReconstructError> {
+    settings.check()?;
+    let problem = Problem::of(measurements, settings.basis, settings.falloff, settings.noise);
+    let predict = |positions: &[usize], strengths: &[f32]| match settings.penalty {
+        Penalty::Tikhonov => tikhonov::predict(&problem, positions, strengths, settings.iterations),
+        Penalty::Sparse => fista::predict(&problem, positions, strengths, settings.iterations),
+        Penalty::TotalVariation => {
+            total_variation::predict(&problem, positions, strengths, settings.iterations)
+        }
+    };
+    let (at, trust, strengths) = match settings.strength {
+        Strength::Fixed(strength) => (0, 1.0, vec![strength as f32]),
+        Strength::CrossValidated { folds } => {
+            let choice = selection::choose_among(&problem, STRENGTHS.len(), folds, |kept| {
+                Ok(predict(kept, &STRENGTHS))
+            })?;
+            let (at, trust) = choice.unwrap_or((0, TRUST[0]));
+            (at, trust, STRENGTHS[..=at].to_vec())
+        }
+    };
+    let every: Vec<usize> = (0..problem.rows.len()).collect();
+    let mut predictions = predict(&every, &strengths);
+    let predicted = predictions.swap_remove(at);
+    let residual = problem.residual_of(&predicted);
+    let noise = problem.noise_in_units();
+    let image = image_of(&problem, predicted, settings.completion, trust);
+    Ok(Regularised {
+        image,
+        strength: f64::from(strengths[at]),
+        trust: f64::from(trust),
+        residual,
+        noise,
+    })
+}
+
+/// Some measurements at their rows of a zero-filled grid, and a 1 at each of these rows.
+struct Masked {
+    grid: Vec<f32>,
+    mask: Vec<f32>,
+}
+
+impl Masked {
+    fn new(problem: &Problem<'_>, positions: &[usize]) -> Self {
+        let area = problem.side.area();
+        let (mut grid, mut mask) = (vec![0.0; area], vec![0.0; area]);
+        for &k in positions {
+            let row = problem.rows[k] as usize;
+            (grid[row], mask[row]) = (problem.values[k], 1.0);
+        }
+        Self { grid, mask }
+    }
+}
+
+/// Orthonormal Walsh-Hadamard transform: its own inverse and transpose.
+fn walsh(n: usize, grid: &mut [f32]) {
+    fwht::transform(grid);
+    grid.iter_mut().for_each(|v| *v /= n as f32);
+}
+
+/// All rows that coefficients predict.
+fn show(problem: &Problem<'_>, coefficients: &mut [f32]) {
+    problem.transform.synthesise(coefficients);
+    walsh(problem.side.pixels(), coefficients);
+}
+
+/// Coefficients that rows see: the transpose, and inverse, of [`show`].
+fn see(problem: &Problem<'_>, grid: &mut [f32]) {
+    walsh(problem.side.pixels(), grid);
+    problem.transform.analyse(grid);
+}
+
+fn dot(a: &[f32], b: &[f32]) -> f64 {
+    a.iter().zip(b).map(|(&a, &b)| f64::from(a) * f64::from(b)).sum()
+}
+
+#[cfg(test)]
+mod tests;
