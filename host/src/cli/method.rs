@@ -4,7 +4,9 @@ use super::Usage;
 use anyhow::Result;
 use clap::{Args, ValueEnum};
 use nirspi_recon::omp::Stop;
-use nirspi_recon::reconstruct::{self, Completion, OmpSettings, Sparsity};
+use nirspi_recon::reconstruct::{
+    self, Completion, OmpSettings, Penalty, RegularisedSettings, Sparsity, Strength,
+};
 use nirspi_recon::{Basis, Image, Measurements};
 use serde::Serialize;
 use std::fmt;
@@ -12,12 +14,31 @@ use std::str::FromStr;
 
 /// How to invert.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[serde(rename_all = "kebab-case")]
 pub enum Method {
     /// Inverse Walsh-Hadamard transform; patterns that were not measured count as zero
     Hadamard,
     /// Orthogonal matching pursuit (the paper's Algorithm 1) in a sparsifying basis
     Omp,
+    /// Least image that agrees with the measurements: as Hadamard rows are orthogonal, the same as hadamard
+    PseudoInverse,
+    /// Most likely image if coefficients fall as one over frequency (Tikhonov, a covariance prior)
+    Tikhonov,
+    /// Small sum of magnitudes of the coefficients (FISTA)
+    Fista,
+    /// Small total variation (Chambolle and Pock)
+    Tv,
+}
+
+impl Method {
+    fn penalty(self) -> Option<Penalty> {
+        match self {
+            Self::Hadamard | Self::PseudoInverse | Self::Omp => None,
+            Self::Tikhonov => Some(Penalty::Tikhonov),
+            Self::Fista => Some(Penalty::Sparse),
+            Self::Tv => Some(Penalty::TotalVariation),
+        }
+    }
 }
 
 /// What becomes of patterns that were measured.
@@ -36,7 +57,7 @@ pub struct MethodArgs {
     /// How to make the image
     #[arg(long, value_enum, default_value_t = Method::Omp)]
     pub method: Method,
-    /// Basis in which the image is sparse: dct, haar, pixel
+    /// Basis in which the image is sparse: dct, haar, daubechies4, pixel
     #[arg(long, value_name = "BASIS", default_value = "dct")]
     pub basis: String,
     /// Atoms to choose; without it, the number that predicts held-back measurements best
@@ -45,6 +66,13 @@ pub struct MethodArgs {
     /// Stop when the residual's norm is this share of the measurements'
     #[arg(long, value_name = "0..1", default_value_t = 0.0, allow_negative_numbers = true)]
     pub residual: f64,
+    /// OMP: choose atoms until no more than the estimated noise is left of the measurements
+    #[arg(long, conflicts_with_all = ["sparsity", "as_printed"])]
+    pub stop_at_noise: bool,
+    /// Strength of the penalty of tikhonov, fista and tv, relative to what noise and prior call for; without it, the one
+    /// that predicts held-back measurements best
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    pub strength: Option<f64>,
     /// The paper's Algorithm 1 as printed: no prior, no cross-validation, an exactly sparse image
     #[arg(long, requires = "sparsity", conflicts_with = "keep")]
     pub as_printed: bool,
@@ -64,6 +92,16 @@ impl MethodArgs {
         if self.sparsity == Some(0) {
             return Err(Usage("--sparsity is 0, expected at least 1".to_owned()).into());
         }
+        if let Some(found) = self.strength {
+            if !(found > 0.0 && found <= 1e6) {
+                let text = format!("--strength is {found}, expected more than 0, at most 1e6");
+                return Err(Usage(text).into());
+            }
+            if self.method.penalty().is_none() {
+                let text = "--strength belongs to --method tikhonov, fista or tv";
+                return Err(Usage(text.to_owned()).into());
+            }
+        }
         Ok(())
     }
 
@@ -78,6 +116,19 @@ pub struct Report {
     method: Method,
     #[serde(skip_serializing_if = "Option::is_none")]
     omp: Option<OmpReport>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    penalty: Option<PenaltyReport>,
+}
+
+#[derive(Debug, Serialize)]
+struct PenaltyReport {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    basis: Option<String>,
+    strength: f64,
+    keep: Keep,
+    relative_residual: f64,
+    trust_in_prediction: f64,
+    noise_of_a_measurement: f64,
 }
 
 #[derive(Debug, Serialize)]
@@ -95,15 +146,34 @@ struct OmpReport {
 impl Report {
     /// In a few words, for a caption.
     pub fn short(&self) -> String {
-        match &self.omp {
-            None => "inverse Hadamard transform".to_owned(),
-            Some(omp) => format!("OMP, {} atoms of the {} basis", omp.sparsity, omp.basis),
+        match (&self.omp, &self.penalty) {
+            (Some(omp), _) => format!("OMP, {} atoms of the {} basis", omp.sparsity, omp.basis),
+            (None, Some(penalty)) => self.penalty_name(penalty),
+            (None, None) => "inverse Hadamard transform".to_owned(),
+        }
+    }
+
+    fn penalty_name(&self, penalty: &PenaltyReport) -> String {
+        match (&penalty.basis, self.method) {
+            (Some(basis), Method::Tikhonov) => format!("Tikhonov, {basis} basis"),
+            (Some(basis), _) => format!("FISTA, {basis} basis"),
+            (None, _) => "total variation".to_owned(),
         }
     }
 }
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(penalty) = &self.penalty {
+            let PenaltyReport { strength, relative_residual, trust_in_prediction, .. } = penalty;
+            let name = self.penalty_name(penalty);
+            return write!(
+                f,
+                "{name}: strength {strength}, relative residual {relative_residual:.3}, {:.0} % of \
+                 the prediction used",
+                100.0 * trust_in_prediction
+            );
+        }
         let Some(omp) = &self.omp else { return f.write_str("inverse Hadamard transform") };
         let OmpReport { basis, sparsity, stop, relative_residual, unseen_atoms, .. } = omp;
         write!(
@@ -124,18 +194,19 @@ pub struct Solved {
 
 /// Makes the image.
 pub fn solve(args: &MethodArgs, measurements: &Measurements) -> Result<Solved> {
-    if args.method == Method::Hadamard {
-        let image = reconstruct::hadamard(measurements);
-        return Ok(Solved { image, report: Report { method: args.method, omp: None } });
-    }
     let keep = if args.as_printed { Keep::Sparse } else { args.keep };
+    if let Some(penalty) = args.method.penalty() {
+        return penalised(args, penalty, measurements);
+    }
+    if args.method != Method::Omp {
+        let image = reconstruct::hadamard(measurements);
+        let report = Report { method: args.method, omp: None, penalty: None };
+        return Ok(Solved { image, report });
+    }
     let mut settings = OmpSettings {
         basis: args.basis()?,
         residual: args.residual,
-        completion: match keep {
-            Keep::Measured => Completion::Measured,
-            Keep::Sparse => Completion::Sparse,
-        },
+        completion: keep.completion(),
         ..OmpSettings::default()
     };
     if let Some(atoms) = args.sparsity {
@@ -145,6 +216,9 @@ pub fn solve(args: &MethodArgs, measurements: &Measurements) -> Result<Solved> {
             settings = OmpSettings { residual: args.residual, ..printed };
         }
     }
+    if args.stop_at_noise {
+        settings.sparsity = Sparsity::Noise;
+    }
     let found = reconstruct::omp(measurements, &settings)?;
     let omp = OmpReport {
         basis: settings.basis.to_string(),
@@ -153,6 +227,7 @@ pub fn solve(args: &MethodArgs, measurements: &Measurements) -> Result<Solved> {
         stop: match found.stop {
             Stop::Sparsity if args.sparsity.is_some() => "as many atoms as asked for",
             Stop::Sparsity => "more atoms predict no better",
+            Stop::Residual if args.stop_at_noise => "no more than noise is left",
             Stop::Residual => "residual reached",
             Stop::NoAtomLeft => "no atom left that explains more",
             Stop::Dependent => "atoms left are combinations of those chosen",
@@ -162,5 +237,38 @@ pub fn solve(args: &MethodArgs, measurements: &Measurements) -> Result<Solved> {
         trust_in_prediction: found.trust,
         noise_of_a_measurement: found.noise,
     };
-    Ok(Solved { image: found.image, report: Report { method: args.method, omp: Some(omp) } })
+    let report = Report { method: args.method, omp: Some(omp), penalty: None };
+    Ok(Solved { image: found.image, report })
+}
+
+fn penalised(args: &MethodArgs, penalty: Penalty, measurements: &Measurements) -> Result<Solved> {
+    let mut settings = RegularisedSettings {
+        basis: args.basis()?,
+        completion: args.keep.completion(),
+        ..RegularisedSettings::new(penalty)
+    };
+    if let Some(strength) = args.strength {
+        settings.strength = Strength::Fixed(strength);
+    }
+    let found = reconstruct::regularised(measurements, &settings)?;
+    let basis = (penalty != Penalty::TotalVariation).then(|| settings.basis.to_string());
+    let penalty = PenaltyReport {
+        basis,
+        strength: found.strength,
+        keep: args.keep,
+        relative_residual: found.residual,
+        trust_in_prediction: found.trust,
+        noise_of_a_measurement: found.noise,
+    };
+    let report = Report { method: args.method, omp: None, penalty: Some(penalty) };
+    Ok(Solved { image: found.image, report })
+}
+
+impl Keep {
+    fn completion(self) -> Completion {
+        match self {
+            Self::Measured => Completion::Measured,
+            Self::Sparse => Completion::Sparse,
+        }
+    }
 }

@@ -22,6 +22,7 @@ mod report;
 mod selftest;
 mod serve_virtual;
 mod setup;
+mod source;
 
 use clap::{Parser, Subcommand};
 use nirspi::files::FileError;

@@ -1,21 +1,17 @@
 //! `nirspi reconstruct`: an image from measurements, ours or anybody's.
 
-use super::Usage;
 use super::camera::{check_sampling, parse_order};
 use super::method::{MethodArgs, Solved, solve};
 use super::print;
 use super::report::StageTimes;
+use super::source::{Source, SourceArgs};
 use anyhow::{Context, Result, bail};
 use indicatif::ProgressBar;
 use nirspi::account::LossCounters;
-use nirspi::files::npz::{self, Readings, Selection};
 use nirspi::files::output::OutputDir;
 use nirspi::files::{image::encode_grey, npy};
-use nirspi::recording::{self, Recording};
-use nirspi::tally::tally_recording;
-use nirspi_recon::{Dropout, Image, Measurements, Order, metrics, reconstruct};
+use nirspi_recon::{Image, Order, metrics, reconstruct};
 use serde::Serialize;
-use std::io::Read;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -28,8 +24,6 @@ use std::time::Duration;
     \x20 nirspi reconstruct wing.npz --method hadamard --out out/\n\
     \x20 nirspi reconstruct wing.npz --method omp --sampling 0.3 --basis dct --out out/")]
 pub struct Args {
-    /// Measurement file or recording
-    input: PathBuf,
     #[command(flatten)]
     method: MethodArgs,
     /// Use only this share of all n x n patterns
@@ -39,30 +33,14 @@ pub struct Args {
     /// natural order, whose first part cannot resolve an image
     #[arg(long, value_name = "ORDER")]
     order: Option<String>,
-    /// Which measurement of a file that holds several
-    #[arg(long, value_name = "N")]
-    index: Option<usize>,
-    /// The file's `y` holds one reading a pattern, taken without complements
-    #[arg(long)]
-    non_differential: bool,
-    /// Leave the settling leak of a recording as it is
-    #[arg(long)]
-    keep_leak: bool,
+    #[command(flatten)]
+    source: SourceArgs,
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
     /// Print the report as JSON
     #[arg(long)]
     json: bool,
-}
-
-/// Measurements with what is known about where they come from.
-struct Source {
-    measurements: Measurements,
-    dropouts: Vec<Dropout>,
-    reference: Option<Image>,
-    frames: Option<LossCounters>,
-    notes: Vec<String>,
 }
 
 #[derive(Debug, Serialize)]
@@ -97,13 +75,13 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     args.method.check()?;
     let mut times = StageTimes::default();
 
-    let source = times.time("read", || load(args))?;
+    let source = times.time("read", || args.source.load())?;
     let all = source.measurements.rows().len();
     let (order, order_name) = choose_order(args, order, &source)?;
     let used = source
         .measurements
         .take(order.as_ref(), args.sampling)
-        .with_context(|| args.input.display().to_string())?;
+        .with_context(|| args.source.input.display().to_string())?;
     // Thousands of patterns take OMP seconds.
     let spinner = ProgressBar::new_spinner().with_message("reconstructing");
     spinner.enable_steady_tick(Duration::from_millis(100));
@@ -111,7 +89,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     spinner.finish_and_clear();
     let Solved { image, report: method } = solved?;
     if !image.pixels().iter().all(|pixel| pixel.is_finite()) {
-        bail!("{}: the readings are too large for an image of 32-bit floats", args.input.display());
+        bail!(
+            "{}: the readings are too large for an image of 32-bit floats",
+            args.source.input.display()
+        );
     }
 
     let side = image.side().pixels();
@@ -119,7 +100,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         metrics::correlation(reference.pixels(), image.pixels(), side, side).ok()
     });
     let report = Report {
-        input: args.input.clone(),
+        input: args.source.input.clone(),
         n: side,
         measurements: all,
         used: used.rows().len(),
@@ -170,77 +151,6 @@ fn choose_order(
     }
 }
 
-fn load(args: &Args) -> Result<Source> {
-    let mut magic = [0; 4];
-    let is_mcap = std::fs::File::open(&args.input)
-        .and_then(|mut file| file.read_exact(&mut magic))
-        .is_ok_and(|()| magic[1..] == *b"MCA");
-    let named_mcap = args.input.extension().is_some_and(|e| e == "mcap");
-    if is_mcap || named_mcap {
-        if args.index.is_some() || args.non_differential {
-            let text = "--index and --non-differential belong to .npz files, not to recordings";
-            return Err(Usage(text.to_owned()).into());
-        }
-        from_recording(args)
-    } else {
-        from_npz(args)
-    }
-}
-
-fn from_npz(args: &Args) -> Result<Source> {
-    let selection = Selection { index: args.index, non_differential: args.non_differential };
-    let file = npz::read(&args.input, selection)?;
-    let named = || args.input.display().to_string();
-    let rows = &file.h_row;
-    let mut notes = file.notes;
-    let (measurements, dropouts) = match &file.readings {
-        Readings::Pairs(y) => Measurements::from_pairs(file.side, rows, y).with_context(named)?,
-        Readings::Differential(d) => {
-            (Measurements::from_differential(file.side, rows, d).with_context(named)?, Vec::new())
-        }
-        Readings::Single(y) => {
-            let mut measurements =
-                Measurements::from_single(file.side, rows, y).with_context(named)?;
-            if let Some(level) = measurements.remove_dark_level() {
-                notes.push(format!("a dark level of {level:.4} was found in `y` and removed"));
-            }
-            (measurements, Vec::new())
-        }
-    };
-    Ok(Source { measurements, dropouts, reference: file.reference, frames: None, notes })
-}
-
-/// Sums the frames of a recording, counting again what became of each.
-fn from_recording(args: &Args) -> Result<Source> {
-    let path = &args.input;
-    // The setup stands at the start of the file; packets are summed in a second pass.
-    let Recording { setup, settling, cut_short, account, .. } = recording::read(path, |_, _| {})?;
-    let (integrated, counters) = tally_recording(path, &setup)?;
-    if integrated.frames() == 0 {
-        bail!("{}: no intact frame in the recording, expected at least one", path.display());
-    }
-    let mut notes: Vec<String> = integrated.warnings().into_iter().map(str::to_owned).collect();
-    if let Some(reason) = cut_short {
-        notes.push(format!("the recording is cut short or damaged: {reason}"));
-    }
-    if account.is_some_and(|account| account != counters) {
-        notes.push("the frames found are not those that the capture counted".to_owned());
-    }
-    if settling.is_none() {
-        notes.push("no calibration in the recording: the settling leak stays".to_owned());
-    }
-    let measurements = integrated
-        .measurements(&setup, settling.as_ref(), args.keep_leak)
-        .with_context(|| path.display().to_string())?;
-    Ok(Source {
-        measurements,
-        dropouts: Vec::new(),
-        reference: None,
-        frames: Some(counters),
-        notes,
-    })
-}
-
 fn write(args: &Args, image: &Image, report: &Report) -> Result<()> {
     let side = image.side().pixels();
     let mut out = OutputDir::create(&args.out)?;
@@ -265,7 +175,7 @@ pub fn enlarged_png(image: &Image) -> Vec<u8> {
 fn say(args: &Args, report: &Report) -> Result<()> {
     print::line(format_args!(
         "{}: {} x {}, {} of {} measurements ({:.1} %), order {}",
-        args.input.display(),
+        args.source.input.display(),
         report.n,
         report.n,
         report.used,
