@@ -11,6 +11,7 @@
 //! | [`Dictionary`] | what both ask of the atoms: projections, and columns of the Gram matrix |
 //! | [`DenseDictionary`] | a dictionary that is a matrix |
 //! | [`MixedDictionary`] | the same in `f32`, and in `f64` where `f32` cannot tell two atoms apart |
+//! | [`nonnegative`] | coefficients of 0 or more |
 //! | [`sampled`] | Hadamard measurements of an image, by fast transforms, without storing a matrix |
 //!
 //! What the algorithm as printed leaves open, and both paths settle alike:
@@ -28,6 +29,7 @@ mod dense;
 mod dictionary;
 mod kernel;
 mod mixed;
+pub mod nonnegative;
 mod panels;
 mod pursuit;
 pub mod reference;

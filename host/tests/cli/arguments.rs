@@ -3,7 +3,7 @@
 use crate::bench::{Bench, first_bytes};
 use std::process::{Command, Stdio};
 
-const COMMANDS: [&str; 10] = [
+const COMMANDS: [&str; 14] = [
     "demo",
     "reconstruct",
     "capture",
@@ -14,6 +14,10 @@ const COMMANDS: [&str; 10] = [
     "flash",
     "setup",
     "metrics",
+    "rain",
+    "range",
+    "bench",
+    "eval",
 ];
 
 #[test]
@@ -50,6 +54,13 @@ fn mistakes_in_the_arguments_get_one_line_and_code_2() {
         (&["demo", "--order", "magic"], &["--order", "magic", "cake-cutting", "table:FILE"]),
         (&["demo", "--sparsity", "0"], &["--sparsity is 0"]),
         (&["demo", "--residual", "1"], &["--residual is 1"]),
+        (&["demo", "--strength", "1"], &["--strength belongs to", "tikhonov, fista or tv"]),
+        (&["demo", "--method", "tv", "--strength", "0"], &["--strength is 0"]),
+        (&["bench", "omp", "--sparsity", "0"], &["--sparsity is 0", "1 to 512"]),
+        (&["bench", "omp", "--measurements", "1025"], &["--measurements is 1025", "1 to 1024"]),
+        (&["bench", "omp", "--backend", "abacus"], &["--backend", "abacus", "auto or cpu"]),
+        (&["eval", "sampling", "in.npz", "--sampling", "0.1,2"], &["--sampling is 2"]),
+        (&["eval", "sampling", "in.npz", "--orders", "magic"], &["magic", "cake-cutting"]),
         (&["demo", "--frames", "0"], &["--frames", "'0'"]),
         (&["demo", "--sweeps", "0"], &["--sweeps", "'0'"]),
         (&["demo", "--blanked", "5"], &["--blanked is 5", "--clocks-per-pattern"]),

@@ -17,3 +17,4 @@ mod selftest;
 #[cfg(unix)]
 mod serial;
 mod versions;
+mod sparse_problems;

@@ -49,6 +49,31 @@ fn omp_predicts_what_was_not_measured_better_than_zero_does() {
 }
 
 #[test]
+fn every_method_predicts_a_phantom_better_than_zero_does_and_says_how() {
+    let (bench, measured) = (Bench::new(), Measured::new(32));
+    bench.write("in.npz", &measured.npz());
+    let correlation_by = |arguments: &[&str]| {
+        let part = ["reconstruct", "in.npz", "--sampling", "0.3", "--order", "zig-zag", "--method"];
+        bench.run(&[&part, arguments].concat()).succeeded();
+        correlation(&bench.pixels("out/image.npy"), &measured.image)
+    };
+    let zero = correlation_by(&["hadamard"]);
+    assert_eq!(correlation_by(&["pseudo-inverse"]), zero);
+    for method in ["tikhonov", "fista", "tv"] {
+        let found = correlation_by(&[method]);
+        assert!(found > zero, "{method}: {found}, zero filling {zero}");
+        let report = bench.json("out/report.json");
+        assert_eq!(report["method"], method);
+        assert!(report["penalty"]["strength"].as_f64().unwrap() > 0.0, "{report}");
+    }
+    correlation_by(&["tikhonov", "--strength", "2", "--basis", "daubechies4"]);
+    let penalty = &bench.json("out/report.json")["penalty"];
+    assert_eq!((&penalty["strength"], &penalty["basis"]), (&2.0.into(), &"daubechies4".into()));
+    correlation_by(&["omp", "--stop-at-noise"]);
+    assert!(bench.json("out/report.json")["omp"]["sparsity"].as_u64().unwrap() > 0);
+}
+
+#[test]
 fn of_several_measurements_the_one_asked_for_is_taken() {
     let (bench, measured) = (Bench::new(), Measured::new(8));
     let dark = vec![0.0; measured.d.len()];

@@ -3,6 +3,7 @@
 mod batch;
 mod laws;
 mod mixed;
+mod nonnegative;
 mod sampled;
 
 use super::*;

@@ -1,0 +1,58 @@
+//! Coefficients of 0 or more.
+
+use super::*;
+use crate::omp::nonnegative;
+
+proptest! {
+    #[test]
+    fn the_solution_is_the_best_of_those_that_are_nowhere_negative(problem in problems()) {
+        // Karush, Kuhn and Tucker: no atom in the support pulls, none outside would help with a part of 0 or more.
+        let (dictionary, y) = dense::<f64>(&problem);
+        let atoms = problem.dictionary.ncols();
+        let found = nonnegative::solve(&dictionary, &y, &Limits::atoms(atoms)).unwrap();
+        prop_assert!(found.coefficients.iter().all(|&c| c > 0.0));
+        let left = residual(&problem, &found.support, &found.coefficients);
+        let length = DVector::from_column_slice(&problem.y).norm();
+        for k in 0..atoms {
+            let atom = problem.dictionary.column(k);
+            let pull = atom.dot(&left);
+            let rounding = 1e-6 * atom.norm() * length;
+            if found.support.contains(&k) {
+                prop_assert!(pull.abs() <= rounding, "{} pulls {}", k, pull);
+            } else if found.stop == Stop::NoAtomLeft {
+                prop_assert!(pull <= rounding, "{} would help: {}", k, pull);
+            }
+        }
+        let stated = found.residual_norms.last().unwrap() * length;
+        prop_assert!((left.norm() - stated).abs() <= 1e-3 * length);
+    }
+
+    #[test]
+    fn where_nothing_negative_is_wanted_it_is_the_reference(seed: u64, count in 1_usize..6) {
+        let mut random = Pcg64::seed_from_u64(seed);
+        let dictionary = DMatrix::from_fn(60, 60, |m, k| if m == k { 1.0 } else { 0.0 });
+        let mut y = vec![0.0; 60];
+        for _ in 0..count {
+            y[random.random_range(0..60_usize)] = f64::from(random.random_range(1.0..2.0_f32));
+        }
+        let problem = Problem { recipe: String::new(), dictionary, y, sparse: vec![] };
+        let (dictionary, y) = dense::<f32>(&problem);
+        let limits = Limits::atoms(count);
+        let found = nonnegative::solve(&dictionary, &y, &limits).unwrap();
+        let exact = solve_exactly(&problem, &limits);
+        prop_assert_eq!(found.support, exact.support);
+    }
+}
+
+#[test]
+fn an_atom_that_would_be_negative_is_not_taken() {
+    let matrix = DMatrix::<f64>::identity(4, 4);
+    let found = nonnegative::solve(
+        &DenseDictionary::new(&matrix),
+        &[1.0, -5.0, 2.0, 0.0],
+        &Limits::atoms(4),
+    )
+    .unwrap();
+    assert_eq!((found.support, found.coefficients), (vec![2, 0], vec![2.0, 1.0]));
+    assert_eq!(found.stop, Stop::NoAtomLeft);
+}

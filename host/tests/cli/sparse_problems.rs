@@ -1,0 +1,89 @@
+//! `nirspi bench omp` and `nirspi eval sampling`.
+
+use crate::bench::{Bench, Measured, npz};
+use std::io::Read;
+
+/// Numbers of one array of an `.npz` file, of eight bytes each.
+fn array(bench: &Bench, file: &str, name: &str, number: fn([u8; 8]) -> f64) -> Vec<f64> {
+    let file = std::fs::File::open(bench.path(file)).unwrap();
+    let mut bytes = Vec::new();
+    let mut archive = zip::ZipArchive::new(file).unwrap();
+    archive.by_name(&format!("{name}.npy")).unwrap().read_to_end(&mut bytes).unwrap();
+    let header = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
+    bytes[header..].as_chunks().0.iter().copied().map(number).collect()
+}
+
+/// Two frames over eight spikes and one even atom of unit norm.
+fn problem() -> Vec<u8> {
+    let mut dictionary = vec![0.0_f32; 8 * 9];
+    for m in 0..8 {
+        dictionary[m * 9 + m] = 1.0;
+        dictionary[m * 9 + 8] = 0.125_f32.sqrt();
+    }
+    let mut frames = vec![0.0_f32; 16];
+    (frames[2], frames[5]) = (3.0, -4.0);
+    frames[8..].fill(1.0);
+    frames[8 + 1] = 3.0;
+    npz(&[("D", &[8, 9], &dictionary), ("Y", &[2, 8], &frames), ("k", &[], &[2.0])])
+}
+
+#[test]
+fn a_given_problem_is_solved_and_timed() {
+    let bench = Bench::new();
+    bench.write("problem.npz", &problem());
+    for precision in ["auto", "f32", "f64"] {
+        let arguments =
+            ["bench", "omp", "--input", "problem.npz", "--out", "solution.npz", "--repeats", "3"];
+        let report =
+            bench.run(&[&arguments[..], &["--precision", precision]].concat()).succeeded().json();
+        assert!(report["median_ms"].as_f64().unwrap() > 0.0, "{report}");
+        assert_eq!((&report["frames"], &report["atoms"]), (&2.into(), &9.into()));
+        let support = array(&bench, "solution.npz", "support", |b| i64::from_le_bytes(b) as f64);
+        assert_eq!(support, [5.0, 2.0, 8.0, 1.0]);
+        let coef = array(&bench, "solution.npz", "coef", f64::from_le_bytes);
+        assert!((coef[0] + 4.0).abs() < 1e-6 && (coef[1] - 3.0).abs() < 1e-6, "{coef:?}");
+        assert!((coef[3] - 2.0).abs() < 1e-5, "{coef:?}");
+    }
+}
+
+#[test]
+fn a_problem_that_does_not_fit_leaves_nothing_behind() {
+    let bench = Bench::new();
+    bench.write("problem.npz", &npz(&[("D", &[2, 3], &[1.0; 6]), ("Y", &[1, 3], &[1.0; 3])]));
+    let arguments = ["bench", "omp", "--input", "problem.npz", "--out", "solution.npz"];
+    bench.run(&arguments).failed(1, &["problem.npz", "no `k`", "D, Y and k"]);
+    assert_eq!(bench.names(), ["problem.npz"]);
+}
+
+#[test]
+fn a_random_problem_needs_no_file() {
+    let bench = Bench::new();
+    let arguments = ["bench", "omp", "--measurements", "128", "--sparsity", "8", "--frames", "3"];
+    let report = bench.run(&[&arguments[..], &["--repeats", "1"]].concat()).succeeded().json();
+    assert_eq!((&report["measurements"], &report["mean_atoms"]), (&128.into(), &8.0.into()));
+}
+
+#[test]
+fn sampling_is_judged_against_the_full_image() {
+    let (bench, measured) = (Bench::new(), Measured::new(16));
+    bench.write("in.npz", &measured.npz());
+    let arguments =
+        ["eval", "sampling", "in.npz", "--sampling", "0.25,1", "--orders", "zig-zag,natural"];
+    let said = bench.run(&[&arguments[..], &["--out", "out", "--json"]].concat()).succeeded();
+    let rows = said.json()["rows"].as_array().unwrap().clone();
+    assert_eq!(rows.len() % 4, 0);
+    let psnr = |method: &str, sampling: f64, order: &str| {
+        let wanted = |row: &&serde_json::Value| {
+            row["method"] == method && row["order"] == order && row["sampling"] == sampling
+        };
+        rows.iter().find(wanted).unwrap()["psnr_db"].as_f64()
+    };
+    // All patterns give the image itself: no finite PSNR, or one beyond single precision.
+    assert!(psnr("hadamard", 1.0, "zig-zag").is_none_or(|db| db > 100.0));
+    let (zero, best) = (psnr("hadamard", 0.25, "zig-zag"), psnr("tikhonov, dct", 0.25, "zig-zag"));
+    assert!(best > zero, "{zero:?} {best:?}");
+    let table = std::fs::read_to_string(bench.path("out/sampling.md")).unwrap();
+    assert!(table.contains("| zig-zag | natural |") && table.contains("| omp, haar |"), "{table}");
+    let plot = std::fs::read_to_string(bench.path("out/sampling.svg")).unwrap();
+    assert!(plot.starts_with("<svg") && plot.matches("<path").count() > 20);
+}
