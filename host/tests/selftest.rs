@@ -101,6 +101,17 @@ fn leds_that_hardly_light_are_seen_and_nothing_is_concluded_from_them() {
 }
 
 #[test]
+fn a_step_that_drowns_in_noise_is_not_stepped_and_no_calibration_is_kept() {
+    let dim = |array: &mut LedArray, lines: Lines| {
+        0.03 * array.light(lines.rows, lines.columns, lines.enable)
+    };
+    let found = wired(dim);
+    assert!(found.passed() && found.settling.is_none(), "{:#?}", failures(&found));
+    let stepping = found.checks.iter().find(|check| check.name().contains("stepping")).unwrap();
+    assert!(stepping.note().contains("too little light for a noise of"), "{stepping:?}");
+}
+
+#[test]
 fn darkness_is_no_calibration() {
     let found = wired(|_, _| 0.0);
     only(&found, "light of all LEDs", &["no step"]);

@@ -7,7 +7,7 @@
 
 use super::check::{Check, Limit};
 use super::stream::shots;
-use crate::calibrate::{HALF_PERIOD, ONSET};
+use crate::calibrate::{HALF_PERIOD, ONSET, Settling};
 use crate::session::{Session, SessionError};
 use nirspi_wire::register::LATENCY_MAX;
 use nirspi_wire::{Configuration, PatternOrder, SampleSource};
@@ -15,13 +15,22 @@ use nirspi_wire::{Configuration, PatternOrder, SampleSource};
 /// Name of the check.
 pub const NAME: &str = "ADC latency by stepping";
 
-/// Sweeps of each step: 131 microseconds.
-const SWEEPS: u32 = 64;
+/// Sweeps of each step: half a millisecond.
+const SWEEPS: u32 = 256;
 /// Frames of each step. The last one's last sample is of the dark after the run, whatever the setting.
 const FRAMES: u32 = 2;
 
-/// Steps through all settings. `from_burst` is what the raw burst says.
-pub fn check(session: &mut Session, from_burst: u8) -> Result<Vec<Check>, SessionError> {
+/// An edge must stand out of the noise by this many standard deviations: passed by chance three times in ten million.
+const SIGMAS: f64 = 5.0;
+
+/// Steps through all settings. `burst` is what the raw bursts say.
+pub fn check(session: &mut Session, burst: &Settling) -> Result<Vec<Check>, SessionError> {
+    let from_burst = burst.adc_latency;
+    let noise = burst.noise_counts * (2.0 / f64::from(SWEEPS)).sqrt();
+    if SIGMAS * noise > 2.0 * ONSET * burst.step_counts {
+        let reason = format!("too little light for a noise of {:.1} counts", burst.noise_counts);
+        return Ok(vec![Check::skipped(NAME, &reason)]);
+    }
     let mut differences = Vec::with_capacity(usize::from(LATENCY_MAX) + 1);
     for adc_latency in 0..=LATENCY_MAX {
         let configuration = Configuration {

@@ -32,7 +32,7 @@ const MIN_LINE_SHARE: f64 = 0.05;
 /// Most that pattern and complement together may differ from pattern 0: what the supply may give way, twice the
 /// deviation that would show in an image of 8 bits, noise apart.
 const MAX_DEVIATION: f64 = 0.02;
-/// Noise of this many standard deviations is allowed for: passed once in ten thousand self-tests, over 1023 patterns.
+/// Noise of this many standard deviations is allowed for: passed by chance once in two thousand self-tests of 1023 patterns.
 const SIGMAS: f64 = 5.0;
 
 fn configuration(differential: bool, adc_latency: u8) -> Configuration<'static> {

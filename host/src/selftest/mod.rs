@@ -86,7 +86,7 @@ pub fn run(
         None => checks.extend(stages.map(|name| Check::skipped(name, "too little light"))),
         Some(settling) => {
             begin(3);
-            let stepped = latency::check(session, settling.adc_latency);
+            let stepped = latency::check(session, settling);
             let stepped = unless_refused(&stages[..1], stepped)?;
             agrees = stepped.iter().all(|check| check.verdict() == Verdict::Passed);
             // Where burst and stepping disagree, it is the stepped setting that puts the windows right.
