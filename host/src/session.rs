@@ -82,6 +82,7 @@ impl Listener for Reports {
     fn packet(&mut self, _: &[u8], content: &Result<DeviceMessage<'_>, PacketError>) {
         match content {
             Ok(DeviceMessage::Event(event)) => self.0.extend(events::at_greeting(&event.kind)),
+            Ok(DeviceMessage::Crash(report)) => self.0.push(events::crash(report)),
             // Intact, and yet no message: of a version that has more to say.
             Err(PacketError::Message) => self.0.push(
                 "the camera reported something that this program does not know: update it"

@@ -95,8 +95,8 @@ impl CameraAddress {
     /// Frames of 1024 patterns that the link must carry in a second; 0 where any speed will do.
     pub fn min_frames_per_s(&self) -> f64 {
         match self {
-            // 4 MB/s, a tenth of what high-speed bulk transfers carry.
-            Self::Usb(_) => 1000.0,
+            // Three quarters of what the boards' link to the FPGA lets come, by the estimate in docs/firmware.md.
+            Self::Usb(_) => 300.0,
             _ => 0.0,
         }
     }

@@ -16,5 +16,5 @@ mod reconstruct;
 mod selftest;
 #[cfg(unix)]
 mod serial;
-mod versions;
 mod sparse_problems;
+mod versions;

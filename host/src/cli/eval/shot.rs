@@ -3,7 +3,7 @@
 use crate::cli::camera::Rain;
 use anyhow::{Result, bail};
 use indicatif::{ProgressBar, ProgressStyle};
-use nirspi::capture::{CaptureOptions, Ended, Progress, capture};
+use nirspi::capture::{Calibration, CaptureOptions, Ended, Progress, capture};
 use nirspi::session::Session;
 use nirspi::setup::MeasurementSetup;
 use nirspi::virtual_camera::{MemoryLink, VirtualOptics};
@@ -61,7 +61,7 @@ pub fn shoot(scene: Scene, conditions: Conditions, seed: u64) -> Result<Shots> {
     let options = CaptureOptions {
         setup: MeasurementSetup::new(&Order::Natural, 1.0)?,
         frames: Some(conditions.frames),
-        calibrate: true,
+        calibration: Calibration::Measure,
         record: None,
     };
     let mut watch = |_: &Progress| ControlFlow::Continue(());
