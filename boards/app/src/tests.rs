@@ -132,7 +132,7 @@ impl FpgaPort for Fpga {
 
     async fn ready(&mut self) {
         if !self.frame_ready() {
-            core::future::pending().await
+            core::future::pending::<()>().await;
         }
     }
 }

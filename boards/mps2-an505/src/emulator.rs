@@ -11,7 +11,7 @@ use vcell::VolatileCell;
 /// TIMER0 of the IoT kit, by its secure alias (Arm ECM0601256, memory map).
 const TIMER0: usize = 0x5000_0000;
 
-/// The APB timer of Arm's Cortex-M System Design Kit (DDI 0479, chapter 4, table 4-1).
+/// The APB timer of Arm's Cortex-M System Design Kit (Arm DDI 0479, APB timer).
 #[repr(C)]
 struct Registers {
     ctrl: VolatileCell<u32>,

@@ -30,7 +30,7 @@ use nirspi_wire::tunnel::Lines;
 use static_cell::{ConstStaticCell, StaticCell};
 use uart::Uart;
 
-/// UART0 and UART1 by their secure aliases (Arm AN505, chapter 3).
+/// UART0 and UART1 by their secure aliases (Arm AN505, memory map).
 static HOST: Uart = Uart::at(0x5020_0000);
 static FPGA: Uart = Uart::at(0x5020_1000);
 

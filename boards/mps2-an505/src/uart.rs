@@ -1,4 +1,4 @@
-//! The APB UART of Arm's Cortex-M System Design Kit (DDI 0479, chapter 4, table 4-3), as the AN505 image has five.
+//! The APB UART of Arm's Cortex-M System Design Kit (Arm DDI 0479, APB UART), as the AN505 image has five.
 //!
 //! The one law: no byte is lost for want of room. A receiver that has none leaves its byte where it is and the line
 //! waits, as it does in QEMU; the real chip would count an overrun there.

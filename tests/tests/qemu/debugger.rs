@@ -64,7 +64,8 @@ impl Debugger {
                 other => text.push(other),
             }
         }
-        (byte(), byte());
+        byte();
+        byte();
         self.line.write_all(b"+").unwrap();
         String::from_utf8(text).unwrap()
     }

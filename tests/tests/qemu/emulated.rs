@@ -11,6 +11,7 @@ use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
+use std::time::Duration;
 
 /// QEMU, running.
 pub struct Emulated {
@@ -27,10 +28,18 @@ fn listen() -> (TcpListener, String) {
     (listener, format!("tcp:127.0.0.1:{port},nodelay=on"))
 }
 
-fn accept(listener: &TcpListener) -> TcpStream {
-    let (stream, _) = listener.accept().unwrap();
-    stream.set_nodelay(true).unwrap();
-    stream
+/// QEMU's connection; one that cannot start says why itself.
+fn accept(listener: &TcpListener, qemu: &mut Child) -> TcpStream {
+    listener.set_nonblocking(true).unwrap();
+    loop {
+        if let Ok((stream, _)) = listener.accept() {
+            stream.set_nonblocking(false).unwrap();
+            stream.set_nodelay(true).unwrap();
+            return stream;
+        }
+        assert!(qemu.try_wait().unwrap().is_none(), "QEMU has ended");
+        thread::sleep(Duration::from_millis(5));
+    }
 }
 
 impl Emulated {
@@ -44,7 +53,7 @@ impl Emulated {
         let (qemu, elf) = (crate::firmware::qemu()?, crate::firmware::elf()?);
         let (host_line, host_argument) = listen();
         let (fpga_line, fpga_argument) = listen();
-        let child = Command::new(qemu)
+        let mut child = Command::new(qemu)
             .args(["-M", "mps2-an505", "-display", "none", "-monitor", "none"])
             .args(["-serial", &host_argument, "-serial", &fpga_argument])
             .arg("-kernel")
@@ -53,7 +62,8 @@ impl Emulated {
             .stdin(Stdio::null())
             .spawn()
             .unwrap();
-        let (host_line, fpga_line) = (accept(&host_line), accept(&fpga_line));
+        let (host_line, fpga_line) =
+            (accept(&host_line, &mut child), accept(&fpga_line, &mut child));
         let interlock_closed = Arc::new(AtomicBool::new(true));
         let (line, interlock) = (fpga_line.try_clone().unwrap(), Arc::clone(&interlock_closed));
         thread::spawn(move || simulator::serve(line, fpga, &interlock));

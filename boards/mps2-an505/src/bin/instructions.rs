@@ -138,7 +138,8 @@ fn counts(work: impl FnOnce()) -> u32 {
 
 /// What the firmware does with a frame, one after the other: the FPGA's checksum, differences, packet.
 fn parts(bus: &mut PortBus<'_, Memory>, sink: &mut OnePacket) -> [u32; 3] {
-    static FRAME: ConstStaticCell<[u8; MAX_FRAME_BYTES]> = ConstStaticCell::new([0; MAX_FRAME_BYTES]);
+    static FRAME: ConstStaticCell<[u8; MAX_FRAME_BYTES]> =
+        ConstStaticCell::new([0; MAX_FRAME_BYTES]);
     static WORDS: ConstStaticCell<[u8; 4 * PATTERNS as usize]> = ConstStaticCell::new([0; _]);
     let (frame, words) = (FRAME.take(), WORDS.take());
     bus.port().frame(frame);
