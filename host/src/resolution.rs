@@ -1,7 +1,7 @@
 //! How fine a camera sees: slanted edge and bars, in millimetres on the target.
 //!
-//! The law: a result is the width of the finest line, half a period, and never finer than one pixel: what lies beyond the
-//! sampling limit is not resolution but luck.
+//! The law: a result is the width of the finest line, half a period, and never finer than one pixel: what lies beyond
+//! the sampling limit is not resolution but luck.
 
 use std::f64::consts::PI;
 
@@ -22,8 +22,8 @@ pub fn edge_scene(size: usize) -> Vec<f32> {
         .collect()
 }
 
-/// Vertical bars of `bar_px` pixels over `size` x `size` pixels, one beginning in the centre, so that bars of one pixel fit
-/// the grid; row-major.
+/// Vertical bars of `bar_px` pixels over `size` x `size` pixels, one beginning in the centre, so that bars of one
+/// pixel fit the grid; row-major.
 #[must_use]
 pub fn bar_scene(size: usize, bar_px: f64) -> Vec<f32> {
     let middle = size as f64 / 2.0;
@@ -44,8 +44,8 @@ fn from_edge(x: usize, y: usize, size: usize) -> f64 {
 }
 
 /// Modulation transfer by spatial frequency in cycles per pixel, 0 to 0.5, from a picture of [`edge_scene`] of any
-/// brightness: the edge's profile, differentiated, Fourier transformed (ISO 12233), and made 1 at 0. Empty if there is no
-/// edge.
+/// brightness: the edge's profile, differentiated, Fourier transformed (ISO 12233), and made 1 at 0. Empty if there
+/// is no edge.
 ///
 /// # Panics
 /// If the picture does not hold `side * side` pixels.
@@ -93,8 +93,8 @@ pub fn edge_mtf(picture: &[f32], side: usize) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// Width of a line at the first frequency where the transfer falls to `level`, in pixels; 1 if it never does below the
-/// sampling limit, none without a curve.
+/// Width of a line at the first frequency where the transfer falls to `level`, in pixels; 1 if it never does below
+/// the sampling limit, none without a curve.
 #[must_use]
 pub fn line_width_px(mtf: &[(f64, f64)], level: f64) -> Option<f64> {
     mtf.first()?;
@@ -106,8 +106,8 @@ pub fn line_width_px(mtf: &[(f64, f64)], level: f64) -> Option<f64> {
     }))
 }
 
-/// How much of the bars' contrast a picture of [`bar_scene`] keeps: the amplitude of their period over the mean, against
-/// that of the `truth`. Negative where dark and bright have changed places.
+/// How much of the bars' contrast a picture of [`bar_scene`] keeps: the amplitude of their period over the mean,
+/// against that of the `truth`. Negative where dark and bright have changed places.
 ///
 /// # Panics
 /// If the pictures do not hold `side * side` pixels.

@@ -40,8 +40,8 @@ impl LedArray {
         }
     }
 
-    /// The same array once something has changed in front of it: `reflectance` is what each LED's spot now sees, 32 x 32,
-    /// row-major.
+    /// The same array once something has changed in front of it: `reflectance` is what each LED's spot now sees, 32 x
+    /// 32, row-major.
     pub fn relight(&mut self, reflectance: &[f32], electrons_per_led: f64) {
         for (electrons, &seen) in self.electrons.iter_mut().zip(reflectance) {
             *electrons = (f64::from(seen) * electrons_per_led) as f32;

@@ -1,9 +1,9 @@
 //! Scattering by one homogeneous sphere (Lorenz-Mie theory).
 //!
-//! The solver is the crate `scatrs`; this module gives it the units and names of the rest of the crate and refuses what
-//! was not checked. Definitions are those of Bohren and Huffman, *Absorption and Scattering of Light by Small
-//! Particles* (1983), chapter 4: size parameter `x = pi D / wavelength`, refractive index `n + ik` with k >= 0 for
-//! a sphere that absorbs, efficiencies as cross section over `pi D^2 / 4`.
+//! The solver is the crate `scatrs`; this module gives it the units and names of the rest of the crate and refuses
+//! what was not checked. Definitions are those of Bohren and Huffman, *Absorption and Scattering of Light by Small
+//! Particles* (1983), chapter 4: size parameter `x = pi D / wavelength`, refractive index `n + ik` with k >= 0 for a
+//! sphere that absorbs, efficiencies as cross section over `pi D^2 / 4`.
 //!
 //! Law: energy is neither made nor lost. `extinction = scattering + absorption`, absorption is exactly 0 for a real
 //! index, and a phase function has a mean of 1 over the sphere.
@@ -13,8 +13,8 @@ use scatrs::mie::{MieOptions, MieSolution, Normalization, PhaseBuffers};
 use std::ops::RangeInclusive;
 use thiserror::Error;
 
-/// Size parameters accepted: what `tests/mie.rs` and `scripts/mie_reference.py` hold against other codes, which reaches
-/// from Rayleigh scattering to an 8 mm drop in violet light.
+/// Size parameters accepted: what `tests/mie.rs` and `scripts/mie_reference.py` hold against other codes, which
+/// reaches from Rayleigh scattering to an 8 mm drop in violet light.
 pub const SIZE_PARAMETERS: RangeInclusive<f64> = 0.01..=65_000.0;
 
 /// Real parts of the refractive index accepted.

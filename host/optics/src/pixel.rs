@@ -1,12 +1,12 @@
 //! Signal and noise of one reconstructed pixel, term by term.
 //!
 //! A differential Hadamard measurement shows N patterns and their complements; the inverse transform gives each pixel
-//! `(1/N) sum of sign * (pattern - complement)`. Its signal is the light of one LED in one exposure; its noise variance is
-//! 2/N of that of one exposure (`Var(pattern - complement) = 2 sigma^2`, N of them, over N^2). So
-//! `SNR = signal / sigma * sqrt(N / 2)` (Harwit and Sloane, *Hadamard Transform Optics*, 1979, chapter 3).
+//! `(1/N) sum of sign * (pattern - complement)`. Its signal is the light of one LED in one exposure; its noise
+//! variance is 2/N of that of one exposure (`Var(pattern - complement) = 2 sigma^2`, N of them, over N^2). So `SNR =
+//! signal / sigma * sqrt(N / 2)` (Harwit and Sloane, *Hadamard Transform Optics*, 1979, chapter 3).
 //!
-//! An exposure is the time that one pattern's light is summed: samples of a pattern times sweeps. The
-//! paper's T_ext of 8 to 25 us is taken to be that: 1024 patterns of 8 us and their complements are 16 ms, of 25 us without
+//! An exposure is the time that one pattern's light is summed: samples of a pattern times sweeps. The paper's T_ext
+//! of 8 to 25 us is taken to be that: 1024 patterns of 8 us and their complements are 16 ms, of 25 us without
 //! complements 26 ms, about the 18 to 24 ms of its Table 1.
 
 use crate::budget::BudgetError;
@@ -115,7 +115,8 @@ pub struct PixelBudget {
 }
 
 impl PixelBudget {
-    /// One pixel of a target of `reflectance` at `distance_mm` in this weather, each pattern exposed for `exposure_us`.
+    /// One pixel of a target of `reflectance` at `distance_mm` in this weather, each pattern exposed for
+    /// `exposure_us`.
     ///
     /// # Errors
     /// [`PixelError`] naming what is out of range.

@@ -3,11 +3,11 @@
 //! Physics: the farthest distance at which one reconstructed pixel's signal reaches a multiple of its noise
 //! ([`crate::pixel`]).
 //!
-//! As printed: z grows in steps of `Z_max / 10`; at each step the source is multiplied by `exp(-alpha z)` *again*, so that
-//! after n steps it carries `exp(-alpha (z_1 + ... + z_n))`; it ends where the photons of one exposure fall to the noise
-//! floor. E(N) is given only by reference; ours is used. The factor A (which is infinite at z = 0 and has the dimension of
-//! a volume), Lambda, mu, Z_dr and the reflectivities are computed there and used nowhere. `beta` is a share of an exposure
-//! used as a coefficient per metre.
+//! As printed: z grows in steps of `Z_max / 10`; at each step the source is multiplied by `exp(-alpha z)` *again*, so
+//! that after n steps it carries `exp(-alpha (z_1 + ... + z_n))`; it ends where the photons of one exposure fall to
+//! the noise floor. E(N) is given only by reference; ours is used. The factor A (which is infinite at z = 0 and has
+//! the dimension of a volume), Lambda, mu, Z_dr and the reflectivities are computed there and used nowhere. `beta` is
+//! a share of an exposure used as a coefficient per metre.
 
 use crate::pixel::{Instrument, PixelBudget, PixelError};
 use crate::rain::Weather;
@@ -103,8 +103,8 @@ pub fn as_printed_mm(
     Ok(z_max_mm)
 }
 
-/// The extinction that this weather would need, per metre, for the camera to see no farther than `range_mm`; none if it
-/// does not see that far in dry air.
+/// The extinction that this weather would need, per metre, for the camera to see no farther than `range_mm`; none if
+/// it does not see that far in dry air.
 ///
 /// # Errors
 /// [`PixelError`] naming what is out of range.

@@ -37,8 +37,8 @@ pub enum RigError {
     },
 }
 
-/// Christiansen's uniformity coefficient in percent, `100 (1 - sum |v - mean| / (n mean))` (Christiansen, *Irrigation by
-/// Sprinkling*, University of California bulletin 670, 1942). 100 is even; irrigation asks for over 80.
+/// Christiansen's uniformity coefficient in percent, `100 (1 - sum |v - mean| / (n mean))` (Christiansen, *Irrigation
+/// by Sprinkling*, University of California bulletin 670, 1942). 100 is even; irrigation asks for over 80.
 ///
 /// # Errors
 /// [`RigError`] for fewer than two volumes, negative ones, or none but zeros.
@@ -89,8 +89,8 @@ impl Default for Rig {
 pub const STEEPEST_TILT_DEG: f64 = 15.0;
 
 impl Rig {
-    /// Drops collected in `columns` x `rows` equal containers that cover the floor, row by row, of `drops` that fall from
-    /// each nozzle. What misses the floor runs down the glass and is not collected. Seeded.
+    /// Drops collected in `columns` x `rows` equal containers that cover the floor, row by row, of `drops` that fall
+    /// from each nozzle. What misses the floor runs down the glass and is not collected. Seeded.
     ///
     /// # Errors
     /// [`RigError::Setting`] naming the setting that is not physical.

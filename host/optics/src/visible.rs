@@ -1,11 +1,12 @@
 //! An ordinary camera in daylight, for comparison: the visible ("VIS") rows of the paper's tables.
 //!
-//! The same field, grid of 32 x 32, distance, daylight and drops as the single-pixel camera has, so that what differs is
-//! the light and not the geometry. The paper does not say which camera it used; this is a small industrial one, focused
-//! on the target.
+//! The same field, grid of 32 x 32, distance, daylight and drops as the single-pixel camera has, so that what differs
+//! is the light and not the geometry. The paper does not say which camera it used; this is a small industrial one,
+//! focused on the target.
 //!
-//! A drop before a pixel shows a wide view of the surroundings instead of what is behind it, 0.94 as bright as they are on
-//! average (Garg and Nayar, Int. J. Comput. Vis. 75, 3, 2007). The surroundings are a sky as bright as a white target.
+//! A drop before a pixel shows a wide view of the surroundings instead of what is behind it, 0.94 as bright as they
+//! are on average (Garg and Nayar, Int. J. Comput. Vis. 75, 3, 2007). The surroundings are a sky as bright as a white
+//! target.
 
 use crate::rain::{BeamShadows, Drops, FallingDrops, RainError};
 use crate::{LEDS, Projector, ProjectorError, Scene};
@@ -79,8 +80,8 @@ impl VisibleCamera {
         self.white_electrons / (photons_per_m2_s * area_m2 * self.quantum_efficiency)
     }
 
-    /// A picture of `scene` at `distance_mm` in this rain, 32 x 32 over the field of `projector`: reflectance as the camera
-    /// would report it, white being 1. Seeded.
+    /// A picture of `scene` at `distance_mm` in this rain, 32 x 32 over the field of `projector`: reflectance as the
+    /// camera would report it, white being 1. Seeded.
     ///
     /// # Errors
     /// [`VisibleError`] for a distance or rain that cannot be.

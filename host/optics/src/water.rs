@@ -1,11 +1,11 @@
 //! The complex refractive index of liquid water from 0.4 to 2 um.
 //!
 //! Two published tables, copied digit for digit by `scripts/water_tables.py`; both say 25 degrees C. Segelstein's is
-//! the denser one (222 rows here against 30) and the default everywhere; Hale and Querry's has one row every 200 nm past
-//! 1 um and misses the shape of the absorption band at 1.45 um.
+//! the denser one (222 rows here against 30) and the default everywhere; Hale and Querry's has one row every 200 nm
+//! past 1 um and misses the shape of the absorption band at 1.45 um.
 //!
-//! Law: no number is made up. Between rows n is linear and ln k is linear in ln(wavelength); outside the tables there is
-//! an error.
+//! Law: no number is made up. Between rows n is linear and ln k is linear in ln(wavelength); outside the tables there
+//! is an error.
 
 mod hale;
 mod segelstein;

@@ -10,8 +10,8 @@ fn efficiencies(x: f64, real: f64, imaginary: f64) -> Efficiencies {
     Mie::new().sphere(x, Index { real, imaginary }).unwrap().efficiencies()
 }
 
-/// `tests/data/mie_reference.csv`, written by `scripts/mie_reference.py --write`, which also compares 556 spheres where
-/// the other codes are installed. Tolerances and what they are relative to are the same there.
+/// `tests/data/mie_reference.csv`, written by `scripts/mie_reference.py --write`, which also compares 556 spheres
+/// where the other codes are installed. Tolerances and what they are relative to are the same there.
 #[test]
 fn spheres_agree_with_miepython_and_scattnlay_to_a_millionth() {
     let table = include_str!("data/mie_reference.csv");

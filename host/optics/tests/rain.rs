@@ -1,4 +1,5 @@
-//! What rain promises: energy conserved, sums that agree with single photons and single drops, the honest sizes of effects.
+//! What rain promises: energy conserved, sums that agree with single photons and single drops, the honest sizes of
+//! effects.
 
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
@@ -153,7 +154,8 @@ fn turned(along: [f64; 3], angle: f64, azimuth: f64) -> [f64; 3] {
 
 #[test]
 fn the_point_spread_function_agrees_with_photons_followed_one_by_one() {
-    // 100 mm/h and 0.5 mm drops, dense enough that 400 000 photons say something: an optical depth of 0.085 over a metre.
+    // 100 mm/h and 0.5 mm drops, dense enough that 400 000 photons say something: an optical depth of 0.085 over a
+    // metre.
     let drops = Drops::monodisperse(100.0, 0.5).unwrap();
     for nm in [550.0, 1550.0] {
         let (medium, angles) = (medium(&drops, nm), angles(&drops, nm));

@@ -1,4 +1,5 @@
-//! What Algorithm 2 promises here: ranges that follow from light and noise, and an honest comparison with the paper's.
+//! What Algorithm 2 promises here: ranges that follow from light and noise, and an honest comparison with the
+//! paper's.
 
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
@@ -41,7 +42,8 @@ fn natural_amounts_of_rain_hardly_change_the_range() {
 
 #[test]
 fn exposure_changes_the_range_by_its_fourth_root() {
-    // Amplifier noise: SNR goes as exposure^(1/2) / distance^2. From 8 to 25 us: 1.33, the ratio of the paper's two ranges.
+    // Amplifier noise: SNR goes as exposure^(1/2) / distance^2. From 8 to 25 us: 1.33, the ratio of the paper's two
+    // ranges.
     let light = weather(1.93, 0.5);
     let ratio = range_m(&light, &wanted(25.0)) / range_m(&light, &wanted(8.0));
     assert!((ratio - (25.0_f64 / 8.0).powf(0.25)).abs() < 0.02, "{ratio}");

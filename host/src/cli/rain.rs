@@ -29,7 +29,7 @@ pub struct Args {
     #[command(flatten)]
     drops: DropArgs,
     /// Wavelengths, in nm
-    #[arg(long, value_name = "NM,...", value_delimiter = ',', default_values_t = [550.0, 850.0, 1550.0])]
+    #[arg(long, value_name = "NM,...", value_delimiter = ',', default_values_t = [550.0, 850.0, 1550.0], allow_negative_numbers = true)]
     wavelengths_nm: Vec<f64>,
     /// Length of the path that a share of light is given for (there and back), or distance of the target, in metres
     #[arg(long, value_name = "M", default_value_t = 1.0, allow_negative_numbers = true)]
@@ -102,8 +102,8 @@ pub struct DropArgs {
     /// Rain rate, in mm/h
     #[arg(long, value_name = "R", default_value_t = 5.6, allow_negative_numbers = true)]
     pub rate_mm_h: f64,
-    /// Drop sizes: marshall-palmer, mono:MM, gamma:SHAPE,SLOPE (slope per mm), fog:UM,G (mode in um, water in g/m3), or
-    /// a CSV file of diameters in mm and drops per m3
+    /// Drop sizes: marshall-palmer, mono:MM, gamma:SHAPE,SLOPE (slope per mm), fog:UM,G (mode in um, water in g/m3),
+    /// or a CSV file of diameters in mm and drops per m3
     #[arg(long, value_name = "LAW", default_value = "marshall-palmer")]
     pub drops: String,
 }

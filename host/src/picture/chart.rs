@@ -1,7 +1,7 @@
 //! A line chart: SNR against distance, sharpness against bar width.
 //!
-//! The law: every point lies where its axis says, clipped to the frame; every line is named in the legend, and every axis
-//! with its unit.
+//! The law: every point lies where its axis says, clipped to the frame; every line is named in the legend, and every
+//! axis with its unit.
 
 use super::text::{Font, Style};
 use image::{Rgb, RgbImage};
@@ -218,7 +218,8 @@ mod tests {
 
     #[test]
     fn a_point_lies_where_its_axes_say() {
-        // A short line at x = 1, the middle of a logarithmic axis of 0.1 to 10, and y = 5.05, the middle of a linear one.
+        // A short line at x = 1, the middle of a logarithmic axis of 0.1 to 10, and y = 5.05, the middle of a linear
+        // one.
         let canvas = chart(vec![(0.99, 5.05), (1.01, 5.05)]).render();
         let x = LEFT_PX + (WIDTH_PX - LEFT_PX - RIGHT_PX) / 2;
         let y = TOP_PX + (HEIGHT_PX - TOP_PX - BOTTOM_PX) / 2;

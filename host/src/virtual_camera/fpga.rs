@@ -5,7 +5,8 @@ use nirspi_mcu::{BusError, FpgaBus};
 use nirspi_optics::rain::RainySpots;
 use nirspi_optics::{Chain, LedArray};
 
-/// ADC clocks after which drops are looked at again: a differential sweep, in which a 2 mm drop falls half a millimetre.
+/// ADC clocks after which drops are looked at again: a differential sweep, in which a 2 mm drop falls half a
+/// millimetre.
 const WEATHER_CLOCKS: u64 = 10_240;
 
 /// An FPGA whose time the virtual camera moves.

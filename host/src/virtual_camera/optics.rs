@@ -82,8 +82,8 @@ impl VirtualOptics {
         Ok(Self { scene, projector, distance_mm, footprint, budget, chain, wavelength_nm, weather })
     }
 
-    /// Lets these drops fall between camera and scene. Daylight is dimmed and scattered as they do on average; what they
-    /// do to the LEDs' light is followed drop by drop.
+    /// Lets these drops fall between camera and scene. Daylight is dimmed and scattered as they do on average; what
+    /// they do to the LEDs' light is followed drop by drop.
     ///
     /// # Errors
     /// Air too dense, or too many drops to be followed.

@@ -11,6 +11,7 @@ mod capture_tcp;
 mod demo;
 mod foreign_devices;
 mod metrics;
+mod rain;
 mod real_data;
 mod reconstruct;
 mod selftest;

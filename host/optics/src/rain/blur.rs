@@ -1,13 +1,13 @@
 //! Forward-scatter blur: where light that a drop turned aside still lands on the target.
 //!
-//! A pencil of light that is scattered by `theta` at `s` before the target lands `s tan(theta)` beside its aim. Summed
-//! over the path this is the point-spread function of rain (Wells, *AGARD Lecture Series* 61, 1973, in its single-scattering
-//! limit): the share within a radius r is `exp(-cL) b * integral over s of P(< atan(r / s))`, with extinction c, scattering
-//! b, and P the cumulative scattering angle.
+//! A pencil of light that is scattered by `theta` at `s` before the target lands `s tan(theta)` beside its aim.
+//! Summed over the path this is the point-spread function of rain (Wells, *AGARD Lecture Series* 61, 1973, in its
+//! single-scattering limit): the share within a radius r is `exp(-cL) b * integral over s of P(< atan(r / s))`, with
+//! extinction c, scattering b, and P the cumulative scattering angle.
 //!
-//! Light scattered twice is left out, which is off by half the square of the optical depth: 0.0000002 over a metre of the
-//! paper's heavy rain. Beyond an optical depth of 0.5 there is an error instead of a wrong number. `tests/rain.rs`
-//! follows single photons instead, as an independent check.
+//! Light scattered twice is left out, which is off by half the square of the optical depth: 0.0000002 over a metre of
+//! the paper's heavy rain. Beyond an optical depth of 0.5 there is an error instead of a wrong number.
+//! `tests/rain.rs` follows single photons instead, as an independent check.
 
 use super::{Medium, RainError, ScatteringAngles, ensure};
 use crate::{LEDS, SIDE};
@@ -125,7 +125,8 @@ impl BlurKernel {
         }
     }
 
-    /// The same, with `own_spot` taken from what stays in the LED's own spot: for light that is accounted for elsewhere.
+    /// The same, with `own_spot` taken from what stays in the LED's own spot: for light that is accounted for
+    /// elsewhere.
     #[must_use]
     pub fn without_own(mut self, own_spot: f64) -> Self {
         let own = &mut self.shares[REACH * REACH / 2];

@@ -61,8 +61,8 @@ impl Drops {
         }))
     }
 
-    /// A gamma law `N(D) = N0 D^shape exp(-slope D)` (Ulbrich, J. Climate Appl. Meteorol. 22, 1764, 1983), with the N0
-    /// that gives this rain rate. `shape` is the paper's mu, `slope_per_mm` its Lambda.
+    /// A gamma law `N(D) = N0 D^shape exp(-slope D)` (Ulbrich, J. Climate Appl. Meteorol. 22, 1764, 1983), with the
+    /// N0 that gives this rain rate. `shape` is the paper's mu, `slope_per_mm` its Lambda.
     ///
     /// # Errors
     /// [`RainError::Setting`] for a rate out of range, a shape not in -1 to 20, a slope not in 0.5 to 50.
@@ -115,8 +115,9 @@ impl Drops {
         Ok(Self { classes })
     }
 
-    /// Fog: `N(D) ~ D^6 exp(-6 D / mode)`, the shape of Deirmendjian's cloud C1 (*Electromagnetic Scattering on Spherical
-    /// Polydispersions*, 1969) around the most frequent diameter `mode_um`, with `liquid_g_per_m3` of water.
+    /// Fog: `N(D) ~ D^6 exp(-6 D / mode)`, the shape of Deirmendjian's cloud C1 (*Electromagnetic Scattering on
+    /// Spherical Polydispersions*, 1969) around the most frequent diameter `mode_um`, with `liquid_g_per_m3` of
+    /// water.
     ///
     /// # Errors
     /// [`RainError::Setting`] for a mode not in 0.5 to 100 um or more water than 5 g/m^3.

@@ -3,9 +3,9 @@
 /// Air density to which the fall-speed law belongs: sea level, 20 degrees C, in kg/m^3.
 pub const SEA_LEVEL_AIR_KG_PER_M3: f64 = 1.204;
 
-/// Terminal speed in still air at sea level: `9.65 - 10.3 exp(-0.6 D)` m/s, D in mm (Atlas, Srivastava and Sekhon, Rev.
-/// Geophys. 11, 1, 1973, a fit to Gunn and Kinzer's measurements from 0.6 to 5.8 mm). Below 0.109 mm, where the fit
-/// turns negative, 0: such droplets hang.
+/// Terminal speed in still air at sea level: `9.65 - 10.3 exp(-0.6 D)` m/s, D in mm (Atlas, Srivastava and Sekhon,
+/// Rev. Geophys. 11, 1, 1973, a fit to Gunn and Kinzer's measurements from 0.6 to 5.8 mm). Below 0.109 mm, where the
+/// fit turns negative, 0: such droplets hang.
 pub fn fall_speed_m_per_s(diameter_mm: f64) -> f64 {
     (9.65 - 10.3 * (-0.6 * diameter_mm).exp()).max(0.0)
 }
@@ -22,14 +22,14 @@ pub fn fall_time_constant_s(diameter_mm: f64) -> f64 {
 }
 
 /// The upper bound `sqrt(D) / (50 T)` of Algorithm 2's beta, before clamping. With D in metres it is the longest time
-/// that a drop stays before one pixel, `sqrt(a) / 50` for a radius a (Garg and Nayar, Int. J. Comput. Vis. 75, 3, 2007),
-/// over the exposure; the paper writes the diameter for the radius.
+/// that a drop stays before one pixel, `sqrt(a) / 50` for a radius a (Garg and Nayar, Int. J. Comput. Vis. 75, 3,
+/// 2007), over the exposure; the paper writes the diameter for the radius.
 pub fn beta_bound_as_printed(diameter_mm: f64, exposure_s: f64) -> f64 {
     (diameter_mm * 1e-3).sqrt() / (50.0 * exposure_s)
 }
 
-/// Share of an exposure that a drop spends before one pixel: the bound above, in 0 to 1, the only range in which it can
-/// be a share. For exposures of microseconds it is 1: the drop stands still.
+/// Share of an exposure that a drop spends before one pixel: the bound above, in 0 to 1, the only range in which it
+/// can be a share. For exposures of microseconds it is 1: the drop stands still.
 pub fn beta(diameter_mm: f64, exposure_s: f64) -> f64 {
     beta_bound_as_printed(diameter_mm, exposure_s).clamp(0.0, 1.0)
 }

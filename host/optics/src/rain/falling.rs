@@ -1,8 +1,8 @@
-//! Single drops in the LEDs' beams. In the paper's heavy rain there is half a drop between camera and target at a metre:
-//! most frames see none, a few see one well. A mean over many drops would show none of this.
+//! Single drops in the LEDs' beams. In the paper's heavy rain there is half a drop between camera and target at a
+//! metre: most frames see none, a few see one well. A mean over many drops would show none of this.
 //!
-//! A drop is an opaque disc here. It refracts or reflects what hits it by far more than a spot's width (the other half of
-//! Q_ext = 2 is diffraction, by a quarter of a milliradian for a 2 mm drop, and stays within the spot). The
+//! A drop is an opaque disc here. It refracts or reflects what hits it by far more than a spot's width (the other
+//! half of Q_ext = 2 is diffraction, by a quarter of a milliradian for a 2 mm drop, and stays within the spot). The
 //! light that it sends elsewhere on the target is in [`super::blur`].
 //!
 //! Law: the drops are a stationary Poisson process. Where and when one enters is random with the seed; where it is

@@ -87,8 +87,8 @@ fn size_parameter(diameter_mm: f64, wavelength_nm: f64) -> f64 {
     PI * diameter_mm * 1e6 / wavelength_nm
 }
 
-/// The classes that stand for all where each costs much: no more than some 20, evenly picked from those that carry more
-/// than a thousandth of the largest class's area.
+/// The classes that stand for all where each costs much: no more than some 20, evenly picked from those that carry
+/// more than a thousandth of the largest class's area.
 fn representative(drops: &Drops) -> impl Iterator<Item = &DropClass> {
     let area = |class: &DropClass| class.per_m3 * class.diameter_mm.powi(2);
     let most = drops.classes().iter().map(area).fold(0.0, f64::max);

@@ -39,7 +39,8 @@ impl RainySpots {
             .classes()
             .iter()
             .any(|class| class.diameter_mm >= SMALLEST_RAINDROP_MM && class.per_m3 > 0.0);
-        // Followed drops take their shadow; their diffraction, as much again, stays in the spot and is not taken at all.
+        // Followed drops take their shadow; their diffraction, as much again, stays in the spot and is not taken at
+        // all.
         let shadow = if rains { (-drops.shadow_per_m() * distance_mm * 1e-3).exp() } else { 1.0 };
         let (kernel, kept) = if rains {
             (kernel.without_own(1.0 - shadow), returned / shadow)

@@ -1,8 +1,8 @@
 //! The veil: light that reaches the detector without having seen the target.
 //!
 //! Two sources, both uniform over the image: drops in the LEDs' own beams scatter some of it straight back, and drops
-//! in daylight glow. In a differential measurement the first adds a constant to every pixel, the second nothing but its
-//! shot noise.
+//! in daylight glow. In a differential measurement the first adds a constant to every pixel, the second nothing but
+//! its shot noise.
 
 use super::{Medium, RainError, ensure};
 use crate::Projector;
@@ -25,9 +25,9 @@ impl Veil {
     /// The veil before a target at `distance_mm`, the detector `baseline_mm` beside the projector, both aimed at the
     /// target's centre.
     ///
-    /// The lidar equation: a slab dz at z returns `beta(pi) / z^2 dz` of the beam where a white (Lambertian) target returns
-    /// `1 / (pi L^2)`. Near the camera the detector does not see the beam: the squares that they cover, as wide as the
-    /// field at z, are `baseline (1 - z / L)` apart.
+    /// The lidar equation: a slab dz at z returns `beta(pi) / z^2 dz` of the beam where a white (Lambertian) target
+    /// returns `1 / (pi L^2)`. Near the camera the detector does not see the beam: the squares that they cover, as
+    /// wide as the field at z, are `baseline (1 - z / L)` apart.
     ///
     /// # Errors
     /// [`RainError::Setting`] for lengths that are not positive.

@@ -36,8 +36,8 @@ impl Weather {
         &self.medium
     }
 
-    /// The same weather with another extinction, scattering and absorption in proportion: for asking what would have to
-    /// be assumed.
+    /// The same weather with another extinction, scattering and absorption in proportion: for asking what would have
+    /// to be assumed.
     #[must_use]
     pub fn with_extinction(mut self, extinction_per_m: f64) -> Self {
         if self.medium.extinction_per_m > 0.0 {

@@ -1,0 +1,102 @@
+//! `nirspi rain`, `range` and `eval`: what they print, and how they refuse.
+
+use crate::bench::Bench;
+
+#[test]
+fn one_sphere_is_told_as_json() {
+    let bench = Bench::new();
+    let arguments = ["rain", "--mie", "--x", "100", "--m-re", "1.33", "--m-im", "1e-4", "--json"];
+    let report = bench.run(&arguments).succeeded().json();
+    // miepython 3.3.0: 2.1007189, 2.0589971, 0.8738868
+    for (name, expected) in [("qext", 2.100_718_9), ("qsca", 2.058_997_1), ("g", 0.873_886_8)] {
+        let found = report[name].as_f64().unwrap();
+        assert!((found - expected).abs() < 1e-6, "{name}: {report}");
+    }
+}
+
+#[test]
+fn rain_is_told_at_the_wavelengths_asked_for() {
+    let bench = Bench::new();
+    let report = bench.run(&["rain", "--drops", "mono:2", "--json"]).succeeded().json();
+    let wavelengths = report["wavelengths"].as_array().unwrap();
+    let nm: Vec<f64> = wavelengths.iter().map(|w| w["wavelength_nm"].as_f64().unwrap()).collect();
+    assert_eq!(nm, [550.0, 850.0, 1550.0]);
+    assert!(wavelengths.iter().all(|w| w["extinction_per_m"].as_f64().unwrap() > 3.5e-4));
+    let text = bench.run(&["rain", "--budget"]).succeeded().stdout;
+    for term in ["LED power", "dark current", "shot noise", "quantisation", "SNR, one pixel"] {
+        assert!(text.contains(term), "{term}: {text}");
+    }
+}
+
+#[test]
+fn uniformity_is_christiansens_of_the_last_column() {
+    let bench = Bench::new();
+    bench.write("volumes.csv", b"place,ml\n1,8\n2,12\n3,9\n4,11\n");
+    let report = bench.run(&["rain", "--uniformity", "volumes.csv", "--json"]).succeeded().json();
+    assert!((report["uniformity_percent"].as_f64().unwrap() - 85.0).abs() < 1e-9, "{report}");
+    bench.write("bad.csv", b"place,ml\n1,8\n2,wet\n");
+    bench.run(&["rain", "--uniformity", "bad.csv"]).failed(1, &["bad.csv", "line 3", "numbers"]);
+    bench.run(&["rain", "--uniformity", "none.csv"]).failed(1, &["none.csv"]);
+}
+
+#[test]
+fn rain_that_cannot_be_is_refused_with_its_range() {
+    let bench = Bench::new();
+    let mistakes: &[(&[&str], &[&str])] = &[
+        (&["--rate-mm-h", "-1"], &["rain rate is -1", "0 to 300 mm/h"]),
+        (&["--wavelengths-nm", "300"], &["300 nm", "400 to 2000 nm"]),
+        (&["--drops", "mono:20"], &["drop diameter is 20", "0.11 to 8 mm"]),
+        (&["--drops", "hail"], &["hail", "marshall-palmer"]),
+        (&["--distance-m", "0"], &["--distance-m is 0"]),
+        (&["--budget", "--reflectance", "2"], &["reflectance is 2", "at most 1"]),
+        (&["--rig", "--tilt-deg", "30"], &["tilt is 30", "0 to 15"]),
+        (
+            &["--mie", "--x", "1e6", "--m-re", "1.3"],
+            &["size parameter x is 1000000", "0.01 to 65000"],
+        ),
+        (&["--mie", "--x", "1"], &["--m-re"]),
+    ];
+    for (arguments, told) in mistakes {
+        bench.run(&[&["rain"], *arguments].concat()).failed(2, told);
+    }
+    bench.run(&["range", "--snr", "0"]).failed(2, &["--snr is 0"]);
+    bench.run(&["range", "--exposures-us", "-8"]).failed(2, &["exposure_us is -8", "more than 0"]);
+}
+
+#[test]
+fn ranges_stand_beside_the_papers_and_the_plot_is_written() {
+    let bench = Bench::new();
+    let report = bench.run(&["range", "--out", "range", "--json"]).succeeded().json();
+    let rows = report["rows"].as_array().unwrap();
+    assert_eq!(rows.len(), 4);
+    for row in rows {
+        let (wet, dry) = (row["physics_m"].as_f64().unwrap(), row["dry_air_m"].as_f64().unwrap());
+        assert!(wet < dry && wet > 0.99 * dry, "{row}");
+    }
+    assert_eq!(bench.json("range/range.json"), report);
+    assert!(bench.path("range/range.png").exists());
+}
+
+#[test]
+fn a_scene_in_rain_is_captured_and_its_seed_repeats_it() {
+    let bench = Bench::new();
+    for out in ["a", "b"] {
+        let arguments =
+            ["demo", "--rain", "heavy", "--distance-m", "0.6", "--frames", "20", "--out"];
+        bench.run(&[&arguments[..], &[out]].concat()).succeeded();
+    }
+    assert_eq!(bench.json("a/report.json")["rain"], "heavy");
+    assert_eq!(bench.pixels("a/raw.npy"), bench.pixels("b/raw.npy"));
+    bench.run(&["demo", "--rain", "snow"]).failed(2, &["snow", "none", "light", "heavy"]);
+}
+
+#[test]
+fn table_3_has_both_cameras_at_every_distance_with_intervals() {
+    let bench = Bench::new();
+    let arguments = ["eval", "table3", "--scenes", "2", "--frames", "20", "--out", "t", "--json"];
+    let report = bench.run(&arguments).succeeded().json();
+    assert_eq!(report["rows"].as_array().unwrap().len(), 8);
+    assert_eq!(report["simulated"], true);
+    assert!(report["rows"][0]["psnr_db"]["ci95"].as_f64().unwrap() >= 0.0);
+    assert!(bench.path("t/table3.png").exists() && bench.path("t/table3.json").exists());
+}
