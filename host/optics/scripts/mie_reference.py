@@ -9,8 +9,8 @@
 Agreement asked for: 1e-6 up to x = 12 000, with the exceptions in `tolerance`. Of what, is said in MEASURES:
 quantities that fall to nothing (absorption of clear water, backscatter, side lobes) are measured against what they are a
 part of, because both codes get them by subtraction.
-PyMieScatt 1.8.1.1 is not used: it does not import with SciPy 1.14 or later, and its own truncation leaves 1e-5 to 1e-3 in
-these numbers for x of 100 to 12 000.
+PyMieScatt 1.8.1.1 is not used: it does not import with SciPy 1.14 or later, and with that mended its own errors are 1e-5
+to 1e-3 in these numbers for x of 100 to 12 000.
 """
 
 import csv
@@ -80,7 +80,8 @@ CODES = {"miepython": by_miepython, "scattnlay": by_scattnlay}
 def write(path):
     with open(path, "w", newline="") as file:
         out = csv.writer(file, lineterminator="\n")
-        file.write(f"# miepython {miepython.__version__} and scattnlay 2.4, by host/optics/scripts/mie_reference.py --write\n")
+        file.write(f"# miepython {miepython.__version__} and scattnlay 2.4, by ")
+        file.write("host/optics/scripts/mie_reference.py --write\n")
         out.writerow(["code", "x", "n", "k", *NAMES])
         for m in TABLE_INDICES:
             for x in TABLE_SIZES:

@@ -190,7 +190,10 @@ mod tests {
 
     proptest! {
         #[test]
-        fn uniformity_does_not_depend_on_how_much_rain_fell(volumes in prop::collection::vec(0.01..10.0, 2..40), factor in 0.1..10.0) {
+        fn uniformity_does_not_depend_on_how_much_rain_fell(
+            volumes in prop::collection::vec(0.01..10.0, 2..40),
+            factor in 0.1..10.0,
+        ) {
             let scaled: Vec<f64> = volumes.iter().map(|v| v * factor).collect();
             let (a, b) = (uniformity_percent(&volumes).unwrap(), uniformity_percent(&scaled).unwrap());
             prop_assert!((a - b).abs() < 1e-9 && a <= 100.0 && a > -100.0);

@@ -97,7 +97,11 @@ fn spheres_that_were_not_checked_are_refused_by_name_and_range() {
 
 proptest! {
     #[test]
-    fn energy_is_neither_made_nor_lost(log_x in -2.0..4.08, real in 1.01..2.0, imaginary in prop_oneof![Just(0.0), 1e-9..1.0]) {
+    fn energy_is_neither_made_nor_lost(
+        log_x in -2.0..4.08,
+        real in 1.01..2.0,
+        imaginary in prop_oneof![Just(0.0), 1e-9..1.0],
+    ) {
         let q = efficiencies(10_f64.powf(log_x), real, imaginary);
         prop_assert!(q.scattering > 0.0 && q.absorption >= 0.0 && q.backscatter >= 0.0);
         prop_assert!((q.extinction - q.scattering - q.absorption).abs() <= 1e-12 * q.extinction);
@@ -106,11 +110,16 @@ proptest! {
     }
 
     #[test]
-    fn a_phase_function_has_a_mean_of_one_and_the_asymmetry_as_its_mean_cosine(log_x in -1.0..2.0, real in 1.05..1.8, imaginary in 0.0..0.2) {
+    fn a_phase_function_has_a_mean_of_one_and_the_asymmetry_as_its_mean_cosine(
+        log_x in -1.0..2.0,
+        real in 1.05..1.8,
+        imaginary in 0.0..0.2,
+    ) {
         // 3000 midpoints in the angle resolve lobes of width pi / x.
         let (mut mean, mut cosine) = (0.0, 0.0);
         let steps = 3000;
-        let angles: Vec<f64> = (0..steps).map(|i| (f64::from(i) + 0.5) / f64::from(steps) * std::f64::consts::PI).collect();
+        let angles: Vec<f64> =
+            (0..steps).map(|i| (f64::from(i) + 0.5) / f64::from(steps) * std::f64::consts::PI).collect();
         let cosines: Vec<f64> = angles.iter().map(|a| a.cos()).collect();
         let mut mie = Mie::new();
         let sphere = mie.sphere(10_f64.powf(log_x), Index { real, imaginary }).unwrap();

@@ -25,8 +25,8 @@ pub struct SceneArgs {
     /// Distance from the virtual camera to the target, in metres
     #[arg(long, value_name = "M", default_value_t = 0.3, allow_negative_numbers = true)]
     pub distance_m: f64,
-    /// What falls between the virtual camera and the target, as in the paper's Table 2: light is 1.93 mm/h of 0.5 mm drops,
-    /// heavy 5.6 mm/h of 2 mm drops
+    /// What falls between the virtual camera and the target, as in the paper's Table 2: light is 1.93 mm/h of 0.5 mm
+    /// drops, heavy 5.6 mm/h of 2 mm drops
     #[arg(long, value_enum, default_value_t = Rain::None)]
     pub rain: Rain,
     /// Seed of the simulated noise: the same seed gives the same bytes

@@ -29,7 +29,8 @@ pub struct Args {
     #[command(flatten)]
     drops: DropArgs,
     /// Wavelengths, in nm
-    #[arg(long, value_name = "NM,...", value_delimiter = ',', default_values_t = [550.0, 850.0, 1550.0], allow_negative_numbers = true)]
+    #[arg(long, value_name = "NM,...", value_delimiter = ',', default_values_t = [550.0, 850.0, 1550.0],
+          allow_negative_numbers = true)]
     wavelengths_nm: Vec<f64>,
     /// Length of the path that a share of light is given for (there and back), or distance of the target, in metres
     #[arg(long, value_name = "M", default_value_t = 1.0, allow_negative_numbers = true)]
@@ -393,7 +394,8 @@ fn say(report: &RainReport) -> Result<()> {
     print::line(format_args!("lost: over {} m and back. {}", report.path_m, report.note))?;
     if let Some(fall) = &report.fall {
         print::line(format_args!(
-            "a drop of {} mm falls at {:.2} m/s, twice its diameter in {:.3} ms; beta is {:.2} for 25 us, {:.4} for 20 ms",
+            "a drop of {} mm falls at {:.2} m/s, twice its diameter in {:.3} ms; \
+             beta is {:.2} for 25 us, {:.4} for 20 ms",
             fall.diameter_mm,
             fall.speed_m_per_s,
             fall.time_constant_ms,

@@ -31,7 +31,8 @@ pub struct Args {
     #[arg(long, value_name = "0..1", default_value_t = 1.0, allow_negative_numbers = true)]
     reflectance: f64,
     /// Exposures of a pattern, in us
-    #[arg(long, value_name = "US,...", value_delimiter = ',', default_values_t = [8.0, 25.0], allow_negative_numbers = true)]
+    #[arg(long, value_name = "US,...", value_delimiter = ',', default_values_t = [8.0, 25.0],
+          allow_negative_numbers = true)]
     exposures_us: Vec<f64>,
     /// Folder for range.png and range.json
     #[arg(long, value_name = "DIR")]
@@ -146,11 +147,24 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 fn assumptions(instrument: &Instrument) -> Vec<String> {
     let b = &instrument.budget;
     vec![
-        format!("{} mW of light an LED, half angle {} degrees, of which a lens of {} mm takes what it can", b.led_power_mw, b.led_half_angle_deg, instrument.projector.aperture_mm),
-        format!("detector of {} mm (FGA015), numerical aperture {}, efficiency {}", b.detector_diameter_mm, b.detector_na, b.quantum_efficiency),
-        format!("{:.0} electrons rms of amplifier noise a sample, {} klx of daylight behind a {} nm filter", instrument.chain.amplifier_noise_electrons, b.ambient_klx, b.filter_width_nm),
+        format!(
+            "{} mW of light an LED, half angle {} degrees, of which a lens of {} mm takes what it can",
+            b.led_power_mw, b.led_half_angle_deg, instrument.projector.aperture_mm
+        ),
+        format!(
+            "detector of {} mm (FGA015), numerical aperture {}, efficiency {}",
+            b.detector_diameter_mm, b.detector_na, b.quantum_efficiency
+        ),
+        format!(
+            "{:.0} electrons rms of amplifier noise a sample, {} klx of daylight behind a {} nm filter",
+            instrument.chain.amplifier_noise_electrons, b.ambient_klx, b.filter_width_nm
+        ),
         "an exposure is the time that one pattern's light is summed; 1024 patterns and their complements".to_owned(),
-        format!("as printed: Z_max of {} m (paper, 2.A), so that its answer is a multiple of {} m", Z_MAX_MM * 1e-3, Z_MAX_MM * 1e-4),
+        format!(
+            "as printed: Z_max of {} m (paper, 2.A), so that its answer is a multiple of {} m",
+            Z_MAX_MM * 1e-3,
+            Z_MAX_MM * 1e-4
+        ),
         "drops of one size, 0.5 mm light and 2 mm heavy, as the paper's Table 2".to_owned(),
     ]
 }
@@ -180,7 +194,8 @@ fn reading(
     }
     if let Some(mm) = farthest_mm(instrument, heavy, &agreed(8.0))? {
         lines.push(format!(
-            "the same SNR at 8 us: {:.2} m; the paper's 2 and 1.5 m differ as its two exposures do ((25/8)^(1/4) = 1.33), whatever falls",
+            "the same SNR at 8 us: {:.2} m; the paper's 2 and 1.5 m differ as its two exposures do \
+             ((25/8)^(1/4) = 1.33), whatever falls",
             mm * 1e-3
         ));
     }
@@ -188,15 +203,18 @@ fn reading(
         let factor = needed / heavy.medium().extinction_per_m;
         let at_least = if needed * 1.5 > 0.99 * DEEPEST_OPTICAL_DEPTH { "at least " } else { "" };
         lines.push(format!(
-            "for rain to bring 2 m down to 1.5 m its extinction would have to be {at_least}{needed:.2} per metre, {at_least}{factor:.0} times what 5.6 mm/h has"
+            "for rain to bring 2 m down to 1.5 m its extinction would have to be {at_least}{needed:.2} \
+             per metre, {at_least}{factor:.0} times what 5.6 mm/h has"
         ));
     }
     lines.push(format!(
-        "light rain takes out {:.1} times more than heavy rain: the same water in drops of a quarter of the size has four times the shadow",
+        "light rain takes out {:.1} times more than heavy rain: the same water in drops of a quarter \
+         of the size has four times the shadow",
         light.medium().extinction_per_m / heavy.medium().extinction_per_m
     ));
     lines.push(
-        "the paper's lower limits (0.1 and 0.2 m) follow from no term here; Algorithm 2's first step, Z_max / 10, is that long for a Z_max of 1 and 2 m"
+        "the paper's lower limits (0.1 and 0.2 m) follow from no term here; Algorithm 2's first step, \
+         Z_max / 10, is that long for a Z_max of 1 and 2 m"
             .to_owned(),
     );
     Ok(lines)
