@@ -3,6 +3,7 @@
 use crate::cli::camera::Rain;
 use anyhow::{Result, bail};
 use indicatif::{ProgressBar, ProgressStyle};
+use nirspi::calibrate::CalibrationError;
 use nirspi::capture::{Calibration, CaptureOptions, Ended, Progress, capture};
 use nirspi::session::Session;
 use nirspi::setup::MeasurementSetup;
@@ -57,20 +58,31 @@ pub fn shoot(scene: Scene, conditions: Conditions, seed: u64) -> Result<Shots> {
         optics = optics.in_rain(drops)?;
     }
     let truth = optics.focused_footprint()?.weights().to_vec();
+    let nir_spi = expose(&optics, conditions.frames, seed)?;
+    Ok(Shots { truth, nir_spi, vis: Image::new(Side::INSTRUMENT, visible) })
+}
+
+/// One capture by the whole virtual camera, reconstructed.
+fn expose(optics: &VirtualOptics, frames: u32, seed: u64) -> Result<Image> {
     let mut session = Session::open(Box::new(MemoryLink::new(optics.camera(seed)?)))?;
     let options = CaptureOptions {
         setup: MeasurementSetup::new(&Order::Natural, 1.0)?,
-        frames: Some(conditions.frames),
+        frames: Some(frames),
         calibration: Calibration::Measure,
         record: None,
     };
     let mut watch = |_: &Progress| ControlFlow::Continue(());
     let captured = capture(&mut session, &options, &mut watch)?;
-    if let Ended::Fault(fault) = &captured.ended {
-        bail!("the virtual camera switched its LEDs off: {fault:?}");
+    match &captured.ended {
+        Ended::Complete => {}
+        Ended::Fault(fault) => bail!("the virtual camera switched its LEDs off: {fault:?}"),
+        other => bail!("the capture did not end by itself: {other:?}"),
+    }
+    // Too little light for a calibration is part of the picture; an answer that came too late is not.
+    if let Some(problem @ CalibrationError::Incomplete { .. }) = &captured.calibration_problem {
+        bail!("not calibrated: {problem}");
     }
     let measurements =
         captured.integrated.measurements(&captured.setup, captured.settling.as_ref(), false)?;
-    let vis = Image::new(Side::INSTRUMENT, visible);
-    Ok(Shots { truth, nir_spi: reconstruct::hadamard(&measurements), vis })
+    Ok(reconstruct::hadamard(&measurements))
 }

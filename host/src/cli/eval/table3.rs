@@ -158,27 +158,21 @@ fn rows(measured: &[Measured]) -> Vec<Row> {
         for distance_m in distances.clone() {
             let those = measured.iter().filter(|m| distance_m.is_none_or(|d| d == m.distance_m));
             let those: Vec<&Measured> = those.collect();
-            let estimate = |wet: bool, of: fn(&Quality) -> f64| {
-                let values: Vec<f64> = those
-                    .iter()
-                    .map(|m| if wet { &m.wet } else { &m.dry })
-                    .map(|pair| of(if image == "VIS" { &pair.vis } else { &pair.spi }))
-                    .collect();
-                Estimate::of(&values)
+            let estimate = |of: &dyn Fn(&Measured) -> f64| {
+                Estimate::of(&those.iter().map(|m| of(m)).collect::<Vec<f64>>())
             };
-            let (psnr, ssim): (fn(&Quality) -> f64, fn(&Quality) -> f64) =
-                (|q| q.psnr_db, |q| q.ssim);
-            if let (Some(psnr_db), Some(ssim_wet), Some(dry_psnr_db), Some(dry_ssim)) = (
-                estimate(true, psnr),
-                estimate(true, ssim),
-                estimate(false, psnr),
-                estimate(false, ssim),
+            let camera = |pair: &Pair| if image == "VIS" { pair.vis } else { pair.spi };
+            if let (Some(psnr_db), Some(ssim), Some(dry_psnr_db), Some(dry_ssim)) = (
+                estimate(&|m| camera(&m.wet).psnr_db),
+                estimate(&|m| camera(&m.wet).ssim),
+                estimate(&|m| camera(&m.dry).psnr_db),
+                estimate(&|m| camera(&m.dry).ssim),
             ) {
                 rows.push(Row {
                     image,
                     distance_m,
                     psnr_db,
-                    ssim: ssim_wet,
+                    ssim,
                     dry_psnr_db,
                     dry_ssim,
                     paper_psnr_db,
