@@ -47,6 +47,15 @@ pub enum Rain {
 }
 
 impl Rain {
+    /// As it is written on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Light => "light",
+            Self::Heavy => "heavy",
+        }
+    }
+
     /// Its drops; none in dry air.
     pub fn drops(self) -> Result<Option<Drops>, RainError> {
         match self {

@@ -11,6 +11,7 @@ use nirspi::files::output::OutputDir;
 use nirspi::picture::{Panel, Range, SideBySide};
 use nirspi::scene::SceneSource;
 use nirspi_optics::{Projector, Scene};
+use nirspi_recon::Image;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -72,6 +73,8 @@ struct Row {
     /// The same scenes and noise without rain.
     dry_psnr_db: Estimate,
     dry_ssim: Estimate,
+    /// Of a picture with nothing on it: the least that a camera can get.
+    blank_psnr_db: Estimate,
     paper_psnr_db: f64,
     paper_ssim: f64,
     /// Needs the user's Inception weights.
@@ -82,6 +85,7 @@ struct Measured {
     distance_m: f64,
     wet: Pair,
     dry: Pair,
+    blank: Quality,
 }
 
 /// One scene as both cameras saw it.
@@ -106,10 +110,13 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let measured: Vec<Measured> = jobs
         .par_iter()
         .map(|&(distance_m, i)| {
-            let wet = Pair::of(&take(args, args.rain, distance_m, i)?)?;
+            let shots = take(args, args.rain, distance_m, i)?;
+            let blank = Image::new(shots.nir_spi.side(), vec![0.0; shots.truth.len()]);
+            let blank = compare(&blank, &shots.truth)?.quality;
+            let wet = Pair::of(&shots)?;
             let dry = Pair::of(&take(args, Rain::None, distance_m, i)?)?;
             bar.inc(1);
-            Ok(Measured { distance_m, wet, dry })
+            Ok(Measured { distance_m, wet, dry, blank })
         })
         .collect::<Result<_>>()?;
     bar.finish_and_clear();
@@ -162,11 +169,18 @@ fn rows(measured: &[Measured]) -> Vec<Row> {
                 Estimate::of(&those.iter().map(|m| of(m)).collect::<Vec<f64>>())
             };
             let camera = |pair: &Pair| if image == "VIS" { pair.vis } else { pair.spi };
-            if let (Some(psnr_db), Some(ssim), Some(dry_psnr_db), Some(dry_ssim)) = (
+            if let (
+                Some(psnr_db),
+                Some(ssim),
+                Some(dry_psnr_db),
+                Some(dry_ssim),
+                Some(blank_psnr_db),
+            ) = (
                 estimate(&|m| camera(&m.wet).psnr_db),
                 estimate(&|m| camera(&m.wet).ssim),
                 estimate(&|m| camera(&m.dry).psnr_db),
                 estimate(&|m| camera(&m.dry).ssim),
+                estimate(&|m| m.blank.psnr_db),
             ) {
                 rows.push(Row {
                     image,
@@ -175,6 +189,7 @@ fn rows(measured: &[Measured]) -> Vec<Row> {
                     ssim,
                     dry_psnr_db,
                     dry_ssim,
+                    blank_psnr_db,
                     paper_psnr_db,
                     paper_ssim,
                     fid: None,
@@ -235,8 +250,11 @@ fn picture(args: &Args) -> Result<SideBySide> {
         }
     }
     Ok(SideBySide {
-        header: format!("One of {} scenes a distance, rain: {:?}, 15 klx", args.scenes, args.rain)
-            .to_lowercase(),
+        header: format!(
+            "One of {} scenes a distance, rain {}, 15 klx",
+            args.scenes,
+            args.rain.name()
+        ),
         panels,
         footer: "simulated: virtual camera; VIS is a model of a small industrial camera".to_owned(),
     })
@@ -244,20 +262,25 @@ fn picture(args: &Args) -> Result<SideBySide> {
 
 fn say(report: &Report) -> Result<()> {
     print::line(format_args!(
-        "Table 3, rain {:?}, {} scenes a distance, {} sweeps a picture (ours simulated; ± is 95 %)",
-        report.rain, report.scenes, report.frames
+        "Table 3, rain {}, {} scenes a distance, {} sweeps a picture (ours simulated; ± is 95 %)",
+        report.rain.name(),
+        report.scenes,
+        report.frames
     ))?;
-    print::line("image    distance   PSNR dB           SSIM               without rain     paper")?;
+    print::line(
+        "image    distance   PSNR dB           SSIM               without rain     blank     paper",
+    )?;
     for row in &report.rows {
         let distance = row.distance_m.map_or_else(|| "all".to_owned(), |m| format!("{m} m"));
         print::line(format_args!(
-            "{:<8} {:<9}  {:<16}  {:<17}  {:5.2} dB, {:.3}  {} dB, {}",
+            "{:<8} {:<9}  {:<16}  {:<17}  {:5.2} dB, {:.3}  {:5.2} dB  {} dB, {}",
             row.image,
             distance,
             row.psnr_db.text(2),
             row.ssim.text(3),
             row.dry_psnr_db.mean,
             row.dry_ssim.mean,
+            row.blank_psnr_db.mean,
             row.paper_psnr_db,
             row.paper_ssim
         ))?;

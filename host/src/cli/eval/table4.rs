@@ -257,20 +257,22 @@ fn chart(report: &Report) -> Chart {
         y: Axis {
             name: "contrast kept".to_owned(),
             from: 0.0,
-            to: 1.2,
+            // Room for the legend.
+            to: 1.5,
             logarithmic: false,
             ticks: vec![0.0, 0.1, 0.5, 1.0],
         },
         lines: lines.collect(),
-        footer: format!("simulated: rain {:?}, {} pictures a point", report.rain, BAR_PICTURES)
-            .to_lowercase(),
+        footer: format!("simulated: rain {}, {BAR_PICTURES} pictures a point", report.rain.name()),
     }
 }
 
 fn say(report: &Report) -> Result<()> {
     print::line(format_args!(
-        "Table 4, rain {:?}, {} edges a distance, {} sweeps a picture; line width in mm (ours simulated; ± is 95 %)",
-        report.rain, report.scenes, report.frames
+        "Table 4, rain {}, {} edges a distance, {} sweeps a picture; line width in mm (ours simulated; ± is 95 %)",
+        report.rain.name(),
+        report.scenes,
+        report.frames
     ))?;
     print::line(
         "image    distance  pixel  defocus  MTF50            MTF10            bars   paper",
