@@ -9,7 +9,7 @@ use crate::session::{Listener, Session, SessionError};
 use crate::setup::MeasurementSetup;
 use nirspi_recon::{Leak, LeakError};
 use nirspi_wire::register::RAW_SAMPLES_MAX;
-use nirspi_wire::{Command, DeviceMessage, PacketError, Raw};
+use nirspi_wire::{Command, DeviceMessage, PacketError, Raw, State};
 use serde::{Deserialize, Serialize};
 use std::time::{Duration, Instant};
 use thiserror::Error;
@@ -22,6 +22,8 @@ const MIN_STEP_TO_NOISE: f64 = 20.0;
 pub(crate) const ONSET: f64 = 0.05;
 /// The response has settled where the mean of this many samples is within its noise of 1.
 const SETTLED_SAMPLES: usize = 4;
+/// How often a camera whose burst has not come whole is asked whether it is still at it.
+const ASK_EVERY: Duration = Duration::from_millis(500);
 /// Bursts that are averaged: 2 ms of light bring the taps' noise to about a thousandth.
 pub const BURSTS: usize = 64;
 
@@ -99,6 +101,28 @@ impl Listener for BurstListener<'_> {
     }
 }
 
+impl BurstListener<'_> {
+    fn is_whole(&self) -> bool {
+        self.samples.iter().all(Option::is_some)
+    }
+
+    /// Until all samples are there, or the camera says that no more will come. What it has sent before it says so comes
+    /// before, so no patience of ours decides: a camera on a slow line or a busy machine is as good as any.
+    fn await_end(&mut self, session: &mut Session) -> Result<(), SessionError> {
+        let mut state = State::Running;
+        while !self.is_whole() && state == State::Running {
+            let asked = Instant::now();
+            while !self.is_whole() && asked.elapsed() < ASK_EVERY {
+                session.listen(Duration::from_millis(50), self)?;
+            }
+            if !self.is_whole() {
+                state = session.status(self)?.state;
+            }
+        }
+        Ok(())
+    }
+}
+
 /// Takes raw bursts and evaluates their mean. The camera must be idle or configured; it is left configured for the
 /// burst.
 ///
@@ -114,10 +138,7 @@ pub fn calibrate(
     for _ in 0..BURSTS {
         let mut burst = BurstListener { samples: vec![None; expected], inner: listener };
         session.command(Command::RawBurst { samples: RAW_SAMPLES_MAX }, &mut burst)?;
-        let deadline = Instant::now() + Duration::from_secs(2);
-        while burst.samples.iter().any(Option::is_none) && Instant::now() < deadline {
-            session.listen(Duration::from_millis(50), &mut burst)?;
-        }
+        burst.await_end(session)?;
         let before = samples.len();
         samples.extend(burst.samples.iter().flatten().map(|&s| f64::from(s)));
         let found = samples.len() - before;
