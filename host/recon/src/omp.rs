@@ -143,7 +143,8 @@ fn finite<T: Copy + Into<f64>>(field: &'static str, values: &[T]) -> Result<(), 
 impl Limits {
     fn check(&self) -> Result<(), OmpError> {
         for (limit, found) in [("residual", self.residual), ("noise", self.noise)] {
-            if !(found >= 0.0) {
+            let sound = found >= 0.0; // NaN is not
+            if !sound {
                 return Err(OmpError::Limit { limit, found });
             }
         }

@@ -9,12 +9,7 @@ use std::f32::consts::FRAC_1_SQRT_2;
 pub(super) const HAAR: &[f32] = &[FRAC_1_SQRT_2, FRAC_1_SQRT_2];
 
 /// Low-pass taps of the Daubechies wavelet of four taps, `(1 + s, 3 + s, 3 - s, 1 - s) / (4 sqrt 2)` with `s = sqrt 3`.
-pub(super) const DAUBECHIES_4: &[f32] = &[
-    0.482_962_913_144_534_1,
-    0.836_516_303_737_807_9,
-    0.224_143_868_042_013_4,
-    -0.129_409_522_551_260_4,
-];
+pub(super) const DAUBECHIES_4: &[f32] = &[0.482_962_9, 0.836_516_3, 0.224_143_87, -0.129_409_52];
 
 /// High-pass tap `i`: the low-pass taps backwards with alternating signs.
 fn high(taps: &[f32], i: usize) -> f32 {

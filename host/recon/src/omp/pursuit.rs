@@ -213,7 +213,9 @@ impl<'d, T: Scalar, D: Dictionary<T> + ?Sized> Solver<'d, T, D> {
         self.rows.of_atom(atom, 0, &mut self.weights);
         let own: f64 = self.dictionary.atoms().energies()[atom].into();
         let pivot = own - squares(&self.weights);
-        if !(pivot > T::DEPENDENT * own) {
+        // Not a number where the Gram matrix overflows.
+        let independent = pivot > T::DEPENDENT * own;
+        if !independent {
             return false;
         }
         let root = pivot.sqrt();
@@ -261,7 +263,7 @@ impl<'d, T: Scalar, D: Dictionary<T> + ?Sized> Solver<'d, T, D> {
     /// Chooses the best atom of the other panels to go along; returns its column.
     fn look_ahead(&mut self, atom: usize) -> Option<&'d [T]> {
         let (panel, score) = self.second;
-        if panel == atom / PANEL || !(score > T::default()) {
+        if panel == atom / PANEL || score <= T::default() {
             self.ahead = None;
             return None;
         }

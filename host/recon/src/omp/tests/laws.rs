@@ -34,7 +34,7 @@ proptest! {
     fn under_the_coherence_bound_recovery_is_exact(seed: u64, count in 1_usize..8) {
         // Spikes and Walsh functions: coherence 1 / sqrt(256), so up to 8 atoms of the 512.
         let mut random = Pcg64::seed_from_u64(seed);
-        let sign = |i: usize, j: usize| if (i & j).count_ones() % 2 == 0 { 1.0 } else { -1.0 };
+        let sign = |i: usize, j: usize| if (i & j).count_ones().is_multiple_of(2) { 1.0 } else { -1.0 };
         let dictionary = DMatrix::from_fn(256, 512, |m, k| match k.checked_sub(256) {
             None => f64::from(u8::from(m == k)),
             Some(k) => sign(m, k) / 16.0,

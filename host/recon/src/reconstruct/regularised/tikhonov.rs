@@ -59,7 +59,7 @@ fn conjugate_gradients(
         }
         let image = operate(&direction);
         let curvature = dot(&direction, &image);
-        if !(curvature > 0.0) {
+        if curvature <= 0.0 || curvature.is_nan() {
             break;
         }
         let step = (energy / curvature) as f32;
