@@ -10,6 +10,7 @@ use super::{Limits, OmpError, Solution, finite};
 use rayon::prelude::*;
 use std::fmt;
 use std::str::FromStr;
+use std::sync::{Mutex, PoisonError};
 use thiserror::Error;
 
 /// What computes.
@@ -107,22 +108,26 @@ fn on_all_cores<T: Scalar, D: Dictionary<T> + ?Sized>(
     }
     let width = padded(dictionary.atoms().count());
     let together = frames.div_ceil(rayon::current_num_threads()).clamp(1, TOGETHER);
-    // A solver's memory is a thread's, and stays warm from group to group.
+    // As many solvers as threads, each handed from group to group with its memory warm.
+    let idle = Mutex::new(Vec::new());
     let groups: Result<Vec<Vec<Path<T>>>, OmpError> = y
         .par_chunks(together * expected)
-        .map_init(
-            || (Solver::new(dictionary, limits), vec![T::default(); together * width]),
-            |(solver, p0), y| {
-                let solver = solver.as_mut().map_err(|error| error.clone())?;
-                let frames = y.chunks_exact(expected);
-                let p0 = &mut p0[..frames.len() * width];
-                dictionary.project_all(y, p0);
-                frames
-                    .zip(p0.chunks_exact(width))
-                    .map(|(y, p0)| solver.solve_projected(p0, energy(y)))
-                    .collect()
-            },
-        )
+        .map(|y| {
+            let waiting = idle.lock().unwrap_or_else(PoisonError::into_inner).pop();
+            let (mut solver, mut p0) = match waiting {
+                Some(solver) => solver,
+                None => (Solver::new(dictionary, limits)?, vec![T::default(); together * width]),
+            };
+            let frames = y.chunks_exact(expected);
+            let projections = &mut p0[..frames.len() * width];
+            dictionary.project_all(y, projections);
+            let paths = frames
+                .zip(projections.chunks_exact(width))
+                .map(|(y, p0)| solver.solve_projected(p0, energy(y)))
+                .collect();
+            idle.lock().unwrap_or_else(PoisonError::into_inner).push((solver, p0));
+            paths
+        })
         .collect();
     Ok(groups?.into_iter().flatten().collect())
 }

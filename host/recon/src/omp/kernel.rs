@@ -22,9 +22,9 @@ pub(super) struct Rows<T> {
 }
 
 impl<T: Scalar> Rows<T> {
-    /// None yet, of `panels * PANEL` atoms.
-    pub(super) fn new(panels: usize) -> Self {
-        Self { panels: vec![Vec::new(); panels], len: 0 }
+    /// None yet, of `panels * PANEL` atoms, with room for some.
+    pub(super) fn new(panels: usize, room: usize) -> Self {
+        Self { panels: (0..panels).map(|_| Vec::with_capacity(room)).collect(), len: 0 }
     }
 
     /// Forgets the rows, keeps their memory.

@@ -97,7 +97,7 @@ impl<'d, T: Scalar, D: Dictionary<T> + ?Sized> Solver<'d, T, D> {
             inverse_norms: Vec::with_capacity(width),
             best: vec![Best::default(); width / PANEL],
             second: (0, T::default()),
-            rows: Rows::new(width / PANEL),
+            rows: Rows::new(width / PANEL, limits.sparsity.min(ROOM)),
             ahead: None,
             ahead_column: vec![T::default(); width],
             ahead_weights: Vec::new(),
@@ -288,6 +288,9 @@ struct Ahead {
     atom: usize,
     rows: usize,
 }
+
+/// Rows that are made room for at once; more take their memory as they come.
+const ROOM: usize = 64;
 
 /// Squared norm of a measurement.
 pub(super) fn energy<T: Scalar>(y: &[T]) -> f64 {

@@ -25,7 +25,7 @@ proptest! {
 
 #[test]
 fn one_image_is_a_stack_of_one() {
-    let (_guard, path) = file("image.npy", &encode(&[2, 3], &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0]));
+    let (_guard, path) = file("image.npy", &encode(&[2, 3], &[0.0_f32, 1.0, 2.0, 3.0, 4.0, 5.0]));
     let stack = read_stack(&path).unwrap();
     assert_eq!((stack.count, stack.height, stack.width), (1, 2, 3));
     assert_eq!(stack.values, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
@@ -34,7 +34,7 @@ fn one_image_is_a_stack_of_one() {
 #[test]
 fn data_are_aligned_for_memory_mapping() {
     for shape in [vec![4], vec![1, 4], vec![1, 2, 2], vec![1; 40]] {
-        let values = vec![1.5; shape.iter().product()];
+        let values = vec![1.5_f32; shape.iter().product()];
         let bytes = encode(&shape, &values);
         assert_eq!((bytes.len() - 4 * values.len()) % 64, 0, "{shape:?}");
     }
@@ -75,7 +75,7 @@ fn each_kind_of_bad_file_gets_its_line() {
 
 #[test]
 fn a_file_cut_anywhere_is_an_error() {
-    let whole = encode(&[2, 3, 4], &[0.5; 24]);
+    let whole = encode(&[2, 3, 4], &[0.5_f32; 24]);
     for end in 0..whole.len() {
         refusal(&whole[..end]);
     }
