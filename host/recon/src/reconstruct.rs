@@ -19,9 +19,11 @@
 //!
 #![doc = include_str!("reconstruct/study.md")]
 
+mod own_atoms;
 mod regularised;
 mod selection;
 
+pub use own_atoms::omp_over;
 pub use regularised::{Penalty, Regularised, RegularisedSettings, Strength, regularised};
 
 use crate::basis::{Basis, Transform};
@@ -182,6 +184,14 @@ pub enum ReconstructError {
         found: f64,
         /// What would do.
         expected: &'static str,
+    },
+    /// Atoms of the user's own that are no images of the side that was measured.
+    #[error("atoms of {found} numbers, expected a multiple of the {area} pixels of an image")]
+    Atoms {
+        /// Numbers in all.
+        found: usize,
+        /// Pixels of an image.
+        area: usize,
     },
     /// The pursuit refused the problem.
     #[error(transparent)]

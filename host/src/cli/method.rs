@@ -1,8 +1,9 @@
 //! Arguments that say how to make an image from measurements, and what the report says of it.
 
 use super::Usage;
-use anyhow::Result;
+use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
+use nirspi::files::npy::read_stack;
 use nirspi_recon::omp::Stop;
 use nirspi_recon::reconstruct::{
     self, Completion, OmpSettings, Penalty, RegularisedSettings, Sparsity, Strength,
@@ -10,6 +11,7 @@ use nirspi_recon::reconstruct::{
 use nirspi_recon::{Basis, Image, Measurements};
 use serde::Serialize;
 use std::fmt;
+use std::path::PathBuf;
 use std::str::FromStr;
 
 /// How to invert.
@@ -60,6 +62,9 @@ pub struct MethodArgs {
     /// Basis in which the image is sparse: dct, haar, daubechies4, pixel
     #[arg(long, value_name = "BASIS", default_value = "dct")]
     pub basis: String,
+    /// OMP: images of your own (N, n, n) as atoms, instead of a basis
+    #[arg(long, value_name = "NPY", conflicts_with = "basis")]
+    pub dictionary: Option<PathBuf>,
     /// Atoms to choose; without it, the number that predicts held-back measurements best
     #[arg(long, value_name = "K")]
     pub sparsity: Option<usize>,
@@ -91,6 +96,9 @@ impl MethodArgs {
         }
         if self.sparsity == Some(0) {
             return Err(Usage("--sparsity is 0, expected at least 1".to_owned()).into());
+        }
+        if self.dictionary.is_some() && self.method != Method::Omp {
+            return Err(Usage("--dictionary belongs to --method omp".to_owned()).into());
         }
         if let Some(found) = self.strength {
             if !(found > 0.0 && found <= 1e6) {
@@ -219,9 +227,24 @@ pub fn solve(args: &MethodArgs, measurements: &Measurements) -> Result<Solved> {
     if args.stop_at_noise {
         settings.sparsity = Sparsity::Noise;
     }
-    let found = reconstruct::omp(measurements, &settings)?;
+    let found = match &args.dictionary {
+        None => reconstruct::omp(measurements, &settings)?,
+        Some(path) => {
+            let atoms = read_stack(path)?;
+            let (side, shape) = (measurements.side().pixels(), (atoms.height, atoms.width));
+            if shape != (side, side) {
+                bail!("{}: images of {shape:?}, expected {:?}", path.display(), (side, side));
+            }
+            reconstruct::omp_over(measurements, &atoms.values, &settings)
+                .with_context(|| path.display().to_string())?
+        }
+    };
+    let basis = match &args.dictionary {
+        None => settings.basis.to_string(),
+        Some(path) => path.display().to_string(),
+    };
     let omp = OmpReport {
-        basis: settings.basis.to_string(),
+        basis,
         sparsity: found.sparsity,
         keep,
         stop: match found.stop {

@@ -50,17 +50,29 @@ type Misses = Vec<[Miss; TRUST.len()]>;
 /// error over `folds` held-back parts: absolute and squared error together, each relative to zero filling's. Squares
 /// alone would let the few large coefficients decide, absolute values alone the many small ones.
 pub(super) fn choose(problem: &Problem, most: usize, folds: usize) -> Result<Choice, OmpError> {
-    let count = problem.rows.len();
-    let largest = most.min(count / 4).max(1);
-    let sparsities = geometric(largest);
-    let found = choose_among(problem, sparsities.len(), folds, |kept| {
+    choose_sparsity(problem, most, folds, |kept, sparsities| {
+        let largest = sparsities.iter().copied().max().unwrap_or(0);
         let (path, dictionary) = problem.pursue(kept, largest)?;
         let predict = |&atoms: &usize| {
             let chosen = &path.support[..atoms.min(path.support.len())];
             dictionary.predict(chosen, &path.coefficients(atoms))
         };
         Ok(sparsities.iter().map(predict).collect())
-    })?;
+    })
+}
+
+/// [`choose`] for any dictionary: `predict` makes the prediction of each number of atoms, from the measurements at some
+/// positions.
+pub(super) fn choose_sparsity(
+    problem: &Problem<'_>,
+    most: usize,
+    folds: usize,
+    predict: impl Fn(&[usize], &[usize]) -> Result<Vec<Vec<f32>>, OmpError> + Sync,
+) -> Result<Choice, OmpError> {
+    let count = problem.rows.len();
+    let largest = most.min(count / 4).max(1);
+    let sparsities = geometric(largest);
+    let found = choose_among(problem, sparsities.len(), folds, |kept| predict(kept, &sparsities))?;
     Ok(match found {
         None => Choice { atoms: largest, trust: 0.0 },
         Some((at, trust)) => Choice { atoms: sparsities[at], trust },

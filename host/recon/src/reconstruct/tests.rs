@@ -118,6 +118,41 @@ fn a_sparse_image_is_recovered_from_a_random_half() {
 }
 
 #[test]
+fn atoms_of_ones_own_stand_for_a_basis_and_do_better_where_they_fit() {
+    let side = side(16);
+    // Bars of all lengths and places: the scene is two of them.
+    let bar = |r: usize, c: usize, height: usize, width: usize| -> Vec<f32> {
+        let inside =
+            |p: usize| (r..r + height).contains(&(p / 16)) && (c..c + width).contains(&(p % 16));
+        (0..256).map(|p| f32::from(u8::from(inside(p)))).collect()
+    };
+    let mut atoms = vec![1.0; 256];
+    for (r, c) in (0..12).flat_map(|r| (0..12).map(move |c| (r, c))) {
+        atoms.extend(bar(r, c, 2, 5));
+        atoms.extend(bar(r, c, 5, 2));
+    }
+    let scene: Vec<f64> =
+        bar(3, 4, 2, 5).iter().zip(bar(7, 2, 5, 2)).map(|(a, b)| f64::from(a + 2.0 * b)).collect();
+    let all = measured(side, &scene);
+    let full = hadamard(&all);
+    let part = all.take(Some(&Order::Random(3)), 0.3).unwrap();
+    let settings = OmpSettings::default();
+    let own = omp_over(&part, &atoms, &settings).unwrap();
+    let cosines = correlation_of(&omp(&part, &settings).unwrap().image, &full);
+    let found = correlation_of(&own.image, &full);
+    assert!(found > 0.99 && found > cosines + 0.1, "{found}, cosines {cosines}");
+    assert!(own.trust > 0.5 && own.sparsity < 20, "{own:?}");
+
+    let sparse = OmpSettings::as_printed(Basis::Pixel, 2);
+    let exact = omp_over(&part, &atoms, &sparse).unwrap();
+    for (a, b) in exact.image.pixels().iter().zip(full.pixels()) {
+        assert!((a - b).abs() < 1e-3);
+    }
+    let refused = omp_over(&part, &atoms[1..], &settings).unwrap_err().to_string();
+    assert!(refused.contains("multiple of the 256 pixels"), "{refused}");
+}
+
+#[test]
 fn units_do_not_matter() {
     let image = scene(side(16), 1);
     let volts = measured(side(16), &image).take(Some(&Order::CakeCutting), 0.3).unwrap();

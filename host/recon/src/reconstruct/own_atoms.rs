@@ -1,0 +1,128 @@
+//! OMP over a dictionary of the user's own: any images, any number of them.
+//!
+//! The one law: nothing is known of the atoms but what they look like, so all are expected alike; the noise is the only
+//! prior. Everything else is [`omp()`](super::omp)'s.
+
+use super::{OmpReconstruction, OmpSettings, Problem, ReconstructError, Sparsity, image_of};
+use super::{check_prior, selection};
+use crate::basis::Basis;
+use crate::omp::{DenseDictionary, Limits, OmpError, Path, Solver};
+use crate::{Measurements, fwht};
+use nalgebra::DMatrix;
+
+/// [`omp()`](super::omp) with `atoms` of the user's own instead of a basis: row-major images of the measurements' side, one
+/// after another, of any norms. The settings' basis and falloff have no say.
+///
+/// # Errors
+/// [`ReconstructError`] if a setting is out of range, or `atoms` are not whole images of finite numbers.
+pub fn omp_over(
+    measurements: &Measurements,
+    atoms: &[f32],
+    settings: &OmpSettings,
+) -> Result<OmpReconstruction, ReconstructError> {
+    check_prior(settings.falloff, settings.noise)?;
+    let area = measurements.side().area();
+    if atoms.is_empty() || !atoms.len().is_multiple_of(area) {
+        return Err(ReconstructError::Atoms { found: atoms.len(), area });
+    }
+    if let Some(index) = atoms.iter().position(|v| !v.is_finite()) {
+        let found = atoms[index].into();
+        return Err(OmpError::NotFinite { field: "dictionary", index, found }.into());
+    }
+    let mut problem = Problem::of(measurements, Basis::Pixel, 0.0, settings.noise);
+    problem.residual = settings.residual;
+    problem.to_noise = settings.sparsity == Sparsity::Noise;
+    let shown = Shown::new(&problem, atoms);
+    let choice = match settings.sparsity {
+        Sparsity::Fixed(atoms) => selection::Choice { atoms, trust: 1.0 },
+        Sparsity::Noise => selection::Choice { atoms: problem.rows.len(), trust: 1.0 },
+        Sparsity::CrossValidated { most, folds } => {
+            selection::choose_sparsity(&problem, most, folds, |kept, sparsities| {
+                let path = shown.pursue(&problem, kept, sparsities.iter().copied().max())?;
+                Ok(sparsities.iter().map(|&atoms| shown.predict(&path, atoms)).collect())
+            })?
+        }
+    };
+    let every: Vec<usize> = (0..problem.rows.len()).collect();
+    let path = shown.pursue(&problem, &every, Some(choice.atoms))?;
+    let predicted = shown.predict(&path, choice.atoms);
+    let residual = problem.residual_of(&predicted);
+    Ok(OmpReconstruction {
+        image: image_of(&problem, predicted, settings.completion, choice.trust),
+        sparsity: path.support.len(),
+        stop: path.stop,
+        residual,
+        unseen_atoms: path.unseen.len(),
+        trust: choice.trust.into(),
+        noise: problem.noise_in_units(),
+    })
+}
+
+/// The atoms, of unit norm, by every row: `rows x atoms`.
+struct Shown {
+    rows: DMatrix<f32>,
+    /// Expected size of a coefficient.
+    scale: f32,
+}
+
+impl Shown {
+    fn new(problem: &Problem<'_>, atoms: &[f32]) -> Self {
+        let area = problem.side.area();
+        let mut rows = DMatrix::from_column_slice(area, atoms.len() / area, atoms);
+        for mut atom in rows.column_iter_mut() {
+            // An atom of nothing stays that, and is never seen.
+            let norm = atom.norm();
+            if norm > 0.0 {
+                atom /= norm * problem.side.pixels() as f32;
+            }
+            let mut values = atom.as_slice().to_vec();
+            fwht::transform(&mut values);
+            atom.copy_from_slice(&values);
+        }
+        // As in `prior_scale`: as much energy as was measured is expected to be.
+        let mean = |row: u32| row != 0;
+        let energy = problem.rows.iter().zip(&problem.values).filter(|(row, _)| mean(**row));
+        let energy: f32 = energy.map(|(_, v)| v * v).sum();
+        let seen = problem.rows.iter().filter(|row| mean(**row));
+        let seen: f32 = seen.map(|&row| rows.row(row as usize).norm_squared()).sum();
+        let scale = if energy > 0.0 && seen > 0.0 { (energy / seen).sqrt() } else { 1.0 };
+        Self { rows, scale }
+    }
+
+    /// Chooses atoms for the measurements at some positions. A row of noise for each atom is the prior, as
+    /// [`crate::omp::sampled`] has it.
+    fn pursue(
+        &self,
+        problem: &Problem<'_>,
+        positions: &[usize],
+        most: Option<usize>,
+    ) -> Result<Path<f32>, OmpError> {
+        let (measured, atoms) = (positions.len(), self.rows.ncols());
+        let ridge = problem.prior.noise / self.scale;
+        let matrix =
+            DMatrix::from_fn(measured + atoms, atoms, |m, k| match m.checked_sub(measured) {
+                None => self.rows[(problem.rows[positions[m]] as usize, k)],
+                Some(other) if other == k => ridge,
+                Some(_) => 0.0,
+            });
+        let mut y: Vec<f32> = positions.iter().map(|&k| problem.values[k]).collect();
+        y.resize(measured + atoms, 0.0);
+        // The rows of the prior measure nothing, and are no noise.
+        let share = (measured as f64 / (measured + atoms) as f64).sqrt();
+        let noise = if problem.to_noise { f64::from(problem.prior.noise) * share } else { 0.0 };
+        let sparsity = most.unwrap_or(0);
+        let limits = Limits { sparsity, residual: problem.residual, noise };
+        Solver::new(&DenseDictionary::new(&matrix), &limits)?.solve(&y)
+    }
+
+    /// Every row, as the first `atoms` of a path predict it.
+    fn predict(&self, path: &Path<f32>, atoms: usize) -> Vec<f32> {
+        let mut predicted = vec![0.0; self.rows.nrows()];
+        for (&atom, x) in path.support.iter().zip(path.coefficients(atoms)) {
+            for (predicted, row) in predicted.iter_mut().zip(self.rows.column(atom).iter()) {
+                *predicted += x as f32 * row;
+            }
+        }
+        predicted
+    }
+}
