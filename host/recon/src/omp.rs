@@ -22,7 +22,8 @@
 //!   the largest correlation with the residual cannot be in that span, unless all that is left is rounding:
 //!   the search ends there ([`Stop::Dependent`]). What is rounding depends on the number type: under 1e-5 of an atom's norm
 //!   squared in `f32`, 1e-10 in `f64`.
-//! - Equal correlations: the lower atom is chosen.
+//! - Equal correlations: the lower atom is chosen. Of atoms that point the same way to rounding (random Hadamard rows see some
+//!   cosines alike) the lower stands for all.
 
 mod batch;
 mod dense;

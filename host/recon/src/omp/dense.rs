@@ -7,6 +7,7 @@ use super::panels::Panels;
 use super::scalar::Scalar;
 use nalgebra::DMatrix;
 use pulp::Arch;
+use rayon::prelude::*;
 
 /// A `measurements x atoms` matrix of any column norms, ready for any number of measurements.
 #[derive(Debug, Clone)]
@@ -56,8 +57,36 @@ impl<T: Scalar> DenseDictionary<T> {
                 None => matrix.column(atom).iter().fold(T::default(), |sum, &v| sum + v * v),
             })
             .collect();
-        Self { panels, atoms: Atoms::new(energies), gram, width, arch }
+        let atoms = Atoms::new(energies);
+        let doubles = doubles(&atoms, &gram, width);
+        Self { panels, atoms: atoms.with_doubles(doubles), gram, width, arch }
     }
+
+    /// Takes pairs of atoms for different after all.
+    pub(super) fn with_doubles(mut self, doubles: Vec<(usize, usize)>) -> Self {
+        self.atoms = self.atoms.with_doubles(doubles);
+        self
+    }
+}
+
+/// Pairs of atoms, the lower first, of which one leaves nothing but rounding of the other.
+fn doubles<T: Scalar>(atoms: &Atoms<T>, gram: &[T], width: usize) -> Vec<(usize, usize)> {
+    let energies = atoms.energies();
+    let seen = |k: usize| !atoms.unseen().contains(&k);
+    let like = T::from_f64(1.0 - T::DEPENDENT);
+    gram.par_chunks_exact(width)
+        .take(energies.len())
+        .enumerate()
+        .flat_map_iter(|(i, row)| {
+            let least = like * energies[i];
+            let same = move |&j: &usize| row[j] * row[j] >= least * energies[j];
+            (i + 1..energies.len())
+                .filter(same)
+                .filter(|&j| seen(i) && seen(j))
+                .map(move |j| (i, j))
+                .collect::<Vec<_>>()
+        })
+        .collect()
 }
 
 impl<T: Scalar> Dictionary<T> for DenseDictionary<T> {

@@ -14,9 +14,11 @@ pub(super) const UNSEEN: f64 = 1e-9;
 #[derive(Debug, Clone)]
 pub struct Atoms<T> {
     energies: Vec<T>,
-    /// Padded to whole panels with zeros, which are never chosen.
+    /// Padded to whole panels; zeros are never chosen.
     inverse_norms: Vec<T>,
     unseen: Vec<usize>,
+    doubles: Vec<(usize, usize)>,
+    normalised: bool,
 }
 
 impl<T: Scalar> Atoms<T> {
@@ -24,20 +26,45 @@ impl<T: Scalar> Atoms<T> {
     #[must_use]
     pub fn new(energies: Vec<T>) -> Self {
         let strongest = energies.iter().fold(0.0, |most, &e| f64::max(most, e.into()));
-        let visible = |e: T| e.into() > UNSEEN * strongest;
-        let unseen = (0..energies.len()).filter(|&k| !visible(energies[k])).collect();
-        let inverse =
-            |&e: &T| if visible(e) { T::from_f64(e.into().sqrt().recip()) } else { T::default() };
-        let mut inverse_norms: Vec<T> = energies.iter().map(inverse).collect();
-        inverse_norms.resize(padded(energies.len()), T::default());
-        Self { energies, inverse_norms, unseen }
+        let hidden = |&k: &usize| energies[k].into() <= UNSEEN * strongest;
+        let unseen = (0..energies.len()).filter(hidden).collect();
+        let (inverse_norms, doubles) = (Vec::new(), Vec::new());
+        Self { energies, inverse_norms, unseen, doubles, normalised: true }.weighed()
     }
 
     /// The same atoms, chosen by their inner products with the residual as they are: longer atoms are more attractive.
     #[must_use]
-    pub fn unnormalised(mut self) -> Self {
-        for norm in self.inverse_norms.iter_mut().filter(|norm| **norm != T::default()) {
-            *norm = T::from_f64(1.0);
+    pub fn unnormalised(self) -> Self {
+        Self { normalised: false, ..self }.weighed()
+    }
+
+    /// The same atoms, of which some pairs, the lower atom first, point the same or the opposite way. Of those one stands
+    /// for all: the lower, or in a choice by inner products the longer. Rounding alone would decide between them.
+    #[must_use]
+    pub(super) fn with_doubles(self, doubles: Vec<(usize, usize)>) -> Self {
+        Self { doubles, ..self }.weighed()
+    }
+
+    /// Pairs of atoms that the measurement cannot tell apart.
+    #[must_use]
+    pub fn doubles(&self) -> &[(usize, usize)] {
+        &self.doubles
+    }
+
+    fn weighed(mut self) -> Self {
+        let weight = |&energy: &T| match self.normalised {
+            true => T::from_f64(energy.into().sqrt().recip()),
+            false => T::from_f64(1.0),
+        };
+        self.inverse_norms = self.energies.iter().map(weight).collect();
+        self.inverse_norms.resize(padded(self.energies.len()), T::default());
+        let longer = |a: usize, b: usize| {
+            let (a, b): (f64, f64) = (self.energies[a].into(), self.energies[b].into());
+            !self.normalised && a > b * (1.0 + T::DEPENDENT)
+        };
+        let shadowed = self.doubles.iter().map(|&(i, j)| if longer(j, i) { i } else { j });
+        for k in self.unseen.iter().copied().chain(shadowed) {
+            self.inverse_norms[k] = T::default();
         }
         self
     }

@@ -6,7 +6,7 @@
 use super::batch::{Backend, Problem, solve_batch_paths};
 use super::dense::DenseDictionary;
 use super::pursuit::{Path, Solver};
-use super::{Limits, OmpError, Solution, Stop, solve_batch};
+use super::{Dictionary, Limits, OmpError, Scalar, Solution, Stop, solve_batch};
 use nalgebra::DMatrix;
 use std::sync::OnceLock;
 
@@ -29,6 +29,13 @@ impl MixedDictionary {
     #[must_use]
     pub fn new(matrix: DMatrix<f64>, normalised: bool) -> Self {
         let single = DenseDictionary::new(&matrix.map(|v| v as f32));
+        // Atoms that only single precision takes for the same stay apart, and their ties go to double precision.
+        let same = |&(i, j): &(usize, usize)| {
+            let (a, b) = (matrix.column(i), matrix.column(j));
+            a.dot(&b).powi(2) >= (1.0 - f64::DEPENDENT) * a.norm_squared() * b.norm_squared()
+        };
+        let doubles = single.atoms().doubles().iter().copied().filter(same).collect();
+        let single = single.with_doubles(doubles);
         let single = if normalised { single } else { single.unnormalised() };
         Self { single, matrix, double: OnceLock::new(), normalised }
     }

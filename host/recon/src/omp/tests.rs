@@ -247,19 +247,23 @@ fn each_reason_to_stop_is_stated() {
     assert_eq!(seen, (Stop::NoAtomLeft, vec![0, 1]));
     let nothing = both(&DMatrix::zeros(4, 3), &[1.0; 4], Limits::atoms(4));
     assert_eq!(nothing, (Stop::NoAtomLeft, vec![]));
-    // Two atoms so close in angle that the second adds less than rounding.
-    let twins = |angle| Problem {
+    // The second atom is so close to the plane of the others that it adds less than rounding.
+    let plane = |height| Problem {
         recipe: String::new(),
-        dictionary: DMatrix::from_row_slice(2, 2, &[1.0, 1.0, 0.0, angle]),
-        y: vec![1.0, 1.0],
+        dictionary: DMatrix::from_row_slice(
+            3,
+            3,
+            &[1.0, 0.0, 1.0, 0.0, 1.0, 2.0, 0.0, 0.0, height],
+        ),
+        y: vec![1.0; 3],
         sparse: vec![],
     };
     let end = |found: Solution| (found.stop, found.support);
-    let dependent = (Stop::Dependent, vec![1]);
-    let two = Limits::atoms(2);
-    assert_eq!(end(solve::<f32>(&twins(1e-3), &two)), dependent);
-    assert_eq!(end(solve::<f64>(&twins(1e-6), &two)), dependent);
-    assert_eq!(end(solve_exactly(&twins(1e-6), &two)), dependent);
+    let dependent = (Stop::Dependent, vec![2, 0]);
+    let three = Limits::atoms(3);
+    assert_eq!(end(solve::<f32>(&plane(1e-3), &three)), dependent);
+    assert_eq!(end(solve::<f64>(&plane(1e-6), &three)), dependent);
+    assert_eq!(end(solve_exactly(&plane(1e-6), &three)), dependent);
 }
 
 #[test]

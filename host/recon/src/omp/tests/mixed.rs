@@ -40,6 +40,28 @@ fn few_of_many_frames_need_double_precision_and_all_have_its_support() {
 }
 
 #[test]
+fn atoms_that_point_the_same_way_are_one_and_no_reason_to_doubt() {
+    let problem = problem(Kind::Doubled, 64, 256, 8, 3);
+    let mut random = Pcg64::seed_from_u64(4);
+    let y: Vec<f64> = (0..64 * 100).map(|_| normal(&mut random)).collect();
+    let dictionary = MixedDictionary::new(problem.dictionary.clone(), true);
+    let (found, again) = dictionary.solve_batch(&Limits::atoms(16), &y, Backend::Cpu).unwrap();
+    assert!(again < 20, "{again} of 100");
+    // The copies stand five after their originals.
+    for solution in &found {
+        assert!(solution.support.iter().all(|k| k % 6 != 5), "{:?}", solution.support);
+    }
+    // An angle that only double precision sees is one all the same.
+    let mut nearly = DMatrix::<f64>::identity(4, 3);
+    nearly.column_mut(2).copy_from_slice(&[1.0, 0.0, 0.0, 1e-3]);
+    let dictionary = MixedDictionary::new(nearly, true);
+    let (found, again) =
+        dictionary.solve_batch(&Limits::atoms(1), &[1.0, 0.0, 0.0, 1e-3], Backend::Cpu).unwrap();
+    assert_eq!((&found[0].support[..], again), (&[2][..], 1));
+    assert_eq!(dictionary.single().atoms().doubles(), []);
+}
+
+#[test]
 fn atoms_as_they_are_are_chosen_by_their_inner_products() {
     // The second atom is longer, the first fits better.
     let matrix = DMatrix::from_row_slice(2, 2, &[1.0, 3.0, 0.0, 3.0]);
