@@ -7,11 +7,14 @@
 Every problem is solved by each program in turn, round after round, so that other load falls on all alike; medians of all
 runs are compared. `nirspi` runs in a process of its own and times itself; its supports come back through a file.
 
+`nirspi` decides as the others do between atoms that look the same, by the last bit, in double precision where it must;
+`--normalise` lets one of them stand for all; `--precision f32` never looks twice.
+
 What is timed: the solution of all frames from `D` and `Y` in memory. scikit-learn gets the Gram matrix and the initial
 projections for nothing, as its `orthogonal_mp_gram` wants them. nirspi gets its Gram matrix (`prepare` says what that
 costs, once for a dictionary), and projects. SPAMS and batched-omp get `D`: SPAMS multiplies out the Gram matrix of a batch
-within its time, of one frame it does without one; batched-omp gets it from us. The row `nirspi, Gram within` adds nirspi's
-preparation to its time.
+within its time, of one frame it does without one; batched-omp gets it from us. The column `with Gram` adds nirspi's preparation
+to its time.
 """
 
 import argparse
@@ -62,11 +65,11 @@ def cosines_by_hadamard_rows(rng, m, n):
 
 
 class Nirspi:
-    def __init__(self, binary, precision, d, y, k, folder):
+    def __init__(self, binary, options, d, y, k, folder):
         self.path, self.out = os.path.join(folder, "problem.npz"), os.path.join(folder, "solution.npz")
         np.savez(self.path, D=d, Y=y, k=k)
         self.command = [binary, "bench", "omp", "--input", self.path, "--out", self.out,
-                        "--precision", precision, "--repeats", "15"]
+                        "--repeats", "15", *options]
         self.prepare = []
 
     def __call__(self):
@@ -139,9 +142,11 @@ def compare(args, kind, m, n, k, frames):
     d, y = problem(kind, m, n, k, frames, seed=1)
     repeats = 9 if frames == 1 else 1
     with tempfile.TemporaryDirectory() as folder:
-        ours = Nirspi(args.nirspi, "auto", d, y, k, folder)
+        ours = Nirspi(args.nirspi, [], d, y, k, folder)
         programs = {
             "nirspi": ours,
+            "nirspi --normalise": Nirspi(args.nirspi, ["--normalise"], d, y, k, folder),
+            "nirspi --precision f32": Nirspi(args.nirspi, ["--precision", "f32"], d, y, k, folder),
             "scikit-learn gram": lambda: scikit(d, y, k, repeats),
         }
         for dtype in (np.float64, np.float32):

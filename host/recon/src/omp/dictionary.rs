@@ -32,14 +32,15 @@ impl<T: Scalar> Atoms<T> {
         Self { energies, inverse_norms, unseen, doubles, normalised: true }.weighed()
     }
 
-    /// The same atoms, chosen by their inner products with the residual as they are: longer atoms are more attractive.
+    /// The same atoms, chosen by their inner products with the residual as they are: longer atoms are more attractive, if only
+    /// by a rounding, so that of equal ones each stands for itself.
     #[must_use]
     pub fn unnormalised(self) -> Self {
-        Self { normalised: false, ..self }.weighed()
+        Self { normalised: false, doubles: Vec::new(), ..self }.weighed()
     }
 
-    /// The same atoms, of which some pairs, the lower atom first, point the same or the opposite way. Of those one stands
-    /// for all: the lower, or in a choice by inner products the longer. Rounding alone would decide between them.
+    /// The same atoms, of which some pairs, the lower atom first, point the same or the opposite way. Of those the lower
+    /// stands for all: rounding alone would decide between them.
     #[must_use]
     pub(super) fn with_doubles(self, doubles: Vec<(usize, usize)>) -> Self {
         Self { doubles, ..self }.weighed()
@@ -58,11 +59,7 @@ impl<T: Scalar> Atoms<T> {
         };
         self.inverse_norms = self.energies.iter().map(weight).collect();
         self.inverse_norms.resize(padded(self.energies.len()), T::default());
-        let longer = |a: usize, b: usize| {
-            let (a, b): (f64, f64) = (self.energies[a].into(), self.energies[b].into());
-            !self.normalised && a > b * (1.0 + T::DEPENDENT)
-        };
-        let shadowed = self.doubles.iter().map(|&(i, j)| if longer(j, i) { i } else { j });
+        let shadowed = self.doubles.iter().map(|&(_, higher)| higher);
         for k in self.unseen.iter().copied().chain(shadowed) {
             self.inverse_norms[k] = T::default();
         }
