@@ -55,8 +55,10 @@ fn a_sound_camera_passes_and_gives_its_calibration() {
     let found = test(MemoryLink::new(optics().camera(1).unwrap()));
     assert!(found.passed(), "{:#?}", failures(&found));
     assert_eq!(found.settling.unwrap().adc_latency, optics().chain().adc_latency_clocks);
-    let skipped = found.checks.iter().filter(|check| check.verdict() == Verdict::Skipped).count();
-    assert_eq!(skipped, 0, "{:#?}", found.checks);
+    let skipped = found.checks.iter().filter(|check| check.verdict() == Verdict::Skipped);
+    // The virtual camera has no memory of its own that frames pass through.
+    let names: Vec<&str> = skipped.map(Check::name).collect();
+    assert_eq!(names, ["device: frame memory"], "{:#?}", found.checks);
 }
 
 #[test]
