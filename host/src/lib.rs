@@ -4,6 +4,7 @@
 //!
 //! * [`link`] moves bytes, [`session`] talks to a camera, [`account`] counts what became of every frame,
 //! * [`versions`] says whether camera and program belong together, [`events`] what a camera reports unasked,
+//! * [`gateware`] loads a camera's FPGA,
 //! * [`calibrate`] measures latency and settling, [`selftest`] checks a camera, [`kept_calibration`] remembers,
 //! * [`capture`] runs a measurement, [`recording`] keeps it,
 //! * [`tally`] and [`integrate`] turn frames into measurements; `nirspi-recon` turns those into an image,
@@ -19,6 +20,7 @@ pub mod events;
 pub mod files;
 #[cfg(feature = "flash")]
 pub mod flash;
+pub mod gateware;
 pub mod integrate;
 pub mod kept_calibration;
 pub mod link;

@@ -12,8 +12,8 @@ use crate::link::{Link, Received};
 use nirspi_wire::packet::{MAX_DEVICE_PACKET, MAX_HOST_PACKET, hello_of_any_version};
 use nirspi_wire::register::Register;
 use nirspi_wire::{
-    Answer, Command, Deframed, Deframer, DeviceMessage, Identity, PROTOCOL_VERSION, PacketError,
-    Refusal, Reply, Request, SelfTestReport, Status, Version, encode, open,
+    Answer, Command, Deframed, Deframer, DeviceMessage, GatewareChunk, Identity, PROTOCOL_VERSION,
+    PacketError, Refusal, Reply, Request, SelfTestReport, Status, Version, encode, open,
 };
 use serde::{Deserialize, Serialize};
 use std::time::{Duration, Instant};
@@ -23,6 +23,7 @@ pub(crate) const ANSWER_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// The first command of a conversation.
 const HELLO: &str = "Hello";
+const LOAD_GATEWARE: &str = "LoadGateware";
 
 /// Who a camera is: the wire's [`Identity`], owned.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -101,7 +102,7 @@ enum OwnedAnswer {
     Status(Status),
     SelfTest(SelfTestReport),
     Register(u32),
-    Gateware,
+    Gateware { next_offset: u32 },
 }
 
 impl From<&Answer<'_>> for OwnedAnswer {
@@ -112,7 +113,7 @@ impl From<&Answer<'_>> for OwnedAnswer {
             Answer::Status(status) => Self::Status(*status),
             Answer::SelfTest(report) => Self::SelfTest(*report),
             Answer::Register(value) => Self::Register(*value),
-            Answer::Gateware { .. } => Self::Gateware,
+            &Answer::Gateware { next_offset } => Self::Gateware { next_offset },
         }
     }
 }
@@ -365,6 +366,21 @@ impl Session {
         match self.ask("ReadRegister", command, listener)? {
             OwnedAnswer::Register(value) => Ok(value),
             _ => Err(SessionError::WrongAnswer { command: "ReadRegister" }),
+        }
+    }
+
+    /// Hands over a piece of a bitstream; returns where the next one belongs.
+    ///
+    /// # Errors
+    /// As [`command`](Self::command).
+    pub fn load_gateware(
+        &mut self,
+        piece: GatewareChunk<'_>,
+        listener: &mut dyn Listener,
+    ) -> Result<u32, SessionError> {
+        match self.ask(LOAD_GATEWARE, Command::LoadGateware(piece), listener)? {
+            OwnedAnswer::Gateware { next_offset } => Ok(next_offset),
+            _ => Err(SessionError::WrongAnswer { command: LOAD_GATEWARE }),
         }
     }
 

@@ -87,8 +87,8 @@ pub fn compare(camera: &CameraIdentity, map: Option<u32>) -> Vec<Part> {
     parts
 }
 
-const LOAD_GATEWARE: &str = "load this version's bitstream: docs/gateware.md, \
-     openFPGALoader -b ecp5_evn target/gateware/ecp5-evn/nirspi.bit";
+const LOAD_GATEWARE: &str = "load this version's bitstream: nirspi gateware target/gateware/ecp5-evn/nirspi.bit --camera ... \
+     (python3 hdl/build.py makes it)";
 
 /// How to bring a board's firmware to this program's version.
 fn update_firmware(board: &str) -> String {

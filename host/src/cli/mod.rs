@@ -10,6 +10,7 @@ mod demo;
 mod devices;
 mod eval;
 mod flash;
+mod gateware;
 mod info;
 mod method;
 mod metrics;
@@ -49,6 +50,7 @@ enum Command {
     Info(info::Args),
     Selftest(selftest::Args),
     Flash(flash::Args),
+    Gateware(gateware::Args),
     Setup(setup::Args),
     Metrics(metrics::Args),
     Rain(rain::Args),
@@ -85,6 +87,7 @@ pub fn run() -> ExitCode {
         Command::Info(args) => info::run(&args),
         Command::Selftest(args) => selftest::run(&args),
         Command::Flash(args) => flash::run(&args),
+        Command::Gateware(args) => gateware::run(&args),
         Command::Setup(args) => setup::run(&args),
         Command::Metrics(args) => metrics::run(&args),
         Command::Rain(args) => rain::run(&args),

@@ -2,6 +2,7 @@
 
 use super::{SimulatedFpga, VirtualCamera};
 use crate::link::{Link, Received};
+use nirspi_mcu::{GatewareLoader, NoLoader};
 use std::io;
 use std::time::Duration;
 
@@ -11,19 +12,19 @@ const STEP_CLOCKS: u32 = 1000;
 const PATIENCE_CLOCKS: u32 = 2_500_000;
 
 /// A camera in the same process. Single-threaded and deterministic.
-pub struct MemoryLink<F> {
-    camera: VirtualCamera<F>,
+pub struct MemoryLink<F, G = NoLoader> {
+    camera: VirtualCamera<F, G>,
 }
 
-impl<F: SimulatedFpga> MemoryLink<F> {
+impl<F: SimulatedFpga, G: GatewareLoader> MemoryLink<F, G> {
     /// Plugs the camera in.
     #[must_use]
-    pub fn new(camera: VirtualCamera<F>) -> Self {
+    pub fn new(camera: VirtualCamera<F, G>) -> Self {
         Self { camera }
     }
 }
 
-impl<F: SimulatedFpga> Link for MemoryLink<F> {
+impl<F: SimulatedFpga, G: GatewareLoader + Send> Link for MemoryLink<F, G> {
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.camera.receive(bytes);
         Ok(())

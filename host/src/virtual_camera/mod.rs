@@ -21,7 +21,9 @@ pub use optics::{VirtualOptics, VirtualOpticsError};
 pub use precomputed::PrecomputedFpga;
 pub use server::{ServeOptions, ServerEvent, serve};
 
-use nirspi_mcu::{BoardInfo, Camera, Inputs, Limits, Micros, NoLoader, PacketSink, Ports};
+use nirspi_mcu::{
+    BoardInfo, Camera, GatewareLoader, Inputs, Limits, Micros, NoLoader, PacketSink, Ports,
+};
 use nirspi_optics::SimulatedDepth;
 use nirspi_wire::Version;
 
@@ -89,10 +91,11 @@ impl Outbox {
     }
 }
 
-/// A camera without silicon. `F` is what stands in for the FPGA and everything in front of it.
-pub struct VirtualCamera<F> {
+/// A camera without silicon. `F` is what stands in for the FPGA and everything in front of it, `G` takes bitstreams.
+pub struct VirtualCamera<F, G = NoLoader> {
     camera: Camera,
     fpga: F,
+    loader: G,
     inbox: Vec<u8>,
     outbox: Outbox,
     depth: SimulatedDepth,
@@ -104,10 +107,19 @@ impl<F: SimulatedFpga> VirtualCamera<F> {
     /// Powers up.
     #[must_use]
     pub fn new(fpga: F, depth: SimulatedDepth, serial: &str) -> Self {
+        Self::with_loader(fpga, NoLoader, depth, serial)
+    }
+}
+
+impl<F: SimulatedFpga, G: GatewareLoader> VirtualCamera<F, G> {
+    /// Powers up a board that can load gateware.
+    #[must_use]
+    pub fn with_loader(fpga: F, loader: G, depth: SimulatedDepth, serial: &str) -> Self {
         let info = BoardInfo::new("virtual", serial, crate_version());
         Self {
             camera: Camera::new(info, Limits::default()),
             fpga,
+            loader,
             inbox: Vec::new(),
             outbox: Outbox::default(),
             depth,
@@ -121,7 +133,7 @@ impl<F: SimulatedFpga> VirtualCamera<F> {
         self.inbox.extend_from_slice(bytes);
         let now = self.now();
         let ports =
-            &mut Ports { bus: &mut self.fpga, sink: &mut self.outbox, loader: &mut NoLoader };
+            &mut Ports { bus: &mut self.fpga, sink: &mut self.outbox, loader: &mut self.loader };
         let taken = self.camera.receive(now, &self.inbox, &self.inputs, ports);
         self.inbox.drain(..taken);
     }
@@ -130,8 +142,11 @@ impl<F: SimulatedFpga> VirtualCamera<F> {
     pub fn step(&mut self, clocks: u32) -> bool {
         self.fpga.advance(clocks);
         let now = self.now();
+        if self.loader.step(now) {
+            return true;
+        }
         let ports =
-            &mut Ports { bus: &mut self.fpga, sink: &mut self.outbox, loader: &mut NoLoader };
+            &mut Ports { bus: &mut self.fpga, sink: &mut self.outbox, loader: &mut self.loader };
         // Before the poll, which judges how long the host has been silent.
         if !self.inbox.is_empty() {
             let taken = self.camera.receive(now, &self.inbox, &self.inputs, ports);
@@ -156,7 +171,7 @@ impl<F: SimulatedFpga> VirtualCamera<F> {
     pub fn link_closed(&mut self) {
         let now = self.now();
         let ports =
-            &mut Ports { bus: &mut self.fpga, sink: &mut self.outbox, loader: &mut NoLoader };
+            &mut Ports { bus: &mut self.fpga, sink: &mut self.outbox, loader: &mut self.loader };
         self.camera.link_closed(now, ports);
         self.inbox.clear();
         self.outbox.clear();

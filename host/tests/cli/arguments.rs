@@ -3,7 +3,7 @@
 use crate::bench::{Bench, first_bytes};
 use std::process::{Command, Stdio};
 
-const COMMANDS: [&str; 14] = [
+const COMMANDS: [&str; 15] = [
     "demo",
     "reconstruct",
     "capture",
@@ -12,6 +12,7 @@ const COMMANDS: [&str; 14] = [
     "info",
     "selftest",
     "flash",
+    "gateware",
     "setup",
     "metrics",
     "rain",
