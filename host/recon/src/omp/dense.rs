@@ -49,14 +49,15 @@ impl<T: Scalar> DenseDictionary<T> {
         let panels = Panels::new(matrix);
         let width = super::padded(matrix.ncols());
         let fits = width.saturating_mul(width).saturating_mul(size_of::<T>()) <= bytes;
-        let gram = if fits { panels.gram(arch) } else { Vec::new() };
-        let energies = (0..matrix.ncols())
+        let mut gram = if fits { panels.gram(arch) } else { Vec::new() };
+        let energies: Vec<T> = (0..matrix.ncols())
             .map(|atom| match gram.get(atom * width + atom) {
                 Some(&energy) => energy,
                 // In the order in which the Gram matrix is summed: the same bits.
                 None => matrix.column(atom).iter().fold(T::default(), |sum, &v| sum + v * v),
             })
             .collect();
+        clear_rounding(&energies, &mut gram, width);
         let atoms = Atoms::new(energies);
         let doubles = doubles(&atoms, &gram, width);
         Self { panels, atoms: atoms.with_doubles(doubles), gram, width, arch }
@@ -67,6 +68,22 @@ impl<T: Scalar> DenseDictionary<T> {
         self.atoms = self.atoms.with_doubles(doubles);
         self
     }
+}
+
+/// Share of an epsilon, relative to the atoms' norms, under which an inner product is the rounding of 0.
+const NOTHING: f64 = 1e-3;
+
+/// Makes zeros of what should be. Orthogonal atoms (cosines by Hadamard rows are, in blocks) otherwise have inner products of
+/// 1e-18 or 1e-35, whose products fall below the normal range of `f32`, where arithmetic is many times slower.
+fn clear_rounding<T: Scalar>(energies: &[T], gram: &mut [T], width: usize) {
+    gram.par_chunks_exact_mut(width).zip(energies).for_each(|(row, &own)| {
+        let least = own * T::from_f64((NOTHING * T::EPSILON).powi(2));
+        for (value, &other) in row.iter_mut().zip(energies) {
+            if *value * *value < least * other {
+                *value = T::default();
+            }
+        }
+    });
 }
 
 /// Pairs of atoms, the lower first, of which one leaves nothing but rounding of the other.
