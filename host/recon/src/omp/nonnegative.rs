@@ -17,7 +17,8 @@ use nalgebra::{DMatrix, DVector};
 /// Exchanges of atoms before the search is given up: Lawson and Hanson's, per atom.
 const EXCHANGES: usize = 3;
 
-/// Finds a sparse `x`, nowhere negative, with the dictionary's `x` near `y`.
+/// Finds a sparse `x`, nowhere negative, with the dictionary's `x` near `y`. As atoms may be given back, the solution's
+/// `residual_norms` are the first and the last alone.
 ///
 /// `N` products an atom in the support go into each choice, and a third of the cube of the support's size into its
 /// coefficients.

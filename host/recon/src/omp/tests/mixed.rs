@@ -21,6 +21,12 @@ fn a_lead_that_single_precision_cannot_see_decides_all_the_same() {
         let dictionary = MixedDictionary::new(matrix, true);
         let (found, again) = dictionary.solve_batch(&limits, &y, Backend::Cpu).unwrap();
         assert_eq!((&found[0].support, again), (&exact.support, 1));
+        let mut solver = dictionary.solver(&limits).unwrap();
+        // Twice: the second finds its memory in use before.
+        for _ in 0..2 {
+            let (found, in_double) = solver.solve(&y).unwrap();
+            assert_eq!((&found.support, in_double), (&exact.support, true));
+        }
     }
 }
 

@@ -44,6 +44,26 @@ proptest! {
     }
 }
 
+proptest! {
+    #[test]
+    fn with_every_step_less_is_left(seed: u64) {
+        // Atoms that lean the same way push each other below 0 again and again.
+        let mut random = Pcg64::seed_from_u64(seed);
+        let dictionary = DMatrix::from_fn(24, 40, |_, _| normal(&mut random) + 0.8);
+        let y = (0..24).map(|_| normal(&mut random) + 0.3).collect();
+        let problem = Problem { recipe: String::new(), dictionary, y, sparse: vec![] };
+        let (dictionary, y) = dense::<f64>(&problem);
+        let left: Vec<f64> = (1..24)
+            .map(|count| {
+                let found = nonnegative::solve(&dictionary, &y, &Limits::atoms(count)).unwrap();
+                assert!(found.support.len() <= count);
+                *found.residual_norms.last().unwrap()
+            })
+            .collect();
+        prop_assert!(left.is_sorted_by(|a, b| a + 1e-9 >= *b), "{:?}", left);
+    }
+}
+
 #[test]
 fn an_atom_that_would_be_negative_is_not_taken() {
     let matrix = DMatrix::<f64>::identity(4, 4);
