@@ -4,9 +4,9 @@ use super::camera::SceneArgs;
 use super::print;
 use anyhow::{Context, Result};
 use nirspi::virtual_camera::{
-    PrecomputedFpga, ServeOptions, ServerEvent, SimulatedFpga, VirtualCamera, serve,
+    PrecomputedFpga, ServeOptions, ServerEvent, SimulatedFpga, VirtualCamera, serve, serve_tunnel,
 };
-use std::net::TcpListener;
+use std::net::{TcpListener, TcpStream};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -15,8 +15,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 ///
 /// One host at a time. Port 0 takes a free one; the first line says which.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n\
-    \x20 nirspi virtual --listen 127.0.0.1:1550 --scene letter:R")]
+#[command(after_help = "Examples:\n\
+    \x20 nirspi virtual --listen 127.0.0.1:1550 --scene letter:R\n\
+    \x20 nirspi virtual --tunnel 127.0.0.1:1551      the firmware in QEMU: boards/mps2-an505")]
 pub struct Args {
     /// Where to listen
     #[arg(long, value_name = "ADDR", default_value = super::devices::DEFAULT_TCP)]
@@ -26,6 +27,9 @@ pub struct Args {
     /// Compute this many frames of each run, then repeat them at full speed (for load tests)
     #[arg(long, value_name = "N")]
     precompute: Option<usize>,
+    /// Be the FPGA alone, with the light before it, for firmware in an emulator that listens here
+    #[arg(long, value_name = "ADDR", conflicts_with_all = ["listen", "precompute", "once", "drop_when_full"])]
+    tunnel: Option<String>,
     /// End when the first host has gone
     #[arg(long)]
     once: bool,
@@ -36,6 +40,18 @@ pub struct Args {
 
 pub fn run(args: &Args) -> Result<ExitCode> {
     let (map, optics) = args.scene.optics()?;
+    if let Some(address) = &args.tunnel {
+        let line = TcpStream::connect(address)
+            .with_context(|| format!("--tunnel {address}: no emulator there"))?;
+        print::line(format_args!(
+            "FPGA behind {address}: {} at {} m (simulated), seed {}",
+            map.name, args.scene.distance_m, args.scene.seed
+        ))?;
+        serve_tunnel(line, &mut optics.fpga(args.scene.seed)?, &AtomicBool::new(true))
+            .with_context(|| format!("--tunnel {address}"))?;
+        print::line("the emulator has gone")?;
+        return Ok(ExitCode::SUCCESS);
+    }
     let listener = TcpListener::bind(&args.listen)
         .with_context(|| format!("--listen {}: cannot listen there", args.listen))?;
     let stop = stop_on_signal()?;

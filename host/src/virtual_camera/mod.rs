@@ -14,12 +14,14 @@ mod link;
 mod optics;
 mod precomputed;
 mod server;
+mod tunnel;
 
 pub use fpga::{OpticalFpga, SimulatedFpga, Wiring};
 pub use link::MemoryLink;
 pub use optics::{VirtualOptics, VirtualOpticsError};
 pub use precomputed::PrecomputedFpga;
 pub use server::{ServeOptions, ServerEvent, serve};
+pub use tunnel::serve_tunnel;
 
 use nirspi_mcu::{
     BoardInfo, Camera, GatewareLoader, Inputs, Limits, Micros, NoLoader, PacketSink, Ports,

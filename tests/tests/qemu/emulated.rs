@@ -2,9 +2,8 @@
 //!
 //! The one law: the firmware is the ELF as it was linked; nothing is put into it or taken out of it.
 
-use crate::simulator;
 use nirspi::link::{Link, TcpLink};
-use nirspi::virtual_camera::SimulatedFpga;
+use nirspi::virtual_camera::{SimulatedFpga, serve_tunnel};
 use std::io::{Read, Write};
 use std::net::{Shutdown, TcpListener, TcpStream};
 use std::process::{Child, Command, Stdio};
@@ -66,7 +65,10 @@ impl Emulated {
             (accept(&host_line, &mut child), accept(&fpga_line, &mut child));
         let interlock_closed = Arc::new(AtomicBool::new(true));
         let (line, interlock) = (fpga_line.try_clone().unwrap(), Arc::clone(&interlock_closed));
-        thread::spawn(move || simulator::serve(line, fpga, &interlock));
+        thread::spawn(move || {
+            let mut fpga = fpga;
+            serve_tunnel(line, &mut fpga, &interlock).unwrap();
+        });
         let host = relay(host_line);
         Some(Self { qemu: child, host, fpga_line, interlock_closed })
     }

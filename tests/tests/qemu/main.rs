@@ -12,7 +12,6 @@ mod emulated;
 mod firmware;
 #[path = "../co_simulation/fpga.rs"]
 mod fpga;
-mod simulator;
 
 use emulated::Emulated;
 use fpga::RtlFpga;

@@ -1,14 +1,14 @@
-//! The other end of the tunnel: a simulated FPGA that an emulated board reaches over a serial line.
+//! A simulated FPGA that the firmware of an emulated board reaches over a serial line ([`nirspi_wire::tunnel`]).
 //!
 //! The one law: simulated time passes with accesses alone. So how fast the emulator is changes no frame.
 
-use nirspi::virtual_camera::SimulatedFpga;
+use super::SimulatedFpga;
+use crate::link::is_hangup;
 use nirspi_wire::crc32;
 use nirspi_wire::host_port::{READ_FRAME, READ_RAW, READ_REGISTER, WRITE_REGISTER};
 use nirspi_wire::tunnel::{Lines, REQUEST_BYTES, Request};
-use std::io::{Read, Write};
+use std::io::{self, Read, Write};
 use std::net::TcpStream;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// ADC clocks that an access takes.
@@ -21,18 +21,26 @@ const LOOK_STEPS: u32 = 50;
 const CENTI_CELSIUS: i16 = 2500;
 
 /// Serves accesses until the board goes away.
-pub fn serve(
+///
+/// # Errors
+/// When the line fails other than by the board's end.
+pub fn serve_tunnel(
     mut line: TcpStream,
-    mut fpga: impl SimulatedFpga,
-    interlock_closed: &Arc<AtomicBool>,
-) {
+    fpga: &mut impl SimulatedFpga,
+    interlock_closed: &AtomicBool,
+) -> io::Result<()> {
+    // Small packets go at once, or each access takes 40 ms.
+    line.set_nodelay(true)?;
     let mut buffer = Vec::new();
     let mut chunk = [0; 4096];
     loop {
-        match line.read(&mut chunk) {
-            Ok(0) | Err(_) => return,
-            Ok(length) => buffer.extend_from_slice(&chunk[..length]),
-        }
+        let length = match line.read(&mut chunk) {
+            Ok(0) => return Ok(()),
+            Ok(length) => length,
+            Err(error) if is_hangup(&error) => return Ok(()),
+            Err(error) => return Err(error),
+        };
+        buffer.extend_from_slice(chunk.get(..length).unwrap_or(&[]));
         while let Some(bytes) = buffer.first_chunk::<REQUEST_BYTES>() {
             let Some(request) = Request::from_bytes(bytes) else {
                 // A board that has restarted in the middle of a request.
@@ -41,7 +49,7 @@ pub fn serve(
             };
             buffer.drain(..REQUEST_BYTES);
             fpga.set_interlock(interlock_closed.load(Ordering::Relaxed));
-            let data = access(&mut fpga, request);
+            let data = access(fpga, request);
             let lines = Lines {
                 frame_ready: fpga.frame_ready(),
                 raw_ready: fpga.raw_ready(),
@@ -51,38 +59,32 @@ pub fn serve(
             let mut reply = lines.to_reply_head(request.number).to_vec();
             reply.extend(data);
             reply.extend(crc32(&reply).to_le_bytes());
-            if line.write_all(&reply).is_err() {
-                return;
+            match line.write_all(&reply) {
+                Err(error) if is_hangup(&error) => return Ok(()),
+                written => written?,
             }
         }
     }
 }
 
+/// What the FPGA answers. One whose bus fails reads as zeros, as one that is not there.
 fn access(fpga: &mut impl SimulatedFpga, request: Request) -> Vec<u8> {
     let Request { opcode, address, argument, .. } = request;
-    let length = request.reply_data();
     let data = match opcode {
-        WRITE_REGISTER => {
-            fpga.write(address, argument).unwrap();
-            Vec::new()
-        }
-        READ_REGISTER => fpga.read(address).unwrap().to_le_bytes().to_vec(),
-        READ_FRAME => padded(fpga.frame(), length),
-        READ_RAW => padded(fpga.raw(), length),
+        WRITE_REGISTER => fpga.write(address, argument).map(|()| Vec::new()),
+        READ_REGISTER => fpga.read(address).map(|value| value.to_le_bytes().to_vec()),
+        READ_FRAME => fpga.frame().map(|bytes| bytes.unwrap_or(&[]).to_vec()),
+        READ_RAW => fpga.raw().map(|bytes| bytes.unwrap_or(&[]).to_vec()),
         _ => {
             wait(fpga);
             return Vec::new();
         }
     };
     fpga.advance(ACCESS_CLOCKS);
+    let mut data = data.unwrap_or_default();
+    // Beyond the end, and where there is nothing, the FPGA gives zeros.
+    data.resize(request.reply_data(), 0);
     data
-}
-
-/// Beyond the end, and where there is nothing, the FPGA gives zeros.
-fn padded(bytes: Result<Option<&[u8]>, nirspi_mcu::BusError>, length: usize) -> Vec<u8> {
-    let mut bytes = bytes.unwrap().unwrap_or(&[]).to_vec();
-    bytes.resize(length, 0);
-    bytes
 }
 
 fn wait(fpga: &mut impl SimulatedFpga) {
