@@ -163,7 +163,7 @@ mod tests {
     }
 
     fn bitstream() -> Vec<u8> {
-        let body = (0..5_000_u32).map(|i| (i * i >> 3) as u8);
+        let body = (0..5_000_u32).map(|i| ((i * i) >> 3) as u8);
         [0xFF, 0x00].into_iter().chain(body).chain([0xFF; 40]).collect()
     }
 
