@@ -15,6 +15,8 @@ pub struct Firmware {
     pub static_bytes: u64,
     symbols: BTreeMap<String, u64>,
     functions: Vec<Function>,
+    /// Where instructions begin (`true`) and data (`false`), by address: the Arm ELF's mapping symbols.
+    mapping: BTreeMap<u64, bool>,
     text: Vec<(u64, Vec<u8>)>,
 }
 
@@ -58,7 +60,16 @@ impl Firmware {
                 Some(Function { name: plain(&named(&symbol)?), start, length })
             })
             .collect();
-        Ok(Self { flash_bytes, static_bytes, symbols, functions, text })
+        let mapping = file.symbols().filter_map(|symbol| match symbol.name().ok()?.get(..2)? {
+            "$t" => Some((symbol.address(), true)),
+            "$d" => Some((symbol.address(), false)),
+            _ => None,
+        });
+        let mapping: BTreeMap<u64, bool> = mapping.collect();
+        if !mapping.values().any(|&is_code| is_code) {
+            return Err(io::Error::new(io::ErrorKind::InvalidData, "stripped: no mapping symbols"));
+        }
+        Ok(Self { flash_bytes, static_bytes, symbols, functions, mapping, text })
     }
 
     /// Address of a symbol.
@@ -93,6 +104,39 @@ impl Firmware {
             .flat_map(|caller| self.branches(caller).map(|target| (caller.name.as_str(), target)))
             .filter_map(|(caller, target)| Some((caller, *called.get(&target)?)))
             .collect()
+    }
+
+    /// Addresses of instructions of the floating-point unit, each with the function that it is in.
+    #[must_use]
+    pub fn float_instructions(&self) -> Vec<(u64, &str)> {
+        let name = |address: u64| {
+            let within = |f: &&Function| (f.start..f.start + f.length).contains(&address);
+            self.functions.iter().find(within).map_or("?", |function| function.name.as_str())
+        };
+        let mut found = Vec::new();
+        for (base, bytes) in &self.text {
+            let half = |address: u64| {
+                let at = usize::try_from(address - base).ok()?;
+                Some(u16::from_le_bytes(*bytes.get(at..)?.first_chunk()?))
+            };
+            let end = base + bytes.len() as u64;
+            let mut starts = self.mapping.range(base..&end).peekable();
+            while let Some((&start, &is_code)) = starts.next() {
+                let stop = starts.peek().map_or(end, |(next, _)| **next);
+                let mut address = start;
+                while is_code
+                    && address < stop
+                    && let Some(first) = half(address)
+                {
+                    let is_wide = first >= 0xE800;
+                    if is_wide && half(address + 2).is_some_and(|second| is_float(first, second)) {
+                        found.push((address, name(address)));
+                    }
+                    address += if is_wide { 4 } else { 2 };
+                }
+            }
+        }
+        found
     }
 
     /// Where the 32-bit branches of a function lead. Constants between instructions may look like one; that one of
@@ -134,9 +178,26 @@ fn branch(address: u64, (first, second): (u16, u16)) -> Option<u64> {
     Some((address + 4).wrapping_add_signed(i64::from(offset)))
 }
 
+/// Whether an instruction of two halves is for coprocessor 10 or 11, which are the floating-point unit: Armv8-M
+/// Architecture Reference Manual, C2.3.
+fn is_float(first: u16, second: u16) -> bool {
+    first & 0xEC00 == 0xEC00 && matches!(second >> 8 & 0xF, 0xA | 0xB)
+}
+
 #[cfg(test)]
 mod tests {
-    use super::branch;
+    use super::{branch, is_float};
+
+    /// As disassembled by others: `vadd.f32 s0, s0, s1`, `vmov r0, s0`, `vldr d0, [r0]`; then `bl` and `ldrd`.
+    #[test]
+    fn arithmetic_of_the_floating_point_unit_is_told_from_other_instructions() {
+        for (first, second) in [(0xEE30, 0x0A20), (0xEE10, 0x0A10), (0xED90, 0x0B00)] {
+            assert!(is_float(first, second), "{first:04x} {second:04x}");
+        }
+        for (first, second) in [(0xF000, 0xFB9F), (0xE9D0, 0x0A00)] {
+            assert!(!is_float(first, second), "{first:04x} {second:04x}");
+        }
+    }
 
     /// As disassembled by others: `bl` forwards and back, and what is none.
     #[test]

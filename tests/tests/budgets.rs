@@ -116,6 +116,18 @@ fn no_firmware_has_a_heap() {
     }
 }
 
+/// Nowhere, so not in interrupts either: sums are integers until they are on the host.
+#[test]
+fn no_firmware_computes_with_floating_point() {
+    const SOFT: &[&str] = &["__aeabi_f", "__aeabi_d", "__addsf", "__adddf", "__mulsf", "__muldf"];
+    for (budget, firmware) in built() {
+        let found = firmware.float_instructions();
+        assert!(found.is_empty(), "{}: {found:x?}", budget.board);
+        let found = firmware.symbols_with(SOFT);
+        assert!(found.is_empty(), "{}: {found:?}", budget.board);
+    }
+}
+
 /// Functions of `core` in which every panic begins.
 const PANICS: &[&str] = &[
     "core::panicking::",
