@@ -11,7 +11,7 @@ use nirspi::tally::{Tally, tally_recording};
 use nirspi::virtual_camera::{MemoryLink, VirtualCamera, VirtualOptics};
 use nirspi_optics::Scene;
 use nirspi_recon::{Order, Side, fwht, metrics, reconstruct};
-use nirspi_tests::tamper::{Fate, Tampered};
+use nirspi_tests::tamper::{Fate, Tampered, only_frames};
 use nirspi_wire::packet::MAX_DEVICE_PACKET;
 use nirspi_wire::{DeviceMessage, Fault, Frame, FrameFlags, Samples, encode, open, walsh};
 use std::ops::ControlFlow;
@@ -89,21 +89,6 @@ fn the_scene_comes_through_exactly_in_any_order() {
         let captured = run(ideal_link(), &options(&order, false));
         assert!(matches!(captured.ended, Ended::Complete));
         check(&captured).unwrap_or_else(|reason| panic!("{order}: {reason}"));
-    }
-}
-
-/// The number of the first packet of a run that is a frame: greeting, answers come before.
-fn only_frames(
-    mut judge: impl FnMut(usize) -> Fate + Send + 'static,
-) -> impl FnMut(usize, usize) -> Fate + Send {
-    let mut frame = 0;
-    move |_, length| {
-        // Nothing else that the device sends is nearly as long.
-        if length < 3000 {
-            return Fate::Pass;
-        }
-        frame += 1;
-        judge(frame - 1)
     }
 }
 

@@ -24,7 +24,7 @@ use nirspi_optics::Scene;
 use nirspi_recon::{Order, Side, metrics, reconstruct};
 use nirspi_tests::elf::Firmware;
 use nirspi_tests::pages::{page, table};
-use nirspi_tests::tamper::{Fate, Tampered};
+use nirspi_tests::tamper::{Fate, Tampered, only_frames};
 use nirspi_wire::packet::MAX_DEVICE_PACKET;
 use nirspi_wire::{
     Command, Deframed, Deframer, DeviceMessage, Fault, Frame, FrameFlags, GatewareChunk, Refusal,
@@ -237,25 +237,11 @@ fn frames_that_the_rtl_makes_faster_than_the_board_reads_them_are_counted_and_sp
     }
 }
 
-/// Nothing else that the device sends is nearly as long as a frame.
-fn of_frames(
-    mut judge: impl FnMut(usize) -> Fate + Send + 'static,
-) -> impl FnMut(usize, usize) -> Fate + Send {
-    let mut frame = 0;
-    move |_, length| {
-        if length < 3000 {
-            return Fate::Pass;
-        }
-        frame += 1;
-        judge(frame - 1)
-    }
-}
-
 #[test]
 fn on_a_bad_line_every_frame_is_accounted_for_and_none_that_arrives_differs() {
     let frames = 9;
     let Some(board) = Emulated::start(optics().fpga(SEED).unwrap()) else { return };
-    let judge = of_frames(|frame| match frame {
+    let judge = only_frames(|frame| match frame {
         1 => Fate::Drop,
         2 => Fate::Flip(99),
         4 => Fate::Delay,

@@ -23,8 +23,23 @@ pub struct Conditions {
     pub frames: u32,
 }
 
+/// How the pictures of a table are taken.
+#[derive(Debug, clap::Args)]
+pub struct Exposure {
+    /// Rain, as in the paper's Table 2
+    #[arg(long, value_enum, default_value_t = Rain::Heavy)]
+    pub rain: Rain,
+    /// Differential sweeps summed into a picture; 244 are 20 ms
+    #[arg(long, value_name = "N", default_value_t = FRAMES,
+          value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub frames: u32,
+    /// Seed of the first picture
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+}
+
 /// All 1024 patterns and their complements: 244 times is 20 ms, the paper's T_pre (Table 1).
-pub const FRAMES: u32 = 244;
+const FRAMES: u32 = 244;
 
 /// What both cameras give of one scene.
 pub struct Shots {

@@ -1,6 +1,6 @@
 //! `nirspi eval table3`: image quality in rain and without it, NIR-SPI and VIS.
 
-use super::shot::{Conditions, FRAMES, Shots, progress, shoot};
+use super::shot::{Conditions, Exposure, Shots, progress, shoot};
 use super::{DISTANCES_M, Estimate};
 use crate::cli::camera::Rain;
 use crate::cli::print;
@@ -29,16 +29,8 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value_t = 200,
           value_parser = clap::value_parser!(u32).range(2..=100_000))]
     scenes: u32,
-    /// Rain, as in the paper's Table 2
-    #[arg(long, value_enum, default_value_t = Rain::Heavy)]
-    rain: Rain,
-    /// Differential sweeps summed into a picture; 244 are 20 ms
-    #[arg(long, value_name = "N", default_value_t = FRAMES,
-          value_parser = clap::value_parser!(u32).range(1..=100_000))]
-    frames: u32,
-    /// Seed of the first scene
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    seed: u64,
+    #[command(flatten)]
+    exposure: Exposure,
     /// Folder for table3.json and table3.png
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -110,7 +102,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let measured: Vec<Measured> = jobs
         .par_iter()
         .map(|&(distance_m, i)| {
-            let shots = take(args, args.rain, distance_m, i)?;
+            let shots = take(args, args.exposure.rain, distance_m, i)?;
             let blank = Image::new(shots.nir_spi.side(), vec![0.0; shots.truth.len()]);
             let blank = compare(&blank, &shots.truth)?.quality;
             let wet = Pair::of(&shots)?;
@@ -124,10 +116,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let rows = rows(&measured);
     let report = Report {
         simulated: true,
-        rain: args.rain,
+        rain: args.exposure.rain,
         scenes: args.scenes,
-        frames: args.frames,
-        seed: args.seed,
+        frames: args.exposure.frames,
+        seed: args.exposure.seed,
         reading: reading(&rows),
         rows,
     };
@@ -154,8 +146,8 @@ fn take(args: &Args, rain: Rain, distance_m: f64, i: u32) -> Result<Shots> {
     let map = SceneSource::Letter(char::from(character)).load(256)?;
     let side_mm = map.side_mm.unwrap_or_else(|| Projector::default().field_mm(distance_m * 1e3));
     let scene = Scene::new(map.reflectance, map.size_px, side_mm)?;
-    let conditions = Conditions { distance_m, rain, frames: args.frames };
-    shoot(scene, conditions, args.seed.wrapping_add(u64::from(i)))
+    let conditions = Conditions { distance_m, rain, frames: args.exposure.frames };
+    shoot(scene, conditions, args.exposure.seed.wrapping_add(u64::from(i)))
 }
 
 fn rows(measured: &[Measured]) -> Vec<Row> {
@@ -233,7 +225,7 @@ fn reading(rows: &[Row]) -> Vec<String> {
 fn picture(args: &Args) -> Result<SideBySide> {
     let mut panels = Vec::new();
     for distance_m in DISTANCES_M {
-        let shots = take(args, args.rain, distance_m, 17)?;
+        let shots = take(args, args.exposure.rain, distance_m, 17)?;
         for (name, image) in [("NIR-SPI", &shots.nir_spi), ("VIS", &shots.vis)] {
             let fitted = compare(image, &shots.truth)?;
             panels.push(Panel {
@@ -253,7 +245,7 @@ fn picture(args: &Args) -> Result<SideBySide> {
         header: format!(
             "One of {} scenes a distance, rain {}, 15 klx",
             args.scenes,
-            args.rain.name()
+            args.exposure.rain.name()
         ),
         panels,
         footer: "simulated: virtual camera; VIS is a model of a small industrial camera".to_owned(),

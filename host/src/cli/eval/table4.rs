@@ -1,6 +1,6 @@
 //! `nirspi eval table4`: spatial resolution in rain, NIR-SPI and VIS, by slanted edge and by bars.
 
-use super::shot::{Conditions, FRAMES, Shots, progress, shoot};
+use super::shot::{Conditions, Exposure, Shots, progress, shoot};
 use super::{DISTANCES_M, Estimate};
 use crate::cli::camera::Rain;
 use crate::cli::print;
@@ -30,16 +30,8 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value_t = 200,
           value_parser = clap::value_parser!(u32).range(20..=100_000))]
     scenes: u32,
-    /// Rain, as in the paper's Table 2
-    #[arg(long, value_enum, default_value_t = Rain::Heavy)]
-    rain: Rain,
-    /// Differential sweeps summed into a picture; 244 are 20 ms
-    #[arg(long, value_name = "N", default_value_t = FRAMES,
-          value_parser = clap::value_parser!(u32).range(1..=100_000))]
-    frames: u32,
-    /// Seed of the first picture
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    seed: u64,
+    #[command(flatten)]
+    exposure: Exposure,
     /// Folder for table4.json and table4.png
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -142,10 +134,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 
     let report = Report {
         simulated: true,
-        rain: args.rain,
+        rain: args.exposure.rain,
         scenes: args.scenes,
-        frames: args.frames,
-        seed: args.seed,
+        frames: args.exposure.frames,
+        seed: args.exposure.seed,
         rows,
         reading: reading(),
     };
@@ -171,8 +163,9 @@ fn take(args: &Args, reflectance: Vec<f32>, distance_m: f64, i: u64) -> Result<S
     let field_mm = Projector::default().field_mm(distance_m * 1e3);
     // The mean of what lies around it, so that the field's own edge adds little.
     let scene = Scene::new(reflectance, SCENE_PX, field_mm)?.with_surround(0.5)?;
-    let conditions = Conditions { distance_m, rain: args.rain, frames: args.frames };
-    shoot(scene, conditions, args.seed.wrapping_add(i))
+    let conditions =
+        Conditions { distance_m, rain: args.exposure.rain, frames: args.exposure.frames };
+    shoot(scene, conditions, args.exposure.seed.wrapping_add(i))
 }
 
 /// Contrast kept of bars, VIS and NIR-SPI, of the mean of some pictures.
