@@ -1,0 +1,84 @@
+//! Which of the 62 characters an image shows: for character accuracy and the Frechet character distance.
+
+use burn::module::Module;
+use burn::nn::Linear;
+use burn::nn::conv::Conv2d;
+use burn::tensor::Tensor;
+use burn::tensor::activation::relu;
+use burn::tensor::backend::Backend;
+
+use super::{convolution, linear, pooled};
+use crate::weights::{Weights, WeightsError};
+
+/// Sizes of a [`Classifier`].
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ClassifierConfig {
+    /// Channels of each pair of convolutions.
+    pub channels: [usize; 3],
+    /// Classes told apart.
+    pub classes: usize,
+}
+
+impl Default for ClassifierConfig {
+    fn default() -> Self {
+        Self { channels: [32, 64, 128], classes: 62 }
+    }
+}
+
+impl ClassifierConfig {
+    /// The sizes of the network that these weights are of.
+    ///
+    /// # Errors
+    /// [`WeightsError`] if they are of another network.
+    pub fn of(weights: &Weights) -> Result<Self, WeightsError> {
+        let mut channels = [0; 3];
+        for (pair, channels) in channels.iter_mut().enumerate() {
+            *channels = weights.shape::<4>(&format!("conv{}.weight", 2 * pair + 1))?[0];
+        }
+        Ok(Self { channels, classes: weights.shape::<2>("fc.weight")?[0] })
+    }
+
+    /// A network with PyTorch's initial weights.
+    pub fn init<B: Backend>(&self, device: &B::Device) -> Classifier<B> {
+        let [c1, c2, c3] = self.channels;
+        Classifier {
+            conv1: convolution([1, c1], 3, 2, 1, 1.0, device),
+            conv2: convolution([c1, c1], 3, 1, 1, 1.0, device),
+            conv3: convolution([c1, c2], 3, 2, 1, 1.0, device),
+            conv4: convolution([c2, c2], 3, 1, 1, 1.0, device),
+            conv5: convolution([c2, c3], 3, 2, 1, 1.0, device),
+            conv6: convolution([c3, c3], 3, 1, 1, 1.0, device),
+            fc: linear(c3, self.classes, device),
+        }
+    }
+}
+
+/// The network; see the module.
+#[derive(Module, Debug)]
+pub struct Classifier<B: Backend> {
+    conv1: Conv2d<B>,
+    conv2: Conv2d<B>,
+    conv3: Conv2d<B>,
+    conv4: Conv2d<B>,
+    conv5: Conv2d<B>,
+    conv6: Conv2d<B>,
+    fc: Linear<B>,
+}
+
+impl<B: Backend> Classifier<B> {
+    /// Features of images (N, 1, 64, 64) in [0, 1]: (N, last of the channels).
+    pub fn features(&self, images: Tensor<B, 4>) -> Tensor<B, 2> {
+        let layers = [&self.conv1, &self.conv2, &self.conv3, &self.conv4, &self.conv5, &self.conv6];
+        pooled(layers.into_iter().fold(images, |h, layer| relu(layer.forward(h))))
+    }
+
+    /// Logits of the classes, (N, classes), of [`Self::features`].
+    pub fn logits(&self, features: Tensor<B, 2>) -> Tensor<B, 2> {
+        self.fc.forward(features)
+    }
+
+    /// Logits of the classes of images (N, 1, 64, 64): (N, classes).
+    pub fn forward(&self, images: Tensor<B, 4>) -> Tensor<B, 2> {
+        self.logits(self.features(images))
+    }
+}

@@ -1,0 +1,425 @@
+//! Trained weights in a safetensors file, in PyTorch's names and layout, so that a network trained in
+//! either framework runs in the other.
+//!
+//! Law: what is used is what was trained. A file that carries a checksum (`sha256` in its metadata: of
+//! all bytes after the header) is held against it, and every tensor's shape is checked before use.
+
+use std::collections::{BTreeMap, HashMap};
+use std::fmt::Write as _;
+use std::path::Path;
+use std::{fs, io};
+
+use half::f16;
+use safetensors::tensor::TensorView;
+use safetensors::{Dtype, SafeTensors};
+use sha2::{Digest, Sha256};
+use thiserror::Error;
+
+/// Metadata key of the network's name: `diffusion`, `fsrcnn`, ...
+pub const MODEL: &str = "model";
+
+/// Metadata key of the weights' version.
+pub const VERSION: &str = "version";
+
+/// Metadata key of the command, seed and data that made the weights.
+pub const RECIPE: &str = "recipe";
+
+/// Metadata key of the checksum.
+const CHECKSUM: &str = "sha256";
+
+/// Why weights cannot be used.
+#[derive(Debug, Error)]
+pub enum WeightsError {
+    /// The file cannot be read.
+    #[error("{file}: {source}")]
+    Read {
+        /// The file.
+        file: String,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// Not a safetensors file, or a damaged one.
+    #[error("{file}: not a whole safetensors file: {reason}")]
+    Format {
+        /// The file.
+        file: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// The bytes are not those that the checksum was made of.
+    #[error("{file}: damaged: checksum of the tensors is {found}, expected {expected}")]
+    Checksum {
+        /// The file.
+        file: String,
+        /// Checksum in the metadata.
+        expected: String,
+        /// Checksum of the bytes.
+        found: String,
+    },
+    /// Weights of another network.
+    #[error("{file}: weights of network {found}, expected {expected}")]
+    Model {
+        /// The file.
+        file: String,
+        /// The network that they are wanted for.
+        expected: String,
+        /// The network that the metadata names.
+        found: String,
+    },
+    /// A tensor has numbers of a kind that weights are not.
+    #[error("{file}: tensor {tensor} holds {found}, expected F32 or F16")]
+    Kind {
+        /// The file.
+        file: String,
+        /// The tensor.
+        tensor: String,
+        /// Kind of its numbers.
+        found: String,
+    },
+    /// A tensor is missing.
+    #[error("{file}: no tensor {tensor}; are these weights of another network?")]
+    Missing {
+        /// The file.
+        file: String,
+        /// The tensor.
+        tensor: String,
+    },
+    /// A tensor has another shape.
+    #[error("{file}: tensor {tensor} is {}, expected {expected}", by(found))]
+    Shape {
+        /// The file.
+        file: String,
+        /// The tensor.
+        tensor: String,
+        /// Its shape.
+        found: Vec<usize>,
+        /// The shape, or what kind of shape, the network wants.
+        expected: String,
+    },
+    /// A tensor that the network has no place for.
+    #[error("{file}: the network has no tensor {tensor}; are these weights of another network?")]
+    Unknown {
+        /// The file.
+        file: String,
+        /// The tensor.
+        tensor: String,
+    },
+    /// No weights of that name come with the program.
+    #[error("no weights of {model} come with this program")]
+    NotEmbedded {
+        /// The network.
+        model: String,
+    },
+    /// A number in the metadata is missing or none.
+    #[error("{file}: metadata {key} is {found}, expected a number")]
+    Number {
+        /// The file.
+        file: String,
+        /// Key of the metadata.
+        key: String,
+        /// Its text.
+        found: String,
+    },
+}
+
+/// A tensor of weights, row-major.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Array {
+    /// Length of each axis.
+    pub shape: Vec<usize>,
+    /// The numbers.
+    pub values: Vec<f32>,
+}
+
+/// How the numbers are kept in a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Precision {
+    /// 16 bits: half the size, a relative error of 5e-4 a weight.
+    Half,
+    /// 32 bits.
+    Single,
+}
+
+/// The weights of one network.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Weights {
+    label: String,
+    metadata: BTreeMap<String, String>,
+    tensors: BTreeMap<String, Array>,
+}
+
+impl Weights {
+    /// None yet; `label` names them in errors.
+    pub fn new(label: &str) -> Self {
+        Self { label: label.to_owned(), metadata: BTreeMap::new(), tensors: BTreeMap::new() }
+    }
+
+    /// The weights in a file.
+    ///
+    /// # Errors
+    /// [`WeightsError`] if it cannot be read, is no whole safetensors file, or is not what its checksum says.
+    pub fn read(file: &Path) -> Result<Self, WeightsError> {
+        let label = file.display().to_string();
+        match fs::read(file) {
+            Ok(bytes) => Self::parse(&label, &bytes),
+            Err(source) => Err(WeightsError::Read { file: label, source }),
+        }
+    }
+
+    /// The weights in the bytes of a safetensors file; `label` names them in errors.
+    ///
+    /// # Errors
+    /// As [`Weights::read`].
+    pub fn parse(label: &str, bytes: &[u8]) -> Result<Self, WeightsError> {
+        let format = |reason: String| WeightsError::Format { file: label.to_owned(), reason };
+        let file = SafeTensors::deserialize(bytes).map_err(|e| format(e.to_string()))?;
+        let (header, metadata) =
+            SafeTensors::read_metadata(bytes).map_err(|e| format(e.to_string()))?;
+        let mut weights = Self::new(label);
+        weights.metadata.extend(metadata.metadata().clone().unwrap_or_default());
+        if let Some(expected) = weights.metadata.remove(CHECKSUM) {
+            // The header's length, eight bytes, stands before the header.
+            let found = checksum(&bytes[size_of::<u64>() + header..]);
+            if found != expected {
+                return Err(WeightsError::Checksum { file: label.to_owned(), expected, found });
+            }
+        }
+        for (name, view) in file.iter() {
+            let values = numbers(&view).ok_or_else(|| WeightsError::Kind {
+                file: label.to_owned(),
+                tensor: name.to_owned(),
+                found: format!("{:?}", view.dtype()),
+            })?;
+            weights.insert(name.to_owned(), Array { shape: view.shape().to_vec(), values });
+        }
+        Ok(weights)
+    }
+
+    /// The bytes of a safetensors file with these weights, its checksum included.
+    ///
+    /// # Errors
+    /// [`WeightsError::Format`] if a name or a shape cannot be written.
+    pub fn to_bytes(&self, precision: Precision) -> Result<Vec<u8>, WeightsError> {
+        let format = |reason: String| WeightsError::Format { file: self.label.clone(), reason };
+        let kept: BTreeMap<&String, Vec<u8>> =
+            self.tensors.iter().map(|(name, array)| (name, array.bytes(precision))).collect();
+        let dtype = match precision {
+            Precision::Half => Dtype::F16,
+            Precision::Single => Dtype::F32,
+        };
+        let write = |metadata: HashMap<String, String>| {
+            let views = self
+                .tensors
+                .iter()
+                .map(|(name, array)| {
+                    TensorView::new(dtype, array.shape.clone(), &kept[name]).map(|v| (name, v))
+                })
+                .collect::<Result<Vec<_>, _>>()?;
+            safetensors::serialize(views, Some(metadata))
+        };
+        let mut metadata: HashMap<_, _> = self.metadata.clone().into_iter().collect();
+        let plain = write(metadata.clone()).map_err(|e| format(e.to_string()))?;
+        let (header, _) = SafeTensors::read_metadata(&plain).map_err(|e| format(e.to_string()))?;
+        metadata.insert(CHECKSUM.to_owned(), checksum(&plain[size_of::<u64>() + header..]));
+        write(metadata).map_err(|e| format(e.to_string()))
+    }
+
+    /// What they are called in errors: the file.
+    pub fn label(&self) -> &str {
+        &self.label
+    }
+
+    /// A text of the metadata.
+    pub fn metadata(&self, key: &str) -> Option<&str> {
+        self.metadata.get(key).map(String::as_str)
+    }
+
+    /// A number of the metadata.
+    ///
+    /// # Errors
+    /// [`WeightsError::Number`] if it is missing or none.
+    pub fn number(&self, key: &str) -> Result<f64, WeightsError> {
+        let text = self.metadata(key);
+        text.and_then(|text| text.parse().ok()).ok_or_else(|| WeightsError::Number {
+            file: self.label.clone(),
+            key: key.to_owned(),
+            found: text.unwrap_or("missing").to_owned(),
+        })
+    }
+
+    /// Keeps a text in the metadata.
+    pub fn set_metadata(&mut self, key: &str, text: impl Into<String>) {
+        self.metadata.insert(key.to_owned(), text.into());
+    }
+
+    /// Are they of this network, as far as the metadata says?
+    ///
+    /// # Errors
+    /// [`WeightsError::Model`] if they are of another.
+    pub fn expect_model(&self, model: &str) -> Result<(), WeightsError> {
+        match self.metadata(MODEL) {
+            Some(found) if found != model => Err(WeightsError::Model {
+                file: self.label.clone(),
+                expected: model.to_owned(),
+                found: found.to_owned(),
+            }),
+            _ => Ok(()),
+        }
+    }
+
+    /// Keeps a tensor.
+    pub fn insert(&mut self, name: String, array: Array) {
+        self.tensors.insert(name, array);
+    }
+
+    /// Names of all tensors.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.tensors.keys().map(String::as_str)
+    }
+
+    /// The tensor of that name.
+    ///
+    /// # Errors
+    /// [`WeightsError`] if there is none, or its shape is another.
+    pub fn tensor(&self, name: &str, shape: &[usize]) -> Result<&Array, WeightsError> {
+        let array = self.get(name)?;
+        if array.shape == shape { Ok(array) } else { Err(self.misshapen(name, array, by(shape))) }
+    }
+
+    /// The shape of a tensor of `AXES` axes, none of them empty.
+    ///
+    /// # Errors
+    /// [`WeightsError`] if there is none, or it has another number of axes.
+    pub fn shape<const AXES: usize>(&self, name: &str) -> Result<[usize; AXES], WeightsError> {
+        let array = self.get(name)?;
+        match <[usize; AXES]>::try_from(array.shape.as_slice()) {
+            Ok(shape) if !shape.contains(&0) => Ok(shape),
+            _ => Err(self.misshapen(name, array, format!("{AXES} axes"))),
+        }
+    }
+
+    /// How many of a numbered list of tensors, `name(0)`, `name(1)`, ..., there are.
+    pub fn count(&self, name: impl Fn(usize) -> String) -> usize {
+        (0..).take_while(|&index| self.tensors.contains_key(&name(index))).count()
+    }
+
+    pub(crate) fn unknown(&self, tensor: &str) -> WeightsError {
+        WeightsError::Unknown { file: self.label.clone(), tensor: tensor.to_owned() }
+    }
+
+    fn get(&self, name: &str) -> Result<&Array, WeightsError> {
+        self.tensors.get(name).ok_or_else(|| WeightsError::Missing {
+            file: self.label.clone(),
+            tensor: name.to_owned(),
+        })
+    }
+
+    fn misshapen(&self, tensor: &str, array: &Array, expected: String) -> WeightsError {
+        WeightsError::Shape {
+            file: self.label.clone(),
+            tensor: tensor.to_owned(),
+            found: array.shape.clone(),
+            expected,
+        }
+    }
+}
+
+impl Array {
+    fn bytes(&self, precision: Precision) -> Vec<u8> {
+        match precision {
+            Precision::Half => {
+                self.values.iter().flat_map(|&v| f16::from_f32(v).to_le_bytes()).collect()
+            }
+            Precision::Single => self.values.iter().flat_map(|v| v.to_le_bytes()).collect(),
+        }
+    }
+}
+
+/// The numbers of a tensor, if they are of a kind that weights are.
+fn numbers(view: &TensorView<'_>) -> Option<Vec<f32>> {
+    let data = view.data();
+    match view.dtype() {
+        Dtype::F32 => Some(data.as_chunks().0.iter().map(|&b| f32::from_le_bytes(b)).collect()),
+        Dtype::F16 => {
+            Some(data.as_chunks().0.iter().map(|&b| f16::from_le_bytes(b).to_f32()).collect())
+        }
+        _ => None,
+    }
+}
+
+fn checksum(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().fold(String::new(), |mut text, byte| {
+        // Writing to a string cannot fail.
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
+}
+
+/// A shape as one says it: 32 x 8 x 3 x 3.
+fn by(shape: &[usize]) -> String {
+    shape.iter().map(ToString::to_string).collect::<Vec<_>>().join(" x ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FILE: &[u8] = include_bytes!("../tests/pytorch/estimator.safetensors");
+
+    fn tiny() -> Weights {
+        let mut weights = Weights::new("tiny");
+        weights.set_metadata(MODEL, "diffusion");
+        weights.set_metadata("beta_end", "0.02");
+        let values = vec![0.1, -3.0, 1e-3, 700.0, 0.0, -1.0];
+        weights.insert("conv.weight".to_owned(), Array { shape: vec![2, 3], values });
+        weights
+    }
+
+    #[test]
+    fn one_changed_byte_is_noticed() {
+        assert!(Weights::parse("file", FILE).is_ok());
+        let mut damaged = FILE.to_vec();
+        damaged[FILE.len() - 7] ^= 1;
+        let error = Weights::parse("file", &damaged).unwrap_err();
+        assert!(matches!(error, WeightsError::Checksum { .. }), "{error}");
+    }
+
+    #[test]
+    fn a_file_cut_short_is_refused() {
+        for length in [0, 5, 100, FILE.len() - 1] {
+            let error = Weights::parse("file", &FILE[..length]).unwrap_err();
+            assert!(matches!(error, WeightsError::Format { .. }), "{length}: {error}");
+        }
+    }
+
+    #[test]
+    fn half_precision_keeps_three_digits_in_half_the_bytes() {
+        let weights = tiny();
+        let read =
+            |precision| Weights::parse("tiny", &weights.to_bytes(precision).unwrap()).unwrap();
+        assert_eq!(read(Precision::Single), weights);
+        let shape = [2, 3];
+        let half = read(Precision::Half);
+        let pairs = half
+            .tensor("conv.weight", &shape)
+            .unwrap()
+            .values
+            .iter()
+            .zip(&weights.tensor("conv.weight", &shape).unwrap().values);
+        for (half, single) in pairs {
+            assert!((half - single).abs() <= 5e-4 * single.abs(), "{half} {single}");
+        }
+    }
+
+    #[test]
+    fn metadata_is_text_or_a_number() {
+        let weights = tiny();
+        assert_eq!(weights.number("beta_end").unwrap(), 0.02);
+        let error = weights.number(MODEL).unwrap_err().to_string();
+        assert_eq!(error, "tiny: metadata model is diffusion, expected a number");
+        assert!(weights.number("beta_start").unwrap_err().to_string().contains("missing"));
+        weights.expect_model("diffusion").unwrap();
+        let error = weights.expect_model("gan").unwrap_err().to_string();
+        assert_eq!(error, "tiny: weights of network diffusion, expected gan");
+    }
+}
