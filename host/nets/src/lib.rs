@@ -11,6 +11,7 @@
 //! ```
 
 pub mod classical;
+pub mod cpu;
 pub mod model;
 pub mod upscale;
 pub mod weights;

@@ -1,5 +1,5 @@
-"""Makes the fixtures beside it: small networks of the PyTorch twin (host/nets/training/net.py) with random
-weights, an input and the output of each. Run: python make.py FOLDER_OF_NET_PY   (torch, safetensors)"""
+"""Makes the fixtures beside it: small networks of the PyTorch twin (host/nets/training/networks.py) with random
+weights, an input and the output of each. Run: python make.py ../../training   (torch, safetensors)"""
 import hashlib
 import sys
 from pathlib import Path
@@ -9,7 +9,7 @@ from safetensors.torch import save_file
 from torch import nn
 
 sys.path.insert(0, sys.argv[1])
-import net  # noqa: E402
+import networks as net  # noqa: E402
 
 HERE = Path(__file__).parent
 

@@ -1,0 +1,88 @@
+//! What lies between convolutions, over whole channels; written so that the compiler makes vectors of it.
+//!
+//! Law: zero stays zero (margins), but for [`film_silu`], whose caller clears them.
+
+use pulp::Arch;
+
+/// e^x for |x| <= 87, relative error below 2e-7: 2^n by the exponent's bits, the rest by its Taylor polynomial.
+#[inline(always)]
+fn exp(x: f32) -> f32 {
+    /// 1.5 * 2^23: adding it leaves the nearest integer in the low bits of the sum.
+    const ROUND: f32 = 12_582_912.0;
+    /// ln 2 in two parts, the first with few bits, so that n times it is exact (Cody and Waite).
+    const LN_2: (f32, f32) = (0.693_359_4, -2.121_944_4e-4);
+    let x = x.clamp(-87.0, 87.0);
+    let shifted = x * std::f32::consts::LOG2_E + ROUND;
+    let n = shifted - ROUND;
+    let r = (x - n * LN_2.0) - n * LN_2.1;
+    let mut p = 1.0 / 5040.0;
+    for c in [1.0 / 720.0, 1.0 / 120.0, 1.0 / 24.0, 1.0 / 6.0, 0.5, 1.0, 1.0] {
+        p = p * r + c;
+    }
+    p * f32::from_bits((shifted.to_bits() << 23).wrapping_add(0x3F80_0000))
+}
+
+/// x / (1 + e^-x).
+#[inline(always)]
+fn silu_of(x: f32) -> f32 {
+    x / (1.0 + exp(-x))
+}
+
+/// SiLU of every value.
+pub(super) fn silu(arch: Arch, values: &mut [f32]) {
+    arch.dispatch(|| values.iter_mut().for_each(|x| *x = silu_of(*x)));
+}
+
+/// SiLU of `values`, into `out`.
+pub(super) fn silu_into(arch: Arch, values: &[f32], out: &mut [f32]) {
+    arch.dispatch(|| values.iter().zip(out).for_each(|(x, out)| *out = silu_of(*x)));
+}
+
+/// SiLU of `gain * value + offset`: feature-wise modulation (Perez et al., FiLM, AAAI 2018).
+pub(super) fn film_silu(arch: Arch, values: &mut [f32], gain: f32, offset: f32) {
+    arch.dispatch(|| values.iter_mut().for_each(|x| *x = silu_of(*x * gain + offset)));
+}
+
+/// Negative values times `slope`: PReLU, and with 0 ReLU.
+pub(super) fn prelu(arch: Arch, values: &mut [f32], slope: f32) {
+    arch.dispatch(|| values.iter_mut().for_each(|x| *x = x.max(0.0) + slope * x.min(0.0)));
+}
+
+/// ln(1 + e^x), without overflow.
+pub(super) fn softplus(x: f32) -> f32 {
+    x.max(0.0) + (-x.abs()).exp().ln_1p()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_exponential_is_right_to_the_last_digits() {
+        for i in -8600..8600 {
+            let x = i as f32 / 100.0;
+            let expected = f64::from(x).exp();
+            assert!((f64::from(exp(x)) / expected - 1.0).abs() < 4e-7, "{x}: {}", exp(x));
+        }
+        assert!(exp(-1e9) < 1e-37 && exp(1e9).is_finite());
+    }
+
+    #[test]
+    fn activations_are_what_they_are_called() {
+        let arch = Arch::new();
+        let x = [-3.0_f32, -0.5, 0.0, 0.7, 40.0];
+        let mut y = x;
+        silu(arch, &mut y);
+        for (x, y) in x.iter().zip(y) {
+            assert!((y - x / (1.0 + (-x).exp())).abs() < 1e-6, "{x}: {y}");
+        }
+        let mut y = x;
+        prelu(arch, &mut y, 0.25);
+        assert_eq!(y, [-0.75, -0.125, 0.0, 0.7, 40.0]);
+        let mut y = x;
+        film_silu(arch, &mut y, 2.0, -1.0);
+        assert!((y[3] - 0.4 / (1.0 + (-0.4_f32).exp())).abs() < 1e-6);
+        assert!((softplus(0.0) - 2.0_f32.ln()).abs() < 1e-6);
+        assert_eq!(softplus(100.0), 100.0);
+    }
+}

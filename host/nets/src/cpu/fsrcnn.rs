@@ -1,0 +1,80 @@
+//! The FSRCNN of [`crate::model::fsrcnn`], on the CPU.
+
+use pulp::Arch;
+
+use super::conv::Conv;
+use super::layers::{conv, prelu, slopes};
+use super::planes::Planes;
+use crate::weights::{Weights, WeightsError};
+
+/// The network, its weights in the order of the loops.
+#[derive(Debug, Clone)]
+pub struct Fsrcnn {
+    arch: Arch,
+    /// Convolutions with the slopes of what follows them.
+    layers: Vec<(Conv, Vec<f32>)>,
+    /// The transposed convolution: a pixel of the output sees only taps of its own parity, so it is one convolution
+    /// with four outputs, one for each place in a block of 2 x 2.
+    deconv: Conv,
+}
+
+impl Fsrcnn {
+    /// The network of these weights.
+    ///
+    /// # Errors
+    /// [`WeightsError`] for a tensor that is missing or of another shape.
+    pub fn new(weights: &Weights) -> Result<Self, WeightsError> {
+        let maps = weights.count(|i| format!("map.{i}.weight"));
+        let names = ["feature".to_owned(), "shrink".to_owned()]
+            .into_iter()
+            .map(|name| (format!("{name}_act"), name))
+            .chain((0..maps).map(|i| (format!("map_act.{i}"), format!("map.{i}"))))
+            .chain([("expand_act".to_owned(), "expand".to_owned())]);
+        let layers = names
+            .map(|(act, name)| {
+                let conv = conv(weights, &name)?;
+                let slopes = slopes(weights, &act, conv.outputs())?;
+                Ok((conv, slopes))
+            })
+            .collect::<Result<Vec<_>, WeightsError>>()?;
+        let [inputs, _, _, _] = weights.shape("deconv.weight")?;
+        let kernels = weights.tensor("deconv.weight", &[inputs, 1, KERNEL, KERNEL])?;
+        let bias = weights.tensor("deconv.bias", &[1])?.values[0];
+        // Output 2 r + d sees input r + k - 2 through tap 2 (2 - k) + 4 + d of the kernel (padding 4), k = 0..5.
+        let tap = |k: usize, d: usize| (8 + d).checked_sub(2 * k).filter(|&tap| tap < KERNEL);
+        let at = |o: usize, i: usize, ky: usize, kx: usize| match (tap(ky, o / 2), tap(kx, o % 2)) {
+            (Some(y), Some(x)) => kernels.values[(i * KERNEL + y) * KERNEL + x],
+            _ => 0.0,
+        };
+        let deconv = Conv::new((4, inputs, 5, 2), at, |_| bias);
+        Ok(Self { arch: Arch::new(), layers, deconv })
+    }
+
+    /// The image of twice the size: `input` holds intensity, depth and validity, each `height` x `width`. Not clamped.
+    pub fn forward(&self, input: &[f32], (height, width): (usize, usize)) -> Vec<f32> {
+        let mut h = Planes::new(CHANNELS, height, width, 2);
+        for channel in 0..CHANNELS {
+            for row in 0..height {
+                let start = (channel * height + row) * width;
+                h.row_mut(channel, row).copy_from_slice(&input[start..start + width]);
+            }
+        }
+        for (conv, slopes) in &self.layers {
+            h = conv.apply(self.arch, &h);
+            prelu(self.arch, &mut h, slopes);
+        }
+        let mut out = self.deconv.apply(self.arch, &h).shuffle(0).pixels();
+        for (row, line) in out.chunks_exact_mut(2 * width).enumerate() {
+            for (column, value) in line.iter_mut().enumerate() {
+                *value += input[row / 2 * width + column / 2];
+            }
+        }
+        out
+    }
+}
+
+/// Intensity, depth, validity.
+const CHANNELS: usize = 3;
+
+/// Side of the transposed convolution.
+const KERNEL: usize = 9;

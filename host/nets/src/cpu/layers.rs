@@ -1,0 +1,78 @@
+//! Layers by their names in a file of weights.
+
+use pulp::Arch;
+
+use super::conv::Conv;
+use super::planes::Planes;
+use crate::weights::{Weights, WeightsError};
+
+/// A convolution of stride 1 that keeps the size of its input (its taps beyond the edge see zeros).
+pub(super) fn conv(weights: &Weights, name: &str) -> Result<Conv, WeightsError> {
+    let (key, bias) = (format!("{name}.weight"), format!("{name}.bias"));
+    let [outputs, inputs, kernel, across] = weights.shape(&key)?;
+    let kernels = weights.tensor(&key, &[outputs, inputs, kernel, across])?;
+    let bias = weights.tensor(&bias, &[outputs])?;
+    let at = |o: usize, i: usize, ky: usize, kx: usize| {
+        kernels.values[((o * inputs + i) * kernel + ky) * across + kx]
+    };
+    Ok(Conv::new((outputs, inputs, kernel, kernel / 2), at, |o| bias.values[o]))
+}
+
+/// A 2 x 2 convolution of stride 2, as one of 1 x 1 over [`Planes::blocks`].
+pub(super) fn conv_blocks(weights: &Weights, name: &str) -> Result<Conv, WeightsError> {
+    let (key, bias) = (format!("{name}.weight"), format!("{name}.bias"));
+    let [outputs, inputs, _, _] = weights.shape(&key)?;
+    let kernels = weights.tensor(&key, &[outputs, inputs, 2, 2])?;
+    let bias = weights.tensor(&bias, &[outputs])?;
+    let at = |o: usize, i: usize, _: usize, _: usize| kernels.values[o * 4 * inputs + i];
+    Ok(Conv::new((outputs, 4 * inputs, 1, 0), at, |o| bias.values[o]))
+}
+
+/// A fully connected layer.
+#[derive(Debug, Clone)]
+pub(super) struct Linear {
+    /// A row for each output.
+    rows: Vec<Vec<f32>>,
+    bias: Vec<f32>,
+}
+
+impl Linear {
+    pub fn new(weights: &Weights, name: &str) -> Result<Self, WeightsError> {
+        let (key, bias) = (format!("{name}.weight"), format!("{name}.bias"));
+        let [outputs, inputs] = weights.shape(&key)?;
+        let matrix = weights.tensor(&key, &[outputs, inputs])?;
+        let bias = weights.tensor(&bias, &[outputs])?.values.clone();
+        let rows = matrix.values.chunks(inputs.max(1)).map(<[f32]>::to_vec).collect();
+        Ok(Self { rows, bias })
+    }
+
+    pub fn apply(&self, input: &[f32]) -> Vec<f32> {
+        let dot = |row: &[f32]| row.iter().zip(input).map(|(w, x)| w * x).sum::<f32>();
+        self.rows.iter().zip(&self.bias).map(|(row, bias)| bias + dot(row)).collect()
+    }
+}
+
+/// The mean of each channel.
+pub(super) fn means(planes: &Planes) -> Vec<f32> {
+    let (height, width) = planes.size();
+    let pixels = (height * width) as f32;
+    // Margins and slack are zero: they add nothing.
+    planes.values().chunks_exact(planes.stride()).map(|c| c.iter().sum::<f32>() / pixels).collect()
+}
+
+/// Slope of each channel's PReLU.
+pub(super) fn slopes(
+    weights: &Weights,
+    name: &str,
+    channels: usize,
+) -> Result<Vec<f32>, WeightsError> {
+    Ok(weights.tensor(&format!("{name}.weight"), &[channels])?.values.clone())
+}
+
+/// PReLU, a slope for each channel.
+pub(super) fn prelu(arch: Arch, planes: &mut Planes, slopes: &[f32]) {
+    let stride = planes.stride();
+    for (channel, &slope) in planes.values_mut().chunks_exact_mut(stride).zip(slopes) {
+        super::activation::prelu(arch, channel, slope);
+    }
+}

@@ -1,0 +1,181 @@
+//! Channels of one image on the way through a network, each with a margin of zeros.
+//!
+//! Law: outside of a convolution's inner loop every margin is zero. So a tap of a convolution is one
+//! offset into a channel, the same for every pixel, and no pixel needs to know that it is at an edge.
+
+/// Floats behind a channel that a loop over whole vectors may read, and write where it is output.
+pub(super) const SLACK: usize = 64;
+
+/// Channels of `height` x `width` pixels with `margin` zeros all around, rows one after the other.
+#[derive(Debug, Clone)]
+pub(super) struct Planes {
+    height: usize,
+    width: usize,
+    margin: usize,
+    values: Vec<f32>,
+    channels: usize,
+}
+
+impl Planes {
+    /// Zeros.
+    pub fn new(channels: usize, height: usize, width: usize, margin: usize) -> Self {
+        let mut planes = Self { height, width, margin, values: Vec::new(), channels };
+        planes.values = vec![0.0; channels * planes.stride()];
+        planes
+    }
+
+    /// The same kind of planes with another number of channels.
+    pub fn like(&self, channels: usize) -> Self {
+        Self::new(channels, self.height, self.width, self.margin)
+    }
+
+    /// Number of channels.
+    pub fn channels(&self) -> usize {
+        self.channels
+    }
+
+    /// Rows, columns.
+    pub fn size(&self) -> (usize, usize) {
+        (self.height, self.width)
+    }
+
+    /// Zeros around the pixels.
+    pub fn margin(&self) -> usize {
+        self.margin
+    }
+
+    /// Floats from one row to the next.
+    pub fn row_stride(&self) -> usize {
+        self.width + 2 * self.margin
+    }
+
+    /// Floats from one channel to the next.
+    pub fn stride(&self) -> usize {
+        (self.height + 2 * self.margin) * self.row_stride() + SLACK
+    }
+
+    /// Where the first pixel lies in its channel.
+    pub fn first(&self) -> usize {
+        self.margin * (self.row_stride() + 1)
+    }
+
+    /// Floats from the first pixel to the last, with it: the margins between rows lie within.
+    pub fn span(&self) -> usize {
+        (self.height - 1) * self.row_stride() + self.width
+    }
+
+    /// All channels, margins and slack with them.
+    pub fn values(&self) -> &[f32] {
+        &self.values
+    }
+
+    /// All channels, margins and slack with them.
+    pub fn values_mut(&mut self) -> &mut [f32] {
+        &mut self.values
+    }
+
+    /// Row `row` of channel `channel`.
+    pub fn row(&self, channel: usize, row: usize) -> &[f32] {
+        let start = channel * self.stride() + self.first() + row * self.row_stride();
+        &self.values[start..start + self.width]
+    }
+
+    /// Row `row` of channel `channel`.
+    pub fn row_mut(&mut self, channel: usize, row: usize) -> &mut [f32] {
+        let start = channel * self.stride() + self.first() + row * self.row_stride();
+        &mut self.values[start..start + self.width]
+    }
+
+    /// Puts the zeros back that a loop over whole channels has written over.
+    pub fn clear_margins(&mut self) {
+        let (stride, row, first, span) =
+            (self.stride(), self.row_stride(), self.first(), self.span());
+        for channel in self.values.chunks_exact_mut(stride) {
+            channel[..first].fill(0.0);
+            for end in 1..self.height {
+                channel[first + end * row - 2 * self.margin..][..2 * self.margin].fill(0.0);
+            }
+            channel[first + span..].fill(0.0);
+        }
+    }
+
+    /// All pixels, channel by channel, without margins.
+    pub fn pixels(&self) -> Vec<f32> {
+        let rows = (0..self.channels).flat_map(|c| (0..self.height).map(move |row| (c, row)));
+        rows.flat_map(|(channel, row)| self.row(channel, row)).copied().collect()
+    }
+
+    /// Adds `other`, pixel by pixel.
+    pub fn add(&mut self, other: &Self) {
+        debug_assert_eq!(self.values.len(), other.values.len());
+        for (value, other) in self.values.iter_mut().zip(&other.values) {
+            *value += other;
+        }
+    }
+
+    /// An image of `2 height` x `2 width` in four channels: pixel (2r + dy, 2c + dx) goes to (r, c) of channel
+    /// `channel + 2 dy + dx`.
+    pub fn unshuffle(&mut self, channel: usize, image: &[f32]) {
+        let (height, width) = self.size();
+        for row in 0..2 * height {
+            let line = &image[row * 2 * width..][..2 * width];
+            for dx in 0..2 {
+                let out = self.row_mut(channel + 2 * (row % 2) + dx, row / 2);
+                for (value, pixel) in out.iter_mut().zip(line[dx..].iter().step_by(2)) {
+                    *value = *pixel;
+                }
+            }
+        }
+    }
+
+    /// The other way round: four channels are one of twice the size, with margin `margin`.
+    pub fn shuffle(&self, margin: usize) -> Self {
+        let (height, width) = self.size();
+        let mut out = Self::new(self.channels / 4, 2 * height, 2 * width, margin);
+        for channel in 0..self.channels {
+            let (dy, dx) = (channel / 2 % 2, channel % 2);
+            for row in 0..height {
+                let line = out.row_mut(channel / 4, 2 * row + dy);
+                for (value, pixel) in line[dx..].iter_mut().step_by(2).zip(self.row(channel, row)) {
+                    *value = *pixel;
+                }
+            }
+        }
+        out
+    }
+
+    /// Every second pixel of every second row, from the first.
+    pub fn every_second(&self) -> Self {
+        let (height, width) = (self.height.div_ceil(2), self.width.div_ceil(2));
+        let mut out = Self::new(self.channels, height, width, self.margin);
+        for channel in 0..self.channels {
+            for row in 0..height {
+                let line = self.row(channel, 2 * row);
+                for (value, pixel) in
+                    out.row_mut(channel, row).iter_mut().zip(line.iter().step_by(2))
+                {
+                    *value = *pixel;
+                }
+            }
+        }
+        out
+    }
+
+    /// Each block of 2 x 2 pixels as four channels, `4 channel + 2 dy + dx`: what a 2 x 2 convolution of stride 2 sees.
+    pub fn blocks(&self) -> Self {
+        let (height, width) = (self.height / 2, self.width / 2);
+        let mut out = Self::new(4 * self.channels, height, width, self.margin);
+        for channel in 0..self.channels {
+            for row in 0..2 * height {
+                let line = self.row(channel, row);
+                for dx in 0..2 {
+                    let to = out.row_mut(4 * channel + 2 * (row % 2) + dx, row / 2);
+                    for (value, pixel) in to.iter_mut().zip(line[dx..].iter().step_by(2)) {
+                        *value = *pixel;
+                    }
+                }
+            }
+        }
+        out
+    }
+}
