@@ -1,7 +1,8 @@
-//! Enhancement of reconstructed images on the way to the 64 x 64 output.
+//! Enhancement of reconstructed images on the way to the 64 x 64 output: fusion with depth by FSRCNN, deblurring
+//! by a diffusion bridge, and the baselines that they have to beat.
 //!
-//! Classical: [`upscale`] and [`classical`] deblurring. FSRCNN, the diffusion deblurrer and the GAN
-//! baseline come with their own issue.
+//! Data flows from [`images`] through [`estimate`] (blur and noise), [`fusion`] and [`deblur`], all of it in [`enhance`].
+//! Without learning anything: [`upscale`] and [`classical`].
 //!
 //! ```
 //! let image = vec![0.25_f32; 32 * 32];
@@ -11,10 +12,27 @@
 //! ```
 
 pub mod classical;
+pub mod consistency;
 pub mod cpu;
+pub mod deblur;
+pub mod device;
+pub mod embedded;
+pub mod enhance;
+pub mod estimate;
+pub mod fusion;
+mod gate;
+pub mod images;
 pub mod model;
+mod network;
+mod spread;
 pub mod upscale;
 pub mod weights;
 
+pub use deblur::{Deblurrer, Method};
+pub use device::{Backend, Device, DeviceError};
+pub use enhance::{Enhanced, Enhancer, KnownEstimate, Options, Sharpener};
+pub use estimate::{BlurEstimator, Estimate};
+pub use fusion::{DepthError, DepthMaps, Fusion};
+pub use images::{Images, ImagesError};
 pub use upscale::{UpscaleError, upscale_2x};
 pub use weights::{Weights, WeightsError};

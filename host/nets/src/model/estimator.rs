@@ -10,6 +10,12 @@ use burn::tensor::backend::Backend;
 use super::{convolution, linear, pooled};
 use crate::weights::{Weights, WeightsError};
 
+/// Added to each mean feature before its logarithm is taken.
+pub(crate) const LOG_FLOOR: f32 = 1e-3;
+
+/// Added to the logarithm, to centre it.
+pub(crate) const LOG_OFFSET: f32 = 3.0;
+
 /// Sizes of an [`Estimator`].
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct EstimatorConfig {
@@ -70,6 +76,8 @@ impl<B: Backend> Estimator<B> {
         let h = [&self.conv1, &self.conv2, &self.conv3, &self.conv4]
             .into_iter()
             .fold(images, |h, convolution| relu(convolution.forward(h)));
-        softplus(self.fc2.forward(relu(self.fc1.forward(pooled(h)))), 1.0)
+        // Noise is a small signal among large ones; the logarithm makes it as visible.
+        let features = (pooled(h) + LOG_FLOOR).log() + LOG_OFFSET;
+        softplus(self.fc2.forward(relu(self.fc1.forward(features))), 1.0)
     }
 }

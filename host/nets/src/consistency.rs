@@ -1,0 +1,200 @@
+//! Agreement with what was measured: an image is moved no further than it takes to explain the readings
+//! within their noise, so that a network cannot invent what the data contradict.
+//!
+//! The camera's model is A = M B: B blurs with a Gaussian of `sigma_px` on the 64 x 64 grid, light at the
+//! edge reflected, and M takes means of 2 x 2 pixels where readings are 32 x 32 (else M = 1). An image x
+//! outside the ball |y - A x| <= tau noise sqrt(n) becomes
+//! x + A^T (A A^T + lambda)^-1 (y - A x), lambda such that it comes to lie on the ball: of all images
+//! of the same change's norm, the one that fits best (Tikhonov; Morozov's discrepancy principle).
+//!
+//! Law: inside the ball nothing changes.
+//!
+//! With reflecting edges B is diagonal in the cosine transform (DCT-II), and pair means fold cosine 64 - k
+//! onto cosine k, so A A^T is diagonal too and no iteration is needed. With some Hadamard rows missing
+//! only what was measured counts; then the same equation is solved by conjugate gradients.
+
+mod cosine;
+mod sampled;
+
+use std::f32::consts::PI;
+
+pub use sampled::MeasuredRows;
+
+use cosine::Cosine;
+
+/// Side of the sharp image.
+pub const SIDE: usize = 64;
+
+/// Radius of the ball over its expected value.
+const TAU: f32 = 1.1;
+
+/// Standard deviation that readings are never trusted beyond: the blur is an estimate and no Gaussian.
+const NOISE_FLOOR: f32 = 0.004;
+
+/// Halvings of the interval of lambda's logarithm: lambda to 1e-5.
+const BISECTIONS: usize = 22;
+
+/// The camera's model for one image, and how far to trust its readings.
+#[derive(Debug)]
+pub struct Consistency {
+    /// Cosine transform of the sharp image and of the readings.
+    image: &'static Cosine,
+    readings: &'static Cosine,
+    /// Attenuation of cosine k of the image.
+    gain: Vec<f32>,
+    /// Diagonal of D D^T on one axis, D = pair means of the blur.
+    power: Vec<f32>,
+    noise: f32,
+    measured: Option<MeasuredRows>,
+}
+
+impl Consistency {
+    /// For readings of `side` x `side` pixels, 32 or 64, of an image of [`SIDE`] x [`SIDE`] blurred by
+    /// `sigma_px` (of the image's pixels), with noise of standard deviation `noise` a reading. `measured`: the
+    /// Hadamard rows that the readings are made of, if not all.
+    pub fn new(side: usize, sigma_px: f32, noise: f32, measured: Option<MeasuredRows>) -> Self {
+        let attenuation = |k: usize| {
+            let omega = PI * k as f32 / SIDE as f32;
+            (-0.5 * (sigma_px * omega).powi(2)).exp()
+        };
+        let halved = side < SIDE;
+        // cos(pi k / 128) is what a pair's mean leaves of cosine k; 1 / sqrt 2 that of its norm.
+        let pair = |k: usize| (PI * k as f32 / (2 * SIDE) as f32).cos() * 0.5_f32.sqrt();
+        let gain: Vec<f32> =
+            (0..SIDE).map(|k| attenuation(k) * if halved { pair(k) } else { 1.0 }).collect();
+        let mut power: Vec<f32> = gain[..side].iter().map(|g| g * g).collect();
+        for k in 1..SIDE - side {
+            power[k] += gain[SIDE - k].powi(2);
+        }
+        let noise = noise.max(NOISE_FLOOR);
+        Self {
+            image: Cosine::of_image(),
+            readings: if halved { Cosine::of_readings() } else { Cosine::of_image() },
+            gain,
+            power,
+            noise,
+            measured,
+        }
+    }
+
+    /// How far `image` ([`SIDE`]^2) is from explaining `readings`, over their noise: near 1 it does.
+    pub fn residual_ratio(&self, readings: &[f32], image: &[f32]) -> f32 {
+        let residual = self.residual(readings, &self.image.forward(image));
+        norm(&residual) / (self.noise * (self.degrees() as f32).sqrt())
+    }
+
+    /// Moves `image` onto the ball, if it is outside.
+    pub fn project(&self, readings: &[f32], image: &mut [f32]) {
+        let radius = TAU * self.noise * (self.degrees() as f32).sqrt();
+        let mut spectrum = self.image.forward(image);
+        let residual = self.residual(readings, &spectrum);
+        if norm(&residual) <= radius {
+            return;
+        }
+        let dual = match &self.measured {
+            None => self.solve(&residual, radius),
+            Some(rows) => rows.solve(self, &residual, radius),
+        };
+        self.add_adjoint(&dual, &mut spectrum);
+        image.copy_from_slice(&self.image.inverse(&spectrum));
+    }
+
+    /// Readings that count.
+    fn degrees(&self) -> usize {
+        self.measured.as_ref().map_or(self.power.len().pow(2), MeasuredRows::count)
+    }
+
+    /// Cosine transform of y - A x, of the measured part of it.
+    fn residual(&self, readings: &[f32], spectrum: &[f32]) -> Vec<f32> {
+        let mut residual = self.readings.forward(readings);
+        let seen = self.apply(spectrum);
+        residual.iter_mut().zip(seen).for_each(|(r, seen)| *r -= seen);
+        if let Some(rows) = &self.measured {
+            rows.keep_measured(self.readings, &mut residual);
+        }
+        residual
+    }
+
+    /// A, in cosine space: attenuate, then fold.
+    fn apply(&self, spectrum: &[f32]) -> Vec<f32> {
+        let side = self.power.len();
+        let mut seen = vec![0.0; side * side];
+        for (row, values) in spectrum.chunks_exact(SIDE).enumerate() {
+            let Some((to_row, row_sign)) = folded(row, side) else { continue };
+            let row_gain = row_sign * self.gain[row];
+            let out = &mut seen[to_row * side..][..side];
+            for (column, value) in values.iter().enumerate() {
+                if let Some((to, sign)) = folded(column, side) {
+                    out[to] += row_gain * sign * self.gain[column] * value;
+                }
+            }
+        }
+        seen
+    }
+
+    /// `spectrum` += A^T `dual`.
+    fn add_adjoint(&self, dual: &[f32], spectrum: &mut [f32]) {
+        let side = self.power.len();
+        for (row, values) in spectrum.chunks_exact_mut(SIDE).enumerate() {
+            let Some((from_row, row_sign)) = folded(row, side) else { continue };
+            let row_gain = row_sign * self.gain[row];
+            let line = &dual[from_row * side..][..side];
+            for (column, value) in values.iter_mut().enumerate() {
+                if let Some((from, sign)) = folded(column, side) {
+                    *value += row_gain * sign * self.gain[column] * line[from];
+                }
+            }
+        }
+    }
+
+    /// A A^T's diagonal at coefficient `index`.
+    fn power_at(&self, index: usize) -> f32 {
+        let side = self.power.len();
+        self.power[index / side] * self.power[index % side]
+    }
+
+    /// (A A^T + lambda)^-1 of the residual, which then has the radius' norm: lambda / (mu + lambda) is left of
+    /// each coefficient.
+    fn solve(&self, residual: &[f32], radius: f32) -> Vec<f32> {
+        let left = |lambda: f32| {
+            let squares = residual.iter().enumerate().map(|(index, r)| {
+                let left = r * lambda / (self.power_at(index) + lambda);
+                f64::from(left * left)
+            });
+            squares.sum::<f64>().sqrt() as f32
+        };
+        let lambda = bisect(BISECTIONS, |lambda| left(lambda) > radius);
+        residual.iter().enumerate().map(|(i, r)| r / (self.power_at(i) + lambda)).collect()
+    }
+}
+
+/// The largest lambda whose result is not `outside` the ball; lambda from 1e-6 up, on a logarithmic scale.
+fn bisect(halvings: usize, mut outside: impl FnMut(f32) -> bool) -> f32 {
+    let (mut inside, mut beyond) = (-6.0_f32, 4.0_f32);
+    for _ in 0..halvings {
+        let middle = 0.5 * (inside + beyond);
+        if outside(10.0_f32.powf(middle)) {
+            beyond = middle;
+        } else {
+            inside = middle;
+        }
+    }
+    10.0_f32.powf(inside)
+}
+
+/// Where a cosine of the image shows in the readings, and its sign; nowhere for the one that pair means
+/// take out.
+fn folded(k: usize, side: usize) -> Option<(usize, f32)> {
+    match k.cmp(&side) {
+        std::cmp::Ordering::Less => Some((k, 1.0)),
+        std::cmp::Ordering::Equal => None,
+        std::cmp::Ordering::Greater => Some((SIDE - k, -1.0)),
+    }
+}
+
+fn norm(values: &[f32]) -> f32 {
+    values.iter().map(|&v| f64::from(v).powi(2)).sum::<f64>().sqrt() as f32
+}
+
+#[cfg(test)]
+mod tests;

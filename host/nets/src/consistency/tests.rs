@@ -1,0 +1,113 @@
+use super::*;
+
+/// Numbers in [0, 1] that look random.
+fn numbers(count: usize, seed: u32) -> Vec<f32> {
+    let mut state = seed.wrapping_mul(2_654_435_761).wrapping_add(12_345);
+    (0..count)
+        .map(|_| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / (1 << 24) as f32
+        })
+        .collect()
+}
+
+/// The definition: Gaussian weights, half-sample reflection at the edge, one axis after the other; means
+/// of 2 x 2 to 32 x 32.
+fn blurred(image: &[f32], sigma_px: f32, side: usize) -> Vec<f32> {
+    let radius = (6.0 * sigma_px).ceil() as i64;
+    let weights: Vec<f64> = (-radius..=radius)
+        .map(|d| (-0.5 * (d as f64 / f64::from(sigma_px)).powi(2)).exp())
+        .collect();
+    let sum: f64 = weights.iter().sum();
+    let reflected = |at: i64| {
+        let period = 2 * SIDE as i64;
+        let at = at.rem_euclid(period);
+        (if at < SIDE as i64 { at } else { period - 1 - at }) as usize
+    };
+    let along = |pixel: &dyn Fn(usize) -> f32, at: usize| -> f32 {
+        let taps = weights.iter().zip(-radius..);
+        taps.map(|(w, d)| w / sum * f64::from(pixel(reflected(at as i64 + d)))).sum::<f64>() as f32
+    };
+    let rows: Vec<f32> =
+        (0..SIDE * SIDE).map(|i| along(&|x| image[i / SIDE * SIDE + x], i % SIDE)).collect();
+    let both: Vec<f32> =
+        (0..SIDE * SIDE).map(|i| along(&|y| rows[y * SIDE + i % SIDE], i / SIDE)).collect();
+    let step = SIDE / side;
+    let mean = |i: usize| {
+        let (y, x) = (i / side * step, i % side * step);
+        let block = (0..step * step).map(|j| both[(y + j / step) * SIDE + x + j % step]);
+        block.sum::<f32>() / (step * step) as f32
+    };
+    (0..side * side).map(mean).collect()
+}
+
+fn apart(a: &[f32], b: &[f32]) -> f32 {
+    norm(&a.iter().zip(b).map(|(a, b)| a - b).collect::<Vec<_>>())
+}
+
+#[test]
+fn the_model_in_cosine_space_is_blur_and_pair_means() {
+    let image = numbers(SIDE * SIDE, 1);
+    for (side, sigma_px) in [(32, 1.0), (32, 3.5), (64, 2.0)] {
+        let model = Consistency::new(side, sigma_px, 0.01, None);
+        let seen = model.readings.inverse(&model.apply(&model.image.forward(&image)));
+        let error = apart(&seen, &blurred(&image, sigma_px, side)) / side as f32;
+        assert!(error < 1e-4, "{side} {sigma_px}: {error}");
+    }
+}
+
+#[test]
+fn the_adjoint_is_the_adjoint() {
+    let model = Consistency::new(32, 1.5, 0.01, None);
+    let (image, dual) = (numbers(SIDE * SIDE, 2), numbers(32 * 32, 3));
+    let dot = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| f64::from(a * b)).sum::<f64>();
+    let mut back = vec![0.0; SIDE * SIDE];
+    model.add_adjoint(&dual, &mut back);
+    let (left, right) = (dot(&model.apply(&image), &dual), dot(&image, &back));
+    assert!((left - right).abs() < 1e-4 * left.abs(), "{left} {right}");
+}
+
+#[test]
+fn inside_the_ball_nothing_changes() {
+    let image = numbers(SIDE * SIDE, 4);
+    let readings = blurred(&image, 2.0, 32);
+    let model = Consistency::new(32, 2.0, 0.02, None);
+    assert!(model.residual_ratio(&readings, &image) < 0.1);
+    let mut projected = image.clone();
+    model.project(&readings, &mut projected);
+    assert_eq!(projected, image);
+}
+
+#[test]
+fn an_invented_stroke_is_moved_onto_the_ball_and_no_further() {
+    let readings = blurred(&vec![0.2; SIDE * SIDE], 1.5, 32);
+    for rows in [None, MeasuredRows::new(32, &(0..1024).step_by(2).collect::<Vec<_>>())] {
+        let sampled = rows.is_some();
+        let model = Consistency::new(32, 1.5, 0.01, rows);
+        let mut image = vec![0.2; SIDE * SIDE];
+        (20..44).for_each(|y| image[y * SIDE + 30..][..5].fill(0.9));
+        let before = model.residual_ratio(&readings, &image);
+        assert!(before > 3.0, "{before}");
+        model.project(&readings, &mut image);
+        let after = model.residual_ratio(&readings, &image);
+        let within = if sampled { 0.05 } else { 0.002 };
+        assert!((after - TAU).abs() < within, "{sampled}: {after}");
+    }
+}
+
+#[test]
+fn rows_that_were_not_measured_bind_nobody() {
+    let measured: Vec<u32> = (0..256).collect();
+    let rows = MeasuredRows::new(32, &measured).unwrap();
+    assert_eq!(rows.count(), 256);
+    let model = Consistency::new(32, 1.0, 0.01, Some(rows));
+    let image = numbers(SIDE * SIDE, 5);
+    let mut readings = blurred(&image, 1.0, 32);
+    // Row 1000 of the Hadamard matrix, a pattern that nobody showed, is wrong by far.
+    for (i, value) in readings.iter_mut().enumerate() {
+        *value += if (i & 1000).count_ones() % 2 == 0 { 0.3 } else { -0.3 };
+    }
+    assert!(model.residual_ratio(&readings, &image) < 0.1);
+    assert_eq!(MeasuredRows::new(32, &(0..1024).collect::<Vec<_>>()), None);
+    assert_eq!(MeasuredRows::new(32, &[]), None);
+}

@@ -1,0 +1,181 @@
+//! The 500-step diffusion of the paper (section 3), sampled backwards: DDPM (Ho et al., NeurIPS 2020), and in
+//! fewer steps by DDIM's sub-sequences at eta = 1 (Song et al., ICLR 2021), which are the same where no
+//! step is left out.
+//!
+//! Images are 2 x - 1 here. The network guesses the noise in x_t = sqrt(abar_t) x_0 + sqrt(1 - abar_t) eps.
+
+use std::num::NonZeroU32;
+
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64;
+
+use super::{AREA, Job, SIDE, Truth};
+use crate::network::RunUNet;
+use crate::weights::{Weights, WeightsError};
+
+/// How much of the image is left after each of the T steps of noise.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Schedule {
+    /// abar_t, products of 1 - beta.
+    left: Vec<f64>,
+}
+
+impl Schedule {
+    /// The schedule that the weights were trained with: metadata `steps`, `beta_start`, `beta_end`.
+    ///
+    /// # Errors
+    /// [`WeightsError::Number`] if one is missing.
+    pub fn of(weights: &Weights) -> Result<Self, WeightsError> {
+        let steps = weights.number("steps")?;
+        let [start, end] = [weights.number("beta_start")?, weights.number("beta_end")?];
+        Ok(Self::linear(steps.clamp(1.0, 10_000.0) as usize, start, end))
+    }
+
+    /// Betas from `start` to `end` in even steps.
+    pub fn linear(steps: usize, start: f64, end: f64) -> Self {
+        let beta = |t: usize| start + (end - start) * t as f64 / (steps.max(2) - 1) as f64;
+        let left = (0..steps).scan(1.0, |product, t| {
+            *product *= 1.0 - beta(t);
+            Some(*product)
+        });
+        Self { left: left.collect() }
+    }
+
+    /// abar at `count` of the steps, evenly spaced, the noisiest first.
+    fn visited(&self, count: NonZeroU32) -> Vec<f64> {
+        let all = self.left.len();
+        let count = (count.get() as usize).clamp(1, all);
+        (1..=count).rev().map(|k| self.left[k * all / count - 1]).collect()
+    }
+}
+
+pub(super) fn run(
+    network: &dyn RunUNet,
+    schedule: &Schedule,
+    steps: NonZeroU32,
+    job: &Job<'_>,
+    truth: &Truth<'_>,
+) -> Vec<f32> {
+    let mut noise = Noise::new(job);
+    let seen: Vec<f32> = job.seen.iter().map(|v| 2.0 * v - 1.0).collect();
+    let mut x = noise.next();
+    let visited = schedule.visited(steps);
+    for (k, &now) in visited.iter().enumerate() {
+        let next = visited.get(k + 1).copied().unwrap_or(1.0);
+        let (signal, sigma) = (now.sqrt() as f32, (1.0 - now).sqrt() as f32);
+        let conditions: Vec<_> =
+            job.estimates.iter().map(|e| e.conditions([signal, sigma])).collect();
+        let epsilon = network.run(SIDE, &x, &seen, &conditions);
+        let mut guess: Vec<f32> = x
+            .iter()
+            .zip(&epsilon)
+            .map(|(x, epsilon)| 0.5 * ((x - sigma * epsilon) / signal + 1.0))
+            .collect();
+        truth.correct(&mut guess);
+        // Variance of the reverse step, and what of the noise itself is kept.
+        let variance = (1.0 - next) / (1.0 - now) * (1.0 - now / next);
+        let kept = (1.0 - next - variance).max(0.0).sqrt() as f32;
+        let (to, fresh) = (next.sqrt() as f32, variance.sqrt() as f32);
+        let draw = if fresh > 0.0 { noise.next() } else { vec![0.0; x.len()] };
+        for ((x, guess), draw) in x.iter_mut().zip(&guess).zip(draw) {
+            let clean = 2.0 * guess - 1.0;
+            // The noise that goes with the corrected guess.
+            let epsilon = (*x - signal * clean) / sigma;
+            *x = to * clean + kept * epsilon + fresh * draw;
+        }
+    }
+    x.iter().map(|v| (0.5 * (v + 1.0)).clamp(0.0, 1.0)).collect()
+}
+
+/// White noise, a stream of its own for each image.
+pub(super) struct Noise(Vec<Pcg64>);
+
+impl Noise {
+    fn new(job: &Job<'_>) -> Self {
+        // Steps of the golden ratio keep the seeds of neighbours apart.
+        let seed = |i: usize| {
+            job.seed.wrapping_add(((job.first + i) as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15))
+        };
+        let generator = |i| Pcg64::seed_from_u64(seed(i));
+        Self((0..job.estimates.len()).map(generator).collect())
+    }
+
+    fn next(&mut self) -> Vec<f32> {
+        let streams = self.0.iter_mut();
+        streams.flat_map(|rng| StandardNormal.sample_iter(rng).take(AREA)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::estimate::Estimate;
+    use crate::network::Conditions;
+
+    /// Knows that the sharp image is 0.75 everywhere.
+    struct Oracle;
+
+    impl RunUNet for Oracle {
+        fn run(&self, _: usize, x: &[f32], _: &[f32], conditions: &[Conditions]) -> Vec<f32> {
+            let area = x.len() / conditions.len();
+            let of = |(image, c): (&[f32], &Conditions)| -> Vec<f32> {
+                image.iter().map(|x| (x - c[0] * 0.5) / c[1]).collect()
+            };
+            x.chunks(area).zip(conditions).flat_map(of).collect()
+        }
+    }
+
+    fn job<'a>(images: &'a [f32], estimates: &'a [Estimate], first: usize) -> Job<'a> {
+        Job {
+            start: images,
+            seen: images,
+            readings: images,
+            readings_side: SIDE,
+            estimates,
+            measured: None,
+            consistency: false,
+            seed: 3,
+            first,
+        }
+    }
+
+    #[test]
+    fn the_schedule_is_that_of_pytorch() {
+        // torch.cumprod(1 - torch.linspace(2e-4, 0.025, 500), 0)[[0, 249, 499]]
+        let schedule = Schedule::linear(500, 2e-4, 0.025);
+        for (t, expected) in [(0, 0.9998), (249, 0.201_162_029_7), (499, 0.001_741_127_6)] {
+            assert!((schedule.left[t] - expected).abs() < 1e-6 * expected, "{t}");
+        }
+        let steps = |count| schedule.visited(NonZeroU32::new(count).unwrap());
+        assert_eq!(steps(1), [schedule.left[499]]);
+        assert_eq!(steps(2), [schedule.left[499], schedule.left[249]]);
+        assert_eq!(steps(500).len(), 500);
+        assert_eq!(steps(900).len(), 500);
+    }
+
+    #[test]
+    fn with_an_oracle_any_number_of_steps_ends_at_the_image() {
+        let schedule = Schedule::linear(500, 2e-4, 0.025);
+        let images = vec![0.5; 2 * AREA];
+        let estimates = [Estimate { sigma_px: 2.0, noise: 0.01 }; 2];
+        let job = job(&images, &estimates, 0);
+        for steps in [1, 10, 500] {
+            let steps = NonZeroU32::new(steps).unwrap();
+            let sharp = run(&Oracle, &schedule, steps, &job, &Truth::new(&job));
+            assert!(sharp.iter().all(|v| (v - 0.75).abs() < 1e-4), "{steps}");
+        }
+    }
+
+    #[test]
+    fn noise_is_white_and_of_the_image_not_of_its_batch() {
+        let images = vec![0.5; 2 * AREA];
+        let estimates = [Estimate { sigma_px: 2.0, noise: 0.01 }; 2];
+        let both = Noise::new(&job(&images, &estimates, 6)).next();
+        let second = Noise::new(&job(&images[AREA..], &estimates[1..], 7)).next();
+        assert_eq!(both[AREA..], second);
+        assert_ne!(both[..AREA], second);
+        let moment = |power| both.iter().map(|v| v.powi(power)).sum::<f32>() / both.len() as f32;
+        assert!(moment(1).abs() < 0.05 && (moment(2) - 1.0).abs() < 0.05);
+    }
+}

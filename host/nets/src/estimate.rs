@@ -1,0 +1,65 @@
+//! How blurred and how noisy an image is, from the image itself.
+
+use crate::device::Device;
+use crate::images::Images;
+use crate::network::{Conditions, RunEstimator};
+use crate::weights::{Weights, WeightsError};
+
+/// Side of the grid that blur is counted on.
+const OUTPUT_SIDE: usize = 64;
+
+/// Blur of this many pixels is 1 to the networks.
+const SIGMA_SCALE_PX: f32 = 4.0;
+
+/// Noise of one over this is 1 to the networks.
+const NOISE_SCALE: f32 = 10.0;
+
+/// The largest condition that the networks were trained with.
+const CONDITION_MAX: f32 = 1.5;
+
+/// Blur and noise of an image.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    /// Standard deviation of a Gaussian blur, in pixels of the 64 x 64 output grid.
+    pub sigma_px: f32,
+    /// Standard deviation of the noise of a pixel of the image as measured, of a full scale of 1.
+    pub noise: f32,
+}
+
+impl Estimate {
+    /// What the UNet is told, after two numbers that say where on its path it is.
+    pub(crate) fn conditions(&self, path: [f32; 2]) -> Conditions {
+        let s = (self.sigma_px / SIGMA_SCALE_PX).clamp(0.0, CONDITION_MAX);
+        let n = (self.noise * NOISE_SCALE).clamp(0.0, CONDITION_MAX);
+        [path[0], path[1], s, s * s, n, n * n]
+    }
+}
+
+/// The network that estimates.
+pub struct BlurEstimator {
+    network: Box<dyn RunEstimator>,
+    batch: usize,
+}
+
+impl BlurEstimator {
+    /// The network of these weights (model `estimator`).
+    ///
+    /// # Errors
+    /// [`WeightsError`] if they are of another network.
+    pub fn new(device: &Device, weights: &Weights) -> Result<Self, WeightsError> {
+        weights.expect_model("estimator")?;
+        Ok(Self { network: device.estimator(weights)?, batch: device.batch() })
+    }
+
+    /// Blur and noise of each image of 32 x 32 or 64 x 64.
+    pub fn estimate<const SIDE: usize>(&self, images: Images<'_, SIDE>) -> Vec<Estimate> {
+        // Blur comes in pixels of the image's own grid.
+        let px = SIGMA_SCALE_PX * (OUTPUT_SIDE / SIDE) as f32;
+        images
+            .values()
+            .chunks(self.batch * SIDE * SIDE)
+            .flat_map(|chunk| self.network.run(SIDE, chunk))
+            .map(|[sigma, noise]| Estimate { sigma_px: px * sigma, noise: noise / NOISE_SCALE })
+            .collect()
+    }
+}

@@ -1,0 +1,157 @@
+//! Intensity and depth become one image of twice the pixels: the paper's fusion by FSRCNN (section 2.C).
+//!
+//! Law: a zone without depth is told apart from a near one: its depth is 0 and so is its validity.
+
+use thiserror::Error;
+
+use crate::device::Device;
+use crate::images::Images;
+use crate::network::RunFsrcnn;
+use crate::weights::{Weights, WeightsError};
+
+/// Side of the intensity image.
+pub const SIDE: usize = 32;
+
+/// The depth that is 1 to the network; deeper is 1 too.
+const DEPTH_SCALE_M: f32 = 3.0;
+
+/// Why depth maps are refused.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum DepthError {
+    /// The maps' sides do not divide 32, or their number is not that of the images, nor one.
+    #[error(
+        "{maps} depth maps of {height} x {width}, expected 1 or {images} of a side that divides 32"
+    )]
+    Shape {
+        /// Maps given.
+        maps: usize,
+        /// Rows of each.
+        height: usize,
+        /// Columns of each.
+        width: usize,
+        /// Images that they belong to.
+        images: usize,
+    },
+}
+
+/// Depth maps as a time-of-flight sensor gives them, 8 x 8 to 32 x 32 zones.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DepthMaps {
+    side: usize,
+    /// Metres; NaN, infinity, zero and less mean that the zone saw nothing.
+    zones_m: Vec<f32>,
+}
+
+impl DepthMaps {
+    /// `maps` of `height` x `width` zones in metres, row-major, for `images` images: one for each, or one
+    /// for all. A zone that is not a positive number saw nothing.
+    ///
+    /// # Errors
+    /// [`DepthError`] if the numbers do not fit.
+    pub fn new(
+        zones_m: Vec<f32>,
+        [maps, height, width]: [usize; 3],
+        images: usize,
+    ) -> Result<Self, DepthError> {
+        let fits = height == width
+            && height > 0
+            && SIDE.is_multiple_of(height)
+            && (maps == images || maps == 1)
+            && zones_m.len() == maps * height * width;
+        if fits {
+            Ok(Self { side: height, zones_m })
+        } else {
+            Err(DepthError::Shape { maps, height, width, images })
+        }
+    }
+
+    /// The maps of `count` images from `first` on.
+    pub(crate) fn of(&self, first: usize, count: usize) -> Self {
+        let area = self.side * self.side;
+        let zones_m = if self.zones_m.len() == area {
+            self.zones_m.clone()
+        } else {
+            self.zones_m[first * area..(first + count) * area].to_vec()
+        };
+        Self { side: self.side, zones_m }
+    }
+
+    /// Depth over 3 m and validity at one pixel of the 32 x 32 grid.
+    fn at(&self, image: usize, pixel: usize) -> (f32, f32) {
+        let zone = SIDE / self.side;
+        let (row, column) = (pixel / SIDE / zone, pixel % SIDE / zone);
+        let area = self.side * self.side;
+        let map = if self.zones_m.len() == area { 0 } else { image };
+        let depth_m = self.zones_m[map * area + row * self.side + column];
+        if depth_m > 0.0 && depth_m.is_finite() {
+            ((depth_m / DEPTH_SCALE_M).min(1.0), 1.0)
+        } else {
+            (0.0, 0.0)
+        }
+    }
+}
+
+/// FSRCNN with its second input.
+pub struct Fusion {
+    network: Box<dyn RunFsrcnn>,
+    batch: usize,
+}
+
+impl Fusion {
+    /// The network of these weights (model `fsrcnn`).
+    ///
+    /// # Errors
+    /// [`WeightsError`] if they are of another network.
+    pub fn new(device: &Device, weights: &Weights) -> Result<Self, WeightsError> {
+        weights.expect_model("fsrcnn")?;
+        Ok(Self { network: device.fsrcnn(weights)?, batch: device.batch() })
+    }
+
+    /// Each image at 64 x 64, in [0, 1]: enlarged and denoised, as blurred as it was.
+    pub fn upscale(&self, images: Images<'_, SIDE>, depth: Option<&DepthMaps>) -> Vec<f32> {
+        let all: Vec<&[f32]> = images.iter().collect();
+        let mut out = Vec::with_capacity(4 * images.values().len());
+        for (chunk, images) in all.chunks(self.batch).enumerate() {
+            let mut input = Vec::with_capacity(3 * images.len() * SIDE * SIDE);
+            for (i, image) in images.iter().enumerate() {
+                input.extend_from_slice(image);
+                let at = |pixel| depth.map_or((0.0, 0.0), |d| d.at(chunk * self.batch + i, pixel));
+                input.extend((0..SIDE * SIDE).map(|pixel| at(pixel).0));
+                input.extend((0..SIDE * SIDE).map(|pixel| at(pixel).1));
+            }
+            out.extend(self.network.run(SIDE, &input).into_iter().map(|v| v.clamp(0.0, 1.0)));
+        }
+        out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_zone_covers_its_pixels_and_a_blind_one_is_marked() {
+        let mut zones = vec![1.5; 2 * 64];
+        zones[64 + 9] = f32::NAN;
+        zones[64 + 10] = 0.0;
+        zones[64 + 11] = 30.0;
+        let depth = DepthMaps::new(zones, [2, 8, 8], 2).unwrap();
+        assert_eq!(depth.at(1, 0), (0.5, 1.0));
+        // Zone (1, 1) is pixels 4 to 7 of rows 4 to 7.
+        assert_eq!(depth.at(1, 4 * SIDE + 7), (0.0, 0.0));
+        assert_eq!(depth.at(1, 7 * SIDE + 8), (0.0, 0.0));
+        assert_eq!(depth.at(1, 4 * SIDE + 12), (1.0, 1.0));
+        assert_eq!(depth.at(1, 8 * SIDE + 4), (0.5, 1.0));
+        assert_eq!(depth.at(0, 4 * SIDE + 7), (0.5, 1.0));
+    }
+
+    #[test]
+    fn one_map_serves_all_images_and_other_shapes_are_refused() {
+        let one = DepthMaps::new(vec![0.3; 64], [1, 8, 8], 5).unwrap();
+        assert_eq!(one.at(4, 100), (0.1, 1.0));
+        for shape in [[2, 8, 8], [1, 5, 5], [1, 8, 4], [1, 0, 0], [1, 64, 64]] {
+            let zones = vec![1.0; shape.iter().product()];
+            assert!(DepthMaps::new(zones, shape, 5).is_err(), "{shape:?}");
+        }
+    }
+}

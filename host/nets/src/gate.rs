@@ -1,0 +1,55 @@
+//! Never harmful: an image that is sharp and clean stays as it is.
+//!
+//! Law: below the lower bounds the enhancement has no say, above the upper ones all of it, and in between
+//! its share grows in proportion, so that no small change of the input makes a jump.
+
+use crate::estimate::Estimate;
+
+/// Blur, in pixels of the output grid, where enhancement begins to have a say, and has it all.
+const SIGMA_PX: [f32; 2] = [0.35, 0.5];
+
+/// The same for noise.
+const NOISE: [f32; 2] = [0.004, 0.008];
+
+/// The enhancement's share of the result.
+pub(crate) fn share(estimate: &Estimate) -> f32 {
+    let between = |value: f32, [from, to]: [f32; 2]| ((value - from) / (to - from)).clamp(0.0, 1.0);
+    between(estimate.sigma_px, SIGMA_PX).max(between(estimate.noise, NOISE))
+}
+
+/// Puts back into `enhanced` what of each input belongs there.
+pub(crate) fn close(estimates: &[Estimate], inputs: &[f32], enhanced: &mut [f32]) {
+    let area = inputs.len() / estimates.len().max(1);
+    let pairs = enhanced.chunks_exact_mut(area).zip(inputs.chunks_exact(area));
+    for ((enhanced, input), estimate) in pairs.zip(estimates) {
+        let share = share(estimate);
+        enhanced.iter_mut().zip(input).for_each(|(e, i)| *e = i + share * (*e - i));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sharp_and_clean_stays_and_either_flaw_opens_the_gate() {
+        for (sigma_px, noise, expected) in [
+            (0.0, 0.0, 0.0),
+            (0.35, 0.004, 0.0),
+            (0.425, 0.0, 0.5),
+            (0.0, 0.006, 0.5),
+            (0.5, 0.0, 1.0),
+            (0.1, 0.05, 1.0),
+            (4.0, 0.1, 1.0),
+        ] {
+            let share = share(&Estimate { sigma_px, noise });
+            assert!((share - expected).abs() < 1e-5, "{sigma_px} {noise}: {share}");
+        }
+        let estimates =
+            [Estimate { sigma_px: 0.1, noise: 0.001 }, Estimate { sigma_px: 0.425, noise: 0.001 }];
+        let mut enhanced = [1.0; 4];
+        close(&estimates, &[0.2, 0.3, 0.2, 0.4], &mut enhanced);
+        let expected = [0.2, 0.3, 0.6, 0.7];
+        assert!(enhanced.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-5), "{enhanced:?}");
+    }
+}
