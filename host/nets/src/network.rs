@@ -2,18 +2,21 @@
 //!
 //! Law: every device gives the same numbers, to 1e-4; nothing above this module knows which one computed.
 
-use burn::backend::Flex;
+#[cfg(feature = "gpu")]
+mod on_burn;
+
 #[cfg(feature = "gpu")]
 use burn::backend::{Cuda, Wgpu};
-use burn::module::Module;
-use burn::tensor::backend::Backend;
-use burn::tensor::{Tensor, TensorData};
+use rayon::prelude::*;
 
+use crate::cpu;
 use crate::device::{Device, Kind};
-use crate::model::{
-    CONDITIONS, Estimator, EstimatorConfig, Fsrcnn, FsrcnnConfig, UNet, UNetConfig, fill,
-};
+use crate::model::CONDITIONS;
+#[cfg(feature = "gpu")]
+use crate::model::{Estimator, EstimatorConfig, Fsrcnn, FsrcnnConfig, UNet, UNetConfig};
 use crate::weights::{Weights, WeightsError};
+#[cfg(feature = "gpu")]
+use on_burn::place;
 
 /// Time (2), blur (2), noise (2).
 pub(crate) type Conditions = [f32; CONDITIONS];
@@ -44,12 +47,10 @@ pub(crate) trait RunFsrcnn: Send {
 
 impl Device {
     pub(crate) fn unet(&self, weights: &Weights) -> Result<Box<dyn RunUNet>, WeightsError> {
+        #[cfg(feature = "gpu")]
         let config = UNetConfig::of(weights)?;
         Ok(match &self.kind {
-            Kind::Cpu => {
-                let device = Default::default();
-                Box::new(place::<Flex, UNet<_>>(config.init(&device), weights, &device)?)
-            }
+            Kind::Cpu => Box::new(OnCpu(cpu::UNet::new(weights)?)),
             #[cfg(feature = "gpu")]
             Kind::Wgpu(device) => {
                 Box::new(place::<Wgpu, UNet<_>>(config.init(device), weights, device)?)
@@ -65,12 +66,10 @@ impl Device {
         &self,
         weights: &Weights,
     ) -> Result<Box<dyn RunEstimator>, WeightsError> {
+        #[cfg(feature = "gpu")]
         let config = EstimatorConfig::of(weights)?;
         Ok(match &self.kind {
-            Kind::Cpu => {
-                let device = Default::default();
-                Box::new(place::<Flex, Estimator<_>>(config.init(&device), weights, &device)?)
-            }
+            Kind::Cpu => Box::new(OnCpu(cpu::Estimator::new(weights)?)),
             #[cfg(feature = "gpu")]
             Kind::Wgpu(device) => {
                 Box::new(place::<Wgpu, Estimator<_>>(config.init(device), weights, device)?)
@@ -83,12 +82,10 @@ impl Device {
     }
 
     pub(crate) fn fsrcnn(&self, weights: &Weights) -> Result<Box<dyn RunFsrcnn>, WeightsError> {
+        #[cfg(feature = "gpu")]
         let config = FsrcnnConfig::of(weights)?;
         Ok(match &self.kind {
-            Kind::Cpu => {
-                let device = Default::default();
-                Box::new(place::<Flex, Fsrcnn<_>>(config.init(&device), weights, &device)?)
-            }
+            Kind::Cpu => Box::new(OnCpu(cpu::Fsrcnn::new(weights)?)),
             #[cfg(feature = "gpu")]
             Kind::Wgpu(device) => {
                 Box::new(place::<Wgpu, Fsrcnn<_>>(config.init(device), weights, device)?)
@@ -101,36 +98,10 @@ impl Device {
     }
 }
 
-/// A burn module and the device that its weights are on.
-struct OnBurn<B: Backend, M> {
-    module: M,
-    device: B::Device,
-}
+/// A network of [`cpu`]: images side by side on all cores, or all cores on one.
+struct OnCpu<M>(M);
 
-fn place<B: Backend, M: Module<B>>(
-    module: M,
-    weights: &Weights,
-    device: &B::Device,
-) -> Result<OnBurn<B, M>, WeightsError> {
-    Ok(OnBurn { module: fill(module, weights)?, device: device.clone() })
-}
-
-impl<B: Backend, M> OnBurn<B, M> {
-    fn tensor<const D: usize>(&self, shape: [usize; D], values: &[f32]) -> Tensor<B, D> {
-        Tensor::from_data(TensorData::new(values.to_vec(), shape), &self.device)
-    }
-
-    fn images(&self, channels: usize, side: usize, values: &[f32]) -> Tensor<B, 4> {
-        let count = values.len() / (channels * side * side);
-        self.tensor([count, channels, side, side], values)
-    }
-}
-
-fn values<B: Backend, const D: usize>(tensor: Tensor<B, D>) -> Vec<f32> {
-    tensor.into_data().iter::<f32>().collect()
-}
-
-impl<B: Backend> RunUNet for OnBurn<B, UNet<B>> {
+impl RunUNet for OnCpu<cpu::UNet> {
     fn run(
         &self,
         side: usize,
@@ -138,23 +109,25 @@ impl<B: Backend> RunUNet for OnBurn<B, UNet<B>> {
         degraded: &[f32],
         conditions: &[Conditions],
     ) -> Vec<f32> {
-        let conditions = self.tensor([conditions.len(), CONDITIONS], conditions.as_flattened());
-        values(self.module.forward(
-            self.images(1, side, current),
-            self.images(1, side, degraded),
-            conditions,
-        ))
+        let area = side * side;
+        let images = current.par_chunks_exact(area).zip(degraded.par_chunks_exact(area));
+        let sharp = images.zip(conditions).map(|((current, degraded), conditions)| {
+            self.0.forward(current, degraded, (side, side), conditions)
+        });
+        sharp.collect::<Vec<_>>().concat()
     }
 }
 
-impl<B: Backend> RunEstimator for OnBurn<B, Estimator<B>> {
+impl RunEstimator for OnCpu<cpu::Estimator> {
     fn run(&self, side: usize, images: &[f32]) -> Vec<[f32; 2]> {
-        values(self.module.forward(self.images(1, side, images))).as_chunks().0.to_vec()
+        let images = images.par_chunks_exact(side * side);
+        images.map(|image| self.0.forward(image, (side, side))).collect()
     }
 }
 
-impl<B: Backend> RunFsrcnn for OnBurn<B, Fsrcnn<B>> {
+impl RunFsrcnn for OnCpu<cpu::Fsrcnn> {
     fn run(&self, side: usize, input: &[f32]) -> Vec<f32> {
-        values(self.module.forward(self.images(3, side, input)))
+        let inputs = input.par_chunks_exact(3 * side * side);
+        inputs.map(|input| self.0.forward(input, (side, side))).collect::<Vec<_>>().concat()
     }
 }

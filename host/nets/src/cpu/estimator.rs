@@ -6,6 +6,7 @@ use super::activation::softplus;
 use super::conv::Conv;
 use super::layers::{Linear, conv, means, prelu};
 use super::planes::Planes;
+use crate::model::estimator::{LOG_FLOOR, LOG_OFFSET};
 use crate::weights::{Weights, WeightsError};
 
 /// The network, its weights in the order of the loops.
@@ -45,7 +46,7 @@ impl Estimator {
             prelu(self.arch, &mut h, &zeros);
         }
         let features: Vec<f32> =
-            means(&h).into_iter().map(|mean| (mean + 1e-3).ln() + 3.0).collect();
+            means(&h).into_iter().map(|mean| (mean + LOG_FLOOR).ln() + LOG_OFFSET).collect();
         let mut hidden = self.fc1.apply(&features);
         hidden.iter_mut().for_each(|x| *x = x.max(0.0));
         let out = self.fc2.apply(&hidden);

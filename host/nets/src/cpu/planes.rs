@@ -39,11 +39,6 @@ impl Planes {
         (self.height, self.width)
     }
 
-    /// Zeros around the pixels.
-    pub fn margin(&self) -> usize {
-        self.margin
-    }
-
     /// Floats from one row to the next.
     pub fn row_stride(&self) -> usize {
         self.width + 2 * self.margin

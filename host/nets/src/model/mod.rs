@@ -5,7 +5,7 @@
 
 mod classifier;
 mod discriminator;
-mod estimator;
+pub(crate) mod estimator;
 mod fsrcnn;
 mod transfer;
 mod unet;
