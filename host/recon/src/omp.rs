@@ -7,12 +7,13 @@
 //! |---|---|
 //! | [`mod@reference`] | the paper's Algorithm 1 line by line, in `f64`: what the others are checked against |
 //! | [`Solver`] | the same support and coefficients, fast, in `f32` or `f64`, one measurement at a time |
-//! | [`solve_batch`] | many measurements of one [`Problem`], on a [`Backend`] chosen at run time |
+//! | [`solve_batch`], [`solve_path`] | many measurements of one [`Problem`], or one, on a [`Backend`] chosen at run time |
 //! | [`Dictionary`] | what both ask of the atoms: projections, and columns of the Gram matrix |
 //! | [`DenseDictionary`] | a dictionary that is a matrix |
 //! | [`MixedDictionary`] | the same in `f32`, and in `f64` where `f32` cannot tell two atoms apart |
 //! | [`nonnegative`] | coefficients of 0 or more |
 //! | [`sampled`] | Hadamard measurements of an image, by fast transforms, without storing a matrix |
+//! | `gpu` | the same on a GPU, in `f32`; with the feature of that name |
 //!
 //! What the algorithm as printed leaves open, and both paths settle alike:
 //! - It assumes atoms of unit norm. Atoms are normalised for the choice, coefficients are those of the atoms given.
@@ -25,9 +26,12 @@
 //! - Equal correlations: the lower atom is chosen. Of atoms that point the same way to rounding (random Hadamard rows see some
 //!   cosines alike) the lower stands for all.
 
+mod backend;
 mod batch;
 mod dense;
 mod dictionary;
+#[cfg(feature = "gpu")]
+pub mod gpu;
 mod kernel;
 mod mixed;
 pub mod nonnegative;
@@ -37,7 +41,8 @@ pub mod reference;
 pub mod sampled;
 mod scalar;
 
-pub use batch::{Backend, ParseBackendError, Problem, solve_batch};
+pub use backend::{Backend, BackendError, ParseBackendError};
+pub use batch::{Problem, solve_batch, solve_path};
 pub use dense::DenseDictionary;
 pub use dictionary::{Atoms, Dictionary, padded};
 pub use mixed::{MixedDictionary, MixedSolver};
@@ -131,6 +136,9 @@ pub enum OmpError {
         /// How many there are.
         atoms: usize,
     },
+    /// What was to compute it cannot.
+    #[error(transparent)]
+    Backend(#[from] BackendError),
 }
 
 fn finite<T: Copy + Into<f64>>(field: &'static str, values: &[T]) -> Result<(), OmpError> {

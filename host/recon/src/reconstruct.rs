@@ -28,7 +28,7 @@ pub use regularised::{Penalty, Regularised, RegularisedSettings, Strength, regul
 
 use crate::basis::{Basis, Transform};
 use crate::omp::sampled::{Prior, SampledHadamard, visible_energy};
-use crate::omp::{Limits, OmpError, Path, Solver, Stop};
+use crate::omp::{Backend, Limits, OmpError, Path, Stop, solve_path};
 use crate::{Image, Measurements, Order, Side, fwht};
 use thiserror::Error;
 
@@ -113,6 +113,8 @@ pub struct OmpSettings {
     pub visibility: f64,
     /// What becomes of rows that were measured.
     pub completion: Completion,
+    /// What computes the pursuits. One image is a few pursuits over different dictionaries: [`Backend::Auto`] is the processor.
+    pub backend: Backend,
 }
 
 impl OmpSettings {
@@ -134,6 +136,7 @@ impl OmpSettings {
             noise: NoiseLevel::Known(0.0),
             visibility: Self::LEAST_VISIBILITY,
             completion: Completion::Sparse,
+            backend: Backend::Auto,
         }
     }
 }
@@ -148,6 +151,7 @@ impl Default for OmpSettings {
             noise: NoiseLevel::Estimated,
             visibility: Self::LEAST_VISIBILITY,
             completion: Completion::Measured,
+            backend: Backend::Auto,
         }
     }
 }
@@ -264,6 +268,7 @@ struct Problem<'a> {
     residual: f64,
     /// Whether it ends at the noise as well.
     to_noise: bool,
+    backend: Backend,
 }
 
 impl<'a> Problem<'a> {
@@ -282,7 +287,17 @@ impl<'a> Problem<'a> {
         };
         let scale = prior_scale(&transform, rows, &values, falloff);
         let prior = Prior { scale, noise, visibility: 0.0 };
-        Self { side, rows, values, unit, transform, prior, residual: 0.0, to_noise: false }
+        Self {
+            side,
+            rows,
+            values,
+            unit,
+            transform,
+            prior,
+            residual: 0.0,
+            to_noise: false,
+            backend: Backend::Auto,
+        }
     }
 
     fn new(measurements: &'a Measurements, settings: &OmpSettings) -> Self {
@@ -290,6 +305,7 @@ impl<'a> Problem<'a> {
         problem.prior.visibility = settings.visibility as f32;
         problem.residual = settings.residual;
         problem.to_noise = settings.sparsity == Sparsity::Noise;
+        problem.backend = settings.backend;
         problem
     }
 
@@ -317,7 +333,7 @@ impl<'a> Problem<'a> {
         let dictionary = SampledHadamard::new(&self.transform, &rows, &self.prior);
         let noise = if self.to_noise { f64::from(self.prior.noise) } else { 0.0 };
         let limits = Limits { sparsity: atoms, residual: self.residual, noise };
-        let path = Solver::new(&dictionary, &limits)?.solve(&values)?;
+        let path = solve_path(&dictionary, &limits, &values, self.backend)?;
         Ok((path, dictionary))
     }
 }

@@ -1,10 +1,10 @@
 //! Arguments that say how to make an image from measurements, and what the report says of it.
 
-use super::Usage;
+use super::{Usage, backend};
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use nirspi::files::npy::read_stack;
-use nirspi_recon::omp::Stop;
+use nirspi_recon::omp::{Backend, Stop};
 use nirspi_recon::reconstruct::{
     self, Completion, OmpSettings, Penalty, RegularisedSettings, Sparsity, Strength,
 };
@@ -84,6 +84,9 @@ pub struct MethodArgs {
     /// What becomes of patterns that were measured
     #[arg(long, value_enum, default_value_t = Keep::Measured)]
     pub keep: Keep,
+    /// OMP: what computes: auto, cpu, wgpu, cuda; one image is too little for a GPU, so auto is the cpu
+    #[arg(long, value_name = "BACKEND", default_value_t = Backend::Auto)]
+    pub backend: Backend,
 }
 
 impl MethodArgs {
@@ -99,6 +102,10 @@ impl MethodArgs {
         }
         if self.dictionary.is_some() && self.method != Method::Omp {
             return Err(Usage("--dictionary belongs to --method omp".to_owned()).into());
+        }
+        if !matches!(self.backend, Backend::Auto | Backend::Cpu) && self.method != Method::Omp {
+            let text = format!("--backend {} belongs to --method omp", self.backend);
+            return Err(Usage(text).into());
         }
         if let Some(found) = self.strength {
             if !(found > 0.0 && found <= 1e6) {
@@ -142,6 +149,9 @@ struct PenaltyReport {
 #[derive(Debug, Serialize)]
 struct OmpReport {
     basis: String,
+    backend: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    device: Option<String>,
     sparsity: usize,
     keep: Keep,
     stop: &'static str,
@@ -211,8 +221,12 @@ pub fn solve(args: &MethodArgs, measurements: &Measurements) -> Result<Solved> {
         let report = Report { method: args.method, omp: None, penalty: None };
         return Ok(Solved { image, report });
     }
+    // One image.
+    let device = backend::choose(args.backend, 1)?.as_ref().map(backend::name);
+    let computes = if device.is_some() { args.backend } else { Backend::Cpu };
     let mut settings = OmpSettings {
         basis: args.basis()?,
+        backend: computes,
         residual: args.residual,
         completion: keep.completion(),
         ..OmpSettings::default()
@@ -221,7 +235,7 @@ pub fn solve(args: &MethodArgs, measurements: &Measurements) -> Result<Solved> {
         settings.sparsity = Sparsity::Fixed(atoms);
         if args.as_printed {
             let printed = OmpSettings::as_printed(settings.basis, atoms);
-            settings = OmpSettings { residual: args.residual, ..printed };
+            settings = OmpSettings { residual: args.residual, backend: computes, ..printed };
         }
     }
     if args.stop_at_noise {
@@ -245,6 +259,8 @@ pub fn solve(args: &MethodArgs, measurements: &Measurements) -> Result<Solved> {
     };
     let omp = OmpReport {
         basis,
+        backend: computes.name(),
+        device,
         sparsity: found.sparsity,
         keep,
         stop: match found.stop {

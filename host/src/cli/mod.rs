@@ -3,6 +3,7 @@
 //! Exit codes: 0 done, 1 failed (one line on stderr says why), 2 used wrongly.
 
 mod address;
+mod backend;
 mod bench;
 mod camera;
 mod capture;

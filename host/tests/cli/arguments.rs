@@ -59,7 +59,7 @@ fn mistakes_in_the_arguments_get_one_line_and_code_2() {
         (&["demo", "--method", "tv", "--strength", "0"], &["--strength is 0"]),
         (&["bench", "omp", "--sparsity", "0"], &["--sparsity is 0", "1 to 512"]),
         (&["bench", "omp", "--measurements", "1025"], &["--measurements is 1025", "1 to 1024"]),
-        (&["bench", "omp", "--backend", "abacus"], &["--backend", "abacus", "auto or cpu"]),
+        (&["bench", "omp", "--backend", "abacus"], &["--backend", "abacus", "auto, cpu, wgpu or cuda"]),
         (&["eval", "sampling", "in.npz", "--sampling", "0.1,2"], &["--sampling is 2"]),
         (&["eval", "sampling", "in.npz", "--orders", "magic"], &["magic", "cake-cutting"]),
         (&["demo", "--frames", "0"], &["--frames", "'0'"]),

@@ -1,56 +1,14 @@
 //! Many measurements of one dictionary at once, on whatever is there to compute on.
 //!
-//! The one law: a batch is a loop. Each solution is the one that [`Solver::solve`] finds alone, bit for bit, whatever the
+//! The one law: a batch is a loop. On the processor each solution is the one that [`Solver::solve`] finds alone, bit for bit, whatever the
 //! number of threads.
 
 use super::dictionary::{Dictionary, padded};
 use super::pursuit::{Path, Solver, energy};
 use super::scalar::Scalar;
-use super::{Limits, OmpError, Solution, finite};
+use super::{Backend, Limits, OmpError, Solution, finite};
 use rayon::prelude::*;
-use std::fmt;
-use std::str::FromStr;
 use std::sync::{Mutex, PoisonError};
-use thiserror::Error;
-
-/// What computes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Backend {
-    /// The fastest that this build and machine have.
-    #[default]
-    Auto,
-    /// All cores of the processor.
-    Cpu,
-}
-
-/// The name of no backend.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[error("unknown backend {found:?}, expected auto or cpu")]
-pub struct ParseBackendError {
-    /// What was given.
-    pub found: String,
-}
-
-impl FromStr for Backend {
-    type Err = ParseBackendError;
-
-    fn from_str(name: &str) -> Result<Self, ParseBackendError> {
-        match name {
-            "auto" => Ok(Self::Auto),
-            "cpu" => Ok(Self::Cpu),
-            _ => Err(ParseBackendError { found: name.to_owned() }),
-        }
-    }
-}
-
-impl fmt::Display for Backend {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Auto => "auto",
-            Self::Cpu => "cpu",
-        })
-    }
-}
 
 /// A dictionary, and when to stop: all that is common to the measurements of a batch.
 #[derive(Debug)]
@@ -66,33 +24,74 @@ const TOGETHER: usize = 16;
 
 /// Finds a sparse representation of each measurement in `y`, `measurements` numbers each, one after another.
 ///
+/// [`Backend::Auto`] is the processor here: a GPU would have to be given the dictionary's Gram matrix for this one call. Who has
+/// many batches of a matrix keeps a `gpu::DeviceDictionary`.
+///
 /// # Errors
-/// [`OmpError`] if the length of `y` is no multiple of the dictionary's measurements, a number is not finite or a limit
-/// makes no sense.
+/// [`OmpError`] if the length of `y` is no multiple of the dictionary's measurements, a number is not finite, a limit
+/// makes no sense, or a device that was asked for by name is not there.
 pub fn solve_batch<T: Scalar, D: Dictionary<T> + ?Sized>(
     problem: &Problem<'_, D>,
     y: &[T],
     backend: Backend,
 ) -> Result<Vec<Solution>, OmpError> {
-    Ok(solve_batch_paths(problem, y, backend)?.into_iter().map(Path::solution).collect())
+    match backend {
+        Backend::Auto | Backend::Cpu => {
+            Ok(solve_batch_paths(problem, y)?.into_iter().map(Path::solution).collect())
+        }
+        Backend::Wgpu | Backend::Cuda => {
+            check(problem, y)?;
+            #[cfg(feature = "gpu")]
+            if let Some(device) = super::gpu::Device::open(backend)? {
+                let Problem { dictionary, limits } = problem;
+                return super::gpu::solve_batch_over(&device, *dictionary, limits, y);
+            }
+            Err(super::BackendError::not_built().into())
+        }
+    }
 }
 
-/// [`solve_batch`] with what the pursuits know besides.
+/// Pursues one measurement, with a solution for every number of atoms. [`Backend::Auto`] is the processor, which has solved it
+/// before a GPU has the Gram matrix.
+///
+/// # Errors
+/// [`OmpError`] if `y` does not fit the dictionary or is not finite, a limit makes no sense, or a device that was asked for by
+/// name is not there.
+pub fn solve_path<D: Dictionary<f32> + ?Sized>(
+    dictionary: &D,
+    limits: &Limits,
+    y: &[f32],
+    backend: Backend,
+) -> Result<Path<f32>, OmpError> {
+    let (Backend::Wgpu | Backend::Cuda) = backend else {
+        return Solver::new(dictionary, limits)?.solve(y);
+    };
+    #[cfg(feature = "gpu")]
+    if let Some(device) = super::gpu::Device::open(backend)? {
+        return super::gpu::path_over(&device, dictionary, limits, y);
+    }
+    Err(super::BackendError::not_built().into())
+}
+
+/// [`solve_batch`] on the processor, with what the pursuits know besides.
 pub(super) fn solve_batch_paths<T: Scalar, D: Dictionary<T> + ?Sized>(
     problem: &Problem<'_, D>,
     y: &[T],
-    backend: Backend,
 ) -> Result<Vec<Path<T>>, OmpError> {
-    let Problem { dictionary, limits } = *problem;
-    let expected = dictionary.measurements();
+    check(problem, y)?;
+    on_all_cores(problem.dictionary, &problem.limits, y)
+}
+
+fn check<T: Scalar, D: Dictionary<T> + ?Sized>(
+    problem: &Problem<'_, D>,
+    y: &[T],
+) -> Result<(), OmpError> {
+    let expected = problem.dictionary.measurements();
     if expected == 0 || !y.len().is_multiple_of(expected) {
         return Err(OmpError::Length { found: y.len(), expected });
     }
     finite("measurement", y)?;
-    limits.check()?;
-    match backend {
-        Backend::Auto | Backend::Cpu => on_all_cores(dictionary, &limits, y),
-    }
+    problem.limits.check()
 }
 
 fn on_all_cores<T: Scalar, D: Dictionary<T> + ?Sized>(

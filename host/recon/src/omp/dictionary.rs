@@ -84,6 +84,12 @@ impl<T: Scalar> Atoms<T> {
         &self.unseen
     }
 
+    /// Whether they are chosen by correlation.
+    #[cfg(feature = "gpu")]
+    pub(super) fn is_normalised(&self) -> bool {
+        self.normalised
+    }
+
     pub(super) fn inverse_norms(&self) -> &[T] {
         &self.inverse_norms
     }

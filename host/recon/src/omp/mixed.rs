@@ -3,10 +3,10 @@
 //! The one law: the support is that of double precision. A choice whose lead over the next best atom is within the rounding
 //! of `f32` is not believed, nor is an end that only `f32` sees; such measurements, a few in a hundred, are solved again.
 
-use super::batch::{Backend, Problem, solve_batch_paths};
+use super::batch::{Problem, solve_batch_paths};
 use super::dense::DenseDictionary;
 use super::pursuit::{Path, Solver};
-use super::{Dictionary, Limits, OmpError, Scalar, Solution, Stop, solve_batch};
+use super::{Backend, Dictionary, Limits, OmpError, Scalar, Solution, Stop, solve_batch};
 use nalgebra::DMatrix;
 use std::sync::OnceLock;
 
@@ -18,9 +18,50 @@ const BELIEVED: f64 = 8.0 * f32::EPSILON as f64;
 #[derive(Debug)]
 pub struct MixedDictionary {
     single: DenseDictionary<f32>,
+    exact: Exact,
+}
+
+/// A matrix for the measurements that single precision cannot decide.
+#[derive(Debug)]
+pub(super) struct Exact {
     matrix: DMatrix<f64>,
     double: OnceLock<DenseDictionary<f64>>,
     normalised: bool,
+}
+
+impl Exact {
+    pub(super) fn new(matrix: DMatrix<f64>, normalised: bool) -> Self {
+        Self { matrix, double: OnceLock::new(), normalised }
+    }
+
+    /// The dictionary, prepared when it is first needed.
+    fn double(&self) -> &DenseDictionary<f64> {
+        self.double.get_or_init(|| {
+            let double = DenseDictionary::new(&self.matrix);
+            if self.normalised { double } else { double.unnormalised() }
+        })
+    }
+
+    /// Solves the `doubtful` ones of the measurements `y` again, on the processor.
+    pub(super) fn solve_again(
+        &self,
+        limits: &Limits,
+        y: &[f64],
+        doubtful: &[usize],
+        solutions: &mut [Solution],
+    ) -> Result<(), OmpError> {
+        if doubtful.is_empty() {
+            return Ok(());
+        }
+        let measurements = self.matrix.nrows();
+        let frame = |i: &usize| &y[i * measurements..(i + 1) * measurements];
+        let again: Vec<f64> = doubtful.iter().flat_map(frame).copied().collect();
+        let problem = Problem { dictionary: self.double(), limits: *limits };
+        for (&i, solution) in doubtful.iter().zip(solve_batch(&problem, &again, Backend::Cpu)?) {
+            solutions[i] = solution;
+        }
+        Ok(())
+    }
 }
 
 impl MixedDictionary {
@@ -37,15 +78,12 @@ impl MixedDictionary {
         let doubles = single.atoms().doubles().iter().copied().filter(same).collect();
         let single = single.with_doubles(doubles);
         let single = if normalised { single } else { single.unnormalised() };
-        Self { single, matrix, double: OnceLock::new(), normalised }
+        Self { single, exact: Exact::new(matrix, normalised) }
     }
 
     /// The dictionary in double precision.
     pub fn double(&self) -> &DenseDictionary<f64> {
-        self.double.get_or_init(|| {
-            let double = DenseDictionary::new(&self.matrix);
-            if self.normalised { double } else { double.unnormalised() }
-        })
+        self.exact.double()
     }
 
     /// The dictionary in single precision.
@@ -63,7 +101,7 @@ impl MixedDictionary {
         Ok(MixedSolver { dictionary: self, limits: *limits, single, double: None, y: Vec::new() })
     }
 
-    /// [`solve_batch`], and how many of the measurements were solved in double precision.
+    /// [`solve_batch`] on the processor, and how many of the measurements were solved in double precision.
     ///
     /// # Errors
     /// Those of [`solve_batch`].
@@ -71,23 +109,14 @@ impl MixedDictionary {
         &self,
         limits: &Limits,
         y: &[f64],
-        backend: Backend,
     ) -> Result<(Vec<Solution>, usize), OmpError> {
         super::finite("measurement", y)?;
         let single: Vec<f32> = y.iter().map(|&y| y as f32).collect();
         let problem = Problem { dictionary: &self.single, limits: *limits };
-        let paths = solve_batch_paths(&problem, &single, backend)?;
-        let measurements = self.matrix.nrows();
+        let paths = solve_batch_paths(&problem, &single)?;
         let doubtful: Vec<usize> = (0..paths.len()).filter(|&i| is_doubtful(&paths[i])).collect();
         let mut solutions: Vec<Solution> = paths.into_iter().map(Path::solution).collect();
-        if !doubtful.is_empty() {
-            let frame = |i: &usize| &y[i * measurements..(i + 1) * measurements];
-            let again: Vec<f64> = doubtful.iter().flat_map(frame).copied().collect();
-            let problem = Problem { dictionary: self.double(), limits: *limits };
-            for (i, solution) in doubtful.iter().zip(solve_batch(&problem, &again, backend)?) {
-                solutions[*i] = solution;
-            }
-        }
+        self.exact.solve_again(limits, y, &doubtful, &mut solutions)?;
         Ok((solutions, doubtful.len()))
     }
 }

@@ -48,9 +48,9 @@ pub struct Path<T> {
     /// to the measurement's norm. Rounding may have decided where it is no more than some tens of epsilons.
     pub least_lead: f64,
     /// Lower-triangular factor of the support's Gram matrix, row after row.
-    factor: Vec<T>,
+    pub(super) factor: Vec<T>,
     /// The initial projection, orthogonalised along with the atoms.
-    steps: Vec<T>,
+    pub(super) steps: Vec<T>,
 }
 
 /// Finds sparse representations over one dictionary, one measurement after another, in memory of its own.

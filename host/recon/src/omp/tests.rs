@@ -1,6 +1,8 @@
 //! Every path against the reference, on every kind of problem there is a name for.
 
 mod batch;
+#[cfg(feature = "gpu")]
+mod gpu;
 mod laws;
 mod mixed;
 mod nonnegative;
@@ -147,9 +149,17 @@ fn condition(problem: &Problem, support: &[usize]) -> f64 {
 
 /// Same support in the same order, and coefficients within the stated bound.
 fn is_the_reference<T: Scalar>(problem: &Problem, limits: &Limits) -> Result<(), TestCaseError> {
+    agrees::<T>(problem, limits, &solve::<T>(problem, limits))
+}
+
+/// [`is_the_reference`] for a solution in numbers of type `T`.
+fn agrees<T: Scalar>(
+    problem: &Problem,
+    limits: &Limits,
+    fast: &Solution,
+) -> Result<(), TestCaseError> {
     let exact = solve_exactly(problem, limits);
-    let fast = solve::<T>(problem, limits);
-    let same = agreeing(problem, &exact, &fast, 1e2 * T::EPSILON);
+    let same = agreeing(problem, &exact, fast, 1e2 * T::EPSILON);
     prop_assert_eq!(&exact.unseen, &fast.unseen);
     // Single precision sees the end of what it can tell sooner.
     let sooner = matches!(fast.stop, Stop::Dependent | Stop::NoAtomLeft) && T::EPSILON > 1e-10;

@@ -6,7 +6,7 @@
 use super::{OmpReconstruction, OmpSettings, Problem, ReconstructError, Sparsity, image_of};
 use super::{check_prior, selection};
 use crate::basis::Basis;
-use crate::omp::{DenseDictionary, Limits, OmpError, Path, Solver};
+use crate::omp::{DenseDictionary, Limits, OmpError, Path, solve_path};
 use crate::{Measurements, fwht};
 use nalgebra::DMatrix;
 
@@ -32,6 +32,7 @@ pub fn omp_over(
     let mut problem = Problem::of(measurements, Basis::Pixel, 0.0, settings.noise);
     problem.residual = settings.residual;
     problem.to_noise = settings.sparsity == Sparsity::Noise;
+    problem.backend = settings.backend;
     let shown = Shown::new(&problem, atoms);
     let choice = match settings.sparsity {
         Sparsity::Fixed(atoms) => selection::Choice { atoms, trust: 1.0 },
@@ -112,7 +113,7 @@ impl Shown {
         let noise = if problem.to_noise { f64::from(problem.prior.noise) * share } else { 0.0 };
         let sparsity = most.unwrap_or(0);
         let limits = Limits { sparsity, residual: problem.residual, noise };
-        Solver::new(&DenseDictionary::new(&matrix), &limits)?.solve(&y)
+        solve_path(&DenseDictionary::new(&matrix), &limits, &y, problem.backend)
     }
 
     /// Every row, as the first `atoms` of a path predict it.

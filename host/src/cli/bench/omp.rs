@@ -1,6 +1,9 @@
 //! `nirspi bench omp`: sparse representations of many frames, timed.
 
-use crate::cli::{Usage, print};
+#[cfg(feature = "gpu")]
+mod gpu;
+
+use crate::cli::{Usage, backend, print};
 use anyhow::{Context, Result};
 use clap::ValueEnum;
 use nalgebra::DMatrix;
@@ -18,6 +21,9 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
+/// Sweeps a second that the patterns' clock allows: as fast as there is anything to reconstruct.
+const FASTEST_SWEEPS_HZ: f64 = nirspi_wire::PATTERN_HZ as f64 / nirspi_wire::PATTERNS as f64;
+
 /// Time orthogonal matching pursuit on a problem of your own, or on a random one
 ///
 /// A problem file holds the dictionary `D` (M x N), measurements `Y` (B x M) and `k`. Atoms are chosen by their inner
@@ -26,6 +32,7 @@ use std::time::Instant;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi bench omp --measurements 512 --sparsity 64 --frames 256\n\
+    \x20 nirspi bench omp --frames 4096 --backend cuda\n\
     \x20 nirspi bench omp --input problem.npz --out solution.npz")]
 pub struct Args {
     /// Problem file; without it, random rows of a Hadamard matrix see cosines of a 32 x 32 image
@@ -49,7 +56,7 @@ pub struct Args {
     /// f32, f64, or auto: f32, and f64 for frames where f32 cannot tell two atoms apart
     #[arg(long, value_enum, default_value_t = Precision::Auto)]
     precision: Precision,
-    /// What computes: auto, cpu
+    /// What computes: auto (a GPU from 64 frames on, if there is one), cpu, wgpu, cuda
     #[arg(long, value_name = "BACKEND", default_value = "auto")]
     backend: Backend,
     /// Times to solve it
@@ -74,6 +81,11 @@ enum Precision {
 #[derive(Debug, Serialize)]
 struct Report {
     backend: &'static str,
+    /// The GPU, as its driver calls it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    device: Option<String>,
+    /// Whether the processor plays the GPU: its times say nothing of one.
+    software: bool,
     threads: usize,
     precision: Precision,
     atoms: usize,
@@ -83,11 +95,13 @@ struct Report {
     repeats: u32,
     /// Once for a dictionary.
     prepare_ms: f64,
-    /// All frames.
+    /// All frames; on a GPU with the transfer of measurements, solutions and images.
     median_ms: f64,
     fastest_ms: f64,
     slowest_ms: f64,
     frames_per_s: f64,
+    /// Frames a second, of the sweeps a second that the patterns' clock allows.
+    of_fastest_sweeps: f64,
     /// Frames that f32 could not decide.
     solved_in_f64: usize,
     /// Atoms chosen, mean over the frames.
@@ -95,6 +109,24 @@ struct Report {
     /// Products (and as many sums) of the rows, the projection and its updates, of one frame.
     products_per_frame: f64,
     gigaproducts_per_s: f64,
+    /// Earlier rows read to orthogonalise the chosen columns of the Gram matrix, of one frame.
+    row_bytes_per_frame: f64,
+    gigabytes_per_s: f64,
+    /// To and from a GPU.
+    transferred_bytes_per_frame: f64,
+}
+
+/// What was measured.
+struct Timed {
+    backend: Backend,
+    device: Option<String>,
+    software: bool,
+    prepare_ms: f64,
+    /// One time a repeat, for all frames.
+    times_ms: Vec<f64>,
+    solutions: Vec<Solution>,
+    solved_in_f64: usize,
+    transferred_bytes_per_frame: f64,
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
@@ -104,11 +136,34 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     };
     let named =
         || args.input.as_ref().map_or("problem".to_owned(), |path| path.display().to_string());
-    let matrix = DMatrix::from_row_slice(problem.measurements, problem.atoms, &problem.dictionary);
-    // A random problem's atoms have the lengths that the rows see of them.
-    let normalise = args.normalise || args.input.is_none();
+    let frames = problem.frames.len() / problem.measurements;
+    let device = match args.precision {
+        // Kernels compute in f32: this is no work for a GPU unless it was asked for, and refused.
+        Precision::F64 if args.backend == Backend::Auto => None,
+        _ => backend::choose(args.backend, frames)?,
+    };
+    let timed = match device {
+        None => on_cpu(args, &problem),
+        #[cfg(feature = "gpu")]
+        Some(device) => gpu::time(args, &problem, &device),
+        #[cfg(not(feature = "gpu"))]
+        Some(device) => match device {},
+    };
+    let mut timed = timed.with_context(named)?;
+    timed.times_ms.sort_unstable_by(f64::total_cmp);
+    if let Some(out) = &args.out {
+        let solutions: Vec<(&[usize], &[f64])> =
+            timed.solutions.iter().map(|s| (&s.support[..], &s.coefficients[..])).collect();
+        write_atomic(out, &problem::encode(out, problem.sparsity, &solutions)?)?;
+    }
+    print::json(&report(args, &problem, &timed))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// All cores, and for one frame no more than one.
+fn on_cpu(args: &Args, problem: &ProblemFile) -> Result<Timed> {
     let start = Instant::now();
-    let dictionary = MixedDictionary::new(matrix, normalise);
+    let dictionary = MixedDictionary::new(matrix(problem), args.normalises());
     if args.precision == Precision::F64 {
         dictionary.double();
     }
@@ -125,40 +180,53 @@ pub fn run(args: &Args) -> Result<ExitCode> {
                 let (solution, in_double) = solver.solve(&problem.frames)?;
                 Ok((vec![solution], usize::from(in_double)))
             }
-            Precision::Auto => dictionary.solve_batch(&limits, &problem.frames, args.backend),
+            Precision::Auto => dictionary.solve_batch(&limits, &problem.frames),
             Precision::F32 => {
                 let problem = Problem { dictionary: dictionary.single(), limits };
-                Ok((solve_batch(&problem, &single, args.backend)?, 0))
+                Ok((solve_batch(&problem, &single, Backend::Cpu)?, 0))
             }
             Precision::F64 => {
                 let double = Problem { dictionary: dictionary.double(), limits };
-                let solutions = solve_batch(&double, &problem.frames, args.backend)?;
+                let solutions = solve_batch(&double, &problem.frames, Backend::Cpu)?;
                 let count = solutions.len();
                 Ok((solutions, count))
             }
         }
     };
-    let (mut solutions, mut solved_in_f64) = solve().with_context(named)?;
-    let mut times = Vec::new();
+    let (mut solutions, mut solved_in_f64) = solve()?;
+    let mut times_ms = Vec::new();
     for _ in 0..args.repeats {
         let start = Instant::now();
         (solutions, solved_in_f64) = solve()?;
-        times.push(milliseconds(start));
+        times_ms.push(milliseconds(start));
     }
-    times.sort_unstable_by(f64::total_cmp);
-    if let Some(out) = &args.out {
-        let solutions: Vec<(&[usize], &[f64])> =
-            solutions.iter().map(|s| (&s.support[..], &s.coefficients[..])).collect();
-        write_atomic(out, &problem::encode(out, problem.sparsity, &solutions)?)?;
-    }
-    let frames = solutions.len();
-    let mean_atoms =
-        solutions.iter().map(|s| s.support.len()).sum::<usize>() as f64 / frames as f64;
-    let median_ms = times[times.len() / 2];
+    Ok(Timed {
+        backend: Backend::Cpu,
+        device: None,
+        software: false,
+        prepare_ms,
+        times_ms,
+        solutions,
+        solved_in_f64,
+        transferred_bytes_per_frame: 0.0,
+    })
+}
+
+/// What the times mean. They are sorted.
+fn report(args: &Args, problem: &ProblemFile, timed: &Timed) -> Report {
+    let frames = timed.solutions.len();
+    let chosen: usize = timed.solutions.iter().map(|s| s.support.len()).sum();
+    let mean_atoms = chosen as f64 / frames as f64;
+    let median_ms = timed.times_ms[timed.times_ms.len() / 2];
     let (m, n, k) = (problem.measurements as f64, problem.atoms as f64, mean_atoms);
     let products_per_frame = n * (m + k * (k - 1.0) / 2.0 + 2.0 * k);
-    print::json(&Report {
-        backend: "cpu",
+    let number_bytes = if args.precision == Precision::F64 { 8.0 } else { 4.0 };
+    let row_bytes_per_frame = number_bytes * n * k * (k - 1.0) / 2.0;
+    let frames_per_s = frames as f64 / median_ms * 1e3;
+    Report {
+        backend: timed.backend.name(),
+        device: timed.device.clone(),
+        software: timed.software,
         threads: rayon::current_num_threads(),
         precision: args.precision,
         atoms: problem.atoms,
@@ -166,17 +234,31 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         sparsity: problem.sparsity,
         frames,
         repeats: args.repeats,
-        prepare_ms,
+        prepare_ms: timed.prepare_ms,
         median_ms,
-        fastest_ms: times[0],
-        slowest_ms: times[times.len() - 1],
-        frames_per_s: frames as f64 / median_ms * 1e3,
-        solved_in_f64,
+        fastest_ms: timed.times_ms[0],
+        slowest_ms: timed.times_ms[timed.times_ms.len() - 1],
+        frames_per_s,
+        of_fastest_sweeps: frames_per_s / FASTEST_SWEEPS_HZ,
+        solved_in_f64: timed.solved_in_f64,
         mean_atoms,
         products_per_frame,
         gigaproducts_per_s: products_per_frame * frames as f64 / median_ms / 1e6,
-    })?;
-    Ok(ExitCode::SUCCESS)
+        row_bytes_per_frame,
+        gigabytes_per_s: row_bytes_per_frame * frames as f64 / median_ms / 1e6,
+        transferred_bytes_per_frame: timed.transferred_bytes_per_frame,
+    }
+}
+
+impl Args {
+    /// A random problem's atoms have the lengths that the rows see of them.
+    fn normalises(&self) -> bool {
+        self.normalise || self.input.is_none()
+    }
+}
+
+fn matrix(problem: &ProblemFile) -> DMatrix<f64> {
+    DMatrix::from_row_slice(problem.measurements, problem.atoms, &problem.dictionary)
 }
 
 fn milliseconds(start: Instant) -> f64 {

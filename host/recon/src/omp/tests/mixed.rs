@@ -19,7 +19,7 @@ fn a_lead_that_single_precision_cannot_see_decides_all_the_same() {
         let exact = reference::solve(&matrix, &y, &limits).unwrap();
         assert_eq!(exact.support, [if lead > 0.0 { 69 } else { 2 }]);
         let dictionary = MixedDictionary::new(matrix, true);
-        let (found, again) = dictionary.solve_batch(&limits, &y, Backend::Cpu).unwrap();
+        let (found, again) = dictionary.solve_batch(&limits, &y).unwrap();
         assert_eq!((&found[0].support, again), (&exact.support, 1));
         let mut solver = dictionary.solver(&limits).unwrap();
         // Twice: the second finds its memory in use before.
@@ -37,7 +37,7 @@ fn few_of_many_frames_need_double_precision_and_all_have_its_support() {
     let y: Vec<f64> = (0..64 * 300).map(|_| normal(&mut random)).collect();
     let dictionary = MixedDictionary::new(problem.dictionary.clone(), true);
     let limits = Limits::atoms(16);
-    let (found, again) = dictionary.solve_batch(&limits, &y, Backend::Cpu).unwrap();
+    let (found, again) = dictionary.solve_batch(&limits, &y).unwrap();
     assert!(again < 30, "{again} of 300");
     for (y, found) in y.chunks_exact(64).zip(&found) {
         let exact = reference::solve(&problem.dictionary, y, &limits).unwrap();
@@ -51,7 +51,7 @@ fn atoms_that_point_the_same_way_are_one_and_no_reason_to_doubt() {
     let mut random = Pcg64::seed_from_u64(4);
     let y: Vec<f64> = (0..64 * 100).map(|_| normal(&mut random)).collect();
     let dictionary = MixedDictionary::new(problem.dictionary.clone(), true);
-    let (found, again) = dictionary.solve_batch(&Limits::atoms(16), &y, Backend::Cpu).unwrap();
+    let (found, again) = dictionary.solve_batch(&Limits::atoms(16), &y).unwrap();
     assert!(again < 20, "{again} of 100");
     // The copies stand five after their originals.
     for solution in &found {
@@ -61,8 +61,7 @@ fn atoms_that_point_the_same_way_are_one_and_no_reason_to_doubt() {
     let mut nearly = DMatrix::<f64>::identity(4, 3);
     nearly.column_mut(2).copy_from_slice(&[1.0, 0.0, 0.0, 1e-3]);
     let dictionary = MixedDictionary::new(nearly, true);
-    let (found, again) =
-        dictionary.solve_batch(&Limits::atoms(1), &[1.0, 0.0, 0.0, 1e-3], Backend::Cpu).unwrap();
+    let (found, again) = dictionary.solve_batch(&Limits::atoms(1), &[1.0, 0.0, 0.0, 1e-3]).unwrap();
     assert_eq!((&found[0].support[..], again), (&[2][..], 1));
     assert_eq!(dictionary.single().atoms().doubles(), []);
 }
@@ -74,7 +73,7 @@ fn atoms_as_they_are_are_chosen_by_their_inner_products() {
     let first = |normalised| {
         let dictionary = MixedDictionary::new(matrix.clone(), normalised);
         let limits = Limits::atoms(1);
-        let (found, _) = dictionary.solve_batch(&limits, &[1.0, 0.1], Backend::Cpu).unwrap();
+        let (found, _) = dictionary.solve_batch(&limits, &[1.0, 0.1]).unwrap();
         found[0].support[0]
     };
     assert_eq!((first(true), first(false)), (0, 1));

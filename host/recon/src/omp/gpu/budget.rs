@@ -1,0 +1,208 @@
+//! What a device gives: shared memory, buffers, and loops of a length that it finishes.
+//!
+//! The one law: what does not fit is refused before it is launched, with what was needed and what there is. Software Vulkan
+//! ends an invocation's loops after some 65 535 rounds without a word; so the rounds are counted here, and a pursuit that takes
+//! more is split over launches.
+
+use super::kernels::Shape;
+use crate::omp::BackendError;
+
+/// Numbers of a frame's state.
+pub(super) const STATE: usize = 8;
+/// Energy of the measurement.
+pub(super) const ENERGY: usize = 0;
+/// Energy of a residual that is explained enough.
+pub(super) const ENOUGH: usize = 1;
+/// Energy of the residual.
+pub(super) const REMAINING: usize = 2;
+/// The first atom's score.
+pub(super) const FIRST_BEST: usize = 3;
+/// Atoms in the support.
+pub(super) const COUNT: usize = 4;
+/// Why there are no more: 0 still looking, 1 explained enough, 2 no atom left, 3 dependent.
+pub(super) const STOP: usize = 5;
+/// Least lead of a chosen atom's score over the next best.
+pub(super) const LEAD: usize = 6;
+/// Least distance of the residual's energy from enough, where that was asked.
+pub(super) const CLOSEST: usize = 7;
+
+/// What a device says of itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Limits {
+    /// Bytes of shared memory of a workgroup.
+    pub shared_bytes: usize,
+    /// Bytes of a buffer.
+    pub buffer_bytes: usize,
+    /// Units of a workgroup.
+    pub units: usize,
+    /// Buffers of a kernel.
+    pub buffers: usize,
+}
+
+/// Rounds of all its loops that one invocation may make: below where software Vulkan ends them.
+pub(super) const ROUNDS: usize = 60_000;
+
+/// Most buffers that a kernel uses.
+const BUFFERS: usize = 7;
+
+/// Atoms of one unit where there are units enough: their projections stay in registers.
+const PER_UNIT: usize = 4;
+
+/// Fewest and most units of a workgroup: four planes of 16, and what every GPU has.
+const UNITS: std::ops::RangeInclusive<usize> = 64..=256;
+
+/// Memory for the rows of the frames that are pursued together, where a buffer may be that large.
+const ROWS_BYTES: usize = 1 << 30;
+
+/// Most frames at once: workgroups that every device takes in one direction.
+const FRAMES: usize = 65_535 / super::kernels::TOGETHER * super::kernels::TOGETHER;
+
+impl Limits {
+    /// How `atoms` atoms are dealt out to the units of a workgroup, with room for the weights of `sparsity` of them.
+    ///
+    /// # Errors
+    /// [`BackendError`] if the device has too few buffers, or too little shared memory.
+    pub(super) fn shape(&self, atoms: usize, sparsity: usize) -> Result<Shape, BackendError> {
+        check("buffers of a kernel", BUFFERS, self.buffers)?;
+        check("units of a workgroup", *UNITS.start(), self.units)?;
+        let most = UNITS.end().min(&self.units);
+        let most = 1 << most.ilog2();
+        let units = atoms.div_ceil(PER_UNIT).next_power_of_two().clamp(*UNITS.start(), most);
+        let per_unit = atoms.div_ceil(units).max(1);
+        let capacity = sparsity.next_power_of_two();
+        let shape = Shape { units, per_unit, capacity };
+        check("bytes of shared memory", shape.shared_bytes(), self.shared_bytes)?;
+        Ok(shape)
+    }
+
+    /// Whether a buffer of `count` numbers of four bytes fits.
+    ///
+    /// # Errors
+    /// [`BackendError`] if it does not.
+    pub(super) fn fits(&self, what: &'static str, count: usize) -> Result<(), BackendError> {
+        check(what, count.saturating_mul(4), self.buffer_bytes)
+    }
+
+    /// How many frames of `numbers` in their largest buffer can be pursued together: at least one, if that fits.
+    ///
+    /// # Errors
+    /// [`BackendError`] if not even one frame fits.
+    pub(super) fn frames(&self, numbers: usize) -> Result<usize, BackendError> {
+        self.fits("bytes of memory for a frame", numbers)?;
+        let within = self.buffer_bytes.min(ROWS_BYTES) / (4 * numbers.max(1));
+        Ok(within.clamp(1, FRAMES))
+    }
+}
+
+impl Shape {
+    /// Shared memory of a pursuit: three numbers a unit, the weights, and the chosen atom's projection.
+    pub(super) fn shared_bytes(&self) -> usize {
+        4 * (3 * self.units + self.capacity + 1)
+    }
+
+    /// Steps of a pursuit, `first..last` of each launch, none of which takes more than `rounds` rounds of loops: step `k`
+    /// takes `k` rounds over the rows, and `k` over the units to fetch the weights; a launch starts with a look at the atoms
+    /// chosen before.
+    ///
+    /// # Errors
+    /// [`BackendError`] if one step takes more.
+    pub(super) fn launches(
+        &self,
+        sparsity: usize,
+        rounds: usize,
+    ) -> Result<Vec<(usize, usize)>, BackendError> {
+        let step = |k: usize| 1 + k + k.div_ceil(self.units);
+        let mut launches = Vec::new();
+        let mut first = 0;
+        while first < sparsity {
+            let mut last = first;
+            let mut used = first;
+            while last < sparsity && used + step(last) <= rounds {
+                used += step(last);
+                last += 1;
+            }
+            if last == first {
+                return check("rounds of loops", first + step(first), rounds).map(|()| launches);
+            }
+            launches.push((first, last));
+            first = last;
+        }
+        Ok(launches)
+    }
+}
+
+/// Rows of a product, `first..last` of each launch.
+pub(super) fn row_launches(rows: usize) -> Vec<(usize, usize)> {
+    (0..rows).step_by(ROUNDS).map(|first| (first, rows.min(first + ROUNDS))).collect()
+}
+
+/// # Errors
+/// [`BackendError`] if `needed` is more than `limit`.
+pub(super) fn check(what: &'static str, needed: usize, limit: usize) -> Result<(), BackendError> {
+    if needed > limit {
+        return Err(BackendError::TooLarge { what, needed, limit });
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn device(shared_bytes: usize) -> Limits {
+        Limits { shared_bytes, buffer_bytes: 128 << 20, units: 1024, buffers: 8 }
+    }
+
+    #[test]
+    fn every_atom_has_a_unit_and_shared_memory_bounds_the_support() {
+        for atoms in [1, 63, 64, 65, 1000, 1024, 4096, 5000] {
+            let shape = device(16 << 10).shape(atoms, 64).unwrap();
+            assert!(shape.units * shape.per_unit >= atoms, "{atoms}: {shape:?}");
+            assert!(shape.units.is_power_of_two() && UNITS.contains(&shape.units));
+        }
+        let most = |bytes| {
+            (1..).take_while(|&k| device(bytes).shape(1024, 1 << k).is_ok()).last().map(|k| 1 << k)
+        };
+        assert_eq!((most(16 << 10), most(32 << 10)), (Some(2048), Some(4096)));
+        let refused = device(16 << 10).shape(1024, 4096).unwrap_err();
+        let expected = 4 * (3 * 256 + 4096 + 1);
+        assert_eq!(
+            refused,
+            BackendError::TooLarge {
+                what: "bytes of shared memory",
+                needed: expected,
+                limit: 16 << 10
+            }
+        );
+    }
+
+    #[test]
+    fn no_launch_takes_more_rounds_than_software_vulkan_finishes() {
+        for (sparsity, units) in [(0, 64), (1, 64), (64, 256), (346, 256), (347, 256), (2000, 64)] {
+            let shape = Shape { units, per_unit: 4, capacity: 1 };
+            let launches = shape.launches(sparsity, ROUNDS).unwrap();
+            let mut next = 0;
+            for &(first, last) in &launches {
+                assert_eq!(first, next);
+                let rounds: usize =
+                    first + (first..last).map(|k| 1 + k + k.div_ceil(units)).sum::<usize>();
+                assert!(rounds <= ROUNDS && last > first, "{rounds}");
+                next = last;
+            }
+            assert_eq!(next, sparsity);
+            assert_eq!(launches.len() > 1, sparsity > 345, "{sparsity}: {launches:?}");
+        }
+        let shape = Shape { units: 64, per_unit: 4, capacity: 1 };
+        assert!(matches!(shape.launches(40_000, ROUNDS), Err(BackendError::TooLarge { .. })));
+        assert_eq!(row_launches(0), []);
+        assert_eq!(row_launches(ROUNDS + 1), [(0, ROUNDS), (ROUNDS, ROUNDS + 1)]);
+    }
+
+    #[test]
+    fn as_many_frames_at_once_as_a_buffer_holds() {
+        let limits = device(16 << 10);
+        assert_eq!(limits.frames(64 * 1024), Ok(512));
+        assert_eq!(limits.frames(1), Ok(FRAMES));
+        assert!(limits.frames(64 << 20).is_err());
+    }
+}

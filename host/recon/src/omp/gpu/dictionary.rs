@@ -1,0 +1,366 @@
+//! A dictionary on a device, for any number of batches.
+//!
+//! The one law: what goes to the device once stays there. The matrix, its Gram matrix and the atoms' pictures are uploaded or
+//! computed when the dictionary is made; a batch brings its measurements and takes its solutions.
+//!
+//! Measurements, solutions and images may stay on the device too ([`DeviceFrames`], [`DeviceSolutions`], [`DeviceImages`]).
+//! What does not yet: the networks do not take a [`DeviceImages`], so images go through the host's memory to reach them.
+
+use super::device::Device;
+use super::engine::Buffer;
+use super::gram::{DeviceGram, DeviceSolutions, width};
+use super::kernels::TOGETHER;
+use crate::omp::dictionary::Atoms;
+use crate::omp::mixed::Exact;
+use crate::omp::pursuit::energy;
+use crate::omp::{BackendError, Dictionary, Limits, OmpError, Path, Scalar, Solution, finite};
+use cubecl::prelude::CubeElement;
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+/// A `measurements x atoms` matrix of any column norms on a device.
+#[derive(Debug)]
+pub struct DeviceDictionary {
+    gram: DeviceGram,
+    /// Row-major, as wide as the Gram matrix.
+    matrix: Buffer,
+    measurements: usize,
+    exact: Exact,
+}
+
+/// Measurements on a device.
+#[derive(Debug)]
+pub struct DeviceFrames {
+    y: Buffer,
+    energies: Vec<f64>,
+}
+
+/// What the atoms look like, on a device: one picture each.
+#[derive(Debug)]
+pub struct DevicePictures {
+    buffer: Buffer,
+    pixels: usize,
+}
+
+/// Images on a device, `frames x pixels`.
+#[derive(Debug)]
+pub struct DeviceImages {
+    buffer: Buffer,
+    pixels: usize,
+    frames: usize,
+}
+
+impl DeviceDictionary {
+    /// Uploads `matrix` and multiplies out its Gram matrix there. Atoms are chosen by their correlations with the residual, or
+    /// with `normalised` false by their inner products as they are.
+    ///
+    /// # Errors
+    /// [`OmpError`] if a number is not finite in `f32`, or the matrices do not fit the device.
+    pub fn new(device: &Device, matrix: DMatrix<f64>, normalised: bool) -> Result<Self, OmpError> {
+        let (measurements, atoms) = matrix.shape();
+        if measurements == 0 {
+            return Err(OmpError::Length { found: 0, expected: 1 });
+        }
+        let width = width(device, atoms)?;
+        let single = matrix.map(|v| v as f32);
+        finite("dictionary", single.as_slice())?;
+        device.limits().fits("bytes of a buffer for the dictionary", measurements * width)?;
+        let mut columns = vec![0.0; width * measurements];
+        columns[..atoms * measurements].copy_from_slice(single.as_slice());
+        let mut rows = vec![0.0; measurements * width];
+        for (row, values) in rows.chunks_exact_mut(width).zip(single.row_iter()) {
+            row.iter_mut().zip(values.iter()).for_each(|(row, &value)| *row = value);
+        }
+        let engine = &device.engine;
+        let columns = engine.upload(&columns);
+        let matrix_there = engine.upload(&rows);
+        let gram = engine.products(&columns, &matrix_there, measurements, width);
+        let energies = matrix.column_iter().map(|atom| atom.norm_squared() as f32).collect();
+        let atoms = Atoms::new(energies);
+        let atoms = if normalised {
+            let like = (1.0 - f32::DEPENDENT) as f32;
+            let marks = engine.read(&[&engine.doubles(&gram, width, like)])?;
+            let doubles = confirmed(&matrix, &atoms, u32::from_bytes(&marks[0]));
+            atoms.with_doubles(doubles)
+        } else {
+            atoms.unnormalised()
+        };
+        let gram = DeviceGram::new(device, gram, atoms)?;
+        let exact = Exact::new(matrix, normalised);
+        Ok(Self { gram, matrix: matrix_there, measurements, exact })
+    }
+
+    /// Where it is.
+    #[must_use]
+    pub fn device(&self) -> &Device {
+        &self.gram.device
+    }
+
+    /// How many frames [`pursue`](Self::pursue) takes at once for up to `sparsity` atoms.
+    ///
+    /// # Errors
+    /// [`OmpError`] if not even one fits the device.
+    pub fn frames_at_once(&self, sparsity: usize) -> Result<usize, OmpError> {
+        let other = self.device().limits().frames(self.measurements)?;
+        Ok(self.gram.frames_at_once(sparsity)?.min(other / TOGETHER * TOGETHER).max(1))
+    }
+
+    /// Takes measurements to the device, `measurements` numbers each, one after another.
+    ///
+    /// # Errors
+    /// [`OmpError`] if they are no multiple of the dictionary's measurements, or a number is not finite.
+    pub fn upload(&self, y: &[f32]) -> Result<DeviceFrames, OmpError> {
+        let expected = self.measurements;
+        if !y.len().is_multiple_of(expected) {
+            return Err(OmpError::Length { found: y.len(), expected });
+        }
+        finite("measurement", y)?;
+        let energies: Vec<f64> = y.chunks_exact(expected).map(energy).collect();
+        // Whole groups of frames.
+        let there = energies.len().next_multiple_of(TOGETHER).max(TOGETHER) * expected;
+        let mut padded = y.to_vec();
+        padded.resize(there, 0.0);
+        let y = self.device().engine.upload(&padded);
+        Ok(DeviceFrames { y, energies })
+    }
+
+    /// Finds a sparse representation of each frame; everything stays on the device.
+    ///
+    /// # Errors
+    /// [`OmpError`] if a limit makes no sense or there are more frames than fit at once.
+    pub fn pursue(
+        &self,
+        limits: &Limits,
+        frames: &DeviceFrames,
+    ) -> Result<DeviceSolutions, OmpError> {
+        let limit = self.frames_at_once(limits.sparsity)?;
+        super::budget::check("frames at once", frames.energies.len(), limit)?;
+        let (engine, width) = (&self.device().engine, self.gram.width());
+        let projection = engine.products(&frames.y, &self.matrix, self.measurements, width);
+        self.gram.pursue(projection, frames.energies.clone(), self.measurements, limits)
+    }
+
+    /// Brings solutions to the host as `f32` found them.
+    ///
+    /// # Errors
+    /// [`OmpError`] if the device failed.
+    pub fn download(&self, solutions: &DeviceSolutions) -> Result<Vec<Solution>, OmpError> {
+        let found = self.gram.read(solutions)?;
+        Ok(found.into_iter().map(|found| found.solution).collect())
+    }
+
+    /// Brings the solutions of the measurements `y` to the host. Those that `f32` could not decide are solved again in `f64`,
+    /// on the processor; also returns how many.
+    ///
+    /// # Errors
+    /// [`OmpError`] if the device failed, or `y` are not as many measurements.
+    pub fn download_checked(
+        &self,
+        solutions: &DeviceSolutions,
+        y: &[f64],
+    ) -> Result<(Vec<Solution>, usize), OmpError> {
+        let expected = solutions.frames() * self.measurements;
+        if y.len() != expected {
+            return Err(OmpError::Length { found: y.len(), expected });
+        }
+        let found = self.gram.read(solutions)?;
+        let doubtful: Vec<usize> = (0..found.len()).filter(|&i| found[i].doubtful).collect();
+        let mut checked: Vec<Solution> = found.into_iter().map(|found| found.solution).collect();
+        self.exact.solve_again(solutions.limits(), y, &doubtful, &mut checked)?;
+        Ok((checked, doubtful.len()))
+    }
+
+    /// Takes the atoms' pictures to the device, `pixels` numbers each.
+    ///
+    /// # Errors
+    /// [`OmpError`] if there is not one for each atom, or they do not fit.
+    pub fn upload_pictures(
+        &self,
+        pictures: &[f32],
+        pixels: usize,
+    ) -> Result<DevicePictures, OmpError> {
+        let expected = self.gram.atoms.count() * pixels;
+        if pictures.len() != expected {
+            return Err(OmpError::Length { found: pictures.len(), expected });
+        }
+        self.device().limits().fits("bytes of a buffer for the atoms' pictures", expected)?;
+        Ok(DevicePictures { buffer: self.device().engine.upload(pictures), pixels })
+    }
+
+    /// Images on the device, as `f32` found them: pictures times coefficients, or without pictures each coefficient at its
+    /// atom's place.
+    ///
+    /// # Errors
+    /// [`OmpError`] if they do not fit.
+    pub fn images(
+        &self,
+        solutions: &DeviceSolutions,
+        pictures: Option<&DevicePictures>,
+    ) -> Result<DeviceImages, OmpError> {
+        let frames = solutions.frames();
+        let pixels = pictures.map_or(solutions.atoms(), |pictures| pictures.pixels);
+        self.device().limits().fits("bytes of a buffer for the images", frames * pixels)?;
+        let engine = &self.device().engine;
+        let buffer = match pictures {
+            _ if frames == 0 => engine.empty(0),
+            Some(pictures) => engine.images(&solutions.pursuit, &pictures.buffer, pixels),
+            None => engine.scatter(&solutions.pursuit, pixels),
+        };
+        Ok(DeviceImages { buffer, pixels, frames })
+    }
+
+    /// Brings images to the host.
+    ///
+    /// # Errors
+    /// [`OmpError`] if the device failed.
+    pub fn download_images(&self, images: &DeviceImages) -> Result<Vec<f32>, OmpError> {
+        let bytes = self.device().engine.read(&[&images.buffer])?;
+        Ok(f32::from_bytes(&bytes[0])[..images.frames * images.pixels].to_vec())
+    }
+
+    /// [`solve_batch`](crate::omp::solve_batch) in `f32` alone, in as many turns as fit the device.
+    ///
+    /// # Errors
+    /// [`OmpError`] if `y` does not fit the dictionary, is not finite, or the device fails.
+    pub fn solve_batch_single(
+        &self,
+        limits: &Limits,
+        y: &[f32],
+    ) -> Result<Vec<Solution>, OmpError> {
+        let mut solutions = Vec::new();
+        for y in y.chunks(self.frames_at_once(limits.sparsity)? * self.measurements) {
+            let found = self.pursue(limits, &self.upload(y)?)?;
+            solutions.append(&mut self.download(&found)?);
+        }
+        Ok(solutions)
+    }
+
+    /// Sparse representations, and how many of them `f32` could not decide: those are solved again in `f64`, on the CPU.
+    ///
+    /// # Errors
+    /// [`OmpError`] if `y` does not fit the dictionary, is not finite, or the device fails.
+    pub fn solve_batch(
+        &self,
+        limits: &Limits,
+        y: &[f64],
+    ) -> Result<(Vec<Solution>, usize), OmpError> {
+        finite("measurement", y)?;
+        let (mut solutions, mut again) = (Vec::new(), 0);
+        for y in y.chunks(self.frames_at_once(limits.sparsity)? * self.measurements) {
+            let single: Vec<f32> = y.iter().map(|&y| y as f32).collect();
+            let found = self.pursue(limits, &self.upload(&single)?)?;
+            let (mut checked, in_double) = self.download_checked(&found, y)?;
+            solutions.append(&mut checked);
+            again += in_double;
+        }
+        Ok((solutions, again))
+    }
+}
+
+/// Pairs of atoms that double precision, too, takes for the same.
+fn confirmed(matrix: &DMatrix<f64>, atoms: &Atoms<f32>, marks: &[u32]) -> Vec<(usize, usize)> {
+    let seen = |k: &usize| atoms.unseen().binary_search(k).is_err();
+    let marked: Vec<usize> = (0..matrix.ncols()).filter(|&k| marks[k] != 0).filter(seen).collect();
+    let pairs = marked.into_par_iter().flat_map_iter(|j| {
+        let b = matrix.column(j);
+        let like = (1.0 - f64::DEPENDENT) * b.norm_squared();
+        let same = move |&i: &usize| {
+            let a = matrix.column(i);
+            a.dot(&b).powi(2) >= like * a.norm_squared()
+        };
+        (0..j).filter(seen).filter(same).map(move |i| (i, j)).collect::<Vec<_>>()
+    });
+    pairs.collect()
+}
+
+/// Solves a batch over any dictionary: its Gram matrix goes to the device column by column, initial projections are the
+/// dictionary's own, and nothing is kept for a next batch.
+///
+/// # Errors
+/// [`OmpError`] if a number is not finite, a limit makes no sense or the device fails.
+pub fn solve_batch_over<T: Scalar, D: Dictionary<T> + ?Sized>(
+    device: &Device,
+    dictionary: &D,
+    limits: &Limits,
+    y: &[T],
+) -> Result<Vec<Solution>, OmpError> {
+    let gram = columns_of(device, dictionary)?;
+    let measurements = dictionary.measurements();
+    let at_once = gram.frames_at_once(limits.sparsity)?;
+    let mut solutions = Vec::new();
+    for y in y.chunks(at_once * measurements) {
+        let found = gram.read(&pursue_over(&gram, dictionary, limits, y)?)?;
+        solutions.extend(found.into_iter().map(|found| found.solution));
+    }
+    Ok(solutions)
+}
+
+/// Pursues one measurement over any dictionary, as [`Solver::solve`](crate::omp::Solver::solve) does.
+///
+/// # Errors
+/// Those of [`solve_batch_over`].
+pub fn path_over<D: Dictionary<f32> + ?Sized>(
+    device: &Device,
+    dictionary: &D,
+    limits: &Limits,
+    y: &[f32],
+) -> Result<Path<f32>, OmpError> {
+    if y.len() != dictionary.measurements() {
+        return Err(OmpError::Length { found: y.len(), expected: dictionary.measurements() });
+    }
+    finite("measurement", y)?;
+    let gram = columns_of(device, dictionary)?;
+    let solutions = pursue_over(&gram, dictionary, limits, y)?;
+    Ok(gram.path(&solutions)?)
+}
+
+/// The Gram matrix of any dictionary, on a device.
+fn columns_of<T: Scalar, D: Dictionary<T> + ?Sized>(
+    device: &Device,
+    dictionary: &D,
+) -> Result<DeviceGram, OmpError> {
+    if T::EPSILON < f32::EPSILON.into() {
+        return Err(BackendError::Precision.into());
+    }
+    let atoms = dictionary.atoms();
+    let width = width(device, atoms.count())?;
+    let mut gram = vec![0.0; width * width];
+    let columns = gram.par_chunks_exact_mut(width).take(atoms.count()).enumerate();
+    columns.for_each_init(
+        || vec![T::default(); crate::omp::padded(atoms.count())],
+        |column, (atom, out)| {
+            dictionary.gram_column(atom, column);
+            out.iter_mut().zip(&*column).for_each(|(out, &value)| *out = single(value));
+        },
+    );
+    let energies = atoms.energies().iter().map(|&energy| single(energy)).collect();
+    let own = Atoms::new(energies).with_doubles(atoms.doubles().to_vec());
+    let own = if atoms.is_normalised() { own } else { own.unnormalised() };
+    Ok(DeviceGram::new(device, device.engine.upload(&gram), own)?)
+}
+
+fn pursue_over<T: Scalar, D: Dictionary<T> + ?Sized>(
+    gram: &DeviceGram,
+    dictionary: &D,
+    limits: &Limits,
+    y: &[T],
+) -> Result<DeviceSolutions, OmpError> {
+    let measurements = dictionary.measurements();
+    let frames = y.len() / measurements;
+    let padded = crate::omp::padded(dictionary.atoms().count());
+    let mut p0 = vec![T::default(); frames * padded];
+    dictionary.project_all(y, &mut p0);
+    finite("projection", &p0)?;
+    let mut projection = vec![0.0; frames.max(1) * gram.width()];
+    for (out, p0) in projection.chunks_exact_mut(gram.width()).zip(p0.chunks_exact(padded)) {
+        out.iter_mut().zip(p0).for_each(|(out, &value)| *out = single(value));
+    }
+    let projection = gram.device.engine.upload(&projection);
+    let energies = y.chunks_exact(measurements).map(energy).collect();
+    gram.pursue(projection, energies, measurements, limits)
+}
+
+fn single<T: Scalar>(value: T) -> f32 {
+    let value: f64 = value.into();
+    value as f32
+}

@@ -1,0 +1,252 @@
+//! Pursuits over a Gram matrix that stays on a device.
+//!
+//! The one law: as [`Solver`](crate::omp::Solver), to the rounding of `f32`; where rounding may have decided, the frame says so.
+
+use super::budget::{self, CLOSEST, COUNT, LEAD, REMAINING, STATE, STOP};
+use super::device::Device;
+use super::engine::{Buffer, Pursuit, Rounding};
+use super::kernels::TOGETHER;
+use crate::omp::dictionary::Atoms;
+use crate::omp::{BackendError, Limits, OmpError, Path, Scalar, Solution, Stop};
+use cubecl::prelude::CubeElement;
+
+/// Leads over the next best atom, relative to the measurement's norm, that are believed, as on the CPU.
+const BELIEVED: f64 = 8.0 * f32::EPSILON as f64;
+
+/// Distances of the residual's energy from the limit, relative to the measurement's energy, that are believed: that energy
+/// is a difference of squares in `f32`.
+const BELIEVED_ENERGY: f64 = 64.0 * f32::EPSILON as f64;
+
+/// The Gram matrix and the lengths of a dictionary's atoms, on a device.
+#[derive(Debug)]
+pub(super) struct DeviceGram {
+    pub device: Device,
+    pub atoms: Atoms<f32>,
+    gram: Buffer,
+    table: Buffer,
+    width: usize,
+}
+
+/// Pursuits that have ended, on a device; frames in the order in which they were measured.
+#[derive(Debug)]
+pub struct DeviceSolutions {
+    pub(super) pursuit: Pursuit,
+    energies: Vec<f64>,
+    limits: Limits,
+    unseen: Vec<usize>,
+    atoms: usize,
+}
+
+/// A solution, and whether `f32` may have decided what only `f64` can.
+pub(super) struct Found {
+    pub solution: Solution,
+    pub steps: Vec<f32>,
+    pub doubtful: bool,
+    pub least_lead: f64,
+}
+
+impl DeviceGram {
+    /// Columns of a Gram matrix, of as many numbers as its rows, for atoms of which there are no more than that.
+    pub(super) fn new(
+        device: &Device,
+        gram: Buffer,
+        atoms: Atoms<f32>,
+    ) -> Result<Self, BackendError> {
+        let width = width(device, atoms.count())?;
+        let mut table = vec![0.0; 2 * width];
+        table[..atoms.count()].copy_from_slice(&atoms.inverse_norms()[..atoms.count()]);
+        table[width..][..atoms.count()].copy_from_slice(atoms.energies());
+        let table = device.engine.upload(&table);
+        Ok(Self { device: device.clone(), atoms, gram, table, width })
+    }
+
+    /// Length of a vector over the atoms on the device.
+    pub(super) fn width(&self) -> usize {
+        self.width
+    }
+
+    /// How many frames can be pursued together for up to `sparsity` atoms.
+    ///
+    /// # Errors
+    /// [`BackendError`] if not even one fits.
+    pub(super) fn frames_at_once(&self, sparsity: usize) -> Result<usize, BackendError> {
+        let numbers = self.width * self.most(sparsity).max(TOGETHER);
+        self.device.limits().frames(numbers)
+    }
+
+    /// One more than there are shows that none is left.
+    fn most(&self, sparsity: usize) -> usize {
+        sparsity.min(self.atoms.count() + 1).max(1)
+    }
+
+    /// Pursues frames whose initial projections (`width` numbers each, for as many frames as there are energies, at least)
+    /// are on the device. They are used up.
+    pub(super) fn pursue(
+        &self,
+        projection: Buffer,
+        energies: Vec<f64>,
+        measurements: usize,
+        limits: &Limits,
+    ) -> Result<DeviceSolutions, OmpError> {
+        limits.check()?;
+        let engine = &self.device.engine;
+        let sparsity = self.most(limits.sparsity);
+        let shape = self.device.limits().shape(self.atoms.count(), sparsity)?;
+        let frames = energies.len();
+        let mut state = vec![0.0; frames.max(1) * STATE];
+        for (state, &energy) in state.chunks_exact_mut(STATE).zip(&energies) {
+            state[budget::ENERGY] = energy as f32;
+            state[budget::ENOUGH] = limits.enough(energy, measurements) as f32;
+            state[REMAINING] = energy as f32;
+            state[LEAD] = f32::MAX;
+            state[CLOSEST] = f32::MAX;
+        }
+        let chosen = frames * sparsity;
+        let pursuit = Pursuit {
+            shape,
+            frames,
+            sparsity,
+            gram: self.gram.clone(),
+            atoms: self.table.clone(),
+            projection,
+            rows: engine.empty(chosen * self.width),
+            support: engine.empty(chosen),
+            values: engine.empty(2 * chosen),
+            state: engine.upload(&state),
+            coefficients: engine.empty(chosen),
+        };
+        if frames > 0 {
+            let rounding = Rounding { score: f32::ROUNDING as f32, pivot: f32::DEPENDENT as f32 };
+            let steps = limits.sparsity.min(sparsity);
+            for launch in shape.launches(steps, budget::ROUNDS)? {
+                engine.pursue(&pursuit, launch, rounding);
+            }
+            engine.coefficients(&pursuit);
+        }
+        let unseen = self.atoms.unseen().to_vec();
+        let atoms = self.atoms.count();
+        Ok(DeviceSolutions { pursuit, energies, limits: *limits, unseen, atoms })
+    }
+
+    /// The pursuit of one frame, with a solution for every number of atoms.
+    pub(super) fn path(&self, solutions: &DeviceSolutions) -> Result<Path<f32>, BackendError> {
+        let factor = self.device.engine.factor(&solutions.pursuit);
+        let bytes = self.device.engine.read(&[&factor])?;
+        let mut factor = f32::from_bytes(&bytes[0]).to_vec();
+        let Some(found) = self.read(solutions)?.into_iter().next() else {
+            return Err(BackendError::Failed("it pursued nothing".to_owned()));
+        };
+        let atoms = found.solution.support.len();
+        factor.truncate(atoms * (atoms + 1) / 2);
+        Ok(Path {
+            support: found.solution.support,
+            residual_norms: found.solution.residual_norms,
+            stop: found.solution.stop,
+            unseen: found.solution.unseen,
+            least_lead: found.least_lead,
+            factor,
+            steps: found.steps,
+        })
+    }
+
+    /// Brings solutions back.
+    pub(super) fn read(&self, solutions: &DeviceSolutions) -> Result<Vec<Found>, BackendError> {
+        let pursuit = &solutions.pursuit;
+        if pursuit.frames == 0 {
+            return Ok(Vec::new());
+        }
+        let bytes = self.device.engine.read(&[
+            &pursuit.state,
+            &pursuit.support,
+            &pursuit.values,
+            &pursuit.coefficients,
+        ])?;
+        let (state, support) = (f32::from_bytes(&bytes[0]), u32::from_bytes(&bytes[1]));
+        let (values, coefficients) = (f32::from_bytes(&bytes[2]), f32::from_bytes(&bytes[3]));
+        let frames = (0..pursuit.frames).map(|frame| {
+            let chosen = frame * pursuit.sparsity..(frame + 1) * pursuit.sparsity;
+            let state = &state[frame * STATE..(frame + 1) * STATE];
+            let values = &values[2 * chosen.start..2 * chosen.end];
+            solutions.found(frame, state, &support[chosen.clone()], values, &coefficients[chosen])
+        });
+        Ok(frames.collect())
+    }
+}
+
+impl DeviceSolutions {
+    /// How many frames there are.
+    #[must_use]
+    pub fn frames(&self) -> usize {
+        self.pursuit.frames
+    }
+
+    pub(super) fn limits(&self) -> &Limits {
+        &self.limits
+    }
+
+    /// How many atoms the dictionary has.
+    pub(super) fn atoms(&self) -> usize {
+        self.atoms
+    }
+
+    fn found(
+        &self,
+        frame: usize,
+        state: &[f32],
+        support: &[u32],
+        values: &[f32],
+        coefficients: &[f32],
+    ) -> Found {
+        let energy = self.energies[frame];
+        let count = (state[COUNT] as usize).min(support.len());
+        let steps: Vec<f32> = values.chunks_exact(2).map(|pair| pair[0]).take(count).collect();
+        let mut residual_norms = vec![if energy > 0.0 { 1.0 } else { 0.0 }];
+        let mut remaining = energy;
+        for &step in &steps {
+            remaining -= f64::from(step).powi(2);
+            residual_norms.push((remaining.max(0.0) / energy).sqrt());
+        }
+        let explained = f64::from(state[REMAINING]) <= f64::from(state[budget::ENOUGH]);
+        let stop = match state[STOP] {
+            stop if stop < 0.5 => {
+                if explained {
+                    Stop::Residual
+                } else {
+                    Stop::Sparsity
+                }
+            }
+            stop if stop < 1.5 => Stop::Residual,
+            stop if stop < 2.5 => Stop::NoAtomLeft,
+            _ => Stop::Dependent,
+        };
+        let least_lead = match f64::from(state[LEAD]) {
+            lead if lead >= f64::from(f32::MAX) => f64::INFINITY,
+            lead => lead / energy.sqrt(),
+        };
+        let close = f64::from(state[CLOSEST]) < BELIEVED_ENERGY * energy;
+        let ended_by_rounding = matches!(stop, Stop::Dependent | Stop::NoAtomLeft);
+        let broken = steps.iter().chain(&coefficients[..count]).any(|v| !v.is_finite());
+        let doubtful = least_lead < BELIEVED || close || ended_by_rounding || broken;
+        let solution = Solution {
+            support: support[..count].iter().map(|&atom| atom as usize).collect(),
+            coefficients: coefficients[..count].iter().map(|&c| c.into()).collect(),
+            residual_norms,
+            stop,
+            unseen: self.unseen.clone(),
+        };
+        Found { solution, steps, doubtful, least_lead }
+    }
+}
+
+/// Length of a vector over this many atoms on a device.
+///
+/// # Errors
+/// [`BackendError`] if the Gram matrix would not fit.
+pub(super) fn width(device: &Device, atoms: usize) -> Result<usize, BackendError> {
+    let limits = device.limits();
+    let shape = limits.shape(atoms, 1)?;
+    let width = shape.units * shape.per_unit;
+    budget::check("atoms at most", width, budget::ROUNDS)?;
+    limits.fits("bytes of a buffer for the Gram matrix", width.saturating_mul(width))?;
+    Ok(width)
+}

@@ -1,0 +1,424 @@
+//! What runs on the device: one source, compiled for CUDA, Vulkan, Metal or DirectX at run time.
+//!
+//! The one law: nothing is decided twice. Every unit of a workgroup that pursues a frame computes the same choice from the same
+//! shared numbers, barriers stand outside every branch, and equal scores go to the lower atom as on the CPU.
+//!
+//! Loops whose length is known when the kernel is compiled are unrolled; those that are left are counted by
+//! [`super::budget`].
+
+// The macro turns each kernel into several items, some of which a kernel that only others call does not use.
+#![allow(missing_docs, clippy::too_many_arguments)]
+
+use super::budget::{CLOSEST, COUNT, ENERGY, ENOUGH, FIRST_BEST, LEAD, REMAINING, STATE, STOP};
+use cubecl::prelude::*;
+
+/// Vectors of which one unit computes the products together.
+pub(super) const TOGETHER: usize = 8;
+
+/// Adds `vectors * matrix` over the rows from `first` to `last` to `out`: inner products of `vectors` (`count x rows`) with
+/// the columns of `matrix` (`rows x width`); the launch of the first row starts from 0. Both the Gram matrix (the vectors are
+/// the atoms) and initial projections.
+/// `count` is a multiple of [`TOGETHER`]. One unit a column, workgroups side by side and one below the other.
+#[cube(launch_unchecked)]
+pub(super) fn products(
+    vectors: &Array<f32>,
+    matrix: &Array<f32>,
+    out: &mut Array<f32>,
+    rows: u32,
+    width: u32,
+    first: u32,
+    last: u32,
+) {
+    let rows = rows as usize;
+    let width = width as usize;
+    let column = ABSOLUTE_POS_X as usize;
+    let top = CUBE_POS_Y as usize * TOGETHER;
+    let mut sums = Array::<f32>::new(TOGETHER);
+    #[unroll]
+    for v in 0..TOGETHER {
+        sums[v] = if first == 0 { 0.0f32.runtime() } else { out[(top + v) * width + column] };
+    }
+    for row in first as usize..last as usize {
+        let entry = matrix[row * width + column];
+        #[unroll]
+        for v in 0..TOGETHER {
+            sums[v] += vectors[(top + v) * rows + row] * entry;
+        }
+    }
+    #[unroll]
+    for v in 0..TOGETHER {
+        out[(top + v) * width + column] = sums[v];
+    }
+}
+
+/// Marks with 1 each atom that points the same or the opposite way as a lower one, to the rounding of `f32`; `like` is the
+/// square of the cosine from which that is said. One unit an atom.
+#[cube(launch)]
+pub(super) fn doubles(gram: &Array<f32>, out: &mut Array<u32>, width: u32, like: f32) {
+    let atom = ABSOLUTE_POS;
+    let width = width as usize;
+    let own = gram[atom * width + atom];
+    let mut found = 0u32;
+    for other in 0..atom {
+        let product = gram[other * width + atom];
+        if product * product >= like * own * gram[other * width + other] && product != 0.0 {
+            found = 1u32;
+        }
+    }
+    out[atom] = found;
+}
+
+/// What is known of a pursuit when it is compiled.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(super) struct Shape {
+    /// Units of the workgroup that pursues one frame; a power of two.
+    pub units: usize,
+    /// Atoms of each unit: `atom = unit + units * i`.
+    pub per_unit: usize,
+    /// Room for the weights of chosen atoms in shared memory.
+    pub capacity: usize,
+}
+
+/// Orthogonal matching pursuit, steps `first` to `last` of at most `sparsity`; one workgroup a frame.
+///
+/// As on the CPU, columns of the Gram matrix are orthogonalised as they are chosen: row `i` of `rows` updates the projection
+/// `p` of all atoms, and the Cholesky factor of the support is contained in the rows, so no triangular system is solved.
+/// `atoms` are one over each norm, then the squared norms; `values` of a frame are a step and one over a pivot's root for
+/// each atom of the support.
+#[cube(launch_unchecked)]
+pub(super) fn pursue(
+    gram: &Array<f32>,
+    atoms: &Array<f32>,
+    projection: &mut Array<f32>,
+    rows: &mut Array<f32>,
+    support: &mut Array<u32>,
+    values: &mut Array<f32>,
+    state: &mut Array<f32>,
+    sparsity: u32,
+    first: u32,
+    last: u32,
+    rounding: f32,
+    dependent: f32,
+    #[comptime] shape: Shape,
+) {
+    let units = comptime!(shape.units);
+    let per_unit = comptime!(shape.per_unit);
+    let width = comptime!(shape.units * shape.per_unit);
+    let sparsity = sparsity as usize;
+    let frame = CUBE_POS;
+    let unit = UNIT_POS as usize;
+
+    let mut numbers = SharedMemory::<f32>::new(units);
+    let mut seconds = SharedMemory::<f32>::new(units);
+    let mut places = SharedMemory::<u32>::new(units);
+    let mut weights = SharedMemory::<f32>::new(comptime!(shape.capacity));
+    let mut chosen = SharedMemory::<f32>::new(1usize);
+
+    // This unit's atoms.
+    let mut p = Array::<f32>::new(per_unit);
+    let mut norms = Array::<f32>::new(per_unit);
+    let mut row = Array::<f32>::new(per_unit);
+    #[unroll]
+    for a in 0..per_unit {
+        p[a] = projection[frame * width + a * units + unit];
+        norms[a] = atoms[a * units + unit];
+    }
+    for i in 0..first as usize {
+        let taken = support[frame * sparsity + i] as usize;
+        #[unroll]
+        for a in 0..per_unit {
+            if a * units + unit == taken {
+                norms[a] = 0.0;
+            }
+        }
+    }
+
+    let energy = state[frame * STATE + ENERGY];
+    let enough = state[frame * STATE + ENOUGH];
+    let mut remaining = state[frame * STATE + REMAINING];
+    let mut first_best = state[frame * STATE + FIRST_BEST];
+    let mut count = state[frame * STATE + COUNT];
+    let mut stop = state[frame * STATE + STOP];
+    let mut lead = state[frame * STATE + LEAD];
+    let mut closest = state[frame * STATE + CLOSEST];
+    // The state is read before its owner may write it again.
+    sync_storage();
+
+    for step in first as usize..last as usize {
+        if stop == 0.0 {
+            closest = min(closest, (remaining - enough).abs());
+            if remaining <= enough {
+                stop = 1.0;
+            }
+        }
+
+        // The largest score, the lowest atom that has it, and the largest score of the others.
+        let mut best = 0.0f32;
+        let mut second = 0.0f32;
+        let mut place = unit as u32;
+        #[unroll]
+        for a in 0..per_unit {
+            let score = p[a].abs() * norms[a];
+            if score > best {
+                second = best;
+                best = score;
+                place = (a * units + unit) as u32;
+            } else if score > second {
+                second = score;
+            }
+        }
+        numbers[unit] = best;
+        seconds[unit] = second;
+        places[unit] = place;
+        sync_cube();
+        #[unroll]
+        for level in 0..comptime!(units.trailing_zeros()) {
+            let half = comptime!(units >> (level + 1));
+            if unit < half {
+                let (a, b) = (numbers[unit], numbers[unit + half]);
+                let (at_a, at_b) = (places[unit], places[unit + half]);
+                let (after_a, after_b) = (seconds[unit], seconds[unit + half]);
+                if b > a || (b == a && at_b < at_a) {
+                    numbers[unit] = b;
+                    places[unit] = at_b;
+                    seconds[unit] = max(a, after_b);
+                } else {
+                    seconds[unit] = max(b, after_a);
+                }
+            }
+            sync_cube();
+        }
+        let best = numbers[0];
+        let second = seconds[0];
+        let atom = places[0] as usize;
+        sync_cube();
+
+        if step == 0 {
+            first_best = best;
+        }
+        // Not a number is not more either.
+        let more = best > rounding * first_best;
+        if stop == 0.0 {
+            if more {
+                lead = min(lead, best - second);
+            } else {
+                stop = 2.0;
+            }
+        }
+
+        // What the rows say of the chosen atom, and how much of it they leave.
+        let taken = if stop == 0.0 { step } else { 0usize.runtime() };
+        let mut sum = 0.0f32;
+        let mut i = unit;
+        while i < taken {
+            let weight = rows[(frame * sparsity + i) * width + atom];
+            weights[i] = weight;
+            sum += weight * weight;
+            i += units;
+        }
+        numbers[unit] = sum;
+        #[unroll]
+        for a in 0..per_unit {
+            if a * units + unit == atom {
+                chosen[0] = p[a];
+            }
+        }
+        sync_cube();
+        #[unroll]
+        for level in 0..comptime!(units.trailing_zeros()) {
+            let half = comptime!(units >> (level + 1));
+            if unit < half {
+                numbers[unit] = numbers[unit] + numbers[unit + half];
+            }
+            sync_cube();
+        }
+        let own = atoms[width + atom];
+        let pivot = own - numbers[0];
+        let projected = chosen[0];
+        sync_cube();
+
+        if stop == 0.0 {
+            if pivot > dependent * own {
+                let root = f32::sqrt(pivot);
+                let scale = 1.0f32 / root;
+                let along = projected * scale;
+                #[unroll]
+                for a in 0..per_unit {
+                    row[a] = gram[atom * width + a * units + unit];
+                }
+                for i in 0..taken {
+                    let weight = weights[i];
+                    let before = (frame * sparsity + i) * width + unit;
+                    #[unroll]
+                    for a in 0..per_unit {
+                        row[a] -= weight * rows[before + a * units];
+                    }
+                }
+                let start = (frame * sparsity + step) * width + unit;
+                #[unroll]
+                for a in 0..per_unit {
+                    let entry = row[a] * scale;
+                    rows[start + a * units] = entry;
+                    p[a] -= along * entry;
+                    if a * units + unit == atom {
+                        norms[a] = 0.0;
+                    }
+                }
+                if unit == 0 {
+                    support[frame * sparsity + step] = atom as u32;
+                    values[(frame * sparsity + step) * 2] = along;
+                    values[(frame * sparsity + step) * 2 + 1] = scale;
+                }
+                remaining -= along * along;
+                count += 1.0;
+            } else {
+                stop = 3.0;
+            }
+        }
+        // The next choice reads this row where other units wrote it.
+        sync_storage();
+    }
+
+    #[unroll]
+    for a in 0..per_unit {
+        projection[frame * width + a * units + unit] = p[a];
+    }
+    if unit == 0 {
+        state[frame * STATE + ENERGY] = energy;
+        state[frame * STATE + REMAINING] = remaining;
+        state[frame * STATE + FIRST_BEST] = first_best;
+        state[frame * STATE + COUNT] = count;
+        state[frame * STATE + STOP] = stop;
+        state[frame * STATE + LEAD] = lead;
+        state[frame * STATE + CLOSEST] = closest;
+    }
+}
+
+/// Coefficients of the support by back substitution; one workgroup a frame.
+#[cube(launch)]
+pub(super) fn coefficients(
+    rows: &Array<f32>,
+    support: &Array<u32>,
+    values: &Array<f32>,
+    state: &Array<f32>,
+    out: &mut Array<f32>,
+    sparsity: u32,
+    width: u32,
+    #[comptime] shape: Shape,
+) {
+    let units = comptime!(shape.units);
+    let sparsity = sparsity as usize;
+    let width = width as usize;
+    let frame = CUBE_POS;
+    let unit = UNIT_POS as usize;
+    let count = state[frame * STATE + COUNT] as usize;
+    let mut x = SharedMemory::<f32>::new(comptime!(shape.capacity));
+    let mut i = unit;
+    while i < count {
+        x[i] = values[(frame * sparsity + i) * 2];
+        i += units;
+    }
+    sync_cube();
+    for back in 0..sparsity {
+        let last = sparsity - 1 - back;
+        if last < count {
+            let value = x[last] * values[(frame * sparsity + last) * 2 + 1];
+            let atom = support[frame * sparsity + last] as usize;
+            let mut i = unit;
+            while i < last {
+                x[i] -= rows[(frame * sparsity + i) * width + atom] * value;
+                i += units;
+            }
+            if unit == 0 {
+                out[frame * sparsity + last] = value;
+            }
+        }
+        sync_cube();
+    }
+}
+
+/// The Cholesky factor of each support, row after row of its lower triangle; one workgroup an atom of the support, frames
+/// below each other.
+#[cube(launch)]
+pub(super) fn factor(
+    rows: &Array<f32>,
+    support: &Array<u32>,
+    values: &Array<f32>,
+    state: &Array<f32>,
+    out: &mut Array<f32>,
+    sparsity: u32,
+    width: u32,
+    #[comptime] units: usize,
+) {
+    let sparsity = sparsity as usize;
+    let width = width as usize;
+    let (last, frame) = (CUBE_POS_X as usize, CUBE_POS_Y as usize);
+    let count = state[frame * STATE + COUNT] as usize;
+    let start = frame * (sparsity * (sparsity + 1) / 2) + last * (last + 1) / 2;
+    let at = frame * sparsity;
+    if last < count {
+        let atom = support[at + last] as usize;
+        let mut i = UNIT_POS as usize;
+        while i < last {
+            out[start + i] = rows[(at + i) * width + atom];
+            i += units;
+        }
+        if UNIT_POS == 0 {
+            out[start + last] = 1.0 / values[(at + last) * 2 + 1];
+        }
+    }
+}
+
+/// Images: each atom's picture (`atoms x pixels`) times its coefficient. One unit a pixel, frames below each other.
+#[cube(launch)]
+pub(super) fn images(
+    pictures: &Array<f32>,
+    support: &Array<u32>,
+    coefficients: &Array<f32>,
+    state: &Array<f32>,
+    out: &mut Array<f32>,
+    sparsity: u32,
+    pixels: u32,
+) {
+    let sparsity = sparsity as usize;
+    let (pixel, frame) = (ABSOLUTE_POS_X as usize, CUBE_POS_Y as usize);
+    let pixels = pixels as usize;
+    if pixel < pixels {
+        let count = state[frame * STATE + COUNT] as usize;
+        let mut sum = 0.0f32;
+        for i in 0..count {
+            let atom = support[frame * sparsity + i] as usize;
+            sum += coefficients[frame * sparsity + i] * pictures[atom * pixels + pixel];
+        }
+        out[frame * pixels + pixel] = sum;
+    }
+}
+
+/// Coefficients at their atoms' places, 0 elsewhere. One workgroup a frame.
+#[cube(launch)]
+pub(super) fn scatter(
+    support: &Array<u32>,
+    coefficients: &Array<f32>,
+    state: &Array<f32>,
+    out: &mut Array<f32>,
+    sparsity: u32,
+    atoms: u32,
+    #[comptime] units: usize,
+) {
+    let sparsity = sparsity as usize;
+    let frame = CUBE_POS;
+    let atoms = atoms as usize;
+    let count = state[frame * STATE + COUNT] as usize;
+    let mut i = UNIT_POS as usize;
+    while i < atoms {
+        out[frame * atoms + i] = 0.0;
+        i += units;
+    }
+    sync_storage();
+    let mut i = UNIT_POS as usize;
+    while i < count {
+        let atom = support[frame * sparsity + i] as usize;
+        out[frame * atoms + atom] = coefficients[frame * sparsity + i];
+        i += units;
+    }
+}
