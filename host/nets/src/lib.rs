@@ -14,7 +14,9 @@
 pub mod classical;
 pub mod consistency;
 pub mod cpu;
+pub mod data;
 pub mod deblur;
+pub mod degrade;
 pub mod device;
 pub mod embedded;
 pub mod enhance;

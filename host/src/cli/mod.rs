@@ -25,6 +25,7 @@ mod selftest;
 mod serve_virtual;
 mod setup;
 mod source;
+mod train;
 
 use clap::{Parser, Subcommand};
 use nirspi::files::FileError;
@@ -58,6 +59,7 @@ enum Command {
     Range(range::Args),
     Bench(bench::Args),
     Eval(eval::EvalArgs),
+    Train(train::TrainArgs),
 }
 
 /// A mistake in how the program was called, rather than in what it was given.
@@ -95,6 +97,7 @@ pub fn run() -> ExitCode {
         Command::Range(args) => range::run(&args),
         Command::Bench(args) => bench::run(&args),
         Command::Eval(args) => eval::run(&args),
+        Command::Train(args) => train::run(&args),
     };
     match result {
         Ok(code) => code,

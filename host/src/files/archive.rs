@@ -5,11 +5,12 @@
 //! its checksum holds.
 
 use super::FileError;
-use super::array::{ArrayError, Header, MAGIC, shape_text};
+use super::array::{ArrayError, Header, MAGIC, Sample, shape_text};
 use std::fs::File;
-use std::io::{BufReader, Read, Seek};
+use std::io::{BufReader, Cursor, Read, Seek};
 use std::path::{Path, PathBuf};
-use zip::ZipArchive;
+use zip::write::SimpleFileOptions;
+use zip::{ZipArchive, ZipWriter};
 
 /// What a path is expected to lead to.
 const EXPECTED: &str = "a NumPy .npz archive";
@@ -28,9 +29,9 @@ pub(super) struct Archive {
 
 /// A field of numbers in C order.
 #[derive(Debug)]
-pub(super) struct Numbers {
+pub(super) struct Numbers<T = f64> {
     pub(super) shape: Vec<usize>,
-    pub(super) values: Vec<f64>,
+    pub(super) values: Vec<T>,
 }
 
 /// Opens a plain file, naming the path in every refusal.
@@ -112,6 +113,15 @@ impl Archive {
         field: &'static str,
         accept: impl FnOnce(&[u64]) -> Result<(), String>,
     ) -> Result<Numbers, FileError> {
+        self.numbers_of(field, accept)
+    }
+
+    /// The same, as numbers of another type: stacks of images do not need 8 bytes a pixel.
+    pub(super) fn numbers_of<T: Sample>(
+        &mut self,
+        field: &'static str,
+        accept: impl FnOnce(&[u64]) -> Result<(), String>,
+    ) -> Result<Numbers<T>, FileError> {
         let path = &self.path;
         let mut member = self
             .zip
@@ -136,6 +146,24 @@ impl Archive {
         let values = header.read_data(&mut member, MAX_FIELD_BYTES).map_err(explain)?;
         Ok(Numbers { shape: header.shape().iter().map(|&axis| axis as usize).collect(), values })
     }
+}
+
+/// The bytes of an archive with these members, each a whole `.npy` file under the name of its field.
+///
+/// # Errors
+/// [`FileError`] naming `path`, if the archive cannot be put together.
+pub(crate) fn encode(path: &Path, members: &[(&str, Vec<u8>)]) -> Result<Vec<u8>, FileError> {
+    use std::io::Write as _;
+    let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
+    for (field, bytes) in members {
+        archive
+            .start_file(format!("{field}{MEMBER_SUFFIX}"), SimpleFileOptions::default())
+            .map_err(std::io::Error::from)
+            .and_then(|()| archive.write_all(bytes))
+            .map_err(|error| FileError::io(path, "write", error))?;
+    }
+    let bytes = archive.finish().map_err(|error| FileError::io(path, "write", error.into()))?;
+    Ok(bytes.into_inner())
 }
 
 fn damaged(path: &Path, found: String) -> FileError {

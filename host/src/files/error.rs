@@ -88,11 +88,11 @@ pub enum FileError {
 }
 
 impl FileError {
-    pub(super) fn io(path: &Path, attempt: &'static str, source: io::Error) -> Self {
+    pub(crate) fn io(path: &Path, attempt: &'static str, source: io::Error) -> Self {
         Self::Io { path: path.to_owned(), attempt, source }
     }
 
-    pub(super) fn kind(path: &Path, found: impl Into<String>, expected: &'static str) -> Self {
+    pub(crate) fn kind(path: &Path, found: impl Into<String>, expected: &'static str) -> Self {
         Self::Kind { path: path.to_owned(), found: found.into(), expected }
     }
 }

@@ -40,6 +40,30 @@ pub struct Reflectance {
 /// # Errors
 /// [`FileError`], one line that names file, what was found and what was expected.
 pub fn read_reflectance(path: &Path) -> Result<Reflectance, FileError> {
+    let picture = read_picture(path)?;
+    let (width, height) = (picture.width(), picture.height());
+    let edge = width.min(height);
+    let square = picture.crop_imm((width - edge) / 2, (height - edge) / 2, edge, edge);
+    Ok(Reflectance { size_px: edge as usize, values: grey(&square) })
+}
+
+/// A grey picture of any shape, in `[0, 1]`.
+pub(crate) struct Grey {
+    pub(crate) width: u32,
+    pub(crate) height: u32,
+    pub(crate) values: Vec<f32>,
+}
+
+/// As [`read_reflectance`], uncropped.
+///
+/// # Errors
+/// As [`read_reflectance`].
+pub(super) fn read_grey(path: &Path) -> Result<Grey, FileError> {
+    let picture = read_picture(path)?;
+    Ok(Grey { width: picture.width(), height: picture.height(), values: grey(&picture) })
+}
+
+fn read_picture(path: &Path) -> Result<DynamicImage, FileError> {
     let (file, _) = open_file(path, EXPECTED)?;
     let read = |error| FileError::io(path, "read", error);
     let mut stream = BufReader::new(file);
@@ -55,7 +79,7 @@ pub fn read_reflectance(path: &Path) -> Result<Reflectance, FileError> {
     limits.max_image_height = Some(MAX_EDGE_PX);
     limits.max_alloc = Some(MAX_DECODED_BYTES);
     reader.limits(limits);
-    let picture = reader.decode().map_err(|error| match error {
+    reader.decode().map_err(|error| match error {
         ::image::ImageError::Limits(_) => FileError::kind(
             path,
             "a PNG image that is too large",
@@ -66,18 +90,14 @@ pub fn read_reflectance(path: &Path) -> Result<Reflectance, FileError> {
             found: error.to_string(),
             expected: EXPECTED,
         },
-    })?;
-    Ok(to_reflectance(&picture))
+    })
 }
 
-fn to_reflectance(picture: &DynamicImage) -> Reflectance {
-    let (width, height) = (picture.width(), picture.height());
-    let edge = width.min(height);
-    let square = picture.crop_imm((width - edge) / 2, (height - edge) / 2, edge, edge);
-    let values = match square.color() {
+fn grey(picture: &DynamicImage) -> Vec<f32> {
+    match picture.color() {
         // Grey as it stands: no rounding on the way through colour.
-        ColorType::L8 | ColorType::L16 => square.to_luma32f().into_raw(),
-        _ => square
+        ColorType::L8 | ColorType::L16 => picture.to_luma32f().into_raw(),
+        _ => picture
             .to_rgba32f()
             .pixels()
             .map(|pixel| {
@@ -85,8 +105,7 @@ fn to_reflectance(picture: &DynamicImage) -> Reflectance {
                 ((0.2126 * r + 0.7152 * g + 0.0722 * b) * alpha).clamp(0.0, 1.0)
             })
             .collect(),
-    };
-    Reflectance { size_px: edge as usize, values }
+    }
 }
 
 /// The bytes of an 8-bit grey PNG of values in `[0, 1]`, row-major; what lies outside is clipped,

@@ -5,6 +5,7 @@
 //! whole or not there ([`output`]). A file can claim any size: memory is taken for data that
 //! arrived, never for a claim.
 
+pub mod characters;
 pub mod image;
 pub mod npy;
 pub mod npz;
@@ -18,4 +19,5 @@ mod error;
 #[cfg(test)]
 mod testing;
 
+pub(crate) use archive::encode as encode_archive;
 pub use error::FileError;

@@ -14,12 +14,9 @@
 //! | `coef` | `(B, k)` float64: coefficient of each, 0 where there is none |
 
 use super::FileError;
-use super::archive::{Archive, Numbers};
+use super::archive::{self, Archive, Numbers};
 use super::npy;
-use std::io::{Cursor, Write};
 use std::path::Path;
-use zip::ZipWriter;
-use zip::write::SimpleFileOptions;
 
 /// Measurements, and the dictionary that is to explain them.
 #[derive(Debug, Clone, PartialEq)]
@@ -109,16 +106,9 @@ pub fn encode(
         coef.resize((row + 1) * sparsity, 0.0);
     }
     let shape = [solutions.len(), sparsity];
-    let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
-    let mut add = |name: &str, bytes: &[u8]| -> std::io::Result<()> {
-        archive.start_file(name, SimpleFileOptions::default())?;
-        archive.write_all(bytes)
-    };
-    add("support.npy", &npy::encode(&shape, &support))
-        .and_then(|()| add("coef.npy", &npy::encode(&shape, &coef)))
-        .map_err(|error| FileError::io(path, "write", error))?;
-    let bytes = archive.finish().map_err(|error| FileError::io(path, "write", error.into()))?;
-    Ok(bytes.into_inner())
+    let members =
+        [("support", npy::encode(&shape, &support)), ("coef", npy::encode(&shape, &coef))];
+    archive::encode(path, &members)
 }
 
 #[cfg(test)]

@@ -87,8 +87,19 @@ impl VirtualOptics {
     ///
     /// # Errors
     /// Air too dense, or too many drops to be followed.
-    pub fn in_rain(mut self, drops: Drops) -> Result<Self, VirtualOpticsError> {
+    pub fn in_rain(self, drops: Drops) -> Result<Self, VirtualOpticsError> {
         let weather = Weather::new(drops, self.wavelength_nm, Water::Segelstein)?;
+        let optics = self.in_weather(weather)?;
+        // Whether the drops can be followed shows now rather than when the camera is made.
+        optics.spots(0)?;
+        Ok(optics)
+    }
+
+    /// As [`in_rain`](Self::in_rain), in weather that was worked out before.
+    ///
+    /// # Errors
+    /// Air too dense.
+    pub fn in_weather(mut self, weather: Weather) -> Result<Self, VirtualOpticsError> {
         let baseline_mm = Instrument::default().baseline_mm;
         let veil = weather.veil(&self.projector, self.distance_mm, baseline_mm)?;
         let returned = weather.blur(self.distance_mm)?.returned(self.field_mm() / self.distance_mm);
@@ -96,13 +107,14 @@ impl VirtualOptics {
             * returned
             + self.budget.ambient_electrons_white * veil.airlight;
         self.weather = Some(weather);
-        // Whether the drops can be followed shows now rather than when the camera is made.
-        self.spots(0)?;
         Ok(self)
     }
 
     /// What the LEDs' spots show in the rain; none in dry air.
-    fn spots(&self, seed: u64) -> Result<Option<RainySpots>, RainError> {
+    ///
+    /// # Errors
+    /// Too many drops to be followed.
+    pub fn spots(&self, seed: u64) -> Result<Option<RainySpots>, RainError> {
         let Some(weather) = &self.weather else { return Ok(None) };
         let beams = BeamShadows {
             projector: self.projector,

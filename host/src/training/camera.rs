@@ -1,0 +1,322 @@
+//! The virtual camera as a source of training pairs: some hundred pictures a second instead of a few.
+//!
+//! A capture is linear in light up to the ADC. So the sweeps of an exposure are summed before the receiver instead of
+//! after it: one sweep of the mean light, settled through the receiver's exact response, with the noise of the whole
+//! sum drawn at once. Calibration is measured once by the real procedure on the real virtual camera, and what it
+//! mismeasures stays in every picture. The tests hold all this against captures by the whole camera.
+
+use crate::calibrate::{CalibrationError, Settling, calibrate};
+use crate::session::{Deaf, Session, SessionError};
+use crate::virtual_camera::{MemoryLink, VirtualOptics, VirtualOpticsError};
+use nirspi_nets::data::SIDE_PX;
+use nirspi_nets::degrade::{Degrade, DegradeError, Depth, Reading, blur};
+use nirspi_optics::rain::{Drops, RainError, Weather};
+use nirspi_optics::water::Water;
+use nirspi_optics::{LEDS, Projector, Scene, SceneError};
+use nirspi_recon::{
+    Leak, LeakError, MeasurementError, Measurements, Order, OrderError, Side, fwht, reconstruct,
+};
+use nirspi_wire::{ADC_HZ, CLOCKS_PER_PATTERN};
+use rand::{Rng, RngExt};
+use rand_distr::StandardNormal;
+use rand_pcg::Pcg64Mcg;
+use thiserror::Error;
+
+/// Nearest and farthest target, in mm.
+const DISTANCES_MM: (f64, f64) = (300.0, 1200.0);
+/// Noise that an exposure is chosen for, in units of a white target.
+const NOISE_STD: (f64, f64) = (0.003, 0.08);
+/// Sweeps of the shortest and of the longest exposure: 82 us and 10 s.
+const SWEEPS: (f64, f64) = (1.0, 122_000.0);
+/// Clocks at the start of a pattern whose samples are left out.
+const BLANKED: u16 = 2;
+/// Times at which drops are looked at in one exposure, at most.
+const LOOKS: u32 = 128;
+/// Share of the pictures taken with all patterns, and the least share of patterns otherwise.
+const FULLY_SAMPLED: f32 = 0.7;
+const LEAST_SAMPLING: f32 = 0.25;
+/// Share of the depth maps with zones that give nothing, and of no depth at all.
+const NO_DEPTH: f32 = 0.2;
+
+/// Rain as in the paper's Table 2.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Rainfall {
+    /// Dry air.
+    None,
+    /// 1.93 mm/h of 0.5 mm drops.
+    Light,
+    /// 5.6 mm/h of 2 mm drops.
+    Heavy,
+}
+
+/// Under what a picture is taken.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Conditions {
+    /// From camera to target.
+    pub distance_mm: f64,
+    /// What falls between.
+    pub rain: Rainfall,
+    /// Differential sweeps that are summed.
+    pub sweeps: u32,
+    /// Share of the patterns shown.
+    pub sampling: f32,
+}
+
+/// A picture with the conditions under which it was taken.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CameraPicture {
+    /// What the camera gave.
+    pub reading: Reading,
+    /// When.
+    pub conditions: Conditions,
+}
+
+/// Why there is no such camera, or no picture. `Display` is one line.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum TrainingCameraError {
+    /// Distance, light or receiver.
+    #[error(transparent)]
+    Optics(#[from] VirtualOpticsError),
+    /// The scene.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// Rain.
+    #[error(transparent)]
+    Rain(#[from] RainError),
+    /// The camera could not be opened.
+    #[error(transparent)]
+    Session(#[from] SessionError),
+    /// Or not calibrated.
+    #[error(transparent)]
+    Calibration(#[from] CalibrationError),
+    /// What leaks cannot be undone.
+    #[error(transparent)]
+    Leak(#[from] LeakError),
+    /// The order of patterns.
+    #[error(transparent)]
+    Order(#[from] OrderError),
+    /// The measurement.
+    #[error(transparent)]
+    Measurement(#[from] MeasurementError),
+}
+
+/// The virtual camera, calibrated.
+#[derive(Debug, Clone)]
+pub struct SimulatedCamera {
+    /// What the receiver does to slots, and what calibration believes that it does.
+    leaks: Leak,
+    believed: Leak,
+    order: Vec<u32>,
+    light: Weather,
+    heavy: Weather,
+}
+
+impl SimulatedCamera {
+    /// Opens a virtual camera before a white sheet at 0.3 m and calibrates it.
+    ///
+    /// # Errors
+    /// [`TrainingCameraError`] if it cannot be opened or calibrated.
+    pub fn new(seed: u64) -> Result<Self, TrainingCameraError> {
+        let distance_mm = DISTANCES_MM.0;
+        let field_mm = Projector::default().field_mm(distance_mm);
+        let optics = VirtualOptics::new(Scene::new(vec![1.0], 1, field_mm)?, distance_mm)?;
+        let mut session = Session::open(Box::new(MemoryLink::new(optics.camera(seed)?)))?;
+        let believed = calibrate(&mut session, &mut Deaf)?.leak(CLOCKS_PER_PATTERN, BLANKED)?;
+        let response = |n| optics.chain().settling(n);
+        // Two poles of nanoseconds have settled to rounding after as many clocks.
+        let exact = Settling {
+            adc_latency: 0,
+            response: (0..64).map(response).collect(),
+            dark_counts: 0.0,
+            step_counts: 0.0,
+            noise_counts: 0.0,
+        };
+        let weather = |drops: Drops| Weather::new(drops, 1550.0, Water::Segelstein);
+        Ok(Self {
+            leaks: exact.leak(CLOCKS_PER_PATTERN, BLANKED)?,
+            believed,
+            order: Order::CakeCutting.rows(Side::INSTRUMENT)?,
+            light: weather(Drops::monodisperse(1.93, 0.5)?)?,
+            heavy: weather(Drops::monodisperse(5.6, 2.0)?)?,
+        })
+    }
+
+    /// Conditions as they come: blur alike between focus and the farthest target, any rain, and an exposure for the
+    /// noise wanted, as far as light and patience go.
+    pub fn conditions(&self, rng: &mut impl Rng) -> Result<Conditions, TrainingCameraError> {
+        // Defocus in pixels grows with the difference of the reciprocal distances.
+        let (near, far) = DISTANCES_MM;
+        let distance_mm = rng.random_range(1.0 / far..=1.0 / near).recip();
+        let rain = [Rainfall::None, Rainfall::Light, Rainfall::Heavy][rng.random_range(0..3_usize)];
+        let full = rng.random::<f32>() < FULLY_SAMPLED;
+        let sampling = if full { 1.0 } else { rng.random_range(LEAST_SAMPLING..1.0) };
+        let wanted = NOISE_STD.0 * (NOISE_STD.1 / NOISE_STD.0).powf(rng.random());
+        let optics = VirtualOptics::new(Scene::new(vec![0.5], 1, 1e4)?, distance_mm)?;
+        let one = self.noise_std(&optics, optics.footprint().weights(), 1);
+        let sweeps = (one / wanted).powi(2).clamp(SWEEPS.0, SWEEPS.1).round() as u32;
+        Ok(Conditions { distance_mm, rain, sweeps, sampling })
+    }
+
+    /// Takes a picture of `scene`, 64 x 64 in `[0, 1]`, which fills the field of view and goes on beyond it as in a
+    /// mirror.
+    ///
+    /// # Errors
+    /// [`TrainingCameraError`] for conditions that cannot be.
+    pub fn picture(
+        &self,
+        scene: &[f32],
+        conditions: Conditions,
+        rng: &mut Pcg64Mcg,
+    ) -> Result<CameraPicture, TrainingCameraError> {
+        let Conditions { distance_mm, sweeps, sampling, .. } = conditions;
+        let projector = Projector::default();
+        let field_mm = projector.field_mm(distance_mm);
+        let wide = Scene::new(mirrored(scene), 2 * SIDE_PX, 2.0 * field_mm)?;
+        let mut optics = VirtualOptics::new(wide, distance_mm)?;
+        optics = match conditions.rain {
+            Rainfall::None => optics,
+            Rainfall::Light => optics.in_weather(self.light.clone())?,
+            Rainfall::Heavy => optics.in_weather(self.heavy.clone())?,
+        };
+        let seen = exposed(&optics, sweeps, rng.random())?;
+        let shown = (f64::from(sampling) * LEDS as f64).round().clamp(1.0, LEDS as f64) as usize;
+        let rows = &self.order[..shown];
+        let mut differences = self.differences(&optics, &seen, rows, sweeps, rng);
+        self.believed.correct_differential(&mut differences);
+        let rows: Vec<i64> = rows.iter().map(|&row| i64::from(row)).collect();
+        let measured = Measurements::from_differential(Side::INSTRUMENT, &rows, &differences)?;
+        let image = reconstruct::hadamard(&measured);
+
+        let white = white_counts(&optics);
+        let diameter_px = (optics.blur_mm() / field_mm) as f32 * SIDE_PX as f32;
+        let noise_std = self.noise_std(&optics, &seen, sweeps) * f64::from(sampling).sqrt();
+        let reading = Reading {
+            image: image.pixels().iter().map(|v| (v / white as f32).clamp(0.0, 1.0)).collect(),
+            optical: blur::disc(scene, diameter_px),
+            // A disc's standard deviation along an axis is a quarter of its diameter.
+            sigma_px: diameter_px / 4.0,
+            noise_std: noise_std as f32,
+            sampling,
+            depth: depth(&optics, rng)?,
+        };
+        Ok(CameraPicture { reading, conditions })
+    }
+
+    /// Pattern minus complement for each of `rows`, in mean ADC counts of one sample, leak and noise within.
+    fn differences(
+        &self,
+        optics: &VirtualOptics,
+        seen: &[f32],
+        rows: &[u32],
+        sweeps: u32,
+        rng: &mut impl Rng,
+    ) -> Vec<f64> {
+        let counts = white_counts(optics);
+        let mut signed: Vec<f64> = seen.iter().map(|&w| f64::from(w) * counts).collect();
+        // As long as the camera has LEDs, the length is a power of two.
+        let _ = fwht(&mut signed);
+        let all = signed[0];
+        let slots: Vec<f64> = rows
+            .iter()
+            .flat_map(|&row| [1.0, -1.0].map(|sign| (all + sign * signed[row as usize]) / 2.0))
+            .collect();
+        let samples = f64::from(sweeps) * f64::from(CLOCKS_PER_PATTERN - BLANKED);
+        let read: Vec<f64> = (0..slots.len())
+            .map(|slot| {
+                let earlier =
+                    |tap: usize| slots[(slot + slots.len() * (tap + 1) - tap) % slots.len()];
+                let taps = self.leaks.taps().iter().enumerate();
+                let light: f64 = taps.map(|(tap, share)| share * earlier(tap)).sum();
+                let normal: f64 = rng.sample(StandardNormal);
+                light + (sample_variance(optics, light) / samples).sqrt() * normal
+            })
+            .collect();
+        read.as_chunks::<2>().0.iter().map(|[pattern, complement]| pattern - complement).collect()
+    }
+
+    /// Noise of a reconstructed pixel where all patterns are shown, in units of a white target.
+    fn noise_std(&self, optics: &VirtualOptics, seen: &[f32], sweeps: u32) -> f64 {
+        let counts = white_counts(optics);
+        // Each pattern lights half of the LEDs.
+        let light = seen.iter().map(|&w| f64::from(w)).sum::<f64>() * counts / 2.0;
+        let samples = f64::from(sweeps) * f64::from(CLOCKS_PER_PATTERN - BLANKED);
+        let difference = (2.0 * sample_variance(optics, light) / samples).sqrt();
+        let taps = self.believed.taps();
+        // Undoing the leak divides by what a difference keeps of its own.
+        let own = taps[0] - taps.get(1).unwrap_or(&0.0) / 2.0;
+        difference / own / (LEDS as f64).sqrt() / counts
+    }
+}
+
+impl Degrade for SimulatedCamera {
+    fn degrade(&self, scene: &[f32], rng: &mut Pcg64Mcg) -> Result<Reading, DegradeError> {
+        let refused = |error: TrainingCameraError| DegradeError::Camera(error.to_string());
+        if scene.len() != SIDE_PX * SIDE_PX {
+            return Err(DegradeError::Shape { found: scene.len() });
+        }
+        let conditions = self.conditions(rng).map_err(refused)?;
+        Ok(self.picture(scene, conditions, rng).map_err(refused)?.reading)
+    }
+}
+
+/// ADC counts that one LED on a white target adds to a sample. Distance is known by time of flight, and the budget
+/// with it: this is how counts become reflectances.
+fn white_counts(optics: &VirtualOptics) -> f64 {
+    optics.budget().electrons_per_led / optics.chain().electrons_per_count
+}
+
+/// Variance of one ADC sample in counts squared: shot noise of LEDs' light (in counts) and daylight, the amplifier,
+/// rounding.
+fn sample_variance(optics: &VirtualOptics, light_counts: f64) -> f64 {
+    let chain = optics.chain();
+    let gain = chain.electrons_per_count;
+    let electrons = (light_counts * gain).max(0.0) + chain.ambient_electrons;
+    (electrons + chain.amplifier_noise_electrons.powi(2)) / (gain * gain) + 1.0 / 12.0
+}
+
+/// Mean of what the LEDs' spots show during an exposure.
+fn exposed(optics: &VirtualOptics, sweeps: u32, seed: u64) -> Result<Vec<f32>, RainError> {
+    let Some(mut spots) = optics.spots(seed)? else {
+        return Ok(optics.footprint().weights().to_vec());
+    };
+    let looks = sweeps.min(LOOKS);
+    let sweep_s = 2.0 * LEDS as f64 * f64::from(CLOCKS_PER_PATTERN) / f64::from(ADC_HZ);
+    let mut mean = vec![0.0; LEDS];
+    for _ in 0..looks {
+        for (mean, seen) in mean.iter_mut().zip(spots.reflectance()) {
+            *mean += seen / looks as f32;
+        }
+        spots.advance(sweep_s * f64::from(sweeps) / f64::from(looks));
+    }
+    Ok(mean)
+}
+
+/// The depth map as the camera's sensor gives it, sometimes with a corner of it hidden, sometimes none.
+fn depth(optics: &VirtualOptics, rng: &mut impl Rng) -> Result<Option<Depth>, TrainingCameraError> {
+    if rng.random::<f32>() < NO_DEPTH {
+        return Ok(None);
+    }
+    let reading = optics.depth(rng.random()).map_err(VirtualOpticsError::from)?.reading();
+    let hidden = if rng.random() { rng.random::<u64>() & rng.random::<u64>() } else { 0 };
+    let mm = |zone: usize| if hidden >> zone & 1 == 1 { 0 } else { reading[zone] };
+    Ok(Some(Depth {
+        metres: std::array::from_fn(|zone| f32::from(mm(zone)) * 1e-3),
+        valid: std::array::from_fn(|zone| mm(zone) > 0),
+    }))
+}
+
+/// The scene with half of itself mirrored on every side, 128 x 128.
+fn mirrored(scene: &[f32]) -> Vec<f32> {
+    let half = SIDE_PX / 2;
+    let inner = |at: usize| match at {
+        at if at < half => half - 1 - at,
+        at if at < half + SIDE_PX => at - half,
+        at => 2 * SIDE_PX - 1 - (at - half),
+    };
+    let edge = 2 * SIDE_PX;
+    (0..edge * edge).map(|at| scene[inner(at / edge) * SIDE_PX + inner(at % edge)]).collect()
+}
+
+#[cfg(test)]
+mod tests;
