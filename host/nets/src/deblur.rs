@@ -49,6 +49,14 @@ impl Method {
             Self::Gan => "gan",
         }
     }
+
+    /// Calls of the network for one image.
+    pub fn steps(self) -> u32 {
+        match self {
+            Self::Diffusion { steps } | Self::Ancestral { steps } => steps.get(),
+            Self::Gan => 1,
+        }
+    }
 }
 
 /// A batch of images to deblur.

@@ -64,7 +64,7 @@ pub mod water;
 pub use array::LedArray;
 pub use budget::{Budget, BudgetError, BudgetSettings, BudgetTerms};
 pub use chain::{AdcSample, Chain, ChainError, ChainSettings};
-pub use depth::{DepthError, SimulatedDepth};
+pub use depth::{DEPTH_SIDE, DepthError, SimulatedDepth};
 pub use projector::{Footprint, Projector, ProjectorError};
 pub use scene::{Scene, SceneError};
 

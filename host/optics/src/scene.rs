@@ -109,7 +109,7 @@ impl Scene {
 
     /// Mean reflectance over a square of side `width_mm` centred at (`x_mm`, `y_mm`); the origin is
     /// the centre of the map, x to the right, y down.
-    pub(crate) fn mean_over_square(&self, x_mm: f64, y_mm: f64, width_mm: f64) -> f64 {
+    pub fn mean_over_square(&self, x_mm: f64, y_mm: f64, width_mm: f64) -> f64 {
         let px_per_mm = self.size_px as f64 / self.side_mm;
         let centre_px = self.size_px as f64 / 2.0;
         let half_px = width_mm * px_per_mm / 2.0;

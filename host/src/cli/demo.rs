@@ -1,5 +1,7 @@
 //! `nirspi demo`: the whole camera on a simulated scene, from light to picture.
 
+mod enhanced;
+
 use super::camera::{Rain, SceneArgs, SetupArgs};
 use super::method::{self, MethodArgs, Solved, solve};
 use super::print;
@@ -17,7 +19,6 @@ use nirspi::picture::{Panel, Range, SideBySide};
 use nirspi::scene::SceneMap;
 use nirspi::session::{CameraIdentity, Session};
 use nirspi::virtual_camera::{MemoryLink, VirtualOptics};
-use nirspi_nets::upscale_2x;
 use nirspi_recon::{Image, Side, reconstruct};
 use serde::Serialize;
 use std::ops::ControlFlow;
@@ -27,8 +28,8 @@ use std::process::ExitCode;
 /// Show what the camera does, without a camera: capture a simulated scene and reconstruct it
 ///
 /// An optics simulator lights the gateware's model; the real firmware logic drives it and speaks the real wire
-/// protocol; the host calibrates, captures, counts and reconstructs. Writes scene, raw reconstruction and result as
-/// PNG and NPY, side_by_side.png and report.json.
+/// protocol; the host calibrates, captures, counts, reconstructs, fuses with depth and deblurs. Writes scene and every
+/// stage as PNG and NPY, side_by_side.png and report.json.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n\
     \x20 nirspi demo --scene letter:R --out demo/")]
@@ -81,6 +82,7 @@ struct Report {
     /// The result, against what a perfect 32 x 32 camera would see.
     reconstruction: Quality,
     quality_note: &'static str,
+    enhancement: enhanced::Report,
     #[serde(flatten)]
     method: method::Report,
     notes: Vec<String>,
@@ -93,7 +95,10 @@ struct Images {
     raw: Vec<f32>,
     result: Image,
     fitted: Vec<f32>,
+    output_truth: Vec<f32>,
     upscaled: Vec<f32>,
+    fused: Vec<f32>,
+    deblurred: Vec<f32>,
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
@@ -138,14 +143,16 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let truth = optics.focused_footprint()?.weights().to_vec();
     let raw = compare(&raw, &truth)?;
     let fitted = compare(&image, &truth)?;
-    let side = image.side().pixels();
-    let upscaled = times.time("upscale", || upscale_2x(&fitted.values, 1, side, side))?;
+    let stages = enhanced::run(&image, &setup.rows, &optics, args.scene.seed, &mut times)?;
     let images = Images {
         truth: Image::new(Side::INSTRUMENT, truth),
         raw: raw.values,
         result: image,
         fitted: fitted.values,
-        upscaled,
+        output_truth: stages.truth,
+        upscaled: stages.upscaled,
+        fused: stages.fused,
+        deblurred: stages.deblurred,
     };
     let report = Report {
         scene: map.name.clone(),
@@ -169,6 +176,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         reconstruction: fitted.quality,
         quality_note: "against the scene on the 32 x 32 LED grid without defocus, after the gain and offset of \
                        least squares",
+        enhancement: stages.report,
         method,
         notes,
         stage_ms: times,
@@ -202,8 +210,13 @@ fn write(
     let result = Image::new(Side::INSTRUMENT, images.fitted.clone());
     out.write("reconstruction.png", &enlarged_png(&result))?;
     out.write("reconstruction.npy", &npy::encode(&grid, &images.fitted))?;
-    out.write("upscaled.png", &encode_grey(2 * side, 2 * side, &images.upscaled))?;
-    out.write("upscaled.npy", &npy::encode(&[2 * side, 2 * side], &images.upscaled))?;
+    out.write("truth_64.npy", &npy::encode(&[2 * side, 2 * side], &images.output_truth))?;
+    for (name, image) in
+        [("upscaled", &images.upscaled), ("fused", &images.fused), ("deblurred", &images.deblurred)]
+    {
+        out.write(&format!("{name}.png"), &encode_grey(2 * side, 2 * side, image))?;
+        out.write(&format!("{name}.npy"), &npy::encode(&[2 * side, 2 * side], image))?;
+    }
     out.write(
         "side_by_side.png",
         &encode_rgb(&side_by_side(map, optics, images, report).render()),
@@ -267,10 +280,25 @@ fn side_by_side(
                 vec![metrics(&report.reconstruction), report.method.short()],
             ),
             panel(
-                "result, 64 x 64",
+                "fused with depth",
                 2 * side,
-                &images.upscaled,
-                vec!["Lanczos upscaling".to_owned()],
+                &images.fused,
+                vec![
+                    metrics(&report.enhancement.fused),
+                    format!("FSRCNN, {} depth zones", report.enhancement.depth_zones),
+                ],
+            ),
+            panel(
+                "deblurred",
+                2 * side,
+                &images.deblurred,
+                vec![
+                    metrics(&report.enhancement.deblurred),
+                    format!(
+                        "bridge, 1 step; inconsistency {:.2}",
+                        report.enhancement.inconsistency
+                    ),
+                ],
             ),
         ],
         footer: format!(
@@ -302,6 +330,16 @@ fn say(args: &Args, report: &Report) -> Result<()> {
     print::line(format_args!("raw:    {}", quality_line(&report.raw)))?;
     print::line(format_args!("result: {}", quality_line(&report.reconstruction)))?;
     print::line(format_args!("{}", report.method))?;
+    let enhancement = &report.enhancement;
+    print::line(format_args!("at 64 x 64, Lanczos: {}", quality_line(&enhancement.upscaled)))?;
+    print::line(format_args!("fused with depth:    {}", quality_line(&enhancement.fused)))?;
+    print::line(format_args!(
+        "deblurred:           {} (blur {:.2} px and noise {:.4} estimated, inconsistency {:.2})",
+        quality_line(&enhancement.deblurred),
+        enhancement.sigma_px,
+        enhancement.noise,
+        enhancement.inconsistency
+    ))?;
     for note in &report.notes {
         print::line(format_args!("note: {note}"))?;
     }

@@ -7,14 +7,17 @@ mod backend;
 mod bench;
 mod camera;
 mod capture;
+mod deblur;
 mod demo;
 mod devices;
+mod enhance;
 mod eval;
 mod flash;
 mod gateware;
 mod info;
 mod method;
 mod metrics;
+mod networks;
 mod print;
 mod quality;
 mod rain;
@@ -25,7 +28,9 @@ mod selftest;
 mod serve_virtual;
 mod setup;
 mod source;
+mod stack;
 mod train;
+mod upscale;
 
 use clap::{Parser, Subcommand};
 use nirspi::files::FileError;
@@ -54,6 +59,9 @@ enum Command {
     Flash(flash::Args),
     Gateware(gateware::Args),
     Setup(setup::Args),
+    Upscale(upscale::Args),
+    Deblur(deblur::Args),
+    Enhance(enhance::Args),
     Metrics(metrics::Args),
     Rain(rain::Args),
     Range(range::Args),
@@ -92,6 +100,9 @@ pub fn run() -> ExitCode {
         Command::Flash(args) => flash::run(&args),
         Command::Gateware(args) => gateware::run(&args),
         Command::Setup(args) => setup::run(&args),
+        Command::Upscale(args) => upscale::run(&args),
+        Command::Deblur(args) => deblur::run(&args),
+        Command::Enhance(args) => enhance::run(&args),
         Command::Metrics(args) => metrics::run(&args),
         Command::Rain(args) => rain::run(&args),
         Command::Range(args) => range::run(&args),

@@ -111,6 +111,11 @@ impl Header {
         &self.shape
     }
 
+    /// Are its numbers single bytes, 0 to 255?
+    pub(super) fn is_bytes(&self) -> bool {
+        self.dtype.kind == Kind::Unsigned && self.dtype.size == 1
+    }
+
     /// Bytes of data that belong to this header, if that is at most `limit_bytes`.
     pub(super) fn data_bytes(&self, limit_bytes: u64) -> Result<u64, ArrayError> {
         self.shape

@@ -40,30 +40,34 @@ pub struct Reflectance {
 /// # Errors
 /// [`FileError`], one line that names file, what was found and what was expected.
 pub fn read_reflectance(path: &Path) -> Result<Reflectance, FileError> {
-    let picture = read_picture(path)?;
+    let picture = decode(path)?;
     let (width, height) = (picture.width(), picture.height());
     let edge = width.min(height);
     let square = picture.crop_imm((width - edge) / 2, (height - edge) / 2, edge, edge);
     Ok(Reflectance { size_px: edge as usize, values: grey(&square) })
 }
 
-/// A grey picture of any shape, in `[0, 1]`.
-pub(crate) struct Grey {
-    pub(crate) width: u32,
-    pub(crate) height: u32,
-    pub(crate) values: Vec<f32>,
+/// A grey picture in `[0, 1]`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Grey {
+    /// Columns, at least 1.
+    pub width: u32,
+    /// Rows, at least 1.
+    pub height: u32,
+    /// `width * height` values, row-major.
+    pub values: Vec<f32>,
 }
 
-/// As [`read_reflectance`], uncropped.
+/// Reads a PNG of any kind as [`read_reflectance`] does, of any shape and uncropped.
 ///
 /// # Errors
-/// As [`read_reflectance`].
-pub(super) fn read_grey(path: &Path) -> Result<Grey, FileError> {
-    let picture = read_picture(path)?;
+/// [`FileError`], one line that names file, what was found and what was expected.
+pub fn read_grey(path: &Path) -> Result<Grey, FileError> {
+    let picture = decode(path)?;
     Ok(Grey { width: picture.width(), height: picture.height(), values: grey(&picture) })
 }
 
-fn read_picture(path: &Path) -> Result<DynamicImage, FileError> {
+fn decode(path: &Path) -> Result<DynamicImage, FileError> {
     let (file, _) = open_file(path, EXPECTED)?;
     let read = |error| FileError::io(path, "read", error);
     let mut stream = BufReader::new(file);
@@ -93,6 +97,7 @@ fn read_picture(path: &Path) -> Result<DynamicImage, FileError> {
     })
 }
 
+/// Its grey levels, 0 to 1.
 fn grey(picture: &DynamicImage) -> Vec<f32> {
     match picture.color() {
         // Grey as it stands: no rounding on the way through colour.

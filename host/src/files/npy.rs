@@ -20,7 +20,7 @@ pub struct Stack {
     pub height: usize,
     /// Columns of an image, at least 1.
     pub width: usize,
-    /// `count * height * width` finite values.
+    /// `count * height * width` values, finite unless read as having gaps.
     pub values: Vec<f32>,
 }
 
@@ -30,6 +30,56 @@ pub struct Stack {
 /// # Errors
 /// [`FileError`], one line that names file, what was found and what was expected.
 pub fn read_stack(path: &Path) -> Result<Stack, FileError> {
+    let (_, stack) = read(path)?;
+    finite(path, stack)
+}
+
+/// Reads pictures as [`read_stack`] does, but of 8-bit grey levels v as v / 255, as a PNG's are.
+///
+/// # Errors
+/// As [`read_stack`].
+pub fn read_pictures(path: &Path) -> Result<Pictures, FileError> {
+    let (header, stack) = read(path)?;
+    let mut stack = finite(path, stack)?;
+    if header.is_bytes() {
+        stack.values.iter_mut().for_each(|value| *value /= 255.0);
+    }
+    Ok(Pictures { is_single: header.shape().len() == 2, stack })
+}
+
+/// Reads numbers as [`read_stack`] does, of which some may be missing: NaN or infinite.
+///
+/// # Errors
+/// As [`read_stack`], but for those.
+pub fn read_with_gaps(path: &Path) -> Result<Stack, FileError> {
+    Ok(read(path)?.1)
+}
+
+/// Pictures of a file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pictures {
+    /// Is it one picture (H, W), not a stack of them?
+    pub is_single: bool,
+    /// The pictures.
+    pub stack: Stack,
+}
+
+fn refuse(path: &Path, found: String, expected: &str) -> FileError {
+    FileError::Field { path: path.to_owned(), field: FIELD, found, expected: expected.to_owned() }
+}
+
+fn finite(path: &Path, stack: Stack) -> Result<Stack, FileError> {
+    let Stack { height, width, ref values, .. } = stack;
+    if let Some(flat) = values.iter().position(|value| !value.is_finite()) {
+        let (image, pixel) = (flat / (height * width), flat % (height * width));
+        let found =
+            format!("is {} at [{image}, {}, {}]", values[flat], pixel / width, pixel % width);
+        return Err(refuse(path, found, "finite numbers"));
+    }
+    Ok(stack)
+}
+
+fn read(path: &Path) -> Result<(Header, Stack), FileError> {
     let (file, file_bytes) = open_file(path, EXPECTED)?;
     let mut stream = BufReader::new(file);
     let mut start = Vec::new();
@@ -43,16 +93,10 @@ pub fn read_stack(path: &Path) -> Result<Stack, FileError> {
         return Err(FileError::kind(path, kind_by_start(&start), EXPECTED));
     }
 
-    let refuse = |found, expected: &str| FileError::Field {
-        path: path.to_owned(),
-        field: FIELD,
-        found,
-        expected: expected.to_owned(),
-    };
     let damaged = |found| FileError::Damaged { path: path.to_owned(), found, expected: EXPECTED };
     let explain = |error| match error {
         ArrayError::Damaged(found) => damaged(found),
-        ArrayError::Dtype(found) => refuse(found, "real numbers of up to 8 bytes"),
+        ArrayError::Dtype(found) => refuse(path, found, "real numbers of up to 8 bytes"),
         ArrayError::Io(error) => FileError::io(path, "read", error),
         ArrayError::TooLarge { shape, limit_bytes } => {
             damaged(format!("shape {} with {limit_bytes} bytes of data", shape_text(&shape)))
@@ -63,7 +107,8 @@ pub fn read_stack(path: &Path) -> Result<Stack, FileError> {
         [count, height, width] if count.min(height).min(width) > 0 => (count, height, width),
         [height, width] if height.min(width) > 0 => (1, height, width),
         ref other => {
-            return Err(refuse(format!("has shape {}", shape_text(other)), "(N, H, W) or (H, W)"));
+            let found = format!("has shape {}", shape_text(other));
+            return Err(refuse(path, found, "(N, H, W) or (H, W)"));
         }
     };
     // The file cannot hold more than its own length, so that is the most that is taken into memory.
@@ -71,13 +116,7 @@ pub fn read_stack(path: &Path) -> Result<Stack, FileError> {
     let values: Vec<f32> = header.read_data(&mut stream, limit_bytes).map_err(explain)?;
     // Fit: their product is the length of `values`.
     let (count, height, width) = (count as usize, height as usize, width as usize);
-    if let Some(flat) = values.iter().position(|value| !value.is_finite()) {
-        let (image, pixel) = (flat / (height * width), flat % (height * width));
-        let found =
-            format!("is {} at [{image}, {}, {}]", values[flat], pixel / width, pixel % width);
-        return Err(refuse(found, "finite numbers"));
-    }
-    Ok(Stack { count, height, width, values })
+    Ok((header, Stack { count, height, width, values }))
 }
 
 /// A number that arrays are written of.

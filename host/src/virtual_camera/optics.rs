@@ -154,6 +154,20 @@ impl VirtualOptics {
         perfect.footprint(&self.scene, self.distance_mm)
     }
 
+    /// What a perfect camera of `pixels` x `pixels` would see in the same field: mean reflectances, row-major, free of
+    /// blur.
+    #[must_use]
+    pub fn focused(&self, pixels: usize) -> Vec<f32> {
+        let pitch_mm = self.field_mm() / pixels as f64;
+        let at_mm = |i: usize| (i as f64 + 0.5 - pixels as f64 / 2.0) * pitch_mm;
+        let mean = |i| {
+            let (x_mm, y_mm) = (at_mm(i % pixels), at_mm(i / pixels));
+            // Differences of running sums leave the last bit on either side of the range.
+            self.scene.mean_over_square(x_mm, y_mm, pitch_mm).clamp(0.0, 1.0) as f32
+        };
+        (0..pixels * pixels).map(mean).collect()
+    }
+
     /// Distance of the target.
     #[must_use]
     pub fn distance_mm(&self) -> f64 {

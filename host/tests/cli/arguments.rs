@@ -3,7 +3,7 @@
 use crate::bench::{Bench, first_bytes};
 use std::process::{Command, Stdio};
 
-const COMMANDS: [&str; 15] = [
+const COMMANDS: [&str; 18] = [
     "demo",
     "reconstruct",
     "capture",
@@ -14,6 +14,9 @@ const COMMANDS: [&str; 15] = [
     "flash",
     "gateware",
     "setup",
+    "upscale",
+    "deblur",
+    "enhance",
     "metrics",
     "rain",
     "range",
@@ -59,7 +62,10 @@ fn mistakes_in_the_arguments_get_one_line_and_code_2() {
         (&["demo", "--method", "tv", "--strength", "0"], &["--strength is 0"]),
         (&["bench", "omp", "--sparsity", "0"], &["--sparsity is 0", "1 to 512"]),
         (&["bench", "omp", "--measurements", "1025"], &["--measurements is 1025", "1 to 1024"]),
-        (&["bench", "omp", "--backend", "abacus"], &["--backend", "abacus", "auto, cpu, wgpu or cuda"]),
+        (
+            &["bench", "omp", "--backend", "abacus"],
+            &["--backend", "abacus", "auto, cpu, wgpu or cuda"],
+        ),
         (&["eval", "sampling", "in.npz", "--sampling", "0.1,2"], &["--sampling is 2"]),
         (&["eval", "sampling", "in.npz", "--orders", "magic"], &["magic", "cake-cutting"]),
         (&["demo", "--frames", "0"], &["--frames", "'0'"]),
@@ -77,6 +83,13 @@ fn mistakes_in_the_arguments_get_one_line_and_code_2() {
         (&["flash", "--board", "toaster"], &["toaster", "nucleo-u5a5zj-q, nucleo-h7s3l8"]),
         (&["flash", "--board", "mps2-an505"], &["mps2-an505", "QEMU"]),
         (&["capture", "--camera", "tcp:nowhere"], &["--camera", "tcp:HOST:PORT"]),
+        (&["deblur", "in.npy"], &["--out"]),
+        (&["deblur", "in.npy", "--model", "magic", "--out", "o.npy"], &["magic", "diffusion"]),
+        (&["deblur", "in.npy", "--steps", "0", "--out", "o.npy"], &["--steps", "'0'"]),
+        (&["deblur", "in.npy", "--model", "gan", "--steps", "3", "--out", "o.npy"], &["--steps"]),
+        (&["deblur", "in.npy", "--blur-px", "-1", "--out", "o.npy"], &["--blur-px is -1"]),
+        (&["enhance", "in.npy", "--noise", "nan", "--out", "o.npy"], &["--noise is NaN"]),
+        (&["enhance", "in.npy", "--backend", "tpu", "--out", "o.npy"], &["tpu", "wgpu or cuda"]),
         (&["virtual", "--distance-m", "0"], &["--distance-m is 0"]),
     ];
     for (arguments, words) in mistakes {

@@ -3,7 +3,11 @@
 use crate::bench::Bench;
 use nirspi::files::image::encode_grey;
 
-const FILES: [&str; 11] = [
+const FILES: [&str; 16] = [
+    "deblurred.npy",
+    "deblurred.png",
+    "fused.npy",
+    "fused.png",
     "raw.npy",
     "raw.png",
     "reconstruction.npy",
@@ -13,6 +17,7 @@ const FILES: [&str; 11] = [
     "scene.png",
     "side_by_side.png",
     "truth.npy",
+    "truth_64.npy",
     "upscaled.npy",
     "upscaled.png",
 ];
@@ -38,6 +43,9 @@ fn the_letter_is_captured_without_loss_and_plain_to_see() {
     assert!(quality["ssim"].as_f64().unwrap() > 0.9, "{quality}");
     assert!(quality["correlation"].as_f64().unwrap() > 0.97, "{quality}");
     assert!(quality["psnr_db"].as_f64() > report["raw"]["psnr_db"].as_f64(), "{report}");
+    let stage = |name: &str| report["enhancement"][name]["psnr_db"].as_f64().unwrap();
+    assert!(stage("fused") > stage("upscaled"), "{report}");
+    assert!(stage("deblurred") > stage("fused") + 1.0, "{report}");
     // What was written is what was judged.
     let judged =
         bench.run(&["metrics", "demo/truth.npy", "demo/reconstruction.npy"]).succeeded().json();

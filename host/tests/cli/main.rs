@@ -9,6 +9,7 @@ mod bad_files;
 mod bench;
 mod capture_tcp;
 mod demo;
+mod enhance;
 mod foreign_devices;
 mod metrics;
 mod rain;

@@ -1,0 +1,177 @@
+//! What the commands that run networks have in common: weights, device, progress, report.
+
+use super::Usage;
+use super::report::StageTimes;
+use anyhow::Result;
+use indicatif::{ProgressBar, ProgressStyle};
+use nirspi_nets::weights::{MODEL, VERSION};
+use nirspi_nets::{
+    Backend, BlurEstimator, Deblurrer, Device, Enhanced, Fusion, Method, Sharpener, Weights,
+};
+use serde::Serialize;
+use std::path::PathBuf;
+
+#[derive(Debug, clap::Args)]
+pub struct NetworkArgs {
+    /// Weights of your own (.safetensors) in place of the built-in ones; the file says which network they are of.
+    /// May be given several times
+    #[arg(long, value_name = "FILE")]
+    weights: Vec<PathBuf>,
+    /// Where networks run: auto (a real GPU if there is one), cpu, wgpu or cuda
+    #[arg(long, value_name = "BACKEND", default_value_t)]
+    backend: Backend,
+}
+
+/// A device and the weights of what shall run on it.
+pub struct Networks {
+    device: Device,
+    own: Vec<Weights>,
+    used: Vec<Used>,
+}
+
+/// Weights that ran, for the report.
+#[derive(Debug, Clone, Serialize)]
+pub struct Used {
+    model: String,
+    version: String,
+    from: String,
+}
+
+impl NetworkArgs {
+    /// Opens the device and reads the user's weights, which must be of one of these networks.
+    pub fn open(&self, models: &[&str]) -> Result<Networks> {
+        let mut own = Vec::new();
+        for file in &self.weights {
+            let weights = Weights::read(file)?;
+            let model = weights.metadata(MODEL).unwrap_or("no network that they name").to_owned();
+            if !models.contains(&model.as_str()) {
+                return Err(Usage(format!(
+                    "--weights {}: of {model}, this command runs {}",
+                    file.display(),
+                    models.join(", ")
+                ))
+                .into());
+            }
+            own.push(weights);
+        }
+        Ok(Networks { device: Device::open(self.backend)?, own, used: Vec::new() })
+    }
+}
+
+impl Networks {
+    /// The networks of one folder of weights, on the CPU: for the demo.
+    pub fn built_in(backend: Backend) -> Result<Self> {
+        Ok(Self { device: Device::open(backend)?, own: Vec::new(), used: Vec::new() })
+    }
+
+    fn weights(&mut self, model: &str) -> Result<Weights> {
+        let own = self.own.iter().find(|weights| weights.metadata(MODEL) == Some(model));
+        let weights = match own {
+            Some(weights) => weights.clone(),
+            None => Weights::embedded(model)?,
+        };
+        self.used.push(Used {
+            model: model.to_owned(),
+            version: weights.metadata(VERSION).unwrap_or("unknown").to_owned(),
+            from: weights.label().to_owned(),
+        });
+        Ok(weights)
+    }
+
+    /// FSRCNN.
+    pub fn fusion(&mut self) -> Result<Fusion> {
+        let weights = self.weights("fsrcnn")?;
+        Ok(Fusion::new(&self.device, &weights)?)
+    }
+
+    /// The estimator alone.
+    pub fn estimator(&mut self) -> Result<BlurEstimator> {
+        let weights = self.weights("estimator")?;
+        Ok(BlurEstimator::new(&self.device, &weights)?)
+    }
+
+    /// Estimator and deblurrer.
+    pub fn sharpener(&mut self, method: Method) -> Result<Sharpener> {
+        let estimator = self.estimator()?;
+        let weights = self.weights(method.model())?;
+        Ok(Sharpener::new(estimator, Deblurrer::new(&self.device, &weights, method)?))
+    }
+
+    /// What computes.
+    pub fn device(&self) -> &str {
+        self.device.name()
+    }
+
+    /// All weights that were taken.
+    pub fn used(&self) -> Vec<Used> {
+        self.used.clone()
+    }
+}
+
+/// What a stack of images went through.
+#[derive(Debug, Serialize)]
+pub struct Report {
+    pub input: PathBuf,
+    pub output: PathBuf,
+    pub images: usize,
+    pub device: String,
+    pub weights: Vec<Used>,
+    #[serde(flatten)]
+    pub deblurring: Option<Deblurring>,
+    pub stage_ms: StageTimes,
+}
+
+/// What is known of deblurred images.
+#[derive(Debug, Serialize)]
+pub struct Deblurring {
+    pub model: String,
+    pub steps: u32,
+    pub consistency: bool,
+    pub seed: u64,
+    /// Of each image: blur in pixels of the 64 x 64 grid, and noise of a reading.
+    pub sigma_px: Vec<f32>,
+    pub noise: Vec<f32>,
+    /// Distance of the readings from those of each result, over their noise.
+    pub inconsistency: Vec<f32>,
+}
+
+impl Deblurring {
+    pub fn of(method: &str, steps: u32, consistency: bool, seed: u64, result: &Enhanced) -> Self {
+        Self {
+            model: method.to_owned(),
+            steps,
+            consistency,
+            seed,
+            sigma_px: result.estimates.iter().map(|e| e.sigma_px).collect(),
+            noise: result.estimates.iter().map(|e| e.noise).collect(),
+            inconsistency: result.inconsistency.clone(),
+        }
+    }
+
+    /// One line for people.
+    pub fn line(&self) -> String {
+        let median = |values: &[f32]| {
+            let mut sorted = values.to_vec();
+            sorted.sort_by(f32::total_cmp);
+            sorted.get(sorted.len() / 2).copied().unwrap_or(f32::NAN)
+        };
+        format!(
+            "{} in {} step{}: blur {:.2} px, noise {:.4}, inconsistency {:.2} (medians; near 1 or below, the \
+             readings bear the result out)",
+            self.model,
+            self.steps,
+            if self.steps == 1 { "" } else { "s" },
+            median(&self.sigma_px),
+            median(&self.noise),
+            median(&self.inconsistency)
+        )
+    }
+}
+
+/// A bar that counts images.
+pub fn bar(what: &str, images: usize) -> ProgressBar {
+    let template = format!("{what} {{bar:30}} {{pos}}/{{len}} images");
+    let style =
+        ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar());
+    ProgressBar::new(images as u64).with_style(style)
+}

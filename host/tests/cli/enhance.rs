@@ -1,0 +1,147 @@
+//! `nirspi upscale`, `deblur` and `enhance`. That the networks compute what they should is tested in `nirspi-nets`.
+
+use crate::bench::Bench;
+use nirspi::files::image::encode_grey;
+use nirspi::files::npy;
+
+/// A blurred bar on `side` x `side` pixels, brightness from 0 to 1.
+fn bar(side: usize) -> Vec<f32> {
+    let across = |x: usize| {
+        let off = (x as f32 + 0.5) / side as f32 - 0.5;
+        0.9 * (-(off / 0.12).powi(4)).exp()
+    };
+    (0..side * side).map(|i| across(i % side)).collect()
+}
+
+#[test]
+fn a_stack_comes_out_at_64_pixels_with_its_estimates_and_its_inconsistency() {
+    let bench = Bench::new();
+    bench.write("in.npy", &npy::encode(&[2, 32, 32], &[bar(32), bar(32)].concat()));
+    let zones: Vec<f32> = (0..64).map(|i| if i % 3 == 0 { f32::NAN } else { 0.6 }).collect();
+    bench.write("tof.npy", &npy::encode(&[8, 8], &zones));
+    let report = bench
+        .run(&[
+            "enhance",
+            "in.npy",
+            "--depth",
+            "tof.npy",
+            "--spread",
+            "spread.npy",
+            "--out",
+            "out.npy",
+            "--backend",
+            "cpu",
+            "--json",
+        ])
+        .succeeded()
+        .json();
+    let stack = npy::read_stack(&bench.path("out.npy")).unwrap();
+    assert_eq!((stack.count, stack.height, stack.width), (2, 64, 64));
+    assert!(stack.values.iter().all(|v| (0.0..=1.0).contains(v)));
+    assert_eq!(stack.values[..4096], stack.values[4096..], "the same image, the same result");
+    assert_eq!(npy::read_stack(&bench.path("spread.npy")).unwrap().count, 2);
+    assert_eq!((&report["images"], &report["model"]), (&2.into(), &"diffusion".into()));
+    for key in ["sigma_px", "noise", "inconsistency"] {
+        assert!(report[key][1].as_f64().is_some_and(|v| (0.0..10.0).contains(&v)), "{report}");
+    }
+    assert_eq!(report["device"], "CPU");
+    assert_eq!(report["weights"].as_array().unwrap().len(), 3, "{report}");
+}
+
+#[test]
+fn a_single_image_stays_one_and_bytes_are_grey_levels() {
+    let bench = Bench::new();
+    bench.write("in.npy", &npy::encode(&[32, 32], &bar(32)));
+    bench.run(&["upscale", "in.npy", "--out", "out.npy"]).succeeded();
+    assert_eq!(bench.pixels("out.npy").len(), 64 * 64);
+    // The same as 8-bit levels, in NumPy's format by hand, and as a PNG.
+    let levels: Vec<u8> = bar(32).iter().map(|v| (v * 255.0).round() as u8).collect();
+    let mut file = npy::encode(&[32, 32], &[0.0_f32; 1024]);
+    let header = file.len() - 4096;
+    file.truncate(header);
+    let descr = file.windows(3).position(|w| w == b"<f4").unwrap();
+    file[descr..descr + 3].copy_from_slice(b"|u1");
+    file.extend(&levels);
+    bench.write("bytes.npy", &file);
+    bench.write("in.png", &encode_grey(32, 32, &bar(32)));
+    bench.run(&["upscale", "bytes.npy", "--out", "from_bytes.npy"]).succeeded();
+    bench.run(&["upscale", "in.png", "--out", "from_png.npy"]).succeeded();
+    assert_eq!(bench.pixels("from_bytes.npy"), bench.pixels("from_png.npy"));
+    let exact = bench.pixels("out.npy");
+    let close = |(a, b): (&f32, &f32)| (a - b).abs() < 0.02;
+    assert!(bench.pixels("from_bytes.npy").iter().zip(&exact).all(close));
+}
+
+#[test]
+fn a_folder_of_pictures_becomes_a_folder_of_the_same_names() {
+    let bench = Bench::new();
+    std::fs::create_dir(bench.path("in")).unwrap();
+    for name in ["b.png", "a.png"] {
+        bench.write(&format!("in/{name}"), &encode_grey(64, 64, &bar(64)));
+    }
+    bench.write("in/notes.txt", b"not a picture");
+    bench.run(&["deblur", "in", "--steps", "2", "--out", "sharp"]).succeeded();
+    let mut names: Vec<_> = std::fs::read_dir(bench.path("sharp"))
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    assert_eq!(names, ["a.png", "b.png"]);
+    bench.write("in/c.png", &encode_grey(32, 32, &bar(32)));
+    bench
+        .run(&["deblur", "in", "--out", "again"])
+        .failed(1, &["c.png", "32 x 32", "64 x 64", "a.png"]);
+    assert!(!bench.path("again").exists());
+}
+
+#[test]
+fn what_is_no_image_for_the_networks_gets_one_line_and_nothing_is_written() {
+    let bench = Bench::new();
+    let with = |at: usize, value: f32| {
+        let mut stack = [bar(32), bar(32)].concat();
+        stack[at] = value;
+        npy::encode(&[2, 32, 32], &stack)
+    };
+    bench.write("nan.npy", &with(1024 + 32 + 3, f32::NAN));
+    bench.write("bright.npy", &with(1024 + 32 + 3, 1.25));
+    bench.write("dark.npy", &with(5, -0.5));
+    bench.write("good.npy", &with(0, 0.5));
+    bench.write("large.npy", &npy::encode(&[1, 64, 64], &bar(64)));
+    bench.write("empty.npy", &npy::encode::<f32>(&[0, 32, 32], &[]));
+    bench.write("cut.npy", &with(0, 0.5)[..3000]);
+    bench.write("text.npy", b"no array at all");
+    bench.write("tof.npy", &npy::encode(&[3, 8, 8], &[0.5; 192]));
+    std::fs::create_dir(bench.path("folder")).unwrap();
+    let files = bench.names();
+    let enhance = |input: &str| bench.run(&["enhance", input, "--out", "out.npy"]);
+    enhance("nan.npy").failed(1, &["nan.npy", "NaN", "[1, 1, 3]"]);
+    enhance("bright.npy").failed(1, &["bright.npy", "image 1, row 1, column 3 is 1.25", "0 to 1"]);
+    enhance("dark.npy").failed(1, &["dark.npy", "-0.5", "0 to 1"]);
+    enhance("large.npy").failed(1, &["large.npy", "64 x 64", "expected 32 x 32"]);
+    enhance("empty.npy").failed(1, &["empty.npy", "(0, 32, 32)"]);
+    enhance("cut.npy").failed(1, &["cut.npy", "cut short"]);
+    enhance("text.npy").failed(1, &["text.npy", "NumPy"]);
+    enhance("none.npy").failed(1, &["none.npy", "no such file"]);
+    enhance("folder").failed(1, &["folder", "no .png files"]);
+    bench
+        .run(&["enhance", "good.npy", "--depth", "tof.npy", "--out", "out.npy"])
+        .failed(1, &["tof.npy", "3 depth maps", "1 or 2"]);
+    bench
+        .run(&["enhance", "good.npy", "--out", "out.png"])
+        .failed(1, &["out.png", "2 images", "folder"]);
+    bench
+        .run(&["enhance", "good.npy", "--weights", "text.npy", "--out", "out.npy"])
+        .failed(1, &["text.npy", "safetensors"]);
+    assert_eq!(bench.names(), files);
+}
+
+#[test]
+fn weights_of_another_network_are_refused() {
+    let bench = Bench::new();
+    bench.write("in.npy", &npy::encode(&[32, 32], &bar(32)));
+    let classifier = include_bytes!("../../nets/weights/classifier.safetensors");
+    bench.write("classifier.safetensors", classifier);
+    bench
+        .run(&["upscale", "in.npy", "--weights", "classifier.safetensors", "--out", "out.npy"])
+        .failed(2, &["classifier.safetensors", "of classifier", "fsrcnn"]);
+}
