@@ -24,6 +24,7 @@ pub mod flash;
 pub mod gateware;
 pub mod integrate;
 pub mod kept_calibration;
+pub mod legibility;
 pub mod link;
 pub mod picture;
 pub mod recording;

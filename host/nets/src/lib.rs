@@ -24,6 +24,7 @@ pub mod estimate;
 pub mod fusion;
 mod gate;
 pub mod images;
+pub mod metrics;
 pub mod model;
 mod network;
 mod spread;

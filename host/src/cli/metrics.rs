@@ -1,24 +1,40 @@
-//! `nirspi metrics`: how alike two stacks of images are.
+//! `nirspi metrics`: how alike two stacks of images are, one by one and as sets.
+
+mod sets;
 
 use super::print;
 use anyhow::{Context, Result, bail};
 use nirspi::files::npy::{Stack, read_stack};
 use nirspi_recon::metrics;
 use serde::Serialize;
-use std::path::PathBuf;
+use sets::Sets;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// Compare two .npy stacks of images: PSNR and SSIM, data range 1
+/// Compare two .npy stacks of images: PSNR, SSIM, data range 1, and how far apart they are as sets
 ///
-/// Both hold (N, H, W) or (H, W) numbers in [0, 1]; nothing is scaled or fitted.
+/// Both hold (N, H, W) or (H, W) numbers in [0, 1]; nothing is scaled or fitted. The Fréchet character distance, on the
+/// features of this program's classifier, needs 64 x 64 and two images; FID needs your Inception weights.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n\
-    \x20 nirspi metrics demo/truth.npy demo/reconstruction.npy")]
+#[command(after_help = "Examples:\n\
+    \x20 nirspi metrics demo/truth.npy demo/reconstruction.npy\n\
+    \x20 nirspi metrics sharp.npy deblurred.npy --labels labels.npy --legibility\n\
+    \x20 nirspi metrics sharp.npy deblurred.npy --inception inception.safetensors")]
 pub struct Args {
     /// The images as they should be
     reference: PathBuf,
     /// The images to judge
     test: PathBuf,
+    /// Which character each image shows, (N,), 0 to 61 for 0-9, A-Z, a-z: for the character accuracy
+    #[arg(long, value_name = "FILE.npy")]
+    labels: Option<PathBuf>,
+    /// Inception-v3's weights in safetensors with torchvision's names, for FID (pytorch-fid's file:
+    /// host/nets/scripts/inception_to_safetensors.py)
+    #[arg(long, value_name = "FILE")]
+    inception: Option<PathBuf>,
+    /// Ask Tesseract to read the characters, where this machine has it
+    #[arg(long, requires = "labels")]
+    legibility: bool,
     /// Print JSON, as it does anyway
     #[arg(long)]
     json: bool,
@@ -38,6 +54,8 @@ struct Report {
     /// `null`: all images are identical.
     mean_psnr_db: Option<f64>,
     mean_ssim: f64,
+    #[serde(flatten)]
+    sets: Sets,
     each: Vec<ImageMetrics>,
 }
 
@@ -75,6 +93,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         width,
         mean_psnr_db: (!finite.is_empty()).then(|| mean(&finite)),
         mean_ssim: each.iter().map(|image| image.ssim).sum::<f64>() / n,
+        sets: Sets::compare(args, &reference, &test)?,
         each,
     };
     print::json(&report)?;
@@ -82,7 +101,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 }
 
 /// A stack of images in `[0, 1]`.
-fn load(path: &std::path::Path) -> Result<Stack> {
+fn load(path: &Path) -> Result<Stack> {
     let stack = read_stack(path)?;
     let outside = stack.values.iter().position(|v| !(0.0..=1.0).contains(v));
     if let Some(at) = outside {

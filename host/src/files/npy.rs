@@ -4,11 +4,12 @@
 
 use super::FileError;
 use super::archive::{kind_by_start, open_file};
-use super::array::{ArrayError, Header, MAGIC, shape_text};
+use super::array::{ArrayError, Header, MAGIC, Sample, shape_text};
 use std::io::{BufReader, Read, Seek};
 use std::path::Path;
 
 const EXPECTED: &str = "a NumPy array (.npy) of images, (N, H, W) or (H, W)";
+const EXPECTED_LIST: &str = "a NumPy array (.npy) of shape (N,)";
 const FIELD: &str = "array";
 
 /// Images of one size, row-major, one after another.
@@ -79,8 +80,35 @@ fn finite(path: &Path, stack: Stack) -> Result<Stack, FileError> {
     Ok(stack)
 }
 
+/// Reads a `.npy` file of shape `(N,)`, one number for each image of a stack; any real dtype.
+///
+/// # Errors
+/// [`FileError`], one line that names file, what was found and what was expected.
+pub fn read_list(path: &Path) -> Result<Vec<f64>, FileError> {
+    let fits = |shape: &[u64]| matches!(shape, [count] if *count > 0);
+    Ok(read_numbers(path, EXPECTED_LIST, fits, "(N,)")?.1)
+}
+
 fn read(path: &Path) -> Result<(Header, Stack), FileError> {
-    let (file, file_bytes) = open_file(path, EXPECTED)?;
+    let fits = |shape: &[u64]| matches!(shape.len(), 2 | 3) && !shape.contains(&0);
+    let (header, values) = read_numbers::<f32>(path, EXPECTED, fits, "(N, H, W) or (H, W)")?;
+    // Each axis fits: their product is the length of `values`.
+    let axis = |from_last: usize| {
+        let shape = header.shape();
+        shape.len().checked_sub(from_last).map_or(1, |at| shape[at] as usize)
+    };
+    let stack = Stack { count: axis(3), height: axis(2), width: axis(1), values };
+    Ok((header, stack))
+}
+
+/// Header and numbers of a `.npy` file whose shape fits.
+fn read_numbers<T: Sample>(
+    path: &Path,
+    expected: &'static str,
+    fits: impl Fn(&[u64]) -> bool,
+    shapes: &str,
+) -> Result<(Header, Vec<T>), FileError> {
+    let (file, file_bytes) = open_file(path, expected)?;
     let mut stream = BufReader::new(file);
     let mut start = Vec::new();
     stream
@@ -90,10 +118,10 @@ fn read(path: &Path) -> Result<(Header, Stack), FileError> {
         .and_then(|_| stream.rewind())
         .map_err(|error| FileError::io(path, "read", error))?;
     if !MAGIC.starts_with(&start) {
-        return Err(FileError::kind(path, kind_by_start(&start), EXPECTED));
+        return Err(FileError::kind(path, kind_by_start(&start), expected));
     }
 
-    let damaged = |found| FileError::Damaged { path: path.to_owned(), found, expected: EXPECTED };
+    let damaged = |found| FileError::Damaged { path: path.to_owned(), found, expected };
     let explain = |error| match error {
         ArrayError::Damaged(found) => damaged(found),
         ArrayError::Dtype(found) => refuse(path, found, "real numbers of up to 8 bytes"),
@@ -103,20 +131,13 @@ fn read(path: &Path) -> Result<(Header, Stack), FileError> {
         }
     };
     let header = Header::read(&mut stream).map_err(explain)?;
-    let (count, height, width) = match *header.shape() {
-        [count, height, width] if count.min(height).min(width) > 0 => (count, height, width),
-        [height, width] if height.min(width) > 0 => (1, height, width),
-        ref other => {
-            let found = format!("has shape {}", shape_text(other));
-            return Err(refuse(path, found, "(N, H, W) or (H, W)"));
-        }
-    };
+    if !fits(header.shape()) {
+        return Err(refuse(path, format!("has shape {}", shape_text(header.shape())), shapes));
+    }
     // The file cannot hold more than its own length, so that is the most that is taken into memory.
     let limit_bytes = file_bytes.saturating_sub(header.header_bytes);
-    let values: Vec<f32> = header.read_data(&mut stream, limit_bytes).map_err(explain)?;
-    // Fit: their product is the length of `values`.
-    let (count, height, width) = (count as usize, height as usize, width as usize);
-    Ok((header, Stack { count, height, width, values }))
+    let values = header.read_data(&mut stream, limit_bytes).map_err(explain)?;
+    Ok((header, values))
 }
 
 /// A number that arrays are written of.

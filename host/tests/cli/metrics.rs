@@ -17,6 +17,47 @@ fn two_stacks_are_compared_image_by_image() {
     assert!((report["each"][1]["psnr_db"].as_f64().unwrap() - 26.0206).abs() < 1e-3, "{report}");
 }
 
+/// Three images of 64 x 64 with stripes of their own.
+fn stripes(shift: usize) -> Vec<u8> {
+    let pixel = |at: usize| ((at % 64 + shift + 7 * (at / 4096)) % 9) as f32 / 8.0;
+    npy::encode(&[3, 64, 64], &(0..3 * 4096).map(pixel).collect::<Vec<f32>>())
+}
+
+#[test]
+fn sets_of_characters_have_a_distance_of_their_own_name() {
+    let bench = Bench::new();
+    bench.write("a.npy", &stripes(0));
+    bench.write("b.npy", &stripes(4));
+    bench.write("labels.npy", &npy::encode(&[3], &[10.0, 11.0, 61.0_f64]));
+    let far =
+        bench.run(&["metrics", "a.npy", "b.npy", "--labels", "labels.npy"]).succeeded().json();
+    let near = bench.run(&["metrics", "a.npy", "a.npy"]).succeeded().json();
+    let distance =
+        |report: &serde_json::Value| report["frechet_character_distance"].as_f64().unwrap();
+    assert!(distance(&near) < 1e-3 && distance(&far) > distance(&near), "{near} {far}");
+    assert!(far["fid"].is_null() && near["character_accuracy"].is_null(), "{far}");
+    assert!(far["character_accuracy"]["test"].as_f64().unwrap() <= 1.0, "{far}");
+}
+
+#[test]
+fn a_figure_that_cannot_be_had_says_why() {
+    let bench = Bench::new();
+    bench.write("small.npy", &npy::encode(&[16, 16], &[0.5; 256]));
+    let report = bench.run(&["metrics", "small.npy", "small.npy"]).succeeded().json();
+    assert!(report["frechet_character_distance"].is_null());
+    assert!(report["notes"][0].as_str().unwrap().contains("64 x 64, not 16 x 16"), "{report}");
+    bench.write("one.npy", &stripes(0));
+    bench.write("labels.npy", &npy::encode(&[2], &[10.0, 11.0_f64]));
+    bench.write("odd.npy", &npy::encode(&[3], &[10.0, 11.5, 1.0_f64]));
+    bench.write("flat.npy", &npy::encode(&[3, 1], &[1.0_f64; 3]));
+    let with = |more: &[&str]| bench.run(&[&["metrics", "one.npy", "one.npy"], more].concat());
+    with(&["--labels", "labels.npy"]).failed(1, &["labels.npy", "2 labels, expected 3"]);
+    with(&["--labels", "odd.npy"]).failed(1, &["odd.npy", "11.5 at [1]", "0 to 61"]);
+    with(&["--labels", "flat.npy"]).failed(1, &["flat.npy", "(3, 1)", "(N,)"]);
+    with(&["--inception", "labels.npy"]).failed(1, &["labels.npy", "safetensors"]);
+    with(&["--legibility"]).failed(2, &["--labels"]);
+}
+
 #[test]
 fn stacks_that_cannot_be_compared_are_refused() {
     let bench = Bench::new();

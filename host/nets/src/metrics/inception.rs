@@ -1,0 +1,211 @@
+//! Inception-v3 up to its last pooling, for FID, with weights that the user brings.
+//!
+//! The network of Szegedy et al. (CVPR 2016) in the form that FID is defined with (Heusel et al., NIPS 2017; in PyTorch
+//! Seitzer's pytorch-fid): means that leave the padding out, and a maximum in the last block's pooling. No weights are
+//! shipped: theirs is a file of 90 MB. The law: tensors have torchvision's names and shapes, all are checked before
+//! use, and what else is in the file (the classifier, auxiliary outputs) is not looked at.
+
+mod plan;
+
+use crate::weights::{Weights, WeightsError};
+use burn::backend::Flex;
+use burn::tensor::activation::relu;
+use burn::tensor::module::{avg_pool2d, conv2d, max_pool2d};
+use burn::tensor::ops::ConvOptions;
+use burn::tensor::{Tensor, TensorData};
+use plan::Plan;
+use thiserror::Error;
+
+/// Features of an image: the channels after the last block.
+pub const FEATURES: usize = 2048;
+
+/// Classes of the published weights that FID is defined with.
+pub const FID_CLASSES: usize = 1008;
+
+/// Edge of the images that the network is made for.
+const EDGE_PX: usize = 299;
+
+/// Added to the variance in batch normalisation.
+const EPSILON: f32 = 1e-3;
+
+/// Why an image has no features.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("an image of {found} values, expected {height} x {width}, at least one pixel")]
+pub struct ImageSize {
+    /// Values given.
+    pub found: usize,
+    /// Rows.
+    pub height: usize,
+    /// Columns.
+    pub width: usize,
+}
+
+/// The network with its weights, on the CPU.
+#[derive(Debug, Clone)]
+pub struct Inception {
+    layers: Vec<Layer>,
+    classes: Option<usize>,
+}
+
+#[derive(Debug, Clone)]
+enum Layer {
+    /// With batch normalisation folded in, and ReLU after it.
+    Convolution {
+        weight: Tensor<Flex, 4>,
+        bias: Tensor<Flex, 1>,
+        stride: usize,
+        padding: [usize; 2],
+    },
+    /// Mean of 3 x 3, of the same size.
+    Mean,
+    /// Maximum of 3 x 3.
+    Maximum { stride: usize, padding: usize },
+    /// Branches of one input, their channels one after another.
+    Branches(Vec<Vec<Layer>>),
+}
+
+impl Inception {
+    /// The network of these weights.
+    ///
+    /// # Errors
+    /// [`WeightsError`] if a tensor is missing or has another shape.
+    pub fn new(weights: &Weights) -> Result<Self, WeightsError> {
+        let (layers, _) = build(&plan::network(), "", 3, weights)?;
+        let classes = weights.shape::<2>("fc.weight").ok().map(|[classes, _]| classes);
+        Ok(Self { layers, classes })
+    }
+
+    /// Are these, by the number of their classes, of the kind that FID is defined with?
+    #[must_use]
+    pub fn is_of_fid(&self) -> bool {
+        self.classes == Some(FID_CLASSES)
+    }
+
+    /// The [`FEATURES`] features of a grey image of `height` x `width` pixels in [0, 1], row-major, enlarged to
+    /// 299 x 299.
+    ///
+    /// # Errors
+    /// [`ImageSize`] if the values are no such image.
+    pub fn features(
+        &self,
+        image: &[f32],
+        (height, width): (usize, usize),
+    ) -> Result<Vec<f32>, ImageSize> {
+        if image.is_empty() || height.checked_mul(width) != Some(image.len()) {
+            return Err(ImageSize { found: image.len(), height, width });
+        }
+        let grey: Vec<f32> =
+            enlarged(image, height, width).iter().map(|pixel| 2.0 * pixel - 1.0).collect();
+        let data = TensorData::new(grey, [1, 1, EDGE_PX, EDGE_PX]);
+        let image = Tensor::<Flex, 4>::from_data(data, &Default::default()).repeat_dim(1, 3);
+        let last = forward(&self.layers, image);
+        let [_, channels, rows, columns] = last.dims();
+        let mean = last.reshape([channels, rows * columns]).mean_dim(1);
+        Ok(mean.into_data().iter::<f32>().collect())
+    }
+}
+
+fn forward(layers: &[Layer], image: Tensor<Flex, 4>) -> Tensor<Flex, 4> {
+    layers.iter().fold(image, |x, layer| match layer {
+        Layer::Convolution { weight, bias, stride, padding } => {
+            let options = ConvOptions::new([*stride; 2], *padding, [1, 1], 1);
+            relu(conv2d(x, weight.clone(), Some(bias.clone()), options))
+        }
+        Layer::Mean => avg_pool2d(x, [3, 3], [1, 1], [1, 1], false, false),
+        Layer::Maximum { stride, padding } => {
+            max_pool2d(x, [3, 3], [*stride; 2], [*padding; 2], [1, 1], false)
+        }
+        Layer::Branches(branches) => {
+            let ends = branches.iter().map(|branch| forward(branch, x.clone())).collect();
+            Tensor::cat(ends, 1)
+        }
+    })
+}
+
+/// Layers by the plan for an input of `channels`, and the channels of their output.
+fn build(
+    plans: &[Plan],
+    block: &str,
+    mut channels: usize,
+    weights: &Weights,
+) -> Result<(Vec<Layer>, usize), WeightsError> {
+    let device = Default::default();
+    let mut layers = Vec::with_capacity(plans.len());
+    for plan in plans {
+        layers.push(match plan {
+            Plan::Convolution { name, outputs, kernel, stride, padding } => {
+                let name = format!("{block}{name}");
+                let shape = [*outputs, channels, kernel[0], kernel[1]];
+                channels = *outputs;
+                let (weight, bias) = folded(weights, &name, shape)?;
+                Layer::Convolution {
+                    weight: Tensor::from_data(TensorData::new(weight, shape), &device),
+                    bias: Tensor::from_data(TensorData::new(bias, [channels]), &device),
+                    stride: *stride,
+                    padding: *padding,
+                }
+            }
+            Plan::Mean => Layer::Mean,
+            Plan::Maximum { stride, padding } => {
+                Layer::Maximum { stride: *stride, padding: *padding }
+            }
+            Plan::Branches { name, branches } => {
+                let name = format!("{block}{name}");
+                let built = branches
+                    .iter()
+                    .map(|branch| build(branch, &name, channels, weights))
+                    .collect::<Result<Vec<_>, _>>()?;
+                channels = built.iter().map(|(_, outputs)| outputs).sum();
+                Layer::Branches(built.into_iter().map(|(layers, _)| layers).collect())
+            }
+        });
+    }
+    Ok((layers, channels))
+}
+
+/// Kernel and bias of a convolution whose batch normalisation is done to its kernel once instead of to its output
+/// every time.
+fn folded(
+    weights: &Weights,
+    name: &str,
+    shape: [usize; 4],
+) -> Result<(Vec<f32>, Vec<f32>), WeightsError> {
+    let outputs = shape[0];
+    let of = |what: &str| -> Result<&[f32], WeightsError> {
+        Ok(&weights.tensor(&format!("{name}.bn.{what}"), &[outputs])?.values)
+    };
+    let (gain, shift) = (of("weight")?, of("bias")?);
+    let (mean, variance) = (of("running_mean")?, of("running_var")?);
+    let kernel = &weights.tensor(&format!("{name}.conv.weight"), &shape)?.values;
+    let scale: Vec<f32> =
+        gain.iter().zip(variance).map(|(gain, v)| gain / (v + EPSILON).sqrt()).collect();
+    let inner = shape[1..].iter().product();
+    let scaled =
+        kernel.chunks_exact(inner).zip(&scale).flat_map(|(k, s)| k.iter().map(move |v| v * s));
+    let bias = shift.iter().zip(mean).zip(&scale).map(|((shift, mean), s)| shift - mean * s);
+    Ok((scaled.collect(), bias.collect()))
+}
+
+/// The image at 299 x 299 by bilinear interpolation, pixel centres aligned, as `F.interpolate(align_corners=False)`.
+fn enlarged(image: &[f32], height: usize, width: usize) -> Vec<f32> {
+    // Pixels on either side, and the share of the second.
+    let beside = |at: usize, length: usize| {
+        let x = ((at as f32 + 0.5) * length as f32 / EDGE_PX as f32 - 0.5).max(0.0);
+        let first = (x as usize).min(length - 1);
+        (first, (first + 1).min(length - 1), x - first as f32)
+    };
+    let columns: Vec<_> = (0..EDGE_PX).map(|c| beside(c, width)).collect();
+    (0..EDGE_PX)
+        .flat_map(|r| {
+            let (top, bottom, down) = beside(r, height);
+            let (top, bottom) = (&image[top * width..], &image[bottom * width..]);
+            columns.iter().map(move |&(left, right, across)| {
+                let along = |row: &[f32]| row[left] + across * (row[right] - row[left]);
+                along(top) + down * (along(bottom) - along(top))
+            })
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests;
