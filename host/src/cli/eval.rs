@@ -1,7 +1,10 @@
 //! `nirspi eval`: how good results are: the paper's tables, ours beside them, and what less sampling costs.
 
+mod enhanced;
+mod quality;
 mod sampling;
 mod shot;
+mod table1;
 mod table3;
 mod table4;
 
@@ -16,7 +19,8 @@ use std::process::ExitCode;
 #[command(after_help = "Examples:\n\
     \x20 nirspi eval table2\n\
     \x20 nirspi eval table3 --scenes 200 --out table3/\n\
-    \x20 nirspi eval sampling wing.npz --out sampling/")]
+    \x20 nirspi eval sampling wing.npz --out sampling/\n\
+    \x20 nirspi eval quality --data chars74k/ --out quality/")]
 pub struct EvalArgs {
     #[command(subcommand)]
     table: Table,
@@ -24,19 +28,23 @@ pub struct EvalArgs {
 
 #[derive(Debug, Subcommand)]
 enum Table {
+    Table1(table1::Args),
     /// Range in light and heavy rain: the same as `nirspi range`
     Table2(range::Args),
     Table3(table3::Args),
     Table4(table4::Args),
     Sampling(sampling::Args),
+    Quality(quality::Args),
 }
 
 pub fn run(args: &EvalArgs) -> Result<ExitCode> {
     match &args.table {
+        Table::Table1(args) => table1::run(args),
         Table::Table2(args) => range::run(args),
         Table::Table3(args) => table3::run(args),
         Table::Table4(args) => table4::run(args),
         Table::Sampling(args) => sampling::run(args),
+        Table::Quality(args) => quality::run(args),
     }
 }
 

@@ -1,7 +1,7 @@
 //! A line chart: SNR against distance, sharpness against bar width.
 //!
 //! The law: every point lies where its axis says, clipped to the frame; every line is named in the legend, and every
-//! axis with its unit.
+//! axis with its unit. A legend of many lines stands beside the frame, where it hides nothing.
 
 use super::text::{Font, Style};
 use image::{Rgb, RgbImage};
@@ -12,6 +12,14 @@ const LEFT_PX: u32 = 110;
 const RIGHT_PX: u32 = 40;
 const TOP_PX: u32 = 90;
 const BOTTOM_PX: u32 = 130;
+/// More lines than this have their legend beside the frame.
+const LINES_INSIDE: usize = 6;
+/// A line of up to so many points shows each of them.
+const POINTS_MARKED: usize = 24;
+/// Room for a piece of the line before its name in the legend.
+const LEGEND_LINE_PX: u32 = 50;
+/// Drawn and left out, along a dashed line.
+const DASH_PX: [f64; 2] = [10.0, 7.0];
 
 const GROUND: Rgb<u8> = Rgb([19, 21, 26]);
 const GRID: Rgb<u8> = Rgb([44, 48, 57]);
@@ -86,10 +94,15 @@ impl Chart {
     /// Draws the chart; [`encode_rgb`](crate::files::image::encode_rgb) makes a PNG of it.
     #[must_use]
     pub fn render(&self) -> RgbImage {
-        let mut canvas = RgbImage::from_pixel(WIDTH_PX, HEIGHT_PX, GROUND);
         let style =
             |size_px, line_px, colour| Style { font: Font::sans(), size_px, line_px, colour };
         let (title, small) = (style(28.0, 34, BRIGHT), style(18.0, 22, DIM));
+        let legend_px = if self.lines.len() > LINES_INSIDE {
+            self.widest(&small) as u32 + LEGEND_LINE_PX + RIGHT_PX
+        } else {
+            0
+        };
+        let mut canvas = RgbImage::from_pixel(WIDTH_PX + legend_px, HEIGHT_PX, GROUND);
         let (width, height) =
             (f64::from(WIDTH_PX - LEFT_PX - RIGHT_PX), f64::from(HEIGHT_PX - TOP_PX - BOTTOM_PX));
         let x_px = |x: f64| f64::from(LEFT_PX) + self.x.at(x) * width;
@@ -117,7 +130,7 @@ impl Chart {
         for line in &self.lines {
             self.draw(&mut canvas, line, x_px, y_px);
         }
-        self.legend(&mut canvas, &small, right);
+        self.legend(&mut canvas, &small, right + f64::from(legend_px));
         canvas
     }
 
@@ -130,31 +143,70 @@ impl Chart {
     ) {
         let colour = COLOURS[line.colour % COLOURS.len()];
         let inside = |at: f64| (0.0..=1.0).contains(&at);
-        for (k, pair) in line.points.windows(2).enumerate() {
-            let seen = pair.iter().all(|&(x, y)| inside(self.x.at(x)) && inside(self.y.at(y)));
-            if seen && !(line.dashed && k % 4 >= 2) {
+        let seen = |&(x, y): &(f64, f64)| inside(self.x.at(x)) && inside(self.y.at(y));
+        // Dashes go on from one piece to the next.
+        let mut along = 0.0;
+        for pair in line.points.windows(2) {
+            if pair.iter().all(seen) {
                 let [from, to] = [pair[0], pair[1]].map(|(x, y)| (x_px(x), y_px(y)));
-                stroke(canvas, from, to, colour, 2.5);
+                if line.dashed {
+                    along = dashes(canvas, from, to, colour, along);
+                } else {
+                    stroke(canvas, from, to, colour, 2.5);
+                }
+            }
+        }
+        if line.points.len() <= POINTS_MARKED {
+            for &(x, y) in line.points.iter().filter(|point| seen(point)) {
+                let at = (x_px(x), y_px(y));
+                stroke(canvas, at, at, colour, 8.0);
             }
         }
     }
 
-    /// In the upper right corner, where falling lines leave room.
+    fn widest(&self, style: &Style) -> f32 {
+        self.lines.iter().map(|line| style.width(&line.name)).fold(0.0, f32::max)
+    }
+
+    /// In the upper right corner, where falling lines leave room, or right of the frame.
     fn legend(&self, canvas: &mut RgbImage, style: &Style, right: f64) {
-        let widest = self.lines.iter().map(|line| style.width(&line.name)).fold(0.0, f32::max);
-        let left = right - f64::from(widest) - 20.0;
+        let left = right - f64::from(self.widest(style)) - 20.0;
         for (k, line) in self.lines.iter().enumerate() {
             let top = f64::from(TOP_PX) + 10.0 + 24.0 * k as f64;
             let colour = COLOURS[line.colour % COLOURS.len()];
             let ends =
                 if line.dashed { vec![(0.0, 14.0), (24.0, 38.0)] } else { vec![(0.0, 38.0)] };
             for (from, to) in ends {
-                let at = |dx: f64| (left - 50.0 + dx, top + 11.0);
+                let at = |dx: f64| (left - f64::from(LEGEND_LINE_PX) + dx, top + 11.0);
                 stroke(canvas, at(from), at(to), colour, 2.5);
             }
             style.draw(canvas, &line.name, left as f32, top as f32);
         }
     }
+}
+
+/// A dashed line; `along` is where in the pattern it begins, and the result where it ends.
+fn dashes(
+    canvas: &mut RgbImage,
+    from: (f64, f64),
+    to: (f64, f64),
+    colour: Rgb<u8>,
+    along: f64,
+) -> f64 {
+    let length = (to.0 - from.0).hypot(to.1 - from.1);
+    let at = |px: f64| {
+        let part = px.clamp(0.0, length) / length;
+        (from.0 + part * (to.0 - from.0), from.1 + part * (to.1 - from.1))
+    };
+    let period = DASH_PX[0] + DASH_PX[1];
+    let mut start = -along;
+    while start < length && length > 0.0 {
+        if start + DASH_PX[0] > 0.0 {
+            stroke(canvas, at(start), at(start + DASH_PX[0]), colour, 2.5);
+        }
+        start += period;
+    }
+    (along + length) % period
 }
 
 fn label(tick: f64) -> String {
@@ -227,12 +279,42 @@ mod tests {
     }
 
     #[test]
+    fn many_lines_have_their_legend_beside_the_frame() {
+        let mut many = chart(vec![(1.0, 5.0)]);
+        let frame = many.render().width();
+        many.lines = vec![many.lines[0].clone(); LINES_INSIDE];
+        assert_eq!(many.render().width(), frame);
+        many.lines.push(many.lines[0].clone());
+        assert!(many.render().width() > frame + LEGEND_LINE_PX);
+    }
+
+    #[test]
+    fn a_dashed_line_is_drawn_in_part_whatever_its_points() {
+        let across: Vec<(f64, f64)> =
+            (0..=200).map(|i| (0.1 * 10_f64.powf(f64::from(i) / 100.0), 5.05)).collect();
+        let drawn = |dashed, points: &[(f64, f64)]| {
+            let mut chart = chart(points.to_vec());
+            chart.lines[0].dashed = dashed;
+            let canvas = chart.render();
+            let y = TOP_PX + (HEIGHT_PX - TOP_PX - BOTTOM_PX) / 2;
+            (LEFT_PX..WIDTH_PX - RIGHT_PX)
+                .filter(|&x| *canvas.get_pixel(x, y) == COLOURS[0])
+                .count()
+        };
+        let whole = drawn(false, &across);
+        for points in [across.clone(), vec![across[0], across[200]]] {
+            let part = drawn(true, &points) as f64 / whole as f64;
+            assert!((0.5..0.75).contains(&part), "{part} of the line");
+        }
+    }
+
+    #[test]
     fn points_outside_the_frame_or_nowhere_are_left_out() {
         let nothing = chart(vec![]).render();
         for points in [
             vec![(100.0, 5.0), (200.0, 5.0)],
             vec![(1.0, f64::NAN), (1.1, f64::INFINITY)],
-            vec![(-1.0, 5.0), (1.0, 5.0)],
+            vec![(-1.0, 5.0), (1.0, 50.0)],
         ] {
             assert_eq!(chart(points).render(), nothing);
         }

@@ -12,6 +12,7 @@ mod demo;
 mod enhance;
 mod foreign_devices;
 mod metrics;
+mod quality;
 mod rain;
 mod real_data;
 mod reconstruct;

@@ -4,7 +4,7 @@ use crate::cli::camera::Rain;
 use anyhow::{Result, bail};
 use indicatif::{ProgressBar, ProgressStyle};
 use nirspi::calibrate::CalibrationError;
-use nirspi::capture::{Calibration, CaptureOptions, Ended, Progress, capture};
+use nirspi::capture::{Calibration, Capture, CaptureOptions, Ended, Progress, capture};
 use nirspi::session::Session;
 use nirspi::setup::MeasurementSetup;
 use nirspi::virtual_camera::{MemoryLink, VirtualOptics};
@@ -45,6 +45,8 @@ const FRAMES: u32 = 244;
 pub struct Shots {
     /// What a perfect camera of 32 x 32 pixels would see.
     pub truth: Vec<f32>,
+    /// What one of 64 x 64 pixels would.
+    pub truth_fine: Vec<f32>,
     pub nir_spi: Image,
     pub vis: Image,
 }
@@ -68,24 +70,55 @@ pub fn shoot(scene: Scene, conditions: Conditions, seed: u64) -> Result<Shots> {
         drops.as_ref().unwrap_or(&Drops::none()),
         seed,
     )?;
+    let truth_fine = fine(&scene, Projector::default().field_mm(distance_mm));
     let mut optics = VirtualOptics::new(scene, distance_mm)?;
     if let Some(drops) = drops {
         optics = optics.in_rain(drops)?;
     }
     let truth = optics.focused_footprint()?.weights().to_vec();
     let nir_spi = expose(&optics, conditions.frames, seed)?;
-    Ok(Shots { truth, nir_spi, vis: Image::new(Side::INSTRUMENT, visible) })
+    Ok(Shots { truth, truth_fine, nir_spi, vis: Image::new(Side::INSTRUMENT, visible) })
 }
 
-/// One capture by the whole virtual camera, reconstructed.
+/// The scene over the field, on 64 x 64 pixels.
+fn fine(scene: &Scene, field_mm: f64) -> Vec<f32> {
+    const SIDE: usize = 64;
+    let pitch_mm = field_mm / SIDE as f64;
+    let at_mm = |pixel: usize| (pixel as f64 + 0.5 - SIDE as f64 / 2.0) * pitch_mm;
+    (0..SIDE * SIDE)
+        .map(|at| scene.mean_over_square(at_mm(at % SIDE), at_mm(at / SIDE), pitch_mm) as f32)
+        .collect()
+}
+
+/// What a white sheet gives a pixel of NIR-SPI under these conditions: the scale of its images, as a user would measure
+/// it.
+pub fn white_level(conditions: Conditions, seed: u64) -> Result<f32> {
+    let field_mm = Projector::default().field_mm(conditions.distance_m * 1e3);
+    let sheet = Scene::new(vec![1.0], 1, field_mm)?.with_surround(1.0)?;
+    let image = shoot(sheet, conditions, seed)?.nir_spi;
+    let white = image.pixels().iter().sum::<f32>() / image.pixels().len() as f32;
+    if white > 0.0 { Ok(white) } else { bail!("a white sheet gives no light: {white} counts") }
+}
+
+/// One capture of all patterns by the whole virtual camera, reconstructed.
 fn expose(optics: &VirtualOptics, frames: u32, seed: u64) -> Result<Image> {
+    let setup = MeasurementSetup::new(&Order::Natural, 1.0)?;
+    let captured = record(optics, setup, frames, seed)?;
+    let measurements =
+        captured.integrated.measurements(&captured.setup, captured.settling.as_ref(), false)?;
+    Ok(reconstruct::hadamard(&measurements))
+}
+
+/// One calibrated capture by the whole virtual camera.
+pub fn record(
+    optics: &VirtualOptics,
+    setup: MeasurementSetup,
+    frames: u32,
+    seed: u64,
+) -> Result<Capture> {
     let mut session = Session::open(Box::new(MemoryLink::new(optics.camera(seed)?)))?;
-    let options = CaptureOptions {
-        setup: MeasurementSetup::new(&Order::Natural, 1.0)?,
-        frames: Some(frames),
-        calibration: Calibration::Measure,
-        record: None,
-    };
+    let calibration = Calibration::Measure;
+    let options = CaptureOptions { setup, frames: Some(frames), calibration, record: None };
     let mut watch = |_: &Progress| ControlFlow::Continue(());
     let captured = capture(&mut session, &options, &mut watch)?;
     match &captured.ended {
@@ -97,7 +130,5 @@ fn expose(optics: &VirtualOptics, frames: u32, seed: u64) -> Result<Image> {
     if let Some(problem @ CalibrationError::Incomplete { .. }) = &captured.calibration_problem {
         bail!("not calibrated: {problem}");
     }
-    let measurements =
-        captured.integrated.measurements(&captured.setup, captured.settling.as_ref(), false)?;
-    Ok(reconstruct::hadamard(&measurements))
+    Ok(captured)
 }

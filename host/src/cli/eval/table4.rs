@@ -1,6 +1,7 @@
-//! `nirspi eval table4`: spatial resolution in rain, NIR-SPI and VIS, by slanted edge and by bars.
+//! `nirspi eval table4`: spatial resolution in rain, NIR-SPI, VIS and networks, by slanted edge and by bars.
 
-use super::shot::{Conditions, Exposure, Shots, progress, shoot};
+use super::enhanced::{Enhancers, Picture};
+use super::shot::{Conditions, Exposure, Shots, progress, shoot, white_level};
 use super::{DISTANCES_M, Estimate};
 use crate::cli::camera::Rain;
 use crate::cli::print;
@@ -10,13 +11,12 @@ use nirspi::files::output::OutputDir;
 use nirspi::picture::{Axis, Chart, Line};
 use nirspi::resolution::{bar_scene, bar_transfer, edge_mtf, edge_scene, line_width_px};
 use nirspi_optics::{Projector, Scene};
-use nirspi_recon::Image;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Spatial resolution in rain beside the paper's Table 4: NIR-SPI and VIS, in mm on the target
+/// Spatial resolution in rain beside the paper's Table 4: NIR-SPI, VIS and networks, in mm on the target
 ///
 /// Width of a line at which the transfer of a slanted edge falls to a half (MTF50) and to a tenth (MTF10), and the
 /// finest bars that keep a tenth of their contrast. The edge is taken --scenes times in groups of a tenth, averaged
@@ -55,8 +55,13 @@ const RESOLVED: f64 = 0.1;
 /// Edge of the drawn scenes, in pixels.
 const SCENE_PX: usize = 512;
 
-/// The paper's rows without networks, in mm.
-const PAPER: [(&str, [f64; 3]); 2] = [("VIS", [45.0, 48.0, 60.0]), ("NIR-SPI", [5.0, 25.0, 45.0])];
+/// The paper's rows, in mm.
+const PAPER: [(Picture, [f64; 3]); 4] = [
+    (Picture::Vis, [45.0, 48.0, 60.0]),
+    (Picture::NirSpi, [5.0, 25.0, 45.0]),
+    (Picture::Gan, [5.0, 18.0, 40.0]),
+    (Picture::Diffusion, [5.0, 15.0, 25.0]),
+];
 
 /// What the figures rest on.
 fn reading() -> Vec<String> {
@@ -72,6 +77,9 @@ fn reading() -> Vec<String> {
             of(Projector::blur_mm)
         ),
         "VIS: a focused camera on the same grid; the paper's 45 to 60 mm are coarser than its 43 mm letters".to_owned(),
+        "networks: on their own grid of 64 x 64. They are not linear, and know edges: what they make of one edge or of \
+         bars is no promise for finer things, and bars that are gone stay gone"
+            .to_owned(),
         "what rain does to these: compare with --rain none".to_owned(),
     ]
 }
@@ -89,7 +97,7 @@ struct Report {
 
 #[derive(Debug, Serialize)]
 struct Row {
-    image: &'static str,
+    image: Picture,
     distance_m: f64,
     pixel_mm: f64,
     defocus_mm: f64,
@@ -102,35 +110,47 @@ struct Row {
     paper_mm: f64,
 }
 
+/// Pictures of one row: of the edge, and of each width of bars.
+struct Pictures {
+    side: usize,
+    edges: Vec<Vec<f32>>,
+    bars: Vec<Vec<Vec<f32>>>,
+}
+
 pub fn run(args: &Args) -> Result<ExitCode> {
+    let enhancers = Enhancers::new()?;
     let bars = BARS_PX.len() as u32 * BAR_PICTURES;
     let bar = progress(DISTANCES_M.len() * (args.scenes + bars) as usize, "table 4");
     let mut rows = Vec::new();
     for (k, distance_m) in DISTANCES_M.into_iter().enumerate() {
-        let edges: Vec<Shots> = (0..args.scenes)
-            .into_par_iter()
-            .map(|i| {
-                let shots = take(args, edge_scene(SCENE_PX), distance_m, u64::from(i));
+        let take_all = |scene: &[f32], count: u32| -> Result<Vec<Shots>> {
+            let one = |i: u32| {
+                let shots = take(args, scene.to_vec(), distance_m, u64::from(i));
                 bar.inc(1);
                 shots
+            };
+            (0..count).into_par_iter().map(one).collect()
+        };
+        let edges = take_all(&edge_scene(SCENE_PX), args.scenes)?;
+        let bars: Vec<Vec<Shots>> = BARS_PX
+            .iter()
+            .map(|bar_px| {
+                take_all(&bar_scene(SCENE_PX, bar_px * SCENE_PX as f64 / 32.0), BAR_PICTURES)
             })
             .collect::<Result<_>>()?;
-        let contrasts: Vec<[f64; 2]> = BARS_PX
-            .par_iter()
-            .map(|&bar_px| {
-                let contrast = bar_contrast(args, distance_m, bar_px)?;
-                bar.inc(u64::from(BAR_PICTURES));
-                Ok(contrast)
-            })
-            .collect::<Result<_>>()?;
-        for (which, (image, paper_mm)) in PAPER.into_iter().enumerate() {
-            let of: fn(&Shots) -> &Image = if which == 0 { |s| &s.vis } else { |s| &s.nir_spi };
-            let contrasts: Vec<f64> = contrasts.iter().map(|both| both[which]).collect();
-            rows.push(row(image, distance_m, paper_mm[k], &edges, of, &contrasts));
+        let conditions =
+            Conditions { distance_m, rain: args.exposure.rain, frames: args.exposure.frames };
+        let white = white_level(conditions, args.exposure.seed)?;
+        for (image, paper_mm) in PAPER {
+            let of = |shots: &[Shots]| pictures(image, shots, white, &enhancers);
+            let (side, edges) = of(&edges)?;
+            let bar_pictures = bars.iter().map(|shots| Ok(of(shots)?.1)).collect::<Result<_>>()?;
+            let pictures = Pictures { side, edges, bars: bar_pictures };
+            rows.push(row(image, distance_m, paper_mm[k], &pictures, &bars));
         }
     }
     bar.finish_and_clear();
-    rows.sort_by_key(|row| row.image != "VIS");
+    rows.sort_by_key(|row: &Row| PAPER.iter().position(|(image, _)| *image == row.image));
 
     let report = Report {
         simulated: true,
@@ -168,42 +188,55 @@ fn take(args: &Args, reflectance: Vec<f32>, distance_m: f64, i: u64) -> Result<S
     shoot(scene, conditions, args.exposure.seed.wrapping_add(i))
 }
 
-/// Contrast kept of bars, VIS and NIR-SPI, of the mean of some pictures.
-fn bar_contrast(args: &Args, distance_m: f64, bar_px: f64) -> Result<[f64; 2]> {
-    let scene = bar_scene(SCENE_PX, bar_px * SCENE_PX as f64 / 32.0);
-    let mut sums = [vec![0.0_f32; 1024], vec![0.0_f32; 1024]];
-    let mut truth = Vec::new();
-    for i in 0..u64::from(BAR_PICTURES) {
-        let shots = take(args, scene.clone(), distance_m, i)?;
-        for (sum, image) in sums.iter_mut().zip([&shots.vis, &shots.nir_spi]) {
-            sum.iter_mut().zip(image.pixels()).for_each(|(sum, pixel)| *sum += pixel);
-        }
-        truth = shots.truth;
+/// The pictures of a row and their side.
+fn pictures(
+    image: Picture,
+    shots: &[Shots],
+    white: f32,
+    enhancers: &Enhancers,
+) -> Result<(usize, Vec<Vec<f32>>)> {
+    let all: Vec<&Shots> = shots.iter().collect();
+    if let Some(pictures) = enhancers.pictures(image, &all, &vec![white; shots.len()])? {
+        return Ok((64, pictures));
     }
-    Ok(sums.map(|sum| bar_transfer(&sum, &truth, 32, bar_px)))
+    let of = |shot: &Shots| {
+        if image == Picture::Vis { &shot.vis } else { &shot.nir_spi }.pixels().to_vec()
+    };
+    Ok((32, shots.iter().map(of).collect()))
+}
+
+/// The sum of pictures.
+fn sum(pictures: &[Vec<f32>]) -> Vec<f32> {
+    let mut sum = vec![0.0; pictures.first().map_or(0, Vec::len)];
+    for picture in pictures {
+        sum.iter_mut().zip(picture).for_each(|(sum, pixel)| *sum += pixel);
+    }
+    sum
 }
 
 fn row(
-    image: &'static str,
+    image: Picture,
     distance_m: f64,
     paper_mm: f64,
-    edges: &[Shots],
-    of: fn(&Shots) -> &Image,
-    contrasts: &[f64],
+    pictures: &Pictures,
+    bars: &[Vec<Shots>],
 ) -> Row {
     let projector = Projector::default();
-    let pixel_mm = projector.field_mm(distance_m * 1e3) / 32.0;
-    let group = edges.len() / GROUPS as usize;
-    let curves: Vec<_> = edges
-        .chunks_exact(group)
-        .map(|shots| {
-            let mut sum = vec![0.0_f32; 1024];
-            for shot in shots {
-                sum.iter_mut().zip(of(shot).pixels()).for_each(|(sum, pixel)| *sum += pixel);
-            }
-            edge_mtf(&sum, 32)
-        })
-        .collect();
+    let field_mm = projector.field_mm(distance_m * 1e3);
+    let side = pictures.side;
+    let pixel_mm = field_mm / side as f64;
+    let group = pictures.edges.len() / GROUPS as usize;
+    let curves: Vec<_> =
+        pictures.edges.chunks_exact(group).map(|edges| edge_mtf(&sum(edges), side)).collect();
+    let contrast = |k: usize| {
+        let truth =
+            |shot: &Shots| if side == 64 { shot.truth_fine.clone() } else { shot.truth.clone() };
+        let truth = bars[k].first().map(truth).unwrap_or_default();
+        bar_transfer(&sum(&pictures.bars[k]), &truth, side, BARS_PX[k] * side as f64 / 32.0)
+    };
+    let contrasts: Vec<f64> = (0..BARS_PX.len()).map(contrast).collect();
+    // Bars are counted in pixels of 32 x 32, whatever the picture's.
+    let bar_mm = |px: f64| px * field_mm / 32.0;
     let at = |level| {
         let widths: Vec<f64> = curves
             .iter()
@@ -218,24 +251,20 @@ fn row(
         image,
         distance_m,
         pixel_mm,
-        defocus_mm: if image == "VIS" { 0.0 } else { projector.blur_mm(distance_m * 1e3) },
+        defocus_mm: if image == Picture::Vis { 0.0 } else { projector.blur_mm(distance_m * 1e3) },
         mtf50_mm: at(0.5),
         mtf10_mm: at(0.1),
-        bars_mm: finest.map(|px| px * pixel_mm),
-        bar_contrast: BARS_PX
-            .iter()
-            .map(|px| px * pixel_mm)
-            .zip(contrasts.iter().copied())
-            .collect(),
+        bars_mm: finest.map(|&px| bar_mm(px)),
+        bar_contrast: BARS_PX.iter().map(|&px| bar_mm(px)).zip(contrasts.iter().copied()).collect(),
         paper_mm,
     }
 }
 
 fn chart(report: &Report) -> Chart {
     let lines = report.rows.iter().enumerate().map(|(k, row)| Line {
-        name: format!("{}, {} m", row.image, row.distance_m),
+        name: format!("{}, {} m", row.image.name(), row.distance_m),
         colour: k,
-        dashed: false,
+        dashed: k >= 6,
         points: row.bar_contrast.iter().map(|&(mm, contrast)| (mm, contrast.max(0.0))).collect(),
     });
     Chart {
@@ -268,15 +297,15 @@ fn say(report: &Report) -> Result<()> {
         report.frames
     ))?;
     print::line(
-        "image    distance  pixel  defocus  MTF50            MTF10            bars   paper",
+        "image                distance  pixel  defocus  MTF50            MTF10            bars   paper",
     )?;
     for row in &report.rows {
         let text =
             |estimate: &Option<Estimate>| estimate.map_or_else(|| "none".to_owned(), |e| e.text(2));
         let bars = row.bars_mm.map_or_else(|| "none".to_owned(), |mm| format!("{mm:.1}"));
         print::line(format_args!(
-            "{:<8} {:<8}  {:<5}  {:<7.1}  {:<15}  {:<15}  {:<5}  {}",
-            row.image,
+            "{:<20} {:<8}  {:<5}  {:<7.1}  {:<15}  {:<15}  {:<5}  {}",
+            row.image.name(),
             format!("{} m", row.distance_m),
             row.pixel_mm,
             row.defocus_mm,

@@ -1,0 +1,242 @@
+//! Scenes that are no characters: a network that knows letters could draw them there.
+//!
+//! Where the scene is known, PSNR before and after says whether strokes came in that are not there; the picture shows
+//! it. Real measurements are taken as they are.
+
+use super::measure::{Condition, SIDE, halved};
+use super::rows::Row;
+use super::{MIDDLE, UNTOUCHED};
+use crate::cli::source::SourceArgs;
+use anyhow::{Context, Result};
+use indicatif::ProgressBar;
+use nirspi::files::image::read_reflectance;
+use nirspi::picture::{Panel, Range, SideBySide};
+use nirspi_nets::consistency::Consistency;
+use nirspi_nets::upscale_2x;
+use nirspi_recon::{metrics, reconstruct};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// Cases of one panel, from top to bottom.
+const CASES_A_PANEL: usize = 3;
+
+/// A scene to be enhanced.
+pub struct Scene {
+    name: String,
+    /// 64 x 64 in [0, 1]; none if nobody knows it.
+    truth: Option<Vec<f32>>,
+    /// 32 x 32 in [0, 1].
+    readings: Vec<f32>,
+    condition: Condition,
+}
+
+/// What became of a scene.
+#[derive(Debug, Serialize)]
+pub struct Case {
+    name: String,
+    #[serde(flatten)]
+    condition: Option<Condition>,
+    /// Of Lanczos's interpolation.
+    psnr_before_db: Option<f64>,
+    psnr_after_db: Option<f64>,
+    /// Root mean square of what enhancement changed.
+    changed: f64,
+    /// As in the report's other part; of real measurements nobody knows the noise.
+    inconsistency: Option<f64>,
+}
+
+/// The cases, and a picture of them.
+pub struct Shown {
+    pub cases: Vec<Case>,
+    pub picture: SideBySide,
+}
+
+/// Generated scenes, parts of pictures, real measurements.
+pub fn cases(pictures: Option<&Path>, spi: Option<&Path>, seed: u64) -> Result<Vec<Scene>> {
+    let mut scenes: Vec<Scene> = generated(seed)
+        .into_iter()
+        .enumerate()
+        .map(|(k, (name, truth, condition))| degraded(name, truth, condition, seed, k))
+        .collect();
+    for (k, file) in files(pictures, "png")?.iter().enumerate() {
+        let picture = read_reflectance(file)?;
+        for (part, (down, across)) in [("left", (0.5, 0.2)), ("right", (0.5, 0.8))] {
+            let name = format!("{}, {part}", stem(file));
+            let truth = part_of(&picture.values, picture.size_px, down, across);
+            scenes.push(degraded(name, truth, MIDDLE, seed, 100 + k));
+        }
+    }
+    for file in files(spi, "npz")? {
+        scenes.push(measured(&file).with_context(|| file.display().to_string())?);
+    }
+    Ok(scenes)
+}
+
+fn degraded(
+    name: String,
+    truth: Vec<f32>,
+    condition: Condition,
+    seed: u64,
+    number: usize,
+) -> Scene {
+    let readings = condition.read(&truth, seed, number as u64);
+    Scene { name, truth: Some(truth), readings, condition }
+}
+
+fn generated(seed: u64) -> Vec<(String, Vec<f32>, Condition)> {
+    let flat = |level: f32| vec![level; SIDE * SIDE];
+    let mut rng = Pcg64Mcg::seed_from_u64(seed);
+    let mut stars = flat(0.02);
+    for _ in 0..25 {
+        stars[rng.random_range(0..SIDE * SIDE)] = rng.random_range(0.3..1.0);
+    }
+    let grating = (0..SIDE * SIDE)
+        .map(|at| 0.5 + 0.4 * (0.4 * ((at % SIDE) as f32 + 0.5 * (at / SIDE) as f32)).sin())
+        .collect();
+    vec![
+        ("nothing".to_owned(), flat(0.0), MIDDLE),
+        ("grey".to_owned(), flat(0.5), UNTOUCHED),
+        ("noise alone".to_owned(), flat(0.5), Condition { noise: 0.08, ..MIDDLE }),
+        ("stars".to_owned(), stars, MIDDLE),
+        ("grating".to_owned(), grating, MIDDLE),
+    ]
+}
+
+/// 64 x 64 of a picture, at most half as fine as it is, around a place in it.
+fn part_of(picture: &[f32], size_px: usize, down: f64, across: f64) -> Vec<f32> {
+    let pitch = (size_px / (2 * SIDE)).max(1);
+    let first = |place: f64| {
+        let middle = place * size_px as f64 - (SIDE * pitch / 2) as f64;
+        middle.clamp(0.0, size_px.saturating_sub(SIDE * pitch) as f64) as usize
+    };
+    let (top, left) = (first(down), first(across));
+    let mean = |r: usize, c: usize| {
+        let at = |k: usize| {
+            let row = (top + r * pitch + k / pitch).min(size_px - 1);
+            let column = (left + c * pitch + k % pitch).min(size_px - 1);
+            picture[row * size_px + column]
+        };
+        (0..pitch * pitch).map(at).sum::<f32>() / (pitch * pitch) as f32
+    };
+    (0..SIDE * SIDE).map(|at| mean(at / SIDE, at % SIDE)).collect()
+}
+
+/// A real measurement: 64 x 64 ones are their own truth, seen through means of 2 x 2.
+fn measured(file: &Path) -> Result<Scene> {
+    let source = SourceArgs {
+        input: file.to_owned(),
+        index: Some(0),
+        non_differential: false,
+        keep_leak: false,
+    };
+    let source = source.load()?;
+    let image = reconstruct::hadamard(&source.measurements);
+    let side = image.side().pixels();
+    let (low, high) = image
+        .pixels()
+        .iter()
+        .fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), &p| (low.min(p), high.max(p)));
+    let span = if high > low { high - low } else { 1.0 };
+    let grey: Vec<f32> =
+        image.pixels().iter().map(|p| ((p - low) / span).clamp(0.0, 1.0)).collect();
+    let name = format!("{} (measured)", stem(file));
+    match side {
+        SIDE => {
+            let readings = halved(&grey);
+            Ok(Scene { name, truth: Some(grey), readings, condition: UNTOUCHED })
+        }
+        32 => Ok(Scene { name, truth: None, readings: grey, condition: UNTOUCHED }),
+        _ => anyhow::bail!("an image of {side} x {side}, expected 32 x 32 or 64 x 64"),
+    }
+}
+
+fn stem(path: &Path) -> String {
+    path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
+}
+
+/// Files of a folder by their ending, sorted; none of no folder.
+fn files(folder: Option<&Path>, ending: &str) -> Result<Vec<PathBuf>> {
+    let Some(folder) = folder else { return Ok(Vec::new()) };
+    let named = || format!("{}: cannot read", folder.display());
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(folder).with_context(named)? {
+        let path = entry.with_context(named)?.path();
+        if path.extension().is_some_and(|e| e == ending) {
+            files.push(path);
+        }
+    }
+    files.sort_unstable();
+    Ok(files)
+}
+
+/// Enhances all scenes.
+pub fn enhance(scenes: Vec<Scene>, row: &Row) -> Result<Shown> {
+    let hidden = ProgressBar::hidden();
+    let mut cases = Vec::new();
+    let mut panels: Vec<Panel> = Vec::new();
+    for some in scenes.chunks(CASES_A_PANEL) {
+        let mut panel = Panel {
+            title: "input, enhanced, truth".to_owned(),
+            width: 3 * SIDE,
+            height: CASES_A_PANEL * SIDE,
+            values: vec![0.0; 3 * SIDE * CASES_A_PANEL * SIDE],
+            range: Range::Unit,
+            caption: Vec::new(),
+        };
+        for (place, scene) in some.iter().enumerate() {
+            let before = upscale_2x(&scene.readings, 1, SIDE / 2, SIDE / 2)?;
+            let after = row.enhance(&scene.readings, scene.condition, &hidden)?;
+            let case = judged(scene, &before, &after)?;
+            panel.caption.push(case.line());
+            cases.push(case);
+            let shown = [Some(&before), Some(&after), scene.truth.as_ref()];
+            for (column, image) in shown.into_iter().enumerate() {
+                let Some(image) = image else { continue };
+                for (r, line) in image.chunks_exact(SIDE).enumerate() {
+                    let from = (place * SIDE + r) * 3 * SIDE + column * SIDE;
+                    panel.values[from..from + SIDE].copy_from_slice(line);
+                }
+            }
+        }
+        panels.push(panel);
+    }
+    let picture = SideBySide {
+        header: format!("What is no letter stays none: {}", row.kind().name()),
+        panels,
+        footer: "from top to bottom as below each panel; input: readings of 32 x 32, interpolated. Simulated, but for \
+                 those that say measured: their truth is their own image of 64 x 64, where there is one"
+            .to_owned(),
+    };
+    Ok(Shown { cases, picture })
+}
+
+fn judged(scene: &Scene, before: &[f32], after: &[f32]) -> Result<Case> {
+    let psnr = |image: &[f32]| -> Result<Option<f64>> {
+        let truth = scene.truth.as_deref();
+        let psnr = truth.map(|truth| metrics::psnr(truth, image, SIDE, SIDE, 1.0)).transpose()?;
+        Ok(psnr.filter(|db| db.is_finite()))
+    };
+    let squares: f64 = before.iter().zip(after).map(|(a, b)| f64::from(a - b).powi(2)).sum();
+    let Condition { sigma_px, noise } = scene.condition;
+    let camera = Consistency::new(SIDE / 2, sigma_px, noise, None);
+    let known = noise > 0.0;
+    Ok(Case {
+        name: scene.name.clone(),
+        condition: known.then_some(scene.condition),
+        psnr_before_db: psnr(before)?,
+        psnr_after_db: psnr(after)?,
+        changed: (squares / after.len() as f64).sqrt(),
+        inconsistency: known.then(|| f64::from(camera.residual_ratio(&scene.readings, after))),
+    })
+}
+
+impl Case {
+    fn line(&self) -> String {
+        match (self.psnr_before_db, self.psnr_after_db) {
+            (Some(before), Some(after)) => format!("{}: {before:.1} to {after:.1} dB", self.name),
+            _ => format!("{}: changed by {:.3}", self.name, self.changed),
+        }
+    }
+}
