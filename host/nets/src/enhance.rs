@@ -3,7 +3,7 @@
 //! Law: nothing leaves without its inconsistency, the figure that says whether the readings bear it out.
 
 use crate::consistency::{Consistency, MeasuredRows};
-use crate::deblur::{self, AREA, Deblurrer, Job};
+use crate::deblur::{self, AREA, Deblurrer, Job, Truth};
 use crate::estimate::{BlurEstimator, Estimate};
 use crate::fusion::{DepthMaps, Fusion};
 use crate::gate;
@@ -50,7 +50,8 @@ pub struct KnownEstimate {
 }
 
 impl KnownEstimate {
-    fn over(self, estimated: Estimate) -> Estimate {
+    /// The estimate with what is known in its place.
+    pub fn over(self, estimated: Estimate) -> Estimate {
         Estimate {
             sigma_px: self.sigma_px.unwrap_or(estimated.sigma_px),
             noise: self.noise.unwrap_or(estimated.noise),
@@ -113,7 +114,8 @@ impl Sharpener {
             let estimates = known(options, self.estimator.estimate(batch));
             let stage = Stage { deblurrer: &self.deblurrer, options, first };
             let sharp = |readings: &[f32], estimates: &[Estimate], seed| {
-                stage.sharpen(readings, readings, readings, deblur::SIDE, estimates, seed)
+                let job = stage.job([readings; 3], deblur::SIDE, estimates, seed);
+                stage.sharpen(&job, readings)
             };
             let images = sharp(batch.values(), &estimates, options.seed);
             let spread = stage.spread(batch.values(), &estimates, sharp);
@@ -152,7 +154,11 @@ impl Enhancer {
             let sharp = |readings: &[f32], estimates: &[Estimate], seed| {
                 let start = self.fusion.upscale(Images::known(readings), depth.as_ref());
                 let seen = repeated(readings, SIDE);
-                let images = stage.sharpen(&start, &seen, readings, SIDE, estimates, seed);
+                let job = stage.job([&start, &seen, readings], SIDE, estimates, seed);
+                // What FSRCNN made of a sharp image is no measurement yet: it has to agree with it.
+                let mut plain = start.clone();
+                Truth::new(&job).correct(&mut plain);
+                let images = stage.sharpen(&job, &plain);
                 (start, images)
             };
             let (upscaled, images) = sharp(batch.values(), &estimates, options.seed);
@@ -173,16 +179,15 @@ struct Stage<'a> {
 }
 
 impl Stage<'_> {
-    fn sharpen(
-        &self,
-        start: &[f32],
-        seen: &[f32],
-        readings: &[f32],
+    /// The deblurring of `start`, given the readings as the network sees them and as they are.
+    fn job<'b>(
+        &'b self,
+        [start, seen, readings]: [&'b [f32]; 3],
         readings_side: usize,
-        estimates: &[Estimate],
+        estimates: &'b [Estimate],
         seed: u64,
-    ) -> Vec<f32> {
-        let job = Job {
+    ) -> Job<'b> {
+        Job {
             start,
             seen,
             readings,
@@ -192,10 +197,14 @@ impl Stage<'_> {
             consistency: self.options.consistency,
             seed,
             first: self.first,
-        };
-        let mut images = self.deblurrer.run(&job);
+        }
+    }
+
+    /// Deblurs, but for what is sharp and clean: there `plain` stands.
+    fn sharpen(&self, job: &Job<'_>, plain: &[f32]) -> Vec<f32> {
+        let mut images = self.deblurrer.run(job);
         if self.options.gate {
-            gate::close(estimates, start, &mut images);
+            gate::close(job.estimates, plain, &mut images);
         }
         images
     }

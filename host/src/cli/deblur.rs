@@ -2,16 +2,19 @@
 
 use super::Usage;
 use super::enhance::print_report;
-use super::networks::{Deblurring, NetworkArgs, Report, bar};
+use super::networks::{Deblurring, NetworkArgs, Networks, Report, bar};
 use super::report::StageTimes;
 use super::stack::Input;
 use anyhow::Result;
-use nirspi_nets::{Images, KnownEstimate, Method, Options, deblur};
+use indicatif::ProgressBar;
+use nirspi_nets::classical;
+use nirspi_nets::consistency::Consistency;
+use nirspi_nets::{Enhanced, Images, KnownEstimate, Method, Options, deblur};
 use std::num::NonZeroU32;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Deblur images of 64 x 64
+/// Deblur images of 64 x 64, by a network or a classical method
 ///
 /// Reads .npy ((N, 64, 64) or (64, 64), in [0, 1] or 8-bit grey levels), a PNG or a folder of PNGs. Blur and noise are
 /// estimated from each image unless given; the report says how well each result agrees with its image.
@@ -50,7 +53,30 @@ enum Model {
     Ancestral,
     /// A GAN's generator
     Gan,
+    /// Wiener's filter
+    Wiener,
+    /// Richardson-Lucy deconvolution
+    Rl,
+    /// Deconvolution with least total variation
+    Tv,
 }
+
+/// How the model deblurs.
+enum Way {
+    Network(Method),
+    Classical(classical::Method),
+}
+
+impl Way {
+    fn name(&self) -> &'static str {
+        match self {
+            Self::Network(method) => method.model(),
+            Self::Classical(method) => method.name(),
+        }
+    }
+}
+
+type Blurred<'a> = Images<'a, { deblur::SIDE }>;
 
 /// How to deblur, the same for `deblur` and `enhance`.
 #[derive(Debug, clap::Args)]
@@ -104,40 +130,59 @@ impl Sharpening {
 }
 
 impl Args {
-    fn method(&self) -> Result<Method> {
+    fn way(&self) -> Result<Way> {
+        let only =
+            |flag: &str, whose: &str| Err(Usage(format!("{flag} belongs to {whose}")).into());
         let steps =
             |default| NonZeroU32::new(self.steps.unwrap_or(default)).unwrap_or(NonZeroU32::MIN);
-        Ok(match (self.model, self.steps) {
-            (Model::Gan, Some(2..)) => {
-                return Err(Usage("--steps belongs to diffusion and ancestral".to_owned()).into());
+        Ok(match self.model {
+            Model::Diffusion => Way::Network(Method::Diffusion { steps: steps(1) }),
+            Model::Ancestral => Way::Network(Method::Ancestral { steps: steps(500) }),
+            _ if self.steps.is_some_and(|steps| steps > 1) => {
+                return only("--steps", "diffusion and ancestral");
             }
-            (Model::Gan, _) => Method::Gan,
-            (Model::Diffusion, _) => Method::Diffusion { steps: steps(1) },
-            (Model::Ancestral, _) => Method::Ancestral { steps: steps(500) },
+            Model::Gan => Way::Network(Method::Gan),
+            _ if self.sharpening.spread.is_some() => return only("--spread", "networks"),
+            Model::Wiener => Way::Classical(classical::Method::Wiener),
+            Model::Rl => Way::Classical(classical::Method::RichardsonLucy),
+            Model::Tv => Way::Classical(classical::Method::TotalVariation),
         })
     }
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let method = args.method()?;
+    let way = args.way()?;
     let options = args.sharpening.options()?;
     let mut times = StageTimes::default();
     let input = times.time("read", || Input::read(&args.input))?;
-    let images: Images<'_, { deblur::SIDE }> = input.images()?;
+    let images: Blurred<'_> = input.images()?;
     let target = input.target(&args.out)?;
-    let mut networks = args.networks.open(&["estimator", method.model()])?;
-    let sharpener = times.time("load", || networks.sharpener(method))?;
-
     let bar = bar("deblurring", input.count());
-    let result = times.time("deblur", || {
-        sharpener.deblur(images, &options, &mut |done| bar.set_position(done as u64))
-    });
+    let (networks, result) = match way {
+        Way::Network(method) => {
+            let mut networks = args.networks.open(&["estimator", method.model()])?;
+            let sharpener = times.time("load", || networks.sharpener(method))?;
+            let result = times.time("deblur", || {
+                sharpener.deblur(images, &options, &mut |done| bar.set_position(done as u64))
+            });
+            (networks, result)
+        }
+        Way::Classical(method) => {
+            let mut networks = args.networks.open(&["estimator"])?;
+            let work = || classically(method, images, &mut networks, options.estimate, &bar);
+            let result = times.time("deblur", work)?;
+            (networks, result)
+        }
+    };
     bar.finish_and_clear();
     args.sharpening.write_spread(&input, result.spread.as_deref())?;
     target.write(deblur::SIDE, &result.images)?;
 
-    let deblurring =
-        Deblurring::of(method.model(), method.steps(), options.consistency, options.seed, &result);
+    let (steps, consistency) = match way {
+        Way::Network(method) => (method.steps(), options.consistency),
+        Way::Classical(_) => (1, false),
+    };
+    let deblurring = Deblurring::of(way.name(), steps, consistency, options.seed, &result);
     let report = Report {
         input: args.input.clone(),
         output: args.out.clone(),
@@ -149,4 +194,27 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     };
     print_report(&report, args.json)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// A classical method, told each image's blur and noise.
+fn classically(
+    method: classical::Method,
+    images: Blurred<'_>,
+    networks: &mut Networks,
+    known: KnownEstimate,
+    bar: &ProgressBar,
+) -> Result<Enhanced> {
+    const SIDE: usize = deblur::SIDE;
+    let mut result = Enhanced::default();
+    for (image, estimate) in images.iter().zip(networks.estimator()?.estimate(images)) {
+        let estimate = known.over(estimate);
+        let (sigma_px, noise) = (estimate.sigma_px, estimate.noise.min(1.0));
+        let sharp = classical::deblur(method, image, (SIDE, SIDE), sigma_px, noise)?;
+        let model = Consistency::new(SIDE, sigma_px, noise, None);
+        result.inconsistency.push(model.residual_ratio(image, &sharp));
+        result.images.extend(sharp);
+        result.estimates.push(estimate);
+        bar.inc(1);
+    }
+    Ok(result)
 }

@@ -145,3 +145,23 @@ fn weights_of_another_network_are_refused() {
         .run(&["upscale", "in.npy", "--weights", "classifier.safetensors", "--out", "out.npy"])
         .failed(2, &["classifier.safetensors", "of classifier", "fsrcnn"]);
 }
+
+#[test]
+fn classical_methods_deblur_too_and_what_is_the_networks_is_not_theirs() {
+    let bench = Bench::new();
+    bench.write("in.npy", &npy::encode(&[1, 64, 64], &bar(64)));
+    for model in ["wiener", "rl", "tv"] {
+        let arguments = ["deblur", "in.npy", "--model", model, "--blur-px", "1", "--noise", "0.01"];
+        let report = bench
+            .run(&[&arguments[..], &["--json", "--out", "out.npy"]].concat())
+            .succeeded()
+            .json();
+        assert_eq!(report["model"], model);
+        assert!((report["noise"][0].as_f64().unwrap() - 0.01).abs() < 1e-6, "{report}");
+        assert!(report["inconsistency"][0].as_f64().is_some_and(|v| v < 2.0), "{report}");
+        assert_eq!(bench.pixels("out.npy").len(), 64 * 64);
+        for mine in [["--steps", "2"], ["--spread", "s.npy"]] {
+            bench.run(&[&arguments[..], &mine, &["--out", "o.npy"]].concat()).failed(2, &mine[..1]);
+        }
+    }
+}
