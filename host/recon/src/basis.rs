@@ -10,6 +10,7 @@ mod wavelet;
 pub(crate) use wavelet::merge;
 
 use crate::Side;
+use pulp::{Arch, Simd, WithSimd};
 use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;
@@ -175,6 +176,30 @@ impl Transform {
 
 /// Adds `a * b` to `out`, all row-major, `a` with `inner` columns (an even number) and `b` with `columns`.
 pub(crate) fn product(inner: usize, columns: usize, a: &[f32], b: &[f32], out: &mut [f32]) {
+    Arch::new().dispatch(Product { inner, columns, a, b, out });
+}
+
+/// [`product`] as `pulp` wants it, compiled for each vector width.
+struct Product<'a> {
+    inner: usize,
+    columns: usize,
+    a: &'a [f32],
+    b: &'a [f32],
+    out: &'a mut [f32],
+}
+
+impl WithSimd for Product<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { inner, columns, a, b, out } = self;
+        add_product(inner, columns, a, b, out);
+    }
+}
+
+#[inline(always)]
+fn add_product(inner: usize, columns: usize, a: &[f32], b: &[f32], out: &mut [f32]) {
     for (a, out) in a.chunks_exact(inner).zip(out.chunks_exact_mut(columns)) {
         // Two rows of b at a time halve the traffic through `out`.
         for (pair, b) in a.as_chunks::<2>().0.iter().zip(b.chunks_exact(2 * columns)) {

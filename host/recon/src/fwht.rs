@@ -7,8 +7,10 @@
 //!
 //! The radix-8 first pass keeps the three smallest strides in registers; the passes after it are radix 4
 //! over contiguous runs of at least eight values, which a compiler turns into vector code on any
-//! target that has vectors (baseline x86-64 included), and halve the traffic through memory of radix 2.
+//! target that has vectors (baseline x86-64 included, wider ones where the running machine has them), and halve the
+//! traffic through memory of radix 2. No width changes a result: each value is one chain of sums.
 
+use pulp::{Arch, Simd, WithSimd};
 use std::ops::{Add, Sub};
 use thiserror::Error;
 
@@ -53,6 +55,29 @@ pub fn fwht<T: Real>(data: &mut [T]) -> Result<(), FwhtLengthError> {
 /// [`fwht`] for lengths that are a power of two by construction (images of a [`crate::Side`]).
 pub(crate) fn transform<T: Real>(data: &mut [T]) {
     debug_assert!(data.len().is_power_of_two());
+    if data.len() < DISPATCHED {
+        return passes(data);
+    }
+    Arch::new().dispatch(Passes(data));
+}
+
+/// Shorter transforms take no longer than to choose a vector width.
+const DISPATCHED: usize = 256;
+
+/// [`passes`] as `pulp` wants it: what is inlined into [`WithSimd::with_simd`] is compiled for each vector width.
+struct Passes<'a, T>(&'a mut [T]);
+
+impl<T: Real> WithSimd for Passes<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        passes(self.0);
+    }
+}
+
+#[inline(always)]
+fn passes<T: Real>(data: &mut [T]) {
     let mut stride = 1;
     if data.len() >= 8 {
         for block in data.as_chunks_mut().0 {
@@ -79,6 +104,7 @@ pub(crate) fn transform<T: Real>(data: &mut [T]) {
     }
 }
 
+#[inline(always)]
 fn radix8<T: Real>(x: &mut [T; 8]) {
     let [a, b, c, d, e, f, g, h] = *x;
     // Widest stride first: four independent sums and differences of neighbours fill a vector.
@@ -91,6 +117,7 @@ fn radix8<T: Real>(x: &mut [T; 8]) {
 }
 
 // Four separate arguments, not one slice: that they cannot overlap is what lets the loop vectorise.
+#[inline(always)]
 fn radix4<T: Real>(a: &mut [T], b: &mut [T], c: &mut [T], d: &mut [T]) {
     for (((a, b), c), d) in a.iter_mut().zip(b).zip(c).zip(d) {
         let (ab, ba) = (*a + *b, *a - *b);

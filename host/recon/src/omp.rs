@@ -10,7 +10,7 @@
 //! | [`solve_batch`], [`solve_path`] | many measurements of one [`Problem`], or one, on a [`Backend`] chosen at run time |
 //! | [`Dictionary`] | what both ask of the atoms: projections, and columns of the Gram matrix |
 //! | [`DenseDictionary`] | a dictionary that is a matrix |
-//! | [`MixedDictionary`] | the same in `f32`, and in `f64` where `f32` cannot tell two atoms apart |
+//! | [`MixedDictionary`] | the same in `f32`, with choices in `f64` where `f32` cannot tell two atoms apart |
 //! | [`nonnegative`] | coefficients of 0 or more |
 //! | [`sampled`] | Hadamard measurements of an image, by fast transforms, without storing a matrix |
 //! | `gpu` | the same on a GPU, in `f32`; with the feature of that name |
@@ -37,6 +37,7 @@ mod mixed;
 pub mod nonnegative;
 mod panels;
 mod pursuit;
+mod referee;
 pub mod reference;
 pub mod sampled;
 mod scalar;

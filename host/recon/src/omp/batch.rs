@@ -5,6 +5,7 @@
 
 use super::dictionary::{Dictionary, padded};
 use super::pursuit::{Path, Solver, energy};
+use super::referee::Referee;
 use super::scalar::Scalar;
 use super::{Backend, Limits, OmpError, Solution, finite};
 use rayon::prelude::*;
@@ -79,7 +80,17 @@ pub(super) fn solve_batch_paths<T: Scalar, D: Dictionary<T> + ?Sized>(
     y: &[T],
 ) -> Result<Vec<Path<T>>, OmpError> {
     check(problem, y)?;
-    on_all_cores(problem.dictionary, &problem.limits, y)
+    on_all_cores(problem.dictionary, &problem.limits, y, |_| ())
+}
+
+/// [`solve_batch_paths`], with the referee that `referee_of` has for each frame.
+pub(super) fn solve_batch_with<T: Scalar, D: Dictionary<T> + ?Sized, R: Referee<T>>(
+    problem: &Problem<'_, D>,
+    y: &[T],
+    referee_of: impl Fn(usize) -> R + Sync,
+) -> Result<Vec<Path<T>>, OmpError> {
+    check(problem, y)?;
+    on_all_cores(problem.dictionary, &problem.limits, y, referee_of)
 }
 
 fn check<T: Scalar, D: Dictionary<T> + ?Sized>(
@@ -94,16 +105,17 @@ fn check<T: Scalar, D: Dictionary<T> + ?Sized>(
     problem.limits.check()
 }
 
-fn on_all_cores<T: Scalar, D: Dictionary<T> + ?Sized>(
+fn on_all_cores<T: Scalar, D: Dictionary<T> + ?Sized, R: Referee<T>>(
     dictionary: &D,
     limits: &Limits,
     y: &[T],
+    referee_of: impl Fn(usize) -> R + Sync,
 ) -> Result<Vec<Path<T>>, OmpError> {
     let expected = dictionary.measurements();
     let frames = y.len() / expected;
     if frames == 1 {
         // To wake another thread takes as long as to solve it.
-        return Ok(vec![Solver::new(dictionary, limits)?.solve(y)?]);
+        return Ok(vec![Solver::new(dictionary, limits)?.solve_with(y, &mut referee_of(0))?]);
     }
     let width = padded(dictionary.atoms().count());
     let together = frames.div_ceil(rayon::current_num_threads()).clamp(1, TOGETHER);
@@ -111,7 +123,8 @@ fn on_all_cores<T: Scalar, D: Dictionary<T> + ?Sized>(
     let idle = Mutex::new(Vec::new());
     let groups: Result<Vec<Vec<Path<T>>>, OmpError> = y
         .par_chunks(together * expected)
-        .map(|y| {
+        .enumerate()
+        .map(|(group, y)| {
             let waiting = idle.lock().unwrap_or_else(PoisonError::into_inner).pop();
             let (mut solver, mut p0) = match waiting {
                 Some(solver) => solver,
@@ -122,7 +135,10 @@ fn on_all_cores<T: Scalar, D: Dictionary<T> + ?Sized>(
             dictionary.project_all(y, projections);
             let paths = frames
                 .zip(projections.chunks_exact(width))
-                .map(|(y, p0)| solver.solve_projected(p0, energy(y)))
+                .enumerate()
+                .map(|(i, (y, p0))| {
+                    solver.solve_projected(p0, energy(y), &mut referee_of(group * together + i))
+                })
                 .collect();
             idle.lock().unwrap_or_else(PoisonError::into_inner).push((solver, p0));
             paths

@@ -18,19 +18,26 @@ pub(crate) const PANEL: usize = 64;
 #[derive(Debug, Clone)]
 pub(super) struct Rows<T> {
     panels: Vec<Vec<[T; PANEL]>>,
-    len: usize,
 }
 
 impl<T: Scalar> Rows<T> {
     /// None yet, of `panels * PANEL` atoms, with room for some.
     pub(super) fn new(panels: usize, room: usize) -> Self {
-        Self { panels: (0..panels).map(|_| Vec::with_capacity(room)).collect(), len: 0 }
+        Self { panels: (0..panels).map(|_| Vec::with_capacity(room)).collect() }
     }
 
-    /// Forgets the rows, keeps their memory.
-    pub(super) fn clear(&mut self) {
-        self.panels.iter_mut().for_each(Vec::clear);
-        self.len = 0;
+    /// Forgets all but the first rows, keeps their memory.
+    pub(super) fn truncate(&mut self, rows: usize) {
+        self.panels.iter_mut().for_each(|panel| panel.truncate(rows));
+    }
+
+    /// Takes `step` times row `at` from the projection `p`.
+    pub(super) fn take_from(&self, at: usize, step: T, p: &mut [T]) {
+        for (rows, p) in self.panels.iter().zip(p.as_chunks_mut::<PANEL>().0) {
+            for (p, entry) in p.iter_mut().zip(&rows[at]) {
+                *p -= step * *entry;
+            }
+        }
     }
 
     /// Entries of the rows from `first` on for one atom, appended to `out`.
@@ -78,7 +85,6 @@ impl<T: Scalar> Rows<T> {
         best: &mut [Best<T>],
     ) {
         arch.dispatch(Push { panels: &mut self.panels, step, p, best });
-        self.len += 1;
     }
 }
 

@@ -1,18 +1,15 @@
 //! Single precision where it is enough, double where it is not.
 //!
 //! The one law: the support is that of double precision. A choice whose lead over the next best atom is within the rounding
-//! of `f32` is not believed, nor is an end that only `f32` sees; such measurements, a few in a hundred, are solved again.
+//! of `f32` is made in `f64` (the module `referee`); measurements whose pursuit only `f32` sees at an end are solved again.
 
-use super::batch::{Problem, solve_batch_paths};
+use super::batch::{Problem, solve_batch_paths, solve_batch_with};
 use super::dense::DenseDictionary;
 use super::pursuit::{Path, Solver};
+use super::referee::{BELIEVED, DoubleReferee};
 use super::{Backend, Dictionary, Limits, OmpError, Scalar, Solution, Stop, solve_batch};
 use nalgebra::DMatrix;
 use std::sync::OnceLock;
-
-/// Leads over the next best atom, relative to the measurement's norm, that are believed. Initial projections were seen to
-/// err by up to 1.02 epsilons (1024 atoms of unit norm, 256 to 1024 normal measurements).
-const BELIEVED: f64 = 8.0 * f32::EPSILON as f64;
 
 /// A dictionary in both precisions; the double one is prepared when it is first needed.
 #[derive(Debug)]
@@ -101,7 +98,7 @@ impl MixedDictionary {
         Ok(MixedSolver { dictionary: self, limits: *limits, single, double: None, y: Vec::new() })
     }
 
-    /// [`solve_batch`] on the processor, and how many of the measurements were solved in double precision.
+    /// [`solve_batch`] on the processor, and for how many of the measurements double precision was asked.
     ///
     /// # Errors
     /// Those of [`solve_batch`].
@@ -112,12 +109,34 @@ impl MixedDictionary {
     ) -> Result<(Vec<Solution>, usize), OmpError> {
         super::finite("measurement", y)?;
         let single: Vec<f32> = y.iter().map(|&y| y as f32).collect();
-        let problem = Problem { dictionary: &self.single, limits: *limits };
-        let paths = solve_batch_paths(&problem, &single)?;
+        let measurements = self.exact.matrix.nrows();
+        let frame = |i: usize| &y[i * measurements..(i + 1) * measurements];
+        let paths = self.solve_in_single(limits, &single, &frame)?;
         let doubtful: Vec<usize> = (0..paths.len()).filter(|&i| is_doubtful(&paths[i])).collect();
+        let refereed = paths.iter().filter(|path| path.refereed > 0 && !is_doubtful(path)).count();
         let mut solutions: Vec<Solution> = paths.into_iter().map(Path::solution).collect();
         self.exact.solve_again(limits, y, &doubtful, &mut solutions)?;
-        Ok((solutions, doubtful.len()))
+        Ok((solutions, refereed + doubtful.len()))
+    }
+
+    /// The pursuits in `f32`, refereed.
+    fn solve_in_single<'y>(
+        &self,
+        limits: &Limits,
+        y: &[f32],
+        frame: &(impl Fn(usize) -> &'y [f64] + Sync),
+    ) -> Result<Vec<Path<f32>>, OmpError> {
+        let problem = Problem { dictionary: &self.single, limits: *limits };
+        if self.exact.double.get().is_none() {
+            // Double precision is prepared when somebody asks for it, and not by one thread while others wait.
+            let paths = solve_batch_paths(&problem, y)?;
+            if !paths.iter().any(is_doubtful) {
+                return Ok(paths);
+            }
+        }
+        let double = self.double();
+        let referee_of = |i| Some(DoubleReferee::new(&self.exact.matrix, double, frame(i)));
+        solve_batch_with(&problem, y, referee_of)
     }
 }
 
@@ -139,9 +158,17 @@ impl MixedSolver<'_> {
     pub fn solve(&mut self, y: &[f64]) -> Result<(Solution, bool), OmpError> {
         self.y.clear();
         self.y.extend(y.iter().map(|&y| y as f32));
-        let path = self.single.solve(&self.y)?;
+        let dictionary = self.dictionary;
+        let referee = |double| DoubleReferee::new(&dictionary.exact.matrix, double, y);
+        let mut path =
+            self.single.solve_with(&self.y, &mut dictionary.exact.double.get().map(referee))?;
+        if is_doubtful(&path) && dictionary.exact.double.get().is_none() {
+            let mut referee = referee(dictionary.double());
+            path = self.single.solve_with(&self.y, &mut referee)?;
+        }
         if !is_doubtful(&path) {
-            return Ok((path.solution(), false));
+            let refereed = path.refereed > 0;
+            return Ok((path.solution(), refereed));
         }
         let double = match self.double.take() {
             Some(double) => double,

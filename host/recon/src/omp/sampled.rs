@@ -23,6 +23,7 @@
 use super::dictionary::{Atoms, Dictionary, padded};
 use crate::basis::{Basis, Transform};
 use crate::fwht;
+use pulp::Arch;
 use walsh::WalshCosines;
 
 pub(crate) use visible::visible_energy;
@@ -59,6 +60,7 @@ pub struct SampledHadamard<'a> {
     prior: &'a Prior,
     atoms: Atoms<f32>,
     structure: Structure,
+    arch: Arch,
 }
 
 /// How columns of the Gram matrix are found.
@@ -99,7 +101,8 @@ impl<'a> SampledHadamard<'a> {
             Basis::Dct => Structure::Cosines(WalshCosines::new(transform.side())),
             Basis::Haar | Basis::Daubechies4 => Structure::Transforms,
         };
-        Self { transform, rows: rows.to_vec(), mask, prior, atoms: Atoms::new(energies), structure }
+        let (rows, atoms) = (rows.to_vec(), Atoms::new(energies));
+        Self { transform, rows, mask, prior, atoms, structure, arch: Arch::new() }
     }
 
     /// The measurement of every row, seen or not, that these coefficients predict, in orthonormal units. `z` are
@@ -120,7 +123,7 @@ impl<'a> SampledHadamard<'a> {
     /// `Psi^T W` of a grid of measurements.
     fn see_back(&self, grid: &mut [f32]) {
         if let Structure::Cosines(cosines) = &self.structure {
-            return cosines.see_back(grid);
+            return cosines.see_back(self.arch, grid);
         }
         fwht::transform(grid);
         self.transform.analyse(grid);
@@ -163,7 +166,7 @@ impl Dictionary<f32> for SampledHadamard<'_> {
             }
             Structure::Cosines(cosines) => {
                 cosines.show(atom, &self.mask, out);
-                cosines.see_back(out);
+                cosines.see_back(self.arch, out);
             }
             Structure::Transforms => {
                 out.fill(0.0);

@@ -7,6 +7,7 @@ mod laws;
 mod mixed;
 mod nonnegative;
 mod sampled;
+mod warm;
 
 use super::*;
 use crate::testing::normal;

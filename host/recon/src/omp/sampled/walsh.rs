@@ -10,6 +10,8 @@
 use crate::Side;
 use crate::basis::cosine;
 use crate::fwht;
+use crate::omp::kernel::first_of;
+use pulp::{Arch, Simd, WithSimd};
 
 /// Entries under this are the rounding of zeros.
 const ZERO: f64 = 1e-12;
@@ -65,34 +67,62 @@ impl WalshCosines {
     }
 
     /// Replaces measurements by their inner products with all atoms.
-    pub(super) fn see_back(&self, grid: &mut [f32]) {
-        let n = self.side;
+    pub(super) fn see_back(&self, arch: Arch, grid: &mut [f32]) {
         let mut half = vec![0.0; grid.len()];
-        self.gather(grid, &mut half);
-        for (r, row) in half.chunks_exact(n).enumerate() {
-            for (c, value) in row.iter().enumerate() {
-                grid[c * n + r] = *value;
-            }
+        for _ in 0..2 {
+            arch.dispatch(Gather { cosines: self, grid, out: &mut half });
+            transpose(self.side, &half, grid);
         }
-        half.fill(0.0);
-        self.gather(grid, &mut half);
-        for (r, row) in half.chunks_exact(n).enumerate() {
-            for (c, value) in row.iter().enumerate() {
-                grid[c * n + r] = *value;
+    }
+}
+
+/// Row `u` of `out` is what cosine `u` sees in each column of `grid`, compiled for each vector width.
+struct Gather<'a> {
+    cosines: &'a WalshCosines,
+    grid: &'a [f32],
+    out: &'a mut [f32],
+}
+
+impl WithSimd for Gather<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        match self.cosines.side {
+            2 => self.of_columns::<2>(),
+            4 => self.of_columns::<4>(),
+            8 => self.of_columns::<8>(),
+            16 => self.of_columns::<16>(),
+            _ => self.of_columns::<32>(),
+        }
+    }
+}
+
+impl Gather<'_> {
+    /// `LANES` columns at a time, whose sums stay in registers.
+    #[inline(always)]
+    fn of_columns<const LANES: usize>(self) {
+        let WalshCosines { side: n, starts, walsh, values, .. } = self.cosines;
+        for (out, bounds) in self.out.chunks_exact_mut(*n).zip(starts.windows(2)) {
+            let (walsh, values) = (&walsh[bounds[0]..bounds[1]], &values[bounds[0]..bounds[1]]);
+            for (block, out) in out.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
+                let mut sums = [0.0; LANES];
+                for (a, value) in walsh.iter().zip(values) {
+                    let grid: &[f32; LANES] = first_of(&self.grid[a * n + block * LANES..]);
+                    for (sum, grid) in sums.iter_mut().zip(grid) {
+                        *sum += value * grid;
+                    }
+                }
+                *out = sums;
             }
         }
     }
+}
 
-    /// Adds to row `u` of `out` what cosine `u` sees in each column of `grid`.
-    fn gather(&self, grid: &[f32], out: &mut [f32]) {
-        let n = self.side;
-        for (out, bounds) in out.chunks_exact_mut(n).zip(self.starts.windows(2)) {
-            let entries = bounds[0]..bounds[1];
-            for (&a, value) in self.walsh[entries.clone()].iter().zip(&self.values[entries]) {
-                for (out, grid) in out.iter_mut().zip(&grid[a * n..(a + 1) * n]) {
-                    *out += value * grid;
-                }
-            }
+fn transpose(n: usize, from: &[f32], to: &mut [f32]) {
+    for (c, to) in to.chunks_exact_mut(n).enumerate() {
+        for (r, to) in to.iter_mut().enumerate() {
+            *to = from[r * n + c];
         }
     }
 }

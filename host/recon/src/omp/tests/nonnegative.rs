@@ -76,3 +76,17 @@ fn an_atom_that_would_be_negative_is_not_taken() {
     assert_eq!((found.support, found.coefficients), (vec![2, 0], vec![2.0, 1.0]));
     assert_eq!(found.stop, Stop::NoAtomLeft);
 }
+
+#[test]
+fn an_atom_that_stays_above_nothing_on_the_way_is_not_given_back() {
+    // When the last atom comes, two of those taken head below 0; the one that gets there first is given back alone, and the
+    // other, atom 0, is above 0 again in the end. A step as far as the second one's zero would give back both.
+    let matrix = DMatrix::from_row_slice(
+        4,
+        4,
+        &[0.0, 0.0, 5.0, 3.0, 0.0, 4.0, 3.0, 1.0, 3.0, 4.0, 2.0, 0.0, 3.0, -1.0, 4.0, 4.0_f64],
+    );
+    let y = [1.0, 4.0, 2.0, 5.0];
+    let found = nonnegative::solve(&DenseDictionary::new(&matrix), &y, &Limits::atoms(4)).unwrap();
+    assert_eq!(found.support, [0, 1, 3]);
+}
