@@ -139,6 +139,7 @@ impl DeviceGram {
         let atoms = found.solution.support.len();
         factor.truncate(atoms * (atoms + 1) / 2);
         Ok(Path {
+            refereed: 0,
             support: found.solution.support,
             residual_norms: found.solution.residual_norms,
             stop: found.solution.stop,
