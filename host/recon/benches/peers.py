@@ -2,7 +2,7 @@
 
     python3 -m venv peers && peers/bin/pip install numpy scikit-learn spams-bin batched-omp
     cargo build --release -p nirspi
-    peers/bin/python host/recon/benches/peers.py [--nirspi target/release/nirspi] [--grid] [--rounds 7]
+    peers/bin/python host/recon/benches/peers.py [--nirspi target/release/nirspi] [--grid] [--rounds 7] [--device cuda]
 
 Every problem is solved by each program in turn, round after round, so that other load falls on all alike; medians of all
 runs are compared. `nirspi` runs in a process of its own and times itself; its supports come back through a file.
@@ -15,15 +15,22 @@ projections for nothing, as its `orthogonal_mp_gram` wants them. nirspi gets its
 costs, once for a dictionary), and projects. SPAMS and batched-omp get `D`: SPAMS multiplies out the Gram matrix of a batch
 within its time, of one frame it does without one; batched-omp gets it from us. The column `with Gram` adds nirspi's preparation
 to its time.
+
+`--device cuda` compares the two that run on a GPU, `nirspi --backend cuda` and batched-omp, one frame and batches, with dictionary and
+Gram matrix on the card: the time is from measurements in the host's memory to supports and coefficients there; nirspi brings
+images (the coefficients at their places) too, and in its first row solves again on the processor what f32 cannot decide.
 """
 
 import argparse
+import importlib
 import json
 import os
 import statistics
 import subprocess
+import sys
 import tempfile
 import time
+import types
 import warnings
 
 import numpy as np
@@ -117,15 +124,59 @@ def spams_omp(d, y, k, dtype, threads, repeats):
     return ms, found.T.toarray()
 
 
-def batched(d, y, k, repeats):
-    import torch
-    from orthogonal_matching_pursuit_gpu import omp_v0
+def omp_v0():
+    """batched-omp's function for PyTorch's devices. Its package wants compiled helpers, which only its variant for NumPy calls."""
+    name = "orthogonal_matching_pursuit_gpu"
+    try:
+        return importlib.import_module(name).omp_v0
+    except ImportError:
+        helpers = types.ModuleType(f"{name}.blas_kernels")
+        for helper in ("argmax_blast", "ppsv", "update_projections_blast", "update_D_mybest_blast"):
+            setattr(helpers, helper, None)
+        for module in [module for module in sys.modules if module.startswith(name)]:
+            del sys.modules[module]
+        sys.modules[helpers.__name__] = helpers
+        return importlib.import_module(name).omp_v0
 
-    x, yt = torch.from_numpy(d.astype(np.float32)), torch.from_numpy(y.astype(np.float32))
+
+def batched(d, y, k, repeats, device="cpu"):
+    import torch
+
+    solve = omp_v0()
+    x, yt = torch.from_numpy(d.astype(np.float32)).to(device), torch.from_numpy(y.astype(np.float32))
     gram = x.T @ x
-    ms, found = timed(lambda: omp_v0(x, yt, gram, n_nonzero_coefs=k), repeats)
-    sets, values = found[0], found[1]
-    return ms, (sets, values)
+
+    def run():
+        sets, values = solve(x, yt.to(device), gram, n_nonzero_coefs=k)[:2]
+        return sets.cpu(), values.cpu()
+
+    if device != "cpu":
+        run()
+    return timed(run, repeats)
+
+
+def compare_on_gpu(args, kind, m, n, k, frames):
+    d, y = problem(kind, m, n, k, frames, seed=1)
+    with tempfile.TemporaryDirectory() as folder:
+        programs = {
+            "nirspi": Nirspi(args.nirspi, ["--backend", "cuda"], d, y, k, folder),
+            "nirspi --precision f32": Nirspi(args.nirspi, ["--backend", "cuda", "--precision", "f32"], d, y, k, folder),
+            "batched-omp v0": lambda: batched(d, y, k, 5, "cuda"),
+        }
+        times, found = run_in_turn(programs, args.rounds)
+    medians = {name: statistics.median(t) for name, t in times.items() if t}
+    print(f"\n{kind} dictionary, N = {n}, M = {m}, K = {k}, {frames} frame{'s' * (frames > 1)}, on the GPU")
+    print(f"{'program':26} {'median ms':>10} {'frames/s':>10} {'of nirspi':>10}  same supports")
+    for name in programs:
+        if name not in medians:
+            print(f"{name:26} {found[name]}")
+            continue
+        same = "-"
+        if not isinstance(found["nirspi"], str):
+            same = sum(a == b for a, b in zip(sets_of(found["nirspi"]), sets_of(found[name])))
+        ratio = medians[name] / medians.get("nirspi", float("nan"))
+        print(f"{name:26} {medians[name]:10.3f} {1e3 * frames / medians[name]:10.0f} {ratio:9.1f}x  {same} of {frames}")
+    return {"dictionary": kind, "m": m, "n": n, "k": k, "frames": frames, "median_ms": medians}
 
 
 def sets_of(found):
@@ -136,6 +187,18 @@ def sets_of(found):
     if np.issubdtype(found.dtype, np.integer):
         return [set(row[row >= 0].tolist()) for row in found]
     return [set(np.flatnonzero(row).tolist()) for row in found]
+
+
+def run_in_turn(programs, rounds):
+    times, found = {name: [] for name in programs}, {}
+    for _ in range(rounds):
+        for name, run in programs.items():
+            try:
+                ms, found[name] = run()
+                times[name].append(ms)
+            except Exception as error:  # a peer that fails is reported, not hidden
+                found[name] = f"failed: {error}"[:70]
+    return times, found
 
 
 def compare(args, kind, m, n, k, frames):
@@ -154,14 +217,7 @@ def compare(args, kind, m, n, k, frames):
                 name = f"SPAMS {dtype.__name__}, {threads} thread{'s' * (threads > 1)}"
                 programs[name] = lambda dtype=dtype, threads=threads: spams_omp(d, y, k, dtype, threads, repeats)
         programs["batched-omp v0"] = lambda: batched(d, y, k, repeats)
-        times, found = {name: [] for name in programs}, {}
-        for _ in range(args.rounds):
-            for name, run in programs.items():
-                try:
-                    ms, found[name] = run()
-                    times[name].append(ms)
-                except Exception as error:  # a peer that fails is reported, not hidden
-                    found[name] = f"failed: {error}"[:70]
+        times, found = run_in_turn(programs, args.rounds)
     medians = {name: statistics.median(t) for name, t in times.items() if t}
     within = medians["nirspi"] + statistics.median(ours.prepare)
     reference = sets_of(found["nirspi"])
@@ -186,7 +242,12 @@ def main():
     parser.add_argument("--rounds", type=int, default=7)
     parser.add_argument("--grid", action="store_true", help="also K = 16, 64, 256 by M = 256, 512, 1024")
     parser.add_argument("--json", help="write all medians here")
+    parser.add_argument("--device", choices=("cpu", "cuda"), default="cpu", help="cuda: the programs that run there")
     args = parser.parse_args()
+    if args.device == "cuda":
+        results = [compare_on_gpu(args, kind, 512, 1024, 64, frames) for kind in ("random", "camera") for frames in (1, 256, 4096)]
+        write(args, results)
+        return
     kinds = ("random", "camera")
     results = [compare(args, kind, 512, 1024, 64, frames) for kind in kinds for frames in (1, 256)]
     if args.grid:
@@ -197,6 +258,10 @@ def main():
     print("\ndictionary     N     M    K frames  SPAMS's best   scikit-learn   (times nirspi's median)")
     for r in results:
         print(f"{r['dictionary']:10} {r['n']:5} {r['m']:5} {r['k']:4} {r['frames']:6} {r['of_spams_best']:12.1f}x {r['of_scikit']:13.1f}x")
+    write(args, results)
+
+
+def write(args, results):
     if args.json:
         with open(args.json, "w") as file:
             json.dump(results, file, indent=1)

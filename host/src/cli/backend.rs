@@ -2,6 +2,7 @@
 //!
 //! The one law: who asked for a GPU gets it or one line that says why not; who did not is told once, and goes on.
 
+#[cfg(feature = "gpu")]
 use super::print;
 use anyhow::Result;
 use nirspi_recon::omp::Backend;

@@ -58,6 +58,10 @@ fn mistakes_in_the_arguments_get_one_line_and_code_2() {
         (&["demo", "--order", "magic"], &["--order", "magic", "cake-cutting", "table:FILE"]),
         (&["demo", "--sparsity", "0"], &["--sparsity is 0"]),
         (&["demo", "--residual", "1"], &["--residual is 1"]),
+        (
+            &["demo", "--method", "tv", "--backend", "cuda"],
+            &["--backend cuda belongs to --method omp"],
+        ),
         (&["demo", "--strength", "1"], &["--strength belongs to", "tikhonov, fista or tv"]),
         (&["demo", "--method", "tv", "--strength", "0"], &["--strength is 0"]),
         (&["bench", "omp", "--sparsity", "0"], &["--sparsity is 0", "1 to 512"]),

@@ -1,7 +1,7 @@
 //! `nirspi bench omp` and `nirspi eval sampling`.
 
 use crate::bench::{Bench, Measured, npz};
-use std::io::Read;
+use std::io::{Read, Write};
 
 /// Numbers of one array of an `.npz` file, of eight bytes each.
 fn array(bench: &Bench, file: &str, name: &str, number: fn([u8; 8]) -> f64) -> Vec<f64> {
@@ -61,6 +61,77 @@ fn a_random_problem_needs_no_file() {
     let arguments = ["bench", "omp", "--measurements", "128", "--sparsity", "8", "--frames", "3"];
     let report = bench.run(&[&arguments[..], &["--repeats", "1"]].concat()).succeeded().json();
     assert_eq!((&report["measurements"], &report["mean_atoms"]), (&128.into(), &8.0.into()));
+}
+
+/// What wgpu finds here, or `None` (said aloud) if nothing.
+fn adapter(bench: &Bench) -> Option<String> {
+    let arguments =
+        ["bench", "omp", "--backend", "wgpu", "--measurements", "16", "--sparsity", "1"];
+    let said = bench.run(&arguments);
+    if said.code != Some(0) {
+        assert!(said.stderr.contains("no GPU found (wgpu: "), "{said:?}");
+        // Past the test harness's capture, so that a skipped test is seen.
+        let _ = writeln!(std::io::stderr(), "skipped: no Vulkan adapter");
+        return None;
+    }
+    Some(said.json()["device"].as_str().unwrap().to_owned())
+}
+
+#[test]
+fn a_device_asked_for_by_name_computes_and_is_named() {
+    let bench = Bench::new();
+    let Some(adapter) = adapter(&bench) else { return };
+    bench.write("problem.npz", &problem());
+    for precision in ["auto", "f32"] {
+        let arguments =
+            ["bench", "omp", "--input", "problem.npz", "--out", "solution.npz", "--repeats", "2"];
+        let named = ["--backend", "wgpu", "--precision", precision];
+        let report = bench.run(&[&arguments[..], &named].concat()).succeeded().json();
+        assert_eq!(report["device"], adapter.as_str());
+        assert_eq!(report["backend"], "wgpu");
+        let support = array(&bench, "solution.npz", "support", |b| i64::from_le_bytes(b) as f64);
+        assert_eq!(support, [5.0, 2.0, 8.0, 1.0]);
+        let coef = array(&bench, "solution.npz", "coef", f64::from_le_bytes);
+        assert!((coef[0] + 4.0).abs() < 1e-5 && (coef[3] - 2.0).abs() < 1e-5, "{coef:?}");
+    }
+    let double = ["bench", "omp", "--backend", "wgpu", "--precision", "f64"];
+    bench.run(&double).failed(1, &["f32", "cpu backend for f64"]);
+
+    let measured = Measured::new(16);
+    bench.write("in.npz", &measured.npz());
+    let image = |backend: &str| {
+        let arguments = ["reconstruct", "in.npz", "--sampling", "0.4", "--sparsity", "20"];
+        let to = ["--out", backend, "--backend", backend];
+        bench.run(&[&arguments[..], &to].concat()).succeeded();
+        let report = bench.json(&format!("{backend}/report.json"));
+        assert_eq!(report["omp"]["backend"], backend);
+        bench.pixels(&format!("{backend}/image.npy"))
+    };
+    let (there, here) = (image("wgpu"), image("cpu"));
+    assert!(there.iter().zip(&here).all(|(a, b)| (a - b).abs() < 1e-4));
+}
+
+#[test]
+fn without_a_gpu_auto_says_so_once_and_goes_on() {
+    let bench = Bench::new();
+    let arguments = ["bench", "omp", "--measurements", "64", "--sparsity", "4", "--repeats", "1"];
+    let run = |more: &[&str]| bench.run(&[&arguments[..], more].concat());
+    // Too little for a GPU, or none asked for: nobody looks.
+    assert_eq!(run(&["--frames", "63"]).succeeded().json()["backend"], "cpu");
+    assert_eq!(run(&["--frames", "64", "--backend", "cpu"]).succeeded().json()["backend"], "cpu");
+    let said = run(&["--frames", "64"]);
+    let report = said.json();
+    assert_eq!((said.code, &report["software"]), (Some(0), &false.into()));
+    if report["backend"] == "cpu" {
+        let line = said.stderr.strip_suffix("; using the CPU\n").unwrap();
+        assert!(line.starts_with("nirspi: no GPU found (wgpu: ") && line.contains("; CUDA: "));
+    }
+    let named = run(&["--backend", "cuda"]);
+    if named.code == Some(0) {
+        assert_eq!(named.json()["backend"], "cuda");
+    } else {
+        named.failed(1, &["no GPU found (CUDA: "]);
+    }
 }
 
 #[test]

@@ -17,7 +17,7 @@
 //! columns of the Gram matrix are orthogonalised as they come (a pivoted partial Cholesky factorisation), so a step solves
 //! no triangular system: it reads the rows so far once, 4 bytes an atom each, and writes one. The rows are in the device's memory, shared
 //! memory holds three numbers a unit and one weight an atom chosen: 16 KB are enough for 2048 atoms, 32 KB for 4096, so there is
-//! no second variant for many atoms. What does grow is the number of loop rounds, and [`budget`] splits a pursuit into as many
+//! no second variant for many atoms. What does grow is the number of loop rounds, and `budget` splits a pursuit into as many
 //! launches as it takes.
 //!
 //! Not on the GPU: non-negative coefficients, warm starts, and `f64`.

@@ -221,7 +221,7 @@ fn report(args: &Args, problem: &ProblemFile, timed: &Timed) -> Report {
     let (m, n, k) = (problem.measurements as f64, problem.atoms as f64, mean_atoms);
     let products_per_frame = n * (m + k * (k - 1.0) / 2.0 + 2.0 * k);
     let number_bytes = if args.precision == Precision::F64 { 8.0 } else { 4.0 };
-    let row_bytes_per_frame = number_bytes * n * k * (k - 1.0) / 2.0;
+    let row_bytes_per_frame = number_bytes * n * k * (k - 1.0).max(0.0) / 2.0;
     let frames_per_s = frames as f64 / median_ms * 1e3;
     Report {
         backend: timed.backend.name(),

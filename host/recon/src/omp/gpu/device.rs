@@ -105,7 +105,7 @@ fn cuda_is_installed() -> Result<(), String> {
 
 /// The best adapter: discrete before integrated, and others only if they were asked for.
 fn wgpu(any: bool) -> Result<Device, String> {
-    use wgpu::DeviceType::{Cpu, DiscreteGpu, IntegratedGpu, Other, VirtualGpu};
+    use wgpu::DeviceType::{Cpu, DiscreteGpu, IntegratedGpu, VirtualGpu};
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
         backends: AutoGraphicsApi::backend().into(),
         ..wgpu::InstanceDescriptor::new_without_display_handle()
@@ -118,9 +118,8 @@ fn wgpu(any: bool) -> Result<Device, String> {
     let real = named(DiscreteGpu, WgpuDevice::DiscreteGpu(0))
         .or_else(|| named(IntegratedGpu, WgpuDevice::IntegratedGpu(0)));
     let found = real.or_else(|| {
-        let other = named(VirtualGpu, WgpuDevice::VirtualGpu(0))
-            .or_else(|| named(Other, WgpuDevice::DefaultDevice))
-            .or_else(|| named(Cpu, WgpuDevice::Cpu));
+        let other =
+            named(VirtualGpu, WgpuDevice::VirtualGpu(0)).or_else(|| named(Cpu, WgpuDevice::Cpu));
         if any { other } else { None }
     });
     let Some((name, software, device)) = found else {

@@ -6,8 +6,8 @@
 //! Loops whose length is known when the kernel is compiled are unrolled; those that are left are counted by
 //! [`super::budget`].
 
-// The macro turns each kernel into several items, some of which a kernel that only others call does not use.
-#![allow(missing_docs, clippy::too_many_arguments)]
+// A kernel's arguments are its buffers and sizes, and the macro turns them into functions of as many.
+#![allow(clippy::too_many_arguments)]
 
 use super::budget::{CLOSEST, COUNT, ENERGY, ENOUGH, FIRST_BEST, LEAD, REMAINING, STATE, STOP};
 use cubecl::prelude::*;

@@ -1,4 +1,5 @@
-//! The kernels against the reference, on whatever wgpu finds: software Vulkan where there is no GPU.
+//! The kernels against the reference, on whatever wgpu finds: software Vulkan where there is no GPU. With
+//! `NIRSPI_TEST_BACKEND=cuda` the same tests run through CUDA.
 
 use super::*;
 use crate::basis::{Basis, Transform};
@@ -11,7 +12,10 @@ use std::sync::OnceLock;
 /// A device, or `None` (said aloud) where this machine has none.
 fn device() -> Option<&'static Device> {
     static DEVICE: OnceLock<Option<Device>> = OnceLock::new();
-    let found = DEVICE.get_or_init(|| Device::open(Backend::Wgpu).ok().flatten());
+    let found = DEVICE.get_or_init(|| {
+        let name = std::env::var("NIRSPI_TEST_BACKEND").unwrap_or_else(|_| "wgpu".to_owned());
+        Device::open(name.parse().unwrap()).ok().flatten()
+    });
     if found.is_none() {
         // Past the test harness's capture, so that a skipped test is seen.
         let _ = writeln!(std::io::stderr(), "skipped: no Vulkan adapter");
@@ -182,6 +186,55 @@ fn a_dictionary_of_fast_transforms_has_the_same_path() {
         let batch = solve_batch(&problem, &[y.clone(), y].concat(), Backend::Wgpu).unwrap();
         assert_eq!([&batch[0].support, &batch[1].support], [&exact.support; 2]);
     }
+}
+
+/// Cosines of a 16 x 16 image by `rows` Hadamard rows: atoms that are hard to tell apart.
+fn cosines(rows: &[usize]) -> DMatrix<f64> {
+    let side = side(16);
+    let transform = Transform::new(Basis::Dct, side);
+    let mut dictionary = DMatrix::zeros(rows.len(), 256);
+    for atom in 0..256 {
+        let mut image = vec![0.0_f32; 256];
+        image[atom] = 1.0;
+        transform.synthesise(&mut image);
+        crate::fwht::transform(&mut image);
+        for (m, &row) in rows.iter().enumerate() {
+            dictionary[(m, atom)] = f64::from(image[row] / 16.0);
+        }
+    }
+    dictionary
+}
+
+#[test]
+fn few_of_many_frames_need_double_precision_and_all_have_its_support() {
+    let Some(device) = device() else { return };
+    let mut random = Pcg64::seed_from_u64(4);
+    let rows: Vec<usize> = (0..256).filter(|row| row * 37 % 16 < 7).collect();
+    let random_atoms = problem(Kind::Noisy, 64, 256, 8, 11).dictionary;
+    for (matrix, most) in [(random_atoms, 20), (cosines(&rows), 100)] {
+        let measurements = matrix.nrows();
+        let y: Vec<f64> = (0..measurements * 200).map(|_| normal(&mut random)).collect();
+        let limits = Limits::atoms(16);
+        let dictionary = DeviceDictionary::new(device, matrix.clone(), true).unwrap();
+        let (found, again) = dictionary.solve_batch(&limits, &y).unwrap();
+        assert!(again < most, "{again} of 200");
+        let exact = DenseDictionary::new(&matrix);
+        let mut exact = Solver::new(&exact, &limits).unwrap();
+        for (y, found) in y.chunks_exact(measurements).zip(&found) {
+            assert_eq!(found.support, exact.solve(y).unwrap().support);
+        }
+    }
+}
+
+#[test]
+fn of_equal_atoms_the_lowest_is_chosen() {
+    let Some(device) = device() else { return };
+    let dictionary = DeviceDictionary::new(device, DMatrix::identity(300, 300), true).unwrap();
+    let mut y = vec![0.0; 300];
+    let bright = [0, 17, 64, 81, 128, 145, 255, 256, 299];
+    bright.iter().for_each(|&k| y[k] = if k % 2 == 0 { 2.0 } else { -2.0 });
+    let found = dictionary.solve_batch_single(&Limits::atoms(bright.len()), &y).unwrap();
+    assert_eq!(found[0].support, bright);
 }
 
 #[test]
