@@ -220,8 +220,8 @@ impl Stage<'_> {
             let noisier = doubled(estimates);
             let mut moments = Moments::new(estimates.len() * AREA);
             for copy in 1..=u64::from(self.options.copies) {
-                let seed = self.options.seed ^ copy << 32 ^ (self.first as u64) << 40;
-                let readings = measured_again(readings, estimates, seed);
+                let seed = self.options.seed ^ copy << 32;
+                let readings = measured_again(readings, estimates, seed, self.first);
                 moments.add(&enhance(&readings, &noisier, seed));
             }
             moments.deviation()
@@ -268,3 +268,6 @@ fn repeated(images: &[f32], side: usize) -> Vec<f32> {
     let rows = images.chunks_exact(side).map(|row| row.iter().flat_map(|&v| [v, v]));
     rows.flat_map(|row| row.clone().chain(row)).collect()
 }
+
+#[cfg(test)]
+mod tests;

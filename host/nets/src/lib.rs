@@ -27,6 +27,7 @@ pub mod images;
 pub mod metrics;
 pub mod model;
 mod network;
+mod random;
 mod spread;
 pub mod upscale;
 pub mod weights;

@@ -131,3 +131,60 @@ impl RunFsrcnn for OnCpu<cpu::Fsrcnn> {
         inputs.map(|input| self.0.forward(input, (side, side))).collect::<Vec<_>>().concat()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device::Backend;
+
+    macro_rules! fixture {
+        ($name:literal) => {
+            Weights::parse(
+                $name,
+                include_bytes!(concat!("../tests/pytorch/", $name, ".safetensors")),
+            )
+            .unwrap()
+        };
+    }
+
+    fn values<const AXES: usize>(reference: &Weights, name: &str) -> Vec<f32> {
+        let shape = reference.shape::<AXES>(name).unwrap();
+        reference.tensor(name, &shape).unwrap().values.clone()
+    }
+
+    fn assert_close(ours: &[f32], theirs: &[f32], what: &str) {
+        assert_eq!(ours.len(), theirs.len(), "{what}");
+        let apart = ours.iter().zip(theirs).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(apart < 1e-4, "{what}: {apart}");
+    }
+
+    #[test]
+    fn every_device_of_this_machine_gives_what_pytorch_gives() {
+        for backend in [Backend::Cpu, Backend::Wgpu, Backend::Cuda] {
+            let device = match Device::open(backend) {
+                Ok(device) => device,
+                Err(absent) => {
+                    eprintln!("skipped: {absent}");
+                    continue;
+                }
+            };
+            let reference = fixture!("unet_reference");
+            let conditions = values::<2>(&reference, "in2").as_chunks().0.to_vec();
+            let [current, degraded] = ["in0", "in1"].map(|name| values::<4>(&reference, name));
+            let unet = device.unet(&fixture!("unet")).unwrap();
+            let ours = unet.run(16, &current, &degraded, &conditions);
+            assert_close(&ours, &values::<4>(&reference, "out0"), &format!("UNet, {backend}"));
+
+            let reference = fixture!("estimator_reference");
+            let estimator = device.estimator(&fixture!("estimator")).unwrap();
+            let ours = estimator.run(16, &values::<4>(&reference, "in0"));
+            let theirs = values::<2>(&reference, "out0");
+            assert_close(ours.as_flattened(), &theirs, &format!("estimator, {backend}"));
+
+            let reference = fixture!("fsrcnn_reference");
+            let fsrcnn = device.fsrcnn(&fixture!("fsrcnn")).unwrap();
+            let ours = fsrcnn.run(8, &values::<4>(&reference, "in0"));
+            assert_close(&ours, &values::<4>(&reference, "out0"), &format!("FSRCNN, {backend}"));
+        }
+    }
+}

@@ -3,26 +3,25 @@
 //! The readings get fresh noise of the size estimated in them (a parametric bootstrap), and all
 //! stages run again. Where a network invents, the copies differ.
 
-use rand::SeedableRng;
-use rand_distr::{Distribution, StandardNormal};
-use rand_pcg::Pcg64;
-
 use crate::estimate::Estimate;
+use crate::random::Noise;
 
-/// Readings (N, side, side) as measured another time, in [0, 1].
-pub(crate) fn measured_again(readings: &[f32], estimates: &[Estimate], seed: u64) -> Vec<f32> {
+/// Readings (N, side, side) as measured another time, in [0, 1]; `first` is the index of the first image.
+pub(crate) fn measured_again(
+    readings: &[f32],
+    estimates: &[Estimate],
+    seed: u64,
+    first: usize,
+) -> Vec<f32> {
     let area = readings.len() / estimates.len().max(1);
-    let mut rng = Pcg64::seed_from_u64(seed);
-    let images = readings.chunks_exact(area).zip(estimates);
-    images
-        .flat_map(|(image, estimate)| {
-            let noisy = |value: &f32| {
-                let draw: f32 = StandardNormal.sample(&mut rng);
-                (value + estimate.noise * draw).clamp(0.0, 1.0)
-            };
-            image.iter().map(noisy).collect::<Vec<_>>()
-        })
-        .collect()
+    let mut copy = readings.to_vec();
+    for (i, (image, estimate)) in copy.chunks_exact_mut(area).zip(estimates).enumerate() {
+        let mut noise = Noise::of(seed, first + i);
+        for value in image {
+            *value = (*value + estimate.noise * noise.draw()).clamp(0.0, 1.0);
+        }
+    }
+    copy
 }
 
 /// The estimates of such copies: their noise is that of two measurements.
@@ -80,11 +79,11 @@ mod tests {
         let readings = vec![0.5; 2 * 4096];
         let estimates =
             [Estimate { sigma_px: 1.0, noise: 0.02 }, Estimate { sigma_px: 1.0, noise: 0.0 }];
-        let copy = measured_again(&readings, &estimates, 7);
+        let copy = measured_again(&readings, &estimates, 7, 0);
         let square: f32 = copy[..4096].iter().map(|v| (v - 0.5).powi(2)).sum();
         assert!(((square / 4096.0).sqrt() - 0.02).abs() < 1e-3);
         assert_eq!(copy[4096..], readings[4096..]);
-        assert_eq!(copy, measured_again(&readings, &estimates, 7));
-        assert_ne!(copy, measured_again(&readings, &estimates, 8));
+        assert_eq!(copy, measured_again(&readings, &estimates, 7, 0));
+        assert_ne!(copy, measured_again(&readings, &estimates, 8, 0));
     }
 }

@@ -1,0 +1,130 @@
+//! With the weights that come with the program.
+
+use std::num::NonZeroU32;
+
+use super::*;
+use crate::deblur::Method;
+use crate::device::Device;
+use crate::weights::Weights;
+
+const SIDE: usize = 32;
+
+fn enhancer(steps: u32) -> Enhancer {
+    let device = Device::cpu();
+    let weights = |model| Weights::embedded(model).unwrap();
+    let method = Method::Diffusion { steps: NonZeroU32::new(steps).unwrap() };
+    let deblurrer = Deblurrer::new(&device, &weights("diffusion"), method).unwrap();
+    let estimator = BlurEstimator::new(&device, &weights("estimator")).unwrap();
+    let fusion = Fusion::new(&device, &weights("fsrcnn")).unwrap();
+    Enhancer::new(fusion, Sharpener::new(estimator, deblurrer))
+}
+
+/// A cross of bars on 64 x 64, 0 or 0.9.
+fn cross() -> Vec<f32> {
+    let bar = |at: usize| (26..34).contains(&at);
+    let inside = |at: usize| (10..54).contains(&at);
+    let lit = |y, x| (bar(x) && inside(y)) || (bar(y) && inside(x));
+    (0..AREA).map(|i| if lit(i / 64, i % 64) { 0.9 } else { 0.0 }).collect()
+}
+
+/// Seen through a blur of about `sigma_px` (three boxes) by 32 x 32 pixels with noise.
+fn seen(image: &[f32], sigma_px: f32, noise: f32, seed: u64) -> Vec<f32> {
+    let radius = ((4.0 * sigma_px * sigma_px + 1.0).sqrt() - 1.0) / 2.0;
+    let radius = radius.round() as i64;
+    let mut blurred = image.to_vec();
+    for _ in 0..3 {
+        for step in [1, 64] {
+            let source = blurred.clone();
+            for (i, value) in blurred.iter_mut().enumerate() {
+                let at = (i / step % 64) as i64;
+                let tap = |d: i64| {
+                    let to = (at + d).clamp(0, 63);
+                    source[(i as i64 + (to - at) * step as i64) as usize]
+                };
+                *value = (-radius..=radius).map(tap).sum::<f32>() / (2 * radius + 1) as f32;
+            }
+        }
+    }
+    let mean = |i: usize| {
+        let at = i / SIDE * 2 * 64 + i % SIDE * 2;
+        [0, 1, 64, 65].iter().map(|d| blurred[at + d]).sum::<f32>() / 4.0
+    };
+    let clean: Vec<f32> = (0..SIDE * SIDE).map(mean).collect();
+    measured_again(&clean, &[Estimate { sigma_px, noise }], seed, 0)
+}
+
+fn error(image: &[f32], truth: &[f32]) -> f32 {
+    let squares: f32 = image.iter().zip(truth).map(|(a, b)| (a - b).powi(2)).sum();
+    (squares / image.len() as f32).sqrt()
+}
+
+fn enhance(enhancer: &Enhancer, readings: &[f32], options: &Options) -> Enhanced {
+    enhancer.enhance(Images::new(readings).unwrap(), None, options, &mut |_| {})
+}
+
+#[test]
+fn a_blurred_cross_gets_sharper_at_each_stage_and_the_readings_bear_it_out() {
+    let readings = seen(&cross(), 2.0, 0.02, 1);
+    let result = enhance(&enhancer(1), &readings, &Options::default());
+    let (upscaled, sharp) = (result.upscaled.unwrap(), result.images);
+    let plain = crate::upscale_2x(&readings, 1, SIDE, SIDE).unwrap();
+    let [plain, fused, sharp] = [&plain, &upscaled, &sharp].map(|image| error(image, &cross()));
+    assert!(fused < plain && sharp < 0.7 * fused, "{plain} {fused} {sharp}");
+    assert!(result.inconsistency[0] < 1.2, "{:?}", result.inconsistency);
+    assert!((result.estimates[0].noise - 0.02).abs() < 0.01, "{:?}", result.estimates);
+}
+
+#[test]
+fn an_image_is_enhanced_alike_alone_and_among_others() {
+    // More than one batch.
+    let stack: Vec<f32> = (0..34).flat_map(|seed| seen(&cross(), 1.0, 0.01, seed)).collect();
+    let options = Options { copies: 1, ..Options::default() };
+    let enhancer = enhancer(1);
+    let (area, mut told) = (SIDE * SIDE, Vec::new());
+    let images = Images::new(&stack).unwrap();
+    let all = enhancer.enhance(images, None, &options, &mut |done| told.push(done));
+    assert_eq!(told.last(), Some(&34));
+    let alone = enhance(&enhancer, &stack[33 * area..34 * area], &options);
+    assert_eq!(all.images[33 * AREA..34 * AREA], alone.images);
+    assert_eq!(all.estimates[33], alone.estimates[0]);
+    assert_eq!(all.spread.unwrap().len(), 34 * AREA);
+}
+
+#[test]
+fn the_spread_is_largest_at_edges_and_none_where_nothing_is() {
+    let readings = seen(&cross(), 1.5, 0.02, 5);
+    let options = Options { copies: 4, seed: 9, ..Options::default() };
+    let enhancer = enhancer(1);
+    let spread = enhance(&enhancer, &readings, &options).spread.unwrap();
+    let mean = |rows: std::ops::Range<usize>, columns: std::ops::Range<usize>| {
+        let (height, width) = (rows.len(), columns.len());
+        let sum: f32 = rows.map(|y| spread[y * 64..][columns.clone()].iter().sum::<f32>()).sum();
+        sum / (height * width) as f32
+    };
+    assert!(mean(12..24, 24..36) > 5.0 * mean(0..6, 0..6), "{}", mean(0..6, 0..6));
+    assert_eq!(enhance(&enhancer, &readings, &options).spread.unwrap(), spread, "seeded");
+}
+
+#[test]
+fn a_sharp_clean_image_is_not_touched_by_deblurring() {
+    let images = cross();
+    let result = enhancer(1).sharpener.deblur(
+        Images::new(&images).unwrap(),
+        &Options::default(),
+        &mut |_| {},
+    );
+    assert_eq!(result.images, images);
+    let forced = Options { gate: false, ..Options::default() };
+    let forced = enhancer(1).sharpener.deblur(Images::new(&images).unwrap(), &forced, &mut |_| {});
+    assert_ne!(forced.images, images);
+}
+
+#[test]
+fn what_is_known_of_the_blur_is_believed() {
+    let readings = seen(&cross(), 2.0, 0.02, 1);
+    let estimate = KnownEstimate { sigma_px: Some(3.25), noise: None };
+    let options = Options { estimate, ..Options::default() };
+    let result = enhance(&enhancer(1), &readings, &options);
+    assert_eq!(result.estimates[0].sigma_px, 3.25);
+    assert!(result.estimates[0].noise > 0.0);
+}
