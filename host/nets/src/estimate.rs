@@ -9,10 +9,10 @@ use crate::weights::{Weights, WeightsError};
 const OUTPUT_SIDE: usize = 64;
 
 /// Blur of this many pixels is 1 to the networks.
-const SIGMA_SCALE_PX: f32 = 4.0;
+pub(crate) const SIGMA_SCALE_PX: f32 = 4.0;
 
 /// Noise of one over this is 1 to the networks.
-const NOISE_SCALE: f32 = 10.0;
+pub(crate) const NOISE_SCALE: f32 = 10.0;
 
 /// The largest condition that the networks were trained with.
 const CONDITION_MAX: f32 = 1.5;

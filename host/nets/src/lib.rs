@@ -29,6 +29,7 @@ pub mod model;
 mod network;
 mod random;
 mod spread;
+pub mod train;
 pub mod upscale;
 pub mod weights;
 

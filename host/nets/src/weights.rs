@@ -307,7 +307,7 @@ impl Weights {
         WeightsError::Unknown { file: self.label.clone(), tensor: tensor.to_owned() }
     }
 
-    fn get(&self, name: &str) -> Result<&Array, WeightsError> {
+    pub(crate) fn get(&self, name: &str) -> Result<&Array, WeightsError> {
         self.tensors.get(name).ok_or_else(|| WeightsError::Missing {
             file: self.label.clone(),
             tensor: name.to_owned(),

@@ -39,6 +39,11 @@ impl Schedule {
         Self { left: left.collect() }
     }
 
+    /// abar after step `step`, counted from 0.
+    pub(crate) fn left(&self, step: usize) -> f64 {
+        self.left[step]
+    }
+
     /// abar at `count` of the steps, evenly spaced, the noisiest first.
     fn visited(&self, count: NonZeroU32) -> Vec<f64> {
         let all = self.left.len();

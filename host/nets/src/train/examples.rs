@@ -1,0 +1,266 @@
+//! Batches to learn from and to judge by.
+//!
+//! The one law: example k of a run is the same whenever and on whatever it is made.
+
+use super::TrainError;
+use super::tasks::images;
+use crate::data::{AREA_PX, Part, Purpose, SIDE_PX, Scenes, stream};
+use crate::degrade::{DEPTH_SIDE, Degrade, Depth, READING_PX};
+use crate::model::{Fsrcnn, FsrcnnConfig, fill};
+use crate::upscale::upscale_2x;
+use crate::weights::Weights;
+use burn::backend::Flex;
+use burn::backend::flex::FlexDevice;
+use rand::RngExt;
+use rand_distr::StandardNormal;
+use rayon::prelude::*;
+
+/// Pixels of a reading.
+pub(super) const READING_AREA: usize = READING_PX * READING_PX;
+/// The depth that is 1 to a network; deeper is 1 too.
+const DEPTH_SCALE_M: f32 = 3.0;
+
+/// Turns readings of 32 x 32 into images of 64 x 64, as they come before the deblurrer.
+pub trait Enlarge: Sync {
+    /// `readings` holds n images of 32 x 32, one after another; `depth` one map, or none, for each. Returns n images of
+    /// 64 x 64 in `[0, 1]`.
+    ///
+    /// # Errors
+    /// [`TrainError`] if the readings are no such images.
+    fn enlarge(&self, readings: &[f32], depth: &[Option<Depth>]) -> Result<Vec<f32>, TrainError>;
+}
+
+/// By Lanczos, without learning.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Lanczos;
+
+impl Enlarge for Lanczos {
+    fn enlarge(&self, readings: &[f32], depth: &[Option<Depth>]) -> Result<Vec<f32>, TrainError> {
+        upscale_2x(readings, depth.len(), READING_PX, READING_PX).map_err(|error| {
+            TrainError::Setting {
+                name: "reading",
+                found: error.to_string(),
+                expected: "32 x 32 in [0, 1]",
+            }
+        })
+    }
+}
+
+/// By a trained FSRCNN, as in use.
+pub struct Fused {
+    network: Fsrcnn<Flex>,
+}
+
+impl Fused {
+    /// The network of these weights, on the CPU.
+    ///
+    /// # Errors
+    /// [`TrainError::Weights`] if they are of another network.
+    pub fn new(weights: &Weights) -> Result<Self, TrainError> {
+        weights.expect_model("fsrcnn")?;
+        let network = FsrcnnConfig::of(weights)?.init(&FlexDevice);
+        Ok(Self { network: fill(network, weights)? })
+    }
+}
+
+impl Enlarge for Fused {
+    fn enlarge(&self, readings: &[f32], depth: &[Option<Depth>]) -> Result<Vec<f32>, TrainError> {
+        let input = images(&fusion_input(readings, depth), 3, READING_PX, &FlexDevice);
+        let image = self.network.forward(input).clamp(0.0, 1.0);
+        Ok(image.into_data().convert::<f32>().iter::<f32>().collect())
+    }
+}
+
+/// Some examples, image after image.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Batch {
+    /// How many.
+    pub count: usize,
+    /// Sharp scenes, 64 x 64 each.
+    pub truth: Vec<f32>,
+    /// As light showed them, 64 x 64.
+    pub optical: Vec<f32>,
+    /// As the camera read them, 32 x 32.
+    pub readings: Vec<f32>,
+    /// Depth beside them.
+    pub depth: Vec<Option<Depth>>,
+    /// What the deblurrer is given, 64 x 64: enlarged readings or, for `fine` ones, images of that size from the start.
+    pub degraded: Vec<f32>,
+    /// Whether it is one of those.
+    pub fine: Vec<bool>,
+    /// Blur in pixels of the 64 x 64 grid.
+    pub sigma_px: Vec<f32>,
+    /// Noise of the reading.
+    pub noise_std: Vec<f32>,
+    /// Class, where there is one.
+    pub label: Vec<Option<u8>>,
+}
+
+impl Batch {
+    /// FSRCNN's input, (count, 3, 32, 32): intensity, depth over 3 m, validity of the depth.
+    #[must_use]
+    pub fn fusion_input(&self) -> Vec<f32> {
+        fusion_input(&self.readings, &self.depth)
+    }
+
+    /// What was read, on the 64 x 64 grid, with nothing done to it: each pixel of a reading four times, `fine` images as
+    /// they are. The deblurrer sees it beside the image that it works on.
+    #[must_use]
+    pub fn raw(&self) -> Vec<f32> {
+        let mut raw = self.degraded.clone();
+        let readings = self.readings.chunks_exact(READING_AREA);
+        let coarse =
+            raw.chunks_exact_mut(AREA_PX).zip(readings).zip(&self.fine).filter(|(_, fine)| !**fine);
+        for ((image, reading), _) in coarse {
+            for (at, value) in image.iter_mut().enumerate() {
+                *value = reading[at / SIDE_PX / 2 * READING_PX + at % SIDE_PX / 2];
+            }
+        }
+        raw
+    }
+}
+
+/// FSRCNN's input for these readings: intensity, depth over 3 m, validity of the depth.
+#[must_use]
+pub fn fusion_input(readings: &[f32], depth: &[Option<Depth>]) -> Vec<f32> {
+    let zone = |pixel: usize| {
+        let part = READING_PX / DEPTH_SIDE;
+        pixel / READING_PX / part * DEPTH_SIDE + pixel % READING_PX / part
+    };
+    let mut input = Vec::with_capacity(3 * readings.len());
+    for (reading, depth) in readings.chunks_exact(READING_AREA).zip(depth) {
+        input.extend_from_slice(reading);
+        let at = |pixel: usize| {
+            depth.as_ref().filter(|d| d.valid[zone(pixel)]).map(|d| d.metres[zone(pixel)])
+        };
+        input.extend(
+            (0..READING_AREA).map(|p| at(p).map_or(0.0, |m| (m / DEPTH_SCALE_M).clamp(0.0, 1.0))),
+        );
+        input.extend((0..READING_AREA).map(|p| f32::from(u8::from(at(p).is_some()))));
+    }
+    input
+}
+
+/// Where examples come from.
+pub struct Examples<'a> {
+    /// Sharp scenes.
+    pub scenes: &'a Scenes,
+    /// The camera.
+    pub degrade: &'a dyn Degrade,
+    /// From 32 x 32 to 64 x 64.
+    pub enlarge: &'a dyn Enlarge,
+    /// Share of the examples whose degraded image is of 64 x 64 from the start: `deblur` takes such ones.
+    pub fine: f32,
+    /// Seed of the run.
+    pub seed: u64,
+}
+
+impl Examples<'_> {
+    /// Examples `first` to `first + count` of one side of the split.
+    ///
+    /// # Errors
+    /// [`TrainError`] if a scene cannot be degraded.
+    pub fn batch(&self, part: Part, first: u64, count: usize) -> Result<Batch, TrainError> {
+        let purpose = match part {
+            Part::Training => Purpose::Training,
+            Part::HeldOut => Purpose::HeldOut,
+        };
+        let made = (first..first + count as u64)
+            .into_par_iter()
+            .map(|index| {
+                let mut rng = stream(self.seed, purpose, index);
+                let scene = self.scenes.draw(part, &mut rng);
+                let reading = self.degrade.degrade(&scene.image, &mut rng)?;
+                let fine = (rng.random::<f32>() < self.fine).then(|| {
+                    let mut noisy = |v: &f32| {
+                        let normal: f32 = rng.sample(StandardNormal);
+                        (v + reading.noise_std * normal).clamp(0.0, 1.0)
+                    };
+                    reading.optical.iter().map(&mut noisy).collect::<Vec<f32>>()
+                });
+                Ok((scene, reading, fine))
+            })
+            .collect::<Result<Vec<_>, TrainError>>()?;
+
+        let mut batch = Batch {
+            count,
+            truth: Vec::with_capacity(count * AREA_PX),
+            optical: Vec::with_capacity(count * AREA_PX),
+            readings: Vec::with_capacity(count * READING_AREA),
+            depth: Vec::with_capacity(count),
+            degraded: Vec::new(),
+            fine: Vec::with_capacity(count),
+            sigma_px: Vec::with_capacity(count),
+            noise_std: Vec::with_capacity(count),
+            label: Vec::with_capacity(count),
+        };
+        let mut of_64 = Vec::with_capacity(count);
+        for (scene, reading, fine) in made {
+            batch.truth.extend(scene.image);
+            batch.optical.extend(reading.optical);
+            batch.readings.extend(reading.image);
+            batch.depth.push(reading.depth);
+            batch.sigma_px.push(reading.sigma_px);
+            batch.noise_std.push(reading.noise_std);
+            batch.label.push(scene.label);
+            batch.fine.push(fine.is_some());
+            of_64.push(fine);
+        }
+        batch.degraded = self.enlarge.enlarge(&batch.readings, &batch.depth)?;
+        for (image, fine) in batch.degraded.chunks_exact_mut(SIDE_PX * SIDE_PX).zip(of_64) {
+            if let Some(fine) = fine {
+                image.copy_from_slice(&fine);
+            }
+        }
+        Ok(batch)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::degrade::{AnalyticCamera, Limits};
+
+    #[test]
+    fn examples_are_the_same_in_whatever_batches_they_come() {
+        let camera = AnalyticCamera::new(Limits::default()).unwrap();
+        let scenes = Scenes::procedural();
+        let examples =
+            Examples { scenes: &scenes, degrade: &camera, enlarge: &Lanczos, fine: 0.3, seed: 3 };
+        let all = examples.batch(Part::Training, 0, 6).unwrap();
+        let tail = examples.batch(Part::Training, 4, 2).unwrap();
+        assert_eq!(all.truth[4 * AREA_PX..], tail.truth);
+        assert_eq!(all.degraded[4 * AREA_PX..], tail.degraded);
+        assert_eq!(all.depth[4..], tail.depth);
+        assert_ne!(examples.batch(Part::HeldOut, 4, 2).unwrap().truth, tail.truth);
+    }
+
+    #[test]
+    fn raw_is_the_reading_four_times_or_the_image_itself() {
+        let camera = AnalyticCamera::new(Limits::default()).unwrap();
+        let scenes = Scenes::procedural();
+        let of = |fine| {
+            let examples =
+                Examples { scenes: &scenes, degrade: &camera, enlarge: &Lanczos, fine, seed: 3 };
+            examples.batch(Part::Training, 0, 2).unwrap()
+        };
+        let coarse = of(0.0);
+        assert_eq!(coarse.raw()[AREA_PX + 65], coarse.readings[READING_AREA]);
+        assert_eq!(coarse.raw()[AREA_PX - 1], coarse.readings[READING_AREA - 1]);
+        assert_eq!(of(1.0).raw(), of(1.0).degraded);
+    }
+
+    #[test]
+    fn a_zone_without_depth_is_zero_and_marked() {
+        let mut depth = Depth { metres: [1.5; 64], valid: [true; 64] };
+        depth.valid[9] = false;
+        let input = fusion_input(&[0.25; 2 * READING_AREA], &[Some(depth), None]);
+        let (first, second) = input.split_at(3 * READING_AREA);
+        let at = |row: usize, column: usize| row * READING_PX + column;
+        assert_eq!((first[READING_AREA], first[2 * READING_AREA]), (0.5, 1.0));
+        assert_eq!(first[READING_AREA + at(4, 7)], 0.0);
+        assert_eq!(first[2 * READING_AREA + at(7, 4)], 0.0);
+        assert_eq!(first[2 * READING_AREA + at(8, 8)], 1.0);
+        assert!(second[READING_AREA..].iter().all(|&v| v == 0.0));
+    }
+}

@@ -1,0 +1,223 @@
+//! Training: examples, losses, one loop for every network.
+//!
+//! The one law: a run is a function of its settings, its data and its number of steps. Whatever is random in step k is
+//! drawn from the seed and k, so a run that was killed goes on from its checkpoint to the same weights as one that was
+//! not. Files are the caller's business ([`Keeper`]).
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`examples`] | batches: scenes, degraded and enlarged |
+//! | `tasks` | what each network is to learn, and its held-out score |
+//! | `learner` | a network with its optimiser and its running average |
+//! | `run` | the loop: rate, log, held-out score, checkpoints, early stop |
+//! | [`checkpoint`] | everything that a run is, as bytes |
+
+mod adversarial;
+pub mod checkpoint;
+pub mod examples;
+mod initial;
+mod learner;
+mod run;
+mod solo;
+mod tasks;
+#[cfg(test)]
+mod tests;
+
+pub use examples::{Enlarge, Examples, Fused, Lanczos};
+pub use run::{Ended, Entry, Keeper, Outcome, check, train};
+
+use crate::data::DataError;
+use crate::degrade::DegradeError;
+use crate::weights::WeightsError;
+use serde::{Deserialize, Serialize};
+use std::fmt;
+use thiserror::Error;
+
+/// A network that can be trained.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Model {
+    /// 32 x 32 and depth to 64 x 64.
+    Fsrcnn,
+    /// The deblurrer: a bridge from the degraded image, in 1 to 4 steps.
+    Diffusion,
+    /// The paper's 500 steps (Eq. 5 to 8).
+    Ancestral,
+    /// The generator of a conditional GAN.
+    Gan,
+    /// Blur and noise of an image.
+    Estimator,
+    /// The 62 characters.
+    Classifier,
+}
+
+impl fmt::Display for Model {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Fsrcnn => "fsrcnn",
+            Self::Diffusion => "diffusion",
+            Self::Ancestral => "ancestral",
+            Self::Gan => "gan",
+            Self::Estimator => "estimator",
+            Self::Classifier => "classifier",
+        })
+    }
+}
+
+/// What held-out examples are judged by; more is better.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Score {
+    /// Peak signal-to-noise ratio of images, in dB.
+    PsnrDb,
+    /// The same of the two numbers that the estimator gives.
+    EstimateDb,
+    /// Characters named rightly, in percent.
+    AccuracyPercent,
+}
+
+impl Model {
+    /// What it is judged by.
+    #[must_use]
+    pub fn score(self) -> Score {
+        match self {
+            Self::Estimator => Score::EstimateDb,
+            Self::Classifier => Score::AccuracyPercent,
+            Self::Fsrcnn | Self::Diffusion | Self::Ancestral | Self::Gan => Score::PsnrDb,
+        }
+    }
+}
+
+/// How to train. Everything that the result depends on but the data; kept in checkpoints.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Settings {
+    /// Which network.
+    pub model: Model,
+    /// Channels of its levels; empty for the shipped size.
+    pub width: Vec<usize>,
+    /// Steps in all.
+    pub steps: u64,
+    /// Examples a step.
+    pub batch: usize,
+    /// Highest learning rate; it rises over the first steps and falls along a cosine.
+    pub rate: f64,
+    /// Seed of weights, examples and whatever else is random.
+    pub seed: u64,
+    /// How slowly the average of the weights follows them, 0 to 1: it is the average that is judged and kept.
+    pub average: f64,
+    /// Steps between two entries of the log.
+    pub log_every: u64,
+    /// Steps between two looks at held-out examples, and at most between two checkpoints.
+    pub judge_every: u64,
+    /// Held-out examples looked at.
+    pub held_out: usize,
+    /// Looks without a better score after which training ends; none to go on to the last step.
+    pub patience: Option<u64>,
+}
+
+impl Settings {
+    /// What the shipped network of this name would be trained with here.
+    #[must_use]
+    pub fn new(model: Model) -> Self {
+        let (steps, rate) = match model {
+            Model::Fsrcnn => (8_000, 2e-3),
+            Model::Diffusion => (20_000, 1e-3),
+            Model::Ancestral => (20_000, 5e-4),
+            Model::Gan => (12_000, 5e-4),
+            Model::Estimator => (6_000, 1e-3),
+            Model::Classifier => (6_000, 1e-3),
+        };
+        Self {
+            model,
+            width: Vec::new(),
+            steps,
+            batch: 16,
+            rate,
+            seed: 1,
+            average: 0.999,
+            log_every: 50,
+            judge_every: 500,
+            held_out: 96,
+            patience: Some(12),
+        }
+    }
+
+    fn validate(&self) -> Result<(), TrainError> {
+        let setting = |holds, name, found: String, expected| match holds {
+            true => Ok(()),
+            false => Err(TrainError::Setting { name, found, expected }),
+        };
+        setting(self.steps > 0, "steps", self.steps.to_string(), "at least 1")?;
+        setting(self.batch > 0, "batch", self.batch.to_string(), "at least 1")?;
+        setting(self.held_out > 0, "held-out examples", self.held_out.to_string(), "at least 1")?;
+        let often = self.log_every.min(self.judge_every);
+        setting(often > 0, "steps between entries", often.to_string(), "at least 1")?;
+        let rate = self.rate > 0.0 && self.rate < 1.0;
+        setting(rate, "rate", self.rate.to_string(), "more than 0 and less than 1")?;
+        let average = (0.0..1.0).contains(&self.average);
+        setting(average, "average", self.average.to_string(), "0 to less than 1")?;
+        let widths = self.width.iter().all(|&w| (1..=1024).contains(&w));
+        let (count, expected) = match self.model {
+            Model::Diffusion | Model::Ancestral | Model::Gan => {
+                (self.width.len() < 6, "up to 5 levels of 1 to 1024 channels")
+            }
+            Model::Fsrcnn => (
+                [0, 2].contains(&self.width.len()),
+                "2 numbers, of features and of shrunk features",
+            ),
+            Model::Estimator => {
+                ([0, 4].contains(&self.width.len()), "4 numbers, one for each convolution")
+            }
+            Model::Classifier => {
+                ([0, 3].contains(&self.width.len()), "3 numbers, one for each pair of convolutions")
+            }
+        };
+        setting(widths && count, "width", format!("{:?}", self.width), expected)
+    }
+}
+
+/// Why a run ended badly. `Display` is one line.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum TrainError {
+    /// A setting is outside its range.
+    #[error("{name} is {found}, expected {expected}")]
+    Setting {
+        /// Which.
+        name: &'static str,
+        /// The value found, as text.
+        found: String,
+        /// What it may be.
+        expected: &'static str,
+    },
+    /// The loss, or a weight, is no number any more.
+    #[error(
+        "the loss is {loss} at step {step}; what was kept last is good: go on from it with --resume and a lower --rate"
+    )]
+    NotFinite {
+        /// Step at which it was seen.
+        step: u64,
+        /// The loss.
+        loss: f64,
+    },
+    /// Nothing to train on, or not what the network needs.
+    #[error(transparent)]
+    Data(#[from] DataError),
+    /// A scene could not be degraded.
+    #[error(transparent)]
+    Degrade(#[from] DegradeError),
+    /// Weights that do not fit.
+    #[error(transparent)]
+    Weights(#[from] WeightsError),
+    /// A checkpoint that cannot be gone on from.
+    #[error("checkpoint: {found}, expected {expected}")]
+    Checkpoint {
+        /// What is wrong with it.
+        found: String,
+        /// What it should be.
+        expected: &'static str,
+    },
+    /// The caller could not keep what it was given.
+    #[error(transparent)]
+    Keep(#[from] Box<dyn std::error::Error + Send + Sync>),
+}
