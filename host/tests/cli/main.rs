@@ -20,4 +20,5 @@ mod selftest;
 #[cfg(unix)]
 mod serial;
 mod sparse_problems;
+mod train;
 mod versions;
