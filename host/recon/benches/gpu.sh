@@ -31,10 +31,16 @@ run() {
     chmod +x "$work/nirspi" "$work/tests"
     # NVRTC is looked for by name: CUDA's own folder is seldom among those searched.
     export LD_LIBRARY_PATH=${CUDA_PATH:-/usr/local/cuda}/lib64${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}
-    nvidia-smi | tee "$out/nvidia-smi.txt"
+    nvidia-smi 2>&1 | tee "$out/nvidia-smi.txt" || true
 
     echo "== correctness: the same tests as on software Vulkan"
     NIRSPI_TEST_BACKEND=cuda "$work/tests" omp:: 2>&1 | tee "$out/tests.txt" || true
+
+    if command -v compute-sanitizer >/dev/null; then
+        echo "== races between units: barriers that software Vulkan, which takes turns, does not need"
+        NIRSPI_TEST_BACKEND=cuda timeout 120 compute-sanitizer --tool racecheck "$work/tests" images_are 2>&1 |
+            tee "$out/racecheck.txt" || true
+    fi
 
     echo "== times, with the transfer of measurements, solutions and images"
     : >"$out/bench.jsonl"
