@@ -2,6 +2,8 @@
 //!
 //! Law: nothing leaves without its inconsistency, the figure that says whether the readings bear it out.
 
+use rayon::prelude::*;
+
 use crate::consistency::{Consistency, MeasuredRows};
 use crate::deblur::{self, AREA, Deblurrer, Job, Truth};
 use crate::estimate::{BlurEstimator, Estimate};
@@ -239,13 +241,14 @@ fn inconsistency<const SIDE: usize>(
     estimates: &[Estimate],
     images: &[f32],
 ) -> Vec<f32> {
-    let each = readings.iter().zip(estimates).zip(images.chunks_exact(AREA));
-    each.map(|((readings, estimate), image)| {
-        let measured = options.measured.clone();
-        Consistency::new(SIDE, estimate.sigma_px, estimate.noise, measured)
-            .residual_ratio(readings, image)
-    })
-    .collect()
+    let each = readings.values().par_chunks_exact(SIDE * SIDE).zip(images.par_chunks_exact(AREA));
+    each.zip(estimates)
+        .map(|((readings, image), estimate)| {
+            let measured = options.measured.clone();
+            Consistency::new(SIDE, estimate.sigma_px, estimate.noise, measured)
+                .residual_ratio(readings, image)
+        })
+        .collect()
 }
 
 /// Runs `work` on the stack piece by piece; it is given the index of the piece's first image.

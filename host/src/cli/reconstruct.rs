@@ -1,5 +1,7 @@
 //! `nirspi reconstruct`: an image from measurements, ours or anybody's.
 
+mod enhanced;
+
 use super::camera::{check_sampling, parse_order};
 use super::method::{MethodArgs, Solved, solve};
 use super::print;
@@ -35,6 +37,10 @@ pub struct Args {
     order: Option<String>,
     #[command(flatten)]
     source: SourceArgs,
+    /// Also enlarge and deblur the image, of 32 x 32 or 64 x 64 pixels, by the learned stages (enhanced.npy and .png);
+    /// its brightest 2 x 2 pixels are taken for white
+    #[arg(long)]
+    enhance: bool,
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
@@ -65,6 +71,8 @@ struct Report {
     frames: Option<LossCounters>,
     #[serde(skip_serializing_if = "Option::is_none")]
     correlation_with_files_recon: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    enhancement: Option<enhanced::Report>,
     notes: Vec<String>,
     stage_ms: StageTimes,
 }
@@ -99,6 +107,12 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let correlation = source.reference.as_ref().and_then(|reference| {
         metrics::correlation(reference.pixels(), image.pixels(), side, side).ok()
     });
+    let (sharp, enhancement) = if args.enhance {
+        let (sharp, report) = enhanced::run(&image, used.rows(), &mut times)?;
+        (Some(sharp), Some(report))
+    } else {
+        (None, None)
+    };
     let report = Report {
         input: args.source.input.clone(),
         n: side,
@@ -118,10 +132,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             .collect(),
         frames: source.frames,
         correlation_with_files_recon: correlation,
+        enhancement,
         notes: source.notes,
         stage_ms: times,
     };
-    write(args, &image, &report)?;
+    write(args, &image, sharp.as_deref(), &report)?;
     if args.json {
         print::json(&report)?;
     } else {
@@ -151,11 +166,16 @@ fn choose_order(
     }
 }
 
-fn write(args: &Args, image: &Image, report: &Report) -> Result<()> {
+fn write(args: &Args, image: &Image, sharp: Option<&[f32]>, report: &Report) -> Result<()> {
     let side = image.side().pixels();
     let mut out = OutputDir::create(&args.out)?;
     out.write("image.npy", &npy::encode(&[side, side], image.pixels()))?;
     out.write("image.png", &enlarged_png(&image.stretched()))?;
+    if let Some(sharp) = sharp {
+        let side = nirspi_nets::deblur::SIDE;
+        out.write("enhanced.npy", &npy::encode(&[side, side], sharp))?;
+        out.write("enhanced.png", &encode_grey(side, side, sharp))?;
+    }
     out.write("report.json", format!("{}\n", serde_json::to_string_pretty(report)?).as_bytes())?;
     out.commit()?;
     Ok(())
@@ -199,6 +219,9 @@ fn say(args: &Args, report: &Report) -> Result<()> {
         print::line(format_args!(
             "correlation with the file's own reconstruction: {correlation:.6}"
         ))?;
+    }
+    if let Some(enhancement) = &report.enhancement {
+        print::line(enhancement.line())?;
     }
     for note in &report.notes {
         print::line(format_args!("note: {note}"))?;

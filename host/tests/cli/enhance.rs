@@ -165,3 +165,19 @@ fn classical_methods_deblur_too_and_what_is_the_networks_is_not_theirs() {
         }
     }
 }
+
+#[test]
+fn a_reconstruction_is_enhanced_if_its_size_allows() {
+    let bench = Bench::new();
+    bench.run(&["capture", "--camera", "virtual", "--frames", "20", "--out", "r.mcap"]).succeeded();
+    let report = bench
+        .run(&["reconstruct", "r.mcap", "--enhance", "--out", "out", "--json"])
+        .succeeded()
+        .json();
+    assert!(report["enhancement"]["white"].as_f64().is_some_and(|white| white > 0.0), "{report}");
+    let sharp = bench.pixels("out/enhanced.npy");
+    assert!(sharp.len() == 64 * 64 && sharp.iter().all(|v| (0.0..=1.0).contains(v)));
+    // A letter on a dark ground: both are there.
+    let share = |lit: fn(&f32) -> bool| sharp.iter().filter(|v| lit(v)).count() as f32 / 4096.0;
+    assert!(share(|&v| v > 0.8) > 0.05 && share(|&v| v < 0.1) > 0.5);
+}

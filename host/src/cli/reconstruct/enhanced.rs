@@ -1,0 +1,75 @@
+//! `nirspi reconstruct --enhance`: the learned stages on an image whose scale nobody told.
+//!
+//! No light is 0; that much a differential measurement knows. White is taken to be the brightest 2 x 2 pixels: a
+//! single bright pixel may be noise, and a share of all pixels says nothing about a letter on a dark ground.
+
+use super::super::networks::Networks;
+use super::super::report::StageTimes;
+use anyhow::{Result, bail};
+use nirspi_nets::consistency::MeasuredRows;
+use nirspi_nets::{Backend, Enhancer, Images, Method, Options, deblur, fusion};
+use nirspi_recon::Image;
+use serde::Serialize;
+use std::num::NonZeroU32;
+
+/// What came of it.
+#[derive(Debug, Serialize)]
+pub struct Report {
+    /// The image's value that was taken for white.
+    white: f32,
+    /// Blur in pixels of the 64 x 64 grid, as estimated.
+    sigma_px: f32,
+    /// Noise of a pixel, white being 1, as estimated.
+    noise: f32,
+    /// Distance of the image from that of the result, over its noise.
+    inconsistency: f32,
+}
+
+impl Report {
+    /// One line for people.
+    pub fn line(&self) -> String {
+        format!(
+            "enhanced: blur {:.2} px, noise {:.4}, inconsistency {:.2}; white is {:.4} of the image's units",
+            self.sigma_px, self.noise, self.inconsistency, self.white
+        )
+    }
+}
+
+/// Enhances an image of 32 x 32 or 64 x 64 that was made from these Hadamard rows: 64 x 64 pixels in [0, 1].
+pub fn run(image: &Image, rows: &[u32], times: &mut StageTimes) -> Result<(Vec<f32>, Report)> {
+    let side = image.side().pixels();
+    if side != fusion::SIDE && side != deblur::SIDE {
+        bail!("--enhance is for images of 32 x 32 or 64 x 64 pixels, this one has {side} x {side}");
+    }
+    let white = white(image.pixels(), side);
+    if white <= 0.0 {
+        bail!("--enhance finds no light in the image");
+    }
+    let values: Vec<f32> = image.pixels().iter().map(|v| (v / white).clamp(0.0, 1.0)).collect();
+    let mut networks = Networks::built_in(Backend::Cpu)?;
+    let sharpener = networks.sharpener(Method::Diffusion { steps: NonZeroU32::MIN })?;
+    let options = Options { measured: MeasuredRows::new(side, rows), ..Options::default() };
+    let result = if side == deblur::SIDE {
+        let images = Images::new(&values)?;
+        times.time("enhance", || sharpener.deblur(images, &options, &mut |_| {}))
+    } else {
+        let enhancer = Enhancer::new(networks.fusion()?, sharpener);
+        let images = Images::new(&values)?;
+        times.time("enhance", || enhancer.enhance(images, None, &options, &mut |_| {}))
+    };
+    let report = Report {
+        white,
+        sigma_px: result.estimates[0].sigma_px,
+        noise: result.estimates[0].noise,
+        inconsistency: result.inconsistency[0],
+    };
+    Ok((result.images, report))
+}
+
+/// The largest mean of 2 x 2 neighbours.
+fn white(pixels: &[f32], side: usize) -> f32 {
+    let corners = (0..side - 1).flat_map(|y| (0..side - 1).map(move |x| y * side + x));
+    let means = corners
+        .map(|at| (pixels[at] + pixels[at + 1] + pixels[at + side] + pixels[at + side + 1]) / 4.0);
+    means.fold(0.0, f32::max)
+}
