@@ -10,6 +10,7 @@ use nirspi_nets::{
 };
 use serde::Serialize;
 use std::path::PathBuf;
+use std::time::Duration;
 
 #[derive(Debug, clap::Args)]
 pub struct NetworkArgs {
@@ -59,7 +60,7 @@ impl NetworkArgs {
 }
 
 impl Networks {
-    /// The networks of one folder of weights, on the CPU: for the demo.
+    /// The networks that come with the program.
     pub fn built_in(backend: Backend) -> Result<Self> {
         Ok(Self { device: Device::open(backend)?, own: Vec::new(), used: Vec::new() })
     }
@@ -168,10 +169,12 @@ impl Deblurring {
     }
 }
 
-/// A bar that counts images.
+/// A bar that counts images, and time: hundreds of steps for a batch of images take minutes.
 pub fn bar(what: &str, images: usize) -> ProgressBar {
-    let template = format!("{what} {{bar:30}} {{pos}}/{{len}} images");
+    let template = format!("{what} {{bar:30}} {{pos}}/{{len}} images, {{elapsed}}");
     let style =
         ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar());
-    ProgressBar::new(images as u64).with_style(style)
+    let bar = ProgressBar::new(images as u64).with_style(style);
+    bar.enable_steady_tick(Duration::from_millis(200));
+    bar
 }
