@@ -9,6 +9,7 @@
 //! * [`capture`] runs a measurement, [`recording`] keeps it,
 //! * [`tally`] and [`integrate`] turn frames into measurements; `nirspi-recon` turns those into an image,
 //! * [`files`], [`picture`] and [`scene`] are what people see and hand over, [`resolution`] says how fine it is,
+//!   [`legibility`] whether somebody can read it,
 //! * [`training`] makes pairs to train networks on, through the virtual camera,
 //! * [`udev`] lets users use cameras on USB; [`boards`] lists the boards that firmware is for; with the feature `flash`, `flash` programs them,
 //! * [`virtual_camera`] is a camera without silicon: optics simulator, gateware model, real firmware logic.
