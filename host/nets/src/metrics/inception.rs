@@ -49,19 +49,22 @@ pub struct Inception {
 
 #[derive(Debug, Clone)]
 enum Layer {
-    /// With batch normalisation folded in, and ReLU after it.
-    Convolution {
-        weight: Tensor<Flex, 4>,
-        bias: Tensor<Flex, 1>,
-        stride: usize,
-        padding: [usize; 2],
-    },
+    /// With ReLU after it.
+    Convolution(Box<Convolution>),
     /// Mean of 3 x 3, of the same size.
     Mean,
     /// Maximum of 3 x 3.
     Maximum { stride: usize, padding: usize },
     /// Branches of one input, their channels one after another.
     Branches(Vec<Vec<Layer>>),
+}
+
+/// Kernel and bias, batch normalisation folded in.
+#[derive(Debug, Clone)]
+struct Convolution {
+    weight: Tensor<Flex, 4>,
+    bias: Tensor<Flex, 1>,
+    options: ConvOptions<2>,
 }
 
 impl Inception {
@@ -107,9 +110,9 @@ impl Inception {
 
 fn forward(layers: &[Layer], image: Tensor<Flex, 4>) -> Tensor<Flex, 4> {
     layers.iter().fold(image, |x, layer| match layer {
-        Layer::Convolution { weight, bias, stride, padding } => {
-            let options = ConvOptions::new([*stride; 2], *padding, [1, 1], 1);
-            relu(conv2d(x, weight.clone(), Some(bias.clone()), options))
+        Layer::Convolution(conv) => {
+            let Convolution { weight, bias, options } = &**conv;
+            relu(conv2d(x, weight.clone(), Some(bias.clone()), options.clone()))
         }
         Layer::Mean => avg_pool2d(x, [3, 3], [1, 1], [1, 1], false, false),
         Layer::Maximum { stride, padding } => {
@@ -138,12 +141,11 @@ fn build(
                 let shape = [*outputs, channels, kernel[0], kernel[1]];
                 channels = *outputs;
                 let (weight, bias) = folded(weights, &name, shape)?;
-                Layer::Convolution {
+                Layer::Convolution(Box::new(Convolution {
                     weight: Tensor::from_data(TensorData::new(weight, shape), &device),
                     bias: Tensor::from_data(TensorData::new(bias, [channels]), &device),
-                    stride: *stride,
-                    padding: *padding,
-                }
+                    options: ConvOptions::new([*stride; 2], *padding, [1, 1], 1),
+                }))
             }
             Plan::Mean => Layer::Mean,
             Plan::Maximum { stride, padding } => {

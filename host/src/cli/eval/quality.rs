@@ -108,6 +108,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let held_out = args.held_out.as_deref();
     let characters = Characters::read(&args.data, held_out, args.count as usize, args.seed)?;
     let few = characters.first(args.sampler_count as usize);
+    let scenes = others::cases(args.scenes.as_deref(), args.spi.as_deref(), args.seed)?;
 
     let conditions = conditions();
     let rows: Vec<Row> =
@@ -122,8 +123,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         steps.extend(over(&[row], &[MIDDLE], &few, &judges, args.seed, &bar)?);
     }
     bar.finish_and_clear();
-    let others = others::cases(args.scenes.as_deref(), args.spi.as_deref(), args.seed)?;
-    let shown = others::enhance(others, &networks.row(Kind::Diffusion(1))?)?;
+    let shown = others::enhance(&scenes, &networks.row(Kind::Diffusion(1))?)?;
 
     let mut out = OutputDir::create(&args.out)?;
     for (name, picture) in figures::all(&measured, &steps, &characters, &few) {

@@ -15,6 +15,9 @@ use std::path::Path;
 /// Groups that the embedded weights' training has not seen, by the stack's name.
 const HELD_OUT: &str = include_str!("../../../../nets/weights/held_out.json");
 
+/// Images that a stack must have: a distance of sets needs two.
+const LEAST: usize = 2;
+
 /// Where images come from.
 #[derive(Debug, Clone, Serialize)]
 pub struct Origin {
@@ -56,7 +59,7 @@ impl Characters {
         let stacks = characters::read(path)?;
         let mut all = Self { all: Vec::new(), origins: Vec::new(), notes: Vec::new() };
         for stack in &stacks {
-            all.add(stack, groups.get(stack.name()).map(Vec::as_slice), count, seed)?;
+            all.add(stack, groups.get(stack.name()).map(Vec::as_slice), count, seed);
         }
         if all.all.is_empty() {
             bail!("{}: no image that training has not seen", path.display());
@@ -64,13 +67,7 @@ impl Characters {
         Ok(all)
     }
 
-    fn add(
-        &mut self,
-        stack: &Stack,
-        groups: Option<&[u32]>,
-        count: usize,
-        seed: u64,
-    ) -> Result<()> {
+    fn add(&mut self, stack: &Stack, groups: Option<&[u32]>, count: usize, seed: u64) {
         let unseen = |at: &usize| groups.is_none_or(|g| g.contains(&stack.groups()[*at]));
         let mut places: Vec<usize> = (0..stack.len()).filter(unseen).collect();
         let choice = match groups {
@@ -80,6 +77,10 @@ impl Characters {
         if places.len() < count {
             let name = stack.name();
             self.notes.push(format!("{name}: {} images, fewer than {count}", places.len()));
+        }
+        if places.len() < LEAST {
+            self.notes.push(format!("{}: left out", stack.name()));
+            return;
         }
         places.shuffle(&mut Pcg64Mcg::seed_from_u64(seed));
         places.truncate(count);
@@ -91,7 +92,6 @@ impl Characters {
         }));
         let (name, images) = (stack.name().to_owned(), places.len());
         self.origins.push(Origin { stack: name, images, choice });
-        Ok(())
     }
 
     /// The first `count` of each stack.

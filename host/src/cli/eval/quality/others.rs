@@ -172,7 +172,7 @@ fn files(folder: Option<&Path>, ending: &str) -> Result<Vec<PathBuf>> {
 }
 
 /// Enhances all scenes.
-pub fn enhance(scenes: Vec<Scene>, row: &Row) -> Result<Shown> {
+pub fn enhance(scenes: &[Scene], row: &Row) -> Result<Shown> {
     let hidden = ProgressBar::hidden();
     let mut cases = Vec::new();
     let mut panels: Vec<Panel> = Vec::new();
