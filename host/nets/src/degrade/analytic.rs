@@ -233,7 +233,8 @@ mod tests {
             let limits = Limits { noise_std: 0.05..=0.05, partial: 1.0, sampling, ..still() };
             let read = reading(limits, &grey, 3);
             let found = deviation(&read.image, &[0.5; 1024]);
-            assert!((found / (0.05 * share) - 1.0).abs() < 0.1, "{found}");
+            // Of 256 readings the deviation is known to 1/sqrt(2 * 256) = 4.4 %.
+            assert!((found / (0.05 * share) - 1.0).abs() < 0.15, "{found}");
             assert!((read.noise_std - 0.05 * share).abs() < 1e-6);
         }
     }
