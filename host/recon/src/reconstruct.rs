@@ -20,16 +20,22 @@
 #![doc = include_str!("reconstruct/study.md")]
 
 mod own_atoms;
+mod own_matrix;
+mod pursuit;
 mod regularised;
 mod selection;
+mod video;
 
 pub use own_atoms::omp_over;
+pub use own_matrix::{MatrixError, MatrixMethod, MatrixReconstruction, MatrixSettings, OwnMatrix};
 pub use regularised::{Penalty, Regularised, RegularisedSettings, Strength, regularised};
+pub use video::{VideoFrame, omp_video};
 
 use crate::basis::{Basis, Transform};
 use crate::omp::sampled::{Prior, SampledHadamard, visible_energy};
-use crate::omp::{Backend, Limits, OmpError, Path, Stop, solve_path};
+use crate::omp::{Backend, Limits, OmpError, Stop};
 use crate::{Image, Measurements, Order, Side, fwht};
+use pursuit::{Found, How};
 use thiserror::Error;
 
 /// Inverts the Walsh-Hadamard transform, with zero for rows that were not measured.
@@ -115,9 +121,15 @@ pub struct OmpSettings {
     pub completion: Completion,
     /// What computes the pursuits. One image is a few pursuits over different dictionaries: [`Backend::Auto`] is the processor.
     pub backend: Backend,
+    /// Coefficients of 0 or more: light does not add up to less. For atoms that are light themselves, pixels or one's own.
+    pub non_negative: bool,
 }
 
 impl OmpSettings {
+    fn how(&self) -> How {
+        How { non_negative: self.non_negative, backend: self.backend }
+    }
+
     /// Atoms are never worth their time beyond this number, by the module's table.
     pub const MOST_ATOMS: usize = 300;
 
@@ -137,6 +149,7 @@ impl OmpSettings {
             visibility: Self::LEAST_VISIBILITY,
             completion: Completion::Sparse,
             backend: Backend::Auto,
+            non_negative: false,
         }
     }
 }
@@ -152,6 +165,7 @@ impl Default for OmpSettings {
             visibility: Self::LEAST_VISIBILITY,
             completion: Completion::Measured,
             backend: Backend::Auto,
+            non_negative: false,
         }
     }
 }
@@ -197,6 +211,14 @@ pub enum ReconstructError {
         /// Pixels of an image.
         area: usize,
     },
+    /// Coefficients of 0 or more for atoms that are not light.
+    #[error(
+        "coefficients of 0 or more in the {basis} basis, expected the pixel basis or atoms of one's own"
+    )]
+    Signed {
+        /// The basis.
+        basis: Basis,
+    },
     /// The pursuit refused the problem.
     #[error(transparent)]
     Pursuit(#[from] OmpError),
@@ -212,26 +234,43 @@ pub fn omp(
 ) -> Result<OmpReconstruction, ReconstructError> {
     settings.check()?;
     let problem = Problem::new(measurements, settings);
-    let choice = match settings.sparsity {
-        Sparsity::Fixed(atoms) => selection::Choice { atoms, trust: 1.0 },
-        Sparsity::Noise => selection::Choice { atoms: problem.rows.len(), trust: 1.0 },
-        Sparsity::CrossValidated { most, folds } => selection::choose(&problem, most, folds)?,
-    };
+    let choice = choose_atoms(&problem, settings)?;
     let every: Vec<usize> = (0..problem.rows.len()).collect();
-    let (path, gram) = problem.pursue(&every, choice.atoms)?;
-    let predicted = gram.predict(&path.support, &path.coefficients(choice.atoms));
+    let dictionary = problem.dictionary(&every);
+    let found = problem.pursue(&dictionary, &every, &[choice.atoms])?.remove(0);
+    let predicted = dictionary.predict(&found.support, &found.coefficients);
+    Ok(reconstruction(&problem, found, predicted, settings.completion, choice.trust))
+}
 
+fn choose_atoms(
+    problem: &Problem<'_>,
+    settings: &OmpSettings,
+) -> Result<selection::Choice, OmpError> {
+    match settings.sparsity {
+        Sparsity::Fixed(atoms) => Ok(selection::Choice { atoms, trust: 1.0 }),
+        Sparsity::Noise => Ok(selection::Choice { atoms: problem.rows.len(), trust: 1.0 }),
+        Sparsity::CrossValidated { most, folds } => selection::choose(problem, most, folds),
+    }
+}
+
+/// What there is to say of a representation, and the image that it predicts.
+fn reconstruction(
+    problem: &Problem<'_>,
+    found: Found,
+    predicted: Vec<f32>,
+    completion: Completion,
+    trust: f32,
+) -> OmpReconstruction {
     let residual = problem.residual_of(&predicted);
-    let image = image_of(&problem, predicted, settings.completion, choice.trust);
-    Ok(OmpReconstruction {
-        image,
-        sparsity: path.support.len(),
-        stop: path.stop,
+    OmpReconstruction {
+        image: image_of(problem, predicted, completion, trust),
+        sparsity: found.support.len(),
+        stop: found.stop,
         residual,
-        unseen_atoms: path.unseen.len(),
-        trust: f64::from(choice.trust),
+        unseen_atoms: found.unseen,
+        trust: f64::from(trust),
         noise: problem.noise_in_units(),
-    })
+    }
 }
 
 /// The image of a prediction of all rows, in the measurements' units.
@@ -268,7 +307,7 @@ struct Problem<'a> {
     residual: f64,
     /// Whether it ends at the noise as well.
     to_noise: bool,
-    backend: Backend,
+    how: How,
 }
 
 impl<'a> Problem<'a> {
@@ -287,17 +326,9 @@ impl<'a> Problem<'a> {
         };
         let scale = prior_scale(&transform, rows, &values, falloff);
         let prior = Prior { scale, noise, visibility: 0.0 };
-        Self {
-            side,
-            rows,
-            values,
-            unit,
-            transform,
-            prior,
-            residual: 0.0,
-            to_noise: false,
-            backend: Backend::Auto,
-        }
+        let how = How { non_negative: false, backend: Backend::Auto };
+        let (residual, to_noise) = (0.0, false);
+        Self { side, rows, values, unit, transform, prior, residual, to_noise, how }
     }
 
     fn new(measurements: &'a Measurements, settings: &OmpSettings) -> Self {
@@ -305,8 +336,14 @@ impl<'a> Problem<'a> {
         problem.prior.visibility = settings.visibility as f32;
         problem.residual = settings.residual;
         problem.to_noise = settings.sparsity == Sparsity::Noise;
-        problem.backend = settings.backend;
+        problem.how = settings.how();
         problem
+    }
+
+    /// Measurements of the same rows.
+    fn in_units(&self, measurements: &Measurements) -> Vec<f32> {
+        let n = self.side.pixels() as f64;
+        measurements.values().iter().map(|v| (v / n / self.unit) as f32).collect()
     }
 
     /// Norm of what a prediction of all rows leaves of the measurements, relative to theirs.
@@ -322,19 +359,27 @@ impl<'a> Problem<'a> {
         f64::from(self.prior.noise * self.side.pixels() as f32) * self.unit
     }
 
-    /// Chooses up to `atoms` atoms for the measurements at these positions.
+    /// The basis, seen through the rows at these positions.
+    fn dictionary(&self, positions: &[usize]) -> SampledHadamard<'_> {
+        let rows: Vec<u32> = positions.iter().map(|&k| self.rows[k]).collect();
+        SampledHadamard::new(&self.transform, &rows, &self.prior)
+    }
+
+    /// Chooses up to each number of atoms for the measurements at these positions, the last number the largest.
     fn pursue(
         &self,
+        dictionary: &SampledHadamard<'_>,
         positions: &[usize],
-        atoms: usize,
-    ) -> Result<(Path<f32>, SampledHadamard<'_>), OmpError> {
-        let rows: Vec<u32> = positions.iter().map(|&k| self.rows[k]).collect();
+        sparsities: &[usize],
+    ) -> Result<Vec<Found>, OmpError> {
         let values: Vec<f32> = positions.iter().map(|&k| self.values[k]).collect();
-        let dictionary = SampledHadamard::new(&self.transform, &rows, &self.prior);
+        pursuit::pursue(dictionary, &values, &self.limits(), self.how, sparsities)
+    }
+
+    /// When a pursuit stops, whatever the number of atoms.
+    fn limits(&self) -> Limits {
         let noise = if self.to_noise { f64::from(self.prior.noise) } else { 0.0 };
-        let limits = Limits { sparsity: atoms, residual: self.residual, noise };
-        let path = solve_path(&dictionary, &limits, &values, self.backend)?;
-        Ok((path, dictionary))
+        Limits { sparsity: 0, residual: self.residual, noise }
     }
 }
 
@@ -373,6 +418,9 @@ impl OmpSettings {
         let refuse =
             |setting, found, expected| Err(ReconstructError::Setting { setting, found, expected });
         check_prior(self.falloff, self.noise)?;
+        if self.non_negative && self.basis != Basis::Pixel {
+            return Err(ReconstructError::Signed { basis: self.basis });
+        }
         if !(self.visibility >= 0.0 && self.visibility < 1.0) {
             return refuse("visibility", self.visibility, "0 or more and less than 1");
         }

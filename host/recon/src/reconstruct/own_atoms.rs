@@ -3,10 +3,11 @@
 //! The one law: nothing is known of the atoms but what they look like, so all are expected alike; the noise is the only
 //! prior. Everything else is [`omp()`](super::omp)'s.
 
-use super::{OmpReconstruction, OmpSettings, Problem, ReconstructError, Sparsity, image_of};
-use super::{check_prior, selection};
+use super::pursuit::{self, Found};
+use super::{OmpReconstruction, OmpSettings, Problem, ReconstructError, Sparsity};
+use super::{check_prior, reconstruction, selection};
 use crate::basis::Basis;
-use crate::omp::{DenseDictionary, Limits, OmpError, Path, solve_path};
+use crate::omp::{DenseDictionary, Limits, OmpError};
 use crate::{Measurements, fwht};
 use nalgebra::DMatrix;
 
@@ -32,31 +33,22 @@ pub fn omp_over(
     let mut problem = Problem::of(measurements, Basis::Pixel, 0.0, settings.noise);
     problem.residual = settings.residual;
     problem.to_noise = settings.sparsity == Sparsity::Noise;
-    problem.backend = settings.backend;
+    problem.how = settings.how();
     let shown = Shown::new(&problem, atoms);
     let choice = match settings.sparsity {
         Sparsity::Fixed(atoms) => selection::Choice { atoms, trust: 1.0 },
         Sparsity::Noise => selection::Choice { atoms: problem.rows.len(), trust: 1.0 },
         Sparsity::CrossValidated { most, folds } => {
             selection::choose_sparsity(&problem, most, folds, |kept, sparsities| {
-                let path = shown.pursue(&problem, kept, sparsities.iter().copied().max())?;
-                Ok(sparsities.iter().map(|&atoms| shown.predict(&path, atoms)).collect())
+                let found = shown.pursue(&problem, kept, sparsities)?;
+                Ok(found.iter().map(|found| shown.predict(found)).collect())
             })?
         }
     };
     let every: Vec<usize> = (0..problem.rows.len()).collect();
-    let path = shown.pursue(&problem, &every, Some(choice.atoms))?;
-    let predicted = shown.predict(&path, choice.atoms);
-    let residual = problem.residual_of(&predicted);
-    Ok(OmpReconstruction {
-        image: image_of(&problem, predicted, settings.completion, choice.trust),
-        sparsity: path.support.len(),
-        stop: path.stop,
-        residual,
-        unseen_atoms: path.unseen.len(),
-        trust: choice.trust.into(),
-        noise: problem.noise_in_units(),
-    })
+    let found = shown.pursue(&problem, &every, &[choice.atoms])?.remove(0);
+    let predicted = shown.predict(&found);
+    Ok(reconstruction(&problem, found, predicted, settings.completion, choice.trust))
 }
 
 /// The atoms, of unit norm, by every row: `rows x atoms`.
@@ -96,8 +88,8 @@ impl Shown {
         &self,
         problem: &Problem<'_>,
         positions: &[usize],
-        most: Option<usize>,
-    ) -> Result<Path<f32>, OmpError> {
+        sparsities: &[usize],
+    ) -> Result<Vec<Found>, OmpError> {
         let (measured, atoms) = (positions.len(), self.rows.ncols());
         let ridge = problem.prior.noise / self.scale;
         let matrix =
@@ -110,18 +102,18 @@ impl Shown {
         y.resize(measured + atoms, 0.0);
         // The rows of the prior measure nothing, and are no noise.
         let share = (measured as f64 / (measured + atoms) as f64).sqrt();
-        let noise = if problem.to_noise { f64::from(problem.prior.noise) * share } else { 0.0 };
-        let sparsity = most.unwrap_or(0);
-        let limits = Limits { sparsity, residual: problem.residual, noise };
-        solve_path(&DenseDictionary::new(&matrix), &limits, &y, problem.backend)
+        let Limits { noise, residual, .. } = problem.limits();
+        let limits = Limits { sparsity: 0, residual, noise: noise * share };
+        let dictionary = DenseDictionary::new(&matrix);
+        pursuit::pursue(&dictionary, &y, &limits, problem.how, sparsities)
     }
 
-    /// Every row, as the first `atoms` of a path predict it.
-    fn predict(&self, path: &Path<f32>, atoms: usize) -> Vec<f32> {
+    /// Every row, as these atoms predict it.
+    fn predict(&self, found: &Found) -> Vec<f32> {
         let mut predicted = vec![0.0; self.rows.nrows()];
-        for (&atom, x) in path.support.iter().zip(path.coefficients(atoms)) {
+        for (&atom, x) in found.support.iter().zip(&found.coefficients) {
             for (predicted, row) in predicted.iter_mut().zip(self.rows.column(atom).iter()) {
-                *predicted += x as f32 * row;
+                *predicted += *x as f32 * row;
             }
         }
         predicted

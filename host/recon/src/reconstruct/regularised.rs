@@ -15,7 +15,7 @@
 
 mod fista;
 mod tikhonov;
-mod total_variation;
+pub(super) mod total_variation;
 
 use super::selection::{self, TRUST};
 use super::{Completion, NoiseLevel, Problem, ReconstructError, image_of};

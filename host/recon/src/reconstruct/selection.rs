@@ -51,13 +51,9 @@ type Misses = Vec<[Miss; TRUST.len()]>;
 /// alone would let the few large coefficients decide, absolute values alone the many small ones.
 pub(super) fn choose(problem: &Problem, most: usize, folds: usize) -> Result<Choice, OmpError> {
     choose_sparsity(problem, most, folds, |kept, sparsities| {
-        let largest = sparsities.iter().copied().max().unwrap_or(0);
-        let (path, dictionary) = problem.pursue(kept, largest)?;
-        let predict = |&atoms: &usize| {
-            let chosen = &path.support[..atoms.min(path.support.len())];
-            dictionary.predict(chosen, &path.coefficients(atoms))
-        };
-        Ok(sparsities.iter().map(predict).collect())
+        let dictionary = problem.dictionary(kept);
+        let found = problem.pursue(&dictionary, kept, sparsities)?;
+        Ok(found.iter().map(|f| dictionary.predict(&f.support, &f.coefficients)).collect())
     })
 }
 

@@ -1,5 +1,7 @@
 use super::*;
-use crate::testing::{array, correlation_of, measured, real_data, scene, side};
+use crate::testing::{array, correlation_of, measured, normal, real_data, scene, side};
+use rand::SeedableRng;
+use rand_pcg::Pcg64;
 
 fn opar() -> Option<Measurements> {
     let mut file = real_data("opar_ala1.npz")?;
@@ -153,6 +155,35 @@ fn atoms_of_ones_own_stand_for_a_basis_and_do_better_where_they_fit() {
 }
 
 #[test]
+fn light_that_may_not_be_negative_is_not_and_points_come_back_better() {
+    let side = side(16);
+    let mut points = vec![0.0; 256];
+    for (pixel, light) in [(18, 3.0), (77, 2.0), (140, 1.0), (141, 2.5), (250, 1.5)] {
+        points[pixel] = light;
+    }
+    let all = measured(side, &points);
+    // A fifth of the rows is too little for points of any sign.
+    let part = all.take(Some(&Order::Random(3)), 0.2).unwrap();
+    let signed = OmpSettings {
+        basis: Basis::Pixel,
+        completion: Completion::Sparse,
+        ..OmpSettings::default()
+    };
+    let signed = OmpSettings { sparsity: Sparsity::Fixed(5), ..signed };
+    let lit = OmpSettings { non_negative: true, ..signed };
+    let own: Vec<f32> = (0..256 * 256).map(|p| f32::from(u8::from(p % 257 == 0))).collect();
+    let full = hadamard(&all);
+    let any = correlation_of(&omp(&part, &signed).unwrap().image, &full);
+    for found in [omp(&part, &lit).unwrap(), omp_over(&part, &own, &lit).unwrap()] {
+        assert!(found.image.pixels().iter().all(|&p| p > -1e-4));
+        let correlation = correlation_of(&found.image, &full);
+        assert!(correlation > 0.95 && correlation > any + 0.1, "{correlation}, any sign {any}");
+    }
+    let refused = omp(&part, &OmpSettings { non_negative: true, ..OmpSettings::default() });
+    assert_eq!(refused.unwrap_err(), ReconstructError::Signed { basis: Basis::Dct });
+}
+
+#[test]
 fn units_do_not_matter() {
     let image = scene(side(16), 1);
     let volts = measured(side(16), &image).take(Some(&Order::CakeCutting), 0.3).unwrap();
@@ -193,4 +224,54 @@ fn settings_that_make_no_sense_are_named() {
     assert!(refused(OmpSettings { noise, ..sound }).starts_with("noise is -0.5"));
     let sparsity = Sparsity::CrossValidated { most: 5, folds: 1 };
     assert!(refused(OmpSettings { sparsity, ..sound }).starts_with("folds is 1"));
+}
+
+/// Frames of a square that stands still, moves and changes places with a bar, with noise.
+fn video() -> Vec<Measurements> {
+    let side = side(32);
+    let mut random = Pcg64::seed_from_u64(5);
+    let frame = |k: usize| -> Measurements {
+        let lit = |r: usize, c: usize| match k {
+            0..8 => (8..20).contains(&r) && (6..18).contains(&c),
+            _ => (4..28).contains(&r) && (20..24).contains(&c),
+        };
+        let image: Vec<f64> =
+            (0..1024).map(|p| if lit(p / 32, p % 32) { 1.0 } else { 0.1 }).collect();
+        let rows: Vec<i64> =
+            Order::CakeCutting.rows(side).unwrap()[..307].iter().map(|&r| r.into()).collect();
+        let all = measured(side, &image);
+        let values: Vec<f64> =
+            rows.iter().map(|&r| all.values()[r as usize] + 2.0 * normal(&mut random)).collect();
+        Measurements::from_differential(side, &rows, &values).unwrap()
+    };
+    (0..12).map(frame).collect()
+}
+
+#[test]
+fn frames_of_a_video_start_from_the_one_before_until_the_scene_changes() {
+    let frames = video();
+    let settings = OmpSettings::default();
+    let found = omp_video(&frames, &settings).unwrap();
+    let cold: Vec<usize> = (0..12).filter(|&k| !found[k].warm).collect();
+    assert_eq!(cold, [0, 8]);
+    for (frame, found) in frames.iter().zip(&found) {
+        let alone = omp(
+            frame,
+            &OmpSettings { sparsity: Sparsity::Fixed(found.reconstruction.sparsity), ..settings },
+        );
+        let alone = alone.unwrap();
+        let (left, left_alone) = (found.reconstruction.residual, alone.residual);
+        assert!(left < 1.06 * left_alone, "{left} of the measurements left, alone {left_alone}");
+    }
+    assert_eq!(found[8].reconstruction, omp(&frames[8], &settings).unwrap());
+}
+
+#[test]
+fn frames_with_other_rows_start_from_scratch() {
+    let mut frames = video();
+    frames.truncate(4);
+    frames[2] = frames[2].take(Some(&Order::CakeCutting), 0.25).unwrap();
+    let found = omp_video(&frames, &OmpSettings::default()).unwrap();
+    assert_eq!(found.iter().map(|f| f.warm).collect::<Vec<_>>(), [false, true, false, false]);
+    assert_eq!(omp_video(&[], &OmpSettings::default()).unwrap(), []);
 }

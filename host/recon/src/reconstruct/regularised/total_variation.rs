@@ -53,7 +53,13 @@ pub(super) fn predict(
 }
 
 /// A step of the dual up the gradient of `x`, back into the unit discs.
-fn climb(n: usize, x: &[f32], step: f32, down: &mut [f32], across: &mut [f32]) {
+pub(in crate::reconstruct) fn climb(
+    n: usize,
+    x: &[f32],
+    step: f32,
+    down: &mut [f32],
+    across: &mut [f32],
+) {
     for r in 0..n {
         let below = if r + 1 < n { r + 1 } else { r };
         for c in 0..n {
@@ -68,7 +74,13 @@ fn climb(n: usize, x: &[f32], step: f32, down: &mut [f32], across: &mut [f32]) {
 }
 
 /// A step of `x` along the dual's divergence.
-fn descend(n: usize, down: &[f32], across: &[f32], step: f32, x: &mut [f32]) {
+pub(in crate::reconstruct) fn descend(
+    n: usize,
+    down: &[f32],
+    across: &[f32],
+    step: f32,
+    x: &mut [f32],
+) {
     for r in 0..n {
         for c in 0..n {
             let p = r * n + c;

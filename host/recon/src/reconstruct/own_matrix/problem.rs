@@ -1,0 +1,158 @@
+//! Some of the measurements in units in which nothing has a size of its own, and what is expected of the coefficients.
+//!
+//! The one law: with `u` what the patterns see of an even image, `A` and `y` have their parts along `u` taken out. As nothing is
+//! held against the mean, that changes no minimum, and the largest singular value by far is gone.
+
+use super::solvers::{self, Chosen};
+use super::{MatrixError, MatrixMethod, MatrixSettings, OwnMatrix};
+use crate::Side;
+use crate::basis::{Basis, Transform};
+use crate::omp::Stop;
+use nalgebra::{DMatrix, DVector};
+
+/// The measurements at some positions.
+pub(super) struct Problem {
+    side: Side,
+    /// Patterns, without the mean, of norm 1.
+    patterns: DMatrix<f64>,
+    /// Measurements of variance 1, without the mean.
+    y: DVector<f64>,
+    atoms: Atoms,
+    /// What a pixel of 1 is in the measurements' units.
+    unit: f64,
+    mean: Option<Mean>,
+}
+
+/// What coefficients are of.
+enum Atoms {
+    Basis(Transform),
+    /// Images of norm 1, one a column.
+    Own(DMatrix<f64>),
+}
+
+/// What is needed to find the mean afterwards.
+struct Mean {
+    patterns: DMatrix<f64>,
+    y: DVector<f64>,
+    even: DVector<f64>,
+}
+
+impl Problem {
+    pub(super) fn new(own: &OwnMatrix, settings: &MatrixSettings, y: &[f64], at: &[usize]) -> Self {
+        let raw = own.patterns.select_rows(at);
+        let raw_y = DVector::from_iterator(at.len(), at.iter().map(|&k| y[k]));
+        let area = own.side.area();
+        let even = raw.column_sum();
+        // Without a basis that has the mean for an atom, it is as good or bad as any other.
+        let free = settings.atoms.is_none()
+            && (settings.basis != Basis::Pixel || settings.method == MatrixMethod::TotalVariation)
+            && even.norm() > 1e-9 * raw.norm();
+        let (mut patterns, mut values) = (raw.clone(), raw_y.clone());
+        let mean = free.then(|| {
+            let u = &even / even.norm();
+            patterns -= &u * (u.transpose() * &raw);
+            values -= &u * u.dot(&raw_y);
+            Mean { patterns: raw, y: raw_y, even }
+        });
+        let norm = solvers::norm(&patterns).max(f64::MIN_POSITIVE);
+        patterns /= norm;
+        let spread = (values.norm_squared() / values.len().max(1) as f64).sqrt();
+        let spread = if spread > 0.0 { spread } else { 1.0 };
+        values /= spread;
+        let atoms = match &settings.atoms {
+            None => Atoms::Basis(Transform::new(settings.basis, own.side)),
+            Some(images) => {
+                let images: Vec<f64> = images.iter().map(|&v| v.into()).collect();
+                let mut images = DMatrix::from_column_slice(area, images.len() / area, &images);
+                for mut image in images.column_iter_mut() {
+                    image.try_normalize_mut(0.0);
+                }
+                Atoms::Own(images)
+            }
+        };
+        Self { side: own.side, patterns, y: values, atoms, unit: spread / norm, mean }
+    }
+
+    /// The image at each strength.
+    pub(super) fn penalised(&self, method: MatrixMethod, strengths: &[f64]) -> Vec<DVector<f64>> {
+        if method == MatrixMethod::TotalVariation {
+            let images = solvers::total_variation(self.side, &self.patterns, &self.y, strengths);
+            return images.into_iter().map(|x| self.image(x)).collect();
+        }
+        let (seen, scale) = self.expected();
+        let found = match method {
+            MatrixMethod::Sparse => {
+                let free = usize::from(self.mean.is_some());
+                solvers::sparse(&seen, &self.y, &scale, free, strengths)
+            }
+            _ => solvers::tikhonov(&seen, &self.y, &scale, strengths),
+        };
+        found.into_iter().map(|c| self.image(self.pixels(&c))).collect()
+    }
+
+    /// The image, number of atoms and reason to stop for each of these numbers, the last the largest.
+    pub(super) fn omp(
+        &self,
+        noise: f64,
+        sparsities: &[usize],
+        non_negative: bool,
+    ) -> Result<Vec<(DVector<f64>, usize, Stop)>, MatrixError> {
+        let (seen, scale) = self.expected();
+        let found = solvers::omp(&seen, &self.y, &scale, noise, sparsities, non_negative)?;
+        Ok(found
+            .into_iter()
+            .map(|Chosen { coefficients, size, stop }| {
+                (self.image(self.pixels(&coefficients)), size, stop)
+            })
+            .collect())
+    }
+
+    /// What the patterns see of each atom, and what is expected of its coefficient.
+    fn expected(&self) -> (DMatrix<f64>, DVector<f64>) {
+        let (seen, mut scale) = match &self.atoms {
+            Atoms::Own(images) => {
+                (&self.patterns * images, DVector::from_element(images.ncols(), 1.0))
+            }
+            Atoms::Basis(transform) => {
+                let mut seen = self.patterns.clone();
+                for mut row in seen.row_iter_mut() {
+                    let mut image: Vec<f32> = row.iter().map(|&w| w as f32).collect();
+                    transform.analyse(&mut image);
+                    row.iter_mut().zip(&image).for_each(|(w, &c)| *w = c.into());
+                }
+                let frequencies = transform.basis().frequencies(self.side);
+                let scale = frequencies.iter().map(|f| 1.0 / f64::from(f.max(1.0)));
+                (seen, DVector::from_iterator(frequencies.len(), scale))
+            }
+        };
+        // As much energy as was measured is expected to be.
+        let energies =
+            seen.column_iter().zip(scale.iter()).map(|(atom, s)| atom.norm_squared() * s * s);
+        let expected: f64 = energies.sum();
+        if expected > 0.0 && self.y.norm() > 0.0 {
+            scale *= self.y.norm() / expected.sqrt();
+        }
+        (seen, scale)
+    }
+
+    fn pixels(&self, coefficients: &DVector<f64>) -> DVector<f64> {
+        match &self.atoms {
+            Atoms::Own(images) => images * coefficients,
+            Atoms::Basis(transform) => {
+                let mut image: Vec<f32> = coefficients.iter().map(|&c| c as f32).collect();
+                transform.synthesise(&mut image);
+                DVector::from_iterator(image.len(), image.iter().map(|&v| v.into()))
+            }
+        }
+    }
+
+    /// In the measurements' units, with the mean that explains them best.
+    fn image(&self, pixels: DVector<f64>) -> DVector<f64> {
+        let mut pixels = pixels * self.unit;
+        if let Some(Mean { patterns, y, even }) = &self.mean {
+            let left = y - patterns * &pixels;
+            pixels.add_scalar_mut(even.dot(&left) / even.norm_squared());
+        }
+        pixels
+    }
+}

@@ -1,0 +1,217 @@
+//! The methods, for a dense matrix of norm 1.
+//!
+//! The one law: a list of strengths is worked off from the strongest on, each starting where the one before ended.
+
+use crate::Side;
+use crate::omp::{DenseDictionary, Limits, OmpError, Solver, Stop, nonnegative};
+use crate::reconstruct::regularised::total_variation::{climb, descend};
+use nalgebra::{DMatrix, DVector};
+
+/// Most iterations of the methods that only approach their minimum.
+const ITERATIONS: usize = 300;
+
+/// Change relative to the whole at which a method has settled.
+const SETTLED: f64 = 1e-5;
+
+/// Largest singular value, by power iteration: a little too large rather than too small.
+pub(super) fn norm(a: &DMatrix<f64>) -> f64 {
+    let size = a.ncols();
+    // Of no symmetry that a singular vector could lack.
+    let mut x = DVector::from_fn(size, |i, _| 1.0 + (i as f64 * 0.618_033_988_749_895).fract());
+    let mut norm = 0.0;
+    for _ in 0..50 {
+        let length = x.norm();
+        if length == 0.0 {
+            break;
+        }
+        x /= length;
+        let seen = a * &x;
+        norm = seen.norm();
+        x = a.tr_mul(&seen);
+    }
+    1.02 * norm
+}
+
+/// Least squares of least norm: conjugate gradients from 0 stay in the row space.
+pub(super) fn least_squares(a: &DMatrix<f64>, y: &DVector<f64>) -> DVector<f64> {
+    let mut x = DVector::zeros(a.ncols());
+    let mut residual = y.clone();
+    let mut gradient = a.tr_mul(&residual);
+    let mut direction = gradient.clone();
+    let mut energy = gradient.norm_squared();
+    let enough = 1e-24 * energy;
+    // Without rounding as many steps as singular values suffice.
+    for _ in 0..4 * a.nrows().min(a.ncols()) {
+        if energy <= enough {
+            break;
+        }
+        let seen = a * &direction;
+        let step = energy / seen.norm_squared();
+        x.axpy(step, &direction, 1.0);
+        residual.axpy(-step, &seen, 1.0);
+        gradient = a.tr_mul(&residual);
+        let before = std::mem::replace(&mut energy, gradient.norm_squared());
+        direction = &gradient + direction * (energy / before);
+    }
+    x
+}
+
+/// Coefficients by the dual problem, `(A S^2 A^T + t) z = y` and `c = S^2 A^T z`: as many unknowns as measurements.
+pub(super) fn tikhonov(
+    a: &DMatrix<f64>,
+    y: &DVector<f64>,
+    scale: &DVector<f64>,
+    strengths: &[f64],
+) -> Vec<DVector<f64>> {
+    let mut scaled = a.clone();
+    scaled.column_iter_mut().zip(scale.iter()).for_each(|(mut atom, s)| atom *= *s);
+    let gram = &scaled * scaled.transpose();
+    let mut z = DVector::zeros(y.len());
+    strengths
+        .iter()
+        .map(|&strength| {
+            let operate = |z: &DVector<f64>| &gram * z + z * strength;
+            let mut residual = y - operate(&z);
+            let mut direction = residual.clone();
+            let mut energy = residual.norm_squared();
+            for _ in 0..ITERATIONS {
+                if energy <= SETTLED.powi(2) * y.norm_squared() {
+                    break;
+                }
+                let image = operate(&direction);
+                let step = energy / direction.dot(&image);
+                z.axpy(step, &direction, 1.0);
+                residual.axpy(-step, &image, 1.0);
+                let before = std::mem::replace(&mut energy, residual.norm_squared());
+                direction = &residual + &direction * (energy / before);
+            }
+            scaled.tr_mul(&z).component_mul(scale)
+        })
+        .collect()
+}
+
+/// FISTA; nothing is held against the first `free` coefficients.
+pub(super) fn sparse(
+    a: &DMatrix<f64>,
+    y: &DVector<f64>,
+    scale: &DVector<f64>,
+    free: usize,
+    strengths: &[f64],
+) -> Vec<DVector<f64>> {
+    let mut c = DVector::<f64>::zeros(a.ncols());
+    strengths
+        .iter()
+        .map(|strength| {
+            let mut ahead = c.clone();
+            let mut pace = 1.0_f64;
+            for _ in 0..ITERATIONS {
+                let mut next = a.tr_mul(&(y - a * &ahead)) + &ahead;
+                for (j, v) in next.iter_mut().enumerate().skip(free) {
+                    let threshold = strength * std::f64::consts::SQRT_2 / scale[j];
+                    *v = v.signum() * (v.abs() - threshold).max(0.0);
+                }
+                let faster = 0.5 * (1.0 + (1.0 + 4.0 * pace * pace).sqrt());
+                let change = &next - &c;
+                ahead = &next + &change * ((pace - 1.0) / faster);
+                pace = faster;
+                c = next;
+                if change.norm() <= SETTLED * c.norm() {
+                    break;
+                }
+            }
+            c.clone()
+        })
+        .collect()
+}
+
+/// The primal-dual algorithm with a dual for the measurements and one for the gradient.
+pub(super) fn total_variation(
+    side: Side,
+    a: &DMatrix<f64>,
+    y: &DVector<f64>,
+    strengths: &[f64],
+) -> Vec<DVector<f64>> {
+    let n = side.pixels();
+    let mut x = DVector::<f64>::zeros(side.area());
+    // The gradient has norm sqrt 8; divided by it both parts have norm 1, and steps of 1 / sqrt 2 converge.
+    let gradient = 8.0_f64.sqrt();
+    let contrast = (y.norm() / (side.area() as f64).sqrt()).max(f64::MIN_POSITIVE);
+    let (primal, dual) = (contrast / 2.0_f64.sqrt(), 1.0 / (contrast * 2.0_f64.sqrt()));
+    let mut pull = DVector::<f64>::zeros(y.len());
+    let (mut down, mut across) = (vec![0.0_f32; side.area()], vec![0.0_f32; side.area()]);
+    strengths
+        .iter()
+        .map(|strength| {
+            let radius = strength.sqrt() * gradient;
+            let mut ahead = x.clone();
+            for _ in 0..ITERATIONS {
+                pull = (&pull + (a * &ahead - y) * dual) / (1.0 + dual);
+                let seen: Vec<f32> = ahead.iter().map(|&v| v as f32).collect();
+                // Duals are kept in units of `radius`.
+                climb(n, &seen, (dual / gradient / radius) as f32, &mut down, &mut across);
+                let mut slope = vec![0.0_f32; side.area()];
+                descend(n, &down, &across, 1.0, &mut slope);
+                let mut next = &x - a.tr_mul(&pull) * primal;
+                for (v, slope) in next.iter_mut().zip(&slope) {
+                    *v += primal * radius / gradient * f64::from(*slope);
+                }
+                ahead = &next * 2.0 - &x;
+                let change = (&next - &x).norm();
+                x = next;
+                if change <= SETTLED * x.norm() {
+                    break;
+                }
+            }
+            x.clone()
+        })
+        .collect()
+}
+
+/// Coefficients of which few are not 0.
+pub(super) struct Chosen {
+    pub coefficients: DVector<f64>,
+    pub size: usize,
+    pub stop: Stop,
+}
+
+/// Algorithm 1 over the atoms as they are expected to be, with a row of noise for each.
+pub(super) fn omp(
+    a: &DMatrix<f64>,
+    y: &DVector<f64>,
+    scale: &DVector<f64>,
+    noise: f64,
+    sparsities: &[usize],
+    non_negative: bool,
+) -> Result<Vec<Chosen>, OmpError> {
+    let (rows, atoms) = a.shape();
+    let ridge = noise.sqrt();
+    let matrix = DMatrix::from_fn(rows + atoms, atoms, |m, k| match m.checked_sub(rows) {
+        None => a[(m, k)] * scale[k],
+        Some(other) if other == k => ridge,
+        Some(_) => 0.0,
+    });
+    let dictionary = DenseDictionary::new(&matrix);
+    let mut measured = y.as_slice().to_vec();
+    measured.resize(rows + atoms, 0.0);
+    let chosen = |support: &[usize], coefficients: &[f64], stop| {
+        let mut all = DVector::zeros(atoms);
+        for (&k, c) in support.iter().zip(coefficients) {
+            all[k] = c * scale[k];
+        }
+        Chosen { coefficients: all, size: support.len(), stop }
+    };
+    if non_negative {
+        let solve = |&sparsity: &usize| {
+            let found = nonnegative::solve(&dictionary, &measured, &Limits::atoms(sparsity))?;
+            Ok(chosen(&found.support, &found.coefficients, found.stop))
+        };
+        return sparsities.iter().map(solve).collect();
+    }
+    let longest = Limits::atoms(*sparsities.last().unwrap_or(&0));
+    let path = Solver::new(&dictionary, &longest)?.solve(&measured)?;
+    let first = |&atoms: &usize| {
+        let size = atoms.min(path.support.len());
+        chosen(&path.support[..size], &path.coefficients(size), path.stop)
+    };
+    Ok(sparsities.iter().map(first).collect())
+}

@@ -1,0 +1,144 @@
+use super::*;
+use crate::reconstruct::hadamard;
+use crate::testing::{correlation_of, measured, normal, scene, side};
+use rand::RngExt;
+
+const METHODS: [MatrixMethod; 5] = [
+    MatrixMethod::PseudoInverse,
+    MatrixMethod::Tikhonov,
+    MatrixMethod::Sparse,
+    MatrixMethod::TotalVariation,
+    MatrixMethod::Omp,
+];
+
+/// Patterns of zeros and ones, and what they measure of an image, with some noise.
+fn binary(side: Side, patterns: usize, image: &[f64]) -> (OwnMatrix, Vec<f64>) {
+    let mut random = Pcg64::seed_from_u64(3);
+    let mut weights = Vec::new();
+    for _ in 0..patterns * side.area() {
+        weights.push(if random.random::<bool>() { 1.0 } else { 0.0 });
+    }
+    let y = weights
+        .chunks_exact(side.area())
+        .map(|p| p.iter().zip(image).map(|(w, v)| w * v).sum::<f64>() + 0.05 * normal(&mut random))
+        .collect();
+    (OwnMatrix::new(side, &weights).unwrap(), y)
+}
+
+#[test]
+fn the_pseudo_inverse_is_that_of_the_singular_values() {
+    let mut random = Pcg64::seed_from_u64(1);
+    let side = side(4);
+    for rows in [5, 12, 16, 30] {
+        let mut weights: Vec<f64> = (0..rows * 16).map(|_| normal(&mut random)).collect();
+        // Twice the same pattern, of which the measurements differ.
+        weights.copy_within(0..16, 32);
+        let own = OwnMatrix::new(side, &weights).unwrap();
+        assert_eq!(own.rank(), (rows - 1).min(16));
+        let y: Vec<f64> = (0..rows).map(|_| normal(&mut random)).collect();
+        let found = own.reconstruct(&y, &MatrixSettings::new(MatrixMethod::PseudoInverse)).unwrap();
+        let inverse = own.patterns.clone().pseudo_inverse(1e-9).unwrap();
+        let exact = inverse * DVector::from_column_slice(&y);
+        for (a, b) in found.image.pixels().iter().zip(exact.iter()) {
+            assert!((f64::from(*a) - b).abs() < 1e-5 * exact.norm(), "{rows} rows: {a} and {b}");
+        }
+    }
+}
+
+#[test]
+fn all_hadamard_rows_as_a_matrix_give_the_image_by_every_method() {
+    let (side, image) = (side(8), scene(side(8), 1));
+    let all = measured(side, &image);
+    let sign = |k: usize| if (k / 64 & k % 64).count_ones() % 2 == 0 { 1.0 } else { -1.0 };
+    let own = OwnMatrix::new(side, &(0..64 * 64).map(sign).collect::<Vec<f64>>()).unwrap();
+    assert_eq!((own.rank(), own.unseen_pixels()), (64, 0));
+    let full = hadamard(&all);
+    for method in METHODS {
+        let found = own.reconstruct(all.values(), &MatrixSettings::new(method)).unwrap();
+        let correlation = correlation_of(&found.image, &full);
+        let enough = if method == MatrixMethod::Omp { 0.9 } else { 0.995 };
+        assert!(correlation > enough, "{method:?}: {correlation}");
+        if method == MatrixMethod::PseudoInverse {
+            assert!(found.residual < 1e-6);
+        }
+    }
+}
+
+#[test]
+fn from_half_as_many_random_patterns_as_pixels_every_prior_beats_the_pseudo_inverse() {
+    let (side, image) = (side(16), scene(side(16), 2));
+    let (own, y) = binary(side, 128, &image);
+    let exact = Image::new(side, image.iter().map(|&v| v as f32).collect());
+    let error = |method| {
+        let found = own.reconstruct(&y, &MatrixSettings::new(method)).unwrap();
+        assert!(found.residual < 0.2, "{method:?}: {}", found.residual);
+        let pixels = found.image.pixels().iter().zip(exact.pixels());
+        pixels.map(|(a, b)| (a - b).powi(2)).sum::<f32>()
+    };
+    let least = error(MatrixMethod::PseudoInverse);
+    for method in &METHODS[1..] {
+        let found = error(*method);
+        assert!(found < 0.7 * least, "{method:?}: {found} and {least}");
+    }
+}
+
+#[test]
+fn atoms_of_ones_own_and_light_that_is_not_negative_work_with_a_matrix_too() {
+    let side = side(8);
+    let mut image = vec![0.0; 64];
+    (image[10], image[37]) = (2.0, 1.0);
+    let (own, y) = binary(side, 20, &image);
+    let spikes: Vec<f32> = (0..64 * 64).map(|p| f32::from(u8::from(p % 65 == 0))).collect();
+    for atoms in [None, Some(spikes)] {
+        let settings = MatrixSettings {
+            basis: Basis::Pixel,
+            atoms,
+            non_negative: true,
+            ..MatrixSettings::new(MatrixMethod::Omp)
+        };
+        let found = own.reconstruct(&y, &settings).unwrap().image;
+        assert!(found.pixels().iter().all(|&p| p >= 0.0));
+        let brightest = (0..64).max_by(|&a, &b| found.pixels()[a].total_cmp(&found.pixels()[b]));
+        assert_eq!(brightest, Some(10));
+        assert!((found.pixels()[10] - 2.0).abs() < 0.2 && (found.pixels()[37] - 1.0).abs() < 0.2);
+    }
+}
+
+#[test]
+fn units_of_patterns_and_measurements_do_not_matter() {
+    let (side, image) = (side(8), scene(side(8), 1));
+    let (own, y) = binary(side, 40, &image);
+    let larger = OwnMatrix { patterns: &own.patterns * 1e6, ..own.clone() };
+    let volts: Vec<f64> = y.iter().map(|y| y * 1e-3).collect();
+    for method in METHODS {
+        let settings = MatrixSettings::new(method);
+        let found = own.reconstruct(&y, &settings).unwrap();
+        let other = larger.reconstruct(&volts, &settings).unwrap();
+        assert_eq!((found.strength, found.atoms), (other.strength, other.atoms));
+        for (a, b) in found.image.pixels().iter().zip(other.image.pixels()) {
+            assert!((f64::from(*a) - 1e9 * f64::from(*b)).abs() < 1e-3, "{method:?}: {a} {b}");
+        }
+    }
+}
+
+#[test]
+fn what_is_wrong_with_a_matrix_is_named() {
+    let side = side(2);
+    let refused = |weights: &[f64]| OwnMatrix::new(side, weights).unwrap_err().to_string();
+    assert!(refused(&[1.0; 6]).contains("multiple of the 4 pixels of a 2 x 2 image"));
+    assert!(refused(&[]).contains("0 numbers"));
+    let mut weights = [1.0; 8];
+    weights[6] = f64::NAN;
+    assert!(refused(&weights).contains("matrix is NaN at [1, 2]"), "{}", refused(&weights));
+    assert!(refused(&[0.0; 8]).contains("rank 0"));
+    let own = OwnMatrix::new(side, &[1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0]).unwrap();
+    assert_eq!((own.rank(), own.unseen_pixels(), own.patterns()), (2, 2, 2));
+    let sound = MatrixSettings::new(MatrixMethod::Omp);
+    let wrong = own.reconstruct(&[1.0], &sound).unwrap_err().to_string();
+    assert!(wrong.contains("1 measurements by 2 patterns"), "{wrong}");
+    let wrong = own.reconstruct(&[1.0, f64::INFINITY], &sound).unwrap_err().to_string();
+    assert!(wrong.contains("y is inf at [1, 0]"), "{wrong}");
+    let settings = MatrixSettings { non_negative: true, ..sound };
+    let wrong = own.reconstruct(&[1.0, 1.0], &settings).unwrap_err();
+    assert_eq!(wrong, MatrixError::Signed { basis: Basis::Dct });
+}
