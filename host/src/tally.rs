@@ -114,3 +114,30 @@ pub fn tally_recording(
     let counters = tally.account.counters();
     Ok((tally.integrated, counters))
 }
+
+/// What each frame of a recording that arrived in order says by itself, and what became of all of them.
+///
+/// # Errors
+/// [`RecordingError`] where the file cannot be read.
+pub fn frames_of_recording(
+    path: &Path,
+    setup: &MeasurementSetup,
+) -> Result<(Vec<Integrated>, LossCounters), RecordingError> {
+    let mut tally = Tally::new(setup, None);
+    let (mut frames, mut scratch) = (Vec::new(), Vec::new());
+    recording::read(path, |packet, _| {
+        scratch.clear();
+        scratch.extend_from_slice(packet.strip_suffix(&[0]).unwrap_or(packet));
+        let content = open(&mut scratch);
+        let before = tally.integrated.frames();
+        tally.packet(&content);
+        if let (true, Ok(DeviceMessage::Frame(frame))) =
+            (tally.integrated.frames() > before, &content)
+        {
+            let mut alone = Integrated::new(setup);
+            alone.add(frame);
+            frames.push(alone);
+        }
+    })?;
+    Ok((frames, tally.account.counters()))
+}

@@ -6,12 +6,13 @@ use clap::{Args, ValueEnum};
 use nirspi::files::npy::read_stack;
 use nirspi_recon::omp::{Backend, Stop};
 use nirspi_recon::reconstruct::{
-    self, Completion, OmpSettings, Penalty, RegularisedSettings, Sparsity, Strength,
+    self, Completion, OmpReconstruction, OmpSettings, Penalty, RegularisedSettings, Sparsity,
+    Strength,
 };
 use nirspi_recon::{Basis, Image, Measurements};
 use serde::Serialize;
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 /// How to invert.
@@ -33,6 +34,18 @@ pub enum Method {
 }
 
 impl Method {
+    /// In a few words.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Hadamard => "inverse Hadamard transform",
+            Self::Omp => "OMP",
+            Self::PseudoInverse => "pseudo-inverse",
+            Self::Tikhonov => "Tikhonov",
+            Self::Fista => "FISTA",
+            Self::Tv => "total variation",
+        }
+    }
+
     fn penalty(self) -> Option<Penalty> {
         match self {
             Self::Hadamard | Self::PseudoInverse | Self::Omp => None,
@@ -81,9 +94,13 @@ pub struct MethodArgs {
     /// The paper's Algorithm 1 as printed: no prior, no cross-validation, an exactly sparse image
     #[arg(long, requires = "sparsity", conflicts_with = "keep")]
     pub as_printed: bool,
-    /// What becomes of patterns that were measured
-    #[arg(long, value_enum, default_value_t = Keep::Measured)]
-    pub keep: Keep,
+    /// OMP: no negative light, in single pixels (--basis pixel) or images of your own (--dictionary)
+    #[arg(long, conflicts_with = "as_printed")]
+    pub non_negative: bool,
+    /// What becomes of patterns that were measured; without it, they are kept, but with --non-negative, whose light they
+    /// would take below 0
+    #[arg(long, value_enum)]
+    pub keep: Option<Keep>,
     /// OMP: what computes: auto, cpu, wgpu, cuda; one image is too little for a GPU, so auto is the cpu
     #[arg(long, value_name = "BACKEND", default_value_t = Backend::Auto)]
     pub backend: Backend,
@@ -107,6 +124,16 @@ impl MethodArgs {
             let text = format!("--backend {} belongs to --method omp", self.backend);
             return Err(Usage(text).into());
         }
+        if self.non_negative && self.method != Method::Omp {
+            return Err(Usage("--non-negative belongs to --method omp".to_owned()).into());
+        }
+        if self.non_negative && self.dictionary.is_none() && self.basis()? != Basis::Pixel {
+            let text = format!(
+                "--non-negative in the {} basis, whose atoms are negative themselves, expected --basis pixel or --dictionary",
+                self.basis
+            );
+            return Err(Usage(text).into());
+        }
         if let Some(found) = self.strength {
             if !(found > 0.0 && found <= 1e6) {
                 let text = format!("--strength is {found}, expected more than 0, at most 1e6");
@@ -120,9 +147,88 @@ impl MethodArgs {
         Ok(())
     }
 
-    fn basis(&self) -> Result<Basis> {
+    /// The basis asked for.
+    pub fn basis(&self) -> Result<Basis> {
         Basis::from_str(&self.basis).map_err(|error| Usage(format!("--basis: {error}")).into())
     }
+
+    fn kept(&self) -> Keep {
+        let sparse = self.as_printed || self.non_negative;
+        self.keep.unwrap_or(if sparse { Keep::Sparse } else { Keep::Measured })
+    }
+
+    /// What to ask of OMP, and the name of the GPU that computes one image, if one does.
+    pub fn omp_settings(&self) -> Result<(OmpSettings, Option<String>)> {
+        let device = backend::choose(self.backend, 1)?.as_ref().map(backend::name);
+        let backend = if device.is_some() { self.backend } else { Backend::Cpu };
+        let mut settings = OmpSettings {
+            basis: self.basis()?,
+            backend,
+            residual: self.residual,
+            completion: self.kept().completion(),
+            non_negative: self.non_negative,
+            ..OmpSettings::default()
+        };
+        if let Some(atoms) = self.sparsity {
+            settings.sparsity = Sparsity::Fixed(atoms);
+            if self.as_printed {
+                let printed = OmpSettings::as_printed(settings.basis, atoms);
+                settings = OmpSettings { residual: self.residual, backend, ..printed };
+            }
+        }
+        if self.stop_at_noise {
+            settings.sparsity = Sparsity::Noise;
+        }
+        Ok((settings, device))
+    }
+
+    /// What OMP found with these settings, on this GPU.
+    pub fn solved(
+        &self,
+        found: OmpReconstruction,
+        settings: &OmpSettings,
+        device: Option<String>,
+    ) -> Solved {
+        let omp = OmpReport {
+            basis: match &self.dictionary {
+                None => self.basis.clone(),
+                Some(path) => path.display().to_string(),
+            },
+            backend: settings.backend.name(),
+            device,
+            sparsity: found.sparsity,
+            keep: self.kept(),
+            stop: self.reason(found.stop),
+            relative_residual: found.residual,
+            unseen_atoms: found.unseen_atoms,
+            trust_in_prediction: found.trust,
+            noise_of_a_measurement: found.noise,
+        };
+        let report = Report { method: self.method, omp: Some(omp), penalty: None };
+        Solved { image: found.image, report }
+    }
+
+    /// Why there are no more atoms.
+    pub fn reason(&self, stop: Stop) -> &'static str {
+        match stop {
+            Stop::Sparsity if self.sparsity.is_some() => "as many atoms as asked for",
+            Stop::Sparsity => "more atoms predict no better",
+            Stop::Residual if self.stop_at_noise => "no more than noise is left",
+            Stop::Residual => "residual reached",
+            Stop::NoAtomLeft => "no atom left that explains more",
+            Stop::Dependent => "atoms left are combinations of those chosen",
+        }
+    }
+}
+
+/// Images of one's own as atoms, of the side that was measured.
+pub fn read_atoms(path: &Path, side: usize) -> Result<Vec<f32>> {
+    let atoms = read_stack(path)?;
+    let shape = (atoms.height, atoms.width);
+    if shape != (side, side) {
+        bail!("{}: images of {shape:?}, expected {:?}", path.display(), (side, side));
+    }
+    Ok(atoms.values)
 }
 
 /// What was done and found.
@@ -212,7 +318,6 @@ pub struct Solved {
 
 /// Makes the image.
 pub fn solve(args: &MethodArgs, measurements: &Measurements) -> Result<Solved> {
-    let keep = if args.as_printed { Keep::Sparse } else { args.keep };
     if let Some(penalty) = args.method.penalty() {
         return penalised(args, penalty, measurements);
     }
@@ -221,69 +326,22 @@ pub fn solve(args: &MethodArgs, measurements: &Measurements) -> Result<Solved> {
         let report = Report { method: args.method, omp: None, penalty: None };
         return Ok(Solved { image, report });
     }
-    // One image.
-    let device = backend::choose(args.backend, 1)?.as_ref().map(backend::name);
-    let computes = if device.is_some() { args.backend } else { Backend::Cpu };
-    let mut settings = OmpSettings {
-        basis: args.basis()?,
-        backend: computes,
-        residual: args.residual,
-        completion: keep.completion(),
-        ..OmpSettings::default()
-    };
-    if let Some(atoms) = args.sparsity {
-        settings.sparsity = Sparsity::Fixed(atoms);
-        if args.as_printed {
-            let printed = OmpSettings::as_printed(settings.basis, atoms);
-            settings = OmpSettings { residual: args.residual, backend: computes, ..printed };
-        }
-    }
-    if args.stop_at_noise {
-        settings.sparsity = Sparsity::Noise;
-    }
+    let (settings, device) = args.omp_settings()?;
     let found = match &args.dictionary {
         None => reconstruct::omp(measurements, &settings)?,
         Some(path) => {
-            let atoms = read_stack(path)?;
-            let (side, shape) = (measurements.side().pixels(), (atoms.height, atoms.width));
-            if shape != (side, side) {
-                bail!("{}: images of {shape:?}, expected {:?}", path.display(), (side, side));
-            }
-            reconstruct::omp_over(measurements, &atoms.values, &settings)
+            let atoms = read_atoms(path, measurements.side().pixels())?;
+            reconstruct::omp_over(measurements, &atoms, &settings)
                 .with_context(|| path.display().to_string())?
         }
     };
-    let basis = match &args.dictionary {
-        None => settings.basis.to_string(),
-        Some(path) => path.display().to_string(),
-    };
-    let omp = OmpReport {
-        basis,
-        backend: computes.name(),
-        device,
-        sparsity: found.sparsity,
-        keep,
-        stop: match found.stop {
-            Stop::Sparsity if args.sparsity.is_some() => "as many atoms as asked for",
-            Stop::Sparsity => "more atoms predict no better",
-            Stop::Residual if args.stop_at_noise => "no more than noise is left",
-            Stop::Residual => "residual reached",
-            Stop::NoAtomLeft => "no atom left that explains more",
-            Stop::Dependent => "atoms left are combinations of those chosen",
-        },
-        relative_residual: found.residual,
-        unseen_atoms: found.unseen_atoms,
-        trust_in_prediction: found.trust,
-        noise_of_a_measurement: found.noise,
-    };
-    let report = Report { method: args.method, omp: Some(omp), penalty: None };
-    Ok(Solved { image: found.image, report })
+    Ok(args.solved(found, &settings, device))
 }
 
 fn penalised(args: &MethodArgs, penalty: Penalty, measurements: &Measurements) -> Result<Solved> {
     let mut settings = RegularisedSettings {
         basis: args.basis()?,
-        completion: args.keep.completion(),
+        completion: args.kept().completion(),
         ..RegularisedSettings::new(penalty)
     };
     if let Some(strength) = args.strength {
@@ -294,7 +352,7 @@ fn penalised(args: &MethodArgs, penalty: Penalty, measurements: &Measurements) -
     let penalty = PenaltyReport {
         basis,
         strength: found.strength,
-        keep: args.keep,
+        keep: args.kept(),
         relative_residual: found.residual,
         trust_in_prediction: found.trust,
         noise_of_a_measurement: found.noise,

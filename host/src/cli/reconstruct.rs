@@ -1,12 +1,14 @@
 //! `nirspi reconstruct`: an image from measurements, ours or anybody's.
 
 mod enhanced;
+mod matrix;
+mod stack;
 
 use super::camera::{check_sampling, parse_order};
 use super::method::{MethodArgs, Solved, solve};
-use super::print;
 use super::report::StageTimes;
-use super::source::{Source, SourceArgs};
+use super::source::{Index, Source, SourceArgs};
+use super::{Usage, print};
 use anyhow::{Context, Result, bail};
 use indicatif::ProgressBar;
 use nirspi::account::LossCounters;
@@ -24,7 +26,9 @@ use std::time::Duration;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi reconstruct wing.npz --method hadamard --out out/\n\
-    \x20 nirspi reconstruct wing.npz --method omp --sampling 0.3 --basis dct --out out/")]
+    \x20 nirspi reconstruct wing.npz --method omp --sampling 0.3 --basis dct --out out/\n\
+    \x20 nirspi reconstruct dmd.npz --matrix patterns.npy --method tv --out out/\n\
+    \x20 nirspi reconstruct rec.mcap --index all --warm-start --sampling 0.3 --out video/")]
 pub struct Args {
     #[command(flatten)]
     method: MethodArgs,
@@ -35,6 +39,14 @@ pub struct Args {
     /// natural order, whose first part cannot resolve an image
     #[arg(long, value_name = "ORDER")]
     order: Option<String>,
+    /// Patterns of your own instead of Hadamard rows: (M, n * n) weights, a pattern a row, of which `y` in the input has one
+    /// reading each. --strength is then relative to the readings' variance
+    #[arg(long, value_name = "NPY", conflicts_with_all = ["order", "keep", "residual", "stop_at_noise", "as_printed",
+          "non_differential", "keep_leak", "warm_start"])]
+    matrix: Option<PathBuf>,
+    /// OMP of --index all: start each frame from the one before, as long as that explains it as well
+    #[arg(long, conflicts_with_all = ["dictionary", "non_negative"])]
+    warm_start: bool,
     #[command(flatten)]
     source: SourceArgs,
     /// Also enlarge and deblur the image, of 32 x 32 or 64 x 64 pixels, by the learned stages (enhanced.npy and .png);
@@ -81,27 +93,27 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     check_sampling(args.sampling)?;
     let order = args.order.as_deref().filter(|o| *o != "recorded").map(parse_order).transpose()?;
     args.method.check()?;
+    if let Some(path) = &args.matrix {
+        return matrix::run(args, path);
+    }
+    if args.source.index == Some(Index::All) {
+        return stack::run(args, order);
+    }
+    if args.warm_start {
+        return Err(Usage("--warm-start belongs to --index all".to_owned()).into());
+    }
     let mut times = StageTimes::default();
 
     let source = times.time("read", || args.source.load())?;
     let all = source.measurements.rows().len();
-    let (order, order_name) = choose_order(args, order, &source)?;
+    let (order, order_name) = choose_order(args, order, &source);
     let used = source
         .measurements
         .take(order.as_ref(), args.sampling)
         .with_context(|| args.source.input.display().to_string())?;
-    // Thousands of patterns take OMP seconds.
-    let spinner = ProgressBar::new_spinner().with_message("reconstructing");
-    spinner.enable_steady_tick(Duration::from_millis(100));
-    let solved = times.time("reconstruct", || solve(&args.method, &used));
-    spinner.finish_and_clear();
+    let solved = times.time("reconstruct", || spinning(|| solve(&args.method, &used)));
     let Solved { image, report: method } = solved?;
-    if !image.pixels().iter().all(|pixel| pixel.is_finite()) {
-        bail!(
-            "{}: the readings are too large for an image of 32-bit floats",
-            args.source.input.display()
-        );
-    }
+    check_finite(args, &image)?;
 
     let side = image.side().pixels();
     let correlation = source.reference.as_ref().and_then(|reference| {
@@ -146,27 +158,40 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 }
 
 /// Which patterns come first, and what to call that.
-fn choose_order(
-    args: &Args,
-    asked: Option<Order>,
-    source: &Source,
-) -> Result<(Option<Order>, String)> {
+fn choose_order(args: &Args, asked: Option<Order>, source: &Source) -> (Option<Order>, String) {
     if let Some(order) = asked {
         let name = order.to_string();
-        return Ok((Some(order), name));
+        return (Some(order), name);
     }
     let automatic = reconstruct::default_selection(source.measurements.rows());
     match automatic {
         // All patterns give the same image in any order.
         Some(order) if args.order.is_none() && args.sampling < 1.0 => {
             let name = format!("{order} (the recorded order is the natural one)");
-            Ok((Some(order), name))
+            (Some(order), name)
         }
-        _ => Ok((None, "recorded".to_owned())),
+        _ => (None, "recorded".to_owned()),
     }
 }
 
-fn write(args: &Args, image: &Image, sharp: Option<&[f32]>, report: &Report) -> Result<()> {
+/// Shows that something is done: thousands of patterns take OMP seconds.
+fn spinning<T>(work: impl FnOnce() -> T) -> T {
+    let spinner = ProgressBar::new_spinner().with_message("reconstructing");
+    spinner.enable_steady_tick(Duration::from_millis(100));
+    let done = work();
+    spinner.finish_and_clear();
+    done
+}
+
+fn check_finite(args: &Args, image: &Image) -> Result<()> {
+    if image.pixels().iter().all(|pixel| pixel.is_finite()) {
+        return Ok(());
+    }
+    let input = args.source.input.display();
+    bail!("{input}: the readings are too large for an image of 32-bit floats")
+}
+
+fn write(args: &Args, image: &Image, sharp: Option<&[f32]>, report: &impl Serialize) -> Result<()> {
     let side = image.side().pixels();
     let mut out = OutputDir::create(&args.out)?;
     out.write("image.npy", &npy::encode(&[side, side], image.pixels()))?;

@@ -17,4 +17,9 @@ impl StageTimes {
         self.0.insert(stage.to_owned(), serde_json::json!((ms * 1e3).round() / 1e3));
         result
     }
+
+    /// Milliseconds of a stage; 0 where it did not run.
+    pub fn of(&self, stage: &str) -> f64 {
+        self.0.get(stage).and_then(serde_json::Value::as_f64).unwrap_or(0.0)
+    }
 }

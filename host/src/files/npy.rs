@@ -89,6 +89,33 @@ pub fn read_list(path: &Path) -> Result<Vec<f64>, FileError> {
     Ok(read_numbers(path, EXPECTED_LIST, fits, "(N,)")?.1)
 }
 
+/// A matrix, row-major.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Matrix {
+    /// Rows, at least 1.
+    pub rows: usize,
+    /// Columns, at least 1.
+    pub columns: usize,
+    /// `rows * columns` finite values.
+    pub values: Vec<f64>,
+}
+
+/// Reads a `.npy` file of shape `(M, N)`, any real dtype.
+///
+/// # Errors
+/// [`FileError`], one line that names file, what was found and what was expected.
+pub fn read_matrix(path: &Path) -> Result<Matrix, FileError> {
+    let fits = |shape: &[u64]| shape.len() == 2 && !shape.contains(&0);
+    let expected = "a NumPy array (.npy) of patterns, (M, N)";
+    let (header, values) = read_numbers::<f64>(path, expected, fits, "(M, N), a pattern a row")?;
+    let [rows, columns] = [0, 1].map(|axis| header.shape()[axis] as usize);
+    if let Some(flat) = values.iter().position(|value| !value.is_finite()) {
+        let found = format!("is {} at [{}, {}]", values[flat], flat / columns, flat % columns);
+        return Err(refuse(path, found, "finite numbers"));
+    }
+    Ok(Matrix { rows, columns, values })
+}
+
 fn read(path: &Path) -> Result<(Header, Stack), FileError> {
     let fits = |shape: &[u64]| matches!(shape.len(), 2 | 3) && !shape.contains(&0);
     let (header, values) = read_numbers::<f32>(path, EXPECTED, fits, "(N, H, W) or (H, W)")?;

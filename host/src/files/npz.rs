@@ -61,6 +61,46 @@ pub struct MeasurementFile {
 /// # Errors
 /// [`FileError`], one line that names file, field, what was found and what was expected.
 pub fn read(path: &Path, want: Selection) -> Result<MeasurementFile, FileError> {
+    let wanted = Wanted { which: Which::One(want.index), non_differential: want.non_differential };
+    read_wanted(path, wanted).map(|mut all| all.remove(0))
+}
+
+/// Reads and checks every measurement of a file, in their order: a video.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_all(path: &Path, non_differential: bool) -> Result<Vec<MeasurementFile>, FileError> {
+    read_wanted(path, Wanted { which: Which::Every, non_differential })
+}
+
+/// Reads `length` readings, `y` or else `d`, of patterns that the file does not name.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_plain(path: &Path, index: Option<usize>, length: usize) -> Result<Vec<f64>, FileError> {
+    let mut archive = Archive::open(path)?;
+    let field = if archive.holds("d") && !archive.holds("y") { "d" } else { "y" };
+    require(&archive, field, "y, one reading a pattern")?;
+    let hint = (2 * length, "; of +, - pairs give the differences");
+    let which = Which::One(index);
+    let series = read_series(&mut archive, field, length, hint, "one reading a pattern", which);
+    series.map(|mut series| series.remove(0))
+}
+
+/// Which measurements of a file.
+#[derive(Debug, Clone, Copy)]
+enum Which {
+    One(Option<usize>),
+    Every,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Wanted {
+    which: Which,
+    non_differential: bool,
+}
+
+fn read_wanted(path: &Path, want: Wanted) -> Result<Vec<MeasurementFile>, FileError> {
     let mut archive = Archive::open(path)?;
     for field in ["n", "h_row"] {
         require(&archive, field, "n, h_row, and y or d")?;
@@ -73,7 +113,14 @@ pub fn read(path: &Path, want: Selection) -> Result<MeasurementFile, FileError> 
         notes.push(format!("not compared with the reconstruction in the file: {error}"));
         None
     });
-    Ok(MeasurementFile { side, h_row, readings, reference, notes })
+    let file = |readings| MeasurementFile {
+        side,
+        h_row: h_row.clone(),
+        readings,
+        reference: reference.clone(),
+        notes: notes.clone(),
+    };
+    Ok(readings.into_iter().map(file).collect())
 }
 
 fn require(
@@ -137,19 +184,22 @@ fn read_rows(archive: &mut Archive, side: Side) -> Result<Vec<i64>, FileError> {
 fn read_readings(
     archive: &mut Archive,
     rows: usize,
-    want: Selection,
-) -> Result<Readings, FileError> {
+    want: Wanted,
+) -> Result<Vec<Readings>, FileError> {
+    let all = |series: Vec<Vec<f64>>, kind: fn(Vec<f64>) -> Readings| -> Vec<Readings> {
+        series.into_iter().map(kind).collect()
+    };
     if want.non_differential {
         require(archive, "y", "y, the readings, for --non-differential")?;
         let hint = (2 * rows, "; these look like +, - pairs: leave out --non-differential");
-        return read_series(archive, "y", rows, hint, "one reading a row", want)
-            .map(Readings::Single);
+        return read_series(archive, "y", rows, hint, "one reading a row", want.which)
+            .map(|series| all(series, Readings::Single));
     }
     if !archive.holds("y") {
         require(archive, "d", "y (raw readings) or d (differential)")?;
         let hint = (2 * rows, "; +, - pairs belong in `y`");
-        return read_series(archive, "d", rows, hint, "one difference a row", want)
-            .map(Readings::Differential);
+        return read_series(archive, "d", rows, hint, "one difference a row", want.which)
+            .map(|series| all(series, Readings::Differential));
     }
     if archive.holds("d") {
         let differences = archive.numbers("d", |shape| match is_series(shape, rows) {
@@ -159,18 +209,19 @@ fn read_readings(
         check_finite(archive, "d", &differences, 0)?;
     }
     let hint = (rows, "; one reading a row is read with --non-differential");
-    read_series(archive, "y", 2 * rows, hint, "a +, - pair a row", want).map(Readings::Pairs)
+    read_series(archive, "y", 2 * rows, hint, "a +, - pair a row", want.which)
+        .map(|series| all(series, Readings::Pairs))
 }
 
-/// Reads `length` numbers from a field that holds one series or, chosen by index, a row of several.
+/// Reads `length` numbers from a field that holds one series or, chosen by index, a row of several; or all of these.
 fn read_series(
     archive: &mut Archive,
     field: &'static str,
     length: usize,
     (mistaken_length, hint): (usize, &str),
     meaning: &str,
-    want: Selection,
-) -> Result<Vec<f64>, FileError> {
+    which: Which,
+) -> Result<Vec<Vec<f64>>, FileError> {
     let numbers = archive.numbers(field, |shape| match is_series(shape, length) {
         true => Ok(()),
         false => {
@@ -179,20 +230,19 @@ fn read_series(
         }
     })?;
     let count = numbers.values.len() / length;
+    let Which::One(asked) = which else {
+        check_finite(archive, field, &numbers, 0)?;
+        return Ok(numbers.values.chunks_exact(length).map(<[f64]>::to_vec).collect());
+    };
     // A single measurement needs no choice, however many axes it is stored with.
-    let chosen = want.index.or((count == 1).then_some(0)).filter(|&index| index < count);
+    let chosen = asked.or((count == 1).then_some(0)).filter(|&index| index < count);
     let Some(index) = chosen else {
-        return Err(FileError::Choice {
-            path: archive.path().to_owned(),
-            field,
-            count,
-            asked: want.index,
-        });
+        return Err(FileError::Choice { path: archive.path().to_owned(), field, count, asked });
     };
     let start = index * length;
     let series = Numbers { values: numbers.values[start..start + length].to_vec(), ..numbers };
     check_finite(archive, field, &series, start)?;
-    Ok(series.values)
+    Ok(vec![series.values])
 }
 
 /// Whether an array of this shape holds one series of `length` numbers, or several as rows.

@@ -131,3 +131,134 @@ fn a_run_that_fails_leaves_older_results_alone() {
     assert_eq!(std::fs::read(bench.path("out/report.json")).unwrap(), before);
     assert_eq!(std::fs::read_dir(bench.path("out")).unwrap().count(), 3);
 }
+
+#[test]
+fn light_that_may_not_be_negative_is_not() {
+    let (bench, measured) = (Bench::new(), Measured::new(16));
+    bench.write("in.npz", &measured.npz());
+    let part = ["reconstruct", "in.npz", "--sampling", "0.5", "--non-negative"];
+    bench.run(&[&part[..], &["--basis", "pixel", "--sparsity", "40"]].concat()).succeeded();
+    assert!(bench.pixels("out/image.npy").iter().all(|&p| p > -1e-5));
+    assert_eq!(bench.json("out/report.json")["omp"]["keep"], "sparse");
+    bench
+        .run(&part)
+        .failed(2, &["--non-negative in the dct basis", "--basis pixel or --dictionary"]);
+    let tv = [&part[..], &["--basis", "pixel", "--method", "tv"]].concat();
+    bench.run(&tv).failed(2, &["--non-negative belongs to --method omp"]);
+}
+
+/// Frames of the phantom, brighter and brighter, as a stack.
+fn stack(measured: &Measured, frames: usize) -> Vec<u8> {
+    let count = measured.h_row.len();
+    let brighter = |k: usize| 1.0 + 0.1 * k as f32;
+    let all: Vec<f32> =
+        (0..frames).flat_map(|k| measured.d.iter().map(move |d| d * brighter(k))).collect();
+    let fields: [(&str, &[usize], &[f32]); 3] = [
+        ("n", &[], &[measured.n as f32]),
+        ("h_row", &[count], &measured.h_row),
+        ("d", &[frames, count], &all),
+    ];
+    npz(&fields)
+}
+
+#[test]
+fn all_measurements_of_a_file_are_reconstructed_one_by_one_or_each_from_the_one_before() {
+    let (bench, measured) = (Bench::new(), Measured::new(16));
+    bench.write("in.npz", &stack(&measured, 4));
+    let part =
+        ["reconstruct", "in.npz", "--index", "all", "--sampling", "0.4", "--order", "zig-zag"];
+    let cold = bench.run(&[&part[..], &["--out", "cold", "--json"]].concat()).succeeded().json();
+    let warm = bench.run(&[&part[..], &["--out", "warm", "--warm-start"]].concat()).succeeded();
+    assert!(warm.stdout.contains("4 frames of 16 x 16") && warm.stdout.contains("3 started from"));
+    assert_eq!(
+        (&cold["frames"][3]["warm"], cold["frames"].as_array().unwrap().len()),
+        (&false.into(), 4)
+    );
+    assert_eq!(bench.json("warm/report.json")["frames"][3]["warm"], true);
+    let (cold, warm) = (bench.pixels("cold/image.npy"), bench.pixels("warm/image.npy"));
+    assert_eq!((cold.len(), warm.len()), (4 * 256, 4 * 256));
+    for (cold, warm) in cold.chunks(256).zip(warm.chunks(256)) {
+        assert!(correlation(cold, warm) > 0.99);
+    }
+    bench
+        .run(&["reconstruct", "in.npz", "--index", "1", "--warm-start"])
+        .failed(2, &["--warm-start belongs to --index all"]);
+    bench.run(&["reconstruct", "in.npz", "--index", "some"]).failed(2, &["a number or all"]);
+    bench.run(&["eval", "sampling", "in.npz", "--index", "all"]).failed(2, &["one measurement"]);
+}
+
+/// Patterns of zeros and ones that no one has a name for, and what they measure of the phantom.
+fn own_patterns(measured: &Measured, patterns: usize) -> (Vec<f32>, Vec<f32>) {
+    let area = measured.n * measured.n;
+    let mut state = 1_u32;
+    let weights: Vec<f32> = (0..patterns * area)
+        .map(|_| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 31) as f32
+        })
+        .collect();
+    let see = |p: &[f32]| p.iter().zip(&measured.image).map(|(w, v)| w * v).sum::<f32>();
+    let y = weights.chunks_exact(area).map(see).collect();
+    (weights, y)
+}
+
+#[test]
+fn patterns_of_the_users_own_are_inverted_by_every_method() {
+    let (bench, measured) = (Bench::new(), Measured::new(16));
+    let (weights, y) = own_patterns(&measured, 150);
+    bench.write("phi.npy", &nirspi::files::npy::encode(&[150, 256], &weights));
+    bench.write("in.npz", &npz(&[("y", &[150], &y)]));
+    let run = |more: &[&str]| {
+        bench.run(&[&["reconstruct", "in.npz", "--matrix", "phi.npy"], more].concat())
+    };
+    let mut least = 1.0;
+    for method in ["pseudo-inverse", "tikhonov", "fista", "tv", "omp"] {
+        run(&["--method", method]).succeeded();
+        let found = correlation(&bench.pixels("out/image.npy"), &measured.image);
+        if method == "pseudo-inverse" {
+            least = found;
+        } else {
+            assert!(found > least, "{method}: {found}, pseudo-inverse {least}");
+        }
+        let report = bench.json("out/report.json");
+        assert_eq!((&report["method"], &report["rank"]), (&method.into(), &150.into()));
+    }
+    run(&["--method", "tv", "--sampling", "0.25"]).succeeded();
+    assert_eq!(bench.json("out/report.json")["used"], 64);
+}
+
+#[test]
+fn what_is_wrong_with_patterns_of_the_users_own_is_named() {
+    let (bench, measured) = (Bench::new(), Measured::new(4));
+    let (mut weights, y) = own_patterns(&measured, 10);
+    let write = |name: &str, shape: &[usize], values: &[f32]| {
+        bench.write(name, &nirspi::files::npy::encode(shape, values));
+    };
+    bench.write("in.npz", &npz(&[("y", &[10], &y)]));
+    let run = |matrix: &str, more: &[&str]| {
+        bench.run(&[&["reconstruct", "in.npz", "--matrix", matrix], more].concat())
+    };
+    write("nine.npy", &[9, 16], &weights[..144]);
+    run("nine.npy", &[])
+        .failed(1, &["in.npz", "`y` has shape (10,)", "(9,)", "one reading a pattern"]);
+    write("pairs.npy", &[5, 16], &weights[..80]);
+    run("pairs.npy", &[]).failed(1, &["of +, - pairs give the differences"]);
+    write("odd.npy", &[10, 15], &weights[..150]);
+    run("odd.npy", &[]).failed(1, &["odd.npy", "15 weights", "a power of two"]);
+    write("flat.npy", &[160], &weights);
+    run("flat.npy", &[]).failed(1, &["flat.npy", "has shape (160,)", "(M, N)"]);
+    write("dark.npy", &[10, 16], &[0.0; 160]);
+    run("dark.npy", &[]).failed(1, &["dark.npy", "rank 0"]);
+    write("phi.npy", &[10, 16], &weights);
+    run("phi.npy", &["--method", "hadamard"]).failed(2, &["none of Hadamard's", "pseudo-inverse"]);
+    run("phi.npy", &["--order", "zig-zag"]).failed(2, &["--matrix", "--order"]);
+    weights[35] = f32::NAN;
+    write("phi.npy", &[10, 16], &weights);
+    run("phi.npy", &[]).failed(1, &["phi.npy", "is NaN at [2, 3]"]);
+    assert!(!bench.names().contains(&"out".to_owned()));
+    // Twice the same pattern is no mistake.
+    weights.copy_within(16..32, 32);
+    write("phi.npy", &[10, 16], &weights);
+    let said = run("phi.npy", &["--method", "pseudo-inverse"]).succeeded();
+    assert!(said.stdout.contains("rank 9") && said.stdout.contains("1 of 10 patterns"), "{said:?}");
+}

@@ -6,7 +6,7 @@
 use super::measure::{Condition, SIDE, halved};
 use super::rows::Row;
 use super::{MIDDLE, UNTOUCHED};
-use crate::cli::source::SourceArgs;
+use crate::cli::source::{Index, SourceArgs};
 use anyhow::{Context, Result};
 use indicatif::ProgressBar;
 use nirspi::files::image::read_reflectance;
@@ -127,7 +127,7 @@ fn part_of(picture: &[f32], size_px: usize, down: f64, across: f64) -> Vec<f32> 
 fn measured(file: &Path) -> Result<Scene> {
     let source = SourceArgs {
         input: file.to_owned(),
-        index: Some(0),
+        index: Some(Index::One(0)),
         non_differential: false,
         keep_leak: false,
     };

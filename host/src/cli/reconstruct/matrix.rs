@@ -1,0 +1,155 @@
+//! `nirspi reconstruct --matrix`: measurements by patterns of the user's own.
+
+use super::{Args, print, spinning};
+use crate::cli::Usage;
+use crate::cli::method::{Method, read_atoms};
+use crate::cli::report::StageTimes;
+use anyhow::{Context, Result, bail};
+use nirspi::files::{npy, npz};
+use nirspi_recon::Side;
+use nirspi_recon::reconstruct::{MatrixMethod, MatrixSettings, OwnMatrix};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+#[derive(Debug, Serialize)]
+struct Report {
+    input: PathBuf,
+    matrix: PathBuf,
+    n: usize,
+    patterns: usize,
+    used: usize,
+    /// Patterns used that are no combination of others.
+    rank: usize,
+    unseen_pixels: usize,
+    method: Method,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    basis: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    strength: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sparsity: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    stop: Option<&'static str>,
+    relative_residual: f64,
+    notes: Vec<String>,
+    stage_ms: StageTimes,
+}
+
+pub fn run(args: &Args, path: &Path) -> Result<ExitCode> {
+    let mut settings = settings(args)?;
+    let index = args.source.one()?;
+    let mut times = StageTimes::default();
+    let matrix = times.time("read", || npy::read_matrix(path))?;
+    let n = matrix.columns.isqrt();
+    let side = Side::new(n as u64).ok().filter(|side| side.area() == matrix.columns);
+    let Some(side) = side else {
+        bail!(
+            "{}: {} patterns of {} weights, expected n * n weights with n a power of two from 2 to 256",
+            path.display(),
+            matrix.rows,
+            matrix.columns
+        );
+    };
+    let y = npz::read_plain(&args.source.input, index, matrix.rows)?;
+    if let Some(atoms) = &args.method.dictionary {
+        settings.atoms = Some(read_atoms(atoms, n)?);
+    }
+    let most = ((args.sampling * side.area() as f64).round() as usize).max(1);
+    let used = if args.sampling < 1.0 { matrix.rows.min(most) } else { matrix.rows };
+    let named = || path.display().to_string();
+    let weights = &matrix.values[..used * matrix.columns];
+    let own = times.time("rank", || OwnMatrix::new(side, weights)).with_context(named)?;
+    let solve = || spinning(|| own.reconstruct(&y[..used], &settings));
+    let found = times.time("reconstruct", solve).with_context(named)?;
+    super::check_finite(args, &found.image)?;
+
+    let mut notes = Vec::new();
+    if own.rank() < used.min(side.area()) {
+        let others = used - own.rank();
+        notes.push(format!("{others} of {used} patterns are combinations of others"));
+    }
+    if own.unseen_pixels() > 0 {
+        notes.push(format!("{} pixels are seen by no pattern", own.unseen_pixels()));
+    }
+    let has_basis =
+        !matches!(settings.method, MatrixMethod::PseudoInverse | MatrixMethod::TotalVariation);
+    let basis = match &args.method.dictionary {
+        Some(path) => path.display().to_string(),
+        None => settings.basis.to_string(),
+    };
+    let report = Report {
+        input: args.source.input.clone(),
+        matrix: path.to_owned(),
+        n,
+        patterns: matrix.rows,
+        used,
+        rank: own.rank(),
+        unseen_pixels: own.unseen_pixels(),
+        method: args.method.method,
+        basis: has_basis.then_some(basis),
+        strength: found.strength,
+        sparsity: found.atoms.map(|(size, _)| size),
+        stop: found.atoms.map(|(_, stop)| args.method.reason(stop)),
+        relative_residual: found.residual,
+        notes,
+        stage_ms: times,
+    };
+    super::write(args, &found.image, None, &report)?;
+    if args.json {
+        print::json(&report)?;
+    } else {
+        say(args, &report)?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn settings(args: &Args) -> Result<MatrixSettings> {
+    let method = match args.method.method {
+        Method::Hadamard => {
+            let text = "--method hadamard with --matrix, whose rows are none of Hadamard's: expected pseudo-inverse, \
+                        tikhonov, omp, tv or fista";
+            return Err(Usage(text.to_owned()).into());
+        }
+        Method::PseudoInverse => MatrixMethod::PseudoInverse,
+        Method::Tikhonov => MatrixMethod::Tikhonov,
+        Method::Fista => MatrixMethod::Sparse,
+        Method::Tv => MatrixMethod::TotalVariation,
+        Method::Omp => MatrixMethod::Omp,
+    };
+    Ok(MatrixSettings {
+        basis: args.method.basis()?,
+        strength: args.method.strength,
+        sparsity: args.method.sparsity,
+        non_negative: args.method.non_negative,
+        ..MatrixSettings::new(method)
+    })
+}
+
+fn say(args: &Args, report: &Report) -> Result<()> {
+    print::line(format_args!(
+        "{}: {} x {}, {} of {} patterns of {}, rank {}",
+        report.input.display(),
+        report.n,
+        report.n,
+        report.used,
+        report.patterns,
+        report.matrix.display(),
+        report.rank
+    ))?;
+    let strength = report.strength.map(|t| format!(", strength {t}")).unwrap_or_default();
+    let atoms = report.sparsity.map(|k| format!(", {k} atoms")).unwrap_or_default();
+    let basis = report.basis.as_ref().map(|b| format!(", {b} basis")).unwrap_or_default();
+    print::line(format_args!(
+        "{}{basis}{atoms}{strength}, relative residual {:.3}",
+        report.method.name(),
+        report.relative_residual
+    ))?;
+    for note in &report.notes {
+        print::line(format_args!("note: {note}"))?;
+    }
+    print::line(format_args!(
+        "wrote image.npy, image.png and report.json to {}",
+        args.out.display()
+    ))
+}

@@ -1,0 +1,146 @@
+//! `nirspi reconstruct --index all`: every measurement of a file or frame of a recording, as a video.
+
+use super::{Args, choose_order, print, spinning};
+use crate::cli::Usage;
+use crate::cli::method::{self, Method, Solved, solve};
+use crate::cli::report::StageTimes;
+use anyhow::{Context, Result, bail};
+use nirspi::files::image::encode_grey;
+use nirspi::files::npy;
+use nirspi::files::output::OutputDir;
+use nirspi_recon::reconstruct::omp_video;
+use nirspi_recon::{Image, Measurements, Order};
+use serde::Serialize;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Frames side by side in the picture.
+const COLUMNS: usize = 8;
+
+/// Most frames in the picture; all are in the array.
+const SHOWN: usize = 64;
+
+#[derive(Debug, Serialize)]
+struct Report {
+    input: PathBuf,
+    n: usize,
+    order: String,
+    warm_start: bool,
+    frames: Vec<FrameReport>,
+    stage_ms: StageTimes,
+}
+
+#[derive(Debug, Serialize)]
+struct FrameReport {
+    used: usize,
+    /// Whether it started from the frame before.
+    warm: bool,
+    #[serde(flatten)]
+    method: method::Report,
+    notes: Vec<String>,
+}
+
+pub fn run(args: &Args, order: Option<Order>) -> Result<ExitCode> {
+    if args.warm_start && args.method.method != Method::Omp {
+        return Err(Usage("--warm-start belongs to --method omp".to_owned()).into());
+    }
+    let mut times = StageTimes::default();
+    let sources = times.time("read", || args.source.load_all())?;
+    let named = || args.source.input.display().to_string();
+    let Some(first) = sources.first() else { bail!("{}: no measurement in it", named()) };
+    let (order, order_name) = choose_order(args, order, first);
+    let used: Vec<Measurements> = sources
+        .iter()
+        .map(|source| source.measurements.take(order.as_ref(), args.sampling))
+        .collect::<Result<_, _>>()
+        .with_context(named)?;
+    let solved = times.time("reconstruct", || spinning(|| solve_all(args, &used)))?;
+    let (mut images, mut frames) = (Vec::new(), Vec::new());
+    for ((Solved { image, report }, warm), (used, source)) in
+        solved.into_iter().zip(used.iter().zip(sources))
+    {
+        super::check_finite(args, &image)?;
+        let dropped = |d: &nirspi_recon::Dropout| {
+            format!("drop-out: {} readings from y[{}] on", d.length, d.start)
+        };
+        let mut notes: Vec<String> = source.dropouts.iter().map(dropped).collect();
+        notes.extend(source.notes);
+        frames.push(FrameReport { used: used.rows().len(), warm, method: report, notes });
+        images.push(image);
+    }
+    let n = images[0].side().pixels();
+    let report = Report {
+        input: args.source.input.clone(),
+        n,
+        order: order_name,
+        warm_start: args.warm_start,
+        frames,
+        stage_ms: times,
+    };
+    let mut out = OutputDir::create(&args.out)?;
+    let pixels: Vec<f32> = images.iter().flat_map(|image| image.pixels()).copied().collect();
+    out.write("image.npy", &npy::encode(&[images.len(), n, n], &pixels))?;
+    out.write("image.png", &sheet(&images))?;
+    out.write("report.json", format!("{}\n", serde_json::to_string_pretty(&report)?).as_bytes())?;
+    out.commit()?;
+    if args.json {
+        print::json(&report)?;
+    } else {
+        say(args, &report)?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Each image, and whether it started from the one before.
+fn solve_all(args: &Args, used: &[Measurements]) -> Result<Vec<(Solved, bool)>> {
+    if !args.warm_start {
+        return used.iter().map(|used| Ok((solve(&args.method, used)?, false))).collect();
+    }
+    let (settings, device) = args.method.omp_settings()?;
+    let frames = omp_video(used, &settings)?;
+    let solved = |found| args.method.solved(found, &settings, device.clone());
+    Ok(frames.into_iter().map(|f| (solved(f.reconstruction), f.warm)).collect())
+}
+
+/// The frames in rows, each stretched to its own black and white.
+fn sheet(images: &[Image]) -> Vec<u8> {
+    let shown = &images[..images.len().min(SHOWN)];
+    let n = images[0].side().pixels();
+    let factor = (128 / n).max(1);
+    let (columns, tile) = (shown.len().min(COLUMNS), n * factor);
+    let (width, height) = (columns * tile, shown.len().div_ceil(columns) * tile);
+    let mut pixels = vec![0.0; width * height];
+    for (at, image) in shown.iter().enumerate() {
+        let (top, left) = (at / columns * tile, at % columns * tile);
+        let stretched = image.stretched();
+        for (r, c) in (0..tile).flat_map(|r| (0..tile).map(move |c| (r, c))) {
+            pixels[(top + r) * width + left + c] = stretched.pixels()[r / factor * n + c / factor];
+        }
+    }
+    encode_grey(width, height, &pixels)
+}
+
+fn say(args: &Args, report: &Report) -> Result<()> {
+    let warm = report.frames.iter().filter(|frame| frame.warm).count();
+    print::line(format_args!(
+        "{}: {} frames of {} x {}, order {}, {warm} started from the one before, {:.2} ms a frame",
+        report.input.display(),
+        report.frames.len(),
+        report.n,
+        report.n,
+        report.order,
+        report.stage_ms.of("reconstruct") / report.frames.len() as f64,
+    ))?;
+    if let Some(last) = report.frames.last() {
+        print::line(format_args!("the last: {} measurements, {}", last.used, last.method))?;
+    }
+    for (at, frame) in report.frames.iter().enumerate() {
+        for note in &frame.notes {
+            print::line(format_args!("note: frame {at}: {note}"))?;
+        }
+    }
+    print::line(format_args!(
+        "wrote image.npy, image.png and report.json to {}",
+        args.out.display()
+    ))
+}
