@@ -16,6 +16,7 @@ use std::f64::consts::PI;
 
 use thiserror::Error;
 
+use crate::daylight::{DaylightError, irradiance_w_per_m2};
 use crate::{LEDS, Projector, ProjectorError};
 
 /// Planck constant in J s (SI, exact).
@@ -23,15 +24,6 @@ const PLANCK_J_S: f64 = 6.626_070_15e-34;
 
 /// Speed of light in m/s (SI, exact).
 const LIGHT_M_PER_S: f64 = 299_792_458.0;
-
-/// Spectral irradiance of daylight at 1550 nm per illuminance, in W m^-2 nm^-1 klx^-1.
-///
-/// From ASTM G173-03, global tilt: 0.2699 W m^-2 nm^-1 at 1550 nm (the mean over 1500 to 1600 nm is
-/// 0.2552, 5 % less) in a spectrum whose 280 to 4000 nm weighted by 683 lm/W times the CIE 1931 luminosity function
-/// (the fit of Wyman, Sloan and Shirley, JCGT 2(2), 2013) is 109.6 klx. Assumes that haze and cloud
-/// dim 1550 nm as they dim visible light; liquid water in cloud dims 1550 nm more, so that the
-/// paper's half-cloudy 15 klx is, if anything, overstated.
-const DAYLIGHT_W_PER_M2_NM_KLX: f64 = 0.2699 / 109.6;
 
 /// Why there is no budget.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -49,6 +41,9 @@ pub enum BudgetError {
     /// The projector or the distance is not physical.
     #[error(transparent)]
     Projector(#[from] ProjectorError),
+    /// The filter lies where no daylight is known.
+    #[error(transparent)]
+    Daylight(#[from] DaylightError),
 }
 
 /// What the budget rests on. Each default says where it comes from.
@@ -222,8 +217,8 @@ impl Budget {
 
         let on_target_w = settings.led_power_mw * 1e-3 * settings.projected_fraction(projector);
         let collected = area_m2 / (PI * (distance_mm * 1e-3).powi(2));
-        let daylight_w_per_m2 =
-            settings.ambient_klx * DAYLIGHT_W_PER_M2_NM_KLX * settings.filter_width_nm;
+        let (nm, width_nm) = (settings.wavelength_nm, settings.filter_width_nm);
+        let daylight_w_per_m2 = irradiance_w_per_m2(settings.ambient_klx, nm, width_nm)?;
         Ok(Self {
             electrons_per_led: on_target_w * collected * settings.electrons_per_watt(),
             ambient_electrons_white: daylight_w_per_m2 / PI
@@ -243,6 +238,12 @@ impl Budget {
                 field_sr,
             },
         })
+    }
+
+    /// Daylight on the detector from a white field, in W, of this irradiance within the filter.
+    pub fn daylight_on_detector_w(&self, irradiance_w_per_m2: f64) -> f64 {
+        let area_m2 = PI / 4.0 * (self.effective_collector_mm * 1e-3).powi(2);
+        irradiance_w_per_m2 / PI * area_m2 * self.terms.field_sr * self.terms.transmitted
     }
 
     /// Daylight from a field of this mean reflectance ([`crate::Footprint::mean`]), in electrons
@@ -319,13 +320,21 @@ mod tests {
         // 8 ns / 0.80 eV (1.2816e-19 J) = 6.2423e10 per W.
         let budget = at(300.0, Default::default());
         assert!((budget.electrons_per_led / 25.96 - 1.0).abs() < 2e-3, "{budget:?}");
-        // 15 klx * 2.4626e-3 * 100 nm = 3.6939 W/m^2; / pi * A * 0.0256 sr = 6.5278e-8 W.
-        assert!((budget.ambient_electrons_white / 2200.4 - 1.0).abs() < 2e-3, "{budget:?}");
+        // 15 klx / 109.6 klx * 25.536 W/m^2 = 3.4949 W/m^2; / pi * A * 0.0256 sr = 6.1761e-8 W.
+        assert!((budget.ambient_electrons_white / 2081.8 - 1.0).abs() < 2e-3, "{budget:?}");
+        let on_detector_w = budget.daylight_on_detector_w(budget.terms.daylight_w_per_m2);
+        assert!((on_detector_w / (0.6 * 6.1761e-8) - 1.0).abs() < 2e-3, "{on_detector_w}");
     }
 
     #[test]
     fn settings_that_are_not_physical_are_named() {
         let default = BudgetSettings::default();
+        let dark = BudgetSettings { wavelength_nm: 2500.0, ..default };
+        let error = Budget::new(&dark, &Projector::default(), 300.0).unwrap_err().to_string();
+        assert!(
+            error.contains("2450 to 2550 nm, expected wavelengths within 400 to 1700"),
+            "{error}"
+        );
         let cases = [
             ("led_power_mw", BudgetSettings { led_power_mw: -1.0, ..default }),
             ("led_half_angle_deg", BudgetSettings { led_half_angle_deg: 0.0, ..default }),

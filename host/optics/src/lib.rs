@@ -9,6 +9,7 @@
 //! | [`budget`] | watts, apertures, distance | electrons per ADC sample for one LED, and for daylight |
 //! | [`mod@array`] | 32 row and 32 column lines | electrons per ADC sample for the LEDs they light |
 //! | [`chain`] | electrons, one clock at a time | 14-bit ADC samples with noise, settling and latency |
+//! | [`daylight`] | kilolux, wavelength, filter | W/m^2 of daylight on the target |
 //! | [`depth`] | distance | an 8 x 8 time-of-flight reading |
 //!
 //! What is between camera and target, and what follows from it:
@@ -49,6 +50,7 @@
 pub mod array;
 pub mod budget;
 pub mod chain;
+pub mod daylight;
 pub mod depth;
 pub mod mie;
 pub mod pixel;

@@ -216,16 +216,16 @@ mod tests {
         };
         close("signal", pixel.signal_electrons, 25.96);
         close("pattern", pixel.pattern_electrons, 512.0 * 25.96);
-        close("daylight", pixel.daylight_electrons, 2200.4);
+        close("daylight", pixel.daylight_electrons, 2081.8);
         close("dark", pixel.dark_electrons, 99.86);
-        // sqrt(13 292 + 2 200 + 100) = 124.9
-        close("shot noise", pixel.shot_noise, 124.9);
+        // sqrt(13 292 + 2 082 + 100) = 124.4
+        close("shot noise", pixel.shot_noise, 124.4);
         // 1.1 pA/sqrt(Hz) over pi/2 * 60 MHz for 8 ns: 533.2
         close("amplifier noise", pixel.amplifier_noise, 533.2);
         close("samples", pixel.samples, 3125.0);
-        // 25.96 * sqrt(3125) / 547.7 * sqrt(512)
+        // 25.96 * sqrt(3125) / 547.5 * sqrt(512)
         close("SNR", pixel.pixel_snr, 25.96 * 3125_f64.sqrt() / pixel.noise * 512_f64.sqrt());
-        close("noise", pixel.noise, 547.7);
+        close("noise", pixel.noise, 547.5);
     }
 
     #[test]

@@ -3,13 +3,17 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
+use nirspi_optics::mie::Mie;
 use nirspi_optics::rain::falling::{BeamShadows, FallingDrops};
-use nirspi_optics::rain::{Drops, ForwardBlur, Medium, RainError, ScatteringAngles, Veil};
+use nirspi_optics::rain::{
+    DropClass, Drops, ForwardBlur, Medium, RainError, ScatteringAngles, Veil,
+};
 use nirspi_optics::water::Water;
 use nirspi_optics::{LEDS, Projector};
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
+use std::f64::consts::PI;
 
 fn medium(drops: &Drops, nm: f64) -> Medium {
     Medium::new(drops, nm, Water::Segelstein).unwrap()
@@ -97,21 +101,68 @@ proptest! {
     }
 }
 
+/// Drops of one size as single photons meet them: straight from Mie, sharing neither the coefficients of [`Medium`] nor the bins
+/// of [`ScatteringAngles`].
+struct MieDrops {
+    extinction_per_m: f64,
+    albedo: f64,
+    /// Mean cosine of the scattering angle by Mie's sums.
+    asymmetry: f64,
+    angles_rad: Vec<f64>,
+    /// Share of the scattered light within each angle.
+    cumulative: Vec<f64>,
+}
+
+impl MieDrops {
+    fn new(drops: &Drops, nm: f64) -> Self {
+        let [DropClass { diameter_mm, per_m3 }] = drops.classes() else { panic!("of one size") };
+        let x = PI * diameter_mm * 1e6 / nm;
+        let mut mie = Mie::new();
+        let sphere = mie.sphere(x, Water::Segelstein.index(nm).unwrap()).unwrap();
+        let q = sphere.efficiencies();
+        // Lobes are pi / x wide: twenty points for each.
+        let count = (20.0 * x) as usize;
+        let angles_rad: Vec<f64> = (0..=count).map(|i| PI * i as f64 / count as f64).collect();
+        let cosines: Vec<f64> = angles_rad.iter().map(|a| a.cos()).collect();
+        let phase = sphere.phase(&cosines).unwrap();
+        let density = |i: usize| phase[i] / 2.0 * angles_rad[i].sin() * PI / count as f64;
+        let mut sum = 0.0;
+        let mut cumulative = vec![0.0];
+        for i in 1..=count {
+            sum += (density(i - 1) + density(i)) / 2.0;
+            cumulative.push(sum);
+        }
+        assert!((sum - 1.0).abs() < 1e-3, "a phase function of {sum} in all");
+        Self {
+            extinction_per_m: per_m3 * q.extinction * PI / 4.0 * (diameter_mm * 1e-3).powi(2),
+            albedo: q.scattering / q.extinction,
+            asymmetry: q.asymmetry,
+            angles_rad,
+            cumulative,
+        }
+    }
+
+    /// The angle that a share of the light is within.
+    fn angle_rad(&self, share: f64) -> f64 {
+        let share = share * self.cumulative[self.cumulative.len() - 1];
+        let at =
+            self.cumulative.partition_point(|&c| c < share).clamp(1, self.cumulative.len() - 1);
+        let (low, high) = (self.cumulative[at - 1], self.cumulative[at]);
+        let part = if high > low { (share - low) / (high - low) } else { 0.5 };
+        self.angles_rad[at - 1] + part * (self.angles_rad[at] - self.angles_rad[at - 1])
+    }
+}
+
 /// Photons followed one by one through a slab: free paths, absorption, angles, any number of scatterings, in three
 /// dimensions. Returns the shares that arrive having been scattered, within each radius, and untouched.
-fn photons(
-    medium: &Medium,
-    angles: &ScatteringAngles,
-    slab_m: f64,
-    radii_mm: &[f64],
-) -> (Vec<f64>, f64) {
+fn photons(drops: &MieDrops, slab_m: f64, radii_mm: &[f64]) -> (Vec<f64>, f64) {
     let mut rng = Pcg64Mcg::seed_from_u64(7);
     let count = 400_000;
     let (mut within, mut untouched) = (vec![0.0; radii_mm.len()], 0.0);
     for _ in 0..count {
         let (mut at, mut along, mut scattered) = ([0.0; 3], [0.0, 0.0, 1.0], false);
         loop {
-            let free_m = -(1.0 - rng.random::<f64>()).ln() / medium.extinction_per_m;
+            let free_m = -(1.0 - rng.random::<f64>()).ln() / drops.extinction_per_m;
             let to_target = (slab_m - at[2]) / along[2];
             if along[2] > 0.0 && free_m >= to_target {
                 let radius_mm =
@@ -126,11 +177,11 @@ fn photons(
                 break;
             }
             at = std::array::from_fn(|i| at[i] + along[i] * free_m);
-            if at[2] < 0.0 || rng.random::<f64>() > medium.albedo() {
+            if at[2] < 0.0 || rng.random::<f64>() > drops.albedo {
                 break;
             }
             scattered = true;
-            let angle = angles.quantile_rad(rng.random());
+            let angle = drops.angle_rad(rng.random());
             along = turned(along, angle, rng.random::<f64>() * std::f64::consts::TAU);
         }
     }
@@ -153,6 +204,18 @@ fn turned(along: [f64; 3], angle: f64, azimuth: f64) -> [f64; 3] {
 }
 
 #[test]
+fn angles_drawn_for_photons_have_the_mean_cosine_that_mie_sums_say() {
+    let drops = Drops::monodisperse(100.0, 0.5).unwrap();
+    for nm in [550.0, 1550.0] {
+        let drops = MieDrops::new(&drops, nm);
+        let draws = 20_000;
+        let cosine = |i| drops.angle_rad((f64::from(i) + 0.5) / f64::from(draws)).cos();
+        let mean = (0..draws).map(cosine).sum::<f64>() / f64::from(draws);
+        assert!((mean - drops.asymmetry).abs() < 1e-3, "{nm} nm: {mean}, {}", drops.asymmetry);
+    }
+}
+
+#[test]
 fn the_point_spread_function_agrees_with_photons_followed_one_by_one() {
     // 100 mm/h and 0.5 mm drops, dense enough that 400 000 photons say something: an optical depth of 0.085 over a
     // metre.
@@ -162,7 +225,7 @@ fn the_point_spread_function_agrees_with_photons_followed_one_by_one() {
         let slab_m = 1.0;
         let blur = ForwardBlur::new(medium, Some(angles.clone()), slab_m * 1e3).unwrap();
         let radii_mm = [0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0];
-        let (within, untouched) = photons(&medium, &angles, slab_m, &radii_mm);
+        let (within, untouched) = photons(&MieDrops::new(&drops, nm), slab_m, &radii_mm);
         assert!((untouched - blur.unscattered()).abs() < 3.0 * (0.085_f64 / 400_000.0).sqrt());
         for (radius, found) in radii_mm.into_iter().zip(within) {
             let expected = blur.scattered_within(radius);

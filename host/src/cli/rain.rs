@@ -11,6 +11,7 @@ use nirspi_optics::rain::radar::drops_reflectivity_db;
 use nirspi_optics::rain::{DropClass, Drops, Medium};
 use nirspi_optics::water::Water;
 use serde::Serialize;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::str::FromStr;
@@ -96,6 +97,10 @@ pub struct Args {
     #[arg(long)]
     json: bool,
 }
+
+/// Targets of which a budget says anything, in metres: nearer than a quarter of the lens's focal length light fills the
+/// ADC whatever the gain, and the depth sensor's readings end at 65 m.
+const BUDGET_DISTANCES_M: RangeInclusive<f64> = 0.05..=65.0;
 
 /// What falls.
 #[derive(Debug, Clone, clap::Args)]
@@ -226,11 +231,19 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         .into());
     }
     if args.budget {
+        if !BUDGET_DISTANCES_M.contains(&distance) {
+            let (near, far) = (BUDGET_DISTANCES_M.start(), BUDGET_DISTANCES_M.end());
+            return Err(Usage(format!(
+                "--distance-m is {distance}, expected {near} to {far} metres for --budget"
+            ))
+            .into());
+        }
         let wanted = budget::Wanted {
             drops: args.drops.drops()?,
             distance_m: distance,
             reflectance: args.reflectance,
             exposure_us: args.exposure_us,
+            wavelengths_nm: args.wavelengths_nm.clone(),
         };
         return budget::run(&wanted, args.json);
     }

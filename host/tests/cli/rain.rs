@@ -26,6 +26,15 @@ fn rain_is_told_at_the_wavelengths_asked_for() {
     for term in ["LED power", "dark current", "shot noise", "quantisation", "SNR, one pixel"] {
         assert!(text.contains(term), "{term}: {text}");
     }
+    let budget = bench.run(&["rain", "--budget", "--json"]).succeeded().json();
+    let daylight = budget["daylight"].as_array().unwrap();
+    let watts: Vec<f64> =
+        daylight.iter().map(|d| d["on_target_w_per_m2"].as_f64().unwrap()).collect();
+    // 15 klx of ASTM G173 within 100 nm around 550, 850 and 1550 nm.
+    for (found, expected) in watts.iter().zip([20.668, 12.938, 3.495]) {
+        assert!((found / expected - 1.0).abs() < 1e-3, "{watts:?}");
+    }
+    assert!(daylight.iter().all(|d| d["on_detector_nw"].as_f64().unwrap() > 0.0));
 }
 
 #[test]
@@ -48,6 +57,11 @@ fn rain_that_cannot_be_is_refused_with_its_range() {
         (&["--drops", "mono:20"], &["drop diameter is 20", "0.11 to 8 mm"]),
         (&["--drops", "hail"], &["hail", "marshall-palmer"]),
         (&["--distance-m", "0"], &["--distance-m is 0"]),
+        (
+            &["--budget", "--wavelengths-nm", "1800"],
+            &["--wavelengths-nm", "1750 to 1850 nm", "400 to 1700 nm"],
+        ),
+        (&["--budget", "--distance-m", "100"], &["--distance-m is 100", "0.05 to 65 metres"]),
         (&["--budget", "--reflectance", "2"], &["reflectance is 2", "at most 1"]),
         (&["--rig", "--tilt-deg", "30"], &["tilt is 30", "0 to 15"]),
         (

@@ -2,9 +2,11 @@
 
 use crate::cli::{Usage, print};
 use anyhow::Result;
+use nirspi_optics::daylight::irradiance_w_per_m2;
 use nirspi_optics::pixel::{Instrument, PixelBudget};
 use nirspi_optics::rain::{Drops, Weather};
 use nirspi_optics::water::Water;
+use nirspi_optics::{Budget, BudgetSettings};
 use serde::Serialize;
 use std::process::ExitCode;
 
@@ -14,6 +16,8 @@ pub struct Wanted {
     pub distance_m: f64,
     pub reflectance: f64,
     pub exposure_us: f64,
+    /// Wavelengths at which daylight is compared.
+    pub wavelengths_nm: Vec<f64>,
 }
 
 #[derive(Debug, Serialize)]
@@ -31,7 +35,17 @@ struct Report {
     reflectance: f64,
     exposure_us: f64,
     terms: Vec<Term>,
+    daylight: Vec<DaylightReport>,
     snr_per_pixel: f64,
+}
+
+/// Daylight through the same lens and a filter as wide, at another wavelength.
+#[derive(Debug, Serialize)]
+struct DaylightReport {
+    wavelength_nm: f64,
+    on_target_w_per_m2: f64,
+    on_detector_nw: f64,
+    photons_per_sample: f64,
 }
 
 pub fn run(wanted: &Wanted, json: bool) -> Result<ExitCode> {
@@ -48,6 +62,11 @@ pub fn run(wanted: &Wanted, json: bool) -> Result<ExitCode> {
         reflectance,
         exposure_us,
         terms: terms(&pixel, &weather, reflectance),
+        daylight: wanted
+            .wavelengths_nm
+            .iter()
+            .map(|&nm| daylight(&instrument.budget, &pixel.dry, reflectance, nm))
+            .collect::<Result<_>>()?,
         snr_per_pixel: pixel.pixel_snr,
     };
     if json {
@@ -60,7 +79,40 @@ pub fn run(wanted: &Wanted, json: bool) -> Result<ExitCode> {
     for Term { name, value, unit, how } in &report.terms {
         print::line(format_args!("{name:<28} {:>12} {unit:<10} {how}", figure(*value)))?;
     }
+    print::line(format_args!(
+        "{} klx of daylight from such a target, through the lens and a filter of {} nm (ASTM G173-03):",
+        instrument.budget.ambient_klx, instrument.budget.filter_width_nm
+    ))?;
+    for day in &report.daylight {
+        print::line(format_args!(
+            "{:>8} nm: {:>6} W/m2 on the target, {:>6} nW and {:>6} photons a sample on the detector",
+            day.wavelength_nm,
+            figure(day.on_target_w_per_m2),
+            figure(day.on_detector_nw),
+            figure(day.photons_per_sample)
+        ))?;
+    }
     Ok(ExitCode::SUCCESS)
+}
+
+fn daylight(
+    settings: &BudgetSettings,
+    dry: &Budget,
+    reflectance: f64,
+    wavelength_nm: f64,
+) -> Result<DaylightReport> {
+    let irradiance =
+        irradiance_w_per_m2(settings.ambient_klx, wavelength_nm, settings.filter_width_nm)
+            .map_err(|error| Usage(format!("--wavelengths-nm: {error}")))?;
+    let on_detector_w = reflectance * dry.daylight_on_detector_w(irradiance);
+    // The instrument's photons, of another wavelength.
+    let photon_j = dry.terms.photon_j * settings.wavelength_nm / wavelength_nm;
+    Ok(DaylightReport {
+        wavelength_nm,
+        on_target_w_per_m2: irradiance,
+        on_detector_nw: on_detector_w * 1e9,
+        photons_per_sample: on_detector_w * settings.sample_ns * 1e-9 / photon_j,
+    })
 }
 
 /// Four digits, with an exponent where it is shorter.
