@@ -2,7 +2,13 @@
 
     python3 -m venv peers && peers/bin/pip install numpy scikit-learn spams-bin batched-omp
     cargo build --release -p nirspi
-    peers/bin/python host/recon/benches/peers.py [--nirspi target/release/nirspi] [--grid] [--rounds 7] [--device cuda]
+    peers/bin/python host/recon/benches/peers.py            # from the root, or benches/peers.py from host/recon
+        --grid                 also K = 16, 64, 256 by M = 256, 512, 1024
+        --input problem.npz    a problem of your own: D (M x N), Y (B x M), k
+        --supports 24          instead: as many problems of random shapes and kinds, supports against scikit-learn's
+        --seed 1               the same problems again; without it they are new ones each time, and the seed is said
+        --device cuda          also batched-omp and nirspi on the graphics card
+        --nirspi FILE          a binary of your own
 
 Every problem is solved by each program in turn, round after round, so that other load falls on all alike; medians of all
 runs are compared. `nirspi` runs in a process of its own and times itself; its supports come back through a file.
@@ -25,6 +31,7 @@ import argparse
 import importlib
 import json
 import os
+import secrets
 import statistics
 import subprocess
 import sys
@@ -33,7 +40,13 @@ import time
 import types
 import warnings
 
+from pathlib import Path
+
 import numpy as np
+
+# Beside the sources wherever the script is called from.
+ROOT = Path(__file__).resolve().parents[3]
+TARGET = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
 
 warnings.simplefilter("ignore")
 
@@ -41,14 +54,18 @@ warnings.simplefilter("ignore")
 def problem(kind, m, n, k, frames, seed):
     """A dictionary with columns of unit norm, and frames that are sums of k of them with noise.
 
-    `random`: normal numbers. `camera`: random rows of a Hadamard matrix see cosines of an image; some of these look the same to
-    the rows that happen to be there, and which of two equal atoms is chosen is then left to rounding.
+    `random`: normal numbers. `correlated`: neighbours share most of what they are. `camera`: random rows of a Hadamard matrix see
+    cosines of an image; some of these look the same to the rows that happen to be there, and which of two equal atoms is chosen
+    is then left to rounding.
     """
     rng = np.random.default_rng(seed)
     if kind == "camera":
         d = cosines_by_hadamard_rows(rng, m, n)
     else:
         d = rng.standard_normal((m, n))
+    if kind == "correlated":
+        for j in range(1, n):
+            d[:, j] = 0.8 * d[:, j - 1] + 0.6 * d[:, j]
     d /= np.linalg.norm(d, axis=0)
     y = np.empty((frames, m))
     for f in range(frames):
@@ -72,11 +89,11 @@ def cosines_by_hadamard_rows(rng, m, n):
 
 
 class Nirspi:
-    def __init__(self, binary, options, d, y, k, folder):
+    def __init__(self, binary, options, d, y, k, folder, repeats=15):
         self.path, self.out = os.path.join(folder, "problem.npz"), os.path.join(folder, "solution.npz")
         np.savez(self.path, D=d, Y=y, k=k)
         self.command = [binary, "bench", "omp", "--input", self.path, "--out", self.out,
-                        "--repeats", "15", *options]
+                        "--repeats", str(repeats), *options]
         self.prepare = []
 
     def __call__(self):
@@ -156,7 +173,7 @@ def batched(d, y, k, repeats, device="cpu"):
 
 
 def compare_on_gpu(args, kind, m, n, k, frames):
-    d, y = problem(kind, m, n, k, frames, seed=1)
+    d, y = problem(kind, m, n, k, frames, args.seed)
     with tempfile.TemporaryDirectory() as folder:
         programs = {
             "nirspi": Nirspi(args.nirspi, ["--backend", "cuda"], d, y, k, folder),
@@ -201,8 +218,8 @@ def run_in_turn(programs, rounds):
     return times, found
 
 
-def compare(args, kind, m, n, k, frames):
-    d, y = problem(kind, m, n, k, frames, seed=1)
+def compare(args, kind, d, y, k):
+    (m, n), frames = d.shape, len(y)
     repeats = 9 if frames == 1 else 1
     with tempfile.TemporaryDirectory() as folder:
         ours = Nirspi(args.nirspi, [], d, y, k, folder)
@@ -236,25 +253,74 @@ def compare(args, kind, m, n, k, frames):
             "of_scikit": medians["scikit-learn gram"] / medians["nirspi"]}
 
 
+def supports(args):
+    """Problems of random shapes and kinds: are the supports scikit-learn's?"""
+    rng = np.random.default_rng(args.seed)
+    total = same_total = 0
+    print("kind            M     N    K frames  same supports   where they part, the lead of the one over the other")
+    for number in range(args.supports):
+        kind = ("random", "correlated", "tall", "camera")[number % 4]
+        n = 4 ** rng.integers(3, 6) if kind == "camera" else int(rng.integers(20, 900))
+        m = int(rng.integers(n // 3 + 1, n)) if kind != "tall" else int(rng.integers(n, 2 * n))
+        k, frames = int(rng.integers(1, max(2, min(m, n) // 4))), int(rng.integers(1, 40))
+        d, y = problem("random" if kind == "tall" else kind, m, int(n), k, frames, int(rng.integers(1 << 31)))
+        with tempfile.TemporaryDirectory() as folder:
+            _, ours = Nirspi(args.nirspi, [], d, y, k, folder, repeats=1)()
+        _, theirs = scikit(d, y, k, 1)
+        pairs = list(zip(ours, theirs))
+        same = sum(set(a[a >= 0].tolist()) == set(np.flatnonzero(b).tolist()) for a, b in pairs)
+        leads = [lead_at_the_parting(d, y[i], a, set(np.flatnonzero(b).tolist()))
+                 for i, (a, b) in enumerate(pairs) if set(a[a >= 0].tolist()) != set(np.flatnonzero(b).tolist())]
+        total, same_total = total + frames, same_total + same
+        said = f"{max(leads):.1e} at most" if leads else ""
+        print(f"{kind:12} {m:5} {n:5} {k:4} {frames:6}  {same:5} of {frames:4}   {said}")
+    print(f"{same_total} of {total} frames have scikit-learn's support")
+
+
+def lead_at_the_parting(d, y, ours, theirs):
+    """By how much, relative to the measurement, our first atom that is none of theirs was better than the best that is theirs."""
+    for step, atom in enumerate(ours):
+        if atom not in theirs:
+            chosen = d[:, ours[:step]]
+            residual = y - chosen @ np.linalg.lstsq(chosen, y, rcond=None)[0] if step else y
+            score = np.abs(d.T @ residual) / np.linalg.norm(y)
+            rest = [j for j in theirs if j not in set(ours[:step].tolist())]
+            return float(score[atom] - max(score[j] for j in rest)) if rest else float("nan")
+    return float("nan")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--nirspi", default="target/release/nirspi")
+    parser.add_argument("--nirspi", default=str(TARGET / "release" / "nirspi"))
     parser.add_argument("--rounds", type=int, default=7)
     parser.add_argument("--grid", action="store_true", help="also K = 16, 64, 256 by M = 256, 512, 1024")
+    parser.add_argument("--input", help="time this problem (.npz with D, Y, k) instead")
+    parser.add_argument("--supports", type=int, metavar="N", help="compare supports on N random problems instead")
+    parser.add_argument("--seed", type=int, help="of the problems; new ones each time without it")
     parser.add_argument("--json", help="write all medians here")
     parser.add_argument("--device", choices=("cpu", "cuda"), default="cpu", help="cuda: the programs that run there")
     args = parser.parse_args()
+    if not os.access(args.nirspi, os.X_OK):
+        parser.error(f"no program at {args.nirspi}: cargo build --release -p nirspi, or --nirspi PATH")
+    if args.seed is None:
+        args.seed = secrets.randbelow(1 << 31)
+    print(f"seed {args.seed}, load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
+    if args.supports:
+        return supports(args)
     if args.device == "cuda":
-        results = [compare_on_gpu(args, kind, 512, 1024, 64, frames) for kind in ("random", "camera") for frames in (1, 256, 4096)]
-        write(args, results)
-        return
-    kinds = ("random", "camera")
-    results = [compare(args, kind, 512, 1024, 64, frames) for kind in kinds for frames in (1, 256)]
-    if args.grid:
-        for m in (256, 512, 1024):
-            for k in (16, 64, 256):
-                if k <= m // 2 and (m, k) != (512, 64):
-                    results += [compare(args, "random", m, 1024, k, frames) for frames in (1, 64)]
+        shapes = [(kind, frames) for kind in ("random", "camera") for frames in (1, 256, 4096)]
+        return write(args, [compare_on_gpu(args, kind, 512, 1024, 64, frames) for kind, frames in shapes])
+    if args.input:
+        with np.load(args.input) as file:
+            results = [compare(args, "given", file["D"], np.atleast_2d(file["Y"]), int(file["k"]))]
+    else:
+        shapes = [(kind, 512, 64, frames) for kind in ("random", "camera") for frames in (1, 256)]
+        if args.grid:
+            shapes += [("random", m, k, frames) for m in (256, 512, 1024) for k in (16, 64, 256) for frames in (1, 64)
+                       if (m, k) != (512, 64)]
+        results = []
+        for kind, m, k, frames in shapes:
+            results.append(compare(args, kind, *problem(kind, m, 1024, k, frames, args.seed), k))
     print("\ndictionary     N     M    K frames  SPAMS's best   scikit-learn   (times nirspi's median)")
     for r in results:
         print(f"{r['dictionary']:10} {r['n']:5} {r['m']:5} {r['k']:4} {r['frames']:6} {r['of_spams_best']:12.1f}x {r['of_scikit']:13.1f}x")
