@@ -51,6 +51,10 @@ struct DaylightReport {
 pub fn run(wanted: &Wanted, json: bool) -> Result<ExitCode> {
     let instrument = Instrument::default();
     let nm = instrument.budget.wavelength_nm;
+    // Before anything that takes time.
+    for &nm in &wanted.wavelengths_nm {
+        daylight_on_target(&instrument.budget, nm)?;
+    }
     let weather = Weather::new(wanted.drops.clone(), nm, Water::Segelstein)
         .map_err(|error| Usage(error.to_string()))?;
     let Wanted { distance_m, reflectance, exposure_us, .. } = *wanted;
@@ -95,15 +99,18 @@ pub fn run(wanted: &Wanted, json: bool) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
+fn daylight_on_target(settings: &BudgetSettings, wavelength_nm: f64) -> Result<f64> {
+    irradiance_w_per_m2(settings.ambient_klx, wavelength_nm, settings.filter_width_nm)
+        .map_err(|error| Usage(format!("--wavelengths-nm: {error}")).into())
+}
+
 fn daylight(
     settings: &BudgetSettings,
     dry: &Budget,
     reflectance: f64,
     wavelength_nm: f64,
 ) -> Result<DaylightReport> {
-    let irradiance =
-        irradiance_w_per_m2(settings.ambient_klx, wavelength_nm, settings.filter_width_nm)
-            .map_err(|error| Usage(format!("--wavelengths-nm: {error}")))?;
+    let irradiance = daylight_on_target(settings, wavelength_nm)?;
     let on_detector_w = reflectance * dry.daylight_on_detector_w(irradiance);
     // The instrument's photons, of another wavelength.
     let photon_j = dry.terms.photon_j * settings.wavelength_nm / wavelength_nm;

@@ -94,6 +94,8 @@ fn atoms_of_ones_own_and_light_that_is_not_negative_work_with_a_matrix_too() {
             basis: Basis::Pixel,
             atoms,
             non_negative: true,
+            sparsity: Some(2),
+            strength: Some(1e-4),
             ..MatrixSettings::new(MatrixMethod::Omp)
         };
         let found = own.reconstruct(&y, &settings).unwrap().image;
