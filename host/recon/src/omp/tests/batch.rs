@@ -93,9 +93,9 @@ fn widths() -> Vec<Arch> {
 
 #[test]
 fn backends_have_names() {
-    for backend in [Backend::Auto, Backend::Cpu] {
+    for backend in Backend::ALL {
         assert_eq!(backend.to_string().parse(), Ok(backend));
     }
     let error = "abacus".parse::<Backend>().unwrap_err();
-    assert_eq!(error.to_string(), "unknown backend \"abacus\", expected auto or cpu");
+    assert_eq!(error.to_string(), "unknown backend \"abacus\", expected auto, cpu, wgpu or cuda");
 }

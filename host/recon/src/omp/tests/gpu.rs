@@ -286,7 +286,7 @@ fn problems_without_a_meaning_are_refused_here_too() {
 }
 
 #[test]
-fn auto_takes_no_software_device_and_names_are_kept() {
+fn auto_takes_no_software_device_and_a_name_is_kept_to() {
     assert!(matches!(choose(Backend::Auto, 1), Ok(Choice::Cpu(None))));
     match choose(Backend::Auto, 1000).unwrap() {
         Choice::Gpu(device) => assert!(!device.is_software()),
@@ -299,8 +299,4 @@ fn auto_takes_no_software_device_and_names_are_kept() {
         Ok(Choice::Cpu(_)) => panic!("the processor was not asked for"),
         Err(absent) => assert!(absent.to_string().starts_with("no GPU found (CUDA: "), "{absent}"),
     }
-    for backend in Backend::ALL {
-        assert_eq!(backend.to_string().parse(), Ok(backend));
-    }
-    assert!("gpu".parse::<Backend>().is_err());
 }
