@@ -55,7 +55,7 @@ def blurred(x, sigma_px):
 class Characters:
     """A seeded stream of sharp images and of their degradations."""
 
-    SHARE = dict(fnt=0.12, fnt_aug=0.10, ren=0.15, hnd=0.08, hnd_aug=0.17, img=0.18, comp=0.10, other=0.10)
+    SHARE = dict(fnt=0.10, fnt_aug=0.08, ren=0.13, hnd=0.07, hnd_aug=0.16, img=0.30, comp=0.08, other=0.08)
 
     def __init__(self, seed, folder="."):
         file = np.load(f"{folder}/train.npz")

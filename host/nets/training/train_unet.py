@@ -59,7 +59,7 @@ def sample(characters, chain, count):
         found = [torch.cat(pair) for pair in zip(chain.estimate(y, True), chain.estimate(full, False))]
     raw = torch.cat((F.interpolate(y, scale_factor=2, mode="nearest"), full))
     sigma, noise = torch.cat((sigma, full_sigma)), torch.cat((noise, full_noise))
-    told = torch.from_numpy(r.random(count) < 0.4) & (sigma >= 0)
+    told = torch.from_numpy(r.random(count) < 0.12) & (sigma >= 0)
     off = [torch.from_numpy(np.exp(r.normal(0, spread, count)).astype(np.float32)) for spread in (0.1, 0.2)]
     return x, start, raw, torch.where(told, sigma * off[0], found[0]), torch.where(told, noise * off[1], found[1])
 
