@@ -3,15 +3,18 @@
 use crate::weights::{Weights, WeightsError};
 
 /// Name of each network and the file of its weights.
-const FILES: [(&str, &[u8]); 4] = [
+const FILES: [(&str, &[u8]); 6] = [
     ("estimator", include_bytes!("../weights/estimator.safetensors")),
     ("fsrcnn", include_bytes!("../weights/fsrcnn.safetensors")),
     ("diffusion", include_bytes!("../weights/diffusion.safetensors")),
+    ("gan", include_bytes!("../weights/gan.safetensors")),
+    ("ancestral", include_bytes!("../weights/ancestral.safetensors")),
     ("classifier", include_bytes!("../weights/classifier.safetensors")),
 ];
 
 impl Weights {
-    /// The weights of a network that come with the program: `estimator`, `fsrcnn`, `diffusion` or `classifier`.
+    /// The weights of a network that come with the program: `estimator`, `fsrcnn`, `diffusion`, `gan`,
+    /// `ancestral` or `classifier`.
     ///
     /// # Errors
     /// [`WeightsError::NotEmbedded`] for any other name; [`WeightsError::Checksum`] if this program's file is damaged.

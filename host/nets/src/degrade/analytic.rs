@@ -252,7 +252,6 @@ mod tests {
 
     #[test]
     fn ranges_that_cannot_be_are_named() {
-        #[expect(clippy::reversed_empty_ranges, reason = "this is what is refused")]
         let limits = Limits { sigma_px: 3.0..=1.0, ..still() };
         let error = AnalyticCamera::new(limits).unwrap_err().to_string();
         assert_eq!(error, "blur from 3 to 1, expected 0 to 8 pixels");

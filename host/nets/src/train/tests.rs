@@ -167,11 +167,7 @@ fn the_same_seed_gives_the_same_weights_and_another_seed_others() {
 struct Breaking(std::sync::atomic::AtomicUsize);
 
 impl Degrade for Breaking {
-    fn degrade(
-        &self,
-        scene: &[f32],
-        rng: &mut Pcg64Mcg,
-    ) -> Result<Reading, crate::degrade::DegradeError> {
+    fn degrade(&self, scene: &[f32], rng: &mut Pcg64Mcg) -> Result<Reading, DegradeError> {
         let mut reading = camera().degrade(scene, rng)?;
         if self.0.fetch_add(1, std::sync::atomic::Ordering::Relaxed) > 60 {
             reading.optical.fill(f32::NAN);

@@ -49,7 +49,8 @@ fn the_pseudo_inverse_is_that_of_the_singular_values() {
 fn all_hadamard_rows_as_a_matrix_give_the_image_by_every_method() {
     let (side, image) = (side(8), scene(side(8), 1));
     let all = measured(side, &image);
-    let sign = |k: usize| if (k / 64 & k % 64).count_ones() % 2 == 0 { 1.0 } else { -1.0 };
+    let sign =
+        |k: usize| if ((k / 64) & (k % 64)).count_ones().is_multiple_of(2) { 1.0 } else { -1.0 };
     let own = OwnMatrix::new(side, &(0..64 * 64).map(sign).collect::<Vec<f64>>()).unwrap();
     assert_eq!((own.rank(), own.unseen_pixels()), (64, 0));
     let full = hadamard(&all);
