@@ -78,7 +78,7 @@ pub fn run(args: &Args, order: Option<Order>) -> Result<ExitCode> {
         stage_ms: times,
     };
     let mut out = OutputDir::create(&args.out)?;
-    let pixels: Vec<f32> = images.iter().flat_map(nirspi_recon::Image::pixels).copied().collect();
+    let pixels: Vec<f32> = images.iter().flat_map(Image::pixels).copied().collect();
     out.write("image.npy", &npy::encode(&[images.len(), n, n], &pixels))?;
     out.write("image.png", &sheet(&images))?;
     out.write("report.json", format!("{}\n", serde_json::to_string_pretty(&report)?).as_bytes())?;
