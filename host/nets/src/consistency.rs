@@ -4,7 +4,7 @@
 //! The camera's model is A = M B: B blurs with a Gaussian of `sigma_px` on the 64 x 64 grid, light at the
 //! edge reflected, and M takes means of 2 x 2 pixels where readings are 32 x 32 (else M = 1). An image x
 //! outside the ball |y - A x| <= tau noise sqrt(n) becomes
-//! x + A^T (A A^T + lambda)^-1 (y - A x), lambda such that it comes to lie on the ball: of all images
+//! x + A^T (A A^T + lambda)^-1 (y - A x), lambda such that it comes to lie on the ball, if [`LEAST_LAMBDA`] lets it: of all images
 //! of the same change's norm, the one that fits best (Tikhonov; Morozov's discrepancy principle).
 //!
 //! Law: inside the ball nothing changes.
@@ -30,6 +30,11 @@ const TAU: f32 = 1.1;
 
 /// Standard deviation that readings are never trusted beyond: the blur is an estimate and no Gaussian.
 const NOISE_FLOOR: f32 = 0.004;
+
+/// Least lambda. Where blur is overestimated no image explains the readings, and the equation would answer with noise
+/// amplified without end; so the change is at most 1 / (2 sqrt lambda) = 5 times the residual, and the readings then stay
+/// unexplained, which the inconsistency says.
+const LEAST_LAMBDA: f32 = 0.01;
 
 /// Halvings of the interval of lambda's logarithm: lambda to 1e-5.
 const BISECTIONS: usize = 22;
@@ -168,9 +173,9 @@ impl Consistency {
     }
 }
 
-/// The largest lambda whose result is not `outside` the ball; lambda from 1e-6 up, on a logarithmic scale.
+/// The largest lambda whose result is not `outside` the ball; lambda from [`LEAST_LAMBDA`] up, on a logarithmic scale.
 fn bisect(halvings: usize, mut outside: impl FnMut(f32) -> bool) -> f32 {
-    let (mut inside, mut beyond) = (-6.0_f32, 4.0_f32);
+    let (mut inside, mut beyond) = (LEAST_LAMBDA.log10(), 4.0_f32);
     for _ in 0..halvings {
         let middle = 0.5 * (inside + beyond);
         if outside(10.0_f32.powf(middle)) {

@@ -111,3 +111,19 @@ fn rows_that_were_not_measured_bind_nobody() {
     assert_eq!(MeasuredRows::new(32, &(0..1024).collect::<Vec<_>>()), None);
     assert_eq!(MeasuredRows::new(32, &[]), None);
 }
+
+#[test]
+fn what_no_image_explains_is_not_amplified() {
+    let readings = numbers(32 * 32, 6);
+    let every_other = MeasuredRows::new(32, &(0..1024).step_by(2).collect::<Vec<_>>());
+    for rows in [None, every_other] {
+        let model = Consistency::new(32, 4.0, 0.004, rows);
+        let flat = vec![0.5; SIDE * SIDE];
+        let residual = norm(&model.residual(&readings, &model.image.forward(&flat)));
+        let mut image = flat.clone();
+        model.project(&readings, &mut image);
+        let change = apart(&image, &flat);
+        assert!(change > 0.0 && change <= 5.001 * residual, "{change} for {residual}");
+        assert!(model.residual_ratio(&readings, &image) > 2.0 * TAU, "nothing is hidden");
+    }
+}
