@@ -4,7 +4,7 @@
 //! The camera's model is A = M B: B blurs with a Gaussian of `sigma_px` on the 64 x 64 grid, light at the
 //! edge reflected, and M takes means of 2 x 2 pixels where readings are 32 x 32 (else M = 1). An image x
 //! outside the ball |y - A x| <= tau noise sqrt(n) becomes
-//! x + A^T (A A^T + lambda)^-1 (y - A x), lambda such that it comes to lie on the ball, if [`LEAST_LAMBDA`] lets it: of all images
+//! x + A^T (A A^T + lambda)^-1 (y - A x), lambda such that it comes to lie on the ball, if lambda may be so small: of all images
 //! of the same change's norm, the one that fits best (Tikhonov; Morozov's discrepancy principle).
 //!
 //! Law: inside the ball nothing changes.
