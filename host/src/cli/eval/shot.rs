@@ -70,7 +70,11 @@ pub fn shoot(scene: Scene, conditions: Conditions, seed: u64) -> Result<Shots> {
         drops.as_ref().unwrap_or(&Drops::none()),
         seed,
     )?;
-    let truth_fine = fine(&scene, Projector::default().field_mm(distance_mm));
+    // Sums over a pixel's share of the scene end a rounding below 0 at times.
+    let truth_fine = fine(&scene, Projector::default().field_mm(distance_mm))
+        .into_iter()
+        .map(|v| v.clamp(0.0, 1.0))
+        .collect();
     let mut optics = VirtualOptics::new(scene, distance_mm)?;
     if let Some(drops) = drops {
         optics = optics.in_rain(drops)?;
