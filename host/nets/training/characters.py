@@ -3,7 +3,7 @@
 usage: characters.py CHARS74K_FOLDER FONTS_FOLDER OUT_FOLDER
 
 CHARS74K_FOLDER holds {fnt,hnd,img}_train.npz; FONTS_FOLDER a folder of .woff2, .ttf or .otf files for each family
-(the shipped weights: 161 families of @fontsource from npm, under the OFL). Characters keep Chars74K's own form: bright on dark, centred,
+(the shipped weights: 829 families of @fontsource from npm, under the OFL). Characters keep Chars74K's own form: bright on dark, centred,
 48 pixels along their longer side. Everything is seeded.
 """
 import glob
@@ -84,7 +84,11 @@ def rendered(folder):
             continue
         for label, character in enumerate(CLASSES):
             page = Image.new("L", (520, 520))
-            ImageDraw.Draw(page).text((130, 130), character, 255, font=face)
+            try:
+                ImageDraw.Draw(page).text((130, 130), character, 255, font=face)
+            except OSError as error:
+                print(f"left out: {character} of {path}: {error}")
+                continue
             u = rng.random()
             shift = (0, 0) if u < 0.85 else rng.integers(-4, 5, 2)
             image = centred(page, 48 if u < 0.8 else rng.uniform(26, 58), shift)
@@ -122,6 +126,23 @@ def photograph(glyphs):
     if rng.random() < 0.5:
         image = (image - image.min()) / (np.ptp(image) + 1e-6)
     return (np.clip(image, 0, 1) * 255).astype("u1")
+
+
+def page(glyphs):
+    """Part of a page: lines of small characters, bright on dark or the other way round."""
+    side = rng.uniform(7, 26)
+    out = Image.new("L", (64, 64))
+    y = rng.uniform(-side, 0)
+    while y < 64:
+        x = rng.uniform(-side, 0)
+        while x < 64:
+            if rng.random() > 0.12:
+                glyph = Image.fromarray(glyphs[rng.integers(len(glyphs))][6:58, 6:58])
+                out.paste(glyph.resize((round(side), round(side)), Image.BOX), (round(x), round(y)))
+            x += side * rng.uniform(0.7, 0.95)
+        y += side * rng.uniform(1.0, 1.6)
+    image = np.asarray(out) / 255 * rng.uniform(0.3, 1)
+    return ((1 - image if rng.random() < 0.6 else image) * 255).astype("u1")
 
 
 def no_letter():
@@ -186,11 +207,11 @@ def main(chars74k, fonts, out):
     images = {kind: source["x"][~held[kind]] for kind, source in sources.items()}
     labels = {kind: source["label"][~held[kind]] for kind, source in sources.items()}
     images["fnt_aug"], labels["fnt_aug"] = variants(images["fnt"], labels["fnt"], 14000, 0.6)
-    images["hnd_aug"], labels["hnd_aug"] = variants(images["hnd"], labels["hnd"], 26000, 1.0)
+    images["hnd_aug"], labels["hnd_aug"] = variants(images["hnd"], labels["hnd"], 56000, 1.0)
     images["ren"], labels["ren"] = rendered(fonts)
     glyphs = np.concatenate([images[kind] for kind in ("ren", "fnt", "fnt_aug", "hnd")])
     images["comp"] = np.stack([photograph(glyphs) for _ in range(12000)])
-    images["other"] = np.stack([no_letter() for _ in range(8000)])
+    images["other"] = np.stack([no_letter() for _ in range(8000)] + [page(glyphs) for _ in range(6000)])
     np.savez(f"{out}/train.npz", **images, **{f"{kind}_label": label for kind, label in labels.items()})
     print({kind: len(x) for kind, x in images.items()})
 

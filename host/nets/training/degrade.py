@@ -1,16 +1,22 @@
-"""Characters from train.npz, degraded as the camera does it; images are (B, 1, 64, 64) in [0, 1], sigma is in pixels of the 64 grid."""
+"""Characters from train.npz, degraded as the camera does it; images are (B, 1, 64, 64) in [0, 1], sigma is in pixels of the 64 grid.
+
+Everything is drawn on the device, without a branch that waits for it, so that a whole step of training can be one CUDA graph.
+"""
 import glob
+import math
 
 import numpy as np
 import torch
+import torch.nn.functional as F
 
 STEP_PX = 0.02
+TOP_PX = 6.8
 
 
-def blur_matrices(side=64, top_px=4.6):
+def blur_matrices(side=64):
     """For sigma = 0, 0.02, ...: the matrix that blurs a line of pixels, edges reflected; both sides of an image are blurred by it."""
     out = []
-    for k in range(int(top_px / STEP_PX) + 1):
+    for k in range(int(TOP_PX / STEP_PX) + 1):
         sigma = k * STEP_PX
         reach = int(4 * sigma + 0.5)
         weights = np.exp(-0.5 * (np.arange(-reach, reach + 1) / sigma) ** 2) if reach else np.ones(1)
@@ -32,124 +38,154 @@ def hadamard(n):
     return matrix
 
 
-BLUR = blur_matrices()
-SAMPLE = torch.kron(torch.eye(32), torch.full((1, 2), 0.5))
-H = hadamard(32)
-CHANGES = (H[:, 1:] != H[:, :-1]).sum(1)
-
-
-def rank(cost):
+def rank(cost, changes):
     """Place of each pattern in the order of a cost, ties by the first factor's sequency."""
-    return torch.argsort(torch.argsort((cost * 100 + CHANGES[:, None]).flatten())).view(32, 32)
+    return torch.argsort(torch.argsort((cost * 100 + changes[:, None]).flatten())).view(32, 32)
 
 
-ORDERS = [rank(CHANGES[:, None] + CHANGES[None]), rank((CHANGES[:, None] + 1) * (CHANGES[None] + 1))]
+class Optics:
+    """Blur, the camera's grid and its patterns, on a device."""
 
+    def __init__(self, device):
+        h = hadamard(32)
+        changes = (h[:, 1:] != h[:, :-1]).sum(1)
+        self.blur = blur_matrices().to(device)
+        self.sample = torch.kron(torch.eye(32), torch.full((1, 2), 0.5)).to(device)
+        self.hadamard = h.to(device)
+        costs = (changes[:, None] + changes[None], (changes[:, None] + 1) * (changes[None] + 1))
+        self.orders = torch.stack([rank(cost, changes) for cost in costs]).to(device)
 
-def blurred(x, sigma_px):
-    """(B, 64, 64) blurred by (B) sigmas."""
-    matrix = BLUR[np.minimum(np.round(sigma_px / STEP_PX), len(BLUR) - 1).astype(int)]
-    return matrix @ x @ matrix.transpose(1, 2)
+    def blurred(self, x, sigma_px):
+        """(B, 64, 64) blurred by (B) sigmas."""
+        matrix = self.blur[(sigma_px / STEP_PX).round().clamp(0, len(self.blur) - 1).long()]
+        return matrix @ x @ matrix.transpose(1, 2)
+
+    def sampled(self, optical):
+        """(B, 64, 64) to the camera's (B, 32, 32): means of 2 x 2."""
+        return self.sample @ optical @ self.sample.T
+
+    def partly(self, y, order, count):
+        """What (B) counts of the patterns say of (B, 32, 32), in the zig-zag (0) or cake-cutting (1) order; the others taken as 0."""
+        shown = self.orders[order] < count[:, None, None]
+        h = self.hadamard
+        return h @ ((h @ y @ h) * shown) @ h / 1024
 
 
 class Characters:
     """A seeded stream of sharp images and of their degradations."""
 
-    SHARE = dict(fnt=0.10, fnt_aug=0.08, ren=0.13, hnd=0.07, hnd_aug=0.16, img=0.30, comp=0.08, other=0.08)
+    SHARE = dict(fnt=0.08, fnt_aug=0.09, ren=0.15, hnd=0.06, hnd_aug=0.17, img=0.30, comp=0.08, other=0.07)
+    PHOTOGRAPHS = ("img", "comp", "other")
 
-    def __init__(self, seed, folder="."):
+    def __init__(self, seed, folder=".", device="cpu"):
+        torch.manual_seed(seed)
         file = np.load(f"{folder}/train.npz")
-        self.images = {kind: file[kind] for kind in self.SHARE}
-        self.rng = np.random.default_rng(seed)
-        self.kinds = list(self.SHARE)
-        self.share = np.array(list(self.SHARE.values()))
-        self.folder = folder
+        self.device, self.optics = device, Optics(device)
+        self.images = torch.from_numpy(np.concatenate([file[kind] for kind in self.SHARE])).to(device)
+        counts = [len(file[kind]) for kind in self.SHARE]
+        self.counts = torch.tensor(counts, device=device)
+        self.first = self.counts.cumsum(0) - self.counts
+        self.upto = torch.tensor(list(self.SHARE.values()), device=device).cumsum(0)
+        self.photographs = torch.tensor([kind in self.PHOTOGRAPHS for kind in self.SHARE], device=device)
+        labels = [file[f"{kind}_label"] if f"{kind}_label" in file else np.full(n, -1) for kind, n in zip(self.SHARE, counts)]
+        self.labels = torch.from_numpy(np.concatenate(labels).astype(np.int64)).to(device)
+        # Pairs made by the virtual camera (`nirspi train degrade`), where there are some: pairs*.npz.
+        files = [np.load(path) for path in sorted(glob.glob(f"{folder}/pairs*.npz"))]
         self.pairs = None
-        self.load_pairs()
-
-    def load_pairs(self):
-        """Pairs made by the virtual camera (`nirspi train degrade`), where there are some: pairs*.npz."""
-        files = [np.load(path) for path in sorted(glob.glob(f"{self.folder}/pairs*.npz"))]
         if files:
-            self.pairs = tuple(np.concatenate([file[key] for file in files]) for key in ("x", "y"))
+            sharp, seen = (np.concatenate([file[key] for file in files]).astype(np.float32) for key in ("x", "y"))
+            self.pairs = tuple(torch.from_numpy(a)[:, None].clamp(0, 1).to(device) for a in (sharp, seen))
 
-    def one(self):
-        r = self.rng
-        kind = self.kinds[r.choice(len(self.kinds), p=self.share)]
-        x = self.images[kind][r.integers(len(self.images[kind]))].astype(np.float32) / 255
-        if kind in ("img", "comp", "other"):
-            if r.random() < 0.5:
-                x = x[:, ::-1]
-            if r.random() < 0.5:
-                x = x[::-1]
-            if r.random() < 0.3:
-                x = x.T
-            if r.random() < 0.4:
-                x = 1 - x
-            if r.random() < 0.3:
-                x = np.clip((x - 0.5) * r.uniform(0.5, 1.2) + 0.5 + r.uniform(-0.15, 0.15), 0, 1)
-            if r.random() < 0.3:
-                dy, dx = r.integers(-4, 5, 2)
-                x = np.pad(x, 4, "edge")[4 + dy : 68 + dy, 4 + dx : 68 + dx]
-        elif r.random() < 0.12:
-            dy, dx = r.integers(-5, 6, 2)
-            if max(x[:6].max(), x[-6:].max(), x[:, :6].max(), x[:, -6:].max()) < 0.1:
-                x = np.roll(x, (dy, dx), (0, 1))
-        return np.ascontiguousarray(x)
+    def uniform(self, low, high, *shape):
+        return torch.rand(shape, device=self.device) * (high - low) + low
+
+    def chance(self, p, count):
+        return torch.rand(count, device=self.device) < p
+
+    def picks(self, count):
+        """Indices of images, each kind with its share."""
+        kind = torch.bucketize(self.uniform(0, 0.99999, count), self.upto).clamp(max=len(self.counts) - 1)
+        return kind, self.first[kind] + (self.uniform(0, 0.99999, count) * self.counts[kind]).long()
 
     def batch(self, count):
-        return torch.from_numpy(np.stack([self.one() for _ in range(count)]))[:, None]
+        """Sharp images (B, 1, 64, 64). Photographs and what is no letter are mirrored, turned, inverted, stretched and moved."""
+        kind, at = self.picks(count)
+        x = self.images[at].float() / 255
+
+        def some(p, changed, of):
+            return torch.where((self.chance(p, count) & of)[:, None, None], changed, x)
+
+        free = self.photographs[kind]
+        x = some(0.5, x.flip(2), free)
+        x = some(0.5, x.flip(1), free)
+        x = some(0.3, x.transpose(1, 2), free)
+        x = some(0.4, 1 - x, free)
+        gain, offset = self.uniform(0.5, 1.2, count, 1, 1), self.uniform(-0.15, 0.15, count, 1, 1)
+        x = some(0.3, ((x - 0.5) * gain + 0.5 + offset).clamp(0, 1), free)
+        x = some(0.3, self.turned(x), free)
+        x = some(0.3, self.moved(x, 4), free)
+        # A character keeps its dark edge, so it can go where there is room.
+        edge = torch.stack([x[:, :6].amax((1, 2)), x[:, -6:].amax((1, 2)), x[..., :6].amax((1, 2)), x[..., -6:].amax((1, 2))]).amax(0)
+        return some(0.12, self.moved(x, 5), ~free & (edge < 0.1))[:, None]
+
+    def moved(self, x, most):
+        """Moved by up to `most` pixels, the edge repeated."""
+        grid = torch.arange(64, device=self.device)
+        shifts = torch.randint(-most, most + 1, (2, len(x), 1), device=self.device)
+        rows, columns = ((grid + shift).clamp(0, 63) for shift in shifts)
+        return x.gather(1, rows[:, :, None].expand_as(x)).gather(2, columns[:, None, :].expand_as(x))
+
+    def turned(self, x):
+        """Turned by some 5 degrees and brought 10 % nearer or farther."""
+        count = len(x)
+        turn = torch.randn(count, device=self.device) * math.radians(5)
+        zoom = torch.exp(torch.randn(count, device=self.device) * 0.1)
+        zero = torch.zeros_like(turn)
+        theta = torch.stack((turn.cos() * zoom, -turn.sin() * zoom, zero, turn.sin() * zoom, turn.cos() * zoom, zero), 1).view(count, 2, 3)
+        grid = F.affine_grid(theta, (count, 1, 64, 64), align_corners=False)
+        return F.grid_sample(x[:, None], grid, mode="bicubic", padding_mode="reflection", align_corners=False)[:, 0].clamp(0, 1)
 
     def levels(self, count):
         """Blur (pixels) and noise (rms) of each image: blur 0 to 4.2, noise none to 10 %."""
-        r = self.rng
-        some = np.where(r.random(count) < 0.3, r.uniform(0.3, 2.0, count), r.uniform(0.3, 4.2, count))
-        sigma = np.where(r.random(count) < 0.1, r.uniform(0, 0.4, count), some)
-        u = r.random(count)
-        much = np.where(u < 0.85, r.uniform(0, 0.06, count), r.uniform(0.05, 0.10, count))
-        return sigma.astype(np.float32), np.where(u < 0.12, 0, much).astype(np.float32)
+        wide = torch.where(self.chance(0.4, count), self.uniform(0.3, 2.2, count), self.uniform(0.3, 4.2, count))
+        sigma = torch.where(self.chance(0.1, count), self.uniform(0, 0.4, count), wide)
+        u = torch.rand(count, device=self.device)
+        much = torch.where(u < 0.85, self.uniform(0, 0.06, count), self.uniform(0.05, 0.10, count))
+        return sigma, torch.where(u < 0.12, 0, much)
 
     def degrade(self, x, sampled):
         """(what is measured, the optical image before sampling, sigma, noise). `sampled`: on the camera's 32 x 32 grid, some with
         part of the patterns only; else on the 64 x 64 grid."""
-        r, count = self.rng, len(x)
+        count = len(x)
         sigma, noise = self.levels(count)
-        optical = blurred(x[:, 0], sigma)
-        scattered = r.random(count) < 0.15
-        if scattered.any():
-            # Rain and the projector's edge: a second, wider blur takes some of the light.
-            share = np.where(scattered, r.uniform(0.02, 0.25, count), 0).astype(np.float32)
-            share = torch.from_numpy(share)[:, None, None]
-            optical = (1 - share) * optical + share * blurred(x[:, 0], sigma + r.uniform(1, 2.5, count))
-        y = SAMPLE @ optical @ SAMPLE.T if sampled else optical
-        gauss = torch.from_numpy(r.standard_normal(y.shape).astype(np.float32))
-        y = y + gauss * torch.from_numpy(noise)[:, None, None]
+        optical = self.optics.blurred(x[:, 0], sigma)
+        # Rain and the projector's edge: a second, wider blur takes some of the light.
+        share = torch.where(self.chance(0.15, count), self.uniform(0.02, 0.25, count), 0)[:, None, None]
+        optical = (1 - share) * optical + share * self.optics.blurred(x[:, 0], sigma + self.uniform(1, 2.5, count))
+        y = self.optics.sampled(optical) if sampled else optical
+        y = y + torch.randn_like(y) * noise[:, None, None]
         if sampled:
-            for i in np.nonzero(r.random(count) < 0.12)[0]:
-                order = ORDERS[0 if r.random() < 0.5 else 1]
-                shown = order < int(1024 * r.uniform(0.3, 1))
-                y[i] = H @ ((H @ y[i] @ H) * shown) @ H / 1024
-        return y[:, None].clamp(0, 1), optical[:, None], torch.from_numpy(sigma), torch.from_numpy(noise)
+            order = self.chance(0.5, count).long()
+            partly = self.optics.partly(y, order, 1024 * self.uniform(0.3, 1, count))
+            y = torch.where(self.chance(0.12, count)[:, None, None], partly, y)
+        return y[:, None].clamp(0, 1), optical[:, None], sigma, noise
 
     def depth(self, x):
-        """Depth / 3 m and validity, (B, 2, 32, 32): 8, 16 or 32 zones a side; the target before something farther or nothing."""
-        r, out = self.rng, np.zeros((len(x), 2, 32, 32), np.float32)
-        for i in range(len(x)):
-            if r.random() < 0.4:
-                continue
-            n = int(r.choice([8, 8, 16, 32]))
-            depth_m = np.full((n, n), r.uniform(0.25, 1.3))
-            target = x[i, 0].reshape(n, 64 // n, n, 64 // n).mean((1, 3)).numpy() > 0.3
-            if r.random() < 0.5:
-                depth_m = np.where(target, depth_m, depth_m + r.uniform(0.1, 1.5))
-            depth_m = depth_m + r.normal(0, 0.01, depth_m.shape)
-            valid = r.random((n, n)) > r.uniform(0, 0.2)
-            if r.random() < 0.2:
-                valid &= target
-            zone = np.ones((32 // n, 32 // n))
-            out[i, 0] = np.kron(np.clip(depth_m / 3, 0, 1) * valid, zone)
-            out[i, 1] = np.kron(valid, zone)
-        return torch.from_numpy(out)
+        """Depth / 3 m and validity, (B, 2, 32, 32): 8, 16 or 32 zones a side; the target before something farther or nothing;
+        none at all for two in five."""
+        count = len(x)
+        pick, out = self.uniform(0, 1, count, 1, 1), torch.zeros(count, 2, 32, 32, device=self.device)
+        near, beyond = self.uniform(0.25, 1.3, count, 1, 1), self.uniform(0.1, 1.5, count, 1, 1)
+        beyond = beyond * self.chance(0.5, count)[:, None, None]
+        lost, only = self.uniform(0, 0.2, count, 1, 1), self.chance(0.2, count)[:, None, None]
+        for n, low, high in ((8, 0, 0.5), (16, 0.5, 0.75), (32, 0.75, 1.01)):
+            target = F.avg_pool2d(x, 64 // n)[:, 0] > 0.3
+            depth_m = near + beyond * ~target + torch.randn(count, n, n, device=self.device) * 0.01
+            valid = (torch.rand(count, n, n, device=self.device) >= lost) & (target | ~only)
+            maps = torch.stack(((depth_m / 3).clamp(0, 1) * valid, valid.float()), 1)
+            maps = maps.repeat_interleave(32 // n, 2).repeat_interleave(32 // n, 3)
+            out = torch.where(((pick >= low) & (pick < high))[:, None], maps, out)
+        return out * self.chance(0.6, count)[:, None, None, None]
 
 
 def conditions(t, sigma_px, noise):
@@ -159,11 +195,12 @@ def conditions(t, sigma_px, noise):
     return torch.stack((t, t * t, s, s * s, n, n * n), 1)
 
 
-def held_out(kind, sigma_px, noise, count=60, folder=".", seed=5):
+def held_out(optics, kind, sigma_px, noise, count=60, folder=".", seed=5):
     """Sharp images of groups that training never sees, and what the camera gives of them (32 x 32)."""
-    x = torch.from_numpy(np.load(f"{folder}/val.npz")[kind][: count * 3 : 3].astype(np.float32) / 255)[:, None]
-    y = SAMPLE @ blurred(x[:, 0], np.full(len(x), sigma_px)) @ SAMPLE.T
-    gauss = torch.from_numpy(np.random.default_rng(seed).standard_normal(y.shape).astype(np.float32))
+    device = optics.sample.device
+    x = torch.from_numpy(np.load(f"{folder}/val.npz")[kind][: count * 3 : 3].astype(np.float32) / 255)[:, None].to(device)
+    y = optics.sampled(optics.blurred(x[:, 0], torch.full((len(x),), sigma_px, device=device)))
+    gauss = torch.from_numpy(np.random.default_rng(seed).standard_normal(y.shape).astype(np.float32)).to(device)
     return x, (y + noise * gauss).clamp(0, 1)[:, None]
 
 

@@ -1,58 +1,58 @@
-"""The judge of 62 characters: never part of the chain, only of its metrics. usage: train_classifier.py FOLDER MINUTES"""
-import math
+"""The judge of 62 characters: never part of the chain, only of its metrics. usage: train_classifier.py FOLDER MINUTES [BATCH] [DEVICE]"""
 import sys
-import time
 
 import numpy as np
 import torch
 import torch.nn.functional as F
-from degrade import BLUR
+from degrade import Characters
 from networks import Classifier
 from safetensors.torch import save_file
+from stepper import Stepper, device_from
 
-SEED, BATCH, RATE = 3, 64, 2e-3
-SHARE = dict(fnt=0.15, fnt_aug=0.15, ren=0.2, hnd=0.12, hnd_aug=0.23, img=0.15)
+SEED, RATE = 3, 2e-3
 
 
-def main(folder, minutes):
-    torch.manual_seed(SEED)
-    torch.set_num_threads(1)
-    rng = np.random.default_rng(SEED)
-    train, val = np.load(f"{folder}/train.npz"), np.load(f"{folder}/val.npz")
-    images = {kind: train[kind] for kind in SHARE}
-    labels = {kind: train[f"{kind}_label"] for kind in SHARE}
-    net = Classifier().to(memory_format=torch.channels_last)
-    optimizer = torch.optim.AdamW(net.parameters(), RATE, weight_decay=1e-2)
-    start, step = time.time(), 0
-    while (done := (time.time() - start) / 60 / minutes) < 1:
-        for group in optimizer.param_groups:
-            group["lr"] = RATE * min(1, (step + 1) / 200) * (0.5 + 0.5 * math.cos(math.pi * done)) + 1e-6
-        picks = [(kind, rng.integers(len(images[kind]))) for kind in rng.choice(list(SHARE), BATCH, p=list(SHARE.values()))]
-        x = torch.from_numpy(np.stack([images[kind][i] for kind, i in picks]).astype(np.float32) / 255)[:, None]
-        target = torch.tensor([int(labels[kind][i]) for kind, i in picks])
+class Lettered(Characters):
+    """Only what has a label."""
+
+    SHARE = dict(fnt=0.15, fnt_aug=0.15, ren=0.2, hnd=0.12, hnd_aug=0.23, img=0.15)
+
+    def examples(self, count):
+        kind, at = self.picks(count)
+        x = self.images[at].float() / 255
         # Half of them a little soft, a third a little noisy: a judge must not need perfect edges.
-        blur = BLUR[torch.from_numpy(rng.integers(0, 60, BATCH) * (rng.random(BATCH) < 0.5)).long()]
-        x[:, 0] = blur @ x[:, 0] @ blur.transpose(1, 2)
-        noisy = torch.from_numpy((rng.random(BATCH) < 0.3).astype(np.float32))[:, None, None, None]
-        x = (x + torch.randn_like(x) * 0.02 * noisy).clamp(0, 1)
-        x = torch.roll(x, tuple(int(s) for s in rng.integers(-3, 4, 2)), (2, 3))
-        with torch.autocast("cpu", dtype=torch.bfloat16):
-            loss = F.cross_entropy(net(x).float(), target, label_smoothing=0.05)
-        optimizer.zero_grad()
-        loss.backward()
-        optimizer.step()
-        step += 1
-        if step % 300 == 0:
-            right = {}
-            with torch.no_grad():
-                for kind in ("fnt", "hnd", "img"):
-                    found = net(torch.from_numpy(val[kind].astype(np.float32) / 255)[:, None]).argmax(1).numpy()
-                    right[kind] = round(float((found == val[f"{kind}_label"]).mean()), 3)
-            print(step, f"{done:.0%} loss {loss.item():.3f}, held out:", right, flush=True)
-    state = {name: tensor.contiguous() for name, tensor in net.state_dict().items()}
-    recipe = f"host/nets/training/train_classifier.py, seed {SEED}, {step} steps of {BATCH}"
-    save_file(state, f"{folder}/out/classifier.safetensors", dict(model="classifier", version="1", recipe=recipe))
+        x = self.optics.blurred(x, self.uniform(0, 1.2, count) * self.chance(0.5, count))
+        x = x + torch.randn_like(x) * 0.02 * self.chance(0.3, count)[:, None, None]
+        x = torch.where(self.chance(0.3, count)[:, None, None], self.turned(x), x)
+        # A street photograph is as often dark on bright.
+        dark = self.chance(0.5, count) & self.photographs[kind]
+        return self.moved(torch.where(dark[:, None, None], 1 - x, x), 3).clamp(0, 1)[:, None], self.labels[at]
+
+
+def main(folder, minutes, batch="64", device=None):
+    device = device_from(device)
+    characters, net, val = Lettered(SEED, folder, device), Classifier().to(device), np.load(f"{folder}/val.npz")
+
+    def losses():
+        x, labels = characters.examples(int(batch))
+        return dict(classifier=F.cross_entropy(net(x), labels, label_smoothing=0.05))
+
+    stepper = Stepper(device, dict(classifier=(net, RATE)), losses, float(minutes), decay=3e-2)
+
+    def report(step, spent, losses):
+        right = {}
+        with torch.no_grad():
+            for kind in ("fnt", "hnd", "img"):
+                x = torch.from_numpy(val[kind].astype(np.float32) / 255)[:, None].to(device)
+                found = stepper.mean["classifier"](x).argmax(1).cpu().numpy()
+                right[kind] = round(float((found == val[f"{kind}_label"]).mean()), 3)
+        print(f"{step} steps, {spent:.2f} minutes, loss {losses['classifier']:.3f}, held out: {right}", flush=True)
+
+    stepper.run(20, report)
+    state = {name: tensor.contiguous().cpu() for name, tensor in stepper.mean["classifier"].state_dict().items()}
+    recipe = f"host/nets/training/train_classifier.py, seed {SEED}, {stepper.step} steps of {batch}"
+    save_file(state, f"{folder}/out/classifier.safetensors", dict(model="classifier", version="2", recipe=recipe))
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], float(sys.argv[2]))
+    main(*sys.argv[1:])
