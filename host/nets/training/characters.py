@@ -87,8 +87,8 @@ def rendered(folder):
             try:
                 ImageDraw.Draw(page).text((130, 130), character, 255, font=face)
             except OSError as error:
-                print(f"left out: {character} of {path}: {error}")
-                continue
+                print(f"left out from {character} on: {path}: {error}")
+                break
             u = rng.random()
             shift = (0, 0) if u < 0.85 else rng.integers(-4, 5, 2)
             image = centred(page, 48 if u < 0.8 else rng.uniform(26, 58), shift)

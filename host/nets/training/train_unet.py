@@ -126,7 +126,8 @@ def main(args):
     judge = Discriminator().to(device) if args.role == "gan" else None
     parts = dict(unet=(net, args.rate)) | (dict(judge=(judge, 2e-4)) if judge else {})
     losses = Losses(args.role, characters, chain, net, judge, args.batch, device)
-    if args.compile:
+    # The GAN's two losses go through one graph, whose buffers a compiled network would not keep.
+    if args.compile and judge is None:
         losses.net = torch.compile(net)
     stepper = Stepper(device, parts, losses, args.minutes, decay=1e-3, keep=0.9995)
     checkpoint = f"{folder}/checkpoint_{name}.pt"

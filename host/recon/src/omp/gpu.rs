@@ -33,6 +33,7 @@ mod kernels;
 pub use choice::{Choice, FRAMES_WORTH_A_GPU, choose};
 pub use device::Device;
 pub use dictionary::{
-    DeviceDictionary, DeviceFrames, DeviceImages, DevicePictures, path_over, solve_batch_over,
+    DeviceDictionary, DeviceFrames, DeviceImages, DevicePictures, HostImages, path_over,
+    solve_batch_over,
 };
 pub use gram::DeviceSolutions;

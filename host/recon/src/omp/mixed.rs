@@ -5,8 +5,8 @@
 
 use super::batch::{Problem, solve_batch_paths, solve_batch_with};
 use super::dense::DenseDictionary;
-use super::pursuit::{Path, Solver};
-use super::referee::{BELIEVED, DoubleReferee};
+use super::pursuit::{Path, Solver, energy};
+use super::referee::{BELIEVED, BELIEVED_ENERGY, DoubleReferee};
 use super::{Backend, Dictionary, Limits, OmpError, Scalar, Solution, Stop, solve_batch};
 use nalgebra::DMatrix;
 use std::sync::OnceLock;
@@ -20,14 +20,14 @@ pub struct MixedDictionary {
 
 /// A matrix for the measurements that single precision cannot decide.
 #[derive(Debug)]
-pub(super) struct Exact {
+struct Exact {
     matrix: DMatrix<f64>,
     double: OnceLock<DenseDictionary<f64>>,
     normalised: bool,
 }
 
 impl Exact {
-    pub(super) fn new(matrix: DMatrix<f64>, normalised: bool) -> Self {
+    fn new(matrix: DMatrix<f64>, normalised: bool) -> Self {
         Self { matrix, double: OnceLock::new(), normalised }
     }
 
@@ -40,7 +40,7 @@ impl Exact {
     }
 
     /// Solves the `doubtful` ones of the measurements `y` again, on the processor.
-    pub(super) fn solve_again(
+    fn solve_again(
         &self,
         limits: &Limits,
         y: &[f64],
@@ -112,8 +112,11 @@ impl MixedDictionary {
         let measurements = self.exact.matrix.nrows();
         let frame = |i: usize| &y[i * measurements..(i + 1) * measurements];
         let paths = self.solve_in_single(limits, &single, &frame)?;
-        let doubtful: Vec<usize> = (0..paths.len()).filter(|&i| is_doubtful(&paths[i])).collect();
-        let refereed = paths.iter().filter(|path| path.refereed > 0 && !is_doubtful(path)).count();
+        let frames = paths.iter().zip(single.chunks_exact(measurements));
+        let doubts: Vec<bool> = frames.map(|(path, y)| is_doubtful(path, limits, y)).collect();
+        let doubtful: Vec<usize> = (0..paths.len()).filter(|&i| doubts[i]).collect();
+        let refereed = paths.iter().zip(&doubts).filter(|(p, doubt)| p.refereed > 0 && !**doubt);
+        let refereed = refereed.count();
         let mut solutions: Vec<Solution> = paths.into_iter().map(Path::solution).collect();
         self.exact.solve_again(limits, y, &doubtful, &mut solutions)?;
         Ok((solutions, refereed + doubtful.len()))
@@ -130,7 +133,8 @@ impl MixedDictionary {
         if self.exact.double.get().is_none() {
             // Double precision is prepared when somebody asks for it, and not by one thread while others wait.
             let paths = solve_batch_paths(&problem, y)?;
-            if !paths.iter().any(is_doubtful) {
+            let mut frames = paths.iter().zip(y.chunks_exact(self.exact.matrix.nrows()));
+            if !frames.any(|(path, y)| is_doubtful(path, limits, y)) {
                 return Ok(paths);
             }
         }
@@ -162,11 +166,12 @@ impl MixedSolver<'_> {
         let referee = |double| DoubleReferee::new(&dictionary.exact.matrix, double, y);
         let mut path =
             self.single.solve_with(&self.y, &mut dictionary.exact.double.get().map(referee))?;
-        if is_doubtful(&path) && dictionary.exact.double.get().is_none() {
+        let limits = &self.limits;
+        if is_doubtful(&path, limits, &self.y) && dictionary.exact.double.get().is_none() {
             let mut referee = referee(dictionary.double());
             path = self.single.solve_with(&self.y, &mut referee)?;
         }
-        if !is_doubtful(&path) {
+        if !is_doubtful(&path, limits, &self.y) {
             let refereed = path.refereed > 0;
             return Ok((path.solution(), refereed));
         }
@@ -178,7 +183,15 @@ impl MixedSolver<'_> {
     }
 }
 
-fn is_doubtful(path: &Path<f32>) -> bool {
+/// Whether single precision may have decided what only double precision can: between two atoms, or whether it was the end.
+fn is_doubtful(path: &Path<f32>, limits: &Limits, y: &[f32]) -> bool {
     let ended_by_rounding = matches!(path.stop, Stop::Dependent | Stop::NoAtomLeft);
-    path.least_lead < BELIEVED || ended_by_rounding
+    // Nobody looks at the residual once there are enough atoms.
+    let looked = path.residual_norms.len() - usize::from(path.stop == Stop::Sparsity);
+    let energy = energy(y);
+    let enough = limits.enough(energy, y.len()) / energy;
+    let close = |norm: &f64| (norm.powi(2) - enough).abs() < BELIEVED_ENERGY;
+    path.least_lead < BELIEVED
+        || ended_by_rounding
+        || path.residual_norms[..looked].iter().any(close)
 }

@@ -48,6 +48,10 @@ impl<T, R: Referee<T>> Referee<T> for Option<R> {
 /// err by up to 1.02 epsilons (1024 atoms of unit norm, 256 to 1024 normal measurements).
 pub(super) const BELIEVED: f64 = 8.0 * f32::EPSILON as f64;
 
+/// Distances of the residual's energy from the limit, relative to the measurement's energy, that are believed: that energy
+/// is a difference of squares in `f32`.
+pub(super) const BELIEVED_ENERGY: f64 = 64.0 * f32::EPSILON as f64;
+
 /// Change of the coefficients, relative to the largest, after which another step would change nothing but rounding.
 const REFINED: f64 = 1e-11;
 

@@ -3,6 +3,7 @@
 #[cfg(feature = "gpu")]
 mod gpu;
 
+use super::{FASTEST_SWEEPS_HZ, milliseconds};
 use crate::cli::{Usage, backend, print};
 use anyhow::{Context, Result};
 use clap::ValueEnum;
@@ -20,9 +21,6 @@ use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
-
-/// Sweeps a second that the patterns' clock allows: as fast as there is anything to reconstruct.
-const FASTEST_SWEEPS_HZ: f64 = nirspi_wire::PATTERN_HZ as f64 / nirspi_wire::PATTERNS as f64;
 
 /// Time orthogonal matching pursuit on a problem of your own, or on a random one
 ///
@@ -259,10 +257,6 @@ impl Args {
 
 fn matrix(problem: &ProblemFile) -> DMatrix<f64> {
     DMatrix::from_row_slice(problem.measurements, problem.atoms, &problem.dictionary)
-}
-
-fn milliseconds(start: Instant) -> f64 {
-    start.elapsed().as_secs_f64() * 1e3
 }
 
 /// Cosines of an image by a random choice of Hadamard rows, and frames that are sums of some with noise.

@@ -3,20 +3,29 @@
 //! The one law: what goes to the device once stays there. The matrix, its Gram matrix and the atoms' pictures are uploaded or
 //! computed when the dictionary is made; a batch brings its measurements and takes its solutions.
 //!
+//! A batch goes in turns of [`TURN`] frames, several at a time, each from a thread of its own: CubeCL gives each thread a stream, so that
+//! one turn is copied and unpacked while another is pursued.
+//!
 //! Measurements, solutions and images may stay on the device too ([`DeviceFrames`], [`DeviceSolutions`], [`DeviceImages`]).
 //! What does not yet: the networks do not take a [`DeviceImages`], so images go through the host's memory to reach them.
 
 use super::device::Device;
 use super::engine::Buffer;
-use super::gram::{DeviceGram, DeviceSolutions, width};
+use super::gram::{DeviceGram, DeviceSolutions, FRAMES_A_THREAD, width};
 use super::kernels::TOGETHER;
 use crate::omp::dictionary::Atoms;
-use crate::omp::mixed::Exact;
 use crate::omp::pursuit::energy;
-use crate::omp::{BackendError, Dictionary, Limits, OmpError, Path, Scalar, Solution, finite};
+use crate::omp::{
+    BackendError, Dictionary, Limits, MixedDictionary, OmpError, Path, Scalar, Solution, finite,
+};
+use cubecl::bytes::Bytes;
 use cubecl::prelude::CubeElement;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
+use std::sync::OnceLock;
+
+/// Most frames of a turn: enough to fill a large GPU, and few enough that a batch of some thousands has several.
+const TURN: usize = 1024;
 
 /// A `measurements x atoms` matrix of any column norms on a device.
 #[derive(Debug)]
@@ -25,7 +34,9 @@ pub struct DeviceDictionary {
     /// Row-major, as wide as the Gram matrix.
     matrix: Buffer,
     measurements: usize,
-    exact: Exact,
+    /// The matrix, and whether atoms are chosen by correlation, for frames that single precision cannot decide.
+    exact: (DMatrix<f64>, bool),
+    mixed: OnceLock<MixedDictionary>,
 }
 
 /// Measurements on a device.
@@ -40,6 +51,21 @@ pub struct DeviceFrames {
 pub struct DevicePictures {
     buffer: Buffer,
     pixels: usize,
+}
+
+/// Images that have come back, `frames x pixels`.
+#[derive(Debug)]
+pub struct HostImages {
+    bytes: Bytes,
+    count: usize,
+}
+
+impl std::ops::Deref for HostImages {
+    type Target = [f32];
+
+    fn deref(&self) -> &[f32] {
+        &f32::from_bytes(&self.bytes)[..self.count]
+    }
 }
 
 /// Images on a device, `frames x pixels`.
@@ -86,8 +112,8 @@ impl DeviceDictionary {
             atoms.unnormalised()
         };
         let gram = DeviceGram::new(device, gram, atoms)?;
-        let exact = Exact::new(matrix, normalised);
-        Ok(Self { gram, matrix: matrix_there, measurements, exact })
+        let exact = (matrix, normalised);
+        Ok(Self { gram, matrix: matrix_there, measurements, exact, mixed: OnceLock::new() })
     }
 
     /// Where it is.
@@ -105,22 +131,37 @@ impl DeviceDictionary {
         Ok(self.gram.frames_at_once(sparsity)?.min(other / TOGETHER * TOGETHER).max(1))
     }
 
+    /// Frames of one turn of a batch.
+    ///
+    /// # Errors
+    /// [`OmpError`] if not even one fits the device.
+    pub fn frames_a_turn(&self, sparsity: usize) -> Result<usize, OmpError> {
+        Ok(self.frames_at_once(sparsity)?.min(TURN))
+    }
+
     /// Takes measurements to the device, `measurements` numbers each, one after another.
     ///
     /// # Errors
-    /// [`OmpError`] if they are no multiple of the dictionary's measurements, or a number is not finite.
-    pub fn upload(&self, y: &[f32]) -> Result<DeviceFrames, OmpError> {
+    /// [`OmpError`] if they are no multiple of the dictionary's measurements, or a number is not finite in `f32`.
+    pub fn upload<T: Scalar>(&self, y: &[T]) -> Result<DeviceFrames, OmpError> {
         let expected = self.measurements;
         if !y.len().is_multiple_of(expected) {
             return Err(OmpError::Length { found: y.len(), expected });
         }
-        finite("measurement", y)?;
-        let energies: Vec<f64> = y.chunks_exact(expected).map(energy).collect();
         // Whole groups of frames.
-        let there = energies.len().next_multiple_of(TOGETHER).max(TOGETHER) * expected;
-        let mut padded = y.to_vec();
-        padded.resize(there, 0.0);
-        let y = self.device().engine.upload(&padded);
+        let there = (y.len() / expected).next_multiple_of(TOGETHER).max(TOGETHER);
+        let mut single = vec![0.0; there * expected];
+        let frames = single.par_chunks_exact_mut(expected).zip(y.par_chunks_exact(expected));
+        let convert = |(out, y): (&mut [f32], &[T])| {
+            out.iter_mut().zip(y).for_each(|(out, &y)| *out = self::single(y));
+            energy(out)
+        };
+        let energies: Vec<f64> = frames.with_min_len(FRAMES_A_THREAD).map(convert).collect();
+        if !energies.iter().all(|energy| energy.is_finite()) {
+            finite("measurement", y)?;
+            finite("measurement", &single)?;
+        }
+        let y = self.device().engine.upload(&single);
         Ok(DeviceFrames { y, energies })
     }
 
@@ -149,25 +190,48 @@ impl DeviceDictionary {
         Ok(found.into_iter().map(|found| found.solution).collect())
     }
 
-    /// Brings the solutions of the measurements `y` to the host. Those that `f32` could not decide are solved again in `f64`,
-    /// on the processor; also returns how many.
+    /// Brings solutions to the host, and which of them `f32` could not decide.
     ///
     /// # Errors
-    /// [`OmpError`] if the device failed, or `y` are not as many measurements.
-    pub fn download_checked(
+    /// [`OmpError`] if the device failed.
+    pub fn download_with_doubts(
         &self,
         solutions: &DeviceSolutions,
+    ) -> Result<(Vec<Solution>, Vec<usize>), OmpError> {
+        let found = self.gram.read(solutions)?;
+        let doubtful = (0..found.len()).filter(|&i| found[i].doubtful).collect();
+        Ok((found.into_iter().map(|found| found.solution).collect(), doubtful))
+    }
+
+    /// Solves the `doubtful` ones of the measurements `y` again on the processor, with `f64` as the referee. For a whole batch at
+    /// once, from one thread: the dictionary in double precision is prepared by all threads when it is first needed.
+    ///
+    /// # Errors
+    /// [`OmpError`] if there are not as many measurements as solutions, or one is not finite.
+    pub fn settle(
+        &self,
+        limits: &Limits,
         y: &[f64],
-    ) -> Result<(Vec<Solution>, usize), OmpError> {
-        let expected = solutions.frames() * self.measurements;
+        doubtful: &[usize],
+        solutions: &mut [Solution],
+    ) -> Result<(), OmpError> {
+        let expected = solutions.len() * self.measurements;
         if y.len() != expected {
             return Err(OmpError::Length { found: y.len(), expected });
         }
-        let found = self.gram.read(solutions)?;
-        let doubtful: Vec<usize> = (0..found.len()).filter(|&i| found[i].doubtful).collect();
-        let mut checked: Vec<Solution> = found.into_iter().map(|found| found.solution).collect();
-        self.exact.solve_again(solutions.limits(), y, &doubtful, &mut checked)?;
-        Ok((checked, doubtful.len()))
+        if doubtful.is_empty() {
+            return Ok(());
+        }
+        let mixed = self.mixed.get_or_init(|| {
+            let (matrix, normalised) = self.exact.clone();
+            MixedDictionary::new(matrix, normalised)
+        });
+        let frame = |i: &usize| &y[i * self.measurements..(i + 1) * self.measurements];
+        let again: Vec<f64> = doubtful.iter().flat_map(frame).copied().collect();
+        for (&i, solution) in doubtful.iter().zip(mixed.solve_batch(limits, &again)?.0) {
+            solutions[i] = solution;
+        }
+        Ok(())
     }
 
     /// Takes the atoms' pictures to the device, `pixels` numbers each.
@@ -213,12 +277,12 @@ impl DeviceDictionary {
     ///
     /// # Errors
     /// [`OmpError`] if the device failed.
-    pub fn download_images(&self, images: &DeviceImages) -> Result<Vec<f32>, OmpError> {
-        let bytes = self.device().engine.read(&[&images.buffer])?;
-        Ok(f32::from_bytes(&bytes[0])[..images.frames * images.pixels].to_vec())
+    pub fn download_images(&self, images: &DeviceImages) -> Result<HostImages, OmpError> {
+        let bytes = self.device().engine.read(&[&images.buffer])?.swap_remove(0);
+        Ok(HostImages { bytes, count: images.frames * images.pixels })
     }
 
-    /// [`solve_batch`](crate::omp::solve_batch) in `f32` alone, in as many turns as fit the device.
+    /// [`solve_batch`](crate::omp::solve_batch) in `f32` alone.
     ///
     /// # Errors
     /// [`OmpError`] if `y` does not fit the dictionary, is not finite, or the device fails.
@@ -227,15 +291,13 @@ impl DeviceDictionary {
         limits: &Limits,
         y: &[f32],
     ) -> Result<Vec<Solution>, OmpError> {
-        let mut solutions = Vec::new();
-        for y in y.chunks(self.frames_at_once(limits.sparsity)? * self.measurements) {
-            let found = self.pursue(limits, &self.upload(y)?)?;
-            solutions.append(&mut self.download(&found)?);
-        }
-        Ok(solutions)
+        let turns = y.par_chunks(self.frames_a_turn(limits.sparsity)? * self.measurements);
+        let solved = turns.map(|y| self.download(&self.pursue(limits, &self.upload(y)?)?));
+        Ok(solved.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect())
     }
 
-    /// Sparse representations, and how many of them `f32` could not decide: those are solved again in `f64`, on the CPU.
+    /// Sparse representations, and how many of them `f32` could not decide: those are solved again with `f64` as its referee,
+    /// on the processor.
     ///
     /// # Errors
     /// [`OmpError`] if `y` does not fit the dictionary, is not finite, or the device fails.
@@ -244,16 +306,17 @@ impl DeviceDictionary {
         limits: &Limits,
         y: &[f64],
     ) -> Result<(Vec<Solution>, usize), OmpError> {
-        finite("measurement", y)?;
-        let (mut solutions, mut again) = (Vec::new(), 0);
-        for y in y.chunks(self.frames_at_once(limits.sparsity)? * self.measurements) {
-            let single: Vec<f32> = y.iter().map(|&y| y as f32).collect();
-            let found = self.pursue(limits, &self.upload(&single)?)?;
-            let (mut checked, in_double) = self.download_checked(&found, y)?;
-            solutions.append(&mut checked);
-            again += in_double;
+        let turn = self.frames_a_turn(limits.sparsity)?;
+        let turns = y.par_chunks(turn * self.measurements);
+        let found =
+            turns.map(|y| self.download_with_doubts(&self.pursue(limits, &self.upload(y)?)?));
+        let (mut solutions, mut doubtful) = (Vec::new(), Vec::new());
+        for (mut found, doubts) in found.collect::<Result<Vec<_>, _>>()? {
+            doubtful.extend(doubts.into_iter().map(|i| solutions.len() + i));
+            solutions.append(&mut found);
         }
-        Ok((solutions, again))
+        self.settle(limits, y, &doubtful, &mut solutions)?;
+        Ok((solutions, doubtful.len()))
     }
 }
 

@@ -7,15 +7,13 @@ use super::device::Device;
 use super::engine::{Buffer, Pursuit, Rounding};
 use super::kernels::TOGETHER;
 use crate::omp::dictionary::Atoms;
+use crate::omp::referee::{BELIEVED, BELIEVED_ENERGY};
 use crate::omp::{BackendError, Limits, OmpError, Path, Scalar, Solution, Stop};
 use cubecl::prelude::CubeElement;
+use rayon::prelude::*;
 
-/// Leads over the next best atom, relative to the measurement's norm, that are believed, as on the CPU.
-const BELIEVED: f64 = 8.0 * f32::EPSILON as f64;
-
-/// Distances of the residual's energy from the limit, relative to the measurement's energy, that are believed: that energy
-/// is a difference of squares in `f32`.
-const BELIEVED_ENERGY: f64 = 64.0 * f32::EPSILON as f64;
+/// Frames that a thread unpacks at least.
+pub(super) const FRAMES_A_THREAD: usize = 32;
 
 /// The Gram matrix and the lengths of a dictionary's atoms, on a device.
 #[derive(Debug)]
@@ -32,7 +30,6 @@ pub(super) struct DeviceGram {
 pub struct DeviceSolutions {
     pub(super) pursuit: Pursuit,
     energies: Vec<f64>,
-    limits: Limits,
     unseen: Vec<usize>,
     atoms: usize,
 }
@@ -125,7 +122,7 @@ impl DeviceGram {
         }
         let unseen = self.atoms.unseen().to_vec();
         let atoms = self.atoms.count();
-        Ok(DeviceSolutions { pursuit, energies, limits: *limits, unseen, atoms })
+        Ok(DeviceSolutions { pursuit, energies, unseen, atoms })
     }
 
     /// The pursuit of one frame, with a solution for every number of atoms.
@@ -164,12 +161,19 @@ impl DeviceGram {
         ])?;
         let (state, support) = (f32::from_bytes(&bytes[0]), u32::from_bytes(&bytes[1]));
         let (values, coefficients) = (f32::from_bytes(&bytes[2]), f32::from_bytes(&bytes[3]));
-        let frames = (0..pursuit.frames).map(|frame| {
-            let chosen = frame * pursuit.sparsity..(frame + 1) * pursuit.sparsity;
-            let state = &state[frame * STATE..(frame + 1) * STATE];
-            let values = &values[2 * chosen.start..2 * chosen.end];
-            solutions.found(frame, state, &support[chosen.clone()], values, &coefficients[chosen])
-        });
+        let frames =
+            (0..pursuit.frames).into_par_iter().with_min_len(FRAMES_A_THREAD).map(|frame| {
+                let chosen = frame * pursuit.sparsity..(frame + 1) * pursuit.sparsity;
+                let state = &state[frame * STATE..(frame + 1) * STATE];
+                let values = &values[2 * chosen.start..2 * chosen.end];
+                solutions.found(
+                    frame,
+                    state,
+                    &support[chosen.clone()],
+                    values,
+                    &coefficients[chosen],
+                )
+            });
         Ok(frames.collect())
     }
 }
@@ -179,10 +183,6 @@ impl DeviceSolutions {
     #[must_use]
     pub fn frames(&self) -> usize {
         self.pursuit.frames
-    }
-
-    pub(super) fn limits(&self) -> &Limits {
-        &self.limits
     }
 
     /// How many atoms the dictionary has.

@@ -78,3 +78,18 @@ fn atoms_as_they_are_are_chosen_by_their_inner_products() {
     };
     assert_eq!((first(true), first(false)), (0, 1));
 }
+
+#[test]
+fn a_limit_that_the_residual_meets_to_rounding_is_judged_in_double_precision() {
+    for lead in [1e-9, -1e-9] {
+        let matrix = DMatrix::<f64>::identity(8, 8);
+        let y = [0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.6, 0.8];
+        // After the first atom the residual's energy is 1, the limit a little above or below.
+        let limits = Limits { noise: ((1.0 + lead) / 8.0).sqrt(), ..Limits::atoms(3) };
+        let dictionary = MixedDictionary::new(matrix.clone(), true);
+        let (found, again) = dictionary.solve_batch(&limits, &y).unwrap();
+        let exact = reference::solve(&matrix, &y, &limits).unwrap();
+        assert_eq!((&found[0], again), (&exact, 1), "{lead}");
+        assert_eq!(dictionary.solver(&limits).unwrap().solve(&y).unwrap(), (exact, true));
+    }
+}

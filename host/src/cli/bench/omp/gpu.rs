@@ -1,12 +1,14 @@
 //! The same problem on a GPU: measurements go there, solutions and images come back, and all of it is timed.
 
-use super::{Args, Precision, Timed, matrix, milliseconds};
+use super::super::milliseconds;
+use super::{Args, Precision, Timed, matrix};
 use anyhow::Result;
 use nirspi::files::problem::ProblemFile;
 use nirspi_recon::basis::Transform;
 use nirspi_recon::omp::gpu::{Device, DeviceDictionary, DevicePictures};
 use nirspi_recon::omp::{BackendError, Limits, Solution};
 use nirspi_recon::{Basis, Side};
+use rayon::prelude::*;
 use std::time::Instant;
 
 /// Solves `problem` on `device` as often as asked for, once more to warm up.
@@ -55,24 +57,24 @@ fn solve(
     pictures: Option<&DevicePictures>,
 ) -> Result<(Vec<Solution>, usize, usize)> {
     let limits = Limits::atoms(problem.sparsity);
-    let at_once = dictionary.frames_at_once(problem.sparsity)? * problem.measurements;
-    let (mut solutions, mut solved_in_f64, mut pixels) = (Vec::new(), 0, 0);
-    for y in problem.frames.chunks(at_once) {
-        let single: Vec<f32> = y.iter().map(|&y| y as f32).collect();
-        let there = dictionary.pursue(&limits, &dictionary.upload(&single)?)?;
+    let turn = dictionary.frames_a_turn(problem.sparsity)? * problem.measurements;
+    let solved = problem.frames.par_chunks(turn).map(|y| {
+        let there = dictionary.pursue(&limits, &dictionary.upload(y)?)?;
         let images = dictionary.images(&there, pictures)?;
-        pixels += dictionary.download_images(&images)?.len();
-        let mut found = match args.precision {
-            Precision::F32 => dictionary.download(&there)?,
-            _ => {
-                let (found, in_double) = dictionary.download_checked(&there, y)?;
-                solved_in_f64 += in_double;
-                found
-            }
-        };
+        let (found, doubtful) = dictionary.download_with_doubts(&there)?;
+        Ok((found, doubtful, dictionary.download_images(&images)?.len()))
+    });
+    let (mut solutions, mut doubtful, mut pixels) = (Vec::new(), Vec::new(), 0);
+    for (mut found, doubts, back) in solved.collect::<Result<Vec<_>>>()? {
+        doubtful.extend(doubts.into_iter().map(|i| solutions.len() + i));
         solutions.append(&mut found);
+        pixels += back;
     }
-    Ok((solutions, solved_in_f64, pixels))
+    match args.precision {
+        Precision::F32 => doubtful.clear(),
+        _ => dictionary.settle(&limits, &problem.frames, &doubtful, &mut solutions)?,
+    }
+    Ok((solutions, doubtful.len(), pixels))
 }
 
 /// What the atoms of a random problem look like.

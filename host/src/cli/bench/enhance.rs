@@ -1,0 +1,117 @@
+//! `nirspi bench enhance`: the learned stages, timed.
+
+use super::{FASTEST_SWEEPS_HZ, Times};
+use crate::cli::networks::{NetworkArgs, Used};
+use crate::cli::print;
+use anyhow::Result;
+use nirspi_nets::{Enhancer, Images, Method, Options, fusion};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use serde::Serialize;
+use std::num::NonZeroU32;
+use std::process::ExitCode;
+
+/// Time what `enhance` does to many frames: estimate, fusion, deblurring, agreement with the readings
+///
+/// Frames are soft random blobs with noise, in memory; times are for all of them, from the readings to the images, with whatever
+/// a GPU takes for their transfer. The first run, in which a GPU compiles its kernels, is `first_ms`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n\
+    \x20 nirspi bench enhance --frames 256\n\
+    \x20 nirspi bench enhance --frames 4096 --backend cuda --no-consistency")]
+pub struct Args {
+    /// Frames
+    #[arg(long, value_name = "B", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=65_536))]
+    frames: u32,
+    /// Steps along the bridge
+    #[arg(long, value_name = "S", default_value = "1")]
+    steps: NonZeroU32,
+    /// Let the network say what the readings contradict
+    #[arg(long)]
+    no_consistency: bool,
+    /// Times to run it
+    #[arg(long, value_name = "R", default_value_t = 9, value_parser = clap::value_parser!(u32).range(1..))]
+    repeats: u32,
+    /// Seed of the frames
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    #[command(flatten)]
+    networks: NetworkArgs,
+    /// Print JSON, as it does anyway
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Serialize)]
+struct Report {
+    device: String,
+    weights: Vec<Used>,
+    threads: usize,
+    frames: u32,
+    steps: u32,
+    consistency: bool,
+    repeats: u32,
+    first_ms: f64,
+    /// Everything.
+    #[serde(flatten)]
+    whole: Times,
+    frames_per_s: f64,
+    /// Frames a second, of the sweeps a second that the patterns' clock allows.
+    of_fastest_sweeps: f64,
+    /// Parts of it, each on its own.
+    estimate: Times,
+    fusion: Times,
+}
+
+pub fn run(args: &Args) -> Result<ExitCode> {
+    let mut networks = args.networks.open(&["fsrcnn", "estimator", "diffusion"])?;
+    let (estimator, alone) = (networks.estimator()?, networks.fusion()?);
+    let method = Method::Diffusion { steps: args.steps };
+    let enhancer = Enhancer::new(networks.fusion()?, networks.sharpener(method)?);
+    let options = Options { consistency: !args.no_consistency, gate: false, ..Options::default() };
+    let values = blobs(args.frames as usize, args.seed);
+    let images: Images<'_, { fusion::SIDE }> = Images::new(&values)?;
+    let enhance = || enhancer.enhance(images, None, &options, &mut |_| {}).images.len();
+    let first_ms = Times::of(1, enhance).median_ms;
+    estimator.estimate(images);
+    let whole = Times::of(args.repeats, enhance);
+    let frames_per_s = f64::from(args.frames) / whole.median_ms * 1e3;
+    print::json(&Report {
+        device: networks.device().to_owned(),
+        weights: networks.used(),
+        threads: rayon::current_num_threads(),
+        frames: args.frames,
+        steps: args.steps.get(),
+        consistency: options.consistency,
+        repeats: args.repeats,
+        first_ms,
+        whole,
+        frames_per_s,
+        of_fastest_sweeps: frames_per_s / FASTEST_SWEEPS_HZ,
+        estimate: Times::of(args.repeats, || estimator.estimate(images)),
+        fusion: Times::of(args.repeats, || alone.upscale(images, None)),
+    })?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// (N, 32, 32): three soft blobs each, and noise of 3 %.
+fn blobs(count: usize, seed: u64) -> Vec<f32> {
+    let mut rng = Pcg64::seed_from_u64(seed);
+    let side = fusion::SIDE;
+    let mut out = Vec::with_capacity(count * side * side);
+    for _ in 0..count {
+        let blobs: [[f32; 3]; 3] = std::array::from_fn(|_| {
+            [rng.random_range(4.0..28.0), rng.random_range(4.0..28.0), rng.random_range(2.0..6.0)]
+        });
+        for pixel in 0..side * side {
+            let (x, y) = ((pixel % side) as f32, (pixel / side) as f32);
+            let light: f32 = blobs
+                .iter()
+                .map(|[cx, cy, r]| (-((x - cx).powi(2) + (y - cy).powi(2)) / (2.0 * r * r)).exp())
+                .sum();
+            let noise = 0.06 * (rng.random::<f32>() + rng.random::<f32>() - 1.0);
+            out.push((0.8 * light + noise).clamp(0.0, 1.0));
+        }
+    }
+    out
+}
