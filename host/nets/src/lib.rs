@@ -11,6 +11,7 @@
 //! # Ok::<(), nirspi_nets::UpscaleError>(())
 //! ```
 
+mod blur;
 pub mod classical;
 pub mod consistency;
 pub mod cpu;

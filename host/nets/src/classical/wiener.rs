@@ -4,7 +4,7 @@
 //! h / (h^2 + n / s). For s stands the law of natural images, c / f^2 (Field, J. Opt. Soc. Am. A 4, 1987), with c such
 //! that scene and noise together have the power that is found. The law: the mean is kept.
 
-use super::blur::Blur;
+use super::Blur;
 use std::f64::consts::PI;
 
 /// The sharpened image, not clamped.
