@@ -14,6 +14,7 @@
 mod blur;
 pub mod classical;
 pub mod consistency;
+mod cosine;
 pub mod cpu;
 pub mod data;
 pub mod deblur;
