@@ -6,12 +6,12 @@
 //!
 //! The law: what no blur and no noise has touched comes back as it was.
 
-pub mod blur;
 pub mod richardson_lucy;
 pub mod total_variation;
 pub mod wiener;
 
-use blur::Blur;
+pub use crate::blur::Blur;
+
 use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;

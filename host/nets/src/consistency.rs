@@ -13,14 +13,13 @@
 //! onto cosine k, so A A^T is diagonal too and no iteration is needed. With some Hadamard rows missing
 //! only what was measured counts; then the same equation is solved by conjugate gradients.
 
-mod cosine;
 mod sampled;
-
-use std::f32::consts::PI;
 
 pub use sampled::MeasuredRows;
 
-use cosine::Cosine;
+use crate::cosine::Cosine;
+use std::f32::consts::PI;
+use std::sync::LazyLock;
 
 /// Side of the sharp image.
 pub const SIDE: usize = 64;
@@ -39,12 +38,16 @@ const LEAST_LAMBDA: f32 = 0.01;
 /// Halvings of the interval of lambda's logarithm: lambda to 1e-5.
 const BISECTIONS: usize = 22;
 
+/// The transform of the sharp image, and that of readings of half its side.
+static OF_IMAGE: LazyLock<Cosine<f32>> = LazyLock::new(|| Cosine::new(SIDE, SIDE));
+static OF_READINGS: LazyLock<Cosine<f32>> = LazyLock::new(|| Cosine::new(SIDE / 2, SIDE / 2));
+
 /// The camera's model for one image, and how far to trust its readings.
 #[derive(Debug)]
 pub struct Consistency {
     /// Cosine transform of the sharp image and of the readings.
-    image: &'static Cosine,
-    readings: &'static Cosine,
+    image: &'static Cosine<f32>,
+    readings: &'static Cosine<f32>,
     /// Attenuation of cosine k of the image.
     gain: Vec<f32>,
     /// Diagonal of D D^T on one axis, D = pair means of the blur.
@@ -73,8 +76,8 @@ impl Consistency {
         }
         let noise = noise.max(NOISE_FLOOR);
         Self {
-            image: Cosine::of_image(),
-            readings: if halved { Cosine::of_readings() } else { Cosine::of_image() },
+            image: &OF_IMAGE,
+            readings: if halved { &OF_READINGS } else { &OF_IMAGE },
             gain,
             power,
             noise,

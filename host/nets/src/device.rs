@@ -3,60 +3,13 @@
 //! Law: a backend asked for by name is the one that computes, or opening it fails with one line that says why;
 //! [`Backend::Auto`] takes a real GPU if there is one, never a software one.
 
+pub use nirspi_recon::backend::{Backend, ParseBackendError};
+
+#[cfg(not(feature = "gpu"))]
+use nirspi_recon::backend::NOT_BUILT;
 #[cfg(feature = "gpu")]
-mod probe;
-
-use std::fmt;
-use std::str::FromStr;
-
+use nirspi_recon::backend::probe;
 use thiserror::Error;
-
-/// What shall compute.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Backend {
-    /// A real GPU where there is one, else the CPU.
-    #[default]
-    Auto,
-    /// All cores of the CPU.
-    Cpu,
-    /// A device through Vulkan, Metal or DirectX; also a software one, since it was asked for.
-    Wgpu,
-    /// A GPU through CUDA.
-    Cuda,
-}
-
-impl Backend {
-    /// All there are.
-    pub const ALL: [Self; 4] = [Self::Auto, Self::Cpu, Self::Wgpu, Self::Cuda];
-}
-
-impl fmt::Display for Backend {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Auto => "auto",
-            Self::Cpu => "cpu",
-            Self::Wgpu => "wgpu",
-            Self::Cuda => "cuda",
-        })
-    }
-}
-
-/// The name of no backend.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[error("unknown backend {found:?}, expected auto, cpu, wgpu or cuda")]
-pub struct ParseBackendError {
-    /// What was given.
-    pub found: String,
-}
-
-impl FromStr for Backend {
-    type Err = ParseBackendError;
-
-    fn from_str(name: &str) -> Result<Self, ParseBackendError> {
-        let named = Self::ALL.into_iter().find(|backend| backend.to_string() == name);
-        named.ok_or_else(|| ParseBackendError { found: name.to_owned() })
-    }
-}
 
 /// A backend that was asked for by name is not there.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -121,18 +74,15 @@ impl Device {
 
 #[cfg(feature = "gpu")]
 fn cuda() -> Result<Device, String> {
-    let name = probe::cuda()?;
-    Ok(Device { kind: Kind::Cuda(burn::backend::cuda::CudaDevice::new(0)), name })
+    let found = probe::cuda().map_err(|absent| absent.to_string())?;
+    Ok(Device { kind: Kind::Cuda(found.device), name: found.name })
 }
 
 #[cfg(feature = "gpu")]
 fn wgpu(software_too: bool) -> Result<Device, String> {
-    let (device, name) = probe::wgpu(software_too)?;
-    Ok(Device { kind: Kind::Wgpu(device), name })
+    let found = probe::wgpu(software_too).map_err(|absent| absent.to_string())?;
+    Ok(Device { kind: Kind::Wgpu(found.device), name: found.name })
 }
-
-#[cfg(not(feature = "gpu"))]
-const NOT_BUILT: &str = "this program was built without the feature gpu";
 
 #[cfg(not(feature = "gpu"))]
 fn cuda() -> Result<Device, String> {
@@ -147,15 +97,6 @@ fn wgpu(_software_too: bool) -> Result<Device, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_backend_is_written_and_read_alike() {
-        for backend in Backend::ALL {
-            assert_eq!(backend.to_string().parse(), Ok(backend));
-        }
-        let error = "tpu".parse::<Backend>().unwrap_err();
-        assert_eq!(error.to_string(), "unknown backend \"tpu\", expected auto, cpu, wgpu or cuda");
-    }
 
     #[test]
     fn the_cpu_and_auto_are_always_there() {

@@ -11,8 +11,10 @@
 //! # Ok::<(), nirspi_nets::UpscaleError>(())
 //! ```
 
+mod blur;
 pub mod classical;
 pub mod consistency;
+mod cosine;
 pub mod cpu;
 pub mod data;
 pub mod deblur;

@@ -13,6 +13,7 @@
 //! | [`omp`] | measurements and a dictionary | few coefficients that explain them |
 //! | [`reconstruct`] | measurements | an image |
 //! | [`metrics`] | two images | how alike they are |
+//! | [`backend`] | the name of what shall compute | a [`Backend`] |
 //!
 //! ```
 //! use nirspi_recon::{Measurements, Order, Side, reconstruct};
@@ -29,6 +30,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod backend;
 pub mod basis;
 mod dropout;
 pub mod fwht;
@@ -43,6 +45,7 @@ mod side;
 #[cfg(test)]
 mod testing;
 
+pub use backend::{Backend, ParseBackendError};
 pub use basis::{Basis, ParseBasisError};
 pub use dropout::Dropout;
 pub use fwht::{FwhtLengthError, fwht};

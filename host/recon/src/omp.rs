@@ -42,7 +42,8 @@ pub mod reference;
 pub mod sampled;
 mod scalar;
 
-pub use backend::{Backend, BackendError, ParseBackendError};
+pub use crate::backend::{Backend, ParseBackendError};
+pub use backend::BackendError;
 pub use batch::{Problem, solve_batch, solve_path};
 pub use dense::DenseDictionary;
 pub use dictionary::{Atoms, Dictionary, padded};

@@ -2,7 +2,7 @@
 
 use super::Usage;
 use super::enhance::print_report;
-use super::networks::{Deblurring, NetworkArgs, Networks, Report, bar};
+use super::networks::{Deblurring, ImageArgs, Networks, bar};
 use super::report::StageTimes;
 use super::stack::Input;
 use anyhow::Result;
@@ -23,25 +23,16 @@ use std::process::ExitCode;
     \x20 nirspi deblur blurred.npy --model diffusion --out sharp.npy\n\
     \x20 nirspi deblur blurred.npy --model diffusion --steps 4 --blur-px 2 --noise 0.01 --out sharp.npy")]
 pub struct Args {
-    /// The images: .npy, .png or a folder of .png files
-    #[arg(value_name = "IN")]
-    input: PathBuf,
     /// What deblurs
     #[arg(long, value_enum, default_value_t = Model::Diffusion)]
     model: Model,
     /// Steps: 1 to 500, default 1; of ancestral, default 500
     #[arg(long, value_name = "S", value_parser = clap::value_parser!(u32).range(1..=500))]
     steps: Option<u32>,
-    /// Results: .npy, .png for a single image, else a folder of .png files
-    #[arg(long, value_name = "OUT")]
-    out: PathBuf,
     #[command(flatten)]
     sharpening: Sharpening,
     #[command(flatten)]
-    networks: NetworkArgs,
-    /// Print the report as JSON
-    #[arg(long)]
-    json: bool,
+    images: ImageArgs,
 }
 
 /// What deblurs.
@@ -154,13 +145,13 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let way = args.way()?;
     let options = args.sharpening.options()?;
     let mut times = StageTimes::default();
-    let input = times.time("read", || Input::read(&args.input))?;
+    let input = times.time("read", || Input::read(&args.images.input))?;
     let images: Blurred<'_> = input.images()?;
-    let target = input.target(&args.out)?;
+    let target = input.target(&args.images.out)?;
     let bar = bar("deblurring", input.count());
     let (networks, result) = match way {
         Way::Network(method) => {
-            let mut networks = args.networks.open(&["estimator", method.model()])?;
+            let mut networks = args.images.networks.open(&["estimator", method.model()])?;
             let sharpener = times.time("load", || networks.sharpener(method))?;
             let result = times.time("deblur", || {
                 sharpener.deblur(images, &options, &mut |done| bar.set_position(done as u64))
@@ -168,7 +159,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             (networks, result)
         }
         Way::Classical(method) => {
-            let mut networks = args.networks.open(&["estimator"])?;
+            let mut networks = args.images.networks.open(&["estimator"])?;
             let work = || classically(method, images, &mut networks, options.estimate, &bar);
             let result = times.time("deblur", work)?;
             (networks, result)
@@ -183,16 +174,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         Way::Classical(_) => (1, false),
     };
     let deblurring = Deblurring::of(way.name(), steps, consistency, options.seed, &result);
-    let report = Report {
-        input: args.input.clone(),
-        output: args.out.clone(),
-        images: input.count(),
-        device: networks.device().to_owned(),
-        weights: networks.used(),
-        deblurring: Some(deblurring),
-        stage_ms: times,
-    };
-    print_report(&report, args.json)?;
+    let report = args.images.report(&input, &networks, Some(deblurring), times);
+    print_report(&report, args.images.json)?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -1,15 +1,14 @@
 //! `nirspi enhance`: fusion and deblurring, from the camera's 32 x 32 to the 64 x 64 output.
 
 use super::deblur::Sharpening;
-use super::networks::{Deblurring, NetworkArgs, Report, bar};
+use super::networks::{Deblurring, ImageArgs, Report, bar};
 use super::print;
 use super::report::StageTimes;
 use super::stack::Input;
-use super::upscale::read_depth;
+use super::upscale::DepthArgs;
 use anyhow::Result;
 use nirspi_nets::{Enhancer, Images, Method, fusion};
 use std::num::NonZeroU32;
-use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Enlarge and deblur images, 32 x 32 to 64 x 64: fusion with depth, then the diffusion bridge
@@ -21,37 +20,26 @@ use std::process::ExitCode;
     \x20 nirspi enhance measured.npy --out sharp.npy\n\
     \x20 nirspi enhance measured/ --depth tof.npy --spread spread.npy --out sharp/")]
 pub struct Args {
-    /// The images: .npy, .png or a folder of .png files
-    #[arg(value_name = "IN")]
-    input: PathBuf,
-    /// Depth maps in metres (.npy): one for all images or one for each, 8 x 8 to 32 x 32 zones, 0 or NaN where nothing
-    /// was seen
-    #[arg(long, value_name = "FILE")]
-    depth: Option<PathBuf>,
+    #[command(flatten)]
+    depth: DepthArgs,
     /// Steps along the bridge: 1 has the least error, up to 4 look sharper
     #[arg(long, value_name = "S", default_value = "1")]
     steps: NonZeroU32,
-    /// Results: .npy, .png for a single image, else a folder of .png files
-    #[arg(long, value_name = "OUT")]
-    out: PathBuf,
     #[command(flatten)]
     sharpening: Sharpening,
     #[command(flatten)]
-    networks: NetworkArgs,
-    /// Print the report as JSON
-    #[arg(long)]
-    json: bool,
+    images: ImageArgs,
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
     let options = args.sharpening.options()?;
     let method = Method::Diffusion { steps: args.steps };
     let mut times = StageTimes::default();
-    let input = times.time("read", || Input::read(&args.input))?;
+    let input = times.time("read", || Input::read(&args.images.input))?;
     let images: Images<'_, { fusion::SIDE }> = input.images()?;
-    let target = input.target(&args.out)?;
-    let depth = args.depth.as_deref().map(|file| read_depth(file, input.count())).transpose()?;
-    let mut networks = args.networks.open(&["fsrcnn", "estimator", "diffusion"])?;
+    let target = input.target(&args.images.out)?;
+    let depth = args.depth.read(input.count())?;
+    let mut networks = args.images.networks.open(&["fsrcnn", "estimator", "diffusion"])?;
     let enhancer = times.time("load", || -> Result<_> {
         Ok(Enhancer::new(networks.fusion()?, networks.sharpener(method)?))
     })?;
@@ -66,17 +54,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     target.write(2 * fusion::SIDE, &result.images)?;
 
     let steps = args.steps.get();
-    let consistency = options.consistency;
-    let report = Report {
-        input: args.input.clone(),
-        output: args.out.clone(),
-        images: input.count(),
-        device: networks.device().to_owned(),
-        weights: networks.used(),
-        deblurring: Some(Deblurring::of("diffusion", steps, consistency, options.seed, &result)),
-        stage_ms: times,
-    };
-    print_report(&report, args.json)?;
+    let deblurring = Deblurring::of("diffusion", steps, options.consistency, options.seed, &result);
+    let report = args.images.report(&input, &networks, Some(deblurring), times);
+    print_report(&report, args.images.json)?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -2,6 +2,7 @@
 
 use super::Usage;
 use super::report::StageTimes;
+use super::stack::Input;
 use anyhow::Result;
 use indicatif::{ProgressBar, ProgressStyle};
 use nirspi_nets::weights::{MODEL, VERSION};
@@ -21,6 +22,22 @@ pub struct NetworkArgs {
     /// Where networks run: auto (a real GPU if there is one), cpu, wgpu or cuda
     #[arg(long, value_name = "BACKEND", default_value_t)]
     backend: Backend,
+}
+
+/// What every command takes that makes images of images.
+#[derive(Debug, clap::Args)]
+pub struct ImageArgs {
+    /// The images: .npy, .png or a folder of .png files
+    #[arg(value_name = "IN")]
+    pub input: PathBuf,
+    /// Results: .npy, .png for a single image, else a folder of .png files
+    #[arg(long, value_name = "OUT")]
+    pub out: PathBuf,
+    #[command(flatten)]
+    pub networks: NetworkArgs,
+    /// Print the report as JSON
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// A device and the weights of what shall run on it.
@@ -56,6 +73,27 @@ impl NetworkArgs {
             own.push(weights);
         }
         Ok(Networks { device: Device::open(self.backend)?, own, used: Vec::new() })
+    }
+}
+
+impl ImageArgs {
+    /// What was done to the images.
+    pub fn report(
+        &self,
+        input: &Input,
+        networks: &Networks,
+        deblurring: Option<Deblurring>,
+        stage_ms: StageTimes,
+    ) -> Report {
+        Report {
+            input: self.input.clone(),
+            output: self.out.clone(),
+            images: input.count(),
+            device: networks.device().to_owned(),
+            weights: networks.used(),
+            deblurring,
+            stage_ms,
+        }
     }
 }
 

@@ -1,13 +1,13 @@
 //! `nirspi upscale`: the fusion stage alone.
 
-use super::networks::{NetworkArgs, Report, bar};
+use super::networks::{ImageArgs, bar};
 use super::print;
 use super::report::StageTimes;
 use super::stack::Input;
 use anyhow::{Context, Result};
 use nirspi::files::npy::{self, Stack};
 use nirspi_nets::{DepthMaps, Images, fusion};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Enlarge images from 32 x 32 to 64 x 64, with their depth maps if there are any (FSRCNN)
@@ -19,30 +19,39 @@ use std::process::ExitCode;
     \x20 nirspi upscale measured.npy --out large.npy\n\
     \x20 nirspi upscale measured.npy --depth tof.npy --out large/")]
 pub struct Args {
-    /// The images: .npy, .png or a folder of .png files
-    #[arg(value_name = "IN")]
-    input: PathBuf,
+    #[command(flatten)]
+    depth: DepthArgs,
+    #[command(flatten)]
+    images: ImageArgs,
+}
+
+/// Depth beside the images, the same for `upscale` and `enhance`.
+#[derive(Debug, clap::Args)]
+pub struct DepthArgs {
     /// Depth maps in metres (.npy): one for all images or one for each, 8 x 8 to 32 x 32 zones, 0 or NaN where nothing
     /// was seen
     #[arg(long, value_name = "FILE")]
     depth: Option<PathBuf>,
-    /// Results: .npy, .png for a single image, else a folder of .png files
-    #[arg(long, value_name = "OUT")]
-    out: PathBuf,
-    #[command(flatten)]
-    networks: NetworkArgs,
-    /// Print the report as JSON
-    #[arg(long)]
-    json: bool,
+}
+
+impl DepthArgs {
+    /// Depth maps for so many images, if there are any.
+    pub fn read(&self, images: usize) -> Result<Option<DepthMaps>> {
+        let Some(file) = &self.depth else { return Ok(None) };
+        let Stack { count, height, width, values } = npy::read_with_gaps(file)?;
+        DepthMaps::new(values, [count, height, width], images)
+            .map(Some)
+            .with_context(|| file.display().to_string())
+    }
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
     let mut times = StageTimes::default();
-    let input = times.time("read", || Input::read(&args.input))?;
+    let input = times.time("read", || Input::read(&args.images.input))?;
     let images: Images<'_, { fusion::SIDE }> = input.images()?;
-    let target = input.target(&args.out)?;
-    let depth = args.depth.as_deref().map(|file| read_depth(file, input.count())).transpose()?;
-    let mut networks = args.networks.open(&["fsrcnn"])?;
+    let target = input.target(&args.images.out)?;
+    let depth = args.depth.read(input.count())?;
+    let mut networks = args.images.networks.open(&["fsrcnn"])?;
     let fusion = times.time("load", || networks.fusion())?;
 
     let bar = bar("upscaling", input.count());
@@ -50,31 +59,16 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     bar.finish_and_clear();
     target.write(2 * fusion::SIDE, &large)?;
 
-    let report = Report {
-        input: args.input.clone(),
-        output: args.out.clone(),
-        images: input.count(),
-        device: networks.device().to_owned(),
-        weights: networks.used(),
-        deblurring: None,
-        stage_ms: times,
-    };
-    if args.json {
+    let report = args.images.report(&input, &networks, None, times);
+    if args.images.json {
         print::json(&report)?;
     } else {
         print::line(format_args!(
             "{} images upscaled to 64 x 64 on {}, in {}",
             report.images,
             report.device,
-            args.out.display()
+            report.output.display()
         ))?;
     }
     Ok(ExitCode::SUCCESS)
-}
-
-/// Depth maps for so many images.
-pub fn read_depth(file: &Path, images: usize) -> Result<DepthMaps> {
-    let Stack { count, height, width, values } = npy::read_with_gaps(file)?;
-    DepthMaps::new(values, [count, height, width], images)
-        .with_context(|| file.display().to_string())
 }

@@ -9,7 +9,7 @@ use crate::calibrate::{CalibrationError, Settling, calibrate};
 use crate::session::{Deaf, Session, SessionError};
 use crate::virtual_camera::{MemoryLink, VirtualOptics, VirtualOpticsError};
 use nirspi_nets::data::SIDE_PX;
-use nirspi_nets::degrade::{Degrade, DegradeError, Depth, Reading, blur};
+use nirspi_nets::degrade::{Degrade, DegradeError, Depth, Reading, defocus};
 use nirspi_optics::rain::{Drops, RainError, Weather};
 use nirspi_optics::water::Water;
 use nirspi_optics::{LEDS, Projector, Scene, SceneError};
@@ -193,7 +193,7 @@ impl SimulatedCamera {
         let noise_std = self.noise_std(&optics, &seen, sweeps) * f64::from(sampling).sqrt();
         let reading = Reading {
             image: image.pixels().iter().map(|v| (v / white as f32).clamp(0.0, 1.0)).collect(),
-            optical: blur::disc(scene, diameter_px),
+            optical: defocus::disc(scene, diameter_px),
             // A disc's standard deviation along an axis is a quarter of its diameter.
             sigma_px: diameter_px / 4.0,
             noise_std: noise_std as f32,

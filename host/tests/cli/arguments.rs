@@ -94,6 +94,10 @@ fn mistakes_in_the_arguments_get_one_line_and_code_2() {
         (&["deblur", "in.npy", "--blur-px", "-1", "--out", "o.npy"], &["--blur-px is -1"]),
         (&["enhance", "in.npy", "--noise", "nan", "--out", "o.npy"], &["--noise is NaN"]),
         (&["enhance", "in.npy", "--backend", "tpu", "--out", "o.npy"], &["tpu", "wgpu or cuda"]),
+        (
+            &["train", "fsrcnn", "--backend", "tpu", "--out", "run"],
+            &["--backend", "tpu", "auto, cpu, wgpu or cuda"],
+        ),
         (&["virtual", "--distance-m", "0"], &["--distance-m is 0"]),
     ];
     for (arguments, words) in mistakes {

@@ -3,8 +3,7 @@
 //! x <- x * B(y / B x): the estimate stays positive and keeps the light. Left alone it ends up drawing the noise, so it
 //! stops by the discrepancy principle (Morozov, 1966): as soon as the residual is what noise alone explains.
 
-use super::blur::Blur;
-use super::noise_budget;
+use super::{Blur, noise_budget};
 
 /// Rounds after which it stops in any case: with next to no noise it would go on refining rounding errors.
 const MOST_ROUNDS: usize = 300;

@@ -5,8 +5,7 @@
 //! tune. Solved by the primal-dual method of Chambolle and Pock (J. Math. Imaging Vis. 40, 2011, Algorithm 1), with
 //! isotropic differences that end at the edge.
 
-use super::blur::Blur;
-use super::noise_budget;
+use super::{Blur, noise_budget};
 
 /// Rounds of the solver. Eight times as many change a pixel of a blurred letter by 0.003 in the mean at most (sigma 1 to
 /// 4 px, noise 0 to 8 %).

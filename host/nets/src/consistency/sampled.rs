@@ -1,7 +1,7 @@
 //! Readings of some Hadamard rows only: what the other rows would have said binds nobody.
 
-use super::cosine::Cosine;
 use super::{Consistency, bisect, norm};
+use crate::cosine::Cosine;
 
 /// Most conjugate gradient steps; the equation is well conditioned where lambda matters.
 const CG_STEPS: usize = 60;
@@ -39,7 +39,7 @@ impl MeasuredRows {
     }
 
     /// Takes the unmeasured part out of readings given by their cosine transform.
-    pub(super) fn keep_measured(&self, cosine: &Cosine, spectrum: &mut [f32]) {
+    pub(super) fn keep_measured(&self, cosine: &Cosine<f32>, spectrum: &mut [f32]) {
         let mut readings = cosine.inverse(spectrum);
         walsh_hadamard(&mut readings);
         let scale = 1.0 / readings.len() as f32;

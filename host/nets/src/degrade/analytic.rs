@@ -3,9 +3,9 @@
 //! The one law: it degrades in the order in which light and signal do, and noise enters where it does in the camera,
 //! in the pattern readings, so that partial sampling and leak shape it as they do there.
 
-use super::blur::gaussian;
 use super::{DEPTH_SIDE, Degrade, DegradeError, Depth, READING_PX, Reading, sampled};
-use crate::data::AREA_PX;
+use crate::blur::Blur;
+use crate::data::{AREA_PX, SIDE_PX};
 use nirspi_recon::{Order, Side, fwht};
 use rand::RngExt;
 use rand_distr::StandardNormal;
@@ -104,10 +104,11 @@ impl Degrade for AnalyticCamera {
         }
         let limits = &self.limits;
         let sigma_px = rng.random_range(limits.sigma_px.clone());
-        let mut optical = gaussian(scene, sigma_px);
+        let blurred = |sigma_px| Blur::new(SIDE_PX, SIDE_PX, sigma_px).apply(scene);
+        let mut optical = blurred(sigma_px);
         if rng.random() {
             let share = limits.scattered * rng.random::<f32>();
-            let veil = gaussian(scene, rng.random_range(SCATTER_PX));
+            let veil = blurred(rng.random_range(SCATTER_PX));
             optical.iter_mut().zip(veil).for_each(|(v, wide)| *v += share * (wide - *v));
         }
 

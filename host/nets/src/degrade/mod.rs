@@ -7,7 +7,7 @@
 //! the crate that has one; it implements [`Degrade`] too.
 
 mod analytic;
-pub mod blur;
+pub mod defocus;
 
 pub use analytic::{AnalyticCamera, Limits};
 

@@ -1,64 +1,9 @@
-//! What computes, by name.
+//! Why a backend cannot pursue what it was given.
 //!
-//! The one law: a backend asked for by name is the one that computes, or the call fails and says why; only
-//! [`Backend::Auto`] chooses.
+//! The one law: one line that says what was looked for, or how much there is of what is too little.
 
-use std::fmt;
-use std::str::FromStr;
+use crate::backend::NOT_BUILT;
 use thiserror::Error;
-
-/// What computes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Backend {
-    /// A GPU where there is one and the work is worth sending there, else the processor.
-    #[default]
-    Auto,
-    /// All cores of the processor.
-    Cpu,
-    /// A device through Vulkan, Metal or DirectX. A software device counts, since it was asked for.
-    Wgpu,
-    /// A GPU through CUDA.
-    Cuda,
-}
-
-impl Backend {
-    /// All there are.
-    pub const ALL: [Self; 4] = [Self::Auto, Self::Cpu, Self::Wgpu, Self::Cuda];
-
-    /// As it is written on the command line.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Auto => "auto",
-            Self::Cpu => "cpu",
-            Self::Wgpu => "wgpu",
-            Self::Cuda => "cuda",
-        }
-    }
-}
-
-impl fmt::Display for Backend {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-/// The name of no backend.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[error("unknown backend {found:?}, expected auto, cpu, wgpu or cuda")]
-pub struct ParseBackendError {
-    /// What was given.
-    pub found: String,
-}
-
-impl FromStr for Backend {
-    type Err = ParseBackendError;
-
-    fn from_str(name: &str) -> Result<Self, ParseBackendError> {
-        let named = Self::ALL.into_iter().find(|backend| backend.name() == name);
-        named.ok_or_else(|| ParseBackendError { found: name.to_owned() })
-    }
-}
 
 /// A backend that cannot compute what it was asked for.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -91,6 +36,6 @@ impl BackendError {
     /// This build has no kernels.
     #[must_use]
     pub fn not_built() -> Self {
-        Self::Absent { why: "this build is without the feature gpu".to_owned() }
+        Self::Absent { why: NOT_BUILT.to_owned() }
     }
 }

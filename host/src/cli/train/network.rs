@@ -4,7 +4,6 @@ use super::data::{DataArgs, Found};
 use super::folder::Folder;
 use crate::cli::{Usage, print};
 use anyhow::{Context, Result};
-use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
 use nirspi::training::{Mixed, SimulatedCamera};
 use nirspi_nets::Weights;
@@ -60,25 +59,12 @@ pub struct Args {
     /// Go on from the folder's checkpoint
     #[arg(long)]
     resume: bool,
-    /// What computes
-    #[arg(long, value_enum, default_value_t = BackendArg::Auto)]
-    backend: BackendArg,
+    /// Where the network learns: auto (a real GPU if there is one), cpu, wgpu or cuda
+    #[arg(long, value_name = "BACKEND", default_value_t)]
+    backend: Backend,
     /// Print the report as JSON
     #[arg(long)]
     json: bool,
-}
-
-/// What computes.
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum BackendArg {
-    /// A real GPU where there is one, else the CPU
-    Auto,
-    /// All cores
-    Cpu,
-    /// Vulkan, Metal or DirectX
-    Wgpu,
-    /// CUDA
-    Cuda,
 }
 
 #[derive(Debug, Serialize)]
@@ -108,12 +94,7 @@ pub fn run(args: &Args, model: Model) -> Result<ExitCode> {
         data_args.shapes = 0.0;
     }
     let (scenes, data) = data_args.scenes(args.seed)?;
-    let device = Device::open(match args.backend {
-        BackendArg::Auto => Backend::Auto,
-        BackendArg::Cpu => Backend::Cpu,
-        BackendArg::Wgpu => Backend::Wgpu,
-        BackendArg::Cuda => Backend::Cuda,
-    })?;
+    let device = Device::open(args.backend)?;
     let classifier = model == Model::Classifier;
     let limits = match classifier {
         true => {

@@ -90,12 +90,3 @@ fn widths() -> Vec<Arch> {
     let narrower = None;
     [Some(Arch::new()), narrower].into_iter().flatten().collect()
 }
-
-#[test]
-fn backends_have_names() {
-    for backend in Backend::ALL {
-        assert_eq!(backend.to_string().parse(), Ok(backend));
-    }
-    let error = "abacus".parse::<Backend>().unwrap_err();
-    assert_eq!(error.to_string(), "unknown backend \"abacus\", expected auto, cpu, wgpu or cuda");
-}

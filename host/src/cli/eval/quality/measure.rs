@@ -6,7 +6,7 @@ use super::bootstrap::Interval;
 use super::characters::{Character, Characters};
 use super::rows::{Kind, Networks};
 use anyhow::Result;
-use nirspi_nets::classical::blur::Blur;
+use nirspi_nets::classical::Blur;
 use nirspi_nets::consistency::Consistency;
 use nirspi_nets::images::Images;
 use nirspi_nets::metrics::{CharacterJudge, Judged};
