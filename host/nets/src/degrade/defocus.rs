@@ -5,8 +5,9 @@
 use crate::blur::{along_rows, reflected};
 use crate::data::{AREA_PX, SIDE_PX};
 
-/// Narrower than this, in pixels, a blur leaves a pixel what it was.
-const LEAST_PX: f32 = 0.05;
+/// A disc of less radius leaves a pixel what it was: it may lie between the points at which discs are counted, the nearest
+/// of which is 0.09 pixels from the middle.
+const LEAST_PX: f32 = 0.1;
 
 /// Blur by a disc of `diameter_px`: what a lens out of focus does. Its standard deviation along an axis is a quarter
 /// of the diameter.
@@ -74,6 +75,13 @@ mod tests {
             let wide = spread(&disc(&point(), 4.0 * sigma));
             let expected = (sigma * sigma + 1.0 / 12.0).sqrt();
             assert!((wide - expected).abs() < 0.04 * expected, "{wide} against {expected}");
+        }
+    }
+
+    #[test]
+    fn a_disc_within_a_pixel_changes_nothing() {
+        for hundredths in 0..=80_u8 {
+            assert_eq!(disc(&point(), f32::from(hundredths) / 100.0), point(), "{hundredths}");
         }
     }
 
