@@ -22,7 +22,7 @@ use std::process::ExitCode;
 pub struct Args {
     #[command(flatten)]
     depth: DepthArgs,
-    /// Steps along the bridge: 1 has the least error, up to 4 look sharper
+    /// Steps along the bridge: 1 has the least error and takes the least time
     #[arg(long, value_name = "S", default_value = "1")]
     steps: NonZeroU32,
     #[command(flatten)]

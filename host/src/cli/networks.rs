@@ -48,7 +48,7 @@ pub struct Networks {
 }
 
 /// Weights that ran, for the report.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Used {
     model: String,
     version: String,
@@ -109,11 +109,14 @@ impl Networks {
             Some(weights) => weights.clone(),
             None => Weights::embedded(model)?,
         };
-        self.used.push(Used {
+        let used = Used {
             model: model.to_owned(),
             version: weights.metadata(VERSION).unwrap_or("unknown").to_owned(),
             from: weights.label().to_owned(),
-        });
+        };
+        if !self.used.contains(&used) {
+            self.used.push(used);
+        }
         Ok(weights)
     }
 
@@ -194,12 +197,14 @@ impl Deblurring {
             sorted.sort_by(f32::total_cmp);
             sorted.get(sorted.len() / 2).copied().unwrap_or(f32::NAN)
         };
+        let steps = match self.steps {
+            1 => String::new(),
+            steps => format!(" in {steps} steps"),
+        };
         format!(
-            "{} in {} step{}: blur {:.2} px, noise {:.4}, inconsistency {:.2} (medians; near 1 or below, the \
-             readings bear the result out)",
+            "{}{steps}: blur {:.2} px, noise {:.4}, inconsistency {:.2} (medians; near 1 or below, the readings bear the \
+             result out)",
             self.model,
-            self.steps,
-            if self.steps == 1 { "" } else { "s" },
             median(&self.sigma_px),
             median(&self.noise),
             median(&self.inconsistency)
