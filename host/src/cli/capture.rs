@@ -22,7 +22,7 @@ use std::sync::atomic::Ordering;
 /// first. Ctrl-C ends the recording and keeps it.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
-    \x20 nirspi capture --camera usb --frames 1000 --out rec.mcap\n\
+    \x20 nirspi capture --camera usb --frames 1000 --out rec.mcap --picture seen/\n\
     \x20 nirspi capture --camera tcp:127.0.0.1:1550 --frames 1000 --out rec.mcap")]
 pub struct Args {
     /// Which camera: virtual, usb, usb:SERIAL, tcp:HOST:PORT or serial:PATH[:BAUD]
@@ -49,6 +49,10 @@ pub struct Args {
     /// ADC clocks from light to sample, where they are not measured
     #[arg(long, value_name = "N", default_value_t = 0, requires = "no_calibration")]
     adc_latency: u8,
+    /// When it has ended, reconstruct the frames as one image, enlarge and deblur it, into this folder; the same as
+    /// `reconstruct --enhance`
+    #[arg(long, value_name = "DIR")]
+    picture: Option<PathBuf>,
     #[command(flatten)]
     setup: SetupArgs,
     #[command(flatten)]
@@ -168,7 +172,14 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     });
     bar.finish_and_clear();
     let captured = captured?;
-    report(args, session.identity(), &path, &choice, &captured)
+    let code = report(args, session.identity(), &path, &choice, &captured)?;
+    if let Some(out) = args.picture.as_ref().filter(|_| captured.counters.received > 0) {
+        super::reconstruct::picture(&path, out)?;
+        if !args.json {
+            print::line(format_args!("picture: {}", out.join("enhanced.png").display()))?;
+        }
+    }
+    Ok(code)
 }
 
 /// The file to record into, which is not there yet.

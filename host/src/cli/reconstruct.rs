@@ -10,13 +10,15 @@ use super::report::StageTimes;
 use super::source::{Index, Source, SourceArgs};
 use super::{Usage, print};
 use anyhow::{Context, Result, bail};
+use clap::Parser;
 use indicatif::ProgressBar;
 use nirspi::account::LossCounters;
 use nirspi::files::output::OutputDir;
 use nirspi::files::{image::encode_grey, npy};
 use nirspi_recon::{Image, Order, metrics, reconstruct};
 use serde::Serialize;
-use std::path::PathBuf;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -50,8 +52,8 @@ pub struct Args {
     #[command(flatten)]
     source: SourceArgs,
     /// Also enlarge and deblur the image, of 32 x 32 or 64 x 64 pixels, by the learned stages (enhanced.npy and .png);
-    /// its brightest 2 x 2 pixels are taken for white
-    #[arg(long)]
+    /// its brightest 2 x 2 pixels are taken for white, of --index all their median
+    #[arg(long, conflicts_with = "matrix")]
     enhance: bool,
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "out")]
@@ -102,6 +104,30 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if args.warm_start {
         return Err(Usage("--warm-start belongs to --index all".to_owned()).into());
     }
+    let report = one_image(args, order)?;
+    if args.json {
+        print::json(&report)?;
+    } else {
+        say(args, &report)?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The frames of a recording as one image, enhanced; the folder `out` gets what `reconstruct --enhance` writes.
+pub fn picture(recording: &Path, out: &Path) -> Result<()> {
+    #[derive(clap::Parser)]
+    struct Alone {
+        #[command(flatten)]
+        args: Args,
+    }
+    let line = [OsStr::new("reconstruct"), recording.as_os_str(), OsStr::new("--enhance")];
+    let line = line.into_iter().chain([OsStr::new("--out"), out.as_os_str()]);
+    one_image(&Alone::try_parse_from(line)?.args, None)?;
+    Ok(())
+}
+
+/// Reconstructs one image and writes it with its report.
+fn one_image(args: &Args, order: Option<Order>) -> Result<Report> {
     let mut times = StageTimes::default();
 
     let source = times.time("read", || args.source.load())?;
@@ -120,8 +146,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         metrics::correlation(reference.pixels(), image.pixels(), side, side).ok()
     });
     let (sharp, enhancement) = if args.enhance {
-        let (sharp, report) = enhanced::run(&image, used.rows(), &mut times)?;
-        (Some(sharp), Some(report))
+        let (sharp, mut reports) = enhanced::run(&[(&image, used.rows())], &mut times)?;
+        (Some(sharp), reports.pop())
     } else {
         (None, None)
     };
@@ -149,12 +175,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         stage_ms: times,
     };
     write(args, &image, sharp.as_deref(), &report)?;
-    if args.json {
-        print::json(&report)?;
-    } else {
-        say(args, &report)?;
-    }
-    Ok(ExitCode::SUCCESS)
+    Ok(report)
 }
 
 /// Which patterns come first, and what to call that.

@@ -70,6 +70,8 @@ fn mistakes_in_the_arguments_get_one_line_and_code_2() {
             &["bench", "omp", "--backend", "abacus"],
             &["--backend", "abacus", "auto, cpu, wgpu or cuda"],
         ),
+        (&["bench", "enhance", "--frames", "0"], &["--frames", "'0'"]),
+        (&["reconstruct", "in.npz", "--matrix", "p.npy", "--enhance"], &["--matrix", "--enhance"]),
         (&["eval", "sampling", "in.npz", "--sampling", "0.1,2"], &["--sampling is 2"]),
         (&["eval", "sampling", "in.npz", "--orders", "magic"], &["magic", "cake-cutting"]),
         (&["demo", "--frames", "0"], &["--frames", "'0'"]),

@@ -36,6 +36,27 @@ fn a_thousand_frames_are_captured_recorded_and_reconstructed() {
     assert_eq!(frames(&bench, "rec.mcap", "received"), 1000);
 }
 
+#[test]
+fn a_capture_ends_with_a_picture_of_what_was_seen() {
+    let bench = Bench::new();
+    let capture = ["capture", "--frames", "6", "--sweeps", "100", "--out", "rec.mcap"];
+    let said = bench.run(&[&capture[..], &["--picture", "seen"]].concat()).succeeded();
+    assert!(said.stdout.contains("picture: seen"), "{said:?}");
+    let report = bench.json("seen/report.json");
+    assert_eq!(report["frames"]["received"], 6);
+    // The readings bear the picture out.
+    assert!(report["enhancement"]["inconsistency"].as_f64().unwrap() < 1.5, "{report}");
+    let png = std::fs::read(bench.path("seen/enhanced.png")).unwrap();
+    assert_eq!(&png[1..4], b"PNG");
+    // The same frames as a video: each enhanced, with one white for all.
+    let video = ["reconstruct", "rec.mcap", "--index", "all", "--enhance", "--out", "video"];
+    let report = bench.run(&[&video[..], &["--json"]].concat()).succeeded().json();
+    let frames = report["frames"].as_array().unwrap();
+    assert_eq!(frames.len(), 6);
+    assert!(frames.iter().all(|f| f["enhancement"]["white"] == frames[0]["enhancement"]["white"]));
+    assert_eq!(bench.pixels("video/enhanced.npy").len(), 6 * 64 * 64);
+}
+
 #[cfg(unix)]
 #[test]
 fn a_capture_that_is_stopped_keeps_what_it_has_and_succeeds() {

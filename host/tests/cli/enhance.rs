@@ -181,3 +181,15 @@ fn a_reconstruction_is_enhanced_if_its_size_allows() {
     let share = |lit: fn(&f32) -> bool| sharp.iter().filter(|v| lit(v)).count() as f32 / 4096.0;
     assert!(share(|&v| v > 0.8) > 0.05 && share(|&v| v < 0.1) > 0.5);
 }
+
+#[test]
+fn the_time_of_enhancing_is_reported_with_its_parts() {
+    let bench = Bench::new();
+    let args = ["bench", "enhance", "--frames", "2", "--repeats", "1", "--backend", "cpu"];
+    let report = bench.run(&args).succeeded().json();
+    assert_eq!((&report["device"], &report["frames"]), (&"CPU".into(), &2.into()), "{report}");
+    let ms = |part: &serde_json::Value| part["median_ms"].as_f64().unwrap();
+    // Both are parts of the whole, which has the UNet besides.
+    assert!(ms(&report) > ms(&report["fusion"]), "{report}");
+    assert!(ms(&report) > ms(&report["estimate"]), "{report}");
+}

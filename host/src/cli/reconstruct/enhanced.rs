@@ -7,7 +7,9 @@ use super::super::networks::Networks;
 use super::super::report::StageTimes;
 use anyhow::{Result, bail};
 use nirspi_nets::consistency::MeasuredRows;
-use nirspi_nets::{Backend, Enhancer, Images, Method, Options, deblur, fusion};
+use nirspi_nets::{
+    Backend, Enhanced, Enhancer, Images, Method, Options, Sharpener, deblur, fusion,
+};
 use nirspi_recon::Image;
 use serde::Serialize;
 use std::num::NonZeroU32;
@@ -35,35 +37,58 @@ impl Report {
     }
 }
 
-/// Enhances an image of 32 x 32 or 64 x 64 that was made from these Hadamard rows: 64 x 64 pixels in [0, 1].
-pub fn run(image: &Image, rows: &[u32], times: &mut StageTimes) -> Result<(Vec<f32>, Report)> {
-    let side = image.side().pixels();
+/// Enhances images of 32 x 32 or 64 x 64, each with the Hadamard rows that it was made from: 64 x 64 pixels in [0, 1]
+/// each. White is the same for all, so that a video does not flicker: the median of what each would take for it.
+pub fn run(frames: &[(&Image, &[u32])], times: &mut StageTimes) -> Result<(Vec<f32>, Vec<Report>)> {
+    let Some((first, _)) = frames.first() else { bail!("--enhance: no image") };
+    let side = first.side().pixels();
     if side != fusion::SIDE && side != deblur::SIDE {
         bail!("--enhance is for images of 32 x 32 or 64 x 64 pixels, this one has {side} x {side}");
     }
-    let white = white(image.pixels(), side);
+    let mut whites: Vec<f32> = frames.iter().map(|(f, _)| white(f.pixels(), side)).collect();
+    whites.sort_by(f32::total_cmp);
+    let white = whites[whites.len() / 2];
     if white <= 0.0 {
         bail!("--enhance finds no light in the image");
     }
-    let values: Vec<f32> = image.pixels().iter().map(|v| (v / white).clamp(0.0, 1.0)).collect();
     let mut networks = Networks::built_in(Backend::Cpu)?;
     let sharpener = networks.sharpener(Method::Diffusion { steps: NonZeroU32::MIN })?;
-    let options = Options { measured: MeasuredRows::new(side, rows), ..Options::default() };
-    let result = if side == deblur::SIDE {
-        let images = Images::new(&values)?;
-        times.time("enhance", || sharpener.deblur(images, &options, &mut |_| {}))
-    } else {
-        let enhancer = Enhancer::new(networks.fusion()?, sharpener);
-        let images = Images::new(&values)?;
-        times.time("enhance", || enhancer.enhance(images, None, &options, &mut |_| {}))
+    let stages = match side {
+        deblur::SIDE => Stages::Second(sharpener),
+        _ => Stages::Both(Enhancer::new(networks.fusion()?, sharpener)),
     };
-    let report = Report {
-        white,
-        sigma_px: result.estimates[0].sigma_px,
-        noise: result.estimates[0].noise,
-        inconsistency: result.inconsistency[0],
-    };
-    Ok((result.images, report))
+    let (mut pixels, mut reports) = (Vec::new(), Vec::new());
+    times.time("enhance", || -> Result<()> {
+        for (image, rows) in frames {
+            let scaled = image.pixels().iter().map(|v| (v / white).clamp(0.0, 1.0));
+            let mut result = stages.run(&scaled.collect::<Vec<_>>(), side, rows)?;
+            pixels.append(&mut result.images);
+            reports.push(Report {
+                white,
+                sigma_px: result.estimates[0].sigma_px,
+                noise: result.estimates[0].noise,
+                inconsistency: result.inconsistency[0],
+            });
+        }
+        Ok(())
+    })?;
+    Ok((pixels, reports))
+}
+
+/// What is 64 x 64 already needs no fusion.
+enum Stages {
+    Both(Enhancer),
+    Second(Sharpener),
+}
+
+impl Stages {
+    fn run(&self, image: &[f32], side: usize, rows: &[u32]) -> Result<Enhanced> {
+        let options = Options { measured: MeasuredRows::new(side, rows), ..Options::default() };
+        Ok(match self {
+            Self::Both(both) => both.enhance(Images::new(image)?, None, &options, &mut |_| {}),
+            Self::Second(second) => second.deblur(Images::new(image)?, &options, &mut |_| {}),
+        })
+    }
 }
 
 /// The largest mean of 2 x 2 neighbours.

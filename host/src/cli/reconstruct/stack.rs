@@ -1,6 +1,6 @@
 //! `nirspi reconstruct --index all`: every measurement of a file or frame of a recording, as a video.
 
-use super::{Args, choose_order, print, spinning};
+use super::{Args, choose_order, enhanced, print, spinning};
 use crate::cli::Usage;
 use crate::cli::method::{self, Method, Solved, solve};
 use crate::cli::report::StageTimes;
@@ -9,7 +9,7 @@ use nirspi::files::image::encode_grey;
 use nirspi::files::npy;
 use nirspi::files::output::OutputDir;
 use nirspi_recon::reconstruct::omp_video;
-use nirspi_recon::{Image, Measurements, Order};
+use nirspi_recon::{Image, Measurements, Order, Side};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -37,6 +37,8 @@ struct FrameReport {
     warm: bool,
     #[serde(flatten)]
     method: method::Report,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    enhancement: Option<enhanced::Report>,
     notes: Vec<String>,
 }
 
@@ -65,8 +67,19 @@ pub fn run(args: &Args, order: Option<Order>) -> Result<ExitCode> {
         };
         let mut notes: Vec<String> = source.dropouts.iter().map(dropped).collect();
         notes.extend(source.notes);
-        frames.push(FrameReport { used: used.rows().len(), warm, method: report, notes });
+        let used = used.rows().len();
+        frames.push(FrameReport { used, warm, method: report, enhancement: None, notes });
         images.push(image);
+    }
+    let mut sharp = None;
+    if args.enhance {
+        let made: Vec<(&Image, &[u32])> =
+            images.iter().zip(&used).map(|(image, used)| (image, used.rows())).collect();
+        let (pixels, reports) = spinning(|| enhanced::run(&made, &mut times))?;
+        for (frame, report) in frames.iter_mut().zip(reports) {
+            frame.enhancement = Some(report);
+        }
+        sharp = Some(pixels);
     }
     let n = images[0].side().pixels();
     let report = Report {
@@ -81,6 +94,13 @@ pub fn run(args: &Args, order: Option<Order>) -> Result<ExitCode> {
     let pixels: Vec<f32> = images.iter().flat_map(Image::pixels).copied().collect();
     out.write("image.npy", &npy::encode(&[images.len(), n, n], &pixels))?;
     out.write("image.png", &sheet(&images))?;
+    if let Some(sharp) = sharp {
+        let side = nirspi_nets::deblur::SIDE;
+        out.write("enhanced.npy", &npy::encode(&[images.len(), side, side], &sharp))?;
+        let at = Side::new(side as u64)?;
+        let sharp = sharp.chunks_exact(at.area()).map(|pixels| Image::new(at, pixels.to_vec()));
+        out.write("enhanced.png", &sheet(&sharp.collect::<Vec<_>>()))?;
+    }
     out.write("report.json", format!("{}\n", serde_json::to_string_pretty(&report)?).as_bytes())?;
     out.commit()?;
     if args.json {
