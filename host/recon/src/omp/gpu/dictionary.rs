@@ -3,8 +3,8 @@
 //! The one law: what goes to the device once stays there. The matrix, its Gram matrix and the atoms' pictures are uploaded or
 //! computed when the dictionary is made; a batch brings its measurements and takes its solutions.
 //!
-//! A batch goes in turns of [`TURN`] frames, several at a time, each from a thread of its own: CubeCL gives each thread a stream, so that
-//! one turn is copied and unpacked while another is pursued.
+//! A batch goes in turns of `TURN` frames, `AT_A_TIME` of them at a time, each from a thread of its own: CubeCL gives each thread
+//! a stream, so that one turn is copied and unpacked while another is pursued.
 //!
 //! Measurements, solutions and images may stay on the device too ([`DeviceFrames`], [`DeviceSolutions`], [`DeviceImages`]).
 //! What does not yet: the networks do not take a [`DeviceImages`], so images go through the host's memory to reach them.
@@ -26,6 +26,9 @@ use std::sync::OnceLock;
 
 /// Most frames of a turn: enough to fill a large GPU, and few enough that a batch of some thousands has several.
 const TURN: usize = 1024;
+
+/// Turns that share the device's memory.
+const AT_A_TIME: usize = 4;
 
 /// A `measurements x atoms` matrix of any column norms on a device.
 #[derive(Debug)]
@@ -131,12 +134,24 @@ impl DeviceDictionary {
         Ok(self.gram.frames_at_once(sparsity)?.min(other / TOGETHER * TOGETHER).max(1))
     }
 
-    /// Frames of one turn of a batch.
+    /// Does `work` for the measurements of each turn of a batch; what came of the turns, in their order.
     ///
     /// # Errors
-    /// [`OmpError`] if not even one fits the device.
-    pub fn frames_a_turn(&self, sparsity: usize) -> Result<usize, OmpError> {
-        Ok(self.frames_at_once(sparsity)?.min(TURN))
+    /// [`OmpError`] if not even one frame fits the device, or that of `work`.
+    pub fn in_turns<T: Sync, R: Send>(
+        &self,
+        sparsity: usize,
+        y: &[T],
+        work: impl Fn(&[T]) -> Result<R, OmpError> + Sync,
+    ) -> Result<Vec<R>, OmpError> {
+        // Together no more than one turn alone could have.
+        let frames = (self.frames_at_once(sparsity)? / AT_A_TIME).clamp(1, TURN);
+        let turn = frames * self.measurements;
+        let mut done = Vec::new();
+        for turns in y.chunks(AT_A_TIME * turn) {
+            done.extend(turns.par_chunks(turn).map(&work).collect::<Result<Vec<R>, _>>()?);
+        }
+        Ok(done)
     }
 
     /// Takes measurements to the device, `measurements` numbers each, one after another.
@@ -291,9 +306,8 @@ impl DeviceDictionary {
         limits: &Limits,
         y: &[f32],
     ) -> Result<Vec<Solution>, OmpError> {
-        let turns = y.par_chunks(self.frames_a_turn(limits.sparsity)? * self.measurements);
-        let solved = turns.map(|y| self.download(&self.pursue(limits, &self.upload(y)?)?));
-        Ok(solved.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect())
+        let solve = |y: &[f32]| self.download(&self.pursue(limits, &self.upload(y)?)?);
+        Ok(self.in_turns(limits.sparsity, y, solve)?.into_iter().flatten().collect())
     }
 
     /// Sparse representations, and how many of them `f32` could not decide: those are solved again with `f64` as its referee,
@@ -306,12 +320,9 @@ impl DeviceDictionary {
         limits: &Limits,
         y: &[f64],
     ) -> Result<(Vec<Solution>, usize), OmpError> {
-        let turn = self.frames_a_turn(limits.sparsity)?;
-        let turns = y.par_chunks(turn * self.measurements);
-        let found =
-            turns.map(|y| self.download_with_doubts(&self.pursue(limits, &self.upload(y)?)?));
+        let solve = |y: &[f64]| self.download_with_doubts(&self.pursue(limits, &self.upload(y)?)?);
         let (mut solutions, mut doubtful) = (Vec::new(), Vec::new());
-        for (mut found, doubts) in found.collect::<Result<Vec<_>, _>>()? {
+        for (mut found, doubts) in self.in_turns(limits.sparsity, y, solve)? {
             doubtful.extend(doubts.into_iter().map(|i| solutions.len() + i));
             solutions.append(&mut found);
         }

@@ -123,6 +123,11 @@ fn a_batch_is_a_loop_here_too() {
         assert_eq!(&dictionary.solve_batch_single(&limits, y).unwrap()[0], found);
     }
     assert_eq!(dictionary.solve_batch_single(&limits, &[]), Ok(vec![]));
+    // More than go in one turn: each frame as often as it takes, in the order given.
+    let many: Vec<f32> = y.iter().copied().cycle().take(48 * 2100).collect();
+    let found = dictionary.solve_batch_single(&limits, &many).unwrap();
+    assert_eq!(found.len(), 2100);
+    assert!(found.iter().zip(together.iter().cycle()).all(|(found, alone)| found == alone));
 }
 
 #[test]

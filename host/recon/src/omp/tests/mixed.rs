@@ -81,7 +81,7 @@ fn atoms_as_they_are_are_chosen_by_their_inner_products() {
 
 #[test]
 fn a_limit_that_the_residual_meets_to_rounding_is_judged_in_double_precision() {
-    for lead in [1e-9, -1e-9] {
+    for lead in [1e-9_f64, -1e-9] {
         let matrix = DMatrix::<f64>::identity(8, 8);
         let y = [0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.6, 0.8];
         // After the first atom the residual's energy is 1, the limit a little above or below.

@@ -8,7 +8,6 @@ use nirspi_recon::basis::Transform;
 use nirspi_recon::omp::gpu::{Device, DeviceDictionary, DevicePictures};
 use nirspi_recon::omp::{BackendError, Limits, Solution};
 use nirspi_recon::{Basis, Side};
-use rayon::prelude::*;
 use std::time::Instant;
 
 /// Solves `problem` on `device` as often as asked for, once more to warm up.
@@ -57,15 +56,14 @@ fn solve(
     pictures: Option<&DevicePictures>,
 ) -> Result<(Vec<Solution>, usize, usize)> {
     let limits = Limits::atoms(problem.sparsity);
-    let turn = dictionary.frames_a_turn(problem.sparsity)? * problem.measurements;
-    let solved = problem.frames.par_chunks(turn).map(|y| {
+    let solved = dictionary.in_turns(problem.sparsity, &problem.frames, |y| {
         let there = dictionary.pursue(&limits, &dictionary.upload(y)?)?;
         let images = dictionary.images(&there, pictures)?;
         let (found, doubtful) = dictionary.download_with_doubts(&there)?;
         Ok((found, doubtful, dictionary.download_images(&images)?.len()))
-    });
+    })?;
     let (mut solutions, mut doubtful, mut pixels) = (Vec::new(), Vec::new(), 0);
-    for (mut found, doubts, back) in solved.collect::<Result<Vec<_>>>()? {
+    for (mut found, doubts, back) in solved {
         doubtful.extend(doubts.into_iter().map(|i| solutions.len() + i));
         solutions.append(&mut found);
         pixels += back;
