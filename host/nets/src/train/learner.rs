@@ -34,7 +34,11 @@ pub(super) fn new(settings: &Settings, device: &Device) -> Result<Box<dyn Learne
         Kind::Cuda(device) => on::<Autodiff<burn::backend::Cuda>>(settings, device.clone()),
         // Training on GPUs takes minutes to compile, and unit tests train on the CPU.
         #[cfg(all(feature = "gpu", test))]
-        Kind::Wgpu(_) | Kind::Cuda(_) => unimplemented!("in the library's own tests"),
+        Kind::Wgpu(_) | Kind::Cuda(_) => Err(TrainError::Setting {
+            name: "device",
+            found: device.name().to_owned(),
+            expected: "the CPU, in the library's own tests",
+        }),
     }
 }
 
