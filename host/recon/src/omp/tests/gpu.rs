@@ -188,7 +188,7 @@ fn a_dictionary_of_fast_transforms_has_the_same_path() {
             assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 1e-4), "{a:?} and {b:?}");
         }
         let problem = crate::omp::Problem { dictionary: &dictionary, limits };
-        let batch = solve_batch(&problem, &[y.clone(), y].concat(), Backend::Wgpu).unwrap();
+        let batch = solve_batch(&problem, &[y.clone(), y].concat(), device.backend()).unwrap();
         assert_eq!([&batch[0].support, &batch[1].support], [&exact.support; 2]);
     }
 }
@@ -286,7 +286,7 @@ fn problems_without_a_meaning_are_refused_here_too() {
     assert!(matches!(wide, OmpError::Backend(BackendError::TooLarge { .. })), "{wide}");
     let double = DenseDictionary::<f64>::new(&DMatrix::identity(4, 4));
     let problem = crate::omp::Problem { dictionary: &double, limits: one };
-    let refused = solve_batch(&problem, &[1.0; 4], Backend::Wgpu).unwrap_err();
+    let refused = solve_batch(&problem, &[1.0; 4], device.backend()).unwrap_err();
     assert_eq!(refused, OmpError::Backend(BackendError::Precision));
 }
 
