@@ -126,9 +126,11 @@ impl<T: Scalar, D: Dictionary<T> + ?Sized> Search<'_, T, D> {
                 Into::<f64>::into(self.taken[j].column[self.taken[i].atom])
             });
             let right = DVector::from_fn(count, |i, _| self.p0[self.taken[i].atom].into());
+            // What an atom has of its own beside all others, whatever their order: pivots, which see only those taken
+            // before, stay far above it where a few atoms together are nearly one too many.
             let independent = gram.clone().cholesky().filter(|cholesky| {
-                let factor = cholesky.l_dirty();
-                (0..count).all(|i| factor[(i, i)].powi(2) > T::DEPENDENT * gram[(i, i)])
+                let inverse = cholesky.inverse();
+                (0..count).all(|i| inverse[(i, i)] * T::DEPENDENT * gram[(i, i)] < 1.0)
             });
             let Some(cholesky) = independent else { return false };
             let target = cholesky.solve(&right);

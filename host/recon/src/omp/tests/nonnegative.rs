@@ -90,3 +90,19 @@ fn an_atom_that_stays_above_nothing_on_the_way_is_not_given_back() {
     let found = nonnegative::solve(&DenseDictionary::new(&matrix), &y, &Limits::atoms(4)).unwrap();
     assert_eq!(found.support, [0, 1, 3]);
 }
+
+#[test]
+fn atoms_that_are_one_too_many_together_are_told_though_each_pivot_is_large() {
+    // Five atoms that leave a thousandth of themselves to each other, and a sixth that the five hold but for the rounding
+    // of its numbers: parts of a hundred thousand would cancel each other.
+    let problem = problem(Kind::Deficient, 16, 16, 4, 11_072_703_967_221_519_038);
+    let (dictionary, y) = dense::<f64>(&problem);
+    let found = nonnegative::solve(&dictionary, &y, &Limits::atoms(16)).unwrap();
+    assert_eq!((found.stop, found.support.len()), (Stop::Dependent, 5));
+    let length = DVector::from_column_slice(&problem.y).norm();
+    let left = residual(&problem, &found.support, &found.coefficients).norm() / length;
+    assert!(
+        (left - found.residual_norms.last().unwrap()).abs() <= 1e-6,
+        "{left} is left: {found:?}"
+    );
+}
