@@ -62,6 +62,17 @@ impl Device {
         &self.name
     }
 
+    /// What computes: never [`Backend::Auto`].
+    pub fn backend(&self) -> Backend {
+        match self.kind {
+            Kind::Cpu => Backend::Cpu,
+            #[cfg(feature = "gpu")]
+            Kind::Wgpu(_) => Backend::Wgpu,
+            #[cfg(feature = "gpu")]
+            Kind::Cuda(_) => Backend::Cuda,
+        }
+    }
+
     /// How many images at once keep it busy.
     pub(crate) fn batch(&self) -> usize {
         match self.kind {

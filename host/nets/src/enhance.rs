@@ -2,6 +2,9 @@
 //!
 //! Law: nothing leaves without its inconsistency, the figure that says whether the readings bear it out.
 
+#[cfg(feature = "gpu")]
+mod there;
+
 use rayon::prelude::*;
 
 use crate::consistency::{Consistency, MeasuredRows};
@@ -11,6 +14,9 @@ use crate::fusion::{DepthMaps, Fusion};
 use crate::gate;
 use crate::images::Images;
 use crate::spread::{Moments, doubled, measured_again};
+
+#[cfg(feature = "gpu")]
+pub use there::{DeviceEnhancer, DeviceEnhancerError};
 
 /// How a stack is deblurred or enhanced.
 #[derive(Debug, Clone)]

@@ -27,6 +27,12 @@ pub struct Estimate {
 }
 
 impl Estimate {
+    /// Of the estimator's two outputs for an image of `side` x `side`: blur comes in pixels of the image's own grid.
+    pub(crate) fn of_outputs([sigma, noise]: [f32; 2], side: usize) -> Self {
+        let px = SIGMA_SCALE_PX * (OUTPUT_SIDE / side) as f32;
+        Self { sigma_px: px * sigma, noise: noise / NOISE_SCALE }
+    }
+
     /// What the UNet is told, after two numbers that say where on its path it is.
     pub(crate) fn conditions(&self, path: [f32; 2]) -> Conditions {
         let s = (self.sigma_px / SIGMA_SCALE_PX).clamp(0.0, CONDITION_MAX);
@@ -53,13 +59,11 @@ impl BlurEstimator {
 
     /// Blur and noise of each image of 32 x 32 or 64 x 64.
     pub fn estimate<const SIDE: usize>(&self, images: Images<'_, SIDE>) -> Vec<Estimate> {
-        // Blur comes in pixels of the image's own grid.
-        let px = SIGMA_SCALE_PX * (OUTPUT_SIDE / SIDE) as f32;
         images
             .values()
             .chunks(self.batch * SIDE * SIDE)
             .flat_map(|chunk| self.network.run(SIDE, chunk))
-            .map(|[sigma, noise]| Estimate { sigma_px: px * sigma, noise: noise / NOISE_SCALE })
+            .map(|outputs| Estimate::of_outputs(outputs, SIDE))
             .collect()
     }
 }

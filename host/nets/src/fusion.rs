@@ -91,6 +91,13 @@ impl DepthMaps {
     }
 }
 
+/// Appends what FSRCNN sees of the depth of one image: depth over 3 m, then its validity, 32 x 32 each.
+pub(crate) fn push_planes(depth: Option<&DepthMaps>, image: usize, planes: &mut Vec<f32>) {
+    let at = |pixel| depth.map_or((0.0, 0.0), |depth| depth.at(image, pixel));
+    planes.extend((0..SIDE * SIDE).map(|pixel| at(pixel).0));
+    planes.extend((0..SIDE * SIDE).map(|pixel| at(pixel).1));
+}
+
 /// FSRCNN with its second input.
 pub struct Fusion {
     network: Box<dyn RunFsrcnn>,
@@ -115,9 +122,7 @@ impl Fusion {
             let mut input = Vec::with_capacity(3 * images.len() * SIDE * SIDE);
             for (i, image) in images.iter().enumerate() {
                 input.extend_from_slice(image);
-                let at = |pixel| depth.map_or((0.0, 0.0), |d| d.at(chunk * self.batch + i, pixel));
-                input.extend((0..SIDE * SIDE).map(|pixel| at(pixel).0));
-                input.extend((0..SIDE * SIDE).map(|pixel| at(pixel).1));
+                push_planes(depth, chunk * self.batch + i, &mut input);
             }
             out.extend(self.network.run(SIDE, &input).into_iter().map(|v| v.clamp(0.0, 1.0)));
         }

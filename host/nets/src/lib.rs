@@ -37,6 +37,8 @@ pub mod weights;
 
 pub use deblur::{Deblurrer, Method};
 pub use device::{Backend, Device, DeviceError};
+#[cfg(feature = "gpu")]
+pub use enhance::{DeviceEnhancer, DeviceEnhancerError};
 pub use enhance::{Enhanced, Enhancer, KnownEstimate, Options, Sharpener};
 pub use estimate::{BlurEstimator, Estimate};
 pub use fusion::{DepthError, DepthMaps, Fusion};

@@ -3,6 +3,8 @@
 //! Law: every device gives the same numbers, to 1e-4; nothing above this module knows which one computed.
 
 #[cfg(feature = "gpu")]
+mod chain;
+#[cfg(feature = "gpu")]
 mod on_burn;
 
 #[cfg(feature = "gpu")]
@@ -16,7 +18,9 @@ use crate::model::CONDITIONS;
 use crate::model::{Estimator, EstimatorConfig, Fsrcnn, FsrcnnConfig, UNet, UNetConfig};
 use crate::weights::{Weights, WeightsError};
 #[cfg(feature = "gpu")]
-use on_burn::place;
+pub(crate) use chain::{Guess, RunChain};
+#[cfg(feature = "gpu")]
+use on_burn::{OnBurn, place};
 
 /// Time (2), blur (2), noise (2).
 pub(crate) type Conditions = [f32; CONDITIONS];

@@ -2,6 +2,8 @@
 
 mod enhance;
 mod omp;
+mod pipeline;
+mod scenes;
 
 use anyhow::Result;
 use clap::Subcommand;
@@ -17,7 +19,8 @@ const FASTEST_SWEEPS_HZ: f64 = nirspi_wire::PATTERN_HZ as f64 / nirspi_wire::PAT
 #[command(after_help = "Examples:\n\
     \x20 nirspi bench omp --frames 256\n\
     \x20 nirspi bench omp --input problem.npz --out solution.npz\n\
-    \x20 nirspi bench enhance --frames 256")]
+    \x20 nirspi bench enhance --frames 256\n\
+    \x20 nirspi bench pipeline --frames 4096 --backend cuda")]
 pub struct Args {
     #[command(subcommand)]
     what: What,
@@ -27,12 +30,14 @@ pub struct Args {
 enum What {
     Enhance(enhance::Args),
     Omp(omp::Args),
+    Pipeline(pipeline::Args),
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
     match &args.what {
         What::Enhance(args) => enhance::run(args),
         What::Omp(args) => omp::run(args),
+        What::Pipeline(args) => pipeline::run(args),
     }
 }
 

@@ -5,6 +5,8 @@ use super::report::StageTimes;
 use super::stack::Input;
 use anyhow::Result;
 use indicatif::{ProgressBar, ProgressStyle};
+#[cfg(feature = "gpu")]
+use nirspi_nets::DeviceEnhancer;
 use nirspi_nets::weights::{MODEL, VERSION};
 use nirspi_nets::{
     Backend, BlurEstimator, Deblurrer, Device, Enhanced, Fusion, Method, Sharpener, Weights,
@@ -137,6 +139,19 @@ impl Networks {
         let estimator = self.estimator()?;
         let weights = self.weights(method.model())?;
         Ok(Sharpener::new(estimator, Deblurrer::new(&self.device, &weights, method)?))
+    }
+
+    /// All networks, for images that OMP leaves on a GPU.
+    #[cfg(feature = "gpu")]
+    pub fn device_enhancer(&mut self) -> Result<DeviceEnhancer> {
+        let [fsrcnn, estimator] = [self.weights("fsrcnn")?, self.weights("estimator")?];
+        let bridge = self.weights("diffusion")?;
+        Ok(DeviceEnhancer::new(&self.device, &fsrcnn, &estimator, &bridge)?)
+    }
+
+    /// What computes, by its backend.
+    pub fn backend(&self) -> Backend {
+        self.device.backend()
     }
 
     /// What computes.

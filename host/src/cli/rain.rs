@@ -173,44 +173,63 @@ impl FromStr for Law {
     }
 }
 
-/// Rows of numbers of a CSV file; a first line without numbers is a heading, lines with # are comments.
-fn read_rows(path: &Path) -> Result<Vec<(usize, Vec<f64>)>> {
-    let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
-    let mut rows = Vec::new();
-    for (at, line) in text.lines().enumerate() {
-        let line = line.trim();
-        if line.is_empty() || line.starts_with('#') {
-            continue;
+/// Fields of a CSV file, line by line; a first line with no number in it is a heading, lines with # are comments.
+struct Table {
+    path: PathBuf,
+    rows: Vec<(usize, Vec<String>)>,
+}
+
+impl Table {
+    fn read(path: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
+        let lines = text.lines().enumerate().map(|(at, line)| (at + 1, line.trim()));
+        let mut rows: Vec<(usize, Vec<String>)> = lines
+            .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
+            .map(|(at, line)| {
+                (at, line.split([',', ';', '\t']).map(|f| f.trim().to_owned()).collect())
+            })
+            .collect();
+        let is_heading = |(_, fields): &(usize, Vec<String>)| {
+            fields.iter().all(|field| field.parse::<f64>().is_err())
+        };
+        if rows.first().is_some_and(is_heading) {
+            rows.remove(0);
         }
-        let numbers: Result<Vec<f64>, _> =
-            line.split([',', ';', '\t']).map(|field| field.trim().parse::<f64>()).collect();
-        match numbers {
-            Ok(numbers) => rows.push((at + 1, numbers)),
-            Err(_) if rows.is_empty() && at == 0 => {}
-            Err(_) => {
-                anyhow::bail!(
-                    "{}: line {}: found {line:?}, expected numbers",
-                    path.display(),
-                    at + 1
-                )
-            }
-        }
+        Ok(Self { path: path.to_owned(), rows })
     }
-    Ok(rows)
+
+    fn number(&self, line: usize, field: &str) -> Result<f64> {
+        field.parse().ok().with_context(|| {
+            format!("{}: line {line}: found {field:?}, expected a number", self.path.display())
+        })
+    }
+
+    /// The last field of each row.
+    fn last_column(&self) -> Result<Vec<f64>> {
+        let last = |(line, fields): &(usize, Vec<String>)| {
+            self.number(*line, fields.last().map_or("", String::as_str))
+        };
+        self.rows.iter().map(last).collect()
+    }
+
+    /// Rows of two numbers.
+    fn pairs(&self, what: &str) -> Result<Vec<[f64; 2]>> {
+        let pair = |(line, fields): &(usize, Vec<String>)| match &fields[..] {
+            [a, b] => Ok([self.number(*line, a)?, self.number(*line, b)?]),
+            _ => anyhow::bail!(
+                "{}: line {line}: found {} numbers, expected 2: {what}",
+                self.path.display(),
+                fields.len()
+            ),
+        };
+        self.rows.iter().map(pair).collect()
+    }
 }
 
 fn read_classes(path: &Path) -> Result<Vec<DropClass>> {
-    read_rows(path)?
-        .into_iter()
-        .map(|(line, row)| match row[..] {
-            [diameter_mm, per_m3] => Ok(DropClass { diameter_mm, per_m3 }),
-            _ => anyhow::bail!(
-                "{}: line {line}: found {} numbers, expected 2: diameter in mm, drops per m3",
-                path.display(),
-                row.len()
-            ),
-        })
-        .collect()
+    let pairs = Table::read(path)?.pairs("diameter in mm, drops per m3")?;
+    let class = |[diameter_mm, per_m3]: [f64; 2]| DropClass { diameter_mm, per_m3 };
+    Ok(pairs.into_iter().map(class).collect())
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {

@@ -71,6 +71,7 @@ fn mistakes_in_the_arguments_get_one_line_and_code_2() {
             &["--backend", "abacus", "auto, cpu, wgpu or cuda"],
         ),
         (&["bench", "enhance", "--frames", "0"], &["--frames", "'0'"]),
+        (&["bench", "pipeline", "--sparsity", "600"], &["--sparsity is 600", "1 to 512"]),
         (&["reconstruct", "in.npz", "--matrix", "p.npy", "--enhance"], &["--matrix", "--enhance"]),
         (&["eval", "sampling", "in.npz", "--sampling", "0.1,2"], &["--sampling is 2"]),
         (&["eval", "sampling", "in.npz", "--orders", "magic"], &["magic", "cake-cutting"]),

@@ -193,3 +193,29 @@ fn the_time_of_enhancing_is_reported_with_its_parts() {
     assert!(ms(&report) > ms(&report["fusion"]), "{report}");
     assert!(ms(&report) > ms(&report["estimate"]), "{report}");
 }
+
+#[test]
+fn the_whole_of_the_pipeline_is_timed_and_reconstructs_what_was_measured() {
+    let bench = Bench::new();
+    let time = |backend| {
+        let few = ["--frames", "2", "--sparsity", "32", "--repeats", "1"];
+        bench.run(&[&["bench", "pipeline", "--backend", backend], &few[..]].concat())
+    };
+    let report = time("cpu").succeeded().json();
+    assert_eq!((&report["device"], &report["frames"]), (&"CPU".into(), &2.into()), "{report}");
+    let ms = |part: &serde_json::Value| part["median_ms"].as_f64().unwrap();
+    assert!(ms(&report) > ms(&report["reconstruct"]), "{report}");
+    // 23.6 dB with 32 atoms; 12 where the mean is missed.
+    let db = |report: &serde_json::Value| report["reconstructed_psnr_db"].as_f64().unwrap();
+    assert!(db(&report) > 22.0, "{report}");
+    let on_gpu = time("wgpu");
+    if on_gpu.code != Some(0) {
+        on_gpu.failed(1, &["backend wgpu"]);
+        eprintln!("skipped: no wgpu on this machine");
+        return;
+    }
+    let on_gpu = on_gpu.succeeded().json();
+    assert!((db(&on_gpu) - db(&report)).abs() < 0.01, "{on_gpu}");
+    // Images that stay on the device are those that come to the host and go back.
+    assert!(on_gpu["largest_difference"].as_f64().unwrap() < 1e-3, "{on_gpu}");
+}

@@ -44,7 +44,12 @@ fn uniformity_is_christiansens_of_the_last_column() {
     let report = bench.run(&["rain", "--uniformity", "volumes.csv", "--json"]).succeeded().json();
     assert!((report["uniformity_percent"].as_f64().unwrap() - 85.0).abs() < 1e-9, "{report}");
     bench.write("bad.csv", b"place,ml\n1,8\n2,wet\n");
-    bench.run(&["rain", "--uniformity", "bad.csv"]).failed(1, &["bad.csv", "line 3", "numbers"]);
+    bench.run(&["rain", "--uniformity", "bad.csv"]).failed(1, &["bad.csv", "line 3", "a number"]);
+    // No heading, and places that are no numbers: the first volume counts.
+    bench.write("named.csv", b"left,8\nmiddle,12\nright,9\nfront,11\n");
+    let report = bench.run(&["rain", "--uniformity", "named.csv", "--json"]).succeeded().json();
+    assert_eq!(report["containers"], 4, "{report}");
+    assert!((report["uniformity_percent"].as_f64().unwrap() - 85.0).abs() < 1e-9, "{report}");
     bench.run(&["rain", "--uniformity", "none.csv"]).failed(1, &["none.csv"]);
 }
 

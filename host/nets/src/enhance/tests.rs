@@ -9,7 +9,7 @@ use crate::weights::Weights;
 
 const SIDE: usize = 32;
 
-fn enhancer(steps: u32) -> Enhancer {
+pub(super) fn enhancer(steps: u32) -> Enhancer {
     let device = Device::cpu();
     let weights = |model| Weights::embedded(model).unwrap();
     let method = Method::Diffusion { steps: NonZeroU32::new(steps).unwrap() };
@@ -20,7 +20,7 @@ fn enhancer(steps: u32) -> Enhancer {
 }
 
 /// A cross of bars on 64 x 64, 0 or 0.9.
-fn cross() -> Vec<f32> {
+pub(super) fn cross() -> Vec<f32> {
     let bar = |at: usize| (26..34).contains(&at);
     let inside = |at: usize| (10..54).contains(&at);
     let lit = |y, x| (bar(x) && inside(y)) || (bar(y) && inside(x));
@@ -28,7 +28,7 @@ fn cross() -> Vec<f32> {
 }
 
 /// Seen through a blur of about `sigma_px` (three boxes) by 32 x 32 pixels with noise.
-fn seen(image: &[f32], sigma_px: f32, noise: f32, seed: u64) -> Vec<f32> {
+pub(super) fn seen(image: &[f32], sigma_px: f32, noise: f32, seed: u64) -> Vec<f32> {
     let radius = ((4.0 * sigma_px * sigma_px + 1.0).sqrt() - 1.0) / 2.0;
     let radius = radius.round() as i64;
     let mut blurred = image.to_vec();

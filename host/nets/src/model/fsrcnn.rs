@@ -6,7 +6,7 @@ use burn::nn::{PRelu, PReluConfig};
 use burn::tensor::Tensor;
 use burn::tensor::backend::Backend;
 
-use super::{convolution, shuffle, uniform};
+use super::{convolution, nearest, uniform};
 use crate::weights::{Weights, WeightsError};
 
 /// Input channels: intensity, depth, validity of the depth.
@@ -83,8 +83,7 @@ impl<B: Backend> Fsrcnn<B> {
     /// Of (N, 3, H, W), intensity in [0, 1], depth over 3 m and validity of the depth: the image
     /// (N, 1, 2 H, 2 W), not clamped.
     pub fn forward(&self, input: Tensor<B, 4>) -> Tensor<B, 4> {
-        // Four copies of a channel shuffle into the nearest-neighbour enlargement.
-        let nearest = shuffle(input.clone().narrow(1, 0, 1).repeat_dim(1, 4));
+        let nearest = nearest(input.clone().narrow(1, 0, 1));
         let mut h = self.feature_act.forward(self.feature.forward(input));
         h = self.shrink_act.forward(self.shrink.forward(h));
         for (layer, act) in self.map.iter().zip(&self.map_act) {

@@ -73,6 +73,12 @@ fn shuffle<B: Backend>(features: Tensor<B, 4>) -> Tensor<B, 4> {
     ])
 }
 
+/// Each pixel twice in both directions: (N, 1, H, W) to (N, 1, 2 H, 2 W).
+pub(crate) fn nearest<B: Backend>(image: Tensor<B, 4>) -> Tensor<B, 4> {
+    // Four copies of a channel shuffle into the enlargement.
+    shuffle(image.repeat_dim(1, 4))
+}
+
 /// Mean over the image: (N, C, H, W) to (N, C).
 fn pooled<B: Backend>(features: Tensor<B, 4>) -> Tensor<B, 2> {
     let [n, c, h, w] = features.dims();

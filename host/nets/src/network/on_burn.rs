@@ -10,8 +10,8 @@ use crate::weights::{Weights, WeightsError};
 
 /// A burn module and the device that its weights are on.
 pub(super) struct OnBurn<B: Backend, M> {
-    module: M,
-    device: B::Device,
+    pub(super) module: M,
+    pub(super) device: B::Device,
 }
 
 /// Puts weights into a module.
@@ -24,18 +24,18 @@ pub(super) fn place<B: Backend, M: Module<B>>(
 }
 
 impl<B: Backend, M> OnBurn<B, M> {
-    fn tensor<const D: usize>(&self, shape: [usize; D], values: &[f32]) -> Tensor<B, D> {
+    pub(super) fn tensor<const D: usize>(&self, shape: [usize; D], values: &[f32]) -> Tensor<B, D> {
         Tensor::from_data(TensorData::new(values.to_vec(), shape), &self.device)
     }
 
-    fn images(&self, channels: usize, side: usize, values: &[f32]) -> Tensor<B, 4> {
+    pub(super) fn images(&self, channels: usize, side: usize, values: &[f32]) -> Tensor<B, 4> {
         let count = values.len() / (channels * side * side);
         self.tensor([count, channels, side, side], values)
     }
 }
 
-fn values<B: Backend, const D: usize>(tensor: Tensor<B, D>) -> Vec<f32> {
-    tensor.into_data().iter::<f32>().collect()
+pub(super) fn values<B: Backend, const D: usize>(tensor: Tensor<B, D>) -> Vec<f32> {
+    tensor.into_data().into_vec().unwrap_or_else(|data| unreachable!("{data:?} of f32"))
 }
 
 impl<B: Backend> RunUNet for OnBurn<B, UNet<B>> {

@@ -28,12 +28,11 @@ mod device;
 mod dictionary;
 mod engine;
 mod gram;
+mod images;
 mod kernels;
 
 pub use choice::{Choice, FRAMES_WORTH_A_GPU, choose};
 pub use device::Device;
-pub use dictionary::{
-    DeviceDictionary, DeviceFrames, DeviceImages, DevicePictures, HostImages, path_over,
-    solve_batch_over,
-};
+pub use dictionary::{DeviceDictionary, DeviceFrames, DevicePictures, path_over, solve_batch_over};
 pub use gram::DeviceSolutions;
+pub use images::{DeviceImages, HostImages};

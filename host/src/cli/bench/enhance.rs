@@ -1,12 +1,10 @@
 //! `nirspi bench enhance`: the learned stages, timed.
 
-use super::{FASTEST_SWEEPS_HZ, Times};
+use super::{FASTEST_SWEEPS_HZ, Times, scenes};
 use crate::cli::networks::{NetworkArgs, Used};
 use crate::cli::print;
 use anyhow::Result;
 use nirspi_nets::{Enhancer, Images, Method, Options, fusion};
-use rand::{RngExt, SeedableRng};
-use rand_pcg::Pcg64;
 use serde::Serialize;
 use std::num::NonZeroU32;
 use std::process::ExitCode;
@@ -69,7 +67,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let method = Method::Diffusion { steps: args.steps };
     let enhancer = Enhancer::new(networks.fusion()?, networks.sharpener(method)?);
     let options = Options { consistency: !args.no_consistency, gate: false, ..Options::default() };
-    let values = blobs(args.frames as usize, args.seed);
+    let values = scenes::blobs(args.frames as usize, args.seed);
     let images: Images<'_, { fusion::SIDE }> = Images::new(&values)?;
     let enhance = || enhancer.enhance(images, None, &options, &mut |_| {}).images.len();
     let first_ms = Times::of(1, enhance).median_ms;
@@ -92,26 +90,4 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         fusion: Times::of(args.repeats, || alone.upscale(images, None)),
     })?;
     Ok(ExitCode::SUCCESS)
-}
-
-/// (N, 32, 32): three soft blobs each, and noise of 3 %.
-fn blobs(count: usize, seed: u64) -> Vec<f32> {
-    let mut rng = Pcg64::seed_from_u64(seed);
-    let side = fusion::SIDE;
-    let mut out = Vec::with_capacity(count * side * side);
-    for _ in 0..count {
-        let blobs: [[f32; 3]; 3] = std::array::from_fn(|_| {
-            [rng.random_range(4.0..28.0), rng.random_range(4.0..28.0), rng.random_range(2.0..6.0)]
-        });
-        for pixel in 0..side * side {
-            let (x, y) = ((pixel % side) as f32, (pixel / side) as f32);
-            let light: f32 = blobs
-                .iter()
-                .map(|[cx, cy, r]| (-((x - cx).powi(2) + (y - cy).powi(2)) / (2.0 * r * r)).exp())
-                .sum();
-            let noise = 0.06 * (rng.random::<f32>() + rng.random::<f32>() - 1.0);
-            out.push((0.8 * light + noise).clamp(0.0, 1.0));
-        }
-    }
-    out
 }

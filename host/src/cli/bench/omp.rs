@@ -3,18 +3,17 @@
 #[cfg(feature = "gpu")]
 mod gpu;
 
-use super::{FASTEST_SWEEPS_HZ, milliseconds};
+use super::{FASTEST_SWEEPS_HZ, milliseconds, scenes};
 use crate::cli::{Usage, backend, print};
 use anyhow::{Context, Result};
 use clap::ValueEnum;
 use nalgebra::DMatrix;
 use nirspi::files::output::write_atomic;
 use nirspi::files::problem::{self, ProblemFile};
-use nirspi_recon::basis::Transform;
 use nirspi_recon::omp::{
     Backend, Limits, MixedDictionary, OmpError, Problem, Solution, solve_batch,
 };
-use nirspi_recon::{Basis, Order, Side, fwht};
+use nirspi_recon::{Order, Side};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use serde::Serialize;
@@ -276,18 +275,7 @@ fn random_problem(args: &Args) -> Result<ProblemFile> {
     }
     let mut rows = Order::Random(args.seed).rows(side)?;
     rows.truncate(args.measurements);
-    let transform = Transform::new(Basis::Dct, side);
-    let mut dictionary = vec![0.0; args.measurements * area];
-    for atom in 0..area {
-        let mut image = vec![0.0_f32; area];
-        image[atom] = 1.0;
-        transform.synthesise(&mut image);
-        let mut seen: Vec<f64> = image.iter().map(|&v| v.into()).collect();
-        fwht(&mut seen)?;
-        for (m, &row) in rows.iter().enumerate() {
-            dictionary[m * area + atom] = seen[row as usize] / side.pixels() as f64;
-        }
-    }
+    let dictionary = scenes::cosines_by(&rows)?;
     let mut random = Pcg64::seed_from_u64(args.seed);
     let mut frames = Vec::with_capacity(args.frames * args.measurements);
     for _ in 0..args.frames {

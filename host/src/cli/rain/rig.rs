@@ -1,6 +1,6 @@
 //! `nirspi rain --uniformity` and `--rig`.
 
-use super::read_rows;
+use super::Table;
 use crate::cli::{Usage, print};
 use anyhow::{Context, Result};
 use nirspi_optics::rig::{Rig, uniformity_percent};
@@ -25,8 +25,7 @@ struct Report {
 
 /// Collected volumes of a CSV file.
 pub fn measured(path: &Path, json: bool) -> Result<ExitCode> {
-    let volumes: Vec<f64> =
-        read_rows(path)?.into_iter().filter_map(|(_, row)| row.last().copied()).collect();
+    let volumes = Table::read(path)?.last_column()?;
     report(&volumes, None, json).with_context(|| path.display().to_string())
 }
 

@@ -6,19 +6,19 @@
 //! A batch goes in turns of `TURN` frames, `AT_A_TIME` of them at a time, each from a thread of its own: CubeCL gives each thread
 //! a stream, so that one turn is copied and unpacked while another is pursued.
 //!
-//! Measurements, solutions and images may stay on the device too ([`DeviceFrames`], [`DeviceSolutions`], [`DeviceImages`]).
-//! What does not yet: the networks do not take a [`DeviceImages`], so images go through the host's memory to reach them.
+//! Measurements, solutions and images may stay on the device too ([`DeviceFrames`], [`DeviceSolutions`], [`DeviceImages`]); the
+//! networks of `nirspi-nets` take the images from there.
 
 use super::device::Device;
 use super::engine::Buffer;
 use super::gram::{DeviceGram, DeviceSolutions, FRAMES_A_THREAD, width};
+use super::images::DeviceImages;
 use super::kernels::TOGETHER;
 use crate::omp::dictionary::Atoms;
 use crate::omp::pursuit::energy;
 use crate::omp::{
     BackendError, Dictionary, Limits, MixedDictionary, OmpError, Path, Scalar, Solution, finite,
 };
-use cubecl::bytes::Bytes;
 use cubecl::prelude::CubeElement;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -54,29 +54,6 @@ pub struct DeviceFrames {
 pub struct DevicePictures {
     buffer: Buffer,
     pixels: usize,
-}
-
-/// Images that have come back, `frames x pixels`.
-#[derive(Debug)]
-pub struct HostImages {
-    bytes: Bytes,
-    count: usize,
-}
-
-impl std::ops::Deref for HostImages {
-    type Target = [f32];
-
-    fn deref(&self) -> &[f32] {
-        &f32::from_bytes(&self.bytes)[..self.count]
-    }
-}
-
-/// Images on a device, `frames x pixels`.
-#[derive(Debug)]
-pub struct DeviceImages {
-    buffer: Buffer,
-    pixels: usize,
-    frames: usize,
 }
 
 impl DeviceDictionary {
@@ -285,16 +262,7 @@ impl DeviceDictionary {
             Some(pictures) => engine.images(&solutions.pursuit, &pictures.buffer, pixels),
             None => engine.scatter(&solutions.pursuit, pixels),
         };
-        Ok(DeviceImages { buffer, pixels, frames })
-    }
-
-    /// Brings images to the host.
-    ///
-    /// # Errors
-    /// [`OmpError`] if the device failed.
-    pub fn download_images(&self, images: &DeviceImages) -> Result<HostImages, OmpError> {
-        let bytes = self.device().engine.read(&[&images.buffer])?.swap_remove(0);
-        Ok(HostImages { bytes, count: images.frames * images.pixels })
+        Ok(DeviceImages::of(self.device(), buffer, [frames, pixels]))
     }
 
     /// [`solve_batch`](crate::omp::solve_batch) in `f32` alone.

@@ -18,6 +18,10 @@ pub(super) struct Buffer {
 }
 
 impl Buffer {
+    pub(super) fn handle(&self) -> &Handle {
+        &self.handle
+    }
+
     #[expect(
         unsafe_code,
         reason = "CubeCL trusts the length; it is the one the buffer was made with"

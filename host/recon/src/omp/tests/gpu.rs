@@ -140,12 +140,12 @@ fn images_are_the_atoms_times_their_coefficients() {
     let solutions = dictionary.pursue(&limits, &frames).unwrap();
     let found = dictionary.download(&solutions).unwrap();
     let scattered = dictionary.images(&solutions, None).unwrap();
-    let scattered = dictionary.download_images(&scattered).unwrap();
+    let scattered = scattered.download().unwrap();
     let pixels = 70;
     let pictures: Vec<f32> = (0..150 * pixels).map(|i| (i % 17) as f32 - 8.0).collect();
     let there = dictionary.upload_pictures(&pictures, pixels).unwrap();
     let images = dictionary.images(&solutions, Some(&there)).unwrap();
-    let images = dictionary.download_images(&images).unwrap();
+    let images = images.download().unwrap();
     assert_eq!((found.len(), scattered.len(), images.len()), (3, 3 * 150, 3 * pixels));
     for (frame, solution) in found.iter().enumerate() {
         let mut whole = vec![0.0; 150];

@@ -1,13 +1,12 @@
 //! The same problem on a GPU: measurements go there, solutions and images come back, and all of it is timed.
 
-use super::super::milliseconds;
+use super::super::{milliseconds, scenes};
 use super::{Args, Precision, Timed, matrix};
 use anyhow::Result;
 use nirspi::files::problem::ProblemFile;
-use nirspi_recon::basis::Transform;
+use nirspi_recon::Side;
 use nirspi_recon::omp::gpu::{Device, DeviceDictionary, DevicePictures};
 use nirspi_recon::omp::{BackendError, Limits, Solution};
-use nirspi_recon::{Basis, Side};
 use std::time::Instant;
 
 /// Solves `problem` on `device` as often as asked for, once more to warm up.
@@ -60,7 +59,7 @@ fn solve(
         let there = dictionary.pursue(&limits, &dictionary.upload(y)?)?;
         let images = dictionary.images(&there, pictures)?;
         let (found, doubtful) = dictionary.download_with_doubts(&there)?;
-        Ok((found, doubtful, dictionary.download_images(&images)?.len()))
+        Ok((found, doubtful, images.download()?.len()))
     })?;
     let (mut solutions, mut doubtful, mut pixels) = (Vec::new(), Vec::new(), 0);
     for (mut found, doubts, back) in solved {
@@ -77,12 +76,5 @@ fn solve(
 
 /// What the atoms of a random problem look like.
 fn cosines(dictionary: &DeviceDictionary) -> Result<DevicePictures> {
-    let area = Side::INSTRUMENT.area();
-    let transform = Transform::new(Basis::Dct, Side::INSTRUMENT);
-    let mut pictures = vec![0.0; area * area];
-    for (atom, picture) in pictures.chunks_exact_mut(area).enumerate() {
-        picture[atom] = 1.0;
-        transform.synthesise(picture);
-    }
-    Ok(dictionary.upload_pictures(&pictures, area)?)
+    Ok(dictionary.upload_pictures(&scenes::cosines(), Side::INSTRUMENT.area())?)
 }

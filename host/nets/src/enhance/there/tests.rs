@@ -1,0 +1,85 @@
+//! On the GPUs of this machine, software Vulkan too; skipped aloud where there is none.
+
+use nirspi_recon::omp::gpu;
+
+use super::super::tests::{cross, enhancer, seen};
+use super::*;
+use crate::consistency::MeasuredRows;
+
+fn on(device: &Device) -> DeviceEnhancer {
+    let [fsrcnn, estimator, bridge] =
+        ["fsrcnn", "estimator", "diffusion"].map(|model| Weights::embedded(model).unwrap());
+    DeviceEnhancer::new(device, &fsrcnn, &estimator, &bridge).unwrap()
+}
+
+fn devices() -> Vec<(Device, gpu::Device)> {
+    let open = |backend| match (Device::open(backend), gpu::Device::open(backend)) {
+        (Ok(networks), Ok(Some(omp))) => Some((networks, omp)),
+        (absent, _) => {
+            eprintln!("skipped: {}", absent.unwrap_err());
+            None
+        }
+    };
+    [Backend::Wgpu, Backend::Cuda].into_iter().filter_map(open).collect()
+}
+
+fn apart(a: &[f32], b: &[f32]) -> f32 {
+    assert_eq!(a.len(), b.len());
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+}
+
+#[test]
+fn images_that_are_there_become_what_the_processor_makes_of_them() {
+    let readings: Vec<f32> = (0..3).flat_map(|i| seen(&cross(), i as f32, 0.02, i)).collect();
+    let depth = DepthMaps::new(vec![0.6; 64], [1, 8, 8], 3).unwrap();
+    // Half of the patterns.
+    let rows: Vec<u32> = (0..512).collect();
+    let halved = Options { measured: MeasuredRows::new(fusion::SIDE, &rows), ..Options::default() };
+    let white = 2.5;
+    let bright: Vec<f32> = readings.iter().map(|v| v * white).collect();
+    for (device, omp) in devices() {
+        let mut there = on(&device);
+        // A part and a smaller one.
+        there.batch = 2;
+        let images = DeviceImages::upload(&omp, &bright, fusion::SIDE * fusion::SIDE).unwrap();
+        for (depth, options) in [(Some(&depth), &Options::default()), (None, &halved)] {
+            let mut told = Vec::new();
+            let ours =
+                there.enhance(&images, white, depth, options, &mut |done| told.push(done)).unwrap();
+            let seen = Images::new(&readings).unwrap();
+            let theirs = enhancer(1).enhance(seen, depth, options, &mut |_| {});
+            assert_eq!(told, [2, 3]);
+            for (ours, theirs) in ours.estimates.iter().zip(&theirs.estimates) {
+                assert!((ours.sigma_px - theirs.sigma_px).abs() < 1e-3, "{ours:?} {theirs:?}");
+                assert!((ours.noise - theirs.noise).abs() < 1e-4, "{ours:?} {theirs:?}");
+            }
+            let start = apart(&ours.upscaled.unwrap(), &theirs.upscaled.unwrap());
+            let sharp = apart(&ours.images, &theirs.images);
+            let inconsistency = apart(&ours.inconsistency, &theirs.inconsistency);
+            assert!(start < 1e-4 && sharp < 2e-3, "{start} {sharp}");
+            assert!(inconsistency < 1e-2, "{inconsistency}");
+        }
+    }
+}
+
+#[test]
+fn what_cannot_be_enhanced_there_is_refused() {
+    let weights = Weights::embedded("fsrcnn").unwrap();
+    let on_cpu = DeviceEnhancer::new(&Device::cpu(), &weights, &weights, &weights);
+    assert!(matches!(on_cpu, Err(DeviceEnhancerError::NoGpu)));
+    for (device, omp) in devices() {
+        let there = on(&device);
+        let refuse = |pixels, white, options: &Options| {
+            let images = DeviceImages::upload(&omp, &vec![0.5; pixels], pixels).unwrap();
+            there.enhance(&images, white, None, options, &mut |_| {}).unwrap_err()
+        };
+        let options = Options::default();
+        let size = refuse(64 * 64, 1.0, &options).to_string();
+        assert_eq!(size, "images of 4096 pixels, expected 32 x 32");
+        for white in [0.0, -1.0, f32::NAN, f32::INFINITY] {
+            assert!(matches!(refuse(1024, white, &options), DeviceEnhancerError::White { .. }));
+        }
+        let copies = Options { copies: 2, ..options };
+        assert!(matches!(refuse(1024, 1.0, &copies), DeviceEnhancerError::Copies));
+    }
+}
