@@ -52,6 +52,20 @@ impl LossCounters {
     }
 }
 
+/// The account of two runs as one.
+impl std::ops::Add for LossCounters {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            received: self.received + other.received,
+            lost: self.lost + other.lost,
+            corrupt: self.corrupt + other.corrupt,
+            late: self.late + other.late,
+        }
+    }
+}
+
 impl std::fmt::Display for LossCounters {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { received, lost, corrupt, late } = self;

@@ -39,6 +39,12 @@ impl Board {
     }
 }
 
+/// Whether the camera that calls its board this has no light of its own: the virtual one, or one in an emulator.
+#[must_use]
+pub fn is_simulated(board: &str) -> bool {
+    board == "virtual" || Board::named(board).is_some_and(|board| board.chip.is_none())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -11,8 +11,8 @@ use crate::session::{ANSWER_TIMEOUT, Deaf, Listener, Session, SessionError};
 use crate::setup::MeasurementSetup;
 use crate::tally::Tally;
 use nirspi_wire::{
-    Answer, Command, DeviceMessage, Event, EventKind, Fault, PacketError, Reply, RunLength, State,
-    Status,
+    Answer, Command, DeviceMessage, Event, EventKind, Fault, Frame, PacketError, Reply, RunLength,
+    State, Status,
 };
 use std::io;
 use std::ops::ControlFlow;
@@ -124,8 +124,39 @@ pub enum CaptureError {
     },
 }
 
+/// Sees a capture while it runs, from the thread that drains the link: it has to be quick.
+pub trait Observer {
+    /// The camera has taken this setup; frames come next. `problem` is why its response could not be measured.
+    fn begins(
+        &mut self,
+        _setup: &MeasurementSetup,
+        _settling: Option<&Settling>,
+        _problem: Option<&CalibrationError>,
+    ) {
+    }
+
+    /// A frame was received, in order; `counters` count it.
+    fn frame(&mut self, _frame: &Frame<'_>, _counters: &LossCounters) {}
+
+    /// Anything else has come whole.
+    fn message(&mut self, _message: &DeviceMessage<'_>) {}
+
+    /// How far it is; called at least ten times a second, breaks to stop.
+    fn watch(&mut self, progress: &Progress) -> ControlFlow<()>;
+}
+
+/// Looks on, now and then.
+struct Watching<'w>(&'w mut dyn FnMut(&Progress) -> ControlFlow<()>);
+
+impl Observer for Watching<'_> {
+    fn watch(&mut self, progress: &Progress) -> ControlFlow<()> {
+        (self.0)(progress)
+    }
+}
+
 /// Takes the stream apart while it comes.
-struct Run {
+struct Run<'o> {
+    observer: &'o mut dyn Observer,
     number: u16,
     tally: Tally,
     recorder: Option<Recorder>,
@@ -135,7 +166,7 @@ struct Run {
     last_packet: Instant,
 }
 
-impl Run {
+impl Run<'_> {
     /// Writes to the recording, if there is one and it has not failed before.
     fn record(&mut self, write: impl FnOnce(&mut Recorder) -> io::Result<()>) {
         if let Some(recorder) = &mut self.recorder
@@ -146,11 +177,18 @@ impl Run {
     }
 }
 
-impl Listener for Run {
+impl Listener for Run<'_> {
     fn packet(&mut self, raw: &[u8], content: &Result<DeviceMessage<'_>, PacketError>) {
         self.last_packet = Instant::now();
         self.record(|recorder| recorder.packet(raw));
-        self.tally.packet(content);
+        let received = self.tally.packet(content);
+        match content {
+            Ok(DeviceMessage::Frame(frame)) if received => {
+                self.observer.frame(frame, &self.tally.account().counters());
+            }
+            Ok(message) => self.observer.message(message),
+            Err(_) => {}
+        }
         match content {
             Ok(DeviceMessage::Event(Event { kind: EventKind::Fault(fault), .. })) => {
                 self.fault = Some(*fault);
@@ -172,6 +210,18 @@ pub fn capture(
     session: &mut Session,
     options: &CaptureOptions,
     watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+) -> Result<Capture, CaptureError> {
+    observe(session, options, &mut Watching(watch))
+}
+
+/// Runs one capture, with somebody who sees every frame as it comes.
+///
+/// # Errors
+/// As [`capture`].
+pub fn observe(
+    session: &mut Session,
+    options: &CaptureOptions,
+    observer: &mut dyn Observer,
 ) -> Result<Capture, CaptureError> {
     let mut setup = options.setup.clone();
     let (settling, calibration_problem) = match &options.calibration {
@@ -196,8 +246,10 @@ pub fn capture(
                 .map_err(|source| CaptureError::Recording { path: path.clone(), source })?,
         ),
     };
+    observer.begins(&setup, settling.as_ref(), calibration_problem.as_ref());
     let now = Instant::now();
     let mut run = Run {
+        observer,
         number: before.run.wrapping_add(1),
         tally: Tally::new(&setup, Some(before.run.wrapping_add(1))),
         recorder,
@@ -206,7 +258,7 @@ pub fn capture(
         status: None,
         last_packet: now,
     };
-    let ended = match stream(session, options.frames, &mut run, now, watch) {
+    let ended = match stream(session, options.frames, &mut run, now) {
         Ok(ended) => ended,
         Err(error) if run.tally.has_begun() => Ended::LinkLost(error),
         Err(error) => {
@@ -238,7 +290,7 @@ pub fn capture(
 }
 
 /// A run that never started leaves no recording behind.
-fn discard_empty(path: Option<&Path>, run: Run) {
+fn discard_empty(path: Option<&Path>, run: Run<'_>) {
     drop(run.recorder);
     // Not a device that the user records into.
     if let Some(path) = path.filter(|path| path.is_file()) {
@@ -250,9 +302,8 @@ fn discard_empty(path: Option<&Path>, run: Run) {
 fn stream(
     session: &mut Session,
     frames: Option<u32>,
-    run: &mut Run,
+    run: &mut Run<'_>,
     started: Instant,
-    watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<Ended, SessionError> {
     let length = frames.map_or(RunLength::Continuous, RunLength::Frames);
     session.command(Command::Start(length), run)?;
@@ -267,7 +318,8 @@ fn stream(
             run.record(Recorder::flush_if_due);
             let progress =
                 Progress { counters: run.tally.account().counters(), elapsed: started.elapsed() };
-            let wants_stop = watch(&progress).is_break() || run.recorder_error.is_some();
+            let wants_stop =
+                run.observer.watch(&progress).is_break() || run.recorder_error.is_some();
             if wants_stop && !stopped && !run.tally.has_ended() {
                 stopped = true;
                 match session.command(Command::Stop, run) {

@@ -1,4 +1,5 @@
-//! What befell a camera while nobody listened, in words: it reports that right after the greeting.
+//! What a camera reports unasked, in words: right after the greeting what befell it while nobody listened, later what happens
+//! while somebody watches.
 
 use nirspi_wire::{CrashReport, EventKind};
 
@@ -6,8 +7,34 @@ use nirspi_wire::{CrashReport, EventKind};
 #[must_use]
 pub fn at_greeting(kind: &EventKind) -> Option<String> {
     match kind {
-        EventKind::Fault(fault) => Some(format!("the camera switched its LEDs off: {fault:?}")),
+        EventKind::Fault(_) => Some(as_it_happens(kind)),
         EventKind::RunEnded { .. } | EventKind::RawDropped | EventKind::CommandDamaged => None,
+    }
+}
+
+/// One event of a camera that is being watched, as people read it.
+#[must_use]
+pub fn as_it_happens(kind: &EventKind) -> String {
+    match *kind {
+        EventKind::Fault(fault) => format!("the camera switched its LEDs off: {fault:?}"),
+        EventKind::RunEnded {
+            run,
+            frames_made,
+            frames_dropped,
+            fpga_frames_lost,
+            fpga_frames_corrupt,
+        } => {
+            let losses = [
+                (frames_dropped, "dropped for want of room on the link"),
+                (fpga_frames_lost, "lost in the FPGA"),
+                (fpga_frames_corrupt, "damaged between FPGA and firmware"),
+            ];
+            let told = losses.iter().filter(|(count, _)| *count > 0);
+            let told: String = told.map(|(count, how)| format!(", {count} {how}")).collect();
+            format!("run {run} has ended: {frames_made} frames made{told}")
+        }
+        EventKind::RawDropped => "a raw burst was dropped for want of room on the link".to_owned(),
+        EventKind::CommandDamaged => "a command came damaged to the camera".to_owned(),
     }
 }
 
@@ -22,6 +49,20 @@ pub fn crash(report: &CrashReport<'_>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_end_of_a_run_names_what_was_lost_and_nothing_else() {
+        let ended = |frames_dropped| EventKind::RunEnded {
+            run: 3,
+            frames_made: 12,
+            frames_dropped,
+            fpga_frames_lost: 0,
+            fpga_frames_corrupt: 0,
+        };
+        assert_eq!(as_it_happens(&ended(0)), "run 3 has ended: 12 frames made");
+        let told = as_it_happens(&ended(2));
+        assert_eq!(told, "run 3 has ended: 12 frames made, 2 dropped for want of room on the link");
+    }
 
     #[test]
     fn a_crash_is_told_in_one_line() {

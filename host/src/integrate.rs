@@ -4,6 +4,7 @@ use crate::calibrate::Settling;
 use crate::setup::MeasurementSetup;
 use nirspi_recon::{LeakError, MeasurementError, Measurements, Side, Sweep};
 use nirspi_wire::{Frame, FrameFlags};
+use std::collections::VecDeque;
 
 /// The sum of the frames of one run, in ADC counts.
 #[derive(Debug, Clone)]
@@ -18,8 +19,11 @@ impl Integrated {
     /// Nothing summed yet.
     #[must_use]
     pub fn new(setup: &MeasurementSetup) -> Self {
-        let sums = vec![0; setup.rows.len()];
-        Self { sums, frames: 0, sweeps: 0, flags: FrameFlags::default() }
+        Self::of_patterns(setup.rows.len())
+    }
+
+    fn of_patterns(patterns: usize) -> Self {
+        Self { sums: vec![0; patterns], frames: 0, sweeps: 0, flags: FrameFlags::default() }
     }
 
     /// Whether a frame has the setup's number of samples.
@@ -111,6 +115,45 @@ impl Integrated {
     }
 }
 
+/// The sum of the newest frames of a run, as a live view shows it: each frame adds itself and takes the oldest away.
+#[derive(Debug, Clone)]
+pub struct Newest {
+    frames: VecDeque<Integrated>,
+    total: Integrated,
+}
+
+impl Newest {
+    /// No frame yet.
+    #[must_use]
+    pub fn new(setup: &MeasurementSetup) -> Self {
+        Self { frames: VecDeque::new(), total: Integrated::new(setup) }
+    }
+
+    /// Adds a frame that [fits](Integrated::fits), and forgets all but the newest `most`, at least one.
+    pub fn push(&mut self, frame: &Frame<'_>, most: usize) {
+        while self.frames.len() >= most.max(1) {
+            let Some(oldest) = self.frames.pop_front() else { break };
+            for (total, sum) in self.total.sums.iter_mut().zip(&oldest.sums) {
+                *total -= sum;
+            }
+            self.total.frames -= oldest.frames;
+            self.total.sweeps -= oldest.sweeps;
+        }
+        let mut alone = Integrated::of_patterns(self.total.sums.len());
+        alone.add(frame);
+        self.total.add(frame);
+        self.frames.push_back(alone);
+    }
+
+    /// Their sum.
+    #[must_use]
+    pub fn sum(&self) -> Integrated {
+        // Flags cannot be taken away again one by one.
+        let flags = self.frames.iter().fold(FrameFlags::default(), |all, f| all.with(f.flags));
+        Integrated { flags, ..self.total.clone() }
+    }
+}
+
 /// Why a sum of frames gives no measurements.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum IntegrateError {
@@ -120,4 +163,43 @@ pub enum IntegrateError {
     /// The camera's response.
     #[error(transparent)]
     Leak(#[from] LeakError),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nirspi_recon::Order;
+    use nirspi_wire::samples::Samples;
+    use proptest::prelude::*;
+
+    /// Hands over a frame of these samples.
+    fn with_frame<T>(values: &[i64], flags: FrameFlags, take: impl FnOnce(&Frame<'_>) -> T) -> T {
+        let mut bytes = vec![0; 4 * values.len()];
+        let samples = Samples::pack(values.iter().copied(), &mut bytes).unwrap();
+        take(&Frame { run: 1, sequence: 0, device_time_us: 0, sweeps: 2, flags, samples })
+    }
+
+    proptest! {
+        #[test]
+        fn the_newest_frames_sum_to_what_they_sum_to_alone(
+            frames in prop::collection::vec((prop::collection::vec(-1000i64..1000, 4), any::<bool>(), 1usize..6), 1..40)
+        ) {
+            let setup = MeasurementSetup::new(&Order::Natural, 4.0 / 1024.0).unwrap();
+            let flag = |set: bool| if set { FrameFlags::OVER_RANGE } else { FrameFlags::default() };
+            let mut newest = Newest::new(&setup);
+            for (at, (values, over, most)) in frames.iter().enumerate() {
+                let before = newest.frames.len();
+                with_frame(values, flag(*over), |frame| newest.push(frame, *most));
+                let kept = (before + 1).min(*most);
+                let mut expected = Integrated::new(&setup);
+                for (values, over, _) in &frames[at + 1 - kept..=at] {
+                    with_frame(values, flag(*over), |frame| expected.add(frame));
+                }
+                let sum = newest.sum();
+                prop_assert_eq!(sum.frames(), kept as u64);
+                prop_assert_eq!(sum.means(&setup), expected.means(&setup));
+                prop_assert_eq!(sum.warnings(), expected.warnings());
+            }
+        }
+    }
 }

@@ -10,6 +10,7 @@
 //! * [`tally`] and [`integrate`] turn frames into measurements; `nirspi-recon` turns those into an image,
 //! * [`files`], [`picture`] and [`scene`] are what people see and hand over, [`resolution`] says how fine it is,
 //!   [`legibility`] whether somebody can read it,
+//! * [`serve`] shows a camera live on a web page, [`white`] gives its images a scale,
 //! * [`training`] makes pairs to train networks on, through the virtual camera,
 //! * [`udev`] lets users use cameras on USB; [`boards`] lists the boards that firmware is for; with the feature `flash`, `flash` programs them,
 //! * [`virtual_camera`] is a camera without silicon: optics simulator, gateware model, real firmware logic.
@@ -32,6 +33,7 @@ pub mod recording;
 pub mod resolution;
 pub mod scene;
 pub mod selftest;
+pub mod serve;
 pub mod session;
 pub mod setup;
 pub mod tally;
@@ -39,3 +41,4 @@ pub mod training;
 pub mod udev;
 pub mod versions;
 pub mod virtual_camera;
+pub mod white;

@@ -29,10 +29,10 @@ impl Tally {
         Self { run, account: LossAccount::new(), integrated, ended: false, device_time_us: 0 }
     }
 
-    /// A packet has come.
-    pub fn packet(&mut self, content: &Result<DeviceMessage<'_>, PacketError>) {
+    /// A packet has come. Returns whether it was a frame that was added to the sum.
+    pub fn packet(&mut self, content: &Result<DeviceMessage<'_>, PacketError>) -> bool {
         match content {
-            Ok(DeviceMessage::Frame(frame)) => self.frame(frame),
+            Ok(DeviceMessage::Frame(frame)) => return self.frame(frame),
             Ok(DeviceMessage::Event(event)) => match event.kind {
                 EventKind::RunEnded { run, frames_made, .. }
                     if self.run.is_none_or(|own| own == run) =>
@@ -44,19 +44,24 @@ impl Tally {
             Ok(_) => {}
             Err(_) => self.account.damaged(),
         }
+        false
     }
 
-    fn frame(&mut self, frame: &Frame<'_>) {
+    fn frame(&mut self, frame: &Frame<'_>) -> bool {
         if *self.run.get_or_insert(frame.run) != frame.run {
-            return;
+            return false;
         }
         self.device_time_us = self.device_time_us.max(frame.device_time_us);
         if !self.integrated.fits(frame) {
             // Intact, yet not of this setup: as lost as if it had been damaged.
             self.account.damaged();
-        } else if self.account.frame(frame.sequence) == Arrival::Received {
+            return false;
+        }
+        let received = self.account.frame(frame.sequence) == Arrival::Received;
+        if received {
             self.integrated.add(frame);
         }
+        received
     }
 
     /// The camera says that the run is over, and how many frames it has made.
@@ -129,11 +134,7 @@ pub fn frames_of_recording(
         scratch.clear();
         scratch.extend_from_slice(packet.strip_suffix(&[0]).unwrap_or(packet));
         let content = open(&mut scratch);
-        let before = tally.integrated.frames();
-        tally.packet(&content);
-        if let (true, Ok(DeviceMessage::Frame(frame))) =
-            (tally.integrated.frames() > before, &content)
-        {
+        if let (true, Ok(DeviceMessage::Frame(frame))) = (tally.packet(&content), &content) {
             let mut alone = Integrated::new(setup);
             alone.add(frame);
             frames.push(alone);

@@ -102,7 +102,7 @@ pub struct SetupArgs {
     /// or table:FILE (numbers, entry k the natural-order Hadamard row shown k-th)
     #[arg(long, value_name = "ORDER", default_value = "cake-cutting")]
     pub order: String,
-    /// Share of the 1024 patterns to show, the first of the order [default: demo 0.5, capture 1]
+    /// Share of the 1024 patterns to show, the first of the order [default: demo and serve 0.5, capture 1]
     #[arg(long, value_name = "0..1", allow_negative_numbers = true)]
     pub sampling: Option<f64>,
     /// Sweeps summed into one frame

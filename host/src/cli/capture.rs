@@ -1,15 +1,14 @@
 //! `nirspi capture`: record a camera, with every frame accounted for.
 
 use super::address::CameraAddress;
+use super::calibration::{CalibrationArgs, Choice, Origin};
 use super::camera::{SceneArgs, SetupArgs};
 use super::{Usage, print, serve_virtual::stop_on_signal};
 use anyhow::Result;
 use indicatif::{ProgressBar, ProgressStyle};
 use nirspi::account::LossCounters;
-use nirspi::capture::{Calibration, Capture, CaptureOptions, Ended, Progress, capture};
-use nirspi::kept_calibration::{KeptCalibration, path_of};
+use nirspi::capture::{Capture, CaptureOptions, Ended, Progress, capture};
 use nirspi::session::CameraIdentity;
-use nirspi::setup::MeasurementSetup;
 use serde::Serialize;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -37,18 +36,8 @@ pub struct Args {
     /// Replace the file if it is there
     #[arg(long)]
     overwrite: bool,
-    /// Measure ADC latency and settling first, whatever calibration is kept
-    #[arg(long)]
-    calibrate: bool,
-    /// Use this calibration, written by `nirspi selftest`, rather than the one kept for the camera
-    #[arg(long, value_name = "FILE", conflicts_with = "calibrate")]
-    calibration: Option<PathBuf>,
-    /// Use no calibration, and measure none
-    #[arg(long, conflicts_with_all = ["calibrate", "calibration"])]
-    no_calibration: bool,
-    /// ADC clocks from light to sample, where they are not measured
-    #[arg(long, value_name = "N", default_value_t = 0, requires = "no_calibration")]
-    adc_latency: u8,
+    #[command(flatten)]
+    calibration: CalibrationArgs,
     /// When it has ended, reconstruct the frames as one image, enlarge and deblur it, into this folder; the same as
     /// `reconstruct --enhance`
     #[arg(long, value_name = "DIR")]
@@ -87,73 +76,13 @@ struct Report<'r> {
     calibration_problem: Option<String>,
 }
 
-/// A kept calibration.
-#[derive(Debug, Clone, Serialize)]
-struct Origin {
-    measured: String,
-    file: PathBuf,
-}
-
-/// Where this capture's calibration comes from, and what is to be said about it.
-struct Choice {
-    calibration: Calibration,
-    origin: Option<Origin>,
-    note: Option<String>,
-}
-
-impl Choice {
-    fn plain(calibration: Calibration) -> Self {
-        Self { calibration, origin: None, note: None }
-    }
-
-    fn kept(kept: KeptCalibration, file: PathBuf) -> Self {
-        let origin = Some(Origin { measured: kept.measured().to_owned(), file });
-        Self { calibration: Calibration::Kept(kept.settling), origin, note: None }
-    }
-}
-
-fn choose_calibration(
-    args: &Args,
-    setup: &MeasurementSetup,
-    camera: &CameraIdentity,
-) -> Result<Choice> {
-    if args.no_calibration {
-        return Ok(Choice::plain(Calibration::None));
-    }
-    if let Some(file) = &args.calibration {
-        if !setup.differential {
-            return Err(Usage(
-                "--calibration with --non-differential: patterns without complements need the dark level of the \
-                 moment, use --calibrate"
-                    .to_owned(),
-            )
-            .into());
-        }
-        return Ok(Choice::kept(KeptCalibration::read(file, camera)?, file.clone()));
-    }
-    if args.calibrate || !setup.differential {
-        return Ok(Choice::plain(Calibration::Measure));
-    }
-    // No home, no calibration kept in it.
-    let Some(file) = path_of(&camera.serial).ok().filter(|file| file.exists()) else {
-        return Ok(Choice::plain(Calibration::Measure));
-    };
-    Ok(match KeptCalibration::read(&file, camera) {
-        Ok(kept) => Choice::kept(kept, file),
-        Err(problem) => {
-            let note = Some(format!("kept calibration not used, measured afresh: {problem}"));
-            Choice { note, ..Choice::plain(Calibration::Measure) }
-        }
-    })
-}
-
 pub fn run(args: &Args) -> Result<ExitCode> {
     let mut setup = args.setup.setup(1.0)?;
-    setup.adc_latency = args.adc_latency;
+    setup.adc_latency = args.calibration.adc_latency;
     let path = recording_path(args)?;
     let stop = stop_on_signal()?;
     let mut session = args.camera.open(&args.scene)?;
-    let choice = choose_calibration(args, &setup, session.identity())?;
+    let choice = args.calibration.choose(&setup, session.identity())?;
     let options = CaptureOptions {
         setup,
         frames: args.frames,

@@ -46,6 +46,18 @@ impl Method {
         }
     }
 
+    /// As it is written on the command line.
+    pub fn argument(self) -> &'static str {
+        match self {
+            Self::Hadamard => "hadamard",
+            Self::Omp => "omp",
+            Self::PseudoInverse => "pseudo-inverse",
+            Self::Tikhonov => "tikhonov",
+            Self::Fista => "fista",
+            Self::Tv => "tv",
+        }
+    }
+
     fn penalty(self) -> Option<Penalty> {
         match self {
             Self::Hadamard | Self::PseudoInverse | Self::Omp => None,
@@ -318,24 +330,55 @@ pub struct Solved {
 
 /// Makes the image.
 pub fn solve(args: &MethodArgs, measurements: &Measurements) -> Result<Solved> {
-    if let Some(penalty) = args.method.penalty() {
-        return penalised(args, penalty, measurements);
+    Solver::new(args, measurements.side().pixels())?.solve(measurements)
+}
+
+/// A method with all that it needs, for one measurement after another.
+pub struct Solver {
+    args: MethodArgs,
+    omp: Option<PreparedOmp>,
+}
+
+/// What OMP needs.
+struct PreparedOmp {
+    settings: OmpSettings,
+    /// The GPU, if one computes.
+    device: Option<String>,
+    /// Images of one's own, and where they are from.
+    atoms: Option<(Vec<f32>, PathBuf)>,
+}
+
+impl Solver {
+    /// Reads what there is to read, for images of this side.
+    pub fn new(args: &MethodArgs, side: usize) -> Result<Self> {
+        let mut omp = None;
+        if args.method == Method::Omp {
+            let (settings, device) = args.omp_settings()?;
+            let read = |path: &PathBuf| anyhow::Ok((read_atoms(path, side)?, path.clone()));
+            let atoms = args.dictionary.as_ref().map(read).transpose()?;
+            omp = Some(PreparedOmp { settings, device, atoms });
+        }
+        Ok(Self { args: args.clone(), omp })
     }
-    if args.method != Method::Omp {
+
+    /// Makes an image.
+    pub fn solve(&self, measurements: &Measurements) -> Result<Solved> {
+        let args = &self.args;
+        if let Some(PreparedOmp { settings, device, atoms }) = &self.omp {
+            let found = match atoms {
+                None => reconstruct::omp(measurements, settings)?,
+                Some((atoms, path)) => reconstruct::omp_over(measurements, atoms, settings)
+                    .with_context(|| path.display().to_string())?,
+            };
+            return Ok(args.solved(found, settings, device.clone()));
+        }
+        if let Some(penalty) = args.method.penalty() {
+            return penalised(args, penalty, measurements);
+        }
         let image = reconstruct::hadamard(measurements);
         let report = Report { method: args.method, omp: None, penalty: None };
-        return Ok(Solved { image, report });
+        Ok(Solved { image, report })
     }
-    let (settings, device) = args.omp_settings()?;
-    let found = match &args.dictionary {
-        None => reconstruct::omp(measurements, &settings)?,
-        Some(path) => {
-            let atoms = read_atoms(path, measurements.side().pixels())?;
-            reconstruct::omp_over(measurements, &atoms, &settings)
-                .with_context(|| path.display().to_string())?
-        }
-    };
-    Ok(args.solved(found, &settings, device))
 }
 
 fn penalised(args: &MethodArgs, penalty: Penalty, measurements: &Measurements) -> Result<Solved> {

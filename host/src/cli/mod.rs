@@ -5,6 +5,7 @@
 mod address;
 mod backend;
 mod bench;
+mod calibration;
 mod camera;
 mod capture;
 mod deblur;
@@ -25,6 +26,7 @@ mod range;
 mod reconstruct;
 mod report;
 mod selftest;
+mod serve;
 mod serve_virtual;
 mod setup;
 mod source;
@@ -52,6 +54,7 @@ enum Command {
     Demo(demo::Args),
     Reconstruct(reconstruct::Args),
     Capture(capture::Args),
+    Serve(serve::Args),
     Virtual(serve_virtual::Args),
     Devices(devices::Args),
     Info(info::Args),
@@ -93,6 +96,7 @@ pub fn run() -> ExitCode {
         Command::Demo(args) => demo::run(&args),
         Command::Reconstruct(args) => reconstruct::run(&args),
         Command::Capture(args) => capture::run(&args),
+        Command::Serve(args) => serve::run(args),
         Command::Virtual(args) => serve_virtual::run(&args),
         Command::Devices(args) => devices::run(&args),
         Command::Info(args) => info::run(&args),

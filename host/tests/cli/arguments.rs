@@ -3,10 +3,11 @@
 use crate::bench::{Bench, first_bytes};
 use std::process::{Command, Stdio};
 
-const COMMANDS: [&str; 18] = [
+const COMMANDS: [&str; 19] = [
     "demo",
     "reconstruct",
     "capture",
+    "serve",
     "virtual",
     "devices",
     "info",

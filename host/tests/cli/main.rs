@@ -19,6 +19,7 @@ mod reconstruct;
 mod selftest;
 #[cfg(unix)]
 mod serial;
+mod serve;
 mod sparse_problems;
 mod train;
 mod versions;

@@ -1,11 +1,9 @@
-//! `nirspi reconstruct --enhance`: the learned stages on an image whose scale nobody told.
-//!
-//! No light is 0; that much a differential measurement knows. White is taken to be the brightest 2 x 2 pixels: a
-//! single bright pixel may be noise, and a share of all pixels says nothing about a letter on a dark ground.
+//! `nirspi reconstruct --enhance`: the learned stages on an image whose scale nobody told, as [`nirspi::white`] finds it.
 
 use super::super::networks::Networks;
 use super::super::report::StageTimes;
 use anyhow::{Result, bail};
+use nirspi::white::brightest;
 use nirspi_nets::consistency::MeasuredRows;
 use nirspi_nets::{
     Backend, Enhanced, Enhancer, Images, Method, Options, Sharpener, deblur, fusion,
@@ -45,7 +43,7 @@ pub fn run(frames: &[(&Image, &[u32])], times: &mut StageTimes) -> Result<(Vec<f
     if side != fusion::SIDE && side != deblur::SIDE {
         bail!("--enhance is for images of 32 x 32 or 64 x 64 pixels, this one has {side} x {side}");
     }
-    let mut whites: Vec<f32> = frames.iter().map(|(f, _)| white(f.pixels(), side)).collect();
+    let mut whites: Vec<f32> = frames.iter().map(|(f, _)| brightest(f.pixels(), side)).collect();
     whites.sort_by(f32::total_cmp);
     let white = whites[whites.len() / 2];
     if white <= 0.0 {
@@ -89,12 +87,4 @@ impl Stages {
             Self::Second(second) => second.deblur(Images::new(image)?, &options, &mut |_| {}),
         })
     }
-}
-
-/// The largest mean of 2 x 2 neighbours.
-fn white(pixels: &[f32], side: usize) -> f32 {
-    let corners = (0..side - 1).flat_map(|y| (0..side - 1).map(move |x| y * side + x));
-    let means = corners
-        .map(|at| (pixels[at] + pixels[at + 1] + pixels[at + side] + pixels[at + side + 1]) / 4.0);
-    means.fold(0.0, f32::max)
 }

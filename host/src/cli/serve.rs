@@ -1,0 +1,145 @@
+//! `nirspi serve`: a camera, live, on a web page.
+
+use super::address::CameraAddress;
+use super::calibration::{CalibrationArgs, Choice};
+use super::camera::{SceneArgs, SetupArgs};
+use super::method::{Method, MethodArgs, Solver};
+use super::networks::Networks;
+use super::serve_virtual::stop_on_signal;
+use super::{one_line, print};
+use anyhow::{Context, Result};
+use nirspi::serve::settings::{MAX_FRAMES, Settings};
+use nirspi::serve::{CameraSource, Connect, Connected, Imaging, Reconstruct, serve};
+use nirspi::session::Session;
+use nirspi::setup::MeasurementSetup;
+use nirspi_nets::Enhancer;
+use nirspi_recon::Side;
+use nirspi_recon::omp::Backend;
+use std::net::{Ipv4Addr, SocketAddr, TcpListener};
+use std::num::NonZeroU32;
+use std::process::ExitCode;
+
+/// Half of the patterns: twice the frames, and OMP predicts the other half.
+const DEFAULT_SAMPLING: f64 = 0.5;
+
+/// Show a camera live on a web page: reconstructed, fused with depth and deblurred, with every frame accounted for
+///
+/// Prints the address to open. The page shows images, estimated blur and noise, rates, the account of all frames and the
+/// camera's events; it switches the method, the enhancement and how many frames are summed. A camera that goes away is looked
+/// for again; after a fault somebody has to say on the page that LEDs may go on. Only this machine can look, unless
+/// --listen says otherwise. Ctrl-C switches the LEDs off and ends it.
+///
+/// For scripts: GET /api/state (JSON: account, rates, versions, settings), /image.png (32 x 32), /enhanced.png (64 x 64) and
+/// /events (a stream of all of it); POST /api/settings takes {"method": "omp", "enhance": true, "frames": 64, "resume": true} or a
+/// part of it.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n\
+    \x20 nirspi serve\n\
+    \x20 nirspi serve --camera usb --sampling 0.3\n\
+    \x20 curl http://127.0.0.1:8080/api/state\n\
+    \x20 curl -d '{\"method\": \"hadamard\"}' http://127.0.0.1:8080/api/settings")]
+pub struct Args {
+    /// Which camera: virtual, usb, usb:SERIAL, tcp:HOST:PORT or serial:PATH[:BAUD]
+    #[arg(long, value_name = "CAMERA", default_value = "virtual")]
+    camera: CameraAddress,
+    /// Where to listen: IP:PORT; port 0 takes a free one
+    #[arg(long, value_name = "ADDR", default_value = "127.0.0.1:8080")]
+    listen: SocketAddr,
+    /// Newest frames that are summed into each image
+    #[arg(long, value_name = "N", default_value_t = 64,
+          value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_FRAMES)))]
+    frames: u32,
+    #[command(flatten)]
+    calibration: CalibrationArgs,
+    #[command(flatten)]
+    setup: SetupArgs,
+    #[command(flatten)]
+    method: MethodArgs,
+    #[command(flatten)]
+    scene: SceneArgs,
+}
+
+pub fn run(args: Args) -> Result<ExitCode> {
+    args.method.check()?;
+    let mut setup = args.setup.setup(DEFAULT_SAMPLING)?;
+    setup.adc_latency = args.calibration.adc_latency;
+    let listener = TcpListener::bind(args.listen)
+        .with_context(|| format!("--listen {}: cannot listen there", args.listen))?;
+    let address = listener.local_addr()?;
+    let methods = methods(&args.method)?;
+    let imaging = Imaging { methods, enhancer: enhancer(args.method.backend)? };
+    let settings =
+        Settings { method: args.method.method.argument(), enhance: true, frames: args.frames };
+    let stop = stop_on_signal()?;
+    let session = args.camera.open(&args.scene)?;
+    let connected = prepared(session, &args.calibration, &setup)?;
+
+    let machine = match address {
+        SocketAddr::V4(v4) if v4.ip().is_unspecified() => {
+            SocketAddr::from((Ipv4Addr::LOCALHOST, v4.port()))
+        }
+        other => other,
+    };
+    print::line(format_args!(
+        "open http://{machine} to see camera {}; Ctrl-C ends it",
+        args.camera
+    ))?;
+    if !address.ip().is_loopback() {
+        print::line("everybody in the network can look at it and switch it")?;
+    }
+    let camera = CameraSource {
+        address: args.camera.to_string(),
+        setup: setup.clone(),
+        connect: connect(args, setup),
+    };
+    let ledger = serve(listener, camera, connected, imaging, settings, &stop)?;
+    let shown = ledger.images.shown;
+    print::line(format_args!("stopped: {}; {shown} shown", ledger.frames))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The method asked for, and beside it those that a page can always switch to.
+fn methods(args: &MethodArgs) -> Result<Vec<(&'static str, Reconstruct)>> {
+    let mut all = vec![Method::Hadamard, Method::Omp];
+    if !all.contains(&args.method) {
+        all.push(args.method);
+    }
+    let ready = |method| {
+        let solver =
+            Solver::new(&MethodArgs { method, ..args.clone() }, Side::INSTRUMENT.pixels())?;
+        let solve: Reconstruct = Box::new(move |measurements| {
+            solver.solve(measurements).map(|solved| solved.image).map_err(|e| one_line(&e))
+        });
+        Ok((method.argument(), solve))
+    };
+    all.into_iter().map(ready).collect()
+}
+
+/// The learned stages, where OMP runs; one image at a time is no work for a GPU that nobody asked for.
+fn enhancer(backend: Backend) -> Result<Enhancer> {
+    let backend = if backend == Backend::Auto { Backend::Cpu } else { backend };
+    let mut networks = Networks::built_in(backend)?;
+    let sharpener =
+        networks.sharpener(nirspi_nets::Method::Diffusion { steps: NonZeroU32::MIN })?;
+    Ok(Enhancer::new(networks.fusion()?, sharpener))
+}
+
+/// A camera with its calibration.
+fn prepared(
+    session: Session,
+    args: &CalibrationArgs,
+    setup: &MeasurementSetup,
+) -> Result<Connected> {
+    let Choice { calibration, note, .. } = args.choose(setup, session.identity())?;
+    Ok(Connected { session, calibration, note })
+}
+
+/// How to find the camera again.
+fn connect(args: Args, setup: MeasurementSetup) -> Connect {
+    let found = move || {
+        let mut session = args.camera.open_quietly(&args.scene)?;
+        session.await_reports()?;
+        prepared(session, &args.calibration, &setup)
+    };
+    Box::new(move || found().map_err(|error| one_line(&error)))
+}

@@ -1,0 +1,129 @@
+//! Who may ask: pages that this server served, and programs on machines that reach it.
+//!
+//! A browser carries requests of any page to this address: another site's page may post to it, and with a name of its own that
+//! resolves to this machine (DNS rebinding) it may even read. Both show in the headers, which no page can forge.
+//!
+//! The one law: what is refused is refused before anything else is looked at.
+
+use axum::http::uri::Authority;
+use axum::http::{HeaderMap, HeaderName, header};
+use std::net::{IpAddr, SocketAddr};
+use thiserror::Error;
+
+/// Why a request is refused.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+pub enum Refused {
+    /// The address asked for is not this server's.
+    #[error(
+        "this server does not go by that name: open it by its IP address, or as localhost on its own machine"
+    )]
+    Host,
+    /// Another site's page asks.
+    #[error("a page of another site asked: open this server's own")]
+    Origin,
+}
+
+/// Lets a request pass, or says why not. `listen` is where this server listens.
+///
+/// The port in `Host` is not looked at: it is another where somebody forwards ours (ssh -L), and never a foreign page's to choose.
+///
+/// # Errors
+/// [`Refused`].
+pub fn check(headers: &HeaderMap, listen: SocketAddr) -> Result<(), Refused> {
+    let host = only(headers, &header::HOST).ok_or(Refused::Host)?;
+    let authority: Authority = host.parse().map_err(|_| Refused::Host)?;
+    if !is_ours(authority.host(), listen) {
+        return Err(Refused::Host);
+    }
+    if headers.contains_key(header::ORIGIN) {
+        let origin = only(headers, &header::ORIGIN).and_then(|o| o.strip_prefix("http://"));
+        if !origin.is_some_and(|origin| origin.eq_ignore_ascii_case(host)) {
+            return Err(Refused::Origin);
+        }
+    }
+    // Pictures that other pages show come without Origin. Following a link is nobody's harm.
+    let told = |name| headers.get(HeaderName::from_static(name)).map(|value| value.as_bytes());
+    let foreign = matches!(told("sec-fetch-site"), Some(b"cross-site" | b"same-site"));
+    if foreign && told("sec-fetch-mode") != Some(b"navigate") {
+        return Err(Refused::Origin);
+    }
+    Ok(())
+}
+
+/// The value of a header that is there once.
+fn only<'h>(headers: &'h HeaderMap, name: &HeaderName) -> Option<&'h str> {
+    let mut all = headers.get_all(name).iter();
+    let first = all.next()?;
+    if all.next().is_some() { None } else { first.to_str().ok() }
+}
+
+/// Whether an address could be ours. No name but localhost is: names are what rebinding needs.
+fn is_ours(host: &str, listen: SocketAddr) -> bool {
+    if host.eq_ignore_ascii_case("localhost") {
+        return true;
+    }
+    let ip = host.trim_start_matches('[').trim_end_matches(']').parse::<IpAddr>();
+    ip.is_ok_and(|ip| ip.is_loopback() || listen.ip().is_unspecified() || ip == listen.ip())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn asked(listen: &str, headers: &[(&'static str, &'static str)]) -> Result<(), Refused> {
+        let mut map = HeaderMap::new();
+        for &(name, value) in headers {
+            map.append(HeaderName::from_static(name), value.parse().unwrap());
+        }
+        check(&map, listen.parse().unwrap())
+    }
+
+    #[test]
+    fn our_own_pages_and_scripts_pass() {
+        for host in
+            ["127.0.0.1:8080", "localhost:8080", "LOCALHOST", "[::1]:8080", "localhost:9000"]
+        {
+            assert_eq!(asked("127.0.0.1:8080", &[("host", host)]), Ok(()), "{host}");
+        }
+        for (host, origin) in [
+            ("127.0.0.1:8080", "http://127.0.0.1:8080"),
+            ("localhost:9000", "http://localhost:9000"),
+        ] {
+            let headers = [("host", host), ("origin", origin), ("sec-fetch-site", "same-origin")];
+            assert_eq!(asked("127.0.0.1:8080", &headers), Ok(()), "{host}");
+        }
+        assert_eq!(asked("0.0.0.0:80", &[("host", "192.168.1.7")]), Ok(()));
+        assert_eq!(asked("192.168.1.7:80", &[("host", "192.168.1.7")]), Ok(()));
+        let link = [("sec-fetch-site", "cross-site"), ("sec-fetch-mode", "navigate")];
+        assert_eq!(asked("[::1]:80", &[&[("host", "localhost")], &link[..]].concat()), Ok(()));
+    }
+
+    #[test]
+    fn foreign_names_are_refused() {
+        for host in
+            ["evil.example:8080", "evil.example", "localhost.evil.example", "192.168.1.7", "", "@"]
+        {
+            assert_eq!(asked("127.0.0.1:8080", &[("host", host)]), Err(Refused::Host), "{host}");
+        }
+        assert_eq!(asked("127.0.0.1:80", &[]), Err(Refused::Host));
+        let twice = [("host", "localhost"), ("host", "localhost")];
+        assert_eq!(asked("127.0.0.1:80", &twice), Err(Refused::Host));
+        assert_eq!(asked("0.0.0.0:80", &[("host", "lab.example")]), Err(Refused::Host));
+        assert_eq!(asked("10.0.0.1:80", &[("host", "10.0.0.2")]), Err(Refused::Host));
+    }
+
+    #[test]
+    fn foreign_pages_are_refused() {
+        let host = ("host", "127.0.0.1:8080");
+        for origin in
+            ["http://evil.example", "null", "https://127.0.0.1:8080", "http://127.0.0.1:3000", ""]
+        {
+            let asked = asked("127.0.0.1:8080", &[host, ("origin", origin)]);
+            assert_eq!(asked, Err(Refused::Origin), "{origin}");
+        }
+        for site in ["cross-site", "same-site"] {
+            let picture = [host, ("sec-fetch-site", site), ("sec-fetch-mode", "no-cors")];
+            assert_eq!(asked("127.0.0.1:8080", &picture), Err(Refused::Origin), "{site}");
+        }
+    }
+}

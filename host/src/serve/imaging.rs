@@ -1,0 +1,184 @@
+//! Frames -> images: takes the newest look, reconstructs it, enhances it, and publishes the moment.
+//!
+//! The one law: it works on the newest frames there are and never makes the camera's thread wait.
+
+use super::settings::Settings;
+use super::slot::Look;
+use super::state::{Moment, Offered, Published, Rate, Rates};
+use super::{Shared, lock};
+use crate::white::{SteadyWhite, brightest};
+use nirspi_nets::consistency::MeasuredRows;
+use nirspi_nets::{Enhancer, Images, Options, fusion};
+use nirspi_recon::{Image, Measurements, Side};
+use serde::Serialize;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use tokio::sync::watch;
+
+/// Least time from image to image: more than this no screen shows.
+const PACE: Duration = Duration::from_millis(33);
+/// How often pages hear of a camera that sends nothing.
+const HEARTBEAT: Duration = Duration::from_millis(500);
+
+/// Makes an image in the measurements' units, or says in one line why not.
+pub type Reconstruct = Box<dyn Fn(&Measurements) -> Result<Image, String> + Send>;
+
+/// All that makes images.
+pub struct Imaging {
+    /// Methods of reconstruction by name; the settings name one of them.
+    pub methods: Vec<(&'static str, Reconstruct)>,
+    /// Fusion and deblurring.
+    pub enhancer: Enhancer,
+}
+
+/// The images of one moment, and what is known of them.
+#[derive(Debug, Serialize)]
+pub struct Picture {
+    /// (32, 32) in [0, 1], 1 being white.
+    #[serde(skip)]
+    pub image: Vec<f32>,
+    /// (64, 64) in [0, 1].
+    #[serde(skip)]
+    pub enhanced: Option<Vec<f32>>,
+    method: &'static str,
+    /// Frames summed.
+    frames: u64,
+    /// ADC counts of one pixel that were taken for white.
+    white_counts: f32,
+    reconstruct_ms: f64,
+    /// `null` where it is switched off.
+    enhancement: Option<Enhancement>,
+    /// What the frames' flags say against them.
+    warnings: Vec<&'static str>,
+}
+
+/// What the learned stages found.
+#[derive(Debug, Clone, Copy, Serialize)]
+struct Enhancement {
+    /// Blur in pixels of the 64 x 64 grid, as estimated.
+    blur_px: f32,
+    /// Noise of a pixel, white being 1, as estimated.
+    noise: f32,
+    /// Distance of the image from that of the result, over its noise: near 1 or below, the readings bear it out.
+    inconsistency: f32,
+    /// Whether a depth map was there to be fused.
+    depth: bool,
+    enhance_ms: f64,
+}
+
+/// Makes images and publishes them until told to stop.
+pub fn run(shared: &Shared, imaging: &Imaging, publish: &watch::Sender<Arc<Published>>) {
+    let mut white = SteadyWhite::default();
+    let (mut picture, mut problem) = (None, None);
+    let started = Instant::now();
+    let (mut frames, mut images) = (Rate::new(started), Rate::new(started));
+    while !shared.is_over() {
+        let turn = Instant::now();
+        if let Some(look) = shared.slot.take(HEARTBEAT) {
+            let settings = *lock(&shared.settings);
+            match imaging.picture(&look, settings, &mut white) {
+                Ok(made) => (picture, problem) = (Some(Arc::new(made)), None),
+                Err(why) => problem = Some(why),
+            }
+            shared.slot.done(problem.is_none());
+        }
+        let now = Instant::now();
+        let ledger = shared.slot.ledger();
+        let rates = Rates {
+            camera_frames_per_s: frames.at(now, ledger.frames.received),
+            images_per_s: images.at(now, ledger.images.shown),
+        };
+        let published = Published::new(&Moment {
+            log: &lock(&shared.camera),
+            ledger,
+            rates,
+            settings: *lock(&shared.settings),
+            offered: Offered::new(&shared.methods),
+            picture: picture.as_ref(),
+            problem: problem.as_deref(),
+            viewers: shared.viewers(),
+        });
+        if let Ok(published) = published {
+            publish.send_replace(Arc::new(published));
+        }
+        std::thread::sleep(PACE.saturating_sub(turn.elapsed()));
+    }
+}
+
+impl Imaging {
+    /// The images of one look.
+    fn picture(
+        &self,
+        look: &Look,
+        settings: Settings,
+        white: &mut SteadyWhite,
+    ) -> Result<Picture, String> {
+        let started = Instant::now();
+        let (_, reconstruct) = self
+            .methods
+            .iter()
+            .find(|(name, _)| *name == settings.method)
+            .ok_or_else(|| format!("no method {}", settings.method))?;
+        let measurements = look
+            .sum
+            .measurements(&look.run.setup, look.run.settling.as_ref(), false)
+            .map_err(|error| error.to_string())?;
+        let image = reconstruct(&measurements)?;
+        let reconstruct_ms = ms_since(started);
+        let side = image.side().pixels();
+        if side != Side::INSTRUMENT.pixels() || image.pixels().iter().any(|p| !p.is_finite()) {
+            return Err("the frames gave no image of finite numbers".to_owned());
+        }
+        let white_counts = white.follow(brightest(image.pixels(), side));
+        let scale = if white_counts > 0.0 { 1.0 / white_counts } else { 0.0 };
+        let image: Vec<f32> = image.pixels().iter().map(|v| (v * scale).clamp(0.0, 1.0)).collect();
+        let (mut enhanced, mut enhancement) = (None, None);
+        if settings.enhance {
+            let (pixels, found) = self.enhance(&image, look, measurements.rows())?;
+            (enhanced, enhancement) = (Some(pixels), Some(found));
+        }
+        Ok(Picture {
+            image,
+            enhanced,
+            method: settings.method,
+            frames: look.sum.frames(),
+            white_counts,
+            reconstruct_ms,
+            enhancement,
+            warnings: look.sum.warnings(),
+        })
+    }
+
+    /// Both learned stages.
+    fn enhance(
+        &self,
+        image: &[f32],
+        look: &Look,
+        rows: &[u32],
+    ) -> Result<(Vec<f32>, Enhancement), String> {
+        let started = Instant::now();
+        let images: Images<'_, { fusion::SIDE }> =
+            Images::new(image).map_err(|error| error.to_string())?;
+        let measured = MeasuredRows::new(fusion::SIDE, rows);
+        let options = Options { measured, ..Options::default() };
+        let depth = look.depth.as_deref();
+        let result = self.enhancer.enhance(images, depth, &options, &mut |_| {});
+        let (Some(estimate), Some(&inconsistency)) =
+            (result.estimates.first(), result.inconsistency.first())
+        else {
+            return Err("the networks gave no image".to_owned());
+        };
+        let found = Enhancement {
+            blur_px: estimate.sigma_px,
+            noise: estimate.noise,
+            inconsistency,
+            depth: depth.is_some(),
+            enhance_ms: ms_since(started),
+        };
+        Ok((result.images, found))
+    }
+}
+
+fn ms_since(started: Instant) -> f64 {
+    started.elapsed().as_secs_f64() * 1e3
+}

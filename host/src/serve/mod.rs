@@ -1,0 +1,135 @@
+//! The live web page of a camera.
+//!
+//! ```text
+//! camera's thread ──> slot ──> imaging thread ──> watch channel ──> browser, browser, ...
+//!  every frame      newest      newest image       newest moment      at its own pace
+//! ```
+//!
+//! Data flows one way, and each arrow keeps the newest and counts what it passes over, so nobody waits for anybody behind
+//! him: not the camera for networks, not networks for a browser, not one browser for another. What pages wish comes
+//! the other way as one small message ([`settings::Change`]). Two threads compute; all of HTTP is one more, asynchronous.
+
+mod camera;
+mod camera_log;
+mod guard;
+mod http;
+mod imaging;
+pub mod settings;
+mod slot;
+mod state;
+
+pub use camera::{CameraSource, Connect, Connected};
+pub use imaging::{Imaging, Reconstruct};
+pub use slot::{ImageCounters, Ledger};
+
+use camera_log::CameraLog;
+use settings::Settings;
+use slot::Slot;
+use state::Published;
+use std::io;
+use std::net::TcpListener;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use thiserror::Error;
+use tokio::sync::watch;
+
+/// Why serving ended otherwise than by its user.
+#[derive(Debug, Error)]
+pub enum ServeError {
+    /// The camera would not measure.
+    #[error("{0}")]
+    Camera(String),
+    /// The network failed.
+    #[error("the web server failed: {0}")]
+    Network(#[from] io::Error),
+    /// A thread died of a defect of this program.
+    #[error("the {0} thread died")]
+    Thread(&'static str),
+}
+
+/// What the threads have in common.
+struct Shared {
+    slot: Slot,
+    camera: Mutex<CameraLog>,
+    settings: Mutex<Settings>,
+    /// Methods that the settings can name.
+    methods: Vec<&'static str>,
+    /// A person says that LEDs may go on again.
+    resume: AtomicBool,
+    over: AtomicBool,
+    viewers: AtomicUsize,
+}
+
+impl Shared {
+    fn new(camera: CameraLog, methods: Vec<&'static str>, settings: Settings) -> Self {
+        Self {
+            slot: Slot::default(),
+            camera: Mutex::new(camera),
+            settings: Mutex::new(settings),
+            methods,
+            resume: AtomicBool::new(false),
+            over: AtomicBool::new(false),
+            viewers: AtomicUsize::new(0),
+        }
+    }
+
+    fn is_over(&self) -> bool {
+        self.over.load(Ordering::Relaxed)
+    }
+
+    fn viewers(&self) -> usize {
+        self.viewers.load(Ordering::Relaxed)
+    }
+}
+
+/// What is behind a lock. A thread that died holding it leaves counters and settings, which are whole at any moment.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Serves `camera` to whoever opens `listener`'s address, until `stop` is set. Returns what became of all frames.
+///
+/// # Errors
+/// [`ServeError`], after the camera was stopped.
+pub fn serve(
+    listener: TcpListener,
+    camera: CameraSource,
+    connected: Connected,
+    imaging: Imaging,
+    settings: Settings,
+    stop: &AtomicBool,
+) -> Result<Ledger, ServeError> {
+    let log = CameraLog::new(&camera.address, connected.session.identity());
+    let methods = imaging.methods.iter().map(|(name, _)| *name).collect();
+    let shared = Arc::new(Shared::new(log, methods, settings));
+    let (publish, published) = watch::channel(Arc::new(Published::default()));
+    let measuring = {
+        let shared = Arc::clone(&shared);
+        spawn("camera", move || camera::run(&shared, camera, connected))?
+    };
+    let making = {
+        let shared = Arc::clone(&shared);
+        spawn("imaging", move || imaging::run(&shared, &imaging, &publish))?
+    };
+    let is_over =
+        || stop.load(Ordering::Relaxed) || measuring.is_finished() || making.is_finished();
+    let served = http::run(listener, Arc::clone(&shared), published, is_over);
+    shared.over.store(true, Ordering::Relaxed);
+    // The camera is stopped whatever else has happened.
+    let measured = measuring.join().map_err(|_| ServeError::Thread("camera"))?;
+    making.join().map_err(|_| ServeError::Thread("imaging"))?;
+    measured.map_err(ServeError::Camera)?;
+    served?;
+    Ok(shared.slot.ledger())
+}
+
+fn spawn<T: Send + 'static>(
+    name: &str,
+    work: impl FnOnce() -> T + Send + 'static,
+) -> io::Result<JoinHandle<T>> {
+    std::thread::Builder::new().name(name.to_owned()).spawn(work)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,134 @@
+//! What a page may change while the camera runs, and the one message that says so.
+//!
+//! The one law: a change is taken whole or refused whole, with one line that says why.
+
+use serde::{Deserialize, Serialize};
+use std::fmt;
+use thiserror::Error;
+
+/// Most frames that one image can be the sum of.
+pub const MAX_FRAMES: u32 = 1024;
+
+/// How images are made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Settings {
+    /// Name of the method of reconstruction.
+    pub method: &'static str,
+    /// Whether the learned stages run.
+    pub enhance: bool,
+    /// Newest frames that are summed into one image.
+    pub frames: u32,
+}
+
+/// A page's wish. What is left out stays as it is.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Change {
+    /// Another method.
+    pub method: Option<String>,
+    /// The learned stages on or off.
+    pub enhance: Option<bool>,
+    /// Another number of frames.
+    pub frames: Option<u32>,
+    /// Measure again after a fault: LEDs go on.
+    #[serde(default)]
+    pub resume: bool,
+}
+
+/// A wish that cannot be granted.
+#[derive(Debug, Error, PartialEq, Eq)]
+pub enum ChangeError {
+    /// No such method.
+    #[error("method is {found:?}, expected {}", .offered.join(" or "))]
+    Method {
+        /// What was asked for.
+        found: String,
+        /// What there is.
+        offered: Vec<&'static str>,
+    },
+    /// No frame, or too many.
+    #[error("frames is {found}, expected 1 to {MAX_FRAMES}")]
+    Frames {
+        /// What was asked for.
+        found: u32,
+    },
+    /// No such message.
+    #[error("{0}, expected for example {{\"method\": \"omp\", \"enhance\": true, \"frames\": 64}}")]
+    Form(String),
+}
+
+impl Change {
+    /// Reads a message.
+    ///
+    /// # Errors
+    /// [`ChangeError::Form`] where it is no JSON of this form.
+    pub fn parse(json: &[u8]) -> Result<Self, ChangeError> {
+        serde_json::from_slice(json).map_err(|error| ChangeError::Form(error.to_string()))
+    }
+}
+
+impl Settings {
+    /// The settings with this change, of the methods `offered`.
+    ///
+    /// # Errors
+    /// [`ChangeError`] that names the field.
+    pub fn with(self, change: &Change, offered: &[&'static str]) -> Result<Self, ChangeError> {
+        let method = match &change.method {
+            None => self.method,
+            Some(found) => {
+                offered.iter().find(|name| *name == found).copied().ok_or_else(|| {
+                    ChangeError::Method { found: found.clone(), offered: offered.to_vec() }
+                })?
+            }
+        };
+        let frames = change.frames.unwrap_or(self.frames);
+        if !(1..=MAX_FRAMES).contains(&frames) {
+            return Err(ChangeError::Frames { found: frames });
+        }
+        Ok(Self { method, enhance: change.enhance.unwrap_or(self.enhance), frames })
+    }
+}
+
+impl fmt::Display for Settings {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { method, enhance, frames } = self;
+        let enhanced = if *enhance { "enhanced" } else { "not enhanced" };
+        write!(f, "{method}, {frames} frames an image, {enhanced}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const OFFERED: [&str; 2] = ["hadamard", "omp"];
+    const SETTINGS: Settings = Settings { method: "omp", enhance: true, frames: 64 };
+
+    fn asked(json: &str) -> Result<Settings, ChangeError> {
+        SETTINGS.with(&Change::parse(json.as_bytes())?, &OFFERED)
+    }
+
+    #[test]
+    fn what_is_left_out_stays() {
+        assert_eq!(asked("{}"), Ok(SETTINGS));
+        assert_eq!(asked(r#"{"enhance": false}"#), Ok(Settings { enhance: false, ..SETTINGS }));
+        let all = asked(r#"{"method": "hadamard", "frames": 1024, "resume": true}"#);
+        assert_eq!(all, Ok(Settings { method: "hadamard", frames: 1024, ..SETTINGS }));
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused_in_one_line_that_names_it() {
+        for (json, words) in [
+            (r#"{"method": "magic"}"#, "method is \"magic\", expected hadamard or omp"),
+            (r#"{"frames": 0}"#, "frames is 0, expected 1 to 1024"),
+            (r#"{"frames": 1025}"#, "frames is 1025"),
+            (r#"{"frames": -1}"#, "-1"),
+            (r#"{"laser": true}"#, "laser"),
+            ("[1", "expected for example"),
+            ("", "expected for example"),
+        ] {
+            let line = asked(json).unwrap_err().to_string();
+            assert!(line.contains(words) && line.lines().count() == 1, "{json}: {line}");
+        }
+    }
+}
