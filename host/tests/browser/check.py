@@ -1,0 +1,141 @@
+#!/usr/bin/env python3
+"""The page of `nirspi serve` in a real browser: every switch, the saved picture, a phone's screen, a fault, the end.
+
+    python3 check.py target/release/nirspi [--screenshot docs/serve.png]
+
+Needs playwright (PyPI) and chromium (Debian). Says what is wrong and exits 1, or prints what it saw.
+"""
+
+import argparse
+import json
+import signal
+import struct
+import subprocess
+
+from playwright.sync_api import expect, sync_playwright
+
+# No wait takes longer, on a busy machine either.
+LIMIT_MS = 40_000
+
+# Grey levels of a canvas, left to right and top to bottom.
+LEVELS = """canvas => {
+  const pixels = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
+  return Array.from({ length: pixels.length / 4 }, (_, at) => pixels[4 * at]);
+}"""
+
+
+def levels(page, name):
+    return page.locator(f"#{name}").evaluate(LEVELS)
+
+
+def seen(page, name, side):
+    """Waits for an image of light and dark."""
+    page.wait_for_function(
+        f"() => {{ const levels = ({LEVELS})(document.getElementById('{name}'));"
+        f" return levels.length === {side * side} && Math.max(...levels) > 200 && Math.min(...levels) < 30; }}"
+    )
+
+
+def fits(page):
+    """Nothing sticks out of the screen sideways."""
+    width, screen = page.evaluate("[document.documentElement.scrollWidth, window.innerWidth]")
+    assert width <= screen, f"{width} px of page on {screen} px of screen"
+
+
+def live(page, address, screenshot):
+    page.goto(address)
+    seen(page, "image", 32)
+    seen(page, "enhanced", 64)
+    expect(page.locator("#simulated")).to_be_visible()
+    expect(page.locator("#line")).to_have_text("measuring")
+    before = levels(page, "image")
+    page.wait_for_function(f"before => String(({LEVELS})(document.getElementById('image'))) !== before",
+                           arg=",".join(map(str, before)))
+    account = page.locator("#account")
+    for name in ["received", "lost", "corrupt", "late", "shown"]:
+        expect(account).to_contain_text(name)
+    expect(page.locator("#rates dd").nth(2)).not_to_have_text("0.0")
+    expect(page.locator("#estimates")).to_contain_text("of 64 px")
+    fits(page)
+    if screenshot:
+        page.screenshot(path=screenshot)
+
+
+def switches(page):
+    page.get_by_label("hadamard").check()
+    expect(page.locator("#about-image")).to_contain_text("hadamard, 64 frames")
+    page.locator("#frames").fill("3")
+    expect(page.locator("#about-image")).to_contain_text("hadamard, 8 frames")
+    with page.expect_download() as saved:
+        page.locator("#save").click()
+    png = open(saved.value.path(), "rb").read()
+    assert struct.unpack(">II", png[16:24]) == (1072, 612), "size of the saved picture"
+    page.get_by_label("enhance", exact=True).uncheck()
+    expect(page.locator("#no-enhanced")).to_have_text("switched off")
+    expect(page.locator("#no-enhanced")).to_be_visible()
+
+
+def fault(browser, address):
+    """A camera that has switched its LEDs off, told to a page by hand."""
+    page = browser.new_page()
+    state = json.loads(page.request.get(f"{address}/api/state").body())
+    state["camera"] |= {"phase": "fault", "line": "the camera switched its LEDs off: Interlock"}
+    state["frames"]["lost"] = 7
+    state["events"] = [{"unix_ms": 0, "text": "<b>not markup</b>"}]
+    message = json.dumps({"state": state, "image": None, "enhanced": None})
+    page.route("**/events", lambda route: route.fulfill(
+        content_type="text/event-stream", body=f"retry: 100000\ndata: {message}\n\n"))
+    wishes = []
+    page.route("**/api/settings", lambda route: (wishes.append(route.request.post_data_json), route.fulfill(json={})))
+    page.goto(address)
+    expect(page.locator("#account .loss")).to_have_text("7")
+    expect(page.locator("#losses")).to_contain_text("7 lost, 0 corrupt")
+    expect(page.locator("#events")).to_contain_text("<b>not markup</b>")
+    page.locator("#resume").click()
+    page.wait_for_timeout(100)
+    assert wishes == [{"resume": True}], wishes
+    page.close()
+
+
+def phone(browser, address):
+    page = browser.new_page(viewport={"width": 360, "height": 740}, color_scheme="dark")
+    page.goto(address)
+    seen(page, "image", 32)
+    fits(page)
+    page.close()
+
+
+def main():
+    arguments = argparse.ArgumentParser()
+    arguments.add_argument("nirspi")
+    arguments.add_argument("--screenshot")
+    arguments = arguments.parse_args()
+    server = subprocess.Popen([arguments.nirspi, "serve", "--listen", "127.0.0.1:0"],
+                              stdout=subprocess.PIPE, text=True)
+    try:
+        address = next(word for word in server.stdout.readline().split() if word.startswith("http://"))
+        with sync_playwright() as playwright:
+            browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=["--no-sandbox"])
+            page = browser.new_page(viewport={"width": 1200, "height": 1130})
+            page.set_default_timeout(LIMIT_MS)
+            expect.set_options(timeout=LIMIT_MS)
+            complaints = []
+            page.on("pageerror", lambda error: complaints.append(str(error)))
+            page.on("console", lambda said: complaints.append(said.text) if said.type == "error" else None)
+            live(page, address, arguments.screenshot)
+            switches(page)
+            assert not complaints, complaints
+            fault(browser, address)
+            phone(browser, address)
+            server.send_signal(signal.SIGINT)
+            expect(page.locator("#line")).to_contain_text("does not answer")
+            browser.close()
+        said = server.stdout.read()
+        assert server.wait(10) == 0 and said.startswith("stopped: "), said
+        print(f"the page works in a browser; {said.strip()}")
+    finally:
+        server.kill()
+
+
+if __name__ == "__main__":
+    main()
