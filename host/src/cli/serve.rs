@@ -15,7 +15,7 @@ use nirspi::setup::MeasurementSetup;
 use nirspi_nets::Enhancer;
 use nirspi_recon::Side;
 use nirspi_recon::omp::Backend;
-use std::net::{Ipv4Addr, SocketAddr, TcpListener};
+use std::net::TcpListener;
 use std::num::NonZeroU32;
 use std::process::ExitCode;
 
@@ -31,7 +31,7 @@ const DEFAULT_SAMPLING: f64 = 0.5;
 ///
 /// For scripts: GET /api/state (JSON: account, rates, versions, settings), /image.png (32 x 32), /enhanced.png (64 x 64) and
 /// /events (a stream of all of it); POST /api/settings takes {"method": "omp", "enhance": true, "frames": 64, "resume": true} or a
-/// part of it.
+/// part of it. --backend holds for the networks too.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi serve\n\
@@ -42,9 +42,9 @@ pub struct Args {
     /// Which camera: virtual, usb, usb:SERIAL, tcp:HOST:PORT or serial:PATH[:BAUD]
     #[arg(long, value_name = "CAMERA", default_value = "virtual")]
     camera: CameraAddress,
-    /// Where to listen: IP:PORT; port 0 takes a free one
+    /// Where to listen; port 0 takes a free one
     #[arg(long, value_name = "ADDR", default_value = "127.0.0.1:8080")]
-    listen: SocketAddr,
+    listen: String,
     /// Newest frames that are summed into each image
     #[arg(long, value_name = "N", default_value_t = 64,
           value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_FRAMES)))]
@@ -63,7 +63,7 @@ pub fn run(args: Args) -> Result<ExitCode> {
     args.method.check()?;
     let mut setup = args.setup.setup(DEFAULT_SAMPLING)?;
     setup.adc_latency = args.calibration.adc_latency;
-    let listener = TcpListener::bind(args.listen)
+    let listener = TcpListener::bind(&args.listen)
         .with_context(|| format!("--listen {}: cannot listen there", args.listen))?;
     let address = listener.local_addr()?;
     let methods = methods(&args.method)?;
@@ -74,11 +74,9 @@ pub fn run(args: Args) -> Result<ExitCode> {
     let session = args.camera.open(&args.scene)?;
     let connected = prepared(session, &args.calibration, &setup)?;
 
-    let machine = match address {
-        SocketAddr::V4(v4) if v4.ip().is_unspecified() => {
-            SocketAddr::from((Ipv4Addr::LOCALHOST, v4.port()))
-        }
-        other => other,
+    let machine = match address.ip() {
+        ip if ip.is_unspecified() => format!("localhost:{}", address.port()),
+        _ => address.to_string(),
     };
     print::line(format_args!(
         "open http://{machine} to see camera {}; Ctrl-C ends it",
