@@ -12,10 +12,10 @@ use crate::capture::{
 };
 use crate::events;
 use crate::integrate::Newest;
-use crate::session::{Session, SessionError};
+use crate::session::{Deaf, Session, SessionError};
 use crate::setup::MeasurementSetup;
 use nirspi_nets::DepthMaps;
-use nirspi_wire::{Depth, DeviceMessage, Fault, Frame, Refusal};
+use nirspi_wire::{Depth, DeviceMessage, EventKind, Fault, Frame, Refusal};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -49,16 +49,28 @@ pub struct CameraSource {
     pub connect: Connect,
 }
 
+/// What ended a run.
+enum End {
+    /// All is over.
+    Told,
+    /// The camera has gone, in one line.
+    Gone(String),
+    /// It switched its LEDs off.
+    Fault(Fault),
+}
+
 /// Measures until told to stop.
 ///
 /// # Errors
 /// One line, where the first run cannot even begin.
 pub fn run(shared: &Shared, mut source: CameraSource, first: Connected) -> Result<(), String> {
-    let mut live = Live { shared, earlier: LossCounters::default(), now: None, depth: None };
+    let earlier = LossCounters::default();
+    let mut live = Live { shared, earlier, now: None, depth: None, fault: None, begun: false };
     let mut next = Some(first);
-    let mut begun = false;
+    // Whoever starts this program has the camera in sight.
+    let mut person_said = true;
     while !shared.is_over() {
-        let Connected { mut session, calibration, note } = match next.take() {
+        let mut connected = match next.take() {
             Some(connected) => connected,
             None => match (source.connect)() {
                 Ok(connected) => {
@@ -72,35 +84,30 @@ pub fn run(shared: &Shared, mut source: CameraSource, first: Connected) -> Resul
                 }
             },
         };
-        for text in session.reports().iter().cloned().chain(note) {
-            lock(&shared.camera).event(text);
-        }
-        let setup = source.setup.clone();
-        let options = CaptureOptions { setup, frames: None, calibration, record: None };
-        let ended = observe(&mut session, &options, &mut live);
+        let standing = if person_said { None } else { standing_fault(&mut connected.session) };
+        person_said = false;
+        let end = match standing {
+            Some(fault) => End::Fault(fault),
+            None => live.measure(&mut connected, source.setup.clone())?,
+        };
         // The link is let go before the camera is looked for again.
-        drop(session);
-        begun |= live.now.take().is_some();
-        match ended {
-            Ok(captured) => {
-                live.earlier = live.earlier + captured.counters;
-                shared.slot.account(live.earlier);
-                match captured.ended {
-                    Ended::Complete | Ended::Stopped => {}
-                    Ended::LinkLost(error) => gone(shared, &error.to_string()),
-                    Ended::Fault(fault) => await_person(shared, fault),
-                }
+        drop(connected);
+        match end {
+            End::Told => {}
+            End::Gone(why) => gone(shared, &why),
+            End::Fault(fault) => {
+                await_person(shared, fault);
+                person_said = true;
             }
-            Err(error) if !begun => return Err(error.to_string()),
-            // Its cause is not gone yet. When it is, LEDs must not go on by themselves.
-            Err(CaptureError::Session(SessionError::Refused {
-                refusal: Refusal::Fault(fault),
-                ..
-            })) => await_person(shared, fault),
-            Err(error) => gone(shared, &error.to_string()),
         }
     }
     Ok(())
+}
+
+/// The fault that stands in a camera that has come back. That its host was gone is none: it is here again.
+fn standing_fault(session: &mut Session) -> Option<Fault> {
+    // A camera that does not answer will not measure either, and that says why.
+    session.status(&mut Deaf).ok()?.fault.filter(|fault| *fault != Fault::HostSilent)
 }
 
 /// The camera has gone: rests before it is looked for.
@@ -139,6 +146,45 @@ struct Live<'s> {
     earlier: LossCounters,
     now: Option<(Arc<RunSetup>, Newest)>,
     depth: Option<Arc<DepthMaps>>,
+    /// What the camera says has switched its LEDs off.
+    fault: Option<Fault>,
+    /// Whether any run has begun.
+    begun: bool,
+}
+
+impl Live<'_> {
+    /// One run. Fails where it is the first and cannot begin.
+    fn measure(
+        &mut self,
+        connected: &mut Connected,
+        setup: MeasurementSetup,
+    ) -> Result<End, String> {
+        let Connected { session, calibration, note } = connected;
+        for text in session.reports().iter().cloned().chain(note.take()) {
+            lock(&self.shared.camera).event(text);
+        }
+        let calibration = calibration.clone();
+        let options = CaptureOptions { setup, frames: None, calibration, record: None };
+        (self.now, self.fault) = (None, None);
+        let captured = match observe(session, &options, self) {
+            Ok(captured) => captured,
+            Err(error) if !self.begun => return Err(error.to_string()),
+            // Its cause is not gone yet. When it is, LEDs must not go on by themselves.
+            Err(CaptureError::Session(SessionError::Refused {
+                refusal: Refusal::Fault(fault),
+                ..
+            })) => return Ok(End::Fault(fault)),
+            Err(error) => return Ok(End::Gone(error.to_string())),
+        };
+        self.earlier = self.earlier + captured.counters;
+        self.shared.slot.account(self.earlier);
+        Ok(match (self.fault, captured.ended) {
+            // The link may have gone right after it.
+            (Some(fault), _) | (None, Ended::Fault(fault)) => End::Fault(fault),
+            (None, Ended::LinkLost(error)) => End::Gone(error.to_string()),
+            (None, Ended::Complete | Ended::Stopped) => End::Told,
+        })
+    }
 }
 
 impl Observer for Live<'_> {
@@ -150,7 +196,7 @@ impl Observer for Live<'_> {
     ) {
         let run = RunSetup { setup: setup.clone(), settling: settling.cloned() };
         self.now = Some((Arc::new(run), Newest::new(setup)));
-        self.depth = None;
+        (self.depth, self.begun) = (None, true);
         let mut log = lock(&self.shared.camera);
         if let Some(problem) = problem {
             log.event(format!("not calibrated: {problem}"));
@@ -167,7 +213,12 @@ impl Observer for Live<'_> {
 
     fn message(&mut self, message: &DeviceMessage<'_>) {
         let text = match message {
-            DeviceMessage::Event(event) => events::as_it_happens(&event.kind),
+            DeviceMessage::Event(event) => {
+                if let EventKind::Fault(fault) = event.kind {
+                    self.fault = Some(fault);
+                }
+                events::as_it_happens(&event.kind)
+            }
             DeviceMessage::Crash(report) => events::crash(report),
             DeviceMessage::Depth(depth) => {
                 self.depth = depth_map(depth).map(Arc::new);

@@ -6,7 +6,7 @@
 //! The one law: what is refused is refused before anything else is looked at.
 
 use axum::http::uri::Authority;
-use axum::http::{HeaderMap, HeaderName, header};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, header};
 use std::net::{IpAddr, SocketAddr};
 use thiserror::Error;
 
@@ -42,7 +42,7 @@ pub fn check(headers: &HeaderMap, listen: SocketAddr) -> Result<(), Refused> {
         }
     }
     // Pictures that other pages show come without Origin. Following a link is nobody's harm.
-    let told = |name| headers.get(HeaderName::from_static(name)).map(|value| value.as_bytes());
+    let told = |name| headers.get(HeaderName::from_static(name)).map(HeaderValue::as_bytes);
     let foreign = matches!(told("sec-fetch-site"), Some(b"cross-site" | b"same-site"));
     if foreign && told("sec-fetch-mode") != Some(b"navigate") {
         return Err(Refused::Origin);

@@ -30,10 +30,17 @@ fn until(what: &str, is_so: impl Fn() -> bool) {
     }
 }
 
-/// A virtual camera whose enclosure can be opened.
+/// A virtual camera whose enclosure can be opened, and its cable pulled.
 struct Enclosed {
     camera: VirtualCamera<OpticalFpga>,
-    closed: Arc<AtomicBool>,
+    hands: Arc<Hands>,
+}
+
+/// What people do to it.
+#[derive(Default)]
+struct Hands {
+    open: AtomicBool,
+    pulled: AtomicBool,
 }
 
 impl Link for Enclosed {
@@ -43,7 +50,10 @@ impl Link for Enclosed {
     }
 
     fn receive(&mut self, buffer: &mut [u8], _: Duration) -> io::Result<Received> {
-        self.camera.set_interlock(self.closed.load(Ordering::Relaxed));
+        if self.hands.pulled.load(Ordering::Relaxed) {
+            return Ok(Received::Closed);
+        }
+        self.camera.set_interlock(!self.hands.open.load(Ordering::Relaxed));
         for _ in 0..100 {
             self.camera.step(1000);
         }
@@ -55,56 +65,114 @@ impl Link for Enclosed {
     }
 }
 
-fn enclosed(closed: &Arc<AtomicBool>) -> Connected {
+/// Plugs one in. Its enclosure may have been open a while before.
+fn enclosed(hands: &Arc<Hands>, was_open: bool) -> Connected {
     let scene = Scene::new(vec![1.0; 16], 4, 40.0).unwrap();
-    let camera = VirtualOptics::new(scene, 300.0).unwrap().camera(1).unwrap();
-    let link = Enclosed { camera, closed: Arc::clone(closed) };
+    let mut camera = VirtualOptics::new(scene, 300.0).unwrap().camera(1).unwrap();
+    camera.set_interlock(!was_open);
+    camera.step(1000);
+    let link = Enclosed { camera, hands: Arc::clone(hands) };
     let session = Session::open(Box::new(link)).unwrap();
     Connected { session, calibration: Calibration::None, note: None }
 }
 
+/// A camera's thread under test.
+struct Lab {
+    hands: Arc<Hands>,
+    shared: Arc<Shared>,
+    measuring: JoinHandle<Result<(), String>>,
+}
+
+impl Lab {
+    /// Frames come. Whoever plugs the camera in again has had it `open`.
+    fn new(open_while_unplugged: bool) -> Self {
+        let hands = Arc::<Hands>::default();
+        let first = enclosed(&hands, false);
+        let shared = shared(first.session.identity());
+        let measuring = {
+            let (shared, hands) = (Arc::clone(&shared), Arc::clone(&hands));
+            let setup = MeasurementSetup::new(&Order::CakeCutting, 0.125).unwrap();
+            let connect: Connect = Box::new(move || {
+                hands.pulled.store(false, Ordering::Relaxed);
+                Ok(enclosed(&hands, open_while_unplugged))
+            });
+            let source = CameraSource { address: "test".to_owned(), setup, connect };
+            std::thread::spawn(move || camera::run(&shared, source, first))
+        };
+        let lab = Self { hands, shared, measuring };
+        until("measuring", || lab.received() > 10);
+        lab
+    }
+
+    fn phase(&self) -> Phase {
+        lock(&self.shared.camera).camera.phase
+    }
+
+    fn received(&self) -> u64 {
+        self.shared.slot.ledger().frames.received
+    }
+
+    /// Longer than a camera that is looked for is away: no frame comes.
+    #[track_caller]
+    fn stays_dark(&self) {
+        let before = self.received();
+        std::thread::sleep(Duration::from_millis(1500));
+        assert_eq!((self.phase(), self.received()), (Phase::Fault, before));
+    }
+
+    #[track_caller]
+    fn resumes(&self) {
+        let before = self.received();
+        self.shared.resume.store(true, Ordering::Relaxed);
+        until("on again", || self.received() > before + 10);
+        assert_eq!(self.phase(), Phase::Measuring);
+    }
+
+    /// Ends it; returns what was told.
+    fn end(self) -> Vec<String> {
+        self.shared.over.store(true, Ordering::Relaxed);
+        self.measuring.join().unwrap().unwrap();
+        lock(&self.shared.camera).events().iter().map(|event| event.text.clone()).collect()
+    }
+}
+
 #[test]
 fn after_a_fault_leds_go_on_again_only_when_a_person_says_so() {
-    let closed = Arc::new(AtomicBool::new(true));
-    let first = enclosed(&closed);
-    let shared = shared(first.session.identity());
-    let measuring = {
-        let (shared, closed) = (Arc::clone(&shared), Arc::clone(&closed));
-        let setup = MeasurementSetup::new(&Order::CakeCutting, 0.125).unwrap();
-        let connect: Connect = Box::new(move || Ok(enclosed(&closed)));
-        let source = CameraSource { address: "test".to_owned(), setup, connect };
-        std::thread::spawn(move || camera::run(&shared, source, first))
-    };
-    let phase = || lock(&shared.camera).camera.phase;
-    let received = || shared.slot.ledger().frames.received;
-    until("measuring", || received() > 10);
-    closed.store(false, Ordering::Relaxed);
-    until("off", || phase() == Phase::Fault);
-    let before = received();
-
+    let lab = Lab::new(false);
+    lab.hands.open.store(true, Ordering::Relaxed);
+    until("off", || lab.phase() == Phase::Fault);
     // The cause still stands: asked to go on, it stays off.
-    shared.resume.store(true, Ordering::Relaxed);
-    until("asked", || !shared.resume.load(Ordering::Relaxed));
-    until("off", || phase() == Phase::Fault);
+    lab.shared.resume.store(true, Ordering::Relaxed);
+    until("asked", || !lab.shared.resume.load(Ordering::Relaxed));
+    until("off", || lab.phase() == Phase::Fault);
     // The cause is gone: nobody has asked.
-    closed.store(true, Ordering::Relaxed);
-    std::thread::sleep(Duration::from_millis(1500));
-    assert_eq!((phase(), received()), (Phase::Fault, before));
-
-    shared.resume.store(true, Ordering::Relaxed);
-    until("on again", || received() > before + 10);
-    assert_eq!(phase(), Phase::Measuring);
-    shared.over.store(true, Ordering::Relaxed);
-    measuring.join().unwrap().unwrap();
-    let told: Vec<String> = lock(&shared.camera).events().iter().map(|e| e.text.clone()).collect();
+    lab.hands.open.store(false, Ordering::Relaxed);
+    lab.stays_dark();
+    lab.resumes();
+    let told = lab.end();
     assert!(told.iter().any(|text| text.contains("LEDs off: Interlock")), "{told:?}");
+}
+
+#[test]
+fn a_camera_that_comes_back_measures_on_unless_it_was_opened_meanwhile() {
+    let lab = Lab::new(false);
+    let before = lab.received();
+    lab.hands.pulled.store(true, Ordering::Relaxed);
+    until("measuring again", || lab.received() > before + 100 && lab.phase() == Phase::Measuring);
+    lab.end();
+
+    let lab = Lab::new(true);
+    lab.hands.pulled.store(true, Ordering::Relaxed);
+    until("off", || lab.phase() == Phase::Fault);
+    lab.stays_dark();
+    lab.resumes();
+    lab.end();
 }
 
 #[test]
 fn a_browser_that_does_not_read_costs_nobody_and_then_sees_the_newest() {
     const LAST: usize = 60;
-    let closed = Arc::new(AtomicBool::new(true));
-    let shared = shared(enclosed(&closed).session.identity());
+    let shared = shared(enclosed(&Arc::default(), false).session.identity());
     let (publish, published) = watch::channel(Arc::new(Published::default()));
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap();
