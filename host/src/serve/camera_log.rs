@@ -64,7 +64,7 @@ pub struct EventLine {
 }
 
 /// What the camera's thread knows.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct CameraLog {
     /// The camera.
     pub camera: CameraState,

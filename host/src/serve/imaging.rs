@@ -4,7 +4,7 @@
 
 use super::settings::Settings;
 use super::slot::Look;
-use super::state::{Moment, Offered, Published, Rate, Rates};
+use super::state::{Offered, Published, Rate, Rates, State};
 use super::{Shared, lock};
 use crate::white::{SteadyWhite, brightest};
 use nirspi_nets::consistency::MeasuredRows;
@@ -88,16 +88,22 @@ pub fn run(shared: &Shared, imaging: &Imaging, publish: &watch::Sender<Arc<Publi
             camera_frames_per_s: frames.at(now, ledger.frames.received),
             images_per_s: images.at(now, ledger.images.shown),
         };
-        let published = Published::new(&Moment {
-            log: &lock(&shared.camera),
+        let settings = *lock(&shared.settings);
+        // A copy: the camera's thread may have something to add meanwhile.
+        let log = lock(&shared.camera).clone();
+        let state = State {
+            program: env!("CARGO_PKG_VERSION"),
+            camera: &log.camera,
             ledger,
             rates,
-            settings: *lock(&shared.settings),
+            settings,
             offered: Offered::new(&shared.methods),
-            picture: picture.as_ref(),
+            picture: picture.as_deref(),
             problem: problem.as_deref(),
             viewers: shared.viewers(),
-        });
+            events: log.events(),
+        };
+        let published = Published::new(&state, picture.as_ref());
         if let Ok(published) = published {
             publish.send_replace(Arc::new(published));
         }

@@ -2,7 +2,7 @@
 //!
 //! The one law: what goes out is one message made at one moment, so that its counters add up and its image is theirs.
 
-use super::camera_log::{CameraLog, CameraState, EventLine};
+use super::camera_log::{CameraState, EventLine};
 use super::imaging::Picture;
 use super::settings::{MAX_FRAMES, Settings};
 use super::slot::Ledger;
@@ -67,22 +67,27 @@ impl<'s> Offered<'s> {
 /// Everything but pixels; `GET /api/state`.
 #[derive(Debug, Serialize)]
 pub struct State<'s> {
-    program: &'static str,
-    camera: &'s CameraState,
-    /// `frames` and `images`.
+    /// Version of this program.
+    pub program: &'static str,
+    /// The camera.
+    pub camera: &'s CameraState,
+    /// The account: `frames` and `images`.
     #[serde(flatten)]
-    ledger: Ledger,
-    rates: Rates,
-    settings: Settings,
-    offered: Offered<'s>,
+    pub ledger: Ledger,
+    /// Rates.
+    pub rates: Rates,
+    /// What is set.
+    pub settings: Settings,
+    /// What could be.
+    pub offered: Offered<'s>,
     /// About the images shown; `null` before the first.
-    picture: Option<&'s Picture>,
+    pub picture: Option<&'s Picture>,
     /// Why the newest frame gave no image.
-    problem: Option<&'s str>,
+    pub problem: Option<&'s str>,
     /// Pages that look.
-    viewers: usize,
+    pub viewers: usize,
     /// Oldest first.
-    events: &'s VecDeque<EventLine>,
+    pub events: &'s VecDeque<EventLine>,
 }
 
 /// What pages are sent.
@@ -106,53 +111,20 @@ pub struct Published {
     pub picture: Option<Arc<Picture>>,
 }
 
-/// All that one moment is made of.
-pub struct Moment<'m> {
-    /// Camera and events.
-    pub log: &'m CameraLog,
-    /// The account.
-    pub ledger: Ledger,
-    /// Rates.
-    pub rates: Rates,
-    /// What is set.
-    pub settings: Settings,
-    /// What could be.
-    pub offered: Offered<'m>,
-    /// The newest images.
-    pub picture: Option<&'m Arc<Picture>>,
-    /// Why there are no newer ones.
-    pub problem: Option<&'m str>,
-    /// Pages that look.
-    pub viewers: usize,
-}
-
 impl Published {
     /// Puts a moment into the words of pages and scripts.
     ///
     /// # Errors
     /// Never: all of it can be said in JSON.
-    pub fn new(moment: &Moment<'_>) -> serde_json::Result<Self> {
-        let picture = moment.picture;
-        let state = State {
-            program: env!("CARGO_PKG_VERSION"),
-            camera: &moment.log.camera,
-            ledger: moment.ledger,
-            rates: moment.rates,
-            settings: moment.settings,
-            offered: moment.offered,
-            picture: picture.map(Arc::as_ref),
-            problem: moment.problem,
-            viewers: moment.viewers,
-            events: moment.log.events(),
-        };
+    pub fn new(state: &State<'_>, picture: Option<&Arc<Picture>>) -> serde_json::Result<Self> {
         let message = Message {
-            state: &state,
+            state,
             image: picture.map(|picture| levels(&picture.image)),
             enhanced: picture.and_then(|picture| picture.enhanced.as_deref().map(levels)),
         };
         Ok(Self {
             message: serde_json::to_string(&message)?,
-            state: serde_json::to_string_pretty(&state)?,
+            state: serde_json::to_string_pretty(state)?,
             picture: picture.cloned(),
         })
     }

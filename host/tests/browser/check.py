@@ -58,6 +58,8 @@ def live(page, address, screenshot):
     expect(page.locator("#estimates")).to_contain_text("of 64 px")
     fits(page)
     if screenshot:
+        # Rates are those of whole seconds.
+        page.wait_for_timeout(4000)
         page.screenshot(path=screenshot)
 
 
@@ -116,7 +118,7 @@ def main():
         address = next(word for word in server.stdout.readline().split() if word.startswith("http://"))
         with sync_playwright() as playwright:
             browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=["--no-sandbox"])
-            page = browser.new_page(viewport={"width": 1200, "height": 1130})
+            page = browser.new_page(viewport={"width": 1200, "height": 960})
             page.set_default_timeout(LIMIT_MS)
             expect.set_options(timeout=LIMIT_MS)
             complaints = []
