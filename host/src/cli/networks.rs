@@ -150,6 +150,7 @@ impl Networks {
     }
 
     /// What computes, by its backend.
+    #[cfg(feature = "gpu")]
     pub fn backend(&self) -> Backend {
         self.device.backend()
     }

@@ -8,8 +8,10 @@ use crate::cli::networks::{NetworkArgs, Networks, Used};
 use crate::cli::{Usage, print};
 use anyhow::Result;
 use nalgebra::DMatrix;
+#[cfg(feature = "gpu")]
+use nirspi_nets::Backend;
 use nirspi_nets::consistency::MeasuredRows;
-use nirspi_nets::{Backend, Enhancer, Images, Method, Options, fusion};
+use nirspi_nets::{Enhancer, Images, Method, Options, fusion};
 use nirspi_recon::basis::Transform;
 use nirspi_recon::metrics::psnr;
 use nirspi_recon::omp::{Limits, MixedDictionary};
@@ -133,11 +135,13 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         repeats: args.repeats,
     };
     let mut networks = args.networks.open(&["fsrcnn", "estimator", "diffusion"])?;
+    #[cfg(feature = "gpu")]
     let (timed, software) = match networks.backend() {
-        #[cfg(feature = "gpu")]
-        backend @ (Backend::Wgpu | Backend::Cuda) => gpu::time(&work, backend, &mut networks)?,
-        _ => (on_cpu(&work, &mut networks)?, false),
+        Backend::Cpu => (on_cpu(&work, &mut networks)?, false),
+        backend => gpu::time(&work, backend, &mut networks)?,
     };
+    #[cfg(not(feature = "gpu"))]
+    let (timed, software) = (on_cpu(&work, &mut networks)?, false);
     let images = blobs.chunks_exact(side.area()).zip(timed.reconstructed.chunks_exact(side.area()));
     let mut quality = images
         .map(|(truth, image)| psnr(truth, image, side.pixels(), side.pixels(), 1.0))
