@@ -7,7 +7,7 @@ use super::method::{self, MethodArgs, Solved, solve};
 use super::print;
 use super::quality::{Quality, compare};
 use super::reconstruct::enlarged_png;
-use super::report::StageTimes;
+use super::report::{StageTimes, to_json};
 use anyhow::{Result, bail};
 use indicatif::{ProgressBar, ProgressStyle};
 use nirspi::account::LossCounters;
@@ -154,6 +154,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         fused: stages.fused,
         deblurred: stages.deblurred,
     };
+    notes.extend(stages.report.doubt(args.frames));
     let report = Report {
         scene: map.name.clone(),
         simulated: true,
@@ -221,7 +222,7 @@ fn write(
         "side_by_side.png",
         &encode_rgb(&side_by_side(map, optics, images, report).render()),
     )?;
-    out.write("report.json", format!("{}\n", serde_json::to_string_pretty(report)?).as_bytes())?;
+    out.write("report.json", to_json(report)?.as_bytes())?;
     out.commit()?;
     Ok(())
 }
@@ -334,9 +335,9 @@ fn say(args: &Args, report: &Report) -> Result<()> {
     print::line(format_args!("at 64 x 64, Lanczos: {}", quality_line(&enhancement.upscaled)))?;
     print::line(format_args!("fused with depth:    {}", quality_line(&enhancement.fused)))?;
     print::line(format_args!(
-        "deblurred:           {} (blur {:.2} px and noise {:.4} estimated, inconsistency {:.2})",
+        "deblurred:           {} (blur {}, noise {:.4} estimated, inconsistency {:.2})",
         quality_line(&enhancement.deblurred),
-        enhancement.sigma_px,
+        blur_line(enhancement),
         enhancement.noise,
         enhancement.inconsistency
     ))?;
@@ -344,6 +345,16 @@ fn say(args: &Args, report: &Report) -> Result<()> {
         print::line(format_args!("note: {note}"))?;
     }
     print::line(format_args!("look at {}", args.out.join("side_by_side.png").display()))
+}
+
+/// How blurred it is, and who says so.
+fn blur_line(enhancement: &enhanced::Report) -> String {
+    let (taken, estimated) = (enhancement.sigma_px, enhancement.estimated_sigma_px);
+    if taken > estimated {
+        format!("{taken:.2} px by lens and distance, {estimated:.2} px estimated")
+    } else {
+        format!("{taken:.2} px estimated")
+    }
 }
 
 fn quality_line(quality: &Quality) -> String {

@@ -1,6 +1,7 @@
 //! `nirspi range`: how far the camera sees in rain (the paper's Algorithm 2 and Table 2).
 
 use super::{Usage, print};
+use crate::cli::report::to_json;
 use anyhow::Result;
 use nirspi::files::image::encode_rgb;
 use nirspi::files::output::OutputDir;
@@ -130,10 +131,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         let mut out = OutputDir::create(out)?;
         let chart = chart(args, &instrument, &weathers, &dry);
         out.write("range.png", &encode_rgb(&chart.render()))?;
-        out.write(
-            "range.json",
-            format!("{}\n", serde_json::to_string_pretty(&report)?).as_bytes(),
-        )?;
+        out.write("range.json", to_json(&report)?.as_bytes())?;
         out.commit()?;
     }
     if args.json {

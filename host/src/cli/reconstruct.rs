@@ -6,7 +6,7 @@ mod stack;
 
 use super::camera::{check_sampling, parse_order};
 use super::method::{MethodArgs, Solved, solve};
-use super::report::StageTimes;
+use super::report::{StageTimes, to_json};
 use super::source::{Index, Source, SourceArgs};
 use super::{Usage, print};
 use anyhow::{Context, Result, bail};
@@ -222,7 +222,7 @@ fn write(args: &Args, image: &Image, sharp: Option<&[f32]>, report: &impl Serial
         out.write("enhanced.npy", &npy::encode(&[side, side], sharp))?;
         out.write("enhanced.png", &encode_grey(side, side, sharp))?;
     }
-    out.write("report.json", format!("{}\n", serde_json::to_string_pretty(report)?).as_bytes())?;
+    out.write("report.json", to_json(report)?.as_bytes())?;
     out.commit()?;
     Ok(())
 }

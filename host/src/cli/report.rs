@@ -1,7 +1,13 @@
 //! Pieces that several reports share.
 
+use anyhow::Result;
 use serde::Serialize;
 use std::time::Instant;
+
+/// A report as it is written to a file: for people to read, too.
+pub fn to_json(report: &impl Serialize) -> Result<String> {
+    Ok(format!("{}\n", serde_json::to_string_pretty(report)?))
+}
 
 /// How long each stage took, in the order in which they ran.
 #[derive(Debug, Default, Serialize)]

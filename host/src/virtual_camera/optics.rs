@@ -186,6 +186,14 @@ impl VirtualOptics {
         self.projector.blur_mm(self.distance_mm)
     }
 
+    /// Standard deviation of the defocus disc of a target at `distance_mm`, in pixels of an image of `side` x `side`: what a
+    /// camera knows of its blur that knows its lens and the distance. A disc's is a fourth of its diameter.
+    #[must_use]
+    pub fn defocus_px(&self, distance_mm: f64, side: usize) -> f64 {
+        let pixel_mm = self.projector.field_mm(distance_mm) / side as f64;
+        self.projector.blur_mm(distance_mm) / 4.0 / pixel_mm
+    }
+
     /// Electrons per ADC sample.
     #[must_use]
     pub fn budget(&self) -> &Budget {

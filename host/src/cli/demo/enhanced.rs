@@ -7,7 +7,8 @@ use anyhow::Result;
 use nirspi::virtual_camera::VirtualOptics;
 use nirspi_nets::consistency::MeasuredRows;
 use nirspi_nets::{
-    Backend, DepthMaps, Enhancer, Images, Method, Options, deblur, fusion, upscale_2x,
+    Backend, DepthMaps, Enhancer, Images, KnownEstimate, Method, Options, deblur, fusion,
+    upscale_2x,
 };
 use nirspi_optics::DEPTH_SIDE;
 use nirspi_recon::{Image, Side};
@@ -33,8 +34,12 @@ pub struct Report {
     /// The diffusion bridge.
     pub deblurred: Quality,
     pub steps: u32,
-    /// Blur in pixels of the 64 x 64 grid, as estimated.
+    /// Blur in pixels of the 64 x 64 grid that was taken out: the larger one of the next two.
     pub sigma_px: f32,
+    /// As the image shows it.
+    pub estimated_sigma_px: f32,
+    /// As lens and depth map have it, where there is a depth map.
+    pub defocus_px: Option<f32>,
     /// Noise of a reading of full scale 1, as estimated.
     pub noise: f32,
     /// Distance of the readings from those of the result, over their noise.
@@ -43,6 +48,24 @@ pub struct Report {
     pub depth_zones: usize,
     pub device: String,
     pub quality_note: &'static str,
+}
+
+/// Inconsistency from which the readings contradict the image: an image that agrees with them ends at 1.1 or below, the
+/// radius that it is moved to.
+const CONTRADICTED: f32 = 1.2;
+
+impl Report {
+    /// What is to be said of an image that the readings do not bear out.
+    pub fn doubt(&self, frames: u32) -> Option<String> {
+        (self.inconsistency > CONTRADICTED).then(|| {
+            format!(
+                "the readings do not bear the deblurred image out (inconsistency {:.2}): do not trust its strokes; more \
+                 light helps, as with --frames {}",
+                self.inconsistency,
+                frames.saturating_mul(10)
+            )
+        })
+    }
 }
 
 /// Runs the stages on an image in ADC counts that was reconstructed from these Hadamard rows.
@@ -65,7 +88,12 @@ pub fn run(
     let readings: Images<'_, { fusion::SIDE }> = Images::new(&reflectance)?;
     let zones_m: Vec<f32> =
         optics.depth(seed)?.reading().iter().map(|&mm| f32::from(mm) * 1e-3).collect();
-    let depth_zones = zones_m.iter().filter(|&&m| m > 0.0).count();
+    let seen_m = seen(&zones_m);
+    let depth_zones = seen_m.len();
+    // The lens and the distance say how far it is out of focus; noise hides that from the estimator, which says too little then.
+    let defocus_px = seen_m
+        .get(depth_zones / 2)
+        .map(|&m| optics.defocus_px(f64::from(m) * 1e3, deblur::SIDE) as f32);
     let depth = DepthMaps::new(zones_m, [1, DEPTH_SIDE, DEPTH_SIDE], 1)?;
 
     let mut networks = Networks::built_in(Backend::Cpu)?;
@@ -75,7 +103,10 @@ pub fn run(
     })?;
     let rows: Vec<u32> = rows.iter().map(|&row| row.into()).collect();
     let measured = MeasuredRows::new(fusion::SIDE, &rows);
-    let options = Options { measured, seed, ..Options::default() };
+    let estimated = networks.estimator()?.estimate(readings)[0].sigma_px;
+    let sigma_px = defocus_px.filter(|&defocus_px| defocus_px > estimated);
+    let estimate = KnownEstimate { sigma_px, ..KnownEstimate::default() };
+    let options = Options { measured, seed, estimate, ..Options::default() };
     let result =
         times.time("enhance", || enhancer.enhance(readings, Some(&depth), &options, &mut |_| {}));
     let side = fusion::SIDE;
@@ -93,6 +124,8 @@ pub fn run(
         deblurred: deblurred_fit.quality,
         steps: steps.get(),
         sigma_px: result.estimates[0].sigma_px,
+        estimated_sigma_px: estimated,
+        defocus_px,
         noise: result.estimates[0].noise,
         inconsistency: result.inconsistency[0],
         depth_zones,
@@ -107,4 +140,11 @@ pub fn run(
         deblurred: deblurred_fit.values,
         report,
     })
+}
+
+/// Distances of the zones that saw something, sorted.
+fn seen(zones_m: &[f32]) -> Vec<f32> {
+    let mut seen: Vec<f32> = zones_m.iter().copied().filter(|&m| m > 0.0).collect();
+    seen.sort_by(f32::total_cmp);
+    seen
 }

@@ -12,6 +12,7 @@ mod rows;
 
 use super::shot::progress;
 use crate::cli::print;
+use crate::cli::report::to_json;
 use anyhow::Result;
 use characters::Characters;
 use indicatif::ProgressBar;
@@ -140,7 +141,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         others: shown.cases,
         notes: characters.notes().to_vec(),
     };
-    let json = format!("{}\n", serde_json::to_string_pretty(&report)?);
+    let json = to_json(&report)?;
     out.write("quality.json", json.as_bytes())?;
     out.commit()?;
     if args.json {

@@ -5,6 +5,7 @@ mod plot;
 use crate::cli::Usage;
 use crate::cli::camera::parse_order;
 use crate::cli::print;
+use crate::cli::report::to_json;
 use crate::cli::source::SourceArgs;
 use anyhow::{Context, Result};
 use indicatif::ProgressBar;
@@ -159,7 +160,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let table = table(&report, &args.orders, &names, &args.sampling);
     let mut out = OutputDir::create(&args.out)?;
     out.write("sampling.md", table.as_bytes())?;
-    out.write("sampling.json", format!("{}\n", serde_json::to_string_pretty(&report)?).as_bytes())?;
+    out.write("sampling.json", to_json(&report)?.as_bytes())?;
     let best = best_order(&report, &args.orders);
     out.write("sampling.svg", plot::draw(&curves(&report, best, &names), best).as_bytes())?;
     out.commit()?;

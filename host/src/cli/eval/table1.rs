@@ -4,6 +4,7 @@ use super::shot::{Conditions, record, white_level};
 use crate::cli::Usage;
 use crate::cli::camera::Rain;
 use crate::cli::print;
+use crate::cli::report::to_json;
 use anyhow::Result;
 use indicatif::ProgressBar;
 use nirspi::files::image::encode_rgb;
@@ -176,7 +177,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     };
     if let Some(path) = &args.out {
         let mut out = OutputDir::create(path)?;
-        let json = format!("{}\n", serde_json::to_string_pretty(&report)?);
+        let json = to_json(&report)?;
         out.write("table1.json", json.as_bytes())?;
         out.write("table1.png", &encode_rgb(&chart(&report).render()))?;
         out.commit()?;

@@ -7,6 +7,7 @@ use super::{DISTANCES_M, Estimate};
 use crate::cli::camera::Rain;
 use crate::cli::print;
 use crate::cli::quality::{Quality, compare};
+use crate::cli::report::to_json;
 use anyhow::Result;
 use nirspi::files::image::encode_rgb;
 use nirspi::files::output::OutputDir;
@@ -145,10 +146,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     };
     if let Some(path) = &args.out {
         let mut out = OutputDir::create(path)?;
-        out.write(
-            "table3.json",
-            format!("{}\n", serde_json::to_string_pretty(&report)?).as_bytes(),
-        )?;
+        out.write("table3.json", to_json(&report)?.as_bytes())?;
         let picture = picture(args, &wet_whites, &enhancers)?;
         out.write("table3.png", &encode_rgb(&picture.render()))?;
         out.commit()?;

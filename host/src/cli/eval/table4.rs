@@ -5,6 +5,7 @@ use super::shot::{Conditions, Exposure, Shots, progress, shoot, white_level};
 use super::{DISTANCES_M, Estimate};
 use crate::cli::camera::Rain;
 use crate::cli::print;
+use crate::cli::report::to_json;
 use anyhow::Result;
 use nirspi::files::image::encode_rgb;
 use nirspi::files::output::OutputDir;
@@ -163,10 +164,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     };
     if let Some(path) = &args.out {
         let mut out = OutputDir::create(path)?;
-        out.write(
-            "table4.json",
-            format!("{}\n", serde_json::to_string_pretty(&report)?).as_bytes(),
-        )?;
+        out.write("table4.json", to_json(&report)?.as_bytes())?;
         out.write("table4.png", &encode_rgb(&chart(&report).render()))?;
         out.commit()?;
     }

@@ -3,7 +3,7 @@
 use super::{Args, choose_order, enhanced, print, spinning};
 use crate::cli::Usage;
 use crate::cli::method::{self, Method, Solved, solve};
-use crate::cli::report::StageTimes;
+use crate::cli::report::{StageTimes, to_json};
 use anyhow::{Context, Result, bail};
 use nirspi::files::image::encode_grey;
 use nirspi::files::npy;
@@ -101,7 +101,7 @@ pub fn run(args: &Args, order: Option<Order>) -> Result<ExitCode> {
         let sharp = sharp.chunks_exact(at.area()).map(|pixels| Image::new(at, pixels.to_vec()));
         out.write("enhanced.png", &sheet(&sharp.collect::<Vec<_>>()))?;
     }
-    out.write("report.json", format!("{}\n", serde_json::to_string_pretty(&report)?).as_bytes())?;
+    out.write("report.json", to_json(&report)?.as_bytes())?;
     out.commit()?;
     if args.json {
         print::json(&report)?;

@@ -5,6 +5,7 @@
 
 use super::data::Found;
 use super::network::unit;
+use crate::cli::report::to_json;
 use anyhow::{Context, Result, bail};
 use nirspi::files::image::encode_rgb;
 use nirspi::files::output::{OutputDir, write_atomic};
@@ -82,7 +83,7 @@ impl Folder {
 
     /// Keeps who was held out.
     pub fn write_data(&self, data: &Found) -> Result<()> {
-        let text = format!("{}\n", serde_json::to_string_pretty(data)?);
+        let text = to_json(data)?;
         Ok(write_atomic(&self.file(Self::DATA), text.as_bytes())?)
     }
 
