@@ -5,6 +5,7 @@ mod omp;
 mod pipeline;
 mod scenes;
 
+use super::networks::NetworkArgs;
 use anyhow::Result;
 use clap::Subcommand;
 use serde::Serialize;
@@ -39,6 +40,28 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         What::Omp(args) => omp::run(args),
         What::Pipeline(args) => pipeline::run(args),
     }
+}
+
+/// What the benchmarks take that run networks.
+#[derive(Debug, clap::Args)]
+struct RunArgs {
+    /// Frames
+    #[arg(long, value_name = "B", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=65_536))]
+    frames: u32,
+    /// Let the network say what the readings contradict
+    #[arg(long)]
+    no_consistency: bool,
+    /// Times to run it
+    #[arg(long, value_name = "R", default_value_t = 9, value_parser = clap::value_parser!(u32).range(1..))]
+    repeats: u32,
+    /// Seed of all that is random
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    #[command(flatten)]
+    networks: NetworkArgs,
+    /// Print JSON, as it does anyway
+    #[arg(long)]
+    json: bool,
 }
 
 /// Of several runs, in milliseconds.

@@ -1,7 +1,7 @@
 //! `nirspi bench enhance`: the learned stages, timed.
 
-use super::{FASTEST_SWEEPS_HZ, Times, scenes};
-use crate::cli::networks::{NetworkArgs, Used};
+use super::{FASTEST_SWEEPS_HZ, RunArgs, Times, scenes};
+use crate::cli::networks::Used;
 use crate::cli::print;
 use anyhow::Result;
 use nirspi_nets::{Enhancer, Images, Method, Options, fusion};
@@ -18,26 +18,11 @@ use std::process::ExitCode;
     \x20 nirspi bench enhance --frames 256\n\
     \x20 nirspi bench enhance --frames 4096 --backend cuda --no-consistency")]
 pub struct Args {
-    /// Frames
-    #[arg(long, value_name = "B", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=65_536))]
-    frames: u32,
     /// Steps along the bridge
     #[arg(long, value_name = "S", default_value = "1")]
     steps: NonZeroU32,
-    /// Let the network say what the readings contradict
-    #[arg(long)]
-    no_consistency: bool,
-    /// Times to run it
-    #[arg(long, value_name = "R", default_value_t = 9, value_parser = clap::value_parser!(u32).range(1..))]
-    repeats: u32,
-    /// Seed of the frames
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
     #[command(flatten)]
-    networks: NetworkArgs,
-    /// Print JSON, as it does anyway
-    #[arg(long)]
-    json: bool,
+    run: RunArgs,
 }
 
 #[derive(Debug, Serialize)]
@@ -62,32 +47,33 @@ struct Report {
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let mut networks = args.networks.open(&["fsrcnn", "estimator", "diffusion"])?;
+    let mut networks = args.run.networks.open(&["fsrcnn", "estimator", "diffusion"])?;
     let (estimator, alone) = (networks.estimator()?, networks.fusion()?);
     let method = Method::Diffusion { steps: args.steps };
     let enhancer = Enhancer::new(networks.fusion()?, networks.sharpener(method)?);
-    let options = Options { consistency: !args.no_consistency, gate: false, ..Options::default() };
-    let values = scenes::blobs(args.frames as usize, args.seed);
+    let options =
+        Options { consistency: !args.run.no_consistency, gate: false, ..Options::default() };
+    let values = scenes::blobs(args.run.frames as usize, args.run.seed);
     let images: Images<'_, { fusion::SIDE }> = Images::new(&values)?;
     let enhance = || enhancer.enhance(images, None, &options, &mut |_| {}).images.len();
     let first_ms = Times::of(1, enhance).median_ms;
     estimator.estimate(images);
-    let whole = Times::of(args.repeats, enhance);
-    let frames_per_s = f64::from(args.frames) / whole.median_ms * 1e3;
+    let whole = Times::of(args.run.repeats, enhance);
+    let frames_per_s = f64::from(args.run.frames) / whole.median_ms * 1e3;
     print::json(&Report {
         device: networks.device().to_owned(),
         weights: networks.used(),
         threads: rayon::current_num_threads(),
-        frames: args.frames,
+        frames: args.run.frames,
         steps: args.steps.get(),
         consistency: options.consistency,
-        repeats: args.repeats,
+        repeats: args.run.repeats,
         first_ms,
         whole,
         frames_per_s,
         of_fastest_sweeps: frames_per_s / FASTEST_SWEEPS_HZ,
-        estimate: Times::of(args.repeats, || estimator.estimate(images)),
-        fusion: Times::of(args.repeats, || alone.upscale(images, None)),
+        estimate: Times::of(args.run.repeats, || estimator.estimate(images)),
+        fusion: Times::of(args.run.repeats, || alone.upscale(images, None)),
     })?;
     Ok(ExitCode::SUCCESS)
 }

@@ -3,8 +3,8 @@
 #[cfg(feature = "gpu")]
 mod gpu;
 
-use super::{FASTEST_SWEEPS_HZ, Times, scenes};
-use crate::cli::networks::{NetworkArgs, Networks, Used};
+use super::{FASTEST_SWEEPS_HZ, RunArgs, Times, scenes};
+use crate::cli::networks::{Networks, Used};
 use crate::cli::{Usage, print};
 use anyhow::Result;
 use nalgebra::DMatrix;
@@ -31,29 +31,14 @@ use std::process::ExitCode;
     \x20 nirspi bench pipeline --frames 256\n\
     \x20 nirspi bench pipeline --frames 4096 --backend cuda --no-consistency")]
 pub struct Args {
-    /// Frames
-    #[arg(long, value_name = "B", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=65_536))]
-    frames: u32,
     /// Measurements of a frame, of 1024
     #[arg(long, value_name = "M", default_value_t = 512, value_parser = clap::value_parser!(u32).range(1..=1024))]
     measurements: u32,
     /// Atoms to choose, no more than measurements
     #[arg(long, value_name = "K", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=1024))]
     sparsity: u32,
-    /// Let the network say what the readings contradict
-    #[arg(long)]
-    no_consistency: bool,
-    /// Times to run it
-    #[arg(long, value_name = "R", default_value_t = 9, value_parser = clap::value_parser!(u32).range(1..))]
-    repeats: u32,
-    /// Seed of the patterns and the frames
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
     #[command(flatten)]
-    networks: NetworkArgs,
-    /// Print JSON, as it does anyway
-    #[arg(long)]
-    json: bool,
+    run: RunArgs,
 }
 
 #[derive(Debug, Serialize)]
@@ -114,11 +99,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         return Err(Usage(format!("--sparsity is {found}, expected 1 to {most}")).into());
     }
     let side = Side::INSTRUMENT;
-    let mut rows = Order::Random(args.seed).rows(side)?;
+    let mut rows = Order::Random(args.run.seed).rows(side)?;
     // The pattern that sees all light first, as every order of a camera has it.
     rows.sort_by_key(|&row| row != 0);
     rows.truncate(args.measurements as usize);
-    let blobs = scenes::blobs(args.frames as usize, args.seed);
+    let blobs = scenes::blobs(args.run.frames as usize, args.run.seed);
     let mut y = Vec::new();
     for image in blobs.chunks_exact(side.area()) {
         y.append(&mut scenes::seen_by(&rows, image)?);
@@ -128,13 +113,13 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         limits: Limits::atoms(args.sparsity as usize),
         y,
         options: Options {
-            consistency: !args.no_consistency,
+            consistency: !args.run.no_consistency,
             measured: MeasuredRows::new(side.pixels(), &rows),
             ..Options::default()
         },
-        repeats: args.repeats,
+        repeats: args.run.repeats,
     };
-    let mut networks = args.networks.open(&["fsrcnn", "estimator", "diffusion"])?;
+    let mut networks = args.run.networks.open(&["fsrcnn", "estimator", "diffusion"])?;
     #[cfg(feature = "gpu")]
     let (timed, software) = match networks.backend() {
         Backend::Cpu => (on_cpu(&work, &mut networks)?, false),
@@ -147,17 +132,17 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         .map(|(truth, image)| psnr(truth, image, side.pixels(), side.pixels(), 1.0))
         .collect::<Result<Vec<_>, _>>()?;
     quality.sort_by(f64::total_cmp);
-    let frames_per_s = f64::from(args.frames) / timed.whole.median_ms * 1e3;
+    let frames_per_s = f64::from(args.run.frames) / timed.whole.median_ms * 1e3;
     print::json(&Report {
         device: networks.device().to_owned(),
         software,
         weights: networks.used(),
         threads: rayon::current_num_threads(),
-        frames: args.frames,
+        frames: args.run.frames,
         measurements: args.measurements,
         sparsity: args.sparsity,
         consistency: work.options.consistency,
-        repeats: args.repeats,
+        repeats: args.run.repeats,
         timed,
         frames_per_s,
         of_fastest_sweeps: frames_per_s / FASTEST_SWEEPS_HZ,
