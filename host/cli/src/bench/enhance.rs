@@ -1,8 +1,8 @@
 //! `nirspi bench enhance`: the learned stages, timed.
 
 use super::{FASTEST_SWEEPS_HZ, RunArgs, Times, scenes};
-use crate::cli::networks::Used;
-use crate::cli::print;
+use crate::networks::Used;
+use crate::print;
 use anyhow::Result;
 use nirspi_nets::{Enhancer, Images, Method, Options, fusion};
 use serde::Serialize;

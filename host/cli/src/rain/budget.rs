@@ -1,6 +1,6 @@
 //! `nirspi rain --budget`: every term of a pixel's signal and noise, with its formula.
 
-use crate::cli::{Usage, print};
+use crate::{Usage, print};
 use anyhow::Result;
 use nirspi_optics::daylight::irradiance_w_per_m2;
 use nirspi_optics::pixel::{Instrument, PixelBudget};

@@ -5,7 +5,7 @@
 
 use super::data::Found;
 use super::network::unit;
-use crate::cli::report::to_json;
+use crate::report::to_json;
 use anyhow::{Context, Result, bail};
 use nirspi::files::image::encode_rgb;
 use nirspi::files::output::{OutputDir, write_atomic};

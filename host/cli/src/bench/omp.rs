@@ -4,7 +4,7 @@
 mod gpu;
 
 use super::{FASTEST_SWEEPS_HZ, milliseconds, scenes};
-use crate::cli::{Usage, backend, print};
+use crate::{Usage, backend, print};
 use anyhow::{Context, Result};
 use clap::ValueEnum;
 use nalgebra::DMatrix;

@@ -11,8 +11,8 @@ mod others;
 mod rows;
 
 use super::shot::progress;
-use crate::cli::print;
-use crate::cli::report::to_json;
+use crate::print;
+use crate::report::to_json;
 use anyhow::Result;
 use characters::Characters;
 use indicatif::ProgressBar;

@@ -1,9 +1,9 @@
 //! `nirspi reconstruct --matrix`: measurements by patterns of the user's own.
 
 use super::{Args, print, spinning};
-use crate::cli::Usage;
-use crate::cli::method::{Method, read_atoms};
-use crate::cli::report::StageTimes;
+use crate::Usage;
+use crate::method::{Method, read_atoms};
+use crate::report::StageTimes;
 use anyhow::{Context, Result, bail};
 use nirspi::files::{npy, npz};
 use nirspi_recon::Side;

@@ -6,7 +6,7 @@
 use super::measure::{Condition, SIDE, halved};
 use super::rows::Row;
 use super::{MIDDLE, UNTOUCHED};
-use crate::cli::source::{Index, SourceArgs};
+use crate::source::{Index, SourceArgs};
 use anyhow::{Context, Result};
 use indicatif::ProgressBar;
 use nirspi::files::image::read_reflectance;

@@ -4,8 +4,8 @@
 mod gpu;
 
 use super::{FASTEST_SWEEPS_HZ, RunArgs, Times, scenes};
-use crate::cli::networks::{Networks, Used};
-use crate::cli::{Usage, print};
+use crate::networks::{Networks, Used};
+use crate::{Usage, print};
 use anyhow::Result;
 use nalgebra::DMatrix;
 #[cfg(feature = "gpu")]

@@ -1,7 +1,7 @@
 //! `nirspi rain --uniformity` and `--rig`.
 
 use super::Table;
-use crate::cli::{Usage, print};
+use crate::{Usage, print};
 use anyhow::{Context, Result};
 use nirspi_optics::rig::{Rig, uniformity_percent};
 use serde::Serialize;

@@ -1,7 +1,7 @@
 //! `nirspi train degrade`: scenes and the virtual camera's pictures of them, as a file.
 
 use super::data::{DataArgs, Found};
-use crate::cli::print;
+use crate::print;
 use anyhow::Result;
 use indicatif::{ProgressBar, ProgressStyle};
 use nirspi::files::output::write_atomic;

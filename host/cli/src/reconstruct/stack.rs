@@ -1,9 +1,9 @@
 //! `nirspi reconstruct --index all`: every measurement of a file or frame of a recording, as a video.
 
 use super::{Args, choose_order, enhanced, print, spinning};
-use crate::cli::Usage;
-use crate::cli::method::{self, Method, Solved, solve};
-use crate::cli::report::{StageTimes, to_json};
+use crate::Usage;
+use crate::method::{self, Method, Solved, solve};
+use crate::report::{StageTimes, to_json};
 use anyhow::{Context, Result, bail};
 use nirspi::files::image::encode_grey;
 use nirspi::files::npy;

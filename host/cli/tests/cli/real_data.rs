@@ -7,7 +7,7 @@ use std::path::PathBuf;
 /// A file of the shared data; they are not part of this repository.
 fn data(name: &str) -> Option<String> {
     let folder = std::env::var_os("NIRSPI_DATA").map_or_else(
-        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"),
+        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"),
         PathBuf::from,
     );
     let path = folder.join("spi").join(name);

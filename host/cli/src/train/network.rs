@@ -2,7 +2,7 @@
 
 use super::data::{DataArgs, Found};
 use super::folder::Folder;
-use crate::cli::{Usage, print};
+use crate::{Usage, print};
 use anyhow::{Context, Result};
 use indicatif::{ProgressBar, ProgressStyle};
 use nirspi::training::{Mixed, SimulatedCamera};

@@ -1,10 +1,10 @@
 //! `nirspi eval table1`: how long each stage takes, on the machine at hand.
 
 use super::shot::{Conditions, record, white_level};
-use crate::cli::Usage;
-use crate::cli::camera::Rain;
-use crate::cli::print;
-use crate::cli::report::to_json;
+use crate::Usage;
+use crate::camera::Rain;
+use crate::print;
+use crate::report::to_json;
 use anyhow::Result;
 use indicatif::ProgressBar;
 use nirspi::files::image::encode_rgb;

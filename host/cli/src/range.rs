@@ -1,7 +1,7 @@
 //! `nirspi range`: how far the camera sees in rain (the paper's Algorithm 2 and Table 2).
 
 use super::{Usage, print};
-use crate::cli::report::to_json;
+use crate::report::to_json;
 use anyhow::Result;
 use nirspi::files::image::encode_rgb;
 use nirspi::files::output::OutputDir;

@@ -3,9 +3,9 @@
 use super::enhanced::{Enhancers, Picture};
 use super::shot::{Conditions, Exposure, Shots, progress, shoot, white_level};
 use super::{DISTANCES_M, Estimate};
-use crate::cli::camera::Rain;
-use crate::cli::print;
-use crate::cli::report::to_json;
+use crate::camera::Rain;
+use crate::print;
+use crate::report::to_json;
 use anyhow::Result;
 use nirspi::files::image::encode_rgb;
 use nirspi::files::output::OutputDir;

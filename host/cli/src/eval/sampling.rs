@@ -2,11 +2,11 @@
 
 mod plot;
 
-use crate::cli::Usage;
-use crate::cli::camera::parse_order;
-use crate::cli::print;
-use crate::cli::report::to_json;
-use crate::cli::source::SourceArgs;
+use crate::Usage;
+use crate::camera::parse_order;
+use crate::print;
+use crate::report::to_json;
+use crate::source::SourceArgs;
 use anyhow::{Context, Result};
 use indicatif::ProgressBar;
 use nirspi::files::output::OutputDir;

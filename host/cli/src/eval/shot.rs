@@ -1,6 +1,6 @@
 //! One picture taken with the virtual camera, from light to image, and one with an ordinary camera.
 
-use crate::cli::camera::Rain;
+use crate::camera::Rain;
 use anyhow::{Result, bail};
 use indicatif::{ProgressBar, ProgressStyle};
 use nirspi::calibrate::CalibrationError;

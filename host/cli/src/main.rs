@@ -1,4 +1,4 @@
-//! Commands. Each module reads its arguments, calls the library, and says what came of it.
+//! The program `nirspi`. Each module reads the arguments of a command, calls the library, and prints the result.
 //!
 //! Exit codes: 0 done, 1 failed (one line on stderr says why), 2 used wrongly.
 
@@ -78,8 +78,7 @@ enum Command {
 #[error("{0}")]
 struct Usage(String);
 
-/// Runs the command line of this process.
-pub fn run() -> ExitCode {
+fn main() -> ExitCode {
     let command = match Cli::try_parse() {
         Ok(cli) => cli.command,
         Err(answer) if is_help(&answer) => {
