@@ -4,7 +4,7 @@
 //! and the counters say what has not.
 
 use crate::account::LossCounters;
-use crate::calibrate::{CalibrationError, Settling, calibrate};
+use crate::calibration::{CalibrationError, Settling, calibrate, calibrate_or};
 use crate::integrate::Integrated;
 use crate::recording::Recorder;
 use crate::session::{ANSWER_TIMEOUT, Deaf, Listener, Session, SessionError};
@@ -41,12 +41,14 @@ pub struct CaptureOptions {
 /// Where a capture's latency and settling come from.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Calibration {
-    /// Nowhere: the setup's latency is right, and the leak is not known.
+    /// The setup's latency is right, and the leak is not known.
     None,
-    /// They are measured first.
+    /// They are measured first. A burst that does not show them ends the capture.
     Measure,
     /// They were measured before.
     Kept(Settling),
+    /// They are measured first. Where the burst is too dim to show them, they are as measured before.
+    MeasureOr(Settling),
 }
 
 /// How far a capture has come.
@@ -76,9 +78,9 @@ pub enum Ended {
 pub struct Capture {
     /// The setup as measured.
     pub setup: MeasurementSetup,
-    /// The camera's response, where it is known.
+    /// LED and amplifier response used for leak correction; `None` with [`Calibration::None`].
     pub settling: Option<Settling>,
-    /// Why it could not be.
+    /// Why the response of [`Calibration::MeasureOr`] is the one measured before.
     pub calibration_problem: Option<CalibrationError>,
     /// The sum of all frames received.
     pub integrated: Integrated,
@@ -102,6 +104,12 @@ pub enum CaptureError {
     /// The camera would not talk or not measure.
     #[error(transparent)]
     Session(#[from] SessionError),
+    /// Latency and settling could not be measured, and none are known.
+    #[error(
+        "{0}; hold a white sheet before the camera and run nirspi calibrate once, or name a latency that you know with \
+         --no-calibration --adc-latency N"
+    )]
+    Calibration(CalibrationError),
     /// The recording cannot be started.
     #[error("{path}: cannot record: {source}")]
     Recording {
@@ -124,9 +132,18 @@ pub enum CaptureError {
     },
 }
 
+impl From<CalibrationError> for CaptureError {
+    fn from(error: CalibrationError) -> Self {
+        match error {
+            CalibrationError::Session(error) => Self::Session(error),
+            error => Self::Calibration(error),
+        }
+    }
+}
+
 /// Sees a capture while it runs, from the thread that drains the link: it has to be quick.
 pub trait Observer {
-    /// The camera has taken this setup; frames come next. `problem` is why its response could not be measured.
+    /// The camera has taken this setup; frames come next. `problem` is why its response is the one measured before.
     fn begins(
         &mut self,
         _setup: &MeasurementSetup,
@@ -227,11 +244,11 @@ pub fn observe(
     let (settling, calibration_problem) = match &options.calibration {
         Calibration::None => (None, None),
         Calibration::Kept(settling) => (Some(settling.clone()), None),
-        Calibration::Measure => match calibrate(session, &mut Deaf) {
-            Ok(settling) => (Some(settling), None),
-            Err(CalibrationError::Session(error)) => return Err(error.into()),
-            Err(problem) => (None, Some(problem)),
-        },
+        Calibration::Measure => (Some(calibrate(session, &mut Deaf)?), None),
+        Calibration::MeasureOr(known) => {
+            let (settling, problem) = calibrate_or(session, &mut Deaf, known)?;
+            (Some(settling), problem)
+        }
     };
     if let Some(settling) = &settling {
         setup.adc_latency = settling.adc_latency;

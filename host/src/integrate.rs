@@ -1,6 +1,6 @@
 //! Frames -> measurements: sums the frames of a run, undoes the settling leak, names the rows.
 
-use crate::calibrate::Settling;
+use crate::calibration::Settling;
 use crate::setup::MeasurementSetup;
 use nirspi_recon::{LeakError, MeasurementError, Measurements, Side, Sweep};
 use nirspi_wire::{Frame, FrameFlags};

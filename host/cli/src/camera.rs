@@ -7,8 +7,8 @@ use nirspi::files::order_table::read_order_table;
 use nirspi::scene::{SceneMap, SceneSource};
 use nirspi::setup::MeasurementSetup;
 use nirspi::virtual_camera::VirtualOptics;
+use nirspi_optics::Projector;
 use nirspi_optics::rain::{Drops, RainError};
-use nirspi_optics::{Projector, Scene};
 use nirspi_recon::Order;
 use std::path::Path;
 use std::str::FromStr;
@@ -67,6 +67,12 @@ impl Rain {
 }
 
 impl SceneArgs {
+    /// A white sheet where the lens is focused, for a calibration.
+    pub fn white_sheet(seed: u64) -> Self {
+        let distance_m = Projector::default().focus_distance_mm / 1e3;
+        Self { scene: "white".to_owned(), distance_m, rain: Rain::None, seed }
+    }
+
     /// The scene and the optics before it.
     pub fn optics(&self) -> Result<(SceneMap, VirtualOptics)> {
         let distance_mm = self.distance_m * 1e3;
@@ -79,11 +85,7 @@ impl SceneArgs {
         }
         let source = SceneSource::from_str(&self.scene).map_err(|e| Usage(e.to_string()))?;
         let map = source.load(SCENE_PX)?;
-        let side_mm = map.side_mm.unwrap_or_else(|| Projector::default().field_mm(distance_mm));
-        let scene = Scene::new(map.reflectance.clone(), map.size_px, side_mm)?;
-        let optics = VirtualOptics::new(scene, distance_mm)
-            // The depth sensor has a range of its own.
-            .and_then(|optics| optics.depth(self.seed).map(|_| optics).map_err(Into::into))
+        let optics = VirtualOptics::before(&map, distance_mm)
             .map_err(|error| Usage(format!("--distance-m {}: {error}", self.distance_m)))?;
         let optics = match self.rain.drops()? {
             Some(drops) => optics.in_rain(drops).map_err(|error| {

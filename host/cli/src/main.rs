@@ -5,6 +5,7 @@
 mod address;
 mod backend;
 mod bench;
+mod calibrate;
 mod calibration;
 mod camera;
 mod capture;
@@ -20,7 +21,6 @@ mod method;
 mod metrics;
 mod networks;
 mod print;
-mod quality;
 mod rain;
 mod range;
 mod reconstruct;
@@ -58,6 +58,7 @@ enum Command {
     Virtual(serve_virtual::Args),
     Devices(devices::Args),
     Info(info::Args),
+    Calibrate(calibrate::Args),
     Selftest(selftest::Args),
     Flash(flash::Args),
     Gateware(gateware::Args),
@@ -99,6 +100,7 @@ fn main() -> ExitCode {
         Command::Virtual(args) => serve_virtual::run(&args),
         Command::Devices(args) => devices::run(&args),
         Command::Info(args) => info::run(&args),
+        Command::Calibrate(args) => calibrate::run(&args),
         Command::Selftest(args) => selftest::run(&args),
         Command::Flash(args) => flash::run(&args),
         Command::Gateware(args) => gateware::run(&args),

@@ -118,6 +118,25 @@ pub struct MethodArgs {
     pub backend: Backend,
 }
 
+impl Default for MethodArgs {
+    /// As if nothing had been said.
+    fn default() -> Self {
+        Self {
+            method: Method::Omp,
+            basis: "dct".to_owned(),
+            dictionary: None,
+            sparsity: None,
+            residual: 0.0,
+            stop_at_noise: false,
+            strength: None,
+            as_printed: false,
+            non_negative: false,
+            keep: None,
+            backend: Backend::Auto,
+        }
+    }
+}
+
 impl MethodArgs {
     /// Finds mistakes before any file is opened.
     pub fn check(&self) -> Result<()> {

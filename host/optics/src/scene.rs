@@ -75,6 +75,14 @@ impl Scene {
         Ok(Self { reflectance, size_px, side_mm, surround: 0.0, summed })
     }
 
+    /// A white sheet without end: reflectance 1 everywhere.
+    #[must_use]
+    pub fn white() -> Self {
+        let reflectance = vec![1.0];
+        let summed = summed_area(&reflectance, 1);
+        Self { reflectance, size_px: 1, side_mm: 1.0, surround: 1.0, summed }
+    }
+
     /// The same scene in front of a background of reflectance `surround`.
     ///
     /// # Errors

@@ -16,7 +16,7 @@ mod stream;
 
 pub use check::{Check, Limit, Verdict};
 
-use crate::calibrate::{CalibrationError, Settling, calibrate};
+use crate::calibration::{CalibrationError, Settling, calibrate};
 use crate::session::{Deaf, Session, SessionError};
 use nirspi_wire::{ADC_MAX, CLOCKS_PER_PATTERN, SelfTestReport};
 use std::time::Duration;

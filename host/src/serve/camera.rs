@@ -6,7 +6,7 @@ use super::camera_log::Phase;
 use super::slot::{Look, RunSetup};
 use super::{Shared, lock};
 use crate::account::LossCounters;
-use crate::calibrate::{CalibrationError, Settling};
+use crate::calibration::{CalibrationError, Settling};
 use crate::capture::{
     Calibration, CaptureError, CaptureOptions, Ended, Observer, Progress, observe,
 };
@@ -57,6 +57,8 @@ enum End {
     Gone(String),
     /// It switched its LEDs off.
     Fault(Fault),
+    /// Its latency is not known, in one line.
+    Uncalibrated(String),
 }
 
 /// Measures until told to stop.
@@ -96,7 +98,13 @@ pub fn run(shared: &Shared, mut source: CameraSource, first: Connected) -> Resul
             End::Told => {}
             End::Gone(why) => gone(shared, &why),
             End::Fault(fault) => {
-                await_person(shared, fault);
+                let line = format!("the camera switched its LEDs off: {fault:?}");
+                await_person(shared, Phase::Fault, line);
+                person_said = true;
+            }
+            End::Uncalibrated(why) => {
+                lock(&shared.camera).event(why.clone());
+                await_person(shared, Phase::Uncalibrated, why);
                 person_said = true;
             }
         }
@@ -120,9 +128,8 @@ fn gone(shared: &Shared, why: &str) {
 }
 
 /// Waits until somebody says that LEDs may go on again.
-fn await_person(shared: &Shared, fault: Fault) {
-    let line = format!("the camera switched its LEDs off: {fault:?}");
-    lock(&shared.camera).enter(Phase::Fault, line);
+fn await_person(shared: &Shared, phase: Phase, line: String) {
+    lock(&shared.camera).enter(phase, line);
     shared.resume.store(false, Ordering::Relaxed);
     while !shared.is_over() && !shared.resume.swap(false, Ordering::Relaxed) {
         std::thread::sleep(TICK);
@@ -168,6 +175,9 @@ impl Live<'_> {
         (self.now, self.fault) = (None, None);
         let captured = match observe(session, &options, self) {
             Ok(captured) => captured,
+            Err(error @ CaptureError::Calibration(_)) => {
+                return Ok(End::Uncalibrated(error.to_string()));
+            }
             Err(error) if !self.begun => return Err(error.to_string()),
             // Its cause is not gone yet. When it is, LEDs must not go on by themselves.
             Err(CaptureError::Session(SessionError::Refused {
@@ -199,7 +209,7 @@ impl Observer for Live<'_> {
         (self.depth, self.begun) = (None, true);
         let mut log = lock(&self.shared.camera);
         if let Some(problem) = problem {
-            log.event(format!("not calibrated: {problem}"));
+            log.event(format!("the kept calibration is used: {problem}"));
         }
         log.measuring(setup, settling.is_some());
     }

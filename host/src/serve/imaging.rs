@@ -6,9 +6,7 @@ use super::settings::Settings;
 use super::slot::Look;
 use super::state::{Offered, Published, Rate, Rates, State};
 use super::{Shared, lock};
-use crate::white::{SteadyWhite, brightest};
-use nirspi_nets::consistency::MeasuredRows;
-use nirspi_nets::{Enhancer, Images, Options, fusion};
+use crate::imaging::{Enhance, Known, SteadyWhite, Warning, White, brightest, warnings};
 use nirspi_recon::{Image, Measurements, Side};
 use serde::Serialize;
 use std::sync::Arc;
@@ -28,7 +26,7 @@ pub struct Imaging {
     /// Methods of reconstruction by name; the settings name one of them.
     pub methods: Vec<(&'static str, Reconstruct)>,
     /// Fusion and deblurring.
-    pub enhancer: Enhancer,
+    pub enhance: Enhance,
 }
 
 /// The images of one moment, and what is known of them.
@@ -48,8 +46,10 @@ pub struct Picture {
     reconstruct_ms: f64,
     /// `null` where it is switched off.
     enhancement: Option<Enhancement>,
-    /// What the frames' flags say against them.
-    warnings: Vec<&'static str>,
+    /// Reasons not to trust the images: the frames' flags, and what the learned stages found.
+    warnings: Vec<String>,
+    /// The same in a few words, for the image itself.
+    short_warnings: Vec<&'static str>,
 }
 
 /// What the learned stages found.
@@ -136,52 +136,43 @@ impl Imaging {
             return Err("the frames gave no image of finite numbers".to_owned());
         }
         let white_counts = white.follow(brightest(image.pixels(), side));
-        let scale = if white_counts > 0.0 { 1.0 / white_counts } else { 0.0 };
-        let image: Vec<f32> = image.pixels().iter().map(|v| (v * scale).clamp(0.0, 1.0)).collect();
-        let (mut enhanced, mut enhancement) = (None, None);
-        if settings.enhance {
-            let (pixels, found) = self.enhance(&image, look, measurements.rows())?;
-            (enhanced, enhancement) = (Some(pixels), Some(found));
+        let mut all: Vec<String> = look.sum.warnings().into_iter().map(str::to_owned).collect();
+        let (mut enhanced, mut enhancement, mut short) = (None, None, Vec::new());
+        if settings.enhance && white_counts > 0.0 {
+            let started = Instant::now();
+            let known = Known {
+                rows: Some(measurements.rows()),
+                depth: look.depth.as_deref(),
+                ..Known::default()
+            };
+            let made = self
+                .enhance
+                .enhance(&image, White::Known(white_counts), &known)
+                .map_err(|error| error.to_string())?;
+            let doubts = warnings(&made);
+            short.extend(doubts.iter().map(Warning::short));
+            all.extend(doubts.iter().map(Warning::to_string));
+            enhancement = Some(Enhancement {
+                blur_px: made.blur_px,
+                noise: made.noise,
+                inconsistency: made.inconsistency,
+                depth: look.depth.is_some(),
+                enhance_ms: ms_since(started),
+            });
+            enhanced = Some(made.pixels);
         }
+        let scale = if white_counts > 0.0 { 1.0 / white_counts } else { 0.0 };
         Ok(Picture {
-            image,
+            image: image.pixels().iter().map(|v| (v * scale).clamp(0.0, 1.0)).collect(),
             enhanced,
             method: settings.method,
             frames: look.sum.frames(),
             white_counts,
             reconstruct_ms,
             enhancement,
-            warnings: look.sum.warnings(),
+            warnings: all,
+            short_warnings: short,
         })
-    }
-
-    /// Both learned stages.
-    fn enhance(
-        &self,
-        image: &[f32],
-        look: &Look,
-        rows: &[u32],
-    ) -> Result<(Vec<f32>, Enhancement), String> {
-        let started = Instant::now();
-        let images: Images<'_, { fusion::SIDE }> =
-            Images::new(image).map_err(|error| error.to_string())?;
-        let measured = MeasuredRows::new(fusion::SIDE, rows);
-        let options = Options { measured, ..Options::default() };
-        let depth = look.depth.as_deref();
-        let result = self.enhancer.enhance(images, depth, &options, &mut |_| {});
-        let (Some(estimate), Some(&inconsistency)) =
-            (result.estimates.first(), result.inconsistency.first())
-        else {
-            return Err("the networks gave no image".to_owned());
-        };
-        let found = Enhancement {
-            blur_px: estimate.sigma_px,
-            noise: estimate.noise,
-            inconsistency,
-            depth: depth.is_some(),
-            enhance_ms: ms_since(started),
-        };
-        Ok((result.images, found))
     }
 }
 

@@ -5,7 +5,7 @@
 //! sum drawn at once. Calibration is measured once by the real procedure on the real virtual camera, and what it
 //! mismeasures stays in every picture. The tests hold all this against captures by the whole camera.
 
-use crate::calibrate::{CalibrationError, Settling, calibrate};
+use crate::calibration::{CalibrationError, Settling, calibrate};
 use crate::session::{Deaf, Session, SessionError};
 use crate::virtual_camera::{MemoryLink, VirtualOptics, VirtualOpticsError};
 use nirspi_nets::data::SIDE_PX;

@@ -14,6 +14,7 @@ mod link;
 mod optics;
 mod precomputed;
 mod server;
+mod shot;
 mod tunnel;
 
 pub use fpga::{OpticalFpga, SimulatedFpga, Wiring};
@@ -21,6 +22,7 @@ pub use link::MemoryLink;
 pub use optics::{VirtualOptics, VirtualOpticsError};
 pub use precomputed::PrecomputedFpga;
 pub use server::{ServeOptions, ServerEvent, serve};
+pub use shot::{Shot, ShotError, calibrate_against_white, shoot};
 pub use tunnel::serve_tunnel;
 
 use nirspi_mcu::{

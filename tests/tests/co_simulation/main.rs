@@ -151,7 +151,7 @@ fn a_calibration_burst_through_the_rtl_is_that_of_the_golden_model() {
     let optics = noiseless();
     let setup = MeasurementSetup {
         rows: vec![0],
-        clocks_per_pattern: nirspi::calibrate::HALF_PERIOD,
+        clocks_per_pattern: nirspi::calibration::HALF_PERIOD,
         blanked: 0,
         ..MeasurementSetup::new(&Order::Natural, 1.0).unwrap()
     };

@@ -3,11 +3,9 @@
 use crate::camera::Rain;
 use anyhow::{Result, bail};
 use indicatif::{ProgressBar, ProgressStyle};
-use nirspi::calibrate::CalibrationError;
-use nirspi::capture::{Calibration, Capture, CaptureOptions, Ended, Progress, capture};
-use nirspi::session::Session;
+use nirspi::capture::{Capture, Progress};
 use nirspi::setup::MeasurementSetup;
-use nirspi::virtual_camera::{MemoryLink, VirtualOptics};
+use nirspi::virtual_camera::{self, VirtualOptics};
 use nirspi_optics::rain::Drops;
 use nirspi_optics::visible::VisibleCamera;
 use nirspi_optics::{Projector, Scene};
@@ -113,26 +111,14 @@ fn expose(optics: &VirtualOptics, frames: u32, seed: u64) -> Result<Image> {
     Ok(reconstruct::hadamard(&measurements))
 }
 
-/// One calibrated capture by the whole virtual camera.
+/// One capture by the whole virtual camera, calibrated against a white sheet.
 pub fn record(
     optics: &VirtualOptics,
     setup: MeasurementSetup,
     frames: u32,
     seed: u64,
 ) -> Result<Capture> {
-    let mut session = Session::open(Box::new(MemoryLink::new(optics.camera(seed)?)))?;
-    let calibration = Calibration::Measure;
-    let options = CaptureOptions { setup, frames: Some(frames), calibration, record: None };
+    let settling = virtual_camera::calibrate_against_white(optics, seed)?;
     let mut watch = |_: &Progress| ControlFlow::Continue(());
-    let captured = capture(&mut session, &options, &mut watch)?;
-    match &captured.ended {
-        Ended::Complete => {}
-        Ended::Fault(fault) => bail!("the virtual camera switched its LEDs off: {fault:?}"),
-        other => bail!("the capture did not end by itself: {other:?}"),
-    }
-    // Too little light for a calibration is part of the picture; an answer that came too late is not.
-    if let Some(problem @ CalibrationError::Incomplete { .. }) = &captured.calibration_problem {
-        bail!("not calibrated: {problem}");
-    }
-    Ok(captured)
+    Ok(virtual_camera::shoot(optics, setup, &settling, frames, seed, &mut watch)?.capture)
 }

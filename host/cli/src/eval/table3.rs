@@ -6,11 +6,11 @@ use super::shot::{Conditions, Exposure, Shots, progress, shoot, white_level};
 use super::{DISTANCES_M, Estimate};
 use crate::camera::Rain;
 use crate::print;
-use crate::quality::{Quality, compare};
 use crate::report::to_json;
 use anyhow::Result;
 use nirspi::files::image::encode_rgb;
 use nirspi::files::output::OutputDir;
+use nirspi::imaging::{Quality, compare};
 use nirspi::picture::{Panel, Range, SideBySide};
 use nirspi::scene::SceneSource;
 use nirspi_nets::images::Images;
@@ -348,6 +348,7 @@ fn picture(args: &Args, whites: &[f32; 3], enhancers: &Enhancers) -> Result<Side
                     "PSNR {:.1} dB  SSIM {:.2}",
                     judged.quality.psnr_db, judged.quality.ssim
                 )],
+                warnings: Vec::new(),
             }));
         }
     }

@@ -62,7 +62,7 @@ pub fn run(args: &Args, path: &Path) -> Result<ExitCode> {
     let own = times.time("rank", || OwnMatrix::new(side, weights)).with_context(named)?;
     let solve = || spinning(|| own.reconstruct(&y[..used], &settings));
     let found = times.time("reconstruct", solve).with_context(named)?;
-    super::check_finite(args, &found.image)?;
+    super::check_finite(&args.source.input, &found.image)?;
 
     let mut notes = Vec::new();
     if own.rank() < used.min(side.area()) {
@@ -95,7 +95,7 @@ pub fn run(args: &Args, path: &Path) -> Result<ExitCode> {
         notes,
         stage_ms: times,
     };
-    super::write(args, &found.image, None, &report)?;
+    super::write(&args.out, &found.image, None, &report)?;
     if args.json {
         print::json(&report)?;
     } else {

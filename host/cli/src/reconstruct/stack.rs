@@ -1,6 +1,6 @@
 //! `nirspi reconstruct --index all`: every measurement of a file or frame of a recording, as a video.
 
-use super::{Args, choose_order, enhanced, print, spinning};
+use super::{Args, enhanced, print, spinning};
 use crate::Usage;
 use crate::method::{self, Method, Solved, solve};
 use crate::report::{StageTimes, to_json};
@@ -8,8 +8,9 @@ use anyhow::{Context, Result, bail};
 use nirspi::files::image::encode_grey;
 use nirspi::files::npy;
 use nirspi::files::output::OutputDir;
+use nirspi::source::FirstPatterns;
 use nirspi_recon::reconstruct::omp_video;
-use nirspi_recon::{Image, Measurements, Order, Side};
+use nirspi_recon::{Image, Measurements, Side};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -42,18 +43,19 @@ struct FrameReport {
     notes: Vec<String>,
 }
 
-pub fn run(args: &Args, order: Option<Order>) -> Result<ExitCode> {
+pub fn run(args: &Args, first: &FirstPatterns) -> Result<ExitCode> {
     if args.warm_start && args.method.method != Method::Omp {
         return Err(Usage("--warm-start belongs to --method omp".to_owned()).into());
     }
     let mut times = StageTimes::default();
     let sources = times.time("read", || args.source.load_all())?;
     let named = || args.source.input.display().to_string();
-    let Some(first) = sources.first() else { bail!("{}: no measurement in it", named()) };
-    let (order, order_name) = choose_order(args, order, first);
-    let used: Vec<Measurements> = sources
+    if sources.is_empty() {
+        bail!("{}: no measurement in it", named());
+    }
+    let (used, orders): (Vec<Measurements>, Vec<String>) = sources
         .iter()
-        .map(|source| source.measurements.take(order.as_ref(), args.sampling))
+        .map(|source| first.take(&source.measurements, args.sampling))
         .collect::<Result<_, _>>()
         .with_context(named)?;
     let solved = times.time("reconstruct", || spinning(|| solve_all(args, &used)))?;
@@ -61,7 +63,7 @@ pub fn run(args: &Args, order: Option<Order>) -> Result<ExitCode> {
     for ((Solved { image, report }, warm), (used, source)) in
         solved.into_iter().zip(used.iter().zip(sources))
     {
-        super::check_finite(args, &image)?;
+        super::check_finite(&args.source.input, &image)?;
         let dropped = |d: &nirspi_recon::Dropout| {
             format!("drop-out: {} readings from y[{}] on", d.length, d.start)
         };
@@ -85,7 +87,7 @@ pub fn run(args: &Args, order: Option<Order>) -> Result<ExitCode> {
     let report = Report {
         input: args.source.input.clone(),
         n,
-        order: order_name,
+        order: orders.into_iter().next().unwrap_or_default(),
         warm_start: args.warm_start,
         frames,
         stage_ms: times,
@@ -155,12 +157,17 @@ fn say(args: &Args, report: &Report) -> Result<()> {
         print::line(format_args!("the last: {} measurements, {}", last.used, last.method))?;
     }
     for (at, frame) in report.frames.iter().enumerate() {
+        let warnings = frame.enhancement.iter().flat_map(|enhancement| &enhancement.warnings);
+        for warning in warnings {
+            print::line(format_args!("warning: frame {at}: {warning}"))?;
+        }
         for note in &frame.notes {
             print::line(format_args!("note: frame {at}: {note}"))?;
         }
     }
+    let enhanced = if args.enhance { ", enhanced.npy, enhanced.png" } else { "" };
     print::line(format_args!(
-        "wrote image.npy, image.png and report.json to {}",
+        "wrote image.npy, image.png{enhanced} and report.json to {}",
         args.out.display()
     ))
 }

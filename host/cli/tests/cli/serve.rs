@@ -279,6 +279,19 @@ fn who_lets_the_network_look_is_told_so() {
 }
 
 #[test]
+fn a_camera_of_unknown_latency_shows_a_red_state_and_no_picture() {
+    let bench = Bench::new();
+    // A letter at 1 m is too dim to show the latency, and no calibration is kept.
+    let server = serve(&bench, &["--distance-m", "1"]);
+    let is_red = |state: &Value| state["camera"]["phase"] == "uncalibrated";
+    let red = server.state("uncalibrated", is_red);
+    let line = red["camera"]["line"].as_str().unwrap();
+    assert!(line.contains("too dim") && line.contains("nirspi calibrate"), "{line}");
+    assert!(red["picture"].is_null(), "{red}");
+    server.get("/image.png").refuses(503, "no such image");
+}
+
+#[test]
 fn what_cannot_be_served_is_said_in_one_line() {
     let bench = Bench::new();
     let taken = TcpListener::bind("127.0.0.1:0").unwrap();

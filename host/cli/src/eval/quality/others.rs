@@ -6,11 +6,11 @@
 use super::measure::{Condition, SIDE, halved};
 use super::rows::Row;
 use super::{MIDDLE, UNTOUCHED};
-use crate::source::{Index, SourceArgs};
 use anyhow::{Context, Result};
 use indicatif::ProgressBar;
 use nirspi::files::image::read_reflectance;
 use nirspi::picture::{Panel, Range, SideBySide};
+use nirspi::source::{Index, Source, SourceOptions};
 use nirspi_nets::consistency::Consistency;
 use nirspi_nets::upscale_2x;
 use nirspi_recon::{metrics, reconstruct};
@@ -125,13 +125,8 @@ fn part_of(picture: &[f32], size_px: usize, down: f64, across: f64) -> Vec<f32> 
 
 /// A real measurement: 64 x 64 ones are their own truth, seen through means of 2 x 2.
 fn measured(file: &Path) -> Result<Scene> {
-    let source = SourceArgs {
-        input: file.to_owned(),
-        index: Some(Index::One(0)),
-        non_differential: false,
-        keep_leak: false,
-    };
-    let source = source.load()?;
+    let first = SourceOptions { index: Some(Index::One(0)), ..SourceOptions::default() };
+    let source = Source::read(file, first)?;
     let image = reconstruct::hadamard(&source.measurements);
     let side = image.side().pixels();
     let (low, high) = image
@@ -184,6 +179,7 @@ pub fn enhance(scenes: &[Scene], row: &Row) -> Result<Shown> {
             values: vec![0.0; 3 * SIDE * CASES_A_PANEL * SIDE],
             range: Range::Unit,
             caption: Vec::new(),
+            warnings: Vec::new(),
         };
         for (place, scene) in some.iter().enumerate() {
             let before = upscale_2x(&scene.readings, 1, SIDE / 2, SIDE / 2)?;

@@ -4,6 +4,13 @@
 //! periods is the camera's step response `s[n]`, `n` clocks after the step: 0 before the light has passed
 //! LEDs, amplifier and ADC, 1 when all has settled. The clock at which it leaves 0 is the latency. What a
 //! pattern leaves in the slots after it (the leak) follows for any dwell and blanking.
+//!
+//! Latency and response belong to the instrument, not to what it looks at: they are measured once, against a white sheet,
+//! and kept ([`KeptCalibration`](super::KeptCalibration)).
+//!
+//! # Invariant
+//! A burst that does not show the latency is an error and never a latency of 0
+//! (`a_burst_too_dim_or_without_an_edge_is_an_error`): with a wrong latency every picture is wrong, most of them inverted.
 
 use crate::session::{Listener, Session, SessionError};
 use crate::setup::MeasurementSetup;
@@ -56,9 +63,10 @@ pub enum CalibrationError {
         /// Samples asked for.
         expected: usize,
     },
-    /// No light, no step.
+    /// Too little light comes back.
     #[error(
-        "no step in the calibration burst: {step_counts:.1} ADC counts with a noise of {noise_counts:.1}"
+        "the calibration burst is too dim to show the ADC latency: a step of {step_counts:.1} ADC counts with a noise of \
+         {noise_counts:.1}"
     )]
     NoStep {
         /// All LEDs on, less all off.
@@ -66,9 +74,11 @@ pub enum CalibrationError {
         /// Standard deviation of one sample.
         noise_counts: f64,
     },
-    /// The response is not one that can be undone.
-    #[error(transparent)]
-    Leak(#[from] LeakError),
+    /// The light changes, but not once in each half period.
+    #[error(
+        "the calibration burst has no edge that could be the LEDs': is another lamp flickering?"
+    )]
+    NoEdge,
 }
 
 /// The setup under which the burst is taken.
@@ -127,11 +137,36 @@ impl BurstListener<'_> {
 /// burst.
 ///
 /// # Errors
-/// [`CalibrationError`]; with [`NoStep`](CalibrationError::NoStep) a measurement is still possible.
+/// [`CalibrationError`], where the burst does not show latency and response.
 pub fn calibrate(
     session: &mut Session,
     listener: &mut dyn Listener,
 ) -> Result<Settling, CalibrationError> {
+    evaluate(&bursts(session, listener)?)
+}
+
+/// As [`calibrate`], with `known` as measured before: where the burst is too dim to show latency and response, they are
+/// those of `known`, with the dark level and the step of this burst. The error that `known` stood in for comes with it.
+///
+/// # Errors
+/// [`CalibrationError`], where the burst does not come.
+pub fn calibrate_or(
+    session: &mut Session,
+    listener: &mut dyn Listener,
+    known: &Settling,
+) -> Result<(Settling, Option<CalibrationError>), CalibrationError> {
+    let samples = bursts(session, listener)?;
+    Ok(match evaluate(&samples) {
+        Ok(settling) => (settling, None),
+        Err(problem) => (known.at_levels_of(&samples), Some(problem)),
+    })
+}
+
+/// The samples of all bursts, one after another.
+fn bursts(
+    session: &mut Session,
+    listener: &mut dyn Listener,
+) -> Result<Vec<f64>, CalibrationError> {
     let expected = usize::from(RAW_SAMPLES_MAX);
     burst_setup().with_configuration(|c| session.command(Command::Configure(c), listener))?;
     let mut samples = Vec::with_capacity(BURSTS * expected);
@@ -146,24 +181,43 @@ pub fn calibrate(
             return Err(CalibrationError::Incomplete { found, expected });
         }
     }
-    evaluate(&samples)
+    Ok(samples)
 }
 
-/// Mean over all periods but the first of each burst, then step response and latency.
+/// The mean of all periods but the first of each burst.
+struct MeanPeriod {
+    /// ADC counts by clock.
+    counts: Vec<f64>,
+    /// How many periods it is the mean of.
+    periods: f64,
+    /// Standard deviation of one sample.
+    noise_counts: f64,
+}
+
+impl MeanPeriod {
+    fn of(samples: &[f64]) -> Self {
+        let period = 2 * usize::from(HALF_PERIOD);
+        // The first period of a burst starts from dark and unsettled.
+        let bursts = samples.chunks_exact(usize::from(RAW_SAMPLES_MAX));
+        let periods: Vec<&[f64]> =
+            bursts.flat_map(|burst| burst.chunks_exact(period).skip(1)).collect();
+        let count = periods.len() as f64;
+        let counts: Vec<f64> =
+            (0..period).map(|n| periods.iter().map(|p| p[n]).sum::<f64>() / count).collect();
+        let variance = periods
+            .iter()
+            .flat_map(|p| p.iter().zip(&counts).map(|(s, m)| (s - m).powi(2)))
+            .sum::<f64>()
+            / ((count - 1.0) * period as f64);
+        Self { counts, periods: count, noise_counts: variance.sqrt() }
+    }
+}
+
+/// Step response and latency of the mean period.
 fn evaluate(samples: &[f64]) -> Result<Settling, CalibrationError> {
     let half = usize::from(HALF_PERIOD);
     let period = 2 * half;
-    // The first period of a burst starts from dark and unsettled.
-    let bursts = samples.chunks_exact(usize::from(RAW_SAMPLES_MAX));
-    let periods: Vec<&[f64]> =
-        bursts.flat_map(|burst| burst.chunks_exact(period).skip(1)).collect();
-    let count = periods.len() as f64;
-    let mean: Vec<f64> =
-        (0..period).map(|n| periods.iter().map(|p| p[n]).sum::<f64>() / count).collect();
-    let variance =
-        periods.iter().flat_map(|p| p.iter().zip(&mean).map(|(s, m)| (s - m).powi(2))).sum::<f64>()
-            / ((count - 1.0) * period as f64);
-    let noise_counts = variance.sqrt();
+    let MeanPeriod { counts: mean, periods: count, noise_counts } = MeanPeriod::of(samples);
 
     // The response is periodic, so its extremes are the settled levels wherever the latency puts them.
     let settled = 16;
@@ -187,7 +241,7 @@ fn evaluate(samples: &[f64]) -> Result<Settling, CalibrationError> {
     let onset = ONSET.max(5.0 * noise_of_mean / step_counts);
     let latency = (0..half)
         .find(|&n| response_at(n) > onset && response_at((n + period - 1) % period) <= onset)
-        .unwrap_or(0);
+        .ok_or(CalibrationError::NoEdge)?;
     let mut response: Vec<f64> = (0..half).map(|n| response_at(latency + n)).collect();
     // Past the point where it has settled, a response is noise: every tap made of that would add to the image's.
     let noise_of_response = noise_of_mean / step_counts / std::f64::consts::SQRT_2;
@@ -204,6 +258,20 @@ fn evaluate(samples: &[f64]) -> Result<Settling, CalibrationError> {
 }
 
 impl Settling {
+    /// The same latency and response, with dark level, step and noise of these samples of a burst.
+    fn at_levels_of(&self, samples: &[f64]) -> Self {
+        let half = usize::from(HALF_PERIOD);
+        let MeanPeriod { counts, noise_counts, .. } = MeanPeriod::of(samples);
+        // From where the response has settled to where the next one begins.
+        let settled = self.response.len().min(half - 1);
+        let level = |step: usize| {
+            let at = |n: usize| counts[(usize::from(self.adc_latency) + step + n) % counts.len()];
+            (settled..half).map(at).sum::<f64>() / (half - settled) as f64
+        };
+        let (on, off) = (level(0), level(half));
+        Self { dark_counts: off, step_counts: on - off, noise_counts, ..self.clone() }
+    }
+
     /// Share of a slot's light that is read in its own slot and in each one after it.
     ///
     /// # Errors
@@ -279,8 +347,21 @@ mod tests {
     }
 
     #[test]
-    fn darkness_is_no_step() {
-        let error = evaluate(&vec![200.0; usize::from(RAW_SAMPLES_MAX)]).unwrap_err();
-        assert!(matches!(error, CalibrationError::NoStep { .. }));
+    fn a_burst_too_dim_or_without_an_edge_is_an_error() {
+        let dark = vec![200.0; usize::from(RAW_SAMPLES_MAX)];
+        assert!(matches!(evaluate(&dark), Err(CalibrationError::NoStep { .. })));
+        // Light that goes on and off twice as fast as the LEDs: on and off do not mirror each other.
+        let flicker: Vec<f64> =
+            (0..dark.len()).map(|n| if n / 64 % 2 == 0 { 9000.0 } else { 200.0 }).collect();
+        assert!(matches!(evaluate(&flicker), Err(CalibrationError::NoEdge)));
+    }
+
+    #[test]
+    fn a_dim_burst_gives_its_own_levels_to_a_known_response() {
+        let known = evaluate(&burst(7, 9000.0, 0.5)).unwrap();
+        let dim = known.at_levels_of(&burst(7, 3.0, 0.5));
+        assert_eq!((dim.adc_latency, &dim.response), (7, &known.response));
+        assert!((dim.dark_counts - 200.0).abs() < 0.01, "{}", dim.dark_counts);
+        assert!((dim.step_counts - 3.0).abs() < 0.01, "{}", dim.step_counts);
     }
 }

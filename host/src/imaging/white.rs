@@ -1,4 +1,4 @@
-//! White, in an image whose scale nobody told: its brightest 2 x 2 pixels.
+//! White level of an image of unknown scale: the mean of its brightest 2 x 2 pixels.
 //!
 //! No light is 0; that much a differential measurement knows. A single bright pixel may be noise, and a share of all
 //! pixels says nothing about a letter on a dark ground.

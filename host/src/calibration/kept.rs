@@ -4,9 +4,11 @@
 //! in ADC clocks and hold for any dwell and blanking, so a calibration belongs to a camera and its gateware and to
 //! nothing else. Its dark level is that of its hour: captures without complements, which need today's, do not use it.
 //!
-//! The one law: a calibration of another camera, or of other gateware, is never applied.
+//! # Invariant
+//! A calibration of another camera, or of other gateware, is never applied
+//! (`a_calibration_of_something_else_is_refused_in_one_line`).
 
-use crate::calibrate::Settling;
+use super::Settling;
 use crate::files::FileError;
 use crate::files::output::{OutputDir, write_atomic};
 use crate::selftest::Check;
@@ -36,7 +38,7 @@ pub struct KeptCalibration {
     pub camera: CameraIdentity,
     /// Latency and step response.
     pub settling: Settling,
-    /// The self-test that it comes from.
+    /// The checks that it has passed.
     pub checks: Vec<Check>,
 }
 
@@ -58,7 +60,9 @@ pub enum CalibrationFileError {
         source: io::Error,
     },
     /// Not a calibration.
-    #[error("{path}: {reason}, expected a calibration written by nirspi selftest")]
+    #[error(
+        "{path}: {reason}, expected a calibration written by nirspi calibrate or nirspi selftest"
+    )]
     Format {
         /// Which file.
         path: PathBuf,
@@ -67,7 +71,7 @@ pub enum CalibrationFileError {
     },
     /// Another version of the format.
     #[error(
-        "{path}: a calibration of format {found}, expected {FORMAT}: run nirspi selftest again"
+        "{path}: a calibration of format {found}, expected {FORMAT}: run nirspi calibrate again"
     )]
     Version {
         /// Which file.
@@ -77,7 +81,7 @@ pub enum CalibrationFileError {
     },
     /// Measured on something else.
     #[error(
-        "{path}: measured with {field} {found}, this camera has {expected}: run nirspi selftest"
+        "{path}: measured with {field} {found}, this camera has {expected}: run nirspi calibrate"
     )]
     Mismatch {
         /// Which file.
