@@ -109,13 +109,12 @@ fn from_npz(args: &SourceArgs, file: MeasurementFile) -> Result<Source> {
     let rows = &file.h_row;
     let mut notes = file.notes;
     let (measurements, dropouts) = match &file.readings {
-        Readings::Pairs(y) => Measurements::from_pairs(file.side, rows, y).with_context(named)?,
+        Readings::Pairs(y) => Measurements::from_pairs(rows, y).with_context(named)?,
         Readings::Differential(d) => {
-            (Measurements::from_differential(file.side, rows, d).with_context(named)?, Vec::new())
+            (Measurements::from_differential(rows, d).with_context(named)?, Vec::new())
         }
         Readings::Single(y) => {
-            let mut measurements =
-                Measurements::from_single(file.side, rows, y).with_context(named)?;
+            let mut measurements = Measurements::from_single(rows, y).with_context(named)?;
             if let Some(level) = measurements.remove_dark_level() {
                 notes.push(format!("a dark level of {level:.4} was found in `y` and removed"));
             }

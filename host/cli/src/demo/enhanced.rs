@@ -71,7 +71,7 @@ impl Report {
 /// Runs the stages on an image in ADC counts that was reconstructed from these Hadamard rows.
 pub fn run(
     image: &Image,
-    rows: &[u16],
+    rows: &[u32],
     optics: &VirtualOptics,
     seed: u64,
     times: &mut StageTimes,
@@ -101,8 +101,7 @@ pub fn run(
         let sharpener = networks.sharpener(Method::Diffusion { steps })?;
         Ok(Enhancer::new(networks.fusion()?, sharpener))
     })?;
-    let rows: Vec<u32> = rows.iter().map(|&row| row.into()).collect();
-    let measured = MeasuredRows::new(fusion::SIDE, &rows);
+    let measured = MeasuredRows::new(fusion::SIDE, rows);
     let estimated = networks.estimator()?.estimate(readings)[0].sigma_px;
     let sigma_px = defocus_px.filter(|&defocus_px| defocus_px > estimated);
     let estimate = KnownEstimate { sigma_px, ..KnownEstimate::default() };
