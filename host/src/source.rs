@@ -217,12 +217,12 @@ fn from_npz(path: &Path, file: MeasurementFile) -> Result<Source, SourceError> {
     let rows = &file.h_row;
     let mut notes = file.notes;
     let (measurements, dropouts) = match &file.readings {
-        Readings::Pairs(y) => Measurements::from_pairs(file.side, rows, y).map_err(wrong)?,
+        Readings::Pairs(y) => Measurements::from_pairs(rows, y).map_err(wrong)?,
         Readings::Differential(d) => {
-            (Measurements::from_differential(file.side, rows, d).map_err(wrong)?, Vec::new())
+            (Measurements::from_differential(rows, d).map_err(wrong)?, Vec::new())
         }
         Readings::Single(y) => {
-            let mut measurements = Measurements::from_single(file.side, rows, y).map_err(wrong)?;
+            let mut measurements = Measurements::from_single(rows, y).map_err(wrong)?;
             if let Some(level) = measurements.remove_dark_level() {
                 notes.push(format!("a dark level of {level:.4} was found in `y` and removed"));
             }

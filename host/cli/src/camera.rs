@@ -100,9 +100,7 @@ impl SceneArgs {
 /// How to measure.
 #[derive(Debug, Clone, Args)]
 pub struct SetupArgs {
-    /// Order of the patterns: natural, sequency, zig-zag, cake-cutting, russian-dolls, total-variation, random:SEED,
-    /// or table:FILE (numbers, entry k the natural-order Hadamard row shown k-th)
-    #[arg(long, value_name = "ORDER", default_value = "cake-cutting")]
+    #[arg(long, value_name = "ORDER", default_value = "cake-cutting", help = order_help())]
     pub order: String,
     /// Share of the 1024 patterns to show, the first of the order [default: demo and serve 0.5, capture 1]
     #[arg(long, value_name = "0..1", allow_negative_numbers = true)]
@@ -144,6 +142,13 @@ impl SetupArgs {
         setup.differential = !self.non_differential;
         Ok(setup)
     }
+}
+
+fn order_help() -> String {
+    format!(
+        "Order of the patterns: {}, or table:FILE (numbers, entry k the natural-order Hadamard row shown k-th)",
+        Order::expected()
+    )
 }
 
 /// An order by name, or a user's own from a file.

@@ -3,19 +3,20 @@
 use super::address::{self, CameraAddress};
 use super::calibration::CalibrationArgs;
 use super::camera::{SceneArgs, SetupArgs};
-use super::method::{Method, MethodArgs, Solver};
+use super::method::MethodArgs;
 use super::serve_virtual::stop_on_signal;
 use super::{one_line, print};
 use anyhow::{Context, Result};
 use nirspi::calibration::Choice;
 use nirspi::imaging::Enhance;
 use nirspi::serve::settings::{MAX_FRAMES, Settings};
-use nirspi::serve::{CameraSource, Connect, Connected, Imaging, Reconstruct, serve};
+use nirspi::serve::{CameraSource, Connect, Connected, Imaging, serve};
 use nirspi::session::Session;
 use nirspi::setup::MeasurementSetup;
 use nirspi_nets::Device;
 use nirspi_recon::Side;
 use nirspi_recon::omp::Backend;
+use nirspi_recon::reconstruct::{Method, Reconstruct};
 use std::net::TcpListener;
 use std::process::ExitCode;
 
@@ -96,21 +97,12 @@ pub fn run(args: Args) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The method asked for, and beside it those that a page can always switch to.
-fn methods(args: &MethodArgs) -> Result<Vec<(&'static str, Reconstruct)>> {
-    let mut all = vec![Method::Hadamard, Method::Omp];
-    if !all.contains(&args.method) {
-        all.push(args.method);
-    }
-    let ready = |method| {
-        let solver =
-            Solver::new(&MethodArgs { method, ..args.clone() }, Side::INSTRUMENT.pixels())?;
-        let solve: Reconstruct = Box::new(move |measurements| {
-            solver.solve(measurements).map(|solved| solved.image).map_err(|e| one_line(&e))
-        });
-        Ok((method.argument(), solve))
-    };
-    all.into_iter().map(ready).collect()
+/// Every method, each with those of the settings that it takes: a page can switch to any.
+fn methods(args: &MethodArgs) -> Result<Vec<(&'static str, Box<dyn Reconstruct>)>> {
+    let settings = args.settings_for(Side::INSTRUMENT.pixels())?;
+    let ready =
+        |method: &Method| Ok((method.argument(), method.prepare(&settings.taken_by(*method))?));
+    Method::ALL.iter().map(ready).collect()
 }
 
 /// The learned stages, where OMP runs; one image at a time is no work for a GPU that was not asked for.

@@ -14,7 +14,7 @@
 
 use crate::session::{Listener, Session, SessionError};
 use crate::setup::MeasurementSetup;
-use nirspi_recon::{Leak, LeakError};
+use nirspi_recon::{Leak, LeakError, Rows, Side};
 use nirspi_wire::register::RAW_SAMPLES_MAX;
 use nirspi_wire::{Command, DeviceMessage, PacketError, Raw, State};
 use serde::{Deserialize, Serialize};
@@ -85,7 +85,7 @@ pub enum CalibrationError {
 fn burst_setup() -> MeasurementSetup {
     MeasurementSetup {
         order: "calibration".to_owned(),
-        rows: vec![0],
+        rows: Rows::natural(Side::INSTRUMENT).first(1),
         differential: true,
         clocks_per_pattern: HALF_PERIOD,
         blanked: 0,

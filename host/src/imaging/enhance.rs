@@ -6,7 +6,7 @@ use nirspi_nets::{
     BlurEstimator, Deblurrer, DepthMaps, Device, Enhancer, Fusion, Images, ImagesError,
     KnownEstimate, Method, Options, Sharpener, Weights, WeightsError, deblur, fusion,
 };
-use nirspi_recon::Image;
+use nirspi_recon::{Image, Rows};
 use std::num::NonZeroU32;
 use thiserror::Error;
 
@@ -42,7 +42,7 @@ impl White {
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Known<'k> {
     /// Natural-order Hadamard rows that it was made from; `None` for all.
-    pub rows: Option<&'k [u32]>,
+    pub rows: Option<&'k Rows>,
     /// Distances that a time-of-flight sensor saw at the same time: one map.
     pub depth: Option<&'k DepthMaps>,
     /// Least blur, in pixels of the 64 x 64 grid: that of the lens at the target's distance. Noise hides blur from the

@@ -7,7 +7,8 @@ use super::slot::Look;
 use super::state::{Offered, Published, Rate, Rates, State};
 use super::{Shared, lock};
 use crate::imaging::{Enhance, Known, SteadyWhite, Warning, White, brightest, warnings};
-use nirspi_recon::{Image, Measurements, Side};
+use nirspi_recon::Side;
+use nirspi_recon::reconstruct::Reconstruct;
 use serde::Serialize;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -18,13 +19,10 @@ const PACE: Duration = Duration::from_millis(33);
 /// How often pages hear of a camera that sends nothing.
 const HEARTBEAT: Duration = Duration::from_millis(500);
 
-/// Makes an image in the measurements' units, or says in one line why not.
-pub type Reconstruct = Box<dyn Fn(&Measurements) -> Result<Image, String> + Send>;
-
 /// All that makes images.
 pub struct Imaging {
-    /// Methods of reconstruction by name; the settings name one of them.
-    pub methods: Vec<(&'static str, Reconstruct)>,
+    /// Methods of reconstruction, each by its word; the settings name one of them.
+    pub methods: Vec<(&'static str, Box<dyn Reconstruct>)>,
     /// Fusion and deblurring.
     pub enhance: Enhance,
 }
@@ -120,7 +118,7 @@ impl Imaging {
         white: &mut SteadyWhite,
     ) -> Result<Picture, String> {
         let started = Instant::now();
-        let (_, reconstruct) = self
+        let (_, method) = self
             .methods
             .iter()
             .find(|(name, _)| *name == settings.method)
@@ -129,7 +127,8 @@ impl Imaging {
             .sum
             .measurements(&look.run.setup, look.run.settling.as_ref(), false)
             .map_err(|error| error.to_string())?;
-        let image = reconstruct(&measurements)?;
+        let made = method.reconstruct(&measurements).map_err(|error| error.to_string())?;
+        let image = made.image;
         let reconstruct_ms = ms_since(started);
         let side = image.side().pixels();
         if side != Side::INSTRUMENT.pixels() || image.pixels().iter().any(|p| !p.is_finite()) {

@@ -19,7 +19,7 @@ mod slot;
 mod state;
 
 pub use camera::{CameraSource, Connect, Connected};
-pub use imaging::{Imaging, Reconstruct};
+pub use imaging::Imaging;
 pub use slot::{ImageCounters, Ledger};
 
 use camera_log::CameraLog;

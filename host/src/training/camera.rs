@@ -14,7 +14,8 @@ use nirspi_optics::rain::{Drops, RainError, Weather};
 use nirspi_optics::water::Water;
 use nirspi_optics::{LEDS, Projector, Scene, SceneError};
 use nirspi_recon::{
-    Leak, LeakError, MeasurementError, Measurements, Order, OrderError, Side, fwht, reconstruct,
+    Leak, LeakError, MeasurementError, Measurements, Order, Rows, RowsError, Side, fwht,
+    reconstruct,
 };
 use nirspi_wire::{ADC_HZ, CLOCKS_PER_PATTERN};
 use rand::{Rng, RngExt};
@@ -95,7 +96,7 @@ pub enum TrainingCameraError {
     Leak(#[from] LeakError),
     /// The order of patterns.
     #[error(transparent)]
-    Order(#[from] OrderError),
+    Order(#[from] RowsError),
     /// The measurement.
     #[error(transparent)]
     Measurement(#[from] MeasurementError),
@@ -107,7 +108,7 @@ pub struct SimulatedCamera {
     /// What the receiver does to slots, and what calibration believes that it does.
     leaks: Leak,
     believed: Leak,
-    order: Vec<u32>,
+    order: Rows,
     light: Weather,
     heavy: Weather,
 }
@@ -181,11 +182,10 @@ impl SimulatedCamera {
         };
         let seen = exposed(&optics, sweeps, rng.random())?;
         let shown = (f64::from(sampling) * LEDS as f64).round().clamp(1.0, LEDS as f64) as usize;
-        let rows = &self.order[..shown];
-        let mut differences = self.differences(&optics, &seen, rows, sweeps, rng);
+        let rows = self.order.first(shown);
+        let mut differences = self.differences(&optics, &seen, &rows, sweeps, rng);
         self.believed.correct_differential(&mut differences);
-        let rows: Vec<i64> = rows.iter().map(|&row| i64::from(row)).collect();
-        let measured = Measurements::from_differential(Side::INSTRUMENT, &rows, &differences)?;
+        let measured = Measurements::from_differential(&rows, &differences)?;
         let image = reconstruct::hadamard(&measured);
 
         let white = white_counts(&optics);

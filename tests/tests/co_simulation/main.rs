@@ -14,7 +14,7 @@ use nirspi::session::{Deaf, Session};
 use nirspi::setup::MeasurementSetup;
 use nirspi::virtual_camera::{MemoryLink, SimulatedFpga, VirtualCamera, VirtualOptics};
 use nirspi_optics::{BudgetSettings, ChainSettings, Projector, Scene};
-use nirspi_recon::{Measurements, Order, Side, fwht, metrics, reconstruct};
+use nirspi_recon::{Measurements, Order, Rows, Side, fwht, metrics, reconstruct};
 use nirspi_wire::fpga::FpgaFrame;
 use nirspi_wire::{Command, Fault, FrameFlags};
 use std::ops::ControlFlow;
@@ -150,7 +150,7 @@ fn slow_leds_and_a_late_adc_give_the_same_bytes_with_the_same_latency() {
 fn a_calibration_burst_through_the_rtl_is_that_of_the_golden_model() {
     let optics = noiseless();
     let setup = MeasurementSetup {
-        rows: vec![0],
+        rows: Rows::natural(Side::INSTRUMENT).first(1),
         clocks_per_pattern: nirspi::calibration::HALF_PERIOD,
         blanked: 0,
         ..MeasurementSetup::new(&Order::Natural, 1.0).unwrap()

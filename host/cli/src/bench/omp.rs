@@ -273,8 +273,7 @@ fn random_problem(args: &Args) -> Result<ProblemFile> {
     if args.frames == 0 {
         return Err(Usage("--frames is 0, expected 1 or more".to_owned()).into());
     }
-    let mut rows = Order::Random(args.seed).rows(side)?;
-    rows.truncate(args.measurements);
+    let rows = Order::Random(args.seed).rows(side)?.first(args.measurements);
     let dictionary = scenes::cosines_by(&rows)?;
     let mut random = Pcg64::seed_from_u64(args.seed);
     let mut frames = Vec::with_capacity(args.frames * args.measurements);

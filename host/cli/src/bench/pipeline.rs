@@ -99,7 +99,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         return Err(Usage(format!("--sparsity is {found}, expected 1 to {most}")).into());
     }
     let side = Side::INSTRUMENT;
-    let mut rows = Order::Random(args.run.seed).rows(side)?;
+    let mut rows = Order::Random(args.run.seed).rows(side)?.to_vec();
     // The pattern that sees all light first, as every order of a camera has it.
     rows.sort_by_key(|&row| row != 0);
     rows.truncate(args.measurements as usize);

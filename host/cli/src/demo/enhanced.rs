@@ -6,7 +6,7 @@ use nirspi::imaging::{Enhance, Known, Quality, Warning, White, compare, warnings
 use nirspi::virtual_camera::VirtualOptics;
 use nirspi_nets::{DepthMaps, Device, deblur, upscale_2x};
 use nirspi_optics::DEPTH_SIDE;
-use nirspi_recon::{Image, Side};
+use nirspi_recon::{Image, Rows, Side};
 use serde::Serialize;
 
 /// The scene as a perfect camera of 64 x 64 pixels would see it, and what the stages made of it.
@@ -51,7 +51,7 @@ pub struct Report {
 /// Runs the stages on an image in ADC counts that was reconstructed from these Hadamard rows.
 pub fn run(
     image: &Image,
-    rows: &[u32],
+    rows: &Rows,
     optics: &VirtualOptics,
     seed: u64,
     times: &mut StageTimes,

@@ -11,9 +11,9 @@ use anyhow::{Context, Result};
 use indicatif::ProgressBar;
 use nirspi::files::output::OutputDir;
 use nirspi_recon::reconstruct::{
-    self, OmpSettings, Penalty, ReconstructError, RegularisedSettings,
+    self, Method, MethodSettings, Reconstruct, ReconstructError, Setting, Sparsity,
 };
-use nirspi_recon::{Basis, Image, Measurements, Order, metrics};
+use nirspi_recon::{Basis, Image, Order, metrics};
 use serde::Serialize;
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -33,7 +33,7 @@ pub struct Args {
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_values_t = [0.1, 0.2, 0.3, 0.5])]
     sampling: Vec<f64>,
     /// Orders: `recorded`, or an order's name
-    #[arg(long, value_name = "LIST", value_delimiter = ',', default_values_t = ORDERS.map(str::to_owned))]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_values_t = default_orders())]
     orders: Vec<String>,
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "sampling")]
@@ -43,60 +43,39 @@ pub struct Args {
     json: bool,
 }
 
-const ORDERS: [&str; 8] = [
-    "recorded",
-    "zig-zag",
-    "cake-cutting",
-    "russian-dolls",
-    "total-variation",
-    "sequency",
-    "natural",
-    "random:1",
-];
-
-/// A method, with its basis where it has one.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Method {
-    ZeroFilling,
-    Omp(Basis),
-    AsPrinted(Basis),
-    Penalty(Penalty, Basis),
+/// The recorded order, every order with a name, and a shuffle.
+fn default_orders() -> Vec<String> {
+    let named = Order::NAMED.iter().map(|named| named.name.to_owned());
+    std::iter::once("recorded".to_owned()).chain(named).chain(["random:1".to_owned()]).collect()
 }
 
-impl Method {
-    fn all() -> Vec<Self> {
-        let mut all = vec![Self::ZeroFilling];
-        all.extend(Basis::ALL.map(Self::Omp));
-        all.extend(Basis::ALL.map(|basis| Self::Penalty(Penalty::Tikhonov, basis)));
-        all.extend(Basis::ALL.map(|basis| Self::Penalty(Penalty::Sparse, basis)));
-        all.push(Self::Penalty(Penalty::TotalVariation, Basis::Pixel));
-        all.push(Self::AsPrinted(Basis::Dct));
-        all
-    }
+/// A method ready to run, under the name that the tables give it.
+struct Candidate {
+    name: String,
+    method: Box<dyn Reconstruct>,
+}
 
-    fn name(self) -> String {
-        match self {
-            Self::ZeroFilling => "hadamard".to_owned(),
-            Self::Omp(basis) => format!("omp, {basis}"),
-            Self::AsPrinted(basis) => format!("as printed, {basis}, k = {PRINTED_SPARSITY}"),
-            Self::Penalty(Penalty::Tikhonov, basis) => format!("tikhonov, {basis}"),
-            Self::Penalty(Penalty::Sparse, basis) => format!("fista, {basis}"),
-            Self::Penalty(Penalty::TotalVariation, _) => "tv".to_owned(),
+/// Every method, in every basis where it has one, and Algorithm 1 as printed.
+fn candidates() -> Result<Vec<Candidate>, ReconstructError> {
+    let mut all = Vec::new();
+    let mut add = |name: String, method: Method, settings: MethodSettings| {
+        method.prepare(&settings).map(|method| all.push(Candidate { name, method }))
+    };
+    for &method in Method::ALL {
+        if !method.takes(Setting::Basis) {
+            add(method.to_string(), method, MethodSettings::default())?;
+            continue;
+        }
+        for basis in Basis::ALL {
+            let settings = MethodSettings { basis, ..MethodSettings::default() };
+            add(format!("{method}, {basis}"), method, settings)?;
         }
     }
-
-    fn image(self, part: &Measurements) -> Result<Image, ReconstructError> {
-        let omp = |settings: &OmpSettings| Ok(reconstruct::omp(part, settings)?.image);
-        match self {
-            Self::ZeroFilling => Ok(reconstruct::hadamard(part)),
-            Self::Omp(basis) => omp(&OmpSettings { basis, ..OmpSettings::default() }),
-            Self::AsPrinted(basis) => omp(&OmpSettings::as_printed(basis, PRINTED_SPARSITY)),
-            Self::Penalty(penalty, basis) => {
-                let settings = RegularisedSettings { basis, ..RegularisedSettings::new(penalty) };
-                Ok(reconstruct::regularised(part, &settings)?.image)
-            }
-        }
-    }
+    let sparsity = Sparsity::Fixed(PRINTED_SPARSITY);
+    let printed = MethodSettings { as_printed: true, sparsity, ..MethodSettings::default() };
+    let name = format!("as printed, {}, k = {PRINTED_SPARSITY}", printed.basis);
+    add(name, Method::OMP, printed)?;
+    Ok(all)
 }
 
 /// Atoms of the printed algorithm.
@@ -134,7 +113,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     }
     let all = args.source.load()?.measurements;
     let full = reconstruct::hadamard(&all);
-    let methods = Method::all();
+    let methods = candidates()?;
     let steps = orders.len() * args.sampling.len() * methods.len();
     let progress = ProgressBar::new(steps as u64);
     let mut rows = Vec::with_capacity(steps);
@@ -142,9 +121,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     for &sampling in &args.sampling {
         for (name, order) in &orders {
             let part = all.take(order.as_ref(), sampling).with_context(named)?;
-            for &method in &methods {
-                let image = method.image(&part).with_context(named)?;
-                rows.push(judge(&full, &image, sampling, name, method).with_context(named)?);
+            for Candidate { name: method_name, method } in &methods {
+                let image = method.reconstruct(&part).with_context(named)?.image;
+                rows.push(judge(&full, &image, sampling, name, method_name).with_context(named)?);
                 progress.inc(1);
             }
         }
@@ -156,7 +135,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         measurements: all.rows().len(),
         rows,
     };
-    let names: Vec<String> = methods.iter().map(|method| method.name()).collect();
+    let names: Vec<String> = methods.into_iter().map(|candidate| candidate.name).collect();
     let table = table(&report, &args.orders, &names, &args.sampling);
     let mut out = OutputDir::create(&args.out)?;
     out.write("sampling.md", table.as_bytes())?;
@@ -180,7 +159,7 @@ fn judge(
     image: &Image,
     sampling: f64,
     order: &str,
-    method: Method,
+    method: &str,
 ) -> Result<Row, metrics::MetricError> {
     let side = full.side().pixels();
     let (low, high) = full
@@ -191,7 +170,7 @@ fn judge(
     Ok(Row {
         sampling,
         order: order.to_owned(),
-        method: method.name(),
+        method: method.to_owned(),
         psnr_db: metrics::psnr(full.pixels(), image.pixels(), side, side, range)?,
         correlation: metrics::correlation(full.pixels(), image.pixels(), side, side)?,
     })

@@ -4,7 +4,7 @@ use super::super::report::StageTimes;
 use anyhow::{Context, Result, bail};
 use nirspi::imaging::{Enhance, EnhancedImage, Known, Warning, White, warnings};
 use nirspi_nets::Device;
-use nirspi_recon::Image;
+use nirspi_recon::{Image, Rows};
 use serde::Serialize;
 
 /// What the learned stages found.
@@ -49,7 +49,7 @@ impl Report {
 
 /// Enhances images of 32 x 32 or 64 x 64, each with the Hadamard rows that it was made from: 64 x 64 pixels in [0, 1]
 /// each. White is the same for all, so that a video does not flicker: the median of what each would take for it.
-pub fn run(frames: &[(&Image, &[u32])], times: &mut StageTimes) -> Result<(Vec<f32>, Vec<Report>)> {
+pub fn run(frames: &[(&Image, &Rows)], times: &mut StageTimes) -> Result<(Vec<f32>, Vec<Report>)> {
     if frames.is_empty() {
         bail!("--enhance: no image");
     }

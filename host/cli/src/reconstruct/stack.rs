@@ -2,15 +2,15 @@
 
 use super::{Args, enhanced, print, spinning};
 use crate::Usage;
-use crate::method::{self, Method, Solved, solve};
+use crate::method::{self, Solved};
 use crate::report::{StageTimes, to_json};
 use anyhow::{Context, Result, bail};
 use nirspi::files::image::encode_grey;
 use nirspi::files::npy;
 use nirspi::files::output::OutputDir;
 use nirspi::source::FirstPatterns;
-use nirspi_recon::reconstruct::omp_video;
-use nirspi_recon::{Image, Measurements, Side};
+use nirspi_recon::reconstruct::{Method, Reconstruction, Setting};
+use nirspi_recon::{Image, Measurements, Rows, Side};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -44,8 +44,9 @@ struct FrameReport {
 }
 
 pub fn run(args: &Args, first: &FirstPatterns) -> Result<ExitCode> {
-    if args.warm_start && args.method.method != Method::Omp {
-        return Err(Usage("--warm-start belongs to --method omp".to_owned()).into());
+    if args.warm_start && !args.method.method.takes(Setting::WarmStart) {
+        let methods = Method::listed(|method| method.takes(Setting::WarmStart));
+        return Err(Usage(format!("--warm-start belongs to --method {methods}")).into());
     }
     let mut times = StageTimes::default();
     let sources = times.time("read", || args.source.load_all())?;
@@ -60,9 +61,9 @@ pub fn run(args: &Args, first: &FirstPatterns) -> Result<ExitCode> {
         .with_context(named)?;
     let solved = times.time("reconstruct", || spinning(|| solve_all(args, &used)))?;
     let (mut images, mut frames) = (Vec::new(), Vec::new());
-    for ((Solved { image, report }, warm), (used, source)) in
-        solved.into_iter().zip(used.iter().zip(sources))
-    {
+    for (made, (used, source)) in solved.into_iter().zip(used.iter().zip(sources)) {
+        let warm = made.report.warm;
+        let Solved { image, report } = args.method.solved(made);
         super::check_finite(&args.source.input, &image)?;
         let dropped = |d: &nirspi_recon::Dropout| {
             format!("drop-out: {} readings from y[{}] on", d.length, d.start)
@@ -75,8 +76,8 @@ pub fn run(args: &Args, first: &FirstPatterns) -> Result<ExitCode> {
     }
     let mut sharp = None;
     if args.enhance {
-        let made: Vec<(&Image, &[u32])> =
-            images.iter().zip(&used).map(|(image, used)| (image, used.rows())).collect();
+        let made: Vec<(&Image, &Rows)> =
+            images.iter().zip(&used).map(|(image, used)| (image, used.rows().as_slice())).collect();
         let (pixels, reports) = spinning(|| enhanced::run(&made, &mut times))?;
         for (frame, report) in frames.iter_mut().zip(reports) {
             frame.enhancement = Some(report);
@@ -113,15 +114,14 @@ pub fn run(args: &Args, first: &FirstPatterns) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Each image, and whether it started from the one before.
-fn solve_all(args: &Args, used: &[Measurements]) -> Result<Vec<(Solved, bool)>> {
-    if !args.warm_start {
-        return used.iter().map(|used| Ok((solve(&args.method, used)?, false))).collect();
-    }
-    let (settings, device) = args.method.omp_settings()?;
-    let frames = omp_video(used, &settings)?;
-    let solved = |found| args.method.solved(found, &settings, device.clone());
-    Ok(frames.into_iter().map(|f| (solved(f.reconstruction), f.warm)).collect())
+/// The image of each frame.
+fn solve_all(args: &Args, used: &[Measurements]) -> Result<Vec<Reconstruction>> {
+    let Some(first) = used.first() else { return Ok(Vec::new()) };
+    let method = args.method.prepare(first.side().pixels())?;
+    Ok(match args.warm_start {
+        true => method.reconstruct_video(used)?,
+        false => used.iter().map(|used| method.reconstruct(used)).collect::<Result<_, _>>()?,
+    })
 }
 
 /// The frames in rows, each stretched to its own black and white.
