@@ -57,10 +57,10 @@ impl Link for Enclosed {
         for _ in 0..100 {
             self.camera.step(1000);
         }
-        let outbox = self.camera.outbox();
-        let length = outbox.waiting().len().min(buffer.len());
-        buffer[..length].copy_from_slice(&outbox.waiting()[..length]);
-        outbox.sent(length);
+        let packets = self.camera.packets_out();
+        let length = packets.waiting().len().min(buffer.len());
+        buffer[..length].copy_from_slice(&packets.waiting()[..length]);
+        packets.sent(length);
         Ok(if length == 0 { Received::Nothing } else { Received::Bytes(length) })
     }
 }
