@@ -296,7 +296,7 @@ fn an_interlock_that_opens_ends_the_capture_with_the_reason() {
         },
         Err(error) => error.to_string(),
     };
-    assert!(message.contains("Interlock"), "{message}");
+    assert!(message.contains("interlock is open"), "{message}");
 }
 
 #[test]

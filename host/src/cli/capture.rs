@@ -151,7 +151,7 @@ fn report(
     let (ended, failed) = match &captured.ended {
         Ended::Complete => ("all frames made".to_owned(), false),
         Ended::Stopped => ("stopped by the user".to_owned(), false),
-        Ended::Fault(fault) => (format!("the camera switched its LEDs off: {fault:?}"), true),
+        Ended::Fault(fault) => (format!("the camera switched its LEDs off: {fault}"), true),
         Ended::LinkLost(error) => {
             (format!("{error}; what it made after the last frame is not known"), true)
         }

@@ -124,7 +124,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     bar.finish_and_clear();
     match &captured.ended {
         Ended::Complete | Ended::Stopped => {}
-        Ended::Fault(fault) => bail!("the virtual camera switched its LEDs off: {fault:?}"),
+        Ended::Fault(fault) => bail!("the virtual camera switched its LEDs off: {fault}"),
         Ended::LinkLost(error) => bail!("{error}"),
     }
 

@@ -121,7 +121,7 @@ fn gone(shared: &Shared, why: &str) {
 
 /// Waits until somebody says that LEDs may go on again.
 fn await_person(shared: &Shared, fault: Fault) {
-    let line = format!("the camera switched its LEDs off: {fault:?}");
+    let line = format!("the camera switched its LEDs off: {fault}");
     lock(&shared.camera).enter(Phase::Fault, line);
     shared.resume.store(false, Ordering::Relaxed);
     while !shared.is_over() && !shared.resume.swap(false, Ordering::Relaxed) {

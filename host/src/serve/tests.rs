@@ -150,7 +150,7 @@ fn after_a_fault_leds_go_on_again_only_when_a_person_says_so() {
     lab.stays_dark();
     lab.resumes();
     let told = lab.end();
-    assert!(told.iter().any(|text| text.contains("LEDs off: Interlock")), "{told:?}");
+    assert!(told.iter().any(|text| text.contains("LEDs off: the enclosure")), "{told:?}");
 }
 
 #[test]

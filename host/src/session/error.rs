@@ -60,14 +60,14 @@ fn refusal_in_words(refusal: &Refusal) -> String {
     use nirspi_wire::ConfigProblem;
     match refusal {
         Refusal::Protocol { device } => format!("it speaks protocol version {device}"),
-        Refusal::State(state) => format!("it is {state:?}"),
+        Refusal::State(state) => format!("it is {state}"),
         Refusal::Configuration(ConfigProblem::OutOfRange { field, found, min, max }) => {
-            format!("{field:?} is {found}, expected {min} to {max}")
+            format!("{field} is {found}, expected {min} to {max}")
         }
         Refusal::Configuration(ConfigProblem::OrderEntry { index, found }) => {
             format!("entry {index} of the order, {found}, is repeated or no pattern")
         }
-        Refusal::Fault(fault) => format!("a fault stands, {fault:?}"),
+        Refusal::Fault(fault) => format!("a fault stands: {fault}"),
         Refusal::NoSuchRegister { address } => format!("there is no register {address:#06x}"),
         Refusal::RawLength { max } => format!("a raw burst has 1 to {max} samples"),
         Refusal::GatewareOffset { expected } => format!("it expected the piece at {expected}"),

@@ -70,5 +70,5 @@ fn what_a_camera_reports_with_its_greeting_is_kept_and_an_earlier_hosts_mess_is_
     let mut session = Session::open(Box::new(link)).unwrap();
     assert_eq!(session.reports().len(), 1, "{:?}", session.reports());
     let reports = session.await_reports().unwrap();
-    assert!(reports[0].contains("HostSilent") && reports[1].contains("Duty"), "{reports:?}");
+    assert!(reports[0].contains("no command") && reports[1].contains("lit over time"), "{reports:?}");
 }

@@ -35,6 +35,7 @@ pub mod usb;
 pub mod walsh;
 
 mod crc32;
+mod display;
 mod stuffing;
 
 pub use crc32::{Crc32, crc32};

@@ -201,6 +201,6 @@ fn an_open_interlock_keeps_the_rtl_dark_and_the_host_is_told() {
     let options = CaptureOptions { setup, frames: Some(1), calibration, record: None };
     match capture(&mut session, &options, &mut |_| ControlFlow::Continue(())) {
         Ok(captured) => assert!(matches!(captured.ended, Ended::Fault(Fault::Interlock))),
-        Err(error) => assert!(error.to_string().contains("Interlock"), "{error}"),
+        Err(error) => assert!(error.to_string().contains("interlock is open"), "{error}"),
     }
 }

@@ -127,7 +127,7 @@ pub fn record(
     let captured = capture(&mut session, &options, &mut watch)?;
     match &captured.ended {
         Ended::Complete => {}
-        Ended::Fault(fault) => bail!("the virtual camera switched its LEDs off: {fault:?}"),
+        Ended::Fault(fault) => bail!("the virtual camera switched its LEDs off: {fault}"),
         other => bail!("the capture did not end by itself: {other:?}"),
     }
     // Too little light for a calibration is part of the picture; an answer that came too late is not.
