@@ -5,11 +5,11 @@
 //! LEDs, amplifier and ADC, 1 when all has settled. The clock at which it leaves 0 is the latency. What a
 //! pattern leaves in the slots after it (the leak) follows for any dwell and blanking.
 
-use crate::session::{Listener, Session, SessionError};
+use crate::session::{Listener, Session, SessionError, request};
 use crate::setup::MeasurementSetup;
 use nirspi_recon::{Leak, LeakError};
 use nirspi_wire::register::RAW_SAMPLES_MAX;
-use nirspi_wire::{Command, DeviceMessage, PacketError, Raw, State};
+use nirspi_wire::{DeviceMessage, PacketError, Raw, State};
 use serde::{Deserialize, Serialize};
 use std::time::{Duration, Instant};
 use thiserror::Error;
@@ -133,11 +133,11 @@ pub fn calibrate(
     listener: &mut dyn Listener,
 ) -> Result<Settling, CalibrationError> {
     let expected = usize::from(RAW_SAMPLES_MAX);
-    burst_setup().with_configuration(|c| session.command(Command::Configure(c), listener))?;
+    burst_setup().with_configuration(|c| session.command(request::Configure(c), listener))?;
     let mut samples = Vec::with_capacity(BURSTS * expected);
     for _ in 0..BURSTS {
         let mut burst = BurstListener { samples: vec![None; expected], inner: listener };
-        session.command(Command::RawBurst { samples: RAW_SAMPLES_MAX }, &mut burst)?;
+        session.command(request::RawBurst(RAW_SAMPLES_MAX), &mut burst)?;
         burst.await_end(session)?;
         let before = samples.len();
         samples.extend(burst.samples.iter().flatten().map(|&s| f64::from(s)));

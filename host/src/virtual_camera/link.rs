@@ -41,7 +41,8 @@ impl<F: SimulatedFpga, G: GatewareLoader + Send> Link for MemoryLink<F, G> {
         }
         let packets = self.camera.packets_out();
         let length = packets.waiting().len().min(buffer.len());
-        if let (Some(to), Some(from)) = (buffer.get_mut(..length), packets.waiting().get(..length)) {
+        if let (Some(to), Some(from)) = (buffer.get_mut(..length), packets.waiting().get(..length))
+        {
             to.copy_from_slice(from);
         }
         packets.sent(length);
