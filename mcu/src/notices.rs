@@ -11,11 +11,8 @@ use heapless::Deque;
 use nirspi_wire::message::CRASH_TEXT_MAX;
 use nirspi_wire::{
     ADC_BITS, ADC_HZ, Answer, CrashReport, DeviceMessage, Event, Identity, PROTOCOL_VERSION,
-    Refusal, Reply, SIDE, Version,
+    Refusal, Reply, SIDE, Version, WAVELENGTH_NM,
 };
-
-/// Wavelength of the LEDs (paper, section 2.A).
-const WAVELENGTH_NM: u16 = 1550;
 
 /// A command's outcome that borrows nothing.
 #[derive(Debug, Clone, Copy, PartialEq)]

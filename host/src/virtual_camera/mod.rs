@@ -34,7 +34,7 @@ const PACKETS_BYTES: usize = 1 << 18;
 /// Device time between depth maps: 15 Hz, as 8 x 8 time-of-flight sensors give.
 const DEPTH_PERIOD: Micros = Micros(66_667);
 /// Zones along one edge of the depth map.
-const DEPTH_SIDE: u8 = 8;
+const DEPTH_SIDE: u8 = nirspi_optics::DEPTH_SIDE as u8;
 
 /// Packets on their way to the host.
 #[derive(Debug, Default)]
@@ -210,4 +210,21 @@ fn crate_version() -> Version {
         part(env!("CARGO_PKG_VERSION_MINOR")),
         part(env!("CARGO_PKG_VERSION_PATCH")),
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use nirspi_optics::{DEPTH_SIDE, instrument};
+    use nirspi_wire::register::LATENCY_MAX;
+
+    #[test]
+    fn the_optics_have_the_instruments_numbers() {
+        assert_eq!(instrument::SIDE, usize::from(nirspi_wire::SIDE));
+        assert_eq!(instrument::LEDS, usize::from(nirspi_wire::PATTERNS));
+        assert_eq!(instrument::WAVELENGTH_NM, f64::from(nirspi_wire::WAVELENGTH_NM));
+        assert_eq!(instrument::SAMPLE_NS * f64::from(nirspi_wire::ADC_HZ), 1e9);
+        assert_eq!(instrument::FULL_SCALE_COUNTS, nirspi_wire::ADC_MAX);
+        assert_eq!(instrument::MAX_ADC_LATENCY_CLOCKS, LATENCY_MAX);
+        assert_eq!(usize::from(super::DEPTH_SIDE), DEPTH_SIDE);
+    }
 }
