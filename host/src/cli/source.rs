@@ -5,7 +5,7 @@ use anyhow::{Context, Result, bail};
 use nirspi::account::LossCounters;
 use nirspi::files::npz::{self, MeasurementFile, Readings, Selection};
 use nirspi::integrate::Integrated;
-use nirspi::recording::{self, Recording};
+use nirspi::recording::{End, Recording};
 use nirspi::tally::{self, tally_recording};
 use nirspi_recon::{Dropout, Image, Measurements};
 use std::io::Read;
@@ -125,11 +125,10 @@ fn from_npz(args: &SourceArgs, file: MeasurementFile) -> Result<Source> {
     Ok(Source { measurements, dropouts, reference: file.reference, frames: None, notes })
 }
 
-/// Sums the frames of a recording, counting again what became of each. The setup stands at the start of the file; packets are
-/// summed in a second pass.
+/// Sums the frames of a recording, counting again what became of each.
 fn from_recording(args: &SourceArgs) -> Result<Source> {
-    let recording = recording::read(&args.input, |_, _| {})?;
-    let (integrated, counters) = tally_recording(&args.input, &recording.setup)?;
+    let mut recording = Recording::open(&args.input)?;
+    let (integrated, counters) = tally_recording(&mut recording)?;
     if integrated.frames() == 0 {
         return no_frame(&args.input);
     }
@@ -137,8 +136,8 @@ fn from_recording(args: &SourceArgs) -> Result<Source> {
 }
 
 fn frames_of_recording(args: &SourceArgs) -> Result<Vec<Source>> {
-    let recording = recording::read(&args.input, |_, _| {})?;
-    let (frames, counters) = tally::frames_of_recording(&args.input, &recording.setup)?;
+    let mut recording = Recording::open(&args.input)?;
+    let (frames, counters) = tally::frames_of_recording(&mut recording)?;
     if frames.is_empty() {
         return no_frame(&args.input);
     }
@@ -156,7 +155,8 @@ fn of_frames(
     integrated: &Integrated,
     counters: LossCounters,
 ) -> Result<Source> {
-    let Recording { setup, settling, cut_short, account, .. } = recording;
+    let Recording { setup, settling, .. } = recording;
+    let End { cut_short, account, .. } = recording.end();
     let mut notes: Vec<String> = integrated.warnings().into_iter().map(str::to_owned).collect();
     if let Some(reason) = cut_short {
         notes.push(format!("the recording is cut short or damaged: {reason}"));
