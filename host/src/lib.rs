@@ -10,7 +10,8 @@
 //! * [`tally`] and [`integrate`] turn frames into measurements; `nirspi-recon` turns those into an image,
 //! * [`files`], [`picture`] and [`scene`] are what people see and hand over, [`resolution`] says how fine it is,
 //!   [`legibility`] whether somebody can read it,
-//! * [`serve`] shows a camera live on a web page, [`white`] gives its images a scale,
+//! * [`serve`] shows a camera live on a web page, [`white_level`] gives its images a scale,
+//! * [`causes`] tells an error with its causes,
 //! * [`training`] makes pairs to train networks on, through the virtual camera,
 //! * [`udev`] lets users use cameras on USB; [`boards`] lists the boards that firmware is for; with the feature `flash`, `flash` programs them,
 //! * [`virtual_camera`] is a camera without silicon: optics simulator, gateware model, real firmware logic.
@@ -19,6 +20,7 @@ pub mod account;
 pub mod boards;
 pub mod calibrate;
 pub mod capture;
+pub mod causes;
 pub mod events;
 pub mod files;
 #[cfg(feature = "flash")]
@@ -41,4 +43,4 @@ pub mod training;
 pub mod udev;
 pub mod versions;
 pub mod virtual_camera;
-pub mod white;
+pub mod white_level;

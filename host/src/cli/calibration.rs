@@ -78,6 +78,7 @@ impl CalibrationArgs {
         Ok(match KeptCalibration::read(&file, camera) {
             Ok(kept) => Choice::kept(kept, file),
             Err(problem) => {
+                let problem = nirspi::causes::in_one_line(&problem);
                 let note = Some(format!("kept calibration not used, measured afresh: {problem}"));
                 Choice { note, ..Choice::plain(Calibration::Measure) }
             }

@@ -8,6 +8,7 @@ use anyhow::Result;
 use indicatif::{ProgressBar, ProgressStyle};
 use nirspi::account::LossCounters;
 use nirspi::capture::{Capture, CaptureOptions, Ended, Progress, capture};
+use nirspi::causes;
 use nirspi::session::CameraIdentity;
 use serde::Serialize;
 use std::ops::ControlFlow;
@@ -152,9 +153,13 @@ fn report(
         Ended::Complete => ("all frames made".to_owned(), false),
         Ended::Stopped => ("stopped by the user".to_owned(), false),
         Ended::Fault(fault) => (format!("the camera switched its LEDs off: {fault}"), true),
-        Ended::LinkLost(error) => {
-            (format!("{error}; what it made after the last frame is not known"), true)
-        }
+        Ended::LinkLost(error) => (
+            format!(
+                "{}; what it made after the last frame is not known",
+                causes::in_one_line(error)
+            ),
+            true,
+        ),
     };
     let report = Report {
         camera,
@@ -172,7 +177,7 @@ fn report(
         calibrated: captured.settling.is_some(),
         calibration: choice.origin.clone(),
         calibration_note: choice.note.as_deref(),
-        calibration_problem: captured.calibration_problem.as_ref().map(ToString::to_string),
+        calibration_problem: captured.calibration_problem.as_ref().map(|p| causes::in_one_line(p)),
     };
     if args.json {
         print::json(&report)?;

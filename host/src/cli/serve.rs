@@ -5,8 +5,8 @@ use super::calibration::{CalibrationArgs, Choice};
 use super::camera::{SceneArgs, SetupArgs};
 use super::method::{Method, MethodArgs, Solver};
 use super::networks::Networks;
+use super::print;
 use super::serve_virtual::stop_on_signal;
-use super::{one_line, print};
 use anyhow::{Context, Result};
 use nirspi::serve::settings::{MAX_FRAMES, Settings};
 use nirspi::serve::{CameraSource, Connect, Connected, Imaging, Reconstruct, serve};
@@ -106,7 +106,7 @@ fn methods(args: &MethodArgs) -> Result<Vec<(&'static str, Reconstruct)>> {
         let solver =
             Solver::new(&MethodArgs { method, ..args.clone() }, Side::INSTRUMENT.pixels())?;
         let solve: Reconstruct = Box::new(move |measurements| {
-            solver.solve(measurements).map(|solved| solved.image).map_err(|e| one_line(&e))
+            solver.solve(measurements).map(|solved| solved.image).map_err(Into::into)
         });
         Ok((method.argument(), solve))
     };
@@ -139,5 +139,5 @@ fn connect(args: Args, setup: MeasurementSetup) -> Connect {
         session.await_reports()?;
         prepared(session, &args.calibration, &setup)
     };
-    Box::new(move || found().map_err(|error| one_line(&error)))
+    Box::new(move || found().map_err(Into::into))
 }

@@ -5,14 +5,17 @@
 use super::settings::Settings;
 use super::slot::Look;
 use super::state::{Offered, Published, Rate, Rates, State};
-use super::{Shared, lock};
-use crate::white::{SteadyWhite, brightest};
+use super::{ForeignError, Shared, lock};
+use crate::causes;
+use crate::integrate::IntegrateError;
+use crate::white_level::{SteadyWhite, brightest};
 use nirspi_nets::consistency::MeasuredRows;
-use nirspi_nets::{Enhancer, Images, Options, fusion};
+use nirspi_nets::{Enhancer, Images, ImagesError, Options, fusion};
 use nirspi_recon::{Image, Measurements, Side};
 use serde::Serialize;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use thiserror::Error;
 use tokio::sync::watch;
 
 /// Least time from image to image: more than this no screen shows.
@@ -20,8 +23,31 @@ const PACE: Duration = Duration::from_millis(33);
 /// How often pages hear of a camera that sends nothing.
 const HEARTBEAT: Duration = Duration::from_millis(500);
 
-/// Makes an image in the measurements' units, or says in one line why not.
-pub type Reconstruct = Box<dyn Fn(&Measurements) -> Result<Image, String> + Send>;
+/// Makes an image in the measurements' units.
+pub type Reconstruct = Box<dyn Fn(&Measurements) -> Result<Image, ForeignError> + Send>;
+
+/// Why a look gave no picture.
+#[derive(Debug, Error)]
+enum PictureError {
+    /// The settings name a method that there is not.
+    #[error("there is no method {0}")]
+    Method(&'static str),
+    /// The frames give no measurements.
+    #[error(transparent)]
+    Measurements(#[from] IntegrateError),
+    /// The method gives no image.
+    #[error(transparent)]
+    Reconstruct(#[from] ForeignError),
+    /// The image is not of the instrument's size, or not finite.
+    #[error("the frames gave no image of finite numbers")]
+    NotFinite,
+    /// The networks do not take the image.
+    #[error(transparent)]
+    Images(#[from] ImagesError),
+    /// The networks returned nothing.
+    #[error("the networks gave no image")]
+    NoImage,
+}
 
 /// All that makes images.
 pub struct Imaging {
@@ -78,7 +104,7 @@ pub fn run(shared: &Shared, imaging: &Imaging, publish: &watch::Sender<Arc<Publi
             let settings = *lock(&shared.settings);
             match imaging.picture(&look, settings, &mut white) {
                 Ok(made) => (picture, problem) = (Some(Arc::new(made)), None),
-                Err(why) => problem = Some(why),
+                Err(why) => problem = Some(causes::in_one_line(&why)),
             }
             shared.slot.done(problem.is_none());
         }
@@ -118,22 +144,20 @@ impl Imaging {
         look: &Look,
         settings: Settings,
         white: &mut SteadyWhite,
-    ) -> Result<Picture, String> {
+    ) -> Result<Picture, PictureError> {
         let started = Instant::now();
         let (_, reconstruct) = self
             .methods
             .iter()
             .find(|(name, _)| *name == settings.method)
-            .ok_or_else(|| format!("no method {}", settings.method))?;
-        let measurements = look
-            .sum
-            .measurements(&look.run.setup, look.run.settling.as_ref(), false)
-            .map_err(|error| error.to_string())?;
+            .ok_or(PictureError::Method(settings.method))?;
+        let measurements =
+            look.sum.measurements(&look.run.setup, look.run.settling.as_ref(), false)?;
         let image = reconstruct(&measurements)?;
         let reconstruct_ms = ms_since(started);
         let side = image.side().pixels();
         if side != Side::INSTRUMENT.pixels() || image.pixels().iter().any(|p| !p.is_finite()) {
-            return Err("the frames gave no image of finite numbers".to_owned());
+            return Err(PictureError::NotFinite);
         }
         let white_counts = white.follow(brightest(image.pixels(), side));
         let scale = if white_counts > 0.0 { 1.0 / white_counts } else { 0.0 };
@@ -161,10 +185,9 @@ impl Imaging {
         image: &[f32],
         look: &Look,
         rows: &[u32],
-    ) -> Result<(Vec<f32>, Enhancement), String> {
+    ) -> Result<(Vec<f32>, Enhancement), PictureError> {
         let started = Instant::now();
-        let images: Images<'_, { fusion::SIDE }> =
-            Images::new(image).map_err(|error| error.to_string())?;
+        let images: Images<'_, { fusion::SIDE }> = Images::new(image)?;
         let measured = MeasuredRows::new(fusion::SIDE, rows);
         let options = Options { measured, ..Options::default() };
         let depth = look.depth.as_deref();
@@ -172,7 +195,7 @@ impl Imaging {
         let (Some(estimate), Some(&inconsistency)) =
             (result.estimates.first(), result.inconsistency.first())
         else {
-            return Err("the networks gave no image".to_owned());
+            return Err(PictureError::NoImage);
         };
         let found = Enhancement {
             blur_px: estimate.sigma_px,

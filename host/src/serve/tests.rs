@@ -80,7 +80,7 @@ fn enclosed(hands: &Arc<Hands>, was_open: bool) -> Connected {
 struct Lab {
     hands: Arc<Hands>,
     shared: Arc<Shared>,
-    measuring: JoinHandle<Result<(), String>>,
+    measuring: JoinHandle<Result<(), CaptureError>>,
 }
 
 impl Lab {

@@ -3,7 +3,7 @@
 use super::super::networks::Networks;
 use super::super::report::StageTimes;
 use anyhow::{Result, bail};
-use nirspi::white::brightest;
+use nirspi::white_level::brightest;
 use nirspi_nets::consistency::MeasuredRows;
 use nirspi_nets::{
     Backend, Enhanced, Enhancer, Images, Method, Options, Sharpener, deblur, fusion,
