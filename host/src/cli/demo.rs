@@ -125,7 +125,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     match &captured.ended {
         Ended::Complete | Ended::Stopped => {}
         Ended::Fault(fault) => bail!("the virtual camera switched its LEDs off: {fault}"),
-        Ended::LinkLost(error) => bail!(error),
+        Ended::LinkLost(error) => bail!("{}", nirspi::causes::in_one_line(error)),
     }
 
     let mut notes: Vec<String> =
