@@ -13,6 +13,7 @@
 //!   [`legibility`] whether somebody can read it,
 //! * [`imaging`] scales, enhances and judges images, and says when not to trust them,
 //! * [`serve`] shows a camera live on a web page,
+//! * [`causes`] tells an error with its causes,
 //! * [`training`] makes pairs to train networks on, through the virtual camera,
 //! * [`udev`] lets users use cameras on USB; [`boards`] lists the boards that firmware is for; with the feature `flash`, `flash` programs them,
 //! * [`virtual_camera`] is a camera without silicon: optics simulator, gateware model, real firmware logic.
@@ -21,6 +22,7 @@ pub mod account;
 pub mod boards;
 pub mod calibration;
 pub mod capture;
+pub mod causes;
 pub mod events;
 pub mod files;
 #[cfg(feature = "flash")]

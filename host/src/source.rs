@@ -5,7 +5,7 @@ use crate::capture::Capture;
 use crate::files::FileError;
 use crate::files::npz::{self, MeasurementFile, Readings, Selection};
 use crate::integrate::{IntegrateError, Integrated};
-use crate::recording::{self, Recording, RecordingError};
+use crate::recording::{End, Recording, RecordingError};
 use crate::tally::{self, tally_recording};
 use nirspi_recon::{Dropout, Image, MeasurementError, Measurements, Order, reconstruct};
 use std::io::Read;
@@ -232,11 +232,10 @@ fn from_npz(path: &Path, file: MeasurementFile) -> Result<Source, SourceError> {
     Ok(Source { measurements, dropouts, reference: file.reference, frames: None, notes })
 }
 
-/// Sums the frames of a recording, counting again what became of each. The setup stands at the start of the file; packets are
-/// summed in a second pass.
+/// Sums the frames of a recording, counting again what became of each.
 fn from_recording(path: &Path, options: SourceOptions) -> Result<Source, SourceError> {
-    let recording = recording::read(path, |_, _| {})?;
-    let (integrated, counters) = tally_recording(path, &recording.setup)?;
+    let mut recording = Recording::open(path)?;
+    let (integrated, counters) = tally_recording(&mut recording)?;
     if integrated.frames() == 0 {
         return Err(SourceError::NoFrame(path.to_owned()));
     }
@@ -244,8 +243,8 @@ fn from_recording(path: &Path, options: SourceOptions) -> Result<Source, SourceE
 }
 
 fn frames_of_recording(path: &Path, options: SourceOptions) -> Result<Vec<Source>, SourceError> {
-    let recording = recording::read(path, |_, _| {})?;
-    let (frames, counters) = tally::frames_of_recording(path, &recording.setup)?;
+    let mut recording = Recording::open(path)?;
+    let (frames, counters) = tally::frames_of_recording(&mut recording)?;
     if frames.is_empty() {
         return Err(SourceError::NoFrame(path.to_owned()));
     }
@@ -260,7 +259,8 @@ fn of_frames(
     integrated: &Integrated,
     counters: LossCounters,
 ) -> Result<Source, SourceError> {
-    let Recording { setup, settling, cut_short, account, .. } = recording;
+    let Recording { setup, settling, .. } = recording;
+    let End { cut_short, account, .. } = recording.end();
     let mut notes: Vec<String> = integrated.warnings().into_iter().map(str::to_owned).collect();
     if let Some(reason) = cut_short {
         notes.push(format!("the recording is cut short or damaged: {reason}"));

@@ -45,7 +45,7 @@ pub enum RuleError {
     #[error("{0}: not written by nirspi, so left as it is")]
     Foreign(PathBuf),
     /// It cannot be read or removed.
-    #[error("{path}: {source}")]
+    #[error("{path}: cannot read or remove it")]
     Io {
         /// Which file.
         path: PathBuf,
@@ -64,8 +64,8 @@ impl RuleError {
         let source = match self {
             Self::Foreign(_) => return false,
             Self::Io { source, .. } => Some(source),
-            Self::Write(error) => std::error::Error::source(error)
-                .and_then(|source| source.downcast_ref::<io::Error>()),
+            Self::Write(FileError::Io { system, .. }) => Some(system),
+            Self::Write(_) => None,
         };
         source.is_some_and(|source| source.kind() == io::ErrorKind::PermissionDenied)
     }
@@ -150,7 +150,7 @@ mod tests {
             RuleError::Write(FileError::Io {
                 path: PathBuf::from("/etc/udev/rules.d"),
                 attempt: "write",
-                source: kind.into(),
+                system: kind.into(),
             })
         };
         assert!(error(io::ErrorKind::PermissionDenied).is_permission());

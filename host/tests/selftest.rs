@@ -212,7 +212,9 @@ fn an_open_interlock_fails_what_needs_light_and_names_the_reason() {
     let found = test(MemoryLink::new(camera));
     let interlock = found.checks.iter().find(|check| check.name() == "device: interlock").unwrap();
     assert_eq!(interlock.verdict(), Verdict::Failed);
-    assert!(failures(&found).iter().skip(1).all(|check| check.note().contains("Interlock")));
+    assert!(
+        failures(&found).iter().skip(1).all(|check| check.note().contains("interlock is open"))
+    );
     assert!(found.settling.is_none());
 }
 

@@ -8,7 +8,7 @@ use nirspi::scene::{SceneMap, SceneSource};
 use nirspi::setup::MeasurementSetup;
 use nirspi::virtual_camera::VirtualOptics;
 use nirspi_optics::Projector;
-use nirspi_optics::rain::{Drops, RainError};
+use nirspi_optics::rain::{Drops, PaperRain, RainError};
 use nirspi_recon::Order;
 use std::path::Path;
 use std::str::FromStr;
@@ -60,8 +60,8 @@ impl Rain {
     pub fn drops(self) -> Result<Option<Drops>, RainError> {
         match self {
             Self::None => Ok(None),
-            Self::Light => Drops::monodisperse(1.93, 0.5).map(Some),
-            Self::Heavy => Drops::monodisperse(5.6, 2.0).map(Some),
+            Self::Light => PaperRain::LIGHT.drops().map(Some),
+            Self::Heavy => PaperRain::HEAVY.drops().map(Some),
         }
     }
 }

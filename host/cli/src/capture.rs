@@ -9,6 +9,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use nirspi::account::LossCounters;
 use nirspi::calibration::{Choice, Origin};
 use nirspi::capture::{Capture, CaptureOptions, Ended, Progress, capture};
+use nirspi::causes;
 use nirspi::session::CameraIdentity;
 use serde::Serialize;
 use std::ops::ControlFlow;
@@ -156,10 +157,14 @@ fn report(
     let (ended, failed) = match &captured.ended {
         Ended::Complete => ("all frames made".to_owned(), false),
         Ended::Stopped => ("stopped by the user".to_owned(), false),
-        Ended::Fault(fault) => (format!("the camera switched its LEDs off: {fault:?}"), true),
-        Ended::LinkLost(error) => {
-            (format!("{error}; what it made after the last frame is not known"), true)
-        }
+        Ended::Fault(fault) => (format!("the camera switched its LEDs off: {fault}"), true),
+        Ended::LinkLost(error) => (
+            format!(
+                "{}; what it made after the last frame is not known",
+                causes::in_one_line(error)
+            ),
+            true,
+        ),
     };
     let report = Report {
         camera,
@@ -177,7 +182,7 @@ fn report(
         calibrated: captured.settling.is_some(),
         calibration: choice.used(captured).cloned(),
         calibration_note: choice.note.as_deref(),
-        calibration_problem: captured.calibration_problem.as_ref().map(ToString::to_string),
+        calibration_problem: captured.calibration_problem.as_ref().map(|p| causes::in_one_line(p)),
     };
     if args.json {
         print::json(&report)?;

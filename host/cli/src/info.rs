@@ -54,8 +54,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         parts,
         fpga_answers,
         state: match status.fault {
-            Some(fault) => format!("{:?}: {fault:?}", status.state),
-            None => format!("{:?}", status.state),
+            Some(fault) => format!("{}: {fault}", status.state),
+            None => status.state.to_string(),
         },
         uptime_s: status.uptime_us as f64 * 1e-6,
         temperature_celsius: temperature(&status),

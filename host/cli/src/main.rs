@@ -36,7 +36,6 @@ mod upscale;
 
 use clap::{Parser, Subcommand};
 use nirspi::files::FileError;
-use nirspi::scene::SceneError;
 use std::process::ExitCode;
 
 /// An open near-infrared single-pixel camera: capture, virtual camera, reconstruction.
@@ -151,21 +150,7 @@ fn mistake_in_one_line(message: &str) -> String {
     line
 }
 
-/// The error and its causes in one line; causes that only repeat what was said are left out.
+/// The error and its causes in one line.
 fn one_line(error: &anyhow::Error) -> String {
-    let mut line = String::new();
-    for cause in error.chain() {
-        let text = cause.to_string();
-        if !line.contains(&text) {
-            if !line.is_empty() {
-                line.push_str(": ");
-            }
-            line.push_str(&text);
-        }
-        // It has told its cause, in its own words.
-        if cause.is::<FileError>() || cause.is::<SceneError>() {
-            break;
-        }
-    }
-    line.replace('\n', " ")
+    nirspi::causes::in_one_line(error.as_ref())
 }

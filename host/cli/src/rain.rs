@@ -8,7 +8,7 @@ use anyhow::{Context, Result};
 use nirspi_optics::mie::{Index, Mie};
 use nirspi_optics::rain::fall::{beta, fall_speed_m_per_s, fall_time_constant_s};
 use nirspi_optics::rain::radar::drops_reflectivity_db;
-use nirspi_optics::rain::{DropClass, Drops, Medium};
+use nirspi_optics::rain::{DropClass, Drops, Medium, PaperRain};
 use nirspi_optics::water::Water;
 use serde::Serialize;
 use std::ops::RangeInclusive;
@@ -106,7 +106,7 @@ const BUDGET_DISTANCES_M: RangeInclusive<f64> = 0.05..=65.0;
 #[derive(Debug, Clone, clap::Args)]
 pub struct DropArgs {
     /// Rain rate, in mm/h
-    #[arg(long, value_name = "R", default_value_t = 5.6, allow_negative_numbers = true)]
+    #[arg(long, value_name = "R", default_value_t = PaperRain::HEAVY.rate_mm_per_h, allow_negative_numbers = true)]
     pub rate_mm_h: f64,
     /// Drop sizes: marshall-palmer, mono:MM, gamma:SHAPE,SLOPE (slope per mm), fog:UM,G (mode in um, water in g/m3),
     /// or a CSV file of diameters in mm and drops per m3

@@ -8,7 +8,7 @@ use nirspi::files::output::OutputDir;
 use nirspi::picture::{Axis, Chart, Line};
 use nirspi_optics::pixel::{Instrument, PixelBudget};
 use nirspi_optics::rain::blur::DEEPEST_OPTICAL_DEPTH;
-use nirspi_optics::rain::{Drops, Weather};
+use nirspi_optics::rain::{Drops, PaperRain, Weather};
 use nirspi_optics::range::{Wanted, as_printed_mm, extinction_needed_per_m, farthest_mm};
 use nirspi_optics::water::Water;
 use serde::Serialize;
@@ -46,14 +46,13 @@ pub struct Args {
 /// A row of the paper's Table 2.
 struct Row {
     name: &'static str,
-    rate_mm_per_h: f64,
-    drop_mm: f64,
+    rain: PaperRain,
     range_m: (f64, f64),
 }
 
 const TABLE_2: [Row; 2] = [
-    Row { name: "light", rate_mm_per_h: 1.93, drop_mm: 0.5, range_m: (0.1, 2.0) },
-    Row { name: "heavy", rate_mm_per_h: 5.6, drop_mm: 2.0, range_m: (0.2, 1.5) },
+    Row { name: "light", rain: PaperRain::LIGHT, range_m: (0.1, 2.0) },
+    Row { name: "heavy", rain: PaperRain::HEAVY, range_m: (0.2, 1.5) },
 ];
 
 /// Algorithm 2's Z_max: how far patterns are projected (paper, 2.A).
@@ -97,24 +96,30 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let mut weathers = Vec::new();
     let mut rows = Vec::new();
     for row in &TABLE_2 {
-        let drops = Drops::monodisperse(row.rate_mm_per_h, row.drop_mm)?;
+        let drops = row.rain.drops()?;
         let weather = Weather::new(drops, nm, Water::Segelstein)?;
         for &exposure_us in &args.exposures_us {
             let wanted = Wanted { reflectance: args.reflectance, exposure_us, snr };
             let metres = |mm: f64| mm * 1e-3;
             rows.push(RowReport {
                 rain: row.name,
-                rate_mm_per_h: row.rate_mm_per_h,
-                drop_mm: row.drop_mm,
+                rate_mm_per_h: row.rain.rate_mm_per_h,
+                drop_mm: row.rain.drop_mm,
                 extinction_per_m: weather.medium().extinction_per_m,
                 loss_over_2_m_percent: 100.0 * (1.0 - weather.medium().transmission(2.0)),
                 exposure_us,
                 paper_m: row.range_m,
                 physics_m: farthest_mm(&instrument, &weather, &wanted).map_err(usage)?.map(metres),
                 dry_air_m: farthest_mm(&instrument, &dry, &wanted).map_err(usage)?.map(metres),
-                as_printed_m: as_printed_mm(&instrument, &weather, &wanted, row.drop_mm, Z_MAX_MM)
-                    .map(metres)
-                    .map_err(usage)?,
+                as_printed_m: as_printed_mm(
+                    &instrument,
+                    &weather,
+                    &wanted,
+                    row.rain.drop_mm,
+                    Z_MAX_MM,
+                )
+                .map(metres)
+                .map_err(usage)?,
             });
         }
         weathers.push(weather);

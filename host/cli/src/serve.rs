@@ -4,8 +4,8 @@ use super::address::{self, CameraAddress};
 use super::calibration::CalibrationArgs;
 use super::camera::{SceneArgs, SetupArgs};
 use super::method::MethodArgs;
+use super::print;
 use super::serve_virtual::stop_on_signal;
-use super::{one_line, print};
 use anyhow::{Context, Result};
 use nirspi::calibration::Choice;
 use nirspi::imaging::Enhance;
@@ -128,5 +128,5 @@ fn connect(args: Args, setup: MeasurementSetup) -> Connect {
         session.await_reports()?;
         prepared(session, &args.calibration, &setup)
     };
-    Box::new(move || found().map_err(|error| one_line(&error)))
+    Box::new(move || found().map_err(Into::into))
 }

@@ -3,6 +3,7 @@
 //! | module | from | to |
 //! |---|---|---|
 //! | [`drops`] | a rain rate, a law of sizes | drops per cubic metre, by diameter |
+//! | [`paper`] | light or heavy | the rain of the paper's Table 2 |
 //! | [`fall`] | diameter, air density | fall speed, time constant, share of an exposure |
 //! | [`medium`] | drops, wavelength | extinction, scattering, absorption, scattering angles |
 //! | [`blur`] | scattering angles, distance | where forward-scattered light lands on the target |
@@ -20,6 +21,7 @@ pub mod drops;
 pub mod fall;
 pub mod falling;
 pub mod medium;
+pub mod paper;
 pub mod radar;
 pub mod spots;
 pub mod veil;
@@ -29,6 +31,7 @@ pub use blur::ForwardBlur;
 pub use drops::{DropClass, Drops};
 pub use falling::{BeamShadows, FallingDrops};
 pub use medium::{Medium, ScatteringAngles};
+pub use paper::PaperRain;
 pub use spots::RainySpots;
 pub use veil::Veil;
 pub use weather::Weather;

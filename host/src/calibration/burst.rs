@@ -12,11 +12,11 @@
 //! A burst that does not show the latency is an error and never a latency of 0
 //! (`a_burst_too_dim_or_without_an_edge_is_an_error`): with a wrong latency every picture is wrong, most of them inverted.
 
-use crate::session::{Listener, Session, SessionError};
+use crate::session::{Listener, Session, SessionError, request};
 use crate::setup::MeasurementSetup;
 use nirspi_recon::{Leak, LeakError, Rows, Side};
 use nirspi_wire::register::RAW_SAMPLES_MAX;
-use nirspi_wire::{Command, DeviceMessage, PacketError, Raw, State};
+use nirspi_wire::{DeviceMessage, PacketError, Raw, State};
 use serde::{Deserialize, Serialize};
 use std::time::{Duration, Instant};
 use thiserror::Error;
@@ -168,11 +168,11 @@ fn bursts(
     listener: &mut dyn Listener,
 ) -> Result<Vec<f64>, CalibrationError> {
     let expected = usize::from(RAW_SAMPLES_MAX);
-    burst_setup().with_configuration(|c| session.command(Command::Configure(c), listener))?;
+    burst_setup().with_configuration(|c| session.command(request::Configure(c), listener))?;
     let mut samples = Vec::with_capacity(BURSTS * expected);
     for _ in 0..BURSTS {
         let mut burst = BurstListener { samples: vec![None; expected], inner: listener };
-        session.command(Command::RawBurst { samples: RAW_SAMPLES_MAX }, &mut burst)?;
+        session.command(request::RawBurst(RAW_SAMPLES_MAX), &mut burst)?;
         burst.await_end(session)?;
         let before = samples.len();
         samples.extend(burst.samples.iter().flatten().map(|&s| f64::from(s)));

@@ -52,7 +52,7 @@ enum Kind {
 #[derive(Debug, Error)]
 pub enum CalibrationFileError {
     /// The file cannot be read.
-    #[error("{path}: {source}")]
+    #[error("{path}: cannot read the calibration")]
     Io {
         /// Which file.
         path: PathBuf,
@@ -97,7 +97,7 @@ pub enum CalibrationFileError {
     #[error(transparent)]
     Write(#[from] FileError),
     /// Nowhere to keep anything.
-    #[error("no data directory to keep calibrations in: {0}")]
+    #[error("no data directory to keep calibrations in")]
     NoHome(#[from] HomeDirError),
 }
 

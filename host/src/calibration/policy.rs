@@ -85,12 +85,12 @@ impl CalibrationPolicy {
                 };
                 Ok(match KeptCalibration::read(&file, camera) {
                     Ok(kept) => Choice::of(kept, file, measure_first),
-                    Err(problem) => Choice {
-                        note: Some(format!(
-                            "kept calibration not used, measured afresh: {problem}"
-                        )),
-                        ..Choice::plain(Calibration::Measure)
-                    },
+                    Err(problem) => {
+                        let problem = causes::in_one_line(&problem);
+                        let note =
+                            format!("kept calibration not used, measured afresh: {problem}");
+                        Choice { note: Some(note), ..Choice::plain(Calibration::Measure) }
+                    }
                 })
             }
         }

@@ -1,7 +1,11 @@
+<<<<<<<< HEAD:host/src/imaging/white.rs
 //! White level of an image of unknown scale: the mean of its brightest 2 x 2 pixels.
+========
+//! The level of white in an image of unknown scale: the mean of the brightest 2 x 2 pixels.
+>>>>>>>> mcu:host/src/white_level.rs
 //!
-//! No light is 0; that much a differential measurement knows. A single bright pixel may be noise, and a share of all
-//! pixels says nothing about a letter on a dark ground.
+//! Black needs no estimate: a differential measurement reads 0 without light. One bright pixel alone may be noise, and
+//! a percentile of all pixels says nothing about a letter on a dark ground.
 
 /// A step of white that the scene makes; below it is noise.
 const JUMP: f32 = 0.25;

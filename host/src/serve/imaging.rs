@@ -6,18 +6,41 @@ use super::settings::Settings;
 use super::slot::Look;
 use super::state::{Offered, Published, Rate, Rates, State};
 use super::{Shared, lock};
-use crate::imaging::{Enhance, Known, SteadyWhite, Warning, White, brightest, warnings};
+use crate::causes;
+use crate::imaging::{Enhance, EnhanceError, Known, SteadyWhite, Warning, White, brightest, warnings};
+use crate::integrate::IntegrateError;
 use nirspi_recon::Side;
-use nirspi_recon::reconstruct::Reconstruct;
+use nirspi_recon::reconstruct::{Reconstruct, ReconstructError};
 use serde::Serialize;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use thiserror::Error;
 use tokio::sync::watch;
 
 /// Least time from image to image: more than this no screen shows.
 const PACE: Duration = Duration::from_millis(33);
 /// How often pages hear of a camera that sends nothing.
 const HEARTBEAT: Duration = Duration::from_millis(500);
+
+/// Why a look gave no picture.
+#[derive(Debug, Error)]
+enum PictureError {
+    /// The settings name a method that there is not.
+    #[error("there is no method {0}")]
+    Method(&'static str),
+    /// The frames give no measurements.
+    #[error(transparent)]
+    Measurements(#[from] IntegrateError),
+    /// The method gives no image.
+    #[error(transparent)]
+    Reconstruct(#[from] ReconstructError),
+    /// The image is not of the instrument's size, or not finite.
+    #[error("the frames gave no image of finite numbers")]
+    NotFinite,
+    /// The networks do not take the image.
+    #[error(transparent)]
+    Enhance(#[from] EnhanceError),
+}
 
 /// All that makes images.
 pub struct Imaging {
@@ -76,7 +99,7 @@ pub fn run(shared: &Shared, imaging: &Imaging, publish: &watch::Sender<Arc<Publi
             let settings = *lock(&shared.settings);
             match imaging.picture(&look, settings, &mut white) {
                 Ok(made) => (picture, problem) = (Some(Arc::new(made)), None),
-                Err(why) => problem = Some(why),
+                Err(why) => problem = Some(causes::in_one_line(&why)),
             }
             shared.slot.done(problem.is_none());
         }
@@ -116,23 +139,20 @@ impl Imaging {
         look: &Look,
         settings: Settings,
         white: &mut SteadyWhite,
-    ) -> Result<Picture, String> {
+    ) -> Result<Picture, PictureError> {
         let started = Instant::now();
         let (_, method) = self
             .methods
             .iter()
             .find(|(name, _)| *name == settings.method)
-            .ok_or_else(|| format!("no method {}", settings.method))?;
-        let measurements = look
-            .sum
-            .measurements(&look.run.setup, look.run.settling.as_ref(), false)
-            .map_err(|error| error.to_string())?;
-        let made = method.reconstruct(&measurements).map_err(|error| error.to_string())?;
-        let image = made.image;
+            .ok_or(PictureError::Method(settings.method))?;
+        let measurements =
+            look.sum.measurements(&look.run.setup, look.run.settling.as_ref(), false)?;
+        let image = method.reconstruct(&measurements)?.image;
         let reconstruct_ms = ms_since(started);
         let side = image.side().pixels();
         if side != Side::INSTRUMENT.pixels() || image.pixels().iter().any(|p| !p.is_finite()) {
-            return Err("the frames gave no image of finite numbers".to_owned());
+            return Err(PictureError::NotFinite);
         }
         let white_counts = white.follow(brightest(image.pixels(), side));
         let mut all: Vec<String> = look.sum.warnings().into_iter().map(str::to_owned).collect();
@@ -144,10 +164,7 @@ impl Imaging {
                 depth: look.depth.as_deref(),
                 ..Known::default()
             };
-            let made = self
-                .enhance
-                .enhance(&image, White::Known(white_counts), &known)
-                .map_err(|error| error.to_string())?;
+            let made = self.enhance.enhance(&image, White::Known(white_counts), &known)?;
             let doubts = warnings(&made);
             short.extend(doubts.iter().map(Warning::short));
             all.extend(doubts.iter().map(Warning::to_string));

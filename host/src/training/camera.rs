@@ -6,13 +6,13 @@
 //! mismeasures stays in every picture. The tests hold all this against captures by the whole camera.
 
 use crate::calibration::{CalibrationError, Settling, calibrate};
-use crate::session::{Deaf, Session, SessionError};
+use crate::session::{IgnorePackets, Session, SessionError};
 use crate::virtual_camera::{MemoryLink, VirtualOptics, VirtualOpticsError};
 use nirspi_nets::data::SIDE_PX;
 use nirspi_nets::degrade::{Degrade, DegradeError, Depth, Reading, defocus};
-use nirspi_optics::rain::{Drops, RainError, Weather};
+use nirspi_optics::rain::{Drops, PaperRain, RainError, Weather};
 use nirspi_optics::water::Water;
-use nirspi_optics::{LEDS, Projector, Scene, SceneError};
+use nirspi_optics::{LEDS, Projector, Scene, SceneError, WAVELENGTH_NM};
 use nirspi_recon::{
     Leak, LeakError, MeasurementError, Measurements, Order, Rows, RowsError, Side, fwht,
     reconstruct,
@@ -44,9 +44,9 @@ const NO_DEPTH: f32 = 0.2;
 pub enum Rainfall {
     /// Dry air.
     None,
-    /// 1.93 mm/h of 0.5 mm drops.
+    /// [`PaperRain::LIGHT`].
     Light,
-    /// 5.6 mm/h of 2 mm drops.
+    /// [`PaperRain::HEAVY`].
     Heavy,
 }
 
@@ -102,9 +102,11 @@ pub enum TrainingCameraError {
     Measurement(#[from] MeasurementError),
 }
 
-/// The virtual camera, calibrated.
+/// The virtual camera's optics and calibration as one linear map from a picture to readings.
+///
+/// No packets, firmware or clocks take part, so it makes many pictures a second; `tests` hold it to the virtual camera.
 #[derive(Debug, Clone)]
-pub struct SimulatedCamera {
+pub struct LinearCamera {
     /// What the receiver does to slots, and what calibration believes that it does.
     leaks: Leak,
     believed: Leak,
@@ -113,7 +115,7 @@ pub struct SimulatedCamera {
     heavy: Weather,
 }
 
-impl SimulatedCamera {
+impl LinearCamera {
     /// Opens a virtual camera before a white sheet at 0.3 m and calibrates it.
     ///
     /// # Errors
@@ -123,7 +125,8 @@ impl SimulatedCamera {
         let field_mm = Projector::default().field_mm(distance_mm);
         let optics = VirtualOptics::new(Scene::new(vec![1.0], 1, field_mm)?, distance_mm)?;
         let mut session = Session::open(Box::new(MemoryLink::new(optics.camera(seed)?)))?;
-        let believed = calibrate(&mut session, &mut Deaf)?.leak(CLOCKS_PER_PATTERN, BLANKED)?;
+        let believed =
+            calibrate(&mut session, &mut IgnorePackets)?.leak(CLOCKS_PER_PATTERN, BLANKED)?;
         let response = |n| optics.chain().settling(n);
         // Two poles of nanoseconds have settled to rounding after as many clocks.
         let exact = Settling {
@@ -133,13 +136,13 @@ impl SimulatedCamera {
             step_counts: 0.0,
             noise_counts: 0.0,
         };
-        let weather = |drops: Drops| Weather::new(drops, 1550.0, Water::Segelstein);
+        let weather = |drops: Drops| Weather::new(drops, WAVELENGTH_NM, Water::Segelstein);
         Ok(Self {
             leaks: exact.leak(CLOCKS_PER_PATTERN, BLANKED)?,
             believed,
             order: Order::CakeCutting.rows(Side::INSTRUMENT)?,
-            light: weather(Drops::monodisperse(1.93, 0.5)?)?,
-            heavy: weather(Drops::monodisperse(5.6, 2.0)?)?,
+            light: weather(PaperRain::LIGHT.drops()?)?,
+            heavy: weather(PaperRain::HEAVY.drops()?)?,
         })
     }
 
@@ -249,7 +252,7 @@ impl SimulatedCamera {
     }
 }
 
-impl Degrade for SimulatedCamera {
+impl Degrade for LinearCamera {
     fn degrade(&self, scene: &[f32], rng: &mut Pcg64Mcg) -> Result<Reading, DegradeError> {
         let refused = |error: TrainingCameraError| DegradeError::Camera(error.to_string());
         if scene.len() != SIDE_PX * SIDE_PX {

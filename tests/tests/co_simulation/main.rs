@@ -10,13 +10,13 @@ mod tap;
 
 use fpga::RtlFpga;
 use nirspi::capture::{Calibration, Capture, CaptureOptions, Ended, capture};
-use nirspi::session::{Deaf, Session};
+use nirspi::session::{IgnorePackets, Session, request};
 use nirspi::setup::MeasurementSetup;
 use nirspi::virtual_camera::{MemoryLink, SimulatedFpga, VirtualCamera, VirtualOptics};
 use nirspi_optics::{BudgetSettings, ChainSettings, Projector, Scene};
 use nirspi_recon::{Measurements, Order, Rows, Side, fwht, metrics, reconstruct};
 use nirspi_wire::fpga::FpgaFrame;
-use nirspi_wire::{Command, Fault, FrameFlags};
+use nirspi_wire::{Fault, FrameFlags};
 use std::ops::ControlFlow;
 use std::time::Duration;
 use tap::{Log, Tap};
@@ -156,10 +156,12 @@ fn a_calibration_burst_through_the_rtl_is_that_of_the_golden_model() {
         ..MeasurementSetup::new(&Order::Natural, 1.0).unwrap()
     };
     let burst = |mut session: Session, log: Log| {
-        setup.with_configuration(|c| session.command(Command::Configure(c), &mut Deaf)).unwrap();
-        session.command(Command::RawBurst { samples: 1024 }, &mut Deaf).unwrap();
+        setup
+            .with_configuration(|c| session.command(request::Configure(c), &mut IgnorePackets))
+            .unwrap();
+        session.command(request::RawBurst(1024), &mut IgnorePackets).unwrap();
         while log.bytes().is_empty() {
-            session.listen(Duration::from_millis(50), &mut Deaf).unwrap();
+            session.listen(Duration::from_millis(50), &mut IgnorePackets).unwrap();
         }
         log.bytes()
     };
@@ -201,6 +203,6 @@ fn an_open_interlock_keeps_the_rtl_dark_and_the_host_is_told() {
     let options = CaptureOptions { setup, frames: Some(1), calibration, record: None };
     match capture(&mut session, &options, &mut |_| ControlFlow::Continue(())) {
         Ok(captured) => assert!(matches!(captured.ended, Ended::Fault(Fault::Interlock))),
-        Err(error) => assert!(error.to_string().contains("Interlock"), "{error}"),
+        Err(error) => assert!(error.to_string().contains("interlock is open"), "{error}"),
     }
 }

@@ -17,7 +17,7 @@ use emulated::Emulated;
 use fpga::RtlFpga;
 use nirspi::capture::{Calibration, Capture, CaptureOptions, Ended, capture};
 use nirspi::link::{Link, Received};
-use nirspi::session::{Deaf, Session, SessionError};
+use nirspi::session::{IgnorePackets, Session, SessionError, request};
 use nirspi::setup::MeasurementSetup;
 use nirspi::virtual_camera::{MemoryLink, VirtualOptics};
 use nirspi_optics::Scene;
@@ -27,8 +27,8 @@ use nirspi_tests::pages::{page, table};
 use nirspi_tests::tamper::{Fate, Tampered, only_frames};
 use nirspi_wire::packet::MAX_DEVICE_PACKET;
 use nirspi_wire::{
-    Command, Deframed, Deframer, DeviceMessage, Fault, Frame, FrameFlags, GatewareChunk, Refusal,
-    RunLength, State, open,
+    Deframed, Deframer, DeviceMessage, Fault, Frame, FrameFlags, GatewareChunk, Refusal, RunLength,
+    State, open,
 };
 use std::io;
 use std::ops::ControlFlow;
@@ -271,13 +271,13 @@ fn an_open_interlock_keeps_the_emulated_board_dark() {
     let mut session = Session::open(board.link()).unwrap();
     board.set_interlock(false);
     let refused = natural()
-        .with_configuration(|c| session.command(Command::Configure(c), &mut Deaf))
+        .with_configuration(|c| session.command(request::Configure(c), &mut IgnorePackets))
         .unwrap_err();
     let SessionError::Refused { refusal: Refusal::Fault(Fault::Interlock), .. } = refused else {
         panic!("{refused}");
     };
     board.set_interlock(true);
-    while !session.status(&mut Deaf).unwrap().interlock_closed {}
+    while !session.status(&mut IgnorePackets).unwrap().interlock_closed {}
     assert!(measure(&mut session, &natural(), 1).counters.is_complete(), "closed, it measures");
 }
 
@@ -286,11 +286,11 @@ fn an_fpga_that_falls_silent_is_a_fault_that_the_host_is_told() {
     let Some(board) = Emulated::start(optics().fpga(SEED).unwrap()) else { return };
     let mut session = Session::open(board.link()).unwrap();
     assert_eq!(session.identity().board, "mps2-an505");
-    assert_eq!(session.status(&mut Deaf).unwrap().fault, None);
+    assert_eq!(session.status(&mut IgnorePackets).unwrap().fault, None);
     board.unplug_fpga();
     let mut fault = None;
     for _ in 0..100 {
-        fault = session.status(&mut Deaf).unwrap().fault;
+        fault = session.status(&mut IgnorePackets).unwrap().fault;
         if fault.is_some() {
             break;
         }
@@ -322,7 +322,7 @@ fn firmware_that_crashes_starts_again_and_tells_the_next_host_once() {
                 Some((tapped, session))
             })
             .unwrap();
-        session.status(&mut Deaf).unwrap();
+        session.status(&mut IgnorePackets).unwrap();
         let captured = measure(&mut session, &natural(), 1);
         assert!(captured.counters.is_complete(), "it measures again");
         tapped.crashes()
@@ -352,17 +352,17 @@ fn the_stack_is_never_deeper_than_three_quarters_of_its_limit() {
     debugger.go();
     // Everything that a host can ask for, refused commands too.
     let mut session = Session::open(board.link()).unwrap();
-    let _ = session.command(Command::Start(RunLength::Continuous), &mut Deaf);
-    let _ = session.command(Command::RawBurst { samples: 0 }, &mut Deaf);
+    let _ = session.command(request::Start(RunLength::Continuous), &mut IgnorePackets);
+    let _ = session.command(request::RawBurst(0), &mut IgnorePackets);
     let piece = GatewareChunk { offset: 0, total: 4, crc: 0, data: &[1, 2] };
-    let _ = session.command(Command::LoadGateware(piece), &mut Deaf);
-    let _ = session.command(Command::SelfTest, &mut Deaf);
+    let _ = session.command(request::LoadGateware(piece), &mut IgnorePackets);
+    let _ = session.command(request::SelfTest, &mut IgnorePackets);
     let table = MeasurementSetup::new(&Order::Random(1), 1.0).unwrap();
     for setup in [natural(), table] {
         assert!(measure(&mut session, &setup, 2).counters.is_complete());
     }
-    session.command(Command::RawBurst { samples: 4096 }, &mut Deaf).unwrap();
-    while session.status(&mut Deaf).unwrap().state == State::Running {}
+    session.command(request::RawBurst(4096), &mut IgnorePackets).unwrap();
+    while session.status(&mut IgnorePackets).unwrap().state == State::Running {}
 
     let stack = debugger.read(end, start);
     let untouched = stack.iter().take_while(|&&byte| byte == PAINT).count();

@@ -5,7 +5,7 @@ use super::folder::Folder;
 use crate::{Usage, print};
 use anyhow::{Context, Result};
 use indicatif::{ProgressBar, ProgressStyle};
-use nirspi::training::{Mixed, SimulatedCamera};
+use nirspi::training::{LinearCamera, Mixed};
 use nirspi_nets::Weights;
 use nirspi_nets::degrade::{AnalyticCamera, Limits};
 use nirspi_nets::device::{Backend, Device};
@@ -105,7 +105,7 @@ pub fn run(args: &Args, model: Model) -> Result<ExitCode> {
     };
     let camera = args.camera_share > 0.0 && !classifier;
     let camera =
-        if camera { Some((SimulatedCamera::new(args.seed)?, args.camera_share)) } else { None };
+        if camera { Some((LinearCamera::new(args.seed)?, args.camera_share)) } else { None };
     let degrade = Mixed { analytic: AnalyticCamera::new(limits)?, camera };
     let enlarge = args.enlarge(model)?;
     let fine = match model {

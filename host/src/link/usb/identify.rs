@@ -154,7 +154,7 @@ pub enum UsbError {
         camera: String,
     },
     /// The system's USB gave up.
-    #[error("USB: {0}")]
+    #[error("the system's USB failed")]
     Io(#[from] io::Error),
 }
 

@@ -1,19 +1,18 @@
 //! Replies and events that wait for room on the link.
 //!
-//! The one law: what is put in comes out once, in order. A command is taken only while there is
-//! [room](Outbox::has_room_for_a_command) for its reply and for all that can follow it on its own accord.
+//! # Invariant
+//! What is put in comes out once, in order. A command is taken only while there is
+//! [room](Notices::has_room_for_a_command) for its reply and for every event that the command can lead to:
+//! `tests::laws::each_command_is_answered_once_and_in_order`.
 
+use crate::packets::send;
 use crate::{BoardInfo, Crash, PacketSink};
 use heapless::Deque;
 use nirspi_wire::message::CRASH_TEXT_MAX;
-use nirspi_wire::packet::{encode, overhead};
 use nirspi_wire::{
     ADC_BITS, ADC_HZ, Answer, CrashReport, DeviceMessage, Event, Identity, PROTOCOL_VERSION,
-    Refusal, Reply, SIDE, Version,
+    Refusal, Reply, SIDE, Version, WAVELENGTH_NM,
 };
-
-/// Wavelength of the LEDs (paper, section 2.A).
-const WAVELENGTH_NM: u16 = 1550;
 
 /// A command's outcome that borrows nothing.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -50,10 +49,11 @@ const NOTICES_OF_A_COMMAND: usize = 4;
 /// Bytes of postcard of the longest notice, a crash report; an identity with two full names is 91 at most.
 const NOTICE_BYTES: usize = 16 + CRASH_TEXT_MAX;
 
+/// Replies and events in the order in which they came.
 #[derive(Debug, Default)]
-pub(crate) struct Outbox(Deque<Notice, CAPACITY>);
+pub(crate) struct Notices(Deque<Notice, CAPACITY>);
 
-impl Outbox {
+impl Notices {
     pub fn push(&mut self, notice: Notice) {
         let pushed = self.0.push_back(notice);
         debug_assert!(pushed.is_ok(), "a command was taken without room for what it leads to");
@@ -125,24 +125,4 @@ fn message<'m>(
             DeviceMessage::Reply(Reply { id, outcome: Ok(Answer::Hello(identity)) })
         }
     })
-}
-
-/// Bytes of postcard around the samples of a frame, a raw burst or a depth map, at most.
-pub(crate) const STREAM_HEADER_BYTES: usize = 64;
-
-/// Sends a message of at most `payload` bytes of postcard; `false`: the link has no room for it.
-pub(crate) fn send(
-    message: &DeviceMessage<'_>,
-    payload: usize,
-    sink: &mut impl PacketSink,
-) -> bool {
-    let Some(room) = sink.claim(payload.saturating_add(overhead(payload))) else {
-        return false;
-    };
-    let Ok(packet) = encode(message, room) else {
-        return false;
-    };
-    let length = packet.len();
-    sink.commit(length);
-    true
 }

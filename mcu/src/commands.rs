@@ -1,11 +1,13 @@
 //! Commands of the host, one at a time, each answered once.
 //!
-//! The one law: nothing is done for a host before its `Hello` has shown that it speaks this protocol; and a
-//! refused command has changed nothing, but for a `Configure` that failed half way on the bus
-//! ([`Refusal::Bus`]), which leaves nothing configured.
+//! # Invariant
+//! Nothing is done for a host before its `Hello` has shown that it speaks this protocol
+//! (`tests::commands::nothing_is_done_before_hello`). A refused command has changed nothing, but for a `Configure` that
+//! failed half way on the bus ([`Refusal::Bus`]), which leaves nothing configured
+//! (`tests::commands::settings_that_do_not_arrive_leave_nothing_configured`).
 
-use crate::camera::{Activity, Machine};
-use crate::outbox::{Notice, Outcome};
+use crate::machine::{Activity, Machine, Session};
+use crate::notices::{Notice, Outcome};
 use crate::{
     FpgaBus, GatewareLoader, Inputs, Micros, PacketSink, Ports, configure, fpga, gateware, safety,
 };
@@ -14,17 +16,6 @@ use nirspi_wire::{
     Answer, Command, Configuration, GatewareChunk, PATTERNS, PROTOCOL_VERSION, PatternOrder,
     Refusal, Request, State, Status,
 };
-
-/// What is known of the host.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Session {
-    /// No `Hello` since power-up or since the link was closed.
-    Closed,
-    /// It speaks this protocol.
-    Open,
-    /// It speaks another one: it is told ours, and nothing else.
-    Foreign,
-}
 
 impl Machine {
     pub(crate) fn carry_out<B: FpgaBus, S: PacketSink, G: GatewareLoader>(
@@ -45,7 +36,7 @@ impl Machine {
             Command::Configure(configuration) => {
                 self.configure(now, &configuration, inputs, *bus).map(|()| Answer::Done)
             }
-            Command::Start(length) => self.start(now, length, *bus).map(|()| Answer::Done),
+            Command::Start(length) => self.start_run(now, length, *bus).map(|()| Answer::Done),
             Command::Stop => return self.stop(id, now, *bus, Outcome::DONE),
             Command::Status => Ok(Answer::Status(self.status(now, inputs, *bus))),
             Command::SelfTest => match self.state() {
@@ -73,7 +64,7 @@ impl Machine {
         self.stop(id, now, bus, Outcome::Hello { gateware });
         self.session = if protocol == PROTOCOL_VERSION { Session::Open } else { Session::Foreign };
         if self.session == Session::Open && self.crash.is_some() {
-            self.outbox.push(Notice::Crash);
+            self.notices.push(Notice::Crash);
         }
     }
 
