@@ -108,10 +108,10 @@ pub enum CaptureError {
     Session(#[from] SessionError),
     /// Latency and settling could not be measured, and none are known.
     #[error(
-        "{0}; hold a white sheet before the camera and run nirspi calibrate once, or name a latency that you know with \
-         --no-calibration --adc-latency N"
+        "the camera's ADC latency is not known (hold a white sheet before the camera and run nirspi calibrate once, or name \
+         a latency that you know with --no-calibration --adc-latency N)"
     )]
-    Calibration(CalibrationError),
+    Calibration(#[source] CalibrationError),
     /// The recording cannot be started.
     #[error("{path}: cannot record")]
     Recording {

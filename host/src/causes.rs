@@ -23,7 +23,7 @@ pub fn in_one_line(error: &(dyn Error + 'static)) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibrate::CalibrationError;
+    use crate::calibration::CalibrationError;
     use crate::recording::RecordingError;
     use crate::session::SessionError;
     use std::io;

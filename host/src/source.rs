@@ -97,19 +97,21 @@ pub enum SourceError {
     #[error(transparent)]
     Recording(#[from] RecordingError),
     /// Its readings are not measurements.
-    #[error("{}: {problem}", .path.display())]
+    #[error("{}", .path.display())]
     Measurements {
         /// Which file.
         path: PathBuf,
         /// What is wrong with them.
+        #[source]
         problem: MeasurementError,
     },
     /// The frames give no measurements.
-    #[error("{}: {problem}", .path.display())]
+    #[error("{}", .path.display())]
     Integrate {
         /// Which file.
         path: PathBuf,
         /// What is wrong with them.
+        #[source]
         problem: IntegrateError,
     },
     /// A recording without frames.

@@ -8,7 +8,7 @@ use nirspi::session::Session;
 use nirspi::virtual_camera::{
     MemoryLink, OpticalFpga, SimulatedFpga, VirtualCamera, VirtualOptics,
 };
-use nirspi_hdl::Lines;
+use nirspi_hdl_model::Lines;
 use nirspi_mcu::{BusError, FpgaBus};
 use nirspi_optics::{LedArray, Scene};
 use nirspi_wire::register::{Register, mode};

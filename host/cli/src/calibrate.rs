@@ -5,7 +5,7 @@ use super::camera::SceneArgs;
 use super::print;
 use anyhow::{Context, Result};
 use nirspi::calibration::{KeptCalibration, calibrate, path_of};
-use nirspi::session::Deaf;
+use nirspi::session::IgnorePackets;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -44,7 +44,7 @@ struct Report {
 
 pub fn run(args: &Args) -> Result<ExitCode> {
     let mut session = address::open(&args.camera, &SceneArgs::white_sheet(args.seed))?;
-    let settling = calibrate(&mut session, &mut Deaf)
+    let settling = calibrate(&mut session, &mut IgnorePackets)
         .with_context(|| format!("{}: not calibrated", args.camera))?;
     let camera = session.identity().clone();
     let file = match &args.calibration {

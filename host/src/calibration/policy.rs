@@ -2,6 +2,7 @@
 
 use super::{CalibrationFileError, KeptCalibration, path_of};
 use crate::capture::{Calibration, Capture};
+use crate::causes;
 use crate::session::CameraIdentity;
 use crate::setup::MeasurementSetup;
 use serde::Serialize;

@@ -69,11 +69,12 @@ impl fmt::Display for CameraAddress {
 #[non_exhaustive]
 pub enum OpenError {
     /// Nothing answers there.
-    #[error("no camera at tcp:{address}: {problem}")]
+    #[error("no camera at tcp:{address}")]
     Tcp {
         /// The address.
         address: String,
         /// What the network says.
+        #[source]
         problem: io::Error,
     },
     /// The port cannot be used.
@@ -88,16 +89,17 @@ pub enum OpenError {
     #[error(transparent)]
     Usb(#[from] UsbError),
     /// It does not speak as a camera does.
-    #[error("{camera}: {problem}")]
+    #[error("{camera}")]
     Session {
         /// The camera's address.
         camera: String,
         /// What went wrong.
+        #[source]
         problem: SessionError,
     },
     /// The virtual camera cannot be built.
-    #[error("the virtual camera: {0}")]
-    Virtual(Box<dyn std::error::Error + Send + Sync>),
+    #[error("the virtual camera cannot be built")]
+    Virtual(#[source] Box<dyn std::error::Error + Send + Sync>),
 }
 
 impl CameraAddress {

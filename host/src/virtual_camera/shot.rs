@@ -6,7 +6,7 @@ use crate::capture::{
     Calibration, Capture, CaptureError, CaptureOptions, Ended, Progress, capture,
 };
 use crate::integrate::IntegrateError;
-use crate::session::{Deaf, Session, SessionError};
+use crate::session::{IgnorePackets, Session, SessionError};
 use crate::setup::MeasurementSetup;
 use nirspi_recon::Measurements;
 use nirspi_wire::Fault;
@@ -24,13 +24,13 @@ pub enum ShotError {
     #[error(transparent)]
     Session(#[from] SessionError),
     /// A white sheet did not show the latency.
-    #[error("before a white sheet, {0}")]
-    Calibration(CalibrationError),
+    #[error("the virtual camera is not calibrated before its white sheet")]
+    Calibration(#[source] CalibrationError),
     /// The capture did not start.
     #[error(transparent)]
     Capture(#[from] CaptureError),
     /// The camera switched its LEDs off.
-    #[error("the virtual camera switched its LEDs off: {0:?}")]
+    #[error("the virtual camera switched its LEDs off: {0}")]
     Fault(Fault),
     /// The caller stopped the capture.
     #[error("the capture was stopped after {received} frames")]
@@ -53,7 +53,7 @@ pub enum ShotError {
 pub fn calibrate_against_white(optics: &VirtualOptics, seed: u64) -> Result<Settling, ShotError> {
     let sheet = optics.white_sheet()?;
     let mut session = Session::open(Box::new(MemoryLink::new(sheet.camera(seed)?)))?;
-    calibrate(&mut session, &mut Deaf).map_err(ShotError::Calibration)
+    calibrate(&mut session, &mut IgnorePackets).map_err(ShotError::Calibration)
 }
 
 /// Captures `frames` frames with the camera behind these optics, whose latency and settling are known.

@@ -74,7 +74,7 @@ pub fn package() -> String {
         constants.push((name.into(), value));
     }
     let mut text = String::from(
-        "/// Addresses, bits, codes and limits, from `mcu/wire`. Written by `tests/rtl/map.rs`: do not edit.\n\
+        "/// Addresses, bits, codes and limits, from `mcu/wire`. Written by `hdl/sim/tests/rtl/map.rs`: do not edit.\n\
          pub package register_map {\n",
     );
     let width = constants.iter().map(|(name, _)| name.len()).max().unwrap_or(0);

@@ -1,7 +1,7 @@
 //! The host port: which addresses exist, and what reads and writes of them do at rest.
 
 use crate::bench::Bench;
-use nirspi_hdl::Gateware;
+use nirspi_hdl_model::Gateware;
 use nirspi_wire::register::{Access, ORDER_TABLE, Register, status};
 use proptest::prelude::*;
 

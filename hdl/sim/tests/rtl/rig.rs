@@ -3,13 +3,13 @@
 //! The one law: the model is never asked what the RTL does; it runs `DEPTH` clocks behind and is given only
 //! what the pins were given, at the moment that the `access` pin says an access took effect.
 //!
-//! What `hdl/src/lib.rs` lets the RTL take a few clocks more for is bounded here: [`STOP_CLOCKS`],
+//! What `hdl/model/src/lib.rs` lets the RTL take a few clocks more for is bounded here: [`STOP_CLOCKS`],
 //! [`TRIP_CLOCKS`] and the start, which follows its access by [`START_CLOCKS`]. Everything else is exact:
 //! LED lines at every clock, both ready pins, every register read, every byte of a frame or burst.
 
 use crate::pins::Pins;
 use crate::project::Project;
-use nirspi_hdl::{AdcSample, Gateware, Lines};
+use nirspi_hdl_model::{AdcSample, Gateware, Lines};
 use nirspi_wire::{
     FrameFlags, crc32,
     fpga::{FpgaFrame, Sums},

@@ -1,7 +1,7 @@
 //! A gateware on the bench: interlock closed, registers by name, samples made from a seed.
 
 use crate::oracle::Measured;
-use nirspi_hdl::{AdcSample, Gateware};
+use nirspi_hdl_model::{AdcSample, Gateware};
 use nirspi_wire::{
     fpga::FpgaFrame,
     register::{FaultCode, Register, control, status},

@@ -1,7 +1,7 @@
 //! What switches the LEDs off, and that nothing switches them on again by itself.
 
 use crate::bench::Bench;
-use nirspi_hdl::{AdcSample, Gateware};
+use nirspi_hdl_model::{AdcSample, Gateware};
 use nirspi_wire::register::{
     DUTY_LIMIT_MAX, DUTY_WINDOW, FaultCode, ORDER_TABLE, Register, WATCHDOG_MAX, control, mode,
     status,

@@ -1,6 +1,6 @@
 //! The simulated RTL as the firmware's FPGA bus.
 //!
-//! The one law: the simulator lives on one thread, which it cannot leave; what is asked of it is done before
+//! The simulator lives on one thread, which it cannot leave; what is asked of it is done before
 //! the call returns, so a run is as repeatable as if there were no thread.
 
 use crate::board::{Board, Seen};

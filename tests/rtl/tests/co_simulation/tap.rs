@@ -1,6 +1,6 @@
 //! What an FPGA gives its firmware, noted on the way.
 //!
-//! The one law: nothing is changed but the moment of a start, and that only where it is asked for.
+//! Nothing is changed but the moment of a start, and that only where it is asked for.
 
 use nirspi::virtual_camera::SimulatedFpga;
 use nirspi_mcu::{BusError, FpgaBus};

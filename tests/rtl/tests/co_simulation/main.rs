@@ -1,20 +1,19 @@
 //! From light to image through the RTL: host, firmware, four SPI lines, gateware, LEDs, photodiode.
 //!
-//! The one law: the golden model's camera gets the same scene and the same commands, and gives the same bytes.
+//! The golden model's camera gets the same scene and the same commands, and gives the same bytes.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap in a helper fails its test")]
 
-mod board;
 mod calibration;
-mod fpga;
+mod emulated;
 mod tap;
 
-use fpga::RtlFpga;
 use nirspi::capture::{Calibration, Capture, CaptureOptions, Ended, capture};
 use nirspi::session::{IgnorePackets, Session, request};
 use nirspi::setup::MeasurementSetup;
 use nirspi::virtual_camera::{MemoryLink, SimulatedFpga, VirtualCamera, VirtualOptics};
 use nirspi_optics::{BudgetSettings, ChainSettings, Projector, Scene};
 use nirspi_recon::{Measurements, Order, Rows, Side, fwht, metrics, reconstruct};
+use nirspi_tests_rtl::RtlFpga;
 use nirspi_wire::fpga::FpgaFrame;
 use nirspi_wire::{Fault, FrameFlags};
 use std::ops::ControlFlow;

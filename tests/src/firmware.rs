@@ -1,15 +1,23 @@
 //! The firmware's ELF and the emulator: found, built, or said to be missing.
 //!
-//! The one law: what is not there is said aloud; what is there and does not work fails.
+//! What is missing is skipped aloud. What is there and does not work fails.
+#![expect(clippy::unwrap_used, reason = "a failed unwrap here fails the test that uses it")]
 
-use nirspi_tests::root;
+use crate::root;
+use nirspi::boards::Board;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
-const TARGET: &str = "thumbv8m.main-none-eabihf";
-const BOARD: &str = "mps2-an505";
+/// The emulated board.
+///
+/// # Panics
+/// If it has no `board.toml`.
+#[must_use]
+pub fn board() -> &'static Board {
+    Board::named("mps2-an505").unwrap()
+}
 
 /// Past the test harness's capture, so that a skipped test is seen.
 fn skipped(reason: &str) {
@@ -17,6 +25,7 @@ fn skipped(reason: &str) {
 }
 
 /// QEMU: `$NIRSPI_QEMU`, or `qemu-system-arm` on the `PATH`, or what `install-qemu.sh` has unpacked.
+#[must_use]
 pub fn qemu() -> Option<PathBuf> {
     let unpacked = root().join("target/qemu/qemu-system-arm");
     let candidates = [
@@ -35,6 +44,10 @@ pub fn qemu() -> Option<PathBuf> {
 }
 
 /// The firmware: `$NIRSPI_FIRMWARE_ELF`, or built here.
+///
+/// # Panics
+/// If it does not build.
+#[must_use]
 pub fn elf() -> Option<&'static Path> {
     static ELF: OnceLock<Option<PathBuf>> = OnceLock::new();
     ELF.get_or_init(|| {
@@ -42,7 +55,7 @@ pub fn elf() -> Option<&'static Path> {
             return Some(given.into());
         }
         if !has_target() {
-            skipped("no thumbv8m target");
+            skipped(&format!("no {} target", board().target));
             return None;
         }
         Some(build())
@@ -52,22 +65,22 @@ pub fn elf() -> Option<&'static Path> {
 
 /// Whether the compiler has the target's core library. One that has not would be fetched, which takes a network.
 fn has_target() -> bool {
-    let output =
-        Command::new("rustc").args(["--print", "target-libdir", "--target", TARGET]).output();
+    let output = Command::new("rustc")
+        .args(["--print", "target-libdir", "--target", board().target])
+        .output();
     let Ok(output) = output else { return false };
     let folder = String::from_utf8_lossy(&output.stdout);
     output.status.success() && Path::new(folder.trim()).is_dir()
 }
 
 fn build() -> PathBuf {
-    let target = root().join("boards/target");
+    let name = board().name;
     let status = Command::new("cargo")
-        .args(["build", "--release", "--locked", "--quiet", "--target-dir"])
-        .arg(&target)
-        .current_dir(root().join("boards/mps2-an505"))
+        .args(["build", "--release", "--locked", "--quiet", "--target-dir", "../target"])
+        .current_dir(root().join("boards").join(name))
         .env_remove("CARGO_TARGET_DIR")
         .status()
         .unwrap();
-    assert!(status.success(), "boards/mps2-an505 does not build");
-    target.join(TARGET).join("release").join(BOARD)
+    assert!(status.success(), "boards/{name} does not build");
+    root().join(board().elf())
 }

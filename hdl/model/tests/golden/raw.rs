@@ -2,7 +2,7 @@
 
 use crate::bench::{Bench, random_sample};
 use crate::oracle::{Setup, setup};
-use nirspi_hdl::AdcSample;
+use nirspi_hdl_model::AdcSample;
 use nirspi_wire::register::{FaultCode, Register, TEST_SEED, control, mode, status, test_sample};
 use proptest::prelude::*;
 

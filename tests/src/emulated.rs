@@ -1,6 +1,7 @@
 //! An emulated board with a simulated FPGA at one UART and a TCP address at the other.
 //!
-//! The one law: the firmware is the ELF as it was linked; nothing is put into it or taken out of it.
+//! The firmware is the ELF as it was linked; nothing is put into it or taken out of it.
+#![expect(clippy::unwrap_used, reason = "a failed unwrap here fails the test that uses it")]
 
 use nirspi::link::{Link, TcpLink};
 use nirspi::virtual_camera::{SimulatedFpga, serve_tunnel};
@@ -43,11 +44,19 @@ fn accept(listener: &TcpListener, qemu: &mut Child) -> TcpStream {
 
 impl Emulated {
     /// Powers up in front of `fpga`. `None` where there is no emulator or no firmware, said aloud.
+    ///
+    /// # Panics
+    /// If QEMU ends before it connects.
+    #[must_use]
     pub fn start(fpga: impl SimulatedFpga + 'static) -> Option<Self> {
         Self::start_with(fpga, &[])
     }
 
     /// As [`start`](Self::start), with more arguments for QEMU.
+    ///
+    /// # Panics
+    /// If QEMU ends before it connects.
+    #[must_use]
     pub fn start_with(fpga: impl SimulatedFpga + 'static, more: &[&str]) -> Option<Self> {
         let (qemu, elf) = (crate::firmware::qemu()?, crate::firmware::elf()?);
         let (host_line, host_argument) = listen();
@@ -74,11 +83,18 @@ impl Emulated {
     }
 
     /// A link to the camera: a new session each time, on the same line.
+    ///
+    /// # Panics
+    /// If the line cannot be opened.
+    #[must_use]
     pub fn link(&self) -> Box<dyn Link> {
         Box::new(TcpLink::connect(&self.host).unwrap())
     }
 
     /// Cuts the FPGA off.
+    ///
+    /// # Panics
+    /// If the line to the FPGA is closed already.
     pub fn unplug_fpga(&self) {
         self.fpga_line.shutdown(Shutdown::Both).unwrap();
     }

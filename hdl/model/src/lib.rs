@@ -40,7 +40,7 @@
 //! from a pin or the host port to its effect; lines, attribution of samples and bytes of frames are exact.
 //!
 //! # The RTL
-//! `rtl/` has the gateware in Veryl, `sv/` the SystemVerilog made from it; `tests/rtl` runs it in Veryl's
+//! `hdl/rtl` has the gateware in Veryl, `hdl/sv` the SystemVerilog made from it; `hdl/sim/tests/rtl` runs it in Veryl's
 //! simulator beside this model, pin by pin and clock by clock. What it takes more than the model, bounded
 //! there: clock 0 of a run comes 14 clocks after the access that starts it; LEDs are lit up to 9 clocks longer
 //! after a stop and 7 after a trip; they go out 3 clocks after the interlock pin opens. Its lines are at the
@@ -48,7 +48,7 @@
 //! the clock that its light is at the LEDs'.
 //!
 //! ```
-//! use nirspi_hdl::{AdcSample, Gateware};
+//! use nirspi_hdl_model::{AdcSample, Gateware};
 //! use nirspi_wire::{fpga::FpgaFrame, register::{Register, control}};
 //!
 //! let mut gateware = Gateware::new();

@@ -2,7 +2,7 @@
 
 use crate::bench::{Bench, random_sample};
 use crate::oracle::{Order, Setup, setup};
-use nirspi_hdl::AdcSample;
+use nirspi_hdl_model::AdcSample;
 use nirspi_wire::register::{Register, status};
 use proptest::prelude::*;
 use std::collections::VecDeque;

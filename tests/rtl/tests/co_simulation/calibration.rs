@@ -1,11 +1,11 @@
 //! The capture's own calibration through the RTL: latency, response and dark level from raw bursts.
 
-use crate::fpga::RtlFpga;
 use crate::{check_image, noiseless, session};
 use nirspi::capture::{Calibration, Capture, CaptureOptions, Ended, capture};
 use nirspi::session::Session;
 use nirspi::setup::MeasurementSetup;
 use nirspi_recon::Order;
+use nirspi_tests_rtl::RtlFpga;
 use std::ops::ControlFlow;
 
 /// One frame by an instrument that has found out its latency and leak itself.

@@ -1,7 +1,7 @@
 //! Which sample goes into which sum, in closed form: loops over slots, no state.
 
 use crate::bench::Bench;
-use nirspi_hdl::{AdcSample, Lines};
+use nirspi_hdl_model::{AdcSample, Lines};
 use nirspi_wire::{
     FrameFlags,
     fpga::{Header, Sums},

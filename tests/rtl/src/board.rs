@@ -1,8 +1,8 @@
 //! The board around the simulated FPGA: clocks, host port's pins, LEDs, photodiode, ADC.
 //!
-//! The one law: the FPGA is reached by its pins alone, and both of its clocks run whatever happens.
+//! The FPGA is reached by its pins alone, and both of its clocks run whatever happens.
 
-use nirspi_hdl::AdcSample;
+use nirspi_hdl_model::AdcSample;
 use nirspi_hdl_sim::{pins::Pins, project::Project};
 use nirspi_optics::{Chain, LedArray};
 use nirspi_wire::fpga::{FpgaFrame, HEADER_BYTES, frame_bytes};
