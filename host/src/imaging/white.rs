@@ -1,8 +1,4 @@
-<<<<<<<< HEAD:host/src/imaging/white.rs
-//! White level of an image of unknown scale: the mean of its brightest 2 x 2 pixels.
-========
 //! The level of white in an image of unknown scale: the mean of the brightest 2 x 2 pixels.
->>>>>>>> mcu:host/src/white_level.rs
 //!
 //! Black needs no estimate: a differential measurement reads 0 without light. One bright pixel alone may be noise, and
 //! a percentile of all pixels says nothing about a letter on a dark ground.
