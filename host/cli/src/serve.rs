@@ -4,7 +4,6 @@ use super::address::CameraAddress;
 use super::calibration::{CalibrationArgs, Choice};
 use super::camera::{SceneArgs, SetupArgs};
 use super::method::{Method, MethodArgs, Solver};
-use super::networks::Networks;
 use super::serve_virtual::stop_on_signal;
 use super::{one_line, print};
 use anyhow::{Context, Result};
@@ -12,11 +11,10 @@ use nirspi::serve::settings::{MAX_FRAMES, Settings};
 use nirspi::serve::{CameraSource, Connect, Connected, Imaging, Reconstruct, serve};
 use nirspi::session::Session;
 use nirspi::setup::MeasurementSetup;
-use nirspi_nets::Enhancer;
+use nirspi_nets::{Device, Enhancer};
 use nirspi_recon::Side;
 use nirspi_recon::omp::Backend;
 use std::net::TcpListener;
-use std::num::NonZeroU32;
 use std::process::ExitCode;
 
 /// Half of the patterns: twice the frames, and OMP predicts the other half.
@@ -116,10 +114,7 @@ fn methods(args: &MethodArgs) -> Result<Vec<(&'static str, Reconstruct)>> {
 /// The learned stages, where OMP runs; one image at a time is no work for a GPU that nobody asked for.
 fn enhancer(backend: Backend) -> Result<Enhancer> {
     let backend = if backend == Backend::Auto { Backend::Cpu } else { backend };
-    let mut networks = Networks::built_in(backend)?;
-    let sharpener =
-        networks.sharpener(nirspi_nets::Method::Diffusion { steps: NonZeroU32::MIN })?;
-    Ok(Enhancer::new(networks.fusion()?, sharpener))
+    Ok(Enhancer::built_in(&Device::open(backend)?)?)
 }
 
 /// A camera with its calibration.

@@ -7,8 +7,7 @@ use super::slot::Look;
 use super::state::{Offered, Published, Rate, Rates, State};
 use super::{Shared, lock};
 use crate::white::{SteadyWhite, brightest};
-use nirspi_nets::consistency::MeasuredRows;
-use nirspi_nets::{Enhancer, Images, Options, fusion};
+use nirspi_nets::{Enhancer, Images, MeasuredRows, Options, fusion};
 use nirspi_recon::{Image, Measurements, Side};
 use serde::Serialize;
 use std::sync::Arc;
@@ -165,10 +164,11 @@ impl Imaging {
         let started = Instant::now();
         let images: Images<'_, { fusion::SIDE }> =
             Images::new(image).map_err(|error| error.to_string())?;
-        let measured = MeasuredRows::new(fusion::SIDE, rows);
+        let measured = MeasuredRows::new(fusion::SIDE, rows).map_err(|error| error.to_string())?;
         let options = Options { measured, ..Options::default() };
         let depth = look.depth.as_deref();
         let result = self.enhancer.enhance(images, depth, &options, &mut |_| {});
+        let result = result.map_err(|error| error.to_string())?;
         let (Some(estimate), Some(&inconsistency)) =
             (result.estimates.first(), result.inconsistency.first())
         else {

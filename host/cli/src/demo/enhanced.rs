@@ -1,19 +1,16 @@
 //! The demo's learned stages: the camera's image becomes a reflectance, is fused with depth, and deblurred.
 
-use super::super::networks::Networks;
 use super::super::quality::{Quality, compare};
 use super::super::report::StageTimes;
 use anyhow::Result;
 use nirspi::virtual_camera::VirtualOptics;
-use nirspi_nets::consistency::MeasuredRows;
 use nirspi_nets::{
-    Backend, DepthMaps, Enhancer, Images, KnownEstimate, Method, Options, deblur, fusion,
-    upscale_2x,
+    DepthMaps, Device, Enhancer, Images, Known, KnownEstimate, MeasuredRows, Options, deblur,
+    fusion, upscale_2x,
 };
 use nirspi_optics::DEPTH_SIDE;
 use nirspi_recon::{Image, Side};
 use serde::Serialize;
-use std::num::NonZeroU32;
 
 /// The scene as a perfect camera of 64 x 64 pixels would see it, and what the stages made of it.
 pub struct Stages {
@@ -76,7 +73,6 @@ pub fn run(
     seed: u64,
     times: &mut StageTimes,
 ) -> Result<Stages> {
-    let steps = NonZeroU32::MIN;
     // The gain that turns a white target at this distance into counts is known from the photon budget, as
     // a user knows it from a white sheet held there.
     let white_counts = optics.budget().electrons_per_led / optics.chain().electrons_per_count;
@@ -96,19 +92,17 @@ pub fn run(
         .map(|&m| optics.defocus_px(f64::from(m) * 1e3, deblur::SIDE) as f32);
     let depth = DepthMaps::new(zones_m, [1, DEPTH_SIDE, DEPTH_SIDE], 1)?;
 
-    let mut networks = Networks::built_in(Backend::Cpu)?;
-    let enhancer = times.time("load_networks", || -> Result<_> {
-        let sharpener = networks.sharpener(Method::Diffusion { steps })?;
-        Ok(Enhancer::new(networks.fusion()?, sharpener))
-    })?;
+    let device = Device::cpu();
+    let enhancer = times.time("load_networks", || Enhancer::built_in(&device))?;
     let rows: Vec<u32> = rows.iter().map(|&row| row.into()).collect();
-    let measured = MeasuredRows::new(fusion::SIDE, &rows);
-    let estimated = networks.estimator()?.estimate(readings)[0].sigma_px;
-    let sigma_px = defocus_px.filter(|&defocus_px| defocus_px > estimated);
+    let measured = MeasuredRows::new(fusion::SIDE, &rows)?;
+    let sigma_px = defocus_px.map_or(Known::Nothing, Known::AtLeast);
     let estimate = KnownEstimate { sigma_px, ..KnownEstimate::default() };
     let options = Options { measured, seed, estimate, ..Options::default() };
-    let result =
-        times.time("enhance", || enhancer.enhance(readings, Some(&depth), &options, &mut |_| {}));
+    let result = times
+        .time("enhance", || enhancer.enhance(readings, Some(&depth), &options, &mut |_| {}))?;
+    let used = result.estimates[0];
+    let estimated = result.estimated.map_or(used, |estimated| estimated[0]);
     let side = fusion::SIDE;
     let upscaled = times.time("upscale", || upscale_2x(&reflectance, 1, side, side))?;
 
@@ -122,14 +116,14 @@ pub fn run(
         upscaled: upscaled_fit.quality,
         fused: fused_fit.quality,
         deblurred: deblurred_fit.quality,
-        steps: steps.get(),
-        sigma_px: result.estimates[0].sigma_px,
-        estimated_sigma_px: estimated,
+        steps: 1,
+        sigma_px: used.sigma_px,
+        estimated_sigma_px: estimated.sigma_px,
         defocus_px,
-        noise: result.estimates[0].noise,
+        noise: used.noise,
         inconsistency: result.inconsistency[0],
         depth_zones,
-        device: networks.device().to_owned(),
+        device: device.name().to_owned(),
         quality_note: "against the scene on a 64 x 64 grid without defocus, after the gain and offset of least \
                        squares",
     };

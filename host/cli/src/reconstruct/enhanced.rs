@@ -1,12 +1,11 @@
 //! `nirspi reconstruct --enhance`: the learned stages on an image whose scale nobody told, as [`nirspi::white`] finds it.
 
-use super::super::networks::Networks;
 use super::super::report::StageTimes;
 use anyhow::{Result, bail};
 use nirspi::white::brightest;
-use nirspi_nets::consistency::MeasuredRows;
 use nirspi_nets::{
-    Backend, Enhanced, Enhancer, Images, Method, Options, Sharpener, deblur, fusion,
+    Device, Enhanced, Enhancer, Images, MeasuredRows, Method, Networks, Options, Sharpener, deblur,
+    fusion,
 };
 use nirspi_recon::Image;
 use serde::Serialize;
@@ -49,11 +48,11 @@ pub fn run(frames: &[(&Image, &[u32])], times: &mut StageTimes) -> Result<(Vec<f
     if white <= 0.0 {
         bail!("--enhance finds no light in the image");
     }
-    let mut networks = Networks::built_in(Backend::Cpu)?;
-    let sharpener = networks.sharpener(Method::Diffusion { steps: NonZeroU32::MIN })?;
+    let mut networks = Networks::built_in(Device::cpu());
+    let method = Method::Diffusion { steps: NonZeroU32::MIN };
     let stages = match side {
-        deblur::SIDE => Stages::Second(sharpener),
-        _ => Stages::Both(Enhancer::new(networks.fusion()?, sharpener)),
+        deblur::SIDE => Stages::Second(networks.sharpener(method)?),
+        _ => Stages::Both(networks.enhancer(method)?),
     };
     let (mut pixels, mut reports) = (Vec::new(), Vec::new());
     times.time("enhance", || -> Result<()> {
@@ -81,10 +80,11 @@ enum Stages {
 
 impl Stages {
     fn run(&self, image: &[f32], side: usize, rows: &[u32]) -> Result<Enhanced> {
-        let options = Options { measured: MeasuredRows::new(side, rows), ..Options::default() };
+        let measured = MeasuredRows::new(side, rows)?;
+        let options = Options { measured, ..Options::default() };
         Ok(match self {
-            Self::Both(both) => both.enhance(Images::new(image)?, None, &options, &mut |_| {}),
-            Self::Second(second) => second.deblur(Images::new(image)?, &options, &mut |_| {}),
+            Self::Both(both) => both.enhance(Images::new(image)?, None, &options, &mut |_| {})?,
+            Self::Second(second) => second.deblur(Images::new(image)?, &options, &mut |_| {})?,
         })
     }
 }
