@@ -11,7 +11,7 @@ impl Sharpen for UnsharpMask {
     fn guess(&self, batch: Blurred<'_>) -> Vec<f32> {
         let images = batch.current.chunks(64 * 64).zip(batch.estimates);
         let sharpened = images.flat_map(|(image, estimate)| {
-            (0..64 * 64).map(move |at| {
+            (0..64 * 64).map(move |at: usize| {
                 // Beyond the edge lies the pixel itself.
                 let at_step = |step| image.get(at.wrapping_add_signed(step)).unwrap_or(&image[at]);
                 let around: f32 = [-64, -1, 1, 64].map(at_step).into_iter().sum();
