@@ -66,6 +66,14 @@ pub enum WeightsError {
         /// The network that the metadata names.
         found: String,
     },
+    /// The metadata names no network.
+    #[error("{file}: the file does not say which network it is for, expected {expected}")]
+    Unnamed {
+        /// The file.
+        file: String,
+        /// The networks that weights are wanted for.
+        expected: String,
+    },
     /// A tensor has numbers of a kind that weights are not.
     #[error("{file}: tensor {tensor} holds {found}, expected F32 or F16")]
     Kind {

@@ -1,10 +1,9 @@
 //! `nirspi bench enhance`: the learned stages, timed.
 
 use super::{FASTEST_SWEEPS_HZ, RunArgs, Times, scenes};
-use crate::networks::Used;
 use crate::print;
 use anyhow::Result;
-use nirspi_nets::{Enhancer, Images, Method, Options, fusion};
+use nirspi_nets::{Images, Method, Options, UsedWeights, fusion};
 use serde::Serialize;
 use std::num::NonZeroU32;
 use std::process::ExitCode;
@@ -28,7 +27,7 @@ pub struct Args {
 #[derive(Debug, Serialize)]
 struct Report {
     device: String,
-    weights: Vec<Used>,
+    weights: Vec<UsedWeights>,
     threads: usize,
     frames: u32,
     steps: u32,
@@ -50,19 +49,20 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let mut networks = args.run.networks.open(&["fsrcnn", "estimator", "diffusion"])?;
     let (estimator, alone) = (networks.estimator()?, networks.fusion()?);
     let method = Method::Diffusion { steps: args.steps };
-    let enhancer = Enhancer::new(networks.fusion()?, networks.sharpener(method)?);
+    let enhancer = networks.enhancer(method)?;
     let options =
         Options { consistency: !args.run.no_consistency, gate: false, ..Options::default() };
     let values = scenes::blobs(args.run.frames as usize, args.run.seed);
     let images: Images<'_, { fusion::SIDE }> = Images::new(&values)?;
-    let enhance = || enhancer.enhance(images, None, &options, &mut |_| {}).images.len();
+    let enhance = || enhancer.enhance(images, None, &options, &mut |_| {});
     let first_ms = Times::of(1, enhance).median_ms;
+    enhance()?;
     estimator.estimate(images);
     let whole = Times::of(args.run.repeats, enhance);
     let frames_per_s = f64::from(args.run.frames) / whole.median_ms * 1e3;
     print::json(&Report {
-        device: networks.device().to_owned(),
-        weights: networks.used(),
+        device: networks.device().name().to_owned(),
+        weights: networks.used().to_vec(),
         threads: rayon::current_num_threads(),
         frames: args.run.frames,
         steps: args.steps.get(),

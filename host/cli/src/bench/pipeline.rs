@@ -4,14 +4,12 @@
 mod gpu;
 
 use super::{FASTEST_SWEEPS_HZ, RunArgs, Times, scenes};
-use crate::networks::{Networks, Used};
 use crate::{Usage, print};
 use anyhow::Result;
 use nalgebra::DMatrix;
 #[cfg(feature = "gpu")]
 use nirspi_nets::Backend;
-use nirspi_nets::consistency::MeasuredRows;
-use nirspi_nets::{Enhancer, Images, Method, Options, fusion};
+use nirspi_nets::{Enhancer, Images, MeasuredRows, Method, Networks, Options, UsedWeights, fusion};
 use nirspi_recon::basis::Transform;
 use nirspi_recon::metrics::psnr;
 use nirspi_recon::omp::{Limits, MixedDictionary};
@@ -46,7 +44,7 @@ struct Report {
     device: String,
     /// Whether the processor plays the GPU: its times say nothing of one.
     software: bool,
-    weights: Vec<Used>,
+    weights: Vec<UsedWeights>,
     threads: usize,
     frames: u32,
     measurements: u32,
@@ -114,14 +112,14 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         y,
         options: Options {
             consistency: !args.run.no_consistency,
-            measured: MeasuredRows::new(side.pixels(), &rows),
+            measured: MeasuredRows::new(side.pixels(), &rows)?,
             ..Options::default()
         },
         repeats: args.run.repeats,
     };
     let mut networks = args.run.networks.open(&["fsrcnn", "estimator", "diffusion"])?;
     #[cfg(feature = "gpu")]
-    let (timed, software) = match networks.backend() {
+    let (timed, software) = match networks.device().backend() {
         Backend::Cpu => (on_cpu(&work, &mut networks)?, false),
         backend => gpu::time(&work, backend, &mut networks)?,
     };
@@ -134,9 +132,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     quality.sort_by(f64::total_cmp);
     let frames_per_s = f64::from(args.run.frames) / timed.whole.median_ms * 1e3;
     print::json(&Report {
-        device: networks.device().to_owned(),
+        device: networks.device().name().to_owned(),
         software,
-        weights: networks.used(),
+        weights: networks.used().to_vec(),
         threads: rayon::current_num_threads(),
         frames: args.run.frames,
         measurements: args.measurements,
@@ -153,14 +151,14 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 
 fn enhancer(networks: &mut Networks) -> Result<Enhancer> {
     let method = Method::Diffusion { steps: NonZeroU32::MIN };
-    Ok(Enhancer::new(networks.fusion()?, networks.sharpener(method)?))
+    Ok(networks.enhancer(method)?)
 }
 
 /// Enhanced images of reconstructed ones, as they are on the host.
 fn enhanced(enhancer: &Enhancer, images: &[f32], options: &Options) -> Result<Vec<f32>> {
     let lit: Vec<f32> = images.par_iter().map(|v| v.clamp(0.0, 1.0)).collect();
     let lit: Images<'_, { fusion::SIDE }> = Images::new(&lit)?;
-    Ok(enhancer.enhance(lit, None, options, &mut |_| {}).images)
+    Ok(enhancer.enhance(lit, None, options, &mut |_| {})?.images)
 }
 
 fn on_cpu(work: &Work, networks: &mut Networks) -> Result<Timed> {

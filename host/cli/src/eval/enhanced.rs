@@ -3,11 +3,11 @@
 //! The law: networks are given what a user would give them, readings over those of a white sheet, and nothing of the
 //! truth.
 
-use super::quality::{Kind, Networks, Row};
+use super::quality::{Kind, Row};
 use super::shot::Shots;
 use anyhow::Result;
 use indicatif::ProgressBar;
-use nirspi_nets::device::Device;
+use nirspi_nets::{Device, Networks};
 use serde::Serialize;
 
 /// Steps of the bridge in the tables.
@@ -45,8 +45,9 @@ pub struct Enhancers {
 
 impl Enhancers {
     pub fn new() -> Result<Self> {
-        let networks = Networks::new(None, Device::cpu());
-        Ok(Self { gan: networks.row(Kind::Gan)?, diffusion: networks.row(Kind::Diffusion(STEPS))? })
+        let mut networks = Networks::built_in(Device::cpu());
+        let mut row = |kind| Row::new(kind, &mut networks);
+        Ok(Self { gan: row(Kind::Gan)?, diffusion: row(Kind::Diffusion(STEPS))? })
     }
 
     /// The pictures of a network's row, 64 x 64 in [0, 1]; none of a row without one. `whites` are the levels of a

@@ -19,8 +19,8 @@ use indicatif::ProgressBar;
 pub(super) use measure::halved;
 use measure::{Condition, Figures, Judges};
 use nirspi::files::output::OutputDir;
-use nirspi_nets::device::Device;
-pub(super) use rows::{Kind, Networks, Row};
+use nirspi_nets::{Device, Networks};
+pub(super) use rows::{Kind, Row};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -104,8 +104,11 @@ struct Report {
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let networks = Networks::new(args.weights.clone(), Device::cpu());
-    let judges = Judges::new(&networks)?;
+    let mut networks = Networks::built_in(Device::cpu());
+    if let Some(folder) = &args.weights {
+        networks = networks.with_folder(folder);
+    }
+    let judges = Judges::new(&mut networks)?;
     let held_out = args.held_out.as_deref();
     let characters = Characters::read(&args.data, held_out, args.count as usize, args.seed)?;
     let few = characters.first(args.sampler_count as usize);
@@ -113,18 +116,18 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 
     let conditions = conditions();
     let rows: Vec<Row> =
-        Kind::ALL.into_iter().map(|kind| networks.row(kind)).collect::<Result<_>>()?;
+        Kind::ALL.into_iter().map(|kind| Row::new(kind, &mut networks)).collect::<Result<_>>()?;
     let stepped: Vec<Kind> = stepped(args.most_steps);
     let work = rows.len() * conditions.len() * characters.len() + stepped.len() * few.len();
     let bar = progress(work, "quality");
     let measured = over(&rows, &conditions, &characters, &judges, args.seed, &bar)?;
     let mut steps = Vec::new();
     for kind in stepped {
-        let row = networks.row(kind)?;
+        let row = Row::new(kind, &mut networks)?;
         steps.extend(over(&[row], &[MIDDLE], &few, &judges, args.seed, &bar)?);
     }
     bar.finish_and_clear();
-    let shown = others::enhance(&scenes, &networks.row(Kind::Diffusion(1))?)?;
+    let shown = others::enhance(&scenes, &Row::new(Kind::Diffusion(1), &mut networks)?)?;
 
     let mut out = OutputDir::create(&args.out)?;
     for (name, picture) in figures::all(&measured, &steps, &characters, &few) {
@@ -135,7 +138,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         simulated: true,
         seed: args.seed,
         images: characters.origins().to_vec(),
-        weights: networks.versions()?,
+        weights: rows::versions(&mut networks)?,
         conditions: measured,
         steps,
         others: shown.cases,

@@ -13,16 +13,11 @@ use nirspi::picture::{Axis, Chart, Line};
 use nirspi::scene::SceneSource;
 use nirspi::setup::MeasurementSetup;
 use nirspi::virtual_camera::VirtualOptics;
-use nirspi_nets::device::Device;
-use nirspi_nets::images::Images;
-use nirspi_nets::{
-    BlurEstimator, Deblurrer, Enhancer, Fusion, Method, Options, Sharpener, Weights,
-};
+use nirspi_nets::{Device, Enhancer, Images, Networks, Options};
 use nirspi_optics::{Projector, Scene};
 use nirspi_recon::Order;
 use nirspi_recon::reconstruct::{self, OmpSettings};
 use serde::Serialize;
-use std::num::NonZeroU32;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
@@ -128,7 +123,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let captured = record(&optics, setup, sweeps, args.seed)?;
     let conditions = Conditions { distance_m: DISTANCE_M, rain: Rain::None, frames: sweeps };
     let white = white_level(conditions, args.seed)?;
-    let networks = Networks::new()?;
+    let chain = Enhancer::built_in(&Device::cpu())?;
+    let fusion_alone = Networks::built_in(Device::cpu()).fusion()?;
 
     let bar = ProgressBar::new(u64::from(args.repeats));
     let mut times: [Vec<f64>; 5] = Default::default();
@@ -141,11 +137,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         let readings: Vec<f32> =
             image.pixels().iter().map(|counts| (counts / white).clamp(0.0, 1.0)).collect();
         let enhanced =
-            networks.chain.enhance(Images::new(&readings)?, None, &Options::default(), &mut |_| {});
+            chain.enhance(Images::new(&readings)?, None, &Options::default(), &mut |_| {})?;
         let all = start.elapsed();
         // The chain does both in one; each again by itself.
         let start = Instant::now();
-        let upscaled = networks.fusion.upscale(Images::new(&readings)?, None);
+        let upscaled = fusion_alone.upscale(Images::new(&readings)?, None);
         let fusion = start.elapsed();
         drop((enhanced, upscaled));
         if repeat >= WARM_UP {
@@ -188,24 +184,6 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         say(&report)?;
     }
     Ok(ExitCode::SUCCESS)
-}
-
-/// What is timed.
-struct Networks {
-    fusion: Fusion,
-    chain: Enhancer,
-}
-
-impl Networks {
-    fn new() -> Result<Self> {
-        let device = Device::cpu();
-        let fusion = || anyhow::Ok(Fusion::new(&device, &Weights::embedded("fsrcnn")?)?);
-        let estimator = BlurEstimator::new(&device, &Weights::embedded("estimator")?)?;
-        let method = Method::Diffusion { steps: NonZeroU32::MIN };
-        let deblurrer = Deblurrer::new(&device, &Weights::embedded(method.model())?, method)?;
-        let chain = Enhancer::new(fusion()?, Sharpener::new(estimator, deblurrer));
-        Ok(Self { fusion: fusion()?, chain })
-    }
 }
 
 /// Times in rising order, and the paper's as dashed lines.

@@ -29,13 +29,17 @@ pub struct UNetConfig {
     pub embedding: usize,
 }
 
+/// The sizes of the shipped networks.
 impl Default for UNetConfig {
     fn default() -> Self {
-        Self { channels: vec![32, 64, 128], blocks: 2, embedding: 64 }
+        Self { channels: Self::SHIPPED_CHANNELS.to_vec(), blocks: 2, embedding: 64 }
     }
 }
 
 impl UNetConfig {
+    /// Channels of the shipped networks.
+    pub const SHIPPED_CHANNELS: [usize; 3] = [48, 96, 192];
+
     /// The sizes of the network that these weights are of.
     ///
     /// # Errors

@@ -216,7 +216,7 @@ fn judged(scene: &Scene, before: &[f32], after: &[f32]) -> Result<Case> {
     };
     let squares: f64 = before.iter().zip(after).map(|(a, b)| f64::from(a - b).powi(2)).sum();
     let Condition { sigma_px, noise } = scene.condition;
-    let camera = Consistency::new(SIDE / 2, sigma_px, noise, None);
+    let camera = Consistency::new(SIDE / 2, sigma_px, noise);
     let known = noise > 0.0;
     Ok(Case {
         name: scene.name.clone(),

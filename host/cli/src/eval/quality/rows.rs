@@ -7,18 +7,11 @@ use super::measure::{Condition, sampling_variance};
 use anyhow::Result;
 use indicatif::ProgressBar;
 use nirspi_nets::classical::{self, Method as Classical};
-use nirspi_nets::deblur::{Deblurrer, Method};
-use nirspi_nets::device::Device;
-use nirspi_nets::enhance::{Enhancer, Options, Sharpener};
-use nirspi_nets::estimate::BlurEstimator;
-use nirspi_nets::fusion::Fusion;
-use nirspi_nets::images::Images;
-use nirspi_nets::upscale_2x;
-use nirspi_nets::weights::{VERSION, Weights};
+use nirspi_nets::weights::VERSION;
+use nirspi_nets::{Enhancer, Fusion, Images, Method, Networks, Options, upscale_2x};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::num::NonZeroU32;
-use std::path::PathBuf;
 
 /// Values of a reading.
 const READING: usize = 32 * 32;
@@ -85,60 +78,16 @@ pub struct Version {
     pub version: String,
 }
 
-/// Where networks come from, and where they run.
-pub struct Networks {
-    folder: Option<PathBuf>,
-    device: Device,
-}
-
-impl Networks {
-    pub fn new(folder: Option<PathBuf>, device: Device) -> Self {
-        Self { folder, device }
-    }
-
-    pub fn weights(&self, model: &str) -> Result<Weights> {
-        let file = self.folder.as_ref().map(|folder| folder.join(format!("{model}.safetensors")));
-        Ok(match file.filter(|file| file.is_file()) {
-            Some(file) => Weights::read(&file)?,
-            None => Weights::embedded(model)?,
+/// The versions of all networks.
+pub fn versions(networks: &mut Networks) -> Result<Vec<Version>> {
+    ["estimator", "fsrcnn", "diffusion", "ancestral", "gan", "classifier"]
+        .into_iter()
+        .map(|model| {
+            let weights = networks.weights(model)?;
+            let version = weights.metadata(VERSION).unwrap_or("unknown").to_owned();
+            Ok(Version { model, version })
         })
-    }
-
-    pub fn versions(&self) -> Result<Vec<Version>> {
-        ["estimator", "fsrcnn", "diffusion", "ancestral", "gan", "classifier"]
-            .into_iter()
-            .map(|model| {
-                let version =
-                    self.weights(model)?.metadata(VERSION).unwrap_or("unknown").to_owned();
-                Ok(Version { model, version })
-            })
-            .collect()
-    }
-
-    /// A row that is ready to run.
-    pub fn row(&self, kind: Kind) -> Result<Row> {
-        let count = |steps| NonZeroU32::new(steps).unwrap_or(NonZeroU32::MIN);
-        let runner = match kind {
-            Kind::Lanczos | Kind::Classical(_) => Runner::None,
-            Kind::Fusion => Runner::Fusion(self.fusion()?),
-            Kind::Gan => self.chain(Method::Gan)?,
-            Kind::Diffusion(steps) => self.chain(Method::Diffusion { steps: count(steps) })?,
-            Kind::Ancestral(steps) => self.chain(Method::Ancestral { steps: count(steps) })?,
-        };
-        Ok(Row { kind, runner })
-    }
-
-    fn fusion(&self) -> Result<Fusion> {
-        Ok(Fusion::new(&self.device, &self.weights("fsrcnn")?)?)
-    }
-
-    fn chain(&self, method: Method) -> Result<Runner> {
-        let estimator = BlurEstimator::new(&self.device, &self.weights("estimator")?)?;
-        let weights = self.weights(method.model())?;
-        let deblurrer = Deblurrer::new(&self.device, &weights, method)?;
-        let sharpener = Sharpener::new(estimator, deblurrer);
-        Ok(Runner::Chain(Box::new(Enhancer::new(self.fusion()?, sharpener))))
-    }
+        .collect()
 }
 
 /// A row that is ready to run.
@@ -154,6 +103,21 @@ enum Runner {
 }
 
 impl Row {
+    /// With the networks that it needs.
+    pub fn new(kind: Kind, networks: &mut Networks) -> Result<Self> {
+        let count = |steps| NonZeroU32::new(steps).unwrap_or(NonZeroU32::MIN);
+        let mut chain =
+            |method| Ok::<_, anyhow::Error>(Runner::Chain(Box::new(networks.enhancer(method)?)));
+        let runner = match kind {
+            Kind::Lanczos | Kind::Classical(_) => Runner::None,
+            Kind::Gan => chain(Method::Gan)?,
+            Kind::Diffusion(steps) => chain(Method::Diffusion { steps: count(steps) })?,
+            Kind::Ancestral(steps) => chain(Method::Ancestral { steps: count(steps) })?,
+            Kind::Fusion => Runner::Fusion(networks.fusion()?),
+        };
+        Ok(Self { kind, runner })
+    }
+
     pub fn kind(&self) -> Kind {
         self.kind
     }
@@ -184,7 +148,7 @@ impl Row {
             Runner::Fusion(fusion) => fusion.upscale(checked, None),
             Runner::Chain(chain) => {
                 let mut progress = |done: usize| bar.set_position(before + done as u64);
-                chain.enhance(checked, None, &Options::default(), &mut progress).images
+                chain.enhance(checked, None, &Options::default(), &mut progress)?.images
             }
             Runner::None => upscale_2x(readings, checked.count(), 32, 32)?,
         };
