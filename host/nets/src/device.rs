@@ -7,7 +7,10 @@ pub use nirspi_recon::backend::{Backend, ParseBackendError};
 
 #[cfg(not(feature = "gpu"))]
 use nirspi_recon::backend::NOT_BUILT;
-#[cfg(feature = "gpu")]
+#[cfg(all(feature = "gpu", not(feature = "train")))]
+const NOT_BUILT: &str =
+    "this build has no networks on a GPU; build it with: cargo build --release --features train";
+#[cfg(all(feature = "gpu", feature = "train"))]
 use nirspi_recon::backend::probe;
 use thiserror::Error;
 
@@ -31,10 +34,10 @@ pub struct Device {
 #[derive(Debug, Clone)]
 pub(crate) enum Kind {
     Cpu,
-    #[cfg(feature = "gpu")]
-    Wgpu(burn::backend::wgpu::WgpuDevice),
-    #[cfg(feature = "gpu")]
-    Cuda(burn::backend::cuda::CudaDevice),
+    #[cfg(all(feature = "gpu", feature = "train"))]
+    Wgpu(cubecl::wgpu::WgpuDevice),
+    #[cfg(all(feature = "gpu", feature = "train"))]
+    Cuda(cubecl::cuda::CudaDevice),
 }
 
 impl Device {
@@ -66,9 +69,9 @@ impl Device {
     pub fn backend(&self) -> Backend {
         match self.kind {
             Kind::Cpu => Backend::Cpu,
-            #[cfg(feature = "gpu")]
+            #[cfg(all(feature = "gpu", feature = "train"))]
             Kind::Wgpu(_) => Backend::Wgpu,
-            #[cfg(feature = "gpu")]
+            #[cfg(all(feature = "gpu", feature = "train"))]
             Kind::Cuda(_) => Backend::Cuda,
         }
     }
@@ -77,30 +80,30 @@ impl Device {
     pub(crate) fn batch(&self) -> usize {
         match self.kind {
             Kind::Cpu => 32,
-            #[cfg(feature = "gpu")]
+            #[cfg(all(feature = "gpu", feature = "train"))]
             Kind::Wgpu(_) | Kind::Cuda(_) => 256,
         }
     }
 }
 
-#[cfg(feature = "gpu")]
+#[cfg(all(feature = "gpu", feature = "train"))]
 fn cuda() -> Result<Device, String> {
     let found = probe::cuda().map_err(|absent| absent.to_string())?;
     Ok(Device { kind: Kind::Cuda(found.device), name: found.name })
 }
 
-#[cfg(feature = "gpu")]
+#[cfg(all(feature = "gpu", feature = "train"))]
 fn wgpu(software_too: bool) -> Result<Device, String> {
     let found = probe::wgpu(software_too).map_err(|absent| absent.to_string())?;
     Ok(Device { kind: Kind::Wgpu(found.device), name: found.name })
 }
 
-#[cfg(not(feature = "gpu"))]
+#[cfg(not(all(feature = "gpu", feature = "train")))]
 fn cuda() -> Result<Device, String> {
     Err(NOT_BUILT.to_owned())
 }
 
-#[cfg(not(feature = "gpu"))]
+#[cfg(not(all(feature = "gpu", feature = "train")))]
 fn wgpu(_software_too: bool) -> Result<Device, String> {
     Err(NOT_BUILT.to_owned())
 }

@@ -27,10 +27,12 @@ pub mod fusion;
 mod gate;
 pub mod images;
 pub mod metrics;
+#[cfg(feature = "train")]
 pub mod model;
 mod network;
 mod random;
 mod spread;
+#[cfg(feature = "train")]
 pub mod train;
 pub mod upscale;
 pub mod weights;

@@ -4,25 +4,27 @@
 
 #[cfg(feature = "gpu")]
 mod chain;
-#[cfg(feature = "gpu")]
+#[cfg(all(feature = "gpu", feature = "train"))]
 mod on_burn;
 
-#[cfg(feature = "gpu")]
+#[cfg(all(feature = "gpu", feature = "train"))]
 use burn::backend::{Cuda, Wgpu};
 use rayon::prelude::*;
 
 use crate::cpu;
 use crate::device::{Device, Kind};
-use crate::model::CONDITIONS;
-#[cfg(feature = "gpu")]
+#[cfg(all(feature = "gpu", feature = "train"))]
 use crate::model::{Estimator, EstimatorConfig, Fsrcnn, FsrcnnConfig, UNet, UNetConfig};
 use crate::weights::{Weights, WeightsError};
 #[cfg(feature = "gpu")]
 pub(crate) use chain::{Guess, RunChain};
-#[cfg(feature = "gpu")]
+#[cfg(all(feature = "gpu", feature = "train"))]
 use on_burn::{OnBurn, place};
 
-/// Time (2), blur (2), noise (2).
+/// Numbers that condition the UNet: time (2), blur (2), noise (2).
+pub const CONDITIONS: usize = 6;
+
+/// The conditions of one image.
 pub(crate) type Conditions = [f32; CONDITIONS];
 
 /// A [`UNet`] on a device.
@@ -51,15 +53,15 @@ pub(crate) trait RunFsrcnn: Send {
 
 impl Device {
     pub(crate) fn unet(&self, weights: &Weights) -> Result<Box<dyn RunUNet>, WeightsError> {
-        #[cfg(feature = "gpu")]
+        #[cfg(all(feature = "gpu", feature = "train"))]
         let config = UNetConfig::of(weights)?;
         Ok(match &self.kind {
             Kind::Cpu => Box::new(OnCpu(cpu::UNet::new(weights)?)),
-            #[cfg(feature = "gpu")]
+            #[cfg(all(feature = "gpu", feature = "train"))]
             Kind::Wgpu(device) => {
                 Box::new(place::<Wgpu, UNet<_>>(config.init(device), weights, device)?)
             }
-            #[cfg(feature = "gpu")]
+            #[cfg(all(feature = "gpu", feature = "train"))]
             Kind::Cuda(device) => {
                 Box::new(place::<Cuda, UNet<_>>(config.init(device), weights, device)?)
             }
@@ -70,15 +72,15 @@ impl Device {
         &self,
         weights: &Weights,
     ) -> Result<Box<dyn RunEstimator>, WeightsError> {
-        #[cfg(feature = "gpu")]
+        #[cfg(all(feature = "gpu", feature = "train"))]
         let config = EstimatorConfig::of(weights)?;
         Ok(match &self.kind {
             Kind::Cpu => Box::new(OnCpu(cpu::Estimator::new(weights)?)),
-            #[cfg(feature = "gpu")]
+            #[cfg(all(feature = "gpu", feature = "train"))]
             Kind::Wgpu(device) => {
                 Box::new(place::<Wgpu, Estimator<_>>(config.init(device), weights, device)?)
             }
-            #[cfg(feature = "gpu")]
+            #[cfg(all(feature = "gpu", feature = "train"))]
             Kind::Cuda(device) => {
                 Box::new(place::<Cuda, Estimator<_>>(config.init(device), weights, device)?)
             }
@@ -86,15 +88,15 @@ impl Device {
     }
 
     pub(crate) fn fsrcnn(&self, weights: &Weights) -> Result<Box<dyn RunFsrcnn>, WeightsError> {
-        #[cfg(feature = "gpu")]
+        #[cfg(all(feature = "gpu", feature = "train"))]
         let config = FsrcnnConfig::of(weights)?;
         Ok(match &self.kind {
             Kind::Cpu => Box::new(OnCpu(cpu::Fsrcnn::new(weights)?)),
-            #[cfg(feature = "gpu")]
+            #[cfg(all(feature = "gpu", feature = "train"))]
             Kind::Wgpu(device) => {
                 Box::new(place::<Wgpu, Fsrcnn<_>>(config.init(device), weights, device)?)
             }
-            #[cfg(feature = "gpu")]
+            #[cfg(all(feature = "gpu", feature = "train"))]
             Kind::Cuda(device) => {
                 Box::new(place::<Cuda, Fsrcnn<_>>(config.init(device), weights, device)?)
             }

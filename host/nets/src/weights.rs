@@ -303,6 +303,7 @@ impl Weights {
         (0..).take_while(|&index| self.tensors.contains_key(&name(index))).count()
     }
 
+    #[cfg(feature = "train")]
     pub(crate) fn unknown(&self, tensor: &str) -> WeightsError {
         WeightsError::Unknown { file: self.label.clone(), tensor: tensor.to_owned() }
     }

@@ -1,4 +1,4 @@
-//! The FSRCNN of [`crate::model::fsrcnn`], on the CPU.
+//! FSRCNN (Dong, Loy, Tang, ECCV 2016) with the depth map as second input, on the CPU.
 
 use pulp::Arch;
 

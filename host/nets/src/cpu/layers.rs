@@ -60,6 +60,20 @@ pub(super) fn means(planes: &Planes) -> Vec<f32> {
     planes.values().chunks_exact(planes.stride()).map(|c| c.iter().sum::<f32>() / pixels).collect()
 }
 
+/// One image as the input of a network whose convolutions reach one pixel far.
+pub(super) fn single(image: &[f32], (height, width): (usize, usize)) -> Planes {
+    let mut planes = Planes::new(1, height, width, 1);
+    for (row, line) in image.chunks_exact(width).enumerate() {
+        planes.row_mut(0, row).copy_from_slice(line);
+    }
+    planes
+}
+
+/// ReLU.
+pub(super) fn relu(arch: Arch, planes: &mut Planes) {
+    super::activation::prelu(arch, planes.values_mut(), 0.0);
+}
+
 /// Slope of each channel's PReLU.
 pub(super) fn slopes(
     weights: &Weights,
