@@ -7,12 +7,14 @@ pub use nirspi_recon::backend::{Backend, ParseBackendError};
 
 #[cfg(not(feature = "gpu"))]
 use nirspi_recon::backend::NOT_BUILT;
-#[cfg(all(feature = "gpu", not(feature = "train")))]
-const NOT_BUILT: &str =
-    "this build has no networks on a GPU; build it with: cargo build --release --features train";
-#[cfg(all(feature = "gpu", feature = "train"))]
+#[cfg(feature = "gpu")]
 use nirspi_recon::backend::probe;
+#[cfg(feature = "gpu")]
+use std::sync::Arc;
 use thiserror::Error;
+
+#[cfg(feature = "gpu")]
+use crate::gpu::{self, Engine};
 
 /// A backend that was asked for by name is not there.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -34,9 +36,9 @@ pub struct Device {
 #[derive(Debug, Clone)]
 pub(crate) enum Kind {
     Cpu,
-    #[cfg(all(feature = "gpu", feature = "train"))]
+    #[cfg(feature = "gpu")]
     Wgpu(cubecl::wgpu::WgpuDevice),
-    #[cfg(all(feature = "gpu", feature = "train"))]
+    #[cfg(feature = "gpu")]
     Cuda(cubecl::cuda::CudaDevice),
 }
 
@@ -69,10 +71,20 @@ impl Device {
     pub fn backend(&self) -> Backend {
         match self.kind {
             Kind::Cpu => Backend::Cpu,
-            #[cfg(all(feature = "gpu", feature = "train"))]
+            #[cfg(feature = "gpu")]
             Kind::Wgpu(_) => Backend::Wgpu,
-            #[cfg(all(feature = "gpu", feature = "train"))]
+            #[cfg(feature = "gpu")]
             Kind::Cuda(_) => Backend::Cuda,
+        }
+    }
+
+    /// What launches kernels on it; nothing for the processor.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn engine(&self) -> Option<Arc<dyn Engine>> {
+        match &self.kind {
+            Kind::Cpu => None,
+            Kind::Wgpu(device) => Some(gpu::wgpu(device)),
+            Kind::Cuda(device) => Some(gpu::cuda(device)),
         }
     }
 
@@ -80,30 +92,30 @@ impl Device {
     pub(crate) fn batch(&self) -> usize {
         match self.kind {
             Kind::Cpu => 32,
-            #[cfg(all(feature = "gpu", feature = "train"))]
+            #[cfg(feature = "gpu")]
             Kind::Wgpu(_) | Kind::Cuda(_) => 256,
         }
     }
 }
 
-#[cfg(all(feature = "gpu", feature = "train"))]
+#[cfg(feature = "gpu")]
 fn cuda() -> Result<Device, String> {
     let found = probe::cuda().map_err(|absent| absent.to_string())?;
     Ok(Device { kind: Kind::Cuda(found.device), name: found.name })
 }
 
-#[cfg(all(feature = "gpu", feature = "train"))]
+#[cfg(feature = "gpu")]
 fn wgpu(software_too: bool) -> Result<Device, String> {
     let found = probe::wgpu(software_too).map_err(|absent| absent.to_string())?;
     Ok(Device { kind: Kind::Wgpu(found.device), name: found.name })
 }
 
-#[cfg(not(all(feature = "gpu", feature = "train")))]
+#[cfg(not(feature = "gpu"))]
 fn cuda() -> Result<Device, String> {
     Err(NOT_BUILT.to_owned())
 }
 
-#[cfg(not(all(feature = "gpu", feature = "train")))]
+#[cfg(not(feature = "gpu"))]
 fn wgpu(_software_too: bool) -> Result<Device, String> {
     Err(NOT_BUILT.to_owned())
 }

@@ -3,7 +3,7 @@
 //! Law: nothing leaves without its inconsistency, the figure that says whether the readings bear it out.
 
 #[cfg(feature = "gpu")]
-mod there;
+mod device;
 
 use rayon::prelude::*;
 
@@ -16,7 +16,7 @@ use crate::images::Images;
 use crate::spread::{Moments, doubled, measured_again};
 
 #[cfg(feature = "gpu")]
-pub use there::{DeviceEnhancer, DeviceEnhancerError};
+pub use device::{DeviceEnhancer, DeviceEnhancerError};
 
 /// How a stack is deblurred or enhanced.
 #[derive(Debug, Clone)]

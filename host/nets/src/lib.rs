@@ -23,8 +23,11 @@ pub mod device;
 pub mod embedded;
 pub mod enhance;
 pub mod estimate;
+mod filter;
 pub mod fusion;
 mod gate;
+#[cfg(feature = "gpu")]
+mod gpu;
 pub mod images;
 pub mod metrics;
 #[cfg(feature = "train")]
