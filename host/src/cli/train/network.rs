@@ -6,10 +6,6 @@ use std::path::PathBuf;
 
 /// Everything but which network.
 #[derive(Debug, clap::Args)]
-#[cfg_attr(
-    not(feature = "train"),
-    expect(dead_code, reason = "read by the run, which this build has not")
-)]
 pub struct Args {
     #[command(flatten)]
     pub data: DataArgs,
