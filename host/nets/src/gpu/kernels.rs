@@ -138,7 +138,7 @@ pub(super) fn convolve(
         xs[i] = within % out_side * stride;
     }
 
-    let steps = (inputs + DEPTH - 1) / DEPTH;
+    let steps = inputs.div_ceil(DEPTH);
     let mut at = CUBE_POS_Y as usize * kernel * kernel * steps * step;
     for ky in 0..kernel {
         for kx in 0..kernel {

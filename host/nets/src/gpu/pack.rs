@@ -75,9 +75,9 @@ mod tests {
         let steps = inputs.div_ceil(DEPTH);
         let mut made = Vec::new();
         for pixel in 0..out * out {
-            for output in 0..outputs {
+            for (output, bias) in table[..outputs].iter().enumerate() {
                 let mut at = output / tile * kernel * kernel * steps * DEPTH * tile + output % tile;
-                let mut sum = table[output];
+                let mut sum = *bias;
                 for (ky, kx) in (0..kernel).flat_map(|ky| (0..kernel).map(move |kx| (ky, kx))) {
                     let y = (pixel / out * stride + ky).wrapping_sub(centre);
                     let x = (pixel % out * stride + kx).wrapping_sub(centre);
