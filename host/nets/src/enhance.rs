@@ -6,7 +6,7 @@
 
 mod known;
 #[cfg(feature = "gpu")]
-mod there;
+mod device;
 
 use std::num::NonZeroU32;
 
@@ -22,7 +22,7 @@ use crate::spread::{Moments, doubled, measured_again};
 
 pub use known::{Known, KnownEstimate};
 #[cfg(feature = "gpu")]
-pub use there::{DeviceEnhancer, DeviceEnhancerError};
+pub use device::{DeviceEnhancer, DeviceEnhancerError};
 
 /// How a stack is deblurred or enhanced.
 #[derive(Debug, Clone)]

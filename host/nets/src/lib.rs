@@ -34,14 +34,19 @@ pub mod device;
 pub mod embedded;
 pub mod enhance;
 pub mod estimate;
+mod filter;
 pub mod fusion;
 mod gate;
+#[cfg(feature = "gpu")]
+mod gpu;
 pub mod images;
 pub mod metrics;
+#[cfg(feature = "train")]
 pub mod model;
 mod network;
 mod random;
 mod spread;
+#[cfg(feature = "train")]
 pub mod train;
 pub mod upscale;
 pub mod weights;

@@ -4,7 +4,7 @@
 //! and it is made anew when the run goes on.
 
 use super::data::Found;
-use super::network::unit;
+use super::run::unit;
 use crate::report::to_json;
 use anyhow::{Context, Result, bail};
 use nirspi::files::image::encode_rgb;

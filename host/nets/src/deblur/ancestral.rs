@@ -65,6 +65,7 @@ impl Schedule {
     }
 
     /// abar after step `step`, counted from 0.
+    #[cfg(feature = "train")]
     pub(crate) fn left(&self, step: usize) -> f64 {
         self.left[step]
     }

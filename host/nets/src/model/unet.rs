@@ -13,10 +13,8 @@ use burn::tensor::activation::silu;
 use burn::tensor::backend::Backend;
 
 use super::{convolution, linear, shuffle, unshuffle};
+use crate::network::CONDITIONS;
 use crate::weights::{Weights, WeightsError};
-
-/// Numbers that condition the network: time (2), blur (2), noise (2).
-pub const CONDITIONS: usize = 6;
 
 /// Sizes of a [`UNet`].
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -1,6 +1,8 @@
 //! Both stages for images that OMP has left on a GPU.
 //!
-//! Law: what comes out is what [`Enhancer`](super::Enhancer) makes of the same images, to what single precision rounds.
+//! # Invariant
+//! What comes out is what [`Enhancer`](super::Enhancer) makes of the same images, to what single precision rounds
+//! (`tests::images_that_are_there_become_what_the_processor_makes_of_them`).
 
 use nirspi_recon::omp::gpu::DeviceImages;
 use thiserror::Error;
@@ -105,8 +107,11 @@ impl DeviceEnhancer {
         let mut all = Enhanced::default();
         for first in (0..images.frames()).step_by(self.batch) {
             let part = first..images.frames().min(first + self.batch);
-            let mut planes = Vec::with_capacity(2 * part.len() * images.pixels());
-            part.clone().for_each(|image| push_planes(depth, image, &mut planes));
+            let mut planes = Vec::new();
+            if depth.is_some() {
+                planes.reserve(2 * part.len() * images.pixels());
+                part.clone().for_each(|image| push_planes(depth, image, &mut planes));
+            }
             let guess = self.chain.run(images, part, white, &planes, options.estimate);
             all.append(finished(guess, options)?);
             progress(all.estimates.len());
