@@ -6,7 +6,7 @@ use super::network::Args;
 use crate::{Usage, print};
 use anyhow::{Context, Result};
 use indicatif::{ProgressBar, ProgressStyle};
-use nirspi::training::{Mixed, LinearCamera};
+use nirspi::training::{LinearCamera, Mixed};
 use nirspi_nets::Weights;
 use nirspi_nets::degrade::{AnalyticCamera, Limits};
 use nirspi_nets::device::Device;
