@@ -73,7 +73,7 @@ impl Warning {
 pub fn warnings(image: &EnhancedImage) -> Vec<Warning> {
     let EnhancedImage { inconsistency, blur_px, noise, .. } = *image;
     // A figure that is no number is no reason to be calm.
-    let beyond = |value: f32, limit: f32| !(value <= limit);
+    let beyond = |value: f32, limit: f32| value > limit || value.is_nan();
     [
         beyond(inconsistency, CONTRADICTED).then_some(Warning::Inconsistent { inconsistency }),
         beyond(noise, TRAINED_NOISE).then_some(Warning::Dim { noise }),

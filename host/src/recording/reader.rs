@@ -164,8 +164,10 @@ impl Records {
         let Self { path, file, reader, ours, over } = self;
         let io_error = |source| RecordingError::Io { path: path.clone(), source };
         let not_ours = |found: String| RecordingError::NotARecording { path: path.clone(), found };
-        while !*over {
-            let Some(event) = reader.next_event() else { break };
+        if *over {
+            return Ok(None);
+        }
+        while let Some(event) = reader.next_event() {
             let record = match event {
                 Ok(LinearReadEvent::ReadRequest(need)) => {
                     let read = file.read(reader.insert(need)).map_err(io_error)?;

@@ -15,6 +15,7 @@ use crate::weights::{Weights, WeightsError};
 ///
 /// Twice the betas of Ho, Jain and Abbeel (NeurIPS 2020: 1e-4 to 0.02 in 1000 steps) would end at 0.04, with abar at 4e-5. The
 /// shipped weights were trained up to 0.025, where abar ends at 0.0017.
+#[cfg(any(feature = "train", test))]
 const SHIPPED: (usize, [f64; 2]) = (500, [2e-4, 0.025]);
 
 /// How much of the image is left after each of the T steps of noise.
@@ -26,12 +27,14 @@ pub struct Schedule {
 
 impl Schedule {
     /// The schedule of the shipped weights, which training takes too.
+    #[cfg(any(feature = "train", test))]
     pub(crate) fn shipped() -> Self {
         let (steps, [start, end]) = SHIPPED;
         Self::linear(steps, start, end)
     }
 
     /// Says in the weights' metadata that they were trained with [`shipped`](Self::shipped).
+    #[cfg(any(feature = "train", test))]
     pub(crate) fn describe_shipped(weights: &mut Weights) {
         let (steps, [start, end]) = SHIPPED;
         weights.set_metadata("steps", steps.to_string());
@@ -40,6 +43,7 @@ impl Schedule {
     }
 
     /// How many steps of noise there are.
+    #[cfg(feature = "train")]
     pub(crate) fn steps(&self) -> usize {
         self.left.len()
     }
