@@ -104,7 +104,7 @@ fn await_start(session: &mut Session) -> Result<u32, GatewareError> {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "virtual-camera"))]
 mod tests {
     use super::*;
     use crate::link::{Link, Received};

@@ -17,6 +17,10 @@
 //! * [`training`] makes pairs to train networks on, through the virtual camera,
 //! * [`udev`] lets users use cameras on USB; [`boards`] lists the boards that firmware is for; with the feature `flash`, `flash` programs them,
 //! * [`virtual_camera`] is a camera without silicon: optics simulator, gateware model, real firmware logic.
+//!
+//! Without its features (`default-features = false`) the library captures, records, calibrates and reads measurements, and
+//! builds neither web server nor typefaces, optics nor networks. The features `enhance`, `pictures`, `virtual-camera`, `serve`
+//! and `training` add the rest, `gpu` the kernels for GPUs.
 
 pub mod account;
 pub mod boards;
@@ -30,19 +34,25 @@ pub mod flash;
 pub mod gateware;
 pub mod imaging;
 pub mod integrate;
+#[cfg(feature = "training")]
 pub mod legibility;
 pub mod link;
+#[cfg(feature = "pictures")]
 pub mod picture;
 pub mod recording;
 pub mod resolution;
+#[cfg(feature = "pictures")]
 pub mod scene;
 pub mod selftest;
+#[cfg(feature = "serve")]
 pub mod serve;
 pub mod session;
 pub mod setup;
 pub mod source;
 pub mod tally;
+#[cfg(feature = "training")]
 pub mod training;
 pub mod udev;
 pub mod versions;
+#[cfg(feature = "virtual-camera")]
 pub mod virtual_camera;

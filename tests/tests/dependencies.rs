@@ -96,6 +96,49 @@ fn a_forbidden_dependency_is_found() {
     assert_eq!(found, ["nirspi-mcu -> nirspi-recon", "nirspi-mcu -> embassy-executor"]);
 }
 
+/// Ordinary dependencies of a package of this workspace.
+fn ordinary(package: &str) -> Vec<String> {
+    let packages = packages();
+    let package = packages.iter().find(|found| found["name"] == package).unwrap();
+    let ordinary = package["dependencies"].as_array().unwrap().iter();
+    ordinary
+        .filter(|dependency| dependency["kind"].is_null())
+        .map(|dependency| dependency["name"].as_str().unwrap().to_owned())
+        .collect()
+}
+
+#[test]
+fn the_command_line_computes_nothing() {
+    let used = ordinary("nirspi-cli");
+    for numeric in ["nalgebra", "rand", "rand_distr", "rand_pcg", "rayon", "burn", "cubecl"] {
+        assert!(!used.iter().any(|used| used == numeric), "nirspi-cli -> {numeric}");
+    }
+}
+
+/// Whoever only captures builds neither web server nor typefaces, optics nor networks.
+#[test]
+fn capture_alone_builds_no_server_no_typefaces_no_optics_and_no_networks() {
+    let tree = |more: &[&str]| {
+        let output = Command::new(env!("CARGO"))
+            .args(["tree", "--locked", "--offline", "--edges", "normal", "--prefix", "none"])
+            .args(["--package", "nirspi"])
+            .args(more)
+            .current_dir(root())
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let text = String::from_utf8(output.stdout).unwrap();
+        let first = |line: &str| line.split_whitespace().next().map(str::to_owned);
+        text.lines().filter_map(first).collect::<BTreeSet<String>>()
+    };
+    let (capture, all) = (tree(&["--no-default-features"]), tree(&[]));
+    assert!(capture.contains("nirspi-wire") && capture.contains("nirspi-recon"), "{capture:?}");
+    for heavy in ["axum", "tokio", "ab_glyph", "image", "nirspi-optics", "nirspi-nets", "cubecl"] {
+        assert!(all.contains(heavy), "the full library has {heavy}");
+        assert!(!capture.contains(heavy), "capture alone builds {heavy}");
+    }
+}
+
 /// Plain `cargo test` builds no hardware simulator, says so, and CI runs what it leaves out.
 #[test]
 fn plain_cargo_test_leaves_out_the_simulator_only_and_ci_runs_the_rest() {
@@ -116,11 +159,12 @@ fn plain_cargo_test_leaves_out_the_simulator_only_and_ci_runs_the_rest() {
         left_out.iter().filter(|package| !uses_simulator(package)).map(|p| name(p)).collect();
     assert!(missing.is_empty(), "not in default-members of Cargo.toml: {missing:?}");
 
-    let all = "cargo test --locked --workspace";
-    let ci = std::fs::read_to_string(root().join(".ci/run")).unwrap();
-    assert!(ci.lines().any(|line| line == all), ".ci/run has no line {all:?}");
     let packages: String =
         left_out.iter().map(|package| format!(" -p {}", name(package))).collect();
+    let ci = std::fs::read_to_string(root().join(".ci/run")).unwrap();
+    for line in ["cargo test --locked".to_owned(), format!("cargo test --locked{packages}")] {
+        assert!(ci.lines().any(|found| found == line), ".ci/run has no line {line:?}");
+    }
     // Past the test harness's capture, so that everybody who runs the tests sees it.
     let _ = writeln!(
         std::io::stderr(),

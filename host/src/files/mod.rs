@@ -5,7 +5,9 @@
 //! whole or not there ([`output`]). A file can claim any size: memory is taken for data that
 //! arrived, never for a claim.
 
+#[cfg(feature = "training")]
 pub mod characters;
+#[cfg(feature = "pictures")]
 pub mod image;
 pub mod npy;
 pub mod npz;
@@ -19,5 +21,6 @@ mod error;
 #[cfg(test)]
 mod testing;
 
+#[cfg(feature = "training")]
 pub(crate) use archive::encode as encode_archive;
 pub use error::FileError;

@@ -7,12 +7,16 @@
 //! `demo`, `reconstruct`, `capture`, `serve` and `eval` all go this way: white level, the larger of lens and estimator as
 //! blur, networks, and the rule for warnings stand here once.
 
+#[cfg(feature = "enhance")]
 mod enhance;
 mod quality;
+#[cfg(feature = "enhance")]
 mod warning;
 mod white;
 
+#[cfg(feature = "enhance")]
 pub use enhance::{Enhance, EnhanceError, EnhancedImage, ImageContext, White};
 pub use quality::{Fitted, Quality, compare};
+#[cfg(feature = "enhance")]
 pub use warning::{Warning, warnings};
 pub use white::{SteadyWhite, brightest};
