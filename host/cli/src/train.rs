@@ -2,7 +2,6 @@
 
 mod data;
 mod degrade;
-mod folder;
 mod network;
 
 use anyhow::Result;
