@@ -1,14 +1,19 @@
 #!/usr/bin/env bash
-# Builds the firmware of every board into boards/target (`cargo test --test budgets` then prints the sizes). With rustup's targets where rustup can get
-# them; else (Debian and Ubuntu, no network but the package mirror) with Debian's compiler and its library's sources,
-# unpacked into boards/target, nothing installed. NIRSPI_FALLBACK=1 takes the second way in any case.
+# Builds the firmware of every board, or of those that are named, into boards/target:
+#   bash boards/build.sh [NAME...]
+# `cargo test --test budgets` then prints the sizes. Uses rustup's targets where rustup can get them. Elsewhere (Debian and
+# Ubuntu, no network but the package mirror) it uses Debian's compiler and the sources of its library, unpacked into
+# boards/target, nothing installed. NIRSPI_FALLBACK=1 always uses Debian's compiler.
 set -euo pipefail
 cd "$(dirname "$0")"
-declare -A target_of=(
-    [mps2-an505]=thumbv8m.main-none-eabihf
-    [nucleo-u5a5zj-q]=thumbv8m.main-none-eabihf
-    [nucleo-h7s3l8]=thumbv7em-none-eabihf
-)
+. ./facts.sh
+if [ $# = 0 ]; then mapfile -t names < <(boards); else names=("$@"); fi
+targets=()
+for name in "${names[@]}"; do
+    target=$(fact "$name" target)
+    targets+=("$target")
+done
+mapfile -t targets < <(printf '%s\n' "${targets[@]}" | sort -u)
 extra=()
 
 # The library's sources must be those of the compiler, so both are Debian's; linker and cargo are rustup's.
@@ -36,13 +41,17 @@ WRAPPER
     local linker
     linker=$(rustc "+$RUSTUP_TOOLCHAIN" --print sysroot)/lib/rustlib/$(uname -m)-unknown-linux-gnu/bin/rust-lld
     export RUSTUP_TOOLCHAIN RUSTC_BOOTSTRAP=1 RUSTC=$root/rustc
-    export CARGO_TARGET_THUMBV8M_MAIN_NONE_EABIHF_LINKER=$linker CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER=$linker
+    local target variable
+    for target in "${targets[@]}"; do
+        variable=CARGO_TARGET_$(tr 'a-z.-' 'A-Z__' <<<"$target")_LINKER
+        export "$variable=$linker"
+    done
     extra=(-Zbuild-std=core,alloc)
 }
 
-if [ -n "${NIRSPI_FALLBACK:-}" ] || ! rustup target add $(printf '%s\n' "${target_of[@]}" | sort -u) >&2; then
+if [ -n "${NIRSPI_FALLBACK:-}" ] || ! rustup target add "${targets[@]}" >&2; then
     fall_back
 fi
-for board in "${!target_of[@]}"; do
-    (cd "$board" && cargo build --locked --release --target-dir ../target "${extra[@]}")
+for name in "${names[@]}"; do
+    (cd "$name" && cargo build --locked --release --target-dir ../target "${extra[@]}")
 done

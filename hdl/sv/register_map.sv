@@ -1,4 +1,4 @@
-/// Addresses, bits, codes and limits, from `mcu/wire`. Written by `tests/rtl/map.rs`: do not edit.
+/// Addresses, bits, codes and limits, from `mcu/wire`. Written by `hdl/sim/tests/rtl/map.rs`: do not edit.
 package nirspi_register_map;
     localparam logic [32-1:0] ADDRESS_IDENTITY        = 32'h00000000;
     localparam logic [32-1:0] RESET_IDENTITY          = 32'h4E535049;

@@ -1,29 +1,19 @@
-//! The boards that firmware is built for, each once: what to call it, which chip it carries, where its build ends up.
+//! The boards that firmware is built for: every `boards/NAME/board.toml` of the repository, read when this crate is built.
 
+mod board;
+
+pub use board::{Board, Pins};
 use std::path::PathBuf;
 
-/// A board under `boards/`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Board {
-    /// Its folder, its package, and what it calls itself on the wire.
-    pub name: &'static str,
-    /// Its chip as probe-rs spells it; `None` where there is nothing to program.
-    pub chip: Option<&'static str>,
-    /// The Rust target of its firmware.
-    pub target: &'static str,
-}
+/// All boards, by name.
+pub static BOARDS: &[Board] = include!(concat!(env!("OUT_DIR"), "/boards.rs"));
 
-/// All boards, the reference first.
-pub const BOARDS: [Board; 3] = [
-    Board {
-        name: "nucleo-u5a5zj-q",
-        chip: Some("STM32U5A5ZJTxQ"),
-        target: "thumbv8m.main-none-eabihf",
-    },
-    Board { name: "nucleo-h7s3l8", chip: Some("STM32H7S3L8Hx"), target: "thumbv7em-none-eabihf" },
-    // Runs in QEMU.
-    Board { name: "mps2-an505", chip: None, target: "thumbv8m.main-none-eabihf" },
-];
+/// Names and titles of the boards that can be flashed, for messages and help.
+#[must_use]
+pub fn flashable() -> String {
+    let boards = BOARDS.iter().filter(|board| board.chip.is_some());
+    boards.map(|board| format!("{} ({})", board.name, board.title)).collect::<Vec<_>>().join(", ")
+}
 
 impl Board {
     /// The board of this name.
@@ -48,26 +38,59 @@ pub fn is_simulated(board: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    #[cfg(feature = "flash")]
     use std::io::Write;
-    use std::path::Path;
 
-    /// `boards/NAME/.cargo/config.toml` runs firmware with `probe-rs run --chip CHIP`: the same chip as here.
+    const HARDWARE: &str = "title = \"Toy\"\nkind = \"hardware\"\nprocessor = \"P1\"\ntarget = \"thumb\"\n\
+        host_link = \"USB\"\nfpga_link = \"SPI\"\nstate = \"built\"\nflash_bytes = 65_536\nstatic_bytes = 20\n\
+        stack_bytes = 10\nchip = \"C1\"\nfpga_wires = 4\npin_name = \"P{number}\"\nled_enable_low = \"off({number})\"\n";
+
     #[test]
-    fn every_chip_is_the_one_that_the_boards_folder_names() {
-        let boards = Path::new(env!("CARGO_MANIFEST_DIR")).join("../boards");
-        for board in BOARDS {
-            let Some(chip) = board.chip else { continue };
-            let path = boards.join(board.name).join(".cargo/config.toml");
-            let Ok(text) = std::fs::read_to_string(&path) else {
-                // Past the test harness's capture, so that a skipped test is seen.
-                let _ = writeln!(std::io::stderr(), "skipped: no {}", path.display());
-                continue;
-            };
-            let words: Vec<&str> =
-                text.split(|c: char| c.is_whitespace() || "\"',[]".contains(c)).collect();
-            let named = words.windows(2).find(|pair| pair[0] == "--chip").map(|pair| pair[1]);
-            assert_eq!(named, Some(chip), "{}", path.display());
+    fn a_board_is_what_its_board_toml_says() {
+        let board = Board::parse("toy", HARDWARE).unwrap();
+        assert_eq!((board.name, board.title, board.chip), ("toy", "Toy", Some("C1")));
+        assert_eq!((board.flash_bytes, board.static_bytes, board.stack_bytes), (65_536, 20, 10));
+        assert_eq!(board.pins.unwrap().fpga_wires, 4);
+        assert_eq!(board.elf(), PathBuf::from("boards/target/thumb/release/toy"));
+    }
+
+    #[test]
+    fn a_wrong_board_toml_is_one_line_that_names_file_and_key() {
+        let without = |key: &str| {
+            let lines = HARDWARE.lines().filter(|line| !line.starts_with(key));
+            lines.map(|line| format!("{line}\n")).collect::<String>()
+        };
+        let emulated = HARDWARE.replace("hardware", "emulated");
+        let wrong = [
+            (
+                format!("{HARDWARE}colour = \"red\"\n"),
+                "unknown key colour, expected one of title, kind",
+            ),
+            (format!("{HARDWARE}chip = \"C2\"\n"), "key chip is there twice"),
+            (format!("{HARDWARE}[section]\n"), "line 15 is \"[section]\", expected key = \"text\""),
+            (HARDWARE.replace("\"USB\"", "\"USB\" # fast"), "comments on lines of their own"),
+            (HARDWARE.replace("\"Toy\"", "5"), "title must be a \"text\""),
+            (HARDWARE.replace("65_536", "\"64 KB\""), "flash_bytes must be a whole number"),
+            (HARDWARE.replace("hardware", "toaster"), "kind is \"toaster\", expected \"hardware\""),
+            (emulated, "an emulated board has no chip: leave that key out"),
+        ];
+        let keys = HARDWARE.lines().map(|line| line.split(' ').next().unwrap());
+        let missing = keys.map(|key| (without(key), format!("missing key {key}")));
+        let wrong = wrong.map(|(text, words)| (text, words.to_owned()));
+        for (text, words) in wrong.into_iter().chain(missing) {
+            let error = Board::parse("toy", text.leak()).unwrap_err();
+            assert!(error.starts_with("boards/toy/board.toml: "), "{error}");
+            assert!(error.contains(&words), "{error:?}, expected {words:?}");
+            assert!(!error.contains('\n'), "{error}");
         }
+    }
+
+    #[test]
+    fn only_the_virtual_camera_and_emulated_boards_are_simulated() {
+        assert!(is_simulated("virtual"));
+        assert!(is_simulated("mps2-an505"));
+        assert!(!is_simulated("nucleo-u5a5zj-q"));
+        assert!(!is_simulated("a board of somebody else"));
     }
 
     /// With the feature only: `cargo test -p nirspi --features flash boards`.

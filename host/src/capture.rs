@@ -4,15 +4,17 @@
 //! and the counters say what has not.
 
 use crate::account::LossCounters;
-use crate::calibrate::{CalibrationError, Settling, calibrate};
+use crate::calibration::{CalibrationError, Settling, calibrate, calibrate_or};
 use crate::integrate::Integrated;
 use crate::recording::Recorder;
-use crate::session::{ANSWER_TIMEOUT, Deaf, Listener, Session, SessionError};
+use crate::session::{
+    ANSWER_TIMEOUT, IgnorePackets, Listener, Request, Session, SessionError, request,
+};
 use crate::setup::MeasurementSetup;
 use crate::tally::Tally;
 use nirspi_wire::{
-    Answer, Command, DeviceMessage, Event, EventKind, Fault, Frame, PacketError, Reply, RunLength,
-    State, Status,
+    Answer, DeviceMessage, Event, EventKind, Fault, Frame, PacketError, Reply, RunLength, State,
+    Status,
 };
 use std::io;
 use std::ops::ControlFlow;
@@ -41,12 +43,14 @@ pub struct CaptureOptions {
 /// Where a capture's latency and settling come from.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Calibration {
-    /// Nowhere: the setup's latency is right, and the leak is not known.
+    /// The setup's latency is right, and the leak is not known.
     None,
-    /// They are measured first.
+    /// They are measured first. A burst that does not show them ends the capture.
     Measure,
     /// They were measured before.
     Kept(Settling),
+    /// They are measured first. Where the burst is too dim to show them, they are as measured before.
+    MeasureOr(Settling),
 }
 
 /// How far a capture has come.
@@ -76,9 +80,9 @@ pub enum Ended {
 pub struct Capture {
     /// The setup as measured.
     pub setup: MeasurementSetup,
-    /// The camera's response, where it is known.
+    /// LED and amplifier response used for leak correction; `None` with [`Calibration::None`].
     pub settling: Option<Settling>,
-    /// Why it could not be.
+    /// Why the response of [`Calibration::MeasureOr`] is the one measured before.
     pub calibration_problem: Option<CalibrationError>,
     /// The sum of all frames received.
     pub integrated: Integrated,
@@ -102,8 +106,14 @@ pub enum CaptureError {
     /// The camera would not talk or not measure.
     #[error(transparent)]
     Session(#[from] SessionError),
+    /// Latency and settling could not be measured, and none are known.
+    #[error(
+        "the camera's ADC latency is not known (hold a white sheet before the camera and run nirspi calibrate once, or name \
+         a latency that you know with --no-calibration --adc-latency N)"
+    )]
+    Calibration(#[source] CalibrationError),
     /// The recording cannot be started.
-    #[error("{path}: cannot record: {source}")]
+    #[error("{path}: cannot record")]
     Recording {
         /// Which file.
         path: PathBuf,
@@ -111,9 +121,7 @@ pub enum CaptureError {
         source: io::Error,
     },
     /// The recording cannot be continued: the disk is full or gone.
-    #[error(
-        "{path}: cannot record any more: {source}; what was written before is kept ({counters} so far)"
-    )]
+    #[error("{path}: cannot record any more, what was written before is kept ({counters} so far)")]
     RecordingCut {
         /// Which file.
         path: PathBuf,
@@ -124,9 +132,18 @@ pub enum CaptureError {
     },
 }
 
+impl From<CalibrationError> for CaptureError {
+    fn from(error: CalibrationError) -> Self {
+        match error {
+            CalibrationError::Session(error) => Self::Session(error),
+            error => Self::Calibration(error),
+        }
+    }
+}
+
 /// Sees a capture while it runs, from the thread that drains the link: it has to be quick.
 pub trait Observer {
-    /// The camera has taken this setup; frames come next. `problem` is why its response could not be measured.
+    /// The camera has taken this setup; frames come next. `problem` is why its response is the one measured before.
     fn begins(
         &mut self,
         _setup: &MeasurementSetup,
@@ -155,7 +172,7 @@ impl Observer for Watching<'_> {
 }
 
 /// Takes the stream apart while it comes.
-struct Run<'o> {
+struct RunListener<'o> {
     observer: &'o mut dyn Observer,
     number: u16,
     tally: Tally,
@@ -166,7 +183,7 @@ struct Run<'o> {
     last_packet: Instant,
 }
 
-impl Run<'_> {
+impl RunListener<'_> {
     /// Writes to the recording, if there is one and it has not failed before.
     fn record(&mut self, write: impl FnOnce(&mut Recorder) -> io::Result<()>) {
         if let Some(recorder) = &mut self.recorder
@@ -177,7 +194,7 @@ impl Run<'_> {
     }
 }
 
-impl Listener for Run<'_> {
+impl Listener for RunListener<'_> {
     fn packet(&mut self, raw: &[u8], content: &Result<DeviceMessage<'_>, PacketError>) {
         self.last_packet = Instant::now();
         self.record(|recorder| recorder.packet(raw));
@@ -227,17 +244,17 @@ pub fn observe(
     let (settling, calibration_problem) = match &options.calibration {
         Calibration::None => (None, None),
         Calibration::Kept(settling) => (Some(settling.clone()), None),
-        Calibration::Measure => match calibrate(session, &mut Deaf) {
-            Ok(settling) => (Some(settling), None),
-            Err(CalibrationError::Session(error)) => return Err(error.into()),
-            Err(problem) => (None, Some(problem)),
-        },
+        Calibration::Measure => (Some(calibrate(session, &mut IgnorePackets)?), None),
+        Calibration::MeasureOr(known) => {
+            let (settling, problem) = calibrate_or(session, &mut IgnorePackets, known)?;
+            (Some(settling), problem)
+        }
     };
     if let Some(settling) = &settling {
         setup.adc_latency = settling.adc_latency;
     }
-    setup.with_configuration(|c| session.command(Command::Configure(c), &mut Deaf))?;
-    let before = session.status(&mut Deaf)?;
+    setup.with_configuration(|c| session.command(request::Configure(c), &mut IgnorePackets))?;
+    let before = session.status(&mut IgnorePackets)?;
 
     let recorder = match &options.record {
         None => None,
@@ -248,7 +265,7 @@ pub fn observe(
     };
     observer.begins(&setup, settling.as_ref(), calibration_problem.as_ref());
     let now = Instant::now();
-    let mut run = Run {
+    let mut run = RunListener {
         observer,
         number: before.run.wrapping_add(1),
         tally: Tally::new(&setup, Some(before.run.wrapping_add(1))),
@@ -290,7 +307,7 @@ pub fn observe(
 }
 
 /// A run that never started leaves no recording behind.
-fn discard_empty(path: Option<&Path>, run: Run<'_>) {
+fn discard_empty(path: Option<&Path>, run: RunListener<'_>) {
     drop(run.recorder);
     // Not a device that the user records into.
     if let Some(path) = path.filter(|path| path.is_file()) {
@@ -302,11 +319,11 @@ fn discard_empty(path: Option<&Path>, run: Run<'_>) {
 fn stream(
     session: &mut Session,
     frames: Option<u32>,
-    run: &mut Run<'_>,
+    run: &mut RunListener<'_>,
     started: Instant,
 ) -> Result<Ended, SessionError> {
     let length = frames.map_or(RunLength::Continuous, RunLength::Frames);
-    session.command(Command::Start(length), run)?;
+    session.command(request::Start(length), run)?;
     let mut stopped = false;
     let mut kept_alive = Instant::now();
     let mut kept_alive_us = 0;
@@ -322,7 +339,7 @@ fn stream(
                 run.observer.watch(&progress).is_break() || run.recorder_error.is_some();
             if wants_stop && !stopped && !run.tally.has_ended() {
                 stopped = true;
-                match session.command(Command::Stop, run) {
+                match session.command(request::Stop, run) {
                     // It had ended by itself meanwhile.
                     Err(SessionError::Refused { .. }) | Ok(()) => {}
                     Err(error) => return Err(error),
@@ -330,7 +347,7 @@ fn stream(
             }
         }
         if run.last_packet.elapsed() > ANSWER_TIMEOUT {
-            return Err(SessionError::NoAnswer { command: "Status" });
+            return Err(SessionError::NoAnswer { command: request::Status::NAME });
         }
         // A simulated camera's time may outrun ours, and it is the camera that counts our silence.
         let device_age =

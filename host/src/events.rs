@@ -16,7 +16,7 @@ pub fn at_greeting(kind: &EventKind) -> Option<String> {
 #[must_use]
 pub fn as_it_happens(kind: &EventKind) -> String {
     match *kind {
-        EventKind::Fault(fault) => format!("the camera switched its LEDs off: {fault:?}"),
+        EventKind::Fault(fault) => format!("the camera switched its LEDs off: {fault}"),
         EventKind::RunEnded {
             run,
             frames_made,

@@ -67,10 +67,10 @@ pub enum FlashingError {
     )]
     Permission(String),
     /// The probe does not work.
-    #[error("the debug probe cannot be used: {0}")]
+    #[error("the debug probe cannot be used")]
     Probe(#[from] DebugProbeError),
     /// The chip does not answer, or is another one.
-    #[error("no {chip} answers: is the board powered, and is it this board? {source}")]
+    #[error("no {chip} answers: is the board powered, and is it this board?")]
     Attach {
         /// The chip looked for.
         chip: String,
@@ -78,14 +78,14 @@ pub enum FlashingError {
         source: Box<probe_rs::Error>,
     },
     /// Not firmware of this chip.
-    #[error("not firmware for this chip: {0}")]
+    #[error("not firmware for this chip")]
     Image(#[from] FileDownloadError),
     /// Erasing, writing or comparing failed.
-    #[error("not written: {0}; flash it again before use")]
+    #[error("the firmware is not written whole: flash it again before use")]
     Write(#[from] FlashError),
     /// It was written and could not be started.
-    #[error("written and verified, but not started: {0}; press the board's reset button")]
-    Reset(Box<probe_rs::Error>),
+    #[error("written and verified, but not started: press the board's reset button")]
+    Reset(#[source] Box<probe_rs::Error>),
 }
 
 /// How far flashing has come.

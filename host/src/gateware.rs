@@ -3,7 +3,7 @@
 //! The one law: a piece is sent when the camera has said that it wants it next, so a reply lost on the way costs one more
 //! piece and never a wrong bitstream.
 
-use crate::session::{Deaf, Session, SessionError};
+use crate::session::{IgnorePackets, Session, SessionError};
 use nirspi_mcu::staging;
 use nirspi_wire::message::GATEWARE_CHUNK_MAX;
 use nirspi_wire::register::{IDENTITY, Register};
@@ -65,7 +65,7 @@ pub fn load(
         let rest = bitstream.get(offset as usize..).unwrap_or(&[]);
         let data = rest.get(..GATEWARE_CHUNK_MAX).unwrap_or(rest);
         let piece = GatewareChunk { offset, total, crc, data };
-        let next = match session.load_gateware(piece, &mut Deaf) {
+        let next = match session.load_gateware(piece, &mut IgnorePackets) {
             Ok(next) => next,
             // Its reply to the piece before was lost, or the piece itself.
             Err(SessionError::NoAnswer { .. }) => offset,
@@ -88,8 +88,8 @@ pub fn load(
 fn await_start(session: &mut Session) -> Result<u32, GatewareError> {
     let begun = Instant::now();
     loop {
-        let identity = match session.register(Register::Identity, &mut Deaf) {
-            Ok(IDENTITY) => return Ok(session.register(Register::Version, &mut Deaf)?),
+        let identity = match session.register(Register::Identity, &mut IgnorePackets) {
+            Ok(IDENTITY) => return Ok(session.register(Register::Version, &mut IgnorePackets)?),
             Ok(other) => other,
             Err(
                 SessionError::NoAnswer { .. }
@@ -100,7 +100,7 @@ fn await_start(session: &mut Session) -> Result<u32, GatewareError> {
         if begun.elapsed() > START_TIME {
             return Err(GatewareError::Silent(identity));
         }
-        session.listen(Duration::from_millis(50), &mut Deaf)?;
+        session.listen(Duration::from_millis(50), &mut IgnorePackets)?;
     }
 }
 

@@ -1,8 +1,8 @@
 //! Frames -> measurements: sums the frames of a run, undoes the settling leak, names the rows.
 
-use crate::calibrate::Settling;
+use crate::calibration::Settling;
 use crate::setup::MeasurementSetup;
-use nirspi_recon::{LeakError, MeasurementError, Measurements, Side, Sweep};
+use nirspi_recon::{LeakError, MeasurementError, Measurements, Sweep};
 use nirspi_wire::{Frame, FrameFlags};
 use std::collections::VecDeque;
 
@@ -83,14 +83,13 @@ impl Integrated {
     /// leaked from slot to slot is put back unless `keep_leak`; without it the dark level is estimated.
     ///
     /// # Errors
-    /// [`IntegrateError`] where the setup's rows are not ones of the instrument, or the response cannot be undone.
+    /// [`IntegrateError`] where the sums are not those of the setup, or the response cannot be undone.
     pub fn measurements(
         &self,
         setup: &MeasurementSetup,
         settling: Option<&Settling>,
         keep_leak: bool,
     ) -> Result<Measurements, IntegrateError> {
-        let rows: Vec<i64> = setup.rows.iter().map(|&row| i64::from(row)).collect();
         let mut values = self.means(setup);
         let leak = settling
             .filter(|_| !keep_leak)
@@ -100,14 +99,14 @@ impl Integrated {
             if let Some(leak) = &leak {
                 leak.correct_differential(&mut values);
             }
-            return Ok(Measurements::from_differential(Side::INSTRUMENT, &rows, &values)?);
+            return Ok(Measurements::from_differential(&setup.rows, &values)?);
         }
         let dark = settling.map_or(0.0, |settling| settling.dark_counts);
         values.iter_mut().for_each(|value| *value -= dark);
         if let Some(leak) = &leak {
             leak.correct_single(&mut values, Sweep::Repeating);
         }
-        let mut measurements = Measurements::from_single(Side::INSTRUMENT, &rows, &values)?;
+        let mut measurements = Measurements::from_single(&setup.rows, &values)?;
         if settling.is_none() {
             measurements.remove_dark_level();
         }

@@ -29,7 +29,7 @@ pub enum LegibilityError {
     #[error("no tesseract on this machine (Debian: apt install tesseract-ocr)")]
     Absent,
     /// The system refused.
-    #[error("tesseract: {0}")]
+    #[error("tesseract cannot be run")]
     Io(#[from] io::Error),
     /// It said that something is wrong.
     #[error("tesseract: {0}")]

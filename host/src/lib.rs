@@ -5,27 +5,31 @@
 //! * [`link`] moves bytes, [`session`] talks to a camera, [`account`] counts what became of every frame,
 //! * [`versions`] says whether camera and program belong together, [`events`] what a camera reports unasked,
 //! * [`gateware`] loads a camera's FPGA,
-//! * [`calibrate`] measures latency and settling, [`selftest`] checks a camera, [`kept_calibration`] remembers,
+//! * [`calibration`] measures latency and settling, keeps and chooses them, [`selftest`] checks a camera,
 //! * [`capture`] runs a measurement, [`recording`] keeps it,
 //! * [`tally`] and [`integrate`] turn frames into measurements; `nirspi-recon` turns those into an image,
+//! * [`source`] reads measurements from a file, a recording or a capture,
 //! * [`files`], [`picture`] and [`scene`] are what people see and hand over, [`resolution`] says how fine it is,
 //!   [`legibility`] whether somebody can read it,
-//! * [`serve`] shows a camera live on a web page, [`white`] gives its images a scale,
+//! * [`imaging`] scales, enhances and judges images, and says when not to trust them,
+//! * [`serve`] shows a camera live on a web page,
+//! * [`causes`] tells an error with its causes,
 //! * [`training`] makes pairs to train networks on, through the virtual camera,
 //! * [`udev`] lets users use cameras on USB; [`boards`] lists the boards that firmware is for; with the feature `flash`, `flash` programs them,
 //! * [`virtual_camera`] is a camera without silicon: optics simulator, gateware model, real firmware logic.
 
 pub mod account;
 pub mod boards;
-pub mod calibrate;
+pub mod calibration;
 pub mod capture;
+pub mod causes;
 pub mod events;
 pub mod files;
 #[cfg(feature = "flash")]
 pub mod flash;
 pub mod gateware;
+pub mod imaging;
 pub mod integrate;
-pub mod kept_calibration;
 pub mod legibility;
 pub mod link;
 pub mod picture;
@@ -36,9 +40,9 @@ pub mod selftest;
 pub mod serve;
 pub mod session;
 pub mod setup;
+pub mod source;
 pub mod tally;
 pub mod training;
 pub mod udev;
 pub mod versions;
 pub mod virtual_camera;
-pub mod white;

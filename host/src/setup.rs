@@ -1,6 +1,6 @@
 //! What is measured: order, number of patterns, timing, sweeps. The host's side of a wire configuration.
 
-use nirspi_recon::{Order, OrderError, Side};
+use nirspi_recon::{Order, Rows, RowsError, Side};
 use nirspi_wire::{
     ADC_HZ, CLOCKS_PER_PATTERN, Configuration, PATTERNS, PatternOrder, SampleSource, samples::Words,
 };
@@ -11,8 +11,9 @@ use serde::{Deserialize, Serialize};
 pub struct MeasurementSetup {
     /// Name of the order, for people.
     pub order: String,
-    /// Natural-order Hadamard row shown k-th; its length is the number of patterns of a sweep.
-    pub rows: Vec<u16>,
+    /// Hadamard rows of [`Side::INSTRUMENT`] in the order shown; their number is that of the patterns of a sweep.
+    #[serde(with = "shown")]
+    pub rows: Rows,
     /// Whether each pattern is followed by its complement.
     pub differential: bool,
     /// ADC clocks that each pattern is shown.
@@ -31,14 +32,11 @@ impl MeasurementSetup {
     ///
     /// # Errors
     /// If the order is no permutation of the 1024 patterns.
-    pub fn new(order: &Order, sampling: f64) -> Result<Self, OrderError> {
-        let mut rows: Vec<u16> =
-            order.rows(Side::INSTRUMENT)?.iter().map(|&row| row as u16).collect();
+    pub fn new(order: &Order, sampling: f64) -> Result<Self, RowsError> {
         let patterns = (sampling * f64::from(PATTERNS)).round().clamp(1.0, f64::from(PATTERNS));
-        rows.truncate(patterns as usize);
         Ok(Self {
             order: order.to_string(),
-            rows,
+            rows: order.rows(Side::INSTRUMENT)?.first(patterns as usize),
             differential: true,
             clocks_per_pattern: CLOCKS_PER_PATTERN,
             blanked: 2,
@@ -69,8 +67,9 @@ impl MeasurementSetup {
     /// Hands the wire configuration to `send`; it borrows the order table.
     pub fn with_configuration<T>(&self, send: impl FnOnce(Configuration<'_>) -> T) -> T {
         let mut table = vec![0; 2 * self.rows.len()];
-        let natural = self.rows.iter().zip(0..).all(|(&row, k): (&u16, u16)| row == k);
-        let order = match Words::pack(self.rows.iter().copied(), &mut table) {
+        let natural = self.rows.iter().copied().eq(0..self.rows.len() as u32);
+        // No side has rows beyond 65 535.
+        let order = match Words::pack(self.rows.iter().map(|&row| row as u16), &mut table) {
             Ok(words) if !natural => PatternOrder::Table(words),
             _ => PatternOrder::Natural,
         };
@@ -85,5 +84,48 @@ impl MeasurementSetup {
             source: SampleSource::Detector,
             over_range_trip: 0,
         })
+    }
+}
+
+/// Rows in a recording: a list of numbers, which are checked when they are read.
+mod shown {
+    use super::{Rows, Side};
+    use serde::{Deserialize, Deserializer, Serializer, de::Error};
+
+    pub fn serialize<S: Serializer>(rows: &Rows, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(rows.iter())
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Rows, D::Error> {
+        let rows = Vec::<i64>::deserialize(deserializer)?;
+        Rows::new(Side::INSTRUMENT, rows).map_err(D::Error::custom)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_setup_comes_back_from_json_as_it_was() {
+        let setup = MeasurementSetup::new(&Order::CakeCutting, 0.3).unwrap();
+        let json = serde_json::to_string(&setup).unwrap();
+        assert!(json.contains("\"rows\":[0,"), "{json}");
+        assert_eq!(serde_json::from_str::<MeasurementSetup>(&json).unwrap(), setup);
+    }
+
+    #[test]
+    fn a_setup_with_rows_that_the_instrument_lacks_is_refused_when_it_is_read() {
+        let setup = MeasurementSetup::new(&Order::Natural, 2.0 / 1024.0).unwrap();
+        let json = serde_json::to_string(&setup).unwrap();
+        for (rows, why) in [
+            ("[0,1024]", "h_row[1] is 1024, expected 0 to 1023"),
+            ("[7,7]", "h_row[1] repeats row 7, first at h_row[0]"),
+            ("[]", "h_row is empty"),
+        ] {
+            let broken = json.replace("[0,1]", rows);
+            let error = serde_json::from_str::<MeasurementSetup>(&broken).unwrap_err().to_string();
+            assert!(error.contains(why), "{error}");
+        }
     }
 }

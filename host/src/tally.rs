@@ -4,10 +4,9 @@
 
 use crate::account::{Arrival, LossAccount, LossCounters};
 use crate::integrate::Integrated;
-use crate::recording::{self, RecordingError};
+use crate::recording::{Packet, Recording, RecordingError};
 use crate::setup::MeasurementSetup;
 use nirspi_wire::{DeviceMessage, EventKind, Frame, PacketError, open};
-use std::path::Path;
 
 /// What a run's packets amount to.
 #[derive(Debug, Clone)]
@@ -101,21 +100,17 @@ impl Tally {
     }
 }
 
-/// Counts a recording again.
+/// Counts the packets of a recording again.
 ///
 /// # Errors
 /// [`RecordingError`] where the file cannot be read.
 pub fn tally_recording(
-    path: &Path,
-    setup: &MeasurementSetup,
+    recording: &mut Recording,
 ) -> Result<(Integrated, LossCounters), RecordingError> {
-    let mut tally = Tally::new(setup, None);
-    let mut scratch = Vec::new();
-    recording::read(path, |packet, _| {
-        scratch.clear();
-        scratch.extend_from_slice(packet.strip_suffix(&[0]).unwrap_or(packet));
-        tally.packet(&open(&mut scratch));
-    })?;
+    let mut tally = Tally::new(&recording.setup, None);
+    for packet in recording {
+        tally.packet(&open(encoded(&mut packet?)));
+    }
     let counters = tally.account.counters();
     Ok((tally.integrated, counters))
 }
@@ -125,20 +120,28 @@ pub fn tally_recording(
 /// # Errors
 /// [`RecordingError`] where the file cannot be read.
 pub fn frames_of_recording(
-    path: &Path,
-    setup: &MeasurementSetup,
+    recording: &mut Recording,
 ) -> Result<(Vec<Integrated>, LossCounters), RecordingError> {
-    let mut tally = Tally::new(setup, None);
-    let (mut frames, mut scratch) = (Vec::new(), Vec::new());
-    recording::read(path, |packet, _| {
-        scratch.clear();
-        scratch.extend_from_slice(packet.strip_suffix(&[0]).unwrap_or(packet));
-        let content = open(&mut scratch);
+    let setup = recording.setup.clone();
+    let mut tally = Tally::new(&setup, None);
+    let mut frames = Vec::new();
+    for packet in recording {
+        let mut packet = packet?;
+        let content = open(encoded(&mut packet));
         if let (true, Ok(DeviceMessage::Frame(frame))) = (tally.packet(&content), &content) {
-            let mut alone = Integrated::new(setup);
+            let mut alone = Integrated::new(&setup);
             alone.add(frame);
             frames.push(alone);
         }
-    })?;
+    }
     Ok((frames, tally.account.counters()))
+}
+
+/// The packet without its delimiter, to be decoded in place.
+fn encoded(packet: &mut Packet) -> &mut [u8] {
+    let bytes = &mut packet.bytes;
+    if bytes.last() == Some(&0) {
+        bytes.pop();
+    }
+    bytes
 }

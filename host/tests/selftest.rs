@@ -8,7 +8,7 @@ use nirspi::session::Session;
 use nirspi::virtual_camera::{
     MemoryLink, OpticalFpga, SimulatedFpga, VirtualCamera, VirtualOptics,
 };
-use nirspi_hdl::Lines;
+use nirspi_hdl_model::Lines;
 use nirspi_mcu::{BusError, FpgaBus};
 use nirspi_optics::{LedArray, Scene};
 use nirspi_wire::register::{Register, mode};
@@ -212,7 +212,9 @@ fn an_open_interlock_fails_what_needs_light_and_names_the_reason() {
     let found = test(MemoryLink::new(camera));
     let interlock = found.checks.iter().find(|check| check.name() == "device: interlock").unwrap();
     assert_eq!(interlock.verdict(), Verdict::Failed);
-    assert!(failures(&found).iter().skip(1).all(|check| check.note().contains("Interlock")));
+    assert!(
+        failures(&found).iter().skip(1).all(|check| check.note().contains("interlock is open"))
+    );
     assert!(found.settling.is_none());
 }
 

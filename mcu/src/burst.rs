@@ -1,14 +1,16 @@
 //! A raw burst: plain ADC samples of the first clocks of a sweep, in pieces.
 //!
-//! The one law: a burst arrives whole, or an event says that it does not. Its pieces wait for room, since
+//! # Invariant
+//! A burst arrives whole, or an event says that it does not:
+//! `tests::frames::pieces_of_a_burst_wait_for_room_and_are_given_up_in_the_end`. Pieces of a burst wait for room, since
 //! the FPGA keeps the samples and the LEDs are off again after at most 33 microseconds.
 
-use crate::camera::{Activity, Machine};
-use crate::outbox::{STREAM_HEADER_BYTES, send};
-use crate::{FpgaBus, Micros, PacketSink, fpga};
+use crate::configure::Setup;
+use crate::packets::{STREAM_HEADER_BYTES, send};
+use crate::{FpgaBus, Limits, Micros, PacketSink, fpga};
 use nirspi_wire::register::{RAW_SAMPLES_MAX, Register, control};
 use nirspi_wire::samples::Words;
-use nirspi_wire::{DeviceMessage, EventKind, Fault, Raw, Refusal};
+use nirspi_wire::{DeviceMessage, Fault, Raw, Refusal};
 
 /// Samples in one piece: half of a frame's length on the link.
 pub const RAW_PIECE_SAMPLES: u16 = 1024;
@@ -29,97 +31,134 @@ pub(crate) struct Burst {
     recorded: bool,
 }
 
-impl Machine {
-    /// `RawBurst`.
-    pub(crate) fn start_burst(
-        &mut self,
-        now: Micros,
-        samples: u16,
-        bus: &mut impl FpgaBus,
-    ) -> Result<(), Refusal> {
-        let setup = self.ready_setup()?;
-        if !(1..=RAW_SAMPLES_MAX).contains(&samples) {
-            return Err(Refusal::RawLength { max: RAW_SAMPLES_MAX });
-        }
-        let started = fpga::verify(bus, &setup, &self.limits)
-            .and_then(|()| Ok(fpga::write(bus, Register::RawLength, samples.into())?))
-            .map_err(|_| fpga::identify(bus).err().unwrap_or(Fault::FpgaConfiguration))
-            .and_then(|()| fpga::start(bus, control::START_RAW));
-        if let Err(fault) = started {
-            self.trip(now, fault, bus);
-            return Err(Refusal::Fault(fault));
-        }
-        self.activity = Activity::Burst(Burst { samples, sent: 0, since: now, recorded: false });
-        Ok(())
-    }
-
-    /// At most one piece.
-    pub(crate) fn step_burst(
-        &mut self,
-        now: Micros,
-        bus: &mut impl FpgaBus,
-        sink: &mut impl PacketSink,
-    ) -> bool {
-        let may_send = self.may_stream();
-        let Activity::Burst(burst) = &mut self.activity else { return false };
-        if !burst.recorded {
-            if bus.raw_ready() {
-                burst.recorded = true;
-                burst.since = now;
-            } else if now.since(burst.since) > BURST_PATIENCE {
-                self.trip(now, Fault::FpgaStalled, bus);
-                return false;
-            } else {
-                return false;
-            }
-        }
-        let waited = now.since(burst.since);
-        let step = match bus.raw() {
-            Ok(None) => Step::Wait,
-            Ok(Some(bytes)) => burst.send_piece(now, bytes, may_send, sink),
-            Err(_) => Step::Lost,
-        };
-        match step {
-            Step::Sent if burst.sent < burst.samples => return true,
-            Step::Wait if waited <= PIECE_PATIENCE => return false,
-            Step::Sent => {}
-            Step::Wait | Step::Lost => self.notify(now, EventKind::RawDropped),
-        }
-        self.activity = Activity::Resting;
-        true
-    }
+/// What a step of a burst came to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Step {
+    /// The FPGA still records, or the link has no room.
+    Waiting,
+    /// A piece was sent, and there are more.
+    Sent,
+    /// The last piece was sent.
+    Done,
+    /// The rest of the burst is given up.
+    Dropped,
+    /// The FPGA did not record the burst in time; LEDs may be on.
+    Stalled,
 }
 
-enum Step {
+/// What became of one piece.
+enum Piece {
     Sent,
-    Wait,
+    /// The samples are not here yet, or the link is full.
+    NotNow,
     Lost,
 }
 
 impl Burst {
+    /// `RawBurst`: checks that the FPGA still holds `setup`, and starts the one sweep that is recorded.
+    ///
+    /// [`Refusal::Fault`] if the FPGA did not take the start; LEDs may then be on.
+    pub fn start(
+        now: Micros,
+        samples: u16,
+        setup: &Setup,
+        limits: &Limits,
+        bus: &mut impl FpgaBus,
+    ) -> Result<Self, Refusal> {
+        if !(1..=RAW_SAMPLES_MAX).contains(&samples) {
+            return Err(Refusal::RawLength { max: RAW_SAMPLES_MAX });
+        }
+        fpga::verify(bus, setup, limits)
+            .and_then(|()| Ok(fpga::write(bus, Register::RawLength, samples.into())?))
+            .map_err(|_| fpga::identify(bus).err().unwrap_or(Fault::FpgaConfiguration))
+            .and_then(|()| fpga::start(bus, control::START_RAW))
+            .map_err(Refusal::Fault)?;
+        Ok(Self { samples, sent: 0, since: now, recorded: false })
+    }
+
+    /// At most one piece.
+    pub fn step(
+        &mut self,
+        now: Micros,
+        may_send: bool,
+        bus: &mut impl FpgaBus,
+        sink: &mut impl PacketSink,
+    ) -> Step {
+        if !self.recorded {
+            if bus.raw_ready() {
+                self.recorded = true;
+                self.since = now;
+            } else if now.since(self.since) > BURST_PATIENCE {
+                return Step::Stalled;
+            } else {
+                return Step::Waiting;
+            }
+        }
+        let waited = now.since(self.since);
+        let piece = match bus.raw() {
+            Ok(None) => Piece::NotNow,
+            Ok(Some(bytes)) => self.send_piece(now, bytes, may_send, sink),
+            Err(_) => Piece::Lost,
+        };
+        match piece {
+            Piece::Sent if self.sent < self.samples => Step::Sent,
+            Piece::Sent => Step::Done,
+            Piece::NotNow if waited <= PIECE_PATIENCE => Step::Waiting,
+            Piece::NotNow | Piece::Lost => Step::Dropped,
+        }
+    }
+
     fn send_piece(
         &mut self,
         now: Micros,
         bytes: &[u8],
         may_send: bool,
         sink: &mut impl PacketSink,
-    ) -> Step {
+    ) -> Piece {
         if bytes.len() != usize::from(self.samples).saturating_mul(2) {
-            return Step::Lost;
+            return Piece::Lost;
         }
         let length = self.samples.saturating_sub(self.sent).min(RAW_PIECE_SAMPLES);
         let start = usize::from(self.sent).saturating_mul(2);
         let piece = bytes.get(start..).and_then(|rest| rest.get(..usize::from(length) << 1));
         let Some(Ok(samples)) = piece.map(Words::from_le_bytes) else {
-            return Step::Lost;
+            return Piece::Lost;
         };
         let payload = (usize::from(length) << 1).saturating_add(STREAM_HEADER_BYTES);
         let raw = Raw { first_clock: self.sent, total: self.samples, samples };
         if !may_send || !send(&DeviceMessage::Raw(raw), payload, sink) {
-            return Step::Wait;
+            return Piece::NotNow;
         }
         self.sent = self.sent.saturating_add(length);
         self.since = now;
-        Step::Sent
+        Piece::Sent
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::configure;
+    use crate::tests::fake_fpga::FakeFpga;
+    use crate::tests::support::{Link, SMALL};
+    use std::vec;
+
+    #[test]
+    fn a_burst_waits_for_the_fpga_then_for_room_and_goes_piece_by_piece() {
+        let (mut bus, mut link, limits) = (FakeFpga::default(), Link::default(), Limits::default());
+        let setup = configure::check(&SMALL, &limits).unwrap();
+        fpga::set(&mut bus, &setup, &limits).unwrap();
+        let samples = RAW_PIECE_SAMPLES + 1;
+        let mut burst = Burst::start(Micros(0), samples, &setup, &limits, &mut bus).unwrap();
+        bus.raw = None;
+        assert_eq!(burst.step(Micros(1), true, &mut bus, &mut link), Step::Waiting);
+        assert_eq!(burst.step(Micros(200_000), true, &mut bus, &mut link), Step::Stalled);
+
+        bus.raw = Some(vec![0; 2 * usize::from(samples)]);
+        assert_eq!(burst.step(Micros(2), false, &mut bus, &mut link), Step::Waiting);
+        assert_eq!(burst.step(Micros(3), true, &mut bus, &mut link), Step::Sent);
+        assert_eq!(burst.step(Micros(1_000_000), false, &mut bus, &mut link), Step::Dropped);
+        assert_eq!(burst.step(Micros(4), true, &mut bus, &mut link), Step::Done);
+        assert_eq!(link.packets.len(), 2);
     }
 }

@@ -24,6 +24,11 @@ pub(crate) fn control(bus: &mut impl FpgaBus, bits: u32) -> Result<(), BusError>
     write(bus, Register::Control, bits)
 }
 
+/// Gives the frame buffer back to the FPGA.
+pub(crate) fn release(bus: &mut impl FpgaBus) -> Result<(), BusError> {
+    control(bus, control::RELEASE)
+}
+
 /// Fault of an FPGA that does not answer at all.
 pub(crate) const SILENT: Fault = Fault::FpgaAbsent { identity: 0 };
 

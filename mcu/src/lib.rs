@@ -21,8 +21,10 @@
 //! }
 //! ```
 //!
-//! One idea a module: `safety` (sensors), `configure` (checks), `fpga` (registers), `session` (commands), `run`
-//! and `burst` (data), `host_port` (which bytes a board moves), `selftest`, `gateware`, `outbox` (what waits for the link), `camera` (who is asked when).
+//! One idea a module. `camera` is what a board calls; `commands` (of the host) and `poll` (safety rules, then one step)
+//! drive the `machine`, which holds the state. The machine's parts know nothing of the machine: `run` and `burst`
+//! (data), `selftest`, `gateware`, `configure` (checks), `safety` (sensors), `fpga` (registers), `notices` (replies and
+//! events that wait for the link), `packets` (a message into the link). `host_port` says which bytes a board moves.
 #![no_std]
 #![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 #![deny(clippy::arithmetic_side_effects)]
@@ -42,6 +44,7 @@ extern crate std;
 
 mod burst;
 mod camera;
+mod commands;
 mod configure;
 mod crash;
 pub mod ecp5;
@@ -49,14 +52,16 @@ mod fpga;
 mod gateware;
 mod host_port;
 mod limits;
+mod machine;
 mod merge;
+mod notices;
 pub mod ntc;
-mod outbox;
+mod packets;
+mod poll;
 mod ports;
 mod run;
 mod safety;
 mod selftest;
-mod session;
 pub mod staging;
 mod time;
 

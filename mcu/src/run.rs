@@ -1,12 +1,15 @@
 //! A run: frames from the FPGA to the link, and the count of every one of them.
 //!
-//! The one law: when a run has ended,
-//! `frames_made = frames_sent + frames_dropped + fpga_frames_lost + fpga_frames_corrupt`.
+//! # Invariant
+//! When a run has ended,
+//! `frames_made = frames_sent + frames_dropped + fpga_frames_lost + fpga_frames_corrupt`:
+//! `tests::laws::every_frame_made_is_sent_or_counted_and_the_run_ends_once`.
 
-use crate::camera::{Activity, Machine};
-use crate::outbox::{Outcome, STREAM_HEADER_BYTES, send};
+use crate::configure::Setup;
+use crate::notices::Outcome;
+use crate::packets::{STREAM_HEADER_BYTES, send};
 use crate::time::Anchor;
-use crate::{FpgaBus, Micros, PacketSink, configure, fpga};
+use crate::{FpgaBus, Limits, Micros, PacketSink, configure, fpga};
 use nirspi_wire::fpga::{FpgaFrame, Header};
 use nirspi_wire::register::{Register, control};
 use nirspi_wire::{
@@ -55,8 +58,18 @@ impl Counters {
         self.corrupt = self.corrupt.wrapping_add(1);
     }
 
+    /// Counters of the run after this one.
+    pub fn of_next_run(&self) -> Self {
+        Self { run: self.run.wrapping_add(1), ..Self::default() }
+    }
+
+    /// Frames that have not come yet count as dropped: the host that they were for is gone.
+    pub fn drop_missing(&mut self) {
+        self.dropped = self.dropped.wrapping_add(self.missing());
+    }
+
     /// Frames that the FPGA has made and that have not come yet.
-    pub fn missing(&self) -> u32 {
+    fn missing(&self) -> u32 {
         let Self { made, sent, dropped, lost, corrupt, .. } = *self;
         let missing = [sent, dropped, lost, corrupt].into_iter().fold(made, u32::wrapping_sub);
         // More came than were made: an FPGA that cannot count.
@@ -92,7 +105,96 @@ struct Ending {
     reply: Option<(u16, Outcome)>,
 }
 
+/// What a frame passes on its way from the FPGA to the link.
+pub(crate) struct Path<'m> {
+    pub counters: &'m mut Counters,
+    /// The bus failed when the frame before was to be released.
+    pub release_pending: &'m mut bool,
+    /// Memory for the frame's packed samples.
+    pub scratch: &'m mut [u8],
+    /// The FPGA does not answer.
+    pub absent: bool,
+    /// A host listens, and no reply or event waits.
+    pub may_send: bool,
+}
+
+/// How far a run is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Progress {
+    UnderWay,
+    /// The last frame of the run has been made, and LEDs are still on.
+    Complete,
+    /// LEDs are on and no frame has come for too long.
+    Stalled,
+}
+
+/// What the camera knows of the FPGA when a run winds up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Fpga {
+    /// The FPGA does not answer: no frame is waited for.
+    Absent,
+    /// The FPGA has not confirmed that the LEDs are off, so it may still make frames.
+    MayBeLit,
+    Dark,
+}
+
+/// What to say of a run that is over.
+#[derive(Debug, PartialEq)]
+pub(crate) struct Ended {
+    pub reply: Option<(u16, Outcome)>,
+    /// [`EventKind::RunEnded`].
+    pub event: EventKind,
+}
+
 impl Run {
+    /// `Start`: checks that the FPGA still holds `setup`, and switches the LEDs on.
+    ///
+    /// [`Refusal::Fault`] if the FPGA did not take the start; LEDs may then be on.
+    pub fn start(
+        now: Micros,
+        length: RunLength,
+        setup: &Setup,
+        limits: &Limits,
+        bus: &mut impl FpgaBus,
+    ) -> Result<Self, Refusal> {
+        // 0 in the FPGA's register is a run without end.
+        let frames = match length {
+            RunLength::Continuous => 0,
+            RunLength::Frames(frames) => {
+                configure::in_range(ConfigField::Frames, frames, 1, u32::MAX)
+                    .map_err(Refusal::Configuration)?;
+                frames
+            }
+        };
+        let (anchor, started) = fpga::verify(bus, setup, limits)
+            .and_then(|()| Ok(fpga::write(bus, Register::Frames, frames)?))
+            .and_then(|()| Ok(fpga::clock(bus)?))
+            .map_err(|_| fpga::identify(bus).err().unwrap_or(Fault::FpgaConfiguration))
+            .and_then(|clock| {
+                let started = fpga::start(bus, control::START)?;
+                Ok((Anchor { clock, time: now }, started))
+            })
+            .map_err(Refusal::Fault)?;
+        let frame_micros = setup.frame_clocks() / crate::CLOCKS_PER_MICRO;
+        let stall_after = frame_micros.saturating_mul(limits.stall_frames.into());
+        let run = Self {
+            length,
+            patterns: setup.patterns,
+            anchor,
+            stall_after: Micros(stall_after).max(limits.stall_min),
+            last_frame: now,
+            last_sequence: None,
+            ending: None,
+        };
+        if started == fpga::Started::OverAlready {
+            let mut counters = Counters::default();
+            if counters.read(bus).is_err() || !run.is_complete(counters.made) {
+                return Err(Refusal::Fault(Fault::FpgaStalled));
+            }
+        }
+        Ok(run)
+    }
+
     /// LEDs are on.
     pub fn is_lit(&self) -> bool {
         self.ending.is_none()
@@ -102,12 +204,102 @@ impl Run {
         matches!(self.length, RunLength::Frames(frames) if made >= frames)
     }
 
+    /// What the machine has to do next.
+    pub fn progress(&self, now: Micros, counters: &Counters) -> Progress {
+        if !self.is_lit() {
+            Progress::UnderWay
+        } else if self.is_complete(counters.made) {
+            Progress::Complete
+        } else if now.since(self.last_frame) > self.stall_after {
+            Progress::Stalled
+        } else {
+            Progress::UnderWay
+        }
+    }
+
     /// LEDs have been switched off; `reply` is given once the last frame is through.
     pub fn end(&mut self, now: Micros, reply: Option<(u16, Outcome)>) {
         let ending = self.ending.get_or_insert(Ending { since: now, reply: None });
         if reply.is_some() {
             ending.reply = reply;
         }
+    }
+
+    /// Takes at most one frame, and sends or counts it; whether there was a frame.
+    pub fn take_frame(
+        &mut self,
+        now: Micros,
+        path: Path<'_>,
+        bus: &mut impl FpgaBus,
+        sink: &mut impl PacketSink,
+    ) -> bool {
+        let Path { counters, release_pending, scratch, absent, may_send } = path;
+        // After a release that failed, the line still stands for the frame that was taken before.
+        if *release_pending || absent || !bus.frame_ready() {
+            return false;
+        }
+        let taken = match bus.frame() {
+            Ok(None) => return false,
+            Ok(Some(bytes)) => assemble(bytes, self.patterns, scratch),
+            Err(_) => None,
+        };
+        // The FPGA needs its buffer back before the next frame is complete; the link can wait.
+        *release_pending = fpga::release(bus).is_err();
+        self.last_frame = now;
+        let Some((header, samples)) = taken else {
+            counters.count_corrupt();
+            return true;
+        };
+        if self.last_sequence.replace(header.sequence) == Some(header.sequence) {
+            // The release of this frame was lost on the bus.
+            return true;
+        }
+        counters.advance(header.sequence.wrapping_add(1), header.lost);
+        let payload = samples.len().saturating_mul(4).saturating_add(STREAM_HEADER_BYTES);
+        let frame = DeviceMessage::Frame(Frame {
+            run: counters.run,
+            sequence: header.sequence,
+            device_time_us: self.anchor.time_of(header.clock).0,
+            sweeps: header.sweeps,
+            flags: header.flags,
+            samples,
+        });
+        let count = if may_send && send(&frame, payload, sink) {
+            &mut counters.sent
+        } else {
+            &mut counters.dropped
+        };
+        *count = count.wrapping_add(1);
+        true
+    }
+
+    /// What to say of the run once its LEDs are off and its last frame is through; `None` before.
+    pub fn wind_up(
+        &mut self,
+        now: Micros,
+        counters: &mut Counters,
+        fpga: Fpga,
+        bus: &mut impl FpgaBus,
+    ) -> Option<Ended> {
+        let ending = self.ending.as_mut()?;
+        if fpga != Fpga::Absent {
+            let unknown = fpga == Fpga::MayBeLit || counters.read(bus).is_err();
+            let more = unknown || counters.missing() > 0;
+            if more && now.since(ending.since) <= DRAIN_PATIENCE {
+                return None;
+            }
+        }
+        // Frames that the FPGA made and never delivered were damaged on the way.
+        counters.corrupt = counters.corrupt.wrapping_add(counters.missing());
+        let Counters { run, made, dropped, lost, corrupt, .. } = *counters;
+        let event = EventKind::RunEnded {
+            run,
+            frames_made: made,
+            frames_dropped: dropped,
+            fpga_frames_lost: lost,
+            fpga_frames_corrupt: corrupt,
+        };
+        Some(Ended { reply: ending.reply.take(), event })
     }
 }
 
@@ -122,172 +314,49 @@ fn assemble<'s>(
     Some((frame.header, samples))
 }
 
-impl Machine {
-    /// `Start`.
-    pub(crate) fn start(
-        &mut self,
-        now: Micros,
-        length: RunLength,
-        bus: &mut impl FpgaBus,
-    ) -> Result<(), Refusal> {
-        let setup = self.ready_setup()?;
-        // 0 in the FPGA's register is a run without end.
-        let frames = match length {
-            RunLength::Continuous => 0,
-            RunLength::Frames(frames) => {
-                configure::in_range(ConfigField::Frames, frames, 1, u32::MAX)
-                    .map_err(Refusal::Configuration)?;
-                frames
-            }
-        };
-        let started = fpga::verify(bus, &setup, &self.limits)
-            .and_then(|()| Ok(fpga::write(bus, Register::Frames, frames)?))
-            .and_then(|()| Ok(fpga::clock(bus)?))
-            .map_err(|_| fpga::identify(bus).err().unwrap_or(Fault::FpgaConfiguration))
-            .and_then(|clock| {
-                let started = fpga::start(bus, control::START)?;
-                Ok((Anchor { clock, time: now }, started))
-            });
-        let (anchor, started) = match started {
-            Ok(started) => started,
-            Err(fault) => {
-                self.trip(now, fault, bus);
-                return Err(Refusal::Fault(fault));
-            }
-        };
-        let frame_micros = setup.frame_clocks() / crate::CLOCKS_PER_MICRO;
-        let stall_after = frame_micros.saturating_mul(self.limits.stall_frames.into());
-        let run = Run {
-            length,
-            patterns: setup.patterns,
-            anchor,
-            stall_after: Micros(stall_after).max(self.limits.stall_min),
-            last_frame: now,
-            last_sequence: None,
-            ending: None,
-        };
-        if started == fpga::Started::OverAlready {
-            let mut counters = Counters::default();
-            if counters.read(bus).is_err() || !run.is_complete(counters.made) {
-                self.trip(now, Fault::FpgaStalled, bus);
-                return Err(Refusal::Fault(Fault::FpgaStalled));
-            }
-        }
-        self.counters = Counters { run: self.counters.run.wrapping_add(1), ..Counters::default() };
-        self.release_pending = false;
-        self.activity = Activity::Run(run);
-        Ok(())
-    }
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tests::fake_fpga::FakeFpga;
+    use crate::tests::support::{Link, SMALL};
 
-    /// LEDs off; `reply` and `RunEnded` follow the last frame.
-    pub(crate) fn end_run(
-        &mut self,
-        now: Micros,
-        reply: Option<(u16, Outcome)>,
-        bus: &mut impl FpgaBus,
-    ) {
-        self.leds_off(bus);
-        if let Activity::Run(run) = &mut self.activity {
-            run.end(now, reply);
-        }
-        self.wind_up(now, bus);
-    }
+    #[test]
+    fn a_run_of_one_frame_sends_the_frame_and_ends_when_it_is_through() {
+        let (mut bus, mut link, limits) = (FakeFpga::default(), Link::default(), Limits::default());
+        let setup = configure::check(&SMALL, &limits).unwrap();
+        fpga::set(&mut bus, &setup, &limits).unwrap();
+        let mut run =
+            Run::start(Micros(0), RunLength::Frames(1), &setup, &limits, &mut bus).unwrap();
+        let mut counters = Counters::default().of_next_run();
+        assert_eq!(run.progress(Micros(1), &counters), Progress::UnderWay);
+        assert_eq!(run.progress(Micros(10_000_000), &counters), Progress::Stalled);
 
-    /// At most one frame, then the end of the run if it has come.
-    pub(crate) fn step_run(
-        &mut self,
-        now: Micros,
-        bus: &mut impl FpgaBus,
-        sink: &mut impl PacketSink,
-    ) -> bool {
-        let worked = self.take_frame(now, bus, sink);
-        let Activity::Run(run) = &self.activity else { return worked };
-        if run.is_lit() && run.is_complete(self.counters.made) {
-            self.end_run(now, None, bus);
-        } else {
-            if run.is_lit() && now.since(run.last_frame) > run.stall_after {
-                self.trip(now, Fault::FpgaStalled, bus);
-            }
-            self.wind_up(now, bus);
-        }
-        worked
-    }
+        bus.make_frame();
+        let mut scratch = [0; SAMPLE_BYTES];
+        let mut release_pending = false;
+        let path = Path {
+            counters: &mut counters,
+            release_pending: &mut release_pending,
+            scratch: &mut scratch,
+            absent: false,
+            may_send: true,
+        };
+        assert!(run.take_frame(Micros(2), path, &mut bus, &mut link));
+        assert_eq!((link.packets.len(), counters.sent, release_pending), (1, 1, false));
+        assert_eq!(run.progress(Micros(3), &counters), Progress::Complete);
 
-    fn take_frame(
-        &mut self,
-        now: Micros,
-        bus: &mut impl FpgaBus,
-        sink: &mut impl PacketSink,
-    ) -> bool {
-        let may_send = self.may_stream();
-        let absent = self.fpga_is_absent();
-        let Activity::Run(run) = &mut self.activity else { return false };
-        // After a release that failed, the line still stands for the frame that was taken before.
-        if self.release_pending || absent || !bus.frame_ready() {
-            return false;
-        }
-        let taken = match bus.frame() {
-            Ok(None) => return false,
-            Ok(Some(bytes)) => assemble(bytes, run.patterns, &mut self.scratch),
-            Err(_) => None,
+        assert_eq!(
+            run.wind_up(Micros(3), &mut counters, Fpga::Dark, &mut bus),
+            None,
+            "LEDs are on"
+        );
+        run.end(Micros(4), Some((7, Outcome::DONE)));
+        assert_eq!(run.wind_up(Micros(5), &mut counters, Fpga::MayBeLit, &mut bus), None);
+        let ended = run.wind_up(Micros(6), &mut counters, Fpga::Dark, &mut bus).unwrap();
+        assert_eq!(ended.reply, Some((7, Outcome::DONE)));
+        let EventKind::RunEnded { run: 1, frames_made: 1, frames_dropped: 0, .. } = ended.event
+        else {
+            panic!("{:?}", ended.event);
         };
-        // The FPGA needs its buffer back before the next frame is complete; the link can wait.
-        self.release_pending = fpga::control(bus, control::RELEASE).is_err();
-        run.last_frame = now;
-        let counters = &mut self.counters;
-        let Some((header, samples)) = taken else {
-            counters.count_corrupt();
-            return true;
-        };
-        if run.last_sequence.replace(header.sequence) == Some(header.sequence) {
-            // Its release before was lost on the bus.
-            return true;
-        }
-        counters.advance(header.sequence.wrapping_add(1), header.lost);
-        let payload = samples.len().saturating_mul(4).saturating_add(STREAM_HEADER_BYTES);
-        let frame = DeviceMessage::Frame(Frame {
-            run: counters.run,
-            sequence: header.sequence,
-            device_time_us: run.anchor.time_of(header.clock).0,
-            sweeps: header.sweeps,
-            flags: header.flags,
-            samples,
-        });
-        let count = if may_send && send(&frame, payload, sink) {
-            &mut counters.sent
-        } else {
-            &mut counters.dropped
-        };
-        *count = count.wrapping_add(1);
-        true
-    }
-
-    /// Ends a run whose LEDs are off once its last frame is through.
-    pub(crate) fn wind_up(&mut self, now: Micros, bus: &mut impl FpgaBus) {
-        let absent = self.fpga_is_absent();
-        let Activity::Run(Run { ending: Some(ending), .. }) = &mut self.activity else { return };
-        if !absent {
-            let unknown = self.off_pending || self.counters.read(bus).is_err();
-            let more = unknown || self.counters.missing() > 0;
-            if more && now.since(ending.since) <= DRAIN_PATIENCE {
-                return;
-            }
-        }
-        // What the FPGA made and never delivered did not survive the way from there.
-        self.counters.corrupt = self.counters.corrupt.wrapping_add(self.counters.missing());
-        let reply = ending.reply.take();
-        self.activity = Activity::Resting;
-        if let Some((id, outcome)) = reply {
-            self.reply(id, outcome);
-        }
-        let Counters { run, made, dropped, lost, corrupt, .. } = self.counters;
-        let ended = EventKind::RunEnded {
-            run,
-            frames_made: made,
-            frames_dropped: dropped,
-            fpga_frames_lost: lost,
-            fpga_frames_corrupt: corrupt,
-        };
-        self.notify(now, ended);
     }
 }

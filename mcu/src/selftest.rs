@@ -1,19 +1,19 @@
 //! Checks of the device without any optics.
 //!
-//! The one law: a self-test leaves the configuration as it found it, and lights the array for no more than
-//! one sweep, which is 82 microseconds.
+//! # Invariant
+//! A self-test leaves the configuration as it found it, and lights the array for no more than one sweep, which is 82
+//! microseconds: `tests::selftest::a_good_device_passes_everything_in_any_resting_state` and
+//! `the_test_frame_is_one_sweep_and_nothing_is_taken_meanwhile`.
 //!
 //! The FPGA drives the LEDs in every run, so the test frame cannot be dark: it is one sweep at the fastest
 //! rate, each pattern followed by its complement, so every LED is lit for half of 82 microseconds. It is
 //! left out (not in [`SelfTestReport::ran`]) where a fault stands, a sensor objects, or the bus has failed.
 
-use crate::camera::{Activity, Machine};
 use crate::configure::Setup;
-use crate::outbox::Outcome;
 use crate::{BusError, FpgaBus, Inputs, Limits, Micros, fpga, safety};
 use nirspi_wire::fpga::{FpgaFrame, Sums};
 use nirspi_wire::register::{Register, TEST_SEED, control, mode, status, test_sample};
-use nirspi_wire::{Answer, CLOCKS_PER_PATTERN, FrameFlags, PATTERNS, SelfTestReport};
+use nirspi_wire::{CLOCKS_PER_PATTERN, FrameFlags, PATTERNS, SelfTestReport};
 
 /// Longest time that the test frame may take: it needs 82 microseconds and a transfer.
 const TEST_PATIENCE: Micros = Micros(100_000);
@@ -41,7 +41,7 @@ pub(crate) struct TestFrame {
 }
 
 /// Checks that are done at once.
-fn examine(bus: &mut impl FpgaBus, inputs: &Inputs, limits: &Limits) -> SelfTestReport {
+pub(crate) fn examine(bus: &mut impl FpgaBus, inputs: &Inputs, limits: &Limits) -> SelfTestReport {
     let mut report = SelfTestReport::default();
     note(&mut report, SelfTestReport::FPGA_IDENTITY, fpga::identify(bus).is_ok());
     note(&mut report, SelfTestReport::FPGA_BUS, every_bit_holds(bus).unwrap_or(false));
@@ -127,59 +127,54 @@ fn is_the_test_frame(bytes: &[u8]) -> bool {
     })
 }
 
-impl Machine {
-    /// `SelfTest`; the reply comes when the test frame is through.
-    pub(crate) fn self_test(
-        &mut self,
-        id: u16,
-        now: Micros,
-        inputs: &Inputs,
-        bus: &mut impl FpgaBus,
-    ) {
-        let report = examine(bus, inputs, &self.limits);
-        let may_light = report.failed == 0
-            && self.fault.is_none()
-            && safety::objection(inputs, &self.limits, None).is_none();
-        if !may_light {
-            return self.reply(id, Outcome::Other(Ok(Answer::SelfTest(report))));
-        }
-        let test = TestFrame { id, report, since: now };
-        let begun = fpga::set(bus, &TEST_SETUP, &self.limits).is_ok()
-            && fpga::write(bus, Register::Frames, 1).is_ok()
-            && fpga::start(bus, control::START).is_ok();
-        self.activity = Activity::TestFrame(test);
-        self.release_pending = false;
-        if !begun {
-            self.finish_test(false, bus);
+/// Starts the test frame; whether the FPGA took it. LEDs may be on either way.
+pub(crate) fn begin(bus: &mut impl FpgaBus, limits: &Limits) -> bool {
+    fpga::set(bus, &TEST_SETUP, limits).is_ok()
+        && fpga::write(bus, Register::Frames, 1).is_ok()
+        && fpga::start(bus, control::START).is_ok()
+}
+
+impl TestFrame {
+    /// `report` holds the checks that were done at once; `id` is the command that waits for the reply.
+    pub fn new(id: u16, report: SelfTestReport, now: Micros) -> Self {
+        Self { id, report, since: now }
+    }
+
+    /// Whether the test frame was right; `None` while it may still come.
+    pub fn step(&self, now: Micros, bus: &mut impl FpgaBus) -> Option<bool> {
+        let late = now.since(self.since) > TEST_PATIENCE;
+        match bus.frame_ready().then(|| bus.frame().map(|b| b.map(is_the_test_frame))) {
+            None | Some(Ok(None)) if !late => None,
+            Some(Ok(Some(passed))) => Some(passed),
+            _ => Some(false),
         }
     }
 
-    /// Takes the test frame if it has come.
-    pub(crate) fn step_test(&mut self, now: Micros, bus: &mut impl FpgaBus) -> bool {
-        let Activity::TestFrame(test) = &self.activity else { return false };
-        let late = now.since(test.since) > TEST_PATIENCE;
-        let passed = match bus.frame_ready().then(|| bus.frame().map(|b| b.map(is_the_test_frame)))
-        {
-            None | Some(Ok(None)) if !late => return false,
-            Some(Ok(Some(passed))) => passed,
-            _ => false,
-        };
-        self.finish_test(passed, bus);
-        true
-    }
-
-    /// LEDs off, the configuration back in place, and the reply.
-    pub(crate) fn finish_test(&mut self, passed: bool, bus: &mut impl FpgaBus) {
-        let Activity::TestFrame(TestFrame { id, mut report, .. }) = self.activity else { return };
+    /// The command to answer, and the whole report.
+    pub fn verdict(&self, passed: bool) -> (u16, SelfTestReport) {
+        let mut report = self.report;
         note(&mut report, SelfTestReport::TEST_FRAME, passed);
-        self.activity = Activity::Resting;
-        self.leds_off(bus);
-        self.release_pending = fpga::control(bus, control::RELEASE).is_err();
-        if let Some(setup) = self.setup
-            && fpga::set(bus, &setup, &self.limits).is_err()
-        {
-            self.setup = None;
-        }
-        self.reply(id, Outcome::Other(Ok(Answer::SelfTest(report))));
+        (self.id, report)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tests::fake_fpga::FakeFpga;
+
+    #[test]
+    fn a_test_frame_passes_when_it_comes_and_fails_when_it_is_late() {
+        let (mut bus, limits) = (FakeFpga::default(), Limits::default());
+        assert!(begin(&mut bus, &limits));
+        let test = TestFrame::new(7, SelfTestReport::default(), Micros(0));
+        assert_eq!(test.step(Micros(1), &mut bus), None);
+        assert_eq!(test.step(Micros(200_000), &mut bus), Some(false), "late");
+        bus.make_frame();
+        assert_eq!(test.step(Micros(1), &mut bus), Some(true));
+
+        let (id, report) = test.verdict(true);
+        assert_eq!((id, report.ran, report.failed), (7, SelfTestReport::TEST_FRAME, 0));
+        assert_eq!(test.verdict(false).1.failed, SelfTestReport::TEST_FRAME);
     }
 }

@@ -1,8 +1,11 @@
 //! Shared pieces of the end-to-end tests.
 
 pub mod elf;
+pub mod emulated;
+pub mod firmware;
 pub mod pages;
 pub mod tamper;
+pub mod tapped;
 
 use std::path::{Path, PathBuf};
 

@@ -1,11 +1,17 @@
-//! What the files of a board say agrees: pins in code, in its page and at the FPGA, settings, rules, aliases.
+//! The files of a board agree with its `board.toml` and with one another: pins in the code, in its page and at the FPGA,
+//! settings, scripts, tables of the pages.
 
+use nirspi::boards::{BOARDS, Board, Pins};
 use nirspi_tests::root;
 use nirspi_wire::usb;
 use std::collections::BTreeSet;
+use std::io::Write;
+use std::process::Command;
 
-/// Boards with pins.
-const BOARDS: [&str; 2] = ["nucleo-u5a5zj-q", "nucleo-h7s3l8"];
+/// Boards with a pin table.
+fn wired() -> impl Iterator<Item = (&'static str, Pins)> {
+    BOARDS.iter().filter_map(|board| Some((board.name, board.pins?)))
+}
 
 /// Signal, pin, place on the board, where the wire goes.
 type Row = [String; 4];
@@ -46,7 +52,7 @@ fn pins_in_page(board: &str) -> Vec<Row> {
 
 #[test]
 fn a_boards_page_shows_the_pins_of_its_code() {
-    for board in BOARDS {
+    for (board, _) in wired() {
         let code = pins_in_code(board);
         assert!(code.len() > 15, "{board}: {code:?}");
         assert_eq!(pins_in_page(board), code, "{board}");
@@ -55,7 +61,7 @@ fn a_boards_page_shows_the_pins_of_its_code() {
 
 #[test]
 fn no_pin_and_no_place_is_used_twice() {
-    for board in BOARDS {
+    for (board, _) in wired() {
         let rows = pins_in_code(board);
         let count = |column: usize| {
             rows.iter().map(|row| &row[column]).filter(|cell| !cell.contains("USB")).count()
@@ -74,10 +80,10 @@ fn no_pin_and_no_place_is_used_twice() {
 #[test]
 fn a_wire_to_the_fpga_ends_where_the_constraints_have_that_signal() {
     let constraints = read("hdl/boards/ecp5-evn/board.lpf");
-    for board in BOARDS {
+    for (board, pins) in wired() {
         let rows = pins_in_code(board);
         let wires: Vec<_> = rows.iter().filter_map(|row| row[3].strip_prefix("FPGA ")).collect();
-        assert_eq!(wires.len(), 8, "{board}: the host port and two lines");
+        assert_eq!(wires.len() as u64, pins.fpga_wires, "{board}: wires to the FPGA");
         for wire in wires {
             let [place, arduino, signal] = wire.split(' ').collect::<Vec<_>>()[..] else {
                 panic!("{board}: {wire}")
@@ -96,46 +102,179 @@ fn a_wire_to_the_fpga_ends_where_the_constraints_have_that_signal() {
     }
 }
 
+/// Port and number of a pin that is spelled as `pattern` says: `PF14` as `P{port}{number}` is `F` and `14`.
+fn port_and_number<'p>(pattern: &str, pin: &'p str) -> Option<(&'p str, &'p str)> {
+    let (before, after) = pattern.split_once("{number}").expect("{number} in pin_name");
+    let pin = pin.strip_suffix(after)?;
+    let (port, number) = match before.split_once("{port}") {
+        Some((start, between)) => {
+            let rest = pin.strip_prefix(start)?;
+            (rest.get(..1)?, rest.get(1..)?.strip_prefix(between)?)
+        }
+        None => ("", pin.strip_prefix(before)?),
+    };
+    number.parse::<u8>().is_ok().then_some((port, number))
+}
+
+#[test]
+fn pins_are_read_as_board_toml_spells_them() {
+    assert_eq!(port_and_number("P{port}{number}", "PF14"), Some(("F", "14")));
+    assert_eq!(port_and_number("PIN_{number}", "PIN_25"), Some(("", "25")));
+    assert_eq!(port_and_number("P{port}_{number}", "P0_13"), Some(("0", "13")));
+    assert_eq!(port_and_number("P{port}{number}", "PIN_25"), None);
+}
+
 #[test]
 fn the_crash_handler_turns_off_the_pin_that_enables_the_leds() {
-    for board in BOARDS {
+    for (board, pins) in wired() {
         let rows = pins_in_code(board);
         let pin = &rows.iter().find(|row| row[0] == "led_enable").expect("led_enable")[1];
-        let (port, number) = pin[1..].split_at(1);
+        let Some((port, number)) = port_and_number(pins.pin_name, pin) else {
+            panic!("{board}: {pin} is not spelled as {}, which board.toml says", pins.pin_name)
+        };
+        let off = pins.led_enable_low.replace("{port}", port).replace("{number}", number);
         let code = read(&format!("boards/{board}/src/pins.rs"));
-        let off = format!("pac::GPIO{port}.bsrr().write(|bits| bits.set_br({number}, true));");
-        assert!(code.contains(&off), "{board}: {pin}");
+        let leds_off = code.split_once("pub fn leds_off() {").expect("leds_off").1;
+        let leds_off = leds_off.split_once("\n}\n").expect("an end of leds_off").0;
+        assert!(leds_off.contains(&off), "{board}: no {off:?} in leds_off");
     }
 }
 
 #[test]
-fn udev_rules_name_the_camera_and_come_before_the_seats() {
-    for board in BOARDS {
-        let rules = read(&format!("boards/{board}/60-nirspi.rules"));
-        let rule = rules.lines().find(|line| !line.starts_with('#')).expect("a rule");
-        for part in [
-            format!("ATTR{{idVendor}}==\"{:04x}\"", usb::VENDOR_ID),
-            format!("ATTR{{idProduct}}==\"{:04x}\"", usb::PRODUCT_ID),
-            format!("ATTR{{product}}==\"{}\"", usb::PRODUCT),
-            "TAG+=\"uaccess\"".to_owned(),
-        ] {
-            assert!(rule.contains(&part), "{board}: {part}");
+fn the_udev_rule_names_the_camera() {
+    let rules = read("boards/60-nirspi.rules");
+    let rule = rules.lines().find(|line| !line.starts_with('#')).expect("a rule");
+    for part in [
+        format!("ATTR{{idVendor}}==\"{:04x}\"", usb::VENDOR_ID),
+        format!("ATTR{{idProduct}}==\"{:04x}\"", usb::PRODUCT_ID),
+        format!("ATTR{{product}}==\"{}\"", usb::PRODUCT),
+        "TAG+=\"uaccess\"".to_owned(),
+    ] {
+        assert!(rule.contains(&part), "{part}");
+    }
+}
+
+/// Folders of `boards/` that have a file of this name.
+fn folders_with(file: &str) -> BTreeSet<String> {
+    let entries = std::fs::read_dir(root().join("boards")).expect("boards");
+    let folders = entries.map(|entry| entry.expect("an entry").path());
+    let found = folders.filter(|folder| folder.join(file).is_file());
+    found.filter_map(|folder| Some(folder.file_name()?.to_str()?.to_owned())).collect()
+}
+
+#[test]
+fn every_folder_with_a_memory_layout_is_a_board() {
+    let described = folders_with("board.toml");
+    assert_eq!(folders_with("memory.x"), described, "each needs a board.toml");
+    let built: BTreeSet<String> = BOARDS.iter().map(|board| board.name.to_owned()).collect();
+    assert_eq!(built, described, "the host crate has an old list: touch host/build.rs");
+}
+
+#[test]
+fn a_boards_folder_is_its_package_and_its_settings_name_its_target_and_chip() {
+    for Board { name, target, chip, .. } in BOARDS {
+        let manifest = read(&format!("boards/{name}/Cargo.toml"));
+        let package = format!("[package]\nname = \"{name}\"\n");
+        assert!(manifest.starts_with(&package), "boards/{name}/Cargo.toml: no package {name}");
+        let settings = read(&format!("boards/{name}/.cargo/config.toml"));
+        let mut parts = vec![format!("target = \"{target}\""), format!("[target.{target}]")];
+        parts.extend(chip.map(|chip| format!("probe-rs run --chip {chip}\"")));
+        for part in parts {
+            assert!(settings.contains(&part), "boards/{name}/.cargo/config.toml: no {part}");
         }
+        let toolchain = read("boards/rust-toolchain.toml");
+        let listed = format!("\"{target}\"");
+        assert!(toolchain.contains(&listed), "boards/rust-toolchain.toml: no {target}");
+    }
+}
+
+/// What `boards/run.sh`, `boards/build.sh` and CI read.
+#[test]
+fn shell_scripts_read_the_same_facts() {
+    let shell = |command: &str| {
+        let script = format!(". boards/facts.sh; {command}");
+        let output = Command::new("bash").args(["-c", &script]).current_dir(root()).output();
+        output.map(|output| {
+            let text = if output.status.success() { output.stdout } else { output.stderr };
+            (output.status.success(), String::from_utf8_lossy(&text).trim_end().to_owned())
+        })
+    };
+    let Ok((true, names)) = shell("boards") else {
+        return say("skipped: no bash");
+    };
+    assert_eq!(names, BOARDS.iter().map(|board| board.name).collect::<Vec<_>>().join("\n"));
+    for board in BOARDS {
+        let name = board.name;
+        let fact = |key: &str| shell(&format!("fact {name} {key}")).expect("bash");
+        assert_eq!(fact("target"), (true, board.target.to_owned()));
+        assert_eq!(fact("state"), (true, board.state.to_owned()));
+        assert_eq!(fact("flash_bytes").1.replace('_', ""), board.flash_bytes.to_string());
+        let elf = root().canonicalize().expect("a root").join(board.elf());
+        assert_eq!(shell(&format!("elf {name}")).expect("bash").1, elf.display().to_string());
+        let missing = format!("boards/{name}/board.toml: missing key colour");
+        assert_eq!(fact("colour"), (false, missing));
+    }
+    let (found, error) = shell("fact toaster target").expect("bash");
+    assert!(!found && error.starts_with("no board toaster, expected one of: "), "{error}");
+}
+
+/// Past the test harness's capture, so that a skipped test is seen.
+fn say(line: &str) {
+    let _ = writeln!(std::io::stderr(), "{line}");
+}
+
+/// Holds the rows of a page's table that `is_row` picks against `rows`. `NIRSPI_BLESS=1` writes them anew.
+fn check_rows(path: &str, header: &str, is_row: impl Fn(&str) -> bool, rows: &[String]) {
+    let page = read(path);
+    let lines: Vec<&str> = page.lines().collect();
+    let header = lines.iter().position(|line| *line == header).expect(header);
+    let is_other = |line: &&&str| line.starts_with('|') && !is_row(line);
+    let start = header + 2 + lines[header + 2..].iter().take_while(is_other).count();
+    let length = lines[start..].iter().take_while(|line| is_row(line)).count();
+    if std::env::var_os("NIRSPI_BLESS").is_some() {
+        let (before, after) = (&lines[..start], &lines[start + length..]);
+        let new = before.iter().copied().chain(rows.iter().map(String::as_str));
+        let new: String =
+            new.chain(after.iter().copied()).map(|line| format!("{line}\n")).collect();
+        std::fs::write(root().join(path), new).expect(path);
+        return;
+    }
+    assert_eq!(
+        lines[start..start + length],
+        *rows,
+        "{path} is stale: NIRSPI_BLESS=1 cargo test -p nirspi-tests --test boards writes it anew"
+    );
+}
+
+/// `65536` as `65 536`.
+fn in_thousands(number: u64) -> String {
+    match number {
+        0..1000 => number.to_string(),
+        _ => format!("{} {:03}", in_thousands(number / 1000), number % 1000),
     }
 }
 
 #[test]
-fn aliases_use_each_boards_own_settings() {
-    let aliases = read(".cargo/config.toml");
-    for board in BOARDS {
-        let settings = read(&format!("boards/{board}/.cargo/config.toml"));
-        assert!(settings.contains("probe-rs run --chip STM32"), "{board}");
-        for command in ["build", "run"] {
-            let alias = format!(
-                "\"{command} --release --manifest-path boards/{board}/Cargo.toml \
-                 --config boards/{board}/.cargo/config.toml\""
-            );
-            assert!(aliases.contains(&alias), "no alias {alias}");
-        }
-    }
+fn tables_of_the_pages_show_what_board_toml_says() {
+    let rows = |row: &dyn Fn(&Board) -> String| BOARDS.iter().map(row).collect::<Vec<_>>();
+    let boards = rows(&|board| {
+        let Board { name, title, processor, target, host_link, fpga_link, state, .. } = board;
+        let folder = format!("[`{name}`]({name}/README.md)");
+        format!(
+            "| {folder} | {title} | {processor} | `{target}` | {host_link} | {fpga_link} | {state} |"
+        )
+    });
+    let header = "| folder | board | processor | target | host link | FPGA link | state |";
+    check_rows("boards/README.md", header, |line| line.starts_with('|'), &boards);
+    let states = rows(&|Board { name, title, state, .. }| {
+        format!("| [{title}](boards/{name}/README.md) | {state} |")
+    });
+    check_rows("README.md", "| board | state |", |line| line.contains("](boards/"), &states);
+    let budgets = rows(&|board| {
+        let Board { name, flash_bytes, static_bytes, stack_bytes, .. } = *board;
+        let [flash, statics, stack] = [flash_bytes, static_bytes, stack_bytes].map(in_thousands);
+        format!("| `{name}` | {flash} | {statics} | {stack} |")
+    });
+    let header = "| board | flash, bytes | static memory, bytes | stack, bytes |";
+    check_rows("docs/firmware.md", header, |line| line.starts_with('|'), &budgets);
 }

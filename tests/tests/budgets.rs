@@ -1,9 +1,11 @@
-//! Every board's firmware fits the budget that docs/firmware.md states, has no heap, and can panic only where listed.
+//! Every board's firmware fits the budget of its `board.toml`, has no heap, and can panic only where docs/firmware.md
+//! lists it.
 //!
-//! What is not built is skipped aloud: `cargo build --release` in the folder of a board builds it.
+//! What is not built is skipped aloud: `bash boards/build.sh` builds every board.
 
 #![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
 
+use nirspi::boards::{BOARDS, Board};
 use nirspi_tests::elf::Firmware;
 use nirspi_tests::pages::{page, table};
 use nirspi_tests::root;
@@ -11,85 +13,46 @@ use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::PathBuf;
 
-/// A row of the page's table of budgets.
-struct Budget {
-    board: String,
-    flash_bytes: u64,
-    static_bytes: u64,
-    stack_bytes: u64,
-}
-
 const PAGE: &str = "docs/firmware.md";
-
-fn budgets() -> Vec<Budget> {
-    let number = |cell: &String| cell.replace(' ', "").parse().unwrap();
-    let budget = |row: Vec<String>| {
-        let [board, flash, statics, stack] = &row[..] else { panic!("four cells in {row:?}") };
-        Budget {
-            board: board.clone(),
-            flash_bytes: number(flash),
-            static_bytes: number(statics),
-            stack_bytes: number(stack),
-        }
-    };
-    table(&page(PAGE), "## Budgets").into_iter().map(budget).collect()
-}
 
 /// Past the test harness's capture, so that the table and a skipped board are seen.
 fn say(line: &str) {
     let _ = writeln!(std::io::stderr(), "{line}");
 }
 
-/// The ELF, under `$NIRSPI_BOARDS_TARGET` or `boards/target`, if it has been built.
-fn elf(board: &str) -> Option<PathBuf> {
-    let given = std::env::var_os("NIRSPI_BOARDS_TARGET").map(PathBuf::from);
-    let target = given.unwrap_or_else(|| root().join("boards/target"));
-    ["thumbv8m.main-none-eabihf", "thumbv7em-none-eabihf"]
-        .iter()
-        .map(|triple| target.join(triple).join("release").join(board))
-        .find(|path| path.is_file())
+/// The ELF, under `$NIRSPI_BOARDS_TARGET` or `boards/target`.
+fn elf(board: &Board) -> PathBuf {
+    match std::env::var_os("NIRSPI_BOARDS_TARGET") {
+        Some(given) => PathBuf::from(given).join(board.target).join("release").join(board.name),
+        None => root().join(board.elf()),
+    }
 }
 
-/// Every board that is built, with its budget.
-fn built() -> Vec<(Budget, Firmware)> {
-    let found = budgets().into_iter().filter_map(|budget| {
-        let Some(path) = elf(&budget.board) else {
-            say(&format!("skipped: {} is not built", budget.board));
+/// Every board that is built.
+fn built() -> Vec<(&'static Board, Firmware)> {
+    let found = BOARDS.iter().filter_map(|board| {
+        let path = elf(board);
+        if !path.is_file() {
+            say(&format!("skipped: {} is not built", board.name));
             return None;
-        };
-        let firmware = Firmware::read(&path).unwrap();
-        Some((budget, firmware))
+        }
+        Some((board, Firmware::read(&path).unwrap()))
     });
     found.collect()
-}
-
-#[test]
-fn every_board_has_a_budget() {
-    let folders: BTreeSet<String> = std::fs::read_dir(root().join("boards"))
-        .unwrap()
-        .filter_map(|entry| {
-            let path = entry.unwrap().path();
-            path.join("memory.x")
-                .is_file()
-                .then(|| path.file_name()?.to_str().map(str::to_owned))?
-        })
-        .collect();
-    let budgeted: BTreeSet<String> = budgets().into_iter().map(|budget| budget.board).collect();
-    assert_eq!(folders, budgeted);
 }
 
 #[test]
 fn flash_and_memory_stay_within_their_budgets() {
     say("board              flash, bytes     of     static, bytes     of");
     let mut over = Vec::new();
-    for (budget, firmware) in built() {
-        let Budget { board, flash_bytes, static_bytes, .. } = &budget;
+    for (board, firmware) in built() {
+        let Board { name, flash_bytes, static_bytes, .. } = board;
         say(&format!(
-            "{board:<16} {:>14} {flash_bytes:>8} {:>14} {static_bytes:>8}",
+            "{name:<16} {:>14} {flash_bytes:>8} {:>14} {static_bytes:>8}",
             firmware.flash_bytes, firmware.static_bytes
         ));
         if firmware.flash_bytes > *flash_bytes || firmware.static_bytes > *static_bytes {
-            over.push(budget.board);
+            over.push(name);
         }
     }
     assert!(over.is_empty(), "over budget: {over:?}");
@@ -97,22 +60,22 @@ fn flash_and_memory_stay_within_their_budgets() {
 
 #[test]
 fn there_is_room_for_the_stack() {
-    for (budget, firmware) in built() {
+    for (board, firmware) in built() {
         let (Some(start), Some(end)) =
             (firmware.symbol("_stack_start"), firmware.symbol("_stack_end"))
         else {
-            panic!("{}: no stack symbols", budget.board);
+            panic!("{}: no stack symbols", board.name);
         };
-        assert!(start - end >= budget.stack_bytes, "{}: {} bytes", budget.board, start - end);
+        assert!(start - end >= board.stack_bytes, "{}: {} bytes", board.name, start - end);
     }
 }
 
 #[test]
 fn no_firmware_has_a_heap() {
     const HEAP: &[&str] = &["__rust_alloc", "__rg_alloc", "__rdl_alloc", "malloc", "GlobalAlloc"];
-    for (budget, firmware) in built() {
+    for (board, firmware) in built() {
         let found = firmware.symbols_with(HEAP);
-        assert!(found.is_empty(), "{}: {found:?}", budget.board);
+        assert!(found.is_empty(), "{}: {found:?}", board.name);
     }
 }
 
@@ -120,11 +83,11 @@ fn no_firmware_has_a_heap() {
 #[test]
 fn no_firmware_computes_with_floating_point() {
     const SOFT: &[&str] = &["__aeabi_f", "__aeabi_d", "__addsf", "__adddf", "__mulsf", "__muldf"];
-    for (budget, firmware) in built() {
+    for (board, firmware) in built() {
         let found = firmware.float_instructions();
-        assert!(found.is_empty(), "{}: {found:x?}", budget.board);
+        assert!(found.is_empty(), "{}: {found:x?}", board.name);
         let found = firmware.symbols_with(SOFT);
-        assert!(found.is_empty(), "{}: {found:?}", budget.board);
+        assert!(found.is_empty(), "{}: {found:?}", board.name);
     }
 }
 
@@ -143,7 +106,7 @@ const PANICS: &[&str] = &[
 #[test]
 fn the_application_can_panic_only_where_the_page_says_and_why_it_does_not() {
     const BOARD: &str = "mps2-an505";
-    let Some((_, firmware)) = built().into_iter().find(|(budget, _)| budget.board == BOARD) else {
+    let Some((_, firmware)) = built().into_iter().find(|(board, _)| board.name == BOARD) else {
         return;
     };
     // The list is of the compiler in boards/rust-toolchain.toml. Another one, as boards/build.sh may have to take, leaves

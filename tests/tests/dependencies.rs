@@ -5,6 +5,7 @@
 use nirspi_tests::root;
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
+use std::io::Write;
 use std::process::Command;
 
 /// What one crate may use.
@@ -31,16 +32,18 @@ fn table() -> BTreeMap<String, Allowed> {
         .collect()
 }
 
-fn metadata(folder: &str) -> Vec<Value> {
+fn metadata() -> Value {
     let output = Command::new(env!("CARGO"))
         .args(["metadata", "--format-version", "1", "--no-deps", "--offline"])
-        .current_dir(root().join(folder))
+        .current_dir(root())
         .output()
         .unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let mut metadata: Value = serde_json::from_slice(&output.stdout).unwrap();
-    let Value::Array(packages) = metadata["packages"].take() else { panic!("no packages") };
-    packages
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn packages() -> Vec<Value> {
+    metadata()["packages"].as_array().unwrap().clone()
 }
 
 /// Every dependency that the table does not allow, as `user -> used`.
@@ -72,7 +75,7 @@ fn violations(packages: &[Value], table: &BTreeMap<String, Allowed>) -> Vec<Stri
 #[test]
 fn crates_use_what_the_architecture_page_allows_and_nothing_else() {
     let table = table();
-    let packages = metadata(".");
+    let packages = packages();
     assert_eq!(packages.len(), table.len(), "one row a crate");
     let found = violations(&packages, &table);
     assert!(found.is_empty(), "docs/architecture.md does not allow: {found:#?}");
@@ -80,7 +83,7 @@ fn crates_use_what_the_architecture_page_allows_and_nothing_else() {
 
 #[test]
 fn a_forbidden_dependency_is_found() {
-    let mut packages = metadata(".");
+    let mut packages = packages();
     for package in &mut packages {
         if package["name"] == "nirspi-mcu" {
             package["dependencies"].as_array_mut().unwrap().extend([
@@ -91,6 +94,38 @@ fn a_forbidden_dependency_is_found() {
     }
     let found = violations(&packages, &table());
     assert_eq!(found, ["nirspi-mcu -> nirspi-recon", "nirspi-mcu -> embassy-executor"]);
+}
+
+/// Plain `cargo test` builds no hardware simulator, says so, and CI runs what it leaves out.
+#[test]
+fn plain_cargo_test_leaves_out_the_simulator_only_and_ci_runs_the_rest() {
+    let metadata = metadata();
+    let default: Vec<&Value> =
+        metadata["workspace_default_members"].as_array().unwrap().iter().collect();
+    let packages = metadata["packages"].as_array().unwrap();
+    let name = |package: &Value| package["name"].as_str().unwrap().to_owned();
+    let (default, left_out): (Vec<&Value>, Vec<&Value>) =
+        packages.iter().partition(|package| default.contains(&&package["id"]));
+    let uses_simulator = |package: &&Value| {
+        let mut used = package["dependencies"].as_array().unwrap().iter().map(name);
+        name(package) == "nirspi-hdl-sim" || used.any(|used| used == "nirspi-hdl-sim")
+    };
+    let builds: Vec<_> = default.into_iter().filter(uses_simulator).map(name).collect();
+    assert!(builds.is_empty(), "plain `cargo test` builds the simulator for {builds:?}");
+    let missing: Vec<_> =
+        left_out.iter().filter(|package| !uses_simulator(package)).map(|p| name(p)).collect();
+    assert!(missing.is_empty(), "not in default-members of Cargo.toml: {missing:?}");
+
+    let all = "cargo test --locked --workspace";
+    let ci = std::fs::read_to_string(root().join(".ci/run")).unwrap();
+    assert!(ci.lines().any(|line| line == all), ".ci/run has no line {all:?}");
+    let packages: String =
+        left_out.iter().map(|package| format!(" -p {}", name(package))).collect();
+    // Past the test harness's capture, so that everybody who runs the tests sees it.
+    let _ = writeln!(
+        std::io::stderr(),
+        "not run by plain cargo test: the gateware's RTL; cargo test{packages} runs it"
+    );
 }
 
 /// Crates that compute. The program leaves that to the libraries.
@@ -106,7 +141,7 @@ fn computing(packages: &[Value]) -> Vec<&str> {
 
 #[test]
 fn the_program_itself_computes_nothing() {
-    let mut packages = metadata(".");
+    let mut packages = packages();
     assert_eq!(computing(&packages), Vec::<&str>::new());
     for package in &mut packages {
         if package["name"] == "nirspi-cli" {

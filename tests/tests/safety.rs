@@ -52,8 +52,8 @@ impl Bench {
         let mut heard = Vec::new();
         for _ in 0..steps {
             self.camera.step(STEP_CLOCKS);
-            let waiting = self.camera.outbox().waiting().to_vec();
-            self.camera.outbox().sent(waiting.len());
+            let waiting = self.camera.packets_out().waiting().to_vec();
+            self.camera.packets_out().sent(waiting.len());
             let mut bytes = &waiting[..];
             while let Some(found) = self.deframer.next(&mut bytes) {
                 let Deframed::Packet(packet) = found else { panic!("{found:?}") };

@@ -4,7 +4,7 @@
 
 use crate::project::Project;
 use crate::trace::{Edge, Levels, Trace};
-use nirspi_hdl::{AdcSample, Lines};
+use nirspi_hdl_model::{AdcSample, Lines};
 use veryl_analyzer::ir::{VarId, VarPath};
 use veryl_analyzer::value::Value;
 use veryl_simulator::{Simulator, ir::Event};

@@ -10,7 +10,7 @@
 //! | 4 | inputs before the edge: sample (14 bits), over range, interlock, `sck`, `cs_n`, lines (4 bits) |
 //! | 12 | outputs after it: rows; columns; enable, frame ready, raw ready, access, lines (4 bits), drive (4 bits) |
 
-use nirspi_hdl::AdcSample;
+use nirspi_hdl_model::AdcSample;
 use std::{
     fs::File,
     io::{BufWriter, Write},

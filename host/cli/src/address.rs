@@ -1,137 +1,32 @@
-//! `--camera`: which camera is meant, and how to reach it.
+//! `--camera`: opens the camera that is meant, and says on stderr what it reports from before.
 
 use super::camera::SceneArgs;
 use super::print;
 use anyhow::{Context, Result};
-use nirspi::link::{DEFAULT_BAUD, Link, SerialLink, TcpLink, UsbLink};
+pub use nirspi::link::CameraAddress;
+use nirspi::link::Link;
 use nirspi::session::Session;
 use nirspi::virtual_camera::MemoryLink;
-use std::fmt;
-use std::io;
-use std::path::PathBuf;
-use std::str::FromStr;
 
-/// Which camera to use.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum CameraAddress {
-    /// The one in this process.
-    Virtual,
-    /// One behind a TCP address.
-    Tcp(String),
-    /// One behind a serial port.
-    Serial { path: PathBuf, baud: u32 },
-    /// One on USB: the one with this serial number, or the only one.
-    Usb(Option<String>),
+/// Opens a conversation with the camera, and says what befell it before. `scene` is what a virtual one looks at.
+pub fn open(address: &CameraAddress, scene: &SceneArgs) -> Result<Session> {
+    let mut session = open_quietly(address, scene)?;
+    for report in session.await_reports().with_context(|| address.to_string())? {
+        print::complain(format_args!("before this, {report}"));
+    }
+    Ok(session)
 }
 
-impl FromStr for CameraAddress {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text.split_once(':') {
-            None if text == "virtual" => Ok(Self::Virtual),
-            None if text == "usb" => Ok(Self::Usb(None)),
-            Some(("usb", serial)) if !serial.is_empty() => Ok(Self::Usb(Some(serial.to_owned()))),
-            Some(("tcp", address)) if address.contains(':') => Ok(Self::Tcp(address.to_owned())),
-            Some(("serial", port)) if !port.is_empty() => {
-                let speed = port.rsplit_once(':').and_then(|(path, baud)| {
-                    let baud = baud.parse().ok().filter(|&baud: &u32| baud > 0)?;
-                    Some((path, baud)).filter(|(path, _)| !path.is_empty())
-                });
-                let (path, baud) = speed.unwrap_or((port, DEFAULT_BAUD));
-                Ok(Self::Serial { path: PathBuf::from(path), baud })
-            }
-            _ => {
-                Err("expected virtual, usb, usb:SERIAL, tcp:HOST:PORT or serial:PATH[:BAUD]"
-                    .to_owned())
-            }
-        }
-    }
-}
-
-impl fmt::Display for CameraAddress {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Virtual => f.write_str("virtual"),
-            Self::Tcp(address) => write!(f, "tcp:{address}"),
-            Self::Serial { path, .. } => write!(f, "serial:{}", path.display()),
-            Self::Usb(None) => f.write_str("usb"),
-            Self::Usb(Some(serial)) => write!(f, "usb:{serial}"),
-        }
-    }
-}
-
-impl CameraAddress {
-    /// Opens a conversation with the camera, and says on stderr what befell it while nobody listened. `scene` is what
-    /// a virtual one looks at.
-    pub fn open(&self, scene: &SceneArgs) -> Result<Session> {
-        let mut session = self.open_quietly(scene)?;
-        for report in session.await_reports().with_context(|| self.to_string())? {
-            print::complain(format_args!("before this, {report}"));
-        }
-        Ok(session)
-    }
-
-    /// The same without a word.
-    pub fn open_quietly(&self, scene: &SceneArgs) -> Result<Session> {
-        let link: Box<dyn Link> = match self {
-            Self::Virtual => {
-                let (_, optics) = scene.optics()?;
-                return Ok(Session::open(Box::new(MemoryLink::new(optics.camera(scene.seed)?)))?);
-            }
-            Self::Tcp(address) => Box::new(
-                TcpLink::connect(address).with_context(|| format!("no camera at tcp:{address}"))?,
-            ),
-            Self::Serial { path, baud } => Box::new(
-                SerialLink::open(path, *baud)
-                    .map_err(|error| anyhow::anyhow!("{self}: {}", serial_problem(&error)))?,
-            ),
-            // Which names the camera and says what to do.
-            Self::Usb(serial) => Box::new(UsbLink::open(serial.as_deref())?),
-        };
-        Session::open(link).with_context(|| self.to_string())
-    }
-
-    /// Frames of 1024 patterns that the link must carry in a second; 0 where any speed will do.
-    pub fn min_frames_per_s(&self) -> f64 {
-        match self {
-            // Three quarters of what the boards' link to the FPGA lets come, by the estimate in docs/firmware.md.
-            Self::Usb(_) => 300.0,
-            _ => 0.0,
-        }
-    }
-}
-
-fn serial_problem(error: &io::Error) -> String {
-    match error.kind() {
-        io::ErrorKind::NotFound => "there is no such port: nirspi devices lists them".to_owned(),
-        io::ErrorKind::PermissionDenied if cfg!(target_os = "linux") => {
-            "no permission: sudo usermod -aG dialout $USER, then log in again".to_owned()
-        }
-        _ => error.to_string(),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_form_is_understood_and_said_again() {
-        let serial = |path: &str, baud| CameraAddress::Serial { path: path.into(), baud };
-        for (text, expected) in [
-            ("virtual", CameraAddress::Virtual),
-            ("usb", CameraAddress::Usb(None)),
-            ("usb:0042:A", CameraAddress::Usb(Some("0042:A".to_owned()))),
-            ("tcp:[::1]:1550", CameraAddress::Tcp("[::1]:1550".to_owned())),
-            ("serial:/dev/ttyACM0", serial("/dev/ttyACM0", DEFAULT_BAUD)),
-            ("serial:COM7:3000000", serial("COM7", 3_000_000)),
-            ("serial:/dev/by-path/pci:0", serial("/dev/by-path/pci:0", DEFAULT_BAUD)),
-        ] {
-            assert_eq!(text.parse(), Ok(expected), "{text}");
-        }
-        for text in ["", "usb:", "tcp:nowhere", "serial:", "fax:1"] {
-            assert!(text.parse::<CameraAddress>().is_err(), "{text}");
-        }
-    }
+/// The same without a word.
+pub fn open_quietly(address: &CameraAddress, scene: &SceneArgs) -> Result<Session> {
+    // Mistakes in the scene's arguments are said as mistakes in the call.
+    let optics = match address {
+        CameraAddress::Virtual => Some(scene.optics()?.1),
+        _ => None,
+    };
+    let link = || -> Result<Box<dyn Link>> {
+        let optics = optics.context("it has no optics")?;
+        Ok(Box::new(MemoryLink::new(optics.camera(scene.seed)?)))
+    };
+    Ok(address.open(link)?)
 }

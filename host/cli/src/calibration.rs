@@ -2,85 +2,54 @@
 
 use super::Usage;
 use anyhow::Result;
-use nirspi::capture::Calibration;
-use nirspi::kept_calibration::{KeptCalibration, path_of};
+use nirspi::calibration::{CalibrationPolicy, Choice, PolicyError};
 use nirspi::session::CameraIdentity;
 use nirspi::setup::MeasurementSetup;
-use serde::Serialize;
 use std::path::PathBuf;
 
 /// Which calibration to use.
 #[derive(Debug, Clone, clap::Args)]
 pub struct CalibrationArgs {
-    /// Measure ADC latency and settling first, whatever calibration is kept
+    /// Measure ADC latency and settling first, even if a calibration is kept. If the scene is too dim for that, the kept
+    /// one is used
     #[arg(long)]
     calibrate: bool,
-    /// Use this calibration, written by `nirspi selftest`, rather than the one kept for the camera
+    /// Use this calibration, written by `nirspi calibrate` or `nirspi selftest`, instead of the one kept for the camera
     #[arg(long, value_name = "FILE", conflicts_with = "calibrate")]
     calibration: Option<PathBuf>,
-    /// Use no calibration, and measure none
-    #[arg(long, conflicts_with_all = ["calibrate", "calibration"])]
+    /// Use no calibration and measure none: needs --adc-latency, and leaves the leak from pattern to pattern as it is
+    #[arg(long, conflicts_with_all = ["calibrate", "calibration"], requires = "adc_latency")]
     no_calibration: bool,
-    /// ADC clocks from light to sample, where they are not measured
-    #[arg(long, value_name = "N", default_value_t = 0, requires = "no_calibration")]
-    pub adc_latency: u8,
-}
-
-/// A kept calibration.
-#[derive(Debug, Clone, Serialize)]
-pub struct Origin {
-    pub measured: String,
-    pub file: PathBuf,
-}
-
-/// Where a capture's calibration comes from, and what is to be said about it.
-pub struct Choice {
-    pub calibration: Calibration,
-    pub origin: Option<Origin>,
-    pub note: Option<String>,
-}
-
-impl Choice {
-    fn plain(calibration: Calibration) -> Self {
-        Self { calibration, origin: None, note: None }
-    }
-
-    fn kept(kept: KeptCalibration, file: PathBuf) -> Self {
-        let origin = Some(Origin { measured: kept.measured().to_owned(), file });
-        Self { calibration: Calibration::Kept(kept.settling), origin, note: None }
-    }
+    /// ADC clocks from light to sample, as you know them; with a wrong number the picture is wrong or inverted
+    #[arg(long, value_name = "N", requires = "no_calibration")]
+    adc_latency: Option<u8>,
 }
 
 impl CalibrationArgs {
+    /// The latency to measure with where no calibration replaces it.
+    pub fn adc_latency(&self) -> u8 {
+        self.adc_latency.unwrap_or(0)
+    }
+
+    fn policy(&self) -> CalibrationPolicy {
+        match &self.calibration {
+            _ if self.no_calibration => CalibrationPolicy::Off,
+            Some(file) => CalibrationPolicy::File(file.clone()),
+            None if self.calibrate => CalibrationPolicy::Measure,
+            None => CalibrationPolicy::Kept,
+        }
+    }
+
     /// The calibration for this camera and setup.
     pub fn choose(&self, setup: &MeasurementSetup, camera: &CameraIdentity) -> Result<Choice> {
-        if self.no_calibration {
-            return Ok(Choice::plain(Calibration::None));
-        }
-        if let Some(file) = &self.calibration {
-            if !setup.differential {
-                return Err(Usage(
-                    "--calibration with --non-differential: patterns without complements need the dark level of the \
-                     moment, use --calibrate"
-                        .to_owned(),
-                )
-                .into());
-            }
-            return Ok(Choice::kept(KeptCalibration::read(file, camera)?, file.clone()));
-        }
-        if self.calibrate || !setup.differential {
-            return Ok(Choice::plain(Calibration::Measure));
-        }
-        // No home, no calibration kept in it.
-        let Some(file) = path_of(&camera.serial).ok().filter(|file| file.exists()) else {
-            return Ok(Choice::plain(Calibration::Measure));
-        };
-        Ok(match KeptCalibration::read(&file, camera) {
-            Ok(kept) => Choice::kept(kept, file),
-            Err(problem) => {
-                let note = Some(format!("kept calibration not used, measured afresh: {problem}"));
-                Choice { note, ..Choice::plain(Calibration::Measure) }
-            }
+        self.policy().choose(setup, camera).map_err(|error| match error {
+            PolicyError::DarkLevel => Usage(
+                "--calibration with --non-differential: patterns without complements need the dark level of the \
+                 moment, use --calibrate"
+                    .to_owned(),
+            )
+            .into(),
+            error => error.into(),
         })
     }
 }

@@ -7,8 +7,8 @@ use nirspi::files::order_table::read_order_table;
 use nirspi::scene::{SceneMap, SceneSource};
 use nirspi::setup::MeasurementSetup;
 use nirspi::virtual_camera::VirtualOptics;
-use nirspi_optics::rain::{Drops, RainError};
-use nirspi_optics::{Projector, Scene};
+use nirspi_optics::Projector;
+use nirspi_optics::rain::Rainfall;
 use nirspi_recon::Order;
 use std::path::Path;
 use std::str::FromStr;
@@ -47,26 +47,23 @@ pub enum Rain {
 }
 
 impl Rain {
-    /// As it is written on the command line.
-    pub fn name(self) -> &'static str {
+    /// The same for the optics.
+    pub fn rainfall(self) -> Rainfall {
         match self {
-            Self::None => "none",
-            Self::Light => "light",
-            Self::Heavy => "heavy",
-        }
-    }
-
-    /// Its drops; none in dry air.
-    pub fn drops(self) -> Result<Option<Drops>, RainError> {
-        match self {
-            Self::None => Ok(None),
-            Self::Light => Drops::monodisperse(1.93, 0.5).map(Some),
-            Self::Heavy => Drops::monodisperse(5.6, 2.0).map(Some),
+            Self::None => Rainfall::None,
+            Self::Light => Rainfall::Light,
+            Self::Heavy => Rainfall::Heavy,
         }
     }
 }
 
 impl SceneArgs {
+    /// A white sheet where the lens is focused, for a calibration.
+    pub fn white_sheet(seed: u64) -> Self {
+        let distance_m = Projector::default().focus_distance_mm / 1e3;
+        Self { scene: "white".to_owned(), distance_m, rain: Rain::None, seed }
+    }
+
     /// The scene and the optics before it.
     pub fn optics(&self) -> Result<(SceneMap, VirtualOptics)> {
         let distance_mm = self.distance_m * 1e3;
@@ -79,13 +76,9 @@ impl SceneArgs {
         }
         let source = SceneSource::from_str(&self.scene).map_err(|e| Usage(e.to_string()))?;
         let map = source.load(SCENE_PX)?;
-        let side_mm = map.side_mm.unwrap_or_else(|| Projector::default().field_mm(distance_mm));
-        let scene = Scene::new(map.reflectance.clone(), map.size_px, side_mm)?;
-        let optics = VirtualOptics::new(scene, distance_mm)
-            // The depth sensor has a range of its own.
-            .and_then(|optics| optics.depth(self.seed).map(|_| optics).map_err(Into::into))
+        let optics = VirtualOptics::before(&map, distance_mm)
             .map_err(|error| Usage(format!("--distance-m {}: {error}", self.distance_m)))?;
-        let optics = match self.rain.drops()? {
+        let optics = match self.rain.rainfall().drops()? {
             Some(drops) => optics.in_rain(drops).map_err(|error| {
                 Usage(format!("--rain at --distance-m {}: {error}", self.distance_m))
             })?,
@@ -98,9 +91,7 @@ impl SceneArgs {
 /// How to measure.
 #[derive(Debug, Clone, Args)]
 pub struct SetupArgs {
-    /// Order of the patterns: natural, sequency, zig-zag, cake-cutting, russian-dolls, total-variation, random:SEED,
-    /// or table:FILE (numbers, entry k the natural-order Hadamard row shown k-th)
-    #[arg(long, value_name = "ORDER", default_value = "cake-cutting")]
+    #[arg(long, value_name = "ORDER", default_value = "cake-cutting", help = order_help())]
     pub order: String,
     /// Share of the 1024 patterns to show, the first of the order [default: demo and serve 0.5, capture 1]
     #[arg(long, value_name = "0..1", allow_negative_numbers = true)]
@@ -142,6 +133,13 @@ impl SetupArgs {
         setup.differential = !self.non_differential;
         Ok(setup)
     }
+}
+
+fn order_help() -> String {
+    format!(
+        "Order of the patterns: {}, or table:FILE (numbers, entry k the natural-order Hadamard row shown k-th)",
+        Order::expected()
+    )
 }
 
 /// An order by name, or a user's own from a file.

@@ -1,13 +1,15 @@
 //! `nirspi capture`: record a camera, with every frame accounted for.
 
-use super::address::CameraAddress;
-use super::calibration::{CalibrationArgs, Choice, Origin};
+use super::address::{self, CameraAddress};
+use super::calibration::CalibrationArgs;
 use super::camera::{SceneArgs, SetupArgs};
 use super::{Usage, print, serve_virtual::stop_on_signal};
 use anyhow::Result;
 use indicatif::{ProgressBar, ProgressStyle};
 use nirspi::account::LossCounters;
+use nirspi::calibration::{Choice, Origin};
 use nirspi::capture::{Capture, CaptureOptions, Ended, Progress, capture};
+use nirspi::causes;
 use nirspi::session::CameraIdentity;
 use serde::Serialize;
 use std::ops::ControlFlow;
@@ -17,8 +19,9 @@ use std::sync::atomic::Ordering;
 
 /// Record frames of a camera into an MCAP file
 ///
-/// ADC latency and settling are those that `nirspi selftest` has kept for this camera; without such, they are measured
-/// first. Ctrl-C ends the recording and keeps it.
+/// ADC latency and settling are those that `nirspi calibrate` or `nirspi selftest` has kept for this camera. If none are
+/// kept, they are measured first, on the scene; a scene too dim for that ends the command. Ctrl-C ends the recording and
+/// keeps it.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi capture --camera usb --frames 1000 --out rec.mcap --picture seen/\n\
@@ -78,10 +81,10 @@ struct Report<'r> {
 
 pub fn run(args: &Args) -> Result<ExitCode> {
     let mut setup = args.setup.setup(1.0)?;
-    setup.adc_latency = args.calibration.adc_latency;
+    setup.adc_latency = args.calibration.adc_latency();
     let path = recording_path(args)?;
     let stop = stop_on_signal()?;
-    let mut session = args.camera.open(&args.scene)?;
+    let mut session = address::open(&args.camera, &args.scene)?;
     let choice = args.calibration.choose(&setup, session.identity())?;
     let options = CaptureOptions {
         setup,
@@ -103,7 +106,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let captured = captured?;
     let code = report(args, session.identity(), &path, &choice, &captured)?;
     if let Some(out) = args.picture.as_ref().filter(|_| captured.counters.received > 0) {
-        super::reconstruct::picture(&path, out)?;
+        let warnings = super::reconstruct::picture(&captured, &path, out)?;
+        for warning in warnings {
+            print::complain(format_args!("warning: {warning}"));
+        }
         if !args.json {
             print::line(format_args!("picture: {}", out.join("enhanced.png").display()))?;
         }
@@ -151,10 +157,14 @@ fn report(
     let (ended, failed) = match &captured.ended {
         Ended::Complete => ("all frames made".to_owned(), false),
         Ended::Stopped => ("stopped by the user".to_owned(), false),
-        Ended::Fault(fault) => (format!("the camera switched its LEDs off: {fault:?}"), true),
-        Ended::LinkLost(error) => {
-            (format!("{error}; what it made after the last frame is not known"), true)
-        }
+        Ended::Fault(fault) => (format!("the camera switched its LEDs off: {fault}"), true),
+        Ended::LinkLost(error) => (
+            format!(
+                "{}; what it made after the last frame is not known",
+                causes::in_one_line(error)
+            ),
+            true,
+        ),
     };
     let report = Report {
         camera,
@@ -170,9 +180,9 @@ fn report(
         frames_per_s: counters.received as f64 / seconds,
         adc_latency_clocks: captured.setup.adc_latency,
         calibrated: captured.settling.is_some(),
-        calibration: choice.origin.clone(),
+        calibration: choice.used(captured).cloned(),
         calibration_note: choice.note.as_deref(),
-        calibration_problem: captured.calibration_problem.as_ref().map(ToString::to_string),
+        calibration_problem: captured.calibration_problem.as_ref().map(|p| causes::in_one_line(p)),
     };
     if args.json {
         print::json(&report)?;
@@ -180,11 +190,11 @@ fn report(
         if let Some(note) = &choice.note {
             print::line(note)?;
         }
-        if let Some(Origin { measured, file }) = &choice.origin {
+        if let Some(Origin { measured, file }) = &report.calibration {
             print::line(format_args!("calibration of {measured}, {}", file.display()))?;
         }
         if let Some(problem) = &report.calibration_problem {
-            print::line(format_args!("not calibrated: {problem}"))?;
+            print::line(format_args!("the kept calibration is used: {problem}"))?;
         }
         match report.made {
             Some(made) => print::line(format_args!("{counters}: {made} frames made"))?,

@@ -5,20 +5,20 @@ mod enhanced;
 use super::camera::{Rain, SceneArgs, SetupArgs};
 use super::method::{self, MethodArgs, Solved, solve};
 use super::print;
-use super::quality::{Quality, compare};
 use super::reconstruct::enlarged_png;
 use super::report::{StageTimes, to_json};
-use anyhow::{Result, bail};
+use anyhow::Result;
 use indicatif::{ProgressBar, ProgressStyle};
 use nirspi::account::LossCounters;
-use nirspi::capture::{Calibration, CaptureOptions, Ended, Progress, capture};
+use nirspi::capture::Progress;
 use nirspi::files::image::{encode_grey, encode_rgb};
 use nirspi::files::npy;
 use nirspi::files::output::OutputDir;
+use nirspi::imaging::{Quality, compare};
 use nirspi::picture::{Panel, Range, SideBySide};
 use nirspi::scene::SceneMap;
-use nirspi::session::{CameraIdentity, Session};
-use nirspi::virtual_camera::{MemoryLink, VirtualOptics};
+use nirspi::session::CameraIdentity;
+use nirspi::virtual_camera::{VirtualOptics, calibrate_against_white, shoot};
 use nirspi_recon::{Image, Side, reconstruct};
 use serde::Serialize;
 use std::ops::ControlFlow;
@@ -28,7 +28,7 @@ use std::process::ExitCode;
 /// Show what the camera does, without a camera: capture a simulated scene and reconstruct it
 ///
 /// An optics simulator lights the gateware's model; the real firmware logic drives it and speaks the real wire
-/// protocol; the host calibrates, captures, counts, reconstructs, fuses with depth and deblurs. Writes scene and every
+/// protocol; the host calibrates against a white sheet, captures, counts, reconstructs, fuses with depth and deblurs. Writes scene and every
 /// stage as PNG and NPY, side_by_side.png and report.json.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n\
@@ -106,12 +106,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let setup = args.setup.setup(DEFAULT_SAMPLING)?;
     let mut times = StageTimes::default();
     let (map, optics) = times.time("scene", || args.scene.optics())?;
-    let link = MemoryLink::new(optics.camera(args.scene.seed)?);
-    let mut session = Session::open(Box::new(link))?;
-    let camera = session.identity().clone();
+    // Latency belongs to the camera, not to what it looks at now.
+    let seed = args.scene.seed;
+    let settling = times.time("calibrate", || calibrate_against_white(&optics, seed))?;
 
-    let calibration = Calibration::Measure;
-    let options = CaptureOptions { setup, frames: Some(args.frames), calibration, record: None };
     let bar = ProgressBar::new(u64::from(args.frames)).with_style(
         ProgressStyle::with_template("capture {bar:30} {pos}/{len} frames")
             .unwrap_or_else(|_| ProgressStyle::default_bar()),
@@ -120,30 +118,26 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         bar.set_position(progress.counters.total());
         ControlFlow::Continue(())
     };
-    let captured = times.time("capture", || capture(&mut session, &options, &mut watch))?;
+    let shot = times
+        .time("capture", || shoot(&optics, setup, &settling, args.frames, seed, &mut watch))?;
     bar.finish_and_clear();
-    match &captured.ended {
-        Ended::Complete | Ended::Stopped => {}
-        Ended::Fault(fault) => bail!("the virtual camera switched its LEDs off: {fault:?}"),
-        Ended::LinkLost(error) => bail!("{error}"),
-    }
-
+    let camera = shot.session.identity().clone();
+    let captured = &shot.capture;
     let mut notes: Vec<String> =
-        captured.calibration_problem.iter().map(|p| format!("not calibrated: {p}")).collect();
-    notes.extend(captured.integrated.warnings().into_iter().map(str::to_owned));
+        captured.integrated.warnings().into_iter().map(str::to_owned).collect();
     let setup = &captured.setup;
     let settling = captured.settling.as_ref();
     let leak = settling.map(|s| s.leak(setup.clocks_per_pattern, setup.blanked)).transpose()?;
     let raw = captured.integrated.measurements(setup, settling, true)?;
     let raw = times.time("inverse_transform", || reconstruct::hadamard(&raw));
-    let measurements = captured.integrated.measurements(setup, settling, false)?;
+    let measurements = shot.measurements()?;
     let Solved { image, report: method } =
         times.time("reconstruct", || solve(&args.method, &measurements))?;
 
     let truth = optics.focused_footprint()?.weights().to_vec();
     let raw = compare(&raw, &truth)?;
     let fitted = compare(&image, &truth)?;
-    let stages = enhanced::run(&image, &setup.rows, &optics, args.scene.seed, &mut times)?;
+    let stages = enhanced::run(&image, measurements.rows(), &optics, seed, &mut times)?;
     let images = Images {
         truth: Image::new(Side::INSTRUMENT, truth),
         raw: raw.values,
@@ -154,7 +148,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         fused: stages.fused,
         deblurred: stages.deblurred,
     };
-    notes.extend(stages.report.doubt(args.frames));
+    if fitted.quality.inverted {
+        notes.push(
+            "the image is darker where the scene is brighter: it is scored as blank".to_owned(),
+        );
+    }
     let report = Report {
         scene: map.name.clone(),
         simulated: true,
@@ -241,6 +239,7 @@ fn side_by_side(
         values: values.to_vec(),
         range: Range::Unit,
         caption,
+        warnings: Vec::new(),
     };
     let metrics = |q: &Quality| format!("PSNR {:.1} dB  SSIM {:.2}", q.psnr_db, q.ssim);
     SideBySide {
@@ -289,18 +288,21 @@ fn side_by_side(
                     format!("FSRCNN, {} depth zones", report.enhancement.depth_zones),
                 ],
             ),
-            panel(
-                "deblurred",
-                2 * side,
-                &images.deblurred,
-                vec![
-                    metrics(&report.enhancement.deblurred),
-                    format!(
-                        "bridge, 1 step; inconsistency {:.2}",
-                        report.enhancement.inconsistency
-                    ),
-                ],
-            ),
+            Panel {
+                warnings: report.enhancement.short_warnings.clone(),
+                ..panel(
+                    "deblurred",
+                    2 * side,
+                    &images.deblurred,
+                    vec![
+                        metrics(&report.enhancement.deblurred),
+                        format!(
+                            "bridge, 1 step; inconsistency {:.2}",
+                            report.enhancement.inconsistency
+                        ),
+                    ],
+                )
+            },
         ],
         footer: format!(
             "simulated: virtual camera, seed {}; {} frames of {} patterns, {:.1} ms of light; {} lost, {} corrupt, {} late",
@@ -341,6 +343,9 @@ fn say(args: &Args, report: &Report) -> Result<()> {
         enhancement.noise,
         enhancement.inconsistency
     ))?;
+    for warning in &enhancement.warnings {
+        print::line(format_args!("warning: {warning}"))?;
+    }
     for note in &report.notes {
         print::line(format_args!("note: {note}"))?;
     }

@@ -78,7 +78,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             Err(SessionError::Link(error))
                 if !named && error.kind() == io::ErrorKind::ConnectionRefused => {}
             Err(error) => {
-                let problem = Some(error.to_string());
+                let problem = Some(nirspi::causes::in_one_line(&error));
                 devices.push(Device { problem, ..Device::new(camera) });
             }
         }
@@ -117,7 +117,10 @@ fn on_usb() -> Vec<Device> {
     let cameras = match usb::usb_cameras() {
         Ok(cameras) => cameras,
         Err(error) => {
-            return vec![Device::new("usb".to_owned()).noting(&format!("not listed: {error}"))];
+            return vec![
+                Device::new("usb".to_owned())
+                    .noting(&format!("not listed: {}", nirspi::causes::in_one_line(&error))),
+            ];
         }
     };
     let device = |camera: UsbCamera| {

@@ -12,7 +12,6 @@ use anyhow::Result;
 use clap::{Args, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
 use nirspi_eval::shot::{self, FRAMES};
-use nirspi_optics::rain::Rainfall;
 use std::process::ExitCode;
 
 /// The paper's tables, ours beside them (ours simulated); what less sampling costs
@@ -66,12 +65,7 @@ struct ExposureArgs {
 
 impl ExposureArgs {
     fn exposure(&self) -> shot::Exposure {
-        let rain = match self.rain {
-            Rain::None => Rainfall::None,
-            Rain::Light => Rainfall::Light,
-            Rain::Heavy => Rainfall::Heavy,
-        };
-        shot::Exposure { rain, frames: self.frames, seed: self.seed }
+        shot::Exposure { rain: self.rain.rainfall(), frames: self.frames, seed: self.seed }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::Usage;
 use anyhow::Result;
-use nirspi::boards::{BOARDS, Board};
+use nirspi::boards::{Board, flashable};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -14,8 +14,7 @@ use std::process::ExitCode;
     \x20 nirspi flash --board nucleo-u5a5zj-q\n\
     \x20 nirspi flash --list")]
 pub struct Args {
-    /// Which board: nucleo-u5a5zj-q or nucleo-h7s3l8
-    #[arg(long, value_name = "NAME", required_unless_present = "list")]
+    #[arg(long, value_name = "NAME", required_unless_present = "list", help = board_help())]
     board: Option<String>,
     /// Firmware to write; default: the board's release build under boards/target
     #[arg(long, value_name = "FILE")]
@@ -26,6 +25,10 @@ pub struct Args {
     /// List the debug probes that are plugged in
     #[arg(long, conflicts_with_all = ["board", "elf", "probe"])]
     list: bool,
+}
+
+fn board_help() -> String {
+    format!("Which board: {}", flashable())
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
@@ -44,9 +47,7 @@ fn board(name: &str) -> Result<(&'static Board, &'static str)> {
             Usage(format!("--board {name}: runs in QEMU, there is no chip to flash")).into()
         );
     }
-    let known: Vec<&str> =
-        BOARDS.iter().filter(|board| board.chip.is_some()).map(|board| board.name).collect();
-    Err(Usage(format!("--board is {name:?}, expected one of {}", known.join(", "))).into())
+    Err(Usage(format!("--board is {name:?}, expected one of {}", flashable())).into())
 }
 
 #[cfg(not(feature = "flash"))]
@@ -77,7 +78,7 @@ fn act(args: &Args, board: Option<(&'static Board, &'static str)>) -> Result<Exi
     let elf = args.elf.clone().unwrap_or_else(|| board.elf());
     let firmware = std::fs::read(&elf).with_context(|| {
         let hint = if args.elf.is_none() {
-            format!(": build it first, cd boards/{} && cargo build --release", board.name)
+            format!(": build it first, bash boards/build.sh {}", board.name)
         } else {
             String::new()
         };

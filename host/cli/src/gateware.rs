@@ -1,6 +1,6 @@
 //! `nirspi gateware`: loads a bitstream into a camera's FPGA.
 
-use super::address::CameraAddress;
+use super::address::{self, CameraAddress};
 use super::camera::SceneArgs;
 use super::print;
 use anyhow::{Context, Result};
@@ -41,7 +41,7 @@ struct Report {
 pub fn run(args: &Args) -> Result<ExitCode> {
     let file = args.bitstream.display();
     let bitstream = std::fs::read(&args.bitstream).with_context(|| file.to_string())?;
-    let mut session = args.camera.open(&args.scene)?;
+    let mut session = address::open(&args.camera, &args.scene)?;
     let style = ProgressStyle::with_template("loading {bar:30} {bytes}/{total_bytes}, {eta} left")
         .unwrap_or_else(|_| ProgressStyle::default_bar());
     let bar = ProgressBar::new(bitstream.len() as u64).with_style(style);

@@ -1,6 +1,6 @@
 //! `nirspi info`: who a camera is, whether it and this program belong together, and what to update.
 
-use super::address::CameraAddress;
+use super::address::{self, CameraAddress};
 use super::camera::SceneArgs;
 use super::print;
 use anyhow::Result;
@@ -42,7 +42,7 @@ struct Report<'r> {
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let mut session = args.camera.open_quietly(&args.scene)?;
+    let mut session = address::open_quietly(&args.camera, &args.scene)?;
     let mut reports = Reports(session.reports().to_vec());
     let (identity_register, map) = registers(&mut session, &mut reports)?;
     let status = session.status(&mut reports)?;
@@ -54,8 +54,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         parts,
         fpga_answers,
         state: match status.fault {
-            Some(fault) => format!("{:?}: {fault:?}", status.state),
-            None => format!("{:?}", status.state),
+            Some(fault) => format!("{}: {fault}", status.state),
+            None => status.state.to_string(),
         },
         uptime_s: status.uptime_us as f64 * 1e-6,
         temperature_celsius: temperature(&status),

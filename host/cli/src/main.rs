@@ -5,6 +5,7 @@
 mod address;
 mod backend;
 mod bench;
+mod calibrate;
 mod calibration;
 mod camera;
 mod capture;
@@ -20,7 +21,6 @@ mod method;
 mod metrics;
 mod networks;
 mod print;
-mod quality;
 mod rain;
 mod range;
 mod reconstruct;
@@ -36,7 +36,6 @@ mod upscale;
 
 use clap::{Parser, Subcommand};
 use nirspi::files::FileError;
-use nirspi::scene::SceneError;
 use nirspi_eval::EvalError;
 use std::process::ExitCode;
 
@@ -59,6 +58,7 @@ enum Command {
     Virtual(serve_virtual::Args),
     Devices(devices::Args),
     Info(info::Args),
+    Calibrate(calibrate::Args),
     Selftest(selftest::Args),
     Flash(flash::Args),
     Gateware(gateware::Args),
@@ -113,6 +113,7 @@ fn main() -> ExitCode {
         Command::Virtual(args) => serve_virtual::run(&args),
         Command::Devices(args) => devices::run(&args),
         Command::Info(args) => info::run(&args),
+        Command::Calibrate(args) => calibrate::run(&args),
         Command::Selftest(args) => selftest::run(&args),
         Command::Flash(args) => flash::run(&args),
         Command::Gateware(args) => gateware::run(&args),
@@ -163,21 +164,7 @@ fn mistake_in_one_line(message: &str) -> String {
     line
 }
 
-/// The error and its causes in one line; causes that only repeat what was said are left out.
+/// The error and its causes in one line.
 fn one_line(error: &anyhow::Error) -> String {
-    let mut line = String::new();
-    for cause in error.chain() {
-        let text = cause.to_string();
-        if !line.contains(&text) {
-            if !line.is_empty() {
-                line.push_str(": ");
-            }
-            line.push_str(&text);
-        }
-        // It has told its cause, in its own words.
-        if cause.is::<FileError>() || cause.is::<SceneError>() {
-            break;
-        }
-    }
-    line.replace('\n', " ")
+    nirspi::causes::in_one_line(error.as_ref())
 }

@@ -7,17 +7,19 @@ mod stack;
 use super::camera::{check_sampling, parse_order};
 use super::method::{MethodArgs, Solved, solve};
 use super::report::{StageTimes, to_json};
-use super::source::{Index, Source, SourceArgs};
+use super::source::SourceArgs;
 use super::{Usage, print};
 use anyhow::{Context, Result, bail};
-use clap::Parser;
 use indicatif::ProgressBar;
 use nirspi::account::LossCounters;
+use nirspi::capture::Capture;
+use nirspi::files::image::{encode_grey, encode_rgb};
+use nirspi::files::npy;
 use nirspi::files::output::OutputDir;
-use nirspi::files::{image::encode_grey, npy};
-use nirspi_recon::{Image, Order, metrics, reconstruct};
+use nirspi::picture::{Panel, Range, SideBySide};
+use nirspi::source::{FirstPatterns, Index, Source};
+use nirspi_recon::{Image, metrics};
 use serde::Serialize;
-use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
@@ -93,18 +95,32 @@ struct Report {
 
 pub fn run(args: &Args) -> Result<ExitCode> {
     check_sampling(args.sampling)?;
-    let order = args.order.as_deref().filter(|o| *o != "recorded").map(parse_order).transpose()?;
+    let first = match args.order.as_deref() {
+        None => FirstPatterns::Automatic,
+        Some("recorded") => FirstPatterns::Recorded,
+        Some(order) => FirstPatterns::Of(parse_order(order)?),
+    };
     args.method.check()?;
     if let Some(path) = &args.matrix {
         return matrix::run(args, path);
     }
     if args.source.index == Some(Index::All) {
-        return stack::run(args, order);
+        return stack::run(args, &first);
     }
     if args.warm_start {
         return Err(Usage("--warm-start belongs to --index all".to_owned()).into());
     }
-    let report = one_image(args, order)?;
+    let mut times = StageTimes::default();
+    let source = times.time("read", || args.source.load())?;
+    let request = Request {
+        input: &args.source.input,
+        method: &args.method,
+        first: &first,
+        sampling: args.sampling,
+        enhance: args.enhance,
+        out: &args.out,
+    };
+    let report = one_image(&request, source, times)?;
     if args.json {
         print::json(&report)?;
     } else {
@@ -113,46 +129,52 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The frames of a recording as one image, enhanced; the folder `out` gets what `reconstruct --enhance` writes.
-pub fn picture(recording: &Path, out: &Path) -> Result<()> {
-    #[derive(clap::Parser)]
-    struct Alone {
-        #[command(flatten)]
-        args: Args,
-    }
-    let line = [OsStr::new("reconstruct"), recording.as_os_str(), OsStr::new("--enhance")];
-    let line = line.into_iter().chain([OsStr::new("--out"), out.as_os_str()]);
-    one_image(&Alone::try_parse_from(line)?.args, None)?;
-    Ok(())
+/// The frames of a capture as one image, enhanced; the folder `out` gets what `reconstruct --enhance` writes.
+pub fn picture(captured: &Capture, recording: &Path, out: &Path) -> Result<Vec<String>> {
+    let request = Request {
+        input: recording,
+        method: &MethodArgs::default(),
+        first: &FirstPatterns::Automatic,
+        sampling: 1.0,
+        enhance: true,
+        out,
+    };
+    let report = one_image(&request, Source::of_capture(captured)?, StageTimes::default())?;
+    Ok(report.enhancement.map(|enhancement| enhancement.warnings).unwrap_or_default())
+}
+
+/// What to make of one measurement.
+struct Request<'r> {
+    input: &'r Path,
+    method: &'r MethodArgs,
+    first: &'r FirstPatterns,
+    sampling: f64,
+    enhance: bool,
+    out: &'r Path,
 }
 
 /// Reconstructs one image and writes it with its report.
-fn one_image(args: &Args, order: Option<Order>) -> Result<Report> {
-    let mut times = StageTimes::default();
-
-    let source = times.time("read", || args.source.load())?;
+fn one_image(request: &Request<'_>, source: Source, mut times: StageTimes) -> Result<Report> {
     let all = source.measurements.rows().len();
-    let (order, order_name) = choose_order(args, order, &source);
-    let used = source
-        .measurements
-        .take(order.as_ref(), args.sampling)
-        .with_context(|| args.source.input.display().to_string())?;
-    let solved = times.time("reconstruct", || spinning(|| solve(&args.method, &used)));
+    let named = || request.input.display().to_string();
+    let (used, order_name) =
+        request.first.take(&source.measurements, request.sampling).with_context(named)?;
+    let solved = times.time("reconstruct", || spinning(|| solve(request.method, &used)));
     let Solved { image, report: method } = solved?;
-    check_finite(args, &image)?;
+    check_finite(request.input, &image)?;
 
     let side = image.side().pixels();
     let correlation = source.reference.as_ref().and_then(|reference| {
         metrics::correlation(reference.pixels(), image.pixels(), side, side).ok()
     });
-    let (sharp, enhancement) = if args.enhance {
+    let (sharp, enhancement) = if request.enhance {
         let (sharp, mut reports) = enhanced::run(&[(&image, used.rows())], &mut times)?;
         (Some(sharp), reports.pop())
     } else {
         (None, None)
     };
     let report = Report {
-        input: args.source.input.clone(),
+        input: request.input.to_owned(),
         n: side,
         measurements: all,
         used: used.rows().len(),
@@ -174,25 +196,9 @@ fn one_image(args: &Args, order: Option<Order>) -> Result<Report> {
         notes: source.notes,
         stage_ms: times,
     };
-    write(args, &image, sharp.as_deref(), &report)?;
+    let short = report.enhancement.as_ref().map_or(&[][..], |enhancement| &enhancement.short);
+    write(request.out, &image, sharp.as_deref().map(|sharp| (sharp, short)), &report)?;
     Ok(report)
-}
-
-/// Which patterns come first, and what to call that.
-fn choose_order(args: &Args, asked: Option<Order>, source: &Source) -> (Option<Order>, String) {
-    if let Some(order) = asked {
-        let name = order.to_string();
-        return (Some(order), name);
-    }
-    let automatic = reconstruct::default_selection(source.measurements.rows());
-    match automatic {
-        // All patterns give the same image in any order.
-        Some(order) if args.order.is_none() && args.sampling < 1.0 => {
-            let name = format!("{order} (the recorded order is the natural one)");
-            (Some(order), name)
-        }
-        _ => (None, "recorded".to_owned()),
-    }
 }
 
 /// Shows that something is done: thousands of patterns take OMP seconds.
@@ -204,27 +210,50 @@ fn spinning<T>(work: impl FnOnce() -> T) -> T {
     done
 }
 
-fn check_finite(args: &Args, image: &Image) -> Result<()> {
+fn check_finite(input: &Path, image: &Image) -> Result<()> {
     if image.pixels().iter().all(|pixel| pixel.is_finite()) {
         return Ok(());
     }
-    let input = args.source.input.display();
-    bail!("{input}: the readings are too large for an image of 32-bit floats")
+    bail!("{}: the readings are too large for an image of 32-bit floats", input.display())
 }
 
-fn write(args: &Args, image: &Image, sharp: Option<&[f32]>, report: &impl Serialize) -> Result<()> {
+/// Writes an image, and the enhanced one with its warnings, if there is one.
+fn write(
+    out: &Path,
+    image: &Image,
+    sharp: Option<(&[f32], &[String])>,
+    report: &impl Serialize,
+) -> Result<()> {
     let side = image.side().pixels();
-    let mut out = OutputDir::create(&args.out)?;
+    let mut out = OutputDir::create(out)?;
     out.write("image.npy", &npy::encode(&[side, side], image.pixels()))?;
     out.write("image.png", &enlarged_png(&image.stretched()))?;
-    if let Some(sharp) = sharp {
+    if let Some((sharp, warnings)) = sharp {
         let side = nirspi_nets::deblur::SIDE;
         out.write("enhanced.npy", &npy::encode(&[side, side], sharp))?;
-        out.write("enhanced.png", &encode_grey(side, side, sharp))?;
+        out.write("enhanced.png", &warned_png(side, sharp, warnings))?;
     }
     out.write("report.json", to_json(report)?.as_bytes())?;
     out.commit()?;
     Ok(())
+}
+
+/// The image alone, or with the reasons not to trust it below.
+fn warned_png(side: usize, pixels: &[f32], warnings: &[String]) -> Vec<u8> {
+    if warnings.is_empty() {
+        return encode_grey(side, side, pixels);
+    }
+    let panel = Panel {
+        title: String::new(),
+        width: side,
+        height: side,
+        values: pixels.to_vec(),
+        range: Range::Unit,
+        caption: Vec::new(),
+        warnings: warnings.to_vec(),
+    };
+    let (header, footer) = (String::new(), String::new());
+    encode_rgb(&SideBySide { header, panels: vec![panel], footer }.render())
 }
 
 /// A PNG whose pixels a person can see: squares, at least 256 px for the whole image.
@@ -268,12 +297,16 @@ fn say(args: &Args, report: &Report) -> Result<()> {
     }
     if let Some(enhancement) = &report.enhancement {
         print::line(enhancement.line())?;
+        for warning in &enhancement.warnings {
+            print::line(format_args!("warning: {warning}"))?;
+        }
     }
     for note in &report.notes {
         print::line(format_args!("note: {note}"))?;
     }
+    let enhanced = if args.enhance { ", enhanced.npy, enhanced.png" } else { "" };
     print::line(format_args!(
-        "wrote image.npy, image.png and report.json to {}",
+        "wrote image.npy, image.png{enhanced} and report.json to {}",
         args.out.display()
     ))
 }

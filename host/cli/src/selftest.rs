@@ -1,11 +1,11 @@
 //! `nirspi selftest`: checks a camera end to end, and keeps its calibration.
 
-use super::address::CameraAddress;
+use super::address::{self, CameraAddress};
 use super::camera::SceneArgs;
 use super::print;
 use anyhow::Result;
 use indicatif::{ProgressBar, ProgressStyle};
-use nirspi::kept_calibration::{KeptCalibration, path_of};
+use nirspi::calibration::{KeptCalibration, path_of};
 use nirspi::selftest::{Check, LinkDemands, STAGES, SelfTest, Verdict, run as test};
 use nirspi::session::CameraIdentity;
 use serde::Serialize;
@@ -50,7 +50,7 @@ struct Report<'r> {
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let mut session = args.camera.open(&args.scene)?;
+    let mut session = address::open(&args.camera, &args.scene)?;
     let camera = session.identity().clone();
     let style = ProgressStyle::with_template("{spinner} {pos}/{len} {msg}")
         .unwrap_or_else(|_| ProgressStyle::default_bar());
@@ -80,13 +80,13 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     Ok(if report.passed { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// Keeps the calibration, if there is one to keep.
+/// Keeps the calibration of a camera that has passed. What a camera with a fault measures of itself is not to be trusted.
 fn keep(
     args: &Args,
     camera: &CameraIdentity,
     found: &SelfTest,
 ) -> Result<Option<(KeptCalibration, PathBuf)>> {
-    let Some(settling) = found.settling.clone() else { return Ok(None) };
+    let Some(settling) = found.settling.clone().filter(|_| found.passed()) else { return Ok(None) };
     let path = match &args.calibration {
         Some(path) => path.clone(),
         None => path_of(&camera.serial)?,
@@ -122,6 +122,9 @@ fn say(report: &Report<'_>) -> Result<()> {
         (Some(path), Some(measured)) => {
             print::line(format_args!("calibration of {measured} kept in {}", path.display()))
         }
-        _ => print::line("no calibration kept"),
+        _ if report.passed => {
+            print::line("no calibration kept: the burst did not show the latency")
+        }
+        _ => print::line("no calibration kept: the self-test failed"),
     }
 }

@@ -1,22 +1,23 @@
 //! `nirspi serve`: a camera, live, on a web page.
 
-use super::address::CameraAddress;
-use super::calibration::{CalibrationArgs, Choice};
+use super::address::{self, CameraAddress};
+use super::calibration::CalibrationArgs;
 use super::camera::{SceneArgs, SetupArgs};
-use super::method::{Method, MethodArgs, Solver};
-use super::networks::Networks;
+use super::method::MethodArgs;
+use super::print;
 use super::serve_virtual::stop_on_signal;
-use super::{one_line, print};
 use anyhow::{Context, Result};
+use nirspi::calibration::Choice;
+use nirspi::imaging::Enhance;
 use nirspi::serve::settings::{MAX_FRAMES, Settings};
-use nirspi::serve::{CameraSource, Connect, Connected, Imaging, Reconstruct, serve};
+use nirspi::serve::{CameraSource, Connect, Connected, Imaging, serve};
 use nirspi::session::Session;
 use nirspi::setup::MeasurementSetup;
-use nirspi_nets::Enhancer;
+use nirspi_nets::Device;
 use nirspi_recon::Side;
 use nirspi_recon::omp::Backend;
+use nirspi_recon::reconstruct::{Method, Reconstruct};
 use std::net::TcpListener;
-use std::num::NonZeroU32;
 use std::process::ExitCode;
 
 /// Half of the patterns: twice the frames, and OMP predicts the other half.
@@ -62,16 +63,16 @@ pub struct Args {
 pub fn run(args: Args) -> Result<ExitCode> {
     args.method.check()?;
     let mut setup = args.setup.setup(DEFAULT_SAMPLING)?;
-    setup.adc_latency = args.calibration.adc_latency;
+    setup.adc_latency = args.calibration.adc_latency();
     let listener = TcpListener::bind(&args.listen)
         .with_context(|| format!("--listen {}: cannot listen there", args.listen))?;
     let address = listener.local_addr()?;
     let methods = methods(&args.method)?;
-    let imaging = Imaging { methods, enhancer: enhancer(args.method.backend)? };
+    let imaging = Imaging { methods, enhance: enhance(args.method.backend)? };
     let settings =
         Settings { method: args.method.method.argument(), enhance: true, frames: args.frames };
     let stop = stop_on_signal()?;
-    let session = args.camera.open(&args.scene)?;
+    let session = address::open(&args.camera, &args.scene)?;
     let connected = prepared(session, &args.calibration, &setup)?;
 
     let machine = match address.ip() {
@@ -96,30 +97,18 @@ pub fn run(args: Args) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The method asked for, and beside it those that a page can always switch to.
-fn methods(args: &MethodArgs) -> Result<Vec<(&'static str, Reconstruct)>> {
-    let mut all = vec![Method::Hadamard, Method::Omp];
-    if !all.contains(&args.method) {
-        all.push(args.method);
-    }
-    let ready = |method| {
-        let solver =
-            Solver::new(&MethodArgs { method, ..args.clone() }, Side::INSTRUMENT.pixels())?;
-        let solve: Reconstruct = Box::new(move |measurements| {
-            solver.solve(measurements).map(|solved| solved.image).map_err(|e| one_line(&e))
-        });
-        Ok((method.argument(), solve))
-    };
-    all.into_iter().map(ready).collect()
+/// Every method, each with those of the settings that it takes: a page can switch to any.
+fn methods(args: &MethodArgs) -> Result<Vec<(&'static str, Box<dyn Reconstruct>)>> {
+    let settings = args.settings_for(Side::INSTRUMENT.pixels())?;
+    let ready =
+        |method: &Method| Ok((method.argument(), method.prepare(&settings.taken_by(*method))?));
+    Method::ALL.iter().map(ready).collect()
 }
 
-/// The learned stages, where OMP runs; one image at a time is no work for a GPU that nobody asked for.
-fn enhancer(backend: Backend) -> Result<Enhancer> {
+/// The learned stages, where OMP runs; one image at a time is no work for a GPU that was not asked for.
+fn enhance(backend: Backend) -> Result<Enhance> {
     let backend = if backend == Backend::Auto { Backend::Cpu } else { backend };
-    let mut networks = Networks::built_in(backend)?;
-    let sharpener =
-        networks.sharpener(nirspi_nets::Method::Diffusion { steps: NonZeroU32::MIN })?;
-    Ok(Enhancer::new(networks.fusion()?, sharpener))
+    Ok(Enhance::built_in(&Device::open(backend)?)?)
 }
 
 /// A camera with its calibration.
@@ -135,9 +124,9 @@ fn prepared(
 /// How to find the camera again.
 fn connect(args: Args, setup: MeasurementSetup) -> Connect {
     let found = move || {
-        let mut session = args.camera.open_quietly(&args.scene)?;
+        let mut session = address::open_quietly(&args.camera, &args.scene)?;
         session.await_reports()?;
         prepared(session, &args.calibration, &setup)
     };
-    Box::new(move || found().map_err(|error| one_line(&error)))
+    Box::new(move || found().map_err(Into::into))
 }

@@ -63,7 +63,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let options = ServeOptions { once: args.once, drop_when_full: args.drop_when_full };
     let fpga = optics.fpga(args.scene.seed)?;
     let depth = optics.depth(args.scene.seed)?;
-    let serial = format!("virtual-{}", args.scene.seed);
+    let serial = optics.serial(args.scene.seed);
     match args.precompute {
         Some(frames) => {
             let fpga = PrecomputedFpga::new(fpga, frames);

@@ -68,7 +68,7 @@ fn explain(error: RuleError) -> anyhow::Error {
     }
     // Root's PATH may not have it.
     let program = std::env::current_exe().unwrap_or_else(|_| PathBuf::from("nirspi"));
-    anyhow::anyhow!("{error}: sudo {} setup", program.display())
+    anyhow::anyhow!("{}: sudo {} setup", nirspi::causes::in_one_line(&error), program.display())
 }
 
 /// Has udev read its rules again and look at what is plugged in.

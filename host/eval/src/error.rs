@@ -115,12 +115,12 @@ macro_rules! from_libraries {
 }
 
 from_libraries!(
-    nirspi::capture::CaptureError,
     nirspi::integrate::IntegrateError,
     nirspi::legibility::LegibilityError,
     nirspi::scene::SceneError,
-    nirspi::session::SessionError,
+    nirspi::source::SourceError,
     nirspi::training::TrainingCameraError,
+    nirspi::virtual_camera::ShotError,
     nirspi::virtual_camera::VirtualOpticsError,
     nirspi_nets::classical::ClassicalError,
     nirspi_nets::data::DataError,
@@ -138,7 +138,7 @@ from_libraries!(
     nirspi_optics::visible::VisibleError,
     nirspi_recon::FwhtLengthError,
     nirspi_recon::MeasurementError,
-    nirspi_recon::OrderError,
+    nirspi_recon::RowsError,
     nirspi_recon::SideError,
     nirspi_recon::metrics::MetricError,
     nirspi_recon::omp::BackendError,

@@ -33,7 +33,6 @@ pub mod table3;
 pub mod table4;
 pub mod train;
 
-mod compare;
 mod error;
 mod fid;
 

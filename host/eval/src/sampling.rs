@@ -4,7 +4,7 @@ mod plot;
 
 use crate::error::{EvalError, Result};
 use nirspi_recon::reconstruct::{
-    self, OmpSettings, Penalty, ReconstructError, RegularisedSettings,
+    self, Method, MethodSettings, Reconstruct, ReconstructError, Setting, Sparsity,
 };
 use nirspi_recon::{Basis, Image, Measurements, Order, metrics};
 use serde::Serialize;
@@ -14,61 +14,40 @@ use std::path::PathBuf;
 /// The order in which the measurements are.
 pub const RECORDED: &str = "recorded";
 
-/// Orders that are compared unless the caller names others.
-pub const ORDERS: [&str; 8] = [
-    RECORDED,
-    "zig-zag",
-    "cake-cutting",
-    "russian-dolls",
-    "total-variation",
-    "sequency",
-    "natural",
-    "random:1",
-];
-
-/// A method, with its basis where it has one.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Method {
-    ZeroFilling,
-    Omp(Basis),
-    AsPrinted(Basis),
-    Penalty(Penalty, Basis),
+/// The orders that are compared unless the caller names others: the recorded one, every order with a name, and a shuffle.
+#[must_use]
+pub fn default_orders() -> Vec<String> {
+    let named = Order::NAMED.iter().map(|named| named.name.to_owned());
+    std::iter::once(RECORDED.to_owned()).chain(named).chain(["random:1".to_owned()]).collect()
 }
 
-impl Method {
-    fn all() -> Vec<Self> {
-        let mut all = vec![Self::ZeroFilling];
-        all.extend(Basis::ALL.map(Self::Omp));
-        all.extend(Basis::ALL.map(|basis| Self::Penalty(Penalty::Tikhonov, basis)));
-        all.extend(Basis::ALL.map(|basis| Self::Penalty(Penalty::Sparse, basis)));
-        all.push(Self::Penalty(Penalty::TotalVariation, Basis::Pixel));
-        all.push(Self::AsPrinted(Basis::Dct));
-        all
-    }
+/// A method ready to run, under the name that the tables give it.
+struct Candidate {
+    name: String,
+    method: Box<dyn Reconstruct>,
+}
 
-    fn name(self) -> String {
-        match self {
-            Self::ZeroFilling => "hadamard".to_owned(),
-            Self::Omp(basis) => format!("omp, {basis}"),
-            Self::AsPrinted(basis) => format!("as printed, {basis}, k = {PRINTED_SPARSITY}"),
-            Self::Penalty(Penalty::Tikhonov, basis) => format!("tikhonov, {basis}"),
-            Self::Penalty(Penalty::Sparse, basis) => format!("fista, {basis}"),
-            Self::Penalty(Penalty::TotalVariation, _) => "tv".to_owned(),
+/// Every method, in every basis where it has one, and Algorithm 1 as printed.
+fn candidates() -> Result<Vec<Candidate>, ReconstructError> {
+    let mut all = Vec::new();
+    let mut add = |name: String, method: Method, settings: MethodSettings| {
+        method.prepare(&settings).map(|method| all.push(Candidate { name, method }))
+    };
+    for &method in Method::ALL {
+        if !method.takes(Setting::Basis) {
+            add(method.to_string(), method, MethodSettings::default())?;
+            continue;
+        }
+        for basis in Basis::ALL {
+            let settings = MethodSettings { basis, ..MethodSettings::default() };
+            add(format!("{method}, {basis}"), method, settings)?;
         }
     }
-
-    fn image(self, part: &Measurements) -> Result<Image, ReconstructError> {
-        let omp = |settings: &OmpSettings| Ok(reconstruct::omp(part, settings)?.image);
-        match self {
-            Self::ZeroFilling => Ok(reconstruct::hadamard(part)),
-            Self::Omp(basis) => omp(&OmpSettings { basis, ..OmpSettings::default() }),
-            Self::AsPrinted(basis) => omp(&OmpSettings::as_printed(basis, PRINTED_SPARSITY)),
-            Self::Penalty(penalty, basis) => {
-                let settings = RegularisedSettings { basis, ..RegularisedSettings::new(penalty) };
-                Ok(reconstruct::regularised(part, &settings)?.image)
-            }
-        }
-    }
+    let sparsity = Sparsity::Fixed(PRINTED_SPARSITY);
+    let printed = MethodSettings { as_printed: true, sparsity, ..MethodSettings::default() };
+    let name = format!("as printed, {}, k = {PRINTED_SPARSITY}", printed.basis);
+    add(name, Method::OMP, printed)?;
+    Ok(all)
 }
 
 /// Atoms of the printed algorithm.
@@ -103,12 +82,11 @@ pub struct Report {
 }
 
 /// What to compare.
-#[derive(Debug, Clone, PartialEq)]
 pub struct Study {
     /// Orders by name; `None` is the order in which the measurements are.
     orders: Vec<(String, Option<Order>)>,
     shares: Vec<f64>,
-    methods: Vec<Method>,
+    methods: Vec<Candidate>,
 }
 
 impl Study {
@@ -119,7 +97,7 @@ impl Study {
     pub fn new(orders: Vec<(String, Option<Order>)>, shares: Vec<f64>) -> Result<Self> {
         match shares.iter().find(|share| !(**share > 0.0 && **share <= 1.0)) {
             Some(found) => Err(EvalError::setting("sampling", found, "more than 0, at most 1")),
-            None => Ok(Self { orders, shares, methods: Method::all() }),
+            None => Ok(Self { orders, shares, methods: candidates()? }),
         }
     }
 
@@ -139,9 +117,9 @@ impl Study {
         for &sampling in &self.shares {
             for (name, order) in &self.orders {
                 let part = all.take(order.as_ref(), sampling)?;
-                for &method in &self.methods {
-                    let image = method.image(&part)?;
-                    rows.push(judge(&full, &image, sampling, name, method)?);
+                for candidate in &self.methods {
+                    let image = candidate.method.reconstruct(&part)?.image;
+                    rows.push(judge(&full, &image, sampling, name, &candidate.name)?);
                     done();
                 }
             }
@@ -169,7 +147,7 @@ impl Study {
     }
 
     fn method_names(&self) -> Vec<String> {
-        self.methods.iter().map(|method| method.name()).collect()
+        self.methods.iter().map(|candidate| candidate.name.clone()).collect()
     }
 }
 
@@ -179,7 +157,7 @@ fn judge(
     image: &Image,
     sampling: f64,
     order: &str,
-    method: Method,
+    method: &str,
 ) -> Result<Row, metrics::MetricError> {
     let side = full.side().pixels();
     let (low, high) = full
@@ -190,7 +168,7 @@ fn judge(
     Ok(Row {
         sampling,
         order: order.to_owned(),
-        method: method.name(),
+        method: method.to_owned(),
         psnr_db: metrics::psnr(full.pixels(), image.pixels(), side, side, range)?,
         correlation: metrics::correlation(full.pixels(), image.pixels(), side, side)?,
     })
@@ -263,7 +241,9 @@ fn curves(report: &Report, order: &str, methods: &[String]) -> Vec<plot::Curve> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nirspi_recon::{Side, fwht};
+    use nirspi_recon::{Rows, Side, fwht};
+
+    const METHODS: [&str; 2] = ["hadamard", "tikhonov, dct"];
 
     /// Measurements of a disc, all rows of a 16 x 16 Hadamard matrix.
     fn disc() -> Measurements {
@@ -271,15 +251,13 @@ mod tests {
         let lit = |p: usize| ((p / 16) as f64 - 6.0).hypot((p % 16) as f64 - 9.0) < 4.5;
         let mut seen: Vec<f64> = (0..256).map(|p| if lit(p) { 0.9 } else { 0.1 }).collect();
         fwht(&mut seen).unwrap();
-        let d: Vec<f32> = seen.iter().map(|&v| v as f32).collect();
-        let rows: Vec<u32> = (0..256).collect();
-        Measurements::from_differential(side, &rows, &d).unwrap()
+        Measurements::from_differential(&Rows::natural(side), &seen).unwrap()
     }
 
     fn study(shares: &[f64]) -> Study {
         let orders = vec![(RECORDED.to_owned(), None), ("zig-zag".to_owned(), Some(Order::ZigZag))];
         let mut study = Study::new(orders, shares.to_vec()).unwrap();
-        study.methods = vec![Method::ZeroFilling, Method::Penalty(Penalty::Tikhonov, Basis::Dct)];
+        study.methods.retain(|candidate| METHODS.contains(&candidate.name.as_str()));
         study
     }
 
@@ -308,7 +286,7 @@ mod tests {
     #[test]
     fn a_share_out_of_range_is_named() {
         for (share, told) in [(0.0, "0"), (1.5, "1.5"), (f64::NAN, "NaN")] {
-            let error = Study::new(Vec::new(), vec![0.5, share]).unwrap_err();
+            let error = Study::new(Vec::new(), vec![0.5, share]).err().unwrap();
             let expected = format!("sampling is {told}, expected more than 0, at most 1");
             assert_eq!(error.to_string(), expected);
         }

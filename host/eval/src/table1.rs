@@ -4,7 +4,7 @@
 //! one picture at a time, from a frame of the virtual camera to 64 x 64 pixels.
 
 use crate::error::{EvalError, Result};
-use crate::shot::{Conditions, record, white_level};
+use crate::shot::{CalibratedCamera, Conditions};
 use nirspi::picture::{Axis, Chart, Line};
 use nirspi::scene::SceneSource;
 use nirspi::setup::MeasurementSetup;
@@ -125,9 +125,10 @@ pub fn table1(settings: &Settings, done: &dyn Fn()) -> Result<Report> {
     let side_mm = letter.side_mm.unwrap_or_else(|| Projector::default().field_mm(DISTANCE_M * 1e3));
     let scene = Scene::new(letter.reflectance, letter.size_px, side_mm)?;
     let optics = VirtualOptics::new(scene, DISTANCE_M * 1e3)?;
-    let captured = record(&optics, setup, sweeps, seed)?;
+    let camera = CalibratedCamera::new(seed)?;
+    let captured = camera.record(&optics, setup, sweeps, seed)?;
     let conditions = Conditions { distance_m: DISTANCE_M, rain: Rainfall::None, frames: sweeps };
-    let white = white_level(conditions, seed)?;
+    let white = camera.white_level(conditions, seed)?;
     let networks = Networks::new()?;
 
     let mut times: [Vec<f64>; 5] = Default::default();

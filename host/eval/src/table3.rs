@@ -4,13 +4,13 @@
 //! camera; an ordinary camera sees the same, and two networks enhance what NIR-SPI saw.
 
 use crate::DISTANCES_M;
-use crate::compare::{Quality, compare};
 use crate::error::Result;
 use crate::estimate::Estimate;
 use crate::fid::Fid;
 use crate::pictures::{Enhancers, Picture};
 use crate::quality::halved;
-use crate::shot::{Conditions, Exposure, Shots, shoot, white_level};
+use crate::shot::{CalibratedCamera, Conditions, Exposure, Shots};
+use nirspi::imaging::{Quality, compare};
 use nirspi::picture::{Panel, Range, SideBySide};
 use nirspi::scene::SceneSource;
 use nirspi_nets::images::Images;
@@ -118,6 +118,7 @@ struct Taken {
 /// All pictures and networks of the table, taken once.
 pub struct Table {
     settings: Settings,
+    camera: CalibratedCamera,
     enhancers: Enhancers,
     sets: Sets,
     taken: Vec<Taken>,
@@ -133,22 +134,24 @@ impl Table {
     pub fn take(settings: Settings, done: &(dyn Fn() + Sync)) -> Result<Self> {
         let sets = Sets::new(settings.inception.as_deref())?;
         let enhancers = Enhancers::new()?;
+        let exposure = settings.exposure;
+        let camera = CalibratedCamera::new(exposure.seed)?;
         let jobs: Vec<(f64, u32)> =
             DISTANCES_M.iter().flat_map(|&m| (0..settings.scenes).map(move |i| (m, i))).collect();
         let taken: Vec<Taken> = jobs
             .par_iter()
             .map(|&(distance_m, i)| {
-                let wet = take(&settings.exposure, settings.exposure.rain, distance_m, i)?;
-                let dry = take(&settings.exposure, Rainfall::None, distance_m, i)?;
+                let wet = take(&camera, &exposure, exposure.rain, distance_m, i)?;
+                let dry = take(&camera, &exposure, Rainfall::None, distance_m, i)?;
                 let blank = Image::new(wet.nir_spi.side(), vec![0.0; wet.truth.len()]);
                 let blank = compare(&blank, &wet.truth)?.quality;
                 done();
                 Ok(Taken { distance_m, wet, dry, blank })
             })
             .collect::<Result<_>>()?;
-        let wet_whites = whites(&settings.exposure, settings.exposure.rain)?;
-        let dry_whites = whites(&settings.exposure, Rainfall::None)?;
-        Ok(Self { settings, enhancers, sets, taken, wet_whites, dry_whites })
+        let wet_whites = whites(&camera, &exposure, exposure.rain)?;
+        let dry_whites = whites(&camera, &exposure, Rainfall::None)?;
+        Ok(Self { settings, camera, enhancers, sets, taken, wet_whites, dry_whites })
     }
 
     /// The figures of the pictures.
@@ -181,16 +184,16 @@ impl Table {
     /// # Errors
     /// A capture that fails.
     pub fn picture(&self) -> Result<SideBySide> {
-        picture(&self.settings, &self.wet_whites, &self.enhancers)
+        picture(&self.camera, &self.settings, &self.wet_whites, &self.enhancers)
     }
 }
 
 /// What a white sheet gives at each distance.
-fn whites(exposure: &Exposure, rain: Rainfall) -> Result<[f32; 3]> {
+fn whites(camera: &CalibratedCamera, exposure: &Exposure, rain: Rainfall) -> Result<[f32; 3]> {
     let mut levels = [0.0; 3];
     for (level, distance_m) in levels.iter_mut().zip(DISTANCES_M) {
         let conditions = Conditions { distance_m, rain, frames: exposure.frames };
-        *level = white_level(conditions, exposure.seed)?;
+        *level = camera.white_level(conditions, exposure.seed)?;
     }
     Ok(levels)
 }
@@ -300,13 +303,19 @@ fn row(
 }
 
 /// Scene number `i`: another character, another rain, other noise.
-fn take(exposure: &Exposure, rain: Rainfall, distance_m: f64, i: u32) -> Result<Shots> {
+fn take(
+    camera: &CalibratedCamera,
+    exposure: &Exposure,
+    rain: Rainfall,
+    distance_m: f64,
+    i: u32,
+) -> Result<Shots> {
     let character = CHARACTERS.as_bytes()[i as usize % CHARACTERS.len()];
     let map = SceneSource::Letter(char::from(character)).load(256)?;
     let side_mm = map.side_mm.unwrap_or_else(|| Projector::default().field_mm(distance_m * 1e3));
     let scene = Scene::new(map.reflectance, map.size_px, side_mm)?;
     let conditions = Conditions { distance_m, rain, frames: exposure.frames };
-    shoot(scene, conditions, exposure.seed.wrapping_add(u64::from(i)))
+    camera.shoot(scene, conditions, exposure.seed.wrapping_add(u64::from(i)))
 }
 
 /// What rain does here, and what it cannot do.
@@ -347,12 +356,17 @@ fn reading(rows: &[Row], inception: bool) -> Vec<String> {
     lines
 }
 
-fn picture(settings: &Settings, whites: &[f32; 3], enhancers: &Enhancers) -> Result<SideBySide> {
+fn picture(
+    camera: &CalibratedCamera,
+    settings: &Settings,
+    whites: &[f32; 3],
+    enhancers: &Enhancers,
+) -> Result<SideBySide> {
     let exposure = &settings.exposure;
     let mut panels = Vec::new();
     for distance_m in [DISTANCES_M[0], DISTANCES_M[1]] {
-        let wet = take(exposure, exposure.rain, distance_m, 17)?;
-        let dry = take(exposure, Rainfall::None, distance_m, 17)?;
+        let wet = take(camera, exposure, exposure.rain, distance_m, 17)?;
+        let dry = take(camera, exposure, Rainfall::None, distance_m, 17)?;
         let blank = compare(&wet.nir_spi, &wet.truth)?.quality;
         let taken = [Taken { distance_m, wet, dry, blank }];
         for paper in &PAPER {
@@ -367,6 +381,7 @@ fn picture(settings: &Settings, whites: &[f32; 3], enhancers: &Enhancers) -> Res
                     "PSNR {:.1} dB  SSIM {:.2}",
                     judged.quality.psnr_db, judged.quality.ssim
                 )],
+                warnings: Vec::new(),
             }));
         }
     }

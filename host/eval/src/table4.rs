@@ -8,7 +8,7 @@ use crate::DISTANCES_M;
 use crate::error::Result;
 use crate::estimate::Estimate;
 use crate::pictures::{Enhancers, Picture};
-use crate::shot::{Conditions, Exposure, Shots, shoot, white_level};
+use crate::shot::{CalibratedCamera, Conditions, Exposure, Shots};
 use nirspi::picture::{Axis, Chart, Line};
 use nirspi::resolution::{bar_scene, bar_transfer, edge_mtf, edge_scene, line_width_px};
 use nirspi_optics::{Projector, Scene};
@@ -133,11 +133,12 @@ struct Pictures {
 pub fn table4(settings: &Settings, done: &(dyn Fn() + Sync)) -> Result<Report> {
     let Settings { scenes, exposure } = settings;
     let enhancers = Enhancers::new()?;
+    let camera = CalibratedCamera::new(exposure.seed)?;
     let mut rows = Vec::new();
     for (k, distance_m) in DISTANCES_M.into_iter().enumerate() {
         let take_all = |scene: &[f32], count: u32| -> Result<Vec<Shots>> {
             let one = |i: u32| {
-                let shots = take(exposure, scene.to_vec(), distance_m, u64::from(i));
+                let shots = take(&camera, exposure, scene.to_vec(), distance_m, u64::from(i));
                 done();
                 shots
             };
@@ -151,7 +152,7 @@ pub fn table4(settings: &Settings, done: &(dyn Fn() + Sync)) -> Result<Report> {
             })
             .collect::<Result<_>>()?;
         let conditions = Conditions { distance_m, rain: exposure.rain, frames: exposure.frames };
-        let white = white_level(conditions, exposure.seed)?;
+        let white = camera.white_level(conditions, exposure.seed)?;
         for (image, paper_mm) in PAPER {
             let of = |shots: &[Shots]| pictures(image, shots, white, &enhancers);
             let (side, edges) = of(&edges)?;
@@ -173,12 +174,18 @@ pub fn table4(settings: &Settings, done: &(dyn Fn() + Sync)) -> Result<Report> {
 }
 
 /// A scene that fills the field.
-fn take(exposure: &Exposure, reflectance: Vec<f32>, distance_m: f64, i: u64) -> Result<Shots> {
+fn take(
+    camera: &CalibratedCamera,
+    exposure: &Exposure,
+    reflectance: Vec<f32>,
+    distance_m: f64,
+    i: u64,
+) -> Result<Shots> {
     let field_mm = Projector::default().field_mm(distance_m * 1e3);
     // The mean of what lies around it, so that the field's own edge adds little.
     let scene = Scene::new(reflectance, SCENE_PX, field_mm)?.with_surround(0.5)?;
     let conditions = Conditions { distance_m, rain: exposure.rain, frames: exposure.frames };
-    shoot(scene, conditions, exposure.seed.wrapping_add(i))
+    camera.shoot(scene, conditions, exposure.seed.wrapping_add(i))
 }
 
 /// The pictures of a row and their side.

@@ -29,6 +29,7 @@ pub struct LedArray {
 impl LedArray {
     /// The array lighting the scene of `footprint`, where one LED on a white target gives
     /// `electrons_per_led` electrons per ADC sample ([`crate::Budget::electrons_per_led`]).
+    #[must_use]
     pub fn new(footprint: &Footprint, electrons_per_led: f64) -> Self {
         let electrons =
             footprint.weights().iter().map(|&w| (f64::from(w) * electrons_per_led) as f32);

@@ -17,6 +17,7 @@ use std::f64::consts::PI;
 use thiserror::Error;
 
 use crate::daylight::{DaylightError, irradiance_w_per_m2};
+use crate::instrument::{SAMPLE_NS, WAVELENGTH_NM};
 use crate::{LEDS, Projector, ProjectorError};
 
 /// Planck constant in J s (SI, exact).
@@ -57,7 +58,7 @@ pub struct BudgetSettings {
     /// what the etendue of a 0.15 mm chip allows a 2 mm emitter: asin(0.15 / 2) = 4.3 degrees. A
     /// field lens on the array points every LED at the projection lens.
     pub led_half_angle_deg: f64,
-    /// Wavelength, in nm (paper, 2.A).
+    /// Wavelength, in nm: [`WAVELENGTH_NM`].
     pub wavelength_nm: f64,
     /// Diameter of the collecting optics, in mm: a 25 mm lens, the common size. With the default
     /// detector the etendue leaves 1.7 mm of it in use; a larger detector uses more.
@@ -72,7 +73,7 @@ pub struct BudgetSettings {
     pub optics_transmission: f64,
     /// Electrons per photon: 0.9 (paper, 2.D).
     pub quantum_efficiency: f64,
-    /// Time of one ADC sample, in ns: 8 at 125 MS/s (paper, 2.D).
+    /// Time of one ADC sample, in ns: [`SAMPLE_NS`].
     pub sample_ns: f64,
     /// Illuminance on the target, in klx: 15, half-cloudy (paper, Tables 3 and 4).
     pub ambient_klx: f64,
@@ -85,13 +86,13 @@ impl Default for BudgetSettings {
         Self {
             led_power_mw: 4.0,
             led_half_angle_deg: 5.0,
-            wavelength_nm: 1550.0,
+            wavelength_nm: WAVELENGTH_NM,
             collector_aperture_mm: 25.0,
             detector_diameter_mm: 0.15,
             detector_na: 1.0,
             optics_transmission: 0.6,
             quantum_efficiency: 0.9,
-            sample_ns: 8.0,
+            sample_ns: SAMPLE_NS,
             ambient_klx: 15.0,
             filter_width_nm: 100.0,
         }
@@ -241,6 +242,7 @@ impl Budget {
     }
 
     /// Daylight on the detector from a white field, in W, of this irradiance within the filter.
+    #[must_use]
     pub fn daylight_on_detector_w(&self, irradiance_w_per_m2: f64) -> f64 {
         let area_m2 = PI / 4.0 * (self.effective_collector_mm * 1e-3).powi(2);
         irradiance_w_per_m2 / PI * area_m2 * self.terms.field_sr * self.terms.transmitted
@@ -248,12 +250,14 @@ impl Budget {
 
     /// Daylight from a field of this mean reflectance ([`crate::Footprint::mean`]), in electrons
     /// per sample.
+    #[must_use]
     pub fn ambient_electrons(&self, mean_reflectance: f64) -> f64 {
         self.ambient_electrons_white * mean_reflectance
     }
 
     /// The most light that can come: all LEDs and daylight on a white target, in electrons per
     /// sample.
+    #[must_use]
     pub fn brightest_electrons(&self) -> f64 {
         self.electrons_per_led * LEDS as f64 + self.ambient_electrons_white
     }

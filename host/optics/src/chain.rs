@@ -19,12 +19,7 @@ use rand_pcg::Pcg64Mcg;
 use thiserror::Error;
 
 use crate::Budget;
-
-/// Largest ADC code: 14 bit (paper, 2.D).
-pub const FULL_SCALE_COUNTS: u16 = (1 << 14) - 1;
-
-/// Longest ADC pipeline that can be set, in clocks.
-pub const MAX_ADC_LATENCY_CLOCKS: u8 = 63;
+use crate::instrument::{FULL_SCALE_COUNTS, MAX_ADC_LATENCY_CLOCKS, SAMPLE_NS};
 
 /// The steps of the switchable amplifier gain, in electrons per ADC count: two steps an octave.
 pub const GAINS_ELECTRONS_PER_COUNT: [f64; 32] = gains();
@@ -74,7 +69,7 @@ pub enum ChainError {
 /// The receiver's settings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChainSettings {
-    /// ADC clock period, in ns: 8 at 125 MS/s (paper, 2.D).
+    /// ADC clock period, in ns: [`SAMPLE_NS`].
     pub sample_ns: f64,
     /// LED rise and fall time from 10 to 90 %, in ns. Fast 1550 nm LEDs take 10 to 20.
     pub led_edge_ns: f64,
@@ -97,7 +92,7 @@ pub struct ChainSettings {
 
 impl Default for ChainSettings {
     fn default() -> Self {
-        let (sample_ns, amplifier_bandwidth_hz) = (8.0, 60e6);
+        let (sample_ns, amplifier_bandwidth_hz) = (SAMPLE_NS, 60e6);
         Self {
             sample_ns,
             led_edge_ns: 15.0,
@@ -120,6 +115,7 @@ impl Default for ChainSettings {
 
 /// Amplifier noise in electrons rms per sample, from its input current noise density: over the
 /// `pi/2 * bandwidth` that a single pole passes, `i * sqrt(pi/2 * B) * t / e`.
+#[must_use]
 pub fn amplifier_noise_electrons(pa_per_sqrt_hz: f64, bandwidth_hz: f64, sample_ns: f64) -> f64 {
     const ELECTRON_C: f64 = 1.602_176_634e-19;
     let amperes = pa_per_sqrt_hz * 1e-12 * (std::f64::consts::FRAC_PI_2 * bandwidth_hz).sqrt();
@@ -129,6 +125,7 @@ pub fn amplifier_noise_electrons(pa_per_sqrt_hz: f64, bandwidth_hz: f64, sample_
 impl ChainSettings {
     /// A receiver without noise, settling, daylight or latency, one electron a count: the exact
     /// chain that integration tests compare with.
+    #[must_use]
     pub fn ideal() -> Self {
         Self {
             led_edge_ns: 0.0,
@@ -170,6 +167,7 @@ impl ChainSettings {
 
     /// Part of a step of light that sample `n` after it shows: 0 is the clock in which the lines
     /// changed. The analytic response of the two poles, without the ADC's latency.
+    #[must_use]
     pub fn settling(&self, n: u32) -> f64 {
         let t = (f64::from(n) + 1.0) * self.sample_ns;
         let (led, amplifier) = (self.led_tau_ns(), self.amplifier_tau_ns());
@@ -300,6 +298,7 @@ impl Chain {
     }
 
     /// The settings it was made with.
+    #[must_use]
     pub fn settings(&self) -> &ChainSettings {
         &self.settings
     }

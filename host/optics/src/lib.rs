@@ -12,6 +12,8 @@
 //! | [`daylight`] | kilolux, wavelength, filter | W/m^2 of daylight on the target |
 //! | [`depth`] | distance | an 8 x 8 time-of-flight reading |
 //!
+//! [`instrument`] holds the numbers that every stage shares.
+//!
 //! What is between camera and target, and what follows from it:
 //!
 //! | module | from | to |
@@ -23,7 +25,7 @@
 //! | [`rig`] | collected volumes, nozzles | uniformity of a rain simulator |
 //! | [`visible`] | scene, daylight, drops | what an ordinary camera sees |
 //!
-//! The law of the crate: light is counted in **electrons per ADC sample** from [`budget`] on, and
+//! Light is counted in **electrons per ADC sample** from [`budget`] on, and
 //! nothing is rescaled to look good. A weak signal stays weak; the gain that shows it is a setting.
 //!
 //! ```
@@ -52,6 +54,7 @@ pub mod budget;
 pub mod chain;
 pub mod daylight;
 pub mod depth;
+pub mod instrument;
 pub mod mie;
 pub mod pixel;
 pub mod projector;
@@ -60,18 +63,12 @@ pub mod range;
 pub mod rig;
 pub mod scene;
 pub mod visible;
-
 pub mod water;
 
 pub use array::LedArray;
 pub use budget::{Budget, BudgetError, BudgetSettings, BudgetTerms};
 pub use chain::{AdcSample, Chain, ChainError, ChainSettings};
 pub use depth::{DEPTH_SIDE, DepthError, SimulatedDepth};
+pub use instrument::{LEDS, SIDE, WAVELENGTH_NM};
 pub use projector::{Footprint, Projector, ProjectorError};
 pub use scene::{Scene, SceneError};
-
-/// LEDs along one side of the array (paper, section 2.A).
-pub const SIDE: usize = 32;
-
-/// LEDs in the array.
-pub const LEDS: usize = SIDE * SIDE;

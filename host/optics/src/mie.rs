@@ -79,6 +79,7 @@ pub struct Mie {
 
 impl Mie {
     /// A solver.
+    #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
@@ -115,6 +116,7 @@ pub struct Sphere<'a> {
 
 impl Sphere<'_> {
     /// Efficiencies and asymmetry.
+    #[must_use]
     pub fn efficiencies(&self) -> Efficiencies {
         let q = self.solution.efficiencies();
         Efficiencies {

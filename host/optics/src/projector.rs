@@ -119,22 +119,26 @@ impl Projector {
     }
 
     /// Distance from the array to the lens that focuses it: `1 / (1/f - 1/focus)`, in millimetres.
+    #[must_use]
     pub fn array_distance_mm(&self) -> f64 {
         1.0 / (1.0 / self.focal_length_mm - 1.0 / self.focus_distance_mm)
     }
 
     /// Size on the target over size on the array, for a target at `distance_mm`.
+    #[must_use]
     pub fn magnification(&self, distance_mm: f64) -> f64 {
         distance_mm / self.array_distance_mm()
     }
 
     /// Side of the square that the 32 x 32 LEDs cover at `distance_mm`, in millimetres.
+    #[must_use]
     pub fn field_mm(&self, distance_mm: f64) -> f64 {
         SIDE as f64 * self.led_pitch_mm * self.magnification(distance_mm)
     }
 
     /// Diameter of the defocus disc at `distance_mm`, in millimetres: the cone from the aperture to
     /// a point on the focus plane, cut by the target, `aperture * |1 - D / focus|`.
+    #[must_use]
     pub fn blur_mm(&self, distance_mm: f64) -> f64 {
         self.aperture_mm * (1.0 - distance_mm / self.focus_distance_mm).abs()
     }
@@ -242,11 +246,13 @@ pub struct Footprint {
 
 impl Footprint {
     /// The 1024 reflectances, row-major, row 0 at the top of the scene.
+    #[must_use]
     pub fn weights(&self) -> &[f32] {
         &self.weights
     }
 
     /// Reflectance under all LEDs together.
+    #[must_use]
     pub fn mean(&self) -> f64 {
         self.weights.iter().map(|&w| f64::from(w)).sum::<f64>() / LEDS as f64
     }

@@ -75,6 +75,14 @@ impl Scene {
         Ok(Self { reflectance, size_px, side_mm, surround: 0.0, summed })
     }
 
+    /// A white sheet without end: reflectance 1 everywhere.
+    #[must_use]
+    pub fn white() -> Self {
+        let reflectance = vec![1.0];
+        let summed = summed_area(&reflectance, 1);
+        Self { reflectance, size_px: 1, side_mm: 1.0, surround: 1.0, summed }
+    }
+
     /// The same scene in front of a background of reflectance `surround`.
     ///
     /// # Errors
@@ -88,27 +96,32 @@ impl Scene {
     }
 
     /// Reflectances, row-major, `size_px` x `size_px`.
+    #[must_use]
     pub fn reflectance(&self) -> &[f32] {
         &self.reflectance
     }
 
     /// Pixels along one side.
+    #[must_use]
     pub fn size_px(&self) -> usize {
         self.size_px
     }
 
     /// Side on the target plane, in millimetres.
+    #[must_use]
     pub fn side_mm(&self) -> f64 {
         self.side_mm
     }
 
     /// Reflectance outside the map.
+    #[must_use]
     pub fn surround(&self) -> f32 {
         self.surround
     }
 
     /// Mean reflectance over a square of side `width_mm` centred at (`x_mm`, `y_mm`); the origin is
     /// the centre of the map, x to the right, y down.
+    #[must_use]
     pub fn mean_over_square(&self, x_mm: f64, y_mm: f64, width_mm: f64) -> f64 {
         let px_per_mm = self.size_px as f64 / self.side_mm;
         let centre_px = self.size_px as f64 / 2.0;

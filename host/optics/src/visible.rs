@@ -73,6 +73,7 @@ impl Default for VisibleCamera {
 
 impl VisibleCamera {
     /// Exposure that a white target needs, in s: illuminance on the sensor is `E / (4 N^2)` (glass of 0.9).
+    #[must_use]
     pub fn exposure_s(&self) -> f64 {
         let on_sensor_lx = self.daylight_klx * 1e3 * 0.9 / (4.0 * self.f_number.powi(2));
         let photons_per_m2_s = on_sensor_lx / LUMEN_PER_WATT / PHOTON_J;

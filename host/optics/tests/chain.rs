@@ -2,9 +2,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
-use nirspi_optics::chain::{
-    FULL_SCALE_COUNTS, GAINS_ELECTRONS_PER_COUNT, MAX_ADC_LATENCY_CLOCKS, amplifier_noise_electrons,
-};
+use nirspi_optics::chain::{GAINS_ELECTRONS_PER_COUNT, amplifier_noise_electrons};
+use nirspi_optics::instrument::{FULL_SCALE_COUNTS, MAX_ADC_LATENCY_CLOCKS};
 use nirspi_optics::{
     AdcSample, Budget, BudgetSettings, Chain, ChainError, ChainSettings, Projector,
 };

@@ -9,7 +9,7 @@ use nirspi_recon::omp::{
     Backend, DenseDictionary, Dictionary, Limits, Problem, Scalar, Solver, reference, solve_batch,
 };
 use nirspi_recon::reconstruct::{OmpSettings, omp};
-use nirspi_recon::{Basis, Measurements, Order, Side};
+use nirspi_recon::{Basis, Measurements, Order, Rows, Side};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -80,8 +80,8 @@ fn reference_with_its_gram(bencher: Bencher) {
 
 #[divan::bench(args = Basis::ALL)]
 fn one_frame_by_transforms(bencher: Bencher, basis: Basis) {
-    let Ok(mut rows) = Order::Random(1).rows(Side::INSTRUMENT) else { return };
-    rows.truncate(MEASUREMENTS);
+    let Ok(rows) = Order::Random(1).rows(Side::INSTRUMENT) else { return };
+    let rows = rows.first(MEASUREMENTS);
     let y = frames(MEASUREMENTS, 1);
     let transform = Transform::new(basis, Side::INSTRUMENT);
     let prior = Prior::none(ATOMS);
@@ -106,8 +106,7 @@ fn reconstruct_default_30_percent(bencher: Bencher, side: u64) {
     if nirspi_recon::fwht(&mut image).is_err() {
         return;
     }
-    let rows: Vec<i64> = (0..side.area() as i64).collect();
-    let part = Measurements::from_differential(side, &rows, &image)
+    let part = Measurements::from_differential(&Rows::natural(side), &image)
         .and_then(|all| all.take(Some(&Order::CakeCutting), 0.3));
     let Ok(part) = part else { return };
     bencher.bench_local(|| omp(black_box(&part), &OmpSettings::default()));

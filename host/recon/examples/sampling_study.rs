@@ -8,7 +8,7 @@
 //! the full sweep.
 
 use nirspi_recon::reconstruct::{OmpSettings, hadamard, omp};
-use nirspi_recon::{Basis, Image, Measurements, Order, Side, metrics};
+use nirspi_recon::{Basis, Image, Measurements, NamedOrder, Order, Rows, Side, metrics};
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -49,16 +49,15 @@ fn main() -> Result<()> {
     }
     println!();
     print!("| scene |");
-    let orders =
-        ["cake-cutting", "zig-zag", "total-variation", "russian-dolls", "sequency", "natural"];
-    orders.iter().for_each(|order| print!(" {order} |"));
+    let orders = Order::NAMED;
+    orders.iter().for_each(|named| print!(" {} |", named.name));
     println!("\n|---|{}", "---|".repeat(orders.len()));
     for share in [0.05, 0.1, 0.2, 0.3] {
         let mut sums = vec![(0.0, 0.0); orders.len()];
         for scene in &scenes {
             print!("| {} {:.0} % |", scene.name, 100.0 * share);
-            for (order, sums) in orders.iter().zip(&mut sums) {
-                let part = scene.all.take(Some(&order.parse()?), share)?;
+            for (NamedOrder { order, .. }, sums) in orders.iter().zip(&mut sums) {
+                let part = scene.all.take(Some(order), share)?;
                 let full = hadamard(&scene.all);
                 let found = omp(&part, &OmpSettings::default())?;
                 let zero = correlation(&hadamard(&part), &full)?;
@@ -156,23 +155,17 @@ fn array<T: npyz::Deserialize>(path: &Path, name: &str) -> Result<Vec<T>> {
 
 fn wing(data: &Path) -> Result<Scene> {
     let path = data.join("spi/opar_ala1.npz");
-    let rows: Vec<i64> = array::<i32>(&path, "h_row")?.into_iter().map(i64::from).collect();
+    let rows = Rows::new(Side::new(64)?, array::<i32>(&path, "h_row")?)?;
     let y: Vec<f64> = array::<f32>(&path, "y")?.into_iter().map(f64::from).collect();
-    Ok(Scene {
-        name: "wing (real, 64)",
-        all: Measurements::from_pairs(Side::new(64)?, &rows, &y)?.0,
-    })
+    Ok(Scene { name: "wing (real, 64)", all: Measurements::from_pairs(&rows, &y)?.0 })
 }
 
 fn car(data: &Path, detector: usize) -> Result<Scene> {
     let path = data.join("spi/scheidt_car.npz");
-    let rows: Vec<i64> = array::<i32>(&path, "h_row")?.into_iter().map(i64::from).collect();
+    let rows = Rows::new(Side::new(32)?, array::<i32>(&path, "h_row")?)?;
     let d: Vec<f64> = array::<i32>(&path, "d")?.into_iter().map(f64::from).collect();
     let d = d.chunks_exact(rows.len()).nth(detector).ok_or("no such detector")?;
-    Ok(Scene {
-        name: "car (real, 32)",
-        all: Measurements::from_differential(Side::new(32)?, &rows, d)?,
-    })
+    Ok(Scene { name: "car (real, 32)", all: Measurements::from_differential(&rows, d)? })
 }
 
 fn letter(data: &Path, side: usize) -> Result<Scene> {
@@ -196,7 +189,6 @@ fn simulated(name: &'static str, side: usize, width: usize, pixels: &[u8]) -> Re
         image[r * side + c] += f64::from(value) / (255 * block * block) as f64;
     }
     nirspi_recon::fwht(&mut image)?;
-    let rows: Vec<i64> = (0..image.len() as i64).collect();
-    let side = Side::new(side as u64)?;
-    Ok(Scene { name, all: Measurements::from_differential(side, &rows, &image)? })
+    let rows = Rows::natural(Side::new(side as u64)?);
+    Ok(Scene { name, all: Measurements::from_differential(&rows, &image)? })
 }

@@ -1,7 +1,7 @@
 //! What computes, by name: OMP here and the networks of `nirspi-nets` take the same names.
 //!
-//! The one law: a backend asked for by name is the one that computes, or the call fails and says why; only
-//! [`Backend::Auto`] chooses, and it never chooses a software device.
+//! A backend asked for by name is the one that computes, or the call fails and says why; only [`Backend::Auto`] chooses, and
+//! never a software device (`probe::find`, with the feature `gpu`).
 
 #[cfg(feature = "gpu")]
 pub mod probe;

@@ -17,6 +17,7 @@ use thiserror::Error;
 
 /// An orthonormal basis of `n x n` images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum Basis {
     /// Single pixels.
     Pixel,
@@ -33,7 +34,7 @@ pub enum Basis {
 
 /// The name of no basis.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[error("unknown basis {found:?}, expected pixel, dct, haar or daubechies4")]
+#[error("unknown basis {found:?}, expected {}", Basis::expected())]
 pub struct ParseBasisError {
     /// What was given.
     pub found: String,
@@ -43,30 +44,38 @@ impl FromStr for Basis {
     type Err = ParseBasisError;
 
     fn from_str(name: &str) -> Result<Self, ParseBasisError> {
-        match name {
-            "pixel" => Ok(Self::Pixel),
-            "dct" => Ok(Self::Dct),
-            "haar" => Ok(Self::Haar),
-            "daubechies4" => Ok(Self::Daubechies4),
-            _ => Err(ParseBasisError { found: name.to_owned() }),
-        }
+        let named = Self::ALL.into_iter().find(|basis| basis.name() == name);
+        named.ok_or_else(|| ParseBasisError { found: name.to_owned() })
     }
 }
 
 impl fmt::Display for Basis {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Pixel => "pixel",
-            Self::Dct => "dct",
-            Self::Haar => "haar",
-            Self::Daubechies4 => "daubechies4",
-        })
+        f.write_str(self.name())
     }
 }
 
 impl Basis {
     /// All of them.
     pub const ALL: [Self; 4] = [Self::Pixel, Self::Dct, Self::Haar, Self::Daubechies4];
+
+    /// The name that [`FromStr`] reads.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Pixel => "pixel",
+            Self::Dct => "dct",
+            Self::Haar => "haar",
+            Self::Daubechies4 => "daubechies4",
+        }
+    }
+
+    /// The names of all bases, as a list for messages.
+    #[must_use]
+    pub fn expected() -> String {
+        let [others @ .., last] = Self::ALL.map(Self::name);
+        format!("{} or {last}", others.join(", "))
+    }
 
     /// Low-pass taps of a wavelet basis.
     pub(crate) fn taps(self) -> Option<&'static [f32]> {

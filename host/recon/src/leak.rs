@@ -29,6 +29,7 @@ pub struct Leak {
 
 /// Taps that describe no leak that can be undone.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum LeakError {
     /// No taps.
     #[error("a leak of no taps, expected at least the slot's own share")]

@@ -1,12 +1,13 @@
 //! Single-pixel reconstruction: from measurements to an image.
 //!
-//! The one law: everything here is a pure function of its arguments. No file, no clock, no thread that outlives a call,
-//! no randomness but from a seed that is an argument or a constant.
+//! Everything here is a pure function of its arguments: no file, no clock, no thread that outlives a call, and no
+//! randomness but from a seed that is an argument or a constant.
 //!
 //! | module | turns | into |
 //! |---|---|---|
 //! | [`leak`] | readings that bleed into their neighbours | readings |
 //! | [`Measurements`] | readings or differences, with dropouts found | one number a Hadamard row |
+//! | [`Rows`] | numbers of Hadamard rows | rows that were checked once |
 //! | [`order`] | the name of an order | rows |
 //! | [`fwht`](mod@fwht) | an image | its Hadamard measurements, and back |
 //! | [`basis`] | an image | coefficients, most of them nearly zero |
@@ -16,13 +17,13 @@
 //! | [`backend`] | the name of what shall compute | a [`Backend`] |
 //!
 //! ```
-//! use nirspi_recon::{Measurements, Order, Side, reconstruct};
+//! use nirspi_recon::{Measurements, Order, Rows, Side, reconstruct};
 //!
 //! let side = Side::new(8)?;
 //! // A scene, and what the instrument measures of it.
 //! let mut d: Vec<f64> = (0..64).map(|p| if p % 8 > 3 { 1.0 } else { 0.0 }).collect();
 //! nirspi_recon::fwht(&mut d)?;
-//! let all = Measurements::from_differential(side, &(0..64).collect::<Vec<_>>(), &d)?;
+//! let all = Measurements::from_differential(&Rows::natural(side), &d)?;
 //! // A quarter of the patterns are enough for so coarse a scene, if they are the coarse ones.
 //! let quarter = all.take(Some(&Order::CakeCutting), 0.25)?;
 //! let image = reconstruct::hadamard(&quarter);
@@ -41,6 +42,7 @@ pub mod metrics;
 pub mod omp;
 pub mod order;
 pub mod reconstruct;
+mod rows;
 mod side;
 #[cfg(test)]
 mod testing;
@@ -52,5 +54,6 @@ pub use fwht::{FwhtLengthError, fwht};
 pub use image::Image;
 pub use leak::{Leak, LeakError, Sweep};
 pub use measurements::{MeasurementError, Measurements};
-pub use order::{Order, OrderError, ParseOrderError};
+pub use order::{NamedOrder, Order, ParseOrderError};
+pub use rows::{Rows, RowsError};
 pub use side::{Side, SideError};

@@ -1,19 +1,18 @@
 //! Measurements: one number a Hadamard row, with everything of the instrument undone.
 //!
-//! The one law: a [`Measurements`] is always consistent (one finite value for each of its rows, every row
-//! one that its side has, none twice), whatever it was built from.
+//! # Invariant
+//! A [`Measurements`] has one finite value for each of its [`Rows`], whatever it was built from. Held by
+//! `measurements::tests::each_fault_is_named`.
 
 use crate::dropout::{self, Dropout};
-use crate::{Order, OrderError, Side, order};
+use crate::{Order, Rows, RowsError, Side, order};
 use thiserror::Error;
 
 /// Signed measurements `value[k] = sum over pixels of H[row[k], p] * x[p]`, in the order in which they
-/// were taken. Rows are those of the natural-order (Sylvester) Hadamard matrix of order `side^2`, each
-/// at most once; values are finite. Rows that were not measured, or were left out, are absent.
+/// were taken. Values are finite. Rows that were not measured, or were left out, are absent.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measurements {
-    side: Side,
-    rows: Vec<u32>,
+    rows: Rows,
     values: Vec<f64>,
 }
 
@@ -31,8 +30,8 @@ pub enum MeasurementError {
         /// The length the others call for.
         expected: usize,
     },
-    /// No measurement at all.
-    #[error("no measurement at all, expected at least one")]
+    /// Drop-outs took every measurement.
+    #[error("no measurement is left, expected at least one that no drop-out touches")]
     Empty,
     /// A value is NaN or infinite.
     #[error("{field}[{index}] is {found}, expected a finite number")]
@@ -44,35 +43,15 @@ pub enum MeasurementError {
         /// What was found.
         found: f64,
     },
-    /// A Hadamard row that this side does not have.
-    #[error("h_row[{index}] is {found}, expected 0 to {last}")]
-    RowOutOfRange {
-        /// Where.
-        index: usize,
-        /// What was found.
-        found: i64,
-        /// The last row there is.
-        last: usize,
-    },
-    /// The same Hadamard row twice.
-    #[error("h_row[{index}] repeats row {row}, first at h_row[{first}]")]
-    RowRepeated {
-        /// Where the second stands.
-        index: usize,
-        /// Where the first stands.
-        first: usize,
-        /// The row.
-        row: u32,
-    },
-    /// A share of the patterns that is none.
+    /// A share of the patterns out of range.
     #[error("a sampling of {found}, expected more than 0 and at most 1")]
     Fraction {
         /// What was asked for.
         found: f64,
     },
-    /// An order that is no permutation of the rows.
+    /// The rows, or those of an order.
     #[error(transparent)]
-    Order(#[from] OrderError),
+    Rows(#[from] RowsError),
 }
 
 impl Measurements {
@@ -80,16 +59,11 @@ impl Measurements {
     /// complement (or any signed measurement of that row). Fewer than `side^2` rows are a partial sampling.
     ///
     /// # Errors
-    /// [`MeasurementError`] names the list (`d` or `h_row`), the position and what was found.
-    pub fn from_differential(
-        side: Side,
-        rows: &[i64],
-        d: &[f64],
-    ) -> Result<Self, MeasurementError> {
+    /// [`MeasurementError`] says that there is not one value a row, or which one is not finite.
+    pub fn from_differential(rows: &Rows, d: &[f64]) -> Result<Self, MeasurementError> {
         expect_length("d", d.len(), rows.len())?;
-        let rows = checked_rows(side, rows)?;
         expect_finite("d", d)?;
-        Ok(Self { side, rows, values: d.to_vec() })
+        Ok(Self { rows: rows.clone(), values: d.to_vec() })
     }
 
     /// From raw readings in time order, a pattern and then its complement: `y = [+, -, +, -, ...]`,
@@ -99,17 +73,12 @@ impl Measurements {
     /// from the result, and named in the list.
     ///
     /// # Errors
-    /// [`MeasurementError`] names the list (`y` or `h_row`), the position and what was found; it is
-    /// [`Empty`](MeasurementError::Empty) too if no pair survives.
-    pub fn from_pairs(
-        side: Side,
-        rows: &[i64],
-        y: &[f64],
-    ) -> Result<(Self, Vec<Dropout>), MeasurementError> {
+    /// [`MeasurementError`] says that there are not two readings a row, or which one is not finite; it is
+    /// [`Empty`](MeasurementError::Empty) if no pair survives.
+    pub fn from_pairs(rows: &Rows, y: &[f64]) -> Result<(Self, Vec<Dropout>), MeasurementError> {
         expect_length("y", y.len(), 2 * rows.len())?;
-        let rows = checked_rows(side, rows)?;
         expect_finite("y", y)?;
-        let dropouts = dropout::find(&rows, y);
+        let dropouts = dropout::find(rows, y);
         let mut lost = vec![false; rows.len()];
         for dropout in &dropouts {
             lost[dropout.pairs()].fill(true);
@@ -125,7 +94,9 @@ impl Measurements {
             return Err(MeasurementError::Empty);
         }
         expect_finite("d", &values)?; // readings near the end of f64's range may differ by more
-        Ok((Self { side, rows: kept, values }, dropouts))
+        let rows =
+            if dropouts.is_empty() { rows.clone() } else { Rows::trusted(rows.side(), kept) };
+        Ok((Self { rows, values }, dropouts))
     }
 
     /// From readings of the positive patterns alone (light where `H` is +1): `d[k] = 2 y[k] - S`, where `S`
@@ -137,10 +108,9 @@ impl Measurements {
     /// have been subtracted before, or be [removed](Self::remove_dark_level) after.
     ///
     /// # Errors
-    /// [`MeasurementError`] names the list (`y` or `h_row`), the position and what was found.
-    pub fn from_single(side: Side, rows: &[i64], y: &[f64]) -> Result<Self, MeasurementError> {
+    /// [`MeasurementError`] says that there is not one reading a row, or which one is not finite.
+    pub fn from_single(rows: &Rows, y: &[f64]) -> Result<Self, MeasurementError> {
         expect_length("y", y.len(), rows.len())?;
-        let rows = checked_rows(side, rows)?;
         expect_finite("y", y)?;
         let all_ones = match rows.iter().position(|&row| row == 0) {
             Some(k) => y[k],
@@ -148,7 +118,7 @@ impl Measurements {
         };
         let values: Vec<f64> = y.iter().map(|y| 2.0 * y - all_ones).collect();
         expect_finite("d", &values)?;
-        Ok(Self { side, rows, values })
+        Ok(Self { rows: rows.clone(), values })
     }
 
     /// Removes what a dark level in every reading (ambient light, an ADC's offset) has left in measurements
@@ -158,7 +128,7 @@ impl Measurements {
     /// It is estimated as the mean of the middle half of the values over the half of the rows with the highest
     /// sequency, where a scene's own measurements scatter around zero; one within four standard errors of zero is left alone, as `None`.
     pub fn remove_dark_level(&mut self) -> Option<f64> {
-        let fine = order::positions_by_sequency(self.side, &self.rows);
+        let fine = order::positions_by_sequency(&self.rows);
         let mut values: Vec<f64> =
             fine[fine.len() / 2..].iter().map(|&position| self.values[position]).collect();
         values.sort_unstable_by(f64::total_cmp);
@@ -181,22 +151,22 @@ impl Measurements {
     /// returned only where fewer were measured.
     ///
     /// # Errors
-    /// [`MeasurementError::Fraction`] unless `0 < fraction <= 1`; [`MeasurementError::Order`] if the order is
+    /// [`MeasurementError::Fraction`] unless `0 < fraction <= 1`; [`MeasurementError::Rows`] if the order is
     /// a table that is no permutation.
     pub fn take(&self, order: Option<&Order>, fraction: f64) -> Result<Self, MeasurementError> {
         if !(fraction > 0.0 && fraction <= 1.0) {
             return Err(MeasurementError::Fraction { found: fraction });
         }
-        let asked = ((fraction * self.side.area() as f64).round() as usize).max(1);
+        let asked = ((fraction * self.side().area() as f64).round() as usize).max(1);
         let positions: Vec<usize> = match order {
             None => (0..self.rows.len()).take(asked).collect(),
             Some(order) => {
-                let mut position = vec![None; self.side.area()];
+                let mut position = vec![None; self.side().area()];
                 for (k, &row) in self.rows.iter().enumerate() {
                     position[row as usize] = Some(k);
                 }
-                let shown = order.rows(self.side)?;
-                shown.into_iter().filter_map(|row| position[row as usize]).take(asked).collect()
+                let shown = order.rows(self.side())?;
+                shown.iter().filter_map(|&row| position[row as usize]).take(asked).collect()
             }
         };
         Ok(self.subset(positions))
@@ -205,18 +175,18 @@ impl Measurements {
     /// The measurements at these positions, in that order.
     pub(crate) fn subset(&self, positions: impl IntoIterator<Item = usize>) -> Self {
         let (rows, values) = positions.into_iter().map(|k| (self.rows[k], self.values[k])).unzip();
-        Self { side: self.side, rows, values }
+        Self { rows: Rows::trusted(self.side(), rows), values }
     }
 
     /// Side of the image that was measured.
     #[must_use]
     pub fn side(&self) -> Side {
-        self.side
+        self.rows.side()
     }
 
-    /// Natural-order Hadamard rows in the order taken, each at most once.
+    /// Hadamard rows in the order taken.
     #[must_use]
-    pub fn rows(&self) -> &[u32] {
+    pub fn rows(&self) -> &Rows {
         &self.rows
     }
 
@@ -244,26 +214,6 @@ fn expect_finite(field: &'static str, values: &[f64]) -> Result<(), MeasurementE
         Some(index) => Err(MeasurementError::NotFinite { field, index, found: values[index] }),
         None => Ok(()),
     }
-}
-
-fn checked_rows(side: Side, rows: &[i64]) -> Result<Vec<u32>, MeasurementError> {
-    if rows.is_empty() {
-        return Err(MeasurementError::Empty);
-    }
-    let last = side.area() - 1;
-    let mut first_at = vec![None; side.area()];
-    let mut checked = Vec::with_capacity(rows.len());
-    for (index, &found) in rows.iter().enumerate() {
-        let row = usize::try_from(found)
-            .ok()
-            .filter(|&row| row <= last)
-            .ok_or(MeasurementError::RowOutOfRange { index, found, last })?;
-        if let Some(first) = first_at[row].replace(index) {
-            return Err(MeasurementError::RowRepeated { index, first, row: row as u32 });
-        }
-        checked.push(row as u32);
-    }
-    Ok(checked)
 }
 
 #[cfg(test)]

@@ -36,6 +36,7 @@ mod kernel;
 mod mixed;
 pub mod nonnegative;
 mod panels;
+mod path;
 mod pursuit;
 mod referee;
 pub mod reference;
@@ -48,7 +49,8 @@ pub use batch::{Problem, solve_batch, solve_path};
 pub use dense::DenseDictionary;
 pub use dictionary::{Atoms, Dictionary, padded};
 pub use mixed::{MixedDictionary, MixedSolver};
-pub use pursuit::{Path, Solver, error_bound};
+pub use path::Path;
+pub use pursuit::{Solver, error_bound};
 pub use scalar::Scalar;
 
 use thiserror::Error;
@@ -103,6 +105,7 @@ pub struct Solution {
 
 /// A problem that has no solution to look for.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum OmpError {
     /// The measurement does not fit the dictionary.
     #[error("a measurement of {found} values for a dictionary of {expected} rows")]

@@ -1,7 +1,11 @@
 //! The order in which Hadamard patterns are shown.
 //!
-//! The one law: [`Order::rows`] is a permutation of `0..n^2`, whose k-th entry is the row of the
-//! natural-order Hadamard matrix shown k-th.
+//! A new order is a variant of [`Order`], an entry of [`Order::NAMED`] with the function that makes its rows, and a line of
+//! the table below. Parsers, help texts and comparisons follow from the entry.
+//!
+//! # Invariant
+//! [`Order::rows`] is a permutation of `0..n^2`, whose k-th entry is the row of the natural-order Hadamard matrix shown
+//! k-th. Held by `order::tests::every_order_is_a_permutation_at_every_side`.
 //!
 //! Row `r = n * r_hi + r_lo` is the pattern `w(r_hi) (x) w(r_lo)`: the 1-D Walsh function `w(r_hi)` down
 //! the image times `w(r_lo)` across it. `s(r)` below is the *sequency* of a 1-D function, its number of sign
@@ -20,7 +24,7 @@
 //!
 //! Other programs use some of these names for other orders; compare tables, not names.
 
-use crate::Side;
+use crate::{Rows, RowsError, Side};
 use rand::Rng;
 use rand_pcg::Pcg64;
 use std::cmp::Ordering;
@@ -30,6 +34,7 @@ use thiserror::Error;
 
 /// An order of the `n^2` patterns of a sweep. The module's table says which definition each one follows.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum Order {
     /// Row k of the Sylvester matrix.
     Natural,
@@ -49,65 +54,100 @@ pub enum Order {
     Table(Vec<u32>),
 }
 
-/// A table that is no permutation of the rows.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
-pub enum OrderError {
-    /// The table does not have one entry a pattern.
-    #[error("an order table of {found} entries, expected {expected}")]
-    Length {
-        /// Entries of the table.
-        found: usize,
-        /// Patterns of a sweep, `n^2`.
-        expected: usize,
-    },
-    /// An entry is no row.
-    #[error("order table entry {index} is {found}, expected 0 to {last}")]
-    OutOfRange {
-        /// Position in the table.
-        index: usize,
-        /// The entry.
-        found: u32,
-        /// Last row there is.
-        last: u32,
-    },
-    /// An entry is there twice.
-    #[error("order table entry {index} repeats row {row}, first at entry {first}")]
-    Repeated {
-        /// Position of the second.
-        index: usize,
-        /// Position of the first.
-        first: usize,
-        /// The row.
-        row: u32,
-    },
+/// An order that has a name, with what belongs to it: one entry here is all that an order needs.
+#[derive(Debug, Clone)]
+pub struct NamedOrder {
+    /// The name that [`Order::from_str`] reads.
+    pub name: &'static str,
+    /// In one line, for a list of orders.
+    pub about: &'static str,
+    /// The order.
+    pub order: Order,
+    rows: fn(Side) -> Vec<u32>,
+}
+
+impl Order {
+    /// Every order that has a name. Argument parsers, error texts and comparisons take their lists from here.
+    pub const NAMED: &'static [NamedOrder] = &[
+        NamedOrder {
+            name: "natural",
+            about: "rows of the Sylvester matrix as they come",
+            order: Self::Natural,
+            rows: |side| (0..side.area() as u32).collect(),
+        },
+        NamedOrder {
+            name: "sequency",
+            about: "ascending sign changes of the row as one long function",
+            order: Self::Sequency,
+            rows: sequency,
+        },
+        NamedOrder {
+            name: "zig-zag",
+            about: "anti-diagonals of the grid of two sequencies, as JPEG scans a block",
+            order: Self::ZigZag,
+            rows: zig_zag,
+        },
+        NamedOrder {
+            name: "cake-cutting",
+            about: "ascending number of connected blocks",
+            order: Self::CakeCutting,
+            rows: |side| sorted(side, Pattern::blocks),
+        },
+        NamedOrder {
+            name: "russian-dolls",
+            about: "complete coarse bases first, each inside the next",
+            order: Self::RussianDolls,
+            rows: russian_dolls,
+        },
+        NamedOrder {
+            name: "total-variation",
+            about: "ascending total variation of the pattern",
+            order: Self::TotalVariation,
+            rows: total_variation,
+        },
+    ];
+
+    /// What [`Order::from_str`] reads, as a list for messages: `natural, sequency, ... or random:SEED`.
+    #[must_use]
+    pub fn expected() -> String {
+        let names: Vec<&str> = Self::NAMED.iter().map(|named| named.name).collect();
+        format!("{} or random:SEED", names.join(", "))
+    }
+
+    /// The row shown k-th, for all `side^2` patterns.
+    ///
+    /// # Errors
+    /// [`RowsError`] if this is a [`Table`](Self::Table) that is no permutation of `0..side^2`.
+    pub fn rows(&self, side: Side) -> Result<Rows, RowsError> {
+        let rows = match self {
+            Self::Random(seed) => shuffled(side.area() as u32, *seed),
+            Self::Table(table) => {
+                return Rows::new(side, table.iter().copied()).and_then(Rows::whole);
+            }
+            named => (named.entry().ok_or(RowsError::Empty)?.rows)(side),
+        };
+        Ok(Rows::trusted(side, rows))
+    }
+
+    fn entry(&self) -> Option<&'static NamedOrder> {
+        Self::NAMED.iter().find(|named| named.order == *self)
+    }
 }
 
 /// The name of no order.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[error(
-    "unknown order {found:?}, expected natural, sequency, zig-zag, cake-cutting, russian-dolls, \
-     total-variation or random:SEED"
-)]
+#[error("unknown order {found:?}, expected {}", Order::expected())]
 pub struct ParseOrderError {
     /// What was given.
     pub found: String,
 }
 
-const NAMED: [(&str, Order); 6] = [
-    ("natural", Order::Natural),
-    ("sequency", Order::Sequency),
-    ("zig-zag", Order::ZigZag),
-    ("cake-cutting", Order::CakeCutting),
-    ("russian-dolls", Order::RussianDolls),
-    ("total-variation", Order::TotalVariation),
-];
-
 impl FromStr for Order {
     type Err = ParseOrderError;
 
     fn from_str(name: &str) -> Result<Self, ParseOrderError> {
-        if let Some((_, order)) = NAMED.iter().find(|(known, _)| *known == name) {
-            return Ok(order.clone());
+        if let Some(named) = Self::NAMED.iter().find(|named| named.name == name) {
+            return Ok(named.order.clone());
         }
         name.strip_prefix("random:")
             .and_then(|seed| seed.parse().ok())
@@ -121,43 +161,8 @@ impl fmt::Display for Order {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Random(seed) => write!(f, "random:{seed}"),
-            Self::Table(_) => f.write_str("table"),
-            named => {
-                let name =
-                    NAMED.iter().find(|(_, order)| order == named).map_or("", |(name, _)| name);
-                f.write_str(name)
-            }
+            named => f.write_str(named.entry().map_or("table", |entry| entry.name)),
         }
-    }
-}
-
-impl Order {
-    /// Natural row shown k-th, for all `side^2` patterns.
-    ///
-    /// # Errors
-    /// [`OrderError`] if this is a [`Table`](Self::Table) that is no permutation of `0..side^2`.
-    pub fn rows(&self, side: Side) -> Result<Vec<u32>, OrderError> {
-        let area = side.area() as u32;
-        Ok(match self {
-            Self::Natural => (0..area).collect(),
-            Self::Sequency => (0..area).map(|k| walsh_row(k, area)).collect(),
-            Self::ZigZag => zig_zag(side),
-            Self::CakeCutting => sorted(side, Pattern::blocks),
-            Self::RussianDolls => russian_dolls(side),
-            Self::TotalVariation => {
-                let n = side.pixels() as f64;
-                let variation = |p: &Pattern| {
-                    let (i, j) = (f64::from(p.down), f64::from(p.across));
-                    2.0 * n * (i + j) - (4.0 - 2.0 * std::f64::consts::SQRT_2) * i * j
-                };
-                sorted(side, |p| Ascending(variation(p)))
-            }
-            Self::Random(seed) => shuffled(area, *seed),
-            Self::Table(table) => {
-                check_permutation(table, side.area())?;
-                table.clone()
-            }
-        })
     }
 }
 
@@ -176,10 +181,9 @@ impl Pattern {
 }
 
 /// Positions of the rows but the all-ones one, in ascending sequency (along the zig-zag).
-pub(crate) fn positions_by_sequency(side: Side, rows: &[u32]) -> Vec<usize> {
-    let mut rank = vec![0; side.area()];
-    // A named order always exists.
-    for (k, row) in Order::ZigZag.rows(side).unwrap_or_default().into_iter().enumerate() {
+pub(crate) fn positions_by_sequency(rows: &Rows) -> Vec<usize> {
+    let mut rank = vec![0; rows.side().area()];
+    for (k, row) in zig_zag(rows.side()).into_iter().enumerate() {
         rank[row as usize] = k;
     }
     let mut positions: Vec<usize> = (0..rows.len()).filter(|&k| rows[k] != 0).collect();
@@ -209,6 +213,11 @@ fn sorted<K: Ord>(side: Side, key: impl Fn(&Pattern) -> K) -> Vec<u32> {
     patterns.iter().map(|p| p.row).collect()
 }
 
+fn sequency(side: Side) -> Vec<u32> {
+    let area = side.area() as u32;
+    (0..area).map(|k| walsh_row(k, area)).collect()
+}
+
 fn zig_zag(side: Side) -> Vec<u32> {
     sorted(side, |p| {
         let diagonal = p.down + p.across;
@@ -233,6 +242,14 @@ fn russian_dolls(side: Side) -> Vec<u32> {
     })
 }
 
+fn total_variation(side: Side) -> Vec<u32> {
+    let n = side.pixels() as f64;
+    sorted(side, |p| {
+        let (i, j) = (f64::from(p.down), f64::from(p.across));
+        Ascending(2.0 * n * (i + j) - (4.0 - 2.0 * std::f64::consts::SQRT_2) * i * j)
+    })
+}
+
 /// Stream of the generator behind [`Order::Random`]: any constant would do, but never another one.
 const RANDOM_STREAM: u128 = 0x6e69_7273_7069;
 
@@ -253,23 +270,6 @@ fn shuffled(count: u32, seed: u64) -> Vec<u32> {
         rows.swap(last, below(last as u64 + 1));
     }
     rows
-}
-
-fn check_permutation(table: &[u32], area: usize) -> Result<(), OrderError> {
-    if table.len() != area {
-        return Err(OrderError::Length { found: table.len(), expected: area });
-    }
-    let mut first = vec![None; area];
-    for (index, &row) in table.iter().enumerate() {
-        let Some(seen) = first.get_mut(row as usize) else {
-            return Err(OrderError::OutOfRange { index, found: row, last: area as u32 - 1 });
-        };
-        match *seen {
-            Some(first) => return Err(OrderError::Repeated { index, first, row }),
-            None => *seen = Some(index),
-        }
-    }
-    Ok(())
 }
 
 /// A finite number as a sort key.

@@ -19,39 +19,31 @@
 //!
 #![doc = include_str!("reconstruct/study.md")]
 
+mod method;
+mod methods;
 mod own_atoms;
 mod own_matrix;
 mod pursuit;
 mod regularised;
+mod report;
 mod selection;
 mod video;
 
+pub use method::{Method, MethodSettings, OwnAtoms, ParseMethodError, Reconstruct, Setting};
+pub use methods::hadamard;
 pub use own_atoms::omp_over;
 pub use own_matrix::{MatrixError, MatrixMethod, MatrixReconstruction, MatrixSettings, OwnMatrix};
 pub use regularised::{Penalty, Regularised, RegularisedSettings, Strength, regularised};
+pub use report::{Reconstruction, Report};
 pub use video::{VideoFrame, omp_video};
 
 use crate::basis::{Basis, Transform};
 use crate::omp::sampled::{Prior, SampledHadamard, visible_energy};
 use crate::omp::{Backend, Limits, OmpError, Stop};
-use crate::{Image, Measurements, Order, Side, fwht};
+use crate::{Image, Measurements, Order, Rows, Side, fwht};
 use pursuit::{Found, How};
+use std::str::FromStr;
 use thiserror::Error;
-
-/// Inverts the Walsh-Hadamard transform, with zero for rows that were not measured.
-///
-/// Over all rows this is exact. Over some it is the image of least energy that agrees with them.
-#[must_use]
-pub fn hadamard(measurements: &Measurements) -> Image {
-    let side = measurements.side();
-    let mut grid = vec![0.0_f64; side.area()];
-    for (&row, &value) in measurements.rows().iter().zip(measurements.values()) {
-        grid[row as usize] = value;
-    }
-    fwht::transform(&mut grid);
-    let pixels = grid.into_iter().map(|v| (v / side.area() as f64) as f32).collect();
-    Image::new(side, pixels)
-}
 
 /// The order in which to take a part of recorded measurements, where the recorded one does not serve.
 ///
@@ -83,6 +75,21 @@ pub enum Sparsity {
     Noise,
 }
 
+impl Sparsity {
+    /// Why a pursuit that was to choose this many atoms stopped.
+    #[must_use]
+    pub fn reason(self, stop: Stop) -> &'static str {
+        match (stop, self) {
+            (Stop::Sparsity, Self::Fixed(_)) => "as many atoms as asked for",
+            (Stop::Sparsity, _) => "more atoms predict no better",
+            (Stop::Residual, Self::Noise) => "no more than noise is left",
+            (Stop::Residual, _) => "residual reached",
+            (Stop::NoAtomLeft, _) => "no atom left that explains more",
+            (Stop::Dependent, _) => "atoms left are combinations of those chosen",
+        }
+    }
+}
+
 /// What becomes of rows that were measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Completion {
@@ -90,6 +97,37 @@ pub enum Completion {
     Measured,
     /// All rows are the representation's: the image is exactly sparse, its noise that of the fit.
     Sparse,
+}
+
+impl Completion {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Measured, Self::Sparse];
+
+    /// As it is written on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Measured => "measured",
+            Self::Sparse => "sparse",
+        }
+    }
+}
+
+/// The name of no completion.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("unknown completion {found:?}, expected {}", Completion::ALL.map(Completion::name).join(" or "))]
+pub struct ParseCompletionError {
+    /// What was given.
+    pub found: String,
+}
+
+impl FromStr for Completion {
+    type Err = ParseCompletionError;
+
+    fn from_str(name: &str) -> Result<Self, ParseCompletionError> {
+        let named = Self::ALL.into_iter().find(|completion| completion.name() == name);
+        named.ok_or_else(|| ParseCompletionError { found: name.to_owned() })
+    }
 }
 
 /// How noisy a measurement is.
@@ -189,7 +227,7 @@ pub struct OmpReconstruction {
     pub noise: f64,
 }
 
-/// A setting that makes no sense.
+/// Why there is no image.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ReconstructError {
@@ -219,9 +257,20 @@ pub enum ReconstructError {
         /// The basis.
         basis: Basis,
     },
+    /// A setting that the method does not take.
+    #[error("{setting} belongs to {}, not to {method}", Method::listed(|method| method.takes(*setting)))]
+    NotTaken {
+        /// The setting.
+        setting: Setting,
+        /// The method.
+        method: Method,
+    },
     /// The pursuit refused the problem.
     #[error(transparent)]
     Pursuit(#[from] OmpError),
+    /// A method of the user's own found no image, for this reason.
+    #[error("{0}")]
+    Failed(String),
 }
 
 /// Reconstructs an image from partial measurements by a sparse representation.
@@ -297,7 +346,7 @@ fn image_of(
 /// are then equally far from the limits of `f32`.
 struct Problem<'a> {
     side: Side,
-    rows: &'a [u32],
+    rows: &'a Rows,
     values: Vec<f32>,
     /// The largest measurement, in orthonormal units.
     unit: f64,
@@ -322,7 +371,7 @@ impl<'a> Problem<'a> {
         let transform = Transform::new(basis, side);
         let noise = match noise {
             NoiseLevel::Known(sigma) => (sigma / n / unit) as f32,
-            NoiseLevel::Estimated => selection::noise_level(side, rows, &values),
+            NoiseLevel::Estimated => selection::noise_level(rows, &values),
         };
         let scale = prior_scale(&transform, rows, &values, falloff);
         let prior = Prior { scale, noise, visibility: 0.0 };

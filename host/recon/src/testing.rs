@@ -1,6 +1,6 @@
 //! Scenes, instruments and yardsticks that several test modules share.
 
-use crate::{Image, Measurements, Side, fwht};
+use crate::{Image, Measurements, Rows, Side, fwht};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use std::path::PathBuf;
@@ -35,7 +35,7 @@ pub(crate) fn scene(side: Side, kind: u8) -> Vec<f64> {
 }
 
 /// What a perfect detector reads: pattern, complement, pattern, ...
-pub(crate) fn readings(side: Side, rows: &[i64], scene: &[f64]) -> Vec<f64> {
+pub(crate) fn readings(side: Side, rows: &[u32], scene: &[f64]) -> Vec<f64> {
     let total: f64 = scene.iter().sum();
     let mut d = scene.to_vec();
     assert_eq!(d.len(), side.area());
@@ -47,10 +47,9 @@ pub(crate) fn readings(side: Side, rows: &[i64], scene: &[f64]) -> Vec<f64> {
 
 /// All of a scene's measurements, in natural order.
 pub(crate) fn measured(side: Side, scene: &[f64]) -> Measurements {
-    let rows: Vec<i64> = (0..side.area() as i64).collect();
     let mut d = scene.to_vec();
     fwht(&mut d).unwrap();
-    Measurements::from_differential(side, &rows, &d).unwrap()
+    Measurements::from_differential(&Rows::natural(side), &d).unwrap()
 }
 
 #[derive(Debug, Clone, Copy)]

@@ -12,14 +12,14 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum FileError {
     /// The operating system refused.
-    #[error("{}: cannot {attempt} it: {}", Shown::path(path), reason(source))]
+    #[error("{}: cannot {attempt} it: {}", Shown::path(path), reason(system))]
     Io {
         /// The file or folder.
         path: PathBuf,
         /// What was tried: "read", "write", "create".
         attempt: &'static str,
-        /// What the system said.
-        source: io::Error,
+        /// What the system said. The message tells this in a user's words, so it is no `source()`.
+        system: io::Error,
     },
     /// The path leads to something else than it should: a folder for a file, or the reverse.
     #[error("{}: found {found}, expected {expected}", Shown::path(path))]
@@ -88,8 +88,8 @@ pub enum FileError {
 }
 
 impl FileError {
-    pub(crate) fn io(path: &Path, attempt: &'static str, source: io::Error) -> Self {
-        Self::Io { path: path.to_owned(), attempt, source }
+    pub(crate) fn io(path: &Path, attempt: &'static str, system: io::Error) -> Self {
+        Self::Io { path: path.to_owned(), attempt, system }
     }
 
     pub(crate) fn kind(path: &Path, found: impl Into<String>, expected: &'static str) -> Self {

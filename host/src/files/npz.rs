@@ -16,7 +16,7 @@
 use super::FileError;
 use super::archive::{Archive, Numbers};
 use super::array::shape_text;
-use nirspi_recon::{Image, Side};
+use nirspi_recon::{Image, Rows, RowsError, Side};
 use std::path::Path;
 
 /// What of a file is wanted.
@@ -43,10 +43,8 @@ pub enum Readings {
 /// and fit it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeasurementFile {
-    /// Side of the image that was measured.
-    pub side: Side,
-    /// Natural-order Hadamard rows in the order shown.
-    pub h_row: Vec<i64>,
+    /// Hadamard rows in the order shown; their side is that of the image.
+    pub h_row: Rows,
     /// What the detector saw.
     pub readings: Readings,
     /// The file's own reconstruction, if it holds one.
@@ -114,7 +112,6 @@ fn read_wanted(path: &Path, want: Wanted) -> Result<Vec<MeasurementFile>, FileEr
         None
     });
     let file = |readings| MeasurementFile {
-        side,
         h_row: h_row.clone(),
         readings,
         reference: reference.clone(),
@@ -157,28 +154,29 @@ fn read_side(archive: &mut Archive) -> Result<Side, FileError> {
         .ok_or_else(|| refuse(archive, "n", format!("is {value}"), EXPECTED))
 }
 
-fn read_rows(archive: &mut Archive, side: Side) -> Result<Vec<i64>, FileError> {
+fn read_rows(archive: &mut Archive, side: Side) -> Result<Rows, FileError> {
     const FIELD: &str = "h_row";
     let (n, area) = (side.pixels(), side.area());
     let numbers = archive.numbers(FIELD, |shape| match shape {
         [rows] if (1..=area as u64).contains(rows) => Ok(()),
         _ => Err(format!("(M,) with M from 1 to {area} for n = {n}")),
     })?;
-    let mut first = vec![None; area];
-    let mut rows = Vec::with_capacity(numbers.values.len());
-    for (k, &value) in numbers.values.iter().enumerate() {
-        let row =
-            as_integer(value).filter(|row| (0..area as i64).contains(row)).ok_or_else(|| {
-                let expected = format!("a whole number from 0 to {} for n = {n}", area - 1);
-                refuse(archive, FIELD, format!("is {value} at [{k}]"), expected)
-            })?;
-        if let Some(first) = first[row as usize].replace(k) {
-            let found = format!("repeats row {row} at [{k}], first at [{first}]");
-            return Err(refuse(archive, FIELD, found, "each row once"));
+    let expected = || format!("a whole number from 0 to {} for n = {n}", area - 1);
+    let whole = |(k, &value): (usize, &f64)| {
+        as_integer(value)
+            .ok_or_else(|| refuse(archive, FIELD, format!("is {value} at [{k}]"), expected()))
+    };
+    let rows: Vec<i64> = numbers.values.iter().enumerate().map(whole).collect::<Result<_, _>>()?;
+    Rows::new(side, rows).map_err(|error| match error {
+        RowsError::OutOfRange { index, found, .. } => {
+            refuse(archive, FIELD, format!("is {found} at [{index}]"), expected())
         }
-        rows.push(row);
-    }
-    Ok(rows)
+        RowsError::Repeated { index, first, row } => {
+            let found = format!("repeats row {row} at [{index}], first at [{first}]");
+            refuse(archive, FIELD, found, "each row once")
+        }
+        other => refuse(archive, FIELD, other.to_string(), expected()),
+    })
 }
 
 fn read_readings(

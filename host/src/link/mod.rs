@@ -2,10 +2,12 @@
 //!
 //! The one law: a link moves bytes and knows nothing of packets.
 
+mod address;
 mod serial;
 mod tcp;
 pub mod usb;
 
+pub use address::{CameraAddress, OpenError};
 pub use serial::{DEFAULT_BAUD, SerialLink, serial_ports};
 pub use tcp::TcpLink;
 pub use usb::UsbLink;

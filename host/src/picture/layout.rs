@@ -18,6 +18,7 @@ const FRAME: Rgb<u8> = Rgb([52, 56, 66]);
 const BRIGHT: Rgb<u8> = Rgb([236, 238, 242]);
 const MIDDLE: Rgb<u8> = Rgb([176, 181, 191]);
 const DIM: Rgb<u8> = Rgb([146, 152, 164]);
+const AMBER: Rgb<u8> = Rgb([255, 184, 77]);
 
 /// How a panel's values become grey levels.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,6 +46,8 @@ pub struct Panel {
     pub range: Range,
     /// Lines below the image, such as `PSNR 23.4 dB  SSIM 0.81`.
     pub caption: Vec<String>,
+    /// Reasons not to trust the image, right below it in amber.
+    pub warnings: Vec<String>,
 }
 
 /// A row of panels with a header and a footer line; empty texts take no room.
@@ -72,6 +75,8 @@ impl SideBySide {
 
         let header = Block::new(HEADER, [self.header.as_str()], inner);
         let titles = self.blocks(TITLE, |panel| vec![panel.title.as_str()]);
+        let warnings =
+            self.blocks(WARNING, |panel| panel.warnings.iter().map(String::as_str).collect());
         let captions =
             self.blocks(CAPTION, |panel| panel.caption.iter().map(String::as_str).collect());
         let footer = Block::new(FOOTER, [self.footer.as_str()], inner);
@@ -80,7 +85,8 @@ impl SideBySide {
         let header_top = MARGIN_PX;
         let title_top = header_top + header.height_and(18);
         let image_top = title_top + spaced(tallest(&titles), 10);
-        let caption_top = image_top + PANEL_PX + 12;
+        let warning_top = image_top + PANEL_PX + 12;
+        let caption_top = warning_top + spaced(tallest(&warnings), 8);
         let footer_top = caption_top + spaced(tallest(&captions), 16);
         let height = footer_top + footer.height() + MARGIN_PX;
 
@@ -92,6 +98,7 @@ impl SideBySide {
             // A short title stands on the image, not where a longer neighbour's begins.
             title.draw(&mut canvas, left, image_top - spaced(title.height(), 10));
             draw_image(&mut canvas, panel, left, image_top);
+            warnings[column].draw(&mut canvas, left, warning_top);
             captions[column].draw(&mut canvas, left, caption_top);
         }
         footer.draw(&mut canvas, MARGIN_PX, footer_top);
@@ -113,6 +120,8 @@ const TITLE: fn() -> Style =
     || Style { font: Font::sans(), size_px: 23.0, line_px: 28, colour: BRIGHT };
 const CAPTION: fn() -> Style =
     || Style { font: Font::mono(), size_px: 16.0, line_px: 22, colour: MIDDLE };
+const WARNING: fn() -> Style =
+    || Style { font: Font::sans(), size_px: 19.0, line_px: 26, colour: AMBER };
 const FOOTER: fn() -> Style =
     || Style { font: Font::sans(), size_px: 18.0, line_px: 24, colour: DIM };
 
@@ -223,6 +232,7 @@ mod tests {
             values: (0..side * side).map(|i| i as f32 / (side * side - 1) as f32).collect(),
             range: Range::Unit,
             caption: caption.iter().map(|&line| line.to_owned()).collect(),
+            warnings: Vec::new(),
         }
     }
 
@@ -308,6 +318,22 @@ mod tests {
                 assert!(canvas.width() == PANEL_PX + 2 * MARGIN_PX);
             }
         }
+    }
+
+    #[test]
+    fn a_warning_is_drawn_below_its_image_in_amber() {
+        let warned =
+            Panel { warnings: vec!["too little light".to_owned()], ..panel("", 2, &["x"]) };
+        let canvas = side_by_side("", vec![panel("", 2, &["x"]), warned], "").render();
+        let amber = |from: u32| {
+            let columns = from..from + PANEL_PX;
+            let rows = MARGIN_PX + PANEL_PX..canvas.height();
+            rows.flat_map(|y| columns.clone().map(move |x| (x, y)))
+                .filter(|&(x, y)| *canvas.get_pixel(x, y) == AMBER)
+                .count()
+        };
+        assert_eq!(amber(MARGIN_PX), 0);
+        assert!(amber(MARGIN_PX + PANEL_PX + GAP_PX) > 20);
     }
 
     #[test]

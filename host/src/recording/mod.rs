@@ -6,12 +6,14 @@
 //! host's clock. Records follow each other plainly, in no chunks: a file that ends anywhere, or is damaged in one
 //! packet, loses no other, and the crate's chunk reader, which panics on some damage, is never used.
 //!
-//! The one law: a capture that is killed keeps everything up to its last flush, half a second before at most.
+//! # Invariant
+//! A capture that is killed keeps everything up to its last flush, half a second before at most:
+//! `reader::tests::a_recording_cut_anywhere_gives_what_is_before_the_cut_or_says_what_is_missing`.
 
 mod reader;
 mod writer;
 
-pub use reader::{Recording, RecordingError, read};
+pub use reader::{End, Packet, Recording, RecordingError};
 pub use writer::Recorder;
 
 /// MCAP profile of our files.

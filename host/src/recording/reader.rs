@@ -1,8 +1,8 @@
-//! Reads a recording back, whole or cut short.
+//! Reads a recording back in one pass, whole or cut short: first what was measured, then packet by packet.
 
 use super::{ACCOUNT, ENCODING, IDENTITY, JSON, PROFILE, SETTLING, SETUP, TOPIC};
 use crate::account::LossCounters;
-use crate::calibrate::Settling;
+use crate::calibration::Settling;
 use crate::session::CameraIdentity;
 use crate::setup::MeasurementSetup;
 use mcap::McapError;
@@ -17,8 +17,19 @@ use thiserror::Error;
 /// No record of ours is longer; a longer one is damage.
 const LONGEST_RECORD: usize = 64 << 20;
 
-/// What a recording says besides its packets.
-#[derive(Debug, Clone, PartialEq)]
+/// A recording under way: what stands before its packets, and the packets as an iterator.
+///
+/// ```no_run
+/// # fn main() -> Result<(), nirspi::recording::RecordingError> {
+/// let mut recording = nirspi::recording::Recording::open("capture.mcap".as_ref())?;
+/// println!("{} patterns", recording.setup.rows.len());
+/// while let Some(packet) = recording.next().transpose()? {
+///     println!("{} bytes", packet.bytes.len());
+/// }
+/// println!("{} packets", recording.end().packets);
+/// # Ok(())
+/// # }
+/// ```
 pub struct Recording {
     /// Who was recorded.
     pub identity: CameraIdentity,
@@ -26,6 +37,24 @@ pub struct Recording {
     pub setup: MeasurementSetup,
     /// How the camera settles, where that was measured.
     pub settling: Option<Settling>,
+    records: Records,
+    /// The first packet, which was met where the header ends.
+    first: Option<Packet>,
+    end: End,
+}
+
+/// One packet of a recording.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Packet {
+    /// As it came, delimiter included.
+    pub bytes: Vec<u8>,
+    /// When it came, in ns of the host's clock.
+    pub time_ns: u64,
+}
+
+/// What is known at the end of a recording.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct End {
     /// The account as the capture closed it; `None` where it was cut short.
     pub account: Option<LossCounters>,
     /// Packets read.
@@ -34,11 +63,169 @@ pub struct Recording {
     pub cut_short: Option<String>,
 }
 
+impl Recording {
+    /// Opens `path` and reads what stands before its packets.
+    ///
+    /// # Errors
+    /// [`RecordingError`] where the file is no recording, or is cut short before its first packet.
+    pub fn open(path: &Path) -> Result<Self, RecordingError> {
+        let mut records = Records::open(path)?;
+        let (mut parts, mut end) = (Parts::default(), End::default());
+        let first = loop {
+            match records.next(&mut end)? {
+                Some(Found::Packet(packet)) => break Some(packet),
+                Some(Found::Metadata(metadata)) => parts.keep(path, &metadata)?,
+                None => break None,
+            }
+        };
+        let missing = |missing| RecordingError::Missing {
+            path: path.to_owned(),
+            missing,
+            cut_short: end.cut_short.clone(),
+        };
+        let identity = parts.identity.ok_or_else(|| missing("identity"))?;
+        let setup = parts.setup.ok_or_else(|| missing("setup"))?;
+        end.account = parts.account;
+        Ok(Self { identity, setup, settling: parts.settling, records, first, end })
+    }
+
+    /// What is known at the end of the recording: whole once the iterator has given its last packet.
+    #[must_use]
+    pub fn end(&self) -> &End {
+        &self.end
+    }
+
+    fn next_packet(&mut self) -> Result<Option<Packet>, RecordingError> {
+        if let Some(first) = self.first.take() {
+            return Ok(Some(first));
+        }
+        let mut parts = Parts::default();
+        loop {
+            match self.records.next(&mut self.end)? {
+                Some(Found::Packet(packet)) => return Ok(Some(packet)),
+                Some(Found::Metadata(metadata)) => {
+                    parts.keep(&self.records.path, &metadata)?;
+                    self.end.account = parts.account.or(self.end.account);
+                }
+                None => return Ok(None),
+            }
+        }
+    }
+}
+
+/// The packets in the order in which they came. A file that ends in the middle is no error: every packet before is
+/// given, and [`End::cut_short`] says what is wrong. Nothing follows an error.
+impl Iterator for Recording {
+    type Item = Result<Packet, RecordingError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let next = self.next_packet().transpose()?;
+        match &next {
+            Ok(_) => self.end.packets += 1,
+            Err(_) => self.records.over = true,
+        }
+        Some(next)
+    }
+}
+
+/// The records of a file that matter here, one by one.
+struct Records {
+    path: PathBuf,
+    file: File,
+    reader: LinearReader,
+    /// The header says that the file is a recording of ours.
+    ours: bool,
+    over: bool,
+}
+
+/// A record that matters.
+enum Found {
+    Packet(Packet),
+    Metadata(Metadata),
+}
+
+impl Records {
+    fn open(path: &Path) -> Result<Self, RecordingError> {
+        let file = File::open(path)
+            .map_err(|source| RecordingError::Io { path: path.to_owned(), source })?;
+        let reader = LinearReader::new_with_options(
+            LinearReaderOptions::default()
+                // Each packet has a checksum of its own; that of the whole data section covers what is said about them.
+                .with_validate_data_section_crc(true)
+                // Whole, they are refused below: the crate panics on some damaged chunks (0.26, found by fuzzing).
+                .with_emit_chunks(true)
+                .with_record_length_limit(LONGEST_RECORD),
+        );
+        Ok(Self { path: path.to_owned(), file, reader, ours: false, over: false })
+    }
+
+    /// The next record that matters; `None` at the end of the file, or where it is damaged, which `end` then says.
+    fn next(&mut self, end: &mut End) -> Result<Option<Found>, RecordingError> {
+        let Self { path, file, reader, ours, over } = self;
+        let io_error = |source| RecordingError::Io { path: path.clone(), source };
+        let not_ours = |found: String| RecordingError::NotARecording { path: path.clone(), found };
+        while !*over {
+            let Some(event) = reader.next_event() else { break };
+            let record = match event {
+                Ok(LinearReadEvent::ReadRequest(need)) => {
+                    let read = file.read(reader.insert(need)).map_err(io_error)?;
+                    reader.notify_read(read);
+                    continue;
+                }
+                // Only what we write is looked at: the crate panics on some damaged attachments (0.26, found by
+                // fuzzing).
+                Ok(LinearReadEvent::Record {
+                    opcode: opcode @ (op::HEADER | op::CHANNEL | op::MESSAGE | op::METADATA),
+                    data,
+                }) => mcap::parse_record(opcode, data),
+                Ok(LinearReadEvent::Record { opcode: op::CHUNK, .. }) => {
+                    return Err(not_ours(
+                        "records in chunks, as other tools write them,".to_owned(),
+                    ));
+                }
+                Ok(LinearReadEvent::Record { .. }) => continue,
+                Err(error) => Err(error),
+            };
+            match record {
+                Ok(Record::Header(header)) if header.profile == PROFILE => *ours = true,
+                Ok(Record::Header(header)) => {
+                    return Err(not_ours(format!("an MCAP file of profile {:?}", header.profile)));
+                }
+                Ok(Record::Channel(channel)) => {
+                    if channel.topic != TOPIC || channel.message_encoding != ENCODING {
+                        let found = format!("{:?} {:?}", channel.topic, channel.message_encoding);
+                        return Err(RecordingError::Version { path: path.clone(), found });
+                    }
+                }
+                Ok(Record::Message { header, data }) => {
+                    let packet = Packet { bytes: data.into_owned(), time_ns: header.log_time };
+                    return Ok(Some(Found::Packet(packet)));
+                }
+                Ok(Record::Metadata(metadata)) => return Ok(Some(Found::Metadata(metadata))),
+                Ok(_) => {}
+                Err(McapError::UnexpectedEof) if !*ours => {
+                    return Err(not_ours("an empty or cut file".to_owned()));
+                }
+                Err(McapError::BadMagic) => {
+                    return Err(not_ours("a file of another kind".to_owned()));
+                }
+                Err(error) if !*ours => return Err(not_ours(one_line(&error))),
+                Err(error) => {
+                    end.cut_short = Some(one_line(&error));
+                    break;
+                }
+            }
+        }
+        *over = true;
+        if *ours { Ok(None) } else { Err(not_ours("an empty or foreign file".to_owned())) }
+    }
+}
+
 /// Why a file is no recording.
 #[derive(Debug, Error)]
 pub enum RecordingError {
     /// The file cannot be read.
-    #[error("{path}: {source}")]
+    #[error("{path}: cannot read the recording")]
     Io {
         /// Which file.
         path: PathBuf,
@@ -85,89 +272,6 @@ pub enum RecordingError {
 
 fn cut_note(cut_short: &Option<String>) -> String {
     cut_short.as_ref().map_or_else(String::new, |reason| format!(", which is cut short: {reason}"))
-}
-
-/// Reads `path`, giving each packet (delimiter included) and its arrival time in ns to `packet`.
-///
-/// # Errors
-/// [`RecordingError`]. A file that ends in the middle is no error: everything before is given.
-pub fn read(path: &Path, mut packet: impl FnMut(&[u8], u64)) -> Result<Recording, RecordingError> {
-    let io_error = |source| RecordingError::Io { path: path.to_owned(), source };
-    let not_ours = |found: String| RecordingError::NotARecording { path: path.to_owned(), found };
-    let mut file = File::open(path).map_err(io_error)?;
-    let mut reader = LinearReader::new_with_options(
-        LinearReaderOptions::default()
-            // Each packet has a checksum of its own; that of the whole data section covers what is said about them.
-            .with_validate_data_section_crc(true)
-            // Whole, they are refused below: the crate panics on some damaged chunks (0.26, found by fuzzing).
-            .with_emit_chunks(true)
-            .with_record_length_limit(LONGEST_RECORD),
-    );
-    let mut parts = Parts::default();
-    let mut packets = 0;
-    let mut cut_short = None;
-    let mut ours = false;
-    while let Some(event) = reader.next_event() {
-        let record = match event {
-            Ok(LinearReadEvent::ReadRequest(need)) => {
-                let read = file.read(reader.insert(need)).map_err(io_error)?;
-                reader.notify_read(read);
-                continue;
-            }
-            // Only what we write is looked at: the crate panics on some damaged attachments (0.26, found by fuzzing).
-            Ok(LinearReadEvent::Record {
-                opcode: opcode @ (op::HEADER | op::CHANNEL | op::MESSAGE | op::METADATA),
-                data,
-            }) => mcap::parse_record(opcode, data),
-            Ok(LinearReadEvent::Record { opcode: op::CHUNK, .. }) => {
-                return Err(not_ours("records in chunks, as other tools write them,".to_owned()));
-            }
-            Ok(LinearReadEvent::Record { .. }) => continue,
-            Err(error) => Err(error),
-        };
-        match record {
-            Ok(Record::Header(header)) if header.profile == PROFILE => ours = true,
-            Ok(Record::Header(header)) => {
-                return Err(not_ours(format!("an MCAP file of profile {:?}", header.profile)));
-            }
-            Ok(Record::Channel(channel)) => {
-                if channel.topic != TOPIC || channel.message_encoding != ENCODING {
-                    let found = format!("{:?} {:?}", channel.topic, channel.message_encoding);
-                    return Err(RecordingError::Version { path: path.to_owned(), found });
-                }
-            }
-            Ok(Record::Message { header, data }) => {
-                packets += 1;
-                packet(&data, header.log_time);
-            }
-            Ok(Record::Metadata(metadata)) => parts.keep(path, &metadata)?,
-            Ok(_) => {}
-            Err(McapError::UnexpectedEof) if !ours => {
-                return Err(not_ours("an empty or cut file".to_owned()));
-            }
-            Err(McapError::BadMagic) => return Err(not_ours("a file of another kind".to_owned())),
-            Err(error) if !ours => return Err(not_ours(one_line(&error))),
-            Err(error) => {
-                cut_short = Some(one_line(&error));
-                break;
-            }
-        }
-    }
-    if !ours {
-        return Err(not_ours("an empty or foreign file".to_owned()));
-    }
-    let missing = |missing| {
-        let (path, cut_short) = (path.to_owned(), cut_short.clone());
-        RecordingError::Missing { path, missing, cut_short }
-    };
-    Ok(Recording {
-        identity: parts.identity.ok_or_else(|| missing("identity"))?,
-        setup: parts.setup.ok_or_else(|| missing("setup"))?,
-        settling: parts.settling,
-        account: parts.account,
-        packets,
-        cut_short,
-    })
 }
 
 /// The parser's messages are drawings of several lines.
@@ -246,16 +350,13 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.mcap");
         recording(&path, 700);
-        let mut count = 0usize;
-        let recording = read(&path, |packet, _| {
-            assert_eq!(packet, vec![count as u8; 5000]);
-            count += 1;
-        })
-        .unwrap();
-        assert_eq!(count, 700);
-        assert_eq!(recording.setup, setup());
-        assert_eq!(recording.account.map(|a| a.received), Some(700));
-        assert_eq!(recording.cut_short, None);
+        let mut recording = Recording::open(&path).unwrap();
+        assert_eq!((&recording.identity, &recording.setup), (&identity(), &setup()));
+        for (count, packet) in recording.by_ref().enumerate() {
+            assert_eq!(packet.unwrap().bytes, vec![count as u8; 5000]);
+        }
+        let account = Some(LossCounters { received: 700, ..Default::default() });
+        assert_eq!(recording.end(), &End { account, packets: 700, cut_short: None });
     }
 
     #[test]
@@ -268,13 +369,12 @@ mod tests {
         let mut most = 0;
         for cut in (0..whole.len()).step_by(whole.len() / 97 + 1) {
             std::fs::write(&cut_path, &whole[..cut]).unwrap();
-            let mut count = 0;
-            match read(&cut_path, |packet, _| {
-                assert_eq!(packet.len(), 5000);
-                count += 1;
-            }) {
-                Ok(recording) => {
-                    assert!(recording.cut_short.is_some(), "cut at {cut} went unnoticed");
+            match Recording::open(&cut_path) {
+                Ok(mut recording) => {
+                    assert!(recording.by_ref().all(|packet| packet.unwrap().bytes.len() == 5000));
+                    let count = recording.end().packets;
+                    let cut_short = recording.end().cut_short.as_ref();
+                    assert!(cut_short.is_some(), "cut at {cut} went unnoticed");
                     assert!(count >= most, "{count} packets at {cut}, {most} before");
                     most = count;
                 }
@@ -294,9 +394,7 @@ mod tests {
         let header = 8 + 9 + u64::from_le_bytes(bytes[9..17].try_into().unwrap()) as usize;
         bytes.splice(header..header, [op::ATTACHMENT, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
         std::fs::write(&path, bytes).unwrap();
-        let mut count = 0;
-        read(&path, |_, _| count += 1).unwrap();
-        assert_eq!(count, 3);
+        assert_eq!(Recording::open(&path).unwrap().filter_map(Result::ok).count(), 3);
     }
 
     #[test]
@@ -305,7 +403,7 @@ mod tests {
         let path = folder.path().join("x.mcap");
         for content in [&b""[..], b"PK\x03\x04 not an mcap", &[0x89; 100]] {
             std::fs::write(&path, content).unwrap();
-            let error = read(&path, |_, _| {}).unwrap_err().to_string();
+            let error = Recording::open(&path).err().unwrap().to_string();
             assert!(error.contains("x.mcap") && error.lines().count() == 1, "{error}");
         }
     }

@@ -2,7 +2,7 @@
 
 use super::{ACCOUNT, ENCODING, IDENTITY, JSON, PROFILE, SETTLING, SETUP, TOPIC};
 use crate::account::LossCounters;
-use crate::calibrate::Settling;
+use crate::calibration::Settling;
 use crate::session::CameraIdentity;
 use crate::setup::MeasurementSetup;
 use mcap::records::{MessageHeader, Metadata};

@@ -7,7 +7,7 @@
 
 use super::check::{Check, Limit};
 use super::stream::shots;
-use crate::calibrate::{HALF_PERIOD, ONSET, Settling};
+use crate::calibration::{HALF_PERIOD, ONSET, Settling};
 use crate::session::{Session, SessionError};
 use nirspi_wire::register::LATENCY_MAX;
 use nirspi_wire::{Configuration, PatternOrder, SampleSource};

@@ -5,7 +5,8 @@ use super::check::{Check, Limit};
 use super::stream::stream;
 use crate::session::{Session, SessionError};
 use crate::setup::MeasurementSetup;
-use nirspi_wire::{CLOCKS_PER_PATTERN, PATTERNS};
+use nirspi_recon::{Rows, Side};
+use nirspi_wire::CLOCKS_PER_PATTERN;
 
 /// Name of the check of the losses.
 pub const LOSSES: &str = "link losses";
@@ -18,7 +19,7 @@ const PACE: f64 = 0.8;
 fn setup(sweeps: u32) -> MeasurementSetup {
     MeasurementSetup {
         order: "natural".to_owned(),
-        rows: (0..PATTERNS).collect(),
+        rows: Rows::natural(Side::INSTRUMENT),
         differential: true,
         clocks_per_pattern: CLOCKS_PER_PATTERN,
         blanked: 2,

@@ -16,8 +16,9 @@ mod stream;
 
 pub use check::{Check, Limit, Verdict};
 
-use crate::calibrate::{CalibrationError, Settling, calibrate};
-use crate::session::{Deaf, Session, SessionError};
+use crate::calibration::{CalibrationError, Settling, calibrate};
+use crate::causes;
+use crate::session::{IgnorePackets, Session, SessionError};
 use nirspi_wire::{ADC_MAX, CLOCKS_PER_PATTERN, SelfTestReport};
 use std::time::Duration;
 
@@ -70,14 +71,14 @@ pub fn run(
     begin: &mut dyn FnMut(usize),
 ) -> Result<SelfTest, SessionError> {
     begin(0);
-    let mut checks = device(session.self_test(&mut Deaf)?);
+    let mut checks = device(session.self_test(&mut IgnorePackets)?);
     begin(1);
     checks.extend(unless_refused(&[generator::NAME], generator::check(session))?);
     begin(2);
-    let settling = match calibrate(session, &mut Deaf) {
+    let settling = match calibrate(session, &mut IgnorePackets) {
         Ok(settling) => Ok(settling),
         Err(CalibrationError::Session(error)) => Err(refusal_in_words(error)?),
-        Err(problem) => Err(problem.to_string()),
+        Err(problem) => Err(causes::in_one_line(&problem)),
     };
     checks.extend(light_and_settling(settling.as_ref()));
     let settling = settling.ok();

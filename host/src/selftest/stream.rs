@@ -1,11 +1,9 @@
 //! Short runs whose every frame is looked at, and runs that only count.
 
-use crate::session::{ANSWER_TIMEOUT, Deaf, Listener, Session, SessionError};
+use crate::session::{ANSWER_TIMEOUT, IgnorePackets, Listener, Session, SessionError, request};
 use crate::setup::MeasurementSetup;
 use crate::tally::Tally;
-use nirspi_wire::{
-    Command, Configuration, DeviceMessage, EventKind, PacketError, RunLength, Status,
-};
+use nirspi_wire::{Configuration, DeviceMessage, EventKind, PacketError, RunLength, Status};
 use std::time::{Duration, Instant};
 
 /// How often the camera hears from a host that only listens.
@@ -50,11 +48,11 @@ pub fn shots(
     configuration: Configuration<'_>,
     count: u32,
 ) -> Result<Vec<Shot>, SessionError> {
-    session.command(Command::Configure(configuration), &mut Deaf)?;
-    let run = session.status(&mut Deaf)?.run.wrapping_add(1);
+    session.command(request::Configure(configuration), &mut IgnorePackets)?;
+    let run = session.status(&mut IgnorePackets)?.run.wrapping_add(1);
     let mut collector =
         Collector { run, shots: Vec::new(), ended: false, last_packet: Instant::now() };
-    session.command(Command::Start(RunLength::Frames(count)), &mut collector)?;
+    session.command(request::Start(RunLength::Frames(count)), &mut collector)?;
     while !collector.ended && collector.shots.len() < count as usize {
         session.listen(Duration::from_millis(50), &mut collector)?;
         if collector.last_packet.elapsed() > ANSWER_TIMEOUT {
@@ -63,7 +61,7 @@ pub fn shots(
     }
     // A run whose end was not heard of is ended for sure. One that has ended refuses, and that is well.
     if !collector.ended {
-        match session.command(Command::Stop, &mut collector) {
+        match session.command(request::Stop, &mut collector) {
             Ok(()) | Err(SessionError::Refused { .. }) => {}
             Err(error) => return Err(error),
         }
@@ -104,12 +102,12 @@ pub fn stream(
     setup: &MeasurementSetup,
     duration: Duration,
 ) -> Result<Stream, SessionError> {
-    setup.with_configuration(|c| session.command(Command::Configure(c), &mut Deaf))?;
-    let run = session.status(&mut Deaf)?.run.wrapping_add(1);
+    setup.with_configuration(|c| session.command(request::Configure(c), &mut IgnorePackets))?;
+    let run = session.status(&mut IgnorePackets)?.run.wrapping_add(1);
     let started = Instant::now();
     let tally = Tally::new(setup, Some(run));
     let mut counter = Counter { tally, bytes: 0, last_packet: started };
-    session.command(Command::Start(RunLength::Continuous), &mut counter)?;
+    session.command(request::Start(RunLength::Continuous), &mut counter)?;
     let (mut kept_alive, mut kept_alive_us) = (started, 0);
     while started.elapsed() < duration && !counter.tally.has_ended() {
         session.listen(Duration::from_millis(20), &mut counter)?;
@@ -122,7 +120,7 @@ pub fn stream(
         }
     }
     let (elapsed, bytes) = (started.elapsed(), counter.bytes);
-    match session.command(Command::Stop, &mut counter) {
+    match session.command(request::Stop, &mut counter) {
         // It had ended by itself, by a fault.
         Ok(()) | Err(SessionError::Refused { .. }) => {}
         Err(error) => return Err(error),

@@ -4,16 +4,16 @@
 
 use super::camera_log::Phase;
 use super::slot::{Look, RunSetup};
-use super::{Shared, lock};
+use super::{ForeignError, Shared, lock};
 use crate::account::LossCounters;
-use crate::calibrate::{CalibrationError, Settling};
+use crate::calibration::{CalibrationError, Settling};
 use crate::capture::{
     Calibration, CaptureError, CaptureOptions, Ended, Observer, Progress, observe,
 };
-use crate::events;
 use crate::integrate::Newest;
-use crate::session::{Deaf, Session, SessionError};
+use crate::session::{IgnorePackets, Session, SessionError};
 use crate::setup::MeasurementSetup;
+use crate::{causes, events};
 use nirspi_nets::DepthMaps;
 use nirspi_wire::{Depth, DeviceMessage, EventKind, Fault, Frame, Refusal};
 use std::ops::ControlFlow;
@@ -36,8 +36,8 @@ pub struct Connected {
     pub note: Option<String>,
 }
 
-/// How to find the camera again; one line where that fails.
-pub type Connect = Box<dyn FnMut() -> Result<Connected, String> + Send>;
+/// How to find the camera again.
+pub type Connect = Box<dyn FnMut() -> Result<Connected, ForeignError> + Send>;
 
 /// A camera and how to measure with it.
 pub struct CameraSource {
@@ -57,13 +57,19 @@ enum End {
     Gone(String),
     /// It switched its LEDs off.
     Fault(Fault),
+    /// Its latency is not known, in one line.
+    Uncalibrated(String),
 }
 
 /// Measures until told to stop.
 ///
 /// # Errors
-/// One line, where the first run cannot even begin.
-pub fn run(shared: &Shared, mut source: CameraSource, first: Connected) -> Result<(), String> {
+/// [`CaptureError`] where the first run cannot even begin.
+pub fn run(
+    shared: &Shared,
+    mut source: CameraSource,
+    first: Connected,
+) -> Result<(), CaptureError> {
     let earlier = LossCounters::default();
     let mut live = Live { shared, earlier, now: None, depth: None, fault: None, begun: false };
     let mut next = Some(first);
@@ -78,6 +84,7 @@ pub fn run(shared: &Shared, mut source: CameraSource, first: Connected) -> Resul
                     connected
                 }
                 Err(problem) => {
+                    let problem = causes::in_one_line(&*problem);
                     lock(&shared.camera).enter(Phase::Lost, format!("{problem}; trying again"));
                     shared.rest(RETRY);
                     continue;
@@ -96,7 +103,13 @@ pub fn run(shared: &Shared, mut source: CameraSource, first: Connected) -> Resul
             End::Told => {}
             End::Gone(why) => gone(shared, &why),
             End::Fault(fault) => {
-                await_person(shared, fault);
+                let line = format!("the camera switched its LEDs off: {fault}");
+                await_person(shared, Phase::Fault, line);
+                person_said = true;
+            }
+            End::Uncalibrated(why) => {
+                lock(&shared.camera).event(why.clone());
+                await_person(shared, Phase::Uncalibrated, why);
                 person_said = true;
             }
         }
@@ -107,7 +120,7 @@ pub fn run(shared: &Shared, mut source: CameraSource, first: Connected) -> Resul
 /// The fault that stands in a camera that has come back. That its host was gone is none: it is here again.
 fn standing_fault(session: &mut Session) -> Option<Fault> {
     // A camera that does not answer will not measure either, and that says why.
-    session.status(&mut Deaf).ok()?.fault.filter(|fault| *fault != Fault::HostSilent)
+    session.status(&mut IgnorePackets).ok()?.fault.filter(|fault| *fault != Fault::HostSilent)
 }
 
 /// The camera has gone: rests before it is looked for.
@@ -120,9 +133,8 @@ fn gone(shared: &Shared, why: &str) {
 }
 
 /// Waits until somebody says that LEDs may go on again.
-fn await_person(shared: &Shared, fault: Fault) {
-    let line = format!("the camera switched its LEDs off: {fault:?}");
-    lock(&shared.camera).enter(Phase::Fault, line);
+fn await_person(shared: &Shared, phase: Phase, line: String) {
+    lock(&shared.camera).enter(phase, line);
     shared.resume.store(false, Ordering::Relaxed);
     while !shared.is_over() && !shared.resume.swap(false, Ordering::Relaxed) {
         std::thread::sleep(TICK);
@@ -158,7 +170,7 @@ impl Live<'_> {
         &mut self,
         connected: &mut Connected,
         setup: MeasurementSetup,
-    ) -> Result<End, String> {
+    ) -> Result<End, CaptureError> {
         let Connected { session, calibration, note } = connected;
         for text in session.reports().iter().cloned().chain(note.take()) {
             lock(&self.shared.camera).event(text);
@@ -168,20 +180,23 @@ impl Live<'_> {
         (self.now, self.fault) = (None, None);
         let captured = match observe(session, &options, self) {
             Ok(captured) => captured,
-            Err(error) if !self.begun => return Err(error.to_string()),
+            Err(error @ CaptureError::Calibration(_)) => {
+                return Ok(End::Uncalibrated(causes::in_one_line(&error)));
+            }
+            Err(error) if !self.begun => return Err(error),
             // Its cause is not gone yet. When it is, LEDs must not go on by themselves.
             Err(CaptureError::Session(SessionError::Refused {
                 refusal: Refusal::Fault(fault),
                 ..
             })) => return Ok(End::Fault(fault)),
-            Err(error) => return Ok(End::Gone(error.to_string())),
+            Err(error) => return Ok(End::Gone(causes::in_one_line(&error))),
         };
         self.earlier = self.earlier + captured.counters;
         self.shared.slot.account(self.earlier);
         Ok(match (self.fault, captured.ended) {
             // The link may have gone right after it.
             (Some(fault), _) | (None, Ended::Fault(fault)) => End::Fault(fault),
-            (None, Ended::LinkLost(error)) => End::Gone(error.to_string()),
+            (None, Ended::LinkLost(error)) => End::Gone(causes::in_one_line(&error)),
             (None, Ended::Complete | Ended::Stopped) => End::Told,
         })
     }
@@ -199,7 +214,8 @@ impl Observer for Live<'_> {
         (self.depth, self.begun) = (None, true);
         let mut log = lock(&self.shared.camera);
         if let Some(problem) = problem {
-            log.event(format!("not calibrated: {problem}"));
+            let problem = causes::in_one_line(problem);
+            log.event(format!("the kept calibration is used: {problem}"));
         }
         log.measuring(setup, settling.is_some());
     }

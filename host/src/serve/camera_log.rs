@@ -21,6 +21,8 @@ pub enum Phase {
     Measuring,
     /// It switched its LEDs off, and waits for somebody to say that they may go on again.
     Fault,
+    /// Its latency could not be measured and none is kept, so no picture would be right. A person must say to try again.
+    Uncalibrated,
     /// It has gone; it is looked for again.
     Lost,
 }

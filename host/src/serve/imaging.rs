@@ -6,13 +6,15 @@ use super::settings::Settings;
 use super::slot::Look;
 use super::state::{Offered, Published, Rate, Rates, State};
 use super::{Shared, lock};
-use crate::white::{SteadyWhite, brightest};
-use nirspi_nets::consistency::MeasuredRows;
-use nirspi_nets::{Enhancer, Images, Options, fusion};
-use nirspi_recon::{Image, Measurements, Side};
+use crate::causes;
+use crate::imaging::{Enhance, EnhanceError, Known, SteadyWhite, Warning, White, brightest, warnings};
+use crate::integrate::IntegrateError;
+use nirspi_recon::Side;
+use nirspi_recon::reconstruct::{Reconstruct, ReconstructError};
 use serde::Serialize;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use thiserror::Error;
 use tokio::sync::watch;
 
 /// Least time from image to image: more than this no screen shows.
@@ -20,15 +22,32 @@ const PACE: Duration = Duration::from_millis(33);
 /// How often pages hear of a camera that sends nothing.
 const HEARTBEAT: Duration = Duration::from_millis(500);
 
-/// Makes an image in the measurements' units, or says in one line why not.
-pub type Reconstruct = Box<dyn Fn(&Measurements) -> Result<Image, String> + Send>;
+/// Why a look gave no picture.
+#[derive(Debug, Error)]
+enum PictureError {
+    /// The settings name a method that there is not.
+    #[error("there is no method {0}")]
+    Method(&'static str),
+    /// The frames give no measurements.
+    #[error(transparent)]
+    Measurements(#[from] IntegrateError),
+    /// The method gives no image.
+    #[error(transparent)]
+    Reconstruct(#[from] ReconstructError),
+    /// The image is not of the instrument's size, or not finite.
+    #[error("the frames gave no image of finite numbers")]
+    NotFinite,
+    /// The networks do not take the image.
+    #[error(transparent)]
+    Enhance(#[from] EnhanceError),
+}
 
 /// All that makes images.
 pub struct Imaging {
-    /// Methods of reconstruction by name; the settings name one of them.
-    pub methods: Vec<(&'static str, Reconstruct)>,
+    /// Methods of reconstruction, each by its word; the settings name one of them.
+    pub methods: Vec<(&'static str, Box<dyn Reconstruct>)>,
     /// Fusion and deblurring.
-    pub enhancer: Enhancer,
+    pub enhance: Enhance,
 }
 
 /// The images of one moment, and what is known of them.
@@ -48,8 +67,10 @@ pub struct Picture {
     reconstruct_ms: f64,
     /// `null` where it is switched off.
     enhancement: Option<Enhancement>,
-    /// What the frames' flags say against them.
-    warnings: Vec<&'static str>,
+    /// Reasons not to trust the images: the frames' flags, and what the learned stages found.
+    warnings: Vec<String>,
+    /// The same in a few words, for the image itself.
+    short_warnings: Vec<&'static str>,
 }
 
 /// What the learned stages found.
@@ -78,7 +99,7 @@ pub fn run(shared: &Shared, imaging: &Imaging, publish: &watch::Sender<Arc<Publi
             let settings = *lock(&shared.settings);
             match imaging.picture(&look, settings, &mut white) {
                 Ok(made) => (picture, problem) = (Some(Arc::new(made)), None),
-                Err(why) => problem = Some(why),
+                Err(why) => problem = Some(causes::in_one_line(&why)),
             }
             shared.slot.done(problem.is_none());
         }
@@ -118,70 +139,56 @@ impl Imaging {
         look: &Look,
         settings: Settings,
         white: &mut SteadyWhite,
-    ) -> Result<Picture, String> {
+    ) -> Result<Picture, PictureError> {
         let started = Instant::now();
-        let (_, reconstruct) = self
+        let (_, method) = self
             .methods
             .iter()
             .find(|(name, _)| *name == settings.method)
-            .ok_or_else(|| format!("no method {}", settings.method))?;
-        let measurements = look
-            .sum
-            .measurements(&look.run.setup, look.run.settling.as_ref(), false)
-            .map_err(|error| error.to_string())?;
-        let image = reconstruct(&measurements)?;
+            .ok_or(PictureError::Method(settings.method))?;
+        let measurements =
+            look.sum.measurements(&look.run.setup, look.run.settling.as_ref(), false)?;
+        let image = method.reconstruct(&measurements)?.image;
         let reconstruct_ms = ms_since(started);
         let side = image.side().pixels();
         if side != Side::INSTRUMENT.pixels() || image.pixels().iter().any(|p| !p.is_finite()) {
-            return Err("the frames gave no image of finite numbers".to_owned());
+            return Err(PictureError::NotFinite);
         }
         let white_counts = white.follow(brightest(image.pixels(), side));
-        let scale = if white_counts > 0.0 { 1.0 / white_counts } else { 0.0 };
-        let image: Vec<f32> = image.pixels().iter().map(|v| (v * scale).clamp(0.0, 1.0)).collect();
-        let (mut enhanced, mut enhancement) = (None, None);
-        if settings.enhance {
-            let (pixels, found) = self.enhance(&image, look, measurements.rows())?;
-            (enhanced, enhancement) = (Some(pixels), Some(found));
+        let mut all: Vec<String> = look.sum.warnings().into_iter().map(str::to_owned).collect();
+        let (mut enhanced, mut enhancement, mut short) = (None, None, Vec::new());
+        if settings.enhance && white_counts > 0.0 {
+            let started = Instant::now();
+            let known = Known {
+                rows: Some(measurements.rows()),
+                depth: look.depth.as_deref(),
+                ..Known::default()
+            };
+            let made = self.enhance.enhance(&image, White::Known(white_counts), &known)?;
+            let doubts = warnings(&made);
+            short.extend(doubts.iter().map(Warning::short));
+            all.extend(doubts.iter().map(Warning::to_string));
+            enhancement = Some(Enhancement {
+                blur_px: made.blur_px,
+                noise: made.noise,
+                inconsistency: made.inconsistency,
+                depth: look.depth.is_some(),
+                enhance_ms: ms_since(started),
+            });
+            enhanced = Some(made.pixels);
         }
+        let scale = if white_counts > 0.0 { 1.0 / white_counts } else { 0.0 };
         Ok(Picture {
-            image,
+            image: image.pixels().iter().map(|v| (v * scale).clamp(0.0, 1.0)).collect(),
             enhanced,
             method: settings.method,
             frames: look.sum.frames(),
             white_counts,
             reconstruct_ms,
             enhancement,
-            warnings: look.sum.warnings(),
+            warnings: all,
+            short_warnings: short,
         })
-    }
-
-    /// Both learned stages.
-    fn enhance(
-        &self,
-        image: &[f32],
-        look: &Look,
-        rows: &[u32],
-    ) -> Result<(Vec<f32>, Enhancement), String> {
-        let started = Instant::now();
-        let images: Images<'_, { fusion::SIDE }> =
-            Images::new(image).map_err(|error| error.to_string())?;
-        let measured = MeasuredRows::new(fusion::SIDE, rows);
-        let options = Options { measured, ..Options::default() };
-        let depth = look.depth.as_deref();
-        let result = self.enhancer.enhance(images, depth, &options, &mut |_| {});
-        let (Some(estimate), Some(&inconsistency)) =
-            (result.estimates.first(), result.inconsistency.first())
-        else {
-            return Err("the networks gave no image".to_owned());
-        };
-        let found = Enhancement {
-            blur_px: estimate.sigma_px,
-            noise: estimate.noise,
-            inconsistency,
-            depth: depth.is_some(),
-            enhance_ms: ms_since(started),
-        };
-        Ok((result.images, found))
     }
 }
 

@@ -19,9 +19,10 @@ mod slot;
 mod state;
 
 pub use camera::{CameraSource, Connect, Connected};
-pub use imaging::{Imaging, Reconstruct};
+pub use imaging::Imaging;
 pub use slot::{ImageCounters, Ledger};
 
+use crate::capture::CaptureError;
 use camera_log::CameraLog;
 use settings::Settings;
 use slot::Slot;
@@ -38,15 +39,18 @@ use tokio::sync::watch;
 #[derive(Debug, Error)]
 pub enum ServeError {
     /// The camera would not measure.
-    #[error("{0}")]
-    Camera(String),
+    #[error(transparent)]
+    Camera(#[from] CaptureError),
     /// The network failed.
-    #[error("the web server failed: {0}")]
+    #[error("the web server failed")]
     Network(#[from] io::Error),
     /// A thread died of a defect of this program.
     #[error("the {0} thread died")]
     Thread(&'static str),
 }
+
+/// An error of what the caller of [`serve`] has handed over.
+pub type ForeignError = Box<dyn std::error::Error + Send + Sync>;
 
 /// What the threads have in common.
 struct Shared {
@@ -119,7 +123,7 @@ pub fn serve(
     // The camera is stopped whatever else has happened.
     let measured = measuring.join().map_err(|_| ServeError::Thread("camera"))?;
     making.join().map_err(|_| ServeError::Thread("imaging"))?;
-    measured.map_err(ServeError::Camera)?;
+    measured?;
     served?;
     Ok(shared.slot.ledger())
 }

@@ -39,7 +39,7 @@ pub struct Change {
 #[derive(Debug, Error, PartialEq, Eq)]
 pub enum ChangeError {
     /// No such method.
-    #[error("method is {found:?}, expected {}", .offered.join(" or "))]
+    #[error("method is {found:?}, expected {}", alternatives(.offered))]
     Method {
         /// What was asked for.
         found: String,
@@ -55,6 +55,14 @@ pub enum ChangeError {
     /// No such message.
     #[error("{0}, expected for example {{\"method\": \"omp\", \"enhance\": true, \"frames\": 64}}")]
     Form(String),
+}
+
+/// `a, b or c`.
+fn alternatives(words: &[&str]) -> String {
+    match words {
+        [others @ .., last] if !others.is_empty() => format!("{} or {last}", others.join(", ")),
+        words => words.concat(),
+    }
 }
 
 impl Change {

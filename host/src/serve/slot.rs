@@ -5,7 +5,7 @@
 
 use super::lock;
 use crate::account::LossCounters;
-use crate::calibrate::Settling;
+use crate::calibration::Settling;
 use crate::integrate::Integrated;
 use crate::setup::MeasurementSetup;
 use nirspi_nets::DepthMaps;

@@ -57,10 +57,10 @@ impl Link for Enclosed {
         for _ in 0..100 {
             self.camera.step(1000);
         }
-        let outbox = self.camera.outbox();
-        let length = outbox.waiting().len().min(buffer.len());
-        buffer[..length].copy_from_slice(&outbox.waiting()[..length]);
-        outbox.sent(length);
+        let packets = self.camera.packets_out();
+        let length = packets.waiting().len().min(buffer.len());
+        buffer[..length].copy_from_slice(&packets.waiting()[..length]);
+        packets.sent(length);
         Ok(if length == 0 { Received::Nothing } else { Received::Bytes(length) })
     }
 }
@@ -80,7 +80,7 @@ fn enclosed(hands: &Arc<Hands>, was_open: bool) -> Connected {
 struct Lab {
     hands: Arc<Hands>,
     shared: Arc<Shared>,
-    measuring: JoinHandle<Result<(), String>>,
+    measuring: JoinHandle<Result<(), CaptureError>>,
 }
 
 impl Lab {
@@ -150,7 +150,7 @@ fn after_a_fault_leds_go_on_again_only_when_a_person_says_so() {
     lab.stays_dark();
     lab.resumes();
     let told = lab.end();
-    assert!(told.iter().any(|text| text.contains("LEDs off: Interlock")), "{told:?}");
+    assert!(told.iter().any(|text| text.contains("LEDs off: the enclosure")), "{told:?}");
 }
 
 #[test]

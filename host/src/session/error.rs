@@ -1,6 +1,7 @@
 //! Why a conversation with a camera ends, and why a camera refuses, in words.
 
-use super::{ANSWER_TIMEOUT, HELLO};
+use super::ANSWER_TIMEOUT;
+use super::request::{Hello, Request};
 use nirspi_wire::{PROTOCOL_VERSION, Refusal};
 use thiserror::Error;
 
@@ -8,7 +9,7 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum SessionError {
     /// The link failed.
-    #[error("the link to the camera failed: {0}")]
+    #[error("the link to the camera failed")]
     Link(#[from] std::io::Error),
     /// The camera has gone.
     #[error("the camera closed the link{}", if *.mid_packet { " in the middle of a packet" } else { "" })]
@@ -18,7 +19,7 @@ pub enum SessionError {
     },
     /// The camera has gone before it said who it is.
     #[error(
-        "the link was closed instead of a greeting: another host has the camera, or this is none"
+        "the link closed before the camera answered: another program may be using it, or this is not a nirspi camera"
     )]
     TurnedAway,
     /// The two sides speak different versions.
@@ -42,7 +43,7 @@ pub enum SessionError {
     #[error(
         "no answer to {command} within {} s{}",
         ANSWER_TIMEOUT.as_secs(),
-        if *.command == HELLO { ": is this a nirspi camera?" } else { "" }
+        if *.command == Hello::NAME { ": is this a nirspi camera?" } else { "" }
     )]
     NoAnswer {
         /// What was asked.
@@ -60,14 +61,14 @@ fn refusal_in_words(refusal: &Refusal) -> String {
     use nirspi_wire::ConfigProblem;
     match refusal {
         Refusal::Protocol { device } => format!("it speaks protocol version {device}"),
-        Refusal::State(state) => format!("it is {state:?}"),
+        Refusal::State(state) => format!("it is {state}"),
         Refusal::Configuration(ConfigProblem::OutOfRange { field, found, min, max }) => {
-            format!("{field:?} is {found}, expected {min} to {max}")
+            format!("{field} is {found}, expected {min} to {max}")
         }
         Refusal::Configuration(ConfigProblem::OrderEntry { index, found }) => {
             format!("entry {index} of the order, {found}, is repeated or no pattern")
         }
-        Refusal::Fault(fault) => format!("a fault stands, {fault:?}"),
+        Refusal::Fault(fault) => format!("a fault stands: {fault}"),
         Refusal::NoSuchRegister { address } => format!("there is no register {address:#06x}"),
         Refusal::RawLength { max } => format!("a raw burst has 1 to {max} samples"),
         Refusal::GatewareOffset { expected } => format!("it expected the piece at {expected}"),

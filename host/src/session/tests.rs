@@ -1,7 +1,9 @@
 //! A camera of fixed words.
 
 use super::*;
-use nirspi_wire::{Event, EventKind, Fault, State};
+use crate::link::Received;
+use nirspi_wire::packet::MAX_DEVICE_PACKET;
+use nirspi_wire::{Answer, Event, EventKind, Fault, Reply, State, Version, encode};
 use std::io;
 
 /// Answers each request with the next of these chunks.
@@ -30,45 +32,102 @@ fn event(kind: EventKind) -> Vec<u8> {
     packet(DeviceMessage::Event(Event { device_time_us: 0, kind }))
 }
 
+const IDENTITY: Identity<'static> = Identity {
+    protocol: PROTOCOL_VERSION,
+    firmware: Version(0, 1, 0),
+    gateware: Version(0, 1, 0),
+    board: "test",
+    serial: "1",
+    side: 32,
+    adc_hz: 0,
+    adc_bits: 14,
+    wavelength_nm: 1550,
+};
+
+const STATUS: Status = Status {
+    state: State::Idle,
+    fault: None,
+    uptime_us: 0,
+    run: 0,
+    frames_made: 0,
+    frames_sent: 0,
+    frames_dropped: 0,
+    fpga_frames_lost: 0,
+    fpga_frames_corrupt: 0,
+    commands_damaged: 1,
+    temperature_centi_celsius: 0,
+    duty_permille: 0,
+    leds_on: false,
+    interlock_closed: true,
+};
+
+fn reply(id: u16, answer: Answer<'_>) -> Vec<u8> {
+    packet(DeviceMessage::Reply(Reply { id, outcome: Ok(answer) }))
+}
+
+/// A session with a camera that answers its commands with these chunks.
+fn session(chunks: Vec<Vec<u8>>) -> Session {
+    let greeting = vec![reply(0, Answer::Hello(IDENTITY))];
+    Session::open(Box::new(Scripted([greeting, chunks].concat()))).unwrap()
+}
+
 #[test]
 fn what_a_camera_reports_with_its_greeting_is_kept_and_an_earlier_hosts_mess_is_not() {
-    let identity = Identity {
-        protocol: PROTOCOL_VERSION,
-        firmware: Version(0, 1, 0),
-        gateware: Version(0, 1, 0),
-        board: "test",
-        serial: "1",
-        side: 32,
-        adc_hz: 0,
-        adc_bits: 14,
-        wavelength_nm: 1550,
-    };
-    let status = Status {
-        state: State::Idle,
-        fault: None,
-        uptime_us: 0,
-        run: 0,
-        frames_made: 0,
-        frames_sent: 0,
-        frames_dropped: 0,
-        fpga_frames_lost: 0,
-        fpga_frames_corrupt: 0,
-        commands_damaged: 1,
-        temperature_centi_celsius: 0,
-        duty_permille: 0,
-        leds_on: false,
-        interlock_closed: true,
-    };
-    let reply = |id, answer| packet(DeviceMessage::Reply(Reply { id, outcome: Ok(answer) }));
     let greeting = [
         event(EventKind::CommandDamaged),
-        reply(0, Answer::Hello(identity)),
+        reply(0, Answer::Hello(IDENTITY)),
         event(EventKind::Fault(Fault::HostSilent)),
     ];
-    let later = [event(EventKind::Fault(Fault::Duty)), reply(1, Answer::Status(status))].concat();
+    let later = [event(EventKind::Fault(Fault::Duty)), reply(1, Answer::Status(STATUS))].concat();
     let link = Scripted(vec![greeting.concat(), later]);
     let mut session = Session::open(Box::new(link)).unwrap();
     assert_eq!(session.reports().len(), 1, "{:?}", session.reports());
     let reports = session.await_reports().unwrap();
-    assert!(reports[0].contains("HostSilent") && reports[1].contains("Duty"), "{reports:?}");
+    assert!(
+        reports[0].contains("no command") && reports[1].contains("lit over time"),
+        "{reports:?}"
+    );
+}
+
+/// Counts the packets that it hears, damaged ones apart.
+#[derive(Default)]
+struct Count {
+    whole: usize,
+    damaged: usize,
+}
+
+impl Listener for Count {
+    fn packet(&mut self, _: &[u8], content: &Result<DeviceMessage<'_>, PacketError>) {
+        match content {
+            Ok(_) => self.whole += 1,
+            Err(_) => self.damaged += 1,
+        }
+    }
+}
+
+#[test]
+fn every_packet_is_heard_while_an_answer_is_awaited() {
+    let chunk = [
+        event(EventKind::RawDropped),
+        vec![1, 2, 3, 0],
+        reply(1, Answer::Done),
+        event(EventKind::CommandDamaged),
+    ];
+    let mut heard = Count::default();
+    session(vec![chunk.concat()]).command(request::Stop, &mut heard).unwrap();
+    assert_eq!((heard.whole, heard.damaged), (3, 1));
+}
+
+#[test]
+fn an_answer_counts_whatever_other_answers_come_with_it() {
+    let chunk = [reply(0, Answer::Done), reply(1, Answer::Register(7)), reply(2, Answer::Done)];
+    let mut session = session(vec![chunk.concat()]);
+    assert_eq!(session.command(request::ReadRegister(0), &mut IgnorePackets).unwrap(), 7);
+}
+
+#[test]
+fn an_answer_that_belongs_to_another_command_names_the_command_that_was_asked() {
+    let mut session = session(vec![reply(1, Answer::Done)]);
+    let error = session.status(&mut IgnorePackets).unwrap_err();
+    assert!(matches!(error, SessionError::WrongAnswer { command: "Status" }), "{error}");
 }

@@ -5,16 +5,17 @@
 //! sum drawn at once. Calibration is measured once by the real procedure on the real virtual camera, and what it
 //! mismeasures stays in every picture. The tests hold all this against captures by the whole camera.
 
-use crate::calibrate::{CalibrationError, Settling, calibrate};
-use crate::session::{Deaf, Session, SessionError};
+use crate::calibration::{CalibrationError, Settling, calibrate};
+use crate::session::{IgnorePackets, Session, SessionError};
 use crate::virtual_camera::{MemoryLink, VirtualOptics, VirtualOpticsError};
 use nirspi_nets::data::SIDE_PX;
 use nirspi_nets::degrade::{Degrade, DegradeError, Depth, Reading, defocus};
-use nirspi_optics::rain::{Drops, RainError, Weather};
+use nirspi_optics::rain::{Drops, PaperRain, RainError, Rainfall, Weather};
 use nirspi_optics::water::Water;
-use nirspi_optics::{LEDS, Projector, Scene, SceneError};
+use nirspi_optics::{LEDS, Projector, Scene, SceneError, WAVELENGTH_NM};
 use nirspi_recon::{
-    Leak, LeakError, MeasurementError, Measurements, Order, OrderError, Side, fwht, reconstruct,
+    Leak, LeakError, MeasurementError, Measurements, Order, Rows, RowsError, Side, fwht,
+    reconstruct,
 };
 use nirspi_wire::{ADC_HZ, CLOCKS_PER_PATTERN};
 use rand::{Rng, RngExt};
@@ -37,17 +38,6 @@ const FULLY_SAMPLED: f32 = 0.7;
 const LEAST_SAMPLING: f32 = 0.25;
 /// Share of the depth maps with zones that give nothing, and of no depth at all.
 const NO_DEPTH: f32 = 0.2;
-
-/// Rain as in the paper's Table 2.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Rainfall {
-    /// Dry air.
-    None,
-    /// 1.93 mm/h of 0.5 mm drops.
-    Light,
-    /// 5.6 mm/h of 2 mm drops.
-    Heavy,
-}
 
 /// Under what a picture is taken.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -95,24 +85,26 @@ pub enum TrainingCameraError {
     Leak(#[from] LeakError),
     /// The order of patterns.
     #[error(transparent)]
-    Order(#[from] OrderError),
+    Order(#[from] RowsError),
     /// The measurement.
     #[error(transparent)]
     Measurement(#[from] MeasurementError),
 }
 
-/// The virtual camera, calibrated.
+/// The virtual camera's optics and calibration as one linear map from a picture to readings.
+///
+/// No packets, firmware or clocks take part, so it makes many pictures a second; `tests` hold it to the virtual camera.
 #[derive(Debug, Clone)]
-pub struct SimulatedCamera {
+pub struct LinearCamera {
     /// What the receiver does to slots, and what calibration believes that it does.
     leaks: Leak,
     believed: Leak,
-    order: Vec<u32>,
+    order: Rows,
     light: Weather,
     heavy: Weather,
 }
 
-impl SimulatedCamera {
+impl LinearCamera {
     /// Opens a virtual camera before a white sheet at 0.3 m and calibrates it.
     ///
     /// # Errors
@@ -122,7 +114,8 @@ impl SimulatedCamera {
         let field_mm = Projector::default().field_mm(distance_mm);
         let optics = VirtualOptics::new(Scene::new(vec![1.0], 1, field_mm)?, distance_mm)?;
         let mut session = Session::open(Box::new(MemoryLink::new(optics.camera(seed)?)))?;
-        let believed = calibrate(&mut session, &mut Deaf)?.leak(CLOCKS_PER_PATTERN, BLANKED)?;
+        let believed =
+            calibrate(&mut session, &mut IgnorePackets)?.leak(CLOCKS_PER_PATTERN, BLANKED)?;
         let response = |n| optics.chain().settling(n);
         // Two poles of nanoseconds have settled to rounding after as many clocks.
         let exact = Settling {
@@ -132,13 +125,13 @@ impl SimulatedCamera {
             step_counts: 0.0,
             noise_counts: 0.0,
         };
-        let weather = |drops: Drops| Weather::new(drops, 1550.0, Water::Segelstein);
+        let weather = |drops: Drops| Weather::new(drops, WAVELENGTH_NM, Water::Segelstein);
         Ok(Self {
             leaks: exact.leak(CLOCKS_PER_PATTERN, BLANKED)?,
             believed,
             order: Order::CakeCutting.rows(Side::INSTRUMENT)?,
-            light: weather(Drops::monodisperse(1.93, 0.5)?)?,
-            heavy: weather(Drops::monodisperse(5.6, 2.0)?)?,
+            light: weather(PaperRain::LIGHT.drops()?)?,
+            heavy: weather(PaperRain::HEAVY.drops()?)?,
         })
     }
 
@@ -181,11 +174,10 @@ impl SimulatedCamera {
         };
         let seen = exposed(&optics, sweeps, rng.random())?;
         let shown = (f64::from(sampling) * LEDS as f64).round().clamp(1.0, LEDS as f64) as usize;
-        let rows = &self.order[..shown];
-        let mut differences = self.differences(&optics, &seen, rows, sweeps, rng);
+        let rows = self.order.first(shown);
+        let mut differences = self.differences(&optics, &seen, &rows, sweeps, rng);
         self.believed.correct_differential(&mut differences);
-        let rows: Vec<i64> = rows.iter().map(|&row| i64::from(row)).collect();
-        let measured = Measurements::from_differential(Side::INSTRUMENT, &rows, &differences)?;
+        let measured = Measurements::from_differential(&rows, &differences)?;
         let image = reconstruct::hadamard(&measured);
 
         let white = white_counts(&optics);
@@ -249,7 +241,7 @@ impl SimulatedCamera {
     }
 }
 
-impl Degrade for SimulatedCamera {
+impl Degrade for LinearCamera {
     fn degrade(&self, scene: &[f32], rng: &mut Pcg64Mcg) -> Result<Reading, DegradeError> {
         let refused = |error: TrainingCameraError| DegradeError::Camera(error.to_string());
         if scene.len() != SIDE_PX * SIDE_PX {

@@ -7,7 +7,8 @@ mod camera;
 pub mod fonts;
 pub mod pairs;
 
-pub use camera::{CameraPicture, Conditions, Rainfall, SimulatedCamera, TrainingCameraError};
+pub use camera::{CameraPicture, Conditions, LinearCamera, TrainingCameraError};
+pub use nirspi_optics::rain::Rainfall;
 
 use nirspi_nets::degrade::{AnalyticCamera, Degrade, DegradeError, Reading};
 use rand::RngExt;
@@ -18,7 +19,7 @@ pub struct Mixed {
     /// The formulas.
     pub analytic: AnalyticCamera,
     /// The camera, and the share of the pictures that it takes.
-    pub camera: Option<(SimulatedCamera, f32)>,
+    pub camera: Option<(LinearCamera, f32)>,
 }
 
 impl Degrade for Mixed {

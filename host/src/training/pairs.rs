@@ -2,7 +2,7 @@
 //!
 //! The one law: pair k depends on the seed and k alone, so a longer file begins with the shorter one.
 
-use super::{CameraPicture, Rainfall, SimulatedCamera, TrainingCameraError};
+use super::{CameraPicture, LinearCamera, Rainfall, TrainingCameraError};
 use crate::files::FileError;
 use crate::files::{encode_archive, npy};
 use nirspi_nets::data::{Origin, Part, Purpose, SIDE_PX, Scene, Scenes, stream};
@@ -26,7 +26,7 @@ pub struct Pair {
 pub fn take(
     scenes: &Scenes,
     part: Part,
-    camera: &SimulatedCamera,
+    camera: &LinearCamera,
     count: usize,
     seed: u64,
     taken: &(dyn Fn() + Sync),
@@ -118,7 +118,7 @@ mod tests {
     #[test]
     fn a_longer_file_begins_with_the_shorter_one_and_is_whole() {
         let scenes = Scenes::procedural();
-        let camera = SimulatedCamera::new(1).unwrap();
+        let camera = LinearCamera::new(1).unwrap();
         let take = |count| take(&scenes, Part::Training, &camera, count, 7, &|| ()).unwrap();
         let (two, four) = (take(2), take(4));
         assert_eq!(two[..], four[..2]);

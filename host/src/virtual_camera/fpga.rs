@@ -1,6 +1,6 @@
 //! The golden model of the gateware, with light in front of it, as the firmware's FPGA bus.
 
-use nirspi_hdl::{AdcSample, Gateware, Lines};
+use nirspi_hdl_model::{AdcSample, Gateware, Lines};
 use nirspi_mcu::{BusError, FpgaBus};
 use nirspi_optics::rain::RainySpots;
 use nirspi_optics::{Chain, LedArray};

@@ -32,19 +32,20 @@ impl<F: SimulatedFpga, G: GatewareLoader + Send> Link for MemoryLink<F, G> {
 
     fn receive(&mut self, buffer: &mut [u8], _timeout: Duration) -> io::Result<Received> {
         let mut spent = 0;
-        while self.camera.outbox().waiting().is_empty() {
+        while self.camera.packets_out().waiting().is_empty() {
             if spent >= PATIENCE_CLOCKS {
                 return Ok(Received::Nothing);
             }
             self.camera.step(STEP_CLOCKS);
             spent += STEP_CLOCKS;
         }
-        let outbox = self.camera.outbox();
-        let length = outbox.waiting().len().min(buffer.len());
-        if let (Some(to), Some(from)) = (buffer.get_mut(..length), outbox.waiting().get(..length)) {
+        let packets = self.camera.packets_out();
+        let length = packets.waiting().len().min(buffer.len());
+        if let (Some(to), Some(from)) = (buffer.get_mut(..length), packets.waiting().get(..length))
+        {
             to.copy_from_slice(from);
         }
-        outbox.sent(length);
+        packets.sent(length);
         Ok(Received::Bytes(length))
     }
 }

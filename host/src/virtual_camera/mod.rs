@@ -14,6 +14,7 @@ mod link;
 mod optics;
 mod precomputed;
 mod server;
+mod shot;
 mod tunnel;
 
 pub use fpga::{OpticalFpga, SimulatedFpga, Wiring};
@@ -21,6 +22,7 @@ pub use link::MemoryLink;
 pub use optics::{VirtualOptics, VirtualOpticsError};
 pub use precomputed::PrecomputedFpga;
 pub use server::{ServeOptions, ServerEvent, serve};
+pub use shot::{Shot, ShotError, calibrate_against_white, shoot};
 pub use tunnel::serve_tunnel;
 
 use nirspi_mcu::{
@@ -30,23 +32,23 @@ use nirspi_optics::SimulatedDepth;
 use nirspi_wire::Version;
 
 /// Bytes that wait for the host before the link counts as full: what a real device's USB stack holds.
-const OUTBOX_BYTES: usize = 1 << 18;
+const PACKETS_BYTES: usize = 1 << 18;
 /// Device time between depth maps: 15 Hz, as 8 x 8 time-of-flight sensors give.
 const DEPTH_PERIOD: Micros = Micros(66_667);
 /// Zones along one edge of the depth map.
-const DEPTH_SIDE: u8 = 8;
+const DEPTH_SIDE: u8 = nirspi_optics::DEPTH_SIDE as u8;
 
 /// Packets on their way to the host.
 #[derive(Debug, Default)]
-pub struct Outbox {
+pub struct PacketsOut {
     bytes: Vec<u8>,
     committed: usize,
     sent: usize,
 }
 
-impl PacketSink for Outbox {
+impl PacketSink for PacketsOut {
     fn claim(&mut self, length: usize) -> Option<&mut [u8]> {
-        if self.committed - self.sent + length > OUTBOX_BYTES {
+        if self.committed - self.sent + length > PACKETS_BYTES {
             return None;
         }
         let end = self.committed + length;
@@ -61,7 +63,7 @@ impl PacketSink for Outbox {
     }
 }
 
-impl Outbox {
+impl PacketsOut {
     /// What waits to be sent.
     #[must_use]
     pub fn waiting(&self) -> &[u8] {
@@ -71,7 +73,7 @@ impl Outbox {
     /// Whether a frame would find no room.
     #[must_use]
     pub fn is_full(&self) -> bool {
-        self.waiting().len() + nirspi_wire::packet::MAX_DEVICE_PACKET > OUTBOX_BYTES
+        self.waiting().len() + nirspi_wire::packet::MAX_DEVICE_PACKET > PACKETS_BYTES
     }
 
     /// The first `length` bytes that waited have been sent.
@@ -80,7 +82,7 @@ impl Outbox {
         if self.sent >= self.committed {
             self.sent = 0;
             self.committed = 0;
-        } else if self.sent > OUTBOX_BYTES {
+        } else if self.sent > PACKETS_BYTES {
             self.bytes.copy_within(self.sent..self.committed, 0);
             self.committed -= self.sent;
             self.sent = 0;
@@ -99,7 +101,7 @@ pub struct VirtualCamera<F, G = NoLoader> {
     fpga: F,
     loader: G,
     inbox: Vec<u8>,
-    outbox: Outbox,
+    packets: PacketsOut,
     depth: SimulatedDepth,
     next_depth: Micros,
     inputs: Inputs,
@@ -123,7 +125,7 @@ impl<F: SimulatedFpga, G: GatewareLoader> VirtualCamera<F, G> {
             fpga,
             loader,
             inbox: Vec::new(),
-            outbox: Outbox::default(),
+            packets: PacketsOut::default(),
             depth,
             next_depth: Micros(0),
             inputs: Inputs { interlock_closed: true, temperature_centi_celsius: Some(2500) },
@@ -135,7 +137,7 @@ impl<F: SimulatedFpga, G: GatewareLoader> VirtualCamera<F, G> {
         self.inbox.extend_from_slice(bytes);
         let now = self.now();
         let ports =
-            &mut Ports { bus: &mut self.fpga, sink: &mut self.outbox, loader: &mut self.loader };
+            &mut Ports { bus: &mut self.fpga, sink: &mut self.packets, loader: &mut self.loader };
         let taken = self.camera.receive(now, &self.inbox, &self.inputs, ports);
         self.inbox.drain(..taken);
     }
@@ -148,7 +150,7 @@ impl<F: SimulatedFpga, G: GatewareLoader> VirtualCamera<F, G> {
             return true;
         }
         let ports =
-            &mut Ports { bus: &mut self.fpga, sink: &mut self.outbox, loader: &mut self.loader };
+            &mut Ports { bus: &mut self.fpga, sink: &mut self.packets, loader: &mut self.loader };
         // Before the poll, which judges how long the host has been silent.
         if !self.inbox.is_empty() {
             let taken = self.camera.receive(now, &self.inbox, &self.inputs, ports);
@@ -165,18 +167,18 @@ impl<F: SimulatedFpga, G: GatewareLoader> VirtualCamera<F, G> {
     }
 
     /// Packets that wait for the host.
-    pub fn outbox(&mut self) -> &mut Outbox {
-        &mut self.outbox
+    pub fn packets_out(&mut self) -> &mut PacketsOut {
+        &mut self.packets
     }
 
     /// The host has gone.
     pub fn link_closed(&mut self) {
         let now = self.now();
         let ports =
-            &mut Ports { bus: &mut self.fpga, sink: &mut self.outbox, loader: &mut self.loader };
+            &mut Ports { bus: &mut self.fpga, sink: &mut self.packets, loader: &mut self.loader };
         self.camera.link_closed(now, ports);
         self.inbox.clear();
-        self.outbox.clear();
+        self.packets.clear();
     }
 
     /// Opens or closes the enclosure.
@@ -210,4 +212,21 @@ fn crate_version() -> Version {
         part(env!("CARGO_PKG_VERSION_MINOR")),
         part(env!("CARGO_PKG_VERSION_PATCH")),
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use nirspi_optics::{DEPTH_SIDE, instrument};
+    use nirspi_wire::register::LATENCY_MAX;
+
+    #[test]
+    fn the_optics_have_the_instruments_numbers() {
+        assert_eq!(instrument::SIDE, usize::from(nirspi_wire::SIDE));
+        assert_eq!(instrument::LEDS, usize::from(nirspi_wire::PATTERNS));
+        assert_eq!(instrument::WAVELENGTH_NM, f64::from(nirspi_wire::WAVELENGTH_NM));
+        assert_eq!(instrument::SAMPLE_NS * f64::from(nirspi_wire::ADC_HZ), 1e9);
+        assert_eq!(instrument::FULL_SCALE_COUNTS, nirspi_wire::ADC_MAX);
+        assert_eq!(instrument::MAX_ADC_LATENCY_CLOCKS, LATENCY_MAX);
+        assert_eq!(usize::from(super::DEPTH_SIDE), DEPTH_SIDE);
+    }
 }

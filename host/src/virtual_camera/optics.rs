@@ -1,12 +1,13 @@
 //! What stands in front of the virtual camera: scene, projector, photon budget, receiver.
 
 use super::{OpticalFpga, VirtualCamera};
+use crate::scene::SceneMap;
 use nirspi_optics::pixel::Instrument;
 use nirspi_optics::rain::{BeamShadows, Drops, RainError, RainySpots, Weather};
 use nirspi_optics::water::Water;
 use nirspi_optics::{
     Budget, BudgetError, BudgetSettings, Chain, ChainError, ChainSettings, DepthError, Footprint,
-    LedArray, Projector, ProjectorError, Scene, SimulatedDepth,
+    LedArray, Projector, ProjectorError, Scene, SceneError, SimulatedDepth,
 };
 use thiserror::Error;
 
@@ -20,9 +21,9 @@ pub struct VirtualOptics {
     projector: Projector,
     distance_mm: f64,
     footprint: Footprint,
+    budget_settings: BudgetSettings,
     budget: Budget,
     chain: ChainSettings,
-    wavelength_nm: f64,
     weather: Option<Weather>,
 }
 
@@ -41,6 +42,9 @@ pub enum VirtualOpticsError {
     /// Distance.
     #[error(transparent)]
     Depth(#[from] DepthError),
+    /// Reflectances.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
     /// Weather.
     #[error(transparent)]
     Rain(#[from] RainError),
@@ -61,6 +65,20 @@ impl VirtualOptics {
         )
     }
 
+    /// The default camera in front of a scene by name or file: a target of its own size, or one that fills the field.
+    ///
+    /// # Errors
+    /// A distance that no light covers, or that the depth sensor cannot read.
+    pub fn before(map: &SceneMap, distance_mm: f64) -> Result<Self, VirtualOpticsError> {
+        let fills = || Projector::default().field_mm(distance_mm);
+        let side_mm = map.side_mm.unwrap_or_else(fills);
+        let scene = Scene::new(map.reflectance.clone(), map.size_px, side_mm)?;
+        let optics = Self::new(scene, distance_mm)?;
+        // The depth sensor has a range of its own.
+        optics.depth(0)?;
+        Ok(optics)
+    }
+
     /// As [`new`](Self::new), with everything given. The gain and the daylight in `chain` are replaced by
     /// those that follow from the budget.
     ///
@@ -74,12 +92,49 @@ impl VirtualOptics {
         mut chain: ChainSettings,
     ) -> Result<Self, VirtualOpticsError> {
         let footprint = projector.footprint(&scene, distance_mm)?;
-        let wavelength_nm = budget.wavelength_nm;
+        let budget_settings = *budget;
         let budget = Budget::new(budget, &projector, distance_mm)?;
         chain.electrons_per_count = chain.auto_gain(&budget)?;
         chain.ambient_electrons = budget.ambient_electrons(footprint.mean());
         let weather = None;
-        Ok(Self { scene, projector, distance_mm, footprint, budget, chain, wavelength_nm, weather })
+        Ok(Self {
+            scene,
+            projector,
+            distance_mm,
+            footprint,
+            budget_settings,
+            budget,
+            chain,
+            weather,
+        })
+    }
+
+    /// The same camera in dry air before a white sheet that fills its field, where its lens is focused: what latency and
+    /// settling are measured against.
+    ///
+    /// # Errors
+    /// Optics that have no focus.
+    pub fn white_sheet(&self) -> Result<Self, VirtualOpticsError> {
+        let Self { projector, budget_settings, chain, .. } = self;
+        let distance_mm = projector.focus_distance_mm;
+        Self::with_settings(Scene::white(), distance_mm, *projector, budget_settings, *chain)
+    }
+
+    /// ADC counts that a white target gives one pixel, as the photon budget has it.
+    #[must_use]
+    pub fn white_counts(&self) -> f64 {
+        self.budget.electrons_per_led / self.chain.electrons_per_count
+    }
+
+    /// The serial number of the virtual camera with this seed. Cameras that differ in anything that is the instrument's,
+    /// not the scene's, have different ones, so that none uses the kept calibration of another.
+    #[must_use]
+    pub fn serial(&self, seed: u64) -> String {
+        // Gain and daylight follow distance and scene, and change neither latency nor settling.
+        let chain =
+            ChainSettings { electrons_per_count: 1.0, ambient_electrons: 0.0, ..self.chain };
+        let instrument = format!("{:?} {:?} {chain:?}", self.projector, self.budget_settings);
+        format!("virtual-{seed}-{:08x}", fnv1a(instrument.as_bytes()))
     }
 
     /// Lets these drops fall between camera and scene. Daylight is dimmed and scattered as they do on average; what
@@ -88,7 +143,7 @@ impl VirtualOptics {
     /// # Errors
     /// Air too dense, or too many drops to be followed.
     pub fn in_rain(self, drops: Drops) -> Result<Self, VirtualOpticsError> {
-        let weather = Weather::new(drops, self.wavelength_nm, Water::Segelstein)?;
+        let weather = Weather::new(drops, self.budget_settings.wavelength_nm, Water::Segelstein)?;
         let optics = self.in_weather(weather)?;
         // Whether the drops can be followed shows now rather than when the camera is made.
         optics.spots(0)?;
@@ -233,7 +288,41 @@ impl VirtualOptics {
     /// # Errors
     /// A setting out of range.
     pub fn camera(&self, seed: u64) -> Result<VirtualCamera<OpticalFpga>, VirtualOpticsError> {
-        let serial = format!("virtual-{seed}");
-        Ok(VirtualCamera::new(self.fpga(seed)?, self.depth(seed)?, &serial))
+        Ok(VirtualCamera::new(self.fpga(seed)?, self.depth(seed)?, &self.serial(seed)))
+    }
+}
+
+/// FNV-1a, 32 bit: a short name for settings, not a checksum (Fowler, Noll and Vo).
+fn fnv1a(bytes: &[u8]) -> u32 {
+    bytes.iter().fold(0x811c_9dc5, |hash, &byte| (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cameras_that_differ_have_different_serials_and_scenes_do_not_matter() {
+        let projector = Projector::default();
+        let of = |scene: Scene, distance_mm, chain| {
+            let budget = BudgetSettings::default();
+            VirtualOptics::with_settings(scene, distance_mm, projector, &budget, chain)
+                .unwrap()
+                .serial(3)
+        };
+        let chain = ChainSettings::default();
+        let near = of(Scene::white(), 300.0, chain);
+        assert_eq!(near, of(Scene::new(vec![0.1], 1, 10.0).unwrap(), 700.0, chain));
+        let slower = ChainSettings { adc_latency_clocks: 9, ..chain };
+        assert_ne!(near, of(Scene::white(), 300.0, slower));
+        assert!(near.starts_with("virtual-3-"), "{near}");
+    }
+
+    #[test]
+    fn a_camera_before_a_white_sheet_is_still_the_same_camera() {
+        let letter = VirtualOptics::new(Scene::new(vec![0.2], 1, 10.0).unwrap(), 900.0).unwrap();
+        let sheet = letter.white_sheet().unwrap();
+        assert_eq!(letter.serial(1), sheet.serial(1));
+        assert!((sheet.footprint().mean() - 1.0).abs() < 1e-9);
     }
 }

@@ -137,16 +137,16 @@ fn converse<F: SimulatedFpga>(
         let mut worked = false;
         // A batch between two looks at the socket: system calls cost more than frames.
         for _ in 0..64 {
-            if camera.outbox().is_full() && !options.drop_when_full {
+            if camera.packets_out().is_full() && !options.drop_when_full {
                 break;
             }
             worked |= camera.step(STEP_CLOCKS);
         }
         let mut blocked = false;
-        while !camera.outbox().waiting().is_empty() {
-            match stream.write(camera.outbox().waiting()) {
+        while !camera.packets_out().waiting().is_empty() {
+            match stream.write(camera.packets_out().waiting()) {
                 Ok(0) => return Err(io::ErrorKind::WriteZero.into()),
-                Ok(length) => camera.outbox().sent(length),
+                Ok(length) => camera.packets_out().sent(length),
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => {
                     blocked = true;
                     break;

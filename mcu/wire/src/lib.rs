@@ -11,8 +11,16 @@
 //! * [`walsh`]: which sign of which Hadamard row an LED shows,
 //! * [`usb`]: identity on the bus.
 //!
-//! The one law: firmware, gateware model, host and tests all take these from here; no number of this
-//! crate is written a second time anywhere else. `no_std`, no allocation, no feature flags.
+//! `no_std`, no allocation, no feature flags.
+//!
+//! # Invariant
+//! Firmware, gateware model, host and tests take these numbers from here. A number of this crate stands a second time
+//! only where this crate cannot be used, and a test holds the two equal:
+//!
+//! | second place | test |
+//! |---|---|
+//! | `hdl/rtl/register_map.veryl`, generated from here | `hdl/tests/rtl/stale.rs` |
+//! | `nirspi_optics::instrument` | `nirspi`: `the_optics_have_the_instruments_numbers` |
 //!
 //! # Versions
 //! [`PROTOCOL_VERSION`] changes whenever the bytes of any message change. The bytes of every message of
@@ -35,6 +43,7 @@ pub mod usb;
 pub mod walsh;
 
 mod crc32;
+mod display;
 mod stuffing;
 
 pub use crc32::{Crc32, crc32};
@@ -55,6 +64,9 @@ pub const SIDE: u8 = 32;
 
 /// Hadamard patterns of a full sweep, `SIDE * SIDE`.
 pub const PATTERNS: u16 = SIDE as u16 * SIDE as u16;
+
+/// Wavelength of the LEDs (paper, section 2.A).
+pub const WAVELENGTH_NM: u16 = 1550;
 
 /// ADC sample rate and FPGA sequencer clock (paper, section 2.D).
 pub const ADC_HZ: u32 = 125_000_000;

@@ -19,8 +19,8 @@ fuzz_target!(|bytes: &[u8]| {
         camera.set_interlock(closed);
         send(&mut camera, payload);
         camera.step(u32::from(what) * 8);
-        let waiting = camera.outbox().waiting().len();
-        camera.outbox().sent(if what & 2 == 0 { waiting } else { waiting / 2 });
+        let waiting = camera.packets_out().waiting().len();
+        camera.packets_out().sent(if what & 2 == 0 { waiting } else { waiting / 2 });
         assert!(closed || !camera.fpga().running(), "lit with an open interlock");
     }
 });

@@ -9,7 +9,9 @@ use std::io::Write;
 fuzz_target!(|bytes: &[u8]| {
     let mut file = tempfile::NamedTempFile::new().expect("a temporary file");
     file.write_all(bytes).expect("written");
-    if let Err(error) = nirspi::recording::read(file.path(), |_, _| {}) {
+    let read = nirspi::recording::Recording::open(file.path())
+        .and_then(|mut recording| recording.try_for_each(|packet| packet.map(drop)));
+    if let Err(error) = read {
         assert_eq!(error.to_string().lines().count(), 1);
     }
 });

@@ -1,39 +1,26 @@
 //! The whole firmware as ARM machine code, on an emulated Cortex-M33: host, wire protocol, executor, drivers, firmware
-//! logic, and behind the board's second UART the gateware's golden model, or its RTL.
+//! logic, and behind the board's second UART the gateware's golden model. `tests/rtl` puts the RTL there instead.
 //!
-//! The one law: the virtual camera in this process gets the same scene and the same commands, and gives the same
-//! frames, bit for bit. Device times differ: the two have different clocks.
+//! The virtual camera in this process gets the same scene and the same commands, and gives the same frames, bit for
+//! bit. Device times differ: the two have different clocks.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap in a helper fails its test")]
 
-#[path = "../co_simulation/board.rs"]
-mod board;
 mod debugger;
-mod emulated;
-mod firmware;
-#[path = "../co_simulation/fpga.rs"]
-mod fpga;
 
-use emulated::Emulated;
-use fpga::RtlFpga;
-use nirspi::capture::{Calibration, Capture, CaptureOptions, Ended, capture};
-use nirspi::link::{Link, Received};
-use nirspi::session::{Deaf, Session, SessionError};
+use nirspi::capture::{Capture, Ended};
+use nirspi::link::Link;
+use nirspi::session::{IgnorePackets, Session, SessionError, request};
 use nirspi::setup::MeasurementSetup;
 use nirspi::virtual_camera::{MemoryLink, VirtualOptics};
 use nirspi_optics::Scene;
 use nirspi_recon::{Order, Side, metrics, reconstruct};
 use nirspi_tests::elf::Firmware;
+use nirspi_tests::emulated::Emulated;
+use nirspi_tests::firmware;
 use nirspi_tests::pages::{page, table};
 use nirspi_tests::tamper::{Fate, Tampered, only_frames};
-use nirspi_wire::packet::MAX_DEVICE_PACKET;
-use nirspi_wire::{
-    Command, Deframed, Deframer, DeviceMessage, Fault, Frame, FrameFlags, GatewareChunk, Refusal,
-    RunLength, State, open,
-};
-use std::io;
-use std::ops::ControlFlow;
-use std::sync::{Arc, Mutex};
-use std::time::Duration;
+use nirspi_tests::tapped::{Tapped, measure, run};
+use nirspi_wire::{Fault, GatewareChunk, Refusal, RunLength, State};
 
 const PX: usize = 64;
 const SEED: u64 = 7;
@@ -51,100 +38,6 @@ fn scene() -> Scene {
 /// With all its noise, settling and latency.
 fn optics() -> VirtualOptics {
     VirtualOptics::new(scene(), 300.0).unwrap()
-}
-
-/// A frame, but for its time.
-#[derive(Debug, Clone, PartialEq)]
-struct Shot {
-    run: u16,
-    sequence: u32,
-    sweeps: u32,
-    flags: FrameFlags,
-    samples: Vec<i64>,
-}
-
-/// A camera's line, of which everything that came is kept.
-struct Tapped {
-    line: Option<Box<dyn Link>>,
-    came: Arc<Mutex<Vec<u8>>>,
-}
-
-impl Tapped {
-    fn new(line: Box<dyn Link>) -> Self {
-        Self { line: Some(line), came: Arc::default() }
-    }
-
-    /// The line, once.
-    fn link(&mut self) -> Box<dyn Link> {
-        Box::new(Tap { line: self.line.take().unwrap(), came: Arc::clone(&self.came) })
-    }
-
-    /// What `of` finds in the messages that came whole.
-    fn find<T>(&self, of: impl Fn(&DeviceMessage<'_>) -> Option<T>) -> Vec<T> {
-        let came = self.came.lock().unwrap();
-        let mut deframer: Box<Deframer<MAX_DEVICE_PACKET>> = Box::default();
-        let (mut rest, mut all) = (&came[..], Vec::new());
-        while let Some(found) = deframer.next(&mut rest) {
-            if let Deframed::Packet(packet) = found
-                && let Ok(message) = open::<DeviceMessage<'_>>(packet)
-            {
-                all.extend(of(&message));
-            }
-        }
-        all
-    }
-
-    fn shots(&self) -> Vec<Shot> {
-        self.find(|message| {
-            let DeviceMessage::Frame(frame) = message else { return None };
-            let &Frame { run, sequence, sweeps, flags, ref samples, .. } = frame;
-            Some(Shot { run, sequence, sweeps, flags, samples: samples.iter().collect() })
-        })
-    }
-
-    fn crashes(&self) -> Vec<String> {
-        self.find(|message| {
-            let DeviceMessage::Crash(report) = message else { return None };
-            Some(report.text.to_owned())
-        })
-    }
-}
-
-struct Tap {
-    line: Box<dyn Link>,
-    came: Arc<Mutex<Vec<u8>>>,
-}
-
-impl Link for Tap {
-    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
-        self.line.send(bytes)
-    }
-
-    fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<Received> {
-        let received = self.line.receive(buffer, timeout)?;
-        if let Received::Bytes(length) = received {
-            self.came.lock().unwrap().extend_from_slice(&buffer[..length]);
-        }
-        Ok(received)
-    }
-}
-
-fn measure(session: &mut Session, setup: &MeasurementSetup, frames: u32) -> Capture {
-    let setup = setup.clone();
-    let options = CaptureOptions {
-        setup,
-        frames: Some(frames),
-        calibration: Calibration::None,
-        record: None,
-    };
-    capture(session, &options, &mut |_| ControlFlow::Continue(())).unwrap()
-}
-
-fn run(line: Box<dyn Link>, setup: &MeasurementSetup, frames: u32) -> (Capture, Vec<Shot>) {
-    let mut tapped = Tapped::new(line);
-    let mut session = Session::open(tapped.link()).unwrap();
-    let captured = measure(&mut session, setup, frames);
-    (captured, tapped.shots())
 }
 
 fn in_process() -> Box<dyn Link> {
@@ -202,41 +95,6 @@ fn an_order_table_several_sweeps_and_a_second_run_come_through_too() {
     assert!(shots == virtual_camera.shots());
 }
 
-/// Firmware as machine code and gateware as RTL: the camera with everything but the silicon.
-#[test]
-fn frames_of_the_rtl_come_through_the_emulated_board_as_the_golden_models_do() {
-    let optics = optics().ideal();
-    let setup = MeasurementSetup::new(&Order::Natural, 1.0).unwrap();
-    let Some(board) = Emulated::start(RtlFpga::new(&optics, SEED)) else { return };
-    let (captured, shots) = run(board.link(), &setup, 1);
-    assert!(matches!(captured.ended, Ended::Complete), "{:?}", captured.ended);
-    let golden = MemoryLink::new(optics.camera(SEED).unwrap());
-    let (_, expected) = run(Box::new(golden), &setup, 1);
-    assert_eq!(shots.len(), 1);
-    assert!(shots == expected, "the frames differ");
-    println!(
-        "one sweep of 1024 patterns and complements through RTL and firmware: {:.2?}",
-        captured.elapsed
-    );
-}
-
-#[test]
-fn frames_that_the_rtl_makes_faster_than_the_board_reads_them_are_counted_and_spoil_no_other() {
-    let frames = 400;
-    let optics = optics().ideal();
-    let setup = MeasurementSetup::new(&Order::Natural, 0.05).unwrap();
-    let Some(board) = Emulated::start(RtlFpga::new(&optics, SEED)) else { return };
-    let (captured, shots) = run(board.link(), &setup, frames);
-    assert_eq!(captured.counters.total(), u64::from(frames), "{}", captured.counters);
-    assert!(captured.counters.lost > 0 && captured.counters.received > 1, "{}", captured.counters);
-    let golden = MemoryLink::new(optics.camera(SEED).unwrap());
-    let (_, expected) = run(Box::new(golden), &setup, 1);
-    for shot in shots {
-        // Without noise every frame has the same samples.
-        assert!(shot.samples == expected[0].samples, "frame {}", shot.sequence);
-    }
-}
-
 #[test]
 fn on_a_bad_line_every_frame_is_accounted_for_and_none_that_arrives_differs() {
     let frames = 9;
@@ -271,13 +129,13 @@ fn an_open_interlock_keeps_the_emulated_board_dark() {
     let mut session = Session::open(board.link()).unwrap();
     board.set_interlock(false);
     let refused = natural()
-        .with_configuration(|c| session.command(Command::Configure(c), &mut Deaf))
+        .with_configuration(|c| session.command(request::Configure(c), &mut IgnorePackets))
         .unwrap_err();
     let SessionError::Refused { refusal: Refusal::Fault(Fault::Interlock), .. } = refused else {
         panic!("{refused}");
     };
     board.set_interlock(true);
-    while !session.status(&mut Deaf).unwrap().interlock_closed {}
+    while !session.status(&mut IgnorePackets).unwrap().interlock_closed {}
     assert!(measure(&mut session, &natural(), 1).counters.is_complete(), "closed, it measures");
 }
 
@@ -285,12 +143,12 @@ fn an_open_interlock_keeps_the_emulated_board_dark() {
 fn an_fpga_that_falls_silent_is_a_fault_that_the_host_is_told() {
     let Some(board) = Emulated::start(optics().fpga(SEED).unwrap()) else { return };
     let mut session = Session::open(board.link()).unwrap();
-    assert_eq!(session.identity().board, "mps2-an505");
-    assert_eq!(session.status(&mut Deaf).unwrap().fault, None);
+    assert_eq!(session.identity().board, firmware::board().name);
+    assert_eq!(session.status(&mut IgnorePackets).unwrap().fault, None);
     board.unplug_fpga();
     let mut fault = None;
     for _ in 0..100 {
-        fault = session.status(&mut Deaf).unwrap().fault;
+        fault = session.status(&mut IgnorePackets).unwrap().fault;
         if fault.is_some() {
             break;
         }
@@ -322,7 +180,7 @@ fn firmware_that_crashes_starts_again_and_tells_the_next_host_once() {
                 Some((tapped, session))
             })
             .unwrap();
-        session.status(&mut Deaf).unwrap();
+        session.status(&mut IgnorePackets).unwrap();
         let captured = measure(&mut session, &natural(), 1);
         assert!(captured.counters.is_complete(), "it measures again");
         tapped.crashes()
@@ -352,17 +210,17 @@ fn the_stack_is_never_deeper_than_three_quarters_of_its_limit() {
     debugger.go();
     // Everything that a host can ask for, refused commands too.
     let mut session = Session::open(board.link()).unwrap();
-    let _ = session.command(Command::Start(RunLength::Continuous), &mut Deaf);
-    let _ = session.command(Command::RawBurst { samples: 0 }, &mut Deaf);
+    let _ = session.command(request::Start(RunLength::Continuous), &mut IgnorePackets);
+    let _ = session.command(request::RawBurst(0), &mut IgnorePackets);
     let piece = GatewareChunk { offset: 0, total: 4, crc: 0, data: &[1, 2] };
-    let _ = session.command(Command::LoadGateware(piece), &mut Deaf);
-    let _ = session.command(Command::SelfTest, &mut Deaf);
+    let _ = session.command(request::LoadGateware(piece), &mut IgnorePackets);
+    let _ = session.command(request::SelfTest, &mut IgnorePackets);
     let table = MeasurementSetup::new(&Order::Random(1), 1.0).unwrap();
     for setup in [natural(), table] {
         assert!(measure(&mut session, &setup, 2).counters.is_complete());
     }
-    session.command(Command::RawBurst { samples: 4096 }, &mut Deaf).unwrap();
-    while session.status(&mut Deaf).unwrap().state == State::Running {}
+    session.command(request::RawBurst(4096), &mut IgnorePackets).unwrap();
+    while session.status(&mut IgnorePackets).unwrap().state == State::Running {}
 
     let stack = debugger.read(end, start);
     let untouched = stack.iter().take_while(|&&byte| byte == PAINT).count();

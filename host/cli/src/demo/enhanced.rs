@@ -1,19 +1,13 @@
-//! The demo's learned stages: the camera's image becomes a reflectance, is fused with depth, and deblurred.
+//! The demo's learned stages, judged: the image over white, fused with depth, deblurred.
 
-use super::super::networks::Networks;
-use super::super::quality::{Quality, compare};
 use super::super::report::StageTimes;
 use anyhow::Result;
+use nirspi::imaging::{Enhance, Known, Quality, Warning, White, compare, warnings};
 use nirspi::virtual_camera::VirtualOptics;
-use nirspi_nets::consistency::MeasuredRows;
-use nirspi_nets::{
-    Backend, DepthMaps, Enhancer, Images, KnownEstimate, Method, Options, deblur, fusion,
-    upscale_2x,
-};
+use nirspi_nets::{DepthMaps, Device, deblur, upscale_2x};
 use nirspi_optics::DEPTH_SIDE;
-use nirspi_recon::{Image, Side};
+use nirspi_recon::{Image, Rows, Side};
 use serde::Serialize;
-use std::num::NonZeroU32;
 
 /// The scene as a perfect camera of 64 x 64 pixels would see it, and what the stages made of it.
 pub struct Stages {
@@ -47,97 +41,68 @@ pub struct Report {
     /// Depth zones that saw something.
     pub depth_zones: usize,
     pub device: String,
+    /// Reasons not to trust the result.
+    pub warnings: Vec<String>,
+    #[serde(skip)]
+    pub short_warnings: Vec<String>,
     pub quality_note: &'static str,
-}
-
-/// Inconsistency from which the readings contradict the image: an image that agrees with them ends at 1.1 or below, the
-/// radius that it is moved to.
-const CONTRADICTED: f32 = 1.2;
-
-impl Report {
-    /// What is to be said of an image that the readings do not bear out.
-    pub fn doubt(&self, frames: u32) -> Option<String> {
-        (self.inconsistency > CONTRADICTED).then(|| {
-            format!(
-                "the readings do not bear the deblurred image out (inconsistency {:.2}): do not trust its strokes; more \
-                 light helps, as with --frames {}",
-                self.inconsistency,
-                frames.saturating_mul(10)
-            )
-        })
-    }
 }
 
 /// Runs the stages on an image in ADC counts that was reconstructed from these Hadamard rows.
 pub fn run(
     image: &Image,
-    rows: &[u16],
+    rows: &Rows,
     optics: &VirtualOptics,
     seed: u64,
     times: &mut StageTimes,
 ) -> Result<Stages> {
-    let steps = NonZeroU32::MIN;
-    // The gain that turns a white target at this distance into counts is known from the photon budget, as
-    // a user knows it from a white sheet held there.
-    let white_counts = optics.budget().electrons_per_led / optics.chain().electrons_per_count;
-    let reflectance: Vec<f32> = image
-        .pixels()
-        .iter()
-        .map(|&counts| (f64::from(counts) / white_counts).clamp(0.0, 1.0) as f32)
-        .collect();
-    let readings: Images<'_, { fusion::SIDE }> = Images::new(&reflectance)?;
     let zones_m: Vec<f32> =
         optics.depth(seed)?.reading().iter().map(|&mm| f32::from(mm) * 1e-3).collect();
     let seen_m = seen(&zones_m);
-    let depth_zones = seen_m.len();
-    // The lens and the distance say how far it is out of focus; noise hides that from the estimator, which says too little then.
-    let defocus_px = seen_m
-        .get(depth_zones / 2)
-        .map(|&m| optics.defocus_px(f64::from(m) * 1e3, deblur::SIDE) as f32);
     let depth = DepthMaps::new(zones_m, [1, DEPTH_SIDE, DEPTH_SIDE], 1)?;
-
-    let mut networks = Networks::built_in(Backend::Cpu)?;
-    let enhancer = times.time("load_networks", || -> Result<_> {
-        let sharpener = networks.sharpener(Method::Diffusion { steps })?;
-        Ok(Enhancer::new(networks.fusion()?, sharpener))
-    })?;
-    let rows: Vec<u32> = rows.iter().map(|&row| row.into()).collect();
-    let measured = MeasuredRows::new(fusion::SIDE, &rows);
-    let estimated = networks.estimator()?.estimate(readings)[0].sigma_px;
-    let sigma_px = defocus_px.filter(|&defocus_px| defocus_px > estimated);
-    let estimate = KnownEstimate { sigma_px, ..KnownEstimate::default() };
-    let options = Options { measured, seed, estimate, ..Options::default() };
-    let result =
-        times.time("enhance", || enhancer.enhance(readings, Some(&depth), &options, &mut |_| {}));
-    let side = fusion::SIDE;
-    let upscaled = times.time("upscale", || upscale_2x(&reflectance, 1, side, side))?;
+    let defocus_px = seen_m
+        .get(seen_m.len() / 2)
+        .map(|&m| optics.defocus_px(f64::from(m) * 1e3, deblur::SIDE) as f32);
+    let enhance = times.time("load_networks", || Enhance::built_in(&Device::cpu()))?;
+    // The gain that turns a white target at this distance into counts is known from the photon budget, as
+    // a user knows it from a white sheet held there.
+    let white = White::Known(optics.white_counts() as f32);
+    let known = Known { rows: Some(rows), depth: Some(&depth), least_blur_px: defocus_px, seed };
+    let made = times.time("enhance", || enhance.enhance(image, white, &known))?;
+    let side = image.side().pixels();
+    let upscaled = times.time("upscale", || upscale_2x(&made.scaled, 1, side, side))?;
 
     let truth = optics.focused(deblur::SIDE);
     let output = Side::new(deblur::SIDE as u64)?;
     let judge = |values: &[f32]| compare(&Image::new(output, values.to_vec()), &truth);
-    let fused = result.upscaled.unwrap_or_default();
-    let (upscaled_fit, fused_fit, deblurred_fit) =
-        (judge(&upscaled)?, judge(&fused)?, judge(&result.images)?);
+    let (upscaled, fused, deblurred) = (
+        judge(&upscaled)?,
+        judge(made.fused.as_deref().unwrap_or_default())?,
+        judge(&made.pixels)?,
+    );
+    let warnings = warnings(&made);
     let report = Report {
-        upscaled: upscaled_fit.quality,
-        fused: fused_fit.quality,
-        deblurred: deblurred_fit.quality,
-        steps: steps.get(),
-        sigma_px: result.estimates[0].sigma_px,
-        estimated_sigma_px: estimated,
+        upscaled: upscaled.quality,
+        fused: fused.quality,
+        deblurred: deblurred.quality,
+        steps: 1,
+        sigma_px: made.blur_px,
+        estimated_sigma_px: made.estimated_blur_px,
         defocus_px,
-        noise: result.estimates[0].noise,
-        inconsistency: result.inconsistency[0],
-        depth_zones,
-        device: networks.device().to_owned(),
+        noise: made.noise,
+        inconsistency: made.inconsistency,
+        depth_zones: seen_m.len(),
+        device: enhance.device().name().to_owned(),
+        warnings: warnings.iter().map(Warning::to_string).collect(),
+        short_warnings: warnings.iter().map(|warning| warning.short().to_owned()).collect(),
         quality_note: "against the scene on a 64 x 64 grid without defocus, after the gain and offset of least \
                        squares",
     };
     Ok(Stages {
         truth,
-        upscaled: upscaled_fit.values,
-        fused: fused_fit.values,
-        deblurred: deblurred_fit.values,
+        upscaled: upscaled.values,
+        fused: fused.values,
+        deblurred: deblurred.values,
         report,
     })
 }

@@ -7,7 +7,7 @@ use crate::{print, refused};
 use anyhow::{Context, Result};
 use indicatif::ProgressBar;
 use nirspi::files::output::OutputDir;
-use nirspi_eval::sampling::{ORDERS, RECORDED, Study};
+use nirspi_eval::sampling::{RECORDED, Study, default_orders};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -25,7 +25,7 @@ pub struct Args {
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_values_t = [0.1, 0.2, 0.3, 0.5])]
     sampling: Vec<f64>,
     /// Orders: `recorded`, or an order's name
-    #[arg(long, value_name = "LIST", value_delimiter = ',', default_values_t = ORDERS.map(str::to_owned))]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_values_t = default_orders())]
     orders: Vec<String>,
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "sampling")]

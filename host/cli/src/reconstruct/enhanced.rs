@@ -1,18 +1,13 @@
-//! `nirspi reconstruct --enhance`: the learned stages on an image whose scale nobody told, as [`nirspi::white`] finds it.
+//! `nirspi reconstruct --enhance`: the learned stages on images whose white level is not known.
 
-use super::super::networks::Networks;
 use super::super::report::StageTimes;
-use anyhow::{Result, bail};
-use nirspi::white::brightest;
-use nirspi_nets::consistency::MeasuredRows;
-use nirspi_nets::{
-    Backend, Enhanced, Enhancer, Images, Method, Options, Sharpener, deblur, fusion,
-};
-use nirspi_recon::Image;
+use anyhow::{Context, Result, bail};
+use nirspi::imaging::{Enhance, EnhancedImage, Known, Warning, White, warnings};
+use nirspi_nets::Device;
+use nirspi_recon::{Image, Rows};
 use serde::Serialize;
-use std::num::NonZeroU32;
 
-/// What came of it.
+/// What the learned stages found.
 #[derive(Debug, Serialize)]
 pub struct Report {
     /// The image's value that was taken for white.
@@ -21,11 +16,28 @@ pub struct Report {
     sigma_px: f32,
     /// Noise of a pixel, white being 1, as estimated.
     noise: f32,
-    /// Distance of the image from that of the result, over its noise.
+    /// Distance of the readings from those of the result, over their noise.
     inconsistency: f32,
+    /// Reasons not to trust the result.
+    pub warnings: Vec<String>,
+    /// The same in a few words, for the picture.
+    #[serde(skip)]
+    pub short: Vec<String>,
 }
 
 impl Report {
+    fn of(image: &EnhancedImage) -> Self {
+        let warnings = warnings(image);
+        Self {
+            white: image.white,
+            sigma_px: image.blur_px,
+            noise: image.noise,
+            inconsistency: image.inconsistency,
+            short: warnings.iter().map(|warning| warning.short().to_owned()).collect(),
+            warnings: warnings.iter().map(Warning::to_string).collect(),
+        }
+    }
+
     /// One line for people.
     pub fn line(&self) -> String {
         format!(
@@ -37,54 +49,22 @@ impl Report {
 
 /// Enhances images of 32 x 32 or 64 x 64, each with the Hadamard rows that it was made from: 64 x 64 pixels in [0, 1]
 /// each. White is the same for all, so that a video does not flicker: the median of what each would take for it.
-pub fn run(frames: &[(&Image, &[u32])], times: &mut StageTimes) -> Result<(Vec<f32>, Vec<Report>)> {
-    let Some((first, _)) = frames.first() else { bail!("--enhance: no image") };
-    let side = first.side().pixels();
-    if side != fusion::SIDE && side != deblur::SIDE {
-        bail!("--enhance is for images of 32 x 32 or 64 x 64 pixels, this one has {side} x {side}");
+pub fn run(frames: &[(&Image, &Rows)], times: &mut StageTimes) -> Result<(Vec<f32>, Vec<Report>)> {
+    if frames.is_empty() {
+        bail!("--enhance: no image");
     }
-    let mut whites: Vec<f32> = frames.iter().map(|(f, _)| brightest(f.pixels(), side)).collect();
-    whites.sort_by(f32::total_cmp);
-    let white = whites[whites.len() / 2];
-    if white <= 0.0 {
-        bail!("--enhance finds no light in the image");
-    }
-    let mut networks = Networks::built_in(Backend::Cpu)?;
-    let sharpener = networks.sharpener(Method::Diffusion { steps: NonZeroU32::MIN })?;
-    let stages = match side {
-        deblur::SIDE => Stages::Second(sharpener),
-        _ => Stages::Both(Enhancer::new(networks.fusion()?, sharpener)),
-    };
+    let white = White::Brightest.median_level(frames.iter().map(|(image, _)| *image));
+    let enhance = Enhance::built_in(&Device::cpu())?;
     let (mut pixels, mut reports) = (Vec::new(), Vec::new());
     times.time("enhance", || -> Result<()> {
         for (image, rows) in frames {
-            let scaled = image.pixels().iter().map(|v| (v / white).clamp(0.0, 1.0));
-            let mut result = stages.run(&scaled.collect::<Vec<_>>(), side, rows)?;
-            pixels.append(&mut result.images);
-            reports.push(Report {
-                white,
-                sigma_px: result.estimates[0].sigma_px,
-                noise: result.estimates[0].noise,
-                inconsistency: result.inconsistency[0],
-            });
+            let known = Known { rows: Some(rows), ..Known::default() };
+            let mut made =
+                enhance.enhance(image, White::Known(white), &known).context("--enhance")?;
+            reports.push(Report::of(&made));
+            pixels.append(&mut made.pixels);
         }
         Ok(())
     })?;
     Ok((pixels, reports))
-}
-
-/// What is 64 x 64 already needs no fusion.
-enum Stages {
-    Both(Enhancer),
-    Second(Sharpener),
-}
-
-impl Stages {
-    fn run(&self, image: &[f32], side: usize, rows: &[u32]) -> Result<Enhanced> {
-        let options = Options { measured: MeasuredRows::new(side, rows), ..Options::default() };
-        Ok(match self {
-            Self::Both(both) => both.enhance(Images::new(image)?, None, &options, &mut |_| {}),
-            Self::Second(second) => second.deblur(Images::new(image)?, &options, &mut |_| {}),
-        })
-    }
 }

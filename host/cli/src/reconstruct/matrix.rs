@@ -2,12 +2,12 @@
 
 use super::{Args, print, spinning};
 use crate::Usage;
-use crate::method::{Method, read_atoms};
+use crate::method::read_atoms;
 use crate::report::StageTimes;
 use anyhow::{Context, Result, bail};
 use nirspi::files::{npy, npz};
 use nirspi_recon::Side;
-use nirspi_recon::reconstruct::{MatrixMethod, MatrixSettings, OwnMatrix};
+use nirspi_recon::reconstruct::{MatrixSettings, Method, OwnMatrix, Setting};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -22,7 +22,7 @@ struct Report {
     /// Patterns used that are no combination of others.
     rank: usize,
     unseen_pixels: usize,
-    method: Method,
+    method: &'static str,
     #[serde(skip_serializing_if = "Option::is_none")]
     basis: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -62,7 +62,7 @@ pub fn run(args: &Args, path: &Path) -> Result<ExitCode> {
     let own = times.time("rank", || OwnMatrix::new(side, weights)).with_context(named)?;
     let solve = || spinning(|| own.reconstruct(&y[..used], &settings));
     let found = times.time("reconstruct", solve).with_context(named)?;
-    super::check_finite(args, &found.image)?;
+    super::check_finite(&args.source.input, &found.image)?;
 
     let mut notes = Vec::new();
     if own.rank() < used.min(side.area()) {
@@ -72,8 +72,6 @@ pub fn run(args: &Args, path: &Path) -> Result<ExitCode> {
     if own.unseen_pixels() > 0 {
         notes.push(format!("{} pixels are seen by no pattern", own.unseen_pixels()));
     }
-    let has_basis =
-        !matches!(settings.method, MatrixMethod::PseudoInverse | MatrixMethod::TotalVariation);
     let basis = match &args.method.dictionary {
         Some(path) => path.display().to_string(),
         None => settings.basis.to_string(),
@@ -86,16 +84,16 @@ pub fn run(args: &Args, path: &Path) -> Result<ExitCode> {
         used,
         rank: own.rank(),
         unseen_pixels: own.unseen_pixels(),
-        method: args.method.method,
-        basis: has_basis.then_some(basis),
+        method: args.method.method.argument(),
+        basis: args.method.method.takes(Setting::Basis).then_some(basis),
         strength: found.strength,
         sparsity: found.atoms.map(|(size, _)| size),
-        stop: found.atoms.map(|(_, stop)| args.method.reason(stop)),
+        stop: found.atoms.map(|(_, stop)| args.method.atoms().reason(stop)),
         relative_residual: found.residual,
         notes,
         stage_ms: times,
     };
-    super::write(args, &found.image, None, &report)?;
+    super::write(&args.out, &found.image, None, &report)?;
     if args.json {
         print::json(&report)?;
     } else {
@@ -105,17 +103,13 @@ pub fn run(args: &Args, path: &Path) -> Result<ExitCode> {
 }
 
 fn settings(args: &Args) -> Result<MatrixSettings> {
-    let method = match args.method.method {
-        Method::Hadamard => {
-            let text = "--method hadamard with --matrix, whose rows are none of Hadamard's: expected pseudo-inverse, \
-                        tikhonov, omp, tv or fista";
-            return Err(Usage(text.to_owned()).into());
-        }
-        Method::PseudoInverse => MatrixMethod::PseudoInverse,
-        Method::Tikhonov => MatrixMethod::Tikhonov,
-        Method::Fista => MatrixMethod::Sparse,
-        Method::Tv => MatrixMethod::TotalVariation,
-        Method::Omp => MatrixMethod::Omp,
+    let asked = args.method.method;
+    let Some(method) = asked.with_matrix() else {
+        let methods = Method::listed(|method| method.with_matrix().is_some());
+        return Err(Usage(format!(
+            "--method {asked} needs Hadamard rows, and --matrix gives other patterns: expected {methods}"
+        ))
+        .into());
     };
     Ok(MatrixSettings {
         basis: args.method.basis()?,
@@ -142,7 +136,7 @@ fn say(args: &Args, report: &Report) -> Result<()> {
     let basis = report.basis.as_ref().map(|b| format!(", {b} basis")).unwrap_or_default();
     print::line(format_args!(
         "{}{basis}{atoms}{strength}, relative residual {:.3}",
-        report.method.name(),
+        args.method.method.name(),
         report.relative_residual
     ))?;
     for note in &report.notes {

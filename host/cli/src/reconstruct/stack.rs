@@ -1,15 +1,16 @@
 //! `nirspi reconstruct --index all`: every measurement of a file or frame of a recording, as a video.
 
-use super::{Args, choose_order, enhanced, print, spinning};
+use super::{Args, enhanced, print, spinning};
 use crate::Usage;
-use crate::method::{self, Method, Solved, solve};
+use crate::method::{self, Solved};
 use crate::report::{StageTimes, to_json};
 use anyhow::{Context, Result, bail};
 use nirspi::files::image::encode_grey;
 use nirspi::files::npy;
 use nirspi::files::output::OutputDir;
-use nirspi_recon::reconstruct::omp_video;
-use nirspi_recon::{Image, Measurements, Order, Side};
+use nirspi::source::FirstPatterns;
+use nirspi_recon::reconstruct::{Method, Reconstruction, Setting};
+use nirspi_recon::{Image, Measurements, Rows, Side};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -42,26 +43,28 @@ struct FrameReport {
     notes: Vec<String>,
 }
 
-pub fn run(args: &Args, order: Option<Order>) -> Result<ExitCode> {
-    if args.warm_start && args.method.method != Method::Omp {
-        return Err(Usage("--warm-start belongs to --method omp".to_owned()).into());
+pub fn run(args: &Args, first: &FirstPatterns) -> Result<ExitCode> {
+    if args.warm_start && !args.method.method.takes(Setting::WarmStart) {
+        let methods = Method::listed(|method| method.takes(Setting::WarmStart));
+        return Err(Usage(format!("--warm-start belongs to --method {methods}")).into());
     }
     let mut times = StageTimes::default();
     let sources = times.time("read", || args.source.load_all())?;
     let named = || args.source.input.display().to_string();
-    let Some(first) = sources.first() else { bail!("{}: no measurement in it", named()) };
-    let (order, order_name) = choose_order(args, order, first);
-    let used: Vec<Measurements> = sources
+    if sources.is_empty() {
+        bail!("{}: no measurement in it", named());
+    }
+    let (used, orders): (Vec<Measurements>, Vec<String>) = sources
         .iter()
-        .map(|source| source.measurements.take(order.as_ref(), args.sampling))
+        .map(|source| first.take(&source.measurements, args.sampling))
         .collect::<Result<_, _>>()
         .with_context(named)?;
     let solved = times.time("reconstruct", || spinning(|| solve_all(args, &used)))?;
     let (mut images, mut frames) = (Vec::new(), Vec::new());
-    for ((Solved { image, report }, warm), (used, source)) in
-        solved.into_iter().zip(used.iter().zip(sources))
-    {
-        super::check_finite(args, &image)?;
+    for (made, (used, source)) in solved.into_iter().zip(used.iter().zip(sources)) {
+        let warm = made.report.warm;
+        let Solved { image, report } = args.method.solved(made);
+        super::check_finite(&args.source.input, &image)?;
         let dropped = |d: &nirspi_recon::Dropout| {
             format!("drop-out: {} readings from y[{}] on", d.length, d.start)
         };
@@ -73,8 +76,8 @@ pub fn run(args: &Args, order: Option<Order>) -> Result<ExitCode> {
     }
     let mut sharp = None;
     if args.enhance {
-        let made: Vec<(&Image, &[u32])> =
-            images.iter().zip(&used).map(|(image, used)| (image, used.rows())).collect();
+        let made: Vec<(&Image, &Rows)> =
+            images.iter().zip(&used).map(|(image, used)| (image, used.rows().as_slice())).collect();
         let (pixels, reports) = spinning(|| enhanced::run(&made, &mut times))?;
         for (frame, report) in frames.iter_mut().zip(reports) {
             frame.enhancement = Some(report);
@@ -85,7 +88,7 @@ pub fn run(args: &Args, order: Option<Order>) -> Result<ExitCode> {
     let report = Report {
         input: args.source.input.clone(),
         n,
-        order: order_name,
+        order: orders.into_iter().next().unwrap_or_default(),
         warm_start: args.warm_start,
         frames,
         stage_ms: times,
@@ -111,15 +114,14 @@ pub fn run(args: &Args, order: Option<Order>) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Each image, and whether it started from the one before.
-fn solve_all(args: &Args, used: &[Measurements]) -> Result<Vec<(Solved, bool)>> {
-    if !args.warm_start {
-        return used.iter().map(|used| Ok((solve(&args.method, used)?, false))).collect();
-    }
-    let (settings, device) = args.method.omp_settings()?;
-    let frames = omp_video(used, &settings)?;
-    let solved = |found| args.method.solved(found, &settings, device.clone());
-    Ok(frames.into_iter().map(|f| (solved(f.reconstruction), f.warm)).collect())
+/// The image of each frame.
+fn solve_all(args: &Args, used: &[Measurements]) -> Result<Vec<Reconstruction>> {
+    let Some(first) = used.first() else { return Ok(Vec::new()) };
+    let method = args.method.prepare(first.side().pixels())?;
+    Ok(match args.warm_start {
+        true => method.reconstruct_video(used)?,
+        false => used.iter().map(|used| method.reconstruct(used)).collect::<Result<_, _>>()?,
+    })
 }
 
 /// The frames in rows, each stretched to its own black and white.
@@ -155,12 +157,17 @@ fn say(args: &Args, report: &Report) -> Result<()> {
         print::line(format_args!("the last: {} measurements, {}", last.used, last.method))?;
     }
     for (at, frame) in report.frames.iter().enumerate() {
+        let warnings = frame.enhancement.iter().flat_map(|enhancement| &enhancement.warnings);
+        for warning in warnings {
+            print::line(format_args!("warning: frame {at}: {warning}"))?;
+        }
         for note in &frame.notes {
             print::line(format_args!("note: frame {at}: {note}"))?;
         }
     }
+    let enhanced = if args.enhance { ", enhanced.npy, enhanced.png" } else { "" };
     print::line(format_args!(
-        "wrote image.npy, image.png and report.json to {}",
+        "wrote image.npy, image.png{enhanced} and report.json to {}",
         args.out.display()
     ))
 }

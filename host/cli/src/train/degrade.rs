@@ -5,7 +5,7 @@ use crate::print;
 use anyhow::Result;
 use indicatif::{ProgressBar, ProgressStyle};
 use nirspi::files::output::write_atomic;
-use nirspi::training::{SimulatedCamera, pairs};
+use nirspi::training::{LinearCamera, pairs};
 use nirspi_eval::train::Found;
 use nirspi_nets::data::Part;
 use serde::Serialize;
@@ -53,7 +53,7 @@ struct Report {
 
 pub fn run(args: &Args) -> Result<ExitCode> {
     let (scenes, data) = args.data.data().scenes(args.seed)?;
-    let camera = SimulatedCamera::new(args.seed)?;
+    let camera = LinearCamera::new(args.seed)?;
     let bar = ProgressBar::new(u64::from(args.count)).with_style(
         ProgressStyle::with_template("degrade {bar:30} {pos}/{len} pairs, {eta} left")
             .unwrap_or_else(|_| ProgressStyle::default_bar()),

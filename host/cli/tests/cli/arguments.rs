@@ -44,6 +44,7 @@ fn every_command_explains_itself_with_an_example() {
 #[test]
 fn mistakes_in_the_arguments_get_one_line_and_code_2() {
     let bench = Bench::new();
+    let boards = nirspi::boards::flashable();
     let mistakes: &[(&[&str], &[&str])] = &[
         (&["demo", "--bogus"], &["--bogus"]),
         (&["bogus"], &["bogus"]),
@@ -88,7 +89,7 @@ fn mistakes_in_the_arguments_get_one_line_and_code_2() {
         ),
         (&["info", "--camera", "usb:"], &["--camera", "usb:SERIAL"]),
         (&["flash"], &["--board"]),
-        (&["flash", "--board", "toaster"], &["toaster", "nucleo-u5a5zj-q, nucleo-h7s3l8"]),
+        (&["flash", "--board", "toaster"], &["toaster", &boards]),
         (&["flash", "--board", "mps2-an505"], &["mps2-an505", "QEMU"]),
         (&["capture", "--camera", "tcp:nowhere"], &["--camera", "tcp:HOST:PORT"]),
         (&["deblur", "in.npy"], &["--out"]),

@@ -193,7 +193,16 @@ fn tampered(camera: &str, mut tamper: impl FnMut(&mut Vec<u8>) -> bool + Send + 
 
 /// Without calibration, so that nearly all bytes are frames'.
 fn capture_through(bench: &Bench, camera: &str) -> crate::bench::Outcome {
-    let plain = ["--no-calibration", "--frames", "100", "--out", "rec.mcap", "--json"];
+    let plain = [
+        "--no-calibration",
+        "--adc-latency",
+        "6",
+        "--frames",
+        "100",
+        "--out",
+        "rec.mcap",
+        "--json",
+    ];
     bench.run(&[&["capture", "--camera", camera][..], &plain].concat())
 }
 

@@ -115,3 +115,20 @@ fn scenes_and_distances_that_cannot_be_leave_nothing_behind() {
     bench.run(&["demo", "--frames", "1", "--out", "text.png"]).failed(1, &["text.png", "a file"]);
     assert_eq!(std::fs::read(bench.path("text.png")).unwrap(), b"no picture at all");
 }
+
+#[test]
+fn a_far_letter_is_dim_and_never_inverted() {
+    let bench = Bench::new();
+    for distance in ["0.7", "1"] {
+        let report = bench
+            .run(&["demo", "--distance-m", distance, "--out", "demo", "--json"])
+            .succeeded()
+            .json();
+        assert_eq!(report["adc_latency_clocks"], 6, "{report}");
+        for stage in ["raw", "reconstruction"] {
+            let likeness = report[stage]["correlation"].as_f64().unwrap();
+            assert!(likeness > 0.3, "{stage} at {distance} m: {likeness}");
+            assert!(report[stage]["inverted"].is_null(), "{report}");
+        }
+    }
+}

@@ -130,7 +130,7 @@ fn a_web_server_is_no_camera() {
 
 #[test]
 fn a_device_that_hangs_up_is_no_camera() {
-    refused(&device(drop), &["link was closed instead of a greeting", "another host"]);
+    refused(&device(drop), &["link closed before the camera answered", "another program"]);
 }
 
 #[test]

@@ -7,6 +7,7 @@
 mod arguments;
 mod bad_files;
 mod bench;
+mod calibrate;
 mod capture_tcp;
 mod demo;
 mod enhance;

@@ -250,7 +250,7 @@ fn what_is_wrong_with_patterns_of_the_users_own_is_named() {
     write("dark.npy", &[10, 16], &[0.0; 160]);
     run("dark.npy", &[]).failed(1, &["dark.npy", "rank 0"]);
     write("phi.npy", &[10, 16], &weights);
-    run("phi.npy", &["--method", "hadamard"]).failed(2, &["none of Hadamard's", "pseudo-inverse"]);
+    run("phi.npy", &["--method", "hadamard"]).failed(2, &["needs Hadamard rows", "pseudo-inverse"]);
     run("phi.npy", &["--order", "zig-zag"]).failed(2, &["--matrix", "--order"]);
     weights[35] = f32::NAN;
     write("phi.npy", &[10, 16], &weights);

@@ -33,7 +33,7 @@ fn a_self_test_keeps_a_calibration_that_capture_then_uses_and_names() {
         let report = capture(fresh).succeeded().json();
         assert!(report["calibration"].is_null() && report["calibrated"] == true, "{report}");
     }
-    let none = capture(&["--no-calibration", "--json"]).succeeded().json();
+    let none = capture(&["--no-calibration", "--adc-latency", "6", "--json"]).succeeded().json();
     assert_eq!(none["calibrated"], false);
 }
 
@@ -46,7 +46,8 @@ fn a_calibration_of_another_camera_or_gateware_is_refused() {
         bench.run(&[&arguments, more].concat())
     };
     capture(&["--calibration", "mine.json", "--seed", "2"])
-        .failed(1, &["mine.json", "serial number virtual-1", "virtual-2", "nirspi selftest"]);
+        .failed(1, &["mine.json", "serial number virtual-1", "virtual-2", "nirspi calibrate"]);
+    let serial = bench.json("mine.json")["camera"]["serial"].as_str().unwrap().to_owned();
     let mut text = std::fs::read_to_string(bench.path("mine.json")).unwrap();
     text = text.replace(r#""gateware": "0.1.0""#, r#""gateware": "0.0.1""#);
     bench.write("mine.json", text.as_bytes());
@@ -57,7 +58,7 @@ fn a_calibration_of_another_camera_or_gateware_is_refused() {
     // The one kept for the camera is passed over with a word, and the capture goes on.
     let folder = bench.path("data").join("nirspi/calibration");
     std::fs::create_dir_all(&folder).unwrap();
-    std::fs::copy(bench.path("mine.json"), folder.join("virtual-1.json")).unwrap();
+    std::fs::copy(bench.path("mine.json"), folder.join(format!("{serial}.json"))).unwrap();
     let said = capture(&[]).succeeded().stdout;
     assert!(said.contains("measured afresh") && said.contains("gateware 0.0.1"), "{said}");
 }
@@ -83,6 +84,8 @@ fn a_failed_self_test_names_the_fault_and_exits_with_1() {
     let failed: Vec<&str> =
         outcome.stdout.lines().filter(|line| line.starts_with("FAIL")).collect();
     assert_eq!(failed.len(), 1, "{outcome:?}");
+    assert!(outcome.stdout.contains("no calibration kept: the self-test failed"), "{outcome:?}");
+    assert!(!bench.path("data/nirspi/calibration/broken.json").exists());
     assert!(failed[0].contains("LED lines") && failed[0].contains("row line 12"), "{failed:?}");
     server.join().unwrap();
 }

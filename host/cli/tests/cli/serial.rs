@@ -58,13 +58,13 @@ impl Plugged {
                 }
                 let mut worked = false;
                 for _ in 0..64 {
-                    worked |= !camera.outbox().is_full() && camera.step(STEP_CLOCKS);
+                    worked |= !camera.packets_out().is_full() && camera.step(STEP_CLOCKS);
                 }
-                let waiting = camera.outbox().waiting().to_vec();
+                let waiting = camera.packets_out().waiting().to_vec();
                 if writer.write_all(&waiting).is_err() {
                     break;
                 }
-                camera.outbox().sent(waiting.len());
+                camera.packets_out().sent(waiting.len());
                 if !worked {
                     std::thread::sleep(Duration::from_millis(1));
                 }

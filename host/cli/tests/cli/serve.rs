@@ -223,7 +223,8 @@ fn pages_switch_method_enhancement_and_number_of_frames() {
     let bench = Bench::new();
     let server = serve(&bench, &["--method", "tikhonov"]);
     let state = server.state("enhanced", shows_enhanced);
-    assert_eq!(state["offered"]["methods"], serde_json::json!(["hadamard", "omp", "tikhonov"]));
+    let every = ["hadamard", "omp", "pseudo-inverse", "tikhonov", "fista", "tv"];
+    assert_eq!(state["offered"]["methods"], serde_json::json!(every));
     assert_eq!(state["picture"]["method"], "tikhonov");
     let set = server.change(r#"{"method": "hadamard", "enhance": false, "frames": 3}"#).json();
     assert_eq!(set, serde_json::json!({"method": "hadamard", "enhance": false, "frames": 3}));
@@ -235,7 +236,9 @@ fn pages_switch_method_enhancement_and_number_of_frames() {
     });
     server.get("/enhanced.png").refuses(503, "no such image");
 
-    server.change(r#"{"method": "magic", "enhance": true}"#).refuses(400, "hadamard or omp");
+    server
+        .change(r#"{"method": "magic", "enhance": true}"#)
+        .refuses(400, "expected hadamard, omp, ");
     server.change(r#"{"frames": 0}"#).refuses(400, "frames is 0");
     server.change(r#"{"laser": "on"}"#).refuses(400, "laser");
     server.change("\u{0}").refuses(400, "expected for example");
@@ -276,6 +279,19 @@ fn who_lets_the_network_look_is_told_so() {
     server.process.says("everybody in the network");
     server.ask("GET", "/", &["Host: camera.evil.example"], "").refuses(403, "by that name");
     assert_eq!(server.ask("GET", "/", &["Host: 192.0.2.7"], "").status, 200);
+}
+
+#[test]
+fn a_camera_of_unknown_latency_shows_a_red_state_and_no_picture() {
+    let bench = Bench::new();
+    // A letter at 1 m is too dim to show the latency, and no calibration is kept.
+    let server = serve(&bench, &["--distance-m", "1"]);
+    let is_red = |state: &Value| state["camera"]["phase"] == "uncalibrated";
+    let red = server.state("uncalibrated", is_red);
+    let line = red["camera"]["line"].as_str().unwrap();
+    assert!(line.contains("too dim") && line.contains("nirspi calibrate"), "{line}");
+    assert!(red["picture"].is_null(), "{red}");
+    server.get("/image.png").refuses(503, "no such image");
 }
 
 #[test]

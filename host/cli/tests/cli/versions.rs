@@ -58,6 +58,6 @@ fn a_build_that_cannot_flash_says_how_to_get_one_that_can() {
 fn a_missing_firmware_file_says_how_to_build_it() {
     let bench = Bench::new();
     let flash = ["flash", "--board", "nucleo-u5a5zj-q"];
-    bench.run(&flash).failed(1, &["boards/target", "cd boards/nucleo-u5a5zj-q && cargo build"]);
+    bench.run(&flash).failed(1, &["boards/target", "bash boards/build.sh nucleo-u5a5zj-q"]);
     bench.run(&["flash", "--list"]).succeeded();
 }

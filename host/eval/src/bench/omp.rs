@@ -233,8 +233,7 @@ pub fn random_problem(
     if frames == 0 {
         return Err(EvalError::setting("frames", frames, "1 or more"));
     }
-    let mut rows = Order::Random(seed).rows(side)?;
-    rows.truncate(measurements);
+    let rows = Order::Random(seed).rows(side)?.first(measurements);
     let dictionary = scenes::cosines_by(&rows)?;
     let mut random = Pcg64::seed_from_u64(seed);
     let mut y = Vec::with_capacity(frames * measurements);

@@ -96,7 +96,7 @@ impl Work {
             return Err(EvalError::setting("sparsity", sparsity, format!("1 to {measurements}")));
         }
         let side = Side::INSTRUMENT;
-        let mut rows = Order::Random(seed).rows(side)?;
+        let mut rows = Order::Random(seed).rows(side)?.to_vec();
         // The pattern that sees all light first, as every order of a camera has it.
         rows.sort_by_key(|&row| row != 0);
         rows.truncate(measurements as usize);

@@ -8,11 +8,11 @@ use super::measure::{Condition, SIDE, halved};
 use super::{MIDDLE, UNTOUCHED};
 use crate::error::{EvalError, On, Result};
 use nirspi::files::image::read_reflectance;
-use nirspi::files::npz::{self, Readings, Selection};
 use nirspi::picture::{Panel, Range, SideBySide};
+use nirspi::source::{Index, Source, SourceOptions};
 use nirspi_nets::consistency::Consistency;
 use nirspi_nets::upscale_2x;
-use nirspi_recon::{Measurements, metrics, reconstruct};
+use nirspi_recon::{metrics, reconstruct};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use serde::Serialize;
@@ -127,14 +127,9 @@ fn part_of(picture: &[f32], size_px: usize, down: f64, across: f64) -> Vec<f32> 
 
 /// A real measurement: 64 x 64 ones are their own truth, seen through means of 2 x 2.
 fn measured(path: &Path) -> Result<Scene> {
-    let file = npz::read(path, Selection { index: Some(0), non_differential: false })?;
-    let (side, rows) = (file.side, &file.h_row);
-    let measurements = match &file.readings {
-        Readings::Pairs(y) => Measurements::from_pairs(side, rows, y)?.0,
-        Readings::Differential(d) => Measurements::from_differential(side, rows, d)?,
-        Readings::Single(y) => Measurements::from_single(side, rows, y)?,
-    };
-    let image = reconstruct::hadamard(&measurements);
+    let first = SourceOptions { index: Some(Index::One(0)), ..SourceOptions::default() };
+    let source = Source::read(path, first)?;
+    let image = reconstruct::hadamard(&source.measurements);
     let side = image.side().pixels();
     let (low, high) = image
         .pixels()
@@ -188,6 +183,7 @@ pub fn enhance(scenes: &[Scene], contender: &Contender) -> Result<Shown> {
             values: vec![0.0; 3 * SIDE * CASES_A_PANEL * SIDE],
             range: Range::Unit,
             caption: Vec::new(),
+            warnings: Vec::new(),
         };
         for (place, scene) in some.iter().enumerate() {
             let before = upscale_2x(&scene.readings, 1, SIDE / 2, SIDE / 2)?;

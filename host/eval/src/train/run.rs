@@ -3,7 +3,7 @@
 use super::data::{Data, Found};
 use super::folder::RunFolder;
 use crate::error::{EvalError, On, Result};
-use nirspi::training::{Mixed, SimulatedCamera};
+use nirspi::training::{LinearCamera, Mixed};
 use nirspi_nets::Weights;
 use nirspi_nets::degrade::{AnalyticCamera, Limits};
 use nirspi_nets::device::{Backend, Device};
@@ -86,7 +86,7 @@ fn degradation(request: &Request) -> Result<Mixed> {
         return Ok(Mixed { analytic: AnalyticCamera::new(limits)?, camera: None });
     }
     let camera = match request.camera_share > 0.0 {
-        true => Some((SimulatedCamera::new(request.settings.seed)?, request.camera_share)),
+        true => Some((LinearCamera::new(request.settings.seed)?, request.camera_share)),
         false => None,
     };
     Ok(Mixed { analytic: AnalyticCamera::new(Limits::default())?, camera })

@@ -6,7 +6,7 @@
 use super::{DEPTH_SIDE, Degrade, DegradeError, Depth, READING_PX, Reading, sampled};
 use crate::blur::Blur;
 use crate::data::{AREA_PX, SIDE_PX};
-use nirspi_recon::{Order, Side, fwht};
+use nirspi_recon::{Order, Rows, Side, fwht};
 use rand::RngExt;
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
@@ -78,7 +78,7 @@ const DEPTH_NOISE_M: f32 = 0.005;
 pub struct AnalyticCamera {
     limits: Limits,
     /// Rows in the orders whose first patterns carry most.
-    orders: Vec<Vec<u32>>,
+    orders: Vec<Rows>,
 }
 
 impl AnalyticCamera {

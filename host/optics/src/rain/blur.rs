@@ -49,11 +49,13 @@ impl ForwardBlur {
     }
 
     /// Share of the light that reaches its aim untouched, `exp(-cL)`.
+    #[must_use]
     pub fn unscattered(&self) -> f64 {
         self.medium.transmission(self.distance_mm * 1e-3)
     }
 
     /// Share of the light that is scattered once and lands within `radius_mm` of its aim.
+    #[must_use]
     pub fn scattered_within(&self, radius_mm: f64) -> f64 {
         let Some(angles) = &self.angles else { return 0.0 };
         let step_mm = self.distance_mm / STEPS as f64;
@@ -65,6 +67,7 @@ impl ForwardBlur {
 
     /// Share of a target point's light that still reaches a bucket detector which sees `field_rad` across: what is
     /// left of the beam, and what is scattered by less than half the field and so stays in view.
+    #[must_use]
     pub fn returned(&self, field_rad: f64) -> f64 {
         let depth = self.medium.scattering_per_m * self.distance_mm * 1e-3;
         let kept = self.angles.as_ref().map_or(0.0, |angles| angles.within(field_rad / 2.0));
@@ -72,6 +75,7 @@ impl ForwardBlur {
     }
 
     /// The point-spread function on the grid of LED spots, `pitch_mm` apart on the target.
+    #[must_use]
     pub fn kernel(&self, pitch_mm: f64) -> BlurKernel {
         // Density at radius r, from the cumulative share at radii a sixth of an octave apart.
         let smallest = pitch_mm / PI.sqrt();
@@ -116,6 +120,7 @@ pub struct BlurKernel {
 
 impl BlurKernel {
     /// Scattered share that lands `rows` below and `columns` right of an LED's own spot; 0 beyond the grid.
+    #[must_use]
     pub fn scattered(&self, rows: i32, columns: i32) -> f64 {
         let at =
             |offset: i32| usize::try_from(offset + SIDE as i32 - 1).ok().filter(|&i| i < REACH);
@@ -139,6 +144,7 @@ impl BlurKernel {
     ///
     /// # Panics
     /// If `reflectance` does not hold 1024 values.
+    #[must_use]
     pub fn halo(&self, reflectance: &[f32]) -> Vec<f64> {
         assert_eq!(reflectance.len(), LEDS, "a 32 x 32 grid");
         let lit: Vec<(usize, usize, f64)> = reflectance

@@ -42,6 +42,7 @@ pub struct Drops {
 
 impl Drops {
     /// Dry air.
+    #[must_use]
     pub fn none() -> Self {
         Self::default()
     }
@@ -155,16 +156,19 @@ impl Drops {
     }
 
     /// The classes.
+    #[must_use]
     pub fn classes(&self) -> &[DropClass] {
         &self.classes
     }
 
     /// Whether the air is dry.
+    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.concentration_per_m3() == 0.0
     }
 
     /// Drops in a cubic metre.
+    #[must_use]
     pub fn concentration_per_m3(&self) -> f64 {
         self.classes.iter().map(|class| class.per_m3).sum()
     }
@@ -175,18 +179,21 @@ impl Drops {
     }
 
     /// Depth of water that falls in an hour at sea level, `sum N v pi/6 D^3`.
+    #[must_use]
     pub fn rate_mm_per_h(&self) -> f64 {
         // mm^3 m / (m^3 s) = 1e-9 m/s = 1e-6 mm/s
         self.sum(|d| PI / 6.0 * d.powi(3) * fall_speed_m_per_s(d)) * 1e-6 * 3600.0
     }
 
     /// Water in the air.
+    #[must_use]
     pub fn liquid_water_g_per_m3(&self) -> f64 {
         self.sum(|d| PI / 6.0 * (d * 1e-3).powi(3) * WATER_G_PER_M3)
     }
 
     /// Share of a plane that the drops of one metre of air cover, `sum N pi/4 D^2`: half of the extinction of drops
     /// that are large against the wavelength.
+    #[must_use]
     pub fn shadow_per_m(&self) -> f64 {
         self.sum(|d| PI / 4.0 * d * d * 1e-6)
     }

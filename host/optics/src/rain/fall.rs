@@ -6,17 +6,20 @@ pub const SEA_LEVEL_AIR_KG_PER_M3: f64 = 1.204;
 /// Terminal speed in still air at sea level: `9.65 - 10.3 exp(-0.6 D)` m/s, D in mm (Atlas, Srivastava and Sekhon,
 /// Rev. Geophys. 11, 1, 1973, a fit to Gunn and Kinzer's measurements from 0.6 to 5.8 mm). Below 0.109 mm, where the
 /// fit turns negative, 0: such droplets hang.
+#[must_use]
 pub fn fall_speed_m_per_s(diameter_mm: f64) -> f64 {
     (9.65 - 10.3 * (-0.6 * diameter_mm).exp()).max(0.0)
 }
 
 /// Terminal speed in air of another density: times `(1.204 / density)^0.4` (Foote and du Toit, J. Appl. Meteorol. 8,
 /// 249, 1969).
+#[must_use]
 pub fn fall_speed_in_air_m_per_s(diameter_mm: f64, air_kg_per_m3: f64) -> f64 {
     fall_speed_m_per_s(diameter_mm) * (SEA_LEVEL_AIR_KG_PER_M3 / air_kg_per_m3).powf(0.4)
 }
 
 /// Time in which a drop falls by twice its diameter, `2 D / v`, in seconds: the paper's tau_rain (Algorithm 2).
+#[must_use]
 pub fn fall_time_constant_s(diameter_mm: f64) -> f64 {
     2.0 * diameter_mm * 1e-3 / fall_speed_m_per_s(diameter_mm)
 }
@@ -24,12 +27,14 @@ pub fn fall_time_constant_s(diameter_mm: f64) -> f64 {
 /// The upper bound `sqrt(D) / (50 T)` of Algorithm 2's beta, before clamping. With D in metres it is the longest time
 /// that a drop stays before one pixel, `sqrt(a) / 50` for a radius a (Garg and Nayar, Int. J. Comput. Vis. 75, 3,
 /// 2007), over the exposure; the paper writes the diameter for the radius.
+#[must_use]
 pub fn beta_bound_as_printed(diameter_mm: f64, exposure_s: f64) -> f64 {
     (diameter_mm * 1e-3).sqrt() / (50.0 * exposure_s)
 }
 
 /// Share of an exposure that a drop spends before one pixel: the bound above, in 0 to 1, the only range in which it
 /// can be a share. For exposures of microseconds it is 1: the drop stands still.
+#[must_use]
 pub fn beta(diameter_mm: f64, exposure_s: f64) -> f64 {
     beta_bound_as_printed(diameter_mm, exposure_s).clamp(0.0, 1.0)
 }

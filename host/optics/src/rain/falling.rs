@@ -184,11 +184,13 @@ impl FallingDrops {
     }
 
     /// Share of each LED's light that the drops leave on both ways, 32 x 32, row-major.
+    #[must_use]
     pub fn kept(&self) -> Vec<f32> {
         self.left(Ways::Both)
     }
 
     /// The same on the way back alone: what drops leave of each spot's view, for a camera that needs no LEDs.
+    #[must_use]
     pub fn seen(&self) -> Vec<f32> {
         self.left(Ways::Back)
     }
@@ -202,6 +204,7 @@ impl FallingDrops {
     }
 
     /// Drops in the air around the beams.
+    #[must_use]
     pub fn count(&self) -> usize {
         self.drops.len()
     }

@@ -58,6 +58,7 @@ impl Medium {
     }
 
     /// Scattered share of what is taken out; 1 without drops, which absorb nothing.
+    #[must_use]
     pub fn albedo(&self) -> f64 {
         if self.extinction_per_m > 0.0 {
             self.scattering_per_m / self.extinction_per_m
@@ -67,17 +68,20 @@ impl Medium {
     }
 
     /// Extinction in dB/km.
+    #[must_use]
     pub fn extinction_db_per_km(&self) -> f64 {
         self.extinction_per_m * 1e3 * 10.0 / 10.0_f64.ln()
     }
 
     /// Share of a beam left after `path_m` (Beer and Lambert).
+    #[must_use]
     pub fn transmission(&self, path_m: f64) -> f64 {
         (-self.extinction_per_m * path_m).exp()
     }
 
     /// Distance at which the contrast of a black object against the sky falls to 2 %, `3.912 / extinction`
     /// (Koschmieder); infinite in dry air.
+    #[must_use]
     pub fn visibility_m(&self) -> f64 {
         3.912 / self.extinction_per_m
     }
@@ -174,6 +178,7 @@ impl ScatteringAngles {
     }
 
     /// Share of the scattered light that leaves within `angle_rad` of the beam.
+    #[must_use]
     pub fn within(&self, angle_rad: f64) -> f64 {
         let bin = self.edges_rad.partition_point(|&edge| edge < angle_rad);
         if bin >= BINS {
@@ -186,6 +191,7 @@ impl ScatteringAngles {
     }
 
     /// The angle within which a share of the scattered light leaves: a random angle for a random `share` in 0 to 1.
+    #[must_use]
     pub fn quantile_rad(&self, share: f64) -> f64 {
         let bin = self.cumulative.partition_point(|&sum| sum < share).min(BINS - 1);
         let (low_angle, low) =
@@ -196,6 +202,7 @@ impl ScatteringAngles {
     }
 
     /// Mean cosine of the scattering angle, from the bins' centres.
+    #[must_use]
     pub fn asymmetry(&self) -> f64 {
         let mut low = (0.0, 0.0);
         let mut mean = 0.0;
@@ -207,6 +214,7 @@ impl ScatteringAngles {
     }
 
     /// What the sampled phase function integrated to before it was made 1: how well the bins resolve it.
+    #[must_use]
     pub fn raw_total(&self) -> f64 {
         self.raw_total
     }

@@ -11,18 +11,21 @@ use num_complex::Complex64;
 const WATER_AT_10_CM: Complex64 = Complex64::new(8.88, 0.63);
 
 /// `10 log10(horizontal / vertical)` of two reflectivities, in dB: Algorithm 2's Z_dr.
+#[must_use]
 pub fn differential_reflectivity_db(horizontal: f64, vertical: f64) -> f64 {
     10.0 * (horizontal / vertical).log10()
 }
 
 /// Height over width of a falling drop: `1.03 - 0.062 D`, D in mm, at most 1 (Pruppacher and Beard, Q. J. R.
 /// Meteorol. Soc. 96, 247, 1970).
+#[must_use]
 pub fn axis_ratio(diameter_mm: f64) -> f64 {
     (1.03 - 0.062 * diameter_mm).clamp(0.4, 1.0)
 }
 
 /// Z_dr of these drops, in dB; none without drops. Oblate spheroids small against the wavelength (Rayleigh-Gans;
 /// Bringi and Chandrasekar, *Polarimetric Doppler Weather Radar*, 2001, appendix 1), symmetry axes vertical.
+#[must_use]
 pub fn drops_reflectivity_db(drops: &Drops) -> Option<f64> {
     let both = |vertical: bool| {
         drops.sum(|d| d.powi(6) * polarisability(axis_ratio(d), vertical).norm_sqr())

@@ -66,6 +66,7 @@ impl RainySpots {
     }
 
     /// What each LED's spot shows now, 32 x 32, row-major: reflectances as a camera in dry air would see them.
+    #[must_use]
     pub fn reflectance(&self) -> Vec<f32> {
         let kept = self.kept as f32;
         let spots = self.dry.iter().zip(&self.added);

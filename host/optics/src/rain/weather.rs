@@ -27,11 +27,13 @@ impl Weather {
     }
 
     /// What is in the air.
+    #[must_use]
     pub fn drops(&self) -> &Drops {
         &self.drops
     }
 
     /// Optical coefficients.
+    #[must_use]
     pub fn medium(&self) -> &Medium {
         &self.medium
     }

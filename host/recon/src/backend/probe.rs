@@ -1,8 +1,12 @@
-//! Is there a GPU?
+//! Looks for GPUs.
 //!
-//! The one law: absence is an answer, never a crash. CUDA's libraries are looked for before CubeCL would panic without
-//! them.
+//! # Invariant
+//! [`find`] is the one place that turns a [`Backend`] into a device: a backend asked for by name is found or the error
+//! says what is missing, and [`Backend::Auto`] never gives a software device. Held by
+//! `backend::probe::tests::auto_gives_a_real_gpu_or_says_what_is_missing`. A missing library is an answer, never a panic:
+//! CUDA's libraries are looked for before CubeCL would panic without them.
 
+use super::Backend;
 use cubecl::cuda::{CudaDevice, install::cuda_path};
 use cubecl::future::block_on;
 use cubecl::wgpu::{AutoGraphicsApi, GraphicsApi, WgpuDevice};
@@ -45,6 +49,43 @@ pub enum Absent {
     /// Only what computes no faster than the processor, or is it.
     #[error("only {0}, which is no GPU")]
     NoGpu(String),
+}
+
+/// A device that a backend names.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Gpu {
+    /// Through CUDA.
+    Cuda(Found<CudaDevice>),
+    /// Through Vulkan, Metal or DirectX.
+    Wgpu(Found<WgpuDevice>),
+}
+
+/// The device of a backend is not there. `Display` is one line with all that was looked for.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("{}", .looked_for.iter().map(|(kind, absent)| format!("{kind}: {absent}")).collect::<Vec<_>>().join("; "))]
+pub struct Missing {
+    /// CUDA, wgpu or both, with what is missing of each.
+    pub looked_for: Vec<(&'static str, Absent)>,
+}
+
+/// The device that a backend names; none for the processor. [`Backend::Auto`] means a GPU through CUDA, else a discrete or
+/// integrated one through wgpu; a software device is given to [`Backend::Wgpu`] only.
+///
+/// # Errors
+/// [`Missing`] if there is none.
+pub fn find(backend: Backend) -> Result<Option<Gpu>, Missing> {
+    let through_cuda = || cuda().map(Gpu::Cuda).map_err(|absent| ("CUDA", absent));
+    let through_wgpu =
+        |software_too| wgpu(software_too).map(Gpu::Wgpu).map_err(|absent| ("wgpu", absent));
+    let found = match backend {
+        Backend::Cpu => return Ok(None),
+        Backend::Cuda => through_cuda().map_err(|absent| vec![absent]),
+        Backend::Wgpu => through_wgpu(true).map_err(|absent| vec![absent]),
+        Backend::Auto => through_cuda()
+            .or_else(|no_cuda| through_wgpu(false).map_err(|no_wgpu| vec![no_wgpu, no_cuda])),
+    };
+    found.map(Some).map_err(|looked_for| Missing { looked_for })
 }
 
 /// The first GPU that CUDA can use.
@@ -103,4 +144,36 @@ pub fn wgpu(software_too: bool) -> Result<Found<WgpuDevice>, Absent> {
             None => Absent::Adapter,
             Some(info) => Absent::NoGpu(info.name.clone()),
         })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn auto_gives_a_real_gpu_or_says_what_is_missing() {
+        match find(Backend::Auto) {
+            Ok(None) => panic!("the processor is no answer to a search for a GPU"),
+            Ok(Some(Gpu::Cuda(found))) => assert!(!found.software),
+            Ok(Some(Gpu::Wgpu(found))) => assert!(!found.software),
+            Err(missing) => {
+                let line = missing.to_string();
+                assert!(line.contains("wgpu: ") && line.contains("; CUDA: "), "{line}");
+                assert!(!line.contains('\n'), "{line}");
+            }
+        }
+        assert_eq!(find(Backend::Cpu), Ok(None));
+    }
+
+    #[test]
+    fn a_backend_by_name_is_that_one_or_missing() {
+        match find(Backend::Cuda) {
+            Ok(found) => assert!(matches!(found, Some(Gpu::Cuda(_))), "{found:?}"),
+            Err(missing) => assert!(missing.to_string().starts_with("CUDA: "), "{missing}"),
+        }
+        match find(Backend::Wgpu) {
+            Ok(found) => assert!(matches!(found, Some(Gpu::Wgpu(_))), "{found:?}"),
+            Err(missing) => assert!(missing.to_string().starts_with("wgpu: "), "{missing}"),
+        }
+    }
 }

@@ -1,14 +1,10 @@
 use crate::testing::{Noise, array, correlation_of, readings, real_data, scene, side};
-use crate::{Measurements, reconstruct};
+use crate::{Measurements, Rows, reconstruct};
 use proptest::prelude::*;
 
-fn natural(n: u64) -> Vec<i64> {
-    (0..(n * n) as i64).collect()
-}
-
 /// Raw readings of a scene with a dark level, a drifting lamp and noise.
-fn recorded(n: u64, kind: u8, dark: f64, noise: Noise) -> (Vec<i64>, Vec<f64>) {
-    let rows = natural(n);
+fn recorded(n: u64, kind: u8, dark: f64, noise: Noise) -> (Rows, Vec<f64>) {
+    let rows = Rows::natural(side(n));
     let mut y = readings(side(n), &rows, &scene(side(n), kind));
     let total = y[0];
     let count = y.len() as f64;
@@ -27,7 +23,7 @@ proptest! {
         kind in 0_u8..5, dark in 0.0..0.5, seed: u64, sigma in 0.0..0.3
     ) {
         let (rows, y) = recorded(32, kind, dark, Noise::Normal { sigma, seed });
-        let (measured, dropouts) = Measurements::from_pairs(side(32), &rows, &y).unwrap();
+        let (measured, dropouts) = Measurements::from_pairs(&rows, &y).unwrap();
         prop_assert_eq!(dropouts, vec![]);
         prop_assert_eq!(measured.rows().len(), rows.len());
     }
@@ -37,7 +33,7 @@ proptest! {
         kind in 0_u8..5, photons in 0.2..200.0, seed: u64
     ) {
         let (rows, y) = recorded(32, kind, 0.0, Noise::Poisson { photons, seed });
-        let (_, dropouts) = Measurements::from_pairs(side(32), &rows, &y).unwrap();
+        let (_, dropouts) = Measurements::from_pairs(&rows, &y).unwrap();
         prop_assert_eq!(dropouts, vec![]);
     }
 
@@ -67,7 +63,7 @@ proptest! {
             y[end] = floor + (whole[end] - floor) * partial;
             end += 1;
         }
-        let (measured, dropouts) = Measurements::from_pairs(side(32), &rows, &y).unwrap();
+        let (measured, dropouts) = Measurements::from_pairs(&rows, &y).unwrap();
         prop_assert_eq!(dropouts.len(), 1);
         let found = &dropouts[0];
         prop_assert!(found.start <= start && found.start + found.length >= start + length, "{:?}", found);
@@ -75,10 +71,9 @@ proptest! {
         for row in &found.rows {
             prop_assert!(!measured.rows().contains(row));
         }
-        let (full, _) = Measurements::from_pairs(side(32), &rows, &whole).unwrap();
+        let (full, _) = Measurements::from_pairs(&rows, &whole).unwrap();
         let kept = Measurements::from_differential(
-            side(32),
-            &measured.rows().iter().map(|&r| i64::from(r)).collect::<Vec<_>>(),
+            measured.rows(),
             &measured.rows().iter().map(|&r| full.values()[r as usize]).collect::<Vec<_>>(),
         ).unwrap();
         // What is left is what it would have been, except readings a fraction of which leaked in.
@@ -92,17 +87,17 @@ proptest! {
 #[test]
 fn short_runs_hardly_change_the_image() {
     let (rows, whole) = recorded(32, 1, 0.1, Noise::Normal { sigma: 1e-4, seed: 1 });
-    let (full, _) = Measurements::from_pairs(side(32), &rows, &whole).unwrap();
+    let (full, _) = Measurements::from_pairs(&rows, &whole).unwrap();
     for start in [301, 700, 1501, 2020] {
         let mut y = whole.clone();
         y[start..start + 20].fill(0.0);
-        let (measured, dropouts) = Measurements::from_pairs(side(32), &rows, &y).unwrap();
+        let (measured, dropouts) = Measurements::from_pairs(&rows, &y).unwrap();
         assert_eq!((dropouts[0].start, dropouts[0].length), (start, 20));
         let (a, b) = (reconstruct::hadamard(&measured), reconstruct::hadamard(&full));
         assert!(correlation_of(&a, &b) > 0.99, "run at {start}: {}", correlation_of(&a, &b));
         // The same run left in stripes the image where it cuts a pair in two (whole pairs become zeros).
         let d: Vec<f64> = y.as_chunks::<2>().0.iter().map(|[p, m]| p - m).collect();
-        let striped = Measurements::from_differential(side(32), &rows, &d).unwrap();
+        let striped = Measurements::from_differential(&rows, &d).unwrap();
         let striped = correlation_of(&reconstruct::hadamard(&striped), &b);
         assert!(
             start % 2 == 0 || striped < correlation_of(&a, &b) - 0.01,
@@ -115,11 +110,11 @@ fn short_runs_hardly_change_the_image() {
 fn two_runs_are_two_and_a_dimming_lamp_is_none() {
     let (rows, mut y) = recorded(16, 0, 0.0, Noise::Normal { sigma: 1e-3, seed: 5 });
     y[100..120].iter_mut().for_each(|y| *y *= 0.7);
-    let (_, none) = Measurements::from_pairs(side(16), &rows, &y).unwrap();
+    let (_, none) = Measurements::from_pairs(&rows, &y).unwrap();
     assert_eq!(none, vec![]);
     y[31..36].fill(0.0);
     y[400] = 0.0;
-    let (_, two) = Measurements::from_pairs(side(16), &rows, &y).unwrap();
+    let (_, two) = Measurements::from_pairs(&rows, &y).unwrap();
     let found: Vec<_> = two.iter().map(|d| (d.start, d.length, d.rows.clone())).collect();
     assert_eq!(found, [(31, 5, vec![15, 16, 17]), (400, 1, vec![200])]);
 }
@@ -129,22 +124,22 @@ fn a_detector_of_negative_polarity_is_the_same_upside_down() {
     let (rows, mut y) = recorded(16, 0, 0.0, Noise::Normal { sigma: 1e-3, seed: 5 });
     y[60..70].fill(0.0);
     y.iter_mut().for_each(|y| *y = -*y);
-    let (_, dropouts) = Measurements::from_pairs(side(16), &rows, &y).unwrap();
+    let (_, dropouts) = Measurements::from_pairs(&rows, &y).unwrap();
     assert_eq!((dropouts[0].start, dropouts[0].length), (60, 10));
 }
 
 #[test]
 fn runs_cut_into_the_real_recording_are_found() {
     let Some(mut file) = real_data("opar_ala1.npz") else { return };
-    let rows: Vec<i64> = array::<i32>(&mut file, "h_row").into_iter().map(i64::from).collect();
+    let rows = Rows::new(side(64), array::<i32>(&mut file, "h_row")).unwrap();
     let whole: Vec<f64> = array::<f32>(&mut file, "y").into_iter().map(f64::from).collect();
-    let (full, none) = Measurements::from_pairs(side(64), &rows, &whole).unwrap();
+    let (full, none) = Measurements::from_pairs(&rows, &whole).unwrap();
     assert_eq!(none, vec![]);
     for length in [1, 2, 3, 7, 20, 101, 200] {
         for start in [2, 5, 900, 3333, 7000, whole.len() - length] {
             let mut y = whole.clone();
             y[start..start + length].fill(0.0);
-            let (measured, dropouts) = Measurements::from_pairs(side(64), &rows, &y).unwrap();
+            let (measured, dropouts) = Measurements::from_pairs(&rows, &y).unwrap();
             let found: Vec<_> = dropouts.iter().map(|d| (d.start, d.length)).collect();
             assert_eq!(found, [(start, length)]);
             let alike =

@@ -7,6 +7,7 @@ use thiserror::Error;
 
 /// A backend that cannot compute what it was asked for.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum BackendError {
     /// This machine or this build does not have it.
     #[error("no GPU found ({why})")]

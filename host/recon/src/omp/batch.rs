@@ -4,7 +4,8 @@
 //! number of threads.
 
 use super::dictionary::{Dictionary, padded};
-use super::pursuit::{Path, Solver, energy};
+use super::path::Path;
+use super::pursuit::{Solver, energy};
 use super::referee::Referee;
 use super::scalar::Scalar;
 use super::{Backend, Limits, OmpError, Solution, finite};

@@ -30,6 +30,7 @@ mod engine;
 mod gram;
 mod images;
 mod kernels;
+mod layout;
 
 pub use choice::{Choice, FRAMES_WORTH_A_GPU, choose};
 pub use device::Device;

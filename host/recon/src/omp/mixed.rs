@@ -5,7 +5,8 @@
 
 use super::batch::{Problem, solve_batch_paths, solve_batch_with};
 use super::dense::DenseDictionary;
-use super::pursuit::{Path, Solver, energy};
+use super::path::Path;
+use super::pursuit::{Solver, energy};
 use super::referee::{BELIEVED, BELIEVED_ENERGY, DoubleReferee};
 use super::{Backend, Dictionary, Limits, OmpError, Scalar, Solution, Stop, solve_batch};
 use nalgebra::DMatrix;

@@ -20,9 +20,10 @@
 
 use super::dictionary::{Dictionary, padded};
 use super::kernel::{Best, Next, PANEL, Rows, Step, largest, score};
+use super::path::Path;
 use super::referee::Referee;
 use super::scalar::Scalar;
-use super::{Limits, OmpError, Solution, Stop, finite};
+use super::{Limits, OmpError, Stop, finite};
 use pulp::Arch;
 
 /// How far the coefficients of `atoms` atoms may be off, relative to the norm of all of them, where `condition` is the
@@ -32,28 +33,6 @@ use pulp::Arch;
 #[must_use]
 pub fn error_bound<T: Scalar>(atoms: usize, condition: f64) -> f64 {
     4.0 * atoms.max(4) as f64 * condition * T::EPSILON
-}
-
-/// A pursuit that has ended: a solution for every number of atoms up to the last.
-#[derive(Debug, Clone)]
-pub struct Path<T> {
-    /// Atoms in the order in which they were chosen.
-    pub support: Vec<usize>,
-    /// Norm of the residual before the first and after each atom, relative to the measurement's.
-    pub residual_norms: Vec<f64>,
-    /// Why there are no more.
-    pub stop: Stop,
-    /// Atoms that the measurement does not see.
-    pub unseen: Vec<usize>,
-    /// Least lead of a chosen atom over the best other one: difference of their correlations with the residual, relative
-    /// to the measurement's norm. Rounding may have decided where it is no more than some tens of epsilons.
-    pub least_lead: f64,
-    /// Atoms whose lead was too small to be believed, and that were chosen in double precision.
-    pub refereed: usize,
-    /// Lower-triangular factor of the support's Gram matrix, row after row.
-    pub(super) factor: Vec<T>,
-    /// The initial projection, orthogonalised along with the atoms.
-    pub(super) steps: Vec<T>,
 }
 
 /// Finds sparse representations over one dictionary, one measurement after another, in memory of its own.
@@ -397,57 +376,4 @@ fn squares<T: Scalar>(values: &[T]) -> f64 {
         }
     }
     sums.iter().sum::<f64>() + energy(rest)
-}
-
-impl<T: Scalar> Path<T> {
-    fn add(&mut self, atom: usize, step: T, remaining: &mut f64, energy: f64) {
-        self.steps.push(step);
-        self.support.push(atom);
-        *remaining -= step.into().powi(2);
-        self.residual_norms.push((remaining.max(0.0) / energy).sqrt());
-    }
-
-    /// Least-squares coefficients over the first `atoms` of the support (all of it if it has fewer).
-    #[must_use]
-    pub fn coefficients(&self, atoms: usize) -> Vec<f64> {
-        let atoms = atoms.min(self.support.len());
-        let mut x: Vec<f64> = self.steps[..atoms].iter().map(|&s| s.into()).collect();
-        self.substitute_back(&mut x);
-        x
-    }
-
-    /// Replaces `g` by the solution of `G x = g` over the whole support, as well as this number type factorised its Gram
-    /// matrix `G`.
-    pub(super) fn divide(&self, g: &mut [f64]) {
-        for i in 0..g.len() {
-            let row = self.factor_row(i);
-            let (known, rest) = g.split_at_mut(i);
-            let sum: f64 = known.iter().zip(row).map(|(x, &entry)| x * entry.into()).sum();
-            rest[0] = (rest[0] - sum) / row[i].into();
-        }
-        self.substitute_back(g);
-    }
-
-    fn factor_row(&self, i: usize) -> &[T] {
-        &self.factor[i * (i + 1) / 2..][..=i]
-    }
-
-    fn substitute_back(&self, x: &mut [f64]) {
-        for i in (0..x.len()).rev() {
-            let row = self.factor_row(i);
-            let (known, rest) = x.split_at_mut(i);
-            rest[0] /= Into::<f64>::into(row[i]);
-            for (x, &entry) in known.iter_mut().zip(row) {
-                *x -= entry.into() * rest[0];
-            }
-        }
-    }
-
-    /// The solution over the whole support.
-    #[must_use]
-    pub fn solution(self) -> Solution {
-        let coefficients = self.coefficients(self.support.len());
-        let Self { support, residual_norms, stop, unseen, .. } = self;
-        Solution { support, coefficients, residual_norms, stop, unseen }
-    }
 }

@@ -11,7 +11,7 @@
 
 use super::dense::DenseDictionary;
 use super::dictionary::Dictionary;
-use super::pursuit::Path;
+use super::path::Path;
 use nalgebra::DMatrix;
 
 /// Who chooses between atoms whose scores are too near to each other for a number type.

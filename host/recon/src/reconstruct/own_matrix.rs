@@ -20,6 +20,7 @@
 mod problem;
 mod solvers;
 
+use super::Penalty;
 use crate::basis::Basis;
 use crate::omp::{OmpError, Stop};
 use crate::{Image, Side};
@@ -101,12 +102,8 @@ pub enum MatrixError {
 pub enum MatrixMethod {
     /// Least squares of least norm.
     PseudoInverse,
-    /// Small coefficients, weighted by what is expected of each.
-    Tikhonov,
-    /// Small sum of magnitudes of the coefficients.
-    Sparse,
-    /// Small total variation.
-    TotalVariation,
+    /// The least of a penalty.
+    Penalty(Penalty),
     /// Few coefficients.
     Omp,
 }
@@ -236,8 +233,7 @@ impl OwnMatrix {
                     Some(strength) => strength,
                     // Few atoms leave more than noise: the strongest that predicts as well.
                     None => {
-                        let errors =
-                            self.errors_of_strengths(y, settings, MatrixMethod::Tikhonov)?;
+                        let errors = self.errors_of_strengths(y, settings, Penalty::Tikhonov)?;
                         let as_good = as_good_as_the_best(&errors);
                         STRENGTHS[errors.iter().position(as_good).unwrap_or(0)]
                     }
@@ -251,17 +247,18 @@ impl OwnMatrix {
                 let (pixels, size, stop) = found.remove(0);
                 (pixels, Some(noise), Some((size, stop)))
             }
-            method => {
+            MatrixMethod::Penalty(penalty) => {
                 // The same way there as in the comparison: methods that only approach their minimum remember it.
                 let strengths = match settings.strength {
                     Some(strength) => vec![strength],
                     None => {
-                        let errors = self.errors_of_strengths(y, settings, method)?;
+                        let errors = self.errors_of_strengths(y, settings, penalty)?;
                         STRENGTHS[..=last_as_good(&errors)].to_vec()
                     }
                 };
                 let problem = Problem::new(self, settings, y, &every);
-                let pixels = problem.penalised(method, &strengths).swap_remove(strengths.len() - 1);
+                let pixels =
+                    problem.penalised(penalty, &strengths).swap_remove(strengths.len() - 1);
                 (pixels, strengths.last().copied(), None)
             }
         };
@@ -297,9 +294,9 @@ impl OwnMatrix {
         &self,
         y: &[f64],
         settings: &MatrixSettings,
-        method: MatrixMethod,
+        penalty: Penalty,
     ) -> Result<Vec<f64>, MatrixError> {
-        let predict = |problem: &Problem| Ok(problem.penalised(method, &STRENGTHS));
+        let predict = |problem: &Problem| Ok(problem.penalised(penalty, &STRENGTHS));
         self.errors(y, settings, STRENGTHS.len(), predict)
     }
 

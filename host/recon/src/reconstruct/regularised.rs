@@ -48,6 +48,36 @@ pub enum Strength {
     Fixed(f64),
 }
 
+impl Default for Strength {
+    fn default() -> Self {
+        Self::CrossValidated { folds: 4 }
+    }
+}
+
+impl Strength {
+    pub(super) fn check(self) -> Result<(), ReconstructError> {
+        let refuse =
+            |setting, found, expected| Err(ReconstructError::Setting { setting, found, expected });
+        match self {
+            Self::Fixed(found) if !(found > 0.0 && found <= 1e6) => {
+                refuse("strength", found, "more than 0, at most 1e6")
+            }
+            Self::CrossValidated { folds } if folds < 2 => {
+                refuse("folds", folds as f64, "2 or more")
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+impl Penalty {
+    /// Whether the penalty is one on coefficients, and not on pixels.
+    #[must_use]
+    pub fn has_basis(self) -> bool {
+        self != Self::TotalVariation
+    }
+}
+
 /// Settings of [`regularised`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RegularisedSettings {
@@ -74,7 +104,7 @@ impl RegularisedSettings {
         Self {
             penalty,
             basis: Basis::Dct,
-            strength: Strength::CrossValidated { folds: 4 },
+            strength: Strength::default(),
             falloff: 1.0,
             noise: NoiseLevel::Estimated,
             completion: Completion::Measured,
@@ -83,19 +113,10 @@ impl RegularisedSettings {
     }
 
     fn check(&self) -> Result<(), ReconstructError> {
-        let refuse =
-            |setting, found, expected| Err(ReconstructError::Setting { setting, found, expected });
-        match self.strength {
-            Strength::Fixed(found) if !(found > 0.0 && found <= 1e6) => {
-                return refuse("strength", found, "more than 0, at most 1e6");
-            }
-            Strength::CrossValidated { folds } if folds < 2 => {
-                return refuse("folds", folds as f64, "2 or more");
-            }
-            _ => {}
-        }
+        self.strength.check()?;
         if self.iterations == 0 {
-            return refuse("iterations", 0.0, "1 or more");
+            let (setting, expected) = ("iterations", "1 or more");
+            return Err(ReconstructError::Setting { setting, found: 0.0, expected });
         }
         super::check_prior(self.falloff, self.noise)
     }

@@ -4,7 +4,7 @@
 
 use super::Problem;
 use crate::omp::OmpError;
-use crate::{Side, order};
+use crate::{Rows, order};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
@@ -135,7 +135,7 @@ fn misses_of(problem: &Problem<'_>, predictions: &[Vec<f32>], held: &[usize]) ->
 fn split(problem: &Problem, folds: usize) -> Vec<Option<usize>> {
     let mut random = Pcg64::seed_from_u64(SPLIT_SEED);
     let mut fold_of = vec![None; problem.rows.len()];
-    let by_sequency = order::positions_by_sequency(problem.side, problem.rows);
+    let by_sequency = order::positions_by_sequency(problem.rows);
     for group in by_sequency.chunks(folds) {
         let mut free: Vec<usize> = (0..folds).collect();
         for &k in group {
@@ -154,8 +154,8 @@ const ROUNDING: f32 = 1e-6;
 /// Noise of a measurement: the median magnitude over the quarter of the rows (at least eight) of highest
 /// sequency. Detail of the scene is in there too: what it returns is the level under which a coefficient cannot
 /// be told from its neighbours, an upper bound of the noise.
-pub(super) fn noise_level(side: Side, rows: &[u32], values: &[f32]) -> f32 {
-    let positions = order::positions_by_sequency(side, rows);
+pub(super) fn noise_level(rows: &Rows, values: &[f32]) -> f32 {
+    let positions = order::positions_by_sequency(rows);
     let count = (positions.len() / 4).max(8).min(positions.len());
     let mut magnitudes: Vec<f32> =
         positions[positions.len() - count..].iter().map(|&k| values[k].abs()).collect();

@@ -49,8 +49,8 @@ fn refusal(members: &[(&str, Vec<u8>)], want: Selection) -> String {
 fn a_good_file_reads_however_it_was_zipped() {
     for how in [Zip::Stored, Zip::Zip64, Zip::Deflated] {
         let found = read_bytes(&zip(how, &good()), PAIRS).unwrap();
-        assert_eq!(found.side.pixels(), 2, "{how:?}");
-        assert_eq!(found.h_row, [0, 3, 1]);
+        assert_eq!(found.h_row.side().pixels(), 2, "{how:?}");
+        assert_eq!(*found.h_row, [0, 3, 1]);
         assert_eq!(found.readings, Readings::Pairs(vec![5.0, 1.0, 2.0, 3.0, 4.0, 4.5]));
         assert_eq!(found.reference.unwrap().pixels(), [1.0, 2.0, 3.0, 4.0]);
         assert!(found.notes.is_empty());
@@ -326,7 +326,7 @@ proptest! {
             // Checksums leave three ways to differ: `y` or `recon` renamed away, and what they do
             // not cover.
             Ok(found) => {
-                prop_assert_eq!(found.h_row, [0, 3, 1]);
+                prop_assert_eq!(found.h_row.as_slice(), [0, 3, 1]);
                 match found.readings {
                     Readings::Pairs(y) => prop_assert_eq!(y, [5.0, 1.0, 2.0, 3.0, 4.0, 4.5]),
                     Readings::Differential(d) => prop_assert_eq!(d, [4.0, -1.0, -0.5]),

@@ -154,7 +154,7 @@ pub enum UsbError {
         camera: String,
     },
     /// The system's USB gave up.
-    #[error("USB: {0}")]
+    #[error("the system's USB failed")]
     Io(#[from] io::Error),
 }
 
@@ -171,7 +171,7 @@ fn none(wanted: Option<&str>, there: &[String]) -> String {
 /// What to do about a missing permission.
 fn permission_hint(linux: bool) -> &'static str {
     if linux {
-        ": sudo nirspi setup, which installs the udev rule (boards/<board>/60-nirspi.rules)"
+        ": sudo nirspi setup, which installs the udev rule (boards/60-nirspi.rules)"
     } else {
         ""
     }

@@ -1,34 +1,15 @@
 //! What a device gives: shared memory, buffers, and loops of a length that it finishes.
 //!
-//! The one law: what does not fit is refused before it is launched, with what was needed and what there is. Software Vulkan
-//! ends an invocation's loops after some 65 535 rounds without a word; so the rounds are counted here, and a pursuit that takes
-//! more is split over launches.
+//! What does not fit is refused before it is launched, with what was needed and what there is. Software Vulkan ends an
+//! invocation's loops after some 65 535 rounds and reports no error; so the rounds are counted here, and a pursuit that
+//! takes more is split over launches.
 
-use super::kernels::Shape;
+use super::layout::{Shape, TOGETHER};
 use crate::omp::BackendError;
-
-/// Numbers of a frame's state.
-pub(super) const STATE: usize = 8;
-/// Energy of the measurement.
-pub(super) const ENERGY: usize = 0;
-/// Energy of a residual that is explained enough.
-pub(super) const ENOUGH: usize = 1;
-/// Energy of the residual.
-pub(super) const REMAINING: usize = 2;
-/// The first atom's score.
-pub(super) const FIRST_BEST: usize = 3;
-/// Atoms in the support.
-pub(super) const COUNT: usize = 4;
-/// Why there are no more: 0 still looking, 1 explained enough, 2 no atom left, 3 dependent.
-pub(super) const STOP: usize = 5;
-/// Least lead of a chosen atom's score over the next best.
-pub(super) const LEAD: usize = 6;
-/// Least distance of the residual's energy from enough, where that was asked.
-pub(super) const CLOSEST: usize = 7;
 
 /// What a device says of itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Limits {
+pub(super) struct DeviceLimits {
     /// Bytes of shared memory of a workgroup.
     pub shared_bytes: usize,
     /// Bytes of a buffer.
@@ -55,9 +36,9 @@ const UNITS: std::ops::RangeInclusive<usize> = 64..=256;
 const ROWS_BYTES: usize = 1 << 30;
 
 /// Most frames at once: workgroups that every device takes in one direction.
-const FRAMES: usize = 65_535 / super::kernels::TOGETHER * super::kernels::TOGETHER;
+const FRAMES: usize = 65_535 / TOGETHER * TOGETHER;
 
-impl Limits {
+impl DeviceLimits {
     /// How `atoms` atoms are dealt out to the units of a workgroup, with room for the weights of `sparsity` of them.
     ///
     /// # Errors
@@ -95,11 +76,6 @@ impl Limits {
 }
 
 impl Shape {
-    /// Shared memory of a pursuit: three numbers a unit, the weights, and the chosen atom's projection.
-    pub(super) fn shared_bytes(&self) -> usize {
-        4 * (3 * self.units + self.capacity + 1)
-    }
-
     /// Steps of a pursuit, `first..last` of each launch, none of which takes more than `rounds` rounds of loops: step `k`
     /// takes `k` rounds over the rows, and `k` over the units to fetch the weights; a launch starts with a look at the atoms
     /// chosen before.
@@ -149,8 +125,8 @@ pub(super) fn check(what: &'static str, needed: usize, limit: usize) -> Result<(
 mod tests {
     use super::*;
 
-    fn device(shared_bytes: usize) -> Limits {
-        Limits { shared_bytes, buffer_bytes: 128 << 20, units: 1024, buffers: 8 }
+    fn device(shared_bytes: usize) -> DeviceLimits {
+        DeviceLimits { shared_bytes, buffer_bytes: 128 << 20, units: 1024, buffers: 8 }
     }
 
     #[test]

@@ -1,10 +1,8 @@
-//! Which device computes.
-//!
-//! The one law: absence is an answer, never a crash, and a software device computes only for who asks for it by name.
+//! The device that computes. [`probe::find`] chooses which one that is.
 
-use super::budget::Limits;
+use super::budget::DeviceLimits;
 use super::engine::Engine;
-use crate::backend::probe::{self, Found};
+use crate::backend::probe::{self, Found, Gpu};
 use crate::omp::{Backend, BackendError};
 use cubecl::Runtime;
 use cubecl::cuda::CudaRuntime;
@@ -28,22 +26,23 @@ impl fmt::Debug for Device {
 }
 
 impl Device {
-    /// The device that a backend names; none for the processor. [`Backend::Auto`] means a GPU through CUDA, else a discrete
-    /// or integrated one through wgpu.
+    /// The device that a backend names, by the rule of [`probe::find`]; none for the processor.
     ///
     /// # Errors
     /// [`BackendError::Absent`] if there is none.
     pub fn open(backend: Backend) -> Result<Option<Self>, BackendError> {
-        let absent = |why| BackendError::Absent { why };
-        match backend {
-            Backend::Cpu => Ok(None),
-            Backend::Cuda => cuda().map(Some).map_err(absent),
-            Backend::Wgpu => wgpu(true).map(Some).map_err(absent),
-            Backend::Auto => cuda()
-                .or_else(|no_cuda| wgpu(false).map_err(|no_wgpu| format!("{no_wgpu}; {no_cuda}")))
-                .map(Some)
-                .map_err(absent),
-        }
+        let found = probe::find(backend)
+            .map_err(|missing| BackendError::Absent { why: missing.to_string() })?;
+        Ok(found.map(|gpu| match gpu {
+            Gpu::Cuda(Found { device, name, software }) => {
+                let engine = Arc::new(CudaRuntime::client(&device));
+                Self { engine, name, backend: Backend::Cuda, software }
+            }
+            Gpu::Wgpu(Found { device, name, software }) => {
+                let engine = Arc::new(WgpuRuntime::client(&device));
+                Self { engine, name, backend: Backend::Wgpu, software }
+            }
+        }))
     }
 
     /// As its driver calls it.
@@ -64,21 +63,7 @@ impl Device {
         self.software
     }
 
-    pub(super) fn limits(&self) -> Limits {
+    pub(super) fn limits(&self) -> DeviceLimits {
         self.engine.limits()
     }
-}
-
-fn cuda() -> Result<Device, String> {
-    let Found { device, name, software } =
-        probe::cuda().map_err(|absent| format!("CUDA: {absent}"))?;
-    let engine = Arc::new(CudaRuntime::client(&device));
-    Ok(Device { engine, name, backend: Backend::Cuda, software })
-}
-
-fn wgpu(software_too: bool) -> Result<Device, String> {
-    let Found { device, name, software } =
-        probe::wgpu(software_too).map_err(|absent| format!("wgpu: {absent}"))?;
-    let engine = Arc::new(WgpuRuntime::client(&device));
-    Ok(Device { engine, name, backend: Backend::Wgpu, software })
 }

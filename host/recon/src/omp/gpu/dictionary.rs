@@ -13,7 +13,7 @@ use super::device::Device;
 use super::engine::Buffer;
 use super::gram::{DeviceGram, DeviceSolutions, FRAMES_A_THREAD, width};
 use super::images::DeviceImages;
-use super::kernels::TOGETHER;
+use super::layout::TOGETHER;
 use crate::omp::dictionary::Atoms;
 use crate::omp::pursuit::energy;
 use crate::omp::{

@@ -3,8 +3,9 @@
 //! The one law: a kernel sees only buffers of the lengths that its indices reach. Lengths are checked here, before a launch that
 //! checks nothing.
 
-use super::budget::{Limits, ROUNDS, STATE, row_launches};
-use super::kernels::{self, Shape, TOGETHER};
+use super::budget::{DeviceLimits, ROUNDS, row_launches};
+use super::kernels;
+use super::layout::{STATE, Shape, TOGETHER};
 use crate::omp::BackendError;
 use cubecl::prelude::*;
 use cubecl::reader::read_sync;
@@ -53,7 +54,7 @@ pub(super) struct Pursuit {
 
 impl Pursuit {
     fn width(&self) -> usize {
-        self.shape.units * self.shape.per_unit
+        self.shape.width()
     }
 
     fn is_whole(&self) -> bool {
@@ -70,7 +71,8 @@ impl Pursuit {
     }
 }
 
-/// A share of a square root's rounding under which numbers of a pursuit count as rounding, as the CPU has them.
+/// Scores and pivots below these shares count as zero: the thresholds of the CPU, `Scalar::ROUNDING` and
+/// `Scalar::DEPENDENT`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Rounding {
     pub score: f32,
@@ -79,7 +81,7 @@ pub(super) struct Rounding {
 
 /// One device. Everything is queued; errors come out of [`read`](Self::read).
 pub(super) trait Engine: Send + Sync {
-    fn limits(&self) -> Limits;
+    fn limits(&self) -> DeviceLimits;
     fn upload(&self, numbers: &[f32]) -> Buffer;
     /// Numbers of no particular value; at least one.
     fn empty(&self, count: usize) -> Buffer;
@@ -113,10 +115,10 @@ fn units(count: usize) -> CubeDim {
 }
 
 impl<R: Runtime> Engine for ComputeClient<R> {
-    fn limits(&self) -> Limits {
+    fn limits(&self) -> DeviceLimits {
         let properties = self.properties();
         let hardware = &properties.hardware;
-        Limits {
+        DeviceLimits {
             shared_bytes: hardware.max_shared_memory_size,
             buffer_bytes: usize::try_from(properties.memory.max_page_size).unwrap_or(usize::MAX),
             units: hardware.max_units_per_cube.min(hardware.max_cube_dim.0) as usize,

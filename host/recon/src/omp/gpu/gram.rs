@@ -2,10 +2,12 @@
 //!
 //! The one law: as [`Solver`](crate::omp::Solver), to the rounding of `f32`; where rounding may have decided, the frame says so.
 
-use super::budget::{self, CLOSEST, COUNT, LEAD, REMAINING, STATE, STOP};
+use super::budget;
 use super::device::Device;
 use super::engine::{Buffer, Pursuit, Rounding};
-use super::kernels::TOGETHER;
+use super::layout::{
+    CLOSEST, COUNT, ENERGY, ENOUGH, LEAD, Progress, REMAINING, STATE, STOP, TOGETHER,
+};
 use crate::omp::dictionary::Atoms;
 use crate::omp::referee::{BELIEVED, BELIEVED_ENERGY};
 use crate::omp::{BackendError, Limits, OmpError, Path, Scalar, Solution, Stop};
@@ -92,8 +94,8 @@ impl DeviceGram {
         let frames = energies.len();
         let mut state = vec![0.0; frames.max(1) * STATE];
         for (state, &energy) in state.chunks_exact_mut(STATE).zip(&energies) {
-            state[budget::ENERGY] = energy as f32;
-            state[budget::ENOUGH] = limits.enough(energy, measurements) as f32;
+            state[ENERGY] = energy as f32;
+            state[ENOUGH] = limits.enough(energy, measurements) as f32;
             state[REMAINING] = energy as f32;
             state[LEAD] = f32::MAX;
             state[CLOSEST] = f32::MAX;
@@ -207,18 +209,13 @@ impl DeviceSolutions {
             remaining -= f64::from(step).powi(2);
             residual_norms.push((remaining.max(0.0) / energy).sqrt());
         }
-        let explained = f64::from(state[REMAINING]) <= f64::from(state[budget::ENOUGH]);
-        let stop = match state[STOP] {
-            stop if stop < 0.5 => {
-                if explained {
-                    Stop::Residual
-                } else {
-                    Stop::Sparsity
-                }
-            }
-            stop if stop < 1.5 => Stop::Residual,
-            stop if stop < 2.5 => Stop::NoAtomLeft,
-            _ => Stop::Dependent,
+        let explained = f64::from(state[REMAINING]) <= f64::from(state[ENOUGH]);
+        let stop = match Progress::read(state[STOP]) {
+            Progress::Looking if explained => Stop::Residual,
+            Progress::Looking => Stop::Sparsity,
+            Progress::Explained => Stop::Residual,
+            Progress::NoAtomLeft => Stop::NoAtomLeft,
+            Progress::Dependent => Stop::Dependent,
         };
         let least_lead = match f64::from(state[LEAD]) {
             lead if lead >= f64::from(f32::MAX) => f64::INFINITY,
@@ -246,7 +243,7 @@ impl DeviceSolutions {
 pub(super) fn width(device: &Device, atoms: usize) -> Result<usize, BackendError> {
     let limits = device.limits();
     let shape = limits.shape(atoms, 1)?;
-    let width = shape.units * shape.per_unit;
+    let width = shape.width();
     budget::check("atoms at most", width, budget::ROUNDS)?;
     limits.fits("bytes of a buffer for the Gram matrix", width.saturating_mul(width))?;
     Ok(width)

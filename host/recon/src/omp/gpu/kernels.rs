@@ -9,11 +9,11 @@
 // A kernel's arguments are its buffers and sizes, and the macro turns them into functions of as many.
 #![allow(clippy::too_many_arguments)]
 
-use super::budget::{CLOSEST, COUNT, ENERGY, ENOUGH, FIRST_BEST, LEAD, REMAINING, STATE, STOP};
+use super::layout::{
+    CLOSEST, COUNT, DEPENDENT, ENERGY, ENOUGH, EXPLAINED, FIRST_BEST, LEAD, LOOKING, NO_ATOM_LEFT,
+    REMAINING, STATE, STOP, Shape, TOGETHER,
+};
 use cubecl::prelude::*;
-
-/// Vectors of which one unit computes the products together.
-pub(super) const TOGETHER: usize = 8;
 
 /// Adds `vectors * matrix` over the rows from `first` to `last` to `out`: inner products of `vectors` (`count x rows`) with
 /// the columns of `matrix` (`rows x width`); the launch of the first row starts from 0. Both the Gram matrix (the vectors are
@@ -66,17 +66,6 @@ pub(super) fn doubles(gram: &Array<f32>, out: &mut Array<u32>, width: u32, like:
         }
     }
     out[atom] = found;
-}
-
-/// What is known of a pursuit when it is compiled.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(super) struct Shape {
-    /// Units of the workgroup that pursues one frame; a power of two.
-    pub units: usize,
-    /// Atoms of each unit: `atom = unit + units * i`.
-    pub per_unit: usize,
-    /// Room for the weights of chosen atoms in shared memory.
-    pub capacity: usize,
 }
 
 /// Orthogonal matching pursuit, steps `first` to `last` of at most `sparsity`; one workgroup a frame.
@@ -145,10 +134,10 @@ pub(super) fn pursue(
     sync_storage();
 
     for step in first as usize..last as usize {
-        if stop == 0.0 {
+        if stop == LOOKING {
             closest = min(closest, (remaining - enough).abs());
             if remaining <= enough {
-                stop = 1.0;
+                stop = EXPLAINED.runtime();
             }
         }
 
@@ -198,16 +187,16 @@ pub(super) fn pursue(
         }
         // Not a number is not more either.
         let more = best > rounding * first_best;
-        if stop == 0.0 {
+        if stop == LOOKING {
             if more {
                 lead = min(lead, best - second);
             } else {
-                stop = 2.0;
+                stop = NO_ATOM_LEFT.runtime();
             }
         }
 
         // What the rows say of the chosen atom, and how much of it they leave.
-        let taken = if stop == 0.0 { step } else { 0usize.runtime() };
+        let taken = if stop == LOOKING { step } else { 0usize.runtime() };
         let mut sum = 0.0f32;
         let mut i = unit;
         while i < taken {
@@ -237,7 +226,7 @@ pub(super) fn pursue(
         let projected = chosen[0];
         sync_cube();
 
-        if stop == 0.0 {
+        if stop == LOOKING {
             if pivot > dependent * own {
                 let root = f32::sqrt(pivot);
                 let scale = 1.0f32 / root;
@@ -272,7 +261,7 @@ pub(super) fn pursue(
                 remaining -= along * along;
                 count += 1.0;
             } else {
-                stop = 3.0;
+                stop = DEPENDENT.runtime();
             }
         }
         // The next choice reads this row where other units wrote it.

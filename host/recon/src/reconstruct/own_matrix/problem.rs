@@ -4,7 +4,7 @@
 //! held against the mean, that changes no minimum, and the largest singular value by far is gone.
 
 use super::solvers::{self, Chosen};
-use super::{MatrixError, MatrixMethod, MatrixSettings, OwnMatrix};
+use super::{MatrixError, MatrixMethod, MatrixSettings, OwnMatrix, Penalty};
 use crate::Side;
 use crate::basis::{Basis, Transform};
 use crate::omp::Stop;
@@ -45,7 +45,8 @@ impl Problem {
         let even = raw.column_sum();
         // Without a basis that has the mean for an atom, it is as good or bad as any other.
         let free = settings.atoms.is_none()
-            && (settings.basis != Basis::Pixel || settings.method == MatrixMethod::TotalVariation)
+            && (settings.basis != Basis::Pixel
+                || settings.method == MatrixMethod::Penalty(Penalty::TotalVariation))
             && even.norm() > 1e-9 * raw.norm();
         let (mut patterns, mut values) = (raw.clone(), raw_y.clone());
         let mean = free.then(|| {
@@ -74,18 +75,22 @@ impl Problem {
     }
 
     /// The image at each strength.
-    pub(super) fn penalised(&self, method: MatrixMethod, strengths: &[f64]) -> Vec<DVector<f64>> {
-        if method == MatrixMethod::TotalVariation {
-            let images = solvers::total_variation(self.side, &self.patterns, &self.y, strengths);
-            return images.into_iter().map(|x| self.image(x)).collect();
-        }
-        let (seen, scale) = self.expected();
-        let found = match method {
-            MatrixMethod::Sparse => {
+    pub(super) fn penalised(&self, penalty: Penalty, strengths: &[f64]) -> Vec<DVector<f64>> {
+        let found = match penalty {
+            Penalty::TotalVariation => {
+                let images =
+                    solvers::total_variation(self.side, &self.patterns, &self.y, strengths);
+                return images.into_iter().map(|x| self.image(x)).collect();
+            }
+            Penalty::Sparse => {
+                let (seen, scale) = self.expected();
                 let free = usize::from(self.mean.is_some());
                 solvers::sparse(&seen, &self.y, &scale, free, strengths)
             }
-            _ => solvers::tikhonov(&seen, &self.y, &scale, strengths),
+            Penalty::Tikhonov => {
+                let (seen, scale) = self.expected();
+                solvers::tikhonov(&seen, &self.y, &scale, strengths)
+            }
         };
         found.into_iter().map(|c| self.image(self.pixels(&c))).collect()
     }

@@ -5,9 +5,9 @@ use rand::RngExt;
 
 const METHODS: [MatrixMethod; 5] = [
     MatrixMethod::PseudoInverse,
-    MatrixMethod::Tikhonov,
-    MatrixMethod::Sparse,
-    MatrixMethod::TotalVariation,
+    MatrixMethod::Penalty(Penalty::Tikhonov),
+    MatrixMethod::Penalty(Penalty::Sparse),
+    MatrixMethod::Penalty(Penalty::TotalVariation),
     MatrixMethod::Omp,
 ];
 

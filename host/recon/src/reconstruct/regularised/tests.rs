@@ -1,6 +1,6 @@
 use super::*;
 use crate::testing::{array, correlation_of, measured, normal, real_data, scene, side};
-use crate::{Order, reconstruct};
+use crate::{Order, Rows, reconstruct};
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
 
@@ -135,13 +135,13 @@ fn settings_that_make_no_sense_are_named() {
 fn tikhonov_beats_zero_filling_on_real_measurements_at_every_share() {
     for (name, size, field) in [("opar_ala1.npz", 64, "y"), ("scheidt_car.npz", 32, "d")] {
         let Some(mut file) = real_data(name) else { return };
-        let rows: Vec<i64> = array::<i32>(&mut file, "h_row").into_iter().map(i64::from).collect();
+        let rows = Rows::new(side(size), array::<i32>(&mut file, "h_row")).unwrap();
         let all = if field == "y" {
             let y: Vec<f64> = array::<f32>(&mut file, "y").into_iter().map(f64::from).collect();
-            Measurements::from_pairs(side(size), &rows, &y).unwrap().0
+            Measurements::from_pairs(&rows, &y).unwrap().0
         } else {
             let d: Vec<f64> = array::<i32>(&mut file, "d").into_iter().map(f64::from).collect();
-            Measurements::from_differential(side(size), &rows, &d[..rows.len()]).unwrap()
+            Measurements::from_differential(&rows, &d[..rows.len()]).unwrap()
         };
         let full = reconstruct::hadamard(&all);
         for share in [0.1, 0.2, 0.3, 0.5] {

@@ -1,0 +1,409 @@
+//! The RTL and the golden model side by side: the same pins, the same accesses, compared every clock.
+//!
+//! The one law: the model is never asked what the RTL does; it runs `DEPTH` clocks behind and is given only
+//! what the pins were given, at the moment that the `access` pin says an access took effect.
+//!
+//! What `hdl/model/src/lib.rs` lets the RTL take a few clocks more for is bounded here: [`STOP_CLOCKS`],
+//! [`TRIP_CLOCKS`] and the start, which follows its access by [`START_CLOCKS`]. Everything else is exact:
+//! LED lines at every clock, both ready pins, every register read, every byte of a frame or burst.
+
+use crate::pins::Pins;
+use crate::project::Project;
+use nirspi_hdl_model::{AdcSample, Gateware, Lines};
+use nirspi_wire::{
+    FrameFlags, crc32,
+    fpga::{FpgaFrame, Sums},
+    register::{Register, control},
+};
+use std::collections::VecDeque;
+
+/// Clocks from the choice of a slot to the end of what it sets off: `types::DEPTH`.
+const DEPTH: u64 = 13;
+/// Clocks from the choice of a slot to its lines at the pins, and so to its light's sample at the pins.
+const TO_PINS: u64 = 6;
+/// Clocks from the interlock pin to the end of what it sets off: two to be in step, and those of a run.
+const INTERLOCK: u64 = 2 + 1 + DEPTH;
+/// Clocks from the interlock pin to the pins of the LEDs, past everything else.
+const TO_DARK: u64 = 3;
+/// Clocks from a start's access to clock 0 of the run.
+const START_CLOCKS: u64 = DEPTH + 1;
+/// Clocks that LEDs may be lit longer than in the model after a stop or an opened interlock.
+const STOP_CLOCKS: u64 = 9;
+/// The same after any other trip and a raw burst.
+const TRIP_CLOCKS: u64 = 7;
+
+/// What the host asks for.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Access {
+    Write(u16, u32),
+    Read(u16),
+    Frame,
+    Raw,
+}
+
+/// What the model answers.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Answer {
+    Value(u32),
+    Bytes(Vec<u8>),
+}
+
+/// How the host drives its port.
+#[derive(Debug, Clone, Copy)]
+pub struct Port {
+    /// Period of its clock; the ADC's is 8000.
+    pub host_ps: u64,
+    /// Clocks of the host port in half a period of `sck`, and how many more when it is high.
+    pub half: u32,
+    pub quad: bool,
+}
+
+pub struct Rig {
+    pub(crate) pins: Pins,
+    pub model: Gateware,
+    pub port: Port,
+    seed: u64,
+    /// Over-range samples in 256.
+    pub over_range_rate: u8,
+    /// Codes fade to an eighth and come back; the logarithm of a quarter of the period, in clocks.
+    pub fade: u32,
+    pub(crate) clock: u64,
+    next_adc_ps: u64,
+    next_host_ps: u64,
+    seen: VecDeque<Seen>,
+    interlock: VecDeque<(u64, bool)>,
+    /// Clocks in which the level of the interlock pin keeps the LEDs out.
+    dark: std::ops::Range<u64>,
+    /// It has, and no run has begun since.
+    put_out: bool,
+    pub(crate) asked: Option<Access>,
+    pub(crate) answer: Option<Answer>,
+    start: Option<(u64, u32)>,
+    grace: u64,
+    /// LEDs were enabled in the clock before.
+    just_lit: bool,
+    /// What the model was last told, for the report of a difference.
+    told: VecDeque<String>,
+    pub mismatch: Option<String>,
+    pub variant: Variant,
+    clock_held: u64,
+    pub seen_so_far: Tally,
+}
+
+/// What of the RTL was built differently, to see in seconds what takes hours.
+#[derive(Debug, Clone, Copy)]
+pub struct Variant {
+    /// Bits of a sum.
+    pub sum_bits: u32,
+    /// Clock of the RTL less that of the model: a multiple of the duty window.
+    pub clock_ahead: u64,
+    /// Clock of the model when the RTL leaves reset.
+    pub begins_at: u64,
+}
+
+impl Default for Variant {
+    fn default() -> Self {
+        Self { sum_bits: 48, clock_ahead: 0, begins_at: 0 }
+    }
+}
+
+/// What has been compared, to know that scenarios reach what they are for.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Tally {
+    pub lit_clocks: u64,
+    pub frames: u64,
+    pub frames_over_range: u64,
+    pub frames_overflow: u64,
+    pub frames_after_loss: u64,
+    pub bursts: u64,
+    pub starts: u64,
+    pub starts_refused: u64,
+    pub stops: u64,
+    /// By fault code.
+    pub faults: [u64; 5],
+}
+
+/// The pins in one clock.
+#[derive(Debug, Clone, Copy)]
+struct Seen {
+    sample: AdcSample,
+    leds: Lines,
+    /// The interlock pin has put the LEDs out.
+    put_out: bool,
+}
+
+/// The sample at the pins in a clock.
+fn sample(seed: u64, rate: u8, clock: u64) -> AdcSample {
+    let mut z = seed ^ clock.wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    z ^= z >> 31;
+    AdcSample { code: (z & 0x3FFF) as u16, over_range: (z >> 56) < rate.into() }
+}
+
+impl Rig {
+    pub fn new(project: &Project, seed: u64) -> Self {
+        Self {
+            pins: Pins::new(project),
+            model: Gateware::new(),
+            port: Port { host_ps: 10_000, half: 3, quad: true },
+            seed,
+            over_range_rate: 0,
+            fade: 63,
+            clock: 0,
+            next_adc_ps: 0,
+            next_host_ps: 1,
+            seen: VecDeque::new(),
+            interlock: VecDeque::new(),
+            dark: 0..u64::MAX,
+            put_out: true,
+            asked: None,
+            answer: None,
+            start: None,
+            grace: 0,
+            just_lit: false,
+            told: VecDeque::new(),
+            mismatch: None,
+            variant: Variant::default(),
+            clock_held: 0,
+            seen_so_far: Tally::default(),
+        }
+    }
+
+    /// The same for an RTL built differently.
+    pub fn of_variant(project: &Project, seed: u64, variant: Variant) -> Self {
+        let half = format!("param HALF: u32 = {}", variant.sum_bits / 2);
+        let clock = variant.begins_at.wrapping_add(variant.clock_ahead);
+        let reset = format!("clock_now    = 64'd{clock} - (types::DEPTH as 64);");
+        let project = project.with("accumulators", "param HALF: u32 = 24", &half).with(
+            "engine",
+            "clock_now    = -(types::DEPTH as 64);",
+            &reset,
+        );
+        let mut rig = Self { variant, ..Self::new(&project, seed) };
+        for _ in 0..variant.begins_at {
+            rig.model.tick(AdcSample::default());
+        }
+        rig
+    }
+
+    /// A frame of the model as this variant delivers it.
+    fn frame_of_variant(&mut self, bytes: &[u8]) -> Vec<u8> {
+        let Ok(frame) = FpgaFrame::parse(bytes) else { return Vec::new() };
+        let mut header = frame.header;
+        header.clock = header.clock.wrapping_add(self.variant.clock_ahead);
+        let modulus = 1u64 << self.variant.sum_bits;
+        if frame.sums().any(|sums| sums.positive.max(sums.negative) >= modulus) {
+            header.flags = header.flags.with(FrameFlags::OVERFLOW);
+        }
+        let tally = &mut self.seen_so_far;
+        tally.frames += 1;
+        tally.frames_over_range += u64::from(header.flags.contains(FrameFlags::OVER_RANGE));
+        tally.frames_overflow += u64::from(header.flags.contains(FrameFlags::OVERFLOW));
+        tally.frames_after_loss += u64::from(header.flags.contains(FrameFlags::AFTER_LOSS));
+        let mut bytes = header.to_bytes().to_vec();
+        for sums in frame.sums() {
+            let (positive, negative) = (sums.positive % modulus, sums.negative % modulus);
+            bytes.extend(Sums { positive, negative }.to_bytes());
+        }
+        bytes.extend(crc32(&bytes).to_le_bytes());
+        bytes
+    }
+
+    /// What the model reads, of its clock as of this variant.
+    fn read_of_variant(&mut self, address: u16) -> u32 {
+        let value = self.model.read(address).unwrap_or(0);
+        match Register::at(address) {
+            Some(Register::ClockLow) => {
+                let high = self.model.read(Register::ClockHigh.address()).unwrap_or(0);
+                self.clock_held =
+                    (u64::from(high) << 32 | u64::from(value)) + self.variant.clock_ahead;
+                self.clock_held as u32
+            }
+            Some(Register::ClockHigh) => (self.clock_held >> 32) as u32,
+            Some(Register::Fault) => {
+                self.seen_so_far.faults[value as usize] += 1;
+                value
+            }
+            _ => value,
+        }
+    }
+
+    /// Notes the first difference; all later ones follow from it.
+    pub(crate) fn expect<T: PartialEq + std::fmt::Debug>(
+        &mut self,
+        what: &str,
+        rtl: &T,
+        model: &T,
+    ) {
+        if rtl != model && self.mismatch.is_none() {
+            let told = Vec::from(self.told.clone()).join("\n  ");
+            self.mismatch =
+                Some(format!("clock {}: {what}: {rtl:?}, model {model:?}\n  {told}", self.clock));
+        }
+    }
+
+    fn tell(&mut self, what: String) {
+        self.told.push_back(what);
+        if self.told.len() > 12 {
+            self.told.pop_front();
+        }
+    }
+
+    /// One clock of the ADC.
+    fn adc_clock(&mut self) {
+        let now = self.clock;
+        // Samples of a clock's light are at the pins with its lines.
+        let mut sample = sample(self.seed, self.over_range_rate, now);
+        sample.code >>= (now >> self.fade) & 3;
+        self.pins.sample(sample);
+        let mut leds = self.pins.leds();
+        // Without `enable` the other lines light nothing: they may follow a clock later.
+        if !leds.enable {
+            if !std::mem::take(&mut self.just_lit) {
+                self.expect("lines without enable", &leds, &Lines::default());
+            }
+            leds = Lines::default();
+        }
+        self.just_lit |= leds.enable;
+        self.put_out |= self.dark.contains(&now);
+        if self.put_out {
+            self.expect("LEDs after the interlock opened", &leds, &Lines::default());
+        }
+        self.seen.push_back(Seen { sample, leds, put_out: self.put_out });
+        if self.seen.len() as u64 > DEPTH - TO_PINS + 1 {
+            self.seen.pop_front();
+        }
+        let access = self.pins.access();
+        if now >= DEPTH {
+            self.model_clock(now - DEPTH, access);
+        }
+        self.pins.adc_edge();
+        self.clock += 1;
+    }
+
+    /// Clock `t` of the model, with which the RTL is done now.
+    fn model_clock(&mut self, t: u64, access: bool) {
+        if self.start.is_none() {
+            let ready = self.pins.ready();
+            let expected = (self.model.frame_ready(), self.model.raw_ready());
+            self.expect("ready pins", &ready, &expected);
+        }
+        let was_lit = self.model.lines().enable;
+        while self.interlock.front().is_some_and(|&(at, _)| at == t) {
+            let (_, closed) = self.interlock.pop_front().unwrap();
+            self.model.set_interlock(closed);
+            self.tell(format!("clock {t}: interlock {closed}"));
+        }
+        if access {
+            match self.asked.take() {
+                Some(asked) => self.access(t, asked),
+                None => self.expect("accesses", &1, &0),
+            }
+        }
+        if let Some((at, bits)) = self.start
+            && at == t
+        {
+            self.start = None;
+            self.model.write(Register::Control.address(), bits);
+            let running = self.model.running();
+            self.tell(format!("clock {t}: started {running}"));
+            self.seen_so_far.starts += u64::from(running);
+            self.seen_so_far.starts_refused += u64::from(!running);
+        }
+        if was_lit && !self.model.lines().enable {
+            self.grace = STOP_CLOCKS;
+            self.seen_so_far.stops += 1;
+        }
+        let Seen { sample, leds, put_out } = self.seen[0];
+        let expected = self.model.lines();
+        if self.grace > 0 && !expected.enable {
+            self.grace -= 1;
+            if !leds.enable {
+                self.grace = 0;
+                self.expect("LED lines going out", &leds, &expected);
+            }
+        } else if !put_out {
+            self.expect("LED lines", &leds, &expected);
+        }
+        let lit = self.model.lines().enable;
+        self.seen_so_far.lit_clocks += u64::from(lit);
+        let running = self.model.running();
+        self.model.tick(sample);
+        // A run that ends by itself has put its LEDs out already, unless its latency is 0.
+        if lit && running && !self.model.running() {
+            self.grace = TRIP_CLOCKS;
+        }
+    }
+
+    fn access(&mut self, t: u64, access: Access) {
+        const STARTS: u32 = control::START | control::START_RAW;
+        self.tell(format!("clock {t}: {access:x?}, running {}", self.model.running()));
+        let answer = match access {
+            Access::Write(address, value) => {
+                let control = address == Register::Control.address();
+                if control && value & STARTS != 0 {
+                    self.model.write(address, value & !STARTS);
+                    if self.model.running() {
+                        self.model.write(address, value & STARTS);
+                    } else {
+                        self.start = Some((t + START_CLOCKS, value & STARTS));
+                        self.put_out = self.dark.contains(&self.clock);
+                    }
+                } else {
+                    self.model.write(address, value);
+                }
+                return;
+            }
+            Access::Read(address) => Answer::Value(self.read_of_variant(address)),
+            Access::Frame => {
+                let bytes = self.model.frame().unwrap_or_default().to_vec();
+                Answer::Bytes(self.frame_of_variant(&bytes))
+            }
+            Access::Raw => {
+                let bytes = self.model.raw().unwrap_or_default().to_vec();
+                self.seen_so_far.bursts += u64::from(!bytes.is_empty());
+                Answer::Bytes(bytes)
+            }
+        };
+        self.answer = Some(answer);
+    }
+
+    /// One clock of the host port, and those of the ADC before it.
+    pub(crate) fn host_clock(&mut self) {
+        while self.next_adc_ps <= self.next_host_ps {
+            self.next_adc_ps += 8000;
+            self.adc_clock();
+        }
+        self.next_host_ps += self.port.host_ps;
+        self.pins.host_edge();
+    }
+
+    pub fn wait(&mut self, host_clocks: u32) {
+        for _ in 0..host_clocks {
+            self.host_clock();
+        }
+    }
+
+    pub fn wait_adc(&mut self, clocks: u64) {
+        let end = self.clock + clocks;
+        while self.clock < end {
+            self.host_clock();
+        }
+    }
+
+    pub fn interlock(&mut self, closed: bool) {
+        self.pins.interlock(closed);
+        let at = self.clock + INTERLOCK - DEPTH;
+        // A level that no clock has seen was never there.
+        if self.interlock.back().is_some_and(|&(last, _)| last == at) {
+            self.interlock.pop_back();
+        }
+        self.interlock.push_back((at, closed));
+        if closed {
+            self.dark.end = self.dark.end.min(self.clock + TO_DARK);
+        } else {
+            self.dark = self.clock + TO_DARK..u64::MAX;
+        }
+    }
+}

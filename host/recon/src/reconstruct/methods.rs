@@ -1,0 +1,23 @@
+//! The list of the built-in methods. A new one is a file here and an entry in [`ALL`].
+
+mod fista;
+mod hadamard;
+mod omp;
+mod penalised;
+mod pseudo_inverse;
+mod tikhonov;
+mod total_variation;
+
+use super::Method;
+pub use hadamard::hadamard;
+pub(super) use omp::METHOD as OMP;
+
+/// Every built-in method, in the order in which help texts and comparisons show them.
+pub(super) const ALL: &[Method] = &[
+    hadamard::METHOD,
+    omp::METHOD,
+    pseudo_inverse::METHOD,
+    tikhonov::METHOD,
+    fista::METHOD,
+    total_variation::METHOD,
+];

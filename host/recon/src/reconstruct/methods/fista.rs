@@ -1,0 +1,17 @@
+//! Few and small coefficients, by FISTA.
+
+use super::penalised;
+use crate::reconstruct::method::{Entry, Setting};
+use crate::reconstruct::{MatrixMethod, Method, Penalty};
+
+const NAME: &str = "FISTA";
+
+/// [`Penalty::Sparse`].
+pub(in super::super) const METHOD: Method = Method(&Entry {
+    argument: "fista",
+    name: NAME,
+    about: "Small sum of magnitudes of the coefficients (FISTA)",
+    takes: &[Setting::Basis, Setting::Strength],
+    with_matrix: Some(MatrixMethod::Penalty(Penalty::Sparse)),
+    prepare: |settings| penalised::prepare(NAME, Penalty::Sparse, settings),
+});

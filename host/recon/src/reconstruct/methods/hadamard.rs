@@ -1,0 +1,45 @@
+//! The inverse Walsh-Hadamard transform: zero filling.
+
+use crate::reconstruct::method::Entry;
+use crate::reconstruct::{Method, Reconstruct, ReconstructError, Reconstruction, Report};
+use crate::{Image, Measurements, fwht};
+
+/// Zero filling.
+pub(in super::super) const METHOD: Method = Method(&Entry {
+    argument: "hadamard",
+    name: "inverse Hadamard transform",
+    about: "Inverse Walsh-Hadamard transform; patterns that were not measured count as zero",
+    takes: &[],
+    with_matrix: None,
+    prepare: |_| Ok(Box::new(ZeroFilling { name: "inverse Hadamard transform" })),
+});
+
+/// [`hadamard`] under a name.
+pub(super) struct ZeroFilling {
+    pub(super) name: &'static str,
+}
+
+impl Reconstruct for ZeroFilling {
+    fn name(&self) -> &str {
+        self.name
+    }
+
+    fn reconstruct(&self, measurements: &Measurements) -> Result<Reconstruction, ReconstructError> {
+        Ok(Reconstruction { image: hadamard(measurements), report: Report::new(self.name) })
+    }
+}
+
+/// Inverts the Walsh-Hadamard transform, with zero for rows that were not measured.
+///
+/// Over all rows this is exact. Over some it is the image of least energy that agrees with them.
+#[must_use]
+pub fn hadamard(measurements: &Measurements) -> Image {
+    let side = measurements.side();
+    let mut grid = vec![0.0_f64; side.area()];
+    for (&row, &value) in measurements.rows().iter().zip(measurements.values()) {
+        grid[row as usize] = value;
+    }
+    fwht::transform(&mut grid);
+    let pixels = grid.into_iter().map(|v| (v / side.area() as f64) as f32).collect();
+    Image::new(side, pixels)
+}

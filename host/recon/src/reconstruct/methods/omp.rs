@@ -1,0 +1,120 @@
+//! Orthogonal matching pursuit, in a basis or over atoms of the user's own, on the processor or a GPU.
+
+use crate::omp::BackendError;
+use crate::reconstruct::method::{Entry, OwnAtoms, Setting};
+use crate::reconstruct::{
+    MatrixMethod, Method, MethodSettings, OmpReconstruction, OmpSettings, Reconstruct,
+    ReconstructError, Reconstruction, Report, omp, omp_over, omp_video,
+};
+use crate::{Backend, Measurements};
+
+const NAME: &str = "OMP";
+
+/// Few atoms.
+pub(in super::super) const METHOD: Method = Method(&Entry {
+    argument: "omp",
+    name: NAME,
+    about: "Orthogonal matching pursuit (the paper's Algorithm 1) in a sparsifying basis",
+    takes: &[
+        Setting::Basis,
+        Setting::Dictionary,
+        Setting::NonNegative,
+        Setting::Backend,
+        Setting::WarmStart,
+    ],
+    with_matrix: Some(MatrixMethod::Omp),
+    prepare: |settings| Ok(Box::new(Omp::new(settings)?)),
+});
+
+struct Omp {
+    settings: OmpSettings,
+    atoms: Option<OwnAtoms>,
+    /// The GPU, if one computes.
+    device: Option<String>,
+}
+
+impl Omp {
+    fn new(asked: &MethodSettings) -> Result<Self, ReconstructError> {
+        let device = device(asked.backend).map_err(crate::omp::OmpError::from)?;
+        let base = match asked.as_printed {
+            true => OmpSettings::as_printed(asked.basis, 0),
+            false => OmpSettings { basis: asked.basis, ..OmpSettings::default() },
+        };
+        let settings = OmpSettings {
+            backend: if device.is_some() { asked.backend } else { Backend::Cpu },
+            sparsity: asked.sparsity,
+            residual: asked.residual,
+            completion: asked.completion(),
+            non_negative: asked.non_negative,
+            ..base
+        };
+        Ok(Self { settings, atoms: asked.dictionary.clone(), device })
+    }
+
+    fn reported(&self, found: OmpReconstruction) -> Reconstruction {
+        let OmpSettings { basis, backend, completion, sparsity, .. } = self.settings;
+        let mut report = Report::new(NAME);
+        report.basis = Some(match &self.atoms {
+            None => basis.to_string(),
+            Some(atoms) => atoms.name.clone(),
+        });
+        report.backend = Some(backend);
+        report.device = self.device.clone();
+        report.sparsity = Some(found.sparsity);
+        report.completion = Some(completion);
+        report.stop = Some(sparsity.reason(found.stop));
+        report.residual = Some(found.residual);
+        report.unseen_atoms = Some(found.unseen_atoms);
+        report.trust = Some(found.trust);
+        report.noise = Some(found.noise);
+        Reconstruction { image: found.image, report }
+    }
+}
+
+impl Reconstruct for Omp {
+    fn name(&self) -> &str {
+        NAME
+    }
+
+    fn reconstruct(&self, measurements: &Measurements) -> Result<Reconstruction, ReconstructError> {
+        let found = match &self.atoms {
+            None => omp(measurements, &self.settings),
+            Some(atoms) => omp_over(measurements, &atoms.values, &self.settings),
+        };
+        Ok(self.reported(found?))
+    }
+
+    fn reconstruct_video(
+        &self,
+        frames: &[Measurements],
+    ) -> Result<Vec<Reconstruction>, ReconstructError> {
+        if self.atoms.is_some() {
+            return frames.iter().map(|frame| self.reconstruct(frame)).collect();
+        }
+        let frames = omp_video(frames, &self.settings)?;
+        let reported = frames.into_iter().map(|frame| {
+            let mut made = self.reported(frame.reconstruction);
+            made.report.warm = frame.warm;
+            made
+        });
+        Ok(reported.collect())
+    }
+}
+
+/// The GPU for one image, if one was asked for by name.
+#[cfg(feature = "gpu")]
+fn device(backend: Backend) -> Result<Option<String>, BackendError> {
+    use crate::omp::gpu::{Choice, choose};
+    Ok(match choose(backend, 1)? {
+        Choice::Gpu(device) => Some(device.name().to_owned()),
+        Choice::Cpu(_) => None,
+    })
+}
+
+#[cfg(not(feature = "gpu"))]
+fn device(backend: Backend) -> Result<Option<String>, BackendError> {
+    match backend {
+        Backend::Auto | Backend::Cpu => Ok(None),
+        Backend::Wgpu | Backend::Cuda => Err(BackendError::not_built()),
+    }
+}

@@ -1,0 +1,46 @@
+//! What the methods with a [`Penalty`] share: settings, and a report.
+
+use crate::Measurements;
+use crate::reconstruct::{
+    MethodSettings, Penalty, Reconstruct, ReconstructError, Reconstruction, RegularisedSettings,
+    Report, regularised,
+};
+
+struct Penalised {
+    name: &'static str,
+    settings: RegularisedSettings,
+}
+
+/// A method that holds `penalty` against an image.
+pub(super) fn prepare(
+    name: &'static str,
+    penalty: Penalty,
+    settings: &MethodSettings,
+) -> Result<Box<dyn Reconstruct>, ReconstructError> {
+    let settings = RegularisedSettings {
+        basis: settings.basis,
+        strength: settings.strength,
+        completion: settings.completion(),
+        ..RegularisedSettings::new(penalty)
+    };
+    Ok(Box::new(Penalised { name, settings }))
+}
+
+impl Reconstruct for Penalised {
+    fn name(&self) -> &str {
+        self.name
+    }
+
+    fn reconstruct(&self, measurements: &Measurements) -> Result<Reconstruction, ReconstructError> {
+        let RegularisedSettings { penalty, basis, completion, .. } = self.settings;
+        let found = regularised(measurements, &self.settings)?;
+        let mut report = Report::new(self.name);
+        report.basis = penalty.has_basis().then(|| basis.to_string());
+        report.strength = Some(found.strength);
+        report.completion = Some(completion);
+        report.residual = Some(found.residual);
+        report.trust = Some(found.trust);
+        report.noise = Some(found.noise);
+        Ok(Reconstruction { image: found.image, report })
+    }
+}

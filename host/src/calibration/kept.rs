@@ -1,0 +1,325 @@
+//! Calibrations that outlive a session: what a self-test measured, kept for the captures after it.
+//!
+//! One JSON file a camera, named after its serial number, in the user's data directory. Latency and step response are
+//! in ADC clocks and hold for any dwell and blanking, so a calibration belongs to a camera and its gateware and to
+//! nothing else. Its dark level is that of its hour: captures without complements, which need today's, do not use it.
+//!
+//! # Invariant
+//! A calibration of another camera, or of other gateware, is never applied
+//! (`a_calibration_of_something_else_is_refused_in_one_line`).
+
+use super::Settling;
+use crate::files::FileError;
+use crate::files::output::{OutputDir, write_atomic};
+use crate::selftest::Check;
+use crate::session::CameraIdentity;
+use etcetera::{BaseStrategy, HomeDirError, choose_base_strategy};
+use serde::{Deserialize, Serialize};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::time::{SystemTime, UNIX_EPOCH};
+use thiserror::Error;
+
+/// Version of the file's format. A field that changes its meaning changes this.
+const FORMAT: u32 = 1;
+
+/// A calibration as it is kept.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct KeptCalibration {
+    /// Always `nirspi calibration`.
+    kind: Kind,
+    /// Version of the format.
+    version: u32,
+    /// When it was measured, in seconds since 1970.
+    measured_unix_s: u64,
+    /// The same, for people.
+    measured: String,
+    /// The camera that was measured.
+    pub camera: CameraIdentity,
+    /// Latency and step response.
+    pub settling: Settling,
+    /// The checks that it has passed.
+    pub checks: Vec<Check>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+enum Kind {
+    #[serde(rename = "nirspi calibration")]
+    Calibration,
+}
+
+/// Why a calibration is not used.
+#[derive(Debug, Error)]
+pub enum CalibrationFileError {
+    /// The file cannot be read.
+    #[error("{path}: cannot read the calibration")]
+    Io {
+        /// Which file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// Not a calibration.
+    #[error(
+        "{path}: {reason}, expected a calibration written by nirspi calibrate or nirspi selftest"
+    )]
+    Format {
+        /// Which file.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
+    /// Another version of the format.
+    #[error(
+        "{path}: a calibration of format {found}, expected {FORMAT}: run nirspi calibrate again"
+    )]
+    Version {
+        /// Which file.
+        path: PathBuf,
+        /// Its version.
+        found: u32,
+    },
+    /// Measured on something else.
+    #[error(
+        "{path}: measured with {field} {found}, this camera has {expected}: run nirspi calibrate"
+    )]
+    Mismatch {
+        /// Which file.
+        path: PathBuf,
+        /// What differs.
+        field: &'static str,
+        /// As kept.
+        found: String,
+        /// As the camera says.
+        expected: String,
+    },
+    /// It cannot be written.
+    #[error(transparent)]
+    Write(#[from] FileError),
+    /// Nowhere to keep anything.
+    #[error("no data directory to keep calibrations in")]
+    NoHome(#[from] HomeDirError),
+}
+
+impl KeptCalibration {
+    /// What was measured at `when`.
+    #[must_use]
+    pub fn new(
+        camera: CameraIdentity,
+        settling: Settling,
+        checks: Vec<Check>,
+        when: SystemTime,
+    ) -> Self {
+        let measured_unix_s = when.duration_since(UNIX_EPOCH).map_or(0, |age| age.as_secs());
+        let measured = date(measured_unix_s);
+        let (kind, version) = (Kind::Calibration, FORMAT);
+        Self { kind, version, measured_unix_s, measured, camera, settling, checks }
+    }
+
+    /// When it was measured, as `2026-11-20 08:30 UTC`.
+    #[must_use]
+    pub fn measured(&self) -> &str {
+        &self.measured
+    }
+
+    /// Writes it, whole or not at all.
+    ///
+    /// # Errors
+    /// When the folder cannot be made or the file not be written.
+    pub fn write(&self, path: &Path) -> Result<(), CalibrationFileError> {
+        let json = serde_json::to_vec_pretty(self).map_err(|error| format_error(path, &error))?;
+        match (path.parent(), path.file_name().and_then(|name| name.to_str())) {
+            (Some(folder), Some(name)) => {
+                let mut folder = OutputDir::create(folder)?;
+                folder.write(name, &json)?;
+                folder.commit()?;
+            }
+            // Which says what is wrong with such a path.
+            _ => write_atomic(path, &json)?,
+        }
+        Ok(())
+    }
+
+    /// Reads it for use with `camera`.
+    ///
+    /// # Errors
+    /// Where there is none, or none that may be used with this camera.
+    pub fn read(path: &Path, camera: &CameraIdentity) -> Result<Self, CalibrationFileError> {
+        /// The part that every version has.
+        #[derive(Deserialize)]
+        struct Head {
+            #[serde(rename = "kind")]
+            _kind: Kind,
+            version: u32,
+        }
+        let text = std::fs::read(path)
+            .map_err(|source| CalibrationFileError::Io { path: path.to_owned(), source })?;
+        let head: Head =
+            serde_json::from_slice(&text).map_err(|error| format_error(path, &error))?;
+        if head.version != FORMAT {
+            let found = head.version;
+            return Err(CalibrationFileError::Version { path: path.to_owned(), found });
+        }
+        let kept: Self =
+            serde_json::from_slice(&text).map_err(|error| format_error(path, &error))?;
+        kept.check(camera).map_err(|(field, found, expected)| CalibrationFileError::Mismatch {
+            path: path.to_owned(),
+            field,
+            found,
+            expected,
+        })?;
+        Ok(kept)
+    }
+
+    /// What differs, as kept and as it should be.
+    fn check(&self, camera: &CameraIdentity) -> Result<(), (&'static str, String, String)> {
+        let (kept, now) = (&self.camera, camera);
+        let same = [
+            ("serial number", kept.serial.clone(), now.serial.clone()),
+            ("board", kept.board.clone(), now.board.clone()),
+            ("gateware", kept.gateware.clone(), now.gateware.clone()),
+            ("ADC rate in Hz", kept.adc_hz.to_string(), now.adc_hz.to_string()),
+        ];
+        same.into_iter().find(|(_, kept, now)| kept != now).map_or(Ok(()), Err)
+    }
+}
+
+fn format_error(path: &Path, error: &serde_json::Error) -> CalibrationFileError {
+    CalibrationFileError::Format { path: path.to_owned(), reason: error.to_string() }
+}
+
+/// Where the calibration of the camera with this serial number is kept.
+///
+/// # Errors
+/// Where the user has no home.
+pub fn path_of(serial: &str) -> Result<PathBuf, CalibrationFileError> {
+    let folder = choose_base_strategy()?.data_dir().join("nirspi").join("calibration");
+    Ok(folder.join(format!("{}.json", file_name(serial))))
+}
+
+/// A serial number as a file name, one name for each: what is no letter, digit, `-` or `_` becomes `%` and two digits.
+fn file_name(serial: &str) -> String {
+    serial
+        .bytes()
+        .map(|byte| match byte {
+            b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'-' | b'_' => char::from(byte).to_string(),
+            byte => format!("%{byte:02x}"),
+        })
+        .collect()
+}
+
+/// `2026-11-20 08:30 UTC`: the Gregorian calendar by years that begin in March, so that a leap day is a year's last
+/// (H. Hinnant, *chrono-Compatible Low-Level Date Algorithms*, `civil_from_days`).
+fn date(unix_s: u64) -> String {
+    // From 1 March of year 0 to 1 January 1970; an era is 400 years.
+    const DAYS_BEFORE_1970: u64 = 719_468;
+    const DAYS_OF_ERA: u64 = 146_097;
+    let (days, seconds) = (unix_s / 86_400 + DAYS_BEFORE_1970, unix_s % 86_400);
+    let (era, day) = (days / DAYS_OF_ERA, days % DAYS_OF_ERA);
+    let year = (day - day / 1460 + day / 36_524 - day / (DAYS_OF_ERA - 1)) / 365;
+    let day = day - (365 * year + year / 4 - year / 100);
+    let month_from_march = (5 * day + 2) / 153;
+    let day = day - (153 * month_from_march + 2) / 5 + 1;
+    let month = (month_from_march + 2) % 12 + 1;
+    let year = era * 400 + year + u64::from(month <= 2);
+    let (hour, minute) = (seconds / 3600, seconds / 60 % 60);
+    format!("{year}-{month:02}-{day:02} {hour:02}:{minute:02} UTC")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::Duration;
+
+    fn camera() -> CameraIdentity {
+        CameraIdentity {
+            protocol: 1,
+            firmware: "0.1.0".into(),
+            gateware: "0.1.0".into(),
+            board: "virtual".into(),
+            serial: "A 1".into(),
+            adc_hz: 125_000_000,
+            adc_bits: 14,
+            wavelength_nm: 1550,
+        }
+    }
+
+    fn kept() -> KeptCalibration {
+        let settling = Settling {
+            adc_latency: 6,
+            response: vec![0.4, 0.9],
+            dark_counts: 2048.0,
+            step_counts: 8000.0,
+            noise_counts: 18.5,
+        };
+        let when = UNIX_EPOCH + Duration::from_secs(1_795_163_400);
+        KeptCalibration::new(camera(), settling, vec![Check::told("x", true, "")], when)
+    }
+
+    #[test]
+    fn a_calibration_comes_back_as_it_was() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("made/for/it/a.json");
+        kept().write(&path).unwrap();
+        assert_eq!(KeptCalibration::read(&path, &camera()).unwrap(), kept());
+        assert_eq!(kept().measured(), "2026-11-20 08:30 UTC");
+    }
+
+    #[test]
+    fn a_calibration_of_something_else_is_refused_in_one_line() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.json");
+        kept().write(&path).unwrap();
+        type Change<'c> = (&'c str, &'c dyn Fn(&mut CameraIdentity));
+        let changes: [Change<'_>; 4] = [
+            ("serial number A 1", &|camera| camera.serial = "B2".into()),
+            ("board virtual", &|camera| camera.board = "nucleo".into()),
+            ("gateware 0.1.0", &|camera| camera.gateware = "0.2.0".into()),
+            ("ADC rate in Hz 125000000", &|camera| camera.adc_hz = 100_000_000),
+        ];
+        for (words, change) in changes {
+            let mut camera = camera();
+            change(&mut camera);
+            let error = KeptCalibration::read(&path, &camera).unwrap_err().to_string();
+            assert!(error.contains(words) && error.lines().count() == 1, "{error}");
+        }
+        // Newer firmware with the same gateware changes nothing between light and sample.
+        let newer = CameraIdentity { firmware: "9.9.9".into(), ..camera() };
+        KeptCalibration::read(&path, &newer).unwrap();
+    }
+
+    #[test]
+    fn a_file_of_another_format_says_so() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.json");
+        let error = |text: &str| {
+            std::fs::write(&path, text).unwrap();
+            KeptCalibration::read(&path, &camera()).unwrap_err().to_string()
+        };
+        let newer = error(r#"{"kind": "nirspi calibration", "version": 2, "other": []}"#);
+        assert!(newer.contains("format 2, expected 1"), "{newer}");
+        for foreign in ["", "{}", r#"{"kind": "shopping list", "version": 1}"#] {
+            let error = error(foreign);
+            assert!(error.contains("expected a calibration") && error.lines().count() == 1);
+        }
+    }
+
+    #[test]
+    fn serial_numbers_become_file_names_one_each() {
+        assert_eq!(file_name("virtual-1"), "virtual-1");
+        assert_eq!(file_name("../a b%"), "%2e%2e%2fa%20b%25");
+    }
+
+    #[test]
+    fn dates_are_those_of_the_calendar() {
+        for (unix_s, expected) in [
+            (0, "1970-01-01 00:00 UTC"),
+            (951_827_696, "2000-02-29 12:34 UTC"),
+            (1_709_251_199, "2024-02-29 23:59 UTC"),
+            (1_709_251_200, "2024-03-01 00:00 UTC"),
+            (4_107_542_400, "2100-03-01 00:00 UTC"),
+        ] {
+            assert_eq!(date(unix_s), expected);
+        }
+    }
+}

@@ -1,0 +1,39 @@
+//! An error and its causes in one line, for people.
+//!
+//! # Invariant
+//! An error of this workspace says what happened at its own level; its cause is its `source()` and no part of its own
+//! message. So every cause is told once, wherever the chain is printed
+//! (`tests::every_level_is_told_once_and_in_one_line`).
+
+use std::error::Error;
+
+/// What happened, then each cause after a colon.
+#[must_use]
+pub fn in_one_line(error: &(dyn Error + 'static)) -> String {
+    let mut line = error.to_string();
+    let mut cause = error.source();
+    while let Some(error) = cause {
+        line.push_str(": ");
+        line.push_str(&error.to_string());
+        cause = error.source();
+    }
+    line.replace('\n', " ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibration::CalibrationError;
+    use crate::recording::RecordingError;
+    use crate::session::SessionError;
+    use std::io;
+
+    #[test]
+    fn every_level_is_told_once_and_in_one_line() {
+        let cause = || io::Error::other("no\ncable");
+        let session = CalibrationError::Session(SessionError::Link(cause()));
+        assert_eq!(in_one_line(&session), "the link to the camera failed: no cable");
+        let recording = RecordingError::Io { path: "a.mcap".into(), source: cause() };
+        assert_eq!(in_one_line(&recording), "a.mcap: cannot read the recording: no cable");
+    }
+}

@@ -1,0 +1,18 @@
+//! From a reconstructed image to an enhanced one, with its quality and the warnings that belong on it.
+//!
+//! ```text
+//! Image (ADC counts) ──white──> [0, 1] ──Enhance──> 64 x 64 in [0, 1] ──> Warning, Quality
+//! ```
+//!
+//! `demo`, `reconstruct`, `capture`, `serve` and `eval` all go this way: white level, the larger of lens and estimator as
+//! blur, networks, and the rule for warnings stand here once.
+
+mod enhance;
+mod quality;
+mod warning;
+mod white;
+
+pub use enhance::{Enhance, EnhanceError, EnhancedImage, Known, White};
+pub use quality::{Fitted, Quality, compare};
+pub use warning::{Warning, warnings};
+pub use white::{SteadyWhite, brightest};

@@ -1,0 +1,121 @@
+//! What people must know before they trust a picture: one rule for every command, page and file.
+
+use super::EnhancedImage;
+use std::fmt;
+
+/// Inconsistency above which the readings contradict the image. An image that agrees with them ends at 1.1 or below, the
+/// radius that the networks' result is moved to.
+const CONTRADICTED: f32 = 1.2;
+/// Blur, in pixels of the 64 x 64 grid, up to which the networks were trained (`host/nets/weights/README.md`).
+const TRAINED_BLUR_PX: f32 = 4.2;
+/// Noise of a pixel, white being 1, up to which the networks were trained.
+const TRAINED_NOISE: f32 = 0.1;
+
+/// A reason not to trust a picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum Warning {
+    /// The readings contradict the enhanced image.
+    Inconsistent {
+        /// Distance of the readings from those of the image, over their noise.
+        inconsistency: f32,
+    },
+    /// More blur than the networks have learned to take out.
+    Blurred {
+        /// Standard deviation in pixels of the 64 x 64 grid.
+        blur_px: f32,
+    },
+    /// Too little light for the noise.
+    Dim {
+        /// Noise of one pixel, white being 1.
+        noise: f32,
+    },
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Inconsistent { inconsistency } => write!(
+                f,
+                "the readings contradict the enhanced image (inconsistency {inconsistency:.2}, expected at most \
+                 {CONTRADICTED}): do not trust its strokes; more light helps"
+            ),
+            Self::Blurred { blur_px } => write!(
+                f,
+                "blurred by {blur_px:.1} px, more than the {TRAINED_BLUR_PX} px that the networks have learned: move the \
+                 target to where the lens is focused"
+            ),
+            Self::Dim { noise } => write!(
+                f,
+                "too little light: the noise is {:.0} % of white, expected at most {:.0} %; capture more frames or come \
+                 nearer",
+                100.0 * noise,
+                100.0 * TRAINED_NOISE
+            ),
+        }
+    }
+}
+
+impl Warning {
+    /// In a few words, for the picture itself.
+    #[must_use]
+    pub fn short(&self) -> &'static str {
+        match self {
+            Self::Inconsistent { .. } => "readings contradict it",
+            Self::Blurred { .. } => "too blurred",
+            Self::Dim { .. } => "too little light",
+        }
+    }
+}
+
+/// All warnings that belong on this picture, worst first.
+#[must_use]
+pub fn warnings(image: &EnhancedImage) -> Vec<Warning> {
+    let EnhancedImage { inconsistency, blur_px, noise, .. } = *image;
+    // A figure that is no number is no reason to be calm.
+    let beyond = |value: f32, limit: f32| !(value <= limit);
+    [
+        beyond(inconsistency, CONTRADICTED).then_some(Warning::Inconsistent { inconsistency }),
+        beyond(noise, TRAINED_NOISE).then_some(Warning::Dim { noise }),
+        beyond(blur_px, TRAINED_BLUR_PX).then_some(Warning::Blurred { blur_px }),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn image(inconsistency: f32, blur_px: f32, noise: f32) -> EnhancedImage {
+        EnhancedImage {
+            scaled: Vec::new(),
+            white: 1.0,
+            fused: None,
+            pixels: Vec::new(),
+            blur_px,
+            estimated_blur_px: blur_px,
+            noise,
+            inconsistency,
+        }
+    }
+
+    #[test]
+    fn a_good_picture_has_no_warning_and_each_fault_its_own() {
+        assert!(warnings(&image(1.1, 2.0, 0.03)).is_empty());
+        let shorts = |image| warnings(&image).iter().map(Warning::short).collect::<Vec<_>>();
+        assert_eq!(shorts(image(1.3, 2.0, 0.03)), ["readings contradict it"]);
+        assert_eq!(shorts(image(1.0, 4.5, 0.03)), ["too blurred"]);
+        assert_eq!(shorts(image(1.0, 2.0, 0.2)), ["too little light"]);
+        assert_eq!(shorts(image(f32::NAN, 9.0, 0.2)).len(), 3);
+    }
+
+    #[test]
+    fn a_warning_is_one_line_with_its_number() {
+        let all = warnings(&image(2.5, 9.25, 0.2));
+        let lines: Vec<String> = all.iter().map(ToString::to_string).collect();
+        assert!(lines[0].contains("2.50") && lines[1].contains("20 %") && lines[2].contains("9.2"));
+        assert!(lines.iter().all(|line| line.lines().count() == 1));
+    }
+}

@@ -1,0 +1,176 @@
+//! Cameras by name: `virtual`, `usb`, `usb:SERIAL`, `tcp:HOST:PORT`, `serial:PATH[:BAUD]`.
+
+use super::usb::UsbError;
+use super::{DEFAULT_BAUD, Link, SerialLink, TcpLink, UsbLink};
+use crate::session::{Session, SessionError};
+use std::fmt;
+use std::io;
+use std::path::PathBuf;
+use std::str::FromStr;
+use thiserror::Error;
+
+/// Which camera to use.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum CameraAddress {
+    /// The one in this process.
+    Virtual,
+    /// One behind a TCP address.
+    Tcp(String),
+    /// One behind a serial port.
+    Serial {
+        /// Its device, as `/dev/ttyACM0` or `COM7`.
+        path: PathBuf,
+        /// Bits a second.
+        baud: u32,
+    },
+    /// One on USB: the one with this serial number, or the only one.
+    Usb(Option<String>),
+}
+
+impl FromStr for CameraAddress {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.split_once(':') {
+            None if text == "virtual" => Ok(Self::Virtual),
+            None if text == "usb" => Ok(Self::Usb(None)),
+            Some(("usb", serial)) if !serial.is_empty() => Ok(Self::Usb(Some(serial.to_owned()))),
+            Some(("tcp", address)) if address.contains(':') => Ok(Self::Tcp(address.to_owned())),
+            Some(("serial", port)) if !port.is_empty() => {
+                let speed = port.rsplit_once(':').and_then(|(path, baud)| {
+                    let baud = baud.parse().ok().filter(|&baud: &u32| baud > 0)?;
+                    Some((path, baud)).filter(|(path, _)| !path.is_empty())
+                });
+                let (path, baud) = speed.unwrap_or((port, DEFAULT_BAUD));
+                Ok(Self::Serial { path: PathBuf::from(path), baud })
+            }
+            _ => {
+                Err("expected virtual, usb, usb:SERIAL, tcp:HOST:PORT or serial:PATH[:BAUD]"
+                    .to_owned())
+            }
+        }
+    }
+}
+
+impl fmt::Display for CameraAddress {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Virtual => f.write_str("virtual"),
+            Self::Tcp(address) => write!(f, "tcp:{address}"),
+            Self::Serial { path, .. } => write!(f, "serial:{}", path.display()),
+            Self::Usb(None) => f.write_str("usb"),
+            Self::Usb(Some(serial)) => write!(f, "usb:{serial}"),
+        }
+    }
+}
+
+/// Why a camera could not be opened.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum OpenError {
+    /// Nothing answers there.
+    #[error("no camera at tcp:{address}")]
+    Tcp {
+        /// The address.
+        address: String,
+        /// What the network says.
+        #[source]
+        problem: io::Error,
+    },
+    /// The port cannot be used.
+    #[error("serial:{}: {}", .path.display(), serial_problem(.problem))]
+    Serial {
+        /// The port.
+        path: PathBuf,
+        /// What the system says.
+        problem: io::Error,
+    },
+    /// No such camera on USB, or it cannot be used.
+    #[error(transparent)]
+    Usb(#[from] UsbError),
+    /// It does not speak as a camera does.
+    #[error("{camera}")]
+    Session {
+        /// The camera's address.
+        camera: String,
+        /// What went wrong.
+        #[source]
+        problem: SessionError,
+    },
+    /// The virtual camera cannot be built.
+    #[error("the virtual camera cannot be built")]
+    Virtual(#[source] Box<dyn std::error::Error + Send + Sync>),
+}
+
+impl CameraAddress {
+    /// Opens a conversation with the camera. `virtual_link` makes the one in this process, if that is meant.
+    ///
+    /// # Errors
+    /// [`OpenError`], which says what to do about it.
+    pub fn open<E: Into<Box<dyn std::error::Error + Send + Sync>>>(
+        &self,
+        virtual_link: impl FnOnce() -> Result<Box<dyn Link>, E>,
+    ) -> Result<Session, OpenError> {
+        let link: Box<dyn Link> = match self {
+            Self::Virtual => {
+                virtual_link().map_err(|problem| OpenError::Virtual(problem.into()))?
+            }
+            Self::Tcp(address) => Box::new(
+                TcpLink::connect(address)
+                    .map_err(|problem| OpenError::Tcp { address: address.clone(), problem })?,
+            ),
+            Self::Serial { path, baud } => Box::new(
+                SerialLink::open(path, *baud)
+                    .map_err(|problem| OpenError::Serial { path: path.clone(), problem })?,
+            ),
+            // Whose errors name the camera and say what to do.
+            Self::Usb(serial) => Box::new(UsbLink::open(serial.as_deref())?),
+        };
+        Session::open(link)
+            .map_err(|problem| OpenError::Session { camera: self.to_string(), problem })
+    }
+
+    /// Frames of 1024 patterns that the link must carry in a second; 0 where any speed will do.
+    #[must_use]
+    pub fn min_frames_per_s(&self) -> f64 {
+        match self {
+            // Three quarters of what the boards' link to the FPGA lets come, by the estimate in docs/firmware.md.
+            Self::Usb(_) => 300.0,
+            _ => 0.0,
+        }
+    }
+}
+
+fn serial_problem(error: &io::Error) -> String {
+    match error.kind() {
+        io::ErrorKind::NotFound => "there is no such port: nirspi devices lists them".to_owned(),
+        io::ErrorKind::PermissionDenied if cfg!(target_os = "linux") => {
+            "no permission: sudo usermod -aG dialout $USER, then log in again".to_owned()
+        }
+        _ => error.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_form_is_understood_and_said_again() {
+        let serial = |path: &str, baud| CameraAddress::Serial { path: path.into(), baud };
+        for (text, expected) in [
+            ("virtual", CameraAddress::Virtual),
+            ("usb", CameraAddress::Usb(None)),
+            ("usb:0042:A", CameraAddress::Usb(Some("0042:A".to_owned()))),
+            ("tcp:[::1]:1550", CameraAddress::Tcp("[::1]:1550".to_owned())),
+            ("serial:/dev/ttyACM0", serial("/dev/ttyACM0", DEFAULT_BAUD)),
+            ("serial:COM7:3000000", serial("COM7", 3_000_000)),
+            ("serial:/dev/by-path/pci:0", serial("/dev/by-path/pci:0", DEFAULT_BAUD)),
+        ] {
+            assert_eq!(text.parse(), Ok(expected), "{text}");
+        }
+        for text in ["", "usb:", "tcp:nowhere", "serial:", "fax:1"] {
+            assert!(text.parse::<CameraAddress>().is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,144 @@
+//! A link cut into packets, and questions matched with their answers.
+//!
+//! A conversation does not know yet who is at the other end: [`Session::open`](super::Session::open) greets the camera
+//! and makes a session of it.
+
+use super::request::Request;
+use super::{ANSWER_TIMEOUT, Listener, SessionError};
+use crate::link::{Link, Received};
+use nirspi_wire::packet::{MAX_DEVICE_PACKET, MAX_HOST_PACKET, hello_of_any_version};
+use nirspi_wire::{
+    Answer, Command, Deframed, Deframer, DeviceMessage, PacketError, Refusal, Reply, encode, open,
+};
+use std::time::{Duration, Instant};
+
+/// Longest time between two looks at the clock while an answer is awaited.
+const LOOK: Duration = Duration::from_millis(100);
+
+/// Hears each reply: the number of the request, and what came of it.
+type Answered<'f> = dyn FnMut(u16, Result<&Answer<'_>, Refusal>) + 'f;
+
+/// A link on which requests are numbered and packets are cut out of the bytes that come.
+pub(super) struct Conversation {
+    link: Box<dyn Link>,
+    incoming: Incoming,
+    next_id: u16,
+}
+
+impl Conversation {
+    /// Begins; what an earlier host may have left half sent is cut off.
+    pub(super) fn begin(mut link: Box<dyn Link>) -> Result<Self, SessionError> {
+        link.send(&[0])?;
+        Ok(Self { link, incoming: Incoming::new(), next_id: 0 })
+    }
+
+    /// Sends a command without waiting for its answer; returns the number that the answer will repeat.
+    pub(super) fn send(&mut self, command: Command<'_>) -> Result<u16, SessionError> {
+        let id = self.next_id;
+        self.next_id = id.wrapping_add(1);
+        let mut packet = vec![0; MAX_HOST_PACKET];
+        let packet = encode(&nirspi_wire::Request { id, command }, &mut packet)
+            .map_err(|error| std::io::Error::new(std::io::ErrorKind::InvalidInput, error))?;
+        match self.link.send(packet) {
+            Ok(()) => Ok(id),
+            Err(error) if crate::link::is_hangup(&error) => Err(self.closed()),
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    fn closed(&self) -> SessionError {
+        SessionError::Closed { mid_packet: self.incoming.deframer.pending() > 0 }
+    }
+
+    /// Listens for up to `timeout`, or until something has come; gives every packet to `listener` and every reply
+    /// among them to `answered`.
+    pub(super) fn pump(
+        &mut self,
+        timeout: Duration,
+        listener: &mut dyn Listener,
+        answered: &mut Answered<'_>,
+    ) -> Result<(), SessionError> {
+        match self.link.receive(&mut self.incoming.chunk, timeout)? {
+            Received::Bytes(length) => self.incoming.take(length, listener, answered),
+            Received::Nothing => {}
+            Received::Closed => return Err(self.closed()),
+        }
+        Ok(())
+    }
+
+    /// Sends a request and waits for its reply.
+    pub(super) fn ask<R: Request>(
+        &mut self,
+        request: &R,
+        listener: &mut dyn Listener,
+    ) -> Result<R::Reply, SessionError> {
+        let command = R::NAME;
+        let id = self.send(request.command())?;
+        let deadline = Instant::now() + ANSWER_TIMEOUT;
+        let mut outcome = None;
+        while let Some(left) = deadline.checked_duration_since(Instant::now()) {
+            self.pump(left.min(LOOK), listener, &mut |answered, answer| {
+                if answered == id {
+                    outcome = Some(answer.map(R::reply));
+                }
+            })?;
+            match outcome {
+                None => {}
+                Some(Ok(Some(reply))) => return Ok(reply),
+                Some(Ok(None)) => return Err(SessionError::WrongAnswer { command }),
+                Some(Err(Refusal::Protocol { device })) => {
+                    return Err(SessionError::Version { camera: device });
+                }
+                Some(Err(refusal)) => return Err(SessionError::Refused { command, refusal }),
+            }
+        }
+        Err(SessionError::NoAnswer { command })
+    }
+}
+
+/// Bytes on their way to packets.
+struct Incoming {
+    deframer: Box<Deframer<MAX_DEVICE_PACKET>>,
+    chunk: Vec<u8>,
+    raw: Vec<u8>,
+}
+
+impl Incoming {
+    fn new() -> Self {
+        Self {
+            deframer: Box::default(),
+            chunk: vec![0; 1 << 18],
+            raw: Vec::with_capacity(MAX_DEVICE_PACKET + 1),
+        }
+    }
+
+    /// Cuts `chunk[..length]` into packets.
+    fn take(&mut self, length: usize, listener: &mut dyn Listener, answered: &mut Answered<'_>) {
+        let mut bytes = self.chunk.get(..length).unwrap_or(&[]);
+        while let Some(found) = self.deframer.next(&mut bytes) {
+            self.raw.clear();
+            let content = match found {
+                Deframed::TooLong => Err(PacketError::TooLong),
+                Deframed::Packet(packet) => {
+                    self.raw.extend_from_slice(packet);
+                    open::<DeviceMessage<'_>>(packet)
+                }
+            };
+            self.raw.push(0);
+            listener.packet(&self.raw, &content);
+            match &content {
+                Ok(DeviceMessage::Reply(Reply { id, outcome })) => {
+                    answered(*id, outcome.as_ref().map_err(|&refusal| refusal));
+                }
+                // Perhaps the greeting of a version that says more than ours.
+                Err(PacketError::Message) => {
+                    self.raw.pop();
+                    if let Some((id, device)) = hello_of_any_version(&mut self.raw) {
+                        answered(id, Err(Refusal::Protocol { device }));
+                    }
+                }
+                _ => {}
+            }
+        }
+    }
+}

@@ -1,0 +1,165 @@
+//! Commands of the host, one at a time, each answered once.
+//!
+//! # Invariant
+//! Nothing is done for a host before its `Hello` has shown that it speaks this protocol
+//! (`tests::commands::nothing_is_done_before_hello`). A refused command has changed nothing, but for a `Configure` that
+//! failed half way on the bus ([`Refusal::Bus`]), which leaves nothing configured
+//! (`tests::commands::settings_that_do_not_arrive_leave_nothing_configured`).
+
+use crate::machine::{Activity, Machine, Session};
+use crate::notices::{Notice, Outcome};
+use crate::{
+    FpgaBus, GatewareLoader, Inputs, Micros, PacketSink, Ports, configure, fpga, gateware, safety,
+};
+use nirspi_wire::register::{ORDER_TABLE, Register, status};
+use nirspi_wire::{
+    Answer, Command, Configuration, GatewareChunk, PATTERNS, PROTOCOL_VERSION, PatternOrder,
+    Refusal, Request, State, Status,
+};
+
+impl Machine {
+    pub(crate) fn carry_out<B: FpgaBus, S: PacketSink, G: GatewareLoader>(
+        &mut self,
+        now: Micros,
+        request: &Request<'_>,
+        inputs: &Inputs,
+        ports: &mut Ports<'_, B, S, G>,
+    ) {
+        let &Request { id, command } = request;
+        let Ports { bus, loader, .. } = ports;
+        self.last_command = now;
+        let done = match command {
+            Command::Hello { protocol } => return self.hello(id, now, protocol, *bus),
+            _ if self.session != Session::Open => {
+                Err(Refusal::Protocol { device: PROTOCOL_VERSION })
+            }
+            Command::Configure(configuration) => {
+                self.configure(now, &configuration, inputs, *bus).map(|()| Answer::Done)
+            }
+            Command::Start(length) => self.start_run(now, length, *bus).map(|()| Answer::Done),
+            Command::Stop => return self.stop(id, now, *bus, Outcome::DONE),
+            Command::Status => Ok(Answer::Status(self.status(now, inputs, *bus))),
+            Command::SelfTest => match self.state() {
+                State::Running => Err(Refusal::State(State::Running)),
+                _ => return self.self_test(id, now, inputs, *bus),
+            },
+            Command::ReadRegister { address } => read_register(address, *bus).map(Answer::Register),
+            Command::LoadGateware(chunk) => self
+                .load_gateware(&chunk, *bus, *loader)
+                .map(|next_offset| Answer::Gateware { next_offset }),
+            Command::RawBurst { samples } => {
+                self.start_burst(now, samples, *bus).map(|()| Answer::Done)
+            }
+            Command::Reboot(into) => {
+                self.reboot = Some(into);
+                return self.stop(id, now, *bus, Outcome::DONE);
+            }
+        };
+        self.reply(id, Outcome::Other(done));
+    }
+
+    /// A new session: what the host before it has left running ends.
+    fn hello(&mut self, id: u16, now: Micros, protocol: u16, bus: &mut impl FpgaBus) {
+        let gateware = fpga::version(bus);
+        self.stop(id, now, bus, Outcome::Hello { gateware });
+        self.session = if protocol == PROTOCOL_VERSION { Session::Open } else { Session::Foreign };
+        if self.session == Session::Open && self.crash.is_some() {
+            self.notices.push(Notice::Crash);
+        }
+    }
+
+    /// LEDs off. The reply comes when no frame of the run is left, and `RunEnded` follows it.
+    fn stop(&mut self, id: u16, now: Micros, bus: &mut impl FpgaBus, outcome: Outcome) {
+        if let Activity::Run(_) = self.activity {
+            return self.end_run(now, Some((id, outcome)), bus);
+        }
+        self.leds_off(bus);
+        self.activity = Activity::Resting;
+        self.reply(id, outcome);
+    }
+
+    /// `Configure`: checks, acknowledges, writes and reads back.
+    fn configure(
+        &mut self,
+        now: Micros,
+        configuration: &Configuration<'_>,
+        inputs: &Inputs,
+        bus: &mut impl FpgaBus,
+    ) -> Result<(), Refusal> {
+        if self.state() == State::Running {
+            return Err(Refusal::State(State::Running));
+        }
+        let setup =
+            configure::check(configuration, &self.limits).map_err(Refusal::Configuration)?;
+        if let Some(fault) = safety::objection(inputs, &self.limits, self.fault) {
+            return Err(Refusal::Fault(fault));
+        }
+        if let Err(fault) = fpga::acknowledge(bus) {
+            self.trip(now, fault, bus);
+            return Err(Refusal::Fault(fault));
+        }
+        self.loading = None;
+        self.setup = None;
+        let table = match &configuration.order {
+            PatternOrder::Table(table) => fpga::set_table(bus, table),
+            PatternOrder::Natural | PatternOrder::Sequency => Ok(()),
+        };
+        table.and_then(|()| fpga::set(bus, &setup, &self.limits)).map_err(|_| Refusal::Bus)?;
+        self.setup = Some(setup);
+        self.fault = None;
+        Ok(())
+    }
+
+    fn status(&mut self, now: Micros, inputs: &Inputs, bus: &mut impl FpgaBus) -> Status {
+        let resting = matches!(self.activity, Activity::Resting);
+        if let Activity::Run(_) = self.activity {
+            // An FPGA that does not answer leaves the last counts; its absence is noticed elsewhere.
+            let _ = self.counters.read(bus);
+        }
+        // Where the FPGA cannot say, the pessimistic answer.
+        let leds_on = fpga::read(bus, Register::Status)
+            .map_or(!resting, |status| status & status::LEDS_ON != 0);
+        Status {
+            state: self.state(),
+            fault: self.fault,
+            uptime_us: now.0,
+            run: self.counters.run,
+            frames_made: self.counters.made,
+            frames_sent: self.counters.sent,
+            frames_dropped: self.counters.dropped,
+            fpga_frames_lost: self.counters.lost,
+            fpga_frames_corrupt: self.counters.corrupt,
+            commands_damaged: self.commands_damaged,
+            temperature_centi_celsius: inputs.temperature_centi_celsius.unwrap_or(i16::MIN),
+            duty_permille: self.setup.map_or(0, |setup| setup.duty_permille),
+            leds_on,
+            interlock_closed: inputs.interlock_closed,
+        }
+    }
+
+    fn load_gateware(
+        &mut self,
+        chunk: &GatewareChunk<'_>,
+        bus: &mut impl FpgaBus,
+        loader: &mut impl GatewareLoader,
+    ) -> Result<u32, Refusal> {
+        if self.state() == State::Running {
+            return Err(Refusal::State(State::Running));
+        }
+        if chunk.offset == 0 && fpga::identify(bus).is_err() {
+            loader.forget();
+        }
+        let next_offset = gateware::take(&mut self.loading, chunk, loader)?;
+        // The FPGA forgets its settings with the first piece.
+        self.setup = None;
+        Ok(next_offset)
+    }
+}
+
+fn read_register(address: u16, bus: &mut impl FpgaBus) -> Result<u32, Refusal> {
+    let table = ORDER_TABLE..ORDER_TABLE.saturating_add(PATTERNS);
+    if Register::at(address).is_none() && !table.contains(&address) {
+        return Err(Refusal::NoSuchRegister { address });
+    }
+    bus.read(address).map_err(|_| Refusal::Bus)
+}

@@ -1,0 +1,329 @@
+//! The state of the camera, and every change of it that switches LEDs, answers a command or reports an event.
+//!
+//! A part that is busy (a run, a raw burst, a test frame) says what its step came to; the machine draws the
+//! consequence. The parts know nothing of the machine, so each can be read and tested alone.
+//!
+//! # Invariant
+//! A fault switches the LEDs off before the call that found the fault returns
+//! (`tests::safety::a_rule_also_speaks_where_only_bytes_come_in`), and the first fault stands until a configuration
+//! acknowledges it (`tests::safety::the_first_reason_stands_and_is_told_once`).
+
+use crate::burst::{self, Burst};
+use crate::configure::Setup;
+use crate::gateware::Loading;
+use crate::notices::{Notice, Notices, Outcome};
+use crate::run::{self, Counters, Fpga, Run, SAMPLE_BYTES};
+use crate::selftest::{self, TestFrame};
+use crate::{BoardInfo, Crash, FpgaBus, Inputs, Limits, Micros, PacketSink, fpga, safety};
+use nirspi_wire::{Answer, Event, EventKind, Fault, RebootInto, Refusal, RunLength, State};
+
+/// What is known of the host.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Session {
+    /// No `Hello` since power-up or since the link was closed.
+    Closed,
+    /// The host speaks this protocol.
+    Open,
+    /// The host speaks another protocol: the camera names its own version, and answers nothing else.
+    Foreign,
+}
+
+/// What the FPGA is busy with.
+#[derive(Debug)]
+pub(crate) enum Activity {
+    Resting,
+    Run(Run),
+    Burst(Burst),
+    TestFrame(TestFrame),
+}
+
+/// All of the camera but the bytes of a half-received command.
+#[derive(Debug)]
+pub(crate) struct Machine {
+    pub info: BoardInfo,
+    pub limits: Limits,
+    pub session: Session,
+    pub notices: Notices,
+    pub activity: Activity,
+    /// The configuration that the FPGA holds.
+    pub setup: Option<Setup>,
+    pub fault: Option<Fault>,
+    pub counters: Counters,
+    pub loading: Option<Loading>,
+    pub reboot: Option<RebootInto>,
+    /// The crash that ended the last start, until the host has been told.
+    pub crash: Option<Crash>,
+    pub commands_damaged: u32,
+    pub last_command: Micros,
+    /// When the FPGA's status was last read.
+    pub last_check: Option<Micros>,
+    /// The FPGA has not confirmed that the LEDs are off.
+    pub off_pending: bool,
+    /// The bus failed when a frame was to be released.
+    pub release_pending: bool,
+    /// Samples of a frame or distances of a map, on their way into a packet.
+    pub scratch: [u8; SAMPLE_BYTES],
+}
+
+impl Machine {
+    pub fn new(info: BoardInfo, limits: Limits) -> Self {
+        Self {
+            info,
+            limits,
+            session: Session::Closed,
+            notices: Notices::default(),
+            activity: Activity::Resting,
+            setup: None,
+            fault: None,
+            counters: Counters::default(),
+            loading: None,
+            reboot: None,
+            crash: None,
+            commands_damaged: 0,
+            last_command: Micros(0),
+            last_check: None,
+            off_pending: false,
+            release_pending: false,
+            scratch: [0; SAMPLE_BYTES],
+        }
+    }
+
+    pub fn state(&self) -> State {
+        match (&self.fault, &self.activity, &self.setup) {
+            (Some(_), ..) => State::Fault,
+            (None, Activity::Resting, Some(_)) => State::Configured,
+            (None, Activity::Resting, None) => State::Idle,
+            (None, ..) => State::Running,
+        }
+    }
+
+    /// The configuration to start with, if nothing stands against a start.
+    fn ready_setup(&self) -> Result<Setup, Refusal> {
+        match (self.fault, self.state(), self.setup) {
+            (Some(fault), ..) => Err(Refusal::Fault(fault)),
+            (None, State::Configured, Some(setup)) => Ok(setup),
+            (None, state, _) => Err(Refusal::State(state)),
+        }
+    }
+
+    pub fn fpga_is_absent(&self) -> bool {
+        matches!(self.fault, Some(Fault::FpgaAbsent { .. }))
+    }
+
+    /// Whether frames may go out: a host listens, and no reply or event waits.
+    pub fn may_stream(&self) -> bool {
+        self.session == Session::Open && self.notices.is_empty()
+    }
+
+    pub fn reply(&mut self, id: u16, outcome: Outcome) {
+        self.notices.push(Notice::Reply { id, outcome });
+    }
+
+    /// Reports an event to a host that speaks this protocol. Without such a host the event is not kept: the next host
+    /// learns the state from `Status`.
+    pub fn notify(&mut self, now: Micros, kind: EventKind) {
+        if self.session == Session::Open {
+            self.notices.push(Notice::Event(Event { device_time_us: now.0, kind }));
+        }
+    }
+
+    pub fn flush(&mut self, sink: &mut impl PacketSink) -> bool {
+        self.notices.flush(&self.info, &mut self.crash, sink)
+    }
+
+    /// Switches the LEDs off. Every poll repeats this until the FPGA says that the LEDs are off.
+    pub fn leds_off(&mut self, bus: &mut impl FpgaBus) {
+        self.off_pending = fpga::go_dark(bus).is_err();
+    }
+
+    /// Switches the LEDs off for this reason, until a configuration acknowledges the fault. The first fault stands.
+    pub fn trip(&mut self, now: Micros, fault: Fault, bus: &mut impl FpgaBus) {
+        self.leds_off(bus);
+        if self.fault.is_none() {
+            self.fault = Some(fault);
+            self.notify(now, EventKind::Fault(fault));
+        }
+        match &mut self.activity {
+            Activity::Resting => {}
+            Activity::Run(run) => run.end(now, None),
+            Activity::Burst(_) => self.activity = Activity::Resting,
+            Activity::TestFrame(_) => self.finish_test(false, bus),
+        }
+    }
+
+    /// A start failed: an FPGA that did not take the start is a fault, any other refusal changes nothing.
+    fn refused_start(&mut self, now: Micros, refusal: Refusal, bus: &mut impl FpgaBus) -> Refusal {
+        if let Refusal::Fault(fault) = refusal {
+            self.trip(now, fault, bus);
+        }
+        refusal
+    }
+
+    /// `Start`.
+    pub fn start_run(
+        &mut self,
+        now: Micros,
+        length: RunLength,
+        bus: &mut impl FpgaBus,
+    ) -> Result<(), Refusal> {
+        let setup = self.ready_setup()?;
+        let run = match Run::start(now, length, &setup, &self.limits, bus) {
+            Ok(run) => run,
+            Err(refusal) => return Err(self.refused_start(now, refusal, bus)),
+        };
+        self.counters = self.counters.of_next_run();
+        self.release_pending = false;
+        self.activity = Activity::Run(run);
+        Ok(())
+    }
+
+    /// At most one frame, then the end of the run if it has come.
+    pub fn step_run(
+        &mut self,
+        now: Micros,
+        bus: &mut impl FpgaBus,
+        sink: &mut impl PacketSink,
+    ) -> bool {
+        let may_send = self.may_stream();
+        let absent = self.fpga_is_absent();
+        let Activity::Run(run) = &mut self.activity else { return false };
+        let path = run::Path {
+            counters: &mut self.counters,
+            release_pending: &mut self.release_pending,
+            scratch: &mut self.scratch,
+            absent,
+            may_send,
+        };
+        let worked = run.take_frame(now, path, bus, sink);
+        match run.progress(now, &self.counters) {
+            run::Progress::Complete => self.end_run(now, None, bus),
+            run::Progress::Stalled => {
+                self.trip(now, Fault::FpgaStalled, bus);
+                self.wind_up(now, bus);
+            }
+            run::Progress::UnderWay => self.wind_up(now, bus),
+        }
+        worked
+    }
+
+    /// LEDs off; `reply` and `RunEnded` follow the last frame.
+    pub fn end_run(&mut self, now: Micros, reply: Option<(u16, Outcome)>, bus: &mut impl FpgaBus) {
+        self.leds_off(bus);
+        if let Activity::Run(run) = &mut self.activity {
+            run.end(now, reply);
+        }
+        self.wind_up(now, bus);
+    }
+
+    /// Ends a run whose LEDs are off once its last frame is through.
+    fn wind_up(&mut self, now: Micros, bus: &mut impl FpgaBus) {
+        let fpga = match (self.fpga_is_absent(), self.off_pending) {
+            (true, _) => Fpga::Absent,
+            (false, true) => Fpga::MayBeLit,
+            (false, false) => Fpga::Dark,
+        };
+        let Activity::Run(run) = &mut self.activity else { return };
+        let Some(run::Ended { reply, event }) = run.wind_up(now, &mut self.counters, fpga, bus)
+        else {
+            return;
+        };
+        self.activity = Activity::Resting;
+        if let Some((id, outcome)) = reply {
+            self.reply(id, outcome);
+        }
+        self.notify(now, event);
+    }
+
+    /// `RawBurst`.
+    pub fn start_burst(
+        &mut self,
+        now: Micros,
+        samples: u16,
+        bus: &mut impl FpgaBus,
+    ) -> Result<(), Refusal> {
+        let setup = self.ready_setup()?;
+        match Burst::start(now, samples, &setup, &self.limits, bus) {
+            Ok(burst) => self.activity = Activity::Burst(burst),
+            Err(refusal) => return Err(self.refused_start(now, refusal, bus)),
+        }
+        Ok(())
+    }
+
+    /// At most one piece.
+    pub fn step_burst(
+        &mut self,
+        now: Micros,
+        bus: &mut impl FpgaBus,
+        sink: &mut impl PacketSink,
+    ) -> bool {
+        let may_send = self.may_stream();
+        let Activity::Burst(burst) = &mut self.activity else { return false };
+        match burst.step(now, may_send, bus, sink) {
+            burst::Step::Waiting => return false,
+            burst::Step::Stalled => {
+                self.trip(now, Fault::FpgaStalled, bus);
+                return false;
+            }
+            burst::Step::Sent => return true,
+            burst::Step::Done => {}
+            burst::Step::Dropped => self.notify(now, EventKind::RawDropped),
+        }
+        self.activity = Activity::Resting;
+        true
+    }
+
+    /// `SelfTest`; the reply comes when the test frame is through.
+    pub fn self_test(&mut self, id: u16, now: Micros, inputs: &Inputs, bus: &mut impl FpgaBus) {
+        let report = selftest::examine(bus, inputs, &self.limits);
+        let may_light = report.failed == 0
+            && self.fault.is_none()
+            && safety::objection(inputs, &self.limits, None).is_none();
+        if !may_light {
+            return self.reply(id, Outcome::Other(Ok(Answer::SelfTest(report))));
+        }
+        let test = TestFrame::new(id, report, now);
+        let begun = selftest::begin(bus, &self.limits);
+        self.activity = Activity::TestFrame(test);
+        self.release_pending = false;
+        if !begun {
+            self.finish_test(false, bus);
+        }
+    }
+
+    /// Takes the test frame if it has come.
+    pub fn step_test(&mut self, now: Micros, bus: &mut impl FpgaBus) -> bool {
+        let Activity::TestFrame(test) = &self.activity else { return false };
+        let Some(passed) = test.step(now, bus) else { return false };
+        self.finish_test(passed, bus);
+        true
+    }
+
+    /// LEDs off, the configuration back in place, and the reply.
+    fn finish_test(&mut self, passed: bool, bus: &mut impl FpgaBus) {
+        let Activity::TestFrame(test) = &self.activity else { return };
+        let (id, report) = test.verdict(passed);
+        self.activity = Activity::Resting;
+        self.leds_off(bus);
+        self.release_pending = fpga::release(bus).is_err();
+        if let Some(setup) = self.setup
+            && fpga::set(bus, &setup, &self.limits).is_err()
+        {
+            self.setup = None;
+        }
+        self.reply(id, Outcome::Other(Ok(Answer::SelfTest(report))));
+    }
+
+    /// The host is gone: LEDs off, and what was begun for that host is forgotten.
+    pub fn close(&mut self, bus: &mut impl FpgaBus) {
+        self.leds_off(bus);
+        if let Activity::Run(_) = self.activity {
+            let _ = self.counters.read(bus);
+            self.counters.drop_missing();
+        }
+        self.activity = Activity::Resting;
+        self.session = Session::Closed;
+        self.notices.clear();
+        self.setup = None;
+        self.loading = None;
+    }
+}

@@ -1,0 +1,117 @@
+//! What happens at each poll: safety rules first, then waiting replies, then one step of what the FPGA is busy with.
+//!
+//! # Invariant
+//! LEDs are on only while the camera is running, whatever the link, the host or the FPGA do
+//! (`tests::laws::nothing_panics_and_light_means_running`). A bus that fails is asked again on every poll, and the
+//! FPGA's own watchdog ends the run meanwhile
+//! (`tests::safety::a_dead_bus_is_an_absent_fpga_and_is_told_again_to_stop_on_every_poll`).
+
+use crate::machine::{Activity, Machine};
+use crate::{FpgaBus, GatewareLoader, Inputs, Micros, PacketSink, Ports, Progress, fpga, safety};
+use nirspi_wire::register::{Register, status};
+use nirspi_wire::{EventKind, Fault};
+
+impl Machine {
+    pub fn poll<B: FpgaBus, S: PacketSink, G: GatewareLoader>(
+        &mut self,
+        now: Micros,
+        inputs: &Inputs,
+        ports: &mut Ports<'_, B, S, G>,
+    ) -> Progress {
+        let Ports { bus, sink, .. } = ports;
+        // While a bitstream is on its way there is no FPGA to talk to, and none that lights anything.
+        if self.off_pending && self.loading.is_none() {
+            self.leds_off(*bus);
+        }
+        self.guard_sensors(now, inputs, *bus);
+        self.guard_host(now, *bus);
+        self.guard_fpga(now, *bus);
+        if self.release_pending {
+            self.release_pending = fpga::release(*bus).is_err();
+        }
+
+        let mut worked = self.flush(*sink);
+        worked |= match self.activity {
+            Activity::Resting => false,
+            Activity::Run(_) => self.step_run(now, *bus, *sink),
+            Activity::Burst(_) => self.step_burst(now, *bus, *sink),
+            Activity::TestFrame(_) => self.step_test(now, *bus),
+        };
+        worked |= self.flush(*sink);
+
+        let done = matches!(self.activity, Activity::Resting) && self.notices.is_empty();
+        Progress { worked, reboot: self.reboot.filter(|_| done) }
+    }
+
+    pub fn guard_sensors(&mut self, now: Micros, inputs: &Inputs, bus: &mut impl FpgaBus) {
+        if self.fault.is_none()
+            && let Some(fault) = safety::objection(inputs, &self.limits, None)
+        {
+            self.trip(now, fault, bus);
+        }
+    }
+
+    fn guard_host(&mut self, now: Micros, bus: &mut impl FpgaBus) {
+        let lit = matches!(&self.activity, Activity::Run(run) if run.is_lit());
+        if lit && now.since(self.last_command) > self.limits.host_silence {
+            self.trip(now, Fault::HostSilent, bus);
+        }
+    }
+
+    /// Looks at the FPGA where it is time to.
+    fn guard_fpga(&mut self, now: Micros, bus: &mut impl FpgaBus) {
+        let resting = matches!(self.activity, Activity::Resting);
+        let period = if resting { self.limits.resting_check } else { self.limits.running_check };
+        let early = self.last_check.is_some_and(|last| now.since(last) < period);
+        if early || self.loading.is_some() {
+            return;
+        }
+        self.last_check = Some(now);
+        let status = match fpga::health(bus) {
+            Ok(status) => status,
+            Err(fault) => return self.trip(now, fault, bus),
+        };
+        match &self.activity {
+            Activity::Run(run) if run.is_lit() => {
+                if status & status::RUNNING == 0 {
+                    self.run_is_over(now, bus);
+                }
+            }
+            // Left over from before a restart of the firmware alone, say.
+            Activity::Resting | Activity::Run(_) => {
+                if status & (status::RUNNING | status::LEDS_ON) != 0 {
+                    self.leds_off(bus);
+                }
+            }
+            Activity::Burst(_) | Activity::TestFrame(_) => {}
+        }
+    }
+
+    /// The FPGA is not running any more, and has no fault.
+    fn run_is_over(&mut self, now: Micros, bus: &mut impl FpgaBus) {
+        let Activity::Run(run) = &self.activity else { return };
+        let made = fpga::read(bus, Register::FramesMade).unwrap_or(0);
+        if run.is_complete(made) {
+            self.end_run(now, None, bus);
+        } else {
+            // The FPGA has been reset.
+            self.trip(now, Fault::FpgaStalled, bus);
+        }
+    }
+
+    /// No command is taken while a reply is owed that needs more than the command itself: the end of a run, a test
+    /// frame, a restart.
+    pub fn takes_commands(&self) -> bool {
+        let busy = match &self.activity {
+            Activity::Resting | Activity::Burst(_) => false,
+            Activity::Run(run) => !run.is_lit(),
+            Activity::TestFrame(_) => true,
+        };
+        !busy && self.reboot.is_none() && self.notices.has_room_for_a_command()
+    }
+
+    pub fn count_damage(&mut self, now: Micros) {
+        self.commands_damaged = self.commands_damaged.saturating_add(1);
+        self.notify(now, EventKind::CommandDamaged);
+    }
+}

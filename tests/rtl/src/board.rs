@@ -1,0 +1,192 @@
+//! The board around the simulated FPGA: clocks, host port's pins, LEDs, photodiode, ADC.
+//!
+//! The FPGA is reached by its pins alone, and both of its clocks run whatever happens.
+
+use nirspi_hdl_model::AdcSample;
+use nirspi_hdl_sim::{pins::Pins, project::Project};
+use nirspi_optics::{Chain, LedArray};
+use nirspi_wire::fpga::{FpgaFrame, HEADER_BYTES, frame_bytes};
+use nirspi_wire::host_port::{
+    DUMMY_CYCLES, QUAD, READ_FRAME, READ_RAW, READ_REGISTER, SCK_DIVIDER, WRITE_REGISTER,
+};
+use nirspi_wire::register::Register;
+
+/// Period of the ADC's clock.
+const ADC_PS: u64 = 8_000;
+/// Period of the host port's clock: 100 MHz, so `sck` has 16.7 MHz.
+const HOST_PS: u64 = 10_000;
+/// Clocks of the host port between two accesses: what a write sets off has come to the pins.
+const BETWEEN: u8 = 40;
+
+/// A board, powered up.
+pub struct Board {
+    pins: Pins,
+    array: LedArray,
+    chain: Chain,
+    at_pins: AdcSample,
+    /// ADC clocks since reset.
+    clock: u64,
+    next_adc_ps: u64,
+    next_host_ps: u64,
+    /// As written last: only the host knows how long a burst is.
+    raw_length: u32,
+}
+
+/// What the microcontroller's other pins see.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Seen {
+    pub clock: u64,
+    pub lit: bool,
+    pub frame_ready: bool,
+    pub raw_ready: bool,
+}
+
+impl Board {
+    pub fn new(array: LedArray, chain: Chain) -> Self {
+        let mut pins = Pins::new(&Project::read());
+        pins.interlock(true);
+        Self {
+            pins,
+            array,
+            chain,
+            at_pins: AdcSample::default(),
+            clock: 0,
+            next_adc_ps: 0,
+            next_host_ps: 1,
+            raw_length: Register::RawLength.reset(),
+        }
+    }
+
+    pub fn seen(&mut self) -> Seen {
+        let (frame_ready, raw_ready) = self.pins.ready();
+        Seen { clock: self.clock, lit: self.pins.leds().enable, frame_ready, raw_ready }
+    }
+
+    pub fn interlock(&mut self, closed: bool) {
+        self.pins.interlock(closed);
+    }
+
+    /// The light of this clock's lines is in this clock's sample, but for the chain's own latency.
+    fn adc_clock(&mut self) {
+        let lines = self.pins.leds();
+        let light = self.array.light(lines.rows, lines.columns, lines.enable);
+        let sample = self.chain.sample(light);
+        let sample = AdcSample { code: sample.counts, over_range: sample.over_range };
+        if self.at_pins != sample {
+            self.at_pins = sample;
+            self.pins.sample(sample);
+        }
+        self.pins.adc_edge();
+        self.clock += 1;
+    }
+
+    /// One clock of the host port, and those of the ADC before it.
+    fn host_clock(&mut self) {
+        while self.next_adc_ps <= self.next_host_ps {
+            self.next_adc_ps += ADC_PS;
+            self.adc_clock();
+        }
+        self.next_host_ps += HOST_PS;
+        self.pins.host_edge();
+    }
+
+    fn wait(&mut self, host_clocks: u8) {
+        for _ in 0..host_clocks {
+            self.host_clock();
+        }
+    }
+
+    pub fn advance(&mut self, adc_clocks: u32) {
+        let end = self.clock + u64::from(adc_clocks);
+        while self.clock < end {
+            self.host_clock();
+        }
+    }
+
+    /// One period of `sck`; the lines at its rising edge.
+    fn sck(&mut self, lines: u8) -> u8 {
+        self.pins.drive(lines);
+        self.pins.sck(false);
+        self.wait(SCK_DIVIDER / 2);
+        let (driven, _) = self.pins.driven();
+        self.pins.sck(true);
+        self.wait(SCK_DIVIDER / 2);
+        driven
+    }
+
+    /// The lowest `bits` of a word by four lines.
+    fn send(&mut self, word: u32, bits: u32) {
+        for shift in (0..bits).step_by(4).rev() {
+            self.sck((word >> shift) as u8 & 0xF);
+        }
+    }
+
+    fn receive(&mut self, bits: u32) -> u32 {
+        (0..bits).step_by(4).fold(0, |word, _| word << 4 | u32::from(self.sck(0)))
+    }
+
+    fn receive_bytes(&mut self, count: usize) -> Vec<u8> {
+        (0..count).map(|_| self.receive(8) as u8).collect()
+    }
+
+    /// Selects the FPGA, sends opcode and address.
+    fn begin(&mut self, opcode: u8, address: u16) {
+        self.pins.sck(false);
+        self.pins.select(true);
+        for shift in (0..8).rev() {
+            self.sck((opcode | QUAD) >> shift & 1);
+        }
+        self.send(address.into(), 16);
+    }
+
+    fn dummy(&mut self) {
+        for _ in 0..DUMMY_CYCLES {
+            self.sck(0);
+        }
+    }
+
+    fn end(&mut self) {
+        self.pins.sck(false);
+        self.wait(SCK_DIVIDER / 2);
+        self.pins.select(false);
+        self.wait(BETWEEN);
+    }
+
+    pub fn write(&mut self, address: u16, value: u32) {
+        if address == Register::RawLength.address() {
+            self.raw_length = value;
+        }
+        self.begin(WRITE_REGISTER, address);
+        self.send(value, 32);
+        self.end();
+    }
+
+    pub fn read(&mut self, address: u16) -> u32 {
+        self.begin(READ_REGISTER, address);
+        self.dummy();
+        let value = self.receive(32);
+        self.end();
+        value
+    }
+
+    /// The frame, as long as its header says it is.
+    pub fn frame(&mut self) -> Vec<u8> {
+        self.begin(READ_FRAME, 0);
+        self.dummy();
+        let mut bytes = self.receive_bytes(HEADER_BYTES);
+        if let Some(header) = FpgaFrame::parse_header(&bytes) {
+            let rest = frame_bytes(header.patterns) - HEADER_BYTES;
+            bytes.extend(self.receive_bytes(rest));
+        }
+        self.end();
+        bytes
+    }
+
+    pub fn raw(&mut self) -> Vec<u8> {
+        self.begin(READ_RAW, 0);
+        self.dummy();
+        let bytes = self.receive_bytes(2 * self.raw_length as usize);
+        self.end();
+        bytes
+    }
+}

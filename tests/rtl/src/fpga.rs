@@ -1,0 +1,127 @@
+//! The simulated RTL as the firmware's FPGA bus.
+//!
+//! The simulator lives on one thread, which it cannot leave; what is asked of it is done before
+//! the call returns, so a run is as repeatable as if there were no thread.
+
+use crate::board::{Board, Seen};
+use nirspi::virtual_camera::{SimulatedFpga, VirtualOptics};
+use nirspi_mcu::{BusError, FpgaBus};
+use nirspi_optics::{Chain, LedArray};
+use nirspi_wire::register::{Register, control};
+use std::sync::mpsc::{Receiver, Sender, channel};
+
+enum Ask {
+    Advance(u32),
+    Interlock(bool),
+    Read(u16),
+    Write(u16, u32),
+    Frame,
+    Raw,
+}
+
+#[derive(Default)]
+struct Told {
+    seen: Seen,
+    value: u32,
+    bytes: Vec<u8>,
+}
+
+/// The RTL between an LED array and a photodiode's ADC.
+pub struct RtlFpga {
+    asks: Sender<Ask>,
+    answers: Receiver<Told>,
+    seen: Seen,
+    frame: Option<Vec<u8>>,
+    raw: Option<Vec<u8>>,
+}
+
+impl RtlFpga {
+    /// Powers up in front of a scene, with the interlock closed.
+    pub fn new(optics: &VirtualOptics, seed: u64) -> Self {
+        let array = LedArray::new(optics.footprint(), optics.budget().electrons_per_led);
+        let chain = Chain::new(*optics.chain(), seed).unwrap();
+        let (asks, asked) = channel();
+        let (answer, answers) = channel();
+        std::thread::spawn(move || {
+            let mut board = Board::new(array, chain);
+            for ask in asked {
+                let mut told = Told::default();
+                match ask {
+                    Ask::Advance(clocks) => board.advance(clocks),
+                    Ask::Interlock(closed) => board.interlock(closed),
+                    Ask::Read(address) => told.value = board.read(address),
+                    Ask::Write(address, value) => board.write(address, value),
+                    Ask::Frame => told.bytes = board.frame(),
+                    Ask::Raw => told.bytes = board.raw(),
+                }
+                told.seen = board.seen();
+                if answer.send(told).is_err() {
+                    return;
+                }
+            }
+        });
+        Self { asks, answers, seen: Seen::default(), frame: None, raw: None }
+    }
+
+    fn ask(&mut self, ask: Ask) -> Told {
+        self.asks.send(ask).unwrap();
+        let told = self.answers.recv().unwrap();
+        self.seen = told.seen;
+        told
+    }
+}
+
+impl FpgaBus for RtlFpga {
+    fn read(&mut self, address: u16) -> Result<u32, BusError> {
+        Ok(self.ask(Ask::Read(address)).value)
+    }
+
+    fn write(&mut self, address: u16, value: u32) -> Result<(), BusError> {
+        const STARTS: u32 = control::START | control::START_RAW;
+        if address == Register::Control.address() && value & (control::RELEASE | STARTS) != 0 {
+            (self.frame, self.raw) = (None, None);
+        }
+        self.ask(Ask::Write(address, value));
+        Ok(())
+    }
+
+    fn frame_ready(&mut self) -> bool {
+        self.seen.frame_ready
+    }
+
+    fn raw_ready(&mut self) -> bool {
+        self.seen.raw_ready
+    }
+
+    fn frame(&mut self) -> Result<Option<&[u8]>, BusError> {
+        if self.frame.is_none() && self.seen.frame_ready {
+            self.frame = Some(self.ask(Ask::Frame).bytes);
+        }
+        Ok(self.frame.as_deref())
+    }
+
+    fn raw(&mut self) -> Result<Option<&[u8]>, BusError> {
+        if self.raw.is_none() && self.seen.raw_ready {
+            self.raw = Some(self.ask(Ask::Raw).bytes);
+        }
+        Ok(self.raw.as_deref())
+    }
+}
+
+impl SimulatedFpga for RtlFpga {
+    fn advance(&mut self, clocks: u32) {
+        self.ask(Ask::Advance(clocks));
+    }
+
+    fn clock(&self) -> u64 {
+        self.seen.clock
+    }
+
+    fn running(&self) -> bool {
+        self.seen.lit
+    }
+
+    fn set_interlock(&mut self, closed: bool) {
+        self.ask(Ask::Interlock(closed));
+    }
+}

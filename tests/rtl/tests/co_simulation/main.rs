@@ -1,0 +1,207 @@
+//! From light to image through the RTL: host, firmware, four SPI lines, gateware, LEDs, photodiode.
+//!
+//! The golden model's camera gets the same scene and the same commands, and gives the same bytes.
+#![allow(clippy::unwrap_used, reason = "a failed unwrap in a helper fails its test")]
+
+mod calibration;
+mod emulated;
+mod tap;
+
+use nirspi::capture::{Calibration, Capture, CaptureOptions, Ended, capture};
+use nirspi::session::{IgnorePackets, Session, request};
+use nirspi::setup::MeasurementSetup;
+use nirspi::virtual_camera::{MemoryLink, SimulatedFpga, VirtualCamera, VirtualOptics};
+use nirspi_optics::{BudgetSettings, ChainSettings, Projector, Scene};
+use nirspi_recon::{Measurements, Order, Rows, Side, fwht, metrics, reconstruct};
+use nirspi_tests_rtl::RtlFpga;
+use nirspi_wire::fpga::FpgaFrame;
+use nirspi_wire::{Fault, FrameFlags};
+use std::ops::ControlFlow;
+use std::time::Duration;
+use tap::{Log, Tap};
+
+const PX: usize = 64;
+/// A bus of 16.7 MHz takes longer to read a frame than the FPGA to make one: only the first of a run is sure to come.
+const FRAMES: u32 = 1;
+
+/// A ring on rough ground: every one of the 1024 patterns has something to say about it.
+fn scene() -> Scene {
+    let rough = |r: usize, c: usize| (r * 37 + c * 101 + r * c * 13) % 97;
+    let reflectance = (0..PX * PX).map(|p| {
+        let (r, c) = (p / PX, p % PX);
+        let ring = (8.0..14.0).contains(&(r as f32 - 40.0).hypot(c as f32 - 24.0));
+        0.004 * rough(r / 2, c / 2) as f32 + if ring { 0.5 } else { 0.1 }
+    });
+    Scene::new(reflectance.collect(), PX, 48.0).unwrap()
+}
+
+fn ideal() -> VirtualOptics {
+    VirtualOptics::new(scene(), 300.0).unwrap().ideal()
+}
+
+/// LEDs, amplifier and ADC as slow as they are by default; no noise.
+fn noiseless() -> VirtualOptics {
+    let mut chain = ChainSettings::default();
+    (chain.shot_noise, chain.amplifier_noise_electrons) = (false, 0.0);
+    VirtualOptics::with_settings(
+        scene(),
+        300.0,
+        Projector::default(),
+        &BudgetSettings::default(),
+        chain,
+    )
+    .unwrap()
+}
+
+fn session<F: SimulatedFpga + 'static>(optics: &VirtualOptics, fpga: F) -> Session {
+    let camera = VirtualCamera::new(fpga, optics.depth(1).unwrap(), "co-simulated");
+    Session::open(Box::new(MemoryLink::new(camera))).unwrap()
+}
+
+fn run(session: &mut Session, setup: &MeasurementSetup, frames: u32) -> Capture {
+    let setup = setup.clone();
+    let calibration = Calibration::None;
+    let options = CaptureOptions { setup, frames: Some(frames), calibration, record: None };
+    capture(session, &options, &mut |_| ControlFlow::Continue(())).unwrap()
+}
+
+/// The RTL's capture, once the golden model's has given the same bytes.
+fn both(optics: &VirtualOptics, setup: &MeasurementSetup, frames: u32) -> Capture {
+    let (rtl, rtl_log) = Tap::new(RtlFpga::new(optics, 1));
+    let captured = run(&mut session(optics, rtl), setup, frames);
+    assert!(matches!(captured.ended, Ended::Complete), "{:?}", captured.ended);
+    let rtl = rtl_log.bytes();
+    let first = FpgaFrame::parse(&rtl[0]).unwrap().header;
+
+    let (golden, golden_log) = Tap::new(optics.fpga(1).unwrap());
+    run(&mut session(optics, golden.starting_at(first.clock)), setup, frames);
+    let golden = golden_log.bytes();
+    assert_eq!(rtl.len(), frames as usize);
+    assert!(rtl == golden, "{}", first_difference(&rtl, &golden));
+    captured
+}
+
+fn first_difference(rtl: &[Vec<u8>], golden: &[Vec<u8>]) -> String {
+    for (i, (a, b)) in rtl.iter().zip(golden).enumerate() {
+        if let Some(at) = a.iter().zip(b).position(|(a, b)| a != b) {
+            return format!("frame {i}, byte {at}: RTL {}, golden model {}", a[at], b[at]);
+        }
+    }
+    "one of them gave more".into()
+}
+
+/// Every measurement of an ideal camera is the transform of the scene, to within the rounding of its two readings.
+fn check(captured: &Capture) {
+    let optics = ideal();
+    let counts = optics.budget().electrons_per_led / optics.chain().electrons_per_count;
+    let mut expected: Vec<f64> =
+        optics.footprint().weights().iter().map(|&w| f64::from(w) * counts).collect();
+    fwht(&mut expected).unwrap();
+    let measurements = captured.integrated.measurements(&captured.setup, None, true).unwrap();
+    assert_eq!(measurements.rows().len(), captured.setup.rows.len());
+    for (&row, value) in measurements.rows().iter().zip(measurements.values()) {
+        let off = (value - expected[row as usize]).abs();
+        assert!(off <= 1.01, "row {row} is {off:.1} ADC counts off");
+    }
+    if measurements.rows().len() == expected.len() {
+        check_image(&optics, &measurements);
+    }
+}
+
+/// The image of a full set of measurements is the scene's.
+fn check_image(optics: &VirtualOptics, measurements: &Measurements) {
+    let image = reconstruct::hadamard(measurements);
+    let side = Side::INSTRUMENT.pixels();
+    let weights = optics.footprint().weights();
+    let correlation = metrics::correlation(weights, image.pixels(), side, side).unwrap();
+    assert!(correlation > 0.9999, "correlation {correlation}");
+}
+
+#[test]
+fn a_scene_comes_through_the_rtl_exactly_and_bit_for_bit_as_through_the_golden_model() {
+    let setup = MeasurementSetup::new(&Order::Natural, 1.0).unwrap();
+    let captured = both(&ideal(), &setup, FRAMES);
+    check(&captured);
+    assert!(captured.counters.is_complete());
+    let each = captured.elapsed / FRAMES;
+    println!("one sweep of 1024 patterns and complements, shown, read and sent: {each:.2?}");
+}
+
+#[test]
+fn an_order_table_and_a_part_of_the_patterns_come_through_too() {
+    let mut setup = MeasurementSetup::new(&Order::Random(7), 0.1).unwrap();
+    setup.sweeps = 3;
+    let captured = both(&ideal(), &setup, FRAMES);
+    assert!(captured.counters.is_complete());
+    check(&captured);
+}
+
+#[test]
+fn slow_leds_and_a_late_adc_give_the_same_bytes_with_the_same_latency() {
+    let optics = noiseless();
+    let mut setup = MeasurementSetup::new(&Order::Natural, 0.25).unwrap();
+    setup.adc_latency = optics.chain().adc_latency_clocks;
+    both(&optics, &setup, FRAMES);
+}
+
+/// What calibration works on: the same burst, so the same latency and leak.
+#[test]
+fn a_calibration_burst_through_the_rtl_is_that_of_the_golden_model() {
+    let optics = noiseless();
+    let setup = MeasurementSetup {
+        rows: Rows::natural(Side::INSTRUMENT).first(1),
+        clocks_per_pattern: nirspi::calibration::HALF_PERIOD,
+        blanked: 0,
+        ..MeasurementSetup::new(&Order::Natural, 1.0).unwrap()
+    };
+    let burst = |mut session: Session, log: Log| {
+        setup
+            .with_configuration(|c| session.command(request::Configure(c), &mut IgnorePackets))
+            .unwrap();
+        session.command(request::RawBurst(1024), &mut IgnorePackets).unwrap();
+        while log.bytes().is_empty() {
+            session.listen(Duration::from_millis(50), &mut IgnorePackets).unwrap();
+        }
+        log.bytes()
+    };
+    let (rtl, rtl_log) = Tap::new(RtlFpga::new(&optics, 1));
+    let (golden, golden_log) = Tap::new(optics.fpga(1).unwrap());
+    let rtl = burst(session(&optics, rtl), rtl_log);
+    assert_eq!(rtl[0].len(), 2 * 1024);
+    assert!(rtl == burst(session(&optics, golden), golden_log));
+}
+
+#[test]
+fn frames_that_a_slow_bus_loses_are_counted_and_spoil_no_other() {
+    let frames = 200;
+    let setup = MeasurementSetup::new(&Order::Natural, 0.1).unwrap();
+    let (fpga, log) = Tap::new(RtlFpga::new(&ideal(), 1));
+    let captured = run(&mut session(&ideal(), fpga), &setup, frames);
+    let counters = captured.counters;
+    assert_eq!(counters.total(), u64::from(frames));
+    assert!(counters.lost > 0 && counters.received > 2, "{counters}");
+    check(&captured);
+
+    let mut expected = 0;
+    for bytes in log.bytes() {
+        let header = FpgaFrame::parse(&bytes).unwrap().header;
+        let after_loss = header.sequence != expected;
+        assert_eq!(header.flags.contains(FrameFlags::AFTER_LOSS), after_loss);
+        expected = header.sequence + 1;
+    }
+}
+
+#[test]
+fn an_open_interlock_keeps_the_rtl_dark_and_the_host_is_told() {
+    let mut camera =
+        VirtualCamera::new(RtlFpga::new(&ideal(), 1), ideal().depth(1).unwrap(), "co-simulated");
+    camera.set_interlock(false);
+    let mut session = Session::open(Box::new(MemoryLink::new(camera))).unwrap();
+    let setup = MeasurementSetup::new(&Order::Natural, 1.0).unwrap();
+    let calibration = Calibration::None;
+    let options = CaptureOptions { setup, frames: Some(1), calibration, record: None };
+    match capture(&mut session, &options, &mut |_| ControlFlow::Continue(())) {
+        Ok(captured) => assert!(matches!(captured.ended, Ended::Fault(Fault::Interlock))),
+        Err(error) => assert!(error.to_string().contains("interlock is open"), "{error}"),
+    }
+}

@@ -1,0 +1,99 @@
+//! What an FPGA gives its firmware, noted on the way.
+//!
+//! Nothing is changed but the moment of a start, and that only where it is asked for.
+
+use nirspi::virtual_camera::SimulatedFpga;
+use nirspi_mcu::{BusError, FpgaBus};
+use nirspi_wire::register::{Register, control};
+use std::sync::{Arc, Mutex};
+
+/// Bytes of each frame and burst, in the order in which they came.
+#[derive(Debug, Clone, Default)]
+pub struct Log(Arc<Mutex<Vec<Vec<u8>>>>);
+
+impl Log {
+    pub fn bytes(&self) -> Vec<Vec<u8>> {
+        self.0.lock().unwrap().clone()
+    }
+}
+
+/// An FPGA with a log.
+pub struct Tap<F> {
+    fpga: F,
+    log: Log,
+    start_at: Option<u64>,
+}
+
+impl<F: SimulatedFpga> Tap<F> {
+    pub fn new(fpga: F) -> (Self, Log) {
+        let log = Log::default();
+        (Self { fpga, log: log.clone(), start_at: None }, log)
+    }
+
+    /// Runs start at this clock: firmware behind another bus gets there at another time.
+    pub fn starting_at(self, clock: u64) -> Self {
+        Self { start_at: Some(clock), ..self }
+    }
+
+    /// The same bytes are offered again until they are released.
+    fn note(log: &Log, bytes: Option<&[u8]>) {
+        let mut log = log.0.lock().unwrap();
+        if let Some(bytes) = bytes
+            && log.last().is_none_or(|last| last != bytes)
+        {
+            log.push(bytes.to_vec());
+        }
+    }
+}
+
+impl<F: SimulatedFpga> FpgaBus for Tap<F> {
+    fn read(&mut self, address: u16) -> Result<u32, BusError> {
+        self.fpga.read(address)
+    }
+
+    fn write(&mut self, address: u16, value: u32) -> Result<(), BusError> {
+        let starts = address == Register::Control.address() && value & control::START != 0;
+        if let Some(clock) = self.start_at.filter(|_| starts) {
+            self.fpga.advance(u32::try_from(clock - self.fpga.clock()).unwrap());
+        }
+        self.fpga.write(address, value)
+    }
+
+    fn frame_ready(&mut self) -> bool {
+        self.fpga.frame_ready()
+    }
+
+    fn raw_ready(&mut self) -> bool {
+        self.fpga.raw_ready()
+    }
+
+    fn frame(&mut self) -> Result<Option<&[u8]>, BusError> {
+        let bytes = self.fpga.frame()?;
+        Self::note(&self.log, bytes);
+        Ok(bytes)
+    }
+
+    fn raw(&mut self) -> Result<Option<&[u8]>, BusError> {
+        let bytes = self.fpga.raw()?;
+        Self::note(&self.log, bytes);
+        Ok(bytes)
+    }
+}
+
+impl<F: SimulatedFpga> SimulatedFpga for Tap<F> {
+    fn advance(&mut self, clocks: u32) {
+        self.fpga.advance(clocks);
+    }
+
+    fn clock(&self) -> u64 {
+        self.fpga.clock()
+    }
+
+    fn running(&self) -> bool {
+        self.fpga.running()
+    }
+
+    fn set_interlock(&mut self, closed: bool) {
+        self.fpga.set_interlock(closed);
+    }
+}
