@@ -156,11 +156,12 @@ mod tests {
     use super::*;
 
     fn chain(error: &EvalError) -> Vec<String> {
-        let mut causes: Vec<&dyn Error> = vec![error];
-        while let Some(cause) = causes.last().and_then(|last| last.source()) {
-            causes.push(cause);
+        let (mut told, mut next) = (Vec::new(), Some(error as &dyn Error));
+        while let Some(cause) = next {
+            told.push(cause.to_string());
+            next = cause.source();
         }
-        causes.iter().map(ToString::to_string).collect()
+        told
     }
 
     #[test]

@@ -294,6 +294,8 @@ pub fn chart(report: &Report) -> Chart {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nirspi_nets::classical::Blur;
+    use nirspi_recon::{Image, Side};
 
     /// Perfect pictures of the edge and of all bars.
     fn perfect(side: usize) -> Pictures {
@@ -309,25 +311,45 @@ mod tests {
         Pictures { side, edges, bars: BARS_PX.iter().map(bars).collect() }
     }
 
+    /// The bars as a camera without blur sees them.
+    fn truths(pictures: &Pictures) -> Vec<Vec<Shots>> {
+        let shots = |bars: &Vec<Vec<f32>>| {
+            let truth = bars[0].clone();
+            let image = Image::new(Side::INSTRUMENT, truth.clone());
+            vec![Shots { truth, truth_fine: Vec::new(), nir_spi: image.clone(), vis: image }]
+        };
+        pictures.bars.iter().map(shots).collect()
+    }
+
     #[test]
-    fn a_perfect_picture_resolves_what_its_pixels_allow() {
+    fn a_perfect_picture_resolves_lines_as_wide_as_a_pixel() {
         let pictures = perfect(32);
-        let shots: Vec<Vec<Shots>> = (pictures.bars.iter())
-            .map(|bars| {
-                let image =
-                    nirspi_recon::Image::new(nirspi_recon::Side::INSTRUMENT, bars[0].clone());
-                let (truth, truth_fine) = (bars[0].clone(), Vec::new());
-                vec![Shots { truth, truth_fine, nir_spi: image.clone(), vis: image }]
-            })
-            .collect();
-        let row = row(Picture::NirSpi, 0.3, 5.0, &pictures, &shots);
+        let row = row(Picture::NirSpi, 0.3, 5.0, &pictures, &truths(&pictures));
         assert!((row.pixel_mm - Projector::default().field_mm(300.0) / 32.0).abs() < 1e-9);
-        // The transfer of a square pixel of width w is sinc: a half at lines of 0.83 w.
         let mtf50 = row.mtf50_mm.unwrap();
-        assert!((mtf50.mean / row.pixel_mm - 0.83).abs() < 0.15, "{row:?}");
+        assert!((mtf50.mean / row.pixel_mm - 1.0).abs() < 1e-9, "{row:?}");
         assert_eq!(mtf50.n, GROUPS as usize);
         assert!(row.bar_contrast.iter().all(|(_, kept)| (kept - 1.0).abs() < 1e-6), "{row:?}");
         assert!((row.bars_mm.unwrap() / row.pixel_mm - BARS_PX[0]).abs() < 1e-9, "{row:?}");
+    }
+
+    #[test]
+    fn blur_widens_the_line_as_its_transfer_says() {
+        let sharp = perfect(32);
+        let blur = Blur::new(32, 32, 2.0);
+        let blurred = |images: &[Vec<f32>]| -> Vec<Vec<f32>> {
+            images.iter().map(|image| blur.apply(image)).collect()
+        };
+        let bars = sharp.bars.iter().map(|bars| blurred(bars)).collect();
+        let pictures = Pictures { side: 32, edges: blurred(&sharp.edges), bars };
+        let row = row(Picture::NirSpi, 0.3, 5.0, &pictures, &truths(&sharp));
+        // A Gaussian of sigma s passes half at sqrt(ln 2 / 2) / (pi s) cycles a pixel; a line is half a cycle.
+        let expected = std::f64::consts::PI * 2.0 / (2.0_f64.ln() / 2.0).sqrt() / 2.0;
+        let found = row.mtf50_mm.unwrap().mean / row.pixel_mm;
+        assert!((found / expected - 1.0).abs() < 0.1, "{found} against {expected}");
+        let [narrow, .., wide] = row.bar_contrast[..] else { panic!("{row:?}") };
+        assert!(narrow.1 < RESOLVED && wide.1 > 0.8, "{row:?}");
+        assert!(row.bars_mm.unwrap() > 1.5 * row.pixel_mm, "{row:?}");
     }
 
     #[test]

@@ -77,7 +77,7 @@ pub fn run(args: &Args, first: &FirstPatterns) -> Result<ExitCode> {
     let mut sharp = None;
     if args.enhance {
         let made: Vec<(&Image, &Rows)> =
-            images.iter().zip(&used).map(|(image, used)| (image, used.rows().as_slice())).collect();
+            images.iter().zip(&used).map(|(image, used)| (image, used.rows())).collect();
         let (pixels, reports) = spinning(|| enhanced::run(&made, &mut times))?;
         for (frame, report) in frames.iter_mut().zip(reports) {
             frame.enhancement = Some(report);

@@ -59,11 +59,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn heavier_rain_brings_more_water_and_dry_air_none() {
-        let water = |rainfall: Rainfall| {
-            rainfall.drops().unwrap().map_or(0.0, |drops| drops.liquid_water_g_per_m3())
+    fn heavier_rain_falls_at_a_higher_rate_and_dry_air_has_no_drops() {
+        let rate = |rainfall: Rainfall| {
+            rainfall.drops().unwrap().map_or(0.0, |drops| drops.rate_mm_per_h())
         };
-        let [none, light, heavy] = Rainfall::ALL.map(water);
+        let [none, light, heavy] = Rainfall::ALL.map(rate);
         assert!(none == 0.0 && none < light && light < heavy, "{none} {light} {heavy}");
+        assert_eq!(Rainfall::ALL.map(Rainfall::name), ["none", "light", "heavy"]);
     }
 }
