@@ -2,14 +2,14 @@
 
 use super::Usage;
 use super::enhance::print_report;
-use super::networks::{Deblurring, ImageArgs, Networks, bar};
+use super::networks::{Deblurring, ImageArgs, bar};
 use super::report::StageTimes;
 use super::stack::Input;
 use anyhow::Result;
 use indicatif::ProgressBar;
 use nirspi_nets::classical;
 use nirspi_nets::consistency::Consistency;
-use nirspi_nets::{Enhanced, Images, KnownEstimate, Method, Options, deblur};
+use nirspi_nets::{Enhanced, Images, KnownEstimate, Method, Networks, Options, deblur};
 use std::num::NonZeroU32;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -104,7 +104,7 @@ impl Sharpening {
         within("--noise", self.noise, 1.0)?;
         Ok(Options {
             consistency: !self.no_consistency,
-            estimate: KnownEstimate { sigma_px: self.blur_px, noise: self.noise },
+            estimate: KnownEstimate { sigma_px: self.blur_px.into(), noise: self.noise.into() },
             seed: self.seed,
             copies: if self.spread.is_some() { SPREAD_COPIES } else { 0 },
             ..Options::default()
@@ -155,7 +155,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             let sharpener = times.time("load", || networks.sharpener(method))?;
             let result = times.time("deblur", || {
                 sharpener.deblur(images, &options, &mut |done| bar.set_position(done as u64))
-            });
+            })?;
             (networks, result)
         }
         Way::Classical(method) => {
@@ -193,7 +193,7 @@ fn classically(
         let estimate = known.over(estimate);
         let (sigma_px, noise) = (estimate.sigma_px, estimate.noise.min(1.0));
         let sharp = classical::deblur(method, image, (SIDE, SIDE), sigma_px, noise)?;
-        let model = Consistency::new(SIDE, sigma_px, noise, None);
+        let model = Consistency::new(SIDE, sigma_px, noise);
         result.inconsistency.push(model.residual_ratio(image, &sharp));
         result.images.extend(sharp);
         result.estimates.push(estimate);

@@ -7,7 +7,7 @@ use super::report::StageTimes;
 use super::stack::Input;
 use super::upscale::DepthArgs;
 use anyhow::Result;
-use nirspi_nets::{Enhancer, Images, Method, fusion};
+use nirspi_nets::{Images, Method, fusion};
 use std::num::NonZeroU32;
 use std::process::ExitCode;
 
@@ -40,15 +40,13 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let target = input.target(&args.images.out)?;
     let depth = args.depth.read(input.count())?;
     let mut networks = args.images.networks.open(&["fsrcnn", "estimator", "diffusion"])?;
-    let enhancer = times.time("load", || -> Result<_> {
-        Ok(Enhancer::new(networks.fusion()?, networks.sharpener(method)?))
-    })?;
+    let enhancer = times.time("load", || networks.enhancer(method))?;
 
     let bar = bar("enhancing", input.count());
     let result = times.time("enhance", || {
         enhancer
             .enhance(images, depth.as_ref(), &options, &mut |done| bar.set_position(done as u64))
-    });
+    })?;
     bar.finish_and_clear();
     args.sharpening.write_spread(&input, result.spread.as_deref())?;
     target.write(2 * fusion::SIDE, &result.images)?;

@@ -5,12 +5,7 @@ use super::report::StageTimes;
 use super::stack::Input;
 use anyhow::Result;
 use indicatif::{ProgressBar, ProgressStyle};
-#[cfg(feature = "gpu")]
-use nirspi_nets::DeviceEnhancer;
-use nirspi_nets::weights::{MODEL, VERSION};
-use nirspi_nets::{
-    Backend, BlurEstimator, Deblurrer, Device, Enhanced, Fusion, Method, Sharpener, Weights,
-};
+use nirspi_nets::{Backend, Device, Enhanced, Networks, UsedWeights, WeightsError};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -42,39 +37,24 @@ pub struct ImageArgs {
     pub json: bool,
 }
 
-/// A device and the weights of what shall run on it.
-pub struct Networks {
-    device: Device,
-    own: Vec<Weights>,
-    used: Vec<Used>,
-}
-
-/// Weights that ran, for the report.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Used {
-    model: String,
-    version: String,
-    from: String,
-}
-
 impl NetworkArgs {
     /// Opens the device and reads the user's weights, which must be of one of these networks.
     pub fn open(&self, models: &[&str]) -> Result<Networks> {
-        let mut own = Vec::new();
+        let mut networks = Networks::built_in(Device::open(self.backend)?);
         for file in &self.weights {
-            let weights = Weights::read(file)?;
-            let model = weights.metadata(MODEL).unwrap_or("no network that they name").to_owned();
-            if !models.contains(&model.as_str()) {
-                return Err(Usage(format!(
-                    "--weights {}: of {model}, this command runs {}",
-                    file.display(),
-                    models.join(", ")
-                ))
-                .into());
-            }
-            own.push(weights);
+            networks = networks.with_file(file, models).map_err(of_argument)?;
         }
-        Ok(Networks { device: Device::open(self.backend)?, own, used: Vec::new() })
+        Ok(networks)
+    }
+}
+
+/// Weights of a network that the command does not run are a wrong argument.
+fn of_argument(error: WeightsError) -> anyhow::Error {
+    match error {
+        WeightsError::Model { .. } | WeightsError::Unnamed { .. } => {
+            Usage(format!("--weights {error}")).into()
+        }
+        other => other.into(),
     }
 }
 
@@ -91,78 +71,11 @@ impl ImageArgs {
             input: self.input.clone(),
             output: self.out.clone(),
             images: input.count(),
-            device: networks.device().to_owned(),
-            weights: networks.used(),
+            device: networks.device().name().to_owned(),
+            weights: networks.used().to_vec(),
             deblurring,
             stage_ms,
         }
-    }
-}
-
-impl Networks {
-    /// The networks that come with the program.
-    pub fn built_in(backend: Backend) -> Result<Self> {
-        Ok(Self { device: Device::open(backend)?, own: Vec::new(), used: Vec::new() })
-    }
-
-    fn weights(&mut self, model: &str) -> Result<Weights> {
-        let own = self.own.iter().find(|weights| weights.metadata(MODEL) == Some(model));
-        let weights = match own {
-            Some(weights) => weights.clone(),
-            None => Weights::embedded(model)?,
-        };
-        let used = Used {
-            model: model.to_owned(),
-            version: weights.metadata(VERSION).unwrap_or("unknown").to_owned(),
-            from: weights.label().to_owned(),
-        };
-        if !self.used.contains(&used) {
-            self.used.push(used);
-        }
-        Ok(weights)
-    }
-
-    /// FSRCNN.
-    pub fn fusion(&mut self) -> Result<Fusion> {
-        let weights = self.weights("fsrcnn")?;
-        Ok(Fusion::new(&self.device, &weights)?)
-    }
-
-    /// The estimator alone.
-    pub fn estimator(&mut self) -> Result<BlurEstimator> {
-        let weights = self.weights("estimator")?;
-        Ok(BlurEstimator::new(&self.device, &weights)?)
-    }
-
-    /// Estimator and deblurrer.
-    pub fn sharpener(&mut self, method: Method) -> Result<Sharpener> {
-        let estimator = self.estimator()?;
-        let weights = self.weights(method.model())?;
-        Ok(Sharpener::new(estimator, Deblurrer::new(&self.device, &weights, method)?))
-    }
-
-    /// All networks, for images that OMP leaves on a GPU.
-    #[cfg(feature = "gpu")]
-    pub fn device_enhancer(&mut self) -> Result<DeviceEnhancer> {
-        let [fsrcnn, estimator] = [self.weights("fsrcnn")?, self.weights("estimator")?];
-        let bridge = self.weights("diffusion")?;
-        Ok(DeviceEnhancer::new(&self.device, &fsrcnn, &estimator, &bridge)?)
-    }
-
-    /// What computes, by its backend.
-    #[cfg(feature = "gpu")]
-    pub fn backend(&self) -> Backend {
-        self.device.backend()
-    }
-
-    /// What computes.
-    pub fn device(&self) -> &str {
-        self.device.name()
-    }
-
-    /// All weights that were taken.
-    pub fn used(&self) -> Vec<Used> {
-        self.used.clone()
     }
 }
 
@@ -173,7 +86,7 @@ pub struct Report {
     pub output: PathBuf,
     pub images: usize,
     pub device: String,
-    pub weights: Vec<Used>,
+    pub weights: Vec<UsedWeights>,
     #[serde(flatten)]
     pub deblurring: Option<Deblurring>,
     pub stage_ms: StageTimes,

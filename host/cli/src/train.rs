@@ -3,13 +3,16 @@
 mod data;
 mod degrade;
 mod network;
+#[cfg(feature = "train")]
+mod run;
 
 use anyhow::Result;
 use clap::Subcommand;
+#[cfg(feature = "train")]
 use nirspi_nets::train::Model;
 use std::process::ExitCode;
 
-/// Train the networks on your own characters, on the CPU or a GPU
+/// Train the networks on your own characters, on the CPU or a GPU (builds with the feature `train`)
 ///
 /// Every few hundred steps the run is kept whole in its folder: checkpoint.bin to go on from (--resume), the best weights in
 /// weights.safetensors, log.jsonl and plot.png. Ctrl-C keeps it too.
@@ -56,12 +59,22 @@ enum What {
 
 pub fn run(args: &TrainArgs) -> Result<ExitCode> {
     match &args.what {
-        What::Fsrcnn(args) => network::run(args, Model::Fsrcnn),
-        What::Diffusion(args) => network::run(args, Model::Diffusion),
-        What::Ancestral(args) => network::run(args, Model::Ancestral),
-        What::Gan(args) => network::run(args, Model::Gan),
-        What::Estimator(args) => network::run(args, Model::Estimator),
-        What::Classifier(args) => network::run(args, Model::Classifier),
         What::Degrade(args) => degrade::run(args),
+        #[cfg(feature = "train")]
+        What::Fsrcnn(args) => run::run(args, Model::Fsrcnn),
+        #[cfg(feature = "train")]
+        What::Diffusion(args) => run::run(args, Model::Diffusion),
+        #[cfg(feature = "train")]
+        What::Ancestral(args) => run::run(args, Model::Ancestral),
+        #[cfg(feature = "train")]
+        What::Gan(args) => run::run(args, Model::Gan),
+        #[cfg(feature = "train")]
+        What::Estimator(args) => run::run(args, Model::Estimator),
+        #[cfg(feature = "train")]
+        What::Classifier(args) => run::run(args, Model::Classifier),
+        #[cfg(not(feature = "train"))]
+        _ => anyhow::bail!(
+            "this build has no training; build it with: cargo build --release --features train"
+        ),
     }
 }

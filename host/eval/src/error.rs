@@ -122,6 +122,8 @@ from_libraries!(
     nirspi::training::TrainingCameraError,
     nirspi::virtual_camera::ShotError,
     nirspi::virtual_camera::VirtualOpticsError,
+    nirspi_nets::EnhanceError,
+    nirspi_nets::MeasuredRowsError,
     nirspi_nets::classical::ClassicalError,
     nirspi_nets::data::DataError,
     nirspi_nets::degrade::DegradeError,
@@ -129,7 +131,6 @@ from_libraries!(
     nirspi_nets::images::ImagesError,
     nirspi_nets::metrics::FrechetError,
     nirspi_nets::metrics::inception::ImageSize,
-    nirspi_nets::train::TrainError,
     nirspi_nets::upscale::UpscaleError,
     nirspi_nets::weights::WeightsError,
     nirspi_optics::SceneError,
@@ -150,6 +151,9 @@ from_libraries!(
 
 #[cfg(feature = "gpu")]
 from_libraries!(nirspi_nets::DeviceEnhancerError);
+
+#[cfg(feature = "train")]
+from_libraries!(nirspi_nets::train::TrainError);
 
 #[cfg(test)]
 mod tests {

@@ -5,9 +5,9 @@
 //! (`networks_see_readings_over_those_of_a_white_sheet`).
 
 use crate::error::Result;
-use crate::quality::{Contender, Method, Networks};
+use crate::quality::{Contender, Method};
 use crate::shot::Shots;
-use nirspi_nets::device::Device;
+use nirspi_nets::{Device, Networks};
 use serde::Serialize;
 
 /// Steps of the bridge in the tables.
@@ -55,10 +55,10 @@ impl Enhancers {
     /// # Errors
     /// Damaged weights.
     pub fn new() -> Result<Self> {
-        let networks = Networks::new(None, Device::cpu());
+        let mut networks = Networks::built_in(Device::cpu());
         Ok(Self {
-            gan: networks.contender(Method::Gan)?,
-            diffusion: networks.contender(Method::Diffusion(STEPS))?,
+            gan: Contender::new(Method::Gan, &mut networks)?,
+            diffusion: Contender::new(Method::Diffusion(STEPS), &mut networks)?,
         })
     }
 

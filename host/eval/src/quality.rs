@@ -16,7 +16,7 @@ mod others;
 
 pub use bootstrap::Interval;
 pub use characters::{Character, Characters, Origin};
-pub use contenders::{Contender, Method, Networks, Version};
+pub use contenders::{Contender, Method, Version};
 pub use measure::{Condition, Figures};
 pub use others::Case;
 
@@ -25,7 +25,7 @@ pub(crate) use measure::halved;
 use crate::error::Result;
 use image::RgbImage;
 use measure::Judges;
-use nirspi_nets::device::Device;
+use nirspi_nets::{Device, Networks};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -91,7 +91,12 @@ pub struct Report {
 /// Everything that is measured, read and checked.
 pub struct Study {
     settings: Settings,
-    networks: Networks,
+    contenders: Vec<Contender>,
+    /// For the curves over steps.
+    stepped: Vec<Contender>,
+    /// For scenes that are no characters.
+    bridge: Contender,
+    weights: Vec<Version>,
     judges: Judges,
     characters: Characters,
     few: Characters,
@@ -112,21 +117,30 @@ impl Study {
     /// # Errors
     /// A file that cannot be read, or no image that training has not seen.
     pub fn new(settings: Settings) -> Result<Self> {
-        let networks = Networks::new(settings.weights.clone(), Device::cpu());
-        let judges = Judges::new(&networks)?;
+        let mut networks = Networks::built_in(Device::cpu());
+        if let Some(folder) = &settings.weights {
+            networks = networks.with_folder(folder);
+        }
+        let judges = Judges::new(&mut networks)?;
         let held_out = settings.held_out.as_deref();
         let characters = Characters::read(&settings.data, held_out, settings.count, settings.seed)?;
         let few = characters.first(settings.sampler_count);
         let (pictures, spi) = (settings.scenes.as_deref(), settings.spi.as_deref());
         let scenes = others::cases(pictures, spi, settings.seed)?;
-        Ok(Self { settings, networks, judges, characters, few, scenes })
+        let mut ready = |methods: &[Method]| -> Result<Vec<Contender>> {
+            methods.iter().map(|method| Contender::new(*method, &mut networks)).collect()
+        };
+        let (contenders, stepped) = (ready(&Method::ALL)?, ready(&stepped(settings.most_steps))?);
+        let bridge = Contender::new(Method::Diffusion(1), &mut networks)?;
+        let weights = Version::all(&mut networks)?;
+        Ok(Self { settings, contenders, stepped, bridge, weights, judges, characters, few, scenes })
     }
 
     /// Images that are enhanced.
     #[must_use]
     pub fn images(&self) -> usize {
-        Method::ALL.len() * conditions().len() * self.characters.len()
-            + stepped(self.settings.most_steps).len() * self.few.len()
+        self.contenders.len() * conditions().len() * self.characters.len()
+            + self.stepped.len() * self.few.len()
     }
 
     /// Measures; `done` is called with the number of images just enhanced.
@@ -134,25 +148,18 @@ impl Study {
     /// # Errors
     /// Images that a method or a judge cannot take.
     pub fn run(&self, done: &dyn Fn(usize)) -> Result<Measured> {
-        let Self { settings, networks, judges, characters, few, scenes } = self;
-        let contenders: Vec<Contender> = Method::ALL
-            .into_iter()
-            .map(|method| networks.contender(method))
-            .collect::<Result<_>>()?;
-        let measured = over(&contenders, &conditions(), characters, judges, settings.seed, done)?;
-        let mut steps = Vec::new();
-        for method in stepped(settings.most_steps) {
-            let contender = networks.contender(method)?;
-            steps.extend(over(&[contender], &[MIDDLE], few, judges, settings.seed, done)?);
-        }
-        let shown = others::enhance(scenes, &networks.contender(Method::Diffusion(1))?)?;
+        let Self { settings, contenders, judges, characters, few, .. } = self;
+        let seed = settings.seed;
+        let measured = over(contenders, &conditions(), characters, judges, seed, done)?;
+        let steps = over(&self.stepped, &[MIDDLE], few, judges, seed, done)?;
+        let shown = others::enhance(&self.scenes, &self.bridge)?;
         let mut pictures = charts::all(&measured, &steps, characters, few);
         pictures.push(("others.png", shown.picture.render()));
         let report = Report {
             simulated: true,
-            seed: settings.seed,
+            seed,
             images: characters.origins().to_vec(),
-            weights: networks.versions()?,
+            weights: self.weights.clone(),
             conditions: measured,
             steps,
             others: shown.cases,

@@ -9,17 +9,12 @@ use nirspi::picture::{Axis, Chart, Line};
 use nirspi::scene::SceneSource;
 use nirspi::setup::MeasurementSetup;
 use nirspi::virtual_camera::VirtualOptics;
-use nirspi_nets::device::Device;
-use nirspi_nets::images::Images;
-use nirspi_nets::{
-    BlurEstimator, Deblurrer, Enhancer, Fusion, Method, Options, Sharpener, Weights,
-};
+use nirspi_nets::{Device, Enhancer, Images, Networks, Options};
 use nirspi_optics::rain::Rainfall;
 use nirspi_optics::{Projector, Scene};
 use nirspi_recon::Order;
 use nirspi_recon::reconstruct::{self, OmpSettings};
 use serde::Serialize;
-use std::num::NonZeroU32;
 use std::time::Instant;
 
 /// What to time.
@@ -129,7 +124,8 @@ pub fn table1(settings: &Settings, done: &dyn Fn()) -> Result<Report> {
     let captured = camera.record(&optics, setup, sweeps, seed)?;
     let conditions = Conditions { distance_m: DISTANCE_M, rain: Rainfall::None, frames: sweeps };
     let white = camera.white_level(conditions, seed)?;
-    let networks = Networks::new()?;
+    let chain = Enhancer::built_in(&Device::cpu())?;
+    let fusion_alone = Networks::built_in(Device::cpu()).fusion()?;
 
     let mut times: [Vec<f64>; 5] = Default::default();
     for repeat in 0..WARM_UP + repeats {
@@ -141,11 +137,11 @@ pub fn table1(settings: &Settings, done: &dyn Fn()) -> Result<Report> {
         let readings: Vec<f32> =
             image.pixels().iter().map(|counts| (counts / white).clamp(0.0, 1.0)).collect();
         let enhanced =
-            networks.chain.enhance(Images::new(&readings)?, None, &Options::default(), &mut |_| {});
+            chain.enhance(Images::new(&readings)?, None, &Options::default(), &mut |_| {})?;
         let all = start.elapsed();
         // The chain does both in one; each again by itself.
         let start = Instant::now();
-        let upscaled = networks.fusion.upscale(Images::new(&readings)?, None);
+        let upscaled = fusion_alone.upscale(Images::new(&readings)?, None);
         let fusion = start.elapsed();
         drop((enhanced, upscaled));
         if repeat >= WARM_UP {
@@ -173,24 +169,6 @@ pub fn table1(settings: &Settings, done: &dyn Fn()) -> Result<Report> {
                 .to_owned(),
         ],
     })
-}
-
-/// What is timed.
-struct Networks {
-    fusion: Fusion,
-    chain: Enhancer,
-}
-
-impl Networks {
-    fn new() -> Result<Self> {
-        let device = Device::cpu();
-        let fusion = || Fusion::new(&device, &Weights::embedded("fsrcnn")?);
-        let estimator = BlurEstimator::new(&device, &Weights::embedded("estimator")?)?;
-        let method = Method::Diffusion { steps: NonZeroU32::MIN };
-        let deblurrer = Deblurrer::new(&device, &Weights::embedded(method.model())?, method)?;
-        let chain = Enhancer::new(fusion()?, Sharpener::new(estimator, deblurrer));
-        Ok(Self { fusion: fusion()?, chain })
-    }
 }
 
 /// Times in rising order, and the paper's as dashed lines.

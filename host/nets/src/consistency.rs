@@ -7,17 +7,21 @@
 //! x + A^T (A A^T + lambda)^-1 (y - A x), lambda such that it comes to lie on the ball, if lambda may be so small: of all images
 //! of the same change's norm, the one that fits best (Tikhonov; Morozov's discrepancy principle).
 //!
-//! Law: inside the ball nothing changes.
+//! # Invariant
+//! An image inside the ball is not changed (`inside_the_ball_nothing_changes`).
 //!
+//! # How the equation is solved
 //! With reflecting edges B is diagonal in the cosine transform (DCT-II), and pair means fold cosine 64 - k
 //! onto cosine k, so A A^T is diagonal too and no iteration is needed. With some Hadamard rows missing
-//! only what was measured counts; then the same equation is solved by conjugate gradients.
+//! only what was measured counts; [`MeasuredRows`] then solves the same equation in a Krylov space.
 
-mod sampled;
+mod krylov;
+mod measured;
 
-pub use sampled::MeasuredRows;
+pub use measured::{MeasuredRows, MeasuredRowsError, SampledRows};
 
 use crate::cosine::Cosine;
+use krylov::Krylov;
 use std::f32::consts::PI;
 use std::sync::LazyLock;
 
@@ -53,14 +57,14 @@ pub struct Consistency {
     /// Diagonal of D D^T on one axis, D = pair means of the blur.
     power: Vec<f32>,
     noise: f32,
-    measured: Option<MeasuredRows>,
+    measured: MeasuredRows,
 }
 
 impl Consistency {
     /// For readings of `side` x `side` pixels, 32 or 64, of an image of [`SIDE`] x [`SIDE`] blurred by
-    /// `sigma_px` (of the image's pixels), with noise of standard deviation `noise` a reading. `measured`: the
-    /// Hadamard rows that the readings are made of, if not all.
-    pub fn new(side: usize, sigma_px: f32, noise: f32, measured: Option<MeasuredRows>) -> Self {
+    /// `sigma_px` (of the image's pixels), with noise of standard deviation `noise` a reading. Every Hadamard row was
+    /// measured; [`of_rows`](Self::of_rows) says otherwise.
+    pub fn new(side: usize, sigma_px: f32, noise: f32) -> Self {
         let attenuation = |k: usize| {
             let omega = PI * k as f32 / SIDE as f32;
             (-0.5 * (sigma_px * omega).powi(2)).exp()
@@ -81,8 +85,17 @@ impl Consistency {
             gain,
             power,
             noise,
-            measured,
+            measured: MeasuredRows::All,
         }
+    }
+
+    /// The same model where only some Hadamard rows were measured.
+    ///
+    /// # Errors
+    /// [`MeasuredRowsError::OtherSide`] if the rows belong to readings of another side.
+    pub fn of_rows(self, measured: &MeasuredRows) -> Result<Self, MeasuredRowsError> {
+        measured.expect_side(self.power.len())?;
+        Ok(Self { measured: measured.clone(), ..self })
     }
 
     /// How far `image` ([`SIDE`]^2) is from explaining `readings`, over their noise: near 1 it does.
@@ -100,8 +113,8 @@ impl Consistency {
             return;
         }
         let dual = match &self.measured {
-            None => self.solve(&residual, radius),
-            Some(rows) => rows.solve(self, &residual, radius),
+            MeasuredRows::All => self.solve(&residual, radius),
+            MeasuredRows::Rows(rows) => self.solve_sampled(rows, &residual, radius),
         };
         self.add_adjoint(&dual, &mut spectrum);
         image.copy_from_slice(&self.image.inverse(&spectrum));
@@ -109,7 +122,10 @@ impl Consistency {
 
     /// Readings that count.
     fn degrees(&self) -> usize {
-        self.measured.as_ref().map_or(self.power.len().pow(2), MeasuredRows::count)
+        match &self.measured {
+            MeasuredRows::All => self.power.len().pow(2),
+            MeasuredRows::Rows(rows) => rows.count(),
+        }
     }
 
     /// Cosine transform of y - A x, of the measured part of it.
@@ -117,7 +133,7 @@ impl Consistency {
         let mut residual = self.readings.forward(readings);
         let seen = self.apply(spectrum);
         residual.iter_mut().zip(seen).for_each(|(r, seen)| *r -= seen);
-        if let Some(rows) = &self.measured {
+        if let MeasuredRows::Rows(rows) = &self.measured {
             rows.keep_measured(self.readings, &mut residual);
         }
         residual
@@ -173,6 +189,28 @@ impl Consistency {
         };
         let lambda = bisect(BISECTIONS, |lambda| left(lambda) > radius);
         residual.iter().enumerate().map(|(i, r)| r / (self.power_at(i) + lambda)).collect()
+    }
+
+    /// (P A A^T P + lambda)^-1 of the residual, P the part that the rows measured, with lambda such that the new residual
+    /// has the radius' norm.
+    fn solve_sampled(&self, rows: &SampledRows, residual: &[f32], radius: f32) -> Vec<f32> {
+        let mut krylov = Krylov::new(residual);
+        loop {
+            krylov.step(|v| {
+                let powers = v.iter().enumerate();
+                let mut image: Vec<f32> = powers.map(|(i, v)| self.power_at(i) * v).collect();
+                rows.keep_measured(self.readings, &mut image);
+                image
+            });
+            if !krylov.is_due() {
+                continue;
+            }
+            // y - A (x + A^T dual) = residual - A A^T dual = lambda dual.
+            let lambda = bisect(BISECTIONS, |lambda| lambda * krylov.norm(lambda) > radius);
+            if krylov.is_enough(lambda) {
+                return krylov.solution(lambda);
+            }
+        }
     }
 }
 

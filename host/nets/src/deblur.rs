@@ -1,22 +1,26 @@
-//! Deblurring by a network, three ways that share one interface: the bridge (to be used), the ancestral
-//! sampler (the faithful baseline) and the GAN's generator (the paper's other baseline).
+//! Deblurring by a network in one of three ways: the bridge (the one to use), the ancestral sampler (the faithful
+//! baseline) and the GAN's generator (the paper's other baseline). [`Sharpen`] puts another network on the bridge.
 //!
-//! Law: an image's result depends on itself, its options and its index, never on its neighbours in a batch.
+//! # Invariant
+//! An image's result depends on the image, its options and its index, never on the other images of a batch
+//! (`an_image_is_enhanced_alike_alone_and_among_others`, `a_sample_is_of_the_image_not_of_its_batch`).
 
 mod ancestral;
 mod bridge;
-mod step;
+mod constraint;
+mod sharpen;
 
 use std::num::NonZeroU32;
 
-use crate::consistency::MeasuredRows;
 use crate::device::Device;
 use crate::estimate::Estimate;
 use crate::network::RunUNet;
 use crate::weights::{Weights, WeightsError};
 
 pub use ancestral::Schedule;
-pub(crate) use step::Truth;
+pub(crate) use constraint::DataConstraint;
+use sharpen::Residual;
+pub use sharpen::{Blurred, Sharpen, SharpenError};
 
 /// Side of the images.
 pub const SIDE: usize = 64;
@@ -66,14 +70,7 @@ pub(crate) struct Job<'a> {
     pub(crate) start: &'a [f32],
     /// (N, 64, 64): the readings themselves, each pixel repeated where they are 32 x 32.
     pub(crate) seen: &'a [f32],
-    /// (N, side, side): the readings.
-    pub(crate) readings: &'a [f32],
-    pub(crate) readings_side: usize,
     pub(crate) estimates: &'a [Estimate],
-    /// Hadamard rows behind the readings, if not all; checked before.
-    pub(crate) measured: Option<&'a MeasuredRows>,
-    /// Shall each step agree with the readings?
-    pub(crate) consistency: bool,
     pub(crate) seed: u64,
     /// Index of the first image.
     pub(crate) first: usize,
@@ -81,14 +78,13 @@ pub(crate) struct Job<'a> {
 
 /// A network that deblurs.
 pub struct Deblurrer {
-    network: Box<dyn RunUNet>,
     path: Path,
     batch: usize,
 }
 
 enum Path {
-    Bridge { steps: NonZeroU32 },
-    Ancestral { schedule: Schedule, steps: NonZeroU32 },
+    Bridge { network: Box<dyn Sharpen>, steps: NonZeroU32 },
+    Ancestral { network: Box<dyn RunUNet>, schedule: Schedule, steps: NonZeroU32 },
 }
 
 impl Deblurrer {
@@ -98,14 +94,21 @@ impl Deblurrer {
     /// [`WeightsError`] if they are of another network.
     pub fn new(device: &Device, weights: &Weights, method: Method) -> Result<Self, WeightsError> {
         weights.expect_model(method.model())?;
-        let path = match method {
-            Method::Diffusion { steps } => Path::Bridge { steps },
-            Method::Gan => Path::Bridge { steps: NonZeroU32::MIN },
+        let (unet, batch) = (device.unet(weights)?, device.batch());
+        Ok(match method {
+            Method::Diffusion { steps } => Self::own(Box::new(Residual { unet, batch }), steps),
+            Method::Gan => Self::own(Box::new(Residual { unet, batch }), NonZeroU32::MIN),
             Method::Ancestral { steps } => {
-                Path::Ancestral { schedule: Schedule::of(weights)?, steps }
+                let schedule = Schedule::of(weights)?;
+                Self { path: Path::Ancestral { network: unet, schedule, steps }, batch }
             }
-        };
-        Ok(Self { network: device.unet(weights)?, path, batch: device.batch() })
+        })
+    }
+
+    /// A network of your own on the bridge, in so many steps.
+    pub fn own(network: Box<dyn Sharpen>, steps: NonZeroU32) -> Self {
+        let batch = network.batch().max(1);
+        Self { path: Path::Bridge { network, steps }, batch }
     }
 
     /// How many images at once keep its device busy.
@@ -114,12 +117,18 @@ impl Deblurrer {
     }
 
     /// The sharp images, (N, 64, 64) in [0, 1].
-    pub(crate) fn run(&self, job: &Job<'_>) -> Vec<f32> {
-        let truth = Truth::new(job);
+    ///
+    /// # Errors
+    /// [`SharpenError`] if the network of a bridge gives no images.
+    pub(crate) fn run(
+        &self,
+        job: &Job<'_>,
+        constraint: &DataConstraint<'_>,
+    ) -> Result<Vec<f32>, SharpenError> {
         match &self.path {
-            Path::Bridge { steps } => bridge::run(&*self.network, *steps, job, &truth),
-            Path::Ancestral { schedule, steps } => {
-                ancestral::run(&*self.network, schedule, *steps, job, &truth)
+            Path::Bridge { network, steps } => bridge::run(&**network, *steps, job, constraint),
+            Path::Ancestral { network, schedule, steps } => {
+                Ok(ancestral::run(&**network, schedule, *steps, job, constraint))
             }
         }
     }

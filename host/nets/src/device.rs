@@ -9,7 +9,12 @@ pub use nirspi_recon::backend::{Backend, ParseBackendError};
 use nirspi_recon::backend::NOT_BUILT;
 #[cfg(feature = "gpu")]
 use nirspi_recon::backend::probe;
+#[cfg(feature = "gpu")]
+use std::sync::Arc;
 use thiserror::Error;
+
+#[cfg(feature = "gpu")]
+use crate::gpu::{self, Engine};
 
 /// A backend that was asked for by name is not there.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -32,9 +37,9 @@ pub struct Device {
 pub(crate) enum Kind {
     Cpu,
     #[cfg(feature = "gpu")]
-    Wgpu(burn::backend::wgpu::WgpuDevice),
+    Wgpu(cubecl::wgpu::WgpuDevice),
     #[cfg(feature = "gpu")]
-    Cuda(burn::backend::cuda::CudaDevice),
+    Cuda(cubecl::cuda::CudaDevice),
 }
 
 impl Device {
@@ -70,6 +75,16 @@ impl Device {
             Kind::Wgpu(_) => Backend::Wgpu,
             #[cfg(feature = "gpu")]
             Kind::Cuda(_) => Backend::Cuda,
+        }
+    }
+
+    /// What launches kernels on it; nothing for the processor.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn engine(&self) -> Option<Arc<dyn Engine>> {
+        match &self.kind {
+            Kind::Cpu => None,
+            Kind::Wgpu(device) => Some(gpu::wgpu(device)),
+            Kind::Cuda(device) => Some(gpu::cuda(device)),
         }
     }
 

@@ -15,7 +15,7 @@ pub(crate) const SIGMA_SCALE_PX: f32 = 4.0;
 pub(crate) const NOISE_SCALE: f32 = 10.0;
 
 /// The largest condition that the networks were trained with.
-const CONDITION_MAX: f32 = 1.5;
+pub(crate) const CONDITION_MAX: f32 = 1.5;
 
 /// Blur and noise of an image.
 #[derive(Debug, Clone, Copy, PartialEq)]

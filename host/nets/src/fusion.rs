@@ -1,6 +1,9 @@
 //! Intensity and depth become one image of twice the pixels: the paper's fusion by FSRCNN (section 2.C).
 //!
-//! Law: a zone without depth is told apart from a near one: its depth is 0 and so is its validity.
+//! # Invariant
+//! A zone without depth differs from a near one: its depth is 0 and its validity too
+//! (`a_zone_covers_its_pixels_and_a_blind_one_is_marked`). Training builds the network's input with the same functions
+//! (`training_and_inference_build_the_same_input`).
 
 use thiserror::Error;
 
@@ -76,26 +79,34 @@ impl DepthMaps {
         Self { side: self.side, zones_m }
     }
 
-    /// Depth over 3 m and validity at one pixel of the 32 x 32 grid.
-    fn at(&self, image: usize, pixel: usize) -> (f32, f32) {
-        let zone = SIDE / self.side;
-        let (row, column) = (pixel / SIDE / zone, pixel % SIDE / zone);
+    /// What a zone of the map of one image saw, in metres.
+    fn zone_m(&self, image: usize, zone: usize) -> Option<f32> {
         let area = self.side * self.side;
         let map = if self.zones_m.len() == area { 0 } else { image };
-        let depth_m = self.zones_m[map * area + row * self.side + column];
-        if depth_m > 0.0 && depth_m.is_finite() {
-            ((depth_m / DEPTH_SCALE_M).min(1.0), 1.0)
-        } else {
-            (0.0, 0.0)
-        }
+        let depth_m = self.zones_m[map * area + zone];
+        (depth_m > 0.0 && depth_m.is_finite()).then_some(depth_m)
     }
 }
 
 /// Appends what FSRCNN sees of the depth of one image: depth over 3 m, then its validity, 32 x 32 each.
 pub(crate) fn push_planes(depth: Option<&DepthMaps>, image: usize, planes: &mut Vec<f32>) {
-    let at = |pixel| depth.map_or((0.0, 0.0), |depth| depth.at(image, pixel));
-    planes.extend((0..SIDE * SIDE).map(|pixel| at(pixel).0));
-    planes.extend((0..SIDE * SIDE).map(|pixel| at(pixel).1));
+    let side = depth.map_or(1, |depth| depth.side);
+    push_zones(side, |zone| depth?.zone_m(image, zone), planes);
+}
+
+/// The same for a map of `side` x `side` zones; `zone_m` says in metres what a zone saw, if anything.
+pub(crate) fn push_zones(
+    side: usize,
+    zone_m: impl Fn(usize) -> Option<f32>,
+    planes: &mut Vec<f32>,
+) {
+    let pixels = SIDE / side;
+    let zone_of = |pixel: usize| pixel / SIDE / pixels * side + pixel % SIDE / pixels;
+    let zones: Vec<(f32, f32)> = (0..side * side)
+        .map(|zone| zone_m(zone).map_or((0.0, 0.0), |m| ((m / DEPTH_SCALE_M).min(1.0), 1.0)))
+        .collect();
+    planes.extend((0..SIDE * SIDE).map(|pixel| zones[zone_of(pixel)].0));
+    planes.extend((0..SIDE * SIDE).map(|pixel| zones[zone_of(pixel)].1));
 }
 
 /// FSRCNN with its second input.
@@ -134,6 +145,14 @@ impl Fusion {
 mod tests {
     use super::*;
 
+    /// Depth over 3 m and validity at one pixel of the 32 x 32 grid.
+    fn planes_at(depth: &DepthMaps, image: usize, pixel: usize) -> (f32, f32) {
+        let mut planes = Vec::new();
+        push_planes(Some(depth), image, &mut planes);
+        assert_eq!(planes.len(), 2 * SIDE * SIDE);
+        (planes[pixel], planes[SIDE * SIDE + pixel])
+    }
+
     #[test]
     fn a_zone_covers_its_pixels_and_a_blind_one_is_marked() {
         let mut zones = vec![1.5; 2 * 64];
@@ -141,19 +160,20 @@ mod tests {
         zones[64 + 10] = 0.0;
         zones[64 + 11] = 30.0;
         let depth = DepthMaps::new(zones, [2, 8, 8], 2).unwrap();
-        assert_eq!(depth.at(1, 0), (0.5, 1.0));
+        let at = |image, pixel| planes_at(&depth, image, pixel);
+        assert_eq!(at(1, 0), (0.5, 1.0));
         // Zone (1, 1) is pixels 4 to 7 of rows 4 to 7.
-        assert_eq!(depth.at(1, 4 * SIDE + 7), (0.0, 0.0));
-        assert_eq!(depth.at(1, 7 * SIDE + 8), (0.0, 0.0));
-        assert_eq!(depth.at(1, 4 * SIDE + 12), (1.0, 1.0));
-        assert_eq!(depth.at(1, 8 * SIDE + 4), (0.5, 1.0));
-        assert_eq!(depth.at(0, 4 * SIDE + 7), (0.5, 1.0));
+        assert_eq!(at(1, 4 * SIDE + 7), (0.0, 0.0));
+        assert_eq!(at(1, 7 * SIDE + 8), (0.0, 0.0));
+        assert_eq!(at(1, 4 * SIDE + 12), (1.0, 1.0));
+        assert_eq!(at(1, 8 * SIDE + 4), (0.5, 1.0));
+        assert_eq!(at(0, 4 * SIDE + 7), (0.5, 1.0));
     }
 
     #[test]
     fn one_map_serves_all_images_and_other_shapes_are_refused() {
         let one = DepthMaps::new(vec![0.3; 64], [1, 8, 8], 5).unwrap();
-        assert_eq!(one.at(4, 100), (0.1, 1.0));
+        assert_eq!(planes_at(&one, 4, 100), (0.1, 1.0));
         for shape in [[2, 8, 8], [1, 5, 5], [1, 8, 4], [1, 0, 0], [1, 64, 64]] {
             let zones = vec![1.0; shape.iter().product()];
             assert!(DepthMaps::new(zones, shape, 5).is_err(), "{shape:?}");

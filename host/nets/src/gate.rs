@@ -1,7 +1,11 @@
 //! Never harmful: an image that is sharp and clean stays as it is.
 //!
-//! Law: below the lower bounds the enhancement has no say, above the upper ones all of it, and in between
-//! its share grows in proportion, so that no small change of the input makes a jump.
+//! # Invariant
+//! Below the lower bounds the enhancement has no say, above the upper ones all of it, and in between its share grows in
+//! proportion, so that no small change of the input makes a jump
+//! (`sharp_and_clean_stays_and_either_flaw_opens_the_gate`).
+
+use rayon::prelude::*;
 
 use crate::estimate::Estimate;
 
@@ -17,14 +21,22 @@ pub(crate) fn share(estimate: &Estimate) -> f32 {
     between(estimate.sigma_px, SIGMA_PX).max(between(estimate.noise, NOISE))
 }
 
-/// Puts back into `enhanced` what of each input belongs there.
-pub(crate) fn close(estimates: &[Estimate], inputs: &[f32], enhanced: &mut [f32]) {
-    let area = inputs.len() / estimates.len().max(1);
-    let pairs = enhanced.chunks_exact_mut(area).zip(inputs.chunks_exact(area));
-    for ((enhanced, input), estimate) in pairs.zip(estimates) {
+/// Puts back into `enhanced`, images of `area` pixels, what of each input belongs there. `input` makes input k; only images
+/// that the gate is not fully open for ask for theirs.
+pub(crate) fn close<I: AsRef<[f32]>>(
+    estimates: &[Estimate],
+    area: usize,
+    enhanced: &mut [f32],
+    input: impl Fn(usize) -> I + Sync,
+) {
+    let images = enhanced.par_chunks_exact_mut(area).zip(estimates).enumerate();
+    images.for_each(|(index, (enhanced, estimate))| {
         let share = share(estimate);
-        enhanced.iter_mut().zip(input).for_each(|(e, i)| *e = i + share * (*e - i));
-    }
+        if share < 1.0 {
+            let input = input(index);
+            enhanced.iter_mut().zip(input.as_ref()).for_each(|(e, i)| *e = i + share * (*e - i));
+        }
+    });
 }
 
 #[cfg(test)]
@@ -45,11 +57,15 @@ mod tests {
             let share = share(&Estimate { sigma_px, noise });
             assert!((share - expected).abs() < 1e-5, "{sigma_px} {noise}: {share}");
         }
-        let estimates =
-            [Estimate { sigma_px: 0.1, noise: 0.001 }, Estimate { sigma_px: 0.425, noise: 0.001 }];
-        let mut enhanced = [1.0; 4];
-        close(&estimates, &[0.2, 0.3, 0.2, 0.4], &mut enhanced);
-        let expected = [0.2, 0.3, 0.6, 0.7];
+    }
+
+    #[test]
+    fn each_image_gets_its_share_and_an_open_gate_asks_for_no_input() {
+        let estimates = [0.1, 0.425, 2.0].map(|sigma_px| Estimate { sigma_px, noise: 0.001 });
+        let mut enhanced = [1.0; 6];
+        let inputs = [[0.2, 0.3], [0.2, 0.4]];
+        close(&estimates, 2, &mut enhanced, |index| inputs[index]);
+        let expected = [0.2, 0.3, 0.6, 0.7, 1.0, 1.0];
         assert!(enhanced.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-5), "{enhanced:?}");
     }
 }

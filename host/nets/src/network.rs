@@ -1,31 +1,29 @@
 //! Networks where they run, behind one face a network: plain slices in, plain vectors out.
 //!
-//! Law: every device gives the same numbers, to 1e-4; nothing above this module knows which one computed.
+//! # Invariant
+//! Every device gives the same numbers, to 1e-4; nothing above this module knows which one computed
+//! (`tests::every_device_of_this_machine_gives_what_pytorch_gives`).
 
 #[cfg(feature = "gpu")]
 mod chain;
-#[cfg(feature = "gpu")]
-mod on_burn;
 
-#[cfg(feature = "gpu")]
-use burn::backend::{Cuda, Wgpu};
 use rayon::prelude::*;
 
 use crate::cpu;
-use crate::device::{Device, Kind};
-use crate::model::CONDITIONS;
+use crate::device::Device;
 #[cfg(feature = "gpu")]
-use crate::model::{Estimator, EstimatorConfig, Fsrcnn, FsrcnnConfig, UNet, UNetConfig};
+use crate::gpu;
 use crate::weights::{Weights, WeightsError};
 #[cfg(feature = "gpu")]
 pub(crate) use chain::{Guess, RunChain};
-#[cfg(feature = "gpu")]
-use on_burn::{OnBurn, place};
 
-/// Time (2), blur (2), noise (2).
+/// Numbers that condition the UNet: time (2), blur (2), noise (2).
+pub const CONDITIONS: usize = 6;
+
+/// The conditions of one image.
 pub(crate) type Conditions = [f32; CONDITIONS];
 
-/// A [`UNet`] on a device.
+/// The UNet on a device.
 pub(crate) trait RunUNet: Send {
     /// What the network says of each pair of images (N, `side`, `side`) under its conditions.
     fn run(
@@ -37,13 +35,13 @@ pub(crate) trait RunUNet: Send {
     ) -> Vec<f32>;
 }
 
-/// An [`Estimator`] on a device.
+/// The estimator on a device.
 pub(crate) trait RunEstimator: Send {
     /// The two outputs for each image of (N, `side`, `side`).
     fn run(&self, side: usize, images: &[f32]) -> Vec<[f32; 2]>;
 }
 
-/// An [`Fsrcnn`] on a device.
+/// FSRCNN on a device.
 pub(crate) trait RunFsrcnn: Send {
     /// (N, 2 `side`, 2 `side`) of (N, 3, `side`, `side`), not clamped.
     fn run(&self, side: usize, input: &[f32]) -> Vec<f32>;
@@ -52,18 +50,10 @@ pub(crate) trait RunFsrcnn: Send {
 impl Device {
     pub(crate) fn unet(&self, weights: &Weights) -> Result<Box<dyn RunUNet>, WeightsError> {
         #[cfg(feature = "gpu")]
-        let config = UNetConfig::of(weights)?;
-        Ok(match &self.kind {
-            Kind::Cpu => Box::new(OnCpu(cpu::UNet::new(weights)?)),
-            #[cfg(feature = "gpu")]
-            Kind::Wgpu(device) => {
-                Box::new(place::<Wgpu, UNet<_>>(config.init(device), weights, device)?)
-            }
-            #[cfg(feature = "gpu")]
-            Kind::Cuda(device) => {
-                Box::new(place::<Cuda, UNet<_>>(config.init(device), weights, device)?)
-            }
-        })
+        if let Some(engine) = self.engine() {
+            return Ok(Box::new(gpu::UNet::new(&engine, weights)?));
+        }
+        Ok(Box::new(OnCpu(cpu::UNet::new(weights)?)))
     }
 
     pub(crate) fn estimator(
@@ -71,34 +61,18 @@ impl Device {
         weights: &Weights,
     ) -> Result<Box<dyn RunEstimator>, WeightsError> {
         #[cfg(feature = "gpu")]
-        let config = EstimatorConfig::of(weights)?;
-        Ok(match &self.kind {
-            Kind::Cpu => Box::new(OnCpu(cpu::Estimator::new(weights)?)),
-            #[cfg(feature = "gpu")]
-            Kind::Wgpu(device) => {
-                Box::new(place::<Wgpu, Estimator<_>>(config.init(device), weights, device)?)
-            }
-            #[cfg(feature = "gpu")]
-            Kind::Cuda(device) => {
-                Box::new(place::<Cuda, Estimator<_>>(config.init(device), weights, device)?)
-            }
-        })
+        if let Some(engine) = self.engine() {
+            return Ok(Box::new(gpu::Estimator::new(&engine, weights)?));
+        }
+        Ok(Box::new(OnCpu(cpu::Estimator::new(weights)?)))
     }
 
     pub(crate) fn fsrcnn(&self, weights: &Weights) -> Result<Box<dyn RunFsrcnn>, WeightsError> {
         #[cfg(feature = "gpu")]
-        let config = FsrcnnConfig::of(weights)?;
-        Ok(match &self.kind {
-            Kind::Cpu => Box::new(OnCpu(cpu::Fsrcnn::new(weights)?)),
-            #[cfg(feature = "gpu")]
-            Kind::Wgpu(device) => {
-                Box::new(place::<Wgpu, Fsrcnn<_>>(config.init(device), weights, device)?)
-            }
-            #[cfg(feature = "gpu")]
-            Kind::Cuda(device) => {
-                Box::new(place::<Cuda, Fsrcnn<_>>(config.init(device), weights, device)?)
-            }
-        })
+        if let Some(engine) = self.engine() {
+            return Ok(Box::new(gpu::Fsrcnn::new(&engine, weights)?));
+        }
+        Ok(Box::new(OnCpu(cpu::Fsrcnn::new(weights)?)))
     }
 }
 
@@ -158,8 +132,9 @@ mod tests {
 
     fn assert_close(ours: &[f32], theirs: &[f32], what: &str) {
         assert_eq!(ours.len(), theirs.len(), "{what}");
-        let apart = ours.iter().zip(theirs).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
-        assert!(apart < 1e-4, "{what}: {apart}");
+        for (at, (ours, theirs)) in ours.iter().zip(theirs).enumerate() {
+            assert!((ours - theirs).abs() < 1e-4, "{what}: [{at}] {ours}, PyTorch {theirs}");
+        }
     }
 
     #[test]

@@ -66,6 +66,14 @@ pub enum WeightsError {
         /// The network that the metadata names.
         found: String,
     },
+    /// The metadata names no network.
+    #[error("{file}: the file does not say which network it is for, expected {expected}")]
+    Unnamed {
+        /// The file.
+        file: String,
+        /// The networks that weights are wanted for.
+        expected: String,
+    },
     /// A tensor has numbers of a kind that weights are not.
     #[error("{file}: tensor {tensor} holds {found}, expected F32 or F16")]
     Kind {
@@ -103,6 +111,21 @@ pub enum WeightsError {
         file: String,
         /// The tensor.
         tensor: String,
+    },
+    /// A layer is wider than a GPU's kernel takes.
+    #[error(
+        "{file}: layer {layer} has {found} input channels, expected at most {limit} on a GPU; use the processor \
+         (--backend cpu)"
+    )]
+    TooWide {
+        /// The file.
+        file: String,
+        /// The layer.
+        layer: String,
+        /// Its input channels.
+        found: usize,
+        /// Most input channels.
+        limit: usize,
     },
     /// No weights of that name come with the program.
     #[error("no weights of {model} come with this program")]
@@ -303,6 +326,13 @@ impl Weights {
         (0..).take_while(|&index| self.tensors.contains_key(&name(index))).count()
     }
 
+    #[cfg(feature = "gpu")]
+    pub(crate) fn too_wide(&self, layer: &str, found: usize, limit: usize) -> WeightsError {
+        let (file, layer) = (self.label.clone(), layer.to_owned());
+        WeightsError::TooWide { file, layer, found, limit }
+    }
+
+    #[cfg(feature = "train")]
     pub(crate) fn unknown(&self, tensor: &str) -> WeightsError {
         WeightsError::Unknown { file: self.label.clone(), tensor: tensor.to_owned() }
     }

@@ -88,8 +88,7 @@ impl CalibrationPolicy {
                     Ok(kept) => Choice::of(kept, file, measure_first),
                     Err(problem) => {
                         let problem = causes::in_one_line(&problem);
-                        let note =
-                            format!("kept calibration not used, measured afresh: {problem}");
+                        let note = format!("kept calibration not used, measured afresh: {problem}");
                         Choice { note: Some(note), ..Choice::plain(Calibration::Measure) }
                     }
                 })

@@ -1,10 +1,9 @@
 //! The learned stages for one image: scale to white, fuse with depth, deblur, agree with the readings.
 
 use super::white::brightest;
-use nirspi_nets::consistency::MeasuredRows;
 use nirspi_nets::{
-    BlurEstimator, Deblurrer, DepthMaps, Device, Enhancer, Fusion, Images, ImagesError,
-    KnownEstimate, Method, Options, Sharpener, Weights, WeightsError, deblur, fusion,
+    DepthMaps, Device, Enhancer, Images, ImagesError, Known, KnownEstimate, MeasuredRows,
+    MeasuredRowsError, Method, Networks, Options, Sharpener, WeightsError, deblur, fusion,
 };
 use nirspi_recon::{Image, Rows};
 use std::num::NonZeroU32;
@@ -40,11 +39,11 @@ impl White {
 
 /// What is known of an image besides its pixels.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Known<'k> {
+pub struct ImageContext<'c> {
     /// Natural-order Hadamard rows that it was made from; `None` for all.
-    pub rows: Option<&'k Rows>,
+    pub rows: Option<&'c Rows>,
     /// Distances that a time-of-flight sensor saw at the same time: one map.
-    pub depth: Option<&'k DepthMaps>,
+    pub depth: Option<&'c DepthMaps>,
     /// Least blur, in pixels of the 64 x 64 grid: that of the lens at the target's distance. Noise hides blur from the
     /// estimator, so the larger of the two is taken out.
     pub least_blur_px: Option<f32>,
@@ -71,6 +70,12 @@ pub enum EnhanceError {
     /// A pixel is NaN or infinite.
     #[error(transparent)]
     Pixels(#[from] ImagesError),
+    /// The measured rows are not rows of such an image.
+    #[error(transparent)]
+    Rows(#[from] MeasuredRowsError),
+    /// The networks gave no image.
+    #[error(transparent)]
+    Networks(#[from] nirspi_nets::EnhanceError),
 }
 
 /// One image through the learned stages.
@@ -98,7 +103,6 @@ pub struct EnhancedImage {
 pub struct Enhance {
     both: Enhancer,
     second: Sharpener,
-    estimator: BlurEstimator,
     device: Device,
 }
 
@@ -108,22 +112,15 @@ impl Enhance {
     /// # Errors
     /// [`WeightsError`] if the built-in weights are damaged.
     pub fn built_in(device: &Device) -> Result<Self, WeightsError> {
-        let estimator = || BlurEstimator::new(device, &Weights::embedded("estimator")?);
-        let sharpener = || {
-            let method = Method::Diffusion { steps: NonZeroU32::MIN };
-            let weights = Weights::embedded(method.model())?;
-            Ok::<_, WeightsError>(Sharpener::new(
-                estimator()?,
-                Deblurrer::new(device, &weights, method)?,
-            ))
-        };
-        let fusion = Fusion::new(device, &Weights::embedded("fsrcnn")?)?;
-        Ok(Self {
-            both: Enhancer::new(fusion, sharpener()?),
-            second: sharpener()?,
-            estimator: estimator()?,
-            device: device.clone(),
-        })
+        let method = Method::Diffusion { steps: NonZeroU32::MIN };
+        let second = Networks::built_in(device.clone()).sharpener(method)?;
+        Ok(Self::of(Enhancer::built_in(device)?, second, device.clone()))
+    }
+
+    /// With networks of your own: both stages for 32 x 32, the second alone for 64 x 64.
+    #[must_use]
+    pub fn of(both: Enhancer, second: Sharpener, device: Device) -> Self {
+        Self { both, second, device }
     }
 
     /// Where the networks run.
@@ -140,7 +137,7 @@ impl Enhance {
         &self,
         image: &Image,
         white: White,
-        known: &Known<'_>,
+        context: &ImageContext<'_>,
     ) -> Result<EnhancedImage, EnhanceError> {
         let side = image.side().pixels();
         if side != fusion::SIDE && side != deblur::SIDE {
@@ -152,37 +149,35 @@ impl Enhance {
         }
         let scaled: Vec<f32> =
             image.pixels().iter().map(|&value| (value / white).clamp(0.0, 1.0)).collect();
+        // What is 64 x 64 was not measured by patterns of 32 x 32.
+        let measured = match context.rows {
+            Some(rows) if side == fusion::SIDE => MeasuredRows::new(side, rows)?,
+            _ => MeasuredRows::All,
+        };
+        // The larger of lens and estimator: noise hides blur from the estimator.
+        let sigma_px = context.least_blur_px.map_or(Known::Nothing, Known::AtLeast);
         let options = Options {
-            measured: known.rows.and_then(|rows| MeasuredRows::new(side, rows)),
-            seed: known.seed,
+            measured,
+            seed: context.seed,
+            estimate: KnownEstimate { sigma_px, ..KnownEstimate::default() },
             ..Options::default()
         };
-        let (result, estimated_blur_px) = if side == fusion::SIDE {
-            let readings: Images<'_, { fusion::SIDE }> = Images::new(&scaled)?;
-            let estimated = self.estimator.estimate(readings)[0].sigma_px;
-            let options = with_least_blur(options, known.least_blur_px, estimated);
-            (self.both.enhance(readings, known.depth, &options, &mut |_| {}), estimated)
+        let result = if side == fusion::SIDE {
+            self.both.enhance(Images::new(&scaled)?, context.depth, &options, &mut |_| {})?
         } else {
-            let readings: Images<'_, { deblur::SIDE }> = Images::new(&scaled)?;
-            let estimated = self.estimator.estimate(readings)[0].sigma_px;
-            let options = with_least_blur(options, known.least_blur_px, estimated);
-            (self.second.deblur(readings, &options, &mut |_| {}), estimated)
+            self.second.deblur(Images::new(&scaled)?, &options, &mut |_| {})?
         };
+        let used = result.estimates[0];
+        let estimated = result.estimated.as_ref().map_or(used, |estimated| estimated[0]);
         Ok(EnhancedImage {
             scaled,
             white,
             fused: result.upscaled,
             pixels: result.images,
-            blur_px: result.estimates[0].sigma_px,
-            estimated_blur_px,
-            noise: result.estimates[0].noise,
+            blur_px: used.sigma_px,
+            estimated_blur_px: estimated.sigma_px,
+            noise: used.noise,
             inconsistency: result.inconsistency[0],
         })
     }
-}
-
-/// The larger of lens and estimator.
-fn with_least_blur(options: Options, least_px: Option<f32>, estimated_px: f32) -> Options {
-    let sigma_px = least_px.filter(|&least_px| least_px > estimated_px);
-    Options { estimate: KnownEstimate { sigma_px, ..KnownEstimate::default() }, ..options }
 }

@@ -12,7 +12,7 @@ mod quality;
 mod warning;
 mod white;
 
-pub use enhance::{Enhance, EnhanceError, EnhancedImage, Known, White};
+pub use enhance::{Enhance, EnhanceError, EnhancedImage, ImageContext, White};
 pub use quality::{Fitted, Quality, compare};
 pub use warning::{Warning, warnings};
 pub use white::{SteadyWhite, brightest};

@@ -7,7 +7,9 @@ use super::slot::Look;
 use super::state::{Offered, Published, Rate, Rates, State};
 use super::{Shared, lock};
 use crate::causes;
-use crate::imaging::{Enhance, EnhanceError, Known, SteadyWhite, Warning, White, brightest, warnings};
+use crate::imaging::{
+    Enhance, EnhanceError, ImageContext, SteadyWhite, Warning, White, brightest, warnings,
+};
 use crate::integrate::IntegrateError;
 use nirspi_recon::Side;
 use nirspi_recon::reconstruct::{Reconstruct, ReconstructError};
@@ -159,10 +161,10 @@ impl Imaging {
         let (mut enhanced, mut enhancement, mut short) = (None, None, Vec::new());
         if settings.enhance && white_counts > 0.0 {
             let started = Instant::now();
-            let known = Known {
+            let known = ImageContext {
                 rows: Some(measurements.rows()),
                 depth: look.depth.as_deref(),
-                ..Known::default()
+                ..ImageContext::default()
             };
             let made = self.enhance.enhance(&image, White::Known(white_counts), &known)?;
             let doubts = warnings(&made);

@@ -1,11 +1,10 @@
 //! `nirspi bench enhance`: the learned stages, timed.
 
 use super::RunArgs;
-use crate::networks::Used;
 use crate::print;
 use anyhow::Result;
 use nirspi_eval::bench::enhance::{Stages, Timed, time};
-use nirspi_nets::{Enhancer, Method, Options};
+use nirspi_nets::{Method, Options, UsedWeights};
 use serde::Serialize;
 use std::num::NonZeroU32;
 use std::process::ExitCode;
@@ -29,7 +28,7 @@ pub struct Args {
 #[derive(Debug, Serialize)]
 struct Report {
     device: String,
-    weights: Vec<Used>,
+    weights: Vec<UsedWeights>,
     threads: usize,
     frames: u32,
     steps: u32,
@@ -46,13 +45,13 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let stages = Stages {
         estimator: networks.estimator()?,
         fusion: networks.fusion()?,
-        enhancer: Enhancer::new(networks.fusion()?, networks.sharpener(method)?),
+        enhancer: networks.enhancer(method)?,
     };
     let options = Options { consistency: !run.no_consistency, gate: false, ..Options::default() };
     let timed = time(&stages, run.frames, &options, run.repeats, run.seed)?;
     print::json(&Report {
-        device: networks.device().to_owned(),
-        weights: networks.used(),
+        device: networks.device().name().to_owned(),
+        weights: networks.used().to_vec(),
         threads: nirspi_eval::bench::threads(),
         frames: run.frames,
         steps: args.steps.get(),

@@ -1,11 +1,10 @@
 //! `nirspi bench pipeline`: from measurements to enhanced images, timed.
 
 use super::RunArgs;
-use crate::networks::{Networks, Used};
 use crate::{print, refused};
 use anyhow::Result;
 use nirspi_eval::bench::pipeline::{Settings, Timed, Work, on_cpu};
-use nirspi_nets::{Enhancer, Method};
+use nirspi_nets::{Method, Networks, UsedWeights};
 use serde::Serialize;
 use std::num::NonZeroU32;
 use std::process::ExitCode;
@@ -35,7 +34,7 @@ struct Report {
     device: String,
     /// Whether the processor plays the GPU: its times say nothing of one.
     software: bool,
-    weights: Vec<Used>,
+    weights: Vec<UsedWeights>,
     threads: usize,
     frames: u32,
     measurements: u32,
@@ -60,9 +59,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let mut networks = run.networks.open(&["fsrcnn", "estimator", "diffusion"])?;
     let (timed, software) = time(&work, &mut networks)?;
     print::json(&Report {
-        device: networks.device().to_owned(),
+        device: networks.device().name().to_owned(),
         software,
-        weights: networks.used(),
+        weights: networks.used().to_vec(),
         threads: nirspi_eval::bench::threads(),
         frames: run.frames,
         measurements: args.measurements,
@@ -77,11 +76,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 /// The times on the networks' device, and whether the processor plays it.
 fn time(work: &Work, networks: &mut Networks) -> Result<(Timed, bool)> {
     let method = Method::Diffusion { steps: NonZeroU32::MIN };
-    let enhancer = Enhancer::new(networks.fusion()?, networks.sharpener(method)?);
+    let enhancer = networks.enhancer(method)?;
     #[cfg(feature = "gpu")]
-    if networks.backend() != nirspi_nets::Backend::Cpu {
+    if networks.device().backend() != nirspi_nets::Backend::Cpu {
         use anyhow::Context;
-        let backend = networks.backend();
+        let backend = networks.device().backend();
         let device = nirspi_recon::omp::gpu::Device::open(backend)?
             .context("the networks' device has no kernels for OMP")?;
         let on_device = networks.device_enhancer()?;

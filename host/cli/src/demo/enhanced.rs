@@ -2,7 +2,7 @@
 
 use super::super::report::StageTimes;
 use anyhow::Result;
-use nirspi::imaging::{Enhance, Known, Quality, Warning, White, compare, warnings};
+use nirspi::imaging::{Enhance, ImageContext, Quality, Warning, White, compare, warnings};
 use nirspi::virtual_camera::VirtualOptics;
 use nirspi_nets::{DepthMaps, Device, deblur, upscale_2x};
 use nirspi_optics::DEPTH_SIDE;
@@ -67,7 +67,8 @@ pub fn run(
     // The gain that turns a white target at this distance into counts is known from the photon budget, as
     // a user knows it from a white sheet held there.
     let white = White::Known(optics.white_counts() as f32);
-    let known = Known { rows: Some(rows), depth: Some(&depth), least_blur_px: defocus_px, seed };
+    let known =
+        ImageContext { rows: Some(rows), depth: Some(&depth), least_blur_px: defocus_px, seed };
     let made = times.time("enhance", || enhance.enhance(image, white, &known))?;
     let side = image.side().pixels();
     let upscaled = times.time("upscale", || upscale_2x(&made.scaled, 1, side, side))?;

@@ -2,7 +2,7 @@
 
 use super::super::report::StageTimes;
 use anyhow::{Context, Result, bail};
-use nirspi::imaging::{Enhance, EnhancedImage, Known, Warning, White, warnings};
+use nirspi::imaging::{Enhance, EnhancedImage, ImageContext, Warning, White, warnings};
 use nirspi_nets::Device;
 use nirspi_recon::{Image, Rows};
 use serde::Serialize;
@@ -58,7 +58,7 @@ pub fn run(frames: &[(&Image, &Rows)], times: &mut StageTimes) -> Result<(Vec<f3
     let (mut pixels, mut reports) = (Vec::new(), Vec::new());
     times.time("enhance", || -> Result<()> {
         for (image, rows) in frames {
-            let known = Known { rows: Some(rows), ..Known::default() };
+            let known = ImageContext { rows: Some(rows), ..ImageContext::default() };
             let mut made =
                 enhance.enhance(image, White::Known(white), &known).context("--enhance")?;
             reports.push(Report::of(&made));

@@ -59,6 +59,16 @@ fn a_figure_that_cannot_be_had_says_why() {
 }
 
 #[test]
+#[cfg(not(feature = "train"))]
+fn a_build_without_inception_says_which_build_has_it() {
+    let bench = Bench::new();
+    bench.write("one.npy", &stripes(0));
+    let weights = concat!(env!("CARGO_MANIFEST_DIR"), "/nets/weights/classifier.safetensors");
+    let line = "this build has no FID; build it with: cargo build --release --features train";
+    bench.run(&["metrics", "one.npy", "one.npy", "--inception", weights]).failed(1, &[line]);
+}
+
+#[test]
 fn stacks_that_cannot_be_compared_are_refused() {
     let bench = Bench::new();
     bench.write("a.npy", &npy::encode(&[16, 16], &[0.5; 256]));

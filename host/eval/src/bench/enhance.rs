@@ -37,7 +37,7 @@ pub struct Timed {
 /// Times `stages` on `frames` frames.
 ///
 /// # Errors
-/// None for frames in memory.
+/// A device that fails.
 pub fn time(
     stages: &Stages,
     frames: u32,
@@ -48,8 +48,9 @@ pub fn time(
     let Stages { enhancer, estimator, fusion: alone } = stages;
     let values = scenes::blobs(frames as usize, seed);
     let images: Images<'_, { fusion::SIDE }> = Images::new(&values)?;
-    let enhance = || enhancer.enhance(images, None, options, &mut |_| {}).images.len();
+    let enhance = || enhancer.enhance(images, None, options, &mut |_| {});
     let first_ms = Times::of(1, enhance).median_ms;
+    enhance()?;
     estimator.estimate(images);
     let whole = Times::of(repeats, enhance);
     let frames_per_s = f64::from(frames) / whole.median_ms * 1e3;

@@ -6,8 +6,7 @@ mod gpu;
 use super::{FASTEST_SWEEPS_HZ, Times, scenes};
 use crate::error::{EvalError, Result};
 use nalgebra::DMatrix;
-use nirspi_nets::consistency::MeasuredRows;
-use nirspi_nets::{Enhancer, Images, Options, fusion};
+use nirspi_nets::{Enhancer, Images, MeasuredRows, Options, fusion};
 use nirspi_recon::basis::Transform;
 use nirspi_recon::metrics::psnr;
 use nirspi_recon::omp::{Limits, MixedDictionary};
@@ -113,7 +112,7 @@ impl Work {
             y,
             options: Options {
                 consistency: settings.consistency,
-                measured: MeasuredRows::new(side.pixels(), &rows),
+                measured: MeasuredRows::new(side.pixels(), &rows)?,
                 ..Options::default()
             },
         })
@@ -145,7 +144,7 @@ impl Work {
 fn enhanced(enhancer: &Enhancer, images: &[f32], options: &Options) -> Result<Vec<f32>> {
     let lit: Vec<f32> = images.par_iter().map(|v| v.clamp(0.0, 1.0)).collect();
     let lit: Images<'_, { fusion::SIDE }> = Images::new(&lit)?;
-    Ok(enhancer.enhance(lit, None, options, &mut |_| {}).images)
+    Ok(enhancer.enhance(lit, None, options, &mut |_| {})?.images)
 }
 
 /// Times `work` on all cores of the CPU.

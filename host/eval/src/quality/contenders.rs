@@ -7,18 +7,11 @@
 use super::measure::{Condition, sampling_variance};
 use crate::error::Result;
 use nirspi_nets::classical::{self, Method as Classical};
-use nirspi_nets::deblur::{self, Deblurrer};
-use nirspi_nets::device::Device;
-use nirspi_nets::enhance::{Enhancer, Options, Sharpener};
-use nirspi_nets::estimate::BlurEstimator;
-use nirspi_nets::fusion::Fusion;
-use nirspi_nets::images::Images;
-use nirspi_nets::upscale_2x;
-use nirspi_nets::weights::{VERSION, Weights};
+use nirspi_nets::weights::VERSION;
+use nirspi_nets::{Enhancer, Fusion, Images, Networks, Options, deblur, upscale_2x};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::num::NonZeroU32;
-use std::path::PathBuf;
 
 /// Values of a reading.
 const READING: usize = 32 * 32;
@@ -90,76 +83,20 @@ pub struct Version {
     pub version: String,
 }
 
-/// Where networks come from, and where they run.
-pub struct Networks {
-    folder: Option<PathBuf>,
-    device: Device,
-}
-
-impl Networks {
-    /// Weights of this folder, `<network>.safetensors`; the embedded ones where there is no such file.
-    #[must_use]
-    pub fn new(folder: Option<PathBuf>, device: Device) -> Self {
-        Self { folder, device }
-    }
-
-    /// The weights of a network.
-    ///
-    /// # Errors
-    /// A file that cannot be read, or a network that is not embedded.
-    pub fn weights(&self, model: &str) -> Result<Weights> {
-        let file = self.folder.as_ref().map(|folder| folder.join(format!("{model}.safetensors")));
-        Ok(match file.filter(|file| file.is_file()) {
-            Some(file) => Weights::read(&file)?,
-            None => Weights::embedded(model)?,
-        })
-    }
-
+impl Version {
     /// The versions of all networks.
     ///
     /// # Errors
-    /// As [`Self::weights`].
-    pub fn versions(&self) -> Result<Vec<Version>> {
+    /// Weights that cannot be read.
+    pub fn all(networks: &mut Networks) -> Result<Vec<Self>> {
         ["estimator", "fsrcnn", "diffusion", "ancestral", "gan", "classifier"]
             .into_iter()
             .map(|model| {
-                let version =
-                    self.weights(model)?.metadata(VERSION).unwrap_or("unknown").to_owned();
-                Ok(Version { model, version })
+                let weights = networks.weights(model)?;
+                let version = weights.metadata(VERSION).unwrap_or("unknown").to_owned();
+                Ok(Self { model, version })
             })
             .collect()
-    }
-
-    /// A method that is ready to run.
-    ///
-    /// # Errors
-    /// As [`Self::weights`].
-    pub fn contender(&self, method: Method) -> Result<Contender> {
-        let count = |steps| NonZeroU32::new(steps).unwrap_or(NonZeroU32::MIN);
-        let runner = match method {
-            Method::Lanczos | Method::Classical(_) => Runner::None,
-            Method::Fusion => Runner::Fusion(self.fusion()?),
-            Method::Gan => self.chain(deblur::Method::Gan)?,
-            Method::Diffusion(steps) => {
-                self.chain(deblur::Method::Diffusion { steps: count(steps) })?
-            }
-            Method::Ancestral(steps) => {
-                self.chain(deblur::Method::Ancestral { steps: count(steps) })?
-            }
-        };
-        Ok(Contender { method, runner })
-    }
-
-    fn fusion(&self) -> Result<Fusion> {
-        Ok(Fusion::new(&self.device, &self.weights("fsrcnn")?)?)
-    }
-
-    fn chain(&self, method: deblur::Method) -> Result<Runner> {
-        let estimator = BlurEstimator::new(&self.device, &self.weights("estimator")?)?;
-        let weights = self.weights(method.model())?;
-        let deblurrer = Deblurrer::new(&self.device, &weights, method)?;
-        let sharpener = Sharpener::new(estimator, deblurrer);
-        Ok(Runner::Chain(Box::new(Enhancer::new(self.fusion()?, sharpener))))
     }
 }
 
@@ -176,6 +113,26 @@ enum Runner {
 }
 
 impl Contender {
+    /// The method with the networks that it needs.
+    ///
+    /// # Errors
+    /// Weights that cannot be read.
+    pub fn new(method: Method, networks: &mut Networks) -> Result<Self> {
+        let count = |steps| NonZeroU32::new(steps).unwrap_or(NonZeroU32::MIN);
+        let network = match method {
+            Method::Lanczos | Method::Classical(_) => {
+                return Ok(Self { method, runner: Runner::None });
+            }
+            Method::Fusion => {
+                return Ok(Self { method, runner: Runner::Fusion(networks.fusion()?) });
+            }
+            Method::Gan => deblur::Method::Gan,
+            Method::Diffusion(steps) => deblur::Method::Diffusion { steps: count(steps) },
+            Method::Ancestral(steps) => deblur::Method::Ancestral { steps: count(steps) },
+        };
+        Ok(Self { method, runner: Runner::Chain(Box::new(networks.enhancer(network)?)) })
+    }
+
     /// Which method.
     #[must_use]
     pub fn method(&self) -> Method {
@@ -217,7 +174,7 @@ impl Contender {
         let images = match &self.runner {
             Runner::Fusion(fusion) => fusion.upscale(checked, None),
             Runner::Chain(chain) => {
-                chain.enhance(checked, None, &Options::default(), &mut progress).images
+                chain.enhance(checked, None, &Options::default(), &mut progress)?.images
             }
             Runner::None => upscale_2x(readings, checked.count(), 32, 32)?,
         };
@@ -254,6 +211,7 @@ fn interpolation_gain() -> Result<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nirspi_nets::Device;
 
     /// Readings of an edge under a condition.
     fn edge(condition: Condition) -> Vec<f32> {
@@ -263,12 +221,12 @@ mod tests {
 
     #[test]
     fn only_classical_methods_get_the_condition() {
-        let networks = Networks::new(None, Device::cpu());
+        let mut networks = Networks::built_in(Device::cpu());
         let (little, much) =
             (Condition { sigma_px: 1.0, noise: 0.01 }, Condition { sigma_px: 3.0, noise: 0.05 });
         let readings = edge(little);
         for method in Method::ALL {
-            let contender = networks.contender(method).unwrap();
+            let contender = Contender::new(method, &mut networks).unwrap();
             let under = |condition| contender.enhance(&readings, condition, &|_| {}).unwrap();
             let is_classical = matches!(method, Method::Classical(_));
             assert_eq!(under(little) != under(much), is_classical, "{}", method.name());
@@ -277,13 +235,16 @@ mod tests {
 
     #[test]
     fn every_image_is_counted_once() {
-        let networks = Networks::new(None, Device::cpu());
+        let mut networks = Networks::built_in(Device::cpu());
         let condition = Condition { sigma_px: 1.0, noise: 0.01 };
         let readings = edge(condition).repeat(3);
         for method in [Method::Lanczos, Method::Classical(Classical::Wiener), Method::Gan] {
             let count = std::cell::Cell::new(0);
             let done = |images| count.set(count.get() + images);
-            networks.contender(method).unwrap().enhance(&readings, condition, &done).unwrap();
+            Contender::new(method, &mut networks)
+                .unwrap()
+                .enhance(&readings, condition, &done)
+                .unwrap();
             assert_eq!(count.get(), 3, "{}", method.name());
         }
     }

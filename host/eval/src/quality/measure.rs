@@ -6,8 +6,9 @@
 
 use super::bootstrap::Interval;
 use super::characters::{Character, Characters};
-use super::contenders::{Method, Networks};
+use super::contenders::Method;
 use crate::error::Result;
+use nirspi_nets::Networks;
 use nirspi_nets::classical::Blur;
 use nirspi_nets::consistency::Consistency;
 use nirspi_nets::images::Images;
@@ -113,7 +114,7 @@ struct One {
 }
 
 impl Judges {
-    pub fn new(networks: &Networks) -> Result<Self> {
+    pub fn new(networks: &mut Networks) -> Result<Self> {
         Ok(Self { characters: CharacterJudge::new(&networks.weights("classifier")?)? })
     }
 
@@ -194,7 +195,7 @@ fn one(
     image: &[f32],
 ) -> Result<One> {
     let sharp = &character.sharp;
-    let camera = Consistency::new(READINGS, condition.sigma_px, condition.noise, None);
+    let camera = Consistency::new(READINGS, condition.sigma_px, condition.noise);
     Ok(One {
         // Two equal images have an infinite one; no mean would survive it.
         psnr_db: metrics::psnr(sharp, image, SIDE, SIDE, 1.0)?.min(MOST_PSNR_DB),

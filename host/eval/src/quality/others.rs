@@ -220,7 +220,7 @@ fn judged(scene: &Scene, before: &[f32], after: &[f32]) -> Result<Case> {
     };
     let squares: f64 = before.iter().zip(after).map(|(a, b)| f64::from(a - b).powi(2)).sum();
     let Condition { sigma_px, noise } = scene.condition;
-    let camera = Consistency::new(SIDE / 2, sigma_px, noise, None);
+    let camera = Consistency::new(SIDE / 2, sigma_px, noise);
     let known = noise > 0.0;
     Ok(Case {
         name: scene.name.clone(),
@@ -244,8 +244,8 @@ impl Case {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::quality::{Method, Networks};
-    use nirspi_nets::device::Device;
+    use crate::quality::Method;
+    use nirspi_nets::{Device, Networks};
 
     #[test]
     fn a_part_of_a_picture_is_averaged_to_its_size() {
@@ -264,8 +264,9 @@ mod tests {
         let scenes = cases(None, None, 1).unwrap();
         let names: Vec<&str> = scenes.iter().map(|scene| scene.name.as_str()).collect();
         assert_eq!(names, ["nothing", "grey", "noise alone", "stars", "grating"]);
-        let networks = Networks::new(None, Device::cpu());
-        let shown = enhance(&scenes, &networks.contender(Method::Lanczos).unwrap()).unwrap();
+        let mut networks = Networks::built_in(Device::cpu());
+        let shown =
+            enhance(&scenes, &Contender::new(Method::Lanczos, &mut networks).unwrap()).unwrap();
         assert_eq!((shown.cases.len(), shown.picture.panels.len()), (5, 2));
         // Lanczos is what enhancement is compared with.
         assert!(shown.cases.iter().all(|case| case.changed == 0.0));

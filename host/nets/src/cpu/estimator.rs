@@ -1,13 +1,17 @@
-//! The estimator of [`crate::model::estimator`], on the CPU.
+//! The network that estimates blur and noise of an image from the image itself, on the CPU.
 
 use pulp::Arch;
 
 use super::activation::softplus;
 use super::conv::Conv;
-use super::layers::{Linear, conv, means, prelu};
-use super::planes::Planes;
-use crate::model::estimator::{LOG_FLOOR, LOG_OFFSET};
+use super::layers::{Linear, conv, means, relu, single};
 use crate::weights::{Weights, WeightsError};
+
+/// Added to each mean feature before its logarithm is taken.
+pub(crate) const LOG_FLOOR: f32 = 1e-3;
+
+/// Added to the logarithm, to centre it.
+pub(crate) const LOG_OFFSET: f32 = 3.0;
 
 /// The network, its weights in the order of the loops.
 #[derive(Debug, Clone)]
@@ -34,16 +38,12 @@ impl Estimator {
 
     /// The network's two outputs for an image of `height` x `width` pixels.
     pub fn forward(&self, image: &[f32], (height, width): (usize, usize)) -> [f32; 2] {
-        let mut h = Planes::new(1, height, width, 1);
-        for (row, line) in image.chunks_exact(width).enumerate() {
-            h.row_mut(0, row).copy_from_slice(line);
-        }
+        let mut h = single(image, (height, width));
         for (index, conv) in self.convs.iter().enumerate() {
             let full = conv.apply(self.arch, &h);
             // All but the first have stride 2; what they skip is cheap enough to be thrown away.
             h = if index == 0 { full } else { full.every_second() };
-            let zeros = vec![0.0; h.channels()];
-            prelu(self.arch, &mut h, &zeros);
+            relu(self.arch, &mut h);
         }
         let features: Vec<f32> =
             means(&h).into_iter().map(|mean| (mean + LOG_FLOOR).ln() + LOG_OFFSET).collect();

@@ -1,10 +1,11 @@
-//! The FSRCNN of [`crate::model::fsrcnn`], on the CPU.
+//! FSRCNN (Dong, Loy, Tang, ECCV 2016) with the depth map as second input, on the CPU.
 
 use pulp::Arch;
 
 use super::conv::Conv;
-use super::layers::{conv, prelu, slopes};
+use super::layers::{conv, keeping, prelu, slopes};
 use super::planes::Planes;
+use crate::filter::Filter;
 use crate::weights::{Weights, WeightsError};
 
 /// The network, its weights in the order of the loops.
@@ -13,8 +14,7 @@ pub struct Fsrcnn {
     arch: Arch,
     /// Convolutions with the slopes of what follows them.
     layers: Vec<(Conv, Vec<f32>)>,
-    /// The transposed convolution: a pixel of the output sees only taps of its own parity, so it is one convolution
-    /// with four outputs, one for each place in a block of 2 x 2.
+    /// The transposed convolution, as one with four outputs, one for each place in a block of 2 x 2.
     deconv: Conv,
 }
 
@@ -37,16 +37,7 @@ impl Fsrcnn {
                 Ok((conv, slopes))
             })
             .collect::<Result<Vec<_>, WeightsError>>()?;
-        let [inputs, _, _, _] = weights.shape("deconv.weight")?;
-        let kernels = weights.tensor("deconv.weight", &[inputs, 1, KERNEL, KERNEL])?;
-        let bias = weights.tensor("deconv.bias", &[1])?.values[0];
-        // Output 2 r + d sees input r + k - 2 through tap 2 (2 - k) + 4 + d of the kernel (padding 4), k = 0..5.
-        let tap = |k: usize, d: usize| (8 + d).checked_sub(2 * k).filter(|&tap| tap < KERNEL);
-        let at = |o: usize, i: usize, ky: usize, kx: usize| match (tap(ky, o / 2), tap(kx, o % 2)) {
-            (Some(y), Some(x)) => kernels.values[(i * KERNEL + y) * KERNEL + x],
-            _ => 0.0,
-        };
-        let deconv = Conv::new((4, inputs, 5, 2), at, |_| bias);
+        let deconv = keeping(&Filter::transposed(weights, "deconv")?);
         Ok(Self { arch: Arch::new(), layers, deconv })
     }
 
@@ -75,6 +66,3 @@ impl Fsrcnn {
 
 /// Intensity, depth, validity.
 const CHANNELS: usize = 3;
-
-/// Side of the transposed convolution.
-const KERNEL: usize = 9;

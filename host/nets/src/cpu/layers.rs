@@ -4,18 +4,18 @@ use pulp::Arch;
 
 use super::conv::Conv;
 use super::planes::Planes;
+use crate::filter::Filter;
 use crate::weights::{Weights, WeightsError};
 
 /// A convolution of stride 1 that keeps the size of its input (its taps beyond the edge see zeros).
 pub(super) fn conv(weights: &Weights, name: &str) -> Result<Conv, WeightsError> {
-    let (key, bias) = (format!("{name}.weight"), format!("{name}.bias"));
-    let [outputs, inputs, kernel, across] = weights.shape(&key)?;
-    let kernels = weights.tensor(&key, &[outputs, inputs, kernel, across])?;
-    let bias = weights.tensor(&bias, &[outputs])?;
-    let at = |o: usize, i: usize, ky: usize, kx: usize| {
-        kernels.values[((o * inputs + i) * kernel + ky) * across + kx]
-    };
-    Ok(Conv::new((outputs, inputs, kernel, kernel / 2), at, |o| bias.values[o]))
+    Ok(keeping(&Filter::convolution(weights, name)?))
+}
+
+/// The same of weights that are read already.
+pub(super) fn keeping(filter: &Filter) -> Conv {
+    let sizes = (filter.outputs, filter.inputs, filter.side, filter.side / 2);
+    Conv::new(sizes, |o, i, ky, kx| filter.at(o, i, ky, kx), |o| filter.bias[o])
 }
 
 /// A 2 x 2 convolution of stride 2, as one of 1 x 1 over [`Planes::blocks`].
@@ -38,11 +38,8 @@ pub(super) struct Linear {
 
 impl Linear {
     pub fn new(weights: &Weights, name: &str) -> Result<Self, WeightsError> {
-        let (key, bias) = (format!("{name}.weight"), format!("{name}.bias"));
-        let [outputs, inputs] = weights.shape(&key)?;
-        let matrix = weights.tensor(&key, &[outputs, inputs])?;
-        let bias = weights.tensor(&bias, &[outputs])?.values.clone();
-        let rows = matrix.values.chunks(inputs.max(1)).map(<[f32]>::to_vec).collect();
+        let Filter { inputs, weights, bias, .. } = Filter::linear(weights, name)?;
+        let rows = weights.chunks(inputs.max(1)).map(<[f32]>::to_vec).collect();
         Ok(Self { rows, bias })
     }
 
@@ -58,6 +55,20 @@ pub(super) fn means(planes: &Planes) -> Vec<f32> {
     let pixels = (height * width) as f32;
     // Margins and slack are zero: they add nothing.
     planes.values().chunks_exact(planes.stride()).map(|c| c.iter().sum::<f32>() / pixels).collect()
+}
+
+/// One image as the input of a network whose convolutions reach one pixel far.
+pub(super) fn single(image: &[f32], (height, width): (usize, usize)) -> Planes {
+    let mut planes = Planes::new(1, height, width, 1);
+    for (row, line) in image.chunks_exact(width).enumerate() {
+        planes.row_mut(0, row).copy_from_slice(line);
+    }
+    planes
+}
+
+/// ReLU.
+pub(super) fn relu(arch: Arch, planes: &mut Planes) {
+    super::activation::prelu(arch, planes.values_mut(), 0.0);
 }
 
 /// Slope of each channel's PReLU.

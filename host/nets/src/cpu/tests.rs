@@ -75,6 +75,20 @@ fn the_estimator_gives_what_pytorch_gives() {
 }
 
 #[test]
+fn the_classifier_gives_what_pytorch_gives() {
+    let (weights, reference) = fixture!("classifier");
+    let classifier = Classifier::new(&weights).unwrap();
+    for index in 0..2 {
+        let (input, [_, _, height, width]) = image::<4>(&reference, "in0", index);
+        let features = classifier.features(&input, (height, width));
+        assert_eq!(features.len(), classifier.feature_count());
+        assert_close(&features, &image::<2>(&reference, "out0", index).0);
+        let logits = classifier.logits(&features);
+        assert_close(&logits, &image::<2>(&reference, "out1", index).0);
+    }
+}
+
+#[test]
 fn weights_of_another_network_are_refused_by_the_name_of_a_tensor() {
     let (weights, _) = fixture!("fsrcnn");
     let error = UNet::new(&weights).unwrap_err();

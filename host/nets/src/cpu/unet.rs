@@ -1,4 +1,4 @@
-//! The UNet of [`crate::model::unet`], on the CPU.
+//! The UNet of the deblurrer, of the 500-step baseline and of the GAN's generator, on the CPU.
 
 use pulp::Arch;
 

@@ -6,10 +6,16 @@
 
 use std::num::NonZeroU32;
 
-use super::{AREA, Job, SIDE, Truth};
+use super::{AREA, DataConstraint, Job, SIDE};
 use crate::network::RunUNet;
 use crate::random::Noise;
 use crate::weights::{Weights, WeightsError};
+
+/// The schedule of the shipped weights: steps, then the first and the last beta, as in `host/nets/training/train_unet.py`.
+///
+/// Twice the betas of Ho, Jain and Abbeel (NeurIPS 2020: 1e-4 to 0.02 in 1000 steps) would end at 0.04, with abar at 4e-5. The
+/// shipped weights were trained up to 0.025, where abar ends at 0.0017.
+const SHIPPED: (usize, [f64; 2]) = (500, [2e-4, 0.025]);
 
 /// How much of the image is left after each of the T steps of noise.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,6 +25,25 @@ pub struct Schedule {
 }
 
 impl Schedule {
+    /// The schedule of the shipped weights, which training takes too.
+    pub(crate) fn shipped() -> Self {
+        let (steps, [start, end]) = SHIPPED;
+        Self::linear(steps, start, end)
+    }
+
+    /// Says in the weights' metadata that they were trained with [`shipped`](Self::shipped).
+    pub(crate) fn describe_shipped(weights: &mut Weights) {
+        let (steps, [start, end]) = SHIPPED;
+        weights.set_metadata("steps", steps.to_string());
+        weights.set_metadata("beta_start", start.to_string());
+        weights.set_metadata("beta_end", end.to_string());
+    }
+
+    /// How many steps of noise there are.
+    pub(crate) fn steps(&self) -> usize {
+        self.left.len()
+    }
+
     /// The schedule that the weights were trained with: metadata `steps`, `beta_start`, `beta_end`.
     ///
     /// # Errors
@@ -40,6 +65,7 @@ impl Schedule {
     }
 
     /// abar after step `step`, counted from 0.
+    #[cfg(feature = "train")]
     pub(crate) fn left(&self, step: usize) -> f64 {
         self.left[step]
     }
@@ -57,7 +83,7 @@ pub(super) fn run(
     schedule: &Schedule,
     steps: NonZeroU32,
     job: &Job<'_>,
-    truth: &Truth<'_>,
+    constraint: &DataConstraint<'_>,
 ) -> Vec<f32> {
     let images = job.first..job.first + job.estimates.len();
     let mut noise: Vec<Noise> = images.map(|index| Noise::of(job.seed, index)).collect();
@@ -81,7 +107,7 @@ pub(super) fn run(
             .zip(&epsilon)
             .map(|(x, epsilon)| 0.5 * ((x - sigma * epsilon) / signal + 1.0))
             .collect();
-        truth.correct(&mut guess);
+        constraint.correct(&mut guess);
         // Variance of the reverse step, and what of the noise itself is kept.
         let variance = (1.0 - next) / (1.0 - now) * (1.0 - now / next);
         let kept = (1.0 - next - variance).max(0.0).sqrt() as f32;
@@ -100,6 +126,7 @@ pub(super) fn run(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::consistency::MeasuredRows;
     use crate::estimate::Estimate;
     use crate::network::Conditions;
 
@@ -117,17 +144,13 @@ mod tests {
     }
 
     fn job<'a>(images: &'a [f32], estimates: &'a [Estimate], first: usize) -> Job<'a> {
-        Job {
-            start: images,
-            seen: images,
-            readings: images,
-            readings_side: SIDE,
-            estimates,
-            measured: None,
-            consistency: false,
-            seed: 3,
-            first,
-        }
+        Job { start: images, seen: images, estimates, seed: 3, first }
+    }
+
+    /// Readings that bind nothing.
+    fn free<'a>(job: &Job<'a>) -> DataConstraint<'a> {
+        let (readings, all) = (job.seen, &MeasuredRows::All);
+        DataConstraint::new(readings, SIDE, job.estimates, all, false).unwrap()
     }
 
     #[test]
@@ -145,6 +168,21 @@ mod tests {
     }
 
     #[test]
+    fn the_shipped_schedule_is_that_of_the_embedded_weights_and_of_their_trainer() {
+        let weights = Weights::embedded("ancestral").unwrap();
+        assert_eq!(Schedule::of(&weights).unwrap(), Schedule::shipped());
+        let (steps, [start, end]) = SHIPPED;
+        let trainer = include_str!("../../training/train_unet.py");
+        let line = trainer.lines().find(|line| line.starts_with("STEPS, BETA_START, BETA_END"));
+        let (_, values) = line.unwrap().split_once('=').unwrap();
+        let values: Vec<f64> = values.split(',').map(|v| v.trim().parse().unwrap()).collect();
+        assert_eq!(values, [steps as f64, start, end]);
+        let mut described = Weights::new("described");
+        Schedule::describe_shipped(&mut described);
+        assert_eq!(Schedule::of(&described).unwrap(), Schedule::shipped());
+    }
+
+    #[test]
     fn with_an_oracle_any_number_of_steps_ends_at_the_image() {
         let schedule = Schedule::linear(500, 2e-4, 0.025);
         let images = vec![0.5; 2 * AREA];
@@ -152,7 +190,7 @@ mod tests {
         let job = job(&images, &estimates, 0);
         for steps in [1, 10, 500] {
             let steps = NonZeroU32::new(steps).unwrap();
-            let sharp = run(&Oracle, &schedule, steps, &job, &Truth::new(&job));
+            let sharp = run(&Oracle, &schedule, steps, &job, &free(&job));
             assert!(sharp.iter().all(|v| (v - 0.75).abs() < 1e-4), "{steps}");
         }
     }
@@ -171,7 +209,7 @@ mod tests {
         let estimates = [Estimate { sigma_px: 2.0, noise: 0.01 }; 2];
         let sample = |job: &Job<'_>| {
             let steps = NonZeroU32::new(3).unwrap();
-            run(&Idle, &schedule, steps, job, &Truth::new(job))
+            run(&Idle, &schedule, steps, job, &free(job))
         };
         let both = sample(&job(&images, &estimates, 6));
         let second = sample(&job(&images[AREA..], &estimates[1..], 7));

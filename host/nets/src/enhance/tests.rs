@@ -1,7 +1,5 @@
 //! With the weights that come with the program.
 
-use std::num::NonZeroU32;
-
 use super::*;
 use crate::deblur::Method;
 use crate::device::Device;
@@ -59,7 +57,7 @@ fn error(image: &[f32], truth: &[f32]) -> f32 {
 }
 
 fn enhance(enhancer: &Enhancer, readings: &[f32], options: &Options) -> Enhanced {
-    enhancer.enhance(Images::new(readings).unwrap(), None, options, &mut |_| {})
+    enhancer.enhance(Images::new(readings).unwrap(), None, options, &mut |_| {}).unwrap()
 }
 
 #[test]
@@ -82,7 +80,7 @@ fn an_image_is_enhanced_alike_alone_and_among_others() {
     let enhancer = enhancer(1);
     let (area, mut told) = (SIDE * SIDE, Vec::new());
     let images = Images::new(&stack).unwrap();
-    let all = enhancer.enhance(images, None, &options, &mut |done| told.push(done));
+    let all = enhancer.enhance(images, None, &options, &mut |done| told.push(done)).unwrap();
     assert_eq!(told.last(), Some(&34));
     let alone = enhance(&enhancer, &stack[33 * area..34 * area], &options);
     assert_eq!(all.images[33 * AREA..34 * AREA], alone.images);
@@ -105,26 +103,90 @@ fn the_spread_is_largest_at_edges_and_none_where_nothing_is() {
     assert_eq!(enhance(&enhancer, &readings, &options).spread.unwrap(), spread, "seeded");
 }
 
+fn deblur(sharpener: &Sharpener, images: &[f32], options: &Options) -> Enhanced {
+    sharpener.deblur(Images::new(images).unwrap(), options, &mut |_| {}).unwrap()
+}
+
 #[test]
 fn a_sharp_clean_image_is_not_touched_by_deblurring() {
-    let images = cross();
-    let result = enhancer(1).sharpener.deblur(
-        Images::new(&images).unwrap(),
-        &Options::default(),
-        &mut |_| {},
-    );
-    assert_eq!(result.images, images);
+    let (images, sharpener) = (cross(), enhancer(1).sharpener);
+    assert_eq!(deblur(&sharpener, &images, &Options::default()).images, images);
     let forced = Options { gate: false, ..Options::default() };
-    let forced = enhancer(1).sharpener.deblur(Images::new(&images).unwrap(), &forced, &mut |_| {});
-    assert_ne!(forced.images, images);
+    assert_ne!(deblur(&sharpener, &images, &forced).images, images);
 }
 
 #[test]
 fn what_is_known_of_the_blur_is_believed() {
+    let (readings, enhancer) = (seen(&cross(), 2.0, 0.02, 1), enhancer(1));
+    let with = |sigma_px| {
+        let estimate = KnownEstimate { sigma_px, ..KnownEstimate::default() };
+        enhance(&enhancer, &readings, &Options { estimate, ..Options::default() })
+    };
+    let blind = with(Known::Nothing);
+    let estimated = blind.estimates[0];
+    assert_eq!(blind.estimated, Some(vec![estimated]));
+    let told = with(Known::Exactly(3.25));
+    assert_eq!(told.estimates[0], Estimate { sigma_px: 3.25, ..estimated });
+    assert_eq!(told.estimated, Some(vec![estimated]), "as the estimator found it");
+    let bound = with(Known::AtLeast(3.25));
+    assert_eq!((bound.estimates[0], bound.images), (told.estimates[0], told.images));
+    let low = with(Known::AtLeast(0.5));
+    assert_eq!((low.estimates[0], low.images), (estimated, blind.images));
+}
+
+#[test]
+fn the_built_in_enhancer_is_made_of_the_embedded_weights() {
     let readings = seen(&cross(), 2.0, 0.02, 1);
-    let estimate = KnownEstimate { sigma_px: Some(3.25), noise: None };
-    let options = Options { estimate, ..Options::default() };
-    let result = enhance(&enhancer(1), &readings, &options);
-    assert_eq!(result.estimates[0].sigma_px, 3.25);
-    assert!(result.estimates[0].noise > 0.0);
+    let built_in = Enhancer::built_in(&Device::cpu()).unwrap();
+    let options = Options::default();
+    let ours = enhance(&built_in, &readings, &options).images;
+    assert_eq!(ours, enhance(&enhancer(1), &readings, &options).images);
+}
+
+/// White everywhere, whatever was seen.
+struct White;
+
+impl Sharpen for White {
+    fn guess(&self, batch: deblur::Blurred<'_>) -> Vec<f32> {
+        vec![2.0; batch.current.len()]
+    }
+}
+
+#[test]
+fn a_network_of_ones_own_is_held_against_the_readings_and_the_gate_stays() {
+    let readings = seen(&cross(), 2.0, 0.02, 1);
+    let own = enhancer(1).with_network(Box::new(White), NonZeroU32::MIN);
+    let free = Options { consistency: false, ..Options::default() };
+    let images = enhance(&own, &readings, &free).images;
+    assert!(images.iter().all(|v| *v == 1.0), "nothing holds the guess");
+    let held = enhance(&own, &readings, &Options::default());
+    let mean = held.images.iter().sum::<f32>() / AREA as f32;
+    assert!(mean < 0.5, "the readings do: {mean}");
+    let sharp = cross();
+    let kept = deblur(&own.sharpener, &sharp, &Options::default()).images;
+    assert_eq!(kept, sharp, "a sharp, clean image is not the network's");
+}
+
+#[test]
+fn readings_whose_gate_is_shut_become_fsrcnns_image_in_agreement_with_them() {
+    let readings = seen(&cross(), 2.0, 0.02, 1);
+    let [sigma_px, noise] = [0.1, 0.001].map(Known::Exactly);
+    let options = Options { estimate: KnownEstimate { sigma_px, noise }, ..Options::default() };
+    let shut = enhance(&enhancer(1), &readings, &options);
+    let own = enhancer(1).with_network(Box::new(White), NonZeroU32::MIN);
+    assert_eq!(shut.images, enhance(&own, &readings, &options).images, "no network has a say");
+    let constraint = constraint_on(&readings, &shut.estimates, &options).unwrap();
+    assert_eq!(shut.images, agreeing(&shut.upscaled.unwrap(), 0, &constraint));
+}
+
+#[test]
+fn rows_of_other_readings_are_refused() {
+    let readings = seen(&cross(), 2.0, 0.02, 1);
+    let measured = MeasuredRows::new(64, &[0, 1, 2]).unwrap();
+    let options = Options { measured, ..Options::default() };
+    let images = Images::new(&readings).unwrap();
+    let error = enhancer(1).enhance(images, None, &options, &mut |_| {}).unwrap_err();
+    let expected =
+        "the measured Hadamard rows are of 64 x 64 readings, but the readings are 32 x 32";
+    assert_eq!(error.to_string(), expected);
 }

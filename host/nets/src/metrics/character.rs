@@ -4,23 +4,18 @@
 //! a small network trained on characters, and tells nothing about FID.
 
 use super::frechet::{FrechetError, frechet_distance};
+use crate::cpu::Classifier;
 use crate::images::Images;
-use crate::model::{Classifier, ClassifierConfig, fill};
 use crate::weights::{Weights, WeightsError};
-use burn::backend::Flex;
-use burn::tensor::{Tensor, TensorData};
+use rayon::prelude::*;
 
 /// Side of the images that are judged.
 pub const SIDE: usize = 64;
 
-/// Images that are judged at once.
-const BATCH: usize = 32;
-
 /// The classifier, on the CPU.
 #[derive(Debug)]
 pub struct CharacterJudge {
-    network: Classifier<Flex>,
-    features: usize,
+    network: Classifier,
 }
 
 /// What the classifier says of a stack.
@@ -41,33 +36,28 @@ impl CharacterJudge {
     /// [`WeightsError`] if they are of another network.
     pub fn new(weights: &Weights) -> Result<Self, WeightsError> {
         weights.expect_model("classifier")?;
-        let config = ClassifierConfig::of(weights)?;
-        let network = fill(config.init(&Default::default()), weights)?;
-        Ok(Self { network, features: config.channels[2] })
+        Ok(Self { network: Classifier::new(weights)? })
     }
 
     /// Features of an image.
     #[must_use]
     pub fn features(&self) -> usize {
-        self.features
+        self.network.feature_count()
     }
 
     /// Judges a stack.
     #[must_use]
     pub fn judge(&self, images: Images<'_, SIDE>) -> Judged {
         let mut all = Judged::default();
-        for batch in images.values().chunks(BATCH * SIDE * SIDE) {
-            let shape = [batch.len() / (SIDE * SIDE), 1, SIDE, SIDE];
-            let data = TensorData::new(batch.to_vec(), shape);
-            let features = self.network.features(Tensor::from_data(data, &Default::default()));
-            all.features.extend(features.to_data().iter::<f32>());
-            let logits: Vec<f32> = self.network.logits(features).into_data().iter().collect();
-            for logits in logits.chunks_exact(logits.len() / shape[0]) {
-                let (class, certainty) = likeliest(logits);
-                all.classes.push(class);
-                all.certainty.push(certainty);
-            }
+        let images = images.values().par_chunks_exact(SIDE * SIDE);
+        let features: Vec<_> =
+            images.map(|image| self.network.features(image, (SIDE, SIDE))).collect();
+        for features in &features {
+            let (class, certainty) = likeliest(&self.network.logits(features));
+            all.classes.push(class);
+            all.certainty.push(certainty);
         }
+        all.features = features.concat();
         all
     }
 
@@ -76,7 +66,7 @@ impl CharacterJudge {
     /// # Errors
     /// [`FrechetError`] if there are fewer.
     pub fn distance(&self, reference: &Judged, test: &Judged) -> Result<f64, FrechetError> {
-        frechet_distance(&reference.features, &test.features, self.features)
+        frechet_distance(&reference.features, &test.features, self.features())
     }
 }
 
@@ -105,15 +95,15 @@ mod tests {
 
     #[test]
     fn each_image_is_judged_on_its_own_whatever_the_batch() {
+        const COUNT: usize = 5;
         let judge = CharacterJudge::new(&Weights::embedded("classifier").unwrap()).unwrap();
         let pixel = |at: usize| ((at * 7919 + at / 64) % 97) as f32 / 96.0;
-        let stack: Vec<f32> = (0..(BATCH + 2) * SIDE * SIDE).map(pixel).collect();
+        let stack: Vec<f32> = (0..COUNT * SIDE * SIDE).map(pixel).collect();
         let all = judge.judge(Images::new(&stack).unwrap());
-        assert_eq!(all.features.len(), (BATCH + 2) * judge.features());
-        let last = judge.judge(Images::new(&stack[(BATCH + 1) * SIDE * SIDE..]).unwrap());
-        assert_eq!(all.classes[BATCH + 1..], last.classes[..]);
-        let tail = &all.features[(BATCH + 1) * judge.features()..];
-        assert!(tail.iter().zip(&last.features).all(|(a, b)| (a - b).abs() < 1e-4));
+        assert_eq!(all.features.len(), COUNT * judge.features());
+        let last = judge.judge(Images::new(&stack[(COUNT - 1) * SIDE * SIDE..]).unwrap());
+        assert_eq!(all.classes[COUNT - 1..], last.classes[..]);
+        assert_eq!(all.features[(COUNT - 1) * judge.features()..], last.features[..]);
         assert!(judge.distance(&all, &all).unwrap() < 1e-3);
         assert!(judge.distance(&all, &last).is_err());
     }

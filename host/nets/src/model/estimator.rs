@@ -8,13 +8,8 @@ use burn::tensor::activation::{relu, softplus};
 use burn::tensor::backend::Backend;
 
 use super::{convolution, linear, pooled};
+use crate::cpu::estimator::{LOG_FLOOR, LOG_OFFSET};
 use crate::weights::{Weights, WeightsError};
-
-/// Added to each mean feature before its logarithm is taken.
-pub(crate) const LOG_FLOOR: f32 = 1e-3;
-
-/// Added to the logarithm, to centre it.
-pub(crate) const LOG_OFFSET: f32 = 3.0;
 
 /// Sizes of an [`Estimator`].
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -1,11 +1,11 @@
-//! The networks as burn modules, generic over the backend: for training, and for inference on a GPU.
+//! The networks as burn modules, generic over the backend, for training.
 //!
 //! Law: with the same weights each gives what its PyTorch twin (`host/nets/training/net.py`) gives, to
 //! 1e-4. Names of parameters are PyTorch's, sizes are read from the weights, and tensors are N, C, H, W.
 
 mod classifier;
 mod discriminator;
-pub(crate) mod estimator;
+mod estimator;
 mod fsrcnn;
 mod transfer;
 mod unet;
@@ -19,12 +19,13 @@ use burn::nn::{Initializer, Linear, LinearConfig};
 use burn::tensor::Tensor;
 use burn::tensor::backend::Backend;
 
+pub use crate::network::CONDITIONS;
 pub use classifier::{Classifier, ClassifierConfig};
 pub use discriminator::{Discriminator, DiscriminatorConfig};
 pub use estimator::{Estimator, EstimatorConfig};
 pub use fsrcnn::{Fsrcnn, FsrcnnConfig};
 pub use transfer::{fill, weights_of};
-pub use unet::{Block, CONDITIONS, UNet, UNetConfig};
+pub use unet::{Block, UNet, UNetConfig};
 
 /// PyTorch's initial weights, uniform within 1 / sqrt(fan-in), times `gain`.
 fn uniform(gain: f64) -> Initializer {

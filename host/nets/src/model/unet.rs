@@ -13,10 +13,8 @@ use burn::tensor::activation::silu;
 use burn::tensor::backend::Backend;
 
 use super::{convolution, linear, shuffle, unshuffle};
+use crate::network::CONDITIONS;
 use crate::weights::{Weights, WeightsError};
-
-/// Numbers that condition the network: time (2), blur (2), noise (2).
-pub const CONDITIONS: usize = 6;
 
 /// Sizes of a [`UNet`].
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -29,13 +27,17 @@ pub struct UNetConfig {
     pub embedding: usize,
 }
 
+/// The sizes of the shipped networks.
 impl Default for UNetConfig {
     fn default() -> Self {
-        Self { channels: vec![32, 64, 128], blocks: 2, embedding: 64 }
+        Self { channels: Self::SHIPPED_CHANNELS.to_vec(), blocks: 2, embedding: 64 }
     }
 }
 
 impl UNetConfig {
+    /// Channels of the shipped networks.
+    pub const SHIPPED_CHANNELS: [usize; 3] = [48, 96, 192];
+
     /// The sizes of the network that these weights are of.
     ///
     /// # Errors

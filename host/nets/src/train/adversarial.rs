@@ -3,9 +3,11 @@
 
 use super::examples::Batch;
 use super::initial::seeded;
-use super::learner::Learner;
-use super::solo::{Trained, averaged, decay, expect_finite, expect_states, read, written};
-use super::tasks::{UNET_GAINS, generated, one_step, scenes, unet};
+use super::tasks::{UNET_GAINS, generated, one_step, unet};
+use super::tensors::scenes;
+use super::trained::{
+    Learner, Trained, averaged, decay, expect_finite, expect_states, read, written,
+};
 use super::{Settings, TrainError};
 use crate::model::{Discriminator, DiscriminatorConfig, UNet, weights_of};
 use crate::weights::Weights;

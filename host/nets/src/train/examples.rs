@@ -3,9 +3,10 @@
 //! The one law: example k of a run is the same whenever and on whatever it is made.
 
 use super::TrainError;
-use super::tasks::images;
+use super::tensors::images;
 use crate::data::{AREA_PX, Part, Purpose, SIDE_PX, Scenes, stream};
 use crate::degrade::{DEPTH_SIDE, Degrade, Depth, READING_PX};
+use crate::fusion::push_zones;
 use crate::model::{Fsrcnn, FsrcnnConfig, fill};
 use crate::upscale::upscale_2x;
 use crate::weights::Weights;
@@ -17,8 +18,6 @@ use rayon::prelude::*;
 
 /// Pixels of a reading.
 pub(super) const READING_AREA: usize = READING_PX * READING_PX;
-/// The depth that is 1 to a network; deeper is 1 too.
-const DEPTH_SCALE_M: f32 = 3.0;
 
 /// Turns readings of 32 x 32 into images of 64 x 64, as they come before the deblurrer.
 pub trait Enlarge: Sync {
@@ -120,23 +119,18 @@ impl Batch {
     }
 }
 
-/// FSRCNN's input for these readings: intensity, depth over 3 m, validity of the depth.
+/// FSRCNN's input for these readings, (count, 3, 32, 32), as [`Fusion`](crate::Fusion) builds it: intensity, depth over
+/// 3 m, validity of the depth.
 #[must_use]
 pub fn fusion_input(readings: &[f32], depth: &[Option<Depth>]) -> Vec<f32> {
-    let zone = |pixel: usize| {
-        let part = READING_PX / DEPTH_SIDE;
-        pixel / READING_PX / part * DEPTH_SIDE + pixel % READING_PX / part
-    };
     let mut input = Vec::with_capacity(3 * readings.len());
     for (reading, depth) in readings.chunks_exact(READING_AREA).zip(depth) {
         input.extend_from_slice(reading);
-        let at = |pixel: usize| {
-            depth.as_ref().filter(|d| d.valid[zone(pixel)]).map(|d| d.metres[zone(pixel)])
+        let zone_m = |zone: usize| {
+            let depth = depth.as_ref()?;
+            depth.valid[zone].then_some(depth.metres[zone])
         };
-        input.extend(
-            (0..READING_AREA).map(|p| at(p).map_or(0.0, |m| (m / DEPTH_SCALE_M).clamp(0.0, 1.0))),
-        );
-        input.extend((0..READING_AREA).map(|p| f32::from(u8::from(at(p).is_some()))));
+        push_zones(DEPTH_SIDE, zone_m, &mut input);
     }
     input
 }
@@ -220,6 +214,7 @@ impl Examples<'_> {
 mod tests {
     use super::*;
     use crate::degrade::{AnalyticCamera, Limits};
+    use crate::fusion::{DepthMaps, push_planes};
 
     #[test]
     fn examples_are_the_same_in_whatever_batches_they_come() {
@@ -248,6 +243,25 @@ mod tests {
         assert_eq!(coarse.raw()[AREA_PX + 65], coarse.readings[READING_AREA]);
         assert_eq!(coarse.raw()[AREA_PX - 1], coarse.readings[READING_AREA - 1]);
         assert_eq!(of(1.0).raw(), of(1.0).degraded);
+    }
+
+    #[test]
+    fn training_and_inference_build_the_same_input() {
+        // Near, far, farther than 3 m, and blind zones.
+        let metres: [f32; 64] = std::array::from_fn(|zone| 0.07 * (zone + 1) as f32);
+        let valid: [bool; 64] = std::array::from_fn(|zone| zone % 5 != 2);
+        let readings: Vec<f32> = (0..2 * READING_AREA).map(|i| (i % 97) as f32 / 96.0).collect();
+        let trained = fusion_input(&readings, &[Some(Depth { metres, valid }), None]);
+
+        let zones: Vec<f32> =
+            metres.iter().zip(valid).map(|(&m, valid)| if valid { m } else { f32::NAN }).collect();
+        let maps = DepthMaps::new([zones, vec![0.0; 64]].concat(), [2, 8, 8], 2).unwrap();
+        let mut used = Vec::new();
+        for (index, reading) in readings.chunks_exact(READING_AREA).enumerate() {
+            used.extend_from_slice(reading);
+            push_planes(Some(&maps), index, &mut used);
+        }
+        assert_eq!(trained, used);
     }
 
     #[test]

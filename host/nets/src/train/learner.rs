@@ -1,28 +1,13 @@
-//! A network on some device, as the loop sees it.
+//! The learner of each model, on the device that trains it.
 
 use super::adversarial::Adversarial;
-use super::examples::Batch;
 use super::solo::Solo;
 use super::tasks::{Ancestral, Bridge, Classify, Fuse, Measure};
+use super::trained::Learner;
 use super::{Model, Settings, TrainError};
 use crate::device::{Device, Kind};
-use crate::weights::Weights;
 use burn::backend::{Autodiff, Flex};
 use burn::tensor::backend::AutodiffBackend;
-
-/// A network with its optimiser and the running average of its weights.
-pub(super) trait Learner {
-    /// Learns from a batch; the loss.
-    fn step(&mut self, batch: &Batch, step: u64, rate: f64) -> Result<f64, TrainError>;
-    /// Sum of the scores of these examples, by the averaged weights.
-    fn judge(&self, batch: &Batch) -> f64;
-    /// The averaged weights.
-    fn weights(&self) -> Weights;
-    /// All that it is, `step` steps into its run.
-    fn states(&self, step: u64) -> Result<Vec<Vec<u8>>, TrainError>;
-    /// Becomes what `states` were taken of.
-    fn restore(&mut self, states: &[Vec<u8>]) -> Result<(), TrainError>;
-}
 
 /// The learner of a model on a device, with its first weights.
 pub(super) fn new(settings: &Settings, device: &Device) -> Result<Box<dyn Learner>, TrainError> {

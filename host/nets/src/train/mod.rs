@@ -1,15 +1,19 @@
 //! Training: examples, losses, one loop for every network.
 //!
-//! The one law: a run is a function of its settings, its data and its number of steps. Whatever is random in step k is
+//! # Invariant
+//! A run is a function of its settings, its data and its number of steps. Whatever is random in step k is
 //! drawn from the seed and k, so a run that was killed goes on from its checkpoint to the same weights as one that was
-//! not. Files are the caller's business ([`Keeper`]).
+//! not (`a_run_that_was_stopped_goes_on_to_the_very_same_weights`). The caller keeps the files ([`Keeper`]).
 //!
 //! | module | holds |
 //! |---|---|
 //! | [`examples`] | batches: scenes, degraded and enlarged |
 //! | `tasks` | what each network is to learn, and its held-out score |
-//! | `learner` | a network with its optimiser and its running average |
-//! | `run` | the loop: rate, log, held-out score, checkpoints, early stop |
+//! | `trained` | a network with its optimiser and its running average |
+//! | `solo`, `adversarial` | what learns from examples alone, and against a judge |
+//! | `learner` | the learner of each model |
+//! | `training_loop` | rate, log, held-out score, checkpoints, early stop |
+//! | `log` | how far a run is |
 //! | [`checkpoint`] | everything that a run is, as bytes |
 
 mod adversarial;
@@ -17,14 +21,18 @@ pub mod checkpoint;
 pub mod examples;
 mod initial;
 mod learner;
-mod run;
+mod log;
 mod solo;
 mod tasks;
+mod tensors;
 #[cfg(test)]
 mod tests;
+mod trained;
+mod training_loop;
 
 pub use examples::{Enlarge, Examples, Fused, Lanczos};
-pub use run::{Ended, Entry, Keeper, Outcome, check, train};
+pub use log::{Entry, Progress};
+pub use training_loop::{Ended, Keeper, Outcome, check, train};
 
 use crate::data::DataError;
 use crate::degrade::DegradeError;
@@ -127,7 +135,7 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// What the shipped network of this name would be trained with here.
+    /// The size of the shipped network of this name, and what it would be trained with here.
     #[must_use]
     pub fn new(model: Model) -> Self {
         let (steps, rate) = match model {

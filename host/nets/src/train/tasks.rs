@@ -3,6 +3,7 @@
 use super::Settings;
 use super::examples::{Batch, READING_AREA};
 use super::initial::Gains;
+use super::tensors::{columns, each, images, scenes};
 use crate::data::{AREA_PX, SIDE_PX};
 use crate::deblur::Schedule;
 use crate::degrade::READING_PX;
@@ -24,11 +25,6 @@ use rand_pcg::Pcg64Mcg;
 const AT_START: f32 = 0.6;
 /// Root of the squared error below which Charbonnier's loss is no longer that of absolute values.
 const CHARBONNIER: f64 = 1e-3;
-/// Steps of the paper's diffusion (section 3).
-const STEPS: usize = 500;
-/// First and last beta of the linear schedule (Ho, Jain, Abbeel, NeurIPS 2020), for 500 steps instead of 1000.
-const BETAS: (f64, f64) = (2e-4, 0.04);
-
 /// Gains of the UNet's layers: blocks start near the identity, the output near nothing.
 pub(super) const UNET_GAINS: &Gains = &[("conv2", 0.3), ("output_conv", 0.1)];
 
@@ -62,30 +58,6 @@ pub(super) trait Task<B: AutodiffBackend>: Sized + 'static {
 
     /// What whoever uses the weights must know beside them.
     fn describe(&self, _weights: &mut Weights) {}
-}
-
-/// Images (count, channels, side, side).
-pub(super) fn images<B: Backend>(
-    values: &[f32],
-    channels: usize,
-    side: usize,
-    device: &B::Device,
-) -> Tensor<B, 4> {
-    let count = values.len() / (channels * side * side);
-    Tensor::from_data(TensorData::new(values.to_vec(), [count, channels, side, side]), device)
-}
-
-pub(super) fn scenes<B: Backend>(values: &[f32], device: &B::Device) -> Tensor<B, 4> {
-    images(values, 1, SIDE_PX, device)
-}
-
-fn columns<B: Backend>(rows: &[[f32; CONDITIONS]], device: &B::Device) -> Tensor<B, 2> {
-    let values: Vec<f32> = rows.as_flattened().to_vec();
-    Tensor::from_data(TensorData::new(values, [rows.len(), CONDITIONS]), device)
-}
-
-fn each<B: Backend>(values: &[f32], device: &B::Device) -> Tensor<B, 4> {
-    Tensor::from_data(TensorData::new(values.to_vec(), [values.len(), 1, 1, 1]), device)
 }
 
 /// Charbonnier's loss: absolute error, smooth at 0.
@@ -259,7 +231,7 @@ impl<B: AutodiffBackend> Task<B> for Ancestral {
     const GAINS: &'static Gains = UNET_GAINS;
 
     fn new(settings: &Settings) -> Self {
-        Self { config: unet(settings), schedule: Schedule::linear(STEPS, BETAS.0, BETAS.1) }
+        Self { config: unet(settings), schedule: Schedule::shipped() }
     }
 
     fn network(&self, device: &B::Device) -> UNet<B> {
@@ -273,7 +245,8 @@ impl<B: AutodiffBackend> Task<B> for Ancestral {
         rng: &mut Pcg64Mcg,
         device: &B::Device,
     ) -> Tensor<B, 1> {
-        let steps: Vec<usize> = (0..batch.count).map(|_| rng.random_range(0..STEPS)).collect();
+        let steps: Vec<usize> =
+            (0..batch.count).map(|_| rng.random_range(0..self.schedule.steps())).collect();
         let (current, noise) = self.noised(batch, &steps, rng);
         let told = self.tell(network, batch, &steps, &current, device);
         (told - scenes(&noise, device)).square().mean()
@@ -281,20 +254,19 @@ impl<B: AutodiffBackend> Task<B> for Ancestral {
 
     /// The image that the network sees half way, in one step: 500 would take minutes.
     fn score(&self, network: &UNet<B::InnerBackend>, batch: &Batch, device: &B::Device) -> f64 {
-        let steps = vec![STEPS / 2; batch.count];
+        let half_way = self.schedule.steps() / 2;
+        let steps = vec![half_way; batch.count];
         let rng = &mut crate::data::stream(0, crate::data::Purpose::HeldOut, u64::MAX);
         let (current, _) = self.noised(batch, &steps, rng);
         let noise = self.tell(network, batch, &steps, &current, device);
-        let kept = self.schedule.left(STEPS / 2);
+        let kept = self.schedule.left(half_way);
         let current = scenes::<B::InnerBackend>(&current, device);
         let image = (current - noise * (1.0 - kept).sqrt()) / kept.sqrt();
         psnr_db((image + 1.0) / 2.0, scenes(&batch.truth, device))
     }
 
     fn describe(&self, weights: &mut Weights) {
-        weights.set_metadata("beta_start", BETAS.0.to_string());
-        weights.set_metadata("beta_end", BETAS.1.to_string());
-        weights.set_metadata("steps", STEPS.to_string());
+        Schedule::describe_shipped(weights);
     }
 }
 

@@ -5,6 +5,7 @@ use super::*;
 use crate::data::{AREA_PX, Kind, Scenes, Stack};
 use crate::degrade::{AnalyticCamera, Degrade, Limits, Reading};
 use crate::device::Device;
+use crate::model::{ClassifierConfig, EstimatorConfig, FsrcnnConfig, UNetConfig};
 use crate::weights::{Precision, Weights};
 use rand_pcg::Pcg64Mcg;
 
@@ -220,4 +221,21 @@ fn settings_that_cannot_be_are_named() {
     assert!(refused(Settings { rate: f64::NAN, ..tiny(Model::Gan) }).contains("rate is NaN"));
     let width = Settings { width: vec![1, 2, 3], ..tiny(Model::Fsrcnn) };
     assert!(refused(width).contains("width is [1, 2, 3], expected 2 numbers"));
+}
+
+#[test]
+fn networks_are_trained_at_the_size_of_the_shipped_ones() {
+    let shipped = |model: Model| Weights::embedded(&model.to_string()).unwrap();
+    for model in [Model::Diffusion, Model::Gan, Model::Ancestral] {
+        let standard = Settings::new(model);
+        assert!(standard.width.is_empty());
+        assert_eq!(tasks::unet(&standard), UNetConfig::of(&shipped(model)).unwrap(), "{model}");
+    }
+    assert_eq!(FsrcnnConfig::default(), FsrcnnConfig::of(&shipped(Model::Fsrcnn)).unwrap());
+    assert_eq!(
+        EstimatorConfig::default(),
+        EstimatorConfig::of(&shipped(Model::Estimator)).unwrap()
+    );
+    let classifier = ClassifierConfig::of(&shipped(Model::Classifier)).unwrap();
+    assert_eq!(ClassifierConfig::default(), classifier);
 }

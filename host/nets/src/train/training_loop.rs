@@ -1,13 +1,15 @@
 //! The loop that every network is trained by.
 
-use super::checkpoint::{Checkpoint, Progress};
+use super::checkpoint::Checkpoint;
 use super::examples::{Batch, Examples};
-use super::learner::{self, Learner};
+use super::learner;
+use super::log::{Entry, Progress};
+use super::trained::Learner;
 use super::{Model, Score, Settings, TrainError};
 use crate::data::{DataError, Part};
 use crate::device::Device;
 use crate::weights::{MODEL, RECIPE, VERSION, Weights};
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use std::sync::mpsc::sync_channel;
 use std::time::Instant;
 
@@ -19,23 +21,6 @@ const LAST_RATE: f64 = 0.01;
 const AHEAD: usize = 3;
 /// Examples judged at once.
 const JUDGED_AT_ONCE: usize = 32;
-
-/// One line of the log.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Entry {
-    /// Steps done.
-    pub step: u64,
-    /// Mean loss since the entry before.
-    pub loss: f64,
-    /// Score of held-out examples, where they were looked at: more is better.
-    pub held_out: Option<f64>,
-    /// What the score is.
-    pub score: Score,
-    /// Learning rate.
-    pub rate: f64,
-    /// Seconds of training.
-    pub seconds: f64,
-}
 
 /// Who keeps what a run makes. An error ends the run.
 pub trait Keeper {
@@ -140,9 +125,9 @@ pub fn train(
                 }
             }
         });
-        let mut run = Run { settings, learner: learner.as_mut(), keeper, judged: &judged };
+        let mut training = Loop { settings, learner: learner.as_mut(), keeper, judged: &judged };
         for batch in batches {
-            let ended = run.step(&batch?, &mut progress, before_s, begun)?;
+            let ended = training.step(&batch?, &mut progress, before_s, begun)?;
             if let Some(ended) = ended {
                 return Ok(ended);
             }
@@ -187,14 +172,15 @@ fn judged_batches(settings: &Settings, examples: &Examples<'_>) -> Result<Vec<Ba
         .collect()
 }
 
-struct Run<'r> {
+/// What one pass of the loop works on.
+struct Loop<'r> {
     settings: &'r Settings,
     learner: &'r mut dyn Learner,
     keeper: &'r mut dyn Keeper,
     judged: &'r [Batch],
 }
 
-impl Run<'_> {
+impl Loop<'_> {
     /// One step and what is due after it; why the run ends, if it does.
     fn step(
         &mut self,

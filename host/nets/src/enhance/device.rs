@@ -1,16 +1,18 @@
 //! Both stages for images that OMP has left on a GPU.
 //!
-//! Law: what comes out is what [`Enhancer`](super::Enhancer) makes of the same images, to what single precision rounds.
+//! # Invariant
+//! What comes out is what [`Enhancer`](super::Enhancer) makes of the same images, to what single precision rounds
+//! (`tests::images_that_are_there_become_what_the_processor_makes_of_them`).
 
 use nirspi_recon::omp::gpu::DeviceImages;
 use thiserror::Error;
 
-use super::{Enhanced, Options, inconsistency};
-use crate::deblur::{Job, Truth};
+use super::{Enhanced, Options, agreeing, constraint_on};
+use crate::consistency::MeasuredRowsError;
+use crate::deblur::AREA;
 use crate::device::{Backend, Device};
 use crate::fusion::{self, DepthMaps, push_planes};
 use crate::gate;
-use crate::images::Images;
 use crate::network::{Guess, RunChain};
 use crate::weights::{Weights, WeightsError};
 
@@ -43,6 +45,9 @@ pub enum DeviceEnhancerError {
     /// Copies were asked for.
     #[error("the spread over copies is not taken on a device, expected no copies")]
     Copies,
+    /// The measured rows do not belong to these readings.
+    #[error(transparent)]
+    Rows(#[from] MeasuredRowsError),
     /// The weights are of another network.
     #[error(transparent)]
     Weights(#[from] WeightsError),
@@ -102,10 +107,13 @@ impl DeviceEnhancer {
         let mut all = Enhanced::default();
         for first in (0..images.frames()).step_by(self.batch) {
             let part = first..images.frames().min(first + self.batch);
-            let mut planes = Vec::with_capacity(2 * part.len() * images.pixels());
-            part.clone().for_each(|image| push_planes(depth, image, &mut planes));
+            let mut planes = Vec::new();
+            if depth.is_some() {
+                planes.reserve(2 * part.len() * images.pixels());
+                part.clone().for_each(|image| push_planes(depth, image, &mut planes));
+            }
             let guess = self.chain.run(images, part, white, &planes, options.estimate);
-            all.append(finished(guess, options));
+            all.append(finished(guess, options)?);
             progress(all.estimates.len());
         }
         Ok(all)
@@ -113,29 +121,22 @@ impl DeviceEnhancer {
 }
 
 /// What [`Enhancer`](super::Enhancer) does after the networks.
-fn finished(guess: Guess, options: &Options) -> Enhanced {
+fn finished(guess: Guess, options: &Options) -> Result<Enhanced, MeasuredRowsError> {
     let Guess { readings, estimates, start, mut sharp } = guess;
-    let truth = Truth::new(&Job {
-        start: &start,
-        // The network has seen them.
-        seen: &[],
-        readings: &readings,
-        readings_side: fusion::SIDE,
-        estimates: &estimates,
-        measured: options.measured.as_ref(),
-        consistency: options.consistency,
-        seed: options.seed,
-        first: 0,
-    });
-    truth.correct(&mut sharp);
+    let constraint = constraint_on(&readings, &estimates, options)?;
+    constraint.correct(&mut sharp);
     if options.gate {
-        let mut plain = start.clone();
-        truth.correct(&mut plain);
-        gate::close(&estimates, &plain, &mut sharp);
+        gate::close(&estimates, AREA, &mut sharp, |index| agreeing(&start, index, &constraint));
     }
-    let seen = Images::<{ fusion::SIDE }>::known(&readings);
-    let inconsistency = inconsistency(options, seen, &estimates, &sharp);
-    Enhanced { images: sharp, upscaled: Some(start), estimates, inconsistency, spread: None }
+    let inconsistency = constraint.residual_ratios(&sharp);
+    Ok(Enhanced {
+        images: sharp,
+        upscaled: Some(start),
+        estimates,
+        estimated: None,
+        inconsistency,
+        spread: None,
+    })
 }
 
 #[cfg(test)]

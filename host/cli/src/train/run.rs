@@ -1,0 +1,106 @@
+//! `nirspi train NETWORK`: one network, kept in a folder as it learns.
+
+use super::network::Args;
+use crate::{print, refused};
+use anyhow::{Context, Result};
+use indicatif::{ProgressBar, ProgressStyle};
+use nirspi_eval::train::{Report, Request, Watch, run as train};
+use nirspi_nets::train::{Ended, Entry, Model, Settings};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+pub fn run(args: &Args, model: Model) -> Result<ExitCode> {
+    let request = Request {
+        settings: args.settings(model),
+        data: args.data.data(),
+        camera_share: args.camera_share,
+        fsrcnn: args.fsrcnn.clone(),
+        out: args.out.clone(),
+        resume: args.resume,
+        backend: args.backend,
+    };
+    let stop = Arc::new(AtomicBool::new(false));
+    let asked = Arc::clone(&stop);
+    ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed))
+        .context("cannot listen for interrupts")?;
+    let mut shown = Shown { bar: ProgressBar::hidden(), stop };
+    let report = train(&request, &mut shown).map_err(refused)?;
+    shown.bar.finish_and_clear();
+    if args.json {
+        print::json(&report)?;
+    } else {
+        say(&report)?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+impl Args {
+    fn settings(&self, model: Model) -> Settings {
+        let standard = Settings::new(model);
+        Settings {
+            width: self.width.clone(),
+            steps: self.steps.unwrap_or(standard.steps),
+            batch: self.batch,
+            rate: self.rate.unwrap_or(standard.rate),
+            seed: self.seed,
+            judge_every: self.judge_every,
+            log_every: standard.log_every.min(self.judge_every),
+            patience: (self.patience > 0).then_some(self.patience),
+            ..standard
+        }
+    }
+}
+
+/// The bar, and whether the user wants no more.
+struct Shown {
+    bar: ProgressBar,
+    stop: Arc<AtomicBool>,
+}
+
+impl Watch for Shown {
+    fn starts(&mut self, settings: &Settings, step: u64) {
+        let template = "{prefix} {bar:24} {pos}/{len} steps, {eta} left, {msg}";
+        let style =
+            ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+        self.bar = ProgressBar::new(settings.steps).with_style(style);
+        self.bar.set_prefix(settings.model.to_string());
+        if step > 0 {
+            self.bar.set_position(step);
+            self.bar.reset_eta();
+        }
+    }
+
+    fn entry(&mut self, entry: &Entry, held_out: Option<f64>) {
+        let unit = entry.score.unit();
+        let held_out =
+            held_out.map_or_else(String::new, |score| format!(", held out {score:.2} {unit}"));
+        self.bar.set_message(format!("loss {:.5}{held_out}", entry.loss));
+    }
+
+    fn stepped(&mut self, step: u64) -> bool {
+        self.bar.set_position(step);
+        !self.stop.load(Ordering::Relaxed)
+    }
+}
+
+fn say(report: &Report) -> Result<()> {
+    let outcome = &report.outcome;
+    let ended = match outcome.ended {
+        Ended::Complete => "all steps done",
+        Ended::NoLongerBetter => "held-out examples got no better",
+        Ended::Stopped => "stopped; go on with --resume",
+    };
+    print::line(format_args!(
+        "{}: {} steps in {:.0} s, {:.2} steps/s on {}: {ended}",
+        report.model, outcome.step, outcome.seconds, outcome.steps_per_second, outcome.device
+    ))?;
+    match outcome.best {
+        Some((score, step)) => print::line(format_args!(
+            "best on held-out examples: {score:.2} {} at step {step}, kept in {}",
+            outcome.score.unit(),
+            report.weights.display()
+        )),
+        None => print::line("held-out examples were not looked at yet"),
+    }
+}

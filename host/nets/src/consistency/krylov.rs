@@ -1,0 +1,163 @@
+//! (M + lambda)^-1 r for every lambda at the price of one: Lanczos' basis of the Krylov space of M and r.
+//!
+//! Lanczos (J. Res. Natl. Bur. Stand. 45, 1950) makes vectors v_1 = r / |r|, v_2, ... in which M is tridiagonal. The basis
+//! does not depend on lambda, so one run of products with M serves a whole search for lambda: for each value only
+//! (T + lambda) c = |r| e_1 is solved, with as many unknowns as steps. What comes out is what conjugate gradients give
+//! after so many steps (Frommer, Maass, SIAM J. Sci. Comput. 20, 1999).
+//!
+//! # Invariant
+//! For any lambda the solution is that of the whole equation, to the tolerance
+//! (`every_shift_is_solved_in_one_space`).
+
+use super::norm;
+
+/// Most products with the matrix. The equation is well conditioned where lambda matters.
+const MOST_STEPS: usize = 60;
+
+/// Steps from one look at the error to the next.
+const STEPS_A_LOOK: usize = 2;
+
+/// Norm of what the solution leaves of the right-hand side, over its norm, that is good enough.
+const TOLERANCE: f64 = 1e-3;
+
+/// The Krylov space of a symmetric, positive semidefinite matrix and a right-hand side.
+pub(super) struct Krylov {
+    length: f64,
+    /// v_1 to v_m, then v_(m + 1).
+    basis: Vec<Vec<f32>>,
+    /// Diagonal of T, one element a step.
+    diagonal: Vec<f64>,
+    /// Beside the diagonal; element k couples v_(k + 1) and v_(k + 2).
+    beside: Vec<f64>,
+}
+
+impl Krylov {
+    /// The space of `right`, which is not 0.
+    pub(super) fn new(right: &[f32]) -> Self {
+        let length = f64::from(norm(right));
+        let first = right.iter().map(|v| (f64::from(*v) / length) as f32).collect();
+        Self { length, basis: vec![first], diagonal: Vec::new(), beside: Vec::new() }
+    }
+
+    /// One step: `apply` multiplies by the matrix.
+    pub(super) fn step(&mut self, apply: impl FnOnce(&[f32]) -> Vec<f32>) {
+        let steps = self.diagonal.len();
+        let now = &self.basis[steps];
+        let mut next = apply(now);
+        if let Some(before) = steps.checked_sub(1) {
+            take_away(&mut next, self.beside[before], &self.basis[before]);
+        }
+        let along = dot(now, &next);
+        take_away(&mut next, along, now);
+        let left = f64::from(norm(&next));
+        // At 0 the space holds the whole solution, and the next vector is not used.
+        let scale = if left > 0.0 { 1.0 / left } else { 0.0 };
+        next.iter_mut().for_each(|v| *v = (f64::from(*v) * scale) as f32);
+        self.basis.push(next);
+        self.diagonal.push(along);
+        self.beside.push(left);
+    }
+
+    /// Whether the error is worth a look after this many steps.
+    pub(super) fn is_due(&self) -> bool {
+        let steps = self.diagonal.len();
+        steps.is_multiple_of(STEPS_A_LOOK) || steps >= MOST_STEPS || self.coupling() == 0.0
+    }
+
+    /// Whether the solution for `lambda` is good enough, or no step would make it better.
+    pub(super) fn is_enough(&self, lambda: f32) -> bool {
+        let last = self.coefficients(lambda).last().map_or(0.0, |c| c.abs());
+        self.diagonal.len() >= MOST_STEPS || self.coupling() * last <= TOLERANCE * self.length
+    }
+
+    /// Norm of the solution for `lambda`.
+    pub(super) fn norm(&self, lambda: f32) -> f32 {
+        self.coefficients(lambda).iter().map(|c| c * c).sum::<f64>().sqrt() as f32
+    }
+
+    /// (M + `lambda`)^-1 of the right-hand side.
+    pub(super) fn solution(&self, lambda: f32) -> Vec<f32> {
+        let mut solution = vec![0.0; self.basis[0].len()];
+        for (coefficient, vector) in self.coefficients(lambda).iter().zip(&self.basis) {
+            take_away(&mut solution, -coefficient, vector);
+        }
+        solution
+    }
+
+    /// What couples the space to the vector after it.
+    fn coupling(&self) -> f64 {
+        self.beside.last().copied().unwrap_or(f64::INFINITY)
+    }
+
+    /// (T + `lambda`)^-1 |r| e_1, by elimination.
+    fn coefficients(&self, lambda: f32) -> Vec<f64> {
+        let lambda = f64::from(lambda);
+        let mut pivots: Vec<f64> = Vec::with_capacity(self.diagonal.len());
+        let mut values: Vec<f64> = Vec::with_capacity(self.diagonal.len());
+        for (k, diagonal) in self.diagonal.iter().enumerate() {
+            let (pivot, value) = match k.checked_sub(1) {
+                None => (diagonal + lambda, self.length),
+                Some(before) => {
+                    let factor = self.beside[before] / pivots[before];
+                    (diagonal + lambda - factor * self.beside[before], -factor * values[before])
+                }
+            };
+            pivots.push(pivot);
+            values.push(value);
+        }
+        for k in (0..values.len()).rev() {
+            let after = values.get(k + 1).map_or(0.0, |after| self.beside[k] * after);
+            values[k] = (values[k] - after) / pivots[k];
+        }
+        values
+    }
+}
+
+/// `values` -= `factor` times `other`.
+fn take_away(values: &mut [f32], factor: f64, other: &[f32]) {
+    let factor = factor as f32;
+    values.iter_mut().zip(other).for_each(|(v, o)| *v -= factor * o);
+}
+
+fn dot(a: &[f32], b: &[f32]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| f64::from(a * b)).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A symmetric, positive semidefinite matrix of rank 40: a diagonal seen through a reflection.
+    fn multiply(v: &[f32]) -> Vec<f32> {
+        let mirror: Vec<f32> = (0..64).map(|i| (1.0 + i as f32 * 0.7).sin()).collect();
+        let reflected = |v: &[f32]| -> Vec<f32> {
+            let share = 2.0 * dot(&mirror, v) / dot(&mirror, &mirror);
+            v.iter()
+                .zip(&mirror)
+                .map(|(v, m)| (f64::from(*v) - share * f64::from(*m)) as f32)
+                .collect()
+        };
+        let powers = reflected(v).into_iter().enumerate();
+        let scaled: Vec<f32> =
+            powers.map(|(i, v)| if i < 40 { v * 0.9_f32.powi(i as i32) } else { 0.0 }).collect();
+        reflected(&scaled)
+    }
+
+    #[test]
+    fn every_shift_is_solved_in_one_space() {
+        let right: Vec<f32> = (0..64).map(|i| (i as f32 * 1.3).cos()).collect();
+        let mut krylov = Krylov::new(&right);
+        while !(krylov.is_due() && krylov.is_enough(0.01)) {
+            krylov.step(multiply);
+        }
+        assert!(krylov.diagonal.len() < MOST_STEPS, "{}", krylov.diagonal.len());
+        for lambda in [0.01, 0.1, 1.0, 100.0] {
+            assert!(krylov.is_enough(lambda), "larger shifts are easier: {lambda}");
+            let solution = krylov.solution(lambda);
+            let back = multiply(&solution).into_iter().zip(&solution).map(|(m, s)| m + lambda * s);
+            let left: Vec<f32> = back.zip(&right).map(|(b, r)| b - r).collect();
+            assert!(norm(&left) < 1.1 * TOLERANCE as f32 * norm(&right), "{lambda}");
+            assert!((krylov.norm(lambda) / norm(&solution) - 1.0).abs() < 1e-3, "{lambda}");
+        }
+    }
+}

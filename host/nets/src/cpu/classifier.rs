@@ -1,0 +1,55 @@
+//! Which of the 62 characters an image shows, on the CPU: for character accuracy and the Fréchet character distance.
+
+use pulp::Arch;
+
+use super::conv::Conv;
+use super::layers::{Linear, conv, means, relu, single};
+use crate::weights::{Weights, WeightsError};
+
+/// Convolutions, and by how much each shrinks the image.
+const STRIDES: [usize; 6] = [2, 1, 2, 1, 2, 1];
+
+/// The network, its weights in the order of the loops.
+#[derive(Debug, Clone)]
+pub struct Classifier {
+    arch: Arch,
+    convs: Vec<Conv>,
+    fc: Linear,
+}
+
+impl Classifier {
+    /// The network of these weights.
+    ///
+    /// # Errors
+    /// [`WeightsError`] for a tensor that is missing or of another shape.
+    pub fn new(weights: &Weights) -> Result<Self, WeightsError> {
+        let convs = (1..=STRIDES.len()).map(|i| conv(weights, &format!("conv{i}")));
+        Ok(Self {
+            arch: Arch::new(),
+            convs: convs.collect::<Result<_, _>>()?,
+            fc: Linear::new(weights, "fc")?,
+        })
+    }
+
+    /// How many features an image has.
+    pub fn feature_count(&self) -> usize {
+        self.convs.last().map_or(0, Conv::outputs)
+    }
+
+    /// Features of an image of `height` x `width` pixels in [0, 1].
+    pub fn features(&self, image: &[f32], (height, width): (usize, usize)) -> Vec<f32> {
+        let mut h = single(image, (height, width));
+        for (conv, stride) in self.convs.iter().zip(STRIDES) {
+            let full = conv.apply(self.arch, &h);
+            // What a stride of 2 skips is cheap enough to be thrown away.
+            h = if stride == 1 { full } else { full.every_second() };
+            relu(self.arch, &mut h);
+        }
+        means(&h)
+    }
+
+    /// Logits of the classes, of [`Self::features`].
+    pub fn logits(&self, features: &[f32]) -> Vec<f32> {
+        self.fc.apply(features)
+    }
+}

@@ -1,0 +1,66 @@
+//! The measured readings as a constraint on what a network guesses: every sampler moves its guess into agreement with
+//! them before it goes on.
+
+use rayon::prelude::*;
+
+use super::AREA;
+use crate::consistency::{Consistency, MeasuredRows, MeasuredRowsError};
+use crate::estimate::Estimate;
+
+/// The readings of a batch, and the camera's model for each image of it; made once a batch.
+pub(crate) struct DataConstraint<'a> {
+    models: Vec<Consistency>,
+    readings: &'a [f32],
+    area: usize,
+    binding: bool,
+}
+
+impl<'a> DataConstraint<'a> {
+    /// Readings (N, `side`, `side`) made from these Hadamard rows. A constraint that is not `binding` moves nothing, but
+    /// still says how far an image is from the readings.
+    ///
+    /// # Errors
+    /// [`MeasuredRowsError::OtherSide`] if the rows belong to readings of another side.
+    pub(crate) fn new(
+        readings: &'a [f32],
+        side: usize,
+        estimates: &[Estimate],
+        measured: &MeasuredRows,
+        binding: bool,
+    ) -> Result<Self, MeasuredRowsError> {
+        let model = |e: &Estimate| Consistency::new(side, e.sigma_px, e.noise).of_rows(measured);
+        let models = estimates.iter().map(model).collect::<Result<_, _>>()?;
+        Ok(Self { models, readings, area: side * side, binding })
+    }
+
+    /// Puts each guess of (N, 64, 64) into [0, 1] and into agreement with its readings.
+    pub(crate) fn correct(&self, guesses: &mut [f32]) {
+        let images = guesses.par_chunks_exact_mut(AREA).enumerate();
+        images.for_each(|(index, guess)| self.correct_one(index, guess));
+    }
+
+    /// The same for the guess of image `index` alone.
+    pub(crate) fn correct_one(&self, index: usize, guess: &mut [f32]) {
+        guess.iter_mut().for_each(|value| *value = value.clamp(0.0, 1.0));
+        if self.binding {
+            self.models[index].project(self.readings_of(index), guess);
+            guess.iter_mut().for_each(|value| *value = value.clamp(0.0, 1.0));
+        }
+    }
+
+    /// How far each image of (N, 64, 64) is from explaining its readings, over their noise.
+    pub(crate) fn residual_ratios(&self, images: &[f32]) -> Vec<f32> {
+        let each = images.par_chunks_exact(AREA).zip(&self.models).enumerate();
+        each.map(|(index, (image, model))| model.residual_ratio(self.readings_of(index), image))
+            .collect()
+    }
+
+    /// The readings, (N, side, side).
+    pub(crate) fn readings(&self) -> &'a [f32] {
+        self.readings
+    }
+
+    fn readings_of(&self, index: usize) -> &[f32] {
+        &self.readings[index * self.area..][..self.area]
+    }
+}

@@ -1,0 +1,79 @@
+//! What the caller knows of blur and noise, and how it is joined with what the estimator finds.
+
+use crate::estimate::Estimate;
+
+/// What is known of a number that the estimator estimates too.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub enum Known {
+    /// Nothing: the estimate is taken.
+    #[default]
+    Nothing,
+    /// A lower bound, such as the lens's defocus at the measured distance: the larger of bound and estimate is taken.
+    /// Noise can hide blur from the estimator, and the estimate is then too small.
+    AtLeast(f32),
+    /// The number: the estimate is not used.
+    Exactly(f32),
+}
+
+impl Known {
+    fn over(self, estimated: f32) -> f32 {
+        match self {
+            Self::Nothing => estimated,
+            // A bound that is no number binds nothing.
+            Self::AtLeast(bound) => estimated.max(bound),
+            Self::Exactly(value) => value,
+        }
+    }
+}
+
+/// The number, if there is one.
+impl From<Option<f32>> for Known {
+    fn from(value: Option<f32>) -> Self {
+        value.map_or(Self::Nothing, Self::Exactly)
+    }
+}
+
+/// What the caller knows of blur and noise.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct KnownEstimate {
+    /// Blur in pixels of the 64 x 64 grid.
+    pub sigma_px: Known,
+    /// Noise of a reading.
+    pub noise: Known,
+}
+
+impl KnownEstimate {
+    /// The estimate, joined with what is known.
+    pub fn over(self, estimated: Estimate) -> Estimate {
+        Estimate {
+            sigma_px: self.sigma_px.over(estimated.sigma_px),
+            noise: self.noise.over(estimated.noise),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_lower_bound_binds_only_below_itself_and_a_known_number_always() {
+        let estimated = Estimate { sigma_px: 2.0, noise: 0.02 };
+        for (known, expected) in [
+            (Known::Nothing, 2.0),
+            (Known::AtLeast(1.0), 2.0),
+            (Known::AtLeast(3.0), 3.0),
+            (Known::AtLeast(f32::NAN), 2.0),
+            (Known::Exactly(1.0), 1.0),
+            (Some(1.5).into(), 1.5),
+            (None.into(), 2.0),
+        ] {
+            let of_blur = KnownEstimate { sigma_px: known, ..KnownEstimate::default() };
+            assert_eq!(of_blur.over(estimated), Estimate { sigma_px: expected, ..estimated });
+            let of_noise = KnownEstimate { noise: known, ..KnownEstimate::default() };
+            assert_eq!(of_noise.over(estimated).sigma_px, 2.0);
+        }
+        let of_noise = KnownEstimate { noise: Known::AtLeast(0.03), ..KnownEstimate::default() };
+        assert_eq!(of_noise.over(estimated).noise, 0.03);
+    }
+}

@@ -1,0 +1,109 @@
+//! Estimator, FSRCNN and one step of the bridge, one after another, for images that are on the device already.
+//!
+//! # Invariant
+//! Between the images and the guess nothing comes to the host: one read at the end brings all that was asked for
+//! (`enhance::device::tests::images_that_are_there_become_what_the_processor_makes_of_them` holds the result).
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use nirspi_recon::omp::gpu::DeviceImages;
+
+use super::engine::{Buffer, Degraded, Engine, Known};
+use super::{Estimator, Fsrcnn, UNet};
+use crate::deblur::SIDE;
+use crate::enhance::KnownEstimate;
+use crate::estimate::{CONDITION_MAX, Estimate};
+use crate::fusion;
+use crate::network::{Guess, RunChain};
+use crate::weights::{Weights, WeightsError};
+
+/// The three networks on one device.
+pub(crate) struct Chain {
+    engine: Arc<dyn Engine>,
+    fsrcnn: Fsrcnn,
+    estimator: Estimator,
+    unet: UNet,
+}
+
+impl Chain {
+    /// Takes the networks of these weights to a device.
+    ///
+    /// # Errors
+    /// [`WeightsError`] for a tensor that is missing, of another shape, or too wide.
+    pub(crate) fn new(
+        engine: &Arc<dyn Engine>,
+        fsrcnn: &Weights,
+        estimator: &Weights,
+        bridge: &Weights,
+    ) -> Result<Self, WeightsError> {
+        Ok(Self {
+            engine: Arc::clone(engine),
+            fsrcnn: Fsrcnn::new(engine, fsrcnn)?,
+            estimator: Estimator::new(engine, estimator)?,
+            unet: UNet::new(engine, bridge)?,
+        })
+    }
+
+    /// The guesses for `frames` images from number `first` on.
+    fn part(
+        &self,
+        images: &Buffer,
+        (first, frames): (usize, usize),
+        white: f32,
+        depth: &[f32],
+        known: KnownEstimate,
+    ) -> Guess {
+        let on = self.engine.as_ref();
+        let (coarse, area) = ((frames, fusion::SIDE), fusion::SIDE * fusion::SIDE);
+        let readings = on.readings(images, first * area, white, frames * area);
+        let outputs = self.estimator.forward(coarse, &readings);
+        let depth = (!depth.is_empty()).then(|| on.upload(depth));
+        let start = self.fsrcnn.forward(coarse, &readings, depth.as_ref(), true);
+        // The bridge from its beginning, t = 1, to its end.
+        let told = known.over(Estimate { sigma_px: 0.0, noise: 0.0 }).conditions([1.0, 1.0]);
+        let known_there = Known {
+            conditions: told,
+            blur: known.sigma_px.is_some(),
+            noise: known.noise.is_some(),
+        };
+        let grid = (SIDE / fusion::SIDE) as f32;
+        let conditions = on.conditions(&outputs, &known_there, grid, CONDITION_MAX);
+        let seen = Degraded::Coarse(&readings);
+        let sharp = self.unet.forward((frames, SIDE), &start, seen, &conditions, Some(&start));
+        let read = on.read(&[&readings, &outputs, &start, &sharp]);
+        let [readings, outputs, start, sharp] =
+            <[Vec<f32>; 4]>::try_from(read).unwrap_or_else(|_| unreachable!("four were asked for"));
+        let estimates = outputs.as_chunks().0.iter();
+        let estimates =
+            estimates.map(|&two| known.over(Estimate::of_outputs(two, fusion::SIDE))).collect();
+        Guess { readings, estimates, start, sharp }
+    }
+}
+
+impl RunChain for Chain {
+    fn run(
+        &self,
+        images: &DeviceImages,
+        part: Range<usize>,
+        white: f32,
+        depth: &[f32],
+        known: KnownEstimate,
+    ) -> Guess {
+        let pixels = images.frames() * images.pixels();
+        let images = Buffer::of(images.handle(), pixels);
+        let coarse = self.fsrcnn.at_once(fusion::SIDE).min(self.estimator.at_once(fusion::SIDE));
+        let at_once = self.unet.at_once(SIDE).min(coarse);
+        let planes = 2 * fusion::SIDE * fusion::SIDE;
+        let mut all = Guess::default();
+        for first in part.clone().step_by(at_once) {
+            let frames = at_once.min(part.end - first);
+            let depth = match depth {
+                [] => &[],
+                _ => &depth[(first - part.start) * planes..][..frames * planes],
+            };
+            all.append(self.part(&images, (first, frames), white, depth, known));
+        }
+        all
+    }
+}

@@ -1,0 +1,91 @@
+//! FSRCNN on a GPU.
+
+use std::sync::Arc;
+
+use super::engine::{Buffer, Engine, Finish};
+use super::kernels::{Activation, Add};
+use super::layer::{Layer, checked};
+use super::pack::Order;
+use super::plan::frames_at_once;
+use super::unet::AT_ONCE;
+use crate::filter::Filter;
+use crate::network::RunFsrcnn;
+use crate::weights::{Weights, WeightsError};
+
+/// Intensity, depth, validity.
+const CHANNELS: usize = 3;
+
+/// The network, its weights on a device.
+pub(crate) struct Fsrcnn {
+    engine: Arc<dyn Engine>,
+    /// Convolutions, each with PReLU after it.
+    layers: Vec<Layer>,
+    /// The transposed convolution, as one with a pixel shuffle after it.
+    doubling: Layer,
+}
+
+impl Fsrcnn {
+    /// Takes the network of these weights to a device.
+    ///
+    /// # Errors
+    /// [`WeightsError`] for a tensor that is missing, of another shape, or too wide.
+    pub(crate) fn new(engine: &Arc<dyn Engine>, weights: &Weights) -> Result<Self, WeightsError> {
+        let on = engine.as_ref();
+        let maps = weights.count(|i| format!("map.{i}.weight"));
+        let names = ["feature".to_owned(), "shrink".to_owned()]
+            .into_iter()
+            .map(|name| (format!("{name}_act"), name))
+            .chain((0..maps).map(|i| (format!("map_act.{i}"), format!("map.{i}"))))
+            .chain([("expand_act".to_owned(), "expand".to_owned())]);
+        let layers = names.map(|(act, name)| {
+            let filter = checked(weights, &name, Filter::convolution(weights, &name)?)?;
+            let slopes = weights.tensor(&format!("{act}.weight"), &[filter.outputs])?;
+            let reach = (1, filter.side / 2);
+            Ok(Layer::new(on, &filter, reach, Some(&slopes.values), Order::AsStored))
+        });
+        let layers = layers.collect::<Result<_, WeightsError>>()?;
+        let filter = checked(weights, "deconv", Filter::transposed(weights, "deconv")?)?;
+        let doubling = Layer::new(on, &filter, (1, filter.side / 2), None, Order::Shuffled);
+        Ok(Self { engine: Arc::clone(engine), layers, doubling })
+    }
+
+    /// How many images of `side` x `side` go through at once.
+    pub(super) fn at_once(&self, side: usize) -> usize {
+        let widest = self.layers.iter().map(|layer| layer.geometry.outputs).max().unwrap_or(0);
+        frames_at_once(widest.max(CHANNELS + 1) * side * side, self.engine.buffer_bytes(), AT_ONCE)
+    }
+
+    /// `readings` (frames, side, side) with twice the side; `depth` (frames, 2, side, side), if there is any.
+    pub(super) fn forward(
+        &self,
+        (frames, side): (usize, usize),
+        readings: &Buffer,
+        depth: Option<&Buffer>,
+        clamp: bool,
+    ) -> Buffer {
+        let on = self.engine.as_ref();
+        let prelu = Finish { activation: Activation::Prelu, ..Finish::default() };
+        let mut h = on.stacked(readings, depth, side * side);
+        for layer in &self.layers {
+            h = on.convolve(layer, &h, frames, side, prelu).out;
+        }
+        let add = Some((Add::Pixel, readings));
+        let finish = Finish { add, shuffle: true, clamp, ..Finish::default() };
+        on.convolve(&self.doubling, &h, frames, side, finish).out
+    }
+}
+
+impl RunFsrcnn for Fsrcnn {
+    fn run(&self, side: usize, input: &[f32]) -> Vec<f32> {
+        let on = self.engine.as_ref();
+        let area = side * side;
+        let parts = input.chunks(self.at_once(side) * CHANNELS * area).map(|part| {
+            let images = || part.chunks_exact(CHANNELS * area);
+            let readings: Vec<f32> = images().flat_map(|image| &image[..area]).copied().collect();
+            let depth: Vec<f32> = images().flat_map(|image| &image[area..]).copied().collect();
+            let [readings, depth] = [&readings, &depth].map(|numbers| on.upload(numbers));
+            self.forward((images().len(), side), &readings, Some(&depth), false)
+        });
+        parts.flat_map(|out| on.read(&[&out]).swap_remove(0)).collect()
+    }
+}

@@ -1,0 +1,374 @@
+//! What runs on the device: one source, compiled for CUDA, Vulkan, Metal or DirectX at run time.
+//!
+//! Barriers stand outside every branch. Loops whose length is known when a kernel is compiled are unrolled, but for the one over a
+//! step's channels; rounds of those that are left are counted by [`super::plan`].
+
+// A kernel's arguments are its buffers and sizes, and the macro turns them into functions of as many.
+#![allow(clippy::too_many_arguments)]
+
+use cubecl::prelude::*;
+
+/// Input channels of one step through shared memory; as many as [`COLUMNS`], so that a unit loads the pixels that it
+/// computes.
+pub(super) const DEPTH: usize = 8;
+
+/// Units side by side in a workgroup: each has other channels.
+pub(super) const COLUMNS: usize = 8;
+
+/// Units below each other: each has other pixels.
+pub(super) const ROWS: usize = 32;
+
+/// Units of a workgroup.
+pub(super) const UNITS: usize = COLUMNS * ROWS;
+
+/// Numbers between the input channels of a step in shared memory, beyond the pixels: so that the eight channels of a pixel are
+/// written to eight different banks.
+const SKEW: usize = 4;
+
+/// What is known of a convolution when it is compiled.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(super) struct Shape {
+    /// Pixels of a unit: `row + ROWS * i`.
+    pub pixels: usize,
+    /// Channels of a unit: `column + COLUMNS * j`.
+    pub channels: usize,
+    pub activation: Activation,
+    pub add: Add,
+    /// Whether channel `place * C + c` goes to channel `c` of one of four pixels of an enlarged image.
+    pub shuffle: bool,
+    /// Whether what is written is put into [0, 1].
+    pub clamp: bool,
+    /// Whether SiLU of what is written goes to a second buffer.
+    pub activated: bool,
+}
+
+/// What is done to a sum before anything is added to it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum Activation {
+    Nothing,
+    /// x / (1 + e^-x).
+    Silu,
+    /// The same of x (1 + scale) + shift, both from the conditions of the frame.
+    FilmSilu,
+    /// With the slope of the channel; ReLU where that is 0.
+    Prelu,
+    /// ln(1 + e^x).
+    Softplus,
+}
+
+/// What is added to an activation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum Add {
+    Nothing,
+    /// A number for each that is written.
+    Alike,
+    /// One number for each pixel of the convolution, whatever the channel.
+    Pixel,
+}
+
+#[cube]
+fn silu(x: f32) -> f32 {
+    x / (1.0f32 + f32::exp(-x))
+}
+
+/// A convolution: pixels of all frames below each other, channels side by side, a workgroup for a tile of both. Input
+/// `frame x side x side x inputs`; `weights` and `table` as `pack` makes them; output `frame x out_side x out_side x outputs`,
+/// or twice as many pixels in both directions after a shuffle.
+#[cube(launch_unchecked)]
+pub(super) fn convolve(
+    input: &Array<f32>,
+    weights: &Array<f32>,
+    table: &Array<f32>,
+    film: &Array<f32>,
+    addend: &Array<f32>,
+    out: &mut Array<f32>,
+    activated: &mut Array<f32>,
+    pixels: u32,
+    side: u32,
+    out_side: u32,
+    inputs: u32,
+    outputs: u32,
+    kernel: u32,
+    stride: u32,
+    centre: u32,
+    film_width: u32,
+    film_first: u32,
+    #[comptime] shape: Shape,
+) {
+    let mine = comptime!(shape.pixels);
+    let own = comptime!(shape.channels);
+    let pitch = comptime!(ROWS * shape.pixels + SKEW);
+    let tile = comptime!(COLUMNS * shape.channels);
+    let step = comptime!(DEPTH * COLUMNS * shape.channels);
+    let loads = comptime!((DEPTH * COLUMNS * shape.channels).div_ceil(UNITS));
+
+    let pixels = pixels as usize;
+    let side = side as usize;
+    let out_side = out_side as usize;
+    let inputs = inputs as usize;
+    let outputs = outputs as usize;
+    let kernel = kernel as usize;
+    let stride = stride as usize;
+    let centre = centre as usize;
+
+    let unit = UNIT_POS as usize;
+    let column = unit % COLUMNS;
+    let row = unit / COLUMNS;
+    let first_pixel = CUBE_POS_X as usize * comptime!(ROWS * shape.pixels) + row;
+    let first_channel = CUBE_POS_Y as usize * tile + column;
+
+    let mut seen = SharedMemory::<f32>::new(comptime!(DEPTH * (ROWS * shape.pixels + SKEW)));
+    let mut taps = SharedMemory::<f32>::new(step);
+    let mut sums = Array::<f32>::new(comptime!(shape.pixels * shape.channels));
+    #[unroll]
+    for i in 0..comptime!(shape.pixels * shape.channels) {
+        sums[i] = 0.0f32;
+    }
+
+    // For each of this unit's pixels: its frame's first pixel, and row and column of its first tap, `centre` too many.
+    let mut frames = Array::<usize>::new(mine);
+    let mut ys = Array::<usize>::new(mine);
+    let mut xs = Array::<usize>::new(mine);
+    #[unroll]
+    for i in 0..mine {
+        let pixel = first_pixel + ROWS * i;
+        let within = pixel % (out_side * out_side);
+        frames[i] = pixel / (out_side * out_side) * side * side;
+        ys[i] = within / out_side * stride;
+        xs[i] = within % out_side * stride;
+    }
+
+    let steps = inputs.div_ceil(DEPTH);
+    let mut at = CUBE_POS_Y as usize * kernel * kernel * steps * step;
+    for ky in 0..kernel {
+        for kx in 0..kernel {
+            for chunk in 0..steps {
+                let channel = chunk * DEPTH + column;
+                #[unroll]
+                for i in 0..mine {
+                    let y = ys[i] + ky;
+                    let x = xs[i] + kx;
+                    let inside = channel < inputs
+                        && first_pixel + ROWS * i < pixels
+                        && y >= centre
+                        && y < side + centre
+                        && x >= centre
+                        && x < side + centre;
+                    let mut value = 0.0f32;
+                    if inside {
+                        let pixel = frames[i] + (y - centre) * side + (x - centre);
+                        value = input[pixel * inputs + channel];
+                    }
+                    seen[column * pitch + row + ROWS * i] = value;
+                }
+                #[unroll]
+                for i in 0..loads {
+                    let index = unit + UNITS * i;
+                    if index < step {
+                        taps[index] = weights[at + index];
+                    }
+                }
+                at += step;
+                sync_cube();
+                for k in 0..DEPTH {
+                    let mut across = Array::<f32>::new(own);
+                    #[unroll]
+                    for j in 0..own {
+                        across[j] = taps[k * tile + column + COLUMNS * j];
+                    }
+                    #[unroll]
+                    for i in 0..mine {
+                        let down = seen[k * pitch + row + ROWS * i];
+                        #[unroll]
+                        for j in 0..own {
+                            sums[i * own + j] += down * across[j];
+                        }
+                    }
+                }
+                sync_cube();
+            }
+        }
+    }
+
+    #[unroll]
+    for i in 0..mine {
+        let pixel = first_pixel + ROWS * i;
+        if pixel < pixels {
+            let frame = pixel / (out_side * out_side);
+            #[unroll]
+            for j in 0..own {
+                let channel = first_channel + COLUMNS * j;
+                if channel < outputs {
+                    let mut value = sums[i * own + j] + table[channel];
+                    if comptime!(shape.activation == Activation::Silu) {
+                        value = silu(value);
+                    }
+                    if comptime!(shape.activation == Activation::FilmSilu) {
+                        let told = frame * film_width as usize + film_first as usize + channel;
+                        value = silu(value * (1.0f32 + film[told]) + film[told + outputs]);
+                    }
+                    if comptime!(shape.activation == Activation::Prelu) {
+                        value = max(value, 0.0f32) + table[outputs + channel] * min(value, 0.0f32);
+                    }
+                    if comptime!(shape.activation == Activation::Softplus) {
+                        value = max(value, 0.0f32) + f32::ln(1.0f32 + f32::exp(-f32::abs(value)));
+                    }
+                    let mut to = pixel * outputs + channel;
+                    if comptime!(shape.shuffle) {
+                        let within = pixel % (out_side * out_side);
+                        let y = within / out_side;
+                        let x = within % out_side;
+                        let channels = outputs / 4;
+                        let place = channel / channels;
+                        let line = (frame * out_side + y) * 2 + place / 2;
+                        to = (line * 2 * out_side + 2 * x + place % 2) * channels
+                            + channel % channels;
+                    }
+                    if comptime!(shape.add == Add::Alike) {
+                        value += addend[to];
+                    }
+                    if comptime!(shape.add == Add::Pixel) {
+                        value += addend[pixel];
+                    }
+                    if comptime!(shape.clamp) {
+                        value = min(max(value, 0.0f32), 1.0f32);
+                    }
+                    out[to] = value;
+                    if comptime!(shape.activated) {
+                        activated[to] = silu(value);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// `images` from number `first` on, over `white` and put into [0, 1]. One unit a number.
+#[cube(launch_unchecked)]
+pub(super) fn readings(
+    images: &Array<f32>,
+    out: &mut Array<f32>,
+    first: u32,
+    white: f32,
+    count: u32,
+) {
+    let at = ABSOLUTE_POS;
+    if at < count as usize {
+        out[at] = min(max(images[first as usize + at] / white, 0.0f32), 1.0f32);
+    }
+}
+
+/// What FSRCNN sees: intensity, depth and validity of each pixel side by side. `depth` has the two planes of a frame one after
+/// the other, if there is any. One unit a number.
+#[cube(launch_unchecked)]
+pub(super) fn stacked(
+    readings: &Array<f32>,
+    depth: &Array<f32>,
+    out: &mut Array<f32>,
+    area: u32,
+    count: u32,
+    #[comptime] has_depth: bool,
+) {
+    let at = ABSOLUTE_POS;
+    if at < count as usize {
+        let area = area as usize;
+        let channel = at % 3;
+        let pixel = at / 3;
+        let mut value = 0.0f32;
+        if channel == 0 {
+            value = readings[pixel];
+        } else {
+            if comptime!(has_depth) {
+                let plane = pixel / area * 2 + channel - 1;
+                value = depth[plane * area + pixel % area];
+            }
+        }
+        out[at] = value;
+    }
+}
+
+/// What the UNet sees: blocks of 2 x 2 pixels of `current` (channels 0 to 3) and of `degraded` (4 to 7); with `coarse`, the
+/// latter has one pixel for each block. `side` is that of the blocks. One unit a number.
+#[cube(launch_unchecked)]
+pub(super) fn paired(
+    current: &Array<f32>,
+    degraded: &Array<f32>,
+    out: &mut Array<f32>,
+    side: u32,
+    count: u32,
+    #[comptime] coarse: bool,
+) {
+    let at = ABSOLUTE_POS;
+    if at < count as usize {
+        let side = side as usize;
+        let place = at % 4;
+        let block = at / 8;
+        let line = block / side * 2 + place / 2;
+        let fine = line * 2 * side + block % side * 2 + place % 2;
+        if at % 8 < 4 {
+            out[at] = current[fine];
+        } else {
+            let mut seen = fine;
+            if comptime!(coarse) {
+                seen = block;
+            }
+            out[at] = degraded[seen];
+        }
+    }
+}
+
+/// ln(mean + `floor`) + `offset` of each channel of each frame. One unit a channel of a frame.
+#[cube(launch_unchecked)]
+pub(super) fn pooled(
+    input: &Array<f32>,
+    out: &mut Array<f32>,
+    pixels: u32,
+    channels: u32,
+    count: u32,
+    floor: f32,
+    offset: f32,
+) {
+    let at = ABSOLUTE_POS;
+    if at < count as usize {
+        let channels = channels as usize;
+        let first = at / channels * pixels as usize * channels + at % channels;
+        let mut sum = 0.0f32;
+        for pixel in 0..pixels as usize {
+            sum += input[first + pixel * channels];
+        }
+        out[at] = f32::ln(sum / pixels as f32 + floor) + offset;
+    }
+}
+
+/// The UNet's six conditions from the estimator's two outputs: `path`, then blur and noise on the scale of the networks, up to
+/// `most`, and their squares. `scale` takes blur to the 64 x 64 grid; what is `known` stands in place of what was
+/// estimated. One unit a frame.
+#[cube(launch_unchecked)]
+pub(super) fn conditions(
+    estimates: &Array<f32>,
+    known: &Array<f32>,
+    out: &mut Array<f32>,
+    scale: f32,
+    most: f32,
+    count: u32,
+    #[comptime] blur_known: bool,
+    #[comptime] noise_known: bool,
+) {
+    let frame = ABSOLUTE_POS;
+    if frame < count as usize {
+        let mut blur = min(max(estimates[frame * 2] * scale, 0.0f32), most);
+        let mut noise = min(max(estimates[frame * 2 + 1], 0.0f32), most);
+        if comptime!(blur_known) {
+            blur = known[2];
+        }
+        if comptime!(noise_known) {
+            noise = known[4];
+        }
+        out[frame * 6] = known[0];
+        out[frame * 6 + 1] = known[1];
+        out[frame * 6 + 2] = blur;
+        out[frame * 6 + 3] = blur * blur;
+        out[frame * 6 + 4] = noise;
+        out[frame * 6 + 5] = noise * noise;
+    }
+}

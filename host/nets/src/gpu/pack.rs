@@ -1,0 +1,135 @@
+//! Weights in the order in which the kernel reads them.
+//!
+//! A workgroup makes a tile of channels. Tile after tile, tap after tap, and [`DEPTH`] input channels after [`DEPTH`], the weights of
+//! the whole tile stand side by side; what is beyond the last input or output channel is zero.
+
+use super::kernels::DEPTH;
+use crate::filter::Filter;
+
+/// In which order the kernel writes the channels that it makes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Order {
+    /// As the file has them.
+    AsStored,
+    /// For a pixel shuffle: the place in the block of 2 x 2 first, then the channel of the enlarged image, so that one pixel's
+    /// channels are written side by side. The file has the channel first.
+    Shuffled,
+}
+
+impl Order {
+    /// The channel, in the file, of channel `at` of the kernel.
+    fn stored(self, at: usize, outputs: usize) -> usize {
+        match self {
+            Self::AsStored => at,
+            Self::Shuffled => {
+                let channels = outputs / 4;
+                4 * (at % channels) + at / channels
+            }
+        }
+    }
+}
+
+/// The weights for tiles of `tile` channels.
+pub(super) fn weights(filter: &Filter, tile: usize, order: Order) -> Vec<f32> {
+    let steps = filter.inputs.div_ceil(DEPTH);
+    let length = filter.outputs.next_multiple_of(tile) * filter.side.pow(2) * steps * DEPTH;
+    let mut packed = Vec::with_capacity(length);
+    for first in (0..filter.outputs).step_by(tile) {
+        for (ky, kx) in (0..filter.side).flat_map(|ky| (0..filter.side).map(move |kx| (ky, kx))) {
+            for input in 0..steps * DEPTH {
+                packed.extend((first..first + tile).map(|output| {
+                    if input < filter.inputs && output < filter.outputs {
+                        filter.at(order.stored(output, filter.outputs), input, ky, kx)
+                    } else {
+                        0.0
+                    }
+                }));
+            }
+        }
+    }
+    packed
+}
+
+/// What is added to each channel, then the slope of its PReLU; 0 for `None`, which is ReLU.
+pub(super) fn table(filter: &Filter, slopes: Option<&[f32]>, order: Order) -> Vec<f32> {
+    let stored = || (0..filter.outputs).map(|output| order.stored(output, filter.outputs));
+    let bias = stored().map(|output| filter.bias[output]);
+    let slopes = stored().map(|output| slopes.map_or(0.0, |slopes| slopes[output]));
+    bias.chain(slopes).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{definition, random_filter};
+    use super::*;
+
+    /// What the kernel makes of packed weights, one number after another, zeros around the image.
+    fn interpreted(
+        packed: &[f32],
+        table: &[f32],
+        filter: &Filter,
+        (tile, stride, centre): (usize, usize, usize),
+        (image, side, out): (&[f32], usize, usize),
+    ) -> Vec<f32> {
+        let Filter { inputs, outputs, side: kernel, .. } = *filter;
+        let steps = inputs.div_ceil(DEPTH);
+        let mut made = Vec::new();
+        for pixel in 0..out * out {
+            for (output, bias) in table[..outputs].iter().enumerate() {
+                let mut at = output / tile * kernel * kernel * steps * DEPTH * tile + output % tile;
+                let mut sum = *bias;
+                for (ky, kx) in (0..kernel).flat_map(|ky| (0..kernel).map(move |kx| (ky, kx))) {
+                    let y = (pixel / out * stride + ky).wrapping_sub(centre);
+                    let x = (pixel % out * stride + kx).wrapping_sub(centre);
+                    for input in 0..steps * DEPTH {
+                        if input < inputs && y < side && x < side {
+                            sum += packed[at] * image[(y * side + x) * inputs + input];
+                        }
+                        at += tile;
+                    }
+                }
+                made.push(sum);
+            }
+        }
+        made
+    }
+
+    #[test]
+    fn packed_weights_are_the_convolution() {
+        for (inputs, outputs, kernel, stride, centre, tile) in
+            [(3, 5, 5, 1, 2, 16), (9, 33, 3, 2, 1, 32), (8, 16, 2, 2, 0, 16), (12, 70, 1, 1, 0, 48)]
+        {
+            let filter = random_filter(inputs, outputs, kernel, 7);
+            let side = 6;
+            let image: Vec<f32> = random_filter(inputs, side * side, 1, 3).weights;
+            let out = (side + 2 * centre - kernel) / stride + 1;
+            let ours = interpreted(
+                &weights(&filter, tile, Order::AsStored),
+                &table(&filter, None, Order::AsStored),
+                &filter,
+                (tile, stride, centre),
+                (&image, side, out),
+            );
+            let expected = definition(&filter, (stride, centre), &image, side);
+            assert_eq!(ours.len(), expected.len());
+            for (a, b) in ours.iter().zip(&expected) {
+                assert!((a - b).abs() < 1e-4, "{inputs} {outputs}: {a} {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn shuffled_channels_go_by_place_then_by_channel() {
+        let filter = random_filter(2, 12, 1, 5);
+        let packed = weights(&filter, 16, Order::Shuffled);
+        let table = table(&filter, Some(&filter.bias), Order::Shuffled);
+        for (place, channel) in (0..4).flat_map(|q| (0..3).map(move |c| (q, c))) {
+            let (at, stored) = (3 * place + channel, 4 * channel + place);
+            assert_eq!(packed[at], filter.at(stored, 0, 0, 0));
+            assert_eq!(packed[16 + at], filter.at(stored, 1, 0, 0));
+            assert_eq!(table[at], filter.bias[stored]);
+            assert_eq!(table[12 + at], filter.bias[stored]);
+        }
+        assert!(packed[12..16].iter().chain(&packed[32..]).all(|&v| v == 0.0), "padding");
+    }
+}

@@ -1,0 +1,162 @@
+//! How a convolution is dealt out to workgroups, and what a device's limits allow.
+//!
+//! # Invariant
+//! No unit makes more rounds of loops than software Vulkan finishes, which is some 65 535: it ends longer loops without a word
+//! (`tests::a_convolution_of_too_many_rounds_is_refused`).
+
+use super::kernels::{COLUMNS, DEPTH, ROWS};
+
+/// Rounds of all its loops that one unit may make.
+const ROUNDS: usize = 60_000;
+
+/// Channels that one unit may compute for each of its pixels.
+const CHANNELS_A_UNIT: [usize; 4] = [8, 6, 4, 2];
+
+/// Pixels of one unit, where there are pixels enough to fill a large GPU with workgroups, and where not.
+const PIXELS_A_UNIT: [usize; 2] = [8, 2];
+
+/// Pixels times tiles of channels from which units take many.
+const ENOUGH_PIXELS: usize = 1 << 16;
+
+/// Bytes of a buffer, where a device would allow for more.
+const BUFFER_BYTES: usize = 1 << 30;
+
+/// Workgroups that every device takes in one direction.
+const GROUPS: usize = 65_535;
+
+/// Sizes of a convolution of square kernels over square images.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Geometry {
+    pub inputs: usize,
+    pub outputs: usize,
+    /// Side of a kernel.
+    pub kernel: usize,
+    pub stride: usize,
+    /// The tap, in both directions, that lies on the pixel itself: zeros around the image.
+    pub centre: usize,
+}
+
+impl Geometry {
+    /// Side of what becomes of images of `side` x `side`.
+    pub(super) fn side(&self, side: usize) -> usize {
+        (side + 2 * self.centre - self.kernel) / self.stride + 1
+    }
+
+    /// Steps of [`DEPTH`] input channels.
+    pub(super) fn steps(&self) -> usize {
+        self.kernel * self.kernel * self.inputs.div_ceil(DEPTH)
+    }
+
+    /// Rounds of loops of one unit.
+    fn rounds(&self) -> usize {
+        let steps = self.steps();
+        self.kernel + self.kernel * self.kernel + steps * (1 + DEPTH)
+    }
+
+    /// The most input channels of a kernel of that side that a unit gets through.
+    pub(super) fn most_inputs(kernel: usize) -> usize {
+        let taps = kernel * kernel;
+        (ROUNDS - kernel - taps) / (taps * (1 + DEPTH)) * DEPTH
+    }
+
+    /// Whether a unit gets through.
+    pub(super) fn fits(&self) -> bool {
+        self.rounds() <= ROUNDS
+    }
+}
+
+/// Channels of one unit, so that the tiles of `outputs` channels waste the least, and are wide where that is the same.
+pub(super) fn channels_a_unit(outputs: usize) -> usize {
+    let padded = |channels: usize| outputs.next_multiple_of(COLUMNS * channels);
+    let best = CHANNELS_A_UNIT.into_iter().min_by_key(|&channels| padded(channels));
+    best.unwrap_or(CHANNELS_A_UNIT[0])
+}
+
+/// Pixels of one unit for `pixels` in all and `tiles` tiles of channels.
+pub(super) fn pixels_a_unit(pixels: usize, tiles: usize) -> usize {
+    let [many, few] = PIXELS_A_UNIT;
+    if pixels * tiles >= ENOUGH_PIXELS || pixels > GROUPS * ROWS * few { many } else { few }
+}
+
+/// How many frames whose largest activation has `numbers` numbers go through a network at once: at least one, at most
+/// `most`, where a buffer has room for `buffer_bytes`.
+pub(super) fn frames_at_once(numbers: usize, buffer_bytes: usize, most: usize) -> usize {
+    let bytes = buffer_bytes.min(BUFFER_BYTES);
+    (bytes / (size_of::<f32>() * numbers.max(1))).clamp(1, most)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn geometry(inputs: usize, kernel: usize, stride: usize, centre: usize) -> Geometry {
+        Geometry { inputs, outputs: 48, kernel, stride, centre }
+    }
+
+    #[test]
+    fn sides_are_those_of_pytorch() {
+        // Kernel, stride, padding, side in, side out of torch.nn.Conv2d.
+        for (kernel, stride, centre, side, expected) in [
+            (3, 1, 1, 32, 32),
+            (3, 2, 1, 32, 16),
+            (3, 2, 1, 15, 8),
+            (2, 2, 0, 16, 8),
+            (5, 1, 2, 8, 8),
+            (1, 1, 0, 1, 1),
+        ] {
+            assert_eq!(
+                geometry(1, kernel, stride, centre).side(side),
+                expected,
+                "{kernel} {stride}"
+            );
+        }
+    }
+
+    #[test]
+    fn tiles_waste_no_channel_of_the_shipped_networks_and_few_of_others() {
+        for (outputs, channels) in
+            [(48, 6), (96, 6), (192, 8), (64, 8), (32, 4), (16, 2), (12, 2), (4, 2), (128, 8)]
+        {
+            assert_eq!(channels_a_unit(outputs), channels, "{outputs}");
+        }
+        for outputs in 1..400_usize {
+            let tile = COLUMNS * channels_a_unit(outputs);
+            assert!(outputs.next_multiple_of(tile) - outputs < 16, "{outputs}: {tile}");
+        }
+    }
+
+    #[test]
+    fn a_convolution_of_too_many_rounds_is_refused() {
+        for kernel in [1, 2, 3, 5] {
+            let most = Geometry::most_inputs(kernel);
+            assert!(geometry(most, kernel, 1, 0).fits(), "{kernel}");
+            assert!(!geometry(most + 1, kernel, 1, 0).fits(), "{kernel}");
+            assert!(geometry(most, kernel, 1, 0).rounds() < 65_535);
+        }
+        assert!(Geometry::most_inputs(3) >= 4 * 1024, "the widest network that can be trained");
+    }
+
+    #[test]
+    fn as_many_frames_at_once_as_a_buffer_holds() {
+        assert_eq!(frames_at_once(32 * 32 * 48, 128 << 20, 256), 256);
+        assert_eq!(frames_at_once(32 * 32 * 1024, 128 << 20, 256), 32);
+        assert_eq!(frames_at_once(usize::MAX / 8, 128 << 20, 256), 1);
+        assert_eq!(
+            frames_at_once(32 * 32 * 48, usize::MAX, 100_000),
+            BUFFER_BYTES / (4 * 32 * 32 * 48)
+        );
+    }
+
+    #[test]
+    fn workgroups_stay_below_what_every_device_takes() {
+        for pixels in [1, 4095, 1 << 16, 4_194_240, 4_194_241, 16_000_000] {
+            let groups = pixels_div(pixels, pixels_a_unit(pixels, 1));
+            assert!(groups <= GROUPS, "{pixels}: {groups}");
+        }
+        assert_eq!((pixels_a_unit(1024, 1), pixels_a_unit(1 << 14, 4)), (2, 8));
+    }
+
+    fn pixels_div(pixels: usize, a_unit: usize) -> usize {
+        pixels.div_ceil(ROWS * a_unit)
+    }
+}
