@@ -130,7 +130,6 @@ from_libraries!(
     nirspi_nets::device::DeviceError,
     nirspi_nets::images::ImagesError,
     nirspi_nets::metrics::FrechetError,
-    nirspi_nets::metrics::inception::ImageSize,
     nirspi_nets::upscale::UpscaleError,
     nirspi_nets::weights::WeightsError,
     nirspi_optics::SceneError,
@@ -153,7 +152,10 @@ from_libraries!(
 from_libraries!(nirspi_nets::DeviceEnhancerError);
 
 #[cfg(feature = "train")]
-from_libraries!(nirspi_nets::train::TrainError);
+from_libraries!(nirspi_nets::metrics::inception::ImageSize, nirspi_nets::train::TrainError);
+
+#[cfg(not(feature = "train"))]
+from_libraries!(nirspi_nets::metrics::inception::NotBuilt);
 
 #[cfg(test)]
 mod tests {

@@ -4,9 +4,9 @@
 //! Every image comes with its inconsistency, the figure that says whether the readings support the image
 //! (`a_blurred_cross_gets_sharper_at_each_stage_and_the_readings_bear_it_out`).
 
-mod known;
 #[cfg(feature = "gpu")]
 mod device;
+mod known;
 
 use std::num::NonZeroU32;
 
@@ -20,9 +20,9 @@ use crate::gate;
 use crate::images::Images;
 use crate::spread::{Moments, doubled, measured_again};
 
-pub use known::{Known, KnownEstimate};
 #[cfg(feature = "gpu")]
 pub use device::{DeviceEnhancer, DeviceEnhancerError};
+pub use known::{Known, KnownEstimate};
 
 /// How a stack is deblurred or enhanced.
 #[derive(Debug, Clone)]

@@ -50,6 +50,16 @@ impl KnownEstimate {
             noise: self.noise.over(estimated.noise),
         }
     }
+
+    /// The path's two numbers, then the least and the most of blur and noise on the scale of the networks: an estimate within
+    /// these bounds is the estimate joined with what is known.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn condition_bounds(self, path: [f32; 2]) -> [f32; 6] {
+        let least = self.over(Estimate { sigma_px: 0.0, noise: 0.0 }).conditions(path);
+        let most = Estimate { sigma_px: f32::MAX, noise: f32::MAX };
+        let most = self.over(most).conditions(path);
+        [path[0], path[1], least[2], most[2], least[4], most[4]]
+    }
 }
 
 #[cfg(test)]

@@ -9,11 +9,11 @@ use std::sync::Arc;
 
 use nirspi_recon::omp::gpu::DeviceImages;
 
-use super::engine::{Buffer, Degraded, Engine, Known};
+use super::engine::{Buffer, Degraded, Engine};
 use super::{Estimator, Fsrcnn, UNet};
 use crate::deblur::SIDE;
 use crate::enhance::KnownEstimate;
-use crate::estimate::{CONDITION_MAX, Estimate};
+use crate::estimate::Estimate;
 use crate::fusion;
 use crate::network::{Guess, RunChain};
 use crate::weights::{Weights, WeightsError};
@@ -61,14 +61,9 @@ impl Chain {
         let depth = (!depth.is_empty()).then(|| on.upload(depth));
         let start = self.fsrcnn.forward(coarse, &readings, depth.as_ref(), true);
         // The bridge from its beginning, t = 1, to its end.
-        let told = known.over(Estimate { sigma_px: 0.0, noise: 0.0 }).conditions([1.0, 1.0]);
-        let known_there = Known {
-            conditions: told,
-            blur: known.sigma_px.is_some(),
-            noise: known.noise.is_some(),
-        };
+        let bounds = known.condition_bounds([1.0, 1.0]);
         let grid = (SIDE / fusion::SIDE) as f32;
-        let conditions = on.conditions(&outputs, &known_there, grid, CONDITION_MAX);
+        let conditions = on.conditions(&outputs, &bounds, grid);
         let seen = Degraded::Coarse(&readings);
         let sharp = self.unet.forward((frames, SIDE), &start, seen, &conditions, Some(&start));
         let read = on.read(&[&readings, &outputs, &start, &sharp]);

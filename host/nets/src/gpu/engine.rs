@@ -77,14 +77,9 @@ pub(crate) enum Degraded<'a> {
     Coarse(&'a Buffer),
 }
 
-/// What the kernel of conditions puts in place of estimates.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Known {
-    /// All six, of which those of the path count, and the others where they are known.
-    pub conditions: [f32; 6],
-    pub blur: bool,
-    pub noise: bool,
-}
+/// What the kernel of conditions joins with the estimates: two numbers of the bridge's path, then the least and the most of
+/// blur and of noise, on the scale of the networks.
+pub(crate) type Bounds = [f32; 6];
 
 /// One device. Everything is queued; a failed launch shows in [`read`](Self::read).
 pub(crate) trait Engine: Send + Sync {
@@ -113,7 +108,7 @@ pub(crate) trait Engine: Send + Sync {
     /// See [`kernels::pooled`].
     fn pooled(&self, input: &Buffer, pixels: usize, channels: usize, log: (f32, f32)) -> Buffer;
     /// See [`kernels::conditions`].
-    fn conditions(&self, estimates: &Buffer, known: &Known, scale: f32, most: f32) -> Buffer;
+    fn conditions(&self, estimates: &Buffer, bounds: &Bounds, scale: f32) -> Buffer;
 }
 
 fn units() -> CubeDim {
@@ -330,10 +325,10 @@ impl<R: Runtime> Engine for ComputeClient<R> {
     }
 
     #[expect(unsafe_code, reason = "the kernel checks its one index itself")]
-    fn conditions(&self, estimates: &Buffer, known: &Known, scale: f32, most: f32) -> Buffer {
+    fn conditions(&self, estimates: &Buffer, bounds: &Bounds, scale: f32) -> Buffer {
         let frames = estimates.count / 2;
         let out = Engine::empty(self, 6 * frames);
-        let told = self.upload(&known.conditions);
+        let bounds = self.upload(bounds);
         // SAFETY: a frame below `frames` has two estimates and six conditions.
         unsafe {
             kernels::conditions::launch_unchecked::<R>(
@@ -341,13 +336,10 @@ impl<R: Runtime> Engine for ComputeClient<R> {
                 groups(frames),
                 units(),
                 estimates.arg(),
-                told.arg(),
+                bounds.arg(),
                 out.arg(),
                 scale,
-                most,
                 frames as u32,
-                known.blur,
-                known.noise,
             );
         }
         out

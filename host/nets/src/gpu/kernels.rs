@@ -340,32 +340,22 @@ pub(super) fn pooled(
     }
 }
 
-/// The UNet's six conditions from the estimator's two outputs: `path`, then blur and noise on the scale of the networks, up to
-/// `most`, and their squares. `scale` takes blur to the 64 x 64 grid; what is `known` stands in place of what was
-/// estimated. One unit a frame.
+/// The UNet's six conditions from the estimator's two outputs: the path, then blur and noise on the scale of the networks
+/// within their bounds, and their squares. `scale` takes blur to the 64 x 64 grid. One unit a frame.
 #[cube(launch_unchecked)]
 pub(super) fn conditions(
     estimates: &Array<f32>,
-    known: &Array<f32>,
+    bounds: &Array<f32>,
     out: &mut Array<f32>,
     scale: f32,
-    most: f32,
     count: u32,
-    #[comptime] blur_known: bool,
-    #[comptime] noise_known: bool,
 ) {
     let frame = ABSOLUTE_POS;
     if frame < count as usize {
-        let mut blur = min(max(estimates[frame * 2] * scale, 0.0f32), most);
-        let mut noise = min(max(estimates[frame * 2 + 1], 0.0f32), most);
-        if comptime!(blur_known) {
-            blur = known[2];
-        }
-        if comptime!(noise_known) {
-            noise = known[4];
-        }
-        out[frame * 6] = known[0];
-        out[frame * 6 + 1] = known[1];
+        let blur = min(max(estimates[frame * 2] * scale, bounds[2]), bounds[3]);
+        let noise = min(max(estimates[frame * 2 + 1], bounds[4]), bounds[5]);
+        out[frame * 6] = bounds[0];
+        out[frame * 6 + 1] = bounds[1];
         out[frame * 6 + 2] = blur;
         out[frame * 6 + 3] = blur * blur;
         out[frame * 6 + 4] = noise;

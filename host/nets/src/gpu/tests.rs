@@ -3,10 +3,11 @@
 
 use std::sync::Arc;
 
-use super::engine::{Buffer, Degraded, Engine, Finish, Known};
+use super::engine::{Buffer, Degraded, Engine, Finish};
 use super::kernels::{Activation, Add};
 use super::layer::Layer;
 use super::pack::Order;
+use crate::Known;
 use crate::cpu;
 use crate::device::{Backend, Device};
 use crate::filter::Filter;
@@ -285,16 +286,17 @@ fn conditions_are_those_that_the_host_would_tell() {
     for (backend, engine) in engines() {
         let on = engine.as_ref();
         let there = on.upload(outputs.as_flattened());
-        for (blur, noise) in [(false, false), (true, false), (false, true), (true, true)] {
-            let known = crate::KnownEstimate {
-                sigma_px: blur.then_some(3.0),
-                noise: noise.then_some(0.07),
+        let known = [Known::Nothing, Known::AtLeast(0.05), Known::Exactly(0.07)];
+        for (blur, noise) in known.into_iter().flat_map(|blur| known.map(|noise| (blur, noise))) {
+            let pixels = |known| match known {
+                Known::Nothing => Known::Nothing,
+                Known::AtLeast(share) => Known::AtLeast(40.0 * share),
+                Known::Exactly(share) => Known::Exactly(40.0 * share),
             };
+            let known = crate::KnownEstimate { sigma_px: pixels(blur), noise };
             let of = |outputs| known.over(crate::Estimate::of_outputs(outputs, 32));
             let expected = outputs.map(|outputs| of(outputs).conditions([0.5, 0.25]));
-            let conditions = of([0.0; 2]).conditions([0.5, 0.25]);
-            let known = Known { conditions, blur, noise };
-            let ours = on.conditions(&there, &known, 2.0, crate::estimate::CONDITION_MAX);
+            let ours = on.conditions(&there, &known.condition_bounds([0.5, 0.25]), 2.0);
             assert_close(&read(on, &ours), expected.as_flattened(), &format!("{backend}"));
         }
     }
