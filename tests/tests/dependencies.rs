@@ -171,3 +171,29 @@ fn plain_cargo_test_leaves_out_the_simulator_only_and_ci_runs_the_rest() {
         "not run by plain cargo test: the gateware's RTL; cargo test{packages} runs it"
     );
 }
+
+/// Crates that compute. The program leaves that to the libraries.
+const COMPUTING: [&str; 6] = ["nalgebra", "rand", "rand_distr", "rand_pcg", "rayon", "burn"];
+
+/// Ordinary dependencies of the program on crates that compute.
+fn computing(packages: &[Value]) -> Vec<&str> {
+    let program = packages.iter().find(|package| package["name"] == "nirspi-cli").unwrap();
+    let ordinary =
+        program["dependencies"].as_array().unwrap().iter().filter(|d| d["kind"].is_null());
+    ordinary.map(|d| d["name"].as_str().unwrap()).filter(|name| COMPUTING.contains(name)).collect()
+}
+
+#[test]
+fn the_program_itself_computes_nothing() {
+    let mut packages = packages();
+    assert_eq!(computing(&packages), Vec::<&str>::new());
+    for package in &mut packages {
+        if package["name"] == "nirspi-cli" {
+            package["dependencies"].as_array_mut().unwrap().extend([
+                serde_json::json!({"name": "rayon", "kind": null}),
+                serde_json::json!({"name": "rand", "kind": "dev"}),
+            ]);
+        }
+    }
+    assert_eq!(computing(&packages), ["rayon"], "a forbidden dependency is found");
+}

@@ -1,19 +1,13 @@
-//! `nirspi bench`: how long things take here, as JSON.
+//! `nirspi bench`: speed on this machine, as JSON.
 
 mod enhance;
 mod omp;
 mod pipeline;
-mod scenes;
 
 use super::networks::NetworkArgs;
 use anyhow::Result;
 use clap::Subcommand;
-use serde::Serialize;
 use std::process::ExitCode;
-use std::time::Instant;
-
-/// Sweeps a second that the patterns' clock allows: as fast as there is anything to reconstruct.
-const FASTEST_SWEEPS_HZ: f64 = nirspi_wire::PATTERN_HZ as f64 / nirspi_wire::PATTERNS as f64;
 
 /// Measure speed on this machine, as JSON
 #[derive(Debug, clap::Args)]
@@ -62,35 +56,4 @@ struct RunArgs {
     /// Print JSON, as it does anyway
     #[arg(long)]
     json: bool,
-}
-
-/// Of several runs, in milliseconds.
-#[derive(Debug, Clone, Serialize)]
-struct Times {
-    median_ms: f64,
-    fastest_ms: f64,
-    slowest_ms: f64,
-}
-
-impl Times {
-    /// Runs `work` as often as said, at least once.
-    fn of<T>(repeats: u32, mut work: impl FnMut() -> T) -> Self {
-        let mut times: Vec<f64> = (0..repeats.max(1))
-            .map(|_| {
-                let start = Instant::now();
-                std::hint::black_box(work());
-                milliseconds(start)
-            })
-            .collect();
-        times.sort_by(f64::total_cmp);
-        Self {
-            median_ms: times[times.len() / 2],
-            fastest_ms: times[0],
-            slowest_ms: times[times.len() - 1],
-        }
-    }
-}
-
-fn milliseconds(start: Instant) -> f64 {
-    start.elapsed().as_secs_f64() * 1e3
 }

@@ -8,7 +8,7 @@ use nirspi::scene::{SceneMap, SceneSource};
 use nirspi::setup::MeasurementSetup;
 use nirspi::virtual_camera::VirtualOptics;
 use nirspi_optics::Projector;
-use nirspi_optics::rain::{Drops, PaperRain, RainError};
+use nirspi_optics::rain::Rainfall;
 use nirspi_recon::Order;
 use std::path::Path;
 use std::str::FromStr;
@@ -47,21 +47,12 @@ pub enum Rain {
 }
 
 impl Rain {
-    /// As it is written on the command line.
-    pub fn name(self) -> &'static str {
+    /// The same for the optics.
+    pub fn rainfall(self) -> Rainfall {
         match self {
-            Self::None => "none",
-            Self::Light => "light",
-            Self::Heavy => "heavy",
-        }
-    }
-
-    /// Its drops; none in dry air.
-    pub fn drops(self) -> Result<Option<Drops>, RainError> {
-        match self {
-            Self::None => Ok(None),
-            Self::Light => PaperRain::LIGHT.drops().map(Some),
-            Self::Heavy => PaperRain::HEAVY.drops().map(Some),
+            Self::None => Rainfall::None,
+            Self::Light => Rainfall::Light,
+            Self::Heavy => Rainfall::Heavy,
         }
     }
 }
@@ -87,7 +78,7 @@ impl SceneArgs {
         let map = source.load(SCENE_PX)?;
         let optics = VirtualOptics::before(&map, distance_mm)
             .map_err(|error| Usage(format!("--distance-m {}: {error}", self.distance_m)))?;
-        let optics = match self.rain.drops()? {
+        let optics = match self.rain.rainfall().drops()? {
             Some(drops) => optics.in_rain(drops).map_err(|error| {
                 Usage(format!("--rain at --distance-m {}: {error}", self.distance_m))
             })?,

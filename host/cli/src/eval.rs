@@ -1,17 +1,17 @@
 //! `nirspi eval`: how good results are: the paper's tables, ours beside them, and what less sampling costs.
 
-mod enhanced;
 mod quality;
 mod sampling;
-mod shot;
 mod table1;
 mod table3;
 mod table4;
 
+use super::camera::Rain;
 use super::range;
 use anyhow::Result;
 use clap::{Args, Subcommand};
-use serde::Serialize;
+use indicatif::{ProgressBar, ProgressStyle};
+use nirspi_eval::shot::{self, FRAMES};
 use std::process::ExitCode;
 
 /// The paper's tables, ours beside them (ours simulated); what less sampling costs
@@ -48,32 +48,31 @@ pub fn run(args: &EvalArgs) -> Result<ExitCode> {
     }
 }
 
-/// The paper's distances, in m (section 5).
-const DISTANCES_M: [f64; 3] = [0.3, 0.6, 1.0];
-
-/// A mean with the half width of its 95 % confidence interval.
-#[derive(Debug, Clone, Copy, Serialize)]
-struct Estimate {
-    mean: f64,
-    /// 1.96 standard errors; `null` of a single value.
-    ci95: Option<f64>,
-    n: usize,
+/// How the pictures of a table are taken.
+#[derive(Debug, Args)]
+struct ExposureArgs {
+    /// Rain, as in the paper's Table 2
+    #[arg(long, value_enum, default_value_t = Rain::Heavy)]
+    rain: Rain,
+    /// Differential sweeps summed into a picture; 244 are 20 ms
+    #[arg(long, value_name = "N", default_value_t = FRAMES,
+          value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    frames: u32,
+    /// Seed of the first picture
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
 }
 
-impl Estimate {
-    /// Of independent values; none of none.
-    fn of(values: &[f64]) -> Option<Self> {
-        let n = values.len();
-        let mean = values.iter().sum::<f64>() / n as f64;
-        let squares: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
-        let ci95 = (n > 1).then(|| 1.96 * (squares / (n - 1) as f64 / n as f64).sqrt());
-        (n > 0).then_some(Self { mean, ci95, n })
+impl ExposureArgs {
+    fn exposure(&self) -> shot::Exposure {
+        shot::Exposure { rain: self.rain.rainfall(), frames: self.frames, seed: self.seed }
     }
+}
 
-    fn text(&self, digits: usize) -> String {
-        match self.ci95 {
-            Some(ci) => format!("{:.digits$} ± {ci:.digits$}", self.mean),
-            None => format!("{:.digits$}", self.mean),
-        }
-    }
+/// A progress bar for `total` pictures.
+fn progress(total: usize, what: &str) -> ProgressBar {
+    let template = format!("{what} {{bar:30}} {{pos}}/{{len}} pictures, {{eta}} left");
+    let style =
+        ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar());
+    ProgressBar::new(total as u64).with_style(style)
 }

@@ -36,6 +36,7 @@ mod upscale;
 
 use clap::{Parser, Subcommand};
 use nirspi::files::FileError;
+use nirspi_eval::EvalError;
 use std::process::ExitCode;
 
 /// An open near-infrared single-pixel camera: capture, virtual camera, reconstruction.
@@ -77,6 +78,19 @@ enum Command {
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 struct Usage(String);
+
+/// A mistake in the arguments that the evaluation found: its settings are the arguments, in snake case.
+fn refused(error: EvalError) -> anyhow::Error {
+    match &error {
+        EvalError::Setting { name, .. } | EvalError::Refused { name, .. } => {
+            let argument = name.replace('_', "-");
+            let told = error.to_string();
+            Usage(format!("--{argument}{}", told.strip_prefix(name).unwrap_or(&told))).into()
+        }
+        _ if error.is_setting() => Usage(error.to_string()).into(),
+        _ => error.into(),
+    }
+}
 
 fn main() -> ExitCode {
     let command = match Cli::try_parse() {

@@ -1,20 +1,15 @@
 //! `nirspi rain`: what rain, fog and single drops do to light; the photon budget; the rain simulator's uniformity.
 
-mod budget;
-mod rig;
-
-use super::{Usage, print};
+use super::{Usage, print, refused};
 use anyhow::{Context, Result};
-use nirspi_optics::mie::{Index, Mie};
-use nirspi_optics::rain::fall::{beta, fall_speed_m_per_s, fall_time_constant_s};
-use nirspi_optics::rain::radar::drops_reflectivity_db;
-use nirspi_optics::rain::{DropClass, Drops, Medium, PaperRain};
-use nirspi_optics::water::Water;
+use nirspi::files::table::Table;
+use nirspi_eval::rain::budget::{self, Settings, Term};
+use nirspi_eval::rain::{self, RainReport, rig};
+use nirspi_optics::mie::Index;
+use nirspi_optics::rain::{DropClass, DropLaw, Drops, PaperRain};
 use serde::Serialize;
-use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::str::FromStr;
 
 /// Say what rain does to light: extinction, scattering, photon budget; one sphere; a rain simulator's uniformity
 ///
@@ -98,10 +93,6 @@ pub struct Args {
     json: bool,
 }
 
-/// Targets of which a budget says anything, in metres: nearer than a quarter of the lens's focal length light fills the
-/// ADC whatever the gain, and the depth sensor's readings end at 65 m.
-const BUDGET_DISTANCES_M: RangeInclusive<f64> = 0.05..=65.0;
-
 /// What falls.
 #[derive(Debug, Clone, clap::Args)]
 pub struct DropArgs {
@@ -116,113 +107,19 @@ pub struct DropArgs {
 
 impl DropArgs {
     /// The drops asked for.
-    pub fn drops(&self) -> Result<Drops> {
-        let law: Law = self.drops.parse().map_err(|e: String| Usage(format!("--drops: {e}")))?;
-        let rate = self.rate_mm_h;
-        let drops = match law {
-            Law::MarshallPalmer => Drops::marshall_palmer(rate),
-            Law::Mono(mm) => Drops::monodisperse(rate, mm),
-            Law::Gamma(shape, slope) => Drops::gamma(rate, shape, slope),
-            Law::Fog(um, water) => Drops::fog(um, water),
-            Law::File(path) => Drops::measured(read_classes(&path)?),
+    fn drops(&self) -> Result<Drops> {
+        let drops = if self.is_file() {
+            Drops::measured(read_classes(Path::new(&self.drops))?)
+        } else {
+            let law = self.drops.parse::<DropLaw>();
+            let law = law.map_err(|e| Usage(format!("--drops: {e}, or a .csv file")))?;
+            law.drops(self.rate_mm_h)
         };
         drops.map_err(|error| Usage(error.to_string()).into())
     }
-}
 
-/// A law of drop sizes.
-#[derive(Debug, Clone, PartialEq)]
-enum Law {
-    MarshallPalmer,
-    Mono(f64),
-    Gamma(f64, f64),
-    Fog(f64, f64),
-    File(PathBuf),
-}
-
-impl FromStr for Law {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let numbers = |numbers: &str, count: usize| {
-            let found: Result<Vec<f64>, _> =
-                numbers.split(',').map(|n| n.trim().parse::<f64>()).collect();
-            found
-                .ok()
-                .filter(|found| found.len() == count)
-                .ok_or_else(|| format!("found {text}, expected {count} number(s) after the colon"))
-        };
-        Ok(match text.split_once(':') {
-            None if text == "marshall-palmer" => Self::MarshallPalmer,
-            Some(("mono", rest)) => Self::Mono(numbers(rest, 1)?[0]),
-            Some(("gamma", rest)) => {
-                let numbers = numbers(rest, 2)?;
-                Self::Gamma(numbers[0], numbers[1])
-            }
-            Some(("fog", rest)) => {
-                let numbers = numbers(rest, 2)?;
-                Self::Fog(numbers[0], numbers[1])
-            }
-            None if text.to_ascii_lowercase().ends_with(".csv") => Self::File(text.into()),
-            _ => {
-                return Err(format!(
-                    "found {text}, expected marshall-palmer, mono:MM, gamma:SHAPE,SLOPE, fog:UM,G or a .csv file"
-                ));
-            }
-        })
-    }
-}
-
-/// Fields of a CSV file, line by line; a first line with no number in it is a heading, lines with # are comments.
-struct Table {
-    path: PathBuf,
-    rows: Vec<(usize, Vec<String>)>,
-}
-
-impl Table {
-    fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
-        let lines = text.lines().enumerate().map(|(at, line)| (at + 1, line.trim()));
-        let mut rows: Vec<(usize, Vec<String>)> = lines
-            .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
-            .map(|(at, line)| {
-                (at, line.split([',', ';', '\t']).map(|f| f.trim().to_owned()).collect())
-            })
-            .collect();
-        let is_heading = |(_, fields): &(usize, Vec<String>)| {
-            fields.iter().all(|field| field.parse::<f64>().is_err())
-        };
-        if rows.first().is_some_and(is_heading) {
-            rows.remove(0);
-        }
-        Ok(Self { path: path.to_owned(), rows })
-    }
-
-    fn number(&self, line: usize, field: &str) -> Result<f64> {
-        field.parse().ok().with_context(|| {
-            format!("{}: line {line}: found {field:?}, expected a number", self.path.display())
-        })
-    }
-
-    /// The last field of each row.
-    fn last_column(&self) -> Result<Vec<f64>> {
-        let last = |(line, fields): &(usize, Vec<String>)| {
-            self.number(*line, fields.last().map_or("", String::as_str))
-        };
-        self.rows.iter().map(last).collect()
-    }
-
-    /// Rows of two numbers.
-    fn pairs(&self, what: &str) -> Result<Vec<[f64; 2]>> {
-        let pair = |(line, fields): &(usize, Vec<String>)| match &fields[..] {
-            [a, b] => Ok([self.number(*line, a)?, self.number(*line, b)?]),
-            _ => anyhow::bail!(
-                "{}: line {line}: found {} numbers, expected 2: {what}",
-                self.path.display(),
-                fields.len()
-            ),
-        };
-        self.rows.iter().map(pair).collect()
+    fn is_file(&self) -> bool {
+        !self.drops.contains(':') && self.drops.to_ascii_lowercase().ends_with(".csv")
     }
 }
 
@@ -234,170 +131,53 @@ fn read_classes(path: &Path) -> Result<Vec<DropClass>> {
 
 pub fn run(args: &Args) -> Result<ExitCode> {
     if args.mie {
-        return sphere(args);
-    }
-    if let Some(path) = &args.uniformity {
-        return rig::measured(path, args.json);
-    }
-    if args.rig {
-        return rig::simulated(args.tilt_deg, args.seed, args.json);
-    }
-    let distance = args.distance_m;
-    if !(distance.is_finite() && distance > 0.0) {
-        return Err(Usage(format!(
-            "--distance-m is {distance}, expected a positive number of metres"
-        ))
-        .into());
-    }
-    if args.budget {
-        if !BUDGET_DISTANCES_M.contains(&distance) {
-            let (near, far) = (BUDGET_DISTANCES_M.start(), BUDGET_DISTANCES_M.end());
-            return Err(Usage(format!(
-                "--distance-m is {distance}, expected {near} to {far} metres for --budget"
-            ))
-            .into());
-        }
-        let wanted = budget::Wanted {
+        sphere(args)?;
+    } else if let Some(path) = &args.uniformity {
+        let volumes = Table::read(path)?.last_column()?;
+        let report = rig::measured(&volumes).with_context(|| path.display().to_string())?;
+        say_or_json(&report, args.json, say_uniformity)?;
+    } else if args.rig {
+        let report = rig::simulated(args.tilt_deg, args.seed).map_err(refused)?;
+        say_or_json(&report, args.json, say_uniformity)?;
+    } else if args.budget {
+        let settings = Settings {
             drops: args.drops.drops()?,
-            distance_m: distance,
+            distance_m: args.distance_m,
             reflectance: args.reflectance,
             exposure_us: args.exposure_us,
             wavelengths_nm: args.wavelengths_nm.clone(),
         };
-        return budget::run(&wanted, args.json);
+        let report = budget::budget(&settings).map_err(refused)?;
+        say_or_json(&report, args.json, say_budget)?;
+    } else {
+        let (name, drops) = (&args.drops.drops, args.drops.drops()?);
+        let radar = !name.starts_with("fog");
+        let report = rain::rain(name, &drops, &args.wavelengths_nm, args.distance_m, radar)
+            .map_err(refused)?;
+        say_or_json(&report, args.json, say)?;
     }
-    rain(args)
+    Ok(ExitCode::SUCCESS)
 }
 
-#[derive(Debug, Serialize)]
-struct SphereReport {
-    x: f64,
-    m_re: f64,
-    m_im: f64,
-    qext: f64,
-    qsca: f64,
-    qabs: f64,
-    qback: f64,
-    g: f64,
+fn say_or_json<R: Serialize>(report: &R, json: bool, say: fn(&R) -> Result<()>) -> Result<()> {
+    if json { print::json(report) } else { say(report) }
 }
 
-fn sphere(args: &Args) -> Result<ExitCode> {
+fn sphere(args: &Args) -> Result<()> {
     let (Some(x), Some(m_re)) = (args.x, args.m_re) else {
         return Err(Usage("--mie needs --x and --m-re".to_owned()).into());
     };
     let index = Index { real: m_re, imaginary: args.m_im };
-    let mut mie = Mie::new();
-    let q = mie.sphere(x, index).map_err(|error| Usage(error.to_string()))?.efficiencies();
-    let report = SphereReport {
-        x,
-        m_re,
-        m_im: args.m_im,
-        qext: q.extinction,
-        qsca: q.scattering,
-        qabs: q.absorption,
-        qback: q.backscatter,
-        g: q.asymmetry,
-    };
+    let report = rain::sphere(x, index).map_err(refused)?;
     if args.json {
-        print::json(&report)?;
-    } else {
-        print::line(format_args!("x = {x}, m = {m_re} + {}i", args.m_im))?;
-        print::line(format_args!("Q_ext  {:.9e}", report.qext))?;
-        print::line(format_args!("Q_sca  {:.9e}", report.qsca))?;
-        print::line(format_args!("Q_abs  {:.9e}", report.qabs))?;
-        print::line(format_args!("Q_back {:.9e}", report.qback))?;
-        print::line(format_args!("g      {:.9}", report.g))?;
+        return print::json(&report);
     }
-    Ok(ExitCode::SUCCESS)
-}
-
-#[derive(Debug, Serialize)]
-struct RainReport {
-    drops: String,
-    rate_mm_per_h: f64,
-    drops_per_m3: f64,
-    water_g_per_m3: f64,
-    z_dr_db: Option<f64>,
-    path_m: f64,
-    wavelengths: Vec<WavelengthReport>,
-    /// Of a single drop size only.
-    fall: Option<FallReport>,
-    note: &'static str,
-}
-
-#[derive(Debug, Serialize)]
-struct WavelengthReport {
-    wavelength_nm: f64,
-    extinction_per_m: f64,
-    scattering_per_m: f64,
-    absorption_per_m: f64,
-    extinction_db_per_km: f64,
-    albedo: f64,
-    asymmetry: f64,
-    /// Lost over the path and back; none of it comes back here by forward scattering.
-    loss_there_and_back: f64,
-    /// `null` in dry air.
-    visibility_m: Option<f64>,
-}
-
-#[derive(Debug, Serialize)]
-struct FallReport {
-    diameter_mm: f64,
-    speed_m_per_s: f64,
-    time_constant_ms: f64,
-    /// For exposures of 25 us (one pattern) and 20 ms (an image).
-    beta_25_us: f64,
-    beta_20_ms: f64,
-}
-
-const NOTE: &str = "extinction counts light diffracted by under a milliradian, half of it, as lost; \
-                    a camera of this resolution does not lose it (docs/physics.md)";
-
-fn rain(args: &Args) -> Result<ExitCode> {
-    let drops = args.drops.drops()?;
-    let mut wavelengths = Vec::new();
-    for &nm in &args.wavelengths_nm {
-        let medium = Medium::new(&drops, nm, Water::Segelstein)
-            .map_err(|error| Usage(format!("--wavelengths-nm: {error}")))?;
-        wavelengths.push(WavelengthReport {
-            wavelength_nm: nm,
-            extinction_per_m: medium.extinction_per_m,
-            scattering_per_m: medium.scattering_per_m,
-            absorption_per_m: medium.absorption_per_m,
-            extinction_db_per_km: medium.extinction_db_per_km(),
-            albedo: medium.albedo(),
-            asymmetry: medium.asymmetry,
-            loss_there_and_back: 1.0 - medium.transmission(2.0 * args.distance_m),
-            visibility_m: Some(medium.visibility_m()).filter(|v| v.is_finite()),
-        });
-    }
-    let fall = match drops.classes() {
-        [one] => Some(FallReport {
-            diameter_mm: one.diameter_mm,
-            speed_m_per_s: fall_speed_m_per_s(one.diameter_mm),
-            time_constant_ms: fall_time_constant_s(one.diameter_mm) * 1e3,
-            beta_25_us: beta(one.diameter_mm, 25e-6),
-            beta_20_ms: beta(one.diameter_mm, 20e-3),
-        }),
-        _ => None,
-    };
-    let report = RainReport {
-        drops: args.drops.drops.clone(),
-        rate_mm_per_h: drops.rate_mm_per_h(),
-        drops_per_m3: drops.concentration_per_m3(),
-        water_g_per_m3: drops.liquid_water_g_per_m3(),
-        z_dr_db: drops_reflectivity_db(&drops).filter(|_| !args.drops.drops.starts_with("fog")),
-        path_m: args.distance_m,
-        wavelengths,
-        fall,
-        note: NOTE,
-    };
-    if args.json {
-        print::json(&report)?;
-    } else {
-        say(&report)?;
-    }
-    Ok(ExitCode::SUCCESS)
+    print::line(format_args!("x = {x}, m = {m_re} + {}i", args.m_im))?;
+    print::line(format_args!("Q_ext  {:.9e}", report.qext))?;
+    print::line(format_args!("Q_sca  {:.9e}", report.qsca))?;
+    print::line(format_args!("Q_abs  {:.9e}", report.qabs))?;
+    print::line(format_args!("Q_back {:.9e}", report.qback))?;
+    print::line(format_args!("g      {:.9}", report.g))
 }
 
 fn say(report: &RainReport) -> Result<()> {
@@ -436,4 +216,51 @@ fn say(report: &RainReport) -> Result<()> {
         ))?;
     }
     Ok(())
+}
+
+fn say_budget(report: &budget::Report) -> Result<()> {
+    let budget::Report { reflectance, distance_m, exposure_us, .. } = report;
+    print::line(format_args!(
+        "one pixel, target of reflectance {reflectance} at {distance_m} m, {exposure_us} us a pattern (simulated)"
+    ))?;
+    for Term { name, value, unit, how } in &report.terms {
+        print::line(format_args!("{name:<28} {:>12} {unit:<10} {how}", figure(*value)))?;
+    }
+    print::line(format_args!(
+        "{} klx of daylight from such a target, through the lens and a filter of {} nm (ASTM G173-03):",
+        report.ambient_klx, report.filter_width_nm
+    ))?;
+    for day in &report.daylight {
+        print::line(format_args!(
+            "{:>8} nm: {:>6} W/m2 on the target, {:>6} nW and {:>6} photons a sample on the detector",
+            day.wavelength_nm,
+            figure(day.on_target_w_per_m2),
+            figure(day.on_detector_nw),
+            figure(day.photons_per_sample)
+        ))?;
+    }
+    Ok(())
+}
+
+/// Four digits, with an exponent where it is shorter.
+fn figure(value: f64) -> String {
+    if value == 0.0 || (1e-3..1e6).contains(&value.abs()) {
+        let digits = (3 - value.abs().max(1e-3).log10().floor() as i32).clamp(0, 6) as usize;
+        format!("{value:.digits$}")
+    } else {
+        format!("{value:.3e}")
+    }
+}
+
+fn say_uniformity(report: &rig::Report) -> Result<()> {
+    let from = match report.tilt_deg {
+        Some(tilt) => {
+            format!("simulated: six nozzles in two rows, floor tilted by {tilt} degrees")
+        }
+        None => "measured".to_owned(),
+    };
+    print::line(format_args!(
+        "uniformity (Christiansen) {:.2} % of {} volumes, mean {:.4}, {:.4} to {:.4} ({from})",
+        report.uniformity_percent, report.containers, report.mean, report.least, report.most
+    ))
 }

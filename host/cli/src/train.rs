@@ -2,8 +2,6 @@
 
 mod data;
 mod degrade;
-#[cfg(feature = "train")]
-mod folder;
 mod network;
 #[cfg(feature = "train")]
 mod run;

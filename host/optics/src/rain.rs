@@ -3,7 +3,8 @@
 //! | module | from | to |
 //! |---|---|---|
 //! | [`drops`] | a rain rate, a law of sizes | drops per cubic metre, by diameter |
-//! | [`paper`] | light or heavy | the rain of the paper's Table 2 |
+//! | [`law`] | text | a law of sizes |
+//! | [`paper`], [`rainfall`] | the paper's Table 2 | light rain, heavy rain, dry air |
 //! | [`fall`] | diameter, air density | fall speed, time constant, share of an exposure |
 //! | [`medium`] | drops, wavelength | extinction, scattering, absorption, scattering angles |
 //! | [`blur`] | scattering angles, distance | where forward-scattered light lands on the target |
@@ -20,9 +21,11 @@ pub mod blur;
 pub mod drops;
 pub mod fall;
 pub mod falling;
+pub mod law;
 pub mod medium;
 pub mod paper;
 pub mod radar;
+pub mod rainfall;
 pub mod spots;
 pub mod veil;
 pub mod weather;
@@ -30,8 +33,10 @@ pub mod weather;
 pub use blur::ForwardBlur;
 pub use drops::{DropClass, Drops};
 pub use falling::{BeamShadows, FallingDrops};
+pub use law::{DropLaw, ParseDropLawError};
 pub use medium::{Medium, ScatteringAngles};
 pub use paper::PaperRain;
+pub use rainfall::Rainfall;
 pub use spots::RainySpots;
 pub use veil::Veil;
 pub use weather::Weather;

@@ -14,6 +14,7 @@ pub mod npz;
 pub mod order_table;
 pub mod output;
 pub mod problem;
+pub mod table;
 
 mod archive;
 mod array;

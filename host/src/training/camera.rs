@@ -10,7 +10,7 @@ use crate::session::{IgnorePackets, Session, SessionError};
 use crate::virtual_camera::{MemoryLink, VirtualOptics, VirtualOpticsError};
 use nirspi_nets::data::SIDE_PX;
 use nirspi_nets::degrade::{Degrade, DegradeError, Depth, Reading, defocus};
-use nirspi_optics::rain::{Drops, PaperRain, RainError, Weather};
+use nirspi_optics::rain::{Drops, PaperRain, RainError, Rainfall, Weather};
 use nirspi_optics::water::Water;
 use nirspi_optics::{LEDS, Projector, Scene, SceneError, WAVELENGTH_NM};
 use nirspi_recon::{
@@ -38,17 +38,6 @@ const FULLY_SAMPLED: f32 = 0.7;
 const LEAST_SAMPLING: f32 = 0.25;
 /// Share of the depth maps with zones that give nothing, and of no depth at all.
 const NO_DEPTH: f32 = 0.2;
-
-/// Rain as in the paper's Table 2.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Rainfall {
-    /// Dry air.
-    None,
-    /// [`PaperRain::LIGHT`].
-    Light,
-    /// [`PaperRain::HEAVY`].
-    Heavy,
-}
 
 /// Under what a picture is taken.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -7,7 +7,8 @@ mod camera;
 pub mod fonts;
 pub mod pairs;
 
-pub use camera::{CameraPicture, Conditions, LinearCamera, Rainfall, TrainingCameraError};
+pub use camera::{CameraPicture, Conditions, LinearCamera, TrainingCameraError};
+pub use nirspi_optics::rain::Rainfall;
 
 use nirspi_nets::degrade::{AnalyticCamera, Degrade, DegradeError, Reading};
 use rand::RngExt;

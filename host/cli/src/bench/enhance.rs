@@ -1,9 +1,10 @@
 //! `nirspi bench enhance`: the learned stages, timed.
 
-use super::{FASTEST_SWEEPS_HZ, RunArgs, Times, scenes};
+use super::RunArgs;
 use crate::print;
 use anyhow::Result;
-use nirspi_nets::{Images, Method, Options, UsedWeights, fusion};
+use nirspi_eval::bench::enhance::{Stages, Timed, time};
+use nirspi_nets::{Method, Options, UsedWeights};
 use serde::Serialize;
 use std::num::NonZeroU32;
 use std::process::ExitCode;
@@ -33,47 +34,30 @@ struct Report {
     steps: u32,
     consistency: bool,
     repeats: u32,
-    first_ms: f64,
-    /// Everything.
     #[serde(flatten)]
-    whole: Times,
-    frames_per_s: f64,
-    /// Frames a second, of the sweeps a second that the patterns' clock allows.
-    of_fastest_sweeps: f64,
-    /// Parts of it, each on its own.
-    estimate: Times,
-    fusion: Times,
+    timed: Timed,
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let mut networks = args.run.networks.open(&["fsrcnn", "estimator", "diffusion"])?;
-    let (estimator, alone) = (networks.estimator()?, networks.fusion()?);
+    let run = &args.run;
+    let mut networks = run.networks.open(&["fsrcnn", "estimator", "diffusion"])?;
     let method = Method::Diffusion { steps: args.steps };
-    let enhancer = networks.enhancer(method)?;
-    let options =
-        Options { consistency: !args.run.no_consistency, gate: false, ..Options::default() };
-    let values = scenes::blobs(args.run.frames as usize, args.run.seed);
-    let images: Images<'_, { fusion::SIDE }> = Images::new(&values)?;
-    let enhance = || enhancer.enhance(images, None, &options, &mut |_| {});
-    let first_ms = Times::of(1, enhance).median_ms;
-    enhance()?;
-    estimator.estimate(images);
-    let whole = Times::of(args.run.repeats, enhance);
-    let frames_per_s = f64::from(args.run.frames) / whole.median_ms * 1e3;
+    let stages = Stages {
+        estimator: networks.estimator()?,
+        fusion: networks.fusion()?,
+        enhancer: networks.enhancer(method)?,
+    };
+    let options = Options { consistency: !run.no_consistency, gate: false, ..Options::default() };
+    let timed = time(&stages, run.frames, &options, run.repeats, run.seed)?;
     print::json(&Report {
         device: networks.device().name().to_owned(),
         weights: networks.used().to_vec(),
-        threads: rayon::current_num_threads(),
-        frames: args.run.frames,
+        threads: nirspi_eval::bench::threads(),
+        frames: run.frames,
         steps: args.steps.get(),
         consistency: options.consistency,
-        repeats: args.run.repeats,
-        first_ms,
-        whole,
-        frames_per_s,
-        of_fastest_sweeps: frames_per_s / FASTEST_SWEEPS_HZ,
-        estimate: Times::of(args.run.repeats, || estimator.estimate(images)),
-        fusion: Times::of(args.run.repeats, || alone.upscale(images, None)),
+        repeats: run.repeats,
+        timed,
     })?;
     Ok(ExitCode::SUCCESS)
 }

@@ -1,35 +1,21 @@
 //! `nirspi eval quality`: how good enhanced images are on characters that no training has seen, and what becomes of
 //! scenes that are no characters.
-//!
-//! The law: every row gets the same readings, and its figures come with the number of images they rest on.
 
-mod bootstrap;
-mod characters;
-mod figures;
-mod measure;
-mod others;
-mod rows;
-
-use super::shot::progress;
+use super::progress;
 use crate::print;
 use crate::report::to_json;
 use anyhow::Result;
-use characters::Characters;
-use indicatif::ProgressBar;
-pub(super) use measure::halved;
-use measure::{Condition, Figures, Judges};
+use nirspi::files::image::encode_rgb;
 use nirspi::files::output::OutputDir;
-use nirspi_nets::{Device, Networks};
-pub(super) use rows::{Kind, Row};
-use serde::Serialize;
+use nirspi_eval::quality::{Condition, Measured, Report, Settings, Study, Version};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Quality against blur, noise and number of steps, on characters never seen in training; and what is no character
 ///
 /// Sharp 64 x 64 images are blurred (Gaussian, sigma in pixels of 64), sampled to 32 x 32 by means of 2 x 2, given
-/// noise, and enhanced by every row: Lanczos, three classical methods that are told blur and noise, and the networks,
-/// which are told nothing. Writes quality.json, charts and a picture of scenes that are no letters.
+/// noise, and enhanced by every row: Lanczos, three classical methods that get blur and noise, and the networks, which
+/// get neither. Writes quality.json, charts and a picture of scenes that are no letters.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n\
     \x20 nirspi eval quality --data chars74k/ --scenes scenes/ --spi spi/ --out quality/")]
@@ -73,79 +59,26 @@ pub struct Args {
     json: bool,
 }
 
-/// Blur of the curves over noise and steps, and noise of those over blur and steps: the middle of issue 6's targets.
-const MIDDLE: Condition = Condition { sigma_px: 2.0, noise: 0.03 };
-
-/// Blurs, in pixels of 64.
-const SIGMAS_PX: [f32; 6] = [0.3, 0.7, 1.0, 2.0, 3.0, 4.0];
-
-/// Standard deviations of noise.
-const NOISES: [f32; 5] = [0.0, 0.01, 0.03, 0.05, 0.08];
-
-/// Nothing to undo but the sampling.
-const UNTOUCHED: Condition = Condition { sigma_px: 0.0, noise: 0.0 };
-
-/// Steps of the curves over steps.
-const STEPS: [u32; 6] = [1, 2, 4, 10, 50, 500];
-
-#[derive(Debug, Serialize)]
-struct Report {
-    simulated: bool,
-    seed: u64,
-    /// Stacks and how many images of each.
-    images: Vec<characters::Origin>,
-    weights: Vec<rows::Version>,
-    /// Each row at each condition.
-    conditions: Vec<Figures>,
-    /// Each row with so many steps at the middle condition.
-    steps: Vec<Figures>,
-    others: Vec<others::Case>,
-    notes: Vec<String>,
-}
-
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let mut networks = Networks::built_in(Device::cpu());
-    if let Some(folder) = &args.weights {
-        networks = networks.with_folder(folder);
-    }
-    let judges = Judges::new(&mut networks)?;
-    let held_out = args.held_out.as_deref();
-    let characters = Characters::read(&args.data, held_out, args.count as usize, args.seed)?;
-    let few = characters.first(args.sampler_count as usize);
-    let scenes = others::cases(args.scenes.as_deref(), args.spi.as_deref(), args.seed)?;
-
-    let conditions = conditions();
-    let rows: Vec<Row> =
-        Kind::ALL.into_iter().map(|kind| Row::new(kind, &mut networks)).collect::<Result<_>>()?;
-    let stepped: Vec<Kind> = stepped(args.most_steps);
-    let work = rows.len() * conditions.len() * characters.len() + stepped.len() * few.len();
-    let bar = progress(work, "quality");
-    let measured = over(&rows, &conditions, &characters, &judges, args.seed, &bar)?;
-    let mut steps = Vec::new();
-    for kind in stepped {
-        let row = Row::new(kind, &mut networks)?;
-        steps.extend(over(&[row], &[MIDDLE], &few, &judges, args.seed, &bar)?);
-    }
-    bar.finish_and_clear();
-    let shown = others::enhance(&scenes, &Row::new(Kind::Diffusion(1), &mut networks)?)?;
-
-    let mut out = OutputDir::create(&args.out)?;
-    for (name, picture) in figures::all(&measured, &steps, &characters, &few) {
-        out.write(name, &nirspi::files::image::encode_rgb(&picture))?;
-    }
-    out.write("others.png", &nirspi::files::image::encode_rgb(&shown.picture.render()))?;
-    let report = Report {
-        simulated: true,
+    let study = Study::new(Settings {
+        data: args.data.clone(),
+        held_out: args.held_out.clone(),
+        scenes: args.scenes.clone(),
+        spi: args.spi.clone(),
+        weights: args.weights.clone(),
+        count: args.count as usize,
+        sampler_count: args.sampler_count as usize,
+        most_steps: args.most_steps,
         seed: args.seed,
-        images: characters.origins().to_vec(),
-        weights: rows::versions(&mut networks)?,
-        conditions: measured,
-        steps,
-        others: shown.cases,
-        notes: characters.notes().to_vec(),
-    };
-    let json = to_json(&report)?;
-    out.write("quality.json", json.as_bytes())?;
+    })?;
+    let bar = progress(study.images(), "quality");
+    let Measured { report, pictures } = study.run(&|images| bar.inc(images as u64))?;
+    bar.finish_and_clear();
+    let mut out = OutputDir::create(&args.out)?;
+    for (name, picture) in &pictures {
+        out.write(name, &encode_rgb(picture))?;
+    }
+    out.write("quality.json", to_json(&report)?.as_bytes())?;
     out.commit()?;
     if args.json {
         print::json(&report)?;
@@ -155,60 +88,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// All conditions, each once.
-fn conditions() -> Vec<Condition> {
-    let mut all = vec![UNTOUCHED];
-    all.extend(SIGMAS_PX.map(|sigma_px| Condition { sigma_px, ..MIDDLE }));
-    all.extend(
-        NOISES.map(|noise| Condition { noise, ..MIDDLE }).into_iter().filter(|c| *c != MIDDLE),
-    );
-    all
-}
-
-/// The rows whose steps are counted, and those that they are compared with.
-fn stepped(most: u32) -> Vec<Kind> {
-    let mut all = vec![Kind::Lanczos, Kind::Classical(figures::BEST_CLASSICAL), Kind::Gan];
-    for steps in STEPS.into_iter().filter(|&steps| steps <= most) {
-        if steps <= figures::MOST_BRIDGE_STEPS {
-            all.push(Kind::Diffusion(steps));
-        }
-        all.push(Kind::Ancestral(steps));
-    }
-    all
-}
-
-fn over(
-    rows: &[Row],
-    conditions: &[Condition],
-    characters: &Characters,
-    judges: &Judges,
-    seed: u64,
-    bar: &ProgressBar,
-) -> Result<Vec<Figures>> {
-    let sharp = judges.judge(&characters.values())?;
-    let mut all = Vec::new();
-    for &condition in conditions {
-        let readings = condition.readings(characters, seed);
-        for row in rows {
-            let images = row.enhance(&readings, condition, bar)?;
-            all.extend(judges.figures(
-                row.kind(),
-                condition,
-                characters,
-                &sharp,
-                &readings,
-                &images,
-            )?);
-        }
-    }
-    Ok(all)
-}
-
 fn say(args: &Args, report: &Report) -> Result<()> {
     for origin in &report.images {
         print::line(format_args!("{}: {} images, {}", origin.stack, origin.images, origin.choice))?;
     }
-    let version = |v: &rows::Version| format!("{} {}", v.model, v.version);
+    let version = |v: &Version| format!("{} {}", v.model, v.version);
     let versions: Vec<String> = report.weights.iter().map(version).collect();
     print::line(format_args!("weights: {}", versions.join(", ")))?;
     print::line("PSNR dB / SSIM / Fréchet character distance / characters seen right")?;

@@ -1,19 +1,13 @@
 //! `nirspi eval table4`: spatial resolution in rain, NIR-SPI, VIS and networks, by slanted edge and by bars.
 
-use super::enhanced::{Enhancers, Picture};
-use super::shot::{Conditions, Exposure, Shots, progress, shoot, white_level};
-use super::{DISTANCES_M, Estimate};
-use crate::camera::Rain;
+use super::{ExposureArgs, progress};
 use crate::print;
 use crate::report::to_json;
 use anyhow::Result;
 use nirspi::files::image::encode_rgb;
 use nirspi::files::output::OutputDir;
-use nirspi::picture::{Axis, Chart, Line};
-use nirspi::resolution::{bar_scene, bar_transfer, edge_mtf, edge_scene, line_width_px};
-use nirspi_optics::{Projector, Scene};
-use rayon::prelude::*;
-use serde::Serialize;
+use nirspi_eval::estimate::Estimate;
+use nirspi_eval::table4::{Report, Settings, chart, table4};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -32,7 +26,7 @@ pub struct Args {
           value_parser = clap::value_parser!(u32).range(20..=100_000))]
     scenes: u32,
     #[command(flatten)]
-    exposure: Exposure,
+    exposure: ExposureArgs,
     /// Folder for table4.json and table4.png
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -41,127 +35,11 @@ pub struct Args {
     json: bool,
 }
 
-/// Groups that the pictures of the edge are averaged in; their spread gives the interval.
-const GROUPS: u32 = 10;
-
-/// Pictures of each bar width, averaged.
-const BAR_PICTURES: u32 = 10;
-
-/// Bars tried, in pixels of the grid.
-const BARS_PX: [f64; 10] = [1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0];
-
-/// Contrast that bars must keep to count as resolved.
-const RESOLVED: f64 = 0.1;
-
-/// Edge of the drawn scenes, in pixels.
-const SCENE_PX: usize = 512;
-
-/// The paper's rows, in mm.
-const PAPER: [(Picture, [f64; 3]); 4] = [
-    (Picture::Vis, [45.0, 48.0, 60.0]),
-    (Picture::NirSpi, [5.0, 25.0, 45.0]),
-    (Picture::Gan, [5.0, 18.0, 40.0]),
-    (Picture::Diffusion, [5.0, 15.0, 25.0]),
-];
-
-/// What the figures rest on.
-fn reading() -> Vec<String> {
-    let projector = Projector::default();
-    let of = |length: fn(&Projector, f64) -> f64| {
-        DISTANCES_M.map(|m| format!("{:.1}", length(&projector, m * 1e3))).join(", ")
-    };
-    vec![
-        format!(
-            "NIR-SPI: a pixel is {} mm wide and the lens's defocus disc {} mm; the paper's 5, 25, 45 mm lie close to \
-             the disc's width, ours to the width of a line that survives it",
-            of(|p, mm| p.field_mm(mm) / 32.0),
-            of(Projector::blur_mm)
-        ),
-        "VIS: a focused camera on the same grid; the paper's 45 to 60 mm are coarser than its 43 mm letters".to_owned(),
-        "networks: on their own grid of 64 x 64. They are not linear, and know edges: what they make of one edge or of \
-         bars is no promise for finer things, and bars that are gone stay gone"
-            .to_owned(),
-        "what rain does to these: compare with --rain none".to_owned(),
-    ]
-}
-
-#[derive(Debug, Serialize)]
-struct Report {
-    simulated: bool,
-    rain: Rain,
-    scenes: u32,
-    frames: u32,
-    seed: u64,
-    rows: Vec<Row>,
-    reading: Vec<String>,
-}
-
-#[derive(Debug, Serialize)]
-struct Row {
-    image: Picture,
-    distance_m: f64,
-    pixel_mm: f64,
-    defocus_mm: f64,
-    mtf50_mm: Option<Estimate>,
-    mtf10_mm: Option<Estimate>,
-    /// The finest bars, of all wider ones are resolved; `null`: none of those tried.
-    bars_mm: Option<f64>,
-    /// Bar width in mm and contrast kept.
-    bar_contrast: Vec<(f64, f64)>,
-    paper_mm: f64,
-}
-
-/// Pictures of one row: of the edge, and of each width of bars.
-struct Pictures {
-    side: usize,
-    edges: Vec<Vec<f32>>,
-    bars: Vec<Vec<Vec<f32>>>,
-}
-
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let enhancers = Enhancers::new()?;
-    let bars = BARS_PX.len() as u32 * BAR_PICTURES;
-    let bar = progress(DISTANCES_M.len() * (args.scenes + bars) as usize, "table 4");
-    let mut rows = Vec::new();
-    for (k, distance_m) in DISTANCES_M.into_iter().enumerate() {
-        let take_all = |scene: &[f32], count: u32| -> Result<Vec<Shots>> {
-            let one = |i: u32| {
-                let shots = take(args, scene.to_vec(), distance_m, u64::from(i));
-                bar.inc(1);
-                shots
-            };
-            (0..count).into_par_iter().map(one).collect()
-        };
-        let edges = take_all(&edge_scene(SCENE_PX), args.scenes)?;
-        let bars: Vec<Vec<Shots>> = BARS_PX
-            .iter()
-            .map(|bar_px| {
-                take_all(&bar_scene(SCENE_PX, bar_px * SCENE_PX as f64 / 32.0), BAR_PICTURES)
-            })
-            .collect::<Result<_>>()?;
-        let conditions =
-            Conditions { distance_m, rain: args.exposure.rain, frames: args.exposure.frames };
-        let white = white_level(conditions, args.exposure.seed)?;
-        for (image, paper_mm) in PAPER {
-            let of = |shots: &[Shots]| pictures(image, shots, white, &enhancers);
-            let (side, edges) = of(&edges)?;
-            let bar_pictures = bars.iter().map(|shots| Ok(of(shots)?.1)).collect::<Result<_>>()?;
-            let pictures = Pictures { side, edges, bars: bar_pictures };
-            rows.push(row(image, distance_m, paper_mm[k], &pictures, &bars));
-        }
-    }
+    let settings = Settings { scenes: args.scenes, exposure: args.exposure.exposure() };
+    let bar = progress(settings.pictures(), "table 4");
+    let report = table4(&settings, &|| bar.inc(1))?;
     bar.finish_and_clear();
-    rows.sort_by_key(|row: &Row| PAPER.iter().position(|(image, _)| *image == row.image));
-
-    let report = Report {
-        simulated: true,
-        rain: args.exposure.rain,
-        scenes: args.scenes,
-        frames: args.exposure.frames,
-        seed: args.exposure.seed,
-        rows,
-        reading: reading(),
-    };
     if let Some(path) = &args.out {
         let mut out = OutputDir::create(path)?;
         out.write("table4.json", to_json(&report)?.as_bytes())?;
@@ -176,123 +54,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// A scene that fills the field.
-fn take(args: &Args, reflectance: Vec<f32>, distance_m: f64, i: u64) -> Result<Shots> {
-    let field_mm = Projector::default().field_mm(distance_m * 1e3);
-    // The mean of what lies around it, so that the field's own edge adds little.
-    let scene = Scene::new(reflectance, SCENE_PX, field_mm)?.with_surround(0.5)?;
-    let conditions =
-        Conditions { distance_m, rain: args.exposure.rain, frames: args.exposure.frames };
-    shoot(scene, conditions, args.exposure.seed.wrapping_add(i))
-}
-
-/// The pictures of a row and their side.
-fn pictures(
-    image: Picture,
-    shots: &[Shots],
-    white: f32,
-    enhancers: &Enhancers,
-) -> Result<(usize, Vec<Vec<f32>>)> {
-    let all: Vec<&Shots> = shots.iter().collect();
-    if let Some(pictures) = enhancers.pictures(image, &all, &vec![white; shots.len()])? {
-        return Ok((64, pictures));
-    }
-    let of = |shot: &Shots| {
-        if image == Picture::Vis { &shot.vis } else { &shot.nir_spi }.pixels().to_vec()
-    };
-    Ok((32, shots.iter().map(of).collect()))
-}
-
-/// The sum of pictures.
-fn sum(pictures: &[Vec<f32>]) -> Vec<f32> {
-    let mut sum = vec![0.0; pictures.first().map_or(0, Vec::len)];
-    for picture in pictures {
-        sum.iter_mut().zip(picture).for_each(|(sum, pixel)| *sum += pixel);
-    }
-    sum
-}
-
-fn row(
-    image: Picture,
-    distance_m: f64,
-    paper_mm: f64,
-    pictures: &Pictures,
-    bars: &[Vec<Shots>],
-) -> Row {
-    let projector = Projector::default();
-    let field_mm = projector.field_mm(distance_m * 1e3);
-    let side = pictures.side;
-    let pixel_mm = field_mm / side as f64;
-    let group = pictures.edges.len() / GROUPS as usize;
-    let curves: Vec<_> =
-        pictures.edges.chunks_exact(group).map(|edges| edge_mtf(&sum(edges), side)).collect();
-    let contrast = |k: usize| {
-        let truth =
-            |shot: &Shots| if side == 64 { shot.truth_fine.clone() } else { shot.truth.clone() };
-        let truth = bars[k].first().map(truth).unwrap_or_default();
-        bar_transfer(&sum(&pictures.bars[k]), &truth, side, BARS_PX[k] * side as f64 / 32.0)
-    };
-    let contrasts: Vec<f64> = (0..BARS_PX.len()).map(contrast).collect();
-    // Bars are counted in pixels of 32 x 32, whatever the picture's.
-    let bar_mm = |px: f64| px * field_mm / 32.0;
-    let at = |level| {
-        let widths: Vec<f64> = curves
-            .iter()
-            .filter_map(|mtf| line_width_px(mtf, level).map(|px| px * pixel_mm))
-            .collect();
-        Estimate::of(&widths)
-    };
-    let unresolved =
-        contrasts.iter().rposition(|&contrast| contrast.is_nan() || contrast < RESOLVED);
-    let finest = BARS_PX.get(unresolved.map_or(0, |at| at + 1));
-    Row {
-        image,
-        distance_m,
-        pixel_mm,
-        defocus_mm: if image == Picture::Vis { 0.0 } else { projector.blur_mm(distance_m * 1e3) },
-        mtf50_mm: at(0.5),
-        mtf10_mm: at(0.1),
-        bars_mm: finest.map(|&px| bar_mm(px)),
-        bar_contrast: BARS_PX.iter().map(|&px| bar_mm(px)).zip(contrasts.iter().copied()).collect(),
-        paper_mm,
-    }
-}
-
-fn chart(report: &Report) -> Chart {
-    let lines = report.rows.iter().enumerate().map(|(k, row)| Line {
-        name: format!("{}, {} m", row.image.name(), row.distance_m),
-        colour: k,
-        dashed: k >= 6,
-        points: row.bar_contrast.iter().map(|&(mm, contrast)| (mm, contrast.max(0.0))).collect(),
-    });
-    Chart {
-        header: "Contrast that bars keep".to_owned(),
-        x: Axis {
-            name: "width of a bar on the target, mm".to_owned(),
-            from: 1.0,
-            to: 100.0,
-            logarithmic: true,
-            ticks: vec![1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0],
-        },
-        y: Axis {
-            name: "contrast kept".to_owned(),
-            from: 0.0,
-            // Room for the legend.
-            to: 1.5,
-            logarithmic: false,
-            ticks: vec![0.0, 0.1, 0.5, 1.0],
-        },
-        lines: lines.collect(),
-        footer: format!("simulated: rain {}, {BAR_PICTURES} pictures a point", report.rain.name()),
-    }
-}
-
 fn say(report: &Report) -> Result<()> {
     print::line(format_args!(
         "Table 4, rain {}, {} edges a distance, {} sweeps a picture; line width in mm (ours simulated; ± is 95 %)",
-        report.rain.name(),
-        report.scenes,
-        report.frames
+        report.rain, report.scenes, report.frames
     ))?;
     print::line(
         "image                distance  pixel  defocus  MTF50            MTF10            bars   paper",

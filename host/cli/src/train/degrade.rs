@@ -1,11 +1,12 @@
 //! `nirspi train degrade`: scenes and the virtual camera's pictures of them, as a file.
 
-use super::data::{DataArgs, Found};
+use super::data::DataArgs;
 use crate::print;
 use anyhow::Result;
 use indicatif::{ProgressBar, ProgressStyle};
 use nirspi::files::output::write_atomic;
 use nirspi::training::{LinearCamera, pairs};
+use nirspi_eval::train::Found;
 use nirspi_nets::data::Part;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -51,7 +52,7 @@ struct Report {
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let (scenes, data) = args.data.scenes(args.seed)?;
+    let (scenes, data) = args.data.data().scenes(args.seed)?;
     let camera = LinearCamera::new(args.seed)?;
     let bar = ProgressBar::new(u64::from(args.count)).with_style(
         ProgressStyle::with_template("degrade {bar:30} {pos}/{len} pairs, {eta} left")

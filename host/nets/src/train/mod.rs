@@ -84,6 +84,17 @@ pub enum Score {
     AccuracyPercent,
 }
 
+impl Score {
+    /// The unit of the number.
+    #[must_use]
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::PsnrDb | Self::EstimateDb => "dB",
+            Self::AccuracyPercent => "%",
+        }
+    }
+}
+
 impl Model {
     /// What it is judged by.
     #[must_use]

@@ -1,0 +1,81 @@
+//! The same problem on a GPU: the time includes the way of measurements there, and of solutions and images back.
+
+use super::super::{milliseconds, scenes};
+use super::{Precision, Report, Settings, Timed, matrix, report};
+use crate::error::Result;
+use nirspi::files::problem::ProblemFile;
+use nirspi_recon::Side;
+use nirspi_recon::omp::gpu::{Device, DeviceDictionary, DevicePictures};
+use nirspi_recon::omp::{BackendError, Limits, Solution};
+use std::time::Instant;
+
+/// Times `problem` on a GPU, after a run to warm up.
+///
+/// # Errors
+/// [`Precision::F64`], which kernels do not have; a device that fails.
+pub fn on_gpu(problem: &ProblemFile, settings: &Settings, device: &Device) -> Result<Report> {
+    if settings.precision == Precision::F64 {
+        return Err(BackendError::Precision.into());
+    }
+    let start = Instant::now();
+    let dictionary = DeviceDictionary::new(device, matrix(problem), settings.normalise)?;
+    let prepare_ms = milliseconds(start);
+    // Without pictures of the atoms, an image is the coefficients at their places.
+    let pictures = settings.cosines.then(|| cosines(&dictionary)).transpose()?;
+    let solve = || solve(settings, problem, &dictionary, pictures.as_ref());
+    let (mut solutions, mut solved_in_f64, pixels) = solve()?;
+    let mut times_ms = Vec::new();
+    for _ in 0..settings.repeats.max(1) {
+        let start = Instant::now();
+        (solutions, solved_in_f64, _) = solve()?;
+        times_ms.push(milliseconds(start));
+    }
+    let frames = (problem.frames.len() / problem.measurements) as f64;
+    // An index, a step, a pivot and a coefficient for each atom, and what the search ended with.
+    let solution = 4 * problem.sparsity * 4 + 32;
+    let transferred_bytes_per_frame =
+        (4 * problem.measurements + solution) as f64 + 4.0 * pixels as f64 / frames;
+    let timed = Timed {
+        backend: device.backend(),
+        device: Some(device.name().to_owned()),
+        software: device.is_software(),
+        prepare_ms,
+        times_ms,
+        solutions,
+        solved_in_f64,
+        transferred_bytes_per_frame,
+    };
+    Ok(report(settings, problem, timed))
+}
+
+/// Solutions, how many of them took double precision, and how many pixels came back.
+fn solve(
+    settings: &Settings,
+    problem: &ProblemFile,
+    dictionary: &DeviceDictionary,
+    pictures: Option<&DevicePictures>,
+) -> Result<(Vec<Solution>, usize, usize)> {
+    let limits = Limits::atoms(problem.sparsity);
+    let solved = dictionary.in_turns(problem.sparsity, &problem.frames, |y| {
+        let there = dictionary.pursue(&limits, &dictionary.upload(y)?)?;
+        let images = dictionary.images(&there, pictures)?;
+        let (found, doubtful) = dictionary.download_with_doubts(&there)?;
+        Ok((found, doubtful, images.download()?.len()))
+    })?;
+    let (mut solutions, mut doubtful, mut pixels) = (Vec::new(), Vec::new(), 0);
+    for (mut found, doubts, back) in solved {
+        doubtful.extend(doubts.into_iter().map(|i| solutions.len() + i));
+        solutions.append(&mut found);
+        pixels += back;
+    }
+    match settings.precision {
+        Precision::F32 => doubtful.clear(),
+        _ => dictionary.settle(&limits, &problem.frames, &doubtful, &mut solutions)?,
+    }
+    Ok((solutions, doubtful.len(), pixels))
+}
+
+/// What the atoms of a random problem look like.
+fn cosines(dictionary: &DeviceDictionary) -> Result<DevicePictures> {
+    Ok(dictionary.upload_pictures(&scenes::cosines(), Side::INSTRUMENT.area())?)
+}

@@ -1,0 +1,43 @@
+//! Evaluation of the nirspi camera: how good images are, how far the camera sees, how fast the host computes.
+//!
+//! Every report is a plain struct that serialises to JSON; nothing here prints. Functions that take long call `done` after each
+//! unit of work, so that a caller can show progress.
+//!
+//! | module | question |
+//! |---|---|
+//! | [`table1`] | how long does each stage of one picture take (the paper's Table 1)? |
+//! | [`range`] | how far does the camera see in rain (Table 2)? |
+//! | [`table3`] | how good are images in rain (Table 3)? |
+//! | [`table4`] | how fine is the spatial resolution in rain (Table 4)? |
+//! | [`quality`] | how good are enhanced images, against blur, noise and number of steps? |
+//! | [`sampling`] | how good are images of a part of the patterns, by order, basis and method? |
+//! | [`sets`] | how alike are two stacks of images, one by one and as sets? |
+//! | [`bench`] | how many frames a second does this machine reconstruct and enhance? |
+//! | [`rain`] | what does rain do to light, and to the photon budget of a pixel? |
+//! | [`train`] | how does a network learn from a user's characters? |
+//!
+//! [`shot`] takes the pictures of the tables through the virtual camera, [`pictures`] enhances them, [`estimate`] says how sure a
+//! mean is.
+
+pub mod bench;
+pub mod estimate;
+pub mod pictures;
+pub mod quality;
+pub mod rain;
+pub mod range;
+pub mod sampling;
+pub mod sets;
+pub mod shot;
+pub mod table1;
+pub mod table3;
+pub mod table4;
+pub mod train;
+
+mod error;
+mod fid;
+
+pub use error::{EvalError, Result};
+pub use fid::Fid;
+
+/// The paper's distances, in m (section 5).
+pub const DISTANCES_M: [f64; 3] = [0.3, 0.6, 1.0];

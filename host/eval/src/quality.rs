@@ -1,0 +1,242 @@
+//! How good enhanced images are on characters that no training has seen, and what becomes of scenes that are no characters.
+//!
+//! Sharp 64 x 64 images are blurred (Gaussian, sigma in pixels of 64), sampled to 32 x 32 by means of 2 x 2, given noise, and
+//! enhanced by every method: Lanczos, three classical methods that get blur and noise, and the networks, which get neither.
+//!
+//! # Invariant
+//! Every method gets the same readings, and its figures come with the number of images that they rest on
+//! (`every_row_is_measured_on_the_same_unseen_images` in the tests of `nirspi-cli`).
+
+mod bootstrap;
+mod characters;
+mod charts;
+mod contenders;
+mod measure;
+mod others;
+
+pub use bootstrap::Interval;
+pub use characters::{Character, Characters, Origin};
+pub use contenders::{Contender, Method, Version};
+pub use measure::{Condition, Figures};
+pub use others::Case;
+
+pub(crate) use measure::halved;
+
+use crate::error::Result;
+use image::RgbImage;
+use measure::Judges;
+use nirspi_nets::{Device, Networks};
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// What to measure.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Settings {
+    /// Characters: `.npz` stacks or Chars74K's folder.
+    pub data: PathBuf,
+    /// Groups of each stack that training has not seen, as JSON; `None`: those of the embedded weights.
+    pub held_out: Option<PathBuf>,
+    /// Folder of PNG pictures, parts of which are scenes that are no letters.
+    pub scenes: Option<PathBuf>,
+    /// Folder of real measurements (`.npz`).
+    pub spi: Option<PathBuf>,
+    /// Folder of other weights, `<network>.safetensors`.
+    pub weights: Option<PathBuf>,
+    /// Images of each stack.
+    pub count: usize,
+    /// Images of each stack for the curve over steps.
+    pub sampler_count: usize,
+    /// Most steps of that curve.
+    pub most_steps: u32,
+    /// Seed of choice and noise.
+    pub seed: u64,
+}
+
+/// Blur of the curves over noise and steps, and noise of the curves over blur and steps: strong, yet a character can be read.
+const MIDDLE: Condition = Condition { sigma_px: 2.0, noise: 0.03 };
+
+/// Blurs, in pixels of 64.
+const SIGMAS_PX: [f32; 6] = [0.3, 0.7, 1.0, 2.0, 3.0, 4.0];
+
+/// Standard deviations of noise.
+const NOISES: [f32; 5] = [0.0, 0.01, 0.03, 0.05, 0.08];
+
+/// Nothing to undo but the sampling.
+const UNTOUCHED: Condition = Condition { sigma_px: 0.0, noise: 0.0 };
+
+/// Steps of the curves over steps.
+const STEPS: [u32; 6] = [1, 2, 4, 10, 50, 500];
+
+/// The quality of every method, and what became of scenes that are no characters.
+#[derive(Debug, Serialize)]
+pub struct Report {
+    /// Always true.
+    pub simulated: bool,
+    /// Seed of choice and noise.
+    pub seed: u64,
+    /// Stacks and how many images of each.
+    pub images: Vec<Origin>,
+    /// The networks' versions.
+    pub weights: Vec<Version>,
+    /// Each method at each condition.
+    pub conditions: Vec<Figures>,
+    /// Each method with so many steps at the middle condition.
+    pub steps: Vec<Figures>,
+    /// Scenes that are no characters.
+    pub others: Vec<Case>,
+    /// Images that are fewer than asked for.
+    pub notes: Vec<String>,
+}
+
+/// Everything that is measured, read and checked.
+pub struct Study {
+    settings: Settings,
+    contenders: Vec<Contender>,
+    /// For the curves over steps.
+    stepped: Vec<Contender>,
+    /// For scenes that are no characters.
+    bridge: Contender,
+    weights: Vec<Version>,
+    judges: Judges,
+    characters: Characters,
+    few: Characters,
+    scenes: Vec<others::Scene>,
+}
+
+/// The report and its pictures by file name.
+pub struct Measured {
+    /// The numbers.
+    pub report: Report,
+    /// Charts, and scenes that are no characters.
+    pub pictures: Vec<(&'static str, RgbImage)>,
+}
+
+impl Study {
+    /// Reads images, weights and scenes.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or no image that training has not seen.
+    pub fn new(settings: Settings) -> Result<Self> {
+        let mut networks = Networks::built_in(Device::cpu());
+        if let Some(folder) = &settings.weights {
+            networks = networks.with_folder(folder);
+        }
+        let judges = Judges::new(&mut networks)?;
+        let held_out = settings.held_out.as_deref();
+        let characters = Characters::read(&settings.data, held_out, settings.count, settings.seed)?;
+        let few = characters.first(settings.sampler_count);
+        let (pictures, spi) = (settings.scenes.as_deref(), settings.spi.as_deref());
+        let scenes = others::cases(pictures, spi, settings.seed)?;
+        let mut ready = |methods: &[Method]| -> Result<Vec<Contender>> {
+            methods.iter().map(|method| Contender::new(*method, &mut networks)).collect()
+        };
+        let (contenders, stepped) = (ready(&Method::ALL)?, ready(&stepped(settings.most_steps))?);
+        let bridge = Contender::new(Method::Diffusion(1), &mut networks)?;
+        let weights = Version::all(&mut networks)?;
+        Ok(Self { settings, contenders, stepped, bridge, weights, judges, characters, few, scenes })
+    }
+
+    /// Images that are enhanced.
+    #[must_use]
+    pub fn images(&self) -> usize {
+        self.contenders.len() * conditions().len() * self.characters.len()
+            + self.stepped.len() * self.few.len()
+    }
+
+    /// Measures; `done` is called with the number of images just enhanced.
+    ///
+    /// # Errors
+    /// Images that a method or a judge cannot take.
+    pub fn run(&self, done: &dyn Fn(usize)) -> Result<Measured> {
+        let Self { settings, contenders, judges, characters, few, .. } = self;
+        let seed = settings.seed;
+        let measured = over(contenders, &conditions(), characters, judges, seed, done)?;
+        let steps = over(&self.stepped, &[MIDDLE], few, judges, seed, done)?;
+        let shown = others::enhance(&self.scenes, &self.bridge)?;
+        let mut pictures = charts::all(&measured, &steps, characters, few);
+        pictures.push(("others.png", shown.picture.render()));
+        let report = Report {
+            simulated: true,
+            seed,
+            images: characters.origins().to_vec(),
+            weights: self.weights.clone(),
+            conditions: measured,
+            steps,
+            others: shown.cases,
+            notes: characters.notes().to_vec(),
+        };
+        Ok(Measured { report, pictures })
+    }
+}
+
+/// All conditions, each once.
+fn conditions() -> Vec<Condition> {
+    let mut all = vec![UNTOUCHED];
+    all.extend(SIGMAS_PX.map(|sigma_px| Condition { sigma_px, ..MIDDLE }));
+    all.extend(
+        NOISES.map(|noise| Condition { noise, ..MIDDLE }).into_iter().filter(|c| *c != MIDDLE),
+    );
+    all
+}
+
+/// The methods whose steps are counted, and those that they are compared with.
+fn stepped(most: u32) -> Vec<Method> {
+    let mut all = vec![Method::Lanczos, Method::Classical(charts::BEST_CLASSICAL), Method::Gan];
+    for steps in STEPS.into_iter().filter(|&steps| steps <= most) {
+        if steps <= charts::MOST_BRIDGE_STEPS {
+            all.push(Method::Diffusion(steps));
+        }
+        all.push(Method::Ancestral(steps));
+    }
+    all
+}
+
+fn over(
+    contenders: &[Contender],
+    conditions: &[Condition],
+    characters: &Characters,
+    judges: &Judges,
+    seed: u64,
+    done: &dyn Fn(usize),
+) -> Result<Vec<Figures>> {
+    let sharp = judges.judge(&characters.values())?;
+    let mut all = Vec::new();
+    for &condition in conditions {
+        let readings = condition.readings(characters, seed);
+        for contender in contenders {
+            let images = contender.enhance(&readings, condition, done)?;
+            all.extend(judges.figures(
+                contender.method(),
+                condition,
+                characters,
+                &sharp,
+                &readings,
+                &images,
+            )?);
+        }
+    }
+    Ok(all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_condition_is_there_once_and_the_middle_is_among_them() {
+        let all = conditions();
+        assert_eq!(all.len(), 1 + SIGMAS_PX.len() + NOISES.len() - 1);
+        assert_eq!(all.iter().filter(|c| **c == MIDDLE).count(), 1);
+        for (at, condition) in all.iter().enumerate() {
+            assert!(!all[..at].contains(condition), "{condition:?}");
+        }
+    }
+
+    #[test]
+    fn steps_go_no_further_than_asked_and_the_bridge_no_further_than_it_settles() {
+        let of = |most| stepped(most).into_iter().filter_map(Method::steps).collect::<Vec<u32>>();
+        assert_eq!(of(1), [1, 1]);
+        assert_eq!(of(10), [1, 1, 2, 2, 4, 4, 10, 10]);
+        assert_eq!(of(500).iter().filter(|&&steps| steps == 500).count(), 1);
+    }
+}

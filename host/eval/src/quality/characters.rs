@@ -1,0 +1,202 @@
+//! The characters that everything is measured on.
+//!
+//! # Invariant
+//! No image is among them whose family, writer or photograph training has seen (`only_groups_held_out_are_taken`).
+
+use crate::error::{EvalError, On, Result};
+use nirspi::files::characters;
+use nirspi_nets::data::Stack;
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_pcg::Pcg64Mcg;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Groups that the embedded weights' training has not seen, by the stack's name.
+const HELD_OUT: &str = include_str!("../../../nets/weights/held_out.json");
+
+/// Images that a stack must have: a distance of sets needs two.
+const LEAST: usize = 2;
+
+/// Where images come from.
+#[derive(Debug, Clone, Serialize)]
+pub struct Origin {
+    /// The stack's name.
+    pub stack: String,
+    /// Images taken.
+    pub images: usize,
+    /// `of 460 held out`, or why all were taken.
+    pub choice: String,
+}
+
+/// One image.
+#[derive(Debug, Clone)]
+pub struct Character {
+    /// 64 x 64 in [0, 1].
+    pub sharp: Vec<f32>,
+    /// Which character it shows, if known.
+    pub label: Option<u8>,
+    /// Index among the origins.
+    pub stack: usize,
+}
+
+/// All images, stack after stack.
+#[derive(Debug, Clone)]
+pub struct Characters {
+    all: Vec<Character>,
+    origins: Vec<Origin>,
+    notes: Vec<String>,
+}
+
+impl Characters {
+    /// `count` images of each stack at `path`, chosen by the seed from the groups held out.
+    ///
+    /// # Errors
+    /// Files that cannot be read, or no image left.
+    pub fn read(path: &Path, held_out: Option<&Path>, count: usize, seed: u64) -> Result<Self> {
+        let groups = match held_out {
+            None => groups(HELD_OUT).on(|| "held_out.json of the embedded weights".to_owned())?,
+            Some(file) => {
+                let text = std::fs::read_to_string(file);
+                let text = text.on(|| format!("{}: cannot read it", file.display()))?;
+                groups(&text).on_file(file)?
+            }
+        };
+        let stacks = characters::read(path)?;
+        let mut all = Self { all: Vec::new(), origins: Vec::new(), notes: Vec::new() };
+        for stack in &stacks {
+            all.add(stack, groups.get(stack.name()).map(Vec::as_slice), count, seed);
+        }
+        if all.all.is_empty() {
+            let path = path.display();
+            return Err(EvalError::Content(format!("{path}: no image that training has not seen")));
+        }
+        Ok(all)
+    }
+
+    fn add(&mut self, stack: &Stack, groups: Option<&[u32]>, count: usize, seed: u64) {
+        let unseen = |at: &usize| groups.is_none_or(|g| g.contains(&stack.groups()[*at]));
+        let mut places: Vec<usize> = (0..stack.len()).filter(unseen).collect();
+        let choice = match groups {
+            Some(_) => format!("of {} held out", places.len()),
+            None => format!("of {}: training is not said to have seen this stack", places.len()),
+        };
+        if places.len() < count {
+            let name = stack.name();
+            self.notes.push(format!("{name}: {} images, fewer than {count}", places.len()));
+        }
+        if places.len() < LEAST {
+            self.notes.push(format!("{}: left out", stack.name()));
+            return;
+        }
+        places.shuffle(&mut Pcg64Mcg::seed_from_u64(seed));
+        places.truncate(count);
+        let at = self.origins.len();
+        self.all.extend(places.iter().map(|&place| Character {
+            sharp: stack.image(place).iter().map(|&level| f32::from(level) / 255.0).collect(),
+            label: stack.label(place),
+            stack: at,
+        }));
+        let (name, images) = (stack.name().to_owned(), places.len());
+        self.origins.push(Origin { stack: name, images, choice });
+    }
+
+    /// The first `count` of each stack.
+    #[must_use]
+    pub fn first(&self, count: usize) -> Self {
+        let mut fewer = Self { all: Vec::new(), ..self.clone() };
+        for (at, origin) in fewer.origins.iter_mut().enumerate() {
+            let of_stack = self.all.iter().filter(|character| character.stack == at).take(count);
+            let before = fewer.all.len();
+            fewer.all.extend(of_stack.cloned());
+            origin.images = fewer.all.len() - before;
+        }
+        fewer
+    }
+
+    /// Images in all.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.all.len()
+    }
+
+    /// Whether there is no image.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.all.is_empty()
+    }
+
+    /// Image by image.
+    pub fn iter(&self) -> std::slice::Iter<'_, Character> {
+        self.all.iter()
+    }
+
+    /// All pixels, (N, 64, 64).
+    #[must_use]
+    pub fn values(&self) -> Vec<f32> {
+        self.all.iter().flat_map(|character| character.sharp.iter().copied()).collect()
+    }
+
+    /// Where the images come from.
+    #[must_use]
+    pub fn origins(&self) -> &[Origin] {
+        &self.origins
+    }
+
+    /// Stacks with fewer images than asked for.
+    #[must_use]
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+}
+
+fn groups(text: &str) -> Result<BTreeMap<String, Vec<u32>>> {
+    serde_json::from_str(text).on(|| "expected {\"stack\": [group, ...], ...}".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nirspi_nets::data::Kind;
+
+    /// Six images of two writers each, of the level that is their number.
+    fn stack() -> Stack {
+        let pixels = (0..6 * 64 * 64).map(|at| (at / 4096) as u8).collect();
+        Stack::new("own", Kind::Drawn, pixels, Some((0..6).collect()), vec![1, 1, 2, 2, 3, 3])
+            .unwrap()
+    }
+
+    fn of(groups: Option<&[u32]>, count: usize, seed: u64) -> Characters {
+        let mut all = Characters { all: Vec::new(), origins: Vec::new(), notes: Vec::new() };
+        all.add(&stack(), groups, count, seed);
+        all
+    }
+
+    #[test]
+    fn only_groups_held_out_are_taken() {
+        for seed in 0..5 {
+            let taken = of(Some(&[3, 1]), 3, seed);
+            assert_eq!((taken.len(), taken.origins()[0].choice.as_str()), (3, "of 4 held out"));
+            assert!(taken.iter().all(|c| ![2, 3].contains(&c.label.unwrap())), "{taken:?}");
+        }
+        assert_eq!(of(None, 6, 1).len(), 6);
+    }
+
+    #[test]
+    fn a_choice_follows_from_its_seed_and_few_are_the_first_of_many() {
+        let labels = |c: &Characters| c.iter().map(|c| c.label.unwrap()).collect::<Vec<u8>>();
+        assert_eq!(labels(&of(None, 6, 7)), labels(&of(None, 6, 7)));
+        let many = of(None, 6, 7);
+        let few = many.first(2);
+        assert_eq!(labels(&few), labels(&many)[..2]);
+        assert_eq!(few.origins()[0].images, 2);
+    }
+
+    #[test]
+    fn a_stack_with_too_few_images_is_left_out_with_a_note() {
+        let none = of(Some(&[9]), 4, 1);
+        assert!(none.is_empty() && none.origins().is_empty());
+        assert_eq!(none.notes(), ["own: 0 images, fewer than 4", "own: left out"]);
+    }
+}

@@ -1,0 +1,183 @@
+//! Charts of a quality report: PSNR, SSIM and Fréchet character distance one below another, over blur, noise and steps.
+
+use super::MIDDLE;
+use super::characters::Characters;
+use super::contenders::Method;
+use super::measure::{Condition, Figures};
+use image::{GenericImage, RgbImage};
+use nirspi::picture::{Axis, Chart, Line};
+use nirspi_nets::classical::Method as Classical;
+
+/// The classical method in the charts over steps.
+pub const BEST_CLASSICAL: Classical = Classical::TotalVariation;
+
+/// Steps after which the bridge is not followed any further: more change nothing.
+pub const MOST_BRIDGE_STEPS: u32 = 50;
+
+/// What a chart shows up its axis.
+struct Measure {
+    name: &'static str,
+    of: fn(&Figures) -> f64,
+}
+
+const MEASURES: [Measure; 3] = [
+    Measure { name: "PSNR, dB (higher is better)", of: |f| f.psnr_db.value },
+    Measure { name: "SSIM (higher is better)", of: |f| f.ssim.value },
+    Measure {
+        name: "Fréchet character distance (lower is better; not FID)",
+        of: |f| f.frechet_character_distance.value,
+    },
+];
+
+/// File names and pictures.
+pub fn all(
+    measured: &[Figures],
+    steps: &[Figures],
+    characters: &Characters,
+    few: &Characters,
+) -> Vec<(&'static str, RgbImage)> {
+    let Condition { sigma_px, noise } = MIDDLE;
+    let whole: Vec<&Figures> = measured.iter().filter(|f| f.stack.is_none()).collect();
+    let along = |of: fn(&Condition) -> f64, fixed: fn(&Condition) -> bool| {
+        Method::ALL.map(|method| {
+            let row = whole.iter().filter(|f| f.method == method && fixed(&f.condition));
+            let mut row: Vec<(f64, &Figures)> = row.map(|f| (of(&f.condition), *f)).collect();
+            row.sort_by(|a, b| a.0.total_cmp(&b.0));
+            (method.name(), row)
+        })
+    };
+    let blur = along(|c| f64::from(c.sigma_px), |c| c.noise == MIDDLE.noise);
+    let noises = along(|c| f64::from(c.noise), |c| c.sigma_px == MIDDLE.sigma_px);
+    let count = characters.len();
+    vec![
+        (
+            "blur.png",
+            column(
+                &format!("Quality against blur, noise {noise}"),
+                &linear("blur, sigma in pixels of 64 x 64", &[0.0, 1.0, 2.0, 3.0, 4.0]),
+                &blur,
+                count,
+            ),
+        ),
+        (
+            "noise.png",
+            column(
+                &format!("Quality against noise, blur {sigma_px} px"),
+                &linear("noise of the readings, 1 is white", &[0.0, 0.02, 0.04, 0.06, 0.08]),
+                &noises,
+                count,
+            ),
+        ),
+        (
+            "steps.png",
+            column(
+                &format!("Quality against steps, blur {sigma_px} px, noise {noise}"),
+                &Axis {
+                    logarithmic: true,
+                    ..linear("network calls an image", &[1.0, 2.0, 4.0, 10.0, 50.0, 500.0])
+                },
+                &by_steps(steps),
+                few.len(),
+            ),
+        ),
+    ]
+}
+
+type Row<'a> = (String, Vec<(f64, &'a Figures)>);
+
+/// Rows over their steps; one that has none goes all the way across.
+fn by_steps(steps: &[Figures]) -> Vec<Row<'_>> {
+    let whole = || steps.iter().filter(|f| f.stack.is_none());
+    let stepped = |name: &str, of: fn(Method) -> bool| {
+        let points = whole().filter(|f| of(f.method));
+        let points = points.filter_map(|f| Some((f64::from(f.method.steps()?), f))).collect();
+        (name.to_owned(), points)
+    };
+    let mut rows = vec![
+        stepped("diffusion (bridge)", |method| matches!(method, Method::Diffusion(_))),
+        stepped("ancestral sampler", |method| matches!(method, Method::Ancestral(_))),
+    ];
+    let flat = whole().filter(|f| f.method.steps().is_none());
+    rows.extend(flat.map(|f| (f.row.clone(), vec![(1.0, f), (500.0, f)])));
+    rows
+}
+
+fn linear(name: &str, ticks: &[f64]) -> Axis {
+    Axis {
+        name: name.to_owned(),
+        from: ticks[0],
+        to: ticks[ticks.len() - 1],
+        logarithmic: false,
+        ticks: ticks.to_vec(),
+    }
+}
+
+/// The three charts of one axis, one below another.
+fn column(header: &str, x: &Axis, rows: &[Row<'_>], images: usize) -> RgbImage {
+    let charts = MEASURES.map(|measure| {
+        let lines: Vec<Line> = rows
+            .iter()
+            .enumerate()
+            .map(|(k, (name, points))| Line {
+                name: name.clone(),
+                colour: k,
+                // The colours come again.
+                dashed: k >= 6,
+                points: points.iter().map(|(x, f)| (*x, (measure.of)(f))).collect(),
+            })
+            .collect();
+        let values = lines.iter().flat_map(|line| line.points.iter().map(|point| point.1));
+        let chart = Chart {
+            header: header.to_owned(),
+            x: x.clone(),
+            y: Axis { name: measure.name.to_owned(), ..rounded(values) },
+            lines,
+            footer: format!("simulated: {images} characters that training has not seen"),
+        };
+        chart.render()
+    });
+    let (width, height) = (charts[0].width(), charts.iter().map(RgbImage::height).sum());
+    let mut picture = RgbImage::new(width, height);
+    let mut top = 0;
+    for chart in &charts {
+        // All are of one width: they have the same names in their legends.
+        let _ = picture.copy_from(chart, 0, top);
+        top += chart.height();
+    }
+    picture
+}
+
+/// An axis with ticks at 1, 2 or 5 times a power of ten, a few of them, that holds all values.
+fn rounded(values: impl Iterator<Item = f64>) -> Axis {
+    let (low, high) = values
+        .filter(|value| value.is_finite())
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
+    let (low, high) = if low <= high { (low, high) } else { (0.0, 1.0) };
+    let rough = ((high - low) / 6.0).max(1e-3);
+    let power = 10_f64.powf(rough.log10().floor());
+    let step = [1.0, 2.0, 5.0].map(|m| m * power).into_iter().find(|s| *s >= rough);
+    let step = step.unwrap_or(10.0 * power);
+    let (first, last) =
+        ((low / step).floor(), (high / step).ceil().max((low / step).floor() + 1.0));
+    let ticks = (0..=(last - first) as usize).map(|k| (first + k as f64) * step).collect();
+    Axis { name: String::new(), from: first * step, to: last * step, logarithmic: false, ticks }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_axis_holds_its_values_between_round_ticks() {
+        for (values, ticks) in [
+            (vec![17.2, 31.4], vec![15.0, 20.0, 25.0, 30.0, 35.0]),
+            (vec![0.46, 0.99], vec![0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0]),
+            (vec![3.0], vec![3.0, 3.001]),
+            (vec![f64::NAN], vec![0.0, 0.2, 0.4, 0.6, 0.8, 1.0]),
+        ] {
+            let axis = rounded(values.into_iter());
+            assert_eq!(axis.ticks.len(), ticks.len(), "{:?}", axis.ticks);
+            assert!(axis.ticks.iter().zip(&ticks).all(|(a, b)| (a - b).abs() < 1e-9));
+        }
+    }
+}

@@ -1,0 +1,217 @@
+//! What rain, fog and single drops do to light, and the uniformity of a rain simulator.
+
+pub mod budget;
+pub mod rig;
+
+use crate::error::{EvalError, Result};
+use nirspi_optics::mie::{Index, Mie};
+use nirspi_optics::rain::fall::{beta, fall_speed_m_per_s, fall_time_constant_s};
+use nirspi_optics::rain::radar::drops_reflectivity_db;
+use nirspi_optics::rain::{Drops, Medium};
+use nirspi_optics::water::Water;
+use serde::Serialize;
+
+/// What one sphere does to light: efficiencies over its geometric shadow.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct SphereReport {
+    /// Size parameter, pi times diameter over wavelength.
+    pub x: f64,
+    /// Real part of the refractive index.
+    pub m_re: f64,
+    /// Imaginary part, positive for a sphere that absorbs.
+    pub m_im: f64,
+    /// Extinction.
+    pub qext: f64,
+    /// Scattering.
+    pub qsca: f64,
+    /// Absorption.
+    pub qabs: f64,
+    /// Backscatter.
+    pub qback: f64,
+    /// Asymmetry of the scattering.
+    pub g: f64,
+}
+
+/// The efficiencies of a sphere of size parameter `x` and refractive index `index`.
+///
+/// # Errors
+/// [`EvalError::Mie`] for a sphere that the solver was not checked for.
+pub fn sphere(x: f64, index: Index) -> Result<SphereReport> {
+    let q = Mie::new().sphere(x, index)?.efficiencies();
+    Ok(SphereReport {
+        x,
+        m_re: index.real,
+        m_im: index.imaginary,
+        qext: q.extinction,
+        qsca: q.scattering,
+        qabs: q.absorption,
+        qback: q.backscatter,
+        g: q.asymmetry,
+    })
+}
+
+/// What rain or fog does to light.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RainReport {
+    /// The drops, as the caller calls them.
+    pub drops: String,
+    /// Rain rate.
+    pub rate_mm_per_h: f64,
+    /// Drops in a cubic metre.
+    pub drops_per_m3: f64,
+    /// Water in the air.
+    pub water_g_per_m3: f64,
+    /// Differential reflectivity for a radar; `null` where the caller did not ask for it, or in dry air.
+    pub z_dr_db: Option<f64>,
+    /// Distance that the losses are given for, there and back.
+    pub path_m: f64,
+    /// At each wavelength.
+    pub wavelengths: Vec<WavelengthReport>,
+    /// Only for drops of one size.
+    pub fall: Option<FallReport>,
+    /// How to read the extinction.
+    pub note: &'static str,
+}
+
+/// The same at one wavelength.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct WavelengthReport {
+    /// The wavelength.
+    pub wavelength_nm: f64,
+    /// Light taken out of a beam.
+    pub extinction_per_m: f64,
+    /// The part that is scattered.
+    pub scattering_per_m: f64,
+    /// The part that is absorbed.
+    pub absorption_per_m: f64,
+    /// Extinction, as radio engineers write it.
+    pub extinction_db_per_km: f64,
+    /// Scattering over extinction.
+    pub albedo: f64,
+    /// Mean cosine of the scattering angle.
+    pub asymmetry: f64,
+    /// Lost over the path and back; none of it comes back here by forward scattering.
+    pub loss_there_and_back: f64,
+    /// `null` in dry air.
+    pub visibility_m: Option<f64>,
+}
+
+/// How a drop falls, against exposures.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FallReport {
+    /// The drop.
+    pub diameter_mm: f64,
+    /// Its speed.
+    pub speed_m_per_s: f64,
+    /// Time in which it falls twice its diameter.
+    pub time_constant_ms: f64,
+    /// The paper's beta for an exposure of 25 us (one pattern).
+    pub beta_25_us: f64,
+    /// The same for 20 ms (an image).
+    pub beta_20_ms: f64,
+}
+
+/// How to read the extinction of a [`RainReport`].
+const NOTE: &str = "extinction counts light diffracted by under a milliradian, half of it, as lost; \
+                    a camera of this resolution does not lose it (docs/physics.md)";
+
+/// What `drops` do to light of these wavelengths over `distance_m` and back. `radar` adds their differential reflectivity, which
+/// fog drops do not have.
+///
+/// # Errors
+/// [`EvalError::Setting`] for a distance, [`EvalError::Refused`] for a wavelength out of range.
+pub fn rain(
+    name: &str,
+    drops: &Drops,
+    wavelengths_nm: &[f64],
+    distance_m: f64,
+    radar: bool,
+) -> Result<RainReport> {
+    check_distance(distance_m)?;
+    let mut wavelengths = Vec::new();
+    for &nm in wavelengths_nm {
+        let medium = Medium::new(drops, nm, Water::Segelstein)
+            .map_err(|error| EvalError::refused("wavelengths_nm", &error))?;
+        wavelengths.push(WavelengthReport {
+            wavelength_nm: nm,
+            extinction_per_m: medium.extinction_per_m,
+            scattering_per_m: medium.scattering_per_m,
+            absorption_per_m: medium.absorption_per_m,
+            extinction_db_per_km: medium.extinction_db_per_km(),
+            albedo: medium.albedo(),
+            asymmetry: medium.asymmetry,
+            loss_there_and_back: 1.0 - medium.transmission(2.0 * distance_m),
+            visibility_m: Some(medium.visibility_m()).filter(|v| v.is_finite()),
+        });
+    }
+    let fall = match drops.classes() {
+        [one] => Some(FallReport {
+            diameter_mm: one.diameter_mm,
+            speed_m_per_s: fall_speed_m_per_s(one.diameter_mm),
+            time_constant_ms: fall_time_constant_s(one.diameter_mm) * 1e3,
+            beta_25_us: beta(one.diameter_mm, 25e-6),
+            beta_20_ms: beta(one.diameter_mm, 20e-3),
+        }),
+        _ => None,
+    };
+    Ok(RainReport {
+        drops: name.to_owned(),
+        rate_mm_per_h: drops.rate_mm_per_h(),
+        drops_per_m3: drops.concentration_per_m3(),
+        water_g_per_m3: drops.liquid_water_g_per_m3(),
+        z_dr_db: drops_reflectivity_db(drops).filter(|_| radar),
+        path_m: distance_m,
+        wavelengths,
+        fall,
+        note: NOTE,
+    })
+}
+
+fn check_distance(distance_m: f64) -> Result<()> {
+    match distance_m.is_finite() && distance_m > 0.0 {
+        true => Ok(()),
+        false => Err(EvalError::setting("distance_m", distance_m, "a positive number of metres")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sphere_has_the_efficiencies_of_miepython() {
+        // miepython 3.3.0: 2.1007189, 2.0589971, 0.8738868
+        let q = sphere(100.0, Index { real: 1.33, imaginary: 1e-4 }).unwrap();
+        for (found, expected) in [(q.qext, 2.100_718_9), (q.qsca, 2.058_997_1), (q.g, 0.873_886_8)]
+        {
+            assert!((found - expected).abs() < 1e-6, "{q:?}");
+        }
+        assert!((q.qext - q.qsca - q.qabs).abs() < 1e-12);
+        assert!(sphere(1e6, Index { real: 1.3, imaginary: 0.0 }).unwrap_err().is_setting());
+    }
+
+    #[test]
+    fn losses_follow_from_the_extinction_and_the_path() {
+        let drops = Drops::monodisperse(5.6, 2.0).unwrap();
+        let report = rain("mono:2", &drops, &[550.0, 1550.0], 3.0, true).unwrap();
+        for at in &report.wavelengths {
+            let lost = 1.0 - (-at.extinction_per_m * 6.0).exp();
+            assert!((at.loss_there_and_back - lost).abs() < 1e-12, "{at:?}");
+            assert!(
+                (at.extinction_per_m - at.scattering_per_m - at.absorption_per_m).abs() < 1e-12
+            );
+        }
+        assert_eq!(report.fall.as_ref().unwrap().diameter_mm, 2.0);
+        assert!(report.z_dr_db.is_some());
+        assert!(rain("mono:2", &drops, &[550.0], 3.0, false).unwrap().z_dr_db.is_none());
+    }
+
+    #[test]
+    fn dry_air_has_no_visibility_and_wrong_settings_are_named() {
+        let dry = rain("none", &Drops::none(), &[550.0], 1.0, false).unwrap();
+        assert_eq!((dry.wavelengths[0].visibility_m, dry.fall), (None, None));
+        let wrong = |nm, m| rain("none", &Drops::none(), &[nm], m, false).unwrap_err().to_string();
+        assert_eq!(wrong(550.0, -1.0), "distance_m is -1, expected a positive number of metres");
+        assert!(wrong(300.0, 1.0).starts_with("wavelengths_nm: "), "{}", wrong(300.0, 1.0));
+    }
+}

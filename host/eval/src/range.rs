@@ -1,0 +1,304 @@
+//! How far the camera sees in rain: physics, Algorithm 2 as printed, and the paper's Table 2 beside them.
+
+use crate::error::{EvalError, Result};
+use nirspi::picture::{Axis, Chart, Line};
+use nirspi_optics::pixel::{Instrument, PixelBudget, PixelError};
+use nirspi_optics::rain::blur::DEEPEST_OPTICAL_DEPTH;
+use nirspi_optics::rain::{Drops, PaperRain, Weather};
+use nirspi_optics::range::{Wanted, as_printed_mm, extinction_needed_per_m, farthest_mm};
+use nirspi_optics::water::Water;
+use serde::Serialize;
+
+/// What is asked of the camera.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// Signal of a pixel over its noise at the farthest distance.
+    pub snr: f64,
+    /// Reflectance of the target.
+    pub reflectance: f64,
+    /// Exposures of a pattern.
+    pub exposures_us: Vec<f64>,
+}
+
+/// A row of the paper's Table 2.
+struct Row {
+    name: &'static str,
+    rain: PaperRain,
+    range_m: (f64, f64),
+}
+
+const TABLE_2: [Row; 2] = [
+    Row { name: "light", rain: PaperRain::LIGHT, range_m: (0.1, 2.0) },
+    Row { name: "heavy", rain: PaperRain::HEAVY, range_m: (0.2, 1.5) },
+];
+
+/// Algorithm 2's Z_max: how far patterns are projected (paper, 2.A).
+const Z_MAX_MM: f64 = 3000.0;
+
+/// Ranges beside the paper's.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Report {
+    /// Always true.
+    pub simulated: bool,
+    /// Signal of a pixel over its noise at the farthest distance.
+    pub snr: f64,
+    /// Reflectance of the target.
+    pub reflectance: f64,
+    /// Each rain with each exposure.
+    pub rows: Vec<RowReport>,
+    /// What the numbers rest on.
+    pub assumptions: Vec<String>,
+    /// What must be assumed to agree with the paper, and what physics says instead.
+    pub reading: Vec<String>,
+}
+
+/// The range in one rain with one exposure.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RowReport {
+    /// The rain.
+    pub rain: &'static str,
+    /// Its rate.
+    pub rate_mm_per_h: f64,
+    /// Diameter of its drops.
+    pub drop_mm: f64,
+    /// Light that it takes out of a beam.
+    pub extinction_per_m: f64,
+    /// The same over 2 m.
+    pub loss_over_2_m_percent: f64,
+    /// Exposure of a pattern.
+    pub exposure_us: f64,
+    /// The paper's, of 8 to 25 us together.
+    pub paper_m: (f64, f64),
+    /// By the photon budget; `null`: the signal is too weak at any distance.
+    pub physics_m: Option<f64>,
+    /// The same without rain.
+    pub dry_air_m: Option<f64>,
+    /// By Algorithm 2 as printed.
+    pub as_printed_m: f64,
+}
+
+/// The range in each rain of the paper's Table 2, with each exposure.
+///
+/// # Errors
+/// [`EvalError::is_setting`] for a setting out of range.
+pub fn range(settings: &Settings) -> Result<Report> {
+    let Settings { snr, reflectance, .. } = *settings;
+    if !(snr.is_finite() && snr > 0.0) {
+        return Err(EvalError::setting("snr", snr, "more than 0"));
+    }
+    let Air { instrument, dry, wet } = Air::new()?;
+    let mut rows = Vec::new();
+    for (row, weather) in TABLE_2.iter().zip(&wet) {
+        for &exposure_us in &settings.exposures_us {
+            let wanted = Wanted { reflectance, exposure_us, snr };
+            let metres = |mm: f64| mm * 1e-3;
+            let printed = as_printed_mm(&instrument, weather, &wanted, row.rain.drop_mm, Z_MAX_MM)?;
+            rows.push(RowReport {
+                rain: row.name,
+                rate_mm_per_h: row.rain.rate_mm_per_h,
+                drop_mm: row.rain.drop_mm,
+                extinction_per_m: weather.medium().extinction_per_m,
+                loss_over_2_m_percent: 100.0 * (1.0 - weather.medium().transmission(2.0)),
+                exposure_us,
+                paper_m: row.range_m,
+                physics_m: farthest_mm(&instrument, weather, &wanted)?.map(metres),
+                dry_air_m: farthest_mm(&instrument, &dry, &wanted)?.map(metres),
+                as_printed_m: metres(printed),
+            });
+        }
+    }
+    Ok(Report {
+        simulated: true,
+        snr,
+        reflectance,
+        assumptions: assumptions(&instrument),
+        reading: reading(&instrument, &wet, reflectance)?,
+        rows,
+    })
+}
+
+/// The instrument, and the air before it: dry, and in the order of [`TABLE_2`].
+struct Air {
+    instrument: Instrument,
+    dry: Weather,
+    wet: Vec<Weather>,
+}
+
+impl Air {
+    fn new() -> Result<Self> {
+        let instrument = Instrument::default();
+        let nm = instrument.budget.wavelength_nm;
+        let weather = |drops| Ok(Weather::new(drops, nm, Water::Segelstein)?);
+        let wet = TABLE_2.iter().map(|row| weather(row.rain.drops()?)).collect::<Result<_>>()?;
+        Ok(Self { dry: weather(Drops::none())?, wet, instrument })
+    }
+}
+
+fn assumptions(instrument: &Instrument) -> Vec<String> {
+    let b = &instrument.budget;
+    vec![
+        format!(
+            "{} mW of light an LED, half angle {} degrees, of which a lens of {} mm takes what it can",
+            b.led_power_mw, b.led_half_angle_deg, instrument.projector.aperture_mm
+        ),
+        format!(
+            "detector of {} mm (FGA015), numerical aperture {}, efficiency {}",
+            b.detector_diameter_mm, b.detector_na, b.quantum_efficiency
+        ),
+        format!(
+            "{:.0} electrons rms of amplifier noise a sample, {} klx of daylight behind a {} nm filter",
+            instrument.chain.amplifier_noise_electrons, b.ambient_klx, b.filter_width_nm
+        ),
+        "an exposure is the time that one pattern's light is summed; 1024 patterns and their complements".to_owned(),
+        format!(
+            "as printed: Z_max of {} m (paper, 2.A), so that its answer is a multiple of {} m",
+            Z_MAX_MM * 1e-3,
+            Z_MAX_MM * 1e-4
+        ),
+        "drops of one size, 0.5 mm light and 2 mm heavy, as the paper's Table 2".to_owned(),
+    ]
+}
+
+/// What must be assumed to agree with the paper, and what physics says instead.
+fn reading(
+    instrument: &Instrument,
+    weathers: &[Weather],
+    reflectance: f64,
+) -> Result<Vec<String>, PixelError> {
+    let [light, heavy] = weathers else { return Ok(Vec::new()) };
+    let snr_at = |weather: &Weather, distance_mm, exposure_us| {
+        PixelBudget::new(instrument, weather, distance_mm, reflectance, exposure_us)
+            .map(|p| p.pixel_snr)
+    };
+    let at_2_m = snr_at(light, 2000.0, 25.0)?;
+    let agreed = |exposure_us| Wanted { reflectance, exposure_us, snr: at_2_m };
+    let mut lines = vec![format!(
+        "2 m in light rain at 25 us agrees with the paper if a pixel may have an SNR of {at_2_m:.2}"
+    )];
+    if let Some(mm) = farthest_mm(instrument, heavy, &agreed(25.0))? {
+        lines.push(format!(
+            "the same SNR in heavy rain at 25 us: {:.3} m, not 1.5: 2 m of this rain take out {:.2} % of the light",
+            mm * 1e-3,
+            100.0 * (1.0 - heavy.medium().transmission(2.0))
+        ));
+    }
+    if let Some(mm) = farthest_mm(instrument, heavy, &agreed(8.0))? {
+        lines.push(format!(
+            "the same SNR at 8 us: {:.2} m; the paper's 2 and 1.5 m differ as its two exposures do \
+             ((25/8)^(1/4) = 1.33), whatever falls",
+            mm * 1e-3
+        ));
+    }
+    if let Some(needed) = extinction_needed_per_m(instrument, heavy, &agreed(25.0), 1500.0)? {
+        let factor = needed / heavy.medium().extinction_per_m;
+        let at_least = if needed * 1.5 > 0.99 * DEEPEST_OPTICAL_DEPTH { "at least " } else { "" };
+        lines.push(format!(
+            "for rain to bring 2 m down to 1.5 m its extinction would have to be {at_least}{needed:.2} \
+             per metre, {at_least}{factor:.0} times what 5.6 mm/h has"
+        ));
+    }
+    lines.push(format!(
+        "light rain takes out {:.1} times more than heavy rain: the same water in drops of a quarter \
+         of the size has four times the shadow",
+        light.medium().extinction_per_m / heavy.medium().extinction_per_m
+    ));
+    lines.push(
+        "the paper's lower limits (0.1 and 0.2 m) follow from no term here; Algorithm 2's first step, \
+         Z_max / 10, is that long for a Z_max of 1 and 2 m"
+            .to_owned(),
+    );
+    Ok(lines)
+}
+
+/// Signal over noise of a pixel against its distance, in dry air, heavy rain and fog.
+///
+/// # Errors
+/// None: the air is the paper's.
+pub fn chart(settings: &Settings) -> Result<Chart> {
+    let Air { instrument, dry, wet } = &Air::new()?;
+    let fog = Drops::fog(10.0, 0.1)
+        .and_then(|fog| Weather::new(fog, instrument.budget.wavelength_nm, Water::Segelstein));
+    let mut kinds: Vec<(&str, &Weather, bool)> = vec![("dry", dry, false)];
+    kinds.extend(wet.last().map(|heavy| ("heavy rain, 2 mm", heavy, true)));
+    kinds.extend(fog.iter().map(|fog| ("fog, 0.1 g/m3", fog, false)));
+    let mut lines = Vec::new();
+    for (name, weather, dashed) in kinds {
+        for &exposure_us in &settings.exposures_us {
+            let points = (0..=200).filter_map(|i| {
+                let mm = 100.0 * 100.0_f64.powf(f64::from(i) / 200.0);
+                let pixel =
+                    PixelBudget::new(instrument, weather, mm, settings.reflectance, exposure_us);
+                pixel.ok().map(|pixel| (mm * 1e-3, pixel.pixel_snr))
+            });
+            let name = format!("{name}, {exposure_us} us");
+            // A dashed line leaves the one under it visible.
+            lines.push(Line { name, colour: lines.len(), dashed, points: points.collect() });
+        }
+    }
+    let along = (0..=100).map(|i| 0.1 * 10_f64.powf(f64::from(i) / 50.0));
+    let threshold = along.map(|m| (m, settings.snr)).collect();
+    let name = format!("SNR {}", settings.snr);
+    lines.push(Line { name, colour: lines.len(), dashed: true, points: threshold });
+    Ok(Chart {
+        header: "How far one pixel is seen in rain".to_owned(),
+        x: Axis {
+            name: "distance, m".to_owned(),
+            from: 0.1,
+            to: 10.0,
+            logarithmic: true,
+            ticks: vec![0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0],
+        },
+        y: Axis {
+            name: "SNR of one pixel".to_owned(),
+            from: 0.01,
+            to: 1000.0,
+            logarithmic: true,
+            ticks: vec![0.01, 0.1, 1.0, 10.0, 100.0, 1000.0],
+        },
+        lines,
+        footer: "simulated; rain of 5.6 mm/h and dry air differ by less than a line's width"
+            .to_owned(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn settings(exposures_us: &[f64]) -> Settings {
+        Settings { snr: 1.0, reflectance: 1.0, exposures_us: exposures_us.to_vec() }
+    }
+
+    #[test]
+    fn rain_shortens_the_range_a_little_and_a_longer_exposure_lengthens_it() {
+        let report = range(&settings(&[8.0, 25.0])).unwrap();
+        assert_eq!(
+            report.rows.iter().map(|row| row.rain).collect::<Vec<_>>(),
+            ["light", "light", "heavy", "heavy"]
+        );
+        for pair in report.rows.chunks_exact(2) {
+            let (short, long) = (pair[0].physics_m.unwrap(), pair[1].physics_m.unwrap());
+            // The signal falls as the fourth power of the distance, the noise with the root of the exposure's length.
+            assert!((long / short / (25.0_f64 / 8.0).powf(0.25) - 1.0).abs() < 0.12, "{report:?}");
+            assert!(long < pair[1].dry_air_m.unwrap());
+        }
+        assert!(report.reading.iter().any(|line| line.contains("not 1.5")), "{report:?}");
+    }
+
+    #[test]
+    fn a_chart_has_a_line_for_each_air_and_exposure_and_one_for_the_threshold() {
+        assert_eq!(chart(&settings(&[8.0, 25.0])).unwrap().lines.len(), 3 * 2 + 1);
+    }
+
+    #[test]
+    fn settings_out_of_range_are_named() {
+        let told = |settings: &Settings| {
+            let error = range(settings).unwrap_err();
+            assert!(error.is_setting());
+            error.to_string()
+        };
+        let blind = Settings { snr: 0.0, ..settings(&[8.0]) };
+        assert_eq!(told(&blind), "snr is 0, expected more than 0");
+        assert!(told(&settings(&[-8.0])).contains("exposure_us is -8"));
+    }
+}

@@ -1,0 +1,319 @@
+//! How alike two stacks of images are: PSNR and SSIM image by image, distances of features, and characters read.
+//!
+//! # Invariant
+//! A figure that cannot be computed is `null`, and `notes` says why (`a_figure_that_cannot_be_computed_is_noted`). The only
+//! number called FID is computed with the user's Inception weights.
+
+use crate::error::{EvalError, Result};
+use crate::fid::Fid;
+use nirspi::files::npy::{Stack, read_list, read_stack};
+use nirspi::legibility::{Judge, LegibilityError};
+use nirspi_nets::Weights;
+use nirspi_nets::data::CHARACTERS;
+use nirspi_nets::images::Images;
+use nirspi_nets::metrics::CharacterJudge;
+use nirspi_recon::metrics;
+use serde::Serialize;
+use std::path::Path;
+
+/// A share of the reference's images and of the test's.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct Shares {
+    /// Of the reference's.
+    pub reference: f64,
+    /// Of the test's.
+    pub test: f64,
+}
+
+/// How alike two stacks are as sets.
+#[derive(Debug, Default, Serialize)]
+pub struct Sets {
+    /// On 128 features of this program's own classifier: not comparable with FID.
+    pub frechet_character_distance: Option<f64>,
+    /// Share of the images in which the classifier sees the labelled character.
+    pub character_accuracy: Option<Shares>,
+    /// With the user's Inception weights.
+    pub fid: Option<f64>,
+    /// The outside judge.
+    pub legibility_judge: Option<String>,
+    /// Share of the images in which the outside judge reads the labelled character.
+    pub legibility: Option<Shares>,
+    /// Why a figure is missing.
+    pub notes: Vec<String>,
+}
+
+impl Sets {
+    /// Compares two stacks of one shape, and more closely what `options` asks for. `done` is called after each image that
+    /// Inception has looked at, twice the number of images in all.
+    ///
+    /// # Errors
+    /// Weights that do not fit, a judge that fails.
+    fn compare(
+        reference: &Stack,
+        test: &Stack,
+        options: &Options<'_>,
+        done: &dyn Fn(),
+    ) -> Result<Self> {
+        let mut sets = Self::default();
+        sets.judge_characters(reference, test, options.labels)?;
+        if let Some(fid) = options.fid {
+            sets.measure_fid(fid, reference, test, done)?;
+        }
+        if let Some(labels) = options.labels.filter(|_| options.legibility) {
+            sets.have_read(reference, test, labels)?;
+        }
+        Ok(sets)
+    }
+
+    fn judge_characters(
+        &mut self,
+        reference: &Stack,
+        test: &Stack,
+        labels: Option<&[u8]>,
+    ) -> Result<()> {
+        if (test.height, test.width) != (64, 64) {
+            let shape = format!("{} x {}", test.height, test.width);
+            self.notes.push(format!("the classifier judges images of 64 x 64, not {shape}"));
+            return Ok(());
+        }
+        let judge = CharacterJudge::new(&Weights::embedded("classifier")?)?;
+        let [a, b] = [&reference.values, &test.values].map(|values| Images::new(values));
+        let (a, b) = (judge.judge(a?), judge.judge(b?));
+        match judge.distance(&a, &b) {
+            Ok(distance) => self.frechet_character_distance = Some(distance),
+            Err(why) => self.notes.push(format!("no Fréchet character distance: {why}")),
+        }
+        self.character_accuracy = labels.map(|labels| Shares {
+            reference: agreement(&a.classes, labels),
+            test: agreement(&b.classes, labels),
+        });
+        Ok(())
+    }
+
+    fn measure_fid(
+        &mut self,
+        fid: &Fid,
+        reference: &Stack,
+        test: &Stack,
+        done: &dyn Fn(),
+    ) -> Result<()> {
+        self.notes.extend(fid.note());
+        let size = (test.height, test.width);
+        let [a, b] =
+            [reference, test].map(|stack| stack.values.chunks_exact(test.height * test.width));
+        self.fid = Some(fid.distance(a, b, size, done)?);
+        Ok(())
+    }
+
+    fn have_read(&mut self, reference: &Stack, test: &Stack, labels: &[u8]) -> Result<()> {
+        let judge = match Judge::tesseract() {
+            Ok(judge) => judge,
+            Err(why @ LegibilityError::Absent) => {
+                self.notes.push(format!("legibility skipped: {why}"));
+                return Ok(());
+            }
+            Err(error) => return Err(error.into()),
+        };
+        let shown: Vec<_> = labels.iter().map(|&l| CHARACTERS.chars().nth(l.into())).collect();
+        let share = |stack: &Stack| -> Result<f64> {
+            Ok(agreement(&judge.read(&stack.values, (stack.height, stack.width))?, &shown))
+        };
+        self.legibility = Some(Shares { reference: share(reference)?, test: share(test)? });
+        self.legibility_judge = Some(judge.name);
+        Ok(())
+    }
+}
+
+/// How often two lists of one length say the same.
+fn agreement<T: PartialEq>(found: &[T], expected: &[T]) -> f64 {
+    let same = found.iter().zip(expected).filter(|(a, b)| a == b).count();
+    same as f64 / expected.len() as f64
+}
+
+/// Reads which character each of `images` images shows, 0 to 61 for 0-9, A-Z, a-z.
+///
+/// # Errors
+/// A file that cannot be read, another number of labels, a label out of range.
+pub fn read_labels(path: &Path, images: usize) -> Result<Vec<u8>> {
+    let labels = read_list(path)?;
+    if labels.len() != images {
+        return Err(EvalError::Content(format!(
+            "{}: {} labels, expected {images}, one an image",
+            path.display(),
+            labels.len()
+        )));
+    }
+    let class = |(at, label): (usize, &f64)| {
+        let known = label.fract() == 0.0 && (0.0..CHARACTERS.len() as f64).contains(label);
+        known.then_some(*label as u8).ok_or_else(|| {
+            EvalError::Content(format!(
+                "{}: {label} at [{at}], expected whole numbers from 0 to {}",
+                path.display(),
+                CHARACTERS.len() - 1
+            ))
+        })
+    };
+    labels.iter().enumerate().map(class).collect()
+}
+
+/// Reads a stack of images in `[0, 1]`.
+///
+/// # Errors
+/// A file that cannot be read, no images, a value out of range.
+pub fn read_images(path: &Path) -> Result<Stack> {
+    let stack = read_stack(path)?;
+    let outside = stack.values.iter().position(|v| !(0.0..=1.0).contains(v));
+    if let Some(at) = outside {
+        let (image, pixel) = (at / (stack.height * stack.width), at % (stack.height * stack.width));
+        let (row, column) = (pixel / stack.width, pixel % stack.width);
+        return Err(EvalError::Content(format!(
+            "{}: {} at [{image}, {row}, {column}], expected 0 to 1",
+            path.display(),
+            stack.values[at]
+        )));
+    }
+    if stack.count == 0 {
+        return Err(EvalError::Content(format!("{}: no images", path.display())));
+    }
+    Ok(stack)
+}
+
+/// The figures of one image.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ImageMetrics {
+    /// `null`: the images are identical.
+    pub psnr_db: Option<f64>,
+    /// Structural similarity, Gaussian window of 11 px.
+    pub ssim: f64,
+}
+
+/// How alike two stacks are.
+#[derive(Debug, Serialize)]
+pub struct Comparison {
+    /// Pairs of images.
+    pub images: usize,
+    /// Rows of an image.
+    pub height: usize,
+    /// Columns of an image.
+    pub width: usize,
+    /// `null`: all images are identical.
+    pub mean_psnr_db: Option<f64>,
+    /// Mean over the images.
+    pub mean_ssim: f64,
+    /// As sets.
+    #[serde(flatten)]
+    pub sets: Sets,
+    /// Image by image.
+    pub each: Vec<ImageMetrics>,
+}
+
+/// What to compute beyond PSNR, SSIM and the Fréchet character distance.
+#[derive(Clone, Copy, Default)]
+pub struct Options<'a> {
+    /// Which character each image shows, one an image: for the character accuracy.
+    pub labels: Option<&'a [u8]>,
+    /// Inception-v3 with the user's weights, for FID.
+    pub fid: Option<&'a Fid>,
+    /// Have Tesseract read the characters.
+    pub legibility: bool,
+}
+
+/// Compares two stacks of images in `[0, 1]` of one shape; nothing is scaled or fitted. `done` is called after each image that
+/// Inception has looked at, twice the number of images in all.
+///
+/// # Errors
+/// Stacks of different shapes, images too small for SSIM, weights that do not fit.
+pub fn compare(
+    reference: &Stack,
+    test: &Stack,
+    options: &Options<'_>,
+    done: &dyn Fn(),
+) -> Result<Comparison> {
+    let shape = |s: &Stack| (s.count, s.height, s.width);
+    if shape(reference) != shape(test) {
+        let (found, expected) = (shape(test), shape(reference));
+        return Err(EvalError::Content(format!("shape {found:?}, expected {expected:?}")));
+    }
+    let (height, width) = (reference.height, reference.width);
+    let mut each = Vec::with_capacity(reference.count);
+    let pairs = reference.values.chunks_exact(height * width);
+    for (a, b) in pairs.zip(test.values.chunks_exact(height * width)) {
+        let psnr = metrics::psnr(a, b, width, height, 1.0)?;
+        each.push(ImageMetrics {
+            // Identical images have no finite PSNR, and JSON has no infinity.
+            psnr_db: psnr.is_finite().then_some(psnr),
+            ssim: metrics::ssim(a, b, width, height, 1.0)?,
+        });
+    }
+    let finite: Vec<f64> = each.iter().filter_map(|image| image.psnr_db).collect();
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    Ok(Comparison {
+        images: reference.count,
+        height,
+        width,
+        mean_psnr_db: (!finite.is_empty()).then(|| mean(&finite)),
+        mean_ssim: each.iter().map(|image| image.ssim).sum::<f64>() / each.len() as f64,
+        sets: Sets::compare(reference, test, options, done)?,
+        each,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nirspi::files::npy::encode;
+
+    fn stack(count: usize, side: usize, value: impl Fn(usize) -> f32) -> Stack {
+        let values = (0..count * side * side).map(value).collect();
+        Stack { count, height: side, width: side, values }
+    }
+
+    #[test]
+    fn a_figure_that_cannot_be_computed_is_noted() {
+        let small = stack(2, 16, |at| (at % 7) as f32 / 7.0);
+        let same = compare(&small, &small, &Options::default(), &|| {}).unwrap();
+        assert_eq!((same.mean_psnr_db, same.mean_ssim), (None, 1.0));
+        assert_eq!(same.sets.frechet_character_distance, None);
+        assert_eq!(same.sets.notes, ["the classifier judges images of 64 x 64, not 16 x 16"]);
+        let one = stack(1, 64, |at| (at % 7) as f32 / 7.0);
+        let one = compare(&one, &one, &Options::default(), &|| {}).unwrap();
+        assert!(one.sets.notes[0].starts_with("no Fréchet character distance: "), "{:?}", one.sets);
+    }
+
+    #[test]
+    fn identical_images_do_not_enter_the_mean_of_the_psnr() {
+        let reference = stack(2, 16, |at| (at % 16) as f32 / 32.0);
+        let test = stack(2, 16, |at| (at % 16) as f32 / 32.0 + if at < 256 { 0.0 } else { 0.1 });
+        let report = compare(&reference, &test, &Options::default(), &|| {}).unwrap();
+        assert_eq!(report.each[0].psnr_db, None);
+        assert!((report.mean_psnr_db.unwrap() - 20.0).abs() < 1e-4, "{report:?}");
+        let wide = compare(&reference, &stack(1, 16, |_| 0.0), &Options::default(), &|| {});
+        let told = "shape (1, 16, 16), expected (2, 16, 16)";
+        assert_eq!(wide.unwrap_err().to_string(), told);
+    }
+
+    #[test]
+    fn labels_are_whole_numbers_one_an_image() {
+        let folder = tempfile::tempdir().unwrap();
+        let read = |labels: &[f64], images| {
+            let path = folder.path().join("labels.npy");
+            std::fs::write(&path, encode(&[labels.len()], labels)).unwrap();
+            read_labels(&path, images).map_err(|error| error.to_string())
+        };
+        assert_eq!(read(&[0.0, 61.0], 2), Ok(vec![0, 61]));
+        assert!(read(&[0.0], 2).unwrap_err().ends_with("1 labels, expected 2, one an image"));
+        assert!(read(&[0.0, 62.0], 2).unwrap_err().contains("62 at [1]"));
+        assert!(read(&[0.5, 2.0], 2).unwrap_err().contains("0.5 at [0]"));
+    }
+
+    #[test]
+    fn an_image_out_of_range_is_named_with_its_place() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.npy");
+        let mut values = vec![0.5_f32; 2 * 6];
+        values[6 + 4] = 1.5;
+        std::fs::write(&path, encode(&[2, 2, 3], &values)).unwrap();
+        let told = read_images(&path).unwrap_err().to_string();
+        assert!(told.ends_with("a.npy: 1.5 at [1, 1, 1], expected 0 to 1"), "{told}");
+    }
+}

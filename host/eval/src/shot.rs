@@ -1,0 +1,160 @@
+//! One picture taken with the virtual camera, from light to image, and one with an ordinary camera.
+
+use crate::DISTANCES_M;
+use crate::error::{EvalError, Result};
+use nirspi::calibration::Settling;
+use nirspi::capture::{Capture, Progress};
+use nirspi::setup::MeasurementSetup;
+use nirspi::virtual_camera::{self, VirtualOptics};
+use nirspi_optics::rain::{Drops, Rainfall};
+use nirspi_optics::visible::VisibleCamera;
+use nirspi_optics::{Projector, Scene};
+use nirspi_recon::{Image, Order, Side, reconstruct};
+use std::ops::ControlFlow;
+
+/// The conditions of a picture.
+#[derive(Debug, Clone, Copy)]
+pub struct Conditions {
+    /// Distance of the target.
+    pub distance_m: f64,
+    /// What falls between camera and target.
+    pub rain: Rainfall,
+    /// Differential sweeps that are summed.
+    pub frames: u32,
+}
+
+/// How the pictures of a table are taken.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Exposure {
+    /// What falls between camera and target.
+    pub rain: Rainfall,
+    /// Differential sweeps summed into a picture.
+    pub frames: u32,
+    /// Seed of the first picture.
+    pub seed: u64,
+}
+
+/// All 1024 patterns and their complements: 244 times is 20 ms, the paper's T_pre (Table 1).
+pub const FRAMES: u32 = 244;
+
+/// What both cameras give of one scene.
+pub struct Shots {
+    /// What a perfect camera of 32 x 32 pixels would see.
+    pub truth: Vec<f32>,
+    /// What a perfect camera of 64 x 64 pixels would see.
+    pub truth_fine: Vec<f32>,
+    /// What the single-pixel camera gives, in ADC counts.
+    pub nir_spi: Image,
+    /// What an ordinary camera gives.
+    pub vis: Image,
+}
+
+/// The virtual camera with its latency and settling, measured once against a white sheet.
+#[derive(Debug, Clone)]
+pub struct CalibratedCamera {
+    settling: Settling,
+}
+
+impl CalibratedCamera {
+    /// Calibrates the camera.
+    ///
+    /// # Errors
+    /// A burst that cannot be measured.
+    pub fn new(seed: u64) -> Result<Self> {
+        // The scene does not matter: the sheet takes its place.
+        let optics = VirtualOptics::new(Scene::white(), 1e3 * DISTANCES_M[0])?;
+        Ok(Self { settling: virtual_camera::calibrate_against_white(&optics, seed)? })
+    }
+
+    /// Takes `scene` with this camera and with an ordinary one.
+    ///
+    /// # Errors
+    /// A scene or distance that the optics refuse, a capture that fails.
+    pub fn shoot(&self, scene: Scene, conditions: Conditions, seed: u64) -> Result<Shots> {
+        let distance_mm = conditions.distance_m * 1e3;
+        let drops = conditions.rain.drops()?;
+        let visible = VisibleCamera::default().picture(
+            &scene,
+            &Projector::default(),
+            distance_mm,
+            drops.as_ref().unwrap_or(&Drops::none()),
+            seed,
+        )?;
+        let mut optics = VirtualOptics::new(scene, distance_mm)?;
+        if let Some(drops) = drops {
+            optics = optics.in_rain(drops)?;
+        }
+        let setup = MeasurementSetup::new(&Order::Natural, 1.0)?;
+        let captured = self.record(&optics, setup, conditions.frames, seed)?;
+        let measurements =
+            captured.integrated.measurements(&captured.setup, captured.settling.as_ref(), false)?;
+        Ok(Shots {
+            truth: optics.focused_footprint()?.weights().to_vec(),
+            truth_fine: optics.focused(64),
+            nir_spi: reconstruct::hadamard(&measurements),
+            vis: Image::new(Side::INSTRUMENT, visible),
+        })
+    }
+
+    /// The counts that a white sheet gives a pixel under these conditions: the scale of images, as a user would measure it.
+    ///
+    /// # Errors
+    /// A sheet that gives no light, a capture that fails.
+    pub fn white_level(&self, conditions: Conditions, seed: u64) -> Result<f32> {
+        let image = self.shoot(Scene::white(), conditions, seed)?.nir_spi;
+        let white = image.pixels().iter().sum::<f32>() / image.pixels().len() as f32;
+        if white > 0.0 {
+            return Ok(white);
+        }
+        Err(EvalError::Content(format!("a white sheet gives no light: {white} counts")))
+    }
+
+    /// One capture by the whole virtual camera: light, gateware model, firmware, packets, host.
+    ///
+    /// # Errors
+    /// A capture that fails.
+    pub fn record(
+        &self,
+        optics: &VirtualOptics,
+        setup: MeasurementSetup,
+        frames: u32,
+        seed: u64,
+    ) -> Result<Capture> {
+        let mut watch = |_: &Progress| ControlFlow::Continue(());
+        let settling = &self.settling;
+        Ok(virtual_camera::shoot(optics, setup, settling, frames, seed, &mut watch)?.capture)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CONDITIONS: Conditions = Conditions { distance_m: 0.3, rain: Rainfall::None, frames: 20 };
+
+    #[test]
+    fn a_white_sheet_is_white_at_every_distance_though_it_gives_less_light() {
+        let camera = CalibratedCamera::new(1).unwrap();
+        let at = |distance_m| Conditions { distance_m, ..CONDITIONS };
+        let [near, far] = [0.3, 1.0].map(|m| camera.white_level(at(m), 1).unwrap());
+        assert!(near > 0.0 && far > 0.0, "{near} {far}");
+        let field_mm = Projector::default().field_mm(300.0);
+        let grey = Scene::new(vec![0.5], 1, field_mm).unwrap().with_surround(0.5).unwrap();
+        let shots = camera.shoot(grey, at(0.3), 2).unwrap();
+        let mean = |pixels: &[f32]| pixels.iter().sum::<f32>() / pixels.len() as f32;
+        assert!((mean(shots.nir_spi.pixels()) / near - 0.5).abs() < 0.02, "{near}");
+        assert!((mean(&shots.truth) - 0.5).abs() < 1e-3);
+        assert_eq!((shots.truth.len(), shots.truth_fine.len()), (1024, 4096));
+    }
+
+    #[test]
+    fn a_shot_follows_from_its_seed() {
+        let camera = CalibratedCamera::new(1).unwrap();
+        let shot = |seed| {
+            let scene = Scene::new(vec![0.2, 0.8, 0.8, 0.2], 2, 40.0).unwrap();
+            camera.shoot(scene, CONDITIONS, seed).unwrap().nir_spi
+        };
+        assert_eq!(shot(3).pixels(), shot(3).pixels());
+        assert_ne!(shot(3).pixels(), shot(4).pixels());
+    }
+}

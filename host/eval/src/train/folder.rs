@@ -1,0 +1,216 @@
+//! A run's folder: checkpoint, weights, log, plot.
+//!
+//! # Invariant
+//! Each file is whole or the one before, whenever the run is killed. Only the log's last line may be torn, and a run that goes on
+//! writes the log anew from its checkpoint (`a_log_is_written_anew_from_its_checkpoint`).
+
+use super::data::Found;
+use crate::error::{EvalError, On, Result};
+use nirspi::files::image::encode_rgb;
+use nirspi::files::output::{OutputDir, write_atomic};
+use nirspi::picture::{Axis, Chart, Line};
+use nirspi_nets::train::Entry;
+use nirspi_nets::train::checkpoint::Checkpoint;
+use std::fs::{File, OpenOptions};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// The folder of one run.
+pub struct RunFolder {
+    path: PathBuf,
+    log: Option<File>,
+}
+
+impl RunFolder {
+    /// The run as it is.
+    const CHECKPOINT: &'static str = "checkpoint.bin";
+    /// Averaged weights with the best held-out score.
+    pub const WEIGHTS: &'static str = "weights.safetensors";
+    /// A line of JSON an entry.
+    const LOG: &'static str = "log.jsonl";
+    /// Loss and held-out score.
+    const PLOT: &'static str = "plot.png";
+    /// Which groups were held out.
+    const DATA: &'static str = "data.json";
+
+    fn at(path: &Path) -> Self {
+        Self { path: path.to_owned(), log: None }
+    }
+
+    fn file(&self, name: &str) -> PathBuf {
+        self.path.join(name)
+    }
+
+    /// A run from its first step. A run that could go on is not overwritten.
+    ///
+    /// # Errors
+    /// A folder that holds a run, or cannot be written.
+    pub fn start(path: &Path) -> Result<Self> {
+        let mut folder = Self::at(path);
+        let checkpoint = folder.file(Self::CHECKPOINT);
+        if checkpoint.exists() {
+            return Err(EvalError::Content(format!(
+                "{}: a run is kept there, expected --resume to go on with it, or another folder",
+                checkpoint.display()
+            )));
+        }
+        OutputDir::create(path)?.commit()?;
+        folder.write_log(&[])?;
+        Ok(folder)
+    }
+
+    /// A run to go on with; the log is brought back to its checkpoint.
+    ///
+    /// # Errors
+    /// A folder without a checkpoint, or with a damaged one.
+    pub fn resume(path: &Path) -> Result<(Self, Checkpoint)> {
+        let mut folder = Self::at(path);
+        let file = folder.file(Self::CHECKPOINT);
+        let bytes = std::fs::read(&file)
+            .on(|| format!("{}: no checkpoint to go on from", file.display()))?;
+        let checkpoint = Checkpoint::from_bytes(&bytes).on_file(&file)?;
+        folder.write_log(&checkpoint.progress.log)?;
+        Ok((folder, checkpoint))
+    }
+
+    fn write_log(&mut self, log: &[Entry]) -> Result<()> {
+        let lines = log
+            .iter()
+            .map(|entry| Ok(serde_json::to_string(entry)? + "\n"))
+            .collect::<Result<String>>()?;
+        let file = self.file(Self::LOG);
+        write_atomic(&file, lines.as_bytes())?;
+        let named = || format!("{}: cannot write it", file.display());
+        self.log = Some(OpenOptions::new().append(true).open(&file).on(named)?);
+        Ok(())
+    }
+
+    /// Keeps which groups were held out.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write_data(&self, data: &Found) -> Result<()> {
+        let text = serde_json::to_string_pretty(data)? + "\n";
+        Ok(write_atomic(&self.file(Self::DATA), text.as_bytes())?)
+    }
+
+    /// A line of the log.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn entry(&mut self, entry: &Entry) -> Result<()> {
+        let line = serde_json::to_string(entry)? + "\n";
+        let named = || format!("{}: cannot write it", self.path.join(Self::LOG).display());
+        match &mut self.log {
+            Some(log) => log.write_all(line.as_bytes()).and_then(|()| log.flush()).on(named),
+            None => Ok(()),
+        }
+    }
+
+    /// The run as it is, and its plot.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn checkpoint(&self, bytes: &[u8], log: &[Entry]) -> Result<()> {
+        write_atomic(&self.file(Self::CHECKPOINT), bytes)?;
+        if let Some(chart) = plot(log) {
+            write_atomic(&self.file(Self::PLOT), &encode_rgb(&chart.render()))?;
+        }
+        Ok(())
+    }
+
+    /// The best weights.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn best(&self, bytes: &[u8]) -> Result<()> {
+        Ok(write_atomic(&self.file(Self::WEIGHTS), bytes)?)
+    }
+}
+
+/// Loss and held-out score over steps, each brought to the range of its values: they share a frame, not a unit.
+fn plot(log: &[Entry]) -> Option<Chart> {
+    let last = log.last()?;
+    let losses: Vec<(f64, f64)> = log.iter().map(|e| (e.step as f64, e.loss)).collect();
+    let scores: Vec<(f64, f64)> =
+        log.iter().filter_map(|e| e.held_out.map(|score| (e.step as f64, score))).collect();
+    let line = |name: &str, colour, points: &[(f64, f64)], decimals: usize| {
+        let low = points.iter().map(|p| p.1).fold(f64::INFINITY, f64::min);
+        let high = points.iter().map(|p| p.1).fold(f64::NEG_INFINITY, f64::max);
+        let span = if high > low { high - low } else { 1.0 };
+        Line {
+            name: format!("{name}: {low:.decimals$} to {high:.decimals$}"),
+            colour,
+            dashed: false,
+            points: points.iter().map(|&(x, y)| (x, (y - low) / span)).collect(),
+        }
+    };
+    let steps = last.step as f64;
+    let mut lines = vec![line("loss", 1, &losses, 5)];
+    if !scores.is_empty() {
+        lines.push(line(&format!("held out, {}", last.score.unit()), 0, &scores, 2));
+    }
+    Some(Chart {
+        header: "Loss and held-out score".to_owned(),
+        x: Axis {
+            name: "steps".to_owned(),
+            from: 0.0,
+            to: steps,
+            logarithmic: false,
+            ticks: (0..=4).map(|k| (steps * f64::from(k) / 4.0).round()).collect(),
+        },
+        y: Axis {
+            name: "least to most of each line".to_owned(),
+            from: -0.05,
+            to: 1.05,
+            logarithmic: false,
+            ticks: vec![0.0, 0.5, 1.0],
+        },
+        lines,
+        footer: format!("{} steps in {:.0} s", last.step, last.seconds),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nirspi_nets::train::Score;
+
+    fn entry(step: u64, held_out: Option<f64>) -> Entry {
+        let (loss, seconds) = (1.0 / step as f64, step as f64);
+        Entry { step, loss, held_out, score: Score::PsnrDb, rate: 1e-3, seconds }
+    }
+
+    #[test]
+    fn a_plot_brings_each_line_to_its_own_range() {
+        assert!(plot(&[]).is_none());
+        let log = [entry(1, None), entry(2, Some(20.0)), entry(4, Some(24.0))];
+        let chart = plot(&log).unwrap();
+        let [loss, score] = &chart.lines[..] else { panic!("{}", chart.lines.len()) };
+        assert_eq!(loss.points, [(1.0, 1.0), (2.0, 1.0 / 3.0), (4.0, 0.0)]);
+        assert_eq!(score.points, [(2.0, 0.0), (4.0, 1.0)]);
+        assert_eq!(score.name, "held out, dB: 20.00 to 24.00");
+    }
+
+    #[test]
+    fn a_log_is_written_anew_from_its_checkpoint() {
+        let temporary = tempfile::tempdir().unwrap();
+        let path = temporary.path().join("run");
+        let mut folder = RunFolder::start(&path).unwrap();
+        for step in 1..=3 {
+            folder.entry(&entry(step, None)).unwrap();
+        }
+        let lines = || std::fs::read_to_string(path.join("log.jsonl")).unwrap().lines().count();
+        assert_eq!(lines(), 3);
+        // The run was killed after its checkpoint at step 2.
+        folder.write_log(&[entry(1, None), entry(2, None)]).unwrap();
+        folder.entry(&entry(3, None)).unwrap();
+        assert_eq!(lines(), 3);
+        folder.checkpoint(b"damaged", &[entry(1, None)]).unwrap();
+        assert!(path.join("plot.png").exists());
+        let told = RunFolder::start(&path).err().unwrap().to_string();
+        assert!(told.contains("a run is kept there"), "{told}");
+        let told = RunFolder::resume(&path).err().unwrap().to_string();
+        assert!(told.ends_with("checkpoint.bin"), "{told}");
+    }
+}
