@@ -104,7 +104,8 @@ fn await_start(session: &mut Session) -> Result<u32, GatewareError> {
     }
 }
 
-#[cfg(all(test, feature = "virtual-camera"))]
+#[cfg(test)]
+#[cfg(feature = "virtual-camera")]
 mod tests {
     use super::*;
     use crate::link::{Link, Received};

@@ -40,11 +40,3 @@ pub fn choose(backend: Backend, _frames: usize) -> Result<Option<Device>> {
         Backend::Wgpu | Backend::Cuda => Err(BackendError::not_built().into()),
     }
 }
-
-/// As the device's driver calls it.
-pub fn name(device: &Device) -> String {
-    #[cfg(feature = "gpu")]
-    return device.name().to_owned();
-    #[cfg(not(feature = "gpu"))]
-    match *device {}
-}
