@@ -116,7 +116,7 @@ fn a_step_that_drowns_in_noise_is_not_stepped_and_no_calibration_is_kept() {
 #[test]
 fn darkness_is_no_calibration() {
     let found = wired(|_, _| 0.0);
-    only(&found, "light of all LEDs", &["no step"]);
+    only(&found, "light of all LEDs", &["too dim"]);
     assert!(found.settling.is_none());
 }
 

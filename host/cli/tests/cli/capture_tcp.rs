@@ -139,7 +139,7 @@ fn a_second_host_is_told_that_the_camera_is_taken() {
     let mut first = bench.start(&["capture", "--camera", &camera, "--out", "first.mcap"]);
     first.has_written(&bench.path("first.mcap"), 10_000);
     let second = ["capture", "--camera", &camera, "--frames", "5", "--out", "second.mcap"];
-    bench.run(&second).failed(1, &[&camera, "another host"]);
+    bench.run(&second).failed(1, &[&camera, "another program"]);
     assert_eq!(bench.names(), ["first.mcap"]);
     server.says("turned away");
     first.signal("INT");

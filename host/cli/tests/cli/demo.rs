@@ -60,18 +60,18 @@ fn far_out_of_focus_the_distance_tells_the_blur_and_too_little_light_is_said() {
         let far = ["demo", "--rain", "heavy", "--distance-m", "0.6", "--out", "demo", "--json"];
         bench.run(&[&far[..], &["--frames", frames]].concat()).succeeded().json()
     };
-    let dim = run("244");
+    let dim = run("122");
     let of = |report: &serde_json::Value, name: &str| report["enhancement"][name].as_f64().unwrap();
     // The lens's disc of 20 mm in a field of 96 mm: a fourth of its diameter is 3.3 of 64 pixels.
     assert!((of(&dim, "sigma_px") - 10.0 / 3.0).abs() < 0.05, "{dim}");
     assert!(of(&dim, "estimated_sigma_px") < of(&dim, "sigma_px"), "{dim}");
-    let notes = |report: &serde_json::Value| report["notes"].to_string();
-    assert!(notes(&dim).contains("do not bear the deblurred image out"), "{dim}");
-    // Ten times the light.
+    let warnings = |report: &serde_json::Value| report["enhancement"]["warnings"].to_string();
+    assert!(warnings(&dim).contains("the readings contradict the enhanced image"), "{dim}");
+    // Twenty times the light.
     let bright = run("2440");
     let db = |name: &str| bright["enhancement"][name]["psnr_db"].as_f64().unwrap();
     assert!(db("deblurred") > db("upscaled") + 4.0, "{bright}");
-    assert!(!notes(&bright).contains("bear"), "{bright}");
+    assert!(!warnings(&bright).contains("contradict"), "{bright}");
 }
 
 #[test]
@@ -119,7 +119,7 @@ fn scenes_and_distances_that_cannot_be_leave_nothing_behind() {
 #[test]
 fn a_far_letter_is_dim_and_never_inverted() {
     let bench = Bench::new();
-    for distance in ["0.7", "1"] {
+    for (distance, least) in [("0.7", 0.3), ("1", 0.1)] {
         let report = bench
             .run(&["demo", "--distance-m", distance, "--out", "demo", "--json"])
             .succeeded()
@@ -127,7 +127,7 @@ fn a_far_letter_is_dim_and_never_inverted() {
         assert_eq!(report["adc_latency_clocks"], 6, "{report}");
         for stage in ["raw", "reconstruction"] {
             let likeness = report[stage]["correlation"].as_f64().unwrap();
-            assert!(likeness > 0.3, "{stage} at {distance} m: {likeness}");
+            assert!(likeness > least, "{stage} at {distance} m: {likeness}");
             assert!(report[stage]["inverted"].is_null(), "{report}");
         }
     }

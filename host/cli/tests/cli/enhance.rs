@@ -143,7 +143,7 @@ fn weights_of_another_network_are_refused() {
     bench.write("classifier.safetensors", classifier);
     bench
         .run(&["upscale", "in.npy", "--weights", "classifier.safetensors", "--out", "out.npy"])
-        .failed(2, &["classifier.safetensors", "of classifier", "fsrcnn"]);
+        .failed(2, &["classifier.safetensors", "network classifier", "expected fsrcnn"]);
 }
 
 #[test]

@@ -310,7 +310,7 @@ fn what_cannot_be_served_is_said_in_one_line() {
     // The camera itself refuses.
     let late = ["--no-calibration", "--adc-latency", "200"];
     let said = bench.run(&[&["serve", "--listen", "127.0.0.1:0"], &late[..]].concat());
-    said.failed(1, &["refused Configure: AdcLatency is 200"]);
+    said.failed(1, &["refused Configure", "the ADC latency is 200"]);
 }
 
 #[cfg(unix)]
