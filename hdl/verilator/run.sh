@@ -32,7 +32,7 @@ perl "$VERILATOR_ROOT/bin/verilator" --cc --exe --build --build-jobs 2 -O3 -CFLA
 
 rm -rf "$build/records"
 mkdir "$build/records"
-# Not `-p nirspi-hdl-sim`: with the features of that crate alone the simulator would be compiled a second time.
-NIRSPI_PIN_TRACE=$build/records cargo test --quiet --locked --workspace --test rtl -- random_scenarios \
+# Both crates, as in .ci/run: with the features of one alone the simulator would be compiled a second time.
+NIRSPI_PIN_TRACE=$build/records cargo test --quiet --locked -p nirspi-hdl-sim -p nirspi-tests-rtl --test rtl -- random_scenarios \
     >"$build/scenarios.log" || { cat "$build/scenarios.log"; exit 1; }
 "$build/obj/replay" "$build/records"/*.trace
