@@ -332,7 +332,7 @@ mod tests {
                 // Glyphs are drawn smoothly: much red, little blue.
                 .filter(|&(x, y)| {
                     let [red, _, blue] = canvas.get_pixel(x, y).0;
-                    red > 100 && red > 2 * blue
+                    red > 100 && red / 2 > blue
                 })
                 .count()
         };
