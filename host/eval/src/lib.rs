@@ -12,7 +12,7 @@
 //! | [`quality`] | how good are enhanced images, against blur, noise and number of steps? |
 //! | [`sampling`] | how good are images of a part of the patterns, by order, basis and method? |
 //! | [`sets`] | how alike are two stacks of images, one by one and as sets? |
-//! | [`bench`] | how many frames a second does this machine reconstruct and enhance? |
+//! | [`mod@bench`] | how many frames a second does this machine reconstruct and enhance? |
 //! | [`rain`] | what does rain do to light, and to the photon budget of a pixel? |
 //! | [`train`] | how does a network learn from a user's characters? |
 //!
