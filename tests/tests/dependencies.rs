@@ -115,7 +115,7 @@ fn the_command_line_computes_nothing() {
     }
 }
 
-/// Whoever only captures builds neither web server nor typefaces, optics nor networks.
+/// The library without its features builds no web server, no typefaces, no optics and no networks.
 #[test]
 fn capture_alone_builds_no_server_no_typefaces_no_optics_and_no_networks() {
     let tree = |more: &[&str]| {

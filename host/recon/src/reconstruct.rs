@@ -90,7 +90,7 @@ impl Sparsity {
     }
 }
 
-/// What becomes of rows that were measured.
+/// Whether measured rows keep their values or take those of the fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Completion {
     /// They keep their measured values; only the others are predicted.
@@ -155,7 +155,7 @@ pub struct OmpSettings {
     pub noise: NoiseLevel,
     /// Share of its energy that the measured rows must see of an atom for it to be chosen.
     pub visibility: f64,
-    /// What becomes of rows that were measured.
+    /// Whether measured rows keep their values or take those of the fit.
     pub completion: Completion,
     /// What computes the pursuits. One image is a few pursuits over different dictionaries: [`Backend::Auto`] is the processor.
     pub backend: Backend,

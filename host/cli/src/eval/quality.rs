@@ -33,7 +33,7 @@ pub struct Args {
     /// Folder of real measurements (.npz), reconstructed and enhanced
     #[arg(long, value_name = "DIR")]
     spi: Option<PathBuf>,
-    /// Folder of other weights, <network>.safetensors; the embedded ones where there is none
+    /// Folder with weights of your own, one NETWORK.safetensors each; a network without a file there runs with the built-in weights
     #[arg(long, value_name = "DIR")]
     weights: Option<PathBuf>,
     /// Images of each stack

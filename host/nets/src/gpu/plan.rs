@@ -37,7 +37,7 @@ pub(crate) struct Geometry {
 }
 
 impl Geometry {
-    /// Side of what becomes of images of `side` x `side`.
+    /// Side of the output for an input of `side` x `side`.
     pub(super) fn side(&self, side: usize) -> usize {
         (side + 2 * self.centre - self.kernel) / self.stride + 1
     }

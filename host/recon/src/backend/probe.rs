@@ -73,7 +73,7 @@ pub struct Missing {
 /// integrated one through wgpu; a software device is given to [`Backend::Wgpu`] only.
 ///
 /// # Errors
-/// [`Missing`] if there is none.
+/// [`Missing`], which says which backends were looked for and why each is not usable.
 pub fn find(backend: Backend) -> Result<Option<Gpu>, Missing> {
     let through_cuda = || cuda().map(Gpu::Cuda).map_err(|absent| ("CUDA", absent));
     let through_wgpu =

@@ -238,7 +238,7 @@ pub struct MethodSettings {
     pub non_negative: bool,
     /// How strong a penalty is.
     pub strength: Strength,
-    /// What becomes of rows that were measured. `None`: [`Completion::Measured`], but [`Completion::Sparse`] for
+    /// Whether measured rows keep their values or take those of the fit. `None`: [`Completion::Measured`], but [`Completion::Sparse`] for
     /// Algorithm 1 as printed and with coefficients of 0 or more, because noise of the measured rows would make pixels
     /// negative.
     pub completion: Option<Completion>,
@@ -318,7 +318,7 @@ impl MethodSettings {
         taken
     }
 
-    /// What becomes of rows that were measured.
+    /// Whether measured rows keep their values or take those of the fit.
     #[must_use]
     pub fn completion(&self) -> Completion {
         let sparse = self.as_printed || self.non_negative;

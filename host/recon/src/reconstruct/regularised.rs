@@ -91,7 +91,7 @@ pub struct RegularisedSettings {
     pub falloff: f64,
     /// Noise of the measurements.
     pub noise: NoiseLevel,
-    /// What becomes of rows that were measured.
+    /// Whether measured rows keep their values or take those of the fit.
     pub completion: Completion,
     /// Most iterations of the method.
     pub iterations: usize,
