@@ -1,4 +1,4 @@
-//! How good enhanced images are on characters that no training has seen, and what becomes of scenes that are no characters.
+//! How good enhanced images are, on characters that no training has seen and on other scenes.
 //!
 //! Sharp 64 x 64 images are blurred (Gaussian, sigma in pixels of 64), sampled to 32 x 32 by means of 2 x 2, given noise, and
 //! enhanced by every method: Lanczos, three classical methods that get blur and noise, and the networks, which get neither.

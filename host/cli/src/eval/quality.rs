@@ -1,5 +1,4 @@
-//! `nirspi eval quality`: how good enhanced images are on characters that no training has seen, and what becomes of
-//! scenes that are no characters.
+//! `nirspi eval quality`: how good enhanced images are, on characters that no training has seen and on other scenes.
 
 use super::progress;
 use crate::print;

@@ -1,5 +1,5 @@
-//! Every kernel against its definition in double precision, on the GPUs of this machine, software Vulkan too; skipped aloud where there
-//! is none. Buffers are full of NaN before a kernel writes them, so a test sees each number that the kernel left unwritten.
+//! Every kernel against its definition in double precision, on each GPU of this machine and on software Vulkan. A machine without
+//! either prints that the tests are skipped. Buffers are full of NaN before a kernel writes them, so a test sees each number that the kernel left unwritten.
 
 use std::sync::Arc;
 
