@@ -7,11 +7,15 @@ mod table3;
 mod table4;
 
 use super::camera::Rain;
-use super::range;
+use super::report::to_json;
+use super::{print, range};
 use anyhow::Result;
 use clap::{Args, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
+use nirspi::files::output::OutputDir;
 use nirspi_eval::shot::{self, FRAMES};
+use serde::Serialize;
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// The paper's tables, ours beside them (ours simulated); what less sampling costs
@@ -66,6 +70,36 @@ struct ExposureArgs {
 impl ExposureArgs {
     fn exposure(&self) -> shot::Exposure {
         shot::Exposure { rain: self.rain.rainfall(), frames: self.frames, seed: self.seed }
+    }
+}
+
+/// Where a table's report goes.
+#[derive(Debug, Args)]
+struct OutputArgs {
+    /// Folder for the report as JSON and its picture
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Print the report as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+impl OutputArgs {
+    /// Writes `NAME.json` and `NAME.png` into the folder, if one is named, and prints the report as JSON or in words.
+    fn hand_over<R: Serialize>(
+        &self,
+        name: &str,
+        report: &R,
+        picture: impl FnOnce() -> Result<Vec<u8>>,
+        say: impl FnOnce(&R) -> Result<()>,
+    ) -> Result<()> {
+        if let Some(path) = &self.out {
+            let mut out = OutputDir::create(path)?;
+            out.write(&format!("{name}.json"), to_json(report)?.as_bytes())?;
+            out.write(&format!("{name}.png"), &picture()?)?;
+            out.commit()?;
+        }
+        if self.json { print::json(report) } else { say(report) }
     }
 }
 

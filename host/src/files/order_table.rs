@@ -1,16 +1,13 @@
 //! A user's own order of patterns: a text file of numbers, entry k the natural-order Hadamard row shown k-th.
 //!
-//! The law: every number in the file is an entry; whatever is neither a number, blank, comma nor comment (`#` to
-//! the end of the line) is an error that names its line.
+//! Numbers are separated by blanks, commas, semicolons or lines; `#` begins a comment. Anything else is an error that names its line
+//! (`what_is_no_table_is_refused_in_one_line_that_names_the_place`).
 
 use super::FileError;
-use super::archive::open_file;
-use std::io::Read;
+use super::archive::read_text;
 use std::path::Path;
 
 const EXPECTED: &str = "a text file of pattern numbers";
-/// A table of 256 x 256 entries of five digits is 0.4 MB.
-const MAX_BYTES: u64 = 4 << 20;
 
 /// Reads a table. Whether it is a permutation is for [`Order::rows`](nirspi_recon::Order::rows) to say, which knows
 /// the side.
@@ -18,16 +15,7 @@ const MAX_BYTES: u64 = 4 << 20;
 /// # Errors
 /// [`FileError`], one line that names file, line, what was found and what was expected.
 pub fn read_order_table(path: &Path) -> Result<Vec<u32>, FileError> {
-    let (file, _) = open_file(path, EXPECTED)?;
-    let mut bytes = Vec::new();
-    file.take(MAX_BYTES + 1)
-        .read_to_end(&mut bytes)
-        .map_err(|error| FileError::io(path, "read", error))?;
-    let text = match String::from_utf8(bytes) {
-        Ok(text) if text.len() as u64 <= MAX_BYTES => text,
-        Ok(_) => return Err(FileError::kind(path, "more than 4 MiB", EXPECTED)),
-        Err(_) => return Err(FileError::kind(path, "a binary file", EXPECTED)),
-    };
+    let text = read_text(path, EXPECTED)?;
     let mut table = Vec::new();
     for (line, content) in (1..).zip(text.lines()) {
         let numbers = content.split('#').next().unwrap_or("");

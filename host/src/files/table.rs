@@ -4,13 +4,10 @@
 //! line without a number: it is a heading.
 
 use super::FileError;
-use super::archive::open_file;
-use std::io::Read;
+use super::archive::read_text;
 use std::path::{Path, PathBuf};
 
 const EXPECTED: &str = "a text file with a row of numbers a line";
-/// A table of 100 000 rows of four numbers is 4 MB.
-const MAX_BYTES: u64 = 4 << 20;
 
 /// The fields of a table, line by line.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -26,16 +23,7 @@ impl Table {
     /// # Errors
     /// [`FileError`] for a file that cannot be read, is too large or is not text.
     pub fn read(path: &Path) -> Result<Self, FileError> {
-        let (file, _) = open_file(path, EXPECTED)?;
-        let mut bytes = Vec::new();
-        file.take(MAX_BYTES + 1)
-            .read_to_end(&mut bytes)
-            .map_err(|error| FileError::io(path, "read", error))?;
-        let text = match String::from_utf8(bytes) {
-            Ok(text) if text.len() as u64 <= MAX_BYTES => text,
-            Ok(_) => return Err(FileError::kind(path, "more than 4 MiB", EXPECTED)),
-            Err(_) => return Err(FileError::kind(path, "a binary file", EXPECTED)),
-        };
+        let text = read_text(path, EXPECTED)?;
         let lines = text.lines().enumerate().map(|(at, line)| (at + 1, line.trim()));
         let mut rows: Vec<(usize, Vec<String>)> = lines
             .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))

@@ -1,13 +1,11 @@
 //! `nirspi eval table1`: how long each stage takes, on the machine at hand.
 
-use crate::report::to_json;
+use super::OutputArgs;
 use crate::{print, refused};
 use anyhow::Result;
 use indicatif::ProgressBar;
 use nirspi::files::image::encode_rgb;
-use nirspi::files::output::OutputDir;
 use nirspi_eval::table1::{Report, Settings, chart, table1};
-use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Time of every stage of one picture beside the paper's Table 1
@@ -28,12 +26,8 @@ pub struct Args {
     /// Seed of the picture
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Folder for table1.json and table1.png
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
-    /// Print the report as JSON
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    output: OutputArgs,
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
@@ -41,17 +35,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let bar = ProgressBar::new(u64::from(args.repeats));
     let report = table1(&settings, &|| bar.inc(1)).map_err(refused)?;
     bar.finish_and_clear();
-    if let Some(path) = &args.out {
-        let mut out = OutputDir::create(path)?;
-        out.write("table1.json", to_json(&report)?.as_bytes())?;
-        out.write("table1.png", &encode_rgb(&chart(&report).render()))?;
-        out.commit()?;
-    }
-    if args.json {
-        print::json(&report)?;
-    } else {
-        say(&report)?;
-    }
+    let picture = || Ok(encode_rgb(&chart(&report).render()));
+    args.output.hand_over("table1", &report, picture, say)?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -1,11 +1,9 @@
 //! `nirspi eval table3`: image quality in rain and without it: NIR-SPI, VIS, and NIR-SPI enhanced by networks.
 
-use super::{ExposureArgs, progress};
+use super::{ExposureArgs, OutputArgs, progress};
 use crate::print;
-use crate::report::to_json;
 use anyhow::Result;
 use nirspi::files::image::encode_rgb;
-use nirspi::files::output::OutputDir;
 use nirspi_eval::table3::{Report, Row, Settings, Table};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -27,12 +25,8 @@ pub struct Args {
     /// Inception-v3's weights in safetensors with torchvision's names, for FID; a second or so a picture
     #[arg(long, value_name = "FILE")]
     inception: Option<PathBuf>,
-    /// Folder for table3.json and table3.png
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
-    /// Print the report as JSON
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    output: OutputArgs,
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
@@ -45,17 +39,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let table = Table::take(settings, &|| bar.inc(1))?;
     bar.finish_and_clear();
     let report = table.report()?;
-    if let Some(path) = &args.out {
-        let mut out = OutputDir::create(path)?;
-        out.write("table3.json", to_json(&report)?.as_bytes())?;
-        out.write("table3.png", &encode_rgb(&table.picture()?.render()))?;
-        out.commit()?;
-    }
-    if args.json {
-        print::json(&report)?;
-    } else {
-        say(&report)?;
-    }
+    let picture = || Ok(encode_rgb(&table.picture()?.render()));
+    args.output.hand_over("table3", &report, picture, say)?;
     Ok(ExitCode::SUCCESS)
 }
 

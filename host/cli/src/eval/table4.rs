@@ -1,14 +1,11 @@
 //! `nirspi eval table4`: spatial resolution in rain, NIR-SPI, VIS and networks, by slanted edge and by bars.
 
-use super::{ExposureArgs, progress};
+use super::{ExposureArgs, OutputArgs, progress};
 use crate::print;
-use crate::report::to_json;
 use anyhow::Result;
 use nirspi::files::image::encode_rgb;
-use nirspi::files::output::OutputDir;
 use nirspi_eval::estimate::Estimate;
 use nirspi_eval::table4::{Report, Settings, chart, table4};
-use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Spatial resolution in rain beside the paper's Table 4: NIR-SPI, VIS and networks, in mm on the target
@@ -27,12 +24,8 @@ pub struct Args {
     scenes: u32,
     #[command(flatten)]
     exposure: ExposureArgs,
-    /// Folder for table4.json and table4.png
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
-    /// Print the report as JSON
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    output: OutputArgs,
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
@@ -40,17 +33,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let bar = progress(settings.pictures(), "table 4");
     let report = table4(&settings, &|| bar.inc(1))?;
     bar.finish_and_clear();
-    if let Some(path) = &args.out {
-        let mut out = OutputDir::create(path)?;
-        out.write("table4.json", to_json(&report)?.as_bytes())?;
-        out.write("table4.png", &encode_rgb(&chart(&report).render()))?;
-        out.commit()?;
-    }
-    if args.json {
-        print::json(&report)?;
-    } else {
-        say(&report)?;
-    }
+    let picture = || Ok(encode_rgb(&chart(&report).render()));
+    args.output.hand_over("table4", &report, picture, say)?;
     Ok(ExitCode::SUCCESS)
 }
 
