@@ -16,8 +16,8 @@ use crate::link::Link;
 use conversation::Conversation;
 use nirspi_wire::register::Register;
 use nirspi_wire::{
-    Command, DeviceMessage, GatewareChunk, Identity, PROTOCOL_VERSION, PacketError, SelfTestReport,
-    Status,
+    Capabilities, Command, DeviceMessage, GatewareChunk, Identity, PacketError, SelfTestReport,
+    Status, version,
 };
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
@@ -44,6 +44,9 @@ pub struct CameraIdentity {
     pub adc_bits: u8,
     /// Wavelength of the LEDs.
     pub wavelength_nm: u16,
+    /// What the camera can do, in words; empty for a camera of protocol version 1, which does not say.
+    #[serde(default)]
+    pub capabilities: Vec<String>,
 }
 
 impl From<&Identity<'_>> for CameraIdentity {
@@ -57,8 +60,19 @@ impl From<&Identity<'_>> for CameraIdentity {
             adc_hz: identity.adc_hz,
             adc_bits: identity.adc_bits,
             wavelength_nm: identity.wavelength_nm,
+            capabilities: in_words(identity.capabilities.0.unwrap_or_default()),
         }
     }
+}
+
+/// The name of each capability; the number of the bit where this program does not know the capability.
+fn in_words(capabilities: Capabilities) -> Vec<String> {
+    let bits = (0..u32::BITS).filter(|bit| capabilities.contains(Capabilities(1 << bit)));
+    bits.map(|bit| {
+        let known = Capabilities::NAMES.iter().find(|(known, _)| known.0 == 1 << bit);
+        known.map_or_else(|| format!("capability {bit}"), |(_, name)| (*name).to_owned())
+    })
+    .collect()
 }
 
 /// Hears every packet of a session.
@@ -84,11 +98,7 @@ impl Listener for Reports {
         match content {
             Ok(DeviceMessage::Event(event)) => self.0.extend(events::at_greeting(&event.kind)),
             Ok(DeviceMessage::Crash(report)) => self.0.push(events::crash(report)),
-            // Intact, and yet no message: of a version that has more to say.
-            Err(PacketError::Message) => self.0.push(
-                "the camera reported something that this program does not know: update it"
-                    .to_owned(),
-            ),
+            // A message of a newer version is passed over; a damaged one was the link's affair.
             _ => {}
         }
     }
@@ -102,15 +112,24 @@ pub struct Session {
 }
 
 impl Session {
-    /// Greets the camera behind `link`.
+    /// Greets the camera behind `link`, and settles the protocol version: the newest that both sides speak.
     ///
     /// # Errors
     /// [`SessionError::Version`] where the two cannot talk; the others where nothing sensible answers.
     pub fn open(link: Box<dyn Link>) -> Result<Self, SessionError> {
         let mut conversation = Conversation::begin(link)?;
         let mut reports = Reports::default();
-        match conversation.ask(&request::Hello(PROTOCOL_VERSION), &mut reports) {
-            Ok(identity) if identity.protocol == PROTOCOL_VERSION => {
+        let mut greet = |protocol| conversation.ask(&request::Hello(protocol), &mut reports);
+        let identity = match greet(version::CURRENT) {
+            // The camera is older than this program, and this program still speaks its version.
+            Ok(identity) if identity.protocol < version::CURRENT => {
+                let protocol = identity.protocol;
+                if version::speaks(protocol) { greet(protocol) } else { Ok(identity) }
+            }
+            answer => answer,
+        };
+        match identity {
+            Ok(identity) if version::speaks(identity.protocol) => {
                 Ok(Self { conversation, identity, reports: reports.0 })
             }
             Ok(identity) => Err(SessionError::Version { camera: identity.protocol }),

@@ -17,6 +17,8 @@ pub struct Tally {
     integrated: Integrated,
     ended: bool,
     device_time_us: u64,
+    /// Intact messages of a newer protocol version.
+    unknown: u64,
 }
 
 impl Tally {
@@ -25,7 +27,8 @@ impl Tally {
     #[must_use]
     pub fn new(setup: &MeasurementSetup, run: Option<u16>) -> Self {
         let integrated = Integrated::new(setup);
-        Self { run, account: LossAccount::new(), integrated, ended: false, device_time_us: 0 }
+        let account = LossAccount::new();
+        Self { run, account, integrated, ended: false, device_time_us: 0, unknown: 0 }
     }
 
     /// A packet has come. Returns whether it was a frame that was added to the sum.
@@ -41,6 +44,7 @@ impl Tally {
                 _ => {}
             },
             Ok(_) => {}
+            Err(PacketError::Message) => self.unknown += 1,
             Err(_) => self.account.damaged(),
         }
         false
@@ -91,6 +95,12 @@ impl Tally {
     #[must_use]
     pub fn account(&self) -> &LossAccount {
         &self.account
+    }
+
+    /// Intact messages that this program does not know: passed over, since a newer camera may send them.
+    #[must_use]
+    pub fn unknown_packets(&self) -> u64 {
+        self.unknown
     }
 
     /// The sum of the frames received in order.

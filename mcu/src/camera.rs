@@ -9,7 +9,7 @@ use crate::packets::{STREAM_HEADER_BYTES, send};
 use crate::{
     BoardInfo, Crash, FpgaBus, GatewareLoader, Inputs, Limits, Micros, PacketSink, Ports, Progress,
 };
-use nirspi_wire::packet::{MAX_HOST_PACKET, PacketError, open};
+use nirspi_wire::packet::{MAX_HOST_PACKET, parse, request_id, unseal};
 use nirspi_wire::samples::Words;
 use nirspi_wire::{Deframed, Deframer, Depth, DeviceMessage, Request, State};
 
@@ -47,14 +47,17 @@ impl Camera {
         machine.guard_sensors(now, inputs, ports.bus);
         let mut rest = bytes;
         while machine.takes_commands() {
-            let opened = match self.deframer.next(&mut rest) {
+            let payload = match self.deframer.next(&mut rest) {
                 None => break,
-                Some(Deframed::TooLong) => Err(PacketError::TooLong),
-                Some(Deframed::Packet(packet)) => open::<Request<'_>>(packet),
+                Some(Deframed::TooLong) => None,
+                Some(Deframed::Packet(packet)) => unseal(packet).ok(),
             };
-            match opened {
-                Ok(request) => machine.carry_out(now, &request, inputs, ports),
-                Err(_) => machine.count_damage(now),
+            let request =
+                payload.map(|payload| (parse::<Request<'_>>(payload), request_id(payload)));
+            match request {
+                Some((Ok(request), _)) => machine.carry_out(now, &request, inputs, ports),
+                Some((Err(_), Some(id))) => machine.refuse_unknown(now, id),
+                _ => machine.count_damage(now),
             }
             machine.flush(ports.sink);
         }

@@ -13,8 +13,8 @@ use crate::{
 };
 use nirspi_wire::register::{ORDER_TABLE, Register, status};
 use nirspi_wire::{
-    Answer, Command, Configuration, GatewareChunk, PATTERNS, PROTOCOL_VERSION, PatternOrder,
-    Refusal, Request, State, Status,
+    Answer, Command, Configuration, DeviceMessage, GatewareChunk, PATTERNS, PatternOrder, Refusal,
+    Reply, Request, State, Status, version,
 };
 
 impl Machine {
@@ -30,9 +30,7 @@ impl Machine {
         self.last_command = now;
         let done = match command {
             Command::Hello { protocol } => return self.hello(id, now, protocol, *bus),
-            _ if self.session != Session::Open => {
-                Err(Refusal::Protocol { device: PROTOCOL_VERSION })
-            }
+            _ if self.protocol().is_none() => Err(Refusal::Protocol { device: version::CURRENT }),
             Command::Configure(configuration) => {
                 self.configure(now, &configuration, inputs, *bus).map(|()| Answer::Done)
             }
@@ -58,12 +56,32 @@ impl Machine {
         self.reply(id, Outcome::Other(done));
     }
 
+    /// Answers a request whose command this firmware does not know. A session of a version without that refusal counts
+    /// the request as damage, as the firmware of that version did.
+    pub(crate) fn refuse_unknown(&mut self, now: Micros, id: u16) {
+        let outcome = Err(Refusal::Unknown);
+        let since = DeviceMessage::Reply(Reply { id, outcome }).since();
+        match self.protocol() {
+            Some(protocol) if protocol < since => self.count_damage(now),
+            Some(_) => {
+                self.last_command = now;
+                self.reply(id, Outcome::Other(outcome));
+            }
+            None => {
+                let device = version::CURRENT;
+                self.reply(id, Outcome::Other(Err(Refusal::Protocol { device })));
+            }
+        }
+    }
+
     /// A new session: what the host before it has left running ends.
     fn hello(&mut self, id: u16, now: Micros, protocol: u16, bus: &mut impl FpgaBus) {
         let gateware = fpga::version(bus);
-        self.stop(id, now, bus, Outcome::Hello { gateware });
-        self.session = if protocol == PROTOCOL_VERSION { Session::Open } else { Session::Foreign };
-        if self.session == Session::Open && self.crash.is_some() {
+        let spoken = version::speaks(protocol);
+        let answered = if spoken { protocol } else { version::CURRENT };
+        self.stop(id, now, bus, Outcome::Hello { protocol: answered, gateware });
+        self.session = if spoken { Session::Open { protocol } } else { Session::Foreign };
+        if spoken && self.crash.is_some() {
             self.notices.push(Notice::Crash);
         }
     }

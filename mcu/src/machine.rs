@@ -15,16 +15,18 @@ use crate::notices::{Notice, Notices, Outcome};
 use crate::run::{self, Counters, Fpga, Run, SAMPLE_BYTES};
 use crate::selftest::{self, TestFrame};
 use crate::{BoardInfo, Crash, FpgaBus, Inputs, Limits, Micros, PacketSink, fpga, safety};
-use nirspi_wire::{Answer, Event, EventKind, Fault, RebootInto, Refusal, RunLength, State};
+use nirspi_wire::{
+    Answer, Event, EventKind, Fault, RebootInto, Refusal, RunLength, State, version,
+};
 
 /// What is known of the host.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Session {
     /// No `Hello` since power-up or since the link was closed.
     Closed,
-    /// The host speaks this protocol.
-    Open,
-    /// The host speaks another protocol: the camera names its own version, and answers nothing else.
+    /// Host and camera speak this protocol version.
+    Open { protocol: u16 },
+    /// The host speaks a version that this firmware does not: the camera names its own version, and answers nothing else.
     Foreign,
 }
 
@@ -110,9 +112,17 @@ impl Machine {
         matches!(self.fault, Some(Fault::FpgaAbsent { .. }))
     }
 
+    /// The protocol version of the session; `None` without a session.
+    pub fn protocol(&self) -> Option<u16> {
+        match self.session {
+            Session::Open { protocol } => Some(protocol),
+            Session::Closed | Session::Foreign => None,
+        }
+    }
+
     /// Whether frames may go out: a host listens, and no reply or event waits.
     pub fn may_stream(&self) -> bool {
-        self.session == Session::Open && self.notices.is_empty()
+        self.protocol().is_some() && self.notices.is_empty()
     }
 
     pub fn reply(&mut self, id: u16, outcome: Outcome) {
@@ -122,13 +132,14 @@ impl Machine {
     /// Reports an event to a host that speaks this protocol. Without such a host the event is not kept: the next host
     /// learns the state from `Status`.
     pub fn notify(&mut self, now: Micros, kind: EventKind) {
-        if self.session == Session::Open {
+        if self.protocol().is_some() {
             self.notices.push(Notice::Event(Event { device_time_us: now.0, kind }));
         }
     }
 
     pub fn flush(&mut self, sink: &mut impl PacketSink) -> bool {
-        self.notices.flush(&self.info, &mut self.crash, sink)
+        let protocol = self.protocol().unwrap_or(version::CURRENT);
+        self.notices.flush(protocol, &self.info, &mut self.crash, sink)
     }
 
     /// Switches the LEDs off. Every poll repeats this until the FPGA says that the LEDs are off.

@@ -10,8 +10,8 @@ use crate::{BoardInfo, Crash, PacketSink};
 use heapless::Deque;
 use nirspi_wire::message::CRASH_TEXT_MAX;
 use nirspi_wire::{
-    ADC_BITS, ADC_HZ, Answer, CrashReport, DeviceMessage, Event, Identity, PROTOCOL_VERSION,
-    Refusal, Reply, SIDE, Version, WAVELENGTH_NM,
+    ADC_BITS, ADC_HZ, Answer, Capabilities, CrashReport, DeviceMessage, Event, Identity, Refusal,
+    Reply, SIDE, Tail, Version, WAVELENGTH_NM,
 };
 
 /// A command's outcome that borrows nothing.
@@ -19,6 +19,8 @@ use nirspi_wire::{
 pub(crate) enum Outcome {
     /// The rest of the identity is filled in when it is sent.
     Hello {
+        /// Of the session, or the newest of this firmware where there is no session.
+        protocol: u16,
         gateware: Version,
     },
     Other(Result<Answer<'static>, Refusal>),
@@ -46,7 +48,7 @@ const CAPACITY: usize = 16;
 /// run (or the loss of a raw burst), a crash report.
 const NOTICES_OF_A_COMMAND: usize = 4;
 
-/// Bytes of postcard of the longest notice, a crash report; an identity with two full names is 91 at most.
+/// Bytes of postcard of the longest notice, a crash report; an identity with two full names is 96 at most.
 const NOTICE_BYTES: usize = 16 + CRASH_TEXT_MAX;
 
 /// Replies and events in the order in which they came.
@@ -71,9 +73,11 @@ impl Notices {
         self.0.clear();
     }
 
-    /// Sends what the link has room for; whether that was anything.
+    /// Sends what the link has room for; whether that was anything. What a session of version `protocol` does not have
+    /// is dropped.
     pub fn flush(
         &mut self,
+        protocol: u16,
         info: &BoardInfo,
         crash: &mut Option<Crash>,
         sink: &mut impl PacketSink,
@@ -81,6 +85,7 @@ impl Notices {
         let mut worked = false;
         while let Some(notice) = self.0.front() {
             let sent = message(notice, info, crash.as_ref())
+                .filter(|message| message.since() <= protocol)
                 .is_none_or(|message| send(&message, NOTICE_BYTES, sink));
             if !sent {
                 break;
@@ -110,9 +115,9 @@ fn message<'m>(
         Notice::Reply { id, outcome: Outcome::Other(outcome) } => {
             DeviceMessage::Reply(Reply { id, outcome })
         }
-        Notice::Reply { id, outcome: Outcome::Hello { gateware } } => {
+        Notice::Reply { id, outcome: Outcome::Hello { protocol, gateware } } => {
             let identity = Identity {
-                protocol: PROTOCOL_VERSION,
+                protocol,
                 firmware: info.firmware,
                 gateware,
                 board: &info.board,
@@ -121,6 +126,7 @@ fn message<'m>(
                 adc_hz: ADC_HZ,
                 adc_bits: ADC_BITS,
                 wavelength_nm: WAVELENGTH_NM,
+                capabilities: Tail((protocol >= Capabilities::SINCE).then_some(info.capabilities)),
             };
             DeviceMessage::Reply(Reply { id, outcome: Ok(Answer::Hello(identity)) })
         }

@@ -4,7 +4,7 @@
 
 use crate::Micros;
 use heapless::String;
-use nirspi_wire::{RebootInto, Version};
+use nirspi_wire::{Capabilities, RebootInto, Version};
 
 /// Why the FPGA could not be reached.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -158,13 +158,22 @@ pub struct BoardInfo {
     pub serial: String<NAME_BYTES>,
     /// Firmware version.
     pub firmware: Version,
+    /// What the device can do.
+    pub capabilities: Capabilities,
 }
 
 impl BoardInfo {
     /// Of both names the first [`NAME_BYTES`] bytes at most are kept, in whole characters.
     #[must_use]
     pub fn new(board: &str, serial: &str, firmware: Version) -> Self {
-        Self { board: cut(board), serial: cut(serial), firmware }
+        let capabilities = Capabilities::default();
+        Self { board: cut(board), serial: cut(serial), firmware, capabilities }
+    }
+
+    /// The same board, which can do this as well.
+    #[must_use]
+    pub fn can(self, capability: Capabilities) -> Self {
+        Self { capabilities: self.capabilities.with(capability), ..self }
     }
 }
 

@@ -6,8 +6,8 @@ use nirspi::virtual_camera::{OpticalFpga, SimulatedFpga, VirtualCamera, VirtualO
 use nirspi_optics::Scene;
 use nirspi_wire::packet::MAX_DEVICE_PACKET;
 use nirspi_wire::{
-    Command, Configuration, Deframed, Deframer, DeviceMessage, EventKind, Fault, PROTOCOL_VERSION,
-    PatternOrder, Refusal, Reply, Request, RunLength, SampleSource, encode, open,
+    Command, Configuration, Deframed, Deframer, DeviceMessage, EventKind, Fault, PatternOrder,
+    Refusal, Reply, Request, RunLength, SampleSource, encode, open, version,
 };
 
 /// 8 us, the pace of the virtual camera.
@@ -34,7 +34,7 @@ impl Bench {
         let scene = Scene::new(vec![0.5; 64], 8, 48.0).unwrap();
         let camera = VirtualOptics::new(scene, 300.0).unwrap().camera(1).unwrap();
         let mut bench = Self { camera, deframer: Box::default(), next_id: 0 };
-        bench.ask(Command::Hello { protocol: PROTOCOL_VERSION });
+        bench.ask(Command::Hello { protocol: version::CURRENT });
         bench
     }
 

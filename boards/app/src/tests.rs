@@ -14,7 +14,7 @@ use nirspi_wire::packet::{MAX_DEVICE_PACKET, MAX_HOST_PACKET};
 use nirspi_wire::register::{IDENTITY, Register, control, status};
 use nirspi_wire::{
     Answer, Command, Configuration, Deframed, Deframer, DeviceMessage, FrameFlags,
-    PROTOCOL_VERSION, PatternOrder, RebootInto, Reply, Request, RunLength, SampleSource, encode,
+    version, PatternOrder, RebootInto, Reply, Request, RunLength, SampleSource, encode,
     open,
 };
 use std::boxed::Box;
@@ -221,7 +221,7 @@ fn packet(id: u16, command: Command<'_>) -> Vec<u8> {
 }
 
 fn hello(id: u16) -> Vec<u8> {
-    packet(id, Command::Hello { protocol: PROTOCOL_VERSION })
+    packet(id, Command::Hello { protocol: version::CURRENT })
 }
 
 const TWO_PATTERNS: Configuration<'static> = Configuration {
@@ -282,7 +282,7 @@ fn leds_are_let_on_from_the_configuration_until_the_host_is_gone() {
 fn frames_come_in_order_and_a_full_link_drops_whole_ones() {
     let mut bench = Bench::new(4);
     for (id, command) in [
-        (1, Command::Hello { protocol: PROTOCOL_VERSION }),
+        (1, Command::Hello { protocol: version::CURRENT }),
         (2, Command::Configure(TWO_PATTERNS)),
         (3, Command::Start(RunLength::Continuous)),
     ] {
@@ -305,7 +305,7 @@ fn frames_come_in_order_and_a_full_link_drops_whole_ones() {
 fn a_long_transfer_delays_the_answer_and_loses_nothing() {
     let mut bench = Bench::new(64);
     for (id, command) in
-        [(1, Command::Hello { protocol: PROTOCOL_VERSION }), (2, Command::Configure(TWO_PATTERNS))]
+        [(1, Command::Hello { protocol: version::CURRENT }), (2, Command::Configure(TWO_PATTERNS))]
     {
         bench.send(&packet(id, command));
         bench.turn();

@@ -33,6 +33,7 @@ use nirspi_app::{DepthMailbox, Device, board_info, run};
 use nirspi_mcu::Limits;
 use nirspi_nucleo::{crash, gateware, restart};
 use nirspi_usb::{Endpoints, Memory, OUT_BUFFER_BYTES, PACKET_BYTES, Presence, serve};
+use nirspi_wire::Capabilities;
 use nirspi_wire::fpga::MAX_FRAME_BYTES;
 use static_cell::{ConstStaticCell, StaticCell};
 
@@ -124,7 +125,9 @@ async fn main(spawner: Spawner) {
     };
 
     let serial = embassy_stm32::uid::uid_hex();
-    let info = board_info("nucleo-h7s3l8", serial);
+    let info = board_info("nucleo-h7s3l8", serial)
+        .can(Capabilities::LOAD_GATEWARE)
+        .can(Capabilities::BOOTLOADER);
     let driver = Driver::new_hs(
         p.USB_OTG_HS,
         Interrupts,

@@ -36,6 +36,7 @@ use nirspi_app::{Board, DepthMailbox, Device, board_info, measure_depth, run};
 use nirspi_mcu::{HostPort, Limits};
 use nirspi_nucleo::{crash, gateware, restart};
 use nirspi_usb::{Endpoints, Memory, OUT_BUFFER_BYTES, PACKET_BYTES, Presence, serve};
+use nirspi_wire::Capabilities;
 use nirspi_wire::fpga::MAX_FRAME_BYTES;
 use nirspi_wire::register::{IDENTITY, Register};
 use static_cell::{ConstStaticCell, StaticCell};
@@ -142,7 +143,10 @@ async fn main(spawner: Spawner) {
     }
 
     let serial = embassy_stm32::uid::uid_hex();
-    let info = board_info("nucleo-u5a5zj-q", serial);
+    let info = board_info("nucleo-u5a5zj-q", serial)
+        .can(Capabilities::DEPTH)
+        .can(Capabilities::LOAD_GATEWARE)
+        .can(Capabilities::BOOTLOADER);
     let driver = Driver::new_hs(
         p.USB_OTG_HS,
         Interrupts,

@@ -241,6 +241,7 @@ mod tests {
             adc_hz: 125_000_000,
             adc_bits: 14,
             wavelength_nm: 1550,
+            capabilities: Vec::new(),
         }
     }
 

@@ -1,7 +1,7 @@
 //! Recordings: an MCAP file with every wire packet as it came, and what is needed to understand them.
 //!
 //! Channel `/wire` holds the packets (COBS, delimiter included), intact ones and damaged ones alike; the
-//! message encoding names the protocol version. Metadata records hold the camera's identity, the setup, the
+//! message encoding names the protocol version of the session; recordings of all versions from `version::MIN` on are read. Metadata records hold the camera's identity, the setup, the
 //! calibration and, at the end, the account of the run, each as one JSON text. Times are nanoseconds of the
 //! host's clock. Records follow each other plainly, in no chunks: a file that ends anywhere, or is damaged in one
 //! packet, loses no other, and the crate's chunk reader, which panics on some damage, is never used.
@@ -20,8 +20,19 @@ pub use writer::Recorder;
 pub const PROFILE: &str = "nirspi";
 /// Topic of the packets.
 pub const TOPIC: &str = "/wire";
-/// Message encoding of the packets; the version is the wire protocol's.
-pub const ENCODING: &str = "nirspi-wire-v1";
+/// Message encoding of the packets, but for the number of the wire protocol's version.
+const ENCODING: &str = "nirspi-wire-v";
+
+/// Message encoding of the packets of a session of this protocol version.
+#[must_use]
+pub fn encoding(protocol: u16) -> String {
+    format!("{ENCODING}{protocol}")
+}
+
+/// The protocol version that a message encoding names.
+fn protocol_of(encoding: &str) -> Option<u16> {
+    encoding.strip_prefix(ENCODING)?.parse().ok()
+}
 
 const IDENTITY: &str = "nirspi.identity";
 const SETUP: &str = "nirspi.setup";

@@ -1,6 +1,6 @@
 //! Reads a recording back in one pass, whole or cut short: first what was measured, then packet by packet.
 
-use super::{ACCOUNT, ENCODING, IDENTITY, JSON, PROFILE, SETTLING, SETUP, TOPIC};
+use super::{ACCOUNT, IDENTITY, JSON, PROFILE, SETTLING, SETUP, TOPIC, protocol_of};
 use crate::account::LossCounters;
 use crate::calibration::Settling;
 use crate::session::CameraIdentity;
@@ -8,6 +8,7 @@ use crate::setup::MeasurementSetup;
 use mcap::McapError;
 use mcap::records::{Metadata, Record, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use nirspi_wire::version;
 use serde::de::DeserializeOwned;
 use std::fs::File;
 use std::io::{self, Read};
@@ -194,7 +195,8 @@ impl Records {
                     return Err(not_ours(format!("an MCAP file of profile {:?}", header.profile)));
                 }
                 Ok(Record::Channel(channel)) => {
-                    if channel.topic != TOPIC || channel.message_encoding != ENCODING {
+                    let protocol = protocol_of(&channel.message_encoding);
+                    if channel.topic != TOPIC || !protocol.is_some_and(version::speaks) {
                         let found = format!("{:?} {:?}", channel.topic, channel.message_encoding);
                         return Err(RecordingError::Version { path: path.clone(), found });
                     }
@@ -242,8 +244,12 @@ pub enum RecordingError {
         /// What it is instead.
         found: String,
     },
-    /// A recording of another wire protocol.
-    #[error("{path}: recorded as {found}, this program reads {ENCODING}")]
+    /// A recording of a newer wire protocol.
+    #[error(
+        "{path}: recorded as {found}, this program reads {TOPIC:?} of nirspi-wire-v{} to v{}: update this program",
+        version::MIN,
+        version::CURRENT
+    )]
     Version {
         /// Which file.
         path: PathBuf,
@@ -332,6 +338,7 @@ mod tests {
             adc_hz: 125_000_000,
             adc_bits: 14,
             wavelength_nm: 1550,
+            capabilities: Vec::new(),
         }
     }
 

@@ -1,6 +1,6 @@
 //! Writes a recording as it comes in.
 
-use super::{ACCOUNT, ENCODING, IDENTITY, JSON, PROFILE, SETTLING, SETUP, TOPIC};
+use super::{ACCOUNT, IDENTITY, JSON, PROFILE, SETTLING, SETUP, TOPIC, encoding};
 use crate::account::LossCounters;
 use crate::calibration::Settling;
 use crate::session::CameraIdentity;
@@ -64,7 +64,8 @@ impl Recorder {
     ) -> McapResult<Self> {
         let options = WriteOptions::new().use_chunks(false).profile(PROFILE).disable_seeking(true);
         let mut writer = options.create(NoSeek::new(file))?;
-        let channel = writer.add_channel(0, TOPIC, ENCODING, &BTreeMap::new())?;
+        let channel =
+            writer.add_channel(0, TOPIC, &encoding(identity.protocol), &BTreeMap::new())?;
         let epoch = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos();
         let now = Instant::now();
         let mut recorder = Self {

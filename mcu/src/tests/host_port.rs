@@ -9,7 +9,7 @@ use nirspi_wire::fpga::{MAX_FRAME_BYTES, frame_bytes};
 use nirspi_wire::host_port::{READ_FRAME, READ_RAW};
 use nirspi_wire::register::{Register, control};
 use nirspi_wire::{
-    Answer, Command, DeviceMessage, EventKind, PROTOCOL_VERSION, Reply, RunLength, SelfTestReport,
+    Answer, Command, DeviceMessage, EventKind, Reply, RunLength, SelfTestReport, version,
 };
 use std::boxed::Box;
 use std::vec::Vec;
@@ -193,7 +193,7 @@ impl Device {
         let info = BoardInfo::new("bench", "0001", nirspi_wire::Version(1, 2, 3));
         let camera = Camera::new(info, Limits::default());
         let mut device = Self { camera, bus: bus(), link: Link::default(), now: Micros(1_000) };
-        device.ask(Command::Hello { protocol: PROTOCOL_VERSION });
+        device.ask(Command::Hello { protocol: version::CURRENT });
         device
     }
 

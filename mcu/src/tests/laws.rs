@@ -6,8 +6,8 @@ use nirspi_wire::fpga::Sums;
 use nirspi_wire::packet::encode;
 use nirspi_wire::register::FaultCode;
 use nirspi_wire::{
-    Answer, Command, Configuration, DeviceMessage, EventKind, GatewareChunk, PROTOCOL_VERSION,
-    PatternOrder, RebootInto, RunLength, SampleSource, State,
+    Answer, Command, Configuration, DeviceMessage, EventKind, GatewareChunk, PatternOrder,
+    RebootInto, RunLength, SampleSource, State, version,
 };
 use proptest::collection;
 use proptest::prelude::*;
@@ -87,7 +87,7 @@ proptest! {
         match end {
             End::Stop => { let _ = bench.receive(&packet(8, Command::Stop)); }
             End::Hello => {
-                let _ = bench.receive(&packet(8, Command::Hello { protocol: PROTOCOL_VERSION }));
+                let _ = bench.receive(&packet(8, Command::Hello { protocol: version::CURRENT }));
             }
             End::Fault => bench.fpga.trip(FaultCode::Duty),
             End::Interlock => bench.inputs.interlock_closed = false,

@@ -7,8 +7,8 @@ use crate::{
 };
 use nirspi_wire::packet::{MAX_HOST_PACKET, encode, open};
 use nirspi_wire::{
-    Answer, Command, Configuration, DeviceMessage, Event, EventKind, Frame, PROTOCOL_VERSION,
-    PatternOrder, Refusal, Reply, Request, RunLength, SampleSource, Status, Version,
+    Answer, Capabilities, Command, Configuration, DeviceMessage, Event, EventKind, Frame,
+    PatternOrder, Refusal, Reply, Request, RunLength, SampleSource, Status, Version, version,
 };
 use std::boxed::Box;
 use std::vec::Vec;
@@ -107,7 +107,8 @@ pub const SMALL: Configuration<'static> = Configuration {
 impl Bench {
     /// After power-up and the first poll.
     pub fn new() -> Self {
-        let info = BoardInfo::new("bench", "0001", Version(1, 2, 3));
+        let info =
+            BoardInfo::new("bench", "0001", Version(1, 2, 3)).can(Capabilities::LOAD_GATEWARE);
         let mut bench = Self {
             camera: Camera::new(info, Limits::default()),
             fpga: FakeFpga::default(),
@@ -124,7 +125,7 @@ impl Bench {
     /// With a session.
     pub fn open() -> Self {
         let mut bench = Self::new();
-        let answer = bench.ask(Command::Hello { protocol: PROTOCOL_VERSION });
+        let answer = bench.ask(Command::Hello { protocol: version::CURRENT });
         assert!(matches!(answer, Ok(Answer::Hello(_))), "{answer:?}");
         bench
     }

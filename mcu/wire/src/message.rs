@@ -1,8 +1,10 @@
-//! Protocol version 1: commands of the host, replies and stream of the device.
+//! Commands of the host, replies and stream of the device.
 //!
-//! The one law: these types *are* the format. Adding, removing or reordering a variant or a field changes
-//! bytes, and so the protocol version (see the crate's page and `tests/v1.rs`).
+//! # Invariant
+//! These types are the format of every version from [`version::MIN`](crate::version::MIN) on: variants and tails are
+//! appended, everything else stays ([`version`](crate::version) has the rules; `tests/frozen` holds the bytes).
 
+use crate::Tail;
 use crate::samples::{Block, Samples, Words};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -180,6 +182,18 @@ pub enum DeviceMessage<'a> {
     Crash(CrashReport<'a>),
 }
 
+impl DeviceMessage<'_> {
+    /// The first protocol version that has this message. A session of an older version does not carry it.
+    #[must_use]
+    pub const fn since(&self) -> u16 {
+        match self {
+            Self::Reply(Reply { outcome: Err(Refusal::Unknown), .. }) => 2,
+            Self::Reply(_) | Self::Frame(_) | Self::Raw(_) | Self::Depth(_) | Self::Crash(_) => 1,
+            Self::Event(event) => event.kind.since(),
+        }
+    }
+}
+
 /// Answer to the command of the same id.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Reply<'a> {
@@ -232,6 +246,43 @@ pub struct Identity<'a> {
     pub adc_bits: u8,
     /// Wavelength of the LEDs.
     pub wavelength_nm: u16,
+    /// What the device can do. Since version 2.
+    pub capabilities: Tail<Capabilities>,
+}
+
+/// What a camera can do, one bit each.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Capabilities(pub u32);
+
+impl Capabilities {
+    /// The camera has a time-of-flight sensor and sends depth maps.
+    pub const DEPTH: Self = Self(1 << 0);
+    /// The camera takes FPGA bitstreams over the link (`LoadGateware`).
+    pub const LOAD_GATEWARE: Self = Self(1 << 1);
+    /// The camera can restart into its chip's boot loader.
+    pub const BOOTLOADER: Self = Self(1 << 2);
+
+    /// The first protocol version that has capabilities.
+    pub const SINCE: u16 = 2;
+
+    /// Name of every capability, by bit.
+    pub const NAMES: [(Self, &'static str); 3] = [
+        (Self::DEPTH, "depth"),
+        (Self::LOAD_GATEWARE, "load gateware"),
+        (Self::BOOTLOADER, "boot loader"),
+    ];
+
+    /// Whether all bits of `other` are set.
+    #[must_use]
+    pub const fn contains(self, other: Self) -> bool {
+        self.0 & other.0 == other.0
+    }
+
+    /// Bits of both.
+    #[must_use]
+    pub const fn with(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
 }
 
 /// Why a command was not carried out; nothing has changed.
@@ -269,6 +320,8 @@ pub enum Refusal {
     Unsupported,
     /// The FPGA did not answer on its bus.
     Bus,
+    /// The device does not know this command: the host speaks a newer version. Since version 2.
+    Unknown,
 }
 
 /// A part of [`Configuration`].
@@ -471,6 +524,16 @@ pub enum EventKind {
     RawDropped,
     /// Bytes from the host that were no command.
     CommandDamaged,
+}
+
+impl EventKind {
+    /// The first protocol version that has this event.
+    #[must_use]
+    pub const fn since(&self) -> u16 {
+        match self {
+            Self::Fault(_) | Self::RunEnded { .. } | Self::RawDropped | Self::CommandDamaged => 1,
+        }
+    }
 }
 
 /// How the device is.

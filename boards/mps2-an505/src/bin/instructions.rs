@@ -23,7 +23,7 @@ use nirspi_wire::fpga::{FpgaFrame, Header, MAX_FRAME_BYTES, Sums, frame_bytes};
 use nirspi_wire::packet::{MAX_DEVICE_PACKET, MAX_HOST_PACKET, encode};
 use nirspi_wire::register::{IDENTITY, Register, control, status};
 use nirspi_wire::{
-    Command, Configuration, DeviceMessage, Frame, FrameFlags, PATTERNS, PROTOCOL_VERSION,
+    Command, Configuration, DeviceMessage, Frame, FrameFlags, PATTERNS, version,
     PatternOrder, Request, RunLength, SampleSource, Samples, Version, crc32,
 };
 use static_cell::ConstStaticCell;
@@ -192,7 +192,7 @@ fn main() -> ! {
     let mut now = Micros(0);
 
     for command in [
-        Command::Hello { protocol: PROTOCOL_VERSION },
+        Command::Hello { protocol: version::CURRENT },
         Command::Configure(CONFIGURATION),
         Command::Start(RunLength::Continuous),
     ] {
