@@ -84,7 +84,10 @@ fn a_greeting_that_says_more_than_ours_still_names_its_version() {
     let greeting = |id, packet: &mut [u8]| {
         encode(&(0u8, id, 0u8, 0u8, 99u16, [0xA5u8; 31]), packet).unwrap().to_vec()
     };
-    refused(&replying(greeting), &["protocol version 99", "versions 1 to 2", "update this program"]);
+    refused(
+        &replying(greeting),
+        &["protocol version 99", "versions 1 to 2", "update this program"],
+    );
 }
 
 #[test]
