@@ -13,9 +13,8 @@ use nirspi_wire::fpga::{Header, MAX_FRAME_BYTES, Sums};
 use nirspi_wire::packet::{MAX_DEVICE_PACKET, MAX_HOST_PACKET};
 use nirspi_wire::register::{IDENTITY, Register, control, status};
 use nirspi_wire::{
-    Answer, Command, Configuration, Deframed, Deframer, DeviceMessage, FrameFlags,
-    version, PatternOrder, RebootInto, Reply, Request, RunLength, SampleSource, encode,
-    open,
+    Answer, Command, Configuration, Deframed, Deframer, DeviceMessage, FrameFlags, PatternOrder,
+    RebootInto, Reply, Request, RunLength, SampleSource, encode, open, version,
 };
 use std::boxed::Box;
 use std::rc::Rc;

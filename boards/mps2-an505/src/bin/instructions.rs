@@ -23,8 +23,8 @@ use nirspi_wire::fpga::{FpgaFrame, Header, MAX_FRAME_BYTES, Sums, frame_bytes};
 use nirspi_wire::packet::{MAX_DEVICE_PACKET, MAX_HOST_PACKET, encode};
 use nirspi_wire::register::{IDENTITY, Register, control, status};
 use nirspi_wire::{
-    Command, Configuration, DeviceMessage, Frame, FrameFlags, PATTERNS, version,
-    PatternOrder, Request, RunLength, SampleSource, Samples, Version, crc32,
+    Command, Configuration, DeviceMessage, Frame, FrameFlags, PATTERNS, PatternOrder, Request,
+    RunLength, SampleSource, Samples, Version, crc32, version,
 };
 use static_cell::ConstStaticCell;
 
