@@ -19,6 +19,7 @@ steps=(
     "examples        examples of the libraries"
     "page            the live page in a browser; Debian's Chromium, demo"
     "tcp             two processes over TCP; demo"
+    "dissector       Wireshark's dissector on a recording; Debian's tshark"
     "flash           probe-rs knows every board's chip"
     "mie             Mie scattering against miepython and scattnlay; PyPI"
     "mutations       deliberate faults in the RTL are seen"
@@ -174,6 +175,15 @@ step_tcp() {
     grep -q '"received": 2000' "$out/capture.json"
     wait "$server"
     "$nirspi" reconstruct "$out/rec.mcap" --method hadamard --out "$out/rec"
+}
+
+step_dissector() {
+    DEBIAN_FRONTEND=noninteractive debian tshark || echo "no tshark installed here"
+    if command -v tshark >/dev/null; then
+        python3 mcu/wire/wireshark/check.py host/tests/recordings/v1.mcap
+    else
+        echo "skipped: the dissector, no tshark"
+    fi
 }
 
 step_flash() {

@@ -9,6 +9,7 @@
 #![expect(clippy::unwrap_used, reason = "a failed unwrap in a helper fails its test")]
 
 mod bytes;
+mod dissector;
 mod v1;
 mod v2;
 mod variants;
