@@ -10,6 +10,7 @@
 
 mod bytes;
 mod dissector;
+mod page;
 mod v1;
 mod v2;
 mod variants;
