@@ -1,8 +1,6 @@
 //! Recordings of every released protocol version open and give what they gave when they were made.
 //!
 //! If a test in this file fails, do not change the test or the recordings: somebody's measurements have become unreadable.
-#![expect(clippy::unwrap_used, reason = "a failed unwrap in a helper fails its test")]
-
 use nirspi::recording::Recording;
 use nirspi::tally::tally_recording;
 use std::path::{Path, PathBuf};
