@@ -80,10 +80,10 @@ impl Place {
 
     /// A new file beside the one that it is to replace. A link stays; the file that it leads to is replaced.
     fn beside(path: &Path) -> io::Result<(Self, File)> {
-        let path = fs::canonicalize(path)?;
         if path.is_dir() {
             return Err(io::ErrorKind::IsADirectory.into());
         }
+        let path = if path.is_symlink() { fs::canonicalize(path)? } else { path.to_owned() };
         let name = |n: u32| {
             let mut name = OsString::from(path.file_stem().unwrap_or_default());
             name.push(if n == 1 { ".new.mcap".to_owned() } else { format!(".new-{n}.mcap") });
@@ -232,7 +232,7 @@ mod tests {
         let replace = Target::Replace(path.clone());
         let (mut place, mut file) = Place::make(&replace).unwrap();
         file.write_all(b"new").unwrap();
-        assert_eq!(place.path(), fs::canonicalize(folder.path()).unwrap().join("rec.new-2.mcap"));
+        assert_eq!(place.path(), folder.path().join("rec.new-2.mcap"));
         assert_eq!(fs::read(&path).unwrap(), b"old");
         place.settle(&file, true).unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"new");

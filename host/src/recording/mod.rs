@@ -12,6 +12,7 @@
 //! `reader::tests::a_recording_cut_anywhere_gives_what_is_before_the_cut_or_says_what_is_missing`.
 
 mod file;
+mod lengths;
 mod reader;
 mod run;
 mod writer;

@@ -1,5 +1,6 @@
 //! Reads a recording back in one pass, whole or cut short: first what was measured, then packet by packet.
 
+use super::lengths;
 use super::{ACCOUNT, ENCODING, IDENTITY, JSON, PROFILE, RUN, RunAccount, SETTLING, SETUP, TOPIC};
 use crate::calibration::Settling;
 use crate::session::CameraIdentity;
@@ -182,7 +183,11 @@ impl Records {
                 Ok(LinearReadEvent::Record {
                     opcode: opcode @ (op::HEADER | op::CHANNEL | op::MESSAGE | op::METADATA),
                     data,
-                }) => mcap::parse_record(opcode, data),
+                }) if lengths::fit(opcode, data) => mcap::parse_record(opcode, data),
+                Ok(LinearReadEvent::Record {
+                    opcode: op::HEADER | op::CHANNEL | op::METADATA,
+                    ..
+                }) => Err(McapError::UnexpectedEof),
                 Ok(LinearReadEvent::Record { opcode: op::CHUNK, .. }) => {
                     return Err(not_ours(
                         "records in chunks, as other tools write them,".to_owned(),

@@ -1,6 +1,4 @@
 //! Any file that claims to be a recording: read, counted and reconstructed as far as it goes, or refused in one line.
-//!
-//! Run with `-- -malloc_limit_mb=8192`: the mcap crate reserves (never touches) what a string in a record claims.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -96,6 +96,11 @@ impl Camera {
                             Ok(Answer::Done)
                         }
                     },
+                    // Takes the first piece again and again.
+                    Command::LoadGateware(piece) if piece.offset == 0 => {
+                        Ok(Answer::Gateware { next_offset: piece.data.len() as u32 })
+                    }
+                    Command::LoadGateware(_) => Err(Refusal::GatewareOffset { expected: 0 }),
                     _ => Ok(Answer::Done),
                 };
                 let gone = self.send(DeviceMessage::Reply(Reply { id, outcome }), false).is_err();
@@ -311,7 +316,7 @@ fn overwrite_keeps_the_old_recording_until_the_new_one_is_whole() {
     );
     // All is recorded.
     let report = capture(&bench, &camera(HONEST, || {}), &["--overwrite"]).succeeded().json();
-    assert!(report["recording"].as_str().unwrap().ends_with("rec.mcap"), "{report}");
+    assert_eq!(report["recording"], "rec.mcap");
     assert_ne!(old(), b"precious");
     assert_eq!(bench.names(), ["rec.mcap", "rec.new.mcap"]);
     let again = ["reconstruct", "rec.mcap", "--method", "hadamard", "--json"];
@@ -331,4 +336,13 @@ fn a_camera_whose_burst_never_comes_can_be_left() {
     process.signal("INT");
     process.wait().failed(1, &["stopped by the user before the first frame"]);
     assert_eq!(bench.names(), ["seen"]);
+}
+
+#[test]
+fn a_camera_that_never_gets_on_with_a_bitstream_is_given_up() {
+    let bench = Bench::new();
+    let bitstream: Vec<u8> = [0xFF, 0x00].into_iter().chain([0x5A; 20_000]).collect();
+    bench.write("top.bin", &bitstream);
+    let gateware = ["gateware", "top.bin", "--camera", &camera(HONEST, || {})];
+    bench.run(&gateware).failed(1, &["lost its place at byte 0"]);
 }

@@ -31,6 +31,19 @@ fn networks() -> [(Weights, Check); 5] {
     ]
 }
 
+/// What training takes for the sizes of the network of that number.
+#[cfg(feature = "train")]
+fn trained(network: usize, weights: &Weights) -> Result<(), WeightsError> {
+    use crate::model::*;
+    match network {
+        0 => UNetConfig::of(weights).map(drop),
+        1 => FsrcnnConfig::of(weights).map(drop),
+        2 => EstimatorConfig::of(weights).map(drop),
+        3 => ClassifierConfig::of(weights).map(drop),
+        _ => DiscriminatorConfig::of(weights).map(drop),
+    }
+}
+
 #[derive(Debug, Clone)]
 enum Damage {
     Dropped,
@@ -108,6 +121,11 @@ proptest! {
         let found = altered.get(name).ok();
         // A rename to nothing, or a row of one number that was a row of one number.
         let same = found.is_some_and(|found| found == sound);
+        #[cfg(feature = "train")]
+        {
+            let said = |result: Result<(), WeightsError>| result.map_err(|error| error.to_string());
+            prop_assert_eq!(said(trained(network, &altered)), said(check(&altered)));
+        }
         match (check(&altered), same) {
             (Ok(()), true) => {}
             (Err(error), false) => {
