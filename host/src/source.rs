@@ -183,6 +183,7 @@ impl Source {
         let Capture { setup, settling, integrated, counters, .. } = capture;
         let mut notes: Vec<String> = integrated.warnings().into_iter().map(str::to_owned).collect();
         notes.extend(settling.is_none().then(|| NOT_CALIBRATED.to_owned()));
+        notes.extend(capture.missing().as_deref().map(not_whole));
         Ok(Self {
             measurements: integrated.measurements(setup, settling.as_ref(), false)?,
             dropouts: Vec::new(),
@@ -191,6 +192,11 @@ impl Source {
             notes,
         })
     }
+}
+
+/// What a capture lacks, as a note; the text may come from a file.
+fn not_whole(missing: &str) -> String {
+    format!("the recording is not whole: {}", missing.escape_debug())
 }
 
 const NOT_CALIBRATED: &str = "no calibration in the recording: the settling leak stays";
@@ -211,9 +217,11 @@ impl SourceOptions {
     /// Whether the file is a recording, for which these options must make sense.
     fn fits_recording(&self, path: &Path) -> Result<bool, SourceError> {
         let mut magic = [0; 4];
-        let is_mcap = std::fs::File::open(path)
-            .and_then(|mut file| file.read_exact(&mut magic))
-            .is_ok_and(|()| magic[1..] == *b"MCA");
+        // A pipe would be waited for; what is no file is refused where it is read.
+        let is_mcap = path.is_file()
+            && std::fs::File::open(path)
+                .and_then(|mut file| file.read_exact(&mut magic))
+                .is_ok_and(|()| magic[1..] == *b"MCA");
         let named_mcap = path.extension().is_some_and(|e| e == "mcap");
         let one = matches!(self.index, Some(Index::One(_)));
         if (is_mcap || named_mcap) && (one || self.non_differential) {
@@ -290,10 +298,7 @@ fn of_frames(
         if account.counters != counters {
             notes.push("the frames found are not those that the capture counted".to_owned());
         }
-        notes.extend(account.missing.as_ref().map(|missing| {
-            let missing = missing.escape_debug();
-            format!("the recording is not whole: {missing}")
-        }));
+        notes.extend(account.missing.as_deref().map(not_whole));
     }
     notes.extend(tally.misfit().map(|misfit| format!("some frames are left out: {misfit}")));
     if settling.is_none() {

@@ -221,7 +221,12 @@ impl Weights {
     /// [`WeightsError`] if it cannot be read, is no whole safetensors file, or is not what its checksum says.
     pub fn read(file: &Path) -> Result<Self, WeightsError> {
         let label = file.display().to_string();
-        match fs::read(file) {
+        let bytes = fs::metadata(file).and_then(|found| match found.is_file() {
+            true => fs::read(file),
+            // A pipe would be waited for, and a device need not end.
+            false => Err(io::Error::new(io::ErrorKind::InvalidInput, "not a file")),
+        });
+        match bytes {
             Ok(bytes) => Self::parse(&label, &bytes),
             Err(source) => Err(WeightsError::Read { file: label, source }),
         }

@@ -150,8 +150,13 @@ enum Found {
 
 impl Records {
     fn open(path: &Path) -> Result<Self, RecordingError> {
-        let file = File::open(path)
-            .map_err(|source| RecordingError::Io { path: path.to_owned(), source })?;
+        let io_error = |source| RecordingError::Io { path: path.to_owned(), source };
+        // A pipe would be waited for, and a device need not end.
+        if !std::fs::metadata(path).map_err(io_error)?.is_file() {
+            let found = "a folder, a device or a pipe".to_owned();
+            return Err(RecordingError::NotARecording { path: path.to_owned(), found });
+        }
+        let file = File::open(path).map_err(io_error)?;
         let reader = LinearReader::new_with_options(
             LinearReaderOptions::default()
                 // Each packet has a checksum of its own; that of the whole data section covers what is said about them.

@@ -205,3 +205,23 @@ fn a_recording_whose_setup_or_calibration_cannot_be_is_refused() {
         reconstruct(&name).failed(1, &[&name, words]);
     }
 }
+
+#[cfg(unix)]
+#[test]
+fn a_pipe_or_a_device_is_refused_and_not_waited_for() {
+    let bench = Bench::new();
+    for name in ["pipe.mcap", "pipe.npz", "pipe.safetensors"] {
+        let made = std::process::Command::new("mkfifo").arg(bench.path(name)).status().unwrap();
+        assert!(made.success());
+    }
+    bench
+        .run(&["reconstruct", "pipe.mcap"])
+        .failed(1, &["pipe.mcap", "expected a nirspi recording"]);
+    bench.run(&["reconstruct", "pipe.npz"]).failed(1, &["pipe.npz"]);
+    bench.write("in.npy", &nirspi::files::npy::encode(&[32, 32], &[0.5; 1024]));
+    for weights in ["pipe.safetensors", "/dev/zero"] {
+        let upscale = ["upscale", "in.npy", "--backend", "cpu", "--out", "out.npy"];
+        let outcome = bench.run(&[&upscale[..], &["--weights", weights]].concat());
+        outcome.failed(1, &[weights, "not a file"]);
+    }
+}
