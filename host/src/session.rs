@@ -79,6 +79,11 @@ fn in_words(capabilities: Capabilities) -> Vec<String> {
 pub trait Listener {
     /// A packet came. `raw` is as it stood on the wire, delimiter included.
     fn packet(&mut self, raw: &[u8], content: &Result<DeviceMessage<'_>, PacketError>);
+
+    /// Whether to go on waiting for what comes next; asked several times a second where a wait may be long.
+    fn goes_on(&mut self) -> bool {
+        true
+    }
 }
 
 /// Ignores every packet: for a command of which only the reply counts.
@@ -89,18 +94,38 @@ impl Listener for IgnorePackets {
     fn packet(&mut self, _: &[u8], _: &Result<DeviceMessage<'_>, PacketError>) {}
 }
 
-/// Keeps what a camera reports with its greeting, in words.
+/// Keeps what a camera reports with its greeting, in words: at most [`Reports::MOST`] lines, the last of which says that
+/// more came.
 #[derive(Debug, Default)]
 pub struct Reports(pub Vec<String>);
 
-impl Listener for Reports {
-    fn packet(&mut self, _: &[u8], content: &Result<DeviceMessage<'_>, PacketError>) {
-        match content {
-            Ok(DeviceMessage::Event(event)) => self.0.extend(events::at_greeting(&event.kind)),
-            Ok(DeviceMessage::Crash(report)) => self.0.push(events::crash(report)),
-            // A message of a newer version is passed over; a damaged one was the link's affair.
+impl Reports {
+    /// Most lines that are kept, whatever a camera sends.
+    pub const MOST: usize = 100;
+
+    fn keep(&mut self, report: Option<String>) {
+        match (report, self.0.len() + 1) {
+            (Some(report), ..Self::MOST) => self.0.push(report),
+            (Some(_), Self::MOST) => {
+                self.0.push("the camera reported more than is shown".to_owned())
+            }
             _ => {}
         }
+    }
+}
+
+impl Listener for Reports {
+    fn packet(&mut self, _: &[u8], content: &Result<DeviceMessage<'_>, PacketError>) {
+        self.keep(match content {
+            Ok(DeviceMessage::Event(event)) => events::at_greeting(&event.kind),
+            Ok(DeviceMessage::Crash(report)) => Some(events::crash(report)),
+            // Intact, and yet no message: of a version that has more to say.
+            Err(PacketError::Message) => Some(
+                "the camera reported something that this program does not know: update it"
+                    .to_owned(),
+            ),
+            _ => None,
+        });
     }
 }
 

@@ -5,7 +5,7 @@
 
 use nirspi::capture::{Calibration, Capture, CaptureOptions, Ended, capture};
 use nirspi::link::Link;
-use nirspi::recording::Recording;
+use nirspi::recording::{Recording, Target};
 use nirspi::session::{Session, SessionError};
 use nirspi::setup::MeasurementSetup;
 use nirspi::tally::{Tally, tally_recording};
@@ -211,8 +211,10 @@ fn calibration_finds_latency_and_leak_and_undoing_them_helps() {
 fn a_recording_gives_the_same_tally_as_the_capture_that_made_it() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.mcap");
-    let options =
-        CaptureOptions { record: Some(path.clone()), ..options(&Order::CakeCutting, false) };
+    let options = CaptureOptions {
+        record: Some(Target::New(path.clone())),
+        ..options(&Order::CakeCutting, false)
+    };
     let judge = only_frames(|frame| match frame {
         1 => Fate::Drop,
         2 => Fate::Delay,
@@ -223,9 +225,16 @@ fn a_recording_gives_the_same_tally_as_the_capture_that_made_it() {
     let counters = captured.counters;
     let (received, lost) = (counters.received, counters.lost);
     assert_eq!((received, lost, counters.corrupt, counters.late), (3, 1, 1, 1));
-    let (integrated, recounted) = tally_recording(&mut Recording::open(&path).unwrap()).unwrap();
-    assert_eq!(recounted, counters);
-    assert_eq!(integrated.means(&captured.setup), captured.integrated.means(&captured.setup));
+    let mut recording = Recording::open(&path).unwrap();
+    let tally = tally_recording(&mut recording).unwrap();
+    assert_eq!(tally.account().counters(), counters);
+    let means = tally.integrated().means(&captured.setup);
+    assert_eq!(means, captured.integrated.means(&captured.setup));
+    // Three of six frames came in order: the recording says so itself.
+    let account = recording.end().account.clone().unwrap();
+    assert_eq!((account.asked, account.made), (Some(FRAMES), Some(u64::from(FRAMES))));
+    assert_eq!(account.missing, captured.missing());
+    assert!(account.missing.unwrap().contains("1 lost, 1 corrupt, 1 late"));
 }
 
 #[test]
@@ -234,7 +243,7 @@ fn an_intact_frame_of_another_setup_is_corrupt() {
     let mut tally = Tally::new(&captured.setup, None);
     let frame = |sequence, words: usize, buffer: &mut [u8]| {
         let samples = Samples::pack(vec![1i64; words].into_iter(), buffer).unwrap();
-        let (run, flags) = (0, FrameFlags::default());
+        let (run, flags) = (0, FrameFlags::DIFFERENTIAL);
         let frame = Frame { run, sequence, device_time_us: 0, sweeps: 1, flags, samples };
         let mut packet = vec![0; MAX_DEVICE_PACKET + 1];
         let length = encode(&DeviceMessage::Frame(frame), &mut packet).unwrap().len();
@@ -271,8 +280,10 @@ fn the_same_seed_gives_the_same_bytes() {
     let folder = tempfile::tempdir().unwrap();
     let record = |name: &str, seed| {
         let path = folder.path().join(name);
-        let options =
-            CaptureOptions { record: Some(path.clone()), ..options(&Order::CakeCutting, true) };
+        let options = CaptureOptions {
+            record: Some(Target::New(path.clone())),
+            ..options(&Order::CakeCutting, true)
+        };
         run(Box::new(MemoryLink::new(optics().camera(seed).unwrap())), &options);
         let recording = Recording::open(&path).unwrap();
         recording.map(|packet| packet.unwrap().bytes).collect::<Vec<_>>()

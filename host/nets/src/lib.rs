@@ -45,6 +45,7 @@ pub mod metrics;
 pub mod model;
 mod network;
 mod random;
+mod schema;
 mod spread;
 #[cfg(feature = "train")]
 pub mod train;

@@ -162,6 +162,10 @@ impl KeptCalibration {
         }
         let kept: Self =
             serde_json::from_slice(&text).map_err(|error| format_error(path, &error))?;
+        kept.settling.check().map_err(|problem| CalibrationFileError::Format {
+            path: path.to_owned(),
+            reason: problem.to_string(),
+        })?;
         kept.check(camera).map_err(|(field, found, expected)| CalibrationFileError::Mismatch {
             path: path.to_owned(),
             field,

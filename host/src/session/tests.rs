@@ -92,6 +92,18 @@ fn what_a_camera_reports_with_its_greeting_is_kept_and_an_earlier_hosts_mess_is_
     );
 }
 
+#[test]
+fn a_camera_that_never_stops_reporting_fills_no_memory() {
+    let fault = event(EventKind::Fault(Fault::Duty));
+    let greeting = [fault.repeat(5000), reply(0, Answer::Hello(IDENTITY))].concat();
+    let mut chunks: Vec<Vec<u8>> = greeting.chunks(4096).map(<[u8]>::to_vec).collect();
+    chunks.push([fault.repeat(1000), reply(1, Answer::Status(STATUS))].concat());
+    let mut session = Session::open(Box::new(Scripted(chunks))).unwrap();
+    let reports = session.await_reports().unwrap();
+    assert_eq!(reports.len(), Reports::MOST);
+    assert!(reports.last().unwrap().contains("more"), "{reports:?}");
+}
+
 /// Counts the packets that it hears, damaged ones apart.
 #[derive(Default)]
 struct Count {

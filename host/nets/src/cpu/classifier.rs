@@ -4,6 +4,7 @@ use pulp::Arch;
 
 use super::conv::Conv;
 use super::layers::{Linear, conv, means, relu, single};
+use crate::schema;
 use crate::weights::{Weights, WeightsError};
 
 /// Convolutions, and by how much each shrinks the image.
@@ -21,8 +22,9 @@ impl Classifier {
     /// The network of these weights.
     ///
     /// # Errors
-    /// [`WeightsError`] for a tensor that is missing or of another shape.
+    /// [`WeightsError`] for a tensor that is missing, of another shape, not finite, or unknown.
     pub fn new(weights: &Weights) -> Result<Self, WeightsError> {
+        schema::classifier(weights)?;
         let convs = (1..=STRIDES.len()).map(|i| conv(weights, &format!("conv{i}")));
         Ok(Self {
             arch: Arch::new(),

@@ -5,6 +5,7 @@ use pulp::Arch;
 use super::activation::softplus;
 use super::conv::Conv;
 use super::layers::{Linear, conv, means, relu, single};
+use crate::schema;
 use crate::weights::{Weights, WeightsError};
 
 /// Added to each mean feature before its logarithm is taken.
@@ -26,8 +27,9 @@ impl Estimator {
     /// The network of these weights.
     ///
     /// # Errors
-    /// [`WeightsError`] for a tensor that is missing or of another shape.
+    /// [`WeightsError`] for a tensor that is missing, of another shape, not finite, or unknown.
     pub fn new(weights: &Weights) -> Result<Self, WeightsError> {
+        schema::estimator(weights)?;
         Ok(Self {
             arch: Arch::new(),
             convs: (1..=4).map(|i| conv(weights, &format!("conv{i}"))).collect::<Result<_, _>>()?,

@@ -6,6 +6,7 @@ use super::conv::Conv;
 use super::layers::{conv, keeping, prelu, slopes};
 use super::planes::Planes;
 use crate::filter::Filter;
+use crate::schema;
 use crate::weights::{Weights, WeightsError};
 
 /// The network, its weights in the order of the loops.
@@ -22,9 +23,9 @@ impl Fsrcnn {
     /// The network of these weights.
     ///
     /// # Errors
-    /// [`WeightsError`] for a tensor that is missing or of another shape.
+    /// [`WeightsError`] for a tensor that is missing, of another shape, not finite, or unknown.
     pub fn new(weights: &Weights) -> Result<Self, WeightsError> {
-        let maps = weights.count(|i| format!("map.{i}.weight"));
+        let [_, _, maps] = schema::fsrcnn(weights)?;
         let names = ["feature".to_owned(), "shrink".to_owned()]
             .into_iter()
             .map(|name| (format!("{name}_act"), name))

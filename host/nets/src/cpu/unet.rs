@@ -6,6 +6,7 @@ use super::activation::{film_silu, silu, silu_into};
 use super::conv::Conv;
 use super::layers::{Linear, conv, conv_blocks};
 use super::planes::Planes;
+use crate::schema::{self, UNetSizes};
 use crate::weights::{Weights, WeightsError};
 
 /// A residual block: convolution, scale and shift by the conditions, convolution.
@@ -60,14 +61,14 @@ impl UNet {
     /// The network of these weights.
     ///
     /// # Errors
-    /// [`WeightsError`] for a tensor that is missing or of another shape.
+    /// [`WeightsError`] for a tensor that is missing, of another shape, not finite, or unknown.
     pub fn new(weights: &Weights) -> Result<Self, WeightsError> {
-        let levels = weights.count(|i| format!("encoder.{i}.0.conv1.weight"));
+        let UNetSizes { channels, blocks: count, .. } = schema::unet(weights)?;
+        let levels = channels.len();
         let blocks = |side: &str, level: usize| {
-            let count = weights.count(|j| format!("{side}.{level}.{j}.conv1.weight"));
             (0..count).map(|j| Block::new(weights, &format!("{side}.{level}.{j}"))).collect()
         };
-        let below = || 0..levels.saturating_sub(1);
+        let below = || 0..levels - 1;
         Ok(Self {
             arch: Arch::new(),
             embed1: Linear::new(weights, "embed1")?,

@@ -51,11 +51,15 @@ impl Schedule {
     /// The schedule that the weights were trained with: metadata `steps`, `beta_start`, `beta_end`.
     ///
     /// # Errors
-    /// [`WeightsError::Number`] if one is missing.
+    /// [`WeightsError::Number`] if one is missing, or is no number of steps or no share of noise.
     pub fn of(weights: &Weights) -> Result<Self, WeightsError> {
-        let steps = weights.number("steps")?;
-        let [start, end] = [weights.number("beta_start")?, weights.number("beta_end")?];
-        Ok(Self::linear(steps.clamp(1.0, 10_000.0) as usize, start, end))
+        let steps = weights.number_that("steps", "a whole number from 1 to 10000", |steps| {
+            (1.0..=10_000.0).contains(&steps) && steps.fract() == 0.0
+        })?;
+        let share = |key| {
+            weights.number_that(key, "a number between 0 and 1", |beta| beta > 0.0 && beta < 1.0)
+        };
+        Ok(Self::linear(steps as usize, share("beta_start")?, share("beta_end")?))
     }
 
     /// Betas from `start` to `end` in even steps.

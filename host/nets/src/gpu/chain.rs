@@ -30,7 +30,7 @@ impl Chain {
     /// Takes the networks of these weights to a device.
     ///
     /// # Errors
-    /// [`WeightsError`] for a tensor that is missing, of another shape, or too wide.
+    /// [`WeightsError`] for a tensor that is missing, of another shape, not finite, unknown, or too wide.
     pub(crate) fn new(
         engine: &Arc<dyn Engine>,
         fsrcnn: &Weights,

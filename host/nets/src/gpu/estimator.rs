@@ -11,6 +11,7 @@ use super::unet::AT_ONCE;
 use crate::cpu::estimator::{LOG_FLOOR, LOG_OFFSET};
 use crate::filter::Filter;
 use crate::network::RunEstimator;
+use crate::schema;
 use crate::weights::{Weights, WeightsError};
 
 /// By how much each convolution shrinks the image.
@@ -28,8 +29,9 @@ impl Estimator {
     /// Takes the network of these weights to a device.
     ///
     /// # Errors
-    /// [`WeightsError`] for a tensor that is missing, of another shape, or too wide.
+    /// [`WeightsError`] for a tensor that is missing, of another shape, not finite, unknown, or too wide.
     pub(crate) fn new(engine: &Arc<dyn Engine>, weights: &Weights) -> Result<Self, WeightsError> {
+        schema::estimator(weights)?;
         let on = engine.as_ref();
         let convs = STRIDES.into_iter().enumerate().map(|(index, stride)| {
             let name = format!("conv{}", index + 1);

@@ -10,6 +10,7 @@ use super::plan::frames_at_once;
 use super::unet::AT_ONCE;
 use crate::filter::Filter;
 use crate::network::RunFsrcnn;
+use crate::schema;
 use crate::weights::{Weights, WeightsError};
 
 /// Intensity, depth, validity.
@@ -28,10 +29,10 @@ impl Fsrcnn {
     /// Takes the network of these weights to a device.
     ///
     /// # Errors
-    /// [`WeightsError`] for a tensor that is missing, of another shape, or too wide.
+    /// [`WeightsError`] for a tensor that is missing, of another shape, not finite, unknown, or too wide.
     pub(crate) fn new(engine: &Arc<dyn Engine>, weights: &Weights) -> Result<Self, WeightsError> {
         let on = engine.as_ref();
-        let maps = weights.count(|i| format!("map.{i}.weight"));
+        let [_, _, maps] = schema::fsrcnn(weights)?;
         let names = ["feature".to_owned(), "shrink".to_owned()]
             .into_iter()
             .map(|name| (format!("{name}_act"), name))

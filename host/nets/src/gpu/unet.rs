@@ -9,6 +9,7 @@ use super::pack::Order;
 use super::plan::frames_at_once;
 use crate::filter::Filter;
 use crate::network::{CONDITIONS, Conditions, RunUNet};
+use crate::schema::{self, UNetSizes};
 use crate::weights::{Weights, WeightsError};
 
 /// Most images that go through at once.
@@ -42,13 +43,13 @@ impl UNet {
     /// Takes the network of these weights to a device.
     ///
     /// # Errors
-    /// [`WeightsError`] for a tensor that is missing, of another shape, or too wide.
+    /// [`WeightsError`] for a tensor that is missing, of another shape, not finite, unknown, or too wide.
     pub(crate) fn new(engine: &Arc<dyn Engine>, weights: &Weights) -> Result<Self, WeightsError> {
         let on = engine.as_ref();
-        let levels = weights.count(|i| format!("encoder.{i}.0.conv1.weight"));
+        let UNetSizes { channels, blocks: count, .. } = schema::unet(weights)?;
+        let levels = channels.len();
         let mut films = Films::default();
         let mut blocks = |side: &str, level: usize| -> Result<Vec<Block>, WeightsError> {
-            let count = weights.count(|j| format!("{side}.{level}.{j}.conv1.weight"));
             let block = |j| {
                 let name = format!("{side}.{level}.{j}");
                 let conv = |which: &str| Layer::named(on, weights, &format!("{name}.{which}"));
@@ -57,7 +58,7 @@ impl UNet {
             };
             (0..count).map(block).collect()
         };
-        let below = levels.saturating_sub(1);
+        let below = levels - 1;
         let encoder =
             (0..levels).map(|level| blocks("encoder", level)).collect::<Result<Vec<_>, _>>()?;
         let decoder =

@@ -8,6 +8,7 @@ use burn::tensor::activation::relu;
 use burn::tensor::backend::Backend;
 
 use super::{convolution, linear, pooled};
+use crate::schema;
 use crate::weights::{Weights, WeightsError};
 
 /// Sizes of a [`Classifier`].
@@ -21,7 +22,7 @@ pub struct ClassifierConfig {
 
 impl Default for ClassifierConfig {
     fn default() -> Self {
-        Self { channels: [32, 64, 128], classes: 62 }
+        Self { channels: [32, 64, 128], classes: schema::CLASSES }
     }
 }
 
@@ -31,11 +32,8 @@ impl ClassifierConfig {
     /// # Errors
     /// [`WeightsError`] if they are of another network.
     pub fn of(weights: &Weights) -> Result<Self, WeightsError> {
-        let mut channels = [0; 3];
-        for (pair, channels) in channels.iter_mut().enumerate() {
-            *channels = weights.shape::<4>(&format!("conv{}.weight", 2 * pair + 1))?[0];
-        }
-        Ok(Self { channels, classes: weights.shape::<2>("fc.weight")?[0] })
+        let widths = schema::classifier(weights)?;
+        Ok(Self { channels: [widths[0], widths[1], widths[2]], classes: schema::CLASSES })
     }
 
     /// A network with PyTorch's initial weights.

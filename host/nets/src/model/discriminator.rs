@@ -8,6 +8,7 @@ use burn::tensor::activation::leaky_relu;
 use burn::tensor::backend::Backend;
 
 use super::convolution;
+use crate::schema;
 use crate::weights::{Weights, WeightsError};
 
 /// Sizes of a [`Discriminator`].
@@ -29,11 +30,8 @@ impl DiscriminatorConfig {
     /// # Errors
     /// [`WeightsError`] if they are of another network.
     pub fn of(weights: &Weights) -> Result<Self, WeightsError> {
-        let mut channels = [0; 3];
-        for (layer, channels) in channels.iter_mut().enumerate() {
-            *channels = weights.shape::<4>(&format!("conv{}.weight", layer + 1))?[0];
-        }
-        Ok(Self { channels })
+        let widths = schema::discriminator(weights)?;
+        Ok(Self { channels: [widths[0], widths[1], widths[2]] })
     }
 
     /// A network with PyTorch's initial weights.

@@ -9,6 +9,7 @@ use burn::tensor::backend::Backend;
 
 use super::{convolution, linear, pooled};
 use crate::cpu::estimator::{LOG_FLOOR, LOG_OFFSET};
+use crate::schema;
 use crate::weights::{Weights, WeightsError};
 
 /// Sizes of an [`Estimator`].
@@ -32,11 +33,8 @@ impl EstimatorConfig {
     /// # Errors
     /// [`WeightsError`] if they are of another network.
     pub fn of(weights: &Weights) -> Result<Self, WeightsError> {
-        let mut channels = [0; 4];
-        for (layer, channels) in channels.iter_mut().enumerate() {
-            *channels = weights.shape::<4>(&format!("conv{}.weight", layer + 1))?[0];
-        }
-        Ok(Self { channels, hidden: weights.shape::<2>("fc1.weight")?[0] })
+        let widths = schema::estimator(weights)?;
+        Ok(Self { channels: [widths[0], widths[1], widths[2], widths[3]], hidden: widths[4] })
     }
 
     /// A network with PyTorch's initial weights.

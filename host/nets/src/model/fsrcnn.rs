@@ -7,6 +7,7 @@ use burn::tensor::Tensor;
 use burn::tensor::backend::Backend;
 
 use super::{convolution, nearest, uniform};
+use crate::schema;
 use crate::weights::{Weights, WeightsError};
 
 /// Input channels: intensity, depth, validity of the depth.
@@ -35,8 +36,7 @@ impl FsrcnnConfig {
     /// # Errors
     /// [`WeightsError`] if they are of another network.
     pub fn of(weights: &Weights) -> Result<Self, WeightsError> {
-        let [shrunk, features, _, _] = weights.shape::<4>("shrink.weight")?;
-        let mappings = weights.count(|layer| format!("map.{layer}.weight"));
+        let [features, shrunk, mappings] = schema::fsrcnn(weights)?;
         Ok(Self { features, shrunk, mappings })
     }
 

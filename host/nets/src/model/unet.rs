@@ -14,6 +14,7 @@ use burn::tensor::backend::Backend;
 
 use super::{convolution, linear, shuffle, unshuffle};
 use crate::network::CONDITIONS;
+use crate::schema::{self, UNetSizes};
 use crate::weights::{Weights, WeightsError};
 
 /// Sizes of a [`UNet`].
@@ -43,12 +44,7 @@ impl UNetConfig {
     /// # Errors
     /// [`WeightsError`] if they are of another network.
     pub fn of(weights: &Weights) -> Result<Self, WeightsError> {
-        let embedding = weights.shape::<2>("embed1.weight")?[0];
-        let levels = weights.count(|level| format!("encoder.{level}.0.conv1.weight"));
-        let blocks = weights.count(|block| format!("encoder.0.{block}.conv1.weight"));
-        let channels = (0..levels.max(1))
-            .map(|level| Ok(weights.shape::<4>(&format!("encoder.{level}.0.conv1.weight"))?[0]))
-            .collect::<Result<_, _>>()?;
+        let UNetSizes { channels, blocks, embedding } = schema::unet(weights)?;
         Ok(Self { channels, blocks, embedding })
     }
 
