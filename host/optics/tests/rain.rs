@@ -275,7 +275,10 @@ fn the_two_tables_of_water_agree_in_extinction_and_differ_in_albedo() {
     let by = |water| Medium::new(&drops, 1550.0, water).unwrap();
     let (one, other) = (by(Water::Segelstein), by(Water::HaleQuerry));
     assert!((one.extinction_per_m / other.extinction_per_m - 1.0).abs() < 1e-3);
-    assert!((one.albedo() - 0.605).abs() < 1e-3 && (other.albedo() - 0.654).abs() < 1e-3, "{other:?}");
+    assert!(
+        (one.albedo() - 0.605).abs() < 1e-3 && (other.albedo() - 0.654).abs() < 1e-3,
+        "{other:?}"
+    );
 }
 
 #[test]
