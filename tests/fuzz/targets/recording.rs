@@ -1,6 +1,8 @@
-//! Any file that claims to be a recording: read as far as it goes, or refused in one line.
+//! Fuzzes the reader of recordings. The reader must read as far as the file is sound, or refuse it
+//! in one line.
 //!
-//! Run with `-- -malloc_limit_mb=8192`: the mcap crate reserves (never touches) what a string in a record claims.
+//! Run with `-- -malloc_limit_mb=8192`: the mcap crate reserves, and never touches, the length that
+//! a string in a record claims.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
