@@ -42,7 +42,7 @@ impl Block {
     }
 }
 
-/// The network, its weights in the order of the loops.
+/// The network, with weights in the order of the loops.
 #[derive(Debug, Clone)]
 pub struct UNet {
     arch: Arch,
@@ -57,10 +57,10 @@ pub struct UNet {
 }
 
 impl UNet {
-    /// The network of these weights.
+    /// The network with these weights.
     ///
     /// # Errors
-    /// [`WeightsError`] for a tensor that is missing or of another shape.
+    /// [`WeightsError`] if a tensor is missing or has another shape.
     pub fn new(weights: &Weights) -> Result<Self, WeightsError> {
         let levels = weights.count(|i| format!("encoder.{i}.0.conv1.weight"));
         let blocks = |side: &str, level: usize| {
@@ -85,8 +85,8 @@ impl UNet {
         })
     }
 
-    /// What the network says of `current` and `degraded`, images of `height` x `width` pixels, both divisible by
-    /// 2^levels, under `conditions`; of the same size.
+    /// The network's output for `current` and `degraded`, images of `height` x `width` pixels, both
+    /// divisible by 2^levels, under `conditions`. The output has the same size.
     pub fn forward(
         &self,
         current: &[f32],
