@@ -1,9 +1,9 @@
 //! Replies and events that wait for room on the link.
 //!
 //! # Invariant
-//! What is put in comes out once, in order. A command is taken only while there is
-//! [room](Notices::has_room_for_a_command) for its reply and for every event that the command can lead to:
-//! `tests::laws::each_command_is_answered_once_and_in_order`.
+//! Every notice comes out once, in the order in which it was put in. A command is taken only while
+//! there is [room](Notices::has_room_for_a_command) for its reply and for every event that the
+//! command can cause (`tests::laws::each_command_is_answered_once_and_in_order`).
 
 use crate::packets::send;
 use crate::{BoardInfo, Crash, PacketSink};
@@ -14,12 +14,13 @@ use nirspi_wire::{
     Reply, SIDE, Tail, Version, WAVELENGTH_NM,
 };
 
-/// A command's outcome that borrows nothing.
+/// The outcome of a command, without borrowed data.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Outcome {
-    /// The rest of the identity is filled in when it is sent.
+    /// `Hello`. The rest of the identity is filled in when the reply is sent.
     Hello {
-        /// Of the session, or the newest of this firmware where there is no session.
+        /// Protocol version of the session, or the newest version of this firmware where there is
+        /// no session.
         protocol: u16,
         gateware: Version,
     },
@@ -37,18 +38,19 @@ pub(crate) enum Notice {
         outcome: Outcome,
     },
     Event(Event),
-    /// Of the last start.
+    /// The report of the crash that ended the last start.
     Crash,
 }
 
-/// Notices that wait.
+/// Number of notices that can wait.
 const CAPACITY: usize = 16;
 
-/// The most that one command can lead to before the next one is taken: its reply, a fault, the end of a
-/// run (or the loss of a raw burst), a crash report.
+/// Largest number of notices that one command can cause before the next command is taken: its
+/// reply, a fault, the end of a run (or the loss of a raw burst), and a crash report.
 const NOTICES_OF_A_COMMAND: usize = 4;
 
-/// Bytes of postcard of the longest notice, a crash report; an identity with two full names is 96 at most.
+/// Longest notice in bytes of postcard: a crash report. An identity with two full names has at most
+/// 96 bytes.
 const NOTICE_BYTES: usize = 16 + CRASH_TEXT_MAX;
 
 /// Replies and events in the order in which they came.
@@ -73,8 +75,8 @@ impl Notices {
         self.0.clear();
     }
 
-    /// Sends what the link has room for; whether that was anything. What a session of version `protocol` does not have
-    /// is dropped.
+    /// Sends what the link has room for; true if anything was sent. A notice that version
+    /// `protocol` does not have is dropped.
     pub fn flush(
         &mut self,
         protocol: u16,
@@ -100,7 +102,7 @@ impl Notices {
     }
 }
 
-/// `None`: a crash that has been reported already.
+/// The message of a notice. `None`: a crash that has been reported already.
 fn message<'m>(
     notice: &Notice,
     info: &'m BoardInfo,

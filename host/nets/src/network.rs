@@ -1,8 +1,9 @@
-//! Networks where they run, behind one face a network: plain slices in, plain vectors out.
+//! The networks behind one trait each, on any device: plain slices in, plain vectors out.
 //!
 //! # Invariant
-//! Every device gives the same numbers, to 1e-4; nothing above this module knows which one computed
-//! (`tests::every_device_of_this_machine_gives_what_pytorch_gives`).
+//! Every device gives the same numbers to within 1e-4
+//! (`tests::every_device_of_this_machine_gives_what_pytorch_gives`), and no module above this one
+//! depends on the device.
 
 #[cfg(feature = "gpu")]
 mod chain;
@@ -17,7 +18,7 @@ use crate::weights::{Weights, WeightsError};
 #[cfg(feature = "gpu")]
 pub(crate) use chain::{Guess, RunChain};
 
-/// Numbers that condition the UNet: time (2), blur (2), noise (2).
+/// Number of conditions of the UNet: time (2), blur (2), noise (2).
 pub const CONDITIONS: usize = 6;
 
 /// The conditions of one image.
@@ -25,7 +26,7 @@ pub(crate) type Conditions = [f32; CONDITIONS];
 
 /// The UNet on a device.
 pub(crate) trait RunUNet: Send {
-    /// What the network says of each pair of images (N, `side`, `side`) under its conditions.
+    /// The network's output for each pair of images (N, `side`, `side`) under its conditions.
     fn run(
         &self,
         side: usize,
@@ -43,7 +44,7 @@ pub(crate) trait RunEstimator: Send {
 
 /// FSRCNN on a device.
 pub(crate) trait RunFsrcnn: Send {
-    /// (N, 2 `side`, 2 `side`) of (N, 3, `side`, `side`), not clamped.
+    /// The image (N, 2 `side`, 2 `side`), not clamped, from (N, 3, `side`, `side`).
     fn run(&self, side: usize, input: &[f32]) -> Vec<f32>;
 }
 
@@ -76,7 +77,7 @@ impl Device {
     }
 }
 
-/// A network of [`cpu`]: images side by side on all cores, or all cores on one.
+/// A network of [`cpu`]: one image for each core, or all cores on one image.
 struct OnCpu<M>(M);
 
 impl RunUNet for OnCpu<cpu::UNet> {

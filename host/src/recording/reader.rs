@@ -1,7 +1,9 @@
 //! Reads a recording back in one pass, whole or cut short: first what was measured, then packet by packet.
 
 use super::lengths;
-use super::{ACCOUNT, IDENTITY, JSON, PROFILE, RUN, RunAccount, SETTLING, SETUP, TOPIC, protocol_of};
+use super::{
+    ACCOUNT, IDENTITY, JSON, PROFILE, RUN, RunAccount, SETTLING, SETUP, TOPIC, protocol_of,
+};
 use crate::calibration::Settling;
 use crate::session::CameraIdentity;
 use crate::setup::MeasurementSetup;

@@ -1,4 +1,4 @@
-//! What each command does, and each reason for which it is refused.
+//! Tests of the effect of each command, and of each reason for refusing a command.
 
 use super::support::*;
 use nirspi_wire::packet::MAX_HOST_PACKET;

@@ -1,4 +1,4 @@
-//! A crash is told to the first host after it, and to no other.
+//! Tests that the first host after a crash gets the crash report, and no later host.
 
 use super::support::*;
 use crate::{BoardInfo, CRASH_WORDS, Camera, Crash, Limits, Micros};

@@ -1,13 +1,13 @@
-//! Hosts of older and newer protocol versions.
+//! Tests with hosts of older and newer protocol versions.
 
 use super::support::*;
 use nirspi_wire::packet::{encode, unseal};
 use nirspi_wire::{Answer, Capabilities, Command, EventKind, Refusal, State, Tail, version};
 use std::vec::Vec;
 
-/// A whole packet of this payload.
+/// A whole packet with this payload.
 fn packet_of(payload: &[u8]) -> Vec<u8> {
-    // A byte array is written as its bytes alone, without a length.
+    // Postcard writes a byte array as its bytes alone, without a length.
     let mut room = [0; 64];
     match *payload {
         [a, b] => encode(&[a, b], &mut room),
@@ -18,12 +18,12 @@ fn packet_of(payload: &[u8]) -> Vec<u8> {
     .to_vec()
 }
 
-/// A request with number `id` of a command that no version has.
+/// A request with number `id` of a command that exists in no version.
 fn unknown(id: u8) -> Vec<u8> {
     packet_of(&[id, 0x7F])
 }
 
-/// What a camera has sent, without COBS, CRC and delimiter.
+/// The payloads of the packets that a camera has sent, without COBS, CRC and delimiter.
 fn payloads(bench: &mut Bench) -> Vec<Vec<u8>> {
     let payload = |mut packet: Vec<u8>| {
         packet.pop();
@@ -35,7 +35,7 @@ fn payloads(bench: &mut Bench) -> Vec<Vec<u8>> {
 #[test]
 fn a_host_of_version_1_gets_the_bytes_of_version_1() {
     let mut bench = Bench::new();
-    // Id 1, Hello, protocol 1: what a host of version 1 has always sent.
+    // Id 1, Hello, protocol 1: the bytes that a host of version 1 sends.
     bench.receive(&packet_of(&[1, 0, 1]));
     bench.poll();
     let greeting = payloads(&mut bench).concat();

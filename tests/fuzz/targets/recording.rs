@@ -1,4 +1,5 @@
-//! Any file that claims to be a recording: read, counted and reconstructed as far as it goes, or refused in one line.
+//! Fuzzes the reader of recordings. The reader must read as far as the file is sound, or refuse it
+//! in one line.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -43,7 +43,7 @@ impl Block {
     }
 }
 
-/// The network, its weights in the order of the loops.
+/// The network, with weights in the order of the loops.
 #[derive(Debug, Clone)]
 pub struct UNet {
     arch: Arch,
@@ -58,10 +58,10 @@ pub struct UNet {
 }
 
 impl UNet {
-    /// The network of these weights.
+    /// The network with these weights.
     ///
     /// # Errors
-    /// [`WeightsError`] for a tensor that is missing, of another shape, not finite, or unknown.
+    /// [`WeightsError`] if a tensor is missing, of another shape, not finite, or unknown.
     pub fn new(weights: &Weights) -> Result<Self, WeightsError> {
         let UNetSizes { channels, blocks: count, .. } = schema::unet(weights)?;
         let levels = channels.len();
@@ -86,8 +86,8 @@ impl UNet {
         })
     }
 
-    /// What the network says of `current` and `degraded`, images of `height` x `width` pixels, both divisible by
-    /// 2^levels, under `conditions`; of the same size.
+    /// The network's output for `current` and `degraded`, images of `height` x `width` pixels, both
+    /// divisible by 2^levels, under `conditions`. The output has the same size.
     pub fn forward(
         &self,
         current: &[f32],

@@ -1,4 +1,5 @@
-//! Against PyTorch: `host/nets/tests/pytorch/make.py` made the weights, the inputs and the outputs.
+//! Tests against PyTorch: `host/nets/tests/pytorch/make.py` made the weights, the inputs and the
+//! outputs.
 
 use burn::backend::Flex;
 use burn::tensor::{Tensor, TensorData};
