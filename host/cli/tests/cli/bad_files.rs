@@ -147,6 +147,7 @@ fn crafted(bench: &Bench, name: &str, setup: &MeasurementSetup, settling: &Settl
         adc_hz: 125_000_000,
         adc_bits: 14,
         wavelength_nm: 1550,
+        capabilities: Vec::new(),
     };
     let target = Target::New(bench.path(name));
     let mut recorder =

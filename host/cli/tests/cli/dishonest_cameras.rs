@@ -5,8 +5,8 @@ use crate::bench::{Bench, Outcome};
 use nirspi_wire::packet::{MAX_DEVICE_PACKET, MAX_HOST_PACKET};
 use nirspi_wire::{
     Answer, Command, Deframed, Deframer, DeviceMessage, Event, EventKind, Fault, Frame, FrameFlags,
-    Identity, PROTOCOL_VERSION, Refusal, Reply, Request, Samples, State, Status, Version, encode,
-    open,
+    Identity, Refusal, Reply, Request, Samples, State, Status, Tail, Version, encode, open,
+    version,
 };
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -191,7 +191,7 @@ impl Camera {
 }
 
 const IDENTITY: Identity<'static> = Identity {
-    protocol: PROTOCOL_VERSION,
+    protocol: version::CURRENT,
     firmware: Version(0, 1, 0),
     gateware: Version(0, 1, 0),
     board: "dishonest",
@@ -200,6 +200,7 @@ const IDENTITY: Identity<'static> = Identity {
     adc_hz: 125_000_000,
     adc_bits: 14,
     wavelength_nm: 1550,
+    capabilities: Tail(None),
 };
 
 /// Captures 50 frames of it into `rec.mcap`.
