@@ -195,7 +195,7 @@ step_flash() {
 step_mie() {
     python_with mie miepython==3.3.0 scattnlay==2.4
     cargo build --locked -p nirspi-optics --example mie_table
-    target/mie/bin/python host/optics/scripts/mie_reference.py target/debug/examples/mie_table
+    target/mie/bin/python host/optics/scripts/mie_reference.py "${CARGO_TARGET_DIR:-target}/debug/examples/mie_table"
 }
 
 step_mutations() {
