@@ -1,7 +1,7 @@
 //! `nirspi calibrate`: measures ADC latency and settling against a white sheet and keeps them for the camera.
 
 use super::address::{self, CameraAddress};
-use super::camera::SceneArgs;
+use super::camera::{ModelArgs, SceneArgs};
 use super::print;
 use anyhow::{Context, Result};
 use nirspi::calibration::{KeptCalibration, calibrate, path_of};
@@ -27,6 +27,8 @@ pub struct Args {
     /// Keep the calibration in this file instead of under the camera's serial number in the user's data directory
     #[arg(long, value_name = "FILE")]
     calibration: Option<PathBuf>,
+    #[command(flatten)]
+    model: ModelArgs,
     /// Seed of the virtual camera's simulated noise
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
@@ -43,7 +45,7 @@ struct Report {
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let mut session = address::open(&args.camera, &SceneArgs::white_sheet(args.seed))?;
+    let mut session = address::open(&args.camera, &SceneArgs::white_sheet(&args.model, args.seed))?;
     let settling = calibrate(&mut session, &mut IgnorePackets)
         .with_context(|| format!("{}: not calibrated", args.camera))?;
     let camera = session.identity().clone();

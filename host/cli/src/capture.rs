@@ -80,7 +80,7 @@ struct Report<'r> {
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let mut setup = args.setup.setup(1.0)?;
+    let mut setup = args.setup.setup(1.0, &args.scene.model)?;
     setup.adc_latency = args.calibration.adc_latency();
     let path = recording_path(args)?;
     let stop = stop_on_signal()?;

@@ -17,7 +17,7 @@ use nirspi_nets::images::Images;
 use nirspi_nets::metrics::{CharacterJudge, Judged as Features};
 use nirspi_nets::{Weights, upscale_2x};
 use nirspi_optics::rain::Rainfall;
-use nirspi_optics::{Projector, Scene};
+use nirspi_optics::{CameraModel, Scene};
 use nirspi_recon::{Image, Side};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -28,6 +28,8 @@ use std::path::{Path, PathBuf};
 pub struct Settings {
     /// Scenes at each distance, at least two.
     pub scenes: u32,
+    /// Which camera takes the pictures.
+    pub camera: CameraModel,
     /// How they are taken.
     pub exposure: Exposure,
     /// Inception-v3's weights, for FID; a second or so a picture.
@@ -64,6 +66,8 @@ const CHARACTERS: &str = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz01
 pub struct Report {
     /// Always true.
     pub simulated: bool,
+    /// The camera description's name.
+    pub camera: String,
     /// `none`, `light` or `heavy`.
     pub rain: &'static str,
     /// Scenes at each distance.
@@ -135,7 +139,7 @@ impl Table {
         let sets = Sets::new(settings.inception.as_deref())?;
         let enhancers = Enhancers::new()?;
         let exposure = settings.exposure;
-        let camera = CalibratedCamera::new(exposure.seed)?;
+        let camera = CalibratedCamera::new(&settings.camera, exposure.seed)?;
         let jobs: Vec<(f64, u32)> =
             DISTANCES_M.iter().flat_map(|&m| (0..settings.scenes).map(move |i| (m, i))).collect();
         let taken: Vec<Taken> = jobs
@@ -170,11 +174,12 @@ impl Table {
         }
         Ok(Report {
             simulated: true,
+            camera: settings.camera.name.clone(),
             rain: settings.exposure.rain.name(),
             scenes: settings.scenes,
             frames: settings.exposure.frames,
             seed: settings.exposure.seed,
-            reading: reading(&rows, settings.inception.is_some()),
+            reading: reading(&settings.camera, &rows, settings.inception.is_some()),
             rows,
         })
     }
@@ -312,15 +317,16 @@ fn take(
 ) -> Result<Shots> {
     let character = CHARACTERS.as_bytes()[i as usize % CHARACTERS.len()];
     let map = SceneSource::Letter(char::from(character)).load(256)?;
-    let side_mm = map.side_mm.unwrap_or_else(|| Projector::default().field_mm(distance_m * 1e3));
+    let side_mm =
+        map.side_mm.unwrap_or_else(|| camera.model().projector().field_mm(distance_m * 1e3));
     let scene = Scene::new(map.reflectance, map.size_px, side_mm)?;
     let conditions = Conditions { distance_m, rain, frames: exposure.frames };
     camera.shoot(scene, conditions, exposure.seed.wrapping_add(u64::from(i)))
 }
 
 /// What rain does here, and what it cannot do.
-fn reading(rows: &[Row], inception: bool) -> Vec<String> {
-    let projector = Projector::default();
+fn reading(camera: &CameraModel, rows: &[Row], inception: bool) -> Vec<String> {
+    let projector = camera.projector();
     let blur =
         DISTANCES_M.map(|m| format!("{:.0} mm at {m} m", projector.blur_mm(m * 1e3))).join(", ");
     let mut lines: Vec<String> = rows
@@ -336,7 +342,10 @@ fn reading(rows: &[Row], inception: bool) -> Vec<String> {
             )
         })
         .collect();
-    lines.push(format!("NIR-SPI: the lens is focused at 0.3 m; its defocus disc ({blur}) and noise decide, not rain"));
+    lines.push(format!(
+        "NIR-SPI: the lens is focused at {} m; its defocus disc ({blur}) and noise decide, not rain",
+        projector.focus_distance_mm / 1e3
+    ));
     lines.extend([
         "VIS: daylight, distance and falling drops do not bring a focused camera to 10 dB; \
          water on the glass of the paper's rain box might, and is not simulated"
@@ -403,7 +412,8 @@ mod tests {
     #[test]
     fn rain_costs_quality_and_the_same_scenes_come_again() {
         let exposure = Exposure { rain: Rainfall::Heavy, frames: 4, seed: 1 };
-        let settings = Settings { scenes: 2, exposure, inception: None };
+        let camera = CameraModel::default();
+        let settings = Settings { scenes: 2, camera, exposure, inception: None };
         let report = || {
             let table = Table::take(settings.clone(), &|| {}).unwrap();
             serde_json::to_value(table.report().unwrap()).unwrap()

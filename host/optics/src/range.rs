@@ -92,9 +92,9 @@ pub fn as_printed_mm(
         drops = drops * faded + (1.0 - faded);
         let pixel =
             PixelBudget::new(instrument, &dry, z_mm, wanted.reflectance, wanted.exposure_us)?;
-        let photons = pixel.signal_electrons * source * pixel.samples;
+        let photons = pixel.exposure_signal * source;
         let background = pixel.dry.ambient_electrons_white * drops;
-        let floor = ((pixel.noise.powi(2) + background) * pixel.samples).sqrt() * wanted.snr
+        let floor = (pixel.exposure_noise.powi(2) + background * pixel.samples).sqrt() * wanted.snr
             / (pixel.pixel_snr / pixel.exposure_snr);
         if photons <= floor {
             return Ok(z_mm);

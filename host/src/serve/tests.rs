@@ -96,7 +96,8 @@ impl Lab {
                 hands.pulled.store(false, Ordering::Relaxed);
                 Ok(enclosed(&hands, open_while_unplugged))
             });
-            let source = CameraSource { address: "test".to_owned(), setup, connect };
+            let model = nirspi_optics::CameraModel::default();
+            let source = CameraSource { address: "test".to_owned(), setup, model, connect };
             std::thread::spawn(move || camera::run(&shared, source, first))
         };
         let lab = Self { hands, shared, measuring };

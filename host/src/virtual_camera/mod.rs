@@ -11,6 +11,7 @@
 
 mod fpga;
 mod link;
+mod model;
 mod optics;
 mod precomputed;
 mod server;
@@ -19,6 +20,8 @@ mod tunnel;
 
 pub use fpga::{OpticalFpga, SimulatedFpga, Wiring};
 pub use link::MemoryLink;
+pub use model::{CameraFileError, read_camera_model};
+pub use nirspi_optics::CameraModel;
 pub use optics::{VirtualOptics, VirtualOpticsError};
 pub use precomputed::PrecomputedFpga;
 pub use server::{ServeOptions, ServerEvent, serve};

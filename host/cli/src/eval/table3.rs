@@ -30,9 +30,11 @@ pub struct Args {
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
+    let camera = args.exposure.model.read()?;
     let settings = Settings {
         scenes: args.scenes,
-        exposure: args.exposure.exposure(),
+        exposure: args.exposure.exposure(&camera),
+        camera,
         inception: args.inception.clone(),
     };
     let bar = progress(settings.pictures(), "table 3");

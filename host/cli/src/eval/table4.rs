@@ -29,7 +29,9 @@ pub struct Args {
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let settings = Settings { scenes: args.scenes, exposure: args.exposure.exposure() };
+    let camera = args.exposure.model.read()?;
+    let exposure = args.exposure.exposure(&camera);
+    let settings = Settings { scenes: args.scenes, camera, exposure };
     let bar = progress(settings.pictures(), "table 4");
     let report = table4(&settings, &|| bar.inc(1))?;
     bar.finish_and_clear();
