@@ -4,7 +4,7 @@
 
 use crate::files::FileError;
 use crate::files::image::{Reflectance, read_reflectance};
-use crate::picture::glyph;
+use crate::picture::Typeface;
 use image::imageops::{self, FilterType};
 use image::{ImageBuffer, Luma};
 use std::fmt;
@@ -93,7 +93,9 @@ impl FromStr for SceneSource {
         };
         let mut characters = text.chars();
         match (characters.next(), characters.next()) {
-            (Some(character), None) if glyph::has_shape(character) => Ok(Self::Letter(character)),
+            (Some(character), None) if Typeface::ubuntu_light().has_shape(character) => {
+                Ok(Self::Letter(character))
+            }
             (Some(character), None) => Err(SceneError::NoShape { character }),
             _ => Err(SceneError::NotOneCharacter {
                 scene: scene.to_owned(),
@@ -122,10 +124,7 @@ impl SceneSource {
     pub fn load(&self, size_px: usize) -> Result<SceneMap, SceneError> {
         match self {
             Self::Letter(character) => {
-                let reflectance = glyph::render(*character, size_px, GLYPH_FILL)
-                    .ok_or(SceneError::NoShape { character: *character })?;
-                let name = format!("letter {character}");
-                Ok(SceneMap { name, size_px, reflectance, side_mm: Some(LETTER_SIDE_MM) })
+                SceneMap::letter(&Typeface::ubuntu_light(), *character, size_px)
             }
             Self::White => Ok(SceneMap {
                 name: WHITE.to_owned(),
@@ -141,6 +140,25 @@ impl SceneSource {
                 Ok(SceneMap { name, size_px, reflectance, side_mm: None })
             }
         }
+    }
+}
+
+impl SceneMap {
+    /// One bright character of a typeface on the dark target of [`LETTER_SIDE_MM`], of whose edge the character's longer side
+    /// takes 0.9.
+    ///
+    /// # Errors
+    /// [`SceneError::NoShape`] if the typeface lacks the character.
+    pub fn letter(
+        typeface: &Typeface,
+        character: char,
+        size_px: usize,
+    ) -> Result<Self, SceneError> {
+        let reflectance = typeface
+            .draw(character, size_px, GLYPH_FILL)
+            .ok_or(SceneError::NoShape { character })?;
+        let name = format!("letter {character}");
+        Ok(Self { name, size_px, reflectance, side_mm: Some(LETTER_SIDE_MM) })
     }
 }
 

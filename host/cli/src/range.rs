@@ -7,16 +7,16 @@ use anyhow::Result;
 use nirspi::files::image::encode_rgb;
 use nirspi::files::output::OutputDir;
 use nirspi_eval::camera_model::{resolution_chart, snr_chart};
-use nirspi_eval::range::{Report, Settings, chart, range};
+use nirspi_eval::range::{Report, Settings, chart, exposure_chart, range};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Say how far the camera sees in rain, beside the paper's Table 2
 ///
 /// The farthest distance at which one pixel of a white target still has the signal-to-noise ratio asked for, from the
-/// photon budget and the rain's Mie extinction; Algorithm 2 as printed; and what would have to be assumed to agree
-/// with the paper. With --out, the same as a chart, and how fine and how
-/// well this camera and the shipped ones see.
+/// photon budget and the rain's Mie extinction; Algorithm 2 as printed, and with the gain of all patterns; the exposure
+/// that a pixel needs against distance; and what would have to be assumed to agree with the paper. With --out, the same as
+/// charts, and how fine and how well this camera and the shipped ones see.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi range\n\
@@ -34,8 +34,8 @@ pub struct Args {
     exposures_us: Vec<f64>,
     #[command(flatten)]
     model: ModelArgs,
-    /// Folder for range.png, range.json, and the finest line (resolution.png) and SNR (snr.png) against distance of this camera and
-    /// the shipped ones
+    /// Folder for range.png, exposure.png, range.json, and the finest line (resolution.png) and SNR (snr.png) against
+    /// distance of this camera and the shipped ones
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Print the report as JSON
@@ -54,6 +54,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if let Some(out) = &args.out {
         let mut out = OutputDir::create(out)?;
         out.write("range.png", &encode_rgb(&chart(&settings)?.render()))?;
+        out.write("exposure.png", &encode_rgb(&exposure_chart(&settings)?.render()))?;
         let camera = &settings.camera;
         out.write("resolution.png", &encode_rgb(&resolution_chart(camera)?.render()))?;
         out.write("snr.png", &encode_rgb(&snr_chart(camera)?.render()))?;
@@ -74,13 +75,13 @@ fn say(args: &Args, report: &Report) -> Result<()> {
         report.camera, report.snr, report.reflectance
     ))?;
     print::line(
-        "rain    mm/h  drop mm  exposure us   paper m    physics m  dry air m  as printed m",
+        "rain    mm/h  drop mm  exposure us   paper m    physics m  dry air m  as printed m  with gain m",
     )?;
     let metres =
         |range: Option<f64>| range.map_or_else(|| "none".to_owned(), |m| format!("{m:.3}"));
     for row in &report.rows {
         print::line(format_args!(
-            "{:<6} {:5.2}  {:7.1}  {:11}   {:>3} to {:<3} {:>9}  {:>9}  {:>12.2}",
+            "{:<6} {:5.2}  {:7.1}  {:11}   {:>3} to {:<3} {:>9}  {:>9}  {:>12.2}  {:>11.2}",
             row.rain,
             row.rate_mm_per_h,
             row.drop_mm,
@@ -89,7 +90,20 @@ fn say(args: &Args, report: &Report) -> Result<()> {
             row.paper_m.1,
             metres(row.physics_m),
             metres(row.dry_air_m),
-            row.as_printed_m
+            row.as_printed_m,
+            row.as_printed_with_gain_m
+        ))?;
+    }
+    print::line(format_args!(
+        "exposure needed in heavy rain, us: distance m, for SNR {}, for SNR {}, the paper's",
+        report.snr,
+        5.0 * report.snr
+    ))?;
+    for row in &report.exposures {
+        let paper = row.paper_us.map_or_else(String::new, |us| format!("{us}"));
+        print::line(format_args!(
+            "  {:4}  {:9.4}  {:9.3}  {paper}",
+            row.distance_m, row.needed_us, row.needed_for_5_times_us
         ))?;
     }
     for (title, lines) in [("reading", &report.reading), ("assumed", &report.assumptions)] {
@@ -99,8 +113,8 @@ fn say(args: &Args, report: &Report) -> Result<()> {
     }
     if let Some(out) = &args.out {
         print::line(format_args!(
-            "wrote {}, resolution.png, snr.png and range.json",
-            out.join("range.png").display()
+            "wrote range.png, exposure.png, resolution.png, snr.png and range.json to {}",
+            out.display()
         ))?;
     }
     Ok(())

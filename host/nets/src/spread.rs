@@ -1,7 +1,8 @@
-//! How sure a result is: its standard deviation, pixel by pixel, had the same scene been measured again.
+//! How well a result repeats: its standard deviation, pixel by pixel, had the same scene been measured again.
 //!
 //! The readings get fresh noise of the size estimated in them (a parametric bootstrap), and all
-//! stages run again. Where a network invents, the copies differ.
+//! stages run again. This is repeatability, no error bar: what the network gets wrong in every copy (bias, or a stroke that it
+//! invents each time) is not in it. `docs/quality.md` says how often the truth lies within it.
 
 use crate::estimate::Estimate;
 use crate::random::Noise;
