@@ -18,7 +18,7 @@ const SCENE_PX: usize = 256;
 /// What stands before a virtual camera.
 #[derive(Debug, Clone, Args)]
 pub struct SceneArgs {
-    /// What the virtual camera looks at: letter:R (43 mm, bright on dark), white (a sheet) or a PNG file (fills the field)
+    /// What the virtual camera looks at: letter:R (43 mm, bright on dark), white (a sheet), black (a covered lens) or a PNG file (fills the field)
     #[arg(long, value_name = "SCENE", default_value = "letter:R")]
     pub scene: String,
     /// Distance from the virtual camera to the target, in metres [default: where the lens is focused; the paper's camera 0.3]
@@ -77,7 +77,16 @@ impl Rain {
 impl SceneArgs {
     /// A white sheet where the lens is focused, for a calibration.
     pub fn white_sheet(model: &ModelArgs, seed: u64) -> Self {
-        let (scene, model) = ("white".to_owned(), model.clone());
+        Self::sheet("white", model, seed)
+    }
+
+    /// A cover before the lens, for a dark frame.
+    pub fn covered(model: &ModelArgs, seed: u64) -> Self {
+        Self::sheet("black", model, seed)
+    }
+
+    fn sheet(scene: &str, model: &ModelArgs, seed: u64) -> Self {
+        let (scene, model) = (scene.to_owned(), model.clone());
         Self { scene, distance_m: None, rain: Some(Rain::None), model, seed }
     }
 

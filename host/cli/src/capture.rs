@@ -115,7 +115,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let path = captured.recording.as_deref().unwrap_or(Path::new(""));
     let code = report(args, session.identity(), path, &choice, &captured)?;
     if let Some(out) = args.picture.as_ref().filter(|_| captured.counters.received > 0) {
-        let warnings = super::reconstruct::picture(&captured, path, out)?;
+        let warnings =
+            super::reconstruct::picture(&captured, choice.flat_field.clone(), path, out)?;
         for warning in warnings {
             print::complain(format_args!("warning: {warning}"));
         }

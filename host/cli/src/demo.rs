@@ -18,7 +18,9 @@ use nirspi::imaging::{Quality, compare};
 use nirspi::picture::{Panel, Range, SideBySide};
 use nirspi::scene::SceneMap;
 use nirspi::session::CameraIdentity;
-use nirspi::virtual_camera::{VirtualOptics, calibrate_against_white, shoot};
+use nirspi::virtual_camera::{
+    VirtualOptics, calibrate_against_white, flat_field_against_white, shoot,
+};
 use nirspi_optics::rain::Rainfall;
 use nirspi_recon::{Image, Side, reconstruct};
 use serde::Serialize;
@@ -76,6 +78,8 @@ struct Report {
     frames: LossCounters,
     adc_latency_clocks: u8,
     leak_taps: Vec<f64>,
+    /// LEDs that the flat field found dead, as row and column; `null` where all LEDs are alike and none was measured.
+    dead_leds: Option<Vec<[u8; 2]>>,
     /// Plain inverse transform, leak left in.
     raw: Quality,
     /// The result, against what a perfect 32 x 32 camera would see.
@@ -110,6 +114,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let model = optics.camera_model();
     let frames = args.frames.unwrap_or(model.readout.sweeps_per_picture);
     let settling = times.time("calibrate", || calibrate_against_white(&optics, seed))?;
+    let flat_field =
+        times.time("flat_field", || flat_field_against_white(&optics, &settling, seed))?;
 
     let bar = ProgressBar::new(u64::from(frames)).with_style(
         ProgressStyle::with_template("capture {bar:30} {pos}/{len} frames")
@@ -134,6 +140,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let measurements = shot.measurements()?;
     let Solved { image, report: method } =
         times.time("reconstruct", || solve(&args.method, &measurements))?;
+    let image = match &flat_field {
+        Some(flat) => flat.correct(&image),
+        None => image,
+    };
 
     let truth = optics.focused_footprint()?.weights().to_vec();
     let raw = compare(&raw, &truth)?;
@@ -173,6 +183,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         frames: captured.counters,
         adc_latency_clocks: setup.adc_latency,
         leak_taps: leak.map(|leak| leak.taps().to_vec()).unwrap_or_default(),
+        dead_leds: flat_field.map(|flat| flat.dead_leds().to_vec()),
         raw: raw.quality,
         reconstruction: fitted.quality,
         quality_note: "against the scene on the 32 x 32 LED grid without defocus, after the gain and offset of \

@@ -118,8 +118,8 @@ fn prepared(
     args: &CalibrationArgs,
     setup: &MeasurementSetup,
 ) -> Result<Connected> {
-    let Choice { calibration, note, .. } = args.choose(setup, session.identity())?;
-    Ok(Connected { session, calibration, note })
+    let Choice { calibration, note, flat_field, .. } = args.choose(setup, session.identity())?;
+    Ok(Connected { session, calibration, note, flat_field })
 }
 
 /// How to find the camera again.

@@ -2,7 +2,7 @@
 
 use crate::DISTANCES_M;
 use crate::error::{EvalError, Result};
-use nirspi::calibration::Settling;
+use nirspi::calibration::{FlatField, Settling};
 use nirspi::capture::{Capture, Progress};
 use nirspi::setup::MeasurementSetup;
 use nirspi::virtual_camera::{self, VirtualOptics};
@@ -46,11 +46,12 @@ pub struct Shots {
     pub vis: Image,
 }
 
-/// The virtual camera with its latency and settling, measured once against a white sheet.
+/// The virtual camera with its latency, settling and flat field, measured once against a white sheet.
 #[derive(Debug, Clone)]
 pub struct CalibratedCamera {
     model: CameraModel,
     settling: Settling,
+    flat_field: Option<FlatField>,
 }
 
 impl CalibratedCamera {
@@ -62,7 +63,8 @@ impl CalibratedCamera {
         // The scene does not matter: the sheet takes its place.
         let optics = VirtualOptics::of(model, Scene::white(), 1e3 * DISTANCES_M[0])?;
         let settling = virtual_camera::calibrate_against_white(&optics, seed)?;
-        Ok(Self { model: model.clone(), settling })
+        let flat_field = virtual_camera::flat_field_against_white(&optics, &settling, seed)?;
+        Ok(Self { model: model.clone(), settling, flat_field })
     }
 
     /// Which camera it is.
@@ -93,10 +95,15 @@ impl CalibratedCamera {
         let captured = self.record(&optics, setup, conditions.frames, seed)?;
         let measurements =
             captured.integrated.measurements(&captured.setup, captured.settling.as_ref(), false)?;
+        let image = reconstruct::hadamard(&measurements);
+        let nir_spi = match &self.flat_field {
+            Some(flat) => flat.correct(&image),
+            None => image,
+        };
         Ok(Shots {
             truth: optics.focused_footprint()?.weights().to_vec(),
             truth_fine: optics.focused(64),
-            nir_spi: reconstruct::hadamard(&measurements),
+            nir_spi,
             vis: Image::new(Side::INSTRUMENT, visible),
         })
     }

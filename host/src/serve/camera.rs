@@ -6,7 +6,7 @@ use super::camera_log::Phase;
 use super::slot::{Look, RunSetup};
 use super::{ForeignError, Shared, lock};
 use crate::account::LossCounters;
-use crate::calibration::{CalibrationError, Settling};
+use crate::calibration::{CalibrationError, FlatField, KeptFlatField, Settling};
 use crate::capture::{
     Calibration, CaptureError, CaptureOptions, Ended, Observer, Progress, observe,
 };
@@ -35,6 +35,8 @@ pub struct Connected {
     pub calibration: Calibration,
     /// What is to be said about that.
     pub note: Option<String>,
+    /// The flat field kept for the camera.
+    pub flat_field: Option<KeptFlatField>,
 }
 
 /// How to find the camera again.
@@ -75,8 +77,16 @@ pub fn run(
 ) -> Result<(), CaptureError> {
     let earlier = LossCounters::default();
     let model = source.model.clone();
-    let mut live =
-        Live { shared, model, earlier, now: None, depth: None, fault: None, begun: false };
+    let mut live = Live {
+        shared,
+        model,
+        earlier,
+        now: None,
+        flat_field: None,
+        depth: None,
+        fault: None,
+        begun: false,
+    };
     let mut next = Some(first);
     // Whoever starts this program has the camera in sight.
     let mut person_said = true;
@@ -163,6 +173,8 @@ struct Live<'s> {
     /// The account of the runs before.
     earlier: LossCounters,
     now: Option<(Arc<RunSetup>, Newest)>,
+    /// Of the camera that answers now.
+    flat_field: Option<FlatField>,
     depth: Option<Arc<DepthMaps>>,
     /// What the camera says has switched its LEDs off.
     fault: Option<Fault>,
@@ -177,10 +189,14 @@ impl Live<'_> {
         connected: &mut Connected,
         setup: MeasurementSetup,
     ) -> Result<End, CaptureError> {
-        let Connected { session, calibration, note } = connected;
+        let Connected { session, calibration, note, flat_field } = connected;
         for text in session.reports().iter().cloned().chain(note.take()) {
             lock(&self.shared.camera).event(text);
         }
+        if let Some(kept) = flat_field {
+            lock(&self.shared.camera).event(kept.summary());
+        }
+        self.flat_field = flat_field.as_ref().map(|kept| kept.flat.clone());
         let calibration = calibration.clone();
         let options = CaptureOptions { setup, frames: None, calibration, record: None };
         (self.now, self.fault) = (None, None);
@@ -222,7 +238,11 @@ impl Observer for Live<'_> {
         settling: Option<&Settling>,
         problem: Option<&CalibrationError>,
     ) {
-        let run = RunSetup { setup: setup.clone(), settling: settling.cloned() };
+        let run = RunSetup {
+            setup: setup.clone(),
+            settling: settling.cloned(),
+            flat_field: self.flat_field.clone(),
+        };
         self.now = Some((Arc::new(run), Newest::new(setup)));
         (self.depth, self.begun) = (None, true);
         let mut log = lock(&self.shared.camera);

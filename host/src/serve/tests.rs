@@ -73,7 +73,7 @@ fn enclosed(hands: &Arc<Hands>, was_open: bool) -> Connected {
     camera.step(1000);
     let link = Enclosed { camera, hands: Arc::clone(hands) };
     let session = Session::open(Box::new(link)).unwrap();
-    Connected { session, calibration: Calibration::None, note: None }
+    Connected { session, calibration: Calibration::None, note: None, flat_field: None }
 }
 
 /// A camera's thread under test.

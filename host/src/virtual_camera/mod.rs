@@ -25,7 +25,7 @@ pub use nirspi_optics::CameraModel;
 pub use optics::{VirtualOptics, VirtualOpticsError};
 pub use precomputed::PrecomputedFpga;
 pub use server::{ServeOptions, ServerEvent, serve};
-pub use shot::{Shot, ShotError, calibrate_against_white, shoot};
+pub use shot::{Shot, ShotError, calibrate_against_white, flat_field_against_white, shoot};
 pub use tunnel::serve_tunnel;
 
 use nirspi_mcu::{
