@@ -36,9 +36,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     }
     let report = camera_model(&camera)?;
     if args.json {
-        print::json(&report)?
+        print::json(&report)?;
     } else {
-        say(&report)?
+        say(&report)?;
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -305,7 +305,7 @@ fn row(
         Some(Estimate::jackknife(line(&whole)?, &left?))
     };
     let lens_mm = (image != Picture::Vis).then(|| {
-        [0.5, 0.1].map(|level| lens_line_mm(&projector, distance_m * 1e3, pixel_mm, level))
+        [0.5, 0.1].map(|level| lens_line_mm(projector, distance_m * 1e3, pixel_mm, level))
     });
     let unresolved =
         contrasts.iter().rposition(|&contrast| contrast.is_nan() || contrast < RESOLVED);
