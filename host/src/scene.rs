@@ -223,7 +223,7 @@ mod tests {
     fn scenes_that_do_not_exist_get_a_line() {
         assert_eq!(
             line(""),
-            "scene: found nothing, expected letter:R, white or the path of a PNG image"
+            "scene: found nothing, expected letter:R, white, black or the path of a PNG image"
         );
         assert_eq!(
             line("letter:"),
