@@ -4,7 +4,7 @@ use nirspi::files::image::encode_grey;
 use nirspi::imaging::{Enhance, ImageContext, White, warnings};
 use nirspi::scene::SceneSource;
 use nirspi::setup::MeasurementSetup;
-use nirspi::virtual_camera::{VirtualOptics, calibrate_against_white, shoot};
+use nirspi::virtual_camera::{CameraModel, VirtualOptics, calibrate_against_white, shoot};
 use nirspi_nets::Device;
 use nirspi_recon::Order;
 use nirspi_recon::reconstruct::{Method, MethodSettings};
@@ -12,7 +12,7 @@ use std::ops::ControlFlow;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let letter = "letter:R".parse::<SceneSource>()?.load(256)?;
-    let optics = VirtualOptics::before(&letter, 300.0)?;
+    let optics = VirtualOptics::before(CameraModel::paper(), &letter, 300.0)?;
     let settling = calibrate_against_white(&optics, 1)?;
     let half_of_the_patterns = MeasurementSetup::new(&Order::CakeCutting, 0.5)?;
     let go_on = &mut |_: &_| ControlFlow::Continue(());

@@ -361,7 +361,9 @@ pub fn observe(
         Err(error) if run.tally.has_begun() => Ended::LinkLost(error),
         Err(error) => {
             // A run that never started leaves no recording behind.
-            run.recorder.map(Recorder::discard);
+            if let Some(recorder) = run.recorder {
+                recorder.discard();
+            }
             return Err(error.into());
         }
     };

@@ -263,8 +263,9 @@ mod tests {
         assert!((disc_transfer(1.0, 1.0 / PI) - 0.880_101).abs() < 1e-6);
         assert!(disc_transfer(2.0, 3.831_706 / PI / 2.0).abs() < 1e-6);
         let along = EDGE_ANGLE_DEG.to_radians().cos();
-        assert!((square_transfer(1.0 / along, 0.5) - 0.6366).abs() < 2e-3);
-        assert_eq!((disc_transfer(3.0, 0.0), square_transfer(3.0, 0.0)), (1.0, 1.0));
+        assert!((square_transfer(1.0 / along, 0.5) - 2.0 / PI).abs() < 2.5e-3);
+        assert!((disc_transfer(3.0, 0.0) - 1.0).abs() < 1e-12);
+        assert_eq!(square_transfer(3.0, 0.0), 1.0);
     }
 
     #[test]

@@ -20,16 +20,20 @@ const GLYPH_FILL: f32 = 0.9;
 const LETTER_PREFIX: &str = "letter:";
 /// How a white sheet is written.
 const WHITE: &str = "white";
+/// How a covered lens is written.
+const BLACK: &str = "black";
 /// White paper at 1550 nm reflects about this much.
 const WHITE_REFLECTANCE: f32 = 0.9;
 
-/// Where a scene comes from: `letter:R`, `white`, or the path of a PNG.
+/// Where a scene comes from: `letter:R`, `white`, `black`, or the path of a PNG.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum SceneSource {
     /// One bright character on a dark target.
     Letter(char),
     /// A sheet that fills the field of view, for self-tests.
     White,
+    /// A cover before the lens: nothing comes back, for dark frames.
+    Black,
     /// A PNG, whose grey levels are taken as reflectance.
     File(PathBuf),
 }
@@ -52,7 +56,7 @@ pub struct SceneMap {
 #[non_exhaustive]
 pub enum SceneError {
     /// No scene was named.
-    #[error("scene: found nothing, expected letter:R, white or the path of a PNG image")]
+    #[error("scene: found nothing, expected letter:R, white, black or the path of a PNG image")]
     Empty,
     /// `letter:` was followed by none or several characters.
     #[error(
@@ -88,6 +92,9 @@ impl FromStr for SceneSource {
         if scene == WHITE {
             return Ok(Self::White);
         }
+        if scene == BLACK {
+            return Ok(Self::Black);
+        }
         let Some(text) = scene.strip_prefix(LETTER_PREFIX) else {
             return Ok(Self::File(scene.into()));
         };
@@ -110,6 +117,7 @@ impl fmt::Display for SceneSource {
         match self {
             Self::Letter(character) => write!(f, "{LETTER_PREFIX}{character}"),
             Self::White => f.write_str(WHITE),
+            Self::Black => f.write_str(BLACK),
             Self::File(path) => write!(f, "{}", path.display()),
         }
     }
@@ -126,12 +134,18 @@ impl SceneSource {
             Self::Letter(character) => {
                 SceneMap::letter(&Typeface::ubuntu_light(), *character, size_px)
             }
-            Self::White => Ok(SceneMap {
-                name: WHITE.to_owned(),
-                size_px,
-                reflectance: vec![WHITE_REFLECTANCE; size_px * size_px],
-                side_mm: None,
-            }),
+            Self::White | Self::Black => {
+                let white = *self == Self::White;
+                Ok(SceneMap {
+                    name: self.to_string(),
+                    size_px,
+                    reflectance: vec![
+                        if white { WHITE_REFLECTANCE } else { 0.0 };
+                        size_px * size_px
+                    ],
+                    side_mm: None,
+                })
+            }
             Self::File(path) => {
                 let Reflectance { size_px, values: reflectance } =
                     shrink(read_reflectance(path)?, size_px);
@@ -209,7 +223,7 @@ mod tests {
     fn scenes_that_do_not_exist_get_a_line() {
         assert_eq!(
             line(""),
-            "scene: found nothing, expected letter:R, white or the path of a PNG image"
+            "scene: found nothing, expected letter:R, white, black or the path of a PNG image"
         );
         assert_eq!(
             line("letter:"),

@@ -107,7 +107,7 @@ impl Reports {
         match (report, self.0.len() + 1) {
             (Some(report), ..Self::MOST) => self.0.push(report),
             (Some(_), Self::MOST) => {
-                self.0.push("the camera reported more than is shown".to_owned())
+                self.0.push("the camera reported more than is shown".to_owned());
             }
             _ => {}
         }

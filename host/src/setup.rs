@@ -79,6 +79,13 @@ impl MeasurementSetup {
         })
     }
 
+    /// The same with each pattern shown for `clocks_per_pattern` ADC clocks, of whose samples the first `blanked` are left
+    /// out.
+    #[must_use]
+    pub fn timed(self, clocks_per_pattern: u16, blanked: u16) -> Self {
+        Self { clocks_per_pattern, blanked, ..self }
+    }
+
     /// ADC samples summed in each slot.
     #[must_use]
     pub fn window(&self) -> u16 {

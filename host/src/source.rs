@@ -1,7 +1,9 @@
 //! Where measurements come from: a file of anybody's, a recording, or a capture that has just ended.
 
 use crate::account::LossCounters;
+use crate::calibration::{FlatField, KeptFlatField};
 use crate::capture::Capture;
+use crate::causes;
 use crate::files::FileError;
 use crate::files::npz::{self, MeasurementFile, Readings, Selection};
 use crate::integrate::{IntegrateError, Integrated};
@@ -22,6 +24,8 @@ pub struct SourceOptions {
     pub non_differential: bool,
     /// Leave the leak from pattern to pattern of a recording as it is.
     pub keep_leak: bool,
+    /// Leave the pattern of unequal LEDs of a recording as it is, though a flat field is kept for its camera.
+    pub no_flat_field: bool,
 }
 
 /// A measurement of several.
@@ -147,9 +151,29 @@ pub struct Source {
     pub frames: Option<LossCounters>,
     /// What to tell the user.
     pub notes: Vec<String>,
+    /// The flat field of the camera that was recorded, where one is kept.
+    pub flat_field: Option<FlatField>,
 }
 
 impl Source {
+    /// What the camera has seen, given what a reconstruction makes of its measurements: the pattern of unequal LEDs taken away
+    /// where their flat field is known.
+    #[must_use]
+    pub fn flattened(&self, image: Image) -> Image {
+        match &self.flat_field {
+            Some(flat) => flat.correct(&image),
+            None => image,
+        }
+    }
+
+    /// The same measurements of a camera with this flat field.
+    #[must_use]
+    pub fn with_flat_field(mut self, kept: KeptFlatField) -> Self {
+        self.notes.push(kept.summary());
+        self.flat_field = Some(kept.flat);
+        self
+    }
+
     /// Reads one measurement, or the sum of a recording's frames.
     ///
     /// # Errors
@@ -190,6 +214,7 @@ impl Source {
             reference: None,
             frames: Some(*counters),
             notes,
+            flat_field: None,
         })
     }
 }
@@ -248,7 +273,8 @@ fn from_npz(path: &Path, file: MeasurementFile) -> Result<Source, SourceError> {
             (measurements, Vec::new())
         }
     };
-    Ok(Source { measurements, dropouts, reference: file.reference, frames: None, notes })
+    let (reference, flat_field) = (file.reference, None);
+    Ok(Source { measurements, dropouts, reference, frames: None, notes, flat_field })
 }
 
 /// Sums the frames of a recording, counting again what became of each.
@@ -308,5 +334,18 @@ fn of_frames(
         .measurements(setup, settling.as_ref(), options.keep_leak)
         .map_err(|problem| SourceError::Integrate { path: path.to_owned(), problem })?;
     let (dropouts, frames) = (Vec::new(), Some(counters));
-    Ok(Source { measurements, dropouts, reference: None, frames, notes })
+    let source =
+        Source { measurements, dropouts, reference: None, frames, notes, flat_field: None };
+    if options.no_flat_field {
+        return Ok(source);
+    }
+    Ok(match KeptFlatField::of(&recording.identity) {
+        Ok(Some(kept)) => source.with_flat_field(kept),
+        Ok(None) => source,
+        Err(problem) => {
+            let mut source = source;
+            source.notes.push(format!("flat field not used: {}", causes::in_one_line(&problem)));
+            source
+        }
+    })
 }

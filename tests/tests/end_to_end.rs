@@ -171,18 +171,7 @@ fn two_patterns_taken_for_each_other_fail_the_check() {
 
 #[test]
 fn calibration_finds_latency_and_leak_and_undoing_them_helps() {
-    let noiseless = || {
-        let mut chain = nirspi_optics::ChainSettings::default();
-        (chain.shot_noise, chain.amplifier_noise_electrons) = (false, 0.0);
-        VirtualOptics::with_settings(
-            scene(),
-            300.0,
-            nirspi_optics::Projector::default(),
-            &nirspi_optics::BudgetSettings::default(),
-            chain,
-        )
-        .unwrap()
-    };
+    let noiseless = || optics().noiseless();
     let link = Box::new(MemoryLink::new(noiseless().camera(3).unwrap()));
     let captured = run(link, &options(&Order::CakeCutting, true));
     assert!(captured.calibration_problem.is_none(), "{:?}", captured.calibration_problem);

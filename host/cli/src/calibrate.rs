@@ -1,24 +1,37 @@
-//! `nirspi calibrate`: measures ADC latency and settling against a white sheet and keeps them for the camera.
+//! `nirspi calibrate`: measures ADC latency, settling and flat field against a white sheet and keeps them for the camera.
 
 use super::address::{self, CameraAddress};
-use super::camera::SceneArgs;
+use super::camera::{ModelArgs, SceneArgs};
 use super::print;
-use anyhow::{Context, Result};
-use nirspi::calibration::{KeptCalibration, calibrate, path_of};
-use nirspi::session::IgnorePackets;
+use anyhow::{Context, Result, anyhow};
+use indicatif::ProgressBar;
+use nirspi::calibration::{
+    KeptCalibration, KeptFlatField, Settling, Sweeps, calibrate, flat_field_path_of, measure_dark,
+    measure_flat_field, path_of,
+};
+use nirspi::capture::Progress;
+use nirspi::session::{IgnorePackets, Session};
+use nirspi::setup::MeasurementSetup;
+use nirspi_recon::Order;
 use serde::Serialize;
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::SystemTime;
 
-/// Measure a camera's ADC latency and settling, and keep them for the captures after it
+/// Measure a camera's ADC latency, settling and flat field, and keep them for the captures after it
 ///
 /// Hold a white sheet before the camera, as near as it is sharp. Latency and settling belong to the camera and its
 /// gateware, so once is enough, until the gateware or the amplifier changes. `nirspi selftest` does the same and checks the
 /// rest of the camera as well. A virtual camera looks at its white sheet by itself.
+///
+/// With --white, the sheet must fill the field and be evenly lit: how much the LEDs differ and which are dead is measured
+/// too, and `capture --picture`, `serve` and `reconstruct` take that pattern out of their images. With --dark and the lens
+/// covered, what each pixel reads without light is added to that flat field.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi calibrate --camera usb\n\
+    \x20 nirspi calibrate --camera usb --white\n\
     \x20 nirspi calibrate --camera tcp:127.0.0.1:1550 --calibration bench-2.json")]
 pub struct Args {
     /// Which camera: virtual, usb, usb:SERIAL, tcp:HOST:PORT or serial:PATH[:BAUD]
@@ -27,6 +40,18 @@ pub struct Args {
     /// Keep the calibration in this file instead of under the camera's serial number in the user's data directory
     #[arg(long, value_name = "FILE")]
     calibration: Option<PathBuf>,
+    /// Measure the flat field as well: light of each LED, and dead LEDs
+    #[arg(long, conflicts_with = "calibration")]
+    white: bool,
+    /// Measure the dark frame, the lens covered, and add it to the flat field that is kept
+    #[arg(long, conflicts_with_all = ["calibration", "white"])]
+    dark: bool,
+    /// Sweeps of all patterns summed for the flat field or dark frame; 8000 are 0.7 s of light at 40 ns a pattern
+    #[arg(long, value_name = "N", default_value_t = 8000,
+          value_parser = clap::value_parser!(u32).range(8..=10_000_000))]
+    sweeps: u32,
+    #[command(flatten)]
+    model: ModelArgs,
     /// Seed of the virtual camera's simulated noise
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
@@ -40,10 +65,37 @@ struct Report {
     #[serde(flatten)]
     kept: KeptCalibration,
     file: PathBuf,
+    /// `null` without --white.
+    flat_field: Option<FlatFieldReport>,
+}
+
+#[derive(Debug, Serialize)]
+struct FlatFieldReport {
+    file: PathBuf,
+    sweeps: Sweeps,
+    /// Pattern of images of the white sheet as they come, as a share of white.
+    pattern_before: f64,
+    /// The same corrected.
+    pattern_after: f64,
+    /// Row and column.
+    dead_leds: Vec<[u8; 2]>,
+    /// Pixels with a reading in the dark; `null` where that was not measured.
+    dark_pixels: Option<usize>,
+}
+
+impl FlatFieldReport {
+    fn new(kept: &KeptFlatField, file: PathBuf) -> Self {
+        let KeptFlatField { sweeps, pattern_before, pattern_after, ref flat, .. } = *kept;
+        let (dead_leds, dark_pixels) = (flat.dead_leds().to_vec(), flat.dark_pixels());
+        Self { file, sweeps, pattern_before, pattern_after, dead_leds, dark_pixels }
+    }
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let mut session = address::open(&args.camera, &SceneArgs::white_sheet(args.seed))?;
+    if args.dark {
+        return run_dark(args);
+    }
+    let mut session = address::open(&args.camera, &SceneArgs::white_sheet(&args.model, args.seed))?;
     let settling = calibrate(&mut session, &mut IgnorePackets)
         .with_context(|| format!("{}: not calibrated", args.camera))?;
     let camera = session.identity().clone();
@@ -52,9 +104,14 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         None => path_of(&camera.serial)?,
     };
     let kept = KeptCalibration::new(camera, settling, Vec::new(), SystemTime::now());
+    let flat_field = match args.white {
+        true => Some(white(args, &mut session, &kept.settling)?),
+        false => None,
+    };
     kept.write(&file)?;
     if args.json {
-        print::json(&Report { kept, file })?;
+        let flat_field = flat_field.map(|(flat, file)| FlatFieldReport::new(&flat, file));
+        print::json(&Report { kept, file, flat_field })?;
         return Ok(ExitCode::SUCCESS);
     }
     let KeptCalibration { camera, settling, .. } = &kept;
@@ -67,5 +124,79 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         settling.step_counts
     ))?;
     print::line(format_args!("kept in {}", file.display()))?;
+    if let Some((flat, file)) = &flat_field {
+        print::line(flat.summary())?;
+        print::line(format_args!("kept in {}", file.display()))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// All patterns and their complements, with the timing of the camera.
+fn setup(args: &Args, settling: &Settling) -> Result<MeasurementSetup> {
+    let readout = args.model.read()?.readout;
+    // Ranges are checked when a description is read.
+    let (clocks, blanked) = (readout.clocks_per_pattern as u16, readout.blanked as u16);
+    let setup = MeasurementSetup::new(&Order::Natural, 1.0)?.timed(clocks, blanked);
+    Ok(MeasurementSetup { adc_latency: settling.adc_latency, ..setup })
+}
+
+/// Shows how many of all sweeps have come, over several captures.
+fn watched(bar: &ProgressBar) -> impl FnMut(&Progress) -> ControlFlow<()> + '_ {
+    let (mut before, mut last) = (0, 0);
+    move |progress| {
+        let now = progress.counters.total();
+        if now < last {
+            before += last;
+        }
+        last = now;
+        bar.set_position(before + now);
+        ControlFlow::Continue(())
+    }
+}
+
+/// Measures the flat field and keeps it.
+fn white(
+    args: &Args,
+    session: &mut Session,
+    settling: &Settling,
+) -> Result<(KeptFlatField, PathBuf)> {
+    let (setup, sweeps) = (setup(args, settling)?, Sweeps::of_map(args.sweeps));
+    let bar = ProgressBar::new(u64::from(sweeps.map + 2 * sweeps.check));
+    let measured = measure_flat_field(session, &setup, settling, sweeps, &mut watched(&bar));
+    bar.finish_and_clear();
+    let measured = measured.with_context(|| format!("{}: no flat field", args.camera))?;
+    let camera = session.identity().clone();
+    let file = flat_field_path_of(&camera.serial)?;
+    let kept = KeptFlatField::new(camera, measured, sweeps, SystemTime::now());
+    kept.write(&file)?;
+    Ok((kept, file))
+}
+
+/// Adds a dark frame to the flat field that is kept.
+fn run_dark(args: &Args) -> Result<ExitCode> {
+    let mut session = address::open(&args.camera, &SceneArgs::covered(&args.model, args.seed))?;
+    let camera = session.identity().clone();
+    let kept = KeptFlatField::of(&camera)?.ok_or_else(|| {
+        let serial = &camera.serial;
+        anyhow!("no flat field is kept for camera {serial}: run nirspi calibrate --white first")
+    })?;
+    let settling = KeptCalibration::read(&path_of(&camera.serial)?, &camera)?.settling;
+    let setup = setup(args, &settling)?;
+    let bar = ProgressBar::new(2 * u64::from(args.sweeps));
+    let (flat, sweeps) = (kept.flat.clone(), args.sweeps);
+    let flat = measure_dark(&mut session, &setup, &settling, flat, sweeps, &mut watched(&bar));
+    bar.finish_and_clear();
+    let kept = kept.renewed(flat.with_context(|| format!("{}: no dark frame", args.camera))?);
+    let file = flat_field_path_of(&camera.serial)?;
+    kept.write(&file)?;
+    if args.json {
+        print::json(&FlatFieldReport::new(&kept, file))?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    print::line(format_args!(
+        "dark frame: {} of 1024 pixels read something without light, beyond noise; kept in {}",
+        kept.flat.dark_pixels().unwrap_or(0),
+        file.display()
+    ))?;
     Ok(ExitCode::SUCCESS)
 }

@@ -23,6 +23,9 @@ pub struct CalibrationArgs {
     /// ADC clocks from light to sample, as you know them; with a wrong number the picture is wrong or inverted
     #[arg(long, value_name = "N", requires = "no_calibration")]
     adc_latency: Option<u8>,
+    /// Leave the pattern of unequal LEDs in images, though a flat field of `nirspi calibrate --white` is kept for the camera
+    #[arg(long)]
+    no_flat_field: bool,
 }
 
 impl CalibrationArgs {
@@ -42,14 +45,15 @@ impl CalibrationArgs {
 
     /// The calibration for this camera and setup.
     pub fn choose(&self, setup: &MeasurementSetup, camera: &CameraIdentity) -> Result<Choice> {
-        self.policy().choose(setup, camera).map_err(|error| match error {
+        let choice = self.policy().choose(setup, camera).map_err(|error| match error {
             PolicyError::DarkLevel => Usage(
                 "--calibration with --non-differential: patterns without complements need the dark level of the \
                  moment, use --calibrate"
                     .to_owned(),
             )
             .into(),
-            error => error.into(),
-        })
+            error => anyhow::Error::from(error),
+        })?;
+        Ok(if self.no_flat_field { Choice { flat_field: None, ..choice } } else { choice })
     }
 }

@@ -6,8 +6,7 @@ use clap::{Args, ValueEnum};
 use nirspi::files::order_table::read_order_table;
 use nirspi::scene::{SceneMap, SceneSource};
 use nirspi::setup::MeasurementSetup;
-use nirspi::virtual_camera::VirtualOptics;
-use nirspi_optics::Projector;
+use nirspi::virtual_camera::{CameraModel, VirtualOptics, read_camera_model};
 use nirspi_optics::rain::Rainfall;
 use nirspi_recon::Order;
 use std::path::Path;
@@ -19,19 +18,37 @@ const SCENE_PX: usize = 256;
 /// What stands before a virtual camera.
 #[derive(Debug, Clone, Args)]
 pub struct SceneArgs {
-    /// What the virtual camera looks at: letter:R (43 mm, bright on dark), white (a sheet) or a PNG file (fills the field)
+    /// What the virtual camera looks at: letter:R (43 mm, bright on dark), white (a sheet), black (a covered lens) or a PNG file (fills the field)
     #[arg(long, value_name = "SCENE", default_value = "letter:R")]
     pub scene: String,
-    /// Distance from the virtual camera to the target, in metres
-    #[arg(long, value_name = "M", default_value_t = 0.3, allow_negative_numbers = true)]
-    pub distance_m: f64,
+    /// Distance from the virtual camera to the target, in metres [default: where the lens is focused; the paper's camera 0.3]
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    pub distance_m: Option<f64>,
     /// What falls between the virtual camera and the target, as in the paper's Table 2: light is 1.93 mm/h of 0.5 mm
-    /// drops, heavy 5.6 mm/h of 2 mm drops
-    #[arg(long, value_enum, default_value_t = Rain::None)]
-    pub rain: Rain,
+    /// drops, heavy 5.6 mm/h of 2 mm drops [default: the camera description's, none for the shipped ones]
+    #[arg(long, value_enum)]
+    pub rain: Option<Rain>,
+    #[command(flatten)]
+    pub model: ModelArgs,
     /// Seed of the simulated noise: the same seed gives the same bytes
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
+}
+
+/// Which simulated camera.
+#[derive(Debug, Clone, Args)]
+pub struct ModelArgs {
+    /// Description of the simulated camera: paper, fga015, one-metre, or a TOML file like those that `nirspi camera-model --print`
+    /// prints
+    #[arg(long, value_name = "NAME|FILE", default_value = "paper")]
+    pub camera_model: String,
+}
+
+impl ModelArgs {
+    /// The description.
+    pub fn read(&self) -> Result<CameraModel> {
+        Ok(read_camera_model(&self.camera_model)?)
+    }
 }
 
 /// The paper's rain (Table 2).
@@ -59,16 +76,31 @@ impl Rain {
 
 impl SceneArgs {
     /// A white sheet where the lens is focused, for a calibration.
-    pub fn white_sheet(seed: u64) -> Self {
-        let distance_m = Projector::default().focus_distance_mm / 1e3;
-        Self { scene: "white".to_owned(), distance_m, rain: Rain::None, seed }
+    pub fn white_sheet(model: &ModelArgs, seed: u64) -> Self {
+        Self::sheet("white", model, seed)
+    }
+
+    /// A cover before the lens, for a dark frame.
+    pub fn covered(model: &ModelArgs, seed: u64) -> Self {
+        Self::sheet("black", model, seed)
+    }
+
+    fn sheet(scene: &str, model: &ModelArgs, seed: u64) -> Self {
+        let (scene, model) = (scene.to_owned(), model.clone());
+        Self { scene, distance_m: None, rain: Some(Rain::None), model, seed }
+    }
+
+    /// What falls before this camera.
+    pub fn rainfall(&self, model: &CameraModel) -> Rainfall {
+        self.rain.map_or(model.weather.rain, Rain::rainfall)
     }
 
     /// The scene and the optics before it.
     pub fn optics(&self) -> Result<(SceneMap, VirtualOptics)> {
-        let distance_mm = self.distance_m * 1e3;
+        let model = self.model.read()?;
+        let distance_mm = self.distance_m.map_or(model.projector().focus_distance_mm, |m| m * 1e3);
         if !(distance_mm.is_finite() && distance_mm > 0.0) {
-            let found = self.distance_m;
+            let found = distance_mm / 1e3;
             return Err(Usage(format!(
                 "--distance-m is {found}, expected a positive number of metres"
             ))
@@ -76,12 +108,13 @@ impl SceneArgs {
         }
         let source = SceneSource::from_str(&self.scene).map_err(|e| Usage(e.to_string()))?;
         let map = source.load(SCENE_PX)?;
-        let optics = VirtualOptics::before(&map, distance_mm)
-            .map_err(|error| Usage(format!("--distance-m {}: {error}", self.distance_m)))?;
-        let optics = match self.rain.rainfall().drops()? {
-            Some(drops) => optics.in_rain(drops).map_err(|error| {
-                Usage(format!("--rain at --distance-m {}: {error}", self.distance_m))
-            })?,
+        let distance_m = distance_mm / 1e3;
+        let optics = VirtualOptics::before(&model, &map, distance_mm)
+            .map_err(|error| Usage(format!("--distance-m {distance_m}: {error}")))?;
+        let optics = match self.rainfall(&model).drops()? {
+            Some(drops) => optics
+                .in_rain(drops)
+                .map_err(|error| Usage(format!("--rain at --distance-m {distance_m}: {error}")))?,
             None => optics,
         };
         Ok((map, optics))
@@ -100,13 +133,12 @@ pub struct SetupArgs {
     #[arg(long, value_name = "N", default_value_t = 1,
           value_parser = clap::value_parser!(u32).range(1..))]
     pub sweeps: u32,
-    /// ADC clocks (8 ns) that each pattern is shown: 5 is 25 MHz
-    #[arg(long, value_name = "N", default_value_t = 5,
-          value_parser = clap::value_parser!(u16).range(1..))]
-    pub clocks_per_pattern: u16,
-    /// ADC samples left out at the start of each pattern
-    #[arg(long, value_name = "N", default_value_t = 2)]
-    pub blanked: u16,
+    /// ADC clocks (8 ns) that each pattern is shown: 5 is 25 MHz [default: the camera description's, the paper's camera 5]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub clocks_per_pattern: Option<u16>,
+    /// ADC samples left out at the start of each pattern [default: the camera description's, the paper's camera 2]
+    #[arg(long, value_name = "N")]
+    pub blanked: Option<u16>,
     /// Show patterns alone, without their complements
     #[arg(long)]
     pub non_differential: bool,
@@ -114,10 +146,12 @@ pub struct SetupArgs {
 
 impl SetupArgs {
     /// The setup asked for.
-    pub fn setup(&self, default_sampling: f64) -> Result<MeasurementSetup> {
+    pub fn setup(&self, default_sampling: f64, model: &ModelArgs) -> Result<MeasurementSetup> {
         let order = parse_order(&self.order)?;
-        if self.blanked >= self.clocks_per_pattern {
-            let (blanked, clocks) = (self.blanked, self.clocks_per_pattern);
+        let readout = model.read()?.readout;
+        let clocks = self.clocks_per_pattern.unwrap_or(readout.clocks_per_pattern as u16);
+        let blanked = self.blanked.unwrap_or(readout.blanked as u16);
+        if blanked >= clocks {
             return Err(Usage(format!(
                 "--blanked is {blanked}, expected less than the {clocks} of --clocks-per-pattern"
             ))
@@ -128,8 +162,7 @@ impl SetupArgs {
         let mut setup = MeasurementSetup::new(&order, sampling)
             .with_context(|| format!("--order {}", self.order))?;
         setup.sweeps = self.sweeps;
-        setup.clocks_per_pattern = self.clocks_per_pattern;
-        setup.blanked = self.blanked;
+        setup = setup.timed(clocks, blanked);
         setup.differential = !self.non_differential;
         Ok(setup)
     }

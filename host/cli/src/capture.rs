@@ -88,7 +88,7 @@ struct Report<'r> {
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let mut setup = args.setup.setup(1.0)?;
+    let mut setup = args.setup.setup(1.0, &args.scene.model)?;
     setup.adc_latency = args.calibration.adc_latency();
     let target = target(args)?;
     let stop = stop_on_signal()?;
@@ -115,7 +115,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let path = captured.recording.as_deref().unwrap_or(Path::new(""));
     let code = report(args, session.identity(), path, &choice, &captured)?;
     if let Some(out) = args.picture.as_ref().filter(|_| captured.counters.received > 0) {
-        let warnings = super::reconstruct::picture(&captured, path, out)?;
+        let warnings =
+            super::reconstruct::picture(&captured, choice.flat_field.clone(), path, out)?;
         for warning in warnings {
             print::complain(format_args!("warning: {warning}"));
         }

@@ -2,7 +2,7 @@
 
 mod enhanced;
 
-use super::camera::{Rain, SceneArgs, SetupArgs};
+use super::camera::{SceneArgs, SetupArgs};
 use super::method::{self, MethodArgs, Solved, solve};
 use super::print;
 use super::reconstruct::enlarged_png;
@@ -18,7 +18,10 @@ use nirspi::imaging::{Quality, compare};
 use nirspi::picture::{Panel, Range, SideBySide};
 use nirspi::scene::SceneMap;
 use nirspi::session::CameraIdentity;
-use nirspi::virtual_camera::{VirtualOptics, calibrate_against_white, shoot};
+use nirspi::virtual_camera::{
+    VirtualOptics, calibrate_against_white, flat_field_against_white, shoot,
+};
+use nirspi_optics::rain::Rainfall;
 use nirspi_recon::{Image, Side, reconstruct};
 use serde::Serialize;
 use std::ops::ControlFlow;
@@ -38,10 +41,9 @@ pub struct Args {
     scene: SceneArgs,
     #[command(flatten)]
     setup: SetupArgs,
-    /// Frames to capture; their sum is reconstructed
-    #[arg(long, value_name = "N", default_value_t = DEFAULT_FRAMES,
-          value_parser = clap::value_parser!(u32).range(1..=100_000))]
-    frames: u32,
+    /// Frames to capture; their sum is reconstructed [default: the camera description's, the paper's camera 244]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    frames: Option<u32>,
     #[command(flatten)]
     method: MethodArgs,
     /// Folder for the results
@@ -52,9 +54,6 @@ pub struct Args {
     json: bool,
 }
 
-/// As many single sweeps as the paper's camera fits into its 20 ms before reconstruction (Table 1, T_pre).
-const DEFAULT_FRAMES: u32 = 244;
-
 /// Half of the patterns: enough to read a letter, and few enough to see what OMP adds.
 const DEFAULT_SAMPLING: f64 = 0.5;
 
@@ -62,8 +61,10 @@ const DEFAULT_SAMPLING: f64 = 0.5;
 struct Report {
     scene: String,
     simulated: bool,
+    /// The camera description's name.
+    camera_model: String,
     distance_m: f64,
-    rain: Rain,
+    rain: Rainfall,
     seed: u64,
     field_mm: f64,
     defocus_mm: f64,
@@ -77,6 +78,8 @@ struct Report {
     frames: LossCounters,
     adc_latency_clocks: u8,
     leak_taps: Vec<f64>,
+    /// LEDs that the flat field found dead, as row and column; `null` where all LEDs are alike and none was measured.
+    dead_leds: Option<Vec<[u8; 2]>>,
     /// Plain inverse transform, leak left in.
     raw: Quality,
     /// The result, against what a perfect 32 x 32 camera would see.
@@ -103,14 +106,18 @@ struct Images {
 
 pub fn run(args: &Args) -> Result<ExitCode> {
     args.method.check()?;
-    let setup = args.setup.setup(DEFAULT_SAMPLING)?;
+    let setup = args.setup.setup(DEFAULT_SAMPLING, &args.scene.model)?;
     let mut times = StageTimes::default();
     let (map, optics) = times.time("scene", || args.scene.optics())?;
     // Latency belongs to the camera, not to what it looks at now.
     let seed = args.scene.seed;
+    let model = optics.camera_model();
+    let frames = args.frames.unwrap_or(model.readout.sweeps_per_picture);
     let settling = times.time("calibrate", || calibrate_against_white(&optics, seed))?;
+    let flat_field =
+        times.time("flat_field", || flat_field_against_white(&optics, &settling, seed))?;
 
-    let bar = ProgressBar::new(u64::from(args.frames)).with_style(
+    let bar = ProgressBar::new(u64::from(frames)).with_style(
         ProgressStyle::with_template("capture {bar:30} {pos}/{len} frames")
             .unwrap_or_else(|_| ProgressStyle::default_bar()),
     );
@@ -118,8 +125,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         bar.set_position(progress.counters.total());
         ControlFlow::Continue(())
     };
-    let shot = times
-        .time("capture", || shoot(&optics, setup, &settling, args.frames, seed, &mut watch))?;
+    let shot =
+        times.time("capture", || shoot(&optics, setup, &settling, frames, seed, &mut watch))?;
     bar.finish_and_clear();
     let camera = shot.session.identity().clone();
     let captured = &shot.capture;
@@ -133,6 +140,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let measurements = shot.measurements()?;
     let Solved { image, report: method } =
         times.time("reconstruct", || solve(&args.method, &measurements))?;
+    let image = match &flat_field {
+        Some(flat) => flat.correct(&image),
+        None => image,
+    };
 
     let truth = optics.focused_footprint()?.weights().to_vec();
     let raw = compare(&raw, &truth)?;
@@ -156,8 +167,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let report = Report {
         scene: map.name.clone(),
         simulated: true,
-        distance_m: args.scene.distance_m,
-        rain: args.scene.rain,
+        camera_model: model.name.clone(),
+        distance_m: optics.distance_mm() / 1e3,
+        rain: args.scene.rainfall(model),
         seed: args.scene.seed,
         field_mm: optics.field_mm(),
         defocus_mm: optics.blur_mm(),
@@ -167,10 +179,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         patterns: setup.rows.len(),
         order: setup.order.clone(),
         differential: setup.differential,
-        acquisition_ms: setup.frame_ns() * f64::from(args.frames) * 1e-6,
+        acquisition_ms: setup.frame_ns() * f64::from(frames) * 1e-6,
         frames: captured.counters,
         adc_latency_clocks: setup.adc_latency,
         leak_taps: leak.map(|leak| leak.taps().to_vec()).unwrap_or_default(),
+        dead_leds: flat_field.map(|flat| flat.dead_leds().to_vec()),
         raw: raw.quality,
         reconstruction: fitted.quality,
         quality_note: "against the scene on the 32 x 32 LED grid without defocus, after the gain and offset of \
@@ -327,7 +340,11 @@ fn capitalised(text: &str) -> String {
 fn say(args: &Args, report: &Report) -> Result<()> {
     print::line(format_args!(
         "{} at {} m, {} frames of {} patterns in {:.1} ms of (simulated) light",
-        report.scene, report.distance_m, args.frames, report.patterns, report.acquisition_ms
+        report.scene,
+        report.distance_m,
+        report.frames.received,
+        report.patterns,
+        report.acquisition_ms
     ))?;
     print::line(format_args!("frames: {}", report.frames))?;
     print::line(format_args!("raw:    {}", quality_line(&report.raw)))?;

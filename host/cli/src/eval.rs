@@ -6,15 +6,16 @@ mod table1;
 mod table3;
 mod table4;
 
-use super::camera::Rain;
+use super::camera::{ModelArgs, Rain};
 use super::report::to_json;
 use super::{print, range};
 use anyhow::Result;
 use clap::{Args, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
 use nirspi::files::output::OutputDir;
+use nirspi::virtual_camera::CameraModel;
 use nirspi_eval::pictures::ANCESTRAL_STEPS;
-use nirspi_eval::shot::{self, FRAMES};
+use nirspi_eval::shot;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -59,18 +60,21 @@ struct ExposureArgs {
     /// Rain, as in the paper's Table 2
     #[arg(long, value_enum, default_value_t = Rain::Heavy)]
     rain: Rain,
-    /// Differential sweeps summed into a picture; 244 are 20 ms
-    #[arg(long, value_name = "N", default_value_t = FRAMES,
-          value_parser = clap::value_parser!(u32).range(1..=100_000))]
-    frames: u32,
+    /// Differential sweeps summed into a picture [default: the camera description's; the paper's camera 244, which are 20 ms]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    frames: Option<u32>,
+    #[command(flatten)]
+    model: ModelArgs,
     /// Seed of the first picture
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
 }
 
 impl ExposureArgs {
-    fn exposure(&self) -> shot::Exposure {
-        shot::Exposure { rain: self.rain.rainfall(), frames: self.frames, seed: self.seed }
+    /// The exposure of this camera.
+    fn exposure(&self, camera: &CameraModel) -> shot::Exposure {
+        let frames = self.frames.unwrap_or(camera.readout.sweeps_per_picture);
+        shot::Exposure { rain: self.rain.rainfall(), frames, seed: self.seed }
     }
 }
 

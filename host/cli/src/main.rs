@@ -8,6 +8,7 @@ mod bench;
 mod calibrate;
 mod calibration;
 mod camera;
+mod camera_model;
 mod capture;
 mod deblur;
 mod demo;
@@ -59,6 +60,7 @@ enum Command {
     Devices(devices::Args),
     Info(info::Args),
     Calibrate(calibrate::Args),
+    CameraModel(camera_model::Args),
     Selftest(selftest::Args),
     Flash(flash::Args),
     Gateware(gateware::Args),
@@ -113,6 +115,7 @@ fn main() -> ExitCode {
         Command::Virtual(args) => serve_virtual::run(&args),
         Command::Devices(args) => devices::run(&args),
         Command::Info(args) => info::run(&args),
+        Command::CameraModel(args) => camera_model::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
         Command::Selftest(args) => selftest::run(&args),
         Command::Flash(args) => flash::run(&args),

@@ -1,5 +1,6 @@
 //! `nirspi rain`: what rain, fog and single drops do to light; the photon budget; the rain simulator's uniformity.
 
+use super::camera::ModelArgs;
 use super::{Usage, print, refused};
 use crate::report::to_json;
 use anyhow::{Context, Result};
@@ -76,6 +77,8 @@ pub struct Args {
         allow_negative_numbers = true
     )]
     exposure_us: f64,
+    #[command(flatten)]
+    model: ModelArgs,
     /// Christiansen's uniformity coefficient of collected volumes: a CSV file whose last column holds them
     #[arg(long, value_name = "FILE", group = "what")]
     uniformity: Option<PathBuf>,
@@ -155,6 +158,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             reflectance: args.reflectance,
             exposure_us: args.exposure_us,
             wavelengths_nm: args.wavelengths_nm.clone(),
+            camera: args.model.read()?,
         };
         let report = budget::budget(&settings).map_err(refused)?;
         say_or_json(&report, args.json, say_budget)?;

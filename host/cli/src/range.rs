@@ -1,10 +1,12 @@
 //! `nirspi range`: how far the camera sees in rain (the paper's Algorithm 2 and Table 2).
 
+use super::camera::ModelArgs;
 use super::{print, refused};
 use crate::report::to_json;
 use anyhow::Result;
 use nirspi::files::image::encode_rgb;
 use nirspi::files::output::OutputDir;
+use nirspi_eval::camera_model::{resolution_chart, snr_chart};
 use nirspi_eval::range::{Report, Settings, chart, exposure_chart, range};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -13,8 +15,8 @@ use std::process::ExitCode;
 ///
 /// The farthest distance at which one pixel of a white target still has the signal-to-noise ratio asked for, from the
 /// photon budget and the rain's Mie extinction; Algorithm 2 as printed, and with the gain of all patterns; the exposure
-/// that a pixel needs against distance; and what would have to be assumed to agree with the paper. Writes range.png,
-/// exposure.png and range.json with --out.
+/// that a pixel needs against distance; and what would have to be assumed to agree with the paper. With --out, the same as
+/// charts, and how fine and how well this camera and the shipped ones see.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi range\n\
@@ -30,7 +32,10 @@ pub struct Args {
     #[arg(long, value_name = "US,...", value_delimiter = ',', default_values_t = [8.0, 25.0],
           allow_negative_numbers = true)]
     exposures_us: Vec<f64>,
-    /// Folder for range.png, exposure.png and range.json
+    #[command(flatten)]
+    model: ModelArgs,
+    /// Folder for range.png, exposure.png, range.json, and the finest line (resolution.png) and SNR (snr.png) against
+    /// distance of this camera and the shipped ones
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Print the report as JSON
@@ -43,12 +48,16 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         snr: args.snr,
         reflectance: args.reflectance,
         exposures_us: args.exposures_us.clone(),
+        camera: args.model.read()?,
     };
     let report = range(&settings).map_err(refused)?;
     if let Some(out) = &args.out {
         let mut out = OutputDir::create(out)?;
         out.write("range.png", &encode_rgb(&chart(&settings)?.render()))?;
         out.write("exposure.png", &encode_rgb(&exposure_chart(&settings)?.render()))?;
+        let camera = &settings.camera;
+        out.write("resolution.png", &encode_rgb(&resolution_chart(camera)?.render()))?;
+        out.write("snr.png", &encode_rgb(&snr_chart(camera)?.render()))?;
         out.write("range.json", to_json(&report)?.as_bytes())?;
         out.commit()?;
     }
@@ -62,8 +71,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 
 fn say(args: &Args, report: &Report) -> Result<()> {
     print::line(format_args!(
-        "range for an SNR of {} a pixel, target of reflectance {} (simulated)",
-        report.snr, report.reflectance
+        "range of camera {} for an SNR of {} a pixel, target of reflectance {} (simulated)",
+        report.camera, report.snr, report.reflectance
     ))?;
     print::line(
         "rain    mm/h  drop mm  exposure us   paper m    physics m  dry air m  as printed m  with gain m",
@@ -104,7 +113,7 @@ fn say(args: &Args, report: &Report) -> Result<()> {
     }
     if let Some(out) = &args.out {
         print::line(format_args!(
-            "wrote range.png, exposure.png and range.json to {}",
+            "wrote range.png, exposure.png, resolution.png, snr.png and range.json to {}",
             out.display()
         ))?;
     }

@@ -12,6 +12,7 @@ use super::{Usage, print};
 use anyhow::{Context, Result, bail};
 use indicatif::ProgressBar;
 use nirspi::account::LossCounters;
+use nirspi::calibration::KeptFlatField;
 use nirspi::capture::Capture;
 use nirspi::files::image::{encode_grey, encode_rgb};
 use nirspi::files::npy;
@@ -130,7 +131,12 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 }
 
 /// The frames of a capture as one image, enhanced; the folder `out` gets what `reconstruct --enhance` writes.
-pub fn picture(captured: &Capture, recording: &Path, out: &Path) -> Result<Vec<String>> {
+pub fn picture(
+    captured: &Capture,
+    flat_field: Option<KeptFlatField>,
+    recording: &Path,
+    out: &Path,
+) -> Result<Vec<String>> {
     let request = Request {
         input: recording,
         method: &MethodArgs::default(),
@@ -139,7 +145,11 @@ pub fn picture(captured: &Capture, recording: &Path, out: &Path) -> Result<Vec<S
         enhance: true,
         out,
     };
-    let report = one_image(&request, Source::of_capture(captured)?, StageTimes::default())?;
+    let mut source = Source::of_capture(captured)?;
+    if let Some(kept) = flat_field {
+        source = source.with_flat_field(kept);
+    }
+    let report = one_image(&request, source, StageTimes::default())?;
     Ok(report.enhancement.map(|enhancement| enhancement.warnings).unwrap_or_default())
 }
 
@@ -162,6 +172,7 @@ fn one_image(request: &Request<'_>, source: Source, mut times: StageTimes) -> Re
     let solved = times.time("reconstruct", || spinning(|| solve(request.method, &used)));
     let Solved { image, report: method } = solved?;
     check_finite(request.input, &image)?;
+    let image = source.flattened(image);
 
     let side = image.side().pixels();
     let correlation = source.reference.as_ref().and_then(|reference| {

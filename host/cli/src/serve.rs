@@ -62,7 +62,7 @@ pub struct Args {
 
 pub fn run(args: Args) -> Result<ExitCode> {
     args.method.check()?;
-    let mut setup = args.setup.setup(DEFAULT_SAMPLING)?;
+    let mut setup = args.setup.setup(DEFAULT_SAMPLING, &args.scene.model)?;
     setup.adc_latency = args.calibration.adc_latency();
     let listener = TcpListener::bind(&args.listen)
         .with_context(|| format!("--listen {}: cannot listen there", args.listen))?;
@@ -89,6 +89,7 @@ pub fn run(args: Args) -> Result<ExitCode> {
     let camera = CameraSource {
         address: args.camera.to_string(),
         setup: setup.clone(),
+        model: args.scene.model.read()?,
         connect: connect(args, setup),
     };
     let ledger = serve(listener, camera, connected, imaging, settings, &stop)?;
@@ -117,8 +118,8 @@ fn prepared(
     args: &CalibrationArgs,
     setup: &MeasurementSetup,
 ) -> Result<Connected> {
-    let Choice { calibration, note, .. } = args.choose(setup, session.identity())?;
-    Ok(Connected { session, calibration, note })
+    let Choice { calibration, note, flat_field, .. } = args.choose(setup, session.identity())?;
+    Ok(Connected { session, calibration, note, flat_field })
 }
 
 /// How to find the camera again.

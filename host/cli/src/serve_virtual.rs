@@ -45,7 +45,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             .with_context(|| format!("--tunnel {address}: no emulator there"))?;
         print::line(format_args!(
             "FPGA behind {address}: {} at {} m (simulated), seed {}",
-            map.name, args.scene.distance_m, args.scene.seed
+            map.name,
+            optics.distance_mm() / 1e3,
+            args.scene.seed
         ))?;
         serve_tunnel(line, &mut optics.fpga(args.scene.seed)?, &AtomicBool::new(true))
             .with_context(|| format!("--tunnel {address}"))?;
@@ -58,7 +60,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let address = listener.local_addr()?;
     print::line(format_args!(
         "virtual camera on tcp:{address}: {} at {} m (simulated), seed {}",
-        map.name, args.scene.distance_m, args.scene.seed
+        map.name,
+        optics.distance_mm() / 1e3,
+        args.scene.seed
     ))?;
     let options = ServeOptions { once: args.once, drop_when_full: args.drop_when_full };
     let fpga = optics.fpga(args.scene.seed)?;

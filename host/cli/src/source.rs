@@ -20,12 +20,15 @@ pub struct SourceArgs {
     /// Leave the settling leak of a recording as it is
     #[arg(long)]
     pub keep_leak: bool,
+    /// Leave the pattern of unequal LEDs of a recording as it is, though a flat field is kept for its camera
+    #[arg(long)]
+    pub no_flat_field: bool,
 }
 
 impl SourceArgs {
     fn options(&self) -> SourceOptions {
-        let Self { index, non_differential, keep_leak, .. } = *self;
-        SourceOptions { index, non_differential, keep_leak }
+        let Self { index, non_differential, keep_leak, no_flat_field, .. } = *self;
+        SourceOptions { index, non_differential, keep_leak, no_flat_field }
     }
 
     /// Reads one.

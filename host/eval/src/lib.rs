@@ -13,6 +13,7 @@
 //! | [`sampling`] | how good are images of a part of the patterns, by order, basis and method? |
 //! | [`sets`] | how alike are two stacks of images, one by one and as sets? |
 //! | [`mod@bench`] | how many frames a second does this machine reconstruct and enhance? |
+//! | [`camera_model`] | what follows from a camera description? |
 //! | [`rain`] | what does rain do to light, and to the photon budget of a pixel? |
 //! | [`train`] | how does a network learn from a user's characters? |
 //!
@@ -21,6 +22,7 @@
 
 pub mod bench;
 pub mod bootstrap;
+pub mod camera_model;
 pub mod estimate;
 pub mod pictures;
 pub mod quality;

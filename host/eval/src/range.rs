@@ -2,6 +2,7 @@
 
 use crate::error::{EvalError, Result};
 use nirspi::picture::{Axis, Chart, Line};
+use nirspi_optics::CameraModel;
 use nirspi_optics::pixel::{Instrument, PixelBudget, PixelError};
 use nirspi_optics::rain::blur::DEEPEST_OPTICAL_DEPTH;
 use nirspi_optics::rain::{Drops, PaperRain, Weather};
@@ -20,6 +21,8 @@ pub struct Settings {
     pub reflectance: f64,
     /// Exposures of a pattern.
     pub exposures_us: Vec<f64>,
+    /// Which camera.
+    pub camera: CameraModel,
 }
 
 /// A row of the paper's Table 2.
@@ -42,6 +45,8 @@ const Z_MAX_MM: f64 = 3000.0;
 pub struct Report {
     /// Always true.
     pub simulated: bool,
+    /// The camera description's name.
+    pub camera: String,
     /// Signal of a pixel over its noise at the farthest distance.
     pub snr: f64,
     /// Reflectance of the target.
@@ -111,7 +116,7 @@ pub fn range(settings: &Settings) -> Result<Report> {
     if !(snr.is_finite() && snr > 0.0) {
         return Err(EvalError::setting("snr", snr, "more than 0"));
     }
-    let Air { instrument, dry, wet } = Air::new()?;
+    let Air { instrument, dry, wet } = Air::new(&settings.camera)?;
     let mut rows = Vec::new();
     for (row, weather) in TABLE_2.iter().zip(&wet) {
         for &exposure_us in &settings.exposures_us {
@@ -136,6 +141,7 @@ pub fn range(settings: &Settings) -> Result<Report> {
     }
     Ok(Report {
         simulated: true,
+        camera: settings.camera.name.clone(),
         snr,
         reflectance,
         assumptions: assumptions(&instrument),
@@ -174,8 +180,8 @@ struct Air {
 }
 
 impl Air {
-    fn new() -> Result<Self> {
-        let instrument = Instrument::default();
+    fn new(camera: &CameraModel) -> Result<Self> {
+        let instrument = camera.instrument();
         let nm = instrument.budget.wavelength_nm;
         let weather = |drops| Ok(Weather::new(drops, nm, Water::Segelstein)?);
         let wet = TABLE_2.iter().map(|row| weather(row.rain.drops()?)).collect::<Result<_>>()?;
@@ -191,14 +197,18 @@ fn assumptions(instrument: &Instrument) -> Vec<String> {
             b.led_power_mw, b.led_half_angle_deg, instrument.projector.aperture_mm
         ),
         format!(
-            "detector of {} mm (FGA015), numerical aperture {}, efficiency {}",
+            "detector of {} mm, numerical aperture {}, efficiency {:.2}",
             b.detector_diameter_mm, b.detector_na, b.quantum_efficiency
         ),
         format!(
-            "{:.0} electrons rms of amplifier noise a sample, {} klx of daylight behind a {} nm filter",
-            instrument.chain.amplifier_noise_electrons, b.ambient_klx, b.filter_width_nm
+            "{:.0} electrons rms of amplifier noise a sample, {} klx ({}) behind a {} nm filter",
+            instrument.chain.amplifier_noise_electrons, b.ambient_klx, b.light, b.filter_width_nm
         ),
-        "an exposure is the time that one pattern's light is summed; 1024 patterns and their complements".to_owned(),
+        format!(
+            "an exposure is the time that one pattern is shown, and its complement as long, of 1024 patterns; {} of {} \
+             samples are left out while the LEDs settle",
+            instrument.readout.blanked, instrument.readout.clocks_per_pattern
+        ),
         format!(
             "as printed: Z_max of {} m (paper, 2.A), so that its answer is a multiple of {} m",
             Z_MAX_MM * 1e-3,
@@ -279,7 +289,7 @@ fn reading(
 /// # Errors
 /// None: the air is the paper's.
 pub fn chart(settings: &Settings) -> Result<Chart> {
-    let Air { instrument, dry, wet } = &Air::new()?;
+    let Air { instrument, dry, wet } = &Air::new(&settings.camera)?;
     let fog = Drops::fog(10.0, 0.1)
         .and_then(|fog| Weather::new(fog, instrument.budget.wavelength_nm, Water::Segelstein));
     let mut kinds: Vec<(&str, &Weather, bool)> = vec![("dry", dry, false)];
@@ -330,7 +340,7 @@ pub fn chart(settings: &Settings) -> Result<Chart> {
 /// # Errors
 /// [`EvalError::is_setting`] for a reflectance out of range.
 pub fn exposure_chart(settings: &Settings) -> Result<Chart> {
-    let Air { instrument, wet, .. } = &Air::new()?;
+    let Air { instrument, wet, .. } = &Air::new(&settings.camera)?;
     let Some(heavy) = wet.last() else { return Ok(exposures_against_distance(Vec::new())) };
     let along = || (0..=60).map(|i| 0.2 * 10_f64.powf(f64::from(i) / 60.0));
     let line = |times: f64, colour| -> Result<Line> {
@@ -380,7 +390,8 @@ mod tests {
     use super::*;
 
     fn settings(exposures_us: &[f64]) -> Settings {
-        Settings { snr: 1.0, reflectance: 1.0, exposures_us: exposures_us.to_vec() }
+        let camera = CameraModel::default();
+        Settings { snr: 1.0, reflectance: 1.0, exposures_us: exposures_us.to_vec(), camera }
     }
 
     #[test]

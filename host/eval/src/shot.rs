@@ -2,13 +2,13 @@
 
 use crate::DISTANCES_M;
 use crate::error::{EvalError, Result};
-use nirspi::calibration::Settling;
+use nirspi::calibration::{FlatField, Settling};
 use nirspi::capture::{Capture, Progress};
 use nirspi::setup::MeasurementSetup;
 use nirspi::virtual_camera::{self, VirtualOptics};
 use nirspi_optics::rain::{Drops, Rainfall};
 use nirspi_optics::visible::VisibleCamera;
-use nirspi_optics::{Projector, Scene};
+use nirspi_optics::{CameraModel, Scene};
 use nirspi_recon::{Image, Order, Side, reconstruct};
 use std::ops::ControlFlow;
 
@@ -34,9 +34,6 @@ pub struct Exposure {
     pub seed: u64,
 }
 
-/// All 1024 patterns and their complements: 244 times is 20 ms, the paper's T_pre (Table 1).
-pub const FRAMES: u32 = 244;
-
 /// What both cameras give of one scene.
 pub struct Shots {
     /// What a perfect camera of 32 x 32 pixels would see.
@@ -49,10 +46,12 @@ pub struct Shots {
     pub vis: Image,
 }
 
-/// The virtual camera with its latency and settling, measured once against a white sheet.
+/// The virtual camera with its latency, settling and flat field, measured once against a white sheet.
 #[derive(Debug, Clone)]
 pub struct CalibratedCamera {
+    model: CameraModel,
     settling: Settling,
+    flat_field: Option<FlatField>,
 }
 
 impl CalibratedCamera {
@@ -60,10 +59,18 @@ impl CalibratedCamera {
     ///
     /// # Errors
     /// A burst that cannot be measured.
-    pub fn new(seed: u64) -> Result<Self> {
+    pub fn new(model: &CameraModel, seed: u64) -> Result<Self> {
         // The scene does not matter: the sheet takes its place.
-        let optics = VirtualOptics::new(Scene::white(), 1e3 * DISTANCES_M[0])?;
-        Ok(Self { settling: virtual_camera::calibrate_against_white(&optics, seed)? })
+        let optics = VirtualOptics::of(model, Scene::white(), 1e3 * DISTANCES_M[0])?;
+        let settling = virtual_camera::calibrate_against_white(&optics, seed)?;
+        let flat_field = virtual_camera::flat_field_against_white(&optics, &settling, seed)?;
+        Ok(Self { model: model.clone(), settling, flat_field })
+    }
+
+    /// Which camera it is.
+    #[must_use]
+    pub fn model(&self) -> &CameraModel {
+        &self.model
     }
 
     /// Takes `scene` with this camera and with an ordinary one.
@@ -75,23 +82,28 @@ impl CalibratedCamera {
         let drops = conditions.rain.drops()?;
         let visible = VisibleCamera::default().picture(
             &scene,
-            &Projector::default(),
+            &self.model.projector(),
             distance_mm,
             drops.as_ref().unwrap_or(&Drops::none()),
             seed,
         )?;
-        let mut optics = VirtualOptics::new(scene, distance_mm)?;
+        let mut optics = VirtualOptics::of(&self.model, scene, distance_mm)?;
         if let Some(drops) = drops {
             optics = optics.in_rain(drops)?;
         }
-        let setup = MeasurementSetup::new(&Order::Natural, 1.0)?;
+        let setup = optics.setup(&Order::Natural, 1.0)?;
         let captured = self.record(&optics, setup, conditions.frames, seed)?;
         let measurements =
             captured.integrated.measurements(&captured.setup, captured.settling.as_ref(), false)?;
+        let image = reconstruct::hadamard(&measurements);
+        let nir_spi = match &self.flat_field {
+            Some(flat) => flat.correct(&image),
+            None => image,
+        };
         Ok(Shots {
             truth: optics.focused_footprint()?.weights().to_vec(),
             truth_fine: optics.focused(64),
-            nir_spi: reconstruct::hadamard(&measurements),
+            nir_spi,
             vis: Image::new(Side::INSTRUMENT, visible),
         })
     }
@@ -134,11 +146,11 @@ mod tests {
 
     #[test]
     fn a_white_sheet_is_white_at_every_distance_though_it_gives_less_light() {
-        let camera = CalibratedCamera::new(1).unwrap();
+        let camera = CalibratedCamera::new(CameraModel::paper(), 1).unwrap();
         let at = |distance_m| Conditions { distance_m, ..CONDITIONS };
         let [near, far] = [0.3, 1.0].map(|m| camera.white_level(at(m), 1).unwrap());
         assert!(near > 0.0 && far > 0.0, "{near} {far}");
-        let field_mm = Projector::default().field_mm(300.0);
+        let field_mm = CameraModel::paper().projector().field_mm(300.0);
         let grey = Scene::new(vec![0.5], 1, field_mm).unwrap().with_surround(0.5).unwrap();
         let shots = camera.shoot(grey, at(0.3), 2).unwrap();
         let mean = |pixels: &[f32]| pixels.iter().sum::<f32>() / pixels.len() as f32;
@@ -149,7 +161,7 @@ mod tests {
 
     #[test]
     fn a_shot_follows_from_its_seed() {
-        let camera = CalibratedCamera::new(1).unwrap();
+        let camera = CalibratedCamera::new(CameraModel::paper(), 1).unwrap();
         let shot = |seed| {
             let scene = Scene::new(vec![0.2, 0.8, 0.8, 0.2], 2, 40.0).unwrap();
             camera.shoot(scene, CONDITIONS, seed).unwrap().nir_spi

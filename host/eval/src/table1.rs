@@ -121,7 +121,7 @@ pub fn table1(settings: &Settings, done: &dyn Fn()) -> Result<Report> {
     let side_mm = letter.side_mm.unwrap_or_else(|| Projector::default().field_mm(DISTANCE_M * 1e3));
     let scene = Scene::new(letter.reflectance, letter.size_px, side_mm)?;
     let optics = VirtualOptics::new(scene, DISTANCE_M * 1e3)?;
-    let camera = CalibratedCamera::new(seed)?;
+    let camera = CalibratedCamera::new(optics.camera_model(), seed)?;
     let captured = camera.record(&optics, setup, sweeps, seed)?;
     let conditions = Conditions { distance_m: DISTANCE_M, rain: Rainfall::None, frames: sweeps };
     let white = camera.white_level(conditions, seed)?;

@@ -24,7 +24,7 @@ use nirspi_nets::images::Images;
 use nirspi_nets::metrics::{CharacterJudge, Judged as Features};
 use nirspi_nets::{Weights, upscale_2x};
 use nirspi_optics::rain::Rainfall;
-use nirspi_optics::{Projector, Scene};
+use nirspi_optics::{CameraModel, Scene};
 use nirspi_recon::{Image, Side};
 use rayon::prelude::*;
 use rows::{Measured, Statistics};
@@ -36,6 +36,8 @@ use std::path::{Path, PathBuf};
 pub struct Settings {
     /// Scenes at each distance, at least two.
     pub scenes: u32,
+    /// Which camera takes the pictures.
+    pub camera: CameraModel,
     /// How they are taken.
     pub exposure: Exposure,
     /// Steps of the ancestral sampler, the paper's own; 0 leaves its row out. The paper has 500.
@@ -73,6 +75,8 @@ const PAPER: [Paper; 5] = [
 pub struct Report {
     /// Always true.
     pub simulated: bool,
+    /// The camera description's name.
+    pub camera: String,
     /// `none`, `light` or `heavy`.
     pub rain: &'static str,
     /// Scenes at each distance.
@@ -123,7 +127,7 @@ impl Table {
         let enhancers = Enhancers::new(settings.ancestral_steps)?;
         let typefaces = typefaces::all();
         let exposure = settings.exposure;
-        let camera = CalibratedCamera::new(exposure.seed)?;
+        let camera = CalibratedCamera::new(&settings.camera, exposure.seed)?;
         let jobs: Vec<(f64, u32)> =
             DISTANCES_M.iter().flat_map(|&m| (0..settings.scenes).map(move |i| (m, i))).collect();
         let taken: Vec<Taken> = jobs
@@ -164,13 +168,14 @@ impl Table {
         let (rows, differences) = (statistics.rows()?, statistics.differences());
         Ok(Report {
             simulated: true,
+            camera: settings.camera.name.clone(),
             rain: settings.exposure.rain.name(),
             scenes: settings.scenes,
             typefaces: typefaces.iter().map(Typeface::name).collect(),
             ancestral_steps: settings.ancestral_steps,
             frames: settings.exposure.frames,
             seed: settings.exposure.seed,
-            reading: reading(&rows, &differences, settings.inception.is_some()),
+            reading: reading(&settings.camera, &rows, &differences, settings.inception.is_some()),
             rows,
             differences,
         })
@@ -343,15 +348,21 @@ fn take(
 ) -> Result<Shots> {
     let (character, face) = of_scene(i as usize, typefaces.len());
     let map = SceneMap::letter(&typefaces[face], char::from(CHARACTERS[character]), 256)?;
-    let side_mm = map.side_mm.unwrap_or_else(|| Projector::default().field_mm(distance_m * 1e3));
+    let side_mm =
+        map.side_mm.unwrap_or_else(|| camera.model().projector().field_mm(distance_m * 1e3));
     let scene = Scene::new(map.reflectance, map.size_px, side_mm)?;
     let conditions = Conditions { distance_m, rain, frames: exposure.frames };
     camera.shoot(scene, conditions, exposure.seed.wrapping_add(u64::from(i)))
 }
 
 /// What rain does here, and what it cannot do.
-fn reading(rows: &[Row], differences: &[Difference], inception: bool) -> Vec<String> {
-    let projector = Projector::default();
+fn reading(
+    camera: &CameraModel,
+    rows: &[Row],
+    differences: &[Difference],
+    inception: bool,
+) -> Vec<String> {
+    let projector = camera.projector();
     let blur =
         DISTANCES_M.map(|m| format!("{:.0} mm at {m} m", projector.blur_mm(m * 1e3))).join(", ");
     let mut lines: Vec<String> = rows
@@ -378,7 +389,10 @@ fn reading(rows: &[Row], differences: &[Difference], inception: bool) -> Vec<Str
             d.ssim.text(3)
         )
     }));
-    lines.push(format!("NIR-SPI: the lens is focused at 0.3 m; its defocus disc ({blur}) and noise decide, not rain"));
+    lines.push(format!(
+        "NIR-SPI: the lens is focused at {} m; its defocus disc ({blur}) and noise decide, not rain",
+        projector.focus_distance_mm / 1e3
+    ));
     lines.extend([
         "intervals: glyphs and typefaces drawn again (bootstrap of two crossed factors); all: mean of the three distances, \
          which are fixed and not drawn"
@@ -411,7 +425,9 @@ mod tests {
     #[test]
     fn rain_costs_quality_and_the_same_scenes_come_again() {
         let exposure = Exposure { rain: Rainfall::Heavy, frames: 4, seed: 1 };
-        let settings = Settings { scenes: 2, exposure, ancestral_steps: 2, inception: None };
+        let camera = CameraModel::default();
+        let settings =
+            Settings { scenes: 2, camera, exposure, ancestral_steps: 2, inception: None };
         let report = || {
             let table = Table::take(settings.clone(), &|| {}).unwrap();
             serde_json::to_value(table.report().unwrap()).unwrap()

@@ -14,7 +14,7 @@ use nirspi::picture::{Axis, Chart, Line};
 use nirspi::resolution::{
     bar_scene, bar_transfer, disc_transfer, edge_mtf, edge_scene, line_width_px, square_transfer,
 };
-use nirspi_optics::{Projector, Scene};
+use nirspi_optics::{CameraModel, Projector, Scene};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -23,6 +23,8 @@ use serde::Serialize;
 pub struct Settings {
     /// Pictures of the edge at each distance, at least 10.
     pub scenes: u32,
+    /// Which camera takes the pictures.
+    pub camera: CameraModel,
     /// How they are taken.
     pub exposure: Exposure,
     /// Steps of the ancestral sampler, the paper's own; 0 leaves its row out. The paper has 500.
@@ -67,8 +69,8 @@ const PAPER: [(Picture, [f64; 3]); 5] = [
 ];
 
 /// What the figures rest on.
-fn reading() -> Vec<String> {
-    let projector = Projector::default();
+fn reading(camera: &CameraModel) -> Vec<String> {
+    let projector = camera.projector();
     let of = |length: fn(&Projector, f64) -> f64| {
         DISTANCES_M.map(|m| format!("{:.1}", length(&projector, m * 1e3))).join(", ")
     };
@@ -94,6 +96,8 @@ fn reading() -> Vec<String> {
 pub struct Report {
     /// Always true.
     pub simulated: bool,
+    /// The camera description's name.
+    pub camera: String,
     /// `none`, `light` or `heavy`.
     pub rain: &'static str,
     /// Pictures of the edge at each distance.
@@ -147,12 +151,12 @@ struct Pictures {
 /// # Errors
 /// A capture that fails.
 pub fn table4(settings: &Settings, done: &(dyn Fn() + Sync)) -> Result<Report> {
-    let Settings { scenes, exposure, ancestral_steps } = settings;
+    let Settings { scenes, exposure, ancestral_steps, .. } = settings;
     let enhancers = Enhancers::new(*ancestral_steps)?;
     let images = || {
         PAPER.into_iter().filter(|(image, _)| *ancestral_steps > 0 || *image != Picture::Ancestral)
     };
-    let camera = CalibratedCamera::new(exposure.seed)?;
+    let camera = CalibratedCamera::new(&settings.camera, exposure.seed)?;
     let mut rows = Vec::new();
     for (k, distance_m) in DISTANCES_M.into_iter().enumerate() {
         let take_all = |scene: &[f32], count: u32| -> Result<Vec<Shots>> {
@@ -178,19 +182,21 @@ pub fn table4(settings: &Settings, done: &(dyn Fn() + Sync)) -> Result<Report> {
             let (side, edges) = of(&edges)?;
             let bar_pictures = bars.iter().map(|shots| Ok(of(shots)?.1)).collect::<Result<_>>()?;
             let pictures = Pictures { side, edges, bars: bar_pictures };
-            rows.push(row(image, distance_m, paper_mm[k], &pictures, &bars));
+            let lens = settings.camera.projector();
+            rows.push(row(&lens, image, distance_m, paper_mm[k], &pictures, &bars));
         }
     }
     rows.sort_by_key(|row: &Row| PAPER.iter().position(|(image, _)| *image == row.image));
     Ok(Report {
         simulated: true,
+        camera: settings.camera.name.clone(),
         rain: exposure.rain.name(),
         scenes: *scenes,
         frames: exposure.frames,
         seed: exposure.seed,
         ancestral_steps: *ancestral_steps,
         rows,
-        reading: reading(),
+        reading: reading(&settings.camera),
     })
 }
 
@@ -202,7 +208,7 @@ fn take(
     distance_m: f64,
     i: u64,
 ) -> Result<Shots> {
-    let field_mm = Projector::default().field_mm(distance_m * 1e3);
+    let field_mm = camera.model().projector().field_mm(distance_m * 1e3);
     let scene = wide_scene(reflectance, field_mm)?;
     let conditions = Conditions { distance_m, rain: exposure.rain, frames: exposure.frames };
     camera.shoot(scene, conditions, exposure.seed.wrapping_add(i))
@@ -262,13 +268,13 @@ fn sum(pictures: &[Vec<f32>]) -> Vec<f32> {
 }
 
 fn row(
+    projector: &Projector,
     image: Picture,
     distance_m: f64,
     paper_mm: f64,
     pictures: &Pictures,
     bars: &[Vec<Shots>],
 ) -> Row {
-    let projector = Projector::default();
     let field_mm = projector.field_mm(distance_m * 1e3);
     let side = pictures.side;
     let pixel_mm = field_mm / side as f64;
@@ -299,7 +305,7 @@ fn row(
         Some(Estimate::jackknife(line(&whole)?, &left?))
     };
     let lens_mm = (image != Picture::Vis).then(|| {
-        [0.5, 0.1].map(|level| lens_line_mm(&projector, distance_m * 1e3, pixel_mm, level))
+        [0.5, 0.1].map(|level| lens_line_mm(projector, distance_m * 1e3, pixel_mm, level))
     });
     let unresolved =
         contrasts.iter().rposition(|&contrast| contrast.is_nan() || contrast < RESOLVED);
@@ -384,7 +390,8 @@ mod tests {
     #[test]
     fn a_perfect_picture_resolves_lines_as_wide_as_a_pixel() {
         let pictures = perfect(32);
-        let row = row(Picture::NirSpi, 0.3, 5.0, &pictures, &truths(&pictures));
+        let row =
+            row(&Projector::default(), Picture::NirSpi, 0.3, 5.0, &pictures, &truths(&pictures));
         assert!((row.pixel_mm - Projector::default().field_mm(300.0) / 32.0).abs() < 1e-9);
         let mtf50 = row.mtf50_mm.unwrap();
         assert!((mtf50.mean / row.pixel_mm - 1.0).abs() < 1e-9, "{row:?}");
@@ -402,7 +409,7 @@ mod tests {
         };
         let bars = sharp.bars.iter().map(|bars| blurred(bars)).collect();
         let pictures = Pictures { side: 32, edges: blurred(&sharp.edges), bars };
-        let row = row(Picture::NirSpi, 0.3, 5.0, &pictures, &truths(&sharp));
+        let row = row(&Projector::default(), Picture::NirSpi, 0.3, 5.0, &pictures, &truths(&sharp));
         // A Gaussian of sigma s passes half at sqrt(ln 2 / 2) / (pi s) cycles a pixel; a line is half a cycle.
         let expected = std::f64::consts::PI * 2.0 / (2.0_f64.ln() / 2.0).sqrt() / 2.0;
         let found = row.mtf50_mm.unwrap().mean / row.pixel_mm;

@@ -19,6 +19,8 @@ const MEMO_LIMIT: usize = 4 * LEDS;
 pub struct LedArray {
     /// Electrons per ADC sample from each LED when lit, row-major.
     electrons: Vec<f32>,
+    /// Light of each LED over that of an ideal one; none where all are ideal.
+    gains: Option<Vec<f32>>,
     /// What each row gives where its line is 0 and where it is 1, by the column lines: a sweep has few of those.
     rows: HashMap<u32, [[f64; 2]; SIDE]>,
     /// Bit r of the rows in the high half, bit c of the columns in the low half.
@@ -35,10 +37,22 @@ impl LedArray {
             footprint.weights().iter().map(|&w| (f64::from(w) * electrons_per_led) as f32);
         Self {
             electrons: electrons.collect(),
+            gains: None,
             rows: HashMap::new(),
             memo: HashMap::new(),
             last: None,
         }
+    }
+
+    /// The same array made of real LEDs: `gains` is the light of each over that of an ideal one, 32 x 32, row-major
+    /// ([`crate::CameraModel::led_gains`]).
+    #[must_use]
+    pub fn with_gains(mut self, gains: &[f32]) -> Self {
+        for (electrons, gain) in self.electrons.iter_mut().zip(gains) {
+            *electrons *= gain;
+        }
+        self.gains = gains.iter().any(|&gain| gain != 1.0).then(|| gains.to_vec());
+        self
     }
 
     /// The same array once something has changed in front of it: `reflectance` is what each LED's spot now sees, 32 x
@@ -46,6 +60,9 @@ impl LedArray {
     pub fn relight(&mut self, reflectance: &[f32], electrons_per_led: f64) {
         for (electrons, &seen) in self.electrons.iter_mut().zip(reflectance) {
             *electrons = (f64::from(seen) * electrons_per_led) as f32;
+        }
+        for (electrons, gain) in self.electrons.iter_mut().zip(self.gains.iter().flatten()) {
+            *electrons *= gain;
         }
         self.rows.clear();
         self.memo.clear();

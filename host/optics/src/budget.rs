@@ -6,19 +6,21 @@
 //! the whole field this, not the lens, is what limits the light.
 //!
 //! One LED on a white target, one sample:
-//! `P_LED * projected * A / (pi D^2) * T * QE * t / (h c / lambda)`, with a Lambertian target facing
-//! the camera, so that its on-axis radiance is `rho / pi` times its irradiance.
+//! `P_LED * projected * A / (pi D^2) * F T * QE * t / (h c / lambda)`, with a Lambertian target facing
+//! the camera, so that its on-axis radiance is `rho / pi` times its irradiance. F is the share of the
+//! LED's spectrum that the filter passes, T that of the glass.
 //!
-//! Daylight takes the same way back: `E * filter * rho / pi * A W * T * QE * t / (h c / lambda)`.
+//! Daylight takes the same way back: `E * rho / pi * A W * T * QE * t / (h c / lambda)`, with E the
+//! irradiance within the filter: daylight is not charged the LED's spectral loss.
 //! The detector's field of view is taken to be the projected field, the smallest that loses nothing.
 
 use std::f64::consts::PI;
 
 use thiserror::Error;
 
-use crate::daylight::{DaylightError, irradiance_w_per_m2};
-use crate::instrument::{SAMPLE_NS, WAVELENGTH_NM};
-use crate::{LEDS, Projector, ProjectorError};
+use crate::daylight::DaylightError;
+use crate::lamp::LightSource;
+use crate::{CameraModel, LEDS, Projector, ProjectorError};
 
 /// Planck constant in J s (SI, exact).
 const PLANCK_J_S: f64 = 6.626_070_15e-34;
@@ -47,35 +49,34 @@ pub enum BudgetError {
     Daylight(#[from] DaylightError),
 }
 
-/// What the budget rests on. Each default says where it comes from.
+/// What the budget rests on: the part of a [`CameraModel`] that it needs. The default is the paper's camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BudgetSettings {
-    /// Optical power of one lit LED, in mW. A packaged 1550 nm LED gives a few mW at its full
-    /// current; with half of the array lit, 4 mW of light from about 60 mW of electricity each is
-    /// what the paper's 45 W (Fig. 2) leaves room for.
+    /// Optical power of one lit LED, in mW.
     pub led_power_mw: f64,
-    /// Angle off its axis at which an LED's radiant intensity has halved, in degrees. 5 degrees is
-    /// what the etendue of a 0.15 mm chip allows a 2 mm emitter: asin(0.15 / 2) = 4.3 degrees. A
-    /// field lens on the array points every LED at the projection lens.
+    /// Angle off its axis at which an LED's radiant intensity has halved, in degrees. A field lens on
+    /// the array points every LED at the projection lens.
     pub led_half_angle_deg: f64,
-    /// Wavelength, in nm: [`WAVELENGTH_NM`].
+    /// Width of the LED's spectrum at half height, in nm; Gaussian.
+    pub led_spectrum_nm: f64,
+    /// Wavelength, in nm.
     pub wavelength_nm: f64,
-    /// Diameter of the collecting optics, in mm: a 25 mm lens, the common size. With the default
-    /// detector the etendue leaves 1.7 mm of it in use; a larger detector uses more.
+    /// Diameter of the collecting optics, in mm. A small detector uses less of it than there is.
     pub collector_aperture_mm: f64,
-    /// Diameter of the detector's active area, in mm: Thorlabs FGA015 (paper, 2.B).
+    /// Diameter of the detector's active area, in mm.
     pub detector_diameter_mm: f64,
     /// Numerical aperture of the light on the detector. 1 is a compound parabolic concentrator; an
     /// aspheric lens reaches about 0.6, and 0.36 times the light.
     pub detector_na: f64,
-    /// Transmission of everything from LED to detector: 0.76 of the LED's spectrum (100 nm wide at
-    /// half height, Gaussian) passes the filter, and 0.8 is left for the glass.
-    pub optics_transmission: f64,
-    /// Electrons per photon: 0.9 (paper, 2.D).
+    /// Share of the light that the glass from LED to detector lets through.
+    pub glass_transmission: f64,
+    /// Electrons per photon.
     pub quantum_efficiency: f64,
-    /// Time of one ADC sample, in ns: [`SAMPLE_NS`].
+    /// Time of one ADC sample, in ns.
     pub sample_ns: f64,
-    /// Illuminance on the target, in klx: 15, half-cloudy (paper, Tables 3 and 4).
+    /// Where the light on the target comes from, besides the LEDs'.
+    pub light: LightSource,
+    /// Illuminance on the target, in klx.
     pub ambient_klx: f64,
     /// Width of the collector's band-pass filter around the wavelength, in nm.
     pub filter_width_nm: f64,
@@ -83,26 +84,21 @@ pub struct BudgetSettings {
 
 impl Default for BudgetSettings {
     fn default() -> Self {
-        Self {
-            led_power_mw: 4.0,
-            led_half_angle_deg: 5.0,
-            wavelength_nm: WAVELENGTH_NM,
-            collector_aperture_mm: 25.0,
-            detector_diameter_mm: 0.15,
-            detector_na: 1.0,
-            optics_transmission: 0.6,
-            quantum_efficiency: 0.9,
-            sample_ns: SAMPLE_NS,
-            ambient_klx: 15.0,
-            filter_width_nm: 100.0,
-        }
+        CameraModel::paper().budget_settings()
     }
+}
+
+/// Energy of a photon, in J.
+#[must_use]
+pub fn photon_j(wavelength_nm: f64) -> f64 {
+    PLANCK_J_S * LIGHT_M_PER_S / (wavelength_nm * 1e-9)
 }
 
 impl BudgetSettings {
     fn validate(&self) -> Result<(), BudgetError> {
         let positive = [
             ("wavelength_nm", self.wavelength_nm),
+            ("led_spectrum_nm", self.led_spectrum_nm),
             ("collector_aperture_mm", self.collector_aperture_mm),
             ("detector_diameter_mm", self.detector_diameter_mm),
             ("sample_ns", self.sample_ns),
@@ -120,7 +116,7 @@ impl BudgetSettings {
         }
         let fractions = [
             ("detector_na", self.detector_na),
-            ("optics_transmission", self.optics_transmission),
+            ("glass_transmission", self.glass_transmission),
             ("quantum_efficiency", self.quantum_efficiency),
         ];
         for (name, value) in fractions {
@@ -131,22 +127,40 @@ impl BudgetSettings {
         ensure((0.1..=60.0).contains(&angle), "led_half_angle_deg", angle, expected)
     }
 
-    /// Electrons in one sample from one watt on the collector.
+    /// Electrons in one sample from one watt within the filter on the collector.
     fn electrons_per_watt(&self) -> f64 {
-        self.optics_transmission * self.quantum_efficiency * self.sample_ns * 1e-9 / self.photon_j()
+        self.glass_transmission * self.quantum_efficiency * self.sample_ns * 1e-9
+            / photon_j(self.wavelength_nm)
     }
 
-    fn photon_j(&self) -> f64 {
-        PLANCK_J_S * LIGHT_M_PER_S / (self.wavelength_nm * 1e-9)
+    /// Share of the LED's spectrum that the filter passes: `erf(sqrt(ln 2) W / FWHM)` of a Gaussian.
+    #[must_use]
+    pub fn filtered_fraction(&self) -> f64 {
+        erf(2.0_f64.ln().sqrt() * self.filter_width_nm / self.led_spectrum_nm)
     }
 
     /// Part of an LED's light that enters the projection lens: for an intensity cos^m of the angle,
     /// `1 - cos^(m+1)` of the angle that the lens's edge is seen under.
-    fn projected_fraction(&self, projector: &Projector) -> f64 {
+    #[must_use]
+    pub fn projected_fraction(&self, projector: &Projector) -> f64 {
         let m = 0.5_f64.ln() / self.led_half_angle_deg.to_radians().cos().ln();
         let edge = (projector.aperture_mm / 2.0 / projector.array_distance_mm()).atan();
         1.0 - edge.cos().powf(m + 1.0)
     }
+}
+
+/// The error function of `x` at least 0, by its series (Abramowitz and Stegun, 7.1.6), to rounding.
+fn erf(x: f64) -> f64 {
+    if x > 6.0 {
+        return 1.0;
+    }
+    let (mut term, mut sum, mut n) = (x, x, 0.0);
+    while term > 1e-17 * sum {
+        n += 1.0;
+        term *= 2.0 * x * x / (2.0 * n + 1.0);
+        sum += term;
+    }
+    2.0 / PI.sqrt() * (-x * x).exp() * sum
 }
 
 fn ensure(
@@ -180,8 +194,10 @@ pub struct BudgetTerms {
     pub projected: f64,
     /// Part of a white target's light that the collector takes: its area over `pi D^2`.
     pub collected: f64,
-    /// Part of that which filter and glass let through.
-    pub transmitted: f64,
+    /// Part of the LED's spectrum that the filter passes.
+    pub filtered: f64,
+    /// Part of the light within the filter that the glass lets through.
+    pub glass: f64,
     /// Energy of a photon, in J.
     pub photon_j: f64,
     /// Electrons per photon.
@@ -219,9 +235,11 @@ impl Budget {
         let on_target_w = settings.led_power_mw * 1e-3 * settings.projected_fraction(projector);
         let collected = area_m2 / (PI * (distance_mm * 1e-3).powi(2));
         let (nm, width_nm) = (settings.wavelength_nm, settings.filter_width_nm);
-        let daylight_w_per_m2 = irradiance_w_per_m2(settings.ambient_klx, nm, width_nm)?;
+        let klx = settings.ambient_klx;
+        let daylight_w_per_m2 = settings.light.irradiance_w_per_m2(klx, nm, width_nm)?;
+        let filtered = settings.filtered_fraction();
         Ok(Self {
-            electrons_per_led: on_target_w * collected * settings.electrons_per_watt(),
+            electrons_per_led: on_target_w * collected * filtered * settings.electrons_per_watt(),
             ambient_electrons_white: daylight_w_per_m2 / PI
                 * area_m2
                 * field_sr
@@ -231,8 +249,9 @@ impl Budget {
                 led_power_mw: settings.led_power_mw,
                 projected: settings.projected_fraction(projector),
                 collected,
-                transmitted: settings.optics_transmission,
-                photon_j: settings.photon_j(),
+                filtered,
+                glass: settings.glass_transmission,
+                photon_j: photon_j(nm),
                 quantum_efficiency: settings.quantum_efficiency,
                 sample_ns: settings.sample_ns,
                 daylight_w_per_m2,
@@ -245,7 +264,7 @@ impl Budget {
     #[must_use]
     pub fn daylight_on_detector_w(&self, irradiance_w_per_m2: f64) -> f64 {
         let area_m2 = PI / 4.0 * (self.effective_collector_mm * 1e-3).powi(2);
-        irradiance_w_per_m2 / PI * area_m2 * self.terms.field_sr * self.terms.transmitted
+        irradiance_w_per_m2 / PI * area_m2 * self.terms.field_sr * self.terms.glass
     }
 
     /// Daylight from a field of this mean reflectance ([`crate::Footprint::mean`]), in electrons
@@ -311,6 +330,18 @@ mod tests {
     }
 
     #[test]
+    fn a_narrower_filter_costs_the_led_its_flanks_and_daylight_its_width() {
+        let with =
+            |filter_width_nm| at(300.0, BudgetSettings { filter_width_nm, ..Default::default() });
+        let share = with(50.0).electrons_per_led / with(100.0).electrons_per_led;
+        // erf(0.41628) = 0.44394 and erf(0.83255) = 0.76096 (tables).
+        assert!((share - 0.44394 / 0.76096).abs() < 1e-4, "{share}");
+        let daylight = with(50.0).ambient_electrons_white / with(100.0).ambient_electrons_white;
+        assert!((0.45..0.55).contains(&daylight), "{daylight}");
+        assert!((with(1e3 - 800.0).terms.filtered - 0.98140).abs() < 1e-3);
+    }
+
+    #[test]
     fn a_lambertian_led_sends_the_sine_squared_of_the_edge_angle_into_the_lens() {
         let settings = BudgetSettings { led_half_angle_deg: 60.0, ..Default::default() };
         let edge = (10.0_f64 / 600.0).atan();
@@ -319,15 +350,15 @@ mod tests {
 
     #[test]
     fn the_default_budget_agrees_with_one_worked_by_hand() {
-        // P 4 mW; m = ln 0.5 / ln cos 5 deg = 181.81; edge atan(1/60): 2.510 % projected;
-        // A = pi/4 (1.6617 mm)^2 = 2.1686 mm^2; A / pi D^2 = 7.670e-6; T QE = 0.54;
+        // P 4 mW; m = ln 0.5 / ln cos 5 deg = 181.81; edge atan(1/60): 2.5067 % projected;
+        // A = pi/4 (1.6617 mm)^2 = 2.1686 mm^2; A / pi D^2 = 7.670e-6; filter 0.7610, glass 0.79, QE 0.9: 0.5411;
         // 8 ns / 0.80 eV (1.2816e-19 J) = 6.2423e10 per W.
         let budget = at(300.0, Default::default());
-        assert!((budget.electrons_per_led / 25.96 - 1.0).abs() < 2e-3, "{budget:?}");
-        // 15 klx / 109.6 klx * 25.536 W/m^2 = 3.4949 W/m^2; / pi * A * 0.0256 sr = 6.1761e-8 W.
-        assert!((budget.ambient_electrons_white / 2081.8 - 1.0).abs() < 2e-3, "{budget:?}");
+        assert!((budget.electrons_per_led / 25.98 - 1.0).abs() < 1e-3, "{budget:?}");
+        // 15 klx / 109.6 klx * 25.536 W/m^2 = 3.4949 W/m^2; / pi * A * 0.0256 sr = 6.1761e-8 W; glass and QE 0.711.
+        assert!((budget.ambient_electrons_white / 2741.1 - 1.0).abs() < 1e-3, "{budget:?}");
         let on_detector_w = budget.daylight_on_detector_w(budget.terms.daylight_w_per_m2);
-        assert!((on_detector_w / (0.6 * 6.1761e-8) - 1.0).abs() < 2e-3, "{on_detector_w}");
+        assert!((on_detector_w / (0.79 * 6.1761e-8) - 1.0).abs() < 1e-3, "{on_detector_w}");
     }
 
     #[test]
@@ -346,7 +377,8 @@ mod tests {
             ("collector_aperture_mm", BudgetSettings { collector_aperture_mm: 0.0, ..default }),
             ("detector_diameter_mm", BudgetSettings { detector_diameter_mm: -0.1, ..default }),
             ("detector_na", BudgetSettings { detector_na: 1.1, ..default }),
-            ("optics_transmission", BudgetSettings { optics_transmission: 2.0, ..default }),
+            ("led_spectrum_nm", BudgetSettings { led_spectrum_nm: 0.0, ..default }),
+            ("glass_transmission", BudgetSettings { glass_transmission: 2.0, ..default }),
             ("quantum_efficiency", BudgetSettings { quantum_efficiency: 0.0, ..default }),
             ("sample_ns", BudgetSettings { sample_ns: f64::INFINITY, ..default }),
             ("ambient_klx", BudgetSettings { ambient_klx: f64::NAN, ..default }),

@@ -5,21 +5,27 @@
 //!
 //! In order: the LEDs follow their lines with a first-order edge; daylight is added; the amplifier's
 //! pole smooths both; shot noise (variance = electrons collected in the sample) and amplifier noise
-//! are added; the ADC divides by its gain, adds its baseline, rounds and clips; its pipeline delays
-//! the result. Light is constant within a clock, and a sample is the signal at the clock's end, so
+//! are added; the ADC divides by its gain, adds its baseline and its own noise, rounds and clips; its
+//! pipeline delays the result. Light is constant within a clock, and a sample is the signal at the clock's end, so
 //! the two poles are stepped exactly, not approximated.
 //!
-//! Simplifications: one Gaussian stands for shot and amplifier noise (where electrons are too few
-//! for that, amplifier noise outweighs them), and noise is white from sample to sample: a 60 MHz
-//! pole leaves a correlation of exp(-3.0) = 5 % between neighbours 8 ns apart.
+//! # Noise
+//! Shot noise and amplifier noise are white before the amplifier's pole and pass the noise bandwidth `pi/2 B` of it.
+//! A sample has the variance `pi B t * electrons` of shot noise (`2 q I` over that bandwidth, in electrons of a sample of
+//! length t), and neighbours are correlated by `exp(-2 pi B t)`: 5 % at 60 MHz and 8 ns, 37 % at 20 MHz. The ADC's noise and
+//! its rounding are independent from sample to sample. [`ChainSettings::variance_of_mean`] says what a window of
+//! samples keeps of all that.
+//!
+//! Simplification: one Gaussian stands for shot and amplifier noise. Where electrons are too few for that, amplifier
+//! noise outweighs them.
 
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 use thiserror::Error;
 
-use crate::Budget;
-use crate::instrument::{FULL_SCALE_COUNTS, MAX_ADC_LATENCY_CLOCKS, SAMPLE_NS};
+use crate::instrument::{FULL_SCALE_COUNTS, MAX_ADC_LATENCY_CLOCKS};
+use crate::{Budget, CameraModel};
 
 /// The steps of the switchable amplifier gain, in electrons per ADC count: two steps an octave.
 pub const GAINS_ELECTRONS_PER_COUNT: [f64; 32] = gains();
@@ -73,15 +79,18 @@ pub struct ChainSettings {
     pub sample_ns: f64,
     /// LED rise and fall time from 10 to 90 %, in ns. Fast 1550 nm LEDs take 10 to 20.
     pub led_edge_ns: f64,
-    /// Amplifier bandwidth at -3 dB, in Hz; infinite for none. The default is just under the ADC's
-    /// Nyquist frequency.
+    /// Amplifier bandwidth at -3 dB, in Hz; infinite for none.
     pub amplifier_bandwidth_hz: f64,
     /// Daylight, in electrons per sample ([`Budget::ambient_electrons`]).
     pub ambient_electrons: f64,
+    /// Dark current of the photodiode, in electrons per sample.
+    pub dark_electrons: f64,
     /// Whether photons arrive at random.
     pub shot_noise: bool,
     /// Noise of the amplifier, in electrons rms per sample ([`amplifier_noise_electrons`]).
     pub amplifier_noise_electrons: f64,
+    /// Noise of the ADC beyond rounding, in counts rms ([`adc_noise_counts`]).
+    pub adc_noise_counts: f64,
     /// Gain: electrons per ADC count ([`ChainSettings::auto_gain`]).
     pub electrons_per_count: f64,
     /// What the ADC reads in the dark: room for noise to go below it.
@@ -92,24 +101,7 @@ pub struct ChainSettings {
 
 impl Default for ChainSettings {
     fn default() -> Self {
-        let (sample_ns, amplifier_bandwidth_hz) = (SAMPLE_NS, 60e6);
-        Self {
-            sample_ns,
-            led_edge_ns: 15.0,
-            amplifier_bandwidth_hz,
-            ambient_electrons: 0.0,
-            shot_noise: true,
-            // 1.1 pA/sqrt(Hz): 0.87 from a 22 kilohm feedback resistor (sqrt(4kT/R)) and about 0.65
-            // from 1 nV/sqrt(Hz) of a fast op-amp across 3 pF at 60 MHz (2 pi B C e / sqrt(3)).
-            amplifier_noise_electrons: amplifier_noise_electrons(
-                1.1,
-                amplifier_bandwidth_hz,
-                sample_ns,
-            ),
-            electrons_per_count: 3.0,
-            adc_offset_counts: 2048,
-            adc_latency_clocks: 6,
-        }
+        CameraModel::paper().chain_settings()
     }
 }
 
@@ -122,6 +114,13 @@ pub fn amplifier_noise_electrons(pa_per_sqrt_hz: f64, bandwidth_hz: f64, sample_
     amperes * sample_ns * 1e-9 / ELECTRON_C
 }
 
+/// Noise of an ADC beyond rounding, in counts rms, from its signal-to-noise ratio for a full-scale sine.
+#[must_use]
+pub fn adc_noise_counts(snr_db: f64) -> f64 {
+    let full_scale_rms = (f64::from(FULL_SCALE_COUNTS) + 1.0) / 2.0 / 2.0_f64.sqrt();
+    full_scale_rms / 10_f64.powf(snr_db / 20.0)
+}
+
 impl ChainSettings {
     /// A receiver without noise, settling, daylight or latency, one electron a count: the exact
     /// chain that integration tests compare with.
@@ -131,11 +130,21 @@ impl ChainSettings {
             led_edge_ns: 0.0,
             amplifier_bandwidth_hz: f64::INFINITY,
             ambient_electrons: 0.0,
-            shot_noise: false,
-            amplifier_noise_electrons: 0.0,
             electrons_per_count: 1.0,
             adc_latency_clocks: 0,
-            ..Self::default()
+            ..Self::default().noiseless()
+        }
+    }
+
+    /// The same receiver without any noise or dark current: LEDs and amplifier as slow as they are.
+    #[must_use]
+    pub fn noiseless(self) -> Self {
+        Self {
+            dark_electrons: 0.0,
+            shot_noise: false,
+            amplifier_noise_electrons: 0.0,
+            adc_noise_counts: 0.0,
+            ..self
         }
     }
 
@@ -159,10 +168,70 @@ impl ChainSettings {
             .ok_or(ChainError::NoGain { brightest_electrons, noise_electrons })
     }
 
-    /// Noise of one sample that collected `electrons`, in electrons rms.
+    /// Noise of one sample of `electrons` of light, before the ADC, in electrons rms.
     fn noise_electrons(&self, electrons: f64) -> f64 {
-        let shot = if self.shot_noise { electrons } else { 0.0 };
-        (shot + self.amplifier_noise_electrons.powi(2)).sqrt()
+        (self.shot_variance(electrons) + self.amplifier_noise_electrons.powi(2)).sqrt()
+    }
+
+    /// Variance of the shot noise of one sample of `electrons` of light and the dark current, in electrons squared.
+    #[must_use]
+    pub fn shot_variance(&self, electrons: f64) -> f64 {
+        if self.shot_noise {
+            self.shot_bandwidth() * (electrons.max(0.0) + self.dark_electrons)
+        } else {
+            0.0
+        }
+    }
+
+    /// Shot noise's variance over the electrons of a sample: `pi B t` for a pole; 1 without one, where a sample counts the
+    /// electrons that arrive in it.
+    fn shot_bandwidth(&self) -> f64 {
+        if self.amplifier_bandwidth_hz.is_finite() {
+            std::f64::consts::PI * self.amplifier_bandwidth_hz * self.sample_ns * 1e-9
+        } else {
+            1.0
+        }
+    }
+
+    /// Correlation of the pole's noise in neighbouring samples: `exp(-2 pi B t)`.
+    #[must_use]
+    pub fn noise_correlation(&self) -> f64 {
+        decay(self.sample_ns, self.amplifier_tau_ns())
+    }
+
+    /// Variance of the mean of `window` neighbouring samples of `electrons` of light, in electrons squared: the pole's
+    /// noise with its correlation, the ADC's noise and rounding without.
+    #[must_use]
+    pub fn variance_of_mean(&self, electrons: f64, window: u32) -> f64 {
+        let samples = f64::from(window.max(1));
+        let pole = self.shot_variance(electrons) + self.amplifier_noise_electrons.powi(2);
+        let adc = self.adc_noise_counts.powi(2) + 1.0 / 12.0;
+        (pole * self.correlated(window) + adc * self.electrons_per_count.powi(2)) / samples
+    }
+
+    /// By how much correlation raises the variance of a sum of `window` samples:
+    /// `1 + 2 sum over k of (1 - k / window) rho^k`.
+    #[must_use]
+    pub fn correlated(&self, window: u32) -> f64 {
+        let (samples, rho) = (f64::from(window.max(1)), self.noise_correlation());
+        let (mut sum, mut power) = (1.0, 1.0);
+        for lag in 1..window {
+            power *= rho;
+            if power < 1e-12 {
+                break;
+            }
+            sum += 2.0 * (1.0 - f64::from(lag) / samples) * power;
+        }
+        sum
+    }
+
+    /// Mean of what the samples of a pattern show of it, once `blanked` of its `clocks` are left out: its own share of
+    /// the light, 1 if LEDs and amplifier have settled.
+    #[must_use]
+    pub fn own_share(&self, clocks: u32, blanked: u32) -> f64 {
+        let window = blanked.min(clocks.saturating_sub(1))..clocks.max(1);
+        let samples = f64::from(window.end - window.start);
+        window.map(|n| self.settling(n)).sum::<f64>() / samples
     }
 
     /// Part of a step of light that sample `n` after it shows: 0 is the clock in which the lines
@@ -193,7 +262,9 @@ impl ChainSettings {
         let not_negative = [
             ("led_edge_ns", self.led_edge_ns),
             ("ambient_electrons", self.ambient_electrons),
+            ("dark_electrons", self.dark_electrons),
             ("amplifier_noise_electrons", self.amplifier_noise_electrons),
+            ("adc_noise_counts", self.adc_noise_counts),
         ];
         for (name, value) in not_negative {
             ensure(value.is_finite() && value >= 0.0, name, value, "0 or more")?;
@@ -261,8 +332,13 @@ pub struct Chain {
     counts_per_electron: f64,
     offset_counts: f64,
     amplifier_variance: f64,
+    shot_bandwidth: f64,
+    noise_correlation: f64,
+    /// Share of the pole's noise variance that is new in each sample.
+    fresh: f64,
     led_electrons: f64,
     amplified_electrons: f64,
+    noise_electrons: f64,
     rng: Pcg64Mcg,
     pipeline: [AdcSample; MAX_ADC_LATENCY_CLOCKS as usize],
     pipeline_at: usize,
@@ -286,13 +362,17 @@ impl Chain {
             counts_per_electron: settings.electrons_per_count.recip(),
             offset_counts: f64::from(settings.adc_offset_counts),
             amplifier_variance: settings.amplifier_noise_electrons.powi(2),
+            shot_bandwidth: settings.shot_bandwidth(),
+            noise_correlation: settings.noise_correlation(),
+            fresh: 1.0 - settings.noise_correlation().powi(2),
             led_electrons: 0.0,
             amplified_electrons: 0.0,
+            noise_electrons: 0.0,
             rng: Pcg64Mcg::seed_from_u64(seed),
             pipeline: [AdcSample { counts: 0, over_range: false }; _],
             pipeline_at: 0,
         };
-        let dark = chain.convert(settings.ambient_electrons);
+        let dark = chain.convert(settings.ambient_electrons + settings.dark_electrons);
         chain.pipeline.fill(dark);
         Ok(chain)
     }
@@ -315,17 +395,27 @@ impl Chain {
             light + amplifier_off_by * self.amplifier_decay + led_off_by * self.led_into_amplifier;
         self.led_electrons = light + led_off_by * self.led_decay;
 
-        let electrons = self.amplified_electrons + self.settings.ambient_electrons;
-        let shot_variance = if self.settings.shot_noise { electrons.max(0.0) } else { 0.0 };
-        let variance = shot_variance + self.amplifier_variance;
-        let noise = if variance > 0.0 {
+        let steady = self.settings.ambient_electrons + self.settings.dark_electrons;
+        let electrons = self.amplified_electrons + steady;
+        let shot = if self.settings.shot_noise { electrons.max(0.0) } else { 0.0 };
+        let variance = self.shot_bandwidth * shot + self.amplifier_variance;
+        if variance > 0.0 {
             let normal: f64 = self.rng.sample(StandardNormal);
-            variance.sqrt() * normal
-        } else {
-            0.0
-        };
+            self.noise_electrons *= self.noise_correlation;
+            self.noise_electrons += (self.fresh * variance).sqrt() * normal;
+        }
+        let noise = self.noise_electrons + self.adc_noise();
         let converted = self.convert(electrons + noise);
         self.delay(converted)
+    }
+
+    /// The ADC's own noise, in electrons.
+    fn adc_noise(&mut self) -> f64 {
+        if self.settings.adc_noise_counts == 0.0 {
+            return 0.0;
+        }
+        let normal: f64 = self.rng.sample(StandardNormal);
+        self.settings.adc_noise_counts * self.settings.electrons_per_count * normal
     }
 
     fn convert(&self, electrons: f64) -> AdcSample {

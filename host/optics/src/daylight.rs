@@ -42,14 +42,14 @@ const SPECTRUM: [f64; 130] = [
 
 /// A filter that the table does not cover.
 #[derive(Debug, Clone, PartialEq, Error)]
-#[error(
-    "daylight: a filter from {low_nm} to {high_nm} nm, expected wavelengths within 400 to 1700 nm"
-)]
+#[error("daylight: a filter from {low_nm} to {high_nm} nm, expected wavelengths within {expected}")]
 pub struct DaylightError {
     /// Where the filter begins, in nm.
     pub low_nm: f64,
     /// Where it ends, in nm.
     pub high_nm: f64,
+    /// Where the light's spectrum is known.
+    pub expected: &'static str,
 }
 
 /// Irradiance in W/m^2 that `klx` of daylight has within a filter of `width_nm` around `wavelength_nm`.
@@ -63,7 +63,7 @@ pub fn irradiance_w_per_m2(
 ) -> Result<f64, DaylightError> {
     let (low_nm, high_nm) = (wavelength_nm - width_nm / 2.0, wavelength_nm + width_nm / 2.0);
     if !(WAVELENGTHS_NM.contains(&low_nm) && WAVELENGTHS_NM.contains(&high_nm)) {
-        return Err(DaylightError { low_nm, high_nm });
+        return Err(DaylightError { low_nm, high_nm, expected: "400 to 1700 nm" });
     }
     let overlap = |row: usize| {
         let start = WAVELENGTHS_NM.start() + STEP_NM * row as f64;
@@ -79,16 +79,9 @@ mod tests {
 
     #[test]
     fn the_spectrum_is_as_bright_as_it_says() {
-        // The luminosity function, two lobes of Wyman, Sloan and Shirley's fit.
-        let lobe = |nm: f64, mean: f64, below: f64, above: f64| {
-            let t = (nm - mean) * if nm < mean { below } else { above };
-            (-t * t / 2.0).exp()
-        };
-        let luminosity = |nm: f64| {
-            0.821 * lobe(nm, 568.8, 0.0213, 0.0247) + 0.286 * lobe(nm, 530.9, 0.0613, 0.0322)
-        };
         let middle = |row: usize| 405.0 + 10.0 * row as f64;
-        let weighted = SPECTRUM.iter().enumerate().map(|(row, e)| e * luminosity(middle(row)));
+        let weighted =
+            SPECTRUM.iter().enumerate().map(|(row, e)| e * crate::lamp::luminosity(middle(row)));
         let klx = 683.0 * STEP_NM * weighted.sum::<f64>() * 1e-3;
         assert!((klx / SPECTRUM_KLX - 1.0).abs() < 2e-3, "{klx}");
     }

@@ -1,7 +1,11 @@
-//! The time-of-flight sensor's view of a flat target: 8 x 8 zones, as the common 850 nm sensors give.
+//! The time-of-flight sensor: 8 x 8 zones at 940 nm (ST VL53L5CX and VL53L8CX), and where they lie in the camera's image.
 //!
 //! Law: a zone that has no distance reads 0, never a guess.
+//!
+//! The zones of such a sensor cover 45 x 45 degrees (63 degrees along the diagonal; ST UM3109), the camera's field some 3
+//! to 9 degrees: one to four zones see it, and the others see the wall beside the target. [`DepthGeometry`] says which.
 
+use crate::SIDE;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
@@ -68,9 +72,165 @@ impl SimulatedDepth {
     }
 }
 
+/// Where the zones of the sensor lie, seen from the camera.
+///
+/// The sensor looks along the projector's axis. Zone row 0 is at the top and column 0 at the left, as pixels are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DepthGeometry {
+    /// Angle that the 8 zones of a row, and of a column, cover.
+    pub fov_deg: f64,
+    /// Place of the sensor from the projector's axis: right, and down.
+    pub offset_mm: [f64; 2],
+}
+
+/// A depth map in the camera's image.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DepthView {
+    /// Distance of each pixel, 32 x 32, row-major; 0 where its zone has none.
+    pub pixels_mm: Vec<u16>,
+    /// Median of the zones that see the field; none if none of them has a distance.
+    pub median_mm: Option<u16>,
+    /// Zones that see the field and have a distance.
+    pub zones: usize,
+}
+
+impl DepthGeometry {
+    /// The zone, along one axis, that sees a point at `at_mm` from the projector's axis on a plane at `distance_mm`: a
+    /// pinhole camera, zones of equal width on a plane. Below 0 or from [`DEPTH_SIDE`] on: none.
+    fn zone(&self, at_mm: f64, offset_mm: f64, distance_mm: f64) -> f64 {
+        let half = (self.fov_deg.to_radians() / 2.0).tan();
+        let tangent = (at_mm - offset_mm) / distance_mm;
+        (tangent / half + 1.0) / 2.0 * DEPTH_SIDE as f64
+    }
+
+    /// The zones, along one axis, that see some of a field of `field_mm` on a plane at `distance_mm`.
+    fn zones_of_field(
+        &self,
+        axis: usize,
+        field_mm: f64,
+        distance_mm: f64,
+    ) -> std::ops::Range<usize> {
+        let offset_mm = self.offset_mm[axis];
+        let [from, to] = [-0.5, 0.5].map(|edge| self.zone(edge * field_mm, offset_mm, distance_mm));
+        // An edge that only touches a zone does not see it.
+        let last = DEPTH_SIDE as f64;
+        let from = (from + 1e-9).floor().clamp(0.0, last) as usize;
+        let to = (to - 1e-9).ceil().clamp(0.0, last) as usize;
+        from..to.max(from)
+    }
+
+    /// Puts a reading of 8 x 8 zones into the camera's image. `field_over_distance` is the side of the field over the
+    /// distance of the target ([`crate::Projector::field_over_distance`]).
+    ///
+    /// The sensor stands beside the projector, so that the zones that see the field depend on the target's distance: the
+    /// middle zones give a first one, and the zones found with it the next.
+    #[must_use]
+    pub fn view(&self, zones_mm: &[u16; DEPTH_ZONES], field_over_distance: f64) -> DepthView {
+        let middle = DEPTH_SIDE / 2 - 1..DEPTH_SIDE / 2 + 1;
+        let seen = |rows: std::ops::Range<usize>, columns: std::ops::Range<usize>| {
+            let mut seen: Vec<u16> = rows
+                .flat_map(|row| {
+                    columns.clone().map(move |column| zones_mm[row * DEPTH_SIDE + column])
+                })
+                .filter(|&mm| mm > 0)
+                .collect();
+            seen.sort_unstable();
+            seen
+        };
+        let median = |seen: &[u16]| seen.get(seen.len() / 2).copied();
+        let whole = || median(&seen(0..DEPTH_SIDE, 0..DEPTH_SIDE));
+        let mut nearest_guess = median(&seen(middle.clone(), middle)).or_else(whole);
+        let mut in_field = Vec::new();
+        for _ in 0..3 {
+            let Some(mm) = nearest_guess.map(f64::from) else { break };
+            let zones = |axis| self.zones_of_field(axis, field_over_distance * mm, mm);
+            in_field = seen(zones(1), zones(0));
+            nearest_guess = median(&in_field).or(nearest_guess);
+        }
+        let pixel_mm = |pixel: usize| {
+            let mm = f64::from(nearest_guess?);
+            let at = |i: usize| ((i as f64 + 0.5) / SIDE as f64 - 0.5) * field_over_distance * mm;
+            let column = self.zone(at(pixel % SIDE), self.offset_mm[0], mm);
+            let row = self.zone(at(pixel / SIDE), self.offset_mm[1], mm);
+            let inside = 0.0..DEPTH_SIDE as f64;
+            (inside.contains(&row) && inside.contains(&column))
+                .then(|| zones_mm[row as usize * DEPTH_SIDE + column as usize])
+        };
+        DepthView {
+            pixels_mm: (0..SIDE * SIDE).map(|pixel| pixel_mm(pixel).unwrap_or(0)).collect(),
+            median_mm: median(&in_field),
+            zones: in_field.len(),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{CameraModel, Projector};
+
+    /// A reading of a square target before a wall: a zone sees the target where its middle does.
+    fn before_a_wall(
+        geometry: &DepthGeometry,
+        target_mm: f64,
+        at_mm: u16,
+        wall_mm: u16,
+    ) -> [u16; DEPTH_ZONES] {
+        let half = (geometry.fov_deg.to_radians() / 2.0).tan();
+        let middle = |i: usize| ((i as f64 + 0.5) / 4.0 - 1.0) * half * f64::from(at_mm);
+        std::array::from_fn(|zone| {
+            let x = middle(zone % DEPTH_SIDE) + geometry.offset_mm[0];
+            let y = middle(zone / DEPTH_SIDE) + geometry.offset_mm[1];
+            let hit = x.abs().max(y.abs()) < target_mm / 2.0;
+            if hit { at_mm } else { wall_mm }
+        })
+    }
+
+    #[test]
+    fn the_wall_beside_the_target_is_not_taken_for_the_target() {
+        let geometry = CameraModel::paper().depth_geometry();
+        let field = Projector::default().field_over_distance();
+        // A sheet a little wider than the field; at 0.6 m a zone is 62 mm wide.
+        for at_mm in [300, 600, 1000] {
+            let sheet_mm = 1.6 * field * f64::from(at_mm) + 40.0;
+            let reading = before_a_wall(&geometry, sheet_mm, at_mm, 3000);
+            assert!(
+                reading.iter().filter(|&&mm| mm == 3000).count() > 32,
+                "most zones see the wall"
+            );
+            let view = geometry.view(&reading, field);
+            assert_eq!(view.median_mm, Some(at_mm), "{reading:?}");
+            assert!((1..=6).contains(&view.zones), "{view:?}");
+        }
+    }
+
+    #[test]
+    fn a_pixel_has_the_distance_of_the_zone_that_sees_it() {
+        // Zones numbered by their place; the sensor on the axis: the field lies on the middle four.
+        let reading: [u16; DEPTH_ZONES] = std::array::from_fn(|zone| 1000 + zone as u16);
+        let geometry = DepthGeometry { fov_deg: 45.0, offset_mm: [0.0, 0.0] };
+        let view = geometry.view(&reading, 0.16);
+        let at = |row: usize, column: usize| view.pixels_mm[row * SIDE + column] - 1000;
+        assert_eq!([at(0, 0), at(0, 31), at(31, 0), at(31, 31)], [27, 28, 35, 36]);
+        assert_eq!(view.zones, 4);
+        // A sensor to the left of the axis has the field in its right half.
+        let left = DepthGeometry { offset_mm: [-150.0, 0.0], ..geometry };
+        let view = left.view(&reading, 0.16);
+        assert_eq!(view.pixels_mm[0] - 1000, 28, "one zone farther to the right");
+    }
+
+    #[test]
+    fn zones_without_a_distance_give_none() {
+        let geometry = DepthGeometry { fov_deg: 45.0, offset_mm: [0.0, 0.0] };
+        let view = geometry.view(&[0; DEPTH_ZONES], 0.16);
+        assert_eq!((view.median_mm, view.zones), (None, 0));
+        assert!(view.pixels_mm.iter().all(|&mm| mm == 0));
+        let mut one = [0; DEPTH_ZONES];
+        one[27] = 500;
+        let view = geometry.view(&one, 0.16);
+        assert_eq!((view.median_mm, view.zones), (Some(500), 1));
+        assert_eq!(view.pixels_mm.iter().filter(|&&mm| mm == 500).count(), 16 * 16);
+    }
 
     #[test]
     fn invalid_zones_read_zero_and_the_others_the_distance() {

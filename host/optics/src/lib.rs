@@ -9,10 +9,11 @@
 //! | [`budget`] | watts, apertures, distance | electrons per ADC sample for one LED, and for daylight |
 //! | [`mod@array`] | 32 row and 32 column lines | electrons per ADC sample for the LEDs they light |
 //! | [`chain`] | electrons, one clock at a time | 14-bit ADC samples with noise, settling and latency |
-//! | [`daylight`] | kilolux, wavelength, filter | W/m^2 of daylight on the target |
-//! | [`depth`] | distance | an 8 x 8 time-of-flight reading |
+//! | [`daylight`], [`lamp`] | kilolux, wavelength, filter | W/m^2 of daylight or lamp light on the target |
+//! | [`depth`] | distance | an 8 x 8 time-of-flight reading, and its place in the image |
 //!
-//! [`instrument`] holds the numbers that every stage shares.
+//! [`camera`] holds every constant of a camera, read from TOML. [`instrument`] holds the numbers that the gateware and the
+//! protocol fix.
 //!
 //! What is between camera and target, and what follows from it:
 //!
@@ -24,6 +25,7 @@
 //! | [`range`] | all of these | how far the camera sees (the paper's Algorithm 2) |
 //! | [`rig`] | collected volumes, nozzles | uniformity of a rain simulator |
 //! | [`visible`] | scene, daylight, drops | what an ordinary camera sees |
+//! | [`safety`] | camera description | what an eye before the camera receives |
 //!
 //! Light is counted in **electrons per ADC sample** from [`budget`] on, and
 //! nothing is rescaled to look good. A weak signal stays weak; the gain that shows it is a setting.
@@ -51,24 +53,28 @@
 
 pub mod array;
 pub mod budget;
+pub mod camera;
 pub mod chain;
 pub mod daylight;
 pub mod depth;
 pub mod instrument;
+pub mod lamp;
 pub mod mie;
 pub mod pixel;
 pub mod projector;
 pub mod rain;
 pub mod range;
 pub mod rig;
+pub mod safety;
 pub mod scene;
 pub mod visible;
 pub mod water;
 
 pub use array::LedArray;
 pub use budget::{Budget, BudgetError, BudgetSettings, BudgetTerms};
+pub use camera::{CameraModel, CameraModelError};
 pub use chain::{AdcSample, Chain, ChainError, ChainSettings};
-pub use depth::{DEPTH_SIDE, DepthError, SimulatedDepth};
+pub use depth::{DEPTH_SIDE, DepthError, DepthGeometry, DepthView, SimulatedDepth};
 pub use instrument::{LEDS, SIDE, WAVELENGTH_NM};
 pub use projector::{Footprint, Projector, ProjectorError};
 pub use scene::{Scene, SceneError};

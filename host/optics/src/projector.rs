@@ -8,9 +8,11 @@
 //! in the scene, and a target of one reflectance gives that reflectance at every LED at any distance.
 //! How much light a spot carries is the business of [`crate::budget`].
 
+use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
 use thiserror::Error;
 
-use crate::{LEDS, SIDE, Scene};
+use crate::{CameraModel, LEDS, SIDE, Scene};
 
 /// Grid points a LED pitch on which spots are integrated.
 const SAMPLES_PER_PITCH: usize = 8;
@@ -66,12 +68,9 @@ pub enum ProjectorError {
 
 /// The LED array behind its lens. All lengths in millimetres.
 ///
-/// The defaults are a camera that behaves like the paper's. The focal length is the paper's (Fig. 2).
-/// Pitch, focus and aperture are not printed there and were chosen so that the 43 mm letters of
-/// Fig. 6 fill the 48 mm field at 0.3 m, and so that the blur disc grows as the resolution of
-/// Table 4 does: 0, 20 and 47 mm at 0.3, 0.6 and 1 m against 5, 25 and 45 mm. (At 0.3 m the pitch
-/// on the target, 1.5 mm, sets the resolution.)
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// The default is the paper's camera: `cameras/paper.toml` says what the paper prints and what was chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Projector {
     /// Distance between neighbouring LEDs.
     pub led_pitch_mm: f64,
@@ -83,17 +82,13 @@ pub struct Projector {
     pub focus_distance_mm: f64,
     /// Diameter of the lens.
     pub aperture_mm: f64,
+    /// Share of the light lost at the corners of the field; it grows with the square of the distance from the centre.
+    pub corner_vignetting: f64,
 }
 
 impl Default for Projector {
     fn default() -> Self {
-        Self {
-            led_pitch_mm: 3.0,
-            emitter_mm: 2.0,
-            focal_length_mm: 200.0,
-            focus_distance_mm: 300.0,
-            aperture_mm: 20.0,
-        }
+        CameraModel::paper().projector()
     }
 }
 
@@ -136,11 +131,50 @@ impl Projector {
         SIDE as f64 * self.led_pitch_mm * self.magnification(distance_mm)
     }
 
+    /// Side of the field over the distance of the target: the same at every distance.
+    #[must_use]
+    pub fn field_over_distance(&self) -> f64 {
+        SIDE as f64 * self.led_pitch_mm / self.array_distance_mm()
+    }
+
     /// Diameter of the defocus disc at `distance_mm`, in millimetres: the cone from the aperture to
     /// a point on the focus plane, cut by the target, `aperture * |1 - D / focus|`.
     #[must_use]
     pub fn blur_mm(&self, distance_mm: f64) -> f64 {
         self.aperture_mm * (1.0 - distance_mm / self.focus_distance_mm).abs()
+    }
+
+    /// The finest line on a target at `distance_mm` that keeps `contrast` of its own behind emitter and defocus, never finer
+    /// than a pixel, in millimetres; none if no line as wide as the field does.
+    #[must_use]
+    pub fn finest_line_mm(&self, distance_mm: f64, contrast: f64) -> Option<f64> {
+        let pixel_mm = self.field_mm(distance_mm) / SIDE as f64;
+        let kept = |line_mm: f64| self.transfer(1.0 / (2.0 * line_mm), distance_mm);
+        let width = |step: i32| pixel_mm * (SIDE as f64).powf(f64::from(step) / 2000.0);
+        // From the widest line on: past the first null contrast comes back inverted, which shows nothing.
+        let lost = (0..=2000).rev().find(|&step| kept(width(step)) < contrast);
+        match lost {
+            None => Some(pixel_mm),
+            Some(step) if step < 2000 => Some(width(step + 1)),
+            Some(_) => None,
+        }
+    }
+
+    /// Contrast that a sine on a target at `distance_mm` keeps behind emitter and defocus, at `cycles_per_mm`: a square's
+    /// transfer times a disc's.
+    #[must_use]
+    pub fn transfer(&self, cycles_per_mm: f64, distance_mm: f64) -> f64 {
+        const PARTS: u32 = 400;
+        let spot_mm = self.emitter_mm * self.magnification(distance_mm);
+        let square = sinc(PI * cycles_per_mm * spot_mm);
+        // A disc seen from its edge: chords of a unit circle, `cos^2` of an angle.
+        let phase = PI * cycles_per_mm * self.blur_mm(distance_mm);
+        let part = |i: u32| {
+            let angle = PI * ((f64::from(i) + 0.5) / f64::from(PARTS) - 0.5);
+            angle.cos().powi(2) * (phase * angle.sin()).cos()
+        };
+        let disc = (0..PARTS).map(part).sum::<f64>() * 2.0 / f64::from(PARTS);
+        square * disc
     }
 
     /// The mean reflectance that each LED's spot sees on a scene at `distance_mm`, centred on the
@@ -171,6 +205,10 @@ impl Projector {
         }
         Ok(Footprint { weights })
     }
+}
+
+fn sinc(x: f64) -> f64 {
+    if x == 0.0 { 1.0 } else { x.sin() / x }
 }
 
 fn positive(name: &'static str, value_mm: f64) -> Result<(), ProjectorError> {

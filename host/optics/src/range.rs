@@ -104,9 +104,9 @@ pub fn as_printed_mm(
         drops = drops * faded + (1.0 - faded);
         let pixel =
             PixelBudget::new(instrument, &dry, z_mm, wanted.reflectance, wanted.exposure_us)?;
-        let photons = pixel.signal_electrons * source * pixel.samples;
+        let photons = pixel.exposure_signal * source;
         let background = pixel.dry.ambient_electrons_white * drops;
-        let floor = ((pixel.noise.powi(2) + background) * pixel.samples).sqrt() * wanted.snr;
+        let floor = (pixel.exposure_noise.powi(2) + background * pixel.samples).sqrt() * wanted.snr;
         let gained = match compared_with {
             Floor::OneExposure => 1.0,
             Floor::WholePicture => pixel.pixel_snr / pixel.exposure_snr,

@@ -142,6 +142,54 @@ fn amplifier_noise_is_as_large_as_set_whatever_the_light() {
 }
 
 #[test]
+fn the_noise_of_a_window_is_what_the_settings_say() {
+    for (bandwidth_mhz, adc_noise_counts, light) in
+        [(60.0, 0.0, 8000.0), (10.0, 0.0, 0.0), (20.0, 40.0, 20_000.0)]
+    {
+        let settings = ChainSettings {
+            amplifier_bandwidth_hz: bandwidth_mhz * 1e6,
+            adc_noise_counts,
+            electrons_per_count: 4.0,
+            ..ChainSettings::default()
+        };
+        let window = 9;
+        let mut chain = chain(settings, 7);
+        for _ in 0..200 {
+            chain.sample(light);
+        }
+        let means: Vec<f64> = (0..40_000)
+            .map(|_| {
+                let samples = (0..window).map(|_| f64::from(chain.sample(light).counts));
+                let mean = samples.sum::<f64>() / f64::from(window);
+                // As in a sweep: what is blanked lets the noise forget.
+                for _ in 0..40 {
+                    chain.sample(light);
+                }
+                mean
+            })
+            .collect();
+        let mean = means.iter().sum::<f64>() / means.len() as f64;
+        let variance =
+            means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / means.len() as f64 * 16.0;
+        let expected = settings.variance_of_mean(f64::from(light), window);
+        // 40 000 windows know a variance to sqrt(2 / 40 000) = 0.7 %; four of those.
+        assert!(
+            (variance / expected - 1.0).abs() < 0.028,
+            "{bandwidth_mhz} MHz: {variance} against {expected}"
+        );
+    }
+}
+
+#[test]
+fn shot_noise_behind_a_pole_has_the_variance_of_its_noise_bandwidth() {
+    let settings =
+        ChainSettings { amplifier_bandwidth_hz: 60e6, shot_noise: true, ..ChainSettings::ideal() };
+    let (_, variance) = statistics(settings, 10_000.0, 200_000);
+    // pi * 60 MHz * 8 ns = 1.508
+    assert!((variance / 15_080.0 - 1.0).abs() < 0.014, "{variance}");
+}
+
+#[test]
 fn amplifier_noise_follows_from_its_current_density() {
     // 1 pA/sqrt(Hz) over pi/2 * 60 MHz = 9.708 nA; times 8 ns / e = 484.7 electrons.
     assert!((amplifier_noise_electrons(1.0, 60e6, 8.0) - 484.7).abs() < 0.1);
@@ -225,7 +273,9 @@ fn settings_out_of_range_are_named() {
         ("led_edge_ns", ChainSettings { led_edge_ns: -1.0, ..default }),
         ("amplifier_bandwidth_hz", ChainSettings { amplifier_bandwidth_hz: f64::NAN, ..default }),
         ("ambient_electrons", ChainSettings { ambient_electrons: f64::INFINITY, ..default }),
+        ("dark_electrons", ChainSettings { dark_electrons: -1.0, ..default }),
         ("amplifier_noise_electrons", ChainSettings { amplifier_noise_electrons: -1.0, ..default }),
+        ("adc_noise_counts", ChainSettings { adc_noise_counts: f64::NAN, ..default }),
         ("electrons_per_count", ChainSettings { electrons_per_count: 0.0, ..default }),
         ("adc_offset_counts", ChainSettings { adc_offset_counts: 16384, ..default }),
         ("adc_latency_clocks", ChainSettings { adc_latency_clocks: 64, ..default }),

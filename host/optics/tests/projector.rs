@@ -237,3 +237,17 @@ proptest! {
         prop_assert!(footprint.weights().iter().all(|w| (-1e-6..=1.0 + 1e-6).contains(w)));
     }
 }
+
+#[test]
+fn the_finest_line_is_that_of_disc_and_emitter() {
+    let projector = Projector::default();
+    // By Bessel functions: disc of 20 and 46.67 mm, emitter of 2 and 3.33 mm; a line is half a cycle.
+    for (distance_mm, contrast, expected_mm) in
+        [(600.0, 0.5, 14.26), (600.0, 0.1, 9.21), (1000.0, 0.5, 33.18), (1000.0, 0.1, 21.46)]
+    {
+        let line_mm = projector.finest_line_mm(distance_mm, contrast).unwrap();
+        assert!((line_mm / expected_mm - 1.0).abs() < 5e-3, "{line_mm} against {expected_mm}");
+    }
+    // In focus a pixel is the limit.
+    assert_eq!(projector.finest_line_mm(300.0, 0.1), Some(1.5));
+}

@@ -197,8 +197,13 @@ fn format_error(path: &Path, error: &serde_json::Error) -> CalibrationFileError 
 /// # Errors
 /// Where the user has no home.
 pub fn path_of(serial: &str) -> Result<PathBuf, CalibrationFileError> {
+    path_with(serial, "json")
+}
+
+/// Where a file of the camera with this serial number is kept, with this ending.
+pub(super) fn path_with(serial: &str, ending: &str) -> Result<PathBuf, CalibrationFileError> {
     let folder = choose_base_strategy()?.data_dir().join("nirspi").join("calibration");
-    Ok(folder.join(format!("{}.json", file_name(serial))))
+    Ok(folder.join(format!("{}.{ending}", file_name(serial))))
 }
 
 /// A serial number as a file name, one name for each: what is no letter, digit, `-` or `_` becomes `%` and two digits.
@@ -214,7 +219,7 @@ fn file_name(serial: &str) -> String {
 
 /// `2026-11-20 08:30 UTC`: the Gregorian calendar by years that begin in March, so that a leap day is a year's last
 /// (H. Hinnant, *chrono-Compatible Low-Level Date Algorithms*, `civil_from_days`).
-fn date(unix_s: u64) -> String {
+pub(super) fn date(unix_s: u64) -> String {
     // From 1 March of year 0 to 1 January 1970; an era is 400 years.
     const DAYS_BEFORE_1970: u64 = 719_468;
     const DAYS_OF_ERA: u64 = 146_097;

@@ -1,4 +1,4 @@
-//! ADC latency and settling of a camera: measured from a burst, kept by serial number, chosen for a capture.
+//! ADC latency, settling and flat field of a camera: measured, kept by serial number, chosen for a capture.
 //!
 //! Latency belongs to the instrument, not to the scene. It is measured against a white sheet (`nirspi calibrate`,
 //! `nirspi selftest`), kept, and used for every capture after it.
@@ -9,11 +9,16 @@
 
 mod burst;
 mod check;
+mod flat;
 mod kept;
 mod policy;
 
 pub(crate) use burst::ONSET;
 pub use burst::{BURSTS, CalibrationError, HALF_PERIOD, Settling, calibrate, calibrate_or};
 pub use check::SettlingError;
+pub use flat::{
+    FlatField, FlatFieldError, FlatFieldFileError, FramesError, KeptFlatField, Measured, Sweeps,
+    flat_field_path_of, measure_dark, measure_flat_field, pattern_noise,
+};
 pub use kept::{CalibrationFileError, KeptCalibration, path_of};
 pub use policy::{CalibrationPolicy, Choice, Origin, PolicyError};

@@ -1,6 +1,6 @@
 //! Which calibration a capture uses: the one kept for the camera, one from a file, or one measured first.
 
-use super::{CalibrationFileError, KeptCalibration, path_of};
+use super::{CalibrationFileError, KeptCalibration, KeptFlatField, path_of};
 use crate::capture::{Calibration, Capture};
 use crate::causes;
 use crate::session::CameraIdentity;
@@ -39,8 +39,10 @@ pub struct Choice {
     pub calibration: Calibration,
     /// The kept calibration that is used, or stands ready if a burst is too dim.
     pub origin: Option<Origin>,
-    /// Why a kept calibration was passed over.
+    /// Why a kept calibration or flat field was passed over.
     pub note: Option<String>,
+    /// The flat field kept for the camera: images are to be corrected by it.
+    pub flat_field: Option<KeptFlatField>,
 }
 
 /// Why no calibration could be chosen.
@@ -67,6 +69,27 @@ impl CalibrationPolicy {
     /// [`PolicyError`] if the file asked for cannot be used. A kept calibration that cannot be used is noted and passed
     /// over.
     pub fn choose(
+        &self,
+        setup: &MeasurementSetup,
+        camera: &CameraIdentity,
+    ) -> Result<Choice, PolicyError> {
+        let mut choice = self.latency(setup, camera)?;
+        if *self != Self::Off {
+            match KeptFlatField::of(camera) {
+                Ok(kept) => choice.flat_field = kept,
+                Err(problem) => {
+                    let problem = causes::in_one_line(&problem);
+                    let note = format!("kept flat field not used: {problem}");
+                    choice.note =
+                        Some(choice.note.map_or_else(|| note.clone(), |n| format!("{n}; {note}")));
+                }
+            }
+        }
+        Ok(choice)
+    }
+
+    /// Where latency and settling come from.
+    fn latency(
         &self,
         setup: &MeasurementSetup,
         camera: &CameraIdentity,
@@ -107,7 +130,7 @@ impl Choice {
     }
 
     fn plain(calibration: Calibration) -> Self {
-        Self { calibration, origin: None, note: None }
+        Self { calibration, origin: None, note: None, flat_field: None }
     }
 
     fn of(kept: KeptCalibration, file: PathBuf, measure_first: bool) -> Self {
@@ -117,6 +140,6 @@ impl Choice {
         } else {
             Calibration::Kept(kept.settling)
         };
-        Self { calibration, origin, note: None }
+        Self { calibration, origin, note: None, flat_field: None }
     }
 }

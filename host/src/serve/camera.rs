@@ -6,7 +6,7 @@ use super::camera_log::Phase;
 use super::slot::{Look, RunSetup};
 use super::{ForeignError, Shared, lock};
 use crate::account::LossCounters;
-use crate::calibration::{CalibrationError, Settling};
+use crate::calibration::{CalibrationError, FlatField, KeptFlatField, Settling};
 use crate::capture::{
     Calibration, CaptureError, CaptureOptions, Ended, Observer, Progress, observe,
 };
@@ -15,6 +15,7 @@ use crate::session::{IgnorePackets, Session, SessionError};
 use crate::setup::MeasurementSetup;
 use crate::{causes, events};
 use nirspi_nets::DepthMaps;
+use nirspi_optics::{CameraModel, SIDE};
 use nirspi_wire::{Depth, DeviceMessage, EventKind, Fault, Frame, Refusal};
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -34,6 +35,8 @@ pub struct Connected {
     pub calibration: Calibration,
     /// What is to be said about that.
     pub note: Option<String>,
+    /// The flat field kept for the camera.
+    pub flat_field: Option<KeptFlatField>,
 }
 
 /// How to find the camera again.
@@ -45,6 +48,8 @@ pub struct CameraSource {
     pub address: String,
     /// The measurement. Its latency is replaced by that of the calibration, where there is one.
     pub setup: MeasurementSetup,
+    /// Where the depth sensor's zones lie in the image.
+    pub model: CameraModel,
     /// Finds it again.
     pub connect: Connect,
 }
@@ -71,7 +76,17 @@ pub fn run(
     first: Connected,
 ) -> Result<(), CaptureError> {
     let earlier = LossCounters::default();
-    let mut live = Live { shared, earlier, now: None, depth: None, fault: None, begun: false };
+    let model = source.model.clone();
+    let mut live = Live {
+        shared,
+        model,
+        earlier,
+        now: None,
+        flat_field: None,
+        depth: None,
+        fault: None,
+        begun: false,
+    };
     let mut next = Some(first);
     // Whoever starts this program has the camera in sight.
     let mut person_said = true;
@@ -154,9 +169,12 @@ impl Shared {
 /// Sees every frame of a run and hands the newest over.
 struct Live<'s> {
     shared: &'s Shared,
+    model: CameraModel,
     /// The account of the runs before.
     earlier: LossCounters,
     now: Option<(Arc<RunSetup>, Newest)>,
+    /// Of the camera that answers now.
+    flat_field: Option<FlatField>,
     depth: Option<Arc<DepthMaps>>,
     /// What the camera says has switched its LEDs off.
     fault: Option<Fault>,
@@ -171,10 +189,14 @@ impl Live<'_> {
         connected: &mut Connected,
         setup: MeasurementSetup,
     ) -> Result<End, CaptureError> {
-        let Connected { session, calibration, note } = connected;
+        let Connected { session, calibration, note, flat_field } = connected;
         for text in session.reports().iter().cloned().chain(note.take()) {
             lock(&self.shared.camera).event(text);
         }
+        if let Some(kept) = flat_field {
+            lock(&self.shared.camera).event(kept.summary());
+        }
+        self.flat_field = flat_field.as_ref().map(|kept| kept.flat.clone());
         let calibration = calibration.clone();
         let options = CaptureOptions { setup, frames: None, calibration, record: None };
         (self.now, self.fault) = (None, None);
@@ -216,7 +238,11 @@ impl Observer for Live<'_> {
         settling: Option<&Settling>,
         problem: Option<&CalibrationError>,
     ) {
-        let run = RunSetup { setup: setup.clone(), settling: settling.cloned() };
+        let run = RunSetup {
+            setup: setup.clone(),
+            settling: settling.cloned(),
+            flat_field: self.flat_field.clone(),
+        };
         self.now = Some((Arc::new(run), Newest::new(setup)));
         (self.depth, self.begun) = (None, true);
         let mut log = lock(&self.shared.camera);
@@ -244,7 +270,7 @@ impl Observer for Live<'_> {
             }
             DeviceMessage::Crash(report) => events::crash(report),
             DeviceMessage::Depth(depth) => {
-                self.depth = depth_map(depth).map(Arc::new);
+                self.depth = depth_map(&self.model, depth).map(Arc::new);
                 return;
             }
             _ => return,
@@ -258,9 +284,11 @@ impl Observer for Live<'_> {
     }
 }
 
-/// A depth map of a side that fusion takes.
-fn depth_map(depth: &Depth<'_>) -> Option<DepthMaps> {
-    let side = usize::from(depth.side);
-    let zones_m = depth.distances_mm.iter().map(|mm| f32::from(mm) * 1e-3).collect();
-    DepthMaps::new(zones_m, [1, side, side], 1).ok()
+/// The depth map in the camera's image; none for a sensor of other than 8 x 8 zones, of which it is not known where they lie.
+fn depth_map(model: &CameraModel, depth: &Depth<'_>) -> Option<DepthMaps> {
+    let zones_mm: Vec<u16> = depth.distances_mm.iter().collect();
+    let field = model.projector().field_over_distance();
+    let view = model.depth_geometry().view(zones_mm.as_slice().try_into().ok()?, field);
+    let pixels_m = view.pixels_mm.iter().map(|&mm| f32::from(mm) * 1e-3).collect();
+    DepthMaps::new(pixels_m, [1, SIDE, SIDE], 1).ok()
 }

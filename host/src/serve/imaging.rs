@@ -151,6 +151,10 @@ impl Imaging {
         let measurements =
             look.sum.measurements(&look.run.setup, look.run.settling.as_ref(), false)?;
         let image = method.reconstruct(&measurements)?.image;
+        let image = match &look.run.flat_field {
+            Some(flat) => flat.correct(&image),
+            None => image,
+        };
         let reconstruct_ms = ms_since(started);
         let side = image.side().pixels();
         if side != Side::INSTRUMENT.pixels() || image.pixels().iter().any(|p| !p.is_finite()) {

@@ -5,7 +5,7 @@
 
 use super::lock;
 use crate::account::LossCounters;
-use crate::calibration::Settling;
+use crate::calibration::{FlatField, Settling};
 use crate::integrate::Integrated;
 use crate::setup::MeasurementSetup;
 use nirspi_nets::DepthMaps;
@@ -20,6 +20,8 @@ pub struct RunSetup {
     pub setup: MeasurementSetup,
     /// The camera's response, where it is known.
     pub settling: Option<Settling>,
+    /// How much its LEDs differ, where that is known.
+    pub flat_field: Option<FlatField>,
 }
 
 /// The newest frames and what was seen beside them.
@@ -118,7 +120,7 @@ mod tests {
     fn look(number: u64) -> (Look, LossCounters) {
         let setup = MeasurementSetup::new(&Order::Natural, 1.0).unwrap();
         let sum = Integrated::new(&setup);
-        let run = Arc::new(RunSetup { setup, settling: None });
+        let run = Arc::new(RunSetup { setup, settling: None, flat_field: None });
         let frames = LossCounters { received: number, lost: 2, ..LossCounters::default() };
         (Look { sum, run, depth: None }, frames)
     }

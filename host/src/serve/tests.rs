@@ -73,7 +73,7 @@ fn enclosed(hands: &Arc<Hands>, was_open: bool) -> Connected {
     camera.step(1000);
     let link = Enclosed { camera, hands: Arc::clone(hands) };
     let session = Session::open(Box::new(link)).unwrap();
-    Connected { session, calibration: Calibration::None, note: None }
+    Connected { session, calibration: Calibration::None, note: None, flat_field: None }
 }
 
 /// A camera's thread under test.
@@ -96,7 +96,8 @@ impl Lab {
                 hands.pulled.store(false, Ordering::Relaxed);
                 Ok(enclosed(&hands, open_while_unplugged))
             });
-            let source = CameraSource { address: "test".to_owned(), setup, connect };
+            let model = nirspi_optics::CameraModel::default();
+            let source = CameraSource { address: "test".to_owned(), setup, model, connect };
             std::thread::spawn(move || camera::run(&shared, source, first))
         };
         let lab = Self { hands, shared, measuring };

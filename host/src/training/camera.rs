@@ -12,25 +12,23 @@ use nirspi_nets::data::SIDE_PX;
 use nirspi_nets::degrade::{Degrade, DegradeError, Depth, Reading, defocus};
 use nirspi_optics::rain::{Drops, PaperRain, RainError, Rainfall, Weather};
 use nirspi_optics::water::Water;
-use nirspi_optics::{LEDS, Projector, Scene, SceneError, WAVELENGTH_NM};
+use nirspi_optics::{CameraModel, LEDS, Scene, SceneError};
 use nirspi_recon::{
     Leak, LeakError, MeasurementError, Measurements, Order, Rows, RowsError, Side, fwht,
     reconstruct,
 };
-use nirspi_wire::{ADC_HZ, CLOCKS_PER_PATTERN};
+use nirspi_wire::ADC_HZ;
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 use thiserror::Error;
 
-/// Nearest and farthest target, in mm.
-const DISTANCES_MM: (f64, f64) = (300.0, 1200.0);
+/// Farthest target, over the distance that the lens is focused on, which is the nearest: 0.3 to 1.2 m for the paper's camera.
+const FARTHEST_OVER_FOCUS: f64 = 4.0;
 /// Noise that an exposure is chosen for, in units of a white target.
 const NOISE_STD: (f64, f64) = (0.003, 0.08);
 /// Sweeps of the shortest and of the longest exposure: 82 us and 10 s.
 const SWEEPS: (f64, f64) = (1.0, 122_000.0);
-/// Clocks at the start of a pattern whose samples are left out.
-const BLANKED: u16 = 2;
 /// Times at which drops are looked at in one exposure, at most.
 const LOOKS: u32 = 128;
 /// Share of the pictures taken with all patterns, and the least share of patterns otherwise.
@@ -96,6 +94,9 @@ pub enum TrainingCameraError {
 /// No packets, firmware or clocks take part, so it makes many pictures a second; `tests` hold it to the virtual camera.
 #[derive(Debug, Clone)]
 pub struct LinearCamera {
+    camera: CameraModel,
+    /// Light of each LED over that of an ideal one.
+    gains: Vec<f32>,
     /// What the receiver does to slots, and what calibration believes that it does.
     leaks: Leak,
     believed: Leak,
@@ -105,17 +106,18 @@ pub struct LinearCamera {
 }
 
 impl LinearCamera {
-    /// Opens a virtual camera before a white sheet at 0.3 m and calibrates it.
+    /// Opens the virtual camera of this description before a white sheet where its lens is focused, and calibrates it.
     ///
     /// # Errors
     /// [`TrainingCameraError`] if it cannot be opened or calibrated.
-    pub fn new(seed: u64) -> Result<Self, TrainingCameraError> {
-        let distance_mm = DISTANCES_MM.0;
-        let field_mm = Projector::default().field_mm(distance_mm);
-        let optics = VirtualOptics::new(Scene::new(vec![1.0], 1, field_mm)?, distance_mm)?;
+    pub fn new(camera: &CameraModel, seed: u64) -> Result<Self, TrainingCameraError> {
+        let projector = camera.projector();
+        let distance_mm = projector.focus_distance_mm;
+        let sheet = Scene::new(vec![1.0], 1, projector.field_mm(distance_mm))?;
+        let optics = VirtualOptics::of(camera, sheet, distance_mm)?;
+        let (clocks, blanked) = timing(camera);
         let mut session = Session::open(Box::new(MemoryLink::new(optics.camera(seed)?)))?;
-        let believed =
-            calibrate(&mut session, &mut IgnorePackets)?.leak(CLOCKS_PER_PATTERN, BLANKED)?;
+        let believed = calibrate(&mut session, &mut IgnorePackets)?.leak(clocks, blanked)?;
         let response = |n| optics.chain().settling(n);
         // Two poles of nanoseconds have settled to rounding after as many clocks.
         let exact = Settling {
@@ -125,9 +127,11 @@ impl LinearCamera {
             step_counts: 0.0,
             noise_counts: 0.0,
         };
-        let weather = |drops: Drops| Weather::new(drops, WAVELENGTH_NM, Water::Segelstein);
+        let weather = |drops: Drops| Weather::new(drops, camera.wavelength_nm, Water::Segelstein);
         Ok(Self {
-            leaks: exact.leak(CLOCKS_PER_PATTERN, BLANKED)?,
+            camera: camera.clone(),
+            gains: camera.led_gains(),
+            leaks: exact.leak(clocks, blanked)?,
             believed,
             order: Order::CakeCutting.rows(Side::INSTRUMENT)?,
             light: weather(PaperRain::LIGHT.drops()?)?,
@@ -139,13 +143,14 @@ impl LinearCamera {
     /// noise wanted, as far as light and patience go.
     pub fn conditions(&self, rng: &mut impl Rng) -> Result<Conditions, TrainingCameraError> {
         // Defocus in pixels grows with the difference of the reciprocal distances.
-        let (near, far) = DISTANCES_MM;
+        let near = self.camera.projector.focus_distance_mm;
+        let far = FARTHEST_OVER_FOCUS * near;
         let distance_mm = rng.random_range(1.0 / far..=1.0 / near).recip();
         let rain = [Rainfall::None, Rainfall::Light, Rainfall::Heavy][rng.random_range(0..3_usize)];
         let full = rng.random::<f32>() < FULLY_SAMPLED;
         let sampling = if full { 1.0 } else { rng.random_range(LEAST_SAMPLING..1.0) };
         let wanted = NOISE_STD.0 * (NOISE_STD.1 / NOISE_STD.0).powf(rng.random());
-        let optics = VirtualOptics::new(Scene::new(vec![0.5], 1, 1e4)?, distance_mm)?;
+        let optics = VirtualOptics::of(&self.camera, Scene::new(vec![0.5], 1, 1e4)?, distance_mm)?;
         let one = self.noise_std(&optics, optics.footprint().weights(), 1);
         let sweeps = (one / wanted).powi(2).clamp(SWEEPS.0, SWEEPS.1).round() as u32;
         Ok(Conditions { distance_mm, rain, sweeps, sampling })
@@ -163,16 +168,17 @@ impl LinearCamera {
         rng: &mut Pcg64Mcg,
     ) -> Result<CameraPicture, TrainingCameraError> {
         let Conditions { distance_mm, sweeps, sampling, .. } = conditions;
-        let projector = Projector::default();
+        let projector = self.camera.projector();
         let field_mm = projector.field_mm(distance_mm);
         let wide = Scene::new(mirrored(scene), 2 * SIDE_PX, 2.0 * field_mm)?;
-        let mut optics = VirtualOptics::new(wide, distance_mm)?;
+        let mut optics = VirtualOptics::of(&self.camera, wide, distance_mm)?;
         optics = match conditions.rain {
             Rainfall::None => optics,
             Rainfall::Light => optics.in_weather(self.light.clone())?,
             Rainfall::Heavy => optics.in_weather(self.heavy.clone())?,
         };
-        let seen = exposed(&optics, sweeps, rng.random())?;
+        let mut seen = exposed(&optics, sweeps, rng.random())?;
+        seen.iter_mut().zip(&self.gains).for_each(|(seen, gain)| *seen *= gain);
         let shown = (f64::from(sampling) * LEDS as f64).round().clamp(1.0, LEDS as f64) as usize;
         let rows = self.order.first(shown);
         let mut differences = self.differences(&optics, &seen, &rows, sweeps, rng);
@@ -213,7 +219,6 @@ impl LinearCamera {
             .iter()
             .flat_map(|&row| [1.0, -1.0].map(|sign| (all + sign * signed[row as usize]) / 2.0))
             .collect();
-        let samples = f64::from(sweeps) * f64::from(CLOCKS_PER_PATTERN - BLANKED);
         let read: Vec<f64> = (0..slots.len())
             .map(|slot| {
                 let earlier =
@@ -221,7 +226,7 @@ impl LinearCamera {
                 let taps = self.leaks.taps().iter().enumerate();
                 let light: f64 = taps.map(|(tap, share)| share * earlier(tap)).sum();
                 let normal: f64 = rng.sample(StandardNormal);
-                light + (sample_variance(optics, light) / samples).sqrt() * normal
+                light + (mean_variance(optics, light, sweeps)).sqrt() * normal
             })
             .collect();
         read.as_chunks::<2>().0.iter().map(|[pattern, complement]| pattern - complement).collect()
@@ -232,8 +237,7 @@ impl LinearCamera {
         let counts = white_counts(optics);
         // Each pattern lights half of the LEDs.
         let light = seen.iter().map(|&w| f64::from(w)).sum::<f64>() * counts / 2.0;
-        let samples = f64::from(sweeps) * f64::from(CLOCKS_PER_PATTERN - BLANKED);
-        let difference = (2.0 * sample_variance(optics, light) / samples).sqrt();
+        let difference = (2.0 * mean_variance(optics, light, sweeps)).sqrt();
         let taps = self.believed.taps();
         // Undoing the leak divides by what a difference keeps of its own.
         let own = taps[0] - taps.get(1).unwrap_or(&0.0) / 2.0;
@@ -258,13 +262,21 @@ fn white_counts(optics: &VirtualOptics) -> f64 {
     optics.budget().electrons_per_led / optics.chain().electrons_per_count
 }
 
-/// Variance of one ADC sample in counts squared: shot noise of LEDs' light (in counts) and daylight, the amplifier,
-/// rounding.
-fn sample_variance(optics: &VirtualOptics, light_counts: f64) -> f64 {
+/// Clocks of a pattern, and clocks at its start whose samples are left out.
+fn timing(camera: &CameraModel) -> (u16, u16) {
+    // Ranges are checked when a description is read.
+    (camera.readout.clocks_per_pattern as u16, camera.readout.blanked as u16)
+}
+
+/// Variance of the mean of a slot's samples in `sweeps` sweeps, in counts squared: shot noise of LEDs' light (in counts)
+/// and daylight, the amplifier, the ADC, rounding.
+fn mean_variance(optics: &VirtualOptics, light_counts: f64, sweeps: u32) -> f64 {
     let chain = optics.chain();
     let gain = chain.electrons_per_count;
     let electrons = (light_counts * gain).max(0.0) + chain.ambient_electrons;
-    (electrons + chain.amplifier_noise_electrons.powi(2)) / (gain * gain) + 1.0 / 12.0
+    let (clocks, blanked) = timing(optics.camera_model());
+    let window = u32::from(clocks.saturating_sub(blanked));
+    chain.variance_of_mean(electrons, window) / (gain * gain) / f64::from(sweeps)
 }
 
 /// Mean of what the LEDs' spots show during an exposure.
@@ -273,7 +285,8 @@ fn exposed(optics: &VirtualOptics, sweeps: u32, seed: u64) -> Result<Vec<f32>, R
         return Ok(optics.footprint().weights().to_vec());
     };
     let looks = sweeps.min(LOOKS);
-    let sweep_s = 2.0 * LEDS as f64 * f64::from(CLOCKS_PER_PATTERN) / f64::from(ADC_HZ);
+    let clocks = timing(optics.camera_model()).0;
+    let sweep_s = 2.0 * LEDS as f64 * f64::from(clocks) / f64::from(ADC_HZ);
     let mut mean = vec![0.0; LEDS];
     for _ in 0..looks {
         for (mean, seen) in mean.iter_mut().zip(spots.reflectance()) {

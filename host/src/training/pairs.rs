@@ -114,11 +114,12 @@ pub fn encode(path: &Path, scenes: &Scenes, pairs: &[Pair]) -> Result<Vec<u8>, F
 mod tests {
     use super::*;
     use crate::files::npy;
+    use nirspi_optics::CameraModel;
 
     #[test]
     fn a_longer_file_begins_with_the_shorter_one_and_is_whole() {
         let scenes = Scenes::procedural();
-        let camera = LinearCamera::new(1).unwrap();
+        let camera = LinearCamera::new(CameraModel::paper(), 1).unwrap();
         let take = |count| take(&scenes, Part::Training, &camera, count, 7, &|| ()).unwrap();
         let (two, four) = (take(2), take(4));
         assert_eq!(two[..], four[..2]);

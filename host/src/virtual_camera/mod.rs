@@ -11,6 +11,7 @@
 
 mod fpga;
 mod link;
+mod model;
 mod optics;
 mod precomputed;
 mod server;
@@ -19,10 +20,12 @@ mod tunnel;
 
 pub use fpga::{OpticalFpga, SimulatedFpga, Wiring};
 pub use link::MemoryLink;
+pub use model::{CameraFileError, read_camera_model};
+pub use nirspi_optics::CameraModel;
 pub use optics::{VirtualOptics, VirtualOpticsError};
 pub use precomputed::PrecomputedFpga;
 pub use server::{ServeOptions, ServerEvent, serve};
-pub use shot::{Shot, ShotError, calibrate_against_white, shoot};
+pub use shot::{Shot, ShotError, calibrate_against_white, flat_field_against_white, shoot};
 pub use tunnel::serve_tunnel;
 
 use nirspi_mcu::{

@@ -2,26 +2,24 @@
 
 use super::{OpticalFpga, VirtualCamera};
 use crate::scene::SceneMap;
-use nirspi_optics::pixel::Instrument;
+use crate::setup::MeasurementSetup;
+use nirspi_optics::camera::fnv1a;
 use nirspi_optics::rain::{BeamShadows, Drops, RainError, RainySpots, Weather};
 use nirspi_optics::water::Water;
 use nirspi_optics::{
-    Budget, BudgetError, BudgetSettings, Chain, ChainError, ChainSettings, DepthError, Footprint,
-    LedArray, Projector, ProjectorError, Scene, SceneError, SimulatedDepth,
+    Budget, BudgetError, CameraModel, Chain, ChainError, ChainSettings, DepthError, DepthView,
+    Footprint, LedArray, Projector, ProjectorError, Scene, SceneError, SimulatedDepth,
 };
+use nirspi_recon::{Order, RowsError};
 use thiserror::Error;
-
-/// Noise of the simulated time-of-flight sensor: a few millimetres, as such sensors state indoors.
-const DEPTH_NOISE_MM: f64 = 4.0;
 
 /// Everything that light meets on its way, at one distance.
 #[derive(Debug, Clone)]
 pub struct VirtualOptics {
+    camera: CameraModel,
     scene: Scene,
-    projector: Projector,
     distance_mm: f64,
     footprint: Footprint,
-    budget_settings: BudgetSettings,
     budget: Budget,
     chain: ChainSettings,
     weather: Option<Weather>,
@@ -48,65 +46,80 @@ pub enum VirtualOpticsError {
     /// Weather.
     #[error(transparent)]
     Rain(#[from] RainError),
+    /// Gateware and protocol are of one wavelength.
+    #[error(
+        "wavelength_nm is {0}, expected {expected} for a virtual camera: its protocol knows no other; \
+         `nirspi range` and `nirspi rain --budget` take any",
+        expected = nirspi_wire::WAVELENGTH_NM
+    )]
+    Wavelength(f64),
 }
 
 impl VirtualOptics {
-    /// The default camera in front of `scene`, its gain set for a white target at that distance.
+    /// The paper's camera in front of `scene`, its gain set for a white target at that distance.
     ///
     /// # Errors
     /// A distance that no light covers.
     pub fn new(scene: Scene, distance_mm: f64) -> Result<Self, VirtualOpticsError> {
-        Self::with_settings(
-            scene,
-            distance_mm,
-            Projector::default(),
-            &BudgetSettings::default(),
-            ChainSettings::default(),
-        )
+        Self::of(CameraModel::paper(), scene, distance_mm)
     }
 
-    /// The default camera in front of a scene by name or file: a target of its own size, or one that fills the field.
+    /// This camera in front of `scene`, its gain set for a white target at that distance. The weather of the description
+    /// is not taken from it: see [`Self::in_rain`].
+    ///
+    /// # Errors
+    /// A description that is not physical, or a distance that no light covers.
+    pub fn of(
+        camera: &CameraModel,
+        scene: Scene,
+        distance_mm: f64,
+    ) -> Result<Self, VirtualOpticsError> {
+        if camera.wavelength_nm != f64::from(nirspi_wire::WAVELENGTH_NM) {
+            return Err(VirtualOpticsError::Wavelength(camera.wavelength_nm));
+        }
+        let projector = camera.projector();
+        let footprint = projector.footprint(&scene, distance_mm)?;
+        let budget = Budget::new(&camera.budget_settings(), &projector, distance_mm)?;
+        let mut chain = camera.chain_settings();
+        chain.electrons_per_count = chain.auto_gain(&budget)?;
+        chain.ambient_electrons = budget.ambient_electrons(footprint.mean());
+        let camera = camera.clone();
+        Ok(Self { camera, scene, distance_mm, footprint, budget, chain, weather: None })
+    }
+
+    /// This camera in front of a scene by name or file: a target of its own size, or one that fills the field.
     ///
     /// # Errors
     /// A distance that no light covers, or that the depth sensor cannot read.
-    pub fn before(map: &SceneMap, distance_mm: f64) -> Result<Self, VirtualOpticsError> {
-        let fills = || Projector::default().field_mm(distance_mm);
+    pub fn before(
+        camera: &CameraModel,
+        map: &SceneMap,
+        distance_mm: f64,
+    ) -> Result<Self, VirtualOpticsError> {
+        let fills = || camera.projector().field_mm(distance_mm);
         let side_mm = map.side_mm.unwrap_or_else(fills);
         let scene = Scene::new(map.reflectance.clone(), map.size_px, side_mm)?;
-        let optics = Self::new(scene, distance_mm)?;
+        let optics = Self::of(camera, scene, distance_mm)?;
         // The depth sensor has a range of its own.
         optics.depth(0)?;
         Ok(optics)
     }
 
-    /// As [`new`](Self::new), with everything given. The gain and the daylight in `chain` are replaced by
-    /// those that follow from the budget.
+    /// The camera.
+    #[must_use]
+    pub fn camera_model(&self) -> &CameraModel {
+        &self.camera
+    }
+
+    /// The first patterns of `order`, differential, with the timing of this camera.
     ///
     /// # Errors
-    /// A setting that is not physical.
-    pub fn with_settings(
-        scene: Scene,
-        distance_mm: f64,
-        projector: Projector,
-        budget: &BudgetSettings,
-        mut chain: ChainSettings,
-    ) -> Result<Self, VirtualOpticsError> {
-        let footprint = projector.footprint(&scene, distance_mm)?;
-        let budget_settings = *budget;
-        let budget = Budget::new(budget, &projector, distance_mm)?;
-        chain.electrons_per_count = chain.auto_gain(&budget)?;
-        chain.ambient_electrons = budget.ambient_electrons(footprint.mean());
-        let weather = None;
-        Ok(Self {
-            scene,
-            projector,
-            distance_mm,
-            footprint,
-            budget_settings,
-            budget,
-            chain,
-            weather,
-        })
+    /// As [`MeasurementSetup::new`].
+    pub fn setup(&self, order: &Order, sampling: f64) -> Result<MeasurementSetup, RowsError> {
+        let readout = self.camera.readout;
+        // Ranges are checked when a description is read.
+        let (clocks, blanked) = (readout.clocks_per_pattern as u16, readout.blanked as u16);
+        Ok(MeasurementSetup::new(order, sampling)?.timed(clocks, blanked))
     }
 
     /// The same camera in dry air before a white sheet that fills its field, where its lens is focused: what latency and
@@ -115,9 +128,12 @@ impl VirtualOptics {
     /// # Errors
     /// Optics that have no focus.
     pub fn white_sheet(&self) -> Result<Self, VirtualOpticsError> {
-        let Self { projector, budget_settings, chain, .. } = self;
-        let distance_mm = projector.focus_distance_mm;
-        Self::with_settings(Scene::white(), distance_mm, *projector, budget_settings, *chain)
+        let distance_mm = self.camera.projector.focus_distance_mm;
+        let sheet = Self::of(&self.camera, Scene::white(), distance_mm)?;
+        // A receiver without noise stays one.
+        let ChainSettings { electrons_per_count, ambient_electrons, .. } = sheet.chain;
+        let chain = ChainSettings { electrons_per_count, ambient_electrons, ..self.chain };
+        Ok(Self { chain, ..sheet })
     }
 
     /// ADC counts that a white target gives one pixel, as the photon budget has it.
@@ -131,22 +147,25 @@ impl VirtualOptics {
     /// other than default instruments `virtual-1-` with a short name of their settings.
     #[must_use]
     pub fn serial(&self, seed: u64) -> String {
-        // Gain and daylight follow distance and scene, and change neither latency nor settling.
-        let chain =
-            ChainSettings { electrons_per_count: 1.0, ambient_electrons: 0.0, ..self.chain };
-        let instrument = format!("{:?} {:?} {chain:?}", self.projector, self.budget_settings);
-        let default = {
-            let chain = ChainSettings {
-                electrons_per_count: 1.0,
-                ambient_electrons: 0.0,
-                ..ChainSettings::default()
+        let instrument = |camera: &CameraModel, chain: &ChainSettings| {
+            let paper = CameraModel::paper();
+            // Light, weather and name are not the instrument's.
+            let camera = CameraModel {
+                name: paper.name.clone(),
+                light: paper.light,
+                weather: paper.weather,
+                ..camera.clone()
             };
-            format!("{:?} {:?} {chain:?}", Projector::default(), BudgetSettings::default())
+            // Gain and daylight follow distance and scene, and change neither latency nor settling.
+            let chain =
+                ChainSettings { electrons_per_count: 1.0, ambient_electrons: 0.0, ..*chain };
+            format!("{camera:?} {chain:?}")
         };
-        if instrument == default {
+        let this = instrument(&self.camera, &self.chain);
+        if this == instrument(CameraModel::paper(), &ChainSettings::default()) {
             return format!("virtual-{seed}");
         }
-        format!("virtual-{seed}-{:08x}", fnv1a(instrument.as_bytes()))
+        format!("virtual-{seed}-{:08x}", fnv1a(this.as_bytes()))
     }
 
     /// Lets these drops fall between camera and scene. Daylight is dimmed and scattered as they do on average; what
@@ -155,7 +174,7 @@ impl VirtualOptics {
     /// # Errors
     /// Air too dense, or too many drops to be followed.
     pub fn in_rain(self, drops: Drops) -> Result<Self, VirtualOpticsError> {
-        let weather = Weather::new(drops, self.budget_settings.wavelength_nm, Water::Segelstein)?;
+        let weather = Weather::new(drops, self.camera.wavelength_nm, Water::Segelstein)?;
         let optics = self.in_weather(weather)?;
         // Whether the drops can be followed shows now rather than when the camera is made.
         optics.spots(0)?;
@@ -167,8 +186,8 @@ impl VirtualOptics {
     /// # Errors
     /// Air too dense.
     pub fn in_weather(mut self, weather: Weather) -> Result<Self, VirtualOpticsError> {
-        let baseline_mm = Instrument::default().baseline_mm;
-        let veil = weather.veil(&self.projector, self.distance_mm, baseline_mm)?;
+        let baseline_mm = self.camera.collector.baseline_mm;
+        let veil = weather.veil(&self.camera.projector, self.distance_mm, baseline_mm)?;
         let returned = weather.blur(self.distance_mm)?.returned(self.field_mm() / self.distance_mm);
         self.chain.ambient_electrons = self.budget.ambient_electrons(self.footprint.mean())
             * returned
@@ -184,9 +203,9 @@ impl VirtualOptics {
     pub fn spots(&self, seed: u64) -> Result<Option<RainySpots>, RainError> {
         let Some(weather) = &self.weather else { return Ok(None) };
         let beams = BeamShadows {
-            projector: self.projector,
+            projector: self.camera.projector,
             distance_mm: self.distance_mm,
-            baseline_mm: Instrument::default().baseline_mm,
+            baseline_mm: self.camera.collector.baseline_mm,
             collector_mm: self.budget.effective_collector_mm,
         };
         RainySpots::new(weather, &self.footprint, beams, seed).map(Some)
@@ -198,6 +217,13 @@ impl VirtualOptics {
     pub fn ideal(mut self) -> Self {
         let electrons_per_count = self.chain.electrons_per_count;
         self.chain = ChainSettings { electrons_per_count, ..ChainSettings::ideal() };
+        self
+    }
+
+    /// Takes all noise and dark current from the receiver; LEDs and amplifier stay as slow as they are.
+    #[must_use]
+    pub fn noiseless(mut self) -> Self {
+        self.chain = self.chain.noiseless();
         self
     }
 
@@ -215,8 +241,8 @@ impl VirtualOptics {
     pub fn focused_footprint(&self) -> Result<Footprint, ProjectorError> {
         let perfect = Projector {
             aperture_mm: 1e-3,
-            emitter_mm: self.projector.led_pitch_mm,
-            ..self.projector
+            emitter_mm: self.camera.projector.led_pitch_mm,
+            ..self.camera.projector
         };
         perfect.footprint(&self.scene, self.distance_mm)
     }
@@ -244,21 +270,21 @@ impl VirtualOptics {
     /// Side of the field that the LEDs light, on the target.
     #[must_use]
     pub fn field_mm(&self) -> f64 {
-        self.projector.field_mm(self.distance_mm)
+        self.camera.projector.field_mm(self.distance_mm)
     }
 
     /// Diameter of the defocus disc on the target.
     #[must_use]
     pub fn blur_mm(&self) -> f64 {
-        self.projector.blur_mm(self.distance_mm)
+        self.camera.projector.blur_mm(self.distance_mm)
     }
 
     /// Standard deviation of the defocus disc of a target at `distance_mm`, in pixels of an image of `side` x `side`: what a
     /// camera knows of its blur that knows its lens and the distance. A disc's is a fourth of its diameter.
     #[must_use]
     pub fn defocus_px(&self, distance_mm: f64, side: usize) -> f64 {
-        let pixel_mm = self.projector.field_mm(distance_mm) / side as f64;
-        self.projector.blur_mm(distance_mm) / 4.0 / pixel_mm
+        let pixel_mm = self.camera.projector.field_mm(distance_mm) / side as f64;
+        self.camera.projector.blur_mm(distance_mm) / 4.0 / pixel_mm
     }
 
     /// Electrons per ADC sample.
@@ -279,7 +305,8 @@ impl VirtualOptics {
     /// A receiver setting out of range.
     pub fn fpga(&self, seed: u64) -> Result<OpticalFpga, VirtualOpticsError> {
         let electrons_per_led = self.budget.electrons_per_led;
-        let array = LedArray::new(&self.footprint, electrons_per_led);
+        let gains = self.camera.led_gains();
+        let array = LedArray::new(&self.footprint, electrons_per_led).with_gains(&gains);
         let fpga = OpticalFpga::new(array, Chain::new(self.chain, seed)?);
         Ok(match self.spots(seed)? {
             Some(spots) => fpga.in_rain(spots, electrons_per_led),
@@ -292,7 +319,17 @@ impl VirtualOptics {
     /// # Errors
     /// A distance that it cannot read.
     pub fn depth(&self, seed: u64) -> Result<SimulatedDepth, DepthError> {
-        SimulatedDepth::new(self.distance_mm, DEPTH_NOISE_MM, 0, seed)
+        SimulatedDepth::new(self.distance_mm, self.camera.tof.noise_mm, 0, seed)
+    }
+
+    /// A reading of that sensor in the camera's image.
+    ///
+    /// # Errors
+    /// A distance that it cannot read.
+    pub fn depth_view(&self, seed: u64) -> Result<DepthView, DepthError> {
+        let reading = self.depth(seed)?.reading();
+        let field = self.camera.projector.field_over_distance();
+        Ok(self.camera.depth_geometry().view(&reading, field))
     }
 
     /// The whole camera.
@@ -304,31 +341,39 @@ impl VirtualOptics {
     }
 }
 
-/// FNV-1a, 32 bit: a short name for settings, not a checksum (Fowler, Noll and Vo).
-fn fnv1a(bytes: &[u8]) -> u32 {
-    bytes.iter().fold(0x811c_9dc5, |hash, &byte| (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn cameras_that_differ_have_different_serials_and_scenes_do_not_matter() {
-        let projector = Projector::default();
-        let of = |scene: Scene, distance_mm, chain| {
-            let budget = BudgetSettings::default();
-            VirtualOptics::with_settings(scene, distance_mm, projector, &budget, chain)
-                .unwrap()
-                .serial(3)
+        let of = |toml: &str, scene: Scene, distance_mm| {
+            let camera = CameraModel::parse(toml).unwrap();
+            VirtualOptics::of(&camera, scene, distance_mm).unwrap().serial(3)
         };
-        let chain = ChainSettings::default();
-        let near = of(Scene::white(), 300.0, chain);
-        assert_eq!(near, of(Scene::new(vec![0.1], 1, 10.0).unwrap(), 700.0, chain));
-        let slower = ChainSettings { adc_latency_clocks: 9, ..chain };
-        assert_ne!(near, of(Scene::white(), 300.0, slower));
+        let near = of("", Scene::white(), 300.0);
         assert_eq!(near, "virtual-3");
-        assert!(of(Scene::white(), 300.0, slower).starts_with("virtual-3-"));
+        assert_eq!(near, of("", Scene::new(vec![0.1], 1, 10.0).unwrap(), 700.0));
+        let dusk = "name = \"dusk\"\n[light]\nilluminance_klx = 0.1\n[weather]\nrain = \"heavy\"";
+        assert_eq!(near, of(dusk, Scene::white(), 300.0));
+        let mut serials = vec![near];
+        for toml in [
+            "[adc]\nlatency_clocks = 9",
+            "[leds]\npower_spread = 0.1",
+            "[detector]\ndiameter_mm = 0.3",
+            "basis = \"one-metre\"",
+        ] {
+            let serial = of(toml, Scene::white(), 300.0);
+            assert!(serial.starts_with("virtual-3-") && !serials.contains(&serial), "{serial}");
+            serials.push(serial);
+        }
+    }
+
+    #[test]
+    fn a_camera_of_another_wavelength_is_refused() {
+        let camera = CameraModel { wavelength_nm: 1450.0, ..CameraModel::default() };
+        let error = VirtualOptics::of(&camera, Scene::white(), 300.0).unwrap_err().to_string();
+        assert!(error.contains("wavelength_nm is 1450, expected 1550"), "{error}");
     }
 
     #[test]

@@ -1,14 +1,16 @@
 //! One picture through the whole virtual camera: light, gateware model, firmware, packets, host.
 
 use super::{MemoryLink, VirtualOptics, VirtualOpticsError};
-use crate::calibration::{CalibrationError, Settling, calibrate};
+use crate::calibration::{
+    CalibrationError, FlatField, FlatFieldError, Settling, Sweeps, calibrate, measure_flat_field,
+};
 use crate::capture::{
     Calibration, Capture, CaptureError, CaptureOptions, Ended, Progress, capture,
 };
 use crate::integrate::IntegrateError;
 use crate::session::{IgnorePackets, Session, SessionError};
 use crate::setup::MeasurementSetup;
-use nirspi_recon::Measurements;
+use nirspi_recon::{Measurements, Order, RowsError};
 use nirspi_wire::Fault;
 use std::ops::ControlFlow;
 use thiserror::Error;
@@ -41,6 +43,12 @@ pub enum ShotError {
     /// The camera did not make the frames that were asked for.
     #[error("the capture is not whole: {0}")]
     NotWhole(String),
+    /// A white sheet did not show how the LEDs differ.
+    #[error("the virtual camera's flat field is not known")]
+    FlatField(#[source] FlatFieldError),
+    /// The patterns cannot be made.
+    #[error(transparent)]
+    Rows(#[from] RowsError),
     /// The frames give no measurements.
     #[error(transparent)]
     Integrate(#[from] IntegrateError),
@@ -57,6 +65,35 @@ pub fn calibrate_against_white(optics: &VirtualOptics, seed: u64) -> Result<Sett
     let sheet = optics.white_sheet()?;
     let mut session = Session::open(Box::new(MemoryLink::new(sheet.camera(seed)?)))?;
     calibrate(&mut session, &mut IgnorePackets).map_err(ShotError::Calibration)
+}
+
+/// Sweeps of the flat field of a virtual camera: 0.9 % of noise with the paper's camera.
+const FLAT_FIELD_SWEEPS: u32 = 4000;
+
+/// The flat field of the camera behind these optics, measured against a white sheet where the lens is focused, as its user
+/// would; none for a camera whose LEDs are all alike.
+///
+/// # Errors
+/// [`ShotError`] if the sheet is too dim.
+pub fn flat_field_against_white(
+    optics: &VirtualOptics,
+    settling: &Settling,
+    seed: u64,
+) -> Result<Option<FlatField>, ShotError> {
+    if optics.camera_model().led_gains().iter().all(|&gain| gain == 1.0) {
+        return Ok(None);
+    }
+    let sheet = optics.white_sheet()?;
+    let setup = sheet.setup(&Order::Natural, 1.0)?;
+    let mut session = Session::open(Box::new(MemoryLink::new(sheet.camera(seed)?)))?;
+    let sweeps = Sweeps::of_map(FLAT_FIELD_SWEEPS);
+    let mut go_on = |_: &Progress| ControlFlow::Continue(());
+    match measure_flat_field(&mut session, &setup, settling, sweeps, &mut go_on) {
+        Ok(measured) => Ok(Some(measured.flat)),
+        // LEDs that differ by less than the noise need none.
+        Err(FlatFieldError::NothingGained { .. }) => Ok(None),
+        Err(error) => Err(ShotError::FlatField(error)),
+    }
 }
 
 /// Captures `frames` frames with the camera behind these optics, whose latency and settling are known.

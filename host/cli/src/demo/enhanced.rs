@@ -5,7 +5,7 @@ use anyhow::Result;
 use nirspi::imaging::{Enhance, ImageContext, Quality, Warning, White, compare, warnings};
 use nirspi::virtual_camera::VirtualOptics;
 use nirspi_nets::{DepthMaps, Device, deblur, upscale_2x};
-use nirspi_optics::DEPTH_SIDE;
+use nirspi_optics::SIDE;
 use nirspi_recon::{Image, Rows, Side};
 use serde::Serialize;
 
@@ -38,7 +38,7 @@ pub struct Report {
     pub noise: f32,
     /// Distance of the readings from those of the result, over their noise.
     pub inconsistency: f32,
-    /// Depth zones that saw something.
+    /// Depth zones that see the field and saw something.
     pub depth_zones: usize,
     pub device: String,
     /// Reasons not to trust the result.
@@ -56,13 +56,10 @@ pub fn run(
     seed: u64,
     times: &mut StageTimes,
 ) -> Result<Stages> {
-    let zones_m: Vec<f32> =
-        optics.depth(seed)?.reading().iter().map(|&mm| f32::from(mm) * 1e-3).collect();
-    let seen_m = seen(&zones_m);
-    let depth = DepthMaps::new(zones_m, [1, DEPTH_SIDE, DEPTH_SIDE], 1)?;
-    let defocus_px = seen_m
-        .get(seen_m.len() / 2)
-        .map(|&m| optics.defocus_px(f64::from(m) * 1e3, deblur::SIDE) as f32);
+    let view = optics.depth_view(seed)?;
+    let pixels_m = view.pixels_mm.iter().map(|&mm| f32::from(mm) * 1e-3).collect();
+    let depth = DepthMaps::new(pixels_m, [1, SIDE, SIDE], 1)?;
+    let defocus_px = view.median_mm.map(|mm| optics.defocus_px(f64::from(mm), deblur::SIDE) as f32);
     let enhance = times.time("load_networks", || Enhance::built_in(&Device::cpu()))?;
     // The gain that turns a white target at this distance into counts is known from the photon budget, as
     // a user knows it from a white sheet held there.
@@ -92,7 +89,7 @@ pub fn run(
         defocus_px,
         noise: made.noise,
         inconsistency: made.inconsistency,
-        depth_zones: seen_m.len(),
+        depth_zones: view.zones,
         device: enhance.device().name().to_owned(),
         warnings: warnings.iter().map(Warning::to_string).collect(),
         short_warnings: warnings.iter().map(|warning| warning.short().to_owned()).collect(),
@@ -106,11 +103,4 @@ pub fn run(
         deblurred: deblurred.values,
         report,
     })
-}
-
-/// Distances of the zones that saw something, sorted.
-fn seen(zones_m: &[f32]) -> Vec<f32> {
-    let mut seen: Vec<f32> = zones_m.iter().copied().filter(|&m| m > 0.0).collect();
-    seen.sort_by(f32::total_cmp);
-    seen
 }

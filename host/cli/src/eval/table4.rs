@@ -31,9 +31,11 @@ pub struct Args {
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
+    let camera = args.exposure.model.read()?;
     let settings = Settings {
         scenes: args.scenes,
-        exposure: args.exposure.exposure(),
+        exposure: args.exposure.exposure(&camera),
+        camera,
         ancestral_steps: args.ancestral.steps,
     };
     let bar = progress(settings.pictures(), "table 4");
@@ -57,7 +59,7 @@ fn say(report: &Report) -> Result<()> {
             |estimate: &Option<Estimate>| estimate.map_or_else(|| "none".to_owned(), |e| e.text(2));
         let bars = row.bars_mm.map_or_else(|| "none".to_owned(), |mm| format!("{mm:.1}"));
         print::line(format_args!(
-            "{:<20} {:<8}  {:<5}  {:<7.1}  {:<17}  {:<15}  {:<15}  {:<5}  {}",
+            "{:<20} {:<8}  {:<5.2}  {:<7.1}  {:<17}  {:<15}  {:<15}  {:<5}  {}",
             row.image.name(),
             format!("{} m", row.distance_m),
             row.pixel_mm,

@@ -65,6 +65,7 @@ pub fn run(args: &Args, first: &FirstPatterns) -> Result<ExitCode> {
         let warm = made.report.warm;
         let Solved { image, report } = args.method.solved(made);
         super::check_finite(&args.source.input, &image)?;
+        let image = source.flattened(image);
         let dropped = |d: &nirspi_recon::Dropout| {
             format!("drop-out: {} readings from y[{}] on", d.length, d.start)
         };

@@ -1,6 +1,7 @@
 //! `nirspi train degrade`: scenes and the virtual camera's pictures of them, as a file.
 
 use super::data::DataArgs;
+use crate::camera::ModelArgs;
 use crate::print;
 use anyhow::Result;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -23,6 +24,8 @@ use std::process::ExitCode;
 pub struct Args {
     #[command(flatten)]
     data: DataArgs,
+    #[command(flatten)]
+    model: ModelArgs,
     /// Pairs to make
     #[arg(long, value_name = "N", default_value_t = 1000,
           value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
@@ -53,7 +56,7 @@ struct Report {
 
 pub fn run(args: &Args) -> Result<ExitCode> {
     let (scenes, data) = args.data.data().scenes(args.seed)?;
-    let camera = LinearCamera::new(args.seed)?;
+    let camera = LinearCamera::new(&args.model.read()?, args.seed)?;
     let bar = ProgressBar::new(u64::from(args.count)).with_style(
         ProgressStyle::with_template("degrade {bar:30} {pos}/{len} pairs, {eta} left")
             .unwrap_or_else(|_| ProgressStyle::default_bar()),

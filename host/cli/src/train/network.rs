@@ -1,6 +1,7 @@
 //! The arguments of `nirspi train NETWORK`.
 
 use super::data::DataArgs;
+use crate::camera::ModelArgs;
 use nirspi_nets::device::Backend;
 use std::path::PathBuf;
 
@@ -27,6 +28,8 @@ pub struct Args {
     /// Channels of each level, as 32,64,128 [default: the shipped size]
     #[arg(long, value_name = "C,C,...", value_delimiter = ',')]
     pub width: Vec<usize>,
+    #[command(flatten)]
+    pub model: ModelArgs,
     /// Share of the examples that the virtual camera takes; formulas make the others
     #[arg(long, value_name = "0..1", default_value_t = 0.2)]
     pub camera_share: f32,

@@ -14,6 +14,7 @@ pub fn run(args: &Args, model: Model) -> Result<ExitCode> {
     let request = Request {
         settings: args.settings(model),
         data: args.data.data(),
+        camera: args.model.read()?,
         camera_share: args.camera_share,
         fsrcnn: args.fsrcnn.clone(),
         out: args.out.clone(),

@@ -47,3 +47,46 @@ fn no_calibration_needs_a_latency() {
     plain.failed(2, &["--adc-latency"]);
     assert!(bench.names().is_empty());
 }
+
+/// Bright LEDs that differ by a tenth, one of them dead.
+const UNEQUAL: &[u8] = b"[leds]\npower_mw = 40\npower_spread = 0.1\ndead = [[3, 7]]\n";
+
+#[test]
+fn a_flat_field_is_kept_for_its_camera_and_applied_to_its_pictures() {
+    let bench = Bench::new();
+    bench.write("lab.toml", UNEQUAL);
+    let lab = ["--camera-model", "lab.toml"];
+    bench
+        .run(&[&["calibrate", "--dark"][..], &lab].concat())
+        .failed(1, &["no flat field", "nirspi calibrate --white"]);
+    let white = ["calibrate", "--white", "--sweeps", "400"];
+    let report = bench.run(&[&white[..], &lab, &["--json"]].concat()).succeeded().json();
+    let flat = &report["flat_field"];
+    assert_eq!(flat["dead_leds"], serde_json::json!([[3, 7]]), "{report}");
+    let pattern = |when: &str| flat[when].as_f64().unwrap();
+    assert!(pattern("pattern_after") < pattern("pattern_before") / 10.0, "{report}");
+    let dark = ["calibrate", "--dark", "--sweeps", "40", "--json"];
+    let report = bench.run(&[&dark[..], &lab].concat()).succeeded().json();
+    // Four standard deviations of 1024 pixels.
+    assert!(report["dark_pixels"].as_u64().unwrap() <= 2, "{report}");
+
+    let capture = ["capture", "--frames", "40", "--scene", "white", "--out", "r.mcap"];
+    let picture = |more: &[&str], out: &str| {
+        let more = [more, &["--overwrite", "--picture", out]].concat();
+        bench.run(&[&capture[..], &more].concat()).succeeded();
+        bench.json(&format!("{out}/report.json"))["notes"].to_string()
+    };
+    let notes = picture(&lab, "seen");
+    assert!(notes.contains("1 dead LED (row 3 column 7)"), "{notes}");
+    let reconstruct = |more: &[&str], out: &str| {
+        bench.run(&[&["reconstruct", "r.mcap", "--out", out][..], more].concat()).succeeded();
+        bench.json(&format!("{out}/report.json"))["notes"].to_string()
+    };
+    assert!(reconstruct(&[], "again").contains("flat field of"));
+    assert!(!reconstruct(&["--no-flat-field"], "as-it-is").contains("flat field"));
+    let pixels = |out: &str| std::fs::read(bench.path(&format!("{out}/image.npy"))).unwrap();
+    assert_eq!(pixels("seen"), pixels("again"));
+    assert_ne!(pixels("again"), pixels("as-it-is"));
+    // Another camera has another serial number, and no flat field.
+    assert!(!picture(&["--seed", "2"], "other").contains("flat field"));
+}

@@ -8,6 +8,7 @@ mod arguments;
 mod bad_files;
 mod bench;
 mod calibrate;
+mod camera_model;
 mod capture_files;
 mod capture_tcp;
 mod demo;

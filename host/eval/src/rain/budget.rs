@@ -2,10 +2,10 @@
 
 use crate::error::{EvalError, Result};
 use nirspi_optics::daylight::irradiance_w_per_m2;
-use nirspi_optics::pixel::{Instrument, PixelBudget};
+use nirspi_optics::pixel::PixelBudget;
 use nirspi_optics::rain::{Drops, Weather};
 use nirspi_optics::water::Water;
-use nirspi_optics::{Budget, BudgetSettings};
+use nirspi_optics::{Budget, BudgetSettings, CameraModel};
 use serde::Serialize;
 use std::ops::RangeInclusive;
 
@@ -26,6 +26,8 @@ pub struct Settings {
     pub exposure_us: f64,
     /// Wavelengths at which daylight is compared.
     pub wavelengths_nm: Vec<f64>,
+    /// Which camera.
+    pub camera: CameraModel,
 }
 
 /// One term of the budget.
@@ -38,7 +40,7 @@ pub struct Term {
     /// The unit; empty for a ratio.
     pub unit: &'static str,
     /// The formula, or where the number is from.
-    pub how: &'static str,
+    pub how: String,
 }
 
 /// The budget of one pixel.
@@ -46,6 +48,8 @@ pub struct Term {
 pub struct Report {
     /// Always true.
     pub simulated: bool,
+    /// The camera description's name.
+    pub camera: String,
     /// Distance of the target.
     pub distance_m: f64,
     /// Reflectance of the target.
@@ -90,7 +94,7 @@ pub fn budget(settings: &Settings) -> Result<Report> {
         let expected = format!("{near} to {far} metres for a budget");
         return Err(EvalError::setting("distance_m", settings.distance_m, expected));
     }
-    let instrument = Instrument::default();
+    let instrument = settings.camera.instrument();
     let nm = instrument.budget.wavelength_nm;
     // Before anything that takes time.
     for &nm in &settings.wavelengths_nm {
@@ -104,10 +108,11 @@ pub fn budget(settings: &Settings) -> Result<Report> {
         ambient_klx: instrument.budget.ambient_klx,
         filter_width_nm: instrument.budget.filter_width_nm,
         simulated: true,
+        camera: settings.camera.name.clone(),
         distance_m,
         reflectance,
         exposure_us,
-        terms: terms(&pixel, &weather, reflectance),
+        terms: terms(&settings.camera, &pixel, &weather, reflectance),
         daylight: settings
             .wavelengths_nm
             .iter()
@@ -140,17 +145,32 @@ fn daylight(
     })
 }
 
-fn terms(pixel: &PixelBudget, weather: &Weather, reflectance: f64) -> Vec<Term> {
+fn terms(
+    camera: &CameraModel,
+    pixel: &PixelBudget,
+    weather: &Weather,
+    reflectance: f64,
+) -> Vec<Term> {
     let dry = &pixel.dry.terms;
-    let term = |name, value, unit, how| Term { name, value, unit, how };
+    let term = |name, value, unit, how: &str| Term { name, value, unit, how: how.to_owned() };
     let e = "e/sample";
+    let (light, readout) = (camera.light, camera.readout);
+    let (blanked, clocks) = (readout.blanked, readout.clocks_per_pattern);
+    let width_nm = camera.collector.filter_width_nm;
+    let light_on_target = format!(
+        "{} klx of {} within the filter of {width_nm} nm",
+        light.illuminance_klx, light.source
+    );
+    let amplifier = format!(
+        "{:.3} pA/sqrt(Hz) over pi/2 of {} MHz",
+        camera.amplifier_noise_pa_per_sqrt_hz(),
+        camera.amplifier.bandwidth_mhz
+    );
+    let adc = format!("{} dB of full scale", camera.adc.snr_db);
+    let dark = format!("{} nA", camera.detector.dark_current_na);
+    let samples = format!("exposure over ADC sample, less {blanked} blanked of {clocks}");
     vec![
-        term(
-            "LED power",
-            dry.led_power_mw,
-            "mW",
-            "assumed: what 45 W leaves room for (paper, Fig. 2)",
-        ),
+        term("LED power", dry.led_power_mw, "mW", "the camera description"),
         term("into the projection lens", dry.projected, "", "1 - cos^(m+1) of the lens's edge"),
         term("rain, way out", pixel.rain_out, "", "exp(-cL) + scattered within the LED's own spot"),
         term("target reflectance", reflectance, "", "given; Lambertian"),
@@ -159,12 +179,23 @@ fn terms(pixel: &PixelBudget, weather: &Weather, reflectance: f64) -> Vec<Term> 
             "collector in use",
             pixel.dry.effective_collector_mm,
             "mm",
-            "what the FGA015's etendue allows",
+            "its own, or what the detector's etendue allows",
         ),
         term("collected", dry.collected, "", "A / (pi D^2)"),
-        term("filter and glass", dry.transmitted, "", "assumed: 0.76 filter, 0.8 glass"),
+        term(
+            "LED's light in the filter",
+            dry.filtered,
+            "",
+            "erf(sqrt(ln 2) width / spectrum's width)",
+        ),
+        term("glass", dry.glass, "", "the camera description"),
         term("photon energy", dry.photon_j, "J", "h c / wavelength"),
-        term("quantum efficiency", dry.quantum_efficiency, "", "paper, 2.D"),
+        term(
+            "quantum efficiency",
+            dry.quantum_efficiency,
+            "",
+            "responsivity times photon energy over e",
+        ),
         term("ADC sample", dry.sample_ns, "ns", "125 MS/s"),
         term("signal: one LED", pixel.signal_electrons, e, "the product of the above"),
         term("half of the LEDs", pixel.pattern_electrons, e, "512 LEDs on this reflectance"),
@@ -175,12 +206,7 @@ fn terms(pixel: &PixelBudget, weather: &Weather, reflectance: f64) -> Vec<Term> 
             e,
             "lidar equation over the path",
         ),
-        term(
-            "daylight on the target",
-            dry.daylight_w_per_m2,
-            "W/m2",
-            "15 klx of ASTM G173 within the filter",
-        ),
+        term("daylight on the target", dry.daylight_w_per_m2, "W/m2", &light_on_target),
         term(
             "daylight from the target",
             pixel.daylight_electrons,
@@ -193,21 +219,23 @@ fn terms(pixel: &PixelBudget, weather: &Weather, reflectance: f64) -> Vec<Term> 
             e,
             "albedo (1 - exp(-cL)) of white",
         ),
-        term("dark current", pixel.dark_electrons, e, "assumed: 2 nA"),
-        term("shot noise", pixel.shot_noise, "e rms", "sqrt of all electrons"),
-        term(
-            "amplifier noise",
-            pixel.amplifier_noise,
-            "e rms",
-            "1.1 pA/sqrt(Hz) over pi/2 of 60 MHz",
-        ),
+        term("dark current", pixel.dark_electrons, e, &dark),
+        term("shot noise", pixel.shot_noise, "e rms", "sqrt of all electrons times pi B t"),
+        term("amplifier noise", pixel.amplifier_noise, "e rms", &amplifier),
         term("gain", pixel.electrons_per_count, "e/count", "the finest that fits a white target"),
-        term("ADC noise", pixel.adc_noise, "e rms", "assumed: 72 dB of full scale"),
+        term("ADC noise", pixel.adc_noise, "e rms", &adc),
         term("quantisation", pixel.quantisation_noise, "e rms", "a count over sqrt(12)"),
         term("all noise", pixel.noise, "e rms", "root of the sum of squares"),
-        term("samples", pixel.samples, "", "exposure over ADC sample"),
-        term("signal, one exposure", pixel.signal_electrons * pixel.samples, "e", ""),
-        term("noise, one exposure", pixel.noise * pixel.samples.sqrt(), "e rms", ""),
+        term("samples", pixel.samples, "", &samples),
+        term(
+            "correlation of samples",
+            pixel.correlated,
+            "",
+            "1 + 2 sum (1 - k/W) exp(-2 pi B t k)",
+        ),
+        term("settled", pixel.settled, "", "own share of the light, less half of the leak"),
+        term("signal, one exposure", pixel.exposure_signal, "e", "signal, samples, settled"),
+        term("noise, one exposure", pixel.exposure_noise, "e rms", "noise, samples, correlation"),
         term("SNR, one LED, one exposure", pixel.exposure_snr, "", ""),
         term("SNR, one pixel", pixel.pixel_snr, "", "times sqrt(1024 / 2): differential Hadamard"),
     ]
@@ -220,7 +248,9 @@ mod tests {
     fn settings() -> Settings {
         let drops = Drops::monodisperse(5.6, 2.0).unwrap();
         let wavelengths_nm = vec![550.0, 1550.0];
-        Settings { drops, distance_m: 1.0, reflectance: 1.0, exposure_us: 25.0, wavelengths_nm }
+        let camera = CameraModel::default();
+        let (distance_m, reflectance, exposure_us) = (1.0, 1.0, 25.0);
+        Settings { drops, distance_m, reflectance, exposure_us, wavelengths_nm, camera }
     }
 
     fn term(report: &Report, name: &str) -> f64 {

@@ -11,6 +11,7 @@ use nirspi_nets::train::checkpoint::Checkpoint;
 use nirspi_nets::train::{
     Enlarge, Entry, Examples, Fused, Keeper, Lanczos, Model, Outcome, Settings, check, train,
 };
+use nirspi_optics::CameraModel;
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -21,6 +22,8 @@ pub struct Request {
     pub settings: Settings,
     /// The characters.
     pub data: Data,
+    /// The virtual camera.
+    pub camera: CameraModel,
     /// Share of the examples that the virtual camera takes; formulas make the others.
     pub camera_share: f32,
     /// Weights of the FSRCNN that comes before the deblurrer; `None`: the embedded ones.
@@ -86,7 +89,9 @@ fn degradation(request: &Request) -> Result<Mixed> {
         return Ok(Mixed { analytic: AnalyticCamera::new(limits)?, camera: None });
     }
     let camera = match request.camera_share > 0.0 {
-        true => Some((LinearCamera::new(request.settings.seed)?, request.camera_share)),
+        true => {
+            Some((LinearCamera::new(&request.camera, request.settings.seed)?, request.camera_share))
+        }
         false => None,
     };
     Ok(Mixed { analytic: AnalyticCamera::new(Limits::default())?, camera })
@@ -164,7 +169,11 @@ impl Request {
             if stacks.is_empty() { "procedural scenes".to_owned() } else { stacks.join(", ") };
         let fsrcnn = if self.fsrcnn.is_some() { ", an FSRCNN of the user's" } else { "" };
         let (shapes, share) = (self.data.shapes, self.camera_share);
-        format!("{stacks}; {shapes} shapes, {share} by the virtual camera{fsrcnn}")
+        let camera = match self.camera == *CameraModel::paper() {
+            true => String::new(),
+            false => format!(" {} ({:08x})", self.camera.name, self.camera.digest()),
+        };
+        format!("{stacks}; {shapes} shapes, {share} by the virtual camera{camera}{fsrcnn}")
     }
 }
 
@@ -237,7 +246,8 @@ mod tests {
         };
         let data = Data { stacks: Vec::new(), fonts: Vec::new(), held_out: 0.1, shapes: 0.15 };
         let (camera_share, fsrcnn, resume, backend) = (0.0, None, false, Backend::Cpu);
-        Request { settings, data, camera_share, fsrcnn, out, resume, backend }
+        let camera = CameraModel::default();
+        Request { settings, data, camera, camera_share, fsrcnn, out, resume, backend }
     }
 
     #[test]

@@ -1,10 +1,12 @@
 //! Whether it rains, and how hard: dry air or one of the paper's two kinds of rain.
 
 use super::{Drops, PaperRain, RainError};
+use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// Dry air or rain as in the paper's Table 2.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Rainfall {
     /// Dry air.
     #[default]

@@ -5,6 +5,7 @@ use crate::capture::{Calibration, CaptureOptions, capture};
 use crate::setup::MeasurementSetup;
 use nirspi_nets::data::shapes::Shape;
 use nirspi_nets::data::{Purpose, stream};
+use nirspi_optics::Projector;
 use std::ops::ControlFlow;
 
 fn star() -> Vec<f32> {
@@ -43,7 +44,7 @@ fn mean_and_deviation(a: &[f32], b: &[f32]) -> (f64, f64) {
 
 #[test]
 fn a_picture_by_the_short_way_differs_from_a_capture_by_noise_alone() {
-    let camera = LinearCamera::new(1).unwrap();
+    let camera = LinearCamera::new(CameraModel::paper(), 1).unwrap();
     // Mid grey, so that no noise is clipped.
     let scene: Vec<f32> = star().iter().map(|v| 0.3 + 0.4 * v).collect();
     for (distance_mm, sweeps, sampling) in [(300.0, 60, 1.0), (450.0, 120, 0.5)] {
@@ -61,7 +62,7 @@ fn a_picture_by_the_short_way_differs_from_a_capture_by_noise_alone() {
 
 #[test]
 fn light_that_is_enough_shows_the_scene_as_the_lens_does() {
-    let camera = LinearCamera::new(1).unwrap();
+    let camera = LinearCamera::new(CameraModel::paper(), 1).unwrap();
     let mut rng = stream(2, Purpose::Training, 0);
     let conditions =
         Conditions { distance_mm: 400.0, rain: Rainfall::Heavy, sweeps: 100_000, sampling: 1.0 };
@@ -76,7 +77,7 @@ fn light_that_is_enough_shows_the_scene_as_the_lens_does() {
 
 #[test]
 fn pictures_are_of_their_seed_alone_and_in_range() {
-    let camera = LinearCamera::new(1).unwrap();
+    let camera = LinearCamera::new(CameraModel::paper(), 1).unwrap();
     for index in 0..12 {
         let taken = || camera.degrade(&star(), &mut stream(9, Purpose::Training, index)).unwrap();
         let reading = taken();

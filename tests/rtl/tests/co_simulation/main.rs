@@ -13,7 +13,7 @@ use nirspi::capture::{Calibration, Capture, CaptureOptions, Ended, capture};
 use nirspi::session::{IgnorePackets, Session, request};
 use nirspi::setup::MeasurementSetup;
 use nirspi::virtual_camera::{MemoryLink, SimulatedFpga, VirtualCamera, VirtualOptics};
-use nirspi_optics::{BudgetSettings, ChainSettings, Projector, Scene};
+use nirspi_optics::Scene;
 use nirspi_recon::{Measurements, Order, Rows, Side, fwht, metrics, reconstruct};
 use nirspi_tests_rtl::RtlFpga;
 use nirspi_wire::fpga::FpgaFrame;
@@ -44,16 +44,7 @@ fn ideal() -> VirtualOptics {
 
 /// LEDs, amplifier and ADC with their default settling times, without noise.
 fn noiseless() -> VirtualOptics {
-    let mut chain = ChainSettings::default();
-    (chain.shot_noise, chain.amplifier_noise_electrons) = (false, 0.0);
-    VirtualOptics::with_settings(
-        scene(),
-        300.0,
-        Projector::default(),
-        &BudgetSettings::default(),
-        chain,
-    )
-    .unwrap()
+    VirtualOptics::new(scene(), 300.0).unwrap().noiseless()
 }
 
 fn session<F: SimulatedFpga + 'static>(optics: &VirtualOptics, fpga: F) -> Session {

@@ -1,0 +1,90 @@
+//! `nirspi camera-model`: a camera description, and what follows from it.
+
+use super::print;
+use anyhow::Result;
+use nirspi::virtual_camera::read_camera_model;
+use nirspi_eval::camera_model::{Report, camera_model};
+use std::process::ExitCode;
+
+/// Say what follows from a camera description: field, light, noise, eye safety; or print the description
+///
+/// A description is a TOML file. It needs only the keys that differ from the paper's camera, or from the camera that it names
+/// as `basis`. Every command that simulates takes one: --camera-model NAME or FILE.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n\
+    \x20 nirspi camera-model one-metre\n\
+    \x20 nirspi camera-model paper --print > lab.toml\n\
+    \x20 nirspi demo --camera-model lab.toml --out demo/")]
+pub struct Args {
+    /// paper, fga015, one-metre or a TOML file
+    #[arg(value_name = "NAME|FILE", default_value = "paper")]
+    camera_model: String,
+    /// Print the whole description as TOML
+    #[arg(long, conflicts_with = "json")]
+    print: bool,
+    /// Print the report as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(args: &Args) -> Result<ExitCode> {
+    let camera = read_camera_model(&args.camera_model)?;
+    if args.print {
+        let remarked = camera_with_remarks(&args.camera_model);
+        print::line(remarked.map_or_else(|| camera.to_toml(), str::to_owned).trim_end())?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let report = camera_model(&camera)?;
+    if args.json {
+        print::json(&report)?;
+    } else {
+        say(&report)?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The shipped file of this name, if it is complete: the others say only what differs.
+fn camera_with_remarks(name: &str) -> Option<&'static str> {
+    nirspi::virtual_camera::CameraModel::shipped_text(name).filter(|text| !text.contains("\nbasis"))
+}
+
+fn say(report: &Report) -> Result<()> {
+    print::line(format_args!("camera {} (simulated)", report.camera))?;
+    print::line(format_args!(
+        "one picture: {} sweeps of {:.2} us, {:.1} ms of light",
+        report.sweeps, report.sweep_us, report.picture_ms
+    ))?;
+    print::line(format_args!(
+        "detector: {:.3} electrons a photon; amplifier: {:.2} pA/sqrt(Hz), needs a gain-bandwidth product of {:.2} GHz",
+        report.quantum_efficiency, report.amplifier_noise_pa_per_sqrt_hz, report.gain_bandwidth_ghz
+    ))?;
+    print::line(
+        "distance  field mm  pixel mm  defocus mm  line at 10 % mm  light of one LED e/sample  SNR of a white pixel",
+    )?;
+    for at in &report.distances {
+        print::line(format_args!(
+            "{:6.2} m  {:8.1}  {:8.2}  {:10.1}  {:>15}  {:25.2}  {:20.1}",
+            at.distance_m,
+            at.field_mm,
+            at.pixel_mm,
+            at.defocus_mm,
+            at.line_mm.map_or_else(|| "none".to_owned(), |mm| format!("{mm:.2}")),
+            at.electrons_per_led,
+            at.picture_snr
+        ))?;
+    }
+    let eye = &report.eye_safety;
+    let longest = eye.longest_at_lens_s.map_or_else(
+        || "without end".to_owned(),
+        |s| format!("for {:.0} minutes at the lens", s / 60.0),
+    );
+    print::line(format_args!(
+        "eyes: {:.1} mW through the lens, {:.1} W/m2 at it and {:.1} W/m2 at 0.2 m; the limit for long exposures is {} W/m2 \
+         (ICNIRP 2013, IEC 62471): {longest}; {:.0} mW leave the bare array. Computed, not measured",
+        eye.through_lens_mw,
+        eye.at_lens_w_per_m2,
+        eye.at_200_mm_w_per_m2,
+        eye.limit_w_per_m2,
+        eye.array_mw
+    ))
+}

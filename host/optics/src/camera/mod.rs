@@ -1,0 +1,256 @@
+//! The camera description: every optical, electronic and geometric constant of a camera in one type, read from TOML.
+//!
+//! # Invariant
+//! A constant of the camera stands in `host/optics/cameras/*.toml` and nowhere in the code. Photon budget, range, virtual
+//! camera and training take their settings from a [`CameraModel`]: [`CameraModel::projector`],
+//! [`CameraModel::budget_settings`], [`CameraModel::chain_settings`] and [`CameraModel::instrument`]. The test
+//! `the_budget_is_that_of_the_camera_simulated` (`host/tests/budget.rs`) holds the budget to the virtual camera.
+
+mod file;
+mod views;
+
+pub use file::CameraModelError;
+
+use crate::Projector;
+use crate::lamp::LightSource;
+use crate::rain::Rainfall;
+use serde::{Deserialize, Serialize};
+use std::sync::LazyLock;
+
+/// The cameras that are shipped: name and description.
+const SHIPPED: [(&str, &str); 3] = [
+    ("paper", include_str!("../../cameras/paper.toml")),
+    ("fga015", include_str!("../../cameras/fga015.toml")),
+    ("one-metre", include_str!("../../cameras/one-metre.toml")),
+];
+
+/// A camera: LEDs, optics, receiver, and the light and weather that it works in.
+///
+/// Its default is the paper's camera (`paper.toml`): the networks were trained and the published tables were made with
+/// that camera.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CameraModel {
+    /// For reports.
+    pub name: String,
+    /// Wavelength of the LEDs.
+    pub wavelength_nm: f64,
+    /// The LED array.
+    pub leds: Leds,
+    /// The lens before the array.
+    pub projector: Projector,
+    /// The optics before the detector.
+    pub collector: Collector,
+    /// The photodiode.
+    pub detector: Detector,
+    /// The amplifier.
+    pub amplifier: Amplifier,
+    /// The ADC.
+    pub adc: Adc,
+    /// How long patterns are shown, and which samples count.
+    pub readout: Readout,
+    /// The light that falls on the target besides the LEDs'.
+    pub light: Light,
+    /// What falls between camera and target.
+    pub weather: WeatherSection,
+    /// The time-of-flight sensor.
+    pub tof: TofSensor,
+}
+
+/// The LEDs of the array, 32 x 32.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Leds {
+    /// Optical power of one lit LED.
+    pub power_mw: f64,
+    /// Width of the spectrum at half height; the spectrum is taken as Gaussian.
+    pub spectrum_fwhm_nm: f64,
+    /// Angle off its axis at which an LED's radiant intensity has halved.
+    pub half_angle_deg: f64,
+    /// Rise and fall time from 10 to 90 %.
+    pub edge_ns: f64,
+    /// Standard deviation of the power from LED to LED, as a share of the mean.
+    pub power_spread: f64,
+    /// Standard deviation of the pointing along each axis.
+    pub pointing_spread_deg: f64,
+    /// Which array of that spread.
+    pub spread_seed: u32,
+    /// LEDs that stay dark: row and column, 0 to 31.
+    pub dead: Vec<[u32; 2]>,
+}
+
+/// The optics before the detector.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Collector {
+    /// Diameter of the lens.
+    pub aperture_mm: f64,
+    /// Distance between projector and collector.
+    pub baseline_mm: f64,
+    /// Share of the light that all glass from LED to detector lets through.
+    pub glass_transmission: f64,
+    /// Width of the band-pass filter around the wavelength.
+    pub filter_width_nm: f64,
+}
+
+/// The photodiode.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Detector {
+    /// Diameter of the active area.
+    pub diameter_mm: f64,
+    /// Numerical aperture of the light on it.
+    pub numerical_aperture: f64,
+    /// Photocurrent over light at the wavelength of the LEDs.
+    pub responsivity_a_per_w: f64,
+    /// Capacitance at its working voltage.
+    pub capacitance_pf: f64,
+    /// Dark current at its working voltage.
+    pub dark_current_na: f64,
+}
+
+/// The transimpedance amplifier: one pole.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Amplifier {
+    /// Bandwidth at -3 dB.
+    pub bandwidth_mhz: f64,
+    /// Feedback resistor.
+    pub feedback_kohm: f64,
+    /// Voltage noise of the operational amplifier.
+    pub voltage_noise_nv_per_sqrt_hz: f64,
+    /// Capacitance at its input besides the photodiode's.
+    pub input_capacitance_pf: f64,
+}
+
+/// The ADC, of 14 bit at 125 MS/s.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Adc {
+    /// Signal-to-noise ratio of a full-scale sine.
+    pub snr_db: f64,
+    /// Reading in the dark.
+    pub offset_counts: u32,
+    /// Clocks from the end of a sample to its code.
+    pub latency_clocks: u32,
+}
+
+/// How patterns are shown and samples are taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Readout {
+    /// ADC clocks of 8 ns that each pattern is shown.
+    pub clocks_per_pattern: u32,
+    /// Samples left out at the start of each pattern.
+    pub blanked: u32,
+    /// Differential sweeps summed into one picture.
+    pub sweeps_per_picture: u32,
+}
+
+/// Light on the target besides the LEDs'.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Light {
+    /// Where it comes from.
+    pub source: LightSource,
+    /// How bright it is.
+    pub illuminance_klx: f64,
+}
+
+/// What falls between camera and target.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WeatherSection {
+    /// Dry air or the paper's rain.
+    pub rain: Rainfall,
+}
+
+/// The time-of-flight sensor of 8 x 8 zones.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TofSensor {
+    /// Wavelength of its light.
+    pub wavelength_nm: f64,
+    /// Angle that the 8 zones of a row cover.
+    pub fov_deg: f64,
+    /// Place of the sensor right of the projector's axis, seen from the camera.
+    pub offset_x_mm: f64,
+    /// Place of the sensor below the projector's axis.
+    pub offset_y_mm: f64,
+    /// Noise of a zone, rms.
+    pub noise_mm: f64,
+}
+
+static PAPER: LazyLock<CameraModel> = LazyLock::new(|| {
+    CameraModel::named("paper").expect("the shipped cameras are read by a test of this module")
+});
+
+impl Default for CameraModel {
+    fn default() -> Self {
+        Self::paper().clone()
+    }
+}
+
+impl CameraModel {
+    /// The paper's camera.
+    #[must_use]
+    pub fn paper() -> &'static Self {
+        &PAPER
+    }
+
+    /// The names of the shipped cameras.
+    pub fn names() -> impl Iterator<Item = &'static str> {
+        SHIPPED.iter().map(|(name, _)| *name)
+    }
+
+    /// The shipped camera of this name; none if there is none.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        // A test reads each of them.
+        file::read(Self::shipped_text(name)?).ok()
+    }
+
+    /// The description of the shipped camera of this name, as its TOML file has it.
+    #[must_use]
+    pub fn shipped_text(name: &str) -> Option<&'static str> {
+        SHIPPED.iter().find(|(shipped, _)| *shipped == name).map(|(_, text)| *text)
+    }
+
+    /// Reads a description. What it does not say is as in the shipped camera that it names as `basis`, and without one as
+    /// in the paper's camera.
+    ///
+    /// # Errors
+    /// [`CameraModelError`], one line with the key, what was found and what was expected.
+    pub fn parse(toml: &str) -> Result<Self, CameraModelError> {
+        file::read(toml)
+    }
+
+    /// The whole description as TOML, without remarks.
+    #[must_use]
+    pub fn to_toml(&self) -> String {
+        file::write(self)
+    }
+
+    /// A short name of everything in the description: FNV-1a, 32 bit, no checksum (Fowler, Noll and Vo).
+    #[must_use]
+    pub fn digest(&self) -> u32 {
+        fnv1a(format!("{self:?}").as_bytes())
+    }
+
+    /// Checks all ranges, for a description that was changed after it was read.
+    ///
+    /// # Errors
+    /// [`CameraModelError::Value`] naming the key.
+    pub fn validate(&self) -> Result<(), CameraModelError> {
+        file::check(self)
+    }
+}
+
+/// FNV-1a, 32 bit.
+#[must_use]
+pub fn fnv1a(bytes: &[u8]) -> u32 {
+    bytes.iter().fold(0x811c_9dc5, |hash, &byte| (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,175 @@
+//! Measures a flat field with a camera before a white sheet, and a dark frame with the lens covered.
+
+use super::{FlatField, FramesError, pattern_noise};
+use crate::calibration::Settling;
+use crate::capture::{Calibration, CaptureError, CaptureOptions, Ended, Progress, capture};
+use crate::integrate::IntegrateError;
+use crate::session::Session;
+use crate::setup::MeasurementSetup;
+use nirspi_recon::{Image, reconstruct};
+use serde::{Deserialize, Serialize};
+use std::ops::ControlFlow;
+use thiserror::Error;
+
+/// Noise of a pixel of the white sheet, as a share of white, above which a flat field would spoil images.
+const NOISIEST: f64 = 0.05;
+
+/// How many differential sweeps of all patterns are summed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Sweeps {
+    /// For the flat field.
+    pub map: u32,
+    /// For each of two further images of the sheet, which say how well it corrects.
+    pub check: u32,
+}
+
+impl Sweeps {
+    /// `map` sweeps for the flat field, and an eighth of that for each image that checks it.
+    #[must_use]
+    pub fn of_map(map: u32) -> Self {
+        Self { map, check: (map / 8).max(1) }
+    }
+}
+
+/// A flat field, and what it does to images of the sheet that it was not made from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Measured {
+    /// The flat field.
+    pub flat: FlatField,
+    /// Pattern of the sheet's images as they come, as a share of white.
+    pub pattern_before: f64,
+    /// The same once they are corrected.
+    pub pattern_after: f64,
+    /// Noise of a pixel of the flat field, as a share of white.
+    pub noise: f64,
+}
+
+/// Why there is no flat field. `Display` is one line.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum FlatFieldError {
+    /// The camera would not measure.
+    #[error(transparent)]
+    Capture(#[from] CaptureError),
+    /// The frames give no measurements.
+    #[error(transparent)]
+    Integrate(#[from] IntegrateError),
+    /// Not all frames came.
+    #[error("{received} of {asked} sweeps were received before the capture ended, expected all")]
+    Ended {
+        /// Frames received.
+        received: u64,
+        /// Frames asked for.
+        asked: u32,
+    },
+    /// The image is no white sheet's.
+    #[error(transparent)]
+    Frames(#[from] FramesError),
+    /// Too little light for the sweeps.
+    #[error(
+        "the noise of a pixel is {:.1} % of white after {sweeps} sweeps, expected at most {:.0} %: hold the sheet nearer or \
+         sum more sweeps", 100.0 * noise, 100.0 * NOISIEST
+    )]
+    Noisy {
+        /// Noise over white.
+        noise: f64,
+        /// Sweeps summed.
+        sweeps: u32,
+    },
+    /// The LEDs are more alike than the flat field can tell.
+    #[error(
+        "the LEDs differ by {:.2} % and the flat field would leave {:.2} %: no flat field is needed, or one of more sweeps",
+        100.0 * before, 100.0 * after
+    )]
+    NothingGained {
+        /// Pattern without it.
+        before: f64,
+        /// Pattern with it.
+        after: f64,
+    },
+}
+
+/// Takes pictures with a camera whose latency and settling are known.
+struct Camera<'c> {
+    session: &'c mut Session,
+    setup: &'c MeasurementSetup,
+    settling: &'c Settling,
+    watch: &'c mut dyn FnMut(&Progress) -> ControlFlow<()>,
+}
+
+impl Camera<'_> {
+    fn image(&mut self, sweeps: u32) -> Result<Image, FlatFieldError> {
+        let options = CaptureOptions {
+            setup: self.setup.clone(),
+            frames: Some(sweeps),
+            calibration: Calibration::Kept(self.settling.clone()),
+            record: None,
+        };
+        let captured = capture(self.session, &options, self.watch)?;
+        if !matches!(captured.ended, Ended::Complete) || !captured.counters.is_complete() {
+            let received = captured.counters.received;
+            return Err(FlatFieldError::Ended { received, asked: sweeps });
+        }
+        let settling = captured.settling.as_ref();
+        let measurements = captured.integrated.measurements(&captured.setup, settling, false)?;
+        Ok(reconstruct::hadamard(&measurements))
+    }
+
+    /// Two images of `sweeps` each, and the noise of one of their pixels, rms.
+    fn pair(&mut self, sweeps: u32) -> Result<(Image, Image, f64), FlatFieldError> {
+        let (a, b) = (self.image(sweeps)?, self.image(sweeps)?);
+        let squares = a.pixels().iter().zip(b.pixels()).map(|(a, b)| f64::from(a - b).powi(2));
+        let noise = (squares.sum::<f64>() / 2.0 / a.pixels().len() as f64).sqrt();
+        Ok((a, b, noise))
+    }
+}
+
+/// Measures the flat field of a camera that looks at a white sheet which fills its field. `setup` must have all patterns and
+/// their complements. `watch` is called while frames come and may break to stop.
+///
+/// # Errors
+/// [`FlatFieldError`] if frames are missing, the sheet is too dim or does not fill the field, or nothing would be gained.
+pub fn measure_flat_field(
+    session: &mut Session,
+    setup: &MeasurementSetup,
+    settling: &Settling,
+    sweeps: Sweeps,
+    watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+) -> Result<Measured, FlatFieldError> {
+    let mut camera = Camera { session, setup, settling, watch };
+    let white = camera.image(sweeps.map)?;
+    let (a, b, check_noise) = camera.pair(sweeps.check)?;
+    let noise_counts = check_noise * (f64::from(sweeps.check) / f64::from(sweeps.map)).sqrt();
+    let flat = FlatField::of_white(&white, noise_counts as f32)?;
+    let mean = white.pixels().iter().map(|&v| f64::from(v)).sum::<f64>() / 1024.0;
+    let noise = noise_counts / mean;
+    if noise > NOISIEST {
+        return Err(FlatFieldError::Noisy { noise, sweeps: sweeps.map });
+    }
+    let pattern_before = pattern_noise(&a, &b);
+    let pattern_after = pattern_noise(&flat.correct(&a), &flat.correct(&b));
+    if pattern_after >= pattern_before {
+        let (before, after) = (pattern_before, pattern_after);
+        return Err(FlatFieldError::NothingGained { before, after });
+    }
+    Ok(Measured { flat, pattern_before, pattern_after, noise })
+}
+
+/// Measures the dark frame of a camera whose lens is covered, and gives the flat field with it. `sweeps` are summed twice.
+///
+/// # Errors
+/// [`FlatFieldError`] if frames are missing, or the lens is not covered.
+pub fn measure_dark(
+    session: &mut Session,
+    setup: &MeasurementSetup,
+    settling: &Settling,
+    flat: FlatField,
+    sweeps: u32,
+    watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+) -> Result<FlatField, FlatFieldError> {
+    let mut camera = Camera { session, setup, settling, watch };
+    let (a, b, noise) = camera.pair(sweeps)?;
+    let mean = a.pixels().iter().zip(b.pixels()).map(|(a, b)| (a + b) / 2.0).collect();
+    let dark = Image::new(a.side(), mean);
+    Ok(flat.with_dark(&dark, (noise / 2.0_f64.sqrt()) as f32)?)
+}
