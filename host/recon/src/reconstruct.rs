@@ -45,18 +45,13 @@ use pursuit::{Found, How};
 use std::str::FromStr;
 use thiserror::Error;
 
-/// The order in which to take a part of recorded measurements, where the recorded one does not serve.
+/// The order in which to take a part of measurements, unless the user names another: lowest sequencies first, whatever order
+/// they were recorded in. Most of a scene is in its lowest sequencies; the first part of a raster of patterns (`natural`,
+/// `sequency`, `walsh-2d`) leaves out the finer half of one direction, and an image of it is folded onto itself or smeared.
 ///
-/// A recording's own order is the user's choice and stays (`None`). The first part of the *natural* order, though,
-/// shows only patterns that repeat themselves, and a partial image from it is folded onto itself; a recording in
-/// natural order (ascending rows) is therefore taken in zig-zag order. By this module's last table it is ahead of
-/// cake-cutting up to 20 % on average, and level at 30 %; cake-cutting suits pages and signs full of upright and
-/// level edges better.
-#[must_use]
-pub fn default_selection(rows: &[u32]) -> Option<Order> {
-    let natural = rows.len() > 1 && rows.is_sorted_by(|a, b| a < b);
-    natural.then_some(Order::ZigZag)
-}
+/// By this module's last table zig-zag is ahead of cake-cutting up to 20 % on average, and level at 30 %; cake-cutting suits
+/// pages and signs full of upright and level edges better.
+pub const LOWEST_SEQUENCIES: Order = Order::ZigZag;
 
 /// How many atoms [`omp()`] chooses.
 #[derive(Debug, Clone, Copy, PartialEq)]
