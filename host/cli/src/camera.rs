@@ -19,7 +19,8 @@ const SCENE_PX: usize = 256;
 /// What stands before a virtual camera.
 #[derive(Debug, Clone, Args)]
 pub struct SceneArgs {
-    /// What the virtual camera looks at: letter:R (43 mm, bright on dark), white (a sheet) or a PNG file (fills the field)
+    /// What the virtual camera looks at: letter:R (43 mm, bright on dark), word:STOP, white (a sheet), or a PNG or JPEG
+    /// file (fills the field)
     #[arg(long, value_name = "SCENE", default_value = "letter:R")]
     pub scene: String,
     /// Distance from the virtual camera to the target, in metres
@@ -115,7 +116,7 @@ pub struct SetupArgs {
 impl SetupArgs {
     /// The setup asked for.
     pub fn setup(&self, default_sampling: f64) -> Result<MeasurementSetup> {
-        let order = parse_order(&self.order)?;
+        let order = parse_order("--order", &self.order)?;
         if self.blanked >= self.clocks_per_pattern {
             let (blanked, clocks) = (self.blanked, self.clocks_per_pattern);
             return Err(Usage(format!(
@@ -142,12 +143,12 @@ fn order_help() -> String {
     )
 }
 
-/// An order by name, or a user's own from a file.
-pub fn parse_order(name: &str) -> Result<Order> {
+/// An order by name, or a user's own from a file, as an option says it.
+pub fn parse_order(option: &str, name: &str) -> Result<Order> {
     if let Some(path) = name.strip_prefix("table:") {
         return Ok(Order::Table(read_order_table(Path::new(path))?));
     }
-    Order::from_str(name).map_err(|error| Usage(format!("--order: {error} or table:FILE")).into())
+    Order::from_str(name).map_err(|error| Usage(format!("{option}: {error} or table:FILE")).into())
 }
 
 /// A share of patterns is more than 0 and at most 1.

@@ -5,7 +5,7 @@
 //! leaves ties to an unstable sort, up to these ties. Held against tables that the packages themselves have made
 //! (`others.txt`, by `scripts/orders_of_others.py`) by `order::tests::orders_of_other_packages_are_theirs`.
 
-use super::{Pattern, patterns, sorted, walsh_row};
+use super::{Pattern, sorted, walsh_row};
 use crate::Side;
 
 /// SPyRiT's `HadamSplit2d(n)` and `walsh_matrix_2d`: the grid of two sequencies, row by row.
@@ -64,5 +64,5 @@ fn transposed(side: Side, row: u32) -> u32 {
 /// The patterns of a side by their row.
 #[cfg(test)]
 pub(super) fn by_row(side: Side) -> Vec<Pattern> {
-    patterns(side)
+    super::patterns(side)
 }
