@@ -144,7 +144,7 @@ def sequency_row(s, count):
 raster = np.array([sequency_row(i, m) * m + sequency_row(j, m) for i in range(m) for j in range(m)])
 by_row = np.empty(m * m)
 by_row[car_rows] = d
-pair = np.stack((by_row[raster], np.zeros(m * m)), 1).ravel()
+pair = np.stack((whole + by_row[raster], whole - by_row[raster]), 1).ravel() / 2
 np.save(out / "spyrit.npy", pair.reshape(1, 1, -1).astype(np.float32))
 case("spyrit.npy", car_image, "--shown", "walsh-2d")
 np.save(out / "part.npy", by_row[raster][:600])

@@ -2,7 +2,7 @@
 //!
 //! The law: a comma is never guessed to be a decimal one. It is one where the file itself shows it (numbers are separated by
 //! semicolons, tabs or blanks; a number has digits that no whole number has, as in `0,05` or `1,5E-3`; lines have commas in some
-//! numbers and none in others), or where the user says so.
+//! numbers and none in others), or where the user says so. One comma a line under a heading with one comma parts two columns.
 
 use super::FileError;
 use super::archive::read_large_text;
@@ -55,7 +55,7 @@ pub(super) fn read(path: &Path, decimal_comma: bool) -> Result<Numbers, FileErro
     if body.is_empty() {
         return Err(FileError::kind(path, "a text file without numbers", EXPECTED));
     }
-    let separators = Separators::of(path, body, decimal_comma)?;
+    let separators = Separators::of(path, heading, body, decimal_comma)?;
     let mut rows: Vec<Vec<f64>> = Vec::new();
     for &(line, content) in body {
         let row = separators
@@ -106,7 +106,12 @@ struct Separators {
 }
 
 impl Separators {
-    fn of(path: &Path, body: &[(usize, &str)], decimal_comma: bool) -> Result<Self, FileError> {
+    fn of(
+        path: &Path,
+        heading: Option<&str>,
+        body: &[(usize, &str)],
+        decimal_comma: bool,
+    ) -> Result<Self, FileError> {
         let has = |mark: char| body.iter().any(|(_, line)| line.contains(mark));
         let between = [';', '\t'].into_iter().find(|&mark| has(mark));
         let decimal = |between: Option<char>, decimal| {
@@ -149,6 +154,10 @@ impl Separators {
             };
             if commas.contains(&0) || body.iter().any(shows_decimals) {
                 return decimal(None, ',');
+            }
+            // Two names over two columns.
+            if heading.is_some_and(|heading| heading.matches(',').count() == 1) {
+                return decimal(Some(','), '.');
             }
             return Err(FileError::field(
                 path,
@@ -227,6 +236,9 @@ mod tests {
         assert!(message.contains("one comma a line") && message.contains("--decimal-comma"));
         let Numbers::Table(field) = read(&path, true).unwrap() else { panic!("a table") };
         assert_eq!(field.real, [1.5, 2.5]);
+        let (_folder, path) = file("y.csv", b"h_row,d\n0,15\n3,-4\n");
+        let Numbers::Columns(columns) = read(&path, false).unwrap() else { panic!("columns") };
+        assert_eq!(columns[1].1.real, [15.0, -4.0]);
         let (_folder, path) = file("y.txt", b"1,5;2.5\n");
         assert!(line(&read(&path, false).err().unwrap(), "y.txt").contains("points and commas"));
     }

@@ -3,10 +3,9 @@
 use crate::bench::Bench;
 
 /// Lines that are not run, and why.
-const NOT_RUN: [(&str, &str); 3] = [
+const NOT_RUN: [(&str, &str); 2] = [
     ("virtual", "runs until it is stopped; tests/cli/capture_tcp.rs"),
     ("capture --camera tcp:", "needs the camera of another terminal; tests/cli/capture_tcp.rs"),
-    ("eval sampling", "minutes without optimisation; host/eval/src/sampling.rs"),
 ];
 
 /// What follows `cargo run --release -- ` in blocks of shell commands, without comments.

@@ -1,6 +1,7 @@
 //! How many atoms, and how far to trust what they predict: asked of measurements that were held back.
 //!
-//! The one law: a prediction is judged only on rows it has not seen.
+//! The one law: a prediction is judged only on rows it has not seen. Rows that were not measured are finer than those that were, as a
+//! rule, so a prediction counts only if it is better than zero on the finest half of these, by more than chance.
 
 use super::Problem;
 use crate::omp::OmpError;
@@ -24,17 +25,51 @@ const SPARSITIES: usize = 10;
 /// Splits the measurements into folds; the split is part of the result, so it never changes.
 const SPLIT_SEED: u64 = 0x5eed;
 
+/// Standard errors by which a prediction must be better than zero on fine rows.
+const SURE: f64 = 2.0;
+
 /// How far a prediction is from what was held back.
 #[derive(Debug, Clone, Copy, Default)]
 struct Miss {
     absolute: f64,
     squared: f64,
+    fine: Gain,
+}
+
+/// By how much a prediction of fine rows is better than zero: sums of each row's gain in magnitude and in square, and of their
+/// products.
+#[derive(Debug, Clone, Copy, Default)]
+struct Gain {
+    absolute: f64,
+    squared: f64,
+    products: [f64; 3],
+}
+
+impl Gain {
+    fn of(value: f64, error: f64) -> Self {
+        let (absolute, squared) = (value.abs() - error.abs(), value * value - error * error);
+        let products = [absolute * absolute, 2.0 * absolute * squared, squared * squared];
+        Self { absolute, squared, products }
+    }
+
+    /// Whether the gain, each kind relative to zero filling's miss, is more than chance.
+    fn is_sure(&self, zero: Miss) -> bool {
+        let (a, b) = (1.0 / zero.absolute, 1.0 / zero.squared);
+        let [aa, ab, bb] = self.products;
+        let gain = a * self.absolute + b * self.squared;
+        gain > SURE * (a * a * aa + a * b * ab + b * b * bb).sqrt()
+    }
 }
 
 impl Miss {
     fn add(&mut self, other: Self) {
         self.absolute += other.absolute;
         self.squared += other.squared;
+        self.fine.absolute += other.fine.absolute;
+        self.fine.squared += other.fine.squared;
+        for (sum, product) in self.fine.products.iter_mut().zip(other.fine.products) {
+            *sum += product;
+        }
     }
 
     /// Relative to zero filling's, each kind counting alike: 2 is as bad as that.
@@ -84,6 +119,9 @@ pub(super) fn choose_among(
     predict: impl Fn(&[usize]) -> Result<Vec<Vec<f32>>, OmpError> + Sync,
 ) -> Result<Option<(usize, f32)>, OmpError> {
     let fold_of = split(problem, folds);
+    let mut is_fine = vec![false; problem.rows.len()];
+    let by_sequency = order::positions_by_sequency(problem.rows);
+    by_sequency[by_sequency.len() / 2..].iter().for_each(|&k| is_fine[k] = true);
     let parts: Vec<(Vec<usize>, Vec<usize>)> = (0..folds)
         .map(|fold| (0..problem.rows.len()).partition(|&k| fold_of[k] != Some(fold)))
         .filter(|(kept, held): &(Vec<_>, Vec<_>)| !kept.is_empty() && !held.is_empty())
@@ -93,7 +131,7 @@ pub(super) fn choose_among(
     }
     let results: Result<Vec<Misses>, OmpError> = parts
         .par_iter()
-        .map(|(kept, held)| Ok(misses_of(problem, &predict(kept)?, held)))
+        .map(|(kept, held)| Ok(misses_of(problem, &predict(kept)?, held, &is_fine)))
         .collect();
     let mut total: Misses = vec![Default::default(); count];
     for misses in results? {
@@ -106,7 +144,7 @@ pub(super) fn choose_among(
     for (at, misses) in total.iter().enumerate() {
         for (&trust, miss) in TRUST.iter().zip(misses) {
             let relative = miss.relative_to(zero_filling);
-            if relative < best.1 {
+            if relative < best.1 && miss.fine.is_sure(zero_filling) {
                 best = ((at, trust), relative);
             }
         }
@@ -115,14 +153,21 @@ pub(super) fn choose_among(
 }
 
 /// How far each prediction, and each share of it, is from what was held back.
-fn misses_of(problem: &Problem<'_>, predictions: &[Vec<f32>], held: &[usize]) -> Misses {
+fn misses_of(
+    problem: &Problem<'_>,
+    predictions: &[Vec<f32>],
+    held: &[usize],
+    is_fine: &[bool],
+) -> Misses {
     let miss_of = |predicted: &Vec<f32>| {
         TRUST.map(|trust| {
             let mut miss = Miss::default();
             for &k in held {
                 let row = problem.rows[k] as usize;
+                let value = f64::from(problem.values[k]);
                 let error = f64::from(problem.values[k] - trust * predicted[row]);
-                miss.add(Miss { absolute: error.abs(), squared: error * error });
+                let fine = if is_fine[k] { Gain::of(value, error) } else { Gain::default() };
+                miss.add(Miss { absolute: error.abs(), squared: error * error, fine });
             }
             miss
         })

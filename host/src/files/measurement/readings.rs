@@ -92,7 +92,10 @@ pub(super) fn readings_field(fields: &Fields, want: &Selection) -> Result<String
     if let Some(field) = &want.field {
         return match fields.holds(field) {
             true => Ok(field.clone()),
-            false => missing("--field", "--field with one of these names"),
+            false => {
+                let expected = format!("--field with one of {}", fields.names().join(", "));
+                Err(FileError::field(fields.path(), field.clone(), "is not in the file", expected))
+            }
         };
     }
     // The only field of a file without rows can be nothing but the readings.

@@ -408,7 +408,10 @@ fn an_order_gives_the_rows_of_readings_alone_and_is_never_guessed() {
     let line = refusal(&good(), &Selection { side: Side::new(4).ok(), ..as_is() });
     assert!(line.ends_with("`n` is 2, expected 4 as --side says"), "{line}");
     let line = refusal(&good(), &Selection { field: Some("z".to_owned()), ..as_is() });
-    assert!(line.contains("found `d`, `h_row`") && line.contains("--field"), "{line}");
+    assert!(
+        line.contains("`z` is not in the file, expected --field with one of d, h_row"),
+        "{line}"
+    );
 }
 
 #[test]
