@@ -11,8 +11,8 @@ pub const EDGE_ANGLE_DEG: f64 = 5.0;
 /// Width of the bins that pixels are sorted into by their distance from the edge, in pixels.
 const BIN_PX: f64 = 0.25;
 
-/// Reach of the edge's profile to either side, in pixels.
-const REACH_PX: f64 = 13.0;
+/// Reach of the edge's profile to either side, as a part of the picture's side.
+const REACH: f64 = 13.0 / 32.0;
 
 /// A slanted edge through the middle of `size` x `size` pixels, dark left, bright right, anti-aliased; row-major.
 #[must_use]
@@ -43,54 +43,128 @@ fn from_edge(x: usize, y: usize, size: usize) -> f64 {
     (x as f64 - middle) * cos + (y as f64 - middle) * sin
 }
 
-/// Modulation transfer by spatial frequency in cycles per pixel, 0 to 0.5, from a picture of [`edge_scene`] of any
-/// brightness: the edge's profile, differentiated, Fourier transformed (ISO 12233), and made 1 at 0. Empty if there
-/// is no edge.
-///
-/// # Panics
-/// If the picture does not hold `side * side` pixels.
-#[must_use]
-pub fn edge_mtf(picture: &[f32], side: usize) -> Vec<(f64, f64)> {
-    assert_eq!(picture.len(), side * side, "a square picture");
-    let bins = (2.0 * REACH_PX / BIN_PX) as usize;
-    let (mut sums, mut counts) = (vec![0.0; bins], vec![0_u32; bins]);
-    for (i, &pixel) in picture.iter().enumerate() {
-        let bin = (from_edge(i % side, i / side, side) + REACH_PX) / BIN_PX;
-        if bin >= 0.0 && (bin as usize) < bins {
-            sums[bin as usize] += f64::from(pixel);
-            counts[bin as usize] += 1;
-        }
-    }
-    let profile: Vec<(f64, f64)> = sums
-        .iter()
-        .zip(&counts)
-        .enumerate()
-        .filter(|(_, (_, count))| **count > 0)
-        .map(|(i, (sum, &count))| ((i as f64 + 0.5) * BIN_PX, sum / f64::from(count)))
-        .collect();
-    let spread: Vec<(f64, f64)> = profile
-        .windows(2)
-        .map(|pair| ((pair[0].0 + pair[1].0) / 2.0, pair[1].1 - pair[0].1))
-        .collect();
-    let total: f64 = spread.iter().map(|(_, step)| step).sum();
-    if total == 0.0 || !total.is_finite() {
-        return Vec::new();
-    }
-    (0..=100)
-        .map(|k| {
-            let frequency = f64::from(k) / 200.0;
-            let (mut re, mut im) = (0.0, 0.0);
-            for &(at, step) in &spread {
-                let (sin, cos) = (2.0 * PI * frequency * at).sin_cos();
-                re += step * cos;
-                im += step * sin;
+/// Frequencies that a transfer is computed at: 0 to 0.5 cycles a pixel.
+const FREQUENCIES: usize = 101;
+
+/// Part of the profile at either end that the levels of dark and bright are taken from, as a part of the picture's side.
+const PLATEAU: f64 = 3.0 / 32.0;
+
+/// The slope of an edge's profile as a function of frequency: its Fourier transform, and the height of the edge. Slopes of
+/// several pictures add, and the transfer of their sum is that of their mean.
+#[derive(Debug, Clone, PartialEq)]
+struct Slope {
+    waves: Vec<(f64, f64)>,
+    height: f64,
+}
+
+impl Slope {
+    /// Of a picture of [`edge_scene`] of any brightness; `None` if a number in it is not finite.
+    fn of(picture: &[f32], side: usize) -> Option<Self> {
+        assert_eq!(picture.len(), side * side, "a square picture");
+        let [reach_px, plateau_px] = [REACH, PLATEAU].map(|part| part * side as f64);
+        let bins = (2.0 * reach_px / BIN_PX) as usize;
+        let (mut sums, mut counts) = (vec![0.0; bins], vec![0_u32; bins]);
+        for (i, &pixel) in picture.iter().enumerate() {
+            let bin = (from_edge(i % side, i / side, side) + reach_px) / BIN_PX;
+            if bin >= 0.0 && (bin as usize) < bins {
+                sums[bin as usize] += f64::from(pixel);
+                counts[bin as usize] += 1;
             }
+        }
+        let profile: Vec<(f64, f64)> = sums
+            .iter()
+            .zip(&counts)
+            .enumerate()
+            .filter(|(_, (_, count))| **count > 0)
+            .map(|(i, (sum, &count))| {
+                ((i as f64 + 0.5) * BIN_PX - reach_px, sum / f64::from(count))
+            })
+            .collect();
+        let level = |inside: &dyn Fn(f64) -> bool| {
+            let values: Vec<f64> =
+                profile.iter().filter(|(at, _)| inside(*at)).map(|(_, value)| *value).collect();
+            values.iter().sum::<f64>() / values.len() as f64
+        };
+        let bright = level(&|at| at > reach_px - plateau_px);
+        let dark = level(&|at| at < plateau_px - reach_px);
+        let steps: Vec<(f64, f64)> = profile
+            .windows(2)
+            .map(|pair| ((pair[0].0 + pair[1].0) / 2.0, pair[1].1 - pair[0].1))
+            .collect();
+        let waves = (0..FREQUENCIES).map(|k| {
+            let frequency = at_frequency(k);
+            let wave = |(re, im), &(at, step): &(f64, f64)| {
+                let (sin, cos) = (2.0 * PI * frequency * at).sin_cos();
+                (re + step * cos, im + step * sin)
+            };
+            let (re, im) = steps.iter().fold((0.0, 0.0), wave);
             // Binning averages over a bin; the difference of two bins over another.
             let blurred = PI * frequency * BIN_PX;
             let own = if k == 0 { 1.0 } else { (blurred.sin() / blurred).powi(2) };
-            (frequency, re.hypot(im) / total.abs() / own)
+            (re / own, im / own)
+        });
+        let slope = Self { waves: waves.collect(), height: bright - dark };
+        let finite = slope.height.is_finite()
+            && slope.waves.iter().all(|(re, im)| re.is_finite() && im.is_finite());
+        finite.then_some(slope)
+    }
+}
+
+fn at_frequency(k: usize) -> f64 {
+    0.5 * k as f64 / (FREQUENCIES - 1) as f64
+}
+
+/// Modulation transfer by spatial frequency in cycles per pixel, 0 to 0.5, from pictures of [`edge_scene`] of any brightness,
+/// whose noise is independent: the edge's profile, differentiated, Fourier transformed (ISO 12233), over the edge's height.
+/// Empty if there is no edge.
+///
+/// Noise adds its own power to that of every picture, and would make a transfer look better than it is where it is small. With
+/// several pictures its power is left out: the mean product of the transforms of two *different* pictures has none.
+///
+/// # Panics
+/// If a picture does not hold `side * side` pixels.
+#[must_use]
+pub fn edge_mtf(pictures: &[&[f32]], side: usize) -> Vec<(f64, f64)> {
+    let slopes: Option<Vec<Slope>> = pictures.iter().map(|p| Slope::of(p, side)).collect();
+    let Some(slopes) = slopes.filter(|slopes| !slopes.is_empty()) else { return Vec::new() };
+    let n = slopes.len() as f64;
+    let height = slopes.iter().map(|slope| slope.height).sum::<f64>() / n;
+    if height == 0.0 {
+        return Vec::new();
+    }
+    (0..FREQUENCIES)
+        .map(|k| {
+            let waves = || slopes.iter().map(|slope| slope.waves[k]);
+            let (re, im) = waves().fold((0.0, 0.0), |(re, im), w| (re + w.0, im + w.1));
+            let together = re * re + im * im;
+            let own: f64 = waves().map(|(re, im)| re * re + im * im).sum();
+            let power =
+                if slopes.len() > 1 { (together - own) / (n * (n - 1.0)) } else { together };
+            (at_frequency(k), power.max(0.0).sqrt() / height.abs())
         })
         .collect()
+}
+
+/// Transfer of a disc of light of this diameter at a frequency (in cycles per unit of the diameter's): `2 J1(x) / x` with
+/// x = pi times their product.
+#[must_use]
+pub fn disc_transfer(diameter: f64, frequency: f64) -> f64 {
+    // The mean over the disc's chords; equal steps of the angle converge faster than any power.
+    const STEPS: usize = 256;
+    let angle = |k: usize| (k as f64 + 0.5) * PI / 2.0 / STEPS as f64;
+    let chord = |k: usize| {
+        let (sin, cos) = angle(k).sin_cos();
+        cos * cos * (PI * diameter * frequency * sin).cos()
+    };
+    (0..STEPS).map(chord).sum::<f64>() * 2.0 / STEPS as f64
+}
+
+/// Transfer of a square of light across an edge that is tilted by [`EDGE_ANGLE_DEG`] against its sides.
+#[must_use]
+pub fn square_transfer(width: f64, frequency: f64) -> f64 {
+    let (sin, cos) = EDGE_ANGLE_DEG.to_radians().sin_cos();
+    let sinc = |x: f64| if x == 0.0 { 1.0 } else { (PI * x).sin() / (PI * x) };
+    sinc(width * cos * frequency) * sinc(width * sin * frequency)
 }
 
 /// Width of a line at the first frequency where the transfer falls to `level`, in pixels; 1 if it never does below
@@ -153,7 +227,7 @@ mod tests {
     #[test]
     fn a_box_of_light_has_the_transfer_of_a_sinc() {
         for width in [2, 4, 6] {
-            let mtf = edge_mtf(&blurred_edge(32, width), 32);
+            let mtf = edge_mtf(&[&blurred_edge(32, width)], 32);
             // sinc falls to a half at 0.6034 over the width: a line of 0.829 widths; to 0.1 at 0.9125: 0.548.
             let found = line_width_px(&mtf, 0.5).unwrap();
             assert!((found / (0.829 * width as f64) - 1.0).abs() < 0.05, "{width}: {found}");
@@ -167,9 +241,47 @@ mod tests {
 
     #[test]
     fn a_sharp_edge_is_resolved_to_the_pixel_and_no_finer() {
-        let mtf = edge_mtf(&edge_scene(32), 32);
+        let mtf = edge_mtf(&[&edge_scene(32)], 32);
         assert_eq!(line_width_px(&mtf, 0.5), Some(1.0));
-        assert_eq!(line_width_px(&edge_mtf(&[0.5; 1024], 32), 0.5), None);
+        assert_eq!(line_width_px(&edge_mtf(&[&[0.5; 1024]], 32), 0.5), None);
+    }
+
+    /// Nearly normal, of variance 1: twelve uniform numbers (splitmix64).
+    fn normal(state: &mut u64) -> f32 {
+        let mut uniform = || {
+            *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+            let mixed = (*state ^ (*state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+            ((mixed ^ (mixed >> 31)) >> 40) as f32 / (1 << 24) as f32
+        };
+        (0..12).map(|_| uniform()).sum::<f32>() - 6.0
+    }
+
+    #[test]
+    fn discs_and_squares_have_the_transfers_of_the_books() {
+        // 2 J1(x) / x is 0.8801 at x = 1 and 0 at 3.8317; a sinc is 0.6366 at half of its first zero.
+        assert!((disc_transfer(1.0, 1.0 / PI) - 0.880_101).abs() < 1e-6);
+        assert!(disc_transfer(2.0, 3.831_706 / PI / 2.0).abs() < 1e-6);
+        let along = EDGE_ANGLE_DEG.to_radians().cos();
+        assert!((square_transfer(1.0 / along, 0.5) - 0.6366).abs() < 2e-3);
+        assert_eq!((disc_transfer(3.0, 0.0), square_transfer(3.0, 0.0)), (1.0, 1.0));
+    }
+
+    #[test]
+    fn noise_does_not_make_the_transfer_look_better_however_few_the_pictures() {
+        // White noise with half of the edge's height.
+        let clean = blurred_edge(32, 4);
+        let truth = line_width_px(&edge_mtf(&[&clean], 32), 0.1).unwrap();
+        for count in [40, 400] {
+            let mut state = 1_u64;
+            let pictures: Vec<Vec<f32>> = (0..count)
+                .map(|_| clean.iter().map(|pixel| pixel + 0.5 * normal(&mut state)).collect())
+                .collect();
+            let pictures: Vec<&[f32]> = pictures.iter().map(Vec::as_slice).collect();
+            let found = line_width_px(&edge_mtf(&pictures, 32), 0.1).unwrap();
+            let tolerance = 0.05 * (400.0 / f64::from(count)).sqrt();
+            assert!((found / truth - 1.0).abs() < tolerance, "{count}: {found} for {truth}");
+        }
     }
 
     #[test]

@@ -4,7 +4,7 @@
 
 use crate::files::FileError;
 use crate::files::image::{Reflectance, read_reflectance};
-use crate::picture::glyph;
+use crate::picture::Typeface;
 use image::imageops::{self, FilterType};
 use image::{ImageBuffer, Luma};
 use std::fmt;
@@ -119,7 +119,8 @@ impl FromStr for SceneSource {
             if !(1..=MAX_WORD).contains(&found) {
                 return Err(SceneError::WordLength { scene: scene.to_owned(), found });
             }
-            return match word.chars().find(|&character| !glyph::has_shape(character)) {
+            let typeface = Typeface::ubuntu_light();
+            return match word.chars().find(|&character| !typeface.has_shape(character)) {
                 None => Ok(Self::Word(word.to_owned())),
                 Some(character) => Err(SceneError::NoShape { character }),
             };
@@ -135,7 +136,9 @@ impl FromStr for SceneSource {
         };
         let mut characters = text.chars();
         match (characters.next(), characters.next()) {
-            (Some(character), None) if glyph::has_shape(character) => Ok(Self::Letter(character)),
+            (Some(character), None) if Typeface::ubuntu_light().has_shape(character) => {
+                Ok(Self::Letter(character))
+            }
             (Some(character), None) => Err(SceneError::NoShape { character }),
             _ => Err(SceneError::NotOneCharacter {
                 scene: scene.to_owned(),
@@ -165,10 +168,7 @@ impl SceneSource {
     pub fn load(&self, size_px: usize) -> Result<SceneMap, SceneError> {
         match self {
             Self::Letter(character) => {
-                let reflectance = glyph::render(*character, size_px, GLYPH_FILL)
-                    .ok_or(SceneError::NoShape { character: *character })?;
-                let name = format!("letter {character}");
-                Ok(SceneMap { name, size_px, reflectance, side_mm: Some(LETTER_SIDE_MM) })
+                SceneMap::letter(&Typeface::ubuntu_light(), *character, size_px)
             }
             Self::Word(word) => {
                 let name = format!("word {word}");
@@ -193,11 +193,13 @@ impl SceneSource {
 
 /// Characters side by side, each in a square of its own, halfway down.
 fn drawn(word: &str, size_px: usize) -> Result<Vec<f32>, SceneError> {
+    let typeface = Typeface::ubuntu_light();
     let cell_px = size_px / word.chars().count().max(1);
     let top = (size_px - cell_px) / 2;
     let mut map = vec![0.0; size_px * size_px];
     for (at, character) in word.chars().enumerate() {
-        let glyph = glyph::render(character, cell_px, GLYPH_FILL)
+        let glyph = typeface
+            .draw(character, cell_px, GLYPH_FILL)
             .ok_or(SceneError::NoShape { character })?;
         for (row, pixels) in glyph.chunks_exact(cell_px).enumerate() {
             let start = (top + row) * size_px + at * cell_px;
@@ -205,6 +207,25 @@ fn drawn(word: &str, size_px: usize) -> Result<Vec<f32>, SceneError> {
         }
     }
     Ok(map)
+}
+
+impl SceneMap {
+    /// One bright character of a typeface on the dark target of [`LETTER_SIDE_MM`], of whose edge the character's longer side
+    /// takes 0.9.
+    ///
+    /// # Errors
+    /// [`SceneError::NoShape`] if the typeface lacks the character.
+    pub fn letter(
+        typeface: &Typeface,
+        character: char,
+        size_px: usize,
+    ) -> Result<Self, SceneError> {
+        let reflectance = typeface
+            .draw(character, size_px, GLYPH_FILL)
+            .ok_or(SceneError::NoShape { character })?;
+        let name = format!("letter {character}");
+        Ok(Self { name, size_px, reflectance, side_mm: Some(LETTER_SIDE_MM) })
+    }
 }
 
 /// Averages a picture down to `size_px`. The triangle filter spans two target pixels, so detail

@@ -84,7 +84,8 @@ pub struct Sharpening {
     /// Seed of everything random
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
-    /// Also write how sure each pixel is (.npy): its standard deviation had the same scene been measured again
+    /// Also write how well each pixel repeats (.npy): its standard deviation had the same scene been measured again. What the
+    /// network gets wrong every time is not in it
     #[arg(long, value_name = "FILE")]
     spread: Option<PathBuf>,
 }

@@ -13,6 +13,7 @@ use anyhow::Result;
 use clap::{Args, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
 use nirspi::files::output::OutputDir;
+use nirspi_eval::pictures::ANCESTRAL_STEPS;
 use nirspi_eval::shot::{self, FRAMES};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -22,7 +23,7 @@ use std::process::ExitCode;
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi eval table2\n\
-    \x20 nirspi eval table3 --scenes 200 --out table3/\n\
+    \x20 nirspi eval table3 --scenes 186 --out table3/\n\
     \x20 nirspi eval sampling wing.npz --out sampling/\n\
     \x20 nirspi eval quality --data chars74k/ --out quality/")]
 pub struct EvalArgs {
@@ -71,6 +72,15 @@ impl ExposureArgs {
     fn exposure(&self) -> shot::Exposure {
         shot::Exposure { rain: self.rain.rainfall(), frames: self.frames, seed: self.seed }
     }
+}
+
+/// The paper's own sampler.
+#[derive(Debug, Args)]
+struct AncestralArgs {
+    /// Steps of the ancestral sampler, the paper's own, which has 500 there (fifty times as slow as 10); 0 leaves it out
+    #[arg(long = "ancestral", value_name = "STEPS", default_value_t = ANCESTRAL_STEPS,
+          value_parser = clap::value_parser!(u32).range(0..=500))]
+    steps: u32,
 }
 
 /// Where a table's report goes.

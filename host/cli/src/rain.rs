@@ -1,10 +1,13 @@
 //! `nirspi rain`: what rain, fog and single drops do to light; the photon budget; the rain simulator's uniformity.
 
 use super::{Usage, print, refused};
+use crate::report::to_json;
 use anyhow::{Context, Result};
+use nirspi::files::image::encode_rgb;
+use nirspi::files::output::OutputDir;
 use nirspi::files::table::Table;
 use nirspi_eval::rain::budget::{self, Settings, Term};
-use nirspi_eval::rain::{self, RainReport, rig};
+use nirspi_eval::rain::{self, RainReport, curves, rig};
 use nirspi_optics::mie::Index;
 use nirspi_optics::rain::{DropClass, DropLaw, Drops, PaperRain};
 use serde::Serialize;
@@ -14,11 +17,14 @@ use std::process::ExitCode;
 /// Say what rain does to light: extinction, scattering, photon budget; one sphere; a rain simulator's uniformity
 ///
 /// Without --mie, --budget, --uniformity or --rig: extinction, scattering and absorption of the rain or fog at each
-/// wavelength. Water's index is Segelstein's, 400 to 2000 nm.
+/// wavelength. Water's index is Segelstein's, 400 to 2000 nm. With --out, curves of these against wavelength and drop
+/// size, drop sizes, fall speeds, and extinction against rain rate beside laws of measured optical links, each as PNG
+/// and CSV, with rain.json.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi rain --rate-mm-h 5.6\n\
     \x20 nirspi rain --drops mono:2 --budget --distance-m 1\n\
+    \x20 nirspi rain --out rain/\n\
     \x20 nirspi rain --mie --x 100 --m-re 1.33 --m-im 1e-4 --json\n\
     \x20 nirspi rain --uniformity volumes.csv")]
 pub struct Args {
@@ -88,6 +94,9 @@ pub struct Args {
     /// Seed of the simulated rig
     #[arg(long, value_name = "N", requires = "rig", default_value_t = 1)]
     seed: u64,
+    /// Folder for curves of rain, as PNG and CSV, and rain.json
+    #[arg(long, value_name = "DIR", conflicts_with = "what")]
+    out: Option<PathBuf>,
     /// Print the report as JSON
     #[arg(long)]
     json: bool,
@@ -154,7 +163,24 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         let radar = !name.starts_with("fog");
         let report = rain::rain(name, &drops, &args.wavelengths_nm, args.distance_m, radar)
             .map_err(refused)?;
+        if let Some(path) = &args.out {
+            let curves = curves::curves(name, &drops, &args.wavelengths_nm).map_err(refused)?;
+            let mut out = OutputDir::create(path)?;
+            for curves in &curves {
+                let picture = encode_rgb(&curves.chart.render());
+                out.write(&format!("{}.png", curves.name), &picture)?;
+                out.write(&format!("{}.csv", curves.name), curves.csv().as_bytes())?;
+            }
+            out.write("rain.json", to_json(&report)?.as_bytes())?;
+            out.commit()?;
+        }
         say_or_json(&report, args.json, say)?;
+        if let (Some(path), false) = (&args.out, args.json) {
+            print::line(format_args!(
+                "wrote curves as PNG and CSV, and rain.json, to {}",
+                path.display()
+            ))?;
+        }
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -213,6 +239,12 @@ fn say(report: &RainReport) -> Result<()> {
             fall.time_constant_ms,
             fall.beta_25_us,
             fall.beta_20_ms
+        ))?;
+        let rig = &fall.rig;
+        print::line(format_args!(
+            "in a rig, {} m below nozzles that let drops go at rest: {:.2} m/s, {:.0} drops a cubic metre, {:.2} times the \
+             extinction",
+            rig.height_m, rig.speed_m_per_s, rig.drops_per_m3, rig.times_as_many
         ))?;
     }
     Ok(())

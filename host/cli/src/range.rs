@@ -5,15 +5,16 @@ use crate::report::to_json;
 use anyhow::Result;
 use nirspi::files::image::encode_rgb;
 use nirspi::files::output::OutputDir;
-use nirspi_eval::range::{Report, Settings, chart, range};
+use nirspi_eval::range::{Report, Settings, chart, exposure_chart, range};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Say how far the camera sees in rain, beside the paper's Table 2
 ///
 /// The farthest distance at which one pixel of a white target still has the signal-to-noise ratio asked for, from the
-/// photon budget and the rain's Mie extinction; Algorithm 2 as printed; and what would have to be assumed to agree
-/// with the paper. Writes range.png and range.json with --out.
+/// photon budget and the rain's Mie extinction; Algorithm 2 as printed, and with the gain of all patterns; the exposure
+/// that a pixel needs against distance; and what would have to be assumed to agree with the paper. Writes range.png,
+/// exposure.png and range.json with --out.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi range\n\
@@ -29,7 +30,7 @@ pub struct Args {
     #[arg(long, value_name = "US,...", value_delimiter = ',', default_values_t = [8.0, 25.0],
           allow_negative_numbers = true)]
     exposures_us: Vec<f64>,
-    /// Folder for range.png and range.json
+    /// Folder for range.png, exposure.png and range.json
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Print the report as JSON
@@ -47,6 +48,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if let Some(out) = &args.out {
         let mut out = OutputDir::create(out)?;
         out.write("range.png", &encode_rgb(&chart(&settings)?.render()))?;
+        out.write("exposure.png", &encode_rgb(&exposure_chart(&settings)?.render()))?;
         out.write("range.json", to_json(&report)?.as_bytes())?;
         out.commit()?;
     }
@@ -64,13 +66,13 @@ fn say(args: &Args, report: &Report) -> Result<()> {
         report.snr, report.reflectance
     ))?;
     print::line(
-        "rain    mm/h  drop mm  exposure us   paper m    physics m  dry air m  as printed m",
+        "rain    mm/h  drop mm  exposure us   paper m    physics m  dry air m  as printed m  with gain m",
     )?;
     let metres =
         |range: Option<f64>| range.map_or_else(|| "none".to_owned(), |m| format!("{m:.3}"));
     for row in &report.rows {
         print::line(format_args!(
-            "{:<6} {:5.2}  {:7.1}  {:11}   {:>3} to {:<3} {:>9}  {:>9}  {:>12.2}",
+            "{:<6} {:5.2}  {:7.1}  {:11}   {:>3} to {:<3} {:>9}  {:>9}  {:>12.2}  {:>11.2}",
             row.rain,
             row.rate_mm_per_h,
             row.drop_mm,
@@ -79,7 +81,20 @@ fn say(args: &Args, report: &Report) -> Result<()> {
             row.paper_m.1,
             metres(row.physics_m),
             metres(row.dry_air_m),
-            row.as_printed_m
+            row.as_printed_m,
+            row.as_printed_with_gain_m
+        ))?;
+    }
+    print::line(format_args!(
+        "exposure needed in heavy rain, us: distance m, for SNR {}, for SNR {}, the paper's",
+        report.snr,
+        5.0 * report.snr
+    ))?;
+    for row in &report.exposures {
+        let paper = row.paper_us.map_or_else(String::new, |us| format!("{us}"));
+        print::line(format_args!(
+            "  {:4}  {:9.4}  {:9.3}  {paper}",
+            row.distance_m, row.needed_us, row.needed_for_5_times_us
         ))?;
     }
     for (title, lines) in [("reading", &report.reading), ("assumed", &report.assumptions)] {
@@ -88,7 +103,10 @@ fn say(args: &Args, report: &Report) -> Result<()> {
         }
     }
     if let Some(out) = &args.out {
-        print::line(format_args!("wrote {} and range.json", out.join("range.png").display()))?;
+        print::line(format_args!(
+            "wrote range.png, exposure.png and range.json to {}",
+            out.display()
+        ))?;
     }
     Ok(())
 }

@@ -16,10 +16,11 @@
 //! | [`rain`] | what does rain do to light, and to the photon budget of a pixel? |
 //! | [`train`] | how does a network learn from a user's characters? |
 //!
-//! [`shot`] takes the pictures of the tables through the virtual camera, [`pictures`] enhances them, [`estimate`] says how sure a
-//! mean is.
+//! [`shot`] takes the pictures of the tables through the virtual camera, of targets in several [`typefaces`]; [`pictures`] enhances
+//! them; [`bootstrap`] and [`estimate`] say how sure a figure is.
 
 pub mod bench;
+pub mod bootstrap;
 pub mod estimate;
 pub mod pictures;
 pub mod quality;
@@ -32,6 +33,7 @@ pub mod table1;
 pub mod table3;
 pub mod table4;
 pub mod train;
+pub mod typefaces;
 
 mod error;
 mod fid;

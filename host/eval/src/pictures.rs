@@ -10,6 +10,10 @@ use crate::shot::Shots;
 use nirspi_nets::{Device, Networks};
 use serde::Serialize;
 
+/// Steps of the ancestral sampler, unless asked for otherwise: the paper's 500 take fifty times as long, and quality falls with more
+/// than a few (`docs/quality.md`).
+pub const ANCESTRAL_STEPS: u32 = 10;
+
 /// Steps of the bridge in the tables.
 const STEPS: u32 = 1;
 
@@ -25,9 +29,12 @@ pub enum Picture {
     /// The same, enhanced by the GAN's generator.
     #[serde(rename = "NIR-SPI + GAN")]
     Gan,
-    /// The same, enhanced by the diffusion bridge.
+    /// The same, enhanced by the diffusion bridge in one step.
     #[serde(rename = "NIR-SPI + diffusion")]
     Diffusion,
+    /// The same, enhanced by the ancestral sampler, the paper's own (Eqs. 5 to 8).
+    #[serde(rename = "NIR-SPI + ancestral")]
+    Ancestral,
 }
 
 impl Picture {
@@ -39,6 +46,7 @@ impl Picture {
             Self::NirSpi => "NIR-SPI",
             Self::Gan => "NIR-SPI + GAN",
             Self::Diffusion => "NIR-SPI + diffusion",
+            Self::Ancestral => "NIR-SPI + ancestral",
         }
     }
 }
@@ -47,22 +55,27 @@ impl Picture {
 pub struct Enhancers {
     gan: Contender,
     diffusion: Contender,
+    ancestral: Option<Contender>,
 }
 
 impl Enhancers {
-    /// The embedded networks on the CPU.
+    /// The embedded networks on the CPU; the ancestral sampler takes so many steps, and with 0 there is none.
     ///
     /// # Errors
     /// Damaged weights.
-    pub fn new() -> Result<Self> {
+    pub fn new(ancestral_steps: u32) -> Result<Self> {
         let mut networks = Networks::built_in(Device::cpu());
+        let ancestral = (ancestral_steps > 0)
+            .then(|| Contender::new(Method::Ancestral(ancestral_steps), &mut networks))
+            .transpose()?;
         Ok(Self {
+            ancestral,
             gan: Contender::new(Method::Gan, &mut networks)?,
             diffusion: Contender::new(Method::Diffusion(STEPS), &mut networks)?,
         })
     }
 
-    /// The pictures of a row with a network, 64 x 64 in [0, 1]; `None` for a row without a network. `whites` are the levels
+    /// The pictures of a row with a network, 64 x 64 in [0, 1]; `None` for a row without a network and for a sampler without steps. `whites` are the levels
     /// of a white sheet, one a shot.
     ///
     /// # Errors
@@ -77,6 +90,10 @@ impl Enhancers {
             Picture::Vis | Picture::NirSpi => return Ok(None),
             Picture::Gan => &self.gan,
             Picture::Diffusion => &self.diffusion,
+            Picture::Ancestral => match &self.ancestral {
+                Some(ancestral) => ancestral,
+                None => return Ok(None),
+            },
         };
         let readings: Vec<f32> =
             shots.iter().zip(whites).flat_map(|(shot, white)| scaled(shot, *white)).collect();
@@ -105,7 +122,7 @@ mod tests {
         let (near, far) = (dim(800.0), dim(80.0));
         assert!(scaled(&near, 1000.0).zip(scaled(&far, 100.0)).all(|(a, b)| (a - b).abs() < 1e-6));
         assert_eq!(scaled(&near, 100.0).next(), Some(1.0), "brighter than white is white");
-        let enhancers = Enhancers::new().unwrap();
+        let enhancers = Enhancers::new(0).unwrap();
         let of = |picture, shots: &[&Shots], whites: &[f32]| {
             enhancers.pictures(picture, shots, whites).unwrap()
         };

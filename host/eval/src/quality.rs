@@ -7,14 +7,12 @@
 //! Every method gets the same readings, and its figures come with the number of images that they rest on
 //! (`every_row_is_measured_on_the_same_unseen_images` in the tests of `nirspi-cli`).
 
-mod bootstrap;
 mod characters;
 mod charts;
 mod contenders;
 mod measure;
 mod others;
 
-pub use bootstrap::Interval;
 pub use characters::{Character, Characters, Origin};
 pub use contenders::{Contender, Method, Version};
 pub use measure::{Condition, Figures};
@@ -203,16 +201,18 @@ fn over(
     let mut all = Vec::new();
     for &condition in conditions {
         let readings = condition.readings(characters, seed);
+        let mut made = Vec::new();
         for contender in contenders {
             let images = contender.enhance(&readings, condition, done)?;
-            all.extend(judges.figures(
-                contender.method(),
-                condition,
-                characters,
-                &sharp,
-                &readings,
-                &images,
-            )?);
+            let each = Judges::each(condition, characters, &readings, &images)?;
+            made.push((contender.method(), judges.judge(&images)?, each));
+        }
+        let gan = made.iter().find(|(method, ..)| *method == Method::Gan);
+        let gan = gan.map(|(.., each)| each.as_slice());
+        for (method, judged, each) in &made {
+            let figures =
+                judges.figures((*method, condition), characters, (&sharp, judged), each, gan)?;
+            all.extend(figures);
         }
     }
     Ok(all)

@@ -1,11 +1,14 @@
 //! What rain, fog and single drops do to light, and the uniformity of a rain simulator.
 
 pub mod budget;
+pub mod curves;
 pub mod rig;
 
 use crate::error::{EvalError, Result};
 use nirspi_optics::mie::{Index, Mie};
-use nirspi_optics::rain::fall::{beta, fall_speed_m_per_s, fall_time_constant_s};
+use nirspi_optics::rain::fall::{
+    beta, fall_speed_from_rest_m_per_s, fall_speed_m_per_s, fall_time_constant_s,
+};
 use nirspi_optics::rain::radar::drops_reflectivity_db;
 use nirspi_optics::rain::{Drops, Medium};
 use nirspi_optics::water::Water;
@@ -109,7 +112,26 @@ pub struct FallReport {
     pub beta_25_us: f64,
     /// The same for 20 ms (an image).
     pub beta_20_ms: f64,
+    /// The same rain in a rig as high as the paper's.
+    pub rig: RigReport,
 }
+
+/// A drop half way down the paper's rig of 0.5 m: it has not reached its terminal speed, so that the same mm/h holds more drops. Drops
+/// are taken to leave the nozzles at rest: the most that there can be.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RigReport {
+    /// Fallen from the nozzles.
+    pub height_m: f64,
+    /// Speed there.
+    pub speed_m_per_s: f64,
+    /// Drops in a cubic metre there.
+    pub drops_per_m3: f64,
+    /// Over their number at terminal speed; extinction grows alike.
+    pub times_as_many: f64,
+}
+
+/// Half of the paper's rig's height (section 4).
+const HALF_RIG_M: f64 = 0.25;
 
 /// How to read the extinction of a [`RainReport`].
 const NOTE: &str = "extinction counts light diffracted by under a milliradian, half of it, as lost; \
@@ -151,6 +173,7 @@ pub fn rain(
             time_constant_ms: fall_time_constant_s(one.diameter_mm) * 1e3,
             beta_25_us: beta(one.diameter_mm, 25e-6),
             beta_20_ms: beta(one.diameter_mm, 20e-3),
+            rig: in_rig(drops, one.diameter_mm)?,
         }),
         _ => None,
     };
@@ -164,6 +187,16 @@ pub fn rain(
         wavelengths,
         fall,
         note: NOTE,
+    })
+}
+
+fn in_rig(drops: &Drops, diameter_mm: f64) -> Result<RigReport> {
+    let rig = drops.below_nozzles(HALF_RIG_M)?;
+    Ok(RigReport {
+        height_m: HALF_RIG_M,
+        speed_m_per_s: fall_speed_from_rest_m_per_s(diameter_mm, HALF_RIG_M),
+        drops_per_m3: rig.concentration_per_m3(),
+        times_as_many: rig.concentration_per_m3() / drops.concentration_per_m3(),
     })
 }
 
@@ -201,7 +234,9 @@ mod tests {
                 (at.extinction_per_m - at.scattering_per_m - at.absorption_per_m).abs() < 1e-12
             );
         }
-        assert_eq!(report.fall.as_ref().unwrap().diameter_mm, 2.0);
+        let fall = report.fall.as_ref().unwrap();
+        assert_eq!((fall.diameter_mm, fall.rig.height_m), (2.0, 0.25));
+        assert!((fall.rig.times_as_many - 3.04).abs() < 0.02, "{fall:?}");
         assert!(report.z_dr_db.is_some());
         assert!(rain("mono:2", &drops, &[550.0], 3.0, false).unwrap().z_dr_db.is_none());
     }

@@ -5,7 +5,9 @@ use nirspi::picture::{Axis, Chart, Line};
 use nirspi_optics::pixel::{Instrument, PixelBudget, PixelError};
 use nirspi_optics::rain::blur::DEEPEST_OPTICAL_DEPTH;
 use nirspi_optics::rain::{Drops, PaperRain, Weather};
-use nirspi_optics::range::{Wanted, as_printed_mm, extinction_needed_per_m, farthest_mm};
+use nirspi_optics::range::{
+    Floor, Wanted, as_printed_mm, exposure_needed_us, extinction_needed_per_m, farthest_mm,
+};
 use nirspi_optics::water::Water;
 use serde::Serialize;
 
@@ -46,6 +48,8 @@ pub struct Report {
     pub reflectance: f64,
     /// Each rain with each exposure.
     pub rows: Vec<RowReport>,
+    /// The exposure that a pixel needs, against distance.
+    pub exposures: Vec<ExposureReport>,
     /// What the numbers rest on.
     pub assumptions: Vec<String>,
     /// What must be assumed to agree with the paper, and what physics says instead.
@@ -73,9 +77,30 @@ pub struct RowReport {
     pub physics_m: Option<f64>,
     /// The same without rain.
     pub dry_air_m: Option<f64>,
-    /// By Algorithm 2 as printed.
+    /// By Algorithm 2 as printed: one exposure's photons against one exposure's noise.
     pub as_printed_m: f64,
+    /// The same with the gain of a differential Hadamard transform, which the listing does not have.
+    pub as_printed_with_gain_m: f64,
 }
+
+/// The exposure of a pattern that a pixel needs at one distance.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ExposureReport {
+    /// Distance of the target.
+    pub distance_m: f64,
+    /// For the SNR asked for, in the paper's heavy rain.
+    pub needed_us: f64,
+    /// For five times that SNR.
+    pub needed_for_5_times_us: f64,
+    /// The paper's (2.D: 8 to 25 us for 0.3 to 1 m, its ends taken for the ends); `null` elsewhere.
+    pub paper_us: Option<f64>,
+}
+
+/// The paper's exposures: distance in m, time in us.
+const PAPER_EXPOSURES: [(f64, f64); 2] = [(0.3, 8.0), (1.0, 25.0)];
+
+/// Distances of the table of exposures, in m.
+const EXPOSURE_DISTANCES_M: [f64; 6] = [0.3, 0.45, 0.6, 0.8, 1.0, 2.0];
 
 /// The range in each rain of the paper's Table 2, with each exposure.
 ///
@@ -92,7 +117,8 @@ pub fn range(settings: &Settings) -> Result<Report> {
         for &exposure_us in &settings.exposures_us {
             let wanted = Wanted { reflectance, exposure_us, snr };
             let metres = |mm: f64| mm * 1e-3;
-            let printed = as_printed_mm(&instrument, weather, &wanted, row.rain.drop_mm, Z_MAX_MM)?;
+            let end = (row.rain.drop_mm, Z_MAX_MM);
+            let printed = |floor| as_printed_mm(&instrument, weather, &wanted, end, floor);
             rows.push(RowReport {
                 rain: row.name,
                 rate_mm_per_h: row.rain.rate_mm_per_h,
@@ -103,7 +129,8 @@ pub fn range(settings: &Settings) -> Result<Report> {
                 paper_m: row.range_m,
                 physics_m: farthest_mm(&instrument, weather, &wanted)?.map(metres),
                 dry_air_m: farthest_mm(&instrument, &dry, &wanted)?.map(metres),
-                as_printed_m: metres(printed),
+                as_printed_m: metres(printed(Floor::OneExposure)?),
+                as_printed_with_gain_m: metres(printed(Floor::WholePicture)?),
             });
         }
     }
@@ -113,8 +140,30 @@ pub fn range(settings: &Settings) -> Result<Report> {
         reflectance,
         assumptions: assumptions(&instrument),
         reading: reading(&instrument, &wet, reflectance)?,
+        exposures: exposures(&instrument, &wet, settings)?,
         rows,
     })
+}
+
+/// The exposures needed in heavy rain.
+fn exposures(
+    instrument: &Instrument,
+    wet: &[Weather],
+    settings: &Settings,
+) -> Result<Vec<ExposureReport>> {
+    let Some(heavy) = wet.last() else { return Ok(Vec::new()) };
+    let at = |distance_m: f64| {
+        let target = (distance_m * 1e3, settings.reflectance);
+        let needed = |snr| exposure_needed_us(instrument, heavy, target, snr);
+        let paper = PAPER_EXPOSURES.iter().find(|(m, _)| *m == distance_m);
+        Ok(ExposureReport {
+            distance_m,
+            needed_us: needed(settings.snr)?,
+            needed_for_5_times_us: needed(5.0 * settings.snr)?,
+            paper_us: paper.map(|(_, us)| *us),
+        })
+    };
+    EXPOSURE_DISTANCES_M.into_iter().map(at).collect()
 }
 
 /// The instrument, and the air before it: dry, and in the order of [`TABLE_2`].
@@ -156,6 +205,8 @@ fn assumptions(instrument: &Instrument) -> Vec<String> {
             Z_MAX_MM * 1e-4
         ),
         "drops of one size, 0.5 mm light and 2 mm heavy, as the paper's Table 2".to_owned(),
+        "range is where a pixel of a uniform sheet has this SNR: defocus, which decides what can be read, has no part in it"
+            .to_owned(),
     ]
 }
 
@@ -202,6 +253,19 @@ fn reading(
          of the size has four times the shadow",
         light.medium().extinction_per_m / heavy.medium().extinction_per_m
     ));
+    let [near, far] = PAPER_EXPOSURES
+        .map(|(m, _)| exposure_needed_us(instrument, heavy, (m * 1e3, reflectance), 1.0));
+    let (near, far) = (near?, far?);
+    lines.push(format!(
+        "the exposure needed grows as the fourth power of the distance: {:.0} times from 0.3 to 1 m; the paper's \
+         8 and 25 us grow by 3.1",
+        far / near
+    ));
+    lines.push(
+        "as printed: the photons of one exposure of one LED against the noise of one exposure; a picture is made of 2048 \
+         exposures, which gains sqrt(512) in SNR (with gain). delta_th, how near is near enough, is free in the listing"
+            .to_owned(),
+    );
     lines.push(
         "the paper's lower limits (0.1 and 0.2 m) follow from no term here; Algorithm 2's first step, \
          Z_max / 10, is that long for a Z_max of 1 and 2 m"
@@ -261,6 +325,56 @@ pub fn chart(settings: &Settings) -> Result<Chart> {
     })
 }
 
+/// The exposure of a pattern that a pixel needs, against distance, in heavy rain; the paper's beside it.
+///
+/// # Errors
+/// [`EvalError::is_setting`] for a reflectance out of range.
+pub fn exposure_chart(settings: &Settings) -> Result<Chart> {
+    let Air { instrument, wet, .. } = &Air::new()?;
+    let Some(heavy) = wet.last() else { return Ok(exposures_against_distance(Vec::new())) };
+    let along = || (0..=60).map(|i| 0.2 * 10_f64.powf(f64::from(i) / 60.0));
+    let line = |times: f64, colour| -> Result<Line> {
+        let snr = times * settings.snr;
+        let point = |m: f64| {
+            let target = (m * 1e3, settings.reflectance);
+            Ok((m, exposure_needed_us(instrument, heavy, target, snr)?))
+        };
+        let points = along().map(point).collect::<Result<Vec<_>, PixelError>>()?;
+        Ok(Line { name: format!("SNR {snr}"), colour, dashed: false, points })
+    };
+    let mut lines = vec![line(1.0, 0)?, line(5.0, 1)?];
+    lines.push(Line {
+        name: "paper, 2.D".to_owned(),
+        colour: 2,
+        dashed: true,
+        points: PAPER_EXPOSURES.to_vec(),
+    });
+    Ok(exposures_against_distance(lines))
+}
+
+fn exposures_against_distance(lines: Vec<Line>) -> Chart {
+    Chart {
+        header: "Exposure of a pattern that a pixel needs".to_owned(),
+        x: Axis {
+            name: "distance, m".to_owned(),
+            from: 0.2,
+            to: 2.0,
+            logarithmic: true,
+            ticks: vec![0.2, 0.3, 0.6, 1.0, 2.0],
+        },
+        y: Axis {
+            name: "exposure, us".to_owned(),
+            from: 0.001,
+            to: 1000.0,
+            logarithmic: true,
+            ticks: vec![0.001, 0.01, 0.1, 1.0, 10.0, 100.0, 1000.0],
+        },
+        lines,
+        footer: "simulated; white target unless --reflectance says otherwise, rain of 5.6 mm/h, noise of the amplifier"
+            .to_owned(),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -281,8 +395,25 @@ mod tests {
             // The signal falls as the fourth power of the distance, the noise with the root of the exposure's length.
             assert!((long / short / (25.0_f64 / 8.0).powf(0.25) - 1.0).abs() < 0.12, "{report:?}");
             assert!(long < pair[1].dry_air_m.unwrap());
+            // What all patterns gain together lengthens the range.
+            assert!(
+                pair.iter().all(|row| row.as_printed_m < row.as_printed_with_gain_m),
+                "{report:?}"
+            );
         }
         assert!(report.reading.iter().any(|line| line.contains("not 1.5")), "{report:?}");
+    }
+
+    #[test]
+    fn the_exposure_needed_stands_beside_the_papers_at_both_ends() {
+        let report = range(&settings(&[8.0])).unwrap();
+        let paper: Vec<(f64, Option<f64>)> =
+            report.exposures.iter().map(|row| (row.distance_m, row.paper_us)).collect();
+        assert_eq!((paper[0], paper[4]), ((0.3, Some(8.0)), (1.0, Some(25.0))));
+        for row in &report.exposures {
+            assert!((row.needed_for_5_times_us / row.needed_us - 25.0).abs() < 1e-9, "{row:?}");
+        }
+        assert_eq!(exposure_chart(&settings(&[8.0])).unwrap().lines.len(), 3);
     }
 
     #[test]

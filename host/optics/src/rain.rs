@@ -7,20 +7,24 @@
 //! | [`paper`], [`rainfall`] | the paper's Table 2 | light rain, heavy rain, dry air |
 //! | [`fall`] | diameter, air density | fall speed, time constant, share of an exposure |
 //! | [`medium`] | drops, wavelength | extinction, scattering, absorption, scattering angles |
+//! | [`backward`] | drops, wavelength | light sent back, near 180 degrees |
 //! | [`blur`] | scattering angles, distance | where forward-scattered light lands on the target |
 //! | [`veil`] | medium, geometry | light that comes back without having seen the target |
 //! | [`falling`] | drops, distance, seed | single drops that cross the LEDs' beams, from frame to frame |
 //! | [`weather`] | drops, wavelength | all of these, at any distance |
 //! | [`spots`] | weather, scene, seed | what each LED's spot shows as drops fall |
+//! | [`fso`] | rain rate | loss by laws fitted to optical links, an outside check |
 //! | [`radar`] | drops | differential reflectivity, an input of the paper's Algorithm 2 |
 //!
 //! Law: everything is a sum over the same list of drops ([`Drops`]), so that two results can only differ by physics,
 //! never by what it was assumed to rain. `docs/physics.md` in the repository derives and cites each formula.
 
+pub mod backward;
 pub mod blur;
 pub mod drops;
 pub mod fall;
 pub mod falling;
+pub mod fso;
 pub mod law;
 pub mod medium;
 pub mod paper;
@@ -30,9 +34,11 @@ pub mod spots;
 pub mod veil;
 pub mod weather;
 
+pub use backward::BackwardLobe;
 pub use blur::ForwardBlur;
 pub use drops::{DropClass, Drops};
 pub use falling::{BeamShadows, FallingDrops};
+pub use fso::FsoLaw;
 pub use law::{DropLaw, ParseDropLawError};
 pub use medium::{Medium, ScatteringAngles};
 pub use paper::PaperRain;

@@ -4,8 +4,10 @@
 //! ([`crate::pixel`]).
 //!
 //! As printed: z grows in steps of `Z_max / 10`; at each step the source is multiplied by `exp(-alpha z)` *again*, so
-//! that after n steps it carries `exp(-alpha (z_1 + ... + z_n))`; it ends where the photons of one exposure fall to
-//! the noise floor. E(N) is given only by reference; ours is used. The factor A (which is infinite at z = 0 and has
+//! that after n steps it carries `exp(-alpha (z_1 + ... + z_n))`; it ends where the photons of one exposure of one LED
+//! fall to the noise floor of one exposure. That is the listing, and it leaves out that a picture is made of 2048
+//! exposures: a differential Hadamard transform gives a pixel `sqrt(N / 2)` times the SNR of one exposure.
+//! [`Floor`] names both readings. E(N) is given only by reference; ours is used. The factor A (which is infinite at z = 0 and has
 //! the dimension of a volume), Lambda, mu, Z_dr and the reflectivities are computed there and used nowhere. `beta` is
 //! a share of an exposure used as a coefficient per metre.
 
@@ -67,8 +69,18 @@ pub fn farthest_mm(
     Ok(Some(near))
 }
 
-/// Algorithm 2 as printed, up to `z_max_mm`: the first step at which the photons of one exposure are no more than the
-/// noise floor, or `z_max_mm`. `drop_mm` is its D.
+/// The noise floor that Algorithm 2 compares the photons of one exposure with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Floor {
+    /// Of one exposure, as the listing has it.
+    OneExposure,
+    /// Of the pixel that a differential Hadamard transform makes of all exposures: `sqrt(N / 2)` times lower. This factor
+    /// is ours; the listing does not have it.
+    WholePicture,
+}
+
+/// Algorithm 2 as printed, up to `z_max_mm`: the first step at which the photons of one exposure are no more than
+/// `wanted.snr` times the noise floor, or `z_max_mm`. `drop_mm` is its D.
 ///
 /// # Errors
 /// [`PixelError`] naming what is out of range.
@@ -76,8 +88,8 @@ pub fn as_printed_mm(
     instrument: &Instrument,
     weather: &Weather,
     wanted: &Wanted,
-    drop_mm: f64,
-    z_max_mm: f64,
+    (drop_mm, z_max_mm): (f64, f64),
+    compared_with: Floor,
 ) -> Result<f64, PixelError> {
     let dry = weather.clone().with_extinction(0.0);
     let alpha_per_m = weather.medium().extinction_per_m;
@@ -94,13 +106,32 @@ pub fn as_printed_mm(
             PixelBudget::new(instrument, &dry, z_mm, wanted.reflectance, wanted.exposure_us)?;
         let photons = pixel.signal_electrons * source * pixel.samples;
         let background = pixel.dry.ambient_electrons_white * drops;
-        let floor = ((pixel.noise.powi(2) + background) * pixel.samples).sqrt() * wanted.snr
-            / (pixel.pixel_snr / pixel.exposure_snr);
-        if photons <= floor {
+        let floor = ((pixel.noise.powi(2) + background) * pixel.samples).sqrt() * wanted.snr;
+        let gained = match compared_with {
+            Floor::OneExposure => 1.0,
+            Floor::WholePicture => pixel.pixel_snr / pixel.exposure_snr,
+        };
+        if photons <= floor / gained {
             return Ok(z_mm);
         }
     }
     Ok(z_max_mm)
+}
+
+/// The exposure of a pattern, in us, with which a pixel at `distance_mm` reaches `snr`. Noise is the same in every sample, so that
+/// the SNR goes as the root of the exposure; signal falls as the square of the distance, so that the exposure grows as its fourth
+/// power.
+///
+/// # Errors
+/// [`PixelError`] naming what is out of range.
+pub fn exposure_needed_us(
+    instrument: &Instrument,
+    weather: &Weather,
+    (distance_mm, reflectance): (f64, f64),
+    snr: f64,
+) -> Result<f64, PixelError> {
+    let pixel = PixelBudget::new(instrument, weather, distance_mm, reflectance, 1.0)?;
+    Ok((snr / pixel.pixel_snr).powi(2))
 }
 
 /// The extinction that this weather would need, per metre, for the camera to see no farther than `range_mm`; none if

@@ -6,7 +6,7 @@
 use nirspi_optics::mie::Mie;
 use nirspi_optics::rain::falling::{BeamShadows, FallingDrops};
 use nirspi_optics::rain::{
-    DropClass, Drops, ForwardBlur, Medium, RainError, ScatteringAngles, Veil,
+    BackwardLobe, DropClass, Drops, ForwardBlur, Medium, RainError, ScatteringAngles, Veil,
 };
 use nirspi_optics::water::Water;
 use nirspi_optics::{LEDS, Projector};
@@ -270,6 +270,18 @@ fn the_kernel_on_the_led_grid_holds_the_light_that_lands_there() {
 }
 
 #[test]
+fn the_two_tables_of_water_agree_in_extinction_and_differ_in_albedo() {
+    let drops = Drops::monodisperse(5.6, 2.0).unwrap();
+    let by = |water| Medium::new(&drops, 1550.0, water).unwrap();
+    let (one, other) = (by(Water::Segelstein), by(Water::HaleQuerry));
+    assert!((one.extinction_per_m / other.extinction_per_m - 1.0).abs() < 1e-3);
+    assert!(
+        (one.albedo() - 0.605).abs() < 1e-3 && (other.albedo() - 0.654).abs() < 1e-3,
+        "{other:?}"
+    );
+}
+
+#[test]
 fn dry_air_does_nothing() {
     let dry = medium(&Drops::none(), 1550.0);
     assert_eq!((dry.extinction_per_m, dry.transmission(1000.0), dry.albedo()), (0.0, 1.0, 1.0));
@@ -278,7 +290,7 @@ fn dry_air_does_nothing() {
         (blur.unscattered(), blur.scattered_within(1e9), blur.returned(0.16)),
         (1.0, 0.0, 1.0)
     );
-    let veil = Veil::new(&dry, &Projector::default(), 1000.0, 40.0).unwrap();
+    let veil = Veil::new(&dry, None, &Projector::default(), 1000.0, 40.0).unwrap();
     assert_eq!((veil.backscatter, veil.airlight), (0.0, 0.0));
     assert_eq!(
         ScatteringAngles::new(&Drops::none(), 1550.0, Water::Segelstein),
@@ -294,15 +306,58 @@ fn air_too_dense_for_single_scattering_is_refused() {
     assert!(ForwardBlur::new(medium(&fog, 1550.0), None, -1.0).is_err());
 }
 
+fn backward(drops: &Drops, nm: f64) -> BackwardLobe {
+    BackwardLobe::new(drops, nm, Water::Segelstein).unwrap()
+}
+
 #[test]
-fn the_veil_of_the_papers_heavy_rain_is_a_ten_thousandth_of_a_white_target() {
-    let heavy = medium(&Drops::monodisperse(5.6, 2.0).unwrap(), 1550.0);
-    let veil = |mm| Veil::new(&heavy, &Projector::default(), mm, 40.0).unwrap();
+fn the_veil_of_the_papers_heavy_rain_is_a_millionth_of_a_white_target() {
+    let drops = Drops::monodisperse(5.6, 2.0).unwrap();
+    let (heavy, lobe) = (medium(&drops, 1550.0), backward(&drops, 1550.0));
+    let veil = |mm| Veil::new(&heavy, Some(&lobe), &Projector::default(), mm, 40.0).unwrap();
     let (near, far) = (veil(300.0), veil(1000.0));
-    assert!(far.backscatter > near.backscatter && far.backscatter < 2e-3, "{near:?} {far:?}");
+    assert!(far.backscatter > near.backscatter && far.backscatter < 1e-5, "{near:?} {far:?}");
     // albedo times loss
     assert!((far.airlight / (heavy.albedo() * heavy.extinction_per_m) - 1.0).abs() < 1e-3);
-    assert!(Veil::new(&heavy, &Projector::default(), 0.0, 40.0).is_err());
+    assert!(Veil::new(&heavy, Some(&lobe), &Projector::default(), 0.0, 40.0).is_err());
+}
+
+#[test]
+fn light_sent_back_hardly_depends_on_a_percent_of_the_drop_size_once_it_is_averaged() {
+    let phase = |mm: f64| {
+        let lobe = backward(&Drops::monodisperse(5.6, mm).unwrap(), 550.0);
+        lobe.phase(176_f64.to_radians())
+    };
+    let exact = |mm: f64| {
+        let medium = medium(&Drops::monodisperse(5.6, mm).unwrap(), 550.0);
+        4.0 * PI * medium.backscatter_per_m_sr / medium.scattering_per_m
+    };
+    let sizes = || (0..6).map(|k| 2.0 + 0.004 * f64::from(k));
+    let spread = |of: &dyn Fn(f64) -> f64| {
+        let (low, high) =
+            sizes().map(of).fold((f64::MAX, 0.0_f64), |(l, h), v| (l.min(v), h.max(v)));
+        high / low
+    };
+    let (averaged, at_180) = (spread(&phase), spread(&exact));
+    assert!(averaged < 1.5, "{averaged}");
+    assert!(at_180 > 3.0 * averaged, "{at_180} against {averaged}");
+}
+
+#[test]
+fn the_backward_bands_carry_what_the_whole_phase_function_does() {
+    // Share of the light beyond 140 degrees: from the bands, and from the cumulative distribution.
+    for drops in [Drops::marshall_palmer(5.6).unwrap(), Drops::fog(10.0, 0.1).unwrap()] {
+        let lobe = backward(&drops, 1550.0);
+        let share: f64 = (0..40)
+            .map(|k| {
+                let (low, high) = (140.0 + f64::from(k), 141.0 + f64::from(k));
+                let [low, high, middle] = [low, high, (low + high) / 2.0].map(f64::to_radians);
+                lobe.phase(middle) * (low.cos() - high.cos()) / 2.0
+            })
+            .sum();
+        let whole = 1.0 - angles(&drops, 1550.0).within(140_f64.to_radians());
+        assert!((share / whole - 1.0).abs() < 0.15, "{share} against {whole}");
+    }
 }
 
 fn beams(distance_mm: f64) -> BeamShadows {

@@ -6,7 +6,8 @@
 use nirspi_optics::pixel::{Instrument, PixelBudget};
 use nirspi_optics::rain::{Drops, Weather};
 use nirspi_optics::range::{
-    FARTHEST_MM, Wanted, as_printed_mm, extinction_needed_per_m, farthest_mm,
+    FARTHEST_MM, Floor, Wanted, as_printed_mm, exposure_needed_us, extinction_needed_per_m,
+    farthest_mm,
 };
 use nirspi_optics::water::Water;
 
@@ -63,17 +64,44 @@ fn seeing_1_5_m_where_dry_air_shows_2_takes_hundreds_of_times_the_papers_rain() 
 }
 
 #[test]
-fn as_printed_the_range_is_a_step_of_the_search() {
-    let heavy = weather(5.6, 2.0);
-    let printed =
-        as_printed_mm(&Instrument::default(), &heavy, &wanted(25.0), 2.0, 10_000.0).unwrap();
-    assert_eq!(printed % 1000.0, 0.0);
-    let physics = range_m(&heavy, &wanted(25.0)) * 1e3;
-    assert!(printed >= physics && printed < physics + 1000.0, "{printed} {physics}");
-    assert_eq!(
-        as_printed_mm(&Instrument::default(), &heavy, &wanted(25.0), 2.0, 1000.0),
-        Ok(1000.0)
-    );
+fn as_printed_the_range_is_the_first_step_at_which_one_exposure_drowns_in_its_noise() {
+    let instrument = Instrument::default();
+    for (rate, drop_mm, exposure_us) in [(1.93, 0.5, 8.0), (5.6, 2.0, 8.0), (5.6, 2.0, 25.0)] {
+        let rain = weather(rate, drop_mm);
+        let asked = wanted(exposure_us);
+        let printed =
+            as_printed_mm(&instrument, &rain, &asked, (drop_mm, 3000.0), Floor::OneExposure)
+                .unwrap();
+        assert_eq!(printed % 300.0, 0.0);
+        // One exposure of one LED: at the step before it is above its noise, at this one below.
+        let snr =
+            |mm| PixelBudget::new(&instrument, &rain, mm, 1.0, exposure_us).unwrap().exposure_snr;
+        assert!(snr(printed) < 1.01, "{}", snr(printed));
+        assert!(printed == 300.0 || snr(printed - 300.0) > 1.0, "{}", snr(printed - 300.0));
+    }
+}
+
+#[test]
+fn with_the_gain_of_all_patterns_algorithm_2_ends_within_a_step_of_the_physics() {
+    let (instrument, heavy) = (Instrument::default(), weather(5.6, 2.0));
+    let printed = |z_max_mm| {
+        as_printed_mm(&instrument, &heavy, &wanted(25.0), (2.0, z_max_mm), Floor::WholePicture)
+    };
+    let (stepped, physics) = (printed(10_000.0).unwrap(), range_m(&heavy, &wanted(25.0)) * 1e3);
+    assert_eq!(stepped % 1000.0, 0.0);
+    assert!(stepped >= physics && stepped < physics + 1000.0, "{stepped} {physics}");
+    assert_eq!(printed(1000.0), Ok(1000.0));
+}
+
+#[test]
+fn the_exposure_needed_grows_as_the_fourth_power_of_the_distance_not_by_the_papers_three() {
+    let (instrument, heavy) = (Instrument::default(), weather(5.6, 2.0));
+    let at = |mm| exposure_needed_us(&instrument, &heavy, (mm, 1.0), 5.0).unwrap();
+    let ratio = at(1000.0) / at(300.0);
+    // (1 / 0.3)^4 = 123; shot noise of the array's own light is larger near by.
+    assert!((100.0..125.0).contains(&ratio), "{ratio}");
+    let pixel = PixelBudget::new(&instrument, &heavy, 600.0, 1.0, at(600.0)).unwrap();
+    assert!((pixel.pixel_snr - 5.0).abs() < 1e-9, "{}", pixel.pixel_snr);
 }
 
 #[test]

@@ -210,6 +210,10 @@ fn dashes(
 }
 
 fn label(tick: f64) -> String {
+    // What three digits would round away, and what is wider than the margin.
+    if tick != 0.0 && !(1e-3..1e6).contains(&tick.abs()) {
+        return format!("{tick:e}");
+    }
     let text = format!("{tick:.3}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
@@ -276,6 +280,12 @@ mod tests {
         let x = LEFT_PX + (WIDTH_PX - LEFT_PX - RIGHT_PX) / 2;
         let y = TOP_PX + (HEIGHT_PX - TOP_PX - BOTTOM_PX) / 2;
         assert_eq!(*canvas.get_pixel(x, y), COLOURS[0]);
+    }
+
+    #[test]
+    fn ticks_are_written_so_that_they_can_be_told_apart() {
+        let labels = [0.0, 1e-4, 0.001, 0.25, 2.0, 1e5, 1e10].map(label);
+        assert_eq!(labels, ["0", "1e-4", "0.001", "0.25", "2", "100000", "1e10"]);
     }
 
     #[test]

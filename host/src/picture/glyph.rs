@@ -4,7 +4,7 @@
 //! asked size and never leave it.
 
 use super::text::Font;
-use ab_glyph::{Font as _, GlyphId, PxScale, point};
+use ab_glyph::{Font as _, FontRef, GlyphId, PxScale, point};
 
 /// Samples a pixel along each edge for anti-aliasing.
 const OVERSAMPLING: usize = 4;
@@ -12,30 +12,78 @@ const OVERSAMPLING: usize = 4;
 /// stroke is moved outwards by this part of the target.
 const THICKENING: f32 = 0.028;
 
-/// Whether the font draws something for this character: not for blanks, nor for what it does not
-/// know.
-pub(crate) fn has_shape(character: char) -> bool {
-    let font = Font::sans();
+/// A typeface that test targets are drawn in.
+#[derive(Debug, Clone)]
+pub struct Typeface {
+    name: &'static str,
+    font: FontRef<'static>,
+}
+
+impl Typeface {
+    /// Ubuntu Light, which every letter scene is drawn in.
+    #[must_use]
+    pub fn ubuntu_light() -> Self {
+        Self { name: "Ubuntu Light", font: Font::sans().clone() }
+    }
+
+    /// Hack, of one width.
+    #[must_use]
+    pub fn hack() -> Self {
+        Self { name: "Hack", font: Font::mono().clone() }
+    }
+
+    /// The typeface in a TrueType or OpenType file's bytes; `None` if they hold no font.
+    #[must_use]
+    pub fn from_bytes(name: &'static str, bytes: &'static [u8]) -> Option<Self> {
+        let font = FontRef::try_from_slice(bytes).ok()?;
+        Some(Self { name, font })
+    }
+
+    /// Whether it draws something for this character: not for blanks, nor for what it does not know.
+    #[must_use]
+    pub fn has_shape(&self, character: char) -> bool {
+        has_shape(&self.font, character)
+    }
+
+    /// What it is called.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        self.name
+    }
+
+    /// The character in `[0, 1]`, bright on dark, `size_px * size_px` row-major, its longer side `fill` of the edge, strokes
+    /// thickened; `None` if the typeface has no shape for it.
+    #[must_use]
+    pub fn draw(&self, character: char, size_px: usize, fill: f32) -> Option<Vec<f32>> {
+        render(&self.font, character, size_px, fill)
+    }
+}
+
+fn has_shape(font: &FontRef<'_>, character: char) -> bool {
     let id = font.glyph_id(character);
     id != GlyphId(0) && font.outline(id).is_some()
 }
 
 /// The character in `[0, 1]`, bright on dark, `size_px * size_px` row-major: its longer side is
 /// `fill` of the edge. None if the font has no shape for it.
-pub(crate) fn render(character: char, size_px: usize, fill: f32) -> Option<Vec<f32>> {
-    if !has_shape(character) {
+fn render(font: &FontRef<'_>, character: char, size_px: usize, fill: f32) -> Option<Vec<f32>> {
+    if !has_shape(font, character) {
         return None;
     }
     let fine_px = size_px * OVERSAMPLING;
     let edge = fine_px as f32;
     let radius = THICKENING * edge;
-    let thin = outline_mask(character, fine_px, fill * edge - 2.0 * radius)?;
+    let thin = outline_mask(font, character, fine_px, fill * edge - 2.0 * radius)?;
     Some(average(&thicken(&thin, fine_px, radius), size_px))
 }
 
 /// Which fine pixels the character covers when its longer side has `longer_px`, centred.
-fn outline_mask(character: char, fine_px: usize, longer_px: f32) -> Option<Vec<bool>> {
-    let font = Font::sans();
+fn outline_mask(
+    font: &FontRef<'_>,
+    character: char,
+    fine_px: usize,
+    longer_px: f32,
+) -> Option<Vec<bool>> {
     let id = font.glyph_id(character);
     let unscaled = font.outline(id)?.bounds;
     let longer =
@@ -129,7 +177,7 @@ mod tests {
     #[test]
     fn every_printable_ascii_character_fills_the_target_and_is_centred() {
         for character in '!'..='~' {
-            let map = render(character, SIZE_PX, FILL).unwrap();
+            let map = render(Font::sans(), character, SIZE_PX, FILL).unwrap();
             assert!(map.iter().all(|value| (0.0..=1.0).contains(value)));
             let [left, right, top, bottom] = extent(&map);
             let longer = (right - left).max(bottom - top) as f32 / SIZE_PX as f32;
@@ -145,13 +193,13 @@ mod tests {
     #[test]
     fn strokes_of_a_capital_are_wide_enough_for_32_pixels() {
         // The bar of I, which is one stroke, against 2 of the camera's 32 pixels.
-        let [left, right, ..] = extent(&render('I', SIZE_PX, FILL).unwrap());
+        let [left, right, ..] = extent(&render(Font::sans(), 'I', SIZE_PX, FILL).unwrap());
         assert!((right - left) as f32 / SIZE_PX as f32 > 2.0 / 32.0, "{}", right - left);
     }
 
     #[test]
     fn edges_are_smooth() {
-        let map = render('O', SIZE_PX, FILL).unwrap();
+        let map = render(Font::sans(), 'O', SIZE_PX, FILL).unwrap();
         let between = map.iter().filter(|value| (0.05..0.95).contains(*value)).count();
         assert!(between > SIZE_PX, "{between} pixels between dark and bright");
     }
@@ -159,15 +207,15 @@ mod tests {
     #[test]
     fn blanks_and_unknown_characters_have_no_shape() {
         for character in [' ', '\n', '\0', '\u{200b}', '漢', '\u{10ffff}'] {
-            assert!(!has_shape(character), "{character:?}");
-            assert_eq!(render(character, 16, FILL), None);
+            assert!(!has_shape(Font::sans(), character), "{character:?}");
+            assert_eq!(render(Font::sans(), character, 16, FILL), None);
         }
     }
 
     #[test]
     fn a_target_of_few_pixels_is_drawn_too() {
         for size_px in 1..8 {
-            assert_eq!(render('R', size_px, FILL).unwrap().len(), size_px * size_px);
+            assert_eq!(render(Font::sans(), 'R', size_px, FILL).unwrap().len(), size_px * size_px);
         }
     }
 }

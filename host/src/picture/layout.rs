@@ -114,6 +114,24 @@ impl SideBySide {
     }
 }
 
+/// Rows of panels under each other, left edges aligned.
+///
+/// # Panics
+/// As [`SideBySide::render`].
+#[must_use]
+pub fn stacked(rows: &[SideBySide]) -> RgbImage {
+    let drawn: Vec<RgbImage> = rows.iter().map(SideBySide::render).collect();
+    let width = drawn.iter().map(RgbImage::width).max().unwrap_or(1);
+    let height = drawn.iter().map(RgbImage::height).sum::<u32>().max(1);
+    let mut canvas = RgbImage::from_pixel(width, height, GROUND);
+    let mut top = 0;
+    for row in &drawn {
+        imageops::replace(&mut canvas, row, 0, i64::from(top));
+        top += row.height();
+    }
+    canvas
+}
+
 const HEADER: fn() -> Style =
     || Style { font: Font::sans(), size_px: 32.0, line_px: 40, colour: BRIGHT };
 const TITLE: fn() -> Style =

@@ -11,4 +11,5 @@ mod layout;
 mod text;
 
 pub use chart::{Axis, Chart, Line};
-pub use layout::{Panel, Range, SideBySide};
+pub use glyph::Typeface;
+pub use layout::{Panel, Range, SideBySide, stacked};

@@ -89,7 +89,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 
 fn say(args: &Args, report: &Report) -> Result<()> {
     for origin in &report.images {
-        print::line(format_args!("{}: {} images, {}", origin.stack, origin.images, origin.choice))?;
+        print::line(format_args!(
+            "{}: {} images of {} families, writers or photographs, {}",
+            origin.stack, origin.images, origin.groups, origin.choice
+        ))?;
     }
     let version = |v: &Version| format!("{} {}", v.model, v.version);
     let versions: Vec<String> = report.weights.iter().map(version).collect();
@@ -102,8 +105,11 @@ fn say(args: &Args, report: &Report) -> Result<()> {
             print::line(at(&figures.condition))?;
         }
         let accuracy = figures.character_accuracy.map_or_else(String::new, |a| format!("  {a:.2}"));
+        let over_gan = figures
+            .psnr_minus_gan_db
+            .map_or_else(String::new, |d| format!("  minus GAN {} dB", d.text(2)));
         print::line(format_args!(
-            "  {:<22} {:5.2} [{:5.2}, {:5.2}]  {:.3}  {:7.2}{accuracy}  ({} images)",
+            "  {:<22} {:5.2} [{:5.2}, {:5.2}]  {:.3}  {:7.2}{accuracy}{over_gan}  ({} images)",
             figures.row,
             figures.psnr_db.value,
             figures.psnr_db.low,

@@ -10,8 +10,9 @@ use std::process::ExitCode;
 
 /// Time of every stage of one picture beside the paper's Table 1
 ///
-/// Acquisition is computed from the sequence: patterns, complements, dwell and sweeps. The others are timed on this
-/// machine's CPU, one picture at a time, from a frame of the virtual camera to 64 x 64 pixels. Build with --release.
+/// Acquisition is an input: so many sweeps of patterns and complements as fill 20 ms, as in the paper. The others are
+/// timed on this machine's CPU, one picture at a time, from a frame of the virtual camera to 64 x 64 pixels. T_2D stands
+/// there without diffusion and with it. Build with --release.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n\
     \x20 nirspi eval table1 --repeats 200 --out table1/")]

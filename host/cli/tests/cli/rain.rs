@@ -93,7 +93,27 @@ fn ranges_stand_beside_the_papers_and_the_plot_is_written() {
         assert!(wet < dry && wet > 0.99 * dry, "{row}");
     }
     assert_eq!(bench.json("range/range.json"), report);
-    assert!(bench.path("range/range.png").exists());
+    assert!(bench.path("range/range.png").exists() && bench.path("range/exposure.png").exists());
+    // Grows as the fourth power of the distance, where the paper has a ratio of three.
+    let needed = |k: usize| report["exposures"][k]["needed_us"].as_f64().unwrap();
+    assert!(needed(4) / needed(0) > 90.0, "{report}");
+}
+
+#[test]
+fn curves_of_rain_are_written_as_pictures_and_numbers() {
+    let bench = Bench::new();
+    let out = ["rain", "--drops", "mono:2", "--out", "curves"];
+    let text = bench.run(&out).succeeded().stdout;
+    assert!(text.contains("in a rig") && text.contains("wrote curves"), "{text}");
+    for name in
+        ["extinction_wavelength", "albedo_size", "drop_sizes", "fall_speed", "extinction_rate"]
+    {
+        assert!(bench.path(&format!("curves/{name}.png")).exists(), "{name}");
+        let csv = std::fs::read_to_string(bench.path(&format!("curves/{name}.csv"))).unwrap();
+        assert!(csv.starts_with("line,") && csv.lines().count() > 20, "{name}: {csv}");
+    }
+    assert_eq!(bench.json("curves/rain.json")["fall"]["rig"]["height_m"], 0.25);
+    bench.run(&["rain", "--budget", "--out", "curves"]).failed(2, &["--budget", "--out"]);
 }
 
 #[test]
@@ -112,11 +132,24 @@ fn a_scene_in_rain_is_captured_and_its_seed_repeats_it() {
 #[test]
 fn table_3_has_both_cameras_at_every_distance_with_intervals() {
     let bench = Bench::new();
-    let arguments = ["eval", "table3", "--scenes", "2", "--frames", "20", "--out", "t", "--json"];
+    let arguments = [
+        "eval",
+        "table3",
+        "--scenes",
+        "2",
+        "--frames",
+        "20",
+        "--ancestral",
+        "2",
+        "--out",
+        "t",
+        "--json",
+    ];
     let report = bench.run(&arguments).succeeded().json();
-    // Four pictures (both cameras, GAN, diffusion) under each of four conditions.
-    assert_eq!(report["rows"].as_array().unwrap().len(), 16);
+    // Five pictures (both cameras, GAN, diffusion, ancestral) at three distances and at all.
+    assert_eq!(report["rows"].as_array().unwrap().len(), 20);
     assert_eq!(report["simulated"], true);
-    assert!(report["rows"][0]["psnr_db"]["ci95"].as_f64().unwrap() >= 0.0);
+    let psnr = &report["rows"][0]["psnr_db"];
+    assert!(psnr["low"].as_f64().unwrap() <= psnr["high"].as_f64().unwrap(), "{psnr}");
     assert!(bench.path("t/table3.png").exists() && bench.path("t/table3.json").exists());
 }

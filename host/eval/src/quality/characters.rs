@@ -26,6 +26,8 @@ pub struct Origin {
     pub stack: String,
     /// Images taken.
     pub images: usize,
+    /// Font families, writers or photographs that they are of: what the intervals rest on.
+    pub groups: usize,
     /// `of 460 held out`, or why all were taken.
     pub choice: String,
 }
@@ -39,6 +41,8 @@ pub struct Character {
     pub label: Option<u8>,
     /// Index among the origins.
     pub stack: usize,
+    /// Font family, writer or photograph, of the stack's own numbers.
+    pub group: u32,
 }
 
 /// All images, stack after stack.
@@ -97,9 +101,17 @@ impl Characters {
             sharp: stack.image(place).iter().map(|&level| f32::from(level) / 255.0).collect(),
             label: stack.label(place),
             stack: at,
+            group: stack.groups()[place],
         }));
         let (name, images) = (stack.name().to_owned(), places.len());
-        self.origins.push(Origin { stack: name, images, choice });
+        let groups = self.groups_of(at);
+        self.origins.push(Origin { stack: name, images, groups, choice });
+    }
+
+    /// Groups among the images of a stack.
+    fn groups_of(&self, stack: usize) -> usize {
+        let groups = self.all.iter().filter(|c| c.stack == stack).map(|c| c.group);
+        groups.collect::<std::collections::BTreeSet<u32>>().len()
     }
 
     /// The first `count` of each stack.
@@ -111,6 +123,9 @@ impl Characters {
             let before = fewer.all.len();
             fewer.all.extend(of_stack.cloned());
             origin.images = fewer.all.len() - before;
+        }
+        for at in 0..fewer.origins.len() {
+            fewer.origins[at].groups = fewer.groups_of(at);
         }
         fewer
     }
@@ -179,6 +194,8 @@ mod tests {
             let taken = of(Some(&[3, 1]), 3, seed);
             assert_eq!((taken.len(), taken.origins()[0].choice.as_str()), (3, "of 4 held out"));
             assert!(taken.iter().all(|c| ![2, 3].contains(&c.label.unwrap())), "{taken:?}");
+            assert!(taken.iter().all(|c| [1, 3].contains(&c.group)), "{taken:?}");
+            assert_eq!(taken.origins()[0].groups, 2);
         }
         assert_eq!(of(None, 6, 1).len(), 6);
     }

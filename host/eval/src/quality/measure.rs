@@ -4,9 +4,9 @@
 //! The noise of image k is the same in every condition but for its strength, and the same for every method
 //! (`readings_have_the_noise_that_was_asked_for_and_its_pattern_stays`).
 
-use super::bootstrap::Interval;
 use super::characters::{Character, Characters};
 use super::contenders::Method;
+use crate::bootstrap::{DRAWS, Interval, Redraws};
 use crate::error::Result;
 use nirspi_nets::Networks;
 use nirspi_nets::classical::Blur;
@@ -88,10 +88,14 @@ pub struct Figures {
     pub stack: Option<String>,
     /// Images that the figures rest on.
     pub images: usize,
-    /// Mean over the images; of equal ones 60 dB.
+    /// Mean over the images; of equal ones 60 dB. Intervals draw font families, writers and photographs again.
     pub psnr_db: Interval,
     /// Mean over the images.
     pub ssim: Interval,
+    /// Mean over the images of the difference to the GAN's PSNR; `null` for the GAN and for rows without a sampler.
+    pub psnr_minus_gan_db: Option<Interval>,
+    /// The same of SSIM.
+    pub ssim_minus_gan: Option<Interval>,
     /// On the features of our own classifier: not FID.
     pub frechet_character_distance: Interval,
     /// Share of the labelled characters that our classifier sees right.
@@ -107,7 +111,7 @@ pub struct Judges {
 }
 
 /// One image's figures.
-struct One {
+pub struct One {
     psnr_db: f64,
     ssim: f64,
     inconsistency: f64,
@@ -123,33 +127,46 @@ impl Judges {
         Ok(self.characters.judge(Images::new(images)?))
     }
 
-    /// The figures of images that a method made of readings, of all stacks together and of each.
-    pub fn figures(
-        &self,
-        method: Method,
+    /// The figures of each image that a method made of readings.
+    pub fn each(
         condition: Condition,
         characters: &Characters,
-        sharp: &Judged,
         readings: &[f32],
         images: &[f32],
-    ) -> Result<Vec<Figures>> {
-        let judged = self.judge(images)?;
-        let each: Vec<One> = characters
+    ) -> Result<Vec<One>> {
+        characters
             .iter()
             .zip(images.chunks_exact(SIDE * SIDE))
             .zip(readings.chunks_exact(READINGS * READINGS))
             .map(|((character, image), readings)| one(character, condition, readings, image))
-            .collect::<Result<_>>()?;
+            .collect()
+    }
+
+    /// The figures of a method under a condition, of all stacks together and of each.
+    pub fn figures(
+        &self,
+        (method, condition): (Method, Condition),
+        characters: &Characters,
+        (sharp, judged): (&Judged, &Judged),
+        each: &[One],
+        gan: Option<&[One]>,
+    ) -> Result<Vec<Figures>> {
+        let compared = gan.filter(|_| method.steps().is_some());
         let of = |stack: Option<usize>| -> Result<Figures> {
             let taken = |c: &Character| stack.is_none_or(|stack| stack == c.stack);
-            let places: Vec<usize> =
-                characters.iter().enumerate().filter(|(_, c)| taken(c)).map(|(at, _)| at).collect();
-            let mean = |of: fn(&One) -> f64| {
-                Interval::of_mean(&places.iter().map(|&at| of(&each[at])).collect::<Vec<_>>())
+            let (places, groups): (Vec<usize>, Vec<(usize, u32)>) = characters
+                .iter()
+                .enumerate()
+                .filter(|(_, c)| taken(c))
+                .map(|(at, c)| (at, (c.stack, c.group)))
+                .unzip();
+            let redraws = Redraws::clustered(&groups, DRAWS);
+            let mean = |of: &dyn Fn(usize) -> f64| {
+                redraws.of_mean(&places.iter().map(|&at| of(at)).collect::<Vec<f64>>())
             };
             let distance = |picked: &[usize]| {
                 let picked: Vec<usize> = picked.iter().map(|&k| places[k]).collect();
-                self.characters.distance(&self.some(sharp, &picked), &self.some(&judged, &picked))
+                self.characters.distance(&self.some(sharp, &picked), &self.some(judged, &picked))
             };
             let whole: Vec<usize> = (0..places.len()).collect();
             let labels: Vec<(u8, u8)> = places
@@ -157,23 +174,24 @@ impl Judges {
                 .filter_map(|&at| characters.iter().nth(at)?.label.map(|l| (l, judged.classes[at])))
                 .collect();
             let right = labels.iter().filter(|(label, seen)| label == seen).count();
+            let drawn = redraws.first(DISTANCE_DRAWS);
+            let drawn =
+                drawn.iter().map(|picked| distance(picked)).collect::<Result<Vec<f64>, _>>()?;
             Ok(Figures {
                 row: method.name(),
                 method,
                 condition,
                 stack: stack.map(|stack| characters.origins()[stack].stack.clone()),
                 images: places.len(),
-                psnr_db: mean(|one| one.psnr_db),
-                ssim: mean(|one| one.ssim),
-                frechet_character_distance: Interval::of_set(
-                    distance(&whole)?,
-                    places.len(),
-                    DISTANCE_DRAWS,
-                    distance,
-                )?,
+                psnr_db: mean(&|at| each[at].psnr_db),
+                ssim: mean(&|at| each[at].ssim),
+                psnr_minus_gan_db: compared
+                    .map(|gan| mean(&|at| each[at].psnr_db - gan[at].psnr_db)),
+                ssim_minus_gan: compared.map(|gan| mean(&|at| each[at].ssim - gan[at].ssim)),
+                frechet_character_distance: Redraws::around(distance(&whole)?, drawn),
                 character_accuracy: (!labels.is_empty())
                     .then(|| right as f64 / labels.len() as f64),
-                inconsistency: (condition.noise > 0.0).then(|| mean(|one| one.inconsistency)),
+                inconsistency: (condition.noise > 0.0).then(|| mean(&|at| each[at].inconsistency)),
             })
         };
         let stacks = (0..characters.origins().len()).map(Some);

@@ -11,6 +11,20 @@ pub fn fall_speed_m_per_s(diameter_mm: f64) -> f64 {
     (9.65 - 10.3 * (-0.6 * diameter_mm).exp()).max(0.0)
 }
 
+/// Acceleration of free fall, in m/s^2.
+const GRAVITY_M_PER_S2: f64 = 9.81;
+
+/// Speed of a drop that has fallen `height_m` from rest: `v sqrt(1 - exp(-2 g h / v^2))`, v its terminal speed (drag as the square of
+/// the speed). A drop of 2 mm has a third of its terminal speed after a quarter of a metre.
+#[must_use]
+pub fn fall_speed_from_rest_m_per_s(diameter_mm: f64, height_m: f64) -> f64 {
+    let terminal = fall_speed_m_per_s(diameter_mm);
+    if terminal == 0.0 {
+        return 0.0;
+    }
+    terminal * (-(-2.0 * GRAVITY_M_PER_S2 * height_m / terminal.powi(2)).exp_m1()).sqrt()
+}
+
 /// Terminal speed in air of another density: times `(1.204 / density)^0.4` (Foote and du Toit, J. Appl. Meteorol. 8,
 /// 249, 1969).
 #[must_use]
@@ -51,6 +65,19 @@ mod tests {
             assert!((speed / measured - 1.0).abs() < 0.02, "{mm} mm: {speed}");
         }
         assert_eq!(fall_speed_m_per_s(0.05), 0.0);
+    }
+
+    #[test]
+    fn a_drop_from_rest_falls_freely_at_first_and_at_its_terminal_speed_at_last() {
+        let free = (2.0 * GRAVITY_M_PER_S2 * 0.001_f64).sqrt();
+        assert!((fall_speed_from_rest_m_per_s(4.0, 0.001) / free - 1.0).abs() < 1e-3);
+        assert!(
+            (fall_speed_from_rest_m_per_s(2.0, 50.0) / fall_speed_m_per_s(2.0) - 1.0).abs() < 1e-6
+        );
+        // v = 6.548 m/s: 6.548 sqrt(1 - exp(-4.905 / 42.87)) = 2.153 m/s; after 0.5 m 2.96 m/s.
+        assert!((fall_speed_from_rest_m_per_s(2.0, 0.25) - 2.153).abs() < 2e-3);
+        assert!((fall_speed_from_rest_m_per_s(2.0, 0.5) - 2.96).abs() < 1e-2);
+        assert_eq!(fall_speed_from_rest_m_per_s(0.05, 1.0), 0.0);
     }
 
     #[test]

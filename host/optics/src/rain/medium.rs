@@ -21,7 +21,8 @@ pub struct Medium {
     pub absorption_per_m: f64,
     /// Mean cosine of the scattering angle; 0 without drops.
     pub asymmetry: f64,
-    /// Scattered straight back, per metre and steradian.
+    /// Scattered straight back, at exactly 180 degrees, per metre and steradian. A camera beside its projector does not see that
+    /// angle: [`super::BackwardLobe`].
     pub backscatter_per_m_sr: f64,
 }
 
@@ -87,13 +88,13 @@ impl Medium {
     }
 }
 
-fn size_parameter(diameter_mm: f64, wavelength_nm: f64) -> f64 {
+pub(super) fn size_parameter(diameter_mm: f64, wavelength_nm: f64) -> f64 {
     PI * diameter_mm * 1e6 / wavelength_nm
 }
 
 /// The classes that stand for all where each costs much: no more than some 20, evenly picked from those that carry
 /// more than a thousandth of the largest class's area.
-fn representative(drops: &Drops) -> impl Iterator<Item = &DropClass> {
+pub(super) fn representative(drops: &Drops) -> impl Iterator<Item = &DropClass> {
     let area = |class: &DropClass| class.per_m3 * class.diameter_mm.powi(2);
     let most = drops.classes().iter().map(area).fold(0.0, f64::max);
     let counts = move |class: &&DropClass| area(class) > 1e-3 * most;

@@ -4,7 +4,7 @@
 //! in daylight glow. In a differential measurement the first adds a constant to every pixel, the second nothing but
 //! its shot noise.
 
-use super::{Medium, RainError, ensure};
+use super::{BackwardLobe, Medium, RainError, ensure};
 use crate::Projector;
 use std::f64::consts::PI;
 
@@ -25,14 +25,17 @@ impl Veil {
     /// The veil before a target at `distance_mm`, the detector `baseline_mm` beside the projector, both aimed at the
     /// target's centre.
     ///
-    /// The lidar equation: a slab dz at z returns `beta(pi) / z^2 dz` of the beam where a white (Lambertian) target
-    /// returns `1 / (pi L^2)`. Near the camera the detector does not see the beam: the squares that they cover, as
-    /// wide as the field at z, are `baseline (1 - z / L)` apart.
+    /// The lidar equation: a slab dz at z returns `beta(theta) / z^2 dz` of the beam where a white (Lambertian) target
+    /// returns `1 / (pi L^2)`. Collector and projector seen from z are `atan(baseline / z)` apart, so that the drops
+    /// scatter by theta, that much less than 180 degrees: 172 to 178 in the stretches that count. Near the camera the
+    /// detector does not see the beam: the squares that they cover, as wide as the field at z, are
+    /// `baseline (1 - z / L)` apart. `backward` is `None` in dry air.
     ///
     /// # Errors
     /// [`RainError::Setting`] for lengths that are not positive.
     pub fn new(
         medium: &Medium,
+        backward: Option<&BackwardLobe>,
         projector: &Projector,
         distance_mm: f64,
         baseline_mm: f64,
@@ -47,12 +50,15 @@ impl Veil {
                 let apart = baseline_mm * (1.0 - z / distance_mm);
                 let overlap = (1.0 - apart / projector.field_mm(z)).max(0.0);
                 let less_path = medium.transmission(2e-3 * (z - distance_mm));
-                overlap * (distance_mm / z).powi(2) * less_path
+                let angle_rad = PI - (baseline_mm / z).atan();
+                let phase = backward.map_or(0.0, |lobe| lobe.phase(angle_rad));
+                phase * overlap * (distance_mm / z).powi(2) * less_path
             })
             .sum();
         let path_m = distance_mm * 1e-3;
         Ok(Self {
-            backscatter: PI * medium.backscatter_per_m_sr * ratio * step * 1e-3,
+            // beta = b p / (4 pi)
+            backscatter: medium.scattering_per_m / 4.0 * ratio * step * 1e-3,
             airlight: medium.albedo() * (1.0 - medium.transmission(path_m)),
         })
     }

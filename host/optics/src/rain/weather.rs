@@ -1,6 +1,6 @@
 //! Everything that one kind of weather does to light of one wavelength, worked out once and asked at any distance.
 
-use super::{Drops, ForwardBlur, Medium, RainError, ScatteringAngles, Veil};
+use super::{BackwardLobe, Drops, ForwardBlur, Medium, RainError, ScatteringAngles, Veil};
 use crate::Projector;
 use crate::water::Water;
 
@@ -10,6 +10,7 @@ pub struct Weather {
     drops: Drops,
     medium: Medium,
     angles: Option<ScatteringAngles>,
+    backward: Option<BackwardLobe>,
 }
 
 impl Weather {
@@ -19,11 +20,14 @@ impl Weather {
     /// As [`Medium::new`].
     pub fn new(drops: Drops, wavelength_nm: f64, water: Water) -> Result<Self, RainError> {
         let medium = Medium::new(&drops, wavelength_nm, water)?;
-        let angles = match drops.is_empty() {
-            true => None,
-            false => Some(ScatteringAngles::new(&drops, wavelength_nm, water)?),
+        let (angles, backward) = match drops.is_empty() {
+            true => (None, None),
+            false => (
+                Some(ScatteringAngles::new(&drops, wavelength_nm, water)?),
+                Some(BackwardLobe::new(&drops, wavelength_nm, water)?),
+            ),
         };
-        Ok(Self { drops, medium, angles })
+        Ok(Self { drops, medium, angles, backward })
     }
 
     /// What is in the air.
@@ -70,6 +74,6 @@ impl Weather {
         distance_mm: f64,
         baseline_mm: f64,
     ) -> Result<Veil, RainError> {
-        Veil::new(&self.medium, projector, distance_mm, baseline_mm)
+        Veil::new(&self.medium, self.backward.as_ref(), projector, distance_mm, baseline_mm)
     }
 }

@@ -1,0 +1,87 @@
+//! Light that drops send back towards the camera: the phase function from 140 to 180 degrees, averaged over angles and sizes.
+//!
+//! Straight back, a single drop size shines by orders of magnitude more or less than one a percent larger (the glory and its
+//! resonances), and no camera sees that angle alone: collector and projector stand beside each other. So the phase function is
+//! averaged over bands of two degrees, and each drop class over sizes within 5 % of its own: no nozzle makes drops that are more
+//! equal, and a law of sizes has classes that are wider.
+
+use super::medium::{representative, size_parameter};
+use super::{Drops, RainError};
+use crate::mie::Mie;
+use crate::water::Water;
+
+/// Where the bands begin, in degrees of the scattering angle.
+const FIRST_DEG: f64 = 140.0;
+
+/// Width of a band, in degrees.
+const BAND_DEG: f64 = 2.0;
+
+/// Bands up to 180 degrees.
+const BANDS: usize = 20;
+
+/// Angles in a band.
+const ANGLES: usize = 8;
+
+/// Drop sizes over all classes, at least one a class.
+const SIZES: usize = 16;
+
+/// Half of the relative width over which a class is averaged.
+const SPREAD: f64 = 0.05;
+
+/// Fractional part of the golden ratio: its multiples spread most evenly over 0 to 1.
+const GOLDEN_RATIO: f64 = 0.618_033_988_749_895;
+
+/// The phase function near the way back, mean 1 over the sphere.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BackwardLobe {
+    /// Means over bands of [`BAND_DEG`] from [`FIRST_DEG`] to 180 degrees.
+    bands: [f64; BANDS],
+}
+
+impl BackwardLobe {
+    /// What `drops` send back of light of `wavelength_nm`, each size in proportion to what it scatters.
+    ///
+    /// # Errors
+    /// As [`super::Medium::new`], and [`RainError::NoDrops`] for dry air.
+    pub fn new(drops: &Drops, wavelength_nm: f64, water: Water) -> Result<Self, RainError> {
+        let index = water.index(wavelength_nm)?;
+        let angle_deg = |i: usize| {
+            let jitter = (i as f64 * GOLDEN_RATIO).fract();
+            FIRST_DEG
+                + BAND_DEG * (i / ANGLES) as f64
+                + BAND_DEG * ((i % ANGLES) as f64 + jitter) / ANGLES as f64
+        };
+        let cosines: Vec<f64> =
+            (0..BANDS * ANGLES).map(|i| angle_deg(i).to_radians().cos()).collect();
+        let per_class = SIZES.div_ceil(representative(drops).count().max(1));
+        let mut mie = Mie::new();
+        let mut bands = [0.0; BANDS];
+        let mut scattering = 0.0;
+        for class in representative(drops) {
+            for k in 0..per_class {
+                let part = (k as f64 + 0.5) / per_class as f64;
+                // Downwards at the largest drop, beyond which there are none.
+                let diameter_mm = (class.diameter_mm * (1.0 + SPREAD * (2.0 * part - 1.0)))
+                    .min(super::drops::LARGEST_RAINDROP_MM);
+                let sphere = mie.sphere(size_parameter(diameter_mm, wavelength_nm), index)?;
+                let area = class.per_m3 * diameter_mm.powi(2);
+                let weight = area * sphere.efficiencies().scattering;
+                scattering += weight;
+                for (i, phase) in sphere.phase(&cosines)?.iter().enumerate() {
+                    bands[i / ANGLES] += weight * phase / ANGLES as f64;
+                }
+            }
+        }
+        if scattering == 0.0 {
+            return Err(RainError::NoDrops);
+        }
+        Ok(Self { bands: bands.map(|sum| sum / scattering) })
+    }
+
+    /// The phase function at a scattering angle; below 140 degrees, what it is there.
+    #[must_use]
+    pub fn phase(&self, angle_rad: f64) -> f64 {
+        let band = (angle_rad.to_degrees() - FIRST_DEG) / BAND_DEG;
+        self.bands[(band.max(0.0) as usize).min(BANDS - 1)]
+    }
+}
