@@ -1,9 +1,7 @@
 //! Cross-validation: chooses the number of atoms, and the trust in their prediction, on held-back
 //! measurements.
 //!
-//! A prediction is compared only with rows that it was not made from. Most rows that were not
-//! measured are finer than the measured rows. A prediction is therefore used only if it is better
-//! than zero on the finer half of the held-back rows, by more than chance.
+//! A prediction is compared only with rows that it was not made from.
 
 use super::Problem;
 use crate::omp::OmpError;
@@ -27,51 +25,17 @@ const SPARSITIES: usize = 10;
 /// Seed of the split into folds. The split changes the result, so the seed never changes.
 const SPLIT_SEED: u64 = 0x5eed;
 
-/// A prediction must be better than zero on the finer rows by this number of standard errors.
-const SURE: f64 = 2.0;
-
 /// Difference between a prediction and the held-back measurements.
 #[derive(Debug, Clone, Copy, Default)]
 struct Miss {
     absolute: f64,
     squared: f64,
-    fine: Gain,
-}
-
-/// The gain of a prediction over zero on fine rows: the sums of each row's gain in magnitude and in
-/// square, and of the products of these two gains.
-#[derive(Debug, Clone, Copy, Default)]
-struct Gain {
-    absolute: f64,
-    squared: f64,
-    products: [f64; 3],
-}
-
-impl Gain {
-    fn of(value: f64, error: f64) -> Self {
-        let (absolute, squared) = (value.abs() - error.abs(), value * value - error * error);
-        let products = [absolute * absolute, 2.0 * absolute * squared, squared * squared];
-        Self { absolute, squared, products }
-    }
-
-    /// Whether the gain, relative to zero filling's miss, exceeds [`SURE`] standard errors.
-    fn is_sure(&self, zero: Miss) -> bool {
-        let (a, b) = (1.0 / zero.absolute, 1.0 / zero.squared);
-        let [aa, ab, bb] = self.products;
-        let gain = a * self.absolute + b * self.squared;
-        gain > SURE * (a * a * aa + a * b * ab + b * b * bb).sqrt()
-    }
 }
 
 impl Miss {
     fn add(&mut self, other: Self) {
         self.absolute += other.absolute;
         self.squared += other.squared;
-        self.fine.absolute += other.fine.absolute;
-        self.fine.squared += other.fine.squared;
-        for (sum, product) in self.fine.products.iter_mut().zip(other.fine.products) {
-            *sum += product;
-        }
     }
 
     /// The miss relative to zero filling's. Absolute and squared error count alike: 2 is as bad as
@@ -124,9 +88,6 @@ pub(super) fn choose_among(
     predict: impl Fn(&[usize]) -> Result<Vec<Vec<f32>>, OmpError> + Sync,
 ) -> Result<Option<(usize, f32)>, OmpError> {
     let fold_of = split(problem, folds);
-    let mut is_fine = vec![false; problem.rows.len()];
-    let by_sequency = order::positions_by_sequency(problem.rows);
-    by_sequency[by_sequency.len() / 2..].iter().for_each(|&k| is_fine[k] = true);
     let parts: Vec<(Vec<usize>, Vec<usize>)> = (0..folds)
         .map(|fold| (0..problem.rows.len()).partition(|&k| fold_of[k] != Some(fold)))
         .filter(|(kept, held): &(Vec<_>, Vec<_>)| !kept.is_empty() && !held.is_empty())
@@ -136,7 +97,7 @@ pub(super) fn choose_among(
     }
     let results: Result<Vec<Misses>, OmpError> = parts
         .par_iter()
-        .map(|(kept, held)| Ok(misses_of(problem, &predict(kept)?, held, &is_fine)))
+        .map(|(kept, held)| Ok(misses_of(problem, &predict(kept)?, held)))
         .collect();
     let mut total: Misses = vec![Default::default(); count];
     for misses in results? {
@@ -149,7 +110,7 @@ pub(super) fn choose_among(
     for (at, misses) in total.iter().enumerate() {
         for (&trust, miss) in TRUST.iter().zip(misses) {
             let relative = miss.relative_to(zero_filling);
-            if relative < best.1 && miss.fine.is_sure(zero_filling) {
+            if relative < best.1 {
                 best = ((at, trust), relative);
             }
         }
@@ -158,21 +119,14 @@ pub(super) fn choose_among(
 }
 
 /// The miss of each prediction with each trust, on the held-back measurements.
-fn misses_of(
-    problem: &Problem<'_>,
-    predictions: &[Vec<f32>],
-    held: &[usize],
-    is_fine: &[bool],
-) -> Misses {
+fn misses_of(problem: &Problem<'_>, predictions: &[Vec<f32>], held: &[usize]) -> Misses {
     let miss_of = |predicted: &Vec<f32>| {
         TRUST.map(|trust| {
             let mut miss = Miss::default();
             for &k in held {
                 let row = problem.rows[k] as usize;
-                let value = f64::from(problem.values[k]);
                 let error = f64::from(problem.values[k] - trust * predicted[row]);
-                let fine = if is_fine[k] { Gain::of(value, error) } else { Gain::default() };
-                miss.add(Miss { absolute: error.abs(), squared: error * error, fine });
+                miss.add(Miss { absolute: error.abs(), squared: error * error });
             }
             miss
         })

@@ -55,59 +55,6 @@ fn omp_beats_zero_filling_on_real_measurements() {
     }
 }
 
-/// Light scattered by turbid water, which has no detail, over a faint figure; noise of each measurement as a share of the largest
-/// but the mean. All of it is simulated.
-fn nearly_all_scatter(n: u64, figure: f64, noise: f64, seed: u64) -> Measurements {
-    let side = side(n);
-    let mut random = Pcg64::seed_from_u64(seed);
-    let behind = scene(side, 2);
-    let image: Vec<f64> = (0..side.area())
-        .map(|p| {
-            let (r, c) = ((p / n as usize) as f64 / n as f64, (p % n as usize) as f64 / n as f64);
-            let glow = (-((r - 0.45).powi(2) + (c - 0.55).powi(2)) / 0.3).exp();
-            glow + figure * behind[p]
-        })
-        .collect();
-    let clean = measured(side, &image);
-    let largest = clean.values()[1..].iter().fold(0.0_f64, |most, v| most.max(v.abs()));
-    let values: Vec<f64> =
-        clean.values().iter().map(|v| v + noise * largest * normal(&mut random)).collect();
-    Measurements::from_differential(&Rows::natural(side), &values).unwrap()
-}
-
-#[test]
-fn nothing_is_worse_than_zero_filling_where_the_scene_is_nearly_all_scatter() {
-    for (figure, noise) in
-        [(0.0, 0.003), (0.0, 0.01), (0.02, 0.003), (0.02, 0.01), (0.1, 0.003), (0.1, 0.03)]
-    {
-        for seed in 0..3 {
-            let all = nearly_all_scatter(32, figure, noise, seed);
-            let full = hadamard(&all);
-            for share in [0.1, 0.2, 0.3, 0.5] {
-                let part = all.take(Some(&LOWEST_SEQUENCIES), share).unwrap();
-                let zero = correlation_of(&hadamard(&part), &full);
-                for method in Method::ALL {
-                    let ready = method.prepare(&MethodSettings::default()).unwrap();
-                    let found = correlation_of(&ready.reconstruct(&part).unwrap().image, &full);
-                    if std::env::var("SHOW").is_ok() {
-                        println!(
-                            "{figure} {noise} {share} {seed} {:>10} {:+.5} zero {zero:.5}",
-                            method.name(),
-                            found - zero
-                        );
-                        continue;
-                    }
-                    assert!(
-                        found >= zero - 1e-4,
-                        "{} at {share}, figure {figure}, noise {noise}, seed {seed}: {found}, zero filling {zero}",
-                        method.name()
-                    );
-                }
-            }
-        }
-    }
-}
-
 #[test]
 fn the_lowest_sequencies_see_more_than_the_first_rows_of_a_raster() {
     let image = scene(side(32), 2);
