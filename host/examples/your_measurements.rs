@@ -6,10 +6,11 @@ use nirspi_recon::reconstruct::{Method, MethodSettings, hadamard};
 use std::path::Path;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let file = std::env::args().nth(1).ok_or("which file? give a .npz or .mcap file")?;
-    let source = Source::read(Path::new(&file), SourceOptions::default())?;
+    let file =
+        std::env::args().nth(1).ok_or("which file? give a .npz, .mat, .csv or .mcap file")?;
+    let source = Source::read(Path::new(&file), &SourceOptions::default())?;
     let all = hadamard(&source.measurements);
-    let (used, order) = FirstPatterns::Automatic.take(&source.measurements, 0.3)?;
+    let (used, order) = FirstPatterns::LowestSequencies.take(&source.measurements, 0.3)?;
     println!("{} patterns in the order {order}; correlation with all of them:", used.rows().len());
     for method in Method::ALL {
         let image = method.prepare(&MethodSettings::default())?.reconstruct(&used)?.image;

@@ -16,6 +16,7 @@
 //! * [`causes`] tells an error with its causes,
 //! * [`training`] makes pairs to train networks on, through the virtual camera,
 //! * [`udev`] lets users use cameras on USB; [`boards`] lists the boards that firmware is for; with the feature `flash`, `flash` programs them,
+//! * [`example`] makes measurements to try the program on,
 //! * [`virtual_camera`] is a camera without silicon: optics simulator, gateware model, real firmware logic.
 //!
 //! Without its features (`default-features = false`) the library captures, records, calibrates and reads measurements, and
@@ -28,6 +29,8 @@ pub mod calibration;
 pub mod capture;
 pub mod causes;
 pub mod events;
+#[cfg(feature = "virtual-camera")]
+pub mod example;
 pub mod files;
 #[cfg(feature = "flash")]
 pub mod flash;

@@ -8,7 +8,7 @@ use crate::picture::Typeface;
 use image::imageops::{self, FilterType};
 use image::{ImageBuffer, Luma};
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use thiserror::Error;
 
@@ -18,6 +18,10 @@ pub const LETTER_SIDE_MM: f64 = 43.0;
 const GLYPH_FILL: f32 = 0.9;
 /// How a letter scene is written on the command line.
 const LETTER_PREFIX: &str = "letter:";
+/// How a word scene is written.
+const WORD_PREFIX: &str = "word:";
+/// Most characters of a word: each has 4 of the camera's 32 pixels then.
+const MAX_WORD: usize = 8;
 /// How a white sheet is written.
 const WHITE: &str = "white";
 /// How a covered lens is written.
@@ -25,16 +29,18 @@ const BLACK: &str = "black";
 /// White paper at 1550 nm reflects about this much.
 const WHITE_REFLECTANCE: f32 = 0.9;
 
-/// Where a scene comes from: `letter:R`, `white`, `black`, or the path of a PNG.
+/// Where a scene comes from: `letter:R`, `word:STOP`, `white`, `black`, or the path of a PNG or JPEG.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum SceneSource {
     /// One bright character on a dark target.
     Letter(char),
+    /// Bright characters side by side on a dark target that fills the field of view.
+    Word(String),
     /// A sheet that fills the field of view, for self-tests.
     White,
     /// A cover before the lens: nothing comes back, for dark frames.
     Black,
-    /// A PNG, whose grey levels are taken as reflectance.
+    /// A PNG or JPEG, whose grey levels are taken as reflectance.
     File(PathBuf),
 }
 
@@ -56,7 +62,9 @@ pub struct SceneMap {
 #[non_exhaustive]
 pub enum SceneError {
     /// No scene was named.
-    #[error("scene: found nothing, expected letter:R, white, black or the path of a PNG image")]
+    #[error(
+        "scene: found nothing, expected letter:R, word:STOP, white, black or the path of a PNG or JPEG image"
+    )]
     Empty,
     /// `letter:` was followed by none or several characters.
     #[error(
@@ -67,6 +75,24 @@ pub enum SceneError {
         scene: String,
         /// How many characters it has.
         found: usize,
+    },
+    /// `word:` was followed by no word, or by one too long for 32 pixels.
+    #[error(
+        "scene {scene:?}: found {found} characters after `word:`, expected 1 to {MAX_WORD}, as in word:STOP"
+    )]
+    WordLength {
+        /// What was asked for.
+        scene: String,
+        /// How many characters it has.
+        found: usize,
+    },
+    /// No scheme, no file: most likely a letter or word without its scheme.
+    #[error("scene {scene:?}: no such file; a letter is letter:{first}, a word is word:{scene}")]
+    NoFile {
+        /// What was asked for.
+        scene: String,
+        /// Its first character.
+        first: char,
     },
     /// The embedded font does not draw this character.
     #[error(
@@ -95,8 +121,25 @@ impl FromStr for SceneSource {
         if scene == BLACK {
             return Ok(Self::Black);
         }
+        if let Some(word) = scene.strip_prefix(WORD_PREFIX) {
+            let found = word.chars().count();
+            if !(1..=MAX_WORD).contains(&found) {
+                return Err(SceneError::WordLength { scene: scene.to_owned(), found });
+            }
+            let typeface = Typeface::ubuntu_light();
+            return match word.chars().find(|&character| !typeface.has_shape(character)) {
+                None => Ok(Self::Word(word.to_owned())),
+                Some(character) => Err(SceneError::NoShape { character }),
+            };
+        }
         let Some(text) = scene.strip_prefix(LETTER_PREFIX) else {
-            return Ok(Self::File(scene.into()));
+            let is_word = scene.len() <= MAX_WORD && scene.chars().all(char::is_alphanumeric);
+            return match scene.chars().next() {
+                Some(first) if is_word && !Path::new(scene).exists() => {
+                    Err(SceneError::NoFile { scene: scene.to_owned(), first })
+                }
+                _ => Ok(Self::File(scene.into())),
+            };
         };
         let mut characters = text.chars();
         match (characters.next(), characters.next()) {
@@ -116,6 +159,7 @@ impl fmt::Display for SceneSource {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Letter(character) => write!(f, "{LETTER_PREFIX}{character}"),
+            Self::Word(word) => write!(f, "{WORD_PREFIX}{word}"),
             Self::White => f.write_str(WHITE),
             Self::Black => f.write_str(BLACK),
             Self::File(path) => write!(f, "{}", path.display()),
@@ -134,17 +178,14 @@ impl SceneSource {
             Self::Letter(character) => {
                 SceneMap::letter(&Typeface::ubuntu_light(), *character, size_px)
             }
+            Self::Word(word) => {
+                let name = format!("word {word}");
+                Ok(SceneMap { name, size_px, reflectance: drawn(word, size_px)?, side_mm: None })
+            }
             Self::White | Self::Black => {
-                let white = *self == Self::White;
-                Ok(SceneMap {
-                    name: self.to_string(),
-                    size_px,
-                    reflectance: vec![
-                        if white { WHITE_REFLECTANCE } else { 0.0 };
-                        size_px * size_px
-                    ],
-                    side_mm: None,
-                })
+                let level = if *self == Self::White { WHITE_REFLECTANCE } else { 0.0 };
+                let reflectance = vec![level; size_px * size_px];
+                Ok(SceneMap { name: self.to_string(), size_px, reflectance, side_mm: None })
             }
             Self::File(path) => {
                 let Reflectance { size_px, values: reflectance } =
@@ -155,6 +196,24 @@ impl SceneSource {
             }
         }
     }
+}
+
+/// Characters side by side, each in a square of its own, halfway down.
+fn drawn(word: &str, size_px: usize) -> Result<Vec<f32>, SceneError> {
+    let typeface = Typeface::ubuntu_light();
+    let cell_px = size_px / word.chars().count().max(1);
+    let top = (size_px - cell_px) / 2;
+    let mut map = vec![0.0; size_px * size_px];
+    for (at, character) in word.chars().enumerate() {
+        let glyph = typeface
+            .draw(character, cell_px, GLYPH_FILL)
+            .ok_or(SceneError::NoShape { character })?;
+        for (row, pixels) in glyph.chunks_exact(cell_px).enumerate() {
+            let start = (top + row) * size_px + at * cell_px;
+            map[start..start + cell_px].copy_from_slice(pixels);
+        }
+    }
+    Ok(map)
 }
 
 impl SceneMap {
@@ -220,10 +279,25 @@ mod tests {
     }
 
     #[test]
+    fn a_word_is_its_letters_side_by_side() {
+        let scene = "word:IO".parse::<SceneSource>().unwrap();
+        assert_eq!(scene.to_string(), "word:IO");
+        let map = scene.load(64).unwrap();
+        let at = |x: usize, y: usize| map.reflectance[y * 64 + x];
+        // I has its stem in the middle of the left half, O is open in the middle of the right one.
+        assert!(at(15, 32) == 1.0 && at(48, 32) == 0.0 && at(37, 32) > 0.0);
+        assert!((0..64).all(|x| at(x, 10) == 0.0 && at(x, 54) == 0.0));
+        assert!(line("word:").contains("found 0 characters after `word:`, expected 1 to 8"));
+        assert!(line("word:NINELETTR").contains("found 9 characters"));
+        assert!(line("word:A B").contains("no shape"));
+        assert_eq!(line("R"), "scene \"R\": no such file; a letter is letter:R, a word is word:R");
+    }
+
+    #[test]
     fn scenes_that_do_not_exist_get_a_line() {
         assert_eq!(
             line(""),
-            "scene: found nothing, expected letter:R, white, black or the path of a PNG image"
+            "scene: found nothing, expected letter:R, word:STOP, white, black or the path of a PNG or JPEG image"
         );
         assert_eq!(
             line("letter:"),

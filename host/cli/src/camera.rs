@@ -18,7 +18,8 @@ const SCENE_PX: usize = 256;
 /// What stands before a virtual camera.
 #[derive(Debug, Clone, Args)]
 pub struct SceneArgs {
-    /// What the virtual camera looks at: letter:R (43 mm, bright on dark), white (a sheet), black (a covered lens) or a PNG file (fills the field)
+    /// What the virtual camera looks at: letter:R (43 mm, bright on dark), word:STOP, white (a sheet), black (a covered
+    /// lens), or a PNG or JPEG file (fills the field)
     #[arg(long, value_name = "SCENE", default_value = "letter:R")]
     pub scene: String,
     /// Distance from the virtual camera to the target, in metres [default: where the lens is focused; the paper's camera 0.3]
@@ -147,7 +148,7 @@ pub struct SetupArgs {
 impl SetupArgs {
     /// The setup asked for.
     pub fn setup(&self, default_sampling: f64, model: &ModelArgs) -> Result<MeasurementSetup> {
-        let order = parse_order(&self.order)?;
+        let order = parse_order("--order", &self.order)?;
         let readout = model.read()?.readout;
         let clocks = self.clocks_per_pattern.unwrap_or(readout.clocks_per_pattern as u16);
         let blanked = self.blanked.unwrap_or(readout.blanked as u16);
@@ -175,12 +176,12 @@ fn order_help() -> String {
     )
 }
 
-/// An order by name, or a user's own from a file.
-pub fn parse_order(name: &str) -> Result<Order> {
+/// An order by name, or a user's own from a file, as an option says it.
+pub fn parse_order(option: &str, name: &str) -> Result<Order> {
     if let Some(path) = name.strip_prefix("table:") {
         return Ok(Order::Table(read_order_table(Path::new(path))?));
     }
-    Order::from_str(name).map_err(|error| Usage(format!("--order: {error} or table:FILE")).into())
+    Order::from_str(name).map_err(|error| Usage(format!("{option}: {error} or table:FILE")).into())
 }
 
 /// A share of patterns is more than 0 and at most 1.

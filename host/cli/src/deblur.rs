@@ -146,7 +146,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let way = args.way()?;
     let options = args.sharpening.options()?;
     let mut times = StageTimes::default();
-    let input = times.time("read", || Input::read(&args.images.input))?;
+    let input = times.time("read", || args.images.read(deblur::SIDE))?;
     let images: Blurred<'_> = input.images()?;
     let target = input.target(&args.images.out)?;
     let bar = bar("deblurring", input.count());

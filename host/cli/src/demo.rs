@@ -12,6 +12,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use nirspi::account::LossCounters;
 use nirspi::capture::Progress;
 use nirspi::files::image::{encode_grey, encode_rgb};
+use nirspi::files::measurement::encode as encode_measurement;
 use nirspi::files::npy;
 use nirspi::files::output::OutputDir;
 use nirspi::imaging::{Quality, compare};
@@ -22,7 +23,7 @@ use nirspi::virtual_camera::{
     VirtualOptics, calibrate_against_white, flat_field_against_white, shoot,
 };
 use nirspi_optics::rain::Rainfall;
-use nirspi_recon::{Image, Side, reconstruct};
+use nirspi_recon::{Image, Measurements, Side, reconstruct};
 use serde::Serialize;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -32,7 +33,7 @@ use std::process::ExitCode;
 ///
 /// An optics simulator lights the gateware's model; the real firmware logic drives it and speaks the real wire
 /// protocol; the host calibrates against a white sheet, captures, counts, reconstructs, fuses with depth and deblurs. Writes scene and every
-/// stage as PNG and NPY, side_by_side.png and report.json.
+/// stage as PNG and NPY, side_by_side.png, report.json, and for other commands measurement.npz and frames.npy.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n\
     \x20 nirspi demo --scene letter:R --out demo/")]
@@ -94,6 +95,7 @@ struct Report {
 
 /// The images of the report's stages.
 struct Images {
+    measurements: Measurements,
     truth: Image,
     raw: Vec<f32>,
     result: Image,
@@ -150,6 +152,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let fitted = compare(&image, &truth)?;
     let stages = enhanced::run(&image, measurements.rows(), &optics, seed, &mut times)?;
     let images = Images {
+        measurements,
         truth: Image::new(Side::INSTRUMENT, truth),
         raw: raw.values,
         result: image,
@@ -222,6 +225,10 @@ fn write(
     let result = Image::new(Side::INSTRUMENT, images.fitted.clone());
     out.write("reconstruction.png", &enlarged_png(&result))?;
     out.write("reconstruction.npy", &npy::encode(&grid, &images.fitted))?;
+    // What `enhance` and `reconstruct` take.
+    out.write("frames.npy", &npy::encode(&[1, side, side], &images.fitted))?;
+    let measurement = args.out.join("measurement.npz");
+    out.write("measurement.npz", &encode_measurement(&measurement, &images.measurements, true)?)?;
     out.write("truth_64.npy", &npy::encode(&[2 * side, 2 * side], &images.output_truth))?;
     for (name, image) in
         [("upscaled", &images.upscaled), ("fused", &images.fused), ("deblurred", &images.deblurred)]

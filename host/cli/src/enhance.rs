@@ -4,7 +4,6 @@ use super::deblur::Sharpening;
 use super::networks::{Deblurring, ImageArgs, Report, bar};
 use super::print;
 use super::report::StageTimes;
-use super::stack::Input;
 use super::upscale::DepthArgs;
 use anyhow::Result;
 use nirspi_nets::{Images, Method, fusion};
@@ -35,7 +34,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let options = args.sharpening.options()?;
     let method = Method::Diffusion { steps: args.steps };
     let mut times = StageTimes::default();
-    let input = times.time("read", || Input::read(&args.images.input))?;
+    let input = times.time("read", || args.images.read(fusion::SIDE))?;
     let images: Images<'_, { fusion::SIDE }> = input.images()?;
     let target = input.target(&args.images.out)?;
     let depth = args.depth.read(input.count())?;

@@ -15,6 +15,7 @@ mod demo;
 mod devices;
 mod enhance;
 mod eval;
+mod example;
 mod flash;
 mod gateware;
 mod info;
@@ -53,6 +54,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Demo(demo::Args),
+    Example(example::Args),
     Reconstruct(reconstruct::Args),
     Capture(capture::Args),
     Serve(serve::Args),
@@ -109,6 +111,7 @@ fn main() -> ExitCode {
     };
     let result = match command {
         Command::Demo(args) => demo::run(&args),
+        Command::Example(args) => example::run(&args),
         Command::Reconstruct(args) => reconstruct::run(&args),
         Command::Capture(args) => capture::run(&args),
         Command::Serve(args) => serve::run(args),

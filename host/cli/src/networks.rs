@@ -24,9 +24,12 @@ pub struct NetworkArgs {
 /// What every command takes that makes images of images.
 #[derive(Debug, clap::Args)]
 pub struct ImageArgs {
-    /// The images: .npy, .png or a folder of .png files
+    /// The images: .npy, .png, .jpg or a folder of pictures
     #[arg(value_name = "IN")]
     pub input: PathBuf,
+    /// Crop pictures to their central square and bring them to the size that is expected
+    #[arg(long)]
+    pub resize: bool,
     /// Results: .npy, .png for a single image, else a folder of .png files
     #[arg(long, value_name = "OUT")]
     pub out: PathBuf,
@@ -35,6 +38,13 @@ pub struct ImageArgs {
     /// Print the report as JSON
     #[arg(long)]
     pub json: bool,
+}
+
+impl ImageArgs {
+    /// Reads the images, which are to have this side.
+    pub fn read(&self, side: usize) -> Result<Input> {
+        Input::read(&self.input, self.resize.then_some(side as u32))
+    }
 }
 
 impl NetworkArgs {

@@ -18,20 +18,21 @@ use nirspi::files::image::{encode_grey, encode_rgb};
 use nirspi::files::npy;
 use nirspi::files::output::OutputDir;
 use nirspi::picture::{Panel, Range, SideBySide};
-use nirspi::source::{FirstPatterns, Index, Source};
+use nirspi::source::{FirstPatterns, Index, Part, Source};
 use nirspi_recon::{Image, metrics};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
 
-/// Make an image from a measurement file (.npz) or a recording (.mcap)
+/// Make an image from a measurement file (.npz, .npy, .mat, .h5, .csv, .txt) or a recording (.mcap)
 ///
-/// Writes image.npy (float32, n x n), image.png and report.json.
+/// Writes image.npy (float32, n x n), image.png and report.json; of complex readings real.npy and imaginary.npy, too.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi reconstruct wing.npz --method hadamard --out out/\n\
     \x20 nirspi reconstruct wing.npz --method omp --sampling 0.3 --basis dct --out out/\n\
+    \x20 nirspi reconstruct spyrit.npy --shown walsh-2d --out out/\n\
     \x20 nirspi reconstruct dmd.npz --matrix patterns.npy --method tv --out out/\n\
     \x20 nirspi reconstruct rec.mcap --index all --warm-start --sampling 0.3 --out video/")]
 pub struct Args {
@@ -40,14 +41,14 @@ pub struct Args {
     /// Use only this share of all n x n patterns
     #[arg(long, value_name = "0..1", default_value_t = 1.0, allow_negative_numbers = true)]
     sampling: f64,
-    /// Which patterns come first when sampling: recorded, or an order's name; default: recorded, unless that is the
-    /// natural order, whose first part cannot resolve an image
+    /// Which patterns come first when sampling: an order's name, or recorded, the first as they were shown; default: those of
+    /// the lowest sequencies, whatever order was recorded
     #[arg(long, value_name = "ORDER")]
     order: Option<String>,
     /// Patterns of your own instead of Hadamard rows: (M, n * n) weights, a pattern a row, of which `y` in the input has one
     /// reading each. --strength is then relative to the readings' variance
     #[arg(long, value_name = "NPY", conflicts_with_all = ["order", "keep", "residual", "stop_at_noise", "as_printed",
-          "non_differential", "keep_leak", "warm_start"])]
+          "non_differential", "readings", "shown", "side", "transpose", "keep_leak", "warm_start"])]
     matrix: Option<PathBuf>,
     /// OMP of --index all: start each frame from the one before, as long as that explains it as well
     #[arg(long, conflicts_with_all = ["dictionary", "non_negative"])]
@@ -84,6 +85,11 @@ struct Report {
     #[serde(flatten)]
     method: super::method::Report,
     dropouts: Vec<DropoutReport>,
+    /// Places in the order shown of patterns that the file says were not read.
+    not_read: Vec<usize>,
+    /// What of complex readings image.npy shows.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    part: Option<&'static str>,
     #[serde(skip_serializing_if = "Option::is_none")]
     frames: Option<LossCounters>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -97,9 +103,9 @@ struct Report {
 pub fn run(args: &Args) -> Result<ExitCode> {
     check_sampling(args.sampling)?;
     let first = match args.order.as_deref() {
-        None => FirstPatterns::Automatic,
+        None => FirstPatterns::LowestSequencies,
         Some("recorded") => FirstPatterns::Recorded,
-        Some(order) => FirstPatterns::Of(parse_order(order)?),
+        Some(order) => FirstPatterns::Of(parse_order("--order", order)?),
     };
     args.method.check()?;
     if let Some(path) = &args.matrix {
@@ -140,7 +146,7 @@ pub fn picture(
     let request = Request {
         input: recording,
         method: &MethodArgs::default(),
-        first: &FirstPatterns::Automatic,
+        first: &FirstPatterns::LowestSequencies,
         sampling: 1.0,
         enhance: true,
         out,
@@ -171,6 +177,25 @@ fn one_image(request: &Request<'_>, source: Source, mut times: StageTimes) -> Re
         request.first.take(&source.measurements, request.sampling).with_context(named)?;
     let solved = times.time("reconstruct", || spinning(|| solve(request.method, &used)));
     let Solved { image, report: method } = solved?;
+    let parts = match &source.imaginary {
+        None => None,
+        Some(_) if request.enhance => {
+            return Err(Usage(
+                "--enhance needs a real image: choose --part real or --part imaginary".to_owned(),
+            )
+            .into());
+        }
+        Some(imaginary) => {
+            let (used, _) = request.first.take(imaginary, request.sampling).with_context(named)?;
+            let other =
+                times.time("reconstruct", || spinning(|| solve(request.method, &used)))?.image;
+            Some([image.clone(), other])
+        }
+    };
+    let image = match &parts {
+        None => image,
+        Some([real, imaginary]) => Image::magnitude(real, imaginary),
+    };
     check_finite(request.input, &image)?;
     let image = source.flattened(image);
 
@@ -201,6 +226,8 @@ fn one_image(request: &Request<'_>, source: Source, mut times: StageTimes) -> Re
                 rows: d.rows.clone(),
             })
             .collect(),
+        not_read: source.not_read,
+        part: parts.as_ref().map(|_| Part::Magnitude.name()),
         frames: source.frames,
         correlation_with_files_recon: correlation,
         enhancement,
@@ -208,7 +235,8 @@ fn one_image(request: &Request<'_>, source: Source, mut times: StageTimes) -> Re
         stage_ms: times,
     };
     let short = report.enhancement.as_ref().map_or(&[][..], |enhancement| &enhancement.short);
-    write(request.out, &image, sharp.as_deref().map(|sharp| (sharp, short)), &report)?;
+    let sharp = sharp.as_deref().map(|sharp| (sharp, short));
+    write(request.out, &image, parts.as_ref(), sharp, &report)?;
     Ok(report)
 }
 
@@ -228,10 +256,11 @@ fn check_finite(input: &Path, image: &Image) -> Result<()> {
     bail!("{}: the readings are too large for an image of 32-bit floats", input.display())
 }
 
-/// Writes an image, and the enhanced one with its warnings, if there is one.
+/// Writes an image, real and imaginary part of a complex one, and the enhanced one with its warnings, if there is one.
 fn write(
     out: &Path,
     image: &Image,
+    parts: Option<&[Image; 2]>,
     sharp: Option<(&[f32], &[String])>,
     report: &impl Serialize,
 ) -> Result<()> {
@@ -239,6 +268,9 @@ fn write(
     let mut out = OutputDir::create(out)?;
     out.write("image.npy", &npy::encode(&[side, side], image.pixels()))?;
     out.write("image.png", &enlarged_png(&image.stretched()))?;
+    for (name, part) in ["real.npy", "imaginary.npy"].iter().zip(parts.into_iter().flatten()) {
+        out.write(name, &npy::encode(&[side, side], part.pixels()))?;
+    }
     if let Some((sharp, warnings)) = sharp {
         let side = nirspi_nets::deblur::SIDE;
         out.write("enhanced.npy", &npy::encode(&[side, side], sharp))?;
@@ -278,6 +310,19 @@ pub fn enlarged_png(image: &Image) -> Vec<u8> {
     encode_grey(width, width, &pixels)
 }
 
+/// How many patterns were not read, and the first of them.
+fn not_read_words(places: &[usize]) -> String {
+    const SHOWN: usize = 5;
+    let first: Vec<String> = places.iter().take(SHOWN).map(usize::to_string).collect();
+    let more = if places.len() > SHOWN { ", ..." } else { "" };
+    let patterns = if places.len() == 1 { "pattern" } else { "patterns" };
+    format!(
+        "not read: {} {patterns} left out, at [{}{more}] of those shown",
+        places.len(),
+        first.join(", ")
+    )
+}
+
 fn say(args: &Args, report: &Report) -> Result<()> {
     print::line(format_args!(
         "{}: {} x {}, {} of {} measurements ({:.1} %), order {}",
@@ -296,6 +341,9 @@ fn say(args: &Args, report: &Report) -> Result<()> {
             dropout.first_reading,
             dropout.rows.len()
         ))?;
+    }
+    if !report.not_read.is_empty() {
+        print::line(not_read_words(&report.not_read))?;
     }
     if let Some(frames) = report.frames {
         print::line(format_args!("frames: {frames}"))?;
@@ -316,8 +364,10 @@ fn say(args: &Args, report: &Report) -> Result<()> {
         print::line(format_args!("note: {note}"))?;
     }
     let enhanced = if args.enhance { ", enhanced.npy, enhanced.png" } else { "" };
+    let parts =
+        if report.part.is_some() { " (the magnitude), real.npy, imaginary.npy" } else { "" };
     print::line(format_args!(
-        "wrote image.npy, image.png{enhanced} and report.json to {}",
+        "wrote image.npy, image.png{parts}{enhanced} and report.json to {}",
         args.out.display()
     ))
 }

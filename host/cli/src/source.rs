@@ -1,22 +1,49 @@
 //! Arguments that say which measurements to read, and how.
 
 use super::Usage;
+use super::camera::parse_order;
 use anyhow::Result;
-use nirspi::source::{Index, Source, SourceError, SourceOptions};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use nirspi::files::measurement::{Form, Selection};
+use nirspi::source::{Index, Part, Source, SourceError, SourceOptions};
+use nirspi_recon::{Measurements, Order, Side};
 use std::path::PathBuf;
 
 /// Which measurements.
 #[derive(Debug, clap::Args)]
 pub struct SourceArgs {
-    /// Measurement file or recording
+    /// Measurement file (.npz, .npy, .mat, .h5, .csv, .txt) or recording (.mcap)
     pub input: PathBuf,
     /// Which measurement of a file that holds several: a number, or all of them, as frames of a video; all frames of a
     /// recording likewise, which are summed otherwise
     #[arg(long, value_name = "N|all")]
     pub index: Option<Index>,
-    /// The file's `y` holds one reading a pattern, taken without complements
-    #[arg(long)]
+    #[arg(long, value_name = "ORDER", help = shown_help())]
+    pub shown: Option<String>,
+    /// Side of the image, for a file that does not say it and holds part of a sweep
+    #[arg(long, value_name = "N")]
+    pub side: Option<u64>,
+    /// The field of the file that holds the readings; default: y, or else d
+    #[arg(long, value_name = "NAME")]
+    pub field: Option<String>,
+    /// How readings belong to patterns; default: pairs, or differences in the field d
+    #[arg(long, value_name = "FORM", value_parser = forms())]
+    pub readings: Option<Form>,
+    /// The same as --readings single
+    #[arg(long, conflicts_with = "readings")]
     pub non_differential: bool,
+    /// Patterns are along the first axis of the readings, not along the last
+    #[arg(long)]
+    pub patterns_first: bool,
+    /// Pixels were numbered down the columns of the image, as MATLAB does
+    #[arg(long)]
+    pub transpose: bool,
+    /// Every comma of a text file is a decimal one
+    #[arg(long)]
+    pub decimal_comma: bool,
+    /// What to show of complex readings; of both parts, image.npy is the magnitude
+    #[arg(long, value_name = "PART", default_value = Part::Magnitude.name(), value_parser = parts())]
+    pub part: Part,
     /// Leave the settling leak of a recording as it is
     #[arg(long)]
     pub keep_leak: bool,
@@ -25,25 +52,63 @@ pub struct SourceArgs {
     pub no_flat_field: bool,
 }
 
+fn shown_help() -> String {
+    format!(
+        "The order in which patterns were shown, for a file without h_row: {}, or table:FILE (numbers, entry k the \
+         natural-order Hadamard row shown k-th)",
+        Order::expected()
+    )
+}
+
+fn forms() -> impl TypedValueParser<Value = Form> {
+    let word = |form: Form| PossibleValue::new(form.name()).help(form.about());
+    PossibleValuesParser::new(Form::ALL.map(word)).try_map(|word| word.parse::<Form>())
+}
+
+fn parts() -> impl TypedValueParser<Value = Part> {
+    PossibleValuesParser::new(Part::ALL.map(Part::name)).try_map(|word| word.parse::<Part>())
+}
+
 impl SourceArgs {
-    fn options(&self) -> SourceOptions {
-        let Self { index, non_differential, keep_leak, no_flat_field, .. } = *self;
-        SourceOptions { index, non_differential, keep_leak, no_flat_field }
+    /// What the file does not say itself.
+    pub fn selection(&self) -> Result<Selection> {
+        let side = self.side.map(Side::new).transpose();
+        let shown = self.shown.as_deref().map(|name| parse_order("--shown", name)).transpose()?;
+        Ok(Selection {
+            index: None,
+            form: self.readings.or(self.non_differential.then_some(Form::Single)),
+            field: self.field.clone(),
+            patterns_first: self.patterns_first,
+            side: side.map_err(|error| Usage(format!("--side: {error}")))?,
+            shown,
+            transpose: self.transpose,
+            decimal_comma: self.decimal_comma,
+        })
+    }
+
+    fn options(&self) -> Result<SourceOptions> {
+        let Self { index, part, keep_leak, no_flat_field, .. } = *self;
+        Ok(SourceOptions { index, file: self.selection()?, part, keep_leak, no_flat_field })
     }
 
     /// Reads one.
     pub fn load(&self) -> Result<Source> {
-        Source::read(&self.input, self.options()).map_err(usage_or_failure)
+        Source::read(&self.input, &self.options()?).map_err(usage_or_failure)
+    }
+
+    /// Reads one of real readings.
+    pub fn load_real(&self) -> Result<Measurements> {
+        self.load()?.real(&self.input).map_err(usage_or_failure)
     }
 
     /// Reads all of a file or recording.
     pub fn load_all(&self) -> Result<Vec<Source>> {
-        Source::read_all(&self.input, self.options()).map_err(usage_or_failure)
+        Source::read_all(&self.input, &self.options()?).map_err(usage_or_failure)
     }
 
     /// The one that is asked for.
     pub fn one(&self) -> Result<Option<usize>> {
-        self.options().one().map_err(usage_or_failure)
+        self.options()?.one().map_err(usage_or_failure)
     }
 }
 

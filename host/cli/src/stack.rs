@@ -1,10 +1,10 @@
-//! Images in and images out, as arrays or as pictures: `.npy`, PNG, or a folder of PNGs.
+//! Images in and images out, as arrays or as pictures: `.npy`, PNG or JPEG, or a folder of these.
 //!
 //! The law: what goes into a network is of the right size and in [0, 1], or one line says what is not; where the
 //! results go is checked before anything is computed.
 
 use anyhow::{Context, Result, bail};
-use nirspi::files::image::{encode_grey, read_grey};
+use nirspi::files::image::{Grey, encode_grey, read_grey};
 use nirspi::files::npy;
 use nirspi::files::output::{OutputDir, write_atomic};
 use nirspi_nets::Images;
@@ -31,13 +31,13 @@ enum Form {
 }
 
 impl Input {
-    /// Reads a `.npy` array, a PNG or a folder of PNGs.
-    pub fn read(path: &Path) -> Result<Self> {
+    /// Reads a `.npy` array, a picture or a folder of pictures, which are brought to a side if one is given.
+    pub fn read(path: &Path, resize: Option<u32>) -> Result<Self> {
         if path.is_dir() {
-            return Self::folder(path);
+            return Self::folder(path, resize);
         }
-        if has_extension(path, "png") {
-            let picture = read_grey(path)?;
+        if is_picture(path) {
+            let picture = read_picture(path, resize)?;
             return Ok(Self {
                 path: path.to_owned(),
                 count: 1,
@@ -53,22 +53,22 @@ impl Input {
         Ok(Self { path: path.to_owned(), count, height, width, values, form })
     }
 
-    fn folder(path: &Path) -> Result<Self> {
+    fn folder(path: &Path, resize: Option<u32>) -> Result<Self> {
         let entries = fs::read_dir(path).with_context(|| path.display().to_string())?;
         let mut files = Vec::new();
         for entry in entries {
             let file = entry.with_context(|| path.display().to_string())?.path();
-            if has_extension(&file, "png") {
+            if is_picture(&file) {
                 files.push(file);
             }
         }
         files.sort();
         let Some(first) = files.first() else {
-            bail!("{}: no .png files in it", path.display());
+            bail!("{}: no .png or .jpg files in it", path.display());
         };
         let (mut size, mut values) = (None, Vec::new());
         for file in &files {
-            let picture = read_grey(file)?;
+            let picture = read_picture(file, resize)?;
             let found = (picture.height as usize, picture.width as usize);
             let expected = *size.get_or_insert(found);
             if found != expected {
@@ -85,7 +85,11 @@ impl Input {
             values.extend(picture.values);
         }
         let (height, width) = size.unwrap_or_default();
-        let names = files.iter().map(|file| file_name(file)).collect();
+        let names: Vec<String> = files.iter().map(|file| file_name(file)).collect();
+        // Sorted by path: equal names are neighbours.
+        if let Some(twice) = names.windows(2).find(|pair| pair[0] == pair[1]) {
+            bail!("{}: two pictures whose result would be {}", path.display(), twice[0]);
+        }
         let form = Form::Pictures(names);
         Ok(Self { path: path.to_owned(), count: files.len(), height, width, values, form })
     }
@@ -99,7 +103,7 @@ impl Input {
     pub fn images<const SIDE: usize>(&self) -> Result<Images<'_, SIDE>> {
         if (self.height, self.width) != (SIDE, SIDE) {
             bail!(
-                "{}: images of {} x {} pixels, expected {SIDE} x {SIDE}",
+                "{}: images of {} x {} pixels, expected {SIDE} x {SIDE}; --resize brings pictures to that",
                 self.path.display(),
                 self.height,
                 self.width
@@ -171,10 +175,26 @@ impl Target {
     }
 }
 
+fn is_picture(path: &Path) -> bool {
+    ["png", "jpg", "jpeg"].iter().any(|extension| has_extension(path, extension))
+}
+
+fn read_picture(path: &Path, resize: Option<u32>) -> Result<Grey> {
+    let picture = read_grey(path)?;
+    Ok(match resize {
+        None => picture,
+        Some(side) => picture.resized(side),
+    })
+}
+
 fn has_extension(path: &Path, extension: &str) -> bool {
     path.extension().is_some_and(|found| found.eq_ignore_ascii_case(extension))
 }
 
+/// The name of a picture's result, which is a PNG.
 fn file_name(path: &Path) -> String {
-    path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
+    path.with_extension("png")
+        .file_name()
+        .map(|name| name.to_string_lossy().into_owned())
+        .unwrap_or_default()
 }

@@ -3,7 +3,6 @@
 use super::networks::{ImageArgs, bar};
 use super::print;
 use super::report::StageTimes;
-use super::stack::Input;
 use anyhow::{Context, Result};
 use nirspi::files::npy::{self, Stack};
 use nirspi_nets::{DepthMaps, Images, fusion};
@@ -47,7 +46,7 @@ impl DepthArgs {
 
 pub fn run(args: &Args) -> Result<ExitCode> {
     let mut times = StageTimes::default();
-    let input = times.time("read", || Input::read(&args.images.input))?;
+    let input = times.time("read", || args.images.read(fusion::SIDE))?;
     let images: Images<'_, { fusion::SIDE }> = input.images()?;
     let target = input.target(&args.images.out)?;
     let depth = args.depth.read(input.count())?;

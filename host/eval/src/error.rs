@@ -30,6 +30,16 @@ pub enum EvalError {
         /// The library's message, or what is wrong.
         why: String,
     },
+    /// Measurements of a part of the patterns, where the image of all is the reference.
+    #[error(
+        "{found} of {expected} patterns, expected a full sweep: the image of all patterns is what shares are held against"
+    )]
+    PartialSweep {
+        /// Patterns that were measured.
+        found: usize,
+        /// Patterns of a full sweep.
+        expected: usize,
+    },
     /// Rain that cannot fall like this.
     #[error(transparent)]
     Rain(#[from] RainError),

@@ -4,9 +4,14 @@
 //! A figure that cannot be computed is `null`, and `notes` says why (`a_figure_that_cannot_be_computed_is_noted`). The only
 //! number called FID is computed with the user's Inception weights.
 
+mod images;
+
+pub use images::{Align, Scaled, read_images, scaled};
+
 use crate::error::{EvalError, Result};
 use crate::fid::Fid;
-use nirspi::files::npy::{Stack, read_list, read_stack};
+use images::outside;
+use nirspi::files::npy::{Stack, read_list};
 use nirspi::legibility::{Judge, LegibilityError};
 use nirspi_nets::Weights;
 use nirspi_nets::data::CHARACTERS;
@@ -74,6 +79,10 @@ impl Sets {
         if (test.height, test.width) != (64, 64) {
             let shape = format!("{} x {}", test.height, test.width);
             self.notes.push(format!("the classifier judges images of 64 x 64, not {shape}"));
+            return Ok(());
+        }
+        if [reference, test].iter().any(|stack| outside(stack).is_some()) {
+            self.notes.push("the classifier judges images in [0, 1]".to_owned());
             return Ok(());
         }
         let judge = CharacterJudge::new(&Weights::embedded("classifier")?)?;
@@ -154,28 +163,6 @@ pub fn read_labels(path: &Path, images: usize) -> Result<Vec<u8>> {
         })
     };
     labels.iter().enumerate().map(class).collect()
-}
-
-/// Reads a stack of images in `[0, 1]`.
-///
-/// # Errors
-/// A file that cannot be read, no images, a value out of range.
-pub fn read_images(path: &Path) -> Result<Stack> {
-    let stack = read_stack(path)?;
-    let outside = stack.values.iter().position(|v| !(0.0..=1.0).contains(v));
-    if let Some(at) = outside {
-        let (image, pixel) = (at / (stack.height * stack.width), at % (stack.height * stack.width));
-        let (row, column) = (pixel / stack.width, pixel % stack.width);
-        return Err(EvalError::Content(format!(
-            "{}: {} at [{image}, {row}, {column}], expected 0 to 1",
-            path.display(),
-            stack.values[at]
-        )));
-    }
-    if stack.count == 0 {
-        return Err(EvalError::Content(format!("{}: no images", path.display())));
-    }
-    Ok(stack)
 }
 
 /// The figures of one image.
@@ -304,16 +291,5 @@ mod tests {
         assert!(read(&[0.0], 2).unwrap_err().ends_with("1 labels, expected 2, one an image"));
         assert!(read(&[0.0, 62.0], 2).unwrap_err().contains("62 at [1]"));
         assert!(read(&[0.5, 2.0], 2).unwrap_err().contains("0.5 at [0]"));
-    }
-
-    #[test]
-    fn an_image_out_of_range_is_named_with_its_place() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.npy");
-        let mut values = vec![0.5_f32; 2 * 6];
-        values[6 + 4] = 1.5;
-        std::fs::write(&path, encode(&[2, 2, 3], &values)).unwrap();
-        let told = read_images(&path).unwrap_err().to_string();
-        assert!(told.ends_with("a.npy: 1.5 at [1, 1, 1], expected 0 to 1"), "{told}");
     }
 }

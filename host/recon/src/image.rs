@@ -32,6 +32,17 @@ impl Image {
         &self.pixels
     }
 
+    /// The magnitude of a complex image, pixel by pixel.
+    ///
+    /// # Panics
+    /// If the two parts differ in side: the caller made both from one measurement.
+    #[must_use]
+    pub fn magnitude(real: &Self, imaginary: &Self) -> Self {
+        assert_eq!(real.side, imaginary.side, "the parts of one image");
+        let parts = real.pixels.iter().zip(&imaginary.pixels);
+        Self { side: real.side, pixels: parts.map(|(re, im)| re.hypot(*im)).collect() }
+    }
+
     /// The image stretched to `[0, 1]` for display. The darkest and the brightest half per cent of
     /// the pixels saturate, so that a few outliers (for example the pixel that takes the offset of
     /// a non-differential measurement) do not reduce the contrast of the rest. A flat image becomes

@@ -22,7 +22,15 @@
 //! | `total-variation` | ascending total variation of the pattern: the sum of the lengths of its forward-difference gradients (isotropic, which the paper's text was not at hand to confirm), `2 n (i + j) - (4 - 2 sqrt 2) i j` | X. Yu et al., *Super sub-Nyquist single-pixel imaging by total variation ascending ordering of the Hadamard basis*, 2020 |
 //! | `random:SEED` | Fisher-Yates from the last entry down, driven by `rand_pcg::Pcg64` | R. Durstenfeld, *Algorithm 235: random permutation*, 1964; M. E. O'Neill, *PCG*, 2014 |
 //!
-//! Other programs use some of these names for other orders; compare tables, not names.
+//! | `walsh-2d` | the `(i, j)` grid row by row: `p(i) n + p(j)`, `p(s)` being the row of 1-D sequency `s` | SPyRiT 3.1.1, `HadamSplit2d(n)` without an order |
+//! | `deepinv:sequency` | ours, transposed | deepinv 0.5.0, `SinglePixelCamera(ordering="sequency")` |
+//! | `deepinv:cake_cutting` | ascending `(i + 1)(j + 1)`; its ties are not defined | the same, `"cake_cutting"` |
+//! | `deepinv:zig_zag` | anti-diagonals, `i` falling along each | the same, `"zig_zag"` |
+//! | `deepinv:xy` | ascending `i j + (i^2 + j^2) / 4`; its ties are not defined | the same, `"xy"` |
+//!
+//! Other programs use some of these names for other orders; compare tables, not names. SPyRiT's `define_order` (TV, CC, Sequency,
+//! Variance) is no order that can be named: it leaves ties, the all-ones pattern's among them, to PyTorch's unstable sort, and
+//! `Variance` comes from measured images. Such an order is given as a table.
 
 use crate::{Rows, RowsError, Side};
 use rand::Rng;
@@ -48,6 +56,16 @@ pub enum Order {
     RussianDolls,
     /// Ascending isotropic total variation.
     TotalVariation,
+    /// The grid of two sequencies row by row: SPyRiT's.
+    Walsh2d,
+    /// deepinv's `sequency`.
+    DeepinvSequency,
+    /// deepinv's `cake_cutting`.
+    DeepinvCakeCutting,
+    /// deepinv's `zig_zag`.
+    DeepinvZigZag,
+    /// deepinv's `xy`.
+    DeepinvXy,
     /// A shuffle that its seed determines, today and in every later version.
     Random(u64),
     /// The user's own: entry k is the natural row shown k-th.
@@ -63,6 +81,10 @@ pub struct NamedOrder {
     pub about: &'static str,
     /// The order.
     pub order: Order,
+    /// The package whose definition it is, if it is another one's.
+    pub package: Option<&'static str>,
+    /// Whether that package leaves the order of equal patterns to an unstable sort: its files may have equal ones exchanged.
+    pub has_undefined_ties: bool,
     rows: fn(Side) -> Vec<u32>,
 }
 
@@ -73,37 +95,89 @@ impl Order {
             name: "natural",
             about: "rows of the Sylvester matrix as they come",
             order: Self::Natural,
+            package: None,
+            has_undefined_ties: false,
             rows: |side| (0..side.area() as u32).collect(),
         },
         NamedOrder {
             name: "sequency",
             about: "ascending sign changes of the row as one long function",
             order: Self::Sequency,
+            package: None,
+            has_undefined_ties: false,
             rows: sequency,
         },
         NamedOrder {
             name: "zig-zag",
             about: "anti-diagonals of the grid of two sequencies, as JPEG scans a block",
             order: Self::ZigZag,
+            package: None,
+            has_undefined_ties: false,
             rows: zig_zag,
         },
         NamedOrder {
             name: "cake-cutting",
             about: "ascending number of connected blocks",
             order: Self::CakeCutting,
+            package: None,
+            has_undefined_ties: false,
             rows: |side| sorted(side, Pattern::blocks),
         },
         NamedOrder {
             name: "russian-dolls",
             about: "complete coarse bases first, each inside the next",
             order: Self::RussianDolls,
+            package: None,
+            has_undefined_ties: false,
             rows: russian_dolls,
         },
         NamedOrder {
             name: "total-variation",
             about: "ascending total variation of the pattern",
             order: Self::TotalVariation,
+            package: None,
+            has_undefined_ties: false,
             rows: total_variation,
+        },
+        NamedOrder {
+            name: "walsh-2d",
+            about: "the grid of two sequencies row by row: SPyRiT's HadamSplit2d",
+            order: Self::Walsh2d,
+            package: Some("SPyRiT"),
+            has_undefined_ties: false,
+            rows: others::walsh_2d,
+        },
+        NamedOrder {
+            name: "deepinv:sequency",
+            about: "deepinv's: as `sequency`, down the columns",
+            order: Self::DeepinvSequency,
+            package: Some("deepinv"),
+            has_undefined_ties: false,
+            rows: others::deepinv_sequency,
+        },
+        NamedOrder {
+            name: "deepinv:cake_cutting",
+            about: "deepinv's: ascending number of connected blocks",
+            order: Self::DeepinvCakeCutting,
+            package: Some("deepinv"),
+            has_undefined_ties: true,
+            rows: others::deepinv_cake_cutting,
+        },
+        NamedOrder {
+            name: "deepinv:zig_zag",
+            about: "deepinv's: anti-diagonals of the grid of two sequencies, all in one direction",
+            order: Self::DeepinvZigZag,
+            package: Some("deepinv"),
+            has_undefined_ties: false,
+            rows: others::deepinv_zig_zag,
+        },
+        NamedOrder {
+            name: "deepinv:xy",
+            about: "deepinv's: ascending x y + (x^2 + y^2) / 4 of the two sequencies",
+            order: Self::DeepinvXy,
+            package: Some("deepinv"),
+            has_undefined_ties: true,
+            rows: others::deepinv_xy,
         },
     ];
 
@@ -129,7 +203,9 @@ impl Order {
         Ok(Rows::trusted(side, rows))
     }
 
-    fn entry(&self) -> Option<&'static NamedOrder> {
+    /// The order's entry in the list, if it has a name.
+    #[must_use]
+    pub fn entry(&self) -> Option<&'static NamedOrder> {
         Self::NAMED.iter().find(|named| named.order == *self)
     }
 }
@@ -291,5 +367,6 @@ impl Ord for Ascending {
     }
 }
 
+mod others;
 #[cfg(test)]
 mod tests;

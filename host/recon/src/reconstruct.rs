@@ -48,20 +48,15 @@ use pursuit::{Found, How};
 use std::str::FromStr;
 use thiserror::Error;
 
-/// The order for taking a part of recorded measurements, where the recorded order is unsuitable.
+/// The order for taking a part of recorded measurements, unless the user names another one: the
+/// lowest sequencies first, whatever the recorded order is.
 ///
-/// A recording's own order is the user's choice and stays (`None`). The *natural* order is the
-/// exception: its first part has only patterns that repeat themselves, so an image from that part
-/// is folded onto itself. A recording in natural order (ascending rows) is therefore taken in
-/// zig-zag order. In this module's last table zig-zag is ahead of cake-cutting up to 20 % on
-/// average, and equal at 30 %; cake-cutting is better for pages and signs with many upright and
-/// level edges.
-/// level edges better.
-#[must_use]
-pub fn default_selection(rows: &[u32]) -> Option<Order> {
-    let natural = rows.len() > 1 && rows.is_sorted_by(|a, b| a < b);
-    natural.then_some(Order::ZigZag)
-}
+/// Most of a scene is in its lowest sequencies. The first part of a raster of patterns (`natural`,
+/// `sequency`, `walsh-2d`) leaves out the finer half of one direction, so an image from that part
+/// is folded onto itself or smeared. In this module's last table zig-zag is ahead of cake-cutting
+/// up to 20 % on average, and equal at 30 %; cake-cutting is better for pages and signs with many
+/// upright and level edges.
+pub const LOWEST_SEQUENCIES: Order = Order::ZigZag;
 
 /// How [`omp()`] chooses the number of atoms.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -5,10 +5,12 @@
 //! its checksum holds.
 
 use super::FileError;
-use super::array::{ArrayError, Header, MAGIC, Sample, shape_text};
+use super::array::{ArrayError, Header, MAGIC, Sample, has_shape, shape_text};
+use super::fields::Field;
 use std::fs::File;
 use std::io::{BufReader, Cursor, Read, Seek};
 use std::path::{Path, PathBuf};
+use zip::read::ZipFile;
 use zip::write::SimpleFileOptions;
 use zip::{ZipArchive, ZipWriter};
 
@@ -16,6 +18,8 @@ use zip::{ZipArchive, ZipWriter};
 const EXPECTED: &str = "a NumPy .npz archive";
 /// What NumPy appends to the name of an array.
 const MEMBER_SUFFIX: &str = ".npy";
+/// The numbers that are read.
+pub(super) const NUMBERS: &str = "real numbers of up to 8 bytes";
 /// The largest field taken into memory: a 256 x 256 sweep of raw pairs in float64 is 1 MiB, this is
 /// 256 of them.
 const MAX_FIELD_BYTES: u64 = 256 << 20;
@@ -52,19 +56,32 @@ pub(super) fn open_file(path: &Path, expected: &'static str) -> Result<(File, u6
 }
 
 /// Largest text file of numbers that is read: a table of 100 000 rows of four numbers is 4 MB.
-const MAX_TEXT_BYTES: u64 = 4 << 20;
+const MAX_TEXT_MIB: u64 = 4;
+/// Largest text file of measurements: 32 sweeps of 256 x 256 pairs with 20 characters a reading are 84 MB.
+const MAX_LARGE_TEXT_MIB: u64 = 256;
 
 /// Reads a plain text file of at most 4 MiB, naming the path in every refusal.
 pub(super) fn read_text(path: &Path, expected: &'static str) -> Result<String, FileError> {
+    let bytes = read_bytes(path, expected, MAX_TEXT_MIB)?;
+    String::from_utf8(bytes).map_err(|_| FileError::kind(path, "a binary file", expected))
+}
+
+/// Reads a plain text file of at most 256 MiB, naming the path in every refusal; a heading may be in another code page than
+/// UTF-8.
+pub(super) fn read_large_text(path: &Path, expected: &'static str) -> Result<String, FileError> {
+    let bytes = read_bytes(path, expected, MAX_LARGE_TEXT_MIB)?;
+    Ok(String::from_utf8_lossy(&bytes).into_owned())
+}
+
+fn read_bytes(path: &Path, expected: &'static str, most_mib: u64) -> Result<Vec<u8>, FileError> {
     let (file, _) = open_file(path, expected)?;
     let mut bytes = Vec::new();
-    file.take(MAX_TEXT_BYTES + 1)
+    file.take((most_mib << 20) + 1)
         .read_to_end(&mut bytes)
         .map_err(|error| FileError::io(path, "read", error))?;
-    match String::from_utf8(bytes) {
-        Ok(text) if text.len() as u64 <= MAX_TEXT_BYTES => Ok(text),
-        Ok(_) => Err(FileError::kind(path, "more than 4 MiB", expected)),
-        Err(_) => Err(FileError::kind(path, "a binary file", expected)),
+    match bytes.len() as u64 <= most_mib << 20 {
+        true => Ok(bytes),
+        false => Err(FileError::kind(path, format!("more than {most_mib} MiB"), expected)),
     }
 }
 
@@ -110,10 +127,6 @@ impl Archive {
         Ok(Self { path: path.to_owned(), zip, names })
     }
 
-    pub(super) fn path(&self) -> &Path {
-        &self.path
-    }
-
     /// Names of all fields, sorted.
     pub(super) fn names(&self) -> &[String] {
         &self.names
@@ -127,7 +140,7 @@ impl Archive {
     /// was expected.
     pub(super) fn numbers(
         &mut self,
-        field: &'static str,
+        field: &str,
         accept: impl FnOnce(&[u64]) -> Result<(), String>,
     ) -> Result<Numbers, FileError> {
         self.numbers_of(field, accept)
@@ -136,32 +149,51 @@ impl Archive {
     /// The same, as numbers of another type: stacks of images do not need 8 bytes a pixel.
     pub(super) fn numbers_of<T: Sample>(
         &mut self,
-        field: &'static str,
+        field: &str,
         accept: impl FnOnce(&[u64]) -> Result<(), String>,
     ) -> Result<Numbers<T>, FileError> {
+        let (shape, values) =
+            self.member(field, accept, |header, member| header.read_data(member, MAX_FIELD_BYTES))?;
+        Ok(Numbers { shape, values })
+    }
+
+    /// The same for real and complex numbers.
+    pub(super) fn field(
+        &mut self,
+        field: &str,
+        accept: impl FnOnce(&[u64]) -> Result<(), String>,
+    ) -> Result<Field, FileError> {
+        let (shape, (real, imaginary)) = self
+            .member(field, accept, |header, member| header.read_parts(member, MAX_FIELD_BYTES))?;
+        Ok(Field { shape, real, imaginary })
+    }
+
+    fn member<D>(
+        &mut self,
+        field: &str,
+        accept: impl FnOnce(&[u64]) -> Result<(), String>,
+        decode: impl FnOnce(&Header, &mut ZipFile<'_, BufReader<File>>) -> Result<D, ArrayError>,
+    ) -> Result<(Vec<usize>, D), FileError> {
         let path = &self.path;
         let mut member = self
             .zip
             .by_name(&format!("{field}{MEMBER_SUFFIX}"))
             .map_err(|error| damaged(path, format!("`{field}`: {error}")))?;
-        let refuse =
-            |found, expected| FileError::Field { path: path.clone(), field, found, expected };
+        let refuse = |found, expected: String| FileError::field(path, field, found, expected);
         let explain = |error| match error {
             // A failed checksum and a torn deflate stream arrive as I/O errors too.
             ArrayError::Damaged(what) => damaged(path, format!("`{field}`: {what}")),
             ArrayError::Io(error) => damaged(path, format!("`{field}`: {error}")),
-            ArrayError::Dtype(found) => refuse(found, "real numbers of up to 8 bytes".to_owned()),
+            ArrayError::Dtype(found) => refuse(found, NUMBERS.to_owned()),
             ArrayError::TooLarge { shape, limit_bytes } => refuse(
                 format!("claims shape {}", shape_text(&shape)),
                 format!("at most {} MiB", limit_bytes >> 20),
             ),
         };
         let header = Header::read(&mut member).map_err(explain)?;
-        accept(header.shape()).map_err(|expected| {
-            refuse(format!("has shape {}", shape_text(header.shape())), expected)
-        })?;
-        let values = header.read_data(&mut member, MAX_FIELD_BYTES).map_err(explain)?;
-        Ok(Numbers { shape: header.shape().iter().map(|&axis| axis as usize).collect(), values })
+        accept(header.shape()).map_err(|expected| refuse(has_shape(header.shape()), expected))?;
+        let values = decode(&header, &mut member).map_err(explain)?;
+        Ok((header.shape().iter().map(|&axis| axis as usize).collect(), values))
     }
 }
 

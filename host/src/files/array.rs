@@ -12,6 +12,8 @@ use std::io::{self, Read};
 
 /// What an `.npy` file starts with.
 pub(super) const MAGIC: &[u8; 6] = b"\x93NUMPY";
+/// NumPy's own limit.
+pub(super) const MAX_AXES: usize = 32;
 /// NumPy itself refuses headers over 10 000 characters; this leaves room for other writers.
 const MAX_HEADER_BYTES: u32 = 65_536;
 
@@ -28,7 +30,7 @@ pub(super) enum ArrayError {
     Io(io::Error),
 }
 
-/// Real numbers that NumPy stores: `|b1`, `i1..i8`, `u1..u8`, `f2..f8`, either byte order.
+/// Numbers that NumPy stores: `|b1`, `i1..i8`, `u1..u8`, `f2..f8`, `c8`, `c16`, either byte order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Dtype {
     kind: Kind,
@@ -42,6 +44,8 @@ enum Kind {
     Signed,
     Unsigned,
     Float,
+    /// Two floats, real and imaginary part.
+    Complex,
 }
 
 /// A number that array elements are turned into.
@@ -134,6 +138,14 @@ impl Header {
         stream: &mut impl Read,
         limit_bytes: u64,
     ) -> Result<Vec<T>, ArrayError> {
+        if self.dtype.kind == Kind::Complex {
+            return Err(ArrayError::Dtype("has complex numbers".to_owned()));
+        }
+        let bytes = self.read_bytes(stream, limit_bytes)?;
+        Ok(self.in_c_order(self.dtype.decode(&bytes)))
+    }
+
+    fn read_bytes(&self, stream: &mut impl Read, limit_bytes: u64) -> Result<Vec<u8>, ArrayError> {
         let expected = self.data_bytes(limit_bytes)?;
         let mut bytes = Vec::new();
         stream.by_ref().take(expected).read_to_end(&mut bytes).map_err(ArrayError::Io)?;
@@ -148,11 +160,31 @@ impl Header {
                 "more than the {expected} bytes of data of its header"
             )));
         }
-        let values = self.dtype.decode(&bytes);
+        Ok(bytes)
+    }
+
+    /// Reads real or complex elements as [`read_data`](Self::read_data) does: real parts, and imaginary parts where there are.
+    pub(super) fn read_parts(
+        &self,
+        stream: &mut impl Read,
+        limit_bytes: u64,
+    ) -> Result<(Vec<f64>, Option<Vec<f64>>), ArrayError> {
+        if self.dtype.kind != Kind::Complex {
+            return Ok((self.read_data(stream, limit_bytes)?, None));
+        }
+        let bytes = self.read_bytes(stream, limit_bytes)?;
+        let part = Dtype { kind: Kind::Float, size: self.dtype.size / 2, ..self.dtype };
+        let parts: Vec<f64> = part.decode(&bytes);
+        let of =
+            |first: usize| -> Vec<f64> { parts.iter().skip(first).step_by(2).copied().collect() };
+        Ok((self.in_c_order(of(0)), Some(self.in_c_order(of(1)))))
+    }
+
+    fn in_c_order<T: Sample>(&self, values: Vec<T>) -> Vec<T> {
         // Both fit: their product was multiplied out above and is the length of `bytes`.
         let shape: Vec<usize> = self.shape.iter().map(|&axis| axis as usize).collect();
         let reorder = self.fortran_order && shape.len() > 1 && !values.is_empty();
-        Ok(if reorder { to_c_order(&values, &shape) } else { values })
+        if reorder { to_c_order(&values, &shape) } else { values }
     }
 }
 
@@ -162,6 +194,11 @@ pub(super) fn shape_text(shape: &[u64]) -> String {
         [one] => format!("({one},)"),
         axes => format!("({})", axes.iter().map(u64::to_string).collect::<Vec<_>>().join(", ")),
     }
+}
+
+/// What a message says of a shape that is not expected.
+pub(super) fn has_shape(shape: &[u64]) -> String {
+    format!("has shape {}", shape_text(shape))
 }
 
 fn fill(stream: &mut impl Read, buffer: &mut [u8], part: &str) -> Result<(), ArrayError> {
@@ -235,13 +272,15 @@ impl Dtype {
             Some('i') => Kind::Signed,
             Some('u') => Kind::Unsigned,
             Some('f') => Kind::Float,
+            Some('c') => Kind::Complex,
             _ => return Err(unknown()),
         };
         let size = match (kind, chars.as_str()) {
             (Kind::Bool | Kind::Signed | Kind::Unsigned, "1") => 1,
             (Kind::Signed | Kind::Unsigned | Kind::Float, "2") => 2,
             (Kind::Signed | Kind::Unsigned | Kind::Float, "4") => 4,
-            (Kind::Signed | Kind::Unsigned | Kind::Float, "8") => 8,
+            (Kind::Signed | Kind::Unsigned | Kind::Float | Kind::Complex, "8") => 8,
+            (Kind::Complex, "16") => 16,
             _ => return Err(unknown()),
         };
         Ok(Self { kind, size, big_endian })
@@ -260,7 +299,8 @@ impl Dtype {
             (Kind::Unsigned, _) => self.each(bytes, |b| u64::from_le_bytes(b) as f64),
             (Kind::Float, 2) => self.each(bytes, |b| half_to_f64(u16::from_le_bytes(b))),
             (Kind::Float, 4) => self.each(bytes, |b| f64::from(f32::from_le_bytes(b))),
-            (Kind::Float, _) => self.each(bytes, f64::from_le_bytes),
+            // Complex numbers are decoded part by part.
+            (Kind::Float | Kind::Complex, _) => self.each(bytes, f64::from_le_bytes),
         }
     }
 
@@ -298,7 +338,7 @@ fn half_to_f64(bits: u16) -> f64 {
 }
 
 /// Reorders elements stored with the first axis fastest, so that the last is.
-fn to_c_order<T: Sample>(values: &[T], shape: &[usize]) -> Vec<T> {
+pub(super) fn to_c_order<T: Copy>(values: &[T], shape: &[usize]) -> Vec<T> {
     let mut index = vec![0; shape.len()];
     let strides: Vec<usize> = shape
         .iter()

@@ -99,9 +99,9 @@ fn read_npz(path: &Path) -> Result<Stack, FileError> {
         [images, height, width] if *images > 0 && (*height, *width) == (side, side) => Ok(()),
         _ => Err("(N, 64, 64)".to_owned()),
     })?;
-    let wrong = |field, found, expected: &str| FileError::Field {
+    let wrong = |field: &'static str, found, expected: &str| FileError::Field {
         path: path.to_owned(),
-        field,
+        field: field.into(),
         found,
         expected: expected.to_owned(),
     };

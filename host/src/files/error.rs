@@ -2,6 +2,7 @@
 //!
 //! The law: a message is a single line, whatever the file or its name holds.
 
+use std::borrow::Cow;
 use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -62,24 +63,29 @@ pub enum FileError {
         expected: &'static str,
     },
     /// A field is there, but is not what it should be.
-    #[error("{}: `{field}` {}, expected {expected}", Shown::path(path), Shown::text(found))]
+    #[error(
+        "{}: `{}` {}, expected {expected}",
+        Shown::path(path),
+        Shown::text(field),
+        Shown::text(found)
+    )]
     Field {
         /// The file.
         path: PathBuf,
         /// The field.
-        field: &'static str,
+        field: Cow<'static, str>,
         /// What was found, as the rest of a sentence: `has shape (3,)`, `is NaN at [7]`.
         found: String,
         /// What should be.
         expected: String,
     },
     /// The file holds several measurements and the caller chose none, or one that is not there.
-    #[error("{}: `{field}` holds {}", Shown::path(path), choice(*count, *asked))]
+    #[error("{}: `{}` holds {}", Shown::path(path), Shown::text(field), choice(*count, *asked))]
     Choice {
         /// The file.
         path: PathBuf,
         /// The field.
-        field: &'static str,
+        field: Cow<'static, str>,
         /// How many there are.
         count: usize,
         /// Which was asked for.
@@ -90,6 +96,16 @@ pub enum FileError {
 impl FileError {
     pub(crate) fn io(path: &Path, attempt: &'static str, system: io::Error) -> Self {
         Self::Io { path: path.to_owned(), attempt, system }
+    }
+
+    pub(crate) fn field(
+        path: &Path,
+        field: impl Into<String>,
+        found: impl Into<String>,
+        expected: impl Into<String>,
+    ) -> Self {
+        let (field, found, expected) = (Cow::Owned(field.into()), found.into(), expected.into());
+        Self::Field { path: path.to_owned(), field, found, expected }
     }
 
     pub(crate) fn kind(path: &Path, found: impl Into<String>, expected: &'static str) -> Self {
@@ -193,7 +209,7 @@ mod tests {
                 FileError::kind(&path, "a folder", "a file"),
                 FileError::Damaged { path: path.clone(), found: found.clone(), expected: "a .npz" },
                 FileError::Missing { path: path.clone(), field: "n", found: names, expected: "n" },
-                FileError::Field { path, field: "y", found, expected: "numbers".to_owned() },
+                FileError::Field { path, field: "y".into(), found, expected: "numbers".to_owned() },
             ];
             for error in errors {
                 let line = error.to_string();

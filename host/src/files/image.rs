@@ -1,4 +1,4 @@
-//! Grey pictures as PNG: scenes in, results out.
+//! Grey pictures: PNG and JPEG in, PNG out.
 //!
 //! The law: a grey level *is* the value, v / 255 (or / 65 535), in both directions; nothing is
 //! linearised. That is the convention of the field's test scenes and data sets, it makes a written
@@ -9,14 +9,15 @@
 use super::FileError;
 use super::archive::{kind_by_start, open_file};
 use ::image::codecs::png::PngEncoder;
+use ::image::imageops::{self, FilterType};
 use ::image::{
-    ColorType, DynamicImage, ExtendedColorType, ImageEncoder, ImageFormat, ImageReader, Limits,
-    RgbImage,
+    ColorType, DynamicImage, ExtendedColorType, ImageBuffer, ImageDecoder, ImageEncoder,
+    ImageFormat, ImageReader, Limits, Luma, RgbImage,
 };
 use std::io::{BufRead, BufReader, Seek};
 use std::path::Path;
 
-const EXPECTED: &str = "a PNG image";
+const EXPECTED: &str = "a PNG or JPEG image";
 /// Largest edge that is read; a scene is later averaged down to hundreds of pixels.
 const MAX_EDGE_PX: u32 = 16_384;
 /// Largest decoded picture that is read: 8192 x 8192 in 16-bit RGBA.
@@ -31,7 +32,7 @@ pub struct Reflectance {
     pub values: Vec<f32>,
 }
 
-/// Reads a PNG of any kind (grey, RGB, palette, with or without alpha, up to 16 bit) as
+/// Reads a JPEG, or a PNG of any kind (grey, RGB, palette, with or without alpha, up to 16 bit) as
 /// reflectance.
 ///
 /// Colour becomes Rec. 709 luma (0.2126 R + 0.7152 G + 0.0722 B of the stored values), transparency
@@ -58,7 +59,7 @@ pub struct Grey {
     pub values: Vec<f32>,
 }
 
-/// Reads a PNG of any kind as [`read_reflectance`] does, of any shape and uncropped.
+/// Reads a PNG or JPEG of any kind as [`read_reflectance`] does, of any shape and uncropped.
 ///
 /// # Errors
 /// [`FileError`], one line that names file, what was found and what was expected.
@@ -67,26 +68,56 @@ pub fn read_grey(path: &Path) -> Result<Grey, FileError> {
     Ok(Grey { width: picture.width(), height: picture.height(), values: grey(&picture) })
 }
 
+impl Grey {
+    /// The picture's central square, averaged down or interpolated to `side_px` pixels an edge; values stay in `[0, 1]`.
+    ///
+    /// # Panics
+    /// If `side_px` is 0: there is no such picture.
+    #[must_use]
+    pub fn resized(&self, side_px: u32) -> Self {
+        assert!(side_px > 0, "a picture of 0 pixels");
+        let edge = self.width.min(self.height);
+        let picture: ImageBuffer<Luma<f32>, _> =
+            ImageBuffer::from_raw(self.width, self.height, self.values.clone())
+                .expect("as many values as pixels");
+        let (left, top) = ((self.width - edge) / 2, (self.height - edge) / 2);
+        let square = imageops::crop_imm(&picture, left, top, edge, edge).to_image();
+        let scaled = imageops::resize(&square, side_px, side_px, FilterType::Triangle);
+        let values = scaled.into_raw().into_iter().map(|value| value.clamp(0.0, 1.0)).collect();
+        Self { width: side_px, height: side_px, values }
+    }
+}
+
 fn decode(path: &Path) -> Result<DynamicImage, FileError> {
     let (file, _) = open_file(path, EXPECTED)?;
     let read = |error| FileError::io(path, "read", error);
     let mut stream = BufReader::new(file);
     let start = stream.fill_buf().map_err(read)?;
-    if ::image::guess_format(start).ok() != Some(ImageFormat::Png) {
+    let format = ::image::guess_format(start).ok();
+    let Some(format @ (ImageFormat::Png | ImageFormat::Jpeg)) = format else {
         return Err(FileError::kind(path, kind_by_start(start), EXPECTED));
-    }
+    };
     stream.rewind().map_err(read)?;
 
-    let mut reader = ImageReader::with_format(stream, ImageFormat::Png);
     let mut limits = Limits::default();
     limits.max_image_width = Some(MAX_EDGE_PX);
     limits.max_image_height = Some(MAX_EDGE_PX);
     limits.max_alloc = Some(MAX_DECODED_BYTES);
-    reader.limits(limits);
-    reader.decode().map_err(|error| match error {
+    let decoded = || {
+        let mut reader = ImageReader::with_format(stream, format);
+        reader.limits(limits.clone());
+        let mut decoder = reader.into_decoder()?;
+        limits.reserve(decoder.total_bytes())?;
+        // A telephone stores its picture as the sensor lay, and says which way is up.
+        let orientation = decoder.orientation()?;
+        let mut picture = DynamicImage::from_decoder(decoder)?;
+        picture.apply_orientation(orientation);
+        Ok(picture)
+    };
+    decoded().map_err(|error| match error {
         ::image::ImageError::Limits(_) => FileError::kind(
             path,
-            "a PNG image that is too large",
+            "an image that is too large",
             "at most 16384 pixels an edge and 512 MiB when decoded",
         ),
         error => FileError::Damaged {

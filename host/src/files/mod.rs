@@ -9,8 +9,8 @@
 pub mod characters;
 #[cfg(feature = "pictures")]
 pub mod image;
+pub mod measurement;
 pub mod npy;
-pub mod npz;
 pub mod order_table;
 pub mod output;
 pub mod problem;
@@ -19,8 +19,13 @@ pub mod table;
 mod archive;
 mod array;
 mod error;
+mod fields;
+#[cfg(feature = "hdf5")]
+mod hdf5;
+mod mat;
 #[cfg(test)]
 mod testing;
+mod text;
 
 #[cfg(feature = "training")]
 pub(crate) use archive::encode as encode_archive;

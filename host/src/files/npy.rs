@@ -3,8 +3,11 @@
 //! The law: [`encode`] then [`read_stack`] gives back the same bits.
 
 use super::FileError;
-use super::archive::{kind_by_start, open_file};
-use super::array::{ArrayError, Header, MAGIC, Sample, shape_text};
+use super::archive::{NUMBERS, kind_by_start, open_file};
+use super::array::{ArrayError, Header, MAGIC, MAX_AXES, Sample, shape_text};
+use super::fields::Field;
+use std::borrow::Cow;
+use std::fs::File;
 use std::io::{BufReader, Read, Seek};
 use std::path::Path;
 
@@ -66,7 +69,12 @@ pub struct Pictures {
 }
 
 fn refuse(path: &Path, found: String, expected: &str) -> FileError {
-    FileError::Field { path: path.to_owned(), field: FIELD, found, expected: expected.to_owned() }
+    FileError::Field {
+        path: path.to_owned(),
+        field: FIELD.into(),
+        found,
+        expected: expected.to_owned(),
+    }
 }
 
 fn finite(path: &Path, stack: Stack) -> Result<Stack, FileError> {
@@ -100,6 +108,25 @@ pub struct Matrix {
     pub values: Vec<f64>,
 }
 
+impl Matrix {
+    /// The values of these rows, one after another; all of them are not copied.
+    ///
+    /// # Panics
+    /// If there is no such row.
+    #[must_use]
+    pub fn select(&self, rows: &[usize]) -> Cow<'_, [f64]> {
+        let first = rows.iter().copied().eq(0..rows.len());
+        match first {
+            true => Cow::Borrowed(&self.values[..rows.len() * self.columns]),
+            false => rows
+                .iter()
+                .flat_map(|row| &self.values[row * self.columns..(row + 1) * self.columns])
+                .copied()
+                .collect(),
+        }
+    }
+}
+
 /// Reads a `.npy` file of shape `(M, N)`, any real dtype.
 ///
 /// # Errors
@@ -128,6 +155,17 @@ fn read(path: &Path) -> Result<(Header, Stack), FileError> {
     Ok((header, stack))
 }
 
+/// Reads a `.npy` file of any shape, of real or complex numbers.
+pub(super) fn read_field(path: &Path) -> Result<Field, FileError> {
+    let expected = "a NumPy array (.npy) of readings";
+    let fits = |shape: &[u64]| shape.len() <= MAX_AXES;
+    let decode =
+        |header: &Header, stream: &mut BufReader<File>, limit| header.read_parts(stream, limit);
+    let (header, (real, imaginary)) = read_array(path, expected, fits, "at most 32 axes", decode)?;
+    let shape = header.shape().iter().map(|&axis| axis as usize).collect();
+    Ok(Field { shape, real, imaginary })
+}
+
 /// Header and numbers of a `.npy` file whose shape fits.
 fn read_numbers<T: Sample>(
     path: &Path,
@@ -135,6 +173,18 @@ fn read_numbers<T: Sample>(
     fits: impl Fn(&[u64]) -> bool,
     shapes: &str,
 ) -> Result<(Header, Vec<T>), FileError> {
+    let decode =
+        |header: &Header, stream: &mut BufReader<File>, limit| header.read_data(stream, limit);
+    read_array(path, expected, fits, shapes, decode)
+}
+
+fn read_array<D>(
+    path: &Path,
+    expected: &'static str,
+    fits: impl Fn(&[u64]) -> bool,
+    shapes: &str,
+    decode: impl Fn(&Header, &mut BufReader<File>, u64) -> Result<D, ArrayError>,
+) -> Result<(Header, D), FileError> {
     let (file, file_bytes) = open_file(path, expected)?;
     let mut stream = BufReader::new(file);
     let mut start = Vec::new();
@@ -151,7 +201,7 @@ fn read_numbers<T: Sample>(
     let damaged = |found| FileError::Damaged { path: path.to_owned(), found, expected };
     let explain = |error| match error {
         ArrayError::Damaged(found) => damaged(found),
-        ArrayError::Dtype(found) => refuse(path, found, "real numbers of up to 8 bytes"),
+        ArrayError::Dtype(found) => refuse(path, found, NUMBERS),
         ArrayError::Io(error) => FileError::io(path, "read", error),
         ArrayError::TooLarge { shape, limit_bytes } => {
             damaged(format!("shape {} with {limit_bytes} bytes of data", shape_text(&shape)))
@@ -163,7 +213,7 @@ fn read_numbers<T: Sample>(
     }
     // The file cannot hold more than its own length, so that is the most that is taken into memory.
     let limit_bytes = file_bytes.saturating_sub(header.header_bytes);
-    let values = header.read_data(&mut stream, limit_bytes).map_err(explain)?;
+    let values = decode(&header, &mut stream, limit_bytes).map_err(explain)?;
     Ok((header, values))
 }
 

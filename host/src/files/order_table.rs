@@ -22,7 +22,7 @@ pub fn read_order_table(path: &Path) -> Result<Vec<u32>, FileError> {
         for word in numbers.split([' ', '\t', ',', ';']).filter(|word| !word.is_empty()) {
             table.push(word.parse().map_err(|_| FileError::Field {
                 path: path.to_owned(),
-                field: "order table",
+                field: "order table".into(),
                 found: format!("has {word:?} in line {line}"),
                 expected: "whole numbers from 0".to_owned(),
             })?);

@@ -65,7 +65,7 @@ pub fn read(path: &Path) -> Result<ProblemFile, FileError> {
     if k.fract() != 0.0 || !(1.0..=most).contains(&k) {
         return Err(FileError::Field {
             path: path.to_owned(),
-            field: "k",
+            field: "k".into(),
             found: format!("is {k}"),
             expected: format!("a whole number from 1 to {atoms}, the columns of D"),
         });
@@ -86,7 +86,7 @@ fn check_finite(path: &Path, field: &'static str, numbers: &Numbers) -> Result<(
     let width = numbers.shape.last().copied().unwrap_or(1);
     let found = format!("is {} at [{}, {}]", numbers.values[at], at / width, at % width);
     let expected = "finite numbers".to_owned();
-    Err(FileError::Field { path: path.to_owned(), field, found, expected })
+    Err(FileError::Field { path: path.to_owned(), field: field.into(), found, expected })
 }
 
 /// The bytes of a solution file: for each frame its atoms and their coefficients, at most `sparsity`.

@@ -16,7 +16,7 @@ mod white;
 
 #[cfg(feature = "enhance")]
 pub use enhance::{Enhance, EnhanceError, EnhancedImage, ImageContext, White};
-pub use quality::{Fitted, Quality, compare};
+pub use quality::{Fit, Fitted, Quality, compare};
 #[cfg(feature = "enhance")]
 pub use warning::{Warning, warnings};
 pub use white::{SteadyWhite, brightest};

@@ -32,24 +32,51 @@ pub struct Fitted {
     pub quality: Quality,
 }
 
+/// The gain and offset of least squares that bring an image to a reference's scale.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Fit {
+    /// Gain, 0 or more.
+    pub gain: f64,
+    /// What is added.
+    pub offset: f64,
+    /// Whether the image is darker where the reference is brighter; its gain is 0 then.
+    pub inverted: bool,
+}
+
+impl Fit {
+    /// Fits pixels to a reference of as many.
+    #[must_use]
+    pub fn of(image: &[f32], reference: &[f32]) -> Self {
+        let n = reference.len() as f64;
+        let mean = |values: &[f32]| values.iter().map(|&v| f64::from(v)).sum::<f64>() / n;
+        let (mx, my) = (mean(image), mean(reference));
+        let (mut xx, mut xy) = (0.0, 0.0);
+        for (&x, &y) in image.iter().zip(reference) {
+            let x = f64::from(x) - mx;
+            xx += x * x;
+            xy += x * (f64::from(y) - my);
+        }
+        let inverted = xy < 0.0;
+        let gain = if xx > 0.0 && !inverted { xy / xx } else { 0.0 };
+        Self { gain, offset: my - gain * mx, inverted }
+    }
+
+    /// A pixel on the reference's scale.
+    #[must_use]
+    pub fn apply(&self, pixel: f32) -> f32 {
+        (f64::from(pixel) * self.gain + self.offset) as f32
+    }
+}
+
 /// Fits `image` to `reference`, of the same size, and compares.
 ///
 /// # Errors
 /// [`MetricError`] if the sizes differ or a value is no number.
 pub fn compare(image: &Image, reference: &[f32]) -> Result<Fitted, MetricError> {
-    let n = reference.len() as f64;
-    let mean = |values: &[f32]| values.iter().map(|&v| f64::from(v)).sum::<f64>() / n;
-    let (mx, my) = (mean(image.pixels()), mean(reference));
-    let (mut xx, mut xy) = (0.0, 0.0);
-    for (&x, &y) in image.pixels().iter().zip(reference) {
-        let x = f64::from(x) - mx;
-        xx += x * x;
-        xy += x * (f64::from(y) - my);
-    }
-    let inverted = xy < 0.0;
-    let gain = if xx > 0.0 && !inverted { xy / xx } else { 0.0 };
-    let fit = |x: &f32| ((f64::from(*x) - mx) * gain + my).clamp(0.0, 1.0) as f32;
-    let values: Vec<f32> = image.pixels().iter().map(fit).collect();
+    let fit = Fit::of(image.pixels(), reference);
+    let inverted = fit.inverted;
+    let values: Vec<f32> =
+        image.pixels().iter().map(|&pixel| fit.apply(pixel).clamp(0.0, 1.0)).collect();
     let side = image.side().pixels();
     let quality = Quality {
         psnr_db: metrics::psnr(reference, &values, side, side, 1.0)?,

@@ -40,13 +40,13 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         .orders
         .iter()
         .map(|name| {
-            let order = (name != RECORDED).then(|| parse_order(name)).transpose()?;
+            let order = (name != RECORDED).then(|| parse_order("--orders", name)).transpose()?;
             Ok((name.clone(), order))
         })
         .collect::<Result<_>>()?;
     let study = Study::new(orders, args.sampling.clone()).map_err(refused)?;
     let input = &args.source.input;
-    let measurements = args.source.load()?.measurements;
+    let measurements = args.source.load_real()?;
     let bar = ProgressBar::new(study.images() as u64);
     let report = study
         .run(input.clone(), &measurements, &|| bar.inc(1))

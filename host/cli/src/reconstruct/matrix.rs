@@ -5,7 +5,8 @@ use crate::Usage;
 use crate::method::read_atoms;
 use crate::report::StageTimes;
 use anyhow::{Context, Result, bail};
-use nirspi::files::{npy, npz};
+use nirspi::files::measurement::{Plain, Selection, read_plain};
+use nirspi::files::npy;
 use nirspi_recon::Side;
 use nirspi_recon::reconstruct::{MatrixSettings, Method, OwnMatrix, Setting};
 use serde::Serialize;
@@ -32,6 +33,7 @@ struct Report {
     #[serde(skip_serializing_if = "Option::is_none")]
     stop: Option<&'static str>,
     relative_residual: f64,
+    not_read: Vec<usize>,
     notes: Vec<String>,
     stage_ms: StageTimes,
 }
@@ -51,20 +53,25 @@ pub fn run(args: &Args, path: &Path) -> Result<ExitCode> {
             matrix.columns
         );
     };
-    let y = npz::read_plain(&args.source.input, index, matrix.rows)?;
+    let want = Selection { index, ..args.source.selection()? };
+    let Plain { values: y, patterns, not_read } =
+        read_plain(&args.source.input, &want, matrix.rows)?;
     if let Some(atoms) = &args.method.dictionary {
         settings.atoms = Some(read_atoms(atoms, n)?);
     }
     let most = ((args.sampling * side.area() as f64).round() as usize).max(1);
-    let used = if args.sampling < 1.0 { matrix.rows.min(most) } else { matrix.rows };
+    let used = if args.sampling < 1.0 { y.len().min(most) } else { y.len() };
     let named = || path.display().to_string();
-    let weights = &matrix.values[..used * matrix.columns];
-    let own = times.time("rank", || OwnMatrix::new(side, weights)).with_context(named)?;
+    let kept = matrix.select(&patterns[..used]);
+    let own = times.time("rank", || OwnMatrix::new(side, &kept)).with_context(named)?;
     let solve = || spinning(|| own.reconstruct(&y[..used], &settings));
     let found = times.time("reconstruct", solve).with_context(named)?;
     super::check_finite(&args.source.input, &found.image)?;
 
     let mut notes = Vec::new();
+    if !not_read.is_empty() {
+        notes.push(super::not_read_words(&not_read));
+    }
     if own.rank() < used.min(side.area()) {
         let others = used - own.rank();
         notes.push(format!("{others} of {used} patterns are combinations of others"));
@@ -90,10 +97,11 @@ pub fn run(args: &Args, path: &Path) -> Result<ExitCode> {
         sparsity: found.atoms.map(|(size, _)| size),
         stop: found.atoms.map(|(_, stop)| args.method.atoms().reason(stop)),
         relative_residual: found.residual,
+        not_read,
         notes,
         stage_ms: times,
     };
-    super::write(&args.out, &found.image, None, &report)?;
+    super::write(&args.out, &found.image, None, None, &report)?;
     if args.json {
         print::json(&report)?;
     } else {

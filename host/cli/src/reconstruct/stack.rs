@@ -60,16 +60,37 @@ pub fn run(args: &Args, first: &FirstPatterns) -> Result<ExitCode> {
         .collect::<Result<_, _>>()
         .with_context(named)?;
     let solved = times.time("reconstruct", || spinning(|| solve_all(args, &used)))?;
+    // Imaginary parts of complex readings; every frame of a file has one, or none.
+    let imaginary: Vec<Measurements> = sources
+        .iter()
+        .filter_map(|source| source.imaginary.as_ref())
+        .map(|imaginary| Ok(first.take(imaginary, args.sampling)?.0))
+        .collect::<Result<_>>()
+        .with_context(named)?;
+    if args.enhance && !imaginary.is_empty() {
+        return Err(Usage(
+            "--enhance needs real images: choose --part real or --part imaginary".to_owned(),
+        )
+        .into());
+    }
+    let others = times.time("reconstruct", || spinning(|| solve_all(args, &imaginary)))?;
+    let mut others = others.into_iter();
     let (mut images, mut frames) = (Vec::new(), Vec::new());
     for (made, (used, source)) in solved.into_iter().zip(used.iter().zip(sources)) {
         let warm = made.report.warm;
-        let Solved { image, report } = args.method.solved(made);
+        let Solved { mut image, report } = args.method.solved(made);
+        if let Some(other) = others.next() {
+            image = Image::magnitude(&image, &other.image);
+        }
         super::check_finite(&args.source.input, &image)?;
         let image = source.flattened(image);
         let dropped = |d: &nirspi_recon::Dropout| {
             format!("drop-out: {} readings from y[{}] on", d.length, d.start)
         };
         let mut notes: Vec<String> = source.dropouts.iter().map(dropped).collect();
+        if !source.not_read.is_empty() {
+            notes.push(super::not_read_words(&source.not_read));
+        }
         notes.extend(source.notes);
         let used = used.rows().len();
         frames.push(FrameReport { used, warm, method: report, enhancement: None, notes });

@@ -3,11 +3,13 @@
 use crate::bench::Bench;
 use nirspi::files::image::encode_grey;
 
-const FILES: [&str; 16] = [
+const FILES: [&str; 18] = [
     "deblurred.npy",
     "deblurred.png",
+    "frames.npy",
     "fused.npy",
     "fused.png",
+    "measurement.npz",
     "raw.npy",
     "raw.png",
     "reconstruction.npy",
@@ -105,7 +107,7 @@ fn scenes_and_distances_that_cannot_be_leave_nothing_behind() {
     let bench = Bench::new();
     bench.write("text.png", b"no picture at all");
     let demo = |arguments: &[&str]| bench.run(&[&["demo", "--out", "demo"], arguments].concat());
-    demo(&["--scene", "text.png"]).failed(1, &["text.png", "expected a PNG image"]);
+    demo(&["--scene", "text.png"]).failed(1, &["text.png", "expected a PNG or JPEG image"]);
     demo(&["--scene", "none.png"]).failed(1, &["none.png", "no such file"]);
     demo(&["--scene", "letter:RR"]).failed(2, &["letter:RR", "expected one"]);
     for distance in ["0", "-1", "nan", "inf", "1e9", "1e-9"] {

@@ -122,7 +122,7 @@ fn what_is_no_image_for_the_networks_gets_one_line_and_nothing_is_written() {
     enhance("cut.npy").failed(1, &["cut.npy", "cut short"]);
     enhance("text.npy").failed(1, &["text.npy", "NumPy"]);
     enhance("none.npy").failed(1, &["none.npy", "no such file"]);
-    enhance("folder").failed(1, &["folder", "no .png files"]);
+    enhance("folder").failed(1, &["folder", "no .png or .jpg files"]);
     bench
         .run(&["enhance", "good.npy", "--depth", "tof.npy", "--out", "out.npy"])
         .failed(1, &["tof.npy", "3 depth maps", "1 or 2"]);

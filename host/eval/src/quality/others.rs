@@ -128,7 +128,7 @@ fn part_of(picture: &[f32], size_px: usize, down: f64, across: f64) -> Vec<f32> 
 /// A real measurement: 64 x 64 ones are their own truth, seen through means of 2 x 2.
 fn measured(path: &Path) -> Result<Scene> {
     let first = SourceOptions { index: Some(Index::One(0)), ..SourceOptions::default() };
-    let source = Source::read(path, first)?;
+    let source = Source::read(path, &first)?;
     let image = reconstruct::hadamard(&source.measurements);
     let side = image.side().pixels();
     let (low, high) = image

@@ -116,6 +116,30 @@ fn zig_zag_starts_as_the_public_log_does() {
 }
 
 #[test]
+fn orders_of_other_packages_are_theirs() {
+    let mut compared = 0;
+    for line in include_str!("others.txt").lines().filter(|line| !line.starts_with('#')) {
+        let (head, rows) = line.split_once(": ").unwrap();
+        let (name, n) = head.rsplit_once(' ').unwrap();
+        let theirs: Vec<u32> = rows.split(' ').map(|row| row.parse().unwrap()).collect();
+        let side = side(n.parse().unwrap());
+        let ours = name.parse::<Order>().unwrap().rows(side).unwrap();
+        match others::ties(name) {
+            None => assert_eq!(*ours, theirs[..], "{head}"),
+            Some(key) => {
+                let patterns = others::by_row(side);
+                let keys =
+                    |rows: &[u32]| rows.iter().map(|&row| key(&patterns[row as usize])).collect();
+                let (ours, theirs): (Vec<u64>, Vec<u64>) = (keys(&ours), keys(&theirs));
+                assert_eq!(ours, theirs, "{head}");
+            }
+        }
+        compared += 1;
+    }
+    assert_eq!(compared, 15, "five orders at three sides");
+}
+
+#[test]
 fn the_shuffle_of_a_seed_never_changes() {
     assert_eq!(
         *Order::Random(2026).rows(side(4)).unwrap(),

@@ -9,7 +9,7 @@
 //!
 //! | method | the image is |
 //! |---|---|
-//! | pseudo-inverse | the least of those for which `abs(y - A x)` is least, by conjugate gradients (A. Björck, *Numerical Methods for Least Squares Problems*, 1996, 7.4) |
+//! | pseudo-inverse | the least of those for which `abs(y - A x)` is least, by conjugate gradients (A. Björck, *Numerical Methods for Least Squares Problems*, 1996, 7.4); of orthogonal patterns, `A A^T = D`, it is `A^T D^-1 y` |
 //! | Tikhonov | where `abs(y - A c)^2 + t sum_j (c[j] / s[j])^2` is least |
 //! | sparse | where `abs(y - A c)^2 / 2 + t sqrt 2 sum_j abs(c[j]) / s[j]` is least, by FISTA |
 //! | total variation | where `abs(y - A x)^2 / 2 + t sum of abs(gradient of x)` is least, by Chambolle and Pock |
@@ -26,8 +26,8 @@ use crate::omp::{OmpError, Stop};
 use crate::{Image, Side};
 use nalgebra::{DMatrix, DVector};
 use problem::Problem;
-use rand::SeedableRng;
 use rand::seq::SliceRandom;
+use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use thiserror::Error;
 
@@ -37,6 +37,8 @@ pub struct OwnMatrix {
     side: Side,
     patterns: DMatrix<f64>,
     rank: usize,
+    /// Squared norm of each pattern, where no pattern has a part along another.
+    orthogonal: Option<DVector<f64>>,
 }
 
 /// What is wrong with a matrix, its measurements or a setting.
@@ -177,11 +179,15 @@ impl OwnMatrix {
         }
         finite("matrix", weights, area)?;
         let patterns = DMatrix::from_row_slice(weights.len() / area, area, weights);
-        let rank = rank(&patterns);
+        let orthogonal = energies_if_orthogonal(&patterns);
+        let rank = match &orthogonal {
+            Some(_) => patterns.nrows(),
+            None => rank(&patterns),
+        };
         if rank == 0 {
             return Err(MatrixError::Dark);
         }
-        Ok(Self { side, patterns, rank })
+        Ok(Self { side, patterns, rank, orthogonal })
     }
 
     /// Side of the image.
@@ -226,7 +232,11 @@ impl OwnMatrix {
         let (pixels, strength, atoms) = match settings.method {
             MatrixMethod::PseudoInverse => {
                 let y = DVector::from_column_slice(y);
-                (solvers::least_squares(&self.patterns, &y), None, None)
+                let pixels = match &self.orthogonal {
+                    Some(energies) => self.patterns.tr_mul(&y.component_div(energies)),
+                    None => solvers::least_squares(&self.patterns, &y),
+                };
+                (pixels, None, None)
             }
             MatrixMethod::Omp => {
                 let noise = match settings.strength {
@@ -363,6 +373,36 @@ fn finite(field: &'static str, values: &[f64], width: usize) -> Result<(), Matri
         }
         None => Ok(()),
     }
+}
+
+/// Squared norms of patterns of which none has a part along another. `A A^T v` is held against `D v` for a few random `v`:
+/// two patterns that are not orthogonal would have to be missed by each of them.
+fn energies_if_orthogonal(patterns: &DMatrix<f64>) -> Option<DVector<f64>> {
+    const TRIALS: usize = 3;
+    const ROUNDING: f64 = 1e-9;
+    let (rows, columns) = patterns.shape();
+    if rows > columns {
+        return None;
+    }
+    let mut energies = DVector::<f64>::zeros(rows);
+    for column in patterns.column_iter() {
+        energies.zip_apply(&column, |energy, weight| *energy += weight * weight);
+    }
+    if energies.iter().any(|&energy| energy == 0.0) {
+        return None;
+    }
+    let mut random = Pcg64::seed_from_u64(SPLIT_SEED);
+    let holds = (0..TRIALS).all(|_| {
+        // Patterns of any norm weigh alike.
+        let v = DVector::from_fn(rows, |k, _| (random.random::<f64>() - 0.5) / energies[k].sqrt());
+        let seen = patterns * patterns.tr_mul(&v);
+        let off = |k: usize| {
+            ((seen[k] - energies[k] * v[k]).powi(2) / energies[k], energies[k] * v[k] * v[k])
+        };
+        let (missed, all) = (0..rows).map(off).fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
+        missed <= ROUNDING.powi(2) * all
+    });
+    holds.then_some(energies)
 }
 
 /// Pivoted Cholesky factorisation of the smaller Gram matrix, as far as it goes.

@@ -85,15 +85,55 @@ fn a_wide_or_tall_picture_is_cropped_to_its_centre() {
     assert_eq!(levels, [2.0, 2.0, 3.0, 3.0]);
 }
 
+fn jpeg(picture: &GrayImage) -> Vec<u8> {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    picture.write_to(&mut bytes, ImageFormat::Jpeg).unwrap();
+    bytes.into_inner()
+}
+
+#[test]
+fn a_jpeg_is_read_the_way_up_that_it_says() {
+    let picture = GrayImage::from_fn(16, 16, |_, y| Luma([if y < 8 { 200 } else { 40 }]));
+    let upright = jpeg(&picture);
+    let corners = |bytes: &[u8]| {
+        let map = read(bytes).unwrap();
+        assert_eq!(map.size_px, 16);
+        [0, 15, 240, 255].map(|at| (map.values[at] * 255.0).round() as i32)
+    };
+    let near = |found: [i32; 4], expected: [i32; 4]| {
+        assert!(
+            found.iter().zip(expected).all(|(f, e)| (f - e).abs() < 12),
+            "{found:?} {expected:?}"
+        );
+    };
+    near(corners(&upright), [200, 200, 40, 40]);
+    // Exif orientation 6: the top of the scene is the stored picture's left, turned a quarter clockwise.
+    let exif = b"Exif\0\0MM\0\x2a\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0";
+    let length = u16::try_from(exif.len() + 2).unwrap().to_be_bytes();
+    let turned = [&upright[..2], &[0xff, 0xe1], &length, exif, &upright[2..]].concat();
+    near(corners(&turned), [40, 200, 40, 200]);
+}
+
+#[test]
+fn a_resized_picture_is_the_mean_of_its_central_square() {
+    let values = (0..6 * 4).map(|p| if p % 6 < 3 { 0.25 } else { 0.75 }).collect();
+    let small = Grey { width: 6, height: 4, values }.resized(2);
+    assert_eq!((small.width, small.height), (2, 2));
+    assert!(small.values[0] < 0.4 && small.values[1] > 0.6, "{:?}", small.values);
+    let mean: f32 = small.values.iter().sum::<f32>() / 4.0;
+    assert!((mean - 0.5).abs() < 1e-3, "{:?}", small.values);
+}
+
 #[test]
 fn each_kind_of_bad_picture_gets_its_line() {
     let whole = png(GrayImage::new(20, 20));
     let mut huge = whole.clone();
     huge[16..20].copy_from_slice(&100_000u32.to_be_bytes());
-    let cases: [(&[u8], &str); 5] = [
-        (b"", "found an empty file, expected a PNG image"),
-        (b"\xff\xd8\xff\xe0....", "found a JPEG image, expected a PNG image"),
-        (b"hello there", "found a file of another kind, expected a PNG image"),
+    let cases: [(&[u8], &str); 6] = [
+        (b"", "found an empty file, expected a PNG or JPEG image"),
+        (b"\x93NUMPY\x01\x00", "found a single NumPy array (.npy), expected a PNG or JPEG image"),
+        (b"\xff\xd8\xff\xe0....", "damaged or cut short"),
+        (b"hello there", "found a file of another kind, expected a PNG or JPEG image"),
         (&whole[..whole.len() / 2], "damaged or cut short"),
         (&huge, "expected a"),
     ];
@@ -105,14 +145,20 @@ fn each_kind_of_bad_picture_gets_its_line() {
 
 #[test]
 fn no_damage_makes_the_reader_panic() {
-    let whole = png(GrayImage::from_fn(9, 9, |x, y| Luma([(x * y) as u8])));
+    let picture = GrayImage::from_fn(9, 9, |x, y| Luma([(x * y) as u8]));
+    for whole in [jpeg(&picture), png(picture)] {
+        no_damage_panics(&whole);
+    }
+}
+
+fn no_damage_panics(whole: &[u8]) {
     for end in 0..whole.len() {
         if let Err(error) = read(&whole[..end]) {
             line(&error, "scene.png");
         }
     }
     for at in 0..whole.len() {
-        let mut damaged = whole.clone();
+        let mut damaged = whole.to_vec();
         damaged[at] ^= 0x41;
         if let Err(error) = read(&damaged) {
             line(&error, "scene.png");

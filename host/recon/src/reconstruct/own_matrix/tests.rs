@@ -66,6 +66,47 @@ fn all_hadamard_rows_as_a_matrix_give_the_image_by_every_method() {
 }
 
 #[test]
+fn orthogonal_patterns_of_any_norms_are_inverted_in_one_step() {
+    let side = side(8);
+    let mut random = Pcg64::seed_from_u64(5);
+    let sign = |r: usize, p: usize| f64::from(1 - 2 * ((r & p).count_ones() as i32 % 2));
+    for count in [1, 20, 64] {
+        let weights: Vec<f64> = (0..count)
+            .flat_map(|r| (0..64).map(move |p| sign(r, p) * (1.0 + r as f64 / 9.0)))
+            .collect();
+        let own = OwnMatrix::new(side, &weights).unwrap();
+        assert!(own.orthogonal.is_some());
+        assert_eq!(own.rank(), count);
+        let y: Vec<f64> = (0..count).map(|_| normal(&mut random)).collect();
+        let settings = MatrixSettings::new(MatrixMethod::PseudoInverse);
+        let slow = OwnMatrix { orthogonal: None, ..own.clone() };
+        let (fast, slow) =
+            (own.reconstruct(&y, &settings).unwrap(), slow.reconstruct(&y, &settings).unwrap());
+        assert!(fast.residual < 1e-9);
+        for (a, b) in fast.image.pixels().iter().zip(slow.image.pixels()) {
+            assert!((a - b).abs() < 1e-5, "{count}: {a} and {b}");
+        }
+    }
+}
+
+#[test]
+fn patterns_that_share_a_little_are_not_taken_for_orthogonal() {
+    let side = side(8);
+    let mut weights: Vec<f64> = (0..64 * 64).map(|at| f64::from(u8::from(at % 65 == 0))).collect();
+    assert!(OwnMatrix::new(side, &weights).unwrap().orthogonal.is_some());
+    weights[1] = 1e-6;
+    assert!(OwnMatrix::new(side, &weights).unwrap().orthogonal.is_none());
+    weights[1] = 0.0;
+    // Twice the same pattern; one without light; more patterns than pixels.
+    let copied = [&weights[..64], &weights[..64]].concat();
+    assert_eq!(OwnMatrix::new(side, &copied).unwrap().rank(), 1);
+    let dark = [&weights[..64], &[0.0; 64]].concat();
+    assert_eq!(OwnMatrix::new(side, &dark).unwrap().rank(), 1);
+    let tall = [&weights[..], &weights[..64]].concat();
+    assert!(OwnMatrix::new(side, &tall).unwrap().orthogonal.is_none());
+}
+
+#[test]
 fn from_half_as_many_random_patterns_as_pixels_every_prior_beats_the_pseudo_inverse() {
     let (side, image) = (side(16), scene(side(16), 2));
     let (own, y) = binary(side, 128, &image);

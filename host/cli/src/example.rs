@@ -1,0 +1,49 @@
+//! `nirspi example`: a measurement to try the program on.
+
+use super::{Usage, print};
+use anyhow::Result;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use nirspi::example::Example;
+use nirspi::files::measurement;
+use nirspi::files::output::write_atomic;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Write an example measurement, made by the virtual camera: n, h_row and d in a .npz file
+///
+/// The measurement is simulated, and the file says so: its field `simulated` is 1.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n\
+    \x20 nirspi example wing --out wing.npz")]
+pub struct Args {
+    /// Which example
+    #[arg(value_parser = examples())]
+    example: Example,
+    /// File to write; default: the example's name with .npz
+    #[arg(long, value_name = "FILE.npz")]
+    out: Option<PathBuf>,
+    /// Seed of the simulated noise
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+}
+
+fn examples() -> impl TypedValueParser<Value = Example> {
+    let word = |example: Example| PossibleValue::new(example.name()).help(example.about());
+    PossibleValuesParser::new(Example::ALL.map(word)).try_map(|word| word.parse::<Example>())
+}
+
+pub fn run(args: &Args) -> Result<ExitCode> {
+    let path = args.out.clone().unwrap_or_else(|| format!("{}.npz", args.example.name()).into());
+    if path.extension().is_none_or(|extension| extension != "npz") {
+        let found = path.display();
+        return Err(Usage(format!("--out {found}: expected a name that ends in .npz")).into());
+    }
+    let measured = args.example.measure(args.seed)?;
+    write_atomic(&path, &measurement::encode(&path, &measured, true)?)?;
+    let (patterns, n) = (measured.rows().len(), measured.side().pixels());
+    print::line(format_args!(
+        "wrote {}: {n} x {n}, {patterns} patterns, simulated",
+        path.display()
+    ))?;
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,43 @@
+"""One small measurement in each file format that holds several arrays, for the tests of the readers.
+
+    python host/scripts/small_files.py
+
+Writes host/src/files/small/: n = 2, h_row = 0, 3, 1 and y = 5, 1, 2, 3, 4, 4.5, a complex array z of 2 x 3, and a text. Needs numpy,
+scipy and h5py.
+"""
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+import scipy.io
+
+OUT = Path(__file__).parent.parent / "src" / "files" / "small"
+REAL = {"n": 2, "h_row": np.array([0, 3, 1]), "y": np.array([5, 1, 2, 3, 4, 4.5])}
+COMPLEX = np.array([[1 + 10j, 2 + 20j, 3 + 30j], [4 + 40j, 5 + 50j, 6 + 60j]])
+
+
+def matlab73(path):
+    """As MATLAB's save -v7.3: a block of 512 bytes with its name, axes in reverse, complex numbers as (real, imag)."""
+    with h5py.File(path, "w", userblock_size=512, libver="earliest") as file:
+        for name, array in REAL.items():
+            array = np.atleast_2d(np.asarray(array, dtype=np.float64)).T
+            compressed = {"chunks": array.shape, "compression": "gzip"} if array.size > 1 else {}
+            file.create_dataset(name, data=array, **compressed)
+        pair = np.empty(COMPLEX.T.shape, dtype=[("real", "<f8"), ("imag", "<f8")])
+        pair["real"], pair["imag"] = COMPLEX.T.real, COMPLEX.T.imag
+        file.create_dataset("z", data=pair)
+    with open(path, "r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM")
+
+
+OUT.mkdir(exist_ok=True)
+for name, compressed in (("level5.mat", False), ("level5_compressed.mat", True)):
+    variables = REAL | {"z": COMPLEX, "text": "some words"}
+    scipy.io.savemat(OUT / name, variables, do_compression=compressed, oned_as="column")
+matlab73(OUT / "level73.mat")
+with h5py.File(OUT / "h5py.h5", "w") as file:
+    for name, array in REAL.items():
+        file[name] = array
+    file["z"] = COMPLEX.astype(np.complex64)
+    file["text"] = "some words"

@@ -1,0 +1,198 @@
+//! The arrays of a file by their names, whatever the file's format: NumPy `.npz` and `.npy`, MATLAB `.mat`, HDF5, text.
+//!
+//! The law: an array is decoded only when its field is asked for, and comes out in C order whatever order the format keeps.
+
+use super::FileError;
+use super::archive::{Archive, kind_by_start, open_file};
+#[cfg(feature = "hdf5")]
+use super::hdf5::Hdf5;
+use super::mat::Mat;
+use super::npy;
+use super::text;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+/// What a path is expected to lead to.
+const EXPECTED: &str = "measurements: .npz, .npy, .mat, .h5, .csv or .txt, or a recording (.mcap)";
+/// The name under which messages speak of an array that has none.
+pub(super) const UNNAMED: &str = "array";
+/// Bytes that tell the format; HDF5 may begin behind a block of 512 bytes.
+const START_BYTES: u64 = 520;
+const HDF5_MAGIC: &[u8] = b"\x89HDF\r\n\x1a\n";
+/// The largest `.mat` or HDF5 file taken into memory.
+const MAX_FILE_BYTES: u64 = 1 << 30;
+
+/// Numbers in C order, real or complex.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Field {
+    pub(super) shape: Vec<usize>,
+    pub(super) real: Vec<f64>,
+    /// As many as `real`, for complex numbers.
+    pub(super) imaginary: Option<Vec<f64>>,
+}
+
+impl Field {
+    /// The same numbers with the axes in reverse, of numbers stored with the first axis fastest.
+    pub(super) fn from_column_major(
+        shape: Vec<usize>,
+        real: &[f64],
+        imaginary: Option<&[f64]>,
+    ) -> Self {
+        let turn = |values: &[f64]| super::array::to_c_order(values, &shape);
+        let (real, imaginary) = (turn(real), imaginary.map(turn));
+        Self { shape, real, imaginary }
+    }
+}
+
+/// An open file.
+pub(super) struct Fields {
+    path: PathBuf,
+    names: Vec<String>,
+    format: Format,
+}
+
+enum Format {
+    Npz(Archive),
+    Mat(Mat),
+    #[cfg(feature = "hdf5")]
+    Hdf5(Hdf5),
+    /// Columns of a text with a heading.
+    Columns(Vec<Field>),
+    /// One array without a name.
+    Unnamed(Field),
+}
+
+impl Fields {
+    /// Opens a file of any of the formats; `decimal_comma` is of text alone.
+    pub(super) fn open(path: &Path, decimal_comma: bool) -> Result<Self, FileError> {
+        let (mut file, length) = open_file(path, EXPECTED)?;
+        let mut start = Vec::new();
+        file.by_ref()
+            .take(START_BYTES)
+            .read_to_end(&mut start)
+            .map_err(|error| FileError::io(path, "read", error))?;
+        let (names, format) = if start.starts_with(b"PK") {
+            let archive = Archive::open(path)?;
+            (archive.names().to_vec(), Format::Npz(archive))
+        } else if start.starts_with(super::array::MAGIC) {
+            (Vec::new(), Format::Unnamed(npy::read_field(path)?))
+        } else if start.starts_with(HDF5_MAGIC) || start.get(512..) == Some(HDF5_MAGIC) {
+            open_hdf5(path, length, start.starts_with(b"MATLAB"))?
+        } else if Mat::is_start(&start) {
+            let mat = Mat::open(path, whole(path, length, "a MATLAB file")?)?;
+            (mat.names(), Format::Mat(mat))
+        } else if text::is_start(&start) {
+            match text::read(path, decimal_comma)? {
+                text::Numbers::Columns(columns) => {
+                    let (names, fields) = columns.into_iter().unzip();
+                    (names, Format::Columns(fields))
+                }
+                text::Numbers::Table(field) => (Vec::new(), Format::Unnamed(field)),
+            }
+        } else {
+            return Err(FileError::kind(path, kind_by_start(&start), EXPECTED));
+        };
+        if decimal_comma && !matches!(format, Format::Columns(_) | Format::Unnamed(_)) {
+            return Err(FileError::kind(path, kind_by_start(&start), "text for --decimal-comma"));
+        }
+        Ok(Self { path: path.to_owned(), names, format })
+    }
+
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Names of all fields.
+    pub(super) fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// Whether the file is one array without a name, which stands for whatever is asked for.
+    pub(super) fn is_unnamed(&self) -> bool {
+        matches!(self.format, Format::Unnamed(_))
+    }
+
+    pub(super) fn holds(&self, field: &str) -> bool {
+        self.names.iter().any(|name| name == field)
+    }
+
+    /// Reads a field whose shape `accept` finds good; what it returns otherwise is what was expected.
+    pub(super) fn read(
+        &mut self,
+        field: &str,
+        accept: impl Fn(&[u64]) -> Result<(), String>,
+    ) -> Result<Field, FileError> {
+        let at = self.names.iter().position(|name| name == field);
+        let loaded = match &mut self.format {
+            Format::Npz(archive) => return archive.field(field, accept),
+            Format::Mat(mat) => return mat.read(field, accept),
+            #[cfg(feature = "hdf5")]
+            Format::Hdf5(file) => return file.read(field, accept),
+            Format::Columns(fields) => at.and_then(|at| fields.get(at)).cloned(),
+            Format::Unnamed(field) => Some(field.clone()),
+        };
+        let name = if self.is_unnamed() { UNNAMED } else { field };
+        let Some(loaded) = loaded else {
+            return Err(FileError::field(&self.path, name, "is not there", "a field of the file"));
+        };
+        let shape: Vec<u64> = loaded.shape.iter().map(|&axis| axis as u64).collect();
+        accept(&shape).map_err(|expected| {
+            FileError::field(&self.path, name, super::array::has_shape(&shape), expected)
+        })?;
+        Ok(loaded)
+    }
+}
+
+impl Fields {
+    /// The same, of real numbers alone.
+    pub(super) fn read_real(
+        &mut self,
+        field: &str,
+        accept: impl Fn(&[u64]) -> Result<(), String>,
+    ) -> Result<Vec<f64>, FileError> {
+        let numbers = self.read(field, accept)?;
+        match numbers.imaginary {
+            None => Ok(numbers.real),
+            Some(_) => {
+                Err(FileError::field(&self.path, field, "has complex numbers", "real numbers"))
+            }
+        }
+    }
+}
+
+#[cfg(feature = "hdf5")]
+fn open_hdf5(
+    path: &Path,
+    length: u64,
+    is_matlab: bool,
+) -> Result<(Vec<String>, Format), FileError> {
+    let file = Hdf5::open(path, whole(path, length, "an HDF5 file")?, is_matlab)?;
+    Ok((file.names()?, Format::Hdf5(file)))
+}
+
+#[cfg(not(feature = "hdf5"))]
+fn open_hdf5(path: &Path, _: u64, is_matlab: bool) -> Result<(Vec<String>, Format), FileError> {
+    let found = if is_matlab { "a MATLAB 7.3 file" } else { "an HDF5 file" };
+    Err(FileError::kind(
+        path,
+        format!("{found}, which this build does not read"),
+        "a build with the feature hdf5, or the file saved as MATLAB 7 (save -v7) or .npz",
+    ))
+}
+
+/// The bytes of a file of at most 1 GiB.
+fn whole(path: &Path, length: u64, kind: &str) -> Result<Vec<u8>, FileError> {
+    if length > MAX_FILE_BYTES {
+        return Err(FileError::kind(path, format!("{kind} of {length} bytes"), "at most 1 GiB"));
+    }
+    let mut bytes = Vec::new();
+    open_file(path, EXPECTED)?
+        .0
+        .take(MAX_FILE_BYTES)
+        .read_to_end(&mut bytes)
+        .map_err(|error| FileError::io(path, "read", error))?;
+    Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,81 @@
+use super::super::testing::{file, line};
+use super::*;
+
+/// Files of `host/scripts/small_files.py`: SciPy's and h5py's own bytes.
+const FILES: &[(&str, &[u8])] = &[
+    ("level5.mat", include_bytes!("../small/level5.mat")),
+    ("level5_compressed.mat", include_bytes!("../small/level5_compressed.mat")),
+    #[cfg(feature = "hdf5")]
+    ("level73.mat", include_bytes!("../small/level73.mat")),
+    #[cfg(feature = "hdf5")]
+    ("h5py.h5", include_bytes!("../small/h5py.h5")),
+];
+
+fn read_all(path: &Path) -> Result<Vec<Field>, FileError> {
+    let mut fields = Fields::open(path, false)?;
+    ["n", "h_row", "y", "z"].into_iter().map(|name| fields.read(name, |_| Ok(()))).collect()
+}
+
+#[test]
+fn arrays_come_out_of_each_format_as_they_went_in() {
+    for (name, bytes) in FILES {
+        let (_folder, path) = file(name, bytes);
+        let [n, h_row, y, z] = <[Field; 4]>::try_from(read_all(&path).unwrap()).unwrap();
+        assert_eq!((n.real, n.imaginary), (vec![2.0], None), "{name}");
+        assert_eq!(h_row.real, [0.0, 3.0, 1.0], "{name}");
+        assert_eq!(y.real, [5.0, 1.0, 2.0, 3.0, 4.0, 4.5], "{name}");
+        assert_eq!(z.shape, [2, 3], "{name}");
+        assert_eq!(z.real, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0], "{name}");
+        assert_eq!(z.imaginary.unwrap(), [10.0, 20.0, 30.0, 40.0, 50.0, 60.0], "{name}");
+    }
+}
+
+#[test]
+fn what_is_no_array_of_numbers_is_named_only_when_it_is_asked_for() {
+    for (name, bytes) in FILES.iter().filter(|(name, _)| *name != "level73.mat") {
+        let (_folder, path) = file(name, bytes);
+        let mut fields = Fields::open(&path, false).unwrap();
+        let told = line(&fields.read("text", |_| Ok(())).unwrap_err(), name);
+        assert!(told.contains("`text` is"), "{told}");
+        let told = line(&fields.read("none", |_| Ok(())).unwrap_err(), name);
+        assert!(told.contains("`none`"), "{told}");
+        let told = line(&fields.read("z", |_| Err("(3,)".to_owned())).unwrap_err(), name);
+        assert!(told.ends_with("`z` has shape (2, 3), expected (3,)"), "{told}");
+        let told = line(&Fields::open(&path, true).err().unwrap(), name);
+        assert!(told.ends_with("expected text for --decimal-comma"), "{told}");
+    }
+}
+
+#[test]
+fn a_cut_file_is_refused_or_gives_what_is_whole() {
+    for (name, bytes) in FILES {
+        let (folder, path) = file(name, bytes);
+        let _kept = folder;
+        for end in (0..bytes.len()).step_by(1 + bytes.len() / 400) {
+            std::fs::write(&path, &bytes[..end]).unwrap();
+            if let Err(error) = read_all(&path) {
+                line(&error, name);
+            }
+        }
+    }
+}
+
+#[test]
+fn damage_is_harmless_or_refused() {
+    for (name, bytes) in FILES {
+        let (folder, path) = file(name, bytes);
+        let _kept = folder;
+        for at in 0..bytes.len() {
+            // Bytes that mean nothing in these files are mostly zero.
+            if bytes[at] == 0 && at % 7 != 0 {
+                continue;
+            }
+            let mut damaged = bytes.to_vec();
+            damaged[at] ^= [0xff, 0x01, 0x80][at % 3];
+            std::fs::write(&path, &damaged).unwrap();
+            if let Err(error) = read_all(&path) {
+                line(&error, name);
+            }
+        }
+    }
+}

@@ -1,0 +1,149 @@
+//! Arrays of HDF5 files: MATLAB's `.mat` 7.3, and what h5py and others write.
+//!
+//! The law: the file lies in memory, and reading is bounded by a limit, not by a claim of the file.
+
+use super::FileError;
+use super::array::{MAX_AXES, has_shape};
+use super::fields::Field;
+use hdf5_reader::error::Error;
+use hdf5_reader::messages::datatype::{CompoundField, Datatype};
+use hdf5_reader::{ByteOrder, Hdf5File, OpenOptions};
+use std::path::{Path, PathBuf};
+
+const EXPECTED: &str = "an HDF5 file";
+/// The largest field taken into memory.
+const MAX_FIELD_BYTES: usize = 256 << 20;
+
+/// An open file.
+pub(super) struct Hdf5 {
+    path: PathBuf,
+    file: Hdf5File,
+    /// MATLAB keeps its arrays with the axes in reverse.
+    is_matlab: bool,
+}
+
+impl Hdf5 {
+    pub(super) fn open(path: &Path, bytes: Vec<u8>, is_matlab: bool) -> Result<Self, FileError> {
+        let options = OpenOptions::default()
+            .with_max_chunk_bytes(MAX_FIELD_BYTES)
+            .with_max_read_bytes(MAX_FIELD_BYTES);
+        let file = Hdf5File::from_vec_with_options(bytes, options)
+            .map_err(|error| damaged(path, error.to_string()))?;
+        Ok(Self { path: path.to_owned(), file, is_matlab })
+    }
+
+    /// Names of the arrays that are in no group.
+    pub(super) fn names(&self) -> Result<Vec<String>, FileError> {
+        let root = self.file.root_group().and_then(|root| root.member_names());
+        Ok(root.map_err(|error| damaged(&self.path, error.to_string()))?.1)
+    }
+
+    pub(super) fn read(
+        &self,
+        field: &str,
+        accept: impl Fn(&[u64]) -> Result<(), String>,
+    ) -> Result<Field, FileError> {
+        let explain = |error: Error| damaged(&self.path, format!("`{field}`: {error}"));
+        let refuse =
+            |found: String, expected: &str| FileError::field(&self.path, field, found, expected);
+        let data = self.file.dataset(&format!("/{field}")).map_err(explain)?;
+        let stored: Vec<u64> = data.shape().to_vec();
+        let mut shape = stored.clone();
+        if self.is_matlab {
+            shape.reverse();
+        }
+        accept(&shape).map_err(|expected| refuse(has_shape(&shape), &expected))?;
+        if shape.len() > MAX_AXES {
+            return Err(refuse(has_shape(&shape), "at most 32 axes"));
+        }
+        let parts = parts(data.dtype());
+        let Some((element_bytes, parts)) = parts else {
+            return Err(refuse("is no array of numbers".to_owned(), "numbers of up to 8 bytes"));
+        };
+        let bytes = data.read_raw_bytes().map_err(explain)?;
+        let count = stored.iter().try_fold(1_u64, |product, &axis| product.checked_mul(axis));
+        let elements: Vec<&[u8]> = bytes.chunks_exact(element_bytes).collect();
+        if count != Some(elements.len() as u64) {
+            return Err(damaged(&self.path, format!("`{field}`: {} numbers", elements.len())));
+        }
+        let part = |part: &Part| -> Vec<f64> { elements.iter().map(|e| part.number(e)).collect() };
+        let (real, imaginary) = (part(&parts.0), parts.1.as_ref().map(part));
+        let shape = shape.iter().map(|&axis| axis as usize).collect();
+        Ok(match self.is_matlab {
+            true => Field::from_column_major(shape, &real, imaginary.as_deref()),
+            false => Field { shape, real, imaginary },
+        })
+    }
+}
+
+/// A number within an element.
+#[derive(Clone, Copy)]
+struct Part {
+    offset: usize,
+    size: usize,
+    is_float: bool,
+    is_signed: bool,
+    is_big_endian: bool,
+}
+
+impl Part {
+    fn of(datatype: &Datatype, offset: usize) -> Option<Self> {
+        let (size, is_float, is_signed, order) = match datatype {
+            Datatype::FixedPoint { size, signed, byte_order } => {
+                (*size, false, *signed, *byte_order)
+            }
+            Datatype::FloatingPoint { size, byte_order } => (*size, true, true, *byte_order),
+            // Truth values of h5py.
+            Datatype::Enum { base, .. } => return Self::of(base, offset),
+            _ => return None,
+        };
+        let size = usize::from(size);
+        let known = if is_float { [4, 8].contains(&size) } else { [1, 2, 4, 8].contains(&size) };
+        let is_big_endian = order == ByteOrder::BigEndian;
+        known.then_some(Self { offset, size, is_float, is_signed, is_big_endian })
+    }
+
+    fn number(&self, element: &[u8]) -> f64 {
+        let mut bytes = [0; 8];
+        for (at, byte) in element[self.offset..self.offset + self.size].iter().enumerate() {
+            bytes[if self.is_big_endian { self.size - 1 - at } else { at }] = *byte;
+        }
+        let word = u64::from_le_bytes(bytes);
+        match (self.is_float, self.size) {
+            (true, 4) => f64::from(f32::from_bits(word as u32)),
+            (true, _) => f64::from_bits(word),
+            (false, size) => {
+                let unused = 64 - 8 * size as u32;
+                if self.is_signed {
+                    ((word << unused) as i64 >> unused) as f64
+                } else {
+                    word as f64
+                }
+            }
+        }
+    }
+}
+
+/// Bytes of an element, its number, and its imaginary part where it is complex: a pair of numbers, as MATLAB
+/// (`real`, `imag`) and h5py (`r`, `i`) keep them.
+fn parts(datatype: &Datatype) -> Option<(usize, (Part, Option<Part>))> {
+    let Datatype::Compound { size, fields } = datatype else {
+        let part = Part::of(datatype, 0)?;
+        return Some((part.size, (part, None)));
+    };
+    let [real, imaginary] = &fields[..] else { return None };
+    let named = |field: &CompoundField, names: [&str; 2]| names.contains(&field.name.as_str());
+    if !named(real, ["r", "real"]) || !named(imaginary, ["i", "imag"]) {
+        return None;
+    }
+    let size = *size as usize;
+    let part = |field: &CompoundField| {
+        Part::of(&field.datatype, field.byte_offset as usize)
+            .filter(|part| part.offset + part.size <= size)
+    };
+    Some((size, (part(real)?, Some(part(imaginary)?))))
+}
+
+fn damaged(path: &Path, found: String) -> FileError {
+    FileError::Damaged { path: path.to_owned(), found, expected: EXPECTED }
+}

@@ -1,0 +1,239 @@
+//! Arrays of MATLAB `.mat` files of level 5: what `save` writes up to `-v7`, and SciPy's `savemat`.
+//!
+//! The law: no claim of a header is believed before it was checked, and memory grows with the bytes that came: a compressed
+//! variable is taken apart only when its field is asked for, and only up to a limit.
+//!
+//! Format: MathWorks, *MAT-File Format*, R2023a, "Level 5 MAT-Files".
+
+use super::FileError;
+use super::array::{MAX_AXES, has_shape};
+use super::fields::Field;
+use flate2::bufread::ZlibDecoder;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+const EXPECTED: &str = "a MATLAB level 5 file";
+const HEADER_BYTES: usize = 128;
+/// The largest variable taken into memory.
+const MAX_VARIABLE_BYTES: u64 = 256 << 20;
+/// What of a compressed variable is looked at for its name: flags, sizes and name.
+const HEAD_BYTES: u64 = 4096;
+
+// Data types of elements.
+const INT8: u32 = 1;
+const UINT32: u32 = 6;
+const INT32: u32 = 5;
+const MATRIX: u32 = 14;
+const COMPRESSED: u32 = 15;
+
+/// Flag of complex numbers.
+const COMPLEX: u32 = 0x0800;
+
+/// A file, with the place of each variable.
+pub(super) struct Mat {
+    path: PathBuf,
+    bytes: Vec<u8>,
+    is_big_endian: bool,
+    variables: Vec<Variable>,
+}
+
+struct Variable {
+    name: String,
+    /// The matrix's content, compressed or not.
+    start: usize,
+    end: usize,
+    is_compressed: bool,
+}
+
+/// An element: its type and where its data are.
+struct Element<'b> {
+    kind: u32,
+    data: &'b [u8],
+    /// What follows it.
+    rest: &'b [u8],
+}
+
+/// What comes before a matrix's numbers.
+struct Head<'b> {
+    class: u32,
+    is_complex: bool,
+    shape: Vec<u64>,
+    name: String,
+    rest: &'b [u8],
+}
+
+impl Mat {
+    /// Whether a file of this start is one.
+    pub(super) fn is_start(start: &[u8]) -> bool {
+        start.len() >= HEADER_BYTES
+            && matches!(&start[124..128], [0, 1, b'I', b'M'] | [1, 0, b'M', b'I'])
+    }
+
+    pub(super) fn open(path: &Path, bytes: Vec<u8>) -> Result<Self, FileError> {
+        let is_big_endian = bytes[126] == b'M';
+        let mut mat = Self { path: path.to_owned(), bytes, is_big_endian, variables: Vec::new() };
+        let mut start = HEADER_BYTES;
+        while start < mat.bytes.len() {
+            let (kind, data, end) = mat.variable_at(start)?;
+            let (content, is_compressed) = (&mat.bytes[data..end], kind == COMPRESSED);
+            let head = match kind {
+                COMPRESSED => {
+                    let mut head = Vec::new();
+                    // What is cut off or damaged further on is for whoever asks for this variable.
+                    let _ = ZlibDecoder::new(content).take(HEAD_BYTES).read_to_end(&mut head);
+                    Some(head)
+                }
+                MATRIX => Some(content[..content.len().min(HEAD_BYTES as usize)].to_vec()),
+                _ => None,
+            };
+            let name = head.and_then(|head| {
+                let inside = if is_compressed { head.get(8..)? } else { &head[..] };
+                Some(mat.head(inside)?.name)
+            });
+            if let Some(name) = name {
+                mat.variables.push(Variable { name, start: data, end, is_compressed });
+            }
+            start = end;
+        }
+        Ok(mat)
+    }
+
+    /// Type of the element at `start`, and where its data begin and end.
+    fn variable_at(&self, start: usize) -> Result<(u32, usize, usize), FileError> {
+        let cut = || self.damaged("it ends inside a variable".to_owned());
+        let tag = self.bytes.get(start..start + 8).ok_or_else(cut)?;
+        let (kind, size) = (self.word(&tag[..4]), self.word(&tag[4..]) as usize);
+        let end = (start + 8).checked_add(size).filter(|&end| end <= self.bytes.len());
+        Ok((kind, start + 8, end.ok_or_else(cut)?))
+    }
+
+    pub(super) fn names(&self) -> Vec<String> {
+        self.variables.iter().map(|variable| variable.name.clone()).collect()
+    }
+
+    pub(super) fn read(
+        &self,
+        field: &str,
+        accept: impl Fn(&[u64]) -> Result<(), String>,
+    ) -> Result<Field, FileError> {
+        let refuse =
+            |found: String, expected: String| FileError::field(&self.path, field, found, expected);
+        let variable = self.variables.iter().find(|variable| variable.name == field);
+        let Some(variable) = variable else {
+            return Err(refuse("is not there".to_owned(), "a variable of the file".to_owned()));
+        };
+        let content = &self.bytes[variable.start..variable.end];
+        let mut unpacked = Vec::new();
+        let matrix = if variable.is_compressed {
+            ZlibDecoder::new(content)
+                .take(MAX_VARIABLE_BYTES + 1)
+                .read_to_end(&mut unpacked)
+                .map_err(|error| self.damaged(format!("`{field}`: {error}")))?;
+            if unpacked.len() as u64 > MAX_VARIABLE_BYTES {
+                return Err(refuse("is larger".to_owned(), "at most 256 MiB".to_owned()));
+            }
+            let inner = self.element(&unpacked).filter(|inner| inner.kind == MATRIX);
+            inner.ok_or_else(|| self.damaged(format!("`{field}`: no whole matrix")))?.data
+        } else {
+            content
+        };
+        let cut = || self.damaged(format!("`{field}`: it ends inside its numbers"));
+        let head = self.head(matrix).ok_or_else(cut)?;
+        // Numbers of any type; cells, structures, objects, text and sparse matrices are none.
+        if !(6..=15).contains(&head.class) {
+            let kind = match head.class {
+                1 => "a cell array",
+                2 => "a structure",
+                4 => "text",
+                5 => "a sparse matrix",
+                _ => "an object",
+            };
+            return Err(refuse(format!("is {kind}"), "an array of numbers".to_owned()));
+        }
+        accept(&head.shape).map_err(|expected| refuse(has_shape(&head.shape), expected))?;
+        let count = head.shape.iter().try_fold(1_u64, |product, &axis| product.checked_mul(axis));
+        let real = self.element(head.rest).ok_or_else(cut)?;
+        let numbers = |element: &Element<'_>| {
+            self.numbers(element)
+                .filter(|numbers| Some(numbers.len() as u64) == count)
+                .ok_or_else(cut)
+        };
+        let (values, imaginary) = match head.is_complex {
+            false => (numbers(&real)?, None),
+            true => {
+                let imaginary = self.element(real.rest).ok_or_else(cut)?;
+                (numbers(&real)?, Some(numbers(&imaginary)?))
+            }
+        };
+        let shape = head.shape.iter().map(|&axis| axis as usize).collect();
+        Ok(Field::from_column_major(shape, &values, imaginary.as_deref()))
+    }
+
+    fn head<'b>(&self, matrix: &'b [u8]) -> Option<Head<'b>> {
+        let flags = self.element(matrix).filter(|e| e.kind == UINT32 && e.data.len() == 8)?;
+        let sizes = self.element(flags.rest).filter(|e| e.kind == INT32)?;
+        let name = self.element(sizes.rest).filter(|e| e.kind == INT8)?;
+        let word = self.word(&flags.data[..4]);
+        let shape: Vec<u64> =
+            sizes.data.chunks_exact(4).map(|axis| u64::from(self.word(axis))).collect();
+        (shape.len() <= MAX_AXES).then(|| Head {
+            class: word & 0xff,
+            is_complex: word & COMPLEX != 0,
+            shape,
+            name: String::from_utf8_lossy(name.data).into_owned(),
+            rest: name.rest,
+        })
+    }
+
+    /// The element at the start of these bytes; small ones have their data in the tag.
+    fn element<'b>(&self, bytes: &'b [u8]) -> Option<Element<'b>> {
+        let tag = bytes.get(..4)?;
+        let word = self.word(tag);
+        if word >> 16 != 0 {
+            let (kind, size) = (word & 0xffff, (word >> 16) as usize);
+            let data = bytes.get(4..8)?.get(..size)?;
+            return Some(Element { kind, data, rest: &bytes[8..] });
+        }
+        let size = self.word(bytes.get(4..8)?) as usize;
+        let data = bytes.get(8..)?.get(..size)?;
+        let rest = bytes.get(8 + size.next_multiple_of(8)..).unwrap_or(&[]);
+        Some(Element { kind: word, data, rest })
+    }
+
+    fn numbers(&self, element: &Element<'_>) -> Option<Vec<f64>> {
+        let data = element.data;
+        Some(match element.kind {
+            1 => self.each(data, |b| f64::from(i8::from_le_bytes(b))),
+            2 => self.each(data, |b| f64::from(u8::from_le_bytes(b))),
+            3 => self.each(data, |b| f64::from(i16::from_le_bytes(b))),
+            4 => self.each(data, |b| f64::from(u16::from_le_bytes(b))),
+            5 => self.each(data, |b| f64::from(i32::from_le_bytes(b))),
+            6 => self.each(data, |b| f64::from(u32::from_le_bytes(b))),
+            7 => self.each(data, |b| f64::from(f32::from_le_bytes(b))),
+            9 => self.each(data, f64::from_le_bytes),
+            12 => self.each(data, |b| i64::from_le_bytes(b) as f64),
+            13 => self.each(data, |b| u64::from_le_bytes(b) as f64),
+            _ => return None,
+        })
+    }
+
+    fn each<const N: usize>(&self, data: &[u8], number: impl Fn([u8; N]) -> f64) -> Vec<f64> {
+        let (elements, _) = data.as_chunks::<N>();
+        let in_order = |&(mut element): &[u8; N]| {
+            if self.is_big_endian {
+                element.reverse();
+            }
+            number(element)
+        };
+        elements.iter().map(in_order).collect()
+    }
+
+    fn word(&self, bytes: &[u8]) -> u32 {
+        let bytes = [bytes[0], bytes[1], bytes[2], bytes[3]];
+        if self.is_big_endian { u32::from_be_bytes(bytes) } else { u32::from_le_bytes(bytes) }
+    }
+
+    fn damaged(&self, found: String) -> FileError {
+        FileError::Damaged { path: self.path.clone(), found, expected: EXPECTED }
+    }
+}

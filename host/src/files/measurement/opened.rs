@@ -1,0 +1,139 @@
+//! A file whose shapes fit together, of which measurements are taken one by one.
+
+use super::readings::{NamedReadings, check_infinite, expected_of, found_names, readings_field};
+use super::reference::read_reference;
+use super::rows::{read_rows, read_side, shown};
+use super::{FileError, Form, MeasurementFile, Readings, Reference, Selection};
+use crate::files::fields::{Field, Fields};
+use nirspi_recon::{Image, Rows, Side};
+use std::path::Path;
+
+/// A file whose shapes fit together.
+pub(super) struct Opened {
+    fields: Fields,
+    side: Side,
+    /// The row shown k-th, of those that were read.
+    rows: Vec<Option<u32>>,
+    form: Form,
+    pub(super) readings: NamedReadings,
+    reference: Option<(Field, usize)>,
+    notes: Vec<String>,
+}
+
+impl Opened {
+    pub(super) fn open(path: &Path, want: &Selection) -> Result<Self, FileError> {
+        let mut fields = Fields::open(path, want.decimal_comma)?;
+        let side = read_side(&mut fields, want)?;
+        let has_rows = fields.holds("h_row");
+        if has_rows && want.shown.is_some() {
+            return Err(FileError::field(path, "h_row", "is in the file", "no --shown beside it"));
+        }
+        if !has_rows && want.shown.is_none() {
+            let expected =
+                "n, h_row, and y or d; or --shown ORDER for patterns shown in a known order";
+            let found = found_names(&fields);
+            return Err(FileError::Missing {
+                path: path.to_owned(),
+                field: "h_row",
+                found,
+                expected,
+            });
+        }
+        let name = readings_field(&fields, want)?;
+        let default = if name == "d" { Form::Differences } else { Form::Pairs };
+        let form = want.form.unwrap_or(default);
+        let mut notes = Vec::new();
+        let (side, mut rows, readings) = match &want.shown {
+            None => {
+                let Some(side) = side else {
+                    let (path, found) = (path.to_owned(), found_names(&fields));
+                    let expected = "n, h_row, and y or d; or --side N";
+                    return Err(FileError::Missing { path, field: "n", found, expected });
+                };
+                let rows = read_rows(&mut fields, side)?;
+                let expected = expected_of(form, rows.len());
+                (side, rows, NamedReadings::read(&mut fields, name, want, &expected)?)
+            }
+            Some(order) => {
+                let entry = order.entry().filter(|entry| entry.has_undefined_ties);
+                notes.extend(entry.map(|entry| format!(
+                    "{} leaves the order of equal patterns of {order} to an unstable sort: an h_row or --shown table:FILE \
+                     of the patterns as they were shown is exact",
+                    entry.package.unwrap_or("its package")
+                )));
+                shown(&mut fields, name, want, form, side, order)?
+            }
+        };
+        if want.transpose {
+            let n = side.pixels() as u32;
+            for row in rows.iter_mut().flatten() {
+                *row = (*row % n) * n + *row / n;
+            }
+        }
+        let reference =
+            read_reference(&mut fields, side, readings.layout.count).unwrap_or_else(|error| {
+                notes.push(format!("not compared with the reconstruction in the file: {error}"));
+                None
+            });
+        Ok(Self { fields, side, rows, form, readings, reference, notes })
+    }
+
+    /// The measurement of this index, without the patterns that were not read.
+    pub(super) fn measurement(&mut self, index: usize) -> Result<MeasurementFile, FileError> {
+        let path = self.fields.path();
+        let NamedReadings { name, field, layout } = &self.readings;
+        let real = layout.series(&field.real, index);
+        let imaginary = field.imaginary.as_ref().map(|values| layout.series(values, index));
+        for values in [Some(&real), imaginary.as_ref()].into_iter().flatten() {
+            check_infinite(path, name, values)?;
+        }
+        let count = self.rows.len();
+        let at = |k: usize| -> Vec<usize> {
+            match self.form {
+                Form::Pairs => vec![2 * k, 2 * k + 1],
+                Form::Halves => vec![k, count + k],
+                Form::Single | Form::Differences => vec![k],
+            }
+        };
+        let is_read = |k: usize| {
+            let finite = |values: &[f64]| at(k).iter().all(|&reading| values[reading].is_finite());
+            self.rows[k].is_some() && finite(&real) && imaginary.as_deref().is_none_or(finite)
+        };
+        let (places, not_read): (Vec<usize>, Vec<usize>) = (0..count).partition(|&k| is_read(k));
+        if places.is_empty() {
+            let found = "has no pattern that was read: all are NaN";
+            return Err(FileError::field(path, name.clone(), found, "finite readings"));
+        }
+        let kept = |values: Vec<f64>| -> Readings {
+            let values =
+                places.iter().flat_map(|&k| at(k)).map(|reading| values[reading]).collect();
+            match self.form {
+                Form::Pairs | Form::Halves => Readings::Pairs(values),
+                Form::Single => Readings::Single(values),
+                Form::Differences => Readings::Differential(values),
+            }
+        };
+        let rows = places.iter().filter_map(|&k| self.rows[k]);
+        let h_row = Rows::new(self.side, rows).map_err(|error| {
+            FileError::field(path, "h_row", format!("({error})"), "each row once")
+        })?;
+        let reference = self.reference.as_ref().map(|(field, count)| {
+            let area = self.side.area();
+            let start = if *count == 1 { 0 } else { index * area };
+            let image = |values: &Vec<f64>| {
+                let pixels = values[start..start + area].iter().map(|&value| value as f32);
+                Image::new(self.side, pixels.collect())
+            };
+            Reference { real: image(&field.real), imaginary: field.imaginary.as_ref().map(image) }
+        });
+        Ok(MeasurementFile {
+            h_row,
+            readings: kept(real),
+            imaginary: imaginary.map(kept),
+            places,
+            not_read,
+            reference,
+            notes: self.notes.clone(),
+        })
+    }
+}

@@ -1,0 +1,51 @@
+//! Readings of patterns that the file does not name: those of `--matrix`.
+
+use super::readings::{Expected, Hint, NamedReadings, check_infinite, readings_field};
+use super::{FileError, Selection};
+use crate::files::fields::Fields;
+use std::path::Path;
+
+/// Readings of patterns that the file does not name.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plain {
+    /// Readings, finite.
+    pub values: Vec<f64>,
+    /// The pattern of each.
+    pub patterns: Vec<usize>,
+    /// Patterns that were not read: NaN.
+    pub not_read: Vec<usize>,
+}
+
+/// Reads one number for each of `patterns` patterns, `y` or else `d`.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_plain(path: &Path, want: &Selection, patterns: usize) -> Result<Plain, FileError> {
+    let mut fields = Fields::open(path, want.decimal_comma)?;
+    let name = readings_field(&fields, want)?;
+    let hint = Hint { length: 2 * patterns, words: "; of +, - pairs give the differences" };
+    let expected = Expected { length: patterns, meaning: "one reading a pattern", hint };
+    let readings = NamedReadings::read(&mut fields, name, want, &expected)?;
+    if readings.field.imaginary.is_some() {
+        return Err(FileError::field(
+            path,
+            readings.name,
+            "has complex numbers",
+            "real ones for patterns of one's own",
+        ));
+    }
+    let index = readings.layout.choose(path, &readings.name, want.index)?;
+    let all = readings.layout.series(&readings.field.real, index);
+    check_infinite(path, &readings.name, &all)?;
+    let (patterns, not_read): (Vec<usize>, Vec<usize>) =
+        (0..all.len()).partition(|&k| all[k].is_finite());
+    if patterns.is_empty() {
+        return Err(FileError::field(
+            path,
+            readings.name,
+            "is NaN everywhere",
+            "a pattern that was read",
+        ));
+    }
+    Ok(Plain { values: patterns.iter().map(|&k| all[k]).collect(), patterns, not_read })
+}

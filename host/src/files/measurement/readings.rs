@@ -1,0 +1,148 @@
+//! The field of a file that holds the readings, and the shapes that it may have.
+
+use super::layout::Layout;
+use super::{FileError, Form, Selection};
+use crate::files::array::has_shape;
+use crate::files::fields::{Field, Fields, UNNAMED};
+use std::path::Path;
+
+/// A field of readings, with how measurements are laid out in it.
+pub(super) struct NamedReadings {
+    pub(super) name: String,
+    pub(super) field: Field,
+    pub(super) layout: Layout,
+}
+
+/// What a field of readings must be.
+pub(super) struct Expected<'w> {
+    pub(super) length: usize,
+    pub(super) meaning: &'w str,
+    pub(super) hint: Hint<'w>,
+}
+
+/// Another length, and what it says.
+pub(super) struct Hint<'w> {
+    pub(super) length: usize,
+    pub(super) words: &'w str,
+}
+
+impl NamedReadings {
+    pub(super) fn read(
+        fields: &mut Fields,
+        name: String,
+        want: &Selection,
+        expected: &Expected<'_>,
+    ) -> Result<Self, FileError> {
+        let Expected { length, meaning, hint } = expected;
+        let fits = |shape: &[u64], length| Layout::of(shape, length, want.patterns_first).is_some();
+        let field = fields.read(&name, |shape| {
+            if fits(shape, *length) {
+                return Ok(());
+            }
+            let hint = match () {
+                () if Layout::of(shape, *length, !want.patterns_first).is_some() => {
+                    match want.patterns_first {
+                        true => "; patterns are along its last axis: leave out --patterns-first",
+                        false => "; patterns are along its first axis: add --patterns-first",
+                    }
+                }
+                () if fits(shape, hint.length) => hint.words,
+                () => "",
+            };
+            let axes = match want.patterns_first {
+                true => format!("({length}, ...)"),
+                false => format!("({length},) or (..., {length})"),
+            };
+            Err(format!("{axes}: {meaning}{hint}"))
+        })?;
+        let shape: Vec<u64> = field.shape.iter().map(|&axis| axis as u64).collect();
+        let name = if fields.is_unnamed() { UNNAMED.to_owned() } else { name };
+        let layout = Layout::of(&shape, *length, want.patterns_first).ok_or_else(|| {
+            FileError::field(
+                fields.path(),
+                name.clone(),
+                has_shape(&shape),
+                "the shape of its header",
+            )
+        })?;
+        Ok(Self { name, field, layout })
+    }
+}
+
+/// Names of the fields, for a message.
+pub(super) fn found_names(fields: &Fields) -> Vec<String> {
+    match fields.is_unnamed() {
+        true => vec!["one array without a name".to_owned()],
+        false => fields.names().to_vec(),
+    }
+}
+
+/// The field of the readings.
+pub(super) fn readings_field(fields: &Fields, want: &Selection) -> Result<String, FileError> {
+    let missing = |field, expected| {
+        let (path, found) = (fields.path().to_owned(), found_names(fields));
+        Err(FileError::Missing { path, field, found, expected })
+    };
+    if fields.is_unnamed() {
+        return match &want.field {
+            None => Ok("y".to_owned()),
+            Some(_) => missing("--field", "no --field for an array without a name"),
+        };
+    }
+    if let Some(field) = &want.field {
+        return match fields.holds(field) {
+            true => Ok(field.clone()),
+            false => {
+                let expected = format!("--field with one of {}", fields.names().join(", "));
+                Err(FileError::field(fields.path(), field.clone(), "is not in the file", expected))
+            }
+        };
+    }
+    // The only field of a file without rows can be nothing but the readings.
+    if let [only] = fields.names()
+        && only != "d"
+    {
+        return Ok(only.clone());
+    }
+    match ["y", "d"].into_iter().find(|name| fields.holds(name)) {
+        Some("d") if matches!(want.form, Some(Form::Single | Form::Pairs | Form::Halves)) => {
+            missing("y", "y, the readings; `d` holds differences")
+        }
+        Some(name) => Ok(name.to_owned()),
+        None => missing("d", "y (raw readings) or d (differential), or --field NAME"),
+    }
+}
+
+/// What readings of that form and so many rows must be.
+pub(super) fn expected_of(form: Form, rows: usize) -> Expected<'static> {
+    let hint = match form {
+        Form::Pairs | Form::Halves => Hint {
+            length: rows,
+            words: "; one reading a row is read with --readings single, one difference a row with --readings differences",
+        },
+        Form::Single => Hint {
+            length: 2 * rows,
+            words: "; these look like +, - pairs: leave out --readings single (--non-differential)",
+        },
+        Form::Differences => {
+            Hint { length: 2 * rows, words: "; +, - pairs are read with --readings pairs" }
+        }
+    };
+    Expected { length: rows * form.readings(), meaning: form.meaning(), hint }
+}
+
+/// NaN is a pattern that was not read; an infinite reading is a mistake.
+pub(super) fn check_infinite(path: &Path, field: &str, values: &[f64]) -> Result<(), FileError> {
+    match values.iter().position(|value| value.is_infinite()) {
+        None => Ok(()),
+        Some(at) => {
+            let found = format!("is {} at [{at}]", values[at]);
+            Err(FileError::field(
+                path,
+                field,
+                found,
+                "finite numbers, or NaN for a pattern that was not read",
+            ))
+        }
+    }
+}

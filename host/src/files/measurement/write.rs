@@ -1,0 +1,28 @@
+//! Our own measurements as a file that others read: NumPy `.npz`.
+
+use super::FileError;
+use crate::files::{archive, npy};
+use nirspi_recon::Measurements;
+use std::path::Path;
+
+/// The bytes of a `.npz` file with `n`, `h_row` and `d`; `simulated` is 1 where no real light was measured.
+///
+/// # Errors
+/// [`FileError`] naming `path`, if the archive cannot be put together.
+pub fn encode(
+    path: &Path,
+    measurements: &Measurements,
+    simulated: bool,
+) -> Result<Vec<u8>, FileError> {
+    let rows: Vec<i64> = measurements.rows().iter().map(|&row| row.into()).collect();
+    let count = [rows.len()];
+    archive::encode(
+        path,
+        &[
+            ("n", npy::encode(&[], &[measurements.side().pixels() as i64])),
+            ("h_row", npy::encode(&count, &rows)),
+            ("d", npy::encode(&count, measurements.values())),
+            ("simulated", npy::encode(&[], &[i64::from(simulated)])),
+        ],
+    )
+}
