@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
-use nirspi_optics::rain::{BeamShadows, Drops, RainySpots, Weather};
+use nirspi_optics::rain::{Air, BeamShadows, Drops, RainySpots, Weather};
 use nirspi_optics::visible::VisibleCamera;
 use nirspi_optics::water::Water;
 use nirspi_optics::{Footprint, LEDS, LedArray, Projector, Scene};
@@ -80,6 +80,45 @@ fn fog_dims_evenly_and_adds_its_halo() {
     assert!(middle > two_ways && middle < 1.0, "{middle} {two_ways}");
     // Less is scattered into a corner from a field that ends there.
     assert!(foggy[0] < foggy[16 * 32 + 16]);
+}
+
+#[test]
+fn thicker_fog_leaves_less_contrast_and_a_brighter_black() {
+    let black_and_white = |text: &str| {
+        let air: Air = text.parse().unwrap();
+        let weather = air.weather(1550.0).unwrap();
+        let half = Scene::new(vec![0.0, 1.0, 0.0, 1.0], 2, 2000.0).unwrap();
+        let footprint = Projector::default().footprint(&half, 1000.0).unwrap();
+        let seen = RainySpots::new(&weather, &footprint, beams(1000.0), 1).unwrap().reflectance();
+        // Far from the edge, which is out of focus.
+        (seen[16 * 32 + 4], seen[16 * 32 + 27])
+    };
+    let mut last = black_and_white("none");
+    assert!(last.0 < 1e-3 && last.1 > 0.999, "{last:?}");
+    // Visibilities of 50 to 1 m: optical depths of 0.08 to 3.9 over the metre.
+    for text in ["fog:50m", "fog:8m", "fog:3m", "fog:1m"] {
+        let now = black_and_white(text);
+        assert!(now.1 - now.0 < last.1 - last.0, "{text}: {now:?} after {last:?}");
+        assert!(now.0 > 0.0, "{text}: {now:?}");
+        last = now;
+    }
+}
+
+#[test]
+fn drops_on_the_window_take_light_and_spread_it_over_the_field() {
+    let seen = |text: &str, scene: Vec<f32>| {
+        let weather = text.parse::<Air>().unwrap().weather(1550.0).unwrap();
+        let scene = Scene::new(scene, 2, 96.0).unwrap();
+        let footprint = Projector::default().footprint(&scene, 300.0).unwrap();
+        RainySpots::new(&weather, &footprint, beams(300.0), 1).unwrap().reflectance()
+    };
+    // 20 % is lost there and back; flat drops leave it in the spot's neighbourhood on the way there.
+    let white = |text: &str| f64::from(seen(text, vec![1.0; 4])[16 * 32 + 16]);
+    assert!((white("window:0.2,1") / 0.8 - 1.0).abs() < 0.01, "{}", white("window:0.2,1"));
+    assert!((0.64..0.8).contains(&white("window:0.2,60")), "{}", white("window:0.2,60"));
+    // The dark half of a scene gets light of the other.
+    let dark = |text: &str| seen(text, vec![0.0, 1.0, 0.0, 1.0])[16 * 32 + 5];
+    assert!(dark("window:0.2,30") > 0.01 && dark("none") < 1e-6, "{}", dark("window:0.2,30"));
 }
 
 #[test]
