@@ -1,3 +1,4 @@
+# shellcheck shell=bash
 # What boards/NAME/board.toml says, for shell scripts: `. boards/facts.sh`
 boards_folder=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 

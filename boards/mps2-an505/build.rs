@@ -1,4 +1,4 @@
-//! Puts the memory layout where the linker looks for it.
+//! Copies the memory layout to where the linker finds it.
 
 use std::{env, fs, path::PathBuf};
 

@@ -2,16 +2,26 @@
 //!
 //! The one law: whatever ends a capture (its length, the user, the camera, the link), what has come is kept
 //! and the counters say what has not.
+//!
+//! # Invariant
+//! A capture is whole if the camera says that it has made the frames that were asked for, all of them came whole and in
+//! order, no packet came damaged beyond them, and no fault stands afterwards; anything else is said
+//! ([`Capture::missing`], `missing::tests::a_capture_is_whole_only_if_nothing_is_missing`). What a camera can make this program
+//! write is bounded by the frames that it delivers ([`Junk`], `junk::tests`).
+
+mod junk;
+mod missing;
 
 use crate::account::LossCounters;
 use crate::calibration::{CalibrationError, Settling, calibrate, calibrate_or};
 use crate::integrate::Integrated;
-use crate::recording::Recorder;
+use crate::recording::{Recorder, Recording, RunAccount, Target};
 use crate::session::{
     ANSWER_TIMEOUT, IgnorePackets, Listener, Request, Session, SessionError, request,
 };
 use crate::setup::MeasurementSetup;
-use crate::tally::Tally;
+use crate::tally::{Tally, tally_recording};
+use junk::Junk;
 use nirspi_wire::{
     Answer, DeviceMessage, Event, EventKind, Fault, Frame, PacketError, Reply, RunLength, State,
     Status,
@@ -26,6 +36,8 @@ use thiserror::Error;
 const KEEP_ALIVE: Duration = Duration::from_secs(1);
 /// A camera that says it has stopped, and sends nothing more for this long, has stopped.
 const QUIET: Duration = Duration::from_millis(500);
+/// A run that was stopped ends within this, or the camera does not answer.
+const STOP_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// What to capture.
 #[derive(Debug, Clone)]
@@ -37,7 +49,7 @@ pub struct CaptureOptions {
     /// Where latency and settling come from.
     pub calibration: Calibration,
     /// Where to record.
-    pub record: Option<PathBuf>,
+    pub record: Option<Target>,
 }
 
 /// Where a capture's latency and settling come from.
@@ -65,12 +77,26 @@ pub struct Progress {
 /// What ended a capture.
 #[derive(Debug)]
 pub enum Ended {
-    /// All frames asked for were made.
+    /// The camera says that all frames asked for were made, and that no fault stands.
     Complete,
     /// The user has stopped it.
     Stopped,
     /// The camera switched its LEDs off.
     Fault(Fault),
+    /// The camera ended the run by itself with another number of frames than was asked for.
+    WrongNumber {
+        /// Frames made.
+        made: u64,
+        /// Frames asked for; `None` for a run that goes on until stopped.
+        asked: Option<u32>,
+    },
+    /// The run ended, and the camera did not say afterwards whether a fault stands.
+    Unconfirmed(SessionError),
+    /// Most of what came was not of this run, or damaged. The run was stopped.
+    Junk {
+        /// Bytes of it.
+        bytes: u64,
+    },
     /// The camera went away or fell silent. What it made after the last frame that came is not known.
     LinkLost(SessionError),
 }
@@ -90,10 +116,18 @@ pub struct Capture {
     pub counters: LossCounters,
     /// Damaged packets of any kind.
     pub damaged_packets: u64,
+    /// Intact messages that this program does not know: it passed over them.
+    pub unknown_packets: u64,
     /// Frames that came twice.
     pub repeated: u64,
     /// The camera's own view at the end.
     pub status: Option<Status>,
+    /// Frames asked for; `None` for a run that goes on until stopped.
+    pub asked: Option<u32>,
+    /// Frames that the camera says it has made; `None` if it could not say.
+    pub made: Option<u64>,
+    /// The recording, if there is one. It does not have the name asked for if it was to replace another and is not whole.
+    pub recording: Option<PathBuf>,
     /// What ended it.
     pub ended: Ended,
     /// From start to end of the run.
@@ -112,6 +146,9 @@ pub enum CaptureError {
          a latency that you know with --no-calibration --adc-latency N)"
     )]
     Calibration(#[source] CalibrationError),
+    /// The user has stopped it before the run began.
+    #[error("stopped by the user before the first frame")]
+    Stopped,
     /// The recording cannot be started.
     #[error("{path}: cannot record")]
     Recording {
@@ -121,12 +158,17 @@ pub enum CaptureError {
         source: io::Error,
     },
     /// The recording cannot be continued: the disk is full or gone.
-    #[error("{path}: cannot record any more, what was written before is kept ({counters} so far)")]
+    #[error(
+        "{path}: cannot record any more, {held} of the {} frames received are whole in the file and kept",
+        .counters.received
+    )]
     RecordingCut {
         /// Which file.
         path: PathBuf,
         /// Why.
         source: io::Error,
+        /// Frames that the file holds, by reading it again.
+        held: u64,
         /// The account of the run, of which the last frames are not in the file.
         counters: LossCounters,
     },
@@ -136,6 +178,7 @@ impl From<CalibrationError> for CaptureError {
     fn from(error: CalibrationError) -> Self {
         match error {
             CalibrationError::Session(error) => Self::Session(error),
+            CalibrationError::Stopped => Self::Stopped,
             error => Self::Calibration(error),
         }
     }
@@ -158,7 +201,7 @@ pub trait Observer {
     /// Anything else has come whole.
     fn message(&mut self, _message: &DeviceMessage<'_>) {}
 
-    /// How far it is; called at least ten times a second, breaks to stop.
+    /// How far it is, at nothing while the camera is being calibrated; called at least ten times a second, breaks to stop.
     fn watch(&mut self, progress: &Progress) -> ControlFlow<()>;
 }
 
@@ -171,6 +214,22 @@ impl Observer for Watching<'_> {
     }
 }
 
+/// Looks on while the camera is being calibrated.
+struct Calibrating<'o> {
+    observer: &'o mut dyn Observer,
+    began: Instant,
+}
+
+impl Listener for Calibrating<'_> {
+    fn packet(&mut self, _: &[u8], _: &Result<DeviceMessage<'_>, PacketError>) {}
+
+    fn goes_on(&mut self) -> bool {
+        let progress =
+            Progress { counters: LossCounters::default(), elapsed: self.began.elapsed() };
+        self.observer.watch(&progress).is_continue()
+    }
+}
+
 /// Takes the stream apart while it comes.
 struct RunListener<'o> {
     observer: &'o mut dyn Observer,
@@ -180,7 +239,9 @@ struct RunListener<'o> {
     recorder_error: Option<io::Error>,
     fault: Option<Fault>,
     status: Option<Status>,
-    last_packet: Instant,
+    junk: Junk,
+    /// When the last packet came that was not damaged.
+    last_intact: Instant,
 }
 
 impl RunListener<'_> {
@@ -192,13 +253,28 @@ impl RunListener<'_> {
             self.recorder_error = write(recorder).err();
         }
     }
+
+    /// Whether the camera has sent a frame beyond those that were asked for.
+    fn has_more_than(&self, asked: Option<u32>) -> bool {
+        asked.is_some_and(|asked| self.tally.account().accounted() > u64::from(asked))
+    }
 }
 
 impl Listener for RunListener<'_> {
     fn packet(&mut self, raw: &[u8], content: &Result<DeviceMessage<'_>, PacketError>) {
-        self.last_packet = Instant::now();
+        if self.junk.is_too_much() {
+            return;
+        }
+        let now = Instant::now();
+        if content.is_ok() {
+            self.last_intact = now;
+        }
         self.record(|recorder| recorder.packet(raw));
+        let before = self.tally.account().counters();
         let received = self.tally.packet(content);
+        let after = self.tally.account().counters();
+        let frames = (after.received + after.late) - (before.received + before.late);
+        self.junk.packet(raw.len(), content, frames > 0, now);
         match content {
             Ok(DeviceMessage::Frame(frame)) if received => {
                 self.observer.frame(frame, &self.tally.account().counters());
@@ -241,12 +317,13 @@ pub fn observe(
     observer: &mut dyn Observer,
 ) -> Result<Capture, CaptureError> {
     let mut setup = options.setup.clone();
+    let calibrating = &mut Calibrating { observer: &mut *observer, began: Instant::now() };
     let (settling, calibration_problem) = match &options.calibration {
         Calibration::None => (None, None),
         Calibration::Kept(settling) => (Some(settling.clone()), None),
-        Calibration::Measure => (Some(calibrate(session, &mut IgnorePackets)?), None),
+        Calibration::Measure => (Some(calibrate(session, calibrating)?), None),
         Calibration::MeasureOr(known) => {
-            let (settling, problem) = calibrate_or(session, &mut IgnorePackets, known)?;
+            let (settling, problem) = calibrate_or(session, calibrating, known)?;
             (Some(settling), problem)
         }
     };
@@ -256,64 +333,90 @@ pub fn observe(
     setup.with_configuration(|c| session.command(request::Configure(c), &mut IgnorePackets))?;
     let before = session.status(&mut IgnorePackets)?;
 
+    let number = before.run.wrapping_add(1);
     let recorder = match &options.record {
         None => None,
-        Some(path) => Some(
-            Recorder::create(path, session.identity(), &setup, settling.as_ref())
-                .map_err(|source| CaptureError::Recording { path: path.clone(), source })?,
-        ),
+        Some(target) => {
+            let (identity, settling) = (session.identity(), settling.as_ref());
+            let made = Recorder::create(target, identity, &setup, settling, Some(number));
+            let path = || target.path().to_owned();
+            Some(made.map_err(|source| CaptureError::Recording { path: path(), source })?)
+        }
     };
     observer.begins(&setup, settling.as_ref(), calibration_problem.as_ref());
     let now = Instant::now();
     let mut run = RunListener {
         observer,
-        number: before.run.wrapping_add(1),
-        tally: Tally::new(&setup, Some(before.run.wrapping_add(1))),
+        number,
+        tally: Tally::new(&setup, Some(number)),
         recorder,
         recorder_error: None,
         fault: None,
         status: None,
-        last_packet: now,
+        junk: Junk::new(now),
+        last_intact: now,
     };
     let ended = match stream(session, options.frames, &mut run, now) {
         Ok(ended) => ended,
         Err(error) if run.tally.has_begun() => Ended::LinkLost(error),
         Err(error) => {
-            discard_empty(options.record.as_deref(), run);
+            // A run that never started leaves no recording behind.
+            run.recorder.map(Recorder::discard);
             return Err(error.into());
         }
     };
-    let counters = run.tally.account().counters();
-    let recorded = match (run.recorder_error.take(), run.recorder.take()) {
-        (Some(error), _) => Err(error),
-        (None, Some(recorder)) => recorder.finish(&counters),
-        (None, None) => Ok(()),
-    };
-    if let (Err(source), Some(path)) = (recorded, options.record.clone()) {
-        return Err(CaptureError::RecordingCut { path, source, counters });
-    }
-    Ok(Capture {
+    let account = run.tally.account();
+    let mut captured = Capture {
         setup,
         settling,
         calibration_problem,
         integrated: run.tally.integrated().clone(),
-        counters,
-        damaged_packets: run.tally.account().damaged_packets(),
-        repeated: run.tally.account().repeated(),
+        counters: account.counters(),
+        damaged_packets: account.damaged_packets(),
+        unknown_packets: run.tally.unknown_packets(),
+        repeated: account.repeated(),
         status: run.status,
+        asked: options.frames,
+        made: run.tally.made(),
+        recording: None,
         ended,
         elapsed: now.elapsed(),
+    };
+    if let Some(recorder) = run.recorder {
+        captured.recording = Some(finish(recorder, run.recorder_error, &captured)?);
+    }
+    Ok(captured)
+}
+
+/// Closes the recording of a capture; its name.
+fn finish(
+    recorder: Recorder,
+    failed: Option<io::Error>,
+    captured: &Capture,
+) -> Result<PathBuf, CaptureError> {
+    let Capture { counters, asked, made, .. } = *captured;
+    let account = RunAccount { counters, asked, made, missing: captured.missing() };
+    let finished = match failed {
+        None => recorder.finish(&account),
+        Some(error) => {
+            let path = recorder.path().to_owned();
+            drop(recorder);
+            Err((path, error))
+        }
+    };
+    finished.map_err(|(path, source)| {
+        let held = frames_held(&path);
+        CaptureError::RecordingCut { path, source, held, counters }
     })
 }
 
-/// A run that never started leaves no recording behind.
-fn discard_empty(path: Option<&Path>, run: RunListener<'_>) {
-    drop(run.recorder);
-    // Not a device that the user records into.
-    if let Some(path) = path.filter(|path| path.is_file()) {
-        // It was made a moment ago and holds no packet; where it cannot be removed it does no harm.
-        let _ = std::fs::remove_file(path);
+/// Frames that a file holds; none if it is a device, or does not read.
+fn frames_held(path: &Path) -> u64 {
+    if !path.is_file() {
+        return 0;
     }
+    let tally = Recording::open(path).and_then(|mut recording| tally_recording(&mut recording));
+    tally.map_or(0, |tally| tally.account().counters().received)
 }
 
 fn stream(
@@ -324,11 +427,11 @@ fn stream(
 ) -> Result<Ended, SessionError> {
     let length = frames.map_or(RunLength::Continuous, RunLength::Frames);
     session.command(request::Start(length), run)?;
-    let mut stopped = false;
+    let mut stopped: Option<Instant> = None;
     let mut kept_alive = Instant::now();
     let mut kept_alive_us = 0;
     let mut watched = Instant::now();
-    while !run.tally.has_ended() {
+    while !run.tally.has_ended() && !run.junk.is_too_much() && !run.has_more_than(frames) {
         session.listen(Duration::from_millis(50), run)?;
         if watched.elapsed() > Duration::from_millis(50) {
             watched = Instant::now();
@@ -337,16 +440,15 @@ fn stream(
                 Progress { counters: run.tally.account().counters(), elapsed: started.elapsed() };
             let wants_stop =
                 run.observer.watch(&progress).is_break() || run.recorder_error.is_some();
-            if wants_stop && !stopped && !run.tally.has_ended() {
-                stopped = true;
-                match session.command(request::Stop, run) {
-                    // It had ended by itself meanwhile.
-                    Err(SessionError::Refused { .. }) | Ok(()) => {}
-                    Err(error) => return Err(error),
-                }
+            if wants_stop && stopped.is_none() && !run.tally.has_ended() {
+                stopped = Some(Instant::now());
+                stop(session, run)?;
             }
         }
-        if run.last_packet.elapsed() > ANSWER_TIMEOUT {
+        if stopped.is_some_and(|stopped| stopped.elapsed() > STOP_TIMEOUT) {
+            return Err(SessionError::NoAnswer { command: request::Stop::NAME });
+        }
+        if run.last_intact.elapsed() > ANSWER_TIMEOUT {
             return Err(SessionError::NoAnswer { command: request::Status::NAME });
         }
         // A simulated camera's time may outrun ours, and it is the camera that counts our silence.
@@ -360,18 +462,41 @@ fn stream(
             if let Some(status) = run.status
                 && status.state != State::Running
                 && status.run == run.number
-                && run.last_packet.elapsed() > QUIET
+                && run.last_intact.elapsed() > QUIET
             {
                 run.tally.end(status.frames_made);
             }
         }
     }
-    // The camera's own view, for the record. All that it made is accounted for: if it cannot be asked any
-    // more, nothing is lost.
-    let _ = session.status(run);
-    Ok(match (run.fault, stopped) {
-        (Some(fault), _) => Ended::Fault(fault),
-        (None, true) => Ended::Stopped,
-        (None, false) => Ended::Complete,
+    if run.junk.is_too_much() {
+        // The camera may not listen either.
+        let _ = stop(session, run);
+        return Ok(Ended::Junk { bytes: run.junk.bytes() });
+    }
+    if !run.tally.has_ended() {
+        stop(session, run)?;
+        return Ok(Ended::WrongNumber { made: run.tally.account().accounted(), asked: frames });
+    }
+    // The camera's own view: a fault's event may have been the one packet that was damaged.
+    let status = session.status(run);
+    let accounted = run.tally.account().accounted();
+    let made = run.tally.made().unwrap_or(accounted);
+    // What the camera says and what came must both be what was asked for.
+    let all_made = [made, accounted].iter().all(|&made| frames.map(u64::from) == Some(made));
+    let made = if frames.map(u64::from) == Some(made) { accounted } else { made };
+    Ok(match (run.fault, status) {
+        (Some(fault), _) | (None, Ok(Status { fault: Some(fault), .. })) => Ended::Fault(fault),
+        (None, Err(error)) => Ended::Unconfirmed(error),
+        (None, Ok(_)) if all_made => Ended::Complete,
+        (None, Ok(_)) if stopped.is_some() => Ended::Stopped,
+        (None, Ok(_)) => Ended::WrongNumber { made, asked: frames },
     })
+}
+
+/// Ends the run at the camera. A run that has ended by itself meanwhile is refused, and has ended too.
+fn stop(session: &mut Session, run: &mut RunListener<'_>) -> Result<(), SessionError> {
+    match session.command(request::Stop, run) {
+        Err(SessionError::Refused { .. }) | Ok(()) => Ok(()),
+        Err(error) => Err(error),
+    }
 }

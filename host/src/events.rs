@@ -1,6 +1,7 @@
 //! What a camera reports unasked, in words: right after the greeting what befell it while nobody listened, later what happens
 //! while somebody watches.
 
+use nirspi_wire::message::CRASH_TEXT_MAX;
 use nirspi_wire::{CrashReport, EventKind};
 
 /// One such event, as people read it; `None` for what an earlier host has left behind.
@@ -42,7 +43,9 @@ pub fn as_it_happens(kind: &EventKind) -> String {
 #[must_use]
 pub fn crash(report: &CrashReport<'_>) -> String {
     let seconds = report.uptime_us as f64 / 1e6;
-    let text = report.text.escape_debug();
+    // A device that says more than the protocol lets it is cut off.
+    let text: String =
+        report.text.chars().take(CRASH_TEXT_MAX).flat_map(char::escape_debug).collect();
     format!("the firmware crashed {seconds:.1} s after its last start and was restarted: {text}")
 }
 

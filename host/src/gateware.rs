@@ -60,7 +60,8 @@ pub fn load(
     let total =
         u32::try_from(bitstream.len()).map_err(|_| GatewareError::TooLong(bitstream.len()))?;
     let crc = crc32(bitstream);
-    let (mut offset, mut setbacks) = (0, 0);
+    // A camera that goes back and forth over the same pieces makes no progress.
+    let (mut offset, mut furthest, mut setbacks) = (0, 0, 0);
     while offset < total {
         let rest = bitstream.get(offset as usize..).unwrap_or(&[]);
         let data = rest.get(..GATEWARE_CHUNK_MAX).unwrap_or(rest);
@@ -74,7 +75,11 @@ pub fn load(
             }) => expected,
             Err(error) => return Err(error.into()),
         };
-        setbacks = if next > offset { 0 } else { setbacks + 1 };
+        if next > furthest {
+            (furthest, setbacks) = (next, 0);
+        } else if next <= offset {
+            setbacks += 1;
+        }
         if setbacks > SETBACKS || next > total {
             return Err(GatewareError::OutOfStep { expected: next, total });
         }

@@ -26,6 +26,12 @@ impl Integrated {
         Self { sums: vec![0; patterns], frames: 0, sweeps: 0, flags: FrameFlags::default() }
     }
 
+    /// Patterns of a sweep.
+    #[must_use]
+    pub fn patterns(&self) -> usize {
+        self.sums.len()
+    }
+
     /// Whether a frame has the setup's number of samples.
     #[must_use]
     pub fn fits(&self, frame: &Frame<'_>) -> bool {

@@ -16,8 +16,8 @@ use crate::link::Link;
 use conversation::Conversation;
 use nirspi_wire::register::Register;
 use nirspi_wire::{
-    Command, DeviceMessage, GatewareChunk, Identity, PROTOCOL_VERSION, PacketError, SelfTestReport,
-    Status,
+    Capabilities, Command, DeviceMessage, GatewareChunk, Identity, PacketError, SelfTestReport,
+    Status, version,
 };
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
@@ -44,6 +44,9 @@ pub struct CameraIdentity {
     pub adc_bits: u8,
     /// Wavelength of the LEDs.
     pub wavelength_nm: u16,
+    /// What the camera can do, in words; empty for a camera of protocol version 1, which does not say.
+    #[serde(default)]
+    pub capabilities: Vec<String>,
 }
 
 impl From<&Identity<'_>> for CameraIdentity {
@@ -57,14 +60,30 @@ impl From<&Identity<'_>> for CameraIdentity {
             adc_hz: identity.adc_hz,
             adc_bits: identity.adc_bits,
             wavelength_nm: identity.wavelength_nm,
+            capabilities: in_words(identity.capabilities.0.unwrap_or_default()),
         }
     }
+}
+
+/// The name of each capability; the number of the bit where this program does not know the capability.
+fn in_words(capabilities: Capabilities) -> Vec<String> {
+    let bits = (0..u32::BITS).filter(|bit| capabilities.contains(Capabilities(1 << bit)));
+    bits.map(|bit| {
+        let known = Capabilities::NAMES.iter().find(|(known, _)| known.0 == 1 << bit);
+        known.map_or_else(|| format!("capability {bit}"), |(_, name)| (*name).to_owned())
+    })
+    .collect()
 }
 
 /// Hears every packet of a session.
 pub trait Listener {
     /// A packet came. `raw` is as it stood on the wire, delimiter included.
     fn packet(&mut self, raw: &[u8], content: &Result<DeviceMessage<'_>, PacketError>);
+
+    /// Whether to go on waiting for what comes next; asked several times a second where a wait may be long.
+    fn goes_on(&mut self) -> bool {
+        true
+    }
 }
 
 /// Ignores every packet: for a command of which only the reply counts.
@@ -75,22 +94,38 @@ impl Listener for IgnorePackets {
     fn packet(&mut self, _: &[u8], _: &Result<DeviceMessage<'_>, PacketError>) {}
 }
 
-/// Keeps what a camera reports with its greeting, in words.
+/// Keeps what a camera reports with its greeting, in words: at most [`Reports::MOST`] lines, the last of which says that
+/// more came.
 #[derive(Debug, Default)]
 pub struct Reports(pub Vec<String>);
 
+impl Reports {
+    /// Most lines that are kept, whatever a camera sends.
+    pub const MOST: usize = 100;
+
+    fn keep(&mut self, report: Option<String>) {
+        match (report, self.0.len() + 1) {
+            (Some(report), ..Self::MOST) => self.0.push(report),
+            (Some(_), Self::MOST) => {
+                self.0.push("the camera reported more than is shown".to_owned())
+            }
+            _ => {}
+        }
+    }
+}
+
 impl Listener for Reports {
     fn packet(&mut self, _: &[u8], content: &Result<DeviceMessage<'_>, PacketError>) {
-        match content {
-            Ok(DeviceMessage::Event(event)) => self.0.extend(events::at_greeting(&event.kind)),
-            Ok(DeviceMessage::Crash(report)) => self.0.push(events::crash(report)),
+        self.keep(match content {
+            Ok(DeviceMessage::Event(event)) => events::at_greeting(&event.kind),
+            Ok(DeviceMessage::Crash(report)) => Some(events::crash(report)),
             // Intact, and yet no message: of a version that has more to say.
-            Err(PacketError::Message) => self.0.push(
+            Err(PacketError::Message) => Some(
                 "the camera reported something that this program does not know: update it"
                     .to_owned(),
             ),
-            _ => {}
-        }
+            _ => None,
+        });
     }
 }
 
@@ -102,15 +137,24 @@ pub struct Session {
 }
 
 impl Session {
-    /// Greets the camera behind `link`.
+    /// Greets the camera behind `link`, and settles the protocol version: the newest that both sides speak.
     ///
     /// # Errors
     /// [`SessionError::Version`] where the two cannot talk; the others where nothing sensible answers.
     pub fn open(link: Box<dyn Link>) -> Result<Self, SessionError> {
         let mut conversation = Conversation::begin(link)?;
         let mut reports = Reports::default();
-        match conversation.ask(&request::Hello(PROTOCOL_VERSION), &mut reports) {
-            Ok(identity) if identity.protocol == PROTOCOL_VERSION => {
+        let mut greet = |protocol| conversation.ask(&request::Hello(protocol), &mut reports);
+        let identity = match greet(version::CURRENT) {
+            // The camera is older than this program, and this program still speaks its version.
+            Ok(identity) if identity.protocol < version::CURRENT => {
+                let protocol = identity.protocol;
+                if version::speaks(protocol) { greet(protocol) } else { Ok(identity) }
+            }
+            answer => answer,
+        };
+        match identity {
+            Ok(identity) if version::speaks(identity.protocol) => {
                 Ok(Self { conversation, identity, reports: reports.0 })
             }
             Ok(identity) => Err(SessionError::Version { camera: identity.protocol }),

@@ -1,10 +1,12 @@
 //! What is measured: order, number of patterns, timing, sweeps. The host's side of a wire configuration.
 
 use nirspi_recon::{Order, Rows, RowsError, Side};
+use nirspi_wire::register::LATENCY_MAX;
 use nirspi_wire::{
     ADC_HZ, CLOCKS_PER_PATTERN, Configuration, PATTERNS, PatternOrder, SampleSource, samples::Words,
 };
 use serde::{Deserialize, Serialize};
+use thiserror::Error;
 
 /// One measurement setup, as it is sent to a camera and kept in a recording.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -26,7 +28,39 @@ pub struct MeasurementSetup {
     pub sweeps: u32,
 }
 
+/// A number of a setup that no camera can measure with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+#[error("{field} is {found}, expected {min} to {max}")]
+pub struct SetupError {
+    /// Which number.
+    pub field: &'static str,
+    /// As found.
+    pub found: u32,
+    /// The least that a camera takes.
+    pub min: u32,
+    /// The most that a camera takes.
+    pub max: u32,
+}
+
 impl MeasurementSetup {
+    /// Whether a camera would take this setup: the limits are those of the firmware's `Configure`.
+    ///
+    /// # Errors
+    /// [`SetupError`] names the first number out of range.
+    pub fn check(&self) -> Result<(), SetupError> {
+        let dwell = self.clocks_per_pattern;
+        let limits = [
+            ("clocks_per_pattern", u32::from(dwell), 1, u32::from(u16::MAX)),
+            ("blanked", u32::from(self.blanked), 0, u32::from(dwell.saturating_sub(1))),
+            ("adc_latency", u32::from(self.adc_latency), 0, u32::from(LATENCY_MAX)),
+            ("sweeps", self.sweeps, 1, u32::MAX),
+        ];
+        match limits.into_iter().find(|(_, found, min, max)| !(min..=max).contains(&found)) {
+            Some((field, found, min, max)) => Err(SetupError { field, found, min, max }),
+            None => Ok(()),
+        }
+    }
+
     /// The first `round(sampling * 1024)` patterns of `order` (at least one), differential, at 25 MHz, two
     /// of five samples blanked.
     ///
@@ -119,6 +153,29 @@ mod tests {
         let json = serde_json::to_string(&setup).unwrap();
         assert!(json.contains("\"rows\":[0,"), "{json}");
         assert_eq!(serde_json::from_str::<MeasurementSetup>(&json).unwrap(), setup);
+    }
+
+    #[test]
+    fn a_setup_that_no_camera_takes_names_the_number() {
+        let sound = MeasurementSetup::new(&Order::CakeCutting, 0.3).unwrap();
+        sound.check().unwrap();
+        for (changed, words) in [
+            (
+                MeasurementSetup { clocks_per_pattern: 0, ..sound.clone() },
+                "clocks_per_pattern is 0, expected 1 to 65535",
+            ),
+            (MeasurementSetup { blanked: 5, ..sound.clone() }, "blanked is 5, expected 0 to 4"),
+            (
+                MeasurementSetup { adc_latency: 64, ..sound.clone() },
+                "adc_latency is 64, expected 0 to 63",
+            ),
+            (
+                MeasurementSetup { sweeps: 0, ..sound.clone() },
+                "sweeps is 0, expected 1 to 4294967295",
+            ),
+        ] {
+            assert_eq!(changed.check().unwrap_err().to_string(), words);
+        }
     }
 
     #[test]

@@ -6,7 +6,7 @@ use crate::files::FileError;
 use crate::files::npz::{self, MeasurementFile, Readings, Selection};
 use crate::integrate::{IntegrateError, Integrated};
 use crate::recording::{End, Recording, RecordingError};
-use crate::tally::{self, tally_recording};
+use crate::tally::{self, Misfit, Tally, tally_recording};
 use nirspi_recon::{Dropout, Image, MeasurementError, Measurements, Order, reconstruct};
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -117,6 +117,15 @@ pub enum SourceError {
     /// A recording without frames.
     #[error("{}: no intact frame in the recording, expected at least one", .0.display())]
     NoFrame(PathBuf),
+    /// Every frame contradicts the setup of the recording.
+    #[error("{}: no frame is of the recording's setup", .path.display())]
+    Misfit {
+        /// Which file.
+        path: PathBuf,
+        /// How the first one contradicts it.
+        #[source]
+        misfit: Misfit,
+    },
     /// Options of a measurement file with a recording.
     #[error("--index N and --non-differential belong to .npz files, not to recordings")]
     NotForRecordings,
@@ -174,6 +183,7 @@ impl Source {
         let Capture { setup, settling, integrated, counters, .. } = capture;
         let mut notes: Vec<String> = integrated.warnings().into_iter().map(str::to_owned).collect();
         notes.extend(settling.is_none().then(|| NOT_CALIBRATED.to_owned()));
+        notes.extend(capture.missing().as_deref().map(not_whole));
         Ok(Self {
             measurements: integrated.measurements(setup, settling.as_ref(), false)?,
             dropouts: Vec::new(),
@@ -182,6 +192,11 @@ impl Source {
             notes,
         })
     }
+}
+
+/// What a capture lacks, as a note; the text may come from a file.
+fn not_whole(missing: &str) -> String {
+    format!("the recording is not whole: {}", missing.escape_debug())
 }
 
 const NOT_CALIBRATED: &str = "no calibration in the recording: the settling leak stays";
@@ -202,9 +217,11 @@ impl SourceOptions {
     /// Whether the file is a recording, for which these options must make sense.
     fn fits_recording(&self, path: &Path) -> Result<bool, SourceError> {
         let mut magic = [0; 4];
-        let is_mcap = std::fs::File::open(path)
-            .and_then(|mut file| file.read_exact(&mut magic))
-            .is_ok_and(|()| magic[1..] == *b"MCA");
+        // A pipe would be waited for; what is no file is refused where it is read.
+        let is_mcap = path.is_file()
+            && std::fs::File::open(path)
+                .and_then(|mut file| file.read_exact(&mut magic))
+                .is_ok_and(|()| magic[1..] == *b"MCA");
         let named_mcap = path.extension().is_some_and(|e| e == "mcap");
         let one = matches!(self.index, Some(Index::One(_)));
         if (is_mcap || named_mcap) && (one || self.non_differential) {
@@ -237,20 +254,29 @@ fn from_npz(path: &Path, file: MeasurementFile) -> Result<Source, SourceError> {
 /// Sums the frames of a recording, counting again what became of each.
 fn from_recording(path: &Path, options: SourceOptions) -> Result<Source, SourceError> {
     let mut recording = Recording::open(path)?;
-    let (integrated, counters) = tally_recording(&mut recording)?;
-    if integrated.frames() == 0 {
-        return Err(SourceError::NoFrame(path.to_owned()));
+    let tally = tally_recording(&mut recording)?;
+    if tally.integrated().frames() == 0 {
+        return Err(no_frame(path, &tally));
     }
-    of_frames(path, options, &recording, &integrated, counters)
+    of_frames(path, options, &recording, tally.integrated(), &tally)
+}
+
+/// Why no frame of a recording counts.
+fn no_frame(path: &Path, tally: &Tally) -> SourceError {
+    let path = path.to_owned();
+    match tally.misfit() {
+        Some(misfit) => SourceError::Misfit { path, misfit },
+        None => SourceError::NoFrame(path),
+    }
 }
 
 fn frames_of_recording(path: &Path, options: SourceOptions) -> Result<Vec<Source>, SourceError> {
     let mut recording = Recording::open(path)?;
-    let (frames, counters) = tally::frames_of_recording(&mut recording)?;
+    let (frames, tally) = tally::frames_of_recording(&mut recording)?;
     if frames.is_empty() {
-        return Err(SourceError::NoFrame(path.to_owned()));
+        return Err(no_frame(path, &tally));
     }
-    frames.iter().map(|frame| of_frames(path, options, &recording, frame, counters)).collect()
+    frames.iter().map(|frame| of_frames(path, options, &recording, frame, &tally)).collect()
 }
 
 /// What the sum of some frames says.
@@ -259,17 +285,22 @@ fn of_frames(
     options: SourceOptions,
     recording: &Recording,
     integrated: &Integrated,
-    counters: LossCounters,
+    tally: &Tally,
 ) -> Result<Source, SourceError> {
+    let counters = tally.account().counters();
     let Recording { setup, settling, .. } = recording;
     let End { cut_short, account, .. } = recording.end();
     let mut notes: Vec<String> = integrated.warnings().into_iter().map(str::to_owned).collect();
     if let Some(reason) = cut_short {
         notes.push(format!("the recording is cut short or damaged: {reason}"));
     }
-    if account.is_some_and(|account| account != counters) {
-        notes.push("the frames found are not those that the capture counted".to_owned());
+    if let Some(account) = account {
+        if account.counters != counters {
+            notes.push("the frames found are not those that the capture counted".to_owned());
+        }
+        notes.extend(account.missing.as_deref().map(not_whole));
     }
+    notes.extend(tally.misfit().map(|misfit| format!("some frames are left out: {misfit}")));
     if settling.is_none() {
         notes.push(NOT_CALIBRATED.to_owned());
     }

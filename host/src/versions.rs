@@ -2,7 +2,7 @@
 
 use crate::boards::Board;
 use crate::session::CameraIdentity;
-use nirspi_wire::{PROTOCOL_VERSION, register::Register};
+use nirspi_wire::{register::Register, version};
 use serde::Serialize;
 use std::cmp::Ordering;
 
@@ -79,7 +79,7 @@ pub fn compare(camera: &CameraIdentity, map: Option<u32>) -> Vec<Part> {
         _ => LOAD_GATEWARE.to_owned(),
     };
     let mut parts = vec![
-        part("protocol", &camera.protocol.to_string(), &PROTOCOL_VERSION.to_string(), firmware),
+        part("protocol", &camera.protocol.to_string(), &version::CURRENT.to_string(), firmware),
         part("firmware", &camera.firmware, program, firmware),
         part("gateware", &camera.gateware, &gateware, bitstream),
     ];
@@ -106,7 +106,7 @@ mod tests {
 
     fn camera(change: impl FnOnce(&mut CameraIdentity)) -> CameraIdentity {
         let mut camera = CameraIdentity {
-            protocol: PROTOCOL_VERSION,
+            protocol: version::CURRENT,
             firmware: env!("CARGO_PKG_VERSION").into(),
             gateware: of_register(Register::Version.reset()),
             board: "nucleo-u5a5zj-q".into(),
@@ -114,6 +114,7 @@ mod tests {
             adc_hz: 125_000_000,
             adc_bits: 14,
             wavelength_nm: 1550,
+            capabilities: Vec::new(),
         };
         change(&mut camera);
         camera

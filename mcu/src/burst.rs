@@ -1,9 +1,11 @@
-//! A raw burst: plain ADC samples of the first clocks of a sweep, in pieces.
+//! A raw burst: ADC samples of the first clocks of a sweep, sent in pieces.
+//!
+//! A piece waits while the link has no room. Waiting is safe: the FPGA keeps the samples, and the
+//! LEDs are off again after at most 33 microseconds.
 //!
 //! # Invariant
-//! A burst arrives whole, or an event says that it does not:
-//! `tests::frames::pieces_of_a_burst_wait_for_room_and_are_given_up_in_the_end`. Pieces of a burst wait for room, since
-//! the FPGA keeps the samples and the LEDs are off again after at most 33 microseconds.
+//! A burst arrives whole, or an event says that it does not
+//! (`tests::frames::pieces_of_a_burst_wait_for_room_and_are_given_up_in_the_end`).
 
 use crate::configure::Setup;
 use crate::packets::{STREAM_HEADER_BYTES, send};
@@ -15,7 +17,7 @@ use nirspi_wire::{DeviceMessage, Fault, Raw, Refusal};
 /// Samples in one piece: half of a frame's length on the link.
 pub const RAW_PIECE_SAMPLES: u16 = 1024;
 
-/// Longest time that the FPGA may take.
+/// Longest time that the FPGA may take to record a burst.
 const BURST_PATIENCE: Micros = Micros(100_000);
 
 /// Longest time that a piece waits for room.
@@ -25,18 +27,18 @@ const PIECE_PATIENCE: Micros = Micros(500_000);
 pub(crate) struct Burst {
     samples: u16,
     sent: u16,
-    /// When it started, and then when the last piece was sent.
+    /// Time when the burst started; after the first piece, time when the last piece was sent.
     since: Micros,
-    /// The FPGA has recorded it, so the LEDs are off.
+    /// The FPGA has recorded the burst, so the LEDs are off.
     recorded: bool,
 }
 
-/// What a step of a burst came to.
+/// Outcome of one step of a burst.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Step {
     /// The FPGA still records, or the link has no room.
     Waiting,
-    /// A piece was sent, and there are more.
+    /// A piece was sent; more pieces follow.
     Sent,
     /// The last piece was sent.
     Done,
@@ -46,10 +48,10 @@ pub(crate) enum Step {
     Stalled,
 }
 
-/// What became of one piece.
+/// Outcome of sending one piece.
 enum Piece {
     Sent,
-    /// The samples are not here yet, or the link is full.
+    /// The FPGA's samples have not been transferred yet, or the link is full.
     NotNow,
     Lost,
 }
@@ -76,7 +78,7 @@ impl Burst {
         Ok(Self { samples, sent: 0, since: now, recorded: false })
     }
 
-    /// At most one piece.
+    /// Sends at most one piece.
     pub fn step(
         &mut self,
         now: Micros,

@@ -1,19 +1,20 @@
-//! The camera's public face: what a board calls.
+//! The camera's public interface: the calls that a board makes.
 //!
 //! # Invariant
-//! Safety rules are looked at first on every call, and a rule that is broken has the LEDs off before the call returns:
-//! `tests::safety::a_rule_also_speaks_where_only_bytes_come_in`.
+//! Every call checks the safety rules first. If a rule is broken, the LEDs are off before the call
+//! returns (`tests::safety::a_rule_also_speaks_where_only_bytes_come_in`).
 
 use crate::machine::Machine;
 use crate::packets::{STREAM_HEADER_BYTES, send};
 use crate::{
     BoardInfo, Crash, FpgaBus, GatewareLoader, Inputs, Limits, Micros, PacketSink, Ports, Progress,
 };
-use nirspi_wire::packet::{MAX_HOST_PACKET, PacketError, open};
+use nirspi_wire::packet::{MAX_HOST_PACKET, parse, request_id, unseal};
 use nirspi_wire::samples::Words;
 use nirspi_wire::{Deframed, Deframer, Depth, DeviceMessage, Request, State};
 
-/// The camera's firmware: one value for each camera, under 8 KB, and no other memory.
+/// The camera's firmware. One value is one camera; a value takes less than 8 KB and uses no other
+/// memory.
 #[derive(Debug)]
 pub struct Camera {
     deframer: Deframer<MAX_HOST_PACKET>,
@@ -27,14 +28,16 @@ impl Camera {
         Self { deframer: Deframer::new(), machine: Machine::new(info, limits) }
     }
 
-    /// The firmware has restarted after this crash: the first host is told, after the answer to its `Hello`.
+    /// Records that the firmware has restarted after this crash. The first host gets a crash report
+    /// after the answer to its `Hello`.
     pub fn restarted_after(&mut self, crash: Crash) {
         self.machine.crash = Some(crash);
     }
 
-    /// Takes bytes from the host, in any pieces; returns how many were taken. The rest is to be offered
-    /// again after the next poll: a command is taken only when its reply has a place to wait and the one
-    /// before is answered, so a host that does not read is slowed down instead of losing replies.
+    /// Takes bytes from the host, in pieces of any length, and returns how many bytes were taken.
+    /// The board offers the rest again after the next poll. A command is taken only when its reply
+    /// has a place to wait and the command before is answered, so a host that does not read is
+    /// slowed down instead of losing replies.
     #[must_use = "bytes that were not taken must be offered again"]
     pub fn receive<B: FpgaBus, S: PacketSink, G: GatewareLoader>(
         &mut self,
@@ -47,24 +50,28 @@ impl Camera {
         machine.guard_sensors(now, inputs, ports.bus);
         let mut rest = bytes;
         while machine.takes_commands() {
-            let opened = match self.deframer.next(&mut rest) {
+            let payload = match self.deframer.next(&mut rest) {
                 None => break,
-                Some(Deframed::TooLong) => Err(PacketError::TooLong),
-                Some(Deframed::Packet(packet)) => open::<Request<'_>>(packet),
+                Some(Deframed::TooLong) => None,
+                Some(Deframed::Packet(packet)) => unseal(packet).ok(),
             };
-            match opened {
-                Ok(request) => machine.carry_out(now, &request, inputs, ports),
-                Err(_) => machine.count_damage(now),
+            let request =
+                payload.map(|payload| (parse::<Request<'_>>(payload), request_id(payload)));
+            match request {
+                Some((Ok(request), _)) => machine.carry_out(now, &request, inputs, ports),
+                Some((Err(_), Some(id))) => machine.refuse_unknown(now, id),
+                _ => machine.count_damage(now),
             }
             machine.flush(ports.sink);
         }
         bytes.len().saturating_sub(rest.len())
     }
 
-    /// Safety rules, then pending replies and events, then at most one frame or piece of a raw burst.
+    /// Checks the safety rules, then sends pending replies and events, then at most one frame or
+    /// one piece of a raw burst.
     ///
-    /// Call it at least once a millisecond while running, and after [`receive`](Self::receive) where bytes
-    /// wait, since the host's silence is judged here.
+    /// While the camera is running, call `poll` at least once a millisecond. Where bytes wait, call
+    /// `poll` after [`receive`](Self::receive), because `poll` judges the host's silence.
     pub fn poll<B: FpgaBus, S: PacketSink, G: GatewareLoader>(
         &mut self,
         now: Micros,
@@ -74,8 +81,8 @@ impl Camera {
         self.machine.poll(now, inputs, ports)
     }
 
-    /// Forwards a time-of-flight map of `side` x `side` distances in mm, measured now; dropped if the link
-    /// has no room, no host is there, or the map is not of that size.
+    /// Forwards a time-of-flight map of `side` x `side` distances in mm, measured now. The map is
+    /// dropped if the link has no room, if no host is there, or if the map is not of that size.
     pub fn depth<B: FpgaBus, S: PacketSink, G: GatewareLoader>(
         &mut self,
         now: Micros,
@@ -95,8 +102,9 @@ impl Camera {
         send(&DeviceMessage::Depth(depth), payload, ports.sink);
     }
 
-    /// The host is gone: LEDs off, a half-received command and unsent replies forgotten, back to
-    /// [`State::Idle`]. A fault still stands: it is a matter of the device, not of the session.
+    /// Ends the session: LEDs off, half-received command and unsent replies forgotten, back to
+    /// [`State::Idle`]. A latched fault stays, because a fault belongs to the device and not to the
+    /// session.
     pub fn link_closed<B: FpgaBus, S: PacketSink, G: GatewareLoader>(
         &mut self,
         _now: Micros,
@@ -106,7 +114,7 @@ impl Camera {
         self.machine.close(ports.bus);
     }
 
-    /// What it is doing.
+    /// What the camera is doing.
     #[must_use]
     pub fn state(&self) -> State {
         self.machine.state()

@@ -1,10 +1,11 @@
-//! Commands of the host, one at a time, each answered once.
+//! Commands of the host: taken one at a time, each answered once.
 //!
 //! # Invariant
-//! Nothing is done for a host before its `Hello` has shown that it speaks this protocol
-//! (`tests::commands::nothing_is_done_before_hello`). A refused command has changed nothing, but for a `Configure` that
-//! failed half way on the bus ([`Refusal::Bus`]), which leaves nothing configured
-//! (`tests::commands::settings_that_do_not_arrive_leave_nothing_configured`).
+//! - No command takes effect before the host's `Hello` has shown that the host speaks this protocol
+//!   (`tests::commands::nothing_is_done_before_hello`).
+//! - A refused command changes nothing, with one exception: a `Configure` that failed half way on
+//!   the bus ([`Refusal::Bus`]) leaves the FPGA without a configuration
+//!   (`tests::commands::settings_that_do_not_arrive_leave_nothing_configured`).
 
 use crate::machine::{Activity, Machine, Session};
 use crate::notices::{Notice, Outcome};
@@ -13,8 +14,8 @@ use crate::{
 };
 use nirspi_wire::register::{ORDER_TABLE, Register, status};
 use nirspi_wire::{
-    Answer, Command, Configuration, GatewareChunk, PATTERNS, PROTOCOL_VERSION, PatternOrder,
-    Refusal, Request, State, Status,
+    Answer, Command, Configuration, DeviceMessage, GatewareChunk, PATTERNS, PatternOrder, Refusal,
+    Reply, Request, State, Status, version,
 };
 
 impl Machine {
@@ -30,9 +31,7 @@ impl Machine {
         self.last_command = now;
         let done = match command {
             Command::Hello { protocol } => return self.hello(id, now, protocol, *bus),
-            _ if self.session != Session::Open => {
-                Err(Refusal::Protocol { device: PROTOCOL_VERSION })
-            }
+            _ if self.protocol().is_none() => Err(Refusal::Protocol { device: version::CURRENT }),
             Command::Configure(configuration) => {
                 self.configure(now, &configuration, inputs, *bus).map(|()| Answer::Done)
             }
@@ -58,17 +57,38 @@ impl Machine {
         self.reply(id, Outcome::Other(done));
     }
 
-    /// A new session: what the host before it has left running ends.
+    /// Refuses a command that this firmware does not know. In a session whose version lacks that
+    /// refusal, the request counts as damaged, as the firmware of that version counted it.
+    pub(crate) fn refuse_unknown(&mut self, now: Micros, id: u16) {
+        let outcome = Err(Refusal::Unknown);
+        let since = DeviceMessage::Reply(Reply { id, outcome }).since();
+        match self.protocol() {
+            Some(protocol) if protocol < since => self.count_damage(now),
+            Some(_) => {
+                self.last_command = now;
+                self.reply(id, Outcome::Other(outcome));
+            }
+            None => {
+                let device = version::CURRENT;
+                self.reply(id, Outcome::Other(Err(Refusal::Protocol { device })));
+            }
+        }
+    }
+
+    /// Opens a new session, and ends what the host before has left running.
     fn hello(&mut self, id: u16, now: Micros, protocol: u16, bus: &mut impl FpgaBus) {
         let gateware = fpga::version(bus);
-        self.stop(id, now, bus, Outcome::Hello { gateware });
-        self.session = if protocol == PROTOCOL_VERSION { Session::Open } else { Session::Foreign };
-        if self.session == Session::Open && self.crash.is_some() {
+        let spoken = version::speaks(protocol);
+        let answered = if spoken { protocol } else { version::CURRENT };
+        self.stop(id, now, bus, Outcome::Hello { protocol: answered, gateware });
+        self.session = if spoken { Session::Open { protocol } } else { Session::Foreign };
+        if spoken && self.crash.is_some() {
             self.notices.push(Notice::Crash);
         }
     }
 
-    /// LEDs off. The reply comes when no frame of the run is left, and `RunEnded` follows it.
+    /// Switches the LEDs off. The reply comes when no frame of the run is left, and `RunEnded`
+    /// follows the reply.
     fn stop(&mut self, id: u16, now: Micros, bus: &mut impl FpgaBus, outcome: Outcome) {
         if let Activity::Run(_) = self.activity {
             return self.end_run(now, Some((id, outcome)), bus);
@@ -78,7 +98,7 @@ impl Machine {
         self.reply(id, outcome);
     }
 
-    /// `Configure`: checks, acknowledges, writes and reads back.
+    /// `Configure`: checks, acknowledges, writes and reads back the settings.
     fn configure(
         &mut self,
         now: Micros,
@@ -113,10 +133,10 @@ impl Machine {
     fn status(&mut self, now: Micros, inputs: &Inputs, bus: &mut impl FpgaBus) -> Status {
         let resting = matches!(self.activity, Activity::Resting);
         if let Activity::Run(_) = self.activity {
-            // An FPGA that does not answer leaves the last counts; its absence is noticed elsewhere.
+            // If the FPGA does not answer, the last counts stay; `guard_fpga` notices its absence.
             let _ = self.counters.read(bus);
         }
-        // Where the FPGA cannot say, the pessimistic answer.
+        // If the FPGA does not answer, the reply assumes that the LEDs are on.
         let leds_on = fpga::read(bus, Register::Status)
             .map_or(!resting, |status| status & status::LEDS_ON != 0);
         Status {
@@ -150,7 +170,7 @@ impl Machine {
             loader.forget();
         }
         let next_offset = gateware::take(&mut self.loading, chunk, loader)?;
-        // The FPGA forgets its settings with the first piece.
+        // The first piece makes the FPGA forget its settings.
         self.setup = None;
         Ok(next_offset)
     }

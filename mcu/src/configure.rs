@@ -1,7 +1,9 @@
-//! Checks of a configuration, and the register values that it comes to.
+//! Checks a configuration and translates it into register values.
 //!
-//! The one law: a [`Setup`] exists only for a configuration that the FPGA will accept and that keeps to the
-//! board's light budget at every moment.
+//! # Invariant
+//! A [`Setup`] exists only for a configuration that keeps to the board's light budget in every
+//! window of a run (`tests::no_window_is_brighter_than_the_peak`) and has every number in the range
+//! that the FPGA accepts (`crate::tests::commands::a_number_out_of_range_is_named_with_its_range`).
 
 use crate::Limits;
 use nirspi_wire::register::{DUTY_WINDOW, LATENCY_MAX, mode};
@@ -10,7 +12,7 @@ use nirspi_wire::{
     ConfigField, ConfigProblem, Configuration, PATTERNS, PatternOrder, SampleSource,
 };
 
-/// A checked configuration, as the FPGA's registers hold it.
+/// A checked configuration, in the form of the FPGA's registers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Setup {
     pub mode: u32,
@@ -37,7 +39,7 @@ impl Setup {
     }
 }
 
-/// Checks everything that `configuration` says.
+/// Checks every field of `configuration`.
 pub(crate) fn check(
     configuration: &Configuration<'_>,
     limits: &Limits,
@@ -46,7 +48,7 @@ pub(crate) fn check(
     let latency = configuration.adc_latency;
     in_range(ConfigField::Patterns, patterns.into(), 1, PATTERNS.into())?;
     let (order, shows_all_lit) = match &configuration.order {
-        // Both begin with pattern 0, which has no negative entry: every LED is lit.
+        // Both orders begin with pattern 0, which has no negative entry: every LED is lit.
         PatternOrder::Natural => (0, true),
         PatternOrder::Sequency => (mode::ORDER_SEQUENCY, true),
         PatternOrder::Table(table) => (mode::ORDER_TABLE, check_table(table, patterns)?),
@@ -107,8 +109,8 @@ fn check_table(table: &Words<'_>, patterns: u16) -> Result<bool, ConfigProblem> 
     Ok(seen.first().is_some_and(|&all_lit| all_lit))
 }
 
-/// Light of a setup, in half-arrays lit for a clock as the FPGA counts it: 2 in a slot of pattern 0, 0 in
-/// one of its complement, 1 in any other.
+/// Light of a setup, in half-arrays lit for a clock, as the FPGA counts light: 2 in a slot of
+/// pattern 0, 0 in a slot of its complement, 1 in any other slot.
 struct Light<'s> {
     setup: &'s Setup,
     shows_all_lit: bool,
@@ -119,7 +121,7 @@ impl Light<'_> {
         self.setup.mode & mode::DIFFERENTIAL != 0
     }
 
-    /// Over a whole sweep, in thousandths of the full array, rounded to nearest.
+    /// Mean light over a whole sweep, in thousandths of the full array, rounded to nearest.
     fn mean_permille(&self) -> u16 {
         let patterns = u32::from(self.setup.patterns);
         // A pattern and its complement light each LED once.
@@ -130,17 +132,18 @@ impl Light<'_> {
         permille.and_then(|permille| u16::try_from(permille).ok()).unwrap_or(u16::MAX)
     }
 
-    /// Over the brightest window that a run can meet, rounded up. A window need not begin where a sweep
-    /// does, nor hold a whole number of them; so this may be a thousandth above the mean, and far above it
-    /// where a slot is long. (Runs stopped and started in quick succession show first patterns more often:
-    /// those the FPGA's own limit stops.)
+    /// Light of the brightest window that a run can have, in thousandths of the full array, rounded
+    /// up. A window may begin anywhere in a sweep and may hold a fraction of a sweep, so this value
+    /// may be a thousandth above the mean, and far above the mean where a slot is long. Runs
+    /// stopped and started in quick succession show the first patterns more often; the FPGA's own
+    /// limit stops such runs.
     fn peak_permille(&self) -> u32 {
         let window = u64::from(DUTY_WINDOW);
         let sweep = self.setup.sweep_clocks();
         let slot = u64::from(self.setup.dwell);
         let sweeps = window.checked_div(sweep).unwrap_or(0);
         let rest = window.checked_rem(sweep).unwrap_or(0);
-        // Over whole sweeps the dark complement makes up for the pattern that lights all.
+        // In whole sweeps the dark complement balances the pattern that lights all LEDs.
         let whole = if self.differential() { 0 } else { sweeps.saturating_mul(slot) };
         let extra = if self.shows_all_lit { whole.saturating_add(slot.min(rest)) } else { 0 };
         let light = window.saturating_add(extra);

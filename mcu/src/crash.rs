@@ -1,13 +1,17 @@
-//! What the firmware leaves behind when it crashes, for the host that connects after the restart.
+//! The crash record: what the firmware leaves in memory when it crashes, for the host that connects
+//! after the restart.
 //!
-//! The one law: memory that no crash has written is no record; it is told from one by magic and checksum.
+//! # Invariant
+//! Memory without a crash record is never read as a record: a record needs its magic number and a
+//! right checksum (`tests::crash::memory_that_nobody_wrote_is_no_record`,
+//! `tests::crash::a_record_comes_back_and_no_damaged_one_does`).
 
 use crate::Micros;
 use heapless::String;
 use nirspi_wire::Crc32;
 use nirspi_wire::message::CRASH_TEXT_MAX;
 
-/// Words of memory that a record takes, where a restart does not clear them.
+/// Words of memory that a record takes. The memory must survive a restart.
 pub const CRASH_WORDS: usize = HEAD_WORDS + CRASH_TEXT_MAX / 4 + 1;
 
 /// Magic, uptime, length of the text.
@@ -19,23 +23,23 @@ const MAGIC: u32 = 0x4449_4544;
 /// Why the firmware restarted.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Crash {
-    /// When, since power-up.
+    /// Time of the crash, since power-up.
     pub uptime: Micros,
-    /// Where and why.
+    /// Place and reason of the crash.
     pub text: String<CRASH_TEXT_MAX>,
 }
 
 impl Crash {
-    /// As much of the text as there is room for, in whole characters.
+    /// Keeps as much of the text as there is room for, in whole characters.
     #[must_use]
     pub fn new(uptime: Micros, text: core::fmt::Arguments<'_>) -> Self {
         let mut cut = Cut(String::new());
-        // Full is all that can happen to it.
+        // A write can only fail because the text is full.
         let _ = core::fmt::write(&mut cut, text);
         Self { uptime, text: cut.0 }
     }
 
-    /// As it stands in memory.
+    /// The record as words of memory.
     #[must_use]
     pub fn to_words(&self) -> [u32; CRASH_WORDS] {
         let mut words = [0; CRASH_WORDS];
@@ -77,7 +81,7 @@ impl Crash {
     }
 }
 
-/// Over all words but the last.
+/// Checksum over all words but the last.
 fn checksum(words: &[u32; CRASH_WORDS]) -> u32 {
     let mut crc = Crc32::new();
     for word in words.iter().take(CRASH_WORDS.saturating_sub(1)) {
@@ -86,7 +90,7 @@ fn checksum(words: &[u32; CRASH_WORDS]) -> u32 {
     crc.value()
 }
 
-/// Takes what there is room for.
+/// A writer that keeps what fits and drops the rest.
 struct Cut(String<CRASH_TEXT_MAX>);
 
 impl core::fmt::Write for Cut {

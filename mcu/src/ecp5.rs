@@ -1,12 +1,12 @@
 //! Configures an ECP5 over its slave SPI port, and decides whether it has to.
 //!
-//! Commands, status bits and their order: Lattice FPGA-TN-02039 (ECP5 and ECP5-5G sysCONFIG), as they stand in the
-//! Linux kernel's `drivers/fpga/lattice-sysconfig.c`, which drives the same port; the technical note itself
-//! is not at hand. SPI mode 0, most significant bit first; each command is one selection of the chip, and the
-//! bitstream goes in one selection together with its command.
+//! Source of commands, status bits and their order: Lattice FPGA-TN-02039 (ECP5 and ECP5-5G
+//! sysCONFIG), read from the Linux kernel's `drivers/fpga/lattice-sysconfig.c`, which drives the
+//! same port; the technical note itself was not available. SPI mode 0, most significant bit first.
+//! Each command is one selection of the chip; the bitstream and its command share one selection.
 //!
-//! The one law: [`Configuration::poll`] never waits. It does one command, or one piece of the bitstream, and
-//! says that there is more; time is an argument.
+//! [`Configuration::poll`] never waits: one call does one command or sends one piece of the
+//! bitstream, and says whether there is more to do. Time is an argument.
 
 use crate::{BusError, Micros};
 
@@ -33,14 +33,14 @@ mod status {
     pub const DONE: u32 = 1 << 8;
     pub const BUSY: u32 = 1 << 12;
     pub const FAIL: u32 = 1 << 13;
-    /// What was wrong with the bitstream: identity, illegal command, CRC, preamble, ...
+    /// Kind of error in the bitstream: identity, illegal command, CRC, preamble, ...
     pub const BITSTREAM_ERROR: u32 = 0b111 << 23;
 }
 
-/// `PROGRAMN` is held low for this long; some hundred nanoseconds are enough.
+/// Time for which `PROGRAMN` is held low; some hundred nanoseconds are enough.
 const PROGRAM_PULSE: Micros = Micros(1_000);
 
-/// Afterwards the chip clears its memory before it listens.
+/// Time after the pulse in which the chip clears its memory.
 const CLEARING: Micros = Micros(50_000);
 
 /// Longest time that the chip may be busy with one command.
@@ -48,7 +48,7 @@ const PATIENCE: Micros = Micros(1_000_000);
 
 /// The port's lines.
 pub trait SlaveSpi {
-    /// Drives `PROGRAMN` low, or lets it go high.
+    /// Drives `PROGRAMN` low, or releases the line so that it goes high.
     fn program(&mut self, low: bool);
 
     /// Level of `DONE`: high while the chip is configured.
@@ -63,7 +63,7 @@ pub trait SlaveSpi {
     /// [`BusError`].
     fn write(&mut self, bytes: &[u8]) -> Result<(), BusError>;
 
-    /// Takes bytes.
+    /// Reads bytes.
     ///
     /// # Errors
     /// [`BusError`].
@@ -73,18 +73,18 @@ pub trait SlaveSpi {
 /// Why the chip is not configured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ConfigureError {
-    /// No transfer.
+    /// A transfer failed.
     Bus(BusError),
-    /// Another chip, none, or one that is not in slave SPI mode.
+    /// The chip has another `IDCODE`, is missing, or is not in slave SPI mode.
     WrongDevice {
-        /// Its `IDCODE`.
+        /// `IDCODE` that was read.
         found: u32,
     },
-    /// Busy for too long.
+    /// The chip was busy for too long.
     Stuck,
-    /// It did not take the bitstream.
+    /// The chip did not accept the bitstream.
     Refused {
-        /// The status register.
+        /// The status register after the bitstream.
         status: u32,
     },
 }
@@ -95,14 +95,14 @@ impl From<BusError> for ConfigureError {
     }
 }
 
-/// Whether a bitstream has to be loaded: the chip is left alone only if it is well and is known to run this one.
-/// Bitstreams are told apart by their CRC-32.
+/// Whether a bitstream has to be loaded. The chip is left alone only if it is well and is known to
+/// run this bitstream. The CRC-32 identifies a bitstream.
 #[must_use]
 pub fn must_load(is_well: bool, running: Option<u32>, wanted: u32) -> bool {
     !is_well || running != Some(wanted)
 }
 
-/// What comes next.
+/// The next step of a configuration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Step {
     Program,
@@ -115,7 +115,7 @@ enum Step {
     Over(Result<(), ConfigureError>),
 }
 
-/// Commands that the chip is busy with for a while, in this order.
+/// Commands that keep the chip busy for a while, in this order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Command {
     Enable,
@@ -124,7 +124,7 @@ enum Command {
     Disable,
 }
 
-/// The way of one bitstream into the chip.
+/// The transfer of one bitstream into the chip.
 #[derive(Debug)]
 pub struct Configuration {
     idcode: u32,
@@ -132,14 +132,15 @@ pub struct Configuration {
 }
 
 impl Configuration {
-    /// For a chip with this `IDCODE`.
+    /// A transfer into a chip with this `IDCODE`.
     #[must_use]
     pub const fn new(idcode: u32) -> Self {
         Self { idcode, step: Step::Program }
     }
 
-    /// Goes on; `None`: there is more to do, with the same bitstream. A chip that does not take it is restarted,
-    /// so that it looks for its configuration where its mode pins say.
+    /// Does the next step. `None`: call again with the same bitstream. A chip that does not accept
+    /// the bitstream is restarted, so that the chip loads its configuration from where its mode
+    /// pins say.
     pub fn poll(
         &mut self,
         now: Micros,

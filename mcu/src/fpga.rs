@@ -1,6 +1,11 @@
-//! The FPGA by the names of its registers.
+//! Operations on the FPGA by the names of its registers.
 //!
-//! The one law: what is read back is believed, what was written is not.
+//! Settings are read back after every write. Only the values read back count as written.
+//!
+//! # Invariant
+//! A setting that does not arrive is an error
+//! (`tests::commands::settings_that_do_not_arrive_leave_nothing_configured`,
+//! `tests::commands::one_entry_of_the_order_that_does_not_arrive_is_noticed`).
 
 use crate::configure::Setup;
 use crate::{BusError, FpgaBus, Limits};
@@ -32,7 +37,7 @@ pub(crate) fn release(bus: &mut impl FpgaBus) -> Result<(), BusError> {
 /// Fault of an FPGA that does not answer at all.
 pub(crate) const SILENT: Fault = Fault::FpgaAbsent { identity: 0 };
 
-/// Whether the FPGA is there.
+/// Checks that the FPGA answers with its identity.
 pub(crate) fn identify(bus: &mut impl FpgaBus) -> Result<(), Fault> {
     match read(bus, Register::Identity) {
         Ok(IDENTITY) => Ok(()),
@@ -41,7 +46,7 @@ pub(crate) fn identify(bus: &mut impl FpgaBus) -> Result<(), Fault> {
     }
 }
 
-/// Status of an FPGA that is there and has no fault latched.
+/// Status of an FPGA that answers and has no fault latched.
 pub(crate) fn health(bus: &mut impl FpgaBus) -> Result<u32, Fault> {
     identify(bus)?;
     let status = read(bus, Register::Status).map_err(|_| SILENT)?;
@@ -54,12 +59,12 @@ pub(crate) fn health(bus: &mut impl FpgaBus) -> Result<u32, Fault> {
         Some(FaultCode::Duty) => Fault::Duty,
         Some(FaultCode::OverRange) => Fault::OverRange,
         Some(FaultCode::Interlock) => Fault::Interlock,
-        // A fault that this firmware has no name for: not the gateware it was written for.
+        // A fault code that this firmware does not know comes from other gateware.
         Some(FaultCode::None) | None => Fault::FpgaAbsent { identity: IDENTITY },
     })
 }
 
-/// Version of the gateware; 0.0.0 where none answers.
+/// Version of the gateware; 0.0.0 if no gateware answers.
 pub(crate) fn version(bus: &mut impl FpgaBus) -> Version {
     match (identify(bus), read(bus, Register::Version)) {
         (Ok(()), Ok(word)) => {
@@ -77,7 +82,7 @@ pub(crate) fn clock(bus: &mut impl FpgaBus) -> Result<u64, BusError> {
     Ok(u64::from(high) << 32 | u64::from(low))
 }
 
-/// What was written did not arrive.
+/// The value read back is not the value written.
 #[derive(Debug)]
 pub(crate) struct NotTaken;
 
@@ -87,14 +92,14 @@ impl From<BusError> for NotTaken {
     }
 }
 
-/// Ends whatever runs, and looks that the LEDs are off.
+/// Stops a run, and checks that the LEDs are off.
 pub(crate) fn go_dark(bus: &mut impl FpgaBus) -> Result<(), NotTaken> {
     control(bus, control::STOP)?;
     let lit = read(bus, Register::Status)? & (status::RUNNING | status::LEDS_ON);
     if lit == 0 { Ok(()) } else { Err(NotTaken) }
 }
 
-/// Stops, and clears the latched fault; what still stands against a start.
+/// Stops a run and clears the latched fault. The error is the fault that still forbids a start.
 pub(crate) fn acknowledge(bus: &mut impl FpgaBus) -> Result<(), Fault> {
     identify(bus)?;
     control(bus, control::STOP | control::CLEAR_FAULT).map_err(|_| SILENT)?;
@@ -126,7 +131,7 @@ pub(crate) fn set(bus: &mut impl FpgaBus, setup: &Setup, limits: &Limits) -> Res
     verify(bus, setup, limits)
 }
 
-/// Whether the settings still stand: an FPGA that has been reset has forgotten them.
+/// Checks that the FPGA still has its settings; a reset FPGA has lost them.
 pub(crate) fn verify(
     bus: &mut impl FpgaBus,
     setup: &Setup,
@@ -153,7 +158,8 @@ pub(crate) fn set_table(bus: &mut impl FpgaBus, table: &Words<'_>) -> Result<(),
     Ok(())
 }
 
-/// Starts a run (`control::START`) or raw burst (`control::START_RAW`); whether the FPGA took it.
+/// Starts a run (`control::START`) or raw burst (`control::START_RAW`), and reads how the FPGA
+/// responded.
 pub(crate) fn start(bus: &mut impl FpgaBus, command: u32) -> Result<Started, Fault> {
     control(bus, command).map_err(|_| SILENT)?;
     let status = health(bus)?;
@@ -168,10 +174,11 @@ pub(crate) fn start(bus: &mut impl FpgaBus, command: u32) -> Result<Started, Fau
     }
 }
 
-/// What a start has led to by the time its status is read.
+/// State of the FPGA when its status is read after a start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Started {
     Running,
-    /// Not running, and no reason against it: a few frames take less time than a register read.
+    /// The FPGA is not running and has no fault: the run is over already, because a few frames take
+    /// less time than a register read.
     OverAlready,
 }

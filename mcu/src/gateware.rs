@@ -1,12 +1,16 @@
-//! A bitstream on its way to the FPGA, piece by piece.
+//! Receives a bitstream from the host, piece by piece.
 //!
-//! The one law: the loader is told to finish only when every byte has come, in order, and the checksum over
-//! all of them is right.
+//! # Invariant
+//! The loader's `finish` is called only when every byte has come in order
+//! (`tests::loading::pieces_in_order_make_a_bitstream`,
+//! `tests::loading::a_piece_out_of_order_is_refused_and_the_right_one_still_taken`) and the
+//! checksum over all bytes is right
+//! (`tests::loading::a_wrong_checksum_is_found_at_the_end_and_nothing_is_finished`).
 
 use crate::{GatewareLoader, LoadError};
 use nirspi_wire::{Crc32, GatewareChunk, Refusal};
 
-/// A bitstream of which the beginning has come.
+/// A bitstream whose first bytes have come.
 #[derive(Debug)]
 pub(crate) struct Loading {
     total: u32,
@@ -15,8 +19,9 @@ pub(crate) struct Loading {
     received: Crc32,
 }
 
-/// Takes a piece; returns where the next one belongs. A piece at 0 starts over. A refused piece leaves what
-/// came before as it was; a loader's error or a wrong checksum forgets it.
+/// Takes a piece and returns the offset of the next piece. A piece at offset 0 starts a new
+/// bitstream. A refused piece changes nothing; a loader's error or a wrong checksum discards the
+/// bitstream.
 pub(crate) fn take(
     loading: &mut Option<Loading>,
     chunk: &GatewareChunk<'_>,

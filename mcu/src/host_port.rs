@@ -1,7 +1,8 @@
-//! The FPGA's host port as the camera's [`FpgaBus`]: which data to transfer, how long it is, and until when it is kept.
+//! The FPGA's host port as the camera's [`FpgaBus`]: which data to transfer, how long the data is,
+//! and how long to keep it.
 //!
-//! Register accesses are a few bytes, and done when the call returns. Frames and bursts are long, so the board
-//! moves them between two polls, by DMA where it has one:
+//! A register access is a few bytes and is complete when the call returns. Frames and bursts are
+//! long, so the board transfers them between two polls, by DMA where it has one:
 //!
 //! ```
 //! use nirspi_mcu::{BusError, HostPort, PortBus};
@@ -18,18 +19,22 @@
 //! }
 //! ```
 //!
-//! The one law: what has been transferred is given unchanged until the FPGA has been told to release it or to
-//! start anew; nothing older is ever given after that.
+//! # Invariant
+//! Transferred data is given unchanged until the FPGA gets a release or a new start
+//! (`tests::host_port::a_frame_is_transferred_once_and_given_until_it_is_released`). After a
+//! release, data from before it is never given again
+//! (`tests::host_port::after_a_release_an_older_frame_is_never_given`).
 
 use crate::{BusError, FpgaBus};
 use nirspi_wire::fpga::{MAX_FRAME_BYTES, frame_bytes};
 use nirspi_wire::host_port::{READ_FRAME, READ_RAW};
 use nirspi_wire::register::{Register, control};
 
-/// Times that a transfer is tried. The FPGA keeps the data until it is released.
+/// Number of attempts at a transfer. The FPGA keeps the data until the release.
 const ATTEMPTS: u8 = 3;
 
-/// Single accesses of the FPGA's host port, see [`nirspi_wire::host_port`]; and its two lines.
+/// Single accesses of the FPGA's host port (see [`nirspi_wire::host_port`]), and the port's two
+/// lines.
 pub trait HostPort {
     /// Writes a register.
     ///
@@ -60,13 +65,13 @@ enum Data {
 /// How far a transfer is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Transfer {
-    /// None asked for.
+    /// No transfer is asked for.
     None,
-    /// The board is to carry it out; this many attempts have failed.
+    /// The board must carry out this transfer; `failed` attempts have failed.
     Wanted { data: Data, failed: u8 },
-    /// The buffer holds it.
+    /// The buffer holds this data.
     Held(Data),
-    /// Not told yet.
+    /// The transfer failed; the camera has not been given the error yet.
     Failed(Data, BusError),
 }
 
@@ -76,7 +81,7 @@ pub struct PortBus<'b, P> {
     port: P,
     buffer: &'b mut [u8; MAX_FRAME_BYTES],
     transfer: Transfer,
-    /// As written last: the FPGA copies both when it starts.
+    /// The values written last. The FPGA copies both when it starts.
     patterns: u32,
     raw_samples: u32,
     frame_bytes: usize,
@@ -84,7 +89,8 @@ pub struct PortBus<'b, P> {
 }
 
 impl<'b, P: HostPort> PortBus<'b, P> {
-    /// An FPGA as after its reset. The buffer is lent because where it may lie is a matter of the board's DMA.
+    /// The bus of an FPGA after its reset. The buffer is a parameter because the board's DMA
+    /// decides where the buffer may lie.
     #[must_use]
     pub fn new(port: P, buffer: &'b mut [u8; MAX_FRAME_BYTES]) -> Self {
         let mut bus = Self {
@@ -100,13 +106,14 @@ impl<'b, P: HostPort> PortBus<'b, P> {
         bus
     }
 
-    /// The port, for its other lines.
+    /// The port, for access to its other lines.
     pub fn port(&mut self) -> &mut P {
         &mut self.port
     }
 
-    /// The transfer to carry out now, if any: the port, the opcode, and where the bytes go, all of them.
-    /// Then [`transferred`](Self::transferred) is to be called, before the camera is polled again.
+    /// The transfer to carry out now, if any: the port, the opcode, and the bytes to fill. After
+    /// the transfer, and before the next poll of the camera, the board must call
+    /// [`transferred`](Self::transferred).
     pub fn wanted(&mut self) -> Option<(&mut P, u8, &mut [u8])> {
         let Transfer::Wanted { data, .. } = self.transfer else { return None };
         let (opcode, length) = match data {
@@ -116,7 +123,7 @@ impl<'b, P: HostPort> PortBus<'b, P> {
         Some((&mut self.port, opcode, self.buffer.get_mut(..length)?))
     }
 
-    /// The wanted transfer is over.
+    /// Reports the end of the wanted transfer.
     pub fn transferred(&mut self, result: Result<(), BusError>) {
         let Transfer::Wanted { data, failed } = self.transfer else { return };
         let failed = failed.saturating_add(1);
@@ -145,7 +152,7 @@ impl<'b, P: HostPort> PortBus<'b, P> {
         }
     }
 
-    /// What was written to [`Register::Control`] ends what was there before.
+    /// Discards what the bits written to [`Register::Control`] end.
     fn note_control(&mut self, bits: u32) {
         let starts = bits & (control::START | control::START_RAW) != 0;
         let is_frame = match self.transfer {
@@ -162,7 +169,7 @@ impl<'b, P: HostPort> PortBus<'b, P> {
         }
     }
 
-    /// The FPGA refuses to start with settings beyond the buffer's length.
+    /// Copies the lengths for the next run. The FPGA refuses settings that do not fit the buffer.
     fn take_lengths(&mut self) {
         let within = |length: usize| length.min(MAX_FRAME_BYTES);
         let patterns = u16::try_from(self.patterns).unwrap_or(u16::MAX);

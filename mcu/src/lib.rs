@@ -1,8 +1,9 @@
 //! Firmware logic of the nirspi camera: every decision, no hardware.
 //!
-//! A board owns the peripherals and a loop; [`Camera`] owns everything that a test would want to see. The
-//! board hands it bytes from the host ([`Camera::receive`]) and calls [`Camera::poll`] as often as it can,
-//! with the time, its sensors and its [`Ports`]. Neither call waits, allocates, panics or reads a clock.
+//! A board owns the peripherals and a loop; [`Camera`] owns all logic that tests check. The board
+//! passes bytes from the host to [`Camera::receive`] and calls [`Camera::poll`] as often as it can,
+//! with the time, its sensors and its [`Ports`]. Neither call waits, allocates, panics or reads a
+//! clock.
 //!
 //! ```
 //! use nirspi_mcu::{Camera, FpgaBus, GatewareLoader, Inputs, Micros, PacketSink, Ports, Progress};
@@ -21,10 +22,11 @@
 //! }
 //! ```
 //!
-//! One idea a module. `camera` is what a board calls; `commands` (of the host) and `poll` (safety rules, then one step)
-//! drive the `machine`, which holds the state. The machine's parts know nothing of the machine: `run` and `burst`
-//! (data), `selftest`, `gateware`, `configure` (checks), `safety` (sensors), `fpga` (registers), `notices` (replies and
-//! events that wait for the link), `packets` (a message into the link). `host_port` says which bytes a board moves.
+//! Each module has one idea. `camera` is what a board calls; `commands` (of the host) and `poll`
+//! (safety rules, then one step) drive the `machine`, which holds the state. The parts of the
+//! machine do not use the machine: `run` and `burst` (data), `selftest`, `gateware`, `configure`
+//! (checks), `safety` (sensors), `fpga` (registers), `notices` (replies and events that wait for
+//! the link), `packets` (a message into the link). `host_port` says which bytes a board transfers.
 #![no_std]
 #![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 #![deny(clippy::arithmetic_side_effects)]

@@ -1,6 +1,6 @@
 //! Limits that protect people, LEDs and the measurement.
 //!
-//! The one law: a limit is a number of the board, set when it is built; no command changes one.
+//! The board sets its limits when it is built; no command changes a limit.
 
 use crate::time::Micros;
 use nirspi_wire::message::HOST_SILENCE_US;
@@ -13,21 +13,22 @@ pub struct Limits {
     pub host_silence: Micros,
     /// Largest share of the array lit, in thousandths, over any of the FPGA's duty windows.
     pub duty_permille_max: u16,
-    /// At and above this the LEDs go off.
+    /// Temperature at and above which the LEDs go off.
     pub trip_centi_celsius: i16,
-    /// An over-temperature can be acknowledged at and below this.
+    /// Temperature at and below which the host can acknowledge an over-temperature.
     pub release_centi_celsius: i16,
     /// Readings below this mean a broken sensor.
     pub plausible_min_centi_celsius: i16,
     /// Readings above this mean a broken sensor.
     pub plausible_max_centi_celsius: i16,
-    /// A run has stalled when no frame came for this many times a frame's duration...
+    /// A run has stalled when no frame came for this many times a frame's duration and for at least
+    /// `stall_min`.
     pub stall_frames: u32,
-    /// ...and for at least this long, which short frames need.
+    /// Shortest time without a frame that counts as a stall; short frames need this minimum.
     pub stall_min: Micros,
-    /// How often the FPGA's identity, status and fault are looked at during a run.
+    /// Time between two checks of the FPGA's identity, status and fault during a run.
     pub running_check: Micros,
-    /// The same while LEDs are off.
+    /// Time between two checks while the LEDs are off.
     pub resting_check: Micros,
     /// The FPGA ends a run after this many clocks of 8 ns without an access from the firmware; 1 to
     /// [`register::WATCHDOG_MAX`], and longer than `running_check`.
@@ -64,7 +65,7 @@ impl Default for Limits {
 }
 
 impl Limits {
-    /// Light that the FPGA lets pass in each window: the full array lit costs 2 a clock.
+    /// Light that the FPGA allows in each window; the full array lit costs 2 a clock.
     pub(crate) fn duty_budget(&self) -> u32 {
         let full = 2 * u64::from(register::DUTY_WINDOW);
         let budget = full.saturating_mul(self.duty_permille_max.into()) / 1000;

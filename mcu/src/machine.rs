@@ -1,7 +1,8 @@
 //! The state of the camera, and every change of it that switches LEDs, answers a command or reports an event.
 //!
-//! A part that is busy (a run, a raw burst, a test frame) says what its step came to; the machine draws the
-//! consequence. The parts know nothing of the machine, so each can be read and tested alone.
+//! A busy part (a run, a raw burst, a test frame) returns the outcome of its step, and the machine
+//! acts on the outcome. The parts do not use the machine, so each part can be read and tested
+//! alone.
 //!
 //! # Invariant
 //! A fault switches the LEDs off before the call that found the fault returns
@@ -15,20 +16,23 @@ use crate::notices::{Notice, Notices, Outcome};
 use crate::run::{self, Counters, Fpga, Run, SAMPLE_BYTES};
 use crate::selftest::{self, TestFrame};
 use crate::{BoardInfo, Crash, FpgaBus, Inputs, Limits, Micros, PacketSink, fpga, safety};
-use nirspi_wire::{Answer, Event, EventKind, Fault, RebootInto, Refusal, RunLength, State};
+use nirspi_wire::{
+    Answer, Event, EventKind, Fault, RebootInto, Refusal, RunLength, State, version,
+};
 
-/// What is known of the host.
+/// State of the session with the host.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Session {
     /// No `Hello` since power-up or since the link was closed.
     Closed,
-    /// The host speaks this protocol.
-    Open,
-    /// The host speaks another protocol: the camera names its own version, and answers nothing else.
+    /// Host and camera speak this protocol version.
+    Open { protocol: u16 },
+    /// The host speaks a version that this firmware does not. The camera answers with its own
+    /// version and nothing else.
     Foreign,
 }
 
-/// What the FPGA is busy with.
+/// What occupies the FPGA.
 #[derive(Debug)]
 pub(crate) enum Activity {
     Resting,
@@ -37,7 +41,7 @@ pub(crate) enum Activity {
     TestFrame(TestFrame),
 }
 
-/// All of the camera but the bytes of a half-received command.
+/// The whole camera except the bytes of a half-received command.
 #[derive(Debug)]
 pub(crate) struct Machine {
     pub info: BoardInfo,
@@ -51,15 +55,15 @@ pub(crate) struct Machine {
     pub counters: Counters,
     pub loading: Option<Loading>,
     pub reboot: Option<RebootInto>,
-    /// The crash that ended the last start, until the host has been told.
+    /// The crash that ended the last start, until a host has got the crash report.
     pub crash: Option<Crash>,
     pub commands_damaged: u32,
     pub last_command: Micros,
     /// When the FPGA's status was last read.
     pub last_check: Option<Micros>,
-    /// The FPGA has not confirmed that the LEDs are off.
+    /// The FPGA has not confirmed yet that the LEDs are off.
     pub off_pending: bool,
-    /// The bus failed when a frame was to be released.
+    /// The bus failed during the release of a frame.
     pub release_pending: bool,
     /// Samples of a frame or distances of a map, on their way into a packet.
     pub scratch: [u8; SAMPLE_BYTES],
@@ -97,7 +101,7 @@ impl Machine {
         }
     }
 
-    /// The configuration to start with, if nothing stands against a start.
+    /// The configuration for a start, if nothing forbids a start.
     fn ready_setup(&self) -> Result<Setup, Refusal> {
         match (self.fault, self.state(), self.setup) {
             (Some(fault), ..) => Err(Refusal::Fault(fault)),
@@ -110,9 +114,17 @@ impl Machine {
         matches!(self.fault, Some(Fault::FpgaAbsent { .. }))
     }
 
+    /// The protocol version of the session; `None` without a session.
+    pub fn protocol(&self) -> Option<u16> {
+        match self.session {
+            Session::Open { protocol } => Some(protocol),
+            Session::Closed | Session::Foreign => None,
+        }
+    }
+
     /// Whether frames may go out: a host listens, and no reply or event waits.
     pub fn may_stream(&self) -> bool {
-        self.session == Session::Open && self.notices.is_empty()
+        self.protocol().is_some() && self.notices.is_empty()
     }
 
     pub fn reply(&mut self, id: u16, outcome: Outcome) {
@@ -122,13 +134,14 @@ impl Machine {
     /// Reports an event to a host that speaks this protocol. Without such a host the event is not kept: the next host
     /// learns the state from `Status`.
     pub fn notify(&mut self, now: Micros, kind: EventKind) {
-        if self.session == Session::Open {
+        if self.protocol().is_some() {
             self.notices.push(Notice::Event(Event { device_time_us: now.0, kind }));
         }
     }
 
     pub fn flush(&mut self, sink: &mut impl PacketSink) -> bool {
-        self.notices.flush(&self.info, &mut self.crash, sink)
+        let protocol = self.protocol().unwrap_or(version::CURRENT);
+        self.notices.flush(protocol, &self.info, &mut self.crash, sink)
     }
 
     /// Switches the LEDs off. Every poll repeats this until the FPGA says that the LEDs are off.
@@ -177,7 +190,7 @@ impl Machine {
         Ok(())
     }
 
-    /// At most one frame, then the end of the run if it has come.
+    /// Sends at most one frame, then ends the run if it is over.
     pub fn step_run(
         &mut self,
         now: Micros,
@@ -206,7 +219,7 @@ impl Machine {
         worked
     }
 
-    /// LEDs off; `reply` and `RunEnded` follow the last frame.
+    /// Switches the LEDs off. `reply` and `RunEnded` follow the last frame.
     pub fn end_run(&mut self, now: Micros, reply: Option<(u16, Outcome)>, bus: &mut impl FpgaBus) {
         self.leds_off(bus);
         if let Activity::Run(run) = &mut self.activity {
@@ -215,7 +228,7 @@ impl Machine {
         self.wind_up(now, bus);
     }
 
-    /// Ends a run whose LEDs are off once its last frame is through.
+    /// Ends a run whose LEDs are off, once its last frame has been sent or counted.
     fn wind_up(&mut self, now: Micros, bus: &mut impl FpgaBus) {
         let fpga = match (self.fpga_is_absent(), self.off_pending) {
             (true, _) => Fpga::Absent,
@@ -249,7 +262,7 @@ impl Machine {
         Ok(())
     }
 
-    /// At most one piece.
+    /// Sends at most one piece.
     pub fn step_burst(
         &mut self,
         now: Micros,
@@ -272,7 +285,7 @@ impl Machine {
         true
     }
 
-    /// `SelfTest`; the reply comes when the test frame is through.
+    /// `SelfTest`. The reply comes after the test frame.
     pub fn self_test(&mut self, id: u16, now: Micros, inputs: &Inputs, bus: &mut impl FpgaBus) {
         let report = selftest::examine(bus, inputs, &self.limits);
         let may_light = report.failed == 0
@@ -290,7 +303,7 @@ impl Machine {
         }
     }
 
-    /// Takes the test frame if it has come.
+    /// Checks the test frame if it has come.
     pub fn step_test(&mut self, now: Micros, bus: &mut impl FpgaBus) -> bool {
         let Activity::TestFrame(test) = &self.activity else { return false };
         let Some(passed) = test.step(now, bus) else { return false };
@@ -298,7 +311,7 @@ impl Machine {
         true
     }
 
-    /// LEDs off, the configuration back in place, and the reply.
+    /// Switches the LEDs off, restores the configuration, and replies.
     fn finish_test(&mut self, passed: bool, bus: &mut impl FpgaBus) {
         let Activity::TestFrame(test) = &self.activity else { return };
         let (id, report) = test.verdict(passed);
@@ -313,7 +326,7 @@ impl Machine {
         self.reply(id, Outcome::Other(Ok(Answer::SelfTest(report))));
     }
 
-    /// The host is gone: LEDs off, and what was begun for that host is forgotten.
+    /// Ends the session: LEDs off, and everything begun for that host is forgotten.
     pub fn close(&mut self, bus: &mut impl FpgaBus) {
         self.leds_off(bus);
         if let Activity::Run(_) = self.activity {

@@ -1,25 +1,30 @@
-//! Packets into transfers of one length: what a USB bulk endpoint moves fastest is full packets.
+//! Merges packets into transfers of one length, because a USB bulk endpoint is fastest with full
+//! packets.
 //!
-//! The one law: every byte goes out once, in order, and none waits while nothing follows it: the last transfer
-//! is a short one, or an empty one where the bytes end with a full transfer, since only that ends a bulk read.
+//! # Invariant
+//! Every byte goes out once and in order, and only the last transfer is short
+//! (`tests::merge::every_byte_goes_out_once_in_order_and_only_the_last_transfer_is_short`). Bytes
+//! that end with a full transfer are followed by an empty transfer, because a bulk read ends only
+//! with a short transfer
+//! (`tests::merge::bytes_that_end_with_a_full_transfer_are_followed_by_an_empty_one`).
 
 /// Gathers bytes into transfers of `N`.
 #[derive(Debug)]
 pub struct Merger<const N: usize> {
     bytes: [u8; N],
     filled: usize,
-    /// The last transfer was full, so the reader still waits for the end.
+    /// The last transfer was full, so the reader still waits for a short one.
     open: bool,
 }
 
 impl<const N: usize> Merger<N> {
-    /// With nothing in it.
+    /// An empty merger.
     #[must_use]
     pub const fn new() -> Self {
         Self { bytes: [0; N], filled: 0, open: false }
     }
 
-    /// Takes bytes as far as there is room; returns how many.
+    /// Takes bytes while there is room, and returns how many.
     pub fn take(&mut self, bytes: &[u8]) -> usize {
         let Some(room) = self.bytes.get_mut(self.filled..) else { return 0 };
         let length = room.len().min(bytes.len());
@@ -30,19 +35,20 @@ impl<const N: usize> Merger<N> {
         length
     }
 
-    /// There is no room for more.
+    /// Whether there is no room for more bytes.
     #[must_use]
     pub const fn is_full(&self) -> bool {
         self.filled >= N
     }
 
-    /// Nothing is to be sent, not even an end.
+    /// Whether nothing waits, not even an empty transfer.
     #[must_use]
     pub const fn is_done(&self) -> bool {
         self.filled == 0 && !self.open
     }
 
-    /// The transfer to send now that it is full or nothing follows; empty where it only ends a bulk read.
+    /// The transfer to send now, because it is full or no bytes follow. An empty transfer only ends
+    /// a bulk read.
     pub fn transfer(&mut self) -> &[u8] {
         let length = core::mem::take(&mut self.filled);
         self.open = length >= N;

@@ -1,24 +1,27 @@
 //! Replies and events that wait for room on the link.
 //!
 //! # Invariant
-//! What is put in comes out once, in order. A command is taken only while there is
-//! [room](Notices::has_room_for_a_command) for its reply and for every event that the command can lead to:
-//! `tests::laws::each_command_is_answered_once_and_in_order`.
+//! Every notice comes out once, in the order in which it was put in. A command is taken only while
+//! there is [room](Notices::has_room_for_a_command) for its reply and for every event that the
+//! command can cause (`tests::laws::each_command_is_answered_once_and_in_order`).
 
 use crate::packets::send;
 use crate::{BoardInfo, Crash, PacketSink};
 use heapless::Deque;
 use nirspi_wire::message::CRASH_TEXT_MAX;
 use nirspi_wire::{
-    ADC_BITS, ADC_HZ, Answer, CrashReport, DeviceMessage, Event, Identity, PROTOCOL_VERSION,
-    Refusal, Reply, SIDE, Version, WAVELENGTH_NM,
+    ADC_BITS, ADC_HZ, Answer, Capabilities, CrashReport, DeviceMessage, Event, Identity, Refusal,
+    Reply, SIDE, Tail, Version, WAVELENGTH_NM,
 };
 
-/// A command's outcome that borrows nothing.
+/// The outcome of a command, without borrowed data.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Outcome {
-    /// The rest of the identity is filled in when it is sent.
+    /// `Hello`. The rest of the identity is filled in when the reply is sent.
     Hello {
+        /// Protocol version of the session, or the newest version of this firmware where there is
+        /// no session.
+        protocol: u16,
         gateware: Version,
     },
     Other(Result<Answer<'static>, Refusal>),
@@ -35,18 +38,19 @@ pub(crate) enum Notice {
         outcome: Outcome,
     },
     Event(Event),
-    /// Of the last start.
+    /// The report of the crash that ended the last start.
     Crash,
 }
 
-/// Notices that wait.
+/// Number of notices that can wait.
 const CAPACITY: usize = 16;
 
-/// The most that one command can lead to before the next one is taken: its reply, a fault, the end of a
-/// run (or the loss of a raw burst), a crash report.
+/// Largest number of notices that one command can cause before the next command is taken: its
+/// reply, a fault, the end of a run (or the loss of a raw burst), and a crash report.
 const NOTICES_OF_A_COMMAND: usize = 4;
 
-/// Bytes of postcard of the longest notice, a crash report; an identity with two full names is 91 at most.
+/// Longest notice in bytes of postcard: a crash report. An identity with two full names has at most
+/// 96 bytes.
 const NOTICE_BYTES: usize = 16 + CRASH_TEXT_MAX;
 
 /// Replies and events in the order in which they came.
@@ -71,9 +75,11 @@ impl Notices {
         self.0.clear();
     }
 
-    /// Sends what the link has room for; whether that was anything.
+    /// Sends what the link has room for; true if anything was sent. A notice that version
+    /// `protocol` does not have is dropped.
     pub fn flush(
         &mut self,
+        protocol: u16,
         info: &BoardInfo,
         crash: &mut Option<Crash>,
         sink: &mut impl PacketSink,
@@ -81,6 +87,7 @@ impl Notices {
         let mut worked = false;
         while let Some(notice) = self.0.front() {
             let sent = message(notice, info, crash.as_ref())
+                .filter(|message| message.since() <= protocol)
                 .is_none_or(|message| send(&message, NOTICE_BYTES, sink));
             if !sent {
                 break;
@@ -95,7 +102,7 @@ impl Notices {
     }
 }
 
-/// `None`: a crash that has been reported already.
+/// The message of a notice. `None`: a crash that has been reported already.
 fn message<'m>(
     notice: &Notice,
     info: &'m BoardInfo,
@@ -110,9 +117,9 @@ fn message<'m>(
         Notice::Reply { id, outcome: Outcome::Other(outcome) } => {
             DeviceMessage::Reply(Reply { id, outcome })
         }
-        Notice::Reply { id, outcome: Outcome::Hello { gateware } } => {
+        Notice::Reply { id, outcome: Outcome::Hello { protocol, gateware } } => {
             let identity = Identity {
-                protocol: PROTOCOL_VERSION,
+                protocol,
                 firmware: info.firmware,
                 gateware,
                 board: &info.board,
@@ -121,6 +128,7 @@ fn message<'m>(
                 adc_hz: ADC_HZ,
                 adc_bits: ADC_BITS,
                 wavelength_nm: WAVELENGTH_NM,
+                capabilities: Tail((protocol >= Capabilities::SINCE).then_some(info.capabilities)),
             };
             DeviceMessage::Reply(Reply { id, outcome: Ok(Answer::Hello(identity)) })
         }

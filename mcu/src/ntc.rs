@@ -1,12 +1,14 @@
-//! Temperature from a thermistor and the converter's reading, in integers.
+//! Temperature from the converter's reading of a thermistor, in integers.
 //!
-//! The thermistor is a 10 kilohm NTC with B(25/85) = 3434 K (Murata NCP15XH103 and its many equals), between
-//! the converter's input and ground; [`SERIES_OHM`] lie between the input and the converter's own reference, so
-//! that the reading is a ratio and the supply does not matter. The table is the data sheet's formula
-//! `R = 10 kilohm exp(B (1/T - 1/298.15 K))`; a test computes it anew.
+//! The thermistor is a 10 kilohm NTC with B(25/85) = 3434 K (for example Murata NCP15XH103),
+//! between the converter's input and ground. [`SERIES_OHM`] lie between the input and the
+//! converter's own reference, so the reading is a ratio and does not depend on the supply. The
+//! table is the data sheet's formula `R = 10 kilohm exp(B (1/T - 1/298.15 K))`
+//! (`tests::the_table_is_the_formula`).
 //!
-//! The one law: a reading that no thermistor between -40 and 125 degrees gives, as of a broken or shorted
-//! line, is no temperature.
+//! # Invariant
+//! A reading outside the range from -40 to 125 degrees Celsius, as a broken or shorted line gives,
+//! is not a temperature (`tests::a_broken_or_shorted_line_is_no_temperature`).
 
 /// Resistor from the converter's reference to the input.
 pub const SERIES_OHM: u32 = 10_000;
@@ -14,15 +16,16 @@ pub const SERIES_OHM: u32 = 10_000;
 const FIRST_CENTI_CELSIUS: i32 = -4_000;
 const STEP_CENTI_CELSIUS: i32 = 500;
 
-/// `65536 R / (R + SERIES_OHM)` at -40, -35, ... 125 degrees Celsius; falls.
+/// `65536 R / (R + SERIES_OHM)` at -40, -35, ... 125 degrees Celsius; falling.
 const RATIOS: [u16; 34] = [
     62996, 62124, 61027, 59676, 58044, 56117, 53889, 51374, 48600, 45611, 42466, 39231, 35976,
     32768, 29665, 26714, 23951, 21398, 19064, 16951, 15053, 13359, 11854, 10522, 9346, 8310, 7398,
     6596, 5891, 5270, 4724, 4242, 3817, 3441,
 ];
 
-/// Hundredths of a degree Celsius, where 65536 is the converter's full scale: a reading of `n` bits is to be
-/// shifted left by `16 - n`. Interpolated, to 0.2 degrees of the formula.
+/// Temperature in hundredths of a degree Celsius; 65536 is the converter's full scale. The caller
+/// shifts a reading of `n` bits left by `16 - n`. Interpolation agrees with the formula to 0.2
+/// degrees.
 #[must_use]
 pub fn centi_celsius(ratio: u16) -> Option<i16> {
     let colder = RATIOS.iter();

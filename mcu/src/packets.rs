@@ -1,13 +1,14 @@
-//! A message into the link: encoded in the link's own memory, whole or not at all.
+//! Encodes a message in the link's own memory, whole or not at all.
 
 use crate::PacketSink;
 use nirspi_wire::DeviceMessage;
 use nirspi_wire::packet::{encode, overhead};
 
-/// Bytes of postcard around the samples of a frame, a raw burst or a depth map, at most.
+/// Largest number of postcard bytes around the samples of a frame, a raw burst or a depth map.
 pub(crate) const STREAM_HEADER_BYTES: usize = 64;
 
-/// Sends a message of at most `payload` bytes of postcard; `false`: the link has no room for it.
+/// Sends a message of at most `payload` bytes of postcard; `false`: the link has no room for the
+/// message.
 pub(crate) fn send(
     message: &DeviceMessage<'_>,
     payload: usize,

@@ -1,9 +1,10 @@
-//! What happens at each poll: safety rules first, then waiting replies, then one step of what the FPGA is busy with.
+//! The work of one poll: safety rules first, then waiting replies, then one step of the FPGA's
+//! activity.
 //!
 //! # Invariant
 //! LEDs are on only while the camera is running, whatever the link, the host or the FPGA do
-//! (`tests::laws::nothing_panics_and_light_means_running`). A bus that fails is asked again on every poll, and the
-//! FPGA's own watchdog ends the run meanwhile
+//! (`tests::laws::nothing_panics_and_light_means_running`). After a bus failure every poll repeats
+//! the command to stop, and the FPGA's own watchdog ends the run meanwhile
 //! (`tests::safety::a_dead_bus_is_an_absent_fpga_and_is_told_again_to_stop_on_every_poll`).
 
 use crate::machine::{Activity, Machine};
@@ -19,7 +20,7 @@ impl Machine {
         ports: &mut Ports<'_, B, S, G>,
     ) -> Progress {
         let Ports { bus, sink, .. } = ports;
-        // While a bitstream is on its way there is no FPGA to talk to, and none that lights anything.
+        // While a bitstream is loaded, the FPGA has no host port and lights no LED.
         if self.off_pending && self.loading.is_none() {
             self.leds_off(*bus);
         }
@@ -58,7 +59,7 @@ impl Machine {
         }
     }
 
-    /// Looks at the FPGA where it is time to.
+    /// Checks the FPGA when a check is due.
     fn guard_fpga(&mut self, now: Micros, bus: &mut impl FpgaBus) {
         let resting = matches!(self.activity, Activity::Resting);
         let period = if resting { self.limits.resting_check } else { self.limits.running_check };
@@ -77,7 +78,7 @@ impl Machine {
                     self.run_is_over(now, bus);
                 }
             }
-            // Left over from before a restart of the firmware alone, say.
+            // LEDs at rest may be on after a restart of the firmware alone.
             Activity::Resting | Activity::Run(_) => {
                 if status & (status::RUNNING | status::LEDS_ON) != 0 {
                     self.leds_off(bus);
@@ -87,7 +88,7 @@ impl Machine {
         }
     }
 
-    /// The FPGA is not running any more, and has no fault.
+    /// Acts on an FPGA that is not running any more and has no fault.
     fn run_is_over(&mut self, now: Micros, bus: &mut impl FpgaBus) {
         let Activity::Run(run) = &self.activity else { return };
         let made = fpga::read(bus, Register::FramesMade).unwrap_or(0);
@@ -99,8 +100,8 @@ impl Machine {
         }
     }
 
-    /// No command is taken while a reply is owed that needs more than the command itself: the end of a run, a test
-    /// frame, a restart.
+    /// Whether a command can be taken. No command is taken while a reply waits for the end of a
+    /// run, a test frame or a restart.
     pub fn takes_commands(&self) -> bool {
         let busy = match &self.activity {
             Activity::Resting | Activity::Burst(_) => false,

@@ -1,12 +1,14 @@
-//! What a board lends the firmware: the FPGA, the link to the host, a bitstream loader, its sensors.
+//! The interfaces that a board implements for the firmware: the FPGA, the link to the host, a
+//! bitstream loader, its sensors.
 //!
-//! The one law: no call waits. What is not done yet says so, and is asked again on a later poll.
+//! No call waits. An operation that is not complete says so, and the firmware asks again on a later
+//! poll.
 
 use crate::Micros;
 use heapless::String;
-use nirspi_wire::{RebootInto, Version};
+use nirspi_wire::{Capabilities, RebootInto, Version};
 
-/// Why the FPGA could not be reached.
+/// Why an access to the FPGA failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BusError {
     /// The transfer did not complete in time.
@@ -17,13 +19,13 @@ pub enum BusError {
 
 /// The FPGA's host port: registers of [`nirspi_wire::register`], frames of [`nirspi_wire::fpga`].
 ///
-/// A register access is a few bytes and is done when the call returns. Every access, of registers or of
-/// data, keeps the FPGA's watchdog from ending a run.
+/// A register access is a few bytes and is complete when the call returns. Every access, to a
+/// register or to data, restarts the FPGA's watchdog.
 pub trait FpgaBus {
     /// Reads a register.
     ///
     /// # Errors
-    /// [`BusError`]; an FPGA that is not there usually reads as all zeros or all ones instead.
+    /// [`BusError`]. A missing FPGA usually reads as all zeros or all ones instead.
     fn read(&mut self, address: u16) -> Result<u32, BusError>;
 
     /// Writes a register.
@@ -32,37 +34,37 @@ pub trait FpgaBus {
     /// [`BusError`].
     fn write(&mut self, address: u16, value: u32) -> Result<(), BusError>;
 
-    /// Level of the FPGA's line: a frame is ready. Falls with `CONTROL.RELEASE`.
+    /// Level of the FPGA's line: a frame is ready. The line falls with `CONTROL.RELEASE`.
     fn frame_ready(&mut self) -> bool;
 
     /// Whether a raw burst can be read.
     fn raw_ready(&mut self) -> bool;
 
-    /// The whole frame that is ready; `None` while it is being transferred. The same bytes again until
-    /// `CONTROL.RELEASE` is written.
+    /// The whole frame that is ready; `None` during its transfer. Each call gives the same bytes
+    /// until `CONTROL.RELEASE` is written.
     ///
     /// # Errors
-    /// [`BusError`]; the frame is then given up and released.
+    /// [`BusError`]; the firmware then discards and releases the frame.
     fn frame(&mut self) -> Result<Option<&[u8]>, BusError>;
 
-    /// The whole raw burst that is ready, little-endian `u16` samples; `None` while it is being
-    /// transferred. The same bytes again until the next start.
+    /// The whole raw burst that is ready, as little-endian `u16` samples; `None` during its
+    /// transfer. Each call gives the same bytes until the next start.
     ///
     /// # Errors
-    /// [`BusError`]; the burst is then given up.
+    /// [`BusError`]; the firmware then discards the burst.
     fn raw(&mut self) -> Result<Option<&[u8]>, BusError>;
 
-    /// The memory that frames are transferred into, for the self-test to overwrite; what was held there is given
-    /// up. `None` where there is none of its own.
+    /// The frame buffer, lent to the memory self-test; its contents are lost. `None` if this bus
+    /// has no buffer.
     fn memory(&mut self) -> Option<&mut [u8]> {
         None
     }
 }
 
-/// The link towards the host: whole packets or nothing.
+/// The link towards the host. It takes whole packets or nothing.
 pub trait PacketSink {
-    /// Room for one packet of at most `length` bytes; `None`: the link is full, which is back-pressure and
-    /// no error. Claimed room that is never committed is given back by the next claim.
+    /// Room for one packet of at most `length` bytes; `None`: the link is full, which is
+    /// back-pressure and not an error. The next claim takes back room that was not committed.
     fn claim(&mut self, length: usize) -> Option<&mut [u8]>;
 
     /// Sends the first `length` bytes of the claimed room.
@@ -72,13 +74,13 @@ pub trait PacketSink {
 /// Why a bitstream could not be loaded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LoadError {
-    /// This board cannot load gateware, or none of this length.
+    /// This board cannot load gateware, or not a bitstream of this length.
     Unsupported,
-    /// FPGA or flash did not take it.
+    /// The FPGA or the flash memory did not accept the bitstream.
     Device,
 }
 
-/// Where a bitstream goes. A second `begin` forgets what an unfinished first one wrote.
+/// The destination of a bitstream. A second `begin` discards an unfinished bitstream.
 pub trait GatewareLoader {
     /// Prepares for a bitstream of `total` bytes.
     ///
@@ -92,23 +94,24 @@ pub trait GatewareLoader {
     /// [`LoadError`].
     fn write(&mut self, data: &[u8]) -> Result<(), LoadError>;
 
-    /// All bytes were written and their checksum is right: makes them count.
+    /// Puts the bitstream into effect. All bytes have been written and their checksum is right.
     ///
     /// # Errors
     /// [`LoadError`].
     fn finish(&mut self) -> Result<(), LoadError>;
 
-    /// The FPGA does not answer: it does not run what was loaded last.
+    /// The FPGA does not answer, so it is not known to run the bitstream loaded last.
     fn forget(&mut self) {}
 
-    /// Goes on with what `finish` began, for a millisecond at most; whether there is more to do. The camera is not
-    /// to be polled until there is not: meanwhile there is no FPGA to talk to, and none that lights anything.
+    /// Continues what `finish` began, for a millisecond at most; true if there is more to do. Until
+    /// `step` returns false, the board does not poll the camera: meanwhile the FPGA has no host
+    /// port and lights no LED.
     fn step(&mut self, _now: Micros) -> bool {
         false
     }
 }
 
-/// The loader of a board that has none.
+/// The loader of a board without gateware loading.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct NoLoader;
 
@@ -126,18 +129,18 @@ impl GatewareLoader for NoLoader {
     }
 }
 
-/// All that a board lends for one call.
+/// Everything that a board lends for one call.
 #[derive(Debug)]
 pub struct Ports<'p, B, S, G> {
     /// The FPGA.
     pub bus: &'p mut B,
     /// The link towards the host.
     pub sink: &'p mut S,
-    /// Where bitstreams go.
+    /// The destination of bitstreams.
     pub loader: &'p mut G,
 }
 
-/// Sensors, sampled by the board for every call.
+/// Sensor readings that the board takes for every call.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Inputs {
     /// The enclosure's interlock.
@@ -149,7 +152,7 @@ pub struct Inputs {
 /// Longest board name and serial number, in bytes.
 pub const NAME_BYTES: usize = 32;
 
-/// Who the device is.
+/// Identity of the device.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct BoardInfo {
     /// Name of its folder under `boards/`, or `virtual`.
@@ -158,13 +161,22 @@ pub struct BoardInfo {
     pub serial: String<NAME_BYTES>,
     /// Firmware version.
     pub firmware: Version,
+    /// What the device can do.
+    pub capabilities: Capabilities,
 }
 
 impl BoardInfo {
-    /// Of both names the first [`NAME_BYTES`] bytes at most are kept, in whole characters.
+    /// Keeps the first [`NAME_BYTES`] bytes of both names, in whole characters.
     #[must_use]
     pub fn new(board: &str, serial: &str, firmware: Version) -> Self {
-        Self { board: cut(board), serial: cut(serial), firmware }
+        let capabilities = Capabilities::default();
+        Self { board: cut(board), serial: cut(serial), firmware, capabilities }
+    }
+
+    /// The same board with one more capability.
+    #[must_use]
+    pub fn can(self, capability: Capabilities) -> Self {
+        Self { capabilities: self.capabilities.with(capability), ..self }
     }
 }
 
@@ -178,11 +190,11 @@ fn cut(text: &str) -> String<NAME_BYTES> {
     name
 }
 
-/// What a poll did.
+/// Outcome of a poll.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Progress {
-    /// Something was sent or taken: poll again before sleeping.
+    /// Something was sent or taken: the board polls again before it sleeps.
     pub worked: bool,
-    /// The board is to restart now: the reply that promises it has been given to the link.
+    /// The board must restart now; the link already holds the reply that promises the restart.
     pub reboot: Option<RebootInto>,
 }

@@ -1,9 +1,9 @@
-//! A run: frames from the FPGA to the link, and the count of every one of them.
+//! A run: transfers frames from the FPGA to the link, and counts every frame.
 //!
 //! # Invariant
 //! When a run has ended,
-//! `frames_made = frames_sent + frames_dropped + fpga_frames_lost + fpga_frames_corrupt`:
-//! `tests::laws::every_frame_made_is_sent_or_counted_and_the_run_ends_once`.
+//! `frames_made = frames_sent + frames_dropped + fpga_frames_lost + fpga_frames_corrupt`
+//! (`tests::laws::every_frame_made_is_sent_or_counted_and_the_run_ends_once`).
 
 use crate::configure::Setup;
 use crate::notices::Outcome;
@@ -16,8 +16,8 @@ use nirspi_wire::{
     ConfigField, DeviceMessage, EventKind, Fault, Frame, PATTERNS, Refusal, RunLength, Samples,
 };
 
-/// Longest time that the end of a run waits for frames that the FPGA says it has made. A transfer of the
-/// longest frame takes well under a millisecond.
+/// Longest time that the end of a run waits for frames that the FPGA has counted as made. A
+/// transfer of the longest frame takes well under a millisecond.
 const DRAIN_PATIENCE: Micros = Micros(100_000);
 
 /// Bytes of the samples of the longest frame.
@@ -26,22 +26,23 @@ pub(crate) const SAMPLE_BYTES: usize = 4 * PATTERNS as usize;
 /// Frames of this run or the last one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Counters {
-    /// Number of the run since power-up; 0: none yet.
+    /// Number of the run since power-up; 0 before the first run.
     pub run: u16,
-    /// Completed by the FPGA.
+    /// Frames completed by the FPGA.
     pub made: u32,
-    /// Given to the link.
+    /// Frames given to the link.
     pub sent: u32,
-    /// Dropped whole: the link had no room.
+    /// Frames dropped whole because the link had no room.
     pub dropped: u32,
-    /// Lost in the FPGA: not released in time.
+    /// Frames lost in the FPGA, because the frame before was not released in time.
     pub lost: u32,
-    /// Damaged on the way from the FPGA.
+    /// Frames damaged between the FPGA and the firmware.
     pub corrupt: u32,
 }
 
 impl Counters {
-    /// Takes the FPGA's own counters, if it answers; one that has been reset meanwhile takes nothing back.
+    /// Reads the FPGA's own counters, if the FPGA answers. Counters of an FPGA that was reset
+    /// change nothing.
     pub fn read(&mut self, bus: &mut impl FpgaBus) -> Result<(), Fault> {
         fpga::identify(bus)?;
         let made = fpga::read(bus, Register::FramesMade).map_err(|_| fpga::SILENT)?;
@@ -50,7 +51,8 @@ impl Counters {
         Ok(())
     }
 
-    /// A frame that was ready could not be read: its number is unknown, that it was made is not.
+    /// Counts a frame that was ready and could not be read. The frame was made, but its number is
+    /// unknown.
     fn count_corrupt(&mut self) {
         if self.missing() == 0 {
             self.made = self.made.wrapping_add(1);
@@ -58,25 +60,25 @@ impl Counters {
         self.corrupt = self.corrupt.wrapping_add(1);
     }
 
-    /// Counters of the run after this one.
+    /// Counters of the next run.
     pub fn of_next_run(&self) -> Self {
         Self { run: self.run.wrapping_add(1), ..Self::default() }
     }
 
-    /// Frames that have not come yet count as dropped: the host that they were for is gone.
+    /// Counts missing frames as dropped, because their host is gone.
     pub fn drop_missing(&mut self) {
         self.dropped = self.dropped.wrapping_add(self.missing());
     }
 
-    /// Frames that the FPGA has made and that have not come yet.
+    /// Frames that the FPGA has made and that have not arrived yet.
     fn missing(&self) -> u32 {
         let Self { made, sent, dropped, lost, corrupt, .. } = *self;
         let missing = [sent, dropped, lost, corrupt].into_iter().fold(made, u32::wrapping_sub);
-        // More came than were made: an FPGA that cannot count.
+        // More frames arrived than the FPGA counted: its count is wrong.
         if missing < 1 << 31 { missing } else { 0 }
     }
 
-    /// Both only ever grow, but wrap at 2^32.
+    /// Updates both counters. Both only grow, and wrap at 2^32.
     fn advance(&mut self, made: u32, lost: u32) {
         for (count, found) in [(&mut self.made, made), (&mut self.lost, lost)] {
             if found.wrapping_sub(*count) < 1 << 31 {
@@ -97,18 +99,18 @@ pub(crate) struct Run {
     ending: Option<Ending>,
 }
 
-/// LEDs are off; frames may still be under way.
+/// State of a run whose LEDs are off and whose frames may still be in transfer.
 #[derive(Debug)]
 struct Ending {
     since: Micros,
-    /// Reply that waits for it.
+    /// Reply that waits for the end of the run.
     reply: Option<(u16, Outcome)>,
 }
 
-/// What a frame passes on its way from the FPGA to the link.
+/// What a frame needs on its way from the FPGA to the link.
 pub(crate) struct Path<'m> {
     pub counters: &'m mut Counters,
-    /// The bus failed when the frame before was to be released.
+    /// The bus failed during the release of the frame before.
     pub release_pending: &'m mut bool,
     /// Memory for the frame's packed samples.
     pub scratch: &'m mut [u8],
@@ -124,21 +126,21 @@ pub(crate) enum Progress {
     UnderWay,
     /// The last frame of the run has been made, and LEDs are still on.
     Complete,
-    /// LEDs are on and no frame has come for too long.
+    /// The LEDs are on and no frame has come for too long.
     Stalled,
 }
 
-/// What the camera knows of the FPGA when a run winds up.
+/// What the camera knows of the FPGA at the end of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Fpga {
-    /// The FPGA does not answer: no frame is waited for.
+    /// The FPGA does not answer, so the end of the run waits for no frame.
     Absent,
     /// The FPGA has not confirmed that the LEDs are off, so it may still make frames.
     MayBeLit,
     Dark,
 }
 
-/// What to say of a run that is over.
+/// Reply and event of a run that is over.
 #[derive(Debug, PartialEq)]
 pub(crate) struct Ended {
     pub reply: Option<(u16, Outcome)>,
@@ -157,7 +159,7 @@ impl Run {
         limits: &Limits,
         bus: &mut impl FpgaBus,
     ) -> Result<Self, Refusal> {
-        // 0 in the FPGA's register is a run without end.
+        // In the FPGA's register 0 means a run without end.
         let frames = match length {
             RunLength::Continuous => 0,
             RunLength::Frames(frames) => {
@@ -195,7 +197,7 @@ impl Run {
         Ok(run)
     }
 
-    /// LEDs are on.
+    /// Whether the LEDs are on.
     pub fn is_lit(&self) -> bool {
         self.ending.is_none()
     }
@@ -204,7 +206,7 @@ impl Run {
         matches!(self.length, RunLength::Frames(frames) if made >= frames)
     }
 
-    /// What the machine has to do next.
+    /// Whether the run goes on, is complete or has stalled.
     pub fn progress(&self, now: Micros, counters: &Counters) -> Progress {
         if !self.is_lit() {
             Progress::UnderWay
@@ -217,7 +219,7 @@ impl Run {
         }
     }
 
-    /// LEDs have been switched off; `reply` is given once the last frame is through.
+    /// Notes that the LEDs have been switched off. `reply` is sent after the last frame.
     pub fn end(&mut self, now: Micros, reply: Option<(u16, Outcome)>) {
         let ending = self.ending.get_or_insert(Ending { since: now, reply: None });
         if reply.is_some() {
@@ -225,7 +227,7 @@ impl Run {
         }
     }
 
-    /// Takes at most one frame, and sends or counts it; whether there was a frame.
+    /// Takes at most one frame, and sends or counts it; true if there was a frame.
     pub fn take_frame(
         &mut self,
         now: Micros,
@@ -234,7 +236,7 @@ impl Run {
         sink: &mut impl PacketSink,
     ) -> bool {
         let Path { counters, release_pending, scratch, absent, may_send } = path;
-        // After a release that failed, the line still stands for the frame that was taken before.
+        // After a failed release, the line still signals the frame that was taken before.
         if *release_pending || absent || !bus.frame_ready() {
             return false;
         }
@@ -243,7 +245,8 @@ impl Run {
             Ok(Some(bytes)) => assemble(bytes, self.patterns, scratch),
             Err(_) => None,
         };
-        // The FPGA needs its buffer back before the next frame is complete; the link can wait.
+        // The FPGA needs its buffer back before the next frame is complete, so the release comes
+        // before the link.
         *release_pending = fpga::release(bus).is_err();
         self.last_frame = now;
         let Some((header, samples)) = taken else {
@@ -251,7 +254,7 @@ impl Run {
             return true;
         };
         if self.last_sequence.replace(header.sequence) == Some(header.sequence) {
-            // The release of this frame was lost on the bus.
+            // The bus lost the release of this frame.
             return true;
         }
         counters.advance(header.sequence.wrapping_add(1), header.lost);
@@ -273,7 +276,7 @@ impl Run {
         true
     }
 
-    /// What to say of the run once its LEDs are off and its last frame is through; `None` before.
+    /// Reply and event of a run whose LEDs are off and whose last frame is through; `None` before.
     pub fn wind_up(
         &mut self,
         now: Micros,
@@ -289,7 +292,7 @@ impl Run {
                 return None;
             }
         }
-        // Frames that the FPGA made and never delivered were damaged on the way.
+        // Frames that the FPGA made and did not deliver count as damaged.
         counters.corrupt = counters.corrupt.wrapping_add(counters.missing());
         let Counters { run, made, dropped, lost, corrupt, .. } = *counters;
         let event = EventKind::RunEnded {
@@ -303,7 +306,7 @@ impl Run {
     }
 }
 
-/// The header and packed samples of an intact frame of this many patterns.
+/// The header and packed samples of an intact frame with this many patterns.
 fn assemble<'s>(
     bytes: &[u8],
     patterns: u16,

@@ -1,18 +1,22 @@
-//! Rules on the board's own sensors: interlock and temperature.
+//! Rules for the board's own sensors: interlock and temperature.
 //!
-//! The one law: a sensor that cannot be believed is as bad as one that says no.
+//! # Invariant
+//! A sensor that does not answer, or whose reading is not plausible, forbids light
+//! (`tests::safety::a_sensor_that_does_not_answer`,
+//! `tests::safety::a_sensor_that_reads_what_cannot_be`).
 
 use crate::{Inputs, Limits};
 use nirspi_wire::Fault;
 
-/// Whether the reading can be one of a sensor that is well.
+/// Whether a working sensor can give this reading.
 pub(crate) fn plausible(centi_celsius: i16, limits: &Limits) -> bool {
     (limits.plausible_min_centi_celsius..=limits.plausible_max_centi_celsius)
         .contains(&centi_celsius)
 }
 
-/// What the sensors say against light. `standing` is the fault that stands: an over-temperature lasts
-/// until the array has cooled down to the release point, so that LEDs do not go on and off at the limit.
+/// The fault for which the sensors forbid light. `standing` is the latched fault: an
+/// over-temperature lasts until the array has cooled down to the release point, so the LEDs do not
+/// go on and off at the limit.
 pub(crate) fn objection(
     inputs: &Inputs,
     limits: &Limits,

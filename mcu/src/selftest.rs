@@ -1,13 +1,15 @@
-//! Checks of the device without any optics.
+//! Checks the device without any optics.
 //!
 //! # Invariant
-//! A self-test leaves the configuration as it found it, and lights the array for no more than one sweep, which is 82
-//! microseconds: `tests::selftest::a_good_device_passes_everything_in_any_resting_state` and
-//! `the_test_frame_is_one_sweep_and_nothing_is_taken_meanwhile`.
+//! A self-test leaves the configuration as it was
+//! (`tests::selftest::a_good_device_passes_everything_in_any_resting_state`), and lights the array
+//! for no more than one sweep, which takes 82 microseconds
+//! (`tests::selftest::the_test_frame_is_one_sweep_and_nothing_is_taken_meanwhile`).
 //!
-//! The FPGA drives the LEDs in every run, so the test frame cannot be dark: it is one sweep at the fastest
-//! rate, each pattern followed by its complement, so every LED is lit for half of 82 microseconds. It is
-//! left out (not in [`SelfTestReport::ran`]) where a fault stands, a sensor objects, or the bus has failed.
+//! The FPGA drives the LEDs in every run, so the test frame cannot be dark. The test frame is one
+//! sweep at the fastest rate, each pattern followed by its complement, so every LED is lit for half
+//! of 82 microseconds. The test frame is left out (not in [`SelfTestReport::ran`]) if a fault is
+//! latched, a sensor forbids light, or the bus has failed.
 
 use crate::configure::Setup;
 use crate::{BusError, FpgaBus, Inputs, Limits, Micros, fpga, safety};
@@ -15,7 +17,7 @@ use nirspi_wire::fpga::{FpgaFrame, Sums};
 use nirspi_wire::register::{Register, TEST_SEED, control, mode, status, test_sample};
 use nirspi_wire::{CLOCKS_PER_PATTERN, FrameFlags, PATTERNS, SelfTestReport};
 
-/// Longest time that the test frame may take: it needs 82 microseconds and a transfer.
+/// Longest time that the test frame may take. The frame needs 82 microseconds and a transfer.
 const TEST_PATIENCE: Micros = Micros(100_000);
 
 /// Every pattern and its complement, so that every accumulator of the FPGA takes part.
@@ -32,7 +34,7 @@ const TEST_SETUP: Setup = Setup {
 
 const TEST_FLAGS: FrameFlags = FrameFlags::TEST_SOURCE.with(FrameFlags::DIFFERENTIAL);
 
-/// A test frame under way.
+/// A test frame in progress.
 #[derive(Debug)]
 pub(crate) struct TestFrame {
     id: u16,
@@ -40,7 +42,7 @@ pub(crate) struct TestFrame {
     since: Micros,
 }
 
-/// Checks that are done at once.
+/// Does the checks that are immediate.
 pub(crate) fn examine(bus: &mut impl FpgaBus, inputs: &Inputs, limits: &Limits) -> SelfTestReport {
     let mut report = SelfTestReport::default();
     note(&mut report, SelfTestReport::FPGA_IDENTITY, fpga::identify(bus).is_ok());
@@ -78,10 +80,11 @@ fn every_bit_holds(bus: &mut impl FpgaBus) -> Result<bool, BusError> {
     Ok(true)
 }
 
-/// Every bit as 0 and as 1 between neighbours of either kind, and every byte by its own address.
+/// Writes and reads every bit as 0 and as 1 between neighbours of either kind, and every byte with
+/// a value of its own address.
 fn memory_holds(memory: &mut [u8]) -> bool {
     let same = |byte: u8| move |_: usize| byte;
-    // An odd factor above 256: bytes that a stuck address line would confuse differ.
+    // The factor is odd and above 256, so bytes that a stuck address line would confuse differ.
     let address = |at: usize| (at.wrapping_mul(0x9E37) >> 8) as u8;
     holds(memory, same(0x00))
         && holds(memory, same(0xFF))
@@ -94,12 +97,12 @@ fn holds(memory: &mut [u8], pattern: impl Fn(usize) -> u8) -> bool {
     for (at, byte) in memory.iter_mut().enumerate() {
         *byte = pattern(at);
     }
-    // Without it the compiler knows what stands there, and reads nothing.
+    // Without `black_box` the compiler knows the contents and removes the reads.
     let memory = core::hint::black_box(memory);
     memory.iter().enumerate().all(|(at, &byte)| byte == pattern(at))
 }
 
-/// The sums of the test frame.
+/// The expected sums of the test frame.
 pub(crate) fn expected_sums() -> impl Iterator<Item = Sums> {
     let mut state = TEST_SEED;
     let mut sample = move || {
@@ -107,7 +110,7 @@ pub(crate) fn expected_sums() -> impl Iterator<Item = Sums> {
         state = test_sample(state);
         u64::from(this)
     };
-    // What is sampled before the first light arrives belongs to nothing.
+    // A sample before the arrival of the first light belongs to no slot.
     for _ in 0..TEST_SETUP.latency {
         sample();
     }
@@ -127,7 +130,7 @@ fn is_the_test_frame(bytes: &[u8]) -> bool {
     })
 }
 
-/// Starts the test frame; whether the FPGA took it. LEDs may be on either way.
+/// Starts the test frame; true if the FPGA accepted the start. The LEDs may be on in both cases.
 pub(crate) fn begin(bus: &mut impl FpgaBus, limits: &Limits) -> bool {
     fpga::set(bus, &TEST_SETUP, limits).is_ok()
         && fpga::write(bus, Register::Frames, 1).is_ok()
@@ -135,12 +138,12 @@ pub(crate) fn begin(bus: &mut impl FpgaBus, limits: &Limits) -> bool {
 }
 
 impl TestFrame {
-    /// `report` holds the checks that were done at once; `id` is the command that waits for the reply.
+    /// `report` holds the immediate checks; `id` is the command that waits for the reply.
     pub fn new(id: u16, report: SelfTestReport, now: Micros) -> Self {
         Self { id, report, since: now }
     }
 
-    /// Whether the test frame was right; `None` while it may still come.
+    /// Whether the test frame was right; `None` while the frame may still come.
     pub fn step(&self, now: Micros, bus: &mut impl FpgaBus) -> Option<bool> {
         let late = now.since(self.since) > TEST_PATIENCE;
         match bus.frame_ready().then(|| bus.frame().map(|b| b.map(is_the_test_frame))) {
@@ -150,7 +153,7 @@ impl TestFrame {
         }
     }
 
-    /// The command to answer, and the whole report.
+    /// The number of the command to answer, and the whole report.
     pub fn verdict(&self, passed: bool) -> (u16, SelfTestReport) {
         let mut report = self.report;
         note(&mut report, SelfTestReport::TEST_FRAME, passed);

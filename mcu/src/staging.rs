@@ -1,13 +1,16 @@
-//! A bitstream is gathered in memory, and goes to the FPGA when all of it has come and is right.
+//! Collects a bitstream in memory, and configures the FPGA when the bitstream is complete and
+//! right.
 //!
-//! The one law: the FPGA keeps what it runs until there is a whole bitstream to replace it, and is not touched at
-//! all if that is the one it runs.
+//! # Invariant
+//! The FPGA keeps its gateware until a whole bitstream is there to replace it
+//! (`tests::configuring::a_half_sent_bitstream_does_not_reach_the_chip`). An FPGA that already runs
+//! the bitstream is left alone (`tests::configuring::a_staged_bitstream_goes_to_the_chip_once`).
 
 use crate::ecp5::{Configuration, ConfigureError, IDCODE_LFE5UM5G_85F, SlaveSpi, must_load};
 use crate::{GatewareLoader, LoadError, Micros};
 use nirspi_wire::Crc32;
 
-/// Loads gateware by way of memory that is as long as the longest bitstream it takes.
+/// Loads gateware through memory as long as the longest bitstream.
 #[derive(Debug)]
 pub struct StagingLoader<'m, P> {
     port: P,
@@ -21,7 +24,7 @@ pub struct StagingLoader<'m, P> {
 }
 
 impl<'m, P: SlaveSpi> StagingLoader<'m, P> {
-    /// With what the FPGA is known to run.
+    /// A loader for an FPGA that is known to run the bitstream with this CRC-32.
     #[must_use]
     pub fn new(port: P, memory: &'m mut [u8], running: Option<u32>) -> Self {
         let crc = Crc32::new();
@@ -34,7 +37,7 @@ impl<'m, P: SlaveSpi> StagingLoader<'m, P> {
         self.running
     }
 
-    /// Why the last bitstream was not taken; once.
+    /// Why the last bitstream was refused. The second call gives `None`.
     pub fn take_failure(&mut self) -> Option<ConfigureError> {
         self.failure.take()
     }
@@ -83,12 +86,13 @@ impl<P: SlaveSpi> GatewareLoader for StagingLoader<'_, P> {
     }
 }
 
-/// A bitstream ends with bytes of 0xFF, whose clocks the FPGA needs to wake up, as does erased flash memory: so
-/// many are taken after the last other byte.
+/// Bytes of 0xFF kept after the last other byte. A bitstream ends with bytes of 0xFF, whose clocks
+/// the FPGA needs to wake up; erased flash memory has the same value.
 const TRAILER_BYTES: usize = 32;
 
-/// The bitstream at the beginning of a region of flash memory whose rest is erased; `None` if there is none.
-/// Bitstream files begin with a comment (0xFF, 0x00) or with the preamble (0xFF, 0xFF, 0xBD, 0xB3).
+/// The bitstream at the beginning of a region of flash memory whose rest is erased; `None` if there
+/// is none. A bitstream file begins with a comment (0xFF, 0x00) or with the preamble (0xFF, 0xFF,
+/// 0xBD, 0xB3).
 #[must_use]
 pub fn stored(region: &[u8]) -> Option<&[u8]> {
     let begins = region.starts_with(&[0xFF, 0x00]) || region.starts_with(&[0xFF, 0xFF, 0xBD, 0xB3]);

@@ -1,15 +1,15 @@
-//! Device time, and how the FPGA's clock maps to it.
+//! Device time, and the relation of the FPGA's clock to device time.
 //!
-//! The one law: nothing in this crate reads a clock; time is an argument, and comes back only in messages.
+//! This crate reads no clock: time is an argument of every call that needs it.
 
 use nirspi_wire::ADC_HZ;
 
-/// Microseconds since power-up, monotonic. As a length of time it is the difference of two such moments.
+/// Microseconds since power-up, monotonic. A length of time is the difference of two moments.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub struct Micros(pub u64);
 
 impl Micros {
-    /// Time that has passed since `earlier`; none if a caller's clock went backwards.
+    /// Time that has passed since `earlier`; zero if the caller's clock went backwards.
     #[must_use]
     pub const fn since(self, earlier: Self) -> Self {
         Self(self.0.saturating_sub(earlier.0))
@@ -21,9 +21,10 @@ pub const CLOCKS_PER_MICRO: u64 = ADC_HZ as u64 / 1_000_000;
 
 /// One moment in both times: the FPGA's clock read at a known device time.
 ///
-/// It is taken at the start of each run. Within a run, frames are therefore timed by the FPGA's oscillator
-/// alone, so differences between frames are exact; the offset to device time is known to the length of one
-/// register read, and drifts by the difference of the two oscillators until the next run.
+/// An anchor is taken at the start of each run. Within a run the FPGA's oscillator alone times the
+/// frames, so differences between frames are exact. The offset to device time is known to the
+/// length of one register read, and drifts by the difference of the two oscillators until the next
+/// run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Anchor {
     pub clock: u64,

@@ -1,6 +1,7 @@
-//! What a firmware's ELF says of itself: how much memory it takes, and which of its functions can panic.
+//! Reads a firmware's ELF: how much memory the firmware takes, and which of its functions can
+//! panic.
 //!
-//! The one law: it is read from the machine code as it was linked, not from anything that the build said.
+//! The facts come from the linked machine code, and not from messages of the build.
 
 use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, SymbolKind, elf};
 use std::collections::{BTreeMap, BTreeSet};
@@ -11,11 +12,12 @@ use std::path::Path;
 pub struct Firmware {
     /// Bytes of the image in flash: vectors, code, constants, and the initial values of variables.
     pub flash_bytes: u64,
-    /// Bytes of static variables, those that a restart does not clear too.
+    /// Bytes of static variables, including those that a restart does not clear.
     pub static_bytes: u64,
     symbols: BTreeMap<String, u64>,
     functions: Vec<Function>,
-    /// Where instructions begin (`true`) and data (`false`), by address: the Arm ELF's mapping symbols.
+    /// Addresses where instructions (`true`) or data (`false`) begin: the Arm ELF's mapping
+    /// symbols.
     mapping: BTreeMap<u64, bool>,
     text: Vec<(u64, Vec<u8>)>,
 }
@@ -30,7 +32,7 @@ impl Firmware {
     /// Reads an ELF.
     ///
     /// # Errors
-    /// A file that cannot be read, or is no ELF.
+    /// If the file cannot be read, or is not an ELF.
     pub fn read(path: &Path) -> io::Result<Self> {
         let bytes = std::fs::read(path)?;
         let invalid = |error| io::Error::new(io::ErrorKind::InvalidData, error);
@@ -55,7 +57,7 @@ impl Firmware {
             .symbols()
             .filter(|symbol| symbol.kind() == SymbolKind::Text && symbol.size() > 0)
             .filter_map(|symbol| {
-                // Bit 0 of an address says Thumb.
+                // Bit 0 of an address means Thumb.
                 let (start, length) = (symbol.address() & !1, symbol.size());
                 Some(Function { name: plain(&named(&symbol)?), start, length })
             })
@@ -78,15 +80,15 @@ impl Firmware {
         self.symbols.get(name).copied()
     }
 
-    /// Names, as mangled, that contain any of `parts`.
+    /// Mangled names that contain any of `parts`.
     #[must_use]
     pub fn symbols_with(&self, parts: &[&str]) -> Vec<&str> {
         let wanted = |name: &&str| parts.iter().any(|part| name.contains(part));
         self.symbols.keys().map(String::as_str).filter(wanted).collect()
     }
 
-    /// Pairs of a function and one that it calls by a branch to a fixed address, where both names satisfy their
-    /// condition. Rust's panics are called in no other way.
+    /// Pairs of a function and a function that it calls by a branch to a fixed address, where both
+    /// names satisfy their condition. Rust calls its panic functions only in this way.
     #[must_use]
     pub fn calls(
         &self,
@@ -106,7 +108,7 @@ impl Firmware {
             .collect()
     }
 
-    /// Addresses of instructions of the floating-point unit, each with the function that it is in.
+    /// Addresses of instructions of the floating-point unit, each with its function.
     #[must_use]
     pub fn float_instructions(&self) -> Vec<(u64, &str)> {
         let name = |address: u64| {
@@ -139,8 +141,8 @@ impl Firmware {
         found
     }
 
-    /// Where the 32-bit branches of a function lead. Constants between instructions may look like one; that one of
-    /// them leads to the first byte of a function by chance is as good as impossible.
+    /// Targets of a function's 32-bit branches. A constant between instructions may look like a
+    /// branch; such a constant almost never points to the first byte of a function.
     fn branches(&self, function: &Function) -> impl Iterator<Item = u64> {
         let words = |address: u64| {
             self.text.iter().find_map(|(base, bytes)| {
@@ -154,12 +156,13 @@ impl Firmware {
     }
 }
 
-/// A name without the hash of its crate's build.
+/// A name without the hash of its crate.
 fn plain(mangled: &str) -> String {
     format!("{:#}", rustc_demangle::demangle(mangled))
 }
 
-/// Target of a `BL` (T1) or `B.W` (T4) at this address, Armv8-M Architecture Reference Manual, C2.4.
+/// Target of a `BL` (T1) or `B.W` (T4) at this address (Armv8-M Architecture Reference Manual,
+/// C2.4).
 fn branch(address: u64, (first, second): (u16, u16)) -> Option<u64> {
     let is_branch = first & 0xF800 == 0xF000 && second & 0x9000 == 0x9000;
     if !is_branch {
@@ -178,8 +181,8 @@ fn branch(address: u64, (first, second): (u16, u16)) -> Option<u64> {
     Some((address + 4).wrapping_add_signed(i64::from(offset)))
 }
 
-/// Whether an instruction of two halves is for coprocessor 10 or 11, which are the floating-point unit: Armv8-M
-/// Architecture Reference Manual, C2.3.
+/// Whether an instruction of two halves is for coprocessor 10 or 11, the floating-point unit
+/// (Armv8-M Architecture Reference Manual, C2.3).
 fn is_float(first: u16, second: u16) -> bool {
     first & 0xEC00 == 0xEC00 && matches!(second >> 8 & 0xF, 0xA | 0xB)
 }
@@ -188,7 +191,8 @@ fn is_float(first: u16, second: u16) -> bool {
 mod tests {
     use super::{branch, is_float};
 
-    /// As disassembled by others: `vadd.f32 s0, s0, s1`, `vmov r0, s0`, `vldr d0, [r0]`; then `bl` and `ldrd`.
+    /// Encodings from other disassemblers: `vadd.f32 s0, s0, s1`, `vmov r0, s0`, `vldr d0, [r0]`;
+    /// then `bl` and `ldrd`.
     #[test]
     fn arithmetic_of_the_floating_point_unit_is_told_from_other_instructions() {
         for (first, second) in [(0xEE30, 0x0A20), (0xEE10, 0x0A10), (0xED90, 0x0B00)] {
@@ -199,13 +203,14 @@ mod tests {
         }
     }
 
-    /// As disassembled by others: `bl` forwards and back, and what is none.
+    /// Encodings from other disassemblers: `bl` forwards and back, and instructions that are not
+    /// branches.
     #[test]
     fn branches_lead_where_a_disassembler_says() {
         assert_eq!(branch(0x1000_AB1E, (0xF000, 0xFB9F)), Some(0x1000_B260));
         assert_eq!(branch(0x0800_1000, (0xF7FF, 0xFFFE)), Some(0x0800_1000));
         assert_eq!(branch(0, (0x4770, 0xBF00)), None);
-        // A conditional branch reaches less far, and no panic.
+        // A conditional branch has a shorter range and never calls a panic.
         assert_eq!(branch(0, (0xF000, 0x8001)), None);
     }
 }

@@ -1,6 +1,6 @@
 //! An emulated board with a simulated FPGA at one UART and a TCP address at the other.
 //!
-//! The firmware is the ELF as it was linked; nothing is put into it or taken out of it.
+//! The board runs the firmware's ELF unchanged.
 #![expect(clippy::unwrap_used, reason = "a failed unwrap here fails the test that uses it")]
 
 use nirspi::link::{Link, TcpLink};
@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 
-/// QEMU, running.
+/// A running QEMU.
 pub struct Emulated {
     qemu: Child,
     host: String,
@@ -21,14 +21,15 @@ pub struct Emulated {
     interlock_closed: Arc<AtomicBool>,
 }
 
-/// A listener, and QEMU's argument to connect to it. Small packets go at once, or each access takes 40 ms.
+/// A listener, and QEMU's argument to connect to it. Nagle's algorithm is off, because with it each
+/// access takes 40 ms.
 fn listen() -> (TcpListener, String) {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let port = listener.local_addr().unwrap().port();
     (listener, format!("tcp:127.0.0.1:{port},nodelay=on"))
 }
 
-/// QEMU's connection; one that cannot start says why itself.
+/// Waits for QEMU's connection. A QEMU that cannot start prints the reason itself.
 fn accept(listener: &TcpListener, qemu: &mut Child) -> TcpStream {
     listener.set_nonblocking(true).unwrap();
     loop {
@@ -43,7 +44,8 @@ fn accept(listener: &TcpListener, qemu: &mut Child) -> TcpStream {
 }
 
 impl Emulated {
-    /// Powers up in front of `fpga`. `None` where there is no emulator or no firmware, said aloud.
+    /// Powers up in front of `fpga`. `None`, with a printed message, without an emulator or
+    /// firmware.
     ///
     /// # Panics
     /// If QEMU ends before it connects.
@@ -91,7 +93,7 @@ impl Emulated {
         Box::new(TcpLink::connect(&self.host).unwrap())
     }
 
-    /// Cuts the FPGA off.
+    /// Disconnects the FPGA.
     ///
     /// # Panics
     /// If the line to the FPGA is closed already.
@@ -99,7 +101,7 @@ impl Emulated {
         self.fpga_line.shutdown(Shutdown::Both).unwrap();
     }
 
-    /// Opens or closes the enclosure.
+    /// Opens or closes the enclosure's interlock.
     pub fn set_interlock(&self, closed: bool) {
         self.interlock_closed.store(closed, Ordering::Relaxed);
     }
@@ -112,7 +114,8 @@ impl Drop for Emulated {
     }
 }
 
-/// Puts a TCP server in front of a serial line, one client after the other; its address.
+/// Starts a TCP server in front of a serial line, for one client after the other; returns its
+/// address.
 fn relay(line: TcpStream) -> String {
     let server = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = server.local_addr().unwrap().to_string();
@@ -122,7 +125,7 @@ fn relay(line: TcpStream) -> String {
         thread::spawn(move || {
             let mut chunk = vec![0; 1 << 16];
             while let Ok(length @ 1..) = from_board.read(&mut chunk) {
-                // A line that nobody listens to loses what comes.
+                // Bytes that arrive without a client are lost.
                 if let Some(client) = &mut *to_client.lock().unwrap() {
                     let _ = client.write_all(&chunk[..length]);
                 }

@@ -1,6 +1,7 @@
-//! The firmware's ELF and the emulator: found, built, or said to be missing.
+//! Finds or builds the firmware's ELF and the emulator.
 //!
-//! What is missing is skipped aloud. What is there and does not work fails.
+//! If a part is missing, the test is skipped with a message. If a part is there and does not work,
+//! the test fails.
 #![expect(clippy::unwrap_used, reason = "a failed unwrap here fails the test that uses it")]
 
 use crate::root;
@@ -19,7 +20,7 @@ pub fn board() -> &'static Board {
     Board::named("mps2-an505").unwrap()
 }
 
-/// Past the test harness's capture, so that a skipped test is seen.
+/// Prints past the test harness's capture, so that a skipped test is visible.
 fn skipped(reason: &str) {
     let _ = writeln!(std::io::stderr(), "skipped: {reason}");
 }
@@ -63,7 +64,7 @@ pub fn elf() -> Option<&'static Path> {
     .as_deref()
 }
 
-/// Whether the compiler has the target's core library. One that has not would be fetched, which takes a network.
+/// Whether the compiler has the target's core library. Fetching that library would need a network.
 fn has_target() -> bool {
     let output = Command::new("rustc")
         .args(["--print", "target-libdir", "--target", board().target])

@@ -1,4 +1,4 @@
-//! Shared pieces of the end-to-end tests.
+//! Shared parts of the end-to-end tests.
 
 pub mod elf;
 pub mod emulated;
@@ -15,7 +15,8 @@ pub fn root() -> &'static Path {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
 }
 
-/// Folder of real measurements: `$NIRSPI_DATA`, else `../shared/data`; `None` (said aloud) where neither is there.
+/// Folder of real measurements: `$NIRSPI_DATA`, else `../shared/data`; `None`, with a printed
+/// message, if neither exists.
 #[must_use]
 pub fn data() -> Option<PathBuf> {
     let given = std::env::var_os("NIRSPI_DATA").map(PathBuf::from);
@@ -23,7 +24,7 @@ pub fn data() -> Option<PathBuf> {
     if found.is_dir() {
         return Some(found);
     }
-    // Past the test harness's capture, so that a skipped test is seen.
+    // Prints past the test harness's capture, so that a skipped test is visible.
     use std::io::Write;
     let _ = writeln!(std::io::stderr(), "skipped: no data");
     None

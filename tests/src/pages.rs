@@ -1,4 +1,4 @@
-//! Tables of the pages under `docs/`, which tests hold against what they are about.
+//! Reads tables of the pages under `docs/`, for tests that compare a table with its subject.
 
 use crate::root;
 
@@ -11,7 +11,8 @@ pub fn page(path: &str) -> String {
     std::fs::read_to_string(root().join(path)).unwrap_or_else(|error| panic!("{path}: {error}"))
 }
 
-/// Rows of the table under this heading, its own heading left out: cells without spaces and backticks around them.
+/// Rows of the table under this heading, without the header row; cells are trimmed of spaces and
+/// backticks.
 ///
 /// # Panics
 /// If there is no such heading.

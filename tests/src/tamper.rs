@@ -1,4 +1,4 @@
-//! A link that damages what passes, one packet at a time.
+//! A link that damages the packets passing through it.
 
 use nirspi::link::{Link, Received};
 use std::io;
@@ -9,22 +9,22 @@ use std::time::Duration;
 pub enum Fate {
     /// It arrives.
     Pass,
-    /// It vanishes.
+    /// It is lost.
     Drop,
     /// One bit of the byte at this share of its length (in 256ths) flips.
     Flip(u8),
-    /// The byte at this share of its length (in 256ths) vanishes.
+    /// The byte at this share of its length (in 256ths) is lost.
     Lose(u8),
-    /// It arrives after the next one of its kind: one that is at least half as long.
+    /// It arrives after the next packet that is at least half as long.
     Delay,
-    /// The link ends in its middle.
+    /// The link ends in the middle of the packet.
     Unplug,
 }
 
-/// Decides the fate of a packet from its number and length.
+/// Chooses the fate of a packet from its number and length.
 pub type Judge = Box<dyn FnMut(usize, usize) -> Fate + Send>;
 
-/// A link whose packets meet a [`Fate`].
+/// A link that applies a [`Fate`] to each packet.
 pub struct Tampered {
     inner: Box<dyn Link>,
     judge: Judge,
@@ -61,7 +61,8 @@ impl Tampered {
             Fate::Pass => {}
             Fate::Flip(share) => {
                 let at = usize::from(share) * (packet.len() - 1) / 256;
-                // Never into a delimiter: that is two packets' damage, and has a test of its own.
+                // A delimiter is never hit: that would damage two packets, and has a test of its
+                // own.
                 packet[at] ^= if packet[at] == 1 { 2 } else { 1 };
             }
             Fate::Lose(share) => {
@@ -111,13 +112,13 @@ impl Link for Tampered {
     }
 }
 
-/// A judge of frames of 1024 patterns alone, by their number: all else passes.
+/// A judge for frames of 1024 patterns, by their number; all other packets pass.
 pub fn only_frames(
     mut judge: impl FnMut(usize) -> Fate + Send + 'static,
 ) -> impl FnMut(usize, usize) -> Fate + Send {
     let mut frame = 0;
     move |_, length| {
-        // Nothing else that the device sends is nearly as long.
+        // No other packet of the device is nearly as long.
         if length < 3000 {
             return Fate::Pass;
         }

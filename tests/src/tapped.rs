@@ -1,4 +1,4 @@
-//! A camera's line that keeps everything the camera sends, and the frames found in it.
+//! A camera's line that keeps every byte the camera sends, and the frames in those bytes.
 #![expect(clippy::unwrap_used, reason = "a failed unwrap here fails the test that uses it")]
 
 use nirspi::capture::{Calibration, Capture, CaptureOptions, capture};
@@ -12,7 +12,7 @@ use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-/// A frame without its time: two cameras with different clocks give equal shots.
+/// A frame without its time, so that cameras with different clocks give equal shots.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Shot {
     /// Number of the run.
@@ -21,9 +21,9 @@ pub struct Shot {
     pub sequence: u32,
     /// Sweeps summed in the frame.
     pub sweeps: u32,
-    /// What the FPGA says of the frame.
+    /// The FPGA's flags of the frame.
     pub flags: FrameFlags,
-    /// One sample a pattern.
+    /// One sample for each pattern.
     pub samples: Vec<i64>,
 }
 
@@ -108,7 +108,7 @@ impl Link for Tap {
     }
 }
 
-/// A run of so many frames, not calibrated.
+/// Measures so many frames, without calibration.
 ///
 /// # Panics
 /// If the capture fails.
@@ -124,7 +124,7 @@ pub fn measure(session: &mut Session, setup: &MeasurementSetup, frames: u32) -> 
     capture(session, &options, &mut |_| ControlFlow::Continue(())).unwrap()
 }
 
-/// As [`measure`], in a session of its own on `line`; with the frames that came.
+/// As [`measure`], in a session of its own on `line`; also returns the frames that arrived.
 ///
 /// # Panics
 /// If the camera does not answer or the capture fails.

@@ -1,5 +1,5 @@
-//! The files of a board agree with its `board.toml` and with one another: pins in the code, in its page and at the FPGA,
-//! settings, scripts, tables of the pages.
+//! Tests that the files of a board agree with its `board.toml` and with each other: pins in the
+//! code, on its page and at the FPGA, settings, scripts, tables of the pages.
 
 use nirspi::boards::{BOARDS, Board, Pins};
 use nirspi_tests::root;
@@ -102,7 +102,7 @@ fn a_wire_to_the_fpga_ends_where_the_constraints_have_that_signal() {
     }
 }
 
-/// Port and number of a pin that is spelled as `pattern` says: `PF14` as `P{port}{number}` is `F` and `14`.
+/// Port and number of a pin spelled as in `pattern`: `PF14` as `P{port}{number}` is `F` and `14`.
 fn port_and_number<'p>(pattern: &str, pin: &'p str) -> Option<(&'p str, &'p str)> {
     let (before, after) = pattern.split_once("{number}").expect("{number} in pin_name");
     let pin = pin.strip_suffix(after)?;
@@ -188,7 +188,7 @@ fn a_boards_folder_is_its_package_and_its_settings_name_its_target_and_chip() {
     }
 }
 
-/// What `boards/run.sh`, `boards/build.sh` and CI read.
+/// `boards/run.sh`, `boards/build.sh` and CI read these facts.
 #[test]
 fn shell_scripts_read_the_same_facts() {
     let shell = |command: &str| {
@@ -218,12 +218,13 @@ fn shell_scripts_read_the_same_facts() {
     assert!(!found && error.starts_with("no board toaster, expected one of: "), "{error}");
 }
 
-/// Past the test harness's capture, so that a skipped test is seen.
+/// Prints past the test harness's capture, so that a skipped test is visible.
 fn say(line: &str) {
     let _ = writeln!(std::io::stderr(), "{line}");
 }
 
-/// Holds the rows of a page's table that `is_row` picks against `rows`. `NIRSPI_BLESS=1` writes them anew.
+/// Compares the rows of a page's table for which `is_row` holds with `rows`. `NIRSPI_BLESS=1`
+/// writes them again.
 fn check_rows(path: &str, header: &str, is_row: impl Fn(&str) -> bool, rows: &[String]) {
     let page = read(path);
     let lines: Vec<&str> = page.lines().collect();

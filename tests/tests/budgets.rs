@@ -1,7 +1,7 @@
-//! Every board's firmware fits the budget of its `board.toml`, has no heap, and can panic only where docs/firmware.md
-//! lists it.
+//! Tests that every board's firmware fits the budget of its `board.toml`, has no heap, and can
+//! panic only where docs/firmware.md lists a place.
 //!
-//! What is not built is skipped aloud: `bash boards/build.sh` builds every board.
+//! A board that is not built is skipped with a message: `bash boards/build.sh` builds every board.
 
 #![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
 
@@ -15,7 +15,7 @@ use std::path::PathBuf;
 
 const PAGE: &str = "docs/firmware.md";
 
-/// Past the test harness's capture, so that the table and a skipped board are seen.
+/// Prints past the test harness's capture, so that the table and a skipped board are visible.
 fn say(line: &str) {
     let _ = writeln!(std::io::stderr(), "{line}");
 }
@@ -79,7 +79,8 @@ fn no_firmware_has_a_heap() {
     }
 }
 
-/// Nowhere, so not in interrupts either: sums are integers until they are on the host.
+/// No function uses floating point, so no interrupt does either: sums are integers until they reach
+/// the host.
 #[test]
 fn no_firmware_computes_with_floating_point() {
     const SOFT: &[&str] = &["__aeabi_f", "__aeabi_d", "__addsf", "__adddf", "__mulsf", "__muldf"];
@@ -102,15 +103,16 @@ const PANICS: &[&str] = &[
     "core::slice::copy_from_slice_impl::",
 ];
 
-/// The emulated board: the same application, without a HAL that brings panics of its own.
+/// The emulated board: the same application, without a HAL with panics of its own.
 #[test]
 fn the_application_can_panic_only_where_the_page_says_and_why_it_does_not() {
     const BOARD: &str = "mps2-an505";
     let Some((_, firmware)) = built().into_iter().find(|(board, _)| board.name == BOARD) else {
         return;
     };
-    // The list is of the compiler in boards/rust-toolchain.toml. Another one, as boards/build.sh may have to take, leaves
-    // other panics and, from 1.96 on, spells names in another way ("_R" where "_ZN" stood).
+    // The list belongs to the compiler in boards/rust-toolchain.toml. Another compiler, which
+    // boards/build.sh may have to use, leaves other panics and, from 1.96 on, mangles names
+    // differently ("_R" instead of "_ZN").
     if firmware.symbols_with(&["nirspi_app"]).iter().any(|name| name.starts_with("_R")) {
         return say(&format!(
             "skipped: panics of {BOARD}, built by another compiler than the list"

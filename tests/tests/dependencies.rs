@@ -1,4 +1,4 @@
-//! The table of docs/architecture.md is what `cargo metadata` says.
+//! Tests that the table of docs/architecture.md agrees with `cargo metadata`.
 
 #![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
 
@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
 use std::process::Command;
 
-/// What one crate may use.
+/// What one crate may depend on.
 struct Allowed {
     ours: BTreeSet<String>,
     /// `None`: any crate from outside.
@@ -46,7 +46,7 @@ fn packages() -> Vec<Value> {
     metadata()["packages"].as_array().unwrap().clone()
 }
 
-/// Every dependency that the table does not allow, as `user -> used`.
+/// Every dependency that the table forbids, as `user -> used`.
 fn violations(packages: &[Value], table: &BTreeMap<String, Allowed>) -> Vec<String> {
     let mut found = Vec::new();
     for package in packages {
@@ -56,7 +56,7 @@ fn violations(packages: &[Value], table: &BTreeMap<String, Allowed>) -> Vec<Stri
             continue;
         };
         for dependency in package["dependencies"].as_array().unwrap() {
-            // Tests may use what they like of the outside world, yet none of our upper layers either.
+            // Tests may use any crate from outside, but no upper layer of this workspace.
             let is_dev = dependency["kind"] == "dev";
             let used = dependency["name"].as_str().unwrap();
             let fine = if used.starts_with("nirspi") {
@@ -139,7 +139,7 @@ fn capture_alone_builds_no_server_no_typefaces_no_optics_and_no_networks() {
     }
 }
 
-/// Plain `cargo test` builds no hardware simulator, says so, and CI runs what it leaves out.
+/// Plain `cargo test` builds no hardware simulator and says so; CI runs the tests left out.
 #[test]
 fn plain_cargo_test_leaves_out_the_simulator_only_and_ci_runs_the_rest() {
     let metadata = metadata();
@@ -161,21 +161,23 @@ fn plain_cargo_test_leaves_out_the_simulator_only_and_ci_runs_the_rest() {
 
     let packages: String =
         left_out.iter().map(|package| format!(" -p {}", name(package))).collect();
-    let ci = std::fs::read_to_string(root().join(".ci/run")).unwrap();
-    for line in ["cargo test --locked".to_owned(), format!("cargo test --locked{packages}")] {
-        assert!(ci.lines().any(|found| found == line), ".ci/run has no line {line:?}");
+    let steps = std::fs::read_to_string(root().join(".ci/steps.sh")).unwrap();
+    for command in ["cargo test --locked".to_owned(), format!("cargo test --locked{packages}")] {
+        let runs =
+            |line: &str| line.trim() == command || line.contains(&format!("{{ {command}; }}"));
+        assert!(steps.lines().any(runs), ".ci/steps.sh has no line {command:?}");
     }
-    // Past the test harness's capture, so that everybody who runs the tests sees it.
+    // Prints past the test harness's capture, so that the message is visible.
     let _ = writeln!(
         std::io::stderr(),
         "not run by plain cargo test: the gateware's RTL; cargo test{packages} runs it"
     );
 }
 
-/// Crates that compute. The program leaves that to the libraries.
+/// Crates for computation. The program leaves computation to the libraries.
 const COMPUTING: [&str; 6] = ["nalgebra", "rand", "rand_distr", "rand_pcg", "rayon", "burn"];
 
-/// Ordinary dependencies of the program on crates that compute.
+/// The program's ordinary dependencies on crates for computation.
 fn computing(packages: &[Value]) -> Vec<&str> {
     let program = packages.iter().find(|package| package["name"] == "nirspi-cli").unwrap();
     let ordinary =

@@ -1,11 +1,11 @@
-//! From light to image, through gateware model, firmware logic, wire protocol and host, and what happens
-//! when something in between goes wrong.
+//! Tests from light to image, through gateware model, firmware logic, wire protocol and host, with
+//! and without faults on the way.
 
 #![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
 
 use nirspi::capture::{Calibration, Capture, CaptureOptions, Ended, capture};
 use nirspi::link::Link;
-use nirspi::recording::Recording;
+use nirspi::recording::{Recording, Target};
 use nirspi::session::{Session, SessionError};
 use nirspi::setup::MeasurementSetup;
 use nirspi::tally::{Tally, tally_recording};
@@ -20,7 +20,7 @@ use std::ops::ControlFlow;
 const FRAMES: u32 = 6;
 const PX: usize = 64;
 
-/// A disc on a rough ground: every one of the 1024 patterns has something to say about it.
+/// A disc on a rough ground: each of the 1024 patterns has a measurement different from zero.
 fn scene() -> Scene {
     let mut state = 1u32;
     let rough: Vec<f32> = (0..1024)
@@ -58,8 +58,8 @@ fn ideal_link() -> Box<dyn Link> {
     Box::new(MemoryLink::new(optics().ideal().camera(1).unwrap()))
 }
 
-/// What a capture of the ideal camera must give: all frames, and every measurement to within the rounding of its
-/// two readings to whole ADC counts.
+/// Checks a capture of the ideal camera: all frames arrived, and every measurement is right to
+/// within the rounding of its two readings to whole ADC counts.
 fn check(captured: &Capture) -> Result<(), String> {
     let counters = captured.counters;
     if !counters.is_complete() || counters.total() != u64::from(FRAMES) {
@@ -145,7 +145,7 @@ fn an_unplugged_link_keeps_what_came_and_says_so() {
 #[test]
 fn one_inverted_sign_of_1024_fails_the_check() {
     let optics = optics().ideal();
-    // Shows pattern 700 with the wrong sign: its complement first, then itself.
+    // Pattern 700 has the wrong sign: its complement is shown first, then the pattern.
     let shown = [walsh::pattern(700, false), walsh::pattern(700, true)];
     let fpga = optics.fpga(1).unwrap().wired(move |array, lines| {
         let wrong = shown.contains(&(lines.rows, lines.columns));
@@ -189,7 +189,7 @@ fn calibration_finds_latency_and_leak_and_undoing_them_helps() {
         1.0 - metrics::correlation(&footprint, image.pixels(), side, side).unwrap()
     };
     let (with, without) = (distance(true), distance(false));
-    // What is left is the rounding to whole ADC counts.
+    // The remaining error is the rounding to whole ADC counts.
     assert!(
         without < with / 8.0,
         "1 - correlation: {with:.2e} with the leak, {without:.2e} without"
@@ -200,8 +200,10 @@ fn calibration_finds_latency_and_leak_and_undoing_them_helps() {
 fn a_recording_gives_the_same_tally_as_the_capture_that_made_it() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.mcap");
-    let options =
-        CaptureOptions { record: Some(path.clone()), ..options(&Order::CakeCutting, false) };
+    let options = CaptureOptions {
+        record: Some(Target::New(path.clone())),
+        ..options(&Order::CakeCutting, false)
+    };
     let judge = only_frames(|frame| match frame {
         1 => Fate::Drop,
         2 => Fate::Delay,
@@ -212,9 +214,16 @@ fn a_recording_gives_the_same_tally_as_the_capture_that_made_it() {
     let counters = captured.counters;
     let (received, lost) = (counters.received, counters.lost);
     assert_eq!((received, lost, counters.corrupt, counters.late), (3, 1, 1, 1));
-    let (integrated, recounted) = tally_recording(&mut Recording::open(&path).unwrap()).unwrap();
-    assert_eq!(recounted, counters);
-    assert_eq!(integrated.means(&captured.setup), captured.integrated.means(&captured.setup));
+    let mut recording = Recording::open(&path).unwrap();
+    let tally = tally_recording(&mut recording).unwrap();
+    assert_eq!(tally.account().counters(), counters);
+    let means = tally.integrated().means(&captured.setup);
+    assert_eq!(means, captured.integrated.means(&captured.setup));
+    // Three of six frames came in order: the recording says so itself.
+    let account = recording.end().account.clone().unwrap();
+    assert_eq!((account.asked, account.made), (Some(FRAMES), Some(u64::from(FRAMES))));
+    assert_eq!(account.missing, captured.missing());
+    assert!(account.missing.unwrap().contains("1 lost, 1 corrupt, 1 late"));
 }
 
 #[test]
@@ -223,7 +232,7 @@ fn an_intact_frame_of_another_setup_is_corrupt() {
     let mut tally = Tally::new(&captured.setup, None);
     let frame = |sequence, words: usize, buffer: &mut [u8]| {
         let samples = Samples::pack(vec![1i64; words].into_iter(), buffer).unwrap();
-        let (run, flags) = (0, FrameFlags::default());
+        let (run, flags) = (0, FrameFlags::DIFFERENTIAL);
         let frame = Frame { run, sequence, device_time_us: 0, sweeps: 1, flags, samples };
         let mut packet = vec![0; MAX_DEVICE_PACKET + 1];
         let length = encode(&DeviceMessage::Frame(frame), &mut packet).unwrap().len();
@@ -245,7 +254,7 @@ fn patterns_without_complements_show_the_scene_too() {
     options.setup.sweeps = 16;
     let captured = run(Box::new(MemoryLink::new(optics().camera(2).unwrap())), &options);
     let footprint = optics().footprint().weights().to_vec();
-    // With the calibrated dark level, and with none but the estimate.
+    // Once with the calibrated dark level, once with the estimated one.
     for settling in [captured.settling.as_ref(), None] {
         let measurements =
             captured.integrated.measurements(&captured.setup, settling, false).unwrap();
@@ -260,8 +269,10 @@ fn the_same_seed_gives_the_same_bytes() {
     let folder = tempfile::tempdir().unwrap();
     let record = |name: &str, seed| {
         let path = folder.path().join(name);
-        let options =
-            CaptureOptions { record: Some(path.clone()), ..options(&Order::CakeCutting, true) };
+        let options = CaptureOptions {
+            record: Some(Target::New(path.clone())),
+            ..options(&Order::CakeCutting, true)
+        };
         run(Box::new(MemoryLink::new(optics().camera(seed).unwrap())), &options);
         let recording = Recording::open(&path).unwrap();
         recording.map(|packet| packet.unwrap().bytes).collect::<Vec<_>>()
@@ -279,7 +290,8 @@ fn an_interlock_that_opens_ends_the_capture_with_the_reason() {
     let mut session = Session::open(Box::new(MemoryLink::new(camera))).unwrap();
     let error =
         capture(&mut session, &options(&Order::Natural, false), &mut |_| ControlFlow::Continue(()));
-    // Opened before the start, it refuses; the words name the interlock.
+    // The interlock was opened before the start, so the camera refuses the start; the message names
+    // the interlock.
     let message = match error {
         Ok(captured) => match captured.ended {
             Ended::Fault(fault @ Fault::Interlock) => format!("{fault:?}"),

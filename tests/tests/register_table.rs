@@ -1,4 +1,4 @@
-//! The register table of docs/gateware.md is that of the wire crate.
+//! Tests that the register table of docs/gateware.md is the wire crate's.
 
 use nirspi_tests::root;
 use nirspi_wire::register::Register;

@@ -1,4 +1,5 @@
-//! LEDs go off when they must: real firmware logic, golden model of the gateware, requests as a host sends them.
+//! Tests that LEDs go off when they must: real firmware logic, the gateware's golden model, and
+//! requests as a host sends them.
 
 #![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
 
@@ -6,14 +7,14 @@ use nirspi::virtual_camera::{OpticalFpga, SimulatedFpga, VirtualCamera, VirtualO
 use nirspi_optics::Scene;
 use nirspi_wire::packet::MAX_DEVICE_PACKET;
 use nirspi_wire::{
-    Command, Configuration, Deframed, Deframer, DeviceMessage, EventKind, Fault, PROTOCOL_VERSION,
-    PatternOrder, Refusal, Reply, Request, RunLength, SampleSource, encode, open,
+    Command, Configuration, Deframed, Deframer, DeviceMessage, EventKind, Fault, PatternOrder,
+    Refusal, Reply, Request, RunLength, SampleSource, encode, open, version,
 };
 
-/// 8 us, the pace of the virtual camera.
+/// 8 us, the step of the virtual camera.
 const STEP_CLOCKS: u32 = 1000;
 
-/// What a host would hear, as far as these tests care.
+/// The messages that matter to these tests.
 #[derive(Debug, PartialEq)]
 enum Heard {
     Done,
@@ -34,7 +35,7 @@ impl Bench {
         let scene = Scene::new(vec![0.5; 64], 8, 48.0).unwrap();
         let camera = VirtualOptics::new(scene, 300.0).unwrap().camera(1).unwrap();
         let mut bench = Self { camera, deframer: Box::default(), next_id: 0 };
-        bench.ask(Command::Hello { protocol: PROTOCOL_VERSION });
+        bench.ask(Command::Hello { protocol: version::CURRENT });
         bench
     }
 
@@ -47,7 +48,7 @@ impl Bench {
         self.pass(10)
     }
 
-    /// Lets time pass, and says what came of it.
+    /// Lets time pass; returns the messages of that time.
     fn pass(&mut self, steps: usize) -> Vec<Heard> {
         let mut heard = Vec::new();
         for _ in 0..steps {
@@ -114,7 +115,7 @@ fn an_interlock_that_opens_in_mid_run_ends_it_until_it_is_closed_and_acknowledge
     assert!(heard.contains(&Heard::Fault(Fault::Interlock)), "{heard:?}");
     assert!(heard.contains(&Heard::RunEnded));
 
-    // Neither a start nor an acknowledgement while it is open.
+    // While the interlock is open, the camera refuses both a start and an acknowledgement.
     let heard = bench.ask(Command::Start(RunLength::Continuous));
     assert!(matches!(heard[..], [Heard::Refused(_)]), "{heard:?}");
     assert_eq!(bench.configure(), [Heard::Refused(Refusal::Fault(Fault::Interlock))]);

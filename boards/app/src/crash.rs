@@ -1,12 +1,13 @@
 //! The crash record in memory that a restart does not clear.
 //!
-//! The one law: writing it needs no other part of the firmware to be sound: no lock, no wait, no allocation.
+//! Writing the record uses no other part of the firmware: no lock, no wait, no allocation. So the
+//! record can be written after a failure of any part.
 
 use core::panic::PanicInfo;
 use core::sync::atomic::{AtomicU32, Ordering};
 use nirspi_mcu::{CRASH_WORDS, Crash, Micros};
 
-// cortex-m-rt's `.uninit` is neither loaded nor cleared at start.
+// cortex-m-rt neither loads nor clears its `.uninit` section at start.
 #[cfg_attr(
     target_os = "none",
     expect(unsafe_code, reason = "a section is chosen by an attribute that is unsafe to use"),
@@ -14,7 +15,7 @@ use nirspi_mcu::{CRASH_WORDS, Crash, Micros};
 )]
 static RECORD: [AtomicU32; CRASH_WORDS] = [const { AtomicU32::new(0) }; CRASH_WORDS];
 
-/// Leaves a record for [`take`] after the restart. The record of the first crash stands until then.
+/// Leaves a record for [`take`] after the restart. A record of an earlier crash is kept.
 pub fn store(text: core::fmt::Arguments<'_>) {
     if peek().is_some() {
         return;
@@ -25,7 +26,7 @@ pub fn store(text: core::fmt::Arguments<'_>) {
     }
 }
 
-/// Leaves a record of a panic: where, and what it said.
+/// Leaves a record of a panic: its place and its message.
 pub fn store_panic(info: &PanicInfo<'_>) {
     match info.location() {
         Some(place) => {
@@ -35,7 +36,7 @@ pub fn store_panic(info: &PanicInfo<'_>) {
     }
 }
 
-/// The record of the crash that led to this start, once.
+/// The record of the crash that led to this start. The second call gives `None`.
 #[must_use]
 pub fn take() -> Option<Crash> {
     let found = peek();

@@ -1,14 +1,16 @@
-//! The camera's firmware but for its peripherals: one loop and one host link, the same on every board.
+//! The camera's firmware without its peripherals: one loop and one host link, the same on every
+//! board.
 //!
 //! ```text
 //! USB or UART task <-> [link] <-> [run]: nirspi_mcu::Camera <-> PortBus <-> FPGA port of the board
 //! ```
 //!
-//! A board makes its peripherals, implements [`FpgaPort`], [`Board`] and perhaps [`DepthSensor`], splits a
-//! [`Link`](link::Link), gives its two outer ends to the task that serves the host, and awaits [`run`].
+//! A board creates its peripherals, implements [`FpgaPort`], [`Board`] and optionally
+//! [`DepthSensor`], splits a [`Link`](link::Link), gives the link's two outer ends to the task that
+//! serves the host, and awaits [`run`].
 //!
-//! The one law: what runs in an interrupt is the board's, and short; everything here runs in thread mode and is
-//! suspended only where it says `await`.
+//! Interrupts belong to the board and are short. All code here runs in thread mode and is suspended
+//! only at an `await`.
 #![no_std]
 
 #[cfg(test)]

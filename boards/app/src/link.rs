@@ -1,7 +1,10 @@
-//! Between the camera and the task that serves the host: commands in, packets out.
+//! The link between the camera and the task that serves the host: commands in, packets out.
 //!
-//! The one law: the link holds whole packets. When all its places are taken the camera is refused one, drops that
-//! frame and counts it; nothing waits in the camera for a slow host, and nothing is cut.
+//! # Invariant
+//! The link holds whole packets. When all places are taken, the link refuses the next packet, and
+//! the camera drops that frame whole and counts it
+//! (`tests::frames_come_in_order_and_a_full_link_drops_whole_ones`). So a slow host never blocks
+//! the camera.
 
 use embassy_futures::select::{Either, select};
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
@@ -12,7 +15,7 @@ use embassy_time::{Duration, Timer};
 use nirspi_mcu::{Merger, PacketSink};
 use nirspi_wire::packet::{MAX_DEVICE_PACKET, MAX_HOST_PACKET};
 
-/// Place for one packet on its way to the host.
+/// A place for one packet on its way to the host.
 #[derive(Debug, Clone, Copy)]
 pub struct Packet {
     bytes: [u8; MAX_DEVICE_PACKET],
@@ -20,7 +23,7 @@ pub struct Packet {
 }
 
 impl Packet {
-    /// With nothing in it.
+    /// A place without a packet.
     pub const EMPTY: Self = Self { bytes: [0; MAX_DEVICE_PACKET], length: 0 };
 
     fn after(&self, offset: usize) -> &[u8] {
@@ -35,14 +38,14 @@ pub struct Link<'m> {
     hangup: Hangup,
 }
 
-/// The host's side says that it is gone; the camera says that it has cleared up.
+/// Two signals at the end of a session: the host has gone; the camera has ended the session.
 struct Hangup {
     gone: Signal<NoopRawMutex, ()>,
     cleared: Signal<NoopRawMutex, ()>,
 }
 
 impl Hangup {
-    /// Waits for the end of the session, and leaves it to be [taken](CameraEnd::has_gone).
+    /// Waits for the end of the session. [`CameraEnd::has_gone`] still reports it afterwards.
     async fn noticed(&self) {
         self.gone.wait().await;
         self.gone.signal(());
@@ -50,14 +53,14 @@ impl Hangup {
 }
 
 impl<'m> Link<'m> {
-    /// With as many packets on their way at once as there are places.
+    /// A link on which as many packets can wait as there are places.
     #[must_use]
     pub fn new(places: &'m mut [Packet]) -> Self {
         let hangup = Hangup { gone: Signal::new(), cleared: Signal::new() };
         Self { commands: Pipe::new(), packets: Channel::new(places), hangup }
     }
 
-    /// The camera's end, and the two ends of the task that serves the host.
+    /// Splits the link into the camera's end and the two ends of the task that serves the host.
     pub fn split<const N: usize>(&mut self) -> (CameraEnd<'_>, HostIn<'_>, HostOut<'_, N>) {
         let (commands, bytes) = self.commands.split();
         let (sender, packets) = self.packets.split();
@@ -70,15 +73,15 @@ impl<'m> Link<'m> {
     }
 }
 
-/// Where bytes from the host go in.
+/// The end that takes bytes from the host.
 pub struct HostIn<'l> {
     bytes: pipe::Writer<'l, NoopRawMutex, MAX_HOST_PACKET>,
     hangup: &'l Hangup,
 }
 
 impl HostIn<'_> {
-    /// Hands over bytes from the host, and waits while there is no room: a host that asks faster than it is
-    /// answered is slowed down.
+    /// Passes on bytes from the host. The call waits while there is no room, so a host that sends
+    /// commands faster than the camera answers is slowed down.
     pub async fn received(&mut self, bytes: &[u8]) {
         let mut rest = bytes;
         while !rest.is_empty() {
@@ -87,8 +90,9 @@ impl HostIn<'_> {
         }
     }
 
-    /// The host is gone. When this returns the camera has ended its session, the LEDs are off, and nothing that was
-    /// under way in either direction is left, but for what [`HostOut::discard`] has to forget.
+    /// Ends the session of a host that has gone. When this returns, the camera has ended its
+    /// session, the LEDs are off, and both directions are empty, except for bytes that
+    /// [`HostOut::discard`] has to drop.
     pub async fn closed(&mut self) {
         self.hangup.cleared.reset();
         self.hangup.gone.signal(());
@@ -96,16 +100,17 @@ impl HostIn<'_> {
     }
 }
 
-/// Where bytes to the host come out, in transfers of `N` bytes.
+/// The end that gives bytes for the host, in transfers of `N` bytes.
 pub struct HostOut<'l, const N: usize> {
     packets: zerocopy_channel::Receiver<'l, NoopRawMutex, Packet>,
-    /// Bytes of the first packet that have gone into transfers.
+    /// Bytes of the first packet that are already in transfers.
     sent: usize,
     merger: Merger<N>,
 }
 
 impl<const N: usize> HostOut<'_, N> {
-    /// Waits for something to send; a full transfer, or a short or empty one if nothing follows it now.
+    /// Waits for bytes to send. Returns a full transfer, or a short or empty transfer if no bytes
+    /// follow now.
     pub async fn transfer(&mut self) -> &[u8] {
         if self.merger.is_done() {
             self.packets.receive().await;
@@ -122,7 +127,7 @@ impl<const N: usize> HostOut<'_, N> {
         self.merger.transfer()
     }
 
-    /// Forgets what is half sent, after [`HostIn::closed`].
+    /// Drops a half-sent packet, after [`HostIn::closed`].
     pub fn discard(&mut self) {
         self.packets.clear();
         self.sent = 0;
@@ -130,7 +135,7 @@ impl<const N: usize> HostOut<'_, N> {
     }
 }
 
-/// The camera's end.
+/// The camera's end of the link.
 pub struct CameraEnd<'l> {
     commands: pipe::Reader<'l, NoopRawMutex, MAX_HOST_PACKET>,
     sink: Sink<'l>,
@@ -138,7 +143,7 @@ pub struct CameraEnd<'l> {
 }
 
 impl<'l> CameraEnd<'l> {
-    /// Bytes from the host that have not been taken.
+    /// Bytes from the host that the camera has not taken.
     pub(crate) fn waiting(&mut self) -> &[u8] {
         self.commands.try_fill_buf().unwrap_or(&[])
     }
@@ -149,26 +154,27 @@ impl<'l> CameraEnd<'l> {
         }
     }
 
-    /// Those bytes, and where packets go.
+    /// Bytes from the host, and the place where packets go.
     pub(crate) fn both(&mut self) -> (&[u8], &mut Sink<'l>) {
         (self.commands.try_fill_buf().unwrap_or(&[]), &mut self.sink)
     }
 
-    /// Bytes from the host have come, or it has gone.
+    /// Waits for new bytes from the host, or for the end of the session.
     pub(crate) async fn news(&mut self) {
         if !self.waiting().is_empty() {
-            // They have been offered and not been taken: the camera has to go on first.
+            // The camera did not take the bytes offered, so it has other work to do first.
             return self.hangup.noticed().await;
         }
         select(self.hangup.noticed(), self.commands.fill_buf()).await;
     }
 
-    /// Whether the host has gone since the last call. Then [`clear`](Self::clear) is to be called.
+    /// Whether the host has gone since the last call. The caller must then call
+    /// [`clear`](Self::clear).
     pub(crate) fn has_gone(&self) -> bool {
         self.hangup.gone.try_take().is_some()
     }
 
-    /// Forgets what came from the host that is gone.
+    /// Drops the bytes of a host that has gone.
     pub(crate) fn clear(&mut self) {
         while let length @ 1.. = self.waiting().len() {
             self.taken(length);
@@ -176,7 +182,7 @@ impl<'l> CameraEnd<'l> {
         self.hangup.cleared.signal(());
     }
 
-    /// Until all packets have been sent, for so long at most.
+    /// Waits until all packets have been sent, for at most this long.
     pub(crate) async fn flush(&self, patience: Duration) {
         let sent = async {
             while !self.sink.sender.is_empty() {
@@ -189,7 +195,7 @@ impl<'l> CameraEnd<'l> {
     }
 }
 
-/// Where the camera puts its packets.
+/// The place where the camera puts its packets.
 pub struct Sink<'l> {
     sender: zerocopy_channel::Sender<'l, NoopRawMutex, Packet>,
 }

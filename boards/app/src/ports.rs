@@ -1,37 +1,41 @@
-//! What a board implements: its FPGA port, its pins, its depth sensor.
+//! The interfaces that a board implements: its FPGA port, its pins, its depth sensor.
 //!
-//! The one law: a board decides nothing. It moves bytes, reads pins, and sets one pin as it is told.
+//! A board makes no decisions. It transfers bytes, reads pins, and sets one pin to the level that
+//! the firmware gives.
 
 use core::future::Future;
 use nirspi_mcu::{BusError, HostPort, Inputs};
 use nirspi_wire::RebootInto;
 
-/// The FPGA's host port with long reads that do not keep the processor.
+/// The FPGA's host port, with long reads during which the processor does other work.
 pub trait FpgaPort: HostPort {
-    /// Fills all of `into` by one access with this opcode ([`nirspi_wire::host_port`]) at address 0.
+    /// Fills all of `into` by one access with this opcode ([`nirspi_wire::host_port`]) at address
+    /// 0.
     ///
     /// # Errors
-    /// [`BusError`]; the bytes are then of no use.
+    /// [`BusError`]; the bytes are then undefined.
     fn read_bytes(
         &mut self,
         opcode: u8,
         into: &mut [u8],
     ) -> impl Future<Output = Result<(), BusError>>;
 
-    /// Until one of the two ready lines is high. A board that cannot wait for its lines returns in a millisecond.
+    /// Waits until one of the two ready lines is high. A board that cannot wait for its lines
+    /// returns after a millisecond.
     fn ready(&mut self) -> impl Future<Output = ()>;
 }
 
 /// Everything else of a board.
 pub trait Board {
-    /// Sensors as of now, without waiting.
+    /// Sensor readings of this moment, without waiting.
     fn inputs(&mut self) -> Inputs;
 
-    /// Level of the pin that lets the LED drivers work; low after reset. It is high from a configuration on
-    /// until a fault, the end of the session or a crash: before the FPGA lights anything, so that no frame begins dark.
+    /// Sets the pin that enables the LED drivers; low after reset. The pin is high from a
+    /// configuration until a fault, the end of the session or a crash. It is high before the FPGA
+    /// lights any LED, so no frame begins dark.
     fn enable_leds(&mut self, enabled: bool);
 
-    /// The firmware is alive: called at least once in 10 ms.
+    /// Feeds the chip's watchdog. The firmware calls this at least once in 10 ms.
     fn feed_watchdog(&mut self);
 
     /// Restarts the chip.
@@ -41,11 +45,11 @@ pub trait Board {
 /// Zones along one edge of a time-of-flight map.
 pub const DEPTH_SIDE: u8 = 8;
 
-/// Distances in mm, row-major; 0 where there is none.
+/// Distances in mm, row-major; 0 where the sensor has no distance.
 pub type DepthMap = [u16; DEPTH_SIDE as usize * DEPTH_SIDE as usize];
 
 /// A time-of-flight sensor of 8 x 8 zones.
 pub trait DepthSensor {
-    /// Waits for the next map; `None` if the sensor does not answer, after a while.
+    /// Waits for the next map; `None` if the sensor does not answer in time.
     fn next(&mut self) -> impl Future<Output = Option<DepthMap>>;
 }

@@ -1,7 +1,7 @@
 //! The camera's loop.
 //!
-//! The one law: it comes round at least every millisecond, but for a transfer of the longest frame; and whenever it
-//! waits, the tasks that serve the host run.
+//! One turn of the loop takes at most a millisecond, or the transfer of the longest frame. While
+//! the loop waits, the tasks that serve the host run.
 
 use crate::link::CameraEnd;
 use crate::{Board, DEPTH_SIDE, DepthMap, DepthSensor, FpgaPort};
@@ -17,16 +17,16 @@ use nirspi_mcu::{
 use nirspi_wire::fpga::MAX_FRAME_BYTES;
 use nirspi_wire::{State, Version};
 
-/// The longest sleep: safety is looked at that often.
+/// The longest sleep, and so the longest time between two checks of the safety rules.
 const TICK: Duration = Duration::from_millis(1);
 
-/// The promise of a restart is given this long to get to the host.
+/// Longest time for the reply that promises a restart to reach the host.
 const FAREWELL: Duration = Duration::from_millis(100);
 
-/// Depth maps on their way from [`measure_depth`] to [`run`]; the newest only.
+/// Mailbox from [`measure_depth`] to [`run`]; it holds the newest depth map only.
 pub type DepthMailbox = Signal<NoopRawMutex, DepthMap>;
 
-/// All that makes a board a camera.
+/// Everything that makes a board a camera.
 pub struct Device<'b, B, P, G> {
     /// Pins and sensors.
     pub board: B,
@@ -34,17 +34,17 @@ pub struct Device<'b, B, P, G> {
     pub port: P,
     /// Memory for one frame, where the port's DMA can reach it.
     pub frame: &'b mut [u8; MAX_FRAME_BYTES],
-    /// Where bitstreams go.
+    /// The destination of bitstreams.
     pub loader: G,
-    /// Who it is: [`board_info`].
+    /// Identity of the device, from [`board_info`].
     pub info: BoardInfo,
-    /// What protects people and LEDs.
+    /// Limits that protect people and LEDs.
     pub limits: Limits,
-    /// From [`crash::take`](crate::crash::take).
+    /// The crash that ended the last start, from [`crash::take`](crate::crash::take).
     pub crash: Option<Crash>,
 }
 
-/// Identity of a board by the name of its folder, with this firmware's version.
+/// Identity of a board, by the name of its folder, with this firmware's version.
 #[must_use]
 pub fn board_info(board: &str, serial: &str) -> BoardInfo {
     let part = |text: &str| text.parse().unwrap_or(0);
@@ -125,9 +125,9 @@ pub async fn run<B: Board, P: FpgaPort, G: GatewareLoader>(
     }
 }
 
-/// Sleeps until there may be something to do.
+/// Sleeps until there may be work.
 async fn rest<P: FpgaPort>(bus: &mut PortBus<'_, P>, link: &mut CameraEnd<'_>) {
-    // A line that is high already has not led to any work: the camera is waiting for something else.
+    // A line that is high already has led to no work, so the loop waits for another event.
     let is_ready = bus.frame_ready() || bus.raw_ready();
     let ready = async { if is_ready { pending().await } else { bus.port().ready().await } };
     select3(link.news(), ready, Timer::after(TICK)).await;

@@ -1,4 +1,4 @@
-//! The loop and its link, polled by hand: no executor, and a clock that a test moves.
+//! Tests of the loop and its link, polled by hand: no executor, and a clock that a test moves.
 
 use crate::link::{HostIn, HostOut, Link, Packet};
 use crate::{Board, DepthMailbox, Device, FpgaPort, board_info, run};
@@ -13,15 +13,14 @@ use nirspi_wire::fpga::{Header, MAX_FRAME_BYTES, Sums};
 use nirspi_wire::packet::{MAX_DEVICE_PACKET, MAX_HOST_PACKET};
 use nirspi_wire::register::{IDENTITY, Register, control, status};
 use nirspi_wire::{
-    Answer, Command, Configuration, Deframed, Deframer, DeviceMessage, FrameFlags,
-    PROTOCOL_VERSION, PatternOrder, RebootInto, Reply, Request, RunLength, SampleSource, encode,
-    open,
+    Answer, Command, Configuration, Deframed, Deframer, DeviceMessage, FrameFlags, PatternOrder,
+    RebootInto, Reply, Request, RunLength, SampleSource, encode, open, version,
 };
 use std::boxed::Box;
 use std::rc::Rc;
 use std::vec::Vec;
 
-/// Ten microseconds pass whenever anyone looks.
+/// A clock that advances ten microseconds at every read.
 struct Clock(AtomicU64);
 
 impl embassy_time_driver::Driver for Clock {
@@ -37,14 +36,14 @@ embassy_time_driver::time_driver_impl!(static CLOCK: Clock = Clock(AtomicU64::ne
 const TRANSFER: usize = 64;
 const PATTERNS: u16 = 2;
 
-/// What a test sees of the board, and sets.
+/// The board's pins, as a test reads and sets them.
 #[derive(Default)]
 struct Pins {
     leds_enabled: Cell<bool>,
     running: Cell<bool>,
     sequence: Cell<u32>,
     fed: Cell<u32>,
-    /// Polls that a transfer takes.
+    /// Number of polls that a transfer takes.
     transfer_polls: Cell<u32>,
 }
 
@@ -68,7 +67,7 @@ impl Board for Fake {
     }
 }
 
-/// Registers in memory; a frame is ready whenever a run is on.
+/// A fake FPGA: registers in memory, and a frame that is ready during every run.
 struct Fpga {
     pins: Rc<Pins>,
     registers: [u32; 32],
@@ -137,7 +136,7 @@ impl FpgaPort for Fpga {
     }
 }
 
-/// A board that runs, and the task that serves its host.
+/// A running board, and the task that serves its host.
 struct Bench {
     camera: Pin<Box<dyn Future<Output = ()>>>,
     from_host: HostIn<'static>,
@@ -165,7 +164,7 @@ impl Bench {
         Self { camera, from_host, to_host, pins, deframer: Box::default() }
     }
 
-    /// The camera's loop, some turns of it.
+    /// Runs the camera's loop for some turns.
     fn turn(&mut self) {
         for _ in 0..20 {
             let polled = self.camera.as_mut().poll(&mut Context::from_waker(Waker::noop()));
@@ -173,12 +172,12 @@ impl Bench {
         }
     }
 
-    /// Bytes from the host, all of which find room at once.
+    /// Sends bytes from the host; all of them must find room at once.
     fn send(&mut self, bytes: &[u8]) {
         assert!(poll_once(self.from_host.received(bytes)).is_ready());
     }
 
-    /// The transfers that wait.
+    /// Takes the transfers that wait.
     fn transfers(&mut self) -> Vec<Vec<u8>> {
         let mut transfers = Vec::new();
         while let core::task::Poll::Ready(transfer) = poll_once(self.to_host.transfer()) {
@@ -187,7 +186,7 @@ impl Bench {
         transfers
     }
 
-    /// What each message that waits is.
+    /// The kind of each message that waits.
     fn heard(&mut self) -> Vec<Heard> {
         let bytes = self.transfers().concat();
         let mut rest = &bytes[..];
@@ -221,7 +220,7 @@ fn packet(id: u16, command: Command<'_>) -> Vec<u8> {
 }
 
 fn hello(id: u16) -> Vec<u8> {
-    packet(id, Command::Hello { protocol: PROTOCOL_VERSION })
+    packet(id, Command::Hello { protocol: version::CURRENT })
 }
 
 const TWO_PATTERNS: Configuration<'static> = Configuration {
@@ -260,7 +259,7 @@ fn leds_are_let_on_from_the_configuration_until_the_host_is_gone() {
     bench.turn();
     assert!(bench.pins.running.get());
 
-    // Half a command is left behind.
+    // The first host leaves half a command behind.
     bench.send(&hello(4)[..5]);
     {
         let mut closed = core::pin::pin!(bench.from_host.closed());
@@ -282,7 +281,7 @@ fn leds_are_let_on_from_the_configuration_until_the_host_is_gone() {
 fn frames_come_in_order_and_a_full_link_drops_whole_ones() {
     let mut bench = Bench::new(4);
     for (id, command) in [
-        (1, Command::Hello { protocol: PROTOCOL_VERSION }),
+        (1, Command::Hello { protocol: version::CURRENT }),
         (2, Command::Configure(TWO_PATTERNS)),
         (3, Command::Start(RunLength::Continuous)),
     ] {
@@ -294,7 +293,7 @@ fn frames_come_in_order_and_a_full_link_drops_whole_ones() {
     for _ in 0..10 {
         bench.turn();
     }
-    // Nobody took any: four are on their way, the rest were dropped.
+    // The host has taken no packet: four packets wait, and the other frames were dropped.
     let heard = bench.heard();
     let expected: Vec<Heard> = (0..4).map(|k| Heard::Frame(next + k)).collect();
     assert_eq!(heard, expected);
@@ -305,7 +304,7 @@ fn frames_come_in_order_and_a_full_link_drops_whole_ones() {
 fn a_long_transfer_delays_the_answer_and_loses_nothing() {
     let mut bench = Bench::new(64);
     for (id, command) in
-        [(1, Command::Hello { protocol: PROTOCOL_VERSION }), (2, Command::Configure(TWO_PATTERNS))]
+        [(1, Command::Hello { protocol: version::CURRENT }), (2, Command::Configure(TWO_PATTERNS))]
     {
         bench.send(&packet(id, command));
         bench.turn();
@@ -344,7 +343,8 @@ fn bytes_that_find_no_room_wait_and_are_not_lost() {
     let many: Vec<u8> = (0..400).flat_map(hello).collect();
     let mut heard = Vec::new();
     {
-        // Longer than the pipe: it takes what it can, and the rest as the camera takes commands.
+        // The bytes are longer than the pipe: the pipe takes what fits, and the rest as the camera
+        // takes commands.
         assert!(many.len() > MAX_HOST_PACKET);
         let Bench { camera, from_host, to_host, .. } = &mut bench;
         let mut sending = core::pin::pin!(from_host.received(&many));

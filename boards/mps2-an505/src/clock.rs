@@ -1,6 +1,7 @@
-//! Time for embassy from SysTick: an interrupt a millisecond, microseconds by the counter in between.
+//! Embassy's time from SysTick: one interrupt a millisecond, and microseconds from the counter
+//! between interrupts.
 //!
-//! The one law: time never goes back, and is 0 until the clock is started.
+//! Time never goes back. Time is 0 until the clock is started.
 
 use core::cell::{Cell, RefCell};
 use core::task::Waker;
@@ -43,7 +44,7 @@ pub fn start(peripherals: &mut Peripherals) {
 pub fn on_tick() {
     DRIVER.ticks.lock(|ticks| ticks.set(ticks.get() + 1));
     let now = DRIVER.now();
-    // Gives the wakers whose time has come to their tasks.
+    // Wakes the tasks whose time has come.
     DRIVER.queue.lock(|queue| queue.borrow_mut().next_expiration(now));
 }
 
@@ -53,11 +54,11 @@ impl Driver for SysTickDriver {
             let mut count = SYST::get_current();
             let mut whole = ticks.get();
             if SCB::is_pendst_pending() {
-                // It has wrapped, and the interrupt waits for this lock.
+                // The counter has wrapped, and the interrupt waits for this lock.
                 count = SYST::get_current();
                 whole += 1;
             }
-            // 0 until it is first loaded.
+            // The counter is 0 until its first load.
             let elapsed = if count == 0 { 0 } else { RELOAD - count.min(RELOAD) };
             whole * MICROS_PER_TICK + u64::from(elapsed / CLOCKS_PER_MICRO)
         })
@@ -65,7 +66,7 @@ impl Driver for SysTickDriver {
 
     fn schedule_wake(&self, at: u64, waker: &Waker) {
         self.queue.lock(|queue| {
-            // The next tick looks; there is no alarm to set.
+            // The next tick checks the queue; there is no alarm to set.
             let _ = queue.borrow_mut().schedule_wake(at, waker);
         });
     }

@@ -1,10 +1,11 @@
-//! What QEMU needs that hardware would not.
+//! Work-around for the speed of QEMU's UART.
 //!
-//! Its model of the UART holds one byte and, when that has been read, does not say that it can take the next one
-//! (`hw/char/cmsdk-apb-uart.c`, seen in version 7.2): QEMU's main loop finds out when it turns the next time, which
-//! is once a millisecond. Restarting a timer makes it turn at once. On the real image this timer counts for nobody.
+//! QEMU's model of the UART holds one byte. When that byte has been read, the model does not say
+//! that it can take the next one (`hw/char/cmsdk-apb-uart.c`, seen in version 7.2): QEMU's main
+//! loop notices in its next turn, which comes once a millisecond. Restarting a timer makes the main
+//! loop turn at once. On a real chip the timer has no effect.
 //!
-//! The one law: nothing depends on it but the speed.
+//! The firmware's results do not depend on this module, only its speed in QEMU.
 
 use vcell::VolatileCell;
 
@@ -21,22 +22,23 @@ struct Registers {
 
 const CTRL_ENABLE: u32 = 1 << 0;
 
-/// 10 microseconds: the shortest that QEMU times.
+/// 10 microseconds: the shortest time that QEMU's timer can have.
 const SOON: u32 = 200;
 
 #[expect(unsafe_code, reason = "registers are at an address")]
 fn timer() -> &'static Registers {
-    // SAFETY: the timer is there as long as the program runs; only volatile accesses of whole words are made.
+    // SAFETY: the timer exists as long as the program runs, and the code makes only volatile
+    // accesses of whole words.
     unsafe { &*(TIMER0 as *const Registers) }
 }
 
-/// Before the first [`look_for_input`].
+/// Prepares the timer; call this before the first [`look_for_input`].
 pub fn prepare() {
     timer().reload.set(u32::MAX);
     timer().ctrl.set(CTRL_ENABLE);
 }
 
-/// A byte has been read: QEMU may bring the next one.
+/// Makes QEMU deliver the next byte, after a byte has been read.
 pub fn look_for_input() {
     timer().value.set(SOON);
 }

@@ -1,6 +1,6 @@
-//! Runs the tasks and sleeps by WFI: QEMU takes WFE, by which embassy's own executor sleeps, for no operation.
+//! Runs the tasks and sleeps by WFI. Embassy's own executor sleeps by WFE, which QEMU ignores.
 //!
-//! The one law: a task woken by an interrupt is polled before the next sleep.
+//! A task that an interrupt wakes is polled before the next sleep.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 use cortex_m::{asm, interrupt};
@@ -15,18 +15,18 @@ fn pender(_context: *mut ()) {
     WOKEN.store(true, Ordering::Release);
 }
 
-/// Runs what `init` spawns, for ever.
+/// Runs the tasks that `init` spawns, for ever.
 pub fn run(init: impl FnOnce(Spawner)) -> ! {
     static EXECUTOR: StaticCell<raw::Executor> = StaticCell::new();
     let executor: &'static raw::Executor = EXECUTOR.init(raw::Executor::new(core::ptr::null_mut()));
     init(executor.spawner());
     loop {
         #[expect(unsafe_code, reason = "an executor is polled by its owner")]
-        // SAFETY: called from here alone, and not from the pender.
+        // SAFETY: this is the only call, and the pender does not make it.
         unsafe {
             executor.poll();
         }
-        // An interrupt that comes between the look and the sleep ends the sleep at once.
+        // An interrupt between the check and the sleep ends the sleep at once.
         interrupt::free(|_| {
             if !WOKEN.swap(false, Ordering::Acquire) {
                 asm::wfi();

@@ -1,7 +1,8 @@
-//! The FPGA behind a tunnel: one request and one reply over a UART for each access of its host port.
+//! The FPGA behind a tunnel: one request and one reply over a UART for each access of its host
+//! port.
 //!
-//! The one law: lines and sensors are what the last reply said. Simulated time passes with accesses alone, so nothing
-//! has changed since.
+//! Levels of lines and readings of sensors are those of the last reply. They stay true until the
+//! next access, because simulated time passes only during accesses.
 
 use crate::uart::Uart;
 use core::cell::Cell;
@@ -13,13 +14,14 @@ use nirspi_wire::Crc32;
 use nirspi_wire::host_port::{READ_REGISTER, WRITE_REGISTER};
 use nirspi_wire::tunnel::{CRC_BYTES, LOOK, Lines, REPLY_HEAD_BYTES, Request};
 
-/// A register access takes a simulator of the RTL some milliseconds...
+/// Longest time for a register access: a simulator of the RTL needs some milliseconds.
 const PATIENCE: Duration = Duration::from_secs(1);
-/// ...and after one that got no answer, so long, that the host is not kept waiting for an FPGA that is gone.
+/// Longest time for an access after one without an answer. This time is short so that the host need
+/// not wait for a missing FPGA.
 const IMPATIENCE: Duration = Duration::from_millis(50);
-/// A frame takes it some seconds.
+/// Longest time for a frame: a simulator of the RTL needs some seconds.
 const DATA_PATIENCE: Duration = Duration::from_secs(30);
-/// After an access that failed: what is late has come by then.
+/// Time of silence after a failed access, in which a late reply arrives.
 const SILENCE: Duration = Duration::from_millis(20);
 
 /// The tunnel's end.
@@ -31,7 +33,8 @@ pub struct Tunnel<'b> {
     patience: Duration,
 }
 
-/// A look whose reply has not come whole: who waited for it may have gone, the reply comes all the same.
+/// A look at the lines whose reply has not arrived whole. The task that waited may be gone; the
+/// reply comes all the same.
 struct Look {
     request: Request,
     reply: [u8; REPLY_HEAD_BYTES + CRC_BYTES],
@@ -39,13 +42,13 @@ struct Look {
 }
 
 impl<'b> Tunnel<'b> {
-    /// Over this UART; tells the board's sensors where they are looked for.
+    /// A tunnel over this UART. Readings of the sensors are written to `lines`.
     pub fn new(uart: &'static Uart, lines: &'b Cell<Lines>) -> Self {
-        // What a crash has left half said.
+        // A crash may have left half a request.
         uart.quieten(SILENCE);
         let mut tunnel = Self { uart, lines, number: 0, look: None, patience: PATIENCE };
         tunnel.begin_look();
-        // Without an answer there is no FPGA, no interlock and no sensor, which is what the camera then finds.
+        // A missing answer leaves no FPGA, no interlock and no sensor, and the camera reports that.
         let _ = tunnel.end_look();
         tunnel
     }
@@ -55,7 +58,7 @@ impl<'b> Tunnel<'b> {
         Request { opcode, number: self.number, address, argument }
     }
 
-    /// Takes the lines of a reply that is right.
+    /// Takes the lines of a correct reply.
     fn check(
         &mut self,
         request: Request,
@@ -90,7 +93,7 @@ impl<'b> Tunnel<'b> {
         }
     }
 
-    /// Waits for the reply that is still to come, if any.
+    /// Waits for a reply that has not arrived yet, if any.
     fn end_look(&mut self) -> Result<(), BusError> {
         let Some(Look { request, mut reply, filled }) = self.look.take() else { return Ok(()) };
         let rest = reply.get_mut(filled..).unwrap_or_default();
@@ -158,7 +161,8 @@ impl FpgaPort for Tunnel<'_> {
         self.long_access(request, into).await
     }
 
-    /// One look: simulated time passes by it. The next one is the application's next turn.
+    /// Looks at the lines once, which lets simulated time pass. The application's next turn looks
+    /// again.
     async fn ready(&mut self) {
         self.begin_look();
         while let Some(look) = &mut self.look
@@ -166,7 +170,7 @@ impl FpgaPort for Tunnel<'_> {
         {
             look.filled += self.uart.read(rest).await;
         }
-        // A simulator that does not answer is noticed by the next register access.
+        // The next register access notices a simulator that does not answer.
         let _ = self.end_look();
         if !self.frame_ready() && !self.raw_ready() {
             pending::<()>().await;

@@ -1,9 +1,10 @@
-//! The camera's firmware on QEMU's `mps2-an505`: everything but the silicon.
+//! The camera's firmware on QEMU's `mps2-an505`: everything except the chip.
 //!
-//! UART0 is the host link, UART1 the FPGA's bus on its way to a simulator, SysTick the time. There is no pin, so the
-//! interlock and the temperature are what the simulator says, and the LED enable pin is nowhere.
+//! UART0 is the host link, UART1 the FPGA's bus to a simulator, and SysTick the clock. The board
+//! has no pins: interlock and temperature come from the simulator, and the LED enable pin does not
+//! exist.
 //!
-//! The one law: nothing here is told to the application that another board would not tell it.
+//! The application gets the same calls as on any other board.
 #![no_std]
 #![no_main]
 
@@ -34,10 +35,10 @@ use uart::Uart;
 static HOST: Uart = Uart::at(0x5020_0000);
 static FPGA: Uart = Uart::at(0x5020_1000);
 
-/// Frames on their way to the host: 32 ms of them at 1000 a second.
+/// Number of packets that can wait for the host: 32 ms of frames at 1000 a second.
 const PACKETS: usize = 32;
 
-/// Bytes that go to the host at once.
+/// Number of bytes that go to the host at once.
 const TRANSFER_BYTES: usize = 512;
 
 /// Expansion interrupts of the AN505 image follow the 32 of the IoT kit: receive and transmit of each UART in turn.
@@ -51,7 +52,7 @@ enum Irq {
 }
 
 #[expect(unsafe_code, reason = "the numbers are a matter of the chip")]
-// SAFETY: each is another number, and within those that the chip has.
+// SAFETY: each number is different and within the range that the chip has.
 unsafe impl cortex_m::interrupt::InterruptNumber for Irq {
     fn number(self) -> u16 {
         self as u16
@@ -59,7 +60,7 @@ unsafe impl cortex_m::interrupt::InterruptNumber for Irq {
 }
 
 #[exception]
-// Not `expect`: the macro repeats it where nothing is unsafe.
+// `allow` instead of `expect`: the macro repeats the attribute where the code is not unsafe.
 #[allow(unsafe_code, reason = "the form of this handler")]
 unsafe fn DefaultHandler(number: i16) {
     match number {
@@ -77,7 +78,7 @@ fn SysTick() {
 }
 
 #[exception]
-// Not `expect`: the macro repeats it where nothing is unsafe.
+// `allow` instead of `expect`: the macro repeats the attribute where the code is not unsafe.
 #[allow(unsafe_code, reason = "the form of this handler")]
 unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
     crash::store(format_args!("hard fault at {:#010x}, from {:#010x}", frame.pc(), frame.lr()));
@@ -105,7 +106,7 @@ impl Board for Emulated {
 
     fn feed_watchdog(&mut self) {}
 
-    /// There is no boot loader either.
+    /// The board has no boot loader either.
     fn restart(&mut self, _into: RebootInto) -> ! {
         SCB::sys_reset()
     }
@@ -128,7 +129,7 @@ async fn camera(board: Emulated, link: CameraEnd<'static>) -> ! {
     nirspi_app::run(device, link, DEPTH.init(DepthMailbox::new())).await
 }
 
-/// A UART is never closed: a host that begins says `Hello`.
+/// Serves the host. A UART is never closed: a new host begins with `Hello`.
 #[embassy_executor::task]
 async fn host(mut from: HostIn<'static>, mut to: HostOut<'static, TRANSFER_BYTES>) {
     let receive = async {
@@ -164,7 +165,7 @@ fn main() -> ! {
             unsafe_code,
             reason = "interrupts are enabled by the one who knows their handlers"
         )]
-        // SAFETY: outside of any critical section, and the handlers are those above.
+        // SAFETY: outside of any critical section; the handlers are those above.
         unsafe {
             NVIC::unmask(irq);
         }
@@ -173,7 +174,7 @@ fn main() -> ! {
     let lines = LINES.init(Cell::new(Lines::default()));
     let (camera_end, from_host, to_host) = link.split();
     executor::run(|spawner: Spawner| {
-        // Each is spawned once, so there is room.
+        // Each task is spawned once, so there is room.
         if let (Ok(camera), Ok(host)) =
             (camera(Emulated { lines }, camera_end), host(from_host, to_host))
         {

@@ -1,7 +1,8 @@
-//! The APB UART of Arm's Cortex-M System Design Kit (Arm DDI 0479, APB UART), as the AN505 image has five.
+//! The APB UART of Arm's Cortex-M System Design Kit (Arm DDI 0479, APB UART); the AN505 image has
+//! five.
 //!
-//! The one law: no byte is lost for want of room. A receiver that has none leaves its byte where it is and the line
-//! waits, as it does in QEMU; the real chip would count an overrun there.
+//! No byte is lost when the buffer is full: the receiver leaves the byte in its register, and the
+//! line waits. QEMU behaves so; a real chip would count an overrun.
 
 use crate::emulator;
 use core::future::poll_fn;
@@ -13,7 +14,7 @@ use embassy_sync::waitqueue::AtomicWaker;
 use embassy_time::{Duration, Instant};
 use vcell::VolatileCell;
 
-/// Bytes that have come and were not read yet.
+/// Bytes that have come and have not been read yet.
 const BUFFER_BYTES: usize = 512;
 
 /// `BAUDDIV`: 20 MHz by its smallest divider, 16, is 1.25 Mbit/s. QEMU's lines take no time.
@@ -24,7 +25,7 @@ struct Registers {
     data: VolatileCell<u32>,
     state: VolatileCell<u32>,
     ctrl: VolatileCell<u32>,
-    /// Reads the pending interrupts, a 1 written clears one.
+    /// A read gives the pending interrupts; a 1 written clears one.
     intstatus: VolatileCell<u32>,
     bauddiv: VolatileCell<u32>,
 }
@@ -38,7 +39,7 @@ const CTRL_RX_INTERRUPT: u32 = 1 << 3;
 const INT_TX: u32 = 1 << 0;
 const INT_RX: u32 = 1 << 1;
 
-/// Nothing came in time.
+/// No byte came in time.
 #[derive(Debug)]
 pub struct TimedOut;
 
@@ -50,19 +51,19 @@ pub struct Uart {
 }
 
 impl Uart {
-    /// By the address of its registers.
+    /// The UART whose registers are at this address.
     pub const fn at(address: usize) -> Self {
         Self { address, received: Pipe::new(), transmitter: AtomicWaker::new() }
     }
 
     #[expect(unsafe_code, reason = "registers are at an address")]
     fn registers(&self) -> &Registers {
-        // SAFETY: made only for the addresses of UARTs in `main`, which are there as long as the program runs;
-        // nothing but volatile accesses of whole words is done with them.
+        // SAFETY: `main` makes UARTs only for the addresses of real UARTs, which exist as long as
+        // the program runs; the code makes only volatile accesses of whole words.
         unsafe { &*(self.address as *const Registers) }
     }
 
-    /// Switches both directions on.
+    /// Enables both directions.
     pub fn enable(&self) {
         let registers = self.registers();
         registers.bauddiv.set(BAUD_DIVIDER);
@@ -72,7 +73,7 @@ impl Uart {
     /// The receive interrupt.
     pub fn on_receive(&self) {
         let registers = self.registers();
-        // First: a byte that comes meanwhile is to interrupt again.
+        // The clear comes first, so that a byte that comes meanwhile interrupts again.
         registers.intstatus.set(INT_RX);
         while registers.state.get() & STATE_RX_FULL != 0 {
             if self.received.is_full() {
@@ -81,7 +82,7 @@ impl Uart {
             }
             let byte = registers.data.get() as u8;
             emulator::look_for_input();
-            // There is room: nothing else writes.
+            // There is room, because no other code writes.
             let _ = self.received.try_write(&[byte]);
         }
     }
@@ -94,19 +95,19 @@ impl Uart {
         self.transmitter.wake();
     }
 
-    /// There is room again.
+    /// Continues after the buffer was full.
     fn resume(&self) {
         interrupt::free(|_| {
             let registers = self.registers();
             if registers.ctrl.get() & CTRL_RX_INTERRUPT == 0 {
                 registers.ctrl.set(registers.ctrl.get() | CTRL_RX_INTERRUPT);
-                // What came while the interrupt was off has not asked for it.
+                // A byte that came while the interrupt was off has caused no interrupt.
                 self.on_receive();
             }
         });
     }
 
-    /// Waits for bytes; how many came.
+    /// Waits for bytes; returns how many came.
     pub async fn read(&self, into: &mut [u8]) -> usize {
         let length = self.received.read(into).await;
         self.resume();
@@ -122,7 +123,7 @@ impl Uart {
         }
     }
 
-    /// Waits for all of `into`, asleep but for interrupts; other tasks do not run.
+    /// Waits for all of `into`. The processor sleeps between interrupts, and no other task runs.
     pub fn read_blocking(&self, into: &mut [u8], patience: Duration) -> Result<(), TimedOut> {
         let deadline = Instant::now() + patience;
         let mut rest = into;
@@ -145,7 +146,7 @@ impl Uart {
         Ok(())
     }
 
-    /// Forgets what came, until nothing has for that long.
+    /// Drops bytes until none has come for this long.
     pub fn quieten(&self, silence: Duration) {
         while self.read_blocking(&mut [0], silence).is_ok() {}
     }

@@ -1,4 +1,5 @@
-//! Clocks: 600 MHz for the core and 300 MHz for buses, from the board's 24 MHz crystal, which USB High-Speed needs.
+//! Clocks: 600 MHz for the core and 300 MHz for buses, from the board's 24 MHz crystal. USB
+//! High-Speed needs the crystal.
 
 use embassy_stm32::Config;
 use embassy_stm32::pac::{FLASH, PWR};
@@ -8,7 +9,7 @@ use embassy_stm32::rcc::{
 };
 use embassy_stm32::time::Hertz;
 
-/// AHB and XSPI.
+/// Frequency of AHB and XSPI.
 pub const BUS_HZ: u32 = 300_000_000;
 
 pub fn config() -> Config {
@@ -40,14 +41,15 @@ pub fn config() -> Config {
     config
 }
 
-/// Code comes from flash at several wait states. The data cache stays off: what DMA writes is read as it is.
+/// Enables the instruction cache, because flash needs several wait states. The data cache stays
+/// off, so that the processor reads what DMA has written.
 pub fn enable_cache() {
     if let Some(mut core) = cortex_m::Peripherals::take() {
         core.SCB.enable_icache();
     }
 }
 
-/// Watches the supply: below 2.85 V the LED drivers and the FPGA's levels are not to be trusted any more.
+/// Monitors the supply: below 2.85 V the levels of LED drivers and FPGA are not reliable.
 pub fn watch_supply() {
     use embassy_stm32::pac::flash::vals::BorLev;
     use embassy_stm32::pac::pwr::vals::Pls;
@@ -60,7 +62,7 @@ pub fn watch_supply() {
     }
 }
 
-/// The supply is below 2.85 V.
+/// Whether the supply is below 2.85 V.
 pub fn supply_is_low() -> bool {
     use embassy_stm32::pac::pwr::vals::Pvdo;
     PWR.sr1().read().pvdo() == Pvdo::BELOW

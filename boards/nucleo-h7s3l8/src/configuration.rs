@@ -1,4 +1,5 @@
-//! The ECP5's configuration port on SPI1. This board stores no gateware: its flash has room for the firmware alone.
+//! The ECP5's configuration port on SPI1. This board stores no gateware, because its flash has room
+//! only for the firmware.
 
 use embassy_stm32::gpio::{Input, Output, OutputOpenDrain};
 use embassy_stm32::mode::Blocking;
@@ -8,10 +9,11 @@ use embassy_stm32::time::Hertz;
 use nirspi_mcu::BusError;
 use nirspi_mcu::ecp5::SlaveSpi;
 
-/// Longest bitstream that a host may load: what memory is left. Ours has 391 750 bytes (`hdl/build.py`, seed 1).
+/// Longest bitstream that a host may load: the free memory. The project's bitstream has 391 750
+/// bytes (`hdl/build.py`, seed 1).
 pub const STAGING_BYTES: usize = 392 << 10;
 
-/// Mode 0, most significant bit first. The chip takes 60 MHz, loose wires do not.
+/// Mode 0, most significant bit first. The chip accepts 60 MHz; loose wires need less.
 pub fn config() -> Config {
     let mut config = Config::default();
     config.frequency = Hertz(10_000_000);

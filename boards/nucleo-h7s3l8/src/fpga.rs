@@ -1,7 +1,8 @@
 //! The FPGA's host port on XSPI1, and its two ready lines.
 //!
-//! Opcode by one line, all else by four, eight dummy cycles before what is read: `nirspi_wire::host_port`. The
-//! peripheral makes its own clock and waits for nobody, so an access always ends, whatever the FPGA does.
+//! One line carries the opcode and four lines the rest, with eight dummy cycles before data that is
+//! read: `nirspi_wire::host_port`. The peripheral makes its own clock and waits for no signal, so
+//! an access always ends, whatever the FPGA does.
 
 use crate::clocks::BUS_HZ;
 use embassy_futures::select::select;
@@ -17,7 +18,7 @@ use nirspi_mcu::{BusError, HostPort};
 use nirspi_nucleo::port::prescaler;
 use nirspi_wire::host_port::{QUAD, READ_REGISTER, WRITE_REGISTER};
 
-/// How the peripheral is set up. It wants to know the size of a memory: addresses and lengths must lie within.
+/// Settings of the peripheral. Addresses and lengths must lie within the memory size given here.
 pub fn config() -> Config {
     Config {
         memory_type: MemoryType::Standard,

@@ -1,8 +1,9 @@
 //! The camera on ST's NUCLEO-H7S3L8: USB High-Speed to the host, XSPI to the FPGA.
 //!
-//! This file puts parts together. What the camera decides is in `nirspi_mcu`, when it does so in `nirspi_app`.
+//! This file connects the parts. `nirspi_mcu` makes the camera's decisions; `nirspi_app` runs them
+//! in its loop.
 //!
-//! The one law: the LEDs' enable is low from reset until the camera raises it.
+//! The enable line of the LEDs is low from reset until the camera raises it.
 #![no_std]
 #![no_main]
 
@@ -33,6 +34,7 @@ use nirspi_app::{DepthMailbox, Device, board_info, run};
 use nirspi_mcu::Limits;
 use nirspi_nucleo::{crash, gateware, restart};
 use nirspi_usb::{Endpoints, Memory, OUT_BUFFER_BYTES, PACKET_BYTES, Presence, serve};
+use nirspi_wire::Capabilities;
 use nirspi_wire::fpga::MAX_FRAME_BYTES;
 use static_cell::{ConstStaticCell, StaticCell};
 
@@ -45,7 +47,7 @@ bind_interrupts!(struct Interrupts {
 
 type UsbDriver = Driver<'static, USB_OTG_HS>;
 
-/// Packets on their way to the host: 6 full frames.
+/// Number of packets that can wait for the host: 6 full frames.
 const PLACES: usize = 6;
 
 static PACKETS: ConstStaticCell<[Packet; PLACES]> = ConstStaticCell::new([Packet::EMPTY; PLACES]);
@@ -124,7 +126,9 @@ async fn main(spawner: Spawner) {
     };
 
     let serial = embassy_stm32::uid::uid_hex();
-    let info = board_info("nucleo-h7s3l8", serial);
+    let info = board_info("nucleo-h7s3l8", serial)
+        .can(Capabilities::LOAD_GATEWARE)
+        .can(Capabilities::BOOTLOADER);
     let driver = Driver::new_hs(
         p.USB_OTG_HS,
         Interrupts,
@@ -137,7 +141,7 @@ async fn main(spawner: Spawner) {
     let memory = USB_MEMORY.init(Memory::new(presence));
     let (device, endpoints) = nirspi_usb::device(driver, serial, info.firmware, memory);
     let (camera, commands, packets) = LINK.init(Link::new(PACKETS.take())).split();
-    // No depth sensor: the firmware that it needs is larger than this chip's flash.
+    // There is no depth sensor: the sensor's firmware is larger than this chip's flash.
     let mailbox = MAILBOX.init(DepthMailbox::new());
     spawner.spawn(defmt::unwrap!(usb_device(device)));
     spawner.spawn(defmt::unwrap!(host(endpoints, commands, packets)));

@@ -1,4 +1,5 @@
-//! Clocks: 160 MHz for core and buses, from the board's 16 MHz crystal, which USB High-Speed needs.
+//! Clocks: 160 MHz for core and buses, from the board's 16 MHz crystal. USB High-Speed needs the
+//! crystal.
 
 use embassy_stm32::Config;
 use embassy_stm32::pac::{FLASH, ICACHE, PWR};
@@ -7,7 +8,7 @@ use embassy_stm32::rcc::{
 };
 use embassy_stm32::time::Hertz;
 
-/// Core, AHB and OCTOSPI.
+/// Frequency of core, AHB and OCTOSPI.
 pub const SYSTEM_HZ: u32 = 160_000_000;
 
 pub fn config() -> Config {
@@ -29,12 +30,12 @@ pub fn config() -> Config {
     config
 }
 
-/// Code comes from flash at four wait states: with the cache, mostly at none (RM0456, 8).
+/// Enables the instruction cache: flash needs four wait states, the cache mostly none (RM0456, 8).
 pub fn enable_cache() {
     ICACHE.cr().modify(|cache| cache.set_en(true));
 }
 
-/// Watches the supply: below 2.8 V the LED drivers and the FPGA's levels are not to be trusted any more.
+/// Monitors the supply: below 2.8 V the levels of LED drivers and FPGA are not reliable.
 pub fn watch_supply() {
     use embassy_stm32::pac::flash::vals::BorLev;
     use embassy_stm32::pac::pwr::vals::Pvdls;
@@ -47,7 +48,7 @@ pub fn watch_supply() {
     }
 }
 
-/// The supply is below 2.8 V.
+/// Whether the supply is below 2.8 V.
 pub fn supply_is_low() -> bool {
     use embassy_stm32::pac::pwr::vals::Pvdo;
     PWR.svmsr().read().pvdo() == Pvdo::BELOW

@@ -8,13 +8,15 @@ use embassy_stm32::time::Hertz;
 use nirspi_mcu::BusError;
 use nirspi_mcu::ecp5::SlaveSpi;
 
-/// Longest bitstream that a host may load. Ours has 391 750 bytes (`hdl/build.py`, seed 1).
+/// Longest bitstream that a host may load. The project's bitstream has 391 750 bytes
+/// (`hdl/build.py`, seed 1).
 pub const STAGING_BYTES: usize = 1 << 20;
 
-/// Bank 2: where `probe-rs download --binary-format bin --base-address 0x08200000` puts a bitstream.
+/// Bank 2, where `probe-rs download --binary-format bin --base-address 0x08200000` puts a
+/// bitstream.
 const GATEWARE: (usize, usize) = (0x0820_0000, 2 << 20);
 
-/// Mode 0, most significant bit first. The chip takes 60 MHz, loose wires do not.
+/// Mode 0, most significant bit first. The chip accepts 60 MHz; loose wires need less.
 pub fn config() -> Config {
     let mut config = Config::default();
     config.frequency = Hertz(10_000_000);
@@ -55,7 +57,7 @@ impl SlaveSpi for ConfigurationPort {
 pub fn stored() -> Option<&'static [u8]> {
     let (address, length) = GATEWARE;
     #[expect(unsafe_code, reason = "flash memory beyond the firmware")]
-    // SAFETY: all of bank 2 is readable memory that this firmware never writes (memory.x).
+    // SAFETY: all of bank 2 is readable memory, and this firmware never writes it (memory.x).
     let region = unsafe { core::slice::from_raw_parts(address as *const u8, length) };
     nirspi_mcu::staging::stored(region)
 }

@@ -1,7 +1,8 @@
-//! The 8 x 8 time-of-flight sensor: VL53L5CX or VL53L8CX, told apart by the driver (`vl53-8x8`: no C, no heap).
+//! The 8 x 8 time-of-flight sensor: VL53L5CX or VL53L8CX, which the driver distinguishes
+//! (`vl53-8x8`: no C, no heap).
 //!
-//! The driver sends ST's firmware to the sensor at each start: 86 KB of this board's flash, about 2 s at 400 kHz.
-//! All of that happens in a task of its own; the camera does not wait for it.
+//! The driver sends ST's firmware to the sensor at each start: 86 KB of this board's flash, about 2
+//! s at 400 kHz. A task of its own does all of that, so the camera does not wait for the sensor.
 
 use embassy_stm32::i2c::{Config, Error, I2c, Master};
 use embassy_stm32::mode::Async;
@@ -12,10 +13,10 @@ use embedded_hal_async::i2c::{self, ErrorType, Operation};
 use nirspi_app::{DepthMap, DepthSensor};
 use vl53_8x8::{Resolution, Sensor};
 
-/// Fastest that the sensor measures 64 zones.
+/// Fastest rate at which the sensor measures 64 zones.
 const RATE_HZ: u8 = 15;
 
-/// The sensor has died if no map comes for this long.
+/// A sensor that gives no map for this long has failed.
 const PATIENCE: Duration = Duration::from_millis(500);
 
 /// Bus settings.
@@ -27,11 +28,12 @@ pub fn config() -> Config {
     config
 }
 
-/// The end of a transfer takes a few bits; a bus that is busy for longer is stuck.
+/// Time for the end of a transfer, which takes a few bits. A bus that is busy for longer is stuck.
 const SETTLING: Duration = Duration::from_micros(200);
 
-/// I2C1 that never keeps the processor waiting. The driver below waits by itself for a bus that is busy, for up to
-/// a second, which is longer than the watchdog allows; a bus is busy for ever where the sensor has no supply.
+/// I2C1 without busy waits. The driver below this type would wait for a busy bus for up to a
+/// second, which is longer than the watchdog allows; a bus whose sensor has no supply is busy for
+/// ever.
 struct Bus(I2c<'static, Async, Master>);
 
 impl Bus {
@@ -40,7 +42,7 @@ impl Bus {
         let is_busy = || pac::I2C1.isr().read().busy() || pac::I2C1.cr2().read().start();
         while is_busy() {
             if Instant::now() > patience {
-                // Gives up whatever is under way (RM0456, I2C software reset).
+                // Stops any transfer (RM0456, I2C software reset).
                 pac::I2C1.cr1().modify(|control| control.set_pe(false));
                 while pac::I2C1.cr1().read().pe() {}
                 pac::I2C1.cr1().modify(|control| control.set_pe(true));
@@ -65,7 +67,7 @@ impl i2c::I2c for Bus {
     }
 }
 
-/// The sensor, started when it is asked first, and again when it has stopped answering.
+/// The sensor. It is started at the first request, and again after it has stopped answering.
 pub struct Depth {
     sensor: Sensor<Bus, Delay>,
     started: bool,
@@ -92,7 +94,7 @@ impl Depth {
         for (to, (distance_mm, status)) in
             map.iter_mut().zip(data.distance_mm.iter().zip(&data.target_status))
         {
-            // 5 and 9 are the statuses of a measurement that is good (UM2884, 5.5).
+            // Statuses 5 and 9 mark a good measurement (UM2884, 5.5).
             let good = matches!(status, 5 | 9);
             *to = u16::try_from(*distance_mm).unwrap_or(0) * u16::from(good);
         }

@@ -1,8 +1,9 @@
 //! The camera on ST's NUCLEO-U5A5ZJ-Q, the reference board: USB High-Speed to the host, OCTOSPI to the FPGA.
 //!
-//! This file puts parts together. What the camera decides is in `nirspi_mcu`, when it does so in `nirspi_app`.
+//! This file connects the parts. `nirspi_mcu` makes the camera's decisions; `nirspi_app` runs them
+//! in its loop.
 //!
-//! The one law: the LEDs' enable is low from reset until the camera raises it.
+//! The enable line of the LEDs is low from reset until the camera raises it.
 #![no_std]
 #![no_main]
 
@@ -36,6 +37,7 @@ use nirspi_app::{Board, DepthMailbox, Device, board_info, measure_depth, run};
 use nirspi_mcu::{HostPort, Limits};
 use nirspi_nucleo::{crash, gateware, restart};
 use nirspi_usb::{Endpoints, Memory, OUT_BUFFER_BYTES, PACKET_BYTES, Presence, serve};
+use nirspi_wire::Capabilities;
 use nirspi_wire::fpga::MAX_FRAME_BYTES;
 use nirspi_wire::register::{IDENTITY, Register};
 use static_cell::{ConstStaticCell, StaticCell};
@@ -53,7 +55,7 @@ bind_interrupts!(struct Interrupts {
 
 type UsbDriver = Driver<'static, USB_OTG_HS>;
 
-/// Packets on their way to the host: 32 full frames.
+/// Number of packets that can wait for the host: 32 full frames.
 const PLACES: usize = 32;
 
 static PACKETS: ConstStaticCell<[Packet; PLACES]> = ConstStaticCell::new([Packet::EMPTY; PLACES]);
@@ -142,7 +144,10 @@ async fn main(spawner: Spawner) {
     }
 
     let serial = embassy_stm32::uid::uid_hex();
-    let info = board_info("nucleo-u5a5zj-q", serial);
+    let info = board_info("nucleo-u5a5zj-q", serial)
+        .can(Capabilities::DEPTH)
+        .can(Capabilities::LOAD_GATEWARE)
+        .can(Capabilities::BOOTLOADER);
     let driver = Driver::new_hs(
         p.USB_OTG_HS,
         Interrupts,

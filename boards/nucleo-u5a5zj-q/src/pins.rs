@@ -1,13 +1,14 @@
-//! Every pin of this board that the camera uses: the one table, for the code and for whoever wires it.
+//! Every pin of this board that the camera uses: one table for the code and for the wiring.
 //!
-//! `name: pin => place on the Nucleo, where the wire goes;` `README.md` shows the same table, which a test compares.
-//! Places are those of ST's Zio connectors (UM2861) by their Arduino-style numbers.
+//! A row is `name: pin => place on the Nucleo, where the wire goes;`. `README.md` shows the same
+//! table, and a test compares the two. Places are those of ST's Zio connectors (UM2861) by their
+//! Arduino-style numbers.
 
 use embassy_stm32::{Peri, pac, peripherals};
 
 macro_rules! pin_table {
     (($d:tt) $($name:ident: $pin:ident => $place:literal, $wire:literal;)*) => {
-        /// The pins by what they do.
+        /// The pins, by their function.
         pub struct Pins {
             $(#[doc = concat!($place, " to ", $wire)] pub $name: Peri<'static, peripherals::$pin>,)*
         }
@@ -51,7 +52,7 @@ pin_table! { ($)
     usb_dm: PA11 => "user USB-C", "host D-";
 }
 
-/// `led_enable` low, whatever else is going on: it needs nothing but the port.
+/// Sets `led_enable` low. This needs only the port, so it works in any state of the firmware.
 pub fn leds_off() {
     pac::GPIOF.bsrr().write(|bits| bits.set_br(14, true));
 }

@@ -1,9 +1,10 @@
 //! The end after a crash: LEDs off, a record for the next host, restart.
 //!
-//! Panics end here, and faults (ARM: HardFault, to which all others escalate): a stack that ran into its guard, an
-//! address that is not there.
+//! Panics end here, and so do ARM's HardFaults, to which all other faults escalate: a stack that
+//! ran into its guard, an access to an address that does not exist.
 //!
-//! The one law: nothing comes before the LEDs, and nothing here waits or needs the stack that may be the trouble.
+//! The LEDs go off first. Nothing here waits or uses the old stack, which may be the cause of the
+//! crash.
 
 #[cfg(feature = "terse")]
 mod trace;
@@ -21,18 +22,18 @@ type Action = Option<fn()>;
 
 static LEDS_OFF: Mutex<Cell<Action>> = Mutex::new(Cell::new(None));
 
-/// Says how to turn the LEDs off. To be called before anything can turn them on.
+/// Sets the function that switches the LEDs off. Call this before anything can switch the LEDs on.
 pub fn on_crash(leds_off: fn()) {
     critical_section::with(|token| LEDS_OFF.borrow(token).set(Some(leds_off)));
 }
 
-/// Ends it here and now.
+/// Ends the firmware: LEDs off, crash record, restart.
 pub fn die(text: Arguments<'_>) -> ! {
     cortex_m::interrupt::disable();
     if let Some(leds_off) = critical_section::with(|token| LEDS_OFF.borrow(token).get()) {
         leds_off();
     }
-    // A crash of what comes below, as of a logger that was interrupted, ends here.
+    // A second crash, for example in a logger that was interrupted, restarts here.
     if DYING.swap(true, Ordering::Relaxed) {
         SCB::sys_reset();
     }
@@ -55,7 +56,7 @@ fn panic(_info: &PanicInfo<'_>) -> ! {
 
 #[expect(unsafe_code, reason = "an exception handler that must not touch the stack it finds")]
 mod entry {
-    /// Starts over on an empty stack, with the address of the old one.
+    /// Continues on an empty stack, with the address of the old stack.
     #[unsafe(naked)]
     #[unsafe(export_name = "HardFault")]
     unsafe extern "C" fn hard_fault() -> ! {
@@ -70,14 +71,15 @@ mod entry {
     }
 }
 
-/// With the processor's exception frame: r0 to r3, r12, lr, pc, psr (ARMv7-M ARM, B1.5.6).
+/// Takes the processor's exception frame: r0 to r3, r12, lr, pc, psr (ARMv7-M ARM, B1.5.6).
 extern "C" fn fault(frame: *const [u32; 8]) -> ! {
     #[expect(
         unsafe_code,
         reason = "what the processor has put on the stack, and its fault register"
     )]
-    // SAFETY: the frame is memory that the stack pointer pointed at; where the stack has overflowed it holds
-    // something else than a frame, which is then told as such. The register may be read at any time.
+    // SAFETY: the frame is memory at the stack pointer. After a stack overflow that memory holds
+    // other data, which the record then shows as if it were a frame. The register may be read at
+    // any time.
     let ([.., lr, pc, _], cause) = (unsafe { *frame }, unsafe { (*SCB::PTR).cfsr.read() });
     die(format_args!("fault at {pc:#010x} from {lr:#010x}, cfsr {cause:#010x}"))
 }

@@ -1,6 +1,6 @@
-//! The gateware loader of a board, with the memory of what the FPGA runs.
+//! A board's gateware loader, which remembers what the FPGA runs.
 //!
-//! The one law: what the FPGA is known to run outlasts a restart of the firmware, and is forgotten with the power.
+//! The memory of what the FPGA runs survives a restart of the firmware and is lost with the power.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 use embassy_futures::yield_now;
@@ -9,7 +9,7 @@ use nirspi_mcu::staging::StagingLoader;
 use nirspi_mcu::{GatewareLoader, LoadError, Micros};
 use nirspi_wire::crc32;
 
-/// A CRC-32, and its complement to tell it from memory that was never written.
+/// A CRC-32 and its complement. The complement shows that the memory was written.
 #[expect(unsafe_code, reason = "a section is chosen by an attribute that is unsafe to use")]
 #[unsafe(link_section = ".uninit.gateware")]
 static RUNNING: [AtomicU32; 2] = [const { AtomicU32::new(0) }; 2];
@@ -21,14 +21,14 @@ fn recall() -> Option<u32> {
 
 fn remember(running: Option<u32>) {
     let [crc, complement] = &RUNNING;
-    // Equal words are no record.
+    // Two equal words mean that there is no record.
     let words = running.map_or((0, 0), |running| (running, !running));
     crc.store(words.0, Ordering::Relaxed);
     complement.store(words.1, Ordering::Relaxed);
 }
 
-/// Loads what is stored on the board, if the FPGA does not run it already. To be awaited before the camera starts;
-/// the watchdog is fed meanwhile.
+/// Loads the board's stored bitstream, unless the FPGA already runs it. A board awaits this before
+/// the camera starts; this function feeds the watchdog meanwhile.
 pub async fn load_stored(
     port: &mut impl SlaveSpi,
     stored: &[u8],
@@ -75,11 +75,11 @@ fn now() -> Micros {
     Micros(embassy_time::Instant::now().as_micros())
 }
 
-/// [`StagingLoader`] that remembers.
+/// A [`StagingLoader`] that remembers what the FPGA runs.
 pub struct Loader<'m, P>(StagingLoader<'m, P>);
 
 impl<'m, P: SlaveSpi> Loader<'m, P> {
-    /// Takes bitstreams as long as the memory.
+    /// A loader for bitstreams up to the length of the memory.
     #[must_use]
     pub fn new(port: P, memory: &'m mut [u8]) -> Self {
         Self(StagingLoader::new(port, memory, recall()))

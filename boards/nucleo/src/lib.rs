@@ -1,7 +1,7 @@
-//! What the camera's Nucleo boards do alike, without a HAL: gateware that is remembered over a
-//! restart, the end after a crash, the way into the chip's boot loader.
+//! The common parts of the camera's Nucleo boards, without a HAL: remembering the gateware over a
+//! restart, the end after a crash, entering the chip's boot loader.
 //!
-//! The one law: nothing here knows a pin or a register of one chip; what it needs of them is an argument.
+//! This crate contains no pin and no register of one chip. A board passes them as arguments.
 #![no_std]
 
 pub mod crash;

@@ -1,7 +1,7 @@
-//! Restarts, and the way into the chip's own boot loader.
+//! Restarts the chip, into the firmware or into the chip's own boot loader.
 //!
-//! The one law: the boot loader is entered with the chip as after a reset: the wish is left in memory that a
-//! restart does not clear, and granted before anything else is done.
+//! The boot loader must find the chip as after a reset. So [`restart`] leaves a request in memory
+//! that a restart does not clear, and `main` carries out the request before anything else.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m::peripheral::SCB;
@@ -21,12 +21,13 @@ pub fn restart(into: RebootInto) -> ! {
     SCB::sys_reset()
 }
 
-/// Enters the boot loader whose vector table is at this address, if that was the wish. First thing in `main`.
+/// Enters the boot loader whose vector table is at this address, if [`restart`] has requested the
+/// boot loader. This must be the first call in `main`.
 pub fn enter_bootloader_if_wished(vectors: usize) {
     if WISHED.swap(0, Ordering::Relaxed) == WISH {
         #[expect(unsafe_code, reason = "jumps into code that is not ours")]
-        // SAFETY: the chip is as after a reset, and its reference manual gives the address of its boot loader,
-        // whose vector table begins with a stack pointer and an entry.
+        // SAFETY: the chip is as after a reset, and its reference manual gives the address of its
+        // boot loader, whose vector table begins with a stack pointer and an entry.
         unsafe {
             cortex_m::asm::bootload(vectors as *const u32)
         }

@@ -7,8 +7,11 @@
 //!     └ bulk IN  0x81, 512 bytes: replies, events, frames, merged into full packets
 //! ```
 //!
-//! The one law: the session lasts as long as the configuration; reset, another configuration, suspend (which is what a
-//! pulled cable looks like to a board that has its own supply) end it, and with it the light.
+//! # Invariant
+//! A session lasts as long as the USB configuration. A reset, another configuration or a suspend
+//! ends the session, and with it the light
+//! (`tests::a_session_lasts_from_configuration_to_suspend_reset_or_another_configuration`). A
+//! pulled cable looks like a suspend to a board with its own supply.
 #![no_std]
 
 #[cfg(test)]
@@ -27,22 +30,24 @@ use embassy_usb::{Builder, Config, Handler, UsbDevice};
 use nirspi_app::link::{HostIn, HostOut};
 use nirspi_wire::{Version, usb};
 
-/// Bytes of a high-speed bulk packet (USB 2.0, 5.8.3).
+/// Size of a high-speed bulk packet in bytes (USB 2.0, 5.8.3).
 pub const PACKET_BYTES: usize = 512;
 
-/// Bytes that the driver needs for packets from the host: a bulk and a control packet.
+/// Number of bytes that the driver needs for packets from the host: one bulk packet and one control
+/// packet.
 pub const OUT_BUFFER_BYTES: usize = PACKET_BYTES + CONTROL_BYTES;
 
 const CONTROL_BYTES: usize = 64;
 
-/// `bcdUSB` and the rest in one place; on a full-speed bus the packet size above is not allowed, so hosts refuse it.
+/// Fields of the device descriptor. A full-speed bus does not allow the packet size above, so hosts
+/// refuse the device there.
 fn identity(serial: &'static str, firmware: Version) -> Config<'static> {
     let mut config = Config::new(usb::VENDOR_ID, usb::PRODUCT_ID);
     config.manufacturer = Some(usb::MANUFACTURER);
     config.product = Some(usb::PRODUCT);
     config.serial_number = Some(serial);
     config.device_release = bcd(firmware);
-    // One interface, which says itself what it is.
+    // The device has one interface, and the interface states its own class.
     config.device_class = 0;
     config.device_sub_class = 0;
     config.device_protocol = 0;
@@ -52,13 +57,13 @@ fn identity(serial: &'static str, firmware: Version) -> Config<'static> {
     config
 }
 
-/// `bcdDevice`: two digits of the major version, one each of minor and patch.
+/// `bcdDevice`: two digits of the major version, one digit each of minor and patch.
 fn bcd(Version(major, minor, patch): Version) -> u16 {
     let major = u16::from(major / 10 % 10) << 4 | u16::from(major % 10);
     major << 8 | u16::from(minor.min(9)) << 4 | u16::from(patch.min(9))
 }
 
-/// Platform capability of WebUSB 1.0 (WebUSB, 5.1), with no landing page.
+/// Platform capability of WebUSB 1.0 (WebUSB, 5.1), without a landing page.
 const WEB_USB: [u8; 21] = {
     // {3408b638-09a9-47a0-8bfd-a0768815b665}, after a reserved byte.
     let uuid = [
@@ -72,7 +77,7 @@ const WEB_USB: [u8; 21] = {
     capability
 };
 
-/// Memory of the device, for as long as it exists.
+/// The device's memory, which must live as long as the device.
 pub struct Memory {
     configuration: [u8; 64],
     bos: [u8; 96],
@@ -82,7 +87,7 @@ pub struct Memory {
 }
 
 impl Memory {
-    /// Empty.
+    /// Unused memory.
     #[must_use]
     pub const fn new(presence: &'static Presence) -> Self {
         Self {
@@ -95,7 +100,8 @@ impl Memory {
     }
 }
 
-/// Number of the session that the host may have now, if any: each configuration and each waking up is another.
+/// Number of the session that the host may have now, if any. Each configuration and each resume
+/// begins another session.
 pub type Presence = Signal<NoopRawMutex, Option<u32>>;
 
 struct Watch {
@@ -137,14 +143,14 @@ impl Handler for Watch {
     }
 }
 
-/// The endpoints, to be served by [`serve`].
+/// The endpoints, for [`serve`].
 pub struct Endpoints<D: Driver<'static>> {
     from_host: D::EndpointOut,
     to_host: D::EndpointIn,
     presence: &'static Presence,
 }
 
-/// Builds the device; `run` of the first is to be awaited, and [`serve`] of the second.
+/// Builds the device. A board awaits the first's `run`, and [`serve`] of the second.
 pub fn device<D: Driver<'static>>(
     driver: D,
     serial: &'static str,
@@ -196,7 +202,7 @@ pub async fn serve<D: Driver<'static>>(
         );
         let next = match news.await {
             Either3::Third(next) => next,
-            // An endpoint is gone: so is the host, or it is about to be.
+            // The endpoint is gone: the host has gone, or is about to.
             _ => None,
         };
         commands.closed().await;

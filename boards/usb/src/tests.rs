@@ -1,4 +1,4 @@
-//! What a host sees of the device, asked for as hosts do, over a bus of the test.
+//! Tests of what a host sees of the device, with requests as hosts make them, over a simulated bus.
 
 mod fake;
 
@@ -11,7 +11,7 @@ use std::vec::Vec;
 
 const SERIAL: &str = "0123456789ABCDEF01234567";
 
-/// A device after its first reset, and what it has to say.
+/// A device after its first reset.
 struct Bench {
     wire: Wire,
     presence: &'static Presence,
@@ -101,7 +101,7 @@ fn the_interface_carries_the_protocol_version_and_two_bulk_endpoints() {
 fn windows_is_told_to_bind_winusb_and_under_which_name() {
     let mut bench = Bench::new();
     let capabilities = bench.descriptor(15, 0);
-    // {D8DD60DF-4589-4CC7-9CD2-659D9E648A9F}, as Microsoft's OS 2.0 descriptors specification has it.
+    // {D8DD60DF-4589-4CC7-9CD2-659D9E648A9F}, from Microsoft's OS 2.0 descriptors specification.
     let uuid = [
         0xDF, 0x60, 0xDD, 0xD8, 0x89, 0x45, 0xC7, 0x4C, 0x9C, 0xD2, 0x65, 0x9D, 0x9E, 0x64, 0x8A,
         0x9F,
@@ -117,7 +117,7 @@ fn windows_is_told_to_bind_winusb_and_under_which_name() {
     let guid: Vec<u8> =
         usb::DEVICE_INTERFACE_GUID.encode_utf16().flat_map(u16::to_le_bytes).collect();
     assert!(set.windows(guid.len()).any(|window| window == guid));
-    // Features of the whole device: none of a function, which only composite devices have.
+    // Features of the whole device only; features of a function are for composite devices.
     let kinds: Vec<u16> = descriptors(&set).map(|d| u16::from_le_bytes([d[2], d[3]])).collect();
     assert_eq!(kinds, [0, 3, 4]);
 }

@@ -1,6 +1,9 @@
-//! The two banks of 48-bit accumulators, and which of them the host has.
+//! The two banks of 48-bit accumulators: one bank sums the current frame, the other holds the frame
+//! delivered to the host.
 //!
-//! The one law: a bank is either being summed into or delivered, never both; so no frame mixes two.
+//! # Invariant
+//! A frame never mixes with another frame: it is delivered whole or lost whole
+//! (`golden::runs::a_slow_host_loses_whole_frames_and_every_loss_is_counted_once`).
 
 use crate::format;
 use crate::settings::Settings;
@@ -9,17 +12,17 @@ use nirspi_wire::{
     fpga::{Header, SUM_MODULUS, Sums},
 };
 
-/// Where the sum of a slot belongs.
+/// Which sum a slot adds to.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Slot {
     /// Place of the pattern in the order.
     pub(crate) index: u16,
     pub(crate) complement: bool,
-    /// Overwrites instead of adding: clearing a bank would take a clock a word.
+    /// Overwrite the sum instead of adding to it: clearing a bank would take a clock for each word.
     pub(crate) first_sweep: bool,
 }
 
-/// What the window knows of a frame that it has completed.
+/// Counts that the window keeps of a completed frame.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Summary {
     /// Over-range samples.
@@ -28,11 +31,11 @@ pub(crate) struct Summary {
     pub(crate) shown_at: u64,
 }
 
-/// A frame in the host's hands.
+/// A delivered frame.
 #[derive(Debug, Clone)]
 struct Delivered {
     header: Header,
-    /// Serialised when first asked for.
+    /// The frame's bytes, serialised at the first request.
     bytes: Option<Vec<u8>>,
 }
 
@@ -40,14 +43,14 @@ struct Delivered {
 #[derive(Debug, Clone)]
 pub(crate) struct Frames {
     banks: [Vec<Sums>; 2],
-    /// The bank being summed into; the other is the delivered one, if any is.
+    /// The bank being summed into. The other bank holds the delivered frame, if there is one.
     filling: usize,
-    /// A sum of the frame being made has wrapped.
+    /// A sum of the current frame has wrapped.
     overflow: bool,
     delivered: Option<Delivered>,
     made: u32,
     lost: u32,
-    /// A frame was lost since the last one delivered.
+    /// A frame was lost after the last delivered frame.
     after_loss: bool,
 }
 
@@ -65,7 +68,7 @@ impl Frames {
         }
     }
 
-    /// Begins a run: forgets everything of earlier ones.
+    /// Begins a run and forgets all earlier runs.
     pub(crate) fn restart(&mut self) {
         self.overflow = false;
         self.delivered = None;
@@ -74,7 +77,7 @@ impl Frames {
         self.after_loss = false;
     }
 
-    /// Frames completed in this run, lost ones too.
+    /// Frames completed in this run, including lost frames.
     pub(crate) fn made(&self) -> u32 {
         self.made
     }
@@ -84,12 +87,12 @@ impl Frames {
         self.lost
     }
 
-    /// Whether the host has a frame.
+    /// Whether a frame is delivered.
     pub(crate) fn ready(&self) -> bool {
         self.delivered.is_some()
     }
 
-    /// Takes the host's frame back.
+    /// Takes the delivered frame back.
     pub(crate) fn release(&mut self) {
         self.delivered = None;
     }
@@ -104,7 +107,8 @@ impl Frames {
         *half = after % SUM_MODULUS;
     }
 
-    /// Delivers the frame just completed, or loses it if the host still has the one before.
+    /// Delivers the completed frame, or loses the frame if the host has not released the one
+    /// before.
     pub(crate) fn complete(&mut self, settings: &Settings, summary: Summary) {
         let sequence = self.made;
         self.made = self.made.wrapping_add(1);
@@ -151,7 +155,8 @@ mod tests {
     use crate::registers::Registers;
     use nirspi_wire::fpga::FpgaFrame;
 
-    /// 2^48 counts are 19 hours of full-scale samples: too many to tick, so slot sums are fed directly.
+    /// 2^48 counts are 19 hours of full-scale samples, too many to tick, so the test feeds slot
+    /// sums directly.
     #[test]
     fn a_sum_wraps_at_48_bits_and_only_its_own_frame_says_so() {
         let settings = Settings::copy(&Registers::new()).unwrap();

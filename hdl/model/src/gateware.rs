@@ -1,7 +1,9 @@
-//! The top level: the blocks wired up, seen from the pins.
+//! The top level: connects the blocks, and offers the pins.
 //!
-//! The one law: a clock goes sample, safety, storage, LEDs, in this order; so a fault in a clock undoes
-//! whatever the same clock would have completed.
+//! # Invariant
+//! A clock does sample, safety, storage and LEDs in this order, so a fault in a clock discards
+//! whatever the same clock would have completed
+//! (`golden::safety::a_fault_in_the_clock_that_completes_a_frame_discards_it`).
 
 use crate::frames::Frames;
 use crate::leds::{Leds, Lines};
@@ -14,14 +16,14 @@ use crate::source::{AdcSample, Source};
 use crate::window::Window;
 use nirspi_wire::register::{FaultCode, Register, control, status};
 
-/// What becomes of the samples of a run.
+/// Where the samples of a run go.
 #[derive(Debug, Clone)]
 enum Capture {
     Frames(Window),
     Raw(RawCapture),
 }
 
-/// A run or raw burst under way.
+/// A run or raw burst in progress.
 #[derive(Debug, Clone)]
 struct Run {
     settings: Settings,
@@ -37,7 +39,7 @@ struct Run {
 pub struct Gateware {
     /// Clocks since reset.
     clock: u64,
-    /// High word of the clock as of the last read of the low one.
+    /// High word of the clock at the last read of the low word.
     clock_high: u32,
     registers: Registers,
     table: OrderTable,
@@ -73,7 +75,7 @@ impl Gateware {
         Self::default()
     }
 
-    /// Reads a register or an entry of the order table; `None` where there is neither.
+    /// Reads a register or an entry of the order table; `None` if the address has neither.
     pub fn read(&mut self, address: u16) -> Option<u32> {
         self.safety.feed();
         let Some(register) = Register::at(address) else {
@@ -94,9 +96,8 @@ impl Gateware {
         })
     }
 
-    /// Writes a register or an entry of the order table; false where there is neither. True says only
-    /// that the address exists: writes to read-only registers, and to the order table during a run, are
-    /// ignored.
+    /// Writes a register or an entry of the order table; false if the address has neither. Writes
+    /// to read-only registers, and to the order table during a run, return true and change nothing.
     pub fn write(&mut self, address: u16, value: u32) -> bool {
         self.safety.feed();
         match Register::at(address) {
@@ -109,10 +110,11 @@ impl Gateware {
         true
     }
 
-    /// What drives the LED array during the current clock.
+    /// Levels of the LED lines in the current clock.
     #[must_use]
     pub fn lines(&self) -> Lines {
-        // The last gate before the pins asks again, though a trip has already ended the run.
+        // The last gate before the pins checks the permission again, though a trip has already
+        // ended the run.
         match &self.run {
             Some(run) if self.safety.permits() => run.leds.lines(),
             _ => Lines::default(),
@@ -151,7 +153,7 @@ impl Gateware {
         }
     }
 
-    /// Whether a run or raw burst is under way.
+    /// Whether a run or raw burst is in progress.
     #[must_use]
     pub fn running(&self) -> bool {
         self.run.is_some()
@@ -163,8 +165,8 @@ impl Gateware {
         self.frames.ready()
     }
 
-    /// The delivered frame as it crosses the host port, laid out as in [`nirspi_wire::fpga`]. It stays
-    /// until `RELEASE` or the next start.
+    /// The delivered frame in the layout of [`nirspi_wire::fpga`]. The frame stays until `RELEASE`
+    /// or the next start.
     pub fn frame(&mut self) -> Option<&[u8]> {
         self.safety.feed();
         self.frames.bytes()
@@ -176,8 +178,8 @@ impl Gateware {
         self.raw.is_some()
     }
 
-    /// The raw burst: little-endian words, bit 15 set where the sample was over range. It stays until
-    /// `RELEASE` or the next start.
+    /// The raw burst: little-endian words, bit 15 set where the sample was over range. The burst
+    /// stays until `RELEASE` or the next start.
     pub fn raw(&mut self) -> Option<&[u8]> {
         self.safety.feed();
         self.raw.as_deref()
@@ -210,7 +212,7 @@ impl Gateware {
         if word & control::STOP != 0 {
             self.run = None;
         }
-        // Never takes a fault from under a run: a latched fault has ended it.
+        // A latched fault has already ended the run, so clearing the fault changes no run.
         if word & control::CLEAR_FAULT != 0 {
             self.safety.clear();
         }

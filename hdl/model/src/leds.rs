@@ -1,6 +1,8 @@
 //! Drives the LED lines from the sequencer's slot.
 //!
-//! The one law: lines change only at a slot's first clock and are all 0 once the last slot is over.
+//! # Invariant
+//! Lines change only at the first clock of a slot, and are all 0 after the last slot
+//! (`golden::measurement::every_line_and_every_sum_is_the_oracles`).
 
 use crate::order::OrderTable;
 use crate::sequencer::{Ended, Sequencer};
@@ -14,7 +16,7 @@ pub struct Lines {
     pub rows: u32,
     /// Bit `c` is the line of column `c`.
     pub columns: u32,
-    /// Without it all LEDs are off.
+    /// Level of the enable line. At 0 all LEDs are off.
     pub enable: bool,
 }
 
@@ -26,7 +28,7 @@ impl Lines {
     }
 }
 
-/// The 32 Walsh functions as words of sign lines: a ROM.
+/// The 32 Walsh functions as words of sign lines: the contents of a ROM.
 static WALSH: [u32; SIDE as usize] = {
     let mut words = [0; SIDE as usize];
     let mut k = 0;
@@ -37,7 +39,7 @@ static WALSH: [u32; SIDE as usize] = {
     words
 };
 
-/// Half-arrays that a pattern lights: all Walsh functions but the first are balanced.
+/// Half-arrays that a pattern lights. All Walsh functions except the first are balanced.
 fn half_arrays(pattern: u16, complement: bool) -> u32 {
     match (pattern, complement) {
         (0, false) => 2,
@@ -46,7 +48,7 @@ fn half_arrays(pattern: u16, complement: bool) -> u32 {
     }
 }
 
-/// The lines and the sequencer behind them.
+/// The LED lines and their sequencer.
 #[derive(Debug, Clone)]
 pub(crate) struct Leds {
     sequencer: Sequencer,
@@ -74,7 +76,7 @@ impl Leds {
         self.half_arrays
     }
 
-    /// Goes on to the next clock.
+    /// Moves to the next clock.
     #[inline]
     pub(crate) fn step(&mut self, settings: &Settings, table: &OrderTable) {
         if !self.lines.enable {

@@ -1,11 +1,11 @@
 //! Bit-exact golden model of the camera's gateware: what the FPGA does, clock by clock, in plain Rust.
 //!
-//! [`Gateware`] is the whole FPGA seen from its pins: registers and frames on the host port, LED lines,
-//! ADC, interlock. One [`Gateware::tick`] is one ADC clock of 8 ns. The virtual camera runs on it, and
-//! the RTL is checked against it.
+//! [`Gateware`] is the whole FPGA seen from its pins: registers and frames on the host port, LED
+//! lines, ADC, interlock. One [`Gateware::tick`] is one ADC clock of 8 ns. The virtual camera runs
+//! on this model, and the RTL is checked against the model.
 //!
-//! The one law: this is a model of [`nirspi_wire::register`] and [`nirspi_wire::fpga`]; no address, bit,
-//! code or offset is written here a second time. Each module below is one block of the RTL:
+//! The model takes every address, bit, code and offset from [`nirspi_wire::register`] and
+//! [`nirspi_wire::fpga`]. Each module below is one block of the RTL:
 //!
 //! ```text
 //!  host port ── registers ── settings (copied at a start)
@@ -40,12 +40,15 @@
 //! from a pin or the host port to its effect; lines, attribution of samples and bytes of frames are exact.
 //!
 //! # The RTL
-//! `hdl/rtl` has the gateware in Veryl, `hdl/sv` the SystemVerilog made from it; `hdl/sim/tests/rtl` runs it in Veryl's
-//! simulator beside this model, pin by pin and clock by clock. What it takes more than the model, bounded
-//! there: clock 0 of a run comes 14 clocks after the access that starts it; LEDs are lit up to 9 clocks longer
-//! after a stop and 7 after a trip; they go out 3 clocks after the interlock pin opens. Its lines are at the
-//! pins 6 clocks after a slot is chosen, and `Latency` counts from there: 0 is a sample at the ADC's pins in
-//! the clock that its light is at the LEDs'.
+//! `hdl/rtl` has the gateware in Veryl, and `hdl/sv` the SystemVerilog emitted from it.
+//! `hdl/sim/tests/rtl` runs the RTL in Veryl's simulator beside this model and compares both, pin
+//! by pin and clock by clock. The tests there bound the RTL's delays:
+//!
+//! - Clock 0 of a run comes 14 clocks after the access that starts the run.
+//! - LEDs are lit up to 9 clocks longer after a stop, and up to 7 after a trip.
+//! - LEDs go out 3 clocks after the interlock pin opens.
+//! - Lines are at the pins 6 clocks after the choice of a slot. `Latency` counts from there: 0 is a
+//!   sample that is at the ADC's pins in the clock in which its light is at the LEDs' pins.
 //!
 //! ```
 //! use nirspi_hdl_model::{AdcSample, Gateware};

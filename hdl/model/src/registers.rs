@@ -1,10 +1,13 @@
 //! Storage of the read-write registers.
 //!
-//! The one law: reads give what was written, whatever it was; what it means is checked at a start.
+//! # Invariant
+//! A register reads as it was written, whatever the value
+//! (`golden::registers::a_register_holds_what_its_access_says`). Values are checked at a start
+//! (`golden::runs::every_setting_is_checked_at_a_start_and_only_there`).
 
 use nirspi_wire::register::{Access, Register};
 
-/// One 32-bit word a register; only the words of read-write ones are used.
+/// One 32-bit word for each register. Only the words of read-write registers are used.
 #[derive(Debug, Clone)]
 pub(crate) struct Registers([u32; Register::ALL.len()]);
 
@@ -22,7 +25,7 @@ impl Registers {
         self.0[register as usize]
     }
 
-    /// Does nothing if the register is not a read-write one.
+    /// Writes a read-write register; does nothing for any other register.
     pub(crate) fn set(&mut self, register: Register, value: u32) {
         if register.access() == Access::ReadWrite {
             self.0[register as usize] = value;

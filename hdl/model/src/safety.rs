@@ -1,22 +1,26 @@
-//! What switches the LEDs off whatever the firmware does: interlock, over-range, duty, watchdog.
+//! Switches the LEDs off without the firmware: interlock, over-range, duty, watchdog.
 //!
-//! The one law: the first cause is latched, and nothing is lit until it is cleared.
+//! # Invariant
+//! The first fault is latched
+//! (`golden::safety::the_first_fault_is_the_one_latched_and_one_clock_has_an_order`), and no LED is
+//! lit until the fault is cleared
+//! (`golden::safety::no_light_with_a_fault_latched_an_open_interlock_or_no_run`).
 
 use crate::settings::Settings;
 use nirspi_wire::register::{DUTY_WINDOW, FaultCode};
 
-/// Fault latch and the counters that set it.
+/// The fault latch and its counters.
 #[derive(Debug, Clone)]
 pub(crate) struct Safety {
     fault: FaultCode,
     interlock_closed: bool,
     /// Clocks since the last access to the host port.
     silent: u32,
-    /// Half-arrays lit for a clock, in this duty window.
+    /// Light spent in this duty window, in half-arrays lit for a clock.
     spent: u32,
 }
 
-/// What happened in one clock of a run.
+/// Facts of one clock of a run.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Clock {
     /// Half-arrays lit.
@@ -26,7 +30,7 @@ pub(crate) struct Clock {
 }
 
 impl Safety {
-    /// Interlock open, no fault.
+    /// State after reset: interlock open, no fault.
     pub(crate) fn new() -> Self {
         Self { fault: FaultCode::None, interlock_closed: false, silent: 0, spent: 0 }
     }
@@ -48,7 +52,7 @@ impl Safety {
         self.fault == FaultCode::None && self.interlock_closed
     }
 
-    /// Follows the interlock input. True if that trips.
+    /// Follows the interlock input; true if the change trips.
     pub(crate) fn set_interlock(&mut self, closed: bool, running: bool) -> bool {
         self.interlock_closed = closed;
         let trips = running && !closed;
@@ -58,13 +62,13 @@ impl Safety {
         trips
     }
 
-    /// Sees an access to the host port.
+    /// Restarts the watchdog on an access to the host port.
     pub(crate) fn feed(&mut self) {
         self.silent = 0;
     }
 
-    /// Enters clock `now`, in a run or not. Duty windows follow the clock alone: no start or stop renews
-    /// the light budget.
+    /// Enters clock `now`, in a run or at rest. Duty windows follow the clock alone, so no start or
+    /// stop renews the light budget.
     #[inline]
     pub(crate) fn enter(&mut self, now: u64) {
         if now.is_multiple_of(DUTY_WINDOW.into()) {
@@ -72,7 +76,7 @@ impl Safety {
         }
     }
 
-    /// Ends a clock of a run. True if it trips.
+    /// Ends a clock of a run; true if the clock trips.
     #[inline]
     pub(crate) fn step(&mut self, settings: &Settings, clock: Clock) -> bool {
         self.silent += 1;

@@ -1,11 +1,15 @@
-//! The chain of counters clock, complement, pattern, sweep, frame.
+//! The chain of counters: clock, complement, pattern, sweep, frame.
 //!
-//! The gateware has it twice: one drives the LEDs, one attributes samples `Latency` clocks later. The one
-//! law: both count alike, so a sample can only ever land in the slot whose light it saw.
+//! The gateware has two such chains: one drives the LEDs, the other attributes samples `Latency`
+//! clocks later.
+//!
+//! # Invariant
+//! Both chains count alike, so a sample is summed in the slot whose light it measured
+//! (`golden::measurement::every_line_and_every_sum_is_the_oracles`).
 
 use crate::settings::Settings;
 
-/// Where in a run a clock lies.
+/// Position of a clock in a run.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Sequencer {
     /// Clock of the slot.
@@ -16,7 +20,7 @@ pub(crate) struct Sequencer {
     frame: u32,
 }
 
-/// The longest that ended with a clock.
+/// The longest unit that ended with a clock.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Ended {
     Clock,
@@ -47,7 +51,7 @@ impl Sequencer {
         self.sweep == 0
     }
 
-    /// Goes on to the next clock.
+    /// Moves to the next clock.
     #[inline]
     pub(crate) fn step(&mut self, settings: &Settings) -> Ended {
         self.clock += 1;
@@ -70,7 +74,8 @@ impl Sequencer {
             return Ended::Slot;
         }
         self.sweep = 0;
-        // Wraps to 0 after 2^32 frames of a run without end, which has no end to miss.
+        // The count wraps to 0 after 2^32 frames. Only a run without end is that long, and its end
+        // is not checked.
         self.frame = self.frame.wrapping_add(1);
         if settings.frames == 0 || self.frame != settings.frames {
             Ended::Frame

@@ -1,6 +1,9 @@
-//! The copy of the settings that a run works with.
+//! The copy of the settings that a run uses.
 //!
-//! The one law: a copy exists only with every setting in its range, so no block behind it has to check.
+//! # Invariant
+//! A copy exists only if every setting is in its range
+//! (`golden::runs::every_setting_is_checked_at_a_start_and_only_there`), so no other block checks
+//! settings.
 
 use crate::order::Order;
 use crate::registers::Registers;
@@ -24,14 +27,14 @@ pub(crate) struct Settings {
     /// In clocks.
     pub(crate) latency: u8,
     pub(crate) sweeps: u32,
-    /// 0: until stopped.
+    /// Frames of the run; 0: until stopped.
     pub(crate) frames: u32,
     pub(crate) raw_length: u16,
     /// In clocks.
     pub(crate) watchdog: u32,
     /// In half-arrays lit for a clock.
     pub(crate) duty_limit: u32,
-    /// 0: never.
+    /// Over-range samples of a frame that trip; 0: never.
     pub(crate) over_range_trip: u32,
 }
 

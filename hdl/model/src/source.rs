@@ -1,13 +1,13 @@
-//! Where samples come from: the ADC's pins or the test generator.
+//! The source of samples: the ADC's pins or the test generator.
 //!
-//! The one law: everything behind this block cannot tell which.
+//! Both sources give the same kind of sample, so every block behind this one treats them alike.
 
 use nirspi_wire::{ADC_MAX, register};
 
-/// What the ADC delivers for one clock.
+/// The ADC's output in one clock.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct AdcSample {
-    /// Code of 14 bits; higher bits are not connected.
+    /// Code of 14 bits; higher bits are ignored.
     pub code: u16,
     /// The ADC's over-range pin.
     pub over_range: bool,

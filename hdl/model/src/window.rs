@@ -1,7 +1,8 @@
 //! Attributes samples to slots: latency, blanking, and the sum over a slot.
 //!
-//! The one law: the sample of clock `t` belongs to what was shown at clock `t - Latency`, and counts in
-//! exactly one slot.
+//! # Invariant
+//! The sample of clock `t` belongs to the slot shown at clock `t - Latency`, and to no other slot
+//! (`golden::measurement::every_line_and_every_sum_is_the_oracles`).
 
 use crate::frames::{Frames, Slot, Summary};
 use crate::sequencer::{Ended, Sequencer};
@@ -14,7 +15,7 @@ pub(crate) struct Window {
     /// Clocks until the light of the first slot arrives.
     wait: u8,
     sequencer: Sequencer,
-    /// At most 65 535 clocks of 14 bits: 30 bits.
+    /// Sum of the slot: at most 65 535 samples of 14 bits, so 30 bits.
     slot_sum: u32,
     /// Over-range samples of the frame.
     over_range: u32,
@@ -34,7 +35,7 @@ impl Window {
         }
     }
 
-    /// Takes the sample of this clock; gives the frame's over-range samples so far.
+    /// Takes the sample of this clock; returns the number of the frame's over-range samples so far.
     #[inline]
     pub(crate) fn take(&mut self, settings: &Settings, sample: AdcSample) -> u32 {
         if self.wait == 0 {
@@ -46,7 +47,7 @@ impl Window {
         self.over_range
     }
 
-    /// Ends clock `now`: stores what is complete. True with the last clock of the run.
+    /// Ends clock `now` and stores completed sums. True with the last clock of the run.
     #[inline]
     pub(crate) fn step(&mut self, settings: &Settings, frames: &mut Frames, now: u64) -> bool {
         if self.wait > 0 {

@@ -1,6 +1,7 @@
-//! The RTL of the gateware, read from its Veryl sources and simulated at its pins. For tests only.
+//! The RTL of the gateware, read from its Veryl sources and simulated at its pins. This crate is
+//! for tests only.
 //!
-//! This crate does not know what the RTL should do: the golden model knows, and the tests compare the two.
+//! This crate only runs the RTL. The tests compare the RTL with the golden model.
 #![expect(clippy::unwrap_used, reason = "a failed unwrap here fails the test that uses it")]
 
 pub mod pins;

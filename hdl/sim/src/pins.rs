@@ -1,6 +1,6 @@
 //! The simulated FPGA seen from its pins, with its two clocks.
 //!
-//! The one law: pins change between clock edges, and edges come in the order of their time.
+//! Pins change between clock edges, and edges come in the order of their time.
 
 use crate::project::Project;
 use crate::trace::{Edge, Levels, Trace};
@@ -9,7 +9,7 @@ use veryl_analyzer::ir::{VarId, VarPath};
 use veryl_analyzer::value::Value;
 use veryl_simulator::{Simulator, ir::Event};
 
-/// The core, clocked by hand.
+/// The core; the caller drives both clocks.
 pub struct Pins {
     sim: Simulator,
     adc: Event,
@@ -41,8 +41,8 @@ struct Outputs {
 }
 
 impl Pins {
-    /// After reset; interlock open, port idle. `$NIRSPI_PIN_TRACE` names a folder for a record of all that
-    /// happens at the pins, which another simulator can repeat.
+    /// The FPGA after reset, with open interlock and idle port. `$NIRSPI_PIN_TRACE` names a folder
+    /// for a record of all levels at the pins, which another simulator can repeat.
     ///
     /// # Panics
     /// If the core does not build, or has no such ports.
@@ -85,7 +85,7 @@ impl Pins {
         pins
     }
 
-    /// Notes an edge, with the inputs before it and the outputs after it.
+    /// Records an edge, with the inputs before it and the outputs after it.
     fn record(&mut self, edge: Edge) {
         if let Some(mut trace) = self.trace.take() {
             let outputs = self.levels_out();
@@ -126,38 +126,38 @@ impl Pins {
         self.record(Edge::Host);
     }
 
-    /// What the ADC puts out.
+    /// Sets the ADC's output.
     pub fn sample(&mut self, sample: AdcSample) {
         self.levels.sample = sample;
         self.set(self.inputs.code, sample.code.into(), 14);
         self.set(self.inputs.over_range, sample.over_range.into(), 1);
     }
 
-    /// The interlock loop.
+    /// Opens or closes the interlock loop.
     pub fn interlock(&mut self, closed: bool) {
         self.levels.interlock = closed;
         self.set(self.inputs.interlock, closed.into(), 1);
     }
 
-    /// `cs_n`, low when selected.
+    /// Drives `cs_n`: low when selected.
     pub fn select(&mut self, selected: bool) {
         self.levels.selected = selected;
         self.set(self.inputs.cs_n, (!selected).into(), 1);
     }
 
-    /// The host port's `sck`.
+    /// Drives the host port's `sck`.
     pub fn sck(&mut self, high: bool) {
         self.levels.sck = high;
         self.set(self.inputs.sck, high.into(), 1);
     }
 
-    /// What the host drives on the four lines.
+    /// Sets the levels that the host drives on the four lines.
     pub fn drive(&mut self, lines: u8) {
         self.levels.lines = lines;
         self.set(self.inputs.lines, lines.into(), 4);
     }
 
-    /// What the FPGA drives on the host port, and on which lines.
+    /// Levels that the FPGA drives on the host port, and the lines that it drives.
     pub fn driven(&mut self) -> (u8, u8) {
         (self.get(|o| &o.lines) as u8, self.get(|o| &o.drive) as u8)
     }
@@ -171,7 +171,7 @@ impl Pins {
         }
     }
 
-    /// An access of the host takes effect before this clock is done with.
+    /// Whether an access of the host takes effect in this clock.
     pub fn access(&mut self) -> bool {
         self.get(|o| &o.access) != 0
     }

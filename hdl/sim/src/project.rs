@@ -1,6 +1,5 @@
-//! The Veryl sources: read, checked, emitted as SystemVerilog, made ready to simulate.
-//!
-//! The one law: a warning of the analyser is an error here.
+//! Reads, checks and emits the Veryl sources, and prepares them for simulation. A warning of
+//! Veryl's analyser is an error here.
 
 use std::{
     collections::BTreeMap,
@@ -23,10 +22,10 @@ pub fn folder(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(name)
 }
 
-/// Name without extension and text of every file in a folder; none where there is no folder.
+/// Name without extension and text of every file in a folder; empty if the folder does not exist.
 ///
 /// # Panics
-/// On a file that is no text.
+/// On a file that is not text.
 #[must_use]
 pub fn files(folder: &Path) -> BTreeMap<String, String> {
     let mut texts = BTreeMap::new();
@@ -40,19 +39,20 @@ pub fn files(folder: &Path) -> BTreeMap<String, String> {
 }
 
 impl Project {
-    /// As committed.
+    /// The sources as committed.
     ///
     /// # Panics
-    /// On a file that is no text.
+    /// On a file that is not text.
     #[must_use]
     pub fn read() -> Self {
         Self(files(&folder("rtl")))
     }
 
-    /// With `from`, which must be there once, replaced by `to` in one file.
+    /// The sources with one change: in one file, `to` replaces `from`, which must occur exactly
+    /// once.
     ///
     /// # Panics
-    /// If it is not there once.
+    /// If `from` does not occur exactly once.
     #[must_use]
     pub fn with(&self, file: &str, from: &str, to: &str) -> Self {
         let mut changed = self.clone();
@@ -92,7 +92,7 @@ impl Project {
     /// The SystemVerilog of every file.
     ///
     /// # Panics
-    /// On anything that parser or analyser object to.
+    /// On any error or warning of parser or analyser.
     #[must_use]
     pub fn emit(&self) -> BTreeMap<String, String> {
         let (metadata, parsed, _) = self.analyse();
@@ -110,10 +110,10 @@ impl Project {
             .collect()
     }
 
-    /// Every file as `veryl fmt` has it.
+    /// Every file in the form that `veryl fmt` gives it.
     ///
     /// # Panics
-    /// On anything that parser or analyser object to.
+    /// On any error or warning of parser or analyser.
     #[must_use]
     pub fn format(&self) -> BTreeMap<String, String> {
         let (metadata, parsed, _) = self.analyse();
@@ -125,10 +125,10 @@ impl Project {
         parsed.into_iter().map(format).collect()
     }
 
-    /// One module, ready to be clocked.
+    /// One module, prepared for simulation.
     ///
     /// # Panics
-    /// On anything that parser, analyser or simulator object to.
+    /// On any error or warning of parser, analyser or simulator.
     #[must_use]
     pub fn simulate(&self, top: &str) -> Simulator {
         let (_, _, ir) = self.analyse();

@@ -1,8 +1,7 @@
-//! A record of all that happens at the pins, for another simulator to repeat.
+//! A record of all levels at the pins, for another simulator to repeat.
 //!
-//! The one law: a record begins before the first reset and misses no edge; so it can be repeated from nothing.
-//!
-//! One edge after the other, all little-endian; `hdl/verilator/replay.cpp` reads it:
+//! The record begins before the first reset and has every edge, so another simulator needs nothing
+//! else. Edges follow one another, all little-endian; `hdl/verilator/replay.cpp` reads them:
 //!
 //! | bytes | field |
 //! |---|---|
@@ -51,7 +50,7 @@ impl Levels {
     }
 }
 
-/// A record under way.
+/// A record in progress.
 #[derive(Debug)]
 pub(crate) struct Trace {
     file: BufWriter<File>,
@@ -60,7 +59,7 @@ pub(crate) struct Trace {
 }
 
 impl Trace {
-    /// A new one in `$NIRSPI_PIN_TRACE`, if that is set.
+    /// A new record in `$NIRSPI_PIN_TRACE`, if that variable is set.
     pub(crate) fn asked_for() -> Option<Self> {
         static COUNT: AtomicUsize = AtomicUsize::new(0);
         let folder = PathBuf::from(std::env::var_os("NIRSPI_PIN_TRACE")?);

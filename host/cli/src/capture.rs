@@ -10,6 +10,7 @@ use nirspi::account::LossCounters;
 use nirspi::calibration::{Choice, Origin};
 use nirspi::capture::{Capture, CaptureOptions, Ended, Progress, capture};
 use nirspi::causes;
+use nirspi::recording::Target;
 use nirspi::session::CameraIdentity;
 use serde::Serialize;
 use std::ops::ControlFlow;
@@ -21,7 +22,8 @@ use std::sync::atomic::Ordering;
 ///
 /// ADC latency and settling are those that `nirspi calibrate` or `nirspi selftest` has kept for this camera. If none are
 /// kept, they are measured first, on the scene; a scene too dim for that ends the command. Ctrl-C ends the recording and
-/// keeps it.
+/// keeps it. The exit code is 0 only if nothing is missing: all N frames, or all that were made until Ctrl-C, came whole,
+/// and no fault stands. Otherwise one line says what is missing, the recording is kept, and the exit code is 1.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi capture --camera usb --frames 1000 --out rec.mcap --picture seen/\n\
@@ -36,7 +38,8 @@ pub struct Args {
     /// File to record into; default: the first free one of capture-1.mcap, capture-2.mcap ...
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Replace the file if it is there
+    /// Replace the file if it is there, when the new recording is whole; until then the new one is beside it, as
+    /// NAME.new.mcap
     #[arg(long)]
     overwrite: bool,
     #[command(flatten)]
@@ -63,9 +66,14 @@ struct Report<'r> {
     /// As the camera counted them; `null` where it went away before it could say.
     made: Option<u64>,
     damaged_packets: u64,
+    unknown_packets: u64,
     repeated: u64,
-    ended: String,
+    /// Frames asked for; `null` for a run until Ctrl-C.
+    asked: Option<u32>,
+    ended: &'static str,
     complete: bool,
+    /// What keeps it from being complete; `null` if nothing does.
+    missing: Option<String>,
     seconds: f64,
     frames_per_s: f64,
     adc_latency_clocks: u8,
@@ -82,7 +90,7 @@ struct Report<'r> {
 pub fn run(args: &Args) -> Result<ExitCode> {
     let mut setup = args.setup.setup(1.0, &args.scene.model)?;
     setup.adc_latency = args.calibration.adc_latency();
-    let path = recording_path(args)?;
+    let target = target(args)?;
     let stop = stop_on_signal()?;
     let mut session = address::open(&args.camera, &args.scene)?;
     let choice = args.calibration.choose(&setup, session.identity())?;
@@ -90,7 +98,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         setup,
         frames: args.frames,
         calibration: choice.calibration.clone(),
-        record: Some(path.clone()),
+        record: Some(target),
     };
     let bar = progress_bar(args.frames);
     let captured = capture(&mut session, &options, &mut |progress: &Progress| {
@@ -104,9 +112,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     });
     bar.finish_and_clear();
     let captured = captured?;
-    let code = report(args, session.identity(), &path, &choice, &captured)?;
+    let path = captured.recording.as_deref().unwrap_or(Path::new(""));
+    let code = report(args, session.identity(), path, &choice, &captured)?;
     if let Some(out) = args.picture.as_ref().filter(|_| captured.counters.received > 0) {
-        let warnings = super::reconstruct::picture(&captured, &path, out)?;
+        let warnings = super::reconstruct::picture(&captured, path, out)?;
         for warning in warnings {
             print::complain(format_args!("warning: {warning}"));
         }
@@ -117,22 +126,18 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     Ok(code)
 }
 
-/// The file to record into, which is not there yet.
-fn recording_path(args: &Args) -> Result<PathBuf> {
-    match &args.out {
-        Some(path) if path.exists() && !args.overwrite => {
+/// Where to record. A name that is taken is refused before the camera is asked for anything.
+fn target(args: &Args) -> Result<Target> {
+    Ok(match &args.out {
+        Some(path) if args.overwrite => Target::Replace(path.clone()),
+        Some(path) if path.exists() => {
             let path = path.display();
-            Err(Usage(format!(
-                "--out {path} is there already: choose another name or add --overwrite"
-            ))
-            .into())
+            let advice = "choose another name or add --overwrite";
+            return Err(Usage(format!("--out {path} is there already: {advice}")).into());
         }
-        Some(path) => Ok(path.clone()),
-        None => (1u32..)
-            .map(|n| PathBuf::from(format!("capture-{n}.mcap")))
-            .find(|path| !path.exists())
-            .ok_or_else(|| Usage("no free name for the recording: use --out".to_owned()).into()),
-    }
+        Some(path) => Target::New(path.clone()),
+        None => Target::FirstFree(PathBuf::new()),
+    })
 }
 
 fn progress_bar(frames: Option<u32>) -> ProgressBar {
@@ -154,28 +159,29 @@ fn report(
 ) -> Result<ExitCode> {
     let counters = captured.counters;
     let seconds = captured.elapsed.as_secs_f64();
-    let (ended, failed) = match &captured.ended {
-        Ended::Complete => ("all frames made".to_owned(), false),
-        Ended::Stopped => ("stopped by the user".to_owned(), false),
-        Ended::Fault(fault) => (format!("the camera switched its LEDs off: {fault}"), true),
-        Ended::LinkLost(error) => (
-            format!(
-                "{}; what it made after the last frame is not known",
-                causes::in_one_line(error)
-            ),
-            true,
-        ),
+    let missing = captured.missing();
+    let ended = match captured.ended {
+        Ended::Complete => "all frames made",
+        Ended::Stopped => "stopped by the user",
+        Ended::Fault(_) => "the camera switched its LEDs off",
+        Ended::WrongNumber { .. } => "the camera made another number of frames",
+        Ended::Unconfirmed(_) => "the camera did not say whether a fault stands",
+        Ended::Junk { .. } => "too much of what came was damaged or of other runs",
+        Ended::LinkLost(_) => "the link to the camera was lost",
     };
     let report = Report {
         camera,
         recording: path,
         bytes: std::fs::metadata(path)?.len(),
         frames: counters,
-        made: (!matches!(captured.ended, Ended::LinkLost(_))).then(|| counters.total()),
+        made: captured.made,
         damaged_packets: captured.damaged_packets,
+        unknown_packets: captured.unknown_packets,
         repeated: captured.repeated,
+        asked: captured.asked,
         ended,
-        complete: !failed && counters.is_complete(),
+        complete: missing.is_none(),
+        missing,
         seconds,
         frames_per_s: counters.received as f64 / seconds,
         adc_latency_clocks: captured.setup.adc_latency,
@@ -189,6 +195,12 @@ fn report(
     } else {
         if let Some(note) = &choice.note {
             print::line(note)?;
+        }
+        if captured.unknown_packets > 0 {
+            let count = captured.unknown_packets;
+            print::line(format_args!(
+                "the camera sent {count} messages that this program does not know: update the program"
+            ))?;
         }
         if let Some(Origin { measured, file }) = &report.calibration {
             print::line(format_args!("calibration of {measured}, {}", file.display()))?;
@@ -207,13 +219,9 @@ fn report(
             path.display()
         ))?;
     }
-    if failed {
-        print::complain(format_args!(
-            "{}; {} received frames are kept in {}",
-            report.ended,
-            counters.received,
-            path.display()
-        ));
+    if let Some(missing) = &report.missing {
+        let (received, path) = (counters.received, path.display());
+        print::complain(format_args!("{missing}; {received} received frames are kept in {path}"));
         return Ok(ExitCode::FAILURE);
     }
     Ok(ExitCode::SUCCESS)

@@ -126,7 +126,7 @@ fn on_usb() -> Vec<Device> {
     let device = |camera: UsbCamera| {
         let said = match camera.protocol.map(|protocol| (protocol, check_version(protocol))) {
             None => "protocol not known before it is opened".to_owned(),
-            Some((protocol, Ok(()))) => format!("protocol {protocol}"),
+            Some((oldest, Ok(()))) => format!("protocol {oldest} or newer"),
             Some((_, Err(problem))) => problem.to_string(),
         };
         let protocol = camera.protocol;

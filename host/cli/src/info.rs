@@ -97,6 +97,9 @@ fn say(report: &Report<'_>) -> Result<()> {
         camera.adc_bits,
         camera.wavelength_nm
     ))?;
+    if !camera.capabilities.is_empty() {
+        print::line(format_args!("capabilities: {}", camera.capabilities.join(", ")))?;
+    }
     let sensor = report
         .temperature_celsius
         .map_or_else(|| "no temperature sensor".to_owned(), |celsius| format!("{celsius:.1} °C"));

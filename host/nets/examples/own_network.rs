@@ -1,4 +1,5 @@
-//! A sharpening network of your own in place of the built-in one: here unsharp masking, as strong as the blur is wide.
+//! A sharpening network of your own in place of the built-in one. Here the network is unsharp
+//! masking, as strong as the blur is wide.
 //!
 //! `cargo run -p nirspi-nets --example own_network`
 
@@ -12,7 +13,7 @@ impl Sharpen for UnsharpMask {
         let images = batch.current.chunks(64 * 64).zip(batch.estimates);
         let sharpened = images.flat_map(|(image, estimate)| {
             (0..64 * 64).map(move |at: usize| {
-                // Beyond the edge lies the pixel itself.
+                // Beyond the edge the pixel's own value is used.
                 let at_step = |step| image.get(at.wrapping_add_signed(step)).unwrap_or(&image[at]);
                 let around: f32 = [-64, -1, 1, 64].map(at_step).into_iter().sum();
                 image[at] + estimate.sigma_px * (image[at] - 0.25 * around)
@@ -23,7 +24,7 @@ impl Sharpen for UnsharpMask {
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    // A white square, somewhat out of focus.
+    // A white square, slightly out of focus.
     let side = |at: usize| ((11.0 - (at as f32 - 15.5).abs()) / 5.0).clamp(0.1, 0.9);
     let reading: Vec<f32> = (0..1024).map(|at| side(at % 32).min(side(at / 32))).collect();
     let (device, options) = (Device::cpu(), Options::default());

@@ -1,12 +1,16 @@
-//! Blur with an edge that reflects: by a Gaussian, or row by row with any weights.
+//! Blur with a reflecting edge: by a Gaussian, or row by row with any weights.
 //!
-//! Beyond the edge the image goes on mirrored (d c b a | a b c d | d c b a), as light that an edge throws back. The
-//! law: with a symmetric kernel this blur is its own adjoint, keeps the mean, and is diagonal in the DCT-II
-//! (Strang, SIAM Review 41, 1999).
+//! Beyond the edge the image continues mirrored (d c b a | a b c d | d c b a).
+//!
+//! # Invariant
+//! With a symmetric kernel the blur is its own adjoint (`tests::the_blur_is_its_own_adjoint`),
+//! keeps the mean (`tests::the_blur_keeps_the_mean_and_the_range`), and is diagonal in the DCT-II
+//! (Strang, SIAM Review 41, 1999; `tests::the_transfer_is_what_happens_to_a_wave`).
 
 use std::f64::consts::PI;
 
-/// Kernel standard deviations from its middle to its end; what lies beyond is under 1e-4 of the light.
+/// Reach of the kernel, in standard deviations from its middle to its end. Less than 1e-4 of the
+/// light lies beyond.
 const REACH_SIGMAS: f32 = 4.0;
 
 /// A Gaussian blur of images of one size, sampled and normalised.
@@ -19,7 +23,7 @@ pub struct Blur {
 }
 
 impl Blur {
-    /// A blur of standard deviation `sigma_px` >= 0 for images of `height` x `width`.
+    /// A blur of standard deviation `sigma_px` >= 0 pixels, for images of `height` x `width`.
     #[must_use]
     pub fn new(height: usize, width: usize, sigma_px: f32) -> Self {
         let reach = (REACH_SIGMAS * sigma_px).ceil() as i32;
@@ -38,10 +42,10 @@ impl Blur {
         (self.height, self.width)
     }
 
-    /// The blurred image, row-major; its adjoint does the same.
+    /// The blurred image, row-major. The adjoint is the same function.
     ///
     /// # Panics
-    /// If the image is of another size.
+    /// If the image has another size.
     #[must_use]
     pub fn apply(&self, image: &[f32]) -> Vec<f32> {
         let (height, width) = self.size();
@@ -51,8 +55,8 @@ impl Blur {
         transposed(&down, height)
     }
 
-    /// What the blur leaves of the waves of a DCT-II along the rows and along the columns: wave (k, l) of an image is
-    /// multiplied by `down[k] * across[l]`.
+    /// Factors of the blur for the waves of a DCT-II along the rows and along the columns: wave (k,
+    /// l) of an image is multiplied by `down[k] * across[l]`.
     #[must_use]
     pub fn transfer(&self) -> (Vec<f64>, Vec<f64>) {
         let half = &self.kernel[self.kernel.len() / 2..];
@@ -69,7 +73,7 @@ impl Blur {
     }
 }
 
-/// Each row of an image of `width` columns correlated with `weights`, whose middle is at the pixel.
+/// Correlates each row of an image of `width` columns with `weights`, whose middle is at the pixel.
 pub(crate) fn along_rows(image: &[f32], width: usize, weights: &[f32]) -> Vec<f32> {
     let reach = weights.len() / 2;
     let mut padded = vec![0.0; width + 2 * reach];
@@ -78,7 +82,7 @@ pub(crate) fn along_rows(image: &[f32], width: usize, weights: &[f32]) -> Vec<f3
         for (at, value) in padded.iter_mut().enumerate() {
             *value = line[reflected(at as isize - reach as isize, width)];
         }
-        // Weight by weight: long vectors instead of short sums.
+        // The loop goes weight by weight, which gives long vectors instead of short sums.
         for (weight, shifted) in weights.iter().zip(padded.windows(width)) {
             for (sum, value) in result.iter_mut().zip(shifted) {
                 *sum += weight * value;
@@ -88,14 +92,14 @@ pub(crate) fn along_rows(image: &[f32], width: usize, weights: &[f32]) -> Vec<f3
     out
 }
 
-/// Where in a line of `length` pixels the mirrored line has index `at`.
+/// Index in a line of `length` pixels that corresponds to index `at` of the mirrored line.
 pub(crate) fn reflected(at: isize, length: usize) -> usize {
     let period = 2 * length as isize;
     let at = at.rem_euclid(period);
     if at < length as isize { at as usize } else { (period - 1 - at) as usize }
 }
 
-/// Columns as rows.
+/// The transposed image.
 fn transposed(image: &[f32], width: usize) -> Vec<f32> {
     let height = image.len() / width;
     (0..image.len()).map(|at| image[at % height * width + at / height]).collect()
@@ -141,7 +145,8 @@ mod tests {
         }
     }
 
-    /// SciPy 1.17.1: `gaussian_filter` (sigma 1.5) of a 1 in the middle of 33 x 33 zeros, its row from the middle.
+    /// Result of SciPy 1.17.1's `gaussian_filter` (sigma 1.5) of a 1 in the middle of 33 x 33
+    /// zeros: its row from the middle.
     const SCIPY_ROW: [f32; 4] = [0.070_737, 0.056_641_75, 0.029_080_844, 0.009_573_21];
 
     #[test]

@@ -1,8 +1,9 @@
-//! The choice of weights: for each network the embedded ones or the user's, and the device that runs them all.
+//! Chooses weights: for each network the embedded weights or the user's, and the device that runs
+//! all networks.
 //!
 //! # Invariant
-//! A user's file is taken for the network that the file names, or refused: no network runs with weights of another
-//! (`a_file_is_taken_for_the_network_that_it_names_or_refused`).
+//! A user's file is used for the network that the file names, or refused, so no network runs with
+//! weights of another network (`tests::a_file_is_taken_for_the_network_that_it_names_or_refused`).
 
 use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
@@ -18,7 +19,7 @@ use crate::estimate::BlurEstimator;
 use crate::fusion::Fusion;
 use crate::weights::{MODEL, VERSION, Weights, WeightsError};
 
-/// A device, and the weights that networks run with on it.
+/// A device, and the weights that networks use on it.
 #[derive(Debug, Clone)]
 pub struct Networks {
     device: Device,
@@ -27,27 +28,28 @@ pub struct Networks {
     used: Vec<UsedWeights>,
 }
 
-/// Weights that a network was made of, for a report.
+/// Identity of the weights that a network was made from, for a report.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct UsedWeights {
     /// The network.
     pub model: String,
     /// Version in the weights' metadata.
     pub version: String,
-    /// The file, or that the weights are embedded.
+    /// The file's path, or a note that the weights are embedded.
     pub from: String,
 }
 
 impl Networks {
-    /// The weights that come with the program.
+    /// The embedded weights.
     pub fn built_in(device: Device) -> Self {
         Self { device, own: Vec::new(), folder: None, used: Vec::new() }
     }
 
-    /// The same, but with the user's weights in `file` for the network that the file names, which is one of `models`.
+    /// The same choice, with the user's weights in `file` for the network that the file names. That
+    /// network must be one of `models`.
     ///
     /// # Errors
-    /// [`WeightsError`] if the file cannot be read, is damaged, names no network or another one.
+    /// [`WeightsError`] if the file cannot be read, is damaged, or does not name one of `models`.
     pub fn with_file(mut self, file: &Path, models: &[&str]) -> Result<Self, WeightsError> {
         let weights = Weights::read(file)?;
         let (file, expected) = (weights.label().to_owned(), models.join(" or "));
@@ -63,16 +65,18 @@ impl Networks {
         }
     }
 
-    /// The same, but with the weights in `folder/NETWORK.safetensors` for each network that has such a file.
+    /// The same choice, with the weights in `folder/NETWORK.safetensors` for each network with such
+    /// a file.
     #[must_use]
     pub fn with_folder(self, folder: impl Into<PathBuf>) -> Self {
         Self { folder: Some(folder.into()), ..self }
     }
 
-    /// The weights of a network: from a file of the user's, from the folder, or embedded, in this order.
+    /// The weights of a network: from the user's file, from the folder, or embedded, in this order.
     ///
     /// # Errors
-    /// [`WeightsError`] if a file in the folder is no such weights, or no such network is embedded.
+    /// [`WeightsError`] if a file in the folder is not weights of the network, or the network is
+    /// not embedded.
     pub fn weights(&mut self, model: &str) -> Result<Weights, WeightsError> {
         let weights = self.find(model)?;
         weights.expect_model(model)?;
@@ -126,7 +130,7 @@ impl Networks {
         Ok(Sharpener::new(estimator, Deblurrer::new(&self.device, &weights, method)?))
     }
 
-    /// All three networks: 32 x 32 in, 64 x 64 out.
+    /// All three networks: input 32 x 32, output 64 x 64.
     ///
     /// # Errors
     /// As [`weights`](Self::weights).
@@ -134,10 +138,10 @@ impl Networks {
         Ok(Enhancer::new(self.fusion()?, self.sharpener(method)?))
     }
 
-    /// All three networks, with the bridge in one step, for images that OMP leaves on a GPU.
+    /// All three networks, with one step of the bridge, for images that OMP leaves on a GPU.
     ///
     /// # Errors
-    /// [`DeviceEnhancerError`] if the device is no GPU; otherwise as [`weights`](Self::weights).
+    /// [`DeviceEnhancerError`] if the device is not a GPU; otherwise as [`weights`](Self::weights).
     #[cfg(feature = "gpu")]
     pub fn device_enhancer(&mut self) -> Result<DeviceEnhancer, DeviceEnhancerError> {
         let [fsrcnn, estimator] = [self.weights("fsrcnn")?, self.weights("estimator")?];
@@ -150,14 +154,14 @@ impl Networks {
         &self.device
     }
 
-    /// All weights that were taken so far.
+    /// All weights used so far.
     pub fn used(&self) -> &[UsedWeights] {
         &self.used
     }
 }
 
 impl Enhancer {
-    /// The networks that come with the program: FSRCNN, the estimator, and the diffusion bridge in one step.
+    /// The embedded networks: FSRCNN, the estimator, and the diffusion bridge with one step.
     ///
     /// # Errors
     /// [`WeightsError::Checksum`] if the embedded weights are damaged.
@@ -173,7 +177,7 @@ mod tests {
     use crate::weights::Precision;
     use std::fs;
 
-    /// A folder of this test's own, removed at the end.
+    /// A folder for this test, removed at the end.
     struct Folder(PathBuf);
 
     impl Folder {
@@ -184,7 +188,7 @@ mod tests {
             Self(folder)
         }
 
-        /// Writes the embedded estimator under another version, as weights of the network `model`.
+        /// Writes the embedded estimator with another version, as weights of the network `model`.
         fn write(&self, file: &str, model: Option<&str>) -> PathBuf {
             let embedded = Weights::embedded("estimator").unwrap();
             let mut weights = Weights::new(file);

@@ -1,10 +1,13 @@
-//! Deblurring without learning anything: the rows that every network has to beat.
+//! Classical deblurring without learning: the baselines that every network has to beat.
 //!
-//! Three methods undo a Gaussian blur of known width from an image with white noise of known strength: [`wiener`]
-//! (linear, one transform), [`richardson_lucy`] (multiplicative, stays positive) and [`total_variation`] (edges). Each
-//! is told the truth or an estimate of it, and sets everything else by itself, so that no row is tuned to a picture.
+//! Three methods remove a Gaussian blur of known width from an image with white noise of known
+//! strength: [`wiener`] (linear, one transform), [`richardson_lucy`] (multiplicative, stays
+//! positive) and [`total_variation`] (edges). Blur and noise are true values or estimates. All
+//! other parameters follow from them, so no result is tuned to a picture.
 //!
-//! The law: what no blur and no noise has touched comes back as it was.
+//! # Invariant
+//! An image without blur and noise comes back unchanged
+//! (`tests::what_nothing_has_touched_comes_back_as_it_was`).
 
 pub mod richardson_lucy;
 pub mod total_variation;
@@ -28,10 +31,10 @@ pub enum Method {
 }
 
 impl Method {
-    /// All of them.
+    /// Every method.
     pub const ALL: [Self; 3] = [Self::Wiener, Self::RichardsonLucy, Self::TotalVariation];
 
-    /// The name on the command line.
+    /// The method's name on the command line.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -60,13 +63,13 @@ impl FromStr for Method {
 /// Why a stack of images cannot be deblurred.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum ClassicalError {
-    /// No such method.
+    /// No method has this name.
     #[error("method \"{found}\", expected wiener, rl or tv")]
     Method {
-        /// What was asked for.
+        /// The name that was given.
         found: String,
     },
-    /// The stack is no whole number of images of at least one pixel.
+    /// The values are not a whole number of images with at least one pixel.
     #[error("deblur: {found} values, expected whole images of {height} x {width}, at least one")]
     Shape {
         /// Number of values given.
@@ -88,33 +91,34 @@ pub enum ClassicalError {
         /// The value found.
         value: f32,
     },
-    /// The blur is no width, or wider than the image.
+    /// The blur is not a width, or is wider than the image.
     #[error("deblur: a blur of sigma {found} px, expected 0 to {most}")]
     Sigma {
-        /// What was given.
+        /// The value that was given.
         found: f32,
         /// The longer edge of the image.
         most: usize,
     },
-    /// The noise is no standard deviation of pixels in [0, 1].
+    /// The noise is not a standard deviation of pixels in [0, 1].
     #[error("deblur: noise of {found}, expected 0 to 1")]
     Noise {
-        /// What was given.
+        /// The value that was given.
         found: f32,
     },
 }
 
-/// Least noise that is reckoned with, in the image's units: finer differences are rounding, and dividing them by what
-/// a blur has left of a fine wave would make a picture of them.
+/// Smallest noise that is used, in the image's units. Smaller differences are rounding, and
+/// dividing them by a blur's small factor for a fine wave would turn them into a picture.
 const LEAST_NOISE: f32 = 1e-4;
 
-/// Undoes a Gaussian blur of standard deviation `sigma_px` (0: none, then the noise alone is reduced) in each image of
-/// a stack (N, `height`, `width`), row-major, pixels in [0, 1], with white noise of standard deviation `noise`. Pixels
-/// in [0, 1] in the same layout.
+/// Removes a Gaussian blur of standard deviation `sigma_px` from each image of a stack (N,
+/// `height`, `width`), row-major, with pixels in [0, 1] and white noise of standard deviation
+/// `noise`. With `sigma_px` 0 only the noise is reduced. Returns pixels in [0, 1] in the same
+/// layout.
 ///
 /// # Errors
-/// [`ClassicalError`] if the values are no whole images, a pixel is NaN or outside [0, 1], or the blur or the noise is
-/// out of range.
+/// [`ClassicalError`] if the values are not whole images, a pixel is NaN or outside [0, 1], or the
+/// blur or the noise is out of range.
 pub fn deblur(
     method: Method,
     stack: &[f32],
@@ -151,8 +155,8 @@ pub fn deblur(
     Ok(stack.chunks_exact(pixels).flat_map(one).map(|pixel| pixel.clamp(0.0, 1.0)).collect())
 }
 
-/// The squared residual that noise alone explains: `noise`^2 for each pixel that could show it. What a clipped pixel
-/// (0 or 1) has lost of its noise cannot be counted on.
+/// The squared residual that noise alone explains: `noise`^2 for each pixel that can show its
+/// noise. Clipped pixels (0 or 1) have lost theirs and do not count.
 fn noise_budget(image: &[f32], noise: f32) -> f32 {
     let free = image.iter().filter(|&&pixel| pixel > 0.0 && pixel < 1.0).count();
     noise * noise * free.max(1) as f32

@@ -1,19 +1,21 @@
-//! Agreement with what was measured: an image is moved no further than it takes to explain the readings
-//! within their noise, so that a network cannot invent what the data contradict.
+//! Agreement with the readings (consistency): changes an image just enough that the readings agree
+//! with it to within their noise, so a network cannot invent what the readings contradict.
 //!
-//! The camera's model is A = M B: B blurs with a Gaussian of `sigma_px` on the 64 x 64 grid, light at the
-//! edge reflected, and M takes means of 2 x 2 pixels where readings are 32 x 32 (else M = 1). An image x
-//! outside the ball |y - A x| <= tau noise sqrt(n) becomes
-//! x + A^T (A A^T + lambda)^-1 (y - A x), lambda such that it comes to lie on the ball, if lambda may be so small: of all images
-//! of the same change's norm, the one that fits best (Tikhonov; Morozov's discrepancy principle).
+//! The camera's model is A = M B: B is a Gaussian blur of `sigma_px` on the 64 x 64 grid with
+//! reflecting edges, and M takes means of 2 x 2 pixels where readings are 32 x 32 (else M = 1). An
+//! image x outside the ball |y - A x| <= tau noise sqrt(n) becomes x + A^T (A A^T + lambda)^-1 (y -
+//! A x). Lambda is chosen so that the new image lies on the ball, and is at least [`LEAST_LAMBDA`].
+//! Of all changes with the same norm this one fits best (Tikhonov; Morozov's discrepancy
+//! principle).
 //!
 //! # Invariant
-//! An image inside the ball is not changed (`inside_the_ball_nothing_changes`).
+//! An image inside the ball is not changed (`tests::inside_the_ball_nothing_changes`).
 //!
 //! # How the equation is solved
-//! With reflecting edges B is diagonal in the cosine transform (DCT-II), and pair means fold cosine 64 - k
-//! onto cosine k, so A A^T is diagonal too and no iteration is needed. With some Hadamard rows missing
-//! only what was measured counts; [`MeasuredRows`] then solves the same equation in a Krylov space.
+//! With reflecting edges B is diagonal in the cosine transform (DCT-II), and pair means fold cosine
+//! 64 - k onto cosine k, so A A^T is diagonal too and no iteration is necessary. If some Hadamard
+//! rows are missing, only the measured part counts, and [`MeasuredRows`] solves the same equation
+//! in a Krylov space.
 
 mod krylov;
 mod measured;
@@ -28,25 +30,27 @@ use std::sync::LazyLock;
 /// Side of the sharp image.
 pub const SIDE: usize = 64;
 
-/// Radius of the ball over its expected value.
+/// Factor on the expected radius of the ball.
 const TAU: f32 = 1.1;
 
-/// Standard deviation that readings are never trusted beyond: the blur is an estimate and no Gaussian.
+/// Smallest standard deviation assumed for the readings, because the estimated blur is not exact
+/// and no true blur is exactly Gaussian.
 const NOISE_FLOOR: f32 = 0.004;
 
-/// Least lambda. Where blur is overestimated no image explains the readings, and the equation would answer with noise
-/// amplified without end; so the change is at most 1 / (2 sqrt lambda) = 5 times the residual, and the readings then stay
-/// unexplained, which the inconsistency says.
+/// Smallest lambda. If the blur is overestimated, no image agrees with the readings, and the
+/// equation would amplify noise without bound. This limit keeps the change below 1 / (2 sqrt
+/// lambda) = 5 times the residual. The readings then still disagree, and the inconsistency shows
+/// that.
 const LEAST_LAMBDA: f32 = 0.01;
 
-/// Halvings of the interval of lambda's logarithm: lambda to 1e-5.
+/// Number of halvings of the interval of lambda's logarithm, which gives lambda to 1e-5.
 const BISECTIONS: usize = 22;
 
-/// The transform of the sharp image, and that of readings of half its side.
+/// The cosine transform of the sharp image, and that of readings with half its side.
 static OF_IMAGE: LazyLock<Cosine<f32>> = LazyLock::new(|| Cosine::new(SIDE, SIDE));
 static OF_READINGS: LazyLock<Cosine<f32>> = LazyLock::new(|| Cosine::new(SIDE / 2, SIDE / 2));
 
-/// The camera's model for one image, and how far to trust its readings.
+/// The camera's model for one image, and the noise of its readings.
 #[derive(Debug)]
 pub struct Consistency {
     /// Cosine transform of the sharp image and of the readings.
@@ -61,16 +65,18 @@ pub struct Consistency {
 }
 
 impl Consistency {
-    /// For readings of `side` x `side` pixels, 32 or 64, of an image of [`SIDE`] x [`SIDE`] blurred by
-    /// `sigma_px` (of the image's pixels), with noise of standard deviation `noise` a reading. Every Hadamard row was
-    /// measured; [`of_rows`](Self::of_rows) says otherwise.
+    /// The model for readings of `side` x `side` pixels, 32 or 64, of an image of [`SIDE`] x
+    /// [`SIDE`] pixels. The blur is `sigma_px` of the image's pixels; `noise` is the standard
+    /// deviation of a reading. Every Hadamard row counts as measured; [`of_rows`](Self::of_rows)
+    /// changes that.
     pub fn new(side: usize, sigma_px: f32, noise: f32) -> Self {
         let attenuation = |k: usize| {
             let omega = PI * k as f32 / SIDE as f32;
             (-0.5 * (sigma_px * omega).powi(2)).exp()
         };
         let halved = side < SIDE;
-        // cos(pi k / 128) is what a pair's mean leaves of cosine k; 1 / sqrt 2 that of its norm.
+        // cos(pi k / 128) is the factor of a pair's mean for cosine k; 1 / sqrt 2 is the factor of
+        // its norm.
         let pair = |k: usize| (PI * k as f32 / (2 * SIDE) as f32).cos() * 0.5_f32.sqrt();
         let gain: Vec<f32> =
             (0..SIDE).map(|k| attenuation(k) * if halved { pair(k) } else { 1.0 }).collect();
@@ -89,7 +95,7 @@ impl Consistency {
         }
     }
 
-    /// The same model where only some Hadamard rows were measured.
+    /// The same model with only some Hadamard rows measured.
     ///
     /// # Errors
     /// [`MeasuredRowsError::OtherSide`] if the rows belong to readings of another side.
@@ -98,13 +104,14 @@ impl Consistency {
         Ok(Self { measured: measured.clone(), ..self })
     }
 
-    /// How far `image` ([`SIDE`]^2) is from explaining `readings`, over their noise: near 1 it does.
+    /// Norm of the difference between `readings` and the model's readings of `image` ([`SIDE`]^2),
+    /// over the norm expected from noise. Near 1 or below, they agree.
     pub fn residual_ratio(&self, readings: &[f32], image: &[f32]) -> f32 {
         let residual = self.residual(readings, &self.image.forward(image));
         norm(&residual) / (self.noise * (self.degrees() as f32).sqrt())
     }
 
-    /// Moves `image` onto the ball, if it is outside.
+    /// Moves `image` onto the ball, if the image is outside.
     pub fn project(&self, readings: &[f32], image: &mut [f32]) {
         let radius = TAU * self.noise * (self.degrees() as f32).sqrt();
         let mut spectrum = self.image.forward(image);
@@ -120,7 +127,7 @@ impl Consistency {
         image.copy_from_slice(&self.image.inverse(&spectrum));
     }
 
-    /// Readings that count.
+    /// Number of readings that count.
     fn degrees(&self) -> usize {
         match &self.measured {
             MeasuredRows::All => self.power.len().pow(2),
@@ -128,7 +135,7 @@ impl Consistency {
         }
     }
 
-    /// Cosine transform of y - A x, of the measured part of it.
+    /// Cosine transform of the measured part of y - A x.
     fn residual(&self, readings: &[f32], spectrum: &[f32]) -> Vec<f32> {
         let mut residual = self.readings.forward(readings);
         let seen = self.apply(spectrum);
@@ -139,7 +146,7 @@ impl Consistency {
         residual
     }
 
-    /// A, in cosine space: attenuate, then fold.
+    /// A in cosine space: attenuate, then fold.
     fn apply(&self, spectrum: &[f32]) -> Vec<f32> {
         let side = self.power.len();
         let mut seen = vec![0.0; side * side];
@@ -171,14 +178,14 @@ impl Consistency {
         }
     }
 
-    /// A A^T's diagonal at coefficient `index`.
+    /// Element `index` of the diagonal of A A^T.
     fn power_at(&self, index: usize) -> f32 {
         let side = self.power.len();
         self.power[index / side] * self.power[index % side]
     }
 
-    /// (A A^T + lambda)^-1 of the residual, which then has the radius' norm: lambda / (mu + lambda) is left of
-    /// each coefficient.
+    /// (A A^T + lambda)^-1 of the residual, with lambda such that the new residual has the radius
+    /// as its norm. Of each coefficient lambda / (mu + lambda) is left.
     fn solve(&self, residual: &[f32], radius: f32) -> Vec<f32> {
         let left = |lambda: f32| {
             let squares = residual.iter().enumerate().map(|(index, r)| {
@@ -191,8 +198,8 @@ impl Consistency {
         residual.iter().enumerate().map(|(i, r)| r / (self.power_at(i) + lambda)).collect()
     }
 
-    /// (P A A^T P + lambda)^-1 of the residual, P the part that the rows measured, with lambda such that the new residual
-    /// has the radius' norm.
+    /// (P A A^T P + lambda)^-1 of the residual, where P projects onto the measured rows. Lambda is
+    /// such that the new residual has the radius as its norm.
     fn solve_sampled(&self, rows: &SampledRows, residual: &[f32], radius: f32) -> Vec<f32> {
         let mut krylov = Krylov::new(residual);
         loop {
@@ -214,7 +221,8 @@ impl Consistency {
     }
 }
 
-/// The largest lambda whose result is not `outside` the ball; lambda from [`LEAST_LAMBDA`] up, on a logarithmic scale.
+/// The largest lambda, from [`LEAST_LAMBDA`] up on a logarithmic scale, whose result is not
+/// `outside` the ball.
 fn bisect(halvings: usize, mut outside: impl FnMut(f32) -> bool) -> f32 {
     let (mut inside, mut beyond) = (LEAST_LAMBDA.log10(), 4.0_f32);
     for _ in 0..halvings {
@@ -228,8 +236,8 @@ fn bisect(halvings: usize, mut outside: impl FnMut(f32) -> bool) -> f32 {
     10.0_f32.powf(inside)
 }
 
-/// Where a cosine of the image shows in the readings, and its sign; nowhere for the one that pair means
-/// take out.
+/// The cosine of the readings onto which cosine `k` of the image folds, and its sign; `None` for
+/// the cosine that pair means remove.
 fn folded(k: usize, side: usize) -> Option<(usize, f32)> {
     match k.cmp(&side) {
         std::cmp::Ordering::Less => Some((k, 1.0)),

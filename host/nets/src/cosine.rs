@@ -1,15 +1,16 @@
-//! The orthonormal cosine transform (DCT-II) of images, by its matrix: at 64 pixels a side that is half a million
-//! multiplications, and no faster transform is worth its code.
+//! The orthonormal cosine transform (DCT-II) of images as a matrix product. At 64 pixels per side
+//! the product takes half a million multiplications, too few to justify the code of a faster
+//! transform.
 //!
 //! # Invariant
-//! The transform is orthogonal: its inverse is its adjoint and norms stay what they are
-//! (`the_inverse_undoes_it`, `a_wave_has_one_coefficient`).
+//! The transform is orthogonal: the inverse is the adjoint, and norms are kept
+//! (`tests::the_inverse_undoes_it`, `tests::a_wave_has_one_coefficient`).
 
 use nalgebra::RealField;
 use pulp::{Arch, Simd, WithSimd};
 use std::f64::consts::PI;
 
-/// The transform of images of one size, in single or double precision.
+/// The transform for images of one size, in single or double precision.
 #[derive(Debug)]
 pub(crate) struct Cosine<T> {
     down: Waves<T>,
@@ -17,12 +18,13 @@ pub(crate) struct Cosine<T> {
 }
 
 impl<T: RealField + Copy> Cosine<T> {
-    /// That of images of `height` x `width`.
+    /// The transform for images of `height` x `width`.
     pub(crate) fn new(height: usize, width: usize) -> Self {
         Self { down: Waves::new(height), across: Waves::new(width) }
     }
 
-    /// C X C^T: the coefficient in row k and column l is that of wave k down the image times wave l across it.
+    /// C X C^T: the coefficient in row k and column l belongs to wave k down the image times wave l
+    /// across it.
     pub(crate) fn forward(&self, image: &[T]) -> Vec<T> {
         let columns = product(&self.down.matrix, image, self.down.length);
         product(&columns, &self.across.transposed, self.across.length)
@@ -35,11 +37,11 @@ impl<T: RealField + Copy> Cosine<T> {
     }
 }
 
-/// The waves along one axis.
+/// The waves along one axis, as a matrix.
 #[derive(Debug)]
 struct Waves<T> {
     length: usize,
-    /// Row k is wave k.
+    /// Row k has wave k.
     matrix: Vec<T>,
     transposed: Vec<T>,
 }
@@ -60,13 +62,14 @@ impl<T: RealField + Copy> Waves<T> {
     }
 }
 
-/// Rows and columns of the product that stay in registers together.
+/// Number of rows and columns of the product that stay in registers together.
 const TILE: (usize, usize) = (4, 16);
 
-/// A matrix of `inner` columns by one of `inner` rows.
+/// The product of a matrix with `inner` columns and a matrix with `inner` rows.
 ///
-/// Compiled for each vector width. Products are added in the order of the inner index whatever the width, and are not
-/// fused, so the bits are the same on every machine.
+/// The code is compiled for each vector width. Products are added in the order of the inner index
+/// for any width, without fused multiply-add, so every machine gives the same bits
+/// (`tests::a_product_has_the_bits_of_the_plain_sums`).
 fn product<T: RealField + Copy>(a: &[T], b: &[T], inner: usize) -> Vec<T> {
     let columns = b.len() / inner;
     let mut out = vec![T::zero(); a.len() / inner * columns];
@@ -110,7 +113,7 @@ fn tiles<T: RealField + Copy>(out: &mut [T], a: &[T], b: &[T], (inner, columns):
             out[from..from + TILE.1].copy_from_slice(&sums);
         }
     }
-    // What no tile covers.
+    // The columns outside the tiles.
     for (out, factors) in out.chunks_exact_mut(columns).zip(a.chunks_exact(inner)) {
         for (&factor, line) in factors.iter().zip(b.chunks_exact(columns)) {
             for (out, &value) in out[whole..].iter_mut().zip(&line[whole..]) {

@@ -1,9 +1,11 @@
-//! Deblurring by a network in one of three ways: the bridge (the one to use), the ancestral sampler (the faithful
-//! baseline) and the GAN's generator (the paper's other baseline). [`Sharpen`] puts another network on the bridge.
+//! Deblurs by a network in one of three ways: the bridge (recommended), the ancestral sampler (the
+//! paper's diffusion) and the GAN's generator (the paper's other baseline). [`Sharpen`] puts
+//! another network on the bridge.
 //!
 //! # Invariant
-//! An image's result depends on the image, its options and its index, never on the other images of a batch
-//! (`an_image_is_enhanced_alike_alone_and_among_others`, `a_sample_is_of_the_image_not_of_its_batch`).
+//! The result for an image depends on the image, its options and its index, and never on the other
+//! images of a batch (`enhance::tests::an_image_is_enhanced_alike_alone_and_among_others`,
+//! `ancestral::tests::a_sample_is_of_the_image_not_of_its_batch`).
 
 mod ancestral;
 mod bridge;
@@ -27,15 +29,16 @@ pub const SIDE: usize = 64;
 
 pub(crate) const AREA: usize = SIDE * SIDE;
 
-/// Which network deblurs, and how it is used.
+/// A network for deblurring, and how to use it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Method {
-    /// The bridge from the degraded image to the sharp one (model `diffusion`), in so many steps.
+    /// The bridge from the degraded image to the sharp one (model `diffusion`), with this number of
+    /// steps.
     Diffusion {
-        /// 1 to 4 are the useful range.
+        /// Number of steps; 1 to 4 are useful.
         steps: NonZeroU32,
     },
-    /// The ancestral sampler (model `ancestral`), in so many of its 500 steps.
+    /// The ancestral sampler (model `ancestral`), with this number of its 500 steps.
     Ancestral {
         /// 1 to 500.
         steps: NonZeroU32,
@@ -45,7 +48,7 @@ pub enum Method {
 }
 
 impl Method {
-    /// The name of its weights.
+    /// The name of the method's weights.
     pub fn model(self) -> &'static str {
         match self {
             Self::Diffusion { .. } => "diffusion",
@@ -54,7 +57,7 @@ impl Method {
         }
     }
 
-    /// Calls of the network for one image.
+    /// Number of calls of the network for one image.
     pub fn steps(self) -> u32 {
         match self {
             Self::Diffusion { steps } | Self::Ancestral { steps } => steps.get(),
@@ -66,9 +69,9 @@ impl Method {
 /// A batch of images to deblur.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Job<'a> {
-    /// (N, 64, 64): where the path starts; as blurred as the readings.
+    /// (N, 64, 64): the start of the path, as blurred as the readings.
     pub(crate) start: &'a [f32],
-    /// (N, 64, 64): the readings themselves, each pixel repeated where they are 32 x 32.
+    /// (N, 64, 64): the readings; each pixel of 32 x 32 readings is repeated.
     pub(crate) seen: &'a [f32],
     pub(crate) estimates: &'a [Estimate],
     pub(crate) seed: u64,
@@ -88,10 +91,10 @@ enum Path {
 }
 
 impl Deblurrer {
-    /// The network of these weights, used as `method` says.
+    /// The network with these weights, used by `method`.
     ///
     /// # Errors
-    /// [`WeightsError`] if they are of another network.
+    /// [`WeightsError`] if the weights belong to another network.
     pub fn new(device: &Device, weights: &Weights, method: Method) -> Result<Self, WeightsError> {
         weights.expect_model(method.model())?;
         let (unet, batch) = (device.unet(weights)?, device.batch());
@@ -105,13 +108,13 @@ impl Deblurrer {
         })
     }
 
-    /// A network of your own on the bridge, in so many steps.
+    /// Your own network on the bridge, with this number of steps.
     pub fn own(network: Box<dyn Sharpen>, steps: NonZeroU32) -> Self {
         let batch = network.batch().max(1);
         Self { path: Path::Bridge { network, steps }, batch }
     }
 
-    /// How many images at once keep its device busy.
+    /// Number of images that keep the network's device busy.
     pub(crate) fn batch(&self) -> usize {
         self.batch
     }
@@ -119,7 +122,7 @@ impl Deblurrer {
     /// The sharp images, (N, 64, 64) in [0, 1].
     ///
     /// # Errors
-    /// [`SharpenError`] if the network of a bridge gives no images.
+    /// [`SharpenError`] if the output of a network on the bridge is refused.
     pub(crate) fn run(
         &self,
         job: &Job<'_>,

@@ -1,7 +1,9 @@
-//! Where networks run: the CPU, or a GPU through wgpu (Vulkan, Metal, DirectX) or CUDA.
+//! The device of the networks: the CPU, or a GPU through wgpu (Vulkan, Metal, DirectX) or CUDA.
 //!
-//! Law: a backend asked for by name is the one that computes, or opening it fails with one line that says why;
-//! [`Backend::Auto`] takes a real GPU if there is one, never a software one.
+//! # Invariant
+//! A backend requested by name computes, or opening it fails with one line that says why
+//! (`tests::a_gpu_that_is_missing_is_one_plain_line`). [`Backend::Auto`] takes a real GPU if there
+//! is one, and never a software device (`tests::the_cpu_and_auto_are_always_there`).
 
 pub use nirspi_recon::backend::{Backend, ParseBackendError};
 
@@ -16,7 +18,7 @@ use thiserror::Error;
 #[cfg(feature = "gpu")]
 use crate::gpu::{self, Engine};
 
-/// A backend that was asked for by name is not there.
+/// The backend requested by name was not found.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("backend {backend}: {why}")]
 pub struct DeviceError {
@@ -43,7 +45,7 @@ pub(crate) enum Kind {
 }
 
 impl Device {
-    /// The CPU, which is always there.
+    /// The CPU, which is always available.
     pub fn cpu() -> Self {
         Self { kind: Kind::Cpu, name: "CPU".to_owned() }
     }
@@ -51,7 +53,8 @@ impl Device {
     /// The device of a backend.
     ///
     /// # Errors
-    /// [`DeviceError`] if wgpu or CUDA was asked for and is not there; `Auto` and `Cpu` never fail.
+    /// [`DeviceError`] if wgpu or CUDA was requested and was not found; `Auto` and `Cpu` never
+    /// fail.
     pub fn open(backend: Backend) -> Result<Self, DeviceError> {
         let absent = |why| DeviceError { backend, why };
         match backend {
@@ -62,12 +65,12 @@ impl Device {
         }
     }
 
-    /// As its driver calls it.
+    /// The device's name in its driver.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// What computes: never [`Backend::Auto`].
+    /// The backend of the device; never [`Backend::Auto`].
     pub fn backend(&self) -> Backend {
         match self.kind {
             Kind::Cpu => Backend::Cpu,
@@ -78,7 +81,7 @@ impl Device {
         }
     }
 
-    /// What launches kernels on it; nothing for the processor.
+    /// The engine that launches kernels on the device; `None` for the processor.
     #[cfg(feature = "gpu")]
     pub(crate) fn engine(&self) -> Option<Arc<dyn Engine>> {
         match &self.kind {
@@ -88,7 +91,7 @@ impl Device {
         }
     }
 
-    /// How many images at once keep it busy.
+    /// Number of images that keep the device busy.
     pub(crate) fn batch(&self) -> usize {
         match self.kind {
             Kind::Cpu => 32,

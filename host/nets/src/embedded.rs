@@ -1,8 +1,8 @@
-//! The weights that come with the program (`host/nets/weights`, made as `docs/training.md` says).
+//! The embedded weights (`host/nets/weights`, made as `docs/training.md` describes).
 
 use crate::weights::{Weights, WeightsError};
 
-/// Name of each network and the file of its weights.
+/// Name of each network, and the file of its weights.
 const FILES: [(&str, &[u8]); 6] = [
     ("estimator", include_bytes!("../weights/estimator.safetensors")),
     ("fsrcnn", include_bytes!("../weights/fsrcnn.safetensors")),
@@ -13,11 +13,12 @@ const FILES: [(&str, &[u8]); 6] = [
 ];
 
 impl Weights {
-    /// The weights of a network that come with the program: `estimator`, `fsrcnn`, `diffusion`, `gan`,
-    /// `ancestral` or `classifier`.
+    /// The embedded weights of a network: `estimator`, `fsrcnn`, `diffusion`, `gan`, `ancestral` or
+    /// `classifier`.
     ///
     /// # Errors
-    /// [`WeightsError::NotEmbedded`] for any other name; [`WeightsError::Checksum`] if this program's file is damaged.
+    /// [`WeightsError::NotEmbedded`] for any other name; [`WeightsError::Checksum`] if the embedded
+    /// file is damaged.
     pub fn embedded(model: &str) -> Result<Self, WeightsError> {
         let named = FILES.iter().find(|(name, _)| *name == model);
         let (_, bytes) =

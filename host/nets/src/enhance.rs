@@ -1,8 +1,9 @@
-//! The learned stages as one: estimate blur and noise, fuse with depth, deblur, hold against the readings.
+//! All learned stages together: estimate blur and noise, fuse with depth, deblur, compare with the
+//! readings.
 //!
 //! # Invariant
-//! Every image comes with its inconsistency, the figure that says whether the readings support the image
-//! (`a_blurred_cross_gets_sharper_at_each_stage_and_the_readings_bear_it_out`).
+//! Every image comes with its inconsistency, a number that says whether the readings agree with the
+//! image (`tests::a_blurred_cross_gets_sharper_at_each_stage_and_the_readings_bear_it_out`).
 
 #[cfg(feature = "gpu")]
 mod device;
@@ -24,20 +25,20 @@ use crate::spread::{Moments, doubled, measured_again};
 pub use device::{DeviceEnhancer, DeviceEnhancerError};
 pub use known::{Known, KnownEstimate};
 
-/// How a stack is deblurred or enhanced.
+/// Options for deblurring or enhancing a stack.
 #[derive(Debug, Clone)]
 pub struct Options {
-    /// Whether each step is moved into agreement with the readings.
+    /// Whether each step of the network is moved into agreement with the readings.
     pub consistency: bool,
-    /// Whether sharp and clean images stay as they are.
+    /// Whether sharp and clean images stay unchanged.
     pub gate: bool,
-    /// Hadamard rows that readings of 32 x 32 were made from.
+    /// Hadamard rows from which the readings of 32 x 32 were made.
     pub measured: MeasuredRows,
-    /// What the caller knows of blur and noise.
+    /// What the caller knows about blur and noise.
     pub estimate: KnownEstimate,
-    /// Seed of everything random.
+    /// Seed of all random numbers.
     pub seed: u64,
-    /// Copies to take the spread of; none for no spread.
+    /// Number of copies for the spread; 0 for no spread.
     pub copies: u32,
 }
 
@@ -54,32 +55,34 @@ impl Default for Options {
     }
 }
 
-/// Why images are not enhanced.
+/// Why images cannot be enhanced.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum EnhanceError {
     /// The measured rows do not belong to these readings.
     #[error(transparent)]
     Rows(#[from] MeasuredRowsError),
-    /// A sharpening network gave no images.
+    /// The output of a sharpening network was refused.
     #[error(transparent)]
     Sharpen(#[from] SharpenError),
 }
 
-/// Enhanced images and what is known about them.
+/// Enhanced images, and numbers about them.
 #[derive(Debug, Clone, Default)]
 pub struct Enhanced {
     /// (N, 64, 64) in [0, 1].
     pub images: Vec<f32>,
-    /// (N, 64, 64): the images before deblurring, where they had to be enlarged.
+    /// (N, 64, 64): the images before deblurring; `None` if the input had this size.
     pub upscaled: Option<Vec<f32>>,
-    /// Blur and noise of each image's readings, as they were used.
+    /// Blur and noise of each image's readings, as used.
     pub estimates: Vec<Estimate>,
-    /// The same as the estimator found them, before [`Options::estimate`] was joined in; none where images stayed on a GPU.
+    /// Blur and noise as the estimator found them, before [`Options::estimate`] was applied; `None`
+    /// for images on a GPU.
     pub estimated: Option<Vec<Estimate>>,
-    /// Distance of the readings from those of each image, over their noise: near 1 or below, they agree.
+    /// Inconsistency of each image: distance between its readings and the measured ones, over their
+    /// noise. Near 1 or below, they agree.
     pub inconsistency: Vec<f32>,
-    /// (N, 64, 64): standard deviation over the copies asked for.
+    /// (N, 64, 64): standard deviation over the requested copies.
     pub spread: Option<Vec<f32>>,
 }
 
@@ -99,23 +102,23 @@ impl Enhanced {
     }
 }
 
-/// The deblurring stage on its own: 64 x 64 in and out.
+/// The deblurring stage alone: input and output 64 x 64.
 pub struct Sharpener {
     estimator: BlurEstimator,
     deblurrer: Deblurrer,
 }
 
 impl Sharpener {
-    /// Of its two networks.
+    /// A sharpener made of its two networks.
     pub fn new(estimator: BlurEstimator, deblurrer: Deblurrer) -> Self {
         Self { estimator, deblurrer }
     }
 
-    /// Deblurs a stack; `progress` is called with the number of images that are done. Images of 64 x 64 are taken as they
-    /// are: [`Options::measured`] does not apply to them.
+    /// Deblurs a stack; `progress` gets the number of finished images. [`Options::measured`] does
+    /// not apply to images of 64 x 64.
     ///
     /// # Errors
-    /// [`EnhanceError::Sharpen`] if a network of your own gives no images.
+    /// [`EnhanceError::Sharpen`] if the output of your own network is refused.
     pub fn deblur(
         &self,
         images: Images<'_, { deblur::SIDE }>,
@@ -125,7 +128,7 @@ impl Sharpener {
         in_batches(images, self.deblurrer.batch(), progress, |first, batch| {
             let estimated = self.estimator.estimate(batch);
             let stage = Stage { deblurrer: &self.deblurrer, options, first };
-            // What is 64 x 64 was not measured by patterns of 32 x 32.
+            // An image of 64 x 64 was not measured by patterns of 32 x 32.
             let (side, all, binding) = (deblur::SIDE, &MeasuredRows::All, options.consistency);
             let sharp = |constraint: &DataConstraint<'_>, estimates: &[Estimate], seed| {
                 let readings = constraint.readings();
@@ -147,30 +150,30 @@ impl Sharpener {
     }
 }
 
-/// Both stages: 32 x 32 in, 64 x 64 out.
+/// Both stages: input 32 x 32, output 64 x 64.
 pub struct Enhancer {
     fusion: Fusion,
     sharpener: Sharpener,
 }
 
 impl Enhancer {
-    /// Of its three networks.
+    /// An enhancer made of its three networks.
     pub fn new(fusion: Fusion, sharpener: Sharpener) -> Self {
         Self { fusion, sharpener }
     }
 
-    /// The same enhancer with a sharpening network of your own, in so many steps along the bridge.
+    /// The same enhancer with your own sharpening network, with this number of steps on the bridge.
     #[must_use]
     pub fn with_network(mut self, network: Box<dyn Sharpen>, steps: NonZeroU32) -> Self {
         self.sharpener.deblurrer = Deblurrer::own(network, steps);
         self
     }
 
-    /// Enhances a stack, with the depth maps that go with it; `progress` is called with the number of images that are
-    /// done.
+    /// Enhances a stack with its depth maps; `progress` gets the number of finished images.
     ///
     /// # Errors
-    /// [`EnhanceError`] if the measured rows are not of 32 x 32 readings, or a network of your own gives no images.
+    /// [`EnhanceError`] if the measured rows are not of 32 x 32 readings, or the output of your own
+    /// network is refused.
     pub fn enhance(
         &self,
         images: Images<'_, { crate::fusion::SIDE }>,
@@ -208,7 +211,7 @@ impl Enhancer {
     }
 }
 
-/// Readings of 32 x 32 as a constraint on the images made of them.
+/// Readings of 32 x 32 as a constraint on the images made from them.
 fn constraint_on<'a>(
     readings: &'a [f32],
     estimates: &[Estimate],
@@ -218,15 +221,15 @@ fn constraint_on<'a>(
     DataConstraint::new(readings, side, estimates, &options.measured, options.consistency)
 }
 
-/// Image `index` of FSRCNN's output, moved into agreement with the readings: the gate puts this image in the place of
-/// the sharpened one where the readings were sharp and clean.
+/// Image `index` of FSRCNN's output, moved into agreement with the readings. The gate uses this
+/// image instead of the sharpened one if the readings were sharp and clean.
 fn agreeing(start: &[f32], index: usize, constraint: &DataConstraint<'_>) -> Vec<f32> {
     let mut plain = start[index * AREA..][..AREA].to_vec();
     constraint.correct_one(index, &mut plain);
     plain
 }
 
-/// The deblurring of one batch.
+/// One batch of the deblurring stage.
 struct Stage<'a> {
     deblurrer: &'a Deblurrer,
     options: &'a Options,
@@ -234,7 +237,7 @@ struct Stage<'a> {
 }
 
 impl Stage<'_> {
-    /// The deblurring of `start`, given the readings as the network sees them.
+    /// The deblurring job for `start`; the network also gets the readings.
     fn job<'b>(
         &self,
         start: &'b [f32],
@@ -245,7 +248,7 @@ impl Stage<'_> {
         Job { start, seen, estimates, seed, first: self.first }
     }
 
-    /// Deblurs; images that were sharp and clean become what `plain` makes of their index.
+    /// Deblurs. An image that was sharp and clean is replaced by `plain` of its index.
     fn sharpen<I: AsRef<[f32]>>(
         &self,
         job: &Job<'_>,
@@ -259,7 +262,7 @@ impl Stage<'_> {
         Ok(images)
     }
 
-    /// Standard deviation over copies of the readings, each enhanced as they were.
+    /// Standard deviation over copies of the readings, each enhanced like the original.
     fn spread(
         &self,
         readings: &[f32],
@@ -284,7 +287,7 @@ fn known(options: &Options, estimated: &[Estimate]) -> Vec<Estimate> {
     estimated.iter().map(|e| options.estimate.over(*e)).collect()
 }
 
-/// Runs `work` on the stack piece by piece; it is given the index of the piece's first image.
+/// Calls `work` with each piece of the stack and the index of the piece's first image.
 fn in_batches<const SIDE: usize>(
     images: Images<'_, SIDE>,
     batch: usize,
@@ -299,7 +302,7 @@ fn in_batches<const SIDE: usize>(
     Ok(all)
 }
 
-/// Each pixel of (N, side, side) twice in both directions.
+/// Each pixel of (N, side, side) repeated twice in both directions.
 fn repeated(images: &[f32], side: usize) -> Vec<f32> {
     let rows = images.chunks_exact(side).map(|row| row.iter().flat_map(|&v| [v, v]));
     rows.flat_map(|row| row.clone().chain(row)).collect()

@@ -1,20 +1,20 @@
-//! How blurred and how noisy an image is, from the image itself.
+//! Estimates blur and noise of an image from the image itself.
 
 use crate::device::Device;
 use crate::images::Images;
 use crate::network::{Conditions, RunEstimator};
 use crate::weights::{Weights, WeightsError};
 
-/// Side of the grid that blur is counted on.
+/// Side of the grid whose pixels are the unit of blur.
 const OUTPUT_SIDE: usize = 64;
 
-/// Blur of this many pixels is 1 to the networks.
+/// The blur in pixels that is 1 on the networks' scale.
 pub(crate) const SIGMA_SCALE_PX: f32 = 4.0;
 
-/// Noise of one over this is 1 to the networks.
+/// Factor of the networks' scale of noise: a noise of 1 / 10 is 1.
 pub(crate) const NOISE_SCALE: f32 = 10.0;
 
-/// The largest condition that the networks were trained with.
+/// The largest condition used in training.
 pub(crate) const CONDITION_MAX: f32 = 1.5;
 
 /// Blur and noise of an image.
@@ -27,13 +27,14 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// Of the estimator's two outputs for an image of `side` x `side`: blur comes in pixels of the image's own grid.
+    /// The estimate from the estimator's two outputs for an image of `side` x `side`. The outputs
+    /// count blur in pixels of the image's own grid.
     pub(crate) fn of_outputs([sigma, noise]: [f32; 2], side: usize) -> Self {
         let px = SIGMA_SCALE_PX * (OUTPUT_SIDE / side) as f32;
         Self { sigma_px: px * sigma, noise: noise / NOISE_SCALE }
     }
 
-    /// What the UNet is told, after two numbers that say where on its path it is.
+    /// The UNet's conditions: two numbers for the position on the path, then blur and noise.
     pub(crate) fn conditions(&self, path: [f32; 2]) -> Conditions {
         let s = (self.sigma_px / SIGMA_SCALE_PX).clamp(0.0, CONDITION_MAX);
         let n = (self.noise * NOISE_SCALE).clamp(0.0, CONDITION_MAX);
@@ -41,17 +42,17 @@ impl Estimate {
     }
 }
 
-/// The network that estimates.
+/// The estimator.
 pub struct BlurEstimator {
     network: Box<dyn RunEstimator>,
     batch: usize,
 }
 
 impl BlurEstimator {
-    /// The network of these weights (model `estimator`).
+    /// The network with these weights (model `estimator`).
     ///
     /// # Errors
-    /// [`WeightsError`] if they are of another network.
+    /// [`WeightsError`] if the weights belong to another network.
     pub fn new(device: &Device, weights: &Weights) -> Result<Self, WeightsError> {
         weights.expect_model("estimator")?;
         Ok(Self { network: device.estimator(weights)?, batch: device.batch() })

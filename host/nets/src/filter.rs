@@ -1,4 +1,4 @@
-//! Convolutions and fully connected layers as a file of weights has them, the same for every device.
+//! Convolutions and fully connected layers in the layout of a file of weights, for every device.
 
 use crate::weights::{Weights, WeightsError};
 
@@ -14,15 +14,15 @@ pub(crate) struct Filter {
     pub(crate) side: usize,
     /// outputs x inputs x side x side.
     pub(crate) weights: Vec<f32>,
-    /// One for each output.
+    /// One bias for each output.
     pub(crate) bias: Vec<f32>,
 }
 
 impl Filter {
-    /// The convolution of that name.
+    /// The convolution with this name.
     ///
     /// # Errors
-    /// [`WeightsError`] if a tensor is missing or of another shape.
+    /// [`WeightsError`] if a tensor is missing or has another shape.
     pub(crate) fn convolution(weights: &Weights, name: &str) -> Result<Self, WeightsError> {
         let key = format!("{name}.weight");
         let [outputs, inputs, side, _] = weights.shape(&key)?;
@@ -31,7 +31,7 @@ impl Filter {
         Ok(Self { inputs, outputs, side, weights: kernels, bias })
     }
 
-    /// The fully connected layer of that name, as a convolution of 1 x 1.
+    /// The fully connected layer with this name, as a convolution of 1 x 1.
     ///
     /// # Errors
     /// As [`Self::convolution`].
@@ -43,8 +43,9 @@ impl Filter {
         Ok(Self { inputs, outputs, side: 1, weights: matrix, bias })
     }
 
-    /// FSRCNN's transposed convolution (9 x 9, stride 2, padding 4) as a convolution of 5 x 5 with four outputs, one for
-    /// each place in a block of 2 x 2: a pixel of the enlarged image sees only the taps of its own parity.
+    /// FSRCNN's transposed convolution (9 x 9, stride 2, padding 4) as a convolution of 5 x 5 with
+    /// four outputs, one for each place in a block of 2 x 2: a pixel of the enlarged image uses
+    /// only the taps of its own parity.
     ///
     /// # Errors
     /// As [`Self::convolution`].
@@ -54,7 +55,8 @@ impl Filter {
         let [inputs, _, _, _] = weights.shape(&key)?;
         let kernels = weights.tensor(&key, &[inputs, 1, TRANSPOSED_SIDE, TRANSPOSED_SIDE])?;
         let bias = weights.tensor(&format!("{name}.bias"), &[1])?.values[0];
-        // Output 2 r + d sees input r + k - 2 through tap 2 (2 - k) + 4 + d of the kernel (padding 4), k = 0..5.
+        // Output 2 r + d uses input r + k - 2 through tap 2 (2 - k) + 4 + d of the kernel (padding
+        // 4), k = 0..5.
         let tap =
             |k: usize, d: usize| (8 + d).checked_sub(2 * k).filter(|&tap| tap < TRANSPOSED_SIDE);
         let at = |o: usize, i: usize, ky: usize, kx: usize| match (tap(ky, o / 2), tap(kx, o % 2)) {

@@ -1,9 +1,11 @@
-//! Intensity and depth become one image of twice the pixels: the paper's fusion by FSRCNN (section 2.C).
+//! Fusion of intensity and depth into an image with twice the side, by FSRCNN (the paper's section
+//! 2.C).
 //!
 //! # Invariant
-//! A zone without depth differs from a near one: its depth is 0 and its validity too
-//! (`a_zone_covers_its_pixels_and_a_blind_one_is_marked`). Training builds the network's input with the same functions
-//! (`training_and_inference_build_the_same_input`).
+//! A zone without depth differs from a near zone: its depth and its validity are both 0
+//! (`tests::a_zone_covers_its_pixels_and_a_blind_one_is_marked`). Training builds the network's
+//! input with the same functions
+//! (`train::examples::tests::training_and_inference_build_the_same_input`).
 
 use thiserror::Error;
 
@@ -15,39 +17,40 @@ use crate::weights::{Weights, WeightsError};
 /// Side of the intensity image.
 pub const SIDE: usize = 32;
 
-/// The depth that is 1 to the network; deeper is 1 too.
+/// The depth in metres that is 1 on the network's scale; a greater depth is 1 too.
 const DEPTH_SCALE_M: f32 = 3.0;
 
 /// Why depth maps are refused.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum DepthError {
-    /// The maps' sides do not divide 32, or their number is not that of the images, nor one.
+    /// The maps' side does not divide 32, or their number is neither one nor the number of images.
     #[error(
         "{maps} depth maps of {height} x {width}, expected 1 or {images} of a side that divides 32"
     )]
     Shape {
-        /// Maps given.
+        /// Number of maps.
         maps: usize,
-        /// Rows of each.
+        /// Rows of each map.
         height: usize,
-        /// Columns of each.
+        /// Columns of each map.
         width: usize,
-        /// Images that they belong to.
+        /// Number of images.
         images: usize,
     },
 }
 
-/// Depth maps as a time-of-flight sensor gives them, 8 x 8 to 32 x 32 zones.
+/// Depth maps of a time-of-flight sensor, 8 x 8 to 32 x 32 zones.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DepthMaps {
     side: usize,
-    /// Metres; NaN, infinity, zero and less mean that the zone saw nothing.
+    /// Distances in metres. NaN, infinity, zero or less mean that the zone has no distance.
     zones_m: Vec<f32>,
 }
 
 impl DepthMaps {
-    /// `maps` of `height` x `width` zones in metres, row-major, for `images` images: one for each, or one
-    /// for all. A zone that is not a positive number saw nothing.
+    /// `maps` depth maps of `height` x `width` zones in metres, row-major, for `images` images: one
+    /// map for each image, or one for all. A zone whose value is not a positive number has no
+    /// distance.
     ///
     /// # Errors
     /// [`DepthError`] if the numbers do not fit.
@@ -68,7 +71,7 @@ impl DepthMaps {
         }
     }
 
-    /// The maps of `count` images from `first` on.
+    /// The maps of `count` images, beginning with `first`.
     pub(crate) fn of(&self, first: usize, count: usize) -> Self {
         let area = self.side * self.side;
         let zones_m = if self.zones_m.len() == area {
@@ -79,7 +82,7 @@ impl DepthMaps {
         Self { side: self.side, zones_m }
     }
 
-    /// What a zone of the map of one image saw, in metres.
+    /// Distance of a zone of one image's map, in metres.
     fn zone_m(&self, image: usize, zone: usize) -> Option<f32> {
         let area = self.side * self.side;
         let map = if self.zones_m.len() == area { 0 } else { image };
@@ -88,13 +91,15 @@ impl DepthMaps {
     }
 }
 
-/// Appends what FSRCNN sees of the depth of one image: depth over 3 m, then its validity, 32 x 32 each.
+/// Appends FSRCNN's depth input for one image: depth over 3 m, then its validity, 32 x 32 values
+/// each.
 pub(crate) fn push_planes(depth: Option<&DepthMaps>, image: usize, planes: &mut Vec<f32>) {
     let side = depth.map_or(1, |depth| depth.side);
     push_zones(side, |zone| depth?.zone_m(image, zone), planes);
 }
 
-/// The same for a map of `side` x `side` zones; `zone_m` says in metres what a zone saw, if anything.
+/// The same for a map of `side` x `side` zones; `zone_m` gives a zone's distance in metres, if
+/// there is one.
 pub(crate) fn push_zones(
     side: usize,
     zone_m: impl Fn(usize) -> Option<f32>,
@@ -109,23 +114,23 @@ pub(crate) fn push_zones(
     planes.extend((0..SIDE * SIDE).map(|pixel| zones[zone_of(pixel)].1));
 }
 
-/// FSRCNN with its second input.
+/// FSRCNN with depth as its second input.
 pub struct Fusion {
     network: Box<dyn RunFsrcnn>,
     batch: usize,
 }
 
 impl Fusion {
-    /// The network of these weights (model `fsrcnn`).
+    /// The network with these weights (model `fsrcnn`).
     ///
     /// # Errors
-    /// [`WeightsError`] if they are of another network.
+    /// [`WeightsError`] if the weights belong to another network.
     pub fn new(device: &Device, weights: &Weights) -> Result<Self, WeightsError> {
         weights.expect_model("fsrcnn")?;
         Ok(Self { network: device.fsrcnn(weights)?, batch: device.batch() })
     }
 
-    /// Each image at 64 x 64, in [0, 1]: enlarged and denoised, as blurred as it was.
+    /// Each image at 64 x 64, in [0, 1]: enlarged and denoised, with its blur unchanged.
     pub fn upscale(&self, images: Images<'_, SIDE>, depth: Option<&DepthMaps>) -> Vec<f32> {
         let all: Vec<&[f32]> = images.iter().collect();
         let mut out = Vec::with_capacity(4 * images.values().len());
@@ -162,7 +167,7 @@ mod tests {
         let depth = DepthMaps::new(zones, [2, 8, 8], 2).unwrap();
         let at = |image, pixel| planes_at(&depth, image, pixel);
         assert_eq!(at(1, 0), (0.5, 1.0));
-        // Zone (1, 1) is pixels 4 to 7 of rows 4 to 7.
+        // Zone (1, 1) covers pixels 4 to 7 of rows 4 to 7.
         assert_eq!(at(1, 4 * SIDE + 7), (0.0, 0.0));
         assert_eq!(at(1, 7 * SIDE + 8), (0.0, 0.0));
         assert_eq!(at(1, 4 * SIDE + 12), (1.0, 1.0));

@@ -1,28 +1,30 @@
-//! Never harmful: an image that is sharp and clean stays as it is.
+//! The gate: leaves an image that is sharp and clean unchanged, so that enhancement does no harm.
 //!
 //! # Invariant
-//! Below the lower bounds the enhancement has no say, above the upper ones all of it, and in between its share grows in
-//! proportion, so that no small change of the input makes a jump
-//! (`sharp_and_clean_stays_and_either_flaw_opens_the_gate`).
+//! Below the lower bounds of blur and noise the enhanced image has no share in the result; above an
+//! upper bound it has the whole share. Between the bounds its share grows linearly, so a small
+//! change of the input never makes a jump
+//! (`tests::sharp_and_clean_stays_and_either_flaw_opens_the_gate`).
 
 use rayon::prelude::*;
 
 use crate::estimate::Estimate;
 
-/// Blur, in pixels of the output grid, where enhancement begins to have a say, and has it all.
+/// Bounds of the blur, in pixels of the output grid: where the gate begins to open, and where it is
+/// fully open.
 const SIGMA_PX: [f32; 2] = [0.35, 0.5];
 
-/// The same for noise.
+/// Bounds of the noise of a reading, a white target being 1.
 const NOISE: [f32; 2] = [0.004, 0.008];
 
-/// The enhancement's share of the result.
+/// Share of the enhanced image in the result, 0 to 1.
 pub(crate) fn share(estimate: &Estimate) -> f32 {
     let between = |value: f32, [from, to]: [f32; 2]| ((value - from) / (to - from)).clamp(0.0, 1.0);
     between(estimate.sigma_px, SIGMA_PX).max(between(estimate.noise, NOISE))
 }
 
-/// Puts back into `enhanced`, images of `area` pixels, what of each input belongs there. `input` makes input k; only images
-/// that the gate is not fully open for ask for theirs.
+/// Mixes into `enhanced`, images of `area` pixels, the share of each input that the gate keeps.
+/// `input` makes input k, and is called only for images whose gate is not fully open.
 pub(crate) fn close<I: AsRef<[f32]>>(
     estimates: &[Estimate],
     area: usize,

@@ -1,16 +1,17 @@
-//! Stacks of images that are what the networks were trained on: square, of a known size, in [0, 1].
+//! Stacks of images as the networks expect them: square, of a known size, in [0, 1].
 //!
-//! Law: an [`Images`] holds no other.
+//! # Invariant
+//! An [`Images`] holds only such images (`tests::only_whole_images_in_range_are_let_in`).
 
 use thiserror::Error;
 
 /// Why a stack of images is refused.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum ImagesError {
-    /// No image, or values that are no whole images.
+    /// There is no image, or the values are not whole images.
     #[error("{found} values, expected whole images of {side} x {side}, at least one")]
     Shape {
-        /// Side that the images should have.
+        /// Expected side of the images.
         side: usize,
         /// Number of values.
         found: usize,
@@ -54,13 +55,13 @@ impl<'a, const SIDE: usize> Images<'a, SIDE> {
         Ok(Self(values))
     }
 
-    /// A stack that is known to be in order: a part of one, or what a network gave.
+    /// A stack that is known to be valid: a part of a valid stack, or the output of a network.
     pub(crate) fn known(values: &'a [f32]) -> Self {
         debug_assert!(Self::new(values).is_ok());
         Self(values)
     }
 
-    /// How many.
+    /// Number of images.
     pub fn count(&self) -> usize {
         self.0.len() / (SIDE * SIDE)
     }
@@ -70,7 +71,7 @@ impl<'a, const SIDE: usize> Images<'a, SIDE> {
         self.0
     }
 
-    /// Image by image.
+    /// Iterates over the images.
     pub fn iter(&self) -> std::slice::ChunksExact<'a, f32> {
         self.0.chunks_exact(SIDE * SIDE)
     }

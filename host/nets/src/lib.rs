@@ -1,9 +1,9 @@
-//! Enhancement of reconstructed images on the way to the 64 x 64 output: fusion with depth by FSRCNN, deblurring
-//! by a diffusion bridge, and the baselines that both have to beat.
+//! Enhances reconstructed images to the 64 x 64 output: fusion with depth by FSRCNN, deblurring by
+//! a diffusion bridge, and the baselines that both have to beat.
 //!
-//! Data flows from [`images`] through [`estimate`] (blur and noise), [`fusion`] and [`deblur`], all of it in [`enhance`].
-//! [`Networks`] chooses the weights, [`Sharpen`] takes a network of your own. Without learning anything: [`upscale`] and
-//! [`classical`].
+//! Data flows from [`images`] through [`estimate`] (blur and noise), [`fusion`] and [`deblur`];
+//! [`enhance`] does all of these. [`Networks`] chooses the weights, [`Sharpen`] is the interface
+//! for your own network. [`upscale`] and [`classical`] work without learning.
 //!
 //! ```
 //! use nirspi_nets::{Device, Enhancer, Images, Options};
@@ -45,6 +45,7 @@ pub mod metrics;
 pub mod model;
 mod network;
 mod random;
+mod schema;
 mod spread;
 #[cfg(feature = "train")]
 pub mod train;

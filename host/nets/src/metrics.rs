@@ -1,10 +1,11 @@
-//! How good images are that a network made: what no comparison pixel by pixel sees.
+//! Judges images of networks by features, which a comparison pixel by pixel does not see.
 //!
-//! PSNR and SSIM are in `nirspi_recon::metrics`. Here are distances between *sets* of images ([`frechet`]), on features
-//! of our own classifier ([`character`]) or of the user's [`inception`].
+//! PSNR and SSIM are in `nirspi_recon::metrics`. Here are distances between *sets* of images
+//! ([`frechet`]), on features of this crate's classifier ([`character`]) or of the user's
+//! [`inception`].
 //!
-//! A name says what was measured: FID is what Inception's published weights give and nothing else. Inception runs in builds
-//! with the feature `train`; without it, [`Inception::new`] says which build has FID.
+//! Only a distance on features of Inception's published weights is called FID. Inception runs in
+//! builds with the feature `train`; without it, [`Inception::new`] says which build has FID.
 
 pub mod character;
 pub mod frechet;

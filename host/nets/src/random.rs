@@ -1,4 +1,4 @@
-//! Random numbers that depend on a seed and on an image's index, never on the batch that the image is in.
+//! Random numbers that depend on a seed and on an image's index, and never on the image's batch.
 
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -9,14 +9,14 @@ use rand_pcg::Pcg64;
 pub(crate) struct Noise(Pcg64);
 
 impl Noise {
-    /// The noise of the image `index`.
+    /// The noise of image `index`.
     pub(crate) fn of(seed: u64, index: usize) -> Self {
-        // Steps of the golden ratio keep the seeds of neighbours apart.
+        // A step of the golden ratio separates the seeds of neighbouring images.
         let step = (index as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
         Self(Pcg64::seed_from_u64(seed.wrapping_add(step)))
     }
 
-    /// One number.
+    /// Draws one number.
     pub(crate) fn draw(&mut self) -> f32 {
         StandardNormal.sample(&mut self.0)
     }

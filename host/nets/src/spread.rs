@@ -1,13 +1,16 @@
-//! How well a result repeats: its standard deviation, pixel by pixel, had the same scene been measured again.
+//! The spread of a result: its standard deviation, pixel by pixel, over repeated measurements of
+//! the same scene.
 //!
 //! The readings get fresh noise of the size estimated in them (a parametric bootstrap), and all
-//! stages run again. This is repeatability, no error bar: what the network gets wrong in every copy (bias, or a stroke that it
-//! invents each time) is not in it. `docs/quality.md` says how often the truth lies within it.
+//! stages run again. The spread says how well a result repeats. It is no error bar: what the network
+//! gets wrong in every copy (bias, or a stroke that it invents each time) is not in it.
+//! `docs/quality.md` says how often the truth lies within it.
 
 use crate::estimate::Estimate;
 use crate::random::Noise;
 
-/// Readings (N, side, side) as measured another time, in [0, 1]; `first` is the index of the first image.
+/// Readings (N, side, side) as in another measurement, in [0, 1]; `first` is the index of the first
+/// image.
 pub(crate) fn measured_again(
     readings: &[f32],
     estimates: &[Estimate],
@@ -25,7 +28,7 @@ pub(crate) fn measured_again(
     copy
 }
 
-/// The estimates of such copies: their noise is that of two measurements.
+/// The estimates of such copies, whose noise is that of two measurements.
 pub(crate) fn doubled(estimates: &[Estimate]) -> Vec<Estimate> {
     let twice = |e: &Estimate| Estimate { noise: e.noise * 2.0_f32.sqrt(), ..*e };
     estimates.iter().map(twice).collect()
@@ -54,7 +57,7 @@ impl Moments {
         }
     }
 
-    /// Standard deviations, unbiased variance; zero for a single sample.
+    /// Standard deviations from the unbiased variance; zero for a single sample.
     pub(crate) fn deviation(self) -> Vec<f32> {
         let degrees = self.count.saturating_sub(1).max(1) as f32;
         self.squares.into_iter().map(|square| (square / degrees).max(0.0).sqrt()).collect()

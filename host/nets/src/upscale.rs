@@ -1,32 +1,35 @@
-//! Twice the pixels without learning anything: the line that every learned stage has to beat.
+//! Lanczos interpolation to twice the side, without learning: the baseline that every learned stage
+//! has to beat.
 //!
-//! Separable Lanczos-3 interpolation (Duchon, J. Appl. Meteorol. 18, 1979): pixel *centres* are
-//! aligned, so output pixel i lies at input coordinate (i + 1/2) / 2 - 1/2 and the picture does not
-//! shift; beyond the edge the edge pixel is repeated; weights are normalised.
+//! Separable Lanczos-3 interpolation (Duchon, J. Appl. Meteorol. 18, 1979). Pixel *centres* are
+//! aligned: output pixel i lies at input coordinate (i + 1/2) / 2 - 1/2, so the picture does not
+//! shift. Beyond the edge the edge pixel is repeated; weights are normalised.
 //!
-//! Law: before the clamp to [0, 1] the map is linear, keeps a constant image constant and commutes
-//! with mirroring.
+//! # Invariant
+//! Before the clamp to [0, 1] the map is linear (`tests::interpolation_is_linear`), keeps a
+//! constant image constant (`tests::a_constant_image_stays_constant`) and commutes with mirroring
+//! (`tests::a_mirrored_image_gives_the_mirrored_result`).
 
 use std::f64::consts::PI;
 
 use thiserror::Error;
 
-/// Lobes of the kernel on either side.
+/// Number of lobes of the kernel on either side.
 const LOBES: usize = 3;
 
-/// Input pixels under the kernel for any output pixel.
+/// Number of input pixels under the kernel for any output pixel.
 const TAPS: usize = 2 * LOBES;
 
 /// Why a stack of images cannot be upscaled.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum UpscaleError {
-    /// The stack holds no pixel, or its size does not fit the number of values.
+    /// The stack has no pixel, or its size does not fit the number of values.
     #[error(
         "upscale: {found} values given for {images} images of {height} x {width}; \
          expected their product, and at least one pixel"
     )]
     Shape {
-        /// Images said to be in the stack.
+        /// Number of images according to the caller.
         images: usize,
         /// Rows of an image.
         height: usize,
@@ -96,8 +99,9 @@ fn interpolate(stack: &[f32], height: usize, width: usize) -> Vec<f32> {
     enlarged
 }
 
-/// Weights of the input pixels around output coordinates a quarter of a pixel to the right of an
-/// input pixel: those at offsets -2 to 3 from it. A quarter to the left is their mirror image.
+/// Weights of the input pixels for an output coordinate a quarter of a pixel to the right of an
+/// input pixel, at offsets -2 to 3 from it. The weights for a quarter to the left are the mirror
+/// image.
 fn half_pixel_taps() -> [f32; TAPS] {
     let weights: [f64; TAPS] =
         std::array::from_fn(|tap| lanczos(tap as f64 + 1.0 - LOBES as f64 - 0.25));
@@ -185,7 +189,7 @@ mod tests {
 
         #[test]
         fn the_mean_is_kept_where_the_edge_is_dark(mut image in image()) {
-            // Repeating an edge pixel counts it more than once; without light there, nothing does.
+            // Repeating an edge pixel counts it more than once, so the edges are dark here.
             for (i, v) in image.iter_mut().enumerate() {
                 let (row, column) = (i / W, i % W);
                 if !((3..H - 3).contains(&row) && (3..W - 3).contains(&column)) {
@@ -214,7 +218,8 @@ mod tests {
 
     #[test]
     fn a_fine_wave_is_resampled_where_it_lies() {
-        // A cosine of 8 pixels a period, away from the edges: output i shows it at i / 2 - 1/4.
+        // A cosine of 8 pixels per period, away from the edges: output i has its value at i / 2 -
+        // 1/4.
         let wave = |x: f64| (0.5 + 0.4 * (PI * x / 4.0).cos()) as f32;
         let row: Vec<f32> = (0..32).map(|x| wave(f64::from(x))).collect();
         let enlarged = upscale_2x(&row, 1, 1, 32).unwrap();

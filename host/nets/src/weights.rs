@@ -2,7 +2,8 @@
 //! either framework runs in the other.
 //!
 //! Law: what is used is what was trained. A file that carries a checksum (`sha256` in its metadata: of
-//! all bytes after the header) is held against it, and every tensor's shape is checked before use.
+//! all bytes after the header) is held against it. Names, shapes and numbers of all tensors are checked before a network is
+//! made of them: `crate::schema` has the law of each network.
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write as _;
@@ -85,12 +86,47 @@ pub enum WeightsError {
         found: String,
     },
     /// A tensor is missing.
-    #[error("{file}: no tensor {tensor}; are these weights of another network?")]
+    #[error(
+        "{file}: no tensor {tensor}{}{}; are these weights of another network?",
+        if .expected.is_empty() { String::new() } else { format!(", expected {}", by(.expected)) },
+        .unknown.as_ref().map_or_else(String::new, |name| format!("; the network has no tensor {name}, which is there"))
+    )]
     Missing {
         /// The file.
         file: String,
         /// The tensor.
         tensor: String,
+        /// The shape that it must have; empty where that is not known.
+        expected: Vec<usize>,
+        /// A tensor that is there and that the network has no place for, if there is one: perhaps the same by another name.
+        unknown: Option<String>,
+    },
+    /// A tensor has a number that is none.
+    #[error(
+        "{file}: tensor {tensor}, {}, holds {value} at {index}, expected finite numbers",
+        by(shape)
+    )]
+    NotFinite {
+        /// The file.
+        file: String,
+        /// The tensor.
+        tensor: String,
+        /// Its shape.
+        shape: Vec<usize>,
+        /// Index of the first such number, row-major.
+        index: usize,
+        /// The number.
+        value: f32,
+    },
+    /// A numbered list is longer than the network's can be.
+    #[error("{file}: tensor {tensor} is in a list of more than {most}, expected at most {most}")]
+    TooMany {
+        /// The file.
+        file: String,
+        /// The tensor.
+        tensor: String,
+        /// Most entries of the list.
+        most: usize,
     },
     /// A tensor has another shape.
     #[error("{file}: tensor {tensor} is {}, expected {expected}", by(found))]
@@ -133,8 +169,8 @@ pub enum WeightsError {
         /// The network.
         model: String,
     },
-    /// A number in the metadata is missing or none.
-    #[error("{file}: metadata {key} is {found}, expected a number")]
+    /// A number in the metadata is missing, none, or out of range.
+    #[error("{file}: metadata {key} is {found}, expected {expected}")]
     Number {
         /// The file.
         file: String,
@@ -142,6 +178,8 @@ pub enum WeightsError {
         key: String,
         /// Its text.
         found: String,
+        /// What it should be.
+        expected: &'static str,
     },
 }
 
@@ -183,7 +221,12 @@ impl Weights {
     /// [`WeightsError`] if it cannot be read, is no whole safetensors file, or is not what its checksum says.
     pub fn read(file: &Path) -> Result<Self, WeightsError> {
         let label = file.display().to_string();
-        match fs::read(file) {
+        let bytes = fs::metadata(file).and_then(|found| match found.is_file() {
+            true => fs::read(file),
+            // A pipe would be waited for, and a device need not end.
+            false => Err(io::Error::new(io::ErrorKind::InvalidInput, "not a file")),
+        });
+        match bytes {
             Ok(bytes) => Self::parse(&label, &bytes),
             Err(source) => Err(WeightsError::Read { file: label, source }),
         }
@@ -260,13 +303,29 @@ impl Weights {
     /// A number of the metadata.
     ///
     /// # Errors
-    /// [`WeightsError::Number`] if it is missing or none.
+    /// [`WeightsError::Number`] if it is missing, or no finite number.
     pub fn number(&self, key: &str) -> Result<f64, WeightsError> {
+        self.number_that(key, "a number", |_| true)
+    }
+
+    /// A number of the metadata that is `right`, which is `expected` in words.
+    ///
+    /// # Errors
+    /// [`WeightsError::Number`] if it is missing, no finite number, or not right.
+    pub(crate) fn number_that(
+        &self,
+        key: &str,
+        expected: &'static str,
+        right: impl Fn(f64) -> bool,
+    ) -> Result<f64, WeightsError> {
         let text = self.metadata(key);
-        text.and_then(|text| text.parse().ok()).ok_or_else(|| WeightsError::Number {
+        let number = text.and_then(|text| text.parse().ok());
+        let number = number.filter(|&number: &f64| number.is_finite() && right(number));
+        number.ok_or_else(|| WeightsError::Number {
             file: self.label.clone(),
             key: key.to_owned(),
             found: text.unwrap_or("missing").to_owned(),
+            expected,
         })
     }
 
@@ -303,10 +362,40 @@ impl Weights {
     /// The tensor of that name.
     ///
     /// # Errors
-    /// [`WeightsError`] if there is none, or its shape is another.
+    /// [`WeightsError`] if there is none, its shape is another, or one of its numbers is not finite.
     pub fn tensor(&self, name: &str, shape: &[usize]) -> Result<&Array, WeightsError> {
-        let array = self.get(name)?;
-        if array.shape == shape { Ok(array) } else { Err(self.misshapen(name, array, by(shape))) }
+        self.place(name, shape, None)
+    }
+
+    /// The tensor of that name; `unknown`, a tensor that the network has no place for, may explain why there is none.
+    ///
+    /// # Errors
+    /// As [`tensor`](Self::tensor).
+    pub(crate) fn place(
+        &self,
+        name: &str,
+        shape: &[usize],
+        unknown: Option<&str>,
+    ) -> Result<&Array, WeightsError> {
+        let array = self.tensors.get(name).ok_or_else(|| WeightsError::Missing {
+            file: self.label.clone(),
+            tensor: name.to_owned(),
+            expected: shape.to_vec(),
+            unknown: unknown.map(str::to_owned),
+        })?;
+        if array.shape != shape || array.values.len() != shape.iter().product::<usize>() {
+            return Err(self.misshapen(name, array, by(shape)));
+        }
+        match array.values.iter().position(|value| !value.is_finite()) {
+            None => Ok(array),
+            Some(index) => Err(WeightsError::NotFinite {
+                file: self.label.clone(),
+                tensor: name.to_owned(),
+                shape: shape.to_vec(),
+                index,
+                value: array.values[index],
+            }),
+        }
     }
 
     /// The shape of a tensor of `AXES` axes, none of them empty.
@@ -321,26 +410,30 @@ impl Weights {
         }
     }
 
-    /// How many of a numbered list of tensors, `name(0)`, `name(1)`, ..., there are.
-    pub fn count(&self, name: impl Fn(usize) -> String) -> usize {
-        (0..).take_while(|&index| self.tensors.contains_key(&name(index))).count()
-    }
-
     #[cfg(feature = "gpu")]
     pub(crate) fn too_wide(&self, layer: &str, found: usize, limit: usize) -> WeightsError {
         let (file, layer) = (self.label.clone(), layer.to_owned());
         WeightsError::TooWide { file, layer, found, limit }
     }
 
-    #[cfg(feature = "train")]
+    pub(crate) fn too_many(&self, tensor: &str, most: usize) -> WeightsError {
+        WeightsError::TooMany { file: self.label.clone(), tensor: tensor.to_owned(), most }
+    }
+
     pub(crate) fn unknown(&self, tensor: &str) -> WeightsError {
         WeightsError::Unknown { file: self.label.clone(), tensor: tensor.to_owned() }
     }
 
-    pub(crate) fn get(&self, name: &str) -> Result<&Array, WeightsError> {
+    /// The tensor of that name, whatever it holds.
+    ///
+    /// # Errors
+    /// [`WeightsError::Missing`] if there is none.
+    pub fn get(&self, name: &str) -> Result<&Array, WeightsError> {
         self.tensors.get(name).ok_or_else(|| WeightsError::Missing {
             file: self.label.clone(),
             tensor: name.to_owned(),
+            expected: Vec::new(),
+            unknown: None,
         })
     }
 
@@ -385,8 +478,11 @@ fn checksum(bytes: &[u8]) -> String {
     })
 }
 
-/// A shape as one says it: 32 x 8 x 3 x 3.
-fn by(shape: &[usize]) -> String {
+/// A shape as one says it: 32 x 8 x 3 x 3; a tensor without axes is a single number.
+pub(crate) fn by(shape: &[usize]) -> String {
+    if shape.is_empty() {
+        return "a single number".to_owned();
+    }
     shape.iter().map(ToString::to_string).collect::<Vec<_>>().join(" x ")
 }
 

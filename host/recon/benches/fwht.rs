@@ -1,4 +1,5 @@
-//! Walsh-Hadamard transforms a second: ours, the published crate `fwht`, and a matrix product.
+//! Counts Walsh-Hadamard transforms per second: this crate's, the published crate `fwht`'s, and a
+//! matrix product.
 //!
 //! `cargo bench -p nirspi-recon --bench fwht`
 use divan::{Bencher, black_box, counter::ItemsCount};

@@ -1,6 +1,8 @@
-//! Orthogonal matching pursuit over N = 1024 atoms: one frame with everything prepared, and the preparation.
+//! Times orthogonal matching pursuit over N = 1024 atoms: one frame with a prepared dictionary, and
+//! the preparation.
 //!
-//! `cargo bench -p nirspi-recon --bench omp`; against other programs: `benches/peers.py` beside this file.
+//! `cargo bench -p nirspi-recon --bench omp`. `benches/peers.py` beside this file times other
+//! programs.
 use divan::{Bencher, black_box, counter::ItemsCount};
 use nalgebra::DMatrix;
 use nirspi_recon::basis::Transform;
@@ -90,7 +92,7 @@ fn one_frame_by_transforms(bencher: Bencher, basis: Basis) {
     bencher.bench_local(|| solver.solve(black_box(&y)).map(|path| path.coefficients(SPARSITY)));
 }
 
-/// The whole of [`omp`] with its defaults (cross-validation and all) on 30 % of a frame.
+/// The whole of [`omp`] with its default settings, cross-validation included, on 30 % of a frame.
 #[divan::bench(args = [32, 64, 128], sample_count = 3, sample_size = 1)]
 fn reconstruct_default_30_percent(bencher: Bencher, side: u64) {
     let Ok(side) = Side::new(side) else { return };

@@ -1,5 +1,5 @@
-//! Every built-in method on the same measurement: peak signal-to-noise ratio of the image of part of the patterns against
-//! the scene.
+//! Compares every built-in method on the same measurement: peak signal-to-noise ratio of the image
+//! from part of the patterns, against the scene.
 //!
 //! `cargo run --release -p nirspi-recon --example compare_methods`
 
@@ -29,7 +29,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Shares of the patterns that are compared.
+/// Shares of the patterns to compare.
 const SHARES: [f64; 4] = [0.1, 0.2, 0.3, 0.5];
 
 /// A bright `L` on a dark ground.
@@ -44,8 +44,8 @@ fn letter(side: Side) -> Image {
     Image::new(side, (0..side.area()).map(|p| if lit(p) { 0.9 } else { 0.05 }).collect())
 }
 
-/// What an instrument measures of it: every pattern minus its complement, in natural order, with a little noise that is the
-/// same in every run.
+/// The measurement of an instrument: every pattern minus its complement, in natural order, with a
+/// little noise that is the same in every run.
 fn measured(scene: &Image) -> Result<Measurements, Box<dyn Error>> {
     let mut d: Vec<f64> = scene.pixels().iter().map(|&v| v.into()).collect();
     fwht(&mut d)?;

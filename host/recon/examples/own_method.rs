@@ -1,4 +1,5 @@
-//! A method of one's own beside the built-in ones: implement [`Reconstruct`], and every comparison takes it.
+//! A method of your own beside the built-in ones: implement [`Reconstruct`], and every comparison
+//! accepts the method.
 //!
 //! `cargo run --release -p nirspi-recon --example own_method`
 
@@ -8,8 +9,8 @@ use nirspi_recon::reconstruct::{
 use nirspi_recon::{Image, Measurements, Order, Rows, Side, fwht, metrics};
 use std::error::Error;
 
-/// The nearest image that agrees with the measurements and is dark nowhere below 0, by projections onto the one set and the
-/// other in turn.
+/// Finds the nearest image that agrees with the measurements and is nowhere negative, by
+/// projections onto the two sets in turn.
 struct Projections {
     rounds: usize,
 }
@@ -56,7 +57,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// What each method makes of a measurement, against the scene.
+/// The error of each method's image of a measurement, against the scene.
 fn compare(
     methods: &[Box<dyn Reconstruct>],
     scene: &Image,
@@ -72,7 +73,7 @@ fn compare(
     Ok(found)
 }
 
-/// Bright points in the dark, and what 40 % of the patterns, in random order, measure of them.
+/// Bright points in the dark, and their measurements by 40 % of the patterns in random order.
 fn points(side: Side) -> Result<(Image, Measurements), Box<dyn Error>> {
     let mut pixels = vec![0.0_f32; side.area()];
     for k in 0..24 {

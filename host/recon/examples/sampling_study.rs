@@ -1,11 +1,11 @@
-//! Partial sampling, measured: what zero filling, Algorithm 1 as printed and the default settings make of part of a
-//! sweep. Prints the three tables of the documentation of `nirspi_recon::reconstruct`.
+//! Studies partial sampling: images of part of a sweep by zero filling, by Algorithm 1 as printed,
+//! and by the default settings. Prints the three tables of the documentation of
+//! `nirspi_recon::reconstruct`.
 //!
 //! `cargo run --release -p nirspi-recon --example sampling_study -- path/to/data`
 //!
-//! The folder is laid out as `spi/opar_ala1.npz`, `spi/scheidt_car.npz`, `chars74k/*_train.npz` and
-//! `scenes/*.png`; without it there is nothing to study. Numbers are Pearson correlations with the image of
-//! the full sweep.
+//! The folder must have `spi/opar_ala1.npz`, `spi/scheidt_car.npz`, `chars74k/*_train.npz` and
+//! `scenes/*.png`. Numbers are Pearson correlations with the image of the full sweep.
 
 use nirspi_recon::reconstruct::{OmpSettings, hadamard, omp};
 use nirspi_recon::{Basis, Image, Measurements, NamedOrder, Order, Rows, Side, metrics};
@@ -76,11 +76,11 @@ fn main() -> Result<()> {
     gains(&data)
 }
 
-/// Letters of a set that are compared, and how far apart they are taken.
+/// Number of letters of a set to compare, evenly spaced in the set.
 const LETTERS: usize = 24;
 const LETTERS_APART: usize = 71;
 
-/// What the default gains over zero filling on many letters: mean and worst.
+/// Gain of the default settings over zero filling on many letters: mean and worst.
 fn gains(data: &Path) -> Result<()> {
     println!(
         "\n| {LETTERS} letters, 32 x 32 | rows | DCT mean, worst | Haar mean, worst |\n|---|---|---|---|"

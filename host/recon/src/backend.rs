@@ -1,7 +1,7 @@
-//! What computes, by name: OMP here and the networks of `nirspi-nets` take the same names.
+//! The backends by name. OMP and the networks of `nirspi-nets` use the same names.
 //!
-//! A backend asked for by name is the one that computes, or the call fails and says why; only [`Backend::Auto`] chooses, and
-//! never a software device (`probe::find`, with the feature `gpu`).
+//! A backend requested by name computes, or the call fails and says why. Only [`Backend::Auto`]
+//! chooses a device, and never a software device (`probe::find`, with the feature `gpu`).
 
 #[cfg(feature = "gpu")]
 pub mod probe;
@@ -10,28 +10,29 @@ use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;
 
-/// Why a build without the feature `gpu` has no GPU.
+/// Why a build without the feature `gpu` finds no GPU.
 pub const NOT_BUILT: &str = "this build is without the feature gpu";
 
-/// What computes.
+/// A backend: what computes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Backend {
-    /// A GPU where there is one and the work is worth sending there, else the processor.
+    /// A GPU if there is one and the work is large enough for it, else the processor.
     #[default]
     Auto,
     /// All cores of the processor.
     Cpu,
-    /// A device through Vulkan, Metal or DirectX. A software device counts, since it was asked for.
+    /// A device through Vulkan, Metal or DirectX. A software device is accepted, because the
+    /// backend was requested by name.
     Wgpu,
     /// A GPU through CUDA.
     Cuda,
 }
 
 impl Backend {
-    /// All there are.
+    /// Every backend.
     pub const ALL: [Self; 4] = [Self::Auto, Self::Cpu, Self::Wgpu, Self::Cuda];
 
-    /// As it is written on the command line.
+    /// The backend's name on the command line.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -49,11 +50,11 @@ impl fmt::Display for Backend {
     }
 }
 
-/// The name of no backend.
+/// Error: no backend has this name.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("unknown backend {found:?}, expected auto, cpu, wgpu or cuda")]
 pub struct ParseBackendError {
-    /// What was given.
+    /// The name that was given.
     pub found: String,
 }
 

@@ -1,7 +1,10 @@
 //! Orthonormal bases in which images are sparse.
 //!
-//! The one law: [`Transform::synthesise`] and [`Transform::analyse`] are inverse and transposed to each other,
-//! so energy, angles and least squares mean the same for pixels and for coefficients.
+//! # Invariant
+//! [`Transform::synthesise`] and [`Transform::analyse`] are inverse to each other
+//! (`tests::analysis_and_synthesis_are_inverse_and_keep_energy`) and transposed to each other
+//! (`tests::atoms_are_orthonormal`), so energies, angles and least squares are the same for pixels
+//! and for coefficients.
 //!
 //! Atoms are numbered row-major over the `n x n` grid of coefficients, the mean of the image first.
 
@@ -32,11 +35,11 @@ pub enum Basis {
     Daubechies4,
 }
 
-/// The name of no basis.
+/// Error: no basis has this name.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("unknown basis {found:?}, expected {}", Basis::expected())]
 pub struct ParseBasisError {
-    /// What was given.
+    /// The name that was given.
     pub found: String,
 }
 
@@ -56,7 +59,7 @@ impl fmt::Display for Basis {
 }
 
 impl Basis {
-    /// All of them.
+    /// Every basis.
     pub const ALL: [Self; 4] = [Self::Pixel, Self::Dct, Self::Haar, Self::Daubechies4];
 
     /// The name that [`FromStr`] reads.
@@ -70,7 +73,7 @@ impl Basis {
         }
     }
 
-    /// The names of all bases, as a list for messages.
+    /// The names of all bases, as a list for error messages.
     #[must_use]
     pub fn expected() -> String {
         let [others @ .., last] = Self::ALL.map(Self::name);
@@ -86,8 +89,8 @@ impl Basis {
         }
     }
 
-    /// Spatial frequency of every atom, in half periods an image side; the mean has 0, and a single
-    /// pixel, which has no one frequency, 1.
+    /// Spatial frequency of every atom, in half periods per image side. The mean has frequency 0. A
+    /// single pixel has no one frequency; its entry is 1.
     #[must_use]
     pub fn frequencies(self, side: Side) -> Vec<f32> {
         let n = side.pixels();
@@ -105,7 +108,7 @@ impl Basis {
     }
 }
 
-/// A basis at one side, ready to transform images of it.
+/// A basis prepared for images of one side.
 #[derive(Debug, Clone)]
 pub struct Transform {
     basis: Basis,
@@ -136,7 +139,7 @@ impl Transform {
         self.basis
     }
 
-    /// The side of its images.
+    /// The side of the images.
     #[must_use]
     pub fn side(&self) -> Side {
         self.side
@@ -145,7 +148,7 @@ impl Transform {
     /// Replaces a row-major image by its coefficients.
     ///
     /// # Panics
-    /// If `image` is not `side^2` long: the caller made both.
+    /// If the length of `image` is not `side^2`.
     pub fn analyse(&self, image: &mut [f32]) {
         self.check(image);
         match self.basis.taps() {
@@ -158,7 +161,7 @@ impl Transform {
     /// Replaces coefficients by their row-major image.
     ///
     /// # Panics
-    /// If `coefficients` is not `side^2` long: the caller made both.
+    /// If the length of `coefficients` is not `side^2`.
     pub fn synthesise(&self, coefficients: &mut [f32]) {
         self.check(coefficients);
         match self.basis.taps() {
@@ -188,7 +191,7 @@ pub(crate) fn product(inner: usize, columns: usize, a: &[f32], b: &[f32], out: &
     Arch::new().dispatch(Product { inner, columns, a, b, out });
 }
 
-/// [`product`] as `pulp` wants it, compiled for each vector width.
+/// [`product`] as a type, because `pulp` compiles a type's method for each vector width.
 struct Product<'a> {
     inner: usize,
     columns: usize,
@@ -210,7 +213,7 @@ impl WithSimd for Product<'_> {
 #[inline(always)]
 fn add_product(inner: usize, columns: usize, a: &[f32], b: &[f32], out: &mut [f32]) {
     for (a, out) in a.chunks_exact(inner).zip(out.chunks_exact_mut(columns)) {
-        // Two rows of b at a time halve the traffic through `out`.
+        // Two rows of b at a time halve the memory traffic of `out`.
         for (pair, b) in a.as_chunks::<2>().0.iter().zip(b.chunks_exact(2 * columns)) {
             let (first, second) = b.split_at(columns);
             for ((out, b0), b1) in out.iter_mut().zip(first).zip(second) {
@@ -293,7 +296,8 @@ mod tests {
         }
         let mut x = image;
         Transform::new(Basis::Haar, side(4)).analyse(&mut x);
-        // Left half minus right half, then neighbours' differences, in rows of the square pyramid.
+        // Left half minus right half, then differences of neighbours, in rows of the square
+        // pyramid.
         let expected = [0.0, 8.0, 2.0, 2.0, 0.0, 0.0, 2.0, 2.0];
         assert!(x.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-5), "{x:?}");
         assert!(x[8..].iter().all(|v| v.abs() < 1e-5));
@@ -304,7 +308,7 @@ mod tests {
         let side = side(16);
         let mut x: Vec<f32> = (0..256).map(|p| (p % 16) as f32 + 2.0 * (p / 16) as f32).collect();
         Transform::new(Basis::Daubechies4, side).analyse(&mut x);
-        // Details of the finest scale, away from the border where the slope ends.
+        // Details of the finest scale, without the border, where the slope ends.
         for (r, c) in (0..7).flat_map(|r| (0..7).map(move |c| (r, c))) {
             for at in [16 * (r + 8) + c, 16 * r + c + 8, 16 * (r + 8) + c + 8] {
                 assert!(x[at].abs() < 1e-4, "{r}, {c}: {}", x[at]);

@@ -1,26 +1,26 @@
-//! Dropouts: stretches of a recording in which the detector or its logger delivered nothing.
+//! Finds drop-outs: runs of a recording in which the detector or its logger delivered no signal.
 //!
-//! The one law: light is conserved. A pattern and its complement together always collect the whole scene,
-//! so the pair sum `y+ + y-` is constant up to noise and slow drift *whatever the scene*; a reading near
-//! zero alone proves nothing (the complement of the all-ones pattern is dark, and a point-like scene
-//! makes half of all readings dark). A pair is lost if its sum falls far below the local level of pair
-//! sums, measured in their own spread, *and* one of its readings is near zero. A lamp that dims
-//! without going out therefore is no dropout, and losing a reading that was dark anyway is none either: it
-//! cannot be seen and does no harm.
+//! Light is conserved: a pattern and its complement together collect the whole scene, so the pair
+//! sum `y+ + y-` is constant up to noise and slow drift, *whatever the scene*. A reading near zero
+//! is not enough evidence: the complement of the all-ones pattern is dark, and a point-like scene
+//! makes half of all readings dark. A pair is lost if its sum falls far below the local level of
+//! pair sums, measured in their own spread, *and* one of its readings is near zero. So a lamp that
+//! dims without going out is no drop-out. A lost reading that would have been dark anyway is not
+//! found and does no harm.
 //!
-//! Pairs beside a lost one that are down by less (a run that starts or ends inside a reading's
-//! integration time) go with it.
+//! Next to a lost pair, a pair that is down by less is lost too: the run started or ended inside
+//! the integration time of a reading.
 
 use std::ops::Range;
 
-/// A run of raw readings in which the detector or its logger fell out.
+/// A run of raw readings in which the detector or its logger delivered no signal.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Dropout {
     /// First raw reading of the run, an index into `y`.
     pub start: usize,
-    /// Raw readings of the run.
+    /// Number of raw readings in the run.
     pub length: usize,
-    /// Natural rows whose pair the run touches; they are left out of the measurements.
+    /// Natural rows whose pair the run touches. The measurements leave these rows out.
     pub rows: Vec<u32>,
 }
 
@@ -31,32 +31,34 @@ impl Dropout {
     }
 }
 
-/// Pairs over which a first level is taken: more than twice the longest run (200 readings) that must not pass
-/// for the level itself, at either end of the recording too.
+/// Number of pairs for the first estimate of the level. The number is more than twice the longest
+/// run (200 readings) that must not count as the level itself, also at both ends of the recording.
 const COARSE_PAIRS: usize = 513;
-/// A pair that is under the first level by this share of it, and by more than noise, says nothing about the level.
+/// A pair below the first level by this share of the level, and by more than noise, is left out of
+/// the second estimate.
 const SUSPECT_SHARE: f64 = 0.5;
 const SUSPECT_SIGMAS: f64 = 4.0;
-/// Pairs, of those that are not suspect, through which the level is then laid as a line: few, so that it
-/// follows drift, at both ends of the recording too.
+/// Number of unsuspicious pairs to which the level is then fitted as a line. The number is small,
+/// so that the level follows drift, also at both ends of the recording.
 const FINE_PAIRS: usize = 63;
-/// How many standard deviations (robust) under the local level a lost pair's sum is at least.
+/// Least number of (robust) standard deviations by which a lost pair's sum is below the local
+/// level.
 const LOST_SIGMAS: f64 = 8.0;
-/// A lost pair is down by at least this share of the level, however quiet the recording.
+/// Least share of the level by which a lost pair is down, however quiet the recording.
 const LOST_SHARE: f64 = 0.03;
-/// The same two for a pair beside a lost one, partly down.
+/// Least number of standard deviations, and least share, for a partly lost pair next to a lost one.
 const EDGE_SIGMAS: f64 = 5.0;
 const EDGE_SHARE: f64 = 0.005;
 /// A reading is near zero if it keeps less than this share of the local mean reading.
 const NEAR_ZERO_SHARE: f64 = 0.25;
-/// Of normally distributed values above the mean, 90 % are within this many standard deviations.
+/// 90 % of normally distributed values above the mean are within this many standard deviations.
 const SIGMAS_OF_NINE_TENTHS: f64 = 1.645;
 
-/// Finds the dropouts in finite readings `y = [+, -, +, -, ...]` of `rows`, in time order.
+/// Finds the drop-outs in finite readings `y = [+, -, +, -, ...]` of `rows`, in time order.
 pub(crate) fn find(rows: &[u32], y: &[f64]) -> Vec<Dropout> {
     let pairs = y.as_chunks::<2>().0;
     let mut sums: Vec<f64> = pairs.iter().map(|[plus, minus]| plus + minus).collect();
-    // A detector of negative polarity is the same thing upside down.
+    // A detector of negative polarity gives the same readings with the opposite sign.
     let sign = if median(sums.clone()) < 0.0 { -1.0 } else { 1.0 };
     sums.iter_mut().for_each(|sum| *sum *= sign);
 
@@ -95,8 +97,8 @@ pub(crate) fn find(rows: &[u32], y: &[f64]) -> Vec<Dropout> {
         if last + 1 < pairs.len() && partly(last + 1) {
             last += 1;
         }
-        // Only the outermost pairs can be half lost: their other reading is whole if it is not near zero
-        // and a near-zero one explains the fall.
+        // Only the outermost pairs can be half lost. The other reading of such a pair is whole if
+        // it is not near zero and a near-zero reading explains the fall.
         let whole = |k: usize, reading: usize| {
             let [this, other] = [pairs[k][reading], pairs[k][1 - reading]];
             !near_zero(this, level[k]) && near_zero(other, level[k])
@@ -109,8 +111,8 @@ pub(crate) fn find(rows: &[u32], y: &[f64]) -> Vec<Dropout> {
     found
 }
 
-/// What each pair would sum to were it whole: the line through the medians of the first and the last third of its
-/// nearest whole neighbours. `dark` is the sum without light.
+/// The sum that each pair would have without a drop-out: the line through the medians of the first
+/// and the last third of its nearest whole neighbours. `dark` is the sum without light.
 fn local_level(sums: &[f64], dark: f64) -> Vec<f64> {
     let coarse = running_median(sums, COARSE_PAIRS);
     let fall: Vec<f64> = coarse.iter().zip(sums).map(|(coarse, sum)| coarse - sum).collect();
@@ -136,16 +138,17 @@ fn local_level(sums: &[f64], dark: f64) -> Vec<f64> {
         .collect()
 }
 
-/// What the detector reads without light: the complement of the all-ones pattern shows it, if it was
-/// recorded; the lowest reading stands in for it otherwise.
+/// The detector's reading without light: the complement of the all-ones pattern, if it was
+/// recorded, else the lowest reading.
 fn dark_level(rows: &[u32], pairs: &[[f64; 2]], sign: f64) -> f64 {
     let lowest = pairs.iter().flatten().map(|y| sign * y).fold(f64::INFINITY, f64::min);
     let recorded = rows.iter().position(|&row| row == 0).map(|k| sign * pairs[k][1]);
     recorded.unwrap_or(lowest)
 }
 
-/// Standard deviation of the pair sums about their level, from those *above* it: no dropout is among them, and
-/// nine tenths, not half, because single photons leave most sums equal to their median.
+/// Standard deviation of the pair sums about their level, from the sums *above* the level, because
+/// no drop-out is among those. Nine tenths of them are used, not half, because single photons leave
+/// most sums equal to their median.
 fn spread(fall: &[f64]) -> f64 {
     let mut above: Vec<f64> = fall.iter().filter(|fall| **fall <= 0.0).map(|fall| -fall).collect();
     if above.is_empty() {
@@ -160,7 +163,8 @@ fn median(mut values: Vec<f64>) -> f64 {
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-/// Median of the `window` values nearest to each, the window staying inside the data at both ends.
+/// Median of the `window` values nearest to each value; the window stays inside the data at both
+/// ends.
 fn running_median(values: &[f64], window: usize) -> Vec<f64> {
     let window = window.min(values.len());
     let mut sorted = values[..window].to_vec();

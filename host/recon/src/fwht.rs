@@ -1,24 +1,27 @@
 //! Fast Walsh-Hadamard transform, in place, natural (Sylvester) order, unnormalised.
 //!
-//! The one law: the result is `H x` with `H[i][j] = (-1)^popcount(i & j)`, so that `fwht(fwht(x)) = N x`.
+//! # Invariant
+//! The result is `H x` with `H[i][j] = (-1)^popcount(i & j)` (`tests::equals_the_matrix_of_signs`),
+//! so `fwht(fwht(x)) = N x` (`tests::twice_is_a_multiplication_by_the_length`).
 //!
-//! Because `H_{n*n} = H_n (x) H_n`, the one-dimensional transform of a row-major `n x n` image *is* its
-//! two-dimensional transform: nothing here needs to know about images.
+//! Because `H_{n*n} = H_n (x) H_n`, the one-dimensional transform of a row-major `n x n` image *is*
+//! its two-dimensional transform.
 //!
-//! The radix-8 first pass keeps the three smallest strides in registers; the passes after it are radix 4
-//! over contiguous runs of at least eight values, which a compiler turns into vector code on any
-//! target that has vectors (baseline x86-64 included, wider ones where the running machine has them), and halve the
-//! traffic through memory of radix 2. No width changes a result: each value is one chain of sums.
+//! The radix-8 first pass keeps the three smallest strides in registers. The later passes are radix
+//! 4 over contiguous runs of at least eight values. A compiler turns such runs into vector code on
+//! any target with vectors (baseline x86-64 included, wider vectors where the machine has them),
+//! and radix 4 halves the memory traffic of radix 2. The vector width never changes a result,
+//! because each value is one chain of sums.
 
 use pulp::{Arch, Simd, WithSimd};
 use std::ops::{Add, Sub};
 use thiserror::Error;
 
-/// A slice that has no Walsh-Hadamard transform.
+/// Error: a slice of this length has no Walsh-Hadamard transform.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 #[error("{found} values to transform, expected a power of two")]
 pub struct FwhtLengthError {
-    /// Length that was given.
+    /// Length of the slice.
     pub found: usize,
 }
 
@@ -36,7 +39,7 @@ mod private {
 /// Replaces `data` by its Walsh-Hadamard transform `H data`.
 ///
 /// # Errors
-/// [`FwhtLengthError`] if the length is not a power of two; `data` is then untouched.
+/// [`FwhtLengthError`] if the length is not a power of two; `data` then stays unchanged.
 ///
 /// ```
 /// let mut x = [1.0_f32, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0];
@@ -61,10 +64,11 @@ pub(crate) fn transform<T: Real>(data: &mut [T]) {
     Arch::new().dispatch(Passes(data));
 }
 
-/// Shorter transforms take no longer than to choose a vector width.
+/// Lengths from which a vector width is chosen. A shorter transform takes no longer than the
+/// choice.
 const DISPATCHED: usize = 256;
 
-/// [`passes`] as `pulp` wants it: what is inlined into [`WithSimd::with_simd`] is compiled for each vector width.
+/// [`passes`] as a type, because `pulp` compiles a type's method for each vector width.
 struct Passes<'a, T>(&'a mut [T]);
 
 impl<T: Real> WithSimd for Passes<'_, T> {
@@ -107,7 +111,8 @@ fn passes<T: Real>(data: &mut [T]) {
 #[inline(always)]
 fn radix8<T: Real>(x: &mut [T; 8]) {
     let [a, b, c, d, e, f, g, h] = *x;
-    // Widest stride first: four independent sums and differences of neighbours fill a vector.
+    // The widest stride comes first: four independent sums and differences of neighbours fill a
+    // vector.
     let (s, t) = ([a + e, b + f, c + g, d + h], [a - e, b - f, c - g, d - h]);
     let [s, t] = [s, t].map(|[a, b, c, d]| {
         let [p, q, r, s] = [a + c, b + d, a - c, b - d];
@@ -116,7 +121,8 @@ fn radix8<T: Real>(x: &mut [T; 8]) {
     *x = [s[0], s[1], s[2], s[3], t[0], t[1], t[2], t[3]];
 }
 
-// Four separate arguments, not one slice: that they cannot overlap is what lets the loop vectorise.
+// Four separate arguments instead of one slice: the compiler knows that they do not overlap, and
+// vectorises the loop.
 #[inline(always)]
 fn radix4<T: Real>(a: &mut [T], b: &mut [T], c: &mut [T], d: &mut [T]) {
     for (((a, b), c), d) in a.iter_mut().zip(b).zip(c).zip(d) {

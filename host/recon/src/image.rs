@@ -13,7 +13,7 @@ impl Image {
     /// Wraps row-major pixels.
     ///
     /// # Panics
-    /// If `pixels` is not `side * side` long: the caller made both.
+    /// If the length of `pixels` is not `side * side`.
     #[must_use]
     pub fn new(side: Side, pixels: Vec<f32>) -> Self {
         assert_eq!(pixels.len(), side.area(), "pixels of a {0} x {0} image", side.pixels());
@@ -26,15 +26,16 @@ impl Image {
         self.side
     }
 
-    /// Row-major pixels, `side * side` of them.
+    /// Row-major pixels: `side * side` values.
     #[must_use]
     pub fn pixels(&self) -> &[f32] {
         &self.pixels
     }
 
-    /// The image stretched to `[0, 1]` for people to look at: the darkest and the brightest half per cent of the
-    /// pixels saturate, so that a few outliers (the one that takes the offset of a non-differential measurement, say)
-    /// do not grey out the rest. A flat image becomes 0.
+    /// The image stretched to `[0, 1]` for display. The darkest and the brightest half per cent of
+    /// the pixels saturate, so that a few outliers (for example the pixel that takes the offset of
+    /// a non-differential measurement) do not reduce the contrast of the rest. A flat image becomes
+    /// 0.
     #[must_use]
     pub fn stretched(&self) -> Self {
         let mut sorted = self.pixels.clone();

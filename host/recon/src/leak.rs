@@ -1,12 +1,15 @@
-//! Settling leak: light and charge of one pattern's slot that end up in the slots after it.
+//! Corrects settling leak: light and charge of one pattern's slot that are read in later slots.
 //!
-//! The one law: correcting is the exact inverse of leaking, in time order, before any row is dropped or
-//! reordered.
+//! # Invariant
+//! Correcting is the exact inverse of leaking (`tests::correcting_readings_undoes_leaking`,
+//! `tests::correcting_differences_undoes_leaking_between_slots`). Correct the readings in time
+//! order, before any row is dropped or reordered.
 //!
 //! # Model
-//! With taps `r`, the reading of slot `i` is `y[i] = sum_j r[j] x[i - j]`: `r[0]` is the share that a slot keeps of
-//! its own signal `x`, `r[j]` what it gets from `j` slots before. A sweep that repeats is preceded by
-//! itself (cyclic); a single one by darkness.
+//! With taps `r`, the reading of slot `i` is `y[i] = sum_j r[j] x[i - j]`: `r[0]` is the share of
+//! its own signal `x` that a slot keeps, and `r[j]` the share that it gets from the slot `j` slots
+//! before. A repeating sweep is preceded by itself (cyclic); a single sweep is preceded by
+//! darkness.
 //!
 //! # Differential pairs
 //! Pattern and complement alternate, `x[2k] = (S + h[k]) / 2` and `x[2k+1] = (S - h[k]) / 2`, where `S` is the light
@@ -16,8 +19,9 @@
 //!
 //! `d[k] = sum_m c[m] h[k - m]`, with `c[m] = r[2m] - r[2m-1] / 2 - r[2m+1] / 2` (taps outside the list are 0).
 //!
-//! `S` cancels in a repeating sweep. In one that starts from darkness pair `k` also carries `-S r[2k+1] / 2`: the light
-//! that its complement got from the first pattern and its pattern got from nothing.
+//! `S` cancels in a repeating sweep. In a sweep that starts from darkness, pair `k` also has the
+//! term `-S r[2k+1] / 2`: the light that its complement got from the first pattern, while its
+//! pattern got none.
 
 use thiserror::Error;
 
@@ -27,7 +31,7 @@ pub struct Leak {
     taps: Vec<f64>,
 }
 
-/// Taps that describe no leak that can be undone.
+/// Why a list of taps is refused.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum LeakError {
@@ -37,12 +41,12 @@ pub enum LeakError {
     /// A tap is NaN or infinite.
     #[error("leak tap {index} is {found}, expected a finite number")]
     NotFinite {
-        /// Which tap.
+        /// Index of the tap.
         index: usize,
-        /// What was found.
+        /// The tap's value.
         found: f64,
     },
-    /// Too much leaks: undoing it would amplify noise without bound.
+    /// The leaked share is too large: correcting it would amplify noise without bound.
     #[error(
         "leak taps 1 and up add to {leaked} (absolute values), expected at most {} of tap 0, which is {own}",
         Leak::LARGEST_SHARE
@@ -50,7 +54,7 @@ pub enum LeakError {
     NotDominant {
         /// The slot's own share, tap 0.
         own: f64,
-        /// Sum of the absolute values of the others.
+        /// Sum of the absolute values of the other taps.
         leaked: f64,
     },
 }
@@ -58,21 +62,23 @@ pub enum LeakError {
 /// What came before the first slot of the readings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sweep {
-    /// The same sweep: it repeats.
+    /// The same sweep, because sweeps repeat.
     Repeating,
     /// No light.
     FromDark,
 }
 
 impl Leak {
-    /// Largest leaked share that is accepted, of the slot's own. At this bound noise may grow
-    /// a hundredfold.
+    /// Largest leaked share that is accepted, relative to the slot's own share. At this bound noise
+    /// may grow a hundredfold.
     pub const LARGEST_SHARE: f64 = 0.99;
 
-    /// A leak of these taps, in slots: `taps[0]` a slot's own share, `taps[j]` what it receives from `j` slots before.
+    /// A leak with these taps, in slots: `taps[0]` is a slot's own share, `taps[j]` the share from
+    /// `j` slots before.
     ///
     /// # Errors
-    /// [`LeakError`] if there is no tap, one is not finite, or the leaked ones are not dominated by the first.
+    /// [`LeakError`] if there is no tap, a tap is not finite, or the other taps together are not
+    /// smaller than tap 0.
     pub fn new(taps: Vec<f64>) -> Result<Self, LeakError> {
         let Some(&own) = taps.first() else { return Err(LeakError::Empty) };
         if let Some(index) = taps.iter().position(|tap| !tap.is_finite()) {
@@ -92,19 +98,20 @@ impl Leak {
         &self.taps
     }
 
-    /// Undoes the leak in readings in time order, one a slot: patterns alone, or patterns and complements as
-    /// they alternate.
+    /// Corrects readings in time order, one for each slot: patterns alone, or patterns alternating
+    /// with their complements.
     pub fn correct_single(&self, y: &mut [f64], sweep: Sweep) {
         undo(&self.taps, y, sweep);
     }
 
-    /// Undoes the leak in the differences of a repeating sweep, in time order and complete.
+    /// Corrects the differences of a repeating sweep, in time order and complete.
     pub fn correct_differential(&self, d: &mut [f64]) {
         undo(&self.pair_taps(), d, Sweep::Repeating);
     }
 
-    /// Undoes the leak in the differences of a sweep that started from darkness. `pair_sum` is the light `S` of a pattern
-    /// and its complement together, in the units of `d`: the reading of the all-ones pattern, less dark.
+    /// Corrects the differences of a sweep that started from darkness. `pair_sum` is the light `S`
+    /// of a pattern and its complement together, in the units of `d`: the reading of the all-ones
+    /// pattern less the dark level.
     pub fn correct_differential_from_dark(&self, d: &mut [f64], pair_sum: f64) {
         for (d, odd) in d.iter_mut().zip(self.taps.iter().skip(1).step_by(2)) {
             *d += pair_sum * odd / 2.0;
@@ -124,7 +131,7 @@ impl Leak {
     }
 }
 
-/// Solves `y = taps * x` for `x`, in place. `taps[0]` dominates the others.
+/// Solves `y = taps * x` for `x`, in place. `taps[0]` is larger than the others together.
 fn undo(taps: &[f64], y: &mut [f64], sweep: Sweep) {
     let count = y.len();
     if count == 0 {
@@ -140,8 +147,8 @@ fn undo(taps: &[f64], y: &mut [f64], sweep: Sweep) {
             }
         }
     };
-    // One pass is exact from darkness. Around a cycle the first slots wait for the last: Gauss-Seidel
-    // passes, each of which shrinks the error at least by the leaked share.
+    // From darkness one pass is exact. In a cycle the first slots depend on the last, so
+    // Gauss-Seidel passes follow, each of which shrinks the error at least by the leaked share.
     let share = taps[1..].iter().map(|tap| tap.abs()).sum::<f64>() / taps[0];
     let passes = match sweep {
         Sweep::FromDark => 1,

@@ -1,30 +1,30 @@
 //! Single-pixel reconstruction: from measurements to an image.
 //!
-//! Everything here is a pure function of its arguments: no file, no clock, no thread that outlives a call, and no
-//! randomness but from a seed that is an argument or a constant.
+//! Every function is a pure function of its arguments: no file, no clock, no thread that outlives a
+//! call. Random numbers come from a seed that is an argument or a constant.
 //!
-//! | module | turns | into |
+//! | module | input | output |
 //! |---|---|---|
-//! | [`leak`] | readings that bleed into their neighbours | readings |
-//! | [`Measurements`] | readings or differences, with dropouts found | one number a Hadamard row |
-//! | [`Rows`] | numbers of Hadamard rows | rows that were checked once |
+//! | [`leak`] | readings with light of earlier slots | corrected readings |
+//! | [`Measurements`] | readings or differences | one measurement for each Hadamard row, without drop-outs |
+//! | [`Rows`] | numbers of Hadamard rows | checked rows |
 //! | [`order`] | the name of an order | rows |
 //! | [`fwht`](mod@fwht) | an image | its Hadamard measurements, and back |
 //! | [`basis`] | an image | coefficients, most of them nearly zero |
-//! | [`omp`] | measurements and a dictionary | few coefficients that explain them |
+//! | [`omp`] | measurements and a dictionary | a few coefficients that explain the measurements |
 //! | [`reconstruct`] | measurements | an image |
-//! | [`metrics`] | two images | how alike they are |
-//! | [`backend`] | the name of what shall compute | a [`Backend`] |
+//! | [`metrics`] | two images | a number that compares them |
+//! | [`backend`] | the name of a backend | a [`Backend`] |
 //!
 //! ```
 //! use nirspi_recon::{Measurements, Order, Rows, Side, reconstruct};
 //!
 //! let side = Side::new(8)?;
-//! // A scene, and what the instrument measures of it.
+//! A scene, and its measurements.
 //! let mut d: Vec<f64> = (0..64).map(|p| if p % 8 > 3 { 1.0 } else { 0.0 }).collect();
 //! nirspi_recon::fwht(&mut d)?;
 //! let all = Measurements::from_differential(&Rows::natural(side), &d)?;
-//! // A quarter of the patterns are enough for so coarse a scene, if they are the coarse ones.
+//! A quarter of the patterns is enough for a coarse scene, if it is the coarse quarter.
 //! let quarter = all.take(Some(&Order::CakeCutting), 0.25)?;
 //! let image = reconstruct::hadamard(&quarter);
 //! assert!((image.pixels()[3]).abs() < 1e-6 && (image.pixels()[4] - 1.0).abs() < 1e-6);

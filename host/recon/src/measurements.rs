@@ -1,80 +1,82 @@
-//! Measurements: one number a Hadamard row, with everything of the instrument undone.
+//! Measurements: one number for each Hadamard row, corrected for the instrument.
 //!
 //! # Invariant
-//! A [`Measurements`] has one finite value for each of its [`Rows`], whatever it was built from. Held by
-//! `measurements::tests::each_fault_is_named`.
+//! A [`Measurements`] has one finite value for each of its [`Rows`], whatever it was built from
+//! (`tests::each_fault_is_named`).
 
 use crate::dropout::{self, Dropout};
 use crate::{Order, Rows, RowsError, Side, order};
 use thiserror::Error;
 
-/// Signed measurements `value[k] = sum over pixels of H[row[k], p] * x[p]`, in the order in which they
-/// were taken. Values are finite. Rows that were not measured, or were left out, are absent.
+/// Signed measurements `value[k] = sum over pixels of H[row[k], p] * x[p]`, in the order of
+/// measurement. Values are finite. Rows that were not measured, or were left out, are absent.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measurements {
     rows: Rows,
     values: Vec<f64>,
 }
 
-/// What is wrong with a set of measurements. The caller adds which file they came from.
+/// What is wrong with a set of measurements. The caller adds the name of the file.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum MeasurementError {
     /// Two lists that belong together differ in length.
     #[error("{field} holds {found} values, expected {expected}")]
     Length {
-        /// Which list.
+        /// Name of the list.
         field: &'static str,
         /// Its length.
         found: usize,
-        /// The length the others call for.
+        /// The length of the other lists.
         expected: usize,
     },
-    /// Drop-outs took every measurement.
+    /// Drop-outs left no measurement.
     #[error("no measurement is left, expected at least one that no drop-out touches")]
     Empty,
     /// A value is NaN or infinite.
     #[error("{field}[{index}] is {found}, expected a finite number")]
     NotFinite {
-        /// Which list.
+        /// Name of the list.
         field: &'static str,
-        /// Where.
+        /// Index of the value.
         index: usize,
-        /// What was found.
+        /// The value.
         found: f64,
     },
-    /// A share of the patterns out of range.
+    /// A share of the patterns is out of range.
     #[error("a sampling of {found}, expected more than 0 and at most 1")]
     Fraction {
-        /// What was asked for.
+        /// The share that was requested.
         found: f64,
     },
-    /// The rows, or those of an order.
+    /// The rows, or the rows of an order, are wrong.
     #[error(transparent)]
     Rows(#[from] RowsError),
 }
 
 impl Measurements {
-    /// From differences that are already formed: `d[k]` is the reading of pattern `rows[k]` less that of its
-    /// complement (or any signed measurement of that row). Fewer than `side^2` rows are a partial sampling.
+    /// Measurements from differences: `d[k]` is the reading of pattern `rows[k]` less the reading
+    /// of its complement, or any signed measurement of that row. Fewer than `side^2` rows are a
+    /// partial sampling.
     ///
     /// # Errors
-    /// [`MeasurementError`] says that there is not one value a row, or which one is not finite.
+    /// [`MeasurementError`] if there is not one value for each row, or a value is not finite.
     pub fn from_differential(rows: &Rows, d: &[f64]) -> Result<Self, MeasurementError> {
         expect_length("d", d.len(), rows.len())?;
         expect_finite("d", d)?;
         Ok(Self { rows: rows.clone(), values: d.to_vec() })
     }
 
-    /// From raw readings in time order, a pattern and then its complement: `y = [+, -, +, -, ...]`,
-    /// `2 * rows.len()` of them. A constant dark level cancels in each difference.
+    /// Measurements from raw readings in time order, each pattern followed by its complement:
+    /// `y = [+, -, +, -, ...]`, `2 * rows.len()` readings. A constant dark level cancels in each
+    /// difference.
     ///
-    /// Where the detector or its logger fell out for a while ([`Dropout`]), the pairs it touched are absent
-    /// from the result, and named in the list.
+    /// The result leaves out the pairs that a [`Dropout`] touched, and the list names the
+    /// drop-outs.
     ///
     /// # Errors
-    /// [`MeasurementError`] says that there are not two readings a row, or which one is not finite; it is
-    /// [`Empty`](MeasurementError::Empty) if no pair survives.
+    /// [`MeasurementError`] if there are not two readings for each row, or a reading is not finite;
+    /// [`Empty`](MeasurementError::Empty) if no pair is left.
     pub fn from_pairs(rows: &Rows, y: &[f64]) -> Result<(Self, Vec<Dropout>), MeasurementError> {
         expect_length("y", y.len(), 2 * rows.len())?;
         expect_finite("y", y)?;
@@ -99,16 +101,16 @@ impl Measurements {
         Ok((Self { rows, values }, dropouts))
     }
 
-    /// From readings of the positive patterns alone (light where `H` is +1): `d[k] = 2 y[k] - S`, where `S`
-    /// is the reading of the all-ones pattern, row 0.
+    /// Measurements from readings of the positive patterns alone (light where `H` is +1):
+    /// `d[k] = 2 y[k] - S`, where `S` is the reading of the all-ones pattern, row 0.
     ///
-    /// Without row 0 in `rows`, `S` is estimated as twice the mean reading, because the other rows of a
-    /// scene average to nearly zero (exactly so over all of them only if pixel 0 is dark). Row 0 itself
-    /// stays absent then: the image's mean is not known. A dark level, which does not cancel against row 0, must
-    /// have been subtracted before, or be [removed](Self::remove_dark_level) after.
+    /// Without row 0 in `rows`, `S` is estimated as twice the mean reading, because the other rows
+    /// of a scene average to nearly zero (exactly zero over all rows only if pixel 0 is dark). Row
+    /// 0 itself then stays absent, so the image's mean is unknown. A dark level does not cancel
+    /// against row 0: subtract it before, or [remove](Self::remove_dark_level) it afterwards.
     ///
     /// # Errors
-    /// [`MeasurementError`] says that there is not one reading a row, or which one is not finite.
+    /// [`MeasurementError`] if there is not one reading for each row, or a reading is not finite.
     pub fn from_single(rows: &Rows, y: &[f64]) -> Result<Self, MeasurementError> {
         expect_length("y", y.len(), rows.len())?;
         expect_finite("y", y)?;
@@ -121,18 +123,21 @@ impl Measurements {
         Ok(Self { rows: rows.clone(), values })
     }
 
-    /// Removes what a dark level in every reading (ambient light, an ADC's offset) has left in measurements
-    /// [of patterns alone](Self::from_single): the same constant in each, which would stand as one bright spot in
-    /// the image's first pixel. Returns it.
+    /// Removes the effect of a dark level in every reading (ambient light, an ADC's offset) from
+    /// measurements [of patterns alone](Self::from_single), and returns the level. That effect is
+    /// the same constant in each measurement, and would appear as one bright spot in the image's
+    /// first pixel.
     ///
-    /// It is estimated as the mean of the middle half of the values over the half of the rows with the highest
-    /// sequency, where a scene's own measurements scatter around zero; one within four standard errors of zero is left alone, as `None`.
+    /// The level is estimated as the mean of the middle half of the values over the half of the
+    /// rows with the highest sequency, where a scene's own measurements scatter around zero. An
+    /// estimate within four standard errors of zero is not removed and gives `None`.
     pub fn remove_dark_level(&mut self) -> Option<f64> {
         let fine = order::positions_by_sequency(&self.rows);
         let mut values: Vec<f64> =
             fine[fine.len() / 2..].iter().map(|&position| self.values[position]).collect();
         values.sort_unstable_by(f64::total_cmp);
-        // A few large measurements of the scene must not pass for a level, nor two heaps of equal ones.
+        // A few large measurements of the scene must not count as a level, nor two groups of equal
+        // measurements.
         let middle = &values[values.len() / 4..values.len() - values.len() / 4];
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
         let level = mean(middle);
@@ -146,13 +151,13 @@ impl Measurements {
     }
 
     /// The part of these measurements that a shorter sweep would have taken: the first
-    /// `M = round(fraction * side^2)` (halves up, at least 1) of the patterns in the recorded order, or,
-    /// with `order`, the first `M` of that order among the rows that were measured. Fewer than `M` are
-    /// returned only where fewer were measured.
+    /// `M = round(fraction * side^2)` (halves up, at least 1) patterns in the recorded order or,
+    /// with `order`, the first `M` of that order among the measured rows. Fewer than `M` come back
+    /// only if fewer were measured.
     ///
     /// # Errors
-    /// [`MeasurementError::Fraction`] unless `0 < fraction <= 1`; [`MeasurementError::Rows`] if the order is
-    /// a table that is no permutation.
+    /// [`MeasurementError::Fraction`] unless `0 < fraction <= 1`; [`MeasurementError::Rows`] if the
+    /// order is a table that is not a permutation.
     pub fn take(&self, order: Option<&Order>, fraction: f64) -> Result<Self, MeasurementError> {
         if !(fraction > 0.0 && fraction <= 1.0) {
             return Err(MeasurementError::Fraction { found: fraction });
@@ -184,7 +189,7 @@ impl Measurements {
         self.rows.side()
     }
 
-    /// Hadamard rows in the order taken.
+    /// Hadamard rows in the order of measurement.
     #[must_use]
     pub fn rows(&self) -> &Rows {
         &self.rows

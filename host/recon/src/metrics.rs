@@ -1,16 +1,20 @@
-//! How alike two images are.
+//! Compares two images by a number.
 //!
-//! The one law: a number comes out only where it is defined. Images of different shapes, values that are not
-//! finite, or images too small for the window are errors, never a NaN.
+//! # Invariant
+//! A number is returned only where it is defined: images of different shapes, values that are not
+//! finite, and images too small for the window are errors, never a NaN
+//! (`tests::what_is_not_defined_is_an_error`).
 //!
-//! [`ssim`] follows Z. Wang et al., *Image quality assessment: from error visibility to structural similarity*
-//! (2004), with the window of their reference code, and returns what scikit-image's
-//! `structural_similarity(gaussian_weights=True, sigma=1.5, use_sample_covariance=False)` does: an 11-pixel
-//! Gaussian, population covariance, averaged over the pixels whose whole window lies in the image.
+//! [`ssim`] follows Z. Wang et al., *Image quality assessment: from error visibility to structural
+//! similarity* (2004), with the window of their reference code: an 11-pixel Gaussian, population
+//! covariance, averaged over the pixels whose whole window lies in the image. Its results are those
+//! of scikit-image's
+//! `structural_similarity(gaussian_weights=True, sigma=1.5, use_sample_covariance=False)`
+//! (`tests::numbers_are_those_of_scikit_image`).
 
 use thiserror::Error;
 
-/// Two images between which no metric is defined.
+/// Why no metric is defined for two images.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum MetricError {
     /// A slice is not `width * height` long.
@@ -18,7 +22,7 @@ pub enum MetricError {
     Shape {
         /// `reference` or `test`.
         which: &'static str,
-        /// Its pixels.
+        /// Number of its pixels.
         found: usize,
         /// Columns.
         width: usize,
@@ -30,9 +34,9 @@ pub enum MetricError {
     NotFinite {
         /// `reference` or `test`.
         which: &'static str,
-        /// Where, row-major.
+        /// Index of the pixel, row-major.
         index: usize,
-        /// What was found.
+        /// The pixel's value.
         found: f32,
     },
     /// The image is smaller than the window, or empty.
@@ -48,10 +52,10 @@ pub enum MetricError {
     /// The span of values is not a positive number.
     #[error("a data range of {found}, expected a positive finite number")]
     DataRange {
-        /// What was given.
+        /// The span that was given.
         found: f64,
     },
-    /// An image of one value correlates with nothing.
+    /// An image of one value has no correlation.
     #[error("the {which} image is flat: correlation is not defined")]
     Flat {
         /// `reference` or `test`.
@@ -59,7 +63,7 @@ pub enum MetricError {
     },
 }
 
-/// A pair of images that can be compared, row-major.
+/// Two images that can be compared, row-major.
 struct Pair<'a> {
     reference: &'a [f32],
     test: &'a [f32],
@@ -98,7 +102,8 @@ impl<'a> Pair<'a> {
 /// Both images are `width x height`, row-major.
 ///
 /// # Errors
-/// [`MetricError`] on other lengths, values that are not finite, no pixels, or a `data_range` that is not positive.
+/// [`MetricError`] if a length is wrong, a value is not finite, there are no pixels, or
+/// `data_range` is not positive.
 pub fn psnr(
     reference: &[f32],
     test: &[f32],
@@ -112,11 +117,12 @@ pub fn psnr(
     Ok(10.0 * (data_range.powi(2) * reference.len() as f64 / squared).log10())
 }
 
-/// Pearson correlation of the pixels, -1 to 1: blind to brightness and contrast. Both images are
-/// `width x height`, row-major.
+/// Pearson correlation of the pixels, -1 to 1. Brightness and contrast do not change it. Both
+/// images are `width x height`, row-major.
 ///
 /// # Errors
-/// [`MetricError`] on other lengths, values that are not finite, no pixels, or a flat image.
+/// [`MetricError`] if a length is wrong, a value is not finite, there are no pixels, or an image is
+/// flat.
 pub fn correlation(
     reference: &[f32],
     test: &[f32],
@@ -151,8 +157,8 @@ const K2: f64 = 0.03;
 /// Structural similarity, at most 1. Both images are `width x height`, row-major, of values that span `data_range`.
 ///
 /// # Errors
-/// [`MetricError`] on other lengths, values that are not finite, images smaller than the 11 x 11 window, or a
-/// `data_range` that is not positive.
+/// [`MetricError`] if a length is wrong, a value is not finite, an image is smaller than the 11 x
+/// 11 window, or `data_range` is not positive.
 pub fn ssim(
     reference: &[f32],
     test: &[f32],

@@ -1,30 +1,33 @@
-//! Orthogonal matching pursuit: few atoms of a dictionary that explain a measurement.
+//! Orthogonal matching pursuit: represents a measurement by a few atoms of a dictionary.
 //!
-//! The one law: after every atom the coefficients are the least-squares solution over the support, so the
-//! residual is orthogonal to every atom chosen and its norm never grows.
+//! # Invariant
+//! After every atom the coefficients are the least-squares solution over the support, so the
+//! residual is orthogonal to every atom of the support and its norm never grows
+//! (`tests::laws::what_remains_is_orthogonal_to_the_support_and_never_grows`).
 //!
-//! | module | holds |
+//! | module | contents |
 //! |---|---|
-//! | [`mod@reference`] | the paper's Algorithm 1 line by line, in `f64`: what the others are checked against |
+//! | [`mod@reference`] | the paper's Algorithm 1 line by line, in `f64`: every other implementation is checked against it |
 //! | [`Solver`] | the same support and coefficients, fast, in `f32` or `f64`, one measurement at a time |
 //! | [`solve_batch`], [`solve_path`] | many measurements of one [`Problem`], or one, on a [`Backend`] chosen at run time |
-//! | [`Dictionary`] | what both ask of the atoms: projections, and columns of the Gram matrix |
+//! | [`Dictionary`] | the interface of a dictionary: projections, and columns of the Gram matrix |
 //! | [`DenseDictionary`] | a dictionary that is a matrix |
-//! | [`MixedDictionary`] | the same in `f32`, with choices in `f64` where `f32` cannot tell two atoms apart |
-//! | [`nonnegative`] | coefficients of 0 or more |
-//! | [`sampled`] | Hadamard measurements of an image, by fast transforms, without storing a matrix |
+//! | [`MixedDictionary`] | the same in `f32`, with choices in `f64` where `f32` cannot distinguish two atoms |
+//! | [`nonnegative`] | non-negative coefficients |
+//! | [`sampled`] | Hadamard measurements of an image, by fast transforms, without a stored matrix |
 //! | `gpu` | the same on a GPU, in `f32`; with the feature of that name |
 //!
-//! What the algorithm as printed leaves open, and both paths settle alike:
-//! - It assumes atoms of unit norm. Atoms are normalised for the choice, coefficients are those of the atoms given.
-//! - An atom of zero norm (one that the chosen patterns do not see: 4 of the 1024 DCT atoms for a random
-//!   half of the rows) would divide by zero. It is left out and counted.
-//! - An atom in the span of the support would put a zero on the diagonal of the Cholesky factor. Whatever has
-//!   the largest correlation with the residual cannot be in that span, unless all that is left is rounding:
-//!   the search ends there ([`Stop::Dependent`]). What is rounding depends on the number type: under 1e-5 of an atom's norm
-//!   squared in `f32`, 1e-10 in `f64`.
-//! - Equal correlations: the lower atom is chosen. Of atoms that point the same way to rounding (random Hadamard rows see some
-//!   cosines alike) the lower stands for all.
+//! The printed algorithm leaves these cases open. Every implementation here handles them alike:
+//! - The printed algorithm assumes atoms of unit norm. Here atoms are normalised for the choice,
+//!   and coefficients belong to the atoms as given.
+//! - An atom of zero norm (one that the measured patterns do not see: 4 of the 1024 DCT atoms for a
+//!   random half of the rows) would cause a division by zero. Such an atom is left out and counted.
+//! - An atom in the span of the support would put a zero on the diagonal of the Cholesky factor.
+//!   The atom with the largest correlation cannot be in that span, unless the residual is only
+//!   rounding; the search then ends ([`Stop::Dependent`]). Rounding means less than 1e-5 of an
+//!   atom's squared norm in `f32`, and less than 1e-10 in `f64`.
+//! - Of atoms with equal correlations, the lower is chosen. Of atoms that are parallel to within
+//!   rounding (random Hadamard rows see some cosines alike), only the lowest can be chosen.
 
 mod backend;
 mod batch;
@@ -55,36 +58,37 @@ pub use scalar::Scalar;
 
 use thiserror::Error;
 
-/// When to stop.
+/// When a pursuit stops.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
-    /// Most atoms to choose.
+    /// Largest number of atoms.
     pub sparsity: usize,
-    /// Norm of the residual, relative to the measurement's, at which enough is explained; 0 never is.
+    /// Norm of the residual, relative to the measurement's norm, at which the pursuit stops; 0
+    /// means never.
     pub residual: f64,
-    /// Standard deviation of a measured number's noise, in its own unit: a residual that is no longer than noise
-    /// alone would be, `noise * sqrt(measurements)`, is explained enough.
+    /// Standard deviation of a measured number's noise, in its own unit. The pursuit stops when the
+    /// residual is no longer than noise alone would be, `noise * sqrt(measurements)`.
     pub noise: f64,
 }
 
 impl Limits {
-    /// This many atoms, however small the residual.
+    /// Stops at this number of atoms, however small the residual.
     #[must_use]
     pub fn atoms(sparsity: usize) -> Self {
         Self { sparsity, residual: 0.0, noise: 0.0 }
     }
 }
 
-/// Why the search stopped.
+/// Why a pursuit stopped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stop {
-    /// As many atoms as were asked for.
+    /// The support has as many atoms as requested.
     Sparsity,
-    /// The residual is as small as was asked for.
+    /// The residual is as small as requested.
     Residual,
     /// No atom that the measurement sees correlates with the residual beyond rounding.
     NoAtomLeft,
-    /// The best atom left is a combination of those chosen, to rounding.
+    /// The best atom left is a combination of the chosen atoms, to within rounding.
     Dependent,
 }
 
@@ -93,24 +97,26 @@ pub enum Stop {
 pub struct Solution {
     /// Atoms in the order in which they were chosen.
     pub support: Vec<usize>,
-    /// Coefficient of each atom of the support, for the dictionary as given.
+    /// Coefficient of each atom of the support; the atoms have the norms of the dictionary as
+    /// given.
     pub coefficients: Vec<f64>,
-    /// Norm of the residual before the first and after each atom, relative to the measurement's.
+    /// Norm of the residual before the first atom and after each atom, relative to the
+    /// measurement's norm.
     pub residual_norms: Vec<f64>,
-    /// Why there are no more.
+    /// Why the pursuit stopped.
     pub stop: Stop,
     /// Atoms that the measurement does not see.
     pub unseen: Vec<usize>,
 }
 
-/// A problem that has no solution to look for.
+/// Why a problem is refused.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum OmpError {
-    /// The measurement does not fit the dictionary.
+    /// The measurement's length differs from the dictionary's.
     #[error("a measurement of {found} values for a dictionary of {expected} rows")]
     Length {
-        /// Values measured.
+        /// Length of the measurement.
         found: usize,
         /// Rows of the dictionary.
         expected: usize,
@@ -118,11 +124,12 @@ pub enum OmpError {
     /// A number is NaN or infinite.
     #[error("{field}[{index}] is {found}, expected a finite number")]
     NotFinite {
-        /// `dictionary` (column-major), `measurement`, or `projection` of one onto the other.
+        /// `dictionary` (column-major), `measurement`, or the `projection` of the measurement onto
+        /// the dictionary.
         field: &'static str,
-        /// Where.
+        /// Index of the number.
         index: usize,
-        /// What was found.
+        /// The number.
         found: f64,
     },
     /// A limit is negative or NaN.
@@ -130,18 +137,18 @@ pub enum OmpError {
     Limit {
         /// `residual` or `noise`.
         limit: &'static str,
-        /// What was asked for.
+        /// The limit that was given.
         found: f64,
     },
-    /// A pursuit is to start from an atom that there is not.
+    /// The start names an atom that the dictionary does not have.
     #[error("a start from atom {found} of a dictionary of {atoms}")]
     Start {
-        /// The atom.
+        /// Number of the atom.
         found: usize,
-        /// How many there are.
+        /// Number of atoms in the dictionary.
         atoms: usize,
     },
-    /// What was to compute it cannot.
+    /// The backend cannot compute.
     #[error(transparent)]
     Backend(#[from] BackendError),
 }
@@ -165,7 +172,7 @@ impl Limits {
         Ok(())
     }
 
-    /// Energy of the residual at which enough of a measurement's is explained.
+    /// Energy of the residual at which a measurement's pursuit stops.
     fn enough(&self, energy: f64, measurements: usize) -> f64 {
         (self.residual.powi(2) * energy).max(self.noise.powi(2) * measurements as f64)
     }

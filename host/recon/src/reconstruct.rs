@@ -1,21 +1,24 @@
 //! From measurements to an image.
 //!
-//! The one law: what was measured is kept. By default the image has exactly the measured Hadamard coefficients, and
-//! only the rows that were not measured are filled in: by zeros ([`hadamard`]) or by what a sparse
-//! representation predicts for them ([`omp()`]), as far as it proved itself on rows that were held back.
+//! # Invariant
+//! By default the image has exactly the measured Hadamard coefficients
+//! (`tests::what_was_measured_is_kept_and_any_side_and_share_gives_an_image`). Only the rows that
+//! were not measured are filled in: by zeros ([`hadamard`]), or by the prediction of a sparse
+//! representation ([`omp()`]), scaled by how well it predicted held-back rows.
 //!
 //! # Why OMP is not used bare
-//! Algorithm 1 over unit-norm atoms does poorly on real partial measurements: atoms that the chosen rows barely see
-//! are as attractive as any other once normalised, and fit detail and noise with huge coefficients. Zero
-//! filling of a low-sequency order is the line to beat. What [`OmpSettings::default`] adds, in the order in which it
-//! matters:
+//! Algorithm 1 over unit-norm atoms does poorly on real partial measurements: after normalisation,
+//! atoms that the measured rows barely see compete with all others, and fit detail and noise with
+//! huge coefficients. The baseline to beat is zero filling of a low-sequency order.
+//! [`OmpSettings::default`] adds to Algorithm 1, most important first:
 //!
-//! 1. **Completion**: the measured coefficients stay, the representation fills only the others.
-//! 2. **A prior**: coefficients are expected to fall as one over frequency, the amplitude spectrum of natural
-//!    images (D. J. Field, *Relations between the statistics of natural images and the response properties of cortical
-//!    cells*, 1987), and measurements to carry the noise estimated from them; see [`crate::omp::sampled`].
-//! 3. **Cross-validation**: the number of atoms and how far to trust the prediction (a factor from 0, zero filling, to
-//!    1) are those with the least error on rows that were measured but held back.
+//! 1. **Completion**: the measured coefficients stay; the representation fills only the others.
+//! 2. **A prior**: coefficients are expected to fall as one over frequency, the amplitude spectrum
+//!    of natural images (D. J. Field, *Relations between the statistics of natural images and the
+//!    response properties of cortical cells*, 1987), and measurements to have the noise estimated
+//!    from them; see [`crate::omp::sampled`].
+//! 3. **Cross-validation**: the number of atoms and the trust in the prediction (a factor from 0,
+//!    zero filling, to 1) are those with the least error on rows that were measured but held back.
 //!
 #![doc = include_str!("reconstruct/study.md")]
 
@@ -45,12 +48,14 @@ use pursuit::{Found, How};
 use std::str::FromStr;
 use thiserror::Error;
 
-/// The order in which to take a part of recorded measurements, where the recorded one does not serve.
+/// The order for taking a part of recorded measurements, where the recorded order is unsuitable.
 ///
-/// A recording's own order is the user's choice and stays (`None`). The first part of the *natural* order, though,
-/// shows only patterns that repeat themselves, and a partial image from it is folded onto itself; a recording in
-/// natural order (ascending rows) is therefore taken in zig-zag order. By this module's last table it is ahead of
-/// cake-cutting up to 20 % on average, and level at 30 %; cake-cutting suits pages and signs full of upright and
+/// A recording's own order is the user's choice and stays (`None`). The *natural* order is the
+/// exception: its first part has only patterns that repeat themselves, so an image from that part
+/// is folded onto itself. A recording in natural order (ascending rows) is therefore taken in
+/// zig-zag order. In this module's last table zig-zag is ahead of cake-cutting up to 20 % on
+/// average, and equal at 30 %; cake-cutting is better for pages and signs with many upright and
+/// level edges.
 /// level edges better.
 #[must_use]
 pub fn default_selection(rows: &[u32]) -> Option<Order> {
@@ -58,25 +63,26 @@ pub fn default_selection(rows: &[u32]) -> Option<Order> {
     natural.then_some(Order::ZigZag)
 }
 
-/// How many atoms [`omp()`] chooses.
+/// How [`omp()`] chooses the number of atoms.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Sparsity {
-    /// The number, up to `most`, whose prediction is best on measurements held back, and as much of that
-    /// prediction as holds there. At most a quarter of the measurements.
+    /// The number of atoms, up to `most`, that predicts held-back measurements best, with the trust
+    /// that predicts them best. At most a quarter of the measurements.
     CrossValidated {
-        /// Most atoms.
+        /// Largest number of atoms.
         most: usize,
-        /// Parts into which the measurements are split, each held back once: 2 or more.
+        /// Number of parts into which the measurements are split, 2 or more. Each part is held back
+        /// once.
         folds: usize,
     },
-    /// This many, and their whole prediction.
+    /// This number of atoms, with their whole prediction.
     Fixed(usize),
-    /// As many as it takes to leave no more of the measurements than noise, and their whole prediction.
+    /// As many atoms as reduce the residual to the noise, with their whole prediction.
     Noise,
 }
 
 impl Sparsity {
-    /// Why a pursuit that was to choose this many atoms stopped.
+    /// Why a pursuit with this setting stopped, in words.
     #[must_use]
     pub fn reason(self, stop: Stop) -> &'static str {
         match (stop, self) {
@@ -95,15 +101,16 @@ impl Sparsity {
 pub enum Completion {
     /// They keep their measured values; only the others are predicted.
     Measured,
-    /// All rows are the representation's: the image is exactly sparse, its noise that of the fit.
+    /// All rows take the values of the fit: the image is exactly sparse, and its noise is that of
+    /// the fit.
     Sparse,
 }
 
 impl Completion {
-    /// Both.
+    /// Every completion.
     pub const ALL: [Self; 2] = [Self::Measured, Self::Sparse];
 
-    /// As it is written on the command line.
+    /// The completion's name on the command line.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -113,11 +120,11 @@ impl Completion {
     }
 }
 
-/// The name of no completion.
+/// Error: no completion has this name.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("unknown completion {found:?}, expected {}", Completion::ALL.map(Completion::name).join(" or "))]
 pub struct ParseCompletionError {
-    /// What was given.
+    /// The name that was given.
     pub found: String,
 }
 
@@ -130,36 +137,38 @@ impl FromStr for Completion {
     }
 }
 
-/// How noisy a measurement is.
+/// The noise of a measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum NoiseLevel {
-    /// Estimated: the median magnitude of the quarter of the measured rows of highest sequency, where least of a
-    /// scene is to be found.
+    /// Estimated: the median magnitude of the quarter of the measured rows with the highest
+    /// sequency, which contain least of a scene.
     Estimated,
     /// Standard deviation in the measurements' own units.
     Known(f64),
 }
 
-/// Settings of [`omp()`]. The module says what the defaults rest on.
+/// Settings of [`omp()`]. The module's documentation gives the reasons for the defaults.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OmpSettings {
     /// Basis in which the image is sparse.
     pub basis: Basis,
     /// How many atoms.
     pub sparsity: Sparsity,
-    /// Norm of the residual, relative to the measurements', at which no more atoms are chosen.
+    /// Norm of the residual, relative to the measurements' norm, at which the pursuit stops.
     pub residual: f64,
-    /// Power of the frequency by which coefficients are expected to fall; 0 expects all alike.
+    /// Power of the frequency with which coefficients are expected to fall; 0 expects all to be
+    /// alike.
     pub falloff: f64,
     /// Noise of the measurements.
     pub noise: NoiseLevel,
-    /// Share of its energy that the measured rows must see of an atom for it to be chosen.
+    /// Least share of an atom's energy that the measured rows must see for the atom to be chosen.
     pub visibility: f64,
     /// Whether measured rows keep their values or take those of the fit.
     pub completion: Completion,
-    /// What computes the pursuits. One image is a few pursuits over different dictionaries: [`Backend::Auto`] is the processor.
+    /// The backend of the pursuits. One image takes a few pursuits over different dictionaries, so
+    /// [`Backend::Auto`] is the processor.
     pub backend: Backend,
-    /// Coefficients of 0 or more: light does not add up to less. For atoms that are light themselves, pixels or one's own.
+    /// Non-negative coefficients, for atoms that are light: pixels or your own atoms.
     pub non_negative: bool,
 }
 
@@ -168,14 +177,15 @@ impl OmpSettings {
         How { non_negative: self.non_negative, backend: self.backend }
     }
 
-    /// Atoms are never worth their time beyond this number, by the module's table.
+    /// Number of atoms beyond which more atoms are not worth their time, by the module's table.
     pub const MOST_ATOMS: usize = 300;
 
-    /// Seen by less than this, an atom's correlations are the rounding of `f32` transforms as much as the scene.
+    /// Below this visibility, an atom's correlations are as much rounding of `f32` transforms as
+    /// scene.
     pub const LEAST_VISIBILITY: f64 = 1e-4;
 
-    /// Algorithm 1 as the paper has it: `sparsity` atoms by normalised correlation, no prior, the image exactly
-    /// sparse.
+    /// Algorithm 1 as printed in the paper: `sparsity` atoms by normalised correlation, no prior,
+    /// an exactly sparse image.
     #[must_use]
     pub fn as_printed(basis: Basis, sparsity: usize) -> Self {
         Self {
@@ -208,20 +218,21 @@ impl Default for OmpSettings {
     }
 }
 
-/// What [`omp()`] found.
+/// The result of [`omp()`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct OmpReconstruction {
     /// The image, in the measurements' units.
     pub image: Image,
-    /// Atoms in the representation.
+    /// Number of atoms in the representation.
     pub sparsity: usize,
-    /// Why there are no more; [`Stop::Sparsity`] for the number that cross-validation chose.
+    /// Why the pursuit stopped; [`Stop::Sparsity`] if cross-validation chose the number of atoms.
     pub stop: Stop,
-    /// Norm of what the representation leaves of the measurements, relative to theirs.
+    /// Norm of the difference between the measurements and their representation, relative to the
+    /// measurements' norm.
     pub residual: f64,
-    /// Atoms that the measured rows do not see.
+    /// Number of atoms that the measured rows do not see.
     pub unseen_atoms: usize,
-    /// Share of the prediction that was used for rows not measured, 0 (zero filling) to 1.
+    /// Trust: factor on the prediction for rows that were not measured, 0 (zero filling) to 1.
     pub trust: f64,
     /// Noise of a measurement, estimated or given, in the measurements' units.
     pub noise: f64,
@@ -234,22 +245,22 @@ pub enum ReconstructError {
     /// A setting out of range.
     #[error("{setting} is {found}, expected {expected}")]
     Setting {
-        /// Which.
+        /// Name of the setting.
         setting: &'static str,
-        /// What was given.
+        /// The value.
         found: f64,
-        /// What would do.
+        /// What the setting accepts.
         expected: &'static str,
     },
-    /// Atoms of the user's own that are no images of the side that was measured.
+    /// Atoms of the user's that are not images of the measured side.
     #[error("atoms of {found} numbers, expected a multiple of the {area} pixels of an image")]
     Atoms {
-        /// Numbers in all.
+        /// Number of values in all.
         found: usize,
         /// Pixels of an image.
         area: usize,
     },
-    /// Coefficients of 0 or more for atoms that are not light.
+    /// Non-negative coefficients for a basis whose atoms are not light.
     #[error(
         "coefficients of 0 or more in the {basis} basis, expected the pixel basis or atoms of one's own"
     )]
@@ -257,7 +268,7 @@ pub enum ReconstructError {
         /// The basis.
         basis: Basis,
     },
-    /// A setting that the method does not take.
+    /// A setting that the method does not use.
     #[error("{setting} belongs to {}, not to {method}", Method::listed(|method| method.takes(*setting)))]
     NotTaken {
         /// The setting.
@@ -268,7 +279,7 @@ pub enum ReconstructError {
     /// The pursuit refused the problem.
     #[error(transparent)]
     Pursuit(#[from] OmpError),
-    /// A method of the user's own found no image, for this reason.
+    /// A user's own method found no image, for this reason.
     #[error("{0}")]
     Failed(String),
 }
@@ -302,7 +313,7 @@ fn choose_atoms(
     }
 }
 
-/// What there is to say of a representation, and the image that it predicts.
+/// The reconstruction of a representation: its numbers, and the image that it predicts.
 fn reconstruction(
     problem: &Problem<'_>,
     found: Found,
@@ -342,8 +353,8 @@ fn image_of(
     Image::new(problem.side, pixels)
 }
 
-/// Measurements and prior in orthonormal units, the largest measurement being 1: picoamperes and ADC sums
-/// are then equally far from the limits of `f32`.
+/// Measurements and prior in orthonormal units, scaled so that the largest measurement is 1. So
+/// picoamperes and ADC sums are equally far from the limits of `f32`.
 struct Problem<'a> {
     side: Side,
     rows: &'a Rows,
@@ -352,9 +363,9 @@ struct Problem<'a> {
     unit: f64,
     transform: Transform,
     prior: Prior,
-    /// Norm of the residual, relative to the measurements', at which a pursuit ends.
+    /// Norm of the residual, relative to the measurements' norm, at which a pursuit stops.
     residual: f64,
-    /// Whether it ends at the noise as well.
+    /// Whether a pursuit also stops at the noise.
     to_noise: bool,
     how: How,
 }
@@ -395,7 +406,8 @@ impl<'a> Problem<'a> {
         measurements.values().iter().map(|v| (v / n / self.unit) as f32).collect()
     }
 
-    /// Norm of what a prediction of all rows leaves of the measurements, relative to theirs.
+    /// Norm of the difference between the measurements and a prediction of all rows, relative to
+    /// the measurements' norm.
     fn residual_of(&self, predicted: &[f32]) -> f64 {
         let left = |(&row, value): (&u32, &f32)| f64::from(value - predicted[row as usize]).powi(2);
         let left: f64 = self.rows.iter().zip(&self.values).map(left).sum();
@@ -408,13 +420,14 @@ impl<'a> Problem<'a> {
         f64::from(self.prior.noise * self.side.pixels() as f32) * self.unit
     }
 
-    /// The basis, seen through the rows at these positions.
+    /// The basis, measured by the rows at these positions.
     fn dictionary(&self, positions: &[usize]) -> SampledHadamard<'_> {
         let rows: Vec<u32> = positions.iter().map(|&k| self.rows[k]).collect();
         SampledHadamard::new(&self.transform, &rows, &self.prior)
     }
 
-    /// Chooses up to each number of atoms for the measurements at these positions, the last number the largest.
+    /// Pursues the measurements at these positions up to each number of atoms; the last number is
+    /// the largest.
     fn pursue(
         &self,
         dictionary: &SampledHadamard<'_>,
@@ -425,15 +438,15 @@ impl<'a> Problem<'a> {
         pursuit::pursue(dictionary, &values, &self.limits(), self.how, sparsities)
     }
 
-    /// When a pursuit stops, whatever the number of atoms.
+    /// Limits of a pursuit, whatever the number of atoms.
     fn limits(&self) -> Limits {
         let noise = if self.to_noise { f64::from(self.prior.noise) } else { 0.0 };
         Limits { sparsity: 0, residual: self.residual, noise }
     }
 }
 
-/// Expected size of each coefficient: falling as `frequency^-falloff`, and such that the measured rows
-/// but the first (the mean) are expected to have the energy they have.
+/// Expected size of each coefficient: proportional to `frequency^-falloff`, and scaled so that the
+/// expected energy of the measured rows, without the mean, is their measured energy.
 fn prior_scale(transform: &Transform, rows: &[u32], values: &[f32], falloff: f64) -> Vec<f32> {
     let side = transform.side();
     let frequencies = transform.basis().frequencies(side);

@@ -1,17 +1,17 @@
 //! Which rows of the Hadamard matrix were shown, and in which order.
 //!
 //! # Invariant
-//! A [`Rows`] has at least one row, each row belongs to its side, and no row stands twice. [`Rows::new`] checks this once, and
-//! every later stage relies on it. Held by `rows::tests::each_fault_is_named` and
-//! `rows::tests::whatever_is_accepted_is_sound`.
+//! A [`Rows`] has at least one row, each row belongs to its side, and no row appears twice
+//! (`tests::each_fault_is_named`, `tests::whatever_is_accepted_is_sound`). [`Rows::new`] checks
+//! this once, and every later stage relies on it.
 
 use crate::Side;
 use std::ops::Deref;
 use std::sync::Arc;
 use thiserror::Error;
 
-/// Rows of the natural-order (Sylvester) Hadamard matrix of order `side^2`, in the order in which they are shown: a whole
-/// sweep, or part of one. A clone shares the memory.
+/// Rows of the natural-order (Sylvester) Hadamard matrix of order `side^2`, in the order in which
+/// they are shown: a whole sweep or a part of one. A clone shares the memory.
 ///
 /// ```
 /// use nirspi_recon::{Order, Rows, RowsError, Side};
@@ -27,37 +27,37 @@ pub struct Rows {
     rows: Arc<[u32]>,
 }
 
-/// What is wrong with a list of Hadamard rows. The caller adds which file or order it came from.
+/// What is wrong with a list of Hadamard rows. The caller adds the name of the file or order.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum RowsError {
     /// No row at all.
     #[error("h_row is empty, expected at least one row")]
     Empty,
-    /// Not as many rows as a whole sweep has.
+    /// The list has not as many rows as a whole sweep.
     #[error("h_row has {found} rows, expected all {expected}")]
     Length {
-        /// Rows of the list.
+        /// Number of rows in the list.
         found: usize,
-        /// Rows of a sweep, `n^2`.
+        /// Number of rows in a sweep, `n^2`.
         expected: usize,
     },
-    /// A row that this side does not have.
+    /// A row that does not exist for this side.
     #[error("h_row[{index}] is {found}, expected 0 to {last}")]
     OutOfRange {
         /// Position in the list.
         index: usize,
-        /// What was found.
+        /// Number of the row.
         found: i64,
-        /// The last row there is.
+        /// Number of the last row.
         last: u32,
     },
-    /// The same row twice.
+    /// A row appears twice.
     #[error("h_row[{index}] repeats row {row}, first at h_row[{first}]")]
     Repeated {
-        /// Position of the second.
+        /// Position of the second occurrence.
         index: usize,
-        /// Position of the first.
+        /// Position of the first occurrence.
         first: usize,
         /// The row.
         row: u32,
@@ -98,12 +98,12 @@ impl Rows {
         Self::trusted(side, (0..side.area() as u32).collect())
     }
 
-    /// Rows that are sound by how they were made.
+    /// Rows that are known to satisfy the invariant.
     pub(crate) fn trusted(side: Side, rows: Vec<u32>) -> Self {
         Self { side, rows: rows.into() }
     }
 
-    /// The rows if they are a whole sweep.
+    /// The rows, if they are a whole sweep.
     pub(crate) fn whole(self) -> Result<Self, RowsError> {
         let expected = self.side.area();
         if self.len() == expected {

@@ -1,4 +1,4 @@
-//! Scenes, instruments and yardsticks that several test modules share.
+//! Shared test support: scenes, simulated readings, real data.
 
 use crate::{Image, Measurements, Rows, Side, fwht};
 use rand::{RngExt, SeedableRng};
@@ -9,7 +9,8 @@ pub(crate) fn side(n: u64) -> Side {
     Side::new(n).unwrap()
 }
 
-/// 0 random, 1 blobs and an edge, 2 a letter-like figure, 3 a point, 4 flat.
+/// The scene of this kind: 0 random, 1 blobs and an edge, 2 a letter-like figure, 3 a point, 4
+/// flat.
 pub(crate) fn scene(side: Side, kind: u8) -> Vec<f64> {
     let n = side.pixels();
     let mut random = Pcg64::seed_from_u64(7);
@@ -34,7 +35,7 @@ pub(crate) fn scene(side: Side, kind: u8) -> Vec<f64> {
         .collect()
 }
 
-/// What a perfect detector reads: pattern, complement, pattern, ...
+/// Readings of a perfect detector: pattern, complement, pattern, ...
 pub(crate) fn readings(side: Side, rows: &[u32], scene: &[f64]) -> Vec<f64> {
     let total: f64 = scene.iter().sum();
     let mut d = scene.to_vec();
@@ -54,14 +55,14 @@ pub(crate) fn measured(side: Side, scene: &[f64]) -> Measurements {
 
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Noise {
-    /// In units of the brightest reading.
+    /// Normal noise, in units of the brightest reading.
     Normal { sigma: f64, seed: u64 },
-    /// Photons in the brightest reading.
+    /// Photon noise, with this many photons in the brightest reading.
     Poisson { photons: f64, seed: u64 },
 }
 
 impl Noise {
-    /// Reading `index`, of this mean, with its noise.
+    /// Reading `index` with this mean, with its noise.
     pub(crate) fn of(self, mean: f64, index: u64) -> f64 {
         match self {
             Self::Normal { sigma, seed } => mean + sigma * normal(&mut stream(seed, index)),
@@ -83,7 +84,7 @@ fn stream(seed: u64, index: u64) -> Pcg64 {
     Pcg64::new(u128::from(seed) << 64 | u128::from(index), 1)
 }
 
-/// A standard normal number (Box and Muller).
+/// A random number of the standard normal distribution (Box and Muller).
 pub(crate) fn normal(random: &mut Pcg64) -> f64 {
     let (u, v): (f64, f64) = (1.0 - random.random::<f64>(), random.random());
     (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()
@@ -97,7 +98,7 @@ pub(crate) fn correlation_of(a: &Image, b: &Image) -> f64 {
 /// An open `.npz` file.
 pub(crate) type Npz = zip::ZipArchive<std::io::BufReader<std::fs::File>>;
 
-/// A file of real measurements, or `None` (said aloud) where this machine has none.
+/// A file of real measurements, or `None`, with a printed message, if this machine has no data.
 pub(crate) fn real_data(name: &str) -> Option<Npz> {
     let root = std::env::var_os("NIRSPI_DATA").map_or_else(
         || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"),
@@ -105,7 +106,7 @@ pub(crate) fn real_data(name: &str) -> Option<Npz> {
     );
     let path = root.join("spi").join(name);
     let Ok(file) = std::fs::File::open(&path) else {
-        // Past the test harness's capture, so that a skipped test is seen.
+        // Prints past the test harness's capture, so that a skipped test is visible.
         use std::io::Write;
         let _ = writeln!(std::io::stderr(), "skipped: no data ({} not found)", path.display());
         return None;

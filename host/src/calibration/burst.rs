@@ -31,6 +31,8 @@ pub(crate) const ONSET: f64 = 0.05;
 const SETTLED_SAMPLES: usize = 4;
 /// How often a camera whose burst has not come whole is asked whether it is still at it.
 const ASK_EVERY: Duration = Duration::from_millis(500);
+/// A burst of which no new sample comes for this long will not come whole, whatever the camera says.
+const STALLED: Duration = Duration::from_secs(30);
 /// Bursts that are averaged: 2 ms of light bring the taps' noise to about a thousandth.
 pub const BURSTS: usize = 64;
 
@@ -55,6 +57,9 @@ pub enum CalibrationError {
     /// The conversation ended.
     #[error(transparent)]
     Session(#[from] SessionError),
+    /// The user has stopped it.
+    #[error("stopped by the user while the camera was being calibrated")]
+    Stopped,
     /// Not all of the burst came.
     #[error("only {found} of {expected} samples of the calibration burst came")]
     Incomplete {
@@ -96,6 +101,8 @@ fn burst_setup() -> MeasurementSetup {
 
 struct BurstListener<'l> {
     samples: Vec<Option<u16>>,
+    /// When the last sample came that had not come before.
+    progressed: Instant,
     inner: &'l mut dyn Listener,
 }
 
@@ -105,7 +112,9 @@ impl Listener for BurstListener<'_> {
         if let Ok(DeviceMessage::Raw(Raw { first_clock, samples, .. })) = content {
             let places = self.samples.iter_mut().skip(usize::from(*first_clock));
             for (place, sample) in places.zip(samples.iter()) {
-                *place = Some(sample & nirspi_wire::ADC_MAX);
+                if place.replace(sample & nirspi_wire::ADC_MAX).is_none() {
+                    self.progressed = Instant::now();
+                }
             }
         }
     }
@@ -117,12 +126,15 @@ impl BurstListener<'_> {
     }
 
     /// Until all samples are there, or the camera says that no more will come. What it has sent before it says so comes
-    /// before, so no patience of ours decides: a camera on a slow line or a busy machine is as good as any.
-    fn await_end(&mut self, session: &mut Session) -> Result<(), SessionError> {
+    /// before, so a camera on a slow line or a busy machine is as good as any, as long as samples come.
+    fn await_end(&mut self, session: &mut Session) -> Result<(), CalibrationError> {
         let mut state = State::Running;
-        while !self.is_whole() && state == State::Running {
+        while !self.is_whole() && state == State::Running && self.progressed.elapsed() < STALLED {
             let asked = Instant::now();
             while !self.is_whole() && asked.elapsed() < ASK_EVERY {
+                if !self.inner.goes_on() {
+                    return Err(CalibrationError::Stopped);
+                }
                 session.listen(Duration::from_millis(50), self)?;
             }
             if !self.is_whole() {
@@ -171,7 +183,8 @@ fn bursts(
     burst_setup().with_configuration(|c| session.command(request::Configure(c), listener))?;
     let mut samples = Vec::with_capacity(BURSTS * expected);
     for _ in 0..BURSTS {
-        let mut burst = BurstListener { samples: vec![None; expected], inner: listener };
+        let (samples_of_burst, progressed) = (vec![None; expected], Instant::now());
+        let mut burst = BurstListener { samples: samples_of_burst, progressed, inner: listener };
         session.command(request::RawBurst(RAW_SAMPLES_MAX), &mut burst)?;
         burst.await_end(session)?;
         let before = samples.len();

@@ -162,6 +162,10 @@ impl KeptCalibration {
         }
         let kept: Self =
             serde_json::from_slice(&text).map_err(|error| format_error(path, &error))?;
+        kept.settling.check().map_err(|problem| CalibrationFileError::Format {
+            path: path.to_owned(),
+            reason: problem.to_string(),
+        })?;
         kept.check(camera).map_err(|(field, found, expected)| CalibrationFileError::Mismatch {
             path: path.to_owned(),
             field,
@@ -241,6 +245,7 @@ mod tests {
             adc_hz: 125_000_000,
             adc_bits: 14,
             wavelength_nm: 1550,
+            capabilities: Vec::new(),
         }
     }
 

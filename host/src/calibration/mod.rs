@@ -8,10 +8,12 @@
 //! (`a_dark_scene_uses_the_kept_latency_or_fails`, in `host/tests/calibration.rs`).
 
 mod burst;
+mod check;
 mod kept;
 mod policy;
 
 pub(crate) use burst::ONSET;
 pub use burst::{BURSTS, CalibrationError, HALF_PERIOD, Settling, calibrate, calibrate_or};
+pub use check::SettlingError;
 pub use kept::{CalibrationFileError, KeptCalibration, path_of};
 pub use policy::{CalibrationPolicy, Choice, Origin, PolicyError};

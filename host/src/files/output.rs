@@ -1,13 +1,14 @@
 //! Results on disk: whole, or not there.
 //!
 //! The law: a file appears under its name only when it is complete and safely on the disk, and a
-//! run that fails leaves everything as it was, down to the folders it made.
+//! run that fails leaves everything as it was, down to the folders it made. No staged file is kept open, so a folder takes
+//! more files than a process may have open.
 
 use super::FileError;
 use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
-use tempfile::NamedTempFile;
+use tempfile::TempPath;
 
 /// Start of the names of files that are still being written, beside their final place.
 const STAGED_PREFIX: &str = ".nirspi-";
@@ -21,7 +22,7 @@ const STAGED_PREFIX: &str = ".nirspi-";
 pub struct OutputDir {
     path: PathBuf,
     /// Before `made`, so that the files are gone when the folders go.
-    staged: Vec<(NamedTempFile, PathBuf)>,
+    staged: Vec<(TempPath, PathBuf)>,
     made: MadeFolders,
 }
 
@@ -91,6 +92,7 @@ impl OutputDir {
             }
             placed.push((target, replaces));
         }
+        sync_folder(&self.path).map_err(|error| FileError::io(&self.path, "write to", error))?;
         self.made.0.clear();
         Ok(placed.into_iter().map(|(path, _)| path).collect())
     }
@@ -105,7 +107,29 @@ pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
     };
-    place(stage(folder, path, bytes)?, path)
+    place(stage(folder, path, bytes)?, path)?;
+    sync_folder(folder).map_err(|error| FileError::io(folder, "write to", error))
+}
+
+/// Puts the names in a folder on the disk, where the system has a way to say so.
+pub(crate) fn sync_folder(folder: &Path) -> io::Result<()> {
+    if cfg!(not(unix)) {
+        return Ok(());
+    }
+    match fs::File::open(folder).and_then(|folder| folder.sync_all()) {
+        // A folder that may be written to but not read, or a file system that syncs no folders.
+        Err(error)
+            if matches!(
+                error.kind(),
+                io::ErrorKind::PermissionDenied
+                    | io::ErrorKind::InvalidInput
+                    | io::ErrorKind::Unsupported
+            ) =>
+        {
+            Ok(())
+        }
+        synced => synced,
+    }
 }
 
 /// Folders that go again when a run fails, outermost first.
@@ -121,7 +145,7 @@ impl Drop for MadeFolders {
     }
 }
 
-fn stage(folder: &Path, target: &Path, bytes: &[u8]) -> Result<NamedTempFile, FileError> {
+fn stage(folder: &Path, target: &Path, bytes: &[u8]) -> Result<TempPath, FileError> {
     if target.is_dir() {
         return Err(FileError::kind(target, "a folder", "a file to write"));
     }
@@ -130,30 +154,19 @@ fn stage(folder: &Path, target: &Path, bytes: &[u8]) -> Result<NamedTempFile, Fi
         return Err(FileError::io(folder, "write to", error));
     }
     let write = |error: io::Error| FileError::io(target, "write", error);
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(STAGED_PREFIX);
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        // Results are for others to read, as far as the user's umask lets them; a temporary file is
-        // not.
-        builder.permissions(fs::Permissions::from_mode(0o666));
-    }
-    let mut staged = builder.tempfile_in(folder).map_err(|error| write(without_path(error)))?;
-    staged
-        .write_all(bytes)
-        .and_then(|()| staged.as_file().sync_all())
-        .map_err(|error| write(without_path(error)))?;
-    Ok(staged)
+    // The file is made here and not by `tempfile`, whose errors hide the system's reason. Results are for others to read, as
+    // far as the user's umask lets them.
+    let staged = tempfile::Builder::new()
+        .prefix(STAGED_PREFIX)
+        .make_in(folder, |path| fs::File::create_new(path))
+        .map_err(write)?;
+    let (mut file, path) = staged.into_parts();
+    file.write_all(bytes).and_then(|()| file.sync_all()).map_err(write)?;
+    Ok(path)
 }
 
-fn place(staged: NamedTempFile, target: &Path) -> Result<(), FileError> {
-    staged.persist(target).map(drop).map_err(|error| FileError::io(target, "write", error.error))
-}
-
-/// `tempfile` puts the hidden file's path into its errors; the user asked for another one.
-fn without_path(error: io::Error) -> io::Error {
-    error.raw_os_error().map_or_else(|| error.kind().into(), io::Error::from_raw_os_error)
+fn place(staged: TempPath, target: &Path) -> Result<(), FileError> {
+    staged.persist(target).map_err(|error| FileError::io(target, "write", error.error))
 }
 
 #[cfg(test)]
@@ -246,6 +259,25 @@ mod tests {
             "{error}"
         );
         assert_eq!(names(root.path()), ["taken"]);
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_folder_keeps_no_file_open_however_many_it_takes() {
+        let open = |folder: &Path| {
+            let files = fs::read_dir("/proc/self/fd").unwrap().filter_map(Result::ok);
+            files
+                .filter_map(|fd| fs::read_link(fd.path()).ok())
+                .filter(|to| to.starts_with(folder))
+                .count()
+        };
+        let root = tempfile::tempdir().unwrap();
+        let mut dir = OutputDir::create(root.path()).unwrap();
+        for n in 0..20 {
+            dir.write(&format!("{n}.png"), b"x").unwrap();
+            assert_eq!(open(root.path()), 0, "after {n}");
+        }
+        assert_eq!(dir.commit().unwrap().len(), 20);
     }
 
     #[cfg(unix)]

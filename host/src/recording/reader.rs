@@ -1,13 +1,16 @@
 //! Reads a recording back in one pass, whole or cut short: first what was measured, then packet by packet.
 
-use super::{ACCOUNT, ENCODING, IDENTITY, JSON, PROFILE, SETTLING, SETUP, TOPIC};
-use crate::account::LossCounters;
+use super::lengths;
+use super::{
+    ACCOUNT, IDENTITY, JSON, PROFILE, RUN, RunAccount, SETTLING, SETUP, TOPIC, protocol_of,
+};
 use crate::calibration::Settling;
 use crate::session::CameraIdentity;
 use crate::setup::MeasurementSetup;
 use mcap::McapError;
 use mcap::records::{Metadata, Record, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use nirspi_wire::version;
 use serde::de::DeserializeOwned;
 use std::fs::File;
 use std::io::{self, Read};
@@ -37,6 +40,8 @@ pub struct Recording {
     pub setup: MeasurementSetup,
     /// How the camera settles, where that was measured.
     pub settling: Option<Settling>,
+    /// Number of the run whose frames count; `None` in a recording that does not say so, where it is the first frame's.
+    pub run: Option<u16>,
     records: Records,
     /// The first packet, which was met where the header ends.
     first: Option<Packet>,
@@ -56,7 +61,7 @@ pub struct Packet {
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct End {
     /// The account as the capture closed it; `None` where it was cut short.
-    pub account: Option<LossCounters>,
+    pub account: Option<RunAccount>,
     /// Packets read.
     pub packets: u64,
     /// Where the file ends in the middle or is damaged: what is wrong there. All before it was read.
@@ -86,7 +91,7 @@ impl Recording {
         let identity = parts.identity.ok_or_else(|| missing("identity"))?;
         let setup = parts.setup.ok_or_else(|| missing("setup"))?;
         end.account = parts.account;
-        Ok(Self { identity, setup, settling: parts.settling, records, first, end })
+        Ok(Self { identity, setup, settling: parts.settling, run: parts.run, records, first, end })
     }
 
     /// What is known at the end of the recording: whole once the iterator has given its last packet.
@@ -105,7 +110,9 @@ impl Recording {
                 Some(Found::Packet(packet)) => return Ok(Some(packet)),
                 Some(Found::Metadata(metadata)) => {
                     parts.keep(&self.records.path, &metadata)?;
-                    self.end.account = parts.account.or(self.end.account);
+                    if let Some(account) = parts.account.take() {
+                        self.end.account = Some(account);
+                    }
                 }
                 None => return Ok(None),
             }
@@ -146,8 +153,13 @@ enum Found {
 
 impl Records {
     fn open(path: &Path) -> Result<Self, RecordingError> {
-        let file = File::open(path)
-            .map_err(|source| RecordingError::Io { path: path.to_owned(), source })?;
+        let io_error = |source| RecordingError::Io { path: path.to_owned(), source };
+        // A pipe would be waited for, and a device need not end.
+        if !std::fs::metadata(path).map_err(io_error)?.is_file() {
+            let found = "a folder, a device or a pipe".to_owned();
+            return Err(RecordingError::NotARecording { path: path.to_owned(), found });
+        }
+        let file = File::open(path).map_err(io_error)?;
         let reader = LinearReader::new_with_options(
             LinearReaderOptions::default()
                 // Each packet has a checksum of its own; that of the whole data section covers what is said about them.
@@ -179,7 +191,11 @@ impl Records {
                 Ok(LinearReadEvent::Record {
                     opcode: opcode @ (op::HEADER | op::CHANNEL | op::MESSAGE | op::METADATA),
                     data,
-                }) => mcap::parse_record(opcode, data),
+                }) if lengths::fit(opcode, data) => mcap::parse_record(opcode, data),
+                Ok(LinearReadEvent::Record {
+                    opcode: op::HEADER | op::CHANNEL | op::METADATA,
+                    ..
+                }) => Err(McapError::UnexpectedEof),
                 Ok(LinearReadEvent::Record { opcode: op::CHUNK, .. }) => {
                     return Err(not_ours(
                         "records in chunks, as other tools write them,".to_owned(),
@@ -194,7 +210,8 @@ impl Records {
                     return Err(not_ours(format!("an MCAP file of profile {:?}", header.profile)));
                 }
                 Ok(Record::Channel(channel)) => {
-                    if channel.topic != TOPIC || channel.message_encoding != ENCODING {
+                    let protocol = protocol_of(&channel.message_encoding);
+                    if channel.topic != TOPIC || !protocol.is_some_and(version::speaks) {
                         let found = format!("{:?} {:?}", channel.topic, channel.message_encoding);
                         return Err(RecordingError::Version { path: path.clone(), found });
                     }
@@ -242,8 +259,12 @@ pub enum RecordingError {
         /// What it is instead.
         found: String,
     },
-    /// A recording of another wire protocol.
-    #[error("{path}: recorded as {found}, this program reads {ENCODING}")]
+    /// A recording of a newer wire protocol.
+    #[error(
+        "{path}: recorded as {found}, this program reads {TOPIC:?} of nirspi-wire-v{} to v{}: update this program",
+        version::MIN,
+        version::CURRENT
+    )]
     Version {
         /// Which file.
         path: PathBuf,
@@ -288,15 +309,25 @@ struct Parts {
     identity: Option<CameraIdentity>,
     setup: Option<MeasurementSetup>,
     settling: Option<Settling>,
-    account: Option<LossCounters>,
+    run: Option<u16>,
+    account: Option<RunAccount>,
 }
 
 impl Parts {
     fn keep(&mut self, path: &Path, metadata: &Metadata) -> Result<(), RecordingError> {
         match metadata.name.as_str() {
             IDENTITY => self.identity = Some(parse(path, "identity", metadata)?),
-            SETUP => self.setup = Some(parse(path, "setup", metadata)?),
-            SETTLING => self.settling = Some(parse(path, "settling", metadata)?),
+            SETUP => {
+                let setup: MeasurementSetup = parse(path, "setup", metadata)?;
+                setup.check().map_err(|problem| damaged(path, "setup", &problem))?;
+                self.setup = Some(setup);
+            }
+            SETTLING => {
+                let settling: Settling = parse(path, "settling", metadata)?;
+                settling.check().map_err(|problem| damaged(path, "settling", &problem))?;
+                self.settling = Some(settling);
+            }
+            RUN => self.run = Some(parse(path, "run", metadata)?),
             ACCOUNT => self.account = Some(parse(path, "account", metadata)?),
             _ => {}
         }
@@ -310,17 +341,18 @@ fn parse<T: DeserializeOwned>(
     metadata: &Metadata,
 ) -> Result<T, RecordingError> {
     let json = metadata.metadata.get(JSON).map_or("", String::as_str);
-    serde_json::from_str(json).map_err(|error| RecordingError::Damaged {
-        path: path.to_owned(),
-        part,
-        reason: error.to_string(),
-    })
+    serde_json::from_str(json).map_err(|error| damaged(path, part, &error))
+}
+
+fn damaged(path: &Path, part: &'static str, problem: &impl ToString) -> RecordingError {
+    RecordingError::Damaged { path: path.to_owned(), part, reason: problem.to_string() }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recording::Recorder;
+    use crate::account::LossCounters;
+    use crate::recording::{Recorder, Target};
 
     fn identity() -> CameraIdentity {
         CameraIdentity {
@@ -332,6 +364,7 @@ mod tests {
             adc_hz: 125_000_000,
             adc_bits: 14,
             wavelength_nm: 1550,
+            capabilities: Vec::new(),
         }
     }
 
@@ -339,12 +372,18 @@ mod tests {
         MeasurementSetup::new(&nirspi_recon::Order::CakeCutting, 0.3).unwrap()
     }
 
+    fn account(received: u64) -> RunAccount {
+        let counters = LossCounters { received, ..Default::default() };
+        RunAccount { counters, made: Some(received), ..Default::default() }
+    }
+
     fn recording(path: &Path, packets: usize) {
-        let mut recorder = Recorder::create(path, &identity(), &setup(), None).unwrap();
+        let target = Target::New(path.to_owned());
+        let mut recorder = Recorder::create(&target, &identity(), &setup(), None, Some(7)).unwrap();
         for n in 0..packets {
             recorder.packet(&vec![n as u8; 5000]).unwrap();
         }
-        recorder.finish(&LossCounters { received: packets as u64, ..Default::default() }).unwrap();
+        recorder.finish(&account(packets as u64)).unwrap();
     }
 
     #[test]
@@ -354,10 +393,11 @@ mod tests {
         recording(&path, 700);
         let mut recording = Recording::open(&path).unwrap();
         assert_eq!((&recording.identity, &recording.setup), (&identity(), &setup()));
+        assert_eq!(recording.run, Some(7));
         for (count, packet) in recording.by_ref().enumerate() {
             assert_eq!(packet.unwrap().bytes, vec![count as u8; 5000]);
         }
-        let account = Some(LossCounters { received: 700, ..Default::default() });
+        let account = Some(account(700));
         assert_eq!(recording.end(), &End { account, packets: 700, cut_short: None });
     }
 

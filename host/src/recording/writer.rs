@@ -1,7 +1,7 @@
 //! Writes a recording as it comes in.
 
-use super::{ACCOUNT, ENCODING, IDENTITY, JSON, PROFILE, SETTLING, SETUP, TOPIC};
-use crate::account::LossCounters;
+use super::file::{Place, Target};
+use super::{ACCOUNT, IDENTITY, JSON, PROFILE, RUN, RunAccount, SETTLING, SETUP, TOPIC, encoding};
 use crate::calibration::Settling;
 use crate::session::CameraIdentity;
 use crate::setup::MeasurementSetup;
@@ -12,7 +12,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// Longest time that packets stay in memory.
@@ -20,7 +20,10 @@ const FLUSH_EVERY: Duration = Duration::from_millis(500);
 
 /// An open recording.
 pub struct Recorder {
-    writer: Writer<NoSeek<BufWriter<File>>>,
+    place: Place,
+    writer: Records,
+    /// The same file, to be put on the disk.
+    file: File,
     channel: u16,
     packets: u32,
     epoch: u64,
@@ -36,60 +39,39 @@ fn to_io(error: mcap::McapError) -> io::Error {
 }
 
 impl Recorder {
-    /// Creates the file and writes who is recorded, doing what.
+    /// Makes the file and writes who is recorded, doing what; `run` is the number of the run whose frames count.
     ///
     /// # Errors
-    /// When the file cannot be created or written; it is not left behind then.
+    /// When the file is there already, or cannot be made or written; it is not left behind then.
     pub fn create(
-        path: &Path,
+        target: &Target,
         identity: &CameraIdentity,
         setup: &MeasurementSetup,
         settling: Option<&Settling>,
+        run: Option<u16>,
     ) -> io::Result<Self> {
-        let file = BufWriter::with_capacity(1 << 20, File::create(path)?);
-        Self::with_file(file, identity, setup, settling).map_err(|error| {
-            // Not a device that the user records into. What cannot be removed is empty.
-            if path.is_file() {
-                let _ = std::fs::remove_file(path);
+        let (place, file) = Place::make(target)?;
+        let begun = file.try_clone().map_err(Into::into).and_then(|clone| {
+            let buffered = BufWriter::with_capacity(1 << 20, clone);
+            begun(buffered, identity, setup, settling, run)
+        });
+        let (writer, channel) = match begun {
+            Ok(begun) => begun,
+            Err(error) => {
+                place.remove();
+                return Err(to_io(error));
             }
-            to_io(error)
-        })
-    }
-
-    fn with_file(
-        file: BufWriter<File>,
-        identity: &CameraIdentity,
-        setup: &MeasurementSetup,
-        settling: Option<&Settling>,
-    ) -> McapResult<Self> {
-        let options = WriteOptions::new().use_chunks(false).profile(PROFILE).disable_seeking(true);
-        let mut writer = options.create(NoSeek::new(file))?;
-        let channel = writer.add_channel(0, TOPIC, ENCODING, &BTreeMap::new())?;
-        let epoch = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos();
-        let now = Instant::now();
-        let mut recorder = Self {
-            writer,
-            channel,
-            packets: 0,
-            epoch: u64::try_from(epoch).unwrap_or(u64::MAX),
-            started: now,
-            flushed: now,
         };
-        recorder.note(IDENTITY, identity)?;
-        recorder.note(SETUP, setup)?;
-        if let Some(settling) = settling {
-            recorder.note(SETTLING, settling)?;
-        }
-        // Whatever happens from here on, the file says what it is.
-        recorder.writer.flush()?;
-        Ok(recorder)
+        let epoch = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos();
+        let epoch = u64::try_from(epoch).unwrap_or(u64::MAX);
+        let now = Instant::now();
+        Ok(Self { place, writer, file, channel, packets: 0, epoch, started: now, flushed: now })
     }
 
-    fn note(&mut self, name: &str, value: &impl Serialize) -> McapResult<()> {
-        let json = serde_json::to_string(value).map_err(io::Error::other)?;
-        let metadata = BTreeMap::from([(JSON.to_owned(), json)]);
-        self.writer.write_metadata(&Metadata { name: name.to_owned(), metadata })?;
-        Ok(())
+    /// The file's name now.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        self.place.path()
     }
 
     /// Appends one packet as it came.
@@ -122,13 +104,64 @@ impl Recorder {
         self.writer.flush().map_err(to_io)
     }
 
-    /// Writes the account of the run and closes the file.
+    /// Writes the account of the run and puts the file on the disk. A recording of a run that is whole takes the place of the
+    /// one that it was to replace. Returns the file's name.
     ///
     /// # Errors
-    /// As [`packet`](Self::packet).
-    pub fn finish(mut self, counters: &LossCounters) -> io::Result<()> {
-        self.note(ACCOUNT, counters).map_err(to_io)?;
-        self.writer.finish().map_err(to_io)?;
-        self.writer.into_inner().into_inner().flush()
+    /// The file's name, and why it could not be finished.
+    pub fn finish(self, account: &RunAccount) -> Result<PathBuf, (PathBuf, io::Error)> {
+        let Self { mut place, writer, file, .. } = self;
+        let settled = closed(writer, account)
+            .map_err(to_io)
+            .and_then(|()| place.settle(&file, account.missing.is_none()));
+        let path = place.path().to_owned();
+        settled.map(|()| path.clone()).map_err(|error| (path, error))
     }
+
+    /// Removes the file: nothing was recorded.
+    pub fn discard(self) {
+        let Self { place, writer, .. } = self;
+        drop(writer);
+        place.remove();
+    }
+}
+
+type Records = Writer<NoSeek<BufWriter<File>>>;
+
+/// Writes what stands before the packets; the channel of the packets.
+fn begun(
+    file: BufWriter<File>,
+    identity: &CameraIdentity,
+    setup: &MeasurementSetup,
+    settling: Option<&Settling>,
+    run: Option<u16>,
+) -> McapResult<(Records, u16)> {
+    let options = WriteOptions::new().use_chunks(false).profile(PROFILE).disable_seeking(true);
+    let mut writer = options.create(NoSeek::new(file))?;
+    let channel = writer.add_channel(0, TOPIC, &encoding(identity.protocol), &BTreeMap::new())?;
+    note(&mut writer, IDENTITY, identity)?;
+    note(&mut writer, SETUP, setup)?;
+    if let Some(settling) = settling {
+        note(&mut writer, SETTLING, settling)?;
+    }
+    if let Some(run) = run {
+        note(&mut writer, RUN, &run)?;
+    }
+    // Whatever happens from here on, the file says what it is.
+    writer.flush()?;
+    Ok((writer, channel))
+}
+
+/// Writes what stands after the packets.
+fn closed(mut writer: Records, account: &RunAccount) -> McapResult<()> {
+    note(&mut writer, ACCOUNT, account)?;
+    writer.finish()?;
+    Ok(writer.into_inner().into_inner().flush()?)
+}
+
+fn note(writer: &mut Records, name: &str, value: &impl Serialize) -> McapResult<()> {
+    let json = serde_json::to_string(value).map_err(io::Error::other)?;
+    let metadata = BTreeMap::from([(JSON.to_owned(), json)]);
+    writer.write_metadata(&Metadata { name: name.to_owned(), metadata })?;
+    Ok(())
 }

@@ -189,6 +189,7 @@ impl Live<'_> {
             Err(error @ CaptureError::Calibration(_)) => {
                 return Ok(End::Uncalibrated(causes::in_one_line(&error)));
             }
+            Err(CaptureError::Stopped) => return Ok(End::Told),
             Err(error) if !self.begun => return Err(error),
             // Its cause is not gone yet. When it is, LEDs must not go on by themselves.
             Err(CaptureError::Session(SessionError::Refused {
@@ -199,10 +200,16 @@ impl Live<'_> {
         };
         self.earlier = self.earlier + captured.counters;
         self.shared.slot.account(self.earlier);
+        let missing = captured.missing();
         Ok(match (self.fault, captured.ended) {
             // The link may have gone right after it.
             (Some(fault), _) | (None, Ended::Fault(fault)) => End::Fault(fault),
-            (None, Ended::LinkLost(error)) => End::Gone(causes::in_one_line(&error)),
+            (None, Ended::LinkLost(error) | Ended::Unconfirmed(error)) => {
+                End::Gone(causes::in_one_line(&error))
+            }
+            (None, Ended::WrongNumber { .. } | Ended::Junk { .. }) => {
+                End::Gone(missing.unwrap_or_default())
+            }
             (None, Ended::Complete | Ended::Stopped) => End::Told,
         })
     }

@@ -6,9 +6,11 @@
 use super::request::Request;
 use super::{ANSWER_TIMEOUT, Listener, SessionError};
 use crate::link::{Link, Received};
-use nirspi_wire::packet::{MAX_DEVICE_PACKET, MAX_HOST_PACKET, hello_of_any_version};
+use nirspi_wire::packet::{
+    MAX_DEVICE_PACKET, MAX_HOST_PACKET, hello_of_any_version, parse, unseal,
+};
 use nirspi_wire::{
-    Answer, Command, Deframed, Deframer, DeviceMessage, PacketError, Refusal, Reply, encode, open,
+    Answer, Command, Deframed, Deframer, DeviceMessage, PacketError, Refusal, Reply, encode,
 };
 use std::time::{Duration, Instant};
 
@@ -117,23 +119,23 @@ impl Incoming {
         let mut bytes = self.chunk.get(..length).unwrap_or(&[]);
         while let Some(found) = self.deframer.next(&mut bytes) {
             self.raw.clear();
-            let content = match found {
+            let payload = match found {
                 Deframed::TooLong => Err(PacketError::TooLong),
                 Deframed::Packet(packet) => {
                     self.raw.extend_from_slice(packet);
-                    open::<DeviceMessage<'_>>(packet)
+                    unseal(packet)
                 }
             };
             self.raw.push(0);
+            let content = payload.and_then(parse::<DeviceMessage<'_>>);
             listener.packet(&self.raw, &content);
-            match &content {
-                Ok(DeviceMessage::Reply(Reply { id, outcome })) => {
+            match (&content, payload) {
+                (Ok(DeviceMessage::Reply(Reply { id, outcome })), _) => {
                     answered(*id, outcome.as_ref().map_err(|&refusal| refusal));
                 }
-                // Perhaps the greeting of a version that says more than ours.
-                Err(PacketError::Message) => {
-                    self.raw.pop();
-                    if let Some((id, device)) = hello_of_any_version(&mut self.raw) {
+                // Perhaps the greeting of a version whose identity cannot be read.
+                (Err(_), Ok(payload)) => {
+                    if let Some((id, device)) = hello_of_any_version(payload) {
                         answered(id, Err(Refusal::Protocol { device }));
                     }
                 }

@@ -2,7 +2,7 @@
 
 use super::ANSWER_TIMEOUT;
 use super::request::{Hello, Request};
-use nirspi_wire::{PROTOCOL_VERSION, Refusal};
+use nirspi_wire::{Refusal, version};
 use thiserror::Error;
 
 /// Why a conversation ended.
@@ -24,8 +24,10 @@ pub enum SessionError {
     TurnedAway,
     /// The two sides speak different versions.
     #[error(
-        "the camera speaks protocol version {camera}, this program version {PROTOCOL_VERSION}: update {}",
-        if *.camera > PROTOCOL_VERSION { "this program" } else { "the camera's firmware (nirspi flash)" }
+        "the camera speaks protocol version {camera}, this program versions {} to {}: update {}",
+        version::MIN,
+        version::CURRENT,
+        if *.camera > version::CURRENT { "this program" } else { "the camera's firmware (nirspi flash)" }
     )]
     Version {
         /// The camera's.
@@ -75,5 +77,8 @@ fn refusal_in_words(refusal: &Refusal) -> String {
         Refusal::GatewareCrc => "the gateware's checksum is wrong".to_owned(),
         Refusal::Unsupported => "this board cannot do that".to_owned(),
         Refusal::Bus => "its FPGA does not answer".to_owned(),
+        Refusal::Unknown => {
+            "its firmware does not know this command: update the firmware (nirspi flash)".to_owned()
+        }
     }
 }

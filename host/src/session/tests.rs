@@ -3,7 +3,9 @@
 use super::*;
 use crate::link::Received;
 use nirspi_wire::packet::MAX_DEVICE_PACKET;
-use nirspi_wire::{Answer, Event, EventKind, Fault, Reply, State, Version, encode};
+use nirspi_wire::{
+    Answer, Capabilities, Event, EventKind, Fault, Reply, State, Tail, Version, encode,
+};
 use std::io;
 
 /// Answers each request with the next of these chunks.
@@ -33,7 +35,7 @@ fn event(kind: EventKind) -> Vec<u8> {
 }
 
 const IDENTITY: Identity<'static> = Identity {
-    protocol: PROTOCOL_VERSION,
+    protocol: version::CURRENT,
     firmware: Version(0, 1, 0),
     gateware: Version(0, 1, 0),
     board: "test",
@@ -42,6 +44,7 @@ const IDENTITY: Identity<'static> = Identity {
     adc_hz: 0,
     adc_bits: 14,
     wavelength_nm: 1550,
+    capabilities: Tail(Some(Capabilities::DEPTH)),
 };
 
 const STATUS: Status = Status {
@@ -89,6 +92,18 @@ fn what_a_camera_reports_with_its_greeting_is_kept_and_an_earlier_hosts_mess_is_
     );
 }
 
+#[test]
+fn a_camera_that_never_stops_reporting_fills_no_memory() {
+    let fault = event(EventKind::Fault(Fault::Duty));
+    let greeting = [fault.repeat(5000), reply(0, Answer::Hello(IDENTITY))].concat();
+    let mut chunks: Vec<Vec<u8>> = greeting.chunks(4096).map(<[u8]>::to_vec).collect();
+    chunks.push([fault.repeat(1000), reply(1, Answer::Status(STATUS))].concat());
+    let mut session = Session::open(Box::new(Scripted(chunks))).unwrap();
+    let reports = session.await_reports().unwrap();
+    assert_eq!(reports.len(), Reports::MOST);
+    assert!(reports.last().unwrap().contains("more"), "{reports:?}");
+}
+
 /// Counts the packets that it hears, damaged ones apart.
 #[derive(Default)]
 struct Count {
@@ -130,4 +145,69 @@ fn an_answer_that_belongs_to_another_command_names_the_command_that_was_asked() 
     let mut session = session(vec![reply(1, Answer::Done)]);
     let error = session.status(&mut IgnorePackets).unwrap_err();
     assert!(matches!(error, SessionError::WrongAnswer { command: "Status" }), "{error}");
+}
+
+/// A camera of fixed answers that keeps what it hears.
+struct Heard {
+    answers: Scripted,
+    requests: std::sync::Arc<std::sync::Mutex<Vec<u8>>>,
+}
+
+impl Link for Heard {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.requests.lock().unwrap().extend_from_slice(bytes);
+        Ok(())
+    }
+    fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<Received> {
+        self.answers.receive(buffer, timeout)
+    }
+}
+
+#[test]
+fn an_older_camera_is_greeted_again_in_its_own_version() {
+    // The firmware of version 1 names itself, whatever version the host has said, and has no tail.
+    let old = Identity { protocol: 1, capabilities: Tail(None), ..IDENTITY };
+    let answers = vec![reply(0, Answer::Hello(old)), reply(1, Answer::Hello(old))];
+    let requests = std::sync::Arc::default();
+    let link = Heard { answers: Scripted(answers), requests: std::sync::Arc::clone(&requests) };
+    let session = Session::open(Box::new(link)).unwrap();
+    assert_eq!(session.identity().protocol, 1);
+    assert!(session.identity().capabilities.is_empty());
+    let hello = |id, protocol| {
+        let mut room = [0; 32];
+        let command = Command::Hello { protocol };
+        encode(&nirspi_wire::Request { id, command }, &mut room).unwrap().to_vec()
+    };
+    let expected = [vec![0], hello(0, version::CURRENT), hello(1, 1)].concat();
+    assert_eq!(*requests.lock().unwrap(), expected);
+}
+
+#[test]
+fn a_camera_that_no_longer_speaks_our_version_says_what_to_update() {
+    let new = Identity { protocol: version::CURRENT + 1, ..IDENTITY };
+    let answers = vec![reply(0, Answer::Hello(new))];
+    let error = Session::open(Box::new(Scripted(answers))).err().unwrap().to_string();
+    assert!(
+        error.contains("protocol version 3") && error.contains("update this program"),
+        "{error}"
+    );
+}
+
+#[test]
+fn what_a_camera_can_do_is_named() {
+    let capabilities = Tail(Some(Capabilities(Capabilities::DEPTH.0 | 1 << 31)));
+    let identity = CameraIdentity::from(&Identity { capabilities, ..IDENTITY });
+    assert_eq!(identity.capabilities, ["depth", "capability 31"]);
+}
+
+#[test]
+fn a_message_of_a_later_version_is_passed_over() {
+    // Event 0x7f of a device message that every version has.
+    let mut room = [0; 32];
+    let later = encode(&[4u8, 0, 0x7F], &mut room).unwrap().to_vec();
+    let chunk = [later, reply(1, Answer::Register(7))].concat();
+    let mut session = session(vec![chunk]);
+    let mut heard = Count::default();
+    assert_eq!(session.command(request::ReadRegister(0), &mut heard).unwrap(), 7);
+    assert_eq!((heard.whole, heard.damaged), (1, 1), "heard, as unknown");
 }

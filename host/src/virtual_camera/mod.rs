@@ -32,7 +32,7 @@ use nirspi_mcu::{
     BoardInfo, Camera, GatewareLoader, Inputs, Limits, Micros, NoLoader, PacketSink, Ports,
 };
 use nirspi_optics::SimulatedDepth;
-use nirspi_wire::Version;
+use nirspi_wire::{Capabilities, Version};
 
 /// Bytes that wait for the host before the link counts as full: what a real device's USB stack holds.
 const PACKETS_BYTES: usize = 1 << 18;
@@ -114,15 +114,23 @@ impl<F: SimulatedFpga> VirtualCamera<F> {
     /// Powers up.
     #[must_use]
     pub fn new(fpga: F, depth: SimulatedDepth, serial: &str) -> Self {
-        Self::with_loader(fpga, NoLoader, depth, serial)
+        Self::powered_up(fpga, NoLoader, depth, info(serial))
     }
+}
+
+/// Who a virtual camera is. Its time-of-flight sensor is simulated.
+fn info(serial: &str) -> BoardInfo {
+    BoardInfo::new("virtual", serial, crate_version()).can(Capabilities::DEPTH)
 }
 
 impl<F: SimulatedFpga, G: GatewareLoader> VirtualCamera<F, G> {
     /// Powers up a board that can load gateware.
     #[must_use]
     pub fn with_loader(fpga: F, loader: G, depth: SimulatedDepth, serial: &str) -> Self {
-        let info = BoardInfo::new("virtual", serial, crate_version());
+        Self::powered_up(fpga, loader, depth, info(serial).can(Capabilities::LOAD_GATEWARE))
+    }
+
+    fn powered_up(fpga: F, loader: G, depth: SimulatedDepth, info: BoardInfo) -> Self {
         Self {
             camera: Camera::new(info, Limits::default()),
             fpga,

@@ -38,6 +38,9 @@ pub enum ShotError {
         /// Frames received until then.
         received: u64,
     },
+    /// The camera did not make the frames that were asked for.
+    #[error("the capture is not whole: {0}")]
+    NotWhole(String),
     /// The frames give no measurements.
     #[error(transparent)]
     Integrate(#[from] IntegrateError),
@@ -79,11 +82,15 @@ pub fn shoot(
     };
     let options = CaptureOptions { setup, frames: Some(frames), calibration, record: None };
     let capture = capture(&mut session, &options, watch)?;
+    let missing = capture.missing();
     match capture.ended {
         Ended::Complete => Ok(Shot { session, capture }),
         Ended::Stopped => Err(ShotError::Stopped { received: capture.counters.received }),
         Ended::Fault(fault) => Err(ShotError::Fault(fault)),
-        Ended::LinkLost(error) => Err(error.into()),
+        Ended::LinkLost(error) | Ended::Unconfirmed(error) => Err(error.into()),
+        Ended::WrongNumber { .. } | Ended::Junk { .. } => {
+            Err(ShotError::NotWhole(missing.unwrap_or_default()))
+        }
     }
 }
 

@@ -1,24 +1,25 @@
-//! What each command does, and each reason for which it is refused.
+//! Tests of the effect of each command, and of each reason for refusing a command.
 
 use super::support::*;
 use nirspi_wire::packet::MAX_HOST_PACKET;
 use nirspi_wire::register::{IDENTITY, ORDER_TABLE, Register, mode};
 use nirspi_wire::samples::Words;
 use nirspi_wire::{
-    Answer, Command, ConfigField, ConfigProblem, Configuration, DeviceMessage, EventKind, Identity,
-    PROTOCOL_VERSION, PatternOrder, RebootInto, Refusal, RunLength, SampleSource, State, Version,
+    Answer, Capabilities, Command, ConfigField, ConfigProblem, Configuration, DeviceMessage,
+    EventKind, Identity, PatternOrder, RebootInto, Refusal, RunLength, SampleSource, State, Tail,
+    Version, version,
 };
 use std::vec::Vec;
 
 #[test]
 fn hello_tells_who_the_device_is() {
     let mut bench = Bench::new();
-    let Ok(Answer::Hello(identity)) = bench.ask(Command::Hello { protocol: PROTOCOL_VERSION })
+    let Ok(Answer::Hello(identity)) = bench.ask(Command::Hello { protocol: version::CURRENT })
     else {
         panic!("no identity");
     };
     let expected = Identity {
-        protocol: PROTOCOL_VERSION,
+        protocol: version::CURRENT,
         firmware: Version(1, 2, 3),
         gateware: Version(0, 1, 0),
         board: "bench",
@@ -27,6 +28,7 @@ fn hello_tells_who_the_device_is() {
         adc_hz: 125_000_000,
         adc_bits: 14,
         wavelength_nm: 1550,
+        capabilities: Tail(Some(Capabilities::LOAD_GATEWARE)),
     };
     assert_eq!(identity, expected);
 }
@@ -39,7 +41,7 @@ fn the_longest_identity_fits_its_packet() {
     bench.camera = crate::Camera::new(info, crate::Limits::default());
     bench.fpga.registers.insert(Register::Version.address(), 0x00FF_FFFF);
     bench.next_id = u16::MAX - 1;
-    let Ok(Answer::Hello(identity)) = bench.ask(Command::Hello { protocol: PROTOCOL_VERSION })
+    let Ok(Answer::Hello(identity)) = bench.ask(Command::Hello { protocol: version::CURRENT })
     else {
         panic!("no identity");
     };
@@ -50,28 +52,28 @@ fn the_longest_identity_fits_its_packet() {
 fn a_gateware_that_does_not_answer_has_version_zero() {
     let mut bench = Bench::new();
     bench.fpga.identity = 0xFFFF_FFFF;
-    let answer = bench.ask(Command::Hello { protocol: PROTOCOL_VERSION });
+    let answer = bench.ask(Command::Hello { protocol: version::CURRENT });
     assert!(matches!(answer, Ok(Answer::Hello(identity)) if identity.gateware == Version(0, 0, 0)));
 }
 
 #[test]
 fn a_host_of_another_version_is_told_ours_and_nothing_else() {
     let mut bench = Bench::new();
-    let answer = bench.ask(Command::Hello { protocol: PROTOCOL_VERSION + 1 });
-    assert!(matches!(answer, Ok(Answer::Hello(identity)) if identity.protocol == PROTOCOL_VERSION));
-    let refused = Err(Refusal::Protocol { device: PROTOCOL_VERSION });
+    let answer = bench.ask(Command::Hello { protocol: version::CURRENT + 1 });
+    assert!(matches!(answer, Ok(Answer::Hello(identity)) if identity.protocol == version::CURRENT));
+    let refused = Err(Refusal::Protocol { device: version::CURRENT });
     assert_eq!(bench.ask(Command::Status), refused);
     assert_eq!(bench.ask(Command::Configure(SMALL)), refused);
     assert_eq!(bench.camera.state(), State::Idle);
     // A later Hello of the right version opens the session after all.
-    assert!(bench.ask(Command::Hello { protocol: PROTOCOL_VERSION }).is_ok());
+    assert!(bench.ask(Command::Hello { protocol: version::CURRENT }).is_ok());
     bench.status();
 }
 
 #[test]
 fn nothing_is_done_before_hello() {
     let mut bench = Bench::new();
-    let refused = Err(Refusal::Protocol { device: PROTOCOL_VERSION });
+    let refused = Err(Refusal::Protocol { device: version::CURRENT });
     assert_eq!(bench.ask(Command::Status), refused);
     assert_eq!(bench.ask(Command::Configure(SMALL)), refused);
 }
@@ -80,7 +82,7 @@ fn nothing_is_done_before_hello() {
 fn hello_in_mid_run_ends_the_run() {
     let mut bench = Bench::running(RunLength::Continuous);
     bench.fpga.make_frame();
-    assert!(bench.ask(Command::Hello { protocol: PROTOCOL_VERSION }).is_ok());
+    assert!(bench.ask(Command::Hello { protocol: version::CURRENT }).is_ok());
     assert!(!bench.fpga.leds_on());
     let heard = bench.heard();
     assert_eq!(frames(&heard).len(), 1);
@@ -330,6 +332,6 @@ fn a_link_that_closes_forgets_half_a_command_and_the_session() {
     let _ = bench.receive(&whole[..4]);
     bench.close_link();
     assert_eq!(bench.camera.state(), State::Idle);
-    let refused = Err(Refusal::Protocol { device: PROTOCOL_VERSION });
+    let refused = Err(Refusal::Protocol { device: version::CURRENT });
     assert_eq!(bench.ask(Command::Status), refused, "the half command does not damage this one");
 }

@@ -1,4 +1,5 @@
-//! A bitstream reaches an ECP5 in the order that the chip asks for, and a chip that does not take it is said so.
+//! Tests of the configuration of an ECP5: the order of commands, and the error for a chip that
+//! refuses the bitstream.
 
 use super::fake_ecp5::{FakeEcp5, Illness};
 use crate::ecp5::{Configuration, ConfigureError, IDCODE_LFE5UM5G_85F, PIECE_BYTES, must_load};
@@ -14,7 +15,8 @@ fn bitstream(length: usize) -> Vec<u8> {
     bytes
 }
 
-/// Polls once every 100 us; the longest that it may take is far from a second of patience for each command.
+/// Configures the chip with a poll every 100 us. The longest allowed configuration is far shorter
+/// than a second for each command.
 fn configure(chip: &mut FakeEcp5, bitstream: &[u8]) -> Result<(), ConfigureError> {
     let mut configuration = Configuration::new(IDCODE_LFE5UM5G_85F);
     for now in (0..10_000_000).step_by(100) {
@@ -90,7 +92,7 @@ fn only_a_chip_that_is_well_and_known_to_run_it_is_left_alone() {
     assert!(must_load(true, None, 7), "nobody knows what runs");
 }
 
-/// Loads, and says how many polls long the FPGA was busy.
+/// Loads the bitstream, and returns for how many polls the FPGA was busy.
 fn load(loader: &mut StagingLoader<'_, FakeEcp5>, bitstream: &[u8]) -> usize {
     loader.begin(bitstream.len() as u32).unwrap();
     bitstream.chunks(300).for_each(|piece| loader.write(piece).unwrap());

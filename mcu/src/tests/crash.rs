@@ -1,9 +1,9 @@
-//! A crash is told to the first host after it, and to no other.
+//! Tests that the first host after a crash gets the crash report, and no later host.
 
 use super::support::*;
 use crate::{BoardInfo, CRASH_WORDS, Camera, Crash, Limits, Micros};
 use nirspi_wire::message::CRASH_TEXT_MAX;
-use nirspi_wire::{Command, CrashReport, DeviceMessage, PROTOCOL_VERSION, Version};
+use nirspi_wire::{Command, CrashReport, DeviceMessage, Version, version};
 use proptest::prelude::*;
 use std::string::String;
 use std::vec::Vec;
@@ -39,23 +39,23 @@ fn crashed() -> Bench {
 #[test]
 fn the_first_host_is_told_and_the_next_is_not() {
     let mut bench = crashed();
-    let told = hello(&mut bench, PROTOCOL_VERSION);
+    let told = hello(&mut bench, version::CURRENT);
     assert_eq!(told, [(1 << 40, "panicked at run.rs:7: no".into())]);
-    assert_eq!(hello(&mut bench, PROTOCOL_VERSION), []);
+    assert_eq!(hello(&mut bench, version::CURRENT), []);
 }
 
 #[test]
 fn a_host_of_another_version_leaves_it_to_the_next() {
     let mut bench = crashed();
-    assert_eq!(hello(&mut bench, PROTOCOL_VERSION + 1), []);
-    assert_eq!(hello(&mut bench, PROTOCOL_VERSION).len(), 1);
+    assert_eq!(hello(&mut bench, version::CURRENT + 1), []);
+    assert_eq!(hello(&mut bench, version::CURRENT).len(), 1);
 }
 
 #[test]
 fn a_link_without_room_keeps_it() {
     let mut bench = crashed();
     bench.link.room = 1;
-    assert_eq!(hello(&mut bench, PROTOCOL_VERSION), []);
+    assert_eq!(hello(&mut bench, version::CURRENT), []);
     bench.link.room = 9;
     bench.poll();
     assert_eq!(reports(&bench.heard()).len(), 1);
@@ -65,8 +65,8 @@ fn a_link_without_room_keeps_it() {
 fn two_hellos_at_once_hear_of_it_once() {
     let mut bench = crashed();
     bench.link.room = 0;
-    bench.send(Command::Hello { protocol: PROTOCOL_VERSION });
-    bench.send(Command::Hello { protocol: PROTOCOL_VERSION });
+    bench.send(Command::Hello { protocol: version::CURRENT });
+    bench.send(Command::Hello { protocol: version::CURRENT });
     bench.link.room = 9;
     bench.poll();
     assert_eq!(reports(&bench.heard()).len(), 1);

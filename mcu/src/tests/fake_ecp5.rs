@@ -1,15 +1,16 @@
-//! An ECP5's slave SPI port: strict about the order of commands, and ill in ways that a test chooses.
+//! A fake ECP5 at its slave SPI port: strict about the order of commands, with faults that a test
+//! chooses.
 
 use crate::ecp5::{IDCODE_LFE5UM5G_85F, SlaveSpi};
 use crate::{BusError, Micros};
 use std::vec::Vec;
 
-/// What is wrong with it.
+/// The fault of a fake chip.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Illness {
     /// Busy for ever after the first command.
     Stuck,
-    /// Finds the bitstream damaged.
+    /// Reports a damaged bitstream.
     BadCrc,
     /// Fails to erase itself.
     Fails,
@@ -21,11 +22,11 @@ pub enum Illness {
 pub struct FakeEcp5 {
     pub idcode: u32,
     pub illness: Option<Illness>,
-    /// What it runs.
+    /// The bitstream that the chip runs.
     pub runs: Option<Vec<u8>>,
     /// Falling edges of `PROGRAMN`.
     pub restarts: u32,
-    /// Operation codes other than those of status reads.
+    /// Operation codes received, except status reads.
     pub commands: Vec<u8>,
     now: Micros,
     programn_low_since: Option<Micros>,
@@ -66,12 +67,12 @@ impl FakeEcp5 {
         Self { runs: Some(bitstream.to_vec()), ..Self::default() }
     }
 
-    /// Lets time pass; the chip minds how long something takes only where it does.
+    /// Lets time pass. Only steps that take time in the chip depend on it.
     pub fn pass(&mut self, now: Micros) {
         self.now = now;
     }
 
-    /// A command has ended.
+    /// Carries out a command after its last byte.
     fn carry_out(&mut self, sent: &[u8]) {
         let (&[code, operands @ ..], rest) = sent.split_first_chunk::<4>().expect("four bytes");
         if code == 0x3C {

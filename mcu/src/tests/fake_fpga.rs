@@ -1,4 +1,4 @@
-//! An FPGA that does what a test says: its registers, one frame, and every way to fail.
+//! A fake FPGA for tests: its registers, one frame, and every kind of failure.
 
 use crate::{BusError, FpgaBus};
 use nirspi_wire::fpga::{Header, Sums};
@@ -10,7 +10,7 @@ use nirspi_wire::{FrameFlags, crc32};
 use std::collections::BTreeMap;
 use std::vec::Vec;
 
-/// Register file and frame buffer; runs make frames only when the test says so.
+/// Register file and frame buffer. A run makes frames only when the test calls `make_frame`.
 pub struct FakeFpga {
     pub registers: BTreeMap<u16, u32>,
     pub identity: u32,
@@ -22,15 +22,15 @@ pub struct FakeFpga {
     pub clock: u64,
     pub frame: Option<Vec<u8>>,
     pub raw: Option<Vec<u8>>,
-    /// A start runs all of its frames before the next register read.
+    /// A start completes all frames of the run before the next register read.
     pub instant: bool,
-    /// Calls of `frame` and `raw` that find the transfer still under way.
+    /// Number of calls of `frame` and `raw` during which the transfer is still in progress.
     pub transfer_polls: u32,
     /// Every access fails.
     pub dead: bool,
-    /// Writes that are lost on the bus, without an error.
+    /// The bus loses every write, without an error.
     pub deaf: bool,
-    /// Writes to this address are lost.
+    /// The bus loses writes to this address.
     pub lost_address: Option<u16>,
     /// Bits of the data bus that always read 1.
     pub stuck_ones: u32,
@@ -81,12 +81,12 @@ impl FakeFpga {
         self.running = false;
     }
 
-    /// Loses its configuration: everything as after power-up.
+    /// Loses its configuration: all registers as after power-up.
     pub fn reset(&mut self) {
         *self = Self { accesses: self.accesses, ..Self::default() };
     }
 
-    /// Sums of frame `sequence`; of the test generator where the mode says so.
+    /// Sums of frame `sequence`; sums of the test generator where the mode selects it.
     pub fn sums(&self, sequence: u32) -> Vec<Sums> {
         let patterns = self.get(Register::Patterns) as usize;
         if self.get(Register::Mode) & mode::TEST_SOURCE != 0 {
@@ -97,7 +97,7 @@ impl FakeFpga {
             .collect()
     }
 
-    /// By the definition: the sample of clock t belongs to what was shown at t - latency.
+    /// Sums by definition: the sample of clock t belongs to what was shown at clock t - latency.
     fn test_sums(&self, patterns: usize) -> Vec<Sums> {
         let dwell = self.get(Register::Dwell) as usize;
         let (blank, latency) = (self.get(Register::Blank), self.get(Register::Latency) as usize);
@@ -117,7 +117,7 @@ impl FakeFpga {
         sums
     }
 
-    /// The run completes a frame.
+    /// Completes a frame of the run.
     pub fn make_frame(&mut self) {
         if !self.running {
             return;

@@ -1,4 +1,4 @@
-//! Frames, raw bursts and depth maps on their way to the host.
+//! Tests of frames, raw bursts and depth maps on their way to the host.
 
 use super::support::*;
 use crate::{Micros, RAW_PIECE_SAMPLES};
@@ -122,7 +122,7 @@ fn a_full_link_drops_frames_whole_and_counts_them() {
 #[test]
 fn a_frame_does_not_overtake_a_reply_that_waits() {
     let mut bench = Bench::configured();
-    // The reply finds no room, once when it is given and once more; then there would be some.
+    // The link refuses the reply twice, then has room.
     bench.link.refusals = 2;
     bench.send(Command::Start(RunLength::Continuous));
     bench.frame();

@@ -1,4 +1,5 @@
-//! The host port as a bus: the right length, the same bytes until the release, and never an older frame.
+//! Tests of the host port as a bus: the right length, the same bytes until the release, and never
+//! an older frame.
 
 use super::fake_fpga::FakeFpga;
 use super::support::*;
@@ -9,18 +10,18 @@ use nirspi_wire::fpga::{MAX_FRAME_BYTES, frame_bytes};
 use nirspi_wire::host_port::{READ_FRAME, READ_RAW};
 use nirspi_wire::register::{Register, control};
 use nirspi_wire::{
-    Answer, Command, DeviceMessage, EventKind, PROTOCOL_VERSION, Reply, RunLength, SelfTestReport,
+    Answer, Command, DeviceMessage, EventKind, Reply, RunLength, SelfTestReport, version,
 };
 use std::boxed::Box;
 use std::vec::Vec;
 
-/// An FPGA whose data takes a transfer to get.
+/// An FPGA whose data needs a transfer.
 #[derive(Default)]
 struct Port {
     fpga: FakeFpga,
     /// Opcode and length of every transfer.
     transfers: Vec<(u8, usize)>,
-    /// Transfers that fail before the next succeeds.
+    /// Number of transfers that fail before the next one succeeds.
     failures: u32,
 }
 
@@ -43,7 +44,7 @@ impl HostPort for Port {
 }
 
 impl Port {
-    /// Beyond the end of what there is, zeros, as the FPGA gives.
+    /// Fills bytes beyond the end of the data with zeros, as the FPGA does.
     fn transfer(&mut self, opcode: u8, into: &mut [u8]) -> Result<(), BusError> {
         self.transfers.push((opcode, into.len()));
         if self.failures > 0 {
@@ -66,7 +67,7 @@ fn bus() -> PortBus<'static, Port> {
     PortBus::new(Port::default(), Box::leak(Box::new([0; MAX_FRAME_BYTES])))
 }
 
-/// What a board does between two polls; whether there was anything to do.
+/// Does a board's work between two polls; true if there was any.
 fn serve(bus: &mut PortBus<'_, Port>) -> bool {
     let Some((port, opcode, bytes)) = bus.wanted() else { return false };
     let done = port.transfer(opcode, bytes);
@@ -125,7 +126,7 @@ fn a_transfer_that_is_wanted_no_more_is_forgotten() {
     assert_eq!(bus.frame(), Ok(None));
     control(&mut bus, control::RELEASE);
     assert!(!serve(&mut bus));
-    // Its end, should the board report it late, belongs to nothing.
+    // A late report of the end of a transfer is ignored.
     bus.transferred(Ok(()));
     assert_eq!(bus.frame(), Ok(None));
 }
@@ -193,7 +194,7 @@ impl Device {
         let info = BoardInfo::new("bench", "0001", nirspi_wire::Version(1, 2, 3));
         let camera = Camera::new(info, Limits::default());
         let mut device = Self { camera, bus: bus(), link: Link::default(), now: Micros(1_000) };
-        device.ask(Command::Hello { protocol: PROTOCOL_VERSION });
+        device.ask(Command::Hello { protocol: version::CURRENT });
         device
     }
 

@@ -1,4 +1,4 @@
-//! Laws that hold whatever host, link and FPGA do.
+//! Property tests: what holds whatever host, link and FPGA do.
 
 use super::support::*;
 use crate::{Inputs, Micros};
@@ -6,15 +6,15 @@ use nirspi_wire::fpga::Sums;
 use nirspi_wire::packet::encode;
 use nirspi_wire::register::FaultCode;
 use nirspi_wire::{
-    Answer, Command, Configuration, DeviceMessage, EventKind, GatewareChunk, PROTOCOL_VERSION,
-    PatternOrder, RebootInto, RunLength, SampleSource, State,
+    Answer, Command, Configuration, DeviceMessage, EventKind, GatewareChunk, PatternOrder,
+    RebootInto, RunLength, SampleSource, State, version,
 };
 use proptest::collection;
 use proptest::prelude::*;
 use std::vec;
 use std::vec::Vec;
 
-/// What can happen during a run.
+/// An event during a run.
 #[derive(Debug, Clone)]
 enum Happening {
     Frame,
@@ -87,7 +87,7 @@ proptest! {
         match end {
             End::Stop => { let _ = bench.receive(&packet(8, Command::Stop)); }
             End::Hello => {
-                let _ = bench.receive(&packet(8, Command::Hello { protocol: PROTOCOL_VERSION }));
+                let _ = bench.receive(&packet(8, Command::Hello { protocol: version::CURRENT }));
             }
             End::Fault => bench.fpga.trip(FaultCode::Duty),
             End::Interlock => bench.inputs.interlock_closed = false,
@@ -95,7 +95,7 @@ proptest! {
         for happening in &afterwards {
             happen(&mut bench, happening);
         }
-        // Whatever was refused or did not fit above: now it ends.
+        // With a working bus, the run ends even if a stop was refused or had no room before.
         bench.fpga.dead = false;
         bench.inputs.interlock_closed = false;
         bench.link.room = usize::MAX;
@@ -123,19 +123,20 @@ proptest! {
         let accounted =
             sent.len() as u32 + frames_dropped + fpga_frames_lost + fpga_frames_corrupt;
         prop_assert_eq!(accounted, frames_made);
-        // A bus that died with a frame in flight may have hidden the last ones from the firmware.
+        // A bus that died during the transfer of a frame may have hidden the last frames from the
+        // firmware.
         if !afterwards.iter().any(|happening| matches!(happening, Happening::BusDies)) {
             prop_assert_eq!(frames_made, made);
         }
     }
 }
 
-/// What a host, a user or the weather can do.
+/// An action of the host, a user or the environment.
 #[derive(Debug, Clone)]
 enum Step {
     Command(Order),
     Bytes(Vec<u8>),
-    /// Intact, with any content.
+    /// An intact packet with any content.
     Sealed([u8; 12]),
     Poll(u64),
     Frame,
@@ -149,7 +150,7 @@ enum Step {
     Close,
 }
 
-/// An owned command.
+/// A command with owned data.
 #[derive(Debug, Clone)]
 enum Order {
     Hello(u16),
@@ -235,7 +236,7 @@ fn bytes_of(id: u16, order: &Order) -> Vec<u8> {
     packet(id, command)
 }
 
-/// A host that offers again what was not taken.
+/// A host that offers the bytes that were not taken again.
 #[derive(Default)]
 struct Host {
     unsent: Vec<u8>,
@@ -264,7 +265,7 @@ fn take(bench: &mut Bench, host: &mut Host, step: &Step) {
             host.push(bench);
         }
         Step::Bytes(bytes) => {
-            // Not running into a command that follows.
+            // The delimiter keeps these bytes apart from the next command.
             host.unsent.extend(bytes);
             host.unsent.push(0);
             host.push(bench);
@@ -318,7 +319,7 @@ proptest! {
         for step in &steps {
             take(&mut bench, &mut host, step);
             if !bench.fpga.deaf && bench.fpga.leds_on() {
-                // A stop that was lost on the bus is repeated by the next poll.
+                // The next poll repeats a stop that the bus has lost.
                 bench.poll();
             }
             if !bench.fpga.deaf && bench.fpga.leds_on() {
@@ -367,7 +368,8 @@ proptest! {
                 let length = pieces.next().unwrap_or(usize::MAX).min(rest.len());
                 let taken = bench.receive(&rest[..length]);
                 rest = &rest[taken..];
-                // A poll only where the camera asks for one, so that both polls fall alike.
+                // The bench polls only where the camera asks for a poll, so both cameras are polled
+                // at the same points.
                 if taken < length {
                     bench.poll();
                 }

@@ -1,4 +1,4 @@
-//! Gateware arrives in order and whole, or not at all.
+//! Tests that gateware arrives in order and whole, or not at all.
 
 use super::support::*;
 use nirspi_wire::{Answer, Command, GatewareChunk, Refusal, State, crc32};

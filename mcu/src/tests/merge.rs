@@ -1,4 +1,4 @@
-//! Transfers of one length, from packets of any.
+//! Tests that packets of any length become transfers of one length.
 
 use crate::Merger;
 use proptest::prelude::*;
@@ -6,7 +6,7 @@ use std::vec::Vec;
 
 const N: usize = 8;
 
-/// What a reader on the other side gets: transfers, and the bytes of each bulk read that one ended.
+/// What a reader on the other side gets: the transfers, and the bytes of each bulk read.
 fn send(packets: &[Vec<u8>]) -> (Vec<Vec<u8>>, Vec<Vec<u8>>) {
     let mut merger = Merger::<N>::new();
     let mut transfers = Vec::new();

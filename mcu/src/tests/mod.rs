@@ -13,3 +13,4 @@ mod merge;
 mod safety;
 mod selftest;
 pub(crate) mod support;
+mod versions;

@@ -1,12 +1,13 @@
-//! One test a rule: LEDs off within one poll, an event, no start until the cause is gone and acknowledged.
+//! One test for each safety rule: LEDs off within one poll, an event, and no start until the cause
+//! is gone and acknowledged.
 
 use super::support::*;
 use crate::Micros;
 use nirspi_wire::register::{FaultCode, IDENTITY, Register};
 use nirspi_wire::{Answer, Command, Configuration, EventKind, Fault, Refusal, RunLength, State};
 
-/// Breaks something in a running camera, lets `wait` pass, polls once, and looks at everything that a fault
-/// promises; then mends it and looks that the camera comes back.
+/// Breaks something in a running camera, lets `wait` pass, polls once, and checks everything that a
+/// fault must cause; then repairs the cause and checks that the camera works again.
 fn expect_fault(break_it: impl Fn(&mut Bench), wait: u64, fault: Fault, mend: impl Fn(&mut Bench)) {
     let mut bench = Bench::running(RunLength::Continuous);
     bench.frame();
@@ -199,7 +200,7 @@ fn an_over_temperature_lasts_until_the_release_point() {
     assert_eq!(bench.ask(Command::Configure(SMALL)), Err(Refusal::Fault(still_hot)));
     bench.inputs.temperature_centi_celsius = Some(5_000);
     assert_eq!(bench.ask(Command::Configure(SMALL)), Ok(Answer::Done));
-    // Between the two points nothing speaks against running on.
+    // Between release point and trip point a running camera goes on.
     bench.inputs.temperature_centi_celsius = Some(5_999);
     assert_eq!(bench.ask(Command::Start(RunLength::Continuous)), Ok(Answer::Done));
     bench.poll();
@@ -213,7 +214,7 @@ fn a_fault_is_not_acknowledged_while_its_cause_stands() {
     bench.poll();
     let refused = Err(Refusal::Fault(Fault::Interlock));
     assert_eq!(bench.ask(Command::Configure(SMALL)), refused);
-    // The FPGA's own input counts as much as the board's.
+    // The FPGA's own interlock input counts as much as the board's.
     bench.inputs.interlock_closed = true;
     bench.fpga.interlock_closed = false;
     assert_eq!(bench.ask(Command::Configure(SMALL)), refused);
@@ -280,7 +281,7 @@ fn a_start_that_the_fpga_does_not_take_is_a_fault() {
     assert_eq!(refused, Err(Refusal::Fault(Fault::Interlock)));
     assert_eq!(bench.heard_events(), [EventKind::Fault(Fault::Interlock)]);
 
-    // Settings that were lost since they were written.
+    // The FPGA has lost its settings since they were written.
     let mut bench = Bench::configured();
     bench.fpga.reset();
     let refused = bench.ask(Command::Start(RunLength::Continuous));

@@ -1,4 +1,4 @@
-//! Each check of the self-test passes on a good device and fails on one that is broken in just that way.
+//! Tests that each check passes on a good device and fails on a device with one matching fault.
 
 use super::support::*;
 use nirspi_wire::register::{Register, mode};
@@ -48,7 +48,7 @@ fn the_test_frame_is_one_sweep_and_nothing_is_taken_meanwhile() {
 fn a_wrong_sum_fails_the_test_frame() {
     let mut bench = Bench::configured();
     bench.send(Command::SelfTest);
-    // One clock of latency too many: intact, yet wrong.
+    // One clock of latency too many gives an intact frame with wrong sums.
     bench.fpga.registers.insert(Register::Latency.address(), 4);
     bench.fpga.make_frame();
     bench.poll();

@@ -1,4 +1,5 @@
-//! A link with as much room as a test gives, and a camera between it and a fake FPGA.
+//! Test support: a link with as much room as a test gives, and a camera between that link and a
+//! fake FPGA.
 
 use super::fake_fpga::FakeFpga;
 use crate::{
@@ -7,16 +8,16 @@ use crate::{
 };
 use nirspi_wire::packet::{MAX_HOST_PACKET, encode, open};
 use nirspi_wire::{
-    Answer, Command, Configuration, DeviceMessage, Event, EventKind, Frame, PROTOCOL_VERSION,
-    PatternOrder, Refusal, Reply, Request, RunLength, SampleSource, Status, Version,
+    Answer, Capabilities, Command, Configuration, DeviceMessage, Event, EventKind, Frame,
+    PatternOrder, Refusal, Reply, Request, RunLength, SampleSource, Status, Version, version,
 };
 use std::boxed::Box;
 use std::vec::Vec;
 
-/// Takes `room` more packets.
+/// A link that takes `room` more packets.
 pub struct Link {
     pub room: usize,
-    /// Claims that find no room before the next one does.
+    /// Number of claims that find no room before the next claim succeeds.
     pub refusals: u32,
     pub packets: Vec<Vec<u8>>,
     staging: Vec<u8>,
@@ -47,7 +48,7 @@ impl PacketSink for Link {
     }
 }
 
-/// Keeps what it was given.
+/// A loader that keeps the bytes it gets.
 #[derive(Default)]
 pub struct Loader {
     pub unsupported: bool,
@@ -77,7 +78,7 @@ impl GatewareLoader for Loader {
     }
 }
 
-/// A camera with everything around it.
+/// A camera with a fake FPGA, a link and a loader.
 pub struct Bench {
     pub camera: Camera,
     pub fpga: FakeFpga,
@@ -105,9 +106,10 @@ pub const SMALL: Configuration<'static> = Configuration {
 };
 
 impl Bench {
-    /// After power-up and the first poll.
+    /// A bench after power-up and the first poll.
     pub fn new() -> Self {
-        let info = BoardInfo::new("bench", "0001", Version(1, 2, 3));
+        let info =
+            BoardInfo::new("bench", "0001", Version(1, 2, 3)).can(Capabilities::LOAD_GATEWARE);
         let mut bench = Self {
             camera: Camera::new(info, Limits::default()),
             fpga: FakeFpga::default(),
@@ -121,22 +123,22 @@ impl Bench {
         bench
     }
 
-    /// With a session.
+    /// A bench with a session.
     pub fn open() -> Self {
         let mut bench = Self::new();
-        let answer = bench.ask(Command::Hello { protocol: PROTOCOL_VERSION });
+        let answer = bench.ask(Command::Hello { protocol: version::CURRENT });
         assert!(matches!(answer, Ok(Answer::Hello(_))), "{answer:?}");
         bench
     }
 
-    /// With a configuration.
+    /// A bench with a configuration.
     pub fn configured() -> Self {
         let mut bench = Self::open();
         assert_eq!(bench.ask(Command::Configure(SMALL)), Ok(Answer::Done));
         bench
     }
 
-    /// With LEDs on.
+    /// A bench with the LEDs on.
     pub fn running(length: RunLength) -> Self {
         let mut bench = Self::configured();
         assert_eq!(bench.ask(Command::Start(length)), Ok(Answer::Done));
@@ -174,7 +176,7 @@ impl Bench {
         self.poll()
     }
 
-    /// Sends a command whole; returns its id.
+    /// Sends a whole command; returns its id.
     pub fn send(&mut self, command: Command<'_>) -> u16 {
         let id = self.next_id;
         self.next_id += 1;
@@ -183,7 +185,7 @@ impl Bench {
         id
     }
 
-    /// Sends a command and polls until its reply comes; what comes before it stays on the link.
+    /// Sends a command and polls until its reply comes. Messages before the reply stay on the link.
     pub fn ask(&mut self, command: Command<'_>) -> Result<Answer<'static>, Refusal> {
         let id = self.send(command);
         for _ in 0..10 {
@@ -210,7 +212,7 @@ impl Bench {
         }
     }
 
-    /// Takes what the link has carried.
+    /// Takes the messages that the link has carried.
     pub fn heard(&mut self) -> Vec<DeviceMessage<'static>> {
         self.link.packets.drain(..).map(|packet| message(&packet)).collect()
     }
@@ -219,7 +221,7 @@ impl Bench {
         events(&self.heard())
     }
 
-    /// The FPGA completes a frame, and the camera looks once.
+    /// The FPGA completes a frame, and the camera polls once.
     pub fn frame(&mut self) {
         self.fpga.make_frame();
         self.after(100);
@@ -231,7 +233,7 @@ pub fn packet(id: u16, command: Command<'_>) -> Vec<u8> {
     encode(&Request { id, command }, &mut room).unwrap().to_vec()
 }
 
-/// Opens a packet; it stays in memory for the rest of the test.
+/// Decodes a packet. Its memory is leaked, so that the message can borrow it for the whole test.
 pub fn message(packet: &[u8]) -> DeviceMessage<'static> {
     let (0, encoded) = packet.split_last().map(|(&last, rest)| (last, rest)).unwrap() else {
         panic!("no delimiter");

@@ -1,7 +1,7 @@
 //! The contract of the camera: what crosses a boundary between two machines, and nothing else.
 //!
-//! * [`message`]: commands of the host, replies and stream of the device (protocol version
-//!   [`PROTOCOL_VERSION`]),
+//! * [`message`]: commands of the host, replies and stream of the device,
+//! * [`version`]: versions of the protocol, and the rules by which it grows,
 //! * [`packet`]: how a message becomes bytes on a link: postcard, CRC-32, COBS, a zero byte,
 //! * [`samples`]: the integrated ADC samples of a frame,
 //! * [`register`]: the register map of the FPGA, its fault codes and bits,
@@ -21,12 +21,6 @@
 //! |---|---|
 //! | `hdl/rtl/register_map.veryl`, generated from here | `hdl/tests/rtl/stale.rs` |
 //! | `nirspi_optics::instrument` | `nirspi`: `the_optics_have_the_instruments_numbers` |
-//!
-//! # Versions
-//! [`PROTOCOL_VERSION`] changes whenever the bytes of any message change. The bytes of every message of
-//! a released version are frozen in `tests/v1.rs`. `Hello`, the first field of its answer and
-//! [`Refusal::Protocol`] never change, in no version: so two sides that cannot talk can still say so, naming
-//! both versions.
 #![no_std]
 
 #[cfg(test)]
@@ -40,24 +34,24 @@ pub mod register;
 pub mod samples;
 pub mod tunnel;
 pub mod usb;
+pub mod version;
 pub mod walsh;
 
 mod crc32;
 mod display;
 mod stuffing;
+mod tail;
 
 pub use crc32::{Crc32, crc32};
 pub use message::{
-    Answer, Command, ConfigField, ConfigProblem, Configuration, CrashReport, Depth, DeviceMessage,
-    Event, EventKind, Fault, Frame, FrameFlags, GatewareChunk, Identity, PatternOrder, Raw,
-    RebootInto, Refusal, Reply, Request, RunLength, SampleSource, SelfTestReport, State, Status,
-    Version,
+    Answer, Capabilities, Command, ConfigField, ConfigProblem, Configuration, CrashReport, Depth,
+    DeviceMessage, Event, EventKind, Fault, Frame, FrameFlags, GatewareChunk, Identity,
+    PatternOrder, Raw, RebootInto, Refusal, Reply, Request, RunLength, SampleSource,
+    SelfTestReport, State, Status, Version,
 };
 pub use packet::{Deframed, Deframer, PacketError, encode, open};
 pub use samples::Samples;
-
-/// Version of the wire protocol that this crate speaks.
-pub const PROTOCOL_VERSION: u16 = 1;
+pub use tail::Tail;
 
 /// LEDs along one edge of the array (paper, section 2.A).
 pub const SIDE: u8 = 32;

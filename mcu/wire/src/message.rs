@@ -1,8 +1,10 @@
-//! Protocol version 1: commands of the host, replies and stream of the device.
+//! Commands of the host, replies and stream of the device.
 //!
-//! The one law: these types *are* the format. Adding, removing or reordering a variant or a field changes
-//! bytes, and so the protocol version (see the crate's page and `tests/v1.rs`).
+//! # Invariant
+//! These types are the format of every version from [`version::MIN`](crate::version::MIN) on: variants and tails are
+//! appended, everything else stays ([`version`](crate::version) has the rules; `tests/frozen` holds the bytes).
 
+use crate::Tail;
 use crate::samples::{Block, Samples, Words};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -28,12 +30,12 @@ impl core::fmt::Display for Version {
 pub struct Request<'a> {
     /// Chosen by the host.
     pub id: u16,
-    /// What to do.
+    /// The command.
     #[serde(borrow)]
     pub command: Command<'a>,
 }
 
-/// What a host can ask for.
+/// A command of the host.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Command<'a> {
     /// First command of a session. Its bytes never change.
@@ -48,7 +50,7 @@ pub enum Command<'a> {
     Start(RunLength),
     /// Ends frames. LEDs go off.
     Stop,
-    /// Asks for [`Status`]; any command resets [`HOST_SILENCE_US`].
+    /// Asks for [`Status`]. Like every command it shows that the host is alive ([`HOST_SILENCE_US`]).
     Status,
     /// Checks the device without any optics.
     SelfTest,
@@ -64,11 +66,11 @@ pub enum Command<'a> {
         /// Number of samples, at most [`RAW_SAMPLES_MAX`](crate::register::RAW_SAMPLES_MAX).
         samples: u16,
     },
-    /// Restarts the device.
+    /// Switches the LEDs off and restarts the device.
     Reboot(RebootInto),
 }
 
-/// How long to run.
+/// How long a run lasts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum RunLength {
     /// Until `Stop`.
@@ -77,7 +79,7 @@ pub enum RunLength {
     Frames(u32),
 }
 
-/// What to run after a restart.
+/// What the device starts after a restart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum RebootInto {
     /// The camera application.
@@ -98,11 +100,12 @@ pub enum SampleSource {
 /// Which pattern is shown k-th.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum PatternOrder<'a> {
-    /// Pattern k.
+    /// Pattern k is Hadamard row k.
     Natural,
-    /// Pattern [`walsh::sequency`](crate::walsh::sequency)`(k)`.
+    /// Pattern k is the Hadamard row with k sign changes ([`walsh::sequency`](crate::walsh::sequency)).
     Sequency,
-    /// The k-th entry of a table with one entry a pattern shown, each a pattern number, none twice.
+    /// Pattern k is the Hadamard row that entry k of this table names. The table has one entry for each pattern shown, and
+    /// no row twice.
     #[serde(borrow)]
     Table(Words<'a>),
 }
@@ -115,11 +118,11 @@ pub struct Configuration<'a> {
     pub order: PatternOrder<'a>,
     /// Patterns of a sweep: the first this many of the order, 1 to 1024.
     pub patterns: u16,
-    /// Shows each pattern's complement after it and subtracts.
+    /// Whether each pattern is followed by its complement, whose sum is subtracted.
     pub differential: bool,
     /// Clocks that each pattern is shown: 5 is 25 MHz.
     pub clocks_per_pattern: u16,
-    /// Samples left out at the start of each pattern, while LEDs and amplifier settle.
+    /// Samples left out at the start of each pattern, in which LEDs and amplifier settle.
     pub blanked: u16,
     /// Clocks from light to sample, 0 to 63.
     pub adc_latency: u8,
@@ -131,12 +134,12 @@ pub struct Configuration<'a> {
     pub over_range_trip: u32,
 }
 
-/// A piece of a bitstream.
+/// A piece of an FPGA bitstream.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct GatewareChunk<'a> {
-    /// Where it belongs: pieces come in order, the first at 0.
+    /// Offset of the piece in the bitstream, in bytes. Pieces come in order, the first at 0.
     pub offset: u32,
-    /// Length of the whole bitstream.
+    /// Length of the whole bitstream in bytes.
     pub total: u32,
     /// CRC-32 of the whole bitstream.
     pub crc: u32,
@@ -161,10 +164,10 @@ mod block {
     }
 }
 
-/// Device to host.
+/// A message of the device to the host.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum DeviceMessage<'a> {
-    /// Answer to a command.
+    /// The answer to a command.
     #[serde(borrow)]
     Reply(Reply<'a>),
     /// One integrated measurement of all patterns.
@@ -173,30 +176,42 @@ pub enum DeviceMessage<'a> {
     Raw(Raw<'a>),
     /// A time-of-flight depth map.
     Depth(Depth<'a>),
-    /// Something happened.
+    /// An event in the camera.
     Event(Event),
-    /// The firmware had crashed before this start; once, after the first `Hello`.
+    /// A report of the crash that ended the firmware's last start: once, after the first `Hello`.
     #[serde(borrow)]
     Crash(CrashReport<'a>),
 }
 
-/// Answer to the command of the same id.
+impl DeviceMessage<'_> {
+    /// The first protocol version that has this message. A session of an older version does not carry it.
+    #[must_use]
+    pub const fn since(&self) -> u16 {
+        match self {
+            Self::Reply(Reply { outcome: Err(Refusal::Unknown), .. }) => 2,
+            Self::Reply(_) | Self::Frame(_) | Self::Raw(_) | Self::Depth(_) | Self::Crash(_) => 1,
+            Self::Event(event) => event.kind.since(),
+        }
+    }
+}
+
+/// The answer to the request of the same number.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Reply<'a> {
     /// The request's number.
     pub id: u16,
-    /// What came of it.
+    /// The answer, or the reason of the refusal.
     #[serde(borrow)]
     pub outcome: Result<Answer<'a>, Refusal>,
 }
 
-/// A command that was carried out.
+/// The answer to a command that was carried out.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Answer<'a> {
-    /// Who the device is. The first field never moves.
+    /// To `Hello`: who the device is.
     #[serde(borrow)]
     Hello(Identity<'a>),
-    /// `Configure`, `Start`, `Stop`, `RawBurst`, `Reboot`: done or under way.
+    /// To `Configure`, `Start`, `Stop`, `RawBurst` and `Reboot`: the device has done it or has begun.
     Done,
     /// To `Status`.
     Status(Status),
@@ -204,9 +219,9 @@ pub enum Answer<'a> {
     SelfTest(SelfTestReport),
     /// To `ReadRegister`.
     Register(u32),
-    /// To `LoadGateware`: bytes taken so far.
+    /// To `LoadGateware`: the device has taken the piece.
     Gateware {
-        /// Where the next piece belongs.
+        /// Offset of the next piece in the bitstream.
         next_offset: u32,
     },
 }
@@ -214,61 +229,101 @@ pub enum Answer<'a> {
 /// Who the device is.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Identity<'a> {
-    /// Protocol version of the device. First in every version.
+    /// Protocol version of the session; the device's own where there is no session. The first field in every version.
     pub protocol: u16,
-    /// Firmware version.
+    /// Version of the firmware.
     pub firmware: Version,
-    /// Gateware version; 0.0.0 where no gateware answers.
+    /// Version of the gateware; 0.0.0 where no gateware answers.
     pub gateware: Version,
-    /// Board name, as of its folder under `boards/`, or `virtual`.
+    /// Name of the board: its folder under `boards/`, or `virtual`.
     pub board: &'a str,
     /// Serial number, unique to the device.
     pub serial: &'a str,
     /// LEDs along one edge.
     pub side: u8,
-    /// ADC sample rate.
+    /// Sample rate of the ADC in Hz.
     pub adc_hz: u32,
-    /// ADC resolution.
+    /// Resolution of the ADC in bits.
     pub adc_bits: u8,
-    /// Wavelength of the LEDs.
+    /// Wavelength of the LEDs in nm.
     pub wavelength_nm: u16,
+    /// What the device can do. Since version 2.
+    pub capabilities: Tail<Capabilities>,
 }
 
-/// Why a command was not carried out; nothing has changed.
+/// What a camera can do, one bit each.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Capabilities(pub u32);
+
+impl Capabilities {
+    /// The camera has a time-of-flight sensor and sends depth maps.
+    pub const DEPTH: Self = Self(1 << 0);
+    /// The camera takes FPGA bitstreams over the link (`LoadGateware`).
+    pub const LOAD_GATEWARE: Self = Self(1 << 1);
+    /// The camera can restart into its chip's boot loader.
+    pub const BOOTLOADER: Self = Self(1 << 2);
+
+    /// The first protocol version that has capabilities.
+    pub const SINCE: u16 = 2;
+
+    /// Name of every capability, by bit.
+    pub const NAMES: [(Self, &'static str); 3] = [
+        (Self::DEPTH, "depth"),
+        (Self::LOAD_GATEWARE, "load gateware"),
+        (Self::BOOTLOADER, "boot loader"),
+    ];
+
+    /// Whether all bits of `other` are set.
+    #[must_use]
+    pub const fn contains(self, other: Self) -> bool {
+        self.0 & other.0 == other.0
+    }
+
+    /// Bits of both.
+    #[must_use]
+    pub const fn with(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+}
+
+/// Why a command was not carried out. A refused command has changed nothing, except that a `Bus` refusal of `Configure`
+/// leaves the device without a configuration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Refusal {
     /// The device speaks another protocol version.
     Protocol {
-        /// The device's.
+        /// The newest version that the device speaks.
         device: u16,
     },
-    /// Not in this state.
+    /// The command is not allowed in this state.
     State(State),
-    /// The configuration cannot be shown.
+    /// The device cannot show this configuration.
     Configuration(ConfigProblem),
-    /// A fault stands whose cause is not gone.
+    /// The cause of this fault is still there.
     Fault(Fault),
     /// The FPGA has no such register.
     NoSuchRegister {
-        /// The address asked for.
+        /// The address in the command.
         address: u16,
     },
-    /// More raw samples than the FPGA holds, or none.
+    /// A raw burst of no sample, or of more samples than the FPGA holds.
     RawLength {
-        /// The most there are.
+        /// The most samples that the FPGA holds.
         max: u16,
     },
-    /// This piece of bitstream was not expected here.
+    /// A piece of the bitstream out of order.
     GatewareOffset {
-        /// The one that was.
+        /// Offset of the piece that the device expects.
         expected: u32,
     },
-    /// The bitstream's checksum is wrong; start over.
+    /// The checksum of the bitstream is wrong. The host starts again with the first piece.
     GatewareCrc,
-    /// The board cannot do this.
+    /// This board does not have what the command needs.
     Unsupported,
     /// The FPGA did not answer on its bus.
     Bus,
+    /// The device does not know this command: the host speaks a newer version. Since version 2.
+    Unknown,
 }
 
 /// A part of [`Configuration`].
@@ -297,25 +352,25 @@ pub enum ConfigField {
 pub enum ConfigProblem {
     /// A number outside its range.
     OutOfRange {
-        /// Which.
+        /// The setting.
         field: ConfigField,
-        /// As received.
+        /// The value in the command.
         found: u32,
         /// Least allowed.
         min: u32,
         /// Most allowed.
         max: u32,
     },
-    /// An order table that repeats a pattern or names one that does not exist.
+    /// An order table that names a row twice, or a row that does not exist.
     OrderEntry {
-        /// Where in the table.
+        /// Place in the table, from 0.
         index: u16,
-        /// What stands there.
+        /// The row at this place.
         found: u16,
     },
 }
 
-/// What the device is doing.
+/// State of the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum State {
     /// Nothing configured.
@@ -324,7 +379,7 @@ pub enum State {
     Configured,
     /// LEDs on, frames or a raw burst under way.
     Running,
-    /// LEDs off until the cause is gone and `Configure` acknowledges it.
+    /// The LEDs stay off until the cause of the fault is gone and `Configure` acknowledges the fault.
     Fault,
 }
 
@@ -340,26 +395,26 @@ pub enum Fault {
     },
     /// The temperature sensor is broken or out of its range.
     TemperatureSensor,
-    /// More light over time than the array stands.
+    /// The LEDs were lit for a larger share of time than the array allows.
     Duty,
-    /// Too many over-range samples.
+    /// More over-range samples in one frame than the configuration allows.
     OverRange,
-    /// The firmware did not look after the FPGA in time.
+    /// The firmware did not access the FPGA in time.
     FpgaWatchdog,
-    /// The FPGA does not answer, or with another identity.
+    /// The FPGA does not answer, or answers with another identity.
     FpgaAbsent {
         /// What the identity register read.
         identity: u32,
     },
-    /// The FPGA refused a configuration that the firmware had let pass.
+    /// The FPGA refused a configuration that the firmware had accepted.
     FpgaConfiguration,
-    /// No frame came for many times its duration.
+    /// The FPGA completed no frame for many times the duration of a frame.
     FpgaStalled,
-    /// The host fell silent while LEDs were on.
+    /// The host sent no command for [`HOST_SILENCE_US`] while LEDs were on.
     HostSilent,
 }
 
-/// Bits that say what happened to a frame; the same in the FPGA's header and on the wire.
+/// What happened to a frame, one bit each; the same bits in the FPGA's header and on the wire.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct FrameFlags(pub u16);
 
@@ -391,16 +446,16 @@ impl FrameFlags {
 /// One integrated measurement: `samples[k]` belongs to the pattern shown k-th.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Frame<'a> {
-    /// Number of the run since power-up, modulo 2^16: tells a straggler of an earlier run from this one's.
+    /// Number of the run since power-up, modulo 2^16. A frame of an earlier run has another number.
     pub run: u16,
     /// Number of the frame since `Start`, counted in the FPGA, so a gap is a loss. Wraps at 2^32: after two
     /// days at the fastest rate.
     pub sequence: u32,
-    /// Device time of its first pattern.
+    /// Device time of the frame's first pattern.
     pub device_time_us: u64,
     /// Sweeps summed.
     pub sweeps: u32,
-    /// What happened to it.
+    /// What happened to the frame.
     pub flags: FrameFlags,
     /// Summed ADC counts, one a pattern shown.
     #[serde(borrow)]
@@ -431,54 +486,64 @@ pub struct Depth<'a> {
     pub distances_mm: Words<'a>,
 }
 
-/// What a crash of the firmware has left behind.
+/// The record that a crash of the firmware leaves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CrashReport<'a> {
-    /// When, on the clock of the start that ended with it.
+    /// Time of the crash since the start that it ended.
     pub uptime_us: u64,
-    /// Where and why, at most [`CRASH_TEXT_MAX`] bytes.
+    /// Place and reason, at most [`CRASH_TEXT_MAX`] bytes.
     pub text: &'a str,
 }
 
-/// Something happened.
+/// An event in the camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Event {
-    /// When.
+    /// Device time of the event.
     pub device_time_us: u64,
-    /// What.
+    /// The event.
     pub kind: EventKind,
 }
 
-/// What happened.
+/// What an event is about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum EventKind {
     /// The LEDs went off for this reason.
     Fault(Fault),
     /// A run has ended, by its length, `Stop` or a fault; comes after its last frame.
     RunEnded {
-        /// Which run.
+        /// Number of the run.
         run: u16,
         /// Frames that the FPGA has completed: sequence numbers 0 to this less one.
         frames_made: u32,
-        /// Those of them that the link had no room for.
+        /// Frames of the run for which the link had no room.
         frames_dropped: u32,
-        /// Those of them that were lost in the FPGA: the firmware was too slow.
+        /// Frames of the run that were lost in the FPGA because the firmware was too slow.
         fpga_frames_lost: u32,
-        /// Those of them that were damaged between FPGA and firmware.
+        /// Frames of the run that were damaged between FPGA and firmware.
         fpga_frames_corrupt: u32,
     },
-    /// A raw burst could not be sent whole: the link had no room.
+    /// A raw burst was not sent whole because the link had no room.
     RawDropped,
-    /// Bytes from the host that were no command.
+    /// The host sent bytes that are not a command.
     CommandDamaged,
 }
 
-/// How the device is.
+impl EventKind {
+    /// The first protocol version that has this event.
+    #[must_use]
+    pub const fn since(&self) -> u16 {
+        match self {
+            Self::Fault(_) | Self::RunEnded { .. } | Self::RawDropped | Self::CommandDamaged => 1,
+        }
+    }
+}
+
+/// State, counters and sensors of the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Status {
-    /// What it is doing.
+    /// State of the device.
     pub state: State,
-    /// The fault that stands.
+    /// The fault that keeps the LEDs off.
     pub fault: Option<Fault>,
     /// Time since power-up: the clock of every `device_time_us`.
     pub uptime_us: u64,
@@ -494,7 +559,7 @@ pub struct Status {
     pub fpga_frames_lost: u32,
     /// Frames damaged between FPGA and firmware.
     pub fpga_frames_corrupt: u32,
-    /// Packets from the host that were no command, since power-up.
+    /// Packets from the host that were not commands, since power-up.
     pub commands_damaged: u32,
     /// LED array, hundredths of a degree Celsius; `i16::MIN` where the sensor does not answer.
     pub temperature_centi_celsius: i16,

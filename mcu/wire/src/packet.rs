@@ -2,9 +2,13 @@
 //!
 //! `packet = COBS( postcard(message) ++ CRC-32 little-endian ) ++ 0x00`
 //!
-//! The one law: a receiver that joins anywhere, or meets damage, is in step again after the next zero
-//! byte, and damaged bytes never become a message. Empty packets are allowed and mean nothing, so a
-//! sender may put a zero first to cut off whatever an earlier session left half sent.
+//! Empty packets are allowed and mean nothing, so a sender may put a zero first to cut off what an earlier session left
+//! half sent.
+//!
+//! # Invariant
+//! A receiver that joins anywhere, or meets damage, is in step again after the next zero byte
+//! (`tests/packets.rs`: `a_stream_with_a_gap_is_in_step_after_the_next_delimiter`), and damaged bytes never become a
+//! message (`a_damaged_byte_never_becomes_another_message`).
 
 use crate::stuffing::Stuffer;
 use crate::{Crc32, crc32};
@@ -41,7 +45,7 @@ pub enum PacketError {
     Cobs,
     /// The checksum does not match: bytes were damaged.
     Crc,
-    /// The checksum is right, yet no message of this version: the sender speaks another one.
+    /// The checksum is right and the message is unknown: the sender speaks a newer version.
     Message,
 }
 
@@ -52,7 +56,7 @@ impl core::fmt::Display for PacketError {
             Self::TooLong => "no delimiter within the longest packet",
             Self::Cobs => "broken COBS code",
             Self::Crc => "wrong CRC-32",
-            Self::Message => "intact, but no message of this protocol version",
+            Self::Message => "an intact message that this protocol version does not know",
         })
     }
 }
@@ -104,27 +108,41 @@ pub fn encode<'b, T: Serialize>(message: &T, out: &'b mut [u8]) -> Result<&'b [u
 /// # Errors
 /// [`PacketError::Cobs`], [`Crc`](PacketError::Crc), [`Message`](PacketError::Message).
 pub fn open<'p, T: Deserialize<'p>>(packet: &'p mut [u8]) -> Result<T, PacketError> {
+    parse(unseal(packet)?)
+}
+
+/// Takes COBS and CRC off one packet, in place; what is left are the bytes of its message.
+///
+/// # Errors
+/// [`PacketError::Cobs`], [`Crc`](PacketError::Crc).
+pub fn unseal(packet: &mut [u8]) -> Result<&[u8], PacketError> {
     let length = cobs::decode_in_place(packet).map_err(|_| PacketError::Cobs)?;
     let framed = packet.get(..length).ok_or(PacketError::Cobs)?;
     let (payload, crc) = framed.split_last_chunk::<4>().ok_or(PacketError::Crc)?;
-    if crc32(payload) != u32::from_le_bytes(*crc) {
-        return Err(PacketError::Crc);
-    }
+    if crc32(payload) == u32::from_le_bytes(*crc) { Ok(payload) } else { Err(PacketError::Crc) }
+}
+
+/// Reads the bytes of a message. Bytes after the message are the tail of a newer version, and are ignored.
+///
+/// # Errors
+/// [`PacketError::Message`].
+pub fn parse<'p, T: Deserialize<'p>>(payload: &'p [u8]) -> Result<T, PacketError> {
     match postcard::take_from_bytes(payload) {
-        Ok((message, [])) => Ok(message),
-        _ => Err(PacketError::Message),
+        Ok((message, _tail)) => Ok(message),
+        Err(_) => Err(PacketError::Message),
     }
 }
 
-/// The parts of an answer to `Hello` that no version changes: the request's number and the device's protocol
-/// version. For a packet that [`open`] calls [`PacketError::Message`]; it is opened here in place.
+/// The number of a request whose command is unknown, from the bytes of the message.
 #[must_use]
-pub fn hello_of_any_version(packet: &mut [u8]) -> Option<(u16, u16)> {
-    let length = cobs::decode_in_place(packet).ok()?;
-    let (payload, crc) = packet.get(..length)?.split_last_chunk::<4>()?;
-    if crc32(payload) != u32::from_le_bytes(*crc) {
-        return None;
-    }
+pub fn request_id(payload: &[u8]) -> Option<u16> {
+    postcard::take_from_bytes(payload).ok().map(|(id, _)| id)
+}
+
+/// The parts of an answer to `Hello` that no version changes, from the bytes of the message: the request's number and
+/// the device's protocol version. For a message that [`parse`] does not know.
+#[must_use]
+pub fn hello_of_any_version(payload: &[u8]) -> Option<(u16, u16)> {
     // DeviceMessage::Reply, its id, Ok, Answer::Hello, and the first field of Identity.
     match postcard::take_from_bytes::<(u8, u16, u8, u8, u16)>(payload) {
         Ok(((0, id, 0, 0, protocol), _)) => Some((id, protocol)),

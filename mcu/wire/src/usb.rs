@@ -1,6 +1,6 @@
 //! USB identity. Vendor class (0xFF) with Microsoft OS 2.0 descriptors, so that no system needs a driver.
 
-use crate::PROTOCOL_VERSION;
+use crate::version;
 
 /// Vendor id of pid.codes, which lends product ids to open hardware.
 pub const VENDOR_ID: u16 = 0x1209;
@@ -14,8 +14,9 @@ pub const MANUFACTURER: &str = "nirspi project";
 pub const INTERFACE_CLASS: u8 = 0xFF;
 /// `bInterfaceSubClass` of the camera interface.
 pub const INTERFACE_SUBCLASS: u8 = 0x53;
-/// `bInterfaceProtocol` carries the protocol version, so a host can tell before it opens the device.
-pub const INTERFACE_PROTOCOL: u8 = PROTOCOL_VERSION as u8;
+/// `bInterfaceProtocol`: the oldest protocol version that the camera speaks. A host that speaks this version or a newer
+/// one can greet the camera; the greeting settles the version of the session.
+pub const INTERFACE_PROTOCOL: u8 = version::MIN as u8;
 /// Bulk OUT, host to device.
 pub const ENDPOINT_OUT: u8 = 0x01;
 /// Bulk IN, device to host.

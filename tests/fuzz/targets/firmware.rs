@@ -1,4 +1,5 @@
-//! Any commands, well framed, at any time: the firmware answers or refuses, and never lights LEDs with the interlock open.
+//! Fuzzes the firmware with well-framed commands at any time. The firmware must answer or refuse
+//! each, and never light LEDs with the interlock open.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -10,9 +11,9 @@ fuzz_target!(|bytes: &[u8]| {
     let scene = Scene::new(vec![0.5; 4], 2, 48.0).expect("a scene");
     let optics = VirtualOptics::new(scene, 300.0).expect("optics").ideal();
     let mut camera = optics.camera(1).expect("a camera");
-    // The greeting, without which everything is refused.
+    // The greeting, without which the camera refuses every command.
     send(&mut camera, &[0, 0, 1]);
-    // Each chunk: a byte that says what happens besides, then the postcard bytes of a request.
+    // Each chunk has one byte for the environment, then the postcard bytes of a request.
     for chunk in bytes.chunks(24).take(32) {
         let (&what, payload) = chunk.split_first().expect("not empty");
         let closed = what & 1 == 0;
@@ -28,7 +29,7 @@ fuzz_target!(|bytes: &[u8]| {
 fn send<F: SimulatedFpga>(camera: &mut nirspi::virtual_camera::VirtualCamera<F>, payload: &[u8]) {
     let mut framed = payload.to_vec();
     framed.extend(crc32(payload).to_le_bytes());
-    // COBS, a zero at a time: short payloads need no block longer than 254.
+    // COBS encoding by zeros alone: short payloads need no block longer than 254.
     let mut packet = vec![0];
     let mut code = 0;
     for byte in framed {

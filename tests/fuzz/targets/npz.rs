@@ -1,4 +1,4 @@
-//! Any file that claims to be measurements: read, or refused in one line.
+//! Fuzzes the reader of measurement files. The reader must read the file, or refuse it in one line.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -1,4 +1,5 @@
-//! Any bytes, as a host and as a device hear them: no panic, and what opens encodes to the same again.
+//! Fuzzes both packet decoders. They must not panic, and a decoded message must encode to the same
+//! bytes.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -1,6 +1,6 @@
 //! The board around the simulated FPGA: clocks, host port's pins, LEDs, photodiode, ADC.
 //!
-//! The FPGA is reached by its pins alone, and both of its clocks run whatever happens.
+//! The FPGA is accessed only through its pins, and both of its clocks run all the time.
 
 use nirspi_hdl_model::AdcSample;
 use nirspi_hdl_sim::{pins::Pins, project::Project};
@@ -15,10 +15,11 @@ use nirspi_wire::register::Register;
 const ADC_PS: u64 = 8_000;
 /// Period of the host port's clock: 100 MHz, so `sck` has 16.7 MHz.
 const HOST_PS: u64 = 10_000;
-/// Clocks of the host port between two accesses: what a write sets off has come to the pins.
+/// Clocks of the host port between two accesses, enough for the effects of a write to reach the
+/// pins.
 const BETWEEN: u8 = 40;
 
-/// A board, powered up.
+/// A powered board.
 pub struct Board {
     pins: Pins,
     array: LedArray,
@@ -28,11 +29,11 @@ pub struct Board {
     clock: u64,
     next_adc_ps: u64,
     next_host_ps: u64,
-    /// As written last: only the host knows how long a burst is.
+    /// Length of a raw burst as written last: only the host knows that length.
     raw_length: u32,
 }
 
-/// What the microcontroller's other pins see.
+/// Levels at the microcontroller's other pins.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Seen {
     pub clock: u64,
@@ -66,7 +67,8 @@ impl Board {
         self.pins.interlock(closed);
     }
 
-    /// The light of this clock's lines is in this clock's sample, but for the chain's own latency.
+    /// One clock of the ADC. The sample has the light of this clock's lines, except for the latency
+    /// of the optical chain.
     fn adc_clock(&mut self) {
         let lines = self.pins.leds();
         let light = self.array.light(lines.rows, lines.columns, lines.enable);
@@ -80,7 +82,7 @@ impl Board {
         self.clock += 1;
     }
 
-    /// One clock of the host port, and those of the ADC before it.
+    /// One clock of the host port, and the clocks of the ADC before it.
     fn host_clock(&mut self) {
         while self.next_adc_ps <= self.next_host_ps {
             self.next_adc_ps += ADC_PS;
@@ -103,7 +105,7 @@ impl Board {
         }
     }
 
-    /// One period of `sck`; the lines at its rising edge.
+    /// One period of `sck`; returns the lines at its rising edge.
     fn sck(&mut self, lines: u8) -> u8 {
         self.pins.drive(lines);
         self.pins.sck(false);
@@ -114,7 +116,7 @@ impl Board {
         driven
     }
 
-    /// The lowest `bits` of a word by four lines.
+    /// Sends the lowest `bits` of a word by four lines.
     fn send(&mut self, word: u32, bits: u32) {
         for shift in (0..bits).step_by(4).rev() {
             self.sck((word >> shift) as u8 & 0xF);
@@ -129,7 +131,7 @@ impl Board {
         (0..count).map(|_| self.receive(8) as u8).collect()
     }
 
-    /// Selects the FPGA, sends opcode and address.
+    /// Selects the FPGA and sends opcode and address.
     fn begin(&mut self, opcode: u8, address: u16) {
         self.pins.sck(false);
         self.pins.select(true);
@@ -169,7 +171,7 @@ impl Board {
         value
     }
 
-    /// The frame, as long as its header says it is.
+    /// Reads the frame, whose header gives its length.
     pub fn frame(&mut self) -> Vec<u8> {
         self.begin(READ_FRAME, 0);
         self.dummy();

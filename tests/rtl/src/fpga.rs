@@ -1,7 +1,7 @@
 //! The simulated RTL as the firmware's FPGA bus.
 //!
-//! The simulator lives on one thread, which it cannot leave; what is asked of it is done before
-//! the call returns, so a run is as repeatable as if there were no thread.
+//! The simulator cannot leave its thread. Each call waits until the simulator has done its work, so
+//! a run is as repeatable as on one thread.
 
 use crate::board::{Board, Seen};
 use nirspi::virtual_camera::{SimulatedFpga, VirtualOptics};
@@ -36,7 +36,7 @@ pub struct RtlFpga {
 }
 
 impl RtlFpga {
-    /// Powers up in front of a scene, with the interlock closed.
+    /// A board in front of a scene, powered, with the interlock closed.
     pub fn new(optics: &VirtualOptics, seed: u64) -> Self {
         let array = LedArray::new(optics.footprint(), optics.budget().electrons_per_led);
         let chain = Chain::new(*optics.chain(), seed).unwrap();

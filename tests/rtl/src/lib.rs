@@ -1,4 +1,5 @@
-//! The simulated RTL of the gateware as a part of the camera, in the place where other tests have its golden model.
+//! The simulated RTL of the gateware as a part of the camera. Other tests use the golden model in
+//! its place.
 #![expect(clippy::unwrap_used, reason = "a failed unwrap here fails the test that uses it")]
 
 mod board;

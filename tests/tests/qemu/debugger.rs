@@ -1,16 +1,17 @@
-//! A debugger's hand on the emulated processor: as much of GDB's remote protocol as it takes to break a program.
+//! A debugger for the emulated processor: the part of GDB's remote protocol that a test needs to
+//! break a program.
 //!
-//! The one law: it is used to do what radiation, a wild pointer or a bad solder joint would do, and nothing else.
+//! Tests use it only to simulate radiation, a wild pointer or a bad solder joint.
 
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
 
-/// Attached; the processor stands still until [`go`](Self::go).
+/// A debugger attached to a stopped processor; [`go`](Self::go) lets it run.
 pub struct Debugger {
     line: TcpStream,
 }
 
-/// Where QEMU is to connect its GDB server.
+/// A listener for QEMU's GDB server.
 pub struct Waiting {
     listener: TcpListener,
 }
@@ -30,9 +31,9 @@ impl Waiting {
     pub fn attach(self) -> Debugger {
         let (line, _) = self.listener.accept().unwrap();
         let mut debugger = Debugger { line };
-        // Once it answers it has stopped the processor.
+        // QEMU stops the processor before it answers.
         debugger.ask("?");
-        // It lets nobody write registers who has not read what registers there are.
+        // QEMU accepts register writes only after a read of the register description.
         debugger.ask("qXfer:features:read:target.xml:0,10");
         debugger
     }
@@ -49,7 +50,7 @@ impl Debugger {
         self.receive()
     }
 
-    /// The next packet from QEMU, acknowledged.
+    /// The next packet from QEMU, which is acknowledged.
     fn receive(&mut self) -> String {
         let mut byte = || {
             let mut byte = [0];
@@ -94,7 +95,7 @@ impl Debugger {
         self.send("c");
     }
 
-    /// Stops the processor, makes it go on at `address`.
+    /// Stops the processor and makes it continue at `address`.
     pub fn derail(&mut self, address: u32) {
         self.halt();
         // Register 15, its bytes in the target's order.

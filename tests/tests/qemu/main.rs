@@ -1,8 +1,9 @@
-//! The whole firmware as ARM machine code, on an emulated Cortex-M33: host, wire protocol, executor, drivers, firmware
-//! logic, and behind the board's second UART the gateware's golden model. `tests/rtl` puts the RTL there instead.
+//! Tests of the whole firmware as ARM machine code, on an emulated Cortex-M33: host, wire protocol,
+//! executor, drivers, firmware logic, and the gateware's golden model behind the board's second
+//! UART. `tests/rtl` uses the RTL in place of the model.
 //!
-//! The virtual camera in this process gets the same scene and the same commands, and gives the same frames, bit for
-//! bit. Device times differ: the two have different clocks.
+//! A virtual camera in this process gets the same scene and the same commands, and must give the
+//! same frames, bit for bit. Device times differ, because the two have different clocks.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap in a helper fails its test")]
 
 mod debugger;
@@ -25,7 +26,7 @@ use nirspi_wire::{Fault, GatewareChunk, Refusal, RunLength, State};
 const PX: usize = 64;
 const SEED: u64 = 7;
 
-/// A bar across rough ground.
+/// A bar on a rough ground.
 fn scene() -> Scene {
     let reflectance = (0..PX * PX).map(|p| {
         let (r, c) = (p / PX, p % PX);
@@ -35,7 +36,7 @@ fn scene() -> Scene {
     Scene::new(reflectance.collect(), PX, 48.0).unwrap()
 }
 
-/// With all its noise, settling and latency.
+/// The default optics, with all noise, settling and latency.
 fn optics() -> VirtualOptics {
     VirtualOptics::new(scene(), 300.0).unwrap()
 }
@@ -156,7 +157,7 @@ fn an_fpga_that_falls_silent_is_a_fault_that_the_host_is_told() {
     assert_eq!(fault, Some(Fault::FpgaAbsent { identity: 0 }));
 }
 
-/// Nothing is there: an instruction fetch ends in a hard fault.
+/// An address without memory: an instruction fetch there ends in a hard fault.
 const NOWHERE: u32 = 0x2FF0_0000;
 
 #[test]
@@ -172,7 +173,7 @@ fn firmware_that_crashes_starts_again_and_tells_the_next_host_once() {
 
     debugger.derail(NOWHERE);
     let hear = || {
-        // What is said in the moment of the restart is heard by nobody: a host asks again.
+        // A greeting sent during the restart is lost, so the host tries again.
         let (tapped, mut session) = (0..3)
             .find_map(|_| {
                 let mut tapped = Tapped::new(board.link());
@@ -191,7 +192,7 @@ fn firmware_that_crashes_starts_again_and_tells_the_next_host_once() {
     assert!(hear().is_empty());
 }
 
-/// cortex-m-rt paints the stack with it before it calls `main`.
+/// The byte with which cortex-m-rt fills the stack before it calls `main`.
 const PAINT: u8 = 0xCC;
 
 #[test]
@@ -208,7 +209,7 @@ fn the_stack_is_never_deeper_than_three_quarters_of_its_limit() {
     };
     let mut debugger = debugger.attach();
     debugger.go();
-    // Everything that a host can ask for, refused commands too.
+    // Every command of a host, including commands that are refused.
     let mut session = Session::open(board.link()).unwrap();
     let _ = session.command(request::Start(RunLength::Continuous), &mut IgnorePackets);
     let _ = session.command(request::RawBurst(0), &mut IgnorePackets);
@@ -230,7 +231,8 @@ fn the_stack_is_never_deeper_than_three_quarters_of_its_limit() {
     assert!(4 * deepest < 3 * limit, "{deepest} of {limit} bytes");
 }
 
-/// One instruction is one nanosecond of the emulated clock, so this does not depend on the machine.
+/// One instruction is one nanosecond of the emulated clock, so the count does not depend on the
+/// machine.
 #[test]
 fn a_frame_costs_no_more_instructions_than_budgeted() {
     let (Some(qemu), Some(elf)) = (firmware::qemu(), firmware::elf()) else { return };

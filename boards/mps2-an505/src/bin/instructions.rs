@@ -1,9 +1,11 @@
-//! How many instructions a frame costs: the streaming path alone, with memory in place of the buses.
+//! Counts the instructions that one frame costs: the streaming path alone, with memory in place of
+//! the buses.
 //!
-//! Run under `-icount shift=0`, where one instruction is one nanosecond of the emulated clock, so SysTick's 20 MHz
-//! count fifties of them. They are instructions, not cycles: QEMU has no pipeline and no wait states.
+//! Run under `-icount shift=0`, where one instruction is one nanosecond of the emulated clock, so
+//! one count of SysTick at 20 MHz is fifty instructions. The result is in instructions and not in
+//! cycles: QEMU models neither pipeline nor wait states.
 //!
-//! The one law: what is measured is the code of the firmware as it is linked into it, with nothing left out.
+//! The measured code is the whole code of the firmware, linked as in the firmware.
 #![no_std]
 #![no_main]
 
@@ -23,8 +25,8 @@ use nirspi_wire::fpga::{FpgaFrame, Header, MAX_FRAME_BYTES, Sums, frame_bytes};
 use nirspi_wire::packet::{MAX_DEVICE_PACKET, MAX_HOST_PACKET, encode};
 use nirspi_wire::register::{IDENTITY, Register, control, status};
 use nirspi_wire::{
-    Command, Configuration, DeviceMessage, Frame, FrameFlags, PATTERNS, PROTOCOL_VERSION,
-    PatternOrder, Request, RunLength, SampleSource, Samples, Version, crc32,
+    Command, Configuration, DeviceMessage, Frame, FrameFlags, PATTERNS, PatternOrder, Request,
+    RunLength, SampleSource, Samples, Version, crc32, version,
 };
 use static_cell::ConstStaticCell;
 
@@ -33,7 +35,7 @@ const FRAMES: u32 = 16;
 const GRAIN: u32 = 50;
 const TRANSFER_BYTES: usize = 512;
 
-/// Registers in memory, and a frame that is always ready while a run is on.
+/// A fake FPGA: registers in memory, and a frame that is ready during every run.
 struct Memory {
     registers: [u32; 32],
     running: bool,
@@ -128,15 +130,15 @@ const CONFIGURATION: Configuration<'static> = Configuration {
 
 const INPUTS: Inputs = Inputs { interlock_closed: true, temperature_centi_celsius: Some(2500) };
 
-/// Counts of SysTick that `work` takes.
+/// Number of SysTick counts that `work` takes.
 fn counts(work: impl FnOnce()) -> u32 {
     let before = SYST::get_current();
     work();
-    // It counts down, in 24 bits.
+    // SysTick counts down, in 24 bits.
     before.wrapping_sub(SYST::get_current()) & 0x00FF_FFFF
 }
 
-/// What the firmware does with a frame, one after the other: the FPGA's checksum, differences, packet.
+/// The firmware's three steps with a frame: the FPGA's checksum, the differences, the packet.
 fn parts(bus: &mut PortBus<'_, Memory>, sink: &mut OnePacket) -> [u32; 3] {
     static FRAME: ConstStaticCell<[u8; MAX_FRAME_BYTES]> =
         ConstStaticCell::new([0; MAX_FRAME_BYTES]);
@@ -192,7 +194,7 @@ fn main() -> ! {
     let mut now = Micros(0);
 
     for command in [
-        Command::Hello { protocol: PROTOCOL_VERSION },
+        Command::Hello { protocol: version::CURRENT },
         Command::Configure(CONFIGURATION),
         Command::Start(RunLength::Continuous),
     ] {
@@ -204,7 +206,7 @@ fn main() -> ! {
     let (mut poll, mut merge, mut bytes) = (0, 0, 0);
     let mut merger = Merger::<TRANSFER_BYTES>::new();
     for _ in 0..FRAMES {
-        // 1000 frames a second: the FPGA is looked at once for each.
+        // At 1000 frames a second, the firmware checks the FPGA once for each frame.
         now.0 += 1_000;
         let mut step = |bus: &mut PortBus<'_, Memory>, sink: &mut OnePacket| {
             counts(|| {

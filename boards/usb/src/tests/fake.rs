@@ -1,4 +1,4 @@
-//! A bus without wires: control transfers and events go in, answers come out.
+//! A simulated bus: control transfers and events go in, answers come out.
 
 use core::future::pending;
 use embassy_usb::driver::{
@@ -10,7 +10,7 @@ use std::collections::VecDeque;
 use std::rc::Rc;
 use std::vec::Vec;
 
-/// What goes over it.
+/// The traffic of the simulated bus.
 #[derive(Clone, Default)]
 pub struct Wire(Rc<RefCell<Traffic>>);
 

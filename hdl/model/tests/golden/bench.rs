@@ -1,4 +1,4 @@
-//! A gateware on the bench: interlock closed, registers by name, samples made from a seed.
+//! A test bench: a gateware with closed interlock, registers by name, samples from a seed.
 
 use crate::oracle::Measured;
 use nirspi_hdl_model::{AdcSample, Gateware};
@@ -54,7 +54,7 @@ impl Bench {
         }
     }
 
-    /// Ticks until the LEDs go off; gives the clocks that they were lit.
+    /// Ticks until the LEDs go off; returns the number of clocks in which they were lit.
     pub fn ticks_until_dark(&mut self, sample: AdcSample, at_most: u64) -> u64 {
         let mut lit = 0;
         while self.0.lines().enable && lit <= at_most {
@@ -64,7 +64,7 @@ impl Bench {
         lit
     }
 
-    /// Reads the delivered frame, which must be intact, and gives it back.
+    /// Reads the delivered frame, checks that it is intact, and releases it.
     pub fn take_frame(&mut self) -> Measured {
         let frame = FpgaFrame::parse(self.0.frame().expect("no frame")).expect("damaged frame");
         let measured = Measured { header: frame.header, sums: frame.sums().collect() };
@@ -73,7 +73,7 @@ impl Bench {
     }
 }
 
-/// The sample of clock `t` of an endless random stream; one of 16 is over range.
+/// The sample of clock `t` of an endless random stream. One sample of 16 is over range.
 pub fn random_sample(seed: u64, t: u64) -> AdcSample {
     let mut z = seed ^ t.wrapping_mul(0x9E37_79B9_7F4A_7C15);
     z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);

@@ -1,7 +1,7 @@
-//! The golden model against what the register map promises.
+//! Tests of the golden model against the register map.
 //!
-//! The one law: expectations come from `oracle`, which computes in closed form, or from numbers in the
-//! test itself; never from the model.
+//! Expected values come from `oracle`, which computes them in closed form, or from numbers in the
+//! test. No expected value comes from the model.
 #![expect(clippy::unwrap_used, reason = "a failed unwrap in a helper fails its test")]
 
 mod bench;

@@ -1,4 +1,4 @@
-//! Lines, sums and headers of undisturbed runs.
+//! Tests of lines, sums and headers of undisturbed runs.
 
 use crate::bench::{Bench, random_sample};
 use crate::oracle::{Order, Setup, setup};
@@ -37,7 +37,8 @@ proptest! {
     }
 }
 
-/// Light that each LED adds to the photodiode, in ADC counts; all lit stay within 14 bits.
+/// Light that each LED adds at the photodiode, in ADC counts. The sum of all LEDs stays within 14
+/// bits.
 fn scene() -> impl Strategy<Value = Vec<u16>> {
     prop::collection::vec(0u16..16, 1024)
 }
@@ -63,7 +64,7 @@ proptest! {
         let mut bench = Bench::new();
         setup.apply(&mut bench);
         bench.start();
-        // What was under way to the ADC before the first light, and settles while blanked, is noise.
+        // Samples from before the first light, and samples in the blanked clocks, are noise.
         let mut in_flight: VecDeque<u16> =
             (0..latency).map(|t| random_sample(seed, t.into()).code).collect();
         let (mut shown, mut light) = (None, 0);

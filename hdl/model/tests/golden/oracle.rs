@@ -1,4 +1,4 @@
-//! Which sample goes into which sum, in closed form: loops over slots, no state.
+//! The expected sums in closed form: loops over slots, without state.
 
 use crate::bench::Bench;
 use nirspi_hdl_model::{AdcSample, Lines};
@@ -30,7 +30,7 @@ pub struct Setup {
     pub frames: u32,
 }
 
-/// A frame, as it was read or as it must be.
+/// A frame, as read or as expected.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Measured {
     pub header: Header,
@@ -38,14 +38,14 @@ pub struct Measured {
 }
 
 impl Setup {
-    /// Writes everything but `START`; over-range samples never trip.
+    /// Writes all settings without starting; over-range samples never trip.
     pub fn apply(&self, bench: &mut Bench) {
         let mut bits = 0;
         if let Order::Table(table) = &self.order {
             for (i, &pattern) in table.iter().enumerate() {
                 assert!(bench.0.write(ORDER_TABLE + i as u16, pattern.into()));
             }
-            // Must win over the other bit.
+            // The table bit must win over the sequency bit.
             bits |= mode::ORDER_TABLE | mode::ORDER_SEQUENCY;
         }
         if matches!(self.order, Order::Sequency) {
@@ -67,7 +67,8 @@ impl Setup {
         bench.set(Register::OverRangeTrip, 0);
     }
 
-    /// Pattern shown k-th. Sequency is bit-reversed Gray code; its own sign changes are tested in `wire`.
+    /// The pattern shown k-th. Sequency order is bit-reversed Gray code; `wire` tests its sign
+    /// changes.
     pub fn pattern(&self, k: u16) -> u16 {
         match &self.order {
             Order::Natural => k,
@@ -86,7 +87,7 @@ impl Setup {
         u64::from(self.sweeps) * self.slots_per_sweep() * u64::from(self.dwell)
     }
 
-    /// Clocks of the whole run, LEDs lit.
+    /// Clocks of the whole run in which the LEDs are lit.
     pub fn lit_clocks(&self) -> u64 {
         u64::from(self.frames) * self.clocks_per_frame()
     }
@@ -96,7 +97,7 @@ impl Setup {
         u64::from(f + 1) * self.clocks_per_frame() + u64::from(self.latency)
     }
 
-    /// What is shown at clock `t` of the run.
+    /// The lines at clock `t` of the run.
     pub fn lines(&self, t: u64) -> Lines {
         if t >= self.lit_clocks() {
             return Lines::default();

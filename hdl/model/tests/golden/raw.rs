@@ -1,4 +1,4 @@
-//! Raw bursts.
+//! Tests of raw bursts.
 
 use crate::bench::{Bench, random_sample};
 use crate::oracle::{Setup, setup};
@@ -20,7 +20,7 @@ proptest! {
         setup.apply(&mut bench);
         bench.set(Register::RawLength, length.into());
         bench.control(control::START_RAW);
-        // The sweep is repeated for as long as it takes, whatever `Sweeps` and `Frames` say.
+        // A burst repeats the sweep until it is long enough, whatever `Sweeps` and `Frames` say.
         let endless = Setup { frames: u32::MAX, ..setup };
         for t in 0..u64::from(length) {
             prop_assert!(bench.0.running() && !bench.0.raw_ready());

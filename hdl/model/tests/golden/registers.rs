@@ -1,4 +1,4 @@
-//! The host port: which addresses exist, and what reads and writes of them do at rest.
+//! Tests of the host port at rest: which addresses exist, and what reads and writes do.
 
 use crate::bench::Bench;
 use nirspi_hdl_model::Gateware;
@@ -20,7 +20,7 @@ proptest! {
     #[test]
     fn a_register_holds_what_its_access_says(value: u32) {
         let mut bench = Bench::new();
-        // Not to `Control`: its bits act.
+        // `Control` is left out because its bits act.
         for &register in Register::ALL.iter().filter(|r| r.access() != Access::Command) {
             let before = bench.get(register);
             bench.set(register, value);

@@ -1,4 +1,5 @@
-//! Frames lost and released, runs stopped, restarted and set up anew while running.
+//! Tests of frames lost and released, and of runs stopped, restarted and reconfigured while
+//! running.
 
 use crate::bench::{Bench, random_sample};
 use crate::oracle::{Order, Setup, setup};
@@ -8,7 +9,7 @@ use nirspi_wire::{
 };
 use proptest::prelude::*;
 
-/// A short frame that still takes every path: 24 clocks.
+/// A short frame of 24 clocks that still uses every path.
 fn small() -> Setup {
     Setup {
         order: Order::Sequency,
@@ -35,7 +36,8 @@ proptest! {
         let mut bench = Bench::new();
         setup.apply(&mut bench);
         bench.start();
-        // The host keeps each frame for a random time. Whether frame f is lost depends on nothing else.
+        // The host keeps each frame for a random time. Only that time decides whether frame f is
+        // lost.
         let mut held_until = 0;
         let mut lost = 0;
         let mut after_loss = false;
@@ -43,7 +45,7 @@ proptest! {
         let mut f = 0;
         for t in 1..=setup.complete_after(frames - 1) {
             if in_hand.is_some() && t > held_until {
-                // Read late: what it says must not have changed meanwhile.
+                // A late read must give the frame unchanged.
                 let frame = bench.take_frame();
                 prop_assert_eq!(Some(frame), in_hand.take());
             }
@@ -107,7 +109,7 @@ proptest! {
     fn settings_written_while_running_hold_for_the_next_run(
         now in setup(), next in setup(), at in any::<prop::sample::Index>(), seed: u64,
     ) {
-        // The table cannot be written meanwhile: both runs use the one of the first.
+        // The table cannot be written during the run, so both runs use the table of the first.
         let next = match (&now.order, &next.order) {
             (Order::Table(table), Order::Table(_)) => {
                 Setup { order: Order::Table(table.clone()), ..next }
@@ -187,7 +189,8 @@ fn control_bits_act_in_the_order_listed() {
     setup.apply(&mut bench);
     bench.start();
     bench.ticks(17);
-    // Stops, then starts afresh; the raw start comes last and is refused by the run under way.
+    // Writes a stop and both starts at once: the stop comes first, the raw start comes last and is
+    // refused because a run has started.
     bench.control(control::STOP | control::RELEASE | control::START | control::START_RAW);
     for t in 0..setup.complete_after(0) {
         bench.0.tick(samples(t));

@@ -1,4 +1,5 @@
-//! What switches the LEDs off, and that nothing switches them on again by itself.
+//! Tests of the faults that switch the LEDs off, and that the LEDs stay off until the fault is
+//! cleared.
 
 use crate::bench::Bench;
 use nirspi_hdl_model::{AdcSample, Gateware};
@@ -11,7 +12,7 @@ use proptest::prelude::*;
 const DARK: AdcSample = AdcSample { code: 0, over_range: false };
 const OVER: AdcSample = AdcSample { code: 0x3FFF, over_range: true };
 
-/// Whatever tripped: the LEDs stay off, and only clearing the fault lets a run start again.
+/// Checks that the LEDs stay off after a trip, and that only clearing the fault allows a new run.
 fn stays_off_until_cleared(mut bench: Bench, code: FaultCode) {
     assert_eq!(bench.fault(), code);
     for _ in 0..3 {
@@ -95,7 +96,7 @@ fn every_kind_of_access_feeds_the_watchdog() {
     }
 }
 
-/// A bench that shows nothing but pattern 0, all LEDs on, beginning at the clock given.
+/// A bench that shows only pattern 0, with all LEDs on, from the given clock.
 fn full_light(first_clock: u64) -> Bench {
     let mut bench = Bench::new();
     bench.set(Register::Watchdog, WATCHDOG_MAX);
@@ -108,7 +109,8 @@ fn full_light(first_clock: u64) -> Bench {
 #[test]
 fn pattern_0_alone_trips_the_duty_limit_once_its_light_exceeds_the_budget() {
     let mut bench = full_light(0);
-    // 2 half-arrays a clock: the budget is spent after this many clocks, exceeded one later.
+    // All LEDs cost 2 half-arrays a clock: the budget is spent after this many clocks, and exceeded
+    // one clock later.
     let budget = u64::from(DUTY_LIMIT_MAX / 2);
     assert_eq!(bench.ticks_until_dark(DARK, 2 * budget), budget + 1);
     stays_off_until_cleared_in_the_next_window(bench);
@@ -143,7 +145,7 @@ fn no_sequence_of_starts_gets_around_the_duty_limit() {
 
 #[test]
 fn duty_windows_begin_at_multiples_of_their_length_since_reset() {
-    // Half of the budget before a boundary leaves the whole one after it.
+    // Half of the budget spent before a boundary leaves the whole budget after it.
     let before = u64::from(DUTY_LIMIT_MAX / 4);
     let mut bench = full_light(u64::from(DUTY_WINDOW) - before);
     let budget = u64::from(DUTY_LIMIT_MAX / 2);
@@ -167,7 +169,8 @@ fn whole_sweeps_and_complementary_pairs_never_trip_the_duty_limit() {
 
 #[test]
 fn light_is_counted_in_half_arrays_a_clock() {
-    // Table entry, complement shown too, limit, clocks lit until it is exceeded (dwell 5).
+    // Each case: table entry, whether the complement is shown, limit, clocks lit until the limit is
+    // exceeded (dwell 5).
     let cases = [
         (0, false, 0, 1),
         (0, false, 7, 4),
@@ -209,7 +212,7 @@ fn over_range_samples_of_one_frame_trip_blanked_ones_too_but_none_from_before_th
     bench.set(Register::Latency, 3);
     bench.set(Register::OverRangeTrip, 4);
     bench.start();
-    // Before the first light arrives, and three in each of three frames.
+    // Over-range samples before the arrival of the first light, and three in each of three frames.
     for t in 0u32..3 + 30 {
         let over = t < 3 || (t - 3) % 10 < 3;
         bench.0.tick(if over { OVER } else { DARK });
@@ -265,7 +268,7 @@ fn a_delivered_frame_outlives_a_fault() {
 
 #[test]
 fn the_first_fault_is_the_one_latched_and_one_clock_has_an_order() {
-    // Everything trips in the first clock: over-range before duty before watchdog.
+    // Every cause trips in the first clock; over-range comes before duty, and duty before watchdog.
     let mut bench = Bench::new();
     bench.set(Register::Watchdog, 1);
     bench.set(Register::DutyLimit, 0);
@@ -299,7 +302,7 @@ enum Deed {
 
 fn deed() -> impl Strategy<Value = Deed> {
     let control = Register::Control.address();
-    // Settings under which things happen within a few clocks.
+    // Settings with which events happen within a few clocks.
     let lively = prop::sample::select(vec![
         (Register::Watchdog, 40),
         (Register::Watchdog, 300),
@@ -356,7 +359,7 @@ proptest! {
                     gateware.tick(sample);
                 }
                 let lines = gateware.lines();
-                // Reads would feed the watchdog: ask a copy.
+                // A read would restart the watchdog, so the test reads a copy.
                 let mut copy = gateware.clone();
                 let fault = copy.read(Register::Fault.address()).unwrap();
                 let bits = copy.read(Register::Status.address()).unwrap();

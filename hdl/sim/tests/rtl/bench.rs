@@ -1,6 +1,7 @@
-//! One module on its own, driven by the names of its ports.
+//! One module of the RTL on its own, driven by the names of its ports.
 //!
-//! The one law: ports change between clock edges; what is read before an edge belongs to the clock that it ends.
+//! Ports change between clock edges. A value read before an edge belongs to the clock that the edge
+//! ends.
 
 use crate::project::Project;
 use veryl_analyzer::{ir::VarPath, value::Value};
@@ -9,11 +10,11 @@ use veryl_simulator::{Simulator, ir::Event};
 /// A field of a bundle of signals, as a port packs it: value and width in bits.
 pub type Field = (u64, usize);
 
-/// A module, its inputs all 0.
+/// A module with all inputs 0.
 pub struct Bench(Simulator);
 
 impl Bench {
-    /// After a reset of `clk`, if it has one of that name.
+    /// The module after a reset of `clk`, if it has a clock of that name.
     pub fn new(project: &Project, module: &str) -> Self {
         let mut sim = project.simulate(module);
         sim.step(&Event::Initial);
@@ -36,12 +37,12 @@ impl Bench {
         self.0.set(port, value);
     }
 
-    /// Ports too narrow for the value take its low bits.
+    /// Sets a port. A port narrower than the value takes its low bits.
     pub fn set(&mut self, port: &str, value: impl Into<u64>) {
         self.set_value(port, Value::new(value.into(), 64, false));
     }
 
-    /// The most significant field first.
+    /// Sets a bundle; the most significant field comes first.
     pub fn set_fields(&mut self, port: &str, fields: &[Field]) {
         let values = fields.iter().map(|&(value, width)| Value::new(value, width, false));
         self.set_value(port, values.reduce(|high, low| high.concat(&low)).unwrap());
@@ -55,7 +56,7 @@ impl Bench {
         self.get(port) != 0
     }
 
-    /// Fields of these widths, the most significant first.
+    /// Reads a bundle as fields of these widths; the most significant field comes first.
     pub fn get_fields(&mut self, port: &str, widths: &[usize]) -> Vec<u64> {
         let value = self.0.get(port).expect("no such port");
         let mut end = widths.iter().sum::<usize>();

@@ -1,16 +1,16 @@
-//! Random scenarios through RTL and model.
+//! Runs random scenarios through RTL and golden model, and compares both.
 //!
-//! The one law: what is compared is counted, and a kind of event that never came up fails the test.
+//! Each kind of event is counted. A kind of event that never happened fails the test.
 
 use crate::project::Project;
 use crate::rig::{Rig, Tally, Variant};
 use crate::scenario;
 use nirspi_wire::register::{DUTY_WINDOW, Register, control, mode};
 
-/// Scenarios that one simulated FPGA lives through, one after the other.
+/// Number of scenarios that one simulated FPGA runs, one after the other.
 const SCENARIOS: u64 = 64;
 
-/// A set of scenarios: what to build, what to do.
+/// A set of scenarios: what to build, and what to do.
 struct Suite {
     variant: Variant,
     scenario: fn(&mut Rig, u64),
@@ -39,13 +39,13 @@ fn scenarios(rigs: u64) -> Suite {
     Suite { variant: Variant::default(), scenario: scenario::run, rigs, scenarios: SCENARIOS }
 }
 
-/// Sums of 24 bits wrap within a thousandth of a second.
+/// An RTL whose sums have 24 bits, so that they wrap within a thousandth of a second.
 fn long_sums() -> Suite {
     let variant = Variant { sum_bits: 24, ..Variant::default() };
     Suite { variant, scenario: scenario::long_sums, rigs: 1, scenarios: 30 }
 }
 
-/// The RTL's clock passes 2^32, the model's a duty window, soon after reset.
+/// An RTL whose clock passes 2^32 soon after reset, while the model's clock passes a duty window.
 fn windows() -> Suite {
     let window = u64::from(DUTY_WINDOW);
     let variant =
@@ -53,7 +53,7 @@ fn windows() -> Suite {
     Suite { variant, scenario: scenario::across_a_window, rigs: 8, scenarios: 1 }
 }
 
-/// A difference that some scenario shows; those of one FPGA show nearly all that there are.
+/// The first difference that a scenario shows. One FPGA's scenarios show nearly every difference.
 pub fn difference(project: &Project) -> Option<String> {
     let suites = [(scenarios(1), 0), (long_sums(), 0), (windows(), 0), (scenarios(3), SCENARIOS)];
     suites.iter().find_map(|(suite, first)| suite.run(project, *first).err())
@@ -63,7 +63,7 @@ fn count(tallies: &[Tally], of: impl Fn(&Tally) -> u64) -> u64 {
     tallies.iter().map(of).sum()
 }
 
-/// `NIRSPI_RTL_SCENARIOS` asks for more of them.
+/// `NIRSPI_RTL_SCENARIOS` sets the number of scenarios.
 #[test]
 fn random_scenarios_agree_bit_for_bit() {
     let asked = std::env::var("NIRSPI_RTL_SCENARIOS").ok().and_then(|n| n.parse().ok());
@@ -103,7 +103,8 @@ fn duty_windows_and_both_words_of_the_clock_agree() {
     assert!(count(&tallies, |t| t.faults[2]) >= 5 && count(&tallies, |t| t.faults[0]) >= 5);
 }
 
-/// What the instrument is for: 1024 patterns and complements of 5 clocks, once, read by four lines.
+/// The instrument's own measurement: 1024 patterns and complements of 5 clocks, once, read by four
+/// lines.
 #[test]
 fn a_whole_differential_sweep_agrees() {
     let mut rig = Rig::new(&Project::read(), 1);

@@ -1,13 +1,13 @@
-//! The host's side of the port, as `nirspi_wire::host_port` lays it down.
+//! The host's side of the host port, as defined in `nirspi_wire::host_port`.
 //!
-//! The one law: what the FPGA drives is looked at on every rising edge of `sck`, and compared with what the
-//! model answered to the same access.
+//! On every rising edge of `sck`, the levels that the FPGA drives are compared with the model's
+//! answer to the same access.
 
 use crate::rig::{Access, Answer, Rig};
 use nirspi_wire::{host_port, register::Register};
 
 impl Rig {
-    /// One period of `sck`; what the FPGA drives as the host samples it.
+    /// One period of `sck`; returns what the FPGA drives when the host samples.
     fn sck(&mut self, lines: u8) -> (u8, u8) {
         self.pins.drive(lines);
         self.pins.sck(false);
@@ -22,7 +22,7 @@ impl Rig {
     fn send(&mut self, word: u32, bits: u32, quad: bool) {
         let step = if quad { 4 } else { 1 };
         for shift in (0..bits).step_by(step as usize).map(|sent| bits - step - sent) {
-            // Lines that do not matter are noise.
+            // Lines that the FPGA ignores carry noise.
             let noise = self.clock as u8 & 0xE;
             let value = (word >> shift) as u8;
             let (_, drive) = self.sck(if quad { value & 0xF } else { value & 1 | noise });
@@ -68,7 +68,7 @@ impl Rig {
         }
     }
 
-    /// Waits out what an access still sets off.
+    /// Waits until an access has no more effects.
     fn settled(&mut self) {
         for _ in 0..40 {
             if self.asked.is_none() {
@@ -89,7 +89,7 @@ impl Rig {
         self.settled();
     }
 
-    /// A write given up before its last bit.
+    /// Sends a write that ends before its last bit.
     pub fn write_cut_short(&mut self, address: u16, value: u32) {
         self.begin(host_port::WRITE_REGISTER, address);
         let quad = self.port.quad;
@@ -114,7 +114,7 @@ impl Rig {
         value
     }
 
-    /// Reads the frame or burst: all of it and some beyond, or its first bytes only.
+    /// Reads the frame or burst: whole and some bytes beyond its end, or only its first bytes.
     pub fn stream(&mut self, raw: bool, at_most: usize) {
         let (access, opcode) = if raw {
             (Access::Raw, host_port::READ_RAW)

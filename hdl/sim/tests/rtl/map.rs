@@ -1,6 +1,8 @@
-//! `register_map.veryl`, written from `mcu/wire`.
+//! Generates `register_map.veryl` from `mcu/wire`.
 //!
-//! The one law: the gateware knows no address, bit, code or limit but from this package.
+//! # Invariant
+//! `register_map.veryl` is always the one generated from `mcu/wire`
+//! (`stale::the_register_map_and_the_emitted_systemverilog_are_fresh`).
 
 use nirspi_wire::{
     FrameFlags, PATTERNS, fpga, host_port,
@@ -8,7 +10,7 @@ use nirspi_wire::{
 };
 use std::fmt::Write;
 
-/// `OverRangeTrip` as `OVER_RANGE_TRIP`.
+/// The constant's name: `OverRangeTrip` becomes `OVER_RANGE_TRIP`.
 fn constant(name: &str) -> String {
     let mut out = String::new();
     for (i, c) in name.chars().enumerate() {

@@ -1,7 +1,10 @@
-//! Deliberate faults in the RTL, each of which the module's own bench must see, and the equivalence runs too.
+//! Deliberate faults in the RTL: the module's own bench and the equivalence runs must both notice
+//! each fault.
 //!
-//! The one law: a fault is one substitution of text that still passes the analyser; a fault that either of them
-//! does not see fails the test, and so does a law that no fault breaks.
+//! # Invariant
+//! A fault is one substitution of text that still passes the analyser. A fault that one of the two
+//! does not notice fails the test, and so does a law that no fault breaks
+//! (`every_deliberate_fault_is_seen_and_every_law_can_be_broken`).
 
 use crate::equivalence;
 use crate::modules::{self, Law};
@@ -11,7 +14,7 @@ use std::panic::{catch_unwind, set_hook, take_hook};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread::ScopedJoinHandle;
 
-/// What is broken, in which file, what stands there, what stands there instead.
+/// A fault: what is broken, the file, the original text, the replacement.
 type Fault = (&'static str, &'static str, &'static str, &'static str);
 
 /// The faults.
@@ -111,11 +114,11 @@ const FAULTS: &[Fault] = &[
 ];
 
 thread_local! {
-    /// A panic on this thread is what was looked for.
+    /// The current thread expects a panic.
     static EXPECTED: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Whether a law panics, as it should; what it says then is not printed.
+/// Whether a law panics, as it should. The panic message is not printed.
 fn breaks((_, law): &Law, broken: &Project) -> bool {
     EXPECTED.set(true);
     let breaks = catch_unwind(|| law(broken)).is_err();
@@ -123,11 +126,11 @@ fn breaks((_, law): &Law, broken: &Project) -> bool {
     breaks
 }
 
-/// What saw a fault.
+/// What noticed a fault.
 struct Seen {
-    /// Laws of the module's own bench that it breaks.
+    /// Laws of the module's own bench that the fault breaks.
     laws: Vec<&'static str>,
-    /// The first difference over the top.
+    /// The first difference in the equivalence runs of the top.
     difference: Option<String>,
 }
 
@@ -139,7 +142,7 @@ impl Seen {
         Self { laws, difference: equivalence::difference(&broken) }
     }
 
-    /// By everything that looks at the file.
+    /// Whether everything that tests the file noticed the fault.
     fn by_all(&self, (_, file, ..): &Fault) -> bool {
         self.difference.is_some() && (!self.laws.is_empty() || modules::laws(file).is_empty())
     }
@@ -152,7 +155,7 @@ impl Seen {
     }
 }
 
-/// Minutes: `.ci/run` asks for it.
+/// Takes minutes, so only `.ci/run` runs this test.
 #[test]
 #[ignore = "minutes; .ci/run does it"]
 fn every_deliberate_fault_is_seen_and_every_law_can_be_broken() {

@@ -1,11 +1,13 @@
-//! The RTL and the golden model side by side: the same pins, the same accesses, compared every clock.
+//! Runs the RTL and the golden model side by side: the same pins, the same accesses, compared every
+//! clock.
 //!
-//! The one law: the model is never asked what the RTL does; it runs `DEPTH` clocks behind and is given only
-//! what the pins were given, at the moment that the `access` pin says an access took effect.
+//! The model runs `DEPTH` clocks behind the RTL. The model gets only the levels of the pins, and
+//! each access in the clock in which the `access` pin says that the access took effect. The model
+//! never depends on an output of the RTL other than `access`.
 //!
-//! What `hdl/model/src/lib.rs` lets the RTL take a few clocks more for is bounded here: [`STOP_CLOCKS`],
-//! [`TRIP_CLOCKS`] and the start, which follows its access by [`START_CLOCKS`]. Everything else is exact:
-//! LED lines at every clock, both ready pins, every register read, every byte of a frame or burst.
+//! The delays that `hdl/model/src/lib.rs` allows the RTL are bounded here: [`STOP_CLOCKS`],
+//! [`TRIP_CLOCKS`] and [`START_CLOCKS`]. Everything else is exact: LED lines at every clock, both
+//! ready pins, every register read, every byte of a frame or burst.
 
 use crate::pins::Pins;
 use crate::project::Project;
@@ -17,22 +19,24 @@ use nirspi_wire::{
 };
 use std::collections::VecDeque;
 
-/// Clocks from the choice of a slot to the end of what it sets off: `types::DEPTH`.
+/// Clocks from the choice of a slot to its last effect: `types::DEPTH`.
 const DEPTH: u64 = 13;
-/// Clocks from the choice of a slot to its lines at the pins, and so to its light's sample at the pins.
+/// Clocks from the choice of a slot to the change of its lines at the pins; the sample of its light
+/// is at the pins in the same clock.
 const TO_PINS: u64 = 6;
-/// Clocks from the interlock pin to the end of what it sets off: two to be in step, and those of a run.
+/// Clocks from the interlock pin to its last effect: two to synchronise, one more, and `DEPTH`.
 const INTERLOCK: u64 = 2 + 1 + DEPTH;
-/// Clocks from the interlock pin to the pins of the LEDs, past everything else.
+/// Clocks from the interlock pin to the LEDs' pins, by the direct path.
 const TO_DARK: u64 = 3;
-/// Clocks from a start's access to clock 0 of the run.
+/// Clocks from the access that starts a run to clock 0 of the run.
 const START_CLOCKS: u64 = DEPTH + 1;
-/// Clocks that LEDs may be lit longer than in the model after a stop or an opened interlock.
+/// Clocks for which LEDs may be lit longer than in the model after a stop or an opened interlock.
 const STOP_CLOCKS: u64 = 9;
-/// The same after any other trip and a raw burst.
+/// Clocks for which LEDs may be lit longer than in the model after any other trip and after a raw
+/// burst.
 const TRIP_CLOCKS: u64 = 7;
 
-/// What the host asks for.
+/// An access of the host.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Access {
     Write(u16, u32),
@@ -41,7 +45,7 @@ pub(crate) enum Access {
     Raw,
 }
 
-/// What the model answers.
+/// The model's answer to an access.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Answer {
     Value(u32),
@@ -51,9 +55,10 @@ pub(crate) enum Answer {
 /// How the host drives its port.
 #[derive(Debug, Clone, Copy)]
 pub struct Port {
-    /// Period of its clock; the ADC's is 8000.
+    /// Period of the host port's clock; the ADC's period is 8000 ps.
     pub host_ps: u64,
-    /// Clocks of the host port in half a period of `sck`, and how many more when it is high.
+    /// Clocks of the host port in half a period of `sck`, and the additional clocks of the high
+    /// half.
     pub half: u32,
     pub quad: bool,
 }
@@ -63,18 +68,19 @@ pub struct Rig {
     pub model: Gateware,
     pub port: Port,
     seed: u64,
-    /// Over-range samples in 256.
+    /// Number of over-range samples among 256.
     pub over_range_rate: u8,
-    /// Codes fade to an eighth and come back; the logarithm of a quarter of the period, in clocks.
+    /// Codes fade to an eighth and come back. This is the logarithm of a quarter of that period, in
+    /// clocks.
     pub fade: u32,
     pub(crate) clock: u64,
     next_adc_ps: u64,
     next_host_ps: u64,
     seen: VecDeque<Seen>,
     interlock: VecDeque<(u64, bool)>,
-    /// Clocks in which the level of the interlock pin keeps the LEDs out.
+    /// Clocks in which the level of the interlock pin keeps the LEDs off.
     dark: std::ops::Range<u64>,
-    /// It has, and no run has begun since.
+    /// The interlock pin has switched the LEDs off, and no run has begun since.
     put_out: bool,
     pub(crate) asked: Option<Access>,
     pub(crate) answer: Option<Answer>,
@@ -82,7 +88,7 @@ pub struct Rig {
     grace: u64,
     /// LEDs were enabled in the clock before.
     just_lit: bool,
-    /// What the model was last told, for the report of a difference.
+    /// The last inputs of the model, for the report of a difference.
     told: VecDeque<String>,
     pub mismatch: Option<String>,
     pub variant: Variant,
@@ -90,12 +96,12 @@ pub struct Rig {
     pub seen_so_far: Tally,
 }
 
-/// What of the RTL was built differently, to see in seconds what takes hours.
+/// An RTL with changed constants, which shows in seconds what would take hours.
 #[derive(Debug, Clone, Copy)]
 pub struct Variant {
-    /// Bits of a sum.
+    /// Width of a sum in bits.
     pub sum_bits: u32,
-    /// Clock of the RTL less that of the model: a multiple of the duty window.
+    /// Difference between the RTL's clock and the model's: a multiple of the duty window.
     pub clock_ahead: u64,
     /// Clock of the model when the RTL leaves reset.
     pub begins_at: u64,
@@ -107,7 +113,7 @@ impl Default for Variant {
     }
 }
 
-/// What has been compared, to know that scenarios reach what they are for.
+/// Counts of compared events, to check that scenarios reach what they are for.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Tally {
     pub lit_clocks: u64,
@@ -119,7 +125,7 @@ pub struct Tally {
     pub starts: u64,
     pub starts_refused: u64,
     pub stops: u64,
-    /// By fault code.
+    /// Faults, by fault code.
     pub faults: [u64; 5],
 }
 
@@ -128,7 +134,7 @@ pub struct Tally {
 struct Seen {
     sample: AdcSample,
     leds: Lines,
-    /// The interlock pin has put the LEDs out.
+    /// The interlock pin has switched the LEDs off.
     put_out: bool,
 }
 
@@ -170,7 +176,7 @@ impl Rig {
         }
     }
 
-    /// The same for an RTL built differently.
+    /// The same for a changed RTL.
     pub fn of_variant(project: &Project, seed: u64, variant: Variant) -> Self {
         let half = format!("param HALF: u32 = {}", variant.sum_bits / 2);
         let clock = variant.begins_at.wrapping_add(variant.clock_ahead);
@@ -187,7 +193,7 @@ impl Rig {
         rig
     }
 
-    /// A frame of the model as this variant delivers it.
+    /// A frame of the model in the form that this variant delivers.
     fn frame_of_variant(&mut self, bytes: &[u8]) -> Vec<u8> {
         let Ok(frame) = FpgaFrame::parse(bytes) else { return Vec::new() };
         let mut header = frame.header;
@@ -210,7 +216,7 @@ impl Rig {
         bytes
     }
 
-    /// What the model reads, of its clock as of this variant.
+    /// A register read of the model, with the clock of this variant.
     fn read_of_variant(&mut self, address: u16) -> u32 {
         let value = self.model.read(address).unwrap_or(0);
         match Register::at(address) {
@@ -229,7 +235,7 @@ impl Rig {
         }
     }
 
-    /// Notes the first difference; all later ones follow from it.
+    /// Records the first difference; later differences follow from the first.
     pub(crate) fn expect<T: PartialEq + std::fmt::Debug>(
         &mut self,
         what: &str,
@@ -253,12 +259,12 @@ impl Rig {
     /// One clock of the ADC.
     fn adc_clock(&mut self) {
         let now = self.clock;
-        // Samples of a clock's light are at the pins with its lines.
+        // Samples of a clock's light are at the pins together with the clock's lines.
         let mut sample = sample(self.seed, self.over_range_rate, now);
         sample.code >>= (now >> self.fade) & 3;
         self.pins.sample(sample);
         let mut leds = self.pins.leds();
-        // Without `enable` the other lines light nothing: they may follow a clock later.
+        // Without `enable` the other lines light nothing, and may follow a clock later.
         if !leds.enable {
             if !std::mem::take(&mut self.just_lit) {
                 self.expect("lines without enable", &leds, &Lines::default());
@@ -282,7 +288,7 @@ impl Rig {
         self.clock += 1;
     }
 
-    /// Clock `t` of the model, with which the RTL is done now.
+    /// Runs clock `t` of the model, which the RTL has completed.
     fn model_clock(&mut self, t: u64, access: bool) {
         if self.start.is_none() {
             let ready = self.pins.ready();
@@ -330,7 +336,7 @@ impl Rig {
         self.seen_so_far.lit_clocks += u64::from(lit);
         let running = self.model.running();
         self.model.tick(sample);
-        // A run that ends by itself has put its LEDs out already, unless its latency is 0.
+        // A run that ends by itself has switched its LEDs off already, unless its latency is 0.
         if lit && running && !self.model.running() {
             self.grace = TRIP_CLOCKS;
         }
@@ -369,7 +375,7 @@ impl Rig {
         self.answer = Some(answer);
     }
 
-    /// One clock of the host port, and those of the ADC before it.
+    /// One clock of the host port, and the clocks of the ADC before it.
     pub(crate) fn host_clock(&mut self) {
         while self.next_adc_ps <= self.next_host_ps {
             self.next_adc_ps += 8000;
@@ -395,7 +401,7 @@ impl Rig {
     pub fn interlock(&mut self, closed: bool) {
         self.pins.interlock(closed);
         let at = self.clock + INTERLOCK - DEPTH;
-        // A level that no clock has seen was never there.
+        // A level that no clock has sampled has no effect.
         if self.interlock.back().is_some_and(|&(last, _)| last == at) {
             self.interlock.pop_back();
         }

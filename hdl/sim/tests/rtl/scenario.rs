@@ -1,6 +1,6 @@
-//! Random runs of the camera: settings, deeds of the host, accidents.
+//! Random runs of the camera: settings, actions of the host, accidents.
 //!
-//! The one law: a seed gives the same scenario for ever, whatever the RTL answers.
+//! A scenario depends on its seed alone, and never on an answer of the RTL.
 
 use crate::rig::{Port, Rig};
 use nirspi_wire::register::{DUTY_LIMIT_MAX, ORDER_TABLE, Register as R, control, mode};
@@ -39,7 +39,8 @@ impl Dice {
 /// Clocks of the ADC that a frame may take at most.
 const FRAME_CLOCKS: u64 = 6000;
 
-/// Writes settings, a valid set but for once in sixteen; gives the clocks of a frame.
+/// Writes settings, of which one set in sixteen is invalid; returns the number of clocks of a
+/// frame.
 fn set_up(rig: &mut Rig, dice: &mut Dice) -> u64 {
     let patterns = match dice.range(0, 9) {
         0..=3 => dice.range(1, 3),
@@ -107,7 +108,7 @@ fn set_up(rig: &mut Rig, dice: &mut Dice) -> u64 {
     frame
 }
 
-/// Something that the host, or the world, does to a running camera.
+/// An action of the host, or an accident, during a run.
 fn deed(rig: &mut Rig, dice: &mut Dice, frame: u64) {
     match dice.range(0, 25) {
         0..=3 => rig.wait_adc(dice.range(0, 2 * frame + 100)),
@@ -155,7 +156,7 @@ fn deed(rig: &mut Rig, dice: &mut Dice, frame: u64) {
     }
 }
 
-/// One configuration, started, lived through and read out.
+/// Configures, starts, runs and reads out one scenario.
 pub fn run(rig: &mut Rig, seed: u64) {
     let dice = &mut Dice::new(seed);
     rig.port = Port {
@@ -183,7 +184,8 @@ pub fn run(rig: &mut Rig, seed: u64) {
     rig.stream(true, 100);
 }
 
-/// Patterns, dwell and complements that bring a sum back after 1 to 6 clocks and after many.
+/// Patterns, dwell and complements with which a sum is used again after 1 to 6 clocks, and after
+/// many.
 const RETURNS: [(u64, u64, bool); 10] = [
     (1, 1, false),
     (2, 1, false),
@@ -227,7 +229,7 @@ pub fn long_sums(rig: &mut Rig, seed: u64) {
     }
 }
 
-/// A run with a light budget that is spent about when a duty window ends.
+/// A run that spends its light budget at about the end of a duty window.
 pub fn across_a_window(rig: &mut Rig, seed: u64) {
     let dice = &mut Dice::new(seed);
     rig.interlock(true);

@@ -1,4 +1,4 @@
-//! Generated files are as their sources say. `NIRSPI_BLESS=1` writes them anew.
+//! Tests that generated files match their sources. `NIRSPI_BLESS=1` writes the files again.
 
 use crate::map;
 use crate::project::{Project, files, folder};

@@ -1,6 +1,13 @@
 //! Files that are not what they should be: one line, no result, nothing left behind.
 
 use crate::bench::{Bench, Measured};
+use nirspi::calibration::Settling;
+use nirspi::recording::{Recorder, RunAccount, Target};
+use nirspi::session::CameraIdentity;
+use nirspi::setup::MeasurementSetup;
+use nirspi_recon::Order;
+use nirspi_wire::packet::MAX_DEVICE_PACKET;
+use nirspi_wire::{DeviceMessage, Frame, FrameFlags, Samples, encode};
 
 /// Reconstructs a file of these bytes, which must fail and leave nothing behind.
 #[track_caller]
@@ -127,4 +134,95 @@ fn a_recording_that_is_there_is_not_written_over() {
     bench
         .run(&["capture", "--frames", "2", "--overwrite", "--out", "/dev/full"])
         .failed(1, &["/dev/full", "No space left"]);
+}
+
+/// A recording of one frame of 1024 samples whose setup or calibration is not what a camera or a burst gives.
+fn crafted(bench: &Bench, name: &str, setup: &MeasurementSetup, settling: &Settling) {
+    let identity = CameraIdentity {
+        protocol: 1,
+        firmware: "0.1.0".into(),
+        gateware: "0.1.0".into(),
+        board: "crafted".into(),
+        serial: "1".into(),
+        adc_hz: 125_000_000,
+        adc_bits: 14,
+        wavelength_nm: 1550,
+        capabilities: Vec::new(),
+    };
+    let target = Target::New(bench.path(name));
+    let mut recorder =
+        Recorder::create(&target, &identity, setup, Some(settling), Some(7)).unwrap();
+    let (mut words, mut packet) = ([0; 8192], vec![0; MAX_DEVICE_PACKET + 1]);
+    let samples = Samples::pack((0..1024_i32).map(|k| i64::from(5000 - k)), &mut words).unwrap();
+    let flags = FrameFlags::DIFFERENTIAL;
+    let frame = Frame { run: 7, sequence: 0, device_time_us: 1, sweeps: 1, flags, samples };
+    recorder.packet(encode(&DeviceMessage::Frame(frame), &mut packet).unwrap()).unwrap();
+    recorder.finish(&RunAccount::default()).unwrap();
+}
+
+#[test]
+fn a_recording_whose_setup_or_calibration_cannot_be_is_refused() {
+    let bench = Bench::new();
+    let setup = MeasurementSetup::new(&Order::CakeCutting, 1.0).unwrap();
+    let settling = Settling {
+        adc_latency: 6,
+        response: vec![0.9],
+        dark_counts: 200.0,
+        step_counts: 8000.0,
+        noise_counts: 18.5,
+    };
+    crafted(&bench, "sound.mcap", &setup, &settling);
+    let reconstruct = |name: &str| bench.run(&["reconstruct", name, "--method", "hadamard"]);
+    reconstruct("sound.mcap").succeeded();
+    let fewer = MeasurementSetup::new(&Order::CakeCutting, 0.5).unwrap();
+    let setups: [(MeasurementSetup, &[&str]); 6] = [
+        (MeasurementSetup { clocks_per_pattern: 0, ..setup.clone() }, &["clocks_per_pattern is 0"]),
+        (MeasurementSetup { blanked: 5, ..setup.clone() }, &["blanked is 5, expected 0 to 4"]),
+        (MeasurementSetup { adc_latency: 99, ..setup.clone() }, &["adc_latency is 99"]),
+        (MeasurementSetup { sweeps: 0, ..setup.clone() }, &["sweeps is 0, expected 1"]),
+        (
+            MeasurementSetup { differential: false, ..setup.clone() },
+            &["differences of patterns and complements, expected single patterns"],
+        ),
+        (fewer, &["frames of 1024 patterns, expected 512"]),
+    ];
+    for (at, (wrong, words)) in setups.iter().enumerate() {
+        let name = format!("setup-{at}.mcap");
+        crafted(&bench, &name, wrong, &settling);
+        reconstruct(&name).failed(1, &[&[name.as_str()], *words].concat());
+    }
+    let settlings: [(Settling, &str); 4] = [
+        (
+            Settling { response: vec![0.5; 4000], ..settling.clone() },
+            "length of the response is 4000",
+        ),
+        (Settling { response: vec![1e300], ..settling.clone() }, "response[0] is 1"),
+        (Settling { response: vec![0.0], ..settling.clone() }, "response[0] is 0"),
+        (Settling { dark_counts: 1e308, ..settling.clone() }, "dark_counts is 1"),
+    ];
+    for (at, (wrong, words)) in settlings.iter().enumerate() {
+        let name = format!("settling-{at}.mcap");
+        crafted(&bench, &name, &setup, wrong);
+        reconstruct(&name).failed(1, &[&name, words]);
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_pipe_or_a_device_is_refused_and_not_waited_for() {
+    let bench = Bench::new();
+    for name in ["pipe.mcap", "pipe.npz", "pipe.safetensors"] {
+        let made = std::process::Command::new("mkfifo").arg(bench.path(name)).status().unwrap();
+        assert!(made.success());
+    }
+    bench
+        .run(&["reconstruct", "pipe.mcap"])
+        .failed(1, &["pipe.mcap", "expected a nirspi recording"]);
+    bench.run(&["reconstruct", "pipe.npz"]).failed(1, &["pipe.npz"]);
+    bench.write("in.npy", &nirspi::files::npy::encode(&[32, 32], &[0.5; 1024]));
+    for weights in ["pipe.safetensors", "/dev/zero"] {
+        let upscale = ["upscale", "in.npy", "--backend", "cpu", "--out", "out.npy"];
+        let outcome = bench.run(&[&upscale[..], &["--weights", weights]].concat());
+        outcome.failed(1, &[weights, "not a file"]);
+    }
 }

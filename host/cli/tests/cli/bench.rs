@@ -50,6 +50,19 @@ impl Bench {
 
     /// Starts `nirspi` with these arguments, in the folder.
     pub fn start(&self, arguments: &[&str]) -> Process {
+        self.spawn(&mut Command::new(env!("CARGO_BIN_EXE_nirspi")), arguments)
+    }
+
+    /// Runs `nirspi` under limits that a shell sets, `ulimit -n 64` or the like.
+    #[cfg(unix)]
+    pub fn run_limited(&self, limits: &str, arguments: &[&str]) -> Outcome {
+        let mut shell = Command::new("sh");
+        let script = format!("{limits}; exec \"$0\" \"$@\"");
+        shell.args(["-c", &script, env!("CARGO_BIN_EXE_nirspi")]);
+        self.spawn(&mut shell, arguments).wait()
+    }
+
+    fn spawn(&self, program: &mut Command, arguments: &[&str]) -> Process {
         let log = |stream: &str| {
             let number = fs::read_dir(self.folder.path()).unwrap().count();
             self.path(&format!("log-{number}-{stream}"))
@@ -57,7 +70,7 @@ impl Bench {
         let out = log("out");
         let stdout = File::create(&out).unwrap();
         let err = log("err");
-        let child = Command::new(env!("CARGO_BIN_EXE_nirspi"))
+        let child = program
             .args(arguments)
             .current_dir(self.folder.path())
             // Calibrations that the user keeps are none of ours, nor ours his.

@@ -3,8 +3,8 @@
 use crate::bench::Bench;
 use nirspi_wire::packet::{MAX_DEVICE_PACKET, MAX_HOST_PACKET};
 use nirspi_wire::{
-    Answer, Deframed, Deframer, DeviceMessage, Identity, Refusal, Reply, Request, Version, encode,
-    open,
+    Answer, Deframed, Deframer, DeviceMessage, Identity, Refusal, Reply, Request, Tail, Version,
+    encode, open,
 };
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -70,9 +70,10 @@ fn a_camera_of_a_future_protocol_is_told_apart_with_both_versions() {
             adc_hz: 250_000_000,
             adc_bits: 16,
             wavelength_nm: 1550,
+            capabilities: Tail(None),
         }))
     };
-    let words = ["protocol version 99", "version 1", "update this program"];
+    let words = ["protocol version 99", "versions 1 to 2", "update this program"];
     refused(&answering(identity), &words);
     refused(&answering(|| Err(Refusal::Protocol { device: 99 })), &words);
 }
@@ -83,12 +84,15 @@ fn a_greeting_that_says_more_than_ours_still_names_its_version() {
     let greeting = |id, packet: &mut [u8]| {
         encode(&(0u8, id, 0u8, 0u8, 99u16, [0xA5u8; 31]), packet).unwrap().to_vec()
     };
-    refused(&replying(greeting), &["protocol version 99", "version 1", "update this program"]);
+    refused(
+        &replying(greeting),
+        &["protocol version 99", "versions 1 to 2", "update this program"],
+    );
 }
 
 #[test]
 fn a_camera_of_the_past_is_to_be_updated() {
-    let words = ["protocol version 0", "version 1", "update the camera's firmware"];
+    let words = ["protocol version 0", "versions 1 to 2", "update the camera's firmware"];
     refused(&answering(|| Err(Refusal::Protocol { device: 0 })), &words);
 }
 

@@ -1,17 +1,19 @@
 //! Richardson-Lucy deconvolution (Richardson, J. Opt. Soc. Am. 62, 1972; Lucy, Astron. J. 79, 1974).
 //!
-//! x <- x * B(y / B x): the estimate stays positive and keeps the light. Left alone it ends up drawing the noise, so it
-//! stops by the discrepancy principle (Morozov, 1966): as soon as the residual is what noise alone explains.
+//! x <- x * B(y / B x): the estimate stays positive and keeps the light. Without a stop the
+//! iteration would reproduce the noise. It stops by the discrepancy principle (Morozov, 1966): when
+//! noise alone explains the residual.
 
 use super::{Blur, noise_budget};
 
-/// Rounds after which it stops in any case: with next to no noise it would go on refining rounding errors.
+/// Largest number of rounds. With hardly any noise the iteration would otherwise go on refining
+/// rounding errors.
 const MOST_ROUNDS: usize = 300;
 
-/// Light that every pixel is taken to have besides its own, so that no quotient is of nothing.
+/// Light added to every pixel, so that no quotient has a zero denominator.
 const GROUND: f32 = 1e-3;
 
-/// The sharpened image, positive, not clamped to 1.
+/// The sharpened image: positive, not clamped to 1.
 #[must_use]
 pub fn deblur(image: &[f32], blur: &Blur, noise: f32) -> Vec<f32> {
     let budget = noise_budget(image, noise);
@@ -28,7 +30,8 @@ pub fn deblur(image: &[f32], blur: &Blur, noise: f32) -> Vec<f32> {
         if residual <= budget {
             break;
         }
-        // The blur is its own adjoint, and light sums to one under it: no further factor.
+        // The blur is its own adjoint and keeps the sum of light, so no further factor is
+        // necessary.
         let correction = blur.apply(&quotient);
         estimate.iter_mut().zip(&correction).for_each(|(value, by)| *value *= by);
     }

@@ -4,7 +4,7 @@ use proptest::prelude::*;
 
 const SIDE: usize = 64;
 
-/// A letter E, bright on dark, with room around it.
+/// A letter E, bright on dark, with a margin.
 fn letter() -> Vec<f32> {
     let ink = |r: usize, c: usize| {
         let stem = (12..52).contains(&r) && (16..23).contains(&c);
@@ -14,7 +14,8 @@ fn letter() -> Vec<f32> {
     (0..SIDE * SIDE).map(|at| if ink(at / SIDE, at % SIDE) { 0.9 } else { 0.05 }).collect()
 }
 
-/// White noise of standard deviation 1 from a seed: twelve uniform numbers (PCG's multiplier), less six.
+/// White noise of standard deviation 1 from a seed: the sum of twelve uniform numbers (PCG's
+/// multiplier), minus six.
 fn noise(count: usize, mut state: u64) -> Vec<f32> {
     let mut uniform = || {
         state =

@@ -1,18 +1,18 @@
-//! Deconvolution of least total variation: of all images in [0, 1] that the readings allow, the one with the
-//! shortest edges (Rudin, Osher and Fatemi, Physica D 60, 1992).
+//! Deconvolution with least total variation: of all images in [0, 1] that agree with the readings,
+//! the one with the least total variation (Rudin, Osher and Fatemi, Physica D 60, 1992).
 //!
-//! min TV(x) subject to |B x - y|^2 <= noise power, 0 <= x <= 1: the noise sets the strength, no parameter is left to
-//! tune. Solved by the primal-dual method of Chambolle and Pock (J. Math. Imaging Vis. 40, 2011, Algorithm 1), with
-//! isotropic differences that end at the edge.
+//! min TV(x) subject to |B x - y|^2 <= noise power, 0 <= x <= 1. The noise sets the strength, so
+//! there is no free parameter. The primal-dual method of Chambolle and Pock (J. Math. Imaging Vis.
+//! 40, 2011, Algorithm 1) solves the problem, with isotropic differences that end at the edge.
 
 use super::{Blur, noise_budget};
 
-/// Rounds of the solver. Eight times as many change a pixel of a blurred letter by 0.003 in the mean at most (sigma 1 to
-/// 4 px, noise 0 to 8 %).
+/// Number of rounds. Eight times as many rounds change a pixel of a blurred letter by at most 0.003
+/// on average (sigma 1 to 4 px, noise 0 to 8 %).
 const ROUNDS: usize = 600;
 
-/// Steps of image and multipliers. Their product times the squared norm of (differences, blur), at most 8 + 1, must not
-/// exceed 1; of 0.01 to 0.08 this converged fastest on letters.
+/// Steps of image and multipliers. Their product times the squared norm of (differences, blur), at
+/// most 8 + 1, must not exceed 1. Of the values 0.01 to 0.08 this one converged fastest on letters.
 const IMAGE_STEP: f32 = 0.01;
 const MULTIPLIER_STEP: f32 = 0.99 / (9.0 * IMAGE_STEP);
 
@@ -22,7 +22,7 @@ pub fn deblur(image: &[f32], blur: &Blur, noise: f32) -> Vec<f32> {
     let (_, width) = blur.size();
     let radius = noise_budget(image, noise).sqrt();
     let mut estimate = image.to_vec();
-    // The estimate extrapolated, at which the multipliers are brought up to date.
+    // The extrapolated estimate, at which the multipliers are updated.
     let mut ahead = estimate.clone();
     let mut edges = vec![[0.0_f32; 2]; image.len()];
     let mut misfit = vec![0.0_f32; image.len()];
@@ -38,7 +38,7 @@ pub fn deblur(image: &[f32], blur: &Blur, noise: f32) -> Vec<f32> {
         for (multiplier, residual) in misfit.iter_mut().zip(residual) {
             *multiplier += MULTIPLIER_STEP * residual;
         }
-        // What the ball of the noise does not forgive (Moreau).
+        // The part of the misfit outside the noise ball (Moreau).
         let length = misfit.iter().map(|m| m * m).sum::<f32>().sqrt();
         let left = (1.0 - MULTIPLIER_STEP * radius / length.max(f32::MIN_POSITIVE)).max(0.0);
         misfit.iter_mut().for_each(|multiplier| *multiplier *= left);

@@ -1,8 +1,9 @@
 //! Wiener deconvolution: the linear estimate of least mean squared error (Wiener, 1949).
 //!
-//! With the blur's transfer h, noise power n and the scene's power s, each wave of the DCT-II is multiplied by
-//! h / (h^2 + n / s). For s stands the law of natural images, c / f^2 (Field, J. Opt. Soc. Am. A 4, 1987), with c such
-//! that scene and noise together have the power that is found. The law: the mean is kept.
+//! With the blur's transfer h, noise power n and the scene's power s, each wave of the DCT-II is
+//! multiplied by h / (h^2 + n / s). The scene's power is that of natural images, c / f^2 (Field, J.
+//! Opt. Soc. Am. A 4, 1987), with c such that scene and noise together have the power of the image.
+//! The mean is kept.
 
 use super::Blur;
 use crate::cosine::Cosine;
@@ -16,7 +17,7 @@ pub fn deblur(image: &[f32], blur: &Blur, noise: f32) -> Vec<f32> {
     let mut waves = cosine.forward(&values);
 
     let (h_down, h_across) = blur.transfer();
-    // Cycles per pixel, squared, of each wave.
+    // Squared frequency of each wave, in cycles per pixel.
     let frequency_2 = |k: usize, l: usize| {
         (k as f64 / (2 * height) as f64).powi(2) + (l as f64 / (2 * width) as f64).powi(2)
     };

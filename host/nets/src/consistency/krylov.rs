@@ -1,45 +1,49 @@
-//! (M + lambda)^-1 r for every lambda at the price of one: Lanczos' basis of the Krylov space of M and r.
+//! Solves (M + lambda) x = r for every lambda at the cost of one: Lanczos' basis of the Krylov
+//! space of M and r.
 //!
-//! Lanczos (J. Res. Natl. Bur. Stand. 45, 1950) makes vectors v_1 = r / |r|, v_2, ... in which M is tridiagonal. The basis
-//! does not depend on lambda, so one run of products with M serves a whole search for lambda: for each value only
-//! (T + lambda) c = |r| e_1 is solved, with as many unknowns as steps. What comes out is what conjugate gradients give
-//! after so many steps (Frommer, Maass, SIAM J. Sci. Comput. 20, 1999).
+//! Lanczos (J. Res. Natl. Bur. Stand. 45, 1950) constructs vectors v_1 = r / |r|, v_2, ... in which
+//! M is tridiagonal. The basis does not depend on lambda, so one series of products with M serves a
+//! whole search for lambda. For each lambda only (T + lambda) c = |r| e_1 is solved, with as many
+//! unknowns as steps. The result is that of conjugate gradients after as many steps (Frommer,
+//! Maass, SIAM J. Sci. Comput. 20, 1999).
 //!
 //! # Invariant
-//! For any lambda the solution is that of the whole equation, to the tolerance
-//! (`every_shift_is_solved_in_one_space`).
+//! For every lambda the solution agrees with that of the whole equation to within the tolerance
+//! (`tests::every_shift_is_solved_in_one_space`).
 
 use super::norm;
 
-/// Most products with the matrix. The equation is well conditioned where lambda matters.
+/// Largest number of products with the matrix. The equation is well conditioned for the lambdas
+/// that matter.
 const MOST_STEPS: usize = 60;
 
-/// Steps from one look at the error to the next.
+/// Number of steps between two checks of the error.
 const STEPS_A_LOOK: usize = 2;
 
-/// Norm of what the solution leaves of the right-hand side, over its norm, that is good enough.
+/// Norm of the residual, relative to the right-hand side's norm, at which a solution is accurate
+/// enough.
 const TOLERANCE: f64 = 1e-3;
 
 /// The Krylov space of a symmetric, positive semidefinite matrix and a right-hand side.
 pub(super) struct Krylov {
     length: f64,
-    /// v_1 to v_m, then v_(m + 1).
+    /// Vectors v_1 to v_m, and then v_(m + 1).
     basis: Vec<Vec<f32>>,
-    /// Diagonal of T, one element a step.
+    /// Diagonal of T, one element for each step.
     diagonal: Vec<f64>,
-    /// Beside the diagonal; element k couples v_(k + 1) and v_(k + 2).
+    /// Off-diagonal of T; element k couples v_(k + 1) and v_(k + 2).
     beside: Vec<f64>,
 }
 
 impl Krylov {
-    /// The space of `right`, which is not 0.
+    /// The space of `right`, which must not be 0.
     pub(super) fn new(right: &[f32]) -> Self {
         let length = f64::from(norm(right));
         let first = right.iter().map(|v| (f64::from(*v) / length) as f32).collect();
         Self { length, basis: vec![first], diagonal: Vec::new(), beside: Vec::new() }
     }
 
-    /// One step: `apply` multiplies by the matrix.
+    /// Does one step; `apply` multiplies by the matrix.
     pub(super) fn step(&mut self, apply: impl FnOnce(&[f32]) -> Vec<f32>) {
         let steps = self.diagonal.len();
         let now = &self.basis[steps];
@@ -50,7 +54,7 @@ impl Krylov {
         let along = dot(now, &next);
         take_away(&mut next, along, now);
         let left = f64::from(norm(&next));
-        // At 0 the space holds the whole solution, and the next vector is not used.
+        // At 0 the space contains the whole solution, and the next vector is not used.
         let scale = if left > 0.0 { 1.0 / left } else { 0.0 };
         next.iter_mut().for_each(|v| *v = (f64::from(*v) * scale) as f32);
         self.basis.push(next);
@@ -58,13 +62,13 @@ impl Krylov {
         self.beside.push(left);
     }
 
-    /// Whether the error is worth a look after this many steps.
+    /// Whether the error should be checked after this step.
     pub(super) fn is_due(&self) -> bool {
         let steps = self.diagonal.len();
         steps.is_multiple_of(STEPS_A_LOOK) || steps >= MOST_STEPS || self.coupling() == 0.0
     }
 
-    /// Whether the solution for `lambda` is good enough, or no step would make it better.
+    /// Whether the solution for `lambda` is accurate enough, or no further step would improve it.
     pub(super) fn is_enough(&self, lambda: f32) -> bool {
         let last = self.coefficients(lambda).last().map_or(0.0, |c| c.abs());
         self.diagonal.len() >= MOST_STEPS || self.coupling() * last <= TOLERANCE * self.length
@@ -84,7 +88,7 @@ impl Krylov {
         solution
     }
 
-    /// What couples the space to the vector after it.
+    /// The coupling of the space to the next vector.
     fn coupling(&self) -> f64 {
         self.beside.last().copied().unwrap_or(f64::INFINITY)
     }
@@ -113,7 +117,7 @@ impl Krylov {
     }
 }
 
-/// `values` -= `factor` times `other`.
+/// Subtracts `factor` times `other` from `values`.
 fn take_away(values: &mut [f32], factor: f64, other: &[f32]) {
     let factor = factor as f32;
     values.iter_mut().zip(other).for_each(|(v, o)| *v -= factor * o);
@@ -127,7 +131,7 @@ fn dot(a: &[f32], b: &[f32]) -> f64 {
 mod tests {
     use super::*;
 
-    /// A symmetric, positive semidefinite matrix of rank 40: a diagonal seen through a reflection.
+    /// A symmetric, positive semidefinite matrix of rank 40: a diagonal matrix after a reflection.
     fn multiply(v: &[f32]) -> Vec<f32> {
         let mirror: Vec<f32> = (0..64).map(|i| (1.0 + i as f32 * 0.7).sin()).collect();
         let reflected = |v: &[f32]| -> Vec<f32> {

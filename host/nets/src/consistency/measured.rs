@@ -1,11 +1,11 @@
-//! Which Hadamard rows the readings were made from: only measured rows constrain the image.
+//! The Hadamard rows from which the readings were made. Only measured rows constrain the image.
 
 use super::SIDE;
 use crate::cosine::Cosine;
 use std::sync::Arc;
 use thiserror::Error;
 
-/// Which rows of the natural-order Hadamard matrix were measured.
+/// The measured rows of the natural-order Hadamard matrix.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub enum MeasuredRows {
     /// Every row.
@@ -15,7 +15,7 @@ pub enum MeasuredRows {
     Rows(SampledRows),
 }
 
-/// Some of the Hadamard rows of an image of one size: at least one, and not every one.
+/// Some Hadamard rows of images of one size: at least one, but not all.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SampledRows {
     side: usize,
@@ -27,7 +27,7 @@ pub struct SampledRows {
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum MeasuredRowsError {
-    /// The readings are of a size that no camera model is made for.
+    /// The readings have a size without a camera model.
     #[error("readings of {found} x {found}, expected 32 x 32 or 64 x 64")]
     Side {
         /// Side of the readings.
@@ -36,15 +36,15 @@ pub enum MeasuredRowsError {
     /// The list is empty.
     #[error("the list of measured Hadamard rows is empty, expected at least one row")]
     Empty,
-    /// A row beyond the matrix.
+    /// A row is beyond the matrix.
     #[error("Hadamard row {row} of readings of {side} x {side}, expected 0 to {}", side * side - 1)]
     Row {
-        /// The row.
+        /// Number of the row.
         row: u32,
         /// Side of the readings.
         side: usize,
     },
-    /// Rows of readings of one size were given with readings of another.
+    /// The rows belong to readings of another size.
     #[error(
         "the measured Hadamard rows are of {rows} x {rows} readings, but the readings are {readings} x {readings}"
     )]
@@ -57,10 +57,12 @@ pub enum MeasuredRowsError {
 }
 
 impl MeasuredRows {
-    /// The rows of readings of `side` x `side`, 32 or 64, in any order; [`All`](Self::All) if every row is in the list.
+    /// The rows of readings of `side` x `side`, 32 or 64, in any order; [`All`](Self::All) if the
+    /// list has every row.
     ///
     /// # Errors
-    /// [`MeasuredRowsError`] if the side is another one, the list is empty, or a row is beyond the matrix.
+    /// [`MeasuredRowsError`] if the side is not 32 or 64, the list is empty, or a row is beyond the
+    /// matrix.
     pub fn new(side: usize, rows: &[u32]) -> Result<Self, MeasuredRowsError> {
         if side != SIDE && side != SIDE / 2 {
             return Err(MeasuredRowsError::Side { found: side });
@@ -95,12 +97,12 @@ impl MeasuredRows {
 }
 
 impl SampledRows {
-    /// How many rows were measured.
+    /// Number of measured rows.
     pub fn count(&self) -> usize {
         self.count
     }
 
-    /// Takes the unmeasured part out of readings given by their cosine transform.
+    /// Removes the unmeasured part from readings given by their cosine transform.
     pub(super) fn keep_measured(&self, cosine: &Cosine<f32>, spectrum: &mut [f32]) {
         let mut readings = cosine.inverse(spectrum);
         walsh_hadamard(&mut readings);
@@ -113,7 +115,7 @@ impl SampledRows {
     }
 }
 
-/// In place, natural order, not normalised.
+/// The Walsh-Hadamard transform in place, in natural order, unnormalised.
 fn walsh_hadamard(values: &mut [f32]) {
     let mut half = 1;
     while half < values.len() {

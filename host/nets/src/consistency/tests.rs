@@ -1,6 +1,6 @@
 use super::*;
 
-/// Numbers in [0, 1] that look random.
+/// Pseudo-random numbers in [0, 1].
 fn numbers(count: usize, seed: u32) -> Vec<f32> {
     let mut state = seed.wrapping_mul(2_654_435_761).wrapping_add(12_345);
     (0..count)
@@ -11,8 +11,8 @@ fn numbers(count: usize, seed: u32) -> Vec<f32> {
         .collect()
 }
 
-/// The definition: Gaussian weights, half-sample reflection at the edge, one axis after the other; means
-/// of 2 x 2 to 32 x 32.
+/// The model by its definition: Gaussian weights with half-sample reflection at the edge, one axis
+/// after the other, then means of 2 x 2 pixels for 32 x 32.
 fn blurred(image: &[f32], sigma_px: f32, side: usize) -> Vec<f32> {
     let radius = (6.0 * sigma_px).ceil() as i64;
     let weights: Vec<f64> = (-radius..=radius)
@@ -106,7 +106,7 @@ fn rows_that_were_not_measured_constrain_nothing() {
     let model = Consistency::new(32, 1.0, 0.01).of_rows(&rows).unwrap();
     let image = numbers(SIDE * SIDE, 5);
     let mut readings = blurred(&image, 1.0, 32);
-    // Row 1000 of the Hadamard matrix, a pattern that was not shown, is wrong by far.
+    // The measurement of row 1000, a pattern that was not shown, has a large error.
     for (i, value) in readings.iter_mut().enumerate() {
         *value += if (i & 1000).count_ones() % 2 == 0 { 0.3 } else { -0.3 };
     }

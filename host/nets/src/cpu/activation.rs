@@ -1,15 +1,19 @@
-//! What lies between convolutions, over whole channels; written so that the compiler makes vectors of it.
+//! Activations between convolutions, over whole channels, written so that the compiler vectorises
+//! them.
 //!
-//! Law: zero stays zero (margins), but for [`film_silu`], whose caller clears them.
+//! Every activation maps zero to zero, which keeps margins zero, except [`film_silu`], whose caller
+//! clears the margins.
 
 use pulp::Arch;
 
-/// e^x for |x| <= 87, relative error below 2e-7: 2^n by the exponent's bits, the rest by its Taylor polynomial.
+/// e^x for |x| <= 87, with a relative error below 2e-7: 2^n from the exponent's bits, the rest from
+/// the Taylor polynomial.
 #[inline(always)]
 fn exp(x: f32) -> f32 {
     /// 1.5 * 2^23: adding it leaves the nearest integer in the low bits of the sum.
     const ROUND: f32 = 12_582_912.0;
-    /// ln 2 in two parts, the first with few bits, so that n times it is exact (Cody and Waite).
+    /// ln 2 in two parts. The first part has few bits, so that its product with n is exact (Cody
+    /// and Waite).
     const LN_2: (f32, f32) = (0.693_359_4, -2.121_944_4e-4);
     let x = x.clamp(-87.0, 87.0);
     let shifted = x * std::f32::consts::LOG2_E + ROUND;
@@ -33,7 +37,7 @@ pub(super) fn silu(arch: Arch, values: &mut [f32]) {
     arch.dispatch(|| values.iter_mut().for_each(|x| *x = silu_of(*x)));
 }
 
-/// SiLU of `values`, into `out`.
+/// Writes SiLU of `values` into `out`.
 pub(super) fn silu_into(arch: Arch, values: &[f32], out: &mut [f32]) {
     arch.dispatch(|| values.iter().zip(out).for_each(|(x, out)| *out = silu_of(*x)));
 }
@@ -43,7 +47,7 @@ pub(super) fn film_silu(arch: Arch, values: &mut [f32], gain: f32, offset: f32) 
     arch.dispatch(|| values.iter_mut().for_each(|x| *x = silu_of(*x * gain + offset)));
 }
 
-/// Negative values times `slope`: PReLU, and with 0 ReLU.
+/// Multiplies negative values by `slope`: PReLU; with slope 0, ReLU.
 pub(super) fn prelu(arch: Arch, values: &mut [f32], slope: f32) {
     arch.dispatch(|| values.iter_mut().for_each(|x| *x = x.max(0.0) + slope * x.min(0.0)));
 }

@@ -1,15 +1,17 @@
-//! Which of the 62 characters an image shows, on the CPU: for character accuracy and the Fréchet character distance.
+//! The classifier on the CPU: which of the 62 characters an image shows. Character accuracy and the
+//! Fréchet character distance use it.
 
 use pulp::Arch;
 
 use super::conv::Conv;
 use super::layers::{Linear, conv, means, relu, single};
+use crate::schema;
 use crate::weights::{Weights, WeightsError};
 
-/// Convolutions, and by how much each shrinks the image.
+/// Strides of the convolutions.
 const STRIDES: [usize; 6] = [2, 1, 2, 1, 2, 1];
 
-/// The network, its weights in the order of the loops.
+/// The network, with weights in the order of the loops.
 #[derive(Debug, Clone)]
 pub struct Classifier {
     arch: Arch,
@@ -18,11 +20,12 @@ pub struct Classifier {
 }
 
 impl Classifier {
-    /// The network of these weights.
+    /// The network with these weights.
     ///
     /// # Errors
-    /// [`WeightsError`] for a tensor that is missing or of another shape.
+    /// [`WeightsError`] if a tensor is missing, of another shape, not finite, or unknown.
     pub fn new(weights: &Weights) -> Result<Self, WeightsError> {
+        schema::classifier(weights)?;
         let convs = (1..=STRIDES.len()).map(|i| conv(weights, &format!("conv{i}")));
         Ok(Self {
             arch: Arch::new(),
@@ -31,7 +34,7 @@ impl Classifier {
         })
     }
 
-    /// How many features an image has.
+    /// Number of features of an image.
     pub fn feature_count(&self) -> usize {
         self.convs.last().map_or(0, Conv::outputs)
     }
@@ -41,14 +44,14 @@ impl Classifier {
         let mut h = single(image, (height, width));
         for (conv, stride) in self.convs.iter().zip(STRIDES) {
             let full = conv.apply(self.arch, &h);
-            // What a stride of 2 skips is cheap enough to be thrown away.
+            // Pixels that a stride of 2 skips are computed and dropped, because that is cheap.
             h = if stride == 1 { full } else { full.every_second() };
             relu(self.arch, &mut h);
         }
         means(&h)
     }
 
-    /// Logits of the classes, of [`Self::features`].
+    /// Logits of the classes for [`Self::features`].
     pub fn logits(&self, features: &[f32]) -> Vec<f32> {
         self.fc.apply(features)
     }

@@ -1,41 +1,45 @@
-//! Convolution of [`Planes`]: all that these networks compute, but for a few thousand activations.
+//! Convolution of [`Planes`], nearly all of the computation of these networks.
 //!
-//! A tap is an offset into a channel (the margins see to the edges), so a convolution is a sum over channels and taps of
-//! a shifted run of floats times a weight. Four output channels by three vectors of pixels stay in registers
-//! while that sum runs; what limits the loop is the multiplier.
+//! A tap is an offset into a channel (the margins supply zeros at the edges), so a convolution is a
+//! sum over channels and taps of a shifted run of floats times a weight. Four output channels by
+//! three vectors of pixels stay in registers during that sum, and the multipliers limit the speed.
 //!
-//! Law: an output is its bias plus its products, added over input channels and taps in one order, fused.
-//! Images and threads never share a sum, so a batch and a single image give the same bits.
+//! # Invariant
+//! An output is its bias plus its products, added over input channels and taps in one order, fused
+//! (`cpu::tests::a_convolution_is_the_sum_over_channels_and_taps`). Images and threads never share
+//! a sum, so a batch and a single image give the same bits.
 
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use super::planes::Planes;
 
-/// Output channels worked on together.
+/// Number of output channels computed together.
 const BLOCK: usize = 4;
 
-/// Vectors of pixels worked on together.
+/// Number of vectors of pixels computed together.
 const VECTORS: usize = 3;
 
-/// Multiplications that are worth another thread.
+/// Number of multiplications from which another thread is used.
 const THREAD_WORK: usize = 2_000_000;
 
-/// Weights of a convolution with stride 1 that keeps the size of its input, in the order of the loop.
+/// Weights of a convolution with stride 1 that keeps the size of its input, in the order of the
+/// loop.
 #[derive(Debug, Clone)]
 pub(super) struct Conv {
     inputs: usize,
     outputs: usize,
-    /// Rows and columns from a pixel to each of its taps.
+    /// Offset in rows and columns from a pixel to each of its taps.
     taps: Vec<(isize, isize)>,
-    /// For each block of outputs, input and tap: a weight for each output.
+    /// For each block of outputs, each input and each tap: one weight for each output.
     weights: Vec<[f32; BLOCK]>,
-    /// For each block of outputs.
+    /// Biases of each block of outputs.
     bias: Vec<[f32; BLOCK]>,
 }
 
 impl Conv {
-    /// `weight(output, input, ky, kx)` of a `kernel` x `kernel` convolution whose tap (`centre`, `centre`) is the pixel itself.
+    /// Takes `weight(output, input, ky, kx)` of a `kernel` x `kernel` convolution whose tap
+    /// (`centre`, `centre`) is the pixel itself.
     pub fn new(
         (outputs, inputs, kernel, centre): (usize, usize, usize, usize),
         weight: impl Fn(usize, usize, usize, usize) -> f32,
@@ -67,12 +71,12 @@ impl Conv {
         Self { inputs, outputs, taps, weights, bias }
     }
 
-    /// Channels that it makes.
+    /// Number of output channels.
     pub fn outputs(&self) -> usize {
         self.outputs
     }
 
-    /// The convolution of `input`, whose margin must hold the taps.
+    /// The convolution of `input`, whose margin must be as wide as the taps reach.
     pub fn apply(&self, arch: Arch, input: &Planes) -> Planes {
         debug_assert_eq!(input.channels(), self.inputs);
         let mut out = input.like(self.outputs);

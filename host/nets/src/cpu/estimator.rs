@@ -1,19 +1,20 @@
-//! The network that estimates blur and noise of an image from the image itself, on the CPU.
+//! The estimator on the CPU: estimates blur and noise of an image from the image itself.
 
 use pulp::Arch;
 
 use super::activation::softplus;
 use super::conv::Conv;
 use super::layers::{Linear, conv, means, relu, single};
+use crate::schema;
 use crate::weights::{Weights, WeightsError};
 
-/// Added to each mean feature before its logarithm is taken.
+/// Constant added to each mean feature before the logarithm.
 pub(crate) const LOG_FLOOR: f32 = 1e-3;
 
-/// Added to the logarithm, to centre it.
+/// Constant added to the logarithm, to centre it.
 pub(crate) const LOG_OFFSET: f32 = 3.0;
 
-/// The network, its weights in the order of the loops.
+/// The network, with weights in the order of the loops.
 #[derive(Debug, Clone)]
 pub struct Estimator {
     arch: Arch,
@@ -23,11 +24,12 @@ pub struct Estimator {
 }
 
 impl Estimator {
-    /// The network of these weights.
+    /// The network with these weights.
     ///
     /// # Errors
-    /// [`WeightsError`] for a tensor that is missing or of another shape.
+    /// [`WeightsError`] if a tensor is missing, of another shape, not finite, or unknown.
     pub fn new(weights: &Weights) -> Result<Self, WeightsError> {
+        schema::estimator(weights)?;
         Ok(Self {
             arch: Arch::new(),
             convs: (1..=4).map(|i| conv(weights, &format!("conv{i}"))).collect::<Result<_, _>>()?,
@@ -41,7 +43,8 @@ impl Estimator {
         let mut h = single(image, (height, width));
         for (index, conv) in self.convs.iter().enumerate() {
             let full = conv.apply(self.arch, &h);
-            // All but the first have stride 2; what they skip is cheap enough to be thrown away.
+            // All convolutions except the first have stride 2; the skipped pixels are computed and
+            // dropped, because that is cheap.
             h = if index == 0 { full } else { full.every_second() };
             relu(self.arch, &mut h);
         }

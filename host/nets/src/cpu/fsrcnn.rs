@@ -6,25 +6,27 @@ use super::conv::Conv;
 use super::layers::{conv, keeping, prelu, slopes};
 use super::planes::Planes;
 use crate::filter::Filter;
+use crate::schema;
 use crate::weights::{Weights, WeightsError};
 
-/// The network, its weights in the order of the loops.
+/// The network, with weights in the order of the loops.
 #[derive(Debug, Clone)]
 pub struct Fsrcnn {
     arch: Arch,
-    /// Convolutions with the slopes of what follows them.
+    /// Convolutions, each with the slopes of the PReLU after it.
     layers: Vec<(Conv, Vec<f32>)>,
-    /// The transposed convolution, as one with four outputs, one for each place in a block of 2 x 2.
+    /// The transposed convolution as a convolution with four outputs, one for each place in a block
+    /// of 2 x 2.
     deconv: Conv,
 }
 
 impl Fsrcnn {
-    /// The network of these weights.
+    /// The network with these weights.
     ///
     /// # Errors
-    /// [`WeightsError`] for a tensor that is missing or of another shape.
+    /// [`WeightsError`] if a tensor is missing, of another shape, not finite, or unknown.
     pub fn new(weights: &Weights) -> Result<Self, WeightsError> {
-        let maps = weights.count(|i| format!("map.{i}.weight"));
+        let [_, _, maps] = schema::fsrcnn(weights)?;
         let names = ["feature".to_owned(), "shrink".to_owned()]
             .into_iter()
             .map(|name| (format!("{name}_act"), name))
@@ -41,7 +43,8 @@ impl Fsrcnn {
         Ok(Self { arch: Arch::new(), layers, deconv })
     }
 
-    /// The image of twice the size: `input` holds intensity, depth and validity, each `height` x `width`. Not clamped.
+    /// The image of twice the size, not clamped. `input` holds intensity, depth and validity, each
+    /// `height` x `width`.
     pub fn forward(&self, input: &[f32], (height, width): (usize, usize)) -> Vec<f32> {
         let mut h = Planes::new(CHANNELS, height, width, 2);
         for channel in 0..CHANNELS {
@@ -64,5 +67,5 @@ impl Fsrcnn {
     }
 }
 
-/// Intensity, depth, validity.
+/// Input channels: intensity, depth, validity.
 const CHANNELS: usize = 3;

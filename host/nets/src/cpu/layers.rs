@@ -7,18 +7,18 @@ use super::planes::Planes;
 use crate::filter::Filter;
 use crate::weights::{Weights, WeightsError};
 
-/// A convolution of stride 1 that keeps the size of its input (its taps beyond the edge see zeros).
+/// A convolution with stride 1 that keeps the size of its input; taps beyond the edge read zeros.
 pub(super) fn conv(weights: &Weights, name: &str) -> Result<Conv, WeightsError> {
     Ok(keeping(&Filter::convolution(weights, name)?))
 }
 
-/// The same of weights that are read already.
+/// The same convolution from weights that are already read.
 pub(super) fn keeping(filter: &Filter) -> Conv {
     let sizes = (filter.outputs, filter.inputs, filter.side, filter.side / 2);
     Conv::new(sizes, |o, i, ky, kx| filter.at(o, i, ky, kx), |o| filter.bias[o])
 }
 
-/// A 2 x 2 convolution of stride 2, as one of 1 x 1 over [`Planes::blocks`].
+/// A 2 x 2 convolution with stride 2, as a 1 x 1 convolution over [`Planes::blocks`].
 pub(super) fn conv_blocks(weights: &Weights, name: &str) -> Result<Conv, WeightsError> {
     let (key, bias) = (format!("{name}.weight"), format!("{name}.bias"));
     let [outputs, inputs, _, _] = weights.shape(&key)?;
@@ -31,7 +31,7 @@ pub(super) fn conv_blocks(weights: &Weights, name: &str) -> Result<Conv, Weights
 /// A fully connected layer.
 #[derive(Debug, Clone)]
 pub(super) struct Linear {
-    /// A row for each output.
+    /// One row for each output.
     rows: Vec<Vec<f32>>,
     bias: Vec<f32>,
 }
@@ -53,11 +53,11 @@ impl Linear {
 pub(super) fn means(planes: &Planes) -> Vec<f32> {
     let (height, width) = planes.size();
     let pixels = (height * width) as f32;
-    // Margins and slack are zero: they add nothing.
+    // Margins and slack are zero, so they add nothing.
     planes.values().chunks_exact(planes.stride()).map(|c| c.iter().sum::<f32>() / pixels).collect()
 }
 
-/// One image as the input of a network whose convolutions reach one pixel far.
+/// One image as the input of a network whose convolutions reach one pixel.
 pub(super) fn single(image: &[f32], (height, width): (usize, usize)) -> Planes {
     let mut planes = Planes::new(1, height, width, 1);
     for (row, line) in image.chunks_exact(width).enumerate() {
@@ -71,7 +71,7 @@ pub(super) fn relu(arch: Arch, planes: &mut Planes) {
     super::activation::prelu(arch, planes.values_mut(), 0.0);
 }
 
-/// Slope of each channel's PReLU.
+/// Slope of each channel's PReLU, by the layer's name.
 pub(super) fn slopes(
     weights: &Weights,
     name: &str,
@@ -80,7 +80,7 @@ pub(super) fn slopes(
     Ok(weights.tensor(&format!("{name}.weight"), &[channels])?.values.clone())
 }
 
-/// PReLU, a slope for each channel.
+/// PReLU with one slope for each channel.
 pub(super) fn prelu(arch: Arch, planes: &mut Planes, slopes: &[f32]) {
     let stride = planes.stride();
     for (channel, &slope) in planes.values_mut().chunks_exact_mut(stride).zip(slopes) {

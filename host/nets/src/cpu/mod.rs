@@ -1,10 +1,11 @@
-//! The networks' forward passes on the CPU, where one image is all there is and nothing is trained.
+//! The networks' forward passes on the CPU, for a few images and without training.
 //!
-//! Tests hold each network to PyTorch's outputs for the same weights. The networks that are trained (`crate::model`, feature
-//! `train`) read the same files and are held to the same outputs.
+//! Tests compare each network with PyTorch's outputs for the same weights. The networks for
+//! training (`crate::model`, feature `train`) read the same files and are compared with the same
+//! outputs.
 //!
 //! # Invariant
-//! A result does not depend on the number of threads, nor on what else is in a batch
+//! A result depends neither on the number of threads nor on the other images of a batch
 //! (`enhance::tests::an_image_is_enhanced_alike_alone_and_among_others`).
 
 mod activation;

@@ -1,12 +1,15 @@
-//! Channels of one image on the way through a network, each with a margin of zeros.
+//! Channels of one image inside a network, each with a margin of zeros.
 //!
-//! Law: outside of a convolution's inner loop every margin is zero. So a tap of a convolution is one
-//! offset into a channel, the same for every pixel, and no pixel needs to know that it is at an edge.
+//! # Invariant
+//! Outside a convolution's inner loop every margin is zero
+//! (`cpu::tests::a_convolution_is_the_sum_over_channels_and_taps`). So a tap of a convolution is
+//! one offset into a channel, the same for every pixel, at the edge too.
 
-/// Floats behind a channel that a loop over whole vectors may read, and write where it is output.
+/// Number of floats after a channel that a loop over whole vectors may read, and may write if the
+/// channel is its output.
 pub(super) const SLACK: usize = 64;
 
-/// Channels of `height` x `width` pixels with `margin` zeros all around, rows one after the other.
+/// Channels of `height` x `width` pixels with a margin of `margin` zeros, rows one after another.
 #[derive(Debug, Clone)]
 pub(super) struct Planes {
     height: usize,
@@ -17,14 +20,14 @@ pub(super) struct Planes {
 }
 
 impl Planes {
-    /// Zeros.
+    /// Channels of zeros.
     pub fn new(channels: usize, height: usize, width: usize, margin: usize) -> Self {
         let mut planes = Self { height, width, margin, values: Vec::new(), channels };
         planes.values = vec![0.0; channels * planes.stride()];
         planes
     }
 
-    /// The same kind of planes with another number of channels.
+    /// Planes of the same size with another number of channels.
     pub fn like(&self, channels: usize) -> Self {
         Self::new(channels, self.height, self.width, self.margin)
     }
@@ -34,37 +37,38 @@ impl Planes {
         self.channels
     }
 
-    /// Rows, columns.
+    /// Number of rows and columns.
     pub fn size(&self) -> (usize, usize) {
         (self.height, self.width)
     }
 
-    /// Floats from one row to the next.
+    /// Number of floats from one row to the next.
     pub fn row_stride(&self) -> usize {
         self.width + 2 * self.margin
     }
 
-    /// Floats from one channel to the next.
+    /// Number of floats from one channel to the next.
     pub fn stride(&self) -> usize {
         (self.height + 2 * self.margin) * self.row_stride() + SLACK
     }
 
-    /// Where the first pixel lies in its channel.
+    /// Index of the first pixel in its channel.
     pub fn first(&self) -> usize {
         self.margin * (self.row_stride() + 1)
     }
 
-    /// Floats from the first pixel to the last, with it: the margins between rows lie within.
+    /// Number of floats from the first pixel to the last, inclusive; the margins between rows lie
+    /// within.
     pub fn span(&self) -> usize {
         (self.height - 1) * self.row_stride() + self.width
     }
 
-    /// All channels, margins and slack with them.
+    /// All channels, with margins and slack.
     pub fn values(&self) -> &[f32] {
         &self.values
     }
 
-    /// All channels, margins and slack with them.
+    /// All channels, with margins and slack.
     pub fn values_mut(&mut self) -> &mut [f32] {
         &mut self.values
     }
@@ -81,7 +85,7 @@ impl Planes {
         &mut self.values[start..start + self.width]
     }
 
-    /// Puts the zeros back that a loop over whole channels has written over.
+    /// Restores the zeros of the margins after a loop over whole channels.
     pub fn clear_margins(&mut self) {
         let (stride, row, first, span) =
             (self.stride(), self.row_stride(), self.first(), self.span());
@@ -108,8 +112,8 @@ impl Planes {
         }
     }
 
-    /// An image of `2 height` x `2 width` in four channels: pixel (2r + dy, 2c + dx) goes to (r, c) of channel
-    /// `channel + 2 dy + dx`.
+    /// Stores an image of `2 height` x `2 width` in four channels: pixel (2r + dy, 2c + dx) goes to
+    /// (r, c) of channel `channel + 2 dy + dx`.
     pub fn unshuffle(&mut self, channel: usize, image: &[f32]) {
         let (height, width) = self.size();
         for row in 0..2 * height {
@@ -123,7 +127,7 @@ impl Planes {
         }
     }
 
-    /// The other way round: four channels are one of twice the size, with margin `margin`.
+    /// The inverse: four channels become one of twice the size, with margin `margin`.
     pub fn shuffle(&self, margin: usize) -> Self {
         let (height, width) = self.size();
         let mut out = Self::new(self.channels / 4, 2 * height, 2 * width, margin);
@@ -139,7 +143,7 @@ impl Planes {
         out
     }
 
-    /// Every second pixel of every second row, from the first.
+    /// Every second pixel of every second row, beginning with the first.
     pub fn every_second(&self) -> Self {
         let (height, width) = (self.height.div_ceil(2), self.width.div_ceil(2));
         let mut out = Self::new(self.channels, height, width, self.margin);
@@ -156,7 +160,8 @@ impl Planes {
         out
     }
 
-    /// Each block of 2 x 2 pixels as four channels, `4 channel + 2 dy + dx`: what a 2 x 2 convolution of stride 2 sees.
+    /// Each block of 2 x 2 pixels as four channels, `4 channel + 2 dy + dx`: the input of a 2 x 2
+    /// convolution with stride 2.
     pub fn blocks(&self) -> Self {
         let (height, width) = (self.height / 2, self.width / 2);
         let mut out = Self::new(4 * self.channels, height, width, self.margin);

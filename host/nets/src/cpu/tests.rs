@@ -1,4 +1,5 @@
-//! Against PyTorch (`host/nets/tests/pytorch/make.py`), and against the definition of a convolution.
+//! Tests against PyTorch (`host/nets/tests/pytorch/make.py`), and against the definition of a
+//! convolution.
 
 use proptest::prelude::*;
 use pulp::Arch;
@@ -104,8 +105,8 @@ fn number(seed: &mut u64) -> f32 {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
 
-    /// Every size of image, number of channels and kernel: as the definition has it, on every width of vector, and the
-    /// margins of the result are zeros again.
+    /// Every image size, number of channels and kernel gives the result of the definition on every
+    /// vector width, and margins are zero again.
     #[test]
     fn a_convolution_is_the_sum_over_channels_and_taps(
         (inputs, outputs, height, width) in (1_usize..6, 1_usize..11, 1_usize..12, 1_usize..40),
@@ -146,7 +147,7 @@ proptest! {
         prop_assert!((inside - all).abs() < 1e-9 * (1.0 + all), "margins hold {}", all - inside);
     }
 
-    /// Shuffling back what was unshuffled is the image.
+    /// Shuffling an unshuffled image gives the image.
     #[test]
     fn a_shuffle_undoes_an_unshuffle((height, width) in (1_usize..9, 1_usize..9), mut seed in any::<u64>()) {
         let image: Vec<f32> = (0..4 * height * width).map(|_| number(&mut seed)).collect();

@@ -6,6 +6,7 @@ use super::activation::{film_silu, silu, silu_into};
 use super::conv::Conv;
 use super::layers::{Linear, conv, conv_blocks};
 use super::planes::Planes;
+use crate::schema::{self, UNetSizes};
 use crate::weights::{Weights, WeightsError};
 
 /// A residual block: convolution, scale and shift by the conditions, convolution.
@@ -42,7 +43,7 @@ impl Block {
     }
 }
 
-/// The network, its weights in the order of the loops.
+/// The network, with weights in the order of the loops.
 #[derive(Debug, Clone)]
 pub struct UNet {
     arch: Arch,
@@ -57,17 +58,17 @@ pub struct UNet {
 }
 
 impl UNet {
-    /// The network of these weights.
+    /// The network with these weights.
     ///
     /// # Errors
-    /// [`WeightsError`] for a tensor that is missing or of another shape.
+    /// [`WeightsError`] if a tensor is missing, of another shape, not finite, or unknown.
     pub fn new(weights: &Weights) -> Result<Self, WeightsError> {
-        let levels = weights.count(|i| format!("encoder.{i}.0.conv1.weight"));
+        let UNetSizes { channels, blocks: count, .. } = schema::unet(weights)?;
+        let levels = channels.len();
         let blocks = |side: &str, level: usize| {
-            let count = weights.count(|j| format!("{side}.{level}.{j}.conv1.weight"));
             (0..count).map(|j| Block::new(weights, &format!("{side}.{level}.{j}"))).collect()
         };
-        let below = || 0..levels.saturating_sub(1);
+        let below = || 0..levels - 1;
         Ok(Self {
             arch: Arch::new(),
             embed1: Linear::new(weights, "embed1")?,
@@ -85,8 +86,8 @@ impl UNet {
         })
     }
 
-    /// What the network says of `current` and `degraded`, images of `height` x `width` pixels, both divisible by
-    /// 2^levels, under `conditions`; of the same size.
+    /// The network's output for `current` and `degraded`, images of `height` x `width` pixels, both
+    /// divisible by 2^levels, under `conditions`. The output has the same size.
     pub fn forward(
         &self,
         current: &[f32],

@@ -1,27 +1,29 @@
-//! One image seen otherwise: moved, bent a little, on another ground.
+//! Augmentation: a changed view of an image, moved, bent a little, or on another ground.
 //!
-//! The one law: values stay in `[0, 1]`, and an edge that was sharp stays sharp, since sharp edges are what the
-//! networks are to learn. A bent character is therefore sampled at 4 x 4 points a pixel, and its grey rim is made as
-//! narrow again as it was before it is averaged.
+//! # Invariant
+//! Values stay in `[0, 1]` (`tests::a_view_stays_within_range_and_is_the_same_for_the_same_seed`),
+//! and a sharp edge stays sharp, because the networks learn sharp edges
+//! (`tests::a_bent_character_keeps_its_edges_sharp`). A bent character is therefore sampled at 4 x
+//! 4 points per pixel, and its grey rim is narrowed to its former width before averaging.
 
 use super::canvas::{Surface, draw};
 use super::{AREA_PX, Kind, SIDE_PX};
 use rand::{Rng, RngExt};
 
-/// How far an image may be changed. The default suits characters.
+/// Limits of the changes. The default suits characters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Augmentation {
-    /// Share of the images that are bent, not only moved.
+    /// Share of the images that are bent as well as moved.
     pub bent: f32,
-    /// Largest shift each way, in whole pixels.
+    /// Largest shift in each direction, in whole pixels.
     pub shift_px: i32,
     /// Largest turn, in degrees.
     pub turn_deg: f32,
-    /// Largest change of width and of height, as a part.
+    /// Largest relative change of width and of height.
     pub stretch: f32,
     /// Largest shear.
     pub shear: f32,
-    /// Share of the characters that stand on a surface instead of on black.
+    /// Share of the characters on a surface instead of on black.
     pub on_ground: f32,
     /// Share of the photographs that are shown as negatives.
     pub inverted: f32,
@@ -41,15 +43,15 @@ impl Default for Augmentation {
     }
 }
 
-/// How steep the rim of a bent character is: what bilinear sampling spreads over two pixels is brought back to half of
-/// one.
+/// Steepness of the rim of a bent character: a rim that bilinear sampling spreads over two pixels
+/// is narrowed to half a pixel.
 const STEEPNESS: f32 = 4.0;
 
 impl Augmentation {
-    /// Another view of `image` (64 x 64 levels): 4096 values in `[0, 1]`.
+    /// A changed view of `image` (64 x 64 levels): 4096 values in `[0, 1]`.
     ///
     /// # Panics
-    /// If the image is not 64 x 64: stacks hold no others.
+    /// If the image is not 64 x 64; images of a stack always are.
     #[must_use]
     pub fn view(&self, image: &[u8], kind: Kind, rng: &mut impl Rng) -> Vec<f32> {
         assert_eq!(image.len(), AREA_PX, "levels of a 64 x 64 image");
@@ -73,7 +75,7 @@ impl Augmentation {
         }
     }
 
-    /// A small affine map about the centre.
+    /// Applies a small affine map about the centre.
     fn bend(&self, image: &[u8], kind: Kind, shift: [f32; 2], rng: &mut impl Rng) -> Vec<f32> {
         let mut within = |limit: f32| limit * rng.random_range(-1.0..=1.0_f32);
         let (sin, cos) = within(self.turn_deg).to_radians().sin_cos();
@@ -92,7 +94,8 @@ impl Augmentation {
     }
 }
 
-/// Value at whole pixels; beyond the edge a character's ground is black, a photograph goes on as it ended.
+/// Level of a whole pixel. Beyond the edge a character continues black, a photograph with its edge
+/// pixel.
 fn level(image: &[u8], kind: Kind, column: i32, row: i32) -> f32 {
     let last = SIDE_PX as i32 - 1;
     let (inner_column, inner_row) = (column.clamp(0, last), row.clamp(0, last));
@@ -102,7 +105,7 @@ fn level(image: &[u8], kind: Kind, column: i32, row: i32) -> f32 {
     f32::from(image[inner_row as usize * SIDE_PX + inner_column as usize]) / 255.0
 }
 
-/// Value at a point, in pixels from the corner; pixel centres are at halves.
+/// Level at a point, in pixels from the corner; pixel centres are at halves.
 fn bilinear(image: &[u8], kind: Kind, x: f32, y: f32) -> f32 {
     let (x, y) = (x - 0.5, y - 0.5);
     let (column, row) = (x.floor(), y.floor());
@@ -113,7 +116,7 @@ fn bilinear(image: &[u8], kind: Kind, x: f32, y: f32) -> f32 {
     upper * (1.0 - down) + lower * down
 }
 
-/// Moved by whole pixels: nothing is interpolated.
+/// The image moved by whole pixels, without interpolation.
 fn moved(image: &[u8], kind: Kind, shift: [f32; 2]) -> Vec<f32> {
     let from = |at: usize, shift: f32| at as i32 - shift as i32;
     (0..AREA_PX)
@@ -127,7 +130,7 @@ fn on_ground(mask: &[f32], rng: &mut impl Rng) -> Vec<f32> {
         |level: f32| Surface { level, slope: [(); 2].map(|()| rng.random_range(-0.25..0.25_f32)) };
     let (mut ground, mut ink) = (surface(0.0), surface(0.0));
     ground.level = rng.random();
-    // Apart enough to be seen.
+    // The two brightnesses differ enough to be visible.
     let apart = rng.random_range(0.25..0.75_f32);
     ink.level = if ground.level < 0.5 { ground.level + apart } else { ground.level - apart };
     mask.iter()
@@ -178,7 +181,8 @@ mod tests {
             let view = bent.view(&disc(), Kind::Drawn, &mut stream(1, Purpose::Training, index));
             let grey = view.iter().filter(|v| (0.1..0.9).contains(*v)).count();
             let bright = view.iter().filter(|v| **v >= 0.9).count();
-            // A rim of a pixel around a disc of 18 is 113; of two, as without sharpening, 226.
+            // A rim of one pixel around a disc of diameter 18 has 113 pixels; a rim of two, as
+            // without sharpening, 226.
             assert!(bright > 600 && grey < 140, "{bright} bright, {grey} grey");
         }
     }

@@ -1,12 +1,12 @@
-//! Images drawn by asking what is at a point.
+//! Draws images from a function that gives the brightness at a point.
 
 use super::{AREA_PX, SIDE_PX};
 
-/// Points a pixel along each axis.
+/// Number of points per pixel along each axis.
 const FINE: usize = 4;
 
-/// The image of 64 x 64 whose pixels are means of `shade` over 4 x 4 points each. Points are given in pixels from the
-/// top left corner, column first.
+/// The image of 64 x 64 whose pixels are means of `shade` over 4 x 4 points each. Points are in
+/// pixels from the top left corner, column first.
 pub(super) fn draw(mut shade: impl FnMut(f32, f32) -> f32) -> Vec<f32> {
     let at = |i: usize, fine: usize| i as f32 + (fine as f32 + 0.5) / FINE as f32;
     let mut image = vec![0.0; AREA_PX];
@@ -23,7 +23,7 @@ pub(super) fn draw(mut shade: impl FnMut(f32, f32) -> f32) -> Vec<f32> {
     image
 }
 
-/// A surface that is lit unevenly: a level and a slope.
+/// An unevenly lit surface: a level and a slope.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Surface {
     pub(super) level: f32,
@@ -31,7 +31,7 @@ pub(super) struct Surface {
 }
 
 impl Surface {
-    /// Its brightness at a point, in `[0, 1]`.
+    /// Brightness of the surface at a point, in `[0, 1]`.
     pub(super) fn at(&self, x: f32, y: f32) -> f32 {
         let part = |v: f32| v / SIDE_PX as f32 - 0.5;
         (self.level + self.slope[0] * part(x) + self.slope[1] * part(y)).clamp(0.0, 1.0)

@@ -1,15 +1,18 @@
-//! What networks are trained on: labelled characters, split by who drew them, and scenes that are no letters.
+//! Training data: labelled characters, split by who drew them, and scenes without letters.
 //!
-//! The one law: an example is a pure function of the seed and its number. Nothing here keeps a random state, so a run
-//! that was stopped goes on with the very examples that it would have seen, and a held-out group is never drawn for
-//! training.
+//! # Invariant
+//! An example depends only on the seed and its number
+//! (`train::examples::tests::examples_are_the_same_in_whatever_batches_they_come`). No random state
+//! is kept, so a stopped run continues with the examples that it would have used. Training never
+//! draws from a held-out group
+//! (`scenes::tests::training_draws_from_no_held_out_image_and_the_other_way_round`).
 //!
-//! | module | holds |
+//! | module | contents |
 //! |---|---|
 //! | [`stack`] | images of 64 x 64 with label and group (font family, writer, photograph) |
-//! | [`split`] | which groups training never sees |
-//! | [`augment`] | one image seen otherwise: moved, bent, on another ground |
-//! | [`shapes`] | procedural scenes that are no letters |
+//! | [`split`] | the groups that training never uses |
+//! | [`augment`] | changed views of an image: moved, bent, on another ground |
+//! | [`shapes`] | procedural scenes without letters |
 //! | [`scenes`] | all of these as one seeded source |
 
 pub mod augment;
@@ -25,11 +28,11 @@ pub use split::Split;
 pub use stack::{DataError, Kind, Stack};
 pub use stream::{Purpose, stream};
 
-/// Side of a scene, in pixels: the output grid (paper, 2.C).
+/// Side of a scene in pixels, which is that of the output grid (paper, 2.C).
 pub const SIDE_PX: usize = 64;
-/// Pixels of a scene.
+/// Number of pixels of a scene.
 pub const AREA_PX: usize = SIDE_PX * SIDE_PX;
-/// Classes of Chars74K: 0-9, A-Z, a-z.
+/// Number of classes of Chars74K: 0-9, A-Z, a-z.
 pub const CLASSES: usize = 62;
 /// The character of each class.
 pub const CHARACTERS: &str = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz";

@@ -7,16 +7,16 @@ use super::{DataError, Split, Stack};
 use rand::seq::IndexedRandom;
 use rand::{Rng, RngExt};
 
-/// Which groups a scene may come from.
+/// The part of the groups from which scenes are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Part {
-    /// Those to train on.
+    /// Groups for training.
     Training,
-    /// Those that training never sees.
+    /// Groups that training never uses.
     HeldOut,
 }
 
-/// Where a scene comes from.
+/// The origin of a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Origin {
     /// An image of a stack.
@@ -25,31 +25,31 @@ pub enum Origin {
     Shape(Shape),
 }
 
-/// A sharp scene: what a network is to give back.
+/// A sharp scene: the output that a network must learn.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scene {
     /// 64 x 64 values in `[0, 1]`, row-major.
     pub image: Vec<f32>,
-    /// Class of the character, if it is one and its class is known.
+    /// Class of the character, if the scene is a character of known class.
     pub label: Option<u8>,
     /// Where it comes from.
     pub origin: Origin,
 }
 
-/// Everything that scenes are drawn from.
+/// The sources of scenes.
 #[derive(Debug, Clone)]
 pub struct Scenes {
     stacks: Vec<Stack>,
     split: Option<Split>,
     by_stack: [Vec<Vec<Place>>; 2],
-    /// How images of stacks are varied for training. Held-out ones are shown as they are.
+    /// Augmentation of training images from stacks. Held-out images stay unchanged.
     pub augmentation: Augmentation,
-    /// Share of the scenes that are no letters.
+    /// Share of the training scenes without letters.
     pub shapes: f32,
 }
 
 impl Scenes {
-    /// Procedural scenes alone, of which there is no end and no group.
+    /// Procedural scenes alone. They are unlimited and have no groups.
     #[must_use]
     pub fn procedural() -> Self {
         Self {
@@ -61,11 +61,11 @@ impl Scenes {
         }
     }
 
-    /// Scenes from these stacks, `held_out` of the groups of each kept for [`Part::HeldOut`], and `shapes` of the
-    /// training scenes procedural.
+    /// Scenes from these stacks. Of each stack's groups, the share `held_out` is kept for
+    /// [`Part::HeldOut`]; of the training scenes, the share `shapes` is procedural.
     ///
     /// # Errors
-    /// [`DataError`] as [`Split::new`], or if `shapes` is not in `[0, 1]`.
+    /// [`DataError`] as from [`Split::new`], or if `shapes` is not in `[0, 1]`.
     pub fn new(
         stacks: Vec<Stack>,
         held_out: f64,
@@ -97,14 +97,14 @@ impl Scenes {
         &self.stacks
     }
 
-    /// Who is held out; none of procedural scenes.
+    /// The held-out groups; `None` for procedural scenes.
     #[must_use]
     pub fn split(&self) -> Option<&Split> {
         self.split.as_ref()
     }
 
-    /// A scene. Stacks are drawn from alike, however many images they hold: handwriting is rarer than type, not less
-    /// worth.
+    /// Draws a scene. Each stack is equally likely, whatever its number of images, so handwriting
+    /// counts as much as type.
     #[must_use]
     pub fn draw(&self, part: Part, rng: &mut impl Rng) -> Scene {
         let places = &self.by_stack[part as usize];

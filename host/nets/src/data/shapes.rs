@@ -1,16 +1,17 @@
-//! Scenes that are no letters, so that a network that has learnt letters does not see them everywhere.
+//! Procedural scenes without letters, so that a network that has learnt letters does not see
+//! letters everywhere.
 
 use super::canvas::{Surface, draw};
 use super::{AREA_PX, SIDE_PX};
 use rand::{Rng, RngExt};
 use std::f32::consts::{PI, TAU};
 
-/// What a procedural scene shows.
+/// The content of a procedural scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Shape {
     /// Soft round blobs.
     Blobs,
-    /// Polygons of one brightness each.
+    /// Polygons, each of one brightness.
     Polygons,
     /// A surface lit from one side.
     Gradient,
@@ -24,12 +25,12 @@ pub enum Shape {
     Points,
     /// Noise with a grain.
     Noise,
-    /// One brightness, down to none.
+    /// One brightness, which may be 0.
     Empty,
 }
 
 impl Shape {
-    /// All of them.
+    /// Every shape.
     pub const ALL: [Self; 9] = [
         Self::Blobs,
         Self::Polygons,
@@ -42,7 +43,7 @@ impl Shape {
         Self::Empty,
     ];
 
-    /// A scene of 64 x 64 in `[0, 1]`.
+    /// Draws a scene of 64 x 64 in `[0, 1]`.
     #[must_use]
     pub fn draw(self, rng: &mut impl Rng) -> Vec<f32> {
         let side = SIDE_PX as f32;

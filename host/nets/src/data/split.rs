@@ -1,23 +1,25 @@
-//! Which groups training never sees.
+//! Splits groups into those for training and those held out.
 //!
-//! The one law: a group is on one side or on the other, whole. A font family's bold or a writer's second sheet would
-//! otherwise be known already when it is judged.
+//! # Invariant
+//! Each group is whole on one of the two sides
+//! (`tests::no_group_is_on_both_sides_and_no_image_is_lost`). Otherwise the bold style of a font
+//! family, or a writer's second sheet, would be known from training when it is judged.
 
 use super::{DataError, Purpose, Stack, stream};
 use rand::seq::SliceRandom;
 use serde::Serialize;
 use std::collections::BTreeSet;
 
-/// An image by its stack and its number in there.
+/// An image, given by its stack and its number there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Place {
-    /// Which stack.
+    /// Number of the stack.
     pub stack: usize,
-    /// Which of its images.
+    /// Number of the image in the stack.
     pub image: usize,
 }
 
-/// Images to train on and images to judge by.
+/// Images for training and images for judging.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Split {
     training: Vec<Place>,
@@ -25,25 +27,27 @@ pub struct Split {
     groups: Vec<HeldOutGroups>,
 }
 
-/// The groups of one stack that training never sees, for the record.
+/// The held-out groups of one stack, for the record.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct HeldOutGroups {
     /// The stack's name.
     pub stack: String,
-    /// Its images.
+    /// Number of its images.
     pub images: usize,
-    /// All groups in it.
+    /// Number of its groups.
     pub groups: usize,
-    /// Those held out, in ascending order.
+    /// Held-out groups, in ascending order.
     pub held_out: Vec<u32>,
 }
 
 impl Split {
-    /// Holds out `share` of the groups of each stack, at least one, chosen by the seed. Which ones depends on the
-    /// seed, the stack's name and its groups, not on other stacks or the order of images.
+    /// Holds out `share` of the groups of each stack, at least one, chosen by the seed. The choice
+    /// depends on the seed, the stack's name and its groups, and not on other stacks or the order
+    /// of images.
     ///
     /// # Errors
-    /// [`DataError`] if a stack has one group alone, there is no stack, or `share` is not more than 0 and less than 1.
+    /// [`DataError`] if a stack has only one group, there is no stack, or `share` is not above 0
+    /// and below 1.
     pub fn new(stacks: &[Stack], share: f64, seed: u64) -> Result<Self, DataError> {
         if !(share > 0.0 && share < 1.0) {
             let expected = "more than 0 and less than 1";
@@ -83,26 +87,26 @@ impl Split {
         Ok(split)
     }
 
-    /// Images to train on, by stack and number.
+    /// Images for training, by stack and number.
     #[must_use]
     pub fn training(&self) -> &[Place] {
         &self.training
     }
 
-    /// Images to judge by.
+    /// Images for judging.
     #[must_use]
     pub fn held_out(&self) -> &[Place] {
         &self.held_out
     }
 
-    /// Which groups are held out, for the record.
+    /// The held-out groups, for the record.
     #[must_use]
     pub fn groups(&self) -> &[HeldOutGroups] {
         &self.groups
     }
 }
 
-/// FNV-1a: the same on every machine and in every version.
+/// FNV-1a hash: the same on every machine and in every version.
 fn name_hash(name: &str) -> u64 {
     name.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
         (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)

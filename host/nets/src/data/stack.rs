@@ -1,18 +1,18 @@
-//! Images of 64 x 64 with a label and a group each.
+//! Images of 64 x 64, each with a label and a group.
 
 use super::{AREA_PX, CLASSES};
 use thiserror::Error;
 
-/// What a stack shows, which decides how it may be varied.
+/// The content of a stack, which decides the allowed augmentations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// One bright character on black: type or handwriting.
+    /// One bright character on black, typed or handwritten.
     Drawn,
     /// A cut from a photograph, of any contrast.
     Photograph,
 }
 
-/// Images that belong together. Levels are 8 bit, as they come; a scene is `level / 255`.
+/// A set of images. Levels are 8 bit; a scene is `level / 255`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Stack {
     name: String,
@@ -22,38 +22,38 @@ pub struct Stack {
     groups: Vec<u32>,
 }
 
-/// Data that cannot be trained on. The caller adds which file they came from.
+/// Why data cannot be used for training. The caller adds the name of the file.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum DataError {
-    /// No image at all.
+    /// There is no image.
     #[error("no image, expected at least one of 64 x 64")]
     Empty,
     /// Two lists that belong together differ in length.
     #[error("{field} holds {found} values, expected {expected}: one an image")]
     Length {
-        /// Which list.
+        /// Name of the list.
         field: &'static str,
         /// Its length.
         found: usize,
-        /// The length that the images call for.
+        /// The length that fits the images.
         expected: usize,
     },
-    /// Pixels that are no whole number of images.
+    /// The number of pixels is not a whole number of images.
     #[error("{found} pixels, expected a multiple of 4096: images of 64 x 64")]
     Pixels {
-        /// How many there are.
+        /// Number of pixels.
         found: usize,
     },
     /// A label beyond the classes.
     #[error("label {found} of image {image}, expected 0 to 61 (0-9, A-Z, a-z)")]
     Label {
-        /// Which image.
+        /// Number of the image.
         image: usize,
-        /// What was found.
+        /// The label.
         found: u8,
     },
-    /// Nothing can be held out without nothing being left.
+    /// One group cannot be split.
     #[error(
         "{name}: all images are of one group, expected two or more, so that one can be held out"
     )]
@@ -61,17 +61,17 @@ pub enum DataError {
         /// The stack.
         name: String,
     },
-    /// A share outside its range.
+    /// A share is out of its range.
     #[error("{name} is {found}, expected {expected}")]
     Share {
-        /// Which.
+        /// Name of the share.
         name: &'static str,
-        /// The value found, as text.
+        /// The value, as text.
         found: String,
-        /// What it may be.
+        /// The accepted range.
         expected: &'static str,
     },
-    /// A network that learns classes needs them.
+    /// The stack has no classes, which this network needs.
     #[error("{name}: images without labels, expected a class for each")]
     Unlabelled {
         /// The stack.
@@ -80,11 +80,11 @@ pub enum DataError {
 }
 
 impl Stack {
-    /// Wraps row-major images of 64 x 64: `levels.len() / 4096` of them, with one group and, if there are labels, one
-    /// class (0 to 61) for each.
+    /// A stack of row-major images of 64 x 64: `levels.len() / 4096` images, each with one group
+    /// and, if there are labels, one class (0 to 61).
     ///
     /// # Errors
-    /// [`DataError`] if lengths do not fit, a label is no class, or there is no image.
+    /// [`DataError`] if lengths do not fit, a label is not a class, or there is no image.
     pub fn new(
         name: impl Into<String>,
         kind: Kind,
@@ -113,25 +113,25 @@ impl Stack {
         Ok(Self { name: name.into(), kind, levels, labels, groups })
     }
 
-    /// What it is called in reports.
+    /// The stack's name in reports.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// What it shows.
+    /// The content of the stack.
     #[must_use]
     pub fn kind(&self) -> Kind {
         self.kind
     }
 
-    /// Images in it, at least 1.
+    /// Number of images, at least 1.
     #[must_use]
     pub fn len(&self) -> usize {
         self.groups.len()
     }
 
-    /// Never: a stack holds at least one image.
+    /// Always false: a stack has at least one image.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.groups.is_empty()
@@ -140,13 +140,13 @@ impl Stack {
     /// Image `at`, 64 x 64, row-major.
     ///
     /// # Panics
-    /// If there are not that many.
+    /// If there are fewer images.
     #[must_use]
     pub fn image(&self, at: usize) -> &[u8] {
         &self.levels[at * AREA_PX..(at + 1) * AREA_PX]
     }
 
-    /// Its class, if the stack has labels.
+    /// Class of image `at`, if the stack has labels.
     #[must_use]
     pub fn label(&self, at: usize) -> Option<u8> {
         self.labels.as_ref().and_then(|labels| labels.get(at).copied())

@@ -1,20 +1,20 @@
-//! Random numbers by seed, purpose and number, instead of by what was drawn before.
+//! Random numbers that depend on seed, purpose and number, and not on earlier draws.
 
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 
-/// What numbers are drawn for: no two purposes share a stream.
+/// The purpose of random numbers. Two purposes never share a stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Purpose {
-    /// Which groups are held out.
+    /// Choice of the held-out groups.
     Split,
-    /// Examples to train on.
+    /// Training examples.
     Training,
-    /// Examples to judge by.
+    /// Held-out examples.
     HeldOut,
-    /// What a training step adds to its batch: times of the path, noise.
+    /// Random numbers that a training step adds to its batch: times on the path, noise.
     Step,
-    /// The first weights of a network.
+    /// The initial weights of a network.
     Weights,
     /// Pairs for training elsewhere.
     Pairs,
@@ -28,7 +28,8 @@ pub fn stream(seed: u64, purpose: Purpose, index: u64) -> Pcg64Mcg {
     Pcg64Mcg::seed_from_u64(mixed)
 }
 
-/// The finaliser of splitmix64 (Steele, Lea and Flood, OOPSLA 2014): neighbours become strangers.
+/// The finaliser of splitmix64 (Steele, Lea and Flood, OOPSLA 2014), which makes neighbouring
+/// values independent.
 fn mix(value: u64) -> u64 {
     let mut z = value.wrapping_add(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

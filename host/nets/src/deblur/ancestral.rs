@@ -1,8 +1,9 @@
-//! The 500-step diffusion of the paper (section 3), sampled backwards: DDPM (Ho et al., NeurIPS 2020), and in
-//! fewer steps by DDIM's sub-sequences at eta = 1 (Song et al., ICLR 2021), which are the same where no
-//! step is left out.
+//! The 500-step diffusion of the paper (section 3), sampled backwards: DDPM (Ho et al., NeurIPS
+//! 2020). With fewer steps it uses DDIM's sub-sequences at eta = 1 (Song et al., ICLR 2021), which
+//! equal DDPM if no step is left out.
 //!
-//! Images are 2 x - 1 here. The network guesses the noise in x_t = sqrt(abar_t) x_0 + sqrt(1 - abar_t) eps.
+//! Images are 2 x - 1 here. The network estimates the noise in x_t = sqrt(abar_t) x_0 + sqrt(1 -
+//! abar_t) eps.
 
 use std::num::NonZeroU32;
 
@@ -11,29 +12,31 @@ use crate::network::RunUNet;
 use crate::random::Noise;
 use crate::weights::{Weights, WeightsError};
 
-/// The schedule of the shipped weights: steps, then the first and the last beta, as in `host/nets/training/train_unet.py`.
+/// The schedule of the shipped weights: number of steps, first beta and last beta, as in
+/// `host/nets/training/train_unet.py`.
 ///
-/// Twice the betas of Ho, Jain and Abbeel (NeurIPS 2020: 1e-4 to 0.02 in 1000 steps) would end at 0.04, with abar at 4e-5. The
-/// shipped weights were trained up to 0.025, where abar ends at 0.0017.
+/// Twice the betas of Ho, Jain and Abbeel (NeurIPS 2020: 1e-4 to 0.02 in 1000 steps) would end at
+/// 0.04, with abar at 4e-5. The shipped weights were trained with betas up to 0.025, where abar
+/// ends at 0.0017.
 #[cfg(any(feature = "train", test))]
 const SHIPPED: (usize, [f64; 2]) = (500, [2e-4, 0.025]);
 
-/// How much of the image is left after each of the T steps of noise.
+/// The schedule: the share of the image left after each of the T steps of noise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Schedule {
-    /// abar_t, products of 1 - beta.
+    /// abar_t, the products of 1 - beta.
     left: Vec<f64>,
 }
 
 impl Schedule {
-    /// The schedule of the shipped weights, which training takes too.
+    /// The schedule of the shipped weights, which training uses too.
     #[cfg(any(feature = "train", test))]
     pub(crate) fn shipped() -> Self {
         let (steps, [start, end]) = SHIPPED;
         Self::linear(steps, start, end)
     }
 
-    /// Says in the weights' metadata that they were trained with [`shipped`](Self::shipped).
+    /// Writes into the weights' metadata that they were trained with [`shipped`](Self::shipped).
     #[cfg(any(feature = "train", test))]
     pub(crate) fn describe_shipped(weights: &mut Weights) {
         let (steps, [start, end]) = SHIPPED;
@@ -42,7 +45,7 @@ impl Schedule {
         weights.set_metadata("beta_end", end.to_string());
     }
 
-    /// How many steps of noise there are.
+    /// Number of steps of noise.
     #[cfg(feature = "train")]
     pub(crate) fn steps(&self) -> usize {
         self.left.len()
@@ -51,14 +54,18 @@ impl Schedule {
     /// The schedule that the weights were trained with: metadata `steps`, `beta_start`, `beta_end`.
     ///
     /// # Errors
-    /// [`WeightsError::Number`] if one is missing.
+    /// [`WeightsError::Number`] if one of them is missing, or is not a number of steps or a share of noise.
     pub fn of(weights: &Weights) -> Result<Self, WeightsError> {
-        let steps = weights.number("steps")?;
-        let [start, end] = [weights.number("beta_start")?, weights.number("beta_end")?];
-        Ok(Self::linear(steps.clamp(1.0, 10_000.0) as usize, start, end))
+        let steps = weights.number_that("steps", "a whole number from 1 to 10000", |steps| {
+            (1.0..=10_000.0).contains(&steps) && steps.fract() == 0.0
+        })?;
+        let share = |key| {
+            weights.number_that(key, "a number between 0 and 1", |beta| beta > 0.0 && beta < 1.0)
+        };
+        Ok(Self::linear(steps as usize, share("beta_start")?, share("beta_end")?))
     }
 
-    /// Betas from `start` to `end` in even steps.
+    /// Betas from `start` to `end` in equal steps.
     pub fn linear(steps: usize, start: f64, end: f64) -> Self {
         let beta = |t: usize| start + (end - start) * t as f64 / (steps.max(2) - 1) as f64;
         let left = (0..steps).scan(1.0, |product, t| {
@@ -68,7 +75,7 @@ impl Schedule {
         Self { left: left.collect() }
     }
 
-    /// abar after step `step`, counted from 0.
+    /// abar after step `step`; the first step is 0.
     #[cfg(feature = "train")]
     pub(crate) fn left(&self, step: usize) -> f64 {
         self.left[step]
@@ -112,14 +119,14 @@ pub(super) fn run(
             .map(|(x, epsilon)| 0.5 * ((x - sigma * epsilon) / signal + 1.0))
             .collect();
         constraint.correct(&mut guess);
-        // Variance of the reverse step, and what of the noise itself is kept.
+        // Variance of the reverse step, and the share of the noise that is kept.
         let variance = (1.0 - next) / (1.0 - now) * (1.0 - now / next);
         let kept = (1.0 - next - variance).max(0.0).sqrt() as f32;
         let (to, fresh) = (next.sqrt() as f32, variance.sqrt() as f32);
         let draw = if fresh > 0.0 { draw_all() } else { vec![0.0; x.len()] };
         for ((x, guess), draw) in x.iter_mut().zip(&guess).zip(draw) {
             let clean = 2.0 * guess - 1.0;
-            // The noise that goes with the corrected guess.
+            // The noise that belongs to the corrected guess.
             let epsilon = (*x - signal * clean) / sigma;
             *x = to * clean + kept * epsilon + fresh * draw;
         }
@@ -134,7 +141,7 @@ mod tests {
     use crate::estimate::Estimate;
     use crate::network::Conditions;
 
-    /// Knows that the sharp image is 0.75 everywhere.
+    /// A network that knows the sharp image: 0.75 everywhere.
     struct Oracle;
 
     impl RunUNet for Oracle {
@@ -151,7 +158,7 @@ mod tests {
         Job { start: images, seen: images, estimates, seed: 3, first }
     }
 
-    /// Readings that bind nothing.
+    /// A constraint without effect.
     fn free<'a>(job: &Job<'a>) -> DataConstraint<'a> {
         let (readings, all) = (job.seen, &MeasuredRows::All);
         DataConstraint::new(readings, SIDE, job.estimates, all, false).unwrap()
@@ -201,7 +208,7 @@ mod tests {
 
     #[test]
     fn a_sample_is_of_the_image_not_of_its_batch() {
-        /// Keeps the noise in the image.
+        /// A network that leaves the noise in the image.
         struct Idle;
         impl RunUNet for Idle {
             fn run(&self, _: usize, x: &[f32], _: &[f32], _: &[Conditions]) -> Vec<f32> {

@@ -1,8 +1,8 @@
 //! The bridge from the degraded image to the sharp one: InDI (Delbracio, Milanfar, TMLR 2023).
 //!
-//! x_t = (1 - t) x_0 + t y joins the sharp image x_0 to the start y. At any t the network guesses x_0; a
-//! step from t to t - d goes to (d / t) x_0 + (1 - d / t) x_t. One step, from t = 1, is the guess itself
-//! and minimises the error; more steps trade error for sharpness.
+//! x_t = (1 - t) x_0 + t y joins the sharp image x_0 to the start y. At any t the network estimates
+//! x_0; a step from t to t - d goes to (d / t) x_0 + (1 - d / t) x_t. One step, from t = 1, gives
+//! the estimate itself and minimises the error; more steps give more sharpness with more error.
 
 use std::num::NonZeroU32;
 
@@ -37,7 +37,7 @@ mod tests {
     use crate::estimate::Estimate;
     use std::sync::Mutex;
 
-    /// Says the same correction at any time, and keeps what it was asked.
+    /// A network that gives the same correction at any time, and records its inputs.
     #[derive(Default)]
     struct Constant {
         correction: f32,
@@ -51,7 +51,7 @@ mod tests {
         }
     }
 
-    /// `run` from 0.2 everywhere, by an image whose readings bind nothing.
+    /// `run` from 0.2 everywhere, with a constraint without effect.
     fn walk(network: &dyn Sharpen, steps: u32) -> Result<Vec<f32>, SharpenError> {
         let start = vec![0.2; AREA];
         let estimates = [Estimate { sigma_px: 2.0, noise: 0.01 }];

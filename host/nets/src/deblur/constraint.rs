@@ -1,5 +1,5 @@
-//! The measured readings as a constraint on what a network guesses: every sampler moves its guess into agreement with
-//! them before it goes on.
+//! The readings as a constraint on a network's guesses: every sampler moves each guess into
+//! agreement with the readings before the next step.
 
 use rayon::prelude::*;
 
@@ -7,7 +7,7 @@ use super::AREA;
 use crate::consistency::{Consistency, MeasuredRows, MeasuredRowsError};
 use crate::estimate::Estimate;
 
-/// The readings of a batch, and the camera's model for each image of it; made once a batch.
+/// The readings of a batch, and the camera's model for each image, made once for each batch.
 pub(crate) struct DataConstraint<'a> {
     models: Vec<Consistency>,
     readings: &'a [f32],
@@ -16,8 +16,8 @@ pub(crate) struct DataConstraint<'a> {
 }
 
 impl<'a> DataConstraint<'a> {
-    /// Readings (N, `side`, `side`) made from these Hadamard rows. A constraint that is not `binding` moves nothing, but
-    /// still says how far an image is from the readings.
+    /// Readings (N, `side`, `side`) made from these Hadamard rows. A constraint that is not
+    /// `binding` changes no image, but still computes each image's inconsistency.
     ///
     /// # Errors
     /// [`MeasuredRowsError::OtherSide`] if the rows belong to readings of another side.
@@ -33,13 +33,13 @@ impl<'a> DataConstraint<'a> {
         Ok(Self { models, readings, area: side * side, binding })
     }
 
-    /// Puts each guess of (N, 64, 64) into [0, 1] and into agreement with its readings.
+    /// Clamps each guess of (N, 64, 64) to [0, 1] and moves it into agreement with its readings.
     pub(crate) fn correct(&self, guesses: &mut [f32]) {
         let images = guesses.par_chunks_exact_mut(AREA).enumerate();
         images.for_each(|(index, guess)| self.correct_one(index, guess));
     }
 
-    /// The same for the guess of image `index` alone.
+    /// Corrects the guess of image `index` alone.
     pub(crate) fn correct_one(&self, index: usize, guess: &mut [f32]) {
         guess.iter_mut().for_each(|value| *value = value.clamp(0.0, 1.0));
         if self.binding {
@@ -48,7 +48,8 @@ impl<'a> DataConstraint<'a> {
         }
     }
 
-    /// How far each image of (N, 64, 64) is from explaining its readings, over their noise.
+    /// The inconsistency of each image of (N, 64, 64): its distance from the readings over their
+    /// noise.
     pub(crate) fn residual_ratios(&self, images: &[f32]) -> Vec<f32> {
         let each = images.par_chunks_exact(AREA).zip(&self.models).enumerate();
         each.map(|(index, (image, model))| model.residual_ratio(self.readings_of(index), image))

@@ -1,4 +1,4 @@
-//! Where a network of your own goes in: anything that guesses sharp images.
+//! The interface for your own network: anything that estimates sharp images.
 
 use thiserror::Error;
 
@@ -6,16 +6,17 @@ use super::{AREA, SIDE};
 use crate::estimate::Estimate;
 use crate::network::RunUNet;
 
-/// A network, or anything else, that guesses sharp images.
+/// A network, or any other code, that estimates sharp images.
 ///
-/// The rest stays the library's: the bridge calls [`guess`](Self::guess) once a step, each guess is moved into agreement
-/// with the readings, and sharp, clean images are left as they are.
+/// The library does the rest: the bridge calls [`guess`](Self::guess) once for each step, moves
+/// each guess into agreement with the readings, and leaves sharp, clean images unchanged.
 pub trait Sharpen: Send {
-    /// Guesses the sharp image of each image of a batch: (N, 64, 64), white being 1. A value outside [0, 1] is clamped; a
-    /// value that is not finite, and another number of values, is refused.
+    /// Estimates the sharp image of each image of a batch: (N, 64, 64), white being 1. Values
+    /// outside [0, 1] are clamped. A value that is not finite, or another number of values, is
+    /// refused.
     fn guess(&self, batch: Blurred<'_>) -> Vec<f32>;
 
-    /// How many images at once keep the network's device busy.
+    /// Number of images that keep the network's device busy.
     fn batch(&self) -> usize {
         32
     }
@@ -25,15 +26,15 @@ pub trait Sharpen: Send {
 #[derive(Debug, Clone, Copy)]
 #[non_exhaustive]
 pub struct Blurred<'a> {
-    /// (N, 64, 64) in [0, 1]: where the path starts, as blurred as the readings.
+    /// (N, 64, 64) in [0, 1]: the start of the path, as blurred as the readings.
     pub start: &'a [f32],
-    /// (N, 64, 64) in [0, 1]: where the path is now; equal to `start` in the first step.
+    /// (N, 64, 64) in [0, 1]: the current point of the path, equal to `start` in the first step.
     pub current: &'a [f32],
-    /// (N, 64, 64) in [0, 1]: the readings, each pixel repeated where they are 32 x 32.
+    /// (N, 64, 64) in [0, 1]: the readings; each pixel of 32 x 32 readings is repeated.
     pub readings: &'a [f32],
     /// Blur and noise of each image's readings.
     pub estimates: &'a [Estimate],
-    /// How much of `start` is left in `current`: 1 in the first step, 1 / steps in the last.
+    /// Share of `start` left in `current`: 1 in the first step, 1 / steps in the last.
     pub time: f32,
 }
 
@@ -46,12 +47,12 @@ pub enum SharpenError {
         "the sharpening network gave {found} pixels, expected {images} images of {SIDE} x {SIDE}"
     )]
     Pixels {
-        /// Values given.
+        /// Number of values.
         found: usize,
-        /// Images of the batch.
+        /// Number of images of the batch.
         images: usize,
     },
-    /// A value is not a finite number.
+    /// A value is not finite.
     #[error("the sharpening network gave {value}, expected finite numbers")]
     NotFinite {
         /// The value.
@@ -59,7 +60,7 @@ pub enum SharpenError {
     },
 }
 
-/// The guess of `network`, checked.
+/// The guess of `network`, after checks.
 pub(super) fn checked(network: &dyn Sharpen, batch: Blurred<'_>) -> Result<Vec<f32>, SharpenError> {
     let (guess, images) = (network.guess(batch), batch.estimates.len());
     if guess.len() != images * AREA {
@@ -71,7 +72,8 @@ pub(super) fn checked(network: &dyn Sharpen, batch: Blurred<'_>) -> Result<Vec<f
     }
 }
 
-/// The UNet of the bridge and of the GAN: it says what the sharp image has more than the start.
+/// The UNet of the bridge and of the GAN. It estimates the difference between the sharp image and
+/// the start.
 pub(super) struct Residual {
     pub(super) unet: Box<dyn RunUNet>,
     pub(super) batch: usize,

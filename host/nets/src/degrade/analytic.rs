@@ -1,7 +1,8 @@
-//! The camera as a chain of formulas: blur, scatter, sampling by patterns, leak, noise, quantisation.
+//! The camera as a chain of formulas: blur, scatter, sampling by patterns, leak, noise,
+//! quantisation.
 //!
-//! The one law: it degrades in the order in which light and signal do, and noise enters where it does in the camera,
-//! in the pattern readings, so that partial sampling and leak shape it as they do there.
+//! Degradations come in the order of the real camera. Noise is added to the pattern readings, so
+//! partial sampling and leak affect it as in the real camera.
 
 use super::{DEPTH_SIDE, Degrade, DegradeError, Depth, READING_PX, Reading, sampled};
 use crate::blur::Blur;
@@ -12,22 +13,22 @@ use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 use std::ops::RangeInclusive;
 
-/// How strongly scenes are degraded: each picture draws from these.
+/// Limits of the degradations, from which each picture draws.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Limits {
-    /// Blur by a Gaussian, in pixels of the 64 x 64 grid.
+    /// Standard deviation of a Gaussian blur, in pixels of the 64 x 64 grid.
     pub sigma_px: RangeInclusive<f32>,
     /// Noise of a fully sampled image.
     pub noise_std: RangeInclusive<f32>,
-    /// Share of the patterns, where not all are shown.
+    /// Share of the patterns that are shown, for a partially sampled picture.
     pub sampling: RangeInclusive<f32>,
-    /// Share of the pictures for which not all are.
+    /// Share of the pictures that are partially sampled.
     pub partial: f32,
-    /// Largest share of the light that is scattered forward, wide of its aim.
+    /// Largest share of the light that is scattered forward.
     pub scattered: f32,
-    /// Largest part of a pattern's reading that is left of the one before.
+    /// Largest share of the previous pattern's reading in a reading.
     pub leak: f32,
-    /// Largest error of the brightness scale, and of its zero.
+    /// Largest error of the brightness scale and of its zero.
     pub scale_error: f32,
 }
 
@@ -63,21 +64,22 @@ impl Limits {
     }
 }
 
-/// Scattered light lands this far from its aim, in pixels.
+/// Distance over which scattered light spreads, in pixels.
 const SCATTER_PX: RangeInclusive<f32> = 6.0..=14.0;
-/// Bits of a pattern's reading: 14 of the ADC, less what daylight and headroom take, more by summing.
+/// Bits of a pattern's reading: 14 of the ADC, less the range for daylight and headroom, plus the
+/// gain of summing.
 const BITS: RangeInclusive<f32> = 10.0..=16.0;
-/// Share of the pictures without any depth, and of the zones that give none in the others.
+/// Share of the pictures without depth, and share of the zones without depth in the others.
 const NO_DEPTH: f32 = 0.3;
 const INVALID_ZONES: f32 = 0.1;
 /// Noise of a zone, in metres.
 const DEPTH_NOISE_M: f32 = 0.005;
 
-/// A camera of formulas.
+/// A camera made of formulas.
 #[derive(Debug, Clone)]
 pub struct AnalyticCamera {
     limits: Limits,
-    /// Rows in the orders whose first patterns carry most.
+    /// Rows of the orders whose first patterns contain most of a scene.
     orders: Vec<Rows>,
 }
 
@@ -85,7 +87,7 @@ impl AnalyticCamera {
     /// A camera that degrades within these limits.
     ///
     /// # Errors
-    /// [`DegradeError::Limit`] naming the range that cannot be.
+    /// [`DegradeError::Limit`] names the range that is not valid.
     pub fn new(limits: Limits) -> Result<Self, DegradeError> {
         limits.validate()?;
         let orders = [Order::CakeCutting, Order::ZigZag, Order::Sequency, Order::TotalVariation]
@@ -122,7 +124,7 @@ impl Degrade for AnalyticCamera {
             image: image.iter().map(|v| (gain * v + zero).clamp(0.0, 1.0)).collect(),
             optical,
             sigma_px,
-            // Patterns that are not shown bring no noise either.
+            // Patterns that are not shown add no noise.
             noise_std: noise * sampling.sqrt(),
             sampling,
             depth: depth(rng),
@@ -131,8 +133,8 @@ impl Degrade for AnalyticCamera {
 }
 
 impl AnalyticCamera {
-    /// The image through patterns: Hadamard readings in the order shown, with leak, noise and rounding, transformed
-    /// back with zeros where nothing was shown.
+    /// The image through patterns: Hadamard readings in the order shown, with leak, noise and
+    /// rounding, transformed back with zeros for the patterns that were not shown.
     fn read(
         &self,
         image: &[f32],
@@ -146,12 +148,13 @@ impl AnalyticCamera {
         let order = &self.orders[rng.random_range(0..self.orders.len())];
         let shown = ((sampling * area as f32).round() as usize).clamp(1, area);
         let leak = self.limits.leak * rng.random_range(-1.0..=1.0_f32);
-        // The pattern of all ones is the largest reading, of `area` pixels.
+        // The pattern of all ones has the largest reading, the sum of `area` pixels.
         let step = area as f32 / rng.random_range(BITS).exp2();
-        // White noise of the pixels is white noise of the readings, larger by the root of their number.
+        // White noise of the pixels is white noise of the readings, larger by the square root of
+        // their number.
         let noise = noise * (area as f32).sqrt();
         let mut measured = vec![0.0; area];
-        // Differences of a repeating sweep: what leaks into the first comes from the last.
+        // Differences of a repeating sweep: the last pattern leaks into the first.
         let mut before = readings[order[shown - 1] as usize];
         for &row in &order[..shown] {
             let own = readings[row as usize];
@@ -169,7 +172,8 @@ fn transform(values: &mut [f32]) -> Result<(), DegradeError> {
     fwht(values).map_err(|error| DegradeError::Camera(error.to_string()))
 }
 
-/// A plane before the camera, tilted a little, with zones that give nothing; or no depth at all.
+/// Depth of a plane before the camera, tilted a little, with zones without depth; sometimes no
+/// depth at all.
 fn depth(rng: &mut Pcg64Mcg) -> Option<Depth> {
     if rng.random::<f32>() < NO_DEPTH {
         return None;
@@ -234,7 +238,7 @@ mod tests {
             let limits = Limits { noise_std: 0.05..=0.05, partial: 1.0, sampling, ..still() };
             let read = reading(limits, &grey, 3);
             let found = deviation(&read.image, &[0.5; 1024]);
-            // Of 256 readings the deviation is known to 1/sqrt(2 * 256) = 4.4 %.
+            // From 256 readings the deviation is known to 1/sqrt(2 * 256) = 4.4 %.
             assert!((found / (0.05 * share) - 1.0).abs() < 0.15, "{found}");
             assert!((read.noise_std - 0.05 * share).abs() < 1e-6);
         }

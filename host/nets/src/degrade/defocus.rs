@@ -1,16 +1,18 @@
-//! Blur of a 64 x 64 scene by a lens out of focus, with an edge that reflects.
+//! Blur of a 64 x 64 scene by a lens out of focus, with a reflecting edge.
 //!
-//! The one law: a blur is a mean, so a scene of one brightness stays as it is.
+//! # Invariant
+//! The blur keeps the light and the range of values
+//! (`tests::a_blur_keeps_the_light_and_the_range`).
 
 use crate::blur::{along_rows, reflected};
 use crate::data::{AREA_PX, SIDE_PX};
 
-/// A disc of less radius leaves a pixel what it was: it may lie between the points at which discs are counted, the nearest
-/// of which is 0.09 pixels from the middle.
+/// Smallest radius of a disc that is applied, in pixels. A smaller disc may lie between the points
+/// at which discs are sampled, the nearest of which is 0.09 pixels from the middle.
 const LEAST_PX: f32 = 0.1;
 
-/// Blur by a disc of `diameter_px`: what a lens out of focus does. Its standard deviation along an axis is a quarter
-/// of the diameter.
+/// Blurs by a disc of `diameter_px`, as a lens out of focus does. The blur's standard deviation
+/// along an axis is a quarter of the diameter.
 ///
 /// # Panics
 /// If the scene is not 64 x 64.
@@ -21,7 +23,8 @@ pub fn disc(scene: &[f32], diameter_px: f32) -> Vec<f32> {
     if radius < LEAST_PX {
         return scene.to_vec();
     }
-    // How much of each pixel the disc covers, counted at 8 x 8 points: small discs have no other shape.
+    // The share of each pixel that the disc covers, counted at 8 x 8 points, because small discs
+    // have no other exact shape.
     const FINE: i32 = 8;
     let reach = radius.ceil() as i32;
     let covered = |dx: i32, dy: i32| {
@@ -54,7 +57,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Standard deviation along rows of what a blur makes of one point in the middle.
+    /// Standard deviation along the rows of the blurred image of one point in the middle.
     fn spread(blurred: &[f32]) -> f32 {
         let of = |f: &dyn Fn(f32) -> f32| -> f32 {
             blurred.iter().enumerate().map(|(at, v)| v * f((at % SIDE_PX) as f32 - 32.0)).sum()
@@ -71,7 +74,8 @@ mod tests {
     #[test]
     fn a_blur_is_as_wide_as_asked() {
         for sigma in [0.8, 2.0, 4.0] {
-            // Counted at points of 1/8 pixel, and a pixel's own width of 1/sqrt(12) beside.
+            // The expected width includes the sampling at points of 1/8 pixel, and a pixel's own
+            // width of 1/sqrt(12).
             let wide = spread(&disc(&point(), 4.0 * sigma));
             let expected = (sigma * sigma + 1.0 / 12.0).sqrt();
             assert!((wide - expected).abs() < 0.04 * expected, "{wide} against {expected}");
@@ -93,7 +97,7 @@ mod tests {
         ) {
             let blurred = disc(&scene, width);
             let sum = |image: &[f32]| image.iter().map(|v| f64::from(*v)).sum::<f64>();
-            // A reflecting edge gives back what it takes.
+            // A reflecting edge keeps the light.
             prop_assert!((sum(&blurred) / sum(&scene) - 1.0).abs() < 1e-4);
             prop_assert!(blurred.iter().all(|v| (-1e-5..=1.0 + 1e-5).contains(v)));
         }

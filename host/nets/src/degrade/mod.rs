@@ -1,10 +1,10 @@
-//! From a sharp scene to what the camera gives of it: the other half of every training pair.
+//! Degrades a sharp scene as a camera does, to make training pairs.
 //!
-//! The one law: whatever degrades a scene says how much it did (blur, noise), so that a network can be told, and
-//! draws everything random from the stream that it is given.
+//! Every degradation reports its blur and noise, because networks need both. Random numbers come
+//! only from the generator passed as an argument.
 //!
-//! [`AnalyticCamera`] is formulas alone and fast. A camera that is simulated from light to frames is the business of
-//! the crate that has one; it implements [`Degrade`] too.
+//! [`AnalyticCamera`] uses formulas alone and is fast. Another crate simulates a camera from light
+//! to frames, and implements [`Degrade`] too.
 
 mod analytic;
 pub mod defocus;
@@ -15,17 +15,17 @@ use crate::data::SIDE_PX;
 use rand_pcg::Pcg64Mcg;
 use thiserror::Error;
 
-/// Side of what the camera reads, in pixels.
+/// Side of the camera's reading, in pixels.
 pub const READING_PX: usize = SIDE_PX / 2;
-/// Zones along one edge of a depth map.
+/// Number of zones along one edge of a depth map.
 pub const DEPTH_SIDE: usize = 8;
 
-/// One scene as a camera gave it.
+/// One scene as a camera reads it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reading {
     /// 32 x 32 values in `[0, 1]`, row-major: 1 is what a white target gives.
     pub image: Vec<f32>,
-    /// The scene as light showed it, 64 x 64: blurred, before it was sampled and before noise.
+    /// The scene after the optics, 64 x 64: blurred, before sampling and noise.
     pub optical: Vec<f32>,
     /// Standard deviation of the blur in pixels of the 64 x 64 grid.
     pub sigma_px: f32,
@@ -33,47 +33,47 @@ pub struct Reading {
     pub noise_std: f32,
     /// Share of the patterns that were shown.
     pub sampling: f32,
-    /// Depth beside it, if there is any.
+    /// Depth of the scene, if there is any.
     pub depth: Option<Depth>,
 }
 
 /// An 8 x 8 depth map.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Depth {
-    /// Metres, row-major; anything where there is none.
+    /// Distances in metres, row-major; undefined in zones without a distance.
     pub metres: [f32; DEPTH_SIDE * DEPTH_SIDE],
-    /// Whether the zone gave a distance.
+    /// Whether the zone has a distance.
     pub valid: [bool; DEPTH_SIDE * DEPTH_SIDE],
 }
 
-/// Something that takes pictures of scenes.
+/// A camera that takes pictures of scenes.
 pub trait Degrade: Sync {
     /// A picture of `scene`, 64 x 64 values in `[0, 1]`.
     ///
     /// # Errors
-    /// [`DegradeError`] if no picture can be taken.
+    /// [`DegradeError`] if the camera can take no picture.
     fn degrade(&self, scene: &[f32], rng: &mut Pcg64Mcg) -> Result<Reading, DegradeError>;
 }
 
-/// Why a scene could not be degraded. `Display` is one line.
+/// Why a scene cannot be degraded. `Display` is one line.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum DegradeError {
     /// The scene is not 64 x 64.
     #[error("a scene of {found} pixels, expected 64 x 64")]
     Shape {
-        /// Its pixels.
+        /// Number of its pixels.
         found: usize,
     },
-    /// A limit is no range of numbers that can be.
+    /// A limit is not a valid range.
     #[error("{name} from {from} to {to}, expected {expected}")]
     Limit {
-        /// Which.
+        /// Name of the limit.
         name: &'static str,
         /// Lower end, as text.
         from: String,
         /// Upper end.
         to: String,
-        /// What it may be.
+        /// The accepted range.
         expected: &'static str,
     },
     /// A simulated camera refused.

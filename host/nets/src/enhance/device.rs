@@ -1,7 +1,8 @@
 //! Both stages for images that OMP has left on a GPU.
 //!
 //! # Invariant
-//! What comes out is what [`Enhancer`](super::Enhancer) makes of the same images, to what single precision rounds
+//! The results are those of [`Enhancer`](super::Enhancer) for the same images, to within the
+//! rounding of single precision
 //! (`tests::images_that_are_there_become_what_the_processor_makes_of_them`).
 
 use nirspi_recon::omp::gpu::DeviceImages;
@@ -16,46 +17,47 @@ use crate::gate;
 use crate::network::{Guess, RunChain};
 use crate::weights::{Weights, WeightsError};
 
-/// Why images on a device are not enhanced there.
+/// Why images on a device cannot be enhanced there.
 #[derive(Debug, Error)]
 pub enum DeviceEnhancerError {
-    /// The networks are on the processor.
+    /// The networks run on the processor.
     #[error("the networks are on the processor, expected a GPU")]
     NoGpu,
-    /// The images are not where the networks are.
+    /// Images and networks are on different devices.
     #[error("the images are on {images}, expected them on {networks}, where the networks are")]
     Elsewhere {
-        /// Where the images are.
+        /// Device of the images.
         images: Backend,
-        /// Where the networks are.
+        /// Device of the networks.
         networks: Backend,
     },
-    /// The images are of another size.
+    /// The images have another size.
     #[error("images of {found} pixels, expected {} x {}", fusion::SIDE, fusion::SIDE)]
     Size {
-        /// Pixels of an image.
+        /// Number of pixels of an image.
         found: usize,
     },
-    /// The image's value for white is no light.
+    /// The value for white is not positive and finite.
     #[error("white is {found}, expected more than 0")]
     White {
-        /// What it is.
+        /// The value.
         found: f32,
     },
-    /// Copies were asked for.
+    /// Copies were requested.
     #[error("the spread over copies is not taken on a device, expected no copies")]
     Copies,
     /// The measured rows do not belong to these readings.
     #[error(transparent)]
     Rows(#[from] MeasuredRowsError),
-    /// The weights are of another network.
+    /// The weights belong to another network.
     #[error(transparent)]
     Weights(#[from] WeightsError),
 }
 
-/// Both stages, 32 x 32 in and 64 x 64 out, for images on a GPU, along the bridge in one step.
+/// Both stages for images on a GPU, input 32 x 32 and output 64 x 64, with one step of the bridge.
 ///
-/// Images, FSRCNN's output and the UNet's input stay there. Agreement with the readings and the gate are the host's: they
+/// Images, FSRCNN's output and the UNet's input stay on the GPU. The last steps, agreement with the
+/// readings and the gate, run on the host.
 /// are the last thing that is done to an image before it is looked at.
 pub struct DeviceEnhancer {
     chain: Box<dyn RunChain>,
@@ -64,10 +66,11 @@ pub struct DeviceEnhancer {
 }
 
 impl DeviceEnhancer {
-    /// Of the weights of its three networks (models `fsrcnn`, `estimator` and `diffusion` or `gan`).
+    /// An enhancer with the weights of its three networks (models `fsrcnn`, `estimator`, and
+    /// `diffusion` or `gan`).
     ///
     /// # Errors
-    /// [`DeviceEnhancerError`] if `device` is no GPU or weights are of another network.
+    /// [`DeviceEnhancerError`] if `device` is not a GPU, or weights belong to another network.
     pub fn new(
         device: &Device,
         fsrcnn: &Weights,
@@ -78,11 +81,12 @@ impl DeviceEnhancer {
         Ok(Self { chain, backend: device.backend(), batch: device.batch() })
     }
 
-    /// Enhances images that are on the networks' device, with the depth maps that go with them. Values are divided by
-    /// `white` and clamped to [0, 1]; `progress` is told how many images are done.
+    /// Enhances images on the networks' device, with their depth maps. Values are divided by
+    /// `white` and clamped to [0, 1]; `progress` gets the number of finished images.
     ///
     /// # Errors
-    /// [`DeviceEnhancerError`] if the images are of another size or elsewhere, `white` is no light, or copies are asked for.
+    /// [`DeviceEnhancerError`] if the images have another size or are on another device, `white` is
+    /// not positive and finite, or copies are requested.
     pub fn enhance(
         &self,
         images: &DeviceImages,
@@ -120,7 +124,7 @@ impl DeviceEnhancer {
     }
 }
 
-/// What [`Enhancer`](super::Enhancer) does after the networks.
+/// The steps of [`Enhancer`](super::Enhancer) after the networks.
 fn finished(guess: Guess, options: &Options) -> Result<Enhanced, MeasuredRowsError> {
     let Guess { readings, estimates, start, mut sharp } = guess;
     let constraint = constraint_on(&readings, &estimates, options)?;

@@ -1,17 +1,18 @@
-//! What the caller knows of blur and noise, and how it is joined with what the estimator finds.
+//! The caller's knowledge of blur and noise, and how it is combined with the estimates.
 
 use crate::estimate::Estimate;
 
-/// What is known of a number that the estimator estimates too.
+/// What the caller knows about a number that the estimator also estimates.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub enum Known {
-    /// Nothing: the estimate is taken.
+    /// Nothing: the estimate is used.
     #[default]
     Nothing,
-    /// A lower bound, such as the lens's defocus at the measured distance: the larger of bound and estimate is taken.
-    /// Noise can hide blur from the estimator, and the estimate is then too small.
+    /// A lower bound, such as the lens's defocus at the measured distance. The larger of bound and
+    /// estimate is used, because noise can hide blur from the estimator, whose estimate is then too
+    /// small.
     AtLeast(f32),
-    /// The number: the estimate is not used.
+    /// The exact number: the estimate is not used.
     Exactly(f32),
 }
 
@@ -19,21 +20,21 @@ impl Known {
     fn over(self, estimated: f32) -> f32 {
         match self {
             Self::Nothing => estimated,
-            // A bound that is no number binds nothing.
+            // A bound that is NaN has no effect.
             Self::AtLeast(bound) => estimated.max(bound),
             Self::Exactly(value) => value,
         }
     }
 }
 
-/// The number, if there is one.
+/// `Some` is the exact number.
 impl From<Option<f32>> for Known {
     fn from(value: Option<f32>) -> Self {
         value.map_or(Self::Nothing, Self::Exactly)
     }
 }
 
-/// What the caller knows of blur and noise.
+/// The caller's knowledge of blur and noise.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct KnownEstimate {
     /// Blur in pixels of the 64 x 64 grid.
@@ -43,7 +44,7 @@ pub struct KnownEstimate {
 }
 
 impl KnownEstimate {
-    /// The estimate, joined with what is known.
+    /// The estimate, corrected by what is known.
     pub fn over(self, estimated: Estimate) -> Estimate {
         Estimate {
             sigma_px: self.sigma_px.over(estimated.sigma_px),
@@ -51,8 +52,8 @@ impl KnownEstimate {
         }
     }
 
-    /// The path's two numbers, then the least and the most of blur and noise on the scale of the networks: an estimate within
-    /// these bounds is the estimate joined with what is known.
+    /// The path's two numbers, then the minimum and maximum of blur and of noise on the scale of
+    /// the networks. An estimate clamped to these bounds is the corrected estimate.
     #[cfg(feature = "gpu")]
     pub(crate) fn condition_bounds(self, path: [f32; 2]) -> [f32; 6] {
         let least = self.over(Estimate { sigma_px: 0.0, noise: 0.0 }).conditions(path);

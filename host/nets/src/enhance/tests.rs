@@ -1,4 +1,4 @@
-//! With the weights that come with the program.
+//! Tests with the embedded weights.
 
 use super::*;
 use crate::deblur::Method;
@@ -17,7 +17,7 @@ pub(super) fn enhancer(steps: u32) -> Enhancer {
     Enhancer::new(fusion, Sharpener::new(estimator, deblurrer))
 }
 
-/// A cross of bars on 64 x 64, 0 or 0.9.
+/// A cross of bars on 64 x 64, with values 0 and 0.9.
 pub(super) fn cross() -> Vec<f32> {
     let bar = |at: usize| (26..34).contains(&at);
     let inside = |at: usize| (10..54).contains(&at);
@@ -25,7 +25,8 @@ pub(super) fn cross() -> Vec<f32> {
     (0..AREA).map(|i| if lit(i / 64, i % 64) { 0.9 } else { 0.0 }).collect()
 }
 
-/// Seen through a blur of about `sigma_px` (three boxes) by 32 x 32 pixels with noise.
+/// Readings of `image` by 32 x 32 pixels, through a blur of about `sigma_px` (three boxes), with
+/// noise.
 pub(super) fn seen(image: &[f32], sigma_px: f32, noise: f32, seed: u64) -> Vec<f32> {
     let radius = ((4.0 * sigma_px * sigma_px + 1.0).sqrt() - 1.0) / 2.0;
     let radius = radius.round() as i64;
@@ -74,7 +75,7 @@ fn a_blurred_cross_gets_sharper_at_each_stage_and_the_readings_bear_it_out() {
 
 #[test]
 fn an_image_is_enhanced_alike_alone_and_among_others() {
-    // More than one batch.
+    // A stack of more than one batch.
     let stack: Vec<f32> = (0..34).flat_map(|seed| seen(&cross(), 1.0, 0.01, seed)).collect();
     let options = Options { copies: 1, ..Options::default() };
     let enhancer = enhancer(1);
@@ -143,7 +144,7 @@ fn the_built_in_enhancer_is_made_of_the_embedded_weights() {
     assert_eq!(ours, enhance(&enhancer(1), &readings, &options).images);
 }
 
-/// White everywhere, whatever was seen.
+/// A network that gives white everywhere.
 struct White;
 
 impl Sharpen for White {

@@ -1,8 +1,9 @@
-//! Estimator, FSRCNN and one step of the bridge, one after another, for images that are on the device already.
+//! Estimator, FSRCNN and one step of the bridge, one after another, for images that are already on
+//! the device.
 //!
-//! # Invariant
-//! Between the images and the guess nothing comes to the host: one read at the end brings all that was asked for
-//! (`enhance::device::tests::images_that_are_there_become_what_the_processor_makes_of_them` holds the result).
+//! No data comes to the host between the images and the guess; one read at the end fetches all
+//! results (`enhance::device::tests::images_that_are_there_become_what_the_processor_makes_of_them`
+//! checks the results).
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -27,10 +28,10 @@ pub(crate) struct Chain {
 }
 
 impl Chain {
-    /// Takes the networks of these weights to a device.
+    /// Uploads the networks with these weights to a device.
     ///
     /// # Errors
-    /// [`WeightsError`] for a tensor that is missing, of another shape, or too wide.
+    /// [`WeightsError`] if a tensor is missing, of another shape, not finite, unknown, or too wide.
     pub(crate) fn new(
         engine: &Arc<dyn Engine>,
         fsrcnn: &Weights,
@@ -45,7 +46,7 @@ impl Chain {
         })
     }
 
-    /// The guesses for `frames` images from number `first` on.
+    /// The guesses for `frames` images, beginning with number `first`.
     fn part(
         &self,
         images: &Buffer,
@@ -60,7 +61,7 @@ impl Chain {
         let outputs = self.estimator.forward(coarse, &readings);
         let depth = (!depth.is_empty()).then(|| on.upload(depth));
         let start = self.fsrcnn.forward(coarse, &readings, depth.as_ref(), true);
-        // The bridge from its beginning, t = 1, to its end.
+        // One step of the bridge, from t = 1 to its end.
         let bounds = known.condition_bounds([1.0, 1.0]);
         let grid = (SIDE / fusion::SIDE) as f32;
         let conditions = on.conditions(&outputs, &bounds, grid);

@@ -1,8 +1,7 @@
-//! Launches kernels on one device, whatever its runtime.
+//! Launches kernels on one device, for any runtime of CubeCL.
 //!
-//! # Invariant
-//! A kernel sees only buffers of the lengths that its indices reach: lengths are checked here, before a launch that checks
-//! nothing.
+//! A kernel does not check its indices. So every function here checks the lengths of the buffers
+//! before its launch.
 
 use super::kernels::{self, Activation, Add, ROWS, Shape, UNITS};
 use super::layer::Layer;
@@ -11,7 +10,7 @@ use cubecl::prelude::*;
 use cubecl::reader::read_sync;
 use cubecl::server::Handle;
 
-/// Numbers of four bytes on a device.
+/// A buffer of four-byte numbers on a device.
 #[derive(Clone, Debug)]
 pub(crate) struct Buffer {
     handle: Handle,
@@ -19,7 +18,8 @@ pub(crate) struct Buffer {
 }
 
 impl Buffer {
-    /// Of memory that other kernels of the same device have written: at least `count` numbers.
+    /// A buffer of memory that other kernels of the same device have written, with at least `count`
+    /// numbers.
     pub(super) fn of(handle: &Handle, count: usize) -> Self {
         Self { handle: handle.clone(), count }
     }
@@ -29,22 +29,24 @@ impl Buffer {
         reason = "CubeCL trusts the length; it is the one the buffer was made with"
     )]
     fn arg<R: Runtime>(&self) -> ArrayArg<R> {
-        // SAFETY: every constructor of a buffer takes the count from what it allocates or uploads, or from who has.
+        // SAFETY: every constructor of a buffer takes the count from what it allocates or uploads,
+        // or from a caller that has allocated the memory.
         unsafe { ArrayArg::from_raw_parts(self.handle.clone(), self.count) }
     }
 }
 
-/// What happens to the sums of a convolution on their way to memory.
+/// What is done with the sums of a convolution before they are stored.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Finish<'a> {
     pub activation: Activation,
-    /// For [`Activation::FilmSilu`]: scales and shifts of all layers, a row a frame, and the first scale of this one.
+    /// For [`Activation::FilmSilu`]: scales and shifts of all layers, one row for each frame, and
+    /// the index of this layer's first scale.
     pub film: Option<(&'a Buffer, usize)>,
     pub add: Option<(Add, &'a Buffer)>,
-    /// Four channels become one of twice the side.
+    /// Rearrange four channels into one of twice the side.
     pub shuffle: bool,
     pub clamp: bool,
-    /// Write SiLU of the output too.
+    /// Also store SiLU of the output.
     pub activated: bool,
 }
 
@@ -64,29 +66,29 @@ impl Default for Finish<'_> {
 /// The output of a convolution.
 pub(crate) struct Made {
     pub out: Buffer,
-    /// SiLU of it, where that was asked for.
+    /// SiLU of the output, if requested.
     pub activated: Option<Buffer>,
 }
 
-/// What the UNet is shown as the degraded image.
+/// The UNet's input for the degraded image.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Degraded<'a> {
-    /// As many pixels as the current image.
+    /// An image with as many pixels as the current image.
     Fine(&'a Buffer),
-    /// A pixel for each block of 2 x 2.
+    /// An image with one pixel for each block of 2 x 2.
     Coarse(&'a Buffer),
 }
 
-/// What the kernel of conditions joins with the estimates: two numbers of the bridge's path, then the least and the most of
-/// blur and of noise, on the scale of the networks.
+/// Parameters of the kernel that makes the conditions: two numbers of the bridge's path, then the
+/// minimum and maximum of blur and of noise, on the scale of the networks.
 pub(crate) type Bounds = [f32; 6];
 
-/// One device. Everything is queued; a failed launch shows in [`read`](Self::read).
+/// One device. Calls only queue work; a failed launch appears in [`read`](Self::read).
 pub(crate) trait Engine: Send + Sync {
-    /// Bytes of its largest buffer.
+    /// Size of the device's largest buffer in bytes.
     fn buffer_bytes(&self) -> usize;
     fn upload(&self, numbers: &[f32]) -> Buffer;
-    /// Numbers of no particular value; in tests, NaN.
+    /// A buffer with undefined numbers; in tests, NaN.
     fn empty(&self, count: usize) -> Buffer;
     /// The numbers of each buffer.
     fn read(&self, buffers: &[&Buffer]) -> Vec<Vec<f32>>;
@@ -115,7 +117,7 @@ fn units() -> CubeDim {
     CubeDim::new_1d(UNITS as u32)
 }
 
-/// Workgroups for one unit a number.
+/// Workgroups for one unit per number.
 fn groups(count: usize) -> CubeCount {
     CubeCount::Static(count.div_ceil(UNITS) as u32, 1, 1)
 }
@@ -196,8 +198,9 @@ impl<R: Runtime> Engine for ComputeClient<R> {
             CubeCount::Static(pixels.div_ceil(ROWS * shape.pixels) as u32, tiles as u32, 1);
         let out = Engine::empty(self, count);
         let activated = Engine::empty(self, if finish.activated { count } else { 1 });
-        // SAFETY: the kernel reads pixels inside of `frames` images and weights of `tiles` tiles, writes pixels below `pixels` and
-        // channels below `outputs`, and all these lengths are checked above or by the layer; barriers are outside every branch.
+        // SAFETY: the kernel reads pixels inside `frames` images and weights of `tiles` tiles, and
+        // writes pixels below `pixels` and channels below `outputs`. All these lengths are checked
+        // above or by the layer; barriers are outside every branch.
         unsafe {
             kernels::convolve::launch_unchecked::<R>(
                 self,
@@ -251,7 +254,8 @@ impl<R: Runtime> Engine for ComputeClient<R> {
         assert!(depth.is_none_or(|depth| depth.count >= 2 * readings.count));
         let count = 3 * readings.count;
         let out = Engine::empty(self, count);
-        // SAFETY: indices are below `count` of the output, a third of it of readings, two thirds of depth.
+        // SAFETY: indices are below `count` of the output; a third of it are readings, two thirds
+        // depth.
         unsafe {
             kernels::stacked::launch_unchecked::<R>(
                 self,
@@ -278,7 +282,7 @@ impl<R: Runtime> Engine for ComputeClient<R> {
         assert!(degraded.count >= current.count / if coarse { 4 } else { 1 });
         let count = 2 * current.count;
         let out = Engine::empty(self, count);
-        // SAFETY: indices are below `count` of the output, half of it of images, an eighth of it of blocks.
+        // SAFETY: indices are below `count` of the output; half of it are images, an eighth blocks.
         unsafe {
             kernels::paired::launch_unchecked::<R>(
                 self,
@@ -306,7 +310,7 @@ impl<R: Runtime> Engine for ComputeClient<R> {
         assert!(input.count.is_multiple_of(pixels * channels));
         let count = input.count / pixels;
         let out = Engine::empty(self, count);
-        // SAFETY: the input has `pixels` numbers for each of the output.
+        // SAFETY: the input has `pixels` numbers for each number of the output.
         unsafe {
             kernels::pooled::launch_unchecked::<R>(
                 self,

@@ -11,12 +11,13 @@ use super::unet::AT_ONCE;
 use crate::cpu::estimator::{LOG_FLOOR, LOG_OFFSET};
 use crate::filter::Filter;
 use crate::network::RunEstimator;
+use crate::schema;
 use crate::weights::{Weights, WeightsError};
 
-/// By how much each convolution shrinks the image.
+/// Strides of the convolutions.
 const STRIDES: [usize; 4] = [1, 2, 2, 2];
 
-/// The network, its weights on a device.
+/// The network, with its weights on a device.
 pub(crate) struct Estimator {
     engine: Arc<dyn Engine>,
     convs: Vec<Layer>,
@@ -25,11 +26,12 @@ pub(crate) struct Estimator {
 }
 
 impl Estimator {
-    /// Takes the network of these weights to a device.
+    /// Uploads the network with these weights to a device.
     ///
     /// # Errors
-    /// [`WeightsError`] for a tensor that is missing, of another shape, or too wide.
+    /// [`WeightsError`] if a tensor is missing, of another shape, not finite, unknown, or too wide.
     pub(crate) fn new(engine: &Arc<dyn Engine>, weights: &Weights) -> Result<Self, WeightsError> {
+        schema::estimator(weights)?;
         let on = engine.as_ref();
         let convs = STRIDES.into_iter().enumerate().map(|(index, stride)| {
             let name = format!("conv{}", index + 1);
@@ -44,7 +46,7 @@ impl Estimator {
         })
     }
 
-    /// How many images of `side` x `side` go through at once.
+    /// Number of images of `side` x `side` that the network processes at once.
     pub(super) fn at_once(&self, side: usize) -> usize {
         let widest = self.convs.iter().map(|layer| layer.geometry.outputs).max().unwrap_or(0);
         frames_at_once(widest * side * side, self.engine.buffer_bytes(), AT_ONCE)
@@ -53,7 +55,7 @@ impl Estimator {
     /// The two outputs for each of `frames` images of `side` x `side`.
     pub(super) fn forward(&self, (frames, side): (usize, usize), images: &Buffer) -> Buffer {
         let on = self.engine.as_ref();
-        // Layers without slopes: ReLU.
+        // These layers have no slopes, so PReLU is ReLU.
         let relu = Finish { activation: Activation::Prelu, ..Finish::default() };
         let (mut h, mut side, mut channels) = (images.clone(), side, 1);
         for conv in &self.convs {

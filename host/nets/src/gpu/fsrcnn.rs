@@ -10,28 +10,29 @@ use super::plan::frames_at_once;
 use super::unet::AT_ONCE;
 use crate::filter::Filter;
 use crate::network::RunFsrcnn;
+use crate::schema;
 use crate::weights::{Weights, WeightsError};
 
-/// Intensity, depth, validity.
+/// Input channels: intensity, depth, validity.
 const CHANNELS: usize = 3;
 
-/// The network, its weights on a device.
+/// The network, with its weights on a device.
 pub(crate) struct Fsrcnn {
     engine: Arc<dyn Engine>,
-    /// Convolutions, each with PReLU after it.
+    /// Convolutions, each followed by PReLU.
     layers: Vec<Layer>,
-    /// The transposed convolution, as one with a pixel shuffle after it.
+    /// The transposed convolution, as a convolution followed by a pixel shuffle.
     doubling: Layer,
 }
 
 impl Fsrcnn {
-    /// Takes the network of these weights to a device.
+    /// Uploads the network with these weights to a device.
     ///
     /// # Errors
-    /// [`WeightsError`] for a tensor that is missing, of another shape, or too wide.
+    /// [`WeightsError`] if a tensor is missing, of another shape, not finite, unknown, or too wide.
     pub(crate) fn new(engine: &Arc<dyn Engine>, weights: &Weights) -> Result<Self, WeightsError> {
         let on = engine.as_ref();
-        let maps = weights.count(|i| format!("map.{i}.weight"));
+        let [_, _, maps] = schema::fsrcnn(weights)?;
         let names = ["feature".to_owned(), "shrink".to_owned()]
             .into_iter()
             .map(|name| (format!("{name}_act"), name))
@@ -49,13 +50,14 @@ impl Fsrcnn {
         Ok(Self { engine: Arc::clone(engine), layers, doubling })
     }
 
-    /// How many images of `side` x `side` go through at once.
+    /// Number of images of `side` x `side` that the network processes at once.
     pub(super) fn at_once(&self, side: usize) -> usize {
         let widest = self.layers.iter().map(|layer| layer.geometry.outputs).max().unwrap_or(0);
         frames_at_once(widest.max(CHANNELS + 1) * side * side, self.engine.buffer_bytes(), AT_ONCE)
     }
 
-    /// `readings` (frames, side, side) with twice the side; `depth` (frames, 2, side, side), if there is any.
+    /// Enlarges `readings` (frames, side, side) to twice the side; `depth` is (frames, 2, side,
+    /// side), if there is any.
     pub(super) fn forward(
         &self,
         (frames, side): (usize, usize),

@@ -1,68 +1,71 @@
-//! What runs on the device: one source, compiled for CUDA, Vulkan, Metal or DirectX at run time.
+//! The kernels: one source, compiled for CUDA, Vulkan, Metal or DirectX at run time.
 //!
-//! Barriers stand outside every branch. Loops whose length is known when a kernel is compiled are unrolled, but for the one over a
-//! step's channels; rounds of those that are left are counted by [`super::plan`].
+//! Barriers stand outside every branch. A loop whose length is known when a kernel is compiled is
+//! unrolled, except the loop over a step's channels. [`super::plan`] counts the rounds of the other
+//! loops.
 
-// A kernel's arguments are its buffers and sizes, and the macro turns them into functions of as many.
+// A kernel's arguments are its buffers and sizes, and the macro makes functions with as many
+// arguments.
 #![allow(clippy::too_many_arguments)]
 
 use cubecl::prelude::*;
 
-/// Input channels of one step through shared memory; as many as [`COLUMNS`], so that a unit loads the pixels that it
-/// computes.
+/// Number of input channels in one step through shared memory. It equals [`COLUMNS`], so a unit
+/// loads the pixels that it computes.
 pub(super) const DEPTH: usize = 8;
 
-/// Units side by side in a workgroup: each has other channels.
+/// Number of units side by side in a workgroup; each has other channels.
 pub(super) const COLUMNS: usize = 8;
 
-/// Units below each other: each has other pixels.
+/// Number of units below each other; each has other pixels.
 pub(super) const ROWS: usize = 32;
 
-/// Units of a workgroup.
+/// Number of units of a workgroup.
 pub(super) const UNITS: usize = COLUMNS * ROWS;
 
-/// Numbers between the input channels of a step in shared memory, beyond the pixels: so that the eight channels of a pixel are
-/// written to eight different banks.
+/// Padding between the input channels of a step in shared memory, after the pixels. It makes the
+/// eight channels of a pixel go to eight different banks.
 const SKEW: usize = 4;
 
-/// What is known of a convolution when it is compiled.
+/// Facts about a convolution that its kernel is compiled for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) struct Shape {
-    /// Pixels of a unit: `row + ROWS * i`.
+    /// Number of pixels of a unit: `row + ROWS * i`.
     pub pixels: usize,
-    /// Channels of a unit: `column + COLUMNS * j`.
+    /// Number of channels of a unit: `column + COLUMNS * j`.
     pub channels: usize,
     pub activation: Activation,
     pub add: Add,
-    /// Whether channel `place * C + c` goes to channel `c` of one of four pixels of an enlarged image.
+    /// Whether channel `place * C + c` is stored as channel `c` of one of four pixels of an
+    /// enlarged image.
     pub shuffle: bool,
-    /// Whether what is written is put into [0, 1].
+    /// Whether the output is clamped to [0, 1].
     pub clamp: bool,
-    /// Whether SiLU of what is written goes to a second buffer.
+    /// Whether SiLU of the output is stored in a second buffer.
     pub activated: bool,
 }
 
-/// What is done to a sum before anything is added to it.
+/// The activation of a sum, before anything is added.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum Activation {
     Nothing,
     /// x / (1 + e^-x).
     Silu,
-    /// The same of x (1 + scale) + shift, both from the conditions of the frame.
+    /// SiLU of x (1 + scale) + shift, where scale and shift come from the conditions of the frame.
     FilmSilu,
-    /// With the slope of the channel; ReLU where that is 0.
+    /// PReLU with the slope of the channel; ReLU where the slope is 0.
     Prelu,
     /// ln(1 + e^x).
     Softplus,
 }
 
-/// What is added to an activation.
+/// What is added after the activation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum Add {
     Nothing,
-    /// A number for each that is written.
+    /// One number for each output.
     Alike,
-    /// One number for each pixel of the convolution, whatever the channel.
+    /// One number for each pixel of the convolution, the same for all channels.
     Pixel,
 }
 
@@ -71,9 +74,9 @@ fn silu(x: f32) -> f32 {
     x / (1.0f32 + f32::exp(-x))
 }
 
-/// A convolution: pixels of all frames below each other, channels side by side, a workgroup for a tile of both. Input
-/// `frame x side x side x inputs`; `weights` and `table` as `pack` makes them; output `frame x out_side x out_side x outputs`,
-/// or twice as many pixels in both directions after a shuffle.
+/// A convolution: pixels of all frames as rows, channels as columns, one workgroup for a tile of
+/// both. The input is `frame x side x side x inputs`; `pack` makes `weights` and `table`; the
+/// output is `frame x out_side x out_side x outputs`, or with twice the side after a shuffle.
 #[cube(launch_unchecked)]
 pub(super) fn convolve(
     input: &Array<f32>,
@@ -125,7 +128,8 @@ pub(super) fn convolve(
         sums[i] = 0.0f32;
     }
 
-    // For each of this unit's pixels: its frame's first pixel, and row and column of its first tap, `centre` too many.
+    // For each of this unit's pixels: the first pixel of its frame, and row and column of its first
+    // tap, both larger by `centre`.
     let mut frames = Array::<usize>::new(mine);
     let mut ys = Array::<usize>::new(mine);
     let mut xs = Array::<usize>::new(mine);
@@ -243,7 +247,8 @@ pub(super) fn convolve(
     }
 }
 
-/// `images` from number `first` on, over `white` and put into [0, 1]. One unit a number.
+/// Takes `images` from number `first` on, divides by `white` and clamps to [0, 1]. Each unit
+/// computes one number.
 #[cube(launch_unchecked)]
 pub(super) fn readings(
     images: &Array<f32>,
@@ -258,8 +263,8 @@ pub(super) fn readings(
     }
 }
 
-/// What FSRCNN sees: intensity, depth and validity of each pixel side by side. `depth` has the two planes of a frame one after
-/// the other, if there is any. One unit a number.
+/// FSRCNN's input: intensity, depth and validity of each pixel side by side. `depth`, if there is
+/// any, has the two planes of a frame one after the other. Each unit computes one number.
 #[cube(launch_unchecked)]
 pub(super) fn stacked(
     readings: &Array<f32>,
@@ -287,8 +292,9 @@ pub(super) fn stacked(
     }
 }
 
-/// What the UNet sees: blocks of 2 x 2 pixels of `current` (channels 0 to 3) and of `degraded` (4 to 7); with `coarse`, the
-/// latter has one pixel for each block. `side` is that of the blocks. One unit a number.
+/// The UNet's input: blocks of 2 x 2 pixels of `current` (channels 0 to 3) and of `degraded` (4 to
+/// 7). With `coarse`, `degraded` has one pixel for each block. `side` is that of the blocks. Each
+/// unit computes one number.
 #[cube(launch_unchecked)]
 pub(super) fn paired(
     current: &Array<f32>,
@@ -317,7 +323,8 @@ pub(super) fn paired(
     }
 }
 
-/// ln(mean + `floor`) + `offset` of each channel of each frame. One unit a channel of a frame.
+/// ln(mean + `floor`) + `offset` of each channel of each frame. Each unit computes one channel of a
+/// frame.
 #[cube(launch_unchecked)]
 pub(super) fn pooled(
     input: &Array<f32>,
@@ -340,8 +347,9 @@ pub(super) fn pooled(
     }
 }
 
-/// The UNet's six conditions from the estimator's two outputs: the path, then blur and noise on the scale of the networks
-/// within their bounds, and their squares. `scale` takes blur to the 64 x 64 grid. One unit a frame.
+/// The UNet's six conditions from the estimator's two outputs: the path, then blur and noise on the
+/// scale of the networks, clamped to their bounds, and their squares. `scale` converts blur to the
+/// 64 x 64 grid. Each unit computes one frame.
 #[cube(launch_unchecked)]
 pub(super) fn conditions(
     estimates: &Array<f32>,

@@ -10,17 +10,18 @@ use crate::weights::{Weights, WeightsError};
 /// A convolution whose weights are on a device, in the order of its kernel.
 pub(crate) struct Layer {
     pub geometry: Geometry,
-    /// Channels of a unit.
+    /// Number of channels of a unit.
     pub channels: usize,
-    /// Pixels of a unit, where that is not left to the number of pixels.
+    /// Number of pixels of a unit; `None` if the number of pixels in all decides.
     pub pixels: Option<usize>,
     pub weights: Buffer,
-    /// What is added to each channel, then the slope of its PReLU.
+    /// The bias of each channel, followed by the slope of its PReLU.
     pub table: Buffer,
 }
 
 impl Layer {
-    /// Takes a convolution of that stride and zeros around the image to a device; `slopes` are of the PReLU after it.
+    /// Uploads a convolution with this stride and zeros around the image; `slopes` are those of the
+    /// PReLU after it.
     pub fn new(
         engine: &dyn Engine,
         filter: &Filter,
@@ -41,13 +42,13 @@ impl Layer {
         Self { geometry, channels, pixels: None, weights, table }
     }
 
-    /// The convolution of that name, of stride 1, which keeps the size of its input.
+    /// The convolution with this name, with stride 1, which keeps the size of its input.
     pub fn named(engine: &dyn Engine, weights: &Weights, name: &str) -> Result<Self, WeightsError> {
         let filter = checked(weights, name, Filter::convolution(weights, name)?)?;
         Ok(Self::new(engine, &filter, (1, filter.side / 2), None, Order::AsStored))
     }
 
-    /// The same, for a pixel shuffle after it.
+    /// The convolution with this name, before a pixel shuffle.
     pub fn shuffled(
         engine: &dyn Engine,
         weights: &Weights,
@@ -57,7 +58,7 @@ impl Layer {
         Ok(Self::new(engine, &filter, (1, filter.side / 2), None, Order::Shuffled))
     }
 
-    /// The fully connected layer of that name.
+    /// The fully connected layer with this name.
     pub fn linear(
         engine: &dyn Engine,
         weights: &Weights,
@@ -67,13 +68,13 @@ impl Layer {
         Ok(Self::new(engine, &filter, (1, 0), None, Order::AsStored))
     }
 
-    /// Channels that a workgroup makes.
+    /// Number of channels that a workgroup computes.
     pub fn tile(&self) -> usize {
         COLUMNS * self.channels
     }
 }
 
-/// A layer that is not too wide for a unit.
+/// Checks that a layer is not too wide for a unit.
 pub(super) fn checked(
     weights: &Weights,
     name: &str,

@@ -1,23 +1,25 @@
 //! The networks on a GPU: one kernel source for CUDA, Vulkan, Metal and DirectX, through CubeCL.
 //!
 //! # Invariant
-//! A GPU gives what the processor gives, to 1e-4 (`network::tests::every_device_of_this_machine_gives_what_pytorch_gives`).
+//! A GPU gives the processor's results to within 1e-4
+//! (`network::tests::every_device_of_this_machine_gives_what_pytorch_gives`).
 //!
-//! | module | holds |
+//! | module | contents |
 //! |---|---|
-//! | `plan` | how a convolution is dealt out to workgroups, and what a device's limits allow: pure functions |
+//! | `plan` | distribution of a convolution to workgroups within a device's limits: pure functions |
 //! | `pack` | weights in the order in which the kernel reads them: pure functions |
-//! | `kernels` | what runs on the device |
-//! | `engine` | launches kernels on one device, whatever its runtime |
+//! | `kernels` | the kernels |
+//! | `engine` | launches kernels on one device, for any runtime |
 //! | `layer` | a convolution whose weights are on a device |
 //! | `unet`, `fsrcnn`, `estimator` | the networks |
-//! | `chain` | the three networks one after another, for images that are on the device already |
+//! | `chain` | the three networks one after another, for images that are already on the device |
 //!
 //! # How
-//! Activations are `frame x row x column x channel`. Nearly all work is in one kernel, `convolve`: a convolution as a product of
-//! matrices, pixels by taps and taps by channels, tile by tile through shared memory. What follows a convolution (bias,
-//! modulation by the conditions, activation, residual, pixel shuffle) is done in its registers before anything is
-//! written. Fully connected layers are convolutions of 1 x 1 over images of one pixel.
+//! Activations are `frame x row x column x channel`. Nearly all work is in one kernel, `convolve`:
+//! a convolution as a product of matrices (pixels by taps, and taps by channels), tile by tile
+//! through shared memory. The operations after a convolution (bias, modulation by the conditions,
+//! activation, residual, pixel shuffle) are done in registers before the output is stored. Fully
+//! connected layers are convolutions of 1 x 1 over images of one pixel.
 
 mod chain;
 mod engine;
@@ -44,12 +46,12 @@ pub(crate) use estimator::Estimator;
 pub(crate) use fsrcnn::Fsrcnn;
 pub(crate) use unet::UNet;
 
-/// The engine of a device of wgpu.
+/// The engine of a wgpu device.
 pub(crate) fn wgpu(device: &WgpuDevice) -> Arc<dyn Engine> {
     Arc::new(WgpuRuntime::client(device))
 }
 
-/// The engine of a device of CUDA.
+/// The engine of a CUDA device.
 pub(crate) fn cuda(device: &CudaDevice) -> Arc<dyn Engine> {
     Arc::new(CudaRuntime::client(device))
 }

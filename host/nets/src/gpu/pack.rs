@@ -1,23 +1,25 @@
 //! Weights in the order in which the kernel reads them.
 //!
-//! A workgroup makes a tile of channels. Tile after tile, tap after tap, and [`DEPTH`] input channels after [`DEPTH`], the weights of
-//! the whole tile stand side by side; what is beyond the last input or output channel is zero.
+//! A workgroup computes a tile of channels. For each tile, each tap and each group of [`DEPTH`]
+//! input channels, the weights of the whole tile stand side by side. Weights beyond the last input
+//! or output channel are zero.
 
 use super::kernels::DEPTH;
 use crate::filter::Filter;
 
-/// In which order the kernel writes the channels that it makes.
+/// The order in which the kernel stores its output channels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Order {
-    /// As the file has them.
+    /// The order of the file.
     AsStored,
-    /// For a pixel shuffle: the place in the block of 2 x 2 first, then the channel of the enlarged image, so that one pixel's
-    /// channels are written side by side. The file has the channel first.
+    /// The order for a pixel shuffle: the place in the block of 2 x 2 first, then the channel of
+    /// the enlarged image, so that one pixel's channels are stored side by side. The file has the
+    /// channel first.
     Shuffled,
 }
 
 impl Order {
-    /// The channel, in the file, of channel `at` of the kernel.
+    /// The channel of the file that is channel `at` of the kernel.
     fn stored(self, at: usize, outputs: usize) -> usize {
         match self {
             Self::AsStored => at,
@@ -50,7 +52,7 @@ pub(super) fn weights(filter: &Filter, tile: usize, order: Order) -> Vec<f32> {
     packed
 }
 
-/// What is added to each channel, then the slope of its PReLU; 0 for `None`, which is ReLU.
+/// The bias of each channel, followed by the slope of its PReLU; 0 for `None`, which is ReLU.
 pub(super) fn table(filter: &Filter, slopes: Option<&[f32]>, order: Order) -> Vec<f32> {
     let stored = || (0..filter.outputs).map(|output| order.stored(output, filter.outputs));
     let bias = stored().map(|output| filter.bias[output]);
@@ -63,7 +65,8 @@ mod tests {
     use super::super::tests::{definition, random_filter};
     use super::*;
 
-    /// What the kernel makes of packed weights, one number after another, zeros around the image.
+    /// The kernel's result for packed weights, computed one number at a time, with zeros around the
+    /// image.
     fn interpreted(
         packed: &[f32],
         table: &[f32],

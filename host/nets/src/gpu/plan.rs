@@ -1,27 +1,29 @@
-//! How a convolution is dealt out to workgroups, and what a device's limits allow.
+//! Distributes a convolution to workgroups within the limits of a device.
 //!
 //! # Invariant
-//! No unit makes more rounds of loops than software Vulkan finishes, which is some 65 535: it ends longer loops without a word
+//! No unit makes more rounds of loops than software Vulkan finishes. Software Vulkan ends a longer
+//! loop after some 65 535 rounds without an error
 //! (`tests::a_convolution_of_too_many_rounds_is_refused`).
 
 use super::kernels::{COLUMNS, DEPTH, ROWS};
 
-/// Rounds of all its loops that one unit may make.
+/// Largest number of rounds of all loops of one unit.
 const ROUNDS: usize = 60_000;
 
-/// Channels that one unit may compute for each of its pixels.
+/// Possible numbers of channels that one unit computes for each of its pixels.
 const CHANNELS_A_UNIT: [usize; 4] = [8, 6, 4, 2];
 
-/// Pixels of one unit, where there are pixels enough to fill a large GPU with workgroups, and where not.
+/// Number of pixels of one unit: with enough pixels to fill a large GPU with workgroups, and with
+/// fewer.
 const PIXELS_A_UNIT: [usize; 2] = [8, 2];
 
-/// Pixels times tiles of channels from which units take many.
+/// Number of pixels times tiles of channels from which units take the larger number of pixels.
 const ENOUGH_PIXELS: usize = 1 << 16;
 
-/// Bytes of a buffer, where a device would allow for more.
+/// Largest buffer in bytes, where a device allows more.
 const BUFFER_BYTES: usize = 1 << 30;
 
-/// Workgroups that every device takes in one direction.
+/// Number of workgroups that every device takes in one direction.
 const GROUPS: usize = 65_535;
 
 /// Sizes of a convolution of square kernels over square images.
@@ -32,7 +34,8 @@ pub(crate) struct Geometry {
     /// Side of a kernel.
     pub kernel: usize,
     pub stride: usize,
-    /// The tap, in both directions, that lies on the pixel itself: zeros around the image.
+    /// The tap, in both directions, that lies on the pixel itself; this many zeros surround the
+    /// image.
     pub centre: usize,
 }
 
@@ -42,44 +45,45 @@ impl Geometry {
         (side + 2 * self.centre - self.kernel) / self.stride + 1
     }
 
-    /// Steps of [`DEPTH`] input channels.
+    /// Number of steps of [`DEPTH`] input channels.
     pub(super) fn steps(&self) -> usize {
         self.kernel * self.kernel * self.inputs.div_ceil(DEPTH)
     }
 
-    /// Rounds of loops of one unit.
+    /// Number of loop rounds of one unit.
     fn rounds(&self) -> usize {
         let steps = self.steps();
         self.kernel + self.kernel * self.kernel + steps * (1 + DEPTH)
     }
 
-    /// The most input channels of a kernel of that side that a unit gets through.
+    /// Largest number of input channels with which a kernel of this side stays within the rounds.
     pub(super) fn most_inputs(kernel: usize) -> usize {
         let taps = kernel * kernel;
         (ROUNDS - kernel - taps) / (taps * (1 + DEPTH)) * DEPTH
     }
 
-    /// Whether a unit gets through.
+    /// Whether a unit stays within the rounds.
     pub(super) fn fits(&self) -> bool {
         self.rounds() <= ROUNDS
     }
 }
 
-/// Channels of one unit, so that the tiles of `outputs` channels waste the least, and are wide where that is the same.
+/// Number of channels of one unit. The tiles of `outputs` channels then waste least; of equal
+/// choices the widest wins.
 pub(super) fn channels_a_unit(outputs: usize) -> usize {
     let padded = |channels: usize| outputs.next_multiple_of(COLUMNS * channels);
     let best = CHANNELS_A_UNIT.into_iter().min_by_key(|&channels| padded(channels));
     best.unwrap_or(CHANNELS_A_UNIT[0])
 }
 
-/// Pixels of one unit for `pixels` in all and `tiles` tiles of channels.
+/// Number of pixels of one unit, for `pixels` in all and `tiles` tiles of channels.
 pub(super) fn pixels_a_unit(pixels: usize, tiles: usize) -> usize {
     let [many, few] = PIXELS_A_UNIT;
     if pixels * tiles >= ENOUGH_PIXELS || pixels > GROUPS * ROWS * few { many } else { few }
 }
 
-/// How many frames whose largest activation has `numbers` numbers go through a network at once: at least one, at most
-/// `most`, where a buffer has room for `buffer_bytes`.
+/// Number of frames that a network processes at once, if the largest activation of a frame has
+/// `numbers` numbers and a buffer `buffer_bytes`: at least one, at most `most`.
 pub(super) fn frames_at_once(numbers: usize, buffer_bytes: usize, most: usize) -> usize {
     let bytes = buffer_bytes.min(BUFFER_BYTES);
     (bytes / (size_of::<f32>() * numbers.max(1))).clamp(1, most)
@@ -95,7 +99,7 @@ mod tests {
 
     #[test]
     fn sides_are_those_of_pytorch() {
-        // Kernel, stride, padding, side in, side out of torch.nn.Conv2d.
+        // Kernel, stride, padding, side in and side out of torch.nn.Conv2d.
         for (kernel, stride, centre, side, expected) in [
             (3, 1, 1, 32, 32),
             (3, 2, 1, 32, 16),

@@ -1,5 +1,7 @@
-//! Every kernel against its definition in double precision, on each GPU of this machine and on software Vulkan. A machine without
-//! either prints that the tests are skipped. Buffers are full of NaN before a kernel writes them, so a test sees each number that the kernel left unwritten.
+//! Tests of every kernel against its definition in double precision, on each GPU of this machine
+//! and on software Vulkan. A machine without either prints that the tests are skipped. Buffers are
+//! full of NaN before a kernel writes them, so a test notices each number that the kernel left
+//! unwritten.
 
 use std::sync::Arc;
 
@@ -31,7 +33,7 @@ pub(super) fn random_filter(inputs: usize, outputs: usize, side: usize, seed: u6
     Filter { inputs, outputs, side, weights: weights.collect(), bias: numbers(outputs, seed + 1) }
 }
 
-/// A convolution of one image (side, side, inputs) by its definition, zeros around the image.
+/// A convolution of one image (side, side, inputs) by its definition, with zeros around the image.
 pub(super) fn definition(
     filter: &Filter,
     (stride, centre): (usize, usize),
@@ -73,7 +75,7 @@ fn assert_close(ours: &[f32], expected: &[f32], what: &str) {
     assert_eq!(ours.len(), expected.len(), "{what}");
     for (at, (ours, expected)) in ours.iter().zip(expected).enumerate() {
         let apart = (ours - expected).abs();
-        // NaN is not close either.
+        // NaN fails this comparison too.
         assert!(
             apart <= 2e-5 * (1.0 + expected.abs()),
             "{what}: [{at}] {ours}, expected {expected}"
@@ -89,7 +91,8 @@ fn silu(x: f32) -> f32 {
     x / (1.0 + (-x).exp())
 }
 
-/// Inputs, outputs, kernel, stride, zeros around the image, side: each kind of layer of the shipped networks, and odd ones.
+/// Inputs, outputs, kernel, stride, zeros around the image, side: each kind of layer of the shipped
+/// networks, and unusual ones.
 const LAYERS: [(usize, usize, usize, usize, usize, usize); 16] = [
     (8, 48, 3, 1, 1, 32),
     (48, 48, 3, 1, 1, 9),
@@ -113,7 +116,7 @@ const LAYERS: [(usize, usize, usize, usize, usize, usize); 16] = [
 fn every_shape_of_layer_is_its_definition_for_few_and_many_pixels_a_unit() {
     for (backend, engine) in engines() {
         for (inputs, outputs, kernel, stride, centre, side) in LAYERS {
-            // More pixels than one workgroup has, and not a multiple of them.
+            // More pixels than one workgroup has, and not a multiple of that number.
             let frames = if side == 1 { 67 } else { 3 };
             let filter = random_filter(inputs, outputs, kernel, 11);
             let images = numbers(frames * side * side * inputs, 13);
@@ -141,7 +144,7 @@ fn activations_are_what_they_are_called() {
     let filter = random_filter(4, outputs, 3, 17);
     let images = numbers(frames * side * side * 4, 19);
     let slopes = numbers(outputs, 23);
-    // Two rows too many before and one behind.
+    // Two additional rows before and one after.
     let film = numbers(frames * (2 * outputs + 3), 29);
     let sums: Vec<f32> = images
         .chunks_exact(side * side * 4)
@@ -232,7 +235,7 @@ fn the_small_kernels_put_each_number_where_it_belongs() {
         let close = |ours: &Buffer, expected: &[f32], what: &str| {
             assert_close(&read(on, ours), expected, &format!("{backend}: {what}"));
         };
-        // 300 numbers: more than a workgroup.
+        // 300 numbers are more than a workgroup has.
         let images = numbers(400, 47);
         let expected: Vec<f32> = images[100..].iter().map(|v| (v / 0.75).clamp(0.0, 1.0)).collect();
         let readings = on.readings(&on.upload(&images), 100, 0.75, 300);
@@ -302,7 +305,7 @@ fn conditions_are_those_that_the_host_would_tell() {
     }
 }
 
-/// The shipped networks, at the sizes they are used at.
+/// The shipped networks, at the sizes at which they are used.
 #[test]
 fn the_shipped_networks_give_what_the_processor_gives() {
     let weights = |model| Weights::embedded(model).unwrap();

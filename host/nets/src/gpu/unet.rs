@@ -9,20 +9,21 @@ use super::pack::Order;
 use super::plan::frames_at_once;
 use crate::filter::Filter;
 use crate::network::{CONDITIONS, Conditions, RunUNet};
+use crate::schema::{self, UNetSizes};
 use crate::weights::{Weights, WeightsError};
 
-/// Most images that go through at once.
+/// Largest number of images processed at once.
 pub(super) const AT_ONCE: usize = 256;
 
 /// A residual block: convolution, scale and shift by the conditions, convolution.
 struct Block {
     conv1: Layer,
     conv2: Layer,
-    /// The first of its scales among those of all blocks.
+    /// Index of the block's first scale among the scales of all blocks.
     film: usize,
 }
 
-/// The network, its weights on a device.
+/// The network, with its weights on a device.
 pub(crate) struct UNet {
     engine: Arc<dyn Engine>,
     embed: [Layer; 2],
@@ -34,21 +35,21 @@ pub(crate) struct UNet {
     expand: Vec<Layer>,
     decoder: Vec<Vec<Block>>,
     output: Layer,
-    /// Most channels of a pixel of the finest level.
+    /// Largest number of channels of a pixel of the finest level.
     channels: usize,
 }
 
 impl UNet {
-    /// Takes the network of these weights to a device.
+    /// Uploads the network with these weights to a device.
     ///
     /// # Errors
-    /// [`WeightsError`] for a tensor that is missing, of another shape, or too wide.
+    /// [`WeightsError`] if a tensor is missing, of another shape, not finite, unknown, or too wide.
     pub(crate) fn new(engine: &Arc<dyn Engine>, weights: &Weights) -> Result<Self, WeightsError> {
         let on = engine.as_ref();
-        let levels = weights.count(|i| format!("encoder.{i}.0.conv1.weight"));
+        let UNetSizes { channels, blocks: count, .. } = schema::unet(weights)?;
+        let levels = channels.len();
         let mut films = Films::default();
         let mut blocks = |side: &str, level: usize| -> Result<Vec<Block>, WeightsError> {
-            let count = weights.count(|j| format!("{side}.{level}.{j}.conv1.weight"));
             let block = |j| {
                 let name = format!("{side}.{level}.{j}");
                 let conv = |which: &str| Layer::named(on, weights, &format!("{name}.{which}"));
@@ -57,7 +58,7 @@ impl UNet {
             };
             (0..count).map(block).collect()
         };
-        let below = levels.saturating_sub(1);
+        let below = levels - 1;
         let encoder =
             (0..levels).map(|level| blocks("encoder", level)).collect::<Result<Vec<_>, _>>()?;
         let decoder =
@@ -90,14 +91,14 @@ impl UNet {
         })
     }
 
-    /// How many images of `side` x `side` go through at once.
+    /// Number of images of `side` x `side` that the network processes at once.
     pub(super) fn at_once(&self, side: usize) -> usize {
         let largest = self.channels * (side / 2) * (side / 2);
         frames_at_once(largest.max(2 * side * side), self.engine.buffer_bytes(), AT_ONCE)
     }
 
-    /// What the network says of `frames` images of `side` x `side` under their conditions (frames, 6), and of what they were degraded
-    /// to; plus `start`, if there is one.
+    /// The network's output for `frames` images of `side` x `side`, given their conditions (frames,
+    /// 6) and degraded images; `start` is added, if there is one.
     pub(super) fn forward(
         &self,
         (frames, side): (usize, usize),
@@ -144,7 +145,7 @@ impl UNet {
         on.convolve(&self.output, &h.out, frames, side, finish).out
     }
 
-    /// A block's output, with its SiLU if another block comes after it.
+    /// A block's output, with its SiLU if another block follows.
     fn block(
         &self,
         block: &Block,
@@ -166,7 +167,7 @@ impl UNet {
     }
 }
 
-/// The layers that make scales and shifts of the conditions, as one.
+/// The layers that compute scales and shifts from the conditions, as one layer.
 struct Films {
     all: Filter,
 }
@@ -180,7 +181,7 @@ impl Default for Films {
 }
 
 impl Films {
-    /// Adds a layer; where its outputs begin.
+    /// Adds a layer; returns the index of its first output.
     fn push(&mut self, film: Filter) -> usize {
         let first = self.all.outputs;
         self.all.inputs = film.inputs;

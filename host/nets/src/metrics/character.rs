@@ -1,7 +1,8 @@
-//! Characters as our own classifier sees them: which one an image shows, and how far two sets of images are apart.
+//! The classifier as a judge of characters: which character an image shows, and how far apart two
+//! sets of images are.
 //!
-//! The law: its Fréchet distance is called *Fréchet character distance* wherever it is shown. It is of 128 features of
-//! a small network trained on characters, and tells nothing about FID.
+//! The distance is always called *Fréchet character distance*. Its 128 features come from a small
+//! network trained on characters, so the distance is not comparable with FID.
 
 use super::frechet::{FrechetError, frechet_distance};
 use crate::cpu::Classifier;
@@ -9,7 +10,7 @@ use crate::images::Images;
 use crate::weights::{Weights, WeightsError};
 use rayon::prelude::*;
 
-/// Side of the images that are judged.
+/// Side of the judged images in pixels.
 pub const SIDE: usize = 64;
 
 /// The classifier, on the CPU.
@@ -18,28 +19,28 @@ pub struct CharacterJudge {
     network: Classifier,
 }
 
-/// What the classifier says of a stack.
+/// The classifier's results for a stack.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Judged {
     /// (N, features), row-major.
     pub features: Vec<f32>,
     /// The likeliest class of each image, 0 to 61 for 0-9, A-Z, a-z.
     pub classes: Vec<u8>,
-    /// How likely the classifier finds it, 0 to 1.
+    /// Probability of that class according to the classifier, 0 to 1.
     pub certainty: Vec<f32>,
 }
 
 impl CharacterJudge {
-    /// The network of these weights (model `classifier`).
+    /// The network with these weights (model `classifier`).
     ///
     /// # Errors
-    /// [`WeightsError`] if they are of another network.
+    /// [`WeightsError`] if the weights belong to another network.
     pub fn new(weights: &Weights) -> Result<Self, WeightsError> {
         weights.expect_model("classifier")?;
         Ok(Self { network: Classifier::new(weights)? })
     }
 
-    /// Features of an image.
+    /// Number of features of an image.
     #[must_use]
     pub fn features(&self) -> usize {
         self.network.feature_count()
@@ -61,16 +62,16 @@ impl CharacterJudge {
         all
     }
 
-    /// Fréchet character distance of two judged stacks of at least two images each.
+    /// Fréchet character distance between two judged stacks of at least two images each.
     ///
     /// # Errors
-    /// [`FrechetError`] if there are fewer.
+    /// [`FrechetError`] if a stack has fewer images.
     pub fn distance(&self, reference: &Judged, test: &Judged) -> Result<f64, FrechetError> {
         frechet_distance(&reference.features, &test.features, self.features())
     }
 }
 
-/// The class of the largest logit, and its part of all (softmax).
+/// The class of the largest logit, and its softmax probability.
 fn likeliest(logits: &[f32]) -> (u8, f32) {
     let (mut class, mut most) = (0, f32::NEG_INFINITY);
     for (k, &logit) in logits.iter().enumerate() {

@@ -1,12 +1,17 @@
-//! The Fréchet distance of two sets of features, each taken for a Gaussian.
+//! The Fréchet distance between two sets of features, each taken as a Gaussian.
 //!
-//! d = |m1 - m2|^2 + tr(C1 + C2 - 2 (C1 C2)^(1/2)) with means m and sample covariances C (Dowson and Landau,
-//! J. Multivariate Anal. 12, 1982; Heusel et al., NIPS 2017, on Inception's features: FID). With C1 = A^T A and
-//! C2 = B^T B the trace of the root is the sum of the singular values of A B^T: no root of a matrix that is not
-//! symmetric, and fewer images than features are nothing special. The law: symmetric, never negative, and 0 for equal
-//! sets up to rounding.
+//! d = |m1 - m2|^2 + tr(C1 + C2 - 2 (C1 C2)^(1/2)) with means m and sample covariances C (Dowson
+//! and Landau, J. Multivariate Anal. 12, 1982; Heusel et al., NIPS 2017, on Inception's features:
+//! FID). With C1 = A^T A and C2 = B^T B the trace of the root is the sum of the singular values of
+//! A B^T. So no root of an asymmetric matrix is necessary, and there may be fewer images than
+//! features.
 //!
-//! It depends on how many images the sets have (fewer: larger), so compare distances of equal numbers only.
+//! # Invariant
+//! The distance is symmetric, never negative, and 0 for equal sets, up to rounding
+//! (`tests::it_is_symmetric_and_zero_for_equal_sets`).
+//!
+//! The distance grows as the sets get smaller, so compare only distances of equal numbers of
+//! images.
 
 use nalgebra::{DMatrix, RowDVector};
 use thiserror::Error;
@@ -14,22 +19,22 @@ use thiserror::Error;
 /// Why two sets have no distance.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum FrechetError {
-    /// A covariance needs two images.
+    /// A set has fewer than two images, so it has no covariance.
     #[error("the {which} set has {found} images, expected at least 2")]
     TooFew {
         /// `reference` or `test`.
         which: &'static str,
-        /// Its images.
+        /// Number of its images.
         found: usize,
     },
-    /// The values are no whole rows.
+    /// The values are not whole rows.
     #[error("the {which} set has {found} values, expected a multiple of {features} features")]
     Shape {
         /// `reference` or `test`.
         which: &'static str,
-        /// Its values.
+        /// Number of its values.
         found: usize,
-        /// Features of an image.
+        /// Number of features of an image.
         features: usize,
     },
     /// A feature is NaN or infinite.
@@ -39,19 +44,21 @@ pub enum FrechetError {
     NotFinite {
         /// `reference` or `test`.
         which: &'static str,
-        /// Row.
+        /// Row of the value.
         image: usize,
-        /// Column.
+        /// Column of the value.
         feature: usize,
-        /// What was found.
+        /// The value.
         found: f32,
     },
 }
 
-/// The Fréchet distance of two sets of images by their features, each (N, `features`), row-major, N >= 2.
+/// The Fréchet distance between two sets of images by their features, each (N, `features`),
+/// row-major, N >= 2.
 ///
 /// # Errors
-/// [`FrechetError`] if a set has fewer than two images, values that are no whole rows, or not finite.
+/// [`FrechetError`] if a set has fewer than two images, values that are not whole rows, or a value
+/// that is not finite.
 pub fn frechet_distance(
     reference: &[f32],
     test: &[f32],
@@ -66,7 +73,7 @@ pub fn frechet_distance(
     } else {
         product.tr_mul(&product)
     };
-    // Rounding leaves some that are zero a little below it.
+    // Rounding makes some zero eigenvalues slightly negative.
     let root: f64 = smaller.symmetric_eigenvalues().iter().map(|v| v.max(0.0).sqrt()).sum();
     let spread = reference.factor.norm_squared() + test.factor.norm_squared() - 2.0 * root;
     Ok((means + spread).max(0.0))
@@ -75,7 +82,8 @@ pub fn frechet_distance(
 /// Mean and covariance of features.
 struct Gaussian {
     mean: RowDVector<f64>,
-    /// A with covariance A^T A, of as many rows as images or features, whichever are fewer.
+    /// A matrix A with covariance A^T A. It has as many rows as there are images or features,
+    /// whichever is fewer.
     factor: DMatrix<f64>,
 }
 
@@ -109,18 +117,18 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Features of the run of `scripts/frechet_reference.py` whose numbers are below.
+    /// Features of the run of `scripts/frechet_reference.py` whose results are below.
     fn features(images: usize, count: usize, phase: f64, gain: f64) -> Vec<f32> {
         let value = |(i, j): (usize, usize)| {
             let wave = (0.37 * (i * (j + 1)) as f64 + phase).sin() + 0.2 * (1.9 * j as f64).cos();
-            // Like those of a ReLU: never negative, some always zero.
+            // Values like those of a ReLU: never negative, some always zero.
             (gain * wave * f64::from(u8::from(j % 5 != 3)) + 0.1 * (i % 3) as f64).max(0.0) as f32
         };
         (0..images).flat_map(|i| (0..count).map(move |j| (i, j))).map(value).collect()
     }
 
-    /// SciPy 1.17.1 by `scripts/frechet_reference.py`: images of either set, features, distance. Fewer images than
-    /// features, as many, more, and two.
+    /// Results of SciPy 1.17.1 by `scripts/frechet_reference.py`: images of either set, features,
+    /// distance. The sets have fewer images than features, as many, more, and two.
     const SCIPY: [(usize, usize, usize, f64); 5] = [
         (40, 50, 8, 0.3278976136933225),
         (12, 9, 16, 2.726803297361341),
@@ -164,7 +172,8 @@ mod tests {
 
     #[test]
     fn of_one_feature_it_is_the_difference_of_means_and_of_deviations() {
-        // Means 1 and 5, sample deviations sqrt 2 and 3 sqrt 2: 16 + (2 sqrt 2)^2.
+        // Means 1 and 5, sample deviations sqrt 2 and 3 sqrt 2, so the distance is 16 + (2 sqrt
+        // 2)^2.
         let found = frechet_distance(&[0.0, 2.0], &[2.0, 8.0], 1).unwrap();
         assert!((found - 24.0).abs() < 1e-12, "{found}");
     }

@@ -1,9 +1,12 @@
-//! Inception-v3 up to its last pooling, for FID, with weights that the user brings.
+//! Inception-v3 up to its last pooling, for FID, with the user's weights.
 //!
-//! The network of Szegedy et al. (CVPR 2016) in the form that FID is defined with (Heusel et al., NIPS 2017; in PyTorch
-//! Seitzer's pytorch-fid): means that leave the padding out, and a maximum in the last block's pooling. No weights are
-//! shipped: theirs is a file of 90 MB. The law: tensors have torchvision's names and shapes, all are checked before
-//! use, and what else is in the file (the classifier, auxiliary outputs) is not looked at.
+//! This is the network of Szegedy et al. (CVPR 2016) in the form of FID's definition (Heusel et
+//! al., NIPS 2017; in PyTorch Seitzer's pytorch-fid): means without the padding, and a maximum in
+//! the last block's pooling. The weights are a file of 90 MB and are not shipped.
+//!
+//! Tensors have torchvision's names and shapes, and are all checked before use
+//! (`tests::weights_of_another_network_and_odd_images_are_refused`). Other tensors of the file (the
+//! classifier, auxiliary outputs) are ignored.
 
 mod plan;
 
@@ -16,27 +19,27 @@ use burn::tensor::{Tensor, TensorData};
 use plan::Plan;
 use thiserror::Error;
 
-/// Features of an image: the channels after the last block.
+/// Number of features of an image: the channels after the last block.
 pub const FEATURES: usize = 2048;
 
-/// Classes of the published weights that FID is defined with.
+/// Number of classes of the published weights that define FID.
 pub const FID_CLASSES: usize = 1008;
 
-/// Edge of the images that the network is made for.
+/// Side of the images that the network expects, in pixels.
 const EDGE_PX: usize = 299;
 
 /// Added to the variance in batch normalisation.
 const EPSILON: f32 = 1e-3;
 
-/// Why an image has no features.
+/// Error: the values are not an image of this size.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("an image of {found} values, expected {height} x {width}, at least one pixel")]
 pub struct ImageSize {
-    /// Values given.
+    /// Number of values.
     pub found: usize,
-    /// Rows.
+    /// Rows of the image.
     pub height: usize,
-    /// Columns.
+    /// Columns of the image.
     pub width: usize,
 }
 
@@ -49,17 +52,17 @@ pub struct Inception {
 
 #[derive(Debug, Clone)]
 enum Layer {
-    /// With ReLU after it.
+    /// A convolution followed by ReLU.
     Convolution(Box<Convolution>),
-    /// Mean of 3 x 3, of the same size.
+    /// Mean of 3 x 3 pixels; keeps the size.
     Mean,
-    /// Maximum of 3 x 3.
+    /// Maximum of 3 x 3 pixels.
     Maximum { stride: usize, padding: usize },
-    /// Branches of one input, their channels one after another.
+    /// Branches with one input, whose output channels are concatenated.
     Branches(Vec<Vec<Layer>>),
 }
 
-/// Kernel and bias, batch normalisation folded in.
+/// Kernel and bias, with the batch normalisation folded in.
 #[derive(Debug, Clone)]
 struct Convolution {
     weight: Tensor<Flex, 4>,
@@ -68,7 +71,7 @@ struct Convolution {
 }
 
 impl Inception {
-    /// The network of these weights.
+    /// The network with these weights.
     ///
     /// # Errors
     /// [`WeightsError`] if a tensor is missing or has another shape.
@@ -78,7 +81,7 @@ impl Inception {
         Ok(Self { layers, classes })
     }
 
-    /// Are these, by the number of their classes, of the kind that FID is defined with?
+    /// Whether the weights have as many classes as those that define FID.
     #[must_use]
     pub fn is_of_fid(&self) -> bool {
         self.classes == Some(FID_CLASSES)
@@ -88,7 +91,7 @@ impl Inception {
     /// 299 x 299.
     ///
     /// # Errors
-    /// [`ImageSize`] if the values are no such image.
+    /// [`ImageSize`] if the values are not such an image.
     pub fn features(
         &self,
         image: &[f32],
@@ -125,7 +128,7 @@ fn forward(layers: &[Layer], image: Tensor<Flex, 4>) -> Tensor<Flex, 4> {
     })
 }
 
-/// Layers by the plan for an input of `channels`, and the channels of their output.
+/// Layers of the plan for an input with `channels`, and the number of output channels.
 fn build(
     plans: &[Plan],
     block: &str,
@@ -165,8 +168,8 @@ fn build(
     Ok((layers, channels))
 }
 
-/// Kernel and bias of a convolution whose batch normalisation is done to its kernel once instead of to its output
-/// every time.
+/// Kernel and bias of a convolution, with the batch normalisation applied once to the kernel
+/// instead of to every output.
 fn folded(
     weights: &Weights,
     name: &str,
@@ -188,9 +191,10 @@ fn folded(
     Ok((scaled.collect(), bias.collect()))
 }
 
-/// The image at 299 x 299 by bilinear interpolation, pixel centres aligned, as `F.interpolate(align_corners=False)`.
+/// The image at 299 x 299 by bilinear interpolation with aligned pixel centres, as
+/// `F.interpolate(align_corners=False)` does.
 fn enlarged(image: &[f32], height: usize, width: usize) -> Vec<f32> {
-    // Pixels on either side, and the share of the second.
+    // The two neighbouring pixels, and the share of the second.
     let beside = |at: usize, length: usize| {
         let x = ((at as f32 + 0.5) * length as f32 / EDGE_PX as f32 - 0.5).max(0.0);
         let first = (x as usize).min(length - 1);

@@ -1,28 +1,29 @@
-//! Inception in a build without the feature `train`: it cannot be made, and says which build has it.
+//! Inception in a build without the feature `train`: it cannot be created, and the error says which
+//! build has it.
 
 use crate::weights::Weights;
 use std::convert::Infallible;
 use thiserror::Error;
 
-/// Features of an image.
+/// Number of features of an image.
 pub const FEATURES: usize = 2048;
 
-/// Classes of the published weights that FID is defined with.
+/// Number of classes of the published weights that define FID.
 pub const FID_CLASSES: usize = 1008;
 
-/// This build cannot compute FID.
+/// Error: this build cannot compute FID.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 #[error("this build has no FID; build it with: cargo build --release --features train")]
 pub struct NotBuilt;
 
-/// Never there.
+/// A type without values.
 #[derive(Debug, Clone)]
 pub struct Inception {
     never: Infallible,
 }
 
 impl Inception {
-    /// Fails always.
+    /// Always fails.
     ///
     /// # Errors
     /// [`NotBuilt`].
@@ -30,7 +31,7 @@ impl Inception {
         Err(NotBuilt)
     }
 
-    /// Are the weights, by the number of their classes, of the kind that FID is defined with?
+    /// Whether the weights have as many classes as those that define FID.
     #[must_use]
     pub fn is_of_fid(&self) -> bool {
         match self.never {}

@@ -1,4 +1,4 @@
-//! Which of the 62 characters an image shows: for character accuracy and the Frechet character distance.
+//! The classifier as a burn module: which of the 62 characters an image shows.
 
 use burn::module::Module;
 use burn::nn::Linear;
@@ -8,6 +8,7 @@ use burn::tensor::activation::relu;
 use burn::tensor::backend::Backend;
 
 use super::{convolution, linear, pooled};
+use crate::schema;
 use crate::weights::{Weights, WeightsError};
 
 /// Sizes of a [`Classifier`].
@@ -15,27 +16,24 @@ use crate::weights::{Weights, WeightsError};
 pub struct ClassifierConfig {
     /// Channels of each pair of convolutions.
     pub channels: [usize; 3],
-    /// Classes told apart.
+    /// Number of classes.
     pub classes: usize,
 }
 
 impl Default for ClassifierConfig {
     fn default() -> Self {
-        Self { channels: [32, 64, 128], classes: 62 }
+        Self { channels: [32, 64, 128], classes: schema::CLASSES }
     }
 }
 
 impl ClassifierConfig {
-    /// The sizes of the network that these weights are of.
+    /// The sizes of the network with these weights.
     ///
     /// # Errors
-    /// [`WeightsError`] if they are of another network.
+    /// [`WeightsError`] if the weights belong to another network.
     pub fn of(weights: &Weights) -> Result<Self, WeightsError> {
-        let mut channels = [0; 3];
-        for (pair, channels) in channels.iter_mut().enumerate() {
-            *channels = weights.shape::<4>(&format!("conv{}.weight", 2 * pair + 1))?[0];
-        }
-        Ok(Self { channels, classes: weights.shape::<2>("fc.weight")?[0] })
+        let widths = schema::classifier(weights)?;
+        Ok(Self { channels: [widths[0], widths[1], widths[2]], classes: schema::CLASSES })
     }
 
     /// A network with PyTorch's initial weights.
@@ -53,7 +51,7 @@ impl ClassifierConfig {
     }
 }
 
-/// The network; see the module.
+/// The network; see the module's documentation.
 #[derive(Module, Debug)]
 pub struct Classifier<B: Backend> {
     conv1: Conv2d<B>,
@@ -66,13 +64,13 @@ pub struct Classifier<B: Backend> {
 }
 
 impl<B: Backend> Classifier<B> {
-    /// Features of images (N, 1, 64, 64) in [0, 1]: (N, last of the channels).
+    /// Features of images (N, 1, 64, 64) in [0, 1]: (N, number of features).
     pub fn features(&self, images: Tensor<B, 4>) -> Tensor<B, 2> {
         let layers = [&self.conv1, &self.conv2, &self.conv3, &self.conv4, &self.conv5, &self.conv6];
         pooled(layers.into_iter().fold(images, |h, layer| relu(layer.forward(h))))
     }
 
-    /// Logits of the classes, (N, classes), of [`Self::features`].
+    /// Logits of the classes, (N, classes), for [`Self::features`].
     pub fn logits(&self, features: Tensor<B, 2>) -> Tensor<B, 2> {
         self.fc.forward(features)
     }

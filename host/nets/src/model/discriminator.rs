@@ -1,5 +1,5 @@
-//! The GAN's judge: is this the sharp image of that degraded one, patch by patch
-//! (PatchGAN; Isola et al., CVPR 2017).
+//! The GAN's discriminator: judges patch by patch whether an image is the sharp image of a degraded
+//! one (PatchGAN; Isola et al., CVPR 2017).
 
 use burn::module::Module;
 use burn::nn::conv::Conv2d;
@@ -8,12 +8,13 @@ use burn::tensor::activation::leaky_relu;
 use burn::tensor::backend::Backend;
 
 use super::convolution;
+use crate::schema;
 use crate::weights::{Weights, WeightsError};
 
 /// Sizes of a [`Discriminator`].
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DiscriminatorConfig {
-    /// Channels after each convolution but the last.
+    /// Channels after each convolution except the last.
     pub channels: [usize; 3],
 }
 
@@ -24,16 +25,13 @@ impl Default for DiscriminatorConfig {
 }
 
 impl DiscriminatorConfig {
-    /// The sizes of the network that these weights are of.
+    /// The sizes of the network with these weights.
     ///
     /// # Errors
-    /// [`WeightsError`] if they are of another network.
+    /// [`WeightsError`] if the weights belong to another network.
     pub fn of(weights: &Weights) -> Result<Self, WeightsError> {
-        let mut channels = [0; 3];
-        for (layer, channels) in channels.iter_mut().enumerate() {
-            *channels = weights.shape::<4>(&format!("conv{}.weight", layer + 1))?[0];
-        }
-        Ok(Self { channels })
+        let widths = schema::discriminator(weights)?;
+        Ok(Self { channels: [widths[0], widths[1], widths[2]] })
     }
 
     /// A network with PyTorch's initial weights.
@@ -48,7 +46,7 @@ impl DiscriminatorConfig {
     }
 }
 
-/// The network; see the module.
+/// The network; see the module's documentation.
 #[derive(Module, Debug)]
 pub struct Discriminator<B: Backend> {
     conv1: Conv2d<B>,
@@ -58,7 +56,7 @@ pub struct Discriminator<B: Backend> {
 }
 
 impl<B: Backend> Discriminator<B> {
-    /// Logits (N, 1, H / 8, W / 8), one a patch, of pairs of images (N, 1, H, W).
+    /// Logits (N, 1, H / 8, W / 8), one for each patch, of pairs of images (N, 1, H, W).
     pub fn forward(&self, degraded: Tensor<B, 4>, image: Tensor<B, 4>) -> Tensor<B, 4> {
         let h = [&self.conv1, &self.conv2, &self.conv3]
             .into_iter()

@@ -1,4 +1,4 @@
-//! Blur and noise of an image, from the image itself.
+//! The estimator as a burn module: blur and noise of an image, from the image itself.
 
 use burn::module::Module;
 use burn::nn::Linear;
@@ -9,6 +9,7 @@ use burn::tensor::backend::Backend;
 
 use super::{convolution, linear, pooled};
 use crate::cpu::estimator::{LOG_FLOOR, LOG_OFFSET};
+use crate::schema;
 use crate::weights::{Weights, WeightsError};
 
 /// Sizes of an [`Estimator`].
@@ -27,16 +28,13 @@ impl Default for EstimatorConfig {
 }
 
 impl EstimatorConfig {
-    /// The sizes of the network that these weights are of.
+    /// The sizes of the network with these weights.
     ///
     /// # Errors
-    /// [`WeightsError`] if they are of another network.
+    /// [`WeightsError`] if the weights belong to another network.
     pub fn of(weights: &Weights) -> Result<Self, WeightsError> {
-        let mut channels = [0; 4];
-        for (layer, channels) in channels.iter_mut().enumerate() {
-            *channels = weights.shape::<4>(&format!("conv{}.weight", layer + 1))?[0];
-        }
-        Ok(Self { channels, hidden: weights.shape::<2>("fc1.weight")?[0] })
+        let widths = schema::estimator(weights)?;
+        Ok(Self { channels: [widths[0], widths[1], widths[2], widths[3]], hidden: widths[4] })
     }
 
     /// A network with PyTorch's initial weights.
@@ -53,7 +51,7 @@ impl EstimatorConfig {
     }
 }
 
-/// The network; see the module.
+/// The network; see the module's documentation.
 #[derive(Module, Debug)]
 pub struct Estimator<B: Backend> {
     conv1: Conv2d<B>,
@@ -65,13 +63,13 @@ pub struct Estimator<B: Backend> {
 }
 
 impl<B: Backend> Estimator<B> {
-    /// Of images (N, 1, H, W) in [0, 1]: a fourth of the blur's standard deviation in pixels of that
-    /// grid, and ten times the noise's; (N, 2).
+    /// The outputs (N, 2) for images (N, 1, H, W) in [0, 1]: a fourth of the blur's standard
+    /// deviation in pixels of the images' grid, and ten times the noise's standard deviation.
     pub fn forward(&self, images: Tensor<B, 4>) -> Tensor<B, 2> {
         let h = [&self.conv1, &self.conv2, &self.conv3, &self.conv4]
             .into_iter()
             .fold(images, |h, convolution| relu(convolution.forward(h)));
-        // Noise is a small signal among large ones; the logarithm makes it as visible.
+        // Noise is a small signal among large ones; the logarithm makes both equally visible.
         let features = (pooled(h) + LOG_FLOOR).log() + LOG_OFFSET;
         softplus(self.fc2.forward(relu(self.fc1.forward(features))), 1.0)
     }

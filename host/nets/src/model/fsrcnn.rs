@@ -1,4 +1,5 @@
-//! FSRCNN (Dong, Loy, Tang, ECCV 2016) with the depth map as second input: twice the pixels.
+//! FSRCNN (Dong, Loy, Tang, ECCV 2016) as a burn module, with the depth map as second input: twice
+//! the side.
 
 use burn::module::Module;
 use burn::nn::conv::{Conv2d, ConvTranspose2d, ConvTranspose2dConfig};
@@ -7,6 +8,7 @@ use burn::tensor::Tensor;
 use burn::tensor::backend::Backend;
 
 use super::{convolution, nearest, uniform};
+use crate::schema;
 use crate::weights::{Weights, WeightsError};
 
 /// Input channels: intensity, depth, validity of the depth.
@@ -30,13 +32,12 @@ impl Default for FsrcnnConfig {
 }
 
 impl FsrcnnConfig {
-    /// The sizes of the network that these weights are of.
+    /// The sizes of the network with these weights.
     ///
     /// # Errors
-    /// [`WeightsError`] if they are of another network.
+    /// [`WeightsError`] if the weights belong to another network.
     pub fn of(weights: &Weights) -> Result<Self, WeightsError> {
-        let [shrunk, features, _, _] = weights.shape::<4>("shrink.weight")?;
-        let mappings = weights.count(|layer| format!("map.{layer}.weight"));
+        let [features, shrunk, mappings] = schema::fsrcnn(weights)?;
         Ok(Self { features, shrunk, mappings })
     }
 
@@ -65,7 +66,7 @@ impl FsrcnnConfig {
     }
 }
 
-/// The network; see the module.
+/// The network; see the module's documentation.
 #[derive(Module, Debug)]
 pub struct Fsrcnn<B: Backend> {
     feature: Conv2d<B>,
@@ -80,8 +81,8 @@ pub struct Fsrcnn<B: Backend> {
 }
 
 impl<B: Backend> Fsrcnn<B> {
-    /// Of (N, 3, H, W), intensity in [0, 1], depth over 3 m and validity of the depth: the image
-    /// (N, 1, 2 H, 2 W), not clamped.
+    /// The image (N, 1, 2 H, 2 W), not clamped, from (N, 3, H, W): intensity in [0, 1], depth over
+    /// 3 m, and validity of the depth.
     pub fn forward(&self, input: Tensor<B, 4>) -> Tensor<B, 4> {
         let nearest = nearest(input.clone().narrow(1, 0, 1));
         let mut h = self.feature_act.forward(self.feature.forward(input));

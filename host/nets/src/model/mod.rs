@@ -1,7 +1,10 @@
 //! The networks as burn modules, generic over the backend, for training.
 //!
-//! Law: with the same weights each gives what its PyTorch twin (`host/nets/training/net.py`) gives, to
-//! 1e-4. Names of parameters are PyTorch's, sizes are read from the weights, and tensors are N, C, H, W.
+//! # Invariant
+//! With the same weights each network gives the results of its PyTorch version
+//! (`host/nets/training/networks.py`) to within 1e-4 (`tests::the_unet_gives_what_pytorch_gives`
+//! and its neighbours). Names of parameters are PyTorch's, sizes are read from the weights, and
+//! tensors are N, C, H, W.
 
 mod classifier;
 mod discriminator;
@@ -27,12 +30,12 @@ pub use fsrcnn::{Fsrcnn, FsrcnnConfig};
 pub use transfer::{fill, weights_of};
 pub use unet::{Block, UNet, UNetConfig};
 
-/// PyTorch's initial weights, uniform within 1 / sqrt(fan-in), times `gain`.
+/// PyTorch's initial weights: uniform within 1 / sqrt(fan-in), times `gain`.
 fn uniform(gain: f64) -> Initializer {
     Initializer::KaimingUniform { gain: gain / 3.0_f64.sqrt(), fan_out_only: false }
 }
 
-/// A convolution with biases that keeps (stride 1) or halves (stride 2) the size of the image.
+/// A convolution with bias that keeps (stride 1) or halves (stride 2) the size of the image.
 fn convolution<B: Backend>(
     channels: [usize; 2],
     kernel: usize,
@@ -74,9 +77,9 @@ fn shuffle<B: Backend>(features: Tensor<B, 4>) -> Tensor<B, 4> {
     ])
 }
 
-/// Each pixel twice in both directions: (N, 1, H, W) to (N, 1, 2 H, 2 W).
+/// Each pixel repeated twice in both directions: (N, 1, H, W) to (N, 1, 2 H, 2 W).
 pub(crate) fn nearest<B: Backend>(image: Tensor<B, 4>) -> Tensor<B, 4> {
-    // Four copies of a channel shuffle into the enlargement.
+    // Four copies of a channel shuffle into the enlarged image.
     shuffle(image.repeat_dim(1, 4))
 }
 

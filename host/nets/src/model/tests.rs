@@ -1,4 +1,5 @@
-//! Against PyTorch: `host/nets/tests/pytorch/make.py` made the weights, the inputs and the outputs.
+//! Tests against PyTorch: `host/nets/tests/pytorch/make.py` made the weights, the inputs and the
+//! outputs.
 
 use burn::backend::Flex;
 use burn::tensor::{Tensor, TensorData};
@@ -121,7 +122,17 @@ fn weights_of_another_network_are_refused_by_the_name_of_a_tensor() {
         "estimator: tensor conv1.weight is 4 x 1 x 3 x 3, expected 16 x 1 x 3 x 3"
     );
     weights.insert("fc3.weight".to_owned(), Array { shape: vec![1], values: vec![0.0] });
+    let error = EstimatorConfig::of(&weights).unwrap_err().to_string();
+    assert!(error.contains("no tensor fc3.weight"), "{error}");
+    let (weights, _) = fixture!("estimator");
     let config = EstimatorConfig::of(&weights).unwrap();
-    let error = fill(config.init::<Flex>(&device), &weights).unwrap_err();
+    let mut more = weights.clone();
+    more.insert("fc3.weight".to_owned(), Array { shape: vec![1], values: vec![0.0] });
+    let error = fill(config.init::<Flex>(&device), &more).unwrap_err();
     assert!(error.to_string().contains("no tensor fc3.weight"), "{error}");
+    let mut poisoned = weights;
+    let nan = Array { shape: vec![2], values: vec![0.0, f32::NAN] };
+    poisoned.insert("fc2.bias".to_owned(), nan);
+    let error = fill(config.init::<Flex>(&device), &poisoned).unwrap_err().to_string();
+    assert!(error.contains("fc2.bias") && error.contains("NaN at 1"), "{error}");
 }

@@ -1,6 +1,6 @@
-//! Weights into a burn module and out of it again.
+//! Transfers weights into a burn module, and back into a file.
 //!
-//! PyTorch's layout stands in the file: names joined by dots, a linear layer as outputs x inputs (burn:
+//! The file has PyTorch's layout: names joined by dots, a linear layer as outputs x inputs (burn:
 //! inputs x outputs), PReLU's slopes called `weight` (burn: `alpha`).
 
 use std::collections::BTreeSet;
@@ -11,10 +11,10 @@ use burn::tensor::{Tensor, TensorData};
 
 use crate::weights::{Array, Weights, WeightsError};
 
-/// The module with the weights in place of its own: each exactly once, none left over.
+/// The module with these weights. Each tensor of the file is used exactly once.
 ///
 /// # Errors
-/// [`WeightsError`] naming the first tensor that is missing, of another shape, or unknown.
+/// [`WeightsError`] names the first tensor that is missing, has another shape, or is unknown.
 pub fn fill<B: Backend, M: Module<B>>(module: M, weights: &Weights) -> Result<M, WeightsError> {
     let mut filler =
         Filler { place: Place::default(), weights, taken: BTreeSet::new(), error: None };
@@ -28,14 +28,14 @@ pub fn fill<B: Backend, M: Module<B>>(module: M, weights: &Weights) -> Result<M,
     }
 }
 
-/// The weights of a module, in PyTorch's layout, with no metadata.
+/// The weights of a module, in PyTorch's layout, without metadata.
 pub fn weights_of<B: Backend, M: Module<B>>(label: &str, module: &M) -> Weights {
     let mut reader = Reader { place: Place::default(), weights: Weights::new(label) };
     module.visit(&mut reader);
     reader.weights
 }
 
-/// Where in the module a walk is.
+/// The current place of a walk through the module.
 #[derive(Default)]
 struct Place {
     path: Vec<String>,
@@ -58,7 +58,7 @@ impl Place {
         self.path.join(".")
     }
 
-    /// Is the parameter here a matrix that PyTorch stores the other way round?
+    /// Whether the parameter here is a matrix that PyTorch stores transposed.
     fn is_turned(&self, axes: usize) -> bool {
         axes == 2 && self.kinds.last().is_some_and(|kind| kind == "Struct:Linear")
     }

@@ -1,9 +1,10 @@
-//! The UNet of the deblurrer, of the 500-step baseline and of the GAN's generator.
+//! The UNet of the deblurrer, of the 500-step baseline and of the GAN's generator, as a burn
+//! module.
 //!
-//! Two images of 2 H x 2 W go in, the current image of the path and the degraded one, and one comes
-//! out. All work is done at H x W and below, after a space-to-depth step, which costs a fourth. Each
-//! residual block is told the conditions (time, blur, noise) by a scale and a shift of its channels
-//! (FiLM, Perez et al., AAAI 2018).
+//! Input: two images of 2 H x 2 W, the current image of the path and the degraded one. Output: one
+//! image of that size. All work is done at H x W and below, after a space-to-depth step, which
+//! reduces the cost to a fourth. Each residual block gets the conditions (time, blur, noise) as a
+//! scale and a shift of its channels (FiLM, Perez et al., AAAI 2018).
 
 use burn::module::Module;
 use burn::nn::conv::Conv2d;
@@ -14,6 +15,7 @@ use burn::tensor::backend::Backend;
 
 use super::{convolution, linear, shuffle, unshuffle};
 use crate::network::CONDITIONS;
+use crate::schema::{self, UNetSizes};
 use crate::weights::{Weights, WeightsError};
 
 /// Sizes of a [`UNet`].
@@ -21,9 +23,9 @@ use crate::weights::{Weights, WeightsError};
 pub struct UNetConfig {
     /// Channels of each level, the finest first.
     pub channels: Vec<usize>,
-    /// Residual blocks of a level, on the way down and on the way up.
+    /// Number of residual blocks of a level, on the way down and on the way up.
     pub blocks: usize,
-    /// Length of the vector that the conditions become.
+    /// Length of the embedding of the conditions.
     pub embedding: usize,
 }
 
@@ -38,17 +40,12 @@ impl UNetConfig {
     /// Channels of the shipped networks.
     pub const SHIPPED_CHANNELS: [usize; 3] = [48, 96, 192];
 
-    /// The sizes of the network that these weights are of.
+    /// The sizes of the network with these weights.
     ///
     /// # Errors
-    /// [`WeightsError`] if they are of another network.
+    /// [`WeightsError`] if the weights belong to another network.
     pub fn of(weights: &Weights) -> Result<Self, WeightsError> {
-        let embedding = weights.shape::<2>("embed1.weight")?[0];
-        let levels = weights.count(|level| format!("encoder.{level}.0.conv1.weight"));
-        let blocks = weights.count(|block| format!("encoder.0.{block}.conv1.weight"));
-        let channels = (0..levels.max(1))
-            .map(|level| Ok(weights.shape::<4>(&format!("encoder.{level}.0.conv1.weight"))?[0]))
-            .collect::<Result<_, _>>()?;
+        let UNetSizes { channels, blocks, embedding } = schema::unet(weights)?;
         Ok(Self { channels, blocks, embedding })
     }
 
@@ -76,7 +73,7 @@ impl UNetConfig {
     }
 }
 
-/// The network; see the module.
+/// The network; see the module's documentation.
 #[derive(Module, Debug)]
 pub struct UNet<B: Backend> {
     embed1: Linear<B>,
@@ -90,8 +87,8 @@ pub struct UNet<B: Backend> {
 }
 
 impl<B: Backend> UNet<B> {
-    /// What the network says of `current` and `degraded`, both (N, 1, H, W) with H and W divisible by
-    /// 2^levels, under `conditions` (N, [`CONDITIONS`]); (N, 1, H, W).
+    /// The network's output (N, 1, H, W) for `current` and `degraded`, both (N, 1, H, W) with H and
+    /// W divisible by 2^levels, under `conditions` (N, [`CONDITIONS`]).
     pub fn forward(
         &self,
         current: Tensor<B, 4>,

@@ -1,4 +1,4 @@
-//! Estimator, FSRCNN and UNet one after another on a GPU, for images that are there already.
+//! Estimator, FSRCNN and UNet one after another on a GPU, for images that are already there.
 
 use std::ops::Range;
 
@@ -10,20 +10,20 @@ use crate::estimate::Estimate;
 use crate::gpu;
 use crate::weights::{Weights, WeightsError};
 
-/// What the networks make of images, on the host.
+/// The networks' results for some images, on the host.
 #[derive(Default)]
 pub(crate) struct Guess {
     /// (N, 32, 32) in [0, 1].
     pub(crate) readings: Vec<f32>,
     pub(crate) estimates: Vec<Estimate>,
-    /// (N, 64, 64) in [0, 1]: FSRCNN's.
+    /// (N, 64, 64) in [0, 1]: FSRCNN's output.
     pub(crate) start: Vec<f32>,
-    /// (N, 64, 64): the bridge's, in one step from there; not clamped.
+    /// (N, 64, 64): the bridge's output after one step from `start`; not clamped.
     pub(crate) sharp: Vec<f32>,
 }
 
 impl Guess {
-    /// Puts the guesses for further images after these.
+    /// Appends the results for further images.
     pub(crate) fn append(&mut self, mut other: Self) {
         self.readings.append(&mut other.readings);
         self.estimates.append(&mut other.estimates);
@@ -34,8 +34,8 @@ impl Guess {
 
 /// The three networks on one GPU.
 pub(crate) trait RunChain: Send {
-    /// What they make of some of the images, `white` being 1. `depth`: (N, 2, 32, 32), see
-    /// [`push_planes`](crate::fusion::push_planes), or nothing where there is no depth.
+    /// The results for some of the images, with `white` scaled to 1. `depth` is (N, 2, 32, 32), see
+    /// [`push_planes`](crate::fusion::push_planes); `None` without depth.
     fn run(
         &self,
         images: &DeviceImages,
@@ -47,7 +47,7 @@ pub(crate) trait RunChain: Send {
 }
 
 impl Device {
-    /// Networks of these weights on this device's GPU; none on the processor.
+    /// The networks with these weights on this device's GPU; `None` on the processor.
     pub(crate) fn chain(
         &self,
         fsrcnn: &Weights,

@@ -1,5 +1,6 @@
-//! The GAN: a generator against a judge of patches (pix2pix; Isola et al., CVPR 2017), least squares in place of
-//! logarithms (Mao et al., ICCV 2017).
+//! The GAN: a generator against a discriminator of patches (pix2pix; Isola et al., CVPR 2017), with
+//! least squares instead of logarithms (Mao et al., ICCV 2017). The code calls the discriminator
+//! the judge.
 
 use super::examples::Batch;
 use super::initial::seeded;
@@ -14,12 +15,12 @@ use crate::weights::Weights;
 use burn::module::{AutodiffModule, Module};
 use burn::tensor::backend::AutodiffBackend;
 
-/// Weight of the absolute error beside the judge's opinion (pix2pix).
+/// Weight of the absolute error relative to the judge's loss (pix2pix).
 const ABSOLUTE: f64 = 100.0;
-/// The judge learns more slowly than the generator, or it wins at once.
+/// The judge's learning rate relative to the generator's. A faster judge would win at once.
 const JUDGE_RATE: f64 = 0.5;
 
-/// Generator and judge, each with its optimiser, and the average of the generator.
+/// Generator and judge, each with its optimiser, and the running average of the generator.
 pub(super) struct Adversarial<B: AutodiffBackend> {
     generator: Trained<B, UNet<B>>,
     judge: Trained<B, Discriminator<B>>,
@@ -49,7 +50,7 @@ impl<B: AutodiffBackend> Learner for Adversarial<B> {
         let degraded = scenes::<B>(&batch.degraded, &self.device);
         let made = generated(&self.generator.network, batch, &self.device);
 
-        // The judge: 1 for what is sharp, 0 for what was made.
+        // The judge learns to give 1 for sharp images and 0 for generated ones.
         let judge = &self.judge.network;
         let real = judge.forward(degraded.clone(), truth.clone());
         let false_one = judge.forward(degraded.clone(), made.clone().detach());
@@ -62,7 +63,7 @@ impl<B: AutodiffBackend> Learner for Adversarial<B> {
         let network = self.generator.network.valid();
         self.average =
             averaged::<B::InnerBackend, _>(self.average.clone(), &network, decay(self.decay, step));
-        // Either of them that is lost loses the run.
+        // If either loss is not finite, the run ends.
         Ok(if judged.is_finite() { loss } else { judged })
     }
 

@@ -1,23 +1,25 @@
-//! Everything that a run is, as bytes: a line of JSON, then the states of networks and optimisers.
+//! A checkpoint: a whole run as bytes. A line of JSON comes first, then the states of networks and
+//! optimisers.
 //!
 //! # Invariant
-//! Bytes that are not whole, or of another run, are refused with what is wrong, never half read
-//! (`bytes_cut_short_anywhere_are_refused`).
+//! Incomplete bytes, or bytes of another run, are refused with the reason, and never partly read
+//! (`tests::bytes_cut_short_anywhere_are_refused`,
+//! `tests::a_run_of_other_settings_or_data_is_not_gone_on_with`).
 
 use super::TrainError;
 use super::log::Progress;
 use serde::{Deserialize, Serialize};
 
-/// What a checkpoint starts with; the digit is the format's version.
+/// First bytes of a checkpoint; the digit is the format's version.
 const MAGIC: &[u8; 8] = b"NIRSPIT1";
 const EXPECTED: &str = "a whole checkpoint of nirspi train";
 
 /// A run at one step.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Checkpoint {
-    /// How far it is.
+    /// The run's progress.
     pub progress: Progress,
-    /// States of networks and optimisers, as the learner gave them.
+    /// States of networks and optimisers, from the learner.
     pub states: Vec<Vec<u8>>,
 }
 
@@ -31,7 +33,7 @@ impl Checkpoint {
     /// The bytes of a file.
     ///
     /// # Errors
-    /// [`TrainError::Checkpoint`] if a number in it cannot be written as JSON.
+    /// [`TrainError::Checkpoint`] if a number cannot be written as JSON.
     pub fn to_bytes(&self) -> Result<Vec<u8>, TrainError> {
         let lengths = self.states.iter().map(Vec::len).collect();
         let header = Header { progress: self.progress.clone(), lengths };
@@ -43,10 +45,10 @@ impl Checkpoint {
         Ok(bytes)
     }
 
-    /// Reads them back.
+    /// Reads a checkpoint.
     ///
     /// # Errors
-    /// [`TrainError::Checkpoint`] if they are not whole, or no checkpoint.
+    /// [`TrainError::Checkpoint`] if the bytes are incomplete or not a checkpoint.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, TrainError> {
         let short = || damaged(format!("{} bytes", bytes.len()));
         let rest = bytes.strip_prefix(MAGIC).ok_or_else(|| damaged("other contents".to_owned()))?;

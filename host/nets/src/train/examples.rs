@@ -1,6 +1,8 @@
-//! Batches to learn from and to judge by.
+//! Batches for training and for judging.
 //!
-//! The one law: example k of a run is the same whenever and on whatever it is made.
+//! # Invariant
+//! Example k of a run is the same in every batch and on every machine
+//! (`tests::examples_are_the_same_in_whatever_batches_they_come`).
 
 use super::TrainError;
 use super::tensors::images;
@@ -16,20 +18,20 @@ use rand::RngExt;
 use rand_distr::StandardNormal;
 use rayon::prelude::*;
 
-/// Pixels of a reading.
+/// Number of pixels of a reading.
 pub(super) const READING_AREA: usize = READING_PX * READING_PX;
 
-/// Turns readings of 32 x 32 into images of 64 x 64, as they come before the deblurrer.
+/// Enlarges readings of 32 x 32 to images of 64 x 64, the deblurrer's input.
 pub trait Enlarge: Sync {
-    /// `readings` holds n images of 32 x 32, one after another; `depth` one map, or none, for each. Returns n images of
-    /// 64 x 64 in `[0, 1]`.
+    /// `readings` has n images of 32 x 32, one after another; `depth` has one map, or `None`, for
+    /// each. Returns n images of 64 x 64 in `[0, 1]`.
     ///
     /// # Errors
-    /// [`TrainError`] if the readings are no such images.
+    /// [`TrainError`] if the readings are not such images.
     fn enlarge(&self, readings: &[f32], depth: &[Option<Depth>]) -> Result<Vec<f32>, TrainError>;
 }
 
-/// By Lanczos, without learning.
+/// Enlarges by Lanczos interpolation, without learning.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Lanczos;
 
@@ -45,16 +47,16 @@ impl Enlarge for Lanczos {
     }
 }
 
-/// By a trained FSRCNN, as in use.
+/// Enlarges by a trained FSRCNN, as in use.
 pub struct Fused {
     network: Fsrcnn<Flex>,
 }
 
 impl Fused {
-    /// The network of these weights, on the CPU.
+    /// The network with these weights, on the CPU.
     ///
     /// # Errors
-    /// [`TrainError::Weights`] if they are of another network.
+    /// [`TrainError::Weights`] if the weights belong to another network.
     pub fn new(weights: &Weights) -> Result<Self, TrainError> {
         weights.expect_model("fsrcnn")?;
         let network = FsrcnnConfig::of(weights)?.init(&FlexDevice);
@@ -70,28 +72,29 @@ impl Enlarge for Fused {
     }
 }
 
-/// Some examples, image after image.
+/// A batch of examples, image after image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Batch {
-    /// How many.
+    /// Number of examples.
     pub count: usize,
     /// Sharp scenes, 64 x 64 each.
     pub truth: Vec<f32>,
-    /// As light showed them, 64 x 64.
+    /// Scenes after the optics, 64 x 64.
     pub optical: Vec<f32>,
-    /// As the camera read them, 32 x 32.
+    /// Readings of the camera, 32 x 32.
     pub readings: Vec<f32>,
-    /// Depth beside them.
+    /// Depth of each example.
     pub depth: Vec<Option<Depth>>,
-    /// What the deblurrer is given, 64 x 64: enlarged readings or, for `fine` ones, images of that size from the start.
+    /// The deblurrer's input, 64 x 64: enlarged readings or, for `fine` examples, images that have
+    /// this size from the start.
     pub degraded: Vec<f32>,
-    /// Whether it is one of those.
+    /// Whether the example is `fine`.
     pub fine: Vec<bool>,
     /// Blur in pixels of the 64 x 64 grid.
     pub sigma_px: Vec<f32>,
-    /// Noise of the reading.
+    /// Noise of the readings.
     pub noise_std: Vec<f32>,
-    /// Class, where there is one.
+    /// Class, if it is known.
     pub label: Vec<Option<u8>>,
 }
 
@@ -102,8 +105,8 @@ impl Batch {
         fusion_input(&self.readings, &self.depth)
     }
 
-    /// What was read, on the 64 x 64 grid, with nothing done to it: each pixel of a reading four times, `fine` images as
-    /// they are. The deblurrer sees it beside the image that it works on.
+    /// The readings on the 64 x 64 grid: each pixel of a reading is repeated four times; `fine`
+    /// images stay as they are. The deblurrer gets these beside the image that it works on.
     #[must_use]
     pub fn raw(&self) -> Vec<f32> {
         let mut raw = self.degraded.clone();
@@ -119,8 +122,8 @@ impl Batch {
     }
 }
 
-/// FSRCNN's input for these readings, (count, 3, 32, 32), as [`Fusion`](crate::Fusion) builds it: intensity, depth over
-/// 3 m, validity of the depth.
+/// FSRCNN's input for these readings, (count, 3, 32, 32), built by the functions of
+/// [`Fusion`](crate::Fusion): intensity, depth over 3 m, validity of the depth.
 #[must_use]
 pub fn fusion_input(readings: &[f32], depth: &[Option<Depth>]) -> Vec<f32> {
     let mut input = Vec::with_capacity(3 * readings.len());
@@ -135,22 +138,23 @@ pub fn fusion_input(readings: &[f32], depth: &[Option<Depth>]) -> Vec<f32> {
     input
 }
 
-/// Where examples come from.
+/// The source of examples.
 pub struct Examples<'a> {
     /// Sharp scenes.
     pub scenes: &'a Scenes,
     /// The camera.
     pub degrade: &'a dyn Degrade,
-    /// From 32 x 32 to 64 x 64.
+    /// Enlarges readings from 32 x 32 to 64 x 64.
     pub enlarge: &'a dyn Enlarge,
-    /// Share of the examples whose degraded image is of 64 x 64 from the start: `deblur` takes such ones.
+    /// Share of the examples whose degraded image has 64 x 64 pixels from the start, like the input
+    /// of `deblur`.
     pub fine: f32,
     /// Seed of the run.
     pub seed: u64,
 }
 
 impl Examples<'_> {
-    /// Examples `first` to `first + count` of one side of the split.
+    /// Examples `first` to `first + count` of one part of the split.
     ///
     /// # Errors
     /// [`TrainError`] if a scene cannot be degraded.
@@ -247,7 +251,7 @@ mod tests {
 
     #[test]
     fn training_and_inference_build_the_same_input() {
-        // Near, far, farther than 3 m, and blind zones.
+        // Near, far, farther than 3 m, and zones without depth.
         let metres: [f32; 64] = std::array::from_fn(|zone| 0.07 * (zone + 1) as f32);
         let valid: [bool; 64] = std::array::from_fn(|zone| zone % 5 != 2);
         let readings: Vec<f32> = (0..2 * READING_AREA).map(|i| (i % 97) as f32 / 96.0).collect();

@@ -1,8 +1,10 @@
-//! First weights that depend on the seed alone: the same on every backend.
+//! Initial weights that depend on the seed alone and are the same on every backend
+//! (`train::tests::the_same_seed_gives_the_same_weights_and_another_seed_others`).
 //!
-//! The one law: a tensor that a network starts at one value (a slope, a layer that starts switched off) stays so; every
-//! other one is drawn as PyTorch does, uniform within 1 / sqrt(fan-in), times the gain of its layer. Backends' own
-//! generators are shared by a whole process, so what one test draws would depend on the others.
+//! A tensor that a network initialises to one value (a slope, a layer that starts switched off)
+//! keeps that value. Every other tensor is drawn as in PyTorch: uniform within 1 / sqrt(fan-in),
+//! times the gain of its layer. The backends' own generators are not used, because a whole process
+//! shares them, so one test's numbers would depend on other tests.
 
 use crate::data::{Purpose, stream};
 use crate::model::{fill, weights_of};
@@ -11,10 +13,10 @@ use burn::module::Module;
 use burn::tensor::backend::Backend;
 use rand::RngExt;
 
-/// Gains of the layers whose path ends like this; 1 for all others.
+/// Gains of the layers whose path ends with this name; other layers have gain 1.
 pub(super) type Gains = [(&'static str, f32)];
 
-/// `network` with its first weights of `seed`.
+/// `network` with its initial weights for `seed`.
 pub(super) fn seeded<B: Backend, M: Module<B>>(
     network: M,
     gains: &Gains,
@@ -32,7 +34,7 @@ pub(super) fn seeded<B: Backend, M: Module<B>>(
             let layer = name.rsplit_once('.').map_or(name.as_str(), |(layer, _)| layer);
             let gain =
                 gains.iter().find(|(end, _)| layer.ends_with(end)).map_or(1.0, |(_, gain)| *gain);
-            // A bias has the fan-in of its weights.
+            // A bias has the fan-in of its layer's weights.
             let shape = drawn.get(&format!("{layer}.weight")).map_or(&array.shape, |w| &w.shape);
             let fan_in: usize = shape[1..].iter().product();
             let bound = gain / (fan_in.max(1) as f32).sqrt();

@@ -9,7 +9,7 @@ use crate::device::{Device, Kind};
 use burn::backend::{Autodiff, Flex};
 use burn::tensor::backend::AutodiffBackend;
 
-/// The learner of a model on a device, with its first weights.
+/// The learner of a model on a device, with its initial weights.
 pub(super) fn new(settings: &Settings, device: &Device) -> Result<Box<dyn Learner>, TrainError> {
     match &device.kind {
         Kind::Cpu => on::<Autodiff<Flex>>(settings, Default::default()),
@@ -17,7 +17,7 @@ pub(super) fn new(settings: &Settings, device: &Device) -> Result<Box<dyn Learne
         Kind::Wgpu(device) => on::<Autodiff<burn::backend::Wgpu>>(settings, device.clone()),
         #[cfg(all(feature = "gpu", not(test)))]
         Kind::Cuda(device) => on::<Autodiff<burn::backend::Cuda>>(settings, device.clone()),
-        // Training on GPUs takes minutes to compile, and unit tests train on the CPU.
+        // Training on GPUs takes minutes to compile, so unit tests train on the CPU.
         #[cfg(all(feature = "gpu", test))]
         Kind::Wgpu(_) | Kind::Cuda(_) => Err(TrainError::Setting {
             name: "device",

@@ -1,4 +1,4 @@
-//! How far a run is: its log, its best score, its losses since the last entry.
+//! The progress of a run: its log, its best score, its losses since the last entry.
 
 use super::{Score, Settings, TrainError};
 use serde::{Deserialize, Serialize};
@@ -6,13 +6,13 @@ use serde::{Deserialize, Serialize};
 /// One line of the log.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Entry {
-    /// Steps done.
+    /// Number of steps done.
     pub step: u64,
     /// Mean loss since the entry before.
     pub loss: f64,
-    /// Score of held-out examples, where they were looked at: more is better.
+    /// Score of held-out examples, if they were judged at this step; larger is better.
     pub held_out: Option<f64>,
-    /// What the score is.
+    /// The kind of score.
     pub score: Score,
     /// Learning rate.
     pub rate: f64,
@@ -20,20 +20,20 @@ pub struct Entry {
     pub seconds: f64,
 }
 
-/// How far a run is, and what led there.
+/// The progress and the history of a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Progress {
-    /// How it is trained.
+    /// Settings of the run.
     pub settings: Settings,
-    /// What it is trained on: a text that differs for other data.
+    /// Description of the training data, which differs for other data.
     pub data: String,
-    /// Steps done.
+    /// Number of steps done.
     pub step: u64,
     /// Best held-out score so far, and its step.
     pub best: Option<(f64, u64)>,
-    /// Looks at held-out examples since then.
+    /// Number of judgements of held-out examples since the best score.
     pub looks_since_best: u64,
-    /// Losses since the last entry of the log: their sum and number.
+    /// Losses since the last entry of the log: sum and number.
     #[serde(with = "exact")]
     pub losses: (f64, u64),
     /// Seconds of training so far.
@@ -42,7 +42,7 @@ pub struct Progress {
     pub log: Vec<Entry>,
 }
 
-/// A sum by its bits: JSON readers may be off by the last one.
+/// Stores a sum by its bits, because a JSON reader may change its last bit.
 mod exact {
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -57,11 +57,11 @@ mod exact {
 }
 
 impl Progress {
-    /// Whether a run with these settings on this data may go on from here. A run may become longer or shorter, and
-    /// may go on with another rate: that is for its user to say.
+    /// Checks that a run with these settings on this data may continue from here. The user may
+    /// change the number of steps and the learning rate.
     ///
     /// # Errors
-    /// [`TrainError::Checkpoint`] naming what differs.
+    /// [`TrainError::Checkpoint`] names the difference.
     pub fn expect(&self, settings: &Settings, data: &str) -> Result<(), TrainError> {
         let theirs = &self.settings;
         let alike = Settings { steps: theirs.steps, rate: theirs.rate, ..settings.clone() };

@@ -1,20 +1,21 @@
 //! Training: examples, losses, one loop for every network.
 //!
 //! # Invariant
-//! A run is a function of its settings, its data and its number of steps. Whatever is random in step k is
-//! drawn from the seed and k, so a run that was killed goes on from its checkpoint to the same weights as one that was
-//! not (`a_run_that_was_stopped_goes_on_to_the_very_same_weights`). The caller keeps the files ([`Keeper`]).
+//! A run depends only on its settings, its data and its number of steps. Random numbers of step k
+//! come from the seed and k, so a killed run continues from its checkpoint to the same weights as
+//! an uninterrupted run (`tests::a_run_that_was_stopped_goes_on_to_the_very_same_weights`). The
+//! caller stores the files ([`Keeper`]).
 //!
-//! | module | holds |
+//! | module | contents |
 //! |---|---|
 //! | [`examples`] | batches: scenes, degraded and enlarged |
-//! | `tasks` | what each network is to learn, and its held-out score |
+//! | `tasks` | the loss and the held-out score of each network |
 //! | `trained` | a network with its optimiser and its running average |
-//! | `solo`, `adversarial` | what learns from examples alone, and against a judge |
+//! | `solo`, `adversarial` | learning from examples alone, and against a discriminator |
 //! | `learner` | the learner of each model |
-//! | `training_loop` | rate, log, held-out score, checkpoints, early stop |
-//! | `log` | how far a run is |
-//! | [`checkpoint`] | everything that a run is, as bytes |
+//! | `training_loop` | learning rate, log, held-out score, checkpoints, early stop |
+//! | `log` | the progress of a run |
+//! | [`checkpoint`] | a whole run as bytes |
 
 mod adversarial;
 pub mod checkpoint;
@@ -45,7 +46,7 @@ use thiserror::Error;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Model {
-    /// 32 x 32 and depth to 64 x 64.
+    /// FSRCNN: from 32 x 32 and depth to 64 x 64.
     Fsrcnn,
     /// The deblurrer: a bridge from the degraded image, in 1 to 4 steps.
     Diffusion,
@@ -53,9 +54,9 @@ pub enum Model {
     Ancestral,
     /// The generator of a conditional GAN.
     Gan,
-    /// Blur and noise of an image.
+    /// The estimator of blur and noise.
     Estimator,
-    /// The 62 characters.
+    /// The classifier of the 62 characters.
     Classifier,
 }
 
@@ -72,15 +73,15 @@ impl fmt::Display for Model {
     }
 }
 
-/// What held-out examples are judged by; more is better.
+/// The score of held-out examples; larger is better.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Score {
     /// Peak signal-to-noise ratio of images, in dB.
     PsnrDb,
-    /// The same of the two numbers that the estimator gives.
+    /// The same ratio for the two outputs of the estimator.
     EstimateDb,
-    /// Characters named rightly, in percent.
+    /// Share of correctly named characters, in percent.
     AccuracyPercent,
 }
 
@@ -96,7 +97,7 @@ impl Score {
 }
 
 impl Model {
-    /// What it is judged by.
+    /// The kind of score of this model.
     #[must_use]
     pub fn score(self) -> Score {
         match self {
@@ -107,35 +108,37 @@ impl Model {
     }
 }
 
-/// How to train. Everything that the result depends on but the data; kept in checkpoints.
+/// Settings of a training run. The result depends on these and the data; checkpoints store them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
-    /// Which network.
+    /// The network.
     pub model: Model,
-    /// Channels of its levels; empty for the shipped size.
+    /// Number of channels of each level; empty for the shipped size.
     pub width: Vec<usize>,
-    /// Steps in all.
+    /// Number of steps.
     pub steps: u64,
-    /// Examples a step.
+    /// Number of examples in a step.
     pub batch: usize,
-    /// Highest learning rate; it rises over the first steps and falls along a cosine.
+    /// Highest learning rate. The rate rises over the first steps and falls along a cosine.
     pub rate: f64,
-    /// Seed of weights, examples and whatever else is random.
+    /// Seed of weights, examples and all other random numbers.
     pub seed: u64,
-    /// How slowly the average of the weights follows them, 0 to 1: it is the average that is judged and kept.
+    /// How slowly the running average follows the weights, 0 to 1. The average is judged and kept.
     pub average: f64,
-    /// Steps between two entries of the log.
+    /// Number of steps between two entries of the log.
     pub log_every: u64,
-    /// Steps between two looks at held-out examples, and at most between two checkpoints.
+    /// Number of steps between two judgements of held-out examples, and at most between two
+    /// checkpoints.
     pub judge_every: u64,
-    /// Held-out examples looked at.
+    /// Number of held-out examples to judge.
     pub held_out: usize,
-    /// Looks without a better score after which training ends; none to go on to the last step.
+    /// Number of judgements without a better score after which training ends; `None`: train to the
+    /// last step.
     pub patience: Option<u64>,
 }
 
 impl Settings {
-    /// The size of the shipped network of this name, and what it would be trained with here.
+    /// Settings for the shipped size of this network.
     #[must_use]
     pub fn new(model: Model) -> Self {
         let (steps, rate) = match model {
@@ -195,48 +198,48 @@ impl Settings {
     }
 }
 
-/// Why a run ended badly. `Display` is one line.
+/// Why a run failed. `Display` is one line.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum TrainError {
     /// A setting is outside its range.
     #[error("{name} is {found}, expected {expected}")]
     Setting {
-        /// Which.
+        /// Name of the setting.
         name: &'static str,
         /// The value found, as text.
         found: String,
-        /// What it may be.
+        /// The accepted range.
         expected: &'static str,
     },
-    /// The loss, or a weight, is no number any more.
+    /// The loss or a weight is not finite.
     #[error(
         "the loss is {loss} at step {step}; what was kept last is good: go on from it with --resume and a lower --rate"
     )]
     NotFinite {
-        /// Step at which it was seen.
+        /// The step.
         step: u64,
         /// The loss.
         loss: f64,
     },
-    /// Nothing to train on, or not what the network needs.
+    /// There are no data, or not the data that the network needs.
     #[error(transparent)]
     Data(#[from] DataError),
     /// A scene could not be degraded.
     #[error(transparent)]
     Degrade(#[from] DegradeError),
-    /// Weights that do not fit.
+    /// The weights do not fit.
     #[error(transparent)]
     Weights(#[from] WeightsError),
-    /// A checkpoint that cannot be gone on from.
+    /// The run cannot continue from this checkpoint.
     #[error("checkpoint: {found}, expected {expected}")]
     Checkpoint {
-        /// What is wrong with it.
+        /// What is wrong with the checkpoint.
         found: String,
-        /// What it should be.
+        /// What was expected.
         expected: &'static str,
     },
-    /// The caller could not keep what it was given.
+    /// The caller could not store a result.
     #[error(transparent)]
     Keep(#[from] Box<dyn std::error::Error + Send + Sync>),
 }

@@ -1,4 +1,4 @@
-//! What each network is to learn, and how well it does on examples that it never saw.
+//! The task of each network: its loss, and its score on held-out examples.
 
 use super::Settings;
 use super::examples::{Batch, READING_AREA};
@@ -21,18 +21,19 @@ use rand::RngExt;
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 
-/// Share of the bridge's examples at its start, the degraded image: one step from there is the common case.
+/// Share of the bridge's examples at the start of the path, the degraded image, because one step
+/// from there is the usual case.
 const AT_START: f32 = 0.6;
-/// Root of the squared error below which Charbonnier's loss is no longer that of absolute values.
+/// Size of the error below which Charbonnier's loss differs from the absolute value.
 const CHARBONNIER: f64 = 1e-3;
-/// Gains of the UNet's layers: blocks start near the identity, the output near nothing.
+/// Gains of the UNet's layers: blocks start near the identity, the output near zero.
 pub(super) const UNET_GAINS: &Gains = &[("conv2", 0.3), ("output_conv", 0.1)];
 
-/// What a network learns.
+/// A task for a network.
 pub(super) trait Task<B: AutodiffBackend>: Sized + 'static {
     /// The network.
     type Network: AutodiffModule<B>;
-    /// Gains of its first weights.
+    /// Gains of the initial weights.
     const GAINS: &'static Gains;
 
     fn new(settings: &Settings) -> Self;
@@ -56,7 +57,7 @@ pub(super) trait Task<B: AutodiffBackend>: Sized + 'static {
         device: &B::Device,
     ) -> f64;
 
-    /// What whoever uses the weights must know beside them.
+    /// Adds to the metadata what users of the weights need.
     fn describe(&self, _weights: &mut Weights) {}
 }
 
@@ -70,11 +71,12 @@ pub(super) fn psnr_db<B: Backend>(image: Tensor<B, 4>, truth: Tensor<B, 4>) -> f
     let [count, ..] = truth.dims();
     let squared = (image.clamp(0.0, 1.0) - truth).square().reshape([count, AREA_PX]).mean_dim(1);
     let errors: Vec<f64> = squared.into_data().convert::<f64>().iter::<f64>().collect();
-    // A thousandth of a grey level of 8 bit is as good as it gets: no image is worth more than any other number.
+    // The error is bounded at a thousandth of an 8-bit grey level, so that no image's PSNR is
+    // infinite.
     errors.into_iter().map(|error| -10.0 * error.max(1e-11).log10()).sum()
 }
 
-/// Conditions of the UNet: two numbers of the path, then blur and noise.
+/// The UNet's conditions: two numbers of the path, then blur and noise.
 fn conditions(batch: &Batch, path: impl Fn(usize) -> [f32; 2]) -> Vec<[f32; CONDITIONS]> {
     let known = |at: usize| Estimate { sigma_px: batch.sigma_px[at], noise: batch.noise_std[at] };
     (0..batch.count).map(|at| known(at).conditions(path(at))).collect()
@@ -94,7 +96,7 @@ pub(super) fn unet(settings: &Settings) -> UNetConfig {
     }
 }
 
-/// FSRCNN: what light showed, from readings and depth.
+/// FSRCNN's task: the scene after the optics, from readings and depth.
 pub(super) struct Fuse(FsrcnnConfig);
 
 impl<B: AutodiffBackend> Task<B> for Fuse {
@@ -130,7 +132,8 @@ impl<B: AutodiffBackend> Task<B> for Fuse {
     }
 }
 
-/// The deblurrer on its bridge x_t = (1 - t) x0 + t y (InDI; Delbracio and Milanfar, TMLR 2023).
+/// The deblurrer's task on its bridge x_t = (1 - t) x0 + t y (InDI; Delbracio and Milanfar, TMLR
+/// 2023).
 pub(super) struct Bridge(UNetConfig);
 
 impl<B: AutodiffBackend> Task<B> for Bridge {
@@ -179,19 +182,19 @@ pub(super) fn generated<B: Backend>(
     y.clone() + network.forward(y, scenes(&batch.raw(), device), told)
 }
 
-/// Sum of its PSNR, in dB.
+/// Sum of the PSNR of that image, in dB.
 pub(super) fn one_step<B: Backend>(network: &UNet<B>, batch: &Batch, device: &B::Device) -> f64 {
     psnr_db(generated(network, batch, device), scenes(&batch.truth, device))
 }
 
-/// The paper's diffusion: 500 steps, the network tells the noise (Eq. 8).
+/// The task of the paper's diffusion: 500 steps, the network estimates the noise (Eq. 8).
 pub(super) struct Ancestral {
     config: UNetConfig,
     schedule: Schedule,
 }
 
 impl Ancestral {
-    /// x_t and the noise in it, at one step for each example; images are 2 x - 1 here.
+    /// x_t and its noise, at one step for each example; images are 2 x - 1 here.
     fn noised(&self, batch: &Batch, steps: &[usize], rng: &mut Pcg64Mcg) -> (Vec<f32>, Vec<f32>) {
         let noise: Vec<f32> =
             batch.truth.iter().map(|_| rng.sample::<f32, _>(StandardNormal)).collect();
@@ -252,7 +255,8 @@ impl<B: AutodiffBackend> Task<B> for Ancestral {
         (told - scenes(&noise, device)).square().mean()
     }
 
-    /// The image that the network sees half way, in one step: 500 would take minutes.
+    /// The network's estimate of the image half way along the path, in one step, because 500 steps
+    /// would take minutes.
     fn score(&self, network: &UNet<B::InnerBackend>, batch: &Batch, device: &B::Device) -> f64 {
         let half_way = self.schedule.steps() / 2;
         let steps = vec![half_way; batch.count];
@@ -270,12 +274,12 @@ impl<B: AutodiffBackend> Task<B> for Ancestral {
     }
 }
 
-/// Blur and noise of readings and of images of 64 x 64.
+/// The estimator's task: blur and noise of readings and of images of 64 x 64.
 pub(super) struct Measure(EstimatorConfig);
 
 impl Measure {
-    /// What an estimator says of the readings, and of the degraded images that were of 64 x 64 from the start; and
-    /// what it should: blur in pixels of the grid at hand.
+    /// The estimator's outputs for the readings and for the `fine` degraded images, and the
+    /// expected outputs: blur in pixels of the image's own grid.
     fn outputs<B: Backend>(
         network: &Estimator<B>,
         batch: &Batch,
@@ -345,7 +349,7 @@ impl<B: AutodiffBackend> Task<B> for Measure {
     }
 }
 
-/// The class of a character that is nearly sharp.
+/// The classifier's task: the class of a nearly sharp character.
 pub(super) struct Classify(ClassifierConfig);
 
 impl<B: AutodiffBackend> Task<B> for Classify {
@@ -364,7 +368,7 @@ impl<B: AutodiffBackend> Task<B> for Classify {
         self.0.init(device)
     }
 
-    /// Cross-entropy. Labels were seen to be there before the run began.
+    /// Cross-entropy. The run has checked before that labels exist.
     fn loss(
         &self,
         network: &Classifier<B>,

@@ -21,13 +21,13 @@ pub(super) fn scenes<B: Backend>(values: &[f32], device: &B::Device) -> Tensor<B
     images(values, 1, SIDE_PX, device)
 }
 
-/// The UNet's conditions, one row an image.
+/// The UNet's conditions, one row for each image.
 pub(super) fn columns<B: Backend>(rows: &[[f32; CONDITIONS]], device: &B::Device) -> Tensor<B, 2> {
     let values: Vec<f32> = rows.as_flattened().to_vec();
     Tensor::from_data(TensorData::new(values, [rows.len(), CONDITIONS]), device)
 }
 
-/// One number an image, to be multiplied with images.
+/// One number for each image, shaped for multiplication with images.
 pub(super) fn each<B: Backend>(values: &[f32], device: &B::Device) -> Tensor<B, 4> {
     Tensor::from_data(TensorData::new(values.to_vec(), [values.len(), 1, 1, 1]), device)
 }

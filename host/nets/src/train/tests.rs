@@ -1,4 +1,4 @@
-//! Short runs of tiny networks on procedural scenes: they learn, repeat, go on and stop as promised.
+//! Short runs of tiny networks on procedural scenes: they learn, repeat, continue and stop.
 
 use super::checkpoint::Checkpoint;
 use super::*;
@@ -11,7 +11,7 @@ use rand_pcg::Pcg64Mcg;
 
 type Kept = Result<(), Box<dyn std::error::Error + Send + Sync>>;
 
-/// Keeps everything in memory, and may want no more after a step.
+/// A keeper that stores everything in memory, and can stop the run after a step.
 #[derive(Default)]
 struct Memory {
     entries: Vec<Entry>,
@@ -27,7 +27,7 @@ impl Keeper for Memory {
     }
 
     fn checkpoint(&mut self, checkpoint: &Checkpoint) -> Kept {
-        // Through its bytes, as a file would be.
+        // The checkpoint passes through its bytes, as through a file.
         self.checkpoint = Some(Checkpoint::from_bytes(&checkpoint.to_bytes()?)?);
         Ok(())
     }
@@ -79,7 +79,7 @@ fn run(
     train(settings, &examples, "procedural", resumed, &Device::cpu(), keeper)
 }
 
-/// Ten pages with a small square or a large one: two classes that one sees at a glance.
+/// Ten pages with a small square or a large one: two classes that are easy to distinguish.
 fn squares() -> Scenes {
     let page = |number: usize| -> Vec<u8> {
         let half = if number.is_multiple_of(2) { 4 } else { 20 } + number / 4;
@@ -107,7 +107,7 @@ fn every_network_learns_in_a_short_run() {
             kept.entries.iter().filter(|e| e.held_out.is_some()).count() as u64,
             settings.steps / 20
         );
-        // What was kept is a file that says what it is.
+        // The stored weights are a file with metadata.
         let bytes = kept.best.unwrap().to_bytes(Precision::Half).unwrap();
         let weights = Weights::parse("best", &bytes).unwrap();
         weights.expect_model(&model.to_string()).unwrap();
@@ -164,7 +164,7 @@ fn the_same_seed_gives_the_same_weights_and_another_seed_others() {
     assert_ne!(weights(1), weights(2));
 }
 
-/// A camera that breaks after some pictures: what comes then is no number.
+/// A camera that breaks after some pictures, and then gives NaN.
 struct Breaking(std::sync::atomic::AtomicUsize);
 
 impl Degrade for Breaking {

@@ -1,4 +1,5 @@
-//! A network in training as the loop sees it, and what all learners share: optimiser, running average, states as bytes.
+//! The training loop's interface to a network, and what all learners share: optimiser, running
+//! average, states as bytes.
 
 use super::TrainError;
 use super::examples::Batch;
@@ -13,15 +14,15 @@ use std::collections::HashMap;
 
 /// A network with its optimiser and the running average of its weights.
 pub(super) trait Learner {
-    /// Learns from a batch; the loss.
+    /// Learns from a batch; returns the loss.
     fn step(&mut self, batch: &Batch, step: u64, rate: f64) -> Result<f64, TrainError>;
-    /// Sum of the scores of these examples, by the averaged weights.
+    /// Sum of the scores of these examples, with the averaged weights.
     fn judge(&self, batch: &Batch) -> f64;
     /// The averaged weights.
     fn weights(&self) -> Weights;
-    /// All that it is, `step` steps into its run.
+    /// The learner's whole state after `step` steps.
     fn states(&self, step: u64) -> Result<Vec<Vec<u8>>, TrainError>;
-    /// Becomes what `states` were taken of.
+    /// Restores a state from `states`.
     fn restore(&mut self, states: &[Vec<u8>]) -> Result<(), TrainError>;
 }
 
@@ -38,7 +39,7 @@ impl<B: AutodiffBackend, M: AutodiffModule<B>> Trained<B, M> {
         Self { network, optimiser, device }
     }
 
-    /// Goes down the gradient of `loss`, and says how large that was.
+    /// Takes a step down the gradient of `loss`; returns the loss.
     pub(super) fn descend(&mut self, loss: &Tensor<B, 1>, rate: f64) -> f64 {
         let gradients = GradientsParams::from_grads(loss.backward(), &self.network);
         self.network = self.optimiser.step(rate, self.network.clone(), gradients);
@@ -95,12 +96,13 @@ pub(super) fn expect_states<const N: usize>(
     })
 }
 
-/// How slowly the average follows at a step: fast at first, when the first weights are still in it.
+/// Factor of the running average at a step: small at first, so that the initial weights lose their
+/// share quickly.
 pub(super) fn decay(slowest: f64, step: u64) -> f64 {
     slowest.min((1.0 + step as f64) / (10.0 + step as f64))
 }
 
-/// A checkpoint with a weight that is no number would be worth less than none.
+/// Checks the weights before a checkpoint, because a checkpoint with a NaN would be useless.
 pub(super) fn expect_finite(weights: &Weights, step: u64) -> Result<(), TrainError> {
     for name in weights.names() {
         if let Some(loss) = weights.get(name)?.values.iter().find(|v| !v.is_finite()) {

@@ -1,4 +1,4 @@
-//! The loop that every network is trained by.
+//! The training loop of every network.
 
 use super::checkpoint::Checkpoint;
 use super::examples::{Batch, Examples};
@@ -13,36 +13,36 @@ use serde::Serialize;
 use std::sync::mpsc::sync_channel;
 use std::time::Instant;
 
-/// Steps over which the rate rises, at most.
+/// Largest number of steps over which the learning rate rises.
 const WARM_UP: u64 = 200;
-/// Part of the highest rate that is left at the end.
+/// Last learning rate, relative to the highest.
 const LAST_RATE: f64 = 0.01;
-/// Batches made ahead of the step that wants them.
+/// Number of batches prepared in advance.
 const AHEAD: usize = 3;
-/// Examples judged at once.
+/// Number of examples judged at once.
 const JUDGED_AT_ONCE: usize = 32;
 
-/// Who keeps what a run makes. An error ends the run.
+/// Stores the results of a run. An error ends the run.
 pub trait Keeper {
-    /// A line of the log.
+    /// Stores a line of the log.
     ///
     /// # Errors
-    /// If it cannot be kept.
+    /// If the line cannot be stored.
     fn entry(&mut self, entry: &Entry) -> Result<(), Box<dyn std::error::Error + Send + Sync>>;
-    /// The run as it is: to be kept in place of the one before.
+    /// Stores the whole run, in place of the checkpoint before.
     ///
     /// # Errors
-    /// If it cannot be kept.
+    /// If the checkpoint cannot be stored.
     fn checkpoint(
         &mut self,
         checkpoint: &Checkpoint,
     ) -> Result<(), Box<dyn std::error::Error + Send + Sync>>;
-    /// The averaged weights with the best score so far.
+    /// Stores the averaged weights with the best score so far.
     ///
     /// # Errors
-    /// If they cannot be kept.
+    /// If the weights cannot be stored.
     fn best(&mut self, weights: &Weights) -> Result<(), Box<dyn std::error::Error + Send + Sync>>;
-    /// A step was done. Whether to go on: `false` keeps a checkpoint and ends.
+    /// Called after each step. `false` stores a checkpoint and ends the run.
     fn stepped(&mut self, step: u64, loss: f64) -> bool;
 }
 
@@ -52,35 +52,36 @@ pub trait Keeper {
 pub enum Ended {
     /// All steps are done.
     Complete,
-    /// The score got no better for as long as the settings have patience.
+    /// The score did not improve for as many judgements as the settings allow.
     NoLongerBetter,
-    /// Its keeper wanted no more.
+    /// The keeper stopped the run.
     Stopped,
 }
 
-/// What became of a run.
+/// The result of a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Outcome {
-    /// Why it ended.
+    /// Why the run ended.
     pub ended: Ended,
-    /// Steps done.
+    /// Number of steps done.
     pub step: u64,
     /// Best held-out score, and its step.
     pub best: Option<(f64, u64)>,
-    /// What the score is.
+    /// The kind of score.
     pub score: Score,
     /// Seconds of training, of all parts of the run.
     pub seconds: f64,
-    /// Steps a second in this part of it.
+    /// Steps per second in this part of the run.
     pub steps_per_second: f64,
-    /// What it ran on.
+    /// The device.
     pub device: String,
 }
 
 /// Trains a network, from the start or from a checkpoint.
 ///
 /// # Errors
-/// [`TrainError`]: settings, data, a loss that is no number, a checkpoint that does not fit, or what the keeper says.
+/// [`TrainError`] for wrong settings or data, a loss that is not finite, a checkpoint that does not
+/// fit, or an error of the keeper.
 pub fn train(
     settings: &Settings,
     examples: &Examples<'_>,
@@ -112,7 +113,7 @@ pub fn train(
     let (first, begun) = (progress.step, Instant::now());
     let before_s = progress.seconds;
 
-    // Batches are made while the network learns from the ones before.
+    // One thread prepares batches while the network learns from earlier ones.
     let ended = std::thread::scope(|scope| {
         let (sender, batches) = sync_channel(AHEAD);
         scope.spawn(move || {
@@ -146,10 +147,10 @@ pub fn train(
     })
 }
 
-/// Whether a run can begin: so that nothing need be made for one that cannot.
+/// Checks that a run can begin, before anything is prepared for it.
 ///
 /// # Errors
-/// [`TrainError`] naming the setting, or what the data lack.
+/// [`TrainError`] names the setting, or what the data lack.
 pub fn check(settings: &Settings, examples: &Examples<'_>) -> Result<(), TrainError> {
     settings.validate()?;
     if settings.model == Model::Classifier {
@@ -172,7 +173,7 @@ fn judged_batches(settings: &Settings, examples: &Examples<'_>) -> Result<Vec<Ba
         .collect()
 }
 
-/// What one pass of the loop works on.
+/// State of one pass of the loop.
 struct Loop<'r> {
     settings: &'r Settings,
     learner: &'r mut dyn Learner,
@@ -181,7 +182,7 @@ struct Loop<'r> {
 }
 
 impl Loop<'_> {
-    /// One step and what is due after it; why the run ends, if it does.
+    /// Does one step and the work due after it; returns why the run ends, if it does.
     fn step(
         &mut self,
         batch: &Batch,
@@ -231,7 +232,7 @@ impl Loop<'_> {
         Ok(ended)
     }
 
-    /// Looks at held-out examples; weights that are better than all before are kept.
+    /// Judges held-out examples; stores the weights if they are the best so far.
     fn judge(&mut self, progress: &mut Progress) -> Result<f64, TrainError> {
         let sum = self.judged.iter().map(|batch| self.learner.judge(batch)).sum::<f64>();
         let score = rounded(sum / self.settings.held_out as f64);
@@ -273,7 +274,8 @@ fn rate(settings: &Settings, step: u64) -> f64 {
     settings.rate * rising * (LAST_RATE + (1.0 - LAST_RATE) * cosine)
 }
 
-/// To a millionth of itself: what a log shows, and what JSON gives back as it was.
+/// Rounds to six significant digits or so (a millionth of the value), which a log can show and JSON
+/// returns unchanged.
 fn rounded(value: f64) -> f64 {
     format!("{value:.6e}").parse().unwrap_or(value)
 }

@@ -1,10 +1,13 @@
-//! Looks for GPUs.
+//! Finds GPUs.
 //!
 //! # Invariant
-//! [`find`] is the one place that turns a [`Backend`] into a device: a backend asked for by name is found or the error
-//! says what is missing, and [`Backend::Auto`] never gives a software device. Held by
-//! `backend::probe::tests::auto_gives_a_real_gpu_or_says_what_is_missing`. A missing library is an answer, never a panic:
-//! CUDA's libraries are looked for before CubeCL would panic without them.
+//! [`find`] is the only function that turns a [`Backend`] into a device. A backend requested by
+//! name is found, or the error says what is missing
+//! (`tests::a_backend_by_name_is_that_one_or_missing`). [`Backend::Auto`] never gives a software
+//! device (`tests::auto_gives_a_real_gpu_or_says_what_is_missing`).
+//!
+//! A missing library is an error and never a panic: [`cuda`] looks for CUDA's libraries before
+//! CubeCL, which would panic without them.
 
 use super::Backend;
 use cubecl::cuda::{CudaDevice, install::cuda_path};
@@ -14,39 +17,39 @@ use cudarc::driver::{self, CudaContext, DriverError};
 use thiserror::Error;
 use wgpu::DeviceType;
 
-/// A device that is there.
+/// A device that was found.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Found<D> {
-    /// What CubeCL, and burn with it, calls it.
+    /// The device's identifier in CubeCL and burn.
     pub device: D,
-    /// What its driver calls it.
+    /// The device's name in its driver.
     pub name: String,
-    /// Whether the processor plays the GPU: right results, no speed.
+    /// Whether the processor emulates this GPU: right results without the speed of a GPU.
     pub software: bool,
 }
 
-/// What was looked for and not found. `Display` is one line, which leaves it to the caller to name the backend.
+/// What was looked for and not found. `Display` gives one line, which does not name the backend.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum Absent {
-    /// No driver of NVIDIA's.
+    /// NVIDIA's driver is missing.
     #[error("libcuda not found")]
     Driver,
-    /// No compiler for kernels at run time.
+    /// The compiler for kernels at run time is missing.
     #[error("libnvrtc not found, it comes with the CUDA toolkit")]
     Compiler,
-    /// None of the headers that kernels include.
+    /// The headers that kernels include are missing.
     #[error("no toolkit in /usr/local/cuda, CUDA_PATH is not set")]
     Toolkit,
-    /// All libraries, and nothing that they could use.
+    /// All libraries are there, but no GPU that they can use.
     #[error("no GPU")]
     Device,
-    /// The driver says no.
+    /// The driver refused, for this reason.
     #[error("{0}")]
     Refused(String),
-    /// Nothing that draws.
+    /// No graphics adapter.
     #[error("no graphics adapter")]
     Adapter,
-    /// Only what computes no faster than the processor, or is it.
+    /// Only an adapter that computes on the processor, or no faster.
     #[error("only {0}, which is no GPU")]
     NoGpu(String),
 }
@@ -61,19 +64,20 @@ pub enum Gpu {
     Wgpu(Found<WgpuDevice>),
 }
 
-/// The device of a backend is not there. `Display` is one line with all that was looked for.
+/// The device of a backend was not found. `Display` gives one line with everything that was looked
+/// for.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("{}", .looked_for.iter().map(|(kind, absent)| format!("{kind}: {absent}")).collect::<Vec<_>>().join("; "))]
 pub struct Missing {
-    /// CUDA, wgpu or both, with what is missing of each.
+    /// The backends that were tried (CUDA, wgpu or both), each with what is missing.
     pub looked_for: Vec<(&'static str, Absent)>,
 }
 
-/// The device that a backend names; none for the processor. [`Backend::Auto`] means a GPU through CUDA, else a discrete or
-/// integrated one through wgpu; a software device is given to [`Backend::Wgpu`] only.
+/// The device of a backend; `None` for the processor. [`Backend::Auto`] means a GPU through CUDA,
+/// else a discrete or integrated GPU through wgpu. Only [`Backend::Wgpu`] gives a software device.
 ///
 /// # Errors
-/// [`Missing`], which says which backends were looked for and why each is not usable.
+/// [`Missing`] names the backends that were tried, and why each is not usable.
 pub fn find(backend: Backend) -> Result<Option<Gpu>, Missing> {
     let through_cuda = || cuda().map(Gpu::Cuda).map_err(|absent| ("CUDA", absent));
     let through_wgpu =
@@ -91,7 +95,7 @@ pub fn find(backend: Backend) -> Result<Option<Gpu>, Missing> {
 /// The first GPU that CUDA can use.
 ///
 /// # Errors
-/// [`Absent`] if the driver, the compiler that makes kernels at run time or its headers are missing, or the GPU is.
+/// [`Absent`] if the driver, the run-time compiler, its headers, or a GPU is missing.
 pub fn cuda() -> Result<Found<CudaDevice>, Absent> {
     installed()?;
     let refused = |error: DriverError| Absent::Refused(error.to_string());
@@ -102,10 +106,10 @@ pub fn cuda() -> Result<Found<CudaDevice>, Absent> {
     Ok(Found { device: CudaDevice::new(0), name, software: false })
 }
 
-/// Looks for what CubeCL takes for granted.
+/// Checks for the libraries that CubeCL needs.
 #[expect(unsafe_code, reason = "looking for a library is loading it, which runs its initialisers")]
 fn installed() -> Result<(), Absent> {
-    // SAFETY: NVIDIA's libraries have no preconditions on being loaded; the same ones are loaded to be used.
+    // SAFETY: NVIDIA's libraries may be loaded at any time; CubeCL loads the same libraries later.
     let (driver, compiler) =
         unsafe { (driver::sys::is_culib_present(), cudarc::nvrtc::sys::is_culib_present()) };
     match (driver, compiler, cuda_path()) {
@@ -116,7 +120,8 @@ fn installed() -> Result<(), Absent> {
     }
 }
 
-/// The best adapter of Vulkan, Metal or DirectX: discrete before integrated, and others only if `software_too`.
+/// The best adapter of Vulkan, Metal or DirectX: discrete before integrated, and any other only if
+/// `software_too`.
 ///
 /// # Errors
 /// [`Absent`] if there is none.

@@ -1,7 +1,7 @@
-//! Orthonormal wavelets of images, S. Mallat's square pyramid, periodic at the borders.
+//! Orthonormal wavelets of images: S. Mallat's square pyramid, periodic at the borders.
 //!
-//! The one law: a step splits the top-left corner of an image into sums and differences along both axes, and every
-//! step is orthonormal, so the whole is.
+//! A step splits the top-left corner of an image into sums and differences along both axes. Every
+//! step is orthonormal, so the whole transform is (`basis::tests::atoms_are_orthonormal`).
 
 use std::f32::consts::FRAC_1_SQRT_2;
 

@@ -48,12 +48,13 @@ proptest! {
         seed: u64,
     ) {
         let (rows, whole) = recorded(32, kind, dark, Noise::Normal { sigma: 1e-4, seed });
-        // The first pair is the all-ones pattern: its complement is dark and cannot be missed.
+        // The first pair is the all-ones pattern: a lost reading of its dark complement cannot be
+        // found.
         let start = 2 + (place * (whole.len() - 2 - length) as f64) as usize;
         let mut y = whole.clone();
         let floor = if to_zero { 0.0 } else { dark };
         y[start..start + length].fill(floor);
-        // The readings beside the run are down by part of their integration time.
+        // The readings next to the run are down by part of their integration time.
         let (mut first, mut end) = (start, start + length);
         if start > 2 {
             first -= 1;
@@ -76,7 +77,8 @@ proptest! {
             measured.rows(),
             &measured.rows().iter().map(|&r| full.values()[r as usize]).collect::<Vec<_>>(),
         ).unwrap();
-        // What is left is what it would have been, except readings a fraction of which leaked in.
+        // The remaining measurements are as without the drop-out, except for readings into which a
+        // fraction of the run leaked.
         let worst = measured.values().iter().zip(kept.values()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         prop_assert!(worst < 0.02, "{}", worst);
         let (a, b) = (reconstruct::hadamard(&measured), reconstruct::hadamard(&kept));
@@ -95,7 +97,8 @@ fn short_runs_hardly_change_the_image() {
         assert_eq!((dropouts[0].start, dropouts[0].length), (start, 20));
         let (a, b) = (reconstruct::hadamard(&measured), reconstruct::hadamard(&full));
         assert!(correlation_of(&a, &b) > 0.99, "run at {start}: {}", correlation_of(&a, &b));
-        // The same run left in stripes the image where it cuts a pair in two (whole pairs become zeros).
+        // The same run, if left in, stripes the image where it cuts a pair in two; a whole lost
+        // pair becomes a zero.
         let d: Vec<f64> = y.as_chunks::<2>().0.iter().map(|[p, m]| p - m).collect();
         let striped = Measurements::from_differential(&rows, &d).unwrap();
         let striped = correlation_of(&reconstruct::hadamard(&striped), &b);
@@ -144,8 +147,8 @@ fn runs_cut_into_the_real_recording_are_found() {
             assert_eq!(found, [(start, length)]);
             let alike =
                 correlation_of(&reconstruct::hadamard(&measured), &reconstruct::hadamard(&full));
-            // What is lost is lost: the coarsest patterns come first in its order, and a hundred
-            // of the next ones are worth more than a hundredth.
+            // Lost measurements stay lost: this order shows the coarsest patterns first, and a
+            // hundred of the next patterns have more than a hundredth of the energy.
             let least = if length > 101 { 0.98 } else { 0.99 };
             assert!(alike > least || start < 200, "{length} from {start}: {alike}");
         }

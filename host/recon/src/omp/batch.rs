@@ -1,7 +1,8 @@
-//! Many measurements of one dictionary at once, on whatever is there to compute on.
+//! Pursues many measurements of one dictionary at once, on a [`Backend`] chosen at run time.
 //!
-//! The one law: a batch is a loop. On the processor each solution is the one that [`Solver::solve`] finds alone, bit for bit, whatever the
-//! number of threads.
+//! # Invariant
+//! On the processor each solution of a batch is the one that [`Solver::solve`] finds alone, bit for
+//! bit, whatever the number of threads (`omp::tests::batch::a_batch_is_a_loop`).
 
 use super::dictionary::{Dictionary, padded};
 use super::path::Path;
@@ -12,26 +13,27 @@ use super::{Backend, Limits, OmpError, Solution, finite};
 use rayon::prelude::*;
 use std::sync::{Mutex, PoisonError};
 
-/// A dictionary, and when to stop: all that is common to the measurements of a batch.
+/// The common part of the measurements of a batch: a dictionary, and when to stop.
 #[derive(Debug)]
 pub struct Problem<'d, D: ?Sized> {
     /// The atoms.
     pub dictionary: &'d D,
-    /// When to stop.
+    /// When the pursuit stops.
     pub limits: Limits,
 }
 
-/// Most measurements whose projections are computed together: enough to share each read of the dictionary.
+/// Largest number of measurements projected together: enough to share each read of the dictionary.
 const TOGETHER: usize = 16;
 
-/// Finds a sparse representation of each measurement in `y`, `measurements` numbers each, one after another.
+/// Finds a sparse representation of each measurement in `y`. Each measurement has `measurements`
+/// numbers; one follows the other.
 ///
-/// [`Backend::Auto`] is the processor here: a GPU would have to be given the dictionary's Gram matrix for this one call. Who has
-/// many batches of a matrix keeps a `gpu::DeviceDictionary`.
+/// [`Backend::Auto`] is the processor here, because a GPU would need the dictionary's Gram matrix
+/// for this one call. For many batches of one matrix, keep a `gpu::DeviceDictionary`.
 ///
 /// # Errors
-/// [`OmpError`] if the length of `y` is no multiple of the dictionary's measurements, a number is not finite, a limit
-/// makes no sense, or a device that was asked for by name is not there.
+/// [`OmpError`] if the length of `y` is not a multiple of the dictionary's measurements, a number
+/// is not finite, a limit is negative or NaN, or the requested device is missing.
 pub fn solve_batch<T: Scalar, D: Dictionary<T> + ?Sized>(
     problem: &Problem<'_, D>,
     y: &[T],
@@ -53,12 +55,12 @@ pub fn solve_batch<T: Scalar, D: Dictionary<T> + ?Sized>(
     }
 }
 
-/// Pursues one measurement, with a solution for every number of atoms. [`Backend::Auto`] is the processor, which has solved it
-/// before a GPU has the Gram matrix.
+/// Pursues one measurement, with a solution for every number of atoms. [`Backend::Auto`] is the
+/// processor, because the processor finishes before a GPU has received the Gram matrix.
 ///
 /// # Errors
-/// [`OmpError`] if `y` does not fit the dictionary or is not finite, a limit makes no sense, or a device that was asked for by
-/// name is not there.
+/// [`OmpError`] if `y` does not fit the dictionary or is not finite, a limit is negative or NaN, or
+/// the requested device is missing.
 pub fn solve_path<D: Dictionary<f32> + ?Sized>(
     dictionary: &D,
     limits: &Limits,
@@ -75,7 +77,7 @@ pub fn solve_path<D: Dictionary<f32> + ?Sized>(
     Err(super::BackendError::not_built().into())
 }
 
-/// [`solve_batch`] on the processor, with what the pursuits know besides.
+/// [`solve_batch`] on the processor; returns the whole [`Path`] of each pursuit.
 pub(super) fn solve_batch_paths<T: Scalar, D: Dictionary<T> + ?Sized>(
     problem: &Problem<'_, D>,
     y: &[T],
@@ -84,7 +86,7 @@ pub(super) fn solve_batch_paths<T: Scalar, D: Dictionary<T> + ?Sized>(
     on_all_cores(problem.dictionary, &problem.limits, y, |_| ())
 }
 
-/// [`solve_batch_paths`], with the referee that `referee_of` has for each frame.
+/// [`solve_batch_paths`], with the referee that `referee_of` gives for each frame.
 pub(super) fn solve_batch_with<T: Scalar, D: Dictionary<T> + ?Sized, R: Referee<T>>(
     problem: &Problem<'_, D>,
     y: &[T],
@@ -115,12 +117,12 @@ fn on_all_cores<T: Scalar, D: Dictionary<T> + ?Sized, R: Referee<T>>(
     let expected = dictionary.measurements();
     let frames = y.len() / expected;
     if frames == 1 {
-        // To wake another thread takes as long as to solve it.
+        // One measurement is solved on this thread: waking another thread takes as long as solving.
         return Ok(vec![Solver::new(dictionary, limits)?.solve_with(y, &mut referee_of(0))?]);
     }
     let width = padded(dictionary.atoms().count());
     let together = frames.div_ceil(rayon::current_num_threads()).clamp(1, TOGETHER);
-    // As many solvers as threads, each handed from group to group with its memory warm.
+    // One solver for each thread. A solver passes from group to group with its memory in the cache.
     let idle = Mutex::new(Vec::new());
     let groups: Result<Vec<Vec<Path<T>>>, OmpError> = y
         .par_chunks(together * expected)

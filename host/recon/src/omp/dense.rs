@@ -1,6 +1,7 @@
 //! A dictionary that is a matrix.
 //!
-//! The one law: what does not depend on a measurement is computed once, and only as much of it as memory was given for.
+//! Everything that does not depend on a measurement is computed once, as far as the given memory
+//! allows.
 
 use super::dictionary::{Atoms, Dictionary};
 use super::panels::Panels;
@@ -9,36 +10,37 @@ use nalgebra::DMatrix;
 use pulp::Arch;
 use rayon::prelude::*;
 
-/// A `measurements x atoms` matrix of any column norms, ready for any number of measurements.
+/// A `measurements x atoms` matrix with any column norms, prepared for any number of measurements.
 #[derive(Debug, Clone)]
 pub struct DenseDictionary<T> {
     panels: Panels<T>,
     atoms: Atoms<T>,
-    /// The whole Gram matrix, rows of `padded(atoms)`; empty: columns are computed as they are asked for.
+    /// The whole Gram matrix, in rows of `padded(atoms)`; empty if columns are computed on demand.
     gram: Vec<T>,
     width: usize,
     arch: Arch,
 }
 
 impl<T: Scalar> DenseDictionary<T> {
-    /// Memory that the Gram matrix may take by default: 8192 atoms in `f32`.
+    /// Default memory limit of the Gram matrix in bytes: 8192 atoms in `f32`.
     pub const GRAM_BYTES: usize = 256 << 20;
 
-    /// Prepares `matrix`: copies it and, where it fits [`GRAM_BYTES`](Self::GRAM_BYTES), multiplies out its Gram matrix.
+    /// Prepares `matrix`: copies it, and computes its Gram matrix if that fits
+    /// [`GRAM_BYTES`](Self::GRAM_BYTES).
     #[must_use]
     pub fn new(matrix: &DMatrix<T>) -> Self {
         Self::with_gram_within(matrix, Self::GRAM_BYTES)
     }
 
-    /// Prepares `matrix`; columns of a Gram matrix larger than `bytes` are multiplied out when an atom is chosen,
-    /// `measurements * atoms` products each.
+    /// Prepares `matrix`. If the Gram matrix is larger than `bytes`, a column is computed when its
+    /// atom is chosen, with `measurements * atoms` products.
     #[must_use]
     pub fn with_gram_within(matrix: &DMatrix<T>, bytes: usize) -> Self {
         Self::on(Arch::new(), matrix, bytes)
     }
 
-    /// The same dictionary, with atoms chosen by their inner products with the residual as they are, as programs do that
-    /// expect atoms of unit norm.
+    /// The same dictionary, with atoms chosen by their plain inner products with the residual, as
+    /// in programs that expect atoms of unit norm.
     #[must_use]
     pub fn unnormalised(mut self) -> Self {
         self.atoms = self.atoms.unnormalised();
@@ -53,7 +55,7 @@ impl<T: Scalar> DenseDictionary<T> {
         let energies: Vec<T> = (0..matrix.ncols())
             .map(|atom| match gram.get(atom * width + atom) {
                 Some(&energy) => energy,
-                // In the order in which the Gram matrix is summed: the same bits.
+                // The sum has the order of the Gram matrix's sums, so both give the same bits.
                 None => matrix.column(atom).iter().fold(T::default(), |sum, &v| sum + v * v),
             })
             .collect();
@@ -63,18 +65,20 @@ impl<T: Scalar> DenseDictionary<T> {
         Self { panels, atoms: atoms.with_doubles(doubles), gram, width, arch }
     }
 
-    /// Takes pairs of atoms for different after all.
+    /// Replaces the pairs of atoms that count as parallel.
     pub(super) fn with_doubles(mut self, doubles: Vec<(usize, usize)>) -> Self {
         self.atoms = self.atoms.with_doubles(doubles);
         self
     }
 }
 
-/// Share of an epsilon, relative to the atoms' norms, under which an inner product is the rounding of 0.
+/// An inner product below this share of an epsilon, relative to the atoms' norms, is the rounding
+/// of 0.
 const NOTHING: f64 = 1e-3;
 
-/// Makes zeros of what should be. Orthogonal atoms (cosines by Hadamard rows are, in blocks) otherwise have inner products of
-/// 1e-18 or 1e-35, whose products fall below the normal range of `f32`, where arithmetic is many times slower.
+/// Sets inner products that are only rounding to zero. Orthogonal atoms (cosines measured by
+/// Hadamard rows are orthogonal in blocks) otherwise have inner products of 1e-18 or 1e-35, whose
+/// products fall below the normal range of `f32`, where arithmetic is many times slower.
 fn clear_rounding<T: Scalar>(energies: &[T], gram: &mut [T], width: usize) {
     gram.par_chunks_exact_mut(width).zip(energies).for_each(|(row, &own)| {
         let least = own * T::from_f64((NOTHING * T::EPSILON).powi(2));
@@ -86,7 +90,7 @@ fn clear_rounding<T: Scalar>(energies: &[T], gram: &mut [T], width: usize) {
     });
 }
 
-/// Pairs of atoms, the lower first, of which one leaves nothing but rounding of the other.
+/// Pairs of parallel atoms, the lower first: one atom explains the other to within rounding.
 fn doubles<T: Scalar>(atoms: &Atoms<T>, gram: &[T], width: usize) -> Vec<(usize, usize)> {
     let energies = atoms.energies();
     let seen = |k: usize| !atoms.unseen().contains(&k);

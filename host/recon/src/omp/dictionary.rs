@@ -1,20 +1,20 @@
-//! What a pursuit asks of a dictionary.
+//! The interface of a dictionary for a pursuit.
 //!
-//! The one law: a dictionary is its measurements' inner products. Whoever can project a measurement onto all atoms
-//! and supply a column of the Gram matrix on demand, from a matrix or by fast transforms, is one; a backend that wants the
-//! whole Gram matrix on a device asks for its columns once.
+//! A pursuit needs only inner products: the projection of a measurement onto all atoms, and columns
+//! of the Gram matrix on demand. A dictionary may compute them from a matrix or by fast transforms.
+//! A backend that keeps the whole Gram matrix on a device asks for each column once.
 
 use super::kernel::PANEL;
 use super::scalar::Scalar;
 
-/// An atom this much weaker than the strongest one (norm squared) is not seen.
+/// An atom is not seen if its squared norm is below this share of the strongest atom's.
 pub(super) const UNSEEN: f64 = 1e-9;
 
-/// Lengths of all atoms, as the choice needs them.
+/// The norms of all atoms, in the form that the choice needs.
 #[derive(Debug, Clone)]
 pub struct Atoms<T> {
     energies: Vec<T>,
-    /// Padded to whole panels; zeros are never chosen.
+    /// One over each norm, padded to whole panels. An atom with a zero here is never chosen.
     inverse_norms: Vec<T>,
     unseen: Vec<usize>,
     doubles: Vec<(usize, usize)>,
@@ -22,7 +22,7 @@ pub struct Atoms<T> {
 }
 
 impl<T: Scalar> Atoms<T> {
-    /// From the squared norm of each atom, the diagonal of the Gram matrix.
+    /// Atoms with these squared norms, the diagonal of the Gram matrix.
     #[must_use]
     pub fn new(energies: Vec<T>) -> Self {
         let strongest = energies.iter().fold(0.0, |most, &e| f64::max(most, e.into()));
@@ -32,21 +32,21 @@ impl<T: Scalar> Atoms<T> {
         Self { energies, inverse_norms, unseen, doubles, normalised: true }.weighed()
     }
 
-    /// The same atoms, chosen by their inner products with the residual as they are: longer atoms are more attractive, if only
-    /// by a rounding, so that of equal ones each stands for itself.
+    /// The same atoms, chosen by their plain inner products with the residual. A longer atom then
+    /// wins, if only by a rounding, so every one of several equal atoms stays eligible.
     #[must_use]
     pub fn unnormalised(self) -> Self {
         Self { normalised: false, doubles: Vec::new(), ..self }.weighed()
     }
 
-    /// The same atoms, of which some pairs, the lower atom first, point the same or the opposite way. Of those the lower
-    /// stands for all: rounding alone would decide between them.
+    /// The same atoms, of which these pairs (the lower atom first) are parallel. Only the lower
+    /// atom of a pair can be chosen, because rounding alone would decide between the two.
     #[must_use]
     pub(super) fn with_doubles(self, doubles: Vec<(usize, usize)>) -> Self {
         Self { doubles, ..self }.weighed()
     }
 
-    /// Pairs of atoms that the measurement cannot tell apart.
+    /// Pairs of atoms that the measurement cannot distinguish.
     #[must_use]
     pub fn doubles(&self) -> &[(usize, usize)] {
         &self.doubles
@@ -66,13 +66,13 @@ impl<T: Scalar> Atoms<T> {
         self
     }
 
-    /// How many there are.
+    /// Number of atoms.
     #[must_use]
     pub fn count(&self) -> usize {
         self.energies.len()
     }
 
-    /// Squared norm of each.
+    /// Squared norm of each atom.
     #[must_use]
     pub fn energies(&self) -> &[T] {
         &self.energies
@@ -84,7 +84,7 @@ impl<T: Scalar> Atoms<T> {
         &self.unseen
     }
 
-    /// Whether they are chosen by correlation.
+    /// Whether atoms are chosen by correlation.
     #[cfg(feature = "gpu")]
     pub(super) fn is_normalised(&self) -> bool {
         self.normalised
@@ -95,19 +95,20 @@ impl<T: Scalar> Atoms<T> {
     }
 }
 
-/// Atoms, as their inner products with measurements and with each other. Vectors over the atoms are
-/// [`padded`], zero past the last atom.
+/// A dictionary: inner products of its atoms with measurements and with each other. Vectors over
+/// the atoms have [`padded`] length, with zeros after the last atom.
 pub trait Dictionary<T: Scalar>: Sync {
     /// Length of a measurement.
     fn measurements(&self) -> usize;
 
-    /// Lengths of the atoms.
+    /// The norms of the atoms.
     fn atoms(&self) -> &Atoms<T>;
 
     /// The initial projection: inner product of the measurement `y` with each atom.
     fn project(&self, y: &[T], p0: &mut [T]);
 
-    /// [`project`](Self::project) of several measurements of equal length, one after another; the same numbers.
+    /// [`project`](Self::project) of several measurements, one after another, with the same
+    /// results.
     fn project_all(&self, y: &[T], p0: &mut [T]) {
         let width = padded(self.atoms().count());
         for (y, p0) in y.chunks_exact(self.measurements()).zip(p0.chunks_exact_mut(width)) {
@@ -115,16 +116,16 @@ pub trait Dictionary<T: Scalar>: Sync {
         }
     }
 
-    /// Writes column `atom` of the Gram matrix: its inner products with every atom.
+    /// Writes column `atom` of the Gram matrix: the atom's inner products with every atom.
     fn gram_column(&self, atom: usize, out: &mut [T]);
 
-    /// The same column where it is stored.
+    /// Column `atom` of the Gram matrix, if it is stored.
     fn stored_gram_column(&self, _atom: usize) -> Option<&[T]> {
         None
     }
 }
 
-/// Length of a vector over this many atoms: whole panels of 64.
+/// Length of a vector over this many atoms: a multiple of 64, the panel size.
 #[must_use]
 pub fn padded(atoms: usize) -> usize {
     atoms.next_multiple_of(PANEL)

@@ -1,37 +1,39 @@
-//! The loops that take the time, for the widest vectors that the running machine has.
+//! The inner loops, compiled for the widest vectors that the running machine has.
 //!
-//! The one law: the width of a vector never shows in a result. Every atom is a lane with its own sum, products are
-//! rounded before they are added (no fused multiply-add), and sums run over rows in one order; so SSE2, AVX2, AVX-512
-//! and NEON give the same bits, and a recording reconstructs alike everywhere.
+//! # Invariant
+//! The width of a vector never changes a result
+//! (`omp::tests::batch::every_vector_width_gives_the_same_bits`). Every atom is a lane with its own
+//! sum, products are rounded before they are added (no fused multiply-add), and sums run over rows
+//! in one order. So SSE2, AVX2, AVX-512 and NEON give the same bits.
 //!
-//! Atoms are dealt out in panels of [`PANEL`], whose sums stay in registers while the rows before them stream by once,
-//! contiguously. What limits the loop is the second-level cache, so a row that is read serves two columns: the one
-//! chosen, and the one that is most likely next.
+//! Atoms are distributed to panels of [`PANEL`], whose sums stay in registers while the earlier
+//! rows are read once, contiguously. The second-level cache limits the speed of the loop, so each
+//! row that is read serves two columns: the chosen atom's, and that of the most likely next atom.
 
 use super::scalar::Scalar;
 use pulp::{Arch, Simd, WithSimd};
 
-/// Atoms worked on together.
+/// Number of atoms in a panel.
 pub(crate) const PANEL: usize = 64;
 
-/// Orthogonalised columns of a Gram matrix, as rows: for each panel of atoms, row after row.
+/// Orthogonalised columns of a Gram matrix, stored as rows: for each panel of atoms, row after row.
 #[derive(Debug, Clone)]
 pub(super) struct Rows<T> {
     panels: Vec<Vec<[T; PANEL]>>,
 }
 
 impl<T: Scalar> Rows<T> {
-    /// None yet, of `panels * PANEL` atoms, with room for some.
+    /// No rows yet, for `panels * PANEL` atoms, with memory for `room` rows.
     pub(super) fn new(panels: usize, room: usize) -> Self {
         Self { panels: (0..panels).map(|_| Vec::with_capacity(room)).collect() }
     }
 
-    /// Forgets all but the first rows, keeps their memory.
+    /// Drops all rows after the first `rows`, and keeps the memory.
     pub(super) fn truncate(&mut self, rows: usize) {
         self.panels.iter_mut().for_each(|panel| panel.truncate(rows));
     }
 
-    /// Takes `step` times row `at` from the projection `p`.
+    /// Subtracts `step` times row `at` from the projection `p`.
     pub(super) fn take_from(&self, at: usize, step: T, p: &mut [T]) {
         for (rows, p) in self.panels.iter().zip(p.as_chunks_mut::<PANEL>().0) {
             for (p, entry) in p.iter_mut().zip(&rows[at]) {
@@ -40,27 +42,27 @@ impl<T: Scalar> Rows<T> {
         }
     }
 
-    /// Entries of the rows from `first` on for one atom, appended to `out`.
+    /// Appends one atom's entries of the rows from `first` on to `out`.
     pub(super) fn of_atom(&self, atom: usize, first: usize, out: &mut Vec<T>) {
         out.extend(self.panels[atom / PANEL][first..].iter().map(|row| row[atom % PANEL]));
     }
 }
 
-/// What one chosen atom does to all atoms.
+/// The effect of one chosen atom on all atoms.
 pub(super) struct Step<'a, T> {
-    /// Its column of the Gram matrix, with the rows before `first` taken out.
+    /// The atom's column of the Gram matrix, without its part along the rows before `first`.
     pub column: &'a [T],
-    /// Rows that are taken out already.
+    /// Number of rows that are already subtracted.
     pub first: usize,
-    /// What the rows from `first` on say of the atom.
+    /// The atom's entries in the rows from `first` on.
     pub weights: &'a [T],
-    /// Another column, to take all rows out of in passing.
+    /// Another column, from which the same pass subtracts all rows.
     pub next: Option<Next<'a, T>>,
     /// One over the root of the pivot.
     pub scale: T,
-    /// The atom's share in the measurement.
+    /// The atom's part of the measurement.
     pub step: T,
-    /// One over each atom's norm; 0 for what must not be chosen.
+    /// One over each atom's norm; 0 for atoms that must not be chosen.
     pub inverse_norms: &'a [T],
 }
 
@@ -68,15 +70,15 @@ pub(super) struct Step<'a, T> {
 pub(super) struct Next<'a, T> {
     /// A column of the Gram matrix.
     pub column: &'a [T],
-    /// What the rows say of its atom.
+    /// The rows' entries for the column's atom.
     pub weights: &'a [T],
-    /// Gets the column without the rows.
+    /// Receives the column without the rows.
     pub out: &'a mut [T],
 }
 
 impl<T: Scalar> Rows<T> {
-    /// Adds the row `(column - sum_i weights[i] * row[i]) * scale`, takes `step` times it from the projection `p`, and
-    /// leaves each panel's [`Best`].
+    /// Adds the row `(column - sum_i weights[i] * row[i]) * scale`, subtracts `step` times this row
+    /// from the projection `p`, and computes each panel's [`Best`].
     pub(super) fn push(
         &mut self,
         arch: Arch,
@@ -88,7 +90,7 @@ impl<T: Scalar> Rows<T> {
     }
 }
 
-/// [`Rows::push`] as `pulp` wants it: what is inlined into [`WithSimd::with_simd`] is compiled for each vector width.
+/// [`Rows::push`] as a type, because `pulp` compiles a type's method for each vector width.
 struct Push<'a, T> {
     panels: &'a mut [Vec<[T; PANEL]>],
     step: Step<'a, T>,
@@ -102,7 +104,8 @@ impl<T: Scalar> WithSimd for Push<'_, T> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         if S::F32_LANES == 1 {
-            // No vectors known: four at a time is what baseline x86-64 has, and no loss elsewhere.
+            // Without known vectors, four numbers at a time suit baseline x86-64 and cost nothing
+            // elsewhere.
             self.run(pulp::Scalar128b);
         } else {
             self.run(simd);
@@ -121,11 +124,12 @@ impl<T: Scalar> Push<'_, T> {
             if let Some(next) = &mut step.next {
                 let columns = [column, &next.column[atoms.clone()]];
                 let out = [&mut row[..], &mut next.out[atoms.clone()]];
-                // All rows for the next column: the chosen one has had none either.
+                // All rows are subtracted from the next column; none was subtracted from the chosen
+                // one either.
                 take_out::<T, S, 2, 4>(simd, rows, columns, [step.weights, next.weights], out);
             } else {
                 let (rows, row) = (&rows[step.first..], [&mut row[..]]);
-                // Eight sums hide the latency of an addition, where a panel has so many.
+                // Eight sums hide the latency of an addition, if a panel has that many vectors.
                 if 8 * size_of::<T::Vector<S>>() <= PANEL * size_of::<T>() {
                     take_out::<T, S, 1, 8>(simd, rows, [column], [step.weights], row);
                 } else {
@@ -173,10 +177,10 @@ fn take_out<T: Scalar, S: Simd, const COLUMNS: usize, const VECTORS: usize>(
     }
 }
 
-/// Lanes in which the largest scores are kept: to the end of a panel, one is not compared with its neighbour.
+/// Number of lanes that keep the largest scores. Lanes are compared only at the end of a panel.
 const SCORES: usize = 16;
 
-/// The largest `|p| * inverse_norm` of a panel's atoms, of every sixteenth atom apart.
+/// The largest `|p| * inverse_norm` of a panel's atoms, for every sixteenth atom.
 pub(super) type Best<T> = [T; SCORES];
 
 #[inline(always)]
@@ -192,14 +196,14 @@ fn best_of<T: Scalar>(panel: usize, p: &[T], inverse_norms: &[T]) -> Best<T> {
     best
 }
 
-/// Leaves each panel's [`Best`].
+/// Computes each panel's [`Best`].
 pub(super) fn score<T: Scalar>(p: &[T], inverse_norms: &[T], best: &mut [Best<T>]) {
     for (panel, best) in best.iter_mut().enumerate() {
         *best = best_of(panel, p, inverse_norms);
     }
 }
 
-/// The largest of all but one panel, and the first panel that has it.
+/// The largest of all panels except `but`, and the first panel that has it.
 pub(super) fn largest<T: Scalar>(best: &[Best<T>], but: Option<usize>) -> (usize, T) {
     let others = || best.iter().enumerate().filter(|(panel, _)| Some(*panel) != but);
     let mut lanes = [T::default(); SCORES];

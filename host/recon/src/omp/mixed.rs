@@ -1,7 +1,11 @@
-//! Single precision where it is enough, double where it is not.
+//! Single precision where it is enough, double precision where it is not.
 //!
-//! The one law: the support is that of double precision. A choice whose lead over the next best atom is within the rounding
-//! of `f32` is made in `f64` (the module `referee`); measurements whose pursuit only `f32` sees at an end are solved again.
+//! # Invariant
+//! The support is that of double precision
+//! (`omp::tests::mixed::few_of_many_frames_need_double_precision_and_all_have_its_support`). A
+//! choice whose lead over the next best atom is within the rounding of `f32` is made in `f64`
+//! (module `referee`). A measurement whose pursuit ends only because of the rounding of `f32` is
+//! solved again.
 
 use super::batch::{Problem, solve_batch_paths, solve_batch_with};
 use super::dense::DenseDictionary;
@@ -12,14 +16,14 @@ use super::{Backend, Dictionary, Limits, OmpError, Scalar, Solution, Stop, solve
 use nalgebra::DMatrix;
 use std::sync::OnceLock;
 
-/// A dictionary in both precisions; the double one is prepared when it is first needed.
+/// A dictionary in both precisions. The double-precision one is prepared at its first use.
 #[derive(Debug)]
 pub struct MixedDictionary {
     single: DenseDictionary<f32>,
     exact: Exact,
 }
 
-/// A matrix for the measurements that single precision cannot decide.
+/// A matrix in `f64`, for measurements that single precision cannot decide.
 #[derive(Debug)]
 struct Exact {
     matrix: DMatrix<f64>,
@@ -32,7 +36,7 @@ impl Exact {
         Self { matrix, double: OnceLock::new(), normalised }
     }
 
-    /// The dictionary, prepared when it is first needed.
+    /// The dictionary in `f64`, prepared at its first use.
     fn double(&self) -> &DenseDictionary<f64> {
         self.double.get_or_init(|| {
             let double = DenseDictionary::new(&self.matrix);
@@ -40,7 +44,7 @@ impl Exact {
         })
     }
 
-    /// Solves the `doubtful` ones of the measurements `y` again, on the processor.
+    /// Solves the `doubtful` measurements of `y` again, on the processor.
     fn solve_again(
         &self,
         limits: &Limits,
@@ -63,12 +67,13 @@ impl Exact {
 }
 
 impl MixedDictionary {
-    /// Prepares a `measurements x atoms` matrix. Atoms are chosen by their correlations with the residual, or with
-    /// `normalised` false by their inner products as they are.
+    /// Prepares a `measurements x atoms` matrix. Atoms are chosen by their correlations with the
+    /// residual or, with `normalised` false, by their plain inner products.
     #[must_use]
     pub fn new(matrix: DMatrix<f64>, normalised: bool) -> Self {
         let single = DenseDictionary::new(&matrix.map(|v| v as f32));
-        // Atoms that only single precision takes for the same stay apart, and their ties go to double precision.
+        // Atoms that are parallel only in single precision stay distinct, and double precision
+        // decides between them.
         let same = |&(i, j): &(usize, usize)| {
             let (a, b) = (matrix.column(i), matrix.column(j));
             a.dot(&b).powi(2) >= (1.0 - f64::DEPENDENT) * a.norm_squared() * b.norm_squared()
@@ -90,7 +95,7 @@ impl MixedDictionary {
         &self.single
     }
 
-    /// For one measurement after another, without delay.
+    /// A solver for one measurement after another.
     ///
     /// # Errors
     /// [`OmpError`] if a limit is negative or NaN.
@@ -99,10 +104,11 @@ impl MixedDictionary {
         Ok(MixedSolver { dictionary: self, limits: *limits, single, double: None, y: Vec::new() })
     }
 
-    /// [`solve_batch`] on the processor, and for how many of the measurements double precision was asked.
+    /// [`solve_batch`] on the processor; also returns for how many measurements double precision
+    /// was used.
     ///
     /// # Errors
-    /// Those of [`solve_batch`].
+    /// The errors of [`solve_batch`].
     pub fn solve_batch(
         &self,
         limits: &Limits,
@@ -123,7 +129,7 @@ impl MixedDictionary {
         Ok((solutions, refereed + doubtful.len()))
     }
 
-    /// The pursuits in `f32`, refereed.
+    /// The pursuits in `f32`, with the referee.
     fn solve_in_single<'y>(
         &self,
         limits: &Limits,
@@ -132,7 +138,8 @@ impl MixedDictionary {
     ) -> Result<Vec<Path<f32>>, OmpError> {
         let problem = Problem { dictionary: &self.single, limits: *limits };
         if self.exact.double.get().is_none() {
-            // Double precision is prepared when somebody asks for it, and not by one thread while others wait.
+            // All threads together prepare the double-precision dictionary, and only if a frame
+            // needs it.
             let paths = solve_batch_paths(&problem, y)?;
             let mut frames = paths.iter().zip(y.chunks_exact(self.exact.matrix.nrows()));
             if !frames.any(|(path, y)| is_doubtful(path, limits, y)) {
@@ -145,7 +152,7 @@ impl MixedDictionary {
     }
 }
 
-/// A [`Solver`] in both precisions, with memory of its own.
+/// A [`Solver`] in both precisions, with its own memory.
 #[derive(Debug)]
 pub struct MixedSolver<'d> {
     dictionary: &'d MixedDictionary,
@@ -156,7 +163,7 @@ pub struct MixedSolver<'d> {
 }
 
 impl MixedSolver<'_> {
-    /// The sparse representation of `y`, and whether it took double precision.
+    /// The sparse representation of `y`, and whether double precision was used.
     ///
     /// # Errors
     /// [`OmpError`] if `y` does not fit the dictionary or is not finite.
@@ -184,10 +191,11 @@ impl MixedSolver<'_> {
     }
 }
 
-/// Whether single precision may have decided what only double precision can: between two atoms, or whether it was the end.
+/// Whether single precision may be wrong: about a choice between two atoms, or about the end of the
+/// pursuit.
 fn is_doubtful(path: &Path<f32>, limits: &Limits, y: &[f32]) -> bool {
     let ended_by_rounding = matches!(path.stop, Stop::Dependent | Stop::NoAtomLeft);
-    // Nobody looks at the residual once there are enough atoms.
+    // The residual is not compared with the limit once there are enough atoms.
     let looked = path.residual_norms.len() - usize::from(path.stop == Stop::Sparsity);
     let energy = energy(y);
     let enough = limits.enough(energy, y.len()) / energy;

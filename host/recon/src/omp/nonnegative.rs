@@ -1,8 +1,10 @@
-//! Orthogonal matching pursuit with coefficients of 0 or more: light does not add up to less.
+//! Orthogonal matching pursuit with non-negative coefficients, for atoms that are light.
 //!
-//! The one law: after every atom the coefficients are the non-negative least-squares solution over the support, so the
-//! residual's norm never grows, it is orthogonal to every atom that has a part, and an atom that would need less than
-//! nothing is given back.
+//! # Invariant
+//! After every atom the coefficients are the non-negative least-squares solution over the support
+//! (`tests::nonnegative::the_solution_is_the_best_of_those_that_are_nowhere_negative`), so the norm
+//! of the residual never grows (`tests::nonnegative::with_every_step_less_is_left`). An atom whose
+//! coefficient would become negative is removed from the support.
 //!
 //! With no limit on the atoms this is C. Lawson and R. Hanson, *Solving Least Squares Problems* (1974), chapter 23, whose
 //! choice of the next atom is matching pursuit's without the magnitude; see A. Bruckstein et al., *On the uniqueness of
@@ -14,17 +16,19 @@ use super::scalar::Scalar;
 use super::{Limits, OmpError, Solution, Stop, finite};
 use nalgebra::{DMatrix, DVector};
 
-/// Exchanges of atoms before the search is given up: Lawson and Hanson's, per atom.
+/// Number of removed atoms, per atom of the dictionary, after which the search ends; the value is
+/// Lawson and Hanson's.
 const EXCHANGES: usize = 3;
 
-/// Finds a sparse `x`, nowhere negative, with the dictionary's `x` near `y`. As atoms may be given back, the solution's
-/// `residual_norms` are the first and the last alone.
+/// Finds a sparse, non-negative `x` such that the dictionary times `x` is near `y`. Atoms can be
+/// removed again, so `residual_norms` of the solution has only the first and the last norm.
 ///
-/// `N` products an atom in the support go into each choice, and a third of the cube of the support's size into its
-/// coefficients.
+/// A choice takes `N` products for each atom in the support; the coefficients take a third of the
+/// cube of the support's size.
 ///
 /// # Errors
-/// [`OmpError`] if `y` does not fit the dictionary, a number is not finite or a limit makes no sense.
+/// [`OmpError`] if `y` does not fit the dictionary, a number is not finite, or a limit is negative
+/// or NaN.
 pub fn solve<T: Scalar, D: Dictionary<T> + ?Sized>(
     dictionary: &D,
     y: &[T],
@@ -58,7 +62,7 @@ struct Search<'d, T, D: ?Sized> {
 struct Taken<T> {
     atom: usize,
     coefficient: f64,
-    /// Its column of the Gram matrix.
+    /// The atom's column of the Gram matrix.
     column: Vec<T>,
 }
 
@@ -110,15 +114,15 @@ impl<T: Scalar, D: Dictionary<T> + ?Sized> Search<'_, T, D> {
         p
     }
 
-    /// Energy of the residual: with `G x = p0 - p`, `|y|^2 - sum of x (p0 + p)`.
+    /// Energy of the residual: with `G x = p0 - p`, the energy is `|y|^2 - sum of x (p0 + p)`.
     fn remaining(&self) -> f64 {
         let p = self.projection();
         let explained = |t: &Taken<T>| t.coefficient * (self.p0[t.atom].into() + p[t.atom]);
         self.energy - self.taken.iter().map(explained).sum::<f64>()
     }
 
-    /// Moves the coefficients to the non-negative least-squares solution, giving atoms back on the way; false if those
-    /// taken are not independent.
+    /// Moves the coefficients to the non-negative least-squares solution, and removes atoms on the
+    /// way; false if the atoms of the support are dependent.
     fn settle(&mut self) -> bool {
         loop {
             let count = self.taken.len();
@@ -126,15 +130,16 @@ impl<T: Scalar, D: Dictionary<T> + ?Sized> Search<'_, T, D> {
                 Into::<f64>::into(self.taken[j].column[self.taken[i].atom])
             });
             let right = DVector::from_fn(count, |i, _| self.p0[self.taken[i].atom].into());
-            // What an atom has of its own beside all others, whatever their order: pivots, which see only those taken
-            // before, stay far above it where a few atoms together are nearly one too many.
+            // Independence is judged by the part of each atom outside the span of all others,
+            // whatever their order. A pivot compares an atom only with earlier atoms, and stays far
+            // too large where several atoms together are nearly dependent.
             let independent = gram.clone().cholesky().filter(|cholesky| {
                 let inverse = cholesky.inverse();
                 (0..count).all(|i| inverse[(i, i)] * T::DEPENDENT * gram[(i, i)] < 1.0)
             });
             let Some(cholesky) = independent else { return false };
             let target = cholesky.solve(&right);
-            // As far towards it as no coefficient falls below 0.
+            // Moves towards the solution until the first coefficient reaches 0.
             let mut share = 1.0_f64;
             for (taken, &target) in self.taken.iter().zip(target.iter()) {
                 if target <= 0.0 {

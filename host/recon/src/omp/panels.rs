@@ -1,7 +1,9 @@
-//! Products of a matrix with its like and with measurements, compiled for the machine's vectors.
+//! Products of a matrix with itself and with measurements, compiled for the machine's vectors.
 //!
-//! The one law: entry `(i, j)` is the sum over rows from the first to the last, in that order, whatever the tile that
-//! computes it; a batch gives each frame the bits that it would get alone.
+//! # Invariant
+//! Entry `(i, j)` is the sum over rows from the first to the last, in that order, whichever tile
+//! computes it. So a batch gives each frame the same bits as a single solution
+//! (`omp::tests::batch::a_batch_is_a_loop`).
 
 use super::dictionary::padded;
 use super::kernel::{PANEL, first_of};
@@ -10,8 +12,8 @@ use nalgebra::DMatrix;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
-/// A `measurements x atoms` matrix as `[panel][measurement][atom of the panel]`: what a tile reads is contiguous, and
-/// rows do not fall into the same sets of the cache.
+/// A `measurements x atoms` matrix as `[panel][measurement][atom of the panel]`. A tile reads
+/// contiguous memory, and rows do not fall into the same sets of the cache.
 #[derive(Debug, Clone)]
 pub(super) struct Panels<T> {
     values: Vec<T>,
@@ -42,7 +44,7 @@ impl<T: Scalar> Panels<T> {
         self.measurements
     }
 
-    /// One atom.
+    /// The column of one atom.
     pub(super) fn column(&self, atom: usize) -> Vec<T> {
         let (panel, lane) = (atom / PANEL, atom % PANEL);
         self.panel(panel).iter().map(|row| row[lane]).collect()
@@ -86,11 +88,11 @@ impl<T: Scalar> Panels<T> {
         }
     }
 
-    /// The Gram matrix, `padded(atoms)` rows of as many numbers.
+    /// The Gram matrix: `padded(atoms)` rows of `padded(atoms)` numbers.
     pub(super) fn gram(&self, arch: Arch) -> Vec<T> {
         let (width, count) = (padded(self.atoms), self.count());
         let mut gram = vec![T::default(); width * width];
-        // It is symmetric: panels right of the diagonal, then their mirror image.
+        // The matrix is symmetric: the panels right of the diagonal are computed, then mirrored.
         gram.par_chunks_exact_mut(PANEL * width).enumerate().for_each(|(i, rows)| {
             let left = self.panel(i);
             for start in (0..PANEL).step_by(GROUP) {
@@ -119,7 +121,7 @@ impl<T: Scalar> Panels<T> {
     }
 }
 
-/// Measurements (or atoms) that share one pass over a panel.
+/// Number of measurements (or atoms) that share one pass over a panel.
 const GROUP: usize = 8;
 
 /// `packed^T * panel`, a `FRAMES x PANEL` block.
@@ -137,7 +139,8 @@ impl<T: Scalar, const FRAMES: usize> WithSimd for Product<'_, T, FRAMES> {
         if FRAMES == 1 {
             self.alone(&mut out[0]);
         } else if S::F32_LANES == 1 {
-            // No vectors known: four at a time is what baseline x86-64 has, and no loss elsewhere.
+            // Without known vectors, four numbers at a time suit baseline x86-64 and cost nothing
+            // elsewhere.
             self.tiles::<_, 4>(pulp::Scalar128b, &mut out);
         } else if S::REGISTER_COUNT >= 32 {
             self.tiles::<S, 8>(simd, &mut out);
@@ -149,7 +152,7 @@ impl<T: Scalar, const FRAMES: usize> WithSimd for Product<'_, T, FRAMES> {
 }
 
 impl<T: Scalar, const FRAMES: usize> Product<'_, T, FRAMES> {
-    /// One frame: the panel streams by once, its sums stay in registers.
+    /// One frame: the panel is read once, and its sums stay in registers.
     #[inline(always)]
     fn alone(&self, sums: &mut [T; PANEL]) {
         for (y, atoms) in self.packed.iter().zip(self.panel) {
@@ -159,7 +162,7 @@ impl<T: Scalar, const FRAMES: usize> Product<'_, T, FRAMES> {
         }
     }
 
-    /// Tiles two vectors wide and `HIGH` frames high, which with their operands fill the registers.
+    /// Tiles two vectors wide and `HIGH` frames high. A tile and its operands fill the registers.
     #[inline(always)]
     fn tiles<S: Simd, const HIGH: usize>(&self, simd: S, out: &mut [[T; PANEL]; FRAMES]) {
         let vectors = T::vectors::<S>(&self.panel[0]).len();

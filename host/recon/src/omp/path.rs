@@ -1,27 +1,29 @@
-//! A pursuit that has ended, and the solution of every length that it holds.
+//! The result of a pursuit, with the solution for every number of atoms.
 
 use super::scalar::Scalar;
 use super::{Solution, Stop};
 
-/// A pursuit that has ended: a solution for every number of atoms up to the last.
+/// The result of a pursuit: a solution for every number of atoms up to the last.
 #[derive(Debug, Clone)]
 pub struct Path<T> {
     /// Atoms in the order in which they were chosen.
     pub support: Vec<usize>,
-    /// Norm of the residual before the first and after each atom, relative to the measurement's.
+    /// Norm of the residual before the first atom and after each atom, relative to the
+    /// measurement's norm.
     pub residual_norms: Vec<f64>,
-    /// Why there are no more.
+    /// Why the pursuit stopped.
     pub stop: Stop,
     /// Atoms that the measurement does not see.
     pub unseen: Vec<usize>,
-    /// Least lead of a chosen atom over the best other one: difference of their correlations with the residual, relative
-    /// to the measurement's norm. Rounding may have decided where it is no more than some tens of epsilons.
+    /// Smallest lead of a chosen atom over the best other atom: difference of their correlations
+    /// with the residual, relative to the measurement's norm. Rounding may have decided a choice
+    /// with a lead of some tens of epsilons.
     pub least_lead: f64,
-    /// Atoms whose lead was too small to be believed, and that were chosen in double precision.
+    /// Number of atoms whose lead was too small for `f32`, so that double precision chose.
     pub refereed: usize,
     /// Lower-triangular factor of the support's Gram matrix, row after row.
     pub(super) factor: Vec<T>,
-    /// The initial projection, orthogonalised along with the atoms.
+    /// The initial projection, orthogonalised like the atoms.
     pub(super) steps: Vec<T>,
 }
 
@@ -33,7 +35,8 @@ impl<T: Scalar> Path<T> {
         self.residual_norms.push((remaining.max(0.0) / energy).sqrt());
     }
 
-    /// Least-squares coefficients over the first `atoms` of the support (all of it if it has fewer).
+    /// Least-squares coefficients over the first `atoms` atoms of the support (all of it if it has
+    /// fewer).
     #[must_use]
     pub fn coefficients(&self, atoms: usize) -> Vec<f64> {
         let atoms = atoms.min(self.support.len());
@@ -42,8 +45,8 @@ impl<T: Scalar> Path<T> {
         x
     }
 
-    /// Replaces `g` by the solution of `G x = g` over the whole support, as well as this number type factorised its Gram
-    /// matrix `G`.
+    /// Replaces `g` by the solution of `G x = g` over the whole support, where `G` is the support's
+    /// Gram matrix. The accuracy is that of the factorisation in this number type.
     pub(super) fn divide(&self, g: &mut [f64]) {
         for i in 0..g.len() {
             let row = self.factor_row(i);

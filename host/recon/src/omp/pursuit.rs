@@ -1,22 +1,28 @@
 //! Algorithm 1 from columns of the Gram matrix (Batch-OMP), one measurement at a time.
 //!
-//! The one law: same support and coefficients as [`reference`](super::reference), to the rounding of the number type.
+//! # Invariant
+//! Support and coefficients are those of [`reference`](super::reference), to within the rounding of
+//! the number type (`omp::tests::both_number_types_find_what_the_reference_finds`).
 //!
-//! Instead of solving two triangular systems an atom, the chosen columns of the Gram matrix are orthogonalised as
-//! they come (a partial Cholesky factorisation of the whole Gram matrix, pivoted by the correlations). Row `i` of the
-//! factor `q` then updates the projection `p` of *all* atoms, the residual's energy falls by one square, and the
-//! Cholesky factor of the support, from which the coefficients of any number of atoms can be read, is contained in
-//! it. R. Rubinstein et al., *Efficient implementation of the K-SVD algorithm using batch orthogonal matching pursuit*
-//! (2008), has the Gram and the norm-based stop.
+//! # How
+//! Instead of solving two triangular systems for each atom, a pursuit orthogonalises the column of
+//! the Gram matrix when its atom is chosen (a partial Cholesky factorisation of the whole Gram
+//! matrix, pivoted by the correlations). Row `i` of the factor `q` updates the projection `p` of
+//! *all* atoms, and reduces the residual's energy by one square. The factor `q` contains the
+//! Cholesky factor of the support, which gives the coefficients for any number of atoms. The Gram
+//! matrix and the norm-based stop are from R. Rubinstein et al., *Efficient implementation of the
+//! K-SVD algorithm using batch orthogonal matching pursuit* (2008).
 //!
-//! Of `N` atoms, `K` are found with `N K (K - 1) / 2` products for the rows, `2 N K` for `p` and the scores; the rows
-//! before are read once an atom, `4 N K (K - 1) / 2` bytes in `f32`. At `K = 64`, `N = 1024` that is 2.1 million products
-//! over 8.3 MB that stay in a core's second-level cache: its bandwidth is the limit.
+//! To find `K` of `N` atoms takes `N K (K - 1) / 2` products for the rows and `2 N K` for `p` and
+//! the scores. The earlier rows are read once for each atom, `4 N K (K - 1) / 2` bytes in `f32`. At
+//! `K = 64`, `N = 1024` that is 2.1 million products over 8.3 MB in a core's second-level cache,
+//! whose bandwidth is the limit.
 //!
 //! # Rounding
-//! The residual's energy is a difference of results in the number type: limits on its norm under about 1e-3 of the
-//! measurement's (`f32`) or 1e-7 (`f64`) are met by rounding. Coefficients are those of the normal equations: relative to
-//! the largest, they err by at most [`error_bound`].
+//! The residual's energy is a difference of rounded results. A limit on the residual's norm below
+//! about 1e-3 (`f32`) or 1e-7 (`f64`) of the measurement's norm is therefore met by rounding.
+//! Coefficients are those of the normal equations: relative to the largest, they err by at most
+//! [`error_bound`].
 
 use super::dictionary::{Dictionary, padded};
 use super::kernel::{Best, Next, PANEL, Rows, Step, largest, score};
@@ -26,39 +32,41 @@ use super::scalar::Scalar;
 use super::{Limits, OmpError, Stop, finite};
 use pulp::Arch;
 
-/// How far the coefficients of `atoms` atoms may be off, relative to the norm of all of them, where `condition` is the
-/// condition number of the support's Gram matrix with atoms of unit norm: `4 K condition epsilon`, the leading term of the
-/// normal equations' backward error (N. J. Higham, *Accuracy and Stability of Numerical Algorithms*, 2nd ed., sections 10.1
-/// and 20.4) with the sums' `K epsilon`. Tests hold every problem to it.
+/// Largest error of the coefficients of `atoms` atoms, relative to the norm of all of them.
+/// `condition` is the condition number of the support's Gram matrix with atoms of unit norm. The
+/// bound is `4 K condition epsilon`, the leading term of the normal equations' backward error (N.
+/// J. Higham, *Accuracy and Stability of Numerical Algorithms*, 2nd ed., sections 10.1 and 20.4)
+/// with `K epsilon` for the sums. The tests check every problem against this bound.
 #[must_use]
 pub fn error_bound<T: Scalar>(atoms: usize, condition: f64) -> f64 {
     4.0 * atoms.max(4) as f64 * condition * T::EPSILON
 }
 
-/// Finds sparse representations over one dictionary, one measurement after another, in memory of its own.
+/// Finds sparse representations over one dictionary, one measurement after another, with its own
+/// memory.
 #[derive(Debug)]
 pub struct Solver<'d, T, D: ?Sized> {
     dictionary: &'d D,
     limits: Limits,
     arch: Arch,
     p: Vec<T>,
-    /// One over the norm of every atom that may still be chosen, 0 for the others.
+    /// One over the norm of every atom that may still be chosen, 0 for the other atoms.
     inverse_norms: Vec<T>,
     best: Vec<Best<T>>,
-    /// The second best panel when an atom was last chosen, and its best score.
+    /// The second best panel at the last choice, and its best score.
     second: (usize, T),
     rows: Rows<T>,
-    /// The atoms whose rows they are.
+    /// The atoms of the rows.
     taken: Vec<usize>,
-    /// One over the root of each one's pivot.
+    /// One over the root of each row's pivot.
     scales: Vec<T>,
-    /// Lower-triangular factor of their Gram matrix, row after row.
+    /// Lower-triangular factor of the Gram matrix of these atoms, row after row.
     factor: Vec<T>,
-    /// The atom that was the second best when a column was last taken from the Gram matrix.
+    /// The atom that was second best when a column was last read from the Gram matrix.
     ahead: Option<Ahead>,
-    /// Its column without the rows that there were then.
+    /// Its column without the rows that existed then.
     ahead_column: Vec<T>,
-    /// And what those rows say of it.
+    /// Entries of those rows for this atom.
     ahead_weights: Vec<T>,
     /// The chosen atom's entries in the rows.
     weights: Vec<T>,
@@ -66,7 +74,7 @@ pub struct Solver<'d, T, D: ?Sized> {
 }
 
 impl<'d, T: Scalar, D: Dictionary<T> + ?Sized> Solver<'d, T, D> {
-    /// Makes room for measurements by this dictionary.
+    /// A solver with memory for measurements by this dictionary.
     ///
     /// # Errors
     /// [`OmpError`] if a limit is negative or NaN.
@@ -105,20 +113,22 @@ impl<'d, T: Scalar, D: Dictionary<T> + ?Sized> Solver<'d, T, D> {
         self.solve_from(y, &[])
     }
 
-    /// Chooses atoms for the measurement `y`, taking those of `start` first, in that order: the previous frame's of a
-    /// video. Those that the measurement does not see, and those in the span of others, are passed over. Everything
-    /// holds that holds of [`solve`](Self::solve), but that the first atoms are not the best. As many of them as this solver
-    /// took first for the measurement before, in the same order, cost `N` products each instead of `N` for every atom
-    /// before them, and no column of the Gram matrix.
+    /// Chooses atoms for the measurement `y`, beginning with the atoms of `start` in that order,
+    /// for example the support of a video's previous frame. Atoms of `start` that the measurement
+    /// does not see, or that are in the span of others, are skipped. Everything that holds for
+    /// [`solve`](Self::solve) holds here, except that the first atoms are not the best ones. If
+    /// this solver took the first atoms of `start` for the measurement before, in the same order,
+    /// each of them costs only `N` products and no column of the Gram matrix.
     ///
     /// # Errors
-    /// [`OmpError`] if `y` does not fit the dictionary or is not finite, or `start` has an atom that is none.
+    /// [`OmpError`] if `y` does not fit the dictionary or is not finite, or `start` names an atom
+    /// that the dictionary does not have.
     pub fn solve_from(&mut self, y: &[T], start: &[usize]) -> Result<Path<T>, OmpError> {
         self.project(y)?;
         self.pursue(energy(y), start, &mut ())
     }
 
-    /// [`solve`](Self::solve), where `referee` chooses between atoms that are too near to each other.
+    /// [`solve`](Self::solve) with a `referee` that chooses between atoms with nearly equal scores.
     pub(super) fn solve_with(
         &mut self,
         y: &[T],
@@ -222,7 +232,7 @@ impl<'d, T: Scalar, D: Dictionary<T> + ?Sized> Solver<'d, T, D> {
         Ok(path)
     }
 
-    /// The atom of largest score, the lowest of equals.
+    /// The atom with the largest score, the lowest of equals.
     fn choose(&mut self) -> Choice {
         let (panel, score) = largest(&self.best, None);
         let atom = self.atom_of(panel, score);
@@ -242,7 +252,7 @@ impl<'d, T: Scalar, D: Dictionary<T> + ?Sized> Solver<'d, T, D> {
         atoms.clone().find(is_best).unwrap_or(atoms.start)
     }
 
-    /// Atoms of at least this score, in their order.
+    /// Atoms with at least this score, in ascending order.
     fn rivals(&self, least: f64) -> Vec<usize> {
         let near = |score: T| Into::<f64>::into(score) >= least;
         let panels = self.best.iter().enumerate().filter(|(_, best)| best.iter().any(|&b| near(b)));
@@ -253,7 +263,8 @@ impl<'d, T: Scalar, D: Dictionary<T> + ?Sized> Solver<'d, T, D> {
             .collect()
     }
 
-    /// Forgets all rows but the first of those that `start` asks for again; says how many these are.
+    /// Drops all rows after those that `start` shares with the last measurement; returns the number
+    /// of rows kept.
     fn keep(&mut self, start: &[usize]) -> usize {
         let seen = |atom: &&usize| self.dictionary.atoms().inverse_norms()[**atom] != T::default();
         let same = self.taken.iter().zip(start.iter().filter(seen)).take_while(|(a, b)| a == b);
@@ -265,7 +276,7 @@ impl<'d, T: Scalar, D: Dictionary<T> + ?Sized> Solver<'d, T, D> {
         kept
     }
 
-    /// Adds the next atom whose row is there already.
+    /// Adds the next atom, whose row exists already.
     fn take_again(&mut self, path: &mut Path<T>, remaining: &mut f64, energy: f64) {
         let at = path.support.len();
         let atom = self.taken[at];
@@ -276,13 +287,13 @@ impl<'d, T: Scalar, D: Dictionary<T> + ?Sized> Solver<'d, T, D> {
         path.add(atom, step, remaining, energy);
     }
 
-    /// Adds an atom to the path, unless it is in the span of those chosen.
+    /// Adds an atom to the path, unless the atom is in the span of the support.
     fn take(&mut self, atom: usize, path: &mut Path<T>, remaining: &mut f64, energy: f64) -> bool {
         self.weights.clear();
         self.rows.of_atom(atom, 0, &mut self.weights);
         let own: f64 = self.dictionary.atoms().energies()[atom].into();
         let pivot = own - squares(&self.weights);
-        // Not a number where the Gram matrix overflows.
+        // The comparison is false for NaN, which appears if the Gram matrix overflows.
         let independent = pivot > T::DEPENDENT * own;
         if !independent {
             return false;
@@ -301,11 +312,12 @@ impl<'d, T: Scalar, D: Dictionary<T> + ?Sized> Solver<'d, T, D> {
         true
     }
 
-    /// Makes the atom's column of the Gram matrix, orthogonal to all rows, the next row.
+    /// Adds the atom's column of the Gram matrix, orthogonalised to all rows, as the next row.
     ///
-    /// A pass over the rows takes hardly longer for two columns than for one, and the next atom is often the second
-    /// best of now: its column is brought as far as the rows go, and needs only the rows since when it is chosen. That
-    /// changes the order in which the work is done, and no bit of the result.
+    /// A pass over the rows takes hardly longer for two columns than for one, and the next atom is
+    /// often the second best of now. So the second best atom's column is orthogonalised in the same
+    /// pass, and needs only the newer rows when its atom is chosen. The results are the same to the
+    /// bit.
     fn push(&mut self, atom: usize, scale: T, step: T) {
         let dictionary = self.dictionary;
         let taken_before = self.ahead.take_if(|ahead| ahead.atom == atom);
@@ -329,7 +341,7 @@ impl<'d, T: Scalar, D: Dictionary<T> + ?Sized> Solver<'d, T, D> {
         self.rows.push(self.arch, step, &mut self.p, &mut self.best);
     }
 
-    /// Chooses the best atom of the other panels to go along; returns its column.
+    /// Chooses the best atom of the other panels for the same pass; returns its column.
     fn look_ahead(&mut self, atom: usize) -> Option<&'d [T]> {
         let (panel, score) = self.second;
         if panel == atom / PANEL || score <= T::default() {
@@ -344,21 +356,21 @@ impl<'d, T: Scalar, D: Dictionary<T> + ?Sized> Solver<'d, T, D> {
     }
 }
 
-/// An atom, its score, and by how much that is the largest.
+/// An atom, its score, and the lead of its score over the next best.
 struct Choice {
     atom: usize,
     score: f64,
     lead: f64,
 }
 
-/// A column without the first rows.
+/// A column from which the first rows are subtracted.
 #[derive(Debug)]
 struct Ahead {
     atom: usize,
     rows: usize,
 }
 
-/// Rows that are made room for at once; more take their memory as they come.
+/// Number of rows with memory from the start; further rows allocate their memory.
 const ROOM: usize = 64;
 
 /// Squared norm of a measurement.

@@ -1,29 +1,33 @@
-//! A second look, in double precision, at atoms that single precision cannot tell apart.
+//! Chooses in double precision between atoms that single precision cannot distinguish.
 //!
-//! The one law: a choice costs what it is in doubt about. The pursuit goes on in `f32`; for the few atoms whose scores lie
-//! within its rounding, the correlations with the residual are found in `f64`, from the Gram matrix of the support alone.
+//! The pursuit runs in `f32`. For the few atoms whose scores differ by no more than the rounding of
+//! `f32`, the correlations with the residual are computed in `f64`, from the Gram matrix of the
+//! support alone. So only doubtful choices cost double precision.
 //!
-//! With `G` the support's Gram matrix and `p0` its initial projection, both in `f64`, the coefficients solve `G x = p0`.
-//! The `f32` factor of `G` that the pursuit has anyway brings `x` there by iterative refinement, each step gaining what `f32`
-//! has in digits (C. B. Moler, *Iterative refinement in floating point*, 1967). Rival `j` then correlates by
-//! `d[j] y - sum over the support of G[i, j] x[i]`: some `5 K^2` products for a choice, where the whole pursuit in `f64`
-//! takes `N K^2 / 2` for a measurement.
+//! With `G` the support's Gram matrix and `p0` its initial projection, both in `f64`, the
+//! coefficients solve `G x = p0`. The pursuit's `f32` factor of `G` gives `x` by iterative
+//! refinement, where each step gains the digits of `f32` (C. B. Moler, *Iterative refinement in
+//! floating point*, 1967). The correlation of rival `j` is then
+//! `d[j] y - sum over the support of G[i, j] x[i]`: some `5 K^2` products for a choice, where the
+//! whole pursuit in `f64` takes `N K^2 / 2` for a measurement.
 
 use super::dense::DenseDictionary;
 use super::dictionary::Dictionary;
 use super::path::Path;
 use nalgebra::DMatrix;
 
-/// Who chooses between atoms whose scores are too near to each other for a number type.
+/// Chooses between atoms whose scores are too close for a number type.
 pub(super) trait Referee<T> {
-    /// Leads over the next best atom, relative to the measurement's norm, that need no referee.
+    /// Smallest lead over the next best atom, relative to the measurement's norm, that needs no
+    /// referee.
     fn believed(&self) -> f64;
 
-    /// One of `rivals`, which are at least one, in ascending order; `path` holds what was chosen before.
+    /// Chooses one of `rivals`, which are at least one, in ascending order; `path` holds the
+    /// earlier choices.
     fn choose(&mut self, path: &Path<T>, rivals: &[usize]) -> usize;
 }
 
-/// Nobody: the largest score is believed.
+/// No referee: the largest score wins.
 impl<T> Referee<T> for () {
     fn believed(&self) -> f64 {
         0.0
@@ -44,18 +48,21 @@ impl<T, R: Referee<T>> Referee<T> for Option<R> {
     }
 }
 
-/// Leads over the next best atom, relative to the measurement's norm, that are believed. Initial projections were seen to
-/// err by up to 1.02 epsilons (1024 atoms of unit norm, 256 to 1024 normal measurements).
+/// Smallest lead over the next best atom, relative to the measurement's norm, that counts as
+/// certain. Measured errors of initial projections were up to 1.02 epsilons (1024 atoms of unit
+/// norm, 256 to 1024 normal measurements).
 pub(super) const BELIEVED: f64 = 8.0 * f32::EPSILON as f64;
 
-/// Distances of the residual's energy from the limit, relative to the measurement's energy, that are believed: that energy
-/// is a difference of squares in `f32`.
+/// Smallest distance of the residual's energy from the limit, relative to the measurement's energy,
+/// that counts as certain. The residual's energy is a difference of squares in `f32`.
 pub(super) const BELIEVED_ENERGY: f64 = 64.0 * f32::EPSILON as f64;
 
-/// Change of the coefficients, relative to the largest, after which another step would change nothing but rounding.
+/// Change of the coefficients, relative to the largest, below which a further step would only add
+/// rounding.
 const REFINED: f64 = 1e-11;
 
-/// Most steps of refinement: a Gram matrix so ill-conditioned that they do not suffice ends a pursuit in `f32` before.
+/// Largest number of refinement steps. A Gram matrix that needs more steps has ended the pursuit in
+/// `f32` before.
 const STEPS: usize = 5;
 
 /// The same measurement and dictionary in double precision.
@@ -83,7 +90,7 @@ impl<'a> DoubleReferee<'a> {
         &self.matrix.as_slice()[k * rows..(k + 1) * rows]
     }
 
-    /// Inner products of atom `k` with those of `support`.
+    /// Inner products of atom `k` with the atoms of `support`.
     fn gram_of(&self, k: usize, support: &[usize]) -> Vec<f64> {
         match self.dictionary.stored_gram_column(k) {
             Some(column) => support.iter().map(|&i| column[i]).collect(),

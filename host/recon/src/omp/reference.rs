@@ -1,13 +1,15 @@
-//! Algorithm 1 of the paper, line by line, in `f64`: what every other path is checked against.
+//! Algorithm 1 of the paper, line by line, in `f64`. Every other implementation is checked against
+//! this one.
 //!
-//! The one law: clarity over speed. Symbols are the paper's; line numbers are those of its listing.
+//! The code prefers clarity to speed. Symbols are the paper's; line numbers are those of its
+//! listing.
 
 use super::dictionary::UNSEEN;
 use super::{Limits, OmpError, Scalar, Solution, Stop, finite};
 use nalgebra::{DMatrix, DVector};
 
-/// Finds a sparse `x` with `dictionary * x` near `y`. The dictionary is `measurements x atoms`, of any
-/// column norms.
+/// Finds a sparse `x` such that `dictionary * x` is near `y`. The dictionary is
+/// `measurements x atoms`, with any column norms.
 ///
 /// # Errors
 /// [`OmpError`] if shapes differ, a number is not finite or a limit is negative.
@@ -25,7 +27,7 @@ pub fn solve(dictionary: &DMatrix<f64>, y: &[f64], limits: &Limits) -> Result<So
 
     let mut phi = dictionary.clone();
     for (k, mut atom) in phi.column_iter_mut().enumerate() {
-        // Zero, so that an unseen atom correlates with nothing.
+        // A factor of zero, so that an unseen atom correlates with nothing.
         atom *= if unseen.contains(&k) { 0.0 } else { 1.0 / norms[k] };
     }
     let y = DVector::from_column_slice(y);
@@ -78,7 +80,7 @@ pub fn solve(dictionary: &DMatrix<f64>, y: &[f64], limits: &Limits) -> Result<So
     Ok(Solution { support, coefficients, residual_norms, stop, unseen })
 }
 
-/// The atom of largest |p| that is not chosen yet, the lowest of equals.
+/// The atom with the largest |p| outside the support, the lowest of equals.
 fn largest(p: &DVector<f64>, support: &[usize]) -> Option<usize> {
     (0..p.len())
         .filter(|k| !support.contains(k))

@@ -1,10 +1,17 @@
-//! Some Hadamard rows of an image that is sparse in a basis: the Gram matrix without a matrix.
+//! A dictionary for some Hadamard rows of an image that is sparse in a basis: its Gram matrix is
+//! computed without storing a matrix.
 //!
-//! The one law: everything is in orthonormal units. With `W = H / n` the measurements are `b = W x` (a recorded
-//! difference over the side `n`) and atoms have unit norm, of which the rows that were measured see a part.
+//! Everything is in orthonormal units. With `W = H / n` the measurements are `b = W x` (a recorded
+//! difference divided by the side `n`). Atoms have unit norm, of which the measured rows see a
+//! part.
 //!
-//! A column of the Gram matrix is one atom shown, measured and seen back through the rows that were measured. What that
-//! takes depends on the basis:
+//! # Invariant
+//! Projections and columns of the Gram matrix are those of the written-out matrix
+//! (`omp::tests::sampled::fast_transforms_stand_for_the_dictionary_and_its_prior`).
+//!
+//! # Columns
+//! A column of the Gram matrix is computed by showing one atom, measuring it, and projecting the
+//! measurements of the measured rows back onto all atoms. The cost depends on the basis:
 //!
 //! | basis | a column | because |
 //! |---|---|---|
@@ -13,12 +20,13 @@
 //! | wavelets | two basis and two Walsh transforms | |
 //!
 //! # A prior
-//! Atoms that the rows barely see fit anything with a huge coefficient. The [`Prior`]'s scale `s[j]` of each
-//! coefficient (its expected size) and the noise of a measurement turn least squares into the maximum a posteriori
-//! estimate under independent normal coefficients: minimise `|b - A c|^2 + noise^2 sum_j (c[j] / s[j])^2`. In
-//! `z = c / s` that is plain least squares over the dictionary `[A diag(s); noise I]` and the measurement `[b; 0]`, so
-//! Algorithm 1 needs no change: its Gram matrix is `diag(s) A^T A diag(s) + noise^2 I`, and an atom whose visible
-//! part is under the noise no longer looks attractive.
+//! An atom that the rows barely see fits anything with a huge coefficient. The [`Prior`] has a
+//! scale `s[j]` for each coefficient (its expected size) and the noise of a measurement. With them,
+//! least squares becomes the maximum a posteriori estimate under independent normal coefficients:
+//! minimise `|b - A c|^2 + noise^2 sum_j (c[j] / s[j])^2`. In `z = c / s` this is plain least
+//! squares over the dictionary `[A diag(s); noise I]` and the measurement `[b; 0]`, so Algorithm 1
+//! needs no change: its Gram matrix is `diag(s) A^T A diag(s) + noise^2 I`, and an atom whose
+//! visible part is below the noise no longer has a large score.
 
 use super::dictionary::{Atoms, Dictionary, padded};
 use crate::basis::{Basis, Transform};
@@ -31,31 +39,31 @@ pub(crate) use visible::visible_energy;
 mod visible;
 mod walsh;
 
-/// What is expected of the coefficients and of the measurements, in orthonormal units.
+/// Expected size of the coefficients and noise of the measurements, in orthonormal units.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prior {
-    /// Expected size of each coefficient, one an atom.
+    /// Expected size of each coefficient, one for each atom.
     pub scale: Vec<f32>,
     /// Standard deviation of a measurement's noise.
     pub noise: f32,
-    /// Share of its energy under which an atom counts as not seen.
+    /// Smallest share of an atom's energy that the rows must see for the atom to count as seen.
     pub visibility: f32,
 }
 
 impl Prior {
-    /// Nothing expected: Algorithm 1 as it is, for `atoms` atoms.
+    /// No prior: Algorithm 1 as printed, for `atoms` atoms.
     #[must_use]
     pub fn none(atoms: usize) -> Self {
         Self { scale: vec![1.0; atoms], noise: 0.0, visibility: 0.0 }
     }
 }
 
-/// The dictionary of a basis seen through some rows, with its prior.
+/// The dictionary of a basis measured by some rows, with its prior.
 #[derive(Debug, Clone)]
 pub struct SampledHadamard<'a> {
     transform: &'a Transform,
     rows: Vec<u32>,
-    /// 1 at rows that were measured, else 0.
+    /// 1 at measured rows, else 0.
     mask: Vec<f32>,
     prior: &'a Prior,
     atoms: Atoms<f32>,
@@ -73,11 +81,11 @@ enum Structure {
 }
 
 impl<'a> SampledHadamard<'a> {
-    /// Atoms of `transform`'s basis, seen through `rows`.
+    /// The atoms of `transform`'s basis, measured by `rows`.
     ///
     /// # Panics
-    /// If a row is not one of `0..side^2` (they are those of a [`crate::Measurements`]), or `prior` does not have
-    /// one scale an atom.
+    /// If a row is not one of `0..side^2` (rows of a [`crate::Measurements`] always are), or
+    /// `prior` does not have one scale for each atom.
     #[must_use]
     pub fn new(transform: &'a Transform, rows: &[u32], prior: &'a Prior) -> Self {
         let area = transform.side().area();
@@ -105,8 +113,8 @@ impl<'a> SampledHadamard<'a> {
         Self { transform, rows, mask, prior, atoms, structure, arch: Arch::new() }
     }
 
-    /// The measurement of every row, seen or not, that these coefficients predict, in orthonormal units. `z` are
-    /// coefficients over the prior's scale, as the pursuit returns them.
+    /// The measurement of every row, measured or not, that these coefficients predict, in
+    /// orthonormal units. `z` are coefficients over the prior's scale, as the pursuit returns them.
     #[must_use]
     pub fn predict(&self, support: &[usize], z: &[f64]) -> Vec<f32> {
         let mut grid = vec![0.0; self.prior.scale.len()];

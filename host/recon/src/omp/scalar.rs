@@ -1,7 +1,8 @@
-//! The two number types that every path but the reference is written for.
+//! The number types `f32` and `f64`, for which every implementation except the reference is
+//! written.
 //!
-//! The one law: an algorithm says nothing about the type but its rounding, so `f32` and `f64` choose alike
-//! wherever rounding does not decide.
+//! An algorithm depends on the type only through its rounding, so `f32` and `f64` choose the same
+//! atoms unless rounding decides (`omp::tests::both_number_types_find_what_the_reference_finds`).
 
 use pulp::Simd;
 use std::ops::{AddAssign, Mul, SubAssign};
@@ -19,17 +20,17 @@ pub trait Scalar:
     + AddAssign
     + SubAssign
 {
-    /// As many numbers as a vector of the machine holds.
+    /// A vector of the machine, filled with numbers of this type.
     #[doc(hidden)]
     type Vector<S: Simd>: Copy;
 
     /// Distance from 1 to the next number.
     const EPSILON: f64;
 
-    /// A pivot under this share of its atom's norm squared is rounding.
+    /// A pivot below this share of its atom's squared norm is rounding.
     #[doc(hidden)]
     const DEPENDENT: f64;
-    /// A correlation under this share of the first one is rounding.
+    /// A correlation below this share of the first one is rounding.
     #[doc(hidden)]
     const ROUNDING: f64;
 

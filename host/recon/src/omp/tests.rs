@@ -1,4 +1,4 @@
-//! Every path against the reference, on every kind of problem there is a name for.
+//! Tests of every implementation against the reference, on several kinds of problems.
 
 mod batch;
 #[cfg(feature = "gpu")]
@@ -23,11 +23,11 @@ enum Kind {
     Noisy,
     /// With columns of zeros.
     Blind,
-    /// With columns twice.
+    /// With each column twice.
     Doubled,
-    /// Of a rank far below its measurements and atoms.
+    /// With a rank far below the number of measurements and atoms.
     Deficient,
-    /// Nothing was measured.
+    /// With a measurement of zeros.
     Dark,
 }
 
@@ -122,7 +122,8 @@ fn solve<T: Scalar>(problem: &Problem, limits: &Limits) -> Solution {
     Solver::new(&dictionary, limits).unwrap().solve(&y).unwrap().solution()
 }
 
-/// How many first choices of the two agree; where they part, they must have been equally good to rounding.
+/// Number of first choices that two solutions share. Where they differ, the two choices must have
+/// been equally good to within rounding.
 fn agreeing(problem: &Problem, exact: &Solution, fast: &Solution, rounding: f64) -> usize {
     let same = exact.support.iter().zip(&fast.support).take_while(|(a, b)| a == b).count();
     if let (Some(&a), Some(&b)) = (exact.support.get(same), fast.support.get(same)) {
@@ -138,7 +139,7 @@ fn agreeing(problem: &Problem, exact: &Solution, fast: &Solution, rounding: f64)
     same
 }
 
-/// Condition number of the support's Gram matrix, atoms of unit norm.
+/// Condition number of the support's Gram matrix, with atoms of unit norm.
 fn condition(problem: &Problem, support: &[usize]) -> f64 {
     let mut atoms = problem.dictionary.select_columns(support);
     atoms.column_iter_mut().for_each(|mut atom| {
@@ -148,7 +149,7 @@ fn condition(problem: &Problem, support: &[usize]) -> f64 {
     (values.max() / values.min()).powi(2)
 }
 
-/// Same support in the same order, and coefficients within the stated bound.
+/// Checks for the same support in the same order, and coefficients within the stated bound.
 fn is_the_reference<T: Scalar>(problem: &Problem, limits: &Limits) -> Result<(), TestCaseError> {
     agrees::<T>(problem, limits, &solve::<T>(problem, limits))
 }
@@ -162,7 +163,7 @@ fn agrees<T: Scalar>(
     let exact = solve_exactly(problem, limits);
     let same = agreeing(problem, &exact, fast, 1e2 * T::EPSILON);
     prop_assert_eq!(&exact.unseen, &fast.unseen);
-    // Single precision sees the end of what it can tell sooner.
+    // Single precision reaches the limit of its rounding sooner.
     let sooner = matches!(fast.stop, Stop::Dependent | Stop::NoAtomLeft) && T::EPSILON > 1e-10;
     let (length, fast_length) = (exact.support.len(), fast.support.len());
     if same == 0 && length == 0 {
@@ -180,7 +181,8 @@ fn agrees<T: Scalar>(
     let found: Vec<f64> = fast.support.iter().zip(&fast.coefficients).map(scaled).collect();
     let size = DVector::from_column_slice(&exactly).norm();
     let condition = condition(problem, &exact.support);
-    // The promise is relative to the coefficients; ill-conditioned supports have the bound that the module states.
+    // The bound is relative to the coefficients; an ill-conditioned support has the bound of the
+    // module's documentation.
     let promised = if T::EPSILON > 1e-10 { 1e-4 } else { 1e-10 };
     let bound = error_bound::<T>(same, condition);
     for (a, b) in exactly.iter().zip(&found) {
@@ -249,7 +251,8 @@ fn each_reason_to_stop_is_stated() {
         both(&identity, &[1.0, 30.0, 0.0, 2.0], to_residual(0.1)),
         (Stop::Residual, vec![1])
     );
-    // Four measurements with a noise of 0.6 have a residual of 1.2: the 3 and the 2 are more than that, the 1 is not.
+    // Four measurements with a noise of 0.6 have a residual of 1.2: the coefficients 3 and 2 are
+    // larger, 1 is not.
     assert_eq!(both(&identity, &some, to_noise(0.6)), (Stop::Residual, vec![1, 3]));
     assert_eq!(both(&identity, &some, to_noise(0.4)), (Stop::Residual, vec![1, 3, 0]));
     assert_eq!(both(&identity, &[0.0; 4], Limits::atoms(4)), (Stop::Residual, vec![]));

@@ -1,11 +1,13 @@
 //! Methods of reconstruction behind one trait, and the list of the built-in ones.
 //!
-//! [`Reconstruct`] is what a method is: a name, and measurements to an image. A method of somebody else's implements the
-//! trait and stands beside the built-in ones wherever a `dyn Reconstruct` is taken. [`Method`] is a built-in method by
-//! name; [`Method::prepare`] checks the [settings](MethodSettings) once and gives a `dyn Reconstruct`.
+//! [`Reconstruct`] is the interface of a method: a name, and an image from measurements. A user's
+//! own method implements the trait and works wherever a `dyn Reconstruct` is accepted. [`Method`]
+//! is a built-in method by name; [`Method::prepare`] checks the [settings](MethodSettings) once and
+//! gives a `dyn Reconstruct`.
 //!
-//! A new built-in method is a file in `methods/` that defines its `METHOD`, and an entry in `methods.rs`. Argument
-//! parsers, help texts, comparisons, reports and the live page take their lists from [`Method::ALL`].
+//! A new built-in method is a file in `methods/` that defines its `METHOD`, and an entry in
+//! `methods.rs`. Argument parsers, help texts, comparisons, reports and the live page take their
+//! lists from [`Method::ALL`].
 
 use super::report::Reconstruction;
 use super::{Completion, MatrixMethod, OmpSettings, ReconstructError, Sparsity, Strength, methods};
@@ -15,7 +17,7 @@ use std::str::FromStr;
 use std::sync::Arc;
 use thiserror::Error;
 
-/// Makes an image from measurements, for one measurement after another.
+/// Makes images from measurements, one measurement after another.
 ///
 /// ```
 /// use nirspi_recon::reconstruct::{Method, MethodSettings, Reconstruct};
@@ -33,17 +35,18 @@ use thiserror::Error;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub trait Reconstruct: Send + Sync {
-    /// The method in a few words, as tables and captions show it.
+    /// The method's name in a few words, for tables and captions.
     fn name(&self) -> &str;
 
     /// The image of one measurement, in the measurements' units.
     ///
     /// # Errors
-    /// [`ReconstructError`] if there is no image; a method of one's own says why by [`ReconstructError::Failed`].
+    /// [`ReconstructError`] if there is no image. A user's own method gives its reason in
+    /// [`ReconstructError::Failed`].
     fn reconstruct(&self, measurements: &Measurements) -> Result<Reconstruction, ReconstructError>;
 
-    /// The images of a video's frames. A method that can start a frame from the one before overrides this, and marks
-    /// such frames as [`warm`](super::Report::warm).
+    /// The images of a video's frames. A method that can start a frame from the previous one
+    /// overrides this function, and marks such frames as [`warm`](super::Report::warm).
     ///
     /// # Errors
     /// As [`Reconstruct::reconstruct`].
@@ -59,19 +62,19 @@ pub trait Reconstruct: Send + Sync {
 #[derive(Clone, Copy)]
 pub struct Method(pub(super) &'static Entry);
 
-/// All that a built-in method is known by.
+/// The facts of a built-in method.
 pub(super) struct Entry {
-    /// As it is written on the command line.
+    /// The method's name on the command line.
     pub argument: &'static str,
-    /// In a few words.
+    /// The method's name in a few words.
     pub name: &'static str,
-    /// In one line, for help texts.
+    /// What the method does, in one line for help texts.
     pub about: &'static str,
     /// The settings that the method takes.
     pub takes: &'static [Setting],
-    /// The method for patterns of the user's own, if there is one.
+    /// The method for a user's own patterns, if there is one.
     pub with_matrix: Option<MatrixMethod>,
-    /// Makes the method ready.
+    /// Checks the settings and prepares the method.
     pub prepare: fn(&MethodSettings) -> Result<Box<dyn Reconstruct>, ReconstructError>,
 }
 
@@ -82,13 +85,13 @@ impl Method {
     /// Orthogonal matching pursuit, the default.
     pub const OMP: Self = methods::OMP;
 
-    /// In a few words: `total variation`.
+    /// The method's name in a few words, for example `total variation`.
     #[must_use]
     pub fn name(self) -> &'static str {
         self.0.name
     }
 
-    /// The word that [`Method::from_str`] reads: `tv`.
+    /// The word that [`Method::from_str`] reads, for example `tv`.
     #[must_use]
     pub fn argument(self) -> &'static str {
         self.0.argument
@@ -100,23 +103,24 @@ impl Method {
         self.0.about
     }
 
-    /// Whether a setting means anything to the method.
+    /// Whether the method uses a setting.
     #[must_use]
     pub fn takes(self, setting: Setting) -> bool {
         self.0.takes.contains(&setting)
     }
 
-    /// The method for patterns of the user's own instead of Hadamard rows ([`OwnMatrix`](super::OwnMatrix)), if there
-    /// is one.
+    /// The method for a user's own patterns instead of Hadamard rows
+    /// ([`OwnMatrix`](super::OwnMatrix)), if there is one.
     #[must_use]
     pub fn with_matrix(self) -> Option<MatrixMethod> {
         self.0.with_matrix
     }
 
-    /// Checks the settings and makes the method ready.
+    /// Checks the settings and prepares the method.
     ///
     /// # Errors
-    /// [`ReconstructError`] if a setting is out of range, belongs to another method, or names a GPU that is not there.
+    /// [`ReconstructError`] if a setting is out of range, belongs to another method, or names a GPU
+    /// that is missing.
     pub fn prepare(
         self,
         settings: &MethodSettings,
@@ -125,7 +129,8 @@ impl Method {
         (self.0.prepare)(settings)
     }
 
-    /// The words of the methods for which `holds`, as a list for messages: `tikhonov, fista or tv`.
+    /// The command-line words of the methods for which `holds`, as a list for messages:
+    /// `tikhonov, fista or tv`.
     #[must_use]
     pub fn listed(holds: impl Fn(Self) -> bool) -> String {
         let words: Vec<&str> =
@@ -164,11 +169,11 @@ impl fmt::Display for Method {
     }
 }
 
-/// The name of no method.
+/// Error: no method has this name.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("unknown method {found:?}, expected {}", Method::listed(|_| true))]
 pub struct ParseMethodError {
-    /// What was given.
+    /// The name that was given.
     pub found: String,
 }
 
@@ -181,7 +186,7 @@ impl FromStr for Method {
     }
 }
 
-/// A setting that means something to some methods only.
+/// A setting that only some methods use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Setting {
@@ -189,13 +194,13 @@ pub enum Setting {
     Basis,
     /// [`MethodSettings::dictionary`].
     Dictionary,
-    /// [`MethodSettings::strength`], where it is fixed.
+    /// [`MethodSettings::strength`], if it is fixed.
     Strength,
     /// [`MethodSettings::non_negative`].
     NonNegative,
-    /// [`MethodSettings::backend`], where it is a GPU.
+    /// [`MethodSettings::backend`], if it is a GPU.
     Backend,
-    /// [`Reconstruct::reconstruct_video`] starts frames from the ones before.
+    /// [`Reconstruct::reconstruct_video`] starts a frame from the previous one.
     WarmStart,
 }
 
@@ -212,37 +217,38 @@ impl fmt::Display for Setting {
     }
 }
 
-/// Images of the user's own as atoms.
+/// A user's own images as atoms.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OwnAtoms {
-    /// What reports call them.
+    /// The atoms' name in reports.
     pub name: String,
     /// Row-major images of the measurements' side, one after another.
     pub values: Arc<[f32]>,
 }
 
-/// What to ask of a [`Method`]. The defaults are those of every method's own settings.
+/// Settings of a [`Method`]. The defaults are those of every method's own settings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MethodSettings {
     /// Basis in which the image is sparse.
     pub basis: Basis,
-    /// OMP: atoms of the user's own instead of a basis.
+    /// OMP: a user's own atoms instead of a basis.
     pub dictionary: Option<OwnAtoms>,
     /// OMP: how many atoms.
     pub sparsity: Sparsity,
-    /// OMP: norm of the residual, relative to the measurements', at which no more atoms are chosen.
+    /// OMP: norm of the residual, relative to the measurements' norm, at which the pursuit stops.
     pub residual: f64,
     /// OMP: Algorithm 1 as printed, without prior and completion ([`OmpSettings::as_printed`]).
     pub as_printed: bool,
-    /// OMP: coefficients of 0 or more.
+    /// OMP: non-negative coefficients.
     pub non_negative: bool,
     /// How strong a penalty is.
     pub strength: Strength,
-    /// Whether measured rows keep their values or take those of the fit. `None`: [`Completion::Measured`], but [`Completion::Sparse`] for
-    /// Algorithm 1 as printed and with coefficients of 0 or more, because noise of the measured rows would make pixels
-    /// negative.
+    /// Whether measured rows keep their values or take those of the fit. `None` means
+    /// [`Completion::Measured`], except for Algorithm 1 as printed and for non-negative
+    /// coefficients: there `None` means [`Completion::Sparse`], because noise of the measured rows
+    /// would make pixels negative.
     pub completion: Option<Completion>,
-    /// What computes.
+    /// The backend.
     pub backend: Backend,
 }
 
@@ -264,7 +270,7 @@ impl Default for MethodSettings {
 }
 
 impl MethodSettings {
-    /// Finds mistakes before any work is done.
+    /// Checks the settings before any work is done.
     ///
     /// # Errors
     /// [`ReconstructError`] if a setting is out of range or belongs to another method.
@@ -286,7 +292,7 @@ impl MethodSettings {
         self.strength.check()
     }
 
-    /// Settings that only some methods take and that are not at their defaults.
+    /// Settings that only some methods use and that differ from their defaults.
     fn asked(&self) -> Vec<Setting> {
         let gpu = matches!(self.backend, Backend::Wgpu | Backend::Cuda);
         [
@@ -300,8 +306,8 @@ impl MethodSettings {
         .collect()
     }
 
-    /// These settings with those at their defaults that `method` does not take: what is meant where several methods are
-    /// made ready from one list of arguments.
+    /// These settings, with the settings that `method` does not use at their defaults. This
+    /// prepares several methods from one list of arguments.
     #[must_use]
     pub fn taken_by(&self, method: Method) -> Self {
         let default = Self::default();

@@ -1,4 +1,4 @@
-//! The list of the built-in methods. A new one is a file here and an entry in [`ALL`].
+//! The list of the built-in methods. A new method is a file here and an entry in [`ALL`].
 
 mod fista;
 mod hadamard;

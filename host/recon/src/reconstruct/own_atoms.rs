@@ -1,7 +1,7 @@
-//! OMP over a dictionary of the user's own: any images, any number of them.
+//! OMP over a user's own dictionary: any number of images.
 //!
-//! The one law: nothing is known of the atoms but what they look like, so all are expected alike; the noise is the only
-//! prior. Everything else is [`omp()`](super::omp)'s.
+//! All atoms have the same expected coefficient, because only their images are known; the noise is
+//! the only other part of the prior. Everything else is as in [`omp()`](super::omp).
 
 use super::pursuit::{self, Found};
 use super::{OmpReconstruction, OmpSettings, Problem, ReconstructError, Sparsity};
@@ -11,11 +11,13 @@ use crate::omp::{DenseDictionary, Limits, OmpError};
 use crate::{Measurements, fwht};
 use nalgebra::DMatrix;
 
-/// [`omp()`](super::omp) with `atoms` of the user's own instead of a basis: row-major images of the measurements' side, one
-/// after another, of any norms. The settings' basis and falloff have no say.
+/// [`omp()`](super::omp) with a user's own `atoms` instead of a basis: row-major images of the
+/// measurements' side, one after another, with any norms. The settings' basis and falloff have no
+/// effect.
 ///
 /// # Errors
-/// [`ReconstructError`] if a setting is out of range, or `atoms` are not whole images of finite numbers.
+/// [`ReconstructError`] if a setting is out of range, or `atoms` is not a number of whole images
+/// with finite pixels.
 pub fn omp_over(
     measurements: &Measurements,
     atoms: &[f32],
@@ -51,7 +53,7 @@ pub fn omp_over(
     Ok(reconstruction(&problem, found, predicted, settings.completion, choice.trust))
 }
 
-/// The atoms, of unit norm, by every row: `rows x atoms`.
+/// Measurements of the atoms, of unit norm, by every row: `rows x atoms`.
 struct Shown {
     rows: DMatrix<f32>,
     /// Expected size of a coefficient.
@@ -63,7 +65,7 @@ impl Shown {
         let area = problem.side.area();
         let mut rows = DMatrix::from_column_slice(area, atoms.len() / area, atoms);
         for mut atom in rows.column_iter_mut() {
-            // An atom of nothing stays that, and is never seen.
+            // An atom of zeros stays zero, and counts as unseen.
             let norm = atom.norm();
             if norm > 0.0 {
                 atom /= norm * problem.side.pixels() as f32;
@@ -72,7 +74,7 @@ impl Shown {
             fwht::transform(&mut values);
             atom.copy_from_slice(&values);
         }
-        // As in `prior_scale`: as much energy as was measured is expected to be.
+        // As in `prior_scale`, the expected energy of the measured rows is their measured energy.
         let mean = |row: u32| row != 0;
         let energy = problem.rows.iter().zip(&problem.values).filter(|(row, _)| mean(**row));
         let energy: f32 = energy.map(|(_, v)| v * v).sum();
@@ -82,8 +84,8 @@ impl Shown {
         Self { rows, scale }
     }
 
-    /// Chooses atoms for the measurements at some positions. A row of noise for each atom is the prior, as
-    /// [`crate::omp::sampled`] has it.
+    /// Chooses atoms for the measurements at some positions. A row of noise for each atom is the
+    /// prior, as in [`crate::omp::sampled`].
     fn pursue(
         &self,
         problem: &Problem<'_>,
@@ -100,7 +102,7 @@ impl Shown {
             });
         let mut y: Vec<f32> = positions.iter().map(|&k| problem.values[k]).collect();
         y.resize(measured + atoms, 0.0);
-        // The rows of the prior measure nothing, and are no noise.
+        // The prior's rows have no measurement and no noise.
         let share = (measured as f64 / (measured + atoms) as f64).sqrt();
         let Limits { noise, residual, .. } = problem.limits();
         let limits = Limits { sparsity: 0, residual, noise: noise * share };
@@ -108,7 +110,7 @@ impl Shown {
         pursuit::pursue(&dictionary, &y, &limits, problem.how, sparsities)
     }
 
-    /// Every row, as these atoms predict it.
+    /// Prediction of these atoms for every row.
     fn predict(&self, found: &Found) -> Vec<f32> {
         let mut predicted = vec![0.0; self.rows.nrows()];
         for (&atom, x) in found.support.iter().zip(&found.coefficients) {

@@ -1,16 +1,18 @@
-//! Pursuits of several lengths over one dictionary, with coefficients of any sign or of 0 and more.
+//! Pursuits with several numbers of atoms over one dictionary, with signed or non-negative
+//! coefficients.
 //!
-//! The one law: of `n` atoms is what a pursuit that stops at `n` finds. One without signs holds all shorter ones; one that gives
-//! atoms back does not.
+//! The result for `n` atoms is that of a pursuit that stops at `n`. One signed pursuit contains all
+//! shorter ones. A non-negative pursuit can remove atoms, so each number of atoms needs its own
+//! pursuit.
 
 use crate::omp::{
     Backend, Dictionary, Limits, OmpError, Path, Solution, Stop, nonnegative, solve_path,
 };
 
-/// Which pursuit, and where.
+/// The kind of pursuit, and its backend.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct How {
-    /// Coefficients of 0 or more; found on the processor.
+    /// Non-negative coefficients; computed on the processor.
     pub non_negative: bool,
     pub backend: Backend,
 }
@@ -20,11 +22,12 @@ pub(super) struct Found {
     pub support: Vec<usize>,
     pub coefficients: Vec<f64>,
     pub stop: Stop,
-    /// How many atoms the measurements do not see.
+    /// Number of atoms that the measurements do not see.
     pub unseen: usize,
 }
 
-/// Up to each of these numbers of atoms, the last the largest; `limits` says when to stop before.
+/// Pursues up to each of these numbers of atoms, the last number the largest; `limits` can stop a
+/// pursuit earlier.
 pub(super) fn pursue<D: Dictionary<f32>>(
     dictionary: &D,
     values: &[f32],
@@ -43,7 +46,7 @@ pub(super) fn pursue<D: Dictionary<f32>>(
 }
 
 impl Found {
-    /// The first atoms of a path.
+    /// The solution with the first atoms of a path.
     pub(super) fn first(atoms: usize, path: &Path<f32>) -> Self {
         Self {
             support: path.support[..atoms.min(path.support.len())].to_vec(),

@@ -1,11 +1,12 @@
 //! Reconstruction by a penalty on the image: Tikhonov, total variation, sparse coefficients.
 //!
-//! The one law: one number decides, the strength of the penalty relative to what noise and prior call for, and it is
-//! chosen on measurements that were held back unless the caller gives it.
+//! One number controls the penalty: its strength, relative to what noise and prior call for.
+//! Cross-validation on held-back measurements chooses the strength, unless the caller gives it.
 //!
-//! In orthonormal units, with `A` the measured rows of the scene's coefficients `c` (or pixels `x`), `sigma` the noise and
-//! `s[j]` the expected size of coefficient `j` ([`OmpSettings`](super::OmpSettings)'s prior, amplitudes as one over
-//! frequency), what is minimised is, at strength 1:
+//! The units are orthonormal. `A` gives the measured rows from the scene's coefficients `c` (or
+//! pixels `x`), `sigma` is the noise, and `s[j]` is the expected size of coefficient `j`
+//! ([`OmpSettings`](super::OmpSettings)'s prior, amplitudes as one over frequency). At strength 1
+//! the minimised sum is:
 //!
 //! | penalty | over | maximum a posteriori for |
 //! |---|---|---|
@@ -22,29 +23,30 @@ use super::{Completion, NoiseLevel, Problem, ReconstructError, image_of};
 use crate::basis::Basis;
 use crate::{Image, Measurements, fwht};
 
-/// What is held against an image.
+/// A penalty on an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Penalty {
-    /// Energy of the coefficients, weighted by what is expected of each (A. N. Tikhonov, 1963), by conjugate gradients.
+    /// Energy of the coefficients, weighted by their expected sizes (A. N. Tikhonov, 1963), by
+    /// conjugate gradients.
     Tikhonov,
     /// Magnitudes of the coefficients, by FISTA (A. Beck and M. Teboulle, *A fast iterative shrinkage-thresholding
     /// algorithm for linear inverse problems*, 2009).
     Sparse,
-    /// Total variation (L. Rudin et al., 1992), by A. Chambolle and T. Pock, *A first-order primal-dual algorithm for
-    /// convex problems*, 2011. Needs no basis.
+    /// Total variation (L. Rudin et al., 1992), by A. Chambolle and T. Pock, *A first-order
+    /// primal-dual algorithm for convex problems*, 2011. This penalty needs no basis.
     TotalVariation,
 }
 
-/// How strong a penalty is.
+/// Strength of a penalty.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Strength {
-    /// The one of five, a factor of about three apart, that predicts measurements best that were held back in this many
-    /// parts: 2 or more.
+    /// One of five strengths, a factor of about three apart: the one that predicts held-back
+    /// measurements best.
     CrossValidated {
-        /// Parts.
+        /// Number of parts that are held back in turn, 2 or more.
         folds: usize,
     },
-    /// This, relative to what noise and prior call for.
+    /// This strength, relative to what noise and prior call for.
     Fixed(f64),
 }
 
@@ -71,7 +73,7 @@ impl Strength {
 }
 
 impl Penalty {
-    /// Whether the penalty is one on coefficients, and not on pixels.
+    /// Whether the penalty is on coefficients of a basis, and not on pixels.
     #[must_use]
     pub fn has_basis(self) -> bool {
         self != Self::TotalVariation
@@ -81,24 +83,24 @@ impl Penalty {
 /// Settings of [`regularised`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RegularisedSettings {
-    /// What is held against an image.
+    /// The penalty.
     pub penalty: Penalty,
     /// Basis of the coefficients.
     pub basis: Basis,
-    /// How strong the penalty is.
+    /// Strength of the penalty.
     pub strength: Strength,
-    /// Power of the frequency by which coefficients are expected to fall.
+    /// Power of the frequency with which coefficients are expected to fall.
     pub falloff: f64,
     /// Noise of the measurements.
     pub noise: NoiseLevel,
     /// Whether measured rows keep their values or take those of the fit.
     pub completion: Completion,
-    /// Most iterations of the method.
+    /// Largest number of iterations.
     pub iterations: usize,
 }
 
 impl RegularisedSettings {
-    /// The settings that this module's tests and tables are made with.
+    /// The settings of this module's tests and tables.
     #[must_use]
     pub fn new(penalty: Penalty) -> Self {
         Self {
@@ -122,25 +124,26 @@ impl RegularisedSettings {
     }
 }
 
-/// What [`regularised`] found.
+/// The result of [`regularised`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Regularised {
     /// The image, in the measurements' units.
     pub image: Image,
     /// Strength of the penalty, relative to what noise and prior call for.
     pub strength: f64,
-    /// Share of the prediction that was used for rows not measured, 0 (zero filling) to 1.
+    /// Trust: factor on the prediction for rows that were not measured, 0 (zero filling) to 1.
     pub trust: f64,
-    /// Norm of what the prediction leaves of the measurements, relative to theirs.
+    /// Norm of the difference between the measurements and the prediction, relative to the
+    /// measurements' norm.
     pub residual: f64,
     /// Noise of a measurement, estimated or given, in the measurements' units.
     pub noise: f64,
 }
 
-/// Strengths that are tried, from the strongest on: each starts where the one before it ended.
+/// Strengths to try, the strongest first. Each starts from the result of the one before.
 const STRENGTHS: [f32; 5] = [10.0, 3.0, 1.0, 0.3, 0.1];
 
-/// Reconstructs an image from partial measurements by a penalty.
+/// Reconstructs an image from partial measurements with a penalty.
 ///
 /// # Errors
 /// [`ReconstructError`] if a setting is out of range.
@@ -182,7 +185,7 @@ pub fn regularised(
     })
 }
 
-/// Some measurements at their rows of a zero-filled grid, and a 1 at each of these rows.
+/// Some measurements in a zero-filled grid of all rows, and a mask with a 1 at each of their rows.
 struct Masked {
     grid: Vec<f32>,
     mask: Vec<f32>,
@@ -206,13 +209,13 @@ fn walsh(n: usize, grid: &mut [f32]) {
     grid.iter_mut().for_each(|v| *v /= n as f32);
 }
 
-/// All rows that coefficients predict.
+/// Replaces coefficients by the measurements of all rows that they predict.
 fn show(problem: &Problem<'_>, coefficients: &mut [f32]) {
     problem.transform.synthesise(coefficients);
     walsh(problem.side.pixels(), coefficients);
 }
 
-/// Coefficients that rows see: the transpose, and inverse, of [`show`].
+/// Replaces measurements by coefficients: the transpose, and inverse, of [`show`].
 fn see(problem: &Problem<'_>, grid: &mut [f32]) {
     walsh(problem.side.pixels(), grid);
     problem.transform.analyse(grid);

@@ -1,4 +1,4 @@
-//! What a method says of an image: numbers, and the same in words.
+//! A method's report on its image, in numbers and in words.
 
 use super::Completion;
 use crate::{Backend, Image};
@@ -9,44 +9,46 @@ use std::fmt;
 pub struct Reconstruction {
     /// The image, in the measurements' units.
     pub image: Image,
-    /// How it was made.
+    /// How the image was made.
     pub report: Report,
 }
 
-/// How an image was made. Each method fills in what means something to it; `Display` gives one line of it.
+/// How an image was made. Each method fills in the fields that apply to it; `Display` gives one
+/// line.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Report {
     /// The method, in a few words.
     pub name: String,
-    /// The basis, or what atoms of the user's own are called.
+    /// The basis, or the name of a user's own atoms.
     pub basis: Option<String>,
-    /// What computed, where the method has a choice.
+    /// The backend, for a method with a choice.
     pub backend: Option<Backend>,
-    /// The GPU that computed, if one did.
+    /// Name of the GPU, if a GPU computed.
     pub device: Option<String>,
     /// Strength of a penalty, relative to what noise and prior call for.
     pub strength: Option<f64>,
-    /// Atoms in the representation.
+    /// Number of atoms in the representation.
     pub sparsity: Option<usize>,
-    /// What became of rows that were measured.
+    /// Whether measured rows kept their values.
     pub completion: Option<Completion>,
-    /// Why there are no more atoms.
+    /// Why the pursuit stopped.
     pub stop: Option<&'static str>,
-    /// Norm of what the prediction leaves of the measurements, relative to theirs.
+    /// Norm of the difference between the measurements and the prediction, relative to the
+    /// measurements' norm.
     pub residual: Option<f64>,
-    /// Atoms that the measured rows do not see.
+    /// Number of atoms that the measured rows do not see.
     pub unseen_atoms: Option<usize>,
-    /// Share of the prediction that was used for rows not measured, 0 (zero filling) to 1.
+    /// Trust: factor on the prediction for rows that were not measured, 0 (zero filling) to 1.
     pub trust: Option<f64>,
     /// Noise of a measurement, in the measurements' units.
     pub noise: Option<f64>,
-    /// Whether the frame of a video started from the one before.
+    /// Whether a video's frame started from the previous one.
     pub warm: bool,
 }
 
 impl Report {
-    /// A report that says the method's name, and nothing else yet.
+    /// A report with the method's name only.
     pub fn new(name: impl Into<String>) -> Self {
         Self {
             name: name.into(),
@@ -65,7 +67,7 @@ impl Report {
         }
     }
 
-    /// In a few words, for a caption.
+    /// The report in a few words, for a caption.
     #[must_use]
     pub fn short(&self) -> String {
         let name = &self.name;

@@ -1,6 +1,7 @@
-//! How many atoms, and how far to trust what they predict: asked of measurements that were held back.
+//! Cross-validation: chooses the number of atoms, and the trust in their prediction, on held-back
+//! measurements.
 //!
-//! The one law: a prediction is judged only on rows it has not seen.
+//! A prediction is compared only with rows that it was not made from.
 
 use super::Problem;
 use crate::omp::OmpError;
@@ -9,22 +10,22 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
-/// What cross-validation chose.
+/// The result of cross-validation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Choice {
     pub atoms: usize,
-    /// Factor on the prediction for rows that were not measured.
+    /// Trust: factor on the prediction for rows that were not measured.
     pub trust: f32,
 }
 
-/// Factors that are tried. A coarse grid: the error is flat around its minimum.
+/// Values of trust to try. The grid is coarse because the error is flat around its minimum.
 pub(super) const TRUST: [f32; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
-/// Numbers of atoms that are tried, evenly spaced in their logarithm.
+/// Number of sparsities to try, evenly spaced in their logarithm.
 const SPARSITIES: usize = 10;
-/// Splits the measurements into folds; the split is part of the result, so it never changes.
+/// Seed of the split into folds. The split changes the result, so the seed never changes.
 const SPLIT_SEED: u64 = 0x5eed;
 
-/// How far a prediction is from what was held back.
+/// Difference between a prediction and the held-back measurements.
 #[derive(Debug, Clone, Copy, Default)]
 struct Miss {
     absolute: f64,
@@ -37,18 +38,20 @@ impl Miss {
         self.squared += other.squared;
     }
 
-    /// Relative to zero filling's, each kind counting alike: 2 is as bad as that.
+    /// The miss relative to zero filling's. Absolute and squared error count alike: 2 is as bad as
+    /// zero filling.
     fn relative_to(self, zero: Self) -> f64 {
         self.absolute / zero.absolute + self.squared / zero.squared
     }
 }
 
-/// The miss of each number of atoms and each trust.
+/// The miss for each number of atoms and each trust.
 type Misses = Vec<[Miss; TRUST.len()]>;
 
-/// The number of atoms, up to `most` and a quarter of the measurements, and the trust with the least
-/// error over `folds` held-back parts: absolute and squared error together, each relative to zero filling's. Squares
-/// alone would let the few large coefficients decide, absolute values alone the many small ones.
+/// The number of atoms, up to `most` and a quarter of the measurements, and the trust with the
+/// least error over `folds` held-back parts. The error is the sum of absolute and squared error,
+/// each relative to zero filling's: with squares alone the few large coefficients would decide,
+/// with absolute values alone the many small ones.
 pub(super) fn choose(problem: &Problem, most: usize, folds: usize) -> Result<Choice, OmpError> {
     choose_sparsity(problem, most, folds, |kept, sparsities| {
         let dictionary = problem.dictionary(kept);
@@ -57,8 +60,8 @@ pub(super) fn choose(problem: &Problem, most: usize, folds: usize) -> Result<Cho
     })
 }
 
-/// [`choose`] for any dictionary: `predict` makes the prediction of each number of atoms, from the measurements at some
-/// positions.
+/// [`choose`] for any dictionary. `predict` makes the prediction for each number of atoms, from the
+/// measurements at some positions.
 pub(super) fn choose_sparsity(
     problem: &Problem<'_>,
     most: usize,
@@ -75,8 +78,9 @@ pub(super) fn choose_sparsity(
     })
 }
 
-/// Which of `count` predictions, and how much of it, has the least error over `folds` held-back parts; none if there is
-/// nothing to hold back. `predict` makes all of them, every row of each, from the measurements at some positions.
+/// Chooses the prediction, of `count` predictions, and the trust with the least error over `folds`
+/// held-back parts; `None` if there is nothing to hold back. `predict` makes every row of all
+/// predictions, from the measurements at some positions.
 pub(super) fn choose_among(
     problem: &Problem<'_>,
     count: usize,
@@ -114,7 +118,7 @@ pub(super) fn choose_among(
     Ok(Some(best.0))
 }
 
-/// How far each prediction, and each share of it, is from what was held back.
+/// The miss of each prediction with each trust, on the held-back measurements.
 fn misses_of(problem: &Problem<'_>, predictions: &[Vec<f32>], held: &[usize]) -> Misses {
     let miss_of = |predicted: &Vec<f32>| {
         TRUST.map(|trust| {
@@ -130,8 +134,9 @@ fn misses_of(problem: &Problem<'_>, predictions: &[Vec<f32>], held: &[usize]) ->
     predictions.iter().map(miss_of).collect()
 }
 
-/// Which fold holds each measurement back; none for the all-ones row, the mean, which nothing else can predict.
-/// Neighbours in sequency go to different folds, so that each fold misses rows of every scale.
+/// The fold that holds each measurement back; `None` for the all-ones row (the mean), which no
+/// other row predicts. Neighbours in sequency go to different folds, so each fold lacks rows of
+/// every scale.
 fn split(problem: &Problem, folds: usize) -> Vec<Option<usize>> {
     let mut random = Pcg64::seed_from_u64(SPLIT_SEED);
     let mut fold_of = vec![None; problem.rows.len()];
@@ -145,15 +150,17 @@ fn split(problem: &Problem, folds: usize) -> Vec<Option<usize>> {
     fold_of
 }
 
-/// Standard deviations of a normal distribution in its median magnitude.
+/// Ratio of a normal distribution's standard deviation to its median magnitude.
 const SIGMAS_PER_MEDIAN: f32 = 1.4826;
 
-/// Noise of `f32` transforms, in units of the largest measurement: simulated scenes may have no other.
+/// Noise of `f32` transforms, in units of the largest measurement. A simulated scene may have no
+/// other noise.
 const ROUNDING: f32 = 1e-6;
 
-/// Noise of a measurement: the median magnitude over the quarter of the rows (at least eight) of highest
-/// sequency. Detail of the scene is in there too: what it returns is the level under which a coefficient cannot
-/// be told from its neighbours, an upper bound of the noise.
+/// Noise of a measurement: the median magnitude over the quarter of the rows (at least eight) with
+/// the highest sequency. These rows also contain detail of the scene, so the result is an upper
+/// bound of the noise: the level below which a coefficient cannot be distinguished from its
+/// neighbours.
 pub(super) fn noise_level(rows: &Rows, values: &[f32]) -> f32 {
     let positions = order::positions_by_sequency(rows);
     let count = (positions.len() / 4).max(8).min(positions.len());
@@ -167,7 +174,7 @@ pub(super) fn noise_level(rows: &Rows, values: &[f32]) -> f32 {
     (SIGMAS_PER_MEDIAN * median).max(ROUNDING)
 }
 
-/// Numbers from 1 to `largest`, evenly spaced in their logarithm, each once.
+/// Numbers from 1 to `largest`, evenly spaced in their logarithm, without repetition.
 fn geometric(largest: usize) -> Vec<usize> {
     let step = (largest as f64).ln() / (SPARSITIES - 1) as f64;
     let mut numbers: Vec<usize> =

@@ -20,7 +20,7 @@ fn car(detector: usize) -> Option<Measurements> {
     Some(Measurements::from_differential(&rows, d).unwrap())
 }
 
-/// Correlations with the full image: zero filling, then OMP.
+/// Correlations with the full image, of zero filling and of OMP.
 fn against_full(all: &Measurements, part: &Measurements, basis: Basis) -> (f64, f64) {
     let full = hadamard(all);
     let settings = OmpSettings { basis, ..OmpSettings::default() };
@@ -122,7 +122,7 @@ fn a_sparse_image_is_recovered_from_a_random_half() {
 #[test]
 fn atoms_of_ones_own_stand_for_a_basis_and_do_better_where_they_fit() {
     let side = side(16);
-    // Bars of all lengths and places: the scene is two of them.
+    // Bars of all lengths and places; the scene is two of these bars.
     let bar = |r: usize, c: usize, height: usize, width: usize| -> Vec<f32> {
         let inside =
             |p: usize| (r..r + height).contains(&(p / 16)) && (c..c + width).contains(&(p % 16));
@@ -162,7 +162,7 @@ fn light_that_may_not_be_negative_is_not_and_points_come_back_better() {
         points[pixel] = light;
     }
     let all = measured(side, &points);
-    // A fifth of the rows is too little for points of any sign.
+    // A fifth of the rows is too little for points with any sign.
     let part = all.take(Some(&Order::Random(3)), 0.2).unwrap();
     let signed = OmpSettings {
         basis: Basis::Pixel,
@@ -225,7 +225,7 @@ fn settings_that_make_no_sense_are_named() {
     assert!(refused(OmpSettings { sparsity, ..sound }).starts_with("folds is 1"));
 }
 
-/// Frames of a square that stands still, moves and changes places with a bar, with noise.
+/// Frames with noise: a square stands still, moves, and is replaced by a bar.
 fn video() -> Vec<Measurements> {
     let side = side(32);
     let mut random = Pcg64::seed_from_u64(5);

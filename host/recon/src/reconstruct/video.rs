@@ -1,9 +1,10 @@
 //! OMP over the frames of a video.
 //!
-//! The one law: what was decided on one frame holds for the next as long as it explains the next as well. That is the noise, the
-//! prior, the number of atoms and the trust in them, and most of the atoms: of a frame's support the first
-//! three quarters are taken over with their orthogonalised columns, and the others chosen anew. A frame of which more is left
-//! than that allows, or that has other rows, starts from scratch, and a new scene with it.
+//! Noise, prior, number of atoms and trust are computed on a scene's first frame, and stay for the
+//! next frames as long as they explain them as well. Of a frame's support, the next frame takes
+//! over the first three quarters with their orthogonalised columns, and chooses the other atoms
+//! again. A frame with other rows, or with too large a residual, starts a new scene from scratch
+//! (`tests::frames_of_a_video_start_from_the_one_before_until_the_scene_changes`).
 
 use super::pursuit::Found;
 use super::{
@@ -12,27 +13,28 @@ use super::{
 use crate::Measurements;
 use crate::omp::{Limits, Solver};
 
-/// Of four atoms, how many are taken over.
+/// Number of atoms, of every four, that the next frame takes over.
 const KEPT_OF_FOUR: usize = 3;
 
-/// Residual of a frame, relative to that of its scene's first one, above which the atoms no longer fit: the residual of
-/// some hundred measurements that are noise differs from one frame to the next by this much.
+/// Residual of a frame, relative to that of its scene's first frame, above which the atoms no
+/// longer fit. The residual of some hundred measurements of noise varies between frames by this
+/// much.
 const WORSE: f64 = 1.05;
 
 /// A frame of a video.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VideoFrame {
-    /// As [`omp()`] has it.
+    /// The frame's reconstruction, as from [`omp()`].
     pub reconstruction: OmpReconstruction,
-    /// Whether it started from the frame before.
+    /// Whether the frame started from the previous one.
     pub warm: bool,
 }
 
-/// [`omp()`] of one frame after another, each from where the one before it ended. Coefficients of 0 or more are found from
-/// scratch for each.
+/// [`omp()`] of one frame after another, each starting from the previous one. With non-negative
+/// coefficients every frame starts from scratch.
 ///
 /// # Errors
-/// As [`omp()`].
+/// The errors of [`omp()`].
 pub fn omp_video(
     frames: &[Measurements],
     settings: &OmpSettings,
@@ -52,7 +54,7 @@ pub fn omp_video(
     Ok(done)
 }
 
-/// Adds `first`, and as many frames after it as its atoms explain.
+/// Adds `first`, and as many later frames as its atoms explain.
 fn add_scene(
     first: &Measurements,
     after: &[Measurements],

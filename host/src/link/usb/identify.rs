@@ -2,8 +2,8 @@
 //!
 //! The one law: nothing here touches the bus, so all of it is tested without one.
 
-use nirspi_wire::PROTOCOL_VERSION;
 use nirspi_wire::usb::{INTERFACE_CLASS, INTERFACE_SUBCLASS, PRODUCT, PRODUCT_ID, VENDOR_ID};
+use nirspi_wire::version;
 use std::fmt;
 use std::io;
 use thiserror::Error;
@@ -49,7 +49,7 @@ pub struct DeviceId {
 pub struct UsbCamera {
     /// Serial number.
     pub serial: Option<String>,
-    /// Protocol version, where the system shows the interface before the device is open.
+    /// Oldest protocol version that the camera speaks, where the system shows the interface before the device is open.
     pub protocol: Option<u16>,
 }
 
@@ -96,17 +96,13 @@ pub fn choose<'c, T>(
     }
 }
 
-/// Whether the two sides can talk, by the version in the interface's descriptor. It has 8 bits, so versions are
-/// compared modulo 256; the greeting compares them whole.
+/// Whether the camera can be greeted, by its interface's descriptor, which names the oldest version that the camera
+/// speaks.
 ///
 /// # Errors
 /// [`UsbError::Version`].
-pub fn check_version(protocol: u16) -> Result<(), UsbError> {
-    if protocol == PROTOCOL_VERSION & 0xFF {
-        Ok(())
-    } else {
-        Err(UsbError::Version { camera: protocol })
-    }
+pub fn check_version(oldest: u16) -> Result<(), UsbError> {
+    if oldest <= version::CURRENT { Ok(()) } else { Err(UsbError::Version { oldest }) }
 }
 
 /// Why a USB camera cannot be used.
@@ -128,12 +124,12 @@ pub enum UsbError {
     },
     /// The two sides speak different versions.
     #[error(
-        "the camera's USB descriptor says protocol version {camera}, this program speaks {PROTOCOL_VERSION}: update {}",
-        if *.camera > PROTOCOL_VERSION { "this program" } else { "the camera's firmware (nirspi flash)" }
+        "the camera's USB descriptor asks for protocol version {oldest} or newer, this program speaks up to {}: update this program",
+        version::CURRENT
     )]
     Version {
-        /// The camera's.
-        camera: u16,
+        /// The oldest that the camera speaks.
+        oldest: u16,
     },
     /// The system does not let this user.
     #[error("no permission to open {camera}{}", permission_hint(cfg!(target_os = "linux")))]
@@ -200,7 +196,7 @@ mod tests {
     fn a_camera_is_known_by_ids_name_and_interface_together() {
         let found = recognise(&camera("A1")).unwrap();
         assert_eq!(found.serial.as_deref(), Some("A1"));
-        assert_eq!(found.protocol, Some(PROTOCOL_VERSION));
+        assert_eq!(found.protocol, Some(version::MIN));
         let changes: [&dyn Fn(&mut DeviceId); 6] = [
             &|device| device.vendor ^= 1,
             &|device| device.product ^= 1,
@@ -236,12 +232,11 @@ mod tests {
     }
 
     #[test]
-    fn a_version_mismatch_says_which_side_to_update() {
-        check_version(PROTOCOL_VERSION).unwrap();
-        let newer = check_version(PROTOCOL_VERSION + 1).unwrap_err().to_string();
+    fn a_camera_that_no_longer_speaks_our_version_says_to_update_the_program() {
+        check_version(version::MIN).unwrap();
+        check_version(version::CURRENT).unwrap();
+        let newer = check_version(version::CURRENT + 1).unwrap_err().to_string();
         assert!(newer.contains("update this program"), "{newer}");
-        let older = check_version(PROTOCOL_VERSION - 1).unwrap_err().to_string();
-        assert!(older.contains("nirspi flash"), "{older}");
     }
 
     #[test]

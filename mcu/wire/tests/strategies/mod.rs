@@ -3,10 +3,10 @@
 //! Messages borrow; here they borrow from leaked memory, a few megabytes in a test run.
 
 use nirspi_wire::{
-    Answer, Command, ConfigField, ConfigProblem, Configuration, CrashReport, Depth, DeviceMessage,
-    Event, EventKind, Fault, Frame, FrameFlags, GatewareChunk, Identity, PatternOrder, Raw,
-    RebootInto, Refusal, Reply, Request, RunLength, SampleSource, Samples, SelfTestReport, State,
-    Status, Version, message::GATEWARE_CHUNK_MAX, samples::Words,
+    Answer, Capabilities, Command, ConfigField, ConfigProblem, Configuration, CrashReport, Depth,
+    DeviceMessage, Event, EventKind, Fault, Frame, FrameFlags, GatewareChunk, Identity,
+    PatternOrder, Raw, RebootInto, Refusal, Reply, Request, RunLength, SampleSource, Samples,
+    SelfTestReport, State, Status, Tail, Version, message::GATEWARE_CHUNK_MAX, samples::Words,
 };
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -141,6 +141,7 @@ fn refusal() -> impl Strategy<Value = Refusal> {
         Just(Refusal::GatewareCrc),
         Just(Refusal::Unsupported),
         Just(Refusal::Bus),
+        Just(Refusal::Unknown),
     ]
 }
 
@@ -152,9 +153,11 @@ prop_compose! {
     fn identity()(
         firmware in version(), gateware in version(), board in text(), serial in text(),
         (protocol, side, adc_hz, adc_bits, wavelength_nm) in any::<(u16, u8, u32, u8, u16)>(),
+        capabilities in any::<Option<u32>>(),
     ) -> Identity<'static> {
         Identity {
             protocol, firmware, gateware, board, serial, side, adc_hz, adc_bits, wavelength_nm,
+            capabilities: Tail(capabilities.map(Capabilities)),
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The capture's own calibration through the RTL: latency, response and dark level from raw bursts.
+//! Tests of calibration through the RTL: latency, response and dark level from raw bursts.
 
 use crate::{check_image, noiseless, session};
 use nirspi::capture::{Calibration, Capture, CaptureOptions, Ended, capture};
@@ -8,7 +8,7 @@ use nirspi_recon::Order;
 use nirspi_tests_rtl::RtlFpga;
 use std::ops::ControlFlow;
 
-/// One frame by an instrument that has found out its latency and leak itself.
+/// One frame of an instrument that has measured its own latency and leak.
 fn calibrated(mut session: Session) -> Capture {
     let setup = MeasurementSetup::new(&Order::Natural, 1.0).unwrap();
     let options =

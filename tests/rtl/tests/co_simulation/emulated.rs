@@ -1,4 +1,5 @@
-//! Firmware as machine code on the emulated board, in front of the simulated RTL: everything but the silicon.
+//! Tests of the firmware's machine code on the emulated board, in front of the simulated RTL:
+//! everything except the chips.
 
 use crate::ideal;
 use nirspi::capture::Ended;

@@ -1,6 +1,8 @@
-//! From light to image through the RTL: host, firmware, four SPI lines, gateware, LEDs, photodiode.
+//! Tests from light to image through the RTL: host, firmware, four SPI lines, gateware, LEDs,
+//! photodiode.
 //!
-//! The golden model's camera gets the same scene and the same commands, and gives the same bytes.
+//! A camera with the golden model gets the same scene and the same commands, and must give the same
+//! bytes.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap in a helper fails its test")]
 
 mod calibration;
@@ -21,10 +23,11 @@ use std::time::Duration;
 use tap::{Log, Tap};
 
 const PX: usize = 64;
-/// A bus of 16.7 MHz takes longer to read a frame than the FPGA to make one: only the first of a run is sure to come.
+/// Number of frames. A bus of 16.7 MHz reads a frame more slowly than the FPGA makes one, so only a
+/// run's first frame is sure to arrive.
 const FRAMES: u32 = 1;
 
-/// A ring on rough ground: every one of the 1024 patterns has something to say about it.
+/// A ring on a rough ground: each of the 1024 patterns has a measurement different from zero.
 fn scene() -> Scene {
     let rough = |r: usize, c: usize| (r * 37 + c * 101 + r * c * 13) % 97;
     let reflectance = (0..PX * PX).map(|p| {
@@ -39,7 +42,7 @@ fn ideal() -> VirtualOptics {
     VirtualOptics::new(scene(), 300.0).unwrap().ideal()
 }
 
-/// LEDs, amplifier and ADC as slow as they are by default; no noise.
+/// LEDs, amplifier and ADC with their default settling times, without noise.
 fn noiseless() -> VirtualOptics {
     VirtualOptics::new(scene(), 300.0).unwrap().noiseless()
 }
@@ -56,7 +59,7 @@ fn run(session: &mut Session, setup: &MeasurementSetup, frames: u32) -> Capture 
     capture(session, &options, &mut |_| ControlFlow::Continue(())).unwrap()
 }
 
-/// The RTL's capture, once the golden model's has given the same bytes.
+/// Captures with the RTL, after a check that the golden model's capture has the same bytes.
 fn both(optics: &VirtualOptics, setup: &MeasurementSetup, frames: u32) -> Capture {
     let (rtl, rtl_log) = Tap::new(RtlFpga::new(optics, 1));
     let captured = run(&mut session(optics, rtl), setup, frames);
@@ -81,7 +84,8 @@ fn first_difference(rtl: &[Vec<u8>], golden: &[Vec<u8>]) -> String {
     "one of them gave more".into()
 }
 
-/// Every measurement of an ideal camera is the transform of the scene, to within the rounding of its two readings.
+/// Checks every measurement of an ideal camera against the transform of the scene, to within the
+/// rounding of its two readings.
 fn check(captured: &Capture) {
     let optics = ideal();
     let counts = optics.budget().electrons_per_led / optics.chain().electrons_per_count;
@@ -99,7 +103,7 @@ fn check(captured: &Capture) {
     }
 }
 
-/// The image of a full set of measurements is the scene's.
+/// Checks that the image of a full set of measurements is the scene.
 fn check_image(optics: &VirtualOptics, measurements: &Measurements) {
     let image = reconstruct::hadamard(measurements);
     let side = Side::INSTRUMENT.pixels();
@@ -135,7 +139,7 @@ fn slow_leds_and_a_late_adc_give_the_same_bytes_with_the_same_latency() {
     both(&optics, &setup, FRAMES);
 }
 
-/// What calibration works on: the same burst, so the same latency and leak.
+/// Calibration uses a raw burst: equal bursts give equal latency and leak.
 #[test]
 fn a_calibration_burst_through_the_rtl_is_that_of_the_golden_model() {
     let optics = noiseless();

@@ -1,13 +1,13 @@
-//! What an FPGA gives its firmware, noted on the way.
+//! A tap that records what an FPGA gives its firmware.
 //!
-//! Nothing is changed but the moment of a start, and that only where it is asked for.
+//! A tap changes nothing, except the clock of a start where a test asks for that.
 
 use nirspi::virtual_camera::SimulatedFpga;
 use nirspi_mcu::{BusError, FpgaBus};
 use nirspi_wire::register::{Register, control};
 use std::sync::{Arc, Mutex};
 
-/// Bytes of each frame and burst, in the order in which they came.
+/// Bytes of each frame and burst, in order of arrival.
 #[derive(Debug, Clone, Default)]
 pub struct Log(Arc<Mutex<Vec<Vec<u8>>>>);
 
@@ -30,12 +30,12 @@ impl<F: SimulatedFpga> Tap<F> {
         (Self { fpga, log: log.clone(), start_at: None }, log)
     }
 
-    /// Runs start at this clock: firmware behind another bus gets there at another time.
+    /// Delays starts to this clock: firmware behind another bus starts at another time.
     pub fn starting_at(self, clock: u64) -> Self {
         Self { start_at: Some(clock), ..self }
     }
 
-    /// The same bytes are offered again until they are released.
+    /// Records new bytes once. The bus gives the same bytes again until their release.
     fn note(log: &Log, bytes: Option<&[u8]>) {
         let mut log = log.0.lock().unwrap();
         if let Some(bytes) = bytes

@@ -1,4 +1,4 @@
-//! The two banks of sums.
+//! Tests of the two banks of sums.
 
 use super::bundles::Place;
 use crate::bench::Bench;
@@ -17,10 +17,10 @@ fn last_sample(index: u64, complement: bool, sweep_first: bool) -> u64 {
     Place::fields(Some(place)).iter().fold(0, |word, &(value, width)| word << width | value)
 }
 
-/// The sums of the accumulators' bank 0, in which everything was summed.
+/// The module; all sums go to bank 0.
 struct Accumulators {
     bench: Bench,
-    /// The sum comes a clock after its slot.
+    /// The sum of the slot before: a sum comes a clock after its slot.
     sum: u64,
     overflows: usize,
 }
@@ -65,7 +65,8 @@ fn every_slot_is_added_once_however_soon_it_comes_again(project: &Project) {
             sums.clock(last_sample(index as u64, complement, true), *sum);
         }
     }
-    // Of few addresses, so that they come back after 1, 2, 3... clocks; with clocks between.
+    // Few addresses, so that an address comes back after 1, 2, 3... clocks, with idle clocks
+    // between.
     for round in 0..30_000 {
         if dice.once_in(3) {
             sums.clock(0, dice.range(0, (1 << 30) - 1));
@@ -106,7 +107,7 @@ fn a_word_wraps_at_48_bits_and_says_so_in_that_clock(project: &Project) {
 
 fn the_host_reads_the_bank_that_is_not_being_filled(project: &Project) {
     let mut sums = Accumulators::new(project);
-    // One bank, then the other, each with sums of its own.
+    // One bank after the other, each with its own sums.
     for (bank, offset) in [(false, 100), (true, 200)] {
         sums.bench.set("filling", bank);
         for index in 0..1024 {

@@ -1,4 +1,4 @@
-//! The RAM under the sums.
+//! Tests of the RAM that holds the sums.
 
 use crate::bench::Bench;
 use crate::project::Project;
@@ -11,7 +11,7 @@ fn a_word_is_read_from_the_clock_after_its_writing_on(project: &Project) {
     let mut bench = Bench::new(project, "bank_ram");
     let dice = &mut Dice::new(2);
     let mut words = BTreeMap::new();
-    // What the clocks before have asked for; nothing where that was undefined.
+    // The reads of the clocks before; `None` where the answer is undefined.
     let mut asked = [None; 2];
     let mut compared = 0;
     for clock in 0..20_000 {
@@ -19,7 +19,7 @@ fn a_word_is_read_from_the_clock_after_its_writing_on(project: &Project) {
             assert_eq!(bench.get("read_data"), word, "clock {clock}");
             compared += 1;
         }
-        // Few addresses, among them the highest.
+        // A few addresses, the highest one among them.
         let address = |dice: &mut Dice| if dice.once_in(9) { 2047 } else { dice.range(0, 15) };
         let (from, to, word) = (address(dice), address(dice), dice.next() >> 16);
         let write = dice.once_in(2);

@@ -1,6 +1,6 @@
-//! The bundles of `types.veryl` as ports pack them, and where a clock of a run lies.
+//! The bundles of `types.veryl` as ports pack them, and the position of a clock in a run.
 //!
-//! The one law: nothing here counts; a place follows from the clock by division.
+//! The position is computed by division, so it is independent of the RTL's counters.
 
 use crate::bench::Field;
 use crate::scenario::Dice;
@@ -60,7 +60,7 @@ pub const PLACE: [usize; 10] = [1, 1, 1, 1, 10, 1, 1, 1, 1, 1];
 pub const HEADER: [usize; 5] = [16, 32, 32, 32, 64];
 
 impl Settings {
-    /// A run of some hundred clocks at most.
+    /// Random settings of a run of some hundred clocks at most.
     pub fn random(dice: &mut Dice) -> Self {
         let dwell = if dice.once_in(3) { 1 } else { dice.range(1, 7) };
         Self {
@@ -75,7 +75,7 @@ impl Settings {
         }
     }
 
-    /// As `types::Settings`.
+    /// The settings as the fields of `types::Settings`.
     pub fn fields(&self) -> Vec<Field> {
         let values = [
             self.raw.into(),
@@ -106,7 +106,7 @@ impl Settings {
         values.into_iter().zip(SETTINGS).collect()
     }
 
-    /// Slots that a pattern has.
+    /// Number of slots of a pattern.
     pub fn halves(&self) -> u64 {
         1 + u64::from(self.differential)
     }
@@ -116,7 +116,7 @@ impl Settings {
     }
 }
 
-/// Where a clock lies in a run, as `types::Place`.
+/// Position of a clock in a run, as `types::Place`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Place {
     pub slot_first: bool,
@@ -131,7 +131,7 @@ pub struct Place {
 }
 
 impl Place {
-    /// Clock `t` of a run; none once it is over.
+    /// Position of clock `t`; `None` after the end of the run.
     pub fn of(settings: &Settings, t: u64) -> Option<Self> {
         let (frame, clock) = (t / settings.frame_clocks(), t % settings.frame_clocks());
         let endless = settings.frames == 0 || settings.raw;
@@ -154,10 +154,10 @@ impl Place {
         })
     }
 
-    /// As a port gives it; none where it is not active.
+    /// Position as a port gives it; `None` where the port says inactive.
     ///
     /// # Panics
-    /// If anything that belongs to a clock is set outside of a run.
+    /// If the port sets any field of a position outside a run.
     pub fn from_fields(fields: &[u64]) -> Option<Self> {
         let is = |field: usize| fields[field] != 0;
         if !is(0) {
@@ -178,7 +178,7 @@ impl Place {
         })
     }
 
-    /// The same for a clock outside of a run.
+    /// The fields for a position; all 0 outside a run.
     pub fn fields(place: Option<Self>) -> Vec<Field> {
         let values = place.map_or([0; 10], |place| {
             [

@@ -1,4 +1,4 @@
-//! The FIFO between the clocks.
+//! Tests of the FIFO between the clocks.
 
 use crate::bench::Bench;
 use crate::project::Project;
@@ -19,7 +19,7 @@ fn the_fifo_gives_every_byte_once_and_in_order_whatever_the_clocks(project: &Pro
             let (mut was_full, mut was_empty) = (false, false);
             for clock in 0..20_000u64 {
                 let side = if clock % (ratio + 1) == 0 { slow } else { fast };
-                // Bursts of either kind fill and drain it.
+                // Bursts of writes fill the FIFO and bursts of reads drain it.
                 let eager = (clock / 700).is_multiple_of(3) != (side == "write");
                 let wants = if eager { !dice.once_in(8) } else { dice.once_in(32) };
                 if side == "write" {

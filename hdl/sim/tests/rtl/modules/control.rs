@@ -1,15 +1,16 @@
-//! Accesses and what they set off.
+//! Tests of accesses and their effects.
 
 use crate::bench::Bench;
 use crate::project::Project;
 use crate::scenario::Dice;
 use nirspi_wire::register::{ORDER_TABLE, Register, control};
 
-/// `types::DEPTH`: clocks from the choice of a slot to the end of what it sets off.
+/// `types::DEPTH`: clocks from the choice of a slot to its last effect.
 const DEPTH: u64 = 13;
 /// Clocks from a request to its effect.
 const ACCESS: u64 = 2;
-/// Clocks from a request to its answer: one more than the first clock of a run that it started, and some.
+/// Clocks from a request to its answer: a little more than to the first clock of a run that the
+/// request started.
 const ANSWER: u64 = ACCESS + DEPTH + 6;
 
 laws![
@@ -19,7 +20,7 @@ laws![
     whatever_ends_a_run_ends_it_with_that_clock,
 ];
 
-/// The module with nothing in the way of a start.
+/// The module, ready to accept a start.
 fn bench(project: &Project) -> Bench {
     let mut bench = Bench::new(project, "control");
     bench.set("in_range", true);
@@ -27,7 +28,7 @@ fn bench(project: &Project) -> Bench {
     bench
 }
 
-/// Asks for a write; ends in the clock of its effect.
+/// Requests a write; returns in the clock of its effect.
 fn write(bench: &mut Bench, address: u16, data: u32) {
     bench.set("is_write", true);
     bench.set("address", address);
@@ -40,7 +41,7 @@ fn write(bench: &mut Bench, address: u16, data: u32) {
     }
 }
 
-/// From the clock of an effect to the answer and a clock beyond.
+/// Goes from the clock of an effect to one clock after the answer.
 fn answer(bench: &mut Bench) {
     for _ in 0..=ANSWER - ACCESS {
         bench.tick();
@@ -64,7 +65,7 @@ fn an_access_takes_effect_once_and_is_answered_once(project: &Project) {
     }
 }
 
-/// What a write does, by the register map.
+/// The effects of a write, by the register map.
 #[derive(Debug, PartialEq, Eq)]
 struct Effects {
     stop: bool,
@@ -80,7 +81,7 @@ fn a_control_write_does_what_its_bits_say(project: &Project) {
     let (mut running, mut config_error, mut write_refused) = (false, false, false);
     let mut begun = 0;
     for _ in 0..1500 {
-        // Something may have ended the run since.
+        // The run may have ended since.
         if dice.once_in(6) {
             let cause = dice.pick(&["trips", "ends"]);
             bench.set(cause, true);
@@ -100,7 +101,7 @@ fn a_control_write_does_what_its_bits_say(project: &Project) {
         bench.set("interlock_now", interlock);
         bench.set("in_range", in_range);
         write(&mut bench, address, data);
-        // The interlock may end the run in the very moment of the access, which comes after it.
+        // The interlock may end the run in the clock of the access; the access then comes second.
         let opens = running && dice.once_in(8);
         bench.set("opens", opens);
         running &= !opens;
@@ -152,7 +153,7 @@ fn a_run_goes_through_the_machine_in_fixed_time(project: &Project) {
             at(8, "go_raw", &mut bench);
             at(DEPTH, "arrives", &mut bench);
             at(DEPTH + 1, "first", &mut bench);
-            // Until it comes to its own first clock, the run that was stopped has ended.
+            // A stopped run has ended when its own first clock would come.
             let running = clock > DEPTH || clock == 0 && run > 0;
             assert_eq!(bench.is("running"), running, "clock {clock} of run {run}");
             bench.tick();

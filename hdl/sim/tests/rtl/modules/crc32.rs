@@ -1,4 +1,4 @@
-//! The checksum.
+//! Tests of the checksum.
 
 use crate::bench::Bench;
 use crate::project::Project;
@@ -16,7 +16,7 @@ fn the_checksum_is_that_of_wire(project: &Project) {
         bench.tick();
         bench.set("clear", false);
         for &byte in &bytes {
-            // Clocks without `take` must not count.
+            // A clock without `take` must not count its octet.
             bench.set("octet", dice.next());
             bench.set("take", false);
             bench.tick();

@@ -1,4 +1,4 @@
-//! Accesses between the clocks.
+//! Tests of accesses that cross between the two clocks.
 
 use crate::bench::Bench;
 use crate::project::Project;
@@ -12,12 +12,12 @@ laws![
 /// Operation, address, data.
 type Access = [u64; 3];
 
-/// Both sides, their clocks in any order.
+/// Both sides of the crossing; the test chooses the order of the clocks.
 struct Rig {
     bench: Bench,
-    /// Accesses that came over.
+    /// Accesses that arrived on the other side.
     requests: Vec<Access>,
-    /// Answers that came back.
+    /// Answers that arrived back.
     answers: Vec<u64>,
 }
 
@@ -48,7 +48,8 @@ impl Rig {
         self.bench.edge("clk_adc");
     }
 
-    /// So many edges of one clock, with some of the other between; what crosses must stand still meanwhile.
+    /// Makes `count` edges of one clock with random edges of the other between them; the crossing
+    /// access must stay unchanged meanwhile.
     fn edges(&mut self, dice: &mut Dice, count: u64, stands: Option<Access>) {
         let host_is_slow = dice.once_in(2);
         let at_most = dice.range(1, 6);
@@ -74,7 +75,7 @@ impl Rig {
         self.bench.set("send", true);
         self.host_edge();
         self.bench.set("send", false);
-        // The host goes on to something else.
+        // The host moves on to another access.
         for port in ["operation_in", "address_in", "data_in"] {
             self.bench.set(port, 0u64);
         }

@@ -1,4 +1,4 @@
-//! The light budget.
+//! Tests of the light budget.
 
 use crate::bench::Bench;
 use crate::project::Project;
@@ -11,7 +11,8 @@ fn the_light_budget_is_a_sum_over_its_window(project: &Project) {
     let dice = &mut Dice::new(3);
     let mut spent = 0u64;
     for run in 0..200 {
-        // A run: idle clocks in which the limit is set anew, then lit ones until it is exceeded.
+        // One run: idle clocks in which the limit changes, then lit clocks until the light exceeds
+        // the limit.
         let limit = dice.range(0, 60);
         bench.set("limit", limit);
         bench.set("running", false);

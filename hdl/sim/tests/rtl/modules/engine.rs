@@ -1,4 +1,4 @@
-//! Everything on the ADC's clock, at its edge: accesses, light, samples, bytes.
+//! Tests of everything on the ADC's clock: accesses, light, samples, bytes.
 
 use super::bundles::{Place, Settings};
 use crate::bench::Bench;
@@ -10,7 +10,8 @@ use nirspi_wire::register::{FaultCode, Register as R, control, mode};
 
 /// Clocks from the access that starts a run to the lines of its first slot.
 const TO_LIGHT: u64 = 7;
-/// Clocks that LEDs are lit after the one whose sample or cost ends their run: it is done with seven clocks later.
+/// Clocks for which the LEDs stay lit after the sample or the light that ends their run: the run
+/// ends seven clocks later.
 const TO_DARK: u64 = 7;
 
 laws![
@@ -21,18 +22,18 @@ laws![
     light_costs_what_the_register_map_says,
 ];
 
-/// The engine, its host and a count of its clocks.
+/// The engine, its host and a count of clocks.
 struct Engine {
     bench: Bench,
     clock: u64,
-    /// Of the last access that took effect.
+    /// Clock of the last access that took effect.
     accessed: u64,
-    /// The ADC: code by clock.
+    /// The ADC's code in each clock.
     code: fn(u64) -> u64,
 }
 
 impl Engine {
-    /// After reset, interlock closed.
+    /// The engine after reset, with the interlock closed.
     fn new(project: &Project) -> Self {
         let mut engine =
             Self { bench: Bench::new(project, "engine"), clock: 0, accessed: 0, code: |_| 0 };
@@ -45,7 +46,7 @@ impl Engine {
         self.bench.set("interlock", true);
         self.bench.set("byte_taken", false);
         self.clock = 0;
-        // The interlock goes through as many stages as a run.
+        // The interlock passes as many stages as a run.
         self.clocks(20);
     }
 
@@ -64,7 +65,7 @@ impl Engine {
         }
     }
 
-    /// Ticks until a port is set.
+    /// Ticks until a port is high.
     fn until(&mut self, port: &str) {
         let from = self.clock;
         while !self.bench.is(port) {
@@ -94,7 +95,7 @@ impl Engine {
         self.access(READ_REGISTER, register.address(), 0)
     }
 
-    /// Writes settings and begins a run; gives the clock of its first light.
+    /// Writes settings and begins a run; returns the clock of its first light.
     fn start(&mut self, settings: &Settings) -> u64 {
         let mode = if settings.differential { mode::DIFFERENTIAL } else { 0 };
         for (register, value) in [
@@ -122,7 +123,7 @@ impl Engine {
         self.clock
     }
 
-    /// Clocks until it is dark, with the light of this clock.
+    /// Number of clocks until the LEDs are dark, with the current one.
     fn lit_clocks(&mut self) -> u64 {
         let from = self.clock;
         while self.bench.is("enable") {
@@ -132,7 +133,7 @@ impl Engine {
         self.clock - from
     }
 
-    /// The first bytes of the next frame, which is then given back.
+    /// The first bytes of the next frame; the frame is then released.
     fn frame(&mut self, count: usize) -> Vec<u8> {
         self.until("frame_ready");
         self.access(READ_FRAME, 0, 0);
@@ -185,7 +186,7 @@ fn a_frame_says_when_its_first_slot_was_lit(project: &Project) {
     let mut engine = Engine::new(project);
     let dice = &mut Dice::new(39);
     for _ in 0..15 {
-        // Frames that take longer than a header is read.
+        // Frames that take longer than the read of a header.
         let settings = Settings { patterns: 60, dwell: 9, blank: 0, frames: 2, ..random(dice) };
         let light = engine.start(&settings);
         let shown = [(); 2].map(|()| {
@@ -193,7 +194,7 @@ fn a_frame_says_when_its_first_slot_was_lit(project: &Project) {
             FpgaFrame::parse_header(&header).unwrap().clock
         });
         assert_eq!(shown[1] - shown[0], settings.frame_clocks(), "{settings:?}");
-        // The host reads the clock as of its access; a run begins 14 clocks after its own.
+        // The host reads the clock of its access; a run begins 14 clocks after its access.
         engine.read(R::ClockLow);
         let read_at = engine.accessed;
         let now = u64::from(engine.read(R::ClockLow)) - (engine.accessed - read_at);
@@ -229,7 +230,7 @@ fn leds_are_lit_for_the_watchdogs_clocks_after_any_access(project: &Project) {
             match dice.range(0, 2) {
                 0 => drop(engine.read(R::Status)),
                 1 => engine.set(R::Scratch, 1),
-                // Where there is nothing.
+                // An address without a register.
                 _ => drop(engine.access(READ_REGISTER, 0x900, 0)),
             }
             assert!(engine.bench.is("enable"), "dark though fed, watchdog {watchdog}");
@@ -249,7 +250,7 @@ fn light_costs_what_the_register_map_says(project: &Project) {
         let settings =
             Settings { patterns: dice.range(1, 3), frames: 0, duty_limit: limit, ..random(dice) };
         engine.start(&settings);
-        // Natural order: index 0 is pattern 0, which lights all, and its complement none.
+        // In natural order index 0 is pattern 0, which lights all LEDs; its complement lights none.
         let cost = |t| match Place::of(&settings, t).unwrap() {
             Place { index: 0, complement: false, .. } => 2,
             Place { index: 0, complement: true, .. } => 0,

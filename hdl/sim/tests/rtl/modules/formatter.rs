@@ -1,4 +1,4 @@
-//! Frames and bursts as bytes.
+//! Tests of frames and bursts as bytes.
 
 use super::bundles::{HEADER, Settings};
 use crate::bench::Bench;
@@ -13,7 +13,7 @@ laws![
     whatever_is_opened_ends_what_was_going_on,
 ];
 
-/// A bank and a burst behind the module, with the clocks that they take to answer.
+/// A bank and a burst behind the module, with the clocks that they need to answer.
 struct Rig<'d> {
     bench: Bench,
     dice: &'d mut Dice,
@@ -31,7 +31,7 @@ impl<'d> Rig<'d> {
         Self { bench, dice, sums, words, sums_asked: [0; 3], words_asked: [0; 2] }
     }
 
-    /// One clock; the byte that goes with it.
+    /// One clock; returns the byte of this clock.
     fn tick(&mut self, taken: bool) -> Option<u8> {
         self.bench.set("sum_word", self.sums[self.sums_asked[2] as usize]);
         self.bench.set("raw_word", self.words[self.words_asked[1] as usize]);
@@ -46,14 +46,14 @@ impl<'d> Rig<'d> {
 
     fn open(&mut self, what: &str) {
         self.bench.set(what, true);
-        // The engine says so with either of the others too.
+        // The engine sets `open_none` together with either of the others.
         self.bench.set("open_none", true);
         self.tick(false);
         self.bench.set(what, false);
         self.bench.set("open_none", false);
     }
 
-    /// Bytes until none has come for long, taken by a host that now and then makes them wait.
+    /// Bytes until none has come for long; the host sometimes makes them wait.
     fn bytes(&mut self, at_most: usize) -> Vec<u8> {
         let mut bytes = Vec::new();
         let mut idle = 0;
@@ -66,7 +66,7 @@ impl<'d> Rig<'d> {
         bytes
     }
 
-    /// Puts a frame before the module; gives its bytes.
+    /// Gives the module a frame; returns the expected bytes.
     fn frame(&mut self, patterns: u64, differential: bool) -> Vec<u8> {
         let settings = Settings {
             patterns,

@@ -1,4 +1,4 @@
-//! Delivery of frames, against what the register map says of it.
+//! Tests of the delivery of frames against the register map.
 
 use super::bundles::{HEADER, Settings};
 use crate::bench::Bench;
@@ -11,16 +11,17 @@ laws![
     a_restart_forgets_everything_of_earlier_runs,
 ];
 
-/// What the host may see.
+/// What the host can observe.
 #[derive(Debug, Clone, Default)]
 struct Host {
     /// Bank being filled.
     filling: u64,
     made: u64,
     lost: u64,
-    /// As of its completion: flags, number, over-range samples, lost frames, clock of its first slot.
+    /// The delivered frame at its completion: flags, number, over-range samples, lost frames, clock
+    /// of its first slot.
     delivered: Option<[u64; 5]>,
-    /// Of the frame being made.
+    /// A sum of the current frame has wrapped.
     overflow: bool,
     after_loss: bool,
     shown_at: u64,
@@ -53,13 +54,14 @@ impl Host {
     }
 }
 
-/// Clocks of runs, frames of a few clocks; `restart_in` and `give_back_in` are how rare those are.
+/// Simulates runs with frames of a few clocks. `restart_in` and `give_back_in` say how rare
+/// restarts and releases are.
 fn live(project: &Project, seed: u64, restart_in: u64, give_back_in: u64) -> Host {
     let mut bench = Bench::new(project, "frames");
     let dice = &mut Dice::new(seed);
     let mut host = Host::default();
     let mut settings = Settings::default();
-    // Of a run: it begins some clocks after its restart.
+    // Clock of the run; negative because a run begins some clocks after its restart.
     let mut run_clock = -3i64;
     for clock in 0..6000u64 {
         let restart = dice.once_in(restart_in);
@@ -104,7 +106,7 @@ fn live(project: &Project, seed: u64, restart_in: u64, give_back_in: u64) -> Hos
             host.complete(&settings, over_range);
             host.shown_at = light_next;
         }
-        // The clock of a restart is none of the run before.
+        // The clock of a restart does not belong to the run before.
         run_clock += 1;
 
         let seen = ["filling", "made", "lost", "ready"].map(|port| bench.get(port));

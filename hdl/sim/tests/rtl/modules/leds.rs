@@ -1,11 +1,11 @@
-//! The lines at the LEDs.
+//! Tests of the lines at the LEDs.
 
 use super::bundles::{Place, Settings};
 use crate::bench::Bench;
 use crate::project::Project;
 use crate::scenario::Dice;
 
-/// Clocks from the choice of a slot to its lines.
+/// Clocks from the choice of a slot to the change of its lines.
 const TO_PINS: u64 = 6;
 
 laws![
@@ -15,12 +15,12 @@ laws![
     a_halt_darkens_the_lines_at_once,
 ];
 
-/// A run, its order table answered for.
+/// A run; the test answers for the order table.
 struct Run {
     bench: Bench,
     settings: Settings,
     table: Vec<u64>,
-    /// Indices that the table was asked for.
+    /// Indices that the module asked the table for.
     asked: [u64; 2],
     t: u64,
 }
@@ -30,7 +30,7 @@ impl Run {
         bench.set_fields("settings", &settings.fields());
         bench.set("permit", true);
         bench.set("permitted", true);
-        // Pattern 0, which lights all or nothing, more often than by chance.
+        // Pattern 0 lights all LEDs or none, so the test draws it more often.
         let entry = |dice: &mut Dice| if dice.once_in(4) { 0 } else { dice.range(0, 1023) };
         let table = (0..1024).map(|_| entry(dice)).collect();
         let mut run = Self { bench, settings, table, asked: [0; 2], t: 0 };
@@ -48,7 +48,7 @@ impl Run {
         self.t += 1;
     }
 
-    /// Pattern at the pins, and whether it is a complement; none when dark.
+    /// Pattern at the pins, and whether it is a complement; `None` when dark.
     fn shown(&self) -> Option<(u64, bool)> {
         let place = Place::of(&self.settings, self.t.checked_sub(TO_PINS)?)?;
         let pattern = if self.settings.order_table {
@@ -62,13 +62,14 @@ impl Run {
         Some((pattern, place.complement))
     }
 
-    /// Until some clocks after the end of a run of one frame.
+    /// Number of clocks of a run of one frame, and some beyond its end.
     fn clocks(&self) -> u64 {
         self.settings.frame_clocks() + TO_PINS + 5
     }
 }
 
-/// Row and column lines; `DESIGN.md` section 3 by the letter.
+/// Row and column lines by the definition of a pattern: line `i` is the parity of `k & i`, where `k`
+/// is the upper (rows) or lower (columns) five bits of the pattern. A complement inverts the rows.
 fn lines((pattern, complement): (u64, bool)) -> (u64, u64) {
     let line = |k: u64, i: u64| u64::from((k & i).count_ones() % 2);
     let word = |k: u64| (0..32).fold(0, |word, i| word | line(k, i) << i);
@@ -139,7 +140,7 @@ fn nothing_is_lit_in_the_clock_after_a_permission_is_withdrawn(project: &Project
             run.tick();
             let shown = run.shown();
             assert_eq!(run.bench.is("enable"), shown.is_some() && permit && permitted);
-            // The lines may follow a clock later, but what is not permitted at all they never show.
+            // The lines may follow a clock later, but never show light without permission.
             let expected = shown.filter(|_| permitted).map_or((0, 0), lines);
             assert_eq!((run.bench.get("rows"), run.bench.get("columns")), expected);
         }

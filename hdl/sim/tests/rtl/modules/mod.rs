@@ -1,13 +1,16 @@
-//! Every module against its own law, in numbers of the test itself.
+//! Tests of every module of the RTL on its own. A law is a property of one module that a test
+//! checks.
 //!
-//! The one law: a module has a bench, and every law of a bench is a test that `mutation` can ask too.
+//! # Invariant
+//! Every module has a bench (`every_module_has_a_bench`). At least one deliberate fault breaks
+//! each law (`mutation::every_deliberate_fault_is_seen_and_every_law_can_be_broken`).
 
 use crate::project::{Project, files, folder};
 
-/// Lists the laws of a module, each a function of the RTL's text, and makes a test of each.
+/// Lists the laws of a module, and makes a test of each law. A law is a function of the RTL's text.
 macro_rules! laws {
     ($($law:ident),+ $(,)?) => {
-        /// By name.
+        /// The laws and their names.
         pub const LAWS: &[crate::modules::Law] = &[$((stringify!($law), $law)),+];
 
         mod tests {
@@ -43,10 +46,10 @@ mod synchroniser;
 mod watchdog;
 mod window;
 
-/// What a module promises, and what panics when that is not so.
+/// A property of a module: its name, and a function that panics when the RTL lacks the property.
 pub type Law = (&'static str, fn(&Project));
 
-/// Files of `hdl/rtl` and the laws of the module in each.
+/// Files of `hdl/rtl`, each with the laws of its module.
 pub const BENCHES: &[(&str, &[Law])] = &[
     ("accumulators", accumulators::LAWS),
     ("bank_ram", bank_ram::LAWS),
@@ -72,8 +75,8 @@ pub const BENCHES: &[(&str, &[Law])] = &[
     ("window", window::LAWS),
 ];
 
-/// The top, whose bench is `equivalence`, and the packages: `stale` compares the one with `mcu/wire`, and the
-/// other's bundles are packed anew in `bundles`.
+/// Files without a bench here: `equivalence` tests the top, `stale` compares `register_map` with
+/// `mcu/wire`, and `bundles` packs the bundles of `types` again.
 const ELSEWHERE: &[&str] = &["core", "register_map", "types"];
 
 /// The laws of one file.

@@ -1,4 +1,4 @@
-//! The order table's two copies.
+//! Tests of the order table's two copies.
 
 use crate::bench::Bench;
 use crate::project::Project;
@@ -14,7 +14,7 @@ fn host_and_sequencer_read_what_was_written_two_clocks_after_they_ask(project: &
     for (address, entry) in table.iter_mut().enumerate() {
         *entry = dice.range(0, 1023);
         bench.set("host_address", address as u64);
-        // The host writes whole words, of which ten bits stay.
+        // The host writes whole words; the table keeps ten bits.
         bench.set("host_data", dice.next() << 10 | *entry);
         bench.tick();
     }

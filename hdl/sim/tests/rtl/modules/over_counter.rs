@@ -1,4 +1,4 @@
-//! The count of over-range samples.
+//! Tests of the count of over-range samples.
 
 use crate::bench::Bench;
 use crate::project::Project;
@@ -22,7 +22,7 @@ fn a_count_is_of_the_frame_so_far_and_trips_from_its_limit_on(project: &Project)
         let mut count = 0u64;
         let mut stages: VecDeque<(bool, u64)> = VecDeque::new();
         for clock in 0..dice.range(20, 100) {
-            // A run, after some clocks of none in which samples do not count.
+            // A run, after some idle clocks whose samples do not count.
             let counts = clock >= 8;
             let first = clock == 8 || counts && dice.once_in(25);
             let over = dice.once_in(3);

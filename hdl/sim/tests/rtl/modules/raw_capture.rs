@@ -1,4 +1,4 @@
-//! Bursts of plain samples.
+//! Tests of raw bursts.
 
 use super::bundles::Settings;
 use crate::bench::Bench;
@@ -11,7 +11,8 @@ laws![
     a_run_of_frames_records_nothing,
 ];
 
-/// Starts with these settings; gives the samples of the clocks that were active and what marked them.
+/// Starts a burst with these settings; returns the samples of its active clocks, and the clocks
+/// that the module marked.
 fn run(
     bench: &mut Bench,
     dice: &mut Dice,

@@ -1,4 +1,4 @@
-//! The register bank and the settings made of it.
+//! Tests of the register bank and of the settings made from it.
 
 use super::bundles::{SETTINGS, Settings};
 use crate::bench::Bench;
@@ -128,9 +128,9 @@ fn every_setting_has_its_range(project: &Project) {
     for (register, within, without) in [
         (R::Mode, vec![0, 0xF], vec![0x10, 1 << 31, rest]),
         (R::Patterns, vec![1, 1024], vec![0, 1025, 2048, 1 << 16 | 1, rest]),
-        // Above the reset value of `Blank`.
+        // Values above the reset value of `Blank`.
         (R::Dwell, vec![3, 65_535], vec![0, 1, 2, 65_536, 1 << 16 | 5, rest]),
-        // Below the reset value of `Dwell`.
+        // Values below the reset value of `Dwell`.
         (R::Blank, vec![0, 4], vec![5, 6, 1 << 16, rest]),
         (R::Latency, vec![0, 63], vec![64, 1 << 6 | 1, rest]),
         (R::Sweeps, vec![1, rest], vec![0]),
@@ -187,7 +187,7 @@ fn what_changes_by_itself_is_as_of_its_read(project: &Project) {
             bench.set("fault", fault);
         }
         assert_eq!(read(&mut bench, in_table), entry as u32);
-        // The last low word that was read belongs to this high one.
+        // The high word belongs to the last low word that was read.
         bench.set("clock_now", dice.next());
         assert_eq!(read(&mut bench, R::ClockHigh.address()), (clock >> 32) as u32);
     }

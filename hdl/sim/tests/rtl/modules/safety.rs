@@ -1,4 +1,4 @@
-//! What puts the LEDs out, and for how long.
+//! Tests of the faults that switch the LEDs off, and for how long.
 
 use super::bundles::Settings;
 use crate::bench::Bench;
@@ -12,7 +12,7 @@ laws![
     a_stop_trips_nothing,
 ];
 
-/// The module between runs, everything closed.
+/// The module between runs, with the interlock closed.
 fn bench(project: &Project) -> Bench {
     let mut bench = Bench::new(project, "safety");
     bench.set("interlock_now", true);
@@ -45,7 +45,7 @@ fn the_first_cause_ends_the_run_and_stays_until_cleared(project: &Project) {
     let dice = &mut Dice::new(26);
     let mut seen = [0; 5];
     for run in 0..400 {
-        // One of the four is likely to be first, and sometimes two come together.
+        // One of the four causes is likely to be first; sometimes two causes come together.
         let likely = dice.range(1, 4);
         let short = |dice: &mut Dice, this| if likely == this { dice.range(1, 30) } else { 500 };
         let settings = Settings {
@@ -89,7 +89,7 @@ fn the_first_cause_ends_the_run_and_stays_until_cleared(project: &Project) {
         };
         seen[code as usize] += 1;
         bench.set("running", false);
-        // Whatever comes after, the first cause stays and nothing is lit.
+        // After the first cause, no later cause changes the latched fault and nothing is lit.
         for _ in 0..dice.range(1, 20) {
             bench.set("over_range", dice.once_in(2));
             bench.set("interlock_closed", dice.once_in(2));
@@ -108,7 +108,7 @@ fn the_first_cause_ends_the_run_and_stays_until_cleared(project: &Project) {
 fn an_open_interlock_darkens_at_once_and_until_a_new_start(project: &Project) {
     let mut bench = bench(project);
     let dice = &mut Dice::new(27);
-    // Closed or not: before the first start nothing may be lit.
+    // Whether the interlock is closed or not, nothing may be lit before the first start.
     assert!(!bench.is("permit") && !bench.is("permitted"));
     for _ in 0..50 {
         begin(&mut bench, &Settings::default());
@@ -117,7 +117,8 @@ fn an_open_interlock_darkens_at_once_and_until_a_new_start(project: &Project) {
             bench.tick();
         }
         bench.set("interlock_now", false);
-        // It is dark long before the run itself hears of it, and after it has closed again.
+        // The LEDs are dark long before the run ends, and stay dark after the interlock has closed
+        // again.
         for _ in 0..dice.range(1, 4) {
             assert!(!bench.is("permit") && !bench.is("permitted"));
             bench.tick();

@@ -1,4 +1,4 @@
-//! The chain of counters, against division.
+//! Tests of the chain of counters against positions computed by division.
 
 use super::bundles::{PLACE, Place, Settings};
 use crate::bench::Bench;
@@ -30,7 +30,7 @@ fn every_clock_lies_where_division_puts_it(project: &Project) {
             settings = Settings { patterns: 1, dwell: 70, blank: 69, ..settings };
         }
         start(&mut bench, &settings);
-        // Beyond its end, and a run without one for about four frames.
+        // Goes beyond the end of a run, and covers about four frames of a run without end.
         for t in 0..settings.frame_clocks() * 4 + 10 {
             assert_eq!(place(&mut bench), Place::of(&settings, t), "clock {t} of {settings:?}");
             bench.tick();

@@ -1,4 +1,4 @@
-//! The ADC and the test generator.
+//! Tests of the ADC's samples and the test generator.
 
 use crate::bench::Bench;
 use crate::project::Project;
@@ -33,7 +33,7 @@ fn a_sample_leaves_two_clocks_after_it_was_at_the_pins(project: &Project) {
         let (code, over_range) = (dice.range(0, 0x3FFF), dice.once_in(3));
         bench.set("code", code);
         bench.set("over_range", over_range);
-        // Starts concern the generator alone.
+        // A start affects the test generator alone.
         bench.set("start", dice.once_in(10));
         assert_eq!(bench.get("sample"), stages[1], "clock {clock}");
         stages = [u64::from(over_range) << 14 | code, stages[0]];

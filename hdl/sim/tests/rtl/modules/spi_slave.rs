@@ -1,4 +1,4 @@
-//! The host port, bit by bit as `nirspi_wire::host_port` lays it down.
+//! Tests of the host port, bit by bit, as defined in `nirspi_wire::host_port`.
 
 use crate::bench::Bench;
 use crate::project::Project;
@@ -19,10 +19,10 @@ laws![
 /// Clocks from an access to its answer: within the dummy cycles, at a third of `sck`'s half period.
 const ANSWER_CLOCKS: u32 = 30;
 
-/// Operation, address, data of what goes on to the engine.
+/// Operation, address and data of an access that reaches the engine.
 type Access = [u64; 3];
 
-/// The host, and what is behind the port.
+/// The host, and the engine behind the port.
 struct Rig {
     bench: Bench,
     quad: bool,
@@ -30,7 +30,7 @@ struct Rig {
     half: u32,
     fifo: VecDeque<u64>,
     sent: Vec<Access>,
-    /// What a register answers, and in how many clocks.
+    /// The value of a register, and the clocks until the answer.
     value: u64,
     answer_in: u32,
 }
@@ -66,7 +66,7 @@ impl Rig {
         }
     }
 
-    /// One period of `sck`; lines and what is driven as the host samples them.
+    /// One period of `sck`; returns the lines and the driven levels when the host samples.
     fn sck(&mut self, lines: u64) -> [u64; 2] {
         self.bench.set("lines_in", lines);
         self.bench.set("sck", false);
@@ -77,7 +77,7 @@ impl Rig {
         seen
     }
 
-    /// Sends the lowest bits of a word, of which at most so many periods.
+    /// Sends the lowest bits of a word, for at most so many periods.
     fn send(&mut self, word: u64, bits: u32, quad: bool, periods: &mut u32) {
         let step = if quad { 4 } else { 1 };
         for sent in (step..=bits).step_by(step as usize) {
@@ -85,7 +85,7 @@ impl Rig {
                 return;
             }
             *periods -= 1;
-            // On lines that do not matter, noise.
+            // Lines that the port ignores carry noise.
             let noise = if quad { 0 } else { 0xE };
             let value = (word >> (bits - sent)) & if quad { 0xF } else { 1 };
             let [_, drive] = self.sck(value | noise);
@@ -101,7 +101,7 @@ impl Rig {
         })
     }
 
-    /// Opcode and address, and a write's data, cut short after so many periods.
+    /// Sends opcode, address and a write's data, cut short after so many periods.
     fn begin(&mut self, opcode: u8, address: u64, data: Option<u64>, mut periods: u32) {
         self.bench.set("sck", false);
         self.bench.set("selected", true);
@@ -129,13 +129,13 @@ impl Rig {
         self.clocks(4);
     }
 
-    /// Another host: lines, and how far `sck` is below the fastest allowed.
+    /// Changes the host: its lines, and how much slower than the limit `sck` is.
     fn vary(&mut self, dice: &mut Dice) {
         self.quad = dice.once_in(2);
         self.half = dice.pick(&[3, 3, 4]);
     }
 
-    /// What has gone on since this was asked last.
+    /// Accesses that have reached the engine since the last call.
     fn sent(&mut self) -> Vec<Access> {
         std::mem::take(&mut self.sent)
     }
@@ -143,7 +143,8 @@ impl Rig {
     fn write(&mut self, dice: &mut Dice) {
         let (address, data) = (dice.range(0, 0xFFFF), dice.range(0, 0xFFFF_FFFF));
         self.begin(WRITE_REGISTER, address, Some(data), u32::MAX);
-        // It takes effect before the host lets go, and only once, however long it goes on.
+        // The access takes effect before the host deselects the FPGA, and only once, however long
+        // the selection lasts.
         assert_eq!(self.sent(), [[u64::from(WRITE_REGISTER & 3), address, data]]);
         for _ in 0..dice.range(0, 40) {
             self.sck(0xF);
@@ -163,7 +164,7 @@ impl Rig {
         self.end();
     }
 
-    /// A stream of which some bytes of another epoch still lie before its own.
+    /// A stream that begins while bytes of an earlier epoch are still in the FIFO.
     fn stream(&mut self, dice: &mut Dice) {
         let epoch = dice.range(0, 1);
         let of_epoch = |epoch: u64, dice: &mut Dice, count| -> Vec<u64> {
@@ -222,7 +223,7 @@ fn a_transfer_cut_short_leaves_nothing_behind(project: &Project) {
         rig.vary(dice);
         let all = 8 + if rig.quad { 4 + 8 } else { 16 + 32 };
         let periods = dice.range(0, all - 1) as u32;
-        // The last bit but one is cut off as well as any.
+        // A transfer cut off one bit before its end is cut off like any other.
         let periods = if dice.once_in(3) { all as u32 - 1 } else { periods };
         rig.begin(WRITE_REGISTER, 0x1234, Some(0xFFFF_FFFF), periods);
         rig.end();

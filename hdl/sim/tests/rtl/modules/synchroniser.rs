@@ -1,4 +1,4 @@
-//! One bit comes into step.
+//! Tests of the synchroniser of one bit.
 
 use crate::bench::Bench;
 use crate::project::Project;

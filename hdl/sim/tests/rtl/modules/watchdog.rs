@@ -1,4 +1,4 @@
-//! The watchdog alone.
+//! Tests of the watchdog alone.
 
 use crate::bench::Bench;
 use crate::project::Project;
@@ -13,7 +13,7 @@ fn it_barks_with_the_clock_that_makes_the_silence_as_long_as_set(project: &Proje
     for run in 0..300 {
         let limit = if dice.once_in(4) { 1 } else { dice.range(1, 50) };
         bench.set("less_1", limit - 1);
-        // Between runs nothing counts, whatever the host does.
+        // Between runs the watchdog does not count, whatever the host does.
         for _ in 0..dice.range(2, 70) {
             bench.set("feed", dice.once_in(4));
             bench.tick();

@@ -1,4 +1,4 @@
-//! Samples and the slots they belong to.
+//! Tests of the attribution of samples to slots.
 
 use super::bundles::{PLACE, Place, Settings};
 use crate::bench::Bench;
@@ -14,14 +14,15 @@ laws![
     a_raw_burst_attributes_nothing,
 ];
 
-/// Starts a run that ends by itself and gives each clock's sample, place, and the sum that comes with the next.
+/// Runs to the end of a finite run; returns each clock's sample, place, and the sum that comes in
+/// the next clock.
 fn run(bench: &mut Bench, dice: &mut Dice, settings: &Settings) -> Vec<(u64, Option<Place>, u64)> {
     bench.set_fields("settings", &settings.fields());
     let clocks = TO_SAMPLE + settings.latency + settings.frames * settings.frame_clocks() + 4;
     let mut seen = Vec::new();
     for clock in 0..clocks {
         bench.set("start", clock == 0);
-        // Now and then every bit is set.
+        // Sometimes every bit of the code is set.
         let code = if dice.once_in(8) { 0x3FFF } else { dice.range(0, 0x3FFF) };
         let over_range = dice.once_in(2);
         bench.set("sample", u64::from(over_range) << 14 | code);

@@ -1,4 +1,5 @@
-//! On the GPUs of this machine, software Vulkan too; skipped aloud where there is none.
+//! Tests on the GPUs of this machine, including software Vulkan; without any, the tests are skipped
+//! with a message.
 
 use nirspi_recon::omp::gpu;
 
@@ -27,7 +28,7 @@ fn devices() -> Vec<(Device, gpu::Device)> {
 fn apart(a: &[f32], b: &[f32]) -> f32 {
     assert_eq!(a.len(), b.len());
     let apart = a.iter().zip(b).map(|(a, b)| (a - b).abs());
-    // NaN is as far as can be.
+    // NaN counts as the largest possible difference.
     apart.map(|apart| if apart.is_nan() { f32::INFINITY } else { apart }).fold(0.0, f32::max)
 }
 
@@ -43,7 +44,7 @@ fn images_that_are_there_become_what_the_processor_makes_of_them() {
     let bright: Vec<f32> = readings.iter().map(|v| v * white).collect();
     for (device, omp) in devices() {
         let mut there = on(&device);
-        // A part and a smaller one.
+        // One batch of two images, and a smaller one.
         there.batch = 2;
         let images = DeviceImages::upload(&omp, &bright, fusion::SIDE * fusion::SIDE).unwrap();
         for (depth, options) in [(Some(&depth), &Options::default()), (None, &halved)] {

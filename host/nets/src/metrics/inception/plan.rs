@@ -1,6 +1,5 @@
-//! The layers of Inception-v3, in order, under torchvision's names.
-//!
-//! The law: this page is the architecture; nothing else knows a kernel or a number of channels.
+//! The architecture: the layers of Inception-v3, in order, under torchvision's names. Every kernel
+//! size and number of channels is stated here only.
 
 /// One layer, without weights.
 #[derive(Debug, Clone, PartialEq)]
@@ -13,11 +12,11 @@ pub enum Plan {
         stride: usize,
         padding: [usize; 2],
     },
-    /// Mean of 3 x 3, stride 1, padding left out of it.
+    /// Mean of 3 x 3, stride 1, without the padding.
     Mean,
     /// Maximum of 3 x 3.
     Maximum { stride: usize, padding: usize },
-    /// Branches of one input. Names inside begin with this one's.
+    /// Branches with one input. Names inside begin with this name.
     Branches { name: &'static str, branches: Vec<Vec<Plan>> },
 }
 
@@ -42,27 +41,27 @@ pub fn network() -> Vec<Plan> {
         figure_6("Mixed_6e.", 192),
         reduction_7(),
         figure_7("Mixed_7b.", Plan::Mean),
-        // A slip in the published graph, which every FID since has kept.
+        // This pooling is an error in the published graph; FID's definition keeps it.
         figure_7("Mixed_7c.", Plan::Maximum { stride: 1, padding: 1 }),
     ]
 }
 
-/// Of the same size as its input.
+/// A convolution that keeps the size.
 fn conv(name: &'static str, outputs: usize, kernel: [usize; 2]) -> Plan {
     Plan::Convolution { name, outputs, kernel, stride: 1, padding: kernel.map(|edge| edge / 2) }
 }
 
-/// 3 x 3 without padding.
+/// A convolution of 3 x 3 without padding.
 fn inside(name: &'static str, outputs: usize) -> Plan {
     Plan::Convolution { name, outputs, kernel: [3, 3], stride: 1, padding: [0, 0] }
 }
 
-/// 3 x 3 without padding at every second pixel.
+/// A convolution of 3 x 3 without padding, with stride 2.
 fn halving(name: &'static str, outputs: usize) -> Plan {
     Plan::Convolution { name, outputs, kernel: [3, 3], stride: 2, padding: [0, 0] }
 }
 
-/// Two small kernels in place of a large one (the paper's figure 5).
+/// Two small kernels instead of a large one (the paper's figure 5).
 fn figure_5(name: &'static str, pooled: usize) -> Plan {
     let branches = vec![
         vec![conv("branch1x1", 64, [1, 1])],
@@ -90,7 +89,7 @@ fn reduction_6() -> Plan {
     Plan::Branches { name: "Mixed_6a.", branches }
 }
 
-/// Kernels of one row and one column (the paper's figure 6).
+/// Kernels of one row or one column (the paper's figure 6).
 fn figure_6(name: &'static str, narrow: usize) -> Plan {
     let branches = vec![
         vec![conv("branch1x1", 192, [1, 1])],
@@ -125,7 +124,7 @@ fn reduction_7() -> Plan {
     Plan::Branches { name: "Mixed_7a.", branches }
 }
 
-/// Row and column side by side (the paper's figure 7).
+/// Row and column kernels side by side (the paper's figure 7).
 fn figure_7(name: &'static str, pool: Plan) -> Plan {
     let beside = |across: &'static str, down: &'static str| Plan::Branches {
         name: "",

@@ -1,4 +1,4 @@
-//! Against PyTorch, with weights that both sides make by one formula: 22 million that nobody needs to keep.
+//! Tests against PyTorch, with 22 million weights that both sides compute by one formula.
 
 use super::plan::{Plan, network};
 use super::*;
@@ -11,7 +11,7 @@ fn noise(seed: u32, at: u32) -> f32 {
     x ^= x >> 15;
     x = x.wrapping_mul(2_246_822_519);
     x ^= x >> 13;
-    // 24 bits, which a float holds exactly.
+    // 24 bits, which a float represents exactly.
     (x >> 8) as f32 / 8_388_608.0 - 1.0
 }
 
@@ -71,7 +71,8 @@ fn image() -> Vec<f32> {
     (0..32 * 20).map(|at| 0.5 + 0.5 * noise(9999, at)).collect()
 }
 
-/// torch 2.15.0 with pytorch-fid 0.3.0's network: `scripts/inception_reference.py`. Every 128th feature.
+/// Results of torch 2.15.0 with pytorch-fid 0.3.0's network, by `scripts/inception_reference.py`:
+/// every 128th feature.
 const PYTORCH: [f32; 16] = [
     1.74558, 1.62287, 0.0594491, 0.365007, 0.0062791, 9.7032, 0.0124156, 0.43627, 2.02133, 0.0,
     0.404889, 0.0, 1.27437, 2.51141, 0.37613, 0.980802,

@@ -1,45 +1,48 @@
-//! What a device gives: shared memory, buffers, and loops of a length that it finishes.
+//! Limits of a device: shared memory, buffers, and the length of its loops.
 //!
-//! What does not fit is refused before it is launched, with what was needed and what there is. Software Vulkan ends an
-//! invocation's loops after some 65 535 rounds and reports no error; so the rounds are counted here, and a pursuit that
-//! takes more is split over launches.
+//! A problem that exceeds a limit is refused before the launch, with the amount needed and the
+//! limit. Software Vulkan ends an invocation's loops after some 65 535 rounds without an error, so
+//! the rounds are counted here, and a longer pursuit is split over several launches.
 
 use super::layout::{Shape, TOGETHER};
 use crate::omp::BackendError;
 
-/// What a device says of itself.
+/// Limits that a device reports.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct DeviceLimits {
-    /// Bytes of shared memory of a workgroup.
+    /// Largest shared memory of a workgroup, in bytes.
     pub shared_bytes: usize,
-    /// Bytes of a buffer.
+    /// Largest buffer, in bytes.
     pub buffer_bytes: usize,
-    /// Units of a workgroup.
+    /// Largest number of units in a workgroup.
     pub units: usize,
-    /// Buffers of a kernel.
+    /// Largest number of buffers of a kernel.
     pub buffers: usize,
 }
 
-/// Rounds of all its loops that one invocation may make: below where software Vulkan ends them.
+/// Largest number of rounds of all loops of one invocation, below the limit of software Vulkan.
 pub(super) const ROUNDS: usize = 60_000;
 
-/// Most buffers that a kernel uses.
+/// Largest number of buffers that a kernel here uses.
 const BUFFERS: usize = 7;
 
-/// Atoms of one unit where there are units enough: their projections stay in registers.
+/// Number of atoms for each unit, if there are enough units; that many projections stay in
+/// registers.
 const PER_UNIT: usize = 4;
 
-/// Fewest and most units of a workgroup: four planes of 16, and what every GPU has.
+/// Fewest and most units of a workgroup: four planes of 16, and the number that every GPU has.
 const UNITS: std::ops::RangeInclusive<usize> = 64..=256;
 
-/// Memory for the rows of the frames that are pursued together, where a buffer may be that large.
+/// Memory in bytes for the rows of all frames pursued together, if a buffer may be that large.
 const ROWS_BYTES: usize = 1 << 30;
 
-/// Most frames at once: workgroups that every device takes in one direction.
+/// Largest number of frames at once: the number of workgroups that every device takes in one
+/// direction.
 const FRAMES: usize = 65_535 / TOGETHER * TOGETHER;
 
 impl DeviceLimits {
-    /// How `atoms` atoms are dealt out to the units of a workgroup, with room for the weights of `sparsity` of them.
+    /// Distribution of `atoms` atoms to the units of a workgroup, with room for the weights of
+    /// `sparsity` atoms.
     ///
     /// # Errors
     /// [`BackendError`] if the device has too few buffers, or too little shared memory.
@@ -56,7 +59,7 @@ impl DeviceLimits {
         Ok(shape)
     }
 
-    /// Whether a buffer of `count` numbers of four bytes fits.
+    /// Checks that a buffer of `count` four-byte numbers fits.
     ///
     /// # Errors
     /// [`BackendError`] if it does not.
@@ -64,7 +67,8 @@ impl DeviceLimits {
         check(what, count.saturating_mul(4), self.buffer_bytes)
     }
 
-    /// How many frames of `numbers` in their largest buffer can be pursued together: at least one, if that fits.
+    /// Number of frames that can be pursued together if the largest buffer has `numbers` numbers
+    /// for each frame.
     ///
     /// # Errors
     /// [`BackendError`] if not even one frame fits.
@@ -76,12 +80,12 @@ impl DeviceLimits {
 }
 
 impl Shape {
-    /// Steps of a pursuit, `first..last` of each launch, none of which takes more than `rounds` rounds of loops: step `k`
-    /// takes `k` rounds over the rows, and `k` over the units to fetch the weights; a launch starts with a look at the atoms
-    /// chosen before.
+    /// Splits the steps of a pursuit into launches `first..last`, none of which takes more than
+    /// `rounds` rounds of loops. Step `k` takes `k` rounds over the rows and `k` over the units, to
+    /// fetch the weights. A launch starts with a pass over the atoms chosen before.
     ///
     /// # Errors
-    /// [`BackendError`] if one step takes more.
+    /// [`BackendError`] if one step takes more rounds than allowed.
     pub(super) fn launches(
         &self,
         sparsity: usize,
@@ -107,7 +111,7 @@ impl Shape {
     }
 }
 
-/// Rows of a product, `first..last` of each launch.
+/// Splits the rows of a product into launches `first..last`.
 pub(super) fn row_launches(rows: usize) -> Vec<(usize, usize)> {
     (0..rows).step_by(ROUNDS).map(|first| (first, rows.min(first + ROUNDS))).collect()
 }

@@ -1,27 +1,31 @@
-//! Whether a batch goes to a GPU.
+//! Chooses between a GPU and the processor for a batch.
 //!
-//! The one law: `auto` never fails for want of a GPU, and never looks for one that would not pay.
+//! # Invariant
+//! `auto` never fails because a GPU is missing, and never takes a software device
+//! (`omp::tests::gpu::auto_takes_no_software_device_and_a_name_is_kept_to`).
 
 use super::device::Device;
 use crate::omp::{Backend, BackendError};
 
-/// Frames from which `auto` looks for a GPU. One frame takes a GPU about as long as 64 do (each is one of its workgroups, a step waits
-/// for the step before), and the processor tens of microseconds: an H200 beside 16 cores was as fast as they at 64.
+/// Number of frames from which `auto` looks for a GPU. A GPU needs about as long for one frame as
+/// for 64 (a frame is one workgroup, whose steps follow each other); the processor needs tens of
+/// microseconds. At 64 frames an H200 was as fast as 16 cores.
 pub const FRAMES_WORTH_A_GPU: usize = 64;
 
-/// What computes.
+/// The choice between processor and GPU.
 #[derive(Debug, Clone)]
 pub enum Choice {
-    /// The processor, since it was asked for or the batch is small; or since there is no GPU, which is said why.
+    /// The processor: it was requested, or the batch is small, or no GPU was found (then with the
+    /// reason).
     Cpu(Option<BackendError>),
     /// A device.
     Gpu(Device),
 }
 
-/// Chooses for `frames` of one dictionary.
+/// Chooses a device for `frames` measurements of one dictionary.
 ///
 /// # Errors
-/// [`BackendError::Absent`] if a device was asked for by name and is not there.
+/// [`BackendError::Absent`] if the requested device is missing.
 pub fn choose(backend: Backend, frames: usize) -> Result<Choice, BackendError> {
     if backend == Backend::Auto && frames < FRAMES_WORTH_A_GPU {
         return Ok(Choice::Cpu(None));

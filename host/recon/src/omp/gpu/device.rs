@@ -1,4 +1,4 @@
-//! The device that computes. [`probe::find`] chooses which one that is.
+//! The device that computes. [`probe::find`] finds it.
 
 use super::budget::DeviceLimits;
 use super::engine::Engine;
@@ -10,7 +10,7 @@ use cubecl::wgpu::WgpuRuntime;
 use std::fmt;
 use std::sync::Arc;
 
-/// A device that is ready to compute.
+/// A device, ready to compute.
 #[derive(Clone)]
 pub struct Device {
     pub(super) engine: Arc<dyn Engine>,
@@ -26,10 +26,10 @@ impl fmt::Debug for Device {
 }
 
 impl Device {
-    /// The device that a backend names, by the rule of [`probe::find`]; none for the processor.
+    /// The device of a backend, found by [`probe::find`]; `None` for the processor.
     ///
     /// # Errors
-    /// [`BackendError::Absent`] if there is none.
+    /// [`BackendError::Absent`] if the device is missing.
     pub fn open(backend: Backend) -> Result<Option<Self>, BackendError> {
         let found = probe::find(backend)
             .map_err(|missing| BackendError::Absent { why: missing.to_string() })?;
@@ -45,7 +45,7 @@ impl Device {
         }))
     }
 
-    /// As its driver calls it.
+    /// The device's name in its driver.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
@@ -57,7 +57,7 @@ impl Device {
         self.backend
     }
 
-    /// Whether the processor plays the GPU: right results, no speed.
+    /// Whether the processor emulates this GPU: right results without the speed of a GPU.
     #[must_use]
     pub fn is_software(&self) -> bool {
         self.software

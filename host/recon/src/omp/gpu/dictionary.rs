@@ -1,13 +1,15 @@
 //! A dictionary on a device, for any number of batches.
 //!
-//! The one law: what goes to the device once stays there. The matrix, its Gram matrix and the atoms' pictures are uploaded or
-//! computed when the dictionary is made; a batch brings its measurements and takes its solutions.
+//! The matrix, its Gram matrix and the atoms' pictures are uploaded or computed once, when the
+//! dictionary is made, and stay on the device. A batch uploads its measurements and downloads its
+//! solutions.
 //!
-//! A batch goes in turns of `TURN` frames, `AT_A_TIME` of them at a time, each from a thread of its own: CubeCL gives each thread
-//! a stream, so that one turn is copied and unpacked while another is pursued.
+//! A batch is processed in turns of `TURN` frames, `AT_A_TIME` turns at a time, each by its own
+//! thread. CubeCL gives each thread a stream, so one turn is copied and unpacked while another is
+//! pursued.
 //!
-//! Measurements, solutions and images may stay on the device too ([`DeviceFrames`], [`DeviceSolutions`], [`DeviceImages`]); the
-//! networks of `nirspi-nets` take the images from there.
+//! Measurements, solutions and images can stay on the device too ([`DeviceFrames`],
+//! [`DeviceSolutions`], [`DeviceImages`]); the networks of `nirspi-nets` read the images there.
 
 use super::device::Device;
 use super::engine::Buffer;
@@ -24,20 +26,22 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::sync::OnceLock;
 
-/// Most frames of a turn: enough to fill a large GPU, and few enough that a batch of some thousands has several.
+/// Largest number of frames in a turn: enough to fill a large GPU, and few enough that a batch of
+/// some thousands has several turns.
 const TURN: usize = 1024;
 
-/// Turns that share the device's memory.
+/// Number of turns that share the device's memory.
 const AT_A_TIME: usize = 4;
 
-/// A `measurements x atoms` matrix of any column norms on a device.
+/// A `measurements x atoms` matrix with any column norms, on a device.
 #[derive(Debug)]
 pub struct DeviceDictionary {
     gram: DeviceGram,
-    /// Row-major, as wide as the Gram matrix.
+    /// The matrix, row-major, with rows as wide as the Gram matrix's.
     matrix: Buffer,
     measurements: usize,
-    /// The matrix, and whether atoms are chosen by correlation, for frames that single precision cannot decide.
+    /// The matrix in `f64`, and whether atoms are chosen by correlation, for frames that single
+    /// precision cannot decide.
     exact: (DMatrix<f64>, bool),
     mixed: OnceLock<MixedDictionary>,
 }
@@ -49,7 +53,7 @@ pub struct DeviceFrames {
     energies: Vec<f64>,
 }
 
-/// What the atoms look like, on a device: one picture each.
+/// The atoms' pictures on a device: one image for each atom.
 #[derive(Debug)]
 pub struct DevicePictures {
     buffer: Buffer,
@@ -57,8 +61,8 @@ pub struct DevicePictures {
 }
 
 impl DeviceDictionary {
-    /// Uploads `matrix` and multiplies out its Gram matrix there. Atoms are chosen by their correlations with the residual, or
-    /// with `normalised` false by their inner products as they are.
+    /// Uploads `matrix` and computes its Gram matrix on the device. Atoms are chosen by their
+    /// correlations with the residual or, with `normalised` false, by their plain inner products.
     ///
     /// # Errors
     /// [`OmpError`] if a number is not finite in `f32`, or the matrices do not fit the device.
@@ -96,32 +100,33 @@ impl DeviceDictionary {
         Ok(Self { gram, matrix: matrix_there, measurements, exact, mixed: OnceLock::new() })
     }
 
-    /// Where it is.
+    /// The dictionary's device.
     #[must_use]
     pub fn device(&self) -> &Device {
         &self.gram.device
     }
 
-    /// How many frames [`pursue`](Self::pursue) takes at once for up to `sparsity` atoms.
+    /// Number of frames that [`pursue`](Self::pursue) takes at once for up to `sparsity` atoms.
     ///
     /// # Errors
-    /// [`OmpError`] if not even one fits the device.
+    /// [`OmpError`] if one frame does not fit the device.
     pub fn frames_at_once(&self, sparsity: usize) -> Result<usize, OmpError> {
         let other = self.device().limits().frames(self.measurements)?;
         Ok(self.gram.frames_at_once(sparsity)?.min(other / TOGETHER * TOGETHER).max(1))
     }
 
-    /// Does `work` for the measurements of each turn of a batch; what came of the turns, in their order.
+    /// Calls `work` with the measurements of each turn of a batch; returns the results in the order
+    /// of the turns.
     ///
     /// # Errors
-    /// [`OmpError`] if not even one frame fits the device, or that of `work`.
+    /// [`OmpError`] if one frame does not fit the device, or an error of `work`.
     pub fn in_turns<T: Sync, R: Send>(
         &self,
         sparsity: usize,
         y: &[T],
         work: impl Fn(&[T]) -> Result<R, OmpError> + Sync,
     ) -> Result<Vec<R>, OmpError> {
-        // Together no more than one turn alone could have.
+        // All turns together use no more memory than one turn alone could.
         let frames = (self.frames_at_once(sparsity)? / AT_A_TIME).clamp(1, TURN);
         let turn = frames * self.measurements;
         let mut done = Vec::new();
@@ -131,16 +136,17 @@ impl DeviceDictionary {
         Ok(done)
     }
 
-    /// Takes measurements to the device, `measurements` numbers each, one after another.
+    /// Uploads measurements. Each has `measurements` numbers; one follows the other.
     ///
     /// # Errors
-    /// [`OmpError`] if they are no multiple of the dictionary's measurements, or a number is not finite in `f32`.
+    /// [`OmpError`] if the length is not a multiple of the dictionary's measurements, or a number
+    /// is not finite in `f32`.
     pub fn upload<T: Scalar>(&self, y: &[T]) -> Result<DeviceFrames, OmpError> {
         let expected = self.measurements;
         if !y.len().is_multiple_of(expected) {
             return Err(OmpError::Length { found: y.len(), expected });
         }
-        // Whole groups of frames.
+        // Frames are padded to whole groups.
         let there = (y.len() / expected).next_multiple_of(TOGETHER).max(TOGETHER);
         let mut single = vec![0.0; there * expected];
         let frames = single.par_chunks_exact_mut(expected).zip(y.par_chunks_exact(expected));
@@ -157,10 +163,10 @@ impl DeviceDictionary {
         Ok(DeviceFrames { y, energies })
     }
 
-    /// Finds a sparse representation of each frame; everything stays on the device.
+    /// Finds a sparse representation of each frame. Everything stays on the device.
     ///
     /// # Errors
-    /// [`OmpError`] if a limit makes no sense or there are more frames than fit at once.
+    /// [`OmpError`] if a limit is negative or NaN, or there are more frames than fit at once.
     pub fn pursue(
         &self,
         limits: &Limits,
@@ -173,7 +179,7 @@ impl DeviceDictionary {
         self.gram.pursue(projection, frames.energies.clone(), self.measurements, limits)
     }
 
-    /// Brings solutions to the host as `f32` found them.
+    /// Downloads the solutions that `f32` found.
     ///
     /// # Errors
     /// [`OmpError`] if the device failed.
@@ -182,7 +188,7 @@ impl DeviceDictionary {
         Ok(found.into_iter().map(|found| found.solution).collect())
     }
 
-    /// Brings solutions to the host, and which of them `f32` could not decide.
+    /// Downloads the solutions, and which of them `f32` could not decide.
     ///
     /// # Errors
     /// [`OmpError`] if the device failed.
@@ -195,11 +201,13 @@ impl DeviceDictionary {
         Ok((found.into_iter().map(|found| found.solution).collect(), doubtful))
     }
 
-    /// Solves the `doubtful` ones of the measurements `y` again on the processor, with `f64` as the referee. For a whole batch at
-    /// once, from one thread: the dictionary in double precision is prepared by all threads when it is first needed.
+    /// Solves the `doubtful` measurements of `y` again on the processor, with `f64` as the referee.
+    /// Call this from one thread for a whole batch, because all threads together prepare the
+    /// dictionary in double precision at its first use.
     ///
     /// # Errors
-    /// [`OmpError`] if there are not as many measurements as solutions, or one is not finite.
+    /// [`OmpError`] if the numbers of measurements and solutions differ, or a measurement is not
+    /// finite.
     pub fn settle(
         &self,
         limits: &Limits,
@@ -226,10 +234,10 @@ impl DeviceDictionary {
         Ok(())
     }
 
-    /// Takes the atoms' pictures to the device, `pixels` numbers each.
+    /// Uploads the atoms' pictures, of `pixels` numbers each.
     ///
     /// # Errors
-    /// [`OmpError`] if there is not one for each atom, or they do not fit.
+    /// [`OmpError`] if there is not one picture for each atom, or the pictures do not fit.
     pub fn upload_pictures(
         &self,
         pictures: &[f32],
@@ -243,11 +251,11 @@ impl DeviceDictionary {
         Ok(DevicePictures { buffer: self.device().engine.upload(pictures), pixels })
     }
 
-    /// Images on the device, as `f32` found them: pictures times coefficients, or without pictures each coefficient at its
-    /// atom's place.
+    /// Images on the device, as `f32` found them: pictures times coefficients or, without pictures,
+    /// each coefficient at its atom's place.
     ///
     /// # Errors
-    /// [`OmpError`] if they do not fit.
+    /// [`OmpError`] if the images do not fit.
     pub fn images(
         &self,
         solutions: &DeviceSolutions,
@@ -278,8 +286,8 @@ impl DeviceDictionary {
         Ok(self.in_turns(limits.sparsity, y, solve)?.into_iter().flatten().collect())
     }
 
-    /// Sparse representations, and how many of them `f32` could not decide: those are solved again with `f64` as its referee,
-    /// on the processor.
+    /// Finds sparse representations of a batch; also returns how many of them `f32` could not
+    /// decide. The processor solves those again, with `f64` as the referee.
     ///
     /// # Errors
     /// [`OmpError`] if `y` does not fit the dictionary, is not finite, or the device fails.
@@ -299,7 +307,7 @@ impl DeviceDictionary {
     }
 }
 
-/// Pairs of atoms that double precision, too, takes for the same.
+/// Pairs of atoms that are parallel in double precision too.
 fn confirmed(matrix: &DMatrix<f64>, atoms: &Atoms<f32>, marks: &[u32]) -> Vec<(usize, usize)> {
     let seen = |k: &usize| atoms.unseen().binary_search(k).is_err();
     let marked: Vec<usize> = (0..matrix.ncols()).filter(|&k| marks[k] != 0).filter(seen).collect();
@@ -315,11 +323,11 @@ fn confirmed(matrix: &DMatrix<f64>, atoms: &Atoms<f32>, marks: &[u32]) -> Vec<(u
     pairs.collect()
 }
 
-/// Solves a batch over any dictionary: its Gram matrix goes to the device column by column, initial projections are the
-/// dictionary's own, and nothing is kept for a next batch.
+/// Solves a batch over any dictionary: uploads its Gram matrix column by column, and takes the
+/// initial projections from the dictionary. Nothing is kept for a next batch.
 ///
 /// # Errors
-/// [`OmpError`] if a number is not finite, a limit makes no sense or the device fails.
+/// [`OmpError`] if a number is not finite, a limit is negative or NaN, or the device fails.
 pub fn solve_batch_over<T: Scalar, D: Dictionary<T> + ?Sized>(
     device: &Device,
     dictionary: &D,
@@ -340,7 +348,7 @@ pub fn solve_batch_over<T: Scalar, D: Dictionary<T> + ?Sized>(
 /// Pursues one measurement over any dictionary, as [`Solver::solve`](crate::omp::Solver::solve) does.
 ///
 /// # Errors
-/// Those of [`solve_batch_over`].
+/// The errors of [`solve_batch_over`].
 pub fn path_over<D: Dictionary<f32> + ?Sized>(
     device: &Device,
     dictionary: &D,

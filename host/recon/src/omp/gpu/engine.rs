@@ -1,7 +1,7 @@
-//! Launches the kernels on one device, whatever its runtime.
+//! Launches the kernels on one device, for any runtime of CubeCL.
 //!
-//! The one law: a kernel sees only buffers of the lengths that its indices reach. Lengths are checked here, before a launch that
-//! checks nothing.
+//! A kernel does not check its indices. So every function here checks the lengths of the buffers
+//! before its launch.
 
 use super::budget::{DeviceLimits, ROUNDS, row_launches};
 use super::kernels;
@@ -11,7 +11,7 @@ use cubecl::prelude::*;
 use cubecl::reader::read_sync;
 use cubecl::server::Handle;
 
-/// Numbers of four bytes on a device.
+/// A buffer of four-byte numbers on a device.
 #[derive(Clone, Debug)]
 pub(super) struct Buffer {
     handle: Handle,
@@ -33,20 +33,20 @@ impl Buffer {
     }
 }
 
-/// Where a batch of pursuits lives.
+/// The buffers of a batch of pursuits.
 #[derive(Clone, Debug)]
 pub(super) struct Pursuit {
     pub shape: Shape,
     pub frames: usize,
-    /// Most atoms of a frame.
+    /// Largest number of atoms of a frame.
     pub sparsity: usize,
     pub gram: Buffer,
-    /// One over each norm, then each squared norm.
+    /// One over each norm, followed by each squared norm.
     pub atoms: Buffer,
     pub projection: Buffer,
     pub rows: Buffer,
     pub support: Buffer,
-    /// A step and one over a pivot's root for each atom of the support.
+    /// For each atom of the support, a step and one over the root of its pivot.
     pub values: Buffer,
     pub state: Buffer,
     pub coefficients: Buffer,
@@ -71,27 +71,28 @@ impl Pursuit {
     }
 }
 
-/// Scores and pivots below these shares count as zero: the thresholds of the CPU, `Scalar::ROUNDING` and
-/// `Scalar::DEPENDENT`.
+/// Scores and pivots below these shares count as zero. The thresholds are the CPU's,
+/// `Scalar::ROUNDING` and `Scalar::DEPENDENT`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Rounding {
     pub score: f32,
     pub pivot: f32,
 }
 
-/// One device. Everything is queued; errors come out of [`read`](Self::read).
+/// One device. Calls only queue work; errors appear in [`read`](Self::read).
 pub(super) trait Engine: Send + Sync {
     fn limits(&self) -> DeviceLimits;
     fn upload(&self, numbers: &[f32]) -> Buffer;
-    /// Numbers of no particular value; at least one.
+    /// A buffer with undefined numbers; at least one.
     fn empty(&self, count: usize) -> Buffer;
     /// The bytes of each buffer.
     fn read(&self, buffers: &[&Buffer]) -> Result<Vec<cubecl::bytes::Bytes>, BackendError>;
-    /// `vectors * matrix`, see [`kernels::products`]; `rows` numbers a vector, `width` columns, a multiple of 64.
+    /// `vectors * matrix`, see [`kernels::products`]. A vector has `rows` numbers; `width`, the
+    /// number of columns, is a multiple of 64.
     fn products(&self, vectors: &Buffer, matrix: &Buffer, rows: usize, width: usize) -> Buffer;
     /// A mark for each atom, see [`kernels::doubles`].
     fn doubles(&self, gram: &Buffer, width: usize, like: f32) -> Buffer;
-    /// Steps `first..last`, see [`kernels::pursue`].
+    /// Steps `first..last` of the pursuits, see [`kernels::pursue`].
     fn pursue(&self, pursuit: &Pursuit, steps: (usize, usize), rounding: Rounding);
     /// See [`kernels::coefficients`].
     fn coefficients(&self, pursuit: &Pursuit);
@@ -103,7 +104,7 @@ pub(super) trait Engine: Send + Sync {
     fn scatter(&self, pursuit: &Pursuit, atoms: usize) -> Buffer;
 }
 
-/// Units of a workgroup of the kernels that need no shared memory.
+/// Number of units of a workgroup in kernels without shared memory.
 const UNITS: usize = 64;
 
 fn cubes(x: usize, y: usize) -> CubeCount {
@@ -138,7 +139,7 @@ impl<R: Runtime> Engine for ComputeClient<R> {
     fn read(&self, buffers: &[&Buffer]) -> Result<Vec<cubecl::bytes::Bytes>, BackendError> {
         let handles = buffers.iter().map(|buffer| buffer.handle.clone()).collect();
         read_sync(self.read_async(handles)).map_err(|error| {
-            // Its second line has the cause, what follows is a backtrace.
+            // The second line of the message has the cause; a backtrace follows.
             let text = error.to_string();
             BackendError::Failed(text.lines().take(3).map(str::trim).collect::<Vec<_>>().join(" "))
         })

@@ -1,6 +1,10 @@
 //! Pursuits over a Gram matrix that stays on a device.
 //!
-//! The one law: as [`Solver`](crate::omp::Solver), to the rounding of `f32`; where rounding may have decided, the frame says so.
+//! # Invariant
+//! A solution is that of [`Solver`](crate::omp::Solver), to within the rounding of `f32`
+//! (`omp::tests::gpu::every_kind_of_problem_has_the_references_solution`). A frame in which
+//! rounding may have decided is flagged
+//! (`omp::tests::gpu::ties_and_ends_that_single_precision_cannot_see_go_to_double`).
 
 use super::budget;
 use super::device::Device;
@@ -14,10 +18,10 @@ use crate::omp::{BackendError, Limits, OmpError, Path, Scalar, Solution, Stop};
 use cubecl::prelude::CubeElement;
 use rayon::prelude::*;
 
-/// Frames that a thread unpacks at least.
+/// Least number of frames that a thread unpacks.
 pub(super) const FRAMES_A_THREAD: usize = 32;
 
-/// The Gram matrix and the lengths of a dictionary's atoms, on a device.
+/// The Gram matrix and the norms of a dictionary's atoms, on a device.
 #[derive(Debug)]
 pub(super) struct DeviceGram {
     pub device: Device,
@@ -27,7 +31,7 @@ pub(super) struct DeviceGram {
     width: usize,
 }
 
-/// Pursuits that have ended, on a device; frames in the order in which they were measured.
+/// Pursuits that have ended, on a device, with frames in the order of measurement.
 #[derive(Debug)]
 pub struct DeviceSolutions {
     pub(super) pursuit: Pursuit,
@@ -36,7 +40,7 @@ pub struct DeviceSolutions {
     atoms: usize,
 }
 
-/// A solution, and whether `f32` may have decided what only `f64` can.
+/// A solution, and whether `f32` may have decided what needs `f64`.
 pub(super) struct Found {
     pub solution: Solution,
     pub steps: Vec<f32>,
@@ -45,7 +49,8 @@ pub(super) struct Found {
 }
 
 impl DeviceGram {
-    /// Columns of a Gram matrix, of as many numbers as its rows, for atoms of which there are no more than that.
+    /// Takes columns of a Gram matrix, each with as many numbers as the matrix has rows. There are
+    /// no more atoms than that.
     pub(super) fn new(
         device: &Device,
         gram: Buffer,
@@ -64,22 +69,23 @@ impl DeviceGram {
         self.width
     }
 
-    /// How many frames can be pursued together for up to `sparsity` atoms.
+    /// Number of frames that can be pursued together for up to `sparsity` atoms.
     ///
     /// # Errors
-    /// [`BackendError`] if not even one fits.
+    /// [`BackendError`] if one frame does not fit.
     pub(super) fn frames_at_once(&self, sparsity: usize) -> Result<usize, BackendError> {
         let numbers = self.width * self.most(sparsity).max(TOGETHER);
         self.device.limits().frames(numbers)
     }
 
-    /// One more than there are shows that none is left.
+    /// Limit of the atoms of a pursuit: one more than the dictionary has, which shows that no atom
+    /// is left.
     fn most(&self, sparsity: usize) -> usize {
         sparsity.min(self.atoms.count() + 1).max(1)
     }
 
-    /// Pursues frames whose initial projections (`width` numbers each, for as many frames as there are energies, at least)
-    /// are on the device. They are used up.
+    /// Pursues frames whose initial projections are on the device: `width` numbers each, for at
+    /// least as many frames as there are energies. The projections are overwritten.
     pub(super) fn pursue(
         &self,
         projection: Buffer,
@@ -149,7 +155,7 @@ impl DeviceGram {
         })
     }
 
-    /// Brings solutions back.
+    /// Downloads solutions.
     pub(super) fn read(&self, solutions: &DeviceSolutions) -> Result<Vec<Found>, BackendError> {
         let pursuit = &solutions.pursuit;
         if pursuit.frames == 0 {
@@ -181,13 +187,13 @@ impl DeviceGram {
 }
 
 impl DeviceSolutions {
-    /// How many frames there are.
+    /// Number of frames.
     #[must_use]
     pub fn frames(&self) -> usize {
         self.pursuit.frames
     }
 
-    /// How many atoms the dictionary has.
+    /// Number of atoms in the dictionary.
     pub(super) fn atoms(&self) -> usize {
         self.atoms
     }

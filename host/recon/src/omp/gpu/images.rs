@@ -1,6 +1,5 @@
-//! Images on a device.
-//!
-//! The one law: they are where they were made, and only [`download`](DeviceImages::download) brings them to the host.
+//! Images on a device. They stay there until [`download`](DeviceImages::download) brings them to
+//! the host.
 
 use super::device::Device;
 use super::engine::Buffer;
@@ -18,7 +17,7 @@ pub struct DeviceImages {
     pixels: usize,
 }
 
-/// Images that have come back, `frames x pixels`.
+/// Images on the host, `frames x pixels`.
 #[derive(Debug)]
 pub struct HostImages {
     bytes: Bytes,
@@ -38,10 +37,10 @@ impl DeviceImages {
         Self { device: device.clone(), buffer, frames, pixels }
     }
 
-    /// Takes images of `pixels` numbers each to a device.
+    /// Uploads images of `pixels` numbers each.
     ///
     /// # Errors
-    /// [`OmpError`] if they are no whole images, a number is not finite, or they do not fit.
+    /// [`OmpError`] if the images are not whole, a number is not finite, or the images do not fit.
     pub fn upload(device: &Device, images: &[f32], pixels: usize) -> Result<Self, OmpError> {
         if pixels == 0 || !images.len().is_multiple_of(pixels) {
             return Err(OmpError::Length { found: images.len(), expected: pixels });
@@ -52,7 +51,7 @@ impl DeviceImages {
         Ok(Self::of(device, buffer, [images.len() / pixels, pixels]))
     }
 
-    /// Brings them to the host.
+    /// Downloads the images.
     ///
     /// # Errors
     /// [`OmpError`] if the device failed.
@@ -61,25 +60,26 @@ impl DeviceImages {
         Ok(HostImages { bytes, count: self.frames * self.pixels })
     }
 
-    /// Where they are.
+    /// The images' device.
     #[must_use]
     pub fn device(&self) -> &Device {
         &self.device
     }
 
-    /// How many.
+    /// Number of images.
     #[must_use]
     pub fn frames(&self) -> usize {
         self.frames
     }
 
-    /// Numbers of each.
+    /// Number of pixels of each image.
     #[must_use]
     pub fn pixels(&self) -> usize {
         self.pixels
     }
 
-    /// The memory that they begin in, for who computes on the same device: CubeCL has one client for each.
+    /// The memory in which the images begin, for other code on the same device. CubeCL has one
+    /// client for each device.
     #[must_use]
     pub fn handle(&self) -> &Handle {
         self.buffer.handle()

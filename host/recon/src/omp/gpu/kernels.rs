@@ -1,12 +1,14 @@
-//! What runs on the device: one source, compiled for CUDA, Vulkan, Metal or DirectX at run time.
+//! The kernels: one source, compiled for CUDA, Vulkan, Metal or DirectX at run time.
 //!
-//! The one law: nothing is decided twice. Every unit of a workgroup that pursues a frame computes the same choice from the same
-//! shared numbers, barriers stand outside every branch, and equal scores go to the lower atom as on the CPU.
+//! Every unit of a workgroup that pursues a frame computes the same choice from the same shared
+//! numbers. Barriers stand outside every branch. Of equal scores the lower atom wins, as on the CPU
+//! (`omp::tests::gpu::of_equal_atoms_the_lowest_is_chosen`).
 //!
-//! Loops whose length is known when the kernel is compiled are unrolled; those that are left are counted by
-//! [`super::budget`].
+//! A loop whose length is known when the kernel is compiled is unrolled. [`super::budget`] counts
+//! the rounds of the other loops.
 
-// A kernel's arguments are its buffers and sizes, and the macro turns them into functions of as many.
+// A kernel's arguments are its buffers and sizes, and the macro makes functions with as many
+// arguments.
 #![allow(clippy::too_many_arguments)]
 
 use super::layout::{
@@ -15,10 +17,11 @@ use super::layout::{
 };
 use cubecl::prelude::*;
 
-/// Adds `vectors * matrix` over the rows from `first` to `last` to `out`: inner products of `vectors` (`count x rows`) with
-/// the columns of `matrix` (`rows x width`); the launch of the first row starts from 0. Both the Gram matrix (the vectors are
-/// the atoms) and initial projections.
-/// `count` is a multiple of [`TOGETHER`]. One unit a column, workgroups side by side and one below the other.
+/// Adds `vectors * matrix` over the rows from `first` to `last` to `out`: inner products of
+/// `vectors` (`count x rows`) with the columns of `matrix` (`rows x width`). The launch with the
+/// first row starts from 0. This kernel computes both the Gram matrix (where the vectors are the
+/// atoms) and the initial projections. `count` is a multiple of [`TOGETHER`]. Each unit computes
+/// one column; workgroups form a grid.
 #[cube(launch_unchecked)]
 pub(super) fn products(
     vectors: &Array<f32>,
@@ -51,8 +54,8 @@ pub(super) fn products(
     }
 }
 
-/// Marks with 1 each atom that points the same or the opposite way as a lower one, to the rounding of `f32`; `like` is the
-/// square of the cosine from which that is said. One unit an atom.
+/// Marks with 1 each atom that is parallel to a lower one, to within the rounding of `f32`. Two
+/// atoms are parallel if the square of their cosine is at least `like`. Each unit checks one atom.
 #[cube(launch)]
 pub(super) fn doubles(gram: &Array<f32>, out: &mut Array<u32>, width: u32, like: f32) {
     let atom = ABSOLUTE_POS;
@@ -68,12 +71,14 @@ pub(super) fn doubles(gram: &Array<f32>, out: &mut Array<u32>, width: u32, like:
     out[atom] = found;
 }
 
-/// Orthogonal matching pursuit, steps `first` to `last` of at most `sparsity`; one workgroup a frame.
+/// Orthogonal matching pursuit, steps `first` to `last` of at most `sparsity`; one workgroup for
+/// each frame.
 ///
-/// As on the CPU, columns of the Gram matrix are orthogonalised as they are chosen: row `i` of `rows` updates the projection
-/// `p` of all atoms, and the Cholesky factor of the support is contained in the rows, so no triangular system is solved.
-/// `atoms` are one over each norm, then the squared norms; `values` of a frame are a step and one over a pivot's root for
-/// each atom of the support.
+/// As on the CPU, columns of the Gram matrix are orthogonalised when their atom is chosen. Row `i`
+/// of `rows` updates the projection `p` of all atoms. The rows contain the Cholesky factor of the
+/// support, so no triangular system is solved. `atoms` has one over each norm, then the squared
+/// norms. `values` of a frame has a step and one over the root of a pivot for each atom of the
+/// support.
 #[cube(launch_unchecked)]
 pub(super) fn pursue(
     gram: &Array<f32>,
@@ -103,7 +108,7 @@ pub(super) fn pursue(
     let mut weights = SharedMemory::<f32>::new(comptime!(shape.capacity));
     let mut chosen = SharedMemory::<f32>::new(1usize);
 
-    // This unit's atoms.
+    // The atoms of this unit.
     let mut p = Array::<f32>::new(per_unit);
     let mut norms = Array::<f32>::new(per_unit);
     let mut row = Array::<f32>::new(per_unit);
@@ -130,7 +135,7 @@ pub(super) fn pursue(
     let mut stop = state[frame * STATE + STOP];
     let mut lead = state[frame * STATE + LEAD];
     let mut closest = state[frame * STATE + CLOSEST];
-    // The state is read before its owner may write it again.
+    // Every unit must have read the state before its owner writes it again.
     sync_storage();
 
     for step in first as usize..last as usize {
@@ -141,7 +146,8 @@ pub(super) fn pursue(
             }
         }
 
-        // The largest score, the lowest atom that has it, and the largest score of the others.
+        // The largest score, the lowest atom with that score, and the largest score of the other
+        // atoms.
         let mut best = 0.0f32;
         let mut second = 0.0f32;
         let mut place = unit as u32;
@@ -185,7 +191,7 @@ pub(super) fn pursue(
         if step == 0 {
             first_best = best;
         }
-        // Not a number is not more either.
+        // With NaN the comparison is false, which ends the pursuit.
         let more = best > rounding * first_best;
         if stop == LOOKING {
             if more {
@@ -195,7 +201,7 @@ pub(super) fn pursue(
             }
         }
 
-        // What the rows say of the chosen atom, and how much of it they leave.
+        // The rows' weights of the chosen atom, and what the rows leave of the atom.
         let taken = if stop == LOOKING { step } else { 0usize.runtime() };
         let mut sum = 0.0f32;
         let mut i = unit;
@@ -264,7 +270,7 @@ pub(super) fn pursue(
                 stop = DEPENDENT.runtime();
             }
         }
-        // The next choice reads this row where other units wrote it.
+        // The next choice reads this row, which other units have written.
         sync_storage();
     }
 
@@ -283,7 +289,7 @@ pub(super) fn pursue(
     }
 }
 
-/// Coefficients of the support by back substitution; one workgroup a frame.
+/// Coefficients of the support by back substitution; one workgroup for each frame.
 #[cube(launch)]
 pub(super) fn coefficients(
     rows: &Array<f32>,
@@ -326,8 +332,8 @@ pub(super) fn coefficients(
     }
 }
 
-/// The Cholesky factor of each support, row after row of its lower triangle; one workgroup an atom of the support, frames
-/// below each other.
+/// The Cholesky factor of each support, row after row of its lower triangle; one workgroup for each
+/// atom of the support, with frames in the second dimension of the grid.
 #[cube(launch)]
 pub(super) fn factor(
     rows: &Array<f32>,
@@ -358,7 +364,8 @@ pub(super) fn factor(
     }
 }
 
-/// Images: each atom's picture (`atoms x pixels`) times its coefficient. One unit a pixel, frames below each other.
+/// Images: each atom's picture (`atoms x pixels`) times its coefficient. Each unit computes one
+/// pixel; frames are the second dimension of the grid.
 #[cube(launch)]
 pub(super) fn images(
     pictures: &Array<f32>,
@@ -383,7 +390,7 @@ pub(super) fn images(
     }
 }
 
-/// Coefficients at their atoms' places, 0 elsewhere. One workgroup a frame.
+/// Coefficients at the places of their atoms, 0 elsewhere; one workgroup for each frame.
 #[cube(launch)]
 pub(super) fn scatter(
     support: &Array<u32>,

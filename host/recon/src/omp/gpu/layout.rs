@@ -1,48 +1,48 @@
-//! How numbers of a pursuit lie in a device's memory: what kernels and host must agree on.
+//! The layout of a pursuit's numbers in a device's memory, which kernels and host share.
 
-/// Vectors of which one unit computes the products together.
+/// Number of vectors whose products one unit computes together.
 pub(super) const TOGETHER: usize = 8;
 
-/// Numbers of a frame's state.
+/// Number of state values of a frame.
 pub(super) const STATE: usize = 8;
 /// Energy of the measurement.
 pub(super) const ENERGY: usize = 0;
-/// Energy of a residual that is explained enough.
+/// Energy of the residual at which the pursuit stops.
 pub(super) const ENOUGH: usize = 1;
 /// Energy of the residual.
 pub(super) const REMAINING: usize = 2;
 /// The first atom's score.
 pub(super) const FIRST_BEST: usize = 3;
-/// Atoms in the support.
+/// Number of atoms in the support.
 pub(super) const COUNT: usize = 4;
 /// Whether the pursuit goes on: the number of a [`Progress`].
 pub(super) const STOP: usize = 5;
-/// Least lead of a chosen atom's score over the next best.
+/// Smallest lead of a chosen atom's score over the next best score.
 pub(super) const LEAD: usize = 6;
-/// Least distance of the residual's energy from enough, where that was asked.
+/// Smallest distance of the residual's energy from the limit, over the steps that checked it.
 pub(super) const CLOSEST: usize = 7;
 
-/// Whether a pursuit goes on, and if not, why. Kernels keep it as a number among the state's.
+/// Whether a pursuit goes on, and if not, why. Kernels store it as a number of the state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub(super) enum Progress {
-    /// Looking for the next atom, or as many atoms as asked for.
+    /// Looking for the next atom, or the requested number of atoms is reached.
     Looking = 0,
-    /// The residual is explained enough.
+    /// The residual is within the limit.
     Explained = 1,
-    /// No atom is left that explains more.
+    /// No atom is left that correlates with the residual.
     NoAtomLeft = 2,
-    /// The best atom left is a combination of those chosen.
+    /// The best atom left is a combination of the chosen atoms.
     Dependent = 3,
 }
 
-/// [`Progress::Looking`] as kernels write it: buffers on a device start with it, as zeros.
+/// [`Progress::Looking`] as a number for kernels; new buffers hold it, because it is zero.
 pub(super) const LOOKING: f32 = Progress::Looking.number();
-/// [`Progress::Explained`] as kernels write it.
+/// [`Progress::Explained`] as a number for kernels.
 pub(super) const EXPLAINED: f32 = Progress::Explained.number();
-/// [`Progress::NoAtomLeft`] as kernels write it.
+/// [`Progress::NoAtomLeft`] as a number for kernels.
 pub(super) const NO_ATOM_LEFT: f32 = Progress::NoAtomLeft.number();
-/// [`Progress::Dependent`] as kernels write it.
+/// [`Progress::Dependent`] as a number for kernels.
 pub(super) const DEPENDENT: f32 = Progress::Dependent.number();
 
 impl Progress {
@@ -52,31 +52,33 @@ impl Progress {
         self as u8 as f32
     }
 
-    /// What a kernel wrote; [`Progress::Dependent`], whose frames are solved again, for any other number.
+    /// The progress that a kernel wrote. Any unknown number is [`Progress::Dependent`], whose
+    /// frames are solved again.
     pub(super) fn read(number: f32) -> Self {
         let found = Self::ALL.into_iter().find(|progress| progress.number() == number);
         found.unwrap_or(Self::Dependent)
     }
 }
 
-/// What is known of a pursuit when its kernel is compiled.
+/// Facts about a pursuit that its kernel is compiled for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) struct Shape {
-    /// Units of the workgroup that pursues one frame; a power of two.
+    /// Number of units in the workgroup of a frame; a power of two.
     pub units: usize,
-    /// Atoms of each unit: `atom = unit + units * i`.
+    /// Number of atoms of each unit: `atom = unit + units * i`.
     pub per_unit: usize,
-    /// Room for the weights of chosen atoms in shared memory.
+    /// Number of weights that shared memory has room for.
     pub capacity: usize,
 }
 
 impl Shape {
-    /// Atoms with padding: the length of a vector over all of them.
+    /// Number of atoms with padding: the length of a vector over all atoms.
     pub(super) fn width(&self) -> usize {
         self.units * self.per_unit
     }
 
-    /// Shared memory of a pursuit: three numbers a unit, the weights, and the chosen atom's projection.
+    /// Bytes of shared memory of a pursuit: three numbers for each unit, the weights, and the
+    /// chosen atom's projection.
     pub(super) fn shared_bytes(&self) -> usize {
         4 * (3 * self.units + self.capacity + 1)
     }

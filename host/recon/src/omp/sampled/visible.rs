@@ -1,7 +1,8 @@
-//! How much of each atom some Hadamard rows see.
+//! The share of each atom's energy that some Hadamard rows see.
 //!
-//! The one law: atoms are separable, so with `e[a]` the energy of a 1-D function in Walsh function `a`, an atom has
-//! `e[a] f[b]` in row `(a, b)`, and the sum over the rows that were measured is two matrix products for all atoms alike.
+//! Atoms are separable: with `e[a]` and `f[b]` the energies of an atom's two 1-D functions in Walsh
+//! functions `a` and `b`, the atom has energy `e[a] f[b]` in row `(a, b)`. The sum over the
+//! measured rows is two matrix products for all atoms together.
 
 use super::walsh::WalshCosines;
 use crate::basis::{Basis, Transform, merge, product};
@@ -11,7 +12,7 @@ use crate::fwht;
 pub(crate) fn visible_energy(transform: &Transform, mask: &[f32]) -> Vec<f32> {
     let n = transform.side().pixels();
     match transform.basis().taps() {
-        // Every pixel puts 1 / n^2 of its energy into every row.
+        // Every pixel has 1 / n^2 of its energy in every row.
         None if transform.basis() == Basis::Pixel => {
             vec![mask.iter().sum::<f32>() / mask.len() as f32; mask.len()]
         }
@@ -25,12 +26,13 @@ pub(crate) fn visible_energy(transform: &Transform, mask: &[f32]) -> Vec<f32> {
             let mut energies = vec![0.0; n * n];
             let mut size = n;
             while size > 1 {
-                // The functions of this scale: smooth ones, then details; and the atoms made of them.
+                // The functions of this scale (smooth functions, then details), and the atoms made
+                // of them.
                 let block = seen(n, size, &squared_walsh(taps, n, size), mask);
                 for (u, row) in block.chunks_exact(size).enumerate() {
                     energies[u * n..u * n + size].copy_from_slice(row);
                 }
-                // Of the smooth ones, the next scale is made, down to the mean.
+                // The smooth functions give the next scale, down to the mean.
                 size /= 2;
             }
             energies
@@ -38,7 +40,8 @@ pub(crate) fn visible_energy(transform: &Transform, mask: &[f32]) -> Vec<f32> {
     }
 }
 
-/// Energies of all products of `count` 1-D functions, given as rows of their energies in `n` Walsh functions.
+/// Energies of all products of `count` 1-D functions, each given by a row of its energies in `n`
+/// Walsh functions.
 fn seen(n: usize, count: usize, functions: &[f32], mask: &[f32]) -> Vec<f32> {
     let transposed: Vec<f32> =
         (0..n * count).map(|p| functions[p % count * n + p / count]).collect();
@@ -48,7 +51,8 @@ fn seen(n: usize, count: usize, functions: &[f32], mask: &[f32]) -> Vec<f32> {
     energy
 }
 
-/// Energies in each Walsh function of the `size` wavelet functions of one scale: smooth, then details.
+/// Energies of the `size` wavelet functions of one scale in each Walsh function: smooth functions,
+/// then details.
 fn squared_walsh(taps: &[f32], n: usize, size: usize) -> Vec<f32> {
     let mut all = Vec::with_capacity(size * n);
     for function in 0..size {

@@ -1,11 +1,12 @@
 //! Cosines in the Walsh domain.
 //!
-//! The one law: the Walsh transform of a 1-D cosine of `n` samples is kept once, in `f64` accuracy, without its zeros.
-//! Atom `(u, v)` is then the outer product of two of them, and seeing a grid of measurements back through all atoms is
-//! two products with the same sparse matrix.
+//! The Walsh transform of each 1-D cosine of `n` samples is stored once, computed in `f64`, without
+//! its zeros. Atom `(u, v)` is the outer product of two of them, and projecting a grid of
+//! measurements onto all atoms is two products with the same sparse matrix.
 //!
-//! Cosine `u` shares Walsh functions only with cosines whose lowest set bit is the same: of `n^2` numbers a third are not zero
-//! (S. Venkataraman et al., *Discrete transforms via the Walsh-Hadamard transform*, 1988, has the blocks).
+//! Cosine `u` shares Walsh functions only with cosines that have the same lowest set bit. A third
+//! of the `n^2` numbers is not zero (S. Venkataraman et al., *Discrete transforms via the
+//! Walsh-Hadamard transform*, 1988, describes the blocks).
 
 use crate::Side;
 use crate::basis::cosine;
@@ -13,7 +14,7 @@ use crate::fwht;
 use crate::omp::kernel::first_of;
 use pulp::{Arch, Simd, WithSimd};
 
-/// Entries under this are the rounding of zeros.
+/// Entries below this are rounding of zeros.
 const ZERO: f64 = 1e-12;
 
 #[derive(Debug, Clone)]
@@ -21,7 +22,8 @@ pub(crate) struct WalshCosines {
     side: usize,
     /// Cosine `u` in Walsh function `a`, at `u * n + a`.
     dense: Vec<f32>,
-    /// The same without zeros: the Walsh functions and values of cosine `u` are at `starts[u]..starts[u + 1]`.
+    /// The numbers of `dense` without zeros: Walsh functions and values of cosine `u` are at
+    /// `starts[u]..starts[u + 1]`.
     starts: Vec<usize>,
     walsh: Vec<usize>,
     values: Vec<f32>,
@@ -49,7 +51,7 @@ impl WalshCosines {
         Self { side: n, dense, starts, walsh, values }
     }
 
-    /// Cosine `u` in every Walsh function.
+    /// Cosine `u` in every Walsh function: `n` numbers.
     pub(crate) fn cosine(&self, u: usize) -> &[f32] {
         &self.dense[u * self.side..(u + 1) * self.side]
     }
@@ -76,7 +78,8 @@ impl WalshCosines {
     }
 }
 
-/// Row `u` of `out` is what cosine `u` sees in each column of `grid`, compiled for each vector width.
+/// Row `u` of `out` is the product of cosine `u` with each column of `grid`, compiled for each
+/// vector width.
 struct Gather<'a> {
     cosines: &'a WalshCosines,
     grid: &'a [f32],

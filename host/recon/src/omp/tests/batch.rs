@@ -1,4 +1,4 @@
-//! Many at once, and on any machine: the same bits.
+//! Tests that batches of any size, on any vector width, give the same bits.
 
 use super::*;
 use pulp::Arch;
@@ -18,7 +18,7 @@ fn a_batch_is_a_loop_for<T: Scalar>() {
     let problem = problem(Kind::Noisy, 48, 150, 6, 2);
     let (dictionary, _) = dense::<T>(&problem);
     let limits = Limits { residual: 0.05, ..Limits::atoms(20) };
-    // One, a part of a group, several groups and a rest.
+    // One frame, a part of a group, several groups and a rest.
     for count in [1, 7, 16, 50] {
         let y = frames::<T>(&problem, count);
         let batch = super::super::Problem { dictionary: &dictionary, limits };
@@ -82,7 +82,7 @@ fn every_vector_width_gives_the_same_bits() {
     }
 }
 
-/// What this machine can do.
+/// The vector widths of this machine.
 fn widths() -> Vec<Arch> {
     #[cfg(target_arch = "x86_64")]
     let narrower = pulp::x86::V3::try_new().map(Arch::V3);

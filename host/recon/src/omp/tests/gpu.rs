@@ -1,5 +1,5 @@
-//! The kernels against the reference, on whatever wgpu finds: software Vulkan where there is no GPU. With
-//! `NIRSPI_TEST_BACKEND=cuda` the same tests run through CUDA.
+//! Tests of the kernels against the reference, on the device that wgpu finds: software Vulkan
+//! without a GPU. `NIRSPI_TEST_BACKEND=cuda` runs the same tests through CUDA.
 
 use super::*;
 use crate::basis::{Basis, Transform};
@@ -9,7 +9,7 @@ use crate::testing::side;
 use std::io::Write;
 use std::sync::OnceLock;
 
-/// A device, or `None` (said aloud) where this machine has none.
+/// A device, or `None`, with a printed message, if this machine has none.
 fn device() -> Option<&'static Device> {
     static DEVICE: OnceLock<Option<Device>> = OnceLock::new();
     let found = DEVICE.get_or_init(|| {
@@ -17,13 +17,13 @@ fn device() -> Option<&'static Device> {
         Device::open(name.parse().unwrap()).ok().flatten()
     });
     if found.is_none() {
-        // Past the test harness's capture, so that a skipped test is seen.
+        // Prints past the test harness's capture, so that a skipped test is visible.
         let _ = writeln!(std::io::stderr(), "skipped: no Vulkan adapter");
     }
     found.as_ref()
 }
 
-/// Several measurements of the problem's dictionary: its own first, then others like it.
+/// Several measurements by the problem's dictionary: the problem's own, then similar ones.
 fn frames(problem: &Problem, count: usize) -> Vec<f64> {
     let mut random = Pcg64::seed_from_u64(3);
     let mut y = problem.y.clone();
@@ -60,7 +60,7 @@ fn every_kind_of_problem_has_the_references_solution() {
             agrees::<f32>(&problem, &limits, alone).unwrap();
             let exact = solve_exactly(&problem, &limits);
             if kind == Kind::Doubled {
-                // Copies of an atom: rounding of the reference's own decides which it takes.
+                // Of copies of an atom, the reference's own rounding decides which it chooses.
                 assert_eq!(exact.support.len(), checked.support.len(), "{problem:?}");
             } else {
                 assert_eq!(exact.support, checked.support, "{problem:?}");
@@ -85,7 +85,7 @@ fn single(y: &[f64]) -> Vec<f32> {
     y.iter().map(|&y| y as f32).collect()
 }
 
-/// More rounds of loops than software Vulkan finishes in one launch.
+/// A pursuit with more rounds of loops than software Vulkan finishes in one launch.
 #[test]
 fn a_pursuit_of_many_atoms_is_whole() {
     let Some(device) = device() else { return };
@@ -123,7 +123,7 @@ fn a_batch_is_a_loop_here_too() {
         assert_eq!(&dictionary.solve_batch_single(&limits, y).unwrap()[0], found);
     }
     assert_eq!(dictionary.solve_batch_single(&limits, &[]), Ok(vec![]));
-    // More than go in one turn: each frame as often as it takes, in the order given.
+    // More frames than one turn holds: each frame comes as often as necessary, in the order given.
     let many: Vec<f32> = y.iter().copied().cycle().take(48 * 2100).collect();
     let found = dictionary.solve_batch_single(&limits, &many).unwrap();
     assert_eq!(found.len(), 2100);
@@ -193,7 +193,7 @@ fn a_dictionary_of_fast_transforms_has_the_same_path() {
     }
 }
 
-/// Cosines of a 16 x 16 image by `rows` Hadamard rows: atoms that are hard to tell apart.
+/// Cosines of a 16 x 16 image measured by `rows` Hadamard rows: atoms that are hard to distinguish.
 fn cosines(rows: &[usize]) -> DMatrix<f64> {
     let side = side(16);
     let transform = Transform::new(Basis::Dct, side);
@@ -254,7 +254,7 @@ fn ties_and_ends_that_single_precision_cannot_see_go_to_double() {
         let (found, again) = dictionary.solve_batch(&limits, &y).unwrap();
         let exact = reference::solve(&matrix, &y, &limits).unwrap();
         assert_eq!((&found[0].support, again), (&exact.support, 1));
-        // A limit that the residual meets to rounding only.
+        // A limit that the residual meets only to within rounding.
         let limits = Limits { noise: ((1.0 + lead) / 8.0).sqrt(), ..Limits::atoms(3) };
         let (found, again) = dictionary.solve_batch(&limits, &y).unwrap();
         let exact = reference::solve(&matrix, &y, &limits).unwrap();
@@ -264,7 +264,7 @@ fn ties_and_ends_that_single_precision_cannot_see_go_to_double() {
     let y = [3.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 1.0];
     let (found, again) = identity.solve_batch(&Limits::atoms(2), &y).unwrap();
     assert_eq!((&found[0].support[..], again), (&[0, 3][..], 0));
-    // Nothing is left after three, and f32 alone is not believed.
+    // Three atoms leave a residual of zero, which `f32` alone cannot confirm.
     let (found, again) = identity.solve_batch(&Limits::atoms(5), &y).unwrap();
     assert_eq!((&found[0].support[..], again), (&[0, 3, 7][..], 1));
 }
@@ -298,7 +298,7 @@ fn auto_takes_no_software_device_and_a_name_is_kept_to() {
         Choice::Cpu(why) => assert!(why.unwrap().to_string().starts_with("no GPU found (wgpu: ")),
     }
     assert!(matches!(choose(Backend::Cpu, 1000), Ok(Choice::Cpu(None))));
-    // Absent or there, but no panic.
+    // The result may be an error or a device, but never a panic.
     match choose(Backend::Cuda, 1) {
         Ok(Choice::Gpu(device)) => assert_eq!(device.backend(), Backend::Cuda),
         Ok(Choice::Cpu(_)) => panic!("the processor was not asked for"),

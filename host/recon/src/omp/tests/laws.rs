@@ -1,8 +1,8 @@
-//! What orthogonal matching pursuit promises, whoever carries it out.
+//! Property tests of orthogonal matching pursuit, for every implementation.
 
 use super::*;
 
-/// Reference, `f32` and `f64`, each with the tolerance that its rounding asks for.
+/// Solutions of reference, `f32` and `f64`, each with the tolerance for its rounding.
 fn all_paths(problem: &Problem, limits: &Limits) -> [(Solution, f64); 3] {
     [
         (solve_exactly(problem, limits), 1e-8),
@@ -16,7 +16,8 @@ proptest! {
     fn what_remains_is_orthogonal_to_the_support_and_never_grows(problem in problems()) {
         let length = DVector::from_column_slice(&problem.y).norm();
         for (solution, tolerance) in all_paths(&problem, &Limits::atoms(10)) {
-            // The reference's energies are differences of numbers near 1: their roots are good to 1e-7.
+            // The reference's energies are differences of numbers near 1, so their roots are right
+            // to 1e-7.
             prop_assert!(solution.residual_norms.is_sorted_by(|a, b| a + 1e-7 >= *b));
             let left = residual(&problem, &solution.support, &solution.coefficients);
             for &k in &solution.support {
@@ -29,7 +30,8 @@ proptest! {
         }
     }
 
-    /// J. Tropp, *Greed is good* (2004), Theorem B: fewer than (1 + 1 / coherence) / 2 atoms are found, all and only they.
+    /// J. Tropp, *Greed is good* (2004), Theorem B: fewer than (1 + 1 / coherence) / 2 atoms are
+    /// found exactly.
     #[test]
     fn under_the_coherence_bound_recovery_is_exact(seed: u64, count in 1_usize..8) {
         // Spikes and Walsh functions: coherence 1 / sqrt(256), so up to 8 atoms of the 512.
@@ -72,7 +74,7 @@ proptest! {
         let warm = solver.solve_from(&y, &cold.support).unwrap().solution();
         prop_assert_eq!(&warm.support, &cold.support);
         prop_assert_eq!(&warm.coefficients, &cold.coefficients);
-        // In another order: the same least squares.
+        // The same atoms in another order have the same least-squares solution.
         let backwards: Vec<usize> = cold.support.iter().rev().copied().collect();
         let warm = solver.solve_from(&y, &backwards).unwrap().solution();
         let left = |s: &Solution| residual(&problem, &s.support, &s.coefficients).norm();
@@ -88,7 +90,7 @@ fn a_start_spares_choices_in_a_video_and_keeps_to_the_laws() {
     let limits = Limits { residual: 1e-3, ..Limits::atoms(40) };
     let mut solver = Solver::new(&dictionary, &limits).unwrap();
     let first = solver.solve(&y).unwrap().solution();
-    // The next frame: every coefficient a little different, and one atom more.
+    // The next frame: every coefficient changes a little, and one atom is added.
     let next: Vec<f32> = y
         .iter()
         .zip(before.dictionary.column(200).iter())
@@ -99,7 +101,7 @@ fn a_start_spares_choices_in_a_video_and_keeps_to_the_laws() {
     assert_eq!(warm.support[..first.support.len()], first.support);
     assert_eq!(warm.support.len(), first.support.len() + 1);
     assert!(warm.residual_norms.is_sorted_by(|a, b| a >= b));
-    // An atom that is not seen, or said twice, is passed over.
+    // An unseen or repeated atom of the start is skipped.
     let blind = problem(Kind::Blind, 32, 64, 3, 1);
     let (dictionary, y) = dense::<f32>(&blind);
     let mut solver = Solver::new(&dictionary, &Limits::atoms(3)).unwrap();

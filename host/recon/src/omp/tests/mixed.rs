@@ -1,8 +1,9 @@
-//! Single precision checked by itself.
+//! Tests of single precision with `f64` as the referee.
 
 use super::*;
 
-/// Two atoms whose correlations with the measurement differ by less than `f32` can tell, in either order.
+/// Two atoms, in either order, whose correlations with the measurement differ by less than `f32`
+/// resolves.
 fn nearly_tied(lead: f64) -> (DMatrix<f64>, Vec<f64>) {
     let mut dictionary = DMatrix::identity(8, 70);
     dictionary.column_mut(69).copy_from_slice(&[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.6, 0.8]);
@@ -22,7 +23,7 @@ fn a_lead_that_single_precision_cannot_see_decides_all_the_same() {
         let (found, again) = dictionary.solve_batch(&limits, &y).unwrap();
         assert_eq!((&found[0].support, again), (&exact.support, 1));
         let mut solver = dictionary.solver(&limits).unwrap();
-        // Twice: the second finds its memory in use before.
+        // Runs twice, because the second run finds used memory.
         for _ in 0..2 {
             let (found, in_double) = solver.solve(&y).unwrap();
             assert_eq!((&found.support, in_double), (&exact.support, true));
@@ -53,11 +54,11 @@ fn atoms_that_point_the_same_way_are_one_and_no_reason_to_doubt() {
     let dictionary = MixedDictionary::new(problem.dictionary.clone(), true);
     let (found, again) = dictionary.solve_batch(&Limits::atoms(16), &y).unwrap();
     assert!(again < 20, "{again} of 100");
-    // The copies stand five after their originals.
+    // The copies stand five places after their originals.
     for solution in &found {
         assert!(solution.support.iter().all(|k| k % 6 != 5), "{:?}", solution.support);
     }
-    // An angle that only double precision sees is one all the same.
+    // An angle that only double precision resolves still makes two distinct atoms.
     let mut nearly = DMatrix::<f64>::identity(4, 3);
     nearly.column_mut(2).copy_from_slice(&[1.0, 0.0, 0.0, 1e-3]);
     let dictionary = MixedDictionary::new(nearly, true);
@@ -68,7 +69,7 @@ fn atoms_that_point_the_same_way_are_one_and_no_reason_to_doubt() {
 
 #[test]
 fn atoms_as_they_are_are_chosen_by_their_inner_products() {
-    // The second atom is longer, the first fits better.
+    // The second atom is longer, but the first fits better.
     let matrix = DMatrix::from_row_slice(2, 2, &[1.0, 3.0, 0.0, 3.0]);
     let first = |normalised| {
         let dictionary = MixedDictionary::new(matrix.clone(), normalised);
@@ -84,7 +85,7 @@ fn a_limit_that_the_residual_meets_to_rounding_is_judged_in_double_precision() {
     for lead in [1e-9_f64, -1e-9] {
         let matrix = DMatrix::<f64>::identity(8, 8);
         let y = [0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.6, 0.8];
-        // After the first atom the residual's energy is 1, the limit a little above or below.
+        // After the first atom the residual's energy is 1; the limit is a little above or below.
         let limits = Limits { noise: ((1.0 + lead) / 8.0).sqrt(), ..Limits::atoms(3) };
         let dictionary = MixedDictionary::new(matrix.clone(), true);
         let (found, again) = dictionary.solve_batch(&limits, &y).unwrap();

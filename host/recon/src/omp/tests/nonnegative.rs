@@ -1,4 +1,4 @@
-//! Coefficients of 0 or more.
+//! Tests of non-negative coefficients.
 
 use super::*;
 use crate::omp::nonnegative;
@@ -6,7 +6,8 @@ use crate::omp::nonnegative;
 proptest! {
     #[test]
     fn the_solution_is_the_best_of_those_that_are_nowhere_negative(problem in problems()) {
-        // Karush, Kuhn and Tucker: no atom in the support pulls, none outside would help with a part of 0 or more.
+        // The Karush-Kuhn-Tucker conditions: the gradient is 0 at atoms of the support, and no atom
+        // outside would reduce the residual with a positive coefficient.
         let (dictionary, y) = dense::<f64>(&problem);
         let atoms = problem.dictionary.ncols();
         let found = nonnegative::solve(&dictionary, &y, &Limits::atoms(atoms)).unwrap();
@@ -47,7 +48,7 @@ proptest! {
 proptest! {
     #[test]
     fn with_every_step_less_is_left(seed: u64) {
-        // Atoms that lean the same way push each other below 0 again and again.
+        // Atoms with similar directions push each other below 0 again and again.
         let mut random = Pcg64::seed_from_u64(seed);
         let dictionary = DMatrix::from_fn(24, 40, |_, _| normal(&mut random) + 0.8);
         let y = (0..24).map(|_| normal(&mut random) + 0.3).collect();
@@ -79,8 +80,9 @@ fn an_atom_that_would_be_negative_is_not_taken() {
 
 #[test]
 fn an_atom_that_stays_above_nothing_on_the_way_is_not_given_back() {
-    // When the last atom comes, two of those taken head below 0; the one that gets there first is given back alone, and the
-    // other, atom 0, is above 0 again in the end. A step as far as the second one's zero would give back both.
+    // When the last atom comes, two coefficients fall towards 0. Only the first to reach 0 is
+    // removed; the other, atom 0, is positive in the end. A step to the second one's zero would
+    // remove both.
     let matrix = DMatrix::from_row_slice(
         4,
         4,
@@ -93,8 +95,8 @@ fn an_atom_that_stays_above_nothing_on_the_way_is_not_given_back() {
 
 #[test]
 fn atoms_that_are_one_too_many_together_are_told_though_each_pivot_is_large() {
-    // Five atoms that leave a thousandth of themselves to each other, and a sixth that the five hold but for the rounding
-    // of its numbers: parts of a hundred thousand would cancel each other.
+    // Five nearly dependent atoms, and a sixth that is a combination of the five to within the
+    // rounding of its numbers: coefficients of a hundred thousand would cancel each other.
     let problem = problem(Kind::Deficient, 16, 16, 4, 11_072_703_967_221_519_038);
     let (dictionary, y) = dense::<f64>(&problem);
     let found = nonnegative::solve(&dictionary, &y, &Limits::atoms(16)).unwrap();

@@ -1,4 +1,4 @@
-//! Hadamard measurements of an image against the dictionary written out.
+//! Tests of the sampled Hadamard dictionary against the written-out matrix.
 
 use super::{Problem, agreeing};
 use crate::basis::{Basis, Transform};
@@ -11,7 +11,7 @@ use proptest::prelude::*;
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
 
-/// The dictionary that [`SampledHadamard`] stands for, prior and all, written out in `f64`.
+/// The matrix of a [`SampledHadamard`], with its prior, written out in `f64`.
 fn written_out(transform: &Transform, rows: &[u32], prior: &Prior) -> DMatrix<f64> {
     let area = transform.side().area();
     let n = transform.side().pixels() as f64;
@@ -94,7 +94,7 @@ fn dct_atoms_that_a_random_half_does_not_see_are_left_out() {
     let limits = Limits { residual: 1e-2, ..Limits::atoms(500) };
     let found = Solver::new(&gram, &limits).unwrap().solve(&y).unwrap().solution();
     let missed: Vec<usize> = (0..1024).filter(|&k| gram.atoms().energies()[k] < 1e-9).collect();
-    // Atoms of a few Walsh functions only; the mean is one of them.
+    // These atoms have only a few Walsh functions; the mean is one of them.
     assert_eq!(missed, [0, 520, 528, 536]);
     assert_eq!(found.unseen, missed);
     assert!(found.coefficients.iter().all(|c| c.is_finite()));

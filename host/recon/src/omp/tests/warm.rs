@@ -1,4 +1,4 @@
-//! Pursuits that start from the frame before.
+//! Tests of pursuits that start from the support of the frame before.
 
 use super::*;
 
@@ -16,7 +16,7 @@ fn atoms_taken_over_with_their_columns_are_those_taken_over_without_to_the_bit()
     let limits = Limits::atoms(16);
     let mut keeping = Solver::new(&dictionary, &limits).unwrap();
     let mut start = Vec::new();
-    // More, fewer, none, and others than the solver has columns of.
+    // More atoms, fewer, none, and others than those whose columns the solver has.
     for (y, kept) in frames.iter().zip([12, 16, 5, 0, 12, 16]) {
         let mut forgetful = Solver::new(&dictionary, &limits).unwrap();
         let found = keeping.solve_from(y, &start).unwrap();

@@ -129,7 +129,7 @@ fn frames_of_a_video_start_warm_where_the_method_can() {
     }
 }
 
-/// A method of somebody else's: every pixel is the mean.
+/// A user's own method: every pixel is the mean.
 struct Flat;
 
 impl Reconstruct for Flat {

@@ -1,4 +1,4 @@
-//! Few and small coefficients, by FISTA.
+//! FISTA: few and small coefficients.
 
 use super::penalised;
 use crate::reconstruct::method::{Entry, Setting};
@@ -6,7 +6,7 @@ use crate::reconstruct::{MatrixMethod, Method, Penalty};
 
 const NAME: &str = "FISTA";
 
-/// [`Penalty::Sparse`].
+/// The method with [`Penalty::Sparse`].
 pub(in super::super) const METHOD: Method = Method(&Entry {
     argument: "fista",
     name: NAME,

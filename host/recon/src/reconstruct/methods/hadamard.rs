@@ -1,10 +1,10 @@
-//! The inverse Walsh-Hadamard transform: zero filling.
+//! Zero filling: the inverse Walsh-Hadamard transform.
 
 use crate::reconstruct::method::Entry;
 use crate::reconstruct::{Method, Reconstruct, ReconstructError, Reconstruction, Report};
 use crate::{Image, Measurements, fwht};
 
-/// Zero filling.
+/// The method of zero filling.
 pub(in super::super) const METHOD: Method = Method(&Entry {
     argument: "hadamard",
     name: "inverse Hadamard transform",
@@ -14,7 +14,7 @@ pub(in super::super) const METHOD: Method = Method(&Entry {
     prepare: |_| Ok(Box::new(ZeroFilling { name: "inverse Hadamard transform" })),
 });
 
-/// [`hadamard`] under a name.
+/// [`hadamard`] as a [`Reconstruct`].
 pub(super) struct ZeroFilling {
     pub(super) name: &'static str,
 }
@@ -29,9 +29,10 @@ impl Reconstruct for ZeroFilling {
     }
 }
 
-/// Inverts the Walsh-Hadamard transform, with zero for rows that were not measured.
+/// Inverts the Walsh-Hadamard transform, with zeros for rows that were not measured.
 ///
-/// Over all rows this is exact. Over some it is the image of least energy that agrees with them.
+/// From all rows the image is exact. From some rows it is the image of least energy that agrees
+/// with them.
 #[must_use]
 pub fn hadamard(measurements: &Measurements) -> Image {
     let side = measurements.side();

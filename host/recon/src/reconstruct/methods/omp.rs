@@ -1,4 +1,4 @@
-//! Orthogonal matching pursuit, in a basis or over atoms of the user's own, on the processor or a GPU.
+//! Orthogonal matching pursuit, in a basis or over a user's own atoms, on the processor or a GPU.
 
 use crate::omp::BackendError;
 use crate::reconstruct::method::{Entry, OwnAtoms, Setting};
@@ -10,7 +10,7 @@ use crate::{Backend, Measurements};
 
 const NAME: &str = "OMP";
 
-/// Few atoms.
+/// The method of orthogonal matching pursuit.
 pub(in super::super) const METHOD: Method = Method(&Entry {
     argument: "omp",
     name: NAME,
@@ -29,7 +29,7 @@ pub(in super::super) const METHOD: Method = Method(&Entry {
 struct Omp {
     settings: OmpSettings,
     atoms: Option<OwnAtoms>,
-    /// The GPU, if one computes.
+    /// Name of the GPU, if a GPU computes.
     device: Option<String>,
 }
 
@@ -101,7 +101,7 @@ impl Reconstruct for Omp {
     }
 }
 
-/// The GPU for one image, if one was asked for by name.
+/// Name of the GPU for one image, if a GPU was requested by name.
 #[cfg(feature = "gpu")]
 fn device(backend: Backend) -> Result<Option<String>, BackendError> {
     use crate::omp::gpu::{Choice, choose};

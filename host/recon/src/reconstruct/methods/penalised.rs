@@ -1,4 +1,4 @@
-//! What the methods with a [`Penalty`] share: settings, and a report.
+//! The common part of the methods with a [`Penalty`]: settings, and a report.
 
 use crate::Measurements;
 use crate::reconstruct::{
@@ -11,7 +11,7 @@ struct Penalised {
     settings: RegularisedSettings,
 }
 
-/// A method that holds `penalty` against an image.
+/// Prepares the method with this `penalty`.
 pub(super) fn prepare(
     name: &'static str,
     penalty: Penalty,

@@ -1,5 +1,5 @@
-//! The pseudo-inverse. Hadamard rows are orthogonal, so the least image that agrees with them is that of zero filling;
-//! patterns of the user's own need a solver.
+//! The pseudo-inverse. Hadamard rows are orthogonal, so their pseudo-inverse is zero filling. A
+//! user's own patterns need a solver.
 
 use super::hadamard::ZeroFilling;
 use crate::reconstruct::method::Entry;
@@ -7,7 +7,7 @@ use crate::reconstruct::{MatrixMethod, Method};
 
 const NAME: &str = "pseudo-inverse";
 
-/// Least squares of least norm.
+/// The method of least squares with least norm.
 pub(in super::super) const METHOD: Method = Method(&Entry {
     argument: NAME,
     name: NAME,

@@ -6,7 +6,7 @@ use crate::reconstruct::{MatrixMethod, Method, Penalty};
 
 const NAME: &str = "Tikhonov";
 
-/// [`Penalty::Tikhonov`].
+/// The method with [`Penalty::Tikhonov`].
 pub(in super::super) const METHOD: Method = Method(&Entry {
     argument: "tikhonov",
     name: NAME,

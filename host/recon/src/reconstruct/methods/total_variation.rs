@@ -1,4 +1,4 @@
-//! Flat regions with edges, by the total variation.
+//! Total variation: flat regions with edges.
 
 use super::penalised;
 use crate::reconstruct::method::{Entry, Setting};
@@ -6,7 +6,7 @@ use crate::reconstruct::{MatrixMethod, Method, Penalty};
 
 const NAME: &str = "total variation";
 
-/// [`Penalty::TotalVariation`].
+/// The method with [`Penalty::TotalVariation`].
 pub(in super::super) const METHOD: Method = Method(&Entry {
     argument: "tv",
     name: NAME,

@@ -1,14 +1,15 @@
-//! Few large coefficients: FISTA.
+//! FISTA: few large coefficients.
 //!
-//! The one law: the measured rows are orthonormal, so a gradient step of length 1 never overshoots, and needs no search.
+//! The measured rows are orthonormal, so a gradient step of length 1 never overshoots and needs no
+//! line search.
 
 use super::{Masked, Problem, dot, see, show};
 use crate::basis::Basis;
 
-/// Change of the coefficients, relative to their norm, at which they have settled.
+/// Change of the coefficients, relative to their norm, at which the iteration stops.
 const SETTLED: f64 = 1e-4;
 
-/// The rows that are predicted at each strength.
+/// The predicted rows at each strength.
 pub(super) fn predict(
     problem: &Problem<'_>,
     positions: &[usize],
@@ -16,7 +17,7 @@ pub(super) fn predict(
     iterations: usize,
 ) -> Vec<Vec<f32>> {
     let Masked { grid, mask } = Masked::new(problem, positions);
-    // The mean is no detail: nothing is held against it.
+    // The mean is not a detail, so it has no penalty.
     let free = usize::from(problem.transform.basis() != Basis::Pixel);
     let noise = problem.prior.noise.powi(2) * std::f32::consts::SQRT_2;
     let weights: Vec<f32> = (0..grid.len())

@@ -44,7 +44,8 @@ fn flat_regions_come_back_whole_by_total_variation() {
 
 #[test]
 fn each_minimum_is_one() {
-    // No step away from the result makes its sum smaller: the definition, whatever the algorithm.
+    // No step away from the result reduces its sum. This is the definition of a minimum, whatever
+    // the algorithm.
     let side = side(8);
     let part = measured(side, &scene(side, 1)).take(Some(&Order::ZigZag), 0.5).unwrap();
     let mut random = Pcg64::seed_from_u64(3);

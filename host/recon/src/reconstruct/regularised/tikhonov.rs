@@ -1,10 +1,11 @@
-//! Normal coefficients of known size: conjugate gradients (M. Hestenes and E. Stiefel, 1952).
+//! Tikhonov's penalty for normal coefficients of known size, by conjugate gradients (M. Hestenes
+//! and E. Stiefel, 1952).
 //!
-//! The one law: the unknowns are `z = c / s`, so that what is expected of all is alike, and so is the accuracy.
+//! The unknowns are `z = c / s`, so all have the same expected size and the same accuracy.
 
 use super::{Masked, Problem, dot, see, show};
 
-/// The rows that are predicted at each strength.
+/// The predicted rows at each strength.
 pub(super) fn predict(
     problem: &Problem<'_>,
     positions: &[usize],
@@ -39,10 +40,10 @@ pub(super) fn predict(
         .collect()
 }
 
-/// Share of the right side's norm at which the residual is small enough.
+/// Norm of the residual, relative to the right side's norm, at which the iteration stops.
 const ACCURACY: f64 = 1e-4;
 
-/// Improves `x` towards `operate(x) = right`.
+/// Improves `x` as a solution of `operate(x) = right`.
 fn conjugate_gradients(
     operate: impl Fn(&[f32]) -> Vec<f32>,
     right: &[f32],

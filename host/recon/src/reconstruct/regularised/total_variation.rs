@@ -1,14 +1,14 @@
-//! Flat regions with edges: the primal-dual algorithm of Chambolle and Pock.
+//! Total variation for flat regions with edges, by the primal-dual algorithm of Chambolle and Pock.
 //!
-//! The one law: the data term's proximal map is exact. The rows are orthonormal, so each measured coefficient moves
-//! towards its measurement on its own, and the others stay.
+//! The proximal map of the data term is exact: the rows are orthonormal, so each measured
+//! coefficient moves towards its measurement on its own, and the other coefficients stay.
 
 use super::{Masked, Problem, dot, walsh};
 
-/// Squared norm of the discrete gradient is at most this (A. Chambolle, 2004).
+/// Upper bound of the squared norm of the discrete gradient (A. Chambolle, 2004).
 const GRADIENT: f32 = 8.0;
 
-/// The rows that are predicted at each strength.
+/// The predicted rows at each strength.
 pub(super) fn predict(
     problem: &Problem<'_>,
     positions: &[usize],
@@ -19,7 +19,7 @@ pub(super) fn predict(
     let Masked { grid, mask } = Masked::new(problem, positions);
     let mut x = grid.clone();
     walsh(n, &mut x);
-    // Steps in proportion to the picture's contrast: the result does not depend on them, the pace does.
+    // Steps are proportional to the picture's contrast. They change the speed and not the result.
     let mean = x.iter().sum::<f32>() / x.len() as f32;
     let spread: Vec<f32> = x.iter().map(|x| x - mean).collect();
     let contrast = ((dot(&spread, &spread) / x.len() as f64).sqrt() as f32).max(f32::MIN_POSITIVE);
@@ -52,7 +52,7 @@ pub(super) fn predict(
         .collect()
 }
 
-/// A step of the dual up the gradient of `x`, back into the unit discs.
+/// Moves the dual up the gradient of `x`, and projects it back into the unit discs.
 pub(in crate::reconstruct) fn climb(
     n: usize,
     x: &[f32],
@@ -73,7 +73,7 @@ pub(in crate::reconstruct) fn climb(
     }
 }
 
-/// A step of `x` along the dual's divergence.
+/// Moves `x` along the dual's divergence.
 pub(in crate::reconstruct) fn descend(
     n: usize,
     down: &[f32],

@@ -1,7 +1,7 @@
 //! Every variant of every enum of the protocol, by name.
 //!
-//! The one law: the matches below are exhaustive, so a new variant does not compile until it is listed here,
-//! and what is listed here must have frozen bytes.
+//! The matches below are exhaustive, so a new variant does not compile until it is listed here; what is listed here must
+//! have frozen bytes (`every_variant_is_frozen`).
 
 use nirspi_wire::{
     Answer, Command, ConfigField, ConfigProblem, DeviceMessage, EventKind, Fault, PatternOrder,
@@ -37,7 +37,7 @@ variants! {
     answer: Answer { Hello, Done, Status, SelfTest, Register, Gateware }
     refusal: Refusal {
         Protocol, State, Configuration, Fault, NoSuchRegister, RawLength, GatewareOffset, GatewareCrc,
-        Unsupported, Bus,
+        Unsupported, Bus, Unknown,
     }
     config_problem: ConfigProblem { OutOfRange, OrderEntry }
     config_field: ConfigField {
@@ -109,6 +109,7 @@ fn of_refusal(given: &Refusal, seen: &mut Seen) {
         | Refusal::GatewareOffset { .. }
         | Refusal::GatewareCrc
         | Refusal::Unsupported
-        | Refusal::Bus => {}
+        | Refusal::Bus
+        | Refusal::Unknown => {}
     }
 }

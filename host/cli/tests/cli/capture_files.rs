@@ -1,0 +1,55 @@
+//! The files that `nirspi capture` and the commands for pictures make: their names, and what happens where the system allows no
+//! more.
+
+use crate::bench::Bench;
+
+#[test]
+fn two_captures_started_at_once_make_two_recordings() {
+    let bench = Bench::new();
+    let arguments = ["capture", "--frames", "300", "--json"];
+    let both = [bench.start(&arguments), bench.start(&arguments)];
+    let mut names: Vec<String> = both
+        .map(|capture| {
+            let report = capture.wait().succeeded().json();
+            assert_eq!(report["frames"]["received"], 300, "{report}");
+            report["recording"].as_str().unwrap().to_owned()
+        })
+        .to_vec();
+    names.sort();
+    assert_eq!(names, ["capture-1.mcap", "capture-2.mcap"]);
+    for name in &names {
+        let again = ["reconstruct", name, "--method", "hadamard", "--json"];
+        let report = bench.run(&again).succeeded().json();
+        assert_eq!(report["frames"]["received"], 300, "{report}");
+        assert_eq!(report["notes"].as_array().map_or(0, Vec::len), 0, "{report}");
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_told_with_the_frames_that_the_file_really_holds() {
+    let bench = Bench::new();
+    // 2 MB, and an error in place of the signal that ends a program silently.
+    let limits = "trap '' XFSZ; ulimit -f 4000";
+    let capture = ["capture", "--frames", "3000", "--no-calibration", "--adc-latency", "6"];
+    let outcome = bench.run_limited(limits, &[&capture[..], &["--out", "rec.mcap"]].concat());
+    let outcome = outcome.failed(1, &["rec.mcap: cannot record any more", "File too large"]);
+    let told = outcome.stderr.split("cannot record any more, ").nth(1).unwrap();
+    let told: u64 = told.split(' ').next().unwrap().parse().unwrap();
+    let again = ["reconstruct", "rec.mcap", "--method", "hadamard", "--json"];
+    let report = bench.run(&again).succeeded().json();
+    assert_eq!(report["frames"]["received"], told, "{}: {report}", outcome.stderr);
+    assert!(told > 100, "{told}");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_folder_takes_more_pictures_than_a_process_may_have_files_open() {
+    const COUNT: usize = 120;
+    let bench = Bench::new();
+    let pixels: Vec<f32> = (0..COUNT * 32 * 32).map(|at| (at % 97) as f32 / 96.0).collect();
+    bench.write("many.npy", &nirspi::files::npy::encode(&[COUNT, 32, 32], &pixels));
+    let upscale = ["upscale", "many.npy", "--backend", "cpu", "--out", "pictures"];
+    bench.run_limited("ulimit -n 64", &upscale).succeeded();
+    assert_eq!(std::fs::read_dir(bench.path("pictures")).unwrap().count(), COUNT);
+}

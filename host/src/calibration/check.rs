@@ -1,0 +1,105 @@
+//! A calibration that was read back must be one that a burst can give.
+
+use super::Settling;
+use super::burst::HALF_PERIOD;
+use nirspi_wire::ADC_MAX;
+use nirspi_wire::register::LATENCY_MAX;
+use thiserror::Error;
+
+/// No response overshoots its step by this factor; noise of a dim burst neither.
+const LARGEST_RESPONSE: f64 = 4.0;
+
+/// A number that no burst gives.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[error("{field} is {found}, expected {expected}")]
+pub struct SettlingError {
+    /// Which number.
+    pub field: String,
+    /// As found.
+    pub found: String,
+    /// What a burst gives.
+    pub expected: String,
+}
+
+impl Settling {
+    /// Whether a burst can have given this calibration. What is read from files has to pass.
+    ///
+    /// # Errors
+    /// [`SettlingError`] names the first number that is out of range.
+    pub fn check(&self) -> Result<(), SettlingError> {
+        let wrong = |field: &str, found: &dyn ToString, expected: String| SettlingError {
+            field: field.to_owned(),
+            found: found.to_string(),
+            expected,
+        };
+        if self.adc_latency > LATENCY_MAX {
+            return Err(wrong("adc_latency", &self.adc_latency, format!("0 to {LATENCY_MAX}")));
+        }
+        let length = self.response.len();
+        if length > usize::from(HALF_PERIOD) {
+            let expected = format!("at most {HALF_PERIOD} samples");
+            return Err(wrong("length of the response", &length, expected));
+        }
+        for (at, response) in self.response.iter().enumerate() {
+            // NaN is in no range.
+            if !(-LARGEST_RESPONSE..=LARGEST_RESPONSE).contains(response) {
+                let expected = format!("-{LARGEST_RESPONSE} to {LARGEST_RESPONSE}");
+                return Err(wrong(&format!("response[{at}]"), response, expected));
+            }
+        }
+        // The response begins with the first sample that shows the step.
+        if let Some(first) = self.response.first().filter(|&&first| first <= 0.0) {
+            return Err(wrong("response[0]", first, "more than 0".to_owned()));
+        }
+        let counts = f64::from(ADC_MAX);
+        for (field, found, least) in [
+            ("dark_counts", self.dark_counts, 0.0),
+            // A burst too dim to show the step has one of either sign.
+            ("step_counts", self.step_counts, -counts),
+            ("noise_counts", self.noise_counts, 0.0),
+        ] {
+            if !(least..=counts).contains(&found) {
+                return Err(wrong(field, &found, format!("{least} to {counts}")));
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_calibration_that_no_burst_gives_names_the_number() {
+        let sound = Settling {
+            adc_latency: 6,
+            response: vec![0.4, 0.9],
+            dark_counts: 2048.0,
+            step_counts: 8000.0,
+            noise_counts: 18.5,
+        };
+        sound.check().unwrap();
+        // A chain without any delay settles at once.
+        Settling { response: Vec::new(), ..sound.clone() }.check().unwrap();
+        for (changed, words) in [
+            (Settling { adc_latency: 64, ..sound.clone() }, "adc_latency is 64, expected 0 to 63"),
+            (
+                Settling { response: vec![1.0; 129], ..sound.clone() },
+                "length of the response is 129",
+            ),
+            (Settling { response: vec![0.0], ..sound.clone() }, "response[0] is 0, expected more"),
+            (Settling { response: vec![0.5, f64::NAN], ..sound.clone() }, "response[1] is NaN"),
+            (Settling { response: vec![1e300], ..sound.clone() }, "expected -4 to 4"),
+            (
+                Settling { dark_counts: -1.0, ..sound.clone() },
+                "dark_counts is -1, expected 0 to 16383",
+            ),
+            (Settling { step_counts: f64::INFINITY, ..sound.clone() }, "step_counts is inf"),
+            (Settling { noise_counts: 1e5, ..sound.clone() }, "noise_counts is 100000"),
+        ] {
+            let error = changed.check().unwrap_err().to_string();
+            assert!(error.contains(words), "{error}, expected {words}");
+        }
+    }
+}

@@ -1,0 +1,115 @@
+//! What came in a run that brings it no further: how much of it is too much.
+//!
+//! # Invariant
+//! Of a recording, all but [`ALLOWED`] and as much again as the frames is frames, a trickle of other messages left aside
+//! (`tests::junk_alone_is_too_much_after_the_allowance`, `tests::frames_pay_for_as_much_junk`).
+
+use nirspi_wire::{DeviceMessage, PacketError};
+use std::time::{Duration, Instant};
+
+/// Bytes of junk that any run may have.
+const ALLOWED: u64 = 64 << 20;
+/// Bytes a second of intact messages that are no frames: depth maps, replies, events. A depth map is 150 bytes, 60 times
+/// a second.
+const TRICKLE_PER_S: u64 = 64 << 10;
+
+/// Counts a run's frames and junk, in bytes.
+#[derive(Debug)]
+pub(super) struct Junk {
+    began: Instant,
+    frames: u64,
+    /// Damaged packets, frames of other runs or of another setup, frames that came twice.
+    useless: u64,
+    /// Intact messages that are no frames.
+    messages: u64,
+    too_much: bool,
+}
+
+impl Junk {
+    pub(super) fn new(began: Instant) -> Self {
+        Self { began, frames: 0, useless: 0, messages: 0, too_much: false }
+    }
+
+    /// A packet of so many bytes has come at `now`; `new_frame` if it was a frame of the run that had not come before.
+    pub(super) fn packet(
+        &mut self,
+        bytes: usize,
+        content: &Result<DeviceMessage<'_>, PacketError>,
+        new_frame: bool,
+        now: Instant,
+    ) {
+        let count = match content {
+            _ if new_frame => &mut self.frames,
+            Err(_) | Ok(DeviceMessage::Frame(_)) => &mut self.useless,
+            Ok(_) => &mut self.messages,
+        };
+        *count += bytes as u64;
+        let elapsed = now.saturating_duration_since(self.began) + Duration::from_secs(1);
+        self.too_much |= self.excess(elapsed) > ALLOWED + self.frames;
+    }
+
+    fn excess(&self, elapsed: Duration) -> u64 {
+        let trickle = TRICKLE_PER_S.saturating_mul(elapsed.as_secs());
+        self.useless + self.messages.saturating_sub(trickle)
+    }
+
+    /// Whether the run is to be given up.
+    pub(super) fn is_too_much(&self) -> bool {
+        self.too_much
+    }
+
+    /// Bytes that brought the run no further.
+    pub(super) fn bytes(&self) -> u64 {
+        self.useless + self.messages
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nirspi_wire::{Event, EventKind};
+
+    const DAMAGED: Result<DeviceMessage<'_>, PacketError> = Err(PacketError::TooLong);
+
+    #[test]
+    fn junk_alone_is_too_much_after_the_allowance() {
+        let now = Instant::now();
+        let mut junk = Junk::new(now);
+        for _ in 0..64 {
+            junk.packet(1 << 20, &DAMAGED, false, now);
+            assert!(!junk.is_too_much());
+        }
+        junk.packet(1, &DAMAGED, false, now);
+        assert!(junk.is_too_much());
+        assert_eq!(junk.bytes(), (64 << 20) + 1);
+    }
+
+    #[test]
+    fn frames_pay_for_as_much_junk() {
+        let now = Instant::now();
+        let mut junk = Junk::new(now);
+        for _ in 0..1000 {
+            junk.packet(1 << 20, &DAMAGED, true, now);
+            junk.packet(1 << 20, &DAMAGED, false, now);
+        }
+        assert!(!junk.is_too_much());
+        junk.packet(65 << 20, &DAMAGED, false, now);
+        assert!(junk.is_too_much());
+    }
+
+    #[test]
+    fn depth_maps_and_replies_may_trickle_for_days_and_may_not_flood() {
+        let began = Instant::now();
+        let mut junk = Junk::new(began);
+        let event = Event { device_time_us: 0, kind: EventKind::RawDropped };
+        let message = Ok(DeviceMessage::Event(event));
+        for hour in 0..100 {
+            let now = began + Duration::from_secs(3600 * hour);
+            junk.packet(3600 * 60 * 150, &message, false, now);
+            assert!(!junk.is_too_much(), "{hour}");
+        }
+        let mut junk = Junk::new(began);
+        (0..70).for_each(|_| junk.packet(1 << 20, &message, false, began));
+        assert!(junk.is_too_much());
+    }
+}

@@ -1,0 +1,165 @@
+//! What keeps a capture from being whole, in words.
+
+use super::{Capture, Ended};
+use crate::causes;
+
+impl Capture {
+    /// What is missing, in one line; `None` if the capture is whole: all frames asked for were made and came, no packet beyond
+    /// them was damaged, and the camera says that no fault stands. A run without a number of frames is whole when the user
+    /// has stopped it and all frames made have come.
+    #[must_use]
+    pub fn missing(&self) -> Option<String> {
+        let parts: Vec<String> =
+            [self.end(), self.frames(), self.packets()].into_iter().flatten().collect();
+        (!parts.is_empty()).then(|| parts.join("; "))
+    }
+
+    /// How the run ended, if not as it should.
+    fn end(&self) -> Option<String> {
+        match &self.ended {
+            Ended::Complete => None,
+            Ended::Stopped => self.asked.map(|asked| {
+                let made = self.made.unwrap_or_default();
+                format!("stopped by the user after {made} of {asked} frames")
+            }),
+            Ended::Fault(fault) => {
+                let made = self.of_asked();
+                Some(format!("the camera switched its LEDs off{made}: {fault}"))
+            }
+            Ended::WrongNumber { made, asked: Some(asked) } => {
+                Some(format!("the camera made {made} frames, {asked} were asked for"))
+            }
+            Ended::WrongNumber { made, asked: None } => {
+                Some(format!("the camera ended the run by itself after {made} frames"))
+            }
+            Ended::Unconfirmed(error) => Some(format!(
+                "the camera did not say after the run whether a fault stands: {}",
+                causes::in_one_line(error)
+            )),
+            Ended::Junk { bytes } => {
+                let (received, megabytes) = (self.counters.received, bytes / 1_000_000);
+                Some(format!(
+                    "{megabytes} MB of damaged packets and packets of other runs came with {received} frames, and the \
+                     capture was ended"
+                ))
+            }
+            Ended::LinkLost(error) => {
+                let error = causes::in_one_line(error);
+                Some(format!("{error}; what the camera made after the last frame is not known"))
+            }
+        }
+    }
+
+    fn of_asked(&self) -> String {
+        match (self.made, self.asked) {
+            (Some(made), Some(asked)) => format!(" after {made} of {asked} frames"),
+            (Some(made), None) => format!(" after {made} frames"),
+            (None, _) => String::new(),
+        }
+    }
+
+    /// Frames made that did not come whole and in order.
+    fn frames(&self) -> Option<String> {
+        let counters = self.counters;
+        (!counters.is_complete()).then(|| {
+            let made = counters.total();
+            format!("of {made} frames made: {counters}")
+        })
+    }
+
+    /// Damaged packets that were no frames of the run: what they said is not known.
+    fn packets(&self) -> Option<String> {
+        let others = self.damaged_packets.saturating_sub(self.counters.corrupt);
+        (others > 0).then(|| {
+            let packets = if others == 1 { "packet" } else { "packets" };
+            format!("{others} damaged {packets} beyond these frames, of unknown content")
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::account::LossCounters;
+    use crate::integrate::Integrated;
+    use crate::session::SessionError;
+    use crate::setup::MeasurementSetup;
+    use nirspi_recon::Order;
+    use nirspi_wire::Fault;
+    use std::time::Duration;
+
+    /// A capture of 50 frames for which nothing is missing.
+    fn whole() -> Capture {
+        let setup = MeasurementSetup::new(&Order::Natural, 0.1).unwrap();
+        Capture {
+            integrated: Integrated::new(&setup),
+            setup,
+            settling: None,
+            calibration_problem: None,
+            counters: LossCounters { received: 50, ..Default::default() },
+            damaged_packets: 0,
+            unknown_packets: 0,
+            repeated: 0,
+            status: None,
+            asked: Some(50),
+            made: Some(50),
+            recording: None,
+            ended: Ended::Complete,
+            elapsed: Duration::from_secs(1),
+        }
+    }
+
+    #[test]
+    fn a_capture_is_whole_only_if_nothing_is_missing() {
+        assert_eq!(whole().missing(), None);
+        let no_answer = || SessionError::NoAnswer { command: "Status" };
+        let short = || LossCounters { received: 3, ..Default::default() };
+        let cases: [(Capture, &[&str]); 8] = [
+            (
+                Capture {
+                    counters: short(),
+                    made: Some(3),
+                    ended: Ended::WrongNumber { made: 3, asked: Some(50) },
+                    ..whole()
+                },
+                &["made 3 frames, 50 were asked for"],
+            ),
+            (
+                Capture {
+                    counters: short(),
+                    made: Some(3),
+                    damaged_packets: 1,
+                    ended: Ended::Fault(Fault::Interlock),
+                    ..whole()
+                },
+                &["LEDs off after 3 of 50 frames", "interlock", "1 damaged packet beyond"],
+            ),
+            (
+                Capture {
+                    counters: LossCounters { received: 48, lost: 1, corrupt: 1, late: 0 },
+                    damaged_packets: 1,
+                    ..whole()
+                },
+                &["of 50 frames made: 48 received, 1 lost, 1 corrupt, 0 late"],
+            ),
+            (Capture { damaged_packets: 2, ..whole() }, &["2 damaged packets"]),
+            (Capture { ended: Ended::Unconfirmed(no_answer()), ..whole() }, &["whether a fault"]),
+            (Capture { ended: Ended::Stopped, made: Some(7), ..whole() }, &["after 7 of 50"]),
+            (Capture { ended: Ended::Junk { bytes: 67_000_000 }, ..whole() }, &["67 MB"]),
+            (Capture { ended: Ended::LinkLost(no_answer()), ..whole() }, &["not known"]),
+        ];
+        for (capture, words) in cases {
+            let missing = capture.missing().unwrap();
+            assert!(words.iter().all(|word| missing.contains(word)), "{missing}");
+        }
+    }
+
+    #[test]
+    fn a_run_without_a_length_is_whole_when_the_user_stops_it() {
+        let stopped = Capture { asked: None, ended: Ended::Stopped, ..whole() };
+        assert_eq!(stopped.missing(), None);
+        let ended = Ended::WrongNumber { made: 50, asked: None };
+        let by_itself = Capture { asked: None, ended, ..whole() };
+        assert!(by_itself.missing().unwrap().contains("by itself after 50 frames"));
+    }
+}

@@ -1,0 +1,260 @@
+//! Where a recording goes on the disk, and how a file that is there already is kept from harm.
+//!
+//! # Invariant
+//! A recording is made in a file that this program has just made, or on a device. A file that was there before is never
+//! opened for writing (`tests::two_recordings_at_once_take_two_names`, `tests::a_file_that_is_there_is_left_alone`), and
+//! gives way only when the new recording is whole and on the disk
+//! (`tests::the_old_recording_goes_when_the_new_one_stands_and_not_before`).
+
+use std::ffi::OsString;
+use std::fs::{self, File, OpenOptions};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+/// Longest time that a recording is with the system before it is told to put it on the disk.
+const SYNC_EVERY: Duration = Duration::from_secs(5);
+/// Most names that are tried.
+const NAMES: u32 = 100_000;
+
+/// Where a recording goes.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Target {
+    /// A file of this name, which must not be there; or a device.
+    New(PathBuf),
+    /// A file of this name. One that is there gives way when the new recording is whole; until then the new one is beside it,
+    /// as `NAME.new.mcap`.
+    Replace(PathBuf),
+    /// The first free name of `capture-1.mcap`, `capture-2.mcap` ... in this folder.
+    FirstFree(PathBuf),
+}
+
+impl Target {
+    /// The file or folder that it names.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        match self {
+            Self::New(path) | Self::Replace(path) | Self::FirstFree(path) => path,
+        }
+    }
+}
+
+/// The file that a recording is written into.
+#[derive(Debug)]
+pub(super) struct Place {
+    path: PathBuf,
+    /// The name that it takes when it is whole.
+    replaces: Option<PathBuf>,
+    /// A device was there before, and is not removed.
+    device: bool,
+    syncer: Option<Syncer>,
+}
+
+impl Place {
+    /// Makes the file.
+    ///
+    /// # Errors
+    /// [`io::ErrorKind::AlreadyExists`] if the name is taken, or what the system says.
+    pub(super) fn make(target: &Target) -> io::Result<(Self, File)> {
+        match target {
+            Target::New(path) | Target::Replace(path) if is_device(path) => {
+                let file = OpenOptions::new().write(true).open(path)?;
+                Ok((Self { path: path.clone(), replaces: None, device: true, syncer: None }, file))
+            }
+            Target::New(path) => Self::of_new(path.clone(), None).map_err(|error| {
+                let taken = error.kind() == io::ErrorKind::AlreadyExists;
+                let advice = "the file is there already, choose another name";
+                if taken { io::Error::new(error.kind(), advice) } else { error }
+            }),
+            Target::Replace(path) => match Self::of_new(path.clone(), None) {
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => Self::beside(path),
+                made => made,
+            },
+            Target::FirstFree(folder) => {
+                first_free(|n| folder.join(format!("capture-{n}.mcap")), None)
+            }
+        }
+    }
+
+    /// A new file beside the one that it is to replace. A link stays; the file that it leads to is replaced.
+    fn beside(path: &Path) -> io::Result<(Self, File)> {
+        if path.is_dir() {
+            return Err(io::ErrorKind::IsADirectory.into());
+        }
+        let path = if path.is_symlink() { fs::canonicalize(path)? } else { path.to_owned() };
+        let name = |n: u32| {
+            let mut name = OsString::from(path.file_stem().unwrap_or_default());
+            name.push(if n == 1 { ".new.mcap".to_owned() } else { format!(".new-{n}.mcap") });
+            path.with_file_name(name)
+        };
+        first_free(name, Some(&path))
+    }
+
+    fn of_new(path: PathBuf, replaces: Option<PathBuf>) -> io::Result<(Self, File)> {
+        let file = File::create_new(&path)?;
+        let syncer = Some(Syncer::start(file.try_clone()?));
+        Ok((Self { path, replaces, device: false, syncer }, file))
+    }
+
+    /// The file's name now.
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Puts the file, which is whole, on the disk. With `replace` it takes the name of the file that it was to replace.
+    ///
+    /// # Errors
+    /// What the system says; the file is still there then, by the name that it has.
+    pub(super) fn settle(&mut self, file: &File, replace: bool) -> io::Result<()> {
+        if self.device {
+            return Ok(());
+        }
+        if let Some(syncer) = self.syncer.take() {
+            syncer.end()?;
+        }
+        file.sync_all()?;
+        if let Some(target) = self.replaces.take_if(|_| replace) {
+            fs::rename(&self.path, &target)?;
+            self.path = target;
+        }
+        sync_folder_of(&self.path)
+    }
+
+    /// Removes the file, unless it is a device.
+    pub(super) fn remove(self) {
+        drop(self.syncer);
+        if !self.device {
+            // It was made by this program and holds no frame; where it cannot be removed it does no harm.
+            let _ = fs::remove_file(&self.path);
+        }
+    }
+}
+
+/// The first of these names that is free.
+fn first_free(name: impl Fn(u32) -> PathBuf, replaces: Option<&Path>) -> io::Result<(Place, File)> {
+    for n in 1..NAMES {
+        match Place::of_new(name(n), replaces.map(Path::to_owned)) {
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+            made => return made,
+        }
+    }
+    Err(io::Error::new(io::ErrorKind::AlreadyExists, format!("{NAMES} recordings are there")))
+}
+
+/// Whether something is there that is neither a file nor a folder.
+fn is_device(path: &Path) -> bool {
+    fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir())
+}
+
+/// Makes sure that a name is on the disk, where the system has a way to say so.
+fn sync_folder_of(path: &Path) -> io::Result<()> {
+    let folder = match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    crate::files::output::sync_folder(folder)
+}
+
+/// Puts a file on the disk every few seconds, beside the thread that writes it: a disk that is slow holds up no frame.
+#[derive(Debug)]
+struct Syncer {
+    over: mpsc::Sender<()>,
+    thread: JoinHandle<io::Result<()>>,
+}
+
+impl Syncer {
+    fn start(file: File) -> Self {
+        let (over, is_over) = mpsc::channel();
+        let thread = std::thread::spawn(move || {
+            while is_over.recv_timeout(SYNC_EVERY) == Err(RecvTimeoutError::Timeout) {
+                file.sync_data()?;
+            }
+            Ok(())
+        });
+        Self { over, thread }
+    }
+
+    /// Ends it. What the disk could not take is told here: the system tells it once.
+    fn end(self) -> io::Result<()> {
+        drop(self.over);
+        self.thread.join().unwrap_or_else(|_| Err(io::Error::other("syncing the file panicked")))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Write;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let mut names: Vec<String> = fs::read_dir(folder)
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn two_recordings_at_once_take_two_names() {
+        let folder = tempfile::tempdir().unwrap();
+        let target = Target::FirstFree(folder.path().to_owned());
+        let made: Vec<PathBuf> = std::thread::scope(|scope| {
+            let makers: Vec<_> = (0..8)
+                .map(|_| scope.spawn(|| Place::make(&target).unwrap().0.path().to_owned()))
+                .collect();
+            makers.into_iter().map(|maker| maker.join().unwrap()).collect()
+        });
+        let expected: Vec<String> = (1..=8).map(|n| format!("capture-{n}.mcap")).collect();
+        assert_eq!(names(folder.path()), expected);
+        assert!(made.iter().all(|path| made.iter().filter(|other| *other == path).count() == 1));
+    }
+
+    #[test]
+    fn a_file_that_is_there_is_left_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("rec.mcap");
+        fs::write(&path, b"precious").unwrap();
+        let error = Place::make(&Target::New(path.clone())).unwrap_err();
+        assert_eq!(error.kind(), io::ErrorKind::AlreadyExists);
+        assert_eq!(fs::read(&path).unwrap(), b"precious");
+    }
+
+    #[test]
+    fn the_old_recording_goes_when_the_new_one_stands_and_not_before() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("rec.mcap");
+        fs::write(&path, b"old").unwrap();
+        // Left by an earlier run that was killed: it is recorded data, and stays.
+        fs::write(folder.path().join("rec.new.mcap"), b"earlier").unwrap();
+        let replace = Target::Replace(path.clone());
+        let (mut place, mut file) = Place::make(&replace).unwrap();
+        file.write_all(b"new").unwrap();
+        assert_eq!(place.path(), folder.path().join("rec.new-2.mcap"));
+        assert_eq!(fs::read(&path).unwrap(), b"old");
+        place.settle(&file, true).unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"new");
+        assert_eq!(names(folder.path()), ["rec.mcap", "rec.new.mcap"]);
+
+        // Not whole: both stay.
+        let (mut place, file) = Place::make(&replace).unwrap();
+        place.settle(&file, false).unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"new");
+        assert_eq!(names(folder.path()), ["rec.mcap", "rec.new-2.mcap", "rec.new.mcap"]);
+
+        // Nothing recorded: only the new one goes.
+        let (place, _) = Place::make(&replace).unwrap();
+        place.remove();
+        assert_eq!(names(folder.path()), ["rec.mcap", "rec.new-2.mcap", "rec.new.mcap"]);
+    }
+
+    #[test]
+    fn where_nothing_is_there_to_replace_the_recording_has_its_name_at_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("rec.mcap");
+        let (place, _) = Place::make(&Target::Replace(path.clone())).unwrap();
+        assert_eq!(place.path(), path);
+    }
+}

@@ -1,0 +1,37 @@
+//! What a capture says of its run at the end of the recording.
+
+use crate::account::LossCounters;
+use serde::{Deserialize, Serialize};
+
+/// The account of a run as the capture closed it.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct RunAccount {
+    /// What became of the frames.
+    #[serde(flatten)]
+    pub counters: LossCounters,
+    /// Frames asked for; `None` if the run was to go on until stopped.
+    #[serde(default)]
+    pub asked: Option<u32>,
+    /// Frames that the camera says it has made; `None` if the camera could not say.
+    #[serde(default)]
+    pub made: Option<u64>,
+    /// What the run lacks, in one line; `None` if nothing is missing.
+    #[serde(default)]
+    pub missing: Option<String>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_account_of_an_older_recording_still_reads() {
+        let old = r#"{"received":7,"lost":1,"corrupt":0,"late":0}"#;
+        let account: RunAccount = serde_json::from_str(old).unwrap();
+        let counters = LossCounters { received: 7, lost: 1, ..Default::default() };
+        assert_eq!(account, RunAccount { counters, ..Default::default() });
+        let json = serde_json::to_string(&account).unwrap();
+        assert!(json.starts_with(r#"{"received":7,"#), "{json}");
+        assert_eq!(serde_json::from_str::<LossCounters>(&json).unwrap(), counters);
+    }
+}

@@ -1,0 +1,70 @@
+//! The bytes that protocol version 2 has added, frozen.
+//!
+//! If a test in this file fails, do not change the test: the change would lock out every camera and every recording of
+//! version 2.
+
+use super::bytes::{holds, packet, unhex};
+use nirspi_wire::packet::{request_id, unseal};
+use nirspi_wire::{
+    Answer, Capabilities, DeviceMessage, Identity, Refusal, Reply, Request, Tail, Version, open,
+};
+
+/// Every message that is new, and the greeting with its tail.
+pub fn device_messages() -> Vec<(DeviceMessage<'static>, &'static str)> {
+    let capabilities = Capabilities::DEPTH.with(Capabilities::BOOTLOADER);
+    vec![
+        (
+            greeting(Tail(Some(capabilities))),
+            "00 01 00 00 02 01 02 03 00 01 02 01 62 01 73 20 c0 b2 cd 3b 0e 8e 0c 05",
+        ),
+        (DeviceMessage::Reply(Reply { id: 300, outcome: Err(Refusal::Unknown) }), "00 ac 02 01 0a"),
+    ]
+}
+
+fn greeting(capabilities: Tail<Capabilities>) -> DeviceMessage<'static> {
+    let identity = Identity {
+        protocol: 2,
+        firmware: Version(1, 2, 3),
+        gateware: Version(0, 1, 2),
+        board: "b",
+        serial: "s",
+        side: 32,
+        adc_hz: 125_000_000,
+        adc_bits: 14,
+        wavelength_nm: 1550,
+        capabilities,
+    };
+    DeviceMessage::Reply(Reply { id: 1, outcome: Ok(Answer::Hello(identity)) })
+}
+
+#[test]
+fn device_messages_have_these_bytes() {
+    for (message, payload) in device_messages() {
+        holds(&message, &mut packet(&unhex(payload)));
+    }
+}
+
+#[test]
+fn an_absent_tail_has_no_bytes() {
+    let whole = device_messages()[0].1;
+    let without = &whole[..whole.len() - " 05".len()];
+    holds(&greeting(Tail(None)), &mut packet(&unhex(without)));
+}
+
+#[test]
+fn a_tail_of_a_later_version_is_passed_over() {
+    let (message, payload) = device_messages()[0];
+    let mut longer = packet(&unhex(&format!("{payload} 2a 07 ff")));
+    let encoded = longer.split_last_mut().unwrap().1;
+    assert_eq!(open::<DeviceMessage<'_>>(encoded), Ok(message));
+}
+
+#[test]
+fn a_request_of_a_later_version_still_shows_its_number() {
+    // Id 300, a command number that no version has yet, and what may follow.
+    let mut unknown = packet(&unhex("ac 02 7f 01 02 03"));
+    let encoded = unknown.split_last_mut().unwrap().1;
+    let payload = unseal(encoded).unwrap();
+    assert!(nirspi_wire::packet::parse::<Request<'_>>(payload).is_err());
+    assert_eq!(request_id(payload), Some(300));
+}
