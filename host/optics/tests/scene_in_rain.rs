@@ -144,10 +144,9 @@ fn relit_leds_give_what_new_ones_would() {
 fn an_ordinary_camera_sees_the_scene_with_its_own_noise_and_some_drops() {
     let camera = VisibleCamera::default();
     let scene = Scene::new(vec![0.0, 1.0, 1.0, 0.0], 2, 2000.0).unwrap();
-    let see = |drops: &Drops, seed| {
-        camera.picture(&scene, &Projector::default(), 1000.0, drops, seed).unwrap()
-    };
-    let dry = see(&Drops::none(), 1);
+    let see =
+        |air: &Air, seed| camera.picture(&scene, &Projector::default(), 1000.0, air, seed).unwrap();
+    let dry = see(&Air::dry(), 1);
     let quarter = |rows: std::ops::Range<usize>, columns: std::ops::Range<usize>| -> f64 {
         let values: Vec<f32> =
             rows.flat_map(|r| columns.clone().map(move |c| r * 32 + c)).map(|i| dry[i]).collect();
@@ -155,15 +154,18 @@ fn an_ordinary_camera_sees_the_scene_with_its_own_noise_and_some_drops() {
     };
     // Shot noise of 7000 electrons over 256 pixels: 1.2 % / 16.
     assert!((quarter(0..16, 16..32) - 1.0).abs() < 0.004 && quarter(0..16, 0..16).abs() < 0.001);
-    assert_eq!(dry, see(&Drops::none(), 1));
-    assert_ne!(dry, see(&Drops::none(), 2));
+    assert_eq!(dry, see(&Air::dry(), 1));
+    assert_ne!(dry, see(&Air::dry(), 2));
     // A drop before the black quarter shines.
-    let downpour = Drops::monodisperse(100.0, 3.0).unwrap();
+    let downpour: Air = "rain:100,mono:3".parse().unwrap();
     let brightest = (0..40).map(|seed| {
         let wet = see(&downpour, seed);
         (0..16).flat_map(|r| (0..16).map(move |c| r * 32 + c)).map(|i| wet[i]).fold(0.0, f32::max)
     });
     assert!(brightest.fold(0.0, f32::max) > 0.1);
+    // Fog greys the black, and what is left of white.
+    let fog = see(&"fog:5m".parse().unwrap(), 1);
+    assert!(fog[5] > 0.2 && fog[26] > fog[5], "{} {}", fog[5], fog[26]);
     // Exposure: 15 klx, f/2.8, 5 um, 7000 electrons.
     assert!((camera.exposure_s() / 2.65e-4 - 1.0).abs() < 0.05, "{}", camera.exposure_s());
 }

@@ -130,6 +130,15 @@ impl Air {
         }
     }
 
+    /// What does not fall: fog, smoke, dust, drops on the window. Falling drops are followed one by one.
+    ///
+    /// # Errors
+    /// As [`Self::weather`].
+    pub fn hanging(&self, wavelength_nm: f64) -> Result<Weather, RainError> {
+        let drops = if self.drops.fall() { Drops::none() } else { self.drops.clone() };
+        Self { drops, ..self.clone() }.weather(wavelength_nm)
+    }
+
     /// As the text says, by `made` for 1 g/m^3.
     fn amount(
         text: &str,

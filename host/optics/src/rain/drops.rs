@@ -222,6 +222,13 @@ impl Drops {
         self.concentration_per_m3() == 0.0
     }
 
+    /// Whether there are drops that fall, and that can be followed one by one; droplets and grains hang in the air.
+    #[must_use]
+    pub fn fall(&self) -> bool {
+        let falls = |class: &DropClass| class.diameter_mm >= SMALLEST_RAINDROP_MM;
+        self.classes.iter().any(|class| falls(class) && class.per_m3 > 0.0)
+    }
+
     /// Drops in a cubic metre.
     #[must_use]
     pub fn concentration_per_m3(&self) -> f64 {

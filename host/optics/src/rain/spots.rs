@@ -3,7 +3,6 @@
 //! Law: on average over time a white target gives what [`super::ForwardBlur`] says; from frame to frame it is single
 //! drops that make the difference. Where droplets are too many to be followed (fog), there is the average alone.
 
-use super::drops::SMALLEST_RAINDROP_MM;
 use super::{BeamShadows, FallingDrops, RainError, Weather};
 use crate::Footprint;
 
@@ -37,10 +36,7 @@ impl RainySpots {
         // On the way back light that crosses a drop on the window is lost.
         let returned = blur.returned(field_mm / distance_mm) * weather.clear();
         let drops = weather.drops();
-        let rains = drops
-            .classes()
-            .iter()
-            .any(|class| class.diameter_mm >= SMALLEST_RAINDROP_MM && class.per_m3 > 0.0);
+        let rains = drops.fall();
         // Followed drops take their shadow; their diffraction, as much again, stays in the spot and is not taken at
         // all.
         let shadow = if rains { (-drops.shadow_per_m() * distance_mm * 1e-3).exp() } else { 1.0 };

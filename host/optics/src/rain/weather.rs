@@ -118,4 +118,27 @@ impl Weather {
         let disc_px = window.disc_mm(distance_mm, water) / field_mm * SIDE as f64;
         kernel.behind_drops(window.covered, disc_px)
     }
+
+    /// What an ordinary camera sees of a target in daylight, white being 1: the target through the air and the window, light
+    /// scattered from around, and daylight that the air scatters. `reflectance` is 32 x 32, row-major, over a field of
+    /// `field_mm`. Daylight on the target is that of clear air.
+    ///
+    /// # Errors
+    /// As [`Self::blur`].
+    pub fn by_daylight(
+        &self,
+        reflectance: &[f32],
+        distance_mm: f64,
+        field_mm: f64,
+    ) -> Result<Vec<f64>, RainError> {
+        let blur = self.blur(distance_mm)?;
+        let kernel =
+            self.through_window(blur.kernel(field_mm / SIDE as f64), distance_mm, field_mm);
+        let own = kernel.unscattered + kernel.scattered(0, 0);
+        let halo = kernel.without_own(f64::INFINITY).halo(reflectance);
+        let scattered = 1.0 - self.medium.transmission(distance_mm * 1e-3);
+        let airlight = self.medium.albedo() * scattered * self.clear();
+        let seen = |(&r, halo): (&f32, f64)| f64::from(r) * own + halo + airlight;
+        Ok(reflectance.iter().zip(halo).map(seen).collect())
+    }
 }
