@@ -59,3 +59,5 @@ pub mod udev;
 pub mod versions;
 #[cfg(feature = "virtual-camera")]
 pub mod virtual_camera;
+#[cfg(feature = "virtual-camera")]
+pub mod weather;

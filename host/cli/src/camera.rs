@@ -7,7 +7,8 @@ use nirspi::files::order_table::read_order_table;
 use nirspi::scene::{SceneMap, SceneSource};
 use nirspi::setup::MeasurementSetup;
 use nirspi::virtual_camera::{CameraModel, VirtualOptics, read_camera_model};
-use nirspi_optics::rain::Rainfall;
+use nirspi::weather::{WeatherError, read_weather};
+use nirspi_optics::rain::{Air, Rainfall};
 use nirspi_recon::Order;
 use std::path::Path;
 use std::str::FromStr;
@@ -27,8 +28,10 @@ pub struct SceneArgs {
     pub distance_m: Option<f64>,
     /// What falls between the virtual camera and the target, as in the paper's Table 2: light is 1.93 mm/h of 0.5 mm
     /// drops, heavy 5.6 mm/h of 2 mm drops [default: the camera description's, none for the shipped ones]
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, conflicts_with = "weather")]
     pub rain: Option<Rain>,
+    #[command(flatten)]
+    pub weather: WeatherArgs,
     #[command(flatten)]
     pub model: ModelArgs,
     /// Seed of the simulated noise: the same seed gives the same bytes
@@ -49,6 +52,31 @@ impl ModelArgs {
     /// The description.
     pub fn read(&self) -> Result<CameraModel> {
         Ok(read_camera_model(&self.camera_model)?)
+    }
+}
+
+/// Weather of any kind.
+#[derive(Debug, Clone, Args)]
+pub struct WeatherArgs {
+    /// Weather of another kind between the virtual camera and the target, simulated: none, light, heavy;
+    /// rain:20 (mm/h of natural rain) or rain:20,mono:2 (of 2 mm drops); fog:0.5 (g/m3 of water) or fog:5m (a visibility
+    /// of 5 metres) and fog:5m,4 (droplets of 4 um); smoke:... and dust:... alike, dust:0.5,2,1.53,0.003 with the complex
+    /// index of the grains; a CSV file of drop diameters in mm and drops per m3. window:0.2 or +window:0.2 behind any
+    /// of these: drops of water on a fifth of the window
+    #[arg(long, value_name = "WEATHER")]
+    pub weather: Option<String>,
+}
+
+impl WeatherArgs {
+    /// The weather asked for, if any.
+    pub fn read(&self) -> Result<Option<Air>> {
+        let read = |text: &String| {
+            read_weather(text).map_err(|error| match error {
+                error @ WeatherError::Text(_) => Usage(format!("--weather: {error}")).into(),
+                error => anyhow::Error::from(error),
+            })
+        };
+        self.weather.as_ref().map(read).transpose()
     }
 }
 
@@ -88,12 +116,17 @@ impl SceneArgs {
 
     fn sheet(scene: &str, model: &ModelArgs, seed: u64) -> Self {
         let (scene, model) = (scene.to_owned(), model.clone());
-        Self { scene, distance_m: None, rain: Some(Rain::None), model, seed }
+        let weather = WeatherArgs { weather: None };
+        Self { scene, distance_m: None, rain: Some(Rain::None), weather, model, seed }
     }
 
-    /// What falls before this camera.
-    pub fn rainfall(&self, model: &CameraModel) -> Rainfall {
-        self.rain.map_or(model.weather.rain, Rain::rainfall)
+    /// What is before this camera.
+    pub fn air(&self, model: &CameraModel) -> Result<Air> {
+        let rainfall = || self.rain.map_or(model.weather.rain, Rain::rainfall);
+        match self.weather.read()? {
+            Some(air) => Ok(air),
+            None => Ok(Air::of_rainfall(rainfall())?),
+        }
     }
 
     /// The scene and the optics before it.
@@ -112,12 +145,10 @@ impl SceneArgs {
         let distance_m = distance_mm / 1e3;
         let optics = VirtualOptics::before(&model, &map, distance_mm)
             .map_err(|error| Usage(format!("--distance-m {distance_m}: {error}")))?;
-        let optics = match self.rainfall(&model).drops()? {
-            Some(drops) => optics
-                .in_rain(drops)
-                .map_err(|error| Usage(format!("--rain at --distance-m {distance_m}: {error}")))?,
-            None => optics,
-        };
+        let air = self.air(&model)?;
+        let optics = optics
+            .in_air(&air)
+            .map_err(|error| Usage(format!("{air} at --distance-m {distance_m}: {error}")))?;
         Ok((map, optics))
     }
 }

@@ -22,7 +22,6 @@ use nirspi::session::CameraIdentity;
 use nirspi::virtual_camera::{
     VirtualOptics, calibrate_against_white, flat_field_against_white, shoot,
 };
-use nirspi_optics::rain::Rainfall;
 use nirspi_recon::{Image, Measurements, Side, reconstruct};
 use serde::Serialize;
 use std::ops::ControlFlow;
@@ -65,7 +64,10 @@ struct Report {
     /// The camera description's name.
     camera_model: String,
     distance_m: f64,
-    rain: Rainfall,
+    /// What is between camera and scene.
+    rain: String,
+    /// Extinction between camera and scene, times the distance; 0 in dry air.
+    optical_depth: f64,
     seed: u64,
     field_mm: f64,
     defocus_mm: f64,
@@ -172,7 +174,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         simulated: true,
         camera_model: model.name.clone(),
         distance_m: optics.distance_mm() / 1e3,
-        rain: args.scene.rainfall(model),
+        rain: args.scene.air(model)?.name().to_owned(),
+        optical_depth: optics.optical_depth(),
         seed: args.scene.seed,
         field_mm: optics.field_mm(),
         defocus_mm: optics.blur_mm(),

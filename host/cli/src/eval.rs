@@ -6,7 +6,7 @@ mod table1;
 mod table3;
 mod table4;
 
-use super::camera::{ModelArgs, Rain};
+use super::camera::{ModelArgs, Rain, WeatherArgs};
 use super::report::to_json;
 use super::{print, range};
 use anyhow::Result;
@@ -16,6 +16,7 @@ use nirspi::files::output::OutputDir;
 use nirspi::virtual_camera::CameraModel;
 use nirspi_eval::pictures::ANCESTRAL_STEPS;
 use nirspi_eval::shot;
+use nirspi_optics::rain::Air;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -58,8 +59,10 @@ pub fn run(args: &EvalArgs) -> Result<ExitCode> {
 #[derive(Debug, Args)]
 struct ExposureArgs {
     /// Rain, as in the paper's Table 2
-    #[arg(long, value_enum, default_value_t = Rain::Heavy)]
+    #[arg(long, value_enum, default_value_t = Rain::Heavy, conflicts_with = "weather")]
     rain: Rain,
+    #[command(flatten)]
+    weather: WeatherArgs,
     /// Differential sweeps summed into a picture [default: the camera description's; the paper's camera 244, which are 20 ms]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     frames: Option<u32>,
@@ -72,9 +75,13 @@ struct ExposureArgs {
 
 impl ExposureArgs {
     /// The exposure of this camera.
-    fn exposure(&self, camera: &CameraModel) -> shot::Exposure {
+    fn exposure(&self, camera: &CameraModel) -> Result<shot::Exposure> {
         let frames = self.frames.unwrap_or(camera.readout.sweeps_per_picture);
-        shot::Exposure { rain: self.rain.rainfall(), frames, seed: self.seed }
+        let air = match self.weather.read()? {
+            Some(air) => air,
+            None => Air::of_rainfall(self.rain.rainfall())?,
+        };
+        Ok(shot::Exposure { air, frames, seed: self.seed })
     }
 }
 

@@ -7,10 +7,11 @@ use anyhow::{Context, Result};
 use nirspi::files::image::encode_rgb;
 use nirspi::files::output::OutputDir;
 use nirspi::files::table::Table;
+use nirspi::weather::{is_drop_file, read_drops};
 use nirspi_eval::rain::budget::{self, Settings, Term};
 use nirspi_eval::rain::{self, RainReport, curves, rig};
 use nirspi_optics::mie::Index;
-use nirspi_optics::rain::{DropClass, DropLaw, Drops, PaperRain};
+use nirspi_optics::rain::{DropLaw, Drops, PaperRain};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -120,25 +121,17 @@ pub struct DropArgs {
 impl DropArgs {
     /// The drops asked for.
     fn drops(&self) -> Result<Drops> {
-        let drops = if self.is_file() {
-            Drops::measured(read_classes(Path::new(&self.drops))?)
-        } else {
-            let law = self.drops.parse::<DropLaw>();
-            let law = law.map_err(|e| Usage(format!("--drops: {e}, or a .csv file")))?;
-            law.drops(self.rate_mm_h)
-        };
-        drops.map_err(|error| Usage(error.to_string()).into())
+        if self.is_file() {
+            return Ok(read_drops(Path::new(&self.drops))?);
+        }
+        let law = self.drops.parse::<DropLaw>();
+        let law = law.map_err(|e| Usage(format!("--drops: {e}, or a .csv file")))?;
+        law.drops(self.rate_mm_h).map_err(|error| Usage(error.to_string()).into())
     }
 
     fn is_file(&self) -> bool {
-        !self.drops.contains(':') && self.drops.to_ascii_lowercase().ends_with(".csv")
+        is_drop_file(&self.drops)
     }
-}
-
-fn read_classes(path: &Path) -> Result<Vec<DropClass>> {
-    let pairs = Table::read(path)?.pairs("diameter in mm, drops per m3")?;
-    let class = |[diameter_mm, per_m3]: [f64; 2]| DropClass { diameter_mm, per_m3 };
-    Ok(pairs.into_iter().map(class).collect())
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {

@@ -4,7 +4,7 @@ use crate::error::{EvalError, Result};
 use nirspi::picture::{Axis, Chart, Line};
 use nirspi_optics::CameraModel;
 use nirspi_optics::pixel::{Instrument, PixelBudget, PixelError};
-use nirspi_optics::rain::blur::DEEPEST_OPTICAL_DEPTH;
+use nirspi_optics::rain::blur::DEEPEST_SINGLE;
 use nirspi_optics::rain::{Drops, PaperRain, Weather};
 use nirspi_optics::range::{
     Floor, Wanted, as_printed_mm, exposure_needed_us, extinction_needed_per_m, farthest_mm,
@@ -252,7 +252,7 @@ fn reading(
     }
     if let Some(needed) = extinction_needed_per_m(instrument, heavy, &agreed(25.0), 1500.0)? {
         let factor = needed / heavy.medium().extinction_per_m;
-        let at_least = if needed * 1.5 > 0.99 * DEEPEST_OPTICAL_DEPTH { "at least " } else { "" };
+        let at_least = if needed * 1.5 > 0.99 * DEEPEST_SINGLE { "at least " } else { "" };
         lines.push(format!(
             "for rain to bring 2 m down to 1.5 m its extinction would have to be {at_least}{needed:.2} \
              per metre, {at_least}{factor:.0} times what 5.6 mm/h has"

@@ -6,7 +6,7 @@ use nirspi::calibration::{FlatField, Settling};
 use nirspi::capture::{Capture, Progress};
 use nirspi::setup::MeasurementSetup;
 use nirspi::virtual_camera::{self, VirtualOptics};
-use nirspi_optics::rain::{Drops, Rainfall};
+use nirspi_optics::rain::Air;
 use nirspi_optics::visible::VisibleCamera;
 use nirspi_optics::{CameraModel, Scene};
 use nirspi_recon::{Image, Order, Side, reconstruct};
@@ -14,20 +14,20 @@ use std::ops::ControlFlow;
 
 /// The conditions of a picture.
 #[derive(Debug, Clone, Copy)]
-pub struct Conditions {
+pub struct Conditions<'a> {
     /// Distance of the target.
     pub distance_m: f64,
-    /// What falls between camera and target.
-    pub rain: Rainfall,
+    /// What is between camera and target.
+    pub air: &'a Air,
     /// Differential sweeps that are summed.
     pub frames: u32,
 }
 
 /// How the pictures of a table are taken.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Exposure {
-    /// What falls between camera and target.
-    pub rain: Rainfall,
+    /// What is between camera and target.
+    pub air: Air,
     /// Differential sweeps summed into a picture.
     pub frames: u32,
     /// Seed of the first picture.
@@ -77,20 +77,16 @@ impl CalibratedCamera {
     ///
     /// # Errors
     /// A scene or distance that the optics refuse, a capture that fails.
-    pub fn shoot(&self, scene: Scene, conditions: Conditions, seed: u64) -> Result<Shots> {
+    pub fn shoot(&self, scene: Scene, conditions: Conditions<'_>, seed: u64) -> Result<Shots> {
         let distance_mm = conditions.distance_m * 1e3;
-        let drops = conditions.rain.drops()?;
         let visible = VisibleCamera::default().picture(
             &scene,
             &self.model.projector(),
             distance_mm,
-            drops.as_ref().unwrap_or(&Drops::none()),
+            conditions.air,
             seed,
         )?;
-        let mut optics = VirtualOptics::of(&self.model, scene, distance_mm)?;
-        if let Some(drops) = drops {
-            optics = optics.in_rain(drops)?;
-        }
+        let optics = VirtualOptics::of(&self.model, scene, distance_mm)?.in_air(conditions.air)?;
         let setup = optics.setup(&Order::Natural, 1.0)?;
         let captured = self.record(&optics, setup, conditions.frames, seed)?;
         let measurements =
@@ -112,7 +108,7 @@ impl CalibratedCamera {
     ///
     /// # Errors
     /// A sheet that gives no light, a capture that fails.
-    pub fn white_level(&self, conditions: Conditions, seed: u64) -> Result<f32> {
+    pub fn white_level(&self, conditions: Conditions<'_>, seed: u64) -> Result<f32> {
         let image = self.shoot(Scene::white(), conditions, seed)?.nir_spi;
         let white = image.pixels().iter().sum::<f32>() / image.pixels().len() as f32;
         if white > 0.0 {
@@ -142,12 +138,11 @@ impl CalibratedCamera {
 mod tests {
     use super::*;
 
-    const CONDITIONS: Conditions = Conditions { distance_m: 0.3, rain: Rainfall::None, frames: 20 };
-
     #[test]
     fn a_white_sheet_is_white_at_every_distance_though_it_gives_less_light() {
         let camera = CalibratedCamera::new(CameraModel::paper(), 1).unwrap();
-        let at = |distance_m| Conditions { distance_m, ..CONDITIONS };
+        let air = &Air::dry();
+        let at = |distance_m| Conditions { distance_m, air, frames: 20 };
         let [near, far] = [0.3, 1.0].map(|m| camera.white_level(at(m), 1).unwrap());
         assert!(near > 0.0 && far > 0.0, "{near} {far}");
         let field_mm = CameraModel::paper().projector().field_mm(300.0);
@@ -164,7 +159,8 @@ mod tests {
         let camera = CalibratedCamera::new(CameraModel::paper(), 1).unwrap();
         let shot = |seed| {
             let scene = Scene::new(vec![0.2, 0.8, 0.8, 0.2], 2, 40.0).unwrap();
-            camera.shoot(scene, CONDITIONS, seed).unwrap().nir_spi
+            let conditions = Conditions { distance_m: 0.3, air: &Air::dry(), frames: 20 };
+            camera.shoot(scene, conditions, seed).unwrap().nir_spi
         };
         assert_eq!(shot(3).pixels(), shot(3).pixels());
         assert_ne!(shot(3).pixels(), shot(4).pixels());

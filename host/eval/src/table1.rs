@@ -10,7 +10,7 @@ use nirspi::scene::SceneSource;
 use nirspi::setup::MeasurementSetup;
 use nirspi::virtual_camera::VirtualOptics;
 use nirspi_nets::{Device, Enhancer, Images, Networks, Options};
-use nirspi_optics::rain::Rainfall;
+use nirspi_optics::rain::Air;
 use nirspi_optics::{Projector, Scene};
 use nirspi_recon::Order;
 use nirspi_recon::reconstruct::{self, OmpSettings};
@@ -123,7 +123,8 @@ pub fn table1(settings: &Settings, done: &dyn Fn()) -> Result<Report> {
     let optics = VirtualOptics::new(scene, DISTANCE_M * 1e3)?;
     let camera = CalibratedCamera::new(optics.camera_model(), seed)?;
     let captured = camera.record(&optics, setup, sweeps, seed)?;
-    let conditions = Conditions { distance_m: DISTANCE_M, rain: Rainfall::None, frames: sweeps };
+    let air = &Air::dry();
+    let conditions = Conditions { distance_m: DISTANCE_M, air, frames: sweeps };
     let white = camera.white_level(conditions, seed)?;
     let chain = Enhancer::built_in(&Device::cpu())?;
     let fusion_alone = Networks::built_in(Device::cpu()).fusion()?;

@@ -23,7 +23,7 @@ use nirspi::scene::SceneMap;
 use nirspi_nets::images::Images;
 use nirspi_nets::metrics::{CharacterJudge, Judged as Features};
 use nirspi_nets::{Weights, upscale_2x};
-use nirspi_optics::rain::Rainfall;
+use nirspi_optics::rain::Air;
 use nirspi_optics::{CameraModel, Scene};
 use nirspi_recon::{Image, Side};
 use rayon::prelude::*;
@@ -78,7 +78,7 @@ pub struct Report {
     /// The camera description's name.
     pub camera: String,
     /// `none`, `light` or `heavy`.
-    pub rain: &'static str,
+    pub rain: String,
     /// Scenes at each distance.
     pub scenes: u32,
     /// Typefaces that the characters are drawn in.
@@ -126,23 +126,24 @@ impl Table {
         let sets = Sets::new(settings.inception.as_deref())?;
         let enhancers = Enhancers::new(settings.ancestral_steps)?;
         let typefaces = typefaces::all();
-        let exposure = settings.exposure;
+        let exposure = settings.exposure.clone();
+        let dry_air = Air::dry();
         let camera = CalibratedCamera::new(&settings.camera, exposure.seed)?;
         let jobs: Vec<(f64, u32)> =
             DISTANCES_M.iter().flat_map(|&m| (0..settings.scenes).map(move |i| (m, i))).collect();
         let taken: Vec<Taken> = jobs
             .par_iter()
             .map(|&(distance_m, i)| {
-                let wet = take(&camera, &exposure, exposure.rain, distance_m, (&typefaces, i))?;
-                let dry = take(&camera, &exposure, Rainfall::None, distance_m, (&typefaces, i))?;
+                let wet = take(&camera, &exposure, &exposure.air, distance_m, (&typefaces, i))?;
+                let dry = take(&camera, &exposure, &dry_air, distance_m, (&typefaces, i))?;
                 let blank = Image::new(wet.nir_spi.side(), vec![0.0; wet.truth.len()]);
                 let blank = compare(&blank, &wet.truth)?.quality;
                 done();
                 Ok(Taken { distance_m, wet, dry, blank })
             })
             .collect::<Result<_>>()?;
-        let wet_whites = whites(&camera, &exposure, exposure.rain)?;
-        let dry_whites = whites(&camera, &exposure, Rainfall::None)?;
+        let wet_whites = whites(&camera, &exposure, &exposure.air)?;
+        let dry_whites = whites(&camera, &exposure, &dry_air)?;
         Ok(Self { settings, camera, enhancers, sets, typefaces, taken, wet_whites, dry_whites })
     }
 
@@ -169,7 +170,7 @@ impl Table {
         Ok(Report {
             simulated: true,
             camera: settings.camera.name.clone(),
-            rain: settings.exposure.rain.name(),
+            rain: settings.exposure.air.name().to_owned(),
             scenes: settings.scenes,
             typefaces: typefaces.iter().map(Typeface::name).collect(),
             ancestral_steps: settings.ancestral_steps,
@@ -200,8 +201,8 @@ impl Table {
     fn panels(&self, distance_m: f64) -> Result<SideBySide> {
         let Self { camera, settings, typefaces, .. } = self;
         let exposure = &settings.exposure;
-        let shot = |rain| take(camera, exposure, rain, distance_m, (typefaces, SHOWN));
-        let (wet, dry) = (shot(exposure.rain)?, shot(Rainfall::None)?);
+        let shot = |air: &Air| take(camera, exposure, air, distance_m, (typefaces, SHOWN));
+        let (wet, dry) = (shot(&exposure.air)?, shot(&Air::dry())?);
         let blank = compare(&wet.nir_spi, &wet.truth)?.quality;
         let taken = [Taken { distance_m, wet, dry, blank }];
         let mut panels = Vec::new();
@@ -227,7 +228,7 @@ impl Table {
                 "{distance_m} m: one of {} scenes ({}), rain {}, 15 klx",
                 settings.scenes,
                 typefaces[face].name(),
-                exposure.rain.name()
+                exposure.air.name()
             ),
             panels,
             footer: "simulated: virtual camera; VIS is a model of a small industrial camera"
@@ -240,10 +241,10 @@ impl Table {
 const SHOWN: u32 = 17;
 
 /// What a white sheet gives at each distance.
-fn whites(camera: &CalibratedCamera, exposure: &Exposure, rain: Rainfall) -> Result<[f32; 3]> {
+fn whites(camera: &CalibratedCamera, exposure: &Exposure, air: &Air) -> Result<[f32; 3]> {
     let mut levels = [0.0; 3];
     for (level, distance_m) in levels.iter_mut().zip(DISTANCES_M) {
-        let conditions = Conditions { distance_m, rain, frames: exposure.frames };
+        let conditions = Conditions { distance_m, air, frames: exposure.frames };
         *level = camera.white_level(conditions, exposure.seed)?;
     }
     Ok(levels)
@@ -342,7 +343,7 @@ impl Sets {
 fn take(
     camera: &CalibratedCamera,
     exposure: &Exposure,
-    rain: Rainfall,
+    air: &Air,
     distance_m: f64,
     (typefaces, i): (&[Typeface], u32),
 ) -> Result<Shots> {
@@ -351,7 +352,7 @@ fn take(
     let side_mm =
         map.side_mm.unwrap_or_else(|| camera.model().projector().field_mm(distance_m * 1e3));
     let scene = Scene::new(map.reflectance, map.size_px, side_mm)?;
-    let conditions = Conditions { distance_m, rain, frames: exposure.frames };
+    let conditions = Conditions { distance_m, air, frames: exposure.frames };
     camera.shoot(scene, conditions, exposure.seed.wrapping_add(u64::from(i)))
 }
 
@@ -398,7 +399,7 @@ fn reading(
          which are fixed and not drawn"
             .to_owned(),
         "VIS: daylight, distance and falling drops do not bring a focused camera to 10 dB; \
-         water on the glass of the paper's rain box might, and is not simulated"
+         water on the glass of the paper's rain box might: --weather heavy+window:0.3"
             .to_owned(),
         "against the scene on the 32 x 32 grid without defocus, after the gain and offset of least squares; \
          the paper does not say against what it compares"
@@ -424,7 +425,7 @@ mod tests {
 
     #[test]
     fn rain_costs_quality_and_the_same_scenes_come_again() {
-        let exposure = Exposure { rain: Rainfall::Heavy, frames: 4, seed: 1 };
+        let exposure = Exposure { air: "heavy".parse().unwrap(), frames: 4, seed: 1 };
         let camera = CameraModel::default();
         let settings =
             Settings { scenes: 2, camera, exposure, ancestral_steps: 2, inception: None };

@@ -99,7 +99,7 @@ pub struct Report {
     /// The camera description's name.
     pub camera: String,
     /// `none`, `light` or `heavy`.
-    pub rain: &'static str,
+    pub rain: String,
     /// Pictures of the edge at each distance.
     pub scenes: u32,
     /// Sweeps summed into a picture.
@@ -175,7 +175,7 @@ pub fn table4(settings: &Settings, done: &(dyn Fn() + Sync)) -> Result<Report> {
                 take_all(&scene, BAR_PICTURES)
             })
             .collect::<Result<_>>()?;
-        let conditions = Conditions { distance_m, rain: exposure.rain, frames: exposure.frames };
+        let conditions = Conditions { distance_m, air: &exposure.air, frames: exposure.frames };
         let white = camera.white_level(conditions, exposure.seed)?;
         for (image, paper_mm) in images() {
             let of = |shots: &[Shots]| pictures(image, shots, white, &enhancers);
@@ -190,7 +190,7 @@ pub fn table4(settings: &Settings, done: &(dyn Fn() + Sync)) -> Result<Report> {
     Ok(Report {
         simulated: true,
         camera: settings.camera.name.clone(),
-        rain: exposure.rain.name(),
+        rain: exposure.air.name().to_owned(),
         scenes: *scenes,
         frames: exposure.frames,
         seed: exposure.seed,
@@ -210,7 +210,7 @@ fn take(
 ) -> Result<Shots> {
     let field_mm = camera.model().projector().field_mm(distance_m * 1e3);
     let scene = wide_scene(reflectance, field_mm)?;
-    let conditions = Conditions { distance_m, rain: exposure.rain, frames: exposure.frames };
+    let conditions = Conditions { distance_m, air: &exposure.air, frames: exposure.frames };
     camera.shoot(scene, conditions, exposure.seed.wrapping_add(i))
 }
 

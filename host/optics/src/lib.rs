@@ -19,8 +19,8 @@
 //!
 //! | module | from | to |
 //! |---|---|---|
-//! | [`water`], [`mie`] | wavelength, size | water's refractive index; what one sphere does to light |
-//! | [`rain`] | rain rate, drop sizes, distance | extinction, blur, veil, single drops in the beams |
+//! | [`water`], [`substance`], [`mie`] | wavelength, size | refractive index; what one sphere does to light |
+//! | [`rain`] | weather as a user writes it, distance | extinction, blur, veil, single drops in the beams |
 //! | [`pixel`] | budget, weather, exposure | signal and noise of one pixel, term by term |
 //! | [`range`] | all of these | how far the camera sees (the paper's Algorithm 2) |
 //! | [`rig`] | collected volumes, nozzles | uniformity of a rain simulator |
@@ -67,6 +67,7 @@ pub mod range;
 pub mod rig;
 pub mod safety;
 pub mod scene;
+pub mod substance;
 pub mod visible;
 pub mod water;
 

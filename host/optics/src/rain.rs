@@ -8,10 +8,13 @@
 //! | [`fall`] | diameter, air density | fall speed, time constant, share of an exposure |
 //! | [`medium`] | drops, wavelength | extinction, scattering, absorption, scattering angles |
 //! | [`backward`] | drops, wavelength | light sent back, near 180 degrees |
+//! | `follow` | medium, distance | where light lands, and what comes back, in dense air |
 //! | [`blur`] | scattering angles, distance | where forward-scattered light lands on the target |
 //! | [`veil`] | medium, geometry | light that comes back without having seen the target |
 //! | [`falling`] | drops, distance, seed | single drops that cross the LEDs' beams, from frame to frame |
-//! | [`weather`] | drops, wavelength | all of these, at any distance |
+//! | [`window`] | drops on the window | light that they spread |
+//! | [`air`] | text | what is in the air, and what it is made of |
+//! | [`weather`] | drops, substance, wavelength | all of these, at any distance |
 //! | [`spots`] | weather, scene, seed | what each LED's spot shows as drops fall |
 //! | [`fso`] | rain rate | loss by laws fitted to optical links, an outside check |
 //! | [`radar`] | drops | differential reflectivity, an input of the paper's Algorithm 2 |
@@ -19,11 +22,13 @@
 //! Law: everything is a sum over the same list of drops ([`Drops`]), so that two results can only differ by physics,
 //! never by what it was assumed to rain. `docs/physics.md` in the repository derives and cites each formula.
 
+pub mod air;
 pub mod backward;
 pub mod blur;
 pub mod drops;
 pub mod fall;
 pub mod falling;
+mod follow;
 pub mod fso;
 pub mod law;
 pub mod medium;
@@ -33,9 +38,11 @@ pub mod rainfall;
 pub mod spots;
 pub mod veil;
 pub mod weather;
+pub mod window;
 
+pub use air::{Air, AirError};
 pub use backward::BackwardLobe;
-pub use blur::ForwardBlur;
+pub use blur::{BlurKernel, ForwardBlur};
 pub use drops::{DropClass, Drops};
 pub use falling::{BeamShadows, FallingDrops};
 pub use fso::FsoLaw;
@@ -46,6 +53,7 @@ pub use rainfall::Rainfall;
 pub use spots::RainySpots;
 pub use veil::Veil;
 pub use weather::Weather;
+pub use window::Window;
 
 use crate::mie::MieError;
 use crate::water::WavelengthError;

@@ -155,7 +155,7 @@ pub fn extinction_needed_per_m(
         return Ok(None);
     }
     // Past the single-scattering limit the blur is no longer known: the answer is "at least".
-    let mut high = crate::rain::blur::DEEPEST_OPTICAL_DEPTH / (range_mm * 1e-3);
+    let mut high = crate::rain::blur::DEEPEST_SINGLE / (range_mm * 1e-3);
     let mut low = 0.0;
     while high - low > 1e-5 {
         let middle = (low + high) / 2.0;

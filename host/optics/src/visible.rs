@@ -8,7 +8,7 @@
 //! are on average (Garg and Nayar, Int. J. Comput. Vis. 75, 3, 2007). The surroundings are a sky as bright as a white
 //! target.
 
-use crate::rain::{BeamShadows, Drops, FallingDrops, RainError};
+use crate::rain::{Air, BeamShadows, FallingDrops, RainError};
 use crate::{LEDS, Projector, ProjectorError, Scene};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
@@ -23,6 +23,9 @@ const PHOTON_J: f64 = 3.579e-19;
 
 /// Lumen per watt at 555 nm (SI, exact).
 const LUMEN_PER_WATT: f64 = 683.0;
+
+/// Wavelength at which fog, smoke and dust are judged, in nm.
+const WAVELENGTH_NM: f64 = 550.0;
 
 /// Looks at the drops during one exposure.
 const LOOKS: usize = 8;
@@ -81,7 +84,7 @@ impl VisibleCamera {
         self.white_electrons / (photons_per_m2_s * area_m2 * self.quantum_efficiency)
     }
 
-    /// A picture of `scene` at `distance_mm` in this rain, 32 x 32 over the field of `projector`: reflectance as the
+    /// A picture of `scene` at `distance_mm` in this weather, 32 x 32 over the field of `projector`: reflectance as the
     /// camera would report it, white being 1. Seeded.
     ///
     /// # Errors
@@ -91,7 +94,7 @@ impl VisibleCamera {
         scene: &Scene,
         projector: &Projector,
         distance_mm: f64,
-        drops: &Drops,
+        air: &Air,
         seed: u64,
     ) -> Result<Vec<f32>, VisibleError> {
         // Sharp where the projector is out of focus: it is focused on the target.
@@ -104,7 +107,10 @@ impl VisibleCamera {
             baseline_mm: 1e-3,
             collector_mm: self.aperture_mm,
         };
-        let mut falling = FallingDrops::new(drops, beams, seed)?;
+        let field_mm = projector.field_mm(distance_mm);
+        let hanging = air.hanging(WAVELENGTH_NM)?;
+        let through = hanging.by_daylight(footprint.weights(), distance_mm, field_mm)?;
+        let mut falling = FallingDrops::new(air.drops(), beams, seed)?;
         let mut seen = vec![0.0; LEDS];
         for _ in 0..LOOKS {
             falling.advance(self.exposure_s() / LOOKS as f64);
@@ -113,12 +119,11 @@ impl VisibleCamera {
             }
         }
         let mut rng = Pcg64Mcg::seed_from_u64(seed ^ 0x5EED);
-        Ok(footprint
-            .weights()
-            .iter()
+        Ok(through
+            .into_iter()
             .zip(seen)
-            .map(|(&reflectance, seen)| {
-                let light = f64::from(reflectance) * seen + DROP_BRIGHTNESS * (1.0 - seen);
+            .map(|(target, seen)| {
+                let light = target * seen + DROP_BRIGHTNESS * (1.0 - seen);
                 let electrons = light * self.white_electrons;
                 let noise = (electrons + self.read_noise_electrons.powi(2)).sqrt();
                 let found = electrons + noise * rng.sample::<f64, _>(StandardNormal);

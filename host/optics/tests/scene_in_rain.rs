@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
-use nirspi_optics::rain::{BeamShadows, Drops, RainySpots, Weather};
+use nirspi_optics::rain::{Air, BeamShadows, Drops, RainySpots, Weather};
 use nirspi_optics::visible::VisibleCamera;
 use nirspi_optics::water::Water;
 use nirspi_optics::{Footprint, LEDS, LedArray, Projector, Scene};
@@ -83,6 +83,45 @@ fn fog_dims_evenly_and_adds_its_halo() {
 }
 
 #[test]
+fn thicker_fog_leaves_less_contrast_and_a_brighter_black() {
+    let black_and_white = |text: &str| {
+        let air: Air = text.parse().unwrap();
+        let weather = air.weather(1550.0).unwrap();
+        let half = Scene::new(vec![0.0, 1.0, 0.0, 1.0], 2, 2000.0).unwrap();
+        let footprint = Projector::default().footprint(&half, 1000.0).unwrap();
+        let seen = RainySpots::new(&weather, &footprint, beams(1000.0), 1).unwrap().reflectance();
+        // Far from the edge, which is out of focus.
+        (seen[16 * 32 + 4], seen[16 * 32 + 27])
+    };
+    let mut last = black_and_white("none");
+    assert!(last.0 < 1e-3 && last.1 > 0.999, "{last:?}");
+    // Visibilities of 50 to 1 m: optical depths of 0.08 to 3.9 over the metre.
+    for text in ["fog:50m", "fog:8m", "fog:3m", "fog:1m"] {
+        let now = black_and_white(text);
+        assert!(now.1 - now.0 < last.1 - last.0, "{text}: {now:?} after {last:?}");
+        assert!(now.0 > 0.0, "{text}: {now:?}");
+        last = now;
+    }
+}
+
+#[test]
+fn drops_on_the_window_take_light_and_spread_it_over_the_field() {
+    let seen = |text: &str, scene: Vec<f32>| {
+        let weather = text.parse::<Air>().unwrap().weather(1550.0).unwrap();
+        let scene = Scene::new(scene, 2, 96.0).unwrap();
+        let footprint = Projector::default().footprint(&scene, 300.0).unwrap();
+        RainySpots::new(&weather, &footprint, beams(300.0), 1).unwrap().reflectance()
+    };
+    // 20 % is lost there and back; flat drops leave it in the spot's neighbourhood on the way there.
+    let white = |text: &str| f64::from(seen(text, vec![1.0; 4])[16 * 32 + 16]);
+    assert!((white("window:0.2,1") / 0.8 - 1.0).abs() < 0.01, "{}", white("window:0.2,1"));
+    assert!((0.64..0.8).contains(&white("window:0.2,60")), "{}", white("window:0.2,60"));
+    // The dark half of a scene gets light of the other.
+    let dark = |text: &str| seen(text, vec![0.0, 1.0, 0.0, 1.0])[16 * 32 + 5];
+    assert!(dark("window:0.2,30") > 0.01 && dark("none") < 1e-6, "{}", dark("window:0.2,30"));
+}
+
+#[test]
 fn relit_leds_give_what_new_ones_would() {
     let pixels: Vec<f32> = (0..LEDS).map(|i| (i * 31 % 97) as f32 / 97.0).collect();
     let one =
@@ -105,10 +144,9 @@ fn relit_leds_give_what_new_ones_would() {
 fn an_ordinary_camera_sees_the_scene_with_its_own_noise_and_some_drops() {
     let camera = VisibleCamera::default();
     let scene = Scene::new(vec![0.0, 1.0, 1.0, 0.0], 2, 2000.0).unwrap();
-    let see = |drops: &Drops, seed| {
-        camera.picture(&scene, &Projector::default(), 1000.0, drops, seed).unwrap()
-    };
-    let dry = see(&Drops::none(), 1);
+    let see =
+        |air: &Air, seed| camera.picture(&scene, &Projector::default(), 1000.0, air, seed).unwrap();
+    let dry = see(&Air::dry(), 1);
     let quarter = |rows: std::ops::Range<usize>, columns: std::ops::Range<usize>| -> f64 {
         let values: Vec<f32> =
             rows.flat_map(|r| columns.clone().map(move |c| r * 32 + c)).map(|i| dry[i]).collect();
@@ -116,15 +154,18 @@ fn an_ordinary_camera_sees_the_scene_with_its_own_noise_and_some_drops() {
     };
     // Shot noise of 7000 electrons over 256 pixels: 1.2 % / 16.
     assert!((quarter(0..16, 16..32) - 1.0).abs() < 0.004 && quarter(0..16, 0..16).abs() < 0.001);
-    assert_eq!(dry, see(&Drops::none(), 1));
-    assert_ne!(dry, see(&Drops::none(), 2));
+    assert_eq!(dry, see(&Air::dry(), 1));
+    assert_ne!(dry, see(&Air::dry(), 2));
     // A drop before the black quarter shines.
-    let downpour = Drops::monodisperse(100.0, 3.0).unwrap();
+    let downpour: Air = "rain:100,mono:3".parse().unwrap();
     let brightest = (0..40).map(|seed| {
         let wet = see(&downpour, seed);
         (0..16).flat_map(|r| (0..16).map(move |c| r * 32 + c)).map(|i| wet[i]).fold(0.0, f32::max)
     });
     assert!(brightest.fold(0.0, f32::max) > 0.1);
+    // Fog greys the black, and what is left of white.
+    let fog = see(&"fog:5m".parse().unwrap(), 1);
+    assert!(fog[5] > 0.2 && fog[26] > fog[5], "{} {}", fog[5], fog[26]);
     // Exposure: 15 klx, f/2.8, 5 um, 7000 electrons.
     assert!((camera.exposure_s() / 2.65e-4 - 1.0).abs() < 0.05, "{}", camera.exposure_s());
 }

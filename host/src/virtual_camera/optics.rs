@@ -4,8 +4,7 @@ use super::{OpticalFpga, VirtualCamera};
 use crate::scene::SceneMap;
 use crate::setup::MeasurementSetup;
 use nirspi_optics::camera::fnv1a;
-use nirspi_optics::rain::{BeamShadows, Drops, RainError, RainySpots, Weather};
-use nirspi_optics::water::Water;
+use nirspi_optics::rain::{Air, BeamShadows, RainError, RainySpots, Weather};
 use nirspi_optics::{
     Budget, BudgetError, CameraModel, Chain, ChainError, ChainSettings, DepthError, DepthView,
     Footprint, LedArray, Projector, ProjectorError, Scene, SceneError, SimulatedDepth,
@@ -65,7 +64,7 @@ impl VirtualOptics {
     }
 
     /// This camera in front of `scene`, its gain set for a white target at that distance. The weather of the description
-    /// is not taken from it: see [`Self::in_rain`].
+    /// is not taken from it: see [`Self::in_air`].
     ///
     /// # Errors
     /// A description that is not physical, or a distance that no light covers.
@@ -168,20 +167,23 @@ impl VirtualOptics {
         format!("virtual-{seed}-{:08x}", fnv1a(this.as_bytes()))
     }
 
-    /// Lets these drops fall between camera and scene. Daylight is dimmed and scattered as they do on average; what
-    /// they do to the LEDs' light is followed drop by drop.
+    /// Puts this weather between camera and scene. Daylight is dimmed and scattered as they do on average; what
+    /// falling drops do to the LEDs' light is followed drop by drop.
     ///
     /// # Errors
     /// Air too dense, or too many drops to be followed.
-    pub fn in_rain(self, drops: Drops) -> Result<Self, VirtualOpticsError> {
-        let weather = Weather::new(drops, self.camera.wavelength_nm, Water::Segelstein)?;
-        let optics = self.in_weather(weather)?;
+    pub fn in_air(self, air: &Air) -> Result<Self, VirtualOpticsError> {
+        if air.is_clear() {
+            return Ok(self);
+        }
+        let optics = air.weather(self.camera.wavelength_nm)?;
+        let optics = self.in_weather(optics)?;
         // Whether the drops can be followed shows now rather than when the camera is made.
         optics.spots(0)?;
         Ok(optics)
     }
 
-    /// As [`in_rain`](Self::in_rain), in weather that was worked out before.
+    /// As [`in_air`](Self::in_air), in weather that was worked out before.
     ///
     /// # Errors
     /// Air too dense.
@@ -189,11 +191,18 @@ impl VirtualOptics {
         let baseline_mm = self.camera.collector.baseline_mm;
         let veil = weather.veil(&self.camera.projector, self.distance_mm, baseline_mm)?;
         let returned = weather.blur(self.distance_mm)?.returned(self.field_mm() / self.distance_mm);
-        self.chain.ambient_electrons = self.budget.ambient_electrons(self.footprint.mean())
-            * returned
-            + self.budget.ambient_electrons_white * veil.airlight;
+        self.chain.ambient_electrons =
+            self.budget.ambient_electrons(self.footprint.mean()) * returned * weather.clear()
+                + self.budget.ambient_electrons_white * veil.airlight;
         self.weather = Some(weather);
         Ok(self)
+    }
+
+    /// Extinction between camera and target, times the distance; 0 in dry air.
+    #[must_use]
+    pub fn optical_depth(&self) -> f64 {
+        let per_m = |weather: &Weather| weather.medium().extinction_per_m;
+        self.weather.as_ref().map_or(0.0, per_m) * self.distance_mm * 1e-3
     }
 
     /// What the LEDs' spots show in the rain; none in dry air.

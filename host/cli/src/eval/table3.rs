@@ -36,7 +36,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let camera = args.exposure.model.read()?;
     let settings = Settings {
         scenes: args.scenes,
-        exposure: args.exposure.exposure(&camera),
+        exposure: args.exposure.exposure(&camera)?,
         camera,
         ancestral_steps: args.ancestral.steps,
         inception: args.inception.clone(),

@@ -130,6 +130,46 @@ fn a_scene_in_rain_is_captured_and_its_seed_repeats_it() {
 }
 
 #[test]
+fn weather_of_any_kind_stands_before_the_virtual_camera() {
+    let bench = Bench::new();
+    bench.write("counted.csv", b"0.5,3000\n1,400\n");
+    let mut correlations = Vec::new();
+    for (weather, depth) in [
+        ("none", 0.0..=0.0),
+        ("rain:50,mono:1", 1e-4..=0.01),
+        ("counted.csv+window:0.1", 1e-4..=0.01),
+        ("fog:1m+window:0.2", 1.0..=1.4),
+    ] {
+        let arguments = ["demo", "--weather", weather, "--frames", "20", "--out", "d", "--json"];
+        let report = bench.run(&arguments).succeeded().json();
+        assert_eq!(report["rain"], weather);
+        let found = report["optical_depth"].as_f64().unwrap();
+        assert!(depth.contains(&found), "{weather}: {found}");
+        correlations.push(report["reconstruction"]["correlation"].as_f64().unwrap());
+        std::fs::remove_dir_all(bench.path("d")).unwrap();
+    }
+    assert!(
+        correlations.iter().all(|&c| c > 0.2 && c <= correlations[0] + 0.02),
+        "{correlations:?}"
+    );
+
+    for (weather, told) in [
+        ("snow", "--weather: found snow, expected none, light, heavy"),
+        ("fog:", "--weather: found fog:, expected an amount after the colon"),
+        ("fog:0.2m", "fog:0.2m at --distance-m 0.3: rain: optical depth is"),
+    ] {
+        bench.run(&["demo", "--weather", weather, "--out", "d"]).failed(2, &[told]);
+        assert!(!bench.path("d").exists(), "{weather}");
+    }
+    bench.run(&["demo", "--weather", "none.csv"]).failed(1, &["none.csv"]);
+    bench.run(&["demo", "--weather", "light", "--rain", "light"]).failed(2, &["--rain"]);
+    let table = ["eval", "table4", "--scenes", "2", "--frames", "4", "--weather", "fog:20m"];
+    let report =
+        bench.run(&[&table[..], &["--ancestral", "0", "--json"]].concat()).succeeded().json();
+    assert_eq!(report["rain"], "fog:20m");
+}
+
+#[test]
 fn table_3_has_both_cameras_at_every_distance_with_intervals() {
     let bench = Bench::new();
     let arguments = [

@@ -8,10 +8,7 @@
 use super::medium::{representative, size_parameter};
 use super::{Drops, RainError};
 use crate::mie::Mie;
-use crate::water::Water;
-
-/// Where the bands begin, in degrees of the scattering angle.
-const FIRST_DEG: f64 = 140.0;
+use crate::substance::Substance;
 
 /// Width of a band, in degrees.
 const BAND_DEG: f64 = 2.0;
@@ -34,20 +31,27 @@ const GOLDEN_RATIO: f64 = 0.618_033_988_749_895;
 /// The phase function near the way back, mean 1 over the sphere.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BackwardLobe {
-    /// Means over bands of [`BAND_DEG`] from [`FIRST_DEG`] to 180 degrees.
+    /// Means over bands of 2 degrees, from 140 to 180 degrees.
     bands: [f64; BANDS],
 }
 
 impl BackwardLobe {
+    /// Where the bands begin, in degrees of the scattering angle.
+    pub(super) const FIRST_DEG: f64 = 140.0;
+
     /// What `drops` send back of light of `wavelength_nm`, each size in proportion to what it scatters.
     ///
     /// # Errors
     /// As [`super::Medium::new`], and [`RainError::NoDrops`] for dry air.
-    pub fn new(drops: &Drops, wavelength_nm: f64, water: Water) -> Result<Self, RainError> {
-        let index = water.index(wavelength_nm)?;
+    pub fn new(
+        drops: &Drops,
+        wavelength_nm: f64,
+        substance: impl Into<Substance>,
+    ) -> Result<Self, RainError> {
+        let index = substance.into().index(wavelength_nm)?;
         let angle_deg = |i: usize| {
             let jitter = (i as f64 * GOLDEN_RATIO).fract();
-            FIRST_DEG
+            Self::FIRST_DEG
                 + BAND_DEG * (i / ANGLES) as f64
                 + BAND_DEG * ((i % ANGLES) as f64 + jitter) / ANGLES as f64
         };
@@ -81,7 +85,7 @@ impl BackwardLobe {
     /// The phase function at a scattering angle; below 140 degrees, what it is there.
     #[must_use]
     pub fn phase(&self, angle_rad: f64) -> f64 {
-        let band = (angle_rad.to_degrees() - FIRST_DEG) / BAND_DEG;
+        let band = (angle_rad.to_degrees() - Self::FIRST_DEG) / BAND_DEG;
         self.bands[(band.max(0.0) as usize).min(BANDS - 1)]
     }
 }

@@ -6,15 +6,22 @@
 //! extinction c, scattering b, and P the cumulative scattering angle.
 //!
 //! Light scattered twice is left out, which is off by half the square of the optical depth: 0.0000002 over a metre of
-//! the paper's heavy rain. Beyond an optical depth of 0.5 there is an error instead of a wrong number.
-//! `tests/rain.rs` follows single photons instead, as an independent check.
+//! the paper's heavy rain. Beyond an optical depth of 0.5 single photons are followed instead (module `follow`).
+//! `tests/rain.rs` follows photons of its own through thin air, as an independent check.
 
+use super::follow::{Landing, Slab};
 use super::{Medium, RainError, ScatteringAngles, ensure};
 use crate::{LEDS, SIDE};
 use std::f64::consts::PI;
 
 /// Optical depth above which light scattered twice can no longer be left out.
-pub const DEEPEST_OPTICAL_DEPTH: f64 = 0.5;
+pub const DEEPEST_SINGLE: f64 = 0.5;
+
+/// Largest optical depth accepted: `exp(-10)` of the light is left, 20 ppm there and back.
+pub const DEEPEST: f64 = 5.0;
+
+/// Seed of the photons that are followed: the same air gives the same blur.
+const SEED: u64 = 1;
 
 /// Steps of the integral along the path.
 const STEPS: usize = 200;
@@ -28,13 +35,15 @@ pub struct ForwardBlur {
     medium: Medium,
     angles: Option<ScatteringAngles>,
     distance_mm: f64,
+    /// Where light lands in air too dense for single scattering.
+    landing: Option<Landing>,
 }
 
 impl ForwardBlur {
     /// A target at `distance_mm` behind this medium; `angles` is none in dry air.
     ///
     /// # Errors
-    /// [`RainError::Setting`] for a distance that is not positive or air too dense for single scattering.
+    /// [`RainError::Setting`] for a distance that is not positive or air through which no light comes.
     pub fn new(
         medium: Medium,
         angles: Option<ScatteringAngles>,
@@ -43,9 +52,12 @@ impl ForwardBlur {
         let reachable = distance_mm.is_finite() && distance_mm > 0.0;
         ensure(reachable, "distance", distance_mm, "a positive number of mm")?;
         let depth = medium.extinction_per_m * distance_mm * 1e-3;
-        let expected = "at most 0.5, beyond which light is scattered more than once";
-        ensure(depth <= DEEPEST_OPTICAL_DEPTH, "optical depth", depth, expected)?;
-        Ok(Self { medium, angles, distance_mm })
+        let expected = "at most 5, beyond which no picture is left";
+        ensure(depth <= DEEPEST, "optical depth", depth, expected)?;
+        let dense = angles.as_ref().filter(|_| is_dense(&medium, distance_mm));
+        let landing =
+            dense.map(|angles| Slab { medium: &medium, angles, distance_mm }.landing(SEED));
+        Ok(Self { medium, angles, distance_mm, landing })
     }
 
     /// Share of the light that reaches its aim untouched, `exp(-cL)`.
@@ -54,9 +66,12 @@ impl ForwardBlur {
         self.medium.transmission(self.distance_mm * 1e-3)
     }
 
-    /// Share of the light that is scattered once and lands within `radius_mm` of its aim.
+    /// Share of the light that is scattered and lands within `radius_mm` of its aim.
     #[must_use]
     pub fn scattered_within(&self, radius_mm: f64) -> f64 {
+        if let Some(landing) = &self.landing {
+            return landing.within(radius_mm);
+        }
         let Some(angles) = &self.angles else { return 0.0 };
         let step_mm = self.distance_mm / STEPS as f64;
         let sum: f64 = (0..STEPS)
@@ -66,9 +81,14 @@ impl ForwardBlur {
     }
 
     /// Share of a target point's light that still reaches a bucket detector which sees `field_rad` across: what is
-    /// left of the beam, and what is scattered by less than half the field and so stays in view.
+    /// left of the beam, and what is scattered by less than half the field and so stays in view. In dense air it is
+    /// what a pencil of light from the detector would leave within its field on the target: light paths can be
+    /// reversed.
     #[must_use]
     pub fn returned(&self, field_rad: f64) -> f64 {
+        if let Some(landing) = &self.landing {
+            return self.unscattered() + landing.within(field_rad / 2.0 * self.distance_mm);
+        }
         let depth = self.medium.scattering_per_m * self.distance_mm * 1e-3;
         let kept = self.angles.as_ref().map_or(0.0, |angles| angles.within(field_rad / 2.0));
         self.unscattered() * (1.0 + depth * kept)
@@ -109,6 +129,11 @@ impl ForwardBlur {
     }
 }
 
+/// Whether this much air is too dense for single scattering.
+pub(super) fn is_dense(medium: &Medium, distance_mm: f64) -> bool {
+    medium.extinction_per_m * distance_mm * 1e-3 > DEEPEST_SINGLE
+}
+
 /// A point-spread function on the LED grid.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BlurKernel {
@@ -136,6 +161,38 @@ impl BlurKernel {
     pub fn without_own(mut self, own_spot: f64) -> Self {
         let own = &mut self.shares[REACH * REACH / 2];
         *own = (*own - own_spot).max(0.0);
+        self
+    }
+
+    /// The same behind a window of which a share is covered by drops, which spread their light evenly over a disc. Of that
+    /// light what is scattered in the air is left out.
+    #[must_use]
+    pub fn behind_drops(mut self, covered: f64, disc_px: f64) -> Self {
+        let clear = 1.0 - covered;
+        let covered = covered * self.unscattered;
+        self.unscattered *= clear;
+        // Points of a pixel that lie in the disc.
+        let points = 8;
+        let part = |k: usize| (k as f64 + 0.5) / points as f64 - 0.5;
+        let offset = |i: usize| i as f64 - (SIDE - 1) as f64;
+        let density = covered / (PI * disc_px * disc_px);
+        let smaller_than_a_pixel = disc_px * PI.sqrt() <= 1.0;
+        for (i, share) in self.shares.iter_mut().enumerate() {
+            let (row, column) = (i / REACH, i % REACH);
+            let inside = (0..points * points)
+                .filter(|k| {
+                    let (y, x) =
+                        (offset(row) + part(k / points), offset(column) + part(k % points));
+                    x.hypot(y) < disc_px
+                })
+                .count();
+            let own = i == REACH * REACH / 2;
+            let spread = match smaller_than_a_pixel {
+                true => covered * f64::from(u8::from(own)),
+                false => density * inside as f64 / (points * points) as f64,
+            };
+            *share = *share * clear + spread;
+        }
         self
     }
 

@@ -19,6 +19,9 @@ pub const LARGEST_RAINDROP_MM: f64 = 8.0;
 /// Highest rain rate accepted, in mm/h; a cloudburst has 100 to 200.
 pub const HIGHEST_RATE_MM_PER_H: f64 = 300.0;
 
+/// Most water, smoke or dust accepted, in g/m^3: natural fog has at most 1, a fog chamber 20.
+pub const DENSEST_G_PER_M3: f64 = 100.0;
+
 /// Marshall and Palmer's intercept, in m^-3 mm^-1 (J. Meteorol. 5, 165, 1948).
 const MARSHALL_PALMER_INTERCEPT: f64 = 8000.0;
 
@@ -121,16 +124,50 @@ impl Drops {
     /// water.
     ///
     /// # Errors
-    /// [`RainError::Setting`] for a mode not in 0.5 to 100 um or more water than 5 g/m^3.
+    /// [`RainError::Setting`] for a mode not in 0.5 to 100 um or more water than [`DENSEST_G_PER_M3`].
     pub fn fog(mode_um: f64, liquid_g_per_m3: f64) -> Result<Self, RainError> {
         ensure((0.5..=100.0).contains(&mode_um), "fog mode", mode_um, "0.5 to 100 um")?;
-        let holds = (0.0..=5.0).contains(&liquid_g_per_m3);
-        ensure(holds, "fog water", liquid_g_per_m3, "0 to 5 g/m3")?;
+        let holds = (0.0..=DENSEST_G_PER_M3).contains(&liquid_g_per_m3);
+        ensure(holds, "fog water", liquid_g_per_m3, "0 to 100 g/m3")?;
         let mode_mm = mode_um * 1e-3;
         let law = |d: f64| (d / mode_mm).powi(6) * (-6.0 * d / mode_mm).exp();
         let fog = Self::from_law(0.05 * mode_mm, 5.0 * mode_mm, law);
         let factor = liquid_g_per_m3 / fog.liquid_water_g_per_m3();
         Ok(fog.scaled(factor))
+    }
+
+    /// Particles whose diameters are distributed log-normally by number around `median_um`, `spread` being the geometric
+    /// standard deviation, with `g_per_m3` of a material of `density_g_per_cm3`.
+    ///
+    /// # Errors
+    /// [`RainError::Setting`] for a median not in 0.02 to 100 um, or a mass that is not in 0 to [`DENSEST_G_PER_M3`].
+    pub fn lognormal(
+        median_um: f64,
+        spread: f64,
+        g_per_m3: f64,
+        density_g_per_cm3: f64,
+    ) -> Result<Self, RainError> {
+        ensure(
+            (0.02..=100.0).contains(&median_um),
+            "median diameter",
+            median_um,
+            "0.02 to 100 um",
+        )?;
+        ensure((1.1..=3.0).contains(&spread), "geometric standard deviation", spread, "1.1 to 3")?;
+        let holds = (0.0..=DENSEST_G_PER_M3).contains(&g_per_m3);
+        ensure(holds, "mass in the air", g_per_m3, "0 to 100 g/m3")?;
+        let sigma = spread.ln();
+        // The third moment, and with it the mass, has its median at 3 sigma^2 above that of the numbers.
+        let (low, high) = (-3.0 * sigma, 3.0 * sigma + 3.0 * sigma * sigma);
+        let width = (high - low) / CLASSES as f64;
+        let class = |i| {
+            let log = low + (i as f64 + 0.5) * width;
+            let per_m3 = (-log * log / (2.0 * sigma * sigma)).exp() * width;
+            DropClass { diameter_mm: median_um * 1e-3 * log.exp(), per_m3 }
+        };
+        let one = Self { classes: (0..CLASSES).map(class).collect() };
+        let factor = g_per_m3 / (one.liquid_water_g_per_m3() * density_g_per_cm3);
+        Ok(one.scaled(factor))
     }
 
     /// Midpoints of equal classes.
@@ -143,7 +180,7 @@ impl Drops {
         Self { classes: (0..CLASSES).map(class).collect() }
     }
 
-    fn scaled(mut self, factor: f64) -> Self {
+    pub(super) fn scaled(mut self, factor: f64) -> Self {
         for class in &mut self.classes {
             class.per_m3 *= factor;
         }
@@ -183,6 +220,13 @@ impl Drops {
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.concentration_per_m3() == 0.0
+    }
+
+    /// Whether there are drops that fall, and that can be followed one by one; droplets and grains hang in the air.
+    #[must_use]
+    pub fn fall(&self) -> bool {
+        let falls = |class: &DropClass| class.diameter_mm >= SMALLEST_RAINDROP_MM;
+        self.classes.iter().any(|class| falls(class) && class.per_m3 > 0.0)
     }
 
     /// Drops in a cubic metre.

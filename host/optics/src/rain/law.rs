@@ -2,6 +2,7 @@
 
 use super::{Drops, RainError};
 use std::fmt;
+use std::ops::RangeInclusive;
 use std::str::FromStr;
 use thiserror::Error;
 
@@ -99,16 +100,31 @@ impl FromStr for DropLaw {
     }
 }
 
+/// As many numbers as `counts` allows, separated by commas.
+pub(super) fn numbers_between(
+    text: &str,
+    parameters: &str,
+    counts: RangeInclusive<usize>,
+) -> Result<Vec<f64>, ParseDropLawError> {
+    let found: Option<Vec<f64>> = parameters.split(',').map(|n| n.trim().parse().ok()).collect();
+    found.filter(|found| counts.contains(&found.len())).ok_or_else(|| ParseDropLawError {
+        found: text.to_owned(),
+        expected: match (*counts.start(), *counts.end()) {
+            (1, 1) => "1 number after the colon".to_owned(),
+            (low, high) if low == high => format!("{low} numbers after the colon"),
+            (low, high) => format!("{low} to {high} numbers after the colon"),
+        },
+    })
+}
+
 /// Exactly `COUNT` numbers, separated by commas.
 fn numbers<const COUNT: usize>(
     text: &str,
     parameters: &str,
 ) -> Result<[f64; COUNT], ParseDropLawError> {
-    let found: Option<Vec<f64>> = parameters.split(',').map(|n| n.trim().parse().ok()).collect();
-    found.and_then(|found| found.try_into().ok()).ok_or_else(|| ParseDropLawError {
-        found: text.to_owned(),
-        expected: format!("{COUNT} number{} after the colon", if COUNT == 1 { "" } else { "s" }),
-    })
+    let mut found = numbers_between(text, parameters, COUNT..=COUNT)?.into_iter();
+    // As many as were asked for.
+    Ok(std::array::from_fn(|_| found.next().unwrap_or(f64::NAN)))
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@
 
 use super::{DropClass, Drops, RainError};
 use crate::mie::Mie;
-use crate::water::Water;
+use crate::substance::Substance;
 use std::f64::consts::PI;
 
 /// Optical coefficients of air with drops in it, at one wavelength.
@@ -31,8 +31,12 @@ impl Medium {
     ///
     /// # Errors
     /// [`RainError`] for a wavelength outside the water table or a drop outside the Mie solver's range.
-    pub fn new(drops: &Drops, wavelength_nm: f64, water: Water) -> Result<Self, RainError> {
-        let index = water.index(wavelength_nm)?;
+    pub fn new(
+        drops: &Drops,
+        wavelength_nm: f64,
+        substance: impl Into<Substance>,
+    ) -> Result<Self, RainError> {
+        let index = substance.into().index(wavelength_nm)?;
         let mut mie = Mie::new();
         let mut medium = Self {
             wavelength_nm,
@@ -130,8 +134,12 @@ impl ScatteringAngles {
     ///
     /// # Errors
     /// As [`Medium::new`], and [`RainError::NoDrops`] for dry air.
-    pub fn new(drops: &Drops, wavelength_nm: f64, water: Water) -> Result<Self, RainError> {
-        let index = water.index(wavelength_nm)?;
+    pub fn new(
+        drops: &Drops,
+        wavelength_nm: f64,
+        substance: impl Into<Substance>,
+    ) -> Result<Self, RainError> {
+        let index = substance.into().index(wavelength_nm)?;
         let growth = (PI / FIRST_EDGE_RAD).powf(1.0 / (BINS - 1) as f64);
         let edges_rad: Vec<f64> =
             (0..BINS).map(|i| (FIRST_EDGE_RAD * growth.powi(i as i32)).min(PI)).collect();
@@ -200,6 +208,15 @@ impl ScatteringAngles {
         let width = self.cumulative[bin] - low;
         let part = if width > 0.0 { ((share - low) / width).clamp(0.0, 1.0) } else { 1.0 };
         low_angle + (self.edges_rad[bin] - low_angle) * part
+    }
+
+    /// The phase function at an angle, mean 1 over the sphere: that of its bin.
+    #[must_use]
+    pub fn phase(&self, angle_rad: f64) -> f64 {
+        let bin = self.edges_rad.partition_point(|&edge| edge < angle_rad).min(BINS - 1);
+        let (low_angle, low) =
+            if bin == 0 { (0.0, 0.0) } else { (self.edges_rad[bin - 1], self.cumulative[bin - 1]) };
+        2.0 * (self.cumulative[bin] - low) / (low_angle.cos() - self.edges_rad[bin].cos())
     }
 
     /// Mean cosine of the scattering angle, from the bins' centres.

@@ -3,7 +3,6 @@
 //! Law: on average over time a white target gives what [`super::ForwardBlur`] says; from frame to frame it is single
 //! drops that make the difference. Where droplets are too many to be followed (fog), there is the average alone.
 
-use super::drops::SMALLEST_RAINDROP_MM;
 use super::{BeamShadows, FallingDrops, RainError, Weather};
 use crate::Footprint;
 
@@ -22,7 +21,7 @@ impl RainySpots {
     /// `footprint` seen through `beams` in this weather. The same seed gives the same rain.
     ///
     /// # Errors
-    /// [`RainError`] for air too dense for single scattering or too many drops.
+    /// [`RainError`] for air too dense for a picture or too many drops.
     pub fn new(
         weather: &Weather,
         footprint: &Footprint,
@@ -31,20 +30,21 @@ impl RainySpots {
     ) -> Result<Self, RainError> {
         let BeamShadows { projector, distance_mm, baseline_mm, .. } = beams;
         let blur = weather.blur(distance_mm)?;
-        let pitch_mm = projector.field_mm(distance_mm) / crate::SIDE as f64;
-        let kernel = blur.kernel(pitch_mm);
-        let returned = blur.returned(projector.field_mm(distance_mm) / distance_mm);
+        let field_mm = projector.field_mm(distance_mm);
+        let kernel = blur.kernel(field_mm / crate::SIDE as f64);
+        let through = |kernel| weather.through_window(kernel, distance_mm, field_mm);
+        // On the way back light that crosses a drop on the window is lost.
+        let returned = blur.returned(field_mm / distance_mm) * weather.clear();
         let drops = weather.drops();
-        let rains = drops
-            .classes()
-            .iter()
-            .any(|class| class.diameter_mm >= SMALLEST_RAINDROP_MM && class.per_m3 > 0.0);
+        let rains = drops.fall();
         // Followed drops take their shadow; their diffraction, as much again, stays in the spot and is not taken at
         // all.
         let shadow = if rains { (-drops.shadow_per_m() * distance_mm * 1e-3).exp() } else { 1.0 };
         let (kernel, kept) = if rains {
-            (kernel.without_own(1.0 - shadow), returned / shadow)
+            let kept = returned / shadow * weather.clear();
+            (through(kernel.without_own(1.0 - shadow)), kept)
         } else {
+            let kernel = through(kernel);
             let own = kernel.unscattered + kernel.scattered(0, 0);
             (kernel.without_own(f64::INFINITY), own * returned)
         };
