@@ -2,11 +2,11 @@
 
 use super::Usage;
 use super::enhance::print_report;
-use super::networks::{Deblurring, ImageArgs, bar};
+use super::networks::{Deblurring, ImageArgs, bar, checked};
 use super::report::StageTimes;
-use super::stack::Input;
 use anyhow::Result;
 use indicatif::ProgressBar;
+use nirspi::files::stack::ImageStack;
 use nirspi_nets::classical;
 use nirspi_nets::consistency::Consistency;
 use nirspi_nets::{Enhanced, Images, KnownEstimate, Method, Networks, Options, deblur};
@@ -113,7 +113,7 @@ impl Sharpening {
     }
 
     /// Writes the spread, if it was asked for.
-    pub fn write_spread(&self, input: &Input, spread: Option<&[f32]>) -> Result<()> {
+    pub fn write_spread(&self, input: &ImageStack, spread: Option<&[f32]>) -> Result<()> {
         if let (Some(file), Some(spread)) = (&self.spread, spread) {
             input.target(file)?.write(deblur::SIDE, spread)?;
         }
@@ -147,7 +147,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let options = args.sharpening.options()?;
     let mut times = StageTimes::default();
     let input = times.time("read", || args.images.read(deblur::SIDE))?;
-    let images: Blurred<'_> = input.images()?;
+    let images: Blurred<'_> = checked(&input)?;
     let target = input.target(&args.images.out)?;
     let bar = bar("deblurring", input.count());
     let (networks, result) = match way {

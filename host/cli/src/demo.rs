@@ -3,7 +3,7 @@
 mod enhanced;
 
 use super::camera::{SceneArgs, SetupArgs};
-use super::method::{self, MethodArgs, Solved, solve};
+use super::method::{MethodArgs, Solved, solve};
 use super::print;
 use super::reconstruct::enlarged_png;
 use super::report::{StageTimes, to_json};
@@ -15,6 +15,7 @@ use nirspi::files::image::{encode_grey, encode_rgb};
 use nirspi::files::measurement::encode as encode_measurement;
 use nirspi::files::npy;
 use nirspi::files::output::OutputDir;
+use nirspi::imaging::MethodReport;
 use nirspi::imaging::{Quality, compare};
 use nirspi::picture::{Panel, Range, SideBySide};
 use nirspi::scene::SceneMap;
@@ -90,7 +91,7 @@ struct Report {
     quality_note: &'static str,
     enhancement: enhanced::Report,
     #[serde(flatten)]
-    method: method::Report,
+    method: MethodReport,
     notes: Vec<String>,
     stage_ms: StageTimes,
 }

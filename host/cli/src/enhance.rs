@@ -1,7 +1,7 @@
 //! `nirspi enhance`: fusion and deblurring, from the camera's 32 x 32 to the 64 x 64 output.
 
 use super::deblur::Sharpening;
-use super::networks::{Deblurring, ImageArgs, Report, bar};
+use super::networks::{Deblurring, ImageArgs, Report, bar, checked};
 use super::print;
 use super::report::StageTimes;
 use super::upscale::DepthArgs;
@@ -35,7 +35,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let method = Method::Diffusion { steps: args.steps };
     let mut times = StageTimes::default();
     let input = times.time("read", || args.images.read(fusion::SIDE))?;
-    let images: Images<'_, { fusion::SIDE }> = input.images()?;
+    let images: Images<'_, { fusion::SIDE }> = checked(&input)?;
     let target = input.target(&args.images.out)?;
     let depth = args.depth.read(input.count())?;
     let mut networks = args.images.networks.open(&["fsrcnn", "estimator", "diffusion"])?;

@@ -32,7 +32,6 @@ mod serve;
 mod serve_virtual;
 mod setup;
 mod source;
-mod stack;
 mod train;
 mod upscale;
 

@@ -5,15 +5,13 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use nirspi::files::npy::read_stack;
+use nirspi::imaging::MethodReport;
 use nirspi_recon::omp::Backend;
 use nirspi_recon::reconstruct::{
     self, Completion, Method, MethodSettings, OwnAtoms, Reconstruct, ReconstructError, Sparsity,
     Strength,
 };
 use nirspi_recon::{Basis, Image, Measurements};
-use serde::Serialize;
-use serde::ser::{SerializeMap, Serializer};
-use std::fmt;
 use std::path::{Path, PathBuf};
 
 /// How to make the image.
@@ -157,7 +155,10 @@ impl MethodArgs {
 
     /// What a method has made, as the command line reports it.
     pub fn solved(&self, made: reconstruct::Reconstruction) -> Solved {
-        Solved { image: made.image, report: Report { method: self.method, made: made.report } }
+        Solved {
+            image: made.image,
+            report: MethodReport { method: self.method, made: made.report },
+        }
     }
 }
 
@@ -175,85 +176,12 @@ pub fn read_atoms(path: &Path, side: usize) -> Result<Vec<f32>> {
     Ok(atoms.values)
 }
 
-/// What was done and found.
-#[derive(Debug)]
-pub struct Report {
-    method: Method,
-    made: reconstruct::Report,
-}
-
-impl Report {
-    /// In a few words, for a caption.
-    pub fn short(&self) -> String {
-        self.made.short()
-    }
-}
-
-impl fmt::Display for Report {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.made.fmt(f)
-    }
-}
-
-impl Serialize for Report {
-    /// The method's word, and what it reports under that word, or under `penalty` where it has a strength.
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let made = &self.made;
-        let details = Details {
-            basis: made.basis.as_deref(),
-            backend: made.backend.map(Backend::name),
-            device: made.device.as_deref(),
-            strength: made.strength,
-            sparsity: made.sparsity,
-            keep: made.completion.map(Completion::name),
-            stop: made.stop,
-            relative_residual: made.residual,
-            unseen_atoms: made.unseen_atoms,
-            trust_in_prediction: made.trust,
-            noise_of_a_measurement: made.noise,
-        };
-        let mut map = serializer.serialize_map(None)?;
-        map.serialize_entry("method", self.method.argument())?;
-        if details != Details::default() {
-            let section = if made.strength.is_some() { "penalty" } else { self.method.argument() };
-            map.serialize_entry(section, &details)?;
-        }
-        map.end()
-    }
-}
-
-#[derive(Default, PartialEq, Serialize)]
-struct Details<'r> {
-    #[serde(skip_serializing_if = "Option::is_none")]
-    basis: Option<&'r str>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    backend: Option<&'static str>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    device: Option<&'r str>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    strength: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    sparsity: Option<usize>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    keep: Option<&'static str>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    stop: Option<&'static str>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    relative_residual: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    unseen_atoms: Option<usize>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    trust_in_prediction: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    noise_of_a_measurement: Option<f64>,
-}
-
 /// An image and how it came about.
 pub struct Solved {
     /// In the measurements' units.
     pub image: Image,
     /// What was done.
-    pub report: Report,
+    pub report: MethodReport,
 }
 
 /// Makes the image.

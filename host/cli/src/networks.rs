@@ -2,10 +2,10 @@
 
 use super::Usage;
 use super::report::StageTimes;
-use super::stack::Input;
-use anyhow::Result;
+use anyhow::{Context, Result};
 use indicatif::{ProgressBar, ProgressStyle};
-use nirspi_nets::{Backend, Device, Enhanced, Networks, UsedWeights, WeightsError};
+use nirspi::files::stack::ImageStack;
+use nirspi_nets::{Backend, Device, Enhanced, Images, Networks, UsedWeights, WeightsError};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -42,8 +42,8 @@ pub struct ImageArgs {
 
 impl ImageArgs {
     /// Reads the images, which are to have this side.
-    pub fn read(&self, side: usize) -> Result<Input> {
-        Input::read(&self.input, self.resize.then_some(side as u32))
+    pub fn read(&self, side: usize) -> Result<ImageStack> {
+        Ok(ImageStack::read(&self.input, self.resize.then_some(side as u32))?)
     }
 }
 
@@ -72,7 +72,7 @@ impl ImageArgs {
     /// What was done to the images.
     pub fn report(
         &self,
-        input: &Input,
+        input: &ImageStack,
         networks: &Networks,
         deblurring: Option<Deblurring>,
         stage_ms: StageTimes,
@@ -87,6 +87,11 @@ impl ImageArgs {
             stage_ms,
         }
     }
+}
+
+/// Images of this size and in [0, 1], as a network takes them.
+pub fn checked<const SIDE: usize>(stack: &ImageStack) -> Result<Images<'_, SIDE>> {
+    Images::new(stack.values(SIDE)?).with_context(|| stack.path().display().to_string())
 }
 
 /// What a stack of images went through.

@@ -17,6 +17,7 @@ use nirspi::capture::Capture;
 use nirspi::files::image::{encode_grey, encode_rgb};
 use nirspi::files::npy;
 use nirspi::files::output::OutputDir;
+use nirspi::imaging::MethodReport;
 use nirspi::picture::{Panel, Range, SideBySide};
 use nirspi::source::{FirstPatterns, Index, Part, Source};
 use nirspi_recon::{Image, metrics};
@@ -83,7 +84,7 @@ struct Report {
     sampling: f64,
     order: String,
     #[serde(flatten)]
-    method: super::method::Report,
+    method: MethodReport,
     dropouts: Vec<DropoutReport>,
     /// Places in the order shown of patterns that the file says were not read.
     not_read: Vec<usize>,

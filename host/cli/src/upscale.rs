@@ -1,6 +1,6 @@
 //! `nirspi upscale`: the fusion stage alone.
 
-use super::networks::{ImageArgs, bar};
+use super::networks::{ImageArgs, bar, checked};
 use super::print;
 use super::report::StageTimes;
 use anyhow::{Context, Result};
@@ -47,7 +47,7 @@ impl DepthArgs {
 pub fn run(args: &Args) -> Result<ExitCode> {
     let mut times = StageTimes::default();
     let input = times.time("read", || args.images.read(fusion::SIDE))?;
-    let images: Images<'_, { fusion::SIDE }> = input.images()?;
+    let images: Images<'_, { fusion::SIDE }> = checked(&input)?;
     let target = input.target(&args.images.out)?;
     let depth = args.depth.read(input.count())?;
     let mut networks = args.images.networks.open(&["fsrcnn"])?;

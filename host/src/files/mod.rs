@@ -14,6 +14,8 @@ pub mod npy;
 pub mod order_table;
 pub mod output;
 pub mod problem;
+#[cfg(feature = "pictures")]
+pub mod stack;
 pub mod table;
 
 mod archive;

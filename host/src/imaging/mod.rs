@@ -9,6 +9,7 @@
 
 #[cfg(feature = "enhance")]
 mod enhance;
+mod method_report;
 mod quality;
 #[cfg(feature = "enhance")]
 mod warning;
@@ -16,6 +17,7 @@ mod white;
 
 #[cfg(feature = "enhance")]
 pub use enhance::{Enhance, EnhanceError, EnhancedImage, ImageContext, White};
+pub use method_report::MethodReport;
 pub use quality::{Fit, Fitted, Quality, compare};
 #[cfg(feature = "enhance")]
 pub use warning::{Warning, warnings};

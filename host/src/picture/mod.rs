@@ -8,8 +8,10 @@ pub(crate) mod glyph;
 
 mod chart;
 mod layout;
+mod sheet;
 mod text;
 
 pub use chart::{Axis, Chart, Line};
 pub use glyph::Typeface;
 pub use layout::{Panel, Range, SideBySide, stacked};
+pub use sheet::contact_sheet;

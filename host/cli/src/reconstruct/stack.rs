@@ -2,24 +2,19 @@
 
 use super::{Args, enhanced, print, spinning};
 use crate::Usage;
-use crate::method::{self, Solved};
+use crate::method::Solved;
 use crate::report::{StageTimes, to_json};
 use anyhow::{Context, Result, bail};
-use nirspi::files::image::encode_grey;
 use nirspi::files::npy;
 use nirspi::files::output::OutputDir;
+use nirspi::imaging::MethodReport;
+use nirspi::picture::contact_sheet;
 use nirspi::source::FirstPatterns;
 use nirspi_recon::reconstruct::{Method, Reconstruction, Setting};
 use nirspi_recon::{Image, Measurements, Rows, Side};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;
-
-/// Frames side by side in the picture.
-const COLUMNS: usize = 8;
-
-/// Most frames in the picture; all are in the array.
-const SHOWN: usize = 64;
 
 #[derive(Debug, Serialize)]
 struct Report {
@@ -37,7 +32,7 @@ struct FrameReport {
     /// Whether it started from the frame before.
     warm: bool,
     #[serde(flatten)]
-    method: method::Report,
+    method: MethodReport,
     #[serde(skip_serializing_if = "Option::is_none")]
     enhancement: Option<enhanced::Report>,
     notes: Vec<String>,
@@ -118,13 +113,13 @@ pub fn run(args: &Args, first: &FirstPatterns) -> Result<ExitCode> {
     let mut out = OutputDir::create(&args.out)?;
     let pixels: Vec<f32> = images.iter().flat_map(Image::pixels).copied().collect();
     out.write("image.npy", &npy::encode(&[images.len(), n, n], &pixels))?;
-    out.write("image.png", &sheet(&images))?;
+    out.write("image.png", &contact_sheet(&images))?;
     if let Some(sharp) = sharp {
         let side = nirspi_nets::deblur::SIDE;
         out.write("enhanced.npy", &npy::encode(&[images.len(), side, side], &sharp))?;
         let at = Side::new(side as u64)?;
         let sharp = sharp.chunks_exact(at.area()).map(|pixels| Image::new(at, pixels.to_vec()));
-        out.write("enhanced.png", &sheet(&sharp.collect::<Vec<_>>()))?;
+        out.write("enhanced.png", &contact_sheet(&sharp.collect::<Vec<_>>()))?;
     }
     out.write("report.json", to_json(&report)?.as_bytes())?;
     out.commit()?;
@@ -144,24 +139,6 @@ fn solve_all(args: &Args, used: &[Measurements]) -> Result<Vec<Reconstruction>> 
         true => method.reconstruct_video(used)?,
         false => used.iter().map(|used| method.reconstruct(used)).collect::<Result<_, _>>()?,
     })
-}
-
-/// The frames in rows, each stretched to its own black and white.
-fn sheet(images: &[Image]) -> Vec<u8> {
-    let shown = &images[..images.len().min(SHOWN)];
-    let n = images[0].side().pixels();
-    let factor = (128 / n).max(1);
-    let (columns, tile) = (shown.len().min(COLUMNS), n * factor);
-    let (width, height) = (columns * tile, shown.len().div_ceil(columns) * tile);
-    let mut pixels = vec![0.0; width * height];
-    for (at, image) in shown.iter().enumerate() {
-        let (top, left) = (at / columns * tile, at % columns * tile);
-        let stretched = image.stretched();
-        for (r, c) in (0..tile).flat_map(|r| (0..tile).map(move |c| (r, c))) {
-            pixels[(top + r) * width + left + c] = stretched.pixels()[r / factor * n + c / factor];
-        }
-    }
-    encode_grey(width, height, &pixels)
 }
 
 fn say(args: &Args, report: &Report) -> Result<()> {

@@ -45,7 +45,7 @@ impl Landing {
     pub fn within(&self, radius_mm: f64) -> f64 {
         let at = RINGS_PER_OCTAVE * (radius_mm / self.smallest_mm).log2();
         let last = self.within.len() - 1;
-        if !(at > 0.0) {
+        if at <= 0.0 {
             return self.within[0] * (radius_mm / self.smallest_mm).powi(2);
         }
         let low = (at as usize).min(last);

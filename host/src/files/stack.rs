@@ -1,18 +1,80 @@
 //! Images in and images out, as arrays or as pictures: `.npy`, PNG or JPEG, or a folder of these.
 //!
-//! The law: what goes into a network is of the right size and in [0, 1], or one line says what is not; where the
-//! results go is checked before anything is computed.
+//! # Invariant
+//! Where results go is checked before anything is computed: [`ImageStack::target`] fails first
+//! (`host/cli/tests/cli/enhance.rs`).
 
-use anyhow::{Context, Result, bail};
-use nirspi::files::image::{Grey, encode_grey, read_grey};
-use nirspi::files::npy;
-use nirspi::files::output::{OutputDir, write_atomic};
-use nirspi_nets::Images;
+use super::FileError;
+use super::image::{Grey, encode_grey, read_grey};
+use super::npy;
+use super::output::{OutputDir, write_atomic};
 use std::fs;
 use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// Why images cannot be taken together, or not be written where they are to go. `Display` is one line.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum StackError {
+    /// A file that cannot be read or written.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// A folder without pictures.
+    #[error("{}: no .png or .jpg files in it", .0.display())]
+    Empty(PathBuf),
+    /// Pictures of one folder that differ in size.
+    #[error(
+        "{}: {} x {} pixels, expected {} x {} as {} has",
+        path.display(), found.0, found.1, expected.0, expected.1, first.display()
+    )]
+    Sizes {
+        /// The picture that differs.
+        path: PathBuf,
+        /// Its rows and columns.
+        found: (usize, usize),
+        /// Rows and columns of the first.
+        expected: (usize, usize),
+        /// The first.
+        first: PathBuf,
+    },
+    /// Two pictures of a folder whose results would have one name.
+    #[error("{}: two pictures whose result would be {name}", folder.display())]
+    Twice {
+        /// The folder.
+        folder: PathBuf,
+        /// The name.
+        name: String,
+    },
+    /// Images of another size than is needed.
+    #[error(
+        "{}: images of {height} x {width} pixels, expected {side} x {side}; --resize brings pictures to that",
+        path.display()
+    )]
+    Size {
+        /// Where they come from.
+        path: PathBuf,
+        /// Rows.
+        height: usize,
+        /// Columns.
+        width: usize,
+        /// Rows and columns needed.
+        side: usize,
+    },
+    /// One picture for several images.
+    #[error("--out {}: one picture for {count} images, expected a .npy file or a folder", path.display())]
+    OnePicture {
+        /// Where they were to go.
+        path: PathBuf,
+        /// How many there are.
+        count: usize,
+    },
+}
+
+type Result<T> = std::result::Result<T, StackError>;
 
 /// Images of one size.
-pub struct Input {
+#[derive(Debug)]
+pub struct ImageStack {
     path: PathBuf,
     count: usize,
     height: usize,
@@ -22,6 +84,7 @@ pub struct Input {
 }
 
 /// How the images came, which is how results go.
+#[derive(Debug)]
 enum Form {
     Array {
         is_single: bool,
@@ -30,8 +93,11 @@ enum Form {
     Pictures(Vec<String>),
 }
 
-impl Input {
+impl ImageStack {
     /// Reads a `.npy` array, a picture or a folder of pictures, which are brought to a side if one is given.
+    ///
+    /// # Errors
+    /// [`StackError`] for a file that cannot be read, or pictures that do not belong together.
     pub fn read(path: &Path, resize: Option<u32>) -> Result<Self> {
         if path.is_dir() {
             return Self::folder(path, resize);
@@ -54,17 +120,18 @@ impl Input {
     }
 
     fn folder(path: &Path, resize: Option<u32>) -> Result<Self> {
-        let entries = fs::read_dir(path).with_context(|| path.display().to_string())?;
+        let io = |system| FileError::io(path, "read", system);
+        let entries = fs::read_dir(path).map_err(io)?;
         let mut files = Vec::new();
         for entry in entries {
-            let file = entry.with_context(|| path.display().to_string())?.path();
+            let file = entry.map_err(io)?.path();
             if is_picture(&file) {
                 files.push(file);
             }
         }
         files.sort();
         let Some(first) = files.first() else {
-            bail!("{}: no .png or .jpg files in it", path.display());
+            return Err(StackError::Empty(path.to_owned()));
         };
         let (mut size, mut values) = (None, Vec::new());
         for file in &files {
@@ -72,15 +139,8 @@ impl Input {
             let found = (picture.height as usize, picture.width as usize);
             let expected = *size.get_or_insert(found);
             if found != expected {
-                bail!(
-                    "{}: {} x {} pixels, expected {} x {} as {} has",
-                    file.display(),
-                    found.0,
-                    found.1,
-                    expected.0,
-                    expected.1,
-                    first.display()
-                );
+                let (path, first) = (file.clone(), first.clone());
+                return Err(StackError::Sizes { path, found, expected, first });
             }
             values.extend(picture.values);
         }
@@ -88,33 +148,43 @@ impl Input {
         let names: Vec<String> = files.iter().map(|file| file_name(file)).collect();
         // Sorted by path: equal names are neighbours.
         if let Some(twice) = names.windows(2).find(|pair| pair[0] == pair[1]) {
-            bail!("{}: two pictures whose result would be {}", path.display(), twice[0]);
+            let (folder, name) = (path.to_owned(), twice[0].clone());
+            return Err(StackError::Twice { folder, name });
         }
         let form = Form::Pictures(names);
         Ok(Self { path: path.to_owned(), count: files.len(), height, width, values, form })
     }
 
     /// How many.
+    #[must_use]
     pub fn count(&self) -> usize {
         self.count
     }
 
-    /// The images, of this size and in [0, 1].
-    pub fn images<const SIDE: usize>(&self) -> Result<Images<'_, SIDE>> {
-        if (self.height, self.width) != (SIDE, SIDE) {
-            bail!(
-                "{}: images of {} x {} pixels, expected {SIDE} x {SIDE}; --resize brings pictures to that",
-                self.path.display(),
-                self.height,
-                self.width
-            );
+    /// Where they come from.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The values of the images, row-major, one after another.
+    ///
+    /// # Errors
+    /// [`StackError::Size`] for images of another size than `side` x `side`.
+    pub fn values(&self, side: usize) -> Result<&[f32]> {
+        let Self { height, width, .. } = *self;
+        match (height, width) == (side, side) {
+            true => Ok(&self.values),
+            false => Err(StackError::Size { path: self.path.clone(), height, width, side }),
         }
-        Images::new(&self.values).with_context(|| self.path.display().to_string())
     }
 
     /// Where results of these images go: an array for `.npy`, one picture for `.png`, else a folder of
     /// pictures.
-    pub fn target(&self, out: &Path) -> Result<Target> {
+    ///
+    /// # Errors
+    /// [`StackError::OnePicture`] for one picture and several images.
+    pub fn target(&self, out: &Path) -> Result<StackTarget> {
         let shape = match self.form {
             Form::Array { is_single: true } => None,
             Form::Array { is_single: false } | Form::Pictures(_) => Some(self.count),
@@ -123,11 +193,8 @@ impl Input {
             Kind::Array(shape)
         } else if has_extension(out, "png") {
             if self.count != 1 {
-                bail!(
-                    "--out {}: one picture for {} images, expected a .npy file or a folder",
-                    out.display(),
-                    self.count
-                );
+                let (path, count) = (out.to_owned(), self.count);
+                return Err(StackError::OnePicture { path, count });
             }
             Kind::Picture
         } else {
@@ -137,16 +204,18 @@ impl Input {
             };
             Kind::Folder(names)
         };
-        Ok(Target { path: out.to_owned(), kind })
+        Ok(StackTarget { path: out.to_owned(), kind })
     }
 }
 
 /// Where results go.
-pub struct Target {
+#[derive(Debug)]
+pub struct StackTarget {
     path: PathBuf,
     kind: Kind,
 }
 
+#[derive(Debug)]
 enum Kind {
     /// Of a stack of so many, or of one image alone.
     Array(Option<usize>),
@@ -154,8 +223,11 @@ enum Kind {
     Folder(Vec<String>),
 }
 
-impl Target {
+impl StackTarget {
     /// Writes images of `side` x `side` in [0, 1].
+    ///
+    /// # Errors
+    /// [`StackError::File`] where they cannot be written.
     pub fn write(&self, side: usize, values: &[f32]) -> Result<()> {
         match &self.kind {
             Kind::Array(Some(count)) => {

@@ -1,0 +1,83 @@
+//! What a reconstruction method did, as reports and captions tell it.
+
+use nirspi_recon::omp::Backend;
+use nirspi_recon::reconstruct::{Completion, Method, Report};
+use serde::Serialize;
+use serde::ser::{SerializeMap, Serializer};
+use std::fmt;
+
+/// What was done and found.
+#[derive(Debug)]
+pub struct MethodReport {
+    /// Which method.
+    pub method: Method,
+    /// What it did.
+    pub made: Report,
+}
+
+impl MethodReport {
+    /// In a few words, for a caption.
+    #[must_use]
+    pub fn short(&self) -> String {
+        self.made.short()
+    }
+}
+
+impl fmt::Display for MethodReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.made.fmt(f)
+    }
+}
+
+impl Serialize for MethodReport {
+    /// The method's word, and what it reports under that word, or under `penalty` where it has a strength.
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let made = &self.made;
+        let details = Details {
+            basis: made.basis.as_deref(),
+            backend: made.backend.map(Backend::name),
+            device: made.device.as_deref(),
+            strength: made.strength,
+            sparsity: made.sparsity,
+            keep: made.completion.map(Completion::name),
+            stop: made.stop,
+            relative_residual: made.residual,
+            unseen_atoms: made.unseen_atoms,
+            trust_in_prediction: made.trust,
+            noise_of_a_measurement: made.noise,
+        };
+        let mut map = serializer.serialize_map(None)?;
+        map.serialize_entry("method", self.method.argument())?;
+        if details != Details::default() {
+            let section = if made.strength.is_some() { "penalty" } else { self.method.argument() };
+            map.serialize_entry(section, &details)?;
+        }
+        map.end()
+    }
+}
+
+#[derive(Default, PartialEq, Serialize)]
+struct Details<'r> {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    basis: Option<&'r str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    backend: Option<&'static str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    device: Option<&'r str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    strength: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sparsity: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    keep: Option<&'static str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    stop: Option<&'static str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    relative_residual: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    unseen_atoms: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    trust_in_prediction: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    noise_of_a_measurement: Option<f64>,
+}
