@@ -4,7 +4,7 @@
 
 steps=(
     "format          layout of the code"
-    "typos           spelling; PyPI"
+    "typos           spelling, and prose wrapped at 100 columns; PyPI"
     "firmware        every board's ELF; rustup's targets, or Debian's compiler"
     "test            the README's test command: cargo test; Debian for software Vulkan"
     "gpu             GPU kernels on software Vulkan; Debian"
@@ -57,6 +57,9 @@ step_format() {
 step_typos() {
     python_with typos typos==1.52.0
     git ls-files -z | xargs -0 target/typos/bin/typos --config .typos.toml --force-exclude
+    # A test writes docs/protocol.md.
+    python_with mdformat mdformat==1.0.0 mdformat-gfm==1.0.0
+    git ls-files -z '*.md' ':!docs/protocol.md' | xargs -0 target/mdformat/bin/mdformat --check
 }
 
 step_firmware() { bash boards/build.sh; }

@@ -8,7 +8,7 @@
 //! are on average (Garg and Nayar, Int. J. Comput. Vis. 75, 3, 2007). The surroundings are a sky as bright as a white
 //! target.
 
-use crate::rain::{Air, BeamShadows, FallingDrops, RainError};
+use crate::rain::{Air, BeamShadows, Drops, FallingDrops, RainError};
 use crate::{LEDS, Projector, ProjectorError, Scene};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
@@ -110,7 +110,9 @@ impl VisibleCamera {
         let field_mm = projector.field_mm(distance_mm);
         let hanging = air.hanging(WAVELENGTH_NM)?;
         let through = hanging.by_daylight(footprint.weights(), distance_mm, field_mm)?;
-        let mut falling = FallingDrops::new(air.drops(), beams, seed)?;
+        // What hangs in the air is too much to be followed, and is in `through` already.
+        let drops = if air.drops().fall() { air.drops().clone() } else { Drops::none() };
+        let mut falling = FallingDrops::new(&drops, beams, seed)?;
         let mut seen = vec![0.0; LEDS];
         for _ in 0..LOOKS {
             falling.advance(self.exposure_s() / LOOKS as f64);

@@ -13,7 +13,8 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// What a path is expected to lead to.
-const EXPECTED: &str = "measurements: .npz, .npy, .mat, .h5, .csv or .txt, or a recording (.mcap)";
+pub(super) const EXPECTED: &str =
+    "measurements: .npz, .npy, .mat, .h5, .csv or .txt, or a recording (.mcap)";
 /// The name under which messages speak of an array that has none.
 pub(super) const UNNAMED: &str = "array";
 /// Bytes that tell the format; HDF5 may begin behind a block of 512 bytes.

@@ -6,10 +6,9 @@
 
 use super::FileError;
 use super::archive::read_large_text;
-use super::fields::Field;
+use super::fields::{EXPECTED, Field};
 use std::path::Path;
 
-const EXPECTED: &str = "a text file of numbers";
 /// Words for a reading that was not taken.
 const UNREAD: [&str; 4] = ["nan", "null", "na", "none"];
 

@@ -163,7 +163,7 @@ fn weather_of_any_kind_stands_before_the_virtual_camera() {
     }
     bench.run(&["demo", "--weather", "none.csv"]).failed(1, &["none.csv"]);
     bench.run(&["demo", "--weather", "light", "--rain", "light"]).failed(2, &["--rain"]);
-    let table = ["eval", "table4", "--scenes", "2", "--frames", "4", "--weather", "fog:20m"];
+    let table = ["eval", "table3", "--scenes", "2", "--frames", "4", "--weather", "fog:20m"];
     let report =
         bench.run(&[&table[..], &["--ancestral", "0", "--json"]].concat()).succeeded().json();
     assert_eq!(report["rain"], "fog:20m");
