@@ -22,6 +22,9 @@ mod rain;
 mod readme;
 mod real_data;
 mod reconstruct;
+// The page is of a build with the default features.
+#[cfg(all(feature = "gpu", feature = "hdf5", not(feature = "flash"), not(feature = "train")))]
+mod reference;
 mod selftest;
 #[cfg(unix)]
 mod serial;

@@ -1,12 +1,6 @@
-//! Every command line of the README runs as it stands, from a folder that holds nothing.
+//! Every command line of the README and of the book's first pages runs as it stands, from a folder that holds nothing.
 
 use crate::bench::Bench;
-
-/// Lines that are not run, and why.
-const NOT_RUN: [(&str, &str); 2] = [
-    ("virtual", "runs until it is stopped; tests/cli/capture_tcp.rs"),
-    ("capture --camera tcp:", "needs the camera of another terminal; tests/cli/capture_tcp.rs"),
-];
 
 /// What follows `cargo run --release -- ` in blocks of shell commands, without comments.
 fn commands(page: &str) -> Vec<String> {
@@ -25,16 +19,15 @@ fn commands(page: &str) -> Vec<String> {
     found
 }
 
-#[test]
-fn every_line_of_the_readme_runs_as_it_stands() {
-    let page = include_str!("../../../../README.md");
+/// Runs the lines of a page in turn, from one empty folder. `not_run` names lines that are left out, and why.
+fn runs_as_it_stands(name: &str, page: &str, least: usize, not_run: &[(&str, &str)]) {
     let commands = commands(page);
-    assert!(commands.len() > 10, "{commands:?}");
+    assert!(commands.len() >= least, "{name}: {commands:?}");
     let bench = Bench::new();
     let mut left_out = Vec::new();
     let mut recorded = false;
     for command in &commands {
-        if let Some((line, _)) = NOT_RUN.iter().find(|(line, _)| command.starts_with(line)) {
+        if let Some((line, _)) = not_run.iter().find(|(line, _)| command.starts_with(line)) {
             left_out.push(*line);
             if command.contains("--out rec.mcap") && !recorded {
                 // The recording that the next line reads, of the same camera in this process.
@@ -46,7 +39,37 @@ fn every_line_of_the_readme_runs_as_it_stands() {
         bench.run(&command.split_whitespace().collect::<Vec<_>>()).succeeded();
     }
     // The list says nothing of lines that are gone.
-    for (line, why) in NOT_RUN {
-        assert!(left_out.contains(&line), "{line} ({why}) is no line of the README");
+    for (line, why) in not_run {
+        assert!(left_out.contains(line), "{line} ({why}) is no line of {name}");
     }
+}
+
+#[test]
+fn every_line_of_the_readme_runs_as_it_stands() {
+    let not_run = [
+        ("virtual", "runs until it is stopped; tests/cli/capture_tcp.rs"),
+        ("capture --camera tcp:", "needs the camera of another terminal; tests/cli/capture_tcp.rs"),
+    ];
+    runs_as_it_stands("README.md", include_str!("../../../../README.md"), 11, &not_run);
+}
+
+#[test]
+fn every_line_of_the_first_picture_runs_as_it_stands() {
+    let page = include_str!("../../../../docs/first-picture.md");
+    let not_run = [("serve", "runs until it is stopped; tests/cli/serve.rs")];
+    runs_as_it_stands("docs/first-picture.md", page, 8, &not_run);
+}
+
+#[test]
+fn every_line_of_the_page_about_measurements_runs_as_it_stands() {
+    let page = include_str!("../../../../docs/measurements.md");
+    runs_as_it_stands("docs/measurements.md", page, 10, &[]);
+}
+
+#[test]
+fn every_line_of_how_it_works_and_of_bring_up_runs_as_it_stands() {
+    let page = include_str!("../../../../docs/how-it-works.md");
+    runs_as_it_stands("docs/how-it-works.md", page, 2, &[]);
+    let page = include_str!("../../../../docs/bring-up.md");
+    runs_as_it_stands("docs/bring-up.md", page, 3, &[]);
 }

@@ -1,0 +1,156 @@
+//! Tests that the pages under `docs/` make a book: every page is in the summary, and every link leads to something.
+
+#![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
+
+use nirspi_tests::root;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+fn read(path: &Path) -> String {
+    std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+/// A page without its fenced blocks.
+fn unfenced(page: &str) -> String {
+    let mut is_fenced = false;
+    let mut kept = String::new();
+    for line in page.lines() {
+        if line.trim_start().starts_with("```") {
+            is_fenced = !is_fenced;
+        } else if !is_fenced {
+            kept.push_str(line);
+            kept.push('\n');
+        }
+    }
+    kept
+}
+
+/// The place after the code that a run of this many backticks has begun.
+fn end_of_code(text: &str, backticks: usize) -> Option<usize> {
+    let mut at = 0;
+    while let Some(next) = text[at..].find('`') {
+        let start = at + next;
+        let length = text[start..].bytes().take_while(|&byte| byte == b'`').count();
+        at = start + length;
+        if length == backticks {
+            return Some(at);
+        }
+    }
+    None
+}
+
+/// A paragraph without its code.
+fn without_code(paragraph: &str) -> String {
+    let mut kept = String::new();
+    let mut rest = paragraph;
+    while let Some(start) = rest.find('`') {
+        let backticks = rest[start..].bytes().take_while(|&byte| byte == b'`').count();
+        kept.push_str(&rest[..start]);
+        rest = &rest[start + backticks..];
+        if let Some(end) = end_of_code(rest, backticks) {
+            rest = &rest[end..];
+        }
+    }
+    kept + rest
+}
+
+/// Targets of all links and images of a page.
+fn links(page: &str) -> Vec<String> {
+    let paragraphs: Vec<String> = unfenced(page).split("\n\n").map(without_code).collect();
+    let text = paragraphs.join("\n\n");
+    let targets = text.split("](").skip(1).filter_map(|rest| rest.split([')', ' ', '\n']).next());
+    targets.map(str::to_owned).collect()
+}
+
+/// The anchor that GitHub and mdBook give a heading.
+fn anchor(heading: &str) -> String {
+    let letters = heading.chars().filter_map(|letter| match letter {
+        ' ' => Some('-'),
+        '-' | '_' => Some(letter),
+        _ if letter.is_alphanumeric() => letter.to_lowercase().next(),
+        _ => None,
+    });
+    letters.collect()
+}
+
+/// Anchors of all headings of a page.
+fn anchors(page: &str) -> BTreeSet<String> {
+    let is_heading = |line: &&str| line.starts_with('#');
+    let page = unfenced(page);
+    page.lines().filter(is_heading).map(|line| anchor(line.trim_matches(['#', ' ']))).collect()
+}
+
+/// Whether a link of this page leads to no file, or to no heading of the file.
+fn leads_nowhere(page: &Path, link: &str) -> bool {
+    if link.contains("://") || link.starts_with("mailto:") {
+        return false;
+    }
+    let (file, anchor) = link.split_once('#').unwrap_or((link, ""));
+    let target = match file {
+        "" => page.to_owned(),
+        file => page.parent().unwrap().join(file),
+    };
+    let is_page = target.extension().is_some_and(|extension| extension == "md");
+    !target.exists() || (is_page && !anchor.is_empty() && !anchors(&read(&target)).contains(anchor))
+}
+
+/// Markdown files of a folder, by name.
+fn pages(folder: &Path) -> BTreeSet<String> {
+    let names = folder.read_dir().unwrap().map(|entry| entry.unwrap().file_name());
+    names.filter_map(|name| name.into_string().ok()).filter(|name| name.ends_with(".md")).collect()
+}
+
+/// Every page that people read in the repository.
+fn all_pages() -> Vec<PathBuf> {
+    let docs = root().join("docs");
+    let boards = root().join("boards");
+    let mut all = vec![root().join("README.md"), boards.join("README.md")];
+    all.extend(pages(&docs).iter().map(|name| docs.join(name)));
+    let folders = boards.read_dir().unwrap().map(|entry| entry.unwrap().path());
+    all.extend(folders.map(|folder| folder.join("README.md")).filter(|page| page.is_file()));
+    all
+}
+
+#[test]
+fn every_page_is_in_the_summary_once_and_every_entry_is_a_page() {
+    let docs = root().join("docs");
+    let entries = links(&read(&docs.join("SUMMARY.md")));
+    let listed: BTreeSet<String> = entries.iter().cloned().collect();
+    assert_eq!(entries.len(), listed.len(), "an entry twice in docs/SUMMARY.md: {entries:?}");
+    let mut there = pages(&docs);
+    assert!(there.remove("SUMMARY.md"));
+    let missing: Vec<_> = there.difference(&listed).collect();
+    assert!(missing.is_empty(), "add to docs/SUMMARY.md: {missing:?}");
+    let gone: Vec<_> = listed.difference(&there).collect();
+    assert!(gone.is_empty(), "docs/SUMMARY.md names pages that do not exist: {gone:?}");
+}
+
+#[test]
+fn every_link_leads_to_a_file_and_every_anchor_to_a_heading() {
+    let mut broken = Vec::new();
+    let mut checked = 0;
+    for page in all_pages() {
+        for link in links(&read(&page)) {
+            checked += 1;
+            if leads_nowhere(&page, &link) {
+                broken.push(format!("{}: {link}", page.strip_prefix(root()).unwrap().display()));
+            }
+        }
+    }
+    assert!(checked > 100, "{checked} links");
+    assert!(broken.is_empty(), "links that lead nowhere: {broken:#?}");
+}
+
+#[test]
+fn a_broken_link_is_found_and_a_link_in_code_is_none() {
+    let readme = root().join("README.md");
+    for link in ["docs/none.md", "#none", "docs/glossary.md#none"] {
+        assert!(leads_nowhere(&readme, link), "{link}");
+    }
+    for link in ["docs/glossary.md", "#live", "docs/physics.md#8-photon-budget", "https://a.b/#c"] {
+        assert!(!leads_nowhere(&readme, link), "{link}");
+    }
+    let page = "[`a`](a.md) `[b](b.md)` ![c\nd](c.png)\n\n```text\n[e](e.md)\n# No heading\n```\n";
+    assert_eq!(links(page), ["a.md", "c.png"]);
+    assert!(anchors(page).is_empty());
+}
