@@ -7,7 +7,7 @@
 //! A capture is whole if the camera says that it has made the frames that were asked for, all of them came whole and in
 //! order, no packet came damaged beyond them, and no fault stands afterwards; anything else is said
 //! ([`Capture::missing`], `missing::tests::a_capture_is_whole_only_if_nothing_is_missing`). What a camera can make this program
-//! write is bounded by the frames that it delivers ([`Junk`], `junk::tests`).
+//! write is bounded by the frames that it delivers (`junk::tests`).
 
 mod junk;
 mod missing;

@@ -4,7 +4,7 @@
 //! The camera's model is A = M B: B is a Gaussian blur of `sigma_px` on the 64 x 64 grid with
 //! reflecting edges, and M takes means of 2 x 2 pixels where readings are 32 x 32 (else M = 1). An
 //! image x outside the ball |y - A x| <= tau noise sqrt(n) becomes x + A^T (A A^T + lambda)^-1 (y -
-//! A x). Lambda is chosen so that the new image lies on the ball, and is at least [`LEAST_LAMBDA`].
+//! A x). Lambda is chosen so that the new image lies on the ball, and is at least `LEAST_LAMBDA`.
 //! Of all changes with the same norm this one fits best (Tikhonov; Morozov's discrepancy
 //! principle).
 //!

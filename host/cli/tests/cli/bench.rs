@@ -77,6 +77,8 @@ impl Bench {
             .env("XDG_DATA_HOME", self.path("data"))
             // Mesa asks the desktop which GPU it prefers, and complains where there is no desktop.
             .env("NODEVICE_SELECT", "1")
+            // Help is wrapped at this width.
+            .env("COLUMNS", "100")
             .stdin(Stdio::null())
             .stdout(stdout)
             .stderr(File::create(&err).unwrap())

@@ -19,7 +19,7 @@ pub struct Plain {
 /// Reads one number for each of `patterns` patterns, `y` or else `d`.
 ///
 /// # Errors
-/// As [`read`].
+/// As [`super::read`].
 pub fn read_plain(path: &Path, want: &Selection, patterns: usize) -> Result<Plain, FileError> {
     let mut fields = Fields::open(path, want.decimal_comma)?;
     let name = readings_field(&fields, want)?;
