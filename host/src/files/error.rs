@@ -79,7 +79,7 @@ pub enum FileError {
         field: Cow<'static, str>,
         /// What was found, as the rest of a sentence: `has shape (3,)`, `is NaN at [7]`.
         found: String,
-        /// What was expected.
+        /// The value expected.
         expected: String,
     },
     /// The file holds several measurements, and the caller chose none or an index that is too
