@@ -4,7 +4,6 @@
 //! Whatever ends a capture (its length, the user, the camera, the link), the received frames are
 //! kept and the counters report the missing ones.
 //!
-//! # Invariant
 //! A capture is whole if the camera reports that it made the requested frames, all frames arrived
 //! whole and in order, no other packet was damaged, and no fault is latched afterwards.
 //! [`Capture::missing`] reports anything else

@@ -1,7 +1,6 @@
 //! An error and its causes in one line.
 //!
 //! # Invariant
-//! # Invariant
 //! An error of this workspace describes its own level. Its cause is its `source()` and not part of
 //! its message, so a printed chain tells every cause once
 //! (`tests::every_level_is_told_once_and_in_one_line`).

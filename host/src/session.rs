@@ -1,7 +1,6 @@
 //! A session with a camera: greeting, commands and their answers, and the stream between them.
 //!
 //! # Invariant
-//! # Invariant
 //! The listener receives every packet as it arrived, also while an answer is awaited, and damaged
 //! packets too (`tests::every_packet_is_heard_while_an_answer_is_awaited`).
 

@@ -2,7 +2,6 @@
 //! enhanced by two networks.
 //!
 //! # Invariant
-//! # Invariant
 //! Networks get the input that a user would give them: readings divided by those of a white sheet,
 //! and no part of the truth (`tests::networks_see_readings_over_those_of_a_white_sheet`).
 

@@ -5,7 +5,6 @@
 //! methods that know blur and noise, and the networks, which do not.
 //!
 //! # Invariant
-//! # Invariant
 //! Every method gets the same readings, and its figures come with their number of images
 //! (`every_row_is_measured_on_the_same_unseen_images` in the tests of `nirspi-cli`).
 

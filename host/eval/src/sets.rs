@@ -2,7 +2,6 @@
 //! recognised characters.
 //!
 //! # Invariant
-//! # Invariant
 //! A figure that cannot be computed is `null`, and `notes` says why
 //! (`tests::a_figure_that_cannot_be_computed_is_noted`). Only the number computed with the user's
 //! Inception weights is called FID.

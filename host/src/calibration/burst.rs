@@ -10,7 +10,6 @@
 //! against a white sheet, and kept ([`KeptCalibration`](super::KeptCalibration)).
 //!
 //! # Invariant
-//! # Invariant
 //! A burst that does not show the latency is an error and never a latency of 0
 //! (`tests::a_burst_too_dim_or_without_an_edge_is_an_error`). With a wrong latency every picture is
 //! wrong, and most pictures are inverted.

@@ -8,7 +8,6 @@
 //! one.
 //!
 //! # Invariant
-//! # Invariant
 //! A calibration of another camera, or of other gateware, is never applied
 //! (`tests::a_calibration_of_something_else_is_refused_in_one_line`).
 

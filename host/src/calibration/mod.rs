@@ -5,7 +5,6 @@
 //! sheet (`nirspi calibrate`, `nirspi selftest`), kept, and used for every later capture.
 //!
 //! # Invariant
-//! # Invariant
 //! Every capture runs with a latency that was measured or that the user gave
 //! (`a_dark_scene_uses_the_kept_latency_or_fails` in `host/tests/calibration.rs`).
 

@@ -1,7 +1,6 @@
 //! Limits the junk in a run: bytes that do not belong to its frames.
 //!
 //! # Invariant
-//! # Invariant
 //! A recording holds at most [`ALLOWED`] bytes of junk plus as many bytes as its frames, not
 //! counting a trickle of other messages (`tests::junk_alone_is_too_much_after_the_allowance`,
 //! `tests::frames_pay_for_as_much_junk`).

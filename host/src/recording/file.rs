@@ -1,7 +1,6 @@
 //! Chooses the file of a recording, and protects existing files.
 //!
 //! # Invariant
-//! # Invariant
 //! A recording is written into a file that this program has just made, or into a device. An
 //! existing file is never opened for writing (`tests::two_recordings_at_once_take_two_names`,
 //! `tests::a_file_that_is_there_is_left_alone`). An existing file is replaced only when the new

@@ -4,7 +4,6 @@
 //! exists. One flipped length costs up to 4 GiB of memory (0.26).
 //!
 //! # Invariant
-//! # Invariant
 //! A record that passes claims no string longer than itself
 //! (`tests::a_length_beyond_the_record_is_noticed`).
 

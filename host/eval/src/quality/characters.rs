@@ -1,7 +1,6 @@
 //! The characters of all quality measurements.
 //!
 //! # Invariant
-//! # Invariant
 //! Every image belongs to a family, writer or photograph outside the training data
 //! (`tests::only_groups_held_out_are_taken`).
 

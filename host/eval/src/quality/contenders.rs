@@ -1,7 +1,6 @@
 //! The compared methods, ready to run. Each makes 64 x 64 pixels of 32 x 32.
 //!
 //! # Invariant
-//! # Invariant
 //! Classical methods know blur and noise exactly, and networks know neither, so the networks' gain
 //! does not come from more knowledge (`tests::only_classical_methods_get_the_condition`).
 

@@ -1,7 +1,6 @@
 //! Conditions, their readings, and the figures of a method under a condition.
 //!
 //! # Invariant
-//! # Invariant
 //! The noise of image k is the same in every condition except for its strength, and the same for
 //! every method (`tests::readings_have_the_noise_that_was_asked_for_and_its_pattern_stays`).
 

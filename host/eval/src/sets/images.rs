@@ -1,7 +1,6 @@
 //! Images to compare, from any program's files and this program's own, brought to one scale.
 //!
 //! # Invariant
-//! # Invariant
 //! Images are scaled or fitted only on the caller's request
 //! (`tests::nothing_is_fitted_unless_asked_for`).
 

@@ -1,7 +1,6 @@
 //! A run's folder: checkpoint, weights, log, plot.
 //!
 //! # Invariant
-//! # Invariant
 //! Each file is whole, or the previous version, whenever the run is killed. Only the log's last
 //! line may be incomplete. A resumed run writes the log again from its checkpoint
 //! (`tests::a_log_is_written_anew_from_its_checkpoint`).

@@ -2,7 +2,6 @@
 //! type, read from TOML.
 //!
 //! # Invariant
-//! # Invariant
 //! Every constant of a camera is in `host/optics/cameras/*.toml` and not in the code. Photon
 //! budget, range, virtual camera and training take their settings from a [`CameraModel`]:
 //! [`CameraModel::projector`], [`CameraModel::budget_settings`], [`CameraModel::chain_settings`]

@@ -4,7 +4,6 @@
 //! but change neither LEDs nor lens.
 //!
 //! # Invariant
-//! # Invariant
 //! A flat field of another camera is never applied
 //! (`super::tests::an_old_or_foreign_flat_field_is_refused_in_one_line`).
 

@@ -12,7 +12,6 @@
 //! applied by `capture --picture`, `serve` and `reconstruct`.
 //!
 //! # Invariant
-//! # Invariant
 //! A corrected image of the white sheet is white: the remaining pattern is at least ten times
 //! smaller with LEDs that differ by 10 % (`a_flat_field_takes_the_pattern_of_unequal_leds_away` in
 //! `host/tests/flat_field.rs`).
