@@ -10,7 +10,8 @@
 //! reader, which panics on some damage, is never used.
 //!
 //! # Invariant
-//! A capture that is killed keeps everything up to its last flush, at most half a second before (test
+//! A capture that is killed keeps everything up to its last flush, half a second before at most
+//! (test
 //! `reader::tests::a_recording_cut_anywhere_gives_what_is_before_the_cut_or_says_what_is_missing`).
 //! If the computer loses power, everything flushed five seconds before is on the disk.
 
