@@ -7,8 +7,9 @@
 //! camera has reported how many frames it made, the sum is the number of all frames
 //! (`tests::frames_missing_at_the_end_show_once_the_camera_says_how_many_it_made`).
 //!
-//! A damaged packet does not show which frame it was. It is counted when the gap shows: of a gap of
-//! `g` frames with `d` damaged packets in it, `min(g, d)` are corrupt and the rest are lost.
+//! A damaged packet does not show which frame it was. The damage is counted when the gap shows: of
+//! a gap of `g` frames with `d` damaged packets in it, `min(g, d)` are corrupt and the rest are
+//! lost.
 
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;

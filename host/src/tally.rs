@@ -167,8 +167,8 @@ impl Tally {
         &self.account
     }
 
-    /// Number of intact messages that this program does not know. They are skipped, because a newer
-    /// camera may send them.
+    /// Number of intact messages that this program does not know. The messages are skipped, because
+    /// a newer camera may send them.
     #[must_use]
     pub fn unknown_packets(&self) -> u64 {
         self.unknown

@@ -2,7 +2,8 @@
 //! of the zones in the camera's image.
 //!
 //! # Invariant
-//! A zone without a distance reads 0 (`tests::zones_without_a_distance_give_none`).
+//! A zone without a distance reads 0
+//! (`tests::invalid_zones_read_zero_and_the_others_the_distance`).
 //!
 //! The zones of the sensor cover 45 x 45 degrees (63 degrees along the diagonal; ST UM3109). The
 //! camera's field covers some 3 to 9 degrees. One to four zones see the field, and the other zones

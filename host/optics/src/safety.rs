@@ -5,7 +5,7 @@
 //! 1000 s and longer, `18 000 t^-0.75` W/m^2 for shorter exposures of t seconds. Half of the LEDs
 //! are lit on average over a sweep.
 //!
-//! The result is computed from a description. It is not a measurement and not a certificate.
+//! The result is computed from a description, and is neither a measurement nor a certificate.
 
 use crate::{CameraModel, LEDS};
 use serde::Serialize;

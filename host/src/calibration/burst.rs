@@ -6,7 +6,7 @@
 //! the response leaves 0 is the latency. The leak, a pattern's light in later slots, follows from
 //! the response for any dwell and blanking.
 //!
-//! Latency and response belong to the instrument and not to the scene. They are measured once,
+//! Latency and response belong to the instrument and not to the scene. Both are measured once,
 //! against a white sheet, and kept ([`KeptCalibration`](super::KeptCalibration)).
 //!
 //! # Invariant

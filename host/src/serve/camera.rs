@@ -3,8 +3,7 @@
 //!
 //! # Invariant
 //! The thread waits for the camera only. After a fault the LEDs go on again only when a person asks
-//! (`tests::after_a_fault_leds_go_on_again_only_when_a_person_says_so` in
-//! `host/src/serve/tests.rs`).
+//! (`after_a_fault_leds_go_on_again_only_when_a_person_says_so` in `host/src/serve/tests.rs`).
 
 use super::camera_log::Phase;
 use super::slot::{Look, RunSetup};

