@@ -1,45 +1,50 @@
-//! Every frame that the camera made is received, lost, corrupt or late: counted, never estimated.
+//! Accounts for frames: every frame that the camera made is counted as received, lost, corrupt or
+//! late, and never estimated.
 //!
-//! The one law: `received + lost + corrupt + late` is the number of frames made, as far as the account has
-//! come ([`LossAccount::accounted`]); once the camera has said how many it made, of all of them.
+//! # Invariant
+//! `received + lost + corrupt + late` is the number of frames made up to the newest frame
+//! ([`LossAccount::accounted`]) (`tests::every_frame_made_is_counted_exactly_once`). After the
+//! camera has reported how many frames it made, the sum is the number of all frames
+//! (`tests::frames_missing_at_the_end_show_once_the_camera_says_how_many_it_made`).
 //!
-//! A damaged packet does not say which frame it was. It is charged when the gap shows: of a gap of `g` frames
-//! with `d` damaged packets in it, `min(g, d)` are corrupt and the rest lost.
+//! A damaged packet does not show which frame it was. The damage is counted when the gap shows: of
+//! a gap of `g` frames with `d` damaged packets in it, `min(g, d)` are corrupt and the rest are
+//! lost.
 
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 use std::ops::Range;
 
-/// Gaps remembered for frames that come late after all. Older ones are forgotten: a frame from before them
+/// Number of gaps kept for late frames. Older gaps are discarded: a late frame of a discarded gap
 /// counts as repeated.
 const GAPS_REMEMBERED: usize = 1024;
 
-/// What a frame was to the account.
+/// How a frame arrived.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Arrival {
     /// In order, or the first after a gap.
     Received,
-    /// Fills a gap that had been charged already.
+    /// Fills a gap that was already counted.
     Late,
-    /// Was here before: no frame of its own.
+    /// Arrived before, and does not count again.
     Repeated,
 }
 
-/// The four counters, and what explains them.
+/// The four counters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct LossCounters {
     /// Intact and in order.
     pub received: u64,
-    /// Never came: a gap in the sequence.
+    /// Frames that never arrived: a gap in the sequence.
     pub lost: u64,
-    /// Came damaged.
+    /// Frames that arrived damaged.
     pub corrupt: u64,
-    /// Came intact, but after a newer one.
+    /// Frames that arrived intact, but after a newer frame.
     pub late: u64,
 }
 
 impl LossCounters {
-    /// Frames accounted for.
+    /// Number of frames in the account.
     #[must_use]
     pub fn total(&self) -> u64 {
         self.received + self.lost + self.corrupt + self.late
@@ -52,7 +57,7 @@ impl LossCounters {
     }
 }
 
-/// The account of two runs as one.
+/// The sum of the accounts of two runs.
 impl std::ops::Add for LossCounters {
     type Output = Self;
 
@@ -77,30 +82,30 @@ impl std::fmt::Display for LossCounters {
 #[derive(Debug, Clone, Default)]
 pub struct LossAccount {
     counters: LossCounters,
-    /// Number of the next frame in order; the wire carries its lower 32 bits.
+    /// Number of the next frame in order. The wire carries its lower 32 bits.
     expected: u64,
-    /// Damaged packets not yet charged to a gap.
+    /// Damaged packets that do not belong to a gap yet.
     damaged: u64,
-    /// Gaps charged, oldest first.
+    /// Counted gaps, oldest first.
     gaps: VecDeque<Range<u64>>,
     repeated: u64,
     damaged_packets: u64,
 }
 
 impl LossAccount {
-    /// An account of a run that is about to start.
+    /// The account of a run before its start.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// The full number of a frame from its lower 32 bits: the one closest to the next in order.
+    /// The full number of a frame from its lower 32 bits: the number closest to the next in order.
     fn unwrap_sequence(&self, sequence: u32) -> Option<u64> {
         let ahead = sequence.wrapping_sub(self.expected as u32) as i32;
         self.expected.checked_add_signed(i64::from(ahead))
     }
 
-    /// An intact frame came, with this sequence number on the wire.
+    /// Counts an intact frame with this sequence number on the wire.
     pub fn frame(&mut self, sequence: u32) -> Arrival {
         let Some(sequence) = self.unwrap_sequence(sequence) else {
             self.repeated += 1;
@@ -123,7 +128,7 @@ impl LossAccount {
                 self.gaps.insert(at, part);
             }
         }
-        // It was charged as lost, unless the whole gap was put down to damage.
+        // The frame counts as lost so far, unless the whole gap counts as corrupt.
         if self.counters.lost > 0 {
             self.counters.lost -= 1;
         } else {
@@ -133,13 +138,13 @@ impl LossAccount {
         Arrival::Late
     }
 
-    /// A damaged packet came.
+    /// Counts a damaged packet.
     pub fn damaged(&mut self) {
         self.damaged += 1;
         self.damaged_packets += 1;
     }
 
-    /// The camera says how many frames it has made.
+    /// Records how many frames the camera reports to have made.
     pub fn made(&mut self, frames: u32) {
         match self.unwrap_sequence(frames) {
             Some(frames) if frames > self.expected => {
@@ -164,25 +169,25 @@ impl LossAccount {
         }
     }
 
-    /// The four counters now.
+    /// The current counters.
     #[must_use]
     pub fn counters(&self) -> LossCounters {
         self.counters
     }
 
-    /// Frames accounted for: sequence numbers 0 to this less one.
+    /// Number of frames in the account: sequence numbers from 0 to one less than this number.
     #[must_use]
     pub fn accounted(&self) -> u64 {
         self.expected
     }
 
-    /// Frames that came twice.
+    /// Frames that arrived twice.
     #[must_use]
     pub fn repeated(&self) -> u64 {
         self.repeated
     }
 
-    /// Damaged packets in all, whether they were frames or not.
+    /// Number of damaged packets, of frames or not.
     #[must_use]
     pub fn damaged_packets(&self) -> u64 {
         self.damaged_packets
@@ -238,7 +243,7 @@ mod tests {
             prop_assert_eq!(counters.total(), fates.len() as u64);
             prop_assert_eq!(counters.late, late);
             let count = |fate| fates.iter().filter(|&&f| f == fate).count() as u64;
-            // A late frame is taken out of the lost ones while there are any.
+            // A late frame is subtracted from the lost frames, if there are any.
             prop_assert_eq!(counters.lost + counters.corrupt,
                 count(Fate::Lost) + count(Fate::Damaged) + u64::from(delayed.is_some()));
         }

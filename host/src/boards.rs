@@ -1,4 +1,5 @@
-//! The boards that firmware is built for: every `boards/NAME/board.toml` of the repository, read when this crate is built.
+//! The boards for which firmware is built: every `boards/NAME/board.toml` of the repository. The
+//! build of this crate reads the files.
 
 mod board;
 
@@ -22,14 +23,16 @@ impl Board {
         BOARDS.iter().find(|board| board.name == name)
     }
 
-    /// Where `cargo build --release` in its folder puts the firmware, from the repository's root.
+    /// The path of the firmware that `cargo build --release` makes in the board's folder, from the
+    /// repository's root.
     #[must_use]
     pub fn elf(&self) -> PathBuf {
         ["boards", "target", self.target, "release", self.name].iter().collect()
     }
 }
 
-/// Whether the camera that calls its board this has no light of its own: the virtual one, or one in an emulator.
+/// Whether the camera with this board name has no light of its own: the virtual camera, or a camera
+/// in an emulator.
 #[must_use]
 pub fn is_simulated(board: &str) -> bool {
     board == "virtual" || Board::named(board).is_some_and(|board| board.chip.is_none())
@@ -93,7 +96,7 @@ mod tests {
         assert!(!is_simulated("a board of somebody else"));
     }
 
-    /// With the feature only: `cargo test -p nirspi --features flash boards`.
+    /// Runs only with the feature `flash`: `cargo test -p nirspi --features flash boards`.
     #[cfg(feature = "flash")]
     #[test]
     fn every_chip_is_one_that_probe_rs_knows() {

@@ -1,13 +1,14 @@
-//! Capture: greet, calibrate, configure, start, and account for every frame until the run ends.
-//!
-//! The one law: whatever ends a capture (its length, the user, the camera, the link), what has come is kept
-//! and the counters say what has not.
+//! A capture: greet, calibrate, configure, start, and account for every frame until the run ends.
 //!
 //! # Invariant
-//! A capture is whole if the camera says that it has made the frames that were asked for, all of them came whole and in
-//! order, no packet came damaged beyond them, and no fault stands afterwards; anything else is said
-//! ([`Capture::missing`], `missing::tests::a_capture_is_whole_only_if_nothing_is_missing`). What a camera can make this program
-//! write is bounded by the frames that it delivers (`junk::tests`).
+//! Whatever ends a capture (its length, the user, the camera, the link), the received frames are
+//! kept and the counters report the missing ones.
+//!
+//! A capture is whole if the camera reports that it made the requested frames, all frames arrived
+//! whole and in order, no other packet was damaged, and no fault is latched afterwards.
+//! [`Capture::missing`] reports anything else
+//! (`missing::tests::a_capture_is_whole_only_if_nothing_is_missing`). The frames that a camera
+//! delivers limit what this program writes (`junk::tests`).
 
 mod junk;
 mod missing;
@@ -32,144 +33,146 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use thiserror::Error;
 
-/// How often the camera hears from a host that has nothing to say.
+/// Interval of the host's messages while it only listens.
 const KEEP_ALIVE: Duration = Duration::from_secs(1);
-/// A camera that says it has stopped, and sends nothing more for this long, has stopped.
+/// A camera that reports the end of a run and sends nothing for this long has stopped.
 const QUIET: Duration = Duration::from_millis(500);
-/// A run that was stopped ends within this, or the camera does not answer.
+/// The longest time in which a stopped run must end.
 const STOP_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// What to capture.
+/// Options of a capture.
 #[derive(Debug, Clone)]
 pub struct CaptureOptions {
-    /// The measurement. Its latency is replaced by that of the calibration, where there is one.
+    /// The measurement. If there is a calibration, its latency replaces the latency of the setup.
     pub setup: MeasurementSetup,
-    /// Frames to make; `None` goes on until stopped.
+    /// Frames to make; `None` means until stopped.
     pub frames: Option<u32>,
-    /// Where latency and settling come from.
+    /// The source of latency and settling.
     pub calibration: Calibration,
-    /// Where to record.
+    /// The target of a recording.
     pub record: Option<Target>,
 }
 
-/// Where a capture's latency and settling come from.
+/// The source of a capture's latency and settling.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Calibration {
-    /// The setup's latency is right, and the leak is not known.
+    /// The setup's latency is right, and the leak is unknown.
     None,
-    /// They are measured first. A burst that does not show them ends the capture.
+    /// Measured first. A burst that does not show them ends the capture.
     Measure,
-    /// They were measured before.
+    /// Measured before.
     Kept(Settling),
-    /// They are measured first. Where the burst is too dim to show them, they are as measured before.
+    /// Measured first. If the burst is too dim, the values measured before are used.
     MeasureOr(Settling),
 }
 
-/// How far a capture has come.
+/// The progress of a capture.
 #[derive(Debug, Clone, Copy)]
 pub struct Progress {
-    /// The counters so far.
+    /// The current counters.
     pub counters: LossCounters,
-    /// Since the start of the run.
+    /// Time since the start of the run.
     pub elapsed: Duration,
 }
 
 /// What ended a capture.
 #[derive(Debug)]
 pub enum Ended {
-    /// The camera says that all frames asked for were made, and that no fault stands.
+    /// The camera reports that all requested frames were made, and that no fault is latched.
     Complete,
-    /// The user has stopped it.
+    /// The user stopped the capture.
     Stopped,
     /// The camera switched its LEDs off.
     Fault(Fault),
-    /// The camera ended the run by itself with another number of frames than was asked for.
+    /// The camera ended the run by itself with another number of frames than requested.
     WrongNumber {
         /// Frames made.
         made: u64,
-        /// Frames asked for; `None` for a run that goes on until stopped.
+        /// Frames requested; `None` for a run that goes on until stopped.
         asked: Option<u32>,
     },
-    /// The run ended, and the camera did not say afterwards whether a fault stands.
+    /// The run ended, but the camera did not report afterwards whether a fault is latched.
     Unconfirmed(SessionError),
-    /// Most of what came was not of this run, or damaged. The run was stopped.
+    /// Most of the received bytes were damaged or not of this run. The run was stopped.
     Junk {
-        /// Bytes of it.
+        /// Number of these bytes.
         bytes: u64,
     },
-    /// The camera went away or fell silent. What it made after the last frame that came is not known.
+    /// The camera disconnected or fell silent. How many frames it made after the last received
+    /// frame is unknown.
     LinkLost(SessionError),
 }
 
-/// What a capture brought.
+/// The result of a capture.
 #[derive(Debug)]
 pub struct Capture {
-    /// The setup as measured.
+    /// The setup of the measurement.
     pub setup: MeasurementSetup,
     /// LED and amplifier response used for leak correction; `None` with [`Calibration::None`].
     pub settling: Option<Settling>,
-    /// Why the response of [`Calibration::MeasureOr`] is the one measured before.
+    /// Why [`Calibration::MeasureOr`] used the response measured before.
     pub calibration_problem: Option<CalibrationError>,
     /// The sum of all frames received.
     pub integrated: Integrated,
-    /// The four counters.
+    /// The loss counters.
     pub counters: LossCounters,
-    /// Damaged packets of any kind.
+    /// Number of damaged packets of any kind.
     pub damaged_packets: u64,
-    /// Intact messages that this program does not know: it passed over them.
+    /// Number of intact messages that this program does not know and skipped.
     pub unknown_packets: u64,
-    /// Frames that came twice.
+    /// Number of frames that arrived twice.
     pub repeated: u64,
-    /// The camera's own view at the end.
+    /// The camera's status at the end.
     pub status: Option<Status>,
-    /// Frames asked for; `None` for a run that goes on until stopped.
+    /// Frames requested; `None` for a run that goes on until stopped.
     pub asked: Option<u32>,
-    /// Frames that the camera says it has made; `None` if it could not say.
+    /// Frames that the camera reports to have made; `None` if the camera could not report.
     pub made: Option<u64>,
-    /// The recording, if there is one. It does not have the name asked for if it was to replace another and is not whole.
+    /// The recording, if there is one. An incomplete recording that should replace another file has
+    /// a different name than requested.
     pub recording: Option<PathBuf>,
-    /// What ended it.
+    /// What ended the capture.
     pub ended: Ended,
-    /// From start to end of the run.
+    /// Time from start to end of the run.
     pub elapsed: Duration,
 }
 
-/// Why a capture brought nothing at all.
+/// Why a capture has no result.
 #[derive(Debug, Error)]
 pub enum CaptureError {
-    /// The camera would not talk or not measure.
+    /// The camera did not answer or refused to measure.
     #[error(transparent)]
     Session(#[from] SessionError),
-    /// Latency and settling could not be measured, and none are known.
+    /// Latency and settling could not be measured, and are not known from before.
     #[error(
         "the camera's ADC latency is not known (hold a white sheet before the camera and run nirspi calibrate once, or name \
          a latency that you know with --no-calibration --adc-latency N)"
     )]
     Calibration(#[source] CalibrationError),
-    /// The user has stopped it before the run began.
+    /// The user stopped the capture before the run began.
     #[error("stopped by the user before the first frame")]
     Stopped,
     /// The recording cannot be started.
     #[error("{path}: cannot record")]
     Recording {
-        /// Which file.
+        /// The file.
         path: PathBuf,
         /// Why.
         source: io::Error,
     },
-    /// The recording cannot be continued: the disk is full or gone.
+    /// The recording cannot be continued, because the disk is full or gone.
     #[error(
         "{path}: cannot record any more, {held} of the {} frames received are whole in the file and kept",
         .counters.received
     )]
     RecordingCut {
-        /// Which file.
+        /// The file.
         path: PathBuf,
         /// Why.
         source: io::Error,
-        /// Frames that the file holds, by reading it again.
+        /// Number of frames in the file, counted by reading the file again.
         held: u64,
-        /// The account of the run, of which the last frames are not in the file.
+        /// The account of the run. The last frames of the account are not in the file.
         counters: LossCounters,
     },
 }
@@ -184,9 +187,11 @@ impl From<CalibrationError> for CaptureError {
     }
 }
 
-/// Sees a capture while it runs, from the thread that drains the link: it has to be quick.
+/// Observes a running capture. The thread that drains the link calls the observer, so the observer
+/// must be quick.
 pub trait Observer {
-    /// The camera has taken this setup; frames come next. `problem` is why its response is the one measured before.
+    /// The camera has accepted this setup, and frames come next. `problem` is the reason for using
+    /// the response measured before.
     fn begins(
         &mut self,
         _setup: &MeasurementSetup,
@@ -195,17 +200,18 @@ pub trait Observer {
     ) {
     }
 
-    /// A frame was received, in order; `counters` count it.
+    /// A frame was received, in order. `counters` already count the frame.
     fn frame(&mut self, _frame: &Frame<'_>, _counters: &LossCounters) {}
 
-    /// Anything else has come whole.
+    /// Another intact message was received.
     fn message(&mut self, _message: &DeviceMessage<'_>) {}
 
-    /// How far it is, at nothing while the camera is being calibrated; called at least ten times a second, breaks to stop.
+    /// Reports the progress, which is 0 during calibration. Called at least ten times a second; a
+    /// break stops the capture.
     fn watch(&mut self, progress: &Progress) -> ControlFlow<()>;
 }
 
-/// Looks on, now and then.
+/// An observer that only watches the progress.
 struct Watching<'w>(&'w mut dyn FnMut(&Progress) -> ControlFlow<()>);
 
 impl Observer for Watching<'_> {
@@ -214,7 +220,7 @@ impl Observer for Watching<'_> {
     }
 }
 
-/// Looks on while the camera is being calibrated.
+/// Watches the calibration of the camera.
 struct Calibrating<'o> {
     observer: &'o mut dyn Observer,
     began: Instant,
@@ -230,7 +236,7 @@ impl Listener for Calibrating<'_> {
     }
 }
 
-/// Takes the stream apart while it comes.
+/// Interprets the stream of a run.
 struct RunListener<'o> {
     observer: &'o mut dyn Observer,
     number: u16,
@@ -240,12 +246,12 @@ struct RunListener<'o> {
     fault: Option<Fault>,
     status: Option<Status>,
     junk: Junk,
-    /// When the last packet came that was not damaged.
+    /// Time of the last intact packet.
     last_intact: Instant,
 }
 
 impl RunListener<'_> {
-    /// Writes to the recording, if there is one and it has not failed before.
+    /// Writes to the recording, if there is one without an earlier error.
     fn record(&mut self, write: impl FnOnce(&mut Recorder) -> io::Result<()>) {
         if let Some(recorder) = &mut self.recorder
             && self.recorder_error.is_none()
@@ -254,7 +260,7 @@ impl RunListener<'_> {
         }
     }
 
-    /// Whether the camera has sent a frame beyond those that were asked for.
+    /// Whether the camera has sent more frames than requested.
     fn has_more_than(&self, asked: Option<u32>) -> bool {
         asked.is_some_and(|asked| self.tally.account().accounted() > u64::from(asked))
     }
@@ -297,8 +303,8 @@ impl Listener for RunListener<'_> {
 /// Runs one capture. `watch` is called at least ten times a second and breaks to stop.
 ///
 /// # Errors
-/// [`CaptureError`] where nothing was captured; a run that started always gives a [`Capture`], unless its
-/// recording failed.
+/// [`CaptureError`] if nothing was captured. A run that started always gives a [`Capture`], unless
+/// its recording failed.
 pub fn capture(
     session: &mut Session,
     options: &CaptureOptions,
@@ -307,7 +313,7 @@ pub fn capture(
     observe(session, options, &mut Watching(watch))
 }
 
-/// Runs one capture, with somebody who sees every frame as it comes.
+/// Runs one capture with an observer of every frame.
 ///
 /// # Errors
 /// As [`capture`].
@@ -360,7 +366,7 @@ pub fn observe(
         Ok(ended) => ended,
         Err(error) if run.tally.has_begun() => Ended::LinkLost(error),
         Err(error) => {
-            // A run that never started leaves no recording behind.
+            // A run that never started leaves no recording.
             if let Some(recorder) = run.recorder {
                 recorder.discard();
             }
@@ -390,7 +396,7 @@ pub fn observe(
     Ok(captured)
 }
 
-/// Closes the recording of a capture; its name.
+/// Closes the recording of a capture. Returns its path.
 fn finish(
     recorder: Recorder,
     failed: Option<io::Error>,
@@ -412,7 +418,7 @@ fn finish(
     })
 }
 
-/// Frames that a file holds; none if it is a device, or does not read.
+/// Number of frames in a file; 0 for a device or a file that cannot be read.
 fn frames_held(path: &Path) -> u64 {
     if !path.is_file() {
         return 0;
@@ -453,14 +459,15 @@ fn stream(
         if run.last_intact.elapsed() > ANSWER_TIMEOUT {
             return Err(SessionError::NoAnswer { command: request::Status::NAME });
         }
-        // A simulated camera's time may outrun ours, and it is the camera that counts our silence.
+        // The time of a simulated camera may run faster than the host's, and the camera measures
+        // the host's silence.
         let device_age =
             Duration::from_micros(run.tally.device_time_us().saturating_sub(kept_alive_us));
         if kept_alive.elapsed() > KEEP_ALIVE || device_age > KEEP_ALIVE {
             kept_alive = Instant::now();
             kept_alive_us = run.tally.device_time_us();
             session.keep_alive()?;
-            // The end of the run may have been the one packet that was damaged.
+            // The damaged packet may have been the one with the end of the run.
             if let Some(status) = run.status
                 && status.state != State::Running
                 && status.run == run.number
@@ -471,7 +478,7 @@ fn stream(
         }
     }
     if run.junk.is_too_much() {
-        // The camera may not listen either.
+        // The camera may not receive the stop.
         let _ = stop(session, run);
         return Ok(Ended::Junk { bytes: run.junk.bytes() });
     }
@@ -479,11 +486,12 @@ fn stream(
         stop(session, run)?;
         return Ok(Ended::WrongNumber { made: run.tally.account().accounted(), asked: frames });
     }
-    // The camera's own view: a fault's event may have been the one packet that was damaged.
+    // The status also shows a fault whose event was in a damaged packet.
     let status = session.status(run);
     let accounted = run.tally.account().accounted();
     let made = run.tally.made().unwrap_or(accounted);
-    // What the camera says and what came must both be what was asked for.
+    // The number that the camera reports and the number that arrived must both be the number
+    // requested.
     let all_made = [made, accounted].iter().all(|&made| frames.map(u64::from) == Some(made));
     let made = if frames.map(u64::from) == Some(made) { accounted } else { made };
     Ok(match (run.fault, status) {
@@ -495,7 +503,7 @@ fn stream(
     })
 }
 
-/// Ends the run at the camera. A run that has ended by itself meanwhile is refused, and has ended too.
+/// Stops the run. A run that has already ended refuses the stop, which counts as stopped.
 fn stop(session: &mut Session, run: &mut RunListener<'_>) -> Result<(), SessionError> {
     match session.command(request::Stop, run) {
         Err(SessionError::Refused { .. }) | Ok(()) => Ok(()),

@@ -1,13 +1,13 @@
-//! An error and its causes in one line, for people.
+//! An error and its causes in one line.
 //!
 //! # Invariant
-//! An error of this workspace says what happened at its own level; its cause is its `source()` and no part of its own
-//! message. So every cause is told once, wherever the chain is printed
+//! An error of this workspace describes its own level. Its cause is its `source()` and not part of
+//! its message, so a printed chain tells every cause once
 //! (`tests::every_level_is_told_once_and_in_one_line`).
 
 use std::error::Error;
 
-/// What happened, then each cause after a colon.
+/// The error's message, then each cause after a colon.
 #[must_use]
 pub fn in_one_line(error: &(dyn Error + 'static)) -> String {
     let mut line = error.to_string();

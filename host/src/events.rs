@@ -1,10 +1,11 @@
-//! What a camera reports unasked, in words: right after the greeting what befell it while nobody listened, later what happens
-//! while somebody watches.
+//! The reports of a camera in words: after the greeting, events while no host was connected; later,
+//! events as they happen.
 
 use nirspi_wire::message::CRASH_TEXT_MAX;
 use nirspi_wire::{CrashReport, EventKind};
 
-/// One such event, as people read it; `None` for what an earlier host has left behind.
+/// The words for an event that happened before the greeting; `None` for an event that an earlier
+/// host caused.
 #[must_use]
 pub fn at_greeting(kind: &EventKind) -> Option<String> {
     match kind {
@@ -13,7 +14,7 @@ pub fn at_greeting(kind: &EventKind) -> Option<String> {
     }
 }
 
-/// One event of a camera that is being watched, as people read it.
+/// The words for an event of a connected camera.
 #[must_use]
 pub fn as_it_happens(kind: &EventKind) -> String {
     match *kind {
@@ -39,11 +40,12 @@ pub fn as_it_happens(kind: &EventKind) -> String {
     }
 }
 
-/// What the firmware's last crash left behind, as people read it. The text is the device's: it is shown as one line.
+/// The words for the firmware's last crash. The text comes from the device, and is shown as one
+/// line.
 #[must_use]
 pub fn crash(report: &CrashReport<'_>) -> String {
     let seconds = report.uptime_us as f64 / 1e6;
-    // A device that says more than the protocol lets it is cut off.
+    // A text that is longer than the protocol allows is cut.
     let text: String =
         report.text.chars().take(CRASH_TEXT_MAX).flat_map(char::escape_debug).collect();
     format!("the firmware crashed {seconds:.1} s after its last start and was restarted: {text}")

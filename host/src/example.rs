@@ -1,6 +1,6 @@
-//! Example measurements, made on the spot by the virtual camera: something to try a program on before there is a camera.
+//! Example measurements by the virtual camera, for trying the program without a camera.
 //!
-//! The law: an example is simulated and says so, and the same seed gives the same numbers.
+//! An example is marked as simulated, and the same seed gives the same numbers.
 
 use crate::scene::SceneMap;
 use crate::setup::MeasurementSetup;
@@ -14,19 +14,19 @@ use thiserror::Error;
 
 /// Edge of the drawing.
 const SCENE_PX: usize = 256;
-/// Where the lens is focused.
+/// Distance of the lens's focus.
 const DISTANCE_MM: f64 = 300.0;
-/// Frames summed: 20 ms, as the paper's camera takes them.
+/// Number of summed frames: 20 ms, as with the paper's camera.
 const FRAMES: u32 = 244;
 
 /// An example measurement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Example {
-    /// An insect's wing, drawn: a membrane with veins, fine enough that few patterns cannot show all of it.
+    /// A drawing of an insect's wing: a membrane with veins that are too fine for few patterns.
     Wing,
 }
 
-/// Why there is no example.
+/// Why an example cannot be measured.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ExampleError {
@@ -42,10 +42,10 @@ pub enum ExampleError {
 }
 
 impl Example {
-    /// All of them.
+    /// Every value.
     pub const ALL: [Self; 1] = [Self::Wing];
 
-    /// As it is written on the command line.
+    /// The name on the command line.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -53,7 +53,7 @@ impl Example {
         }
     }
 
-    /// In one line, for a list.
+    /// The description in one line, for a list.
     #[must_use]
     pub fn about(self) -> &'static str {
         match self {
@@ -93,14 +93,15 @@ impl FromStr for Example {
     }
 }
 
-/// A wing from its root below on the left to its tip above on the right, as reflectance.
+/// A wing from its root at the lower left to its tip at the upper right, as reflectance.
 fn wing() -> Vec<f32> {
     const GROUND: f32 = 0.05;
     const MEMBRANE: f32 = 0.35;
     const VEIN: f32 = 0.9;
     let at = |p: usize| {
         let [x, y] = [p % SCENE_PX, p / SCENE_PX].map(|c| 2.0 * c as f64 / SCENE_PX as f64 - 1.0);
-        // Along the wing from 0 to 1, and across as a share of its half width there.
+        // Position along the wing from 0 to 1, and across as a share of the half width at that
+        // position.
         let (along, across) = ((x - y) / 3.2 + 0.5, (x + y) / 1.3);
         if !(0.0..1.0).contains(&along) {
             return GROUND;

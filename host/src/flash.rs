@@ -1,6 +1,7 @@
 //! Programs a board's flash through a debug probe, with the probe-rs library (feature `flash`).
 //!
-//! The one law: a firmware that was written is read back and compared before it is started.
+//! # Invariant
+//! Written firmware is read back and compared before it is started.
 
 use probe_rs::flashing::{
     DownloadOptions, FileDownloadError, FlashError, FlashProgress, ProgressEvent,
@@ -13,7 +14,7 @@ use std::fmt;
 use std::io::Cursor;
 use thiserror::Error;
 
-/// A debug probe that is plugged in.
+/// A connected debug probe.
 #[derive(Debug, Clone)]
 pub struct Probe {
     info: DebugProbeInfo,
@@ -27,7 +28,7 @@ impl From<ProbeListItem> for Probe {
 }
 
 impl Probe {
-    /// `VID:PID:SERIAL`, which names it among others.
+    /// `VID:PID:SERIAL`, which identifies the probe.
     fn selector(&self) -> String {
         let DebugProbeInfo { vendor_id, product_id, serial_number, .. } = &self.info;
         format!("{vendor_id:04x}:{product_id:04x}:{}", serial_number.as_deref().unwrap_or(""))
@@ -44,23 +45,23 @@ impl fmt::Display for Probe {
 /// Why a board was not flashed.
 #[derive(Debug, Error)]
 pub enum FlashingError {
-    /// No probe at all.
+    /// No probe is connected.
     #[error(
         "no debug probe: is the board's ST-LINK connector plugged in, with a cable that carries data?"
     )]
     NoProbe,
-    /// None of that name.
+    /// No probe has the requested name.
     #[error("no debug probe {wanted}; there is {there}")]
     NoSuchProbe {
-        /// What was asked for.
+        /// The requested name.
         wanted: String,
-        /// What is there.
+        /// The connected probes.
         there: String,
     },
-    /// More than one.
+    /// Several probes are connected and the user did not choose one.
     #[error("several debug probes, name one with --probe: {0}")]
     SeveralProbes(String),
-    /// The system does not let this user.
+    /// The system denies the user access.
     #[error(
         "no permission to use debug probe {0}: on Linux install probe-rs' udev rules, \
          https://probe.rs/docs/getting-started/probe-setup"
@@ -69,52 +70,52 @@ pub enum FlashingError {
     /// The probe does not work.
     #[error("the debug probe cannot be used")]
     Probe(#[from] DebugProbeError),
-    /// The chip does not answer, or is another one.
+    /// The chip does not answer, or is another chip.
     #[error("no {chip} answers: is the board powered, and is it this board?")]
     Attach {
-        /// The chip looked for.
+        /// The expected chip.
         chip: String,
-        /// What probe-rs says.
+        /// The error of probe-rs.
         source: Box<probe_rs::Error>,
     },
-    /// Not firmware of this chip.
+    /// The file is not firmware for this chip.
     #[error("not firmware for this chip")]
     Image(#[from] FileDownloadError),
     /// Erasing, writing or comparing failed.
     #[error("the firmware is not written whole: flash it again before use")]
     Write(#[from] FlashError),
-    /// It was written and could not be started.
+    /// The firmware was written but could not be started.
     #[error("written and verified, but not started: press the board's reset button")]
     Reset(#[source] Box<probe_rs::Error>),
 }
 
-/// How far flashing has come.
+/// The progress of flashing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Step {
-    /// Something begins that goes over this many bytes.
+    /// An operation over this many bytes begins.
     Begins {
-        /// What, in a word.
+        /// The operation in one word.
         what: &'static str,
-        /// Bytes in all.
+        /// Number of bytes.
         bytes: u64,
     },
-    /// So many bytes more are done.
+    /// A part of the operation is done.
     Done {
-        /// How many.
+        /// Number of bytes of the part.
         bytes: u64,
     },
 }
 
-/// The debug probes that are plugged in.
+/// The connected debug probes.
 #[must_use]
 pub fn probes() -> Vec<Probe> {
     Lister::new().list_all_with_access().into_iter().map(Probe::from).collect()
 }
 
-/// The probe that is meant: that of `VID:PID:SERIAL` or serial number `wanted`, or the only one.
+/// Chooses the probe with `VID:PID:SERIAL` or serial number `wanted`, or the only probe.
 ///
 /// # Errors
-/// [`FlashingError`] naming what is there.
+/// [`FlashingError`], which names the connected probes.
 pub fn choose<'p>(probes: &'p [Probe], wanted: Option<&str>) -> Result<&'p Probe, FlashingError> {
     let there = || probes.iter().map(Probe::selector).collect::<Vec<_>>().join(", ");
     let meant = |probe: &&Probe| {
@@ -136,10 +137,10 @@ pub fn choose<'p>(probes: &'p [Probe], wanted: Option<&str>) -> Result<&'p Probe
     if chosen.permitted { Ok(chosen) } else { Err(FlashingError::Permission(chosen.selector())) }
 }
 
-/// Writes `elf` into the chip behind `probe`, compares, and starts it.
+/// Writes `elf` into the chip behind `probe`, compares, and starts the firmware.
 ///
 /// # Errors
-/// [`FlashingError`], which says what to do about it.
+/// [`FlashingError`], which says what to do.
 pub fn flash(
     probe: &Probe,
     chip: &str,
@@ -162,7 +163,7 @@ pub fn flash(
     reset.map_err(|error| FlashingError::Reset(Box::new(error)))
 }
 
-/// Attaches; under reset if the firmware that runs now does not let the probe in.
+/// Attaches to the chip; under reset if the running firmware keeps the probe out.
 fn attach(probe: &Probe, chip: &str) -> Result<Session, FlashingError> {
     match probe.info.open()?.attach(chip, Permissions::default()) {
         Ok(session) => Ok(session),
@@ -174,7 +175,7 @@ fn attach(probe: &Probe, chip: &str) -> Result<Session, FlashingError> {
     }
 }
 
-/// Bytes of each operation that probe-rs has announced: all are, before the first starts.
+/// Bytes of each operation. probe-rs announces all operations before the first starts.
 #[derive(Debug, Default)]
 struct Plan([u64; 4]);
 
@@ -196,7 +197,7 @@ impl Plan {
     }
 }
 
-/// Where an operation stands in the plan, and a word for it.
+/// The position of an operation in the plan, and a word for the operation.
 fn place(operation: ProgressOperation) -> (usize, &'static str) {
     match operation {
         ProgressOperation::Fill => (0, "reading"),

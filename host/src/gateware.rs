@@ -1,7 +1,8 @@
-//! A bitstream on its way into a camera's FPGA, through the firmware.
+//! Loads a bitstream into a camera's FPGA, through the firmware.
 //!
-//! The one law: a piece is sent when the camera has said that it wants it next, so a reply lost on the way costs one more
-//! piece and never a wrong bitstream.
+//! # Invariant
+//! A piece is sent only when the camera has asked for this piece. A lost reply costs one more piece
+//! and never a wrong bitstream (`tests::a_lost_piece_is_sent_again`).
 
 use crate::session::{IgnorePackets, Session, SessionError};
 use nirspi_mcu::staging;
@@ -11,41 +12,42 @@ use nirspi_wire::{GatewareChunk, Refusal, crc32};
 use std::time::{Duration, Instant};
 use thiserror::Error;
 
-/// Times in a row that the camera may ask for another piece than the next one, or for none.
+/// How many times in a row the camera may ask for another piece than the next, or not answer.
 const SETBACKS: u32 = 3;
-/// An FPGA runs its bitstream this soon after the last piece: half a second of configuration, and as much again.
+/// The longest time from the last piece to a running FPGA. Configuration takes half a second, and
+/// the start as long again.
 const START_TIME: Duration = Duration::from_secs(5);
 
-/// Why a bitstream did not get to run.
+/// Why a bitstream does not run.
 #[derive(Debug, Error)]
 pub enum GatewareError {
-    /// Not what `ecppack` or Lattice's tools write.
+    /// The file is not one that `ecppack` or Lattice's tools write.
     #[error("no bitstream for an ECP5: it begins with neither a comment nor the preamble")]
     NotABitstream,
-    /// Longer than the protocol can say.
+    /// The file is longer than the protocol allows.
     #[error("{0} bytes are too many for a bitstream")]
     TooLong(usize),
-    /// Too much was lost on the way.
+    /// Too many packets were lost.
     #[error("the camera has lost its place at byte {expected} of {total}, {SETBACKS} times")]
     OutOfStep {
-        /// The piece it asked for.
+        /// The offset of the requested piece.
         expected: u32,
         /// Length of the bitstream.
         total: u32,
     },
-    /// It was taken, and no FPGA of ours answers.
+    /// The bitstream was loaded, but the FPGA does not answer with nirspi's identity.
     #[error(
         "the bitstream was taken, but the FPGA does not run it: its identity register reads {0:#010X}"
     )]
     Silent(u32),
-    /// The conversation ended, or the camera refused.
+    /// The session ended, or the camera refused.
     #[error(transparent)]
     Session(#[from] SessionError),
 }
 
-/// Sends a bitstream piece by piece and waits until the FPGA answers; returns its version register. `progress` hears
-/// how many bytes the camera has. The camera lights nothing meanwhile, and keeps the old gateware until the new one is
-/// there whole.
+/// Sends a bitstream piece by piece and waits until the FPGA answers. Returns its version register.
+/// `progress` receives the number of bytes that the camera has. The LEDs stay off meanwhile, and
+/// the camera keeps the old gateware until the new one is complete.
 ///
 /// # Errors
 /// [`GatewareError`].
@@ -60,7 +62,7 @@ pub fn load(
     let total =
         u32::try_from(bitstream.len()).map_err(|_| GatewareError::TooLong(bitstream.len()))?;
     let crc = crc32(bitstream);
-    // A camera that goes back and forth over the same pieces makes no progress.
+    // A camera that asks for the same pieces repeatedly makes no progress.
     let (mut offset, mut furthest, mut setbacks) = (0, 0, 0);
     while offset < total {
         let rest = bitstream.get(offset as usize..).unwrap_or(&[]);
@@ -68,7 +70,7 @@ pub fn load(
         let piece = GatewareChunk { offset, total, crc, data };
         let next = match session.load_gateware(piece, &mut IgnorePackets) {
             Ok(next) => next,
-            // Its reply to the piece before was lost, or the piece itself.
+            // The reply to the piece before, or the piece itself, was lost.
             Err(SessionError::NoAnswer { .. }) => offset,
             Err(SessionError::Refused {
                 refusal: Refusal::GatewareOffset { expected }, ..
@@ -89,7 +91,7 @@ pub fn load(
     await_start(session)
 }
 
-/// Until the FPGA says who it is.
+/// Waits until the FPGA identifies itself.
 fn await_start(session: &mut Session) -> Result<u32, GatewareError> {
     let begun = Instant::now();
     loop {
@@ -120,14 +122,14 @@ mod tests {
     use std::io;
     use std::sync::{Arc, Mutex};
 
-    /// What a camera was given to load.
+    /// The bitstream that a camera was given to load.
     #[derive(Debug, Default)]
     struct Loaded {
         bytes: Vec<u8>,
         is_finished: bool,
     }
 
-    /// Keeps what it is given, and is busy for a while once it has all.
+    /// Keeps the bitstream, and is busy for a while after the last piece.
     struct Keeper {
         loaded: Arc<Mutex<Loaded>>,
         busy: u32,
@@ -173,7 +175,7 @@ mod tests {
         [0xFF, 0x00].into_iter().chain(body).chain([0xFF; 40]).collect()
     }
 
-    /// Loses one of the things that go from host to camera.
+    /// Loses one of the host's packets to the camera.
     struct Lossy<L> {
         link: L,
         sent: u32,
@@ -206,7 +208,7 @@ mod tests {
     #[test]
     fn a_lost_piece_is_sent_again() {
         let (link, loaded) = camera();
-        // After a delimiter, the greeting and the first piece.
+        // The packets before are a delimiter, the greeting and the first piece.
         let mut session = Session::open(Box::new(Lossy { link, sent: 0, lost: 4 })).unwrap();
         load(&mut session, &bitstream(), &mut |_| {}).unwrap();
         assert!(loaded.lock().unwrap().bytes == bitstream());

@@ -1,4 +1,5 @@
-//! Frames -> measurements: sums the frames of a run, undoes the settling leak, names the rows.
+//! Makes measurements of frames: sums the frames of a run, corrects the settling leak, and assigns
+//! the rows.
 
 use crate::calibration::Settling;
 use crate::setup::MeasurementSetup;
@@ -16,7 +17,7 @@ pub struct Integrated {
 }
 
 impl Integrated {
-    /// Nothing summed yet.
+    /// An empty sum.
     #[must_use]
     pub fn new(setup: &MeasurementSetup) -> Self {
         Self::of_patterns(setup.rows.len())
@@ -26,7 +27,7 @@ impl Integrated {
         Self { sums: vec![0; patterns], frames: 0, sweeps: 0, flags: FrameFlags::default() }
     }
 
-    /// Patterns of a sweep.
+    /// Number of patterns of a sweep.
     #[must_use]
     pub fn patterns(&self) -> usize {
         self.sums.len()
@@ -48,13 +49,13 @@ impl Integrated {
         self.flags = self.flags.with(frame.flags);
     }
 
-    /// Frames summed.
+    /// Number of summed frames.
     #[must_use]
     pub fn frames(&self) -> u64 {
         self.frames
     }
 
-    /// What the frames' flags say against them, a line each.
+    /// Warnings from the frames' flags, one line each.
     #[must_use]
     pub fn warnings(&self) -> Vec<&'static str> {
         [
@@ -77,7 +78,7 @@ impl Integrated {
         .collect()
     }
 
-    /// Mean ADC counts of one sample, for each pattern in the order shown; 0 where nothing was summed.
+    /// Mean ADC counts of one sample, for each pattern in the order shown; 0 without frames.
     #[must_use]
     pub fn means(&self, setup: &MeasurementSetup) -> Vec<f64> {
         let samples = self.sweeps as f64 * f64::from(setup.window());
@@ -85,11 +86,12 @@ impl Integrated {
         self.sums.iter().map(|&sum| sum as f64 * scale).collect()
     }
 
-    /// Measurements in ADC counts. With the camera's response the dark level of single readings is subtracted, and what
-    /// leaked from slot to slot is put back unless `keep_leak`; without it the dark level is estimated.
+    /// Measurements in ADC counts. With the camera's response, the dark level is subtracted from
+    /// single readings, and the leak between slots is corrected unless `keep_leak`. Without the
+    /// response the dark level is estimated.
     ///
     /// # Errors
-    /// [`IntegrateError`] where the sums are not those of the setup, or the response cannot be undone.
+    /// [`IntegrateError`] if the sums do not fit the setup, or the response cannot be corrected.
     pub fn measurements(
         &self,
         setup: &MeasurementSetup,
@@ -120,7 +122,8 @@ impl Integrated {
     }
 }
 
-/// The sum of the newest frames of a run, as a live view shows it: each frame adds itself and takes the oldest away.
+/// The sum of the newest frames of a run, for a live view. Each new frame is added and the oldest
+/// is subtracted.
 #[derive(Debug, Clone)]
 pub struct Newest {
     frames: VecDeque<Integrated>,
@@ -128,13 +131,14 @@ pub struct Newest {
 }
 
 impl Newest {
-    /// No frame yet.
+    /// A sum without frames.
     #[must_use]
     pub fn new(setup: &MeasurementSetup) -> Self {
         Self { frames: VecDeque::new(), total: Integrated::new(setup) }
     }
 
-    /// Adds a frame that [fits](Integrated::fits), and forgets all but the newest `most`, at least one.
+    /// Adds a frame that [fits](Integrated::fits), and keeps only the newest `most` frames, at
+    /// least one.
     pub fn push(&mut self, frame: &Frame<'_>, most: usize) {
         while self.frames.len() >= most.max(1) {
             let Some(oldest) = self.frames.pop_front() else { break };
@@ -150,10 +154,10 @@ impl Newest {
         self.frames.push_back(alone);
     }
 
-    /// Their sum.
+    /// The sum of the frames.
     #[must_use]
     pub fn sum(&self) -> Integrated {
-        // Flags cannot be taken away again one by one.
+        // Flags cannot be subtracted, so they are collected anew.
         let flags = self.frames.iter().fold(FrameFlags::default(), |all, f| all.with(f.flags));
         Integrated { flags, ..self.total.clone() }
     }
@@ -162,10 +166,10 @@ impl Newest {
 /// Why a sum of frames gives no measurements.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum IntegrateError {
-    /// The setup.
+    /// The setup and the sums give no measurements.
     #[error(transparent)]
     Measurements(#[from] MeasurementError),
-    /// The camera's response.
+    /// The leak cannot be corrected with the camera's response.
     #[error(transparent)]
     Leak(#[from] LeakError),
 }
@@ -177,7 +181,7 @@ mod tests {
     use nirspi_wire::samples::Samples;
     use proptest::prelude::*;
 
-    /// Hands over a frame of these samples.
+    /// Calls `take` with a frame of these samples.
     fn with_frame<T>(values: &[i64], flags: FrameFlags, take: impl FnOnce(&Frame<'_>) -> T) -> T {
         let mut bytes = vec![0; 4 * values.len()];
         let samples = Samples::pack(values.iter().copied(), &mut bytes).unwrap();

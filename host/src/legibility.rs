@@ -1,9 +1,9 @@
-//! Can an outside judge read the characters? Tesseract, where the machine has it.
+//! Legibility of characters, judged by Tesseract if the machine has it.
 //!
-//! The law: it sees every image alike, and is never asked about one that it did not see. The character is cut out
-//! where it is brighter than a half, drawn dark on bright 40 pixels high with a margin, and read as one character
-//! (`--psm 10`) of the 62. Clean 64 x 64 characters of Chars74K's fonts it then reads in 49 of 62 cases (Tesseract
-//! 5.3.0), more than with a margin of 10, uncut, or as a word.
+//! Every image is judged in the same way. The character is cut out where the image is brighter than
+//! a half, drawn dark on bright 40 pixels high with a margin, and read as one character (`--psm
+//! 10`) of the 62. Tesseract 5.3.0 then reads 49 of the 62 clean 64 x 64 characters of Chars74K's
+//! fonts, more than with a margin of 10, uncut, or as a word.
 
 use crate::files::image::to_level;
 use image::imageops::{self, FilterType};
@@ -13,50 +13,50 @@ use std::io;
 use std::process::Command;
 use thiserror::Error;
 
-/// Brighter than this belongs to the character.
+/// Pixels brighter than this level belong to the character.
 const INK: f32 = 0.5;
-/// Height that a character is drawn in.
+/// Height of the drawn character.
 const HEIGHT_PX: u32 = 40;
-/// White around it.
+/// White margin around the character.
 const MARGIN_PX: u32 = 20;
-/// What Tesseract prints after each image.
+/// The character that Tesseract prints after each image.
 const PAGE_END: char = '\u{c}';
 
-/// Why nobody has read the images. `Display` is one line.
+/// Why the images were not read. `Display` is one line.
 #[derive(Debug, Error)]
 pub enum LegibilityError {
-    /// The program is not on this machine.
+    /// Tesseract is not on this machine.
     #[error("no tesseract on this machine (Debian: apt install tesseract-ocr)")]
     Absent,
-    /// The system refused.
+    /// The system reported an error.
     #[error("tesseract cannot be run")]
     Io(#[from] io::Error),
-    /// It said that something is wrong.
+    /// Tesseract reported an error.
     #[error("tesseract: {0}")]
     Failed(String),
-    /// It answered for another number of images.
+    /// The number of answers is not the number of images.
     #[error("tesseract answered for {found} images, expected {expected}")]
     Pages {
-        /// Answers.
+        /// Number of answers.
         found: usize,
-        /// Images.
+        /// Number of images.
         expected: usize,
     },
 }
 
-/// An outside judge of legibility.
+/// A program that reads characters.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Judge {
     program: String,
-    /// What it calls itself: `tesseract 5.3.0`.
+    /// Name and version of the program: `tesseract 5.3.0`.
     pub name: String,
 }
 
 impl Judge {
-    /// Tesseract, as found on the path.
+    /// Tesseract, if it is on the path.
     ///
     /// # Errors
-    /// [`LegibilityError::Absent`] if it is not there.
+    /// [`LegibilityError::Absent`] if Tesseract is not on the path.
     pub fn tesseract() -> Result<Self, LegibilityError> {
         Self::from_program("tesseract")
     }
@@ -67,14 +67,14 @@ impl Judge {
         Ok(Self { program: program.to_owned(), name })
     }
 
-    /// The character that is read in each image of `height` x `width` pixels in [0, 1], bright on dark; none where it
-    /// reads nothing or more than one.
+    /// The character read in each image of `height` x `width` pixels in [0, 1], bright on dark;
+    /// `None` if Tesseract reads no character or several.
     ///
     /// # Errors
-    /// [`LegibilityError`] if it could not be asked.
+    /// [`LegibilityError`] if Tesseract cannot be run.
     ///
     /// # Panics
-    /// If the values are no whole images of at least one pixel: the caller made them.
+    /// If the values are not whole images of at least one pixel.
     pub fn read(
         &self,
         images: &[f32],
@@ -89,11 +89,12 @@ impl Judge {
             drawn(image, width).save(&path).map_err(io::Error::other)?;
             list.push_str(&format!("{}\n", path.display()));
         }
-        // One run for all images: starting it takes longer than reading one.
+        // One run reads all images, because starting Tesseract takes longer than reading an image.
         let path = folder.path().join("images.txt");
         std::fs::write(&path, list)?;
         let text = run(Command::new(&self.program)
-            // It would take a thread for each part of a picture that has none.
+            // Without the limit, Tesseract starts a thread for each part of a picture, also for
+            // pictures with one part.
             .env("OMP_THREAD_LIMIT", "1")
             .arg(&path)
             .args(["stdout", "--psm", "10", "-c"])
@@ -102,14 +103,14 @@ impl Judge {
     }
 }
 
-/// The character of each page; none where there is another number of them.
+/// The character of each page; an error if the number of pages differs.
 fn answers(text: &str, expected: usize) -> Result<Vec<Option<char>>, LegibilityError> {
     let read = |page: &str| {
         let mut characters = page.trim().chars();
         characters.next().filter(|_| characters.next().is_none())
     };
     let mut pages: Vec<_> = text.split(PAGE_END).map(read).collect();
-    // Nothing follows the last end of a page.
+    // Nothing follows the last page end.
     pages.pop();
     let found = pages.len();
     if found == expected { Ok(pages) } else { Err(LegibilityError::Pages { found, expected }) }
@@ -127,7 +128,7 @@ fn run(command: &mut Command) -> Result<String, LegibilityError> {
     Ok(String::from_utf8_lossy(&output.stdout).into_owned())
 }
 
-/// The character dark on bright, cut out, with a margin.
+/// The character cut out, dark on bright, with a margin.
 fn drawn(image: &[f32], width: usize) -> GrayImage {
     let inked = || image.iter().enumerate().filter(|(_, v)| **v > INK).map(|(at, _)| at);
     let rows = || inked().map(|at| (at / width) as u32);
@@ -158,7 +159,7 @@ mod tests {
 
     #[test]
     fn the_character_is_cut_out_dark_on_bright() {
-        // 6 x 8 with a bar of two columns and four rows.
+        // A bar of two columns and four rows in 6 x 8 pixels.
         let bar = |at: usize| (1..5).contains(&(at / 8)) && (2..4).contains(&(at % 8));
         let image: Vec<f32> = (0..48).map(|at| if bar(at) { 0.8 } else { 0.0 }).collect();
         let page = drawn(&image, 8);

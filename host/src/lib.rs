@@ -2,26 +2,33 @@
 //!
 //! Data flows one way: bytes -> frames -> measurements -> image -> picture.
 //!
-//! * [`link`] moves bytes, [`session`] talks to a camera, [`account`] counts what became of every frame,
-//! * [`versions`] says whether camera and program belong together, [`events`] what a camera reports unasked,
+//! * [`link`] moves bytes, [`session`] exchanges commands with a camera, [`account`] counts every
+//!   frame,
+//! * [`versions`] checks whether camera and program fit together, [`events`] words a camera's
+//!   reports,
 //! * [`gateware`] loads a camera's FPGA,
-//! * [`calibration`] measures latency and settling, keeps and chooses them, [`selftest`] checks a camera,
-//! * [`capture`] runs a measurement, [`recording`] keeps it,
-//! * [`tally`] and [`integrate`] turn frames into measurements; `nirspi-recon` turns those into an image,
+//! * [`calibration`] measures, keeps and chooses latency and settling, [`selftest`] checks a
+//!   camera,
+//! * [`capture`] runs a measurement, [`recording`] stores it,
+//! * [`tally`] and [`integrate`] make measurements of frames; `nirspi-recon` reconstructs an image
+//!   from measurements,
 //! * [`source`] reads measurements from a file, a recording or a capture,
-//! * [`files`], [`picture`] and [`scene`] are what people see and hand over, [`resolution`] says how fine it is,
-//!   [`legibility`] whether somebody can read it,
-//! * [`imaging`] scales, enhances and judges images, and says when not to trust them,
+//! * [`files`], [`picture`] and [`scene`] read and write what users see, [`resolution`] measures
+//!   the finest detail, [`legibility`] reads characters,
+//! * [`imaging`] scales, enhances and judges images, and gives warnings,
 //! * [`serve`] shows a camera live on a web page,
-//! * [`causes`] tells an error with its causes,
-//! * [`training`] makes pairs to train networks on, through the virtual camera,
-//! * [`udev`] lets users use cameras on USB; [`boards`] lists the boards that firmware is for; with the feature `flash`, `flash` programs them,
-//! * [`example`] makes measurements to try the program on,
-//! * [`virtual_camera`] is a camera without silicon: optics simulator, gateware model, real firmware logic.
+//! * [`causes`] prints an error with its causes,
+//! * [`training`] makes pairs for training networks, with the virtual camera,
+//! * [`udev`] gives users access to cameras on USB; [`boards`] lists the boards with firmware; with
+//!   the feature `flash`, `flash` programs the boards,
+//! * [`example`] makes example measurements,
+//! * [`virtual_camera`] is a camera without hardware: optics simulator, gateware model, real
+//!   firmware logic.
 //!
-//! Without its features (`default-features = false`) the library captures, records, calibrates and reads measurements, and
-//! builds neither web server nor typefaces, optics nor networks. The features `enhance`, `pictures`, `virtual-camera`, `serve`
-//! and `training` add the rest, `gpu` the kernels for GPUs.
+//! Without its features (`default-features = false`) the library captures, records, calibrates and
+//! reads measurements, without web server, typefaces, optics or networks. The features `enhance`,
+//! `pictures`, `virtual-camera`, `serve` and `training` add the other parts; `gpu` adds the kernels
+//! for GPUs.
 
 pub mod account;
 pub mod boards;

@@ -1,20 +1,21 @@
-//! How fine a camera sees: slanted edge and bars, in millimetres on the target.
+//! Measures the resolution of a camera by a slanted edge and bars, in millimetres on the target.
 //!
-//! The law: a result is the width of the finest line, half a period, and never finer than one pixel: what lies beyond
-//! the sampling limit is not resolution but luck.
+//! A result is the width of the finest line, which is half a period, and never less than one pixel.
+//! Detail beyond the sampling limit is not resolved reliably.
 
 use std::f64::consts::PI;
 
-/// Angle of the test edge off the columns, in degrees: 5, as ISO 12233 has it.
+/// Angle between the test edge and the columns, in degrees: 5, as in ISO 12233.
 pub const EDGE_ANGLE_DEG: f64 = 5.0;
 
-/// Width of the bins that pixels are sorted into by their distance from the edge, in pixels.
+/// Width of the bins into which pixels are sorted by their distance from the edge, in pixels.
 const BIN_PX: f64 = 0.25;
 
 /// Reach of the edge's profile to either side, as a part of the picture's side.
 const REACH: f64 = 13.0 / 32.0;
 
-/// A slanted edge through the middle of `size` x `size` pixels, dark left, bright right, anti-aliased; row-major.
+/// A slanted edge through the middle of `size` x `size` pixels, dark left, bright right,
+/// anti-aliased; row-major.
 #[must_use]
 pub fn edge_scene(size: usize) -> Vec<f32> {
     (0..size * size)
@@ -22,8 +23,8 @@ pub fn edge_scene(size: usize) -> Vec<f32> {
         .collect()
 }
 
-/// Vertical bars of `bar_px` pixels over `size` x `size` pixels, one beginning in the centre, so that bars of one
-/// pixel fit the grid; row-major.
+/// Vertical bars of `bar_px` pixels over `size` x `size` pixels. One bar begins in the centre, so
+/// that bars of one pixel fit the grid. Row-major.
 #[must_use]
 pub fn bar_scene(size: usize, bar_px: f64) -> Vec<f32> {
     let middle = size as f64 / 2.0;
@@ -43,14 +44,15 @@ fn from_edge(x: usize, y: usize, size: usize) -> f64 {
     (x as f64 - middle) * cos + (y as f64 - middle) * sin
 }
 
-/// Frequencies that a transfer is computed at: 0 to 0.5 cycles a pixel.
+/// Number of frequencies of a transfer: 0 to 0.5 cycles a pixel.
 const FREQUENCIES: usize = 101;
 
-/// Part of the profile at either end that the levels of dark and bright are taken from, as a part of the picture's side.
+/// Part of the profile at either end that gives the levels of dark and bright, as a part of the
+/// picture's side.
 const PLATEAU: f64 = 3.0 / 32.0;
 
-/// The slope of an edge's profile as a function of frequency: its Fourier transform, and the height of the edge. Slopes of
-/// several pictures add, and the transfer of their sum is that of their mean.
+/// The slope of an edge's profile as a function of frequency: its Fourier transform and the height
+/// of the edge. Slopes of several pictures add, and the transfer of the sum is that of the mean.
 #[derive(Debug, Clone, PartialEq)]
 struct Slope {
     waves: Vec<(f64, f64)>,
@@ -58,7 +60,7 @@ struct Slope {
 }
 
 impl Slope {
-    /// Of a picture of [`edge_scene`] of any brightness; `None` if a number in it is not finite.
+    /// The slope of a picture of [`edge_scene`] of any brightness; `None` if a pixel is not finite.
     fn of(picture: &[f32], side: usize) -> Option<Self> {
         assert_eq!(picture.len(), side * side, "a square picture");
         let [reach_px, plateau_px] = [REACH, PLATEAU].map(|part| part * side as f64);
@@ -98,7 +100,7 @@ impl Slope {
                 (re + step * cos, im + step * sin)
             };
             let (re, im) = steps.iter().fold((0.0, 0.0), wave);
-            // Binning averages over a bin; the difference of two bins over another.
+            // Binning averages over a bin, and so does the difference of two bins.
             let blurred = PI * frequency * BIN_PX;
             let own = if k == 0 { 1.0 } else { (blurred.sin() / blurred).powi(2) };
             (re / own, im / own)
@@ -114,12 +116,14 @@ fn at_frequency(k: usize) -> f64 {
     0.5 * k as f64 / (FREQUENCIES - 1) as f64
 }
 
-/// Modulation transfer by spatial frequency in cycles per pixel, 0 to 0.5, from pictures of [`edge_scene`] of any brightness,
-/// whose noise is independent: the edge's profile, differentiated, Fourier transformed (ISO 12233), over the edge's height.
-/// Empty if there is no edge.
+/// Modulation transfer by spatial frequency in cycles per pixel, 0 to 0.5, from pictures of
+/// [`edge_scene`] of any brightness with independent noise. The transfer is the Fourier transform
+/// of the derivative of the edge's profile (ISO 12233), divided by the edge's height. Empty without
+/// an edge.
 ///
-/// Noise adds its own power to that of every picture, and would make a transfer look better than it is where it is small. With
-/// several pictures its power is left out: the mean product of the transforms of two *different* pictures has none.
+/// Noise adds its own power to the transfer of every picture, and would raise a small transfer.
+/// With several pictures the power of the noise is excluded: the mean product of the transforms of
+/// two *different* pictures does not contain it.
 ///
 /// # Panics
 /// If a picture does not hold `side * side` pixels.
@@ -145,11 +149,11 @@ pub fn edge_mtf(pictures: &[&[f32]], side: usize) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// Transfer of a disc of light of this diameter at a frequency (in cycles per unit of the diameter's): `2 J1(x) / x` with
-/// x = pi times their product.
+/// Transfer of a disc of light of this diameter at a frequency (in cycles per unit of the
+/// diameter): `2 J1(x) / x` with x = pi times diameter times frequency.
 #[must_use]
 pub fn disc_transfer(diameter: f64, frequency: f64) -> f64 {
-    // The mean over the disc's chords; equal steps of the angle converge faster than any power.
+    // The mean over the disc's chords. Equal steps of the angle converge faster than any power.
     const STEPS: usize = 256;
     let angle = |k: usize| (k as f64 + 0.5) * PI / 2.0 / STEPS as f64;
     let chord = |k: usize| {
@@ -159,7 +163,8 @@ pub fn disc_transfer(diameter: f64, frequency: f64) -> f64 {
     (0..STEPS).map(chord).sum::<f64>() * 2.0 / STEPS as f64
 }
 
-/// Transfer of a square of light across an edge that is tilted by [`EDGE_ANGLE_DEG`] against its sides.
+/// Transfer of a square of light across an edge that is tilted by [`EDGE_ANGLE_DEG`] against its
+/// sides.
 #[must_use]
 pub fn square_transfer(width: f64, frequency: f64) -> f64 {
     let (sin, cos) = EDGE_ANGLE_DEG.to_radians().sin_cos();
@@ -167,8 +172,8 @@ pub fn square_transfer(width: f64, frequency: f64) -> f64 {
     sinc(width * cos * frequency) * sinc(width * sin * frequency)
 }
 
-/// Width of a line at the first frequency where the transfer falls to `level`, in pixels; 1 if it never does below
-/// the sampling limit, none without a curve.
+/// Width of a line in pixels at the first frequency where the transfer falls to `level`; 1 if the
+/// transfer stays above `level` up to the sampling limit, `None` without a transfer.
 #[must_use]
 pub fn line_width_px(mtf: &[(f64, f64)], level: f64) -> Option<f64> {
     mtf.first()?;
@@ -180,8 +185,9 @@ pub fn line_width_px(mtf: &[(f64, f64)], level: f64) -> Option<f64> {
     }))
 }
 
-/// How much of the bars' contrast a picture of [`bar_scene`] keeps: the amplitude of their period over the mean,
-/// against that of the `truth`. Negative where dark and bright have changed places.
+/// The share of the bars' contrast that a picture of [`bar_scene`] keeps: the amplitude of their
+/// period divided by the mean, compared with that of the `truth`. Negative if dark and bright have
+/// changed places.
 ///
 /// # Panics
 /// If the pictures do not hold `side * side` pixels.
@@ -200,7 +206,7 @@ pub fn bar_transfer(picture: &[f32], truth: &[f32], side: usize, bar_px: f64) ->
             weight += sine * sine;
             sines += sine;
         }
-        // What the mean has in common with a sine that does not fit a whole number of times.
+        // The mean correlates with a sine whose number of periods is not whole.
         (amplitude - sum / n * sines) / (weight - sines * sines / n) / (sum / n)
     };
     contrast(picture) / contrast(truth)
@@ -210,7 +216,7 @@ pub fn bar_transfer(picture: &[f32], truth: &[f32], side: usize, bar_px: f64) ->
 mod tests {
     use super::*;
 
-    /// The edge seen through pixels as wide as a box of `width` pixels.
+    /// The edge seen by pixels with a width of `width` pixels.
     fn blurred_edge(side: usize, width: usize) -> Vec<f32> {
         let fine = edge_scene(side * 8);
         let half = (width * 8 / 2) as i64;
@@ -228,7 +234,8 @@ mod tests {
     fn a_box_of_light_has_the_transfer_of_a_sinc() {
         for width in [2, 4, 6] {
             let mtf = edge_mtf(&[&blurred_edge(32, width)], 32);
-            // sinc falls to a half at 0.6034 over the width: a line of 0.829 widths; to 0.1 at 0.9125: 0.548.
+            // sinc falls to a half at 0.6034 divided by the width, a line of 0.829 widths; to 0.1
+            // at 0.9125, a line of 0.548 widths.
             let found = line_width_px(&mtf, 0.5).unwrap();
             assert!((found / (0.829 * width as f64) - 1.0).abs() < 0.05, "{width}: {found}");
             let found = line_width_px(&mtf, 0.1).unwrap();
@@ -246,7 +253,7 @@ mod tests {
         assert_eq!(line_width_px(&edge_mtf(&[&[0.5; 1024]], 32), 0.5), None);
     }
 
-    /// Nearly normal, of variance 1: twelve uniform numbers (splitmix64).
+    /// Nearly normal numbers of variance 1: each is the sum of twelve uniform numbers (splitmix64).
     fn normal(state: &mut u64) -> f32 {
         let mut uniform = || {
             *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
@@ -259,7 +266,8 @@ mod tests {
 
     #[test]
     fn discs_and_squares_have_the_transfers_of_the_books() {
-        // 2 J1(x) / x is 0.8801 at x = 1 and 0 at 3.8317; a sinc is 0.6366 at half of its first zero.
+        // 2 J1(x) / x is 0.8801 at x = 1 and 0 at 3.8317; a sinc is 0.6366 at half of its first
+        // zero.
         assert!((disc_transfer(1.0, 1.0 / PI) - 0.880_101).abs() < 1e-6);
         assert!(disc_transfer(2.0, 3.831_706 / PI / 2.0).abs() < 1e-6);
         let along = EDGE_ANGLE_DEG.to_radians().cos();

@@ -1,6 +1,8 @@
-//! What the virtual camera looks at: a letter target, a white sheet, or a picture.
+//! The scenes of the virtual camera: a letter target, a white sheet, or a picture.
 //!
-//! The law: a scene is a square map of reflectance in `[0, 1]`, 1 bright, row-major, top row first.
+//! # Invariant
+//! A scene is a square map of reflectance in `[0, 1]`, with 1 as bright, row-major, top row first
+//! (`tests::a_letter_is_a_43_mm_target_bright_on_dark`).
 
 use crate::files::FileError;
 use crate::files::image::{Reflectance, read_reflectance};
@@ -14,22 +16,22 @@ use thiserror::Error;
 
 /// Edge of the paper's letter target: 43 mm x 43 mm (Fig. 6 and Section 5).
 pub const LETTER_SIDE_MM: f64 = 43.0;
-/// Part of the target's edge that the glyph's longer side fills.
+/// Part of the target's edge that the glyph's longer side takes.
 const GLYPH_FILL: f32 = 0.9;
-/// How a letter scene is written on the command line.
+/// The prefix of a letter scene.
 const LETTER_PREFIX: &str = "letter:";
-/// How a word scene is written.
+/// The prefix of a word scene.
 const WORD_PREFIX: &str = "word:";
-/// Most characters of a word: each has 4 of the camera's 32 pixels then.
+/// The most characters of a word. Each character then has 4 of the camera's 32 pixels.
 const MAX_WORD: usize = 8;
-/// How a white sheet is written.
+/// The name of a white sheet.
 const WHITE: &str = "white";
-/// How a covered lens is written.
+/// The name of a covered lens.
 const BLACK: &str = "black";
-/// White paper at 1550 nm reflects about this much.
+/// Approximate reflectance of white paper at 1550 nm.
 const WHITE_REFLECTANCE: f32 = 0.9;
 
-/// Where a scene comes from: `letter:R`, `word:STOP`, `white`, `black`, or the path of a PNG or JPEG.
+/// The source of a scene: `letter:R`, `word:STOP`, `white`, `black`, or the path of a PNG or JPEG.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum SceneSource {
     /// One bright character on a dark target.
@@ -38,63 +40,65 @@ pub enum SceneSource {
     Word(String),
     /// A sheet that fills the field of view, for self-tests.
     White,
-    /// A cover before the lens: nothing comes back, for dark frames.
+    /// A covered lens without any light, for dark frames.
     Black,
-    /// A PNG or JPEG, whose grey levels are taken as reflectance.
+    /// A PNG or JPEG. Its grey levels are reflectances.
     File(PathBuf),
 }
 
-/// A scene ready to be put before the camera.
+/// A scene for the camera.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SceneMap {
-    /// For titles and reports: `letter R`, or the file's name.
+    /// The scene's name for titles and reports: `letter R`, or the file's name.
     pub name: String,
     /// Edge in pixels, at least 1.
     pub size_px: usize,
     /// `size_px * size_px` reflectances in `[0, 1]`, row-major.
     pub reflectance: Vec<f32>,
-    /// Edge of the target in millimetres; a sheet or picture has none and fills the field of view.
+    /// Edge of the target in millimetres; `None` for a sheet or picture, which fills the field of
+    /// view.
     pub side_mm: Option<f64>,
 }
 
-/// Why there is no such scene. `Display` is one line.
+/// Why a scene cannot be made. `Display` is one line.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum SceneError {
-    /// No scene was named.
+    /// The name of the scene is empty.
     #[error(
         "scene: found nothing, expected letter:R, word:STOP, white, black or the path of a PNG or JPEG image"
     )]
     Empty,
-    /// `letter:` was followed by none or several characters.
+    /// The number of characters after `letter:` is not 1.
     #[error(
         "scene {scene:?}: found {found} characters after `letter:`, expected one, as in letter:R"
     )]
     NotOneCharacter {
-        /// What was asked for.
+        /// The requested scene.
         scene: String,
-        /// How many characters it has.
+        /// Its number of characters.
         found: usize,
     },
-    /// `word:` was followed by no word, or by one too long for 32 pixels.
+    /// The word after `word:` is empty, or too long for 32 pixels.
     #[error(
         "scene {scene:?}: found {found} characters after `word:`, expected 1 to {MAX_WORD}, as in word:STOP"
     )]
     WordLength {
-        /// What was asked for.
+        /// The requested scene.
         scene: String,
-        /// How many characters it has.
+        /// Its number of characters.
         found: usize,
     },
-    /// No scheme, no file: most likely a letter or word without its scheme.
+    /// The scene has neither a prefix nor a file, and is probably a letter or word without its
+    /// prefix.
     #[error("scene {scene:?}: no such file; a letter is letter:{first}, a word is word:{scene}")]
     NoFile {
-        /// What was asked for.
+        /// The requested scene.
         scene: String,
         /// Its first character.
         first: char,
     },
-    /// The embedded font does not draw this character.
+    /// The embedded font has no shape for this character.
     #[error(
         "scene letter:{}: the font has no shape for it, expected a letter, digit or sign",
         character.escape_debug()
@@ -168,8 +172,8 @@ impl fmt::Display for SceneSource {
 }
 
 impl SceneSource {
-    /// Draws or reads the scene. A letter is `size_px` pixels an edge; a larger picture is averaged
-    /// down to that, a smaller one stays as it is.
+    /// Draws or reads the scene. A letter has `size_px` pixels an edge. A larger picture is
+    /// averaged down to `size_px`; a smaller picture keeps its size.
     ///
     /// # Errors
     /// [`SceneError`] if the font lacks the character or the file cannot be read.
@@ -198,7 +202,7 @@ impl SceneSource {
     }
 }
 
-/// Characters side by side, each in a square of its own, halfway down.
+/// Characters side by side, each in its own square, at half height.
 fn drawn(word: &str, size_px: usize) -> Result<Vec<f32>, SceneError> {
     let typeface = Typeface::ubuntu_light();
     let cell_px = size_px / word.chars().count().max(1);
@@ -217,8 +221,8 @@ fn drawn(word: &str, size_px: usize) -> Result<Vec<f32>, SceneError> {
 }
 
 impl SceneMap {
-    /// One bright character of a typeface on the dark target of [`LETTER_SIDE_MM`], of whose edge the character's longer side
-    /// takes 0.9.
+    /// One bright character of a typeface on the dark target of [`LETTER_SIDE_MM`]. The character's
+    /// longer side takes 0.9 of the target's edge.
     ///
     /// # Errors
     /// [`SceneError::NoShape`] if the typeface lacks the character.
@@ -236,8 +240,7 @@ impl SceneMap {
 }
 
 /// Averages a picture down to `size_px`. The triangle filter spans two target pixels, so detail
-/// that does not fit is blurred instead of folded back as false detail, and averages stay in `[0,
-/// 1]`.
+/// that is too fine is blurred instead of becoming false detail, and averages stay in `[0, 1]`.
 fn shrink(map: Reflectance, size_px: usize) -> Reflectance {
     if map.size_px <= size_px {
         return map;
@@ -272,7 +275,7 @@ mod tests {
         let map = scene.load(64).unwrap();
         assert_eq!((map.name.as_str(), map.size_px, map.side_mm), ("letter R", 64, Some(43.0)));
         assert_eq!(map.reflectance.len(), 64 * 64);
-        // R: a stem on the left, open ground on the right below the bowl, dark corners.
+        // R has a stem on the left, open ground on the right below the bowl, and dark corners.
         let at = |x: usize, y: usize| map.reflectance[y * 64 + x];
         assert!(at(20, 32) == 1.0 && at(60, 40) == 0.0);
         assert!([at(0, 0), at(63, 0), at(0, 63), at(63, 63)] == [0.0; 4]);
@@ -284,7 +287,7 @@ mod tests {
         assert_eq!(scene.to_string(), "word:IO");
         let map = scene.load(64).unwrap();
         let at = |x: usize, y: usize| map.reflectance[y * 64 + x];
-        // I has its stem in the middle of the left half, O is open in the middle of the right one.
+        // I has its stem in the middle of the left half; O is open in the middle of the right half.
         assert!(at(15, 32) == 1.0 && at(48, 32) == 0.0 && at(37, 32) > 0.0);
         assert!((0..64).all(|x| at(x, 10) == 0.0 && at(x, 54) == 0.0));
         assert!(line("word:").contains("found 0 characters after `word:`, expected 1 to 8"));
@@ -321,7 +324,8 @@ mod tests {
     fn a_large_picture_is_averaged_down_and_a_small_one_kept() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("stripes.png");
-        // Stripes of one pixel: too fine for 8 pixels, so they must become grey, not false bands.
+        // Stripes of one pixel are too fine for 8 pixels, so they must become grey instead of false
+        // bands.
         let stripes: Vec<f32> = (0..64 * 64).map(|at| (at % 2) as f32).collect();
         std::fs::write(&path, encode_grey(64, 64, &stripes)).unwrap();
         let scene = path.to_str().unwrap().parse::<SceneSource>().unwrap();

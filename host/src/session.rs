@@ -1,7 +1,7 @@
-//! A conversation with a camera: greeting, commands and their answers, the stream in between.
+//! A session with a camera: greeting, commands and their answers, and the stream between them.
 //!
 //! # Invariant
-//! Nothing of the stream is skipped while an answer is awaited: every packet goes to the listener as it came, damaged
+//! The listener receives every packet as it arrived, also while an answer is awaited, and damaged
 //! packets too (`tests::every_packet_is_heard_while_an_answer_is_awaited`).
 
 mod conversation;
@@ -22,13 +22,13 @@ use nirspi_wire::{
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
-/// A camera answers a command within this, or something is wrong.
+/// The longest time in which a camera must answer a command.
 pub(crate) const ANSWER_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// Who a camera is: the wire's [`Identity`], owned.
+/// The identity of a camera: the wire's [`Identity`], owned.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CameraIdentity {
-    /// Protocol version it speaks.
+    /// The camera's protocol version.
     pub protocol: u16,
     /// Firmware version.
     pub firmware: String,
@@ -44,7 +44,8 @@ pub struct CameraIdentity {
     pub adc_bits: u8,
     /// Wavelength of the LEDs.
     pub wavelength_nm: u16,
-    /// What the camera can do, in words; empty for a camera of protocol version 1, which does not say.
+    /// The capabilities of the camera in words; empty for a camera of protocol version 1, which
+    /// does not report capabilities.
     #[serde(default)]
     pub capabilities: Vec<String>,
 }
@@ -65,7 +66,8 @@ impl From<&Identity<'_>> for CameraIdentity {
     }
 }
 
-/// The name of each capability; the number of the bit where this program does not know the capability.
+/// The name of each capability; the number of the bit for a capability that this program does not
+/// know.
 fn in_words(capabilities: Capabilities) -> Vec<String> {
     let bits = (0..u32::BITS).filter(|bit| capabilities.contains(Capabilities(1 << bit)));
     bits.map(|bit| {
@@ -75,18 +77,18 @@ fn in_words(capabilities: Capabilities) -> Vec<String> {
     .collect()
 }
 
-/// Hears every packet of a session.
+/// Receives every packet of a session.
 pub trait Listener {
-    /// A packet came. `raw` is as it stood on the wire, delimiter included.
+    /// Receives a packet. `raw` are the bytes on the wire, delimiter included.
     fn packet(&mut self, raw: &[u8], content: &Result<DeviceMessage<'_>, PacketError>);
 
-    /// Whether to go on waiting for what comes next; asked several times a second where a wait may be long.
+    /// Whether to go on waiting; called several times a second during a long wait.
     fn goes_on(&mut self) -> bool {
         true
     }
 }
 
-/// Ignores every packet: for a command of which only the reply counts.
+/// Ignores every packet, for a command of which only the reply counts.
 #[derive(Debug, Default)]
 pub struct IgnorePackets;
 
@@ -94,13 +96,13 @@ impl Listener for IgnorePackets {
     fn packet(&mut self, _: &[u8], _: &Result<DeviceMessage<'_>, PacketError>) {}
 }
 
-/// Keeps what a camera reports with its greeting, in words: at most [`Reports::MOST`] lines, the last of which says that
-/// more came.
+/// Keeps the reports that a camera sends with its greeting, in words. At most [`Reports::MOST`]
+/// lines are kept, and the last line says that more arrived.
 #[derive(Debug, Default)]
 pub struct Reports(pub Vec<String>);
 
 impl Reports {
-    /// Most lines that are kept, whatever a camera sends.
+    /// The most lines that are kept.
     pub const MOST: usize = 100;
 
     fn keep(&mut self, report: Option<String>) {
@@ -119,7 +121,7 @@ impl Listener for Reports {
         self.keep(match content {
             Ok(DeviceMessage::Event(event)) => events::at_greeting(&event.kind),
             Ok(DeviceMessage::Crash(report)) => Some(events::crash(report)),
-            // Intact, and yet no message: of a version that has more to say.
+            // The packet is intact but unknown: its sender has a newer version.
             Err(PacketError::Message) => Some(
                 "the camera reported something that this program does not know: update it"
                     .to_owned(),
@@ -137,16 +139,18 @@ pub struct Session {
 }
 
 impl Session {
-    /// Greets the camera behind `link`, and settles the protocol version: the newest that both sides speak.
+    /// Greets the camera behind `link` and chooses the newest protocol version that both sides
+    /// speak.
     ///
     /// # Errors
-    /// [`SessionError::Version`] where the two cannot talk; the others where nothing sensible answers.
+    /// [`SessionError::Version`] if there is no common version; other errors if the device does not
+    /// answer as a camera.
     pub fn open(link: Box<dyn Link>) -> Result<Self, SessionError> {
         let mut conversation = Conversation::begin(link)?;
         let mut reports = Reports::default();
         let mut greet = |protocol| conversation.ask(&request::Hello(protocol), &mut reports);
         let identity = match greet(version::CURRENT) {
-            // The camera is older than this program, and this program still speaks its version.
+            // The camera is older than this program, but this program still speaks its version.
             Ok(identity) if identity.protocol < version::CURRENT => {
                 let protocol = identity.protocol;
                 if version::speaks(protocol) { greet(protocol) } else { Ok(identity) }
@@ -163,19 +167,20 @@ impl Session {
         }
     }
 
-    /// Who answered.
+    /// The camera's identity.
     #[must_use]
     pub fn identity(&self) -> &CameraIdentity {
         &self.identity
     }
 
-    /// What the camera has reported with its greeting: what befell it while no host listened, in words.
+    /// Reports that the camera sent with its greeting: events while no host was connected, in
+    /// words.
     #[must_use]
     pub fn reports(&self) -> &[String] {
         &self.reports
     }
 
-    /// Waits until all that the camera had to report with its greeting has come.
+    /// Waits until all reports of the greeting have arrived.
     ///
     /// # Errors
     /// As [`command`](Self::command).
@@ -187,10 +192,10 @@ impl Session {
         answered.map(|_| self.reports())
     }
 
-    /// Listens for up to `timeout`, or until something has come; gives every packet to `listener`.
+    /// Listens for up to `timeout`, or until a packet has arrived. Every packet goes to `listener`.
     ///
     /// # Errors
-    /// When the link ends.
+    /// If the link ends.
     pub fn listen(
         &mut self,
         timeout: Duration,
@@ -199,10 +204,10 @@ impl Session {
         self.conversation.pump(timeout, listener, &mut |_, _| {})
     }
 
-    /// Has the camera carry out a command; returns the reply that belongs to this command.
+    /// Executes a command on the camera and returns the reply to this command.
     ///
     /// # Errors
-    /// [`SessionError::Refused`] with the camera's reason, or when the link ends.
+    /// [`SessionError::Refused`] with the camera's reason, or another error if the link ends.
     pub fn command<R: Request>(
         &mut self,
         request: R,
@@ -211,7 +216,7 @@ impl Session {
         self.conversation.ask(&request, listener)
     }
 
-    /// How the camera is.
+    /// The camera's status.
     ///
     /// # Errors
     /// As [`command`](Self::command).
@@ -219,7 +224,7 @@ impl Session {
         self.command(request::Status, listener)
     }
 
-    /// What the device's checks of itself say.
+    /// The results of the device's own checks.
     ///
     /// # Errors
     /// As [`command`](Self::command).
@@ -242,7 +247,7 @@ impl Session {
         self.command(request::ReadRegister(register.address()), listener)
     }
 
-    /// Hands over a piece of a bitstream; returns where the next one belongs.
+    /// Sends a piece of a bitstream. Returns the offset of the next piece.
     ///
     /// # Errors
     /// As [`command`](Self::command).
@@ -254,10 +259,11 @@ impl Session {
         self.command(request::LoadGateware(piece), listener)
     }
 
-    /// Asks for the camera's status without waiting for the answer: tells the camera that the host is alive.
+    /// Requests the camera's status without waiting for the answer, which tells the camera that the
+    /// host is alive.
     ///
     /// # Errors
-    /// When the link ends.
+    /// If the link ends.
     pub fn keep_alive(&mut self) -> Result<(), SessionError> {
         self.conversation.send(Command::Status).map(|_| ())
     }

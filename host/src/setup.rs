@@ -1,4 +1,5 @@
-//! What is measured: order, number of patterns, timing, sweeps. The host's side of a wire configuration.
+//! The setup of a measurement: order, number of patterns, timing, sweeps. The host's form of a wire
+//! configuration.
 
 use nirspi_recon::{Order, Rows, RowsError, Side};
 use nirspi_wire::register::LATENCY_MAX;
@@ -8,42 +9,43 @@ use nirspi_wire::{
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// One measurement setup, as it is sent to a camera and kept in a recording.
+/// One measurement setup, as sent to a camera and stored in a recording.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct MeasurementSetup {
-    /// Name of the order, for people.
+    /// Name of the order, for users.
     pub order: String,
-    /// Hadamard rows of [`Side::INSTRUMENT`] in the order shown; their number is that of the patterns of a sweep.
+    /// Hadamard rows of [`Side::INSTRUMENT`] in the order shown. Their number is the number of
+    /// patterns of a sweep.
     #[serde(with = "shown")]
     pub rows: Rows,
     /// Whether each pattern is followed by its complement.
     pub differential: bool,
-    /// ADC clocks that each pattern is shown.
+    /// ADC clocks for which each pattern is shown.
     pub clocks_per_pattern: u16,
-    /// ADC samples left out at the start of each pattern.
+    /// ADC samples excluded at the start of each pattern.
     pub blanked: u16,
     /// ADC clocks from light to sample.
     pub adc_latency: u8,
-    /// Sweeps summed into one frame.
+    /// Number of sweeps summed into one frame.
     pub sweeps: u32,
 }
 
-/// A number of a setup that no camera can measure with.
+/// A number of a setup that cameras do not accept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 #[error("{field} is {found}, expected {min} to {max}")]
 pub struct SetupError {
-    /// Which number.
+    /// The name of the number.
     pub field: &'static str,
-    /// As found.
+    /// The value found.
     pub found: u32,
-    /// The least that a camera takes.
+    /// The smallest value that a camera accepts.
     pub min: u32,
-    /// The most that a camera takes.
+    /// The largest value that a camera accepts.
     pub max: u32,
 }
 
 impl MeasurementSetup {
-    /// Whether a camera would take this setup: the limits are those of the firmware's `Configure`.
+    /// Checks that a camera accepts this setup. The limits are those of the firmware's `Configure`.
     ///
     /// # Errors
     /// [`SetupError`] names the first number out of range.
@@ -61,11 +63,11 @@ impl MeasurementSetup {
         }
     }
 
-    /// The first `round(sampling * 1024)` patterns of `order` (at least one), differential, at 25 MHz, two
-    /// of five samples blanked.
+    /// The first `round(sampling * 1024)` patterns of `order` (at least one), differential, at 25
+    /// MHz, with two of five samples blanked.
     ///
     /// # Errors
-    /// If the order is no permutation of the 1024 patterns.
+    /// If the order is not a permutation of the 1024 patterns.
     pub fn new(order: &Order, sampling: f64) -> Result<Self, RowsError> {
         let patterns = (sampling * f64::from(PATTERNS)).round().clamp(1.0, f64::from(PATTERNS));
         Ok(Self {
@@ -79,20 +81,20 @@ impl MeasurementSetup {
         })
     }
 
-    /// The same with each pattern shown for `clocks_per_pattern` ADC clocks, of whose samples the first `blanked` are left
-    /// out.
+    /// The same setup with each pattern shown for `clocks_per_pattern` ADC clocks, of which the
+    /// first `blanked` samples are excluded.
     #[must_use]
     pub fn timed(self, clocks_per_pattern: u16, blanked: u16) -> Self {
         Self { clocks_per_pattern, blanked, ..self }
     }
 
-    /// ADC samples summed in each slot.
+    /// Number of ADC samples summed in each slot.
     #[must_use]
     pub fn window(&self) -> u16 {
         self.clocks_per_pattern.saturating_sub(self.blanked)
     }
 
-    /// ADC clocks of one sweep.
+    /// Number of ADC clocks of one sweep.
     #[must_use]
     pub fn sweep_clocks(&self) -> u64 {
         let halves = if self.differential { 2 } else { 1 };
@@ -105,11 +107,11 @@ impl MeasurementSetup {
         self.sweep_clocks() as f64 * f64::from(self.sweeps) * 1e9 / f64::from(ADC_HZ)
     }
 
-    /// Hands the wire configuration to `send`; it borrows the order table.
+    /// Calls `send` with the wire configuration, which borrows the order table.
     pub fn with_configuration<T>(&self, send: impl FnOnce(Configuration<'_>) -> T) -> T {
         let mut table = vec![0; 2 * self.rows.len()];
         let natural = self.rows.iter().copied().eq(0..self.rows.len() as u32);
-        // No side has rows beyond 65 535.
+        // No side has rows above 65 535.
         let order = match Words::pack(self.rows.iter().map(|&row| row as u16), &mut table) {
             Ok(words) if !natural => PatternOrder::Table(words),
             _ => PatternOrder::Natural,
@@ -128,7 +130,7 @@ impl MeasurementSetup {
     }
 }
 
-/// Rows in a recording: a list of numbers, which are checked when they are read.
+/// Rows in a recording: a list of numbers that is checked when it is read.
 mod shown {
     use super::{Rows, Side};
     use serde::{Deserialize, Deserializer, Serializer, de::Error};

@@ -1,4 +1,4 @@
-//! Where measurements come from: a file of anybody's, a recording, or a capture that has just ended.
+//! Reads measurements from a file of nirspi or another lab, a recording, or a finished capture.
 
 use crate::account::LossCounters;
 use crate::calibration::{FlatField, KeptFlatField};
@@ -18,23 +18,24 @@ use thiserror::Error;
 /// How to read measurements.
 #[derive(Debug, Clone, Default)]
 pub struct SourceOptions {
-    /// Which measurement of a file that holds several. Of a recording: `All` gives each frame, anything else their sum.
+    /// The measurement in a file that holds several. For a recording, `All` gives each frame and
+    /// any other choice gives their sum.
     pub index: Option<Index>,
-    /// What a measurement file does not say itself; its `index` is not looked at.
+    /// What a measurement file does not state itself; its `index` is ignored.
     pub file: Selection,
-    /// What to take of complex readings.
+    /// The part of complex readings to use.
     pub part: Part,
-    /// Leave the leak from pattern to pattern of a recording as it is.
+    /// Whether to leave the leak between patterns of a recording uncorrected.
     pub keep_leak: bool,
-    /// Leave the pattern of unequal LEDs of a recording as it is, though a flat field is kept for its camera.
+    /// Whether to ignore the flat field that is kept for a recording's camera.
     pub no_flat_field: bool,
 }
 
-/// What to take of complex readings, as those of a lock-in amplifier, a terahertz or an ultrasound detector are. Real readings
-/// are taken as they are.
+/// The part of complex readings to use. Lock-in amplifiers, terahertz and ultrasound detectors give
+/// complex readings. Real readings are used unchanged.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Part {
-    /// Both parts, of which the image is the magnitude.
+    /// Both parts. The image is the magnitude.
     #[default]
     Magnitude,
     /// The real part.
@@ -44,10 +45,10 @@ pub enum Part {
 }
 
 impl Part {
-    /// All of them.
+    /// Every value.
     pub const ALL: [Self; 3] = [Self::Magnitude, Self::Real, Self::Imaginary];
 
-    /// As it is written on the command line.
+    /// The name on the command line.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -69,12 +70,12 @@ impl FromStr for Part {
     }
 }
 
-/// A measurement of several.
+/// Which of several measurements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Index {
-    /// This one.
+    /// The measurement with this index.
     One(usize),
-    /// Each.
+    /// Every measurement.
     All,
 }
 
@@ -89,23 +90,23 @@ impl FromStr for Index {
     }
 }
 
-/// Which patterns come first where only a share of them is used.
+/// The order by which patterns are chosen if only a share of them is used.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub enum FirstPatterns {
-    /// Those of the lowest sequencies, whatever order was recorded.
+    /// The lowest sequencies, whatever order was recorded.
     #[default]
     LowestSequencies,
-    /// As recorded.
+    /// The recorded order.
     Recorded,
-    /// Those of this order.
+    /// This order.
     Of(Order),
 }
 
 impl FirstPatterns {
-    /// The first `sampling` (0 to 1) of all patterns, and the order in words.
+    /// The first `sampling` (0 to 1) of all patterns, and the name of the order.
     ///
     /// # Errors
-    /// [`MeasurementError`] if the share leaves nothing, or the order is not one of these patterns.
+    /// [`MeasurementError`] if the share is empty, or the order does not fit these patterns.
     pub fn take(
         &self,
         measurements: &Measurements,
@@ -113,7 +114,7 @@ impl FirstPatterns {
     ) -> Result<(Measurements, String), MeasurementError> {
         let (order, name) = match self {
             Self::Of(order) => (Some(order.clone()), order.to_string()),
-            // All patterns give the same image in any order.
+            // All patterns together give the same image in any order.
             Self::LowestSequencies if sampling < 1.0 => {
                 let order = reconstruct::LOWEST_SEQUENCIES;
                 let name = format!("{order} (lowest sequencies first)");
@@ -137,21 +138,21 @@ pub enum SourceError {
     /// The file cannot be read as a recording.
     #[error(transparent)]
     Recording(#[from] RecordingError),
-    /// Its readings are not measurements.
+    /// The readings are not valid measurements.
     #[error("{}", .path.display())]
     Measurements {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// What is wrong with them.
+        /// The problem.
         #[source]
         problem: MeasurementError,
     },
     /// The frames give no measurements.
     #[error("{}", .path.display())]
     Integrate {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// What is wrong with them.
+        /// The problem.
         #[source]
         problem: IntegrateError,
     },
@@ -161,49 +162,49 @@ pub enum SourceError {
     /// Every frame contradicts the setup of the recording.
     #[error("{}: no frame is of the recording's setup", .path.display())]
     Misfit {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// How the first one contradicts it.
+        /// The contradiction of the first frame.
         #[source]
         misfit: Misfit,
     },
-    /// Options of a measurement file with a recording.
+    /// The options are for measurement files, but the file is a recording.
     #[error(
         "--index N, --part, and what says how a file is laid out belong to measurement files, not to recordings"
     )]
     NotForRecordings,
-    /// Complex readings where real ones are expected.
+    /// The readings are complex, but real readings are needed.
     #[error("{}: complex readings, expected real ones here: choose a part with --part real or --part imaginary", .0.display())]
     Complex(PathBuf),
-    /// Several measurements where one is expected.
+    /// The choice is of several measurements, but one is needed.
     #[error("--index all, expected one measurement here")]
     One,
 }
 
-/// Measurements with what is known about where they come from.
+/// Measurements and their origin.
 #[derive(Debug, Clone)]
 pub struct Source {
-    /// One value a Hadamard row.
+    /// One value for each Hadamard row.
     pub measurements: Measurements,
-    /// The imaginary part of complex measurements of the same rows, where both parts were asked for.
+    /// The imaginary parts of complex measurements of the same rows, if both parts were requested.
     pub imaginary: Option<Measurements>,
-    /// Readings that were lost, with the rows that they cost.
+    /// Lost readings, with the rows that they affect.
     pub dropouts: Vec<Dropout>,
-    /// Places in the order shown of patterns that the file says were not read: NaN, or a negative row.
+    /// Positions in the order shown of the patterns that the file marks as not read: NaN, or a
+    /// negative row.
     pub not_read: Vec<usize>,
     /// The file's own image of the same scene.
     pub reference: Option<Image>,
-    /// What became of a recording's frames.
+    /// The account of a recording's frames.
     pub frames: Option<LossCounters>,
-    /// What to tell the user.
+    /// Notes for the user.
     pub notes: Vec<String>,
-    /// The flat field of the camera that was recorded, where one is kept.
+    /// The flat field of the recorded camera, if one is kept.
     pub flat_field: Option<FlatField>,
 }
 
 impl Source {
-    /// What the camera has seen, given what a reconstruction makes of its measurements: the pattern of unequal LEDs taken away
-    /// where their flat field is known.
+    /// Corrects a reconstructed image by the flat field, if there is one.
     #[must_use]
     pub fn flattened(&self, image: Image) -> Image {
         match &self.flat_field {
@@ -212,7 +213,7 @@ impl Source {
         }
     }
 
-    /// The same measurements of a camera with this flat field.
+    /// The same measurements with the flat field of their camera.
     #[must_use]
     pub fn with_flat_field(mut self, kept: KeptFlatField) -> Self {
         self.notes.push(kept.summary());
@@ -223,7 +224,7 @@ impl Source {
     /// Reads one measurement, or the sum of a recording's frames.
     ///
     /// # Errors
-    /// [`SourceError`], which names the file and what is wrong with it.
+    /// [`SourceError`], which names the file and the problem.
     pub fn read(path: &Path, options: &SourceOptions) -> Result<Self, SourceError> {
         let index = options.one()?;
         if options.fits_recording(path)? {
@@ -245,7 +246,7 @@ impl Source {
         files.into_iter().map(|file| from_file(path, file, options.part)).collect()
     }
 
-    /// The measurements, where only real ones serve.
+    /// The measurements, for uses that need real ones.
     ///
     /// # Errors
     /// [`SourceError::Complex`] for both parts of complex readings.
@@ -256,10 +257,10 @@ impl Source {
         }
     }
 
-    /// The frames of a capture that has just ended, without reading its recording again.
+    /// The frames of a finished capture, without reading its recording again.
     ///
     /// # Errors
-    /// [`IntegrateError`] where its frames give no measurements.
+    /// [`IntegrateError`] if its frames give no measurements.
     pub fn of_capture(capture: &Capture) -> Result<Self, IntegrateError> {
         let Capture { setup, settling, integrated, counters, .. } = capture;
         let mut notes: Vec<String> = integrated.warnings().into_iter().map(str::to_owned).collect();
@@ -278,7 +279,7 @@ impl Source {
     }
 }
 
-/// What a capture lacks, as a note; the text may come from a file.
+/// A note about what a capture lacks. The text may come from a file.
 fn not_whole(missing: &str) -> String {
     format!("the recording is not whole: {}", missing.escape_debug())
 }
@@ -286,10 +287,10 @@ fn not_whole(missing: &str) -> String {
 const NOT_CALIBRATED: &str = "no calibration in the recording: the settling leak stays";
 
 impl SourceOptions {
-    /// The one that is asked for.
+    /// The requested index.
     ///
     /// # Errors
-    /// [`SourceError::One`] if all are.
+    /// [`SourceError::One`] if all measurements were requested.
     pub fn one(&self) -> Result<Option<usize>, SourceError> {
         match self.index {
             None => Ok(None),
@@ -298,10 +299,11 @@ impl SourceOptions {
         }
     }
 
-    /// Whether the file is a recording, for which these options must make sense.
+    /// Whether the file is a recording. An error if options do not apply to recordings.
     fn fits_recording(&self, path: &Path) -> Result<bool, SourceError> {
         let mut magic = [0; 4];
-        // A pipe would be waited for; what is no file is refused where it is read.
+        // Opening a pipe would wait for a writer. Reading the file later refuses everything that is
+        // not a file.
         let is_mcap = path.is_file()
             && std::fs::File::open(path)
                 .and_then(|mut file| file.read_exact(&mut magic))
@@ -332,7 +334,8 @@ fn from_file(path: &Path, file: MeasurementFile, part: Part) -> Result<Source, S
             (measurements, None, dropouts)
         }
         (Some(imaginary), Part::Magnitude) => {
-            // Of both parts the same rows are known: light that dims is no law for either part alone.
+            // Both parts keep the same rows: detecting drop-outs by dimmed light does not apply to
+            // one part alone.
             let differences = |readings| without_dropouts(&file.h_row, readings);
             let wrong = |problem| SourceError::Measurements { path: path.to_owned(), problem };
             let real = differences(&file.readings).map_err(wrong)?;
@@ -340,7 +343,7 @@ fn from_file(path: &Path, file: MeasurementFile, part: Part) -> Result<Source, S
         }
     };
     for dropout in &mut dropouts {
-        // Readings are counted as in the file, those not read among them.
+        // Readings are numbered as in the file, including those that were not read.
         let place = |reading: usize| 2 * file.places[reading / 2] + reading % 2;
         let last = dropout.start + dropout.length - 1;
         (dropout.start, dropout.length) =
@@ -358,12 +361,12 @@ fn from_file(path: &Path, file: MeasurementFile, part: Part) -> Result<Source, S
     Ok(Source { measurements, imaginary, dropouts, not_read, reference, frames, notes, flat_field })
 }
 
-/// The part of a complex reference to compare with: of real readings, its real part.
+/// The part of a complex reference to compare with; for real readings, the real part.
 fn imaginary_of(part: Part, complex: bool) -> Part {
     if complex { part } else { Part::Real }
 }
 
-/// The measurements that readings are, with drop-outs left out.
+/// The measurements of these readings, without drop-outs.
 fn measured(
     rows: &Rows,
     readings: &Readings,
@@ -382,7 +385,7 @@ fn measured(
     }
 }
 
-/// The measurements that readings are, all of them.
+/// The measurements of all these readings.
 fn without_dropouts(rows: &Rows, readings: &Readings) -> Result<Measurements, MeasurementError> {
     match readings {
         Readings::Pairs(y) => {
@@ -394,7 +397,7 @@ fn without_dropouts(rows: &Rows, readings: &Readings) -> Result<Measurements, Me
     }
 }
 
-/// Sums the frames of a recording, counting again what became of each.
+/// Sums the frames of a recording, and makes their account again.
 fn from_recording(path: &Path, options: &SourceOptions) -> Result<Source, SourceError> {
     let mut recording = Recording::open(path)?;
     let tally = tally_recording(&mut recording)?;
@@ -404,7 +407,7 @@ fn from_recording(path: &Path, options: &SourceOptions) -> Result<Source, Source
     of_frames(path, options, &recording, tally.integrated(), &tally)
 }
 
-/// Why no frame of a recording counts.
+/// Why a recording has no valid frame.
 fn no_frame(path: &Path, tally: &Tally) -> SourceError {
     let path = path.to_owned();
     match tally.misfit() {
@@ -422,7 +425,7 @@ fn frames_of_recording(path: &Path, options: &SourceOptions) -> Result<Vec<Sourc
     frames.iter().map(|frame| of_frames(path, options, &recording, frame, &tally)).collect()
 }
 
-/// What the sum of some frames says.
+/// The measurements of the sum of some frames.
 fn of_frames(
     path: &Path,
     options: &SourceOptions,

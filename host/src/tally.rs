@@ -1,6 +1,7 @@
-//! The tally of one run: packets in, the sum of its frames and their account out, live or from a recording.
+//! The tally of one run, live or from a recording: sums the frames of its packets and makes their
+//! account.
 //!
-//! The one law: a recording gives the same tally as the capture that made it.
+//! A recording gives the same tally as the capture that made it.
 
 use crate::account::{Arrival, LossAccount};
 use crate::integrate::Integrated;
@@ -9,45 +10,45 @@ use crate::setup::MeasurementSetup;
 use nirspi_wire::{DeviceMessage, EventKind, Frame, FrameFlags, PacketError, open};
 use thiserror::Error;
 
-/// What a run's packets amount to.
+/// The sum and the account of a run's packets.
 #[derive(Debug, Clone)]
 pub struct Tally {
-    /// The run that counts; `None`: that of the first frame.
+    /// The run that counts; `None` means the run of the first frame.
     run: Option<u16>,
     differential: bool,
     account: LossAccount,
     integrated: Integrated,
-    /// Why the first frame that is not of the setup is none.
+    /// How the first invalid frame contradicts the setup.
     misfit: Option<Misfit>,
-    /// Frames made, by the camera's word, once the run has ended.
+    /// The number of frames that the camera reported at the end of the run.
     said: Option<u32>,
     device_time_us: u64,
-    /// Intact messages of a newer protocol version.
+    /// Number of intact messages of a newer protocol version.
     unknown: u64,
 }
 
 /// How an intact frame contradicts the setup.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum Misfit {
-    /// Another number of patterns.
+    /// The number of patterns differs.
     #[error("frames of {found} patterns, expected {expected} by the setup")]
     Patterns {
-        /// Samples of the frame.
+        /// Number of samples of the frame.
         found: usize,
-        /// Patterns of the setup.
+        /// Number of patterns of the setup.
         expected: usize,
     },
-    /// Differences where the setup has single patterns, or the reverse.
+    /// The frame has differences and the setup single patterns, or the reverse.
     #[error(
         "frames of {}, expected {} by the setup",
         kind_of_samples(*.differential),
         kind_of_samples(!*.differential)
     )]
     Differential {
-        /// What the frame says.
+        /// Whether the frame has differences.
         differential: bool,
     },
-    /// No sweep summed: the samples are no measurement.
+    /// The frame sums no sweep, so its samples are not measurements.
     #[error("frames of 0 sweeps, expected at least 1")]
     NoSweep,
 }
@@ -57,8 +58,8 @@ fn kind_of_samples(differential: bool) -> &'static str {
 }
 
 impl Tally {
-    /// Nothing has come. Frames of another run than `run` are stragglers of earlier ones, and do not count; `None`
-    /// counts the run of the first frame that comes.
+    /// An empty tally. Frames of another run than `run` are stragglers of earlier runs and do not
+    /// count. With `None`, the run of the first frame counts.
     #[must_use]
     pub fn new(setup: &MeasurementSetup, run: Option<u16>) -> Self {
         Self {
@@ -73,7 +74,7 @@ impl Tally {
         }
     }
 
-    /// A packet has come. Returns whether it was a frame that was added to the sum.
+    /// Counts a packet. Returns whether the packet was a frame that was added to the sum.
     pub fn packet(&mut self, content: &Result<DeviceMessage<'_>, PacketError>) -> bool {
         match content {
             Ok(DeviceMessage::Frame(frame)) => return self.frame(frame),
@@ -98,7 +99,7 @@ impl Tally {
         }
         self.device_time_us = self.device_time_us.max(frame.device_time_us);
         if let Some(misfit) = self.misfit_of(frame) {
-            // Intact, yet not of this setup: as lost as if it had been damaged.
+            // An intact frame that does not fit the setup counts as damaged.
             self.misfit.get_or_insert(misfit);
             self.account.damaged();
             return false;
@@ -122,33 +123,33 @@ impl Tally {
         }
     }
 
-    /// The camera says that the run is over, and how many frames it has made.
+    /// Records the end of the run and the number of frames that the camera reported.
     pub fn end(&mut self, frames_made: u32) {
         self.account.made(frames_made);
         self.said = Some(frames_made);
     }
 
-    /// Frames that the run has made by the camera's word, once it has ended. The camera counts in 32 bits; the account
-    /// goes on beyond.
+    /// Number of frames that the camera reported, after the end of the run. The camera counts in 32
+    /// bits; the account counts further.
     #[must_use]
     pub fn made(&self) -> Option<u64> {
         let accounted = self.account.accounted();
         self.said.map(|said| if said == accounted as u32 { accounted } else { u64::from(said) })
     }
 
-    /// Why the first frame that contradicts the setup does so; `None` if no frame does.
+    /// How the first invalid frame contradicts the setup; `None` if all frames fit.
     #[must_use]
     pub fn misfit(&self) -> Option<Misfit> {
         self.misfit
     }
 
-    /// Whether the camera has said that the run is over.
+    /// Whether the camera has reported the end of the run.
     #[must_use]
     pub fn has_ended(&self) -> bool {
         self.said.is_some()
     }
 
-    /// Whether anything of the run, whole or damaged, has come.
+    /// Whether any packet of the run, whole or damaged, has arrived.
     #[must_use]
     pub fn has_begun(&self) -> bool {
         self.account.accounted() > 0 || self.account.damaged_packets() > 0
@@ -160,13 +161,14 @@ impl Tally {
         self.device_time_us
     }
 
-    /// What became of each frame.
+    /// The account of the frames.
     #[must_use]
     pub fn account(&self) -> &LossAccount {
         &self.account
     }
 
-    /// Intact messages that this program does not know: passed over, since a newer camera may send them.
+    /// Number of intact messages that this program does not know. The messages are skipped, because
+    /// a newer camera may send them.
     #[must_use]
     pub fn unknown_packets(&self) -> u64 {
         self.unknown
@@ -182,7 +184,7 @@ impl Tally {
 /// Counts the packets of a recording again.
 ///
 /// # Errors
-/// [`RecordingError`] where the file cannot be read.
+/// [`RecordingError`] if the file cannot be read.
 pub fn tally_recording(recording: &mut Recording) -> Result<Tally, RecordingError> {
     let mut tally = Tally::new(&recording.setup, recording.run);
     for packet in recording {
@@ -191,10 +193,10 @@ pub fn tally_recording(recording: &mut Recording) -> Result<Tally, RecordingErro
     Ok(tally)
 }
 
-/// What each frame of a recording that arrived in order says by itself, and what became of all of them.
+/// The sum of each frame of a recording that arrived in order, and the account of all frames.
 ///
 /// # Errors
-/// [`RecordingError`] where the file cannot be read.
+/// [`RecordingError`] if the file cannot be read.
 pub fn frames_of_recording(
     recording: &mut Recording,
 ) -> Result<(Vec<Integrated>, Tally), RecordingError> {
@@ -213,7 +215,7 @@ pub fn frames_of_recording(
     Ok((frames, tally))
 }
 
-/// The packet without its delimiter, to be decoded in place.
+/// The packet without its delimiter, for decoding in place.
 fn encoded(packet: &mut Packet) -> &mut [u8] {
     let bytes = &mut packet.bytes;
     if bytes.last() == Some(&0) {

@@ -1,6 +1,8 @@
-//! Linux: the udev rule that lets whoever sits at the machine use a camera on USB.
+//! Linux: the udev rule that gives the user at the machine access to cameras on USB.
 //!
-//! The one law: a file that is not ours is neither replaced nor removed.
+//! # Invariant
+//! A file of another program is neither replaced nor removed
+//! (`tests::a_file_of_someone_else_is_left_as_it_is`).
 
 use crate::files::FileError;
 use crate::files::output::write_atomic;
@@ -10,14 +12,14 @@ use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// Where the system's own rules of this machine lie.
+/// The folder of the machine's local rules.
 pub const RULES_DIR: &str = "/etc/udev/rules.d";
 /// Name of the rule. `uaccess` acts in `73-seat-late.rules`, so the number must be lower.
 pub const RULE_NAME: &str = "60-nirspi.rules";
-/// Begins every version of the rule.
+/// The first words of every version of the rule.
 const OURS: &str = "# The nirspi camera";
 
-/// The rule.
+/// The text of the rule.
 #[must_use]
 pub fn rule() -> String {
     format!(
@@ -27,32 +29,32 @@ pub fn rule() -> String {
     )
 }
 
-/// Whether the rule stands.
+/// Whether the rule is installed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Installed {
-    /// As this version writes it.
+    /// Installed, with the text of this version.
     Yes,
-    /// As another version wrote it.
+    /// Installed, with the text of another version.
     Other,
-    /// Not at all.
+    /// Not installed.
     No,
 }
 
 /// Why the rule was not changed.
 #[derive(Debug, Error)]
 pub enum RuleError {
-    /// Someone else's file has its name.
+    /// A file of another program has the rule's name.
     #[error("{0}: not written by nirspi, so left as it is")]
     Foreign(PathBuf),
-    /// It cannot be read or removed.
+    /// The rule cannot be read or removed.
     #[error("{path}: cannot read or remove it")]
     Io {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// Why.
+        /// The system's reason.
         source: io::Error,
     },
-    /// It cannot be written.
+    /// The rule cannot be written.
     #[error(transparent)]
     Write(#[from] FileError),
 }
@@ -71,10 +73,10 @@ impl RuleError {
     }
 }
 
-/// Whether the rule stands in `folder`.
+/// Whether the rule is installed in `folder`.
 ///
 /// # Errors
-/// When another file has its name, or it cannot be read.
+/// If another file has the rule's name, or the rule cannot be read.
 pub fn check(folder: &Path) -> Result<Installed, RuleError> {
     let path = folder.join(RULE_NAME);
     match fs::read_to_string(&path) {
@@ -86,10 +88,10 @@ pub fn check(folder: &Path) -> Result<Installed, RuleError> {
     }
 }
 
-/// Writes the rule into `folder`; whether anything had to be done.
+/// Writes the rule into `folder`. Returns whether anything was changed.
 ///
 /// # Errors
-/// As [`check`], and when it cannot be written.
+/// As [`check`], and if the rule cannot be written.
 pub fn install(folder: &Path) -> Result<bool, RuleError> {
     if check(folder)? == Installed::Yes {
         return Ok(false);
@@ -98,10 +100,10 @@ pub fn install(folder: &Path) -> Result<bool, RuleError> {
     Ok(true)
 }
 
-/// Removes the rule from `folder`; whether there was one.
+/// Removes the rule from `folder`. Returns whether there was a rule.
 ///
 /// # Errors
-/// As [`check`], and when it cannot be removed.
+/// As [`check`], and if the rule cannot be removed.
 pub fn uninstall(folder: &Path) -> Result<bool, RuleError> {
     if check(folder)? == Installed::No {
         return Ok(false);
@@ -156,7 +158,7 @@ mod tests {
         assert!(!RuleError::Foreign(PathBuf::new()).is_permission());
     }
 
-    /// `boards/60-nirspi.rules` is for those who install the rule by hand.
+    /// `boards/60-nirspi.rules` is for users who install the rule by hand.
     #[test]
     fn the_rule_is_that_of_the_boards_folder() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../boards").join(RULE_NAME);

@@ -1,4 +1,4 @@
-//! Whether a camera and this program belong together, and what to update where they do not.
+//! Checks whether a camera and this program fit together, and says what to update.
 
 use crate::boards::Board;
 use crate::session::CameraIdentity;
@@ -6,36 +6,36 @@ use nirspi_wire::{register::Register, version};
 use serde::Serialize;
 use std::cmp::Ordering;
 
-/// How the camera's part compares with the one this program was built with.
+/// How the camera's part compares with the part of this program's build.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Match {
-    /// The same.
+    /// The versions are the same.
     Same,
-    /// The camera's is older.
+    /// The camera's part is older.
     Older,
-    /// The camera's is newer.
+    /// The camera's part is newer.
     Newer,
-    /// The camera has none that answers.
+    /// The camera has no such part that answers.
     Absent,
 }
 
-/// One part, both sides.
+/// One part of the camera and of the program.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Part {
-    /// What it is.
+    /// The name of the part.
     pub name: &'static str,
     /// The camera's version.
     pub camera: String,
-    /// The version this program was built with.
+    /// The version of this program's build.
     pub expected: String,
-    /// How they compare.
+    /// How the two versions compare.
     pub compared: Match,
-    /// What to do; `None` where all is well.
+    /// What to do; `None` if the versions fit.
     pub advice: Option<String>,
 }
 
-/// A version as it stands in the FPGA's register: `major << 16 | minor << 8 | patch`.
+/// A version in the FPGA's register: `major << 16 | minor << 8 | patch`.
 #[must_use]
 pub fn of_register(value: u32) -> String {
     let [_, major, minor, patch] = value.to_be_bytes();
@@ -63,7 +63,7 @@ fn part(
     Part { name, camera: camera.to_owned(), expected: expected.to_owned(), compared, advice }
 }
 
-/// Compares all parts. `map` is what the FPGA's version register reads, if it was read.
+/// Compares all parts. `map` is the value of the FPGA's version register, if it was read.
 #[must_use]
 pub fn compare(camera: &CameraIdentity, map: Option<u32>) -> Vec<Part> {
     let program = env!("CARGO_PKG_VERSION");
@@ -90,7 +90,7 @@ pub fn compare(camera: &CameraIdentity, map: Option<u32>) -> Vec<Part> {
 const LOAD_GATEWARE: &str = "load this version's bitstream: nirspi gateware target/gateware/ecp5-evn/nirspi.bit --camera ... \
      (python3 hdl/build.py makes it)";
 
-/// How to bring a board's firmware to this program's version.
+/// How to update a board's firmware to this program's version.
 fn update_firmware(board: &str) -> String {
     match Board::named(board) {
         Some(Board { name, chip: Some(_), .. }) => {
@@ -120,7 +120,7 @@ mod tests {
         camera
     }
 
-    /// Name and advice of all that is not the same.
+    /// Name and advice of all parts that differ.
     fn advice(camera: &CameraIdentity, map: u32) -> Vec<(&'static str, String)> {
         let parts = compare(camera, Some(map));
         parts.into_iter().filter_map(|part| Some((part.name, part.advice?))).collect()

@@ -1,4 +1,4 @@
-//! Weather by name, or from a file of drops that somebody counted.
+//! Reads weather by name, or from a file of counted drops.
 
 use crate::files::FileError;
 use crate::files::table::Table;
@@ -6,22 +6,22 @@ use nirspi_optics::rain::{Air, AirError, DropClass, Drops, RainError};
 use std::path::Path;
 use thiserror::Error;
 
-/// Why there is no such weather. `Display` is one line.
+/// Why the weather cannot be read. `Display` is one line.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum WeatherError {
-    /// Text that names no weather.
+    /// The text does not name a weather.
     #[error("{0}{file}", file = or_a_file(.0))]
     Text(#[from] AirError),
-    /// A file that cannot be read.
+    /// The file cannot be read.
     #[error(transparent)]
     File(#[from] FileError),
-    /// A file of drops that cannot be.
+    /// The drops of the file are not physical.
     #[error("{file}: {problem}")]
     Drops {
         /// The file.
         file: String,
-        /// What is wrong.
+        /// The problem.
         problem: RainError,
     },
 }
@@ -30,10 +30,10 @@ fn or_a_file(error: &AirError) -> &'static str {
     if matches!(error, AirError::Unknown { .. }) { ", or a .csv file" } else { "" }
 }
 
-/// Drops that somebody counted: a CSV file of diameters in mm and drops per cubic metre.
+/// Counted drops: a CSV file of diameters in mm and drops per cubic metre.
 ///
 /// # Errors
-/// [`WeatherError`] for a file that cannot be read or holds something else.
+/// [`WeatherError`] for a file that cannot be read or is not a file of drops.
 pub fn read_drops(path: &Path) -> Result<Drops, WeatherError> {
     let pairs = Table::read(path)?.pairs("diameter in mm, drops per m3")?;
     let class = |[diameter_mm, per_m3]: [f64; 2]| DropClass { diameter_mm, per_m3 };
@@ -47,10 +47,11 @@ pub fn is_drop_file(text: &str) -> bool {
     !text.contains(':') && text.to_ascii_lowercase().ends_with(".csv")
 }
 
-/// The weather that a user names: as [`Air`] reads it, or a CSV file of drops, either with `+window:...` behind it.
+/// The weather that a user names: a text for [`Air`], or a CSV file of drops. `+window:...` may
+/// follow either.
 ///
 /// # Errors
-/// [`WeatherError`] for text that names no weather.
+/// [`WeatherError`] for text that does not name a weather.
 pub fn read_weather(text: &str) -> Result<Air, WeatherError> {
     let (first, window) = match text.rsplit_once('+') {
         Some((first, window)) => (first, Some(window)),

@@ -1,4 +1,4 @@
-//! `--camera`: opens the camera that is meant, and says on stderr what it reports from before.
+//! `--camera`: opens the camera at this address, and prints its earlier reports on stderr.
 
 use super::camera::SceneArgs;
 use super::print;
@@ -8,7 +8,8 @@ use nirspi::link::Link;
 use nirspi::session::Session;
 use nirspi::virtual_camera::MemoryLink;
 
-/// Opens a conversation with the camera, and says what befell it before. `scene` is what a virtual one looks at.
+/// Opens a session with the camera, and prints its earlier reports. `scene` is the scene of a
+/// virtual camera.
 pub fn open(address: &CameraAddress, scene: &SceneArgs) -> Result<Session> {
     let mut session = open_quietly(address, scene)?;
     for report in session.await_reports().with_context(|| address.to_string())? {
@@ -17,9 +18,9 @@ pub fn open(address: &CameraAddress, scene: &SceneArgs) -> Result<Session> {
     Ok(session)
 }
 
-/// The same without a word.
+/// Opens a session with the camera, and prints nothing.
 pub fn open_quietly(address: &CameraAddress, scene: &SceneArgs) -> Result<Session> {
-    // Mistakes in the scene's arguments are said as mistakes in the call.
+    // Mistakes in the scene's arguments are reported as wrong usage.
     let optics = match address {
         CameraAddress::Virtual => Some(scene.optics()?.1),
         _ => None,

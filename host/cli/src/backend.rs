@@ -1,6 +1,9 @@
-//! What computes, as the command line says it.
+//! The backend of the command line.
 //!
-//! The one law: who asked for a GPU gets it or one line that says why not; who did not is told once, and goes on.
+//! # Invariant
+//! A GPU requested by name computes, or one line says why not. If `auto` finds no GPU, one line
+//! says so, and the CPU computes (`without_a_gpu_auto_says_so_once_and_goes_on` in
+//! `host/cli/tests/cli/sparse_problems.rs`).
 
 #[cfg(feature = "gpu")]
 use super::print;
@@ -19,7 +22,7 @@ pub use nirspi_recon::omp::gpu::Device;
 #[cfg(not(feature = "gpu"))]
 pub enum Device {}
 
-/// The device for a batch of `frames`, or none: the processor.
+/// The device for a batch of `frames`; `None` means the processor.
 #[cfg(feature = "gpu")]
 pub fn choose(backend: Backend, frames: usize) -> Result<Option<Device>> {
     match gpu::choose(backend, frames)? {
@@ -32,7 +35,7 @@ pub fn choose(backend: Backend, frames: usize) -> Result<Option<Device>> {
     }
 }
 
-/// None: the processor is all that this build has.
+/// `None`: this build has only the processor.
 #[cfg(not(feature = "gpu"))]
 pub fn choose(backend: Backend, _frames: usize) -> Result<Option<Device>> {
     match backend {

@@ -1,4 +1,5 @@
-//! `nirspi calibrate`: measures ADC latency, settling and flat field against a white sheet and keeps them for the camera.
+//! `nirspi calibrate`: measures ADC latency, settling and flat field against a white sheet and
+//! keeps them for the camera.
 
 use super::address::{self, CameraAddress};
 use super::camera::{ModelArgs, SceneArgs};
@@ -134,13 +135,13 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 /// All patterns and their complements, with the timing of the camera.
 fn setup(args: &Args, settling: &Settling) -> Result<MeasurementSetup> {
     let readout = args.model.read()?.readout;
-    // Ranges are checked when a description is read.
+    // The ranges were checked when the description was read.
     let (clocks, blanked) = (readout.clocks_per_pattern as u16, readout.blanked as u16);
     let setup = MeasurementSetup::new(&Order::Natural, 1.0)?.timed(clocks, blanked);
     Ok(MeasurementSetup { adc_latency: settling.adc_latency, ..setup })
 }
 
-/// Shows how many of all sweeps have come, over several captures.
+/// Shows the number of received sweeps, over several captures.
 fn watched(bar: &ProgressBar) -> impl FnMut(&Progress) -> ControlFlow<()> + '_ {
     let (mut before, mut last) = (0, 0);
     move |progress| {
@@ -154,7 +155,7 @@ fn watched(bar: &ProgressBar) -> impl FnMut(&Progress) -> ControlFlow<()> + '_ {
     }
 }
 
-/// Measures the flat field and keeps it.
+/// Measures the flat field and writes its file.
 fn white(
     args: &Args,
     session: &mut Session,

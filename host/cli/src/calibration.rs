@@ -1,4 +1,4 @@
-//! Arguments that say where a capture's ADC latency and settling come from.
+//! Arguments for the source of a capture's ADC latency and settling.
 
 use super::Usage;
 use anyhow::Result;
@@ -29,7 +29,7 @@ pub struct CalibrationArgs {
 }
 
 impl CalibrationArgs {
-    /// The latency to measure with where no calibration replaces it.
+    /// The latency for the measurement if there is no calibration.
     pub fn adc_latency(&self) -> u8 {
         self.adc_latency.unwrap_or(0)
     }

@@ -1,4 +1,4 @@
-//! Arguments that say what a virtual camera looks at, and how to measure.
+//! Arguments for the scene of a virtual camera, and for the measurement.
 
 use super::Usage;
 use anyhow::{Context, Result};
@@ -13,7 +13,7 @@ use nirspi_recon::Order;
 use std::path::Path;
 use std::str::FromStr;
 
-/// Edge of the reflectance map that a scene is drawn on.
+/// Edge of a drawn scene's reflectance map.
 const SCENE_PX: usize = 256;
 
 /// What stands before a virtual camera.
@@ -49,7 +49,7 @@ pub struct ModelArgs {
 }
 
 impl ModelArgs {
-    /// The description.
+    /// Reads the description.
     pub fn read(&self) -> Result<CameraModel> {
         Ok(read_camera_model(&self.camera_model)?)
     }
@@ -68,7 +68,7 @@ pub struct WeatherArgs {
 }
 
 impl WeatherArgs {
-    /// The weather asked for, if any.
+    /// The requested weather, if any.
     pub fn read(&self) -> Result<Option<Air>> {
         let read = |text: &String| {
             read_weather(text).map_err(|error| match error {
@@ -93,7 +93,7 @@ pub enum Rain {
 }
 
 impl Rain {
-    /// The same for the optics.
+    /// The same rain as a value of the optics.
     pub fn rainfall(self) -> Rainfall {
         match self {
             Self::None => Rainfall::None,
@@ -120,7 +120,7 @@ impl SceneArgs {
         Self { scene, distance_m: None, rain: Some(Rain::None), weather, model, seed }
     }
 
-    /// What is before this camera.
+    /// The weather in front of this camera.
     pub fn air(&self, model: &CameraModel) -> Result<Air> {
         let rainfall = || self.rain.map_or(model.weather.rain, Rain::rainfall);
         match self.weather.read()? {
@@ -129,7 +129,7 @@ impl SceneArgs {
         }
     }
 
-    /// The scene and the optics before it.
+    /// The scene, and the optics in front of it.
     pub fn optics(&self) -> Result<(SceneMap, VirtualOptics)> {
         let model = self.model.read()?;
         let distance_mm = self.distance_m.map_or(model.projector().focus_distance_mm, |m| m * 1e3);
@@ -207,7 +207,7 @@ fn order_help() -> String {
     )
 }
 
-/// An order by name, or a user's own from a file, as an option says it.
+/// An order by name, or a user's own order from a file. `option` names the option in errors.
 pub fn parse_order(option: &str, name: &str) -> Result<Order> {
     if let Some(path) = name.strip_prefix("table:") {
         return Ok(Order::Table(read_order_table(Path::new(path))?));
@@ -215,7 +215,7 @@ pub fn parse_order(option: &str, name: &str) -> Result<Order> {
     Order::from_str(name).map_err(|error| Usage(format!("{option}: {error} or table:FILE")).into())
 }
 
-/// A share of patterns is more than 0 and at most 1.
+/// Checks that a share of patterns is more than 0 and at most 1.
 pub fn check_sampling(sampling: f64) -> Result<()> {
     if sampling > 0.0 && sampling <= 1.0 {
         return Ok(());

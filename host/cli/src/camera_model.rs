@@ -1,4 +1,4 @@
-//! `nirspi camera-model`: a camera description, and what follows from it.
+//! `nirspi camera-model`: evaluates or prints a camera description.
 
 use super::print;
 use anyhow::Result;
@@ -43,7 +43,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The shipped file of this name, if it is complete: the others say only what differs.
+/// The shipped file of this name, if the file is complete. Other shipped files have only the
+/// differences.
 fn camera_with_remarks(name: &str) -> Option<&'static str> {
     nirspi::virtual_camera::CameraModel::shipped_text(name).filter(|text| !text.contains("\nbasis"))
 }

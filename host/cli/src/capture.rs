@@ -1,4 +1,4 @@
-//! `nirspi capture`: record a camera, with every frame accounted for.
+//! `nirspi capture`: records a camera, with an account of every frame.
 
 use super::address::{self, CameraAddress};
 use super::calibration::CalibrationArgs;
@@ -63,24 +63,24 @@ struct Report<'r> {
     recording: &'r Path,
     bytes: u64,
     frames: LossCounters,
-    /// As the camera counted them; `null` where it went away before it could say.
+    /// As counted by the camera; `null` if the camera disconnected before it reported.
     made: Option<u64>,
     damaged_packets: u64,
     unknown_packets: u64,
     repeated: u64,
-    /// Frames asked for; `null` for a run until Ctrl-C.
+    /// Frames requested; `null` for a run until Ctrl-C.
     asked: Option<u32>,
     ended: &'static str,
     complete: bool,
-    /// What keeps it from being complete; `null` if nothing does.
+    /// What the capture lacks; `null` if nothing is missing.
     missing: Option<String>,
     seconds: f64,
     frames_per_s: f64,
     adc_latency_clocks: u8,
     calibrated: bool,
-    /// When and where the kept calibration was measured; `null` where none was used.
+    /// Time and file of the kept calibration; `null` if none was used.
     calibration: Option<Origin>,
-    /// Why a calibration that is kept was not used.
+    /// Why a kept calibration was not used.
     #[serde(skip_serializing_if = "Option::is_none")]
     calibration_note: Option<&'r str>,
     #[serde(skip_serializing_if = "Option::is_none")]

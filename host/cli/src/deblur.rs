@@ -90,7 +90,7 @@ pub struct Sharpening {
     spread: Option<PathBuf>,
 }
 
-/// Measurements simulated for the spread.
+/// Number of simulated measurements for the spread.
 const SPREAD_COPIES: u32 = 8;
 
 impl Sharpening {
@@ -112,7 +112,7 @@ impl Sharpening {
         })
     }
 
-    /// Writes the spread, if it was asked for.
+    /// Writes the spread, if requested.
     pub fn write_spread(&self, input: &ImageStack, spread: Option<&[f32]>) -> Result<()> {
         if let (Some(file), Some(spread)) = (&self.spread, spread) {
             input.target(file)?.write(deblur::SIDE, spread)?;
@@ -180,7 +180,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// A classical method, told each image's blur and noise.
+/// Deblurs by a classical method with each image's blur and noise.
 fn classically(
     method: classical::Method,
     images: Blurred<'_>,

@@ -55,7 +55,8 @@ pub struct Args {
     json: bool,
 }
 
-/// Half of the patterns: enough to read a letter, and few enough to see what OMP adds.
+/// Half of the patterns, which are enough to read a letter, and few enough to show the effect of
+/// OMP.
 const DEFAULT_SAMPLING: f64 = 0.5;
 
 #[derive(Debug, Serialize)]
@@ -65,7 +66,7 @@ struct Report {
     /// The camera description's name.
     camera_model: String,
     distance_m: f64,
-    /// What is between camera and scene.
+    /// The weather between camera and scene.
     rain: String,
     /// Extinction between camera and scene, times the distance; 0 in dry air.
     optical_depth: f64,
@@ -82,11 +83,12 @@ struct Report {
     frames: LossCounters,
     adc_latency_clocks: u8,
     leak_taps: Vec<f64>,
-    /// LEDs that the flat field found dead, as row and column; `null` where all LEDs are alike and none was measured.
+    /// Row and column of dead LEDs found by the flat field; `null` if all LEDs are alike and no
+    /// flat field was measured.
     dead_leds: Option<Vec<[u8; 2]>>,
-    /// Plain inverse transform, leak left in.
+    /// Plain inverse transform, with the leak uncorrected.
     raw: Quality,
-    /// The result, against what a perfect 32 x 32 camera would see.
+    /// The result, compared with the image of a perfect 32 x 32 camera.
     reconstruction: Quality,
     quality_note: &'static str,
     enhancement: enhanced::Report,
@@ -114,7 +116,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let setup = args.setup.setup(DEFAULT_SAMPLING, &args.scene.model)?;
     let mut times = StageTimes::default();
     let (map, optics) = times.time("scene", || args.scene.optics())?;
-    // Latency belongs to the camera, not to what it looks at now.
+    // Latency belongs to the camera and not to the scene.
     let seed = args.scene.seed;
     let model = optics.camera_model();
     let frames = args.frames.unwrap_or(model.readout.sweeps_per_picture);
@@ -229,7 +231,7 @@ fn write(
     let result = Image::new(Side::INSTRUMENT, images.fitted.clone());
     out.write("reconstruction.png", &enlarged_png(&result))?;
     out.write("reconstruction.npy", &npy::encode(&grid, &images.fitted))?;
-    // What `enhance` and `reconstruct` take.
+    // The input of `enhance` and `reconstruct`.
     out.write("frames.npy", &npy::encode(&[1, side, side], &images.fitted))?;
     let measurement = args.out.join("measurement.npz");
     out.write("measurement.npz", &encode_measurement(&measurement, &images.measurements, true)?)?;
@@ -380,7 +382,7 @@ fn say(args: &Args, report: &Report) -> Result<()> {
     print::line(format_args!("look at {}", args.out.join("side_by_side.png").display()))
 }
 
-/// How blurred it is, and who says so.
+/// A line about the blur and its source.
 fn blur_line(enhancement: &enhanced::Report) -> String {
     let (taken, estimated) = (enhancement.sigma_px, enhancement.estimated_sigma_px);
     if taken > estimated {

@@ -1,4 +1,4 @@
-//! `nirspi devices`: cameras that answer.
+//! `nirspi devices`: lists the cameras that answer.
 
 use super::print;
 use anyhow::Result;
@@ -10,7 +10,7 @@ use std::io;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Where `nirspi virtual` listens unless told otherwise.
+/// Default address of `nirspi virtual`.
 pub const DEFAULT_TCP: &str = "127.0.0.1:1550";
 
 /// List the cameras that can be used
@@ -29,12 +29,12 @@ pub struct Args {
     json: bool,
 }
 
-/// One camera, as `--camera` names it.
+/// One camera, with its address for `--camera`.
 #[derive(Debug, Serialize)]
 struct Device {
     camera: String,
     identity: Option<CameraIdentity>,
-    /// Of a USB camera that was not asked.
+    /// The protocol version of a USB camera that was not opened.
     #[serde(skip_serializing_if = "Option::is_none")]
     protocol: Option<u16>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -57,7 +57,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let asked = args.tcp.iter().map(|address| (address.as_str(), true));
     let addresses: Vec<(&str, bool)> =
         asked.chain(default.map(|address| (address, false))).collect();
-    // All at once: an address where nobody answers takes its time.
+    // The addresses are tried in parallel, because an address without an answer takes time.
     let answers: Vec<_> = std::thread::scope(|scope| {
         let asking: Vec<_> =
             addresses.iter().map(|(address, _)| scope.spawn(|| identify(address))).collect();
@@ -74,7 +74,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             Ok(identity) => {
                 devices.push(Device { identity: Some(identity), ..Device::new(camera) });
             }
-            // Nobody at the default address is no news.
+            // A missing camera at the default address is not reported.
             Err(SessionError::Link(error))
                 if !named && error.kind() == io::ErrorKind::ConnectionRefused => {}
             Err(error) => {
@@ -112,7 +112,7 @@ fn identify(address: &str) -> Result<CameraIdentity, SessionError> {
     Ok(Session::open(Box::new(link))?.identity().clone())
 }
 
-/// Cameras on USB, by their descriptors. A system without USB has none.
+/// Cameras on USB, by their descriptors; empty on a system without USB.
 fn on_usb() -> Vec<Device> {
     let cameras = match usb::usb_cameras() {
         Ok(cameras) => cameras,
@@ -135,7 +135,7 @@ fn on_usb() -> Vec<Device> {
     cameras.into_iter().map(device).collect()
 }
 
-/// Serial ports. A system that does not list them has none.
+/// Serial ports; empty on a system that does not list its ports.
 fn on_serial_ports() -> Vec<Device> {
     let ports = serial_ports().unwrap_or_default();
     let device = |port: PathBuf| {

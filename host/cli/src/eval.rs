@@ -1,4 +1,5 @@
-//! `nirspi eval`: how good results are: the paper's tables, ours beside them, and what less sampling costs.
+//! `nirspi eval`: the quality of results: the paper's tables with nirspi's numbers, and the cost of
+//! less sampling.
 
 mod quality;
 mod sampling;

@@ -1,4 +1,4 @@
-//! `nirspi example`: a measurement to try the program on.
+//! `nirspi example`: a measurement for trying the program.
 
 use super::{Usage, print};
 use anyhow::Result;

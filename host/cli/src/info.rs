@@ -1,4 +1,4 @@
-//! `nirspi info`: who a camera is, whether it and this program belong together, and what to update.
+//! `nirspi info`: the identity of a camera, whether it fits this program, and what to update.
 
 use super::address::{self, CameraAddress};
 use super::camera::SceneArgs;
@@ -34,10 +34,10 @@ struct Report<'r> {
     fpga_answers: bool,
     state: String,
     uptime_s: f64,
-    /// `null` where the sensor does not answer.
+    /// `null` if the sensor does not answer.
     temperature_celsius: Option<f64>,
     interlock_closed: bool,
-    /// What befell the camera while nobody listened.
+    /// Events of the camera while no host was connected.
     reports: Vec<String>,
 }
 
@@ -70,7 +70,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// What the FPGA's identity and version registers read; nothing where it does not answer.
+/// The values of the FPGA's identity and version registers; `None` if the FPGA does not answer.
 fn registers(
     session: &mut Session,
     reports: &mut Reports,

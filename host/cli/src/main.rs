@@ -1,4 +1,5 @@
-//! The program `nirspi`. Each module reads the arguments of a command, calls the library, and prints the result.
+//! The program `nirspi`. Each module reads the arguments of a command, calls the library, and
+//! prints the result.
 //!
 //! Exit codes: 0 done, 1 failed (one line on stderr says why), 2 used wrongly.
 
@@ -99,7 +100,7 @@ fn main() -> ExitCode {
     let command = match Cli::try_parse() {
         Ok(cli) => cli.command,
         Err(answer) if is_help(&answer) => {
-            // Nobody to read it is no reason to fail.
+            // A closed stdout does not count as a failure.
             let _ = answer.print();
             return ExitCode::from(answer.exit_code() as u8);
         }

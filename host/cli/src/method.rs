@@ -1,4 +1,4 @@
-//! Arguments that say how to make an image from measurements, and what the report says of it.
+//! Arguments for the reconstruction, and its part of the report.
 
 use super::Usage;
 use anyhow::{Context, Result, bail};
@@ -55,7 +55,7 @@ pub struct MethodArgs {
 }
 
 impl Default for MethodArgs {
-    /// As if nothing had been said.
+    /// The defaults of all arguments.
     fn default() -> Self {
         Self {
             method: Method::OMP,
@@ -73,7 +73,7 @@ impl Default for MethodArgs {
     }
 }
 
-/// The words of --method, with what each one does.
+/// The words of --method, each with its description.
 fn methods() -> impl TypedValueParser<Value = Method> {
     let word = |method: &Method| PossibleValue::new(method.argument()).help(method.about());
     PossibleValuesParser::new(Method::ALL.iter().map(word)).try_map(|word| word.parse::<Method>())
@@ -85,10 +85,10 @@ fn completions() -> impl TypedValueParser<Value = Completion> {
 }
 
 impl MethodArgs {
-    /// Finds mistakes before any file is opened.
+    /// Checks the arguments before any file is opened.
     pub fn check(&self) -> Result<()> {
         let mut settings = self.settings()?;
-        // The file is read later; that there is one belongs to the check.
+        // The file is read later; the check only needs to know that there is one.
         settings.dictionary = self.dictionary.as_ref().map(|path| own_atoms(path, Vec::new()));
         settings.check(self.method).map_err(|error| Usage(self.words(&error)).into())
     }
@@ -112,12 +112,12 @@ impl MethodArgs {
         }
     }
 
-    /// The basis asked for.
+    /// The requested basis.
     pub fn basis(&self) -> Result<Basis> {
         self.basis.parse().map_err(|error| Usage(format!("--basis: {error}")).into())
     }
 
-    /// How many atoms.
+    /// The requested number of atoms.
     pub fn atoms(&self) -> Sparsity {
         match self.sparsity {
             Some(atoms) => Sparsity::Fixed(atoms),
@@ -126,7 +126,7 @@ impl MethodArgs {
         }
     }
 
-    /// What is asked for, but for atoms of one's own.
+    /// The requested settings, without a user's own atoms.
     fn settings(&self) -> Result<MethodSettings> {
         Ok(MethodSettings {
             basis: self.basis()?,
@@ -141,7 +141,7 @@ impl MethodArgs {
         })
     }
 
-    /// What is asked for, for images of this side: reads what there is to read.
+    /// The requested settings for images of this side. Reads the user's files.
     pub fn settings_for(&self, side: usize) -> Result<MethodSettings> {
         let read = |path: &PathBuf| anyhow::Ok(own_atoms(path, read_atoms(path, side)?));
         let dictionary = self.dictionary.as_ref().map(read).transpose()?;
@@ -153,7 +153,7 @@ impl MethodArgs {
         Ok(self.method.prepare(&self.settings_for(side)?)?)
     }
 
-    /// What a method has made, as the command line reports it.
+    /// The result of a method, in the form of the report.
     pub fn solved(&self, made: reconstruct::Reconstruction) -> Solved {
         Solved {
             image: made.image,
@@ -166,7 +166,7 @@ fn own_atoms(path: &Path, values: Vec<f32>) -> OwnAtoms {
     OwnAtoms { name: path.display().to_string(), values: values.into() }
 }
 
-/// Images of one's own as atoms, of the side that was measured.
+/// A user's own images as atoms, which must have the measurements' side.
 pub fn read_atoms(path: &Path, side: usize) -> Result<Vec<f32>> {
     let atoms = read_stack(path)?;
     let shape = (atoms.height, atoms.width);
@@ -176,11 +176,11 @@ pub fn read_atoms(path: &Path, side: usize) -> Result<Vec<f32>> {
     Ok(atoms.values)
 }
 
-/// An image and how it came about.
+/// An image and its report.
 pub struct Solved {
-    /// In the measurements' units.
+    /// The image, in the measurements' units.
     pub image: Image,
-    /// What was done.
+    /// The report.
     pub report: MethodReport,
 }
 

@@ -1,4 +1,4 @@
-//! `nirspi metrics`: how alike two stacks of images are, one by one and as sets.
+//! `nirspi metrics`: the similarity of two stacks of images, one by one and as sets.
 
 use super::{print, refused};
 use anyhow::{Context, Result};

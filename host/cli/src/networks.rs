@@ -1,4 +1,4 @@
-//! What the commands that run networks have in common: weights, device, progress, report.
+//! The common parts of commands that run networks: weights, device, progress, report.
 
 use super::Usage;
 use super::report::StageTimes;
@@ -41,14 +41,14 @@ pub struct ImageArgs {
 }
 
 impl ImageArgs {
-    /// Reads the images, which are to have this side.
+    /// Reads the images, which must have this side.
     pub fn read(&self, side: usize) -> Result<ImageStack> {
         Ok(ImageStack::read(&self.input, self.resize.then_some(side as u32))?)
     }
 }
 
 impl NetworkArgs {
-    /// Opens the device and reads the user's weights, which must be of one of these networks.
+    /// Opens the device and reads the user's weights, which must belong to one of these networks.
     pub fn open(&self, models: &[&str]) -> Result<Networks> {
         let mut networks = Networks::built_in(Device::open(self.backend)?);
         for file in &self.weights {
@@ -58,7 +58,7 @@ impl NetworkArgs {
     }
 }
 
-/// Weights of a network that the command does not run are a wrong argument.
+/// Weights of a network that the command does not run count as a wrong argument.
 fn of_argument(error: WeightsError) -> anyhow::Error {
     match error {
         WeightsError::Model { .. } | WeightsError::Unnamed { .. } => {
@@ -69,7 +69,7 @@ fn of_argument(error: WeightsError) -> anyhow::Error {
 }
 
 impl ImageArgs {
-    /// What was done to the images.
+    /// The report of the work on the images.
     pub fn report(
         &self,
         input: &ImageStack,
@@ -89,12 +89,12 @@ impl ImageArgs {
     }
 }
 
-/// Images of this size and in [0, 1], as a network takes them.
+/// Images of this size and in [0, 1], in the form of a network's input.
 pub fn checked<const SIDE: usize>(stack: &ImageStack) -> Result<Images<'_, SIDE>> {
     Images::new(stack.values(SIDE)?).with_context(|| stack.path().display().to_string())
 }
 
-/// What a stack of images went through.
+/// The report of a stack of images.
 #[derive(Debug, Serialize)]
 pub struct Report {
     pub input: PathBuf,
@@ -107,17 +107,17 @@ pub struct Report {
     pub stage_ms: StageTimes,
 }
 
-/// What is known of deblurred images.
+/// The estimates for deblurred images.
 #[derive(Debug, Serialize)]
 pub struct Deblurring {
     pub model: String,
     pub steps: u32,
     pub consistency: bool,
     pub seed: u64,
-    /// Of each image: blur in pixels of the 64 x 64 grid, and noise of a reading.
+    /// For each image: blur in pixels of the 64 x 64 grid, and noise of a reading.
     pub sigma_px: Vec<f32>,
     pub noise: Vec<f32>,
-    /// Distance of the readings from those of each result, over their noise.
+    /// Distance of the readings from the readings of each result, divided by their noise.
     pub inconsistency: Vec<f32>,
 }
 
@@ -134,7 +134,7 @@ impl Deblurring {
         }
     }
 
-    /// One line for people.
+    /// One line for the user.
     pub fn line(&self) -> String {
         let median = |values: &[f32]| {
             let mut sorted = values.to_vec();
@@ -156,7 +156,7 @@ impl Deblurring {
     }
 }
 
-/// A bar that counts images, and time: hundreds of steps for a batch of images take minutes.
+/// A progress bar of images and time. Hundreds of steps for a batch of images take minutes.
 pub fn bar(what: &str, images: usize) -> ProgressBar {
     let template = format!("{what} {{bar:30}} {{pos}}/{{len}} images, {{elapsed}}");
     let style =

@@ -1,4 +1,5 @@
-//! `nirspi rain`: what rain, fog and single drops do to light; the photon budget; the rain simulator's uniformity.
+//! `nirspi rain`: the effects of rain, fog and single drops on light; the photon budget; the rain
+//! simulator's uniformity.
 
 use super::camera::ModelArgs;
 use super::{Usage, print, refused};

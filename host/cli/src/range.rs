@@ -1,4 +1,4 @@
-//! `nirspi range`: how far the camera sees in rain (the paper's Algorithm 2 and Table 2).
+//! `nirspi range`: the range of the camera in rain (the paper's Algorithm 2 and Table 2).
 
 use super::camera::ModelArgs;
 use super::{print, refused};

@@ -1,4 +1,4 @@
-//! `nirspi reconstruct`: an image from measurements, ours or anybody's.
+//! `nirspi reconstruct`: an image from measurements of nirspi or of another lab.
 
 mod enhanced;
 mod matrix;
@@ -86,9 +86,9 @@ struct Report {
     #[serde(flatten)]
     method: MethodReport,
     dropouts: Vec<DropoutReport>,
-    /// Places in the order shown of patterns that the file says were not read.
+    /// Positions in the order shown of patterns that the file marks as not read.
     not_read: Vec<usize>,
-    /// What of complex readings image.npy shows.
+    /// The part of complex readings in image.npy.
     #[serde(skip_serializing_if = "Option::is_none")]
     part: Option<&'static str>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -137,7 +137,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The frames of a capture as one image, enhanced; the folder `out` gets what `reconstruct --enhance` writes.
+/// Reconstructs and enhances the frames of a capture as one image. The folder `out` gets the files
+/// of `reconstruct --enhance`.
 pub fn picture(
     captured: &Capture,
     flat_field: Option<KeptFlatField>,
@@ -160,7 +161,7 @@ pub fn picture(
     Ok(report.enhancement.map(|enhancement| enhancement.warnings).unwrap_or_default())
 }
 
-/// What to make of one measurement.
+/// The reconstruction of one measurement.
 struct Request<'r> {
     input: &'r Path,
     method: &'r MethodArgs,
@@ -241,7 +242,7 @@ fn one_image(request: &Request<'_>, source: Source, mut times: StageTimes) -> Re
     Ok(report)
 }
 
-/// Shows that something is done: thousands of patterns take OMP seconds.
+/// Shows a spinner, because OMP takes seconds for thousands of patterns.
 fn spinning<T>(work: impl FnOnce() -> T) -> T {
     let spinner = ProgressBar::new_spinner().with_message("reconstructing");
     spinner.enable_steady_tick(Duration::from_millis(100));
@@ -257,7 +258,8 @@ fn check_finite(input: &Path, image: &Image) -> Result<()> {
     bail!("{}: the readings are too large for an image of 32-bit floats", input.display())
 }
 
-/// Writes an image, real and imaginary part of a complex one, and the enhanced one with its warnings, if there is one.
+/// Writes an image, the real and imaginary part of a complex image, and the enhanced image with its
+/// warnings, if there is one.
 fn write(
     out: &Path,
     image: &Image,
@@ -282,7 +284,7 @@ fn write(
     Ok(())
 }
 
-/// The image alone, or with the reasons not to trust it below.
+/// The image, with any reasons not to trust it below.
 fn warned_png(side: usize, pixels: &[f32], warnings: &[String]) -> Vec<u8> {
     if warnings.is_empty() {
         return encode_grey(side, side, pixels);
@@ -300,7 +302,7 @@ fn warned_png(side: usize, pixels: &[f32], warnings: &[String]) -> Vec<u8> {
     encode_rgb(&SideBySide { header, panels: vec![panel], footer }.render())
 }
 
-/// A PNG whose pixels a person can see: squares, at least 256 px for the whole image.
+/// A PNG with visible pixels: squares, at least 256 px for the whole image.
 pub fn enlarged_png(image: &Image) -> Vec<u8> {
     let side = image.side().pixels();
     let factor = (256 / side).max(1);
@@ -311,7 +313,7 @@ pub fn enlarged_png(image: &Image) -> Vec<u8> {
     encode_grey(width, width, &pixels)
 }
 
-/// How many patterns were not read, and the first of them.
+/// The number of patterns that were not read, and the first of them, in words.
 fn not_read_words(places: &[usize]) -> String {
     const SHOWN: usize = 5;
     let first: Vec<String> = places.iter().take(SHOWN).map(usize::to_string).collect();

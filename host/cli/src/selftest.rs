@@ -13,7 +13,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, SystemTime};
 
-/// Of each of the two measurements of the link.
+/// Duration of each of the two measurements of the link.
 const LINK_DURATION: Duration = Duration::from_secs(1);
 
 /// Check a camera from its LEDs to this program, and keep its calibration
@@ -44,7 +44,7 @@ struct Report<'r> {
     camera: &'r CameraIdentity,
     passed: bool,
     checks: &'r [Check],
-    /// Where the calibration is kept; `null` where there was none to keep.
+    /// The file of the calibration; `null` if there was no calibration to keep.
     calibration: Option<PathBuf>,
     measured: Option<String>,
 }
@@ -80,7 +80,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     Ok(if report.passed { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// Keeps the calibration of a camera that has passed. What a camera with a fault measures of itself is not to be trusted.
+/// Keeps the calibration of a camera that has passed. A camera with a fault cannot measure itself
+/// reliably.
 fn keep(
     args: &Args,
     camera: &CameraIdentity,

@@ -1,4 +1,4 @@
-//! `nirspi serve`: a camera, live, on a web page.
+//! `nirspi serve`: a camera live on a web page.
 
 use super::address::{self, CameraAddress};
 use super::calibration::CalibrationArgs;
@@ -20,7 +20,7 @@ use nirspi_recon::reconstruct::{Method, Reconstruct};
 use std::net::TcpListener;
 use std::process::ExitCode;
 
-/// Half of the patterns: twice the frames, and OMP predicts the other half.
+/// Half of the patterns, which give twice the frames; OMP predicts the other half.
 const DEFAULT_SAMPLING: f64 = 0.5;
 
 /// Show a camera live on a web page: reconstructed, fused with depth and deblurred, with every frame accounted for
@@ -98,7 +98,7 @@ pub fn run(args: Args) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Every method, each with those of the settings that it takes: a page can switch to any.
+/// Every method, each with the settings that it accepts, because a page can switch to any method.
 fn methods(args: &MethodArgs) -> Result<Vec<(&'static str, Box<dyn Reconstruct>)>> {
     let settings = args.settings_for(Side::INSTRUMENT.pixels())?;
     let ready =
@@ -106,7 +106,8 @@ fn methods(args: &MethodArgs) -> Result<Vec<(&'static str, Box<dyn Reconstruct>)
     Method::ALL.iter().map(ready).collect()
 }
 
-/// The learned stages, where OMP runs; one image at a time is no work for a GPU that was not asked for.
+/// The learned stages, on the backend of OMP. One image at a time is too little work for a GPU that
+/// was not requested.
 fn enhance(backend: Backend) -> Result<Enhance> {
     let backend = if backend == Backend::Auto { Backend::Cpu } else { backend };
     Ok(Enhance::built_in(&Device::open(backend)?)?)
@@ -122,7 +123,7 @@ fn prepared(
     Ok(Connected { session, calibration, note, flat_field })
 }
 
-/// How to find the camera again.
+/// A function that connects to the camera again.
 fn connect(args: Args, setup: MeasurementSetup) -> Connect {
     let found = move || {
         let mut session = address::open_quietly(&args.camera, &args.scene)?;

@@ -98,18 +98,18 @@ fn run_server<F: SimulatedFpga>(
                 print::line(format_args!("{host} was cut off ({error}), LEDs off"))
             }
         };
-        // A camera does not stop because its log cannot be written.
+        // The camera goes on even if its log cannot be written.
         told.unwrap_or_default();
     })?;
     Ok(())
 }
 
-/// A flag that Ctrl-C and a polite kill set.
+/// A flag that is set by Ctrl-C and by a termination signal.
 pub fn stop_on_signal() -> Result<Arc<AtomicBool>> {
     let stop = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&stop);
     ctrlc::set_handler(move || {
-        // The second time nobody waits any more.
+        // The second signal ends the program at once.
         if flag.swap(true, Ordering::Relaxed) {
             std::process::exit(130);
         }

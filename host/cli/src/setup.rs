@@ -1,4 +1,4 @@
-//! `nirspi setup`: what a machine needs before a camera on USB can be used.
+//! `nirspi setup`: prepares a machine for cameras on USB.
 
 use super::{Usage, print};
 use anyhow::Result;
@@ -61,17 +61,17 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// What to do about a missing permission.
+/// Explains what to do about a missing permission.
 fn explain(error: RuleError) -> anyhow::Error {
     if !error.is_permission() {
         return error.into();
     }
-    // Root's PATH may not have it.
+    // The PATH of root may not contain the program.
     let program = std::env::current_exe().unwrap_or_else(|_| PathBuf::from("nirspi"));
     anyhow::anyhow!("{}: sudo {} setup", nirspi::causes::in_one_line(&error), program.display())
 }
 
-/// Has udev read its rules again and look at what is plugged in.
+/// Makes udev read its rules again and check the connected devices.
 fn reload() -> bool {
     let udevadm = |arguments: &[&str]| {
         let mut command = Command::new("udevadm");

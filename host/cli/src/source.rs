@@ -1,4 +1,4 @@
-//! Arguments that say which measurements to read, and how.
+//! Arguments for the measurements to read.
 
 use super::Usage;
 use super::camera::parse_order;
@@ -70,7 +70,7 @@ fn parts() -> impl TypedValueParser<Value = Part> {
 }
 
 impl SourceArgs {
-    /// What the file does not say itself.
+    /// The selection: what the file itself does not say.
     pub fn selection(&self) -> Result<Selection> {
         let side = self.side.map(Side::new).transpose();
         let shown = self.shown.as_deref().map(|name| parse_order("--shown", name)).transpose()?;
@@ -91,32 +91,32 @@ impl SourceArgs {
         Ok(SourceOptions { index, file: self.selection()?, part, keep_leak, no_flat_field })
     }
 
-    /// Reads one.
+    /// Reads one measurement.
     pub fn load(&self) -> Result<Source> {
         Source::read(&self.input, &self.options()?).map_err(usage_or_failure)
     }
 
-    /// Reads one of real readings.
+    /// Reads one measurement of real readings.
     pub fn load_real(&self) -> Result<Measurements> {
         self.load()?.real(&self.input).map_err(usage_or_failure)
     }
 
-    /// Reads all of a file or recording.
+    /// Reads all measurements of a file or recording.
     pub fn load_all(&self) -> Result<Vec<Source>> {
         Source::read_all(&self.input, &self.options()?).map_err(usage_or_failure)
     }
 
-    /// The one that is asked for.
+    /// The requested index.
     pub fn one(&self) -> Result<Option<usize>> {
         self.options()?.one().map_err(usage_or_failure)
     }
 }
 
-/// Options that do not go together were used wrongly; all else is a failure.
+/// Conflicting options count as wrong usage; every other error counts as a failure.
 fn usage_or_failure(error: SourceError) -> anyhow::Error {
     match error {
         SourceError::NotForRecordings | SourceError::One => Usage(error.to_string()).into(),
-        // The command line knows these by their own types.
+        // The command line handles these errors by their own types.
         SourceError::File(error) => error.into(),
         SourceError::Recording(error) => error.into(),
         error => error.into(),

@@ -1,4 +1,5 @@
-//! `nirspi train`: networks from a user's own characters, or pairs to train on elsewhere.
+//! `nirspi train`: trains networks from a user's own characters, or makes pairs for training with
+//! other programs.
 
 mod data;
 mod degrade;

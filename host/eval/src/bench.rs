@@ -1,4 +1,4 @@
-//! How fast the host computes: made-up problems, and the loops that time their solution.
+//! Speed of the host: generated problems, and loops that time their solution.
 
 pub mod enhance;
 pub mod omp;
@@ -8,13 +8,13 @@ pub mod scenes;
 use serde::Serialize;
 use std::time::Instant;
 
-/// Sweeps a second that the patterns' clock allows: nothing comes faster to be reconstructed.
+/// Sweeps a second that the patterns' clock allows, the largest rate of sweeps to reconstruct.
 pub const FASTEST_SWEEPS_HZ: f64 = nirspi_wire::PATTERN_HZ as f64 / nirspi_wire::PATTERNS as f64;
 
 /// The time of several runs of the same work.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Times {
-    /// Half of the runs took no longer.
+    /// Median time.
     pub median_ms: f64,
     /// The shortest run.
     pub fastest_ms: f64,
@@ -33,7 +33,7 @@ impl Times {
         Self::from_ms(times.collect())
     }
 
-    /// The same of times already taken, at least one.
+    /// The statistics of measured times, at least one.
     fn from_ms(mut times_ms: Vec<f64>) -> Self {
         times_ms.sort_by(f64::total_cmp);
         Self {
@@ -44,7 +44,7 @@ impl Times {
     }
 }
 
-/// Threads of the CPU that work on many frames.
+/// Number of CPU threads for many frames.
 #[must_use]
 pub fn threads() -> usize {
     rayon::current_num_threads()

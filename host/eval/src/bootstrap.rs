@@ -1,16 +1,16 @@
-//! Confidence intervals without an assumed distribution: what was sampled is drawn again, with replacement (Efron, Ann. Stat. 7, 1,
-//! 1979). Seeded, so that a report is the same again.
+//! Confidence intervals without an assumed distribution: the sample is drawn again with replacement
+//! (Efron, Ann. Stat. 7, 1, 1979). The draws are seeded, so that a report can be repeated.
 //!
-//! What is drawn again are glyphs, typefaces, writers and font families, never single images: images of one writer are alike, and
-//! a hundred of them say less about writing than a hundred writers would. The same draws serve every method, so that a difference
-//! of two methods is that of the same images.
+//! Glyphs, typefaces, writers and font families are drawn again, and never single images: images of
+//! one writer are alike, and a hundred of them say less about writing than a hundred writers would.
+//! All methods use the same draws, so that a difference of two methods is that of the same images.
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Draws for a mean.
+/// Number of draws for a mean.
 pub const DRAWS: usize = 1000;
 
 /// A figure with its 95 % interval.
@@ -20,7 +20,7 @@ pub struct Interval {
     pub value: f64,
     /// The lower end of its interval.
     pub low: f64,
-    /// The upper end.
+    /// The upper end of its interval.
     pub high: f64,
 }
 
@@ -39,13 +39,13 @@ impl Interval {
     }
 }
 
-/// Items drawn again, so many times: indices, some more than once, some not at all.
+/// The draws: indices of items, some more than once, some not at all.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Redraws(Vec<Vec<usize>>);
 
 impl Redraws {
-    /// Items that belong to clusters: `of` names each item's stratum and cluster. In every stratum as many clusters are drawn as
-    /// it has, each with all of its items.
+    /// Draws of items in clusters. `of` gives each item's stratum and cluster. In every stratum as
+    /// many clusters are drawn as the stratum has, each with all of its items.
     #[must_use]
     pub fn clustered(of: &[(usize, u32)], count: usize) -> Self {
         let mut strata: BTreeMap<usize, BTreeMap<u32, Vec<usize>>> = BTreeMap::new();
@@ -67,10 +67,11 @@ impl Redraws {
         Self((0..count).map(|_| draw()).collect())
     }
 
-    /// Items with two factors that cross, such as glyph and typeface: `of` names each item's level of both. Levels of both are
-    /// drawn, each factor by itself, and an item comes as often as the product of its two levels (Owen, *The pigeonhole
-    /// bootstrap*, Ann. Appl. Stat. 1, 386, 2007). The interval is for other glyphs in other typefaces, and rather too wide than too
-    /// narrow.
+    /// Draws of items with two crossed factors, such as glyph and typeface. `of` gives each item's
+    /// level of both factors. The levels of each factor are drawn independently, and an item occurs
+    /// as often as the product of its two levels (Owen, *The pigeonhole bootstrap*, Ann. Appl.
+    /// Stat. 1, 386, 2007). The interval holds for other glyphs in other typefaces, and is too wide
+    /// rather than too narrow.
     #[must_use]
     pub fn crossed(of: &[(usize, usize)], count: usize) -> Self {
         let levels = |each: fn(&(usize, usize)) -> usize| {
@@ -93,7 +94,7 @@ impl Redraws {
                     .enumerate()
                     .flat_map(|(item, levels)| std::iter::repeat_n(item, often(levels)))
                     .collect();
-                // Not every pair of levels has an item: a draw can be empty.
+                // A pair of levels may have no item, so a draw can be empty.
                 if !picked.is_empty() || of.is_empty() {
                     return picked;
                 }
@@ -102,7 +103,7 @@ impl Redraws {
         Self((0..count).map(|_| draw()).collect())
     }
 
-    /// The first draws alone, for a statistic that takes long.
+    /// The first draws only, for a statistic that takes long.
     #[must_use]
     pub fn first(&self, count: usize) -> Self {
         Self(self.0.iter().take(count).cloned().collect())
@@ -113,14 +114,15 @@ impl Redraws {
         self.0.iter()
     }
 
-    /// A statistic whose `value` is known, and which `of` computes for items drawn again: percentiles of the draws.
+    /// The interval of a statistic with the known `value`, from percentiles of the draws. `of`
+    /// computes the statistic of drawn items.
     #[must_use]
     pub fn interval(&self, value: f64, of: impl Fn(&[usize]) -> f64) -> Interval {
         let [low, high] = middle(self.0.iter().map(|picked| of(picked)).collect());
         Interval { value, low, high }
     }
 
-    /// The mean of some values, one for each item.
+    /// The interval of the mean of some values, one for each item.
     #[must_use]
     pub fn of_mean(&self, values: &[f64]) -> Interval {
         let mean = |picked: &[usize]| {
@@ -129,8 +131,9 @@ impl Redraws {
         self.interval(values.iter().sum::<f64>() / values.len() as f64, mean)
     }
 
-    /// A distance of sets. That of drawn sets is larger on the whole, since images repeat in them: only the spread of the `drawn`
-    /// distances is taken, around `value`.
+    /// The interval of a distance of sets. Distances of drawn sets are larger on average, because
+    /// images repeat in them. Therefore only the spread of the `drawn` distances is used, around
+    /// `value`.
     #[must_use]
     pub fn around(value: f64, drawn: Vec<f64>) -> Interval {
         let mean = drawn.iter().sum::<f64>() / drawn.len() as f64;
@@ -139,7 +142,7 @@ impl Redraws {
     }
 }
 
-/// The levels that some item has.
+/// The levels that at least one item has.
 fn present(levels: usize, of: &[(usize, usize)], each: fn(&(usize, usize)) -> usize) -> Vec<usize> {
     (0..levels).filter(|level| of.iter().any(|item| each(item) == *level)).collect()
 }
@@ -174,7 +177,8 @@ mod tests {
 
     #[test]
     fn images_of_one_writer_do_not_count_as_many() {
-        // 20 writers of 20 alike images each: the interval is that of 20 values, 4.5 times that of 400.
+        // 20 writers with 20 equal images each: the interval is that of 20 values, 4.5 times that
+        // of 400.
         let values: Vec<f64> = (0..400).map(|i| f64::from(i / 20)).collect();
         let writers: Vec<(usize, u32)> = (0..400).map(|i| (0, i / 20)).collect();
         let images: Vec<(usize, u32)> = (0..400).map(|i| (0, i)).collect();
@@ -186,7 +190,7 @@ mod tests {
 
     #[test]
     fn fixed_strata_are_not_drawn() {
-        // Two stacks far apart, each of equal images: no draw can change the mean.
+        // Two stacks far apart, each of equal images: the mean is the same in every draw.
         let values: Vec<f64> = (0..40).map(|i| if i < 20 { 10.0 } else { 30.0 }).collect();
         let of: Vec<(usize, u32)> = (0..40).map(|i| (usize::from(i >= 20), i)).collect();
         let interval = Redraws::clustered(&of, DRAWS).of_mean(&values);
@@ -195,19 +199,20 @@ mod tests {
 
     #[test]
     fn of_crossed_factors_each_brings_its_own_spread() {
-        // 62 glyphs in 6 typefaces. What only the typeface changes has the interval of 6 values, not of 372.
+        // 62 glyphs in 6 typefaces. A value that depends only on the typeface has the interval of 6
+        // values, not of 372.
         let of: Vec<(usize, usize)> = (0..372).map(|i| (i % 62, (i % 62 + i / 62) % 6)).collect();
         let redraws = Redraws::crossed(&of, DRAWS);
         let by_face: Vec<f64> = of.iter().map(|&(_, face)| face as f64).collect();
         let by_glyph: Vec<f64> = of.iter().map(|&(glyph, _)| glyph as f64).collect();
-        // Standard deviations of 0..6 and 0..62, over the roots of 6 and 62, times 1.96.
+        // Standard deviations of 0..6 and 0..62, divided by the roots of 6 and 62, times 1.96.
         for (values, expected) in
             [(by_face, 1.96 * 1.708 / 6_f64.sqrt()), (by_glyph, 1.96 * 17.9 / 62_f64.sqrt())]
         {
             let found = half_width(&redraws.of_mean(&values));
             assert!((found / expected - 1.0).abs() < 0.2, "{found} {expected}");
         }
-        // Few items: draws without any are drawn again.
+        // With few items, draws without any item are repeated.
         let few = Redraws::crossed(&[(0, 0), (1, 1)], 100);
         assert!(few.iter().all(|picked| !picked.is_empty()));
     }

@@ -1,4 +1,5 @@
-//! What follows from a camera description: geometry, light, noise, resolution and eye safety; charts against distance.
+//! Evaluates a camera description: geometry, light, noise, resolution and eye safety, with charts
+//! against distance.
 
 use crate::DISTANCES_M;
 use crate::error::Result;
@@ -11,10 +12,10 @@ use nirspi_optics::water::Water;
 use nirspi_optics::{CameraModel, LEDS, SIDE};
 use serde::Serialize;
 
-/// Contrast that a line keeps to count as resolved.
+/// The contrast that a resolved line keeps.
 const RESOLVED: f64 = 0.1;
 
-/// What follows from a camera description.
+/// The properties of a camera description.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
     /// Always true.
@@ -23,7 +24,7 @@ pub struct Report {
     pub camera: String,
     /// Differential sweeps summed into one picture.
     pub sweeps: u32,
-    /// Duration of one of them.
+    /// Duration of one sweep.
     pub sweep_us: f64,
     /// Light time of a picture.
     pub picture_ms: f64,
@@ -33,9 +34,9 @@ pub struct Report {
     pub amplifier_noise_pa_per_sqrt_hz: f64,
     /// Gain-bandwidth product that the amplifier needs.
     pub gain_bandwidth_ghz: f64,
-    /// At some distances.
+    /// The camera at some distances.
     pub distances: Vec<AtDistance>,
-    /// What an eye before the camera receives.
+    /// The light at an eye in front of the camera.
     pub eye_safety: EyeSafety,
 }
 
@@ -50,18 +51,20 @@ pub struct AtDistance {
     pub pixel_mm: f64,
     /// Diameter of the defocus disc on the target.
     pub defocus_mm: f64,
-    /// The finest line that keeps a tenth of its contrast behind lens, emitter and pixel; `null`: none up to the field.
+    /// The finest line that keeps a tenth of its contrast behind lens, emitter and pixel; `null` if
+    /// no line up to the field does.
     pub line_mm: Option<f64>,
     /// Light of one LED from a white target.
     pub electrons_per_led: f64,
-    /// Signal of a pixel of a white sheet in dry air over its noise, in one picture of all patterns.
+    /// Signal of a pixel of a white sheet in dry air divided by its noise, in one picture of all
+    /// patterns.
     pub picture_snr: f64,
 }
 
-/// What follows from a description, at the paper's distances and where its lens is focused.
+/// Evaluates a description at the paper's distances and at its lens's focus.
 ///
 /// # Errors
-/// Settings that fit no distance.
+/// `EvalError` for settings that are not possible at any distance.
 pub fn camera_model(camera: &CameraModel) -> Result<Report> {
     let mut distances: Vec<f64> = DISTANCES_M.to_vec();
     distances.push(camera.projector().focus_distance_mm / 1e3);
@@ -84,7 +87,7 @@ pub fn camera_model(camera: &CameraModel) -> Result<Report> {
     })
 }
 
-/// Time that a pattern is shown in one sweep.
+/// Time for which a pattern is shown in one sweep.
 fn pattern_us(camera: &CameraModel) -> f64 {
     f64::from(camera.readout.clocks_per_pattern) * SAMPLE_NS * 1e-3
 }
@@ -105,7 +108,7 @@ fn at(camera: &CameraModel, weather: &Weather, distance_m: f64) -> Result<AtDist
     })
 }
 
-/// This camera and the shipped ones that differ from it, with what each is called.
+/// This camera and the shipped cameras that differ from it, with their names.
 fn beside(camera: &CameraModel) -> Vec<CameraModel> {
     let mut cameras = vec![camera.clone()];
     let others = CameraModel::names().filter_map(CameraModel::named);
@@ -118,7 +121,7 @@ fn along_m() -> impl Iterator<Item = f64> {
     (0..=160).map(|i| 0.2 * 10_f64.powf(f64::from(i) / 160.0))
 }
 
-/// A chart of something against distance, a line for each camera.
+/// A chart of a value against distance, with a line for each camera.
 fn chart(
     camera: &CameraModel,
     header: &str,
@@ -154,10 +157,10 @@ fn chart(
     })
 }
 
-/// The finest line that a camera shows, against its distance, beside the shipped cameras.
+/// The finest line of a camera against its distance, with the shipped cameras for comparison.
 ///
 /// # Errors
-/// None for a description that was read.
+/// Does not occur for a description that was read.
 pub fn resolution_chart(camera: &CameraModel) -> Result<Chart> {
     let y = Axis {
         name: "line that keeps 10 % of its contrast, mm".to_owned(),
@@ -169,10 +172,11 @@ pub fn resolution_chart(camera: &CameraModel) -> Result<Chart> {
     chart(camera, "How fine a camera sees", y, |at| at.line_mm)
 }
 
-/// Signal over noise of a pixel of one picture against its distance, beside the shipped cameras.
+/// Signal divided by noise of a pixel of one picture against its distance, with the shipped cameras
+/// for comparison.
 ///
 /// # Errors
-/// None for a description that was read.
+/// Does not occur for a description that was read.
 pub fn snr_chart(camera: &CameraModel) -> Result<Chart> {
     let y = Axis {
         name: "SNR of a white pixel in one picture".to_owned(),

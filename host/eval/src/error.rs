@@ -1,4 +1,4 @@
-//! What can go wrong in an evaluation: a setting out of range, a file, or the work of a library below.
+//! Errors of an evaluation: a setting out of range, a file, or an error of a library.
 
 use nirspi::files::FileError;
 use nirspi_optics::mie::MieError;
@@ -8,7 +8,8 @@ use std::error::Error;
 use std::fmt::Display;
 use std::path::Path;
 
-/// Why there is no result. Messages of causes are not repeated: they follow through `source()`.
+/// Why an evaluation has no result. Messages do not repeat their causes, which follow through
+/// `source()`.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum EvalError {
@@ -19,18 +20,19 @@ pub enum EvalError {
         name: &'static str,
         /// Its value.
         found: String,
-        /// The values that are allowed.
+        /// The allowed values.
         expected: String,
     },
-    /// A library below refuses a setting.
+    /// A library refuses a setting.
     #[error("{name}: {why}")]
     Refused {
         /// The setting, in snake case.
         name: &'static str,
-        /// The library's message, or what is wrong.
+        /// The library's message, or the problem.
         why: String,
     },
-    /// Measurements of a part of the patterns, where the image of all is the reference.
+    /// The measurements are of a part of the patterns, but the image of all patterns is the
+    /// reference.
     #[error(
         "{found} of {expected} patterns, expected a full sweep: the image of all patterns is what shares are held against"
     )]
@@ -40,13 +42,13 @@ pub enum EvalError {
         /// Patterns of a full sweep.
         expected: usize,
     },
-    /// Rain that cannot fall like this.
+    /// The rain is not possible.
     #[error(transparent)]
     Rain(#[from] RainError),
-    /// A pixel's budget with a setting out of range.
+    /// A setting of a pixel's budget is out of range.
     #[error(transparent)]
     Pixel(#[from] PixelError),
-    /// A sphere that the Mie solver was not checked for.
+    /// The Mie solver was not checked for this sphere.
     #[error(transparent)]
     Mie(#[from] MieError),
     /// A file could not be read or written.
@@ -55,15 +57,15 @@ pub enum EvalError {
     /// The content of a file cannot be evaluated: file, what was found, what was expected.
     #[error("{0}")]
     Content(String),
-    /// The work on one thing failed.
+    /// The work on one item failed.
     #[error("{what}")]
     At {
-        /// The thing: a file, a folder, a figure.
+        /// The item: a file, a folder, a figure.
         what: String,
-        /// What failed.
+        /// The error.
         source: Box<Self>,
     },
-    /// A library below failed.
+    /// A library failed.
     #[error(transparent)]
     Library(Box<dyn Error + Send + Sync>),
 }
@@ -84,7 +86,7 @@ impl EvalError {
         Self::Refused { name, why: why.to_string() }
     }
 
-    /// Whether the caller's settings are the cause, rather than a file, a device or the scene.
+    /// Whether the caller's settings are the cause, and not a file, a device or the scene.
     #[must_use]
     pub fn is_setting(&self) -> bool {
         matches!(
@@ -98,7 +100,7 @@ impl EvalError {
     }
 }
 
-/// Says what the failed work was on.
+/// Adds the item of the failed work to an error.
 pub(crate) trait On<T> {
     fn on(self, what: impl FnOnce() -> String) -> Result<T>;
     fn on_file(self, path: &Path) -> Result<T>;

@@ -1,4 +1,4 @@
-//! A mean and how sure it is.
+//! A mean and its confidence interval.
 
 use serde::Serialize;
 
@@ -7,15 +7,16 @@ use serde::Serialize;
 pub struct Estimate {
     /// The mean.
     pub mean: f64,
-    /// Student's t times the standard error; `null` of a single value.
+    /// Student's t times the standard error; `null` for a single value.
     pub ci95: Option<f64>,
-    /// Values, or groups, that the interval rests on.
+    /// Number of values, or groups, of the interval.
     pub n: usize,
 }
 
 impl Estimate {
-    /// A figure of all values together, with its interval by the jackknife: `without` holds the same figure of all values but one
-    /// group, for each group (Tukey, Ann. Math. Stat. 29, 614, 1958).
+    /// A figure of all values together, with its interval by the jackknife. `without` holds the
+    /// same figure of all values except one group, for each group (Tukey, Ann. Math. Stat. 29, 614,
+    /// 1958).
     #[must_use]
     pub fn jackknife(of_all: f64, without: &[f64]) -> Self {
         let n = without.len();
@@ -35,7 +36,8 @@ impl Estimate {
     }
 }
 
-/// Student's t that 97.5 % lie below, for so many degrees of freedom: exact to 0.001 (Abramowitz and Stegun 26.7.5 from 10 on).
+/// The 97.5 % quantile of Student's t at these degrees of freedom, exact to 0.001 (Abramowitz and
+/// Stegun 26.7.5 from 10 on).
 fn student_95(freedom: usize) -> f64 {
     const FEW: [f64; 9] = [12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262];
     if let Some(t) = freedom.checked_sub(1).and_then(|at| FEW.get(at)) {
@@ -53,7 +55,8 @@ mod tests {
 
     #[test]
     fn the_interval_of_a_mean_is_students() {
-        // Leaving out one of n values moves the mean by (mean - value) / (n - 1): the standard error of the mean.
+        // Leaving out one of n values moves the mean by (mean - value) / (n - 1), which gives the
+        // standard error of the mean.
         let values = [1.0, 2.0, 3.0, 4.0];
         let without = values.map(|v| (10.0 - v) / 3.0);
         let estimate = Estimate::jackknife(2.5, &without);

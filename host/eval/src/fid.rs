@@ -15,12 +15,13 @@ impl Fid {
     /// Reads the weights: safetensors with torchvision's names.
     ///
     /// # Errors
-    /// A file that cannot be read, weights of another network, a build without the feature `train`.
+    /// `EvalError` for a file that cannot be read, weights of another network, or a build without
+    /// the feature `train`.
     pub fn read(path: &Path) -> Result<Self> {
         Ok(Self { network: Inception::new(&Weights::read(path)?)?, path: path.to_owned() })
     }
 
-    /// Why the distance with these weights is no FID; `None` if it is.
+    /// Why the distance with these weights is not FID; `None` if it is FID.
     pub(crate) fn note(&self) -> Option<String> {
         (!self.network.is_of_fid()).then(|| {
             format!(
@@ -31,7 +32,8 @@ impl Fid {
         })
     }
 
-    /// The distance of two sets of grey images of `height` x `width`; `done` is called after each image.
+    /// The distance of two sets of grey images of `height` x `width`; `done` is called after each
+    /// image.
     pub(crate) fn distance<'a>(
         &self,
         reference: impl Iterator<Item = &'a [f32]>,

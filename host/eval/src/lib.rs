@@ -1,7 +1,7 @@
-//! Evaluation of the nirspi camera: how good images are, how far the camera sees, how fast the host computes.
+//! Evaluation of the nirspi camera: image quality, range, and speed of the host.
 //!
-//! Every report is a plain struct that serialises to JSON; nothing here prints. Functions that take long call `done` after each
-//! unit of work, so that a caller can show progress.
+//! Every report is a plain struct that serialises to JSON, and the library prints nothing. Long
+//! functions call `done` after each unit of work, so that a caller can show progress.
 //!
 //! | module | question |
 //! |---|---|
@@ -17,8 +17,9 @@
 //! | [`rain`] | what does rain do to light, and to the photon budget of a pixel? |
 //! | [`train`] | how does a network learn from a user's characters? |
 //!
-//! [`shot`] takes the pictures of the tables through the virtual camera, of targets in several [`typefaces`]; [`pictures`] enhances
-//! them; [`bootstrap`] and [`estimate`] say how sure a figure is.
+//! [`shot`] takes the pictures of the tables through the virtual camera, of targets in several
+//! [`typefaces`]. [`pictures`] enhances the pictures. [`bootstrap`] and [`estimate`] give the
+//! uncertainty of a figure.
 
 pub mod bench;
 pub mod bootstrap;

@@ -1,8 +1,9 @@
-//! The images that the paper's tables compare: both cameras' pictures, and NIR-SPI pictures enhanced by two networks.
+//! The images that the paper's tables compare: pictures of both cameras, and NIR-SPI pictures
+//! enhanced by two networks.
 //!
 //! # Invariant
-//! Networks get what a user would give them, readings over those of a white sheet, and nothing of the truth
-//! (`networks_see_readings_over_those_of_a_white_sheet`).
+//! Networks get the input that a user would give them: readings divided by those of a white sheet,
+//! and no part of the truth (`tests::networks_see_readings_over_those_of_a_white_sheet`).
 
 use crate::error::Result;
 use crate::quality::{Contender, Method};
@@ -10,8 +11,8 @@ use crate::shot::Shots;
 use nirspi_nets::{Device, Networks};
 use serde::Serialize;
 
-/// Steps of the ancestral sampler, unless asked for otherwise: the paper's 500 take fifty times as long, and quality falls with more
-/// than a few (`docs/quality.md`).
+/// Default steps of the ancestral sampler. The paper's 500 steps take fifty times as long, and
+/// quality falls with more than a few steps (`docs/quality.md`).
 pub const ANCESTRAL_STEPS: u32 = 10;
 
 /// Steps of the bridge in the tables.
@@ -20,25 +21,26 @@ const STEPS: u32 = 1;
 /// An image of the tables.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum Picture {
-    /// An ordinary camera's.
+    /// An ordinary camera's picture.
     #[serde(rename = "VIS")]
     Vis,
-    /// The single-pixel camera's.
+    /// The single-pixel camera's picture.
     #[serde(rename = "NIR-SPI")]
     NirSpi,
-    /// The same, enhanced by the GAN's generator.
+    /// The single-pixel camera's picture, enhanced by the GAN's generator.
     #[serde(rename = "NIR-SPI + GAN")]
     Gan,
-    /// The same, enhanced by the diffusion bridge in one step.
+    /// The single-pixel camera's picture, enhanced by the diffusion bridge in one step.
     #[serde(rename = "NIR-SPI + diffusion")]
     Diffusion,
-    /// The same, enhanced by the ancestral sampler, the paper's own (Eqs. 5 to 8).
+    /// The single-pixel camera's picture, enhanced by the ancestral sampler, the paper's method
+    /// (Eqs. 5 to 8).
     #[serde(rename = "NIR-SPI + ancestral")]
     Ancestral,
 }
 
 impl Picture {
-    /// As the paper calls the row.
+    /// The name of the row in the paper.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -59,10 +61,11 @@ pub struct Enhancers {
 }
 
 impl Enhancers {
-    /// The embedded networks on the CPU; the ancestral sampler takes so many steps, and with 0 there is none.
+    /// The embedded networks on the CPU. The ancestral sampler takes `ancestral_steps` steps; with
+    /// 0 it is left out.
     ///
     /// # Errors
-    /// Damaged weights.
+    /// `EvalError` for damaged weights.
     pub fn new(ancestral_steps: u32) -> Result<Self> {
         let mut networks = Networks::built_in(Device::cpu());
         let ancestral = (ancestral_steps > 0)
@@ -75,11 +78,12 @@ impl Enhancers {
         })
     }
 
-    /// The pictures of a row with a network, 64 x 64 in [0, 1]; `None` for a row without a network and for a sampler without steps. `whites` are the levels
-    /// of a white sheet, one a shot.
+    /// The pictures of a row with a network, 64 x 64 in [0, 1]; `None` for a row without a network
+    /// and for a sampler without steps. `whites` are the levels of a white sheet, one for each
+    /// shot.
     ///
     /// # Errors
-    /// Readings that are not numbers.
+    /// `EvalError` for readings that are NaN or infinite.
     pub fn pictures(
         &self,
         of: Picture,
@@ -102,7 +106,7 @@ impl Enhancers {
     }
 }
 
-/// A NIR-SPI picture over what a white sheet gives.
+/// A NIR-SPI picture divided by the level of a white sheet.
 fn scaled(shot: &Shots, white: f32) -> impl Iterator<Item = f32> + '_ {
     shot.nir_spi.pixels().iter().map(move |counts| (counts / white).clamp(0.0, 1.0))
 }

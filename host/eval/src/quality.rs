@@ -1,10 +1,11 @@
-//! How good enhanced images are, on characters that no training has seen and on other scenes.
+//! The quality of enhanced images, on characters outside the training data and on other scenes.
 //!
-//! Sharp 64 x 64 images are blurred (Gaussian, sigma in pixels of 64), sampled to 32 x 32 by means of 2 x 2, given noise, and
-//! enhanced by every method: Lanczos, three classical methods that get blur and noise, and the networks, which get neither.
+//! Sharp 64 x 64 images are blurred (Gaussian, sigma in pixels of 64), sampled to 32 x 32 by means
+//! of 2 x 2, given noise, and enhanced by every method. The methods are Lanczos, three classical
+//! methods that know blur and noise, and the networks, which do not.
 //!
 //! # Invariant
-//! Every method gets the same readings, and its figures come with the number of images that they rest on
+//! Every method gets the same readings, and its figures come with their number of images
 //! (`every_row_is_measured_on_the_same_unseen_images` in the tests of `nirspi-cli`).
 
 mod characters;
@@ -27,30 +28,31 @@ use nirspi_nets::{Device, Networks};
 use serde::Serialize;
 use std::path::PathBuf;
 
-/// What to measure.
+/// Settings of the measurement.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Settings {
     /// Characters: `.npz` stacks or Chars74K's folder.
     pub data: PathBuf,
-    /// Groups of each stack that training has not seen, as JSON; `None`: those of the embedded weights.
+    /// Held-out groups of each stack, as JSON; `None` means those of the embedded weights.
     pub held_out: Option<PathBuf>,
-    /// Folder of PNG pictures, parts of which are scenes that are no letters.
+    /// Folder of PNG pictures. Parts of the pictures are scenes other than letters.
     pub scenes: Option<PathBuf>,
     /// Folder of real measurements (`.npz`).
     pub spi: Option<PathBuf>,
     /// Folder of other weights, `<network>.safetensors`.
     pub weights: Option<PathBuf>,
-    /// Images of each stack.
+    /// Number of images of each stack.
     pub count: usize,
-    /// Images of each stack for the curve over steps.
+    /// Number of images of each stack for the curve over steps.
     pub sampler_count: usize,
-    /// Most steps of that curve.
+    /// The most steps of that curve.
     pub most_steps: u32,
-    /// Seed of choice and noise.
+    /// Seed of the choice of images and of the noise.
     pub seed: u64,
 }
 
-/// Blur of the curves over noise and steps, and noise of the curves over blur and steps: strong, yet a character can be read.
+/// Blur of the curves over noise and steps, and noise of the curves over blur and steps: strong,
+/// but a character stays readable.
 const MIDDLE: Condition = Condition { sigma_px: 2.0, noise: 0.03 };
 
 /// Blurs, in pixels of 64.
@@ -59,40 +61,40 @@ const SIGMAS_PX: [f32; 6] = [0.3, 0.7, 1.0, 2.0, 3.0, 4.0];
 /// Standard deviations of noise.
 const NOISES: [f32; 5] = [0.0, 0.01, 0.03, 0.05, 0.08];
 
-/// Nothing to undo but the sampling.
+/// A condition without degradation except the sampling.
 const UNTOUCHED: Condition = Condition { sigma_px: 0.0, noise: 0.0 };
 
-/// Steps of the curves over steps.
+/// Numbers of steps of the curves over steps.
 const STEPS: [u32; 6] = [1, 2, 4, 10, 50, 500];
 
-/// The quality of every method, and what became of scenes that are no characters.
+/// The quality of every method, and the results for scenes other than characters.
 #[derive(Debug, Serialize)]
 pub struct Report {
     /// Always true.
     pub simulated: bool,
-    /// Seed of choice and noise.
+    /// Seed of the choice of images and of the noise.
     pub seed: u64,
-    /// Stacks and how many images of each.
+    /// The stacks, and their numbers of images.
     pub images: Vec<Origin>,
     /// The networks' versions.
     pub weights: Vec<Version>,
     /// Each method at each condition.
     pub conditions: Vec<Figures>,
-    /// Each method with so many steps at the middle condition.
+    /// Each method with each number of steps at the middle condition.
     pub steps: Vec<Figures>,
-    /// Scenes that are no characters.
+    /// Results for scenes other than characters.
     pub others: Vec<Case>,
-    /// Images that are fewer than asked for.
+    /// Notes about stacks with fewer images than requested.
     pub notes: Vec<String>,
 }
 
-/// Everything that is measured, read and checked.
+/// All data of the measurement, read and checked.
 pub struct Study {
     settings: Settings,
     contenders: Vec<Contender>,
-    /// For the curves over steps.
+    /// The characters for the curves over steps.
     stepped: Vec<Contender>,
-    /// For scenes that are no characters.
+    /// The contender for scenes other than characters.
     bridge: Contender,
     weights: Vec<Version>,
     judges: Judges,
@@ -101,11 +103,11 @@ pub struct Study {
     scenes: Vec<others::Scene>,
 }
 
-/// The report and its pictures by file name.
+/// The report, and its pictures by file name.
 pub struct Measured {
-    /// The numbers.
+    /// The report.
     pub report: Report,
-    /// Charts, and scenes that are no characters.
+    /// Charts, and scenes other than characters.
     pub pictures: Vec<(&'static str, RgbImage)>,
 }
 
@@ -113,7 +115,7 @@ impl Study {
     /// Reads images, weights and scenes.
     ///
     /// # Errors
-    /// A file that cannot be read, or no image that training has not seen.
+    /// `EvalError` for a file that cannot be read, or if there is no held-out image.
     pub fn new(settings: Settings) -> Result<Self> {
         let mut networks = Networks::built_in(Device::cpu());
         if let Some(folder) = &settings.weights {
@@ -134,17 +136,17 @@ impl Study {
         Ok(Self { settings, contenders, stepped, bridge, weights, judges, characters, few, scenes })
     }
 
-    /// Images that are enhanced.
+    /// Number of images to enhance.
     #[must_use]
     pub fn images(&self) -> usize {
         self.contenders.len() * conditions().len() * self.characters.len()
             + self.stepped.len() * self.few.len()
     }
 
-    /// Measures; `done` is called with the number of images just enhanced.
+    /// Measures. `done` is called with the number of images just enhanced.
     ///
     /// # Errors
-    /// Images that a method or a judge cannot take.
+    /// `EvalError` for images that a method or a judge refuses.
     pub fn run(&self, done: &dyn Fn(usize)) -> Result<Measured> {
         let Self { settings, contenders, judges, characters, few, .. } = self;
         let seed = settings.seed;
@@ -177,7 +179,7 @@ fn conditions() -> Vec<Condition> {
     all
 }
 
-/// The methods whose steps are counted, and those that they are compared with.
+/// The methods with a choice of steps, and the methods for comparison.
 fn stepped(most: u32) -> Vec<Method> {
     let mut all = vec![Method::Lanczos, Method::Classical(charts::BEST_CLASSICAL), Method::Gan];
     for steps in STEPS.into_iter().filter(|&steps| steps <= most) {

@@ -1,4 +1,4 @@
-//! What rain, fog and single drops do to light, and the uniformity of a rain simulator.
+//! The effects of rain, fog and single drops on light, and the uniformity of a rain simulator.
 
 pub mod budget;
 pub mod curves;
@@ -14,10 +14,10 @@ use nirspi_optics::rain::{Drops, Medium};
 use nirspi_optics::water::Water;
 use serde::Serialize;
 
-/// What one sphere does to light: efficiencies over its geometric shadow.
+/// The effects of one sphere on light: efficiencies relative to its geometric shadow.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SphereReport {
-    /// Size parameter, pi times diameter over wavelength.
+    /// Size parameter, pi times diameter divided by wavelength.
     pub x: f64,
     /// Real part of the refractive index.
     pub m_re: f64,
@@ -38,7 +38,7 @@ pub struct SphereReport {
 /// The efficiencies of a sphere of size parameter `x` and refractive index `index`.
 ///
 /// # Errors
-/// [`EvalError::Mie`] for a sphere that the solver was not checked for.
+/// [`EvalError::Mie`] for a sphere for which the solver was not checked.
 pub fn sphere(x: f64, index: Index) -> Result<SphereReport> {
     let q = Mie::new().sphere(x, index)?.efficiencies();
     Ok(SphereReport {
@@ -53,10 +53,10 @@ pub fn sphere(x: f64, index: Index) -> Result<SphereReport> {
     })
 }
 
-/// What rain or fog does to light.
+/// The effects of rain or fog on light.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RainReport {
-    /// The drops, as the caller calls them.
+    /// The caller's name for the drops.
     pub drops: String,
     /// Rain rate.
     pub rate_mm_per_h: f64,
@@ -64,42 +64,42 @@ pub struct RainReport {
     pub drops_per_m3: f64,
     /// Water in the air.
     pub water_g_per_m3: f64,
-    /// Differential reflectivity for a radar; `null` where the caller did not ask for it, or in dry air.
+    /// Differential reflectivity for a radar; `null` if not requested, or in dry air.
     pub z_dr_db: Option<f64>,
-    /// Distance that the losses are given for, there and back.
+    /// Distance of the losses, there and back.
     pub path_m: f64,
-    /// At each wavelength.
+    /// The effects at each wavelength.
     pub wavelengths: Vec<WavelengthReport>,
-    /// Only for drops of one size.
+    /// The fall of a drop, only for drops of one size.
     pub fall: Option<FallReport>,
-    /// How to read the extinction.
+    /// How to interpret the extinction.
     pub note: &'static str,
 }
 
-/// The same at one wavelength.
+/// The effects at one wavelength.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct WavelengthReport {
     /// The wavelength.
     pub wavelength_nm: f64,
-    /// Light taken out of a beam.
+    /// Extinction: light removed from a beam.
     pub extinction_per_m: f64,
-    /// The part that is scattered.
+    /// The scattered part of the extinction.
     pub scattering_per_m: f64,
-    /// The part that is absorbed.
+    /// The absorbed part of the extinction.
     pub absorption_per_m: f64,
-    /// Extinction, as radio engineers write it.
+    /// Extinction in dB/km.
     pub extinction_db_per_km: f64,
-    /// Scattering over extinction.
+    /// Scattering divided by extinction.
     pub albedo: f64,
     /// Mean cosine of the scattering angle.
     pub asymmetry: f64,
-    /// Lost over the path and back; none of it comes back here by forward scattering.
+    /// Loss over the path and back, without light regained by forward scattering.
     pub loss_there_and_back: f64,
     /// `null` in dry air.
     pub visibility_m: Option<f64>,
 }
 
-/// How a drop falls, against exposures.
+/// The fall of a drop, compared with exposures.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FallReport {
     /// The drop.
@@ -110,35 +110,37 @@ pub struct FallReport {
     pub time_constant_ms: f64,
     /// The paper's beta for an exposure of 25 us (one pattern).
     pub beta_25_us: f64,
-    /// The same for 20 ms (an image).
+    /// The paper's beta for an exposure of 20 ms (an image).
     pub beta_20_ms: f64,
     /// The same rain in a rig as high as the paper's.
     pub rig: RigReport,
 }
 
-/// A drop half way down the paper's rig of 0.5 m: it has not reached its terminal speed, so that the same mm/h holds more drops. Drops
-/// are taken to leave the nozzles at rest: the most that there can be.
+/// A drop half way down the paper's rig of 0.5 m. The drop has not reached its terminal speed, so
+/// the same mm/h means more drops. Drops are assumed to leave the nozzles at rest, which gives an
+/// upper bound.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RigReport {
-    /// Fallen from the nozzles.
+    /// Height fallen from the nozzles.
     pub height_m: f64,
-    /// Speed there.
+    /// Speed at that height.
     pub speed_m_per_s: f64,
-    /// Drops in a cubic metre there.
+    /// Drops in a cubic metre at that height.
     pub drops_per_m3: f64,
-    /// Over their number at terminal speed; extinction grows alike.
+    /// Number of drops divided by their number at terminal speed. Extinction grows by the same
+    /// factor.
     pub times_as_many: f64,
 }
 
 /// Half of the paper's rig's height (section 4).
 const HALF_RIG_M: f64 = 0.25;
 
-/// How to read the extinction of a [`RainReport`].
+/// How to interpret the extinction of a [`RainReport`].
 const NOTE: &str = "extinction counts light diffracted by under a milliradian, half of it, as lost; \
                     a camera of this resolution does not lose it (docs/physics.md)";
 
-/// What `drops` do to light of these wavelengths over `distance_m` and back. `radar` adds their differential reflectivity, which
-/// fog drops do not have.
+/// The effects of `drops` on light of these wavelengths over `distance_m` and back. `radar` adds
+/// their differential reflectivity, which fog drops do not have.
 ///
 /// # Errors
 /// [`EvalError::Setting`] for a distance, [`EvalError::Refused`] for a wavelength out of range.

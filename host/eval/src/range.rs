@@ -1,4 +1,5 @@
-//! How far the camera sees in rain: physics, Algorithm 2 as printed, and the paper's Table 2 beside them.
+//! The camera's range in rain by physics and by Algorithm 2 as printed, compared with the paper's
+//! Table 2.
 
 use crate::error::{EvalError, Result};
 use nirspi::picture::{Axis, Chart, Line};
@@ -12,16 +13,16 @@ use nirspi_optics::range::{
 use nirspi_optics::water::Water;
 use serde::Serialize;
 
-/// What is asked of the camera.
+/// Settings of the range.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
-    /// Signal of a pixel over its noise at the farthest distance.
+    /// Signal of a pixel divided by its noise at the farthest distance.
     pub snr: f64,
     /// Reflectance of the target.
     pub reflectance: f64,
     /// Exposures of a pattern.
     pub exposures_us: Vec<f64>,
-    /// Which camera.
+    /// The camera.
     pub camera: CameraModel,
 }
 
@@ -37,27 +38,27 @@ const TABLE_2: [Row; 2] = [
     Row { name: "heavy", rain: PaperRain::HEAVY, range_m: (0.2, 1.5) },
 ];
 
-/// Algorithm 2's Z_max: how far patterns are projected (paper, 2.A).
+/// Algorithm 2's Z_max: the distance to which patterns are projected (paper, 2.A).
 const Z_MAX_MM: f64 = 3000.0;
 
-/// Ranges beside the paper's.
+/// Ranges, compared with the paper's.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
     /// Always true.
     pub simulated: bool,
     /// The camera description's name.
     pub camera: String,
-    /// Signal of a pixel over its noise at the farthest distance.
+    /// Signal of a pixel divided by its noise at the farthest distance.
     pub snr: f64,
     /// Reflectance of the target.
     pub reflectance: f64,
-    /// Each rain with each exposure.
+    /// The range in each rain with each exposure.
     pub rows: Vec<RowReport>,
-    /// The exposure that a pixel needs, against distance.
+    /// The exposure that a pixel needs, by distance.
     pub exposures: Vec<ExposureReport>,
-    /// What the numbers rest on.
+    /// The terms of the budget.
     pub assumptions: Vec<String>,
-    /// What must be assumed to agree with the paper, and what physics says instead.
+    /// The assumptions that agree with the paper, and the results of physics.
     pub reading: Vec<String>,
 }
 
@@ -70,21 +71,22 @@ pub struct RowReport {
     pub rate_mm_per_h: f64,
     /// Diameter of its drops.
     pub drop_mm: f64,
-    /// Light that it takes out of a beam.
+    /// Extinction of the rain.
     pub extinction_per_m: f64,
-    /// The same over 2 m.
+    /// Extinction over 2 m.
     pub loss_over_2_m_percent: f64,
     /// Exposure of a pattern.
     pub exposure_us: f64,
-    /// The paper's, of 8 to 25 us together.
+    /// The paper's range, for 8 to 25 us together.
     pub paper_m: (f64, f64),
-    /// By the photon budget; `null`: the signal is too weak at any distance.
+    /// Range by the photon budget; `null` if the signal is too weak at any distance.
     pub physics_m: Option<f64>,
-    /// The same without rain.
+    /// Range by the photon budget without rain.
     pub dry_air_m: Option<f64>,
-    /// By Algorithm 2 as printed: one exposure's photons against one exposure's noise.
+    /// Range by Algorithm 2 as printed: the photons of one exposure compared with its noise.
     pub as_printed_m: f64,
-    /// The same with the gain of a differential Hadamard transform, which the listing does not have.
+    /// Range by Algorithm 2 with the gain of a differential Hadamard transform, which the listing
+    /// does not have.
     pub as_printed_with_gain_m: f64,
 }
 
@@ -93,11 +95,12 @@ pub struct RowReport {
 pub struct ExposureReport {
     /// Distance of the target.
     pub distance_m: f64,
-    /// For the SNR asked for, in the paper's heavy rain.
+    /// Exposure for the required SNR, in the paper's heavy rain.
     pub needed_us: f64,
     /// For five times that SNR.
     pub needed_for_5_times_us: f64,
-    /// The paper's (2.D: 8 to 25 us for 0.3 to 1 m, its ends taken for the ends); `null` elsewhere.
+    /// The paper's exposure (2.D: 8 to 25 us for 0.3 to 1 m, with the ends assigned to the ends);
+    /// `null` at other distances.
     pub paper_us: Option<f64>,
 }
 
@@ -172,7 +175,7 @@ fn exposures(
     EXPOSURE_DISTANCES_M.into_iter().map(at).collect()
 }
 
-/// The instrument, and the air before it: dry, and in the order of [`TABLE_2`].
+/// The instrument, and the air in front of it: dry, and in the order of [`TABLE_2`].
 struct Air {
     instrument: Instrument,
     dry: Weather,
@@ -220,7 +223,7 @@ fn assumptions(instrument: &Instrument) -> Vec<String> {
     ]
 }
 
-/// What must be assumed to agree with the paper, and what physics says instead.
+/// The assumptions that agree with the paper, and the results of physics.
 fn reading(
     instrument: &Instrument,
     weathers: &[Weather],
@@ -284,10 +287,10 @@ fn reading(
     Ok(lines)
 }
 
-/// Signal over noise of a pixel against its distance, in dry air, heavy rain and fog.
+/// Signal divided by noise of a pixel against its distance, in dry air, heavy rain and fog.
 ///
 /// # Errors
-/// None: the air is the paper's.
+/// Does not occur: the air is the paper's.
 pub fn chart(settings: &Settings) -> Result<Chart> {
     let Air { instrument, dry, wet } = &Air::new(&settings.camera)?;
     let fog = Drops::fog(10.0, 0.1)
@@ -305,7 +308,7 @@ pub fn chart(settings: &Settings) -> Result<Chart> {
                 pixel.ok().map(|pixel| (mm * 1e-3, pixel.pixel_snr))
             });
             let name = format!("{name}, {exposure_us} us");
-            // A dashed line leaves the one under it visible.
+            // A dashed line leaves the line below visible.
             lines.push(Line { name, colour: lines.len(), dashed, points: points.collect() });
         }
     }
@@ -335,7 +338,8 @@ pub fn chart(settings: &Settings) -> Result<Chart> {
     })
 }
 
-/// The exposure of a pattern that a pixel needs, against distance, in heavy rain; the paper's beside it.
+/// The exposure of a pattern that a pixel needs, against distance, in heavy rain, with the paper's
+/// exposures for comparison.
 ///
 /// # Errors
 /// [`EvalError::is_setting`] for a reflectance out of range.
@@ -403,10 +407,11 @@ mod tests {
         );
         for pair in report.rows.chunks_exact(2) {
             let (short, long) = (pair[0].physics_m.unwrap(), pair[1].physics_m.unwrap());
-            // The signal falls as the fourth power of the distance, the noise with the root of the exposure's length.
+            // The signal falls as the fourth power of the distance, the noise with the root of the
+            // exposure's length.
             assert!((long / short / (25.0_f64 / 8.0).powf(0.25) - 1.0).abs() < 0.12, "{report:?}");
             assert!(long < pair[1].dry_air_m.unwrap());
-            // What all patterns gain together lengthens the range.
+            // The gain of all patterns together lengthens the range.
             assert!(
                 pair.iter().all(|row| row.as_printed_m < row.as_printed_with_gain_m),
                 "{report:?}"

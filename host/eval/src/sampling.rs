@@ -1,4 +1,5 @@
-//! The quality of images of a part of the patterns, by order, basis and method, against the image of all patterns.
+//! The quality of images of a part of the patterns, by order, basis and method, compared with the
+//! image of all patterns.
 
 mod plot;
 
@@ -11,11 +12,11 @@ use serde::Serialize;
 use std::fmt::Write;
 use std::path::PathBuf;
 
-/// The order in which the measurements are.
+/// The name of the order of the measurements.
 pub const RECORDED: &str = "recorded";
 
-/// The orders that are compared unless the caller names others: the recorded one, every order with a name but deepinv's, which
-/// are transposes of others, and a shuffle.
+/// The orders that are compared by default: the recorded order, every named order except deepinv's,
+/// which are transposes of others, and a shuffle.
 #[must_use]
 pub fn default_orders() -> Vec<String> {
     let own = |named: &&NamedOrder| named.package.is_none_or(|package| package == "SPyRiT");
@@ -23,7 +24,7 @@ pub fn default_orders() -> Vec<String> {
     std::iter::once(RECORDED.to_owned()).chain(named).chain(["random:1".to_owned()]).collect()
 }
 
-/// A method ready to run, under the name that the tables give it.
+/// A method ready to run, with its name in the tables.
 struct Candidate {
     name: String,
     method: Box<dyn Reconstruct>,
@@ -52,32 +53,32 @@ fn candidates() -> Result<Vec<Candidate>, ReconstructError> {
     Ok(all)
 }
 
-/// Atoms of the printed algorithm.
+/// Number of atoms of the printed algorithm.
 const PRINTED_SPARSITY: usize = 100;
 
-/// The image of one method of one part of the patterns.
+/// The image of one method from one part of the patterns.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Row {
     /// Share of the patterns.
     pub sampling: f64,
-    /// The order whose first patterns were taken.
+    /// The order whose first patterns were used.
     pub order: String,
     /// The method, with its basis.
     pub method: String,
-    /// Against the image of all patterns, whose range of values is the peak.
+    /// PSNR against the image of all patterns, whose range of values is the peak.
     pub psnr_db: f64,
-    /// Pearson's, with the same image.
+    /// Pearson's correlation with the image of all patterns.
     pub correlation: f64,
 }
 
 /// Every order, method and share.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
-    /// Where the measurements are from.
+    /// The source of the measurements.
     pub input: PathBuf,
     /// Side of the image.
     pub n: usize,
-    /// Measurements of all patterns.
+    /// Number of measurements of all patterns.
     pub measurements: usize,
     /// Each share, order and method.
     pub rows: Vec<Row>,
@@ -85,14 +86,14 @@ pub struct Report {
 
 /// What to compare.
 pub struct Study {
-    /// Orders by name; `None` is the order in which the measurements are.
+    /// Orders by name; `None` is the order of the measurements.
     orders: Vec<(String, Option<Order>)>,
     shares: Vec<f64>,
     methods: Vec<Candidate>,
 }
 
 impl Study {
-    /// Every method at these shares of the patterns, the first in each order.
+    /// Every method at these shares of the patterns, using the first patterns of each order.
     ///
     /// # Errors
     /// [`EvalError::Setting`] for a share out of range.
@@ -103,7 +104,7 @@ impl Study {
         }
     }
 
-    /// Images that are made.
+    /// Number of images to make.
     #[must_use]
     pub fn images(&self) -> usize {
         self.orders.len() * self.shares.len() * self.methods.len()
@@ -112,11 +113,11 @@ impl Study {
     /// Makes and judges every image; `done` is called after each.
     ///
     /// # Errors
-    /// [`EvalError::PartialSweep`] for fewer than 99 % of the patterns; an order that is no permutation, measurements that a
-    /// method cannot invert.
+    /// [`EvalError::PartialSweep`] for fewer than 99 % of the patterns; other errors for an order
+    /// that is not a permutation, or measurements that a method cannot invert.
     pub fn run(&self, input: PathBuf, all: &Measurements, done: &dyn Fn()) -> Result<Report> {
         let (found, expected) = (all.rows().len(), all.side().area());
-        // A few patterns that dropped out or were not read leave a reference all the same.
+        // The reference remains usable without a few patterns that dropped out or were not read.
         if found * 100 < expected * 99 {
             return Err(EvalError::PartialSweep { found, expected });
         }
@@ -136,7 +137,8 @@ impl Study {
         Ok(Report { input, n, measurements: all.rows().len(), rows })
     }
 
-    /// PSNR as Markdown tables, one a share: methods down, orders across, the best of each order in bold.
+    /// PSNR as Markdown tables, one for each share: methods down, orders across, the best of each
+    /// order in bold.
     #[must_use]
     pub fn tables(&self, report: &Report) -> String {
         table(report, &self.order_names(), &self.method_names(), &self.shares)
@@ -159,7 +161,8 @@ impl Study {
     }
 }
 
-/// Against the full image: PSNR with its own range of values for a peak, no fit.
+/// Compares an image with the full image: PSNR with the full image's range of values as the peak,
+/// without a fit.
 fn judge(
     full: &Image,
     image: &Image,

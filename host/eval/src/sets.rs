@@ -1,8 +1,10 @@
-//! How alike two stacks of images are: PSNR and SSIM image by image, distances of features, and characters read.
+//! The similarity of two stacks of images: PSNR and SSIM image by image, distances of features, and
+//! recognised characters.
 //!
 //! # Invariant
-//! A figure that cannot be computed is `null`, and `notes` says why (`a_figure_that_cannot_be_computed_is_noted`). The only
-//! number called FID is computed with the user's Inception weights.
+//! A figure that cannot be computed is `null`, and `notes` says why
+//! (`tests::a_figure_that_cannot_be_computed_is_noted`). Only the number computed with the user's
+//! Inception weights is called FID.
 
 mod images;
 
@@ -24,35 +26,37 @@ use std::path::Path;
 /// A share of the reference's images and of the test's.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct Shares {
-    /// Of the reference's.
+    /// Share of the reference's images.
     pub reference: f64,
-    /// Of the test's.
+    /// Share of the test's images.
     pub test: f64,
 }
 
-/// How alike two stacks are as sets.
+/// The similarity of two stacks as sets.
 #[derive(Debug, Default, Serialize)]
 pub struct Sets {
-    /// On 128 features of this program's own classifier: not comparable with FID.
+    /// Fréchet distance on 128 features of this program's own classifier, which is not comparable
+    /// with FID.
     pub frechet_character_distance: Option<f64>,
-    /// Share of the images in which the classifier sees the labelled character.
+    /// Share of the images in which the classifier recognises the labelled character.
     pub character_accuracy: Option<Shares>,
-    /// With the user's Inception weights.
+    /// FID with the user's Inception weights.
     pub fid: Option<f64>,
-    /// The outside judge.
+    /// The name of the character reader.
     pub legibility_judge: Option<String>,
-    /// Share of the images in which the outside judge reads the labelled character.
+    /// Share of the images in which the character reader recognises the labelled character.
     pub legibility: Option<Shares>,
     /// Why a figure is missing.
     pub notes: Vec<String>,
 }
 
 impl Sets {
-    /// Compares two stacks of one shape, and more closely what `options` asks for. `done` is called after each image that
-    /// Inception has looked at, twice the number of images in all.
+    /// Compares two stacks of the same shape, with the further figures that `options` requests.
+    /// `done` is called after each image that Inception has processed, twice the number of images
+    /// in total.
     ///
     /// # Errors
-    /// Weights that do not fit, a judge that fails.
+    /// [`EvalError`] for weights that do not fit, or a character reader that fails.
     fn compare(
         reference: &Stack,
         test: &Stack,
@@ -133,16 +137,16 @@ impl Sets {
     }
 }
 
-/// How often two lists of one length say the same.
+/// Share of equal entries in two lists of the same length.
 fn agreement<T: PartialEq>(found: &[T], expected: &[T]) -> f64 {
     let same = found.iter().zip(expected).filter(|(a, b)| a == b).count();
     same as f64 / expected.len() as f64
 }
 
-/// Reads which character each of `images` images shows, 0 to 61 for 0-9, A-Z, a-z.
+/// Reads the character in each of `images` images, 0 to 61 for 0-9, A-Z, a-z.
 ///
 /// # Errors
-/// A file that cannot be read, another number of labels, a label out of range.
+/// [`EvalError`] for a file that cannot be read, another number of labels, or a label out of range.
 pub fn read_labels(path: &Path, images: usize) -> Result<Vec<u8>> {
     let labels = read_list(path)?;
     if labels.len() != images {
@@ -168,48 +172,49 @@ pub fn read_labels(path: &Path, images: usize) -> Result<Vec<u8>> {
 /// The figures of one image.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ImageMetrics {
-    /// `null`: the images are identical.
+    /// PSNR; `null` if the images are identical.
     pub psnr_db: Option<f64>,
     /// Structural similarity, Gaussian window of 11 px.
     pub ssim: f64,
 }
 
-/// How alike two stacks are.
+/// The similarity of two stacks.
 #[derive(Debug, Serialize)]
 pub struct Comparison {
-    /// Pairs of images.
+    /// Number of pairs of images.
     pub images: usize,
     /// Rows of an image.
     pub height: usize,
     /// Columns of an image.
     pub width: usize,
-    /// `null`: all images are identical.
+    /// Mean PSNR; `null` if all images are identical.
     pub mean_psnr_db: Option<f64>,
-    /// Mean over the images.
+    /// Mean SSIM over the images.
     pub mean_ssim: f64,
-    /// As sets.
+    /// The similarity as sets.
     #[serde(flatten)]
     pub sets: Sets,
-    /// Image by image.
+    /// The figures image by image.
     pub each: Vec<ImageMetrics>,
 }
 
-/// What to compute beyond PSNR, SSIM and the Fréchet character distance.
+/// The figures besides PSNR, SSIM and the Fréchet character distance.
 #[derive(Clone, Copy, Default)]
 pub struct Options<'a> {
-    /// Which character each image shows, one an image: for the character accuracy.
+    /// The character in each image, for the character accuracy.
     pub labels: Option<&'a [u8]>,
     /// Inception-v3 with the user's weights, for FID.
     pub fid: Option<&'a Fid>,
-    /// Have Tesseract read the characters.
+    /// Whether Tesseract reads the characters.
     pub legibility: bool,
 }
 
-/// Compares two stacks of images in `[0, 1]` of one shape; nothing is scaled or fitted. `done` is called after each image that
-/// Inception has looked at, twice the number of images in all.
+/// Compares two stacks of images in `[0, 1]` of the same shape, without scaling or fitting. `done`
+/// is called after each image that Inception has processed, twice the number of images in total.
 ///
 /// # Errors
-/// Stacks of different shapes, images too small for SSIM, weights that do not fit.
+/// [`EvalError`] for stacks of different shapes, images too small for SSIM, or weights that do not
+/// fit.
 pub fn compare(
     reference: &Stack,
     test: &Stack,
@@ -227,7 +232,7 @@ pub fn compare(
     for (a, b) in pairs.zip(test.values.chunks_exact(height * width)) {
         let psnr = metrics::psnr(a, b, width, height, 1.0)?;
         each.push(ImageMetrics {
-            // Identical images have no finite PSNR, and JSON has no infinity.
+            // Identical images have an infinite PSNR, which JSON cannot hold.
             psnr_db: psnr.is_finite().then_some(psnr),
             ssim: metrics::ssim(a, b, width, height, 1.0)?,
         });

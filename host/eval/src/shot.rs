@@ -1,4 +1,4 @@
-//! One picture taken with the virtual camera, from light to image, and one with an ordinary camera.
+//! One picture of the virtual camera, from light to image, and one of an ordinary camera.
 
 use crate::DISTANCES_M;
 use crate::error::{EvalError, Result};
@@ -17,36 +17,37 @@ use std::ops::ControlFlow;
 pub struct Conditions<'a> {
     /// Distance of the target.
     pub distance_m: f64,
-    /// What is between camera and target.
+    /// The weather between camera and target.
     pub air: &'a Air,
-    /// Differential sweeps that are summed.
+    /// Number of differential sweeps to sum.
     pub frames: u32,
 }
 
 /// How the pictures of a table are taken.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Exposure {
-    /// What is between camera and target.
+    /// The weather between camera and target.
     pub air: Air,
-    /// Differential sweeps summed into a picture.
+    /// Number of differential sweeps summed into a picture.
     pub frames: u32,
     /// Seed of the first picture.
     pub seed: u64,
 }
 
-/// What both cameras give of one scene.
+/// The pictures of both cameras of one scene.
 pub struct Shots {
-    /// What a perfect camera of 32 x 32 pixels would see.
+    /// The image of a perfect camera of 32 x 32 pixels.
     pub truth: Vec<f32>,
-    /// What a perfect camera of 64 x 64 pixels would see.
+    /// The image of a perfect camera of 64 x 64 pixels.
     pub truth_fine: Vec<f32>,
-    /// What the single-pixel camera gives, in ADC counts.
+    /// The single-pixel camera's picture, in ADC counts.
     pub nir_spi: Image,
-    /// What an ordinary camera gives.
+    /// The ordinary camera's picture.
     pub vis: Image,
 }
 
-/// The virtual camera with its latency, settling and flat field, measured once against a white sheet.
+/// The virtual camera with its latency, settling and flat field, measured once against a white
+/// sheet.
 #[derive(Debug, Clone)]
 pub struct CalibratedCamera {
     model: CameraModel,
@@ -58,16 +59,16 @@ impl CalibratedCamera {
     /// Calibrates the camera.
     ///
     /// # Errors
-    /// A burst that cannot be measured.
+    /// [`EvalError`] for a burst that cannot be measured.
     pub fn new(model: &CameraModel, seed: u64) -> Result<Self> {
-        // The scene does not matter: the sheet takes its place.
+        // The scene does not matter, because a white sheet replaces it.
         let optics = VirtualOptics::of(model, Scene::white(), 1e3 * DISTANCES_M[0])?;
         let settling = virtual_camera::calibrate_against_white(&optics, seed)?;
         let flat_field = virtual_camera::flat_field_against_white(&optics, &settling, seed)?;
         Ok(Self { model: model.clone(), settling, flat_field })
     }
 
-    /// Which camera it is.
+    /// The camera's description.
     #[must_use]
     pub fn model(&self) -> &CameraModel {
         &self.model
@@ -76,7 +77,7 @@ impl CalibratedCamera {
     /// Takes `scene` with this camera and with an ordinary one.
     ///
     /// # Errors
-    /// A scene or distance that the optics refuse, a capture that fails.
+    /// [`EvalError`] for a scene or distance that the optics refuse, or a capture that fails.
     pub fn shoot(&self, scene: Scene, conditions: Conditions<'_>, seed: u64) -> Result<Shots> {
         let distance_mm = conditions.distance_m * 1e3;
         let visible = VisibleCamera::default().picture(
@@ -104,10 +105,11 @@ impl CalibratedCamera {
         })
     }
 
-    /// The counts that a white sheet gives a pixel under these conditions: the scale of images, as a user would measure it.
+    /// The counts of a pixel that sees a white sheet under these conditions: the scale of images,
+    /// as a user would measure it.
     ///
     /// # Errors
-    /// A sheet that gives no light, a capture that fails.
+    /// [`EvalError`] for a sheet that reflects no light, or a capture that fails.
     pub fn white_level(&self, conditions: Conditions<'_>, seed: u64) -> Result<f32> {
         let image = self.shoot(Scene::white(), conditions, seed)?.nir_spi;
         let white = image.pixels().iter().sum::<f32>() / image.pixels().len() as f32;
@@ -120,7 +122,7 @@ impl CalibratedCamera {
     /// One capture by the whole virtual camera: light, gateware model, firmware, packets, host.
     ///
     /// # Errors
-    /// A capture that fails.
+    /// [`EvalError`] for a capture that fails.
     pub fn record(
         &self,
         optics: &VirtualOptics,

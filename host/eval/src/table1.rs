@@ -1,7 +1,8 @@
-//! How long each stage of one picture takes on this machine, beside the paper's Table 1.
+//! Times each stage of one picture on this machine, compared with the paper's Table 1.
 //!
-//! The acquisition is an input: so many sweeps of the sequence (patterns, complements, dwell) as fill 20 ms, the middle of the paper's
-//! 18 to 24. The other stages are timed on the CPU, one picture at a time, from a frame of the virtual camera to 64 x 64 pixels.
+//! The acquisition is an input: the number of sweeps of the sequence (patterns, complements, dwell)
+//! that fills 20 ms, the middle of the paper's 18 to 24. The other stages are timed on the CPU, one
+//! picture at a time, from a frame of the virtual camera to 64 x 64 pixels.
 
 use crate::error::{EvalError, Result};
 use crate::shot::{CalibratedCamera, Conditions};
@@ -20,7 +21,7 @@ use std::time::Instant;
 /// What to time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Pictures, at least one.
+    /// Number of pictures, at least one.
     pub repeats: u32,
     /// Share of the patterns, in zig-zag order.
     pub sampling: f64,
@@ -28,12 +29,12 @@ pub struct Settings {
     pub seed: u64,
 }
 
-/// Time that light is collected: chosen as the paper's, not measured.
+/// Time of collecting light: chosen like the paper's, not measured.
 const ACQUISITION_NS: f64 = 20e6;
 
 const DISTANCE_M: f64 = 0.3;
 
-/// Pictures before the clock counts.
+/// Number of pictures before timing starts.
 const WARM_UP: u32 = 3;
 
 /// The paper's times on a Jetson Xavier NX, in ms: from, to.
@@ -43,23 +44,24 @@ const PAPER_MS: [(f64, f64); 6] =
 /// The time of each stage.
 #[derive(Debug, Clone, Serialize)]
 pub struct Report {
-    /// The acquisition is chosen, the picture the virtual camera's; the other times are this machine's.
+    /// Always true: the acquisition is chosen and the picture is simulated. The other times are
+    /// this machine's.
     pub simulated_acquisition: bool,
-    /// CPU cores of this machine.
+    /// Number of CPU cores of this machine.
     pub cores: usize,
     /// Whether the program was built with optimisation.
     pub optimised: bool,
-    /// Patterns shown, each with its complement.
+    /// Number of patterns shown, each with its complement.
     pub patterns: usize,
     /// Their share of all patterns.
     pub sampling: f64,
-    /// Sweeps summed into a picture.
+    /// Number of sweeps summed into a picture.
     pub sweeps: u32,
-    /// Pictures timed.
+    /// Number of timed pictures.
     pub repeats: u32,
-    /// Stage by stage.
+    /// Times stage by stage.
     pub rows: Vec<Row>,
-    /// How to read the numbers.
+    /// How to interpret the numbers.
     pub reading: Vec<String>,
 }
 
@@ -68,15 +70,15 @@ pub struct Report {
 pub struct Row {
     /// The paper's symbol.
     pub symbol: &'static str,
-    /// What the stage does here.
+    /// The stage in this program.
     pub stage: &'static str,
-    /// Half of the pictures took no longer.
+    /// Median time.
     pub p50_ms: f64,
-    /// 99 % of the pictures took no longer.
+    /// The time that 99 % of the pictures did not exceed.
     pub p99_ms: f64,
-    /// The paper's: from, to.
+    /// The paper's time: from, to.
     pub paper_ms: (f64, f64),
-    /// Every picture's time, rising.
+    /// Every picture's time, in ascending order.
     #[serde(skip)]
     pub sorted_ms: Vec<f64>,
 }
@@ -107,7 +109,8 @@ impl Row {
 /// Times every stage; `done` is called after each picture.
 ///
 /// # Errors
-/// [`EvalError::Setting`] for a share of patterns out of range; a capture that fails.
+/// [`EvalError::Setting`] for a share of patterns out of range, or another error for a capture that
+/// fails.
 pub fn table1(settings: &Settings, done: &dyn Fn()) -> Result<Report> {
     let Settings { repeats, sampling, seed } = *settings;
     if !(sampling > 0.0 && sampling <= 1.0) {
@@ -141,7 +144,7 @@ pub fn table1(settings: &Settings, done: &dyn Fn()) -> Result<Report> {
         let enhanced =
             chain.enhance(Images::new(&readings)?, None, &Options::default(), &mut |_| {})?;
         let all = start.elapsed();
-        // The chain does both in one; each again by itself.
+        // The chain does both stages in one call, so each is timed again separately.
         let start = Instant::now();
         let upscaled = fusion_alone.upscale(Images::new(&readings)?, None);
         let fusion = start.elapsed();
@@ -177,10 +180,10 @@ pub fn table1(settings: &Settings, done: &dyn Fn()) -> Result<Report> {
     })
 }
 
-/// Times in rising order, and the paper's as dashed lines.
+/// Times in ascending order, with the paper's times as dashed lines.
 #[must_use]
 pub fn chart(report: &Report) -> Chart {
-    // T_2D is there twice.
+    // The symbol T_2D occurs twice.
     let name = |k: usize, row: &Row| match (row.symbol, k) {
         ("T_2D", 3) => "T_2D, no diffusion".to_owned(),
         _ => row.symbol.to_owned(),
@@ -254,7 +257,7 @@ mod tests {
         let without = sum(pre) + sum(omp) + sum(fusion);
         assert!((sum(plain) - without).abs() < 1e-6, "{report:?}");
         assert!((sum(all) - without - sum(diffusion)).abs() < 1e-6, "{report:?}");
-        // A line for each stage and one for the paper's.
+        // A line for each stage and a line for the paper's time.
         assert_eq!(chart(&report).lines.len(), 12);
         let all_of_nothing = table1(&Settings { sampling: 0.0, ..settings }, &|| {}).unwrap_err();
         assert_eq!(all_of_nothing.to_string(), "sampling is 0, expected more than 0, at most 1");

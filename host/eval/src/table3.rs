@@ -1,8 +1,10 @@
-//! Image quality in rain and without it, beside the paper's Table 3: NIR-SPI, VIS, and NIR-SPI enhanced by networks.
+//! Image quality with rain and without, compared with the paper's Table 3: NIR-SPI, VIS, and
+//! NIR-SPI enhanced by networks.
 //!
-//! Targets of 43 mm, each with one character of one typeface that training has not seen, in 15 klx of daylight at 0.3, 0.6 and 1 m,
-//! with rain and noise of their own, through the whole virtual camera; an ordinary camera sees the same, and networks enhance what
-//! NIR-SPI saw.
+//! Each target of 43 mm has one character of one typeface outside the training data, in 15 klx of
+//! daylight at 0.3, 0.6 and 1 m. Each picture has its own rain and noise and passes through the
+//! whole virtual camera. An ordinary camera takes the same scene, and networks enhance the NIR-SPI
+//! picture.
 
 mod rows;
 
@@ -31,30 +33,31 @@ use rows::{Measured, Statistics};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// What to measure.
+/// Settings of the measurement.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
-    /// Scenes at each distance, at least two.
+    /// Number of scenes at each distance, at least two.
     pub scenes: u32,
-    /// Which camera takes the pictures.
+    /// The camera.
     pub camera: CameraModel,
-    /// How they are taken.
+    /// The exposure of the pictures.
     pub exposure: Exposure,
-    /// Steps of the ancestral sampler, the paper's own; 0 leaves its row out. The paper has 500.
+    /// Steps of the ancestral sampler, the paper's method; 0 leaves out its row. The paper has 500.
     pub ancestral_steps: u32,
-    /// Inception-v3's weights, for FID; a second or so a picture.
+    /// Inception-v3's weights, for FID; takes about a second for each picture.
     pub inception: Option<PathBuf>,
 }
 
 impl Settings {
-    /// Pictures that are taken.
+    /// Number of pictures to take.
     #[must_use]
     pub fn pictures(&self) -> usize {
         DISTANCES_M.len() * self.scenes as usize
     }
 }
 
-/// A row of the paper: PSNR in dB, SSIM, FID. Its diffusion model is the ancestral sampler, so that both of ours stand beside it.
+/// A row of the paper: PSNR in dB, SSIM, FID. The paper's diffusion model is the ancestral sampler,
+/// with which both of nirspi's samplers are compared.
 struct Paper {
     image: Picture,
     psnr_db: f64,
@@ -79,25 +82,25 @@ pub struct Report {
     pub camera: String,
     /// `none`, `light` or `heavy`.
     pub rain: String,
-    /// Scenes at each distance.
+    /// Number of scenes at each distance.
     pub scenes: u32,
-    /// Typefaces that the characters are drawn in.
+    /// Typefaces of the characters.
     pub typefaces: Vec<&'static str>,
-    /// Steps of the ancestral sampler; 0: its rows are left out.
+    /// Steps of the ancestral sampler; 0 means that its rows are left out.
     pub ancestral_steps: u32,
-    /// Sweeps summed into a picture.
+    /// Number of sweeps summed into a picture.
     pub frames: u32,
     /// Seed of the first picture.
     pub seed: u64,
-    /// Each kind of image at each distance, and at all.
+    /// Each kind of image at each distance, and at all distances.
     pub rows: Vec<Row>,
-    /// What kinds gain over each other, and what rain costs them, scene by scene.
+    /// Differences between kinds, and differences by rain, scene by scene.
     pub differences: Vec<Difference>,
-    /// How to read the numbers.
+    /// How to interpret the numbers.
     pub reading: Vec<String>,
 }
 
-/// One scene as it was taken with rain and without.
+/// One scene, taken with rain and without.
 struct Taken {
     distance_m: f64,
     wet: Shots,
@@ -105,7 +108,7 @@ struct Taken {
     blank: Quality,
 }
 
-/// All pictures and networks of the table, taken once.
+/// All pictures and networks of the table. Each picture is taken once.
 pub struct Table {
     settings: Settings,
     camera: CalibratedCamera,
@@ -121,7 +124,7 @@ impl Table {
     /// Takes all pictures; `done` is called after each.
     ///
     /// # Errors
-    /// Weights that cannot be read, a capture that fails.
+    /// `EvalError` for weights that cannot be read, or a capture that fails.
     pub fn take(settings: Settings, done: &(dyn Fn() + Sync)) -> Result<Self> {
         let sets = Sets::new(settings.inception.as_deref())?;
         let enhancers = Enhancers::new(settings.ancestral_steps)?;
@@ -150,7 +153,7 @@ impl Table {
     /// The figures of the pictures.
     ///
     /// # Errors
-    /// Distances of sets that cannot be computed.
+    /// `EvalError` for distances of sets that cannot be computed.
     pub fn report(&self) -> Result<Report> {
         let Self { settings, enhancers, sets, taken, typefaces, .. } = self;
         let of = |image| -> Result<Measured> {
@@ -182,16 +185,16 @@ impl Table {
         })
     }
 
-    /// The paper's rows that have pictures here.
+    /// The paper's rows with pictures in this table.
     fn images(&self) -> impl Iterator<Item = &'static Paper> {
         let ancestral = self.settings.ancestral_steps > 0;
         PAPER.iter().filter(move |paper| ancestral || paper.image != Picture::Ancestral)
     }
 
-    /// Scene 17, an R, at each distance (as the paper's Fig. 7), in each row.
+    /// Scene 17, an R, at each distance (like the paper's Fig. 7), in each row.
     ///
     /// # Errors
-    /// A capture that fails.
+    /// `EvalError` for a capture that fails.
     pub fn picture(&self) -> Result<RgbImage> {
         let of = |distance_m| self.panels(distance_m);
         let rows: Vec<SideBySide> = DISTANCES_M.into_iter().map(of).collect::<Result<_>>()?;
@@ -237,10 +240,10 @@ impl Table {
     }
 }
 
-/// The scene that is shown: an R.
+/// The scene in the picture: an R.
 const SHOWN: u32 = 17;
 
-/// What a white sheet gives at each distance.
+/// The level of a white sheet at each distance.
 fn whites(camera: &CalibratedCamera, exposure: &Exposure, air: &Air) -> Result<[f32; 3]> {
     let mut levels = [0.0; 3];
     for (level, distance_m) in levels.iter_mut().zip(DISTANCES_M) {
@@ -257,14 +260,15 @@ fn white_at(whites: &[f32; 3], distance_m: f64) -> f32 {
 
 /// A picture with its figures.
 struct Judged {
-    /// On the 32 x 32 grid.
+    /// The picture on the 32 x 32 grid.
     quality: Quality,
-    /// 64 x 64, on the truth's scale.
+    /// The picture at 64 x 64, on the truth's scale.
     fine: Vec<f32>,
 }
 
-/// Every scene as a row has it. Networks give 64 x 64: for PSNR and SSIM, means of 2 x 2 of it, so that all rows are
-/// compared with the same; the others are interpolated for what looks at 64 x 64.
+/// Every scene in the form of a row. Networks give 64 x 64. PSNR and SSIM use means of 2 x 2 of
+/// these pictures, so that all rows are compared with the same truth. The other rows are
+/// interpolated for figures of 64 x 64.
 fn judged(
     image: Picture,
     taken: &[Taken],
@@ -305,13 +309,14 @@ impl Sets {
         Ok(Self { characters: CharacterJudge::new(&Weights::embedded("classifier")?)?, fid })
     }
 
-    /// What our classifier sees in pictures.
+    /// The classifier's features of pictures.
     fn features(&self, images: &[&[f32]]) -> Result<Features> {
         let stack = images.concat();
         Ok(self.characters.judge(Images::new(&stack)?))
     }
 
-    /// Fréchet character distance of the pictures at some places, any of them more than once.
+    /// Fréchet character distance of the pictures at these indices; an index may occur more than
+    /// once.
     fn character_distance(
         &self,
         truth: &Features,
@@ -356,7 +361,7 @@ fn take(
     camera.shoot(scene, conditions, exposure.seed.wrapping_add(u64::from(i)))
 }
 
-/// What rain does here, and what it cannot do.
+/// The effects of rain in this table, and their limits.
 fn reading(
     camera: &CameraModel,
     rows: &[Row],
@@ -436,7 +441,7 @@ mod tests {
         let report = [report(), report()];
         assert_eq!(report[0], report[1]);
         let rows = report[0]["rows"].as_array().unwrap();
-        // Five kinds of image, at three distances and at all.
+        // Five kinds of image, at three distances and at all distances.
         assert_eq!(rows.len(), 5 * 4);
         for row in rows {
             let psnr = &row["psnr_db"];
@@ -449,7 +454,7 @@ mod tests {
             let mean = kind[..3].iter().map(value).sum::<f64>() / 3.0;
             assert!((value(&kind[3]) - mean).abs() < 1e-9, "{kind:?}");
         }
-        // Rain's cost of each kind, and six pairs of kinds.
+        // The difference by rain of each kind, and six pairs of kinds.
         let differences = report[0]["differences"].as_array().unwrap();
         assert_eq!(differences.len(), (5 + 6) * 4);
         let first = &differences[0];

@@ -1,9 +1,11 @@
-//! Spatial resolution in rain, beside the paper's Table 4: NIR-SPI, VIS and networks, in mm on the target.
+//! Spatial resolution in rain, compared with the paper's Table 4: NIR-SPI, VIS and networks, in mm
+//! on the target.
 //!
-//! The width of a line at which the transfer of a slanted edge falls to a half (MTF50) and to a tenth (MTF10), and the finest bars
-//! that keep a tenth of their contrast. Rain and noise differ in every picture; the transfer is that of all pictures of the edge
-//! together, without the noise's own power, so that more pictures narrow an interval and move nothing. Beside it stands what
-//! geometry says of the lens alone.
+//! The figures are the width of a line at which the transfer of a slanted edge falls to a half
+//! (MTF50) and to a tenth (MTF10), and the finest bars that keep a tenth of their contrast. Rain
+//! and noise differ in every picture. The transfer is that of all pictures of the edge together,
+//! without the power of the noise, so more pictures narrow an interval without a bias. The
+//! resolution of the lens by geometry is given for comparison.
 
 use crate::DISTANCES_M;
 use crate::error::Result;
@@ -18,21 +20,21 @@ use nirspi_optics::{CameraModel, Projector, Scene};
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// What to measure.
+/// Settings of the measurement.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
-    /// Pictures of the edge at each distance, at least 10.
+    /// Number of pictures of the edge at each distance, at least 10.
     pub scenes: u32,
-    /// Which camera takes the pictures.
+    /// The camera.
     pub camera: CameraModel,
-    /// How they are taken.
+    /// The exposure of the pictures.
     pub exposure: Exposure,
-    /// Steps of the ancestral sampler, the paper's own; 0 leaves its row out. The paper has 500.
+    /// Steps of the ancestral sampler, the paper's method; 0 leaves out its row. The paper has 500.
     pub ancestral_steps: u32,
 }
 
 impl Settings {
-    /// Pictures that are taken.
+    /// Number of pictures to take.
     #[must_use]
     pub fn pictures(&self) -> usize {
         let bars = BARS_PX.len() as u32 * BAR_PICTURES;
@@ -40,26 +42,28 @@ impl Settings {
     }
 }
 
-/// Groups of pictures of the edge, each of which is left out once: the spread of what is left gives the interval.
+/// Number of groups of pictures of the edge. Each group is left out once, and the spread of the
+/// results gives the interval.
 const GROUPS: usize = 10;
 
-/// Pictures of each bar width, averaged.
+/// Number of averaged pictures of each bar width.
 const BAR_PICTURES: u32 = 10;
 
-/// Bars tried, in pixels of the grid.
+/// The tested bar widths, in pixels of the grid.
 const BARS_PX: [f64; 10] = [1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0];
 
-/// Contrast that bars must keep to count as resolved.
+/// The contrast that resolved bars keep.
 const RESOLVED: f64 = 0.1;
 
-/// Edge of the drawn scenes, in pixels a field.
+/// Edge of the drawn scenes, in pixels per field.
 const SCENE_PX: usize = 512;
 
-/// Fields that a scene is wide: the edge and the bars run on past the field for further than the lens's disc reaches, so that
-/// nothing but the edge is in what is measured of it.
+/// Width of a scene in fields. The edge and the bars extend beyond the field by more than the
+/// radius of the lens's disc, so that only the edge affects its measurement.
 const SCENE_FIELDS: usize = 2;
 
-/// The paper's rows, in mm. Its diffusion model is the ancestral sampler: both of ours stand beside it.
+/// The paper's rows, in mm. The paper's diffusion model is the ancestral sampler, with which both
+/// of nirspi's samplers are compared.
 const PAPER: [(Picture, [f64; 3]); 5] = [
     (Picture::Vis, [45.0, 48.0, 60.0]),
     (Picture::NirSpi, [5.0, 25.0, 45.0]),
@@ -68,7 +72,7 @@ const PAPER: [(Picture, [f64; 3]); 5] = [
     (Picture::Ancestral, [5.0, 15.0, 25.0]),
 ];
 
-/// What the figures rest on.
+/// The basis of the figures.
 fn reading(camera: &CameraModel) -> Vec<String> {
     let projector = camera.projector();
     let of = |length: fn(&Projector, f64) -> f64| {
@@ -100,17 +104,17 @@ pub struct Report {
     pub camera: String,
     /// `none`, `light` or `heavy`.
     pub rain: String,
-    /// Pictures of the edge at each distance.
+    /// Number of pictures of the edge at each distance.
     pub scenes: u32,
-    /// Sweeps summed into a picture.
+    /// Number of sweeps summed into a picture.
     pub frames: u32,
     /// Seed of the first picture.
     pub seed: u64,
-    /// Steps of the ancestral sampler; 0: its rows are left out.
+    /// Steps of the ancestral sampler; 0 means that its rows are left out.
     pub ancestral_steps: u32,
     /// Each kind of image at each distance.
     pub rows: Vec<Row>,
-    /// How to read the numbers.
+    /// How to interpret the numbers.
     pub reading: Vec<String>,
 }
 
@@ -125,17 +129,19 @@ pub struct Row {
     pub pixel_mm: f64,
     /// Width of the lens's defocus disc on the target.
     pub defocus_mm: f64,
-    /// MTF50 and MTF10 of the lens and the emitter alone, by geometry, and never finer than a pixel; `null` for a camera without them.
+    /// MTF50 and MTF10 of the lens and the emitter alone, by geometry, at least a pixel; `null` for
+    /// a camera without them.
     pub lens_mm: Option<[f64; 2]>,
-    /// Line at which the transfer falls to a half; `null`: it does not.
+    /// Line at which the transfer falls to a half; `null` if the transfer stays above a half.
     pub mtf50_mm: Option<Estimate>,
-    /// Line at which the transfer falls to a tenth; `null`: it does not.
+    /// Line at which the transfer falls to a tenth; `null` if the transfer stays above a tenth.
     pub mtf10_mm: Option<Estimate>,
-    /// The finest bars, of all wider ones are resolved; `null`: none of those tried.
+    /// The finest bars such that all wider bars are resolved; `null` if the widest tested bars are
+    /// not resolved.
     pub bars_mm: Option<f64>,
-    /// Bar width in mm and contrast kept.
+    /// Bar width in mm, and the contrast kept.
     pub bar_contrast: Vec<(f64, f64)>,
-    /// The paper's.
+    /// The paper's resolution.
     pub paper_mm: f64,
 }
 
@@ -149,7 +155,7 @@ struct Pictures {
 /// Takes all pictures and measures them; `done` is called after each picture.
 ///
 /// # Errors
-/// A capture that fails.
+/// `EvalError` for a capture that fails.
 pub fn table4(settings: &Settings, done: &(dyn Fn() + Sync)) -> Result<Report> {
     let Settings { scenes, exposure, ancestral_steps, .. } = settings;
     let enhancers = Enhancers::new(*ancestral_steps)?;
@@ -200,7 +206,7 @@ pub fn table4(settings: &Settings, done: &(dyn Fn() + Sync)) -> Result<Report> {
     })
 }
 
-/// A scene that goes on past the field.
+/// Takes a scene that extends beyond the field.
 fn take(
     camera: &CalibratedCamera,
     exposure: &Exposure,
@@ -214,13 +220,15 @@ fn take(
     camera.shoot(scene, conditions, exposure.seed.wrapping_add(i))
 }
 
-/// A drawn scene around a field of this width. What lies beyond it is its mean, and too far away to be seen.
+/// A drawn scene around a field of this width. The surroundings have the scene's mean reflectance
+/// and are too far away to be seen.
 fn wide_scene(reflectance: Vec<f32>, field_mm: f64) -> Result<Scene> {
     let scene = Scene::new(reflectance, SCENE_FIELDS * SCENE_PX, SCENE_FIELDS as f64 * field_mm)?;
     Ok(scene.with_surround(0.5)?)
 }
 
-/// Line at which the transfer of defocus disc and emitter falls to a level, in mm, by geometry; at least a pixel.
+/// Line at which the transfer of defocus disc and emitter falls to a level, in mm, by geometry, at
+/// least a pixel.
 fn lens_line_mm(projector: &Projector, distance_mm: f64, pixel_mm: f64, level: f64) -> f64 {
     let (disc, emitter) = (
         projector.blur_mm(distance_mm),
@@ -228,7 +236,7 @@ fn lens_line_mm(projector: &Projector, distance_mm: f64, pixel_mm: f64, level: f
     );
     let passes =
         |per_mm: f64| disc_transfer(disc, per_mm) * square_transfer(emitter, per_mm) > level;
-    // The first crossing: the disc's transfer swings beyond it.
+    // The first crossing counts, because the disc's transfer oscillates beyond it.
     let limit = 0.5 / pixel_mm;
     let steps = 1000;
     let at = |k: u32| limit * f64::from(k) / f64::from(steps);
@@ -297,7 +305,7 @@ fn row(
         bar_transfer(&sum(&pictures.bars[k]), &truth, side, BARS_PX[k] * side as f64 / 32.0)
     };
     let contrasts: Vec<f64> = (0..BARS_PX.len()).map(contrast).collect();
-    // Bars are counted in pixels of 32 x 32, whatever the picture's.
+    // Bars are in pixels of 32 x 32, whatever the picture's grid.
     let bar_mm = |px: f64| px * field_mm / 32.0;
     let at = |level| {
         let line = |mtf: &[(f64, f64)]| line_width_px(mtf, level).map(|px| px * pixel_mm);
@@ -324,7 +332,7 @@ fn row(
     }
 }
 
-/// The contrast of bars against their width.
+/// The contrast of bars by their width.
 #[must_use]
 pub fn chart(report: &Report) -> Chart {
     let lines = report.rows.iter().enumerate().map(|(k, row)| Line {
@@ -377,7 +385,7 @@ mod tests {
         Pictures { side, edges, bars: BARS_PX.iter().map(bars).collect() }
     }
 
-    /// The bars as a camera without blur sees them.
+    /// The bars as taken by a camera without blur.
     fn truths(pictures: &Pictures) -> Vec<Vec<Shots>> {
         let shots = |bars: &Vec<Vec<f32>>| {
             let truth = bars[0].clone();
@@ -410,7 +418,8 @@ mod tests {
         let bars = sharp.bars.iter().map(|bars| blurred(bars)).collect();
         let pictures = Pictures { side: 32, edges: blurred(&sharp.edges), bars };
         let row = row(&Projector::default(), Picture::NirSpi, 0.3, 5.0, &pictures, &truths(&sharp));
-        // A Gaussian of sigma s passes half at sqrt(ln 2 / 2) / (pi s) cycles a pixel; a line is half a cycle.
+        // A Gaussian of sigma s transfers a half at sqrt(ln 2 / 2) / (pi s) cycles a pixel, and a
+        // line is half a cycle.
         let expected = std::f64::consts::PI * 2.0 / (2.0_f64.ln() / 2.0).sqrt() / 2.0;
         let found = row.mtf50_mm.unwrap().mean / row.pixel_mm;
         assert!((found / expected - 1.0).abs() < 0.1, "{found} against {expected}");
@@ -437,7 +446,7 @@ mod tests {
                 );
             }
         }
-        // Within the focus a pixel is what is resolved.
+        // At the focus the resolution is a pixel.
         assert!((lens_line_mm(&projector, 300.0, 1.5, 0.5) - 1.5).abs() < 1e-9);
     }
 

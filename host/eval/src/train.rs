@@ -1,4 +1,5 @@
-//! Training of a network on a user's characters, kept in a folder as it learns: in builds with the feature `train`.
+//! Trains a network on a user's characters and stores the run in a folder, in builds with the
+//! feature `train`.
 
 mod data;
 #[cfg(feature = "train")]

@@ -1,7 +1,9 @@
-//! Typefaces of test targets that the networks' training has not seen, and which character of which one a scene shows.
+//! Typefaces of test targets that are outside the networks' training data, and the choice of
+//! character and typeface for a scene.
 //!
-//! Training drew from families under the Open Font License alone; none of these has that licence (`fonts/README.md`). Chars74K,
-//! which training saw as well, does not name its fonts, so that relatives of these may be among them.
+//! Training used only families under the Open Font License, and none of these typefaces has that
+//! licence (`fonts/README.md`). Training also used Chars74K, which does not name its fonts, so
+//! relatives of these typefaces may be among its fonts.
 
 use nirspi::picture::Typeface;
 
@@ -15,15 +17,16 @@ const FILES: [(&str, &[u8]); 4] = [
     ("Latin Modern Mono", include_bytes!("../fonts/latin-modern-mono.otf")),
 ];
 
-/// All typefaces, Ubuntu Light first.
+/// All typefaces; Ubuntu Light is first.
 #[must_use]
 pub fn all() -> Vec<Typeface> {
     let files = FILES.iter().filter_map(|(name, bytes)| Typeface::from_bytes(name, bytes));
     [Typeface::ubuntu_light(), Typeface::hack()].into_iter().chain(files).collect()
 }
 
-/// The character and the typeface of scene number `i`, as indices: every 62 scenes show every character once, each time in the
-/// next typeface, so that 62 times the number of typefaces show every pair once.
+/// The character and the typeface of scene number `i`, as indices. Every 62 scenes show every
+/// character once, each time in the next typeface, so 62 times the number of typefaces show every
+/// pair once.
 #[must_use]
 pub fn of_scene(i: usize, typefaces: usize) -> (usize, usize) {
     let character = i % CHARACTERS.len();

@@ -1,23 +1,27 @@
-//! What each network's weights must be: the name and the shape of every tensor.
+//! Checks the weights of each network: the name and the shape of every tensor.
 //!
-//! Widths are free: a file of a narrower or a deeper network of the same kind is sound. Each width stands in several
-//! tensors, and the length that most of them have is the network's. So one wrong tensor is named, and not its neighbours.
+//! Widths may differ between files: a file of a narrower or a deeper network of the same kind is
+//! valid. Each width occurs in several tensors, and the length that most of these tensors have is
+//! the network's width. So an error names the one wrong tensor, and not its neighbours.
 //!
 //! # Invariant
-//! A network runs with weights that are whole: each tensor there, of the one shape that fits its neighbours, all numbers
-//! finite, no tensor without a place (`tests::a_damaged_tensor_is_named_with_what_was_found_and_expected`). Every backend asks
+//! A network runs only with complete weights: each tensor exists and has the one shape that fits
+//! its neighbours, all numbers are finite, and there are no other tensors
+//! (`tests::a_damaged_tensor_is_named_with_what_was_found_and_expected`). Every backend checks with
 //! this module first (`network::tests::every_device_refuses_the_same_weights_in_the_same_words`).
 
 use crate::network::CONDITIONS;
 use crate::weights::{Weights, WeightsError};
 
-/// Most levels of a UNet: its images of 64 x 64 are halved before the first and after each but the last.
+/// The most levels of a UNet. Its images of 64 x 64 are halved before the first level and after
+/// each level except the last.
 const LEVELS: usize = 6;
 
-/// Most tensors of a numbered list: blocks of a level, or layers between FSRCNN's shrinking and expanding.
+/// The most tensors of a numbered list: blocks of a level, or layers between FSRCNN's shrinking and
+/// expanding.
 const LISTED: usize = 64;
 
-/// Characters that the classifier tells apart.
+/// Number of characters that the classifier distinguishes.
 pub(crate) const CLASSES: usize = 62;
 
 /// Channels of the UNet's input: two images, four pixels of a block each.
@@ -26,9 +30,9 @@ const PAIRED: usize = 8;
 /// The length of an axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Axis {
-    /// This length in every file.
+    /// The same length in every file.
     Fixed(usize),
-    /// So many times the width of this number.
+    /// A multiple of the width with this number.
     Width { times: usize, number: usize },
 }
 
@@ -76,7 +80,7 @@ impl Schema {
         self.tensor(format!("{name}.bias"), &[outputs]);
     }
 
-    /// Holds the weights against the schema; the `count` widths of the network.
+    /// Checks the weights against the schema. Returns the `count` widths of the network.
     fn check(&self, weights: &Weights, count: usize) -> Result<Vec<usize>, WeightsError> {
         let widths: Vec<usize> = (0..count).map(|number| self.width(weights, number)).collect();
         let unknown =
@@ -91,7 +95,8 @@ impl Schema {
         }
     }
 
-    /// The width that most tensors have, the smaller one of two that as many have; 1 where none says.
+    /// The width that most tensors have. Of two equally frequent widths the smaller is taken; 1 if
+    /// no tensor shows the width.
     fn width(&self, weights: &Weights, wanted: usize) -> usize {
         let mut votes: Vec<(usize, usize)> = Vec::new();
         for (name, axes) in &self.tensors {
@@ -116,13 +121,13 @@ impl Schema {
     }
 }
 
-/// How many entries a numbered list has whose tensors' names begin with `list`, a number and a dot: one more than the
-/// largest number, so that a gap shows as a tensor that is missing.
+/// Number of entries of a numbered list, whose tensors' names begin with `list`, a number and a
+/// dot. The result is one more than the largest number, so that a gap shows as a missing tensor.
 fn listed(weights: &Weights, list: &str, most: usize) -> Result<usize, WeightsError> {
     let mut count = 0;
     for name in weights.names() {
         let number = name.strip_prefix(list).and_then(|rest| rest.split_once('.'));
-        // `+1` and `01` are numbers to Rust and none to PyTorch: the schema has no place for them.
+        // `+1` and `01` are numbers in Rust but not in PyTorch, so the schema does not accept them.
         let plain = |digits: &str| digits == "0" || !digits.starts_with(['0', '+']);
         let number = number.map(|(digits, _)| digits).filter(|digits| plain(digits));
         match number.and_then(|digits| digits.parse::<usize>().ok()) {
@@ -139,7 +144,8 @@ fn listed(weights: &Weights, list: &str, most: usize) -> Result<usize, WeightsEr
 /// Widths of the estimator: channels after each of its four convolutions, then the hidden layer.
 ///
 /// # Errors
-/// [`WeightsError`] naming the first tensor that is missing, of another shape, not finite, or has no place.
+/// [`WeightsError`] naming the first tensor that is missing, has another shape, is not finite, or
+/// is not part of the network.
 pub(crate) fn estimator(weights: &Weights) -> Result<Vec<usize>, WeightsError> {
     let mut schema = Schema::default();
     let mut inputs = Axis::Fixed(1);
@@ -168,7 +174,7 @@ pub(crate) fn classifier(weights: &Weights) -> Result<Vec<usize>, WeightsError> 
     schema.check(weights, 3)
 }
 
-/// Widths of the GAN's discriminator: channels after each convolution but the last.
+/// Widths of the GAN's discriminator: channels after each convolution except the last.
 ///
 /// # Errors
 /// As [`estimator`].
@@ -214,9 +220,9 @@ pub(crate) fn fsrcnn(weights: &Weights) -> Result<[usize; 3], WeightsError> {
 pub(crate) struct UNetSizes {
     /// Channels of each level, the finest first.
     pub(crate) channels: Vec<usize>,
-    /// Residual blocks of a level, on the way down and on the way up.
+    /// Residual blocks of a level, both downwards and upwards.
     pub(crate) blocks: usize,
-    /// Length of the vector that the conditions become.
+    /// Length of the vector of the conditions.
     pub(crate) embedding: usize,
 }
 

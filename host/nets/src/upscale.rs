@@ -52,8 +52,8 @@ pub enum UpscaleError {
     },
 }
 
-/// Enlarges a stack of `images` images of `height` x `width` pixels in [0, 1] (row-major, N, H, W) to
-/// `2 height` x `2 width`, values in [0, 1], in the same layout.
+/// Enlarges a stack of `images` images of `height` x `width` pixels in [0, 1] (row-major, N, H, W)
+/// to `2 height` x `2 width`, values in [0, 1], in the same layout.
 ///
 /// # Errors
 /// [`UpscaleError`] if the shape does not fit the values, or a pixel is NaN or outside [0, 1].

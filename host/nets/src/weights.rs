@@ -1,9 +1,11 @@
-//! Trained weights in a safetensors file, in PyTorch's names and layout, so that a network trained in
-//! either framework runs in the other.
+//! Trained weights in a safetensors file, in PyTorch's names and layout, so that a network trained
+//! in either framework runs in the other.
 //!
-//! Law: what is used is what was trained. A file that carries a checksum (`sha256` in its metadata: of
-//! all bytes after the header) is held against it. Names, shapes and numbers of all tensors are checked before a network is
-//! made of them: `crate::schema` has the law of each network.
+//! # Invariant
+//! A file with a checksum (`sha256` in its metadata, of all bytes after the header) is refused if
+//! its bytes differ (`tests::one_changed_byte_is_noticed`). Names, shapes and numbers of all
+//! tensors are checked before a network is made from the tensors; `crate::schema` has the rules of
+//! each network.
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write as _;
@@ -36,18 +38,18 @@ pub enum WeightsError {
     Read {
         /// The file.
         file: String,
-        /// What the system says.
+        /// The system's reason.
         source: io::Error,
     },
-    /// Not a safetensors file, or a damaged one.
+    /// The file is not a safetensors file, or is damaged.
     #[error("{file}: not a whole safetensors file: {reason}")]
     Format {
         /// The file.
         file: String,
-        /// What is wrong with it.
+        /// The problem.
         reason: String,
     },
-    /// The bytes are not those that the checksum was made of.
+    /// The bytes do not have the file's checksum.
     #[error("{file}: damaged: checksum of the tensors is {found}, expected {expected}")]
     Checksum {
         /// The file.
@@ -57,32 +59,32 @@ pub enum WeightsError {
         /// Checksum of the bytes.
         found: String,
     },
-    /// Weights of another network.
+    /// The weights belong to another network.
     #[error("{file}: weights of network {found}, expected {expected}")]
     Model {
         /// The file.
         file: String,
-        /// The network that they are wanted for.
+        /// The network that needs weights.
         expected: String,
         /// The network that the metadata names.
         found: String,
     },
-    /// The metadata names no network.
+    /// The metadata does not name a network.
     #[error("{file}: the file does not say which network it is for, expected {expected}")]
     Unnamed {
         /// The file.
         file: String,
-        /// The networks that weights are wanted for.
+        /// The networks that need weights.
         expected: String,
     },
-    /// A tensor has numbers of a kind that weights are not.
+    /// The numbers of a tensor have a type that weights do not have.
     #[error("{file}: tensor {tensor} holds {found}, expected F32 or F16")]
     Kind {
         /// The file.
         file: String,
         /// The tensor.
         tensor: String,
-        /// Kind of its numbers.
+        /// The type of its numbers.
         found: String,
     },
     /// A tensor is missing.
@@ -96,12 +98,13 @@ pub enum WeightsError {
         file: String,
         /// The tensor.
         tensor: String,
-        /// The shape that it must have; empty where that is not known.
+        /// The shape that the tensor must have; empty if unknown.
         expected: Vec<usize>,
-        /// A tensor that is there and that the network has no place for, if there is one: perhaps the same by another name.
+        /// A tensor of the file that the network does not have, if there is one: the missing tensor
+        /// may have this name.
         unknown: Option<String>,
     },
-    /// A tensor has a number that is none.
+    /// A tensor has a number that is NaN or infinite.
     #[error(
         "{file}: tensor {tensor}, {}, holds {value} at {index}, expected finite numbers",
         by(shape)
@@ -118,14 +121,14 @@ pub enum WeightsError {
         /// The number.
         value: f32,
     },
-    /// A numbered list is longer than the network's can be.
+    /// A numbered list is longer than the network allows.
     #[error("{file}: tensor {tensor} is in a list of more than {most}, expected at most {most}")]
     TooMany {
         /// The file.
         file: String,
         /// The tensor.
         tensor: String,
-        /// Most entries of the list.
+        /// The most entries of the list.
         most: usize,
     },
     /// A tensor has another shape.
@@ -137,10 +140,10 @@ pub enum WeightsError {
         tensor: String,
         /// Its shape.
         found: Vec<usize>,
-        /// The shape, or what kind of shape, the network wants.
+        /// The shape, or the kind of shape, that the network needs.
         expected: String,
     },
-    /// A tensor that the network has no place for.
+    /// The network does not have this tensor.
     #[error("{file}: the network has no tensor {tensor}; are these weights of another network?")]
     Unknown {
         /// The file.
@@ -148,7 +151,7 @@ pub enum WeightsError {
         /// The tensor.
         tensor: String,
     },
-    /// A layer is wider than a GPU's kernel takes.
+    /// A layer is wider than a GPU's kernel allows.
     #[error(
         "{file}: layer {layer} has {found} input channels, expected at most {limit} on a GPU; use the processor \
          (--backend cpu)"
@@ -158,18 +161,18 @@ pub enum WeightsError {
         file: String,
         /// The layer.
         layer: String,
-        /// Its input channels.
+        /// Its number of input channels.
         found: usize,
-        /// Most input channels.
+        /// The most input channels.
         limit: usize,
     },
-    /// No weights of that name come with the program.
+    /// The program has no embedded weights of this name.
     #[error("no weights of {model} come with this program")]
     NotEmbedded {
         /// The network.
         model: String,
     },
-    /// A number in the metadata is missing, none, or out of range.
+    /// A number in the metadata is missing, not a number, or out of range.
     #[error("{file}: metadata {key} is {found}, expected {expected}")]
     Number {
         /// The file.
@@ -178,7 +181,7 @@ pub enum WeightsError {
         key: String,
         /// Its text.
         found: String,
-        /// What it should be.
+        /// The allowed values.
         expected: &'static str,
     },
 }
@@ -192,7 +195,7 @@ pub struct Array {
     pub values: Vec<f32>,
 }
 
-/// How the numbers are kept in a file.
+/// The precision of the numbers in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Precision {
     /// 16 bits: half the size, a relative error of 5e-4 a weight.
@@ -210,20 +213,21 @@ pub struct Weights {
 }
 
 impl Weights {
-    /// None yet; `label` names them in errors.
+    /// Empty weights. `label` names them in errors.
     pub fn new(label: &str) -> Self {
         Self { label: label.to_owned(), metadata: BTreeMap::new(), tensors: BTreeMap::new() }
     }
 
-    /// The weights in a file.
+    /// Reads the weights in a file.
     ///
     /// # Errors
-    /// [`WeightsError`] if it cannot be read, is no whole safetensors file, or is not what its checksum says.
+    /// [`WeightsError`] if the file cannot be read, is not a whole safetensors file, or does not
+    /// have its checksum.
     pub fn read(file: &Path) -> Result<Self, WeightsError> {
         let label = file.display().to_string();
         let bytes = fs::metadata(file).and_then(|found| match found.is_file() {
             true => fs::read(file),
-            // A pipe would be waited for, and a device need not end.
+            // Opening a pipe would wait for a writer, and a device may never end.
             false => Err(io::Error::new(io::ErrorKind::InvalidInput, "not a file")),
         });
         match bytes {
@@ -232,7 +236,7 @@ impl Weights {
         }
     }
 
-    /// The weights in the bytes of a safetensors file; `label` names them in errors.
+    /// The weights in the bytes of a safetensors file. `label` names them in errors.
     ///
     /// # Errors
     /// As [`Weights::read`].
@@ -244,7 +248,7 @@ impl Weights {
         let mut weights = Self::new(label);
         weights.metadata.extend(metadata.metadata().clone().unwrap_or_default());
         if let Some(expected) = weights.metadata.remove(CHECKSUM) {
-            // The header's length, eight bytes, stands before the header.
+            // The header's length, eight bytes, is before the header.
             let found = checksum(&bytes[size_of::<u64>() + header..]);
             if found != expected {
                 return Err(WeightsError::Checksum { file: label.to_owned(), expected, found });
@@ -290,7 +294,7 @@ impl Weights {
         write(metadata).map_err(|e| format(e.to_string()))
     }
 
-    /// What they are called in errors: the file.
+    /// The weights' name in errors: the file.
     pub fn label(&self) -> &str {
         &self.label
     }
@@ -303,15 +307,15 @@ impl Weights {
     /// A number of the metadata.
     ///
     /// # Errors
-    /// [`WeightsError::Number`] if it is missing, or no finite number.
+    /// [`WeightsError::Number`] if the number is missing, or not finite.
     pub fn number(&self, key: &str) -> Result<f64, WeightsError> {
         self.number_that(key, "a number", |_| true)
     }
 
-    /// A number of the metadata that is `right`, which is `expected` in words.
+    /// A number of the metadata for which `right` holds. `expected` says in words what is right.
     ///
     /// # Errors
-    /// [`WeightsError::Number`] if it is missing, no finite number, or not right.
+    /// [`WeightsError::Number`] if the number is missing, not finite, or not right.
     pub(crate) fn number_that(
         &self,
         key: &str,
@@ -329,15 +333,15 @@ impl Weights {
         })
     }
 
-    /// Keeps a text in the metadata.
+    /// Sets a text of the metadata.
     pub fn set_metadata(&mut self, key: &str, text: impl Into<String>) {
         self.metadata.insert(key.to_owned(), text.into());
     }
 
-    /// Are they of this network, as far as the metadata says?
+    /// Checks that the weights belong to this network, as far as the metadata says.
     ///
     /// # Errors
-    /// [`WeightsError::Model`] if they are of another.
+    /// [`WeightsError::Model`] if the weights belong to another network.
     pub fn expect_model(&self, model: &str) -> Result<(), WeightsError> {
         match self.metadata(MODEL) {
             Some(found) if found != model => Err(WeightsError::Model {
@@ -349,7 +353,7 @@ impl Weights {
         }
     }
 
-    /// Keeps a tensor.
+    /// Adds a tensor.
     pub fn insert(&mut self, name: String, array: Array) {
         self.tensors.insert(name, array);
     }
@@ -359,15 +363,17 @@ impl Weights {
         self.tensors.keys().map(String::as_str)
     }
 
-    /// The tensor of that name.
+    /// The tensor of this name and shape.
     ///
     /// # Errors
-    /// [`WeightsError`] if there is none, its shape is another, or one of its numbers is not finite.
+    /// [`WeightsError`] if the tensor is missing, has another shape, or has a number that is not
+    /// finite.
     pub fn tensor(&self, name: &str, shape: &[usize]) -> Result<&Array, WeightsError> {
         self.place(name, shape, None)
     }
 
-    /// The tensor of that name; `unknown`, a tensor that the network has no place for, may explain why there is none.
+    /// The tensor of this name. `unknown` is a tensor that the network does not have, which may
+    /// explain a missing tensor.
     ///
     /// # Errors
     /// As [`tensor`](Self::tensor).
@@ -398,10 +404,10 @@ impl Weights {
         }
     }
 
-    /// The shape of a tensor of `AXES` axes, none of them empty.
+    /// The shape of a tensor of `AXES` axes, each of length 1 or more.
     ///
     /// # Errors
-    /// [`WeightsError`] if there is none, or it has another number of axes.
+    /// [`WeightsError`] if the tensor is missing, or has another number of axes.
     pub fn shape<const AXES: usize>(&self, name: &str) -> Result<[usize; AXES], WeightsError> {
         let array = self.get(name)?;
         match <[usize; AXES]>::try_from(array.shape.as_slice()) {
@@ -424,10 +430,10 @@ impl Weights {
         WeightsError::Unknown { file: self.label.clone(), tensor: tensor.to_owned() }
     }
 
-    /// The tensor of that name, whatever it holds.
+    /// The tensor of this name, unchecked.
     ///
     /// # Errors
-    /// [`WeightsError::Missing`] if there is none.
+    /// [`WeightsError::Missing`] if the tensor is missing.
     pub fn get(&self, name: &str) -> Result<&Array, WeightsError> {
         self.tensors.get(name).ok_or_else(|| WeightsError::Missing {
             file: self.label.clone(),
@@ -458,7 +464,7 @@ impl Array {
     }
 }
 
-/// The numbers of a tensor, if they are of a kind that weights are.
+/// The numbers of a tensor, if they have a type that weights have.
 fn numbers(view: &TensorView<'_>) -> Option<Vec<f32>> {
     let data = view.data();
     match view.dtype() {
@@ -478,7 +484,7 @@ fn checksum(bytes: &[u8]) -> String {
     })
 }
 
-/// A shape as one says it: 32 x 8 x 3 x 3; a tensor without axes is a single number.
+/// A shape in words: 32 x 8 x 3 x 3; a tensor without axes is a single number.
 pub(crate) fn by(shape: &[usize]) -> String {
     if shape.is_empty() {
         return "a single number".to_owned();

@@ -1,27 +1,30 @@
-//! The LED array as the gateware drives it: 32 row lines, 32 column lines, one enable.
+//! The LED array with the gateware's lines: 32 row lines, 32 column lines, one enable.
 //!
-//! A line carries a sign: 0 is +1, 1 is -1. The gate at LED (r, c) XORs its two lines, so the LED is
-//! lit where the product of the signs is +1, and inverting all row lines shows the complement.
+//! A line carries a sign: 0 is +1, 1 is -1. The gate at LED (r, c) XORs its two lines, so the LED
+//! is lit if the product of the signs is +1. Inverting all row lines shows the complement.
 //!
-//! Law: light comes from the *lines*, LED by LED, never from a pattern number. A line that is stuck,
-//! swapped or inverted therefore shows in the light as it would on the bench.
+//! # Invariant
+//! Light comes from the *lines*, LED by LED, and never from a pattern number
+//! (`lines_light_the_leds_of_the_walsh_pattern_they_stand_for` in `host/optics/tests/array.rs`). A
+//! line that is stuck, swapped or inverted therefore shows in the light as with real hardware.
 
 use std::collections::HashMap;
 
 use crate::{Footprint, LEDS, SIDE};
 
-/// Line states remembered. A sweep has 1024 patterns and their complements; twice that leaves room
-/// for a fault being injected, and a stranger driver cannot make the table grow for ever.
+/// The most line states kept. A sweep has 1024 patterns and their complements. Twice that number
+/// leaves room for an injected fault, and limits the table for any other driver.
 const MEMO_LIMIT: usize = 4 * LEDS;
 
-/// The array in front of one scene: turns line states into detected light.
+/// The array in front of one scene. Computes the detected light of line states.
 #[derive(Debug, Clone)]
 pub struct LedArray {
     /// Electrons per ADC sample from each LED when lit, row-major.
     electrons: Vec<f32>,
-    /// Light of each LED over that of an ideal one; none where all are ideal.
+    /// Light of each LED divided by that of an ideal LED; `None` if all LEDs are ideal.
     gains: Option<Vec<f32>>,
-    /// What each row gives where its line is 0 and where it is 1, by the column lines: a sweep has few of those.
+    /// Light of each row for a row line of 0 and of 1, by the state of the column lines. A sweep
+    /// has few such states.
     rows: HashMap<u32, [[f64; 2]; SIDE]>,
     /// Bit r of the rows in the high half, bit c of the columns in the low half.
     memo: HashMap<u64, f32>,
@@ -29,7 +32,7 @@ pub struct LedArray {
 }
 
 impl LedArray {
-    /// The array lighting the scene of `footprint`, where one LED on a white target gives
+    /// The array in front of the scene of `footprint`. One LED on a white target gives
     /// `electrons_per_led` electrons per ADC sample ([`crate::Budget::electrons_per_led`]).
     #[must_use]
     pub fn new(footprint: &Footprint, electrons_per_led: f64) -> Self {
@@ -44,8 +47,8 @@ impl LedArray {
         }
     }
 
-    /// The same array made of real LEDs: `gains` is the light of each over that of an ideal one, 32 x 32, row-major
-    /// ([`crate::CameraModel::led_gains`]).
+    /// The same array with real LEDs. `gains` is the light of each LED divided by that of an ideal
+    /// LED, 32 x 32, row-major ([`crate::CameraModel::led_gains`]).
     #[must_use]
     pub fn with_gains(mut self, gains: &[f32]) -> Self {
         for (electrons, gain) in self.electrons.iter_mut().zip(gains) {
@@ -55,8 +58,8 @@ impl LedArray {
         self
     }
 
-    /// The same array once something has changed in front of it: `reflectance` is what each LED's spot now sees, 32 x
-    /// 32, row-major.
+    /// The same array after a change in front of it. `reflectance` is what each LED's spot now
+    /// sees, 32 x 32, row-major.
     pub fn relight(&mut self, reflectance: &[f32], electrons_per_led: f64) {
         for (electrons, &seen) in self.electrons.iter_mut().zip(reflectance) {
             *electrons = (f64::from(seen) * electrons_per_led) as f32;
@@ -70,7 +73,7 @@ impl LedArray {
     }
 
     /// Settled light in electrons per ADC sample. Bit r of `rows` and bit c of `cols` are the lines
-    /// of LED (r, c); nothing is lit unless `enabled`.
+    /// of LED (r, c). Without `enabled` no LED is lit.
     pub fn light(&mut self, rows: u32, cols: u32, enabled: bool) -> f32 {
         if !enabled {
             return 0.0;
@@ -96,7 +99,7 @@ impl LedArray {
     }
 }
 
-/// Light of each row where its line is 0, which lights the columns at 0, and where it is 1.
+/// Light of each row if its line is 0, which lights the columns at 0, and if its line is 1.
 fn row_sums(electrons: &[f32], cols: u32) -> [[f64; 2]; SIDE] {
     let mut sums = [[0.0; 2]; SIDE];
     for (sum, leds) in sums.iter_mut().zip(electrons.chunks_exact(SIDE)) {

@@ -1,18 +1,23 @@
 //! The photon budget: from watts, apertures and distance to electrons per ADC sample.
 //!
-//! Law: **a detector cannot collect more than its etendue**. A collector of area A that sees the
-//! field's solid angle W needs a detector of area at least `A W / (pi NA^2)`; where the detector is
-//! smaller, the smaller area counts. For the paper's FGA015 (0.15 mm) behind a collector that sees
-//! the whole field this, not the lens, is what limits the light.
+//! # Invariant
+//! **A detector cannot collect more than its etendue**
+//! (`tests::a_larger_collector_helps_only_until_the_detector_is_full`). A collector of area A that
+//! sees the field's solid angle W needs a detector of area at least `A W / (pi NA^2)`. With a
+//! smaller detector, the smaller area counts. For the paper's FGA015 (0.15 mm) behind a collector
+//! that sees the whole field, the detector and not the lens limits the light.
 //!
-//! One LED on a white target, one sample:
-//! `P_LED * projected * A / (pi D^2) * F T * QE * t / (h c / lambda)`, with a Lambertian target facing
-//! the camera, so that its on-axis radiance is `rho / pi` times its irradiance. F is the share of the
-//! LED's spectrum that the filter passes, T that of the glass.
+//! # Formulas
 //!
-//! Daylight takes the same way back: `E * rho / pi * A W * T * QE * t / (h c / lambda)`, with E the
-//! irradiance within the filter: daylight is not charged the LED's spectral loss.
-//! The detector's field of view is taken to be the projected field, the smallest that loses nothing.
+//! One LED on a white target, one sample: `P_LED * projected * A / (pi D^2) * F T * QE * t / (h c /
+//! lambda)`, with a Lambertian target facing the camera, so that its on-axis radiance is `rho / pi`
+//! times its irradiance. F is the share of the LED's spectrum that the filter passes, T that of the
+//! glass.
+//!
+//! Daylight takes the same path back: `E * rho / pi * A W * T * QE * t / (h c / lambda)`, with E
+//! the irradiance within the filter. The LED's spectral loss does not apply to daylight. The
+//! detector's field of view is assumed to be the projected field, the smallest field of view that
+//! loses no light.
 
 use std::f64::consts::PI;
 
@@ -28,7 +33,7 @@ const PLANCK_J_S: f64 = 6.626_070_15e-34;
 /// Speed of light in m/s (SI, exact).
 const LIGHT_M_PER_S: f64 = 299_792_458.0;
 
-/// Why there is no budget.
+/// Why a budget cannot be computed.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum BudgetError {
     /// A setting is outside its physical range.
@@ -38,43 +43,44 @@ pub enum BudgetError {
         name: &'static str,
         /// The value found.
         value: f64,
-        /// What it may be.
+        /// The allowed values.
         expected: &'static str,
     },
     /// The projector or the distance is not physical.
     #[error(transparent)]
     Projector(#[from] ProjectorError),
-    /// The filter lies where no daylight is known.
+    /// The spectrum of daylight is not known within the filter.
     #[error(transparent)]
     Daylight(#[from] DaylightError),
 }
 
-/// What the budget rests on: the part of a [`CameraModel`] that it needs. The default is the paper's camera.
+/// The settings of the photon budget: a part of a [`CameraModel`]. The default is the paper's
+/// camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BudgetSettings {
     /// Optical power of one lit LED, in mW.
     pub led_power_mw: f64,
-    /// Angle off its axis at which an LED's radiant intensity has halved, in degrees. A field lens on
-    /// the array points every LED at the projection lens.
+    /// Angle off the LED's axis at which its radiant intensity has halved, in degrees. A field lens
+    /// on the array points every LED at the projection lens.
     pub led_half_angle_deg: f64,
     /// Width of the LED's spectrum at half height, in nm; Gaussian.
     pub led_spectrum_nm: f64,
     /// Wavelength, in nm.
     pub wavelength_nm: f64,
-    /// Diameter of the collecting optics, in mm. A small detector uses less of it than there is.
+    /// Diameter of the collecting optics, in mm. A small detector uses only part of this diameter.
     pub collector_aperture_mm: f64,
     /// Diameter of the detector's active area, in mm.
     pub detector_diameter_mm: f64,
     /// Numerical aperture of the light on the detector. 1 is a compound parabolic concentrator; an
     /// aspheric lens reaches about 0.6, and 0.36 times the light.
     pub detector_na: f64,
-    /// Share of the light that the glass from LED to detector lets through.
+    /// Share of the light that the glass from LED to detector transmits.
     pub glass_transmission: f64,
     /// Electrons per photon.
     pub quantum_efficiency: f64,
     /// Time of one ADC sample, in ns.
     pub sample_ns: f64,
-    /// Where the light on the target comes from, besides the LEDs'.
+    /// The source of the light on the target besides the LEDs.
     pub light: LightSource,
     /// Illuminance on the target, in klx.
     pub ambient_klx: f64,
@@ -127,20 +133,21 @@ impl BudgetSettings {
         ensure((0.1..=60.0).contains(&angle), "led_half_angle_deg", angle, expected)
     }
 
-    /// Electrons in one sample from one watt within the filter on the collector.
+    /// Electrons in one sample for one watt within the filter on the collector.
     fn electrons_per_watt(&self) -> f64 {
         self.glass_transmission * self.quantum_efficiency * self.sample_ns * 1e-9
             / photon_j(self.wavelength_nm)
     }
 
-    /// Share of the LED's spectrum that the filter passes: `erf(sqrt(ln 2) W / FWHM)` of a Gaussian.
+    /// Share of the LED's spectrum that the filter passes: `erf(sqrt(ln 2) W / FWHM)` of a
+    /// Gaussian.
     #[must_use]
     pub fn filtered_fraction(&self) -> f64 {
         erf(2.0_f64.ln().sqrt() * self.filter_width_nm / self.led_spectrum_nm)
     }
 
     /// Part of an LED's light that enters the projection lens: for an intensity cos^m of the angle,
-    /// `1 - cos^(m+1)` of the angle that the lens's edge is seen under.
+    /// `1 - cos^(m+1)` of the angle of the lens's edge.
     #[must_use]
     pub fn projected_fraction(&self, projector: &Projector) -> f64 {
         let m = 0.5_f64.ln() / self.led_half_angle_deg.to_radians().cos().ln();
@@ -149,7 +156,8 @@ impl BudgetSettings {
     }
 }
 
-/// The error function of `x` at least 0, by its series (Abramowitz and Stegun, 7.1.6), to rounding.
+/// The error function of `x`, which must be at least 0, by its series (Abramowitz and Stegun,
+/// 7.1.6), to rounding.
 fn erf(x: f64) -> f64 {
     if x > 6.0 {
         return 1.0;
@@ -179,24 +187,25 @@ pub struct Budget {
     pub electrons_per_led: f64,
     /// From daylight on a field of reflectance 1.
     pub ambient_electrons_white: f64,
-    /// Diameter of the collector that counts, in mm: its own, or what the detector's etendue allows.
+    /// Effective diameter of the collector, in mm: its own diameter, or the diameter that the
+    /// detector's etendue allows.
     pub effective_collector_mm: f64,
-    /// How these came about.
+    /// The factors of the budget.
     pub terms: BudgetTerms,
 }
 
-/// The factors of a [`Budget`], in the order in which light meets them.
+/// The factors of a [`Budget`], in the order of the light's path.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BudgetTerms {
     /// Light of one LED, in mW.
     pub led_power_mw: f64,
-    /// Part of it that enters the projection lens.
+    /// Part of the LED's light that enters the projection lens.
     pub projected: f64,
     /// Part of a white target's light that the collector takes: its area over `pi D^2`.
     pub collected: f64,
     /// Part of the LED's spectrum that the filter passes.
     pub filtered: f64,
-    /// Part of the light within the filter that the glass lets through.
+    /// Part of the light within the filter that the glass transmits.
     pub glass: f64,
     /// Energy of a photon, in J.
     pub photon_j: f64,
@@ -274,7 +283,7 @@ impl Budget {
         self.ambient_electrons_white * mean_reflectance
     }
 
-    /// The most light that can come: all LEDs and daylight on a white target, in electrons per
+    /// The brightest possible light: all LEDs and daylight on a white target, in electrons per
     /// sample.
     #[must_use]
     pub fn brightest_electrons(&self) -> f64 {
@@ -350,12 +359,13 @@ mod tests {
 
     #[test]
     fn the_default_budget_agrees_with_one_worked_by_hand() {
-        // P 4 mW; m = ln 0.5 / ln cos 5 deg = 181.81; edge atan(1/60): 2.5067 % projected;
-        // A = pi/4 (1.6617 mm)^2 = 2.1686 mm^2; A / pi D^2 = 7.670e-6; filter 0.7610, glass 0.79, QE 0.9: 0.5411;
-        // 8 ns / 0.80 eV (1.2816e-19 J) = 6.2423e10 per W.
+        // P 4 mW; m = ln 0.5 / ln cos 5 deg = 181.81; edge atan(1/60): 2.5067 % projected; A = pi/4
+        // (1.6617 mm)^2 = 2.1686 mm^2; A / pi D^2 = 7.670e-6; filter 0.7610, glass 0.79, QE 0.9:
+        // 0.5411; 8 ns / 0.80 eV (1.2816e-19 J) = 6.2423e10 per W.
         let budget = at(300.0, Default::default());
         assert!((budget.electrons_per_led / 25.98 - 1.0).abs() < 1e-3, "{budget:?}");
-        // 15 klx / 109.6 klx * 25.536 W/m^2 = 3.4949 W/m^2; / pi * A * 0.0256 sr = 6.1761e-8 W; glass and QE 0.711.
+        // 15 klx / 109.6 klx * 25.536 W/m^2 = 3.4949 W/m^2; / pi * A * 0.0256 sr = 6.1761e-8 W;
+        // glass and QE 0.711.
         assert!((budget.ambient_electrons_white / 2741.1 - 1.0).abs() < 1e-3, "{budget:?}");
         let on_detector_w = budget.daylight_on_detector_w(budget.terms.daylight_w_per_m2);
         assert!((on_detector_w / (0.79 * 6.1761e-8) - 1.0).abs() < 1e-3, "{on_detector_w}");

@@ -1,23 +1,30 @@
 //! The receiver: LED edge, photodiode, amplifier and 14-bit ADC, one sample a clock.
 //!
-//! Law: what comes out at clock n depends on the light up to clock n - latency, the settings and the
-//! seed, and on nothing else; with [`ChainSettings::ideal`] it is that light exactly, rounded.
+//! # Invariant
+//! The output at clock n depends only on the light up to clock n - latency, the settings and the
+//! seed (`the_delay_is_exact_at_every_latency` and
+//! `the_same_seed_gives_the_same_samples_and_another_does_not` in `host/optics/tests/chain.rs`).
+//! With [`ChainSettings::ideal`] the output is exactly that light, rounded
+//! (`the_ideal_chain_rounds_the_light_of_the_same_clock`).
 //!
-//! In order: the LEDs follow their lines with a first-order edge; daylight is added; the amplifier's
-//! pole smooths both; shot noise (variance = electrons collected in the sample) and amplifier noise
-//! are added; the ADC divides by its gain, adds its baseline and its own noise, rounds and clips; its
-//! pipeline delays the result. Light is constant within a clock, and a sample is the signal at the clock's end, so
-//! the two poles are stepped exactly, not approximated.
+//! # Stages
+//!
+//! The LEDs follow their lines with a first-order edge. Daylight is added. The amplifier's pole
+//! smooths both. Shot noise (variance = electrons collected in the sample) and amplifier noise are
+//! added. The ADC divides by its gain, adds its baseline and its own noise, rounds and clips. The
+//! ADC's pipeline delays the result. Light is constant within a clock, and a sample is the signal
+//! at the clock's end, so the two poles are stepped exactly, without approximation.
 //!
 //! # Noise
-//! Shot noise and amplifier noise are white before the amplifier's pole and pass the noise bandwidth `pi/2 B` of it.
-//! A sample has the variance `pi B t * electrons` of shot noise (`2 q I` over that bandwidth, in electrons of a sample of
-//! length t), and neighbours are correlated by `exp(-2 pi B t)`: 5 % at 60 MHz and 8 ns, 37 % at 20 MHz. The ADC's noise and
-//! its rounding are independent from sample to sample. [`ChainSettings::variance_of_mean`] says what a window of
-//! samples keeps of all that.
+//! Shot noise and amplifier noise are white before the amplifier's pole and pass its noise
+//! bandwidth `pi/2 B`. A sample has a shot noise of variance `pi B t * electrons` (`2 q I` over
+//! that bandwidth, in electrons of a sample of length t). Neighbouring samples are correlated by
+//! `exp(-2 pi B t)`: 5 % at 60 MHz and 8 ns, 37 % at 20 MHz. The ADC's noise and its rounding are
+//! independent from sample to sample. [`ChainSettings::variance_of_mean`] gives the resulting noise
+//! of a window of samples.
 //!
-//! Simplification: one Gaussian stands for shot and amplifier noise. Where electrons are too few for that, amplifier
-//! noise outweighs them.
+//! Simplification: one Gaussian represents shot noise and amplifier noise. With too few electrons
+//! for a Gaussian, the amplifier noise is larger than the shot noise.
 
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
@@ -27,11 +34,11 @@ use thiserror::Error;
 use crate::instrument::{FULL_SCALE_COUNTS, MAX_ADC_LATENCY_CLOCKS};
 use crate::{Budget, CameraModel};
 
-/// The steps of the switchable amplifier gain, in electrons per ADC count: two steps an octave.
+/// The steps of the switchable amplifier gain, in electrons per ADC count: two steps per octave.
 pub const GAINS_ELECTRONS_PER_COUNT: [f64; 32] = gains();
 
-/// Noise that the gain and the baseline leave room for, in standard deviations. Six are passed once
-/// in a thousand million samples, so that noise alone does not trip the LEDs.
+/// Room of the gain and the baseline for noise, in standard deviations. Noise exceeds six standard
+/// deviations once in a thousand million samples, so noise alone does not switch off the LEDs.
 const HEADROOM_SIGMA: f64 = 6.0;
 
 const fn gains() -> [f64; 32] {
@@ -46,7 +53,7 @@ const fn gains() -> [f64; 32] {
     steps
 }
 
-/// Why there is no receiver with these settings.
+/// Why a receiver with these settings is not possible.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum ChainError {
     /// A setting is outside its range.
@@ -56,7 +63,7 @@ pub enum ChainError {
         name: &'static str,
         /// The value found.
         value: f64,
-        /// What it may be.
+        /// The allowed values.
         expected: &'static str,
     },
     /// No gain keeps light and noise within the ADC's range.
@@ -65,9 +72,9 @@ pub enum ChainError {
          {noise_electrons:.0} of noise; reduce the light"
     )]
     NoGain {
-        /// The most light that can come, in electrons per sample.
+        /// The brightest possible light, in electrons per sample.
         brightest_electrons: f64,
-        /// Noise at that light, in electrons rms.
+        /// Noise of that light, in electrons rms.
         noise_electrons: f64,
     },
 }
@@ -79,13 +86,13 @@ pub struct ChainSettings {
     pub sample_ns: f64,
     /// LED rise and fall time from 10 to 90 %, in ns. Fast 1550 nm LEDs take 10 to 20.
     pub led_edge_ns: f64,
-    /// Amplifier bandwidth at -3 dB, in Hz; infinite for none.
+    /// Amplifier bandwidth at -3 dB, in Hz; infinite means no pole.
     pub amplifier_bandwidth_hz: f64,
     /// Daylight, in electrons per sample ([`Budget::ambient_electrons`]).
     pub ambient_electrons: f64,
     /// Dark current of the photodiode, in electrons per sample.
     pub dark_electrons: f64,
-    /// Whether photons arrive at random.
+    /// Whether there is shot noise.
     pub shot_noise: bool,
     /// Noise of the amplifier, in electrons rms per sample ([`amplifier_noise_electrons`]).
     pub amplifier_noise_electrons: f64,
@@ -93,7 +100,7 @@ pub struct ChainSettings {
     pub adc_noise_counts: f64,
     /// Gain: electrons per ADC count ([`ChainSettings::auto_gain`]).
     pub electrons_per_count: f64,
-    /// What the ADC reads in the dark: room for noise to go below it.
+    /// Reading of the ADC in the dark, which leaves room for noise below it.
     pub adc_offset_counts: u16,
     /// ADC pipeline: clocks from the end of a sample to its code, 0 to 63.
     pub adc_latency_clocks: u8,
@@ -105,8 +112,8 @@ impl Default for ChainSettings {
     }
 }
 
-/// Amplifier noise in electrons rms per sample, from its input current noise density: over the
-/// `pi/2 * bandwidth` that a single pole passes, `i * sqrt(pi/2 * B) * t / e`.
+/// Amplifier noise in electrons rms per sample, from its input current noise density. A single pole
+/// passes `pi/2 * bandwidth`, so the noise is `i * sqrt(pi/2 * B) * t / e`.
 #[must_use]
 pub fn amplifier_noise_electrons(pa_per_sqrt_hz: f64, bandwidth_hz: f64, sample_ns: f64) -> f64 {
     const ELECTRON_C: f64 = 1.602_176_634e-19;
@@ -114,7 +121,8 @@ pub fn amplifier_noise_electrons(pa_per_sqrt_hz: f64, bandwidth_hz: f64, sample_
     amperes * sample_ns * 1e-9 / ELECTRON_C
 }
 
-/// Noise of an ADC beyond rounding, in counts rms, from its signal-to-noise ratio for a full-scale sine.
+/// Noise of an ADC beyond rounding, in counts rms, from its signal-to-noise ratio for a full-scale
+/// sine.
 #[must_use]
 pub fn adc_noise_counts(snr_db: f64) -> f64 {
     let full_scale_rms = (f64::from(FULL_SCALE_COUNTS) + 1.0) / 2.0 / 2.0_f64.sqrt();
@@ -122,8 +130,8 @@ pub fn adc_noise_counts(snr_db: f64) -> f64 {
 }
 
 impl ChainSettings {
-    /// A receiver without noise, settling, daylight or latency, one electron a count: the exact
-    /// chain that integration tests compare with.
+    /// A receiver without noise, settling, daylight or latency, with one electron a count: the
+    /// exact chain for comparisons in integration tests.
     #[must_use]
     pub fn ideal() -> Self {
         Self {
@@ -136,7 +144,7 @@ impl ChainSettings {
         }
     }
 
-    /// The same receiver without any noise or dark current: LEDs and amplifier as slow as they are.
+    /// The same receiver without any noise or dark current. LEDs and amplifier keep their speed.
     #[must_use]
     pub fn noiseless(self) -> Self {
         Self {
@@ -148,8 +156,8 @@ impl ChainSettings {
         }
     }
 
-    /// The most sensitive gain (fewest electrons per count of [`GAINS_ELECTRONS_PER_COUNT`]) at
-    /// which neither the brightest scene of `budget` nor darkness leaves the ADC's range, with six
+    /// The most sensitive gain (fewest electrons per count of [`GAINS_ELECTRONS_PER_COUNT`]) that
+    /// keeps both the brightest scene of `budget` and darkness within the ADC's range, with six
     /// standard deviations of noise.
     ///
     /// # Errors
@@ -173,7 +181,8 @@ impl ChainSettings {
         (self.shot_variance(electrons) + self.amplifier_noise_electrons.powi(2)).sqrt()
     }
 
-    /// Variance of the shot noise of one sample of `electrons` of light and the dark current, in electrons squared.
+    /// Variance of the shot noise of one sample of `electrons` of light and the dark current, in
+    /// electrons squared.
     #[must_use]
     pub fn shot_variance(&self, electrons: f64) -> f64 {
         if self.shot_noise {
@@ -183,8 +192,8 @@ impl ChainSettings {
         }
     }
 
-    /// Shot noise's variance over the electrons of a sample: `pi B t` for a pole; 1 without one, where a sample counts the
-    /// electrons that arrive in it.
+    /// Variance of the shot noise divided by the electrons of a sample: `pi B t` for a pole; 1
+    /// without a pole, because a sample then counts the electrons that arrive in it.
     fn shot_bandwidth(&self) -> f64 {
         if self.amplifier_bandwidth_hz.is_finite() {
             std::f64::consts::PI * self.amplifier_bandwidth_hz * self.sample_ns * 1e-9
@@ -199,8 +208,8 @@ impl ChainSettings {
         decay(self.sample_ns, self.amplifier_tau_ns())
     }
 
-    /// Variance of the mean of `window` neighbouring samples of `electrons` of light, in electrons squared: the pole's
-    /// noise with its correlation, the ADC's noise and rounding without.
+    /// Variance of the mean of `window` neighbouring samples of `electrons` of light, in electrons
+    /// squared: the pole's noise with its correlation, the ADC's noise and rounding without.
     #[must_use]
     pub fn variance_of_mean(&self, electrons: f64, window: u32) -> f64 {
         let samples = f64::from(window.max(1));
@@ -209,8 +218,8 @@ impl ChainSettings {
         (pole * self.correlated(window) + adc * self.electrons_per_count.powi(2)) / samples
     }
 
-    /// By how much correlation raises the variance of a sum of `window` samples:
-    /// `1 + 2 sum over k of (1 - k / window) rho^k`.
+    /// Factor by which correlation raises the variance of a sum of `window` samples: `1 + 2 sum
+    /// over k of (1 - k / window) rho^k`.
     #[must_use]
     pub fn correlated(&self, window: u32) -> f64 {
         let (samples, rho) = (f64::from(window.max(1)), self.noise_correlation());
@@ -225,8 +234,8 @@ impl ChainSettings {
         sum
     }
 
-    /// Mean of what the samples of a pattern show of it, once `blanked` of its `clocks` are left out: its own share of
-    /// the light, 1 if LEDs and amplifier have settled.
+    /// The pattern's own share of the light in its samples, if `blanked` of its `clocks` are
+    /// excluded; 1 if LEDs and amplifier have settled.
     #[must_use]
     pub fn own_share(&self, clocks: u32, blanked: u32) -> f64 {
         let window = blanked.min(clocks.saturating_sub(1))..clocks.max(1);
@@ -234,8 +243,8 @@ impl ChainSettings {
         window.map(|n| self.settling(n)).sum::<f64>() / samples
     }
 
-    /// Part of a step of light that sample `n` after it shows: 0 is the clock in which the lines
-    /// changed. The analytic response of the two poles, without the ADC's latency.
+    /// Part of a step of light that sample `n` after the step shows. Sample 0 is the clock in which
+    /// the lines changed. The analytic response of the two poles, without the ADC's latency.
     #[must_use]
     pub fn settling(&self, n: u32) -> f64 {
         let t = (f64::from(n) + 1.0) * self.sample_ns;
@@ -246,7 +255,7 @@ impl ChainSettings {
     /// Checks the settings.
     ///
     /// # Errors
-    /// [`ChainError::Setting`] naming the one that is out of range.
+    /// [`ChainError::Setting`] naming the setting that is out of range.
     pub fn validate(&self) -> Result<(), ChainError> {
         let more = "more than 0";
         ensure(
@@ -294,13 +303,13 @@ fn ensure(
     if holds { Ok(()) } else { Err(ChainError::Setting { name, value, expected }) }
 }
 
-/// exp(-t / tau); a pole with no time constant has forgotten everything.
+/// exp(-t / tau). A pole with a time constant of 0 keeps nothing.
 fn decay(t: f64, tau: f64) -> f64 {
     if tau > 0.0 { (-t / tau).exp() } else { 0.0 }
 }
 
-/// What is left in a pole `second` at `t` of a unit that was in the pole `first` before it at 0:
-/// `first / (first - second) * (exp(-t / first) - exp(-t / second))`.
+/// The rest in a pole `second` at time `t`, of a unit that was in the preceding pole `first` at
+/// time 0: `first / (first - second) * (exp(-t / first) - exp(-t / second))`.
 fn shared_decay(t: f64, first: f64, second: f64) -> f64 {
     let difference = first - second;
     if first == 0.0 {
@@ -327,7 +336,7 @@ pub struct Chain {
     settings: ChainSettings,
     led_decay: f64,
     amplifier_decay: f64,
-    /// What one clock leaves in the amplifier of a difference in the LEDs.
+    /// Part of a difference in the LEDs that one clock moves into the amplifier.
     led_into_amplifier: f64,
     counts_per_electron: f64,
     offset_counts: f64,
@@ -345,8 +354,8 @@ pub struct Chain {
 }
 
 impl Chain {
-    /// A receiver that has been in the dark (and daylight) for long. The same settings, seed and
-    /// light give the same samples.
+    /// A receiver that has settled in the dark (and daylight). The same settings, seed and light
+    /// give the same samples.
     ///
     /// # Errors
     /// [`ChainError::Setting`] naming the setting that is out of range.
@@ -383,8 +392,8 @@ impl Chain {
         &self.settings
     }
 
-    /// One ADC clock, during which the LEDs are driven to give `light_electrons` per sample once
-    /// settled ([`crate::LedArray::light`]). Light below 0, or NaN, counts as none.
+    /// One ADC clock. `light_electrons` is the light per sample after the LEDs have settled
+    /// ([`crate::LedArray::light`]). Light below 0, or NaN, counts as 0.
     #[inline]
     pub fn sample(&mut self, light_electrons: f32) -> AdcSample {
         let light =

@@ -1,14 +1,21 @@
-//! Daylight by wavelength: what a band-pass filter lets through of so many kilolux.
+//! Daylight by wavelength: the irradiance that a band-pass filter transmits at an illuminance.
 //!
-//! The one law: a filter's daylight is the integral of the spectrum over the filter. Lines and bands of the atmosphere are
-//! narrower than filters; the value at its middle is 6 % below the mean at 850 nm, and as much above it at 1550 nm.
+//! # Invariant
+//! A filter's daylight is the integral of the spectrum over the filter
+//! (`tests::a_filter_gets_the_integral_over_it`). Lines and bands of the atmosphere are narrower
+//! than filters: the value at the filter's middle is 6 % below the mean at 850 nm, and 6 % above
+//! the mean at 1550 nm.
 //!
-//! The spectrum is ASTM G173-03, global tilt (`AM1.5G`, 1000 W/m^2), in means over 10 nm made from the table as PyPI's `pvlib`
-//! 0.16.1 carries it. Weighted by 683 lm/W times the CIE 1931 luminosity function (the fit of Wyman, Sloan and Shirley, *Simple
-//! analytic approximations to the CIE XYZ color matching functions*, JCGT 2(2), 2013) it is 109.6 klx.
+//! # Spectrum
 //!
-//! Assumed: haze and cloud dim every wavelength as they dim visible light. Liquid water in cloud dims 1550 nm more, so that the
-//! paper's half-cloudy 15 klx is, if anything, overstated there.
+//! The spectrum is ASTM G173-03, global tilt (`AM1.5G`, 1000 W/m^2), in means over 10 nm, made from
+//! the table in PyPI's `pvlib` 0.16.1. Weighted by 683 lm/W times the CIE 1931 luminosity function
+//! (the fit of Wyman, Sloan and Shirley, *Simple analytic approximations to the CIE XYZ color
+//! matching functions*, JCGT 2(2), 2013), the spectrum has 109.6 klx.
+//!
+//! Assumption: haze and cloud dim every wavelength as they dim visible light. Liquid water in
+//! clouds dims 1550 nm more, so the paper's half-cloudy 15 klx is overestimated rather than
+//! underestimated at 1550 nm.
 
 use std::ops::RangeInclusive;
 use thiserror::Error;
@@ -16,7 +23,7 @@ use thiserror::Error;
 /// Wavelengths of the table, in nm.
 pub const WAVELENGTHS_NM: RangeInclusive<f64> = 400.0..=1700.0;
 
-/// Illuminance by the whole spectrum, in klx.
+/// Illuminance of the whole spectrum, in klx.
 const SPECTRUM_KLX: f64 = 109.6;
 
 /// Width of a row of the table, in nm.
@@ -40,19 +47,19 @@ const SPECTRUM: [f64; 130] = [
     0.2296, 0.2350, 0.2393, 0.2304, 0.2198, 0.2207, 0.2140, 0.2135, 0.2056, 0.2032,
 ];
 
-/// A filter that the table does not cover.
+/// Error: the table does not cover the filter.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[error("daylight: a filter from {low_nm} to {high_nm} nm, expected wavelengths within {expected}")]
 pub struct DaylightError {
-    /// Where the filter begins, in nm.
+    /// Start of the filter, in nm.
     pub low_nm: f64,
-    /// Where it ends, in nm.
+    /// End of the filter, in nm.
     pub high_nm: f64,
-    /// Where the light's spectrum is known.
+    /// The range of the light's known spectrum.
     pub expected: &'static str,
 }
 
-/// Irradiance in W/m^2 that `klx` of daylight has within a filter of `width_nm` around `wavelength_nm`.
+/// Irradiance in W/m^2 of `klx` of daylight within a filter of `width_nm` around `wavelength_nm`.
 ///
 /// # Errors
 /// [`DaylightError`] if the filter reaches beyond the table.
@@ -95,7 +102,7 @@ mod tests {
         }
         assert!((all(850.0, 7.0) + all(857.0, 7.0) - all(853.5, 14.0)).abs() < 1e-12);
         assert_eq!(all(850.0, 0.0), 0.0);
-        // Water vapour takes nearly all at 1.4 um.
+        // Water vapour absorbs nearly all light at 1.4 um.
         assert!(all(1400.0, 20.0) < 0.01 * all(1550.0, 20.0));
     }
 

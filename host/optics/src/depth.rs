@@ -1,9 +1,13 @@
-//! The time-of-flight sensor: 8 x 8 zones at 940 nm (ST VL53L5CX and VL53L8CX), and where they lie in the camera's image.
+//! The time-of-flight sensor: 8 x 8 zones at 940 nm (ST VL53L5CX and VL53L8CX), and the positions
+//! of the zones in the camera's image.
 //!
-//! Law: a zone that has no distance reads 0, never a guess.
+//! # Invariant
+//! A zone without a distance reads 0
+//! (`tests::invalid_zones_read_zero_and_the_others_the_distance`).
 //!
-//! The zones of such a sensor cover 45 x 45 degrees (63 degrees along the diagonal; ST UM3109), the camera's field some 3
-//! to 9 degrees: one to four zones see it, and the others see the wall beside the target. [`DepthGeometry`] says which.
+//! The zones of the sensor cover 45 x 45 degrees (63 degrees along the diagonal; ST UM3109). The
+//! camera's field covers some 3 to 9 degrees. One to four zones see the field, and the other zones
+//! see the wall next to the target. [`DepthGeometry`] computes which zones see the field.
 
 use crate::SIDE;
 use rand::{RngExt, SeedableRng};
@@ -20,7 +24,7 @@ pub const DEPTH_ZONES: usize = DEPTH_SIDE * DEPTH_SIDE;
 /// Why a depth sensor cannot be simulated.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum DepthError {
-    /// The distance does not fit the reading.
+    /// The distance is outside the sensor's range.
     #[error("depth: distance is {0} mm, expected more than 0 and at most 65535")]
     Distance(f64),
     /// The noise is not a standard deviation.
@@ -38,11 +42,12 @@ pub struct SimulatedDepth {
 }
 
 impl SimulatedDepth {
-    /// A target at `distance_mm`, Gaussian noise of `noise_mm` rms a zone, and no reading in the
-    /// zones whose bit is set in `invalid_zones` (bit `8 * row + column`).
+    /// A target at `distance_mm`, with Gaussian noise of `noise_mm` rms in each zone. Zones whose
+    /// bit is set in `invalid_zones` (bit `8 * row + column`) have no reading.
     ///
     /// # Errors
-    /// [`DepthError`] if the distance does not fit a reading or the noise is negative or NaN.
+    /// [`DepthError`] if the distance is outside the sensor's range, or the noise is negative or
+    /// NaN.
     pub fn new(
         distance_mm: f64,
         noise_mm: f64,
@@ -58,7 +63,7 @@ impl SimulatedDepth {
         Ok(Self { distance_mm, noise_mm, invalid_zones, rng: Pcg64Mcg::seed_from_u64(seed) })
     }
 
-    /// One reading: 8 x 8 distances in millimetres, row-major, 0 where there is none.
+    /// One reading: 8 x 8 distances in millimetres, row-major, 0 for a zone without a distance.
     pub fn reading(&mut self) -> [u16; DEPTH_ZONES] {
         std::array::from_fn(|zone| {
             let noise: f64 = self.rng.sample(StandardNormal);
@@ -66,44 +71,47 @@ impl SimulatedDepth {
                 return 0;
             }
             let measured = (self.distance_mm + self.noise_mm * noise).round();
-            // Noise below 1 mm or past the reading's end is no distance either.
+            // A measured value below 1 mm or above the reading's maximum is not a distance either.
             if (1.0..=f64::from(u16::MAX)).contains(&measured) { measured as u16 } else { 0 }
         })
     }
 }
 
-/// Where the zones of the sensor lie, seen from the camera.
+/// The positions of the sensor's zones, seen from the camera.
 ///
-/// The sensor looks along the projector's axis. Zone row 0 is at the top and column 0 at the left, as pixels are.
+/// The sensor looks along the projector's axis. Zone row 0 is at the top and column 0 at the left,
+/// like pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DepthGeometry {
     /// Angle that the 8 zones of a row, and of a column, cover.
     pub fov_deg: f64,
-    /// Place of the sensor from the projector's axis: right, and down.
+    /// Position of the sensor relative to the projector's axis: right, and down.
     pub offset_mm: [f64; 2],
 }
 
 /// A depth map in the camera's image.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DepthView {
-    /// Distance of each pixel, 32 x 32, row-major; 0 where its zone has none.
+    /// Distance of each pixel, 32 x 32, row-major; 0 if its zone has no distance.
     pub pixels_mm: Vec<u16>,
-    /// Median of the zones that see the field; none if none of them has a distance.
+    /// Median of the zones that see the field; `None` if none of these zones has a distance.
     pub median_mm: Option<u16>,
-    /// Zones that see the field and have a distance.
+    /// Number of zones that see the field and have a distance.
     pub zones: usize,
 }
 
 impl DepthGeometry {
-    /// The zone, along one axis, that sees a point at `at_mm` from the projector's axis on a plane at `distance_mm`: a
-    /// pinhole camera, zones of equal width on a plane. Below 0 or from [`DEPTH_SIDE`] on: none.
+    /// The zone, along one axis, that sees a point at `at_mm` from the projector's axis on a plane
+    /// at `distance_mm`: a pinhole camera with zones of equal width on a plane. A value below 0, or
+    /// from [`DEPTH_SIDE`] on, means no zone.
     fn zone(&self, at_mm: f64, offset_mm: f64, distance_mm: f64) -> f64 {
         let half = (self.fov_deg.to_radians() / 2.0).tan();
         let tangent = (at_mm - offset_mm) / distance_mm;
         (tangent / half + 1.0) / 2.0 * DEPTH_SIDE as f64
     }
 
-    /// The zones, along one axis, that see some of a field of `field_mm` on a plane at `distance_mm`.
+    /// The zones, along one axis, that see part of a field of `field_mm` on a plane at
+    /// `distance_mm`.
     fn zones_of_field(
         &self,
         axis: usize,
@@ -112,18 +120,20 @@ impl DepthGeometry {
     ) -> std::ops::Range<usize> {
         let offset_mm = self.offset_mm[axis];
         let [from, to] = [-0.5, 0.5].map(|edge| self.zone(edge * field_mm, offset_mm, distance_mm));
-        // An edge that only touches a zone does not see it.
+        // A zone whose edge only touches the field does not see the field.
         let last = DEPTH_SIDE as f64;
         let from = (from + 1e-9).floor().clamp(0.0, last) as usize;
         let to = (to - 1e-9).ceil().clamp(0.0, last) as usize;
         from..to.max(from)
     }
 
-    /// Puts a reading of 8 x 8 zones into the camera's image. `field_over_distance` is the side of the field over the
-    /// distance of the target ([`crate::Projector::field_over_distance`]).
+    /// Transfers a reading of 8 x 8 zones into the camera's image. `field_over_distance` is the
+    /// side of the field divided by the distance of the target
+    /// ([`crate::Projector::field_over_distance`]).
     ///
-    /// The sensor stands beside the projector, so that the zones that see the field depend on the target's distance: the
-    /// middle zones give a first one, and the zones found with it the next.
+    /// The sensor is next to the projector, so the zones that see the field depend on the target's
+    /// distance. The middle zones give a first distance; the zones found with the first distance
+    /// give the final distance.
     #[must_use]
     pub fn view(&self, zones_mm: &[u16; DEPTH_ZONES], field_over_distance: f64) -> DepthView {
         let middle = DEPTH_SIDE / 2 - 1..DEPTH_SIDE / 2 + 1;
@@ -169,7 +179,7 @@ mod tests {
     use super::*;
     use crate::{CameraModel, Projector};
 
-    /// A reading of a square target before a wall: a zone sees the target where its middle does.
+    /// A reading of a square target in front of a wall. A zone sees the target if its middle does.
     fn before_a_wall(
         geometry: &DepthGeometry,
         target_mm: f64,
@@ -206,14 +216,15 @@ mod tests {
 
     #[test]
     fn a_pixel_has_the_distance_of_the_zone_that_sees_it() {
-        // Zones numbered by their place; the sensor on the axis: the field lies on the middle four.
+        // Each zone reads its number. With the sensor on the axis, the field lies on the middle
+        // four zones.
         let reading: [u16; DEPTH_ZONES] = std::array::from_fn(|zone| 1000 + zone as u16);
         let geometry = DepthGeometry { fov_deg: 45.0, offset_mm: [0.0, 0.0] };
         let view = geometry.view(&reading, 0.16);
         let at = |row: usize, column: usize| view.pixels_mm[row * SIDE + column] - 1000;
         assert_eq!([at(0, 0), at(0, 31), at(31, 0), at(31, 31)], [27, 28, 35, 36]);
         assert_eq!(view.zones, 4);
-        // A sensor to the left of the axis has the field in its right half.
+        // A sensor to the left of the axis sees the field in its right half.
         let left = DepthGeometry { offset_mm: [-150.0, 0.0], ..geometry };
         let view = left.view(&reading, 0.16);
         assert_eq!(view.pixels_mm[0] - 1000, 28, "one zone farther to the right");
@@ -252,7 +263,8 @@ mod tests {
             assert_eq!(reading, again.reading());
             squares += reading.iter().map(|&mm| (f64::from(mm) - 1000.0).powi(2)).sum::<f64>();
         }
-        // 12 800 values: the variance is known to sqrt(2 / 12 800) = 1.25 %; four of those.
+        // With 12 800 values the variance is known to sqrt(2 / 12 800) = 1.25 %; the limit is four
+        // times that.
         let variance = squares / (readings * DEPTH_ZONES) as f64;
         assert!((variance / (15.0 * 15.0) - 1.0).abs() < 0.05, "{variance}");
     }

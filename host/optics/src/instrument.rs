@@ -1,8 +1,9 @@
 //! Numbers of the instrument that the optics need.
 //!
 //! # Invariant
-//! This crate knows nothing of the wire protocol, so these numbers stand here and in `nirspi-wire`. The test
-//! `the_optics_have_the_instruments_numbers` of `nirspi` (`host/src/virtual_camera/mod.rs`) holds them equal.
+//! This crate does not depend on the wire protocol, so the numbers are both in this file and in
+//! `nirspi-wire`. The test `the_optics_have_the_instruments_numbers` of `nirspi`
+//! (`host/src/virtual_camera/mod.rs`) checks that they are equal.
 
 /// LEDs along one side of the array (paper, section 2.A).
 pub const SIDE: usize = 32;

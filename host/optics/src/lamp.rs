@@ -1,7 +1,8 @@
-//! Where the light on the target comes from, besides the LEDs': daylight, a halogen lamp or an LED lamp.
+//! The source of the light on the target besides the LEDs: daylight, a halogen lamp or an LED lamp.
 //!
-//! The same kilolux hold very different light at 1550 nm: a halogen lamp has some ten times daylight's, because most of
-//! its light is infrared, and a white LED lamp none.
+//! At 1550 nm, the same illuminance means very different light. A halogen lamp has some ten times
+//! the light of daylight, because most of its light is infrared. A white LED lamp has no light at
+//! 1550 nm.
 
 use crate::daylight::{self, DaylightError};
 use serde::{Deserialize, Serialize};
@@ -16,10 +17,10 @@ const SECOND_RADIATION_NM_K: f64 = 1.438_776_877e7;
 /// Lumen per watt at 555 nm (SI, exact at 540 THz).
 const LUMEN_PER_WATT: f64 = 683.0;
 
-/// Beyond this wavelength a white LED lamp has no light, in nm.
+/// The longest wavelength of a white LED lamp, in nm.
 const LED_LAMP_ENDS_NM: f64 = 800.0;
 
-/// A source of light that is not the camera's.
+/// A source of light other than the camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum LightSource {
@@ -46,11 +47,12 @@ impl LightSource {
         }
     }
 
-    /// Irradiance in W/m^2 that `klx` of this light has within a filter of `width_nm` around `wavelength_nm`.
+    /// Irradiance in W/m^2 of `klx` of this light within a filter of `width_nm` around
+    /// `wavelength_nm`.
     ///
     /// # Errors
-    /// [`DaylightError`] for wavelengths at which the source's spectrum is not known here: beyond 400 to 1700 nm, and for
-    /// an LED lamp below 800 nm.
+    /// [`DaylightError`] for wavelengths at which the source's spectrum is not known: outside 400
+    /// to 1700 nm, and for an LED lamp below 800 nm.
     pub fn irradiance_w_per_m2(
         self,
         klx: f64,
@@ -76,9 +78,9 @@ impl fmt::Display for LightSource {
     }
 }
 
-/// A black body's light within a band, scaled to so many kilolux.
+/// A black body's light within a band, scaled to an illuminance.
 fn halogen_w_per_m2(klx: f64, low_nm: f64, high_nm: f64) -> f64 {
-    // Any unit: only ratios count.
+    // The unit does not matter, because only ratios are used.
     let planck = |nm: f64| nm.powi(-5) / (SECOND_RADIATION_NM_K / (nm * HALOGEN_K)).exp_m1();
     let lumen = integral(360.0, 830.0, |nm| LUMEN_PER_WATT * luminosity(nm) * planck(nm));
     integral(low_nm, high_nm, planck) / lumen * klx * 1e3
@@ -96,8 +98,8 @@ fn integral(low: f64, high: f64, of: impl Fn(f64) -> f64) -> f64 {
     (0..=PARTS).map(|i| weight(i) * of(low + step * i as f64)).sum::<f64>() * step / 3.0
 }
 
-/// The CIE 1931 luminosity function: the fit of Wyman, Sloan and Shirley (*Simple analytic approximations to the CIE XYZ
-/// color matching functions*, JCGT 2(2), 2013).
+/// The CIE 1931 luminosity function: the fit of Wyman, Sloan and Shirley (*Simple analytic
+/// approximations to the CIE XYZ color matching functions*, JCGT 2(2), 2013).
 #[must_use]
 pub fn luminosity(nm: f64) -> f64 {
     let lobe = |mean: f64, below: f64, above: f64| {
@@ -114,8 +116,8 @@ mod tests {
     #[test]
     fn a_halogen_lamp_has_ten_times_daylights_near_infrared() {
         let at = |source: LightSource| source.irradiance_w_per_m2(15.0, 1550.0, 100.0).unwrap();
-        // A black body of 2856 K has 16.47 lm for each watt of all its light, and 4.472 % of it are within 1500 to 1600 nm:
-        // 15 klx are 910.5 W/m^2 in all, 40.72 within the filter.
+        // A black body of 2856 K has 16.47 lm for each watt of all its light, and 4.472 % of it are
+        // within 1500 to 1600 nm: 15 klx are 910.5 W/m^2 in all, 40.72 within the filter.
         assert!(
             (at(LightSource::Halogen) / 40.7 - 1.0).abs() < 0.02,
             "{}",

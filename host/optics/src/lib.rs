@@ -1,4 +1,4 @@
-//! Optics of the virtual camera: what the detector would see, and what the ADC would say about it.
+//! Optics of the virtual camera: the light at the detector, and the ADC's reading of the light.
 //!
 //! The light takes one path through this crate, and each module is one stage of it:
 //!
@@ -12,8 +12,8 @@
 //! | [`daylight`], [`lamp`] | kilolux, wavelength, filter | W/m^2 of daylight or lamp light on the target |
 //! | [`depth`] | distance | an 8 x 8 time-of-flight reading, and its place in the image |
 //!
-//! [`camera`] holds every constant of a camera, read from TOML. [`instrument`] holds the numbers that the gateware and the
-//! protocol fix.
+//! [`camera`] holds every constant of a camera, read from TOML. [`instrument`] holds the numbers
+//! that the gateware and the protocol fix.
 //!
 //! What is between camera and target, and what follows from it:
 //!
@@ -27,8 +27,8 @@
 //! | [`visible`] | scene, daylight, drops | what an ordinary camera sees |
 //! | [`safety`] | camera description | what an eye before the camera receives |
 //!
-//! Light is counted in **electrons per ADC sample** from [`budget`] on, and
-//! nothing is rescaled to look good. A weak signal stays weak; the gain that shows it is a setting.
+//! Light is counted in **electrons per ADC sample** from [`budget`] on, without rescaling. A weak
+//! signal stays weak; the gain is a setting.
 //!
 //! ```
 //! use nirspi_optics::{Budget, BudgetSettings, Chain, ChainSettings, LedArray, Projector, Scene};

@@ -1,20 +1,24 @@
 //! Scattering by one homogeneous sphere (Lorenz-Mie theory).
 //!
-//! The solver is the crate `scatrs`; this module gives it the units and names of the rest of the crate and refuses
-//! what was not checked. Definitions are those of Bohren and Huffman, *Absorption and Scattering of Light by Small
-//! Particles* (1983), chapter 4: size parameter `x = pi D / wavelength`, refractive index `n + ik` with k >= 0 for a
-//! sphere that absorbs, efficiencies as cross section over `pi D^2 / 4`.
+//! The crate `scatrs` solves the problem. This module converts units and names, and refuses values
+//! that were not checked. Definitions are those of Bohren and Huffman, *Absorption and Scattering
+//! of Light by Small Particles* (1983), chapter 4: size parameter `x = pi D / wavelength`,
+//! refractive index `n + ik` with k >= 0 for a sphere that absorbs, and efficiencies as cross
+//! section divided by `pi D^2 / 4`.
 //!
-//! Law: energy is neither made nor lost. `extinction = scattering + absorption`, absorption is exactly 0 for a real
-//! index, and a phase function has a mean of 1 over the sphere.
+//! # Invariant
+//! Energy is conserved: `extinction = scattering + absorption`, and absorption is exactly 0 for a
+//! real index (`energy_is_neither_made_nor_lost` in `host/optics/tests/mie.rs`). A phase function
+//! has a mean of 1 over the sphere
+//! (`a_phase_function_has_a_mean_of_one_and_the_asymmetry_as_its_mean_cosine`).
 
 use num_complex::Complex64;
 use scatrs::mie::{MieOptions, MieSolution, Normalization, PhaseBuffers};
 use std::ops::RangeInclusive;
 use thiserror::Error;
 
-/// Size parameters accepted: what `tests/mie.rs` and `scripts/mie_reference.py` hold against other codes, which
-/// reaches from Rayleigh scattering to an 8 mm drop in violet light.
+/// Accepted size parameters. `tests/mie.rs` and `scripts/mie_reference.py` compare this range with
+/// other codes. The range reaches from Rayleigh scattering to an 8 mm drop in violet light.
 pub const SIZE_PARAMETERS: RangeInclusive<f64> = 0.01..=65_000.0;
 
 /// Real parts of the refractive index accepted.
@@ -26,14 +30,14 @@ pub const IMAGINARY_INDICES: RangeInclusive<f64> = 0.0..=10.0;
 /// Why a sphere cannot be solved.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum MieError {
-    /// A number is outside what was checked.
+    /// A number is outside the checked range.
     #[error("Mie: {name} is {value}, expected {} to {}", allowed.start(), allowed.end())]
     Range {
-        /// Which.
+        /// The name of the number.
         name: &'static str,
         /// The value found.
         value: f64,
-        /// What it may be.
+        /// The allowed values.
         allowed: RangeInclusive<f64>,
     },
     /// The solver refused.
@@ -56,22 +60,22 @@ pub struct Index {
     pub imaginary: f64,
 }
 
-/// What a sphere does to light, per geometric cross section.
+/// Effects of a sphere on light, per geometric cross section.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Efficiencies {
-    /// Q_ext: taken out of the beam.
+    /// Q_ext: removed from the beam.
     pub extinction: f64,
-    /// Q_sca: sent elsewhere.
+    /// Q_sca: scattered into other directions.
     pub scattering: f64,
-    /// Q_abs: turned into heat.
+    /// Q_abs: converted to heat.
     pub absorption: f64,
-    /// Q_back: 4 pi times what is scattered straight back into a unit solid angle.
+    /// Q_back: 4 pi times the light scattered straight back into a unit solid angle.
     pub backscatter: f64,
     /// g: mean cosine of the scattering angle.
     pub asymmetry: f64,
 }
 
-/// A solver that keeps its memory from one sphere to the next.
+/// A solver that reuses its memory for the next sphere.
 #[derive(Debug, Clone, Default)]
 pub struct Mie {
     workspace: scatrs::mie::Mie<f64>,
@@ -87,13 +91,14 @@ impl Mie {
     /// Solves the sphere of size parameter `x`.
     ///
     /// # Errors
-    /// [`MieError::Range`] naming the number that is not in [`SIZE_PARAMETERS`], [`REAL_INDICES`] or
+    /// [`MieError::Range`] naming the number outside [`SIZE_PARAMETERS`], [`REAL_INDICES`] or
     /// [`IMAGINARY_INDICES`].
     pub fn sphere(&mut self, x: f64, index: Index) -> Result<Sphere<'_>, MieError> {
         ensure("size parameter x", x, &SIZE_PARAMETERS)?;
         ensure("refractive index n", index.real, &REAL_INDICES)?;
         ensure("refractive index k", index.imaginary, &IMAGINARY_INDICES)?;
-        // `scatrs` states its accuracy up to x = 20 000; beyond that it is our own comparison that vouches for it.
+        // `scatrs` states its accuracy up to x = 20 000. For larger x, the comparison in
+        // `tests/mie.rs` shows the accuracy.
         let options = MieOptions::new().with_allow_unvalidated(true);
         let m = Complex64::new(index.real, index.imaginary);
         Ok(Sphere { solution: self.workspace.compute(x, m, &options)? })
@@ -128,8 +133,9 @@ impl Sphere<'_> {
         }
     }
 
-    /// The phase function of unpolarised light at cosines of the scattering angle, one value for each: mean 1 over
-    /// the sphere, so that a value over 4 pi is the share of scattered light per steradian.
+    /// The phase function of unpolarised light at cosines of the scattering angle, one value for
+    /// each cosine. The mean over the sphere is 1, so a value divided by 4 pi is the share of
+    /// scattered light per steradian.
     ///
     /// # Errors
     /// [`MieError::Solver`] if a cosine is not in [-1, 1].

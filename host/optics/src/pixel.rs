@@ -1,16 +1,18 @@
 //! Signal and noise of one reconstructed pixel, term by term.
 //!
-//! A differential Hadamard measurement shows N patterns and their complements; the inverse transform gives each pixel
-//! `(1/N) sum of sign * (pattern - complement)`. Its signal is the light of one LED in one exposure; its noise
-//! variance is 2/N of that of one exposure (`Var(pattern - complement) = 2 sigma^2`, N of them, over N^2). So `SNR =
-//! signal / sigma * sqrt(N / 2)`. (Harwit and Sloane, *Hadamard Transform Optics*, 1979, treat such masks; the factor is
-//! the one derived here.)
+//! A differential Hadamard measurement shows N patterns and their complements. The inverse
+//! transform gives each pixel `(1/N) sum of sign * (pattern - complement)`. A pixel's signal is the
+//! light of one LED in one exposure. Its noise variance is 2/N of that of one exposure
+//! (`Var(pattern - complement) = 2 sigma^2`, N of them, over N^2). So `SNR = signal / sigma *
+//! sqrt(N / 2)`. (Harwit and Sloane, *Hadamard Transform Optics*, 1979, treat these masks; the
+//! factor is derived here.)
 //!
-//! An exposure is the time that one pattern is shown: its clocks times the sweeps. The complement is shown as long. Of the
-//! samples the camera leaves out the blanked ones, and the others show what has settled: a pattern's own share `r` of
-//! the light, and `1 - r` of the pattern before. Undoing that leak keeps `r - (1 - r) / 2` of a difference
-//! (`host/recon/src/leak.rs` derives it), so the signal is that share of the light. Noise of neighbouring
-//! samples is correlated by the amplifier's pole ([`crate::chain`]).
+//! An exposure is the time for which one pattern is shown: its clocks times the sweeps. The
+//! complement is shown as long. The camera excludes the blanked samples. The other samples show the
+//! pattern's own share `r` of the light, and `1 - r` of the pattern before. Correcting that leak
+//! keeps `r - (1 - r) / 2` of a difference (`host/recon/src/leak.rs` derives this factor), so the
+//! signal is that share of the light. The amplifier's pole correlates the noise of neighbouring
+//! samples ([`crate::chain`]).
 
 use crate::budget::BudgetError;
 use crate::camera::Readout;
@@ -19,7 +21,7 @@ use crate::{Budget, BudgetSettings, CameraModel, ChainSettings, LEDS, Projector}
 use std::f64::consts::PI;
 use thiserror::Error;
 
-/// Why there is no budget of a pixel.
+/// Why the budget of a pixel cannot be computed.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum PixelError {
     /// Light.
@@ -31,16 +33,17 @@ pub enum PixelError {
     /// A number is outside its range.
     #[error("pixel budget: {name} is {value}, expected {expected}")]
     Setting {
-        /// Which.
+        /// The name of the number.
         name: &'static str,
         /// The value found.
         value: f64,
-        /// What it may be.
+        /// The allowed values.
         expected: &'static str,
     },
 }
 
-/// The whole instrument, as a budget sees it: [`CameraModel::instrument`]. The default is the paper's camera.
+/// The whole instrument for a budget: [`CameraModel::instrument`]. The default is the paper's
+/// camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Instrument {
     /// Light.
@@ -49,7 +52,7 @@ pub struct Instrument {
     pub projector: Projector,
     /// Amplifier and ADC.
     pub chain: ChainSettings,
-    /// Which samples of a pattern count.
+    /// Which samples of a pattern are used.
     pub readout: Readout,
     /// Distance between projector and collector, in mm.
     pub baseline_mm: f64,
@@ -61,20 +64,21 @@ impl Default for Instrument {
     }
 }
 
-/// Where light is lost and noise gained on the way to one pixel. Electrons are per ADC sample unless said otherwise.
+/// Losses of light and sources of noise on the path to one pixel. Electrons are per ADC sample
+/// unless stated otherwise.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PixelBudget {
-    /// Light of one LED on a white target in dry air, and of daylight.
+    /// Light of one LED on a white target in dry air, and light of daylight.
     pub dry: Budget,
-    /// Share that rain leaves in the LED's own spot.
+    /// Share of light that stays in the LED's own spot in rain.
     pub rain_out: f64,
-    /// Share that rain leaves on the way back.
+    /// Share of light that remains on the path back in rain.
     pub rain_back: f64,
     /// Light of one LED from the target.
     pub signal_electrons: f64,
-    /// Light of one LED from drops that it lights on the way.
+    /// Light of one LED from illuminated drops on the path.
     pub backscatter_electrons: f64,
-    /// Light of all LEDs that a pattern lights, half of them, from a target of this reflectance.
+    /// Light of all LEDs of a pattern, half of the LEDs, from a target of this reflectance.
     pub pattern_electrons: f64,
     /// Daylight from the target.
     pub daylight_electrons: f64,
@@ -82,7 +86,7 @@ pub struct PixelBudget {
     pub airlight_electrons: f64,
     /// Dark current.
     pub dark_electrons: f64,
-    /// Noise of the arrival of all these, over the amplifier's noise bandwidth, rms.
+    /// Shot noise of all this light, over the amplifier's noise bandwidth, rms.
     pub shot_noise: f64,
     /// Noise of the amplifier, rms.
     pub amplifier_noise: f64,
@@ -92,27 +96,27 @@ pub struct PixelBudget {
     pub quantisation_noise: f64,
     /// All noise, rms.
     pub noise: f64,
-    /// By how much the correlation of neighbouring samples raises the variance of their sum.
+    /// Factor by which the correlation of neighbouring samples raises the variance of their sum.
     pub correlated: f64,
-    /// Share of the light that is left of a pattern minus its complement once the leak is undone.
+    /// Share of the light that remains in a pattern minus its complement after correcting the leak.
     pub settled: f64,
-    /// Electrons per count that the gain was set to.
+    /// Electrons per count of the chosen gain.
     pub electrons_per_count: f64,
-    /// Samples of one exposure that count.
+    /// Number of used samples of one exposure.
     pub samples: f64,
-    /// Signal of one exposure: of all samples that count, once the leak is undone.
+    /// Signal of one exposure: of all used samples, after correcting the leak.
     pub exposure_signal: f64,
     /// Noise of one exposure, rms.
     pub exposure_noise: f64,
-    /// Signal of one exposure over its noise.
+    /// Signal of one exposure divided by its noise.
     pub exposure_snr: f64,
-    /// Signal of one reconstructed pixel over its noise.
+    /// Signal of one reconstructed pixel divided by its noise.
     pub pixel_snr: f64,
 }
 
 impl PixelBudget {
-    /// One pixel of a target of `reflectance` at `distance_mm` in this weather, each pattern and each complement shown
-    /// for `exposure_us`.
+    /// One pixel of a target of `reflectance` at `distance_mm` in this weather, each pattern and
+    /// each complement shown for `exposure_us`.
     ///
     /// # Errors
     /// [`PixelError`] naming what is out of range.
@@ -136,7 +140,7 @@ impl PixelBudget {
         let dry = Budget::new(&instrument.budget, projector, distance_mm)?;
         let blur = weather.blur(distance_mm)?;
         let field_mm = projector.field_mm(distance_mm);
-        // A spot, taken as a circle of the same area.
+        // A spot is approximated by a circle of the same area.
         let own_mm = field_mm / crate::SIDE as f64 / PI.sqrt();
         let rain_out = blur.unscattered() + blur.scattered_within(own_mm);
         let rain_back = blur.returned(field_mm / distance_mm);
@@ -166,7 +170,7 @@ impl PixelBudget {
         let settled = own - (1.0 - own) / 2.0;
         let clocks = exposure_us * 1e3 / instrument.budget.sample_ns;
         let samples = clocks * f64::from(window) / f64::from(clocks_per_pattern);
-        // Windows are far enough apart for their noise to be independent.
+        // Windows are so far apart that their noise is independent.
         let window_noise = (chain.variance_of_mean(light, window) * f64::from(window)).sqrt();
         let exposure_signal = signal_electrons * settled * samples;
         let exposure_noise = window_noise * samples.sqrt();
@@ -214,7 +218,7 @@ mod tests {
 
     #[test]
     fn the_budget_of_a_pixel_agrees_with_one_worked_by_hand() {
-        // docs/physics.md works this out: white target, 0.3 m, 25 us, dry, 15 klx.
+        // docs/physics.md has the same example: white target, 0.3 m, 25 us, dry, 15 klx.
         let pixel = at(300.0, 25.0);
         let close = |name: &str, found: f64, expected: f64| {
             assert!((found / expected - 1.0).abs() < 1e-3, "{name}: {found} against {expected}");
@@ -254,7 +258,7 @@ mod tests {
         let wet = PixelBudget::new(&Instrument::default(), &rain, 1000.0, 1.0, 25.0).unwrap();
         let loss = 1.0 - wet.signal_electrons / at(1000.0, 25.0).signal_electrons;
         let extinction = 1.0 - rain.medium().transmission(2.0);
-        // The forward half of what is scattered stays in the spot and in view.
+        // The forward half of the scattered light stays in the spot and in view.
         assert!(loss > 0.4 * extinction && loss < extinction, "{loss} of {extinction}");
         assert!(wet.airlight_electrons > 0.0 && wet.backscatter_electrons > 0.0);
     }

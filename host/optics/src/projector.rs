@@ -1,12 +1,15 @@
 //! The projector: which part of the target each LED lights.
 //!
-//! A thin lens images the LED array onto the focus plane. On that plane each LED is a sharp square;
-//! in front of it and behind it the cone of light from the aperture meets the target as a disc, so
-//! that the spot is the magnified emitter convolved with that disc.
+//! A thin lens images the LED array onto the focus plane. On the focus plane each LED is a sharp
+//! square. In front of the plane and behind it, the cone of light from the aperture meets the
+//! target as a disc. The spot is the magnified emitter convolved with that disc.
 //!
-//! Law: a spot is a *weighted mean* of reflectance (its weights sum to 1), so the footprint is linear
-//! in the scene, and a target of one reflectance gives that reflectance at every LED at any distance.
-//! How much light a spot carries is the business of [`crate::budget`].
+//! # Invariant
+//! A spot is a *weighted mean* of reflectance (its weights sum to 1). The footprint is linear in
+//! the scene (`the_footprint_is_linear_in_reflectance` in `host/optics/tests/projector.rs`). A
+//! target of one reflectance gives that reflectance at every LED at any distance
+//! (`a_flat_target_is_seen_flat_at_every_distance`). [`crate::budget`] computes the light of a
+//! spot.
 
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
@@ -14,14 +17,14 @@ use thiserror::Error;
 
 use crate::{CameraModel, LEDS, SIDE, Scene};
 
-/// Grid points a LED pitch on which spots are integrated.
+/// Grid points per LED pitch on which spots are integrated.
 const SAMPLES_PER_PITCH: usize = 8;
 
-/// A blur disc wider than this many fields leaves no pattern on the target (and would need an
-/// absurdly large grid to say so).
+/// A blur disc wider than this many fields leaves no pattern on the target (and would need a very
+/// large grid).
 const MAX_BLUR_FIELDS: f64 = 4.0;
 
-/// Why nothing can be projected.
+/// Why the projection cannot be computed.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum ProjectorError {
     /// A length is not positive and finite.
@@ -40,7 +43,7 @@ pub enum ProjectorError {
         /// LED pitch, in millimetres.
         led_pitch_mm: f64,
     },
-    /// The lens has no real image there.
+    /// The lens has no real image at the focus distance.
     #[error(
         "projector: focus_distance_mm {focus_distance_mm} must be more than \
          focal_length_mm {focal_length_mm}"
@@ -51,30 +54,31 @@ pub enum ProjectorError {
         /// Focal length, in millimetres.
         focal_length_mm: f64,
     },
-    /// The blur is so much wider than the field that no pattern is left.
+    /// The blur is so much wider than the field that no pattern remains.
     #[error(
         "projector: at {distance_mm} mm the blur of {blur_mm:.1} mm washes out the field of \
          {field_mm:.1} mm; move nearer to the focus"
     )]
     WashedOut {
-        /// Distance asked for, in millimetres.
+        /// The requested distance, in millimetres.
         distance_mm: f64,
-        /// Diameter of the defocus disc there, in millimetres.
+        /// Diameter of the defocus disc at that distance, in millimetres.
         blur_mm: f64,
-        /// Side of the field there, in millimetres.
+        /// Side of the field at that distance, in millimetres.
         field_mm: f64,
     },
 }
 
-/// The LED array behind its lens. All lengths in millimetres.
+/// The LED array behind its lens. All lengths are in millimetres.
 ///
-/// The default is the paper's camera: `cameras/paper.toml` says what the paper prints and what was chosen.
+/// The default is the paper's camera. `cameras/paper.toml` says which values the paper gives and
+/// which were chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Projector {
     /// Distance between neighbouring LEDs.
     pub led_pitch_mm: f64,
-    /// Width of the square that one LED emits from.
+    /// Width of the square emitter of one LED.
     pub emitter_mm: f64,
     /// Focal length of the lens.
     pub focal_length_mm: f64,
@@ -82,7 +86,8 @@ pub struct Projector {
     pub focus_distance_mm: f64,
     /// Diameter of the lens.
     pub aperture_mm: f64,
-    /// Share of the light lost at the corners of the field; it grows with the square of the distance from the centre.
+    /// Share of the light lost at the corners of the field. The loss grows with the square of the
+    /// distance from the centre.
     pub corner_vignetting: f64,
 }
 
@@ -119,7 +124,7 @@ impl Projector {
         1.0 / (1.0 / self.focal_length_mm - 1.0 / self.focus_distance_mm)
     }
 
-    /// Size on the target over size on the array, for a target at `distance_mm`.
+    /// Size on the target divided by size on the array, for a target at `distance_mm`.
     #[must_use]
     pub fn magnification(&self, distance_mm: f64) -> f64 {
         distance_mm / self.array_distance_mm()
@@ -131,7 +136,8 @@ impl Projector {
         SIDE as f64 * self.led_pitch_mm * self.magnification(distance_mm)
     }
 
-    /// Side of the field over the distance of the target: the same at every distance.
+    /// Side of the field divided by the distance of the target, which is the same at every
+    /// distance.
     #[must_use]
     pub fn field_over_distance(&self) -> f64 {
         SIDE as f64 * self.led_pitch_mm / self.array_distance_mm()
@@ -144,14 +150,16 @@ impl Projector {
         self.aperture_mm * (1.0 - distance_mm / self.focus_distance_mm).abs()
     }
 
-    /// The finest line on a target at `distance_mm` that keeps `contrast` of its own behind emitter and defocus, never finer
-    /// than a pixel, in millimetres; none if no line as wide as the field does.
+    /// The finest line on a target at `distance_mm` that keeps `contrast` of its own contrast after
+    /// blur by emitter and defocus, in millimetres and at least one pixel; `None` if even a line as
+    /// wide as the field loses more.
     #[must_use]
     pub fn finest_line_mm(&self, distance_mm: f64, contrast: f64) -> Option<f64> {
         let pixel_mm = self.field_mm(distance_mm) / SIDE as f64;
         let kept = |line_mm: f64| self.transfer(1.0 / (2.0 * line_mm), distance_mm);
         let width = |step: i32| pixel_mm * (SIDE as f64).powf(f64::from(step) / 2000.0);
-        // From the widest line on: past the first null contrast comes back inverted, which shows nothing.
+        // The search starts at the widest line: after the first null the contrast comes back
+        // inverted, which is not resolution.
         let lost = (0..=2000).rev().find(|&step| kept(width(step)) < contrast);
         match lost {
             None => Some(pixel_mm),
@@ -160,14 +168,14 @@ impl Projector {
         }
     }
 
-    /// Contrast that a sine on a target at `distance_mm` keeps behind emitter and defocus, at `cycles_per_mm`: a square's
-    /// transfer times a disc's.
+    /// Contrast of a sine on a target at `distance_mm` after blur by emitter and defocus, at
+    /// `cycles_per_mm`: a square's transfer times a disc's.
     #[must_use]
     pub fn transfer(&self, cycles_per_mm: f64, distance_mm: f64) -> f64 {
         const PARTS: u32 = 400;
         let spot_mm = self.emitter_mm * self.magnification(distance_mm);
         let square = sinc(PI * cycles_per_mm * spot_mm);
-        // A disc seen from its edge: chords of a unit circle, `cos^2` of an angle.
+        // The projection of a disc onto one axis: chords of a unit circle, `cos^2` of an angle.
         let phase = PI * cycles_per_mm * self.blur_mm(distance_mm);
         let part = |i: u32| {
             let angle = PI * ((f64::from(i) + 0.5) / f64::from(PARTS) - 0.5);
@@ -178,12 +186,12 @@ impl Projector {
     }
 
     /// The mean reflectance that each LED's spot sees on a scene at `distance_mm`, centred on the
-    /// axis. LED row 0 is the top of the scene and column 0 its left; the lens turns the picture
-    /// over, and the array is wired so that this undoes it.
+    /// axis. LED row 0 is the top of the scene and column 0 its left. The lens inverts the picture,
+    /// and the wiring of the array undoes the inversion.
     ///
     /// # Errors
     /// [`ProjectorError`] if a setting or the distance is not physical, or if the target is so far
-    /// out of focus that no pattern is left on it.
+    /// out of focus that no pattern remains.
     pub fn footprint(&self, scene: &Scene, distance_mm: f64) -> Result<Footprint, ProjectorError> {
         self.validate()?;
         positive("distance_mm", distance_mm)?;
@@ -198,7 +206,7 @@ impl Projector {
         let mut weights = Vec::with_capacity(LEDS);
         for row in 0..SIDE {
             for column in 0..SIDE {
-                // Differences of running sums leave the last bit on either side of the range.
+                // Differences of running sums may leave the range by the last bit.
                 let mean = sharp.mean_over_disc(row, column, radius);
                 weights.push(mean.clamp(0.0, 1.0) as f32);
             }
@@ -219,9 +227,9 @@ fn positive(name: &'static str, value_mm: f64) -> Result<(), ProjectorError> {
     }
 }
 
-/// The scene seen through one sharp emitter, sampled on a grid of [`SAMPLES_PER_PITCH`] points a
-/// pitch that has a point on every LED's axis; kept as running sums along rows, so that a disc is
-/// one difference a row.
+/// The scene seen through one sharp emitter, sampled on a grid of [`SAMPLES_PER_PITCH`] points per
+/// pitch with a point on every LED's axis. Stored as running sums along rows, so that each row of a
+/// disc is one difference.
 struct SharpGrid {
     running: Vec<f64>,
     stride: usize,
@@ -251,7 +259,7 @@ impl SharpGrid {
         let x = (self.margin + column * SAMPLES_PER_PITCH) as f64 + 0.5;
         let y = self.margin + row * SAMPLES_PER_PITCH;
         if radius < 0.5 {
-            // Finer than the grid: the emitter's own width hides a disc this small.
+            // A disc smaller than the grid is hidden by the emitter's own width.
             return self.sum_to(y, x + 0.5) - self.sum_to(y, x - 0.5);
         }
         let reach = radius.floor() as usize;
@@ -276,7 +284,7 @@ impl SharpGrid {
 
 /// The mean reflectance in [0, 1] under the spot of each LED, 32 x 32, row-major.
 ///
-/// This is the image that an ideal camera of this resolution would reconstruct.
+/// The image that an ideal camera of this resolution would reconstruct.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Footprint {
     weights: Vec<f32>,

@@ -1,4 +1,4 @@
-//! Rain and fog: what is in the air, and what it does to light.
+//! Rain and fog: the particles in the air, and their effects on light.
 //!
 //! | module | from | to |
 //! |---|---|---|
@@ -19,8 +19,9 @@
 //! | [`fso`] | rain rate | loss by laws fitted to optical links, an outside check |
 //! | [`radar`] | drops | differential reflectivity, an input of the paper's Algorithm 2 |
 //!
-//! Law: everything is a sum over the same list of drops ([`Drops`]), so that two results can only differ by physics,
-//! never by what it was assumed to rain. `docs/physics.md` in the repository derives and cites each formula.
+//! Every effect is a sum over the same list of drops ([`Drops`]), so two results differ by physics
+//! and not by their assumptions about the rain. `docs/physics.md` in the repository derives and
+//! cites each formula.
 
 pub mod air;
 pub mod backward;
@@ -59,26 +60,26 @@ use crate::mie::MieError;
 use crate::water::WavelengthError;
 use thiserror::Error;
 
-/// Why it cannot rain like this.
+/// Why the weather is not possible.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum RainError {
     /// A number is outside its physical or checked range.
     #[error("rain: {name} is {value}, expected {expected}")]
     Setting {
-        /// Which.
+        /// The name of the number.
         name: &'static str,
         /// The value found.
         value: f64,
-        /// What it may be.
+        /// The allowed values.
         expected: &'static str,
     },
     /// A measured distribution without drops.
     #[error("rain: no drop sizes given, expected at least one")]
     NoDrops,
-    /// A drop that the Mie solver was not checked for.
+    /// The Mie solver was not checked for this drop.
     #[error(transparent)]
     Mie(#[from] MieError),
-    /// A wavelength without an index of water.
+    /// The index of water is not known at this wavelength.
     #[error(transparent)]
     Wavelength(#[from] WavelengthError),
 }

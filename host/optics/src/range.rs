@@ -1,42 +1,44 @@
-//! How far the camera sees: the paper's Algorithm 2, as physics has it and as it is printed.
+//! The range of the camera by physics, and by the paper's Algorithm 2 as printed.
 //!
-//! Physics: the farthest distance at which one reconstructed pixel's signal reaches a multiple of its noise
-//! ([`crate::pixel`]).
+//! By physics, the range is the farthest distance at which one reconstructed pixel's signal reaches
+//! a multiple of its noise ([`crate::pixel`]).
 //!
-//! As printed: z grows in steps of `Z_max / 10`; at each step the source is multiplied by `exp(-alpha z)` *again*, so
-//! that after n steps it carries `exp(-alpha (z_1 + ... + z_n))`; it ends where the photons of one exposure of one LED
-//! fall to the noise floor of one exposure. That is the listing, and it leaves out that a picture is made of 2048
-//! exposures: a differential Hadamard transform gives a pixel `sqrt(N / 2)` times the SNR of one exposure.
-//! [`Floor`] names both readings. E(N) is given only by reference; ours is used. The factor A (which is infinite at z = 0 and has
-//! the dimension of a volume), Lambda, mu, Z_dr and the reflectivities are computed there and used nowhere. `beta` is
-//! a share of an exposure used as a coefficient per metre.
+//! As printed, z grows in steps of `Z_max / 10`. At each step the source is multiplied by
+//! `exp(-alpha z)` *again*, so after n steps its factor is `exp(-alpha (z_1 + ... + z_n))`. The
+//! algorithm ends where the photons of one exposure of one LED fall to the noise floor of one
+//! exposure. The listing leaves out that a picture has 2048 exposures: a differential Hadamard
+//! transform gives a pixel `sqrt(N / 2)` times the SNR of one exposure. [`Floor`] has both
+//! readings. The paper gives E(N) only by reference; nirspi's noise is used. The factor A (which is
+//! infinite at z = 0 and has the dimension of a volume), Lambda, mu, Z_dr and the reflectivities
+//! are computed in the listing and never used. `beta` is a share of an exposure, used as a
+//! coefficient per metre.
 
 use crate::pixel::{Instrument, PixelBudget, PixelError};
 use crate::rain::Weather;
 use crate::rain::fall::beta;
 
-/// Nearest distance looked at, in mm.
+/// Nearest distance of the search, in mm.
 pub const NEAREST_MM: f64 = 50.0;
 
-/// Farthest distance looked at, in mm.
+/// Farthest distance of the search, in mm.
 pub const FARTHEST_MM: f64 = 20_000.0;
 
 /// Steps of Algorithm 2: `Delta z = Z_max / 10`.
 const PRINTED_STEPS: usize = 10;
 
-/// What is asked of the camera.
+/// The requirements on a pixel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wanted {
     /// Reflectance of the target.
     pub reflectance: f64,
     /// Exposure of each pattern, in us.
     pub exposure_us: f64,
-    /// Signal of a pixel over its noise.
+    /// Signal of a pixel divided by its noise.
     pub snr: f64,
 }
 
-/// The farthest distance at which a pixel reaches the SNR wanted, in mm; none if it does not at [`NEAREST_MM`], and
-/// [`FARTHEST_MM`] if it still does there.
+/// The farthest distance at which a pixel reaches the required SNR, in mm; `None` if the SNR is not
+/// reached at [`NEAREST_MM`], and [`FARTHEST_MM`] if the SNR is still reached there.
 ///
 /// # Errors
 /// [`PixelError`] naming what is out of range.
@@ -54,7 +56,7 @@ pub fn farthest_mm(
     if !reaches(near)? {
         return Ok(None);
     }
-    // In dense air the farthest distances are refused, not dark.
+    // In dense air the farthest distances are errors, not dark images.
     if reaches(far).unwrap_or(false) {
         return Ok(Some(far));
     }
@@ -72,15 +74,15 @@ pub fn farthest_mm(
 /// The noise floor that Algorithm 2 compares the photons of one exposure with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Floor {
-    /// Of one exposure, as the listing has it.
+    /// The floor of one exposure, as in the listing.
     OneExposure,
-    /// Of the pixel that a differential Hadamard transform makes of all exposures: `sqrt(N / 2)` times lower. This factor
-    /// is ours; the listing does not have it.
+    /// The floor of the pixel that a differential Hadamard transform makes of all exposures, which
+    /// is `sqrt(N / 2)` times lower. This factor is nirspi's; the listing does not have it.
     WholePicture,
 }
 
-/// Algorithm 2 as printed, up to `z_max_mm`: the first step at which the photons of one exposure are no more than
-/// `wanted.snr` times the noise floor, or `z_max_mm`. `drop_mm` is its D.
+/// Algorithm 2 as printed, up to `z_max_mm`: the first step at which the photons of one exposure
+/// are at most `wanted.snr` times the noise floor, or `z_max_mm`. `drop_mm` is the listing's D.
 ///
 /// # Errors
 /// [`PixelError`] naming what is out of range.
@@ -99,7 +101,7 @@ pub fn as_printed_mm(
         let z_mm = z_max_mm * step as f64 / PRINTED_STEPS as f64;
         let z_m = z_mm * 1e-3;
         source *= (-alpha_per_m * z_m).exp();
-        // L_r, over the daylight of a white target: the drops' brightness.
+        // L_r, divided by the daylight of a white target: the drops' brightness.
         let faded = (-beta * z_m).exp();
         drops = drops * faded + (1.0 - faded);
         let pixel =
@@ -118,9 +120,9 @@ pub fn as_printed_mm(
     Ok(z_max_mm)
 }
 
-/// The exposure of a pattern, in us, with which a pixel at `distance_mm` reaches `snr`. Noise is the same in every sample, so that
-/// the SNR goes as the root of the exposure; signal falls as the square of the distance, so that the exposure grows as its fourth
-/// power.
+/// The exposure of a pattern, in us, with which a pixel at `distance_mm` reaches `snr`. Every
+/// sample has the same noise, so the SNR grows as the root of the exposure. The signal falls as the
+/// square of the distance, so the exposure grows as the fourth power of the distance.
 ///
 /// # Errors
 /// [`PixelError`] naming what is out of range.
@@ -134,8 +136,8 @@ pub fn exposure_needed_us(
     Ok((snr / pixel.pixel_snr).powi(2))
 }
 
-/// The extinction that this weather would need, per metre, for the camera to see no farther than `range_mm`; none if
-/// it does not see that far in dry air.
+/// The extinction, per metre, with which the camera's range in this weather would be `range_mm`;
+/// `None` if the range in dry air is smaller.
 ///
 /// # Errors
 /// [`PixelError`] naming what is out of range.
@@ -154,7 +156,7 @@ pub fn extinction_needed_per_m(
     if !reaches(0.0)? {
         return Ok(None);
     }
-    // Past the single-scattering limit the blur is no longer known: the answer is "at least".
+    // Above the single-scattering limit the blur is not known, so the result is a lower bound.
     let mut high = crate::rain::blur::DEEPEST_SINGLE / (range_mm * 1e-3);
     let mut low = 0.0;
     while high - low > 1e-5 {

@@ -1,47 +1,49 @@
 //! The rain simulator: how evenly its nozzles wet the ground (paper, section 4 and 4.A).
 //!
-//! The paper's rig: 1.2 x 0.6 x 0.5 m, six nozzles, can be tilted by 15 degrees. Where the nozzles are is not said
-//! ("strategically placed in a random arrangement"); the default is two rows of three.
+//! The paper's rig is 1.2 x 0.6 x 0.5 m with six nozzles and can be tilted by 15 degrees. The paper
+//! does not give the positions of the nozzles ("strategically placed in a random arrangement"); the
+//! default is two rows of three.
 
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, Normal, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 use thiserror::Error;
 
-/// Why there is no uniformity.
+/// Why the uniformity cannot be computed.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum RigError {
-    /// Fewer than two containers.
+    /// There are fewer than two containers.
     #[error("rain simulator: {0} collected volumes, expected at least 2")]
     TooFew(usize),
-    /// A volume that nothing can hold.
+    /// The volume of a container is not possible.
     #[error("rain simulator: volume {value} at place {place}, expected 0 or more")]
     Volume {
-        /// From 1.
+        /// Number of the container, from 1.
         place: usize,
         /// The value found.
         value: f64,
     },
-    /// Nothing was collected.
+    /// The containers are empty.
     #[error("rain simulator: all collected volumes are 0, expected some rain")]
     Dry,
     /// A setting is outside its range.
     #[error("rain simulator: {name} is {value}, expected {expected}")]
     Setting {
-        /// Which.
+        /// The name of the setting.
         name: &'static str,
         /// The value found.
         value: f64,
-        /// What it may be.
+        /// The allowed values.
         expected: &'static str,
     },
 }
 
-/// Christiansen's uniformity coefficient in percent, `100 (1 - sum |v - mean| / (n mean))` (Christiansen, *Irrigation
-/// by Sprinkling*, University of California bulletin 670, 1942). 100 is even; irrigation asks for over 80.
+/// Christiansen's uniformity coefficient in percent, `100 (1 - sum |v - mean| / (n mean))`
+/// (Christiansen, *Irrigation by Sprinkling*, University of California bulletin 670, 1942). 100 is
+/// even; irrigation needs more than 80.
 ///
 /// # Errors
-/// [`RigError`] for fewer than two volumes, negative ones, or none but zeros.
+/// [`RigError`] for fewer than two volumes, negative volumes, or only zeros.
 pub fn uniformity_percent(volumes: &[f64]) -> Result<f64, RigError> {
     if volumes.len() < 2 {
         return Err(RigError::TooFew(volumes.len()));
@@ -64,8 +66,8 @@ pub struct Rig {
     pub size_mm: [f64; 3],
     /// Nozzles seen from above, in mm from a corner, along length and width.
     pub nozzles_mm: Vec<[f64; 2]>,
-    /// Half of the angle into which a nozzle sprays, in degrees: drops leave in a Gaussian cone of this half-width at
-    /// half height. Assumed; the paper gives none.
+    /// Half of a nozzle's spray angle, in degrees: drops leave in a Gaussian cone of this
+    /// half-width at half height. Assumed, because the paper does not give the angle.
     pub spray_half_angle_deg: f64,
     /// Tilt of the floor along its length, in degrees.
     pub tilt_deg: f64,
@@ -89,8 +91,9 @@ impl Default for Rig {
 pub const STEEPEST_TILT_DEG: f64 = 15.0;
 
 impl Rig {
-    /// Drops collected in `columns` x `rows` equal containers that cover the floor, row by row, of `drops` that fall
-    /// from each nozzle. What misses the floor runs down the glass and is not collected. Seeded.
+    /// Drops collected in `columns` x `rows` equal containers that cover the floor, row by row.
+    /// `drops` fall from each nozzle. Drops that miss the floor run down the glass and are not
+    /// collected. Seeded.
     ///
     /// # Errors
     /// [`RigError::Setting`] naming the setting that is not physical.
@@ -125,7 +128,8 @@ impl Rig {
             for _ in 0..drops {
                 let [along, across]: [f64; 2] =
                     std::array::from_fn(|_| sigma * rng.sample::<f64, _>(StandardNormal));
-                // The tilted floor is met where height - slope x = fall, with x = nozzle + along * fall.
+                // A drop meets the tilted floor at height - slope x = fall, with x = nozzle + along
+                // * fall.
                 let fall = (height + slope * (length / 2.0 - nozzle[0])) / (1.0 + slope * along);
                 let (x, y) = (nozzle[0] + along * fall, nozzle[1] + across * fall);
                 let column = (x / length * columns as f64).floor();
@@ -138,7 +142,7 @@ impl Rig {
         Ok(volumes)
     }
 
-    /// The nozzles moved at random by `rms_mm` each way, as one builds them.
+    /// The nozzles moved at random by `rms_mm` in each direction, like those of a built rig.
     ///
     /// # Errors
     /// [`RigError::Setting`] if the distance is negative.

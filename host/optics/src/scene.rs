@@ -1,15 +1,18 @@
-//! The target: a square reflectance map lying on a plane that faces the camera.
+//! The target: a square reflectance map on a plane that faces the camera.
 //!
-//! Law: a [`Scene`] is always physical. Every reflectance is in [0, 1] and the side is a positive
-//! number of millimetres, because nothing else can be constructed. The mean over any rectangle is
-//! exact for the piecewise-constant map (a summed-area table), however small or large the rectangle.
+//! # Invariant
+//! A [`Scene`] is always physical: every reflectance is in [0, 1] and the side is a positive number
+//! of millimetres, because the constructor refuses anything else
+//! (`tests::bad_maps_are_refused_with_the_place_named`). The mean over any rectangle is exact for
+//! the piecewise-constant map (a summed-area table), for any size of the rectangle
+//! (`tests::a_mean_counts_parts_of_pixels_and_the_surround`).
 
 use thiserror::Error;
 
 /// Why a reflectance map is not a scene.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum SceneError {
-    /// The number of values is not that of a square with this side.
+    /// The number of values does not fit a square with this side.
     #[error(
         "scene: {found} reflectances given, {size_px} x {size_px} = {expected} expected",
         expected = .size_px.saturating_mul(*.size_px)
@@ -45,13 +48,13 @@ pub struct Scene {
     size_px: usize,
     side_mm: f64,
     surround: f32,
-    /// `(size_px + 1)^2` sums of all reflectances above and left of a pixel corner.
+    /// `(size_px + 1)^2` sums of all reflectances above and to the left of a pixel corner.
     summed: Vec<f64>,
 }
 
 impl Scene {
     /// A scene from `size_px` x `size_px` reflectances in [0, 1], row-major, top row first, that
-    /// covers `side_mm` x `side_mm` of the target plane. Around it the reflectance is 0 (see
+    /// covers `side_mm` x `side_mm` of the target plane. The reflectance around the scene is 0 (see
     /// [`Scene::with_surround`]).
     ///
     /// # Errors
@@ -75,7 +78,7 @@ impl Scene {
         Ok(Self { reflectance, size_px, side_mm, surround: 0.0, summed })
     }
 
-    /// A white sheet without end: reflectance 1 everywhere.
+    /// An infinite white sheet with reflectance 1.
     #[must_use]
     pub fn white() -> Self {
         let reflectance = vec![1.0];
@@ -86,7 +89,7 @@ impl Scene {
     /// The same scene in front of a background of reflectance `surround`.
     ///
     /// # Errors
-    /// [`SceneError::Surround`] if it is not in [0, 1].
+    /// [`SceneError::Surround`] if the reflectance is not in [0, 1].
     pub fn with_surround(mut self, surround: f32) -> Result<Self, SceneError> {
         if !(0.0..=1.0).contains(&surround) {
             return Err(SceneError::Surround(surround));

@@ -1,4 +1,4 @@
-//! What particles in the air are made of: the complex refractive index by wavelength.
+//! The material of particles in the air: the complex refractive index by wavelength.
 
 use crate::mie::Index;
 use crate::water::{Water, WavelengthError};
@@ -8,10 +8,10 @@ use crate::water::{Water, WavelengthError};
 pub enum Substance {
     /// Liquid water.
     Water(Water),
-    /// Soot of flames, by the dispersion formula of Chang and Charalampopoulos (Proc. R. Soc. A 430, 577, 1990;
-    /// measured from 0.4 to 30 um).
+    /// Soot of flames, by the dispersion formula of Chang and Charalampopoulos (Proc. R. Soc. A
+    /// 430, 577, 1990; measured from 0.4 to 30 um).
     Soot,
-    /// One index at every wavelength, as somebody measured or assumed it.
+    /// One measured or assumed index at every wavelength.
     Fixed(Index),
 }
 
@@ -31,12 +31,12 @@ impl Substance {
     /// The index at a wavelength.
     ///
     /// # Errors
-    /// [`WavelengthError`] for water outside its tables. Soot is held to the same wavelengths.
+    /// [`WavelengthError`] for water outside its tables. The same limits apply to soot.
     pub fn index(self, wavelength_nm: f64) -> Result<Index, WavelengthError> {
         match self {
             Self::Water(table) => table.index(wavelength_nm),
             Self::Soot => {
-                // Refuses what the formula was not measured for.
+                // Refuses wavelengths for which the formula was not measured.
                 Water::default().index(wavelength_nm)?;
                 let l = (wavelength_nm * 1e-3).ln();
                 Ok(Index {

@@ -1,12 +1,12 @@
 //! An ordinary camera in daylight, for comparison: the visible ("VIS") rows of the paper's tables.
 //!
-//! The same field, grid of 32 x 32, distance, daylight and drops as the single-pixel camera has, so that what differs
-//! is the light and not the geometry. The paper does not say which camera it used; this is a small industrial one,
-//! focused on the target.
+//! Field, grid of 32 x 32, distance, daylight and drops are those of the single-pixel camera, so
+//! that only the light differs and not the geometry. The paper does not name its camera; this is a
+//! small industrial camera, focused on the target.
 //!
-//! A drop before a pixel shows a wide view of the surroundings instead of what is behind it, 0.94 as bright as they
-//! are on average (Garg and Nayar, Int. J. Comput. Vis. 75, 3, 2007). The surroundings are a sky as bright as a white
-//! target.
+//! A drop in front of a pixel shows a wide view of the surroundings instead of the target behind
+//! the drop, with 0.94 of the average brightness of the surroundings (Garg and Nayar, Int. J.
+//! Comput. Vis. 75, 3, 2007). The surroundings are a sky as bright as a white target.
 
 use crate::rain::{Air, BeamShadows, Drops, FallingDrops, RainError};
 use crate::{LEDS, Projector, ProjectorError, Scene};
@@ -15,7 +15,7 @@ use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 use thiserror::Error;
 
-/// Brightness of a drop over that of its surroundings.
+/// Brightness of a drop divided by that of its surroundings.
 const DROP_BRIGHTNESS: f64 = 0.94;
 
 /// Energy of a photon at 555 nm, where a watt is 683 lumen, in J.
@@ -24,13 +24,13 @@ const PHOTON_J: f64 = 3.579e-19;
 /// Lumen per watt at 555 nm (SI, exact).
 const LUMEN_PER_WATT: f64 = 683.0;
 
-/// Wavelength at which fog, smoke and dust are judged, in nm.
+/// Wavelength for computing fog, smoke and dust, in nm.
 const WAVELENGTH_NM: f64 = 550.0;
 
-/// Looks at the drops during one exposure.
+/// Number of updates of the drops during one exposure.
 const LOOKS: usize = 8;
 
-/// Why there is no picture.
+/// Why the picture cannot be computed.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum VisibleError {
     /// Scene or distance.
@@ -52,7 +52,7 @@ pub struct VisibleCamera {
     pub pixel_um: f64,
     /// Electrons per photon.
     pub quantum_efficiency: f64,
-    /// Electrons that a white target is exposed for, of a full well of about 10 000.
+    /// Electrons of a white target, of a full well of about 10 000.
     pub white_electrons: f64,
     /// Read noise, in electrons rms.
     pub read_noise_electrons: f64,
@@ -75,7 +75,8 @@ impl Default for VisibleCamera {
 }
 
 impl VisibleCamera {
-    /// Exposure that a white target needs, in s: illuminance on the sensor is `E / (4 N^2)` (glass of 0.9).
+    /// Exposure that a white target needs, in s. The illuminance on the sensor is `E / (4 N^2)`
+    /// (glass of 0.9).
     #[must_use]
     pub fn exposure_s(&self) -> f64 {
         let on_sensor_lx = self.daylight_klx * 1e3 * 0.9 / (4.0 * self.f_number.powi(2));
@@ -84,11 +85,11 @@ impl VisibleCamera {
         self.white_electrons / (photons_per_m2_s * area_m2 * self.quantum_efficiency)
     }
 
-    /// A picture of `scene` at `distance_mm` in this weather, 32 x 32 over the field of `projector`: reflectance as the
-    /// camera would report it, white being 1. Seeded.
+    /// A picture of `scene` at `distance_mm` in this weather, 32 x 32 over the field of
+    /// `projector`: reflectance as reported by the camera, with white as 1. Seeded.
     ///
     /// # Errors
-    /// [`VisibleError`] for a distance or rain that cannot be.
+    /// [`VisibleError`] for a distance or rain that is not possible.
     pub fn picture(
         &self,
         scene: &Scene,
@@ -97,7 +98,8 @@ impl VisibleCamera {
         air: &Air,
         seed: u64,
     ) -> Result<Vec<f32>, VisibleError> {
-        // Sharp where the projector is out of focus: it is focused on the target.
+        // The picture is sharp where the projector is out of focus, because the camera is focused
+        // on the target.
         let sharp =
             Projector { aperture_mm: 1e-3, emitter_mm: projector.led_pitch_mm, ..*projector };
         let footprint = sharp.footprint(scene, distance_mm)?;
@@ -110,7 +112,7 @@ impl VisibleCamera {
         let field_mm = projector.field_mm(distance_mm);
         let hanging = air.hanging(WAVELENGTH_NM)?;
         let through = hanging.by_daylight(footprint.weights(), distance_mm, field_mm)?;
-        // What hangs in the air is too much to be followed, and is in `through` already.
+        // Droplets that stay in the air are too many to simulate, and are already in `through`.
         let drops = if air.drops().fall() { air.drops().clone() } else { Drops::none() };
         let mut falling = FallingDrops::new(&drops, beams, seed)?;
         let mut seen = vec![0.0; LEDS];

@@ -1,11 +1,14 @@
 //! The complex refractive index of liquid water from 0.4 to 2 um.
 //!
-//! Two published tables, copied digit for digit by `scripts/water_tables.py`; both say 25 degrees C. Segelstein's is
-//! the denser one (222 rows here against 30) and the default everywhere; Hale and Querry's has one row every 200 nm
-//! past 1 um and misses the shape of the absorption band at 1.45 um.
+//! Two published tables, copied digit for digit by `scripts/water_tables.py`; both are for 25
+//! degrees C. Segelstein's table is denser (222 rows here, against 30) and the default. Hale and
+//! Querry's table has one row every 200 nm above 1 um and misses the shape of the absorption band
+//! at 1.45 um.
 //!
-//! Law: no number is made up. Between rows n is linear and ln k is linear in ln(wavelength); outside the tables there
-//! is an error.
+//! # Invariant
+//! Every index comes from a table. Between rows, n is linear and ln k is linear in ln(wavelength)
+//! (`tests::an_index_lies_between_its_neighbouring_rows`). Wavelengths outside the tables are an
+//! error (`tests::other_wavelengths_are_refused_with_the_range`).
 
 mod hale;
 mod segelstein;
@@ -18,11 +21,11 @@ use thiserror::Error;
 /// Wavelengths covered, in nm.
 pub const WAVELENGTHS_NM: RangeInclusive<f64> = 400.0..=2000.0;
 
-/// A wavelength without a table row.
+/// Error: the tables do not cover the wavelength.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 #[error("water: wavelength is {found_nm} nm, expected 400 to 2000 nm")]
 pub struct WavelengthError {
-    /// What was asked for.
+    /// The requested wavelength.
     pub found_nm: f64,
 }
 
@@ -89,7 +92,7 @@ mod tests {
     #[test]
     fn water_absorbs_some_250_times_more_at_1550_nm_than_at_850() {
         let at = |nm| Water::Segelstein.absorption_per_cm(nm).unwrap();
-        // DESIGN section 10: about 10.8 and 0.04 per cm.
+        // Expected are about 10.8 and 0.04 per cm.
         assert!((at(1550.0) - 10.8).abs() < 0.3, "{}", at(1550.0));
         assert!((at(850.0) - 0.042).abs() < 0.003, "{}", at(850.0));
     }

@@ -24,14 +24,15 @@ use thiserror::Error;
 pub enum Basis {
     /// Single pixels.
     Pixel,
-    /// 2-D discrete cosine transform (type II; N. Ahmed et al., *Discrete cosine transform*, 1974). Atom
-    /// `n * u + v` has `u` half periods down and `v` across.
+    /// 2-D discrete cosine transform (type II; N. Ahmed et al., *Discrete cosine transform*, 1974).
+    /// Atom `n * u + v` has `u` half periods down and `v` across.
     Dct,
-    /// 2-D Haar wavelets (S. Mallat's square pyramid, *A theory for multiresolution signal decomposition*, 1989;
-    /// A. Haar, 1910).
+    /// 2-D Haar wavelets (S. Mallat's square pyramid, *A theory for multiresolution signal
+    /// decomposition*, 1989; A. Haar, 1910).
     Haar,
-    /// 2-D Daubechies wavelets of four taps and two vanishing moments, in the same pyramid (I. Daubechies,
-    /// *Orthonormal bases of compactly supported wavelets*, 1988). Coefficients are numbered as Haar's are.
+    /// 2-D Daubechies wavelets of four taps and two vanishing moments, in the same pyramid (I.
+    /// Daubechies, *Orthonormal bases of compactly supported wavelets*, 1988). Coefficients are
+    /// numbered as Haar's are.
     Daubechies4,
 }
 
@@ -186,7 +187,8 @@ impl Transform {
     }
 }
 
-/// Adds `a * b` to `out`, all row-major, `a` with `inner` columns (an even number) and `b` with `columns`.
+/// Adds `a * b` to `out`, all row-major, `a` with `inner` columns (an even number) and `b` with
+/// `columns`.
 pub(crate) fn product(inner: usize, columns: usize, a: &[f32], b: &[f32], out: &mut [f32]) {
     Arch::new().dispatch(Product { inner, columns, a, b, out });
 }

@@ -2,7 +2,8 @@
 
 use crate::Side;
 
-/// An `n x n` image of reflectance in the measurement's own units (not scaled to `[0, 1]`), row-major.
+/// An `n x n` image of reflectance in the measurement's own units (not scaled to `[0, 1]`),
+/// row-major.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Image {
     side: Side,

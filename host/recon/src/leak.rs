@@ -12,12 +12,13 @@
 //! darkness.
 //!
 //! # Differential pairs
-//! Pattern and complement alternate, `x[2k] = (S + h[k]) / 2` and `x[2k+1] = (S - h[k]) / 2`, where `S` is the light
-//! of the pair. In `d[k] = y[2k] - y[2k+1]`, `h[k-m]` arrives in `y[2k]` through the taps `2m` (from the pattern, sign
-//! +) and `2m - 1` (from the complement, sign -), and in `y[2k+1]` through `2m` (complement, -) and `2m + 1`
-//! (pattern, +), each with a factor 1/2. Hence
+//! Pattern and complement alternate, `x[2k] = (S + h[k]) / 2` and `x[2k+1] = (S - h[k]) / 2`, where
+//! `S` is the light of the pair. In `d[k] = y[2k] - y[2k+1]`, `h[k-m]` arrives in `y[2k]` through
+//! the taps `2m` (from the pattern, sign +) and `2m - 1` (from the complement, sign -), and in
+//! `y[2k+1]` through `2m` (complement, -) and `2m + 1` (pattern, +), each with a factor 1/2. Hence
 //!
-//! `d[k] = sum_m c[m] h[k - m]`, with `c[m] = r[2m] - r[2m-1] / 2 - r[2m+1] / 2` (taps outside the list are 0).
+//! `d[k] = sum_m c[m] h[k - m]`, with `c[m] = r[2m] - r[2m-1] / 2 - r[2m+1] / 2` (taps outside the
+//! list are 0).
 //!
 //! `S` cancels in a repeating sweep. In a sweep that starts from darkness, pair `k` also has the
 //! term `-S r[2k+1] / 2`: the light that its complement got from the first pattern, while its

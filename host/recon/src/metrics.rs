@@ -98,8 +98,8 @@ impl<'a> Pair<'a> {
     }
 }
 
-/// Peak signal-to-noise ratio in dB, `10 log10(data_range^2 / mean squared error)`; infinite for equal images.
-/// Both images are `width x height`, row-major.
+/// Peak signal-to-noise ratio in dB, `10 log10(data_range^2 / mean squared error)`; infinite for
+/// equal images. Both images are `width x height`, row-major.
 ///
 /// # Errors
 /// [`MetricError`] if a length is wrong, a value is not finite, there are no pixels, or
@@ -154,7 +154,8 @@ const WINDOW_SIGMA: f64 = 1.5;
 const K1: f64 = 0.01;
 const K2: f64 = 0.03;
 
-/// Structural similarity, at most 1. Both images are `width x height`, row-major, of values that span `data_range`.
+/// Structural similarity, at most 1. Both images are `width x height`, row-major, of values that
+/// span `data_range`.
 ///
 /// # Errors
 /// [`MetricError`] if a length is wrong, a value is not finite, an image is smaller than the 11 x

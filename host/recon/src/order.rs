@@ -1,16 +1,17 @@
 //! The order in which Hadamard patterns are shown.
 //!
-//! A new order is a variant of [`Order`], an entry of [`Order::NAMED`] with the function that makes its rows, and a line of
-//! the table below. Parsers, help texts and comparisons follow from the entry.
+//! A new order is a variant of [`Order`], an entry of [`Order::NAMED`] with the function that makes
+//! its rows, and a line of the table below. Parsers, help texts and comparisons follow from the
+//! entry.
 //!
 //! # Invariant
-//! [`Order::rows`] is a permutation of `0..n^2`, whose k-th entry is the row of the natural-order Hadamard matrix shown
-//! k-th. Held by `order::tests::every_order_is_a_permutation_at_every_side`.
+//! [`Order::rows`] is a permutation of `0..n^2`, whose k-th entry is the row of the natural-order
+//! Hadamard matrix shown k-th. Held by `order::tests::every_order_is_a_permutation_at_every_side`.
 //!
-//! Row `r = n * r_hi + r_lo` is the pattern `w(r_hi) (x) w(r_lo)`: the 1-D Walsh function `w(r_hi)` down
-//! the image times `w(r_lo)` across it. `s(r)` below is the *sequency* of a 1-D function, its number of sign
-//! changes; `i = s(r_hi)`, `j = s(r_lo)`. A 1-D function has `s + 1` runs of equal sign. Every tie is
-//! broken by the smaller natural row.
+//! Row `r = n * r_hi + r_lo` is the pattern `w(r_hi) (x) w(r_lo)`: the 1-D Walsh function `w(r_hi)`
+//! down the image times `w(r_lo)` across it. `s(r)` below is the *sequency* of a 1-D function, its
+//! number of sign changes; `i = s(r_hi)`, `j = s(r_lo)`. A 1-D function has `s + 1` runs of equal
+//! sign. Every tie is broken by the smaller natural row.
 //!
 //! | order | definition followed | source |
 //! |---|---|---|
@@ -28,9 +29,10 @@
 //! | `deepinv:zig_zag` | anti-diagonals, `i` falling along each | the same, `"zig_zag"` |
 //! | `deepinv:xy` | ascending `i j + (i^2 + j^2) / 4`; its ties are not defined | the same, `"xy"` |
 //!
-//! Other programs use some of these names for other orders; compare tables, not names. SPyRiT's `define_order` (TV, CC, Sequency,
-//! Variance) is no order that can be named: it leaves ties, the all-ones pattern's among them, to PyTorch's unstable sort, and
-//! `Variance` comes from measured images. Such an order is given as a table.
+//! Other programs use some of these names for other orders; compare tables, not names. SPyRiT's
+//! `define_order` (TV, CC, Sequency, Variance) is no order that can be named: it leaves ties, the
+//! all-ones pattern's among them, to PyTorch's unstable sort, and `Variance` comes from measured
+//! images. Such an order is given as a table.
 
 use crate::{Rows, RowsError, Side};
 use rand::Rng;
@@ -40,7 +42,8 @@ use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;
 
-/// An order of the `n^2` patterns of a sweep. The module's table says which definition each one follows.
+/// An order of the `n^2` patterns of a sweep. The module's table says which definition each one
+/// follows.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Order {
@@ -83,13 +86,15 @@ pub struct NamedOrder {
     pub order: Order,
     /// The package whose definition it is, if it is another one's.
     pub package: Option<&'static str>,
-    /// Whether that package leaves the order of equal patterns to an unstable sort: its files may have equal ones exchanged.
+    /// Whether that package leaves the order of equal patterns to an unstable sort: its files may
+    /// have equal ones exchanged.
     pub has_undefined_ties: bool,
     rows: fn(Side) -> Vec<u32>,
 }
 
 impl Order {
-    /// Every order that has a name. Argument parsers, error texts and comparisons take their lists from here.
+    /// Every order that has a name. Argument parsers, error texts and comparisons take their lists
+    /// from here.
     pub const NAMED: &'static [NamedOrder] = &[
         NamedOrder {
             name: "natural",
@@ -181,7 +186,8 @@ impl Order {
         },
     ];
 
-    /// What [`Order::from_str`] reads, as a list for messages: `natural, sequency, ... or random:SEED`.
+    /// What [`Order::from_str`] reads, as a list for messages: `natural, sequency, ... or
+    /// random:SEED`.
     #[must_use]
     pub fn expected() -> String {
         let names: Vec<&str> = Self::NAMED.iter().map(|named| named.name).collect();

@@ -68,7 +68,8 @@ impl Rows {
     /// Checks rows in the order in which they are shown.
     ///
     /// # Errors
-    /// [`RowsError`] names the first row that is out of range or repeated, or says that the list is empty.
+    /// [`RowsError`] names the first row that is out of range or repeated, or says that the list is
+    /// empty.
     pub fn new<R: Into<i64>>(
         side: Side,
         rows: impl IntoIterator<Item = R>,

@@ -1,44 +1,46 @@
-//! One board, as `boards/NAME/board.toml` describes it. The library uses this file, and so does its build script,
-//! so a wrong `board.toml` stops the build.
+//! One board, as described in `boards/NAME/board.toml`. The library and its build script both use
+//! this file, so a wrong `board.toml` stops the build.
 //!
-//! `board.toml` is TOML of the simplest form, which a shell script can read too (`boards/facts.sh`): one
-//! `key = value` a line, the value a `"text"` or a whole number, a comment on a line of its own.
+//! `board.toml` is TOML of the simplest form, which a shell script can read too
+//! (`boards/facts.sh`): one `key = value` a line. A value is a `"text"` or a whole number. A
+//! comment has its own line.
 
 /// A board under `boards/`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Board {
-    /// The name of its folder, its package and its program, and its name on the wire.
+    /// The name of the board's folder, package and program, and its name on the wire.
     pub name: &'static str,
-    /// What people call it.
+    /// The title of the board for users.
     pub title: &'static str,
     /// Its microcontroller, or the core that an emulator runs.
     pub processor: &'static str,
-    /// Its chip as probe-rs spells it; `None`: the board is emulated, and there is nothing to flash.
+    /// The chip's name in probe-rs; `None` for an emulated board, which has no flash to program.
     pub chip: Option<&'static str>,
     /// The Rust target of its firmware.
     pub target: &'static str,
-    /// How it talks to the host.
+    /// The link to the host.
     pub host_link: &'static str,
-    /// How it talks to the FPGA.
+    /// The link to the FPGA.
     pub fpga_link: &'static str,
-    /// What has been tried with it.
+    /// What has been tested with the board.
     pub state: &'static str,
-    /// The most flash that its firmware may take.
+    /// The most flash that its firmware may use.
     pub flash_bytes: u64,
-    /// The most static memory that its firmware may take.
+    /// The most static memory that its firmware may use.
     pub static_bytes: u64,
     /// The least room for the stack.
     pub stack_bytes: u64,
-    /// Its pins; `None` where it is emulated.
+    /// Its pins; `None` for an emulated board.
     pub pins: Option<Pins>,
 }
 
-/// What tests have to know to check a board's pin table (`src/pins.rs`).
+/// The properties with which tests check a board's pin table (`src/pins.rs`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Pins {
-    /// Wires to the FPGA: the host port and its ready lines.
+    /// Number of wires to the FPGA: the host port and its ready lines.
     pub fpga_wires: u64,
-    /// How its code names a pin, with `{port}` (one letter, if there are ports) and `{number}`.
+    /// The name of a pin in the board's code, with `{port}` (one letter, if there are ports) and
+    /// `{number}`.
     pub pin_name: &'static str,
     /// The statement that pulls the pin `led_enable` low, with `{port}` and `{number}` of that pin.
     pub led_enable_low: &'static str,
@@ -122,7 +124,7 @@ impl Table {
     }
 }
 
-/// `"text"` or `12_345`.
+/// The value `"text"` or `12_345`.
 fn value(text: &'static str) -> Option<Value> {
     if let Some(text) = text.strip_prefix('"') {
         let text = text.strip_suffix('"')?;
@@ -135,7 +137,7 @@ impl Board {
     /// Reads the text of `boards/NAME/board.toml`.
     ///
     /// # Errors
-    /// One line with the file, what is wrong, and what was expected.
+    /// One line with the file, the problem, and what was expected.
     pub fn parse(name: &'static str, text: &'static str) -> Result<Self, String> {
         let table = Table::read(name, text)?;
         let is_hardware = match table.text("kind")? {

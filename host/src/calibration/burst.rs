@@ -1,16 +1,18 @@
 //! ADC latency and settling response, measured from a raw burst.
 //!
-//! All LEDs go on and off every [`HALF_PERIOD`] ADC clocks (pattern 0 and its complement). The mean of the
-//! periods is the camera's step response `s[n]`, `n` clocks after the step: 0 before the light has passed
-//! LEDs, amplifier and ADC, 1 when all has settled. The clock at which it leaves 0 is the latency. What a
-//! pattern leaves in the slots after it (the leak) follows for any dwell and blanking.
+//! All LEDs go on and off every [`HALF_PERIOD`] ADC clocks (pattern 0 and its complement). The mean
+//! of the periods is the camera's step response `s[n]`, `n` clocks after the step: 0 before the
+//! light has passed LEDs, amplifier and ADC, and 1 when the light has settled. The clock at which
+//! the response leaves 0 is the latency. The leak, a pattern's light in later slots, follows from
+//! the response for any dwell and blanking.
 //!
-//! Latency and response belong to the instrument, not to what it looks at: they are measured once, against a white sheet,
-//! and kept ([`KeptCalibration`](super::KeptCalibration)).
+//! Latency and response belong to the instrument and not to the scene. Both are measured once,
+//! against a white sheet, and kept ([`KeptCalibration`](super::KeptCalibration)).
 //!
 //! # Invariant
 //! A burst that does not show the latency is an error and never a latency of 0
-//! (`a_burst_too_dim_or_without_an_edge_is_an_error`): with a wrong latency every picture is wrong, most of them inverted.
+//! (`tests::a_burst_too_dim_or_without_an_edge_is_an_error`). With a wrong latency every picture is
+//! wrong, and most pictures are inverted.
 
 use crate::session::{Listener, Session, SessionError, request};
 use crate::setup::MeasurementSetup;
@@ -23,29 +25,30 @@ use thiserror::Error;
 
 /// Clocks that the LEDs stay on, and off, in the calibration burst: 1 us.
 pub const HALF_PERIOD: u16 = 128;
-/// The step must stand out of the noise of its mean by this factor.
+/// The step must exceed the noise of its mean by this factor.
 const MIN_STEP_TO_NOISE: f64 = 20.0;
-/// The response has left zero when it is above this share of the step.
+/// The response has left zero when it exceeds this share of the step.
 pub(crate) const ONSET: f64 = 0.05;
-/// The response has settled where the mean of this many samples is within its noise of 1.
+/// The response has settled when the mean of this many samples is within its noise of 1.
 const SETTLED_SAMPLES: usize = 4;
-/// How often a camera whose burst has not come whole is asked whether it is still at it.
+/// Interval at which a camera with an incomplete burst is asked whether it still sends samples.
 const ASK_EVERY: Duration = Duration::from_millis(500);
-/// A burst of which no new sample comes for this long will not come whole, whatever the camera says.
+/// A burst without a new sample for this long is incomplete, whatever the camera reports.
 const STALLED: Duration = Duration::from_secs(30);
-/// Bursts that are averaged: 2 ms of light bring the taps' noise to about a thousandth.
+/// Number of averaged bursts: 2 ms of light reduce the noise of the taps to about a thousandth.
 pub const BURSTS: usize = 64;
 
 /// The measured response of LEDs, amplifier and ADC.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Settling {
-    /// Whole clocks from light to sample.
+    /// Latency from light to sample, in whole clocks.
     pub adc_latency: u8,
-    /// Step response by clock, from the first sample that shows the step to where it has settled at 1.
+    /// Step response by clock, from the first sample that shows the step to the sample that has
+    /// settled at 1.
     pub response: Vec<f64>,
-    /// What a sample reads with all LEDs off: daylight and the ADC's offset.
+    /// Reading of a sample with all LEDs off: daylight and the ADC's offset.
     pub dark_counts: f64,
-    /// All LEDs on, less all off.
+    /// Reading with all LEDs on, minus the reading with all LEDs off.
     pub step_counts: f64,
     /// Standard deviation of one sample.
     pub noise_counts: f64,
@@ -54,27 +57,27 @@ pub struct Settling {
 /// Why a burst gives no calibration.
 #[derive(Debug, Error)]
 pub enum CalibrationError {
-    /// The conversation ended.
+    /// The session with the camera ended.
     #[error(transparent)]
     Session(#[from] SessionError),
-    /// The user has stopped it.
+    /// The user stopped the calibration.
     #[error("stopped by the user while the camera was being calibrated")]
     Stopped,
-    /// Not all of the burst came.
+    /// Samples of the burst are missing.
     #[error("only {found} of {expected} samples of the calibration burst came")]
     Incomplete {
         /// Samples received.
         found: usize,
-        /// Samples asked for.
+        /// Samples requested.
         expected: usize,
     },
-    /// Too little light comes back.
+    /// Too little light reaches the detector.
     #[error(
         "the calibration burst is too dim to show the ADC latency: a step of {step_counts:.1} ADC counts with a noise of \
          {noise_counts:.1}"
     )]
     NoStep {
-        /// All LEDs on, less all off.
+        /// Reading with all LEDs on, minus the reading with all LEDs off.
         step_counts: f64,
         /// Standard deviation of one sample.
         noise_counts: f64,
@@ -86,7 +89,7 @@ pub enum CalibrationError {
     NoEdge,
 }
 
-/// The setup under which the burst is taken.
+/// The setup for the burst.
 fn burst_setup() -> MeasurementSetup {
     MeasurementSetup {
         order: "calibration".to_owned(),
@@ -101,7 +104,7 @@ fn burst_setup() -> MeasurementSetup {
 
 struct BurstListener<'l> {
     samples: Vec<Option<u16>>,
-    /// When the last sample came that had not come before.
+    /// Time at which the last new sample arrived.
     progressed: Instant,
     inner: &'l mut dyn Listener,
 }
@@ -125,8 +128,9 @@ impl BurstListener<'_> {
         self.samples.iter().all(Option::is_some)
     }
 
-    /// Until all samples are there, or the camera says that no more will come. What it has sent before it says so comes
-    /// before, so a camera on a slow line or a busy machine is as good as any, as long as samples come.
+    /// Waits until all samples have arrived, or the camera reports that it sends no more. A camera
+    /// sends its samples before this report. A slow line or a busy machine is therefore harmless,
+    /// as long as samples arrive.
     fn await_end(&mut self, session: &mut Session) -> Result<(), CalibrationError> {
         let mut state = State::Running;
         while !self.is_whole() && state == State::Running && self.progressed.elapsed() < STALLED {
@@ -145,11 +149,11 @@ impl BurstListener<'_> {
     }
 }
 
-/// Takes raw bursts and evaluates their mean. The camera must be idle or configured; it is left configured for the
-/// burst.
+/// Takes raw bursts and evaluates their mean. The camera must be idle or configured, and stays
+/// configured for the burst.
 ///
 /// # Errors
-/// [`CalibrationError`], where the burst does not show latency and response.
+/// [`CalibrationError`] if the burst does not show latency and response.
 pub fn calibrate(
     session: &mut Session,
     listener: &mut dyn Listener,
@@ -157,11 +161,12 @@ pub fn calibrate(
     evaluate(&bursts(session, listener)?)
 }
 
-/// As [`calibrate`], with `known` as measured before: where the burst is too dim to show latency and response, they are
-/// those of `known`, with the dark level and the step of this burst. The error that `known` stood in for comes with it.
+/// As [`calibrate`], with an earlier calibration `known`. If the burst is too dim to show latency
+/// and response, the result has the latency and response of `known` with the dark level and the
+/// step of this burst, and the error is returned with the result.
 ///
 /// # Errors
-/// [`CalibrationError`], where the burst does not come.
+/// [`CalibrationError`] if the burst does not arrive.
 pub fn calibrate_or(
     session: &mut Session,
     listener: &mut dyn Listener,
@@ -197,11 +202,11 @@ fn bursts(
     Ok(samples)
 }
 
-/// The mean of all periods but the first of each burst.
+/// The mean of all periods except the first period of each burst.
 struct MeanPeriod {
     /// ADC counts by clock.
     counts: Vec<f64>,
-    /// How many periods it is the mean of.
+    /// Number of periods in the mean.
     periods: f64,
     /// Standard deviation of one sample.
     noise_counts: f64,
@@ -232,7 +237,7 @@ fn evaluate(samples: &[f64]) -> Result<Settling, CalibrationError> {
     let period = 2 * half;
     let MeanPeriod { counts: mean, periods: count, noise_counts } = MeanPeriod::of(samples);
 
-    // The response is periodic, so its extremes are the settled levels wherever the latency puts them.
+    // The response is periodic, so its extremes are the settled levels at any latency.
     let settled = 16;
     let level = |from: usize| -> f64 {
         (0..settled).map(|n| mean[(from + n) % period]).sum::<f64>() / settled as f64
@@ -245,7 +250,7 @@ fn evaluate(samples: &[f64]) -> Result<Settling, CalibrationError> {
         return Err(CalibrationError::NoStep { step_counts, noise_counts });
     }
 
-    // On and off must mirror each other in a linear chain; their mean halves the noise.
+    // In a linear chain the responses to on and off mirror each other; their mean halves the noise.
     let response_at = |n: usize| {
         let on = (mean[n % period] - low) / step_counts;
         let off = (mean[(n + half) % period] - low) / step_counts;
@@ -256,7 +261,8 @@ fn evaluate(samples: &[f64]) -> Result<Settling, CalibrationError> {
         .find(|&n| response_at(n) > onset && response_at((n + period - 1) % period) <= onset)
         .ok_or(CalibrationError::NoEdge)?;
     let mut response: Vec<f64> = (0..half).map(|n| response_at(latency + n)).collect();
-    // Past the point where it has settled, a response is noise: every tap made of that would add to the image's.
+    // After the response has settled, it contains only noise. Each further tap would add its noise
+    // to the image.
     let noise_of_response = noise_of_mean / step_counts / std::f64::consts::SQRT_2;
     let noise_of_window = noise_of_response / (SETTLED_SAMPLES as f64).sqrt();
     let settled = response.windows(SETTLED_SAMPLES).position(|window| {
@@ -271,11 +277,11 @@ fn evaluate(samples: &[f64]) -> Result<Settling, CalibrationError> {
 }
 
 impl Settling {
-    /// The same latency and response, with dark level, step and noise of these samples of a burst.
+    /// The same latency and response, with dark level, step and noise of these samples.
     fn at_levels_of(&self, samples: &[f64]) -> Self {
         let half = usize::from(HALF_PERIOD);
         let MeanPeriod { counts, noise_counts, .. } = MeanPeriod::of(samples);
-        // From where the response has settled to where the next one begins.
+        // The range from the settled response to the start of the next response.
         let settled = self.response.len().min(half - 1);
         let level = |step: usize| {
             let at = |n: usize| counts[(usize::from(self.adc_latency) + step + n) % counts.len()];
@@ -285,10 +291,10 @@ impl Settling {
         Self { dark_counts: off, step_counts: on - off, noise_counts, ..self.clone() }
     }
 
-    /// Share of a slot's light that is read in its own slot and in each one after it.
+    /// Shares of a slot's light that are read in its own slot and in each later slot.
     ///
     /// # Errors
-    /// If nothing, or next to nothing, of a slot's light is read in its own slot.
+    /// If almost none of a slot's light is read in its own slot.
     pub fn leak(&self, clocks_per_pattern: u16, blanked: u16) -> Result<Leak, LeakError> {
         let dwell = i64::from(clocks_per_pattern);
         let step = |n: i64| -> f64 {
@@ -306,7 +312,7 @@ impl Settling {
                 window.clone().map(passed).sum::<f64>() / samples
             })
             .collect();
-        // The slots after the response's last sample hold nothing.
+        // Slots after the response's last sample contain no light.
         while taps.len() > 1 && taps.last() == Some(&0.0) {
             taps.pop();
         }
@@ -363,7 +369,8 @@ mod tests {
     fn a_burst_too_dim_or_without_an_edge_is_an_error() {
         let dark = vec![200.0; usize::from(RAW_SAMPLES_MAX)];
         assert!(matches!(evaluate(&dark), Err(CalibrationError::NoStep { .. })));
-        // Light that goes on and off twice as fast as the LEDs: on and off do not mirror each other.
+        // Light that goes on and off twice as fast as the LEDs: the responses to on and off do not
+        // mirror each other.
         let flicker: Vec<f64> =
             (0..dark.len()).map(|n| if n / 64 % 2 == 0 { 9000.0 } else { 200.0 }).collect();
         assert!(matches!(evaluate(&flicker), Err(CalibrationError::NoEdge)));

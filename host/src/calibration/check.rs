@@ -1,4 +1,4 @@
-//! A calibration that was read back must be one that a burst can give.
+//! Checks that a calibration read from a file is one that a burst can give.
 
 use super::Settling;
 use super::burst::HALF_PERIOD;
@@ -6,23 +6,24 @@ use nirspi_wire::ADC_MAX;
 use nirspi_wire::register::LATENCY_MAX;
 use thiserror::Error;
 
-/// No response overshoots its step by this factor; noise of a dim burst neither.
+/// The largest value of a response. Neither overshoot nor the noise of a dim burst exceeds its step
+/// by this factor.
 const LARGEST_RESPONSE: f64 = 4.0;
 
-/// A number that no burst gives.
+/// A number that no burst can give.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[error("{field} is {found}, expected {expected}")]
 pub struct SettlingError {
-    /// Which number.
+    /// The name of the number.
     pub field: String,
-    /// As found.
+    /// The number found.
     pub found: String,
-    /// What a burst gives.
+    /// The values that a burst can give.
     pub expected: String,
 }
 
 impl Settling {
-    /// Whether a burst can have given this calibration. What is read from files has to pass.
+    /// Checks that a burst can give this calibration. Every calibration read from a file must pass.
     ///
     /// # Errors
     /// [`SettlingError`] names the first number that is out of range.
@@ -41,7 +42,7 @@ impl Settling {
             return Err(wrong("length of the response", &length, expected));
         }
         for (at, response) in self.response.iter().enumerate() {
-            // NaN is in no range.
+            // NaN is outside every range.
             if !(-LARGEST_RESPONSE..=LARGEST_RESPONSE).contains(response) {
                 let expected = format!("-{LARGEST_RESPONSE} to {LARGEST_RESPONSE}");
                 return Err(wrong(&format!("response[{at}]"), response, expected));
@@ -54,7 +55,7 @@ impl Settling {
         let counts = f64::from(ADC_MAX);
         for (field, found, least) in [
             ("dark_counts", self.dark_counts, 0.0),
-            // A burst too dim to show the step has one of either sign.
+            // The step of a burst that is too dim may have either sign.
             ("step_counts", self.step_counts, -counts),
             ("noise_counts", self.noise_counts, 0.0),
         ] {

@@ -1,12 +1,15 @@
-//! Calibrations that outlive a session: what a self-test measured, kept for the captures after it.
+//! Keeps calibrations between sessions: a self-test measures latency and response for later
+//! captures.
 //!
-//! One JSON file a camera, named after its serial number, in the user's data directory. Latency and step response are
-//! in ADC clocks and hold for any dwell and blanking, so a calibration belongs to a camera and its gateware and to
-//! nothing else. Its dark level is that of its hour: captures without complements, which need today's, do not use it.
+//! Each camera has one JSON file, named after its serial number, in the user's data directory.
+//! Latency and step response are in ADC clocks and hold for any dwell and blanking, so a
+//! calibration depends only on the camera and its gateware. Its dark level holds only for the time
+//! of measurement. Captures without complements need the current dark level and do not use the kept
+//! one.
 //!
 //! # Invariant
 //! A calibration of another camera, or of other gateware, is never applied
-//! (`a_calibration_of_something_else_is_refused_in_one_line`).
+//! (`tests::a_calibration_of_something_else_is_refused_in_one_line`).
 
 use super::Settling;
 use crate::files::FileError;
@@ -20,10 +23,10 @@ use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 use thiserror::Error;
 
-/// Version of the file's format. A field that changes its meaning changes this.
+/// Version of the file's format. A field with a new meaning needs a new version.
 const FORMAT: u32 = 1;
 
-/// A calibration as it is kept.
+/// A calibration in its file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct KeptCalibration {
     /// Always `nirspi calibration`.
@@ -32,13 +35,13 @@ pub struct KeptCalibration {
     version: u32,
     /// When it was measured, in seconds since 1970.
     measured_unix_s: u64,
-    /// The same, for people.
+    /// Time of measurement in words.
     measured: String,
     /// The camera that was measured.
     pub camera: CameraIdentity,
     /// Latency and step response.
     pub settling: Settling,
-    /// The checks that it has passed.
+    /// The checks that the camera has passed.
     pub checks: Vec<Check>,
 }
 
@@ -48,61 +51,61 @@ enum Kind {
     Calibration,
 }
 
-/// Why a calibration is not used.
+/// Why a calibration cannot be used.
 #[derive(Debug, Error)]
 pub enum CalibrationFileError {
     /// The file cannot be read.
     #[error("{path}: cannot read the calibration")]
     Io {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// Why.
+        /// The system's reason.
         source: io::Error,
     },
-    /// Not a calibration.
+    /// The file is not a calibration.
     #[error(
         "{path}: {reason}, expected a calibration written by nirspi calibrate or nirspi selftest"
     )]
     Format {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The problem.
         reason: String,
     },
-    /// Another version of the format.
+    /// The file has another version of the format.
     #[error(
         "{path}: a calibration of format {found}, expected {FORMAT}: run nirspi calibrate again"
     )]
     Version {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// Its version.
+        /// The file's version.
         found: u32,
     },
-    /// Measured on something else.
+    /// The calibration was measured on another camera or gateware.
     #[error(
         "{path}: measured with {field} {found}, this camera has {expected}: run nirspi calibrate"
     )]
     Mismatch {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// What differs.
+        /// The name of the property that differs.
         field: &'static str,
-        /// As kept.
+        /// The property in the file.
         found: String,
-        /// As the camera says.
+        /// The property of this camera.
         expected: String,
     },
-    /// It cannot be written.
+    /// The file cannot be written.
     #[error(transparent)]
     Write(#[from] FileError),
-    /// Nowhere to keep anything.
+    /// There is no folder for the file.
     #[error("no data directory to keep calibrations in")]
     NoHome(#[from] HomeDirError),
 }
 
 impl KeptCalibration {
-    /// What was measured at `when`.
+    /// A calibration measured at `when`.
     #[must_use]
     pub fn new(
         camera: CameraIdentity,
@@ -116,16 +119,16 @@ impl KeptCalibration {
         Self { kind, version, measured_unix_s, measured, camera, settling, checks }
     }
 
-    /// When it was measured, as `2026-11-20 08:30 UTC`.
+    /// Time of measurement, as `2026-11-20 08:30 UTC`.
     #[must_use]
     pub fn measured(&self) -> &str {
         &self.measured
     }
 
-    /// Writes it, whole or not at all.
+    /// Writes the file, whole or not at all.
     ///
     /// # Errors
-    /// When the folder cannot be made or the file not be written.
+    /// If the folder cannot be made, or the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), CalibrationFileError> {
         let json = serde_json::to_vec_pretty(self).map_err(|error| format_error(path, &error))?;
         match (path.parent(), path.file_name().and_then(|name| name.to_str())) {
@@ -134,18 +137,18 @@ impl KeptCalibration {
                 folder.write(name, &json)?;
                 folder.commit()?;
             }
-            // Which says what is wrong with such a path.
+            // `write_atomic` reports the problem of such a path.
             _ => write_atomic(path, &json)?,
         }
         Ok(())
     }
 
-    /// Reads it for use with `camera`.
+    /// Reads the file for use with `camera`.
     ///
     /// # Errors
-    /// Where there is none, or none that may be used with this camera.
+    /// If there is no file, or the calibration does not belong to this camera.
     pub fn read(path: &Path, camera: &CameraIdentity) -> Result<Self, CalibrationFileError> {
-        /// The part that every version has.
+        /// The fields that every version has.
         #[derive(Deserialize)]
         struct Head {
             #[serde(rename = "kind")]
@@ -175,7 +178,7 @@ impl KeptCalibration {
         Ok(kept)
     }
 
-    /// What differs, as kept and as it should be.
+    /// The property that differs, its value in the file, and the value of `camera`.
     fn check(&self, camera: &CameraIdentity) -> Result<(), (&'static str, String, String)> {
         let (kept, now) = (&self.camera, camera);
         let same = [
@@ -192,21 +195,22 @@ fn format_error(path: &Path, error: &serde_json::Error) -> CalibrationFileError 
     CalibrationFileError::Format { path: path.to_owned(), reason: error.to_string() }
 }
 
-/// Where the calibration of the camera with this serial number is kept.
+/// The path of the calibration of the camera with this serial number.
 ///
 /// # Errors
-/// Where the user has no home.
+/// If the user has no home directory.
 pub fn path_of(serial: &str) -> Result<PathBuf, CalibrationFileError> {
     path_with(serial, "json")
 }
 
-/// Where a file of the camera with this serial number is kept, with this ending.
+/// The path of a file of the camera with this serial number, with this ending.
 pub(super) fn path_with(serial: &str, ending: &str) -> Result<PathBuf, CalibrationFileError> {
     let folder = choose_base_strategy()?.data_dir().join("nirspi").join("calibration");
     Ok(folder.join(format!("{}.{ending}", file_name(serial))))
 }
 
-/// A serial number as a file name, one name for each: what is no letter, digit, `-` or `_` becomes `%` and two digits.
+/// A serial number as a file name, unique for each serial number: every byte that is not a letter,
+/// digit, `-` or `_` becomes `%` and two digits.
 fn file_name(serial: &str) -> String {
     serial
         .bytes()
@@ -217,10 +221,11 @@ fn file_name(serial: &str) -> String {
         .collect()
 }
 
-/// `2026-11-20 08:30 UTC`: the Gregorian calendar by years that begin in March, so that a leap day is a year's last
-/// (H. Hinnant, *chrono-Compatible Low-Level Date Algorithms*, `civil_from_days`).
+/// A time as `2026-11-20 08:30 UTC`. The Gregorian calendar is computed with years that begin in
+/// March, so that a leap day is the last day of a year (H. Hinnant, *chrono-Compatible Low-Level
+/// Date Algorithms*, `civil_from_days`).
 pub(super) fn date(unix_s: u64) -> String {
-    // From 1 March of year 0 to 1 January 1970; an era is 400 years.
+    // Days from 1 March of year 0 to 1 January 1970; an era is 400 years.
     const DAYS_BEFORE_1970: u64 = 719_468;
     const DAYS_OF_ERA: u64 = 146_097;
     let (days, seconds) = (unix_s / 86_400 + DAYS_BEFORE_1970, unix_s % 86_400);
@@ -293,7 +298,7 @@ mod tests {
             let error = KeptCalibration::read(&path, &camera).unwrap_err().to_string();
             assert!(error.contains(words) && error.lines().count() == 1, "{error}");
         }
-        // Newer firmware with the same gateware changes nothing between light and sample.
+        // Newer firmware with the same gateware does not change the path from light to sample.
         let newer = CameraIdentity { firmware: "9.9.9".into(), ..camera() };
         KeptCalibration::read(&path, &newer).unwrap();
     }

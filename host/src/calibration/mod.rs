@@ -1,11 +1,12 @@
-//! ADC latency, settling and flat field of a camera: measured, kept by serial number, chosen for a capture.
+//! ADC latency, settling and flat field of a camera: measured, kept by serial number, and chosen
+//! for a capture.
 //!
-//! Latency belongs to the instrument, not to the scene. It is measured against a white sheet (`nirspi calibrate`,
-//! `nirspi selftest`), kept, and used for every capture after it.
+//! Latency belongs to the instrument and not to the scene. Latency is measured against a white
+//! sheet (`nirspi calibrate`, `nirspi selftest`), kept, and used for every later capture.
 //!
 //! # Invariant
-//! No capture runs with a latency that neither was measured nor is known to the user
-//! (`a_dark_scene_uses_the_kept_latency_or_fails`, in `host/tests/calibration.rs`).
+//! Every capture runs with a latency that was measured or that the user gave
+//! (`a_dark_scene_uses_the_kept_latency_or_fails` in `host/tests/calibration.rs`).
 
 mod burst;
 mod check;

@@ -1,4 +1,5 @@
-//! Which calibration a capture uses: the one kept for the camera, one from a file, or one measured first.
+//! Chooses the calibration of a capture: the kept calibration of the camera, one from a file, or a
+//! new measurement.
 
 use super::{CalibrationFileError, KeptCalibration, KeptFlatField, path_of};
 use crate::capture::{Calibration, Capture};
@@ -9,39 +10,39 @@ use serde::Serialize;
 use std::path::PathBuf;
 use thiserror::Error;
 
-/// Where the user wants latency and settling to come from.
+/// The user's choice of the source of latency and settling.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub enum CalibrationPolicy {
-    /// The calibration kept for the camera's serial number; measured first where none is kept.
+    /// The calibration kept for the camera's serial number, or a new measurement if none is kept.
     #[default]
     Kept,
-    /// Measured first, whatever is kept. A burst that is too dim falls back to the kept calibration.
+    /// Always a new measurement. If the burst is too dim, the kept calibration is used.
     Measure,
-    /// Read from this file.
+    /// The calibration in this file.
     File(PathBuf),
-    /// The latency in the setup is right, and the leak is left as it is.
+    /// The latency in the setup is right, and the leak is not corrected.
     Off,
 }
 
-/// A kept calibration that a capture uses.
+/// The source of a kept calibration that a capture uses.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Origin {
-    /// When it was measured, as `2026-11-20 08:30 UTC`.
+    /// Time of measurement, as `2026-11-20 08:30 UTC`.
     pub measured: String,
-    /// The file that holds it.
+    /// The calibration's file.
     pub file: PathBuf,
 }
 
-/// The calibration for one capture, and what to tell the user about it.
+/// The calibration for one capture, and its remarks for the user.
 #[derive(Debug, Clone)]
 pub struct Choice {
-    /// For [`crate::capture::CaptureOptions`].
+    /// The calibration for [`crate::capture::CaptureOptions`].
     pub calibration: Calibration,
-    /// The kept calibration that is used, or stands ready if a burst is too dim.
+    /// The kept calibration that is used, or would replace a burst that is too dim.
     pub origin: Option<Origin>,
-    /// Why a kept calibration or flat field was passed over.
+    /// Why a kept calibration or flat field is not used.
     pub note: Option<String>,
-    /// The flat field kept for the camera: images are to be corrected by it.
+    /// The flat field kept for the camera, by which images are corrected.
     pub flat_field: Option<KeptFlatField>,
 }
 
@@ -49,25 +50,25 @@ pub struct Choice {
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum PolicyError {
-    /// Single patterns need the dark level of the moment, which a file does not hold.
+    /// Single patterns need the current dark level, which a file does not have.
     #[error(
         "a calibration file with single patterns (no complements): their dark level must be measured at the same time, \
          expected a policy that measures"
     )]
     DarkLevel,
-    /// The file is no calibration of this camera.
+    /// The file is not a calibration of this camera.
     #[error(transparent)]
     File(#[from] CalibrationFileError),
 }
 
 impl CalibrationPolicy {
-    /// The calibration for `camera` measuring with `setup`.
+    /// Chooses the calibration for `camera` and `setup`.
     ///
-    /// Patterns without complements need the dark level of the moment, so they are always preceded by a burst.
+    /// Patterns without complements need the current dark level, so a burst always precedes them.
     ///
     /// # Errors
-    /// [`PolicyError`] if the file asked for cannot be used. A kept calibration that cannot be used is noted and passed
-    /// over.
+    /// [`PolicyError`] if the requested file cannot be used. A kept calibration that cannot be used
+    /// is reported as a remark and skipped.
     pub fn choose(
         &self,
         setup: &MeasurementSetup,
@@ -88,7 +89,7 @@ impl CalibrationPolicy {
         Ok(choice)
     }
 
-    /// Where latency and settling come from.
+    /// Chooses the source of latency and settling.
     fn latency(
         &self,
         setup: &MeasurementSetup,
@@ -121,7 +122,8 @@ impl CalibrationPolicy {
 }
 
 impl Choice {
-    /// The kept calibration that this capture has used; `None` if it has measured its own, or none.
+    /// The kept calibration that this capture used; `None` if the capture measured its own
+    /// calibration or used none.
     #[must_use]
     pub fn used(&self, captured: &Capture) -> Option<&Origin> {
         let kept = matches!(self.calibration, Calibration::Kept(_))

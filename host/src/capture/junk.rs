@@ -1,16 +1,17 @@
-//! What came in a run that brings it no further: how much of it is too much.
+//! Limits the junk in a run: bytes that do not belong to its frames.
 //!
 //! # Invariant
-//! Of a recording, all but [`ALLOWED`] and as much again as the frames is frames, a trickle of other messages left aside
-//! (`tests::junk_alone_is_too_much_after_the_allowance`, `tests::frames_pay_for_as_much_junk`).
+//! A recording holds at most [`ALLOWED`] bytes of junk plus as many bytes as its frames, not
+//! counting a trickle of other messages (`tests::junk_alone_is_too_much_after_the_allowance`,
+//! `tests::frames_pay_for_as_much_junk`).
 
 use nirspi_wire::{DeviceMessage, PacketError};
 use std::time::{Duration, Instant};
 
-/// Bytes of junk that any run may have.
+/// Bytes of junk that every run may have.
 const ALLOWED: u64 = 64 << 20;
-/// Bytes a second of intact messages that are no frames: depth maps, replies, events. A depth map is 150 bytes, 60 times
-/// a second.
+/// Bytes a second of intact messages other than frames: depth maps, replies, events. A depth map is
+/// 150 bytes, 60 times a second.
 const TRICKLE_PER_S: u64 = 64 << 10;
 
 /// Counts a run's frames and junk, in bytes.
@@ -18,9 +19,9 @@ const TRICKLE_PER_S: u64 = 64 << 10;
 pub(super) struct Junk {
     began: Instant,
     frames: u64,
-    /// Damaged packets, frames of other runs or of another setup, frames that came twice.
+    /// Damaged packets, frames of other runs or of another setup, and frames that arrived twice.
     useless: u64,
-    /// Intact messages that are no frames.
+    /// Intact messages other than frames.
     messages: u64,
     too_much: bool,
 }
@@ -30,7 +31,8 @@ impl Junk {
         Self { began, frames: 0, useless: 0, messages: 0, too_much: false }
     }
 
-    /// A packet of so many bytes has come at `now`; `new_frame` if it was a frame of the run that had not come before.
+    /// Counts a packet of this many bytes at `now`. `new_frame` says whether the packet was a new
+    /// frame of the run.
     pub(super) fn packet(
         &mut self,
         bytes: usize,
@@ -53,12 +55,12 @@ impl Junk {
         self.useless + self.messages.saturating_sub(trickle)
     }
 
-    /// Whether the run is to be given up.
+    /// Whether the run must be stopped.
     pub(super) fn is_too_much(&self) -> bool {
         self.too_much
     }
 
-    /// Bytes that brought the run no further.
+    /// Number of bytes of junk.
     pub(super) fn bytes(&self) -> u64 {
         self.useless + self.messages
     }

@@ -1,12 +1,13 @@
-//! What keeps a capture from being whole, in words.
+//! Says in words what a capture lacks.
 
 use super::{Capture, Ended};
 use crate::causes;
 
 impl Capture {
-    /// What is missing, in one line; `None` if the capture is whole: all frames asked for were made and came, no packet beyond
-    /// them was damaged, and the camera says that no fault stands. A run without a number of frames is whole when the user
-    /// has stopped it and all frames made have come.
+    /// What is missing, in one line; `None` if the capture is whole. A capture is whole if all
+    /// requested frames were made and arrived, no other packet was damaged, and the camera reports
+    /// that no fault is latched. A run without a number of frames is whole when the user has
+    /// stopped it and all frames made have arrived.
     #[must_use]
     pub fn missing(&self) -> Option<String> {
         let parts: Vec<String> =
@@ -14,7 +15,7 @@ impl Capture {
         (!parts.is_empty()).then(|| parts.join("; "))
     }
 
-    /// How the run ended, if not as it should.
+    /// How the run ended, if not as requested.
     fn end(&self) -> Option<String> {
         match &self.ended {
             Ended::Complete => None,
@@ -58,7 +59,7 @@ impl Capture {
         }
     }
 
-    /// Frames made that did not come whole and in order.
+    /// Frames made that did not arrive whole and in order.
     fn frames(&self) -> Option<String> {
         let counters = self.counters;
         (!counters.is_complete()).then(|| {
@@ -67,7 +68,7 @@ impl Capture {
         })
     }
 
-    /// Damaged packets that were no frames of the run: what they said is not known.
+    /// Damaged packets that were not frames of the run. Their content is unknown.
     fn packets(&self) -> Option<String> {
         let others = self.damaged_packets.saturating_sub(self.counters.corrupt);
         (others > 0).then(|| {
@@ -88,7 +89,7 @@ mod tests {
     use nirspi_wire::Fault;
     use std::time::Duration;
 
-    /// A capture of 50 frames for which nothing is missing.
+    /// A capture of 50 frames without anything missing.
     fn whole() -> Capture {
         let setup = MeasurementSetup::new(&Order::Natural, 0.1).unwrap();
         Capture {

@@ -1,8 +1,10 @@
-//! A NumPy `.npz` archive: a zip file with one `.npy` array a member.
+//! Reads a NumPy `.npz` archive: a zip file in which each member is one `.npy` array.
 //!
-//! The law: a member is opened only when its field is asked for, so whatever else a file holds
-//! (text, pickled objects, large images) costs nothing; one that is opened is read to its end, so
-//! its checksum holds.
+//! # Invariant
+//! A member is opened only when its field is read. Other members (text, pickled objects, large
+//! images) cost nothing (`measurement::tests::a_good_file_reads_however_it_was_zipped`). An opened
+//! member is read to its end, so its checksum is always verified
+//! (`measurement::tests::a_changed_reading_is_caught_by_the_checksum`).
 
 use super::FileError;
 use super::array::{ArrayError, Header, MAGIC, Sample, has_shape, shape_text};
@@ -14,14 +16,14 @@ use zip::read::ZipFile;
 use zip::write::SimpleFileOptions;
 use zip::{ZipArchive, ZipWriter};
 
-/// What a path is expected to lead to.
+/// The kind of file that a path should lead to, for error messages.
 const EXPECTED: &str = "a NumPy .npz archive";
-/// What NumPy appends to the name of an array.
+/// The suffix that NumPy appends to the name of an array.
 const MEMBER_SUFFIX: &str = ".npy";
-/// The numbers that are read.
+/// The numeric types that the reader accepts, for error messages.
 pub(super) const NUMBERS: &str = "real numbers of up to 8 bytes";
-/// The largest field taken into memory: a 256 x 256 sweep of raw pairs in float64 is 1 MiB, this is
-/// 256 of them.
+/// The largest field read into memory. A 256 x 256 sweep of raw pairs in float64 is 1 MiB; the
+/// limit is 256 times as much.
 const MAX_FIELD_BYTES: u64 = 256 << 20;
 
 /// An open archive.
@@ -38,10 +40,11 @@ pub(super) struct Numbers<T = f64> {
     pub(super) values: Vec<T>,
 }
 
-/// Opens a plain file, naming the path in every refusal.
+/// Opens a plain file. Every error names the path.
 pub(super) fn open_file(path: &Path, expected: &'static str) -> Result<(File, u64), FileError> {
     let read = |error| FileError::io(path, "read", error);
-    // Asked before opening: opening a named pipe would wait for a writer.
+    // The kind of file is checked before opening, because opening a named pipe would wait for a
+    // writer.
     let metadata = std::fs::metadata(path).map_err(read)?;
     if metadata.is_dir() {
         return Err(FileError::kind(path, "a folder", expected));
@@ -57,17 +60,18 @@ pub(super) fn open_file(path: &Path, expected: &'static str) -> Result<(File, u6
 
 /// Largest text file of numbers that is read: a table of 100 000 rows of four numbers is 4 MB.
 const MAX_TEXT_MIB: u64 = 4;
-/// Largest text file of measurements: 32 sweeps of 256 x 256 pairs with 20 characters a reading are 84 MB.
+/// Largest text file of measurements: 32 sweeps of 256 x 256 pairs with 20 characters a reading are
+/// 84 MB.
 const MAX_LARGE_TEXT_MIB: u64 = 256;
 
-/// Reads a plain text file of at most 4 MiB, naming the path in every refusal.
+/// Reads a plain text file of at most 4 MiB. Every error names the path.
 pub(super) fn read_text(path: &Path, expected: &'static str) -> Result<String, FileError> {
     let bytes = read_bytes(path, expected, MAX_TEXT_MIB)?;
     String::from_utf8(bytes).map_err(|_| FileError::kind(path, "a binary file", expected))
 }
 
-/// Reads a plain text file of at most 256 MiB, naming the path in every refusal; a heading may be in another code page than
-/// UTF-8.
+/// Reads a plain text file of at most 256 MiB. Every error names the path. A heading may be in
+/// another code page than UTF-8.
 pub(super) fn read_large_text(path: &Path, expected: &'static str) -> Result<String, FileError> {
     let bytes = read_bytes(path, expected, MAX_LARGE_TEXT_MIB)?;
     Ok(String::from_utf8_lossy(&bytes).into_owned())
@@ -85,8 +89,8 @@ fn read_bytes(path: &Path, expected: &'static str, most_mib: u64) -> Result<Vec<
     }
 }
 
-/// What a file is by its first bytes, for a message that tells a user which file was taken by
-/// mistake.
+/// The kind of a file by its first bytes. An error message uses the kind to tell a user which file
+/// was chosen by mistake.
 pub(super) fn kind_by_start(start: &[u8]) -> &'static str {
     const KINDS: [(&[u8], &str); 8] = [
         (b"PK", "a zip archive"),
@@ -118,7 +122,7 @@ impl Archive {
         }
         let zip = ZipArchive::new(BufReader::new(file))
             .map_err(|error| damaged(path, error.to_string()))?;
-        // A name that is no text is no field of ours.
+        // A field of nirspi always has a name in UTF-8, so other names are skipped.
         let members = zip.file_names().flatten();
         let mut names: Vec<String> = members
             .filter_map(|name| name.strip_suffix(MEMBER_SUFFIX).map(str::to_owned))
@@ -127,7 +131,7 @@ impl Archive {
         Ok(Self { path: path.to_owned(), zip, names })
     }
 
-    /// Names of all fields, sorted.
+    /// The names of all fields, sorted.
     pub(super) fn names(&self) -> &[String] {
         &self.names
     }
@@ -136,8 +140,7 @@ impl Archive {
         self.names.iter().any(|name| name == field)
     }
 
-    /// Reads a field whose shape `accept` finds good; what it returns otherwise is the shape that
-    /// was expected.
+    /// Reads a field. `accept` checks the shape; its error is a description of the expected shape.
     pub(super) fn numbers(
         &mut self,
         field: &str,
@@ -146,7 +149,8 @@ impl Archive {
         self.numbers_of(field, accept)
     }
 
-    /// The same, as numbers of another type: stacks of images do not need 8 bytes a pixel.
+    /// Reads a field as [`numbers`](Self::numbers) does, as numbers of another type. Stacks of
+    /// images do not need 8 bytes a pixel.
     pub(super) fn numbers_of<T: Sample>(
         &mut self,
         field: &str,
@@ -157,7 +161,7 @@ impl Archive {
         Ok(Numbers { shape, values })
     }
 
-    /// The same for real and complex numbers.
+    /// Reads a field as [`numbers`](Self::numbers) does, of real or complex numbers.
     pub(super) fn field(
         &mut self,
         field: &str,
@@ -181,7 +185,7 @@ impl Archive {
             .map_err(|error| damaged(path, format!("`{field}`: {error}")))?;
         let refuse = |found, expected: String| FileError::field(path, field, found, expected);
         let explain = |error| match error {
-            // A failed checksum and a torn deflate stream arrive as I/O errors too.
+            // A failed checksum and an incomplete deflate stream also arrive as I/O errors.
             ArrayError::Damaged(what) => damaged(path, format!("`{field}`: {what}")),
             ArrayError::Io(error) => damaged(path, format!("`{field}`: {error}")),
             ArrayError::Dtype(found) => refuse(found, NUMBERS.to_owned()),
@@ -197,10 +201,11 @@ impl Archive {
     }
 }
 
-/// The bytes of an archive with these members, each a whole `.npy` file under the name of its field.
+/// The bytes of an archive with these members. Each member is a whole `.npy` file under the name of
+/// its field.
 ///
 /// # Errors
-/// [`FileError`] naming `path`, if the archive cannot be put together.
+/// [`FileError`] naming `path`, if the archive cannot be written.
 pub(crate) fn encode(path: &Path, members: &[(&str, Vec<u8>)]) -> Result<Vec<u8>, FileError> {
     use std::io::Write as _;
     let mut archive = ZipWriter::new(Cursor::new(Vec::new()));

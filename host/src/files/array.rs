@@ -1,36 +1,38 @@
-//! One NumPy array (`.npy` format 1.0 to 3.0) from a stream of bytes, as numbers in C order.
+//! Reads one NumPy array (`.npy` format 1.0 to 3.0) from a stream of bytes, as numbers in C order.
 //!
-//! The law: no claim of the header is believed before it was checked; memory grows with the bytes
-//! that came.
+//! The header is a Python dictionary literal with three known keys. A scanner without recursion
+//! reads the header, because nested brackets can overflow the stack of a general literal parser.
+//! Format: <https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html>.
 //!
-//! The header is a Python dictionary literal with three known keys, so it is read here by a scanner
-//! without recursion: a general literal parser can be made to overflow its stack by nested
-//! brackets. Format: <https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html>.
+//! # Invariant
+//! Every claim of a header is checked before it is used, and memory grows with the bytes that
+//! arrived (`tests::a_claim_beyond_the_limit_takes_no_memory`).
 
 use super::error::Shown;
 use std::io::{self, Read};
 
-/// What an `.npy` file starts with.
+/// The first bytes of every `.npy` file.
 pub(super) const MAGIC: &[u8; 6] = b"\x93NUMPY";
-/// NumPy's own limit.
+/// The most axes that NumPy allows.
 pub(super) const MAX_AXES: usize = 32;
-/// NumPy itself refuses headers over 10 000 characters; this leaves room for other writers.
+/// NumPy refuses headers over 10 000 characters; the larger limit here leaves room for other
+/// writers.
 const MAX_HEADER_BYTES: u32 = 65_536;
 
 /// Why an array could not be read; [`super::FileError`] adds file and field.
 #[derive(Debug)]
 pub(super) enum ArrayError {
-    /// The bytes are no whole array.
+    /// The bytes are not a whole array.
     Damaged(String),
-    /// An array, but not of numbers that are read here.
+    /// The array holds elements of a type that the reader does not support.
     Dtype(String),
-    /// An array that claims more than the reader allows.
+    /// The array's header claims more data than the reader allows.
     TooLarge { shape: Vec<u64>, limit_bytes: u64 },
-    /// The stream failed.
+    /// Reading the stream failed.
     Io(io::Error),
 }
 
-/// Numbers that NumPy stores: `|b1`, `i1..i8`, `u1..u8`, `f2..f8`, `c8`, `c16`, either byte order.
+/// A numeric type of NumPy: `|b1`, `i1..i8`, `u1..u8`, `f2..f8`, `c8`, `c16`, in either byte order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Dtype {
     kind: Kind,
@@ -44,11 +46,11 @@ enum Kind {
     Signed,
     Unsigned,
     Float,
-    /// Two floats, real and imaginary part.
+    /// Two floats: the real and the imaginary part.
     Complex,
 }
 
-/// A number that array elements are turned into.
+/// A number type into which array elements are converted.
 pub(super) trait Sample: Copy {
     fn from_f64(value: f64) -> Self;
 }
@@ -65,18 +67,18 @@ impl Sample for f32 {
     }
 }
 
-/// What the header of an array says: enough to refuse it before its data is read.
+/// The header of an array. The header is enough to refuse an array before its data are read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Header {
     dtype: Dtype,
     fortran_order: bool,
     shape: Vec<u64>,
-    /// Bytes of the header, data start after them.
+    /// Length of the header in bytes. The data start after the header.
     pub(super) header_bytes: u64,
 }
 
 impl Header {
-    /// Reads magic, version and dictionary; leaves the stream at the first element.
+    /// Reads magic, version and dictionary. The stream is then at the first element.
     pub(super) fn read(stream: &mut impl Read) -> Result<Self, ArrayError> {
         let mut start = [0; 8];
         fill(stream, &mut start, "its header")?;
@@ -110,29 +112,29 @@ impl Header {
         Ok(Self { dtype, fortran_order, shape, header_bytes: 8 + length_bytes + u64::from(length) })
     }
 
-    /// Sizes of the axes as claimed; empty for a single number.
+    /// Sizes of the axes as the header claims them; empty for a single number.
     pub(super) fn shape(&self) -> &[u64] {
         &self.shape
     }
 
-    /// Are its numbers single bytes, 0 to 255?
+    /// Whether the array's numbers are single bytes, 0 to 255.
     pub(super) fn is_bytes(&self) -> bool {
         self.dtype.kind == Kind::Unsigned && self.dtype.size == 1
     }
 
-    /// Bytes of data that belong to this header, if that is at most `limit_bytes`.
+    /// Number of data bytes that the header announces, if the number is at most `limit_bytes`.
     pub(super) fn data_bytes(&self, limit_bytes: u64) -> Result<u64, ArrayError> {
         self.shape
             .iter()
-            // An axis of length 0 makes the array empty however large the others are.
+            // An axis of length 0 makes the array empty, however large the other axes are.
             .try_fold(self.dtype.size as u64, |product, &axis| product.checked_mul(axis))
             .or_else(|| self.shape.contains(&0).then_some(0))
             .filter(|&bytes| bytes <= limit_bytes)
             .ok_or_else(|| ArrayError::TooLarge { shape: self.shape.clone(), limit_bytes })
     }
 
-    /// Reads the elements in C order. The stream must end with them: in an archive its checksum is
-    /// known good only then.
+    /// Reads the elements in C order. The stream must end after the last element: the checksum of
+    /// an archive's member is verified only at the end.
     pub(super) fn read_data<T: Sample>(
         &self,
         stream: &mut impl Read,
@@ -163,7 +165,8 @@ impl Header {
         Ok(bytes)
     }
 
-    /// Reads real or complex elements as [`read_data`](Self::read_data) does: real parts, and imaginary parts where there are.
+    /// Reads real or complex elements as [`read_data`](Self::read_data) does: the real parts, and
+    /// the imaginary parts of complex elements.
     pub(super) fn read_parts(
         &self,
         stream: &mut impl Read,
@@ -181,14 +184,15 @@ impl Header {
     }
 
     fn in_c_order<T: Sample>(&self, values: Vec<T>) -> Vec<T> {
-        // Both fit: their product was multiplied out above and is the length of `bytes`.
+        // Each axis fits into `usize`: the product of all axes was computed above and is the length
+        // of `bytes`.
         let shape: Vec<usize> = self.shape.iter().map(|&axis| axis as usize).collect();
         let reorder = self.fortran_order && shape.len() > 1 && !values.is_empty();
         if reorder { to_c_order(&values, &shape) } else { values }
     }
 }
 
-/// `(4, 3)` the way Python writes it, for messages.
+/// A shape as Python writes it, such as `(4, 3)`, for error messages.
 pub(super) fn shape_text(shape: &[u64]) -> String {
     match shape {
         [one] => format!("({one},)"),
@@ -196,7 +200,7 @@ pub(super) fn shape_text(shape: &[u64]) -> String {
     }
 }
 
-/// What a message says of a shape that is not expected.
+/// The part of an error message that states an unexpected shape.
 pub(super) fn has_shape(shape: &[u64]) -> String {
     format!("has shape {}", shape_text(shape))
 }
@@ -208,8 +212,8 @@ fn fill(stream: &mut impl Read, buffer: &mut [u8], part: &str) -> Result<(), Arr
     })
 }
 
-/// The three values of `{'descr': '<f8', 'fortran_order': False, 'shape': (3, 4), }`, keys in any
-/// order.
+/// Parses the three values of `{'descr': '<f8', 'fortran_order': False, 'shape': (3, 4), }`. The
+/// keys may be in any order.
 fn parse_dictionary(text: &str) -> Result<(Dtype, bool, Vec<u64>), ArrayError> {
     let damaged = |what: &str| ArrayError::Damaged(format!("{what} in its header"));
     let value = |key: &str| -> Result<&str, ArrayError> {
@@ -253,7 +257,7 @@ impl Dtype {
     /// Parses a value that starts with a quoted type string such as `'<f8'`.
     fn parse(value: &str) -> Result<Self, ArrayError> {
         let Some(quote @ ('\'' | '"')) = value.chars().next() else {
-            // A list of fields: a structured array.
+            // A list of fields describes a structured array.
             return Err(ArrayError::Dtype("is a structured array".to_owned()));
         };
         let Some((descr, _)) = value[1..].split_once(quote) else {
@@ -304,7 +308,7 @@ impl Dtype {
         }
     }
 
-    /// Turns each `N` bytes, put into little-endian order, into a sample.
+    /// Converts each `N` bytes, put into little-endian order, into a sample.
     fn each<T: Sample, const N: usize>(
         self,
         bytes: &[u8],
@@ -337,7 +341,7 @@ fn half_to_f64(bits: u16) -> f64 {
     }
 }
 
-/// Reorders elements stored with the first axis fastest, so that the last is.
+/// Reorders elements stored with the first axis fastest into C order, with the last axis fastest.
 pub(super) fn to_c_order<T: Copy>(values: &[T], shape: &[usize]) -> Vec<T> {
     let mut index = vec![0; shape.len()];
     let strides: Vec<usize> = shape

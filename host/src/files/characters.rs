@@ -1,7 +1,12 @@
-//! Characters to train on, from a user's files: `.npz` stacks, or Chars74K as its authors hand it out.
+//! Reads characters for training from a user's files: `.npz` stacks, or Chars74K in its authors'
+//! folders.
 //!
-//! The law: what comes out is 64 x 64, drawn characters bright on dark, each with its class and its group, whatever
-//! way it came in; a file that does not fit is named.
+//! # Invariant
+//! Every character read is 64 x 64 pixels with its class and its group, and drawn characters are
+//! bright on dark (`tests::chars74k_is_read_as_its_authors_hand_it_out`). A file that does not fit
+//! is named in the error (`tests::what_does_not_fit_is_named`).
+//!
+//! # Formats
 //!
 //! A `.npz` stack:
 //!
@@ -11,10 +16,11 @@
 //! | `label` | optional `(N,)`: class, 0 to 61 for 0-9, A-Z, a-z |
 //! | `group`, `family`, `writer` or `font` | optional `(N,)`: who drew it; without one each image is its own group |
 //!
-//! Chars74K (T. de Campos et al., VISAPP 2009): `English/Fnt/Sample001/img001-00001.png` (type, four styles of one
-//! family in a row), `English/Hnd/Img/Sample001/...` (handwriting, numbered by writer) and
-//! `English/Img/GoodImg/Bmp/Sample001/...` (photographs). Drawn characters are cut out and scaled so that their longer
-//! side is 48 pixels; photographs are scaled to 64 and filled up with their own edge.
+//! Chars74K (T. de Campos et al., VISAPP 2009): `English/Fnt/Sample001/img001-00001.png` (type,
+//! four styles of one family in a row), `English/Hnd/Img/Sample001/...` (handwriting, numbered by
+//! writer) and `English/Img/GoodImg/Bmp/Sample001/...` (photographs). Drawn characters are cut out
+//! and scaled so that their longer side is 48 pixels. Photographs are scaled to 64 pixels and
+//! padded with the levels of their own edge.
 
 use super::FileError;
 use super::archive::Archive;
@@ -27,11 +33,11 @@ use std::path::{Path, PathBuf};
 
 /// Longer side of a drawn character, in pixels.
 pub(crate) const GLYPH_PX: u32 = 48;
-/// Brighter than this is ink.
+/// Pixels brighter than this level are ink.
 const INK: f32 = 0.25;
-/// A stack is of drawn characters where the rim of most images is darker than this.
+/// A stack holds drawn characters if the rim of most images is darker than this level.
 const DARK_RIM: f32 = 32.0;
-/// Styles of one family in Chars74K's `Fnt`: plain, bold, italic, both.
+/// Styles of one family in Chars74K's `Fnt`: plain, bold, italic, and bold italic.
 const STYLES: u32 = 4;
 /// Fields that may name the group of each image.
 const GROUPS: [&str; 4] = ["group", "family", "writer", "font"];
@@ -68,7 +74,7 @@ pub fn read(path: &Path) -> Result<Vec<Stack>, FileError> {
     Ok(stacks)
 }
 
-/// Files and folders in a folder, by name.
+/// Files and folders in a folder, sorted by name.
 pub(crate) fn entries(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
     let read = |error| FileError::io(folder, "read", error);
     let mut entries = std::fs::read_dir(folder)
@@ -141,7 +147,8 @@ fn read_npz(path: &Path) -> Result<Stack, FileError> {
         .map_err(|error| refused(path, &error))
 }
 
-/// Characters are drawn on black to the rim; photographs are not.
+/// The kind of characters by their rims: drawn characters are on black up to the rim, photographs
+/// are not.
 fn kind_of(levels: &[u8]) -> Kind {
     let last = SIDE_PX - 1;
     let rim =
@@ -170,7 +177,8 @@ const LAYOUT: [(&str, Folder); 3] = [
     ("Img/GoodImg/Bmp", Folder::Photographs),
 ];
 
-/// Reads `SampleNNN/imgNNN-MMMMM.png`: class NNN - 1, font, writer or photograph MMMMM.
+/// Reads `SampleNNN/imgNNN-MMMMM.png`: the class is NNN - 1; the font, writer or photograph is
+/// MMMMM.
 fn read_folder(folder: &Path, what: Folder) -> Result<Stack, FileError> {
     let mut files: Vec<(PathBuf, u8, u32)> = Vec::new();
     for sample in entries(folder)? {
@@ -225,7 +233,8 @@ fn read_folder(folder: &Path, what: Folder) -> Result<Stack, FileError> {
     };
     let labels = files.iter().map(|(_, label, _)| *label).collect();
     let groups = match what {
-        // Numbers start again with each class.
+        // The numbers of photographs start again in each class, so each photograph gets its own
+        // group.
         Folder::Photographs => (0..files.len() as u32).collect(),
         _ => files.iter().map(|(.., group)| *group).collect(),
     };
@@ -247,8 +256,8 @@ fn resized(picture: &Picture, longer_px: u32) -> Picture {
     imageops::resize(picture, size(width), size(height), FilterType::Triangle)
 }
 
-/// 64 x 64 levels of a bright character on dark, cut out and centred, its longer side `longer_px`; none if there is no
-/// ink.
+/// Cuts out and centres a bright character on dark, as 64 x 64 levels with a longer side of
+/// `longer_px`; `None` if there is no ink.
 pub(crate) fn centred(ink: Grey, longer_px: u32) -> Option<Vec<u8>> {
     let picture = buffer(ink);
     let inked = || picture.enumerate_pixels().filter(|(.., v)| v.0[0] > INK);
@@ -266,8 +275,9 @@ pub(crate) fn centred(ink: Grey, longer_px: u32) -> Option<Vec<u8>> {
     Some(levels)
 }
 
-/// 64 x 64 levels of a photograph, its longer side 64, filled up with its edge; a negative of it where the rim is
-/// brighter than the middle, so that characters are bright.
+/// A photograph as 64 x 64 levels: its longer side is 64 pixels, padded with the levels of its
+/// edge. If the rim is brighter than the middle, the result is a negative, so that characters are
+/// bright.
 fn photograph(picture: Grey) -> Vec<u8> {
     let small = resized(&buffer(picture), SIDE_PX as u32);
     let (width, height) = small.dimensions();

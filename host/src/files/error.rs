@@ -1,6 +1,8 @@
-//! What can be wrong with a file, each as one line that a user can act on.
+//! Errors of files. Each is one line that a user can act on.
 //!
-//! The law: a message is a single line, whatever the file or its name holds.
+//! # Invariant
+//! A message is a single line, whatever the file or its name holds
+//! (`tests::every_message_is_one_line`).
 
 use std::borrow::Cow;
 use std::fmt;
@@ -17,22 +19,23 @@ pub enum FileError {
     Io {
         /// The file or folder.
         path: PathBuf,
-        /// What was tried: "read", "write", "create".
+        /// The operation that failed: "read", "write", "create".
         attempt: &'static str,
-        /// What the system said. The message tells this in a user's words, so it is no `source()`.
+        /// The system's error. `Display` already includes its reason, so `system` is not also a
+        /// `source()`.
         system: io::Error,
     },
-    /// The path leads to something else than it should: a folder for a file, or the reverse.
+    /// The path leads to a folder instead of a file, or to a file instead of a folder.
     #[error("{}: found {found}, expected {expected}", Shown::path(path))]
     Kind {
         /// The file or folder.
         path: PathBuf,
-        /// What stands there.
+        /// What the path leads to.
         found: String,
-        /// What should.
+        /// What the path should lead to.
         expected: &'static str,
     },
-    /// The file is of the right kind, but cut short or corrupted.
+    /// The file is of the right kind, but is cut short or corrupted.
     #[error(
         "{}: damaged or cut short ({}), expected {expected}",
         Shown::path(path),
@@ -41,12 +44,12 @@ pub enum FileError {
     Damaged {
         /// The file.
         path: PathBuf,
-        /// What the damage showed as.
+        /// How the damage showed.
         found: String,
-        /// What a whole file would be.
+        /// What an undamaged file would hold.
         expected: &'static str,
     },
-    /// A field that must be there is not.
+    /// A required field is missing.
     #[error(
         "{}: no `{field}` in it, found {}; expected {expected}",
         Shown::path(path),
@@ -57,12 +60,12 @@ pub enum FileError {
         path: PathBuf,
         /// The field.
         field: &'static str,
-        /// The names that are there.
+        /// The names of the fields in the file.
         found: Vec<String>,
-        /// The names that should be.
+        /// The names that the reader accepts.
         expected: &'static str,
     },
-    /// A field is there, but is not what it should be.
+    /// A field has the wrong type, shape or value.
     #[error(
         "{}: `{}` {}, expected {expected}",
         Shown::path(path),
@@ -76,19 +79,20 @@ pub enum FileError {
         field: Cow<'static, str>,
         /// What was found, as the rest of a sentence: `has shape (3,)`, `is NaN at [7]`.
         found: String,
-        /// What should be.
+        /// The value expected.
         expected: String,
     },
-    /// The file holds several measurements and the caller chose none, or one that is not there.
+    /// The file holds several measurements, and the caller chose none or an index that is too
+    /// large.
     #[error("{}: `{}` holds {}", Shown::path(path), Shown::text(field), choice(*count, *asked))]
     Choice {
         /// The file.
         path: PathBuf,
         /// The field.
         field: Cow<'static, str>,
-        /// How many there are.
+        /// The number of measurements in the file.
         count: usize,
-        /// Which was asked for.
+        /// The index that the caller chose.
         asked: Option<usize>,
     },
 }
@@ -124,7 +128,7 @@ fn choice(count: usize, asked: Option<usize>) -> String {
     }
 }
 
-/// The system's reason in a user's words; its own where it has a better one.
+/// The system's reason in a user's words. Any other reason is kept as the system gives it.
 fn reason(error: &io::Error) -> String {
     match error.kind() {
         io::ErrorKind::NotFound => "no such file or folder".to_owned(),
@@ -135,18 +139,20 @@ fn reason(error: &io::Error) -> String {
     }
 }
 
-/// Foreign text made fit for one line: control characters escaped, cut at a length.
+/// Text from outside the program, prepared for one line: control characters are escaped and the
+/// length is limited.
 pub(super) struct Shown {
     text: String,
     limit: usize,
 }
 
 impl Shown {
-    /// Long enough for any message of ours, short enough for a terminal.
+    /// The most characters of text in a message: enough for every message of nirspi, and short
+    /// enough for a terminal.
     const TEXT_LIMIT: usize = 200;
     /// The longest path of common systems.
     const PATH_LIMIT: usize = 4096;
-    /// Names of fields that a message lists before it stops.
+    /// The most names of fields that a message lists.
     const NAMES: usize = 12;
 
     fn path(path: &Path) -> Self {
@@ -179,8 +185,8 @@ impl fmt::Display for Shown {
             if i == self.limit {
                 return f.write_str("...");
             }
-            // Line separators are no control characters, yet break a line in some terminals and
-            // editors.
+            // Line separators are not control characters, but they break a line in some terminals
+            // and editors.
             if c.is_control() || matches!(c, '\u{2028}' | '\u{2029}') {
                 write!(f, "{}", c.escape_default())?;
             } else {

@@ -1,6 +1,8 @@
-//! The arrays of a file by their names, whatever the file's format: NumPy `.npz` and `.npy`, MATLAB `.mat`, HDF5, text.
+//! Reads the arrays of a file by their names, in any of the formats NumPy `.npz` and `.npy`, MATLAB
+//! `.mat`, HDF5 and text.
 //!
-//! The law: an array is decoded only when its field is asked for, and comes out in C order whatever order the format keeps.
+//! An array is decoded only when its field is read. Its numbers come out in C order, whatever order
+//! the file uses.
 
 use super::FileError;
 use super::archive::{Archive, kind_by_start, open_file};
@@ -12,12 +14,13 @@ use super::text;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-/// What a path is expected to lead to.
+/// The kind of file that a path should lead to, for error messages.
 pub(super) const EXPECTED: &str =
     "measurements: .npz, .npy, .mat, .h5, .csv or .txt, or a recording (.mcap)";
-/// The name under which messages speak of an array that has none.
+/// The name of an array without a name, for error messages.
 pub(super) const UNNAMED: &str = "array";
-/// Bytes that tell the format; HDF5 may begin behind a block of 512 bytes.
+/// Number of first bytes that identify the format. An HDF5 file may begin after a block of 512
+/// bytes.
 const START_BYTES: u64 = 520;
 const HDF5_MAGIC: &[u8] = b"\x89HDF\r\n\x1a\n";
 /// The largest `.mat` or HDF5 file taken into memory.
@@ -28,12 +31,13 @@ const MAX_FILE_BYTES: u64 = 1 << 30;
 pub(super) struct Field {
     pub(super) shape: Vec<usize>,
     pub(super) real: Vec<f64>,
-    /// As many as `real`, for complex numbers.
+    /// The imaginary parts, as many as `real`; `None` for real numbers.
     pub(super) imaginary: Option<Vec<f64>>,
 }
 
 impl Field {
-    /// The same numbers with the axes in reverse, of numbers stored with the first axis fastest.
+    /// A field of numbers that are stored with the first axis fastest. The axes are reversed and
+    /// the numbers keep their order.
     pub(super) fn from_column_major(
         shape: Vec<usize>,
         real: &[f64],
@@ -64,7 +68,7 @@ enum Format {
 }
 
 impl Fields {
-    /// Opens a file of any of the formats; `decimal_comma` is of text alone.
+    /// Opens a file of any of the formats. `decimal_comma` applies to text files only.
     pub(super) fn open(path: &Path, decimal_comma: bool) -> Result<Self, FileError> {
         let (mut file, length) = open_file(path, EXPECTED)?;
         let mut start = Vec::new();
@@ -108,7 +112,7 @@ impl Fields {
         &self.names
     }
 
-    /// Whether the file is one array without a name, which stands for whatever is asked for.
+    /// Whether the file is one array without a name. The array is then the answer for every name.
     pub(super) fn is_unnamed(&self) -> bool {
         matches!(self.format, Format::Unnamed(_))
     }
@@ -117,7 +121,7 @@ impl Fields {
         self.names.iter().any(|name| name == field)
     }
 
-    /// Reads a field whose shape `accept` finds good; what it returns otherwise is what was expected.
+    /// Reads a field. `accept` checks the shape; its error is a description of the expected shape.
     pub(super) fn read(
         &mut self,
         field: &str,
@@ -145,7 +149,7 @@ impl Fields {
 }
 
 impl Fields {
-    /// The same, of real numbers alone.
+    /// Reads a field as [`read`](Self::read) does, of real numbers only.
     pub(super) fn read_real(
         &mut self,
         field: &str,

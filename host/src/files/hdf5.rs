@@ -1,6 +1,7 @@
-//! Arrays of HDF5 files: MATLAB's `.mat` 7.3, and what h5py and others write.
+//! Reads arrays of HDF5 files: MATLAB's `.mat` 7.3, and files of h5py and other writers.
 //!
-//! The law: the file lies in memory, and reading is bounded by a limit, not by a claim of the file.
+//! The file is read into memory whole. A limit bounds the memory for a field, whatever size the
+//! file claims.
 
 use super::FileError;
 use super::array::{MAX_AXES, has_shape};
@@ -11,14 +12,14 @@ use hdf5_reader::{ByteOrder, Hdf5File, OpenOptions};
 use std::path::{Path, PathBuf};
 
 const EXPECTED: &str = "an HDF5 file";
-/// The largest field taken into memory.
+/// The largest field read into memory.
 const MAX_FIELD_BYTES: usize = 256 << 20;
 
 /// An open file.
 pub(super) struct Hdf5 {
     path: PathBuf,
     file: Hdf5File,
-    /// MATLAB keeps its arrays with the axes in reverse.
+    /// Whether MATLAB wrote the file. MATLAB stores its arrays with the axes in reverse.
     is_matlab: bool,
 }
 
@@ -93,7 +94,7 @@ impl Part {
                 (*size, false, *signed, *byte_order)
             }
             Datatype::FloatingPoint { size, byte_order } => (*size, true, true, *byte_order),
-            // Truth values of h5py.
+            // h5py stores truth values as enumerations.
             Datatype::Enum { base, .. } => return Self::of(base, offset),
             _ => return None,
         };
@@ -124,8 +125,8 @@ impl Part {
     }
 }
 
-/// Bytes of an element, its number, and its imaginary part where it is complex: a pair of numbers, as MATLAB
-/// (`real`, `imag`) and h5py (`r`, `i`) keep them.
+/// The bytes of an element, its number, and its imaginary part if the element is complex. A complex
+/// element is a pair of numbers, which MATLAB names `real` and `imag` and h5py names `r` and `i`.
 fn parts(datatype: &Datatype) -> Option<(usize, (Part, Option<Part>))> {
     let Datatype::Compound { size, fields } = datatype else {
         let part = Part::of(datatype, 0)?;

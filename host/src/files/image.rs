@@ -1,10 +1,10 @@
 //! Grey pictures: PNG and JPEG in, PNG out.
 //!
-//! The law: a grey level *is* the value, v / 255 (or / 65 535), in both directions; nothing is
-//! linearised. That is the convention of the field's test scenes and data sets, it makes a written
-//! file read back as what was written, and metrics against a user's own file come out in the user's
-//! numbers. A photograph's tone curve could be undone, but that would not make it a reflectance at
-//! 1550 nm: what a surface reflects there is not in a visible picture.
+//! A grey level is the value: v / 255 (or v / 65 535), in both directions, without linearisation.
+//! Test scenes and data sets of the field use the same convention. A written file reads back as it
+//! was written (`tests::all_256_grey_levels_survive_a_round_trip`), and metrics against a user's
+//! own file use the user's numbers. Undoing the tone curve of a photograph would not give a
+//! reflectance at 1550 nm: a visible picture does not show what a surface reflects there.
 
 use super::FileError;
 use super::archive::{kind_by_start, open_file};
@@ -18,9 +18,9 @@ use std::io::{BufRead, BufReader, Seek};
 use std::path::Path;
 
 const EXPECTED: &str = "a PNG or JPEG image";
-/// Largest edge that is read; a scene is later averaged down to hundreds of pixels.
+/// The largest edge that the reader accepts. A scene is later averaged down to hundreds of pixels.
 const MAX_EDGE_PX: u32 = 16_384;
-/// Largest decoded picture that is read: 8192 x 8192 in 16-bit RGBA.
+/// The largest decoded picture that the reader accepts: 8192 x 8192 in 16-bit RGBA.
 const MAX_DECODED_BYTES: u64 = 512 << 20;
 
 /// A square map of reflectance in `[0, 1]`.
@@ -35,8 +35,8 @@ pub struct Reflectance {
 /// Reads a JPEG, or a PNG of any kind (grey, RGB, palette, with or without alpha, up to 16 bit) as
 /// reflectance.
 ///
-/// Colour becomes Rec. 709 luma (0.2126 R + 0.7152 G + 0.0722 B of the stored values), transparency
-/// shows a black ground, and what is not square is cropped to its centre.
+/// Colour becomes Rec. 709 luma (0.2126 R + 0.7152 G + 0.0722 B of the stored values). Transparent
+/// pixels show a black ground. A picture that is not square is cropped to its centre.
 ///
 /// # Errors
 /// [`FileError`], one line that names file, what was found and what was expected.
@@ -59,7 +59,8 @@ pub struct Grey {
     pub values: Vec<f32>,
 }
 
-/// Reads a PNG or JPEG of any kind as [`read_reflectance`] does, of any shape and uncropped.
+/// Reads a PNG or JPEG of any kind as [`read_reflectance`] does, but of any shape and without
+/// cropping.
 ///
 /// # Errors
 /// [`FileError`], one line that names file, what was found and what was expected.
@@ -69,10 +70,11 @@ pub fn read_grey(path: &Path) -> Result<Grey, FileError> {
 }
 
 impl Grey {
-    /// The picture's central square, averaged down or interpolated to `side_px` pixels an edge; values stay in `[0, 1]`.
+    /// The picture's central square, averaged down or interpolated to `side_px` pixels an edge.
+    /// Values stay in `[0, 1]`.
     ///
     /// # Panics
-    /// If `side_px` is 0: there is no such picture.
+    /// If `side_px` is 0.
     #[must_use]
     pub fn resized(&self, side_px: u32) -> Self {
         assert!(side_px > 0, "a picture of 0 pixels");
@@ -108,7 +110,7 @@ fn decode(path: &Path) -> Result<DynamicImage, FileError> {
         reader.limits(limits.clone());
         let mut decoder = reader.into_decoder()?;
         limits.reserve(decoder.total_bytes())?;
-        // A telephone stores its picture as the sensor lay, and says which way is up.
+        // A phone stores the picture as its sensor was held, and the file states which side is up.
         let orientation = decoder.orientation()?;
         let mut picture = DynamicImage::from_decoder(decoder)?;
         picture.apply_orientation(orientation);
@@ -128,10 +130,10 @@ fn decode(path: &Path) -> Result<DynamicImage, FileError> {
     })
 }
 
-/// Its grey levels, 0 to 1.
+/// The picture's grey levels, 0 to 1.
 fn grey(picture: &DynamicImage) -> Vec<f32> {
     match picture.color() {
-        // Grey as it stands: no rounding on the way through colour.
+        // A grey picture is converted directly, because a conversion through colour would round.
         ColorType::L8 | ColorType::L16 => picture.to_luma32f().into_raw(),
         _ => picture
             .to_rgba32f()
@@ -144,11 +146,11 @@ fn grey(picture: &DynamicImage) -> Vec<f32> {
     }
 }
 
-/// The bytes of an 8-bit grey PNG of values in `[0, 1]`, row-major; what lies outside is clipped,
-/// NaN is black.
+/// The bytes of an 8-bit grey PNG of values in `[0, 1]`, row-major. Values outside the range are
+/// clipped; NaN becomes black.
 ///
 /// # Panics
-/// If there are not `width * height` values, or none: the caller made both.
+/// If there are not exactly `width * height` values, or none.
 #[must_use]
 pub fn encode_grey(width: usize, height: usize, values: &[f32]) -> Vec<u8> {
     assert_eq!(width * height, values.len(), "values of a {width} x {height} picture");
@@ -159,7 +161,7 @@ pub fn encode_grey(width: usize, height: usize, values: &[f32]) -> Vec<u8> {
 /// The bytes of an 8-bit colour PNG.
 ///
 /// # Panics
-/// If the picture has no pixel: the caller made it.
+/// If the picture has no pixel.
 #[must_use]
 pub fn encode_rgb(picture: &RgbImage) -> Vec<u8> {
     encode(picture.as_raw(), picture.width(), picture.height(), ExtendedColorType::Rgb8)

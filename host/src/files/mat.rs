@@ -1,9 +1,11 @@
-//! Arrays of MATLAB `.mat` files of level 5: what `save` writes up to `-v7`, and SciPy's `savemat`.
-//!
-//! The law: no claim of a header is believed before it was checked, and memory grows with the bytes that came: a compressed
-//! variable is taken apart only when its field is asked for, and only up to a limit.
+//! Reads arrays of MATLAB `.mat` files of level 5, which `save` writes up to `-v7` and SciPy's
+//! `savemat` writes.
 //!
 //! Format: MathWorks, *MAT-File Format*, R2023a, "Level 5 MAT-Files".
+//!
+//! Every claim of a header is checked before it is used, and memory grows with the bytes that
+//! arrived. A compressed variable is decompressed only when its field is read, and only up to a
+//! limit.
 
 use super::FileError;
 use super::array::{MAX_AXES, has_shape};
@@ -14,9 +16,10 @@ use std::path::{Path, PathBuf};
 
 const EXPECTED: &str = "a MATLAB level 5 file";
 const HEADER_BYTES: usize = 128;
-/// The largest variable taken into memory.
+/// The largest variable read into memory.
 const MAX_VARIABLE_BYTES: u64 = 256 << 20;
-/// What of a compressed variable is looked at for its name: flags, sizes and name.
+/// The bytes of a compressed variable that are decompressed to find its name: flags, sizes and
+/// name.
 const HEAD_BYTES: u64 = 4096;
 
 // Data types of elements.
@@ -26,10 +29,10 @@ const INT32: u32 = 5;
 const MATRIX: u32 = 14;
 const COMPRESSED: u32 = 15;
 
-/// Flag of complex numbers.
+/// The flag of complex numbers.
 const COMPLEX: u32 = 0x0800;
 
-/// A file, with the place of each variable.
+/// An open file, with the position of each variable.
 pub(super) struct Mat {
     path: PathBuf,
     bytes: Vec<u8>,
@@ -39,21 +42,21 @@ pub(super) struct Mat {
 
 struct Variable {
     name: String,
-    /// The matrix's content, compressed or not.
+    /// Start of the matrix's content, compressed or not.
     start: usize,
     end: usize,
     is_compressed: bool,
 }
 
-/// An element: its type and where its data are.
+/// An element: its type and its data.
 struct Element<'b> {
     kind: u32,
     data: &'b [u8],
-    /// What follows it.
+    /// The bytes after the element.
     rest: &'b [u8],
 }
 
-/// What comes before a matrix's numbers.
+/// The elements of a matrix before its numbers.
 struct Head<'b> {
     class: u32,
     is_complex: bool,
@@ -63,7 +66,7 @@ struct Head<'b> {
 }
 
 impl Mat {
-    /// Whether a file of this start is one.
+    /// Whether a file with these first bytes is a level 5 `.mat` file.
     pub(super) fn is_start(start: &[u8]) -> bool {
         start.len() >= HEADER_BYTES
             && matches!(&start[124..128], [0, 1, b'I', b'M'] | [1, 0, b'M', b'I'])
@@ -79,7 +82,7 @@ impl Mat {
             let head = match kind {
                 COMPRESSED => {
                     let mut head = Vec::new();
-                    // What is cut off or damaged further on is for whoever asks for this variable.
+                    // Damage further on is reported when this variable is read.
                     let _ = ZlibDecoder::new(content).take(HEAD_BYTES).read_to_end(&mut head);
                     Some(head)
                 }
@@ -98,7 +101,7 @@ impl Mat {
         Ok(mat)
     }
 
-    /// Type of the element at `start`, and where its data begin and end.
+    /// The type of the element at `start`, and where its data begin and end.
     fn variable_at(&self, start: usize) -> Result<(u32, usize, usize), FileError> {
         let cut = || self.damaged("it ends inside a variable".to_owned());
         let tag = self.bytes.get(start..start + 8).ok_or_else(cut)?;
@@ -139,7 +142,8 @@ impl Mat {
         };
         let cut = || self.damaged(format!("`{field}`: it ends inside its numbers"));
         let head = self.head(matrix).ok_or_else(cut)?;
-        // Numbers of any type; cells, structures, objects, text and sparse matrices are none.
+        // Classes 6 to 15 are numbers of any type. Cells, structures, objects, text and sparse
+        // matrices have other classes.
         if !(6..=15).contains(&head.class) {
             let kind = match head.class {
                 1 => "a cell array",
@@ -185,7 +189,7 @@ impl Mat {
         })
     }
 
-    /// The element at the start of these bytes; small ones have their data in the tag.
+    /// The element at the start of `bytes`. A small element has its data in its tag.
     fn element<'b>(&self, bytes: &'b [u8]) -> Option<Element<'b>> {
         let tag = bytes.get(..4)?;
         let word = self.word(tag);

@@ -1,8 +1,14 @@
-//! Single-pixel measurements from a file, ours or another lab's: `.npz`, `.npy`, `.mat`, HDF5, `.csv` or `.txt`.
+//! Reads single-pixel measurements from a file of nirspi or of another lab: `.npz`, `.npy`, `.mat`,
+//! HDF5, `.csv` or `.txt`.
 //!
-//! The law: what [`read`] returns is consistent (every row known, within range and shown once, one finite reading or pair for
-//! each), so nothing after it has to look again; and nothing is guessed: an order, a side or a form of readings that does not fit
-//! the numbers is refused.
+//! # Invariant
+//! A measurement that [`read`] returns is consistent: every row is known, within range and shown
+//! once, and has one finite reading or pair. Later code need not check again. The reader never
+//! guesses: an order, a side or a form of readings that does not fit the numbers is an error
+//! (`tests::each_bad_field_gets_a_line_that_names_it`,
+//! `tests::an_order_gives_the_rows_of_readings_alone_and_is_never_guessed`).
+//!
+//! # Fields
 //!
 //! | field | content |
 //! |---|---|
@@ -12,9 +18,10 @@
 //! | `d` | `(..., M)` differential readings; NaN: not read |
 //! | `recon` | optional `(n, n)`, or one for each measurement: someone's reconstruction, to compare with |
 //!
-//! `...` are any leading axes, whose measurements are counted through; axes of length 1 do not count. Readings may be complex,
-//! of any real type, byte order and memory order; other fields are not looked at. A file that is one array, with any name or
-//! none, holds readings alone.
+//! `...` are any leading axes; the measurements in the leading axes are numbered in C order. Axes
+//! of length 1 do not count. Readings may be complex, and of any real type, byte order and memory
+//! order. The reader ignores other fields. If a file is one array, with any name or none, the array
+//! holds the readings.
 
 mod form;
 mod images;
@@ -35,59 +42,62 @@ pub use plain::{Plain, read_plain};
 use std::path::Path;
 pub use write::encode;
 
-/// What of a file is wanted, and what it does not say itself.
+/// What to read from a file, and what the file itself does not say.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Selection {
-    /// Which measurement of a file that holds several.
+    /// The index of the measurement, in a file that holds several.
     pub index: Option<usize>,
-    /// How readings belong to patterns; without it, `y` holds pairs and `d` differences.
+    /// How readings belong to patterns. By default, `y` holds pairs and `d` differences.
     pub form: Option<Form>,
-    /// The field of the readings; without it, `y`, or else `d`.
+    /// The field of the readings. By default `y`, or else `d`.
     pub field: Option<String>,
-    /// Patterns are along the first axis, not the last.
+    /// Whether patterns are along the first axis instead of the last.
     pub patterns_first: bool,
-    /// Side of the image, where the file does not say it.
+    /// Side of the image, if the file does not state it.
     pub side: Option<Side>,
-    /// The order in which patterns were shown, where the file has no `h_row`.
+    /// The order in which patterns were shown, if the file has no `h_row`.
     pub shown: Option<Order>,
-    /// The image's pixels were numbered down the columns, as MATLAB does: patterns are transposed.
+    /// Whether the image's pixels are numbered down the columns, as in MATLAB. Patterns are then
+    /// transposed.
     pub transpose: bool,
-    /// Every comma of a text file is a decimal one.
+    /// Whether every comma of a text file is a decimal comma.
     pub decimal_comma: bool,
 }
 
-/// The numbers that a detector gave, in volts, counts or whatever it was logged in.
+/// The detector's readings, in volts, counts or any other logged unit.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Readings {
     /// `2 M` readings: pattern, complement, pattern, complement.
     Pairs(Vec<f64>),
     /// `M` differences, pattern minus complement.
     Differential(Vec<f64>),
-    /// `M` readings of patterns alone.
+    /// `M` readings of patterns without complements.
     Single(Vec<f64>),
 }
 
-/// One measurement, checked: `h_row` has 1 to n^2 different rows of the n^2, readings are finite
-/// and fit it.
+/// One checked measurement: `h_row` has 1 to n^2 different rows of the n^2, and one finite reading
+/// or pair for each row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeasurementFile {
-    /// Hadamard rows in the order shown, of the patterns that were read; their side is that of the image.
+    /// Hadamard rows of the patterns that were read, in the order shown. The side of `h_row` is
+    /// that of the image.
     pub h_row: Rows,
-    /// What the detector saw.
+    /// The detector's readings.
     pub readings: Readings,
-    /// The imaginary part of complex readings.
+    /// The imaginary parts of complex readings.
     pub imaginary: Option<Readings>,
-    /// Places in the order shown of the patterns that were read, one for each of [`h_row`](Self::h_row).
+    /// Positions in the order shown of the patterns that were read, one for each of
+    /// [`h_row`](Self::h_row).
     pub places: Vec<usize>,
-    /// Places of patterns that were not read: NaN, or a negative row.
+    /// Positions of patterns that were not read: the reading is NaN, or the row is negative.
     pub not_read: Vec<usize>,
     /// The file's own reconstruction, if it holds one.
     pub reference: Option<Reference>,
-    /// What was odd about the file without making it useless, a line each.
+    /// Oddities of the file that do not make it unusable, one line each.
     pub notes: Vec<String>,
 }
 
-/// Somebody's image of the same scene.
+/// An image of the same scene that the file holds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reference {
     /// The image, or its real part.
@@ -96,7 +106,7 @@ pub struct Reference {
     pub imaginary: Option<Image>,
 }
 
-/// Reads and checks a measurement file. `y` is taken before `d`.
+/// Reads and checks a measurement file. If the file has both, `y` is read and not `d`.
 ///
 /// # Errors
 /// [`FileError`], one line that names file, field, what was found and what was expected.
@@ -106,7 +116,7 @@ pub fn read(path: &Path, want: &Selection) -> Result<MeasurementFile, FileError>
     file.measurement(index)
 }
 
-/// Reads and checks every measurement of a file, in their order: a video.
+/// Reads and checks every measurement of a file in order, as the frames of a video.
 ///
 /// # Errors
 /// As [`read`].

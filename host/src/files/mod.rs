@@ -1,9 +1,12 @@
-//! Files that come in and files that go out.
+//! Reads and writes files.
 //!
-//! The law: what comes in is either whole and checked, or refused with one line that names the
-//! file, the field, what was found and what was expected ([`FileError`]); what goes out is either
-//! whole or not there ([`output`]). A file can claim any size: memory is taken for data that
-//! arrived, never for a claim.
+//! # Invariant
+//! A file is either read whole and checked, or refused with a one-line [`FileError`] that names the
+//! file, the field, what was found and what was expected
+//! (`error::tests::every_message_is_one_line`). A result is either written whole or not at all
+//! (`output::tests::one_file_is_whole_or_not_there`). A file can claim any size: memory grows with
+//! the data that arrived, never with a claim
+//! (`array::tests::a_claim_beyond_the_limit_takes_no_memory`).
 
 #[cfg(feature = "training")]
 pub mod characters;

@@ -1,6 +1,9 @@
-//! Images as NumPy `.npy` files: a stack `(N, H, W)` in, any shape of numbers out.
+//! Reads and writes images as NumPy `.npy` files. The reader accepts a stack `(N, H, W)`; the
+//! writer accepts any shape of numbers.
 //!
-//! The law: [`encode`] then [`read_stack`] gives back the same bits.
+//! # Invariant
+//! [`read_stack`] returns the bits that [`encode`] wrote
+//! (`tests::what_is_written_reads_back_bit_for_bit`).
 
 use super::FileError;
 use super::archive::{NUMBERS, kind_by_start, open_file};
@@ -18,13 +21,13 @@ const FIELD: &str = "array";
 /// Images of one size, row-major, one after another.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stack {
-    /// Images in the stack, at least 1.
+    /// Number of images in the stack, at least 1.
     pub count: usize,
-    /// Rows of an image, at least 1.
+    /// Number of rows of an image, at least 1.
     pub height: usize,
-    /// Columns of an image, at least 1.
+    /// Number of columns of an image, at least 1.
     pub width: usize,
-    /// `count * height * width` values, finite unless read as having gaps.
+    /// `count * height * width` values, all finite unless the stack was read by [`read_with_gaps`].
     pub values: Vec<f32>,
 }
 
@@ -38,7 +41,7 @@ pub fn read_stack(path: &Path) -> Result<Stack, FileError> {
     finite(path, stack)
 }
 
-/// Reads pictures as [`read_stack`] does, but of 8-bit grey levels v as v / 255, as a PNG's are.
+/// Reads pictures as [`read_stack`] does. An 8-bit grey level v becomes v / 255, as in a PNG.
 ///
 /// # Errors
 /// As [`read_stack`].
@@ -51,18 +54,18 @@ pub fn read_pictures(path: &Path) -> Result<Pictures, FileError> {
     Ok(Pictures { is_single: header.shape().len() == 2, stack })
 }
 
-/// Reads numbers as [`read_stack`] does, of which some may be missing: NaN or infinite.
+/// Reads numbers as [`read_stack`] does, but numbers may be missing: NaN or infinite.
 ///
 /// # Errors
-/// As [`read_stack`], but for those.
+/// As [`read_stack`], except for missing numbers.
 pub fn read_with_gaps(path: &Path) -> Result<Stack, FileError> {
     Ok(read(path)?.1)
 }
 
-/// Pictures of a file.
+/// The pictures of a file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pictures {
-    /// Is it one picture (H, W), not a stack of them?
+    /// Whether the file is one picture (H, W) instead of a stack.
     pub is_single: bool,
     /// The pictures.
     pub stack: Stack,
@@ -100,19 +103,19 @@ pub fn read_list(path: &Path) -> Result<Vec<f64>, FileError> {
 /// A matrix, row-major.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Matrix {
-    /// Rows, at least 1.
+    /// Number of rows, at least 1.
     pub rows: usize,
-    /// Columns, at least 1.
+    /// Number of columns, at least 1.
     pub columns: usize,
     /// `rows * columns` finite values.
     pub values: Vec<f64>,
 }
 
 impl Matrix {
-    /// The values of these rows, one after another; all of them are not copied.
+    /// The values of these rows, one after another. If all rows are selected, nothing is copied.
     ///
     /// # Panics
-    /// If there is no such row.
+    /// If a row does not exist.
     #[must_use]
     pub fn select(&self, rows: &[usize]) -> Cow<'_, [f64]> {
         let first = rows.iter().copied().eq(0..rows.len());
@@ -146,7 +149,7 @@ pub fn read_matrix(path: &Path) -> Result<Matrix, FileError> {
 fn read(path: &Path) -> Result<(Header, Stack), FileError> {
     let fits = |shape: &[u64]| matches!(shape.len(), 2 | 3) && !shape.contains(&0);
     let (header, values) = read_numbers::<f32>(path, EXPECTED, fits, "(N, H, W) or (H, W)")?;
-    // Each axis fits: their product is the length of `values`.
+    // Each axis fits into `usize`: the product of all axes is the length of `values`.
     let axis = |from_last: usize| {
         let shape = header.shape();
         shape.len().checked_sub(from_last).map_or(1, |at| shape[at] as usize)
@@ -166,7 +169,7 @@ pub(super) fn read_field(path: &Path) -> Result<Field, FileError> {
     Ok(Field { shape, real, imaginary })
 }
 
-/// Header and numbers of a `.npy` file whose shape fits.
+/// Reads the header and the numbers of a `.npy` file whose shape fits.
 fn read_numbers<T: Sample>(
     path: &Path,
     expected: &'static str,
@@ -211,18 +214,18 @@ fn read_array<D>(
     if !fits(header.shape()) {
         return Err(refuse(path, format!("has shape {}", shape_text(header.shape())), shapes));
     }
-    // The file cannot hold more than its own length, so that is the most that is taken into memory.
+    // The file cannot hold more than its own length, so its length limits the memory.
     let limit_bytes = file_bytes.saturating_sub(header.header_bytes);
     let values = decode(&header, &mut stream, limit_bytes).map_err(explain)?;
     Ok((header, values))
 }
 
-/// A number that arrays are written of.
+/// A number type that the writer accepts.
 pub trait Element: Copy + private::Sealed {
-    /// Its name in a header.
+    /// The type's name in a header.
     #[doc(hidden)]
     const DESCR: &'static str;
-    /// Appends its little-endian bytes.
+    /// Appends the number's little-endian bytes.
     #[doc(hidden)]
     fn append(self, bytes: &mut Vec<u8>);
 }
@@ -251,11 +254,10 @@ element!(i64, "<i8");
 /// The bytes of a `.npy` file (format 1.0, little-endian, C order) for an array of this shape.
 ///
 /// # Panics
-/// If the product of `shape` is not the number of values, or there are more than a hundred axes:
-/// the caller made both.
+/// If the product of `shape` is not the number of values, or there are more than a hundred axes.
 #[must_use]
 pub fn encode<T: Element>(shape: &[usize], values: &[T]) -> Vec<u8> {
-    /// Data start at a multiple of this, so that NumPy can map the file.
+    /// The data start at a multiple of this number of bytes, so that NumPy can map the file.
     const ALIGNMENT: usize = 64;
     assert_eq!(
         shape.iter().product::<usize>(),

@@ -1,7 +1,9 @@
-//! A user's own order of patterns: a text file of numbers, entry k the natural-order Hadamard row shown k-th.
+//! Reads a user's own order of patterns: a text file of numbers, in which entry k is the
+//! natural-order Hadamard row shown k-th.
 //!
-//! Numbers are separated by blanks, commas, semicolons or lines; `#` begins a comment. Anything else is an error that names its line
-//! (`what_is_no_table_is_refused_in_one_line_that_names_the_place`).
+//! Numbers are separated by blanks, commas, semicolons or line ends; `#` begins a comment. Anything
+//! else is an error that names its line
+//! (`tests::what_is_no_table_is_refused_in_one_line_that_names_the_place`).
 
 use super::FileError;
 use super::archive::read_text;
@@ -9,8 +11,8 @@ use std::path::Path;
 
 const EXPECTED: &str = "a text file of pattern numbers";
 
-/// Reads a table. Whether it is a permutation is for [`Order::rows`](nirspi_recon::Order::rows) to say, which knows
-/// the side.
+/// Reads a table. [`Order::rows`](nirspi_recon::Order::rows), which knows the side, checks that the
+/// table is a permutation.
 ///
 /// # Errors
 /// [`FileError`], one line that names file, line, what was found and what was expected.

@@ -1,8 +1,12 @@
-//! Results on disk: whole, or not there.
+//! Writes results to disk: each file is whole, or does not exist.
 //!
-//! The law: a file appears under its name only when it is complete and safely on the disk, and a
-//! run that fails leaves everything as it was, down to the folders it made. No staged file is kept open, so a folder takes
-//! more files than a process may have open.
+//! # Invariant
+//! A file appears under its name only when it is complete and synced to the disk
+//! (`tests::files_appear_only_at_commit`). A run that fails leaves everything as before, without
+//! the folders that it made (`tests::a_run_that_fails_leaves_nothing_of_its_own`,
+//! `tests::a_run_that_fails_leaves_what_was_there`). No staged file is kept open, so a folder can
+//! receive more files than a process may have open
+//! (`tests::a_folder_keeps_no_file_open_however_many_it_takes`).
 
 use super::FileError;
 use std::fs;
@@ -10,30 +14,32 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use tempfile::TempPath;
 
-/// Start of the names of files that are still being written, beside their final place.
+/// Prefix of the hidden names of files that are still being written, next to their final paths.
 const STAGED_PREFIX: &str = ".nirspi-";
 
 /// A folder that receives all the results of a run at once.
 ///
-/// [`create`](Self::create) makes the folder, [`write`](Self::write) stages files in it under
-/// hidden names and [`commit`](Self::commit) renames them into place, replacing older ones of the
-/// same name. Dropped without `commit`, it removes what it staged and every folder that it made.
+/// [`create`](Self::create) makes the folder, [`write`](Self::write) stages files in the folder
+/// under hidden names, and [`commit`](Self::commit) renames the files into place and replaces older
+/// files of the same name. An `OutputDir` that is dropped without `commit` removes its staged files
+/// and every folder that it made.
 #[derive(Debug)]
 pub struct OutputDir {
     path: PathBuf,
-    /// Before `made`, so that the files are gone when the folders go.
+    /// `staged` comes before `made`, so that the files are removed before the folders.
     staged: Vec<(TempPath, PathBuf)>,
     made: MadeFolders,
 }
 
 impl OutputDir {
-    /// Opens the folder, making it and its parents where they are missing.
+    /// Opens the folder. Missing folders on its path are made.
     ///
     /// # Errors
-    /// [`FileError`] if the path is a file, or the system refuses; nothing is left behind.
+    /// [`FileError`] if the path is a file, or the system refuses. Nothing is left behind.
     pub fn create(path: &Path) -> Result<Self, FileError> {
         let mut made = MadeFolders(Vec::new());
-        // `--out name/` and `--out name` are the same folder, and an empty path is the current one.
+        // `--out name/` and `--out name` are the same folder, and an empty path is the current
+        // folder.
         let missing: Vec<&Path> = path
             .ancestors()
             .take_while(|p| !p.as_os_str().is_empty() && fs::symlink_metadata(p).is_err())
@@ -57,7 +63,7 @@ impl OutputDir {
         }
     }
 
-    /// The folder.
+    /// The path of the folder.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
@@ -66,7 +72,7 @@ impl OutputDir {
     /// Stages a file named `name` (a plain file name) in the folder.
     ///
     /// # Errors
-    /// [`FileError`] names the file and what the system said.
+    /// [`FileError`] names the file and the system's reason.
     pub fn write(&mut self, name: &str, bytes: &[u8]) -> Result<(), FileError> {
         let target = self.path.join(name);
         let staged = stage(&self.path, &target, bytes)?;
@@ -77,15 +83,15 @@ impl OutputDir {
     /// Renames every staged file into place and returns their paths in the order written.
     ///
     /// # Errors
-    /// [`FileError`] names the first file that could not be placed. New files placed before it are
-    /// removed again; older files that were already replaced stay replaced, whole.
+    /// [`FileError`] names the first file that could not be placed. New files placed before the
+    /// error are removed again. Older files that were already replaced stay replaced, whole.
     pub fn commit(mut self) -> Result<Vec<PathBuf>, FileError> {
         let mut placed: Vec<(PathBuf, bool)> = Vec::new();
         for (staged, target) in self.staged.drain(..) {
             let replaces = target.exists();
             if let Err(error) = place(staged, &target) {
                 for (new, _) in placed.iter().filter(|(_, replaced)| !replaced) {
-                    // The first error is the one to report; this one says nothing more.
+                    // The first error is reported; an error of the removal adds nothing.
                     let _ = fs::remove_file(new);
                 }
                 return Err(error);
@@ -98,7 +104,7 @@ impl OutputDir {
     }
 }
 
-/// Writes one file: it is whole under its name, or not there.
+/// Writes one file, whole or not at all.
 ///
 /// # Errors
 /// [`FileError`] if the folder is missing, the path is a folder, or the system refuses.
@@ -111,13 +117,13 @@ pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
     sync_folder(folder).map_err(|error| FileError::io(folder, "write to", error))
 }
 
-/// Puts the names in a folder on the disk, where the system has a way to say so.
+/// Syncs the names in a folder to the disk, on systems that can do so.
 pub(crate) fn sync_folder(folder: &Path) -> io::Result<()> {
     if cfg!(not(unix)) {
         return Ok(());
     }
     match fs::File::open(folder).and_then(|folder| folder.sync_all()) {
-        // A folder that may be written to but not read, or a file system that syncs no folders.
+        // The folder may be writable but not readable, or the file system cannot sync folders.
         Err(error)
             if matches!(
                 error.kind(),
@@ -132,14 +138,15 @@ pub(crate) fn sync_folder(folder: &Path) -> io::Result<()> {
     }
 }
 
-/// Folders that go again when a run fails, outermost first.
+/// Folders to remove when a run fails, outermost first.
 #[derive(Debug)]
 struct MadeFolders(Vec<PathBuf>);
 
 impl Drop for MadeFolders {
     fn drop(&mut self) {
         for folder in self.0.iter().rev() {
-            // Fails where someone else put a file meanwhile: then the folder is theirs.
+            // The removal fails if another program put a file into the folder meanwhile; the folder
+            // then stays.
             let _ = fs::remove_dir(folder);
         }
     }
@@ -149,13 +156,13 @@ fn stage(folder: &Path, target: &Path, bytes: &[u8]) -> Result<TempPath, FileErr
     if target.is_dir() {
         return Err(FileError::kind(target, "a folder", "a file to write"));
     }
-    // A missing folder is what is wrong, not the hidden file in it.
+    // The error names the missing folder, not the hidden file in it.
     if let Err(error) = fs::metadata(folder) {
         return Err(FileError::io(folder, "write to", error));
     }
     let write = |error: io::Error| FileError::io(target, "write", error);
-    // The file is made here and not by `tempfile`, whose errors hide the system's reason. Results are for others to read, as
-    // far as the user's umask lets them.
+    // This function makes the file itself, because errors of `tempfile` hide the system's reason.
+    // Other users may read results as far as the umask allows.
     let staged = tempfile::Builder::new()
         .prefix(STAGED_PREFIX)
         .make_in(folder, |path| fs::File::create_new(path))
@@ -295,7 +302,7 @@ mod tests {
     #[cfg(target_os = "linux")]
     #[test]
     fn a_folder_that_takes_no_files_is_named_with_the_reason() {
-        // No file can be made in /proc, not even by root.
+        // A program cannot make a file in /proc, not even as root.
         let error = write_atomic(Path::new("/proc/image.npy"), b"x").unwrap_err();
         assert!(line(&error).starts_with("/proc/image.npy: cannot write it: "), "{error}");
         assert!(!error.to_string().contains(STAGED_PREFIX), "{error}");

@@ -1,6 +1,8 @@
-//! Sparse problems from a NumPy `.npz` file, and their solutions.
+//! Reads sparse problems from a NumPy `.npz` file, and writes their solutions.
 //!
-//! The law: a problem that was read fits together, so nothing after it has to look again.
+//! # Invariant
+//! The parts of a problem that was read fit together, so later code need not check again
+//! (`tests::what_does_not_fit_is_named`).
 //!
 //! | field | content |
 //! |---|---|
@@ -18,18 +20,18 @@ use super::archive::{self, Archive, Numbers};
 use super::npy;
 use std::path::Path;
 
-/// Measurements, and the dictionary that is to explain them.
+/// Measurements, and the dictionary in which their sparse solution is sought.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ProblemFile {
     /// `measurements x atoms`, row-major, finite.
     pub dictionary: Vec<f64>,
-    /// Rows of the dictionary, at least 1.
+    /// Number of rows of the dictionary, at least 1.
     pub measurements: usize,
-    /// Columns of the dictionary, at least 1.
+    /// Number of columns of the dictionary, at least 1.
     pub atoms: usize,
     /// Frames of `measurements` numbers, one after another, finite.
     pub frames: Vec<f64>,
-    /// Atoms to choose, at least 1 and no more than there are.
+    /// Number of atoms to choose, at least 1 and at most the number of atoms.
     pub sparsity: usize,
 }
 
@@ -89,10 +91,11 @@ fn check_finite(path: &Path, field: &'static str, numbers: &Numbers) -> Result<(
     Err(FileError::Field { path: path.to_owned(), field: field.into(), found, expected })
 }
 
-/// The bytes of a solution file: for each frame its atoms and their coefficients, at most `sparsity`.
+/// The bytes of a solution file: for each frame its atoms and their coefficients, at most
+/// `sparsity` of each.
 ///
 /// # Errors
-/// [`FileError`] naming `path`, if the archive cannot be put together.
+/// [`FileError`] naming `path`, if the archive cannot be written.
 pub fn encode(
     path: &Path,
     sparsity: usize,

@@ -1,8 +1,9 @@
-//! Images in and images out, as arrays or as pictures: `.npy`, PNG or JPEG, or a folder of these.
+//! Reads and writes stacks of images as arrays or as pictures: `.npy`, PNG or JPEG, or a folder of
+//! these.
 //!
 //! # Invariant
-//! Where results go is checked before anything is computed: [`ImageStack::target`] fails first
-//! (`host/cli/tests/cli/enhance.rs`).
+//! The path of the results is checked before anything is computed: [`ImageStack::target`] fails
+//! first (`host/cli/tests/cli/enhance.rs`).
 
 use super::FileError;
 use super::image::{Grey, encode_grey, read_grey};
@@ -12,17 +13,17 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// Why images cannot be taken together, or not be written where they are to go. `Display` is one line.
+/// Why images cannot be read together, or cannot be written to a path. `Display` is one line.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum StackError {
-    /// A file that cannot be read or written.
+    /// A file cannot be read or written.
     #[error(transparent)]
     File(#[from] FileError),
-    /// A folder without pictures.
+    /// The folder holds no pictures.
     #[error("{}: no .png or .jpg files in it", .0.display())]
     Empty(PathBuf),
-    /// Pictures of one folder that differ in size.
+    /// Pictures of one folder differ in size.
     #[error(
         "{}: {} x {} pixels, expected {} x {} as {} has",
         path.display(), found.0, found.1, expected.0, expected.1, first.display()
@@ -30,42 +31,42 @@ pub enum StackError {
     Sizes {
         /// The picture that differs.
         path: PathBuf,
-        /// Its rows and columns.
+        /// Its number of rows and columns.
         found: (usize, usize),
-        /// Rows and columns of the first.
+        /// The number of rows and columns of the first picture.
         expected: (usize, usize),
-        /// The first.
+        /// The first picture.
         first: PathBuf,
     },
-    /// Two pictures of a folder whose results would have one name.
+    /// The results of two pictures of a folder would have the same name.
     #[error("{}: two pictures whose result would be {name}", folder.display())]
     Twice {
         /// The folder.
         folder: PathBuf,
-        /// The name.
+        /// The common name.
         name: String,
     },
-    /// Images of another size than is needed.
+    /// The images do not have the size that is needed.
     #[error(
         "{}: images of {height} x {width} pixels, expected {side} x {side}; --resize brings pictures to that",
         path.display()
     )]
     Size {
-        /// Where they come from.
+        /// The path of the images.
         path: PathBuf,
         /// Rows.
         height: usize,
         /// Columns.
         width: usize,
-        /// Rows and columns needed.
+        /// The number of rows and of columns needed.
         side: usize,
     },
-    /// One picture for several images.
+    /// The results of several images cannot be one picture.
     #[error("--out {}: one picture for {count} images, expected a .npy file or a folder", path.display())]
     OnePicture {
-        /// Where they were to go.
+        /// The path of the results.
         path: PathBuf,
-        /// How many there are.
+        /// The number of images.
         count: usize,
     },
 }
@@ -83,21 +84,22 @@ pub struct ImageStack {
     form: Form,
 }
 
-/// How the images came, which is how results go.
+/// The form of the images; results have the same form.
 #[derive(Debug)]
 enum Form {
     Array {
         is_single: bool,
     },
-    /// Names of the files.
+    /// Pictures, with the names of the files.
     Pictures(Vec<String>),
 }
 
 impl ImageStack {
-    /// Reads a `.npy` array, a picture or a folder of pictures, which are brought to a side if one is given.
+    /// Reads a `.npy` array, a picture or a folder of pictures. With `resize`, pictures are resized
+    /// to this side.
     ///
     /// # Errors
-    /// [`StackError`] for a file that cannot be read, or pictures that do not belong together.
+    /// [`StackError`] for a file that cannot be read, or for pictures of different sizes.
     pub fn read(path: &Path, resize: Option<u32>) -> Result<Self> {
         if path.is_dir() {
             return Self::folder(path, resize);
@@ -146,7 +148,7 @@ impl ImageStack {
         }
         let (height, width) = size.unwrap_or_default();
         let names: Vec<String> = files.iter().map(|file| file_name(file)).collect();
-        // Sorted by path: equal names are neighbours.
+        // The names are sorted by path, so equal names are adjacent.
         if let Some(twice) = names.windows(2).find(|pair| pair[0] == pair[1]) {
             let (folder, name) = (path.to_owned(), twice[0].clone());
             return Err(StackError::Twice { folder, name });
@@ -155,13 +157,13 @@ impl ImageStack {
         Ok(Self { path: path.to_owned(), count: files.len(), height, width, values, form })
     }
 
-    /// How many.
+    /// The number of images.
     #[must_use]
     pub fn count(&self) -> usize {
         self.count
     }
 
-    /// Where they come from.
+    /// The path of the images.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
@@ -179,7 +181,7 @@ impl ImageStack {
         }
     }
 
-    /// Where results of these images go: an array for `.npy`, one picture for `.png`, else a folder of
+    /// The form of the results: an array for `.npy`, one picture for `.png`, else a folder of
     /// pictures.
     ///
     /// # Errors
@@ -208,7 +210,7 @@ impl ImageStack {
     }
 }
 
-/// Where results go.
+/// Where and in which form results are written.
 #[derive(Debug)]
 pub struct StackTarget {
     path: PathBuf,
@@ -217,17 +219,17 @@ pub struct StackTarget {
 
 #[derive(Debug)]
 enum Kind {
-    /// Of a stack of so many, or of one image alone.
+    /// An array of a stack of this many images, or of one image without the first axis.
     Array(Option<usize>),
     Picture,
     Folder(Vec<String>),
 }
 
 impl StackTarget {
-    /// Writes images of `side` x `side` in [0, 1].
+    /// Writes images of `side` x `side` with values in [0, 1].
     ///
     /// # Errors
-    /// [`StackError::File`] where they cannot be written.
+    /// [`StackError::File`] if the images cannot be written.
     pub fn write(&self, side: usize, values: &[f32]) -> Result<()> {
         match &self.kind {
             Kind::Array(Some(count)) => {

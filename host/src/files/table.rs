@@ -1,7 +1,7 @@
-//! A user's table of numbers: a text file of lines with fields, as a spreadsheet writes them.
+//! Reads a user's table of numbers: a text file of lines with fields, as a spreadsheet writes it.
 //!
-//! Fields are separated by commas, semicolons or tabs. Empty lines and lines that start with `#` are skipped, and so is a first
-//! line without a number: it is a heading.
+//! Fields are separated by commas, semicolons or tabs. Empty lines and lines that start with `#`
+//! are skipped. A first line without a number is a heading and is skipped too.
 
 use super::FileError;
 use super::archive::read_text;
@@ -13,7 +13,7 @@ const EXPECTED: &str = "a text file with a row of numbers a line";
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Table {
     path: PathBuf,
-    /// The number of the line, and its fields.
+    /// The number of each line, and its fields.
     rows: Vec<(usize, Vec<String>)>,
 }
 
@@ -51,7 +51,7 @@ impl Table {
         self.rows.iter().map(last).collect()
     }
 
-    /// Rows of two numbers; `columns` says which.
+    /// Rows of two numbers. `columns` names the two columns in error messages.
     ///
     /// # Errors
     /// [`FileError::Field`] for a row of another length, or a field that is not a number.
@@ -87,7 +87,7 @@ mod tests {
         assert_eq!(Table::read(&path).unwrap().last_column().unwrap(), [8.0, 12.0, 9.0]);
         let pairs = Table::read(&path).unwrap().pairs("place, ml").unwrap();
         assert_eq!(pairs, [[1.0, 8.0], [2.0, 12.0], [3.0, 9.0]]);
-        // A first line with one number in it is a row.
+        // A first line with one number in it is a row, not a heading.
         let (_folder, path) = file("b.csv", b"left,8\nright,12\n");
         assert_eq!(Table::read(&path).unwrap().last_column().unwrap(), [8.0, 12.0]);
     }

@@ -1,4 +1,4 @@
-//! Files made byte by byte for tests, so that each can be wrong in one chosen way.
+//! Makes files byte by byte for tests, so that each file is wrong in one chosen way.
 
 use std::path::PathBuf;
 use tempfile::TempDir;
@@ -34,7 +34,8 @@ pub(super) fn npy_i32(shape: &str, values: &[i32]) -> Vec<u8> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Zip {
     Stored,
-    /// As `numpy.savez` of large arrays and streaming writers do: sizes in a zip64 extra field.
+    /// Sizes in a zip64 extra field, as `numpy.savez` of large arrays and streaming writers store
+    /// them.
     Zip64,
     Deflated,
 }
@@ -101,7 +102,7 @@ fn crc32(bytes: &[u8]) -> u32 {
     })
 }
 
-/// A file of these bytes in a folder that goes with the returned guard.
+/// Writes a file of these bytes in a folder. Dropping the returned guard removes the folder.
 pub(super) fn file(name: &str, bytes: &[u8]) -> (TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
@@ -109,7 +110,7 @@ pub(super) fn file(name: &str, bytes: &[u8]) -> (TempDir, PathBuf) {
     (folder, path)
 }
 
-/// The message of an error, which must be one line that names the file.
+/// The message of an error. Asserts that the message is one line and names the file.
 pub(super) fn line(error: &super::FileError, name: &str) -> String {
     let line = error.to_string();
     assert!(!line.contains(['\n', '\r']), "{line:?}");

@@ -1,8 +1,13 @@
-//! Numbers in a text file, as a spreadsheet or a logger writes them: `.csv`, `.txt`, with decimal points or commas.
+//! Reads numbers in a text file of a spreadsheet or a logger: `.csv`, `.txt`, with decimal points
+//! or commas.
 //!
-//! The law: a comma is never guessed to be a decimal one. It is one where the file itself shows it (numbers are separated by
-//! semicolons, tabs or blanks; a number has digits that no whole number has, as in `0,05` or `1,5E-3`; lines have commas in some
-//! numbers and none in others), or where the user says so. One comma a line under a heading with one comma parts two columns.
+//! # Invariant
+//! A comma is never guessed to be a decimal comma
+//! (`tests::a_decimal_comma_is_seen_where_the_file_shows_it_and_asked_for_where_not`). A comma is
+//! decimal only if the user says so, or if the file shows it in one of three ways: numbers are
+//! separated by semicolons, tabs or blanks; a number has digits that a whole number does not have,
+//! as in `0,05` or `1,5E-3`; some numbers of a line have commas and others have none. One comma a
+//! line, under a heading with one comma, separates two columns.
 
 use super::FileError;
 use super::archive::read_large_text;
@@ -12,7 +17,7 @@ use std::path::Path;
 /// Words for a reading that was not taken.
 const UNREAD: [&str; 4] = ["nan", "null", "na", "none"];
 
-/// What a text file holds.
+/// The numbers of a text file.
 pub(super) enum Numbers {
     /// Columns with names from a heading.
     Columns(Vec<(String, Field)>),
@@ -20,7 +25,7 @@ pub(super) enum Numbers {
     Table(Field),
 }
 
-/// Whether a file of this start is text.
+/// Whether a file with these first bytes is text.
 pub(super) fn is_start(start: &[u8]) -> bool {
     let text = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(start);
     !text.is_empty() && text.iter().all(|&b| b >= b' ' && b != 0x7f || b"\t\r\n".contains(&b)) && {
@@ -29,14 +34,14 @@ pub(super) fn is_start(start: &[u8]) -> bool {
     }
 }
 
-/// Reads a file; with `decimal_comma`, every comma is one.
+/// Reads a file. With `decimal_comma`, every comma is a decimal comma.
 pub(super) fn read(path: &Path, decimal_comma: bool) -> Result<Numbers, FileError> {
     let text = read_large_text(path, EXPECTED)?;
     let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
     let lines: Vec<(usize, &str)> = text
         .lines()
         .enumerate()
-        // A tab at the end may close a cell that was left empty.
+        // A tab at the end of a line may close an empty cell.
         .map(|(at, line)| (at + 1, line.trim_start().trim_end_matches([' ', '\r'])))
         .filter(|(_, line)| !line.is_empty() && !line.starts_with(['#', '%']))
         .collect();
@@ -95,12 +100,13 @@ pub(super) fn read(path: &Path, decimal_comma: bool) -> Result<Numbers, FileErro
     })
 }
 
-/// What stands between numbers, and before their decimals.
+/// The separator between numbers, and the decimal mark.
 struct Separators {
-    /// The separator; `None` is any blank.
+    /// The separator; `None` means any blank.
     between: Option<char>,
     decimal: char,
-    /// Every line ends with the separator, which closes the line and parts nothing.
+    /// Whether every line ends with the separator. The last separator then closes the line and
+    /// starts no further number.
     closes: bool,
 }
 
@@ -135,7 +141,7 @@ impl Separators {
             };
         }
         let blanks = body.iter().any(|(_, line)| {
-            // A blank that does not follow a comma parts two numbers.
+            // A blank that does not follow a comma separates two numbers.
             line.split_whitespace().rev().skip(1).any(|word| !word.ends_with(','))
         });
         if between.is_some() || blanks {
@@ -154,7 +160,7 @@ impl Separators {
             if commas.contains(&0) || body.iter().any(shows_decimals) {
                 return decimal(None, ',');
             }
-            // Two names over two columns.
+            // Two names head two columns.
             if heading.is_some_and(|heading| heading.matches(',').count() == 1) {
                 return decimal(Some(','), '.');
             }
@@ -178,7 +184,7 @@ impl Separators {
     }
 }
 
-/// The number that a word stands for; NaN for one that was not read.
+/// The number that a word states; NaN for a reading that was not taken.
 fn parse(word: &str, decimal: char) -> Option<f64> {
     let word = word.trim_matches('"');
     if word.is_empty() || UNREAD.contains(&word.to_ascii_lowercase().as_str()) {
@@ -217,7 +223,7 @@ mod tests {
         assert_eq!(table("# log\n1 2 3\n"), (vec![1, 3], vec![1.0, 2.0, 3.0]));
         assert_eq!(table("1,2,3\n4,5,6\n").0, [2, 3]);
         assert_eq!(table("voltage of the wing\n1\n2\n3 ").1, [1.0, 2.0, 3.0]);
-        // A byte that is no UTF-8, as in a heading of another code page.
+        // A byte that is not valid UTF-8, as in a heading of another code page.
         let (_folder, path) = file("y.txt", b"U in \xb5V\n1\n2\n");
         assert!(
             matches!(read(&path, false), Ok(Numbers::Table(field)) if field.real == [1.0, 2.0])

@@ -1,4 +1,5 @@
-//! The learned stages for one image: scale to white, fuse with depth, deblur, agree with the readings.
+//! The learned stages for one image: scale to white, fuse with depth, deblur, and make the result
+//! agree with the readings.
 
 use super::white::brightest;
 use nirspi_nets::{
@@ -9,17 +10,17 @@ use nirspi_recon::{Image, Rows};
 use std::num::NonZeroU32;
 use thiserror::Error;
 
-/// What a white target would give one pixel of the image.
+/// The level of one pixel that sees a white target.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum White {
     /// Known, in the image's units (ADC counts for the instrument's own images).
     Known(f32),
-    /// Not known: the brightest 2 x 2 pixels are taken for white.
+    /// Unknown: the brightest 2 x 2 pixels are used as white.
     Brightest,
 }
 
 impl White {
-    /// The level for this image, in its units; 0 where there is no light.
+    /// The white level of this image, in its units; 0 for an image without light.
     #[must_use]
     pub fn level(self, image: &Image) -> f32 {
         match self {
@@ -28,7 +29,8 @@ impl White {
         }
     }
 
-    /// The median level of several images, so that a video does not flicker; 0 for none.
+    /// The median white level of several images, so that a video does not flicker; 0 without
+    /// images.
     #[must_use]
     pub fn median_level<'i>(self, images: impl IntoIterator<Item = &'i Image>) -> f32 {
         let mut levels: Vec<f32> = images.into_iter().map(|image| self.level(image)).collect();
@@ -37,17 +39,17 @@ impl White {
     }
 }
 
-/// What is known of an image besides its pixels.
+/// Information about an image besides its pixels.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ImageContext<'c> {
-    /// Natural-order Hadamard rows that it was made from; `None` for all.
+    /// Natural-order Hadamard rows that were measured; `None` means all rows.
     pub rows: Option<&'c Rows>,
-    /// Distances that a time-of-flight sensor saw at the same time: one map.
+    /// Distances of a time-of-flight sensor at the same time: one map.
     pub depth: Option<&'c DepthMaps>,
-    /// Least blur, in pixels of the 64 x 64 grid: that of the lens at the target's distance. Noise hides blur from the
-    /// estimator, so the larger of the two is taken out.
+    /// Least blur, in pixels of the 64 x 64 grid: the blur of the lens at the target's distance.
+    /// Noise hides blur from the estimator, so the larger of lens and estimate is removed.
     pub least_blur_px: Option<f32>,
-    /// Seed of what is random in the networks.
+    /// Seed of the networks' random numbers.
     pub seed: u64,
 }
 
@@ -55,16 +57,16 @@ pub struct ImageContext<'c> {
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum EnhanceError {
-    /// The networks take two sizes.
+    /// The image has another size than the two sizes that the networks accept.
     #[error("an image of {found} x {found} pixels, expected 32 x 32 or 64 x 64")]
     Side {
-        /// Its side.
+        /// The image's side.
         found: usize,
     },
-    /// Nothing is bright.
+    /// No pixel is bright.
     #[error("no light in the image: white is {white}, expected more than 0")]
     Dark {
-        /// The level taken for white.
+        /// The level that was used as white.
         white: f32,
     },
     /// A pixel is NaN or infinite.
@@ -73,29 +75,30 @@ pub enum EnhanceError {
     /// The measured rows are not rows of such an image.
     #[error(transparent)]
     Rows(#[from] MeasuredRowsError),
-    /// The networks gave no image.
+    /// The networks failed.
     #[error(transparent)]
     Networks(#[from] nirspi_nets::EnhanceError),
 }
 
-/// One image through the learned stages.
+/// The results of the learned stages for one image.
 #[derive(Debug, Clone)]
 pub struct EnhancedImage {
-    /// The input over white, in [0, 1], at its own side.
+    /// The input divided by white, in [0, 1], at its own side.
     pub scaled: Vec<f32>,
-    /// The level taken for white, in the input's units.
+    /// The level used as white, in the input's units.
     pub white: f32,
     /// 64 x 64 after fusion with depth, before deblurring; `None` for an input of 64 x 64.
     pub fused: Option<Vec<f32>>,
     /// The result: 64 x 64 in [0, 1].
     pub pixels: Vec<f32>,
-    /// Blur that was taken out: standard deviation in pixels of the 64 x 64 grid.
+    /// Blur that was removed: standard deviation in pixels of the 64 x 64 grid.
     pub blur_px: f32,
-    /// Blur as the estimator sees it in the image.
+    /// Blur that the estimator found in the image.
     pub estimated_blur_px: f32,
-    /// Noise of one pixel of the input, white being 1, as estimated.
+    /// Estimated noise of one pixel of the input; white is 1.
     pub noise: f32,
-    /// Distance of the readings from those of the result, over their noise: near 1 or below, they agree.
+    /// Distance of the readings from the readings of the result, divided by their noise. A value
+    /// near 1 or below means that they agree.
     pub inconsistency: f32,
 }
 
@@ -107,7 +110,7 @@ pub struct Enhance {
 }
 
 impl Enhance {
-    /// With the networks that come with the program.
+    /// The learned stages with the built-in networks.
     ///
     /// # Errors
     /// [`WeightsError`] if the built-in weights are damaged.
@@ -117,13 +120,14 @@ impl Enhance {
         Ok(Self::of(Enhancer::built_in(device)?, second, device.clone()))
     }
 
-    /// With networks of your own: both stages for 32 x 32, the second alone for 64 x 64.
+    /// The learned stages with other networks: both stages for 32 x 32, the second stage alone for
+    /// 64 x 64.
     #[must_use]
     pub fn of(both: Enhancer, second: Sharpener, device: Device) -> Self {
         Self { both, second, device }
     }
 
-    /// Where the networks run.
+    /// The device on which the networks run.
     #[must_use]
     pub fn device(&self) -> &Device {
         &self.device
@@ -132,7 +136,7 @@ impl Enhance {
     /// Enhances an image of 32 x 32 or 64 x 64 pixels.
     ///
     /// # Errors
-    /// [`EnhanceError`] for another size, a dark image or pixels that are no numbers.
+    /// [`EnhanceError`] for another size, a dark image, or pixels that are NaN or infinite.
     pub fn enhance(
         &self,
         image: &Image,
@@ -149,12 +153,12 @@ impl Enhance {
         }
         let scaled: Vec<f32> =
             image.pixels().iter().map(|&value| (value / white).clamp(0.0, 1.0)).collect();
-        // What is 64 x 64 was not measured by patterns of 32 x 32.
+        // An image of 64 x 64 was not measured by patterns of 32 x 32.
         let measured = match context.rows {
             Some(rows) if side == fusion::SIDE => MeasuredRows::new(side, rows)?,
             _ => MeasuredRows::All,
         };
-        // The larger of lens and estimator: noise hides blur from the estimator.
+        // The larger of lens and estimate is used, because noise hides blur from the estimator.
         let sigma_px = context.least_blur_px.map_or(Known::Nothing, Known::AtLeast);
         let options = Options {
             measured,

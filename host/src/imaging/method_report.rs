@@ -1,4 +1,4 @@
-//! What a reconstruction method did, as reports and captions tell it.
+//! The report of a reconstruction method, for JSON reports and captions.
 
 use nirspi_recon::omp::Backend;
 use nirspi_recon::reconstruct::{Completion, Method, Report};
@@ -6,17 +6,17 @@ use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};
 use std::fmt;
 
-/// What was done and found.
+/// A method and its report.
 #[derive(Debug)]
 pub struct MethodReport {
-    /// Which method.
+    /// The method.
     pub method: Method,
-    /// What it did.
+    /// The method's report.
     pub made: Report,
 }
 
 impl MethodReport {
-    /// In a few words, for a caption.
+    /// A few words for a caption.
     #[must_use]
     pub fn short(&self) -> String {
         self.made.short()
@@ -30,7 +30,8 @@ impl fmt::Display for MethodReport {
 }
 
 impl Serialize for MethodReport {
-    /// The method's word, and what it reports under that word, or under `penalty` where it has a strength.
+    /// Writes the method's name, and its report under the same name. The report of a method with a
+    /// strength is under `penalty`.
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let made = &self.made;
         let details = Details {

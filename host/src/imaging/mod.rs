@@ -1,11 +1,11 @@
-//! From a reconstructed image to an enhanced one, with its quality and the warnings that belong on it.
+//! Enhances a reconstructed image, and gives its quality and its warnings.
 //!
 //! ```text
 //! Image (ADC counts) ──white──> [0, 1] ──Enhance──> 64 x 64 in [0, 1] ──> Warning, Quality
 //! ```
 //!
-//! `demo`, `reconstruct`, `capture`, `serve` and `eval` all go this way: white level, the larger of lens and estimator as
-//! blur, networks, and the rule for warnings stand here once.
+//! `demo`, `reconstruct`, `capture`, `serve` and `eval` all use this module for the white level,
+//! the blur (the larger of lens and estimate), the networks, and the rule for warnings.
 
 #[cfg(feature = "enhance")]
 mod enhance;

@@ -1,4 +1,4 @@
-//! How close an image comes to what it shows.
+//! The quality of an image against a reference.
 
 use nirspi_recon::Image;
 use nirspi_recon::metrics::{self, MetricError};
@@ -11,40 +11,40 @@ pub struct Quality {
     pub psnr_db: f64,
     /// Structural similarity, Gaussian window of 11 px.
     pub ssim: f64,
-    /// Pearson's correlation of the image itself, which needs no fit; none of a flat image.
+    /// Pearson's correlation of the image itself, which needs no fit; `None` for a flat image.
     pub correlation: Option<f64>,
-    /// Whether the image is darker where the reference is brighter. Such an image is wrong, not dim: it is scored as a
-    /// blank one.
+    /// Whether the image is darker where the reference is brighter. An inverted image is wrong, not
+    /// dim, so it is scored as a blank image.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub inverted: bool,
 }
 
-/// An image in ADC counts, brought to the reference's scale by the gain and offset of least squares. A
-/// single-pixel camera has no absolute scale: illumination and gain are not known to it.
+/// An image in ADC counts, scaled to the reference by the gain and offset of least squares. A
+/// single-pixel camera has no absolute scale, because it knows neither illumination nor gain.
 ///
 /// # Invariant
-/// The gain is never negative: a fit may not turn a wrong picture into a right one
-/// (`an_inverted_image_is_scored_as_blank`).
+/// The gain is never negative: a fit must not turn a wrong picture into a right one
+/// (`tests::an_inverted_image_is_scored_as_blank`).
 pub struct Fitted {
-    /// The image on the reference's scale, clamped to `[0, 1]`; flat where it is inverted.
+    /// The image on the reference's scale, clamped to `[0, 1]`; flat if the image is inverted.
     pub values: Vec<f32>,
     /// Its quality.
     pub quality: Quality,
 }
 
-/// The gain and offset of least squares that bring an image to a reference's scale.
+/// The gain and offset of least squares that scale an image to a reference.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fit {
     /// Gain, 0 or more.
     pub gain: f64,
-    /// What is added.
+    /// The offset, added after the gain.
     pub offset: f64,
-    /// Whether the image is darker where the reference is brighter; its gain is 0 then.
+    /// Whether the image is darker where the reference is brighter. The gain is then 0.
     pub inverted: bool,
 }
 
 impl Fit {
-    /// Fits pixels to a reference of as many.
+    /// Fits pixels to a reference with the same number of pixels.
     #[must_use]
     pub fn of(image: &[f32], reference: &[f32]) -> Self {
         let n = reference.len() as f64;
@@ -68,10 +68,10 @@ impl Fit {
     }
 }
 
-/// Fits `image` to `reference`, of the same size, and compares.
+/// Fits `image` to `reference` of the same size, and compares them.
 ///
 /// # Errors
-/// [`MetricError`] if the sizes differ or a value is no number.
+/// [`MetricError`] if the sizes differ, or a value is NaN or infinite.
 pub fn compare(image: &Image, reference: &[f32]) -> Result<Fitted, MetricError> {
     let fit = Fit::of(image.pixels(), reference);
     let inverted = fit.inverted;

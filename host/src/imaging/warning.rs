@@ -1,14 +1,15 @@
-//! What people must know before they trust a picture: one rule for every command, page and file.
+//! Reasons to distrust a picture: one rule for every command, page and file.
 
 use super::EnhancedImage;
 use std::fmt;
 
-/// Inconsistency above which the readings contradict the image. An image that agrees with them ends at 1.1 or below, the
-/// radius that the networks' result is moved to.
+/// Inconsistency above which the readings contradict the image. An image that agrees with its
+/// readings has 1.1 or less, the radius to which the networks' result is moved.
 const CONTRADICTED: f32 = 1.2;
-/// Blur, in pixels of the 64 x 64 grid, up to which the networks were trained (`host/nets/weights/README.md`).
+/// The largest blur, in pixels of the 64 x 64 grid, for which the networks were trained
+/// (`host/nets/weights/README.md`).
 const TRAINED_BLUR_PX: f32 = 4.2;
-/// Noise of a pixel, white being 1, up to which the networks were trained.
+/// The largest noise of a pixel for which the networks were trained; white is 1.
 const TRAINED_NOISE: f32 = 0.1;
 
 /// A reason not to trust a picture.
@@ -17,17 +18,17 @@ const TRAINED_NOISE: f32 = 0.1;
 pub enum Warning {
     /// The readings contradict the enhanced image.
     Inconsistent {
-        /// Distance of the readings from those of the image, over their noise.
+        /// Distance of the readings from the readings of the image, divided by their noise.
         inconsistency: f32,
     },
-    /// More blur than the networks have learned to take out.
+    /// The blur is larger than the networks were trained to remove.
     Blurred {
         /// Standard deviation in pixels of the 64 x 64 grid.
         blur_px: f32,
     },
-    /// Too little light for the noise.
+    /// The noise is too large for the light.
     Dim {
-        /// Noise of one pixel, white being 1.
+        /// Noise of one pixel; white is 1.
         noise: f32,
     },
 }
@@ -57,7 +58,7 @@ impl fmt::Display for Warning {
 }
 
 impl Warning {
-    /// In a few words, for the picture itself.
+    /// A few words for the picture itself.
     #[must_use]
     pub fn short(&self) -> &'static str {
         match self {
@@ -68,11 +69,11 @@ impl Warning {
     }
 }
 
-/// All warnings that belong on this picture, worst first.
+/// All warnings for this picture, worst first.
 #[must_use]
 pub fn warnings(image: &EnhancedImage) -> Vec<Warning> {
     let EnhancedImage { inconsistency, blur_px, noise, .. } = *image;
-    // A figure that is no number is no reason to be calm.
+    // NaN counts as beyond the limit.
     let beyond = |value: f32, limit: f32| value > limit || value.is_nan();
     [
         beyond(inconsistency, CONTRADICTED).then_some(Warning::Inconsistent { inconsistency }),

@@ -1,14 +1,15 @@
-//! The level of white in an image of unknown scale: the mean of the brightest 2 x 2 pixels.
+//! Estimates white in an image of unknown scale: the mean of the brightest 2 x 2 pixels.
 //!
-//! Black needs no estimate: a differential measurement reads 0 without light. One bright pixel alone may be noise, and
-//! a percentile of all pixels says nothing about a letter on a dark ground.
+//! Black needs no estimate, because a differential measurement reads 0 without light. One bright
+//! pixel alone may be noise. A percentile of all pixels says nothing about a letter on a dark
+//! ground.
 
-/// A step of white that the scene makes; below it is noise.
+/// The smallest step of white that counts as a change of the scene; a smaller step counts as noise.
 const JUMP: f32 = 0.25;
-/// Share of what white has moved by noise that a [`SteadyWhite`] takes over from an image.
+/// Share of a small change of white that a [`SteadyWhite`] takes over from each image.
 const SHARE: f32 = 0.1;
 
-/// The largest mean of 2 x 2 neighbours among `side` x `side` pixels; 0 where there is no light.
+/// The largest mean of 2 x 2 neighbours among `side` x `side` pixels; 0 for an image without light.
 #[must_use]
 pub fn brightest(pixels: &[f32], side: usize) -> f32 {
     let corners =
@@ -18,14 +19,16 @@ pub fn brightest(pixels: &[f32], side: usize) -> f32 {
     means.fold(0.0, f32::max)
 }
 
-/// The white of a live view: it follows the scene at once, and noise hardly, so that nothing flickers.
+/// The white level of a live view. The level follows a change of the scene at once and noise only
+/// slowly, so that the view does not flicker
+/// (`tests::white_follows_the_scene_at_once_and_noise_hardly`).
 #[derive(Debug, Clone, Copy, Default)]
 pub struct SteadyWhite {
     level: f32,
 }
 
 impl SteadyWhite {
-    /// The white for an image whose own is `found`.
+    /// The white level for an image whose own estimate is `found`.
     pub fn follow(&mut self, found: f32) -> f32 {
         let change = found - self.level;
         self.level =

@@ -1,4 +1,4 @@
-//! Cameras by name: `virtual`, `usb`, `usb:SERIAL`, `tcp:HOST:PORT`, `serial:PATH[:BAUD]`.
+//! The addresses of cameras: `virtual`, `usb`, `usb:SERIAL`, `tcp:HOST:PORT`, `serial:PATH[:BAUD]`.
 
 use super::usb::UsbError;
 use super::{DEFAULT_BAUD, Link, SerialLink, TcpLink, UsbLink};
@@ -9,21 +9,21 @@ use std::path::PathBuf;
 use std::str::FromStr;
 use thiserror::Error;
 
-/// Which camera to use.
+/// The address of a camera.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum CameraAddress {
-    /// The one in this process.
+    /// The virtual camera in this process.
     Virtual,
-    /// One behind a TCP address.
+    /// A camera behind a TCP address.
     Tcp(String),
-    /// One behind a serial port.
+    /// A camera behind a serial port.
     Serial {
-        /// Its device, as `/dev/ttyACM0` or `COM7`.
+        /// The port's device, such as `/dev/ttyACM0` or `COM7`.
         path: PathBuf,
         /// Bits a second.
         baud: u32,
     },
-    /// One on USB: the one with this serial number, or the only one.
+    /// A camera on USB: the camera with this serial number, or the only camera.
     Usb(Option<String>),
 }
 
@@ -68,32 +68,32 @@ impl fmt::Display for CameraAddress {
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum OpenError {
-    /// Nothing answers there.
+    /// The TCP address does not answer.
     #[error("no camera at tcp:{address}")]
     Tcp {
         /// The address.
         address: String,
-        /// What the network says.
+        /// The network's error.
         #[source]
         problem: io::Error,
     },
-    /// The port cannot be used.
+    /// The serial port cannot be used.
     #[error("serial:{}: {}", .path.display(), serial_problem(.problem))]
     Serial {
         /// The port.
         path: PathBuf,
-        /// What the system says.
+        /// The system's error.
         problem: io::Error,
     },
-    /// No such camera on USB, or it cannot be used.
+    /// There is no such camera on USB, or the camera cannot be used.
     #[error(transparent)]
     Usb(#[from] UsbError),
-    /// It does not speak as a camera does.
+    /// The device at the address does not answer as a camera.
     #[error("{camera}")]
     Session {
         /// The camera's address.
         camera: String,
-        /// What went wrong.
+        /// The session's error.
         #[source]
         problem: SessionError,
     },
@@ -103,10 +103,11 @@ pub enum OpenError {
 }
 
 impl CameraAddress {
-    /// Opens a conversation with the camera. `virtual_link` makes the one in this process, if that is meant.
+    /// Opens a session with the camera. `virtual_link` makes the link to the virtual camera in this
+    /// process, if the address is `virtual`.
     ///
     /// # Errors
-    /// [`OpenError`], which says what to do about it.
+    /// [`OpenError`], which says what to do.
     pub fn open<E: Into<Box<dyn std::error::Error + Send + Sync>>>(
         &self,
         virtual_link: impl FnOnce() -> Result<Box<dyn Link>, E>,
@@ -123,18 +124,19 @@ impl CameraAddress {
                 SerialLink::open(path, *baud)
                     .map_err(|problem| OpenError::Serial { path: path.clone(), problem })?,
             ),
-            // Whose errors name the camera and say what to do.
+            // The link's errors name the camera and say what to do.
             Self::Usb(serial) => Box::new(UsbLink::open(serial.as_deref())?),
         };
         Session::open(link)
             .map_err(|problem| OpenError::Session { camera: self.to_string(), problem })
     }
 
-    /// Frames of 1024 patterns that the link must carry in a second; 0 where any speed will do.
+    /// Frames of 1024 patterns a second that the link must carry; 0 if any speed is enough.
     #[must_use]
     pub fn min_frames_per_s(&self) -> f64 {
         match self {
-            // Three quarters of what the boards' link to the FPGA lets come, by the estimate in docs/firmware.md.
+            // Three quarters of the rate that the boards' link to the FPGA allows, by the estimate
+            // in docs/firmware.md.
             Self::Usb(_) => 300.0,
             _ => 0.0,
         }

@@ -1,6 +1,7 @@
-//! A byte link to a camera: TCP, a serial port, USB; an in-memory one is in [`virtual_camera`](crate::virtual_camera).
+//! Byte links to a camera: TCP, a serial port, USB. The link in memory is in
+//! [`virtual_camera`](crate::virtual_camera).
 //!
-//! The one law: a link moves bytes and knows nothing of packets.
+//! A link moves bytes and does not interpret packets.
 
 mod address;
 mod serial;
@@ -15,14 +16,14 @@ pub use usb::UsbLink;
 use std::io;
 use std::time::Duration;
 
-/// What came of waiting for bytes.
+/// The result of waiting for bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Received {
     /// This many bytes, at least one.
     Bytes(usize),
-    /// None in the time given.
+    /// No bytes in the given time.
     Nothing,
-    /// The other side has gone.
+    /// The other side has closed the link.
     Closed,
 }
 
@@ -31,17 +32,17 @@ pub trait Link: Send {
     /// Sends all of `bytes`.
     ///
     /// # Errors
-    /// When the link is down.
+    /// If the link is down.
     fn send(&mut self, bytes: &[u8]) -> io::Result<()>;
 
     /// Waits up to `timeout` for bytes.
     ///
     /// # Errors
-    /// When the link fails other than by an orderly end or a reset by the other side.
+    /// If the link fails in another way than by an orderly end or a reset by the other side.
     fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<Received>;
 }
 
-/// Whether this error means that the other side went away, rather than that something is wrong here.
+/// Whether the error means that the other side has gone, and not that this side has a problem.
 pub(crate) fn is_hangup(error: &io::Error) -> bool {
     matches!(
         error.kind(),

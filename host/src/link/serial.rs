@@ -1,4 +1,4 @@
-//! A camera behind a serial port: a UART with an adapter, or QEMU's.
+//! A camera behind a serial port: a UART with an adapter, or the UART of QEMU.
 
 use super::{Link, Received, is_hangup};
 use serial2::{CharSize, FlowControl, Parity, SerialPort, Settings, StopBits};
@@ -6,9 +6,9 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Speed of a serial link unless another is asked for. USB serial ports ignore it.
+/// Default speed of a serial link. USB serial ports ignore the speed.
 pub const DEFAULT_BAUD: u32 = 115_200;
-/// A command that cannot be sent within this, cannot be sent.
+/// The longest time for sending a command.
 const SEND_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// A serial port: 8 data bits, no parity, one stop bit, no flow control.
@@ -19,10 +19,10 @@ pub struct SerialLink {
 }
 
 impl SerialLink {
-    /// Opens the port and throws away what it received before.
+    /// Opens the port and discards the bytes that it received before.
     ///
     /// # Errors
-    /// When there is no such port, it may not be used, or it cannot run at `baud` bits a second.
+    /// If the port does not exist, may not be used, or cannot run at `baud` bits a second.
     pub fn open(path: &Path, baud: u32) -> io::Result<Self> {
         let mut port = SerialPort::open(path, |mut settings: Settings| {
             settings.set_raw();
@@ -58,7 +58,7 @@ impl Link for SerialLink {
             self.timeout = timeout;
         }
         match self.port.read(buffer) {
-            // The port was readable, so there is nothing left to come.
+            // The port was readable, so no more bytes will arrive.
             Ok(0) => Ok(Received::Closed),
             Ok(bytes) => Ok(Received::Bytes(bytes)),
             Err(error) if has_gone(&error) => Ok(Received::Closed),
@@ -72,10 +72,11 @@ impl Link for SerialLink {
     }
 }
 
-/// Serial ports that a camera may be behind, by name. None is opened: who knows what listens there.
+/// Serial ports that may lead to a camera, by name. No port is opened, because the device behind a
+/// port is unknown.
 ///
 /// # Errors
-/// When the system does not say which ports there are.
+/// If the system does not list its ports.
 pub fn serial_ports() -> io::Result<Vec<PathBuf>> {
     let mut ports = SerialPort::available_ports()?;
     ports.retain(|port| could_be_a_camera(port));
@@ -83,8 +84,8 @@ pub fn serial_ports() -> io::Result<Vec<PathBuf>> {
     Ok(ports)
 }
 
-/// Leaves out UARTs of the mainboard (`ttyS0` to `ttyS31` are always listed), modems and Bluetooth, and of macOS's two
-/// names for each port the one that waits for a carrier.
+/// Excludes UARTs of the mainboard (`ttyS0` to `ttyS31` are always listed), modems and Bluetooth.
+/// macOS has two names for each port; the name that waits for a carrier is excluded.
 fn could_be_a_camera(port: &Path) -> bool {
     let name = port.file_name().and_then(|name| name.to_str()).unwrap_or_default();
     let kinds = ["ttyUSB", "ttyACM", "ttyAMA", "cu.usb", "cuaU", "COM"];

@@ -16,7 +16,7 @@ impl TcpLink {
     /// Connects to `address`, `host:port`.
     ///
     /// # Errors
-    /// When the address does not resolve, or nothing listens there within five seconds.
+    /// If the address does not resolve, or no program listens at the address within five seconds.
     pub fn connect(address: &str) -> io::Result<Self> {
         let mut last = io::Error::new(io::ErrorKind::NotFound, "the address names no host");
         for candidate in address.to_socket_addrs()? {
@@ -38,7 +38,7 @@ impl Link for TcpLink {
     }
 
     fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<Received> {
-        // A timeout of zero would mean "for ever" to the socket.
+        // A socket interprets a timeout of zero as "for ever".
         let timeout = timeout.max(Duration::from_millis(1));
         if timeout != self.timeout {
             self.stream.set_read_timeout(Some(timeout))?;

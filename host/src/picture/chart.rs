@@ -1,7 +1,10 @@
-//! A line chart: SNR against distance, sharpness against bar width.
+//! A line chart, such as SNR against distance, or sharpness against bar width.
 //!
-//! The law: every point lies where its axis says, clipped to the frame; every line is named in the legend, and every
-//! axis with its unit. A legend of many lines stands beside the frame, where it hides nothing.
+//! # Invariant
+//! Every point lies where its axes say (`tests::a_point_lies_where_its_axes_say`), clipped to the
+//! frame (`tests::points_outside_the_frame_or_nowhere_are_left_out`). Every line is named in the
+//! legend. A legend of many lines is beside the frame, where it covers no line
+//! (`tests::many_lines_have_their_legend_beside_the_frame`).
 
 use super::text::{Font, Style};
 use image::{Rgb, RgbImage};
@@ -12,13 +15,13 @@ const LEFT_PX: u32 = 110;
 const RIGHT_PX: u32 = 40;
 const TOP_PX: u32 = 90;
 const BOTTOM_PX: u32 = 130;
-/// More lines than this have their legend beside the frame.
+/// With more lines than this, the legend is beside the frame.
 const LINES_INSIDE: usize = 6;
-/// A line of up to so many points shows each of them.
+/// A line of up to this many points shows each point.
 const POINTS_MARKED: usize = 24;
 /// Room for a piece of the line before its name in the legend.
 const LEGEND_LINE_PX: u32 = 50;
-/// Drawn and left out, along a dashed line.
+/// Lengths drawn and left out along a dashed line.
 const DASH_PX: [f64; 2] = [10.0, 7.0];
 
 const GROUND: Rgb<u8> = Rgb([19, 21, 26]);
@@ -26,7 +29,7 @@ const GRID: Rgb<u8> = Rgb([44, 48, 57]);
 const BRIGHT: Rgb<u8> = Rgb([236, 238, 242]);
 const DIM: Rgb<u8> = Rgb([146, 152, 164]);
 
-/// Colours of the lines, told apart by people who confuse red and green (Okabe and Ito).
+/// Colours of the lines, chosen to differ for people who confuse red and green (Okabe and Ito).
 const COLOURS: [Rgb<u8>; 6] = [
     Rgb([86, 180, 233]),
     Rgb([230, 159, 0]),
@@ -39,20 +42,20 @@ const COLOURS: [Rgb<u8>; 6] = [
 /// One axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
-    /// What it shows, with its unit.
+    /// The quantity with its unit.
     pub name: String,
-    /// Its two ends.
+    /// The value at its start.
     pub from: f64,
-    /// See `from`.
+    /// The value at its end.
     pub to: f64,
-    /// Whether steps are factors rather than differences.
+    /// Whether the axis is logarithmic.
     pub logarithmic: bool,
-    /// Where it is labelled.
+    /// The labelled values.
     pub ticks: Vec<f64>,
 }
 
 impl Axis {
-    /// Where along the axis a value is: 0 at `from`, 1 at `to`.
+    /// The position of a value along the axis: 0 at `from`, 1 at `to`.
     fn at(&self, value: f64) -> f64 {
         if self.logarithmic {
             (value / self.from).ln() / (self.to / self.from).ln()
@@ -65,28 +68,28 @@ impl Axis {
 /// One line of a chart.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Line {
-    /// In the legend.
+    /// The name in the legend.
     pub name: String,
     /// Which of the six colours.
     pub colour: usize,
-    /// Drawn with gaps.
+    /// Whether the line is dashed.
     pub dashed: bool,
-    /// x and y.
+    /// Points as x and y.
     pub points: Vec<(f64, f64)>,
 }
 
 /// A chart.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chart {
-    /// Above it.
+    /// The title above the chart.
     pub header: String,
-    /// Across.
+    /// The horizontal axis.
     pub x: Axis,
-    /// Up.
+    /// The vertical axis.
     pub y: Axis,
-    /// In the order of the legend.
+    /// The lines in the order of the legend.
     pub lines: Vec<Line>,
-    /// Below it: where it comes from.
+    /// The line of text below the chart: the source.
     pub footer: String,
 }
 
@@ -144,7 +147,7 @@ impl Chart {
         let colour = COLOURS[line.colour % COLOURS.len()];
         let inside = |at: f64| (0.0..=1.0).contains(&at);
         let seen = |&(x, y): &(f64, f64)| inside(self.x.at(x)) && inside(self.y.at(y));
-        // Dashes go on from one piece to the next.
+        // Dashes continue from one piece to the next.
         let mut along = 0.0;
         for pair in line.points.windows(2) {
             if pair.iter().all(seen) {
@@ -168,7 +171,8 @@ impl Chart {
         self.lines.iter().map(|line| style.width(&line.name)).fold(0.0, f32::max)
     }
 
-    /// In the upper right corner, where falling lines leave room, or right of the frame.
+    /// Draws the legend in the upper right corner, where falling lines leave room, or right of the
+    /// frame.
     fn legend(&self, canvas: &mut RgbImage, style: &Style, right: f64) {
         let left = right - f64::from(self.widest(style)) - 20.0;
         for (k, line) in self.lines.iter().enumerate() {
@@ -185,7 +189,8 @@ impl Chart {
     }
 }
 
-/// A dashed line; `along` is where in the pattern it begins, and the result where it ends.
+/// Draws a dashed line. `along` is the position in the dash pattern at the start; the result is the
+/// position at the end.
 fn dashes(
     canvas: &mut RgbImage,
     from: (f64, f64),
@@ -210,7 +215,7 @@ fn dashes(
 }
 
 fn label(tick: f64) -> String {
-    // What three digits would round away, and what is wider than the margin.
+    // Values that three digits would round away, and values wider than the margin.
     if tick != 0.0 && !(1e-3..1e6).contains(&tick.abs()) {
         return format!("{tick:e}");
     }
@@ -218,7 +223,7 @@ fn label(tick: f64) -> String {
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
-/// A straight line of some width; what is outside is cut.
+/// Draws a straight line of some width. Parts outside the canvas are cut.
 fn stroke(canvas: &mut RgbImage, from: (f64, f64), to: (f64, f64), colour: Rgb<u8>, width_px: f64) {
     let length = (to.0 - from.0).hypot(to.1 - from.1);
     if !length.is_finite() || length > 1e5 {
@@ -274,8 +279,8 @@ mod tests {
 
     #[test]
     fn a_point_lies_where_its_axes_say() {
-        // A short line at x = 1, the middle of a logarithmic axis of 0.1 to 10, and y = 5.05, the middle of a linear
-        // one.
+        // A short line at x = 1, the middle of a logarithmic axis of 0.1 to 10, and y = 5.05, the
+        // middle of a linear one.
         let canvas = chart(vec![(0.99, 5.05), (1.01, 5.05)]).render();
         let x = LEFT_PX + (WIDTH_PX - LEFT_PX - RIGHT_PX) / 2;
         let y = TOP_PX + (HEIGHT_PX - TOP_PX - BOTTOM_PX) / 2;

@@ -1,18 +1,20 @@
-//! One character as a test target: as large as it goes, anti-aliased, bold.
+//! One character as a test target: as large as possible, anti-aliased, bold.
 //!
-//! The law: the drawn strokes, thickening included, touch the edges of a centred square of the
-//! asked size and never leave it.
+//! # Invariant
+//! The drawn strokes, thickening included, touch the edges of a centred square of the requested
+//! size and never leave it
+//! (`tests::every_printable_ascii_character_fills_the_target_and_is_centred`).
 
 use super::text::Font;
 use ab_glyph::{Font as _, FontRef, GlyphId, PxScale, point};
 
 /// Samples a pixel along each edge for anti-aliasing.
 const OVERSAMPLING: usize = 4;
-/// The font's strokes are thin for a target that a 32 x 32 camera must resolve: each edge of a
+/// The font's strokes are thin for a target that a 32 x 32 camera must resolve. Each edge of a
 /// stroke is moved outwards by this part of the target.
 const THICKENING: f32 = 0.028;
 
-/// A typeface that test targets are drawn in.
+/// A typeface for test targets.
 #[derive(Debug, Clone)]
 pub struct Typeface {
     name: &'static str,
@@ -20,39 +22,42 @@ pub struct Typeface {
 }
 
 impl Typeface {
-    /// Ubuntu Light, which every letter scene is drawn in.
+    /// Ubuntu Light, the typeface of letter scenes.
     #[must_use]
     pub fn ubuntu_light() -> Self {
         Self { name: "Ubuntu Light", font: Font::sans().clone() }
     }
 
-    /// Hack, of one width.
+    /// Hack, a typeface of fixed width.
     #[must_use]
     pub fn hack() -> Self {
         Self { name: "Hack", font: Font::mono().clone() }
     }
 
-    /// The typeface in a TrueType or OpenType file's bytes; `None` if they hold no font.
+    /// The typeface in the bytes of a TrueType or OpenType file; `None` if the bytes are not a
+    /// font.
     #[must_use]
     pub fn from_bytes(name: &'static str, bytes: &'static [u8]) -> Option<Self> {
         let font = FontRef::try_from_slice(bytes).ok()?;
         Some(Self { name, font })
     }
 
-    /// Whether it draws something for this character: not for blanks, nor for what it does not know.
+    /// Whether the typeface has a shape for this character. Blanks and unknown characters have no
+    /// shape.
     #[must_use]
     pub fn has_shape(&self, character: char) -> bool {
         has_shape(&self.font, character)
     }
 
-    /// What it is called.
+    /// The name of the typeface.
     #[must_use]
     pub fn name(&self) -> &'static str {
         self.name
     }
 
-    /// The character in `[0, 1]`, bright on dark, `size_px * size_px` row-major, its longer side `fill` of the edge, strokes
-    /// thickened; `None` if the typeface has no shape for it.
+    /// The character in `[0, 1]`, bright on dark, `size_px * size_px` row-major. Its longer side is
+    /// `fill` of the edge, and its strokes are thickened. `None` if the typeface has no shape for
+    /// the character.
     #[must_use]
     pub fn draw(&self, character: char, size_px: usize, fill: f32) -> Option<Vec<f32>> {
         render(&self.font, character, size_px, fill)
@@ -64,8 +69,8 @@ fn has_shape(font: &FontRef<'_>, character: char) -> bool {
     id != GlyphId(0) && font.outline(id).is_some()
 }
 
-/// The character in `[0, 1]`, bright on dark, `size_px * size_px` row-major: its longer side is
-/// `fill` of the edge. None if the font has no shape for it.
+/// The character in `[0, 1]`, bright on dark, `size_px * size_px` row-major. Its longer side is
+/// `fill` of the edge. `None` if the font has no shape for the character.
 fn render(font: &FontRef<'_>, character: char, size_px: usize, fill: f32) -> Option<Vec<f32>> {
     if !has_shape(font, character) {
         return None;
@@ -77,7 +82,7 @@ fn render(font: &FontRef<'_>, character: char, size_px: usize, fill: f32) -> Opt
     Some(average(&thicken(&thin, fine_px, radius), size_px))
 }
 
-/// Which fine pixels the character covers when its longer side has `longer_px`, centred.
+/// The fine pixels that the centred character covers if its longer side has `longer_px`.
 fn outline_mask(
     font: &FontRef<'_>,
     character: char,
@@ -112,12 +117,12 @@ fn outline_mask(
     Some(mask)
 }
 
-/// Every pixel within `radius` of a covered one: the rows of a disc, each as a running count along
+/// Every pixel within `radius` of a covered pixel. Each row of the disc is a running count along
 /// the row.
 fn thicken(mask: &[bool], edge: usize, radius: f32) -> Vec<bool> {
     let mut thick = vec![false; mask.len()];
     let reach = radius.floor() as isize;
-    // covered[y][x]: covered pixels of row y left of x.
+    // covered[y][x] is the number of covered pixels of row y left of x.
     let covered: Vec<u32> = mask
         .chunks_exact(edge)
         .flat_map(|row| {
@@ -157,8 +162,8 @@ mod tests {
     const SIZE_PX: usize = 200;
     const FILL: f32 = 0.9;
 
-    /// Smallest rows and columns that hold everything brighter than a half: left, right, top,
-    /// bottom.
+    /// The smallest range of rows and columns that holds every pixel brighter than a half: left,
+    /// right, top, bottom.
     fn extent(map: &[f32]) -> [usize; 4] {
         let lit = || {
             map.iter()
@@ -192,7 +197,7 @@ mod tests {
 
     #[test]
     fn strokes_of_a_capital_are_wide_enough_for_32_pixels() {
-        // The bar of I, which is one stroke, against 2 of the camera's 32 pixels.
+        // The bar of I, which is one stroke, compared with 2 of the camera's 32 pixels.
         let [left, right, ..] = extent(&render(Font::sans(), 'I', SIZE_PX, FILL).unwrap());
         assert!((right - left) as f32 / SIZE_PX as f32 > 2.0 / 32.0, "{}", right - left);
     }

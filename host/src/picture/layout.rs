@@ -1,6 +1,9 @@
-//! Panels in a row, a header above, a footer below.
+//! A picture of panels in a row, with a header above and a footer below.
 //!
-//! The law: the picture grows with its text; nothing is cut, nothing overlaps.
+//! # Invariant
+//! The picture grows with its text
+//! (`tests::more_text_makes_a_taller_picture_and_less_a_lower_one`). No text is cut or overlaps
+//! (`tests::text_of_any_length_stays_inside_its_panel`).
 
 use super::text::{Font, Style};
 use crate::files::image::to_level;
@@ -23,18 +26,18 @@ const AMBER: Rgb<u8> = Rgb([255, 184, 77]);
 /// How a panel's values become grey levels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Range {
-    /// 0 is black, 1 is white: comparable across panels.
+    /// 0 is black and 1 is white, so that panels can be compared.
     Unit,
-    /// The panel's own lowest value is black, its highest white.
+    /// The panel's own lowest value is black and its highest is white.
     Stretched,
     /// These values are black and white.
     Fixed(f32, f32),
 }
 
-/// One image with its title and what is known about it.
+/// One image with its title and notes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Panel {
-    /// Above the image.
+    /// The title above the image.
     pub title: String,
     /// Columns of the image, at least 1.
     pub width: usize,
@@ -42,22 +45,22 @@ pub struct Panel {
     pub height: usize,
     /// `width * height` values, row-major.
     pub values: Vec<f32>,
-    /// How values become grey.
+    /// How values become grey levels.
     pub range: Range,
     /// Lines below the image, such as `PSNR 23.4 dB  SSIM 0.81`.
     pub caption: Vec<String>,
-    /// Reasons not to trust the image, right below it in amber.
+    /// Reasons not to trust the image, directly below the image in amber.
     pub warnings: Vec<String>,
 }
 
-/// A row of panels with a header and a footer line; empty texts take no room.
+/// A row of panels with a header and a footer line. Empty texts take no room.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SideBySide {
-    /// What this is: `Letter R at 0.3 m`.
+    /// The header, such as `Letter R at 0.3 m`.
     pub header: String,
-    /// From left to right.
+    /// The panels from left to right.
     pub panels: Vec<Panel>,
-    /// Where it comes from: `simulated: virtual camera`.
+    /// The source of the images, such as `simulated: virtual camera`.
     pub footer: String,
 }
 
@@ -65,8 +68,8 @@ impl SideBySide {
     /// Draws the picture; [`encode_rgb`](crate::files::image::encode_rgb) makes a PNG of it.
     ///
     /// # Panics
-    /// If there is no panel, or a panel has not `width * height` values, at least one: the caller
-    /// made them.
+    /// If there is no panel, or a panel does not have exactly `width * height` values, at least
+    /// one.
     #[must_use]
     pub fn render(&self) -> RgbImage {
         assert!(!self.panels.is_empty(), "a picture of at least one panel");
@@ -95,7 +98,8 @@ impl SideBySide {
         for (column, panel) in self.panels.iter().enumerate() {
             let left = MARGIN_PX + column as u32 * (PANEL_PX + GAP_PX);
             let title = &titles[column];
-            // A short title stands on the image, not where a longer neighbour's begins.
+            // A short title is directly above its image, also if a neighbour's title has more
+            // lines.
             title.draw(&mut canvas, left, image_top - spaced(title.height(), 10));
             draw_image(&mut canvas, panel, left, image_top);
             warnings[column].draw(&mut canvas, left, warning_top);
@@ -114,7 +118,7 @@ impl SideBySide {
     }
 }
 
-/// Rows of panels under each other, left edges aligned.
+/// Rows of panels below each other, with aligned left edges.
 ///
 /// # Panics
 /// As [`SideBySide::render`].
@@ -143,7 +147,7 @@ const WARNING: fn() -> Style =
 const FOOTER: fn() -> Style =
     || Style { font: Font::sans(), size_px: 18.0, line_px: 24, colour: DIM };
 
-/// Text already broken into lines.
+/// Text broken into lines.
 struct Block {
     style: Style,
     lines: Vec<String>,
@@ -180,7 +184,7 @@ impl Block {
     }
 }
 
-/// A height and the space after it; nothing needs no space.
+/// A height and the space after it. A height of 0 gets no space.
 fn spaced(height_px: u32, space_px: u32) -> u32 {
     if height_px == 0 { 0 } else { height_px + space_px }
 }
@@ -197,8 +201,7 @@ fn draw_image(canvas: &mut RgbImage, panel: &Panel, left: u32, top: u32) {
     let grey: ImageBuffer<Luma<f32>, _> =
         ImageBuffer::from_raw(width, height, grey).expect("a panel has width * height values");
 
-    // The longer edge fills the panel; whole multiples keep the camera's pixels visible as they
-    // are.
+    // The longer edge fills the panel. Whole multiples keep the camera's pixels square.
     let longer = width.max(height);
     let (wide, high) = (scaled(width, longer), scaled(height, longer));
     let filter =
@@ -222,7 +225,7 @@ fn scaled(edge: u32, longer: u32) -> u32 {
 }
 
 impl Range {
-    /// The values that are shown black and white.
+    /// The values of black and of white.
     fn limits(self, values: &[f32]) -> (f32, f32) {
         match self {
             Self::Unit => (0.0, 1.0),
@@ -277,13 +280,14 @@ mod tests {
             let canvas = side_by_side(&texts[5], panels, &texts[6]).render();
             let (width, height) = canvas.dimensions();
             prop_assert_eq!(width, 2 * MARGIN_PX + 2 * PANEL_PX + GAP_PX);
-            // A glyph may lean out of its own box by a pixel or two, no more.
+            // A glyph may extend beyond its box by a pixel or two.
             let lean = 3;
             prop_assert!(is_blank(&canvas, 0..MARGIN_PX - lean, 0..height));
             prop_assert!(is_blank(&canvas, width - MARGIN_PX + lean..width, 0..height));
             prop_assert!(is_blank(&canvas, 0..width, 0..MARGIN_PX - lean));
             prop_assert!(is_blank(&canvas, 0..width, height - MARGIN_PX + lean..height));
-            // Between the panels only header and footer, which are as wide as both, may be drawn.
+            // Between the panels only header and footer, which are as wide as both panels, may be
+            // drawn.
             let inner = 2 * PANEL_PX + GAP_PX;
             let header = Block::new(HEADER, [texts[5].as_str()], inner).height_and(18);
             let footer = Block::new(FOOTER, [texts[6].as_str()], inner).height();
@@ -347,7 +351,7 @@ mod tests {
             let columns = from..from + PANEL_PX;
             let rows = MARGIN_PX + PANEL_PX..canvas.height();
             rows.flat_map(|y| columns.clone().map(move |x| (x, y)))
-                // Glyphs are drawn smoothly: much red, little blue.
+                // Glyphs are anti-aliased: much red, little blue.
                 .filter(|&(x, y)| {
                     let [red, _, blue] = canvas.get_pixel(x, y).0;
                     red > 100 && red / 2 > blue

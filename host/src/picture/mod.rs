@@ -1,8 +1,9 @@
-//! Pictures for people: images side by side with titles, figures and a note of where they come
-//! from.
+//! Pictures for users: images side by side with titles, figures and a note of the source.
 //!
-//! The law: all text stays inside its panel, whatever its length, and nothing (font or library) is
-//! asked of the system.
+//! # Invariant
+//! All text stays inside its panel, whatever its length
+//! (`layout::tests::text_of_any_length_stays_inside_its_panel`). Fonts and libraries are part of
+//! the program, not of the system.
 
 pub(crate) mod glyph;
 

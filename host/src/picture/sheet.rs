@@ -1,19 +1,19 @@
-//! Many images in one picture, for videos.
+//! A contact sheet: many images of a video in one picture.
 
 use crate::files::image::encode_grey;
 use nirspi_recon::Image;
 
-/// Images side by side.
+/// Number of images in a row.
 const COLUMNS: usize = 8;
 
-/// Most images in the picture.
+/// The most images in the picture.
 const SHOWN: usize = 64;
 
-/// Edge of an image in the picture, in pixels, where the image is not larger itself.
+/// Edge of an image in the picture, in pixels, unless the image itself is larger.
 const TILE_PX: usize = 128;
 
-/// The first 64 images in rows of eight as a PNG, each stretched to its own black and white. All images must have one
-/// side; no image gives an empty picture.
+/// The first 64 images in rows of eight as a PNG, each stretched to its own black and white. All
+/// images must have the same side. Without images the picture is empty.
 #[must_use]
 pub fn contact_sheet(images: &[Image]) -> Vec<u8> {
     let shown = &images[..images.len().min(SHOWN)];

@@ -1,7 +1,9 @@
-//! Text of the embedded fonts: measured, wrapped, drawn.
+//! Measures, wraps and draws text in the embedded fonts.
 //!
-//! The law: what [`Style::wrap`] returns is no wider than asked, and [`Style::draw`] paints no
-//! wider than [`Style::width`] says, but for the anti-aliasing of the last glyph.
+//! # Invariant
+//! A line from [`Style::wrap`] is at most as wide as requested
+//! (`tests::no_line_is_wider_than_asked_and_no_character_is_lost`). [`Style::draw`] paints at most
+//! the width that [`Style::width`] returns, except for the anti-aliasing of the last glyph.
 
 use ab_glyph::{Font as _, FontRef, ScaleFont as _, point};
 use image::{Rgb, RgbImage};
@@ -26,13 +28,13 @@ impl Font {
         &SANS
     }
 
-    /// Hack, fixed width: figures that stand under each other.
+    /// Hack, fixed width: figures in columns.
     pub(super) fn mono() -> &'static FontRef<'static> {
         &MONO
     }
 }
 
-/// A font at a size in a colour.
+/// A font with a size and a colour.
 #[derive(Clone, Copy)]
 pub(super) struct Style {
     pub(super) font: &'static FontRef<'static>,
@@ -56,9 +58,9 @@ impl Style {
             .sum()
     }
 
-    /// Breaks text into lines of at most `width_px`: between words where it can, inside one that is
-    /// longer than a line. Control characters count as blanks; text that fits keeps its blanks. At
-    /// least one character goes on a line, however narrow.
+    /// Breaks text into lines of at most `width_px`: between words if possible, else inside a word
+    /// that is longer than a line. Control characters count as blanks. Text that fits keeps its
+    /// blanks. A line has at least one character, however narrow the line.
     pub(super) fn wrap(&self, text: &str, width_px: f32) -> Vec<String> {
         let text = text.replace(char::is_control, " ");
         let text = text.trim();
@@ -90,8 +92,8 @@ impl Style {
         lines
     }
 
-    /// Draws a line of text with the top left corner of its box at `(x, y)`; what is outside is
-    /// cut.
+    /// Draws a line of text with the top left corner of its box at `(x, y)`. Parts outside the
+    /// canvas are cut.
     pub(super) fn draw(&self, canvas: &mut RgbImage, text: &str, x: f32, y: f32) {
         let font = self.font.as_scaled(self.size_px);
         let baseline = (y + (self.line_px as f32 - font.height()) / 2.0 + font.ascent()).round();

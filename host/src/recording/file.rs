@@ -1,9 +1,10 @@
-//! Where a recording goes on the disk, and how a file that is there already is kept from harm.
+//! Chooses the file of a recording, and protects existing files.
 //!
 //! # Invariant
-//! A recording is made in a file that this program has just made, or on a device. A file that was there before is never
-//! opened for writing (`tests::two_recordings_at_once_take_two_names`, `tests::a_file_that_is_there_is_left_alone`), and
-//! gives way only when the new recording is whole and on the disk
+//! A recording is written into a file that this program has just made, or into a device. An
+//! existing file is never opened for writing (`tests::two_recordings_at_once_take_two_names`,
+//! `tests::a_file_that_is_there_is_left_alone`). An existing file is replaced only when the new
+//! recording is whole and on the disk
 //! (`tests::the_old_recording_goes_when_the_new_one_stands_and_not_before`).
 
 use std::ffi::OsString;
@@ -14,25 +15,25 @@ use std::sync::mpsc::{self, RecvTimeoutError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// Longest time that a recording is with the system before it is told to put it on the disk.
+/// The longest time before the system is told to write a recording's data to the disk.
 const SYNC_EVERY: Duration = Duration::from_secs(5);
-/// Most names that are tried.
+/// The most names to try.
 const NAMES: u32 = 100_000;
 
-/// Where a recording goes.
+/// The target of a recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Target {
-    /// A file of this name, which must not be there; or a device.
+    /// A file of this name, which must not exist; or a device.
     New(PathBuf),
-    /// A file of this name. One that is there gives way when the new recording is whole; until then the new one is beside it,
-    /// as `NAME.new.mcap`.
+    /// A file of this name. An existing file is replaced when the new recording is whole. Until
+    /// then the new recording is next to the existing file, as `NAME.new.mcap`.
     Replace(PathBuf),
     /// The first free name of `capture-1.mcap`, `capture-2.mcap` ... in this folder.
     FirstFree(PathBuf),
 }
 
 impl Target {
-    /// The file or folder that it names.
+    /// The path of the file or folder.
     #[must_use]
     pub fn path(&self) -> &Path {
         match self {
@@ -45,9 +46,9 @@ impl Target {
 #[derive(Debug)]
 pub(super) struct Place {
     path: PathBuf,
-    /// The name that it takes when it is whole.
+    /// The name that the file gets when it is whole.
     replaces: Option<PathBuf>,
-    /// A device was there before, and is not removed.
+    /// Whether the path is a device. A device existed before and is not removed.
     device: bool,
     syncer: Option<Syncer>,
 }
@@ -56,7 +57,7 @@ impl Place {
     /// Makes the file.
     ///
     /// # Errors
-    /// [`io::ErrorKind::AlreadyExists`] if the name is taken, or what the system says.
+    /// [`io::ErrorKind::AlreadyExists`] if the name is taken, or the system's error.
     pub(super) fn make(target: &Target) -> io::Result<(Self, File)> {
         match target {
             Target::New(path) | Target::Replace(path) if is_device(path) => {
@@ -78,7 +79,8 @@ impl Place {
         }
     }
 
-    /// A new file beside the one that it is to replace. A link stays; the file that it leads to is replaced.
+    /// Makes a new file next to the file that it will replace. A link stays, and the file behind
+    /// the link is replaced.
     fn beside(path: &Path) -> io::Result<(Self, File)> {
         if path.is_dir() {
             return Err(io::ErrorKind::IsADirectory.into());
@@ -98,15 +100,16 @@ impl Place {
         Ok((Self { path, replaces, device: false, syncer }, file))
     }
 
-    /// The file's name now.
+    /// The current path of the file.
     pub(super) fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Puts the file, which is whole, on the disk. With `replace` it takes the name of the file that it was to replace.
+    /// Writes the whole file to the disk. With `replace`, the file then takes the name of the file
+    /// that it replaces.
     ///
     /// # Errors
-    /// What the system says; the file is still there then, by the name that it has.
+    /// The system's error. The file then keeps its current name.
     pub(super) fn settle(&mut self, file: &File, replace: bool) -> io::Result<()> {
         if self.device {
             return Ok(());
@@ -126,13 +129,14 @@ impl Place {
     pub(super) fn remove(self) {
         drop(self.syncer);
         if !self.device {
-            // It was made by this program and holds no frame; where it cannot be removed it does no harm.
+            // This program made the file, and the file holds no frame, so a failed removal is
+            // harmless.
             let _ = fs::remove_file(&self.path);
         }
     }
 }
 
-/// The first of these names that is free.
+/// The first free name of these names.
 fn first_free(name: impl Fn(u32) -> PathBuf, replaces: Option<&Path>) -> io::Result<(Place, File)> {
     for n in 1..NAMES {
         match Place::of_new(name(n), replaces.map(Path::to_owned)) {
@@ -143,12 +147,12 @@ fn first_free(name: impl Fn(u32) -> PathBuf, replaces: Option<&Path>) -> io::Res
     Err(io::Error::new(io::ErrorKind::AlreadyExists, format!("{NAMES} recordings are there")))
 }
 
-/// Whether something is there that is neither a file nor a folder.
+/// Whether the path is neither a file nor a folder.
 fn is_device(path: &Path) -> bool {
     fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir())
 }
 
-/// Makes sure that a name is on the disk, where the system has a way to say so.
+/// Syncs a name to the disk, on systems that can do so.
 fn sync_folder_of(path: &Path) -> io::Result<()> {
     let folder = match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
@@ -157,7 +161,7 @@ fn sync_folder_of(path: &Path) -> io::Result<()> {
     crate::files::output::sync_folder(folder)
 }
 
-/// Puts a file on the disk every few seconds, beside the thread that writes it: a disk that is slow holds up no frame.
+/// A thread that writes a file to the disk every few seconds, so that a slow disk delays no frame.
 #[derive(Debug)]
 struct Syncer {
     over: mpsc::Sender<()>,
@@ -176,7 +180,8 @@ impl Syncer {
         Self { over, thread }
     }
 
-    /// Ends it. What the disk could not take is told here: the system tells it once.
+    /// Stops the thread. Returns an error of the disk, because the system reports such an error
+    /// only once.
     fn end(self) -> io::Result<()> {
         drop(self.over);
         self.thread.join().unwrap_or_else(|_| Err(io::Error::other("syncing the file panicked")))
@@ -227,7 +232,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("rec.mcap");
         fs::write(&path, b"old").unwrap();
-        // Left by an earlier run that was killed: it is recorded data, and stays.
+        // A file of an earlier run that was killed holds recorded data and stays.
         fs::write(folder.path().join("rec.new.mcap"), b"earlier").unwrap();
         let replace = Target::Replace(path.clone());
         let (mut place, mut file) = Place::make(&replace).unwrap();
@@ -238,13 +243,13 @@ mod tests {
         assert_eq!(fs::read(&path).unwrap(), b"new");
         assert_eq!(names(folder.path()), ["rec.mcap", "rec.new.mcap"]);
 
-        // Not whole: both stay.
+        // The new recording is not whole, so both files stay.
         let (mut place, file) = Place::make(&replace).unwrap();
         place.settle(&file, false).unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"new");
         assert_eq!(names(folder.path()), ["rec.mcap", "rec.new-2.mcap", "rec.new.mcap"]);
 
-        // Nothing recorded: only the new one goes.
+        // Nothing was recorded, so only the new file is removed.
         let (place, _) = Place::make(&replace).unwrap();
         place.remove();
         assert_eq!(names(folder.path()), ["rec.mcap", "rec.new-2.mcap", "rec.new.mcap"]);

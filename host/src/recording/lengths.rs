@@ -1,10 +1,11 @@
-//! Whether the lengths that a record claims fit into the record.
+//! Checks that the lengths in a record fit into the record.
 //!
-//! The mcap crate reserves what a string claims to be before it looks whether the string is there: one flipped length costs up
-//! to 4 GiB of memory (0.26).
+//! The mcap crate reserves memory for a string's claimed length before it checks that the string
+//! exists. One flipped length costs up to 4 GiB of memory (0.26).
 //!
 //! # Invariant
-//! A record that passes claims no string longer than itself (`tests::a_length_beyond_the_record_is_noticed`).
+//! A record that passes claims no string longer than itself
+//! (`tests::a_length_beyond_the_record_is_noticed`).
 
 use mcap::records::op;
 
@@ -12,22 +13,22 @@ use mcap::records::op;
 pub(super) fn fit(opcode: u8, record: &[u8]) -> bool {
     let mut rest = Rest(record);
     let read = match opcode {
-        // Profile and library.
+        // The profile and the library.
         op::HEADER => rest.string().and_then(|()| rest.string()),
-        // Two numbers of 16 bits, topic, encoding, metadata.
+        // Two numbers of 16 bits, then topic, encoding and metadata.
         op::CHANNEL => rest
             .take(4)
             .and_then(|_| rest.string())
             .and_then(|()| rest.string())
             .and_then(|()| rest.strings()),
-        // Name, metadata.
+        // The name, then the metadata.
         op::METADATA => rest.string().and_then(|()| rest.strings()),
         _ => Some(()),
     };
     read.is_some()
 }
 
-/// What of a record is not read yet.
+/// The part of a record that is not read yet.
 struct Rest<'r>(&'r [u8]);
 
 impl<'r> Rest<'r> {
@@ -37,7 +38,7 @@ impl<'r> Rest<'r> {
         Some(taken)
     }
 
-    /// A length of 32 bits, and as many bytes.
+    /// Reads a length of 32 bits, and as many bytes.
     fn block(&mut self) -> Option<&'r [u8]> {
         let length = u32::from_le_bytes(*self.take(4)?.first_chunk()?);
         self.take(usize::try_from(length).ok()?)
@@ -47,7 +48,7 @@ impl<'r> Rest<'r> {
         self.block().map(drop)
     }
 
-    /// A block of strings.
+    /// Reads a block of strings.
     fn strings(&mut self) -> Option<()> {
         let mut block = Rest(self.block()?);
         while !block.0.is_empty() {

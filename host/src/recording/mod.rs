@@ -1,16 +1,19 @@
-//! Recordings: an MCAP file with every wire packet as it came, and what is needed to understand them.
+//! Recordings: an MCAP file with every wire packet as received, and the information to interpret
+//! the packets.
 //!
-//! Channel `/wire` holds the packets (COBS, delimiter included), intact ones and damaged ones alike; the
-//! message encoding names the protocol version of the session; recordings of all versions from `version::MIN` on
-//! are read. Metadata records hold the camera's identity, the setup, the calibration, the number of the run and, at
-//! the end, the account of the run, each as one JSON text. Times are nanoseconds of the
-//! host's clock. Records follow each other plainly, in no chunks: a file that ends anywhere, or is damaged in one
-//! packet, loses no other, and the crate's chunk reader, which panics on some damage, is never used.
+//! Channel `/wire` holds the packets (COBS, delimiter included), both intact and damaged. The
+//! message encoding names the protocol version of the session. Recordings of all versions from
+//! `version::MIN` on are read. Metadata records hold the camera's identity, the setup, the
+//! calibration, the number of the run and, at the end, the account of the run; each is one JSON
+//! text. Times are nanoseconds of the host's clock. Records follow each other without chunks. A
+//! file that ends anywhere, or has one damaged packet, loses no other packet. The crate's chunk
+//! reader, which panics on some damage, is never used.
 //!
 //! # Invariant
-//! A capture that is killed keeps everything up to its last flush, half a second before at most; of a computer that loses
-//! power, what was flushed five seconds before is on the disk:
-//! `reader::tests::a_recording_cut_anywhere_gives_what_is_before_the_cut_or_says_what_is_missing`.
+//! A capture that is killed keeps everything up to its last flush, half a second before at most
+//! (test
+//! `reader::tests::a_recording_cut_anywhere_gives_what_is_before_the_cut_or_says_what_is_missing`).
+//! If the computer loses power, everything flushed five seconds before is on the disk.
 
 mod file;
 mod lengths;
@@ -23,11 +26,11 @@ pub use reader::{End, Packet, Recording, RecordingError};
 pub use run::RunAccount;
 pub use writer::Recorder;
 
-/// MCAP profile of our files.
+/// MCAP profile of nirspi's files.
 pub const PROFILE: &str = "nirspi";
 /// Topic of the packets.
 pub const TOPIC: &str = "/wire";
-/// Message encoding of the packets, but for the number of the wire protocol's version.
+/// Message encoding of the packets, without the number of the wire protocol's version.
 const ENCODING: &str = "nirspi-wire-v";
 
 /// Message encoding of the packets of a session of this protocol version.
@@ -44,8 +47,9 @@ fn protocol_of(encoding: &str) -> Option<u16> {
 const IDENTITY: &str = "nirspi.identity";
 const SETUP: &str = "nirspi.setup";
 const SETTLING: &str = "nirspi.settling";
-/// Number of the run that is recorded; frames of another one are stragglers. Recordings before 0.2 have none.
+/// Number of the recorded run. Frames of another run are stragglers. Recordings before 0.2 have no
+/// number.
 const RUN: &str = "nirspi.run";
 const ACCOUNT: &str = "nirspi.account";
-/// The one key of each metadata record.
+/// The only key of each metadata record.
 const JSON: &str = "json";

@@ -1,4 +1,4 @@
-//! Reads a recording back in one pass, whole or cut short: first what was measured, then packet by packet.
+//! Reads a recording in one pass, whole or cut short: first the setup, then packet by packet.
 
 use super::lengths;
 use super::{
@@ -17,10 +17,10 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// No record of ours is longer; a longer one is damage.
+/// The longest record of nirspi. A longer record is damaged.
 const LONGEST_RECORD: usize = 64 << 20;
 
-/// A recording under way: what stands before its packets, and the packets as an iterator.
+/// An open recording: the information before its packets, and the packets as an iterator.
 ///
 /// ```no_run
 /// # fn main() -> Result<(), nirspi::recording::RecordingError> {
@@ -34,16 +34,17 @@ const LONGEST_RECORD: usize = 64 << 20;
 /// # }
 /// ```
 pub struct Recording {
-    /// Who was recorded.
+    /// The identity of the recorded camera.
     pub identity: CameraIdentity,
-    /// What was measured.
+    /// The setup of the measurement.
     pub setup: MeasurementSetup,
-    /// How the camera settles, where that was measured.
+    /// The settling of the camera, if measured.
     pub settling: Option<Settling>,
-    /// Number of the run whose frames count; `None` in a recording that does not say so, where it is the first frame's.
+    /// Number of the run whose frames count; `None` for a recording without a number, in which the
+    /// first frame's run counts.
     pub run: Option<u16>,
     records: Records,
-    /// The first packet, which was met where the header ends.
+    /// The first packet, which was read at the end of the header.
     first: Option<Packet>,
     end: End,
 }
@@ -51,28 +52,28 @@ pub struct Recording {
 /// One packet of a recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Packet {
-    /// As it came, delimiter included.
+    /// The packet as received, delimiter included.
     pub bytes: Vec<u8>,
-    /// When it came, in ns of the host's clock.
+    /// Time of arrival in ns of the host's clock.
     pub time_ns: u64,
 }
 
-/// What is known at the end of a recording.
+/// The information at the end of a recording.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct End {
-    /// The account as the capture closed it; `None` where it was cut short.
+    /// The account as the capture wrote it; `None` if the recording is cut short.
     pub account: Option<RunAccount>,
     /// Packets read.
     pub packets: u64,
-    /// Where the file ends in the middle or is damaged: what is wrong there. All before it was read.
+    /// The problem, if the file ends early or is damaged. Everything before the problem was read.
     pub cut_short: Option<String>,
 }
 
 impl Recording {
-    /// Opens `path` and reads what stands before its packets.
+    /// Opens `path` and reads the information before its packets.
     ///
     /// # Errors
-    /// [`RecordingError`] where the file is no recording, or is cut short before its first packet.
+    /// [`RecordingError`] if the file is not a recording, or is cut short before its first packet.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
         let mut records = Records::open(path)?;
         let (mut parts, mut end) = (Parts::default(), End::default());
@@ -94,7 +95,8 @@ impl Recording {
         Ok(Self { identity, setup, settling: parts.settling, run: parts.run, records, first, end })
     }
 
-    /// What is known at the end of the recording: whole once the iterator has given its last packet.
+    /// The information at the end of the recording. Complete after the iterator has returned its
+    /// last packet.
     #[must_use]
     pub fn end(&self) -> &End {
         &self.end
@@ -120,8 +122,9 @@ impl Recording {
     }
 }
 
-/// The packets in the order in which they came. A file that ends in the middle is no error: every packet before is
-/// given, and [`End::cut_short`] says what is wrong. Nothing follows an error.
+/// The packets in order of arrival. A file that ends early is not an error: the iterator returns
+/// every packet before the end, and [`End::cut_short`] gives the problem. After an error the
+/// iterator ends.
 impl Iterator for Recording {
     type Item = Result<Packet, RecordingError>;
 
@@ -135,17 +138,17 @@ impl Iterator for Recording {
     }
 }
 
-/// The records of a file that matter here, one by one.
+/// The records of a file that the reader needs, one by one.
 struct Records {
     path: PathBuf,
     file: File,
     reader: LinearReader,
-    /// The header says that the file is a recording of ours.
+    /// Whether the header says that nirspi wrote the file.
     ours: bool,
     over: bool,
 }
 
-/// A record that matters.
+/// A record that the reader needs.
 enum Found {
     Packet(Packet),
     Metadata(Metadata),
@@ -154,7 +157,7 @@ enum Found {
 impl Records {
     fn open(path: &Path) -> Result<Self, RecordingError> {
         let io_error = |source| RecordingError::Io { path: path.to_owned(), source };
-        // A pipe would be waited for, and a device need not end.
+        // Opening a pipe would wait for a writer, and a device may never end.
         if !std::fs::metadata(path).map_err(io_error)?.is_file() {
             let found = "a folder, a device or a pipe".to_owned();
             return Err(RecordingError::NotARecording { path: path.to_owned(), found });
@@ -162,16 +165,19 @@ impl Records {
         let file = File::open(path).map_err(io_error)?;
         let reader = LinearReader::new_with_options(
             LinearReaderOptions::default()
-                // Each packet has a checksum of its own; that of the whole data section covers what is said about them.
+                // Each packet has its own checksum. The checksum of the data section covers the
+                // information about the packets.
                 .with_validate_data_section_crc(true)
-                // Whole, they are refused below: the crate panics on some damaged chunks (0.26, found by fuzzing).
+                // Whole chunks are refused below, because the crate panics on some damaged chunks
+                // (0.26, found by fuzzing).
                 .with_emit_chunks(true)
                 .with_record_length_limit(LONGEST_RECORD),
         );
         Ok(Self { path: path.to_owned(), file, reader, ours: false, over: false })
     }
 
-    /// The next record that matters; `None` at the end of the file, or where it is damaged, which `end` then says.
+    /// The next record that the reader needs; `None` at the end of the file, or at damage, which
+    /// `end` then reports.
     fn next(&mut self, end: &mut End) -> Result<Option<Found>, RecordingError> {
         let Self { path, file, reader, ours, over } = self;
         let io_error = |source| RecordingError::Io { path: path.clone(), source };
@@ -186,8 +192,8 @@ impl Records {
                     reader.notify_read(read);
                     continue;
                 }
-                // Only what we write is looked at: the crate panics on some damaged attachments (0.26, found by
-                // fuzzing).
+                // Only records that nirspi writes are parsed, because the crate panics on some
+                // damaged attachments (0.26, found by fuzzing).
                 Ok(LinearReadEvent::Record {
                     opcode: opcode @ (op::HEADER | op::CHANNEL | op::MESSAGE | op::METADATA),
                     data,
@@ -240,55 +246,55 @@ impl Records {
     }
 }
 
-/// Why a file is no recording.
+/// Why a file cannot be read as a recording.
 #[derive(Debug, Error)]
 pub enum RecordingError {
     /// The file cannot be read.
     #[error("{path}: cannot read the recording")]
     Io {
-        /// Which file.
+        /// The file.
         path: PathBuf,
         /// Why.
         source: io::Error,
     },
-    /// Not one of ours.
+    /// The file is not a recording of nirspi.
     #[error("{path}: {found}, expected a nirspi recording (MCAP)")]
     NotARecording {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// What it is instead.
+        /// The kind of the file.
         found: String,
     },
-    /// A recording of a newer wire protocol.
+    /// The recording has a newer wire protocol.
     #[error(
         "{path}: recorded as {found}, this program reads {TOPIC:?} of nirspi-wire-v{} to v{}: update this program",
         version::MIN,
         version::CURRENT
     )]
     Version {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// What the channel says.
+        /// The encoding of the channel.
         found: String,
     },
-    /// A part that every recording has is not there.
+    /// A required part is missing.
     #[error("{path}: no {missing} in the recording{}", cut_note(.cut_short))]
     Missing {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// Which part.
+        /// The part.
         missing: &'static str,
         /// Whether the file is cut short.
         cut_short: Option<String>,
     },
-    /// A part that does not read.
+    /// A part cannot be parsed.
     #[error("{path}: the recording's {part} does not read: {reason}")]
     Damaged {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// Which part.
+        /// The part.
         part: &'static str,
-        /// Why.
+        /// The parser's reason.
         reason: String,
     },
 }
@@ -297,7 +303,7 @@ fn cut_note(cut_short: &Option<String>) -> String {
     cut_short.as_ref().map_or_else(String::new, |reason| format!(", which is cut short: {reason}"))
 }
 
-/// The parser's messages are drawings of several lines.
+/// One line of the parser's messages, which are drawings of several lines.
 fn one_line(error: &McapError) -> String {
     let text = error.to_string();
     let words: Vec<&str> = text.split_whitespace().take(16).collect();
@@ -431,7 +437,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.mcap");
         recording(&path, 3);
-        // An attachment of two zero bytes, right after magic and header, which end at the header's length.
+        // An attachment of two zero bytes, directly after magic and header. The header's length
+        // marks its end.
         let mut bytes = std::fs::read(&path).unwrap();
         let header = 8 + 9 + u64::from_le_bytes(bytes[9..17].try_into().unwrap()) as usize;
         bytes.splice(header..header, [op::ATTACHMENT, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0]);

@@ -1,18 +1,18 @@
-//! What a capture says of its run at the end of the recording.
+//! The account of a run at the end of a recording.
 
 use crate::account::LossCounters;
 use serde::{Deserialize, Serialize};
 
-/// The account of a run as the capture closed it.
+/// The account of a run, as the capture wrote it.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct RunAccount {
-    /// What became of the frames.
+    /// The loss counters.
     #[serde(flatten)]
     pub counters: LossCounters,
-    /// Frames asked for; `None` if the run was to go on until stopped.
+    /// Frames requested; `None` if the run went on until stopped.
     #[serde(default)]
     pub asked: Option<u32>,
-    /// Frames that the camera says it has made; `None` if the camera could not say.
+    /// Frames that the camera reports to have made; `None` if the camera could not report.
     #[serde(default)]
     pub made: Option<u64>,
     /// What the run lacks, in one line; `None` if nothing is missing.

@@ -1,4 +1,4 @@
-//! Writes a recording as it comes in.
+//! Writes a recording while the packets arrive.
 
 use super::file::{Place, Target};
 use super::{ACCOUNT, IDENTITY, JSON, PROFILE, RUN, RunAccount, SETTLING, SETUP, TOPIC, encoding};
@@ -15,14 +15,14 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-/// Longest time that packets stay in memory.
+/// The longest time that packets stay in memory.
 const FLUSH_EVERY: Duration = Duration::from_millis(500);
 
 /// An open recording.
 pub struct Recorder {
     place: Place,
     writer: Records,
-    /// The same file, to be put on the disk.
+    /// The same file, for syncing to the disk.
     file: File,
     channel: u16,
     packets: u32,
@@ -39,10 +39,12 @@ fn to_io(error: mcap::McapError) -> io::Error {
 }
 
 impl Recorder {
-    /// Makes the file and writes who is recorded, doing what; `run` is the number of the run whose frames count.
+    /// Makes the file and writes identity and setup. `run` is the number of the run whose frames
+    /// count.
     ///
     /// # Errors
-    /// When the file is there already, or cannot be made or written; it is not left behind then.
+    /// If the file exists, or cannot be made or written. A file that could not be written is
+    /// removed.
     pub fn create(
         target: &Target,
         identity: &CameraIdentity,
@@ -68,16 +70,16 @@ impl Recorder {
         Ok(Self { place, writer, file, channel, packets: 0, epoch, started: now, flushed: now })
     }
 
-    /// The file's name now.
+    /// The current path of the file.
     #[must_use]
     pub fn path(&self) -> &Path {
         self.place.path()
     }
 
-    /// Appends one packet as it came.
+    /// Appends one packet as received.
     ///
     /// # Errors
-    /// When the disk is full or gone.
+    /// If the disk is full or gone.
     pub fn packet(&mut self, raw: &[u8]) -> io::Result<()> {
         let age = self.started.elapsed();
         let time = self.epoch.saturating_add(u64::try_from(age.as_nanos()).unwrap_or(u64::MAX));
@@ -92,7 +94,7 @@ impl Recorder {
         self.flush_if_due()
     }
 
-    /// Puts what has come on disk, unless that was done lately.
+    /// Writes the received packets to the file, unless the last flush is recent.
     ///
     /// # Errors
     /// As [`packet`](Self::packet).
@@ -104,11 +106,11 @@ impl Recorder {
         self.writer.flush().map_err(to_io)
     }
 
-    /// Writes the account of the run and puts the file on the disk. A recording of a run that is whole takes the place of the
-    /// one that it was to replace. Returns the file's name.
+    /// Writes the account of the run and syncs the file to the disk. The recording of a whole run
+    /// then replaces the file that it should replace. Returns the file's path.
     ///
     /// # Errors
-    /// The file's name, and why it could not be finished.
+    /// The file's path, and why the file could not be finished.
     pub fn finish(self, account: &RunAccount) -> Result<PathBuf, (PathBuf, io::Error)> {
         let Self { mut place, writer, file, .. } = self;
         let settled = closed(writer, account)
@@ -118,7 +120,7 @@ impl Recorder {
         settled.map(|()| path.clone()).map_err(|error| (path, error))
     }
 
-    /// Removes the file: nothing was recorded.
+    /// Removes the file, because nothing was recorded.
     pub fn discard(self) {
         let Self { place, writer, .. } = self;
         drop(writer);
@@ -128,7 +130,7 @@ impl Recorder {
 
 type Records = Writer<NoSeek<BufWriter<File>>>;
 
-/// Writes what stands before the packets; the channel of the packets.
+/// Writes the information before the packets. Returns the channel of the packets.
 fn begun(
     file: BufWriter<File>,
     identity: &CameraIdentity,
@@ -147,12 +149,12 @@ fn begun(
     if let Some(run) = run {
         note(&mut writer, RUN, &run)?;
     }
-    // Whatever happens from here on, the file says what it is.
+    // After this flush the file identifies itself, whatever happens.
     writer.flush()?;
     Ok((writer, channel))
 }
 
-/// Writes what stands after the packets.
+/// Writes the information after the packets.
 fn closed(mut writer: Records, account: &RunAccount) -> McapResult<()> {
     note(&mut writer, ACCOUNT, account)?;
     writer.finish()?;

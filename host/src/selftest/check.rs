@@ -1,22 +1,22 @@
-//! One line of a self-test: what was measured, what it had to be, and so the verdict.
+//! One check of a self-test: the measured value, its limit, and the verdict.
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// What a measured value has to be.
+/// The limit of a measured value.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Limit {
-    /// This or more.
+    /// This value or more.
     AtLeast(f64),
-    /// This or less.
+    /// This value or less.
     AtMost(f64),
-    /// This, a whole number.
+    /// Exactly this whole number.
     Exactly(f64),
 }
 
 impl Limit {
-    /// Whether `value` keeps to it. NaN does not.
+    /// Whether `value` is within the limit. NaN never is.
     #[must_use]
     pub fn holds(self, value: f64) -> bool {
         match self {
@@ -37,15 +37,15 @@ impl fmt::Display for Limit {
     }
 }
 
-/// What came of a check.
+/// The result of a check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
-    /// As it must be.
+    /// The value is within its limit.
     Passed,
-    /// Not as it must be.
+    /// The value is outside its limit.
     Failed,
-    /// Not looked at; the note says why.
+    /// The check was not made. The note gives the reason.
     Skipped,
 }
 
@@ -65,7 +65,7 @@ pub struct Check {
 }
 
 impl Check {
-    /// A value against its limit, in `unit`.
+    /// A check of a value against its limit, in `unit`.
     #[must_use]
     pub fn measured(name: &str, value: f64, unit: &str, limit: Limit) -> Self {
         let verdict = if limit.holds(value) { Verdict::Passed } else { Verdict::Failed };
@@ -77,13 +77,14 @@ impl Check {
         }
     }
 
-    /// What someone else has judged, or what could not be measured; `note` says why.
+    /// A check whose result comes from another part, or whose value could not be measured. `note`
+    /// gives the reason.
     #[must_use]
     pub fn told(name: &str, passed: bool, note: &str) -> Self {
         Self::new(name, if passed { Verdict::Passed } else { Verdict::Failed }, note)
     }
 
-    /// Not looked at, for this reason.
+    /// A check that was not made, for this reason.
     #[must_use]
     pub fn skipped(name: &str, reason: &str) -> Self {
         Self::new(name, Verdict::Skipped, reason)
@@ -94,50 +95,50 @@ impl Check {
         Self { name: name.to_owned(), verdict, measured, limit, unit, note: note.to_owned() }
     }
 
-    /// The same check with something said about it.
+    /// The same check with a note.
     #[must_use]
     pub fn noting(self, note: &str) -> Self {
         Self { note: note.to_owned(), ..self }
     }
 
-    /// What is checked.
+    /// The name of the check.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// What came of it.
+    /// The result of the check.
     #[must_use]
     pub fn verdict(&self) -> Verdict {
         self.verdict
     }
 
-    /// The value found, in its unit.
+    /// The measured value, in its unit.
     #[must_use]
     pub fn value(&self) -> Option<f64> {
         self.measured
     }
 
-    /// What is said about it.
+    /// The note.
     #[must_use]
     pub fn note(&self) -> &str {
         &self.note
     }
 
-    /// Value and unit for people; empty where there is none.
+    /// Value and unit in words; empty without a value.
     #[must_use]
     pub fn value_in_words(&self) -> String {
         self.measured.map_or_else(String::new, |value| format!("{} {}", number(value), self.unit))
     }
 
-    /// The limit for people; empty where there is none.
+    /// The limit in words; empty without a limit.
     #[must_use]
     pub fn limit_in_words(&self) -> String {
         self.limit.map_or_else(String::new, |limit| limit.to_string())
     }
 }
 
-/// Whole numbers as they are, others with as many digits as mean something.
+/// A number in words: whole numbers unchanged, others with their significant digits.
 fn number(value: f64) -> String {
     if value.fract() == 0.0 {
         format!("{value:.0}")

@@ -1,7 +1,8 @@
-//! Test frames: the FPGA's generator in the ADC's place, and every sum of every frame compared on the host.
+//! Test frames: the FPGA's generator replaces the ADC, and the host compares every sum of every
+//! frame.
 //!
-//! What is compared has gone through sequencer, windowing, accumulators, host port, firmware, packets and link; and it
-//! is known to the last bit.
+//! The compared sums have passed through sequencer, windowing, accumulators, host port, firmware,
+//! packets and link, and are known to the last bit.
 
 use super::check::{Check, Limit};
 use super::stream::{Shot, shots};
@@ -12,10 +13,11 @@ use nirspi_wire::{CLOCKS_PER_PATTERN, Configuration, PATTERNS, PatternOrder, Sam
 /// Name of the check.
 pub const NAME: &str = "test frames through the whole chain";
 
-/// Frames of each setting.
+/// Number of frames of each setting.
 const FRAMES: u32 = 4;
 
-/// Two settings, as unlike as may be. Their frames last two milliseconds, so that no link but the slowest is too slow.
+/// Two very different settings. Their frames last two milliseconds, so that all links but the
+/// slowest are fast enough.
 const SETTINGS: [Configuration<'static>; 2] = [
     Configuration {
         order: PatternOrder::Natural,
@@ -60,7 +62,7 @@ pub fn check(session: &mut Session) -> Result<Vec<Check>, SessionError> {
     }])
 }
 
-/// Where a frame first differs from what it must be.
+/// The first difference between a frame and its expected values.
 fn difference(shot: &Shot, expected: &[Vec<i64>]) -> Option<String> {
     let sequence = shot.sequence;
     let Some(expected) = expected.get(sequence as usize) else {
@@ -79,8 +81,8 @@ fn difference(shot: &Shot, expected: &[Vec<i64>]) -> Option<String> {
     Some(format!("frame {sequence}, sample {at}: {found}, expected {expected}"))
 }
 
-/// The first `count` frames that the generator must give: the sample of clock `t` of the run belongs to what was
-/// shown at `t - latency` (`nirspi_wire::register`).
+/// The first `count` frames that the generator must give. The sample of clock `t` of the run
+/// belongs to the pattern shown at `t - latency` (`nirspi_wire::register`).
 fn frames(configuration: &Configuration<'_>, count: u32) -> Vec<Vec<i64>> {
     let mut period = vec![TEST_SEED];
     loop {

@@ -1,9 +1,11 @@
-//! The ADC's latency, found by stepping the FPGA's setting.
+//! Measures the ADC's latency by stepping the FPGA's setting.
 //!
-//! All LEDs go on and off, [`HALF_PERIOD`] clocks each, and of each slot only the last clock counts. Set to less than
-//! the true latency, the FPGA takes a sample of light that has settled for the last clock's; set to more, it takes one
-//! from behind the change, and the difference of on and off begins to fall. The last setting at which nothing has
-//! fallen is the latency. The raw burst, which passes by this setting, must say the same.
+//! All LEDs go on and off for [`HALF_PERIOD`] clocks each, and only the last clock of each slot
+//! counts. At a setting below the true latency, the FPGA takes an earlier sample of settled light
+//! as the last clock's sample. At a setting above the true latency, the FPGA takes a sample from
+//! after the change, and the difference of on and off becomes smaller. The last setting with the
+//! full difference is the latency. The raw burst, which does not use the setting, must give the
+//! same latency.
 
 use super::check::{Check, Limit};
 use super::stream::shots;
@@ -15,15 +17,17 @@ use nirspi_wire::{Configuration, PatternOrder, SampleSource};
 /// Name of the check.
 pub const NAME: &str = "ADC latency by stepping";
 
-/// Sweeps of each step: half a millisecond.
+/// Number of sweeps of each step: half a millisecond.
 const SWEEPS: u32 = 256;
-/// Frames of each step. The last one's last sample is of the dark after the run, whatever the setting.
+/// Number of frames of each step. The last sample of the last frame is of the dark after the run,
+/// at any setting.
 const FRAMES: u32 = 2;
 
-/// An edge must stand out of the noise by this many standard deviations: passed by chance three times in ten million.
+/// An edge must exceed the noise by this many standard deviations, which noise alone does three
+/// times in ten million.
 const SIGMAS: f64 = 5.0;
 
-/// Steps through all settings. `burst` is what the raw bursts say.
+/// Steps through all settings. `burst` is the result of the raw bursts.
 pub fn check(session: &mut Session, burst: &Settling) -> Result<Vec<Check>, SessionError> {
     let from_burst = burst.adc_latency;
     let noise = burst.noise_counts * (2.0 / f64::from(SWEEPS)).sqrt();
@@ -65,7 +69,8 @@ pub fn check(session: &mut Session, burst: &Settling) -> Result<Vec<Check>, Sess
     }])
 }
 
-/// The last setting before the difference of on and off falls. `None` where it does not fall as one.
+/// The last setting before the difference of on and off falls; `None` if the difference does not
+/// fall as one edge.
 fn edge(differences: &[f64]) -> Option<u8> {
     let full = differences.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let fallen: Vec<bool> =
@@ -79,7 +84,8 @@ fn edge(differences: &[f64]) -> Option<u8> {
 mod tests {
     use super::*;
 
-    /// Differences around a true latency, of light that keeps this share of a change to itself each clock.
+    /// Differences around a true latency, of light that keeps the share `rest` of a change in each
+    /// clock.
     fn differences(latency: usize, rest: f64) -> Vec<f64> {
         let fallen = |past: usize| 1.0 - rest.powi(past as i32);
         (0..=usize::from(LATENCY_MAX))

@@ -1,12 +1,15 @@
-//! The LEDs, by the light they bring to the detector: there is no other sensor of their current.
+//! Checks the LEDs by their light at the detector, because no other sensor measures their current.
 //!
-//! All patterns are shown slowly, once alone (`P`) and once with their complements (`P - N`). Then
+//! All patterns are shown slowly, once alone (`P`) and once with their complements (`P - N`). Two
+//! checks follow:
 //!
-//! * the inverse Hadamard transform of the differences is the light of each LED, and its sums along rows and columns
-//!   are the light that follows each *line*. A line that is stuck or broken leaves the light of its LEDs in pattern and
-//!   complement alike, or adds it to another line's, and its own sum is gone;
-//! * pattern and complement together light every LED once, so `P + N` must be the same for every pattern. Pattern 0
-//!   lights all at once, every other one half: if the LEDs' supply gives way, the halves add up to more.
+//! * The inverse Hadamard transform of the differences is the light of each LED. Sums along rows
+//!   and columns are the light that follows each *line*. A stuck or broken line leaves the light of
+//!   its LEDs equal in pattern and complement, or adds the light to the sum of another line, and
+//!   its own sum vanishes.
+//! * Pattern and complement together light every LED once, so `P + N` must be the same for every
+//!   pattern. Pattern 0 lights all LEDs at once, every other pattern lights half. If the LEDs'
+//!   supply drops under load, the halves add up to more.
 
 use super::check::{Check, Limit};
 use super::stream::shots;
@@ -20,19 +23,21 @@ pub const LINES: &str = "LED lines";
 /// Name of the check of the supply.
 pub const SUPPLY: &str = "LED supply";
 
-/// Clocks of a pattern, long enough for any light to settle in the blanked ones.
+/// Clocks of a pattern, enough for any light to settle during the blanked clocks.
 const CLOCKS: u16 = 64;
 const BLANKED: u16 = 32;
 const SWEEPS: u32 = 16;
 const FRAMES: u32 = 2;
-/// Samples of each reading.
+/// Number of samples of each reading.
 const SAMPLES: f64 = (FRAMES * SWEEPS * (CLOCKS - BLANKED) as u32) as f64;
-/// Least light of a line, of the mean line's. On an evenly lit target an array's lines differ far less.
+/// Least light of a line, as a share of the mean line. The lines of an array differ far less on an
+/// evenly lit target.
 const MIN_LINE_SHARE: f64 = 0.05;
-/// Most that pattern and complement together may differ from pattern 0: what the supply may give way, twice the
-/// deviation that would show in an image of 8 bits, noise apart.
+/// The largest difference between pattern 0 and the sum of pattern and complement, a limit for the
+/// drop of the supply: twice the deviation that an image of 8 bits would show, without noise.
 const MAX_DEVIATION: f64 = 0.02;
-/// Noise of this many standard deviations is allowed for: passed by chance once in two thousand self-tests of 1023 patterns.
+/// The limit allows noise of this many standard deviations, which noise alone exceeds once in two
+/// thousand self-tests of 1023 patterns.
 const SIGMAS: f64 = 5.0;
 
 fn configuration(differential: bool, adc_latency: u8) -> Configuration<'static> {
@@ -49,7 +54,7 @@ fn configuration(differential: bool, adc_latency: u8) -> Configuration<'static> 
     }
 }
 
-/// Mean ADC counts of a sample, by pattern; `None` if no frame came.
+/// Mean ADC counts of a sample, by pattern; `None` if no frame arrived.
 fn means(
     session: &mut Session,
     differential: bool,
@@ -68,7 +73,8 @@ fn means(
     Ok(Some((0..usize::from(PATTERNS)).map(|pattern| sum(pattern) / samples).collect()))
 }
 
-/// Both checks, at the latency setting that puts the windows right. `noise_counts` is that of one sample.
+/// Both checks, at the latency setting that places the windows correctly. `noise_counts` is the
+/// noise of one sample.
 pub fn check(
     session: &mut Session,
     latency: u8,
@@ -79,7 +85,7 @@ pub fn check(
     else {
         return Ok([LINES, SUPPLY].map(|name| Check::told(name, false, "no frame came")).to_vec());
     };
-    // Means are of all patterns, a power of two.
+    // The means are of all patterns, whose number is a power of two.
     let Ok(dead) = dead_lines(&pairs) else {
         return Ok([LINES, SUPPLY]
             .map(|name| Check::told(name, false, "not all patterns came"))
@@ -90,7 +96,7 @@ pub fn check(
         let note = format!("{dead}: stuck, broken, or the target is dark there");
         return Ok(vec![lines.noting(&note), Check::skipped(SUPPLY, "needs all lines")]);
     }
-    // Four readings twice or as a difference: P and P - N, of the pattern and of pattern 0.
+    // Four readings: P and P - N, each of the pattern and of pattern 0.
     let noise = noise_counts * (12.0 / SAMPLES).sqrt();
     Ok(vec![lines.noting("64 lines follow their patterns"), supply(&single, &pairs, noise)])
 }
@@ -107,7 +113,7 @@ fn dead_lines(pairs: &[f64]) -> Result<DeadLines, FwhtLengthError> {
     Ok(DeadLines { rows, columns })
 }
 
-/// Lines whose LEDs' light does not follow them.
+/// Lines that the light of their LEDs does not follow.
 #[derive(Debug, PartialEq, Eq)]
 struct DeadLines {
     rows: Vec<usize>,
@@ -135,7 +141,7 @@ impl fmt::Display for DeadLines {
     }
 }
 
-/// `0-2, 29` of 0, 1, 2, 29.
+/// Ranges in words: `0-2, 29` for 0, 1, 2, 29.
 fn ranges(ascending: &[usize]) -> String {
     let mut runs: Vec<(usize, usize)> = Vec::new();
     for &line in ascending {
@@ -150,12 +156,13 @@ fn ranges(ascending: &[usize]) -> String {
     runs.iter().map(run).collect::<Vec<_>>().join(", ")
 }
 
-/// Whether pattern and complement together give the light of pattern 0. `noise` is that of their sum, in counts.
+/// Whether pattern and complement together give the light of pattern 0. `noise` is the noise of
+/// their sum, in counts.
 fn supply(single: &[f64], pairs: &[f64], noise: f64) -> Check {
     let (Some(&lit), Some(&total)) = (single.first(), pairs.first()) else {
         return Check::told(SUPPLY, false, "no frame came");
     };
-    // The complement of pattern 0 lights nothing.
+    // The complement of pattern 0 lights no LED.
     let dark = lit - total;
     let deviation = |(reading, difference): (&f64, &f64)| {
         (2.0 * reading - difference - 2.0 * dark) / total - 1.0
@@ -184,7 +191,7 @@ mod tests {
     use super::*;
     use nirspi_wire::walsh::{lit, pattern};
 
-    /// Differences of an evenly lit array whose lines are changed by `wiring`.
+    /// Differences of an evenly lit array with changed lines. `wiring` changes the lines.
     fn pairs(wiring: impl Fn(u32, u32) -> (u32, u32)) -> Vec<f64> {
         let light = |k: u16, complement: bool| -> f64 {
             let (rows, columns) = pattern(k, complement);
@@ -203,7 +210,7 @@ mod tests {
                 let hold = |lines: u32| lines & !(1 << line) | stuck << line;
                 let dead = dead_lines(&pairs(|r, c| (hold(r), c))).unwrap();
                 assert_eq!(dead.to_string(), format!("row line {line}"), "stuck at {stuck}");
-                // Column line 0 never changes: held where it is, nothing is wrong.
+                // Column line 0 never changes, so holding it changes nothing.
                 let dead = dead_lines(&pairs(|r, c| (r, hold(c)))).unwrap();
                 let expected = if (line, stuck) == (0, 0) { vec![] } else { vec![line] };
                 assert!(expected.iter().all(|line| dead.columns.contains(line)), "{dead:?}");

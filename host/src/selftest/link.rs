@@ -1,4 +1,5 @@
-//! The link: how many frames a second it carries, and that it loses none at a pace that it can keep.
+//! Checks the link: the number of frames a second that it carries, and that it loses no frame at a
+//! slower pace.
 
 use super::LinkDemands;
 use super::check::{Check, Limit};
@@ -13,7 +14,7 @@ pub const LOSSES: &str = "link losses";
 /// Name of the check of the speed.
 pub const SPEED: &str = "link throughput";
 
-/// Share of its top speed at which a link must lose nothing.
+/// Share of its top speed at which a link must lose no frame.
 const PACE: f64 = 0.8;
 
 fn setup(sweeps: u32) -> MeasurementSetup {
@@ -28,7 +29,7 @@ fn setup(sweeps: u32) -> MeasurementSetup {
     }
 }
 
-/// Runs as fast as it goes, then at [`PACE`] of that.
+/// Runs at top speed, then at [`PACE`] of the top speed.
 pub fn check(session: &mut Session, demands: LinkDemands) -> Result<Vec<Check>, SessionError> {
     let fastest = stream(session, &setup(1), demands.duration)?;
     let seconds = fastest.elapsed.as_secs_f64();

@@ -1,11 +1,14 @@
-//! The self-test: does this camera measure what it says, all the way to the host?
+//! The self-test: checks that the camera measures correctly, from the light to the host.
 //!
-//! Stages, each building on those before: the device's checks of itself; test frames of the FPGA's generator through
-//! the whole chain; settling and latency from raw bursts; latency again, by stepping the FPGA's setting; the LEDs, by
-//! the light that each line and each pattern brings to the detector; the link, by its speed and its losses. Point the
-//! camera at something bright and evenly lit, such as white paper: what reflects nothing shows nothing.
+//! The self-test has stages, each of which builds on earlier stages: the device's own checks; test
+//! frames of the FPGA's generator through the whole chain; settling and latency from raw bursts;
+//! latency again, by stepping the FPGA's setting; the LEDs, by the light of each line and each
+//! pattern at the detector; the link, by its speed and its losses. Point the camera at a bright and
+//! evenly lit target, such as white paper.
 //!
-//! The one law: a verdict follows from a measured value and a limit, and both are shown.
+//! # Invariant
+//! A verdict follows from a measured value and a limit, and both are shown
+//! (`check::tests::the_verdict_follows_from_value_and_limit`).
 
 mod check;
 mod generator;
@@ -22,34 +25,34 @@ use crate::session::{IgnorePackets, Session, SessionError};
 use nirspi_wire::{ADC_MAX, CLOCKS_PER_PATTERN, SelfTestReport};
 use std::time::Duration;
 
-/// Least step of all LEDs together, as a share of the ADC's range. With less, a single LED moves a reading by under a
-/// sixth of a count.
+/// Least step of all LEDs together, as a share of the ADC's range. With a smaller step, a single
+/// LED changes a reading by less than a sixth of a count.
 const MIN_STEP_SHARE: f64 = 0.01;
-/// Blanked samples of the fastest setting, for which the leak is shown.
+/// Blanked samples of the fastest setting, for which the leak is reported.
 const BLANKED: u16 = 2;
-/// Least share of a slot's light to be read in its own slot at the fastest setting. With less, undoing the leak more
-/// than doubles the noise.
+/// Least share of a slot's light that must be read in its own slot at the fastest setting. With a
+/// smaller share, correcting the leak more than doubles the noise.
 const MIN_OWN_SHARE: f64 = 0.5;
 
-/// What is asked of a link.
+/// The demands on a link.
 #[derive(Debug, Clone, Copy)]
 pub struct LinkDemands {
-    /// Frames of 1024 patterns in a second; 0 where any speed will do.
+    /// Frames of 1024 patterns a second; 0 if any speed is enough.
     pub min_frames_per_s: f64,
-    /// How long each of the two measurements takes.
+    /// Duration of each of the two measurements.
     pub duration: Duration,
 }
 
-/// Stages, in order, for people who wait.
+/// Names of the stages in order, for progress messages.
 pub const STAGES: [&str; 6] =
     ["device", "test frames", "settling", "ADC latency", "LEDs", "link throughput"];
 
-/// What a self-test has found.
+/// The result of a self-test.
 #[derive(Debug)]
 pub struct SelfTest {
     /// Every check, in order.
     pub checks: Vec<Check>,
-    /// The calibration to keep, if it could be measured and the latency is beyond doubt.
+    /// The calibration to keep, if the latency could be measured and is confirmed.
     pub settling: Option<Settling>,
 }
 
@@ -61,10 +64,10 @@ impl SelfTest {
     }
 }
 
-/// Runs all stages. `begin` hears the number of each stage in [`STAGES`] as it begins.
+/// Runs all stages. `begin` receives the number of each stage in [`STAGES`] at its start.
 ///
 /// # Errors
-/// When the camera goes away. What it refuses is a failed check.
+/// If the camera disconnects. A command that the camera refuses is a failed check.
 pub fn run(
     session: &mut Session,
     demands: LinkDemands,
@@ -90,7 +93,7 @@ pub fn run(
             let stepped = latency::check(session, settling);
             let stepped = unless_refused(&stages[..1], stepped)?;
             agrees = stepped.iter().all(|check| check.verdict() == Verdict::Passed);
-            // Where burst and stepping disagree, it is the stepped setting that puts the windows right.
+            // If burst and stepping disagree, the stepped setting places the windows correctly.
             let setting = stepped.iter().find_map(Check::value);
             checks.extend(stepped);
             begin(4);
@@ -111,7 +114,7 @@ pub fn run(
     Ok(SelfTest { checks, settling: settling.filter(|_| agrees) })
 }
 
-/// What a stage has found. What the camera refuses, it fails.
+/// The checks of a stage. A refusal of the camera becomes a failed check.
 fn unless_refused(
     names: &[&str],
     outcome: Result<Vec<Check>, SessionError>,
@@ -122,7 +125,7 @@ fn unless_refused(
     })
 }
 
-/// The camera's refusal; any other error stays one.
+/// The camera's refusal in words; any other error stays an error.
 fn refusal_in_words(error: SessionError) -> Result<String, SessionError> {
     match error {
         SessionError::Refused { .. } => Ok(error.to_string()),
@@ -134,7 +137,8 @@ fn min_step_counts() -> f64 {
     (MIN_STEP_SHARE * f64::from(ADC_MAX)).round()
 }
 
-/// One check a bit of the device's report, named as the protocol names it. A bit of a newer device has no name here.
+/// One check for each bit of the device's report, named as in the protocol. A bit that this program
+/// does not know has its number as name.
 fn device(report: SelfTestReport) -> Vec<Check> {
     let named = |bit: u32| SelfTestReport::NAMES.iter().find(|(mask, _)| *mask == 1 << bit);
     (0..u32::BITS)
@@ -152,7 +156,7 @@ fn device(report: SelfTestReport) -> Vec<Check> {
         .collect()
 }
 
-/// What the raw bursts say.
+/// The checks of the raw bursts.
 fn light_and_settling(settling: Result<&Settling, &String>) -> Vec<Check> {
     const STEP: &str = "light of all LEDs";
     const OWN: &str = "settling at 25 MHz";

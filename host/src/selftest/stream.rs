@@ -1,4 +1,4 @@
-//! Short runs whose every frame is looked at, and runs that only count.
+//! Short runs in which every frame is compared, and runs in which frames are only counted.
 
 use crate::session::{ANSWER_TIMEOUT, IgnorePackets, Listener, Session, SessionError, request};
 use crate::setup::MeasurementSetup;
@@ -6,13 +6,13 @@ use crate::tally::Tally;
 use nirspi_wire::{Configuration, DeviceMessage, EventKind, PacketError, RunLength, Status};
 use std::time::{Duration, Instant};
 
-/// How often the camera hears from a host that only listens.
+/// Interval of the host's messages while it only listens.
 const KEEP_ALIVE: Duration = Duration::from_secs(1);
 
-/// A frame that came.
+/// A received frame.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Shot {
-    /// Its number in the run.
+    /// The frame's number in the run.
     pub sequence: u32,
     /// Summed ADC counts, one a pattern shown.
     pub samples: Vec<i64>,
@@ -42,7 +42,7 @@ impl Listener for Collector {
     }
 }
 
-/// The frames of a run of `count` that came; some may be missing.
+/// The received frames of a run of `count` frames; some may be missing.
 pub fn shots(
     session: &mut Session,
     configuration: Configuration<'_>,
@@ -59,7 +59,8 @@ pub fn shots(
             break;
         }
     }
-    // A run whose end was not heard of is ended for sure. One that has ended refuses, and that is well.
+    // The run is stopped if its end was not received. A run that has ended refuses the stop, which
+    // is harmless.
     if !collector.ended {
         match session.command(request::Stop, &mut collector) {
             Ok(()) | Err(SessionError::Refused { .. }) => {}
@@ -69,16 +70,16 @@ pub fn shots(
     Ok(collector.shots)
 }
 
-/// What a run brought that only counted.
+/// The result of a run that only counts frames.
 #[derive(Debug)]
 pub struct Stream {
-    /// Every frame's fate.
+    /// The account of all frames.
     pub tally: Tally,
-    /// Bytes of all packets, as they crossed the link.
+    /// Bytes of all packets on the link.
     pub bytes: u64,
-    /// From the start to the stop.
+    /// Time from start to stop.
     pub elapsed: Duration,
-    /// The camera's own view of the run.
+    /// The camera's own status after the run.
     pub status: Status,
 }
 
@@ -96,7 +97,7 @@ impl Listener for Counter {
     }
 }
 
-/// Lets the camera run for `duration`, and counts.
+/// Runs the camera for `duration`, and counts.
 pub fn stream(
     session: &mut Session,
     setup: &MeasurementSetup,
@@ -111,7 +112,8 @@ pub fn stream(
     let (mut kept_alive, mut kept_alive_us) = (started, 0);
     while started.elapsed() < duration && !counter.tally.has_ended() {
         session.listen(Duration::from_millis(20), &mut counter)?;
-        // A simulated camera's time may outrun ours, and it is the camera that counts our silence.
+        // The time of a simulated camera may run faster than the host's, and the camera measures
+        // the host's silence.
         let device_us = counter.tally.device_time_us();
         let device_age = Duration::from_micros(device_us.saturating_sub(kept_alive_us));
         if kept_alive.elapsed() > KEEP_ALIVE || device_age > KEEP_ALIVE {
@@ -121,7 +123,7 @@ pub fn stream(
     }
     let (elapsed, bytes) = (started.elapsed(), counter.bytes);
     match session.command(request::Stop, &mut counter) {
-        // It had ended by itself, by a fault.
+        // The run had ended by a fault.
         Ok(()) | Err(SessionError::Refused { .. }) => {}
         Err(error) => return Err(error),
     }
@@ -129,7 +131,7 @@ pub fn stream(
         session.listen(Duration::from_millis(20), &mut counter)?;
     }
     let status = session.status(&mut counter)?;
-    // The end of the run may have been the packet that was lost.
+    // The packet with the end of the run may be lost.
     if !counter.tally.has_ended() {
         counter.tally.end(status.frames_made);
     }

@@ -1,6 +1,9 @@
-//! The camera's thread: drains every frame, hands the newest to the slot, and looks for a camera that has gone.
+//! The camera's thread: receives every frame, puts the newest into the slot, and reconnects after
+//! the camera has gone.
 //!
-//! The one law: it waits for the camera and for nobody else. After a fault LEDs go on again only when a person says so.
+//! # Invariant
+//! The thread waits for the camera only. After a fault the LEDs go on again only when a person asks
+//! (`after_a_fault_leds_go_on_again_only_when_a_person_says_so` in `host/src/serve/tests.rs`).
 
 use super::camera_log::Phase;
 use super::slot::{Look, RunSetup};
@@ -22,54 +25,54 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-/// Between two looks for a camera that has gone.
+/// Time between two attempts to reconnect.
 const RETRY: Duration = Duration::from_secs(1);
-/// Between two looks whether to go on.
+/// Time between two checks whether to stop.
 const TICK: Duration = Duration::from_millis(50);
 
-/// A camera that has answered, and what is known of its response.
+/// A camera that has answered, and its response.
 pub struct Connected {
-    /// The conversation.
+    /// The session with the camera.
     pub session: Session,
-    /// Where latency and settling come from.
+    /// The source of latency and settling.
     pub calibration: Calibration,
-    /// What is to be said about that.
+    /// Remarks about the source of latency and settling.
     pub note: Option<String>,
     /// The flat field kept for the camera.
     pub flat_field: Option<KeptFlatField>,
 }
 
-/// How to find the camera again.
+/// A function that connects to the camera again.
 pub type Connect = Box<dyn FnMut() -> Result<Connected, ForeignError> + Send>;
 
-/// A camera and how to measure with it.
+/// A camera and its measurement.
 pub struct CameraSource {
-    /// As the command line names it.
+    /// The camera's address as on the command line.
     pub address: String,
-    /// The measurement. Its latency is replaced by that of the calibration, where there is one.
+    /// The measurement. If there is a calibration, its latency replaces the latency of the setup.
     pub setup: MeasurementSetup,
     /// Where the depth sensor's zones lie in the image.
     pub model: CameraModel,
-    /// Finds it again.
+    /// Connects to the camera again.
     pub connect: Connect,
 }
 
-/// What ended a run.
+/// Why a run ended.
 enum End {
-    /// All is over.
+    /// The server is stopping.
     Told,
-    /// The camera has gone, in one line.
+    /// The link to the camera is gone, for this reason in one line.
     Gone(String),
-    /// It switched its LEDs off.
+    /// The camera switched its LEDs off.
     Fault(Fault),
-    /// Its latency is not known, in one line.
+    /// The camera's latency is not known, for this reason in one line.
     Uncalibrated(String),
 }
 
-/// Measures until told to stop.
+/// Measures until the server stops.
 ///
 /// # Errors
-/// [`CaptureError`] where the first run cannot even begin.
+/// [`CaptureError`] if the first run cannot begin.
 pub fn run(
     shared: &Shared,
     mut source: CameraSource,
@@ -88,7 +91,7 @@ pub fn run(
         begun: false,
     };
     let mut next = Some(first);
-    // Whoever starts this program has the camera in sight.
+    // A person who starts this program can see the camera.
     let mut person_said = true;
     while !shared.is_over() {
         let mut connected = match next.take() {
@@ -112,7 +115,7 @@ pub fn run(
             Some(fault) => End::Fault(fault),
             None => live.measure(&mut connected, source.setup.clone())?,
         };
-        // The link is let go before the camera is looked for again.
+        // The old link is closed before reconnecting.
         drop(connected);
         match end {
             End::Told => {}
@@ -132,13 +135,15 @@ pub fn run(
     Ok(())
 }
 
-/// The fault that stands in a camera that has come back. That its host was gone is none: it is here again.
+/// The fault still latched after reconnecting. `HostSilent` does not count: reconnecting clears its
+/// cause.
 fn standing_fault(session: &mut Session) -> Option<Fault> {
-    // A camera that does not answer will not measure either, and that says why.
+    // A camera that does not answer will not measure either; the measurement then reports the
+    // reason.
     session.status(&mut IgnorePackets).ok()?.fault.filter(|fault| *fault != Fault::HostSilent)
 }
 
-/// The camera has gone: rests before it is looked for.
+/// Reports that the link is gone, and waits before reconnecting.
 fn gone(shared: &Shared, why: &str) {
     let mut log = lock(&shared.camera);
     log.event(why.to_owned());
@@ -147,7 +152,7 @@ fn gone(shared: &Shared, why: &str) {
     shared.rest(RETRY);
 }
 
-/// Waits until somebody says that LEDs may go on again.
+/// Waits until a person allows the LEDs to go on again.
 fn await_person(shared: &Shared, phase: Phase, line: String) {
     lock(&shared.camera).enter(phase, line);
     shared.resume.store(false, Ordering::Relaxed);
@@ -157,7 +162,7 @@ fn await_person(shared: &Shared, phase: Phase, line: String) {
 }
 
 impl Shared {
-    /// Rests for a while, but not when all is over.
+    /// Waits for `time`, or until the server stops.
     fn rest(&self, time: Duration) {
         let started = Instant::now();
         while !self.is_over() && started.elapsed() < time {
@@ -166,24 +171,24 @@ impl Shared {
     }
 }
 
-/// Sees every frame of a run and hands the newest over.
+/// Receives every frame of a run and puts the newest into the slot.
 struct Live<'s> {
     shared: &'s Shared,
     model: CameraModel,
-    /// The account of the runs before.
+    /// The loss counters of all earlier runs.
     earlier: LossCounters,
     now: Option<(Arc<RunSetup>, Newest)>,
-    /// Of the camera that answers now.
+    /// The flat field of the connected camera.
     flat_field: Option<FlatField>,
     depth: Option<Arc<DepthMaps>>,
-    /// What the camera says has switched its LEDs off.
+    /// The fault that switched the LEDs off, as reported by the camera.
     fault: Option<Fault>,
     /// Whether any run has begun.
     begun: bool,
 }
 
 impl Live<'_> {
-    /// One run. Fails where it is the first and cannot begin.
+    /// One run. Fails only if the run is the first and cannot begin.
     fn measure(
         &mut self,
         connected: &mut Connected,
@@ -207,7 +212,8 @@ impl Live<'_> {
             }
             Err(CaptureError::Stopped) => return Ok(End::Told),
             Err(error) if !self.begun => return Err(error),
-            // Its cause is not gone yet. When it is, LEDs must not go on by themselves.
+            // The cause of the fault persists. When the cause is gone, the LEDs must not go on by
+            // themselves.
             Err(CaptureError::Session(SessionError::Refused {
                 refusal: Refusal::Fault(fault),
                 ..
@@ -218,7 +224,7 @@ impl Live<'_> {
         self.shared.slot.account(self.earlier);
         let missing = captured.missing();
         Ok(match (self.fault, captured.ended) {
-            // The link may have gone right after it.
+            // The link may be lost right after the fault.
             (Some(fault), _) | (None, Ended::Fault(fault)) => End::Fault(fault),
             (None, Ended::LinkLost(error) | Ended::Unconfirmed(error)) => {
                 End::Gone(causes::in_one_line(&error))
@@ -284,7 +290,8 @@ impl Observer for Live<'_> {
     }
 }
 
-/// The depth map in the camera's image; none for a sensor of other than 8 x 8 zones, of which it is not known where they lie.
+/// The depth map in the camera's image; `None` for a sensor with other than 8 x 8 zones, because
+/// the positions of its zones are not known.
 fn depth_map(model: &CameraModel, depth: &Depth<'_>) -> Option<DepthMaps> {
     let zones_mm: Vec<u16> = depth.distances_mm.iter().collect();
     let field = model.projector().field_over_distance();

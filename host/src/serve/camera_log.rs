@@ -1,4 +1,4 @@
-//! What is known of the camera, and what has happened to it, in words.
+//! The state of the camera and its events, in words.
 
 use crate::boards;
 use crate::session::CameraIdentity;
@@ -8,33 +8,35 @@ use serde::Serialize;
 use std::collections::VecDeque;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-/// Events that are kept for who comes later.
+/// Number of events kept for pages that connect later.
 const EVENTS: usize = 100;
 
-/// Where the camera is.
+/// The phase of the camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Phase {
-    /// Greeted; latency and settling are measured, or the setup sent.
+    /// The camera has answered. Latency and settling are being measured, or the setup is being
+    /// sent.
     Preparing,
-    /// Frames come.
+    /// Frames arrive.
     Measuring,
-    /// It switched its LEDs off, and waits for somebody to say that they may go on again.
+    /// The camera switched its LEDs off and waits for a person to allow them again.
     Fault,
-    /// Its latency could not be measured and none is kept, so no picture would be right. A person must say to try again.
+    /// The camera's latency could not be measured and no calibration is kept, so every picture
+    /// would be wrong. A person must ask for another attempt.
     Uncalibrated,
-    /// It has gone; it is looked for again.
+    /// The link is gone; the thread tries to reconnect.
     Lost,
 }
 
-/// What is known of the camera.
+/// The state of the camera.
 #[derive(Debug, Clone, Serialize)]
 pub struct CameraState {
-    /// As the command line names it.
+    /// The camera's address as on the command line.
     address: String,
-    /// Whether anything in it is simulated.
+    /// Whether any part of the camera is simulated.
     simulated: bool,
-    /// Where it is.
+    /// The phase.
     pub phase: Phase,
     /// The phase in words.
     line: String,
@@ -44,38 +46,38 @@ pub struct CameraState {
     measurement: Option<Measurement>,
 }
 
-/// What is being measured, in short.
+/// A short description of the measurement.
 #[derive(Debug, Clone, Serialize)]
 struct Measurement {
     patterns: usize,
     order: String,
     differential: bool,
     sweeps: u32,
-    /// Light in one frame.
+    /// Time of light in one frame.
     frame_us: f64,
     calibrated: bool,
 }
 
-/// Something that happened.
+/// One event.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EventLine {
-    /// When, in milliseconds since 1970.
+    /// Time of the event, in milliseconds since 1970.
     unix_ms: u64,
-    /// What, in one line.
+    /// The event in one line.
     pub text: String,
 }
 
-/// What the camera's thread knows.
+/// The state and the events that the camera's thread reports.
 #[derive(Debug, Clone)]
 pub struct CameraLog {
-    /// The camera.
+    /// The state of the camera.
     pub camera: CameraState,
     /// The newest events, oldest first.
     events: VecDeque<EventLine>,
 }
 
 impl CameraLog {
-    /// Of a camera that has answered.
+    /// The log of a camera that has answered.
     pub fn new(address: &str, identity: &CameraIdentity) -> Self {
         let camera = CameraState {
             address: address.to_owned(),
@@ -91,7 +93,7 @@ impl CameraLog {
         log
     }
 
-    /// A camera has answered, perhaps another one.
+    /// Records that a camera has answered; the camera may be another one than before.
     pub fn greeted(&mut self, identity: &CameraIdentity) {
         self.camera.identity = identity.clone();
         self.camera.simulated = boards::is_simulated(&identity.board);
@@ -101,7 +103,7 @@ impl CameraLog {
         self.event(format!("connected to {} {}", identity.board, identity.serial));
     }
 
-    /// Frames come from now on.
+    /// Records that frames arrive from now on.
     pub fn measuring(&mut self, setup: &MeasurementSetup, calibrated: bool) {
         self.camera.measurement = Some(Measurement {
             patterns: setup.rows.len(),
@@ -114,13 +116,13 @@ impl CameraLog {
         self.enter(Phase::Measuring, "measuring".to_owned());
     }
 
-    /// Something else is the case now.
+    /// Records a new phase.
     pub fn enter(&mut self, phase: Phase, line: String) {
         self.camera.phase = phase;
         self.camera.line = line;
     }
 
-    /// Something has happened.
+    /// Records an event.
     pub fn event(&mut self, text: String) {
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         self.events.push_back(EventLine { unix_ms: now.as_millis() as u64, text });

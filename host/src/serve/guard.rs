@@ -1,9 +1,13 @@
-//! Who may ask: pages that this server served, and programs on machines that reach it.
+//! Accepts requests of pages from this server, and of programs on machines that reach this server.
 //!
-//! A browser carries requests of any page to this address: another site's page may post to it, and with a name of its own that
-//! resolves to this machine (DNS rebinding) it may even read. Both show in the headers, which no page can forge.
+//! A browser carries requests of any page to this address. A page of another site may post to the
+//! address. If the site's own name resolves to this machine (DNS rebinding), the page may even
+//! read. Both attacks show in the headers, which pages cannot forge.
 //!
-//! The one law: what is refused is refused before anything else is looked at.
+//! # Invariant
+//! A request is accepted only from this server's pages or without a page
+//! (`tests::our_own_pages_and_scripts_pass`, `tests::foreign_names_are_refused`,
+//! `tests::foreign_pages_are_refused`). The check comes before any other use of the request.
 
 use axum::http::uri::Authority;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, header};
@@ -13,19 +17,20 @@ use thiserror::Error;
 /// Why a request is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum Refused {
-    /// The address asked for is not this server's.
+    /// The requested host name is not this server's.
     #[error(
         "this server does not go by that name: open it by its IP address, or as localhost on its own machine"
     )]
     Host,
-    /// Another site's page asks.
+    /// A page of another site sent the request.
     #[error("a page of another site asked: open this server's own")]
     Origin,
 }
 
-/// Lets a request pass, or says why not. `listen` is where this server listens.
+/// Accepts a request or returns the reason for refusing. `listen` is where this server listens.
 ///
-/// The port in `Host` is not looked at: it is another where somebody forwards ours (ssh -L), and never a foreign page's to choose.
+/// The port in `Host` is not checked. The port differs if a user forwards the server's port (ssh
+/// -L), and a page of another site cannot choose the port.
 ///
 /// # Errors
 /// [`Refused`].
@@ -41,7 +46,7 @@ pub fn check(headers: &HeaderMap, listen: SocketAddr) -> Result<(), Refused> {
             return Err(Refused::Origin);
         }
     }
-    // Pictures that other pages show come without Origin. Following a link is nobody's harm.
+    // Images embedded in pages of other sites come without `Origin`. Following a link is harmless.
     let told = |name| headers.get(HeaderName::from_static(name)).map(HeaderValue::as_bytes);
     let foreign = matches!(told("sec-fetch-site"), Some(b"cross-site" | b"same-site"));
     if foreign && told("sec-fetch-mode") != Some(b"navigate") {
@@ -50,14 +55,15 @@ pub fn check(headers: &HeaderMap, listen: SocketAddr) -> Result<(), Refused> {
     Ok(())
 }
 
-/// The value of a header that is there once.
+/// The value of a header that occurs once.
 fn only<'h>(headers: &'h HeaderMap, name: &HeaderName) -> Option<&'h str> {
     let mut all = headers.get_all(name).iter();
     let first = all.next()?;
     if all.next().is_some() { None } else { first.to_str().ok() }
 }
 
-/// Whether an address could be ours. No name but localhost is: names are what rebinding needs.
+/// Whether an address may be this server's. `localhost` is the only accepted name, because DNS
+/// rebinding needs a name.
 fn is_ours(host: &str, listen: SocketAddr) -> bool {
     if host.eq_ignore_ascii_case("localhost") {
         return true;

@@ -1,7 +1,10 @@
-//! HTTP: the page, the stream of moments to each browser, and what scripts ask for.
+//! HTTP: the page, the stream of states to each browser, and the interface for scripts.
 //!
-//! The one law: a browser is sent the newest moment when it has taken the one before, so a slow or dead one holds nothing up
-//! and costs one moment's memory.
+//! # Invariant
+//! A browser receives the newest state only after it has taken the state before. A slow or dead
+//! browser therefore delays no other part and uses the memory of one state
+//! (`a_browser_that_does_not_read_costs_nobody_and_then_sees_the_newest` in
+//! `host/src/serve/tests.rs`).
 
 use super::settings::Change;
 use super::state::Published;
@@ -26,14 +29,14 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 use tokio::sync::watch;
 
-/// How often it is looked whether all is over.
+/// Time between two checks whether the server stops.
 const TICK: Duration = Duration::from_millis(50);
-/// Most bytes of a wish.
+/// The most bytes of a settings message.
 const MAX_CHANGE_BYTES: usize = 4096;
 
 const PAGE: &str = include_str!("page.html");
 
-/// What browsers are told along with every answer: nothing from elsewhere, nobody's frame, nothing kept.
+/// Security headers for every response: no external content, no framing, no caching.
 const HEADERS: [(HeaderName, &str); 5] = [
     (
         header::CONTENT_SECURITY_POLICY,
@@ -53,7 +56,8 @@ struct App {
     listen: SocketAddr,
 }
 
-/// Serves until `is_over`. Requests under way are cut off: the newest thing a page can be told is that it is over.
+/// Serves until `is_over`. Open requests are then cut off, because the page detects the end of the
+/// server by the closed connection.
 pub fn run(
     listener: TcpListener,
     shared: Arc<Shared>,
@@ -76,7 +80,7 @@ pub fn run(
     listener.set_nonblocking(true)?;
     runtime.block_on(async move {
         let listener = tokio::net::TcpListener::from_std(listener)?.tap_io(|stream| {
-            // A socket that cannot do without delay does with it.
+            // A socket that cannot set the option works with more delay.
             let _ = stream.set_nodelay(true);
         });
         let serving = tokio::spawn(async move { serve(listener, router).await });
@@ -90,7 +94,7 @@ pub fn run(
     })
 }
 
-/// Refuses whom [`guard`] refuses, before anything else.
+/// Refuses every request that [`guard`] refuses, before any other handler.
 async fn only_ours(State(app): State<App>, request: Request, next: Next) -> Response {
     let mut response = match guard::check(request.headers(), app.listen) {
         Ok(()) => next.run(request).await,
@@ -102,7 +106,7 @@ async fn only_ours(State(app): State<App>, request: Request, next: Next) -> Resp
     response
 }
 
-/// An answer of one line.
+/// A response of one line.
 fn line(status: StatusCode, text: &impl ToString) -> Response {
     (status, format!("{}\n", text.to_string())).into_response()
 }
@@ -142,7 +146,7 @@ fn png(side: usize, pixels: Option<&[f32]>) -> Response {
     }
 }
 
-/// Answers with the settings that hold from now on.
+/// Applies a change, and answers with the new settings.
 async fn settings(State(app): State<App>, body: Bytes) -> Response {
     let mut settings = lock(&app.shared.settings);
     let changed = Change::parse(&body).and_then(|change| {
@@ -164,7 +168,7 @@ async fn settings(State(app): State<App>, body: Bytes) -> Response {
     }
 }
 
-/// A page that looks, as long as it does.
+/// Counts a page for as long as the page is connected.
 struct Viewer(Arc<Shared>);
 
 impl Viewer {
@@ -182,12 +186,12 @@ impl Drop for Viewer {
 
 async fn events(State(app): State<App>) -> Sse<impl Stream<Item = Result<Event, Infallible>>> {
     let mut published = app.published;
-    // What there is now comes first.
+    // The first message is the current state.
     published.mark_changed();
     let viewer = Viewer::new(app.shared);
     Sse::new(unfold((published, viewer), |(mut published, viewer)| async move {
         loop {
-            // Fails when all is over.
+            // The receiver fails when the server stops.
             published.changed().await.ok()?;
             let moment = Arc::clone(&published.borrow_and_update());
             if !moment.message.is_empty() {

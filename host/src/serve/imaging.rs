@@ -1,6 +1,8 @@
-//! Frames -> images: takes the newest look, reconstructs it, enhances it, and publishes the moment.
+//! The imaging thread: takes the newest frames, reconstructs and enhances their image, and
+//! publishes the state.
 //!
-//! The one law: it works on the newest frames there are and never makes the camera's thread wait.
+//! The imaging thread always takes the newest frames, and the camera's thread never waits for the
+//! imaging thread.
 
 use super::settings::Settings;
 use super::slot::Look;
@@ -19,15 +21,15 @@ use std::time::{Duration, Instant};
 use thiserror::Error;
 use tokio::sync::watch;
 
-/// Least time from image to image: more than this no screen shows.
+/// Least time from image to image. Screens show no more images a second.
 const PACE: Duration = Duration::from_millis(33);
-/// How often pages hear of a camera that sends nothing.
+/// Time between two states that pages receive while the camera sends nothing.
 const HEARTBEAT: Duration = Duration::from_millis(500);
 
-/// Why a look gave no picture.
+/// Why the newest frames gave no picture.
 #[derive(Debug, Error)]
 enum PictureError {
-    /// The settings name a method that there is not.
+    /// The settings name a method that does not exist.
     #[error("there is no method {0}")]
     Method(&'static str),
     /// The frames give no measurements.
@@ -36,60 +38,61 @@ enum PictureError {
     /// The method gives no image.
     #[error(transparent)]
     Reconstruct(#[from] ReconstructError),
-    /// The image is not of the instrument's size, or not finite.
+    /// The image does not have the instrument's size, or has a pixel that is not finite.
     #[error("the frames gave no image of finite numbers")]
     NotFinite,
-    /// The networks do not take the image.
+    /// The networks refuse the image.
     #[error(transparent)]
     Enhance(#[from] EnhanceError),
 }
 
-/// All that makes images.
+/// The methods and networks that make images.
 pub struct Imaging {
-    /// Methods of reconstruction, each by its word; the settings name one of them.
+    /// Methods of reconstruction by name. The settings name one of the methods.
     pub methods: Vec<(&'static str, Box<dyn Reconstruct>)>,
     /// Fusion and deblurring.
     pub enhance: Enhance,
 }
 
-/// The images of one moment, and what is known of them.
+/// The images of one state, and their properties.
 #[derive(Debug, Serialize)]
 pub struct Picture {
-    /// (32, 32) in [0, 1], 1 being white.
+    /// The reconstructed image, (32, 32) in [0, 1], with white at 1.
     #[serde(skip)]
     pub image: Vec<f32>,
-    /// (64, 64) in [0, 1].
+    /// The enhanced image, (64, 64) in [0, 1].
     #[serde(skip)]
     pub enhanced: Option<Vec<f32>>,
     method: &'static str,
-    /// Frames summed.
+    /// Number of summed frames.
     frames: u64,
-    /// ADC counts of one pixel that were taken for white.
+    /// ADC counts of one pixel that were used as white.
     white_counts: f32,
     reconstruct_ms: f64,
-    /// `null` where it is switched off.
+    /// The results of the learned stages; `null` if they are switched off.
     enhancement: Option<Enhancement>,
-    /// Reasons not to trust the images: the frames' flags, and what the learned stages found.
+    /// Reasons not to trust the images: the frames' flags, and the results of the learned stages.
     warnings: Vec<String>,
-    /// The same in a few words, for the image itself.
+    /// Short forms of the warnings, for the image itself.
     short_warnings: Vec<&'static str>,
 }
 
-/// What the learned stages found.
+/// The results of the learned stages.
 #[derive(Debug, Clone, Copy, Serialize)]
 struct Enhancement {
-    /// Blur in pixels of the 64 x 64 grid, as estimated.
+    /// Estimated blur in pixels of the 64 x 64 grid.
     blur_px: f32,
-    /// Noise of a pixel, white being 1, as estimated.
+    /// Estimated noise of a pixel; white is 1.
     noise: f32,
-    /// Distance of the image from that of the result, over its noise: near 1 or below, the readings bear it out.
+    /// Distance of the image from that of the result, divided by its noise. A value near 1 or below
+    /// means that the readings support the result.
     inconsistency: f32,
-    /// Whether a depth map was there to be fused.
+    /// Whether a depth map was fused.
     depth: bool,
     enhance_ms: f64,
 }
 
-/// Makes images and publishes them until told to stop.
+/// Makes images and publishes them until the server stops.
 pub fn run(shared: &Shared, imaging: &Imaging, publish: &watch::Sender<Arc<Published>>) {
     let mut white = SteadyWhite::default();
     let (mut picture, mut problem) = (None, None);
@@ -112,7 +115,7 @@ pub fn run(shared: &Shared, imaging: &Imaging, publish: &watch::Sender<Arc<Publi
             images_per_s: images.at(now, ledger.images.shown),
         };
         let settings = *lock(&shared.settings);
-        // A copy: the camera's thread may have something to add meanwhile.
+        // The log is copied, so that the camera's thread can add to the log meanwhile.
         let log = lock(&shared.camera).clone();
         let state = State {
             program: env!("CARGO_PKG_VERSION"),
@@ -135,7 +138,7 @@ pub fn run(shared: &Shared, imaging: &Imaging, publish: &watch::Sender<Arc<Publi
 }
 
 impl Imaging {
-    /// The images of one look.
+    /// The images of the newest frames.
     fn picture(
         &self,
         look: &Look,

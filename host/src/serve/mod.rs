@@ -5,9 +5,11 @@
 //!  every frame      newest      newest image       newest moment      at its own pace
 //! ```
 //!
-//! Data flows one way, and each arrow keeps the newest and counts what it passes over, so nobody waits for anybody behind
-//! him: not the camera for networks, not networks for a browser, not one browser for another. What pages wish comes
-//! the other way as one small message ([`settings::Change`]). Two threads compute; all of HTTP is one more, asynchronous.
+//! Data flows from the camera's thread through the imaging thread to the browsers. Each stage keeps
+//! only the newest item and counts what it drops, so a slow consumer never blocks the stage before:
+//! the camera does not wait for networks, the networks do not wait for a browser, and a browser
+//! does not wait for another browser. Pages change settings by one small message
+//! ([`settings::Change`]). Two threads compute; all of HTTP runs asynchronously on a third thread.
 
 mod camera;
 mod camera_log;
@@ -35,31 +37,31 @@ use std::thread::JoinHandle;
 use thiserror::Error;
 use tokio::sync::watch;
 
-/// Why serving ended otherwise than by its user.
+/// Why serving ended without a request of the user.
 #[derive(Debug, Error)]
 pub enum ServeError {
-    /// The camera would not measure.
+    /// The camera could not measure.
     #[error(transparent)]
     Camera(#[from] CaptureError),
     /// The network failed.
     #[error("the web server failed")]
     Network(#[from] io::Error),
-    /// A thread died of a defect of this program.
+    /// A thread panicked because of a bug in this program.
     #[error("the {0} thread died")]
     Thread(&'static str),
 }
 
-/// An error of what the caller of [`serve`] has handed over.
+/// An error of the functions that the caller passes to [`serve`].
 pub type ForeignError = Box<dyn std::error::Error + Send + Sync>;
 
-/// What the threads have in common.
+/// The data that the threads share.
 struct Shared {
     slot: Slot,
     camera: Mutex<CameraLog>,
     settings: Mutex<Settings>,
-    /// Methods that the settings can name.
+    /// Names of the methods that settings can choose.
     methods: Vec<&'static str>,
-    /// A person says that LEDs may go on again.
+    /// Set when a person allows the LEDs to go on again.
     resume: AtomicBool,
     over: AtomicBool,
     viewers: AtomicUsize,
@@ -87,15 +89,17 @@ impl Shared {
     }
 }
 
-/// What is behind a lock. A thread that died holding it leaves counters and settings, which are whole at any moment.
+/// Locks a mutex, also if a thread panicked while holding the lock: counters and settings are valid
+/// at any moment.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Serves `camera` to whoever opens `listener`'s address, until `stop` is set. Returns what became of all frames.
+/// Serves `camera` to the browsers that connect to `listener`, until `stop` is set. Returns the
+/// account of all frames.
 ///
 /// # Errors
-/// [`ServeError`], after the camera was stopped.
+/// [`ServeError`], after the camera is stopped.
 pub fn serve(
     listener: TcpListener,
     camera: CameraSource,
@@ -120,7 +124,7 @@ pub fn serve(
         || stop.load(Ordering::Relaxed) || measuring.is_finished() || making.is_finished();
     let served = http::run(listener, Arc::clone(&shared), published, is_over);
     shared.over.store(true, Ordering::Relaxed);
-    // The camera is stopped whatever else has happened.
+    // The camera is stopped even if the other threads failed.
     let measured = measuring.join().map_err(|_| ServeError::Thread("camera"))?;
     making.join().map_err(|_| ServeError::Thread("imaging"))?;
     measured?;

@@ -1,12 +1,14 @@
-//! What a page may change while the camera runs, and the one message that says so.
+//! The settings that a page can change while the camera runs, and the message that changes them.
 //!
-//! The one law: a change is taken whole or refused whole, with one line that says why.
+//! # Invariant
+//! A change is applied whole, or refused whole with a one-line reason
+//! (`tests::what_cannot_be_is_refused_in_one_line_that_names_it`).
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use thiserror::Error;
 
-/// Most frames that one image can be the sum of.
+/// The most frames that one image can sum.
 pub const MAX_FRAMES: u32 = 1024;
 
 /// How images are made.
@@ -16,48 +18,48 @@ pub struct Settings {
     pub method: &'static str,
     /// Whether the learned stages run.
     pub enhance: bool,
-    /// Newest frames that are summed into one image.
+    /// Number of newest frames that are summed into one image.
     pub frames: u32,
 }
 
-/// A page's wish. What is left out stays as it is.
+/// A change that a page asks for. Fields that are left out keep their values.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Change {
-    /// Another method.
+    /// Another method of reconstruction.
     pub method: Option<String>,
-    /// The learned stages on or off.
+    /// Switches the learned stages on or off.
     pub enhance: Option<bool>,
     /// Another number of frames.
     pub frames: Option<u32>,
-    /// Measure again after a fault: LEDs go on.
+    /// Measures again after a fault: the LEDs go on.
     #[serde(default)]
     pub resume: bool,
 }
 
-/// A wish that cannot be granted.
+/// Why a change is refused.
 #[derive(Debug, Error, PartialEq, Eq)]
 pub enum ChangeError {
-    /// No such method.
+    /// The method does not exist.
     #[error("method is {found:?}, expected {}", alternatives(.offered))]
     Method {
-        /// What was asked for.
+        /// The requested method.
         found: String,
-        /// What there is.
+        /// The methods that exist.
         offered: Vec<&'static str>,
     },
-    /// No frame, or too many.
+    /// The number of frames is 0 or too large.
     #[error("frames is {found}, expected 1 to {MAX_FRAMES}")]
     Frames {
-        /// What was asked for.
+        /// The requested number.
         found: u32,
     },
-    /// No such message.
+    /// The message does not have the form of a change.
     #[error("{0}, expected for example {{\"method\": \"omp\", \"enhance\": true, \"frames\": 64}}")]
     Form(String),
 }
 
-/// `a, b or c`.
+/// A list for an error message: `a, b or c`.
 fn alternatives(words: &[&str]) -> String {
     match words {
         [others @ .., last] if !others.is_empty() => format!("{} or {last}", others.join(", ")),
@@ -66,17 +68,17 @@ fn alternatives(words: &[&str]) -> String {
 }
 
 impl Change {
-    /// Reads a message.
+    /// Parses a message.
     ///
     /// # Errors
-    /// [`ChangeError::Form`] where it is no JSON of this form.
+    /// [`ChangeError::Form`] if the message is not JSON of a change.
     pub fn parse(json: &[u8]) -> Result<Self, ChangeError> {
         serde_json::from_slice(json).map_err(|error| ChangeError::Form(error.to_string()))
     }
 }
 
 impl Settings {
-    /// The settings with this change, of the methods `offered`.
+    /// The settings after this change. `offered` are the methods that exist.
     ///
     /// # Errors
     /// [`ChangeError`] that names the field.

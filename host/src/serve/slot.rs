@@ -1,7 +1,9 @@
-//! The place where the newest frames wait for whoever makes images of them.
+//! Holds the newest frames for the imaging thread.
 //!
-//! The one law: whoever puts something in never waits, and every frame received is shown, passed over, failed or waiting:
-//! counted, as losses are.
+//! # Invariant
+//! The camera's thread never waits to put frames in. Every received frame is counted once: as
+//! shown, passed over, failed or waiting
+//! (`tests::every_frame_is_shown_passed_over_failed_or_waiting`).
 
 use super::lock;
 use crate::account::LossCounters;
@@ -13,47 +15,48 @@ use serde::Serialize;
 use std::sync::{Arc, Condvar, Mutex};
 use std::time::Duration;
 
-/// One run's setup and what is known of the camera's response: all that its frames need to be understood.
+/// One run's setup and the camera's response: everything needed to interpret its frames.
 #[derive(Debug)]
 pub struct RunSetup {
-    /// What was measured.
+    /// The measurement's setup.
     pub setup: MeasurementSetup,
-    /// The camera's response, where it is known.
+    /// The camera's response, if known.
     pub settling: Option<Settling>,
-    /// How much its LEDs differ, where that is known.
+    /// The flat field of its LEDs, if known.
     pub flat_field: Option<FlatField>,
 }
 
-/// The newest frames and what was seen beside them.
+/// The newest frames, and the newest depth map.
 #[derive(Debug, Clone)]
 pub struct Look {
-    /// Their sum.
+    /// The sum of the frames.
     pub sum: Integrated,
-    /// How they were measured.
+    /// How the frames were measured.
     pub run: Arc<RunSetup>,
     /// The newest depth map.
     pub depth: Option<Arc<DepthMaps>>,
 }
 
-/// What became of all frames of all runs.
+/// The account of all frames of all runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Ledger {
-    /// Of those that the camera made.
+    /// Counts of the frames that the camera made.
     pub frames: LossCounters,
-    /// Of those received.
+    /// Counts of the frames received.
     pub images: ImageCounters,
 }
 
-/// What became of the frames received. An image is that of the newest frame, and of some before it.
+/// The account of the received frames. An image belongs to its newest frame and may sum earlier
+/// frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct ImageCounters {
-    /// Were the newest of an image.
+    /// Frames that were the newest of an image.
     pub shown: u64,
-    /// A newer one came before there was time for them.
+    /// Frames replaced by a newer one before the imaging thread took them.
     pub passed_over: u64,
-    /// Gave no image.
+    /// Frames that gave no image.
     pub failed: u64,
-    /// Are being made into one, or will be next.
+    /// Frames in the image being made, or next in the slot.
     pub waiting: u64,
 }
 
@@ -63,7 +66,7 @@ struct Inner {
     ledger: Ledger,
 }
 
-/// Room for one [`Look`].
+/// A slot for one [`Look`].
 #[derive(Debug, Default)]
 pub struct Slot {
     inner: Mutex<Inner>,
@@ -71,7 +74,7 @@ pub struct Slot {
 }
 
 impl Slot {
-    /// A frame was received: this is the look of it. One that nobody took is passed over.
+    /// Puts in the look of a received frame. A look that was not taken counts as passed over.
     pub fn offer(&self, look: Look, frames: LossCounters) {
         let mut inner = lock(&self.inner);
         inner.ledger.frames = frames;
@@ -83,19 +86,20 @@ impl Slot {
         self.filled.notify_one();
     }
 
-    /// The account has changed without a frame received.
+    /// Updates the account of losses without a received frame.
     pub fn account(&self, frames: LossCounters) {
         lock(&self.inner).ledger.frames = frames;
     }
 
-    /// The newest look, if there is one within `patience`. [`done`](Self::done) follows.
+    /// Takes the newest look, if there is one within `patience`. The caller must then call
+    /// [`done`](Self::done).
     pub fn take(&self, patience: Duration) -> Option<Look> {
         let inner = lock(&self.inner);
         let waited = self.filled.wait_timeout_while(inner, patience, |inner| inner.next.is_none());
         waited.unwrap_or_else(std::sync::PoisonError::into_inner).0.next.take()
     }
 
-    /// What was taken has become an image, or failed to.
+    /// Records that the taken look became an image, or failed.
     pub fn done(&self, shown: bool) {
         let images = &mut lock(&self.inner).ledger.images;
         images.waiting -= 1;
@@ -106,7 +110,7 @@ impl Slot {
         }
     }
 
-    /// The account now.
+    /// The current account.
     pub fn ledger(&self) -> Ledger {
         lock(&self.inner).ledger
     }
@@ -133,7 +137,7 @@ mod tests {
             slot.offer(look, frames);
             if number % 7 == 0 {
                 assert!(slot.take(Duration::ZERO).is_some());
-                // One more comes while the image is made.
+                // One more frame arrives while the image is made.
                 if number % 2 == 0 {
                     assert_eq!(slot.ledger().images.waiting, 1);
                 }

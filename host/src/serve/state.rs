@@ -1,6 +1,7 @@
-//! What pages and scripts are told: the camera's state, the account, the rates, and the newest images.
+//! The state sent to pages and scripts: the camera's state, the account, the rates and the newest
+//! images.
 //!
-//! The one law: what goes out is one message made at one moment, so that its counters add up and its image is theirs.
+//! Each state is one message made at one moment, so its counters add up and belong to its image.
 
 use super::camera_log::{CameraState, EventLine};
 use super::imaging::Picture;
@@ -13,10 +14,10 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// How long frames are counted for a rate.
+/// The window over which a rate counts frames.
 const RATE_WINDOW: Duration = Duration::from_secs(1);
 
-/// How fast a counter counts.
+/// The rate of a counter.
 #[derive(Debug, Clone, Copy)]
 pub struct Rate {
     since: Instant,
@@ -25,12 +26,13 @@ pub struct Rate {
 }
 
 impl Rate {
-    /// Nothing counted yet.
+    /// A rate without any counts.
     pub fn new(now: Instant) -> Self {
         Self { since: now, count: 0, per_s: 0.0 }
     }
 
-    /// The counter stands at `count`: how fast it went over the last whole window.
+    /// Updates the rate: the counter has the value `count`. Returns the rate over the last whole
+    /// window.
     pub fn at(&mut self, now: Instant, count: u64) -> f64 {
         let passed = now.saturating_duration_since(self.since);
         if passed >= RATE_WINDOW {
@@ -41,16 +43,16 @@ impl Rate {
     }
 }
 
-/// How fast everything goes.
+/// All rates.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct Rates {
-    /// Frames received from the camera.
+    /// Frames received from the camera a second.
     pub camera_frames_per_s: f64,
-    /// Images made and shown.
+    /// Images made and shown a second.
     pub images_per_s: f64,
 }
 
-/// What settings can be.
+/// The values that settings can have.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct Offered<'s> {
     methods: &'s [&'static str],
@@ -58,13 +60,13 @@ pub struct Offered<'s> {
 }
 
 impl<'s> Offered<'s> {
-    /// These methods.
+    /// The offer of these methods.
     pub fn new(methods: &'s [&'static str]) -> Self {
         Self { methods, max_frames: MAX_FRAMES }
     }
 }
 
-/// Everything but pixels; `GET /api/state`.
+/// The state without pixels; the response of `GET /api/state`.
 #[derive(Debug, Serialize)]
 pub struct State<'s> {
     /// Version of this program.
@@ -76,46 +78,47 @@ pub struct State<'s> {
     pub ledger: Ledger,
     /// Rates.
     pub rates: Rates,
-    /// What is set.
+    /// The current settings.
     pub settings: Settings,
-    /// What could be.
+    /// The values that settings can have.
     pub offered: Offered<'s>,
-    /// About the images shown; `null` before the first.
+    /// Properties of the images shown; `null` before the first.
     pub picture: Option<&'s Picture>,
-    /// Why the newest frame gave no image.
+    /// Why the newest frame gave no image; `null` if it gave one.
     pub problem: Option<&'s str>,
-    /// Pages that look.
+    /// Number of connected pages.
     pub viewers: usize,
-    /// Oldest first.
+    /// Events, oldest first.
     pub events: &'s VecDeque<EventLine>,
 }
 
-/// What pages are sent.
+/// The message to pages.
 #[derive(Serialize)]
 struct Message<'s> {
     state: &'s State<'s>,
     /// 8-bit grey levels of 32 x 32 pixels in base64.
     image: Option<String>,
-    /// 64 x 64 likewise; `null` where it is switched off.
+    /// 8-bit grey levels of 64 x 64 pixels in base64; `null` if the learned stages are switched
+    /// off.
     enhanced: Option<String>,
 }
 
-/// One moment, ready to be sent.
+/// One state, encoded for sending.
 #[derive(Debug, Default)]
 pub struct Published {
-    /// As JSON, without pixels.
+    /// The state as JSON, without pixels.
     pub state: String,
-    /// As JSON, with pixels.
+    /// The state as JSON, with pixels.
     pub message: String,
     /// The images.
     pub picture: Option<Arc<Picture>>,
 }
 
 impl Published {
-    /// Puts a moment into the words of pages and scripts.
+    /// Encodes a state for pages and scripts.
     ///
     /// # Errors
-    /// Never: all of it can be said in JSON.
+    /// Does not occur: every field can be written as JSON.
     pub fn new(state: &State<'_>, picture: Option<&Arc<Picture>>) -> serde_json::Result<Self> {
         let message = Message {
             state,

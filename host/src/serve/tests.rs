@@ -11,7 +11,7 @@ use std::io::{BufRead, BufReader, Write};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
-/// No wait takes longer, on a busy machine either.
+/// The longest wait of a test, enough for a busy machine.
 const LIMIT: Duration = Duration::from_secs(30);
 
 const SETTINGS: Settings = Settings { method: "hadamard", enhance: false, frames: 8 };
@@ -20,7 +20,7 @@ fn shared(identity: &CameraIdentity) -> Arc<Shared> {
     Arc::new(Shared::new(CameraLog::new("test", identity), vec!["hadamard"], SETTINGS))
 }
 
-/// Waits until something is so.
+/// Waits until `is_so` returns true.
 #[track_caller]
 fn until(what: &str, is_so: impl Fn() -> bool) {
     let deadline = Instant::now() + LIMIT;
@@ -30,13 +30,13 @@ fn until(what: &str, is_so: impl Fn() -> bool) {
     }
 }
 
-/// A virtual camera whose enclosure can be opened, and its cable pulled.
+/// A virtual camera whose enclosure can be opened and whose cable can be pulled.
 struct Enclosed {
     camera: VirtualCamera<OpticalFpga>,
     hands: Arc<Hands>,
 }
 
-/// What people do to it.
+/// What the test does to the camera by hand.
 #[derive(Default)]
 struct Hands {
     open: AtomicBool,
@@ -65,7 +65,7 @@ impl Link for Enclosed {
     }
 }
 
-/// Plugs one in. Its enclosure may have been open a while before.
+/// Connects a virtual camera, whose enclosure may have been open before.
 fn enclosed(hands: &Arc<Hands>, was_open: bool) -> Connected {
     let scene = Scene::new(vec![1.0; 16], 4, 40.0).unwrap();
     let mut camera = VirtualOptics::new(scene, 300.0).unwrap().camera(1).unwrap();
@@ -84,7 +84,8 @@ struct Lab {
 }
 
 impl Lab {
-    /// Frames come. Whoever plugs the camera in again has had it `open`.
+    /// Starts the thread and waits for frames. `open_while_unplugged`: the enclosure is opened
+    /// while the camera is unplugged.
     fn new(open_while_unplugged: bool) -> Self {
         let hands = Arc::<Hands>::default();
         let first = enclosed(&hands, false);
@@ -113,7 +114,7 @@ impl Lab {
         self.shared.slot.ledger().frames.received
     }
 
-    /// Longer than a camera that is looked for is away: no frame comes.
+    /// Asserts that no frame arrives, for longer than a reconnection takes.
     #[track_caller]
     fn stays_dark(&self) {
         let before = self.received();
@@ -129,7 +130,7 @@ impl Lab {
         assert_eq!(self.phase(), Phase::Measuring);
     }
 
-    /// Ends it; returns what was told.
+    /// Stops the thread and returns the events.
     fn end(self) -> Vec<String> {
         self.shared.over.store(true, Ordering::Relaxed);
         self.measuring.join().unwrap().unwrap();
@@ -142,7 +143,8 @@ fn after_a_fault_leds_go_on_again_only_when_a_person_says_so() {
     let lab = Lab::new(false);
     lab.hands.open.store(true, Ordering::Relaxed);
     until("off", || lab.phase() == Phase::Fault);
-    // The cause still stands: asked to go on, it connects anew and stays off.
+    // The cause of the fault persists: when asked to go on, the thread reconnects and the LEDs stay
+    // off.
     let connections = || {
         let log = lock(&lab.shared.camera);
         log.events().iter().filter(|event| event.text.starts_with("connected to")).count()
@@ -150,7 +152,7 @@ fn after_a_fault_leds_go_on_again_only_when_a_person_says_so() {
     let before = connections();
     lab.shared.resume.store(true, Ordering::Relaxed);
     until("tried again", || connections() > before && lab.phase() == Phase::Fault);
-    // The cause is gone: nobody has asked.
+    // The cause is gone, but a person has not asked.
     lab.hands.open.store(false, Ordering::Relaxed);
     lab.stays_dark();
     lab.resumes();
@@ -198,7 +200,7 @@ fn a_browser_that_does_not_read_costs_nobody_and_then_sees_the_newest() {
     let mut idle = browser();
     let mut keen = browser();
     until("seen by two", || shared.viewers() == 2);
-    // Numbered moments, far larger than what systems keep for a connection.
+    // Numbered states, far larger than the socket buffers of common systems.
     for number in 1..=LAST {
         let message = format!("{number}{}", ".".repeat(1 << 20));
         publish.send_replace(Arc::new(Published { message, ..Published::default() }));

@@ -1,7 +1,7 @@
-//! A link cut into packets, and questions matched with their answers.
+//! Splits a link's bytes into packets, and matches answers with requests.
 //!
-//! A conversation does not know yet who is at the other end: [`Session::open`](super::Session::open) greets the camera
-//! and makes a session of it.
+//! A conversation does not know the camera yet. [`Session::open`](super::Session::open) greets the
+//! camera and makes a session of the conversation.
 
 use super::request::Request;
 use super::{ANSWER_TIMEOUT, Listener, SessionError};
@@ -14,13 +14,13 @@ use nirspi_wire::{
 };
 use std::time::{Duration, Instant};
 
-/// Longest time between two looks at the clock while an answer is awaited.
+/// The longest wait for bytes between two checks of the time while an answer is awaited.
 const LOOK: Duration = Duration::from_millis(100);
 
-/// Hears each reply: the number of the request, and what came of it.
+/// Receives each reply: the number of the request, and its result.
 type Answered<'f> = dyn FnMut(u16, Result<&Answer<'_>, Refusal>) + 'f;
 
-/// A link on which requests are numbered and packets are cut out of the bytes that come.
+/// A link with numbered requests, whose received bytes are split into packets.
 pub(super) struct Conversation {
     link: Box<dyn Link>,
     incoming: Incoming,
@@ -28,13 +28,14 @@ pub(super) struct Conversation {
 }
 
 impl Conversation {
-    /// Begins; what an earlier host may have left half sent is cut off.
+    /// Begins a conversation. A delimiter ends what an earlier host may have left half sent.
     pub(super) fn begin(mut link: Box<dyn Link>) -> Result<Self, SessionError> {
         link.send(&[0])?;
         Ok(Self { link, incoming: Incoming::new(), next_id: 0 })
     }
 
-    /// Sends a command without waiting for its answer; returns the number that the answer will repeat.
+    /// Sends a command without waiting for its answer. Returns the number that the answer will
+    /// repeat.
     pub(super) fn send(&mut self, command: Command<'_>) -> Result<u16, SessionError> {
         let id = self.next_id;
         self.next_id = id.wrapping_add(1);
@@ -52,8 +53,8 @@ impl Conversation {
         SessionError::Closed { mid_packet: self.incoming.deframer.pending() > 0 }
     }
 
-    /// Listens for up to `timeout`, or until something has come; gives every packet to `listener` and every reply
-    /// among them to `answered`.
+    /// Listens for up to `timeout`, or until a packet has arrived. Every packet goes to `listener`,
+    /// and every reply also to `answered`.
     pub(super) fn pump(
         &mut self,
         timeout: Duration,
@@ -98,7 +99,7 @@ impl Conversation {
     }
 }
 
-/// Bytes on their way to packets.
+/// Received bytes that are not split into packets yet.
 struct Incoming {
     deframer: Box<Deframer<MAX_DEVICE_PACKET>>,
     chunk: Vec<u8>,
@@ -114,7 +115,7 @@ impl Incoming {
         }
     }
 
-    /// Cuts `chunk[..length]` into packets.
+    /// Splits `chunk[..length]` into packets.
     fn take(&mut self, length: usize, listener: &mut dyn Listener, answered: &mut Answered<'_>) {
         let mut bytes = self.chunk.get(..length).unwrap_or(&[]);
         while let Some(found) = self.deframer.next(&mut bytes) {
@@ -133,7 +134,7 @@ impl Incoming {
                 (Ok(DeviceMessage::Reply(Reply { id, outcome })), _) => {
                     answered(*id, outcome.as_ref().map_err(|&refusal| refusal));
                 }
-                // Perhaps the greeting of a version whose identity cannot be read.
+                // The packet may be the greeting of a version whose identity cannot be read.
                 (Err(_), Ok(payload)) => {
                     if let Some((id, device)) = hello_of_any_version(payload) {
                         answered(id, Err(Refusal::Protocol { device }));

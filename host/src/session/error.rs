@@ -1,23 +1,23 @@
-//! Why a conversation with a camera ends, and why a camera refuses, in words.
+//! Why a session with a camera ends, and why a camera refuses, in words.
 
 use super::ANSWER_TIMEOUT;
 use super::request::{Hello, Request};
 use nirspi_wire::{Refusal, version};
 use thiserror::Error;
 
-/// Why a conversation ended.
+/// Why a session ended.
 #[derive(Debug, Error)]
 pub enum SessionError {
     /// The link failed.
     #[error("the link to the camera failed")]
     Link(#[from] std::io::Error),
-    /// The camera has gone.
+    /// The camera has closed the link.
     #[error("the camera closed the link{}", if *.mid_packet { " in the middle of a packet" } else { "" })]
     Closed {
-        /// Whether part of a packet had come.
+        /// Whether part of a packet had arrived.
         mid_packet: bool,
     },
-    /// The camera has gone before it said who it is.
+    /// The link closed before the camera identified itself.
     #[error(
         "the link closed before the camera answered: another program may be using it, or this is not a nirspi camera"
     )]
@@ -30,31 +30,31 @@ pub enum SessionError {
         if *.camera > version::CURRENT { "this program" } else { "the camera's firmware (nirspi flash)" }
     )]
     Version {
-        /// The camera's.
+        /// The camera's version.
         camera: u16,
     },
-    /// The camera would not do it.
+    /// The camera refused a command.
     #[error("the camera refused {command}: {}", refusal_in_words(.refusal))]
     Refused {
-        /// What it was asked to do.
+        /// The name of the command.
         command: &'static str,
-        /// Why not.
+        /// The camera's reason.
         refusal: Refusal,
     },
-    /// No answer.
+    /// The camera did not answer.
     #[error(
         "no answer to {command} within {} s{}",
         ANSWER_TIMEOUT.as_secs(),
         if *.command == Hello::NAME { ": is this a nirspi camera?" } else { "" }
     )]
     NoAnswer {
-        /// What was asked.
+        /// The name of the command.
         command: &'static str,
     },
-    /// An answer that belongs to another command.
+    /// The answer belongs to another command.
     #[error("the camera answered {command} with something else")]
     WrongAnswer {
-        /// What was asked.
+        /// The name of the command.
         command: &'static str,
     },
 }

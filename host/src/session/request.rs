@@ -1,47 +1,48 @@
-//! Commands of the host, each bound to the reply that answers it.
+//! The host's commands, each bound to the type of its reply.
 //!
-//! A new command is a type here with its [`Request`]; no other place lists commands and their replies.
+//! A new command is a new type with its [`Request`] in this file. No other file lists commands and
+//! their replies.
 
 use super::CameraIdentity;
 use nirspi_wire::{
     Answer, Command, Configuration, GatewareChunk, RebootInto, RunLength, SelfTestReport,
 };
 
-/// A command, its name for people, and the reply that it is answered with.
+/// A command, its name, and its reply.
 pub trait Request {
-    /// Name of the command in error messages.
+    /// The command's name in error messages.
     const NAME: &'static str;
-    /// What the camera replies.
+    /// The type of the camera's reply.
     type Reply;
 
-    /// The command as the wire carries it.
+    /// The command in the wire's form.
     fn command(&self) -> Command<'_>;
 
-    /// The reply in this answer; `None` where the answer belongs to another command.
+    /// The reply in this answer; `None` if the answer belongs to another command.
     fn reply(answer: &Answer<'_>) -> Option<Self::Reply>;
 }
 
-/// Greets the camera, naming the protocol version of this program.
+/// Greets the camera with the protocol version of this program.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Hello(pub u16);
 
-/// Sets up a measurement; also acknowledges a fault whose cause is gone.
+/// Sets up a measurement. The command also acknowledges a fault whose cause is gone.
 #[derive(Debug, Clone, Copy)]
 pub struct Configure<'c>(pub Configuration<'c>);
 
-/// Starts frames: LEDs go on.
+/// Starts frames. The LEDs go on.
 #[derive(Debug, Clone, Copy)]
 pub struct Start(pub RunLength);
 
-/// Ends frames: LEDs go off.
+/// Stops frames. The LEDs go off.
 #[derive(Debug, Clone, Copy)]
 pub struct Stop;
 
-/// Asks how the camera is.
+/// Requests the camera's status.
 #[derive(Debug, Clone, Copy)]
 pub struct Status;
 
-/// Asks the device to check itself.
+/// Runs the device's own checks.
 #[derive(Debug, Clone, Copy)]
 pub struct SelfTest;
 
@@ -49,11 +50,11 @@ pub struct SelfTest;
 #[derive(Debug, Clone, Copy)]
 pub struct ReadRegister(pub u16);
 
-/// Hands over a piece of a bitstream; the reply is the offset of the next piece.
+/// Sends a piece of a bitstream. The reply is the offset of the next piece.
 #[derive(Debug, Clone, Copy)]
 pub struct LoadGateware<'c>(pub GatewareChunk<'c>);
 
-/// Records this many plain ADC samples.
+/// Records this many raw ADC samples.
 #[derive(Debug, Clone, Copy)]
 pub struct RawBurst(pub u16);
 

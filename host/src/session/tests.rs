@@ -1,4 +1,4 @@
-//! A camera of fixed words.
+//! A camera with scripted answers.
 
 use super::*;
 use crate::link::Received;
@@ -104,7 +104,7 @@ fn a_camera_that_never_stops_reporting_fills_no_memory() {
     assert!(reports.last().unwrap().contains("more"), "{reports:?}");
 }
 
-/// Counts the packets that it hears, damaged ones apart.
+/// Counts the received packets, with a separate count of damaged ones.
 #[derive(Default)]
 struct Count {
     whole: usize,
@@ -147,7 +147,7 @@ fn an_answer_that_belongs_to_another_command_names_the_command_that_was_asked() 
     assert!(matches!(error, SessionError::WrongAnswer { command: "Status" }), "{error}");
 }
 
-/// A camera of fixed answers that keeps what it hears.
+/// A camera with fixed answers that keeps the bytes it receives.
 struct Heard {
     answers: Scripted,
     requests: std::sync::Arc<std::sync::Mutex<Vec<u8>>>,
@@ -165,7 +165,8 @@ impl Link for Heard {
 
 #[test]
 fn an_older_camera_is_greeted_again_in_its_own_version() {
-    // The firmware of version 1 names itself, whatever version the host has said, and has no tail.
+    // Firmware of version 1 names its own version, whatever version the host sends, and has no
+    // tail.
     let old = Identity { protocol: 1, capabilities: Tail(None), ..IDENTITY };
     let answers = vec![reply(0, Answer::Hello(old)), reply(1, Answer::Hello(old))];
     let requests = std::sync::Arc::default();
@@ -202,7 +203,7 @@ fn what_a_camera_can_do_is_named() {
 
 #[test]
 fn a_message_of_a_later_version_is_passed_over() {
-    // Event 0x7f of a device message that every version has.
+    // Event 0x7f of a device message, which every version has.
     let mut room = [0; 32];
     let later = encode(&[4u8, 0, 0x7F], &mut room).unwrap().to_vec();
     let chunk = [later, reply(1, Answer::Register(7))].concat();

@@ -1,9 +1,12 @@
-//! The virtual camera as a source of training pairs: some hundred pictures a second instead of a few.
+//! The virtual camera as a source of training pairs: some hundred pictures a second instead of a
+//! few.
 //!
-//! A capture is linear in light up to the ADC. So the sweeps of an exposure are summed before the receiver instead of
-//! after it: one sweep of the mean light, settled through the receiver's exact response, with the noise of the whole
-//! sum drawn at once. Calibration is measured once by the real procedure on the real virtual camera, and what it
-//! mismeasures stays in every picture. The tests hold all this against captures by the whole camera.
+//! A capture is linear in light up to the ADC. The sweeps of an exposure can therefore be summed
+//! before the receiver instead of after it: one sweep of the mean light, settled through the
+//! receiver's exact response, with the noise of the whole sum drawn at once. The real procedure
+//! measures the calibration once on the real virtual camera, and the errors of the calibration stay
+//! in every picture. The tests compare pictures with captures by the whole camera
+//! (`tests::a_picture_by_the_short_way_differs_from_a_capture_by_noise_alone`).
 
 use crate::calibration::{CalibrationError, Settling, calibrate};
 use crate::session::{IgnorePackets, Session, SessionError};
@@ -23,43 +26,45 @@ use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 use thiserror::Error;
 
-/// Farthest target, over the distance that the lens is focused on, which is the nearest: 0.3 to 1.2 m for the paper's camera.
+/// Farthest target, divided by the focus distance of the lens, which is the nearest: 0.3 to 1.2 m
+/// for the paper's camera.
 const FARTHEST_OVER_FOCUS: f64 = 4.0;
-/// Noise that an exposure is chosen for, in units of a white target.
+/// Noise for which an exposure is chosen, in units of a white target.
 const NOISE_STD: (f64, f64) = (0.003, 0.08);
 /// Sweeps of the shortest and of the longest exposure: 82 us and 10 s.
 const SWEEPS: (f64, f64) = (1.0, 122_000.0);
-/// Times at which drops are looked at in one exposure, at most.
+/// The most updates of the drops in one exposure.
 const LOOKS: u32 = 128;
-/// Share of the pictures taken with all patterns, and the least share of patterns otherwise.
+/// Share of the pictures taken with all patterns, and the least share of patterns in other
+/// pictures.
 const FULLY_SAMPLED: f32 = 0.7;
 const LEAST_SAMPLING: f32 = 0.25;
-/// Share of the depth maps with zones that give nothing, and of no depth at all.
+/// Share of the depth maps with zones without a reading, and share of pictures without depth.
 const NO_DEPTH: f32 = 0.2;
 
-/// Under what a picture is taken.
+/// The conditions of a picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Conditions {
-    /// From camera to target.
+    /// Distance from camera to target.
     pub distance_mm: f64,
-    /// What falls between.
+    /// The rain between camera and target.
     pub rain: Rainfall,
-    /// Differential sweeps that are summed.
+    /// Number of differential sweeps that are summed.
     pub sweeps: u32,
     /// Share of the patterns shown.
     pub sampling: f32,
 }
 
-/// A picture with the conditions under which it was taken.
+/// A picture and its conditions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CameraPicture {
-    /// What the camera gave.
+    /// The picture.
     pub reading: Reading,
-    /// When.
+    /// The conditions.
     pub conditions: Conditions,
 }
 
-/// Why there is no such camera, or no picture. `Display` is one line.
+/// Why the camera cannot be made, or gives no picture. `Display` is one line.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum TrainingCameraError {
@@ -75,13 +80,13 @@ pub enum TrainingCameraError {
     /// The camera could not be opened.
     #[error(transparent)]
     Session(#[from] SessionError),
-    /// Or not calibrated.
+    /// The camera could not be calibrated.
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
-    /// What leaks cannot be undone.
+    /// The leak cannot be corrected.
     #[error(transparent)]
     Leak(#[from] LeakError),
-    /// The order of patterns.
+    /// The order of patterns is not valid.
     #[error(transparent)]
     Order(#[from] RowsError),
     /// The measurement.
@@ -91,13 +96,14 @@ pub enum TrainingCameraError {
 
 /// The virtual camera's optics and calibration as one linear map from a picture to readings.
 ///
-/// No packets, firmware or clocks take part, so it makes many pictures a second; `tests` hold it to the virtual camera.
+/// Without packets, firmware or clocks, the linear camera makes many pictures a second. `tests`
+/// compare it with the virtual camera.
 #[derive(Debug, Clone)]
 pub struct LinearCamera {
     camera: CameraModel,
-    /// Light of each LED over that of an ideal one.
+    /// Light of each LED divided by that of an ideal LED.
     gains: Vec<f32>,
-    /// What the receiver does to slots, and what calibration believes that it does.
+    /// The receiver's true leak between slots, and the leak that the calibration measured.
     leaks: Leak,
     believed: Leak,
     order: Rows,
@@ -106,10 +112,11 @@ pub struct LinearCamera {
 }
 
 impl LinearCamera {
-    /// Opens the virtual camera of this description before a white sheet where its lens is focused, and calibrates it.
+    /// Opens the virtual camera of this description in front of a white sheet at the lens's focus,
+    /// and calibrates it.
     ///
     /// # Errors
-    /// [`TrainingCameraError`] if it cannot be opened or calibrated.
+    /// [`TrainingCameraError`] if the camera cannot be opened or calibrated.
     pub fn new(camera: &CameraModel, seed: u64) -> Result<Self, TrainingCameraError> {
         let projector = camera.projector();
         let distance_mm = projector.focus_distance_mm;
@@ -119,7 +126,7 @@ impl LinearCamera {
         let mut session = Session::open(Box::new(MemoryLink::new(optics.camera(seed)?)))?;
         let believed = calibrate(&mut session, &mut IgnorePackets)?.leak(clocks, blanked)?;
         let response = |n| optics.chain().settling(n);
-        // Two poles of nanoseconds have settled to rounding after as many clocks.
+        // Two poles of nanoseconds settle to rounding error within this many clocks.
         let exact = Settling {
             adc_latency: 0,
             response: (0..64).map(response).collect(),
@@ -139,8 +146,8 @@ impl LinearCamera {
         })
     }
 
-    /// Conditions as they come: blur alike between focus and the farthest target, any rain, and an exposure for the
-    /// noise wanted, as far as light and patience go.
+    /// Random conditions: blur uniform between focus and the farthest target, any rain, and an
+    /// exposure for the chosen noise, within the limits of light and exposure time.
     pub fn conditions(&self, rng: &mut impl Rng) -> Result<Conditions, TrainingCameraError> {
         // Defocus in pixels grows with the difference of the reciprocal distances.
         let near = self.camera.projector.focus_distance_mm;
@@ -156,11 +163,11 @@ impl LinearCamera {
         Ok(Conditions { distance_mm, rain, sweeps, sampling })
     }
 
-    /// Takes a picture of `scene`, 64 x 64 in `[0, 1]`, which fills the field of view and goes on beyond it as in a
-    /// mirror.
+    /// Takes a picture of `scene`, 64 x 64 in `[0, 1]`, which fills the field of view and continues
+    /// mirrored beyond it.
     ///
     /// # Errors
-    /// [`TrainingCameraError`] for conditions that cannot be.
+    /// [`TrainingCameraError`] for conditions that are not physical.
     pub fn picture(
         &self,
         scene: &[f32],
@@ -201,7 +208,8 @@ impl LinearCamera {
         Ok(CameraPicture { reading, conditions })
     }
 
-    /// Pattern minus complement for each of `rows`, in mean ADC counts of one sample, leak and noise within.
+    /// Pattern minus complement for each of `rows`, in mean ADC counts of one sample, with leak and
+    /// noise.
     fn differences(
         &self,
         optics: &VirtualOptics,
@@ -212,7 +220,7 @@ impl LinearCamera {
     ) -> Vec<f64> {
         let counts = white_counts(optics);
         let mut signed: Vec<f64> = seen.iter().map(|&w| f64::from(w) * counts).collect();
-        // As long as the camera has LEDs, the length is a power of two.
+        // The number of LEDs is a power of two, as the transform requires.
         let _ = fwht(&mut signed);
         let all = signed[0];
         let slots: Vec<f64> = rows
@@ -232,14 +240,14 @@ impl LinearCamera {
         read.as_chunks::<2>().0.iter().map(|[pattern, complement]| pattern - complement).collect()
     }
 
-    /// Noise of a reconstructed pixel where all patterns are shown, in units of a white target.
+    /// Noise of a reconstructed pixel with all patterns, in units of a white target.
     fn noise_std(&self, optics: &VirtualOptics, seen: &[f32], sweeps: u32) -> f64 {
         let counts = white_counts(optics);
         // Each pattern lights half of the LEDs.
         let light = seen.iter().map(|&w| f64::from(w)).sum::<f64>() * counts / 2.0;
         let difference = (2.0 * mean_variance(optics, light, sweeps)).sqrt();
         let taps = self.believed.taps();
-        // Undoing the leak divides by what a difference keeps of its own.
+        // Correcting the leak divides by the share that a difference keeps in its own slot.
         let own = taps[0] - taps.get(1).unwrap_or(&0.0) / 2.0;
         difference / own / (LEDS as f64).sqrt() / counts
     }
@@ -256,20 +264,20 @@ impl Degrade for LinearCamera {
     }
 }
 
-/// ADC counts that one LED on a white target adds to a sample. Distance is known by time of flight, and the budget
-/// with it: this is how counts become reflectances.
+/// ADC counts that one LED on a white target adds to a sample. The time-of-flight sensor gives the
+/// distance and thereby the photon budget, which converts counts to reflectances.
 fn white_counts(optics: &VirtualOptics) -> f64 {
     optics.budget().electrons_per_led / optics.chain().electrons_per_count
 }
 
-/// Clocks of a pattern, and clocks at its start whose samples are left out.
+/// Clocks of a pattern, and number of clocks at its start whose samples are excluded.
 fn timing(camera: &CameraModel) -> (u16, u16) {
-    // Ranges are checked when a description is read.
+    // The ranges were checked when the description was read.
     (camera.readout.clocks_per_pattern as u16, camera.readout.blanked as u16)
 }
 
-/// Variance of the mean of a slot's samples in `sweeps` sweeps, in counts squared: shot noise of LEDs' light (in counts)
-/// and daylight, the amplifier, the ADC, rounding.
+/// Variance of the mean of a slot's samples in `sweeps` sweeps, in counts squared: shot noise of
+/// the LEDs' light (in counts) and of daylight, amplifier, ADC, rounding.
 fn mean_variance(optics: &VirtualOptics, light_counts: f64, sweeps: u32) -> f64 {
     let chain = optics.chain();
     let gain = chain.electrons_per_count;
@@ -279,7 +287,7 @@ fn mean_variance(optics: &VirtualOptics, light_counts: f64, sweeps: u32) -> f64 
     chain.variance_of_mean(electrons, window) / (gain * gain) / f64::from(sweeps)
 }
 
-/// Mean of what the LEDs' spots show during an exposure.
+/// Mean pattern of the LEDs' spots during an exposure.
 fn exposed(optics: &VirtualOptics, sweeps: u32, seed: u64) -> Result<Vec<f32>, RainError> {
     let Some(mut spots) = optics.spots(seed)? else {
         return Ok(optics.footprint().weights().to_vec());
@@ -297,7 +305,7 @@ fn exposed(optics: &VirtualOptics, sweeps: u32, seed: u64) -> Result<Vec<f32>, R
     Ok(mean)
 }
 
-/// The depth map as the camera's sensor gives it, sometimes with a corner of it hidden, sometimes none.
+/// The depth map of the camera's sensor; sometimes with a hidden corner, sometimes `None`.
 fn depth(optics: &VirtualOptics, rng: &mut impl Rng) -> Result<Option<Depth>, TrainingCameraError> {
     if rng.random::<f32>() < NO_DEPTH {
         return Ok(None);

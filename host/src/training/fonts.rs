@@ -1,7 +1,9 @@
-//! Characters from a folder of TrueType and OpenType fonts, as Chars74K's are: bright on dark, centred.
+//! Characters from a folder of TrueType and OpenType fonts, in the form of Chars74K's: bright on
+//! dark, centred.
 //!
-//! The one law: a font either gives all 62 characters or none. One that draws boxes for what it lacks would teach
-//! boxes.
+//! # Invariant
+//! A font gives either all 62 characters or none, because networks would learn the boxes of missing
+//! characters.
 
 use crate::files::FileError;
 use crate::files::characters::{GLYPH_PX, entries, refused};
@@ -11,28 +13,29 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Longer side of the smallest and of the largest character, in pixels; most are as large as Chars74K's.
+/// Longer sides of characters, in pixels, which fonts use in turn. Most have the size of
+/// Chars74K's.
 const SIZES_PX: [f32; 5] = [48.0, 48.0, 48.0, 32.0, 57.0];
 const EXPECTED: &str = "a folder of .ttf or .otf fonts";
 
-/// What a folder of fonts gave.
+/// The characters of a folder of fonts.
 #[derive(Debug)]
 pub struct Rendered {
-    /// The characters; groups are families.
+    /// The characters. Each family is a group.
     pub stack: Stack,
-    /// Fonts drawn from.
+    /// Number of fonts used.
     pub fonts: usize,
-    /// Families among them.
+    /// Number of families of these fonts.
     pub families: usize,
-    /// Fonts left out because they lack a character, or are no fonts.
+    /// Fonts left out because they lack a character or are not valid fonts.
     pub skipped: Vec<PathBuf>,
 }
 
-/// Draws 0-9, A-Z and a-z from every font in `folder`, folders in it included. Files named `Family-Style.ttf` are of
-/// one family.
+/// Draws 0-9, A-Z and a-z from every font in `folder` and its subfolders. Files named
+/// `Family-Style.ttf` belong to one family.
 ///
 /// # Errors
-/// [`FileError`] if the folder cannot be read or no font in it has all characters.
+/// [`FileError`] if the folder cannot be read, or none of its fonts has all characters.
 pub fn render(folder: &Path) -> Result<Rendered, FileError> {
     let mut files = Vec::new();
     find(folder, &mut files)?;
@@ -76,7 +79,7 @@ fn find(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), FileError> {
         let font = |ending: &std::ffi::OsStr| {
             ["ttf", "otf"].iter().any(|known| ending.eq_ignore_ascii_case(known))
         };
-        // A link to a folder may lead back here.
+        // Links are skipped, because a link to a folder may lead back to this folder.
         if entry.is_dir() && !entry.is_symlink() {
             find(&entry, files)?;
         } else if entry.extension().is_some_and(font) {
@@ -86,20 +89,20 @@ fn find(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), FileError> {
     Ok(())
 }
 
-/// `Roboto-BoldItalic.ttf` and `Roboto[wght].ttf` are Roboto.
+/// The family of a file: `Roboto-BoldItalic.ttf` and `Roboto[wght].ttf` are Roboto.
 fn family(file: &Path) -> String {
     let name = file.file_stem().unwrap_or_default().to_string_lossy().to_lowercase();
     name.split(['-', '_', '[']).next().unwrap_or_default().to_owned()
 }
 
-/// All 62 characters, or none.
+/// All 62 characters; `None` if the font lacks one.
 fn alphabet(font: &FontVec, size_px: f32) -> Option<Vec<u8>> {
     let drawn: Option<Vec<Vec<u8>>> =
         CHARACTERS.chars().map(|character| glyph(font, character, size_px)).collect();
     Some(drawn?.concat())
 }
 
-/// One character, its longer side `size_px`, centred, antialiased by coverage.
+/// One character, centred, with a longer side of `size_px`, anti-aliased by coverage.
 fn glyph(font: &FontVec, character: char, size_px: f32) -> Option<Vec<u8>> {
     let id = font.glyph_id(character);
     if id == GlyphId(0) {
@@ -161,7 +164,7 @@ mod tests {
             };
             let (left, right) = extent(&|p| p % SIDE_PX);
             let (top, bottom) = extent(&|p| p / SIDE_PX);
-            // The outline is centred; of its edge pixels, only those more than half covered are bright.
+            // The outline is centred. Only edge pixels that are more than half covered are bright.
             assert!((left + right).abs_diff(SIDE_PX - 1) <= 2, "{at}: columns {left} to {right}");
             assert!((top + bottom).abs_diff(SIDE_PX - 1) <= 2, "{at}: rows {top} to {bottom}");
             let longer = (right - left).max(bottom - top) + 1;

@@ -1,7 +1,11 @@
-//! What training needs of the instrument: characters from files and fonts, and pictures taken by the virtual camera.
+//! Training data from the instrument: characters from files and fonts, and pictures of the virtual
+//! camera.
 //!
-//! The one law: a picture to train on goes the way of a measured one. Light, receiver, calibration and reconstruction
-//! are those of the virtual camera; what is left out for speed (packets, the firmware's states) changes no number.
+//! # Invariant
+//! A training picture is made as a measured picture is. Light, receiver, calibration and
+//! reconstruction are those of the virtual camera. The parts that are left out for speed (packets,
+//! the firmware's states) change no number
+//! (`camera::tests::a_picture_by_the_short_way_differs_from_a_capture_by_noise_alone`).
 
 mod camera;
 pub mod fonts;
@@ -14,11 +18,11 @@ use nirspi_nets::degrade::{AnalyticCamera, Degrade, DegradeError, Reading};
 use rand::RngExt;
 use rand_pcg::Pcg64Mcg;
 
-/// Pictures by the virtual camera and by formulas, mixed.
+/// A mixture of pictures by the virtual camera and by formulas.
 pub struct Mixed {
     /// The formulas.
     pub analytic: AnalyticCamera,
-    /// The camera, and the share of the pictures that it takes.
+    /// The camera, and the share of pictures that it takes.
     pub camera: Option<(LinearCamera, f32)>,
 }
 

@@ -1,6 +1,9 @@
-//! Sharp scenes beside what the virtual camera gave of them, as a file: for training elsewhere.
+//! Pairs of sharp scenes and pictures of the virtual camera, as a file for training with other
+//! programs.
 //!
-//! The one law: pair k depends on the seed and k alone, so a longer file begins with the shorter one.
+//! # Invariant
+//! Pair k depends on the seed and k only, so a longer file begins with the shorter one
+//! (`tests::a_longer_file_begins_with_the_shorter_one_and_is_whole`).
 
 use super::{CameraPicture, LinearCamera, Rainfall, TrainingCameraError};
 use crate::files::FileError;
@@ -13,13 +16,13 @@ use std::path::Path;
 /// A scene and its picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pair {
-    /// What was there.
+    /// The sharp scene.
     pub scene: Scene,
-    /// What the camera gave.
+    /// The camera's picture.
     pub picture: CameraPicture,
 }
 
-/// Takes pictures of `count` scenes; `taken` is told of each.
+/// Takes pictures of `count` scenes. `taken` is called after each picture.
 ///
 /// # Errors
 /// [`TrainingCameraError`] of the first scene that cannot be taken.
@@ -58,7 +61,7 @@ pub fn take(
 /// | `label`, `stack`, `index`, `group` | `(N,)` int64: class, stack (in the order given), image in it, its group; -1 if none |
 ///
 /// # Errors
-/// [`FileError`] naming `path`, if the archive cannot be put together.
+/// [`FileError`] naming `path`, if the archive cannot be written.
 pub fn encode(path: &Path, scenes: &Scenes, pairs: &[Pair]) -> Result<Vec<u8>, FileError> {
     let count = pairs.len();
     let images = |side: usize, of: &dyn Fn(&Pair) -> &[f32]| {

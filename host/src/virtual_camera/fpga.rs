@@ -1,31 +1,31 @@
-//! The golden model of the gateware, with light in front of it, as the firmware's FPGA bus.
+//! The golden model of the gateware, with simulated light, behind the firmware's FPGA bus.
 
 use nirspi_hdl_model::{AdcSample, Gateware, Lines};
 use nirspi_mcu::{BusError, FpgaBus};
 use nirspi_optics::rain::RainySpots;
 use nirspi_optics::{Chain, LedArray};
 
-/// ADC clocks after which drops are looked at again: a differential sweep, in which a 2 mm drop falls half a
-/// millimetre.
+/// ADC clocks between two updates of the drops: one differential sweep, in which a 2 mm drop falls
+/// half a millimetre.
 const WEATHER_CLOCKS: u64 = 10_240;
 
-/// An FPGA whose time the virtual camera moves.
+/// An FPGA whose time the virtual camera advances.
 pub trait SimulatedFpga: FpgaBus + Send {
-    /// Lets ADC clocks pass.
+    /// Advances the time by ADC clocks.
     fn advance(&mut self, clocks: u32);
     /// ADC clocks since power-up.
     fn clock(&self) -> u64;
-    /// Whether LEDs are or may be lit: a run or raw burst is under way.
+    /// Whether LEDs can be lit: a run or raw burst is under way.
     fn running(&self) -> bool;
     /// Opens or closes the interlock input.
     fn set_interlock(&mut self, closed: bool);
 }
 
-/// What the lines from the FPGA make of the LED array: its settled light in electrons a sample. Sound wiring gives
-/// [`LedArray::light`] of the lines as they are; tests give a camera with a fault.
+/// The LED array's answer to the lines of the FPGA: its settled light in electrons a sample.
+/// Correct wiring gives [`LedArray::light`] of the lines unchanged; tests use faulty wiring.
 pub type Wiring = Box<dyn FnMut(&mut LedArray, Lines) -> f32 + Send>;
 
-/// The gateware's golden model between an LED array and a photodiode's ADC.
+/// The golden model of the gateware between an LED array and a photodiode's ADC.
 pub struct OpticalFpga {
     gateware: Gateware,
     array: LedArray,
@@ -39,7 +39,7 @@ pub struct OpticalFpga {
 struct Rain {
     spots: RainySpots,
     electrons_per_led: f64,
-    /// When the drops were looked at last.
+    /// The clock of the last update of the drops.
     seen: u64,
 }
 
@@ -52,13 +52,14 @@ impl OpticalFpga {
         Self { gateware, array, wiring: None, chain, clock: 0, rain: None }
     }
 
-    /// The same camera with this between FPGA and LEDs.
+    /// The same camera with other wiring between FPGA and LEDs.
     #[must_use]
     pub fn wired(self, wiring: impl FnMut(&mut LedArray, Lines) -> f32 + Send + 'static) -> Self {
         Self { wiring: Some(Box::new(wiring)), ..self }
     }
 
-    /// The same with rain in front of it; an LED on a white target in dry air gives `electrons_per_led`.
+    /// The same camera with rain in front of it. In dry air, an LED on a white target gives
+    /// `electrons_per_led`.
     #[must_use]
     pub fn in_rain(mut self, spots: RainySpots, electrons_per_led: f64) -> Self {
         self.array.relight(&spots.reflectance(), electrons_per_led);
@@ -66,7 +67,7 @@ impl OpticalFpga {
         self
     }
 
-    /// Lets the drops fall to where they are at `clock`, if they have not been looked at for long.
+    /// Updates the positions of the drops for `clock`, if the last update is long ago.
     fn look_at_the_rain(&mut self, clock: u64) {
         let Some(rain) = self.rain.as_mut().filter(|rain| clock - rain.seen >= WEATHER_CLOCKS)
         else {
@@ -83,7 +84,7 @@ impl SimulatedFpga for OpticalFpga {
         let begun = self.clock;
         self.clock += u64::from(clocks);
         for passed in 0..clocks {
-            // Nobody looks at the ADC outside a run, and drawing its noise is most of the work.
+            // The ADC is not read outside a run, and drawing its noise is most of the work.
             let sample = if self.gateware.running() {
                 if self.rain.is_some() {
                     self.look_at_the_rain(begun + u64::from(passed));
@@ -117,7 +118,7 @@ impl SimulatedFpga for OpticalFpga {
 
 impl FpgaBus for OpticalFpga {
     fn read(&mut self, address: u16) -> Result<u32, BusError> {
-        // As on the real port, an address without a register reads as zero.
+        // An address without a register reads as zero, as on the real port.
         Ok(self.gateware.read(address).unwrap_or(0))
     }
 

@@ -1,4 +1,4 @@
-//! The virtual camera as a link in memory: its time passes while the host listens.
+//! The virtual camera as a link in memory. Its time advances while the host listens.
 
 use super::{SimulatedFpga, VirtualCamera};
 use crate::link::{Link, Received};
@@ -6,18 +6,19 @@ use nirspi_mcu::{GatewareLoader, NoLoader};
 use std::io;
 use std::time::Duration;
 
-/// Clocks between two looks of the firmware while waiting: 8 us.
+/// Clocks between two polls of the firmware while waiting: 8 us.
 const STEP_CLOCKS: u32 = 1000;
-/// Simulated time that one call may spend in vain, so that the host keeps getting its turn.
+/// The longest simulated time that one call advances without result, so that the host regains
+/// control.
 const PATIENCE_CLOCKS: u32 = 2_500_000;
 
-/// A camera in the same process. Single-threaded and deterministic.
+/// A camera in the same process: single-threaded and deterministic.
 pub struct MemoryLink<F, G = NoLoader> {
     camera: VirtualCamera<F, G>,
 }
 
 impl<F: SimulatedFpga, G: GatewareLoader> MemoryLink<F, G> {
-    /// Plugs the camera in.
+    /// A link to this camera.
     #[must_use]
     pub fn new(camera: VirtualCamera<F, G>) -> Self {
         Self { camera }

@@ -1,13 +1,15 @@
-//! The virtual camera: an optics simulator in front of the gateware's golden model, driven by the real
-//! firmware logic, speaking the real wire protocol.
+//! The virtual camera: an optics simulator and the gateware's golden model, driven by the real
+//! firmware logic, with the real wire protocol.
 //!
 //! ```text
 //! scene -> projector -> LED lines <- gateware model <-> firmware logic <-> packets <-> host
 //!              '-> light -> LED edges, amplifier, noise, ADC -^
 //! ```
 //!
-//! The one law: nothing here decides anything that the firmware or the gateware decides. Time is the ADC
-//! clock of the model, so a seed gives the same bytes on any machine, at any speed.
+//! # Invariant
+//! The virtual camera takes no decision that belongs to the firmware or the gateware. Its time is
+//! the ADC clock of the model, so a seed gives the same bytes on any machine, at any speed
+//! (`the_same_seed_gives_the_same_bytes` in `tests/tests/end_to_end.rs`).
 
 mod fpga;
 mod link;
@@ -34,14 +36,15 @@ use nirspi_mcu::{
 use nirspi_optics::SimulatedDepth;
 use nirspi_wire::{Capabilities, Version};
 
-/// Bytes that wait for the host before the link counts as full: what a real device's USB stack holds.
+/// Bytes waiting for the host at which the link counts as full: the capacity of a real device's USB
+/// stack.
 const PACKETS_BYTES: usize = 1 << 18;
-/// Device time between depth maps: 15 Hz, as 8 x 8 time-of-flight sensors give.
+/// Device time between depth maps: 15 Hz, the rate of 8 x 8 time-of-flight sensors.
 const DEPTH_PERIOD: Micros = Micros(66_667);
 /// Zones along one edge of the depth map.
 const DEPTH_SIDE: u8 = nirspi_optics::DEPTH_SIDE as u8;
 
-/// Packets on their way to the host.
+/// Packets to send to the host.
 #[derive(Debug, Default)]
 pub struct PacketsOut {
     bytes: Vec<u8>,
@@ -67,19 +70,19 @@ impl PacketSink for PacketsOut {
 }
 
 impl PacketsOut {
-    /// What waits to be sent.
+    /// The bytes that wait to be sent.
     #[must_use]
     pub fn waiting(&self) -> &[u8] {
         self.bytes.get(self.sent..self.committed).unwrap_or(&[])
     }
 
-    /// Whether a frame would find no room.
+    /// Whether there is no room for a further frame.
     #[must_use]
     pub fn is_full(&self) -> bool {
         self.waiting().len() + nirspi_wire::packet::MAX_DEVICE_PACKET > PACKETS_BYTES
     }
 
-    /// The first `length` bytes that waited have been sent.
+    /// Removes the first `length` waiting bytes, which were sent.
     pub fn sent(&mut self, length: usize) {
         self.sent += length;
         if self.sent >= self.committed {
@@ -98,7 +101,7 @@ impl PacketsOut {
     }
 }
 
-/// A camera without silicon. `F` is what stands in for the FPGA and everything in front of it, `G` takes bitstreams.
+/// A camera without hardware. `F` simulates the FPGA and the optics, `G` receives bitstreams.
 pub struct VirtualCamera<F, G = NoLoader> {
     camera: Camera,
     fpga: F,
@@ -118,7 +121,7 @@ impl<F: SimulatedFpga> VirtualCamera<F> {
     }
 }
 
-/// Who a virtual camera is. Its time-of-flight sensor is simulated.
+/// The identity of a virtual camera. Its time-of-flight sensor is simulated.
 fn info(serial: &str) -> BoardInfo {
     BoardInfo::new("virtual", serial, crate_version()).can(Capabilities::DEPTH)
 }
@@ -143,7 +146,8 @@ impl<F: SimulatedFpga, G: GatewareLoader> VirtualCamera<F, G> {
         }
     }
 
-    /// Bytes from the host. Those that the firmware does not take now are offered again with each step.
+    /// Receives bytes from the host. Bytes that the firmware does not accept now are offered again
+    /// at each step.
     pub fn receive(&mut self, bytes: &[u8]) {
         self.inbox.extend_from_slice(bytes);
         let now = self.now();
@@ -153,7 +157,8 @@ impl<F: SimulatedFpga, G: GatewareLoader> VirtualCamera<F, G> {
         self.inbox.drain(..taken);
     }
 
-    /// Lets `clocks` ADC clocks pass, then the firmware look once; whether it found something to do.
+    /// Advances the time by `clocks` ADC clocks, then polls the firmware once. Returns whether the
+    /// firmware did anything.
     pub fn step(&mut self, clocks: u32) -> bool {
         self.fpga.advance(clocks);
         let now = self.now();
@@ -162,7 +167,8 @@ impl<F: SimulatedFpga, G: GatewareLoader> VirtualCamera<F, G> {
         }
         let ports =
             &mut Ports { bus: &mut self.fpga, sink: &mut self.packets, loader: &mut self.loader };
-        // Before the poll, which judges how long the host has been silent.
+        // Bytes are received before the poll, because the poll measures how long the host has been
+        // silent.
         if !self.inbox.is_empty() {
             let taken = self.camera.receive(now, &self.inbox, &self.inputs, ports);
             self.inbox.drain(..taken);
@@ -177,12 +183,12 @@ impl<F: SimulatedFpga, G: GatewareLoader> VirtualCamera<F, G> {
         worked
     }
 
-    /// Packets that wait for the host.
+    /// Packets to send to the host.
     pub fn packets_out(&mut self) -> &mut PacketsOut {
         &mut self.packets
     }
 
-    /// The host has gone.
+    /// Reports to the firmware that the link has closed.
     pub fn link_closed(&mut self) {
         let now = self.now();
         let ports =
@@ -198,18 +204,18 @@ impl<F: SimulatedFpga, G: GatewareLoader> VirtualCamera<F, G> {
         self.fpga.set_interlock(closed);
     }
 
-    /// Heats or cools the LED array; `None` unplugs its sensor.
+    /// Sets the temperature of the LED array; `None` unplugs its sensor.
     pub fn set_temperature(&mut self, centi_celsius: Option<i16>) {
         self.inputs.temperature_centi_celsius = centi_celsius;
     }
 
-    /// Device time.
+    /// The device's time.
     #[must_use]
     pub fn now(&self) -> Micros {
         Micros(self.fpga.clock() / u64::from(nirspi_wire::ADC_HZ / 1_000_000))
     }
 
-    /// What stands in for the FPGA.
+    /// The simulated FPGA.
     #[must_use]
     pub fn fpga(&self) -> &F {
         &self.fpga

@@ -1,15 +1,15 @@
-//! A camera description by the name of a shipped camera, or from a TOML file.
+//! Reads a camera description by the name of a shipped camera, or from a TOML file.
 
 use nirspi_optics::{CameraModel, CameraModelError};
 use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// Why there is no such camera description. `Display` is one line.
+/// Why a camera description cannot be read. `Display` is one line.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum CameraFileError {
-    /// The name is neither a shipped camera's nor a file's.
+    /// The name is neither the name of a shipped camera nor the path of a file.
     #[error("camera description {0}: found no such file, expected {expected} or a TOML file", expected = names())]
     Unknown(String),
     /// The file cannot be read.
@@ -17,15 +17,15 @@ pub enum CameraFileError {
     Read {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The system's reason.
         source: io::Error,
     },
-    /// The file is no camera description.
+    /// The file is not a valid camera description.
     #[error("{path}: {problem}")]
     Content {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The problem of its content.
         problem: CameraModelError,
     },
 }
@@ -34,10 +34,10 @@ fn names() -> String {
     CameraModel::names().collect::<Vec<_>>().join(", ")
 }
 
-/// The camera of this name, or of this file where no shipped camera has that name.
+/// The shipped camera of this name; without one, the camera of the file at this path.
 ///
 /// # Errors
-/// [`CameraFileError`] if there is neither, or the file is no camera description.
+/// [`CameraFileError`] if neither exists, or the file is not a valid camera description.
 pub fn read_camera_model(name_or_file: &str) -> Result<CameraModel, CameraFileError> {
     if let Some(camera) = CameraModel::named(name_or_file) {
         return Ok(camera);

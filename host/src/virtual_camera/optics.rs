@@ -1,4 +1,4 @@
-//! What stands in front of the virtual camera: scene, projector, photon budget, receiver.
+//! The optics of the virtual camera: scene, projector, photon budget, receiver.
 
 use super::{OpticalFpga, VirtualCamera};
 use crate::scene::SceneMap;
@@ -12,7 +12,7 @@ use nirspi_optics::{
 use nirspi_recon::{Order, RowsError};
 use thiserror::Error;
 
-/// Everything that light meets on its way, at one distance.
+/// The optics at one distance: everything between the LEDs and the ADC.
 #[derive(Debug, Clone)]
 pub struct VirtualOptics {
     camera: CameraModel,
@@ -24,28 +24,28 @@ pub struct VirtualOptics {
     weather: Option<Weather>,
 }
 
-/// Optics that cannot be.
+/// Why optics cannot be built.
 #[derive(Debug, Error)]
 pub enum VirtualOpticsError {
-    /// Distance or lens.
+    /// The distance or the lens is out of range.
     #[error(transparent)]
     Projector(#[from] ProjectorError),
-    /// Light.
+    /// The photon budget is out of range.
     #[error(transparent)]
     Budget(#[from] BudgetError),
-    /// Receiver.
+    /// The receiver is out of range.
     #[error(transparent)]
     Chain(#[from] ChainError),
-    /// Distance.
+    /// The depth sensor cannot measure the distance.
     #[error(transparent)]
     Depth(#[from] DepthError),
-    /// Reflectances.
+    /// A reflectance is out of range.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// Weather.
+    /// The weather is out of range.
     #[error(transparent)]
     Rain(#[from] RainError),
-    /// Gateware and protocol are of one wavelength.
+    /// Gateware and protocol support one wavelength only.
     #[error(
         "wavelength_nm is {0}, expected {expected} for a virtual camera: its protocol knows no other; \
          `nirspi range` and `nirspi rain --budget` take any",
@@ -55,19 +55,20 @@ pub enum VirtualOpticsError {
 }
 
 impl VirtualOptics {
-    /// The paper's camera in front of `scene`, its gain set for a white target at that distance.
+    /// The paper's camera in front of `scene`. The gain is set for a white target at this distance.
     ///
     /// # Errors
-    /// A distance that no light covers.
+    /// [`VirtualOpticsError`] for a distance without any light.
     pub fn new(scene: Scene, distance_mm: f64) -> Result<Self, VirtualOpticsError> {
         Self::of(CameraModel::paper(), scene, distance_mm)
     }
 
-    /// This camera in front of `scene`, its gain set for a white target at that distance. The weather of the description
-    /// is not taken from it: see [`Self::in_air`].
+    /// This camera in front of `scene`. The gain is set for a white target at this distance. The
+    /// weather of the description is ignored; [`Self::in_air`] sets weather.
     ///
     /// # Errors
-    /// A description that is not physical, or a distance that no light covers.
+    /// [`VirtualOpticsError`] for a description that is not physical, or a distance without any
+    /// light.
     pub fn of(
         camera: &CameraModel,
         scene: Scene,
@@ -86,10 +87,12 @@ impl VirtualOptics {
         Ok(Self { camera, scene, distance_mm, footprint, budget, chain, weather: None })
     }
 
-    /// This camera in front of a scene by name or file: a target of its own size, or one that fills the field.
+    /// This camera in front of a scene by name or file. The target has its own size, or fills the
+    /// field.
     ///
     /// # Errors
-    /// A distance that no light covers, or that the depth sensor cannot read.
+    /// [`VirtualOpticsError`] for a distance without any light, or one that the depth sensor cannot
+    /// measure.
     pub fn before(
         camera: &CameraModel,
         map: &SceneMap,
@@ -99,63 +102,67 @@ impl VirtualOptics {
         let side_mm = map.side_mm.unwrap_or_else(fills);
         let scene = Scene::new(map.reflectance.clone(), map.size_px, side_mm)?;
         let optics = Self::of(camera, scene, distance_mm)?;
-        // The depth sensor has a range of its own.
+        // The depth sensor has its own range.
         optics.depth(0)?;
         Ok(optics)
     }
 
-    /// The camera.
+    /// The camera's description.
     #[must_use]
     pub fn camera_model(&self) -> &CameraModel {
         &self.camera
     }
 
-    /// The first patterns of `order`, differential, with the timing of this camera.
+    /// A setup for the first patterns of `order`, differential, with this camera's timing.
     ///
     /// # Errors
     /// As [`MeasurementSetup::new`].
     pub fn setup(&self, order: &Order, sampling: f64) -> Result<MeasurementSetup, RowsError> {
         let readout = self.camera.readout;
-        // Ranges are checked when a description is read.
+        // The ranges were checked when the description was read.
         let (clocks, blanked) = (readout.clocks_per_pattern as u16, readout.blanked as u16);
         Ok(MeasurementSetup::new(order, sampling)?.timed(clocks, blanked))
     }
 
-    /// The same camera in dry air before a white sheet that fills its field, where its lens is focused: what latency and
-    /// settling are measured against.
+    /// The same camera in dry air before a white sheet that fills its field, at the lens's focus.
+    /// Latency and settling are measured against this sheet.
     ///
     /// # Errors
-    /// Optics that have no focus.
+    /// [`VirtualOpticsError`] for optics without a focus.
     pub fn white_sheet(&self) -> Result<Self, VirtualOpticsError> {
         let distance_mm = self.camera.projector.focus_distance_mm;
         let sheet = Self::of(&self.camera, Scene::white(), distance_mm)?;
-        // A receiver without noise stays one.
+        // A receiver without noise stays without noise.
         let ChainSettings { electrons_per_count, ambient_electrons, .. } = sheet.chain;
         let chain = ChainSettings { electrons_per_count, ambient_electrons, ..self.chain };
         Ok(Self { chain, ..sheet })
     }
 
-    /// ADC counts that a white target gives one pixel, as the photon budget has it.
+    /// ADC counts of one pixel for a white target, from the photon budget.
     #[must_use]
     pub fn white_counts(&self) -> f64 {
         self.budget.electrons_per_led / self.chain.electrons_per_count
     }
 
-    /// The serial number of the virtual camera with this seed. Cameras that differ in anything that is the instrument's,
-    /// not the scene's, have different ones, so that none uses the kept calibration of another: `virtual-1`, and for
-    /// other than default instruments `virtual-1-` with a short name of their settings.
+    /// The serial number of the virtual camera with this seed. Cameras with different instruments
+    /// have different serial numbers, so that no camera uses another camera's kept calibration;
+    /// scenes do not matter
+    /// (`tests::cameras_that_differ_have_different_serials_and_scenes_do_not_matter`). Default
+    /// instruments have `virtual-1`; other instruments have `virtual-1-` with a short name of their
+    /// settings.
     #[must_use]
     pub fn serial(&self, seed: u64) -> String {
         let instrument = |camera: &CameraModel, chain: &ChainSettings| {
             let paper = CameraModel::paper();
-            // Light, weather and name are not the instrument's.
+            // Light, weather and name do not belong to the instrument.
             let camera = CameraModel {
                 name: paper.name.clone(),
                 light: paper.light,
                 weather: paper.weather,
                 ..camera.clone()
             };
-            // Gain and daylight follow distance and scene, and change neither latency nor settling.
+            // Gain and daylight depend on distance and scene, and change neither latency nor
+            // settling.
             let chain =
                 ChainSettings { electrons_per_count: 1.0, ambient_electrons: 0.0, ..*chain };
             format!("{camera:?} {chain:?}")
@@ -167,26 +174,26 @@ impl VirtualOptics {
         format!("virtual-{seed}-{:08x}", fnv1a(this.as_bytes()))
     }
 
-    /// Puts this weather between camera and scene. Daylight is dimmed and scattered as they do on average; what
-    /// falling drops do to the LEDs' light is followed drop by drop.
+    /// Puts weather between camera and scene. Daylight is dimmed and scattered by the average
+    /// effect. The effect of falling drops on the LEDs' light is computed drop by drop.
     ///
     /// # Errors
-    /// Air too dense, or too many drops to be followed.
+    /// [`VirtualOpticsError`] if the air is too dense, or there are too many drops to compute.
     pub fn in_air(self, air: &Air) -> Result<Self, VirtualOpticsError> {
         if air.is_clear() {
             return Ok(self);
         }
         let optics = air.weather(self.camera.wavelength_nm)?;
         let optics = self.in_weather(optics)?;
-        // Whether the drops can be followed shows now rather than when the camera is made.
+        // An error about too many drops shows here, before the camera is made.
         optics.spots(0)?;
         Ok(optics)
     }
 
-    /// As [`in_air`](Self::in_air), in weather that was worked out before.
+    /// As [`in_air`](Self::in_air), with weather that was computed before.
     ///
     /// # Errors
-    /// Air too dense.
+    /// [`VirtualOpticsError`] if the air is too dense.
     pub fn in_weather(mut self, weather: Weather) -> Result<Self, VirtualOpticsError> {
         let baseline_mm = self.camera.collector.baseline_mm;
         let veil = weather.veil(&self.camera.projector, self.distance_mm, baseline_mm)?;
@@ -198,17 +205,17 @@ impl VirtualOptics {
         Ok(self)
     }
 
-    /// Extinction between camera and target, times the distance; 0 in dry air.
+    /// Extinction between camera and target, multiplied by the distance; 0 in dry air.
     #[must_use]
     pub fn optical_depth(&self) -> f64 {
         let per_m = |weather: &Weather| weather.medium().extinction_per_m;
         self.weather.as_ref().map_or(0.0, per_m) * self.distance_mm * 1e-3
     }
 
-    /// What the LEDs' spots show in the rain; none in dry air.
+    /// The LEDs' spots in the rain; `None` in dry air.
     ///
     /// # Errors
-    /// Too many drops to be followed.
+    /// [`RainError`] if there are too many drops to compute.
     pub fn spots(&self, seed: u64) -> Result<Option<RainySpots>, RainError> {
         let Some(weather) = &self.weather else { return Ok(None) };
         let beams = BeamShadows {
@@ -220,8 +227,8 @@ impl VirtualOptics {
         RainySpots::new(weather, &self.footprint, beams, seed).map(Some)
     }
 
-    /// Replaces the receiver by an exact one: no noise, no settling, no daylight, no latency. For tests
-    /// that compare bits.
+    /// Replaces the receiver by an exact one without noise, settling, daylight or latency, for
+    /// tests that compare bits.
     #[must_use]
     pub fn ideal(mut self) -> Self {
         let electrons_per_count = self.chain.electrons_per_count;
@@ -229,24 +236,24 @@ impl VirtualOptics {
         self
     }
 
-    /// Takes all noise and dark current from the receiver; LEDs and amplifier stay as slow as they are.
+    /// Removes all noise and dark current from the receiver. LEDs and amplifier keep their speed.
     #[must_use]
     pub fn noiseless(mut self) -> Self {
         self.chain = self.chain.noiseless();
         self
     }
 
-    /// Mean reflectance that each LED sees, row-major.
+    /// Mean reflectance that each LED illuminates, row-major.
     #[must_use]
     pub fn footprint(&self) -> &Footprint {
         &self.footprint
     }
 
-    /// What a perfect camera of 32 x 32 pixels would see: the scene without blur by defocus, as if the
-    /// lens were focused at the target.
+    /// The image of a perfect camera of 32 x 32 pixels: the scene without defocus, as if the lens
+    /// were focused at the target.
     ///
     /// # Errors
-    /// Never for optics that could be made: the same scene at the same distance.
+    /// Does not occur for optics that could be built, because scene and distance are the same.
     pub fn focused_footprint(&self) -> Result<Footprint, ProjectorError> {
         let perfect = Projector {
             aperture_mm: 1e-3,
@@ -256,15 +263,15 @@ impl VirtualOptics {
         perfect.footprint(&self.scene, self.distance_mm)
     }
 
-    /// What a perfect camera of `pixels` x `pixels` would see in the same field: mean reflectances, row-major, free of
-    /// blur.
+    /// The image of a perfect camera of `pixels` x `pixels` in the same field: mean reflectances,
+    /// row-major, without blur.
     #[must_use]
     pub fn focused(&self, pixels: usize) -> Vec<f32> {
         let pitch_mm = self.field_mm() / pixels as f64;
         let at_mm = |i: usize| (i as f64 + 0.5 - pixels as f64 / 2.0) * pitch_mm;
         let mean = |i| {
             let (x_mm, y_mm) = (at_mm(i % pixels), at_mm(i / pixels));
-            // Differences of running sums leave the last bit on either side of the range.
+            // Differences of running sums may leave the range by the last bit.
             self.scene.mean_over_square(x_mm, y_mm, pitch_mm).clamp(0.0, 1.0) as f32
         };
         (0..pixels * pixels).map(mean).collect()
@@ -288,8 +295,9 @@ impl VirtualOptics {
         self.camera.projector.blur_mm(self.distance_mm)
     }
 
-    /// Standard deviation of the defocus disc of a target at `distance_mm`, in pixels of an image of `side` x `side`: what a
-    /// camera knows of its blur that knows its lens and the distance. A disc's is a fourth of its diameter.
+    /// Standard deviation of the defocus disc of a target at `distance_mm`, in pixels of an image
+    /// of `side` x `side`. A camera that knows its lens and the distance knows this blur. The
+    /// standard deviation of a disc is a fourth of its diameter.
     #[must_use]
     pub fn defocus_px(&self, distance_mm: f64, side: usize) -> f64 {
         let pixel_mm = self.camera.projector.field_mm(distance_mm) / side as f64;
@@ -308,10 +316,10 @@ impl VirtualOptics {
         &self.chain
     }
 
-    /// Puts gateware and ADC behind the optics.
+    /// The FPGA model with gateware and ADC behind the optics.
     ///
     /// # Errors
-    /// A receiver setting out of range.
+    /// [`VirtualOpticsError`] for a receiver setting out of range.
     pub fn fpga(&self, seed: u64) -> Result<OpticalFpga, VirtualOpticsError> {
         let electrons_per_led = self.budget.electrons_per_led;
         let gains = self.camera.led_gains();
@@ -323,18 +331,18 @@ impl VirtualOptics {
         })
     }
 
-    /// The time-of-flight sensor beside the camera.
+    /// The time-of-flight sensor next to the camera.
     ///
     /// # Errors
-    /// A distance that it cannot read.
+    /// [`DepthError`] for a distance that the sensor cannot measure.
     pub fn depth(&self, seed: u64) -> Result<SimulatedDepth, DepthError> {
         SimulatedDepth::new(self.distance_mm, self.camera.tof.noise_mm, 0, seed)
     }
 
-    /// A reading of that sensor in the camera's image.
+    /// A reading of the time-of-flight sensor in the camera's image.
     ///
     /// # Errors
-    /// A distance that it cannot read.
+    /// [`DepthError`] for a distance that the sensor cannot measure.
     pub fn depth_view(&self, seed: u64) -> Result<DepthView, DepthError> {
         let reading = self.depth(seed)?.reading();
         let field = self.camera.projector.field_over_distance();
@@ -344,7 +352,7 @@ impl VirtualOptics {
     /// The whole camera.
     ///
     /// # Errors
-    /// A setting out of range.
+    /// [`VirtualOpticsError`] for a setting out of range.
     pub fn camera(&self, seed: u64) -> Result<VirtualCamera<OpticalFpga>, VirtualOpticsError> {
         Ok(VirtualCamera::new(self.fpga(seed)?, self.depth(seed)?, &self.serial(seed)))
     }

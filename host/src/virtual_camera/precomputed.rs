@@ -1,9 +1,10 @@
-//! Frames computed beforehand, for load tests of everything after the FPGA.
+//! Precomputed frames, for load tests of everything after the FPGA.
 //!
-//! The simulator makes some hundred frames a second, the instrument up to 24 414. Here the first frames of a
-//! run go through the simulator once; then they are offered again and again, as fast as the firmware
-//! takes them, each with its own sequence number, clock and checksum. Firmware logic, protocol, link and host
-//! see nothing but a camera at full speed. Everything but frames (registers, raw bursts) is the model's.
+//! The simulator computes some hundred frames a second; the instrument makes up to 24 414. This
+//! FPGA simulates the first frames of a run once. The frames are then repeated as fast as the
+//! firmware takes them, each with its own sequence number, clock and checksum. To firmware logic,
+//! protocol, link and host, the camera runs at full speed. Registers and raw bursts come from the
+//! model.
 
 use super::fpga::SimulatedFpga;
 use nirspi_mcu::{BusError, FpgaBus};
@@ -11,16 +12,16 @@ use nirspi_wire::crc32;
 use nirspi_wire::fpga::{CRC_BYTES, FpgaFrame, HEADER_BYTES, Header};
 use nirspi_wire::register::{Register, control, status};
 
-/// Clocks after which a frame that the model owes is given up.
+/// Clocks after which the wait for a frame of the model ends.
 const PATIENCE_CLOCKS: u64 = 1 << 32;
 
 /// An FPGA that repeats its first frames.
 pub struct PrecomputedFpga<F> {
     model: F,
-    /// Frames of each run that the model computes.
+    /// Number of frames of each run that the model computes.
     count: usize,
     run: Option<Run>,
-    /// Clocks of the frames offered so far, in all runs.
+    /// Clocks of all frames offered so far, in all runs.
     repeated_clocks: u64,
 }
 
@@ -28,13 +29,13 @@ pub struct PrecomputedFpga<F> {
 struct Run {
     frames: Vec<Vec<u8>>,
     frame_clocks: u64,
-    /// Sequence number of the frame on offer.
+    /// Sequence number of the offered frame.
     sequence: u32,
-    /// Frames of the run; 0 goes on until stopped.
+    /// Number of frames of the run; 0 means until stopped.
     length: u32,
     ended: bool,
     first_clock: u64,
-    /// Whether the bytes on offer carry this sequence number already.
+    /// Whether the offered bytes already contain the sequence number.
     stamped: bool,
 }
 
@@ -47,7 +48,7 @@ impl Run {
         self.sequence as usize % self.frames.len()
     }
 
-    /// Gives the frame on offer its own header and checksum.
+    /// Writes header and checksum into the offered frame.
     fn stamp(&mut self) -> Option<&[u8]> {
         let slot = self.slot();
         let frame = self.frames.get_mut(slot)?;
@@ -65,13 +66,14 @@ impl Run {
 }
 
 impl<F: SimulatedFpga> PrecomputedFpga<F> {
-    /// Repeats the first `count` frames of every run of `model`.
+    /// An FPGA that repeats the first `count` frames of every run of `model`.
     #[must_use]
     pub fn new(model: F, count: usize) -> Self {
         Self { model, count: count.max(1), run: None, repeated_clocks: 0 }
     }
 
-    /// Starts the model and takes its first frames, then stops it. If it refuses, its registers say why.
+    /// Starts the model, takes its first frames and stops it. If the model refuses, its registers
+    /// hold the reason.
     fn start(&mut self) -> Result<(), BusError> {
         let length = self.model.read(Register::Frames.address())?;
         self.model.write(Register::Frames.address(), 0)?;
@@ -107,7 +109,7 @@ impl<F: SimulatedFpga> PrecomputedFpga<F> {
     }
 }
 
-/// Clocks from one frame to the next, of frames in sequence.
+/// Clocks from one frame to the next in a sequence of frames.
 fn frame_clocks(frames: &[Vec<u8>]) -> Option<u64> {
     let clock = |frame: &Vec<u8>| FpgaFrame::parse_header(frame).map(|header| header.clock);
     match frames {
@@ -119,7 +121,7 @@ fn frame_clocks(frames: &[Vec<u8>]) -> Option<u64> {
 
 impl<F: SimulatedFpga> SimulatedFpga for PrecomputedFpga<F> {
     fn advance(&mut self, clocks: u32) {
-        // During a run time is that of the frames offered.
+        // During a run, the time is the time of the offered frames.
         if !self.run.as_ref().is_some_and(Run::offers) {
             self.model.advance(clocks);
         }

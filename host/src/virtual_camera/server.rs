@@ -1,9 +1,9 @@
-//! The virtual camera behind a TCP port: one host at a time, as with a cable. A second one is turned away
-//! after [`KNOCK_WAIT`], time enough for a host that is just leaving.
+//! The virtual camera behind a TCP port. The server accepts one host at a time, as a cable does. A
+//! second host is turned away after [`KNOCK_WAIT`], which gives a leaving host time to disconnect.
 //!
 //! The simulation waits for the network: while the link is full, the camera's time stands still, so
-//! nothing is lost by a slow host. With [`ServeOptions::drop_when_full`] time goes on, and the firmware drops
-//! frames as the real one must.
+//! a slow host loses nothing. With [`ServeOptions::drop_when_full`] the time goes on, and the
+//! firmware drops frames as on the real camera.
 
 use super::{SimulatedFpga, VirtualCamera};
 use crate::link::is_hangup;
@@ -12,39 +12,41 @@ use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Clocks between two looks of the firmware: 8 us.
+/// Clocks between two polls of the firmware: 8 us.
 const STEP_CLOCKS: u32 = 1000;
-/// How long an idle camera waits for bytes before its time goes on.
+/// How long an idle camera waits for bytes before its time advances.
 const IDLE_WAIT: Duration = Duration::from_millis(2);
-/// How often a waiting server looks whether it should end, and a busy one whether someone knocks.
+/// Interval at which a waiting server checks whether to stop, and a busy server checks for a second
+/// host.
 const ACCEPT_WAIT: Duration = Duration::from_millis(20);
-/// How long a second host waits for the first to leave.
+/// How long a second host waits for the first host to leave.
 const KNOCK_WAIT: Duration = Duration::from_millis(500);
 
-/// How to serve.
+/// Options of the server.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ServeOptions {
-    /// End after the first host has gone.
+    /// Whether to stop after the first host has disconnected.
     pub once: bool,
-    /// Let time go on while the link is full.
+    /// Whether the camera's time goes on while the link is full.
     pub drop_when_full: bool,
 }
 
-/// What a server tells its user.
+/// An event that the server reports to its user.
 #[derive(Debug)]
 pub enum ServerEvent {
     /// A host has connected.
     Connected(SocketAddr),
-    /// Another one has, while the first was there.
+    /// A second host connected while the first was connected.
     TurnedAway(SocketAddr),
-    /// It has gone, in order or not.
+    /// The host disconnected; the error, if there was one.
     Disconnected(SocketAddr, Option<io::Error>),
 }
 
 /// Serves `camera` until `stop` is set.
 ///
 /// # Errors
-/// When the listener fails; the failure of one host's link is told and the next host is waited for.
+/// If the listener fails. An error of one host's link is reported as an event, and the server waits
+/// for the next host.
 pub fn serve<F: SimulatedFpga>(
     listener: &TcpListener,
     camera: &mut VirtualCamera<F>,
@@ -70,7 +72,7 @@ pub fn serve<F: SimulatedFpga>(
     Ok(())
 }
 
-/// Where hosts knock. Holds the one that waits for another to leave.
+/// The listening side of the server. Holds a second host that waits for the first to leave.
 struct Door<'l> {
     listener: &'l TcpListener,
     waiting: Option<(TcpStream, SocketAddr, Instant)>,
@@ -78,7 +80,7 @@ struct Door<'l> {
 }
 
 impl Door<'_> {
-    /// The host to talk to next.
+    /// The next host to serve.
     fn next(&mut self) -> io::Result<Option<(TcpStream, SocketAddr)>> {
         if let Some((stream, address, _)) = self.waiting.take() {
             return Ok(Some((stream, address)));
@@ -86,20 +88,21 @@ impl Door<'_> {
         match self.listener.accept() {
             Ok(accepted) => Ok(Some(accepted)),
             Err(error) if error.kind() == io::ErrorKind::WouldBlock => Ok(None),
-            // The host gave up between knocking and entering.
+            // The host disconnected before it was accepted.
             Err(error) if is_hangup(&error) => Ok(None),
             Err(error) => Err(error),
         }
     }
 
-    /// Looks, now and then, who knocks while a host is there; who has waited long enough is turned away.
+    /// Checks from time to time for a second host while the first is connected, and turns away a
+    /// host that has waited too long.
     fn knock(&mut self, tell: &mut dyn FnMut(ServerEvent)) {
         if self.looked.elapsed() < ACCEPT_WAIT {
             return;
         }
         self.looked = Instant::now();
         match &self.waiting {
-            // A listener that fails now will fail again when it is this conversation's turn to end.
+            // A listener that fails now will fail again after this host has disconnected.
             None => {
                 let knocked = self.next().ok().flatten();
                 self.waiting = knocked.map(|(stream, address)| (stream, address, Instant::now()));
@@ -113,7 +116,7 @@ impl Door<'_> {
     }
 }
 
-/// Moves bytes and time until the host hangs up.
+/// Moves bytes and advances time until the host disconnects.
 fn converse<F: SimulatedFpga>(
     mut stream: TcpStream,
     camera: &mut VirtualCamera<F>,
@@ -135,7 +138,8 @@ fn converse<F: SimulatedFpga>(
             Err(error) => return Err(error),
         }
         let mut worked = false;
-        // A batch between two looks at the socket: system calls cost more than frames.
+        // A batch of steps between two reads of the socket, because system calls cost more than
+        // frames.
         for _ in 0..64 {
             if camera.packets_out().is_full() && !options.drop_when_full {
                 break;

@@ -1,4 +1,5 @@
-//! One picture through the whole virtual camera: light, gateware model, firmware, packets, host.
+//! Takes one picture through the whole virtual camera: light, gateware model, firmware, packets,
+//! host.
 
 use super::{MemoryLink, VirtualOptics, VirtualOpticsError};
 use crate::calibration::{
@@ -25,7 +26,7 @@ pub enum ShotError {
     /// The conversation with the camera failed.
     #[error(transparent)]
     Session(#[from] SessionError),
-    /// A white sheet did not show the latency.
+    /// The latency could not be measured against a white sheet.
     #[error("the virtual camera is not calibrated before its white sheet")]
     Calibration(#[source] CalibrationError),
     /// The capture did not start.
@@ -40,13 +41,13 @@ pub enum ShotError {
         /// Frames received until then.
         received: u64,
     },
-    /// The camera did not make the frames that were asked for.
+    /// The camera did not make all requested frames.
     #[error("the capture is not whole: {0}")]
     NotWhole(String),
-    /// A white sheet did not show how the LEDs differ.
+    /// The flat field could not be measured against a white sheet.
     #[error("the virtual camera's flat field is not known")]
     FlatField(#[source] FlatFieldError),
-    /// The patterns cannot be made.
+    /// The patterns cannot be computed.
     #[error(transparent)]
     Rows(#[from] RowsError),
     /// The frames give no measurements.
@@ -54,24 +55,25 @@ pub enum ShotError {
     Integrate(#[from] IntegrateError),
 }
 
-/// Latency and settling of the camera behind these optics, measured against a white sheet where the lens is focused, as
-/// its user would.
+/// Latency and settling of the camera with these optics, measured as a user would: against a white
+/// sheet at the lens's focus.
 ///
-/// They are the instrument's: they hold for any scene, distance and weather, and should be measured once for many shots.
+/// Latency and settling belong to the instrument and hold for any scene, distance and weather.
+/// Measure them once for many shots.
 ///
 /// # Errors
-/// [`ShotError`] if the camera sees no light even there.
+/// [`ShotError`] if the camera sees no light from the white sheet.
 pub fn calibrate_against_white(optics: &VirtualOptics, seed: u64) -> Result<Settling, ShotError> {
     let sheet = optics.white_sheet()?;
     let mut session = Session::open(Box::new(MemoryLink::new(sheet.camera(seed)?)))?;
     calibrate(&mut session, &mut IgnorePackets).map_err(ShotError::Calibration)
 }
 
-/// Sweeps of the flat field of a virtual camera: 0.9 % of noise with the paper's camera.
+/// Number of sweeps for the flat field of a virtual camera: 0.9 % of noise with the paper's camera.
 const FLAT_FIELD_SWEEPS: u32 = 4000;
 
-/// The flat field of the camera behind these optics, measured against a white sheet where the lens is focused, as its user
-/// would; none for a camera whose LEDs are all alike.
+/// The flat field of the camera with these optics, measured as a user would: against a white sheet
+/// at the lens's focus. `None` for a camera whose LEDs are all alike.
 ///
 /// # Errors
 /// [`ShotError`] if the sheet is too dim.
@@ -90,15 +92,15 @@ pub fn flat_field_against_white(
     let mut go_on = |_: &Progress| ControlFlow::Continue(());
     match measure_flat_field(&mut session, &setup, settling, sweeps, &mut go_on) {
         Ok(measured) => Ok(Some(measured.flat)),
-        // LEDs that differ by less than the noise need none.
+        // LEDs that differ by less than the noise need no flat field.
         Err(FlatFieldError::NothingGained { .. }) => Ok(None),
         Err(error) => Err(ShotError::FlatField(error)),
     }
 }
 
-/// Captures `frames` frames with the camera behind these optics, whose latency and settling are known.
+/// Captures `frames` frames with the camera with these optics. Its latency and settling are known.
 ///
-/// `watch` is called while frames come and may break to stop.
+/// `watch` is called while frames arrive and may break to stop.
 ///
 /// # Errors
 /// [`ShotError`] unless all frames were made.
@@ -131,19 +133,19 @@ pub fn shoot(
     }
 }
 
-/// What one shot brought.
+/// The result of one shot.
 pub struct Shot {
-    /// The conversation, which knows the camera's identity.
+    /// The session, which knows the camera's identity.
     pub session: Session,
     /// The frames and their account.
     pub capture: Capture,
 }
 
 impl Shot {
-    /// The measurements, with the leak from pattern to pattern undone.
+    /// The measurements, with the leak between patterns corrected.
     ///
     /// # Errors
-    /// [`ShotError::Integrate`] where the camera's response cannot be undone.
+    /// [`ShotError::Integrate`] if the camera's response cannot be corrected.
     pub fn measurements(&self) -> Result<Measurements, ShotError> {
         let Capture { setup, settling, integrated, .. } = &self.capture;
         Ok(integrated.measurements(setup, settling.as_ref(), false)?)

@@ -1,6 +1,8 @@
-//! A simulated FPGA that the firmware of an emulated board reaches over a serial line ([`nirspi_wire::tunnel`]).
+//! A simulated FPGA that the firmware of an emulated board accesses over a serial line
+//! ([`nirspi_wire::tunnel`]).
 //!
-//! The one law: simulated time passes with accesses alone. So how fast the emulator is changes no frame.
+//! # Invariant
+//! Simulated time advances only with accesses, so the speed of the emulator changes no frame.
 
 use super::SimulatedFpga;
 use crate::link::is_hangup;
@@ -11,11 +13,11 @@ use std::io::{self, Read, Write};
 use std::net::TcpStream;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// ADC clocks that an access takes.
+/// ADC clocks of one access.
 const ACCESS_CLOCKS: u32 = 100;
-/// While nothing is accessed, time passes until a line changes, in steps of the virtual camera's length...
+/// Without an access, time advances in steps of the virtual camera's length until a line changes...
 const STEP_CLOCKS: u32 = 1000;
-/// ...for so long at most, and not at all while no run is on.
+/// ...for at most this many clocks, and only during a run.
 const LOOK_STEPS: u32 = 50;
 /// Room temperature.
 const CENTI_CELSIUS: i16 = 2500;
@@ -23,13 +25,13 @@ const CENTI_CELSIUS: i16 = 2500;
 /// Serves accesses until the board goes away.
 ///
 /// # Errors
-/// When the line fails other than by the board's end.
+/// If the line fails in another way than by the board's disconnecting.
 pub fn serve_tunnel(
     mut line: TcpStream,
     fpga: &mut impl SimulatedFpga,
     interlock_closed: &AtomicBool,
 ) -> io::Result<()> {
-    // Small packets go at once, or each access takes 40 ms.
+    // Small packets are sent at once; otherwise each access takes 40 ms.
     line.set_nodelay(true)?;
     let mut buffer = Vec::new();
     let mut chunk = [0; 4096];
@@ -43,7 +45,7 @@ pub fn serve_tunnel(
         buffer.extend_from_slice(chunk.get(..length).unwrap_or(&[]));
         while let Some(bytes) = buffer.first_chunk::<REQUEST_BYTES>() {
             let Some(request) = Request::from_bytes(bytes) else {
-                // A board that has restarted in the middle of a request.
+                // The board may have restarted in the middle of a request.
                 buffer.remove(0);
                 continue;
             };
@@ -67,7 +69,7 @@ pub fn serve_tunnel(
     }
 }
 
-/// What the FPGA answers. One whose bus fails reads as zeros, as one that is not there.
+/// The answer of the FPGA. An FPGA whose bus fails reads as zeros, like a missing FPGA.
 fn access(fpga: &mut impl SimulatedFpga, request: Request) -> Vec<u8> {
     let Request { opcode, address, argument, .. } = request;
     let data = match opcode {
@@ -82,7 +84,7 @@ fn access(fpga: &mut impl SimulatedFpga, request: Request) -> Vec<u8> {
     };
     fpga.advance(ACCESS_CLOCKS);
     let mut data = data.unwrap_or_default();
-    // Beyond the end, and where there is nothing, the FPGA gives zeros.
+    // The FPGA gives zeros beyond the end of its data and at addresses without data.
     data.resize(request.reply_data(), 0);
     data
 }

@@ -1,13 +1,15 @@
-//! CRC-32 as in zlib, Ethernet and the STM32's CRC unit (ISO-HDLC): polynomial 0x04C1_1DB7 reflected,
-//! initial value and final XOR all ones. The same one guards packets and FPGA frames.
+//! CRC-32 as in zlib, Ethernet and the STM32's CRC unit (ISO-HDLC): polynomial 0x04C1_1DB7
+//! reflected, initial value and final XOR all ones. Packets and FPGA frames use the same CRC.
 //!
-//! Several bytes a step by as many tables ("slicing", Kounavis and Berry 2005): table `k` holds what a byte
-//! amounts to `k` bytes later. Two thirds of a frame's instructions were CRC with one table.
+//! The CRC processes several bytes in one step with as many tables ("slicing", Kounavis and Berry
+//! 2005): table `k` holds the effect of a byte `k` bytes later. With one table, CRC took two thirds
+//! of a frame's instructions.
 
-/// The polynomial, bit 0 its highest power.
+/// The polynomial; bit 0 is its highest power.
 const POLYNOMIAL: u32 = 0xEDB8_8320;
 
-/// Bytes a step. 16 KB of tables buy the host 24 414 frames a second; a microcontroller has 4 KB to spare.
+/// Bytes per step. 16 KB of tables let the host process 24 414 frames a second; a microcontroller
+/// can spare 4 KB.
 #[cfg(target_os = "none")]
 const STEP: usize = 4;
 #[cfg(not(target_os = "none"))]
@@ -68,18 +70,18 @@ pub fn crc32(bytes: &[u8]) -> u32 {
     crc.value()
 }
 
-/// [`crc32`] of bytes that come in pieces.
+/// [`crc32`] of bytes in pieces.
 #[derive(Debug, Clone)]
 pub struct Crc32(u32);
 
 impl Crc32 {
-    /// Of no bytes yet.
+    /// The CRC of no bytes.
     #[must_use]
     pub const fn new() -> Self {
         Self(u32::MAX)
     }
 
-    /// Takes the next piece.
+    /// Adds the next piece.
     pub fn update(&mut self, bytes: &[u8]) {
         self.0 = TABLES.update(self.0, bytes);
     }
@@ -103,7 +105,7 @@ mod tests {
     use proptest::prelude::*;
     use std::vec::Vec;
 
-    /// As defined, bit by bit.
+    /// The CRC by definition, bit by bit.
     fn by_definition(bytes: &[u8]) -> u32 {
         !bytes.iter().fold(u32::MAX, |crc, &byte| {
             (0..8).fold(crc ^ u32::from(byte), |crc, _| (crc >> 1) ^ ((crc & 1) * POLYNOMIAL))

@@ -1,6 +1,6 @@
-//! Faults, states and settings in words, for people.
+//! Faults, states and settings in words.
 //!
-//! The firmware sends values, never text: nothing here is linked into the firmware.
+//! The firmware sends values and no text, so the firmware does not link this module.
 
 use crate::message::HOST_SILENCE_US;
 use crate::register::IDENTITY;

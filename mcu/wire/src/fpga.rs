@@ -1,4 +1,4 @@
-//! A frame as the FPGA's host port delivers it: header, two 48-bit sums a pattern, CRC-32.
+//! A frame from the FPGA's host port: header, two 48-bit sums for each pattern, CRC-32.
 //!
 //! All little-endian:
 //!
@@ -19,7 +19,7 @@
 
 use crate::{FrameFlags, PATTERNS, crc32};
 
-/// `"NSPF"` in ASCII, as it stands in memory.
+/// `"NSPF"` in ASCII, in the order of memory.
 pub const MAGIC: [u8; 4] = *b"NSPF";
 /// Bytes before the sums.
 pub const HEADER_BYTES: usize = 32;
@@ -27,12 +27,12 @@ pub const HEADER_BYTES: usize = 32;
 pub const PATTERN_BYTES: usize = 12;
 /// Bytes of the checksum.
 pub const CRC_BYTES: usize = 4;
-/// Sums are taken modulo this.
+/// The modulus of a sum.
 pub const SUM_MODULUS: u64 = 1 << 48;
-/// Bytes of the longest frame.
+/// Number of bytes of the longest frame.
 pub const MAX_FRAME_BYTES: usize = frame_bytes(PATTERNS);
 
-/// Bytes of a frame of this many patterns.
+/// Number of bytes of a frame of this many patterns.
 #[must_use]
 pub const fn frame_bytes(patterns: u16) -> usize {
     HEADER_BYTES + PATTERN_BYTES * patterns as usize + CRC_BYTES
@@ -45,7 +45,7 @@ pub struct Header {
     pub patterns: u16,
     /// What happened to the frame.
     pub flags: FrameFlags,
-    /// Number of the frame in its run, from 0, lost ones counted.
+    /// Number of the frame in its run, from 0, lost frames included.
     pub sequence: u32,
     /// Sweeps summed.
     pub sweeps: u32,
@@ -58,7 +58,7 @@ pub struct Header {
 }
 
 impl Header {
-    /// As it stands in the frame.
+    /// The header's bytes in the frame.
     #[must_use]
     pub fn to_bytes(&self) -> [u8; HEADER_BYTES] {
         let mut bytes = [0; HEADER_BYTES];
@@ -100,9 +100,9 @@ impl Header {
 /// Why bytes are not a frame of the FPGA.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FrameError {
-    /// Not the length that the header calls for.
+    /// The length is not that of the header's patterns.
     Length,
-    /// Does not begin with [`MAGIC`].
+    /// The bytes do not begin with [`MAGIC`].
     Magic,
     /// The checksum does not match.
     Crc,
@@ -118,7 +118,7 @@ pub struct Sums {
 }
 
 impl Sums {
-    /// As they stand in the frame.
+    /// The sums' bytes in the frame.
     #[must_use]
     pub fn to_bytes(&self) -> [u8; PATTERN_BYTES] {
         let mut bytes = [0; PATTERN_BYTES];
@@ -134,7 +134,8 @@ impl Sums {
     }
 }
 
-/// Of two loads: a byte at a time it was a third of what a frame costs the firmware.
+/// Reads a sum with two loads. Reading bytes one at a time took a third of the firmware's work for
+/// a frame.
 fn sum48(&[b0, b1, b2, b3, b4, b5]: &[u8; 6]) -> u64 {
     let (low, high) = (u32::from_le_bytes([b0, b1, b2, b3]), u16::from_le_bytes([b4, b5]));
     u64::from(high) << 32 | u64::from(low)
@@ -166,7 +167,7 @@ impl<'a> FpgaFrame<'a> {
         Ok(Self { header, sums: covered.get(HEADER_BYTES..).ok_or(FrameError::Length)? })
     }
 
-    /// The header alone, unchecked but for its magic: for tools that make frames.
+    /// The header alone, of which only the magic is checked, for tools that make frames.
     #[must_use]
     pub fn parse_header(bytes: &[u8]) -> Option<Header> {
         bytes.first_chunk().and_then(Header::from_bytes)

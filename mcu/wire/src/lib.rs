@@ -1,4 +1,4 @@
-//! The contract of the camera: what crosses a boundary between two machines, and nothing else.
+//! The contract of the camera: everything that crosses a boundary between two machines.
 //!
 //! * [`message`]: commands of the host, replies and stream of the device,
 //! * [`version`]: versions of the protocol, and the rules by which it grows,
@@ -6,16 +6,16 @@
 //! * [`samples`]: the integrated ADC samples of a frame,
 //! * [`register`]: the register map of the FPGA, its fault codes and bits,
 //! * [`fpga`]: the layout of a frame as the FPGA's host port delivers it,
-//! * [`host_port`]: how accesses cross the host port,
-//! * [`tunnel`]: how the same accesses cross a serial line to a simulator,
+//! * [`host_port`]: the format of accesses on the host port,
+//! * [`tunnel`]: the same accesses over a serial line to a simulator,
 //! * [`walsh`]: which sign of which Hadamard row an LED shows,
 //! * [`usb`]: identity on the bus.
 //!
 //! `no_std`, no allocation, no feature flags.
 //!
 //! # Invariant
-//! Firmware, gateware model, host and tests take these numbers from here. A number of this crate stands a second time
-//! only where this crate cannot be used, and a test holds the two equal:
+//! Firmware, gateware model, host and tests take these numbers from this crate. A number is
+//! repeated only where this crate cannot be used, and a test compares the two:
 //!
 //! | second place | test |
 //! |---|---|

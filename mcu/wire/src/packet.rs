@@ -1,21 +1,21 @@
-//! How a message becomes bytes on a link, the same on USB bulk, UART and TCP.
+//! Encodes messages as bytes on a link, in the same way on USB bulk, UART and TCP.
 //!
 //! `packet = COBS( postcard(message) ++ CRC-32 little-endian ) ++ 0x00`
 //!
-//! Empty packets are allowed and mean nothing, so a sender may put a zero first to cut off what an earlier session left
-//! half sent.
+//! Empty packets are allowed and have no meaning. A sender may start with a zero, which ends what
+//! an earlier session left half sent.
 //!
 //! # Invariant
-//! A receiver that joins anywhere, or meets damage, is in step again after the next zero byte
-//! (`tests/packets.rs`: `a_stream_with_a_gap_is_in_step_after_the_next_delimiter`), and damaged bytes never become a
-//! message (`a_damaged_byte_never_becomes_another_message`).
+//! A receiver that joins anywhere, or receives damaged bytes, is in step again after the next zero
+//! byte (`a_stream_with_a_gap_is_in_step_after_the_next_delimiter` in `tests/packets.rs`). Damaged
+//! bytes never become a message (`a_damaged_byte_never_becomes_another_message`).
 
 use crate::stuffing::Stuffer;
 use crate::{Crc32, crc32};
 use postcard::ser_flavors::Flavor;
 use serde::{Deserialize, Serialize};
 
-/// Bytes that CRC, COBS and the delimiter add to `payload` bytes of postcard, at most.
+/// The most bytes that CRC, COBS and the delimiter add to `payload` bytes of postcard.
 #[must_use]
 pub const fn overhead(payload: usize) -> usize {
     let framed = payload + 4;
@@ -39,13 +39,13 @@ pub const MAX_HOST_PACKET: usize = {
 pub enum PacketError {
     /// The caller's buffer is too small for the message.
     BufferTooSmall,
-    /// No delimiter came within the longest packet there is.
+    /// No delimiter arrived within the length of the longest packet.
     TooLong,
     /// The COBS code points outside the packet.
     Cobs,
     /// The checksum does not match: bytes were damaged.
     Crc,
-    /// The checksum is right and the message is unknown: the sender speaks a newer version.
+    /// The checksum is right, but the message is unknown: the sender speaks a newer version.
     Message,
 }
 
@@ -63,7 +63,8 @@ impl core::fmt::Display for PacketError {
 
 impl core::error::Error for PacketError {}
 
-/// postcard's output, checksummed and COBS-encoded on its way into the caller's buffer.
+/// Computes the checksum of postcard's output, and writes the output COBS-encoded into the caller's
+/// buffer.
 struct PacketWriter<'b> {
     cobs: Stuffer<'b>,
     crc: Crc32,
@@ -111,7 +112,7 @@ pub fn open<'p, T: Deserialize<'p>>(packet: &'p mut [u8]) -> Result<T, PacketErr
     parse(unseal(packet)?)
 }
 
-/// Takes COBS and CRC off one packet, in place; what is left are the bytes of its message.
+/// Removes COBS and CRC from one packet, in place. Returns the bytes of its message.
 ///
 /// # Errors
 /// [`PacketError::Cobs`], [`Crc`](PacketError::Crc).
@@ -122,7 +123,8 @@ pub fn unseal(packet: &mut [u8]) -> Result<&[u8], PacketError> {
     if crc32(payload) == u32::from_le_bytes(*crc) { Ok(payload) } else { Err(PacketError::Crc) }
 }
 
-/// Reads the bytes of a message. Bytes after the message are the tail of a newer version, and are ignored.
+/// Reads the bytes of a message. Bytes after the message are the tail of a newer version, and are
+/// ignored.
 ///
 /// # Errors
 /// [`PacketError::Message`].
@@ -139,7 +141,7 @@ pub fn request_id(payload: &[u8]) -> Option<u16> {
     postcard::take_from_bytes(payload).ok().map(|(id, _)| id)
 }
 
-/// The parts of an answer to `Hello` that no version changes, from the bytes of the message: the request's number and
+/// The parts of an answer to `Hello` that are the same in every version: the request's number and
 /// the device's protocol version. For a message that [`parse`] does not know.
 #[must_use]
 pub fn hello_of_any_version(payload: &[u8]) -> Option<(u16, u16)> {
@@ -150,12 +152,14 @@ pub fn hello_of_any_version(payload: &[u8]) -> Option<(u16, u16)> {
     }
 }
 
-/// Cuts a byte stream into packets. `N` is the longest packet, delimiter not counted.
+/// Splits a byte stream into packets. `N` is the length of the longest packet without its
+/// delimiter.
 #[derive(Debug, Clone)]
 pub struct Deframer<const N: usize> {
     bytes: [u8; N],
     length: usize,
-    /// The packet has outgrown the buffer: skip to its delimiter.
+    /// Whether the packet is longer than the buffer, so that its bytes are skipped up to the
+    /// delimiter.
     skipping: bool,
 }
 
@@ -164,7 +168,7 @@ pub struct Deframer<const N: usize> {
 pub enum Deframed<'d> {
     /// The bytes between two delimiters, still encoded.
     Packet(&'d mut [u8]),
-    /// More bytes without a delimiter than any packet has; they are gone.
+    /// More bytes without a delimiter than any packet has. The bytes are lost.
     TooLong,
 }
 
@@ -175,14 +179,14 @@ impl<const N: usize> Default for Deframer<N> {
 }
 
 impl<const N: usize> Deframer<N> {
-    /// A receiver that has heard nothing yet.
+    /// A deframer without any bytes.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Takes bytes from the front of `input` up to and with the next delimiter. `None`: all was taken and
-    /// no packet is complete.
+    /// Takes bytes from the front of `input` up to and including the next delimiter. `None` means
+    /// that all bytes were taken and no packet is complete.
     pub fn next<'d>(&'d mut self, input: &mut &[u8]) -> Option<Deframed<'d>> {
         while !input.is_empty() {
             let end = input.iter().position(|&byte| byte == 0);
@@ -209,7 +213,8 @@ impl<const N: usize> Deframer<N> {
         None
     }
 
-    /// Bytes of a packet whose delimiter has not come: a link that ends now ends in mid-packet.
+    /// Number of bytes of a packet without its delimiter so far. If the link ends now, it ends in
+    /// mid-packet.
     #[must_use]
     pub fn pending(&self) -> usize {
         if self.skipping { N } else { self.length }

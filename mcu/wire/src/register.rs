@@ -1,18 +1,21 @@
-//! The FPGA's register map: 16-bit addresses, 32-bit values. The gateware is checked against this table.
+//! The FPGA's register map: 16-bit addresses, 32-bit values. The gateware is checked against this
+//! table.
 //!
-//! How the gateware behaves, in terms of these registers:
+//! The behaviour of the gateware, in terms of these registers:
 //!
-//! * A *slot* is the time one pattern or complement is shown: [`Register::Dwell`] clocks. A sweep has
-//!   [`Register::Patterns`] slots, twice as many if differential (pattern, complement, next pattern...).
-//!   [`Register::Sweeps`] sweeps are a frame. Slots, sweeps and frames follow each other without a gap.
-//! * The sample of clock `t` belongs to what was shown at clock `t - Latency`. It is summed unless its
-//!   clock within that slot is below [`Register::Blank`].
-//! * Settings are copied when a run starts: writes while it runs hold for the next one. The order table is
-//!   not copied: writes to it while running are refused and set [`status::WRITE_REFUSED`].
+//! * A *slot* is the time one pattern or complement is shown: [`Register::Dwell`] clocks. A sweep
+//!   has [`Register::Patterns`] slots, twice as many if differential (pattern, complement, next
+//!   pattern...). [`Register::Sweeps`] sweeps are a frame. Slots, sweeps and frames follow each
+//!   other without a gap.
+//! * The sample of clock `t` belongs to what was shown at clock `t - Latency`. The sample is summed
+//!   unless its clock within that slot is below [`Register::Blank`].
+//! * Settings are copied when a run starts: writes while it runs hold for the next one. The order
+//!   table is not copied: writes to it while running are refused and set [`status::WRITE_REFUSED`].
 //! * A frame that is complete while the one before has not been released is lost: counted in
 //!   [`Register::FramesLost`], and the next frame delivered carries `AFTER_LOSS`.
-//! * LEDs are on only while a run or raw burst is under way, no fault is latched and the interlock input is
-//!   closed. A fault ends the run at once, discards the unfinished frame and latches its first code.
+//! * LEDs are on only while a run or raw burst is under way, no fault is latched and the interlock
+//!   input is closed. A fault ends the run at once, discards the unfinished frame and latches its
+//!   first code.
 
 /// Whether a register can be written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -91,14 +94,16 @@ registers! {
     Frames = 0x0E, ReadWrite, 0;
     /// Samples of a raw burst, 1 to [`RAW_SAMPLES_MAX`].
     RawLength = 0x0F, ReadWrite, RAW_SAMPLES_MAX as u32;
-    /// Clocks without any access to the host port after which a run is ended, 1 to [`WATCHDOG_MAX`].
+    /// Clocks without any access to the host port after which a run is ended, 1 to
+    /// [`WATCHDOG_MAX`].
     Watchdog = 0x10, ReadWrite, crate::ADC_HZ / 5;
-    /// Light budget in each window of [`DUTY_WINDOW`] clocks, in half-arrays lit for a clock: a slot of
-    /// pattern 0 costs 2 a clock, its complement 0, any other pattern or complement 1. At most
-    /// [`DUTY_LIMIT_MAX`]. Windows are fixed, one begins whenever the clock since reset is a multiple of their
-    /// length, so that no sequence of starts gets around the limit.
+    /// Light budget in each window of [`DUTY_WINDOW`] clocks, in half-arrays lit for a clock: a
+    /// slot of pattern 0 costs 2 a clock, its complement 0, any other pattern or complement 1. At
+    /// most [`DUTY_LIMIT_MAX`]. Windows are fixed, one begins whenever the clock since reset is a
+    /// multiple of their length, so that no sequence of starts gets around the limit.
     DutyLimit = 0x11, ReadWrite, DUTY_LIMIT_MAX;
-    /// Over-range samples, summed or not, within one frame or raw burst that end the run; 0 never does.
+    /// Over-range samples, summed or not, within one frame or raw burst that end the run; 0 never
+    /// does.
     OverRangeTrip = 0x12, ReadWrite, 4096;
     /// Frames completed in this run, lost ones too.
     FramesMade = 0x13, ReadOnly, 0;
@@ -112,7 +117,8 @@ registers! {
 
 /// `"NSPI"` in ASCII.
 pub const IDENTITY: u32 = 0x4E53_5049;
-/// Address of the order table's first entry; entry `i` is at `ORDER_TABLE + i`, read and write, 10 bits.
+/// Address of the order table's first entry; entry `i` is at `ORDER_TABLE + i`, read and write, 10
+/// bits.
 pub const ORDER_TABLE: u16 = 0x0400;
 /// Most samples that a raw burst can have.
 pub const RAW_SAMPLES_MAX: u16 = 4096;
@@ -133,12 +139,12 @@ pub mod control {
     pub const CLEAR_FAULT: u32 = 1 << 1;
     /// Gives the delivered frame's buffer back.
     pub const RELEASE: u32 = 1 << 2;
-    /// Starts a run, unless one is under way, a fault is latched, the interlock is open or a setting is
-    /// out of range (then [`status::CONFIG_ERROR`](super::status::CONFIG_ERROR) is set). Resets the frame
-    /// counters, drops undelivered frames and raw samples.
+    /// Starts a run, unless one is under way, a fault is latched, the interlock is open or a
+    /// setting is out of range (then [`status::CONFIG_ERROR`](super::status::CONFIG_ERROR) is set).
+    /// Resets the frame counters, drops undelivered frames and raw samples.
     pub const START: u32 = 1 << 3;
-    /// Like `START`, for one raw burst: the sweep of the settings, from its first slot on, with every
-    /// sample stored from clock 0, none summed, no latency or blanking applied.
+    /// Like `START`, for one raw burst: the sweep of the settings, from its first slot on, with
+    /// every sample stored from clock 0, none summed, no latency or blanking applied.
     pub const START_RAW: u32 = 1 << 4;
 }
 
@@ -208,9 +214,9 @@ impl FaultCode {
 /// The test generator's state at the first clock of a run.
 pub const TEST_SEED: u16 = 1;
 
-/// The test generator's next state, which is also its next sample: a 14-bit Fibonacci shift register,
-/// `x^14 + x^5 + x^3 + x + 1`, of period 2^14 - 1. The sample of a run's clock 0 is [`TEST_SEED`]. It stands
-/// in for the ADC, so latency and blanking act on it as on any sample.
+/// The test generator's next state, which is also its next sample: a 14-bit Fibonacci shift
+/// register, `x^14 + x^5 + x^3 + x + 1`, of period 2^14 - 1. The sample of a run's clock 0 is
+/// [`TEST_SEED`]. The generator replaces the ADC, so latency and blanking apply as for any sample.
 #[must_use]
 pub const fn test_sample(state: u16) -> u16 {
     let bit = (state >> 13) ^ (state >> 4) ^ (state >> 2) ^ state;

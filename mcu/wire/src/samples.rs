@@ -1,8 +1,9 @@
-//! The samples of a frame: one signed 32-bit number a pattern, with one exponent for all.
+//! The samples of a frame: one signed 32-bit number for each pattern, with one exponent for all.
 //!
-//! A pattern's integrated ADC sample is the difference of two 48-bit sums. Nearly always it fits 32 bits
-//! (up to 2^17 / window sweeps); where it does not, all samples of the frame are shifted right by the same
-//! `shift` and rounded, so that a frame has 4 bytes a pattern whatever the sweep count.
+//! A pattern's integrated ADC sample is the difference of two 48-bit sums. The difference almost
+//! always fits into 32 bits (up to 2^17 / window sweeps). Otherwise all samples of the frame are
+//! shifted right by the same `shift` and rounded, so that a frame has 4 bytes for each pattern at
+//! any number of sweeps.
 
 use serde::{
     Deserialize, Deserializer, Serialize, Serializer, de::Error as _, ser::SerializeTuple,
@@ -18,12 +19,13 @@ pub struct Samples<'a> {
     words: &'a [u8],
 }
 
-/// Bytes that cannot be samples, or a buffer too small for them.
+/// Bytes that are not valid samples, or a buffer that is too small.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SamplesError;
 
 impl<'a> Samples<'a> {
-    /// Packs `values` (summed ADC counts) into `buffer`, 4 bytes each, with the smallest shift that fits.
+    /// Packs `values` (summed ADC counts) into `buffer`, 4 bytes each, with the smallest shift that
+    /// fits.
     ///
     /// # Errors
     /// If the buffer is smaller than `4 * values.len()`.
@@ -33,16 +35,16 @@ impl<'a> Samples<'a> {
     {
         let buffer = buffer.get_mut(..4 * values.len()).ok_or(SamplesError)?;
         let mut magnitude = 0u64;
-        // Nearly always they fit as they are, and one pass is all.
+        // Almost always the values fit without a shift, and one pass is enough.
         for (word, value) in buffer.chunks_exact_mut(4).zip(values.clone()) {
-            // Folds negative values so that i32::MIN and i32::MAX ask for the same width.
+            // Negative values are folded so that i32::MIN and i32::MAX need the same width.
             magnitude |= (value ^ (value >> 63)) as u64;
             word.copy_from_slice(&(value as i32).to_le_bytes());
         }
         let mut shift = (64 - magnitude.leading_zeros()).saturating_sub(31) as u8;
         if shift > 0 {
             let rounded = |value: i64, shift: u8| (value + (1i64 << (shift - 1))) >> shift;
-            // Rounding up may carry into one bit more.
+            // Rounding up may need one bit more.
             if values.clone().any(|value| i32::try_from(rounded(value, shift)).is_err()) {
                 shift += 1;
             }
@@ -72,7 +74,7 @@ impl<'a> Samples<'a> {
         self.words.is_empty()
     }
 
-    /// Exponent: values are exact where it is 0, and rounded to multiples of `2^shift` otherwise.
+    /// Exponent: values are exact if it is 0, and rounded to multiples of `2^shift` otherwise.
     #[must_use]
     pub fn shift(&self) -> u8 {
         self.shift
@@ -93,7 +95,7 @@ impl core::fmt::Debug for Samples<'_> {
     }
 }
 
-/// Bytes as one block: postcard would otherwise take them one at a time.
+/// Bytes as one block. Without this type, postcard would process one byte at a time.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Block<'a>(pub &'a [u8]);
 
@@ -145,10 +147,10 @@ impl<'a> Words<'a> {
         Ok(Self(buffer))
     }
 
-    /// Wraps bytes that are little-endian words already.
+    /// Wraps bytes that are already little-endian words.
     ///
     /// # Errors
-    /// If their number is odd.
+    /// If the number of bytes is odd.
     pub fn from_le_bytes(bytes: &'a [u8]) -> Result<Self, SamplesError> {
         if bytes.len().is_multiple_of(2) { Ok(Self(bytes)) } else { Err(SamplesError) }
     }

@@ -1,21 +1,26 @@
-//! COBS (Cheshire and Baker 1999), on its way into the caller's buffer: no zero is left in what comes out.
+//! Encodes COBS (Cheshire and Baker 1999) directly into the caller's buffer. The encoded bytes
+//! contain no zero.
 //!
-//! A block is a code byte, the distance to the next one, and the bytes in between; each zero is the end of a block, and
-//! so are 254 bytes without one. The one law: the same bytes come out, whatever pieces went in.
+//! A block is a code byte, which is the distance to the next code byte, and the bytes in between.
+//! Each zero ends a block, and so do 254 bytes without a zero.
+//!
+//! # Invariant
+//! The encoded bytes are the same for any division of the input into pieces
+//! (`tests::any_pieces_come_back_from_the_decoder_of_others`).
 
-/// Longest distance, which stands for no zero.
+/// The longest distance. A block of this length does not encode a zero.
 const FULL: usize = 0xFF;
 
-/// The bytes do not fit.
+/// Error: the bytes do not fit into the buffer.
 #[derive(Debug)]
 pub(crate) struct Overflow;
 
 /// Encodes into `out`.
 pub(crate) struct Stuffer<'b> {
     out: &'b mut [u8],
-    /// Where the open block's code byte is.
+    /// Position of the open block's code byte.
     code: usize,
-    /// Where the next byte goes.
+    /// Position of the next byte.
     next: usize,
 }
 
@@ -30,7 +35,7 @@ impl<'b> Stuffer<'b> {
             if self.next - self.code == FULL {
                 self.close()?;
             }
-            // So many cannot fill the block, wherever its zeros are.
+            // This many bytes cannot fill the block, wherever their zeros are.
             let length = rest.len().min(FULL - (self.next - self.code));
             let (part, after) = rest.split_at(length);
             self.push_part(part)?;
@@ -39,7 +44,8 @@ impl<'b> Stuffer<'b> {
         Ok(())
     }
 
-    /// A zero is left out; in its place will be the code of the block after it.
+    /// Adds a part up to a zero. The zero is left out, and the code of the next block takes its
+    /// place.
     fn push_part(&mut self, part: &[u8]) -> Result<(), Overflow> {
         let (before, room) = self.out.split_at_mut_checked(self.next).ok_or(Overflow)?;
         let room = room.get_mut(..part.len()).ok_or(Overflow)?;
@@ -68,7 +74,7 @@ impl<'b> Stuffer<'b> {
         Ok(())
     }
 
-    /// Closes the last block; length of all.
+    /// Closes the last block. Returns the total length.
     pub fn finish(self) -> Result<usize, Overflow> {
         *self.out.get_mut(self.code).ok_or(Overflow)? = (self.next - self.code) as u8;
         Ok(self.next)
@@ -81,7 +87,7 @@ mod tests {
     use proptest::prelude::*;
     use std::vec::Vec;
 
-    /// Zeros here and there, and runs of about a block's length without.
+    /// Bytes with some zeros, and runs without zeros of about a block's length.
     fn data() -> impl Strategy<Value = Vec<u8>> {
         let run = (0..=600usize, any::<bool>(), 1u8..).prop_map(|(length, ends, byte)| {
             let mut run = std::vec![byte; length];
@@ -91,7 +97,7 @@ mod tests {
         prop::collection::vec(run, 0..5).prop_map(|runs| runs.concat())
     }
 
-    /// By the encoder of others.
+    /// The result of another encoder.
     fn expected(data: &[u8]) -> Vec<u8> {
         let mut out = std::vec![0; cobs::max_encoding_length(data.len()) + 1];
         let length = cobs::encode(data, &mut out);

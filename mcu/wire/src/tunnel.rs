@@ -1,6 +1,8 @@
-//! The FPGA's host port through a serial line: how firmware on an emulated board reaches a simulated FPGA.
+//! The FPGA's host port over a serial line: firmware on an emulated board accesses a simulated
+//! FPGA.
 //!
-//! One access a request, one reply a request, in turn; numbers are little-endian.
+//! Each request is one access and has one reply. Requests and replies alternate. Numbers are
+//! little-endian.
 //!
 //! | request | bytes | reply | bytes |
 //! |---|---|---|---|
@@ -10,26 +12,29 @@
 //! | argument: value to write, or bytes to read | 4 | value or bytes that were read | [`Request::reply_data`] |
 //! | CRC-32 of all before | 4 | CRC-32 of all before | 4 |
 //!
-//! The one law: an access takes effect once, if its request is whole; a request that is not is never answered.
+//! # Invariant
+//! An access takes effect once, if its request is whole. A request that is not whole gets no answer
+//! (`tests::a_request_comes_back_and_no_damaged_one_does`).
 
 use crate::crc32;
 use crate::host_port::{READ_FRAME, READ_RAW, READ_REGISTER, WRITE_REGISTER};
 
-/// Opcode that accesses nothing: time passes, and the reply says what the lines are.
+/// Opcode without an access: time passes, and the reply has the state of the lines.
 pub const LOOK: u8 = 0x00;
-/// Bytes of a request.
+/// Number of bytes of a request.
 pub const REQUEST_BYTES: usize = 12;
-/// Bytes of a reply before its data.
+/// Number of bytes of a reply before its data.
 pub const REPLY_HEAD_BYTES: usize = 4;
-/// Bytes of the checksum.
+/// Number of bytes of the checksum.
 pub const CRC_BYTES: usize = 4;
 
 /// One access.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Request {
-    /// What to do.
+    /// The opcode.
     pub opcode: u8,
-    /// Chosen by the firmware; its reply repeats it, so that a late one is told from the one waited for.
+    /// Number chosen by the firmware. The reply repeats the number, so that a late reply is
+    /// recognised.
     pub number: u8,
     /// Address of the register; 0 for frames and bursts.
     pub address: u16,
@@ -38,7 +43,7 @@ pub struct Request {
 }
 
 impl Request {
-    /// As it goes over the line.
+    /// The request's bytes on the line.
     #[must_use]
     pub fn to_bytes(self) -> [u8; REQUEST_BYTES] {
         let [a0, a1] = self.address.to_le_bytes();
@@ -48,7 +53,7 @@ impl Request {
         [self.opcode, self.number, a0, a1, v0, v1, v2, v3, c0, c1, c2, c3]
     }
 
-    /// `None`: not a request.
+    /// The request; `None` if the bytes are not a request.
     #[must_use]
     pub fn from_bytes(bytes: &[u8; REQUEST_BYTES]) -> Option<Self> {
         let (head, crc) = bytes.split_last_chunk::<CRC_BYTES>()?;
@@ -65,7 +70,7 @@ impl Request {
         Some(Self { opcode, number, address, argument })
     }
 
-    /// Bytes of data in its reply.
+    /// Number of data bytes in the reply.
     #[must_use]
     pub const fn reply_data(self) -> usize {
         match self.opcode {
@@ -76,16 +81,16 @@ impl Request {
     }
 }
 
-/// What the microcontroller's other pins see: lines of the FPGA, and the sensors that a simulator stands in for.
+/// The state of the microcontroller's other pins: lines of the FPGA, and the simulated sensors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Lines {
-    /// The FPGA's line of that name.
+    /// The FPGA's line of the same name.
     pub frame_ready: bool,
-    /// The FPGA's line of that name.
+    /// The FPGA's line of the same name.
     pub raw_ready: bool,
     /// The enclosure's interlock.
     pub interlock_closed: bool,
-    /// LED array, hundredths of a degree Celsius; `None`: the sensor does not answer.
+    /// LED array, hundredths of a degree Celsius; `None` if the sensor does not answer.
     pub temperature_centi_celsius: Option<i16>,
 }
 
@@ -95,7 +100,7 @@ const INTERLOCK_CLOSED: u8 = 1 << 2;
 const TEMPERATURE: u8 = 1 << 3;
 
 impl Lines {
-    /// Beginning of the reply to request `number`.
+    /// The beginning of the reply to request `number`.
     #[must_use]
     pub fn to_reply_head(self, number: u8) -> [u8; REPLY_HEAD_BYTES] {
         let bit = |is_set: bool, bit: u8| if is_set { bit } else { 0 };

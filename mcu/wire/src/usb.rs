@@ -1,12 +1,14 @@
-//! USB identity. Vendor class (0xFF) with Microsoft OS 2.0 descriptors, so that no system needs a driver.
+//! USB identity. Vendor class (0xFF) with Microsoft OS 2.0 descriptors, so that no system needs a
+//! driver.
 
 use crate::version;
 
 /// Vendor id of pid.codes, which lends product ids to open hardware.
 pub const VENDOR_ID: u16 = 0x1209;
-/// pid.codes' id for private testing; to be replaced by our own before hardware is handed out.
+/// pid.codes' id for private testing. The id must be replaced by nirspi's own before hardware is
+/// distributed.
 pub const PRODUCT_ID: u16 = 0x0001;
-/// Name that tells this camera from others under the testing id: hosts match it too.
+/// Product name. Hosts also match the name, because other devices use the same testing id.
 pub const PRODUCT: &str = "nirspi";
 /// `iManufacturer`.
 pub const MANUFACTURER: &str = "nirspi project";
@@ -14,8 +16,9 @@ pub const MANUFACTURER: &str = "nirspi project";
 pub const INTERFACE_CLASS: u8 = 0xFF;
 /// `bInterfaceSubClass` of the camera interface.
 pub const INTERFACE_SUBCLASS: u8 = 0x53;
-/// `bInterfaceProtocol`: the oldest protocol version that the camera speaks. A host that speaks this version or a newer
-/// one can greet the camera; the greeting settles the version of the session.
+/// `bInterfaceProtocol`: the oldest protocol version that the camera speaks. A host that speaks
+/// this version or a newer one can greet the camera; the greeting settles the version of the
+/// session.
 pub const INTERFACE_PROTOCOL: u8 = version::MIN as u8;
 /// Bulk OUT, host to device.
 pub const ENDPOINT_OUT: u8 = 0x01;

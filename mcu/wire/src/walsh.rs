@@ -1,9 +1,9 @@
-//! Which LEDs a pattern lights: the natural-order (Sylvester) Hadamard matrix by rows and columns.
+//! The LEDs of a pattern: the natural-order (Sylvester) Hadamard matrix by rows and columns.
 //!
-//! Pattern `k = 32 k_hi + k_lo` at LED `(r, c)` has the sign
-//! `(-1)^(popcount(k_hi & r) + popcount(k_lo & c))`, so 32 row lines and 32 column lines with an XOR at
-//! each LED show any pattern (DESIGN section 3). A line is 0 for `+` and 1 for `-`; an LED is lit where
-//! the XOR of its two lines is 0, and the complement of a pattern inverts the row lines.
+//! Pattern `k = 32 k_hi + k_lo` at LED `(r, c)` has the sign `(-1)^(popcount(k_hi & r) +
+//! popcount(k_lo & c))`, so 32 row lines and 32 column lines with an XOR at each LED show any
+//! pattern. A line is 0 for `+` and 1 for `-`. An LED is lit if the XOR of its two lines is 0. The
+//! complement of a pattern inverts the row lines.
 
 use crate::SIDE;
 

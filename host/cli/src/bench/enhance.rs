@@ -1,4 +1,4 @@
-//! `nirspi bench enhance`: the learned stages, timed.
+//! `nirspi bench enhance`: times the learned stages.
 
 use super::RunArgs;
 use crate::print;

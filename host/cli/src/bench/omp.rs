@@ -1,4 +1,4 @@
-//! `nirspi bench omp`: sparse representations of many frames, timed.
+//! `nirspi bench omp`: times sparse representations of many frames.
 
 use crate::{backend, print, refused};
 use anyhow::{Context, Result};
@@ -79,12 +79,13 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             Precision::F64 => omp::Precision::F64,
         },
         repeats: args.repeats,
-        // The rows see cosines of different lengths.
+        // The rows' measurements of the cosines have different norms.
         normalise: args.normalise || is_random,
         cosines: is_random,
     };
     let device = match args.precision {
-        // Kernels compute in f32: auto does not look for a GPU, and a GPU asked for is refused.
+        // Kernels compute in f32: `auto` does not look for a GPU, and a GPU requested by name is
+        // refused.
         Precision::F64 if args.backend == Backend::Auto => None,
         _ => backend::choose(args.backend, problem.frames.len() / problem.measurements)?,
     };

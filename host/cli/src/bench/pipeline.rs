@@ -1,4 +1,4 @@
-//! `nirspi bench pipeline`: from measurements to enhanced images, timed.
+//! `nirspi bench pipeline`: times the path from measurements to enhanced images.
 
 use super::RunArgs;
 use crate::{print, refused};

@@ -1,4 +1,5 @@
-//! The demo's learned stages, judged: the image over white, fused with depth, deblurred.
+//! The demo's learned stages and their quality: the image divided by white, fused with depth,
+//! deblurred.
 
 use super::super::report::StageTimes;
 use anyhow::Result;
@@ -9,7 +10,7 @@ use nirspi_optics::SIDE;
 use nirspi_recon::{Image, Rows, Side};
 use serde::Serialize;
 
-/// The scene as a perfect camera of 64 x 64 pixels would see it, and what the stages made of it.
+/// The scene as taken by a perfect camera of 64 x 64 pixels, and the results of the stages.
 pub struct Stages {
     pub truth: Vec<f32>,
     pub upscaled: Vec<f32>,
@@ -18,27 +19,27 @@ pub struct Stages {
     pub report: Report,
 }
 
-/// Quality of each 64 x 64 stage, and what the networks found out.
+/// Quality of each 64 x 64 stage, and the estimates of the networks.
 #[derive(Debug, Serialize)]
 pub struct Report {
-    /// Lanczos interpolation, which learned nothing.
+    /// Lanczos interpolation, without learning.
     pub upscaled: Quality,
     /// FSRCNN with depth.
     pub fused: Quality,
     /// The diffusion bridge.
     pub deblurred: Quality,
     pub steps: u32,
-    /// Blur in pixels of the 64 x 64 grid that was taken out: the larger one of the next two.
+    /// Removed blur in pixels of the 64 x 64 grid: the larger of estimate and lens.
     pub sigma_px: f32,
-    /// As the image shows it.
+    /// Blur estimated from the image.
     pub estimated_sigma_px: f32,
-    /// As lens and depth map have it, where there is a depth map.
+    /// Blur computed from lens and depth map, if there is a depth map.
     pub defocus_px: Option<f32>,
-    /// Noise of a reading of full scale 1, as estimated.
+    /// Estimated noise of a reading; full scale is 1.
     pub noise: f32,
-    /// Distance of the readings from those of the result, over their noise.
+    /// Distance of the readings from the readings of the result, divided by their noise.
     pub inconsistency: f32,
-    /// Depth zones that see the field and saw something.
+    /// Number of depth zones that see the field and have a distance.
     pub depth_zones: usize,
     pub device: String,
     /// Reasons not to trust the result.
@@ -61,8 +62,8 @@ pub fn run(
     let depth = DepthMaps::new(pixels_m, [1, SIDE, SIDE], 1)?;
     let defocus_px = view.median_mm.map(|mm| optics.defocus_px(f64::from(mm), deblur::SIDE) as f32);
     let enhance = times.time("load_networks", || Enhance::built_in(&Device::cpu()))?;
-    // The gain that turns a white target at this distance into counts is known from the photon budget, as
-    // a user knows it from a white sheet held there.
+    // The photon budget gives the counts of a white target at this distance, which a user would
+    // measure with a white sheet.
     let white = White::Known(optics.white_counts() as f32);
     let known =
         ImageContext { rows: Some(rows), depth: Some(&depth), least_blur_px: defocus_px, seed };

@@ -1,4 +1,5 @@
-//! `nirspi eval quality`: how good enhanced images are, on characters that no training has seen and on other scenes.
+//! `nirspi eval quality`: the quality of enhanced images, on characters outside the training data
+//! and on other scenes.
 
 use super::progress;
 use crate::print;

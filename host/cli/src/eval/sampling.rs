@@ -1,4 +1,4 @@
-//! `nirspi eval sampling`: what part of the patterns gives what quality, by every order, basis and method.
+//! `nirspi eval sampling`: the quality by share of the patterns, for every order, basis and method.
 
 use crate::camera::parse_order;
 use crate::report::to_json;

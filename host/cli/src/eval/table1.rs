@@ -1,4 +1,4 @@
-//! `nirspi eval table1`: how long each stage takes, on the machine at hand.
+//! `nirspi eval table1`: the time of each stage on this machine.
 
 use super::OutputArgs;
 use crate::{print, refused};

@@ -1,4 +1,5 @@
-//! `nirspi eval table3`: image quality in rain and without it: NIR-SPI, VIS, and NIR-SPI enhanced by networks.
+//! `nirspi eval table3`: image quality in rain and without: NIR-SPI, VIS, and NIR-SPI enhanced by
+//! networks.
 
 use super::{AncestralArgs, ExposureArgs, OutputArgs, progress};
 use crate::print;

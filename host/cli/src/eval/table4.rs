@@ -1,4 +1,5 @@
-//! `nirspi eval table4`: spatial resolution in rain, NIR-SPI, VIS and networks, by slanted edge and by bars.
+//! `nirspi eval table4`: spatial resolution in rain, NIR-SPI, VIS and networks, by slanted edge and
+//! by bars.
 
 use super::{AncestralArgs, ExposureArgs, OutputArgs, progress};
 use crate::print;

@@ -1,4 +1,4 @@
-//! `nirspi reconstruct --enhance`: the learned stages on images whose white level is not known.
+//! `nirspi reconstruct --enhance`: the learned stages on images of unknown white level.
 
 use super::super::report::StageTimes;
 use anyhow::{Context, Result, bail};
@@ -7,20 +7,20 @@ use nirspi_nets::Device;
 use nirspi_recon::{Image, Rows};
 use serde::Serialize;
 
-/// What the learned stages found.
+/// The results of the learned stages.
 #[derive(Debug, Serialize)]
 pub struct Report {
-    /// The image's value that was taken for white.
+    /// The image's value that was used as white.
     white: f32,
-    /// Blur in pixels of the 64 x 64 grid, as estimated.
+    /// Estimated blur in pixels of the 64 x 64 grid.
     sigma_px: f32,
-    /// Noise of a pixel, white being 1, as estimated.
+    /// Estimated noise of a pixel; white is 1.
     noise: f32,
-    /// Distance of the readings from those of the result, over their noise.
+    /// Distance of the readings from the readings of the result, divided by their noise.
     inconsistency: f32,
     /// Reasons not to trust the result.
     pub warnings: Vec<String>,
-    /// The same in a few words, for the picture.
+    /// Short forms of the warnings, for the picture.
     #[serde(skip)]
     pub short: Vec<String>,
 }
@@ -38,7 +38,7 @@ impl Report {
         }
     }
 
-    /// One line for people.
+    /// One line for the user.
     pub fn line(&self) -> String {
         format!(
             "enhanced: blur {:.2} px, noise {:.4}, inconsistency {:.2}; white is {:.4} of the image's units",
@@ -47,8 +47,9 @@ impl Report {
     }
 }
 
-/// Enhances images of 32 x 32 or 64 x 64, each with the Hadamard rows that it was made from: 64 x 64 pixels in [0, 1]
-/// each. White is the same for all, so that a video does not flicker: the median of what each would take for it.
+/// Enhances images of 32 x 32 or 64 x 64 pixels, each with the Hadamard rows from which it was
+/// made. Each result is 64 x 64 pixels in [0, 1]. All images have the same white level, the median
+/// of their own levels, so that a video does not flicker.
 pub fn run(frames: &[(&Image, &Rows)], times: &mut StageTimes) -> Result<(Vec<f32>, Vec<Report>)> {
     if frames.is_empty() {
         bail!("--enhance: no image");

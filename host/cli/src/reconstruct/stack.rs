@@ -1,4 +1,5 @@
-//! `nirspi reconstruct --index all`: every measurement of a file or frame of a recording, as a video.
+//! `nirspi reconstruct --index all`: every measurement of a file or frame of a recording, as a
+//! video.
 
 use super::{Args, enhanced, print, spinning};
 use crate::Usage;
@@ -29,7 +30,7 @@ struct Report {
 #[derive(Debug, Serialize)]
 struct FrameReport {
     used: usize,
-    /// Whether it started from the frame before.
+    /// Whether the frame started from the previous one.
     warm: bool,
     #[serde(flatten)]
     method: MethodReport,
@@ -55,7 +56,7 @@ pub fn run(args: &Args, first: &FirstPatterns) -> Result<ExitCode> {
         .collect::<Result<_, _>>()
         .with_context(named)?;
     let solved = times.time("reconstruct", || spinning(|| solve_all(args, &used)))?;
-    // Imaginary parts of complex readings; every frame of a file has one, or none.
+    // Imaginary parts of complex readings: all frames of a file have one, or none has.
     let imaginary: Vec<Measurements> = sources
         .iter()
         .filter_map(|source| source.imaginary.as_ref())

@@ -1,4 +1,4 @@
-//! What to train on: the arguments that all of `nirspi train` share.
+//! The training data: arguments of all commands of `nirspi train`.
 
 use nirspi_eval::train::Data;
 use std::path::PathBuf;
@@ -22,7 +22,7 @@ pub struct DataArgs {
 }
 
 impl DataArgs {
-    /// What they say.
+    /// The training data of these arguments.
     pub fn data(&self) -> Data {
         Data {
             stacks: self.data.clone(),

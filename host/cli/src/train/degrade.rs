@@ -1,4 +1,4 @@
-//! `nirspi train degrade`: scenes and the virtual camera's pictures of them, as a file.
+//! `nirspi train degrade`: writes scenes and the virtual camera's pictures of them to a file.
 
 use super::data::DataArgs;
 use crate::camera::ModelArgs;

@@ -1,4 +1,4 @@
-//! `nirspi train NETWORK`: one network, kept in a folder as it learns.
+//! `nirspi train NETWORK`: trains one network and stores the run in a folder.
 
 use super::network::Args;
 use crate::{print, refused};
@@ -53,7 +53,7 @@ impl Args {
     }
 }
 
-/// The bar, and whether the user wants no more.
+/// The progress bar, and whether the user has asked to stop.
 struct Shown {
     bar: ProgressBar,
     stop: Arc<AtomicBool>,

@@ -1,11 +1,12 @@
-//! The learned stages on many frames, timed: estimate, fusion, deblurring, agreement with the readings.
+//! Times the learned stages on many frames: estimate, fusion, deblurring, agreement with the
+//! readings.
 
 use super::{FASTEST_SWEEPS_HZ, Times, scenes};
 use crate::error::Result;
 use nirspi_nets::{BlurEstimator, Enhancer, Fusion, Images, Options, fusion};
 use serde::Serialize;
 
-/// The networks that are timed: the whole chain, and two of its stages alone.
+/// The timed networks: the whole chain, and two of its stages alone.
 pub struct Stages {
     /// All stages.
     pub enhancer: Enhancer,
@@ -15,18 +16,18 @@ pub struct Stages {
     pub fusion: Fusion,
 }
 
-/// Times of soft blobs with noise, from the readings in memory to the images in memory, and with what a GPU takes for their
-/// transfer.
+/// Times for soft blobs with noise, from the readings in memory to the images in memory, including
+/// transfers to and from a GPU.
 #[derive(Debug, Serialize)]
 pub struct Timed {
     /// The first run, in which a GPU compiles its kernels.
     pub first_ms: f64,
-    /// Everything.
+    /// All stages.
     #[serde(flatten)]
     pub whole: Times,
-    /// From the median.
+    /// Frames a second, from the median.
     pub frames_per_s: f64,
-    /// Frames a second, of the sweeps a second that the patterns' clock allows.
+    /// Frames a second, divided by the sweeps a second that the patterns' clock allows.
     pub of_fastest_sweeps: f64,
     /// The estimator alone.
     pub estimate: Times,
@@ -37,7 +38,7 @@ pub struct Timed {
 /// Times `stages` on `frames` frames.
 ///
 /// # Errors
-/// A device that fails.
+/// `EvalError` if the device fails.
 pub fn time(
     stages: &Stages,
     frames: u32,

@@ -1,4 +1,4 @@
-//! Sparse representations of many frames by orthogonal matching pursuit, timed.
+//! Times sparse representations of many frames by orthogonal matching pursuit.
 
 #[cfg(feature = "gpu")]
 mod gpu;
@@ -19,11 +19,11 @@ use rand_pcg::Pcg64;
 use serde::Serialize;
 use std::time::Instant;
 
-/// The floating-point numbers that a pursuit computes with.
+/// The floating-point numbers of a pursuit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Precision {
-    /// `f32`, and `f64` for frames where `f32` cannot tell two atoms apart.
+    /// `f32`, and `f64` for frames in which `f32` cannot distinguish two atoms.
     Auto,
     /// `f32` alone.
     F32,
@@ -34,78 +34,80 @@ pub enum Precision {
 /// How to solve a problem.
 #[derive(Debug, Clone, Copy)]
 pub struct Settings {
-    /// The numbers computed with.
+    /// The floating-point numbers.
     pub precision: Precision,
-    /// Times to solve the problem after a warm-up; at least once.
+    /// Number of timed solutions after a warm-up, at least one.
     pub repeats: u32,
-    /// Choose atoms by correlation, whatever the norms of the dictionary's columns.
+    /// Whether to choose atoms by correlation, whatever the norms of the dictionary's columns.
     pub normalise: bool,
-    /// Atom k is the k-th cosine of a 32 x 32 image, as in a [`random_problem`]: a GPU then makes images of the solutions.
+    /// Whether atom k is the k-th cosine of a 32 x 32 image, as in a [`random_problem`]. A GPU then
+    /// makes images of the solutions.
     pub cosines: bool,
 }
 
-/// The times of a problem's solutions, and what the times mean.
+/// The times of a problem's solutions, and their context.
 #[derive(Debug, Serialize)]
 pub struct Report {
-    /// What computed.
+    /// The backend.
     pub backend: &'static str,
-    /// The GPU, as its driver calls it.
+    /// The GPU's name in its driver.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub device: Option<String>,
-    /// Whether the processor plays the GPU: its times say nothing of one.
+    /// Whether the processor emulates the GPU. Its times then say nothing about a GPU.
     pub software: bool,
-    /// Threads of the CPU.
+    /// Number of CPU threads.
     pub threads: usize,
-    /// The numbers computed with.
+    /// The floating-point numbers.
     pub precision: Precision,
-    /// Columns of the dictionary.
+    /// Number of columns of the dictionary.
     pub atoms: usize,
-    /// Rows of the dictionary.
+    /// Number of rows of the dictionary.
     pub measurements: usize,
-    /// Atoms to choose for a frame.
+    /// Number of atoms to choose for a frame.
     pub sparsity: usize,
-    /// Frames solved.
+    /// Number of frames.
     pub frames: usize,
-    /// Times that all frames were solved.
+    /// Number of timed solutions of all frames.
     pub repeats: u32,
-    /// Once for a dictionary.
+    /// Time for preparing a dictionary once.
     pub prepare_ms: f64,
-    /// All frames; on a GPU with the transfer of measurements, solutions and images.
+    /// Median time for all frames; on a GPU with the transfer of measurements, solutions and
+    /// images.
     pub median_ms: f64,
     /// The shortest time for all frames.
     pub fastest_ms: f64,
-    /// The longest.
+    /// The longest time for all frames.
     pub slowest_ms: f64,
-    /// From the median.
+    /// Frames a second, from the median.
     pub frames_per_s: f64,
-    /// Frames a second, of the sweeps a second that the patterns' clock allows.
+    /// Frames a second, divided by the sweeps a second that the patterns' clock allows.
     pub of_fastest_sweeps: f64,
-    /// Frames that f32 could not decide.
+    /// Number of frames that f32 could not decide.
     pub solved_in_f64: usize,
-    /// Atoms chosen, mean over the frames.
+    /// Number of chosen atoms, mean over the frames.
     pub mean_atoms: f64,
-    /// Products (and as many sums) of the rows, the projection and its updates, of one frame.
+    /// Products (and as many sums) of the rows, the projection and its updates, for one frame.
     pub products_per_frame: f64,
-    /// The same a second.
+    /// Products a second.
     pub gigaproducts_per_s: f64,
-    /// Earlier rows read to orthogonalise the chosen columns of the Gram matrix, of one frame.
+    /// Earlier rows read to orthogonalise the chosen columns of the Gram matrix, for one frame.
     pub row_bytes_per_frame: f64,
-    /// The same a second.
+    /// Rows read a second.
     pub gigabytes_per_s: f64,
-    /// To and from a GPU.
+    /// Bytes transferred to and from a GPU.
     pub transferred_bytes_per_frame: f64,
-    /// Of each frame.
+    /// The solution of each frame.
     #[serde(skip)]
     pub solutions: Vec<Solution>,
 }
 
-/// What was measured.
+/// The measured times.
 struct Timed {
     backend: Backend,
     device: Option<String>,
     software: bool,
     prepare_ms: f64,
-    /// One time a repeat, for all frames.
+    /// The time for all frames, one for each repeat.
     times_ms: Vec<f64>,
     solutions: Vec<Solution>,
     solved_in_f64: usize,
@@ -115,7 +117,7 @@ struct Timed {
 /// Times `problem` on all cores of the CPU; a single frame on one core.
 ///
 /// # Errors
-/// The pursuit's, for settings or frames out of range.
+/// The pursuit's error for settings or frames out of range.
 pub fn on_cpu(problem: &ProblemFile, settings: &Settings) -> Result<Report> {
     let start = Instant::now();
     let dictionary = MixedDictionary::new(matrix(problem), settings.normalise);
@@ -126,11 +128,11 @@ pub fn on_cpu(problem: &ProblemFile, settings: &Settings) -> Result<Report> {
     let limits = Limits::atoms(problem.sparsity);
     let single: Vec<f32> = problem.frames.iter().map(|&y| y as f32).collect();
 
-    // Once to warm up: caches, threads, and what double precision may need.
+    // The warm-up fills caches, threads, and the buffers of double precision.
     let mut solver = dictionary.solver(&limits)?;
     let mut solve = || -> Result<(Vec<Solution>, usize), OmpError> {
         match settings.precision {
-            // One frame is a question of latency: everything is at hand.
+            // A single frame is solved for latency, with everything prepared.
             Precision::Auto if problem.frames.len() == problem.measurements => {
                 let (solution, in_double) = solver.solve(&problem.frames)?;
                 Ok((vec![solution], usize::from(in_double)))
@@ -168,7 +170,7 @@ pub fn on_cpu(problem: &ProblemFile, settings: &Settings) -> Result<Report> {
     Ok(report(settings, problem, timed))
 }
 
-/// What the times mean.
+/// The report of the times.
 fn report(settings: &Settings, problem: &ProblemFile, timed: Timed) -> Report {
     let frames = timed.solutions.len();
     let chosen: usize = timed.solutions.iter().map(|s| s.support.len()).sum();
@@ -211,8 +213,8 @@ fn matrix(problem: &ProblemFile) -> DMatrix<f64> {
     DMatrix::from_row_slice(problem.measurements, problem.atoms, &problem.dictionary)
 }
 
-/// A problem of random content: a random choice of Hadamard rows sees the cosines of a 32 x 32 image, and frames are sums of
-/// `sparsity` of them with noise of 1 %.
+/// A random problem: random Hadamard rows measure the cosines of a 32 x 32 image, and frames are
+/// sums of `sparsity` cosines with noise of 1 %.
 ///
 /// # Errors
 /// [`EvalError::Setting`] for a number out of range.

@@ -1,4 +1,4 @@
-//! The whole way from measurements to enhanced images on many frames, timed.
+//! Times the whole path from measurements to enhanced images on many frames.
 
 #[cfg(feature = "gpu")]
 mod gpu;
@@ -20,47 +20,49 @@ pub use gpu::on_gpu;
 /// What to time.
 #[derive(Debug, Clone, Copy)]
 pub struct Settings {
-    /// Frames: soft blobs with noise.
+    /// Number of frames: soft blobs with noise.
     pub frames: u32,
-    /// Measurements of a frame, of 1024: random rows of a Hadamard matrix, with the row that sees all light.
+    /// Number of measurements of a frame, of 1024: random rows of a Hadamard matrix, including the
+    /// row that sees all light.
     pub measurements: u32,
-    /// Atoms to choose, no more than measurements.
+    /// Number of atoms to choose, at most the number of measurements.
     pub sparsity: u32,
-    /// Move enhanced images until they explain the readings.
+    /// Whether enhanced images are moved until they agree with the readings.
     pub consistency: bool,
-    /// Runs after the first.
+    /// Number of runs after the first.
     pub repeats: u32,
     /// Seed of rows and frames.
     pub seed: u64,
 }
 
-/// What was measured.
+/// The measured times.
 #[derive(Debug, Serialize)]
 pub struct Timed {
     /// The first run, in which a GPU compiles its kernels.
     pub first_ms: f64,
-    /// All of it.
+    /// The whole path.
     #[serde(flatten)]
     pub whole: Times,
-    /// From measurements to images on the host.
+    /// The time from measurements to images on the host.
     pub reconstruct: Times,
-    /// From images on the host to enhanced images.
+    /// The time from images on the host to enhanced images.
     pub enhance: Times,
-    /// Through images on the host, where the whole leaves them on a GPU.
+    /// The whole path with images brought to the host in between; `None` if they are on the host
+    /// anyway.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub through_host: Option<Times>,
-    /// The largest difference of a pixel that this makes.
+    /// The largest difference of a pixel between the two paths.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub largest_difference: Option<f32>,
     /// Frames a second, from the median.
     pub frames_per_s: f64,
-    /// Frames a second, of the sweeps a second that the patterns' clock allows.
+    /// Frames a second, divided by the sweeps a second that the patterns' clock allows.
     pub of_fastest_sweeps: f64,
     /// PSNR of the reconstructed images, median over the frames.
     pub reconstructed_psnr_db: f64,
 }
 
-/// Times of one device, and the images that its reconstruction gave.
+/// Times of one device, and its reconstructed images.
 struct Measured {
     first_ms: f64,
     whole: Times,
@@ -75,7 +77,7 @@ struct Measured {
 #[derive(Debug)]
 pub struct Work {
     settings: Settings,
-    /// (N, 32, 32): the frames as they are.
+    /// (N, 32, 32): the true frames.
     truth: Vec<f32>,
     matrix: DMatrix<f64>,
     limits: Limits,
@@ -96,7 +98,7 @@ impl Work {
         }
         let side = Side::INSTRUMENT;
         let mut rows = Order::Random(seed).rows(side)?.to_vec();
-        // The pattern that sees all light first, as every order of a camera has it.
+        // The pattern that sees all light is first, as in every order of a camera.
         rows.sort_by_key(|&row| row != 0);
         rows.truncate(measurements as usize);
         let truth = scenes::blobs(frames as usize, seed);
@@ -140,7 +142,7 @@ impl Work {
     }
 }
 
-/// Enhanced images of reconstructed ones, as they are on the host.
+/// Enhances reconstructed images that are on the host.
 fn enhanced(enhancer: &Enhancer, images: &[f32], options: &Options) -> Result<Vec<f32>> {
     let lit: Vec<f32> = images.par_iter().map(|v| v.clamp(0.0, 1.0)).collect();
     let lit: Images<'_, { fusion::SIDE }> = Images::new(&lit)?;
@@ -150,7 +152,7 @@ fn enhanced(enhancer: &Enhancer, images: &[f32], options: &Options) -> Result<Ve
 /// Times `work` on all cores of the CPU.
 ///
 /// # Errors
-/// The pursuit's.
+/// The pursuit's error.
 pub fn on_cpu(work: &Work, enhancer: &Enhancer) -> Result<Timed> {
     let dictionary = MixedDictionary::new(work.matrix.clone(), true);
     let transform = Transform::new(Basis::Dct, Side::INSTRUMENT);

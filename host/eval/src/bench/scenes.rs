@@ -1,4 +1,5 @@
-//! The scenes and dictionaries of the benchmarks: soft blobs, and cosines as Hadamard patterns see them.
+//! The scenes and dictionaries of the benchmarks: soft blobs, and cosines as measured by Hadamard
+//! patterns.
 
 use nirspi_recon::basis::Transform;
 use nirspi_recon::{Basis, FwhtLengthError, Side, fwht};
@@ -39,10 +40,11 @@ pub fn cosines() -> Vec<f32> {
     atoms
 }
 
-/// The measurements of a 32 x 32 image by some rows of the Hadamard matrix, whose rows have unit norm.
+/// The measurements of a 32 x 32 image by some rows of the Hadamard matrix, whose rows have unit
+/// norm.
 ///
 /// # Errors
-/// An image of another size.
+/// If the image has another size.
 pub fn seen_by(rows: &[u32], image: &[f32]) -> Result<Vec<f64>, FwhtLengthError> {
     let mut seen: Vec<f64> = image.iter().map(|&v| v.into()).collect();
     fwht(&mut seen)?;
@@ -50,10 +52,10 @@ pub fn seen_by(rows: &[u32], image: &[f32]) -> Result<Vec<f64>, FwhtLengthError>
     Ok(rows.iter().map(|&row| seen[row as usize] / side).collect())
 }
 
-/// The same of each cosine: `rows x 1024`.
+/// The measurements of each cosine by some rows: `rows x 1024`.
 ///
 /// # Errors
-/// None: every cosine has the size.
+/// Does not occur: every cosine has the size.
 pub fn cosines_by(rows: &[u32]) -> Result<Vec<f64>, FwhtLengthError> {
     let area = Side::INSTRUMENT.area();
     let mut dictionary = vec![0.0; rows.len() * area];

@@ -1,7 +1,8 @@
-//! The characters that everything is measured on.
+//! The characters of all quality measurements.
 //!
 //! # Invariant
-//! No image is among them whose family, writer or photograph training has seen (`only_groups_held_out_are_taken`).
+//! Every image belongs to a family, writer or photograph outside the training data
+//! (`tests::only_groups_held_out_are_taken`).
 
 use crate::error::{EvalError, On, Result};
 use nirspi::files::characters;
@@ -13,20 +14,21 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Groups that the embedded weights' training has not seen, by the stack's name.
+/// Groups that were held out from training the embedded weights, by the stack's name.
 const HELD_OUT: &str = include_str!("../../../nets/weights/held_out.json");
 
-/// Images that a stack must have: a distance of sets needs two.
+/// The least number of images of a stack, because a distance of sets needs two.
 const LEAST: usize = 2;
 
-/// Where images come from.
+/// The origin of images.
 #[derive(Debug, Clone, Serialize)]
 pub struct Origin {
     /// The stack's name.
     pub stack: String,
-    /// Images taken.
+    /// Number of images taken.
     pub images: usize,
-    /// Font families, writers or photographs that they are of: what the intervals rest on.
+    /// Number of font families, writers or photographs of the images, on which the intervals are
+    /// based.
     pub groups: usize,
     /// `of 460 held out`, or why all were taken.
     pub choice: String,
@@ -37,11 +39,11 @@ pub struct Origin {
 pub struct Character {
     /// 64 x 64 in [0, 1].
     pub sharp: Vec<f32>,
-    /// Which character it shows, if known.
+    /// The character in the image, if known.
     pub label: Option<u8>,
-    /// Index among the origins.
+    /// Index of the image's origin.
     pub stack: usize,
-    /// Font family, writer or photograph, of the stack's own numbers.
+    /// Font family, writer or photograph, as numbered in the stack.
     pub group: u32,
 }
 
@@ -57,7 +59,7 @@ impl Characters {
     /// `count` images of each stack at `path`, chosen by the seed from the groups held out.
     ///
     /// # Errors
-    /// Files that cannot be read, or no image left.
+    /// [`EvalError`] for files that cannot be read, or if no image is left.
     pub fn read(path: &Path, held_out: Option<&Path>, count: usize, seed: u64) -> Result<Self> {
         let groups = match held_out {
             None => groups(HELD_OUT).on(|| "held_out.json of the embedded weights".to_owned())?,
@@ -108,13 +110,13 @@ impl Characters {
         self.origins.push(Origin { stack: name, images, groups, choice });
     }
 
-    /// Groups among the images of a stack.
+    /// Number of groups among the images of a stack.
     fn groups_of(&self, stack: usize) -> usize {
         let groups = self.all.iter().filter(|c| c.stack == stack).map(|c| c.group);
         groups.collect::<std::collections::BTreeSet<u32>>().len()
     }
 
-    /// The first `count` of each stack.
+    /// The first `count` images of each stack.
     #[must_use]
     pub fn first(&self, count: usize) -> Self {
         let mut fewer = Self { all: Vec::new(), ..self.clone() };
@@ -130,7 +132,7 @@ impl Characters {
         fewer
     }
 
-    /// Images in all.
+    /// Number of images.
     #[must_use]
     pub fn len(&self) -> usize {
         self.all.len()
@@ -142,7 +144,7 @@ impl Characters {
         self.all.is_empty()
     }
 
-    /// Image by image.
+    /// Iterates over the images.
     pub fn iter(&self) -> std::slice::Iter<'_, Character> {
         self.all.iter()
     }
@@ -153,13 +155,13 @@ impl Characters {
         self.all.iter().flat_map(|character| character.sharp.iter().copied()).collect()
     }
 
-    /// Where the images come from.
+    /// The origins of the images.
     #[must_use]
     pub fn origins(&self) -> &[Origin] {
         &self.origins
     }
 
-    /// Stacks with fewer images than asked for.
+    /// Notes about stacks with fewer images than requested.
     #[must_use]
     pub fn notes(&self) -> &[String] {
         &self.notes
@@ -175,7 +177,7 @@ mod tests {
     use super::*;
     use nirspi_nets::data::Kind;
 
-    /// Six images of two writers each, of the level that is their number.
+    /// Six images of two writers each. The level of each image is its number.
     fn stack() -> Stack {
         let pixels = (0..6 * 64 * 64).map(|at| (at / 4096) as u8).collect();
         Stack::new("own", Kind::Drawn, pixels, Some((0..6).collect()), vec![1, 1, 2, 2, 3, 3])

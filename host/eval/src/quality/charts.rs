@@ -1,4 +1,5 @@
-//! Charts of a quality report: PSNR, SSIM and Fréchet character distance one below another, over blur, noise and steps.
+//! Charts of a quality report: PSNR, SSIM and Fréchet character distance below each other, over
+//! blur, noise and steps.
 
 use super::MIDDLE;
 use super::characters::Characters;
@@ -11,10 +12,10 @@ use nirspi_nets::classical::Method as Classical;
 /// The classical method in the charts over steps.
 pub const BEST_CLASSICAL: Classical = Classical::TotalVariation;
 
-/// Steps after which the bridge is not followed any further: more change nothing.
+/// The most steps of the bridge in a chart. Further steps change nothing.
 pub const MOST_BRIDGE_STEPS: u32 = 50;
 
-/// What a chart shows up its axis.
+/// The vertical axis of a chart.
 struct Measure {
     name: &'static str,
     of: fn(&Figures) -> f64,
@@ -29,7 +30,7 @@ const MEASURES: [Measure; 3] = [
     },
 ];
 
-/// File names and pictures.
+/// File names and pictures of all charts.
 pub fn all(
     measured: &[Figures],
     steps: &[Figures],
@@ -85,7 +86,7 @@ pub fn all(
 
 type Row<'a> = (String, Vec<(f64, &'a Figures)>);
 
-/// Rows over their steps; one that has none goes all the way across.
+/// Rows by steps. A row without a choice of steps extends over the whole axis.
 fn by_steps(steps: &[Figures]) -> Vec<Row<'_>> {
     let whole = || steps.iter().filter(|f| f.stack.is_none());
     let stepped = |name: &str, of: fn(Method) -> bool| {
@@ -112,7 +113,7 @@ fn linear(name: &str, ticks: &[f64]) -> Axis {
     }
 }
 
-/// The three charts of one axis, one below another.
+/// The three charts of one axis, below each other.
 fn column(header: &str, x: &Axis, rows: &[Row<'_>], images: usize) -> RgbImage {
     let charts = MEASURES.map(|measure| {
         let lines: Vec<Line> = rows
@@ -121,7 +122,7 @@ fn column(header: &str, x: &Axis, rows: &[Row<'_>], images: usize) -> RgbImage {
             .map(|(k, (name, points))| Line {
                 name: name.clone(),
                 colour: k,
-                // The colours come again.
+                // The colours repeat with dashes.
                 dashed: k >= 6,
                 points: points.iter().map(|(x, f)| (*x, (measure.of)(f))).collect(),
             })
@@ -140,14 +141,14 @@ fn column(header: &str, x: &Axis, rows: &[Row<'_>], images: usize) -> RgbImage {
     let mut picture = RgbImage::new(width, height);
     let mut top = 0;
     for chart in &charts {
-        // All are of one width: they have the same names in their legends.
+        // All charts have the same width, because their legends have the same names.
         let _ = picture.copy_from(chart, 0, top);
         top += chart.height();
     }
     picture
 }
 
-/// An axis with ticks at 1, 2 or 5 times a power of ten, a few of them, that holds all values.
+/// An axis that holds all values, with a few ticks at 1, 2 or 5 times a power of ten.
 fn rounded(values: impl Iterator<Item = f64>) -> Axis {
     let (low, high) = values
         .filter(|value| value.is_finite())

@@ -1,8 +1,8 @@
-//! The methods that are compared: everything that makes 64 x 64 of 32 x 32, ready to run.
+//! The compared methods, ready to run. Each makes 64 x 64 pixels of 32 x 32.
 //!
 //! # Invariant
-//! Classical methods get blur and noise exactly, networks get neither: what networks gain is not that they knew more
-//! (`only_classical_methods_get_the_condition`).
+//! Classical methods know blur and noise exactly, and networks know neither, so the networks' gain
+//! does not come from more knowledge (`tests::only_classical_methods_get_the_condition`).
 
 use super::measure::{Condition, sampling_variance};
 use crate::error::Result;
@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use std::num::NonZeroU32;
 
-/// Values of a reading.
+/// Number of values of a reading.
 const READING: usize = 32 * 32;
 
 /// A method of the comparison.
@@ -27,14 +27,14 @@ pub enum Method {
     Fusion,
     /// FSRCNN, then the GAN's generator.
     Gan,
-    /// FSRCNN, then the bridge in so many steps.
+    /// FSRCNN, then the bridge with this number of steps.
     Diffusion(u32),
-    /// FSRCNN, then the ancestral sampler in so many steps.
+    /// FSRCNN, then the ancestral sampler with this number of steps.
     Ancestral(u32),
 }
 
 impl Method {
-    /// Those that are measured at every condition.
+    /// The methods that are measured at every condition.
     pub const ALL: [Self; 9] = [
         Self::Lanczos,
         Self::Classical(Classical::Wiener),
@@ -47,7 +47,7 @@ impl Method {
         Self::Diffusion(4),
     ];
 
-    /// As charts and reports call it.
+    /// The method's name in charts and reports.
     #[must_use]
     pub fn name(self) -> String {
         let steps =
@@ -64,7 +64,7 @@ impl Method {
         }
     }
 
-    /// Steps; `None` for a method without a choice of steps.
+    /// The number of steps; `None` for a method without a choice of steps.
     #[must_use]
     pub fn steps(self) -> Option<u32> {
         match self {
@@ -74,7 +74,7 @@ impl Method {
     }
 }
 
-/// Which weights a report rests on.
+/// The weights on which a report is based.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Version {
     /// The network.
@@ -87,7 +87,7 @@ impl Version {
     /// The versions of all networks.
     ///
     /// # Errors
-    /// Weights that cannot be read.
+    /// `EvalError` for weights that cannot be read.
     pub fn all(networks: &mut Networks) -> Result<Vec<Self>> {
         ["estimator", "fsrcnn", "diffusion", "ancestral", "gan", "classifier"]
             .into_iter()
@@ -113,10 +113,10 @@ enum Runner {
 }
 
 impl Contender {
-    /// The method with the networks that it needs.
+    /// The method with its networks.
     ///
     /// # Errors
-    /// Weights that cannot be read.
+    /// `EvalError` for weights that cannot be read.
     pub fn new(method: Method, networks: &mut Networks) -> Result<Self> {
         let count = |steps| NonZeroU32::new(steps).unwrap_or(NonZeroU32::MIN);
         let network = match method {
@@ -133,17 +133,17 @@ impl Contender {
         Ok(Self { method, runner: Runner::Chain(Box::new(networks.enhancer(network)?)) })
     }
 
-    /// Which method.
+    /// The method.
     #[must_use]
     pub fn method(&self) -> Method {
         self.method
     }
 
-    /// Images (N, 64, 64) in [0, 1] of readings (N, 32, 32) in [0, 1] that were made under a condition. `done` is called with the
-    /// number of images just made.
+    /// Images (N, 64, 64) in [0, 1] of readings (N, 32, 32) in [0, 1] made under a condition.
+    /// `done` is called with the number of images just made.
     ///
     /// # Errors
-    /// Readings out of range.
+    /// `EvalError` for readings out of range.
     pub fn enhance(
         &self,
         readings: &[f32],
@@ -160,10 +160,11 @@ impl Contender {
         }
     }
 
-    /// The same for readings of unknown blur and noise; a classical method stops after its interpolation.
+    /// As [`enhance`](Self::enhance), for readings of unknown blur and noise. A classical method
+    /// stops after its interpolation.
     ///
     /// # Errors
-    /// Readings out of range.
+    /// `EvalError` for readings out of range.
     pub fn enhance_blind(&self, readings: &[f32], done: &dyn Fn(usize)) -> Result<Vec<f32>> {
         let checked = Images::new(readings)?;
         let mut told = 0;
@@ -183,7 +184,7 @@ impl Contender {
     }
 }
 
-/// Interpolation, then deblurring on the fine grid with what interpolation has made of blur and noise.
+/// Interpolation, then deblurring on the fine grid with the blur and noise after interpolation.
 fn classical_chain(method: Classical, readings: &[f32], condition: Condition) -> Result<Vec<f32>> {
     let sigma_px = (condition.sigma_px.powi(2) + sampling_variance()).sqrt();
     let noise = condition.noise * interpolation_gain()?;
@@ -197,8 +198,8 @@ fn classical_chain(method: Classical, readings: &[f32], condition: Condition) ->
     Ok(each.concat())
 }
 
-/// What interpolation makes of the standard deviation of white noise: the root of the mean, over the four places of an
-/// output pixel, of the sum of its squared weights.
+/// Factor by which interpolation changes the standard deviation of white noise: the root of the
+/// mean, over the four positions of an output pixel, of the sum of its squared weights.
 fn interpolation_gain() -> Result<f32> {
     const STEP: f32 = 0.25;
     let mut grey = vec![0.5; 16 * 16];
@@ -251,7 +252,8 @@ mod tests {
 
     #[test]
     fn interpolation_lessens_noise_as_much_as_is_reckoned() {
-        // Alternating pixels are noise of one frequency; many frequencies are needed: a fixed scramble.
+        // Alternating pixels would be noise of one frequency. A fixed permutation gives many
+        // frequencies.
         let scramble =
             |at: u64| (at.wrapping_mul(6_364_136_223_846_793_005) >> 40) as f32 / (1 << 24) as f32;
         let noise: Vec<f32> =

@@ -1,8 +1,8 @@
-//! Conditions, the readings that they give, and the figures of a method under one.
+//! Conditions, their readings, and the figures of a method under a condition.
 //!
 //! # Invariant
-//! The noise of image k is the same in every condition but for its strength, and the same for every method
-//! (`readings_have_the_noise_that_was_asked_for_and_its_pattern_stays`).
+//! The noise of image k is the same in every condition except for its strength, and the same for
+//! every method (`tests::readings_have_the_noise_that_was_asked_for_and_its_pattern_stays`).
 
 use super::characters::{Character, Characters};
 use super::contenders::Method;
@@ -23,19 +23,20 @@ use serde::Serialize;
 pub const SIDE: usize = 64;
 /// Side of its readings.
 const READINGS: usize = SIDE / 2;
-/// Draws for the interval of a distance: each takes the roots of a matrix.
+/// Number of draws for the interval of a distance: each draw takes the roots of a matrix.
 const DISTANCE_DRAWS: usize = 100;
 
-/// What degrades an image.
+/// The degradation of an image.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Condition {
     /// Gaussian blur, standard deviation in pixels of 64 x 64.
     pub sigma_px: f32,
-    /// White noise of the readings, standard deviation; a white target gives 1.
+    /// White noise of the readings, standard deviation; white is 1.
     pub noise: f32,
 }
 
-/// Variance in px^2 that averaging pairs of pixels adds to the blur: they lie half a pixel from their middle.
+/// Variance in px^2 that averaging pairs of pixels adds to the blur: each pixel is half a pixel
+/// from the middle of its pair.
 pub fn sampling_variance() -> f32 {
     0.25
 }
@@ -48,7 +49,7 @@ impl Condition {
         images.flat_map(|(k, character)| self.read(&character.sharp, seed, k as u64)).collect()
     }
 
-    /// Readings of one image; noise follows from `seed` and the image's `number`.
+    /// Readings of one image. The noise follows from `seed` and the image's `number`.
     #[must_use]
     pub fn read(self, sharp: &[f32], seed: u64, number: u64) -> Vec<f32> {
         let blurred = Blur::new(SIDE, SIDE, self.sigma_px).apply(sharp);
@@ -73,7 +74,7 @@ pub fn halved(image: &[f32]) -> Vec<f32> {
     (0..READINGS * READINGS).map(|k| mean(k / READINGS, k % READINGS)).collect()
 }
 
-/// What a method gave under a condition.
+/// The figures of a method under a condition.
 #[derive(Debug, Clone, Serialize)]
 pub struct Figures {
     /// The method's name.
@@ -81,27 +82,29 @@ pub struct Figures {
     /// The method.
     #[serde(skip)]
     pub method: Method,
-    /// What degraded the images.
+    /// The degradation of the images.
     #[serde(flatten)]
     pub condition: Condition,
-    /// `null`: images of all stacks.
+    /// The stack; `null` means images of all stacks.
     pub stack: Option<String>,
-    /// Images that the figures rest on.
+    /// Number of images of the figures.
     pub images: usize,
-    /// Mean over the images; of equal ones 60 dB. Intervals draw font families, writers and photographs again.
+    /// PSNR, mean over the images; 60 dB for equal images. Intervals draw font families, writers
+    /// and photographs again.
     pub psnr_db: Interval,
-    /// Mean over the images.
+    /// SSIM, mean over the images.
     pub ssim: Interval,
-    /// Mean over the images of the difference to the GAN's PSNR; `null` for the GAN and for rows without a sampler.
+    /// Difference to the GAN's PSNR, mean over the images; `null` for the GAN and for rows without
+    /// a sampler.
     pub psnr_minus_gan_db: Option<Interval>,
-    /// The same of SSIM.
+    /// Difference to the GAN's SSIM, mean over the images.
     pub ssim_minus_gan: Option<Interval>,
-    /// On the features of our own classifier: not FID.
+    /// Fréchet distance on the features of nirspi's own classifier, which is not FID.
     pub frechet_character_distance: Interval,
-    /// Share of the labelled characters that our classifier sees right.
+    /// Share of the labelled characters that nirspi's classifier recognises.
     pub character_accuracy: Option<f64>,
-    /// Distance of the readings from those that the images would give, over the noise: near 1 they agree. `null`
-    /// without noise.
+    /// Distance of the readings from the readings of the images, divided by the noise: near 1 they
+    /// agree. `null` without noise.
     pub inconsistency: Option<Interval>,
 }
 
@@ -122,12 +125,12 @@ impl Judges {
         Ok(Self { characters: CharacterJudge::new(&networks.weights("classifier")?)? })
     }
 
-    /// What the classifier says of images (N, 64, 64).
+    /// The classifier's result for images (N, 64, 64).
     pub fn judge(&self, images: &[f32]) -> Result<Judged> {
         Ok(self.characters.judge(Images::new(images)?))
     }
 
-    /// The figures of each image that a method made of readings.
+    /// The figures of each image that a method made from readings.
     pub fn each(
         condition: Condition,
         characters: &Characters,
@@ -142,7 +145,7 @@ impl Judges {
             .collect()
     }
 
-    /// The figures of a method under a condition, of all stacks together and of each.
+    /// The figures of a method under a condition, for all stacks together and for each stack.
     pub fn figures(
         &self,
         (method, condition): (Method, Condition),
@@ -215,14 +218,14 @@ fn one(
     let sharp = &character.sharp;
     let camera = Consistency::new(READINGS, condition.sigma_px, condition.noise);
     Ok(One {
-        // Two equal images have an infinite one; no mean would survive it.
+        // Two equal images have an infinite PSNR, which would make every mean infinite.
         psnr_db: metrics::psnr(sharp, image, SIDE, SIDE, 1.0)?.min(MOST_PSNR_DB),
         ssim: metrics::ssim(sharp, image, SIDE, SIDE, 1.0)?,
         inconsistency: f64::from(camera.residual_ratio(readings, image)),
     })
 }
 
-/// That of an error of a thousandth in every pixel.
+/// The PSNR of an error of a thousandth in every pixel.
 const MOST_PSNR_DB: f64 = 60.0;
 
 #[cfg(test)]
@@ -249,7 +252,7 @@ mod tests {
 
     #[test]
     fn sampling_adds_the_blur_that_is_reckoned() {
-        // The second moment of an edge's slope, across one row.
+        // The second moment of the slope of an edge along one row.
         let edge: Vec<f32> =
             (0..SIDE * SIDE).map(|at| f32::from(u8::from(at % SIDE >= 32))).collect();
         let row = Blur::new(SIDE, SIDE, 2.0).apply(&edge);
@@ -262,7 +265,8 @@ mod tests {
         };
         let fine = moment(&row[..SIDE], 1.0);
         let coarse = moment(&halved(&row)[..READINGS], 2.0);
-        // Slopes are differences too, over one pixel and over two: their own variance is 1/12 of the pitch squared.
+        // Slopes are differences over one pixel and over two, whose own variance is 1/12 of the
+        // pitch squared.
         let found = (coarse - 4.0 / 12.0) - (fine - 1.0 / 12.0);
         assert!((found - sampling_variance()).abs() < 0.02, "{found}");
     }

@@ -1,7 +1,7 @@
-//! Scenes that are no characters: a network that knows letters could draw them there.
+//! Scenes other than characters, in which a network trained on letters could draw strokes.
 //!
-//! Where the scene is known, PSNR before and after says whether strokes came in that are not there; the picture shows
-//! it. Real measurements are taken as they are.
+//! If the scene is known, PSNR before and after enhancement shows whether false strokes were added;
+//! the picture shows the strokes. Real measurements are used unchanged.
 
 use super::contenders::Contender;
 use super::measure::{Condition, SIDE, halved};
@@ -18,34 +18,34 @@ use rand_pcg::Pcg64Mcg;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// Cases of one panel, from top to bottom.
+/// Number of cases of one panel, from top to bottom.
 const CASES_A_PANEL: usize = 3;
 
-/// A scene to be enhanced.
+/// A scene to enhance.
 pub struct Scene {
     name: String,
-    /// 64 x 64 in [0, 1]; `None`: unknown.
+    /// 64 x 64 in [0, 1]; `None` if the true scene is unknown.
     truth: Option<Vec<f32>>,
     /// 32 x 32 in [0, 1].
     readings: Vec<f32>,
     condition: Condition,
 }
 
-/// What became of a scene.
+/// The result for a scene.
 #[derive(Debug, Serialize)]
 pub struct Case {
     /// The scene.
     pub name: String,
-    /// What degraded it; absent for real measurements.
+    /// The degradation; absent for real measurements.
     #[serde(flatten)]
     pub condition: Option<Condition>,
-    /// Of Lanczos's interpolation.
+    /// PSNR of Lanczos's interpolation.
     pub psnr_before_db: Option<f64>,
-    /// Of the enhanced image.
+    /// PSNR of the enhanced image.
     pub psnr_after_db: Option<f64>,
-    /// Root mean square of what enhancement changed.
+    /// Root mean square of the change by enhancement.
     pub changed: f64,
-    /// As in the report's other part; `null` for real measurements, whose noise is unknown.
+    /// As in the rows of characters; `null` for real measurements, whose noise is unknown.
     pub inconsistency: Option<f64>,
 }
 
@@ -106,7 +106,8 @@ fn generated(seed: u64) -> Vec<(String, Vec<f32>, Condition)> {
     ]
 }
 
-/// 64 x 64 of a picture, at most half as fine as it is, around a place in it.
+/// A part of a picture, 64 x 64, at half of the picture's resolution or less, around a position in
+/// the picture.
 fn part_of(picture: &[f32], size_px: usize, down: f64, across: f64) -> Vec<f32> {
     let pitch = (size_px / (2 * SIDE)).max(1);
     let first = |place: f64| {
@@ -125,7 +126,7 @@ fn part_of(picture: &[f32], size_px: usize, down: f64, across: f64) -> Vec<f32> 
     (0..SIDE * SIDE).map(|at| mean(at / SIDE, at % SIDE)).collect()
 }
 
-/// A real measurement: 64 x 64 ones are their own truth, seen through means of 2 x 2.
+/// A real measurement. A measurement of 64 x 64 is its own truth, sampled by means of 2 x 2.
 fn measured(path: &Path) -> Result<Scene> {
     let first = SourceOptions { index: Some(Index::One(0)), ..SourceOptions::default() };
     let source = Source::read(path, &first)?;
@@ -156,7 +157,7 @@ fn stem(path: &Path) -> String {
     path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }
 
-/// Files of a folder by their ending, sorted; none of no folder.
+/// Files of a folder by their ending, sorted; empty without a folder.
 fn files(folder: Option<&Path>, ending: &str) -> Result<Vec<PathBuf>> {
     let Some(folder) = folder else { return Ok(Vec::new()) };
     let named = || format!("{}: cannot read it", folder.display());
@@ -249,12 +250,12 @@ mod tests {
 
     #[test]
     fn a_part_of_a_picture_is_averaged_to_its_size() {
-        // A picture twice as wide as two parts, of the column's number.
+        // A picture twice as wide as two parts. Each pixel has its column's number.
         let size = 4 * SIDE;
         let picture: Vec<f32> = (0..size * size).map(|at| (at % size) as f32).collect();
         let part = part_of(&picture, size, 0.5, 0.5);
         assert_eq!((part.len(), part[0], part[1]), (SIDE * SIDE, 64.5, 66.5));
-        // At the edge it is moved inwards, and a small picture is repeated at its end.
+        // A part at the edge is moved inwards. A small picture is extended by its last pixels.
         assert_eq!(part_of(&picture, size, 0.5, 1.0)[SIDE - 1], 254.5);
         assert_eq!(part_of(&[0.5; 4], 2, 0.5, 0.5), vec![0.5; SIDE * SIDE]);
     }
@@ -268,7 +269,7 @@ mod tests {
         let shown =
             enhance(&scenes, &Contender::new(Method::Lanczos, &mut networks).unwrap()).unwrap();
         assert_eq!((shown.cases.len(), shown.picture.panels.len()), (5, 2));
-        // Lanczos is what enhancement is compared with.
+        // Enhancement is compared with Lanczos, so Lanczos itself changes nothing.
         assert!(shown.cases.iter().all(|case| case.changed == 0.0));
         assert_eq!(shown.cases[3].psnr_before_db, shown.cases[3].psnr_after_db);
         assert!(shown.cases[1].condition.is_none() && shown.cases[1].inconsistency.is_none());

@@ -9,14 +9,14 @@ use nirspi_optics::{Budget, BudgetSettings, CameraModel};
 use serde::Serialize;
 use std::ops::RangeInclusive;
 
-/// Targets that a budget is given for, in metres: nearer than a quarter of the lens's focal length light fills the ADC whatever the
-/// gain, and the depth sensor's readings end at 65 m.
+/// Distances of a budget, in metres. Closer than a quarter of the lens's focal length, light fills
+/// the ADC at any gain. The depth sensor's readings end at 65 m.
 pub const DISTANCES_M: RangeInclusive<f64> = 0.05..=65.0;
 
-/// What the budget is of.
+/// Settings of the budget.
 #[derive(Debug, Clone)]
 pub struct Settings {
-    /// What falls between camera and target.
+    /// The weather between camera and target.
     pub drops: Drops,
     /// Distance of the target.
     pub distance_m: f64,
@@ -24,9 +24,9 @@ pub struct Settings {
     pub reflectance: f64,
     /// Exposure of each pattern.
     pub exposure_us: f64,
-    /// Wavelengths at which daylight is compared.
+    /// Wavelengths for comparing daylight.
     pub wavelengths_nm: Vec<f64>,
-    /// Which camera.
+    /// The camera.
     pub camera: CameraModel,
 }
 
@@ -39,7 +39,7 @@ pub struct Term {
     pub value: f64,
     /// The unit; empty for a ratio.
     pub unit: &'static str,
-    /// The formula, or where the number is from.
+    /// The formula, or the source of the number.
     pub how: String,
 }
 
@@ -56,21 +56,21 @@ pub struct Report {
     pub reflectance: f64,
     /// Exposure of each pattern.
     pub exposure_us: f64,
-    /// In the order of the light's way.
+    /// Terms in the order of the light's path.
     pub terms: Vec<Term>,
     /// Daylight at other wavelengths.
     pub daylight: Vec<DaylightReport>,
-    /// Daylight on the target, all of the visible.
+    /// Visible daylight on the target.
     #[serde(skip)]
     pub ambient_klx: f64,
     /// Width of the filter before the detector.
     #[serde(skip)]
     pub filter_width_nm: f64,
-    /// Signal of the pixel over its noise.
+    /// Signal of the pixel divided by its noise.
     pub snr_per_pixel: f64,
 }
 
-/// Daylight through the same lens and a filter as wide, at another wavelength.
+/// Daylight through the same lens and an equally wide filter, at another wavelength.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DaylightReport {
     /// The wavelength.
@@ -79,14 +79,14 @@ pub struct DaylightReport {
     pub on_target_w_per_m2: f64,
     /// Power on the detector.
     pub on_detector_nw: f64,
-    /// The same in photons.
+    /// Photons on the detector in a sample.
     pub photons_per_sample: f64,
 }
 
 /// The budget of one pixel.
 ///
 /// # Errors
-/// [`EvalError::is_setting`] for anything out of range.
+/// [`EvalError::is_setting`] holds for every error, because a setting is out of range.
 pub fn budget(settings: &Settings) -> Result<Report> {
     super::check_distance(settings.distance_m)?;
     if !DISTANCES_M.contains(&settings.distance_m) {
@@ -96,7 +96,7 @@ pub fn budget(settings: &Settings) -> Result<Report> {
     }
     let instrument = settings.camera.instrument();
     let nm = instrument.budget.wavelength_nm;
-    // Before anything that takes time.
+    // Settings are checked before computations that take time.
     for &nm in &settings.wavelengths_nm {
         daylight_on_target(&instrument.budget, nm)?;
     }
@@ -135,7 +135,7 @@ fn daylight(
 ) -> Result<DaylightReport> {
     let irradiance = daylight_on_target(settings, wavelength_nm)?;
     let on_detector_w = reflectance * dry.daylight_on_detector_w(irradiance);
-    // The instrument's photons, of another wavelength.
+    // The energy of the instrument's photons, at another wavelength.
     let photon_j = dry.terms.photon_j * settings.wavelength_nm / wavelength_nm;
     Ok(DaylightReport {
         wavelength_nm,

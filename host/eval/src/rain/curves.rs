@@ -1,5 +1,6 @@
-//! Curves of rain: extinction, albedo and asymmetry against wavelength and drop size, drop sizes, fall speeds, and extinction
-//! against rain rate beside laws that were fitted to measured optical links.
+//! Curves of rain: extinction, albedo and asymmetry against wavelength and drop size; drop sizes;
+//! fall speeds; and extinction against rain rate, with laws fitted to measured optical links for
+//! comparison.
 
 use crate::error::{EvalError, Result};
 use nirspi::picture::{Axis, Chart, Line};
@@ -17,23 +18,24 @@ const WAVELENGTHS_NM: (f64, f64, usize) = (400.0, 2000.0, 81);
 /// Drop diameters of the curves over size, in mm.
 const DIAMETERS_MM: (f64, f64, usize) = (0.001, 5.0, 241);
 
-/// Sizes that a point of a curve over size is the mean of: a drop of one exact size has ripples that no rain shows.
+/// Number of sizes averaged in each point of a curve over size. A drop of one exact size has
+/// ripples that rain does not show.
 const SIZES_A_POINT: usize = 9;
 
-/// Relative width over which those lie.
+/// Relative width of these sizes.
 const SIZE_WIDTH: f64 = 0.1;
 
-/// A chart with the name that its file gets.
+/// A chart and the name of its file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curves {
-    /// Without an ending.
+    /// The file's name without an ending.
     pub name: &'static str,
     /// The lines.
     pub chart: Chart,
 }
 
 impl Curves {
-    /// The numbers of all lines: `line,x,y`, named as the axes are.
+    /// The numbers of all lines: `line,x,y`, with the axes' names.
     #[must_use]
     pub fn csv(&self) -> String {
         let quoted = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
@@ -50,17 +52,18 @@ impl Curves {
     }
 }
 
-/// Kinds of air whose curves are drawn.
+/// Kinds of air with a curve.
 struct Air {
     name: String,
     drops: Drops,
 }
 
-/// All curves: of `drops`, called `name`, and of the paper's two rains, Marshall and Palmer's of the heavier's rate, and fog.
-/// `wavelengths_nm` are those of the curves over size.
+/// All curves: of `drops`, called `name`, of the paper's two rains, of Marshall and Palmer's rain
+/// at the heavier rate, and of fog. `wavelengths_nm` are those of the curves over size.
 ///
 /// # Errors
-/// [`EvalError::is_setting`] for a wavelength without an index of water or drops that cannot be.
+/// [`EvalError::is_setting`] for a wavelength without an index of water, or drops that are not
+/// possible.
 pub fn curves(name: &str, drops: &Drops, wavelengths_nm: &[f64]) -> Result<Vec<Curves>> {
     let air = |name: &str, drops| Air { name: name.to_owned(), drops };
     let heavy = PaperRain::HEAVY.rate_mm_per_h;
@@ -79,7 +82,7 @@ pub fn curves(name: &str, drops: &Drops, wavelengths_nm: &[f64]) -> Result<Vec<C
     Ok(all)
 }
 
-/// `count` values from `low` to `high`, apart by equal factors.
+/// `count` values from `low` to `high` with equal ratios.
 fn factors((low, high, count): (f64, f64, usize)) -> Vec<f64> {
     let at = |i| low * (high / low).powf(f64::from(i) / (count - 1) as f64);
     (0..count as u32).map(at).collect()
@@ -95,7 +98,7 @@ fn line(name: &str, colour: usize, points: Vec<(f64, f64)>) -> Line {
     Line { name: name.to_owned(), colour, dashed: false, points }
 }
 
-/// Decades that hold all values that can be drawn, at most ten from the largest down.
+/// Decades that hold all values that can be drawn, at most ten, from the largest down.
 fn decades(lines: &[Line]) -> Vec<f64> {
     let values = || lines.iter().flat_map(|l| &l.points).map(|p| p.1).filter(|y| *y > 0.0);
     let most = values().fold(f64::MIN_POSITIVE, f64::max).log10().ceil() as i32;
@@ -105,7 +108,7 @@ fn decades(lines: &[Line]) -> Vec<f64> {
 
 const SHARES: [f64; 6] = [0.0, 0.2, 0.4, 0.6, 0.8, 1.0];
 
-/// Two legends' heights of room above the shares.
+/// An axis of shares, with room for the height of two legends above.
 fn share_axis(name: &str) -> Axis {
     Axis { to: 1.4, ..axis(name, &SHARES, false) }
 }
@@ -164,7 +167,7 @@ fn over_wavelength(airs: &[Air]) -> Result<Vec<Curves>> {
     ])
 }
 
-/// What a drop of one size does: extinction efficiency, albedo, asymmetry.
+/// The optics of a drop of one size: extinction efficiency, albedo, asymmetry.
 fn drop_optics(diameter_mm: f64, wavelength_nm: f64) -> Result<[f64; 3]> {
     let index = Water::Segelstein
         .index(wavelength_nm)
@@ -215,7 +218,7 @@ fn over_size(wavelengths_nm: &[f64]) -> Result<Vec<Curves>> {
     ])
 }
 
-/// Drops by size; of drops of one size there is no curve.
+/// Drop sizes; drops of one size have no curve.
 fn sizes(airs: &[Air]) -> Curves {
     let mut lines = Vec::new();
     for (k, air) in airs.iter().enumerate() {
@@ -267,7 +270,7 @@ fn speeds() -> Curves {
     }
 }
 
-/// Extinction against rain rate, beside laws fitted to optical links.
+/// Extinction against rain rate, with laws fitted to optical links for comparison.
 fn rates(wavelengths_nm: &[f64]) -> Result<Curves> {
     let rates = factors((0.5, 100.0, 24));
     let ours = |&nm: &f64| -> Result<Vec<(f64, f64)>> {
@@ -330,7 +333,7 @@ mod tests {
                     (chart.x.from..=chart.x.to).contains(&x)
                         && (chart.y.from..=chart.y.to).contains(&y)
                 };
-                // Tails of size distributions run out of the frame.
+                // Tails of size distributions leave the frame.
                 let inside = points.iter().filter(shown).count() as f64 / points.len() as f64;
                 assert!(
                     inside > if *name == "drop_sizes" { 0.3 } else { 0.999 },

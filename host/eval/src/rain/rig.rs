@@ -4,22 +4,22 @@ use crate::error::{EvalError, Result};
 use nirspi_optics::rig::{Rig, uniformity_percent};
 use serde::Serialize;
 
-/// Containers on the simulated floor, of 10 cm a side, and drops from each nozzle.
+/// Containers on the simulated floor, 10 cm a side, and drops from each nozzle.
 const CONTAINERS: (usize, usize) = (12, 6);
 const DROPS: u32 = 200_000;
 
-/// How evenly containers are filled.
+/// The uniformity of the volumes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
     /// Christiansen's coefficient.
     pub uniformity_percent: f64,
-    /// Volumes.
+    /// Number of volumes.
     pub containers: usize,
-    /// Their mean.
+    /// Mean volume.
     pub mean: f64,
-    /// The smallest.
+    /// The smallest volume.
     pub least: f64,
-    /// The largest.
+    /// The largest volume.
     pub most: f64,
     /// Whether the volumes are simulated.
     pub simulated: bool,
@@ -27,10 +27,10 @@ pub struct Report {
     pub tilt_deg: Option<f64>,
 }
 
-/// The uniformity of volumes that somebody collected.
+/// The uniformity of collected volumes.
 ///
 /// # Errors
-/// No volumes, or volumes that are not positive.
+/// [`EvalError`] for no volumes, or volumes that are not positive.
 pub fn measured(volumes: &[f64]) -> Result<Report> {
     report(volumes, None)
 }

@@ -1,12 +1,12 @@
-//! Curves as an SVG picture, laid out without the measures of a font.
+//! Curves as an SVG picture, laid out without font metrics.
 
 use std::fmt::Write;
 
 /// PSNR in dB over the share of patterns.
 pub struct Curve {
-    /// Its line in the legend.
+    /// The name in the legend.
     pub name: String,
-    /// Share and dB.
+    /// Points as share and dB.
     pub points: Vec<(f64, f64)>,
 }
 
@@ -16,10 +16,10 @@ const LEFT: f64 = 60.0;
 const RIGHT: f64 = 660.0;
 const TOP: f64 = 40.0;
 const BOTTOM: f64 = 470.0;
-/// Okabe and Ito's colours, which stay apart for most eyes.
+/// Okabe and Ito's colours, which most people can distinguish.
 const COLOURS: [&str; 8] =
     ["#000000", "#e69f00", "#56b4e9", "#009e73", "#f0e442", "#0072b2", "#d55e00", "#cc79a7"];
-/// After the colours, they come again dashed.
+/// After the last colour, the colours repeat with dashes.
 const DASHES: [&str; 3] = ["none", "8 3", "2 3"];
 
 /// The picture of these curves, measured in one order.

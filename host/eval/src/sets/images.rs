@@ -1,7 +1,8 @@
-//! Images to compare, from anybody's files and this program's own, brought to one scale.
+//! Images to compare, from any program's files and this program's own, brought to one scale.
 //!
 //! # Invariant
-//! Nothing is scaled or fitted unless the caller asks for it (`nothing_is_fitted_unless_asked_for`).
+//! Images are scaled or fitted only on the caller's request
+//! (`tests::nothing_is_fitted_unless_asked_for`).
 
 use crate::error::{EvalError, Result};
 use nirspi::files::image::read_grey;
@@ -10,14 +11,15 @@ use nirspi::files::npy::{Stack, read_stack};
 use nirspi::imaging::Fit;
 use std::path::{Path, PathBuf};
 
-/// Images that `reconstruct` and `demo` write, in the order in which a folder is looked through.
+/// Images that `reconstruct` and `demo` write, in the order of search in a folder.
 const OWN: [&str; 2] = ["image.npy", "reconstruction.npy"];
 
-/// Reads a stack of images: `.npy`; `.npz` with `recon`, `image` or `images`; a PNG or JPEG picture, as grey levels from 0 to 1; a
-/// folder that `reconstruct` or `demo` has written (its `image.npy` or `reconstruction.npy`); or a folder of pictures of one size.
+/// Reads a stack of images: `.npy`; `.npz` with `recon`, `image` or `images`; a PNG or JPEG
+/// picture, as grey levels from 0 to 1; a folder of `reconstruct` or `demo` (its `image.npy` or
+/// `reconstruction.npy`); or a folder of pictures of one size.
 ///
 /// # Errors
-/// A file that cannot be read, no images, pictures of different sizes.
+/// [`EvalError`] for a file that cannot be read, no images, or pictures of different sizes.
 pub fn read_images(path: &Path) -> Result<Stack> {
     let stack = if path.is_dir() { read_folder(path)? } else { read_file(path)? };
     if stack.count == 0 {
@@ -85,29 +87,31 @@ fn read_folder(path: &Path) -> Result<Stack> {
 /// How the test's images are brought to the reference's scale.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Align {
-    /// Not at all.
+    /// Unchanged.
     #[default]
     None,
-    /// Each by the gain (0 or more) and offset of least squares: a single-pixel camera has no absolute scale.
+    /// Each image by the gain (0 or more) and offset of least squares, because a single-pixel
+    /// camera has no absolute scale.
     GainOffset,
 }
 
-/// Two stacks on the scale on which they are compared.
+/// Two stacks on the scale of the comparison.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scaled {
-    /// The reference over the data range.
+    /// The reference divided by the data range.
     pub reference: Stack,
-    /// The test, fitted if that was asked for, over the data range.
+    /// The test, fitted on request, divided by the data range.
     pub test: Stack,
-    /// What PSNR and SSIM take for the range of the data, in the reference's units.
+    /// The range of the data for PSNR and SSIM, in the reference's units.
     pub data_range: f64,
 }
 
-/// Brings two stacks of one shape to one scale. Without a data range it is 1 for a reference in `[0, 1]`; with `align`, for any other
-/// reference, it is the reference's own range.
+/// Brings two stacks of the same shape to one scale. The default data range is 1 for a reference in
+/// `[0, 1]`; with `align`, the default for any other reference is its own range.
 ///
 /// # Errors
-/// Stacks of different shapes; images outside `[0, 1]` without a data range or a fit; a range that is not positive.
+/// [`EvalError`] for stacks of different shapes, images outside `[0, 1]` without a data range or a
+/// fit, or a range that is not positive.
 pub fn scaled(
     [reference_path, test_path]: [&Path; 2],
     mut reference: Stack,
@@ -192,7 +196,7 @@ mod tests {
         let fitted = scale(&[-5.0, -2.5, 0.0, 5.0], Align::GainOffset, None).unwrap();
         let off = |(a, b): (&f32, &f32)| (a - b).abs();
         assert!(fitted.test.values.iter().zip(&fitted.reference.values).map(off).all(|d| d < 1e-6));
-        // An inverted image is not turned round.
+        // The fit does not invert an inverted image.
         let inverted = scale(&[1.0, 0.75, 0.5, 0.0], Align::GainOffset, None).unwrap();
         assert!(inverted.test.values.iter().all(|&v| (v - 0.4375).abs() < 1e-6));
         let halved = scale(&test, Align::None, Some(2.0)).unwrap();

@@ -1,9 +1,10 @@
 //! The figures of table 3: rows, intervals and paired differences.
 //!
-//! The same scenes are taken at every distance, with rain and without it, and every picture is made of the same readings. So every
-//! interval draws scenes, by glyph and by typeface, and a difference is taken scene by scene before it is averaged. The three
-//! distances are the paper's and were not drawn: "all" is the mean of the three, whose interval has no part that comes from the
-//! distances' being different.
+//! The same scenes are taken at every distance, with rain and without, and every picture is made
+//! from the same readings. Every interval therefore draws scenes, by glyph and by typeface, and a
+//! difference is taken scene by scene before it is averaged. The three distances are the paper's
+//! and were not drawn. "all" is the mean of the three distances, whose interval does not include
+//! the differences between the distances.
 
 use super::{Judged, PAPER, Paper, Sets, Taken};
 use crate::DISTANCES_M;
@@ -14,7 +15,7 @@ use nirspi_nets::metrics::Judged as Features;
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// Draws for the interval of a distance of sets: each takes the root of a matrix.
+/// Number of draws for the interval of a distance of sets: each draw takes the root of a matrix.
 const DISTANCE_DRAWS: usize = 100;
 
 /// The quality of one kind of image at one distance.
@@ -22,49 +23,51 @@ const DISTANCE_DRAWS: usize = 100;
 pub struct Row {
     /// The kind of image.
     pub image: Picture,
-    /// `null`: the mean of the three distances; for distances of sets, the pictures of all three in one set.
+    /// The distance; `null` means the mean of the three distances, or for distances of sets the
+    /// pictures of all three distances in one set.
     pub distance_m: Option<f64>,
-    /// After a fit of gain and offset.
+    /// PSNR after a fit of gain and offset.
     pub psnr_db: Interval,
-    /// After the same fit.
+    /// SSIM after the same fit.
     pub ssim: Interval,
-    /// The same scenes and noise without rain.
+    /// PSNR of the same scenes and noise without rain.
     pub dry_psnr_db: Interval,
-    /// As `dry_psnr_db`.
+    /// SSIM of the same scenes and noise without rain.
     pub dry_ssim: Interval,
-    /// Of a picture with nothing on it: the least that a camera can get.
+    /// PSNR of an empty picture: the lowest value of a camera.
     pub blank_psnr_db: Interval,
-    /// At 64 x 64, on the features of our own classifier: not FID. It grows as the number of scenes falls.
+    /// Fréchet distance at 64 x 64 on the features of nirspi's classifier, which is not FID. The
+    /// distance grows with fewer scenes.
     pub frechet_character_distance: Interval,
-    /// With the user's Inception weights.
+    /// FID with the user's Inception weights.
     pub fid: Option<f64>,
-    /// The paper's.
+    /// The paper's PSNR.
     pub paper_psnr_db: f64,
-    /// The paper's.
+    /// The paper's SSIM.
     pub paper_ssim: f64,
-    /// The paper's.
+    /// The paper's FID.
     pub paper_fid: Option<f64>,
 }
 
-/// What one kind of image gains over another on the same scenes.
+/// The difference between two kinds of image of the same scenes.
 #[derive(Debug, Clone, Serialize)]
 pub struct Difference {
     /// The kind of image.
     pub image: Picture,
-    /// What is subtracted from it: another kind's name, or `without rain` for the same kind in dry air.
+    /// The subtracted kind: another kind's name, or `without rain` for the same kind in dry air.
     pub minus: &'static str,
-    /// `null`: the mean of the three distances.
+    /// The distance; `null` means the mean of the three distances.
     pub distance_m: Option<f64>,
-    /// Mean of the scenes' differences.
+    /// Mean of the scenes' differences of PSNR.
     pub psnr_db: Interval,
-    /// The same of SSIM.
+    /// Mean of the scenes' differences of SSIM.
     pub ssim: Interval,
 }
 
-/// What a difference is taken from where it is the same kind without rain.
+/// The name of the subtracted kind, if it is the same kind without rain.
 const WITHOUT_RAIN: &str = "without rain";
 
-/// Pairs of kinds whose difference is of interest: the first minus the second.
+/// Pairs of kinds of interest: the first minus the second.
 const PAIRS: [(Picture, Picture); 6] = [
     (Picture::Gan, Picture::NirSpi),
     (Picture::Diffusion, Picture::NirSpi),
@@ -86,7 +89,7 @@ pub struct Statistics<'a> {
     pub taken: &'a [Taken],
     pub measured: &'a [Measured],
     pub sets: &'a Sets,
-    /// Of the scenes of one distance.
+    /// Draws of the scenes of one distance.
     pub redraws: &'a Redraws,
 }
 
@@ -95,12 +98,12 @@ impl Statistics<'_> {
         self.taken.len() / DISTANCES_M.len()
     }
 
-    /// Where the scenes of a distance are, all three if none is named.
+    /// The indices of a distance; all three without a distance.
     fn distances(distance: Option<usize>) -> std::ops::Range<usize> {
         distance.map_or(0..DISTANCES_M.len(), |at| at..at + 1)
     }
 
-    /// The mean of a figure: of each scene over the distances, then over the scenes.
+    /// The mean of a figure: over the distances for each scene, then over the scenes.
     fn mean(&self, distance: Option<usize>, of: impl Fn(usize) -> f64) -> Interval {
         let at = Self::distances(distance);
         let each = |scene: usize| {
@@ -142,7 +145,7 @@ impl Statistics<'_> {
         };
         let of = |scenes: &[usize]| self.sets.character_distance(truth, found, &places(scenes));
         let scenes: Vec<usize> = (0..self.scenes()).collect();
-        // A set needs two images; a draw of a few scenes can have fewer.
+        // A set needs two images, and a draw of a few scenes may have fewer.
         let draws = self.redraws.first(DISTANCE_DRAWS);
         let draws: Vec<&Vec<usize>> = draws.iter().filter(|draw| places(draw).len() > 1).collect();
         let drawn = draws.par_iter().map(|draw| of(draw)).collect::<Result<Vec<f64>>>()?;
@@ -166,7 +169,7 @@ impl Statistics<'_> {
         })
     }
 
-    /// What rain costs every kind, and what each kind gains over others.
+    /// The difference by rain of every kind, and the differences between kinds.
     pub fn differences(&self) -> Vec<Difference> {
         let of = |image| self.measured.iter().find(|measured| measured.image == image);
         let rain = self.measured.iter().map(|m| (m.image, WITHOUT_RAIN, &m.wet, &m.dry));

@@ -1,4 +1,4 @@
-//! What to train on: characters of a user's, and the part of them that training never sees.
+//! Training data: a user's characters, and their split into training and held-out groups.
 
 use crate::error::{On, Result};
 use nirspi::files::characters;
@@ -7,37 +7,38 @@ use nirspi_nets::data::{Scenes, Stack};
 use serde::Serialize;
 use std::path::PathBuf;
 
-/// Which characters.
+/// The choice of characters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Data {
-    /// `.npz` stacks, folders of them, or Chars74K's folder. Without any stack and font: procedural scenes alone.
+    /// `.npz` stacks, folders of stacks, or Chars74K's folder. Without stacks and fonts, only
+    /// procedural scenes.
     pub stacks: Vec<PathBuf>,
     /// Folders of fonts, from which characters are drawn.
     pub fonts: Vec<PathBuf>,
-    /// Share of the font families, writers and photographs that training never sees.
+    /// Share of the font families, writers and photographs that are held out from training.
     pub held_out: f64,
-    /// Share of the scenes that are no letters.
+    /// Share of the scenes other than letters.
     pub shapes: f32,
 }
 
-/// What was found, for the record.
+/// The data that were found, for the record.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Found {
-    /// Of each stack.
+    /// The data of each stack.
     pub stacks: Vec<nirspi_nets::data::split::HeldOutGroups>,
-    /// Images to train on.
+    /// Number of images for training.
     pub training_images: usize,
-    /// Images that training never sees.
+    /// Number of images held out from training.
     pub held_out_images: usize,
     /// Fonts that were left out.
     pub skipped_fonts: Vec<PathBuf>,
 }
 
 impl Data {
-    /// Reads them; the split follows from the seed.
+    /// Reads the data. The split follows from the seed.
     ///
     /// # Errors
-    /// Files that cannot be read, characters that cannot be split.
+    /// `EvalError` for files that cannot be read, or characters that cannot be split.
     pub fn scenes(&self, seed: u64) -> Result<(Scenes, Found)> {
         let mut stacks: Vec<Stack> = Vec::new();
         let mut skipped_fonts = Vec::new();

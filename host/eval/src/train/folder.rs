@@ -1,8 +1,9 @@
 //! A run's folder: checkpoint, weights, log, plot.
 //!
 //! # Invariant
-//! Each file is whole or the one before, whenever the run is killed. Only the log's last line may be torn, and a run that goes on
-//! writes the log anew from its checkpoint (`a_log_is_written_anew_from_its_checkpoint`).
+//! Each file is whole, or the previous version, whenever the run is killed. Only the log's last
+//! line may be incomplete. A resumed run writes the log again from its checkpoint
+//! (`tests::a_log_is_written_anew_from_its_checkpoint`).
 
 use super::data::Found;
 use crate::error::{EvalError, On, Result};
@@ -22,15 +23,15 @@ pub struct RunFolder {
 }
 
 impl RunFolder {
-    /// The run as it is.
+    /// The state of the run.
     const CHECKPOINT: &'static str = "checkpoint.bin";
     /// Averaged weights with the best held-out score.
     pub const WEIGHTS: &'static str = "weights.safetensors";
-    /// A line of JSON an entry.
+    /// One line of JSON for each entry.
     const LOG: &'static str = "log.jsonl";
     /// Loss and held-out score.
     const PLOT: &'static str = "plot.png";
-    /// Which groups were held out.
+    /// The held-out groups.
     const DATA: &'static str = "data.json";
 
     fn at(path: &Path) -> Self {
@@ -41,10 +42,10 @@ impl RunFolder {
         self.path.join(name)
     }
 
-    /// A run from its first step. A run that could go on is not overwritten.
+    /// Starts a run from its first step. A run that could be resumed is not overwritten.
     ///
     /// # Errors
-    /// A folder that holds a run, or cannot be written.
+    /// [`EvalError`] for a folder that holds a run, or cannot be written.
     pub fn start(path: &Path) -> Result<Self> {
         let mut folder = Self::at(path);
         let checkpoint = folder.file(Self::CHECKPOINT);
@@ -59,10 +60,10 @@ impl RunFolder {
         Ok(folder)
     }
 
-    /// A run to go on with; the log is brought back to its checkpoint.
+    /// Opens a run to resume. The log is restored from its checkpoint.
     ///
     /// # Errors
-    /// A folder without a checkpoint, or with a damaged one.
+    /// [`EvalError`] for a folder without a checkpoint, or with a damaged one.
     pub fn resume(path: &Path) -> Result<(Self, Checkpoint)> {
         let mut folder = Self::at(path);
         let file = folder.file(Self::CHECKPOINT);
@@ -85,19 +86,19 @@ impl RunFolder {
         Ok(())
     }
 
-    /// Keeps which groups were held out.
+    /// Writes the held-out groups.
     ///
     /// # Errors
-    /// A file that cannot be written.
+    /// [`EvalError`] for a file that cannot be written.
     pub fn write_data(&self, data: &Found) -> Result<()> {
         let text = serde_json::to_string_pretty(data)? + "\n";
         Ok(write_atomic(&self.file(Self::DATA), text.as_bytes())?)
     }
 
-    /// A line of the log.
+    /// Appends a line to the log.
     ///
     /// # Errors
-    /// A file that cannot be written.
+    /// [`EvalError`] for a file that cannot be written.
     pub fn entry(&mut self, entry: &Entry) -> Result<()> {
         let line = serde_json::to_string(entry)? + "\n";
         let named = || format!("{}: cannot write it", self.path.join(Self::LOG).display());
@@ -107,10 +108,10 @@ impl RunFolder {
         }
     }
 
-    /// The run as it is, and its plot.
+    /// Writes the state of the run, and its plot.
     ///
     /// # Errors
-    /// A file that cannot be written.
+    /// [`EvalError`] for a file that cannot be written.
     pub fn checkpoint(&self, bytes: &[u8], log: &[Entry]) -> Result<()> {
         write_atomic(&self.file(Self::CHECKPOINT), bytes)?;
         if let Some(chart) = plot(log) {
@@ -119,16 +120,17 @@ impl RunFolder {
         Ok(())
     }
 
-    /// The best weights.
+    /// Writes the best weights.
     ///
     /// # Errors
-    /// A file that cannot be written.
+    /// [`EvalError`] for a file that cannot be written.
     pub fn best(&self, bytes: &[u8]) -> Result<()> {
         Ok(write_atomic(&self.file(Self::WEIGHTS), bytes)?)
     }
 }
 
-/// Loss and held-out score over steps, each brought to the range of its values: they share a frame, not a unit.
+/// Loss and held-out score by step. Each is scaled to the range of its values, because the two have
+/// different units.
 fn plot(log: &[Entry]) -> Option<Chart> {
     let last = log.last()?;
     let losses: Vec<(f64, f64)> = log.iter().map(|e| (e.step as f64, e.loss)).collect();

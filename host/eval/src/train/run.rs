@@ -1,4 +1,4 @@
-//! One network, trained in a folder.
+//! Trains one network in a folder.
 
 use super::data::{Data, Found};
 use super::folder::RunFolder;
@@ -15,7 +15,7 @@ use nirspi_optics::CameraModel;
 use serde::Serialize;
 use std::path::PathBuf;
 
-/// What to train, on what, and where it is kept.
+/// A training run: the network, its data and its folder.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Request {
     /// The network and how it learns.
@@ -24,52 +24,53 @@ pub struct Request {
     pub data: Data,
     /// The virtual camera.
     pub camera: CameraModel,
-    /// Share of the examples that the virtual camera takes; formulas make the others.
+    /// Share of the examples that the virtual camera takes. Formulas make the others.
     pub camera_share: f32,
-    /// Weights of the FSRCNN that comes before the deblurrer; `None`: the embedded ones.
+    /// Weights of the FSRCNN before the deblurrer; `None` means the embedded weights.
     pub fsrcnn: Option<PathBuf>,
     /// Folder for checkpoint, weights, log and plot.
     pub out: PathBuf,
-    /// Go on from the folder's checkpoint.
+    /// Whether to resume from the folder's checkpoint.
     pub resume: bool,
-    /// What computes.
+    /// The backend.
     pub backend: Backend,
 }
 
-/// Follows a run.
+/// Observes a run.
 pub trait Watch {
-    /// Training begins after `step` steps of an earlier run, or none.
+    /// Training begins after `step` steps of an earlier run, or after 0 steps.
     fn starts(&mut self, settings: &Settings, step: u64);
     /// A line of the log, with the last held-out score.
     fn entry(&mut self, entry: &Entry, held_out: Option<f64>);
-    /// A step was done. `false` keeps a checkpoint and ends the run.
+    /// A step was done. `false` writes a checkpoint and ends the run.
     fn stepped(&mut self, step: u64) -> bool;
 }
 
-/// How a run ended.
+/// The result of a run.
 #[derive(Debug, Serialize)]
 pub struct Report {
     /// The network.
     pub model: Model,
-    /// How it learnt.
+    /// The settings of the training.
     pub settings: Settings,
-    /// What it learnt from.
+    /// The data of the training.
     pub data: Found,
     /// Share of the examples that the virtual camera took.
     pub camera_share: f32,
-    /// What came of it.
+    /// The outcome of the training.
     #[serde(flatten)]
     pub outcome: Outcome,
     /// The best weights.
     pub weights: PathBuf,
 }
 
-/// Examples whose degraded image is of 64 x 64 from the start.
+/// Share of examples whose degraded image is 64 x 64 from the start.
 const FINE_SHARE: f32 = 0.25;
-/// A character that is classified has been restored: what is left of blur and noise is small.
+/// Blur and noise of classified characters, which are small because the characters have been
+/// restored.
 const NEARLY_SHARP: (f32, f32) = (1.0, 0.03);
 
-/// The share of a network's examples whose degraded image is of 64 x 64 from the start.
+/// The share of a network's examples whose degraded image is 64 x 64 from the start.
 fn fine_share(model: Model) -> f32 {
     match model {
         Model::Fsrcnn => 0.0,
@@ -79,7 +80,7 @@ fn fine_share(model: Model) -> f32 {
     }
 }
 
-/// What degrades a network's examples.
+/// The degradation of a network's examples.
 fn degradation(request: &Request) -> Result<Mixed> {
     // The classifier sees characters that have been restored.
     if request.settings.model == Model::Classifier {
@@ -97,10 +98,12 @@ fn degradation(request: &Request) -> Result<Mixed> {
     Ok(Mixed { analytic: AnalyticCamera::new(Limits::default())?, camera })
 }
 
-/// Trains a network until its last step, until held-out examples get no better, or until `watch` ends the run.
+/// Trains a network until its last step, until held-out examples no longer improve, or until
+/// `watch` ends the run.
 ///
 /// # Errors
-/// [`EvalError::Setting`] for a share out of range; data, weights or a folder that cannot be used; a step that fails.
+/// [`EvalError::Setting`] for a share out of range; other errors for data, weights or a folder that
+/// cannot be used, or a step that fails.
 pub fn run(request: &Request, watch: &mut dyn Watch) -> Result<Report> {
     let Request { settings, camera_share, out, .. } = request;
     if !(0.0..=1.0).contains(camera_share) {
@@ -140,7 +143,7 @@ pub fn run(request: &Request, watch: &mut dyn Watch) -> Result<Report> {
 }
 
 impl Request {
-    /// What comes before the deblurrer in use; other networks are given readings, or images of 64 x 64.
+    /// The network before the deblurrer. Other networks get readings, or images of 64 x 64.
     fn enlarge(&self) -> Result<Box<dyn Enlarge>> {
         if !deblurs(self.settings.model) {
             return Ok(Box::new(Lanczos));
@@ -152,7 +155,7 @@ impl Request {
         Ok(Box::new(Fused::new(&weights)?))
     }
 
-    /// What the run is trained on, in a line: another line is another run.
+    /// A description of the training data in one line. A different line means a different run.
     fn trained_on(&self, data: &Found) -> String {
         let stacks: Vec<String> = data
             .stacks
@@ -181,7 +184,7 @@ fn deblurs(model: Model) -> bool {
     matches!(model, Model::Diffusion | Model::Ancestral | Model::Gan)
 }
 
-/// Keeps a run in its folder, and lets somebody follow it.
+/// Writes a run to its folder, and lets a [`Watch`] observe the run.
 struct Kept<'k> {
     folder: &'k mut RunFolder,
     watch: &'k mut dyn Watch,
@@ -216,7 +219,7 @@ impl Keeper for Kept<'_> {
 mod tests {
     use super::*;
 
-    /// Counts what it sees, and ends the run after some steps.
+    /// Counts the steps, and ends the run after some steps.
     struct Counted {
         began_at: u64,
         entries: u64,

@@ -1,4 +1,5 @@
-//! Richardson-Lucy deconvolution (Richardson, J. Opt. Soc. Am. 62, 1972; Lucy, Astron. J. 79, 1974).
+//! Richardson-Lucy deconvolution (Richardson, J. Opt. Soc. Am. 62, 1972; Lucy, Astron. J. 79,
+//! 1974).
 //!
 //! x <- x * B(y / B x): the estimate stays positive and keeps the light. Without a stop the
 //! iteration would reproduce the noise. It stops by the discrepancy principle (Morozov, 1966): when

@@ -54,7 +54,8 @@ impl Schedule {
     /// The schedule that the weights were trained with: metadata `steps`, `beta_start`, `beta_end`.
     ///
     /// # Errors
-    /// [`WeightsError::Number`] if one of them is missing, or is not a number of steps or a share of noise.
+    /// [`WeightsError::Number`] if one of them is missing, or is not a number of steps or a share
+    /// of noise.
     pub fn of(weights: &Weights) -> Result<Self, WeightsError> {
         let steps = weights.number_that("steps", "a whole number from 1 to 10000", |steps| {
             (1.0..=10_000.0).contains(&steps) && steps.fract() == 0.0

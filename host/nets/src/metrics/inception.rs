@@ -87,8 +87,8 @@ impl Inception {
         self.classes == Some(FID_CLASSES)
     }
 
-    /// The [`FEATURES`] features of a grey image of `height` x `width` pixels in [0, 1], row-major, enlarged to
-    /// 299 x 299.
+    /// The [`FEATURES`] features of a grey image of `height` x `width` pixels in [0, 1], row-major,
+    /// enlarged to 299 x 299.
     ///
     /// # Errors
     /// [`ImageSize`] if the values are not such an image.

@@ -20,7 +20,8 @@ macro_rules! network {
     };
 }
 
-/// The networks, and what takes weights for each: the forward passes themselves where there are some.
+/// The networks, and what takes weights for each: the forward passes themselves where there are
+/// some.
 fn networks() -> [(Weights, Check); 5] {
     [
         network!("unet", crate::cpu::UNet::new),

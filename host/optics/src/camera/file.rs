@@ -1,6 +1,7 @@
-//! A camera description as a TOML file: read on top of a shipped one, every number within its range.
+//! Reads a camera description from a TOML file, on top of a shipped description, and checks the
+//! range of every number.
 //!
-//! The paper's description has every key, so it says which keys there are and of which kind each is.
+//! The paper's description has every key and thereby defines all keys and their kinds.
 
 use super::{CameraModel, SHIPPED};
 use crate::SIDE;
@@ -10,10 +11,10 @@ use crate::rain::Rainfall;
 use thiserror::Error;
 use toml::{Table, Value};
 
-/// The key that names the shipped camera which a file differs from.
+/// The key that names the shipped camera on which a file is based.
 const BASIS: &str = "basis";
 
-/// The range of each number: key, least, most. Units are in the keys.
+/// The range of each number: key, minimum, maximum. Units are in the keys.
 pub(super) const RANGES: &[(&str, f64, f64)] = &[
     ("wavelength_nm", 400.0, 1700.0),
     ("leds.power_mw", 0.0, 1000.0),
@@ -56,18 +57,18 @@ pub(super) const RANGES: &[(&str, f64, f64)] = &[
     ("tof.noise_mm", 0.0, 1000.0),
 ];
 
-/// Why a text is no camera description. `Display` is one line.
+/// Why a text is not a camera description. `Display` is one line.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum CameraModelError {
-    /// It is not TOML.
+    /// The text is not TOML.
     #[error("line {line}: {reason}, expected TOML such as `power_mw = 4.0`")]
     Syntax {
         /// Line, from 1.
         line: usize,
-        /// What the parser says.
+        /// The parser's message.
         reason: String,
     },
-    /// A key that no description has.
+    /// The key does not exist.
     #[error("found {key}, expected one of {expected}")]
     Key {
         /// The key, with its section.
@@ -75,25 +76,25 @@ pub enum CameraModelError {
         /// The keys of that section.
         expected: String,
     },
-    /// A value of another kind or out of range.
+    /// The value has the wrong kind or is out of range.
     #[error("{key} is {found}, expected {expected}")]
     Value {
         /// The key, with its section.
         key: String,
         /// The value.
         found: String,
-        /// What it may be.
+        /// The allowed values.
         expected: String,
     },
 }
 
 fn value(key: &str, found: &Value, expected: impl Into<String>) -> CameraModelError {
-    // A table or list over several lines becomes one.
+    // A table or list over several lines becomes one line.
     let found = found.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
     CameraModelError::Value { key: key.to_owned(), found, expected: expected.into() }
 }
 
-/// A description on top of the one that it names as its basis.
+/// A description on top of its basis.
 pub fn read(text: &str) -> Result<CameraModel, CameraModelError> {
     let mut given = parse(text)?;
     let names: Vec<&str> = CameraModel::names().collect();
@@ -125,14 +126,14 @@ pub fn write(model: &CameraModel) -> String {
     table_of(model).to_string()
 }
 
-/// Checks every range of a description made by a program.
+/// Checks every range of a description that a program made.
 pub fn check(model: &CameraModel) -> Result<(), CameraModelError> {
     check_table(&table_of(model))?;
     check_together(model)
 }
 
 fn table_of(model: &CameraModel) -> Table {
-    // Numbers, words and lists of numbers are all that the type holds.
+    // The type holds only numbers, words and lists of numbers, so the conversion does not fail.
     Table::try_from(model).unwrap_or_default()
 }
 
@@ -145,7 +146,7 @@ fn parse(text: &str) -> Result<Table, CameraModelError> {
     })
 }
 
-/// Puts the values `given` over those of `table`, which has every key.
+/// Replaces values of `table`, which has every key, by the values `given`.
 fn put(table: &mut Table, given: Table, section: &str) -> Result<(), CameraModelError> {
     for (name, new) in given {
         let key = if section.is_empty() { name.clone() } else { format!("{section}.{name}") };
@@ -166,7 +167,7 @@ fn put(table: &mut Table, given: Table, section: &str) -> Result<(), CameraModel
     Ok(())
 }
 
-/// What a key takes, in words.
+/// The allowed values of a key, in words.
 fn kind(key: &str, value: &Value) -> String {
     let whole = if matches!(value, Value::Integer(_)) { "a whole number" } else { "a number" };
     match (range(key), value) {
@@ -227,13 +228,13 @@ fn check_value(key: &str, found: &Value) -> Result<(), CameraModelError> {
     Err(value(key, found, expected))
 }
 
-/// Whether this is the row and column of an LED.
+/// Whether the value is the row and column of an LED.
 fn is_place(led: &Value) -> bool {
     let inside = |at: &Value| at.as_integer().is_some_and(|at| (0..SIDE as i64).contains(&at));
     led.as_array().is_some_and(|place| place.len() == 2 && place.iter().all(inside))
 }
 
-/// Checks what depends on two values.
+/// Checks conditions on two values.
 fn check_together(model: &CameraModel) -> Result<(), CameraModelError> {
     let expect = |holds: bool, key: &str, found: f64, expected: String| {
         if holds {

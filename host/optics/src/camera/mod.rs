@@ -1,10 +1,12 @@
-//! The camera description: every optical, electronic and geometric constant of a camera in one type, read from TOML.
+//! The camera description: every optical, electronic and geometric constant of a camera in one
+//! type, read from TOML.
 //!
 //! # Invariant
-//! A constant of the camera stands in `host/optics/cameras/*.toml` and nowhere in the code. Photon budget, range, virtual
-//! camera and training take their settings from a [`CameraModel`]: [`CameraModel::projector`],
-//! [`CameraModel::budget_settings`], [`CameraModel::chain_settings`] and [`CameraModel::instrument`]. The test
-//! `the_budget_is_that_of_the_camera_simulated` (`host/tests/budget.rs`) holds the budget to the virtual camera.
+//! Every constant of a camera is in `host/optics/cameras/*.toml` and not in the code. Photon
+//! budget, range, virtual camera and training take their settings from a [`CameraModel`]:
+//! [`CameraModel::projector`], [`CameraModel::budget_settings`], [`CameraModel::chain_settings`]
+//! and [`CameraModel::instrument`]. The test `the_budget_is_that_of_the_camera_simulated`
+//! (`host/tests/budget.rs`) compares the budget with the virtual camera.
 
 mod file;
 mod views;
@@ -17,21 +19,21 @@ use crate::rain::Rainfall;
 use serde::{Deserialize, Serialize};
 use std::sync::LazyLock;
 
-/// The cameras that are shipped: name and description.
+/// The shipped cameras: name and description.
 const SHIPPED: [(&str, &str); 3] = [
     ("paper", include_str!("../../cameras/paper.toml")),
     ("fga015", include_str!("../../cameras/fga015.toml")),
     ("one-metre", include_str!("../../cameras/one-metre.toml")),
 ];
 
-/// A camera: LEDs, optics, receiver, and the light and weather that it works in.
+/// A camera: LEDs, optics, receiver, light and weather.
 ///
-/// Its default is the paper's camera (`paper.toml`): the networks were trained and the published tables were made with
-/// that camera.
+/// The default is the paper's camera (`paper.toml`), with which the networks were trained and the
+/// published tables were made.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CameraModel {
-    /// For reports.
+    /// The name in reports.
     pub name: String,
     /// Wavelength of the LEDs.
     pub wavelength_nm: f64,
@@ -47,11 +49,11 @@ pub struct CameraModel {
     pub amplifier: Amplifier,
     /// The ADC.
     pub adc: Adc,
-    /// How long patterns are shown, and which samples count.
+    /// How long patterns are shown, and which samples are used.
     pub readout: Readout,
-    /// The light that falls on the target besides the LEDs'.
+    /// The light on the target besides the LEDs.
     pub light: Light,
-    /// What falls between camera and target.
+    /// The rain between camera and target.
     pub weather: WeatherSection,
     /// The time-of-flight sensor.
     pub tof: TofSensor,
@@ -65,17 +67,17 @@ pub struct Leds {
     pub power_mw: f64,
     /// Width of the spectrum at half height; the spectrum is taken as Gaussian.
     pub spectrum_fwhm_nm: f64,
-    /// Angle off its axis at which an LED's radiant intensity has halved.
+    /// Angle off the LED's axis at which its radiant intensity has halved.
     pub half_angle_deg: f64,
     /// Rise and fall time from 10 to 90 %.
     pub edge_ns: f64,
-    /// Standard deviation of the power from LED to LED, as a share of the mean.
+    /// Standard deviation of the power between LEDs, as a share of the mean.
     pub power_spread: f64,
     /// Standard deviation of the pointing along each axis.
     pub pointing_spread_deg: f64,
-    /// Which array of that spread.
+    /// Seed of the array's spread.
     pub spread_seed: u32,
-    /// LEDs that stay dark: row and column, 0 to 31.
+    /// Dead LEDs: row and column, 0 to 31.
     pub dead: Vec<[u32; 2]>,
 }
 
@@ -87,7 +89,7 @@ pub struct Collector {
     pub aperture_mm: f64,
     /// Distance between projector and collector.
     pub baseline_mm: f64,
-    /// Share of the light that all glass from LED to detector lets through.
+    /// Share of the light that all glass from LED to detector transmits.
     pub glass_transmission: f64,
     /// Width of the band-pass filter around the wavelength.
     pub filter_width_nm: f64,
@@ -99,9 +101,9 @@ pub struct Collector {
 pub struct Detector {
     /// Diameter of the active area.
     pub diameter_mm: f64,
-    /// Numerical aperture of the light on it.
+    /// Numerical aperture of the light on the detector.
     pub numerical_aperture: f64,
-    /// Photocurrent over light at the wavelength of the LEDs.
+    /// Photocurrent divided by light at the wavelength of the LEDs.
     pub responsivity_a_per_w: f64,
     /// Capacitance at its working voltage.
     pub capacitance_pf: f64,
@@ -119,7 +121,7 @@ pub struct Amplifier {
     pub feedback_kohm: f64,
     /// Voltage noise of the operational amplifier.
     pub voltage_noise_nv_per_sqrt_hz: f64,
-    /// Capacitance at its input besides the photodiode's.
+    /// Capacitance at its input without the photodiode's.
     pub input_capacitance_pf: f64,
 }
 
@@ -139,25 +141,25 @@ pub struct Adc {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Readout {
-    /// ADC clocks of 8 ns that each pattern is shown.
+    /// ADC clocks of 8 ns for which each pattern is shown.
     pub clocks_per_pattern: u32,
-    /// Samples left out at the start of each pattern.
+    /// Samples excluded at the start of each pattern.
     pub blanked: u32,
     /// Differential sweeps summed into one picture.
     pub sweeps_per_picture: u32,
 }
 
-/// Light on the target besides the LEDs'.
+/// Light on the target besides the LEDs.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Light {
-    /// Where it comes from.
+    /// The source of the light.
     pub source: LightSource,
-    /// How bright it is.
+    /// The illuminance.
     pub illuminance_klx: f64,
 }
 
-/// What falls between camera and target.
+/// The rain between camera and target.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WeatherSection {
@@ -173,9 +175,9 @@ pub struct TofSensor {
     pub wavelength_nm: f64,
     /// Angle that the 8 zones of a row cover.
     pub fov_deg: f64,
-    /// Place of the sensor right of the projector's axis, seen from the camera.
+    /// Position of the sensor to the right of the projector's axis, seen from the camera.
     pub offset_x_mm: f64,
-    /// Place of the sensor below the projector's axis.
+    /// Position of the sensor below the projector's axis.
     pub offset_y_mm: f64,
     /// Noise of a zone, rms.
     pub noise_mm: f64,
@@ -203,21 +205,21 @@ impl CameraModel {
         SHIPPED.iter().map(|(name, _)| *name)
     }
 
-    /// The shipped camera of this name; none if there is none.
+    /// The shipped camera of this name; `None` if there is none.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
-        // A test reads each of them.
+        // A test reads each shipped description.
         file::read(Self::shipped_text(name)?).ok()
     }
 
-    /// The description of the shipped camera of this name, as its TOML file has it.
+    /// The TOML text of the shipped camera of this name.
     #[must_use]
     pub fn shipped_text(name: &str) -> Option<&'static str> {
         SHIPPED.iter().find(|(shipped, _)| *shipped == name).map(|(_, text)| *text)
     }
 
-    /// Reads a description. What it does not say is as in the shipped camera that it names as `basis`, and without one as
-    /// in the paper's camera.
+    /// Reads a description. Values that the description does not have are those of the shipped
+    /// camera that it names as `basis`; without `basis`, of the paper's camera.
     ///
     /// # Errors
     /// [`CameraModelError`], one line with the key, what was found and what was expected.
@@ -225,19 +227,19 @@ impl CameraModel {
         file::read(toml)
     }
 
-    /// The whole description as TOML, without remarks.
+    /// The whole description as TOML, without comments.
     #[must_use]
     pub fn to_toml(&self) -> String {
         file::write(self)
     }
 
-    /// A short name of everything in the description: FNV-1a, 32 bit, no checksum (Fowler, Noll and Vo).
+    /// A short name of the whole description: FNV-1a, 32 bit, not a checksum (Fowler, Noll and Vo).
     #[must_use]
     pub fn digest(&self) -> u32 {
         fnv1a(format!("{self:?}").as_bytes())
     }
 
-    /// Checks all ranges, for a description that was changed after it was read.
+    /// Checks all ranges, for a description that was changed after reading.
     ///
     /// # Errors
     /// [`CameraModelError::Value`] naming the key.

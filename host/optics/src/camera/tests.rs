@@ -134,7 +134,7 @@ fn an_ideal_array_has_equal_leds_and_a_real_one_its_spread() {
     assert_eq!((lit.len(), gains[3 * 32 + 7]), (1023, 0.0));
     let mean = lit.iter().sum::<f64>() / 1023.0;
     let spread = (lit.iter().map(|gain| (gain - mean).powi(2)).sum::<f64>() / 1023.0).sqrt();
-    // 1023 LEDs know a spread to 1 / sqrt(2 * 1023) = 2.2 %; four of those.
+    // 1023 LEDs show a spread to within 1 / sqrt(2 * 1023) = 2.2 %; the limit is four times that.
     assert!((mean - 1.0).abs() < 0.013 && (spread / 0.1 - 1.0).abs() < 0.09, "{mean} {spread}");
     assert_eq!(gains, real(1));
     assert_ne!(gains, real(2));

@@ -1,4 +1,4 @@
-//! What each stage of the light's way takes from the camera description.
+//! The settings of each stage of the light's path, from the camera description.
 
 use super::CameraModel;
 use crate::budget::photon_j;
@@ -31,7 +31,7 @@ impl CameraModel {
         self.detector.responsivity_a_per_w * photon_j(self.wavelength_nm) / ELECTRON_C
     }
 
-    /// What the photon budget rests on.
+    /// The settings of the photon budget.
     #[must_use]
     pub fn budget_settings(&self) -> BudgetSettings {
         BudgetSettings {
@@ -51,8 +51,9 @@ impl CameraModel {
         }
     }
 
-    /// Input noise of the amplifier, in pA/sqrt(Hz): `sqrt(4 k T / R)` of the feedback resistor at 300 K, and the voltage
-    /// noise across all capacitance, whose mean over the bandwidth is `2 pi B C e / sqrt(3)`.
+    /// Input noise of the amplifier, in pA/sqrt(Hz): `sqrt(4 k T / R)` of the feedback resistor at
+    /// 300 K, plus the voltage noise across all capacitance, with a mean over the bandwidth of `2
+    /// pi B C e / sqrt(3)`.
     #[must_use]
     pub fn amplifier_noise_pa_per_sqrt_hz(&self) -> f64 {
         let amplifier = &self.amplifier;
@@ -72,7 +73,7 @@ impl CameraModel {
         TAU * amplifier.feedback_kohm * 1e3 * farad * bandwidth_hz.powi(2) * 1e-9
     }
 
-    /// The receiver, before its gain is set, without daylight.
+    /// The receiver before its gain is set, without daylight.
     #[must_use]
     pub fn chain_settings(&self) -> ChainSettings {
         let bandwidth_hz = self.amplifier.bandwidth_mhz * 1e6;
@@ -87,13 +88,13 @@ impl CameraModel {
             amplifier_noise_electrons: amplifier_noise_electrons(noise_pa, bandwidth_hz, SAMPLE_NS),
             adc_noise_counts: adc_noise_counts(self.adc.snr_db),
             electrons_per_count: 3.0,
-            // Ranges are checked when a description is read.
+            // The ranges were checked when the description was read.
             adc_offset_counts: self.adc.offset_counts as u16,
             adc_latency_clocks: self.adc.latency_clocks as u8,
         }
     }
 
-    /// The whole instrument, as the budget of a pixel sees it.
+    /// The whole instrument, for the budget of a pixel.
     #[must_use]
     pub fn instrument(&self) -> Instrument {
         Instrument {
@@ -105,7 +106,7 @@ impl CameraModel {
         }
     }
 
-    /// Where the zones of the time-of-flight sensor lie.
+    /// The positions of the zones of the time-of-flight sensor.
     #[must_use]
     pub fn depth_geometry(&self) -> DepthGeometry {
         DepthGeometry {
@@ -114,8 +115,9 @@ impl CameraModel {
         }
     }
 
-    /// Light of each LED from a white target, over that of an ideal one: 32 x 32, row-major. Spread of power, spread of
-    /// pointing (intensity `cos^m` towards the lens), vignetting, and 0 for a dead LED.
+    /// Light of each LED from a white target, divided by that of an ideal LED: 32 x 32, row-major.
+    /// The factors are the spread of power, the spread of pointing (intensity `cos^m` towards the
+    /// lens), vignetting, and 0 for a dead LED.
     #[must_use]
     pub fn led_gains(&self) -> Vec<f32> {
         let leds = &self.leds;

@@ -1,4 +1,5 @@
-//! What is between camera and target, as a user writes it: dry air, rain, fog, smoke, dust, drops on the window.
+//! The weather between camera and target as a user writes it: dry air, rain, fog, smoke, dust,
+//! drops on the window.
 
 use super::law::numbers_between;
 use super::{DropLaw, Drops, Medium, ParseDropLawError, RainError, Rainfall, Weather, Window};
@@ -8,13 +9,13 @@ use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;
 
-/// Wavelength at which visibility is defined: the eye's best, in nm.
+/// Wavelength at which visibility is defined: that of the eye's best sensitivity, in nm.
 const VISIBILITY_NM: f64 = 550.0;
 
-/// Most frequent diameter of fog droplets where none is given, in um: radiation fog.
+/// Default for the most frequent diameter of fog droplets, in um: radiation fog.
 const FOG_UM: f64 = 10.0;
 
-/// Median diameter of smoke by number where none is given, in um: aged smoke of an open fire.
+/// Default for the median diameter of smoke by number, in um: aged smoke of an open fire.
 const SMOKE_UM: f64 = 0.3;
 
 /// Geometric standard deviation of smoke.
@@ -23,8 +24,8 @@ const SMOKE_SPREAD: f64 = 1.8;
 /// Density of soot, in g/cm^3.
 const SMOKE_G_PER_CM3: f64 = 1.8;
 
-/// Median diameter of dust by number where none is given, in um: transported mineral dust (Hess, Koepke and Schult,
-/// Bull. Am. Meteorol. Soc. 79, 831, 1998: radius 0.5 um, spread 2.2, 2.6 g/cm^3).
+/// Default for the median diameter of dust by number, in um: transported mineral dust (Hess, Koepke
+/// and Schult, Bull. Am. Meteorol. Soc. 79, 831, 1998: radius 0.5 um, spread 2.2, 2.6 g/cm^3).
 const DUST_UM: f64 = 1.0;
 
 /// Geometric standard deviation of dust.
@@ -33,10 +34,11 @@ const DUST_SPREAD: f64 = 2.2;
 /// Density of dust, in g/cm^3.
 const DUST_G_PER_CM3: f64 = 2.6;
 
-/// Index of dust where none is given: assumed for every wavelength. A user who knows the mineral gives the index.
+/// Default for the index of dust, assumed for every wavelength. A user who knows the mineral gives
+/// the index.
 const DUST_INDEX: Index = Index { real: 1.53, imaginary: 0.003 };
 
-/// What the air holds, and the window before the camera.
+/// The particles in the air, and the window in front of the camera.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Air {
     name: String,
@@ -45,22 +47,22 @@ pub struct Air {
     window: Option<Window>,
 }
 
-/// Text that names no weather. `Display` is one line.
+/// Error: the text does not name a weather. `Display` is one line.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum AirError {
-    /// A kind that does not exist.
+    /// The kind does not exist.
     #[error("found {found}, expected {}", Air::EXPECTED)]
     Unknown {
         /// The text.
         found: String,
     },
-    /// Numbers that are missing, too many, or none.
+    /// Numbers are missing, too many, or not numbers.
     #[error(transparent)]
     Numbers(#[from] ParseDropLawError),
     /// Numbers out of range.
     #[error(transparent)]
     Range(#[from] RainError),
-    /// Two kinds of particles at once.
+    /// The text names two kinds of particles at once.
     #[error("found {found}, expected one kind of weather, and drops on the window beside it")]
     Two {
         /// The text.
@@ -69,7 +71,7 @@ pub enum AirError {
 }
 
 impl Air {
-    /// What a text may be.
+    /// The allowed texts.
     pub const EXPECTED: &str = "none, light, heavy, rain:MM_PER_H[,LAW], fog:AMOUNT[,UM], \
          smoke:AMOUNT[,UM[,N,K]] or dust:AMOUNT[,UM[,N,K]] (AMOUNT in g/m3, or 5m for a visibility of 5 metres), \
          window:SHARE[,DEG], or two of them with a plus sign";
@@ -85,22 +87,22 @@ impl Air {
         }
     }
 
-    /// Drops of water that somebody counted; `name` says where they come from.
+    /// Counted drops of water. `name` says where they come from.
     #[must_use]
     pub fn of_drops(name: String, drops: Drops) -> Self {
         Self { name, drops, ..Self::dry() }
     }
 
-    /// The paper's rain, or none.
+    /// The paper's rain, or dry air.
     ///
     /// # Errors
-    /// None: both kinds of rain are in range.
+    /// Does not occur: both kinds of rain are in range.
     pub fn of_rainfall(rainfall: Rainfall) -> Result<Self, RainError> {
         let drops = rainfall.drops()?.unwrap_or_default();
         Ok(Self::of_drops(rainfall.name().to_owned(), drops))
     }
 
-    /// As the user wrote it.
+    /// The weather as the user wrote it.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
@@ -112,16 +114,17 @@ impl Air {
         &self.drops
     }
 
-    /// Whether there is nothing in the air and nothing on the window.
+    /// Whether the air and the window are clear.
     #[must_use]
     pub fn is_clear(&self) -> bool {
         self.drops.is_empty() && self.window.is_none()
     }
 
-    /// What it does to light of `wavelength_nm`.
+    /// The effects of this weather on light of `wavelength_nm`.
     ///
     /// # Errors
-    /// A wavelength at which the material is not known, or particles outside the Mie solver's range.
+    /// [`RainError`] for a wavelength at which the material is not known, or for particles outside
+    /// the Mie solver's range.
     pub fn weather(&self, wavelength_nm: f64) -> Result<Weather, RainError> {
         let weather = Weather::new(self.drops.clone(), wavelength_nm, self.substance)?;
         match self.window {
@@ -130,7 +133,8 @@ impl Air {
         }
     }
 
-    /// What does not fall: fog, smoke, dust, drops on the window. Falling drops are followed one by one.
+    /// The effects of particles that do not fall: fog, smoke, dust, drops on the window. Falling
+    /// drops are simulated one by one.
     ///
     /// # Errors
     /// As [`Self::weather`].
@@ -139,7 +143,7 @@ impl Air {
         Self { drops, ..self.clone() }.weather(wavelength_nm)
     }
 
-    /// As the text says, by `made` for 1 g/m^3.
+    /// The amount in the text. `made` makes the drops of 1 g/m^3.
     fn amount(
         text: &str,
         amount: &str,
@@ -217,10 +221,10 @@ impl Air {
         Ok(Window::new(given[0], angle)?)
     }
 
-    /// This weather with the drops on the window that stand after a plus sign.
+    /// This weather with the drops on the window that the text after a plus sign gives.
     ///
     /// # Errors
-    /// [`AirError`] for text that names no drops on a window.
+    /// [`AirError`] for text that does not give drops on a window.
     pub fn and_window(self, text: &str) -> Result<Self, AirError> {
         let parameters = text.strip_prefix("window:");
         let parameters = parameters.ok_or_else(|| AirError::Unknown { found: text.to_owned() })?;
@@ -247,7 +251,7 @@ impl FromStr for Air {
     type Err = AirError;
 
     fn from_str(text: &str) -> Result<Self, AirError> {
-        // A law of sizes has no plus sign.
+        // A law of sizes contains no plus sign.
         let parts: Vec<&str> = text.split('+').collect();
         match parts[..] {
             [only] if only.starts_with("window:") => Self::dry().and_window(only),

@@ -1,9 +1,11 @@
-//! Light that drops send back towards the camera: the phase function from 140 to 180 degrees, averaged over angles and sizes.
+//! Light that drops scatter back towards the camera: the phase function from 140 to 180 degrees,
+//! averaged over angles and sizes.
 //!
-//! Straight back, a single drop size shines by orders of magnitude more or less than one a percent larger (the glory and its
-//! resonances), and no camera sees that angle alone: collector and projector stand beside each other. So the phase function is
-//! averaged over bands of two degrees, and each drop class over sizes within 5 % of its own: no nozzle makes drops that are more
-//! equal, and a law of sizes has classes that are wider.
+//! Straight back, a single drop size scatters by orders of magnitude more or less than a size one
+//! percent larger (the glory and its resonances). A camera does not see exactly that angle, because
+//! collector and projector are next to each other. The phase function is therefore averaged over
+//! bands of two degrees, and each drop class over sizes within 5 % of its own. Drops of a nozzle
+//! differ at least as much, and classes of a law of sizes are wider.
 
 use super::medium::{representative, size_parameter};
 use super::{Drops, RainError};
@@ -28,7 +30,7 @@ const SPREAD: f64 = 0.05;
 /// Fractional part of the golden ratio: its multiples spread most evenly over 0 to 1.
 const GOLDEN_RATIO: f64 = 0.618_033_988_749_895;
 
-/// The phase function near the way back, mean 1 over the sphere.
+/// The phase function close to the direction back, with a mean of 1 over the sphere.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BackwardLobe {
     /// Means over bands of 2 degrees, from 140 to 180 degrees.
@@ -36,10 +38,11 @@ pub struct BackwardLobe {
 }
 
 impl BackwardLobe {
-    /// Where the bands begin, in degrees of the scattering angle.
+    /// Start of the bands, in degrees of the scattering angle.
     pub(super) const FIRST_DEG: f64 = 140.0;
 
-    /// What `drops` send back of light of `wavelength_nm`, each size in proportion to what it scatters.
+    /// Backscatter of `drops` for light of `wavelength_nm`. Each size contributes in proportion to
+    /// the light that it scatters.
     ///
     /// # Errors
     /// As [`super::Medium::new`], and [`RainError::NoDrops`] for dry air.
@@ -64,7 +67,7 @@ impl BackwardLobe {
         for class in representative(drops) {
             for k in 0..per_class {
                 let part = (k as f64 + 0.5) / per_class as f64;
-                // Downwards at the largest drop, beyond which there are none.
+                // The largest drop is averaged downwards, because there are no larger drops.
                 let diameter_mm = (class.diameter_mm * (1.0 + SPREAD * (2.0 * part - 1.0)))
                     .min(super::drops::LARGEST_RAINDROP_MM);
                 let sphere = mie.sphere(size_parameter(diameter_mm, wavelength_nm), index)?;
@@ -82,7 +85,8 @@ impl BackwardLobe {
         Ok(Self { bands: bands.map(|sum| sum / scattering) })
     }
 
-    /// The phase function at a scattering angle; below 140 degrees, what it is there.
+    /// The phase function at a scattering angle. Below 140 degrees the value is that at 140
+    /// degrees.
     #[must_use]
     pub fn phase(&self, angle_rad: f64) -> f64 {
         let band = (angle_rad.to_degrees() - Self::FIRST_DEG) / BAND_DEG;

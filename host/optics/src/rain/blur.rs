@@ -1,26 +1,28 @@
-//! Forward-scatter blur: where light that a drop turned aside still lands on the target.
+//! Forward-scatter blur: where light scattered by a drop lands on the target.
 //!
-//! A pencil of light that is scattered by `theta` at `s` before the target lands `s tan(theta)` beside its aim.
-//! Summed over the path this is the point-spread function of rain (Wells, *AGARD Lecture Series* 61, 1973, in its
-//! single-scattering limit): the share within a radius r is `exp(-cL) b * integral over s of P(< atan(r / s))`, with
-//! extinction c, scattering b, and P the cumulative scattering angle.
+//! A pencil of light that is scattered by `theta` at `s` before the target lands `s tan(theta)`
+//! beside its aim. Summed over the path, the landing points are the point-spread function of rain
+//! (Wells, *AGARD Lecture Series* 61, 1973, in its single-scattering limit). The share within a
+//! radius r is `exp(-cL) b * integral over s of P(< atan(r / s))`, with extinction c, scattering b,
+//! and P the cumulative scattering angle.
 //!
-//! Light scattered twice is left out, which is off by half the square of the optical depth: 0.0000002 over a metre of
-//! the paper's heavy rain. Beyond an optical depth of 0.5 single photons are followed instead (module `follow`).
-//! `tests/rain.rs` follows photons of its own through thin air, as an independent check.
+//! Light scattered twice is left out. The error is half the square of the optical depth: 0.0000002
+//! over a metre of the paper's heavy rain. Above an optical depth of 0.5, single photons are
+//! simulated instead (module `follow`). As an independent check, `tests/rain.rs` simulates its own
+//! photons through thin air.
 
 use super::follow::{Landing, Slab};
 use super::{Medium, RainError, ScatteringAngles, ensure};
 use crate::{LEDS, SIDE};
 use std::f64::consts::PI;
 
-/// Optical depth above which light scattered twice can no longer be left out.
+/// Optical depth above which light scattered twice must be included.
 pub const DEEPEST_SINGLE: f64 = 0.5;
 
-/// Largest optical depth accepted: `exp(-10)` of the light is left, 20 ppm there and back.
+/// Largest accepted optical depth: `exp(-10)` of the light remains, 20 ppm there and back.
 pub const DEEPEST: f64 = 5.0;
 
-/// Seed of the photons that are followed: the same air gives the same blur.
+/// Seed of the simulated photons: the same air gives the same blur.
 const SEED: u64 = 1;
 
 /// Steps of the integral along the path.
@@ -29,21 +31,21 @@ const STEPS: usize = 200;
 /// Offsets from one LED's spot to another, along one axis: -31 to 31.
 const REACH: usize = 2 * SIDE - 1;
 
-/// What rain does to a pencil of light on its way to a target.
+/// The blur of a pencil of light on its path to a target.
 #[derive(Debug, Clone)]
 pub struct ForwardBlur {
     medium: Medium,
     angles: Option<ScatteringAngles>,
     distance_mm: f64,
-    /// Where light lands in air too dense for single scattering.
+    /// Landing points of light in air too dense for single scattering.
     landing: Option<Landing>,
 }
 
 impl ForwardBlur {
-    /// A target at `distance_mm` behind this medium; `angles` is none in dry air.
+    /// A target at `distance_mm` behind this medium. `angles` is `None` in dry air.
     ///
     /// # Errors
-    /// [`RainError::Setting`] for a distance that is not positive or air through which no light comes.
+    /// [`RainError::Setting`] for a distance that is not positive, or air too dense for any light.
     pub fn new(
         medium: Medium,
         angles: Option<ScatteringAngles>,
@@ -60,7 +62,7 @@ impl ForwardBlur {
         Ok(Self { medium, angles, distance_mm, landing })
     }
 
-    /// Share of the light that reaches its aim untouched, `exp(-cL)`.
+    /// Share of the light that reaches its aim without scattering, `exp(-cL)`.
     #[must_use]
     pub fn unscattered(&self) -> f64 {
         self.medium.transmission(self.distance_mm * 1e-3)
@@ -80,10 +82,10 @@ impl ForwardBlur {
         self.unscattered() * self.medium.scattering_per_m * step_mm * 1e-3 * sum
     }
 
-    /// Share of a target point's light that still reaches a bucket detector which sees `field_rad` across: what is
-    /// left of the beam, and what is scattered by less than half the field and so stays in view. In dense air it is
-    /// what a pencil of light from the detector would leave within its field on the target: light paths can be
-    /// reversed.
+    /// Share of a target point's light that reaches a bucket detector with a field of `field_rad`:
+    /// the light without scattering, plus light scattered by less than half the field. In dense
+    /// air, the share is that of a pencil of light from the detector that lands within its field on
+    /// the target, because light paths can be reversed.
     #[must_use]
     pub fn returned(&self, field_rad: f64) -> f64 {
         if let Some(landing) = &self.landing {
@@ -110,7 +112,8 @@ impl ForwardBlur {
         let share = |row: usize, column: usize| {
             let offset = |i: usize| i.abs_diff(SIDE - 1) as f64;
             if row == SIDE - 1 && column == SIDE - 1 {
-                // A circle of a spot's area: the density of the forward peak is not to be sampled.
+                // A circle of a spot's area is used, because the density of the forward peak cannot
+                // be sampled.
                 return within[0];
             }
             let points = 4;
@@ -129,7 +132,7 @@ impl ForwardBlur {
     }
 }
 
-/// Whether this much air is too dense for single scattering.
+/// Whether the air is too dense for single scattering.
 pub(super) fn is_dense(medium: &Medium, distance_mm: f64) -> bool {
     medium.extinction_per_m * distance_mm * 1e-3 > DEEPEST_SINGLE
 }
@@ -137,14 +140,15 @@ pub(super) fn is_dense(medium: &Medium, distance_mm: f64) -> bool {
 /// A point-spread function on the LED grid.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BlurKernel {
-    /// Share of an LED's light that reaches its spot untouched.
+    /// Share of an LED's light that reaches its spot without scattering.
     pub unscattered: f64,
     /// Scattered shares by offset, 63 x 63, the LED's own spot in the middle.
     shares: Vec<f64>,
 }
 
 impl BlurKernel {
-    /// Scattered share that lands `rows` below and `columns` right of an LED's own spot; 0 beyond the grid.
+    /// Scattered share that lands `rows` below and `columns` right of an LED's own spot; 0 beyond
+    /// the grid.
     #[must_use]
     pub fn scattered(&self, rows: i32, columns: i32) -> f64 {
         let at =
@@ -155,8 +159,8 @@ impl BlurKernel {
         }
     }
 
-    /// The same, with `own_spot` taken from what stays in the LED's own spot: for light that is accounted for
-    /// elsewhere.
+    /// The same kernel, with `own_spot` subtracted from the light that stays in the LED's own spot,
+    /// because that light is included elsewhere.
     #[must_use]
     pub fn without_own(mut self, own_spot: f64) -> Self {
         let own = &mut self.shares[REACH * REACH / 2];
@@ -164,14 +168,14 @@ impl BlurKernel {
         self
     }
 
-    /// The same behind a window of which a share is covered by drops, which spread their light evenly over a disc. Of that
-    /// light what is scattered in the air is left out.
+    /// The same kernel behind a window with drops. The drops cover a share of the window and spread
+    /// their light evenly over a disc. Scattering of that light in the air is left out.
     #[must_use]
     pub fn behind_drops(mut self, covered: f64, disc_px: f64) -> Self {
         let clear = 1.0 - covered;
         let covered = covered * self.unscattered;
         self.unscattered *= clear;
-        // Points of a pixel that lie in the disc.
+        // Points of a pixel that are inside the disc.
         let points = 8;
         let part = |k: usize| (k as f64 + 0.5) / points as f64 - 0.5;
         let offset = |i: usize| i as f64 - (SIDE - 1) as f64;
@@ -196,8 +200,8 @@ impl BlurKernel {
         self
     }
 
-    /// Only the scattered light: what each LED (32 x 32, row-major) sees of the reflectances around its spot. Beyond
-    /// the grid there is nothing to see.
+    /// The scattered light only: what each LED (32 x 32, row-major) receives from the reflectances
+    /// around its spot. Reflectance beyond the grid counts as 0.
     ///
     /// # Panics
     /// If `reflectance` does not hold 1024 values.

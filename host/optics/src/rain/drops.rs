@@ -1,25 +1,28 @@
-//! Drop sizes: how many drops of each diameter a cubic metre of air holds.
+//! Drop sizes: the number of drops of each diameter in a cubic metre of air.
 //!
-//! Laws of sizes are cut into classes once, here; every integral over sizes is then a sum. 100 classes of equal width
-//! carry extinction and rain rate to better than 1 % of the closed forms (tested).
+//! Laws of sizes are divided into classes here, and every integral over sizes is a sum over the
+//! classes. 100 classes of equal width give extinction and rain rate to better than 1 % of the
+//! closed forms (`tests::marshall_palmers_classes_carry_the_law_they_were_cut_from`).
 
 use super::fall::{fall_speed_from_rest_m_per_s, fall_speed_m_per_s};
 use super::{RainError, ensure};
 use std::f64::consts::PI;
 
-/// Classes that a continuous law is cut into.
+/// Number of classes of a continuous law.
 const CLASSES: usize = 100;
 
-/// Smallest raindrop: below it the fall-speed law ([`super::fall`]) has no positive value.
+/// Smallest raindrop. Below this diameter the fall-speed law ([`super::fall`]) has no positive
+/// value.
 pub const SMALLEST_RAINDROP_MM: f64 = 0.11;
 
-/// Largest raindrop: larger ones break up.
+/// Largest raindrop. Larger drops break up.
 pub const LARGEST_RAINDROP_MM: f64 = 8.0;
 
-/// Highest rain rate accepted, in mm/h; a cloudburst has 100 to 200.
+/// Highest accepted rain rate, in mm/h. A cloudburst has 100 to 200.
 pub const HIGHEST_RATE_MM_PER_H: f64 = 300.0;
 
-/// Most water, smoke or dust accepted, in g/m^3: natural fog has at most 1, a fog chamber 20.
+/// Largest accepted mass of water, smoke or dust, in g/m^3. Natural fog has at most 1, a fog
+/// chamber 20.
 pub const DENSEST_G_PER_M3: f64 = 100.0;
 
 /// Marshall and Palmer's intercept, in m^-3 mm^-1 (J. Meteorol. 5, 165, 1948).
@@ -50,7 +53,8 @@ impl Drops {
         Self::default()
     }
 
-    /// Natural rain: `N(D) = 8000 exp(-4.1 R^-0.21 D)` m^-3 mm^-1, D in mm, R in mm/h (Marshall and Palmer, 1948).
+    /// Natural rain: `N(D) = 8000 exp(-4.1 R^-0.21 D)` m^-3 mm^-1, D in mm, R in mm/h (Marshall and
+    /// Palmer, 1948).
     ///
     /// # Errors
     /// [`RainError::Setting`] for a rate that is not in 0 to [`HIGHEST_RATE_MM_PER_H`].
@@ -65,11 +69,12 @@ impl Drops {
         }))
     }
 
-    /// A gamma law `N(D) = N0 D^shape exp(-slope D)` (Ulbrich, J. Climate Appl. Meteorol. 22, 1764, 1983), with the
-    /// N0 that gives this rain rate. `shape` is the paper's mu, `slope_per_mm` its Lambda.
+    /// A gamma law `N(D) = N0 D^shape exp(-slope D)` (Ulbrich, J. Climate Appl. Meteorol. 22, 1764,
+    /// 1983), with the N0 of this rain rate. `shape` is the paper's mu, `slope_per_mm` its Lambda.
     ///
     /// # Errors
-    /// [`RainError::Setting`] for a rate out of range, a shape not in -1 to 20, a slope not in 0.5 to 50.
+    /// [`RainError::Setting`] for a rate out of range, a shape not in -1 to 20, a slope not in 0.5
+    /// to 50.
     pub fn gamma(rate_mm_per_h: f64, shape: f64, slope_per_mm: f64) -> Result<Self, RainError> {
         check_rate(rate_mm_per_h)?;
         ensure((-1.0..=20.0).contains(&shape), "gamma shape", shape, "-1 to 20")?;
@@ -87,10 +92,10 @@ impl Drops {
         Ok(Self::from_law(SMALLEST_RAINDROP_MM, largest, law).scaled_to_rate(rate_mm_per_h))
     }
 
-    /// Drops of one size, as the paper's nozzles are said to give: 0.5 mm light, 2 mm heavy.
+    /// Drops of one size, which the paper states for its nozzles: 0.5 mm light, 2 mm heavy.
     ///
     /// # Errors
-    /// [`RainError::Setting`] for a rate out of range or a diameter that is none of a raindrop.
+    /// [`RainError::Setting`] for a rate out of range, or a diameter that raindrops do not have.
     pub fn monodisperse(rate_mm_per_h: f64, diameter_mm: f64) -> Result<Self, RainError> {
         check_rate(rate_mm_per_h)?;
         let falls = (SMALLEST_RAINDROP_MM..=LARGEST_RAINDROP_MM).contains(&diameter_mm);
@@ -102,10 +107,10 @@ impl Drops {
         Ok(one.scaled_to_rate(rate_mm_per_h))
     }
 
-    /// Drops as somebody counted them.
+    /// Counted drops.
     ///
     /// # Errors
-    /// [`RainError`] if there are none, or a diameter or number is not physical.
+    /// [`RainError`] if there are no drops, or a diameter or number is not physical.
     pub fn measured(classes: Vec<DropClass>) -> Result<Self, RainError> {
         if classes.is_empty() {
             return Err(RainError::NoDrops);
@@ -119,12 +124,13 @@ impl Drops {
         Ok(Self { classes })
     }
 
-    /// Fog: `N(D) ~ D^6 exp(-6 D / mode)`, the shape of Deirmendjian's cloud C1 (*Electromagnetic Scattering on
-    /// Spherical Polydispersions*, 1969) around the most frequent diameter `mode_um`, with `liquid_g_per_m3` of
-    /// water.
+    /// Fog: `N(D) ~ D^6 exp(-6 D / mode)`, the shape of Deirmendjian's cloud C1 (*Electromagnetic
+    /// Scattering on Spherical Polydispersions*, 1969) around the most frequent diameter `mode_um`,
+    /// with `liquid_g_per_m3` of water.
     ///
     /// # Errors
-    /// [`RainError::Setting`] for a mode not in 0.5 to 100 um or more water than [`DENSEST_G_PER_M3`].
+    /// [`RainError::Setting`] for a mode not in 0.5 to 100 um or more water than
+    /// [`DENSEST_G_PER_M3`].
     pub fn fog(mode_um: f64, liquid_g_per_m3: f64) -> Result<Self, RainError> {
         ensure((0.5..=100.0).contains(&mode_um), "fog mode", mode_um, "0.5 to 100 um")?;
         let holds = (0.0..=DENSEST_G_PER_M3).contains(&liquid_g_per_m3);
@@ -136,11 +142,13 @@ impl Drops {
         Ok(fog.scaled(factor))
     }
 
-    /// Particles whose diameters are distributed log-normally by number around `median_um`, `spread` being the geometric
-    /// standard deviation, with `g_per_m3` of a material of `density_g_per_cm3`.
+    /// Particles with a log-normal distribution of diameters by number around `median_um`. `spread`
+    /// is the geometric standard deviation. The mass is `g_per_m3` of a material of
+    /// `density_g_per_cm3`.
     ///
     /// # Errors
-    /// [`RainError::Setting`] for a median not in 0.02 to 100 um, or a mass that is not in 0 to [`DENSEST_G_PER_M3`].
+    /// [`RainError::Setting`] for a median not in 0.02 to 100 um, or a mass that is not in 0 to
+    /// [`DENSEST_G_PER_M3`].
     pub fn lognormal(
         median_um: f64,
         spread: f64,
@@ -157,7 +165,8 @@ impl Drops {
         let holds = (0.0..=DENSEST_G_PER_M3).contains(&g_per_m3);
         ensure(holds, "mass in the air", g_per_m3, "0 to 100 g/m3")?;
         let sigma = spread.ln();
-        // The third moment, and with it the mass, has its median at 3 sigma^2 above that of the numbers.
+        // The third moment, and with it the mass, has its median at 3 sigma^2 above that of the
+        // numbers.
         let (low, high) = (-3.0 * sigma, 3.0 * sigma + 3.0 * sigma * sigma);
         let width = (high - low) / CLASSES as f64;
         let class = |i| {
@@ -192,9 +201,10 @@ impl Drops {
         self.scaled(factor)
     }
 
-    /// The same water per hour `height_m` below nozzles that let the drops go at rest: drops that are slower than at their terminal
-    /// speed are denser, each class by the ratio of the two speeds. A nozzle that shoots drops out with some speed gives fewer:
-    /// this is the most that there can be. Droplets that do not fall are left as they are.
+    /// The same water per hour `height_m` below nozzles that release the drops at rest. Drops below
+    /// their terminal speed are denser, each class by the ratio of the two speeds. A nozzle that
+    /// ejects drops with some speed gives fewer drops, so the result is an upper bound. Droplets
+    /// that do not fall stay unchanged.
     ///
     /// # Errors
     /// [`RainError::Setting`] for a height that is not positive.
@@ -222,7 +232,7 @@ impl Drops {
         self.concentration_per_m3() == 0.0
     }
 
-    /// Whether there are drops that fall, and that can be followed one by one; droplets and grains hang in the air.
+    /// Whether the drops fall and can be simulated one by one. Droplets and grains stay in the air.
     #[must_use]
     pub fn fall(&self) -> bool {
         let falls = |class: &DropClass| class.diameter_mm >= SMALLEST_RAINDROP_MM;
@@ -253,8 +263,8 @@ impl Drops {
         self.sum(|d| PI / 6.0 * (d * 1e-3).powi(3) * WATER_G_PER_M3)
     }
 
-    /// Share of a plane that the drops of one metre of air cover, `sum N pi/4 D^2`: half of the extinction of drops
-    /// that are large against the wavelength.
+    /// Share of a plane that the drops of one metre of air cover, `sum N pi/4 D^2`: half of the
+    /// extinction of drops that are large compared with the wavelength.
     #[must_use]
     pub fn shadow_per_m(&self) -> f64 {
         self.sum(|d| PI / 4.0 * d * d * 1e-6)
@@ -276,10 +286,12 @@ mod tests {
         let rate: f64 = 5.6;
         let slope = 4.1 * rate.powf(-0.21);
         let drops = Drops::marshall_palmer(rate).unwrap();
-        // Integral of pi/4 D^2 N0 exp(-slope D) over all D: pi N0 / (2 slope^3), less what is below 0.11 mm.
+        // Integral of pi/4 D^2 N0 exp(-slope D) over all D: pi N0 / (2 slope^3), less what is below
+        // 0.11 mm.
         let whole = PI * 8000.0 / (2.0 * slope.powi(3)) * 1e-6;
         assert!((drops.shadow_per_m() / whole - 1.0).abs() < 0.01, "{}", drops.shadow_per_m());
-        // With today's fall speeds the law of 1948 rains 10 to 20 % more than it is named for.
+        // With the newer fall speeds, the law of 1948 gives 10 to 20 % more rain than its nominal
+        // rate.
         assert!((1.0..1.25).contains(&(drops.rate_mm_per_h() / rate)), "{}", drops.rate_mm_per_h());
     }
 
@@ -293,7 +305,8 @@ mod tests {
 
     #[test]
     fn below_nozzles_the_same_water_is_in_slower_and_therefore_more_drops() {
-        // 6.548 m/s over 2.153 m/s: 3.04 times; 0.5 mm drops are near their terminal speed: 1.2 times.
+        // 6.548 m/s over 2.153 m/s: 3.04 times; 0.5 mm drops are near their terminal speed: 1.2
+        // times.
         for (diameter_mm, times) in [(2.0, 3.04), (0.5, 1.17)] {
             let drops = Drops::monodisperse(5.6, diameter_mm).unwrap();
             let rig = drops.below_nozzles(0.25).unwrap();

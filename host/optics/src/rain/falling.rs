@@ -1,12 +1,16 @@
-//! Single drops in the LEDs' beams. In the paper's heavy rain there is half a drop between camera and target at a
-//! metre: most frames see none, a few see one well. A mean over many drops would show none of this.
+//! Single drops in the LEDs' beams. In the paper's heavy rain there is half a drop between camera
+//! and target at a metre: most frames have no drop, a few have one. A mean over many drops would
+//! not show this difference.
 //!
-//! A drop is an opaque disc here. It refracts or reflects what hits it by far more than a spot's width (the other
-//! half of Q_ext = 2 is diffraction, by a quarter of a milliradian for a 2 mm drop, and stays within the spot). The
-//! light that it sends elsewhere on the target is in [`super::blur`].
+//! A drop is modelled as an opaque disc. The drop refracts or reflects light by far more than a
+//! spot's width. (The other half of Q_ext = 2 is diffraction, by a quarter of a milliradian for a 2
+//! mm drop, and stays within the spot.) [`super::blur`] computes the light that the drop scatters
+//! onto the target.
 //!
-//! Law: the drops are a stationary Poisson process. Where and when one enters is random with the seed; where it is
-//! later follows from its fall speed.
+//! # Invariant
+//! The drops are a stationary Poisson process: the seed determines place and time of entry, and the
+//! fall speed determines the later position (`a_seed_repeats_its_rain_and_the_drops_stay_as_many`
+//! in `host/optics/tests/rain.rs`).
 
 use super::fall::fall_speed_m_per_s;
 use super::{Drops, RainError, ensure};
@@ -16,10 +20,10 @@ use rand_distr::{Distribution, Poisson};
 use rand_pcg::Pcg64Mcg;
 use std::f64::consts::PI;
 
-/// More drops than this are not followed one by one.
+/// The most drops that are simulated one by one.
 const MOST_DROPS: f64 = 200_000.0;
 
-/// Empty air kept around the beams, so that no drop is born inside one.
+/// Empty air around the beams, so that drops do not appear inside a beam.
 const MARGIN_MM: f64 = 10.0;
 
 /// The beams from projector to target and back to the detector.
@@ -31,12 +35,13 @@ pub struct BeamShadows {
     pub distance_mm: f64,
     /// Distance of the detector's collector from the projector's lens, to the right.
     pub baseline_mm: f64,
-    /// Diameter of the collector that counts ([`crate::Budget::effective_collector_mm`]).
+    /// Effective diameter of the collector ([`crate::Budget::effective_collector_mm`]).
     pub collector_mm: f64,
 }
 
 impl BeamShadows {
-    /// Radius of an LED's beam at depth `z`: the lens's cone about the focus, and the emitter's image.
+    /// Radius of an LED's beam at depth `z`: the lens's cone about the focus, and the emitter's
+    /// image.
     fn out_radius_mm(&self, z: f64) -> f64 {
         let spot = self.projector.emitter_mm / 2.0 * self.projector.magnification(z);
         self.projector.blur_mm(z) / 2.0 + spot
@@ -48,7 +53,8 @@ impl BeamShadows {
         self.collector_mm / 2.0 * (1.0 - part) + self.out_radius_mm(self.distance_mm) * part
     }
 
-    /// Multiplies into `kept` (32 x 32) what a drop leaves of each LED's light on the ways asked for.
+    /// Multiplies into `kept` (32 x 32) the share of each LED's light that a drop leaves on the
+    /// chosen paths.
     fn shade(&self, drop: &Drop, ways: Ways, kept: &mut [f32]) {
         let part = drop.z_mm / self.distance_mm;
         let pitch = self.projector.field_mm(self.distance_mm) / SIDE as f64 * part;
@@ -77,16 +83,16 @@ impl BeamShadows {
     }
 }
 
-/// Which of an LED's light a drop can stand in.
+/// The paths of light that a drop can block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Ways {
     /// From the projector and back to the collector.
     Both,
-    /// Back to the collector alone: a camera in daylight.
+    /// Only back to the collector: a camera in daylight.
     Back,
 }
 
-/// Area that two discs share whose centres are `apart`.
+/// Common area of two discs whose centres are `apart`.
 fn common_area(apart: f64, a: f64, b: f64) -> f64 {
     if apart >= a + b {
         return 0.0;
@@ -123,10 +129,11 @@ pub struct FallingDrops {
 }
 
 impl FallingDrops {
-    /// Rain that has been falling for long. The same drops, beams and seed give the same rain.
+    /// Rain that started long ago. The same drops, beams and seed give the same rain.
     ///
     /// # Errors
-    /// [`RainError::Setting`] for lengths that are not positive, or more than 200 000 drops in view.
+    /// [`RainError::Setting`] for lengths that are not positive, or more than 200 000 drops in
+    /// view.
     pub fn new(drops: &Drops, beams: BeamShadows, seed: u64) -> Result<Self, RainError> {
         let positive = |v: f64| v.is_finite() && v > 0.0;
         let lengths = [
@@ -163,13 +170,13 @@ impl FallingDrops {
         Ok(rain)
     }
 
-    /// Where in the top of the box a drop enters.
+    /// The place in the top of the box where a drop enters.
     fn entry(&mut self) -> (f64, f64) {
         let x_mm = (2.0 * self.rng.random::<f64>() - 1.0) * self.half_width_mm;
         (x_mm, self.rng.random::<f64>() * self.beams.distance_mm)
     }
 
-    /// Lets the drops fall for a while. What leaves below is replaced above.
+    /// Advances the drops by a time. Drops that leave at the bottom are replaced at the top.
     pub fn advance(&mut self, seconds: f64) {
         let height = 2.0 * self.half_height_mm;
         for i in 0..self.drops.len() {
@@ -183,13 +190,14 @@ impl FallingDrops {
         }
     }
 
-    /// Share of each LED's light that the drops leave on both ways, 32 x 32, row-major.
+    /// Share of each LED's light that the drops leave on both paths, 32 x 32, row-major.
     #[must_use]
     pub fn kept(&self) -> Vec<f32> {
         self.left(Ways::Both)
     }
 
-    /// The same on the way back alone: what drops leave of each spot's view, for a camera that needs no LEDs.
+    /// Share of each spot's light that the drops leave on the path back, 32 x 32, row-major, for a
+    /// camera without LEDs.
     #[must_use]
     pub fn seen(&self) -> Vec<f32> {
         self.left(Ways::Back)
@@ -203,7 +211,7 @@ impl FallingDrops {
         kept
     }
 
-    /// Drops in the air around the beams.
+    /// Number of drops in the air around the beams.
     #[must_use]
     pub fn count(&self) -> usize {
         self.drops.len()
@@ -231,7 +239,8 @@ mod tests {
     #[test]
     fn a_drop_before_the_target_darkens_the_leds_it_stands_before_and_no_others() {
         let beams = beams();
-        // At 299 mm an LED's beam is 1 mm wide every 1.5 mm. LED (10, 20) aims at ((20 - 15.5) 1.5, (10 - 15.5) 1.5).
+        // At 299 mm an LED's beam is 1 mm wide every 1.5 mm. LED (10, 20) aims at ((20 - 15.5) 1.5,
+        // (10 - 15.5) 1.5).
         let drop =
             Drop { x_mm: 6.73, y_mm: -8.22, z_mm: 299.0, radius_mm: 0.7, speed_mm_per_s: 0.0 };
         let mut kept = vec![1.0; LEDS];

@@ -1,33 +1,34 @@
-//! Light followed photon by photon through dense air: any number of scatterings, in three dimensions.
+//! Simulates light photon by photon through dense air: any number of scatterings, in three
+//! dimensions.
 //!
-//! A photon flies a free path drawn from Beer and Lambert's law, loses the absorbed share of its weight, turns by an
-//! angle drawn from [`ScatteringAngles`], and flies on, until it crosses the plane of the target or that of the camera
-//! (Monte Carlo; Wang, Jacques and Zheng, Comput. Methods Programs Biomed. 47, 131, 1995). For light that comes back to
-//! the detector each collision contributes what would reach it from there directly (the local estimate; Marchuk and
-//! others, *The Monte Carlo Methods in Atmospheric Optics*, 1980): so few photons hit a lens that counting them would
-//! say nothing.
+//! A photon flies a free path drawn from Beer and Lambert's law, loses the absorbed share of its
+//! weight, turns by an angle drawn from [`ScatteringAngles`], and continues until it crosses the
+//! plane of the target or of the camera (Monte Carlo; Wang, Jacques and Zheng, Comput. Methods
+//! Programs Biomed. 47, 131, 1995). For light back to the detector, each collision contributes its
+//! expected direct light at the detector (the local estimate; Marchuk and others, *The Monte Carlo
+//! Methods in Atmospheric Optics*, 1980), because too few photons hit a lens for counting.
 //!
 //! # Invariant
-//! Where air is thin the results are those of single scattering: `thin_air_scatters_once`.
+//! In thin air the results are those of single scattering (`tests::thin_air_scatters_once`).
 
 use super::{BackwardLobe, Medium, ScatteringAngles};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use std::f64::consts::{PI, TAU};
 
-/// Photons that are followed.
+/// Number of simulated photons.
 const PHOTONS: u32 = 60_000;
 
-/// Weight below which a photon survives one time in ten, with ten times the weight.
+/// Below this weight a photon survives one time in ten, with ten times the weight.
 const FAINT: f64 = 1e-3;
 
-/// Nearest a collision counts to the detector, in mm: about the radius of its lens.
+/// The smallest distance of a collision from the detector, in mm: about the radius of its lens.
 const NEAREST_MM: f64 = 10.0;
 
-/// Rings of the landing radius in an octave.
+/// Rings of the landing radius per octave.
 const RINGS_PER_OCTAVE: f64 = 6.0;
 
-/// Rings in all: from a millionth of the path to eight paths.
+/// Number of rings: from a millionth of the path to eight paths.
 const RINGS: usize = 138;
 
 /// Where the scattered light of a pencil lands on a target.
@@ -39,8 +40,8 @@ pub struct Landing {
 }
 
 impl Landing {
-    /// Share of the light that is scattered and lands within `radius_mm` of its aim. Between rings the share grows
-    /// with the logarithm of the radius.
+    /// Share of the light that is scattered and lands within `radius_mm` of its aim. Between rings
+    /// the share grows with the logarithm of the radius.
     #[must_use]
     pub fn within(&self, radius_mm: f64) -> f64 {
         let at = RINGS_PER_OCTAVE * (radius_mm / self.smallest_mm).log2();
@@ -72,8 +73,8 @@ pub(super) struct Slab<'a> {
 }
 
 impl Slab<'_> {
-    /// Flies a photon from collision to collision. `collided` sees it before each turn; the result is where it crosses
-    /// the target's plane, if it does.
+    /// Flies a photon from collision to collision. `collided` receives the photon before each turn.
+    /// Returns where the photon crosses the target's plane, if it does.
     fn fly(
         &self,
         photon: &mut Photon,
@@ -130,8 +131,9 @@ impl Slab<'_> {
         Landing { smallest_mm, within: rings }
     }
 
-    /// Light that the air sends back into a detector `baseline_mm` beside the projector before it has seen the target,
-    /// over that from a white target in dry air. Both see a field of `field_mm` on the target.
+    /// Light that the air scatters back into a detector `baseline_mm` beside the projector before
+    /// reaching the target, divided by the light of a white target in dry air. Projector and
+    /// detector see a field of `field_mm` on the target.
     pub(super) fn backscatter(
         &self,
         lobe: &BackwardLobe,
@@ -157,7 +159,8 @@ impl Slab<'_> {
                 let length_mm = to.iter().map(|v| v * v).sum::<f64>().sqrt().max(NEAREST_MM);
                 let cosine = unit(to).iter().zip(photon.along).map(|(a, b)| a * b).sum::<f64>();
                 let angle_rad = cosine.clamp(-1.0, 1.0).acos();
-                // The bins are 20 degrees wide there, wider than the glory of droplets.
+                // The bins of the angles are 20 degrees wide there, wider than the glory of
+                // droplets.
                 let phase = match angle_rad >= BackwardLobe::FIRST_DEG.to_radians() {
                     true => lobe.phase(angle_rad),
                     false => self.angles.phase(angle_rad),
@@ -211,7 +214,7 @@ mod tests {
         let blur = ForwardBlur::new(medium, Some(angles.clone()), distance_mm).unwrap();
         for radius_mm in [10.0, 50.0, 200.0, 1000.0] {
             let (followed, once) = (landing.within(radius_mm), blur.scattered_within(radius_mm));
-            // Four standard deviations, and what is scattered twice.
+            // The limit is four standard deviations plus light scattered twice.
             let allowed = 4.0 * (once / f64::from(PHOTONS)).sqrt() + depth * depth / 2.0;
             assert!((followed - once).abs() < allowed, "{radius_mm} mm: {followed}, {once}");
             assert!(once > 5.0 * allowed || radius_mm < 50.0, "{once} {allowed}");
@@ -221,7 +224,7 @@ mod tests {
         let once =
             Veil::new(&medium, Some((&lobe, &angles)), &projector, distance_mm, 40.0).unwrap();
         let followed = slab.backscatter(&lobe, 40.0, projector.field_mm(distance_mm), 5);
-        // The single-scattering veil takes the part of the field that both see along one axis.
+        // The single-scattering veil approximates the common part of the two fields along one axis.
         assert!((followed / once.backscatter - 1.0).abs() < 0.15, "{followed} {once:?}");
     }
 

@@ -1,13 +1,14 @@
-//! What rain takes out of light by laws that were fitted to measurements of free-space optical links: an outside check of the Mie
-//! sums of [`super::Medium`].
+//! Extinction of rain by laws fitted to measurements of free-space optical links: an independent
+//! check of the Mie sums of [`super::Medium`].
 //!
-//! Both are power laws of the rain rate, `k R^alpha` in dB/km, for visible and near-infrared light alike: drops are large against
-//! either. ITU-R P.838 is for radio frequencies and is no reference here.
+//! Both are power laws of the rain rate, `k R^alpha` in dB/km, for visible and near-infrared light
+//! alike, because drops are large compared with either wavelength. ITU-R P.838 is for radio
+//! frequencies and does not apply.
 
 /// A power law of the rain rate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FsoLaw {
-    /// Where it is from.
+    /// The source of the law.
     pub name: &'static str,
     /// dB/km at 1 mm/h.
     pub k: f64,
@@ -45,7 +46,7 @@ mod tests {
             let ours = Medium::new(&drops, 1550.0, Water::Segelstein).unwrap();
             let ratio = ours.extinction_db_per_km() / FsoLaw::JAPAN.db_per_km(rate);
             assert!((ratio - 1.0).abs() < 0.02, "{rate} mm/h: {ratio}");
-            // The other law is lower: rain differs from place to place by tens of percent.
+            // The other law is lower, because rain differs between places by tens of percent.
             let ratio = ours.extinction_db_per_km() / FsoLaw::CARBONNEAU.db_per_km(rate);
             assert!((1.2..1.5).contains(&ratio), "{rate} mm/h: {ratio}");
         }

@@ -1,4 +1,4 @@
-//! A law of drop sizes, as a user writes it.
+//! A law of drop sizes as a user writes it.
 
 use super::{Drops, RainError};
 use std::fmt;
@@ -23,7 +23,7 @@ pub enum DropLaw {
         /// The paper's Lambda.
         slope_per_mm: f64,
     },
-    /// Fog, whose rain rate follows from its water: `fog:UM,G`.
+    /// Fog. The rain rate follows from its water: `fog:UM,G`.
     Fog {
         /// The most frequent diameter.
         mode_um: f64,
@@ -32,24 +32,25 @@ pub enum DropLaw {
     },
 }
 
-/// Text that names no law. `Display` is one line with what was found and what is expected.
+/// Error: the text does not name a law. `Display` is one line with what was found and what is
+/// expected.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("found {found}, expected {expected}")]
 pub struct ParseDropLawError {
     /// The text.
     pub found: String,
-    /// The laws, or how many numbers the law takes.
+    /// The laws, or the number of parameters of the law.
     pub expected: String,
 }
 
 impl DropLaw {
-    /// What a text may be.
+    /// The allowed texts.
     pub const EXPECTED: &str = "marshall-palmer, mono:MM, gamma:SHAPE,SLOPE or fog:UM,G";
 
     /// The drops of this law at a rain rate.
     ///
     /// # Errors
-    /// A rate or a parameter out of range.
+    /// [`RainError`] for a rate or a parameter out of range.
     pub fn drops(self, rate_mm_per_h: f64) -> Result<Drops, RainError> {
         match self {
             Self::MarshallPalmer => Drops::marshall_palmer(rate_mm_per_h),
@@ -123,7 +124,7 @@ fn numbers<const COUNT: usize>(
     parameters: &str,
 ) -> Result<[f64; COUNT], ParseDropLawError> {
     let mut found = numbers_between(text, parameters, COUNT..=COUNT)?.into_iter();
-    // As many as were asked for.
+    // The count was checked above, so no default is used.
     Ok(std::array::from_fn(|_| found.next().unwrap_or(f64::NAN)))
 }
 

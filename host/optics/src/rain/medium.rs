@@ -1,7 +1,9 @@
-//! A volume of air with drops in it: what a metre of it takes out of a beam, and into which angles.
+//! A volume of air with drops: what a metre of air removes from a beam, and the angles into which
+//! it scatters.
 //!
-//! Drops are far apart (a 2 mm drop every 26 cm in the paper's heavy rain), so each scatters alone and their cross
-//! sections add (independent scattering; van de Hulst, *Light Scattering by Small Particles*, 1957, 1.21).
+//! Drops are far apart (a 2 mm drop every 26 cm in the paper's heavy rain), so each scatters
+//! independently and the cross sections add (independent scattering; van de Hulst, *Light
+//! Scattering by Small Particles*, 1957, 1.21).
 
 use super::{DropClass, Drops, RainError};
 use crate::mie::Mie;
@@ -13,24 +15,25 @@ use std::f64::consts::PI;
 pub struct Medium {
     /// Wavelength.
     pub wavelength_nm: f64,
-    /// Taken out of a beam per metre: `sum N Q_ext pi/4 D^2`.
+    /// Extinction: removed from a beam per metre, `sum N Q_ext pi/4 D^2`.
     pub extinction_per_m: f64,
-    /// Of that, sent elsewhere.
+    /// The scattered part of the extinction.
     pub scattering_per_m: f64,
-    /// Of that, absorbed.
+    /// The absorbed part of the extinction.
     pub absorption_per_m: f64,
     /// Mean cosine of the scattering angle; 0 without drops.
     pub asymmetry: f64,
-    /// Scattered straight back, at exactly 180 degrees, per metre and steradian. A camera beside its projector does not see that
-    /// angle: [`super::BackwardLobe`].
+    /// Scattered straight back, at exactly 180 degrees, per metre and steradian. A camera beside
+    /// its projector does not see that angle; see [`super::BackwardLobe`].
     pub backscatter_per_m_sr: f64,
 }
 
 impl Medium {
-    /// The medium that `drops` make for light of `wavelength_nm`.
+    /// The medium of `drops` for light of `wavelength_nm`.
     ///
     /// # Errors
-    /// [`RainError`] for a wavelength outside the water table or a drop outside the Mie solver's range.
+    /// [`RainError`] for a wavelength outside the water table or a drop outside the Mie solver's
+    /// range.
     pub fn new(
         drops: &Drops,
         wavelength_nm: f64,
@@ -62,7 +65,7 @@ impl Medium {
         Ok(medium)
     }
 
-    /// Scattered share of what is taken out; 1 without drops, which absorb nothing.
+    /// Scattered share of the extinction; 1 without drops.
     #[must_use]
     pub fn albedo(&self) -> f64 {
         if self.extinction_per_m > 0.0 {
@@ -84,8 +87,8 @@ impl Medium {
         (-self.extinction_per_m * path_m).exp()
     }
 
-    /// Distance at which the contrast of a black object against the sky falls to 2 %, `3.912 / extinction`
-    /// (Koschmieder); infinite in dry air.
+    /// Distance at which the contrast of a black object against the sky falls to 2 %, `3.912 /
+    /// extinction` (Koschmieder); infinite in dry air.
     #[must_use]
     pub fn visibility_m(&self) -> f64 {
         3.912 / self.extinction_per_m
@@ -96,8 +99,8 @@ pub(super) fn size_parameter(diameter_mm: f64, wavelength_nm: f64) -> f64 {
     PI * diameter_mm * 1e6 / wavelength_nm
 }
 
-/// The classes that stand for all where each costs much: no more than some 20, evenly picked from those that carry
-/// more than a thousandth of the largest class's area.
+/// Representative classes for expensive computations: at most some 20, evenly chosen from classes
+/// with more than a thousandth of the largest class's area.
 pub(super) fn representative(drops: &Drops) -> impl Iterator<Item = &DropClass> {
     let area = |class: &DropClass| class.per_m3 * class.diameter_mm.powi(2);
     let most = drops.classes().iter().map(area).fold(0.0, f64::max);
@@ -112,25 +115,27 @@ const BINS: usize = 120;
 /// Samples of the phase function in each bin.
 const SAMPLES: usize = 16;
 
-/// Fractional part of the golden ratio: its multiples spread most evenly over 0 to 1.
+/// Fractional part of the golden ratio. Its multiples are distributed most evenly over 0 to 1.
 const GOLDEN_RATIO: f64 = 0.618_033_988_749_895;
 
-/// First edge after 0, in radians: a twentieth of the diffraction lobe of an 8 mm drop in violet light.
+/// First edge after 0, in radians: a twentieth of the diffraction lobe of an 8 mm drop in violet
+/// light.
 const FIRST_EDGE_RAD: f64 = 2e-6;
 
-/// Into which angles a medium scatters, as a cumulative distribution.
+/// The distribution of a medium's scattering angles, cumulative.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScatteringAngles {
     /// Upper edges of the bins, ascending, the last pi; the first bin begins at 0.
     edges_rad: Vec<f64>,
     /// Share of all scattered light up to each edge, the last 1.
     cumulative: Vec<f64>,
-    /// What the sampled phase function integrated to before it was made 1.
+    /// Integral of the sampled phase function before normalisation.
     raw_total: f64,
 }
 
 impl ScatteringAngles {
-    /// The angles into which `drops` scatter light of `wavelength_nm`, each size in proportion to what it scatters.
+    /// The angles into which `drops` scatter light of `wavelength_nm`. Each size contributes in
+    /// proportion to the light that it scatters.
     ///
     /// # Errors
     /// As [`Medium::new`], and [`RainError::NoDrops`] for dry air.
@@ -147,7 +152,8 @@ impl ScatteringAngles {
             .map(|i| {
                 let low = if i < SAMPLES { 0.0 } else { edges_rad[i / SAMPLES - 1] };
                 let high = edges_rad[i / SAMPLES];
-                // Spread evenly but not in step with the lobes of a single drop size.
+                // The samples are distributed evenly, but not in step with the lobes of a single
+                // drop size.
                 let jitter = (i as f64 * GOLDEN_RATIO).fract();
                 low + (high - low) * ((i % SAMPLES) as f64 + jitter) / SAMPLES as f64
             })
@@ -199,7 +205,8 @@ impl ScatteringAngles {
         low + (self.cumulative[bin] - low) * part
     }
 
-    /// The angle within which a share of the scattered light leaves: a random angle for a random `share` in 0 to 1.
+    /// The angle within which a share of the scattered light leaves. A random `share` in 0 to 1
+    /// gives a random angle.
     #[must_use]
     pub fn quantile_rad(&self, share: f64) -> f64 {
         let bin = self.cumulative.partition_point(|&sum| sum < share).min(BINS - 1);
@@ -210,7 +217,7 @@ impl ScatteringAngles {
         low_angle + (self.edges_rad[bin] - low_angle) * part
     }
 
-    /// The phase function at an angle, mean 1 over the sphere: that of its bin.
+    /// The phase function at an angle, which is that of its bin. The mean over the sphere is 1.
     #[must_use]
     pub fn phase(&self, angle_rad: f64) -> f64 {
         let bin = self.edges_rad.partition_point(|&edge| edge < angle_rad).min(BINS - 1);
@@ -231,7 +238,8 @@ impl ScatteringAngles {
         mean
     }
 
-    /// What the sampled phase function integrated to before it was made 1: how well the bins resolve it.
+    /// Integral of the sampled phase function before normalisation, which shows how well the bins
+    /// resolve the function.
     #[must_use]
     pub fn raw_total(&self) -> f64 {
         self.raw_total

@@ -1,4 +1,4 @@
-//! The two kinds of rain of the paper's Table 2: each of one drop size.
+//! The two kinds of rain of the paper's Table 2. Each has one drop size.
 
 use super::{Drops, RainError};
 

@@ -1,13 +1,14 @@
-//! Differential reflectivity: what a weather radar says about drop shape, and an input of the paper's Algorithm 2.
+//! Differential reflectivity: the drop shape as seen by a weather radar, an input of the paper's
+//! Algorithm 2.
 //!
-//! Large drops flatten as they fall and send back more horizontal than vertical polarisation. It says something about
-//! drop sizes; it has no part in what a drop does to light.
+//! Large drops flatten as they fall and reflect more horizontal than vertical polarisation. The
+//! reflectivity depends on drop sizes, but does not affect light.
 
 use super::Drops;
 use num_complex::Complex64;
 
-/// Refractive index of water at 10 cm wavelength and 20 degrees C (Battan, *Radar Observation of the Atmosphere*,
-/// 1973).
+/// Refractive index of water at 10 cm wavelength and 20 degrees C (Battan, *Radar Observation of
+/// the Atmosphere*, 1973).
 const WATER_AT_10_CM: Complex64 = Complex64::new(8.88, 0.63);
 
 /// `10 log10(horizontal / vertical)` of two reflectivities, in dB: Algorithm 2's Z_dr.
@@ -16,15 +17,16 @@ pub fn differential_reflectivity_db(horizontal: f64, vertical: f64) -> f64 {
     10.0 * (horizontal / vertical).log10()
 }
 
-/// Height over width of a falling drop: `1.03 - 0.062 D`, D in mm, at most 1 (Pruppacher and Beard, Q. J. R.
-/// Meteorol. Soc. 96, 247, 1970).
+/// Height over width of a falling drop: `1.03 - 0.062 D`, D in mm, at most 1 (Pruppacher and Beard,
+/// Q. J. R. Meteorol. Soc. 96, 247, 1970).
 #[must_use]
 pub fn axis_ratio(diameter_mm: f64) -> f64 {
     (1.03 - 0.062 * diameter_mm).clamp(0.4, 1.0)
 }
 
-/// Z_dr of these drops, in dB; none without drops. Oblate spheroids small against the wavelength (Rayleigh-Gans;
-/// Bringi and Chandrasekar, *Polarimetric Doppler Weather Radar*, 2001, appendix 1), symmetry axes vertical.
+/// Z_dr of these drops, in dB; `None` without drops. The drops are oblate spheroids that are small
+/// compared with the wavelength (Rayleigh-Gans; Bringi and Chandrasekar, *Polarimetric Doppler
+/// Weather Radar*, 2001, appendix 1), with vertical symmetry axes.
 #[must_use]
 pub fn drops_reflectivity_db(drops: &Drops) -> Option<f64> {
     let both = |vertical: bool| {

@@ -1,4 +1,4 @@
-//! Whether it rains, and how hard: dry air or one of the paper's two kinds of rain.
+//! Dry air or one of the paper's two kinds of rain.
 
 use super::{Drops, PaperRain, RainError};
 use serde::{Deserialize, Serialize};
@@ -44,7 +44,7 @@ impl Rainfall {
     /// The drops in the air; `None` for dry air.
     ///
     /// # Errors
-    /// None: both kinds of rain are in range.
+    /// Does not occur: both kinds of rain are in range.
     pub fn drops(self) -> Result<Option<Drops>, RainError> {
         self.rain().map(|rain| rain.drops()).transpose()
     }

@@ -1,18 +1,22 @@
-//! What each LED's spot shows while it rains: the target between drops, light scattered from around, and the veil.
+//! The spot of each LED in rain: the target between drops, light scattered from the surroundings,
+//! and the veil.
 //!
-//! Law: on average over time a white target gives what [`super::ForwardBlur`] says; from frame to frame it is single
-//! drops that make the difference. Where droplets are too many to be followed (fog), there is the average alone.
+//! # Invariant
+//! The average over time of a white target is that of [`super::ForwardBlur`]
+//! (`over_time_single_drops_cost_what_the_mean_says` in `host/optics/tests/scene_in_rain.rs`).
+//! Single drops make the frames differ. Droplets that are too many to simulate (fog) contribute
+//! only their average.
 
 use super::{BeamShadows, FallingDrops, RainError, Weather};
 use crate::Footprint;
 
-/// The 32 x 32 spots of one scene in rain, as time goes by.
+/// The 32 x 32 spots of one scene in rain, over time.
 #[derive(Debug, Clone)]
 pub struct RainySpots {
     dry: Vec<f32>,
     /// Scattered light of each spot and the veil, in units of a white target.
     added: Vec<f32>,
-    /// What is left on average without single drops' shadows.
+    /// Average share that remains without the shadows of single drops.
     kept: f64,
     falling: Option<FallingDrops>,
 }
@@ -21,7 +25,7 @@ impl RainySpots {
     /// `footprint` seen through `beams` in this weather. The same seed gives the same rain.
     ///
     /// # Errors
-    /// [`RainError`] for air too dense for a picture or too many drops.
+    /// [`RainError`] for air too dense for a picture, or too many drops.
     pub fn new(
         weather: &Weather,
         footprint: &Footprint,
@@ -33,12 +37,12 @@ impl RainySpots {
         let field_mm = projector.field_mm(distance_mm);
         let kernel = blur.kernel(field_mm / crate::SIDE as f64);
         let through = |kernel| weather.through_window(kernel, distance_mm, field_mm);
-        // On the way back light that crosses a drop on the window is lost.
+        // On the path back, light that crosses a drop on the window is lost.
         let returned = blur.returned(field_mm / distance_mm) * weather.clear();
         let drops = weather.drops();
         let rains = drops.fall();
-        // Followed drops take their shadow; their diffraction, as much again, stays in the spot and is not taken at
-        // all.
+        // Simulated drops block the light in their shadow. Their diffraction, an equal amount,
+        // stays in the spot and is not subtracted.
         let shadow = if rains { (-drops.shadow_per_m() * distance_mm * 1e-3).exp() } else { 1.0 };
         let (kernel, kept) = if rains {
             let kept = returned / shadow * weather.clear();
@@ -58,14 +62,15 @@ impl RainySpots {
         })
     }
 
-    /// Lets time pass.
+    /// Advances the time.
     pub fn advance(&mut self, seconds: f64) {
         if let Some(falling) = &mut self.falling {
             falling.advance(seconds);
         }
     }
 
-    /// What each LED's spot shows now, 32 x 32, row-major: reflectances as a camera in dry air would see them.
+    /// The current spot of each LED, 32 x 32, row-major: reflectances as seen by a camera in dry
+    /// air.
     #[must_use]
     pub fn reflectance(&self) -> Vec<f32> {
         let kept = self.kept as f32;

@@ -1,8 +1,8 @@
-//! The veil: light that reaches the detector without having seen the target.
+//! The veil: light that reaches the detector without reaching the target.
 //!
-//! Two sources, both uniform over the image: drops in the LEDs' own beams scatter some of it straight back, and drops
-//! in daylight glow. In a differential measurement the first adds a constant to every pixel, the second nothing but
-//! its shot noise.
+//! There are two sources, both uniform over the image. Drops in the LEDs' beams scatter light
+//! straight back. Drops in daylight glow. In a differential measurement the first source adds a
+//! constant to every pixel, and the second source adds only its shot noise.
 
 use super::follow::Slab;
 use super::{BackwardLobe, Medium, RainError, ScatteringAngles, blur, ensure};
@@ -12,30 +12,33 @@ use std::f64::consts::PI;
 /// Steps of the integral along the path.
 const STEPS: usize = 500;
 
-/// Seed of the photons that are followed: the same air gives the same veil.
+/// Seed of the simulated photons: the same air gives the same veil.
 const SEED: u64 = 2;
 
 /// Light from the air between camera and target.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Veil {
-    /// Light that comes back from the drops in one LED's beam, over that from a white target in dry air.
+    /// Light from the drops in one LED's beam, divided by that from a white target in dry air.
     pub backscatter: f64,
-    /// Daylight that the drops send into the detector, over that from a white target in dry air: `albedo (1 - exp(-cL))`, the
-    /// radiance of a scattering volume in uniform light (the paper's `L_b (1 - exp(-beta z))`).
+    /// Daylight that the drops scatter into the detector, divided by that from a white target in
+    /// dry air: `albedo (1 - exp(-cL))`, the radiance of a scattering volume in uniform light (the
+    /// paper's `L_b (1 - exp(-beta z))`).
     pub airlight: f64,
 }
 
 impl Veil {
-    /// The veil before a target at `distance_mm`, the detector `baseline_mm` beside the projector, both aimed at the
-    /// target's centre.
+    /// The veil in front of a target at `distance_mm`. The detector is `baseline_mm` beside the
+    /// projector, and both aim at the target's centre.
     ///
-    /// The lidar equation: a slab dz at z returns `beta(theta) / z^2 dz` of the beam where a white (Lambertian) target
-    /// returns `1 / (pi L^2)`. Collector and projector seen from z are `atan(baseline / z)` apart, so that the drops
-    /// scatter by theta, that much less than 180 degrees: 172 to 178 in the stretches that count. Near the camera the
-    /// detector does not see the beam: the squares that they cover, as wide as the field at z, are
+    /// By the lidar equation, a slab dz at z returns `beta(theta) / z^2 dz` of the beam, and a
+    /// white (Lambertian) target returns `1 / (pi L^2)`. Seen from z, collector and projector are
+    /// `atan(baseline / z)` apart, so the scattering angle theta is smaller than 180 degrees by
+    /// this angle: 172 to 178 degrees in the relevant stretches. Close to the camera the detector
+    /// does not see the beam: the squares that the two fields cover, as wide as the field at z, are
     /// `baseline (1 - z / L)` apart. `scattered` is `None` in dry air.
     ///
-    /// In air too dense for single scattering, single photons are followed instead (module `follow`).
+    /// In air too dense for single scattering, single photons are simulated instead (module
+    /// `follow`).
     ///
     /// # Errors
     /// [`RainError::Setting`] for lengths that are not positive.

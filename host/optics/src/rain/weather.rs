@@ -1,4 +1,4 @@
-//! Everything that one kind of weather does to light of one wavelength, worked out once and asked at any distance.
+//! The effects of one weather on light of one wavelength, computed once for any distance.
 
 use super::{
     BackwardLobe, BlurKernel, Drops, ForwardBlur, Medium, RainError, ScatteringAngles, Veil, Window,
@@ -7,7 +7,7 @@ use crate::mie::Index;
 use crate::substance::Substance;
 use crate::{Projector, SIDE};
 
-/// What is in the air and on the window, what it takes out of light, and where it sends it.
+/// The particles in the air and on the window, and their effects on light.
 #[derive(Debug, Clone)]
 pub struct Weather {
     drops: Drops,
@@ -40,17 +40,17 @@ impl Weather {
         Ok(Self { drops, medium, angles, backward, window: None })
     }
 
-    /// The same behind a window with drops of water on it.
+    /// The same weather behind a window with drops of water.
     ///
     /// # Errors
-    /// [`RainError::Wavelength`] where water's index is not known.
+    /// [`RainError::Wavelength`] if water's index is not known.
     pub fn behind(mut self, window: Window) -> Result<Self, RainError> {
         let water = Substance::default().index(self.medium.wavelength_nm)?;
         self.window = Some((window, water));
         Ok(self)
     }
 
-    /// What is in the air.
+    /// The particles in the air.
     #[must_use]
     pub fn drops(&self) -> &Drops {
         &self.drops
@@ -62,8 +62,8 @@ impl Weather {
         &self.medium
     }
 
-    /// The same weather with another extinction, scattering and absorption in proportion: for asking what would have
-    /// to be assumed.
+    /// The same weather with another extinction, and scattering and absorption in proportion, for
+    /// finding the extinction that a result would need.
     #[must_use]
     pub fn with_extinction(mut self, extinction_per_m: f64) -> Self {
         if self.medium.extinction_per_m > 0.0 {
@@ -76,7 +76,7 @@ impl Weather {
         self
     }
 
-    /// The point-spread function of light on its way to a target.
+    /// The point-spread function of light on its path to a target.
     ///
     /// # Errors
     /// As [`ForwardBlur::new`].
@@ -84,7 +84,7 @@ impl Weather {
         ForwardBlur::new(self.medium, self.angles.clone(), distance_mm)
     }
 
-    /// Light from the air before a target.
+    /// Light from the air in front of a target.
     ///
     /// # Errors
     /// As [`Veil::new`].
@@ -100,14 +100,14 @@ impl Weather {
         Ok(Veil { backscatter: veil.backscatter * clear * clear, airlight: veil.airlight * clear })
     }
 
-    /// Share of the light that crosses the window beside the drops on it.
+    /// Share of the light that crosses the window outside its drops.
     #[must_use]
     pub fn clear(&self) -> f64 {
         self.window.map_or(1.0, |(window, _)| window.clear())
     }
 
-    /// What the drops on the window do to a point-spread function, on a target at `distance_mm` on which the field is
-    /// `field_mm` wide.
+    /// The effect of the drops on the window on a point-spread function, for a target at
+    /// `distance_mm` with a field of `field_mm`.
     pub(super) fn through_window(
         &self,
         kernel: BlurKernel,
@@ -119,9 +119,10 @@ impl Weather {
         kernel.behind_drops(window.covered, disc_px)
     }
 
-    /// What an ordinary camera sees of a target in daylight, white being 1: the target through the air and the window, light
-    /// scattered from around, and daylight that the air scatters. `reflectance` is 32 x 32, row-major, over a field of
-    /// `field_mm`. Daylight on the target is that of clear air.
+    /// The image of an ordinary camera of a target in daylight, with white as 1: the target through
+    /// the air and the window, light scattered from the surroundings, and daylight scattered by the
+    /// air. `reflectance` is 32 x 32, row-major, over a field of `field_mm`. Daylight on the target
+    /// is that of clear air.
     ///
     /// # Errors
     /// As [`Self::blur`].

@@ -1,10 +1,11 @@
-//! Drops of water on the window before projector and collector.
+//! Drops of water on the window in front of projector and collector.
 //!
-//! A drop on a flat window is a lens, a spherical cap of contact angle `a`. At its rim it turns light aside by
-//! `(n - 1) sin a`, and in between in proportion to the distance from its middle, so that the light which crosses it
-//! covers a disc of radius `L (n - 1) sin a` evenly on a target at L, whatever the drop's size (thin lens; the focus
-//! is millimetres behind the drop). The window stands close before the lens: light for every pixel crosses all of it,
-//! and each pixel loses the same share. On the way back, light that crosses a drop misses the detector.
+//! A drop on a flat window is a lens, a spherical cap of contact angle `a`. Its rim deflects light
+//! by `(n - 1) sin a`, and the deflection is proportional to the distance from its middle. On a
+//! target at L, the light through a drop therefore covers a disc of radius `L (n - 1) sin a`
+//! evenly, whatever the drop's size (thin lens; the focus is millimetres behind the drop). The
+//! window is close to the lens: light for every pixel crosses all of it, and each pixel loses the
+//! same share. On the path back, light that crosses a drop misses the detector.
 
 use super::{RainError, ensure};
 use crate::mie::Index;
@@ -12,18 +13,18 @@ use crate::mie::Index;
 /// Drops on the window.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Window {
-    /// Share of the window that they cover.
+    /// Share of the window that the drops cover.
     pub covered: f64,
     /// Contact angle of water on the window: 10 degrees on clean glass, 90 on wax.
     pub contact_angle_deg: f64,
 }
 
 impl Window {
-    /// Contact angle where none is given: glass that is not freshly cleaned.
+    /// Default contact angle: glass that is not freshly cleaned.
     pub const CONTACT_ANGLE_DEG: f64 = 30.0;
 
     /// # Errors
-    /// [`RainError::Setting`] for a share that is not in 0 to 0.9 or an angle that is not in 1 to 90 degrees.
+    /// [`RainError::Setting`] for a share outside 0 to 0.9 or an angle outside 1 to 90 degrees.
     pub fn new(covered: f64, contact_angle_deg: f64) -> Result<Self, RainError> {
         ensure((0.0..=0.9).contains(&covered), "covered share of the window", covered, "0 to 0.9")?;
         let holds = (1.0..=90.0).contains(&contact_angle_deg);
@@ -31,13 +32,14 @@ impl Window {
         Ok(Self { covered, contact_angle_deg })
     }
 
-    /// Radius of the disc over which drops spread their light, on a target at `distance_mm`; `water` is water's index.
+    /// Radius of the disc over which drops spread their light, on a target at `distance_mm`;
+    /// `water` is water's index.
     #[must_use]
     pub fn disc_mm(&self, distance_mm: f64, water: Index) -> f64 {
         distance_mm * (water.real - 1.0) * self.contact_angle_deg.to_radians().sin()
     }
 
-    /// Share of the light that crosses the window beside the drops.
+    /// Share of the light that crosses the window outside its drops.
     #[must_use]
     pub fn clear(&self) -> f64 {
         1.0 - self.covered

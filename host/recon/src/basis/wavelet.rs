@@ -8,7 +8,8 @@ use std::f32::consts::FRAC_1_SQRT_2;
 /// Low-pass taps of the Haar wavelet.
 pub(super) const HAAR: &[f32] = &[FRAC_1_SQRT_2, FRAC_1_SQRT_2];
 
-/// Low-pass taps of the Daubechies wavelet of four taps, `(1 + s, 3 + s, 3 - s, 1 - s) / (4 sqrt 2)` with `s = sqrt 3`.
+/// Low-pass taps of the Daubechies wavelet of four taps, `(1 + s, 3 + s, 3 - s, 1 - s) / (4 sqrt
+/// 2)` with `s = sqrt 3`.
 pub(super) const DAUBECHIES_4: &[f32] = &[0.482_962_9, 0.836_516_3, 0.224_143_87, -0.129_409_52];
 
 /// High-pass tap `i`: the low-pass taps backwards with alternating signs.
@@ -61,7 +62,8 @@ pub(super) fn synthesise(taps: &[f32], n: usize, coefficients: &mut [f32]) {
     }
 }
 
-/// Applies `step` to the rows, then the columns, of the top-left `size x size` corner of an `n x n` image.
+/// Applies `step` to the rows, then the columns, of the top-left `size x size` corner of an `n x n`
+/// image.
 fn along_both_axes(n: usize, size: usize, image: &mut [f32], step: impl Fn(&[f32], &mut [f32])) {
     let (mut line, mut out) = (vec![0.0; size], vec![0.0; size]);
     let rows = (0..size).map(|r| (r * n, 1));

@@ -12,8 +12,9 @@ fn images(width: usize, height: usize) -> (Vec<f32>, Vec<f32>) {
     (0..width * height).map(pixel).unzip()
 }
 
-/// Results of scikit-image 0.26.0's `structural_similarity` (with `gaussian_weights=True, sigma=1.5,
-/// use_sample_covariance=False`) and `peak_signal_noise_ratio`, and of NumPy 2.4.6's `corrcoef`.
+/// Results of scikit-image 0.26.0's `structural_similarity` (with `gaussian_weights=True,
+/// sigma=1.5, use_sample_covariance=False`) and `peak_signal_noise_ratio`, and of NumPy 2.4.6's
+/// `corrcoef`.
 const SCIKIT_IMAGE: [(usize, usize, f64, [f64; 3]); 6] = [
     (11, 11, 1.0, [0.8408564484487093, 24.927084415243268, 0.9357892529036881]),
     (11, 11, 2.0, [0.8596963796565399, 30.947684328522893, 0.9357892529036881]),

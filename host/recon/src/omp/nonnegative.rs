@@ -6,9 +6,10 @@
 //! of the residual never grows (`tests::nonnegative::with_every_step_less_is_left`). An atom whose
 //! coefficient would become negative is removed from the support.
 //!
-//! With no limit on the atoms this is C. Lawson and R. Hanson, *Solving Least Squares Problems* (1974), chapter 23, whose
-//! choice of the next atom is matching pursuit's without the magnitude; see A. Bruckstein et al., *On the uniqueness of
-//! nonnegative sparse solutions to underdetermined systems of equations* (2008).
+//! With no limit on the atoms this is C. Lawson and R. Hanson, *Solving Least Squares Problems*
+//! (1974), chapter 23, whose choice of the next atom is matching pursuit's without the magnitude;
+//! see A. Bruckstein et al., *On the uniqueness of nonnegative sparse solutions to underdetermined
+//! systems of equations* (2008).
 
 use super::dictionary::{Dictionary, padded};
 use super::pursuit::energy;

@@ -1,9 +1,10 @@
 //! Orders as other packages define them, so that their files open here.
 //!
 //! # Invariant
-//! Each order is that of the package named, down to the transposition of the image, at sides 8, 16 and 32; where the package
-//! leaves ties to an unstable sort, up to these ties. Held against tables that the packages themselves have made
-//! (`others.txt`, by `scripts/orders_of_others.py`) by `order::tests::orders_of_other_packages_are_theirs`.
+//! Each order is that of the package named, down to the transposition of the image, at sides 8, 16
+//! and 32; where the package leaves ties to an unstable sort, up to these ties. Held against tables
+//! that the packages themselves have made (`others.txt`, by `scripts/orders_of_others.py`) by
+//! `order::tests::orders_of_other_packages_are_theirs`.
 
 use super::{Pattern, sorted, walsh_row};
 use crate::Side;
@@ -19,8 +20,9 @@ pub(super) fn deepinv_sequency(side: Side) -> Vec<u32> {
     (0..area).map(|k| transposed(side, walsh_row(k, area))).collect()
 }
 
-/// deepinv's `cake_cutting`: ascending number of blocks. Ties, which deepinv leaves to NumPy's unstable sort, stand as in its
-/// list before that sort: sequency by sequency down the image, the across one growing or falling in turn.
+/// deepinv's `cake_cutting`: ascending number of blocks. Ties, which deepinv leaves to NumPy's
+/// unstable sort, stand as in its list before that sort: sequency by sequency down the image, the
+/// across one growing or falling in turn.
 pub(super) fn deepinv_cake_cutting(side: Side) -> Vec<u32> {
     sorted(side, |p| {
         let turn = if p.across.is_multiple_of(2) { p.down } else { u32::MAX - p.down };
@@ -28,13 +30,14 @@ pub(super) fn deepinv_cake_cutting(side: Side) -> Vec<u32> {
     })
 }
 
-/// deepinv's `zig_zag`: anti-diagonals of the grid of two sequencies, each from its end with the highest one down the image.
+/// deepinv's `zig_zag`: anti-diagonals of the grid of two sequencies, each from its end with the
+/// highest one down the image.
 pub(super) fn deepinv_zig_zag(side: Side) -> Vec<u32> {
     sorted(side, |p| (p.down + p.across, u32::MAX - p.down))
 }
 
-/// deepinv's `xy`: ascending `x y + (x^2 + y^2) / 4` of the two sequencies. Ties, which deepinv leaves to PyTorch's unstable
-/// sort, stand in the order of the grid's rows.
+/// deepinv's `xy`: ascending `x y + (x^2 + y^2) / 4` of the two sequencies. Ties, which deepinv
+/// leaves to PyTorch's unstable sort, stand in the order of the grid's rows.
 pub(super) fn deepinv_xy(side: Side) -> Vec<u32> {
     sorted(side, |p| (xy(p), p.down, p.across))
 }

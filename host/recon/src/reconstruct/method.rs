@@ -306,8 +306,8 @@ impl MethodSettings {
         .collect()
     }
 
-    /// These settings, with the settings that `method` does not use at their defaults. This
-    /// prepares several methods from one list of arguments.
+    /// These settings, with the settings that `method` does not use at their defaults. With this
+    /// function, one list of arguments prepares several methods.
     #[must_use]
     pub fn taken_by(&self, method: Method) -> Self {
         let default = Self::default();

@@ -1,11 +1,17 @@
-//! Measurements by patterns of the user's own: any real matrix instead of Hadamard rows.
+//! Reconstruction from measurements by a user's own patterns: any real matrix instead of Hadamard
+//! rows.
 //!
-//! The one law: nothing is assumed of the patterns. How strong a penalty is, or how many atoms there are, is what predicts
-//! measurements best that were held back, unless the caller gives it; and the mean of the image, which patterns of zeros and
-//! ones see far better than anything else, is never held against it.
+//! # Invariant
+//! Nothing is assumed about the patterns. The strength of a penalty, or the number of atoms, is the
+//! one that best predicts held-back measurements, unless the caller gives it. Units do not matter
+//! (`tests::units_of_patterns_and_measurements_do_not_matter`). The mean of the image, which
+//! patterns of zeros and ones measure far better than any detail, has no penalty.
 //!
-//! With `A` the patterns, one a row, `y` the measurements, `c` the coefficients of the image in a basis and `s` what is
-//! expected of them (amplitudes as one over frequency, as in [`OmpSettings`](super::OmpSettings)):
+//! # Methods
+//!
+//! `A` are the patterns, one in each row, `y` the measurements, `c` the coefficients of the image
+//! in a basis, and `s` their expected sizes (amplitudes as one over frequency, as in
+//! [`OmpSettings`](super::OmpSettings)):
 //!
 //! | method | the image is |
 //! |---|---|
@@ -15,7 +21,8 @@
 //! | total variation | where `abs(y - A x)^2 / 2 + t sum of abs(gradient of x)` is least, by Chambolle and Pock |
 //! | OMP | Algorithm 1 over `[A diag(s); sqrt t]`, `t` being Tikhonov's |
 //!
-//! `t` is relative to the measurements' variance, `A` having norm 1; for total variation to the root of that.
+//! `t` is relative to the measurements' variance, for `A` with norm 1; for total variation,
+//! relative to the standard deviation.
 
 mod problem;
 mod solvers;
@@ -31,26 +38,26 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use thiserror::Error;
 
-/// Patterns, one a row, of `side * side` weights each.
+/// A user's own patterns, one in each row, of `side * side` weights each.
 #[derive(Debug, Clone)]
 pub struct OwnMatrix {
     side: Side,
     patterns: DMatrix<f64>,
     rank: usize,
-    /// Squared norm of each pattern, where no pattern has a part along another.
+    /// Squared norm of each pattern, if all patterns are orthogonal to each other.
     orthogonal: Option<DVector<f64>>,
 }
 
-/// What is wrong with a matrix, its measurements or a setting.
+/// Why a matrix, its measurements or a setting is refused.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum MatrixError {
-    /// No whole patterns.
+    /// The weights are not a whole number of patterns.
     #[error("{found} numbers, expected a multiple of the {area} pixels of a {n} x {n} image", n = area.isqrt())]
     Shape {
-        /// Numbers in all.
+        /// Number of weights.
         found: usize,
-        /// Pixels of an image.
+        /// Number of pixels of an image.
         area: usize,
     },
     /// A weight or measurement is NaN or infinite.
@@ -58,35 +65,35 @@ pub enum MatrixError {
     NotFinite {
         /// `matrix` or `y`.
         field: &'static str,
-        /// Pattern.
+        /// Index of the pattern.
         row: usize,
-        /// Pixel.
+        /// Index of the pixel.
         column: usize,
-        /// What was found.
+        /// The value found.
         found: f64,
     },
-    /// No pattern lets any light through.
+    /// All weights of all patterns are 0.
     #[error("a matrix of rank 0: every weight is 0, expected patterns that see something")]
     Dark,
-    /// Not one measurement a pattern.
+    /// The number of measurements is not the number of patterns.
     #[error("{found} measurements by {expected} patterns, expected one a pattern")]
     Length {
-        /// Measurements.
+        /// Number of measurements.
         found: usize,
-        /// Patterns.
+        /// Number of patterns.
         expected: usize,
     },
     /// A setting out of range.
     #[error("{setting} is {found}, expected {expected}")]
     Setting {
-        /// Which.
+        /// The name of the setting.
         setting: &'static str,
-        /// What was given.
+        /// The value that was given.
         found: f64,
-        /// What would do.
+        /// The allowed values.
         expected: &'static str,
     },
-    /// Coefficients of 0 or more for atoms that are not light.
+    /// Non-negative coefficients were requested for a basis whose atoms have negative pixels.
     #[error(
         "coefficients of 0 or more in the {basis} basis, expected the pixel basis or atoms of one's own"
     )]
@@ -99,12 +106,12 @@ pub enum MatrixError {
     Pursuit(#[from] OmpError),
 }
 
-/// How to invert.
+/// The method of inversion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum MatrixMethod {
     /// Least squares of least norm.
     PseudoInverse,
-    /// The least of a penalty.
+    /// The minimum of a sum with a penalty.
     Penalty(Penalty),
     /// Few coefficients.
     Omp,
@@ -113,22 +120,23 @@ pub enum MatrixMethod {
 /// Settings of [`OwnMatrix::reconstruct`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct MatrixSettings {
-    /// How to invert.
+    /// The method of inversion.
     pub method: MatrixMethod,
     /// Basis of the coefficients.
     pub basis: Basis,
-    /// Images of the matrix's side, one after another, instead of a basis.
+    /// Images of the matrix's side, one after another, as atoms instead of a basis.
     pub atoms: Option<Vec<f32>>,
-    /// Strength of a penalty, `t` in the module's table; without it, the best at predicting held-back measurements.
+    /// Strength of a penalty, `t` in the module's table. By default, the strength that best
+    /// predicts held-back measurements.
     pub strength: Option<f64>,
-    /// Atoms for OMP; without it, as many as predict held-back measurements best.
+    /// Number of atoms for OMP. By default, the number that best predicts held-back measurements.
     pub sparsity: Option<usize>,
-    /// OMP: coefficients of 0 or more.
+    /// Whether OMP's coefficients must be non-negative.
     pub non_negative: bool,
 }
 
 impl MatrixSettings {
-    /// Everything found from the measurements, in the DCT basis.
+    /// Default settings: all values are found from the measurements, in the DCT basis.
     #[must_use]
     pub fn new(method: MatrixMethod) -> Self {
         let (atoms, strength, sparsity) = (None, None, None);
@@ -136,42 +144,44 @@ impl MatrixSettings {
     }
 }
 
-/// What [`OwnMatrix::reconstruct`] found.
+/// The result of [`OwnMatrix::reconstruct`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct MatrixReconstruction {
-    /// The image, in the measurements' units over the patterns'.
+    /// The image, in the measurements' units divided by the patterns'.
     pub image: Image,
-    /// Strength of the penalty; none for the pseudo-inverse.
+    /// Strength of the penalty; `None` for the pseudo-inverse.
     pub strength: Option<f64>,
-    /// Atoms of the representation and why there are no more, for OMP.
+    /// For OMP, the number of atoms and why the pursuit stopped.
     pub atoms: Option<(usize, Stop)>,
-    /// Norm of what the image leaves of the measurements, relative to theirs.
+    /// Norm of the residual, relative to the measurements' norm.
     pub residual: f64,
 }
 
-/// Strengths that are tried, from the strongest on.
+/// Strengths to try, the strongest first.
 const STRENGTHS: [f64; 7] = [1.0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
 
-/// Parts into which measurements are split, each held back once.
+/// Number of parts of the measurements. Each part is held back once.
 const FOLDS: usize = 4;
 
-/// Splits the measurements; part of the result, so it never changes.
+/// Seed of the split of the measurements. The split changes the result, so the seed never changes.
 const SPLIT_SEED: u64 = 0x5eed;
 
-/// Squared error, relative to the least, that is as good: where no pattern says anything of another, all errors are alike.
+/// Squared error, relative to the least error, that counts as equally good. If patterns do not
+/// predict each other, all errors are alike.
 const AS_GOOD: f64 = 1.1;
 
-/// Numbers of atoms that are tried, as far as there are measurements.
+/// Numbers of atoms to try, up to the number of measurements.
 const SPARSITIES: [usize; 10] = [1, 2, 4, 8, 16, 32, 64, 128, 200, 300];
 
-/// What a pivot of the Gram matrix must be of the largest for a pattern to count as new.
+/// Smallest pivot of the Gram matrix, relative to the largest, for which a pattern counts as
+/// linearly independent.
 const NEW: f64 = 1e-11;
 
 impl OwnMatrix {
-    /// From the weights of one pattern after another, row-major.
+    /// A matrix from the weights of one pattern after another, row-major.
     ///
     /// # Errors
-    /// [`MatrixError`] if these are no whole patterns of finite weights, or all of them 0.
+    /// [`MatrixError`] if the weights are not whole patterns, are not finite, or are all 0.
     pub fn new(side: Side, weights: &[f64]) -> Result<Self, MatrixError> {
         let area = side.area();
         if weights.is_empty() || !weights.len().is_multiple_of(area) {
@@ -196,28 +206,28 @@ impl OwnMatrix {
         self.side
     }
 
-    /// How many patterns there are.
+    /// Number of patterns.
     #[must_use]
     pub fn patterns(&self) -> usize {
         self.patterns.nrows()
     }
 
-    /// How many of them are no combination of others, to rounding.
+    /// Number of linearly independent patterns, to rounding.
     #[must_use]
     pub fn rank(&self) -> usize {
         self.rank
     }
 
-    /// How many pixels no pattern sees.
+    /// Number of pixels with weight 0 in all patterns.
     #[must_use]
     pub fn unseen_pixels(&self) -> usize {
         self.patterns.column_iter().filter(|column| column.iter().all(|&w| w == 0.0)).count()
     }
 
-    /// The image that `y`, one number a pattern, was measured of.
+    /// Reconstructs the image from `y`, one measurement for each pattern.
     ///
     /// # Errors
-    /// [`MatrixError`] if `y` does not fit the matrix or a setting makes no sense.
+    /// [`MatrixError`] if `y` does not fit the matrix, or a setting is not valid.
     pub fn reconstruct(
         &self,
         y: &[f64],
@@ -241,7 +251,8 @@ impl OwnMatrix {
             MatrixMethod::Omp => {
                 let noise = match settings.strength {
                     Some(strength) => strength,
-                    // Few atoms leave more than noise: the strongest that predicts as well.
+                    // A few atoms leave a residual above the noise, so the strongest of the equally
+                    // good strengths is used.
                     None => {
                         let errors = self.errors_of_strengths(y, settings, Penalty::Tikhonov)?;
                         let as_good = as_good_as_the_best(&errors);
@@ -258,7 +269,8 @@ impl OwnMatrix {
                 (pixels, Some(noise), Some((size, stop)))
             }
             MatrixMethod::Penalty(penalty) => {
-                // The same way there as in the comparison: methods that only approach their minimum remember it.
+                // The list of strengths is the same as in the comparison, because iterative methods
+                // keep a part of their start.
                 let strengths = match settings.strength {
                     Some(strength) => vec![strength],
                     None => {
@@ -324,7 +336,8 @@ impl OwnMatrix {
         Ok(sparsities[last_as_good(&self.errors(y, settings, sparsities.len(), predict)?)])
     }
 
-    /// By how much each of `count` images, made of the other measurements, misses those held back: sums of squares.
+    /// Errors of each of `count` images, made from the other measurements, on the held-back
+    /// measurements: sums of squares.
     fn errors(
         &self,
         y: &[f64],
@@ -360,7 +373,7 @@ fn as_good_as_the_best(errors: &[f64]) -> impl Fn(&f64) -> bool {
     move |error| *error <= AS_GOOD * least
 }
 
-/// Of those that predict as well as the best the last, which leaves least of what was measured.
+/// The last of the equally good results, which has the smallest residual.
 fn last_as_good(errors: &[f64]) -> usize {
     errors.iter().rposition(as_good_as_the_best(errors)).unwrap_or(0)
 }
@@ -375,8 +388,9 @@ fn finite(field: &'static str, values: &[f64], width: usize) -> Result<(), Matri
     }
 }
 
-/// Squared norms of patterns of which none has a part along another. `A A^T v` is held against `D v` for a few random `v`:
-/// two patterns that are not orthogonal would have to be missed by each of them.
+/// Squared norms of the patterns, if all patterns are orthogonal to each other. `A A^T v` is
+/// compared with `D v` for a few random `v`: non-orthogonal patterns would have to pass every
+/// comparison by chance.
 fn energies_if_orthogonal(patterns: &DMatrix<f64>) -> Option<DVector<f64>> {
     const TRIALS: usize = 3;
     const ROUNDING: f64 = 1e-9;
@@ -393,7 +407,7 @@ fn energies_if_orthogonal(patterns: &DMatrix<f64>) -> Option<DVector<f64>> {
     }
     let mut random = Pcg64::seed_from_u64(SPLIT_SEED);
     let holds = (0..TRIALS).all(|_| {
-        // Patterns of any norm weigh alike.
+        // Patterns of any norm have equal weight.
         let v = DVector::from_fn(rows, |k, _| (random.random::<f64>() - 0.5) / energies[k].sqrt());
         let seen = patterns * patterns.tr_mul(&v);
         let off = |k: usize| {
@@ -405,7 +419,8 @@ fn energies_if_orthogonal(patterns: &DMatrix<f64>) -> Option<DVector<f64>> {
     holds.then_some(energies)
 }
 
-/// Pivoted Cholesky factorisation of the smaller Gram matrix, as far as it goes.
+/// The rank by pivoted Cholesky factorisation of the smaller Gram matrix, as far as the
+/// factorisation goes.
 fn rank(patterns: &DMatrix<f64>) -> usize {
     let mut gram = match patterns.nrows() <= patterns.ncols() {
         true => patterns * patterns.transpose(),

@@ -29,8 +29,8 @@ pub enum Penalty {
     /// Energy of the coefficients, weighted by their expected sizes (A. N. Tikhonov, 1963), by
     /// conjugate gradients.
     Tikhonov,
-    /// Magnitudes of the coefficients, by FISTA (A. Beck and M. Teboulle, *A fast iterative shrinkage-thresholding
-    /// algorithm for linear inverse problems*, 2009).
+    /// Magnitudes of the coefficients, by FISTA (A. Beck and M. Teboulle, *A fast iterative
+    /// shrinkage-thresholding algorithm for linear inverse problems*, 2009).
     Sparse,
     /// Total variation (L. Rudin et al., 1992), by A. Chambolle and T. Pock, *A first-order
     /// primal-dual algorithm for convex problems*, 2011. This penalty needs no basis.

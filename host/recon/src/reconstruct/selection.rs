@@ -158,9 +158,8 @@ const SIGMAS_PER_MEDIAN: f32 = 1.4826;
 const ROUNDING: f32 = 1e-6;
 
 /// Noise of a measurement: the median magnitude over the quarter of the rows (at least eight) with
-/// the highest sequency. These rows also contain detail of the scene, so the result is an upper
-/// bound of the noise: the level below which a coefficient cannot be distinguished from its
-/// neighbours.
+/// the highest sequency. The rows also contain detail of the scene, so the result is an upper bound
+/// of the noise: the level below which a coefficient cannot be distinguished from its neighbours.
 pub(super) fn noise_level(rows: &Rows, values: &[f32]) -> f32 {
     let positions = order::positions_by_sequency(rows);
     let count = (positions.len() / 4).max(8).min(positions.len());

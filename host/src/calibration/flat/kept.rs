@@ -1,9 +1,11 @@
-//! Flat fields that outlive a session: one JSON file a camera, beside its calibration.
+//! Keeps flat fields between sessions: one JSON file a camera, next to its calibration.
 //!
-//! A file of its own, because a self-test and new gateware renew latency and settling and change nothing of LEDs and lens.
+//! The flat field has its own file, because a self-test and new gateware renew latency and settling
+//! but change neither LEDs nor lens.
 //!
 //! # Invariant
-//! A flat field of another camera is never applied (`an_old_or_foreign_flat_field_is_refused_in_one_line`).
+//! A flat field of another camera is never applied
+//! (`super::tests::an_old_or_foreign_flat_field_is_refused_in_one_line`).
 
 use super::{FlatField, Measured, Sweeps};
 use crate::calibration::kept::{CalibrationFileError, date, path_with};
@@ -16,10 +18,10 @@ use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 use thiserror::Error;
 
-/// Version of the file's format. A field that changes its meaning changes this.
+/// Version of the file's format. A field with a new meaning needs a new version.
 const FORMAT: u32 = 1;
 
-/// A flat field as it is kept.
+/// A flat field in its file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct KeptFlatField {
     /// Always `nirspi flat field`.
@@ -28,15 +30,15 @@ pub struct KeptFlatField {
     version: u32,
     /// When it was measured, in seconds since 1970.
     measured_unix_s: u64,
-    /// The same, for people.
+    /// Time of measurement in words.
     measured: String,
     /// The camera that was measured.
     pub camera: CameraIdentity,
-    /// Sweeps that were summed.
+    /// Number of summed sweeps.
     pub sweeps: Sweeps,
-    /// Pattern of images of the white sheet without it, as a share of white.
+    /// Fixed pattern of images of the white sheet without the flat field, as a share of white.
     pub pattern_before: f64,
-    /// The same with it.
+    /// Fixed pattern with the flat field, as a share of white.
     pub pattern_after: f64,
     /// The flat field.
     pub flat: FlatField,
@@ -48,60 +50,60 @@ enum Kind {
     FlatField,
 }
 
-/// Why a flat field is not used.
+/// Why a flat field cannot be used.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum FlatFieldFileError {
     /// The file cannot be read.
     #[error("{path}: cannot read the flat field")]
     Io {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// Why.
+        /// The system's reason.
         source: io::Error,
     },
-    /// Not a flat field.
+    /// The file is not a flat field.
     #[error("{path}: {reason}, expected a flat field written by nirspi calibrate --white")]
     Format {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The problem.
         reason: String,
     },
-    /// Another version of the format.
+    /// The file has another version of the format.
     #[error(
         "{path}: a flat field of format {found}, expected {FORMAT}: run nirspi calibrate --white again"
     )]
     Version {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// Its version.
+        /// The file's version.
         found: u32,
     },
-    /// Measured on another camera.
+    /// The flat field was measured on another camera.
     #[error(
         "{path}: measured with {field} {found}, this camera has {expected}: run nirspi calibrate --white"
     )]
     Mismatch {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// What differs.
+        /// The name of the property that differs.
         field: &'static str,
-        /// As kept.
+        /// The property in the file.
         found: String,
-        /// As the camera says.
+        /// The property of this camera.
         expected: String,
     },
-    /// It cannot be written.
+    /// The file cannot be written.
     #[error(transparent)]
     Write(#[from] FileError),
-    /// Nowhere to keep anything.
+    /// There is no folder for the file.
     #[error(transparent)]
     Place(#[from] CalibrationFileError),
 }
 
 impl KeptFlatField {
-    /// What was measured at `when`.
+    /// A flat field measured at `when`.
     #[must_use]
     pub fn new(
         camera: CameraIdentity,
@@ -124,13 +126,14 @@ impl KeptFlatField {
         }
     }
 
-    /// The same with this flat field in place of its own, which has a dark frame now.
+    /// A copy with `flat`, which includes a dark frame, in place of its own flat field.
     #[must_use]
     pub fn renewed(self, flat: FlatField) -> Self {
         Self { flat, ..self }
     }
 
-    /// What a user should know of it: when it was measured, what it takes away, and the dead LEDs.
+    /// A summary for the user: time of measurement, the pattern that the flat field removes, and
+    /// the dead LEDs.
     #[must_use]
     pub fn summary(&self) -> String {
         let percent = |share: f64| 100.0 * share;
@@ -142,7 +145,7 @@ impl KeptFlatField {
         );
         let dead = self.flat.dead_leds();
         if !dead.is_empty() {
-            // All of them are in the file.
+            // The file lists all dead LEDs.
             let named: Vec<String> = dead
                 .iter()
                 .take(8)
@@ -155,10 +158,10 @@ impl KeptFlatField {
         text
     }
 
-    /// Writes it, whole or not at all.
+    /// Writes the file, whole or not at all.
     ///
     /// # Errors
-    /// When the folder cannot be made or the file not be written.
+    /// If the folder cannot be made, or the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), FlatFieldFileError> {
         let json = serde_json::to_vec(self).map_err(|error| format_error(path, &error))?;
         let folder = path.parent().unwrap_or(Path::new("."));
@@ -169,12 +172,12 @@ impl KeptFlatField {
         Ok(())
     }
 
-    /// Reads it for use with `camera`.
+    /// Reads the file for use with `camera`.
     ///
     /// # Errors
-    /// Where there is none, or none that may be used with this camera.
+    /// If there is no file, or the flat field does not belong to this camera.
     pub fn read(path: &Path, camera: &CameraIdentity) -> Result<Self, FlatFieldFileError> {
-        /// The part that every version has.
+        /// The fields that every version has.
         #[derive(Deserialize)]
         struct Head {
             #[serde(rename = "kind")]
@@ -203,12 +206,12 @@ impl KeptFlatField {
         Ok(kept)
     }
 
-    /// The flat field kept for this camera; none where none is kept.
+    /// The kept flat field of this camera; `None` if no flat field is kept.
     ///
     /// # Errors
-    /// Where one is kept that may not be used.
+    /// If the kept flat field cannot be used.
     pub fn of(camera: &CameraIdentity) -> Result<Option<Self>, FlatFieldFileError> {
-        // A user without a home directory has none.
+        // A user without a home directory has no kept flat field.
         let Some(path) = flat_field_path_of(&camera.serial).ok().filter(|path| path.exists())
         else {
             return Ok(None);
@@ -221,10 +224,10 @@ fn format_error(path: &Path, error: &serde_json::Error) -> FlatFieldFileError {
     FlatFieldFileError::Format { path: path.to_owned(), reason: error.to_string() }
 }
 
-/// Where the flat field of the camera with this serial number is kept.
+/// The path of the flat field of the camera with this serial number.
 ///
 /// # Errors
-/// Where the user has no home.
+/// If the user has no home directory.
 pub fn flat_field_path_of(serial: &str) -> Result<PathBuf, FlatFieldFileError> {
     Ok(path_with(serial, "flat.json")?)
 }

@@ -1,4 +1,4 @@
-//! Measures a flat field with a camera before a white sheet, and a dark frame with the lens covered.
+//! Measures a flat field in front of a white sheet, and a dark frame with the lens covered.
 
 use super::{FlatField, FramesError, pattern_noise};
 use crate::calibration::Settling;
@@ -11,34 +11,37 @@ use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 use thiserror::Error;
 
-/// Noise of a pixel of the white sheet, as a share of white, above which a flat field would spoil images.
+/// Noise of a pixel of the white sheet, as a share of white. Above this noise a flat field would
+/// make images worse.
 const NOISIEST: f64 = 0.05;
 
-/// How many differential sweeps of all patterns are summed.
+/// Numbers of differential sweeps of all patterns to sum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Sweeps {
-    /// For the flat field.
+    /// Sweeps for the flat field.
     pub map: u32,
-    /// For each of two further images of the sheet, which say how well it corrects.
+    /// Sweeps for each of the two further images of the sheet, which measure how well the flat
+    /// field corrects.
     pub check: u32,
 }
 
 impl Sweeps {
-    /// `map` sweeps for the flat field, and an eighth of that for each image that checks it.
+    /// `map` sweeps for the flat field, and an eighth of `map` for each image that checks the flat
+    /// field.
     #[must_use]
     pub fn of_map(map: u32) -> Self {
         Self { map, check: (map / 8).max(1) }
     }
 }
 
-/// A flat field, and what it does to images of the sheet that it was not made from.
+/// A flat field, and its effect on two further images of the sheet.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measured {
     /// The flat field.
     pub flat: FlatField,
-    /// Pattern of the sheet's images as they come, as a share of white.
+    /// Fixed pattern of the sheet's images before correction, as a share of white.
     pub pattern_before: f64,
-    /// The same once they are corrected.
+    /// Fixed pattern after correction, as a share of white.
     pub pattern_after: f64,
     /// Noise of a pixel of the flat field, as a share of white.
     pub noise: f64,
@@ -48,43 +51,43 @@ pub struct Measured {
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum FlatFieldError {
-    /// The camera would not measure.
+    /// The camera could not measure.
     #[error(transparent)]
     Capture(#[from] CaptureError),
     /// The frames give no measurements.
     #[error(transparent)]
     Integrate(#[from] IntegrateError),
-    /// Not all frames came.
+    /// Frames are missing.
     #[error("{received} of {asked} sweeps were received before the capture ended, expected all")]
     Ended {
         /// Frames received.
         received: u64,
-        /// Frames asked for.
+        /// Frames requested.
         asked: u32,
     },
-    /// The image is no white sheet's.
+    /// The image is not that of a white sheet.
     #[error(transparent)]
     Frames(#[from] FramesError),
-    /// Too little light for the sweeps.
+    /// There is too little light for this number of sweeps.
     #[error(
         "the noise of a pixel is {:.1} % of white after {sweeps} sweeps, expected at most {:.0} %: hold the sheet nearer or \
          sum more sweeps", 100.0 * noise, 100.0 * NOISIEST
     )]
     Noisy {
-        /// Noise over white.
+        /// Noise divided by white.
         noise: f64,
         /// Sweeps summed.
         sweeps: u32,
     },
-    /// The LEDs are more alike than the flat field can tell.
+    /// The LEDs differ by less than the flat field can measure.
     #[error(
         "the LEDs differ by {:.2} % and the flat field would leave {:.2} %: no flat field is needed, or one of more sweeps",
         100.0 * before, 100.0 * after
     )]
     NothingGained {
-        /// Pattern without it.
+        /// Fixed pattern without the flat field.
         before: f64,
-        /// Pattern with it.
+        /// Fixed pattern with the flat field.
         after: f64,
     },
 }
@@ -115,7 +118,7 @@ impl Camera<'_> {
         Ok(reconstruct::hadamard(&measurements))
     }
 
-    /// Two images of `sweeps` each, and the noise of one of their pixels, rms.
+    /// Two images of `sweeps` sweeps each, and the rms noise of one of their pixels.
     fn pair(&mut self, sweeps: u32) -> Result<(Image, Image, f64), FlatFieldError> {
         let (a, b) = (self.image(sweeps)?, self.image(sweeps)?);
         let squares = a.pixels().iter().zip(b.pixels()).map(|(a, b)| f64::from(a - b).powi(2));
@@ -124,11 +127,12 @@ impl Camera<'_> {
     }
 }
 
-/// Measures the flat field of a camera that looks at a white sheet which fills its field. `setup` must have all patterns and
-/// their complements. `watch` is called while frames come and may break to stop.
+/// Measures the flat field in front of a white sheet that fills the field. `setup` must have all
+/// patterns and their complements. `watch` is called while frames arrive and may break to stop.
 ///
 /// # Errors
-/// [`FlatFieldError`] if frames are missing, the sheet is too dim or does not fill the field, or nothing would be gained.
+/// [`FlatFieldError`] if frames are missing, the sheet is too dim or does not fill the field, or
+/// the flat field would gain nothing.
 pub fn measure_flat_field(
     session: &mut Session,
     setup: &MeasurementSetup,
@@ -155,7 +159,8 @@ pub fn measure_flat_field(
     Ok(Measured { flat, pattern_before, pattern_after, noise })
 }
 
-/// Measures the dark frame of a camera whose lens is covered, and gives the flat field with it. `sweeps` are summed twice.
+/// Measures the dark frame with the lens covered, and returns the flat field with the dark frame.
+/// `sweeps` sweeps are summed twice.
 ///
 /// # Errors
 /// [`FlatFieldError`] if frames are missing, or the lens is not covered.

@@ -1,16 +1,20 @@
-//! The flat field: how bright each LED is, which are dead, and what each pixel reads without light.
+//! The flat field: the brightness of each LED, the dead LEDs, and the reading of each pixel without
+//! light.
 //!
-//! LEDs that differ, lenses that vignette and LEDs that are dead leave a pattern in every image, the same in each. A pixel of
-//! a reconstructed image is linear in the light of its own LED, so the pattern is undone after reconstruction:
-//! `(pixel - dark) / gain`. A dead LED says nothing of its place: that pixel is the mean of its nearest live neighbours.
+//! Unequal LEDs, vignetting lenses and dead LEDs leave the same pattern in every image. A pixel of
+//! a reconstructed image is linear in the light of its own LED, so the pattern is removed after
+//! reconstruction: `(pixel - dark) / gain`. A dead LED gives no information about its pixel, which
+//! becomes the mean of its nearest live neighbours.
 //!
-//! Gain belongs to the LED array and the lens, so a flat field holds at any distance, for any scene, order of patterns and
-//! method. It is measured against a white sheet that fills the field (`nirspi calibrate --white`), kept by serial number
-//! beside the calibration, and applied by `capture --picture`, `serve` and `reconstruct`.
+//! Gain belongs to the LED array and the lens, so a flat field holds at any distance, for any
+//! scene, order of patterns and method. A flat field is measured against a white sheet that fills
+//! the field (`nirspi calibrate --white`), kept by serial number next to the calibration, and
+//! applied by `capture --picture`, `serve` and `reconstruct`.
 //!
 //! # Invariant
-//! Correcting keeps an image of the white sheet white: the pattern that is left is at least ten times smaller with LEDs that
-//! differ by 10 % (`a_flat_field_takes_the_pattern_of_unequal_leds_away`, in `host/tests/flat_field.rs`).
+//! A corrected image of the white sheet is white: the remaining pattern is at least ten times
+//! smaller with LEDs that differ by 10 % (`a_flat_field_takes_the_pattern_of_unequal_leds_away` in
+//! `host/tests/flat_field.rs`).
 
 mod kept;
 mod measure;
@@ -22,11 +26,11 @@ use nirspi_recon::{Image, Side};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// Pixels of the instrument's image, and LEDs of its array.
+/// Number of pixels of the instrument's image, and of LEDs of its array.
 const PIXELS: usize = 32 * 32;
-/// Share of the median light below which an LED counts as dead.
+/// An LED with less than this share of the median light counts as dead.
 const DEAD_BELOW: f32 = 0.2;
-/// Standard deviations of noise below which a reading in the dark counts as 0.
+/// A reading in the dark below this many standard deviations of noise counts as 0.
 const SIGMA: f32 = 4.0;
 
 /// Gain, dark frame and dead LEDs of a camera.
@@ -34,54 +38,55 @@ const SIGMA: f32 = 4.0;
 #[serde(try_from = "Frames", into = "Frames")]
 pub struct FlatField {
     frames: Frames,
-    /// Light of each LED over the mean of the live ones; 0 for a dead one.
+    /// Light of each LED divided by the mean of the live LEDs; 0 for a dead LED.
     gain: Vec<f32>,
 }
 
-/// What was measured, as it is kept. Images are row-major, 32 x 32, in ADC counts.
+/// The measured frames as kept in the file. Images are row-major, 32 x 32, in ADC counts.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Frames {
     /// The image of a white sheet.
     white_counts: Vec<f32>,
-    /// Noise of one pixel of that image, rms.
+    /// The rms noise of one pixel of the white image.
     white_noise_counts: f32,
-    /// The image with the lens covered; none where it was not measured.
+    /// The image with the lens covered; `None` if not measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     dark_counts: Option<Vec<f32>>,
-    /// LEDs that stay dark: row and column, 0 to 31. Found in the frames again when they are read.
+    /// Row and column of each dead LED, 0 to 31. Dead LEDs are found again when the frames are
+    /// read.
     dead_leds: Vec<[u8; 2]>,
 }
 
-/// Why frames are no flat field. `Display` is one line.
+/// Why frames do not give a flat field. `Display` is one line.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum FramesError {
     /// A frame is not of the instrument's size.
     #[error("{name} holds {found} pixels, expected {PIXELS}")]
     Length {
-        /// Which frame.
+        /// The name of the frame.
         name: &'static str,
-        /// Its pixels.
+        /// Its number of pixels.
         found: usize,
     },
     /// A pixel is NaN or infinite.
     #[error("{name}[{at}] is {found}, expected a finite number")]
     NotFinite {
-        /// Which frame.
+        /// The name of the frame.
         name: &'static str,
-        /// Where.
+        /// The index of the pixel.
         at: usize,
         /// The value.
         found: f32,
     },
-    /// The sheet gives no light, or not in most of the field.
+    /// The sheet reflects no light in most of the field.
     #[error(
         "the white sheet shows in {live} of {PIXELS} pixels, expected at least {least}: hold it so that it fills the field",
         least = PIXELS * 3 / 4
     )]
     NotFilled {
-        /// Pixels with light.
+        /// Number of pixels with light.
         live: usize,
     },
 }
@@ -141,47 +146,52 @@ fn median(values: &[f32]) -> f32 {
 }
 
 impl FlatField {
-    /// From an image of a white sheet that fills the field, 32 x 32, and the noise of one of its pixels, rms.
+    /// A flat field from an image of a white sheet that fills the field, 32 x 32, and the rms noise
+    /// of one of its pixels.
     ///
     /// # Errors
-    /// [`FramesError`] if the image is not of the instrument's size or no white sheet's.
+    /// [`FramesError`] if the image does not have the instrument's size or is not that of a white
+    /// sheet.
     pub fn of_white(white: &Image, noise: f32) -> Result<Self, FramesError> {
         let white_counts = white.pixels().to_vec();
         let (dark_counts, dead_leds) = (None, Vec::new());
         Frames { white_counts, white_noise_counts: noise, dark_counts, dead_leds }.try_into()
     }
 
-    /// The same with a dark frame: an image taken with the lens covered, and the noise of one of its pixels, rms. Pixels
-    /// that read no more than their noise count as 0, so that a camera without a pattern in the dark gets no noise from it.
+    /// The same flat field with a dark frame: an image taken with the lens covered, and the rms
+    /// noise of one of its pixels. Pixels that read no more than their noise count as 0, so that a
+    /// camera without a pattern in the dark gets no noise from the dark frame.
     ///
     /// # Errors
-    /// [`FramesError`] if the image is not of the instrument's size, or brighter than the white sheet.
+    /// [`FramesError`] if the image does not have the instrument's size, or is brighter than the
+    /// white sheet.
     pub fn with_dark(self, dark: &Image, noise: f32) -> Result<Self, FramesError> {
         let reading = |&value: &f32| if value.abs() > SIGMA * noise { value } else { 0.0 };
         let dark_counts = Some(dark.pixels().iter().map(reading).collect());
         Frames { dark_counts, ..self.frames }.try_into()
     }
 
-    /// Light of each LED over the mean of the live ones, row-major; 0 for a dead one.
+    /// Light of each LED divided by the mean of the live LEDs, row-major; 0 for a dead LED.
     #[must_use]
     pub fn gain(&self) -> &[f32] {
         &self.gain
     }
 
-    /// LEDs that stay dark: row and column, 0 to 31.
+    /// Row and column of each dead LED, 0 to 31.
     #[must_use]
     pub fn dead_leds(&self) -> &[[u8; 2]] {
         &self.frames.dead_leds
     }
 
-    /// Pixels with a reading in the dark; none where the dark was not measured.
+    /// Number of pixels with a reading in the dark; `None` if the dark was not measured.
     #[must_use]
     pub fn dark_pixels(&self) -> Option<usize> {
         let dark = self.frames.dark_counts.as_ref()?;
         Some(dark.iter().filter(|&&value| value != 0.0).count())
     }
 
-    /// The image of equal LEDs. An image of another size, which no such array has made, stays as it is.
+    /// Corrects an image, as if all LEDs were equal. An image of another size does not come from
+    /// this array and stays unchanged.
     #[must_use]
     pub fn correct(&self, image: &Image) -> Image {
         if image.side() != Side::INSTRUMENT {
@@ -202,7 +212,7 @@ impl FlatField {
         Image::new(image.side(), pixels)
     }
 
-    /// Mean of the nearest live pixels around one.
+    /// Mean of the nearest live pixels around a pixel.
     fn around(&self, pixels: &[f32], row: usize, column: usize) -> f32 {
         let side = Side::INSTRUMENT.pixels();
         for reach in 1..side {
@@ -220,8 +230,9 @@ impl FlatField {
     }
 }
 
-/// The fixed pattern in two images of the same white sheet: standard deviation over mean, as a share. Noise differs from
-/// image to image and has no part in it: the pattern's variance is the covariance of the two.
+/// The fixed pattern in two images of the same white sheet: standard deviation divided by mean. The
+/// pattern's variance is the covariance of the two images, so noise, which differs from image to
+/// image, does not contribute.
 #[must_use]
 pub fn pattern_noise(a: &Image, b: &Image) -> f64 {
     let mean = |image: &Image| {

@@ -6,7 +6,7 @@ fn image(of: impl Fn(usize) -> f32) -> Image {
     Image::new(Side::INSTRUMENT, (0..PIXELS).map(of).collect())
 }
 
-/// Light of an array whose LEDs differ; two are dead.
+/// Light of an array with unequal LEDs, two of which are dead.
 fn gains(at: usize) -> f32 {
     if at == 3 * 32 + 7 || at == 0 { 0.0 } else { 1.0 + 0.2 * (at as f32).sin() }
 }
@@ -22,7 +22,7 @@ fn equal_reflectance_comes_out_equal_and_dead_leds_take_their_neighbours() {
     for at in 1..PIXELS {
         assert!((corrected.pixels()[at] / scale - ramp(at)).abs() < 1e-3, "{at}");
     }
-    // The corner's neighbours are one in its own row and two in the next.
+    // The corner has one neighbour in its own row and two in the next row.
     let corner = corrected.pixels()[0] / scale;
     assert!((corner - (10.0 + 11.0 + 11.0) / 3.0).abs() < 1e-3, "{corner}");
 }
@@ -94,7 +94,7 @@ fn a_flat_field_comes_back_as_it_was_and_names_dead_leds() {
     let summary = back.summary();
     assert!(summary.contains("2 dead LEDs (row 0 column 0, row 3 column 7)"), "{summary}");
     assert!(summary.contains("10.00 %") && summary.contains("0.50 %"), "{summary}");
-    // New firmware or gateware changes nothing of LEDs and lens.
+    // New firmware or gateware changes neither LEDs nor lens.
     let newer = CameraIdentity { gateware: "9.9.9".into(), ..camera("A 1") };
     KeptFlatField::read(&path, &newer).unwrap();
 }

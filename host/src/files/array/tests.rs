@@ -62,7 +62,8 @@ fn half_precision_follows_ieee_754() {
 
 #[test]
 fn fortran_order_comes_out_in_c_order() {
-    // [[[0 1 2 3] [4 ..] [8 ..]] ...] of shape (2, 3, 4), stored with the first axis fastest.
+    // The array [[[0 1 2 3] [4 ..] [8 ..]] ...] of shape (2, 3, 4), stored with the first axis
+    // fastest.
     let mut stored = Vec::new();
     for k in 0..4 {
         for j in 0..3 {

@@ -87,12 +87,12 @@ fn chars74k_is_read_as_its_authors_hand_it_out() {
     assert_eq!(told[0], ("fnt", Kind::Drawn, Some(10), [1, 2].as_slice()));
     assert_eq!(told[1], ("hnd", Kind::Drawn, Some(0), [33].as_slice()));
     assert_eq!(told[2], ("img", Kind::Photograph, Some(61), [0].as_slice()));
-    // Bright on dark, 24 x 48 in the middle.
+    // The character is bright on dark, 24 x 48 pixels in the middle.
     let bright: Vec<usize> = (0..AREA_PX).filter(|&at| stacks[0].image(0)[at] > 128).collect();
     let columns = bright.iter().map(|at| at % SIDE_PX);
     assert_eq!((columns.clone().min(), columns.max()), (Some(20), Some(43)));
     assert_eq!((bright[0] / SIDE_PX, bright[bright.len() - 1] / SIDE_PX), (8, 55));
-    // The rim of the photograph is bright: shown as a negative.
+    // The rim of the photograph is bright, so the image is a negative.
     assert_eq!(stacks[2].image(0)[0], 0);
 }
 

@@ -56,7 +56,7 @@ fn every_kind_of_png_reads_alike() {
         ImageBuffer::from_pixel(2, 2, LumaA([128u8, 255])).into(),
         ImageBuffer::from_pixel(2, 2, Rgb([128u16 * 257; 3])).into(),
         ImageBuffer::from_pixel(2, 2, Rgba([128u8, 128, 128, 255])).into(),
-        // White at half opacity before black.
+        // A white pixel at half opacity before a black ground.
         ImageBuffer::from_pixel(2, 2, Rgba([255u8, 255, 255, 128])).into(),
     ];
     for picture in pictures {
@@ -107,7 +107,8 @@ fn a_jpeg_is_read_the_way_up_that_it_says() {
         );
     };
     near(corners(&upright), [200, 200, 40, 40]);
-    // Exif orientation 6: the top of the scene is the stored picture's left, turned a quarter clockwise.
+    // Exif orientation 6: the top of the scene is the stored picture's left side, turned a quarter
+    // clockwise.
     let exif = b"Exif\0\0MM\0\x2a\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0";
     let length = u16::try_from(exif.len() + 2).unwrap().to_be_bytes();
     let turned = [&upright[..2], &[0xff, 0xe1], &length, exif, &upright[2..]].concat();

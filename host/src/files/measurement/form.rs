@@ -1,4 +1,4 @@
-//! How the readings of a file belong to patterns.
+//! The forms of readings: how the readings of a file belong to patterns.
 
 use std::str::FromStr;
 
@@ -16,10 +16,10 @@ pub enum Form {
 }
 
 impl Form {
-    /// All of them.
+    /// Every form.
     pub const ALL: [Self; 4] = [Self::Pairs, Self::Halves, Self::Single, Self::Differences];
 
-    /// As it is written on the command line.
+    /// The form's name on the command line.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -30,7 +30,7 @@ impl Form {
         }
     }
 
-    /// In one line, for a list of forms.
+    /// The form's description in one line, for a list of forms.
     #[must_use]
     pub fn about(self) -> &'static str {
         match self {
@@ -41,7 +41,7 @@ impl Form {
         }
     }
 
-    /// Readings of one pattern.
+    /// Number of readings of one pattern.
     pub(super) fn readings(self) -> usize {
         match self {
             Self::Pairs | Self::Halves => 2,
@@ -49,7 +49,7 @@ impl Form {
         }
     }
 
-    /// What the numbers of a pattern are, for messages.
+    /// The meaning of a pattern's numbers, for error messages.
     pub(super) fn meaning(self) -> &'static str {
         match self {
             Self::Pairs => "a +, - pair a row",

@@ -1,14 +1,15 @@
-//! Images of a measurement file: the reconstruction that it holds.
+//! Reads the images that a measurement file holds: its own reconstructions.
 
 use super::FileError;
 use crate::files::fields::Fields;
 use crate::files::npy::Stack;
 use std::path::Path;
 
-/// Fields that hold images, the first found is taken.
+/// Fields that hold images. The first that the file has is read.
 const FIELDS: [&str; 3] = ["recon", "image", "images"];
 
-/// Reads the images in `recon`, `image` or `images`, (N, H, W) or (H, W), of an `.npz`, `.mat` or HDF5 file.
+/// Reads the images in `recon`, `image` or `images`, (N, H, W) or (H, W), of an `.npz`, `.mat` or
+/// HDF5 file.
 ///
 /// # Errors
 /// [`FileError`], one line that names file, field, what was found and what was expected.

@@ -1,28 +1,28 @@
-//! Where the readings of one measurement are in an array of several.
+//! Locates the readings of one measurement in an array of several measurements.
 
 use super::FileError;
 use std::path::Path;
 
-/// Measurements of `length` readings in an array in C order.
+/// How measurements of `length` readings lie in an array in C order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Layout {
-    /// Measurements in the array, at least 1.
+    /// Number of measurements in the array, at least 1.
     pub(super) count: usize,
     length: usize,
-    /// Readings of one measurement are `count` apart, not neighbours.
+    /// Whether the readings of one measurement are `count` apart instead of adjacent.
     patterns_first: bool,
 }
 
 impl Layout {
-    /// The layout of an array of this shape, if it holds measurements of so many readings: along the last axis, or along
-    /// the first. Axes of length 1 do not count.
+    /// The layout of an array of this shape, if the array holds measurements of `length` readings
+    /// along the last axis or along the first. Axes of length 1 do not count.
     pub(super) fn of(shape: &[u64], length: usize, patterns_first: bool) -> Option<Self> {
         if shape.is_empty() || shape.contains(&0) {
             return None;
         }
         let axes: Vec<u64> = shape.iter().copied().filter(|&axis| axis != 1).collect();
         let (along, others) = match (&axes[..], patterns_first) {
-            // Measurements of one reading, one measurement or several.
+            // With one reading a measurement, the other axes count the measurements.
             (others, _) if length == 1 => (1, others),
             ([], _) => return None,
             ([first, others @ ..], true) => (*first, others),
@@ -35,7 +35,7 @@ impl Layout {
         Some(Self { count: usize::try_from(count).ok()?, length, patterns_first })
     }
 
-    /// The measurement to read: a single one needs no choice.
+    /// The index of the measurement to read. A file with a single measurement needs no choice.
     pub(super) fn choose(
         &self,
         path: &Path,

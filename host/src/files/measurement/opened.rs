@@ -1,4 +1,4 @@
-//! A file whose shapes fit together, of which measurements are taken one by one.
+//! An open file whose shapes fit together. Measurements are read from the file one by one.
 
 use super::readings::{NamedReadings, check_infinite, expected_of, found_names, readings_field};
 use super::reference::read_reference;
@@ -8,11 +8,11 @@ use crate::files::fields::{Field, Fields};
 use nirspi_recon::{Image, Rows, Side};
 use std::path::Path;
 
-/// A file whose shapes fit together.
+/// An open file whose shapes fit together.
 pub(super) struct Opened {
     fields: Fields,
     side: Side,
-    /// The row shown k-th, of those that were read.
+    /// The row shown k-th; `None` for a row that was not read.
     rows: Vec<Option<u32>>,
     form: Form,
     pub(super) readings: NamedReadings,
@@ -78,7 +78,7 @@ impl Opened {
         Ok(Self { fields, side, rows, form, readings, reference, notes })
     }
 
-    /// The measurement of this index, without the patterns that were not read.
+    /// Reads the measurement of this index, without the patterns that were not read.
     pub(super) fn measurement(&mut self, index: usize) -> Result<MeasurementFile, FileError> {
         let path = self.fields.path();
         let NamedReadings { name, field, layout } = &self.readings;

@@ -1,4 +1,4 @@
-//! Readings of patterns that the file does not name: those of `--matrix`.
+//! Readings of patterns that the file does not name, for `--matrix`.
 
 use super::readings::{Expected, Hint, NamedReadings, check_infinite, readings_field};
 use super::{FileError, Selection};
@@ -8,15 +8,15 @@ use std::path::Path;
 /// Readings of patterns that the file does not name.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plain {
-    /// Readings, finite.
+    /// The readings, all finite.
     pub values: Vec<f64>,
-    /// The pattern of each.
+    /// The pattern of each reading.
     pub patterns: Vec<usize>,
-    /// Patterns that were not read: NaN.
+    /// Patterns that were not read: the file has NaN.
     pub not_read: Vec<usize>,
 }
 
-/// Reads one number for each of `patterns` patterns, `y` or else `d`.
+/// Reads one number for each of `patterns` patterns, from `y` or else from `d`.
 ///
 /// # Errors
 /// As [`super::read`].

@@ -1,4 +1,4 @@
-//! The field of a file that holds the readings, and the shapes that it may have.
+//! Finds the field of a file that holds the readings, and checks the field's shape.
 
 use super::layout::Layout;
 use super::{FileError, Form, Selection};
@@ -6,21 +6,21 @@ use crate::files::array::has_shape;
 use crate::files::fields::{Field, Fields, UNNAMED};
 use std::path::Path;
 
-/// A field of readings, with how measurements are laid out in it.
+/// A field of readings, and the layout of its measurements.
 pub(super) struct NamedReadings {
     pub(super) name: String,
     pub(super) field: Field,
     pub(super) layout: Layout,
 }
 
-/// What a field of readings must be.
+/// The expected shape of a field of readings.
 pub(super) struct Expected<'w> {
     pub(super) length: usize,
     pub(super) meaning: &'w str,
     pub(super) hint: Hint<'w>,
 }
 
-/// Another length, and what it says.
+/// Another length that the field may have, and the hint that an error gives for it.
 pub(super) struct Hint<'w> {
     pub(super) length: usize,
     pub(super) words: &'w str,
@@ -69,7 +69,7 @@ impl NamedReadings {
     }
 }
 
-/// Names of the fields, for a message.
+/// The names of the file's fields, for an error message.
 pub(super) fn found_names(fields: &Fields) -> Vec<String> {
     match fields.is_unnamed() {
         true => vec!["one array without a name".to_owned()],
@@ -77,7 +77,7 @@ pub(super) fn found_names(fields: &Fields) -> Vec<String> {
     }
 }
 
-/// The field of the readings.
+/// Finds the field of the readings.
 pub(super) fn readings_field(fields: &Fields, want: &Selection) -> Result<String, FileError> {
     let missing = |field, expected| {
         let (path, found) = (fields.path().to_owned(), found_names(fields));
@@ -98,7 +98,7 @@ pub(super) fn readings_field(fields: &Fields, want: &Selection) -> Result<String
             }
         };
     }
-    // The only field of a file without rows can be nothing but the readings.
+    // If a file without rows has one field only, the field must be the readings.
     if let [only] = fields.names()
         && only != "d"
     {
@@ -113,7 +113,7 @@ pub(super) fn readings_field(fields: &Fields, want: &Selection) -> Result<String
     }
 }
 
-/// What readings of that form and so many rows must be.
+/// The expected shape of readings of a form and a number of rows.
 pub(super) fn expected_of(form: Form, rows: usize) -> Expected<'static> {
     let hint = match form {
         Form::Pairs | Form::Halves => Hint {
@@ -131,7 +131,8 @@ pub(super) fn expected_of(form: Form, rows: usize) -> Expected<'static> {
     Expected { length: rows * form.readings(), meaning: form.meaning(), hint }
 }
 
-/// NaN is a pattern that was not read; an infinite reading is a mistake.
+/// Refuses infinite readings. NaN marks a pattern that was not read; an infinite reading is a
+/// mistake.
 pub(super) fn check_infinite(path: &Path, field: &str, values: &[f64]) -> Result<(), FileError> {
     match values.iter().position(|value| value.is_infinite()) {
         None => Ok(()),

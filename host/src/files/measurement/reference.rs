@@ -1,11 +1,11 @@
-//! The images that a measurement file holds of its own, to compare with.
+//! Reads the file's own images, to compare with.
 
 use super::FileError;
 use crate::files::array::shape_text;
 use crate::files::fields::{Field, Fields};
 use nirspi_recon::Side;
 
-/// The file's own images and how many there are: one, or one for each measurement.
+/// The file's own images and their number: one, or one for each measurement.
 pub(super) fn read_reference(
     fields: &mut Fields,
     side: Side,

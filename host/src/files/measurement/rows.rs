@@ -1,4 +1,5 @@
-//! Side of the image and the row shown k-th: what the file says, or the order that its user names.
+//! The side of the image and the row shown k-th, from the file or from the order that the user
+//! names.
 
 use super::layout::Layout;
 use super::readings::NamedReadings;
@@ -7,7 +8,7 @@ use crate::files::array::has_shape;
 use crate::files::fields::{Fields, UNNAMED};
 use nirspi_recon::{Order, Rows, RowsError, Side};
 
-/// Side, rows and readings of a file that says neither, shown in this order.
+/// Side, rows and readings of a file that states neither side nor rows and was shown in this order.
 pub(super) fn shown(
     fields: &mut Fields,
     name: String,
@@ -97,7 +98,7 @@ pub(super) fn read_side(fields: &mut Fields, want: &Selection) -> Result<Option<
     }
 }
 
-/// The row shown k-th; none where it was not read.
+/// The row shown k-th; `None` for a row that was not read.
 pub(super) fn read_rows(fields: &mut Fields, side: Side) -> Result<Vec<Option<u32>>, FileError> {
     const FIELD: &str = "h_row";
     let (n, area) = (side.pixels(), side.area());
@@ -146,7 +147,7 @@ pub(super) fn read_rows(fields: &mut Fields, side: Side) -> Result<Vec<Option<u3
     Ok(rows)
 }
 
-/// The whole number that a float stands for; every row number and side is exact in float64.
+/// The whole number that a float represents. Every row number and side is exact in float64.
 fn as_integer(value: f64) -> Option<i64> {
     (value.fract() == 0.0 && value.abs() < 2f64.powi(53)).then_some(value as i64)
 }

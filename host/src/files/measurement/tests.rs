@@ -2,7 +2,7 @@ use super::super::testing::{Zip, file, line, npy, npy_f64, npy_i32, zip};
 use super::*;
 use proptest::prelude::*;
 
-/// Nothing but what the file says.
+/// A selection with nothing set: all information comes from the file.
 fn as_is() -> Selection {
     Selection::default()
 }
@@ -23,7 +23,7 @@ fn good() -> Vec<(&'static str, Vec<u8>)> {
         ("y.npy", npy_f64("(6,)", &[5.0, 1.0, 2.0, 3.0, 4.0, 4.5])),
         ("d.npy", npy_f64("(3,)", &[4.0, -1.0, -0.5])),
         ("recon.npy", npy_f64("(2, 2)", &[1.0, 2.0, 3.0, 4.0])),
-        // Text and pickled objects, not to be looked at.
+        // Text and pickled objects, which the reader must ignore.
         ("meta.npy", npy("'<U3'", false, "()", b"m\0\0\0e\0\0\0t\0\0\0")),
         ("notes.npy", npy("'|O'", false, "(1,)", b"\x80\x04not a pickle")),
         ("torn.npy", b"no array at all".to_vec()),
@@ -307,7 +307,7 @@ fn what_is_no_measurement_file_is_named_for_what_it_is() {
 #[test]
 fn patterns_that_were_not_read_are_named_and_left_out() {
     let nan = f64::NAN;
-    // One reading of a pair is enough to lose the pattern.
+    // A pattern is lost if one reading of its pair is missing.
     let members = with("y.npy", npy_f64("(6,)", &[5.0, 1.0, nan, 3.0, 4.0, 4.5]));
     let found = read_members(&members, &as_is()).unwrap();
     assert_eq!(found.h_row.as_slice(), [0, 1]);
@@ -376,7 +376,7 @@ fn an_order_gives_the_rows_of_readings_alone_and_is_never_guessed() {
     );
     let transposed = Selection { transpose: true, ..sequency.clone() };
     assert_eq!(read_alone(32, &transposed).unwrap().h_row.as_slice()[..4], [0, 8, 12, 4]);
-    // The only array of a file, whatever its name.
+    // The only array of a file is the readings, whatever its name.
     let (_guard, path) = file("y.npz", &zip(Zip::Stored, &[("arr_0.npy", alone(32))]));
     assert_eq!(read(&path, &sequency).unwrap().h_row, found.h_row);
     let refusals = [
@@ -446,8 +446,8 @@ proptest! {
             bytes[at] = byte;
         }
         match read_bytes(&bytes, &as_is()) {
-            // Checksums leave three ways to differ: `y` or `recon` renamed away, and what they do
-            // not cover.
+            // With checksums, two kinds of difference remain: `y` or `recon` is renamed, or the
+            // damage is outside the checksums.
             Ok(found) => {
                 prop_assert_eq!(found.h_row.as_slice(), [0, 3, 1]);
                 match found.readings {

@@ -1,14 +1,15 @@
-//! Our own measurements as a file that others read: NumPy `.npz`.
+//! Writes measurements of nirspi as a file for other programs: NumPy `.npz`.
 
 use super::FileError;
 use crate::files::{archive, npy};
 use nirspi_recon::Measurements;
 use std::path::Path;
 
-/// The bytes of a `.npz` file with `n`, `h_row` and `d`; `simulated` is 1 where no real light was measured.
+/// The bytes of a `.npz` file with `n`, `h_row` and `d`. `simulated` is 1 if no real light was
+/// measured.
 ///
 /// # Errors
-/// [`FileError`] naming `path`, if the archive cannot be put together.
+/// [`FileError`] naming `path`, if the archive cannot be written.
 pub fn encode(
     path: &Path,
     measurements: &Measurements,

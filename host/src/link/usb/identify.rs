@@ -1,6 +1,6 @@
-//! Which devices on the bus are cameras, and which of them is meant: decided from descriptors alone.
+//! Decides from descriptors alone which devices on the bus are cameras, and which camera to use.
 //!
-//! The one law: nothing here touches the bus, so all of it is tested without one.
+//! This module never accesses the bus, so tests need no bus.
 
 use nirspi_wire::usb::{INTERFACE_CLASS, INTERFACE_SUBCLASS, PRODUCT, PRODUCT_ID, VENDOR_ID};
 use nirspi_wire::version;
@@ -8,7 +8,7 @@ use std::fmt;
 use std::io;
 use thiserror::Error;
 
-/// An interface, as its descriptor says.
+/// The descriptor of an interface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct InterfaceId {
     /// `bInterfaceNumber`.
@@ -22,14 +22,14 @@ pub struct InterfaceId {
 }
 
 impl InterfaceId {
-    /// Whether this is a camera's interface, of whatever protocol version.
+    /// Whether this is the interface of a camera, of any protocol version.
     #[must_use]
     pub fn is_camera(&self) -> bool {
         (self.class, self.subclass) == (INTERFACE_CLASS, INTERFACE_SUBCLASS)
     }
 }
 
-/// What the system knows of a device without opening it.
+/// The properties of a device that the system knows without opening it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DeviceId {
     /// `idVendor`.
@@ -40,16 +40,18 @@ pub struct DeviceId {
     pub name: Option<String>,
     /// `iSerialNumber`.
     pub serial: Option<String>,
-    /// Interfaces of the active configuration. Windows lists none before the device is open.
+    /// Interfaces of the active configuration. Windows lists no interfaces before the device is
+    /// open.
     pub interfaces: Vec<InterfaceId>,
 }
 
-/// A camera on the bus that has not been opened.
+/// A camera on the bus, not opened.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct UsbCamera {
     /// Serial number.
     pub serial: Option<String>,
-    /// Oldest protocol version that the camera speaks, where the system shows the interface before the device is open.
+    /// Oldest protocol version that the camera speaks, if the system shows the interface before the
+    /// device is open.
     pub protocol: Option<u16>,
 }
 
@@ -62,8 +64,8 @@ impl fmt::Display for UsbCamera {
     }
 }
 
-/// The camera that this device is, if it is one. Vendor and product id are lent for testing and shared by others, so
-/// the name must match too, and the interface where it can be seen.
+/// The camera, if this device is a camera. Vendor and product id are test ids shared with other
+/// devices, so the name must match too, and the interface if the system shows it.
 #[must_use]
 pub fn recognise(device: &DeviceId) -> Option<UsbCamera> {
     let ours = (device.vendor, device.product) == (VENDOR_ID, PRODUCT_ID)
@@ -76,10 +78,10 @@ pub fn recognise(device: &DeviceId) -> Option<UsbCamera> {
     Some(UsbCamera { serial: device.serial.clone(), protocol })
 }
 
-/// Of the cameras listed the one that is meant: that with `serial`, or the only one.
+/// Chooses one of the listed cameras: the camera with `serial`, or the only camera.
 ///
 /// # Errors
-/// [`UsbError::None`] or [`UsbError::Several`], naming what is there.
+/// [`UsbError::None`] or [`UsbError::Several`], which name the connected cameras.
 pub fn choose<'c, T>(
     cameras: &'c [(UsbCamera, T)],
     serial: Option<&str>,
@@ -96,11 +98,10 @@ pub fn choose<'c, T>(
     }
 }
 
-/// Whether the camera can be greeted, by its interface's descriptor, which names the oldest version that the camera
-/// speaks.
+/// Checks the oldest version that the camera speaks, which its interface's descriptor names.
 ///
 /// # Errors
-/// [`UsbError::Version`].
+/// [`UsbError::Version`] if this program does not speak that version.
 pub fn check_version(oldest: u16) -> Result<(), UsbError> {
     if oldest <= version::CURRENT { Ok(()) } else { Err(UsbError::Version { oldest }) }
 }
@@ -108,48 +109,48 @@ pub fn check_version(oldest: u16) -> Result<(), UsbError> {
 /// Why a USB camera cannot be used.
 #[derive(Debug, Error)]
 pub enum UsbError {
-    /// Not there.
+    /// The camera is not connected.
     #[error("{}", none(.wanted.as_deref(), .there))]
     None {
-        /// The serial number asked for.
+        /// The requested serial number.
         wanted: Option<String>,
-        /// The cameras that are there.
+        /// The connected cameras.
         there: Vec<String>,
     },
-    /// More than one, and none was named.
+    /// Several cameras are connected and the user did not choose one.
     #[error("{} cameras on USB: name one of {}", .there.len(), .there.join(", "))]
     Several {
-        /// The cameras that are there.
+        /// The connected cameras.
         there: Vec<String>,
     },
-    /// The two sides speak different versions.
+    /// The camera needs a newer protocol version than this program has.
     #[error(
         "the camera's USB descriptor asks for protocol version {oldest} or newer, this program speaks up to {}: update this program",
         version::CURRENT
     )]
     Version {
-        /// The oldest that the camera speaks.
+        /// The oldest version that the camera speaks.
         oldest: u16,
     },
-    /// The system does not let this user.
+    /// The system denies the user access.
     #[error("no permission to open {camera}{}", permission_hint(cfg!(target_os = "linux")))]
     Permission {
-        /// Which camera.
+        /// The camera.
         camera: String,
     },
-    /// Another program has it.
+    /// Another program uses the camera.
     #[error("{camera} is in use by another program")]
     Busy {
-        /// Which camera.
+        /// The camera.
         camera: String,
     },
-    /// It has the names of a camera, and not its endpoints.
+    /// The device has the name of a camera but not the endpoints of a camera.
     #[error("{camera} has no camera interface: is its firmware ours?")]
     NoInterface {
-        /// Which camera.
+        /// The camera.
         camera: String,
     },
-    /// The system's USB gave up.
+    /// The system's USB failed.
     #[error("the system's USB failed")]
     Io(#[from] io::Error),
 }

@@ -1,7 +1,8 @@
-//! A camera on USB, through `nusb`: no driver and no system library on any system.
+//! A camera on USB, through `nusb`, which needs no driver and no system library.
 //!
-//! [`identify`] decides which device is meant, [`transfers`] makes a byte stream of bulk transfers; both are tested
-//! without a bus. What is left here hands them to `nusb`, and **has met no hardware yet**.
+//! [`identify`] decides which device to use, and [`transfers`] makes a byte stream of bulk
+//! transfers. Both are tested without a bus. The rest of this module connects them to `nusb` and
+//! **has not been tested with hardware yet**.
 
 pub mod identify;
 pub mod transfers;
@@ -17,12 +18,12 @@ use std::io;
 use std::time::{Duration, Instant};
 use transfers::{Endpoint, InStream, TRANSFER_BYTES, TRANSFERS, TransferProblem};
 
-/// How long a missing permission is waited for: udev hands a device out some moments after it was plugged in.
+/// How long to wait for a permission: udev grants access some moments after a device was connected.
 const PERMISSION_PATIENCE: Duration = Duration::from_secs(2);
-/// The first pause between two tries; each one after it is twice as long.
+/// The first pause between two attempts. Each later pause is twice as long.
 const FIRST_PAUSE: Duration = Duration::from_millis(50);
 
-/// The cameras on USB that are plugged in, with the devices that they are.
+/// The connected cameras on USB, with their devices.
 fn listed() -> io::Result<Vec<(UsbCamera, DeviceInfo)>> {
     /// "No such file or folder": the kernel, or the container, has no USB.
     const ENOENT: u32 = 2;
@@ -36,10 +37,10 @@ fn listed() -> io::Result<Vec<(UsbCamera, DeviceInfo)>> {
     Ok(devices.filter_map(|device| Some((recognise(&device_id(&device))?, device))).collect())
 }
 
-/// The cameras on USB that are plugged in. None is opened.
+/// The connected cameras on USB. No camera is opened.
 ///
 /// # Errors
-/// When the system does not list its devices.
+/// If the system does not list its devices.
 pub fn usb_cameras() -> io::Result<Vec<UsbCamera>> {
     Ok(listed()?.into_iter().map(|(camera, _)| camera).collect())
 }
@@ -62,17 +63,17 @@ fn device_id(device: &DeviceInfo) -> DeviceId {
     }
 }
 
-/// A camera on USB. Its interface is claimed for as long as the link lives.
+/// A camera on USB. The link holds the camera's interface for as long as the link lives.
 pub struct UsbLink {
     incoming: InStream<nusb::Endpoint<Bulk, In>>,
     outgoing: nusb::Endpoint<Bulk, Out>,
 }
 
 impl UsbLink {
-    /// Opens the camera with this serial number, or the only one.
+    /// Opens the camera with this serial number, or the only camera.
     ///
     /// # Errors
-    /// [`UsbError`], which says what to do about it.
+    /// [`UsbError`], which says what to do.
     pub fn open(serial: Option<&str>) -> Result<Self, UsbError> {
         let cameras = listed()?;
         let (camera, info) = choose(&cameras, serial)?;
@@ -107,7 +108,7 @@ impl UsbLink {
     }
 }
 
-/// Tries again, ever more slowly, while the system has not handed the device out yet.
+/// Tries again with growing pauses until the system grants access to the device.
 fn patiently<T>(mut open: impl FnMut() -> Result<T, nusb::Error>) -> Result<T, nusb::Error> {
     let deadline = Instant::now() + PERMISSION_PATIENCE;
     let mut pause = FIRST_PAUSE;

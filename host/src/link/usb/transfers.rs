@@ -1,8 +1,13 @@
-//! Bulk transfers as a byte stream: several in flight, buffers used again and again.
+//! Bulk transfers as a byte stream: several transfers in flight, with recycled buffers.
 //!
-//! While the host looks elsewhere the controller goes on filling the queued transfers; only when all are full does the
-//! device have to wait. The one law: bytes come out in the order in which the device sent them, each once, those of a
-//! transfer that failed half-way too.
+//! The controller fills the queued transfers while the host is busy. The device waits only when all
+//! transfers are full.
+//!
+//! # Invariant
+//! Bytes come out once and in the order in which the device sent them
+//! (`tests::bytes_come_in_order_whatever_the_sizes_of_transfers_and_pieces`), including the bytes
+//! of a transfer that failed half-way
+//! (`tests::a_device_that_goes_in_the_middle_of_a_transfer_leaves_what_it_sent_then_closed`).
 
 use crate::link::Received;
 use std::collections::VecDeque;
@@ -12,66 +17,69 @@ use std::time::{Duration, Instant};
 
 /// Bytes of one IN transfer: 32 high-speed packets, 4 ms of a 4 MB/s stream.
 pub const TRANSFER_BYTES: usize = 16 << 10;
-/// IN transfers in flight: 64 ms of a 4 MB/s stream may wait for a host that is busy elsewhere.
+/// Number of IN transfers in flight. They hold 64 ms of a 4 MB/s stream while the host is busy.
 pub const TRANSFERS: usize = 16;
-/// A command that the device does not take within this, it does not take at all.
+/// The longest time in which a device must take a command.
 const SEND_TIMEOUT: Duration = Duration::from_secs(5);
-/// Stalls in a row, with no byte between, after which an endpoint counts as broken.
+/// An endpoint counts as broken after this many stalls in a row without a byte.
 const STALLS_MAX: u32 = 4;
 
-/// How a transfer ended that did not end well.
+/// Why a transfer failed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum TransferProblem {
-    /// We gave it up.
+    /// The host cancelled the transfer.
     Cancelled,
-    /// The endpoint has halted; clearing that lets it go on.
+    /// The endpoint has halted. Clearing the halt lets it continue.
     Stalled,
-    /// The device is not there any more.
+    /// The device is gone.
     Gone,
-    /// Anything else, in the system's words.
+    /// Another reason, in the system's words.
     Other(String),
 }
 
-/// A bulk endpoint, as far as moving bytes needs one. Transfers complete in the order in which they were submitted.
+/// A bulk endpoint, reduced to moving bytes. Transfers complete in the order in which they were
+/// submitted.
 pub trait Endpoint: Send {
-    /// Memory of a transfer. Reads as what was transferred.
+    /// The memory of a transfer. Dereferences to the transferred bytes.
     type Buffer: Deref<Target = [u8]> + Send;
 
-    /// Queues a transfer. `Out` sends what the buffer holds, `In` fills it.
+    /// Queues a transfer. An `Out` transfer sends the buffer's bytes, an `In` transfer fills the
+    /// buffer.
     fn submit(&mut self, buffer: Self::Buffer);
 
-    /// Transfers queued or complete, and not fetched.
+    /// Number of transfers that are queued, or complete but not fetched.
     fn pending(&self) -> usize;
 
-    /// Fetches the next complete transfer, waiting for up to `timeout`. There is one pending.
+    /// Fetches the next complete transfer, waiting for up to `timeout`. At least one transfer must
+    /// be pending.
     fn complete(
         &mut self,
         timeout: Duration,
     ) -> Option<(Self::Buffer, Result<(), TransferProblem>)>;
 
-    /// Asks for all pending transfers to end now.
+    /// Asks all pending transfers to end now.
     fn cancel_all(&mut self);
 
-    /// Ends a halt. No transfer is pending.
+    /// Clears a halt. No transfer may be pending.
     ///
     /// # Errors
-    /// When the device does not answer.
+    /// If the device does not answer.
     fn clear_halt(&mut self) -> io::Result<()>;
 }
 
-/// What comes from the device.
+/// The stream of bytes from the device.
 pub struct InStream<E: Endpoint> {
     endpoint: E,
-    /// Transfers that brought bytes, oldest first; of the first, `taken` bytes have been handed on.
+    /// Transfers with bytes, oldest first. `taken` bytes of the first transfer have been read.
     ready: VecDeque<E::Buffer>,
     taken: usize,
     stalls: u32,
-    /// Why no more will come once `ready` is empty.
+    /// Why no more bytes arrive once `ready` is empty.
     end: Option<TransferProblem>,
 }
 
 impl<E: Endpoint> InStream<E> {
-    /// Starts listening with these buffers, each a whole number of packets long.
+    /// Submits these buffers, each a whole number of packets long.
     pub fn new(mut endpoint: E, buffers: impl IntoIterator<Item = E::Buffer>) -> Self {
         for buffer in buffers {
             endpoint.submit(buffer);
@@ -82,7 +90,7 @@ impl<E: Endpoint> InStream<E> {
     /// As [`Link::receive`](crate::link::Link::receive).
     ///
     /// # Errors
-    /// When transfers fail other than by the device's going away.
+    /// If transfers fail in another way than by disconnection of the device.
     pub fn receive(&mut self, into: &mut [u8], timeout: Duration) -> io::Result<Received> {
         let deadline = Instant::now() + timeout;
         while self.ready.is_empty() {
@@ -117,12 +125,12 @@ impl<E: Endpoint> InStream<E> {
         if stalled {
             self.restart(empty.into_iter().collect());
         } else if self.end.is_none() {
-            // The device had nothing more to say: a packet of no length ends a full one.
+            // A packet of length 0 after a full packet marks the end of the device's data.
             empty.into_iter().for_each(|buffer| self.endpoint.submit(buffer));
         }
     }
 
-    /// Gets a halted endpoint going again. What the transfers behind the halted one brought is kept.
+    /// Restarts a halted endpoint. The bytes of the transfers behind the halted one are kept.
     fn restart(&mut self, mut empty: Vec<E::Buffer>) {
         self.stalls += 1;
         self.endpoint.cancel_all();
@@ -142,7 +150,7 @@ impl<E: Endpoint> InStream<E> {
         }
     }
 
-    /// Copies from the oldest transfer; an emptied one goes back to the queue.
+    /// Copies from the oldest transfer. An empty transfer is queued again.
     fn hand_on(&mut self, into: &mut [u8]) -> Received {
         let Some(first) = self.ready.front() else { return Received::Nothing };
         let rest = first.get(self.taken..).unwrap_or(&[]);
@@ -162,10 +170,10 @@ impl<E: Endpoint> InStream<E> {
     }
 }
 
-/// Sends one command and waits until the device has taken it.
+/// Sends one command and waits until the device has taken the command.
 ///
 /// # Errors
-/// When it is not taken; [`io::ErrorKind::BrokenPipe`] when the device has gone.
+/// If the device does not take the command; [`io::ErrorKind::BrokenPipe`] if the device is gone.
 pub fn send<E: Endpoint>(endpoint: &mut E, buffer: E::Buffer) -> io::Result<()> {
     endpoint.submit(buffer);
     let outcome = match endpoint.complete(SEND_TIMEOUT) {
@@ -183,7 +191,7 @@ pub fn send<E: Endpoint>(endpoint: &mut E, buffer: E::Buffer) -> io::Result<()> 
             Err(io::Error::new(io::ErrorKind::TimedOut, "the camera takes no command"))
         }
         Err(TransferProblem::Stalled) => {
-            // The next command may find it well again.
+            // The endpoint must work again for the next command.
             endpoint.clear_halt()?;
             Err(io::Error::other("the camera refused the transfer"))
         }

@@ -1,4 +1,4 @@
-//! The short way against the whole virtual camera.
+//! Compares the linear camera with the whole virtual camera.
 
 use super::*;
 use crate::capture::{Calibration, CaptureOptions, capture};
@@ -45,7 +45,7 @@ fn mean_and_deviation(a: &[f32], b: &[f32]) -> (f64, f64) {
 #[test]
 fn a_picture_by_the_short_way_differs_from_a_capture_by_noise_alone() {
     let camera = LinearCamera::new(CameraModel::paper(), 1).unwrap();
-    // Mid grey, so that no noise is clipped.
+    // Grey levels in the middle of the range, so that noise is not clipped.
     let scene: Vec<f32> = star().iter().map(|v| 0.3 + 0.4 * v).collect();
     for (distance_mm, sweeps, sampling) in [(300.0, 60, 1.0), (450.0, 120, 0.5)] {
         let conditions = Conditions { distance_mm, rain: Rainfall::None, sweeps, sampling };
@@ -53,7 +53,8 @@ fn a_picture_by_the_short_way_differs_from_a_capture_by_noise_alone() {
         let short = camera.picture(&scene, conditions, &mut rng).unwrap().reading;
         let whole = captured(&scene, conditions, 3);
         let (mean, deviation) = mean_and_deviation(&short.image, &whole);
-        // Both carry noise of their own: sqrt(2) of it, known to 1/sqrt(2 * 1024) = 2 %.
+        // Both pictures have their own noise: the difference has sqrt(2) times the noise, with an
+        // error of 1/sqrt(2 * 1024) = 2 %.
         let expected = 2f64.sqrt() * f64::from(short.noise_std);
         assert!((deviation / expected - 1.0).abs() < 0.1, "{deviation} against {expected}");
         assert!(mean.abs() < 5.0 * expected / 32.0, "{mean}");
@@ -69,7 +70,8 @@ fn light_that_is_enough_shows_the_scene_as_the_lens_does() {
     let reading = camera.picture(&star(), conditions, &mut rng).unwrap().reading;
     let (mean, deviation) =
         mean_and_deviation(&reading.image, &nirspi_nets::degrade::sampled(&reading.optical));
-    // Rain takes less than a percent; emitters of 2/3 of the pitch see a little more than whole pixels.
+    // Rain takes less than a percent. Emitters of 2/3 of the pitch see slightly different areas
+    // than whole pixels.
     assert!(mean.abs() < 0.02 && deviation < 0.03, "{mean} {deviation}");
     let (_, sharp) = mean_and_deviation(&reading.image, &nirspi_nets::degrade::sampled(&star()));
     assert!(sharp > 2.0 * deviation, "no blur: {sharp}");

@@ -1,4 +1,5 @@
-//! The same problem on a GPU: the time includes the way of measurements there, and of solutions and images back.
+//! Times the same problem on a GPU, including the transfer of measurements to the GPU, and of
+//! solutions and images back.
 
 use super::super::{milliseconds, scenes};
 use super::{Precision, Report, Settings, Timed, matrix, report};
@@ -12,7 +13,7 @@ use std::time::Instant;
 /// Times `problem` on a GPU, after a run to warm up.
 ///
 /// # Errors
-/// [`Precision::F64`], which kernels do not have; a device that fails.
+/// [`Precision::F64`], which the kernels do not have, or a device that fails.
 pub fn on_gpu(problem: &ProblemFile, settings: &Settings, device: &Device) -> Result<Report> {
     if settings.precision == Precision::F64 {
         return Err(BackendError::Precision.into());
@@ -20,7 +21,7 @@ pub fn on_gpu(problem: &ProblemFile, settings: &Settings, device: &Device) -> Re
     let start = Instant::now();
     let dictionary = DeviceDictionary::new(device, matrix(problem), settings.normalise)?;
     let prepare_ms = milliseconds(start);
-    // Without pictures of the atoms, an image is the coefficients at their places.
+    // Without pictures of the atoms, an image has the coefficients at the atoms' positions.
     let pictures = settings.cosines.then(|| cosines(&dictionary)).transpose()?;
     let solve = || solve(settings, problem, &dictionary, pictures.as_ref());
     let (mut solutions, mut solved_in_f64, pixels) = solve()?;
@@ -31,7 +32,7 @@ pub fn on_gpu(problem: &ProblemFile, settings: &Settings, device: &Device) -> Re
         times_ms.push(milliseconds(start));
     }
     let frames = (problem.frames.len() / problem.measurements) as f64;
-    // An index, a step, a pivot and a coefficient for each atom, and what the search ended with.
+    // An index, a step, a pivot and a coefficient for each atom, and the result of the search.
     let solution = 4 * problem.sparsity * 4 + 32;
     let transferred_bytes_per_frame =
         (4 * problem.measurements + solution) as f64 + 4.0 * pixels as f64 / frames;
@@ -48,7 +49,7 @@ pub fn on_gpu(problem: &ProblemFile, settings: &Settings, device: &Device) -> Re
     Ok(report(settings, problem, timed))
 }
 
-/// Solutions, how many of them took double precision, and how many pixels came back.
+/// The solutions, the number of double-precision solutions, and the number of transferred pixels.
 fn solve(
     settings: &Settings,
     problem: &ProblemFile,
@@ -75,7 +76,7 @@ fn solve(
     Ok((solutions, doubtful.len(), pixels))
 }
 
-/// What the atoms of a random problem look like.
+/// Pictures of the atoms of a random problem.
 fn cosines(dictionary: &DeviceDictionary) -> Result<DevicePictures> {
     Ok(dictionary.upload_pictures(&scenes::cosines(), Side::INSTRUMENT.area())?)
 }

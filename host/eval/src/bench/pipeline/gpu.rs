@@ -1,4 +1,5 @@
-//! The same on a GPU: measurements go there, enhanced images come back.
+//! Times the same path on a GPU: measurements are transferred to the GPU, enhanced images come
+//! back.
 
 use super::{Measured, Timed, Times, Work, enhanced, scenes};
 use crate::error::Result;
@@ -6,11 +7,11 @@ use nirspi_nets::{DeviceEnhancer, Enhancer};
 use nirspi_recon::Side;
 use nirspi_recon::omp::gpu::{Device, DeviceDictionary, DeviceImages};
 
-/// Times `work` on a GPU, where images stay from the pursuit to the networks; and the same work with images brought to the host
-/// in between, which `on_host` enhances.
+/// Times `work` on a GPU, where images stay from the pursuit to the networks. Also times the same
+/// work with images brought to the host in between, which `on_host` enhances.
 ///
 /// # Errors
-/// A device that fails.
+/// `EvalError` if the device fails.
 pub fn on_gpu(
     work: &Work,
     device: &Device,
@@ -20,7 +21,8 @@ pub fn on_gpu(
     let dictionary = DeviceDictionary::new(device, work.matrix.clone(), true)?;
     let pictures = dictionary.upload_pictures(&scenes::cosines(), Side::INSTRUMENT.area())?;
 
-    // As f32 finds them: where it cannot decide between two atoms, an image is as good with either.
+    // The choices of f32 are used: if f32 cannot decide between two atoms, the image is equally
+    // good with either.
     let reconstruct = || -> Result<Vec<DeviceImages>> {
         Ok(dictionary.in_turns(work.limits.sparsity, &work.y, |y| {
             let solutions = dictionary.pursue(&work.limits, &dictionary.upload(y)?)?;

@@ -345,7 +345,8 @@ pub fn solve_batch_over<T: Scalar, D: Dictionary<T> + ?Sized>(
     Ok(solutions)
 }
 
-/// Pursues one measurement over any dictionary, as [`Solver::solve`](crate::omp::Solver::solve) does.
+/// Pursues one measurement over any dictionary, as [`Solver::solve`](crate::omp::Solver::solve)
+/// does.
 ///
 /// # Errors
 /// The errors of [`solve_batch_over`].

@@ -152,8 +152,8 @@ impl<R: Runtime> Engine for ComputeClient<R> {
         assert_eq!(matrix.count, rows * width);
         let out = Engine::empty(self, count * width);
         for (first, last) in row_launches(rows) {
-            // SAFETY: vectors are below `count`, rows below `rows` and columns below `width`, by the asserts above; a launch
-            // loops over at most `ROUNDS` rows.
+            // SAFETY: vectors are below `count`, rows below `rows` and columns below `width`, by
+            // the asserts above; a launch loops over at most `ROUNDS` rows.
             unsafe {
                 kernels::products::launch_unchecked::<R>(
                     self,
@@ -192,8 +192,9 @@ impl<R: Runtime> Engine for ComputeClient<R> {
     #[expect(unsafe_code, reason = "bounds checks would double the loads of the inner loop")]
     fn pursue(&self, pursuit: &Pursuit, (first, last): (usize, usize), rounding: Rounding) {
         assert!(pursuit.is_whole() && last <= pursuit.sparsity);
-        // SAFETY: frames, atoms (chosen ones, too, are places of the projection) and steps are below the lengths that
-        // `is_whole` has checked; loops are bounded by `last`, and barriers are outside every branch.
+        // SAFETY: frames, atoms (chosen ones, too, are places of the projection) and steps are
+        // below the lengths that `is_whole` has checked; loops are bounded by `last`, and barriers
+        // are outside every branch.
         unsafe {
             kernels::pursue::launch_unchecked::<R>(
                 self,

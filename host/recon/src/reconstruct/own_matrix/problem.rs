@@ -1,7 +1,10 @@
-//! Some of the measurements in units in which nothing has a size of its own, and what is expected of the coefficients.
+//! Some of the measurements in normalised units, with the expected sizes of the coefficients.
 //!
-//! The one law: with `u` what the patterns see of an even image, `A` and `y` have their parts along `u` taken out. As nothing is
-//! held against the mean, that changes no minimum, and the largest singular value by far is gone.
+//! # Invariant
+//! Let `u` be the measurements of an even image. The parts of `A` and `y` along `u` are removed.
+//! The mean has no penalty, so the removal changes no minimum
+//! (`super::tests::all_hadamard_rows_as_a_matrix_give_the_image_by_every_method`). The removal
+//! eliminates the by far largest singular value.
 
 use super::solvers::{self, Chosen};
 use super::{MatrixError, MatrixMethod, MatrixSettings, OwnMatrix, Penalty};
@@ -13,24 +16,24 @@ use nalgebra::{DMatrix, DVector};
 /// The measurements at some positions.
 pub(super) struct Problem {
     side: Side,
-    /// Patterns, without the mean, of norm 1.
+    /// Patterns without the mean, with norm 1.
     patterns: DMatrix<f64>,
-    /// Measurements of variance 1, without the mean.
+    /// Measurements without the mean, with variance 1.
     y: DVector<f64>,
     atoms: Atoms,
-    /// What a pixel of 1 is in the measurements' units.
+    /// A pixel of 1 in the measurements' units.
     unit: f64,
     mean: Option<Mean>,
 }
 
-/// What coefficients are of.
+/// The atoms of the coefficients.
 enum Atoms {
     Basis(Transform),
-    /// Images of norm 1, one a column.
+    /// Images of norm 1, one in each column.
     Own(DMatrix<f64>),
 }
 
-/// What is needed to find the mean afterwards.
+/// The values for finding the mean afterwards.
 struct Mean {
     patterns: DMatrix<f64>,
     y: DVector<f64>,
@@ -43,7 +46,7 @@ impl Problem {
         let raw_y = DVector::from_iterator(at.len(), at.iter().map(|&k| y[k]));
         let area = own.side.area();
         let even = raw.column_sum();
-        // Without a basis that has the mean for an atom, it is as good or bad as any other.
+        // The mean has no penalty only in a basis with the mean as an atom.
         let free = settings.atoms.is_none()
             && (settings.basis != Basis::Pixel
                 || settings.method == MatrixMethod::Penalty(Penalty::TotalVariation))
@@ -95,7 +98,8 @@ impl Problem {
         found.into_iter().map(|c| self.image(self.pixels(&c))).collect()
     }
 
-    /// The image, number of atoms and reason to stop for each of these numbers, the last the largest.
+    /// The image, number of atoms and reason to stop for each of these numbers; the last number is
+    /// the largest.
     pub(super) fn omp(
         &self,
         noise: f64,
@@ -112,7 +116,7 @@ impl Problem {
             .collect())
     }
 
-    /// What the patterns see of each atom, and what is expected of its coefficient.
+    /// Measurements of each atom, and the expected sizes of the coefficients.
     fn expected(&self) -> (DMatrix<f64>, DVector<f64>) {
         let (seen, mut scale) = match &self.atoms {
             Atoms::Own(images) => {
@@ -130,7 +134,7 @@ impl Problem {
                 (seen, DVector::from_iterator(frequencies.len(), scale))
             }
         };
-        // As much energy as was measured is expected to be.
+        // The expected energy is the measured energy.
         let energies =
             seen.column_iter().zip(scale.iter()).map(|(atom, s)| atom.norm_squared() * s * s);
         let expected: f64 = energies.sum();
@@ -151,7 +155,7 @@ impl Problem {
         }
     }
 
-    /// In the measurements' units, with the mean that explains them best.
+    /// The image in the measurements' units, with the mean that fits the measurements best.
     fn image(&self, pixels: DVector<f64>) -> DVector<f64> {
         let mut pixels = pixels * self.unit;
         if let Some(Mean { patterns, y, even }) = &self.mean {

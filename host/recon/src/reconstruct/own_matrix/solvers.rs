@@ -1,22 +1,23 @@
-//! The methods, for a dense matrix of norm 1.
+//! The methods of inversion for a dense matrix of norm 1.
 //!
-//! The one law: a list of strengths is worked off from the strongest on, each starting where the one before ended.
+//! Each method solves a list of strengths, the strongest first. Each strength starts from the
+//! result of the one before.
 
 use crate::Side;
 use crate::omp::{DenseDictionary, Limits, OmpError, Solver, Stop, nonnegative};
 use crate::reconstruct::regularised::total_variation::{climb, descend};
 use nalgebra::{DMatrix, DVector};
 
-/// Most iterations of the methods that only approach their minimum.
+/// The most iterations of iterative methods.
 const ITERATIONS: usize = 300;
 
-/// Change relative to the whole at which a method has settled.
+/// Relative change at which an iteration has settled.
 const SETTLED: f64 = 1e-5;
 
-/// Largest singular value, by power iteration: a little too large rather than too small.
+/// Largest singular value, by power iteration, with an error towards too large.
 pub(super) fn norm(a: &DMatrix<f64>) -> f64 {
     let size = a.ncols();
-    // Of no symmetry that a singular vector could lack.
+    // The start has no symmetry, so that it is not orthogonal to the singular vector.
     let mut x = DVector::from_fn(size, |i, _| 1.0 + (i as f64 * 0.618_033_988_749_895).fract());
     let mut norm = 0.0;
     for _ in 0..50 {
@@ -32,7 +33,7 @@ pub(super) fn norm(a: &DMatrix<f64>) -> f64 {
     1.02 * norm
 }
 
-/// Least squares of least norm: conjugate gradients from 0 stay in the row space.
+/// Least squares with least norm: conjugate gradients from 0 stay in the row space.
 pub(super) fn least_squares(a: &DMatrix<f64>, y: &DVector<f64>) -> DVector<f64> {
     let mut x = DVector::zeros(a.ncols());
     let mut residual = y.clone();
@@ -40,7 +41,7 @@ pub(super) fn least_squares(a: &DMatrix<f64>, y: &DVector<f64>) -> DVector<f64> 
     let mut direction = gradient.clone();
     let mut energy = gradient.norm_squared();
     let enough = 1e-24 * energy;
-    // Without rounding as many steps as singular values suffice.
+    // Without rounding errors, as many steps as singular values are enough.
     for _ in 0..4 * a.nrows().min(a.ncols()) {
         if energy <= enough {
             break;
@@ -56,7 +57,8 @@ pub(super) fn least_squares(a: &DMatrix<f64>, y: &DVector<f64>) -> DVector<f64> 
     x
 }
 
-/// Coefficients by the dual problem, `(A S^2 A^T + t) z = y` and `c = S^2 A^T z`: as many unknowns as measurements.
+/// Coefficients by the dual problem, `(A S^2 A^T + t) z = y` and `c = S^2 A^T z`, which has as many
+/// unknowns as measurements.
 pub(super) fn tikhonov(
     a: &DMatrix<f64>,
     y: &DVector<f64>,
@@ -90,7 +92,7 @@ pub(super) fn tikhonov(
         .collect()
 }
 
-/// FISTA; nothing is held against the first `free` coefficients.
+/// FISTA. The first `free` coefficients have no penalty.
 pub(super) fn sparse(
     a: &DMatrix<f64>,
     y: &DVector<f64>,
@@ -133,7 +135,8 @@ pub(super) fn total_variation(
 ) -> Vec<DVector<f64>> {
     let n = side.pixels();
     let mut x = DVector::<f64>::zeros(side.area());
-    // The gradient has norm sqrt 8; divided by it both parts have norm 1, and steps of 1 / sqrt 2 converge.
+    // The gradient has norm sqrt 8. Divided by it, both parts have norm 1, and steps of 1 / sqrt 2
+    // converge.
     let gradient = 8.0_f64.sqrt();
     let contrast = (y.norm() / (side.area() as f64).sqrt()).max(f64::MIN_POSITIVE);
     let (primal, dual) = (contrast / 2.0_f64.sqrt(), 1.0 / (contrast * 2.0_f64.sqrt()));
@@ -147,7 +150,7 @@ pub(super) fn total_variation(
             for _ in 0..ITERATIONS {
                 pull = (&pull + (a * &ahead - y) * dual) / (1.0 + dual);
                 let seen: Vec<f32> = ahead.iter().map(|&v| v as f32).collect();
-                // Duals are kept in units of `radius`.
+                // Duals are stored in units of `radius`.
                 climb(n, &seen, (dual / gradient / radius) as f32, &mut down, &mut across);
                 let mut slope = vec![0.0_f32; side.area()];
                 descend(n, &down, &across, 1.0, &mut slope);
@@ -167,14 +170,14 @@ pub(super) fn total_variation(
         .collect()
 }
 
-/// Coefficients of which few are not 0.
+/// A sparse list of coefficients.
 pub(super) struct Chosen {
     pub coefficients: DVector<f64>,
     pub size: usize,
     pub stop: Stop,
 }
 
-/// Algorithm 1 over the atoms as they are expected to be, with a row of noise for each.
+/// Algorithm 1 over atoms scaled by their expected sizes, with a row of noise for each atom.
 pub(super) fn omp(
     a: &DMatrix<f64>,
     y: &DVector<f64>,

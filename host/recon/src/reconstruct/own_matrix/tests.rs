@@ -11,7 +11,7 @@ const METHODS: [MatrixMethod; 5] = [
     MatrixMethod::Omp,
 ];
 
-/// Patterns of zeros and ones, and what they measure of an image, with some noise.
+/// Patterns of zeros and ones, and their measurements of an image, with some noise.
 fn binary(side: Side, patterns: usize, image: &[f64]) -> (OwnMatrix, Vec<f64>) {
     let mut random = Pcg64::seed_from_u64(3);
     let mut weights = Vec::new();
@@ -31,7 +31,7 @@ fn the_pseudo_inverse_is_that_of_the_singular_values() {
     let side = side(4);
     for rows in [5, 12, 16, 30] {
         let mut weights: Vec<f64> = (0..rows * 16).map(|_| normal(&mut random)).collect();
-        // Twice the same pattern, of which the measurements differ.
+        // The same pattern occurs twice, with different measurements.
         weights.copy_within(0..16, 32);
         let own = OwnMatrix::new(side, &weights).unwrap();
         assert_eq!(own.rank(), (rows - 1).min(16));
@@ -97,7 +97,7 @@ fn patterns_that_share_a_little_are_not_taken_for_orthogonal() {
     weights[1] = 1e-6;
     assert!(OwnMatrix::new(side, &weights).unwrap().orthogonal.is_none());
     weights[1] = 0.0;
-    // Twice the same pattern; one without light; more patterns than pixels.
+    // The same pattern twice, a pattern without light, and more patterns than pixels.
     let copied = [&weights[..64], &weights[..64]].concat();
     assert_eq!(OwnMatrix::new(side, &copied).unwrap().rank(), 1);
     let dark = [&weights[..64], &[0.0; 64]].concat();

@@ -19,7 +19,7 @@ pub(super) fn predict(
     let Masked { grid, mask } = Masked::new(problem, positions);
     let mut x = grid.clone();
     walsh(n, &mut x);
-    // Steps are proportional to the picture's contrast. They change the speed and not the result.
+    // Steps are proportional to the picture's contrast, which changes the speed and not the result.
     let mean = x.iter().sum::<f32>() / x.len() as f32;
     let spread: Vec<f32> = x.iter().map(|x| x - mean).collect();
     let contrast = ((dot(&spread, &spread) / x.len() as f64).sqrt() as f32).max(f32::MIN_POSITIVE);

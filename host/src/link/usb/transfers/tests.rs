@@ -1,4 +1,4 @@
-//! A bus without wires: an endpoint whose transfers end as a script says.
+//! A simulated bus: an endpoint whose transfers end as a script says.
 
 use super::*;
 
@@ -9,15 +9,15 @@ enum Ends {
     With(Vec<u8>),
     /// With these bytes, then this.
     Badly(Vec<u8>, TransferProblem),
-    /// Not yet, the first time that someone waits.
+    /// The transfer is not complete at the first wait, then has these bytes.
     Late(Vec<u8>),
 }
 
-/// Plays the script, one step a transfer, in order; after it, nothing comes any more.
+/// Plays the script in order, one step a transfer. After the script, no transfer completes.
 #[derive(Default)]
 struct Script {
     steps: VecDeque<Ends>,
-    /// Buffers submitted, by number; each number comes from [`Script::buffers`].
+    /// Submitted buffers, by number. [`Script::buffers`] gives the numbers.
     queued: VecDeque<Buffer>,
     cancelled: bool,
     halts_cleared: u32,
@@ -86,7 +86,8 @@ fn stream(steps: Vec<Ends>) -> InStream<Script> {
     InStream::new(script, buffers(TRANSFERS))
 }
 
-/// All that comes, in pieces of `piece` bytes at most, and what comes after.
+/// All bytes of the stream, read in pieces of at most `piece` bytes, and the result after the last
+/// byte.
 fn drain(stream: &mut InStream<Script>, piece: usize) -> (Vec<u8>, io::Result<Received>) {
     let mut all = Vec::new();
     let mut into = vec![0; piece];
@@ -157,7 +158,7 @@ fn a_device_that_goes_in_the_middle_of_a_transfer_leaves_what_it_sent_then_close
     ]);
     let (all, end) = drain(&mut stream, 4);
     assert_eq!((all, end.unwrap()), (bytes(0, 8), Received::Closed));
-    // And it stays so.
+    // The stream stays closed.
     assert_eq!(drain(&mut stream, 4).1.unwrap(), Received::Closed);
 }
 
@@ -166,7 +167,7 @@ fn a_stall_is_cleared_and_the_stream_goes_on_where_it_was() {
     let mut stream = stream(vec![
         Ends::With(bytes(0, 4)),
         Ends::Badly(vec![], TransferProblem::Stalled),
-        // Already on its way when the endpoint halted.
+        // The transfer was already on its way when the endpoint halted.
         Ends::With(bytes(4, 4)),
     ]);
     let (all, end) = drain(&mut stream, 64);
@@ -189,7 +190,7 @@ fn a_stall_in_the_middle_of_a_transfer_keeps_its_bytes() {
 fn an_endpoint_that_keeps_stalling_is_an_error() {
     let stall = Ends::Badly(vec![], TransferProblem::Stalled);
     let script = Script { steps: vec![stall; 64].into(), ..Script::default() };
-    // One transfer, so that every stall is a stall of its own.
+    // With a single transfer, each stall is a separate stall.
     let mut stream = InStream::new(script, buffers(1));
     let (all, end) = drain(&mut stream, 64);
     assert!(all.is_empty());
