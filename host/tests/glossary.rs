@@ -7,10 +7,8 @@ use std::path::Path;
 fn glossary(page: &str) -> BTreeMap<&str, String> {
     let entries = page.split("\n- **").skip(1);
     entries
-        .map(|entry| {
-            let (word, meaning) = entry.split_once("**: ").unwrap();
-            (word, meaning.split_whitespace().collect::<Vec<_>>().join(" "))
-        })
+        .filter_map(|entry| entry.split_once("**: "))
+        .map(|(word, meaning)| (word, meaning.split_whitespace().collect::<Vec<_>>().join(" ")))
         .collect()
 }
 

@@ -82,7 +82,7 @@ pub enum ChainError {
 /// The receiver's settings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChainSettings {
-    /// ADC clock period, in ns: [`SAMPLE_NS`].
+    /// ADC clock period, in ns: [`crate::instrument::SAMPLE_NS`].
     pub sample_ns: f64,
     /// LED rise and fall time from 10 to 90 %, in ns. Fast 1550 nm LEDs take 10 to 20.
     pub led_edge_ns: f64,
