@@ -23,7 +23,9 @@ pub fn table(page: &str, heading: &str) -> Vec<Vec<String>> {
     };
     let rows = rest.lines().take_while(|line| !line.starts_with('#'));
     let cell = |cell: &str| cell.trim().trim_matches('`').to_owned();
+    let is_rule = |row: &&str| row.chars().all(|c| "|-: ".contains(c));
     rows.filter_map(|line| line.strip_prefix("| ")?.strip_suffix(" |"))
+        .filter(|row| !is_rule(row))
         .skip(1)
         .map(|row| row.split(" | ").map(cell).collect())
         .collect()

@@ -331,7 +331,8 @@ fn side_by_side(
             },
         ],
         footer: format!(
-            "simulated: virtual camera, seed {}; {} frames of {} patterns, {:.1} ms of light; {} lost, {} corrupt, {} late",
+            "simulated: virtual camera, weather {}, seed {}; {} frames of {} patterns, {:.1} ms of light; {} lost, {} corrupt, {} late",
+            report.rain,
             report.seed,
             report.frames.received,
             report.patterns,

@@ -403,8 +403,8 @@ fn reading(
         "intervals: glyphs and typefaces drawn again (bootstrap of two crossed factors); all: mean of the three distances, \
          which are fixed and not drawn"
             .to_owned(),
-        "VIS: daylight, distance and falling drops do not bring a focused camera to 10 dB; \
-         water on the glass of the paper's rain box might: --weather heavy+window:0.3"
+        "VIS: daylight, distance and falling drops do not bring a focused camera to 10 dB, nor does water on a third of its \
+         window (--weather heavy+window:0.3)"
             .to_owned(),
         "against the scene on the 32 x 32 grid without defocus, after the gain and offset of least squares; \
          the paper does not say against what it compares"
