@@ -143,13 +143,7 @@ fn chart(
     }
     Ok(Chart {
         header: header.to_owned(),
-        x: Axis {
-            name: "distance, m".to_owned(),
-            from: 0.2,
-            to: 2.0,
-            logarithmic: true,
-            ticks: vec![0.2, 0.3, 0.6, 1.0, 2.0],
-        },
+        x: crate::range::distance_axis(),
         y,
         lines,
         footer: "simulated: photon budget and geometry, dry air, white sheet, all patterns"

@@ -366,16 +366,21 @@ pub fn exposure_chart(settings: &Settings) -> Result<Chart> {
     Ok(exposures_against_distance(lines))
 }
 
+/// The axis of charts against the distance of the target.
+pub(crate) fn distance_axis() -> Axis {
+    Axis {
+        name: "distance, m".to_owned(),
+        from: 0.2,
+        to: 2.0,
+        logarithmic: true,
+        ticks: vec![0.2, 0.3, 0.6, 1.0, 2.0],
+    }
+}
+
 fn exposures_against_distance(lines: Vec<Line>) -> Chart {
     Chart {
         header: "Exposure of a pattern that a pixel needs".to_owned(),
-        x: Axis {
-            name: "distance, m".to_owned(),
-            from: 0.2,
-            to: 2.0,
-            logarithmic: true,
-            ticks: vec![0.2, 0.3, 0.6, 1.0, 2.0],
-        },
+        x: distance_axis(),
         y: Axis {
             name: "exposure, us".to_owned(),
             from: 0.001,

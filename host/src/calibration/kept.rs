@@ -12,19 +12,13 @@
 //! (`tests::a_calibration_of_something_else_is_refused_in_one_line`).
 
 use super::Settling;
-use crate::files::FileError;
-use crate::files::output::{OutputDir, write_atomic};
+use super::file::{Kept, KeptFileError};
 use crate::selftest::Check;
 use crate::session::CameraIdentity;
-use etcetera::{BaseStrategy, HomeDirError, choose_base_strategy};
+use etcetera::{BaseStrategy, choose_base_strategy};
 use serde::{Deserialize, Serialize};
-use std::io;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
-use thiserror::Error;
-
-/// Version of the file's format. A field with a new meaning needs a new version.
-const FORMAT: u32 = 1;
 
 /// A calibration in its file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -51,59 +45,6 @@ enum Kind {
     Calibration,
 }
 
-/// Why a calibration cannot be used.
-#[derive(Debug, Error)]
-pub enum CalibrationFileError {
-    /// The file cannot be read.
-    #[error("{path}: cannot read the calibration")]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// The system's reason.
-        source: io::Error,
-    },
-    /// The file is not a calibration.
-    #[error(
-        "{path}: {reason}, expected a calibration written by nirspi calibrate or nirspi selftest"
-    )]
-    Format {
-        /// The file.
-        path: PathBuf,
-        /// The problem.
-        reason: String,
-    },
-    /// The file has another version of the format.
-    #[error(
-        "{path}: a calibration of format {found}, expected {FORMAT}: run nirspi calibrate again"
-    )]
-    Version {
-        /// The file.
-        path: PathBuf,
-        /// The file's version.
-        found: u32,
-    },
-    /// The calibration was measured on another camera or gateware.
-    #[error(
-        "{path}: measured with {field} {found}, this camera has {expected}: run nirspi calibrate"
-    )]
-    Mismatch {
-        /// The file.
-        path: PathBuf,
-        /// The name of the property that differs.
-        field: &'static str,
-        /// The property in the file.
-        found: String,
-        /// The property of this camera.
-        expected: String,
-    },
-    /// The file cannot be written.
-    #[error(transparent)]
-    Write(#[from] FileError),
-    /// There is no folder for the file.
-    #[error("no data directory to keep calibrations in")]
-    NoHome(#[from] HomeDirError),
-}
-
 impl KeptCalibration {
     /// A calibration measured at `when`.
     #[must_use]
@@ -115,7 +56,7 @@ impl KeptCalibration {
     ) -> Self {
         let measured_unix_s = when.duration_since(UNIX_EPOCH).map_or(0, |age| age.as_secs());
         let measured = date(measured_unix_s);
-        let (kind, version) = (Kind::Calibration, FORMAT);
+        let (kind, version) = (Kind::Calibration, Kept::Calibration.format());
         Self { kind, version, measured_unix_s, measured, camera, settling, checks }
     }
 
@@ -129,82 +70,40 @@ impl KeptCalibration {
     ///
     /// # Errors
     /// If the folder cannot be made, or the file cannot be written.
-    pub fn write(&self, path: &Path) -> Result<(), CalibrationFileError> {
-        let json = serde_json::to_vec_pretty(self).map_err(|error| format_error(path, &error))?;
-        match (path.parent(), path.file_name().and_then(|name| name.to_str())) {
-            (Some(folder), Some(name)) => {
-                let mut folder = OutputDir::create(folder)?;
-                folder.write(name, &json)?;
-                folder.commit()?;
-            }
-            // `write_atomic` reports the problem of such a path.
-            _ => write_atomic(path, &json)?,
-        }
-        Ok(())
+    pub fn write(&self, path: &Path) -> Result<(), KeptFileError> {
+        Kept::Calibration.write(path, self)
     }
 
     /// Reads the file for use with `camera`.
     ///
     /// # Errors
     /// If there is no file, or the calibration does not belong to this camera.
-    pub fn read(path: &Path, camera: &CameraIdentity) -> Result<Self, CalibrationFileError> {
-        /// The fields that every version has.
-        #[derive(Deserialize)]
-        struct Head {
-            #[serde(rename = "kind")]
-            _kind: Kind,
-            version: u32,
-        }
-        let text = std::fs::read(path)
-            .map_err(|source| CalibrationFileError::Io { path: path.to_owned(), source })?;
-        let head: Head =
-            serde_json::from_slice(&text).map_err(|error| format_error(path, &error))?;
-        if head.version != FORMAT {
-            let found = head.version;
-            return Err(CalibrationFileError::Version { path: path.to_owned(), found });
-        }
-        let kept: Self =
-            serde_json::from_slice(&text).map_err(|error| format_error(path, &error))?;
-        kept.settling.check().map_err(|problem| CalibrationFileError::Format {
-            path: path.to_owned(),
-            reason: problem.to_string(),
-        })?;
-        kept.check(camera).map_err(|(field, found, expected)| CalibrationFileError::Mismatch {
-            path: path.to_owned(),
-            field,
-            found,
-            expected,
-        })?;
+    pub fn read(path: &Path, camera: &CameraIdentity) -> Result<Self, KeptFileError> {
+        let file = Kept::Calibration;
+        let kept: Self = file.read::<Kind, Self>(path)?;
+        kept.settling.check().map_err(|problem| file.format_error(path, &problem))?;
+        let (then, now) = (&kept.camera, camera);
+        let same = [
+            ("serial number", then.serial.clone(), now.serial.clone()),
+            ("board", then.board.clone(), now.board.clone()),
+            ("gateware", then.gateware.clone(), now.gateware.clone()),
+            ("ADC rate in Hz", then.adc_hz.to_string(), now.adc_hz.to_string()),
+        ];
+        file.check(path, &same)?;
         Ok(kept)
     }
-
-    /// The property that differs, its value in the file, and the value of `camera`.
-    fn check(&self, camera: &CameraIdentity) -> Result<(), (&'static str, String, String)> {
-        let (kept, now) = (&self.camera, camera);
-        let same = [
-            ("serial number", kept.serial.clone(), now.serial.clone()),
-            ("board", kept.board.clone(), now.board.clone()),
-            ("gateware", kept.gateware.clone(), now.gateware.clone()),
-            ("ADC rate in Hz", kept.adc_hz.to_string(), now.adc_hz.to_string()),
-        ];
-        same.into_iter().find(|(_, kept, now)| kept != now).map_or(Ok(()), Err)
-    }
-}
-
-fn format_error(path: &Path, error: &serde_json::Error) -> CalibrationFileError {
-    CalibrationFileError::Format { path: path.to_owned(), reason: error.to_string() }
 }
 
 /// The path of the calibration of the camera with this serial number.
 ///
 /// # Errors
 /// If the user has no home directory.
-pub fn path_of(serial: &str) -> Result<PathBuf, CalibrationFileError> {
+pub fn path_of(serial: &str) -> Result<PathBuf, KeptFileError> {
     path_with(serial, "json")
 }
 
 /// The path of a file of the camera with this serial number, with this ending.
-pub(super) fn path_with(serial: &str, ending: &str) -> Result<PathBuf, CalibrationFileError> {
+pub(super) fn path_with(serial: &str, ending: &str) -> Result<PathBuf, KeptFileError> {
     let folder = choose_base_strategy()?.data_dir().join("nirspi").join("calibration");
     Ok(folder.join(format!("{}.{ending}", file_name(serial))))
 }

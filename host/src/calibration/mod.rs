@@ -10,6 +10,7 @@
 
 mod burst;
 mod check;
+mod file;
 mod flat;
 mod kept;
 mod policy;
@@ -17,9 +18,10 @@ mod policy;
 pub(crate) use burst::ONSET;
 pub use burst::{BURSTS, CalibrationError, HALF_PERIOD, Settling, calibrate, calibrate_or};
 pub use check::SettlingError;
+pub use file::{Kept, KeptFileError};
 pub use flat::{
-    FlatField, FlatFieldError, FlatFieldFileError, FramesError, KeptFlatField, Measured, Sweeps,
-    flat_field_path_of, measure_dark, measure_flat_field, pattern_noise,
+    FlatField, FlatFieldError, FramesError, KeptFlatField, Measured, Sweeps, flat_field_path_of,
+    measure_dark, measure_flat_field, pattern_noise,
 };
-pub use kept::{CalibrationFileError, KeptCalibration, path_of};
+pub use kept::{KeptCalibration, path_of};
 pub use policy::{CalibrationPolicy, Choice, Origin, PolicyError};

@@ -1,7 +1,7 @@
 //! Chooses the calibration of a capture: the kept calibration of the camera, one from a file, or a
 //! new measurement.
 
-use super::{CalibrationFileError, KeptCalibration, KeptFlatField, path_of};
+use super::{KeptCalibration, KeptFileError, KeptFlatField, path_of};
 use crate::capture::{Calibration, Capture};
 use crate::causes;
 use crate::session::CameraIdentity;
@@ -58,7 +58,7 @@ pub enum PolicyError {
     DarkLevel,
     /// The file is not a calibration of this camera.
     #[error(transparent)]
-    File(#[from] CalibrationFileError),
+    File(#[from] KeptFileError),
 }
 
 impl CalibrationPolicy {

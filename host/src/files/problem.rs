@@ -13,7 +13,7 @@
 //! | field of a solution | content |
 //! |---|---|
 //! | `support` | `(B, k)` int64: atoms in the order chosen; -1 where the search ended before |
-//! | `coef` | `(B, k)` float64: coefficient of each, 0 where there is none |
+//! | `coef` | `(B, k)` float64: coefficient of each atom, 0 for an empty place |
 
 use super::FileError;
 use super::archive::{self, Archive, Numbers};

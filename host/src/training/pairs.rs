@@ -54,7 +54,7 @@ pub fn take(
 /// | `x` | `(N, 64, 64)` float32: the scene, sharp |
 /// | `optical` | `(N, 64, 64)` float32: the scene as light showed it, before sampling and noise |
 /// | `y` | `(N, 32, 32)` float32: the camera's image; 1 is a white target |
-/// | `depth_m` | `(N, 8, 8)` float32: metres, 0 where there is none |
+/// | `depth_m` | `(N, 8, 8)` float32: metres, 0 for a zone without a reading |
 /// | `sigma_px`, `noise_std`, `sampling` | `(N,)` float32: blur in pixels of the 64 grid, noise of `y`, share of patterns |
 /// | `distance_m` | `(N,)` float32 |
 /// | `rain`, `sweeps` | `(N,)` int64: 0 none, 1 light, 2 heavy; sweeps summed |

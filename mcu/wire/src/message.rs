@@ -481,7 +481,7 @@ pub struct Depth<'a> {
     pub device_time_us: u64,
     /// Zones along one edge.
     pub side: u8,
-    /// Distance of each zone in mm; 0 where there is none.
+    /// Distance of each zone in mm; 0 for a zone without a reading.
     #[serde(borrow)]
     pub distances_mm: Words<'a>,
 }

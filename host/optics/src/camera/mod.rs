@@ -205,7 +205,7 @@ impl CameraModel {
         SHIPPED.iter().map(|(name, _)| *name)
     }
 
-    /// The shipped camera of this name; `None` if there is none.
+    /// The shipped camera of this name; `None` for an unknown name.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         // A test reads each shipped description.

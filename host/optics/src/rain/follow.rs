@@ -229,6 +229,22 @@ mod tests {
     }
 
     #[test]
+    fn the_veil_is_hardly_brighter_or_darker_where_photons_take_over() {
+        // An optical depth of 0.45. Against a dimmed white target the veil would be exp(0.9) = 2.5 times as bright.
+        let fog = Drops::fog(10.0, 2.0).unwrap();
+        let medium = Medium::new(&fog, 1550.0, Water::Segelstein).unwrap();
+        let angles = ScatteringAngles::new(&fog, 1550.0, Water::Segelstein).unwrap();
+        let lobe = BackwardLobe::new(&fog, 1550.0, Water::Segelstein).unwrap();
+        let distance_mm = 450.0 / medium.extinction_per_m;
+        let projector = Projector::default();
+        let once =
+            Veil::new(&medium, Some((&lobe, &angles)), &projector, distance_mm, 40.0).unwrap();
+        let slab = Slab { medium: &medium, angles: &angles, distance_mm };
+        let followed = slab.backscatter(&lobe, 40.0, projector.field_mm(distance_mm), 5);
+        assert!((0.8..1.5).contains(&(followed / once.backscatter)), "{followed} {once:?}");
+    }
+
+    #[test]
     fn a_share_between_two_rings_lies_between_theirs() {
         let landing = Landing { smallest_mm: 1.0, within: vec![0.1, 0.2, 0.4] };
         assert_eq!(landing.within(1.0), 0.1);

@@ -124,7 +124,7 @@ fn installed() -> Result<(), Absent> {
 /// `software_too`.
 ///
 /// # Errors
-/// [`Absent`] if there is none.
+/// [`Absent`] if no GPU answers.
 pub fn wgpu(software_too: bool) -> Result<Found<WgpuDevice>, Absent> {
     let backends = AutoGraphicsApi::backend().into();
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {

@@ -8,18 +8,12 @@
 //! (`super::tests::an_old_or_foreign_flat_field_is_refused_in_one_line`).
 
 use super::{FlatField, Measured, Sweeps};
-use crate::calibration::kept::{CalibrationFileError, date, path_with};
-use crate::files::FileError;
-use crate::files::output::OutputDir;
+use crate::calibration::file::{Kept, KeptFileError};
+use crate::calibration::kept::{date, path_with};
 use crate::session::CameraIdentity;
 use serde::{Deserialize, Serialize};
-use std::io;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
-use thiserror::Error;
-
-/// Version of the file's format. A field with a new meaning needs a new version.
-const FORMAT: u32 = 1;
 
 /// A flat field in its file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -50,58 +44,6 @@ enum Kind {
     FlatField,
 }
 
-/// Why a flat field cannot be used.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum FlatFieldFileError {
-    /// The file cannot be read.
-    #[error("{path}: cannot read the flat field")]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// The system's reason.
-        source: io::Error,
-    },
-    /// The file is not a flat field.
-    #[error("{path}: {reason}, expected a flat field written by nirspi calibrate --white")]
-    Format {
-        /// The file.
-        path: PathBuf,
-        /// The problem.
-        reason: String,
-    },
-    /// The file has another version of the format.
-    #[error(
-        "{path}: a flat field of format {found}, expected {FORMAT}: run nirspi calibrate --white again"
-    )]
-    Version {
-        /// The file.
-        path: PathBuf,
-        /// The file's version.
-        found: u32,
-    },
-    /// The flat field was measured on another camera.
-    #[error(
-        "{path}: measured with {field} {found}, this camera has {expected}: run nirspi calibrate --white"
-    )]
-    Mismatch {
-        /// The file.
-        path: PathBuf,
-        /// The name of the property that differs.
-        field: &'static str,
-        /// The property in the file.
-        found: String,
-        /// The property of this camera.
-        expected: String,
-    },
-    /// The file cannot be written.
-    #[error(transparent)]
-    Write(#[from] FileError),
-    /// There is no folder for the file.
-    #[error(transparent)]
-    Place(#[from] CalibrationFileError),
-}
-
 impl KeptFlatField {
     /// A flat field measured at `when`.
     #[must_use]
@@ -115,7 +57,7 @@ impl KeptFlatField {
         let Measured { flat, pattern_before, pattern_after, .. } = measured;
         Self {
             kind: Kind::FlatField,
-            version: FORMAT,
+            version: Kept::FlatField.format(),
             measured_unix_s,
             measured: date(measured_unix_s),
             camera,
@@ -162,47 +104,21 @@ impl KeptFlatField {
     ///
     /// # Errors
     /// If the folder cannot be made, or the file cannot be written.
-    pub fn write(&self, path: &Path) -> Result<(), FlatFieldFileError> {
-        let json = serde_json::to_vec(self).map_err(|error| format_error(path, &error))?;
-        let folder = path.parent().unwrap_or(Path::new("."));
-        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let mut folder = OutputDir::create(folder)?;
-        folder.write(&name, &json)?;
-        folder.commit()?;
-        Ok(())
+    pub fn write(&self, path: &Path) -> Result<(), KeptFileError> {
+        Kept::FlatField.write(path, self)
     }
 
     /// Reads the file for use with `camera`.
     ///
     /// # Errors
     /// If there is no file, or the flat field does not belong to this camera.
-    pub fn read(path: &Path, camera: &CameraIdentity) -> Result<Self, FlatFieldFileError> {
-        /// The fields that every version has.
-        #[derive(Deserialize)]
-        struct Head {
-            #[serde(rename = "kind")]
-            _kind: Kind,
-            version: u32,
-        }
-        let text = std::fs::read(path)
-            .map_err(|source| FlatFieldFileError::Io { path: path.to_owned(), source })?;
-        let head: Head =
-            serde_json::from_slice(&text).map_err(|error| format_error(path, &error))?;
-        if head.version != FORMAT {
-            let found = head.version;
-            return Err(FlatFieldFileError::Version { path: path.to_owned(), found });
-        }
-        let kept: Self =
-            serde_json::from_slice(&text).map_err(|error| format_error(path, &error))?;
+    pub fn read(path: &Path, camera: &CameraIdentity) -> Result<Self, KeptFileError> {
+        let kept: Self = Kept::FlatField.read::<Kind, Self>(path)?;
         let same = [
-            ("serial number", &kept.camera.serial, &camera.serial),
-            ("board", &kept.camera.board, &camera.board),
+            ("serial number", kept.camera.serial.clone(), camera.serial.clone()),
+            ("board", kept.camera.board.clone(), camera.board.clone()),
         ];
-        if let Some((field, found, expected)) = same.into_iter().find(|(_, a, b)| a != b) {
-            let (found, expected) = (found.clone(), expected.clone());
-            let path = path.to_owned();
-            return Err(FlatFieldFileError::Mismatch { path, field, found, expected });
-        }
+        Kept::FlatField.check(path, &same)?;
         Ok(kept)
     }
 
@@ -210,7 +126,7 @@ impl KeptFlatField {
     ///
     /// # Errors
     /// If the kept flat field cannot be used.
-    pub fn of(camera: &CameraIdentity) -> Result<Option<Self>, FlatFieldFileError> {
+    pub fn of(camera: &CameraIdentity) -> Result<Option<Self>, KeptFileError> {
         // A user without a home directory has no kept flat field.
         let Some(path) = flat_field_path_of(&camera.serial).ok().filter(|path| path.exists())
         else {
@@ -220,14 +136,10 @@ impl KeptFlatField {
     }
 }
 
-fn format_error(path: &Path, error: &serde_json::Error) -> FlatFieldFileError {
-    FlatFieldFileError::Format { path: path.to_owned(), reason: error.to_string() }
-}
-
 /// The path of the flat field of the camera with this serial number.
 ///
 /// # Errors
 /// If the user has no home directory.
-pub fn flat_field_path_of(serial: &str) -> Result<PathBuf, FlatFieldFileError> {
-    Ok(path_with(serial, "flat.json")?)
+pub fn flat_field_path_of(serial: &str) -> Result<PathBuf, KeptFileError> {
+    path_with(serial, "flat.json")
 }
