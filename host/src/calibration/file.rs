@@ -116,7 +116,12 @@ impl Kept {
 
     /// Writes the file, whole or not at all.
     pub(super) fn write(self, path: &Path, content: &impl Serialize) -> Result<(), KeptFileError> {
-        let json = serde_json::to_vec_pretty(content).map_err(|e| self.format_error(path, &e))?;
+        let json = match self {
+            Self::Calibration => serde_json::to_vec_pretty(content),
+            // Two thousand numbers, not one on each line.
+            Self::FlatField => serde_json::to_vec(content),
+        }
+        .map_err(|e| self.format_error(path, &e))?;
         match (path.parent(), path.file_name().and_then(|name| name.to_str())) {
             (Some(folder), Some(name)) => {
                 let mut folder = OutputDir::create(folder)?;
