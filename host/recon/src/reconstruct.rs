@@ -505,4 +505,6 @@ fn check_prior(falloff: f64, noise: NoiseLevel) -> Result<(), ReconstructError> 
 }
 
 #[cfg(test)]
+mod scatter_tests;
+#[cfg(test)]
 mod tests;

@@ -45,8 +45,50 @@ impl Miss {
     }
 }
 
-/// The miss for each number of atoms and each trust.
-type Misses = Vec<[Miss; TRUST.len()]>;
+/// The fit of a prediction to the held-back measurements of the finer half of the measured rows, which
+/// are the nearest to the rows that were not measured.
+#[derive(Debug, Clone, Copy, Default)]
+struct Fine {
+    count: usize,
+    /// Sums over these rows: prediction squared, prediction times measurement, measurement squared.
+    predicted: f64,
+    product: f64,
+    measured: f64,
+}
+
+impl Fine {
+    fn add(&mut self, other: Self) {
+        self.count += other.count;
+        self.predicted += other.predicted;
+        self.product += other.product;
+        self.measured += other.measured;
+    }
+
+    /// The most trust that these rows support: the factor on the prediction with the least squared
+    /// error, plus one standard error of that factor.
+    fn most_trust(self) -> f64 {
+        if self.predicted == 0.0 || self.count < 2 {
+            return 1.0;
+        }
+        let factor = self.product / self.predicted;
+        let left = (self.measured - factor * self.product).max(0.0);
+        let error = (left / (self.count - 1) as f64 / self.predicted).sqrt();
+        (factor + error).clamp(0.0, 1.0)
+    }
+}
+
+/// The rows that limit the trust.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Trusted {
+    /// All held-back rows choose the trust.
+    ByAll,
+    /// The finer half of the rows also sets an upper limit: where light is nearly all scattered, a
+    /// prediction that holds for coarse rows says nothing about the fine ones.
+    AsFarAsFine,
+}
+
+/// The miss for each number of atoms and each trust, and the fit of the finest rows.
+type Misses = Vec<([Miss; TRUST.len()], Fine)>;
 
 /// The number of atoms, up to `most` and a quarter of the measurements, and the trust with the
 /// least error over `folds` held-back parts. The error is the sum of absolute and squared error,
@@ -71,7 +113,9 @@ pub(super) fn choose_sparsity(
     let count = problem.rows.len();
     let largest = most.min(count / 4).max(1);
     let sparsities = geometric(largest);
-    let found = choose_among(problem, sparsities.len(), folds, |kept| predict(kept, &sparsities))?;
+    let found = choose_among(problem, sparsities.len(), folds, Trusted::ByAll, |kept| {
+        predict(kept, &sparsities)
+    })?;
     Ok(match found {
         None => Choice { atoms: largest, trust: 0.0 },
         Some((at, trust)) => Choice { atoms: sparsities[at], trust },
@@ -85,6 +129,7 @@ pub(super) fn choose_among(
     problem: &Problem<'_>,
     count: usize,
     folds: usize,
+    trusted: Trusted,
     predict: impl Fn(&[usize]) -> Result<Vec<Vec<f32>>, OmpError> + Sync,
 ) -> Result<Option<(usize, f32)>, OmpError> {
     let fold_of = split(problem, folds);
@@ -95,19 +140,21 @@ pub(super) fn choose_among(
     if parts.is_empty() {
         return Ok(None);
     }
+    let fine = finer_half(problem.rows);
     let results: Result<Vec<Misses>, OmpError> = parts
         .par_iter()
-        .map(|(kept, held)| Ok(misses_of(problem, &predict(kept)?, held)))
+        .map(|(kept, held)| Ok(misses_of(problem, &predict(kept)?, held, &fine)))
         .collect();
     let mut total: Misses = vec![Default::default(); count];
     for misses in results? {
-        for (total, misses) in total.iter_mut().flatten().zip(misses.into_iter().flatten()) {
-            total.add(misses);
+        for ((total, total_fine), (misses, fine)) in total.iter_mut().zip(misses) {
+            total.iter_mut().zip(misses).for_each(|(total, miss)| total.add(miss));
+            total_fine.add(fine);
         }
     }
-    let zero_filling = total[0][0];
+    let zero_filling = total[0].0[0];
     let mut best = ((0, 0.0), 2.0);
-    for (at, misses) in total.iter().enumerate() {
+    for (at, (misses, _)) in total.iter().enumerate() {
         for (&trust, miss) in TRUST.iter().zip(misses) {
             let relative = miss.relative_to(zero_filling);
             if relative < best.1 {
@@ -115,11 +162,35 @@ pub(super) fn choose_among(
             }
         }
     }
-    Ok(Some(best.0))
+    let (at, trust) = best.0;
+    let limit = match trusted {
+        Trusted::ByAll => 1.0,
+        Trusted::AsFarAsFine => total[at].1.most_trust() as f32,
+    };
+    Ok(Some((at, trust.min(limit))))
 }
 
 /// The miss of each prediction with each trust, on the held-back measurements.
-fn misses_of(problem: &Problem<'_>, predictions: &[Vec<f32>], held: &[usize]) -> Misses {
+fn misses_of(
+    problem: &Problem<'_>,
+    predictions: &[Vec<f32>],
+    held: &[usize],
+    fine: &[bool],
+) -> Misses {
+    let fine_of = |predicted: &Vec<f32>| {
+        let mut fit = Fine::default();
+        for &k in held.iter().filter(|&&k| fine[k]) {
+            let value = f64::from(problem.values[k]);
+            let guess = f64::from(predicted[problem.rows[k] as usize]);
+            fit.add(Fine {
+                count: 1,
+                predicted: guess * guess,
+                product: guess * value,
+                measured: value * value,
+            });
+        }
+        fit
+    };
     let miss_of = |predicted: &Vec<f32>| {
         TRUST.map(|trust| {
             let mut miss = Miss::default();
@@ -131,7 +202,18 @@ fn misses_of(problem: &Problem<'_>, predictions: &[Vec<f32>], held: &[usize]) ->
             miss
         })
     };
-    predictions.iter().map(miss_of).collect()
+    predictions.iter().map(|predicted| (miss_of(predicted), fine_of(predicted))).collect()
+}
+
+/// Whether each measurement is of the half of the rows (at least eight) with the highest sequency.
+fn finer_half(rows: &Rows) -> Vec<bool> {
+    let positions = order::positions_by_sequency(rows);
+    let count = (positions.len() / 2).max(8).min(positions.len());
+    let mut fine = vec![false; rows.len()];
+    for &k in &positions[positions.len() - count..] {
+        fine[k] = true;
+    }
+    fine
 }
 
 /// The fold that holds each measurement back; `None` for the all-ones row (the mean), which no
