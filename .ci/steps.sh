@@ -60,6 +60,8 @@ step_typos() {
     # Tests write docs/protocol.md and docs/commands.md.
     python_with mdformat mdformat==1.0.0 mdformat-gfm==1.0.0
     git ls-files -z '*.md' ':!docs/protocol.md' ':!docs/commands.md' | xargs -0 target/mdformat/bin/mdformat --check
+    python_with just rust-just==1.59.0
+    target/just/bin/just --unstable --fmt --check
 }
 
 step_firmware() { bash boards/build.sh; }
