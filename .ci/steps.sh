@@ -15,6 +15,7 @@ steps=(
     "application     the firmware's application and USB device on the host"
     "lints           clippy of both workspaces; firmware's targets"
     "docs            documentation without warnings"
+    "book            the documentation as a book without warnings; builds mdBook"
     "demo            the README's demo command"
     "examples        examples of the libraries"
     "page            the live page in a browser; Debian's Chromium, demo"
@@ -131,6 +132,13 @@ step_lints() {
 }
 
 step_docs() { RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps --workspace; }
+
+# mdBook warns and ends well all the same.
+step_book() {
+    cargo install --quiet --locked --root target/mdbook mdbook@0.5.4
+    target/mdbook/bin/mdbook build docs 2>&1 | tee "$out/book.log"
+    if grep -E ' (WARN|ERROR) ' "$out/book.log"; then return 1; fi
+}
 
 step_demo() {
     cargo run --locked --release -- demo --out "$out/demo"
