@@ -1,4 +1,4 @@
-//! nirspi: an open near-infrared single-pixel camera.
+#![doc = include_str!("../README.md")]
 //!
 //! Data flows one way: bytes -> frames -> measurements -> image -> picture.
 //!
