@@ -52,6 +52,13 @@ fn board(name: &str) -> Result<(&'static Board, &'static str)> {
 
 #[cfg(not(feature = "flash"))]
 fn act(_: &Args, _: Option<(&'static Board, &'static str)>) -> Result<ExitCode> {
+    write("", std::path::Path::new(""), None)?;
+    Ok(ExitCode::FAILURE)
+}
+
+/// Writes firmware into a board's chip.
+#[cfg(not(feature = "flash"))]
+pub fn write(_chip: &str, _elf: &std::path::Path, _probe: Option<&str>) -> Result<()> {
     anyhow::bail!(
         "this build cannot flash: cargo run --release --features flash -- flash ... (minutes to build), or flash with \
          probe-rs run from the board's folder"
@@ -62,11 +69,8 @@ fn act(_: &Args, _: Option<(&'static Board, &'static str)>) -> Result<ExitCode> 
 fn act(args: &Args, board: Option<(&'static Board, &'static str)>) -> Result<ExitCode> {
     use super::print;
     use anyhow::Context;
-    use indicatif::{ProgressBar, ProgressStyle};
-    use nirspi::flash::{Step, choose, flash, probes};
-
-    let found = probes();
     let Some((board, chip)) = board else {
+        let found = nirspi::flash::probes();
         if found.is_empty() {
             print::line("no debug probe: plug in the board's ST-LINK connector")?;
         }
@@ -76,15 +80,31 @@ fn act(args: &Args, board: Option<(&'static Board, &'static str)>) -> Result<Exi
         return Ok(ExitCode::SUCCESS);
     };
     let elf = args.elf.clone().unwrap_or_else(|| board.elf());
-    let firmware = std::fs::read(&elf).with_context(|| {
-        let hint = if args.elf.is_none() {
-            format!(": build it first, bash boards/build.sh {}", board.name)
-        } else {
-            String::new()
-        };
-        format!("{}{hint}", elf.display())
-    })?;
-    let probe = choose(&found, args.probe.as_deref())?;
+    let written = write(chip, &elf, args.probe.as_deref());
+    match &args.elf {
+        None if !elf.exists() => {
+            written.with_context(|| format!("build it first, bash boards/build.sh {}", board.name))
+        }
+        _ => written,
+    }?;
+    print::line(format_args!(
+        "{} written to {} and verified; it is running",
+        elf.display(),
+        board.name
+    ))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Writes firmware into a board's chip.
+#[cfg(feature = "flash")]
+pub fn write(chip: &str, elf: &std::path::Path, probe: Option<&str>) -> Result<()> {
+    use anyhow::Context;
+    use indicatif::{ProgressBar, ProgressStyle};
+    use nirspi::flash::{Step, choose, flash, probes};
+
+    let firmware = std::fs::read(elf).with_context(|| elf.display().to_string())?;
+    let found = probes();
+    let probe = choose(&found, probe)?;
     let bar = ProgressBar::new(0).with_style(
         ProgressStyle::with_template("{msg:9} {bar:30} {bytes}/{total_bytes}")
             .unwrap_or_else(|_| ProgressStyle::default_bar()),
@@ -98,11 +118,5 @@ fn act(args: &Args, board: Option<(&'static Board, &'static str)>) -> Result<Exi
         Step::Done { bytes } => bar.inc(bytes),
     });
     bar.finish_and_clear();
-    written.with_context(|| format!("{} through {probe}", elf.display()))?;
-    print::line(format_args!(
-        "{} written to {} and verified; it is running",
-        elf.display(),
-        board.name
-    ))?;
-    Ok(ExitCode::SUCCESS)
+    written.with_context(|| format!("{} through {probe}", elf.display()))
 }
