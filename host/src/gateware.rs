@@ -22,6 +22,7 @@ const START_TIME: Duration = Duration::from_secs(5);
 
 /// Why a bitstream does not run.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum GatewareError {
     /// The file is not one that `ecppack` or Lattice's tools write.
     #[error("no bitstream for an ECP5: it begins with neither a comment nor the preamble")]

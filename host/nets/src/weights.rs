@@ -32,6 +32,7 @@ pub(crate) const CHECKSUM: &str = "sha256";
 
 /// Why weights cannot be used.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum WeightsError {
     /// The file cannot be read.
     #[error("{file}: {source}")]

@@ -1,3 +1,5 @@
+#![allow(clippy::unwrap_used)] // helpers of tests are tests
+
 use super::*;
 use crate::gateware::tests::{bitstream, camera};
 use nirspi_wire::register::Register;
