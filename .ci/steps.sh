@@ -111,10 +111,11 @@ tool() {
 
 step_licences() {
     tool cargo-deny 0.20.2
-    cargo deny check licenses bans sources
+    cargo deny --all-features check licenses bans sources
+    cargo deny --manifest-path boards/Cargo.toml --config .deny.toml check --allow license-not-encountered licenses bans sources
     # Advisories are in a repository on GitHub.
     if timeout 20 git ls-remote -q https://github.com/RustSec/advisory-db HEAD >/dev/null 2>&1; then
-        cargo deny check advisories
+        cargo deny --all-features check advisories
     else
         echo "skipped: advisories, no GitHub"
     fi

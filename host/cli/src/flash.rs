@@ -3,7 +3,7 @@
 use super::Usage;
 use anyhow::Result;
 use nirspi::boards::{Board, flashable};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Program a board with its firmware, through a debug probe
@@ -52,13 +52,13 @@ fn board(name: &str) -> Result<(&'static Board, &'static str)> {
 
 #[cfg(not(feature = "flash"))]
 fn act(_: &Args, _: Option<(&'static Board, &'static str)>) -> Result<ExitCode> {
-    write("", std::path::Path::new(""), None)?;
+    write("", Path::new(""), &[], None)?;
     Ok(ExitCode::FAILURE)
 }
 
-/// Writes firmware into a board's chip.
+/// Writes firmware, the content of an ELF file, into a board's chip.
 #[cfg(not(feature = "flash"))]
-pub fn write(_chip: &str, _elf: &std::path::Path, _probe: Option<&str>) -> Result<()> {
+pub fn write(_chip: &str, _elf: &Path, _firmware: &[u8], _probe: Option<&str>) -> Result<()> {
     anyhow::bail!(
         "this build cannot flash: cargo run --release --features flash -- flash ... (minutes to build), or flash with \
          probe-rs run from the board's folder"
@@ -69,6 +69,7 @@ pub fn write(_chip: &str, _elf: &std::path::Path, _probe: Option<&str>) -> Resul
 fn act(args: &Args, board: Option<(&'static Board, &'static str)>) -> Result<ExitCode> {
     use super::print;
     use anyhow::Context;
+
     let Some((board, chip)) = board else {
         let found = nirspi::flash::probes();
         if found.is_empty() {
@@ -80,13 +81,15 @@ fn act(args: &Args, board: Option<(&'static Board, &'static str)>) -> Result<Exi
         return Ok(ExitCode::SUCCESS);
     };
     let elf = args.elf.clone().unwrap_or_else(|| board.elf());
-    let written = write(chip, &elf, args.probe.as_deref());
-    match &args.elf {
-        None if !elf.exists() => {
-            written.with_context(|| format!("build it first, bash boards/build.sh {}", board.name))
-        }
-        _ => written,
-    }?;
+    let firmware = std::fs::read(&elf).with_context(|| {
+        let hint = if args.elf.is_none() {
+            format!(": build it first, bash boards/build.sh {}", board.name)
+        } else {
+            String::new()
+        };
+        format!("{}{hint}", elf.display())
+    })?;
+    write(chip, &elf, &firmware, args.probe.as_deref())?;
     print::line(format_args!(
         "{} written to {} and verified; it is running",
         elf.display(),
@@ -95,21 +98,20 @@ fn act(args: &Args, board: Option<(&'static Board, &'static str)>) -> Result<Exi
     Ok(ExitCode::SUCCESS)
 }
 
-/// Writes firmware into a board's chip.
+/// Writes firmware, the content of an ELF file, into a board's chip.
 #[cfg(feature = "flash")]
-pub fn write(chip: &str, elf: &std::path::Path, probe: Option<&str>) -> Result<()> {
+pub fn write(chip: &str, elf: &Path, firmware: &[u8], probe: Option<&str>) -> Result<()> {
     use anyhow::Context;
     use indicatif::{ProgressBar, ProgressStyle};
     use nirspi::flash::{Step, choose, flash, probes};
 
-    let firmware = std::fs::read(elf).with_context(|| elf.display().to_string())?;
     let found = probes();
     let probe = choose(&found, probe)?;
     let bar = ProgressBar::new(0).with_style(
         ProgressStyle::with_template("{msg:9} {bar:30} {bytes}/{total_bytes}")
             .unwrap_or_else(|_| ProgressStyle::default_bar()),
     );
-    let written = flash(probe, chip, &firmware, &mut |step| match step {
+    let written = flash(probe, chip, firmware, &mut |step| match step {
         Step::Begins { what, bytes } => {
             bar.reset();
             bar.set_message(what);

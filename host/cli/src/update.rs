@@ -44,7 +44,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         if let Some(firmware) = &plan.firmware {
             let chip = plan.chip().with_context(|| format!("{}: no chip to flash", plan.board))?;
             drop(session);
-            flash::write(chip, &firmware.path, args.probe.as_deref())?;
+            flash::write(chip, &firmware.path, &firmware.content, args.probe.as_deref())?;
             session = await_firmware(firmware, || address::open(&args.camera, &args.scene))?;
         }
         if let Some(change) = &plan.gateware {
@@ -55,9 +55,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         }
     }
     if args.json {
-        print::json(&plan)?;
-        return Ok(ExitCode::SUCCESS);
+        print::json(&plan)?
+    } else {
+        print::line(&plan)?
     }
-    print::line(&plan)?;
     Ok(ExitCode::SUCCESS)
 }
