@@ -105,7 +105,7 @@ step_publish() { cargo publish --workspace --dry-run --locked; }
 
 # A tool from crates.io, under target/.
 tool() {
-    [ -x "target/tools/bin/$1" ] || cargo install --quiet --locked --root target/tools "$1@$2"
+    [ -x "target/tools/bin/$1" ] || cargo install --quiet --locked --root target/tools "$1@$2" "${@:3}"
     PATH=$PWD/target/tools/bin:$PATH
 }
 
@@ -119,7 +119,7 @@ step_licences() {
     else
         echo "skipped: advisories, no GitHub"
     fi
-    tool cargo-about 0.9.3
+    tool cargo-about 0.9.3 --features cli
     cargo about generate --locked --fail --config .github/about.toml --manifest-path host/cli/Cargo.toml \
         --features flash --output-file target/licences.html .github/about.hbs
 }
