@@ -26,6 +26,7 @@ pub struct VirtualOptics {
 
 /// Why optics cannot be built.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum VirtualOpticsError {
     /// The distance or the lens is out of range.
     #[error(transparent)]

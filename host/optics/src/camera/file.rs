@@ -60,6 +60,7 @@ pub(super) const RANGES: &[(&str, f64, f64)] = &[
 
 /// Why a text is not a camera description. `Display` is one line.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum CameraModelError {
     /// The text is not TOML.
     #[error("line {line}: {reason}, expected TOML such as `power_mw = 4.0`")]

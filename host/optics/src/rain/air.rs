@@ -53,6 +53,7 @@ pub struct Air {
 
 /// Error: the text does not name a weather. `Display` is one line.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum AirError {
     /// The kind does not exist.
     #[error("found {found}, expected {}", Air::EXPECTED)]
