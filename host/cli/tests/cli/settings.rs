@@ -93,7 +93,7 @@ fn settings_that_cannot_be_are_refused_in_one_line_with_code_2() {
         let command = ["reconstruct", "in.npz", "--settings", "lab.toml"];
         bench.run(&command).failed(2, words);
     };
-    refused("samplin = 0.3", &["lab.toml", "`samplin` is no option"]);
+    refused("lens = 0.3", &["lab.toml", "`lens` is no option"]);
     refused("[reconstruct]\nframes = 3", &["`[reconstruct] frames` is no option"]);
     refused("[replay]\nframes = 3", &["`replay` is no command"]);
     refused("sampling = 3 0", &["lab.toml", "line 1"]);
