@@ -19,7 +19,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let shot = shoot(&optics, half_of_the_patterns, &settling, 244, 1, go_on)?;
 
     let measurements = shot.measurements()?;
-    let method = Method::OMP.prepare(&MethodSettings::default())?;
+    let method = Method::default().prepare(&MethodSettings::default())?;
     let image = method.reconstruct(&measurements)?.image;
 
     let networks = Enhance::built_in(&Device::cpu())?;

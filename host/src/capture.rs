@@ -12,6 +12,9 @@
 
 mod junk;
 mod missing;
+mod report;
+
+pub use report::CaptureReport;
 
 use crate::account::LossCounters;
 use crate::calibration::{CalibrationError, Settling, calibrate, calibrate_or};
@@ -101,6 +104,22 @@ pub enum Ended {
     /// The camera disconnected or fell silent. How many frames it made after the last received
     /// frame is unknown.
     LinkLost(SessionError),
+}
+
+impl Ended {
+    /// What ended the capture, in a few words.
+    #[must_use]
+    pub fn in_words(&self) -> &'static str {
+        match self {
+            Self::Complete => "all frames made",
+            Self::Stopped => "stopped by the user",
+            Self::Fault(_) => "the camera switched its LEDs off",
+            Self::WrongNumber { .. } => "the camera made another number of frames",
+            Self::Unconfirmed(_) => "the camera did not say whether a fault is latched",
+            Self::Junk { .. } => "most of the bytes were damaged or of other runs",
+            Self::LinkLost(_) => "the link to the camera was lost",
+        }
+    }
 }
 
 /// The result of a capture.

@@ -1,6 +1,7 @@
 //! The reports of a camera in words: after the greeting, events while no host was connected; later,
 //! events as they happen.
 
+use nirspi_recon::words::count;
 use nirspi_wire::message::CRASH_TEXT_MAX;
 use nirspi_wire::{CrashReport, EventKind};
 
@@ -33,7 +34,7 @@ pub fn as_it_happens(kind: &EventKind) -> String {
             ];
             let told = losses.iter().filter(|(count, _)| *count > 0);
             let told: String = told.map(|(count, how)| format!(", {count} {how}")).collect();
-            format!("run {run} has ended: {frames_made} frames made{told}")
+            format!("run {run} has ended: {} made{told}", count(frames_made, "frame"))
         }
         EventKind::RawDropped => "a raw burst was dropped for want of room on the link".to_owned(),
         EventKind::CommandDamaged => "a command came damaged to the camera".to_owned(),

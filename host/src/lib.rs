@@ -4,6 +4,7 @@
 //!
 //! * [`link`] moves bytes, [`session`] exchanges commands with a camera, [`account`] counts every
 //!   frame,
+//! * [`devices`] lists cameras, [`mod@info`] asks one of them who it is,
 //! * [`about`] says what a build contains, [`versions`] checks whether camera and program fit
 //!   together, [`events`] words a camera's reports,
 //! * [`gateware`] loads a camera's FPGA, [`update`] brings a camera to the versions of a release,
@@ -17,7 +18,8 @@
 //!   the finest detail, [`legibility`] reads characters,
 //! * [`imaging`] scales, enhances and judges images, and gives warnings,
 //! * [`serve`] shows a camera live on a web page,
-//! * [`causes`] prints an error with its causes,
+//! * [`causes`] prints an error with its causes, [`heartbeat`] gives signs of life of long work, [`stage_times`]
+//!   measures it,
 //! * [`training`] makes pairs for training networks, with the virtual camera,
 //! * [`udev`] gives users access to cameras on USB; [`boards`] lists the boards with firmware; with
 //!   the feature `flash`, `flash` programs the boards,
@@ -36,6 +38,7 @@ pub mod boards;
 pub mod calibration;
 pub mod capture;
 pub mod causes;
+pub mod devices;
 pub mod events;
 #[cfg(feature = "virtual-camera")]
 pub mod example;
@@ -43,7 +46,9 @@ pub mod files;
 #[cfg(feature = "flash")]
 pub mod flash;
 pub mod gateware;
+pub mod heartbeat;
 pub mod imaging;
+pub mod info;
 pub mod integrate;
 #[cfg(feature = "training")]
 pub mod legibility;
@@ -60,6 +65,7 @@ pub mod serve;
 pub mod session;
 pub mod setup;
 pub mod source;
+pub mod stage_times;
 pub mod tally;
 #[cfg(feature = "training")]
 pub mod training;

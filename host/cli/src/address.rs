@@ -1,4 +1,4 @@
-//! `--camera`: opens the camera at this address, and prints its earlier reports on stderr.
+//! Opens the camera at the address of `--camera`, and prints its earlier reports on stderr.
 
 use super::camera::SceneArgs;
 use super::print;
@@ -13,7 +13,7 @@ use nirspi::virtual_camera::MemoryLink;
 pub fn open(address: &CameraAddress, scene: &SceneArgs) -> Result<Session> {
     let mut session = open_quietly(address, scene)?;
     for report in session.await_reports().with_context(|| address.to_string())? {
-        print::complain(format_args!("before this, {report}"));
+        print::remark(format_args!("before this, {report}"));
     }
     Ok(session)
 }

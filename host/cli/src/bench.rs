@@ -5,6 +5,7 @@ mod omp;
 mod pipeline;
 
 use super::networks::NetworkArgs;
+use super::report::ReportArgs;
 use anyhow::Result;
 use clap::Subcommand;
 use std::process::ExitCode;
@@ -39,21 +40,20 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 /// What the benchmarks take that run networks.
 #[derive(Debug, clap::Args)]
 struct RunArgs {
-    /// Frames
+    /// Frames in the batch
     #[arg(long, value_name = "B", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=65_536))]
     frames: u32,
-    /// Let the network say what the readings contradict
+    /// Do not correct the network's result where the readings contradict it
     #[arg(long)]
     no_consistency: bool,
-    /// Times to run it
+    /// Number of runs
     #[arg(long, value_name = "R", default_value_t = 9, value_parser = clap::value_parser!(u32).range(1..))]
     repeats: u32,
-    /// Seed of all that is random
+    /// Seed of the random frames
     #[arg(long, default_value_t = 1)]
     seed: u64,
     #[command(flatten)]
     networks: NetworkArgs,
-    /// Print JSON, as it does anyway
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    _report: ReportArgs,
 }

@@ -1,53 +1,52 @@
 //! `nirspi calibrate`: measures ADC latency, settling and flat field against a white sheet and
 //! keeps them for the camera.
 
-use super::address::{self, CameraAddress};
-use super::camera::{ModelArgs, SceneArgs};
+use super::address;
+use super::camera::{CameraArgs, ModelArgs, SceneArgs};
 use super::print;
+use super::progress::Progress;
+use super::report::ReportArgs;
 use anyhow::{Context, Result, anyhow};
-use indicatif::ProgressBar;
 use nirspi::calibration::{
     KeptCalibration, KeptFlatField, Settling, Sweeps, calibrate, flat_field_path_of, measure_dark,
     measure_flat_field, path_of,
 };
-use nirspi::capture::Progress;
 use nirspi::session::{IgnorePackets, Session};
 use nirspi::setup::MeasurementSetup;
 use nirspi_recon::Order;
+use nirspi_recon::words::{count, count_of};
 use serde::Serialize;
-use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::SystemTime;
 
 /// Measure a camera's ADC latency, settling and flat field, and keep them for the captures after it
 ///
-/// Hold a white sheet before the camera, as near as it is sharp. Latency and settling belong to the camera and its
-/// gateware, so once is enough, until the gateware or the amplifier changes. `nirspi selftest` does the same and checks the
-/// rest of the camera as well. A virtual camera looks at its white sheet by itself.
+/// Hold a white sheet before the camera, as near as the sheet is still sharp. Latency and settling belong to the camera and
+/// its gateware, so one calibration is enough until the gateware or the amplifier changes. `nirspi selftest` measures the
+/// same and checks the rest of the camera, too. A virtual camera is shown a white sheet automatically.
 ///
-/// With --white, the sheet must fill the field and be evenly lit: how much the LEDs differ and which are dead is measured
-/// too, and `capture --picture`, `serve` and `reconstruct` take that pattern out of their images. With --dark and the lens
-/// covered, what each pixel reads without light is added to that flat field.
+/// With --white, the sheet must fill the field and be evenly lit. The command then also measures the light of each LED and
+/// finds dead LEDs, and `capture --picture`, `serve` and `reconstruct` correct their images for both. With --dark, cover the
+/// lens: the command measures what each pixel reads without light and adds that to the flat field.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi calibrate --camera usb\n\
     \x20 nirspi calibrate --camera usb --white\n\
     \x20 nirspi calibrate --camera tcp:127.0.0.1:1550 --calibration bench-2.json")]
 pub struct Args {
-    /// Which camera: virtual, usb, usb:SERIAL, tcp:HOST:PORT or serial:PATH[:BAUD]
-    #[arg(long, value_name = "CAMERA", default_value = "virtual")]
-    camera: CameraAddress,
-    /// Keep the calibration in this file instead of under the camera's serial number in the user's data directory
+    #[command(flatten)]
+    camera: CameraArgs,
+    /// Keep the calibration in this file [default: a file for the camera's serial number in the user's data directory]
     #[arg(long, value_name = "FILE")]
     calibration: Option<PathBuf>,
     /// Measure the flat field as well: light of each LED, and dead LEDs
     #[arg(long, conflicts_with = "calibration")]
     white: bool,
-    /// Measure the dark frame, the lens covered, and add it to the flat field that is kept
+    /// Measure the dark frame, with the lens covered, and add it to the flat field that is kept
     #[arg(long, conflicts_with_all = ["calibration", "white"])]
     dark: bool,
-    /// Sweeps of all patterns summed for the flat field or dark frame; 8000 are 0.7 s of light at 40 ns a pattern
+    /// Sweeps of all patterns to sum for the flat field or the dark frame; 8000 sweeps are 0.7 s of light at 40 ns a pattern
     #[arg(long, value_name = "N", default_value_t = 8000,
           value_parser = clap::value_parser!(u32).range(8..=10_000_000))]
     sweeps: u32,
@@ -56,9 +55,8 @@ pub struct Args {
     /// Seed of the virtual camera's simulated noise
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Print a JSON report
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    report: ReportArgs,
 }
 
 #[derive(Debug, Serialize)]
@@ -96,9 +94,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if args.dark {
         return run_dark(args);
     }
-    let mut session = address::open(&args.camera, &SceneArgs::white_sheet(&args.model, args.seed))?;
+    let mut session =
+        address::open(&args.camera.camera, &SceneArgs::white_sheet(&args.model, args.seed))?;
     let settling = calibrate(&mut session, &mut IgnorePackets)
-        .with_context(|| format!("{}: not calibrated", args.camera))?;
+        .with_context(|| format!("{}: not calibrated", args.camera.camera))?;
     let camera = session.identity().clone();
     let file = match &args.calibration {
         Some(path) => path.clone(),
@@ -110,26 +109,28 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         false => None,
     };
     kept.write(&file)?;
-    if args.json {
-        let flat_field = flat_field.map(|(flat, file)| FlatFieldReport::new(&flat, file));
-        print::json(&Report { kept, file, flat_field })?;
-        return Ok(ExitCode::SUCCESS);
-    }
-    let KeptCalibration { camera, settling, .. } = &kept;
+    let summary = flat_field.as_ref().map(|(flat, _)| flat.summary());
+    let flat_field = flat_field.map(|(flat, file)| FlatFieldReport::new(&flat, file));
+    let report = Report { kept, file, flat_field };
+    args.report.print(&report, |report| say(report, summary))
+}
+
+fn say(report: &Report, flat_field: Option<impl std::fmt::Display>) -> Result<()> {
+    let KeptCalibration { camera, settling, .. } = &report.kept;
     print::line(format_args!(
-        "{} {}: ADC latency {} clocks, settled after {} clocks, a step of {:.0} ADC counts",
+        "{} {}: ADC latency {}, settled after {}, a step of {:.0} ADC counts",
         camera.board,
         camera.serial,
-        settling.adc_latency,
-        settling.response.len(),
+        count(settling.adc_latency, "clock"),
+        count_of(settling.response.len(), "clock"),
         settling.step_counts
     ))?;
-    print::line(format_args!("kept in {}", file.display()))?;
-    if let Some((flat, file)) = &flat_field {
-        print::line(flat.summary())?;
-        print::line(format_args!("kept in {}", file.display()))?;
+    print::line(format_args!("kept in {}", report.file.display()))?;
+    if let (Some(summary), Some(flat)) = (flat_field, &report.flat_field) {
+        print::line(summary)?;
+        print::line(format_args!("kept in {}", flat.file.display()))?;
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }
 
 /// All patterns and their complements, with the timing of the camera.
@@ -141,20 +142,6 @@ fn setup(args: &Args, settling: &Settling) -> Result<MeasurementSetup> {
     Ok(MeasurementSetup { adc_latency: settling.adc_latency, ..setup })
 }
 
-/// Shows the number of received sweeps, over several captures.
-fn watched(bar: &ProgressBar) -> impl FnMut(&Progress) -> ControlFlow<()> + '_ {
-    let (mut before, mut last) = (0, 0);
-    move |progress| {
-        let now = progress.counters.total();
-        if now < last {
-            before += last;
-        }
-        last = now;
-        bar.set_position(before + now);
-        ControlFlow::Continue(())
-    }
-}
-
 /// Measures the flat field and writes its file.
 fn white(
     args: &Args,
@@ -162,10 +149,10 @@ fn white(
     settling: &Settling,
 ) -> Result<(KeptFlatField, PathBuf)> {
     let (setup, sweeps) = (setup(args, settling)?, Sweeps::of_map(args.sweeps));
-    let bar = ProgressBar::new(u64::from(sweeps.map + 2 * sweeps.check));
-    let measured = measure_flat_field(session, &setup, settling, sweeps, &mut watched(&bar));
-    bar.finish_and_clear();
-    let measured = measured.with_context(|| format!("{}: no flat field", args.camera))?;
+    let bar = Progress::of("flat field", sweeps.map + 2 * sweeps.check, "sweeps");
+    let measured = measure_flat_field(session, &setup, settling, sweeps, &mut bar.watch());
+    drop(bar);
+    let measured = measured.with_context(|| format!("{}: no flat field", args.camera.camera))?;
     let camera = session.identity().clone();
     let file = flat_field_path_of(&camera.serial)?;
     let kept = KeptFlatField::new(camera, measured, sweeps, SystemTime::now());
@@ -175,7 +162,8 @@ fn white(
 
 /// Adds a dark frame to the flat field that is kept.
 fn run_dark(args: &Args) -> Result<ExitCode> {
-    let mut session = address::open(&args.camera, &SceneArgs::covered(&args.model, args.seed))?;
+    let mut session =
+        address::open(&args.camera.camera, &SceneArgs::covered(&args.model, args.seed))?;
     let camera = session.identity().clone();
     let kept = KeptFlatField::of(&camera)?.ok_or_else(|| {
         let serial = &camera.serial;
@@ -183,21 +171,19 @@ fn run_dark(args: &Args) -> Result<ExitCode> {
     })?;
     let settling = KeptCalibration::read(&path_of(&camera.serial)?, &camera)?.settling;
     let setup = setup(args, &settling)?;
-    let bar = ProgressBar::new(2 * u64::from(args.sweeps));
+    let bar = Progress::of("dark frame", 2 * u64::from(args.sweeps), "sweeps");
     let (flat, sweeps) = (kept.flat.clone(), args.sweeps);
-    let flat = measure_dark(&mut session, &setup, &settling, flat, sweeps, &mut watched(&bar));
-    bar.finish_and_clear();
-    let kept = kept.renewed(flat.with_context(|| format!("{}: no dark frame", args.camera))?);
+    let flat = measure_dark(&mut session, &setup, &settling, flat, sweeps, &mut bar.watch());
+    drop(bar);
+    let kept =
+        kept.renewed(flat.with_context(|| format!("{}: no dark frame", args.camera.camera))?);
     let file = flat_field_path_of(&camera.serial)?;
     kept.write(&file)?;
-    if args.json {
-        print::json(&FlatFieldReport::new(&kept, file))?;
-        return Ok(ExitCode::SUCCESS);
-    }
-    print::line(format_args!(
-        "dark frame: {} of 1024 pixels read something without light, beyond noise; kept in {}",
-        kept.flat.dark_pixels().unwrap_or(0),
-        file.display()
-    ))?;
-    Ok(ExitCode::SUCCESS)
+    args.report.print(&FlatFieldReport::new(&kept, file), |dark| {
+        print::line(format_args!(
+            "dark frame: {} of 1024 pixels read something without light, beyond noise; kept in {}",
+            dark.dark_pixels.unwrap_or(0),
+            dark.file.display()
+        ))
+    })
 }

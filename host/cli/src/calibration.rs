@@ -9,21 +9,23 @@ use std::path::PathBuf;
 
 /// Which calibration to use.
 #[derive(Debug, Clone, clap::Args)]
+#[command(next_help_heading = "Calibration")]
 pub struct CalibrationArgs {
-    /// Measure ADC latency and settling first, even if a calibration is kept. If the scene is too dim for that, the kept
-    /// one is used
+    /// Measure ADC latency and settling first, even if a calibration is kept. If the scene is too dim to measure them, the
+    /// kept calibration is used
     #[arg(long)]
     calibrate: bool,
     /// Use this calibration, written by `nirspi calibrate` or `nirspi selftest`, instead of the one kept for the camera
     #[arg(long, value_name = "FILE", conflicts_with = "calibrate")]
     calibration: Option<PathBuf>,
-    /// Use no calibration and measure none: needs --adc-latency, and leaves the leak from pattern to pattern as it is
+    /// Use no calibration and measure none. This needs --adc-latency, and leaves the leak from pattern to pattern in the
+    /// readings
     #[arg(long, conflicts_with_all = ["calibrate", "calibration"], requires = "adc_latency")]
     no_calibration: bool,
-    /// ADC clocks from light to sample, as you know them; with a wrong number the picture is wrong or inverted
+    /// ADC clocks from light to sample, if you know their number. A wrong number makes a wrong or inverted picture
     #[arg(long, value_name = "N", requires = "no_calibration")]
     adc_latency: Option<u8>,
-    /// Leave the pattern of unequal LEDs in images, though a flat field of `nirspi calibrate --white` is kept for the camera
+    /// Do not correct images for unequal LEDs, even if `nirspi calibrate --white` has kept a flat field for the camera
     #[arg(long)]
     no_flat_field: bool,
 }

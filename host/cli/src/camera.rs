@@ -1,6 +1,7 @@
-//! Arguments for the scene of a virtual camera, and for the measurement.
+//! Arguments for the camera, for the scene of a virtual camera, and for the measurement.
 
 use super::Usage;
+use super::address::CameraAddress;
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use nirspi::files::order_table::read_order_table;
@@ -9,25 +10,36 @@ use nirspi::setup::MeasurementSetup;
 use nirspi::virtual_camera::{CameraModel, VirtualOptics, read_camera_model};
 use nirspi::weather::{WeatherError, read_weather};
 use nirspi_optics::rain::{Air, Rainfall};
-use nirspi_recon::Order;
+use nirspi_recon::{Order, Sampling};
 use std::path::Path;
 use std::str::FromStr;
 
 /// Edge of a drawn scene's reflectance map.
 const SCENE_PX: usize = 256;
 
+/// Which camera.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Camera")]
+pub struct CameraArgs {
+    /// Which camera: virtual, usb, usb:SERIAL, tcp:HOST:PORT or serial:PATH[:BAUD]
+    #[arg(long, value_name = "CAMERA", default_value = "virtual")]
+    pub camera: CameraAddress,
+}
+
 /// What stands before a virtual camera.
 #[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Scene and weather, simulated")]
 pub struct SceneArgs {
     /// What the virtual camera looks at: letter:R (43 mm, bright on dark), word:STOP, white (a sheet), black (a covered
     /// lens), or a PNG or JPEG file (fills the field)
     #[arg(long, value_name = "SCENE", default_value = "letter:R")]
     pub scene: String,
-    /// Distance from the virtual camera to the target, in metres [default: where the lens is focused; the paper's camera 0.3]
-    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    /// Distance from the virtual camera to the target, in metres [default: where the lens is focused; 0.3 for the paper's
+    /// camera]
+    #[arg(long, value_name = "M")]
     pub distance_m: Option<f64>,
-    /// What falls between the virtual camera and the target, as in the paper's Table 2: light is 1.93 mm/h of 0.5 mm
-    /// drops, heavy 5.6 mm/h of 2 mm drops [default: the camera description's, none for the shipped ones]
+    /// Rain between the virtual camera and the target, as in the paper's Table 2: light is 1.93 mm/h of 0.5 mm drops,
+    /// heavy 5.6 mm/h of 2 mm drops [default: what the camera description says; none for the shipped ones]
     #[arg(long, value_enum, conflicts_with = "weather")]
     pub rain: Option<Rain>,
     #[command(flatten)]
@@ -42,8 +54,8 @@ pub struct SceneArgs {
 /// Which simulated camera.
 #[derive(Debug, Clone, Args)]
 pub struct ModelArgs {
-    /// Description of the simulated camera: paper, fga015, one-metre, or a TOML file like those that `nirspi camera-model --print`
-    /// prints
+    /// Description of the simulated camera: paper, fga015, one-metre, or a TOML file. `nirspi camera-model --print` prints
+    /// one to start from
     #[arg(long, value_name = "NAME|FILE", default_value = "paper")]
     pub camera_model: String,
 }
@@ -58,11 +70,11 @@ impl ModelArgs {
 /// Weather of any kind.
 #[derive(Debug, Clone, Args)]
 pub struct WeatherArgs {
-    /// Weather of another kind between the virtual camera and the target, simulated: none, light, heavy;
-    /// rain:20 (mm/h of natural rain) or rain:20,mono:2 (of 2 mm drops); fog:0.5 (g/m3 of water) or fog:5m (a visibility
-    /// of 5 metres) and fog:5m,4 (droplets of 4 um); smoke:... and dust:... alike, dust:0.5,2,1.53,0.003 with the complex
-    /// index of the grains; a CSV file of drop diameters in mm and drops per m3. window:0.2 or +window:0.2 behind any
-    /// of these: drops of water on a fifth of the window
+    /// Weather between the virtual camera and the target, in more detail than --rain. rain:20 is 20 mm/h of natural rain,
+    /// rain:20,mono:2 the same of 2 mm drops. fog:0.5 is fog with 0.5 g/m3 of water, fog:5m fog with a visibility of
+    /// 5 metres, fog:5m,4 the same of droplets of 4 µm. smoke:... and dust:... are written as fog is;
+    /// dust:0.5,2,1.53,0.003 adds the complex refractive index of the grains. A CSV file lists drop diameters in mm and
+    /// drops per m3. window:0.2 puts drops of water on a fifth of the window; +window:0.2 adds them to any other weather
     #[arg(long, value_name = "WEATHER")]
     pub weather: Option<String>,
 }
@@ -155,20 +167,24 @@ impl SceneArgs {
 
 /// How to measure.
 #[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Measurement")]
 pub struct SetupArgs {
     #[arg(long, value_name = "ORDER", default_value = "cake-cutting", help = order_help())]
     pub order: String,
-    /// Share of the 1024 patterns to show, the first of the order [default: demo and serve 0.5, capture 1]
-    #[arg(long, value_name = "0..1", allow_negative_numbers = true)]
-    pub sampling: Option<f64>,
+    /// Share of all patterns to show, the first of the order: 0.3, 30% or 30 [default: 0.5; 1 for capture, because a
+    /// recording can be reconstructed from fewer patterns later]
+    #[arg(long, value_name = "SHARE")]
+    pub sampling: Option<Sampling>,
     /// Sweeps summed into one frame
     #[arg(long, value_name = "N", default_value_t = 1,
           value_parser = clap::value_parser!(u32).range(1..))]
     pub sweeps: u32,
-    /// ADC clocks (8 ns) that each pattern is shown: 5 is 25 MHz [default: the camera description's, the paper's camera 5]
+    /// ADC clocks (of 8 ns) for which each pattern is shown: 5 is 25 MHz [default: what the camera description says; 5 for
+    /// the paper's camera]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub clocks_per_pattern: Option<u16>,
-    /// ADC samples left out at the start of each pattern [default: the camera description's, the paper's camera 2]
+    /// ADC samples left out at the start of each pattern [default: what the camera description says; 2 for the paper's
+    /// camera]
     #[arg(long, value_name = "N")]
     pub blanked: Option<u16>,
     /// Show patterns alone, without their complements
@@ -178,7 +194,7 @@ pub struct SetupArgs {
 
 impl SetupArgs {
     /// The setup asked for.
-    pub fn setup(&self, default_sampling: f64, model: &ModelArgs) -> Result<MeasurementSetup> {
+    pub fn setup(&self, default_sampling: Sampling, model: &ModelArgs) -> Result<MeasurementSetup> {
         let order = parse_order("--order", &self.order)?;
         let readout = model.read()?.readout;
         let clocks = self.clocks_per_pattern.unwrap_or(readout.clocks_per_pattern as u16);
@@ -190,8 +206,7 @@ impl SetupArgs {
             .into());
         }
         let sampling = self.sampling.unwrap_or(default_sampling);
-        check_sampling(sampling)?;
-        let mut setup = MeasurementSetup::new(&order, sampling)
+        let mut setup = MeasurementSetup::new(&order, sampling.share())
             .with_context(|| format!("--order {}", self.order))?;
         setup.sweeps = self.sweeps;
         setup = setup.timed(clocks, blanked);
@@ -213,12 +228,4 @@ pub fn parse_order(option: &str, name: &str) -> Result<Order> {
         return Ok(Order::Table(read_order_table(Path::new(path))?));
     }
     Order::from_str(name).map_err(|error| Usage(format!("{option}: {error} or table:FILE")).into())
-}
-
-/// Checks that a share of patterns is more than 0 and at most 1.
-pub fn check_sampling(sampling: f64) -> Result<()> {
-    if sampling > 0.0 && sampling <= 1.0 {
-        return Ok(());
-    }
-    Err(Usage(format!("--sampling is {sampling}, expected more than 0 and at most 1")).into())
 }

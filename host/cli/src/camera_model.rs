@@ -1,6 +1,7 @@
 //! `nirspi camera-model`: evaluates or prints a camera description.
 
 use super::print;
+use super::report::ReportArgs;
 use anyhow::Result;
 use nirspi::virtual_camera::read_camera_model;
 use nirspi_eval::camera_model::{Report, camera_model};
@@ -22,9 +23,8 @@ pub struct Args {
     /// Print the whole description as TOML
     #[arg(long, conflicts_with = "json")]
     print: bool,
-    /// Print the report as JSON
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    report: ReportArgs,
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
@@ -35,12 +35,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     }
     let report = camera_model(&camera)?;
-    if args.json {
-        print::json(&report)?;
-    } else {
-        say(&report)?;
-    }
-    Ok(ExitCode::SUCCESS)
+    args.report.print(&report, say)
 }
 
 /// The shipped file of this name, if the file is complete. Other shipped files have only the
@@ -52,7 +47,7 @@ fn camera_with_remarks(name: &str) -> Option<&'static str> {
 fn say(report: &Report) -> Result<()> {
     print::line(format_args!("camera {} (simulated)", report.camera))?;
     print::line(format_args!(
-        "one picture: {} sweeps of {:.2} us, {:.1} ms of light",
+        "one picture: {} sweeps of {:.2} µs, {:.1} ms of light",
         report.sweeps, report.sweep_us, report.picture_ms
     ))?;
     print::line(format_args!(

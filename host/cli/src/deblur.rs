@@ -1,36 +1,37 @@
 //! `nirspi deblur`: the deblurring stage alone, by the network of choice.
 
 use super::Usage;
-use super::enhance::print_report;
-use super::networks::{Deblurring, ImageArgs, bar, checked};
-use super::report::StageTimes;
+use super::enhance::say;
+use super::networks::{ImageArgs, checked};
+use super::progress::Progress;
+use super::report::stages;
 use anyhow::Result;
-use indicatif::ProgressBar;
 use nirspi::files::stack::ImageStack;
+use nirspi::imaging::Deblurring;
 use nirspi_nets::classical;
-use nirspi_nets::consistency::Consistency;
-use nirspi_nets::{Enhanced, Images, KnownEstimate, Method, Networks, Options, deblur};
+use nirspi_nets::{Images, KnownEstimate, Method, Options, deblur};
 use std::num::NonZeroU32;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Deblur images of 64 x 64, by a network or a classical method
 ///
-/// Reads .npy ((N, 64, 64) or (64, 64), in [0, 1] or 8-bit grey levels), a PNG or a folder of PNGs. Blur and noise are
-/// estimated from each image unless given; the report says how well each result agrees with its image.
+/// The command reads .npy ((N, 64, 64) or (64, 64), in [0, 1] or 8-bit grey levels), a PNG or JPEG picture, or a folder of
+/// pictures. Blur and noise are estimated from each image, unless you give them. The report says how well each result agrees
+/// with its image.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi deblur blurred.npy --model diffusion --out sharp.npy\n\
     \x20 nirspi deblur blurred.npy --model diffusion --steps 4 --blur-px 2 --noise 0.01 --out sharp.npy")]
 pub struct Args {
-    /// What deblurs
-    #[arg(long, value_enum, default_value_t = Model::Diffusion)]
-    model: Model,
-    /// Steps: 1 to 500, default 1; of ancestral, default 500
-    #[arg(long, value_name = "S", value_parser = clap::value_parser!(u32).range(1..=500))]
-    steps: Option<u32>,
     #[command(flatten)]
     sharpening: Sharpening,
+    /// The network or method that deblurs
+    #[arg(long, value_enum, default_value_t = Model::Diffusion)]
+    model: Model,
+    /// Steps of the network, 1 to 500 [default: 1 for diffusion, 500 for ancestral]
+    #[arg(long, value_name = "S", value_parser = clap::value_parser!(u32).range(1..=500))]
+    steps: Option<u32>,
     #[command(flatten)]
     images: ImageArgs,
 }
@@ -38,11 +39,11 @@ pub struct Args {
 /// What deblurs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 enum Model {
-    /// The bridge from the degraded image to the sharp one
+    /// A diffusion network that goes from the blurred image to the sharp one in few steps
     Diffusion,
-    /// The 500-step diffusion, sampled backwards
+    /// The paper's diffusion network of 500 steps
     Ancestral,
-    /// A GAN's generator
+    /// The generator of a generative adversarial network
     Gan,
     /// Wiener's filter
     Wiener,
@@ -71,21 +72,22 @@ type Blurred<'a> = Images<'a, { deblur::SIDE }>;
 
 /// How to deblur, the same for `deblur` and `enhance`.
 #[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Deblurring")]
 pub struct Sharpening {
     /// Blur of the images in pixels of the 64 x 64 grid (standard deviation), if you know it better than the estimator
-    #[arg(long, value_name = "P", allow_negative_numbers = true)]
+    #[arg(long, value_name = "P")]
     blur_px: Option<f32>,
     /// Noise of the images (standard deviation, of a full scale of 1), if you know it better than the estimator
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N")]
     noise: Option<f32>,
-    /// Let the network say what the readings contradict
+    /// Do not correct the network's result where the readings contradict it
     #[arg(long)]
     no_consistency: bool,
     /// Seed of everything random
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
-    /// Also write how well each pixel repeats (.npy): its standard deviation had the same scene been measured again. What the
-    /// network gets wrong every time is not in it
+    /// Also write the repeatability of each pixel (.npy): its standard deviation if the same scene were measured again. An
+    /// error that the network makes every time does not show in this number
     #[arg(long, value_name = "FILE")]
     spread: Option<PathBuf>,
 }
@@ -145,28 +147,31 @@ impl Args {
 pub fn run(args: &Args) -> Result<ExitCode> {
     let way = args.way()?;
     let options = args.sharpening.options()?;
-    let mut times = StageTimes::default();
+    let mut times = stages();
     let input = times.time("read", || args.images.read(deblur::SIDE))?;
     let images: Blurred<'_> = checked(&input)?;
     let target = input.target(&args.images.out)?;
-    let bar = bar("deblurring", input.count());
+    let bar = Progress::of("deblurring", input.count(), "images");
     let (networks, result) = match way {
         Way::Network(method) => {
             let mut networks = args.images.networks.open(&["estimator", method.model()])?;
             let sharpener = times.time("load", || networks.sharpener(method))?;
-            let result = times.time("deblur", || {
-                sharpener.deblur(images, &options, &mut |done| bar.set_position(done as u64))
-            })?;
+            let result = times
+                .time("deblur", || sharpener.deblur(images, &options, &mut |done| bar.set(done)))?;
             (networks, result)
         }
         Way::Classical(method) => {
             let mut networks = args.images.networks.open(&["estimator"])?;
-            let work = || classically(method, images, &mut networks, options.estimate, &bar);
-            let result = times.time("deblur", work)?;
+            let estimator = networks.estimator()?;
+            let result = times.time("deblur", || {
+                classical::deblur_all(method, images, &estimator, options.estimate, &mut || {
+                    bar.add(1)
+                })
+            })?;
             (networks, result)
         }
     };
-    bar.finish_and_clear();
+    drop(bar);
     args.sharpening.write_spread(&input, result.spread.as_deref())?;
     target.write(deblur::SIDE, &result.images)?;
 
@@ -176,29 +181,5 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     };
     let deblurring = Deblurring::of(way.name(), steps, consistency, options.seed, &result);
     let report = args.images.report(&input, &networks, Some(deblurring), times);
-    print_report(&report, args.images.json)?;
-    Ok(ExitCode::SUCCESS)
-}
-
-/// Deblurs by a classical method with each image's blur and noise.
-fn classically(
-    method: classical::Method,
-    images: Blurred<'_>,
-    networks: &mut Networks,
-    known: KnownEstimate,
-    bar: &ProgressBar,
-) -> Result<Enhanced> {
-    const SIDE: usize = deblur::SIDE;
-    let mut result = Enhanced::default();
-    for (image, estimate) in images.iter().zip(networks.estimator()?.estimate(images)) {
-        let estimate = known.over(estimate);
-        let (sigma_px, noise) = (estimate.sigma_px, estimate.noise.min(1.0));
-        let sharp = classical::deblur(method, image, (SIDE, SIDE), sigma_px, noise)?;
-        let model = Consistency::new(SIDE, sigma_px, noise);
-        result.inconsistency.push(model.residual_ratio(image, &sharp));
-        result.images.extend(sharp);
-        result.estimates.push(estimate);
-        bar.inc(1);
-    }
-    Ok(result)
+    args.images.report.print(&report, say)
 }

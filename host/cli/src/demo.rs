@@ -1,16 +1,13 @@
 //! `nirspi demo`: the whole camera on a simulated scene, from light to picture.
 
-mod enhanced;
-
 use super::camera::{SceneArgs, SetupArgs};
 use super::method::{MethodArgs, Solved, solve};
 use super::print;
+use super::progress::Progress;
 use super::reconstruct::enlarged_png;
-use super::report::{StageTimes, to_json};
+use super::report::{ReportArgs, StageTimes, stages, to_json};
 use anyhow::Result;
-use indicatif::{ProgressBar, ProgressStyle};
 use nirspi::account::LossCounters;
-use nirspi::capture::Progress;
 use nirspi::files::image::{encode_grey, encode_rgb};
 use nirspi::files::measurement::encode as encode_measurement;
 use nirspi::files::npy;
@@ -21,43 +18,41 @@ use nirspi::picture::{Panel, Range, SideBySide};
 use nirspi::scene::SceneMap;
 use nirspi::session::CameraIdentity;
 use nirspi::virtual_camera::{
-    VirtualOptics, calibrate_against_white, flat_field_against_white, shoot,
+    StagesReport, VirtualOptics, calibrate_against_white, enhance_stages, flat_field_against_white,
+    shoot,
 };
-use nirspi_recon::{Image, Measurements, Side, reconstruct};
+use nirspi_recon::words::{count, count_of};
+use nirspi_recon::{Image, Measurements, Sampling, Side, reconstruct};
 use serde::Serialize;
-use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Show what the camera does, without a camera: capture a simulated scene and reconstruct it
 ///
-/// An optics simulator lights the gateware's model; the real firmware logic drives it and speaks the real wire
-/// protocol; the host calibrates against a white sheet, captures, counts, reconstructs, fuses with depth and deblurs. Writes scene and every
-/// stage as PNG and NPY, side_by_side.png, report.json, and for other commands measurement.npz and frames.npy.
+/// The light is simulated; the gateware is its bit-exact model; firmware logic and wire protocol are those of a real camera.
+/// The program calibrates the virtual camera against a white sheet, captures the scene, reconstructs the image, fuses the
+/// image with depth and deblurs it. The command writes the scene and the image of every stage as PNG and NPY,
+/// side_by_side.png, report.json, and measurement.npz and frames.npy to try other commands on.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n\
     \x20 nirspi demo --scene letter:R --out demo/")]
 pub struct Args {
     #[command(flatten)]
     scene: SceneArgs,
-    #[command(flatten)]
-    setup: SetupArgs,
-    /// Frames to capture; their sum is reconstructed [default: the camera description's, the paper's camera 244]
+    /// Frames to measure; the image is made from their sum [default: what the camera description says; 244 for the paper's
+    /// camera]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     frames: Option<u32>,
+    #[command(flatten)]
+    setup: SetupArgs,
     #[command(flatten)]
     method: MethodArgs,
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "demo")]
     out: PathBuf,
-    /// Print the report as JSON
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    report: ReportArgs,
 }
-
-/// Half of the patterns, which are enough to read a letter, and few enough to show the effect of
-/// OMP.
-const DEFAULT_SAMPLING: f64 = 0.5;
 
 #[derive(Debug, Serialize)]
 struct Report {
@@ -91,7 +86,7 @@ struct Report {
     /// The result, compared with the image of a perfect 32 x 32 camera.
     reconstruction: Quality,
     quality_note: &'static str,
-    enhancement: enhanced::Report,
+    enhancement: StagesReport,
     #[serde(flatten)]
     method: MethodReport,
     notes: Vec<String>,
@@ -113,8 +108,8 @@ struct Images {
 
 pub fn run(args: &Args) -> Result<ExitCode> {
     args.method.check()?;
-    let setup = args.setup.setup(DEFAULT_SAMPLING, &args.scene.model)?;
-    let mut times = StageTimes::default();
+    let setup = args.setup.setup(Sampling::HALF, &args.scene.model)?;
+    let mut times = stages();
     let (map, optics) = times.time("scene", || args.scene.optics())?;
     // Latency belongs to the camera and not to the scene.
     let seed = args.scene.seed;
@@ -124,17 +119,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let flat_field =
         times.time("flat_field", || flat_field_against_white(&optics, &settling, seed))?;
 
-    let bar = ProgressBar::new(u64::from(frames)).with_style(
-        ProgressStyle::with_template("capture {bar:30} {pos}/{len} frames")
-            .unwrap_or_else(|_| ProgressStyle::default_bar()),
-    );
-    let mut watch = |progress: &Progress| {
-        bar.set_position(progress.counters.total());
-        ControlFlow::Continue(())
-    };
-    let shot =
-        times.time("capture", || shoot(&optics, setup, &settling, frames, seed, &mut watch))?;
-    bar.finish_and_clear();
+    let bar = Progress::of("capture", frames, "frames");
+    let shot = times
+        .time("capture", || shoot(&optics, setup, &settling, frames, seed, &mut bar.watch()))?;
+    drop(bar);
     let camera = shot.session.identity().clone();
     let captured = &shot.capture;
     let mut notes: Vec<String> =
@@ -155,7 +143,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let truth = optics.focused_footprint()?.weights().to_vec();
     let raw = compare(&raw, &truth)?;
     let fitted = compare(&image, &truth)?;
-    let stages = enhanced::run(&image, measurements.rows(), &optics, seed, &mut times)?;
+    let stages = enhance_stages(&image, measurements.rows(), &optics, seed, &mut times)?;
     let images = Images {
         measurements,
         truth: Image::new(Side::INSTRUMENT, truth),
@@ -203,12 +191,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         stage_ms: times,
     };
     write(args, &map, &optics, &images, &report)?;
-    if args.json {
-        print::json(&report)?;
-    } else {
-        say(args, &report)?;
-    }
-    Ok(ExitCode::SUCCESS)
+    args.report.print(&report, |report| say(args, report))
 }
 
 fn write(
@@ -353,11 +336,11 @@ fn capitalised(text: &str) -> String {
 
 fn say(args: &Args, report: &Report) -> Result<()> {
     print::line(format_args!(
-        "{} at {} m, {} frames of {} patterns in {:.1} ms of (simulated) light",
+        "{} at {} m, {} of {} in {:.1} ms of (simulated) light",
         report.scene,
         report.distance_m,
-        report.frames.received,
-        report.patterns,
+        count(report.frames.received, "frame"),
+        count_of(report.patterns, "pattern"),
         report.acquisition_ms
     ))?;
     print::line(format_args!("frames: {}", report.frames))?;
@@ -377,14 +360,12 @@ fn say(args: &Args, report: &Report) -> Result<()> {
     for warning in &enhancement.warnings {
         print::line(format_args!("warning: {warning}"))?;
     }
-    for note in &report.notes {
-        print::line(format_args!("note: {note}"))?;
-    }
+    print::notes(&report.notes)?;
     print::line(format_args!("look at {}", args.out.join("side_by_side.png").display()))
 }
 
 /// A line about the blur and its source.
-fn blur_line(enhancement: &enhanced::Report) -> String {
+fn blur_line(enhancement: &StagesReport) -> String {
     let (taken, estimated) = (enhancement.sigma_px, enhancement.estimated_sigma_px);
     if taken > estimated {
         format!("{taken:.2} px by lens and distance, {estimated:.2} px estimated")

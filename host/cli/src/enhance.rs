@@ -1,19 +1,23 @@
 //! `nirspi enhance`: fusion and deblurring, from the camera's 32 x 32 to the 64 x 64 output.
 
 use super::deblur::Sharpening;
-use super::networks::{Deblurring, ImageArgs, Report, bar, checked};
+use super::networks::{ImageArgs, checked};
 use super::print;
-use super::report::StageTimes;
+use super::progress::Progress;
+use super::report::stages;
 use super::upscale::DepthArgs;
 use anyhow::Result;
+use nirspi::imaging::{Deblurring, StackReport};
 use nirspi_nets::{Images, Method, fusion};
+use nirspi_recon::words::count_of;
 use std::num::NonZeroU32;
 use std::process::ExitCode;
 
-/// Enlarge and deblur images, 32 x 32 to 64 x 64: fusion with depth, then the diffusion bridge
+/// Enlarge and deblur images, from 32 x 32 to 64 x 64: fusion with depth, then deblurring by a diffusion network
 ///
-/// Reads .npy ((N, 32, 32) or (32, 32), in [0, 1] or 8-bit grey levels), a PNG or a folder of PNGs. Blur and noise are
-/// estimated from each image; each result is kept in agreement with the readings, and the report says how well it agrees.
+/// The command reads .npy ((N, 32, 32) or (32, 32), in [0, 1] or 8-bit grey levels), a PNG or JPEG picture, or a folder of
+/// pictures. Blur and noise are estimated from each image. Each result is kept in agreement with its image, and the report
+/// says how well they agree.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi enhance measured.npy --out sharp.npy\n\
@@ -21,11 +25,11 @@ use std::process::ExitCode;
 pub struct Args {
     #[command(flatten)]
     depth: DepthArgs,
-    /// Steps along the bridge: 1 has the least error and takes the least time
-    #[arg(long, value_name = "S", default_value = "1")]
-    steps: NonZeroU32,
     #[command(flatten)]
     sharpening: Sharpening,
+    /// Steps of the deblurring network: 1 has the least error and takes the least time
+    #[arg(long, value_name = "S", default_value = "1")]
+    steps: NonZeroU32,
     #[command(flatten)]
     images: ImageArgs,
 }
@@ -33,7 +37,7 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<ExitCode> {
     let options = args.sharpening.options()?;
     let method = Method::Diffusion { steps: args.steps };
-    let mut times = StageTimes::default();
+    let mut times = stages();
     let input = times.time("read", || args.images.read(fusion::SIDE))?;
     let images: Images<'_, { fusion::SIDE }> = checked(&input)?;
     let target = input.target(&args.images.out)?;
@@ -41,33 +45,28 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let mut networks = args.images.networks.open(&["fsrcnn", "estimator", "diffusion"])?;
     let enhancer = times.time("load", || networks.enhancer(method))?;
 
-    let bar = bar("enhancing", input.count());
+    let bar = Progress::of("enhancing", input.count(), "images");
     let result = times.time("enhance", || {
-        enhancer
-            .enhance(images, depth.as_ref(), &options, &mut |done| bar.set_position(done as u64))
+        enhancer.enhance(images, depth.as_ref(), &options, &mut |done| bar.set(done))
     })?;
-    bar.finish_and_clear();
+    drop(bar);
     args.sharpening.write_spread(&input, result.spread.as_deref())?;
     target.write(2 * fusion::SIDE, &result.images)?;
 
     let steps = args.steps.get();
     let deblurring = Deblurring::of("diffusion", steps, options.consistency, options.seed, &result);
     let report = args.images.report(&input, &networks, Some(deblurring), times);
-    print_report(&report, args.images.json)?;
-    Ok(ExitCode::SUCCESS)
+    args.images.report.print(&report, say)
 }
 
-/// As JSON, or in two lines.
-pub fn print_report(report: &Report, json: bool) -> Result<()> {
-    if json {
-        return print::json(report);
-    }
+/// The report in two lines.
+pub fn say(report: &StackReport) -> Result<()> {
     if let Some(deblurring) = &report.deblurring {
         print::line(deblurring.line())?;
     }
     print::line(format_args!(
-        "{} images on {}, in {}",
-        report.images,
+        "{} on {}, in {}",
+        count_of(report.images, "image"),
         report.device,
         report.output.display()
     ))

@@ -8,11 +8,10 @@ mod table3;
 mod table4;
 
 use super::camera::{ModelArgs, Rain, WeatherArgs};
-use super::report::to_json;
-use super::{print, range};
+use super::range;
+use super::report::{ReportArgs, to_json};
 use anyhow::Result;
 use clap::{Args, Subcommand};
-use indicatif::{ProgressBar, ProgressStyle};
 use nirspi::files::output::OutputDir;
 use nirspi::virtual_camera::CameraModel;
 use nirspi_eval::pictures::ANCESTRAL_STEPS;
@@ -58,13 +57,15 @@ pub fn run(args: &EvalArgs) -> Result<ExitCode> {
 
 /// How the pictures of a table are taken.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Scene and weather, simulated")]
 struct ExposureArgs {
     /// Rain, as in the paper's Table 2
     #[arg(long, value_enum, default_value_t = Rain::Heavy, conflicts_with = "weather")]
     rain: Rain,
     #[command(flatten)]
     weather: WeatherArgs,
-    /// Differential sweeps summed into a picture [default: the camera description's; the paper's camera 244, which are 20 ms]
+    /// Frames to measure; each picture is made from their sum [default: what the camera description says; 244 for the
+    /// paper's camera, which take 20 ms]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     frames: Option<u32>,
     #[command(flatten)]
@@ -89,7 +90,8 @@ impl ExposureArgs {
 /// The paper's own sampler.
 #[derive(Debug, Args)]
 struct AncestralArgs {
-    /// Steps of the ancestral sampler, the paper's own, which has 500 there (fifty times as slow as 10); 0 leaves it out
+    /// Steps of the paper's own sampler. The paper has 500 steps, which take fifty times as long as 10; 0 leaves the sampler
+    /// out
     #[arg(long = "ancestral", value_name = "STEPS", default_value_t = ANCESTRAL_STEPS,
           value_parser = clap::value_parser!(u32).range(0..=500))]
     steps: u32,
@@ -101,9 +103,8 @@ struct OutputArgs {
     /// Folder for the report as JSON and its picture
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Print the report as JSON
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    report: ReportArgs,
 }
 
 impl OutputArgs {
@@ -114,21 +115,13 @@ impl OutputArgs {
         report: &R,
         picture: impl FnOnce() -> Result<Vec<u8>>,
         say: impl FnOnce(&R) -> Result<()>,
-    ) -> Result<()> {
+    ) -> Result<ExitCode> {
         if let Some(path) = &self.out {
             let mut out = OutputDir::create(path)?;
             out.write(&format!("{name}.json"), to_json(report)?.as_bytes())?;
             out.write(&format!("{name}.png"), &picture()?)?;
             out.commit()?;
         }
-        if self.json { print::json(report) } else { say(report) }
+        self.report.print(report, say)
     }
-}
-
-/// A progress bar for `total` pictures.
-fn progress(total: usize, what: &str) -> ProgressBar {
-    let template = format!("{what} {{bar:30}} {{pos}}/{{len}} pictures, {{eta}} left");
-    let style =
-        ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar());
-    ProgressBar::new(total as u64).with_style(style)
 }

@@ -19,7 +19,7 @@ pub struct Args {
     /// Which example
     #[arg(value_parser = examples())]
     example: Example,
-    /// File to write; default: the example's name with .npz
+    /// File to write [default: the example's name with .npz]
     #[arg(long, value_name = "FILE.npz")]
     out: Option<PathBuf>,
     /// Seed of the simulated noise

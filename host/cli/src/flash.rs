@@ -8,7 +8,7 @@ use std::process::ExitCode;
 
 /// Program a board with its firmware, through a debug probe
 ///
-/// Nothing else has to be installed: an ELF file of a release is enough. Needs a build with the feature `flash`.
+/// No other program is needed: an ELF file of a release is enough. This command needs a build with the feature `flash`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi flash --board nucleo-u5a5zj-q\n\
@@ -16,7 +16,7 @@ use std::process::ExitCode;
 pub struct Args {
     #[arg(long, value_name = "NAME", required_unless_present = "list", help = board_help())]
     board: Option<String>,
-    /// Firmware to write; default: the board's release build under boards/target
+    /// Firmware to write [default: the board's release build under boards/target]
     #[arg(long, value_name = "FILE")]
     elf: Option<PathBuf>,
     /// Which probe, where there are several: VID:PID:SERIAL as --list shows it
@@ -101,24 +101,25 @@ fn act(args: &Args, board: Option<(&'static Board, &'static str)>) -> Result<Exi
 /// Writes firmware, the content of an ELF file, into a board's chip.
 #[cfg(feature = "flash")]
 pub fn write(chip: &str, elf: &Path, firmware: &[u8], probe: Option<&str>) -> Result<()> {
+    use super::progress::Progress;
     use anyhow::Context;
-    use indicatif::{ProgressBar, ProgressStyle};
     use nirspi::flash::{Step, choose, flash, probes};
 
     let found = probes();
     let probe = choose(&found, probe)?;
-    let bar = ProgressBar::new(0).with_style(
-        ProgressStyle::with_template("{msg:9} {bar:30} {bytes}/{total_bytes}")
-            .unwrap_or_else(|_| ProgressStyle::default_bar()),
-    );
+    let mut bar = None;
+    let mut done = 0;
     let written = flash(probe, chip, firmware, &mut |step| match step {
         Step::Begins { what, bytes } => {
-            bar.reset();
-            bar.set_message(what);
-            bar.set_length(bytes);
+            (bar, done) = (Some(Progress::of(what, bytes, "bytes")), 0);
         }
-        Step::Done { bytes } => bar.inc(bytes),
+        Step::Done { bytes } => {
+            done += bytes;
+            if let Some(bar) = &bar {
+                bar.set(done);
+            }
+        }
     });
-    bar.finish_and_clear();
+    drop(bar);
     written.with_context(|| format!("{} through {probe}", elf.display()))
 }

@@ -1,11 +1,13 @@
 //! `nirspi gateware`: loads a bitstream into a camera's FPGA.
 
 use super::address::{self, CameraAddress};
-use super::camera::SceneArgs;
+use super::camera::{ModelArgs, SceneArgs};
 use super::print;
+use super::progress::Progress;
+use super::report::ReportArgs;
 use anyhow::{Context, Result};
-use indicatif::{ProgressBar, ProgressStyle};
 use nirspi::gateware;
+use nirspi::session::Session;
 use nirspi::versions::of_register;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -13,8 +15,8 @@ use std::process::ExitCode;
 
 /// Load gateware into a camera's FPGA, through its firmware
 ///
-/// The FPGA keeps it until its power goes; the board's page says how to store it for good. A board that cannot load
-/// gateware refuses.
+/// The FPGA keeps the gateware until its power is switched off; the page of the board says how to store gateware
+/// permanently. A board that cannot load gateware refuses.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n\
     \x20 nirspi gateware target/gateware/ecp5-evn/nirspi.bit --camera usb")]
@@ -26,10 +28,7 @@ pub struct Args {
     #[arg(long, value_name = "CAMERA")]
     camera: CameraAddress,
     #[command(flatten)]
-    scene: SceneArgs,
-    /// Print JSON
-    #[arg(long)]
-    json: bool,
+    report: ReportArgs,
 }
 
 #[derive(Debug, Serialize)]
@@ -38,27 +37,22 @@ struct Report {
     gateware: String,
 }
 
-/// A bar for a bitstream of this many bytes.
-pub fn progress(bytes: usize) -> ProgressBar {
-    let style = ProgressStyle::with_template("loading {bar:30} {bytes}/{total_bytes}, {eta} left")
-        .unwrap_or_else(|_| ProgressStyle::default_bar());
-    ProgressBar::new(bytes as u64).with_style(style)
+/// Opens the camera. A virtual one looks at a white sheet.
+pub fn open(camera: &CameraAddress) -> Result<Session> {
+    let model = ModelArgs { camera_model: "paper".to_owned() };
+    address::open(camera, &SceneArgs::white_sheet(&model, 1))
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
     let file = args.bitstream.display();
     let bitstream = std::fs::read(&args.bitstream).with_context(|| file.to_string())?;
-    let mut session = address::open(&args.camera, &args.scene)?;
-    let bar = progress(bitstream.len());
-    let loaded =
-        gateware::load(&mut session, &bitstream, &mut |bytes| bar.set_position(bytes.into()));
-    bar.finish_and_clear();
+    let mut session = open(&args.camera)?;
+    let bar = Progress::of("loading", bitstream.len(), "bytes");
+    let loaded = gateware::load(&mut session, &bitstream, &mut |bytes| bar.set(bytes));
+    drop(bar);
     let version = loaded.with_context(|| file.to_string())?;
     let report = Report { bytes: bitstream.len(), gateware: of_register(version) };
-    if args.json {
-        print::json(&report)?;
-    } else {
-        print::line(format_args!("the FPGA runs gateware {}", report.gateware))?;
-    }
-    Ok(ExitCode::SUCCESS)
+    args.report.print(&report, |report| {
+        print::line(format_args!("the FPGA runs gateware {}", report.gateware))
+    })
 }

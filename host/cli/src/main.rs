@@ -19,12 +19,14 @@ mod eval;
 mod example;
 mod flash;
 mod gateware;
+mod headings;
 mod info;
 mod method;
 mod metrics;
 mod networks;
 mod packaging;
 mod print;
+mod progress;
 mod rain;
 mod range;
 mod reconstruct;
@@ -32,13 +34,14 @@ mod report;
 mod selftest;
 mod serve;
 mod serve_virtual;
+mod settings;
 mod setup;
 mod source;
 mod train;
 mod update;
 mod upscale;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use nirspi::about::About;
 use nirspi::files::FileError;
 use nirspi_eval::EvalError;
@@ -54,6 +57,8 @@ static VERSION: LazyLock<String> =
 #[command(after_help = "Example, with no camera at hand:\n\
     \x20 nirspi demo --out demo/")]
 struct Cli {
+    #[command(flatten)]
+    general: settings::GeneralArgs,
     #[command(subcommand)]
     command: Command,
 }
@@ -107,19 +112,33 @@ fn refused(error: EvalError) -> anyhow::Error {
 }
 
 fn main() -> ExitCode {
-    let command = match Cli::try_parse() {
-        Ok(cli) => cli.command,
-        Err(answer) if is_help(&answer) => {
+    let (cli, settings) = match settings::parse::<Cli>(
+        headings::arranged(Cli::command()),
+        std::env::args_os().collect(),
+    ) {
+        Ok(parsed) => parsed,
+        Err(settings::Refused::Help(answer)) => {
             // A closed stdout does not count as a failure.
             let _ = answer.print();
             return ExitCode::from(answer.exit_code() as u8);
         }
-        Err(mistake) => {
-            print::complain(mistake_in_one_line(&mistake.render().to_string()));
+        Err(settings::Refused::Mistake(line)) => {
+            print::complain(line);
             return ExitCode::from(2);
         }
     };
-    let result = match command {
+    settings.begin(&cli.general);
+    let done = run(cli.command).and_then(|code| settings.save(&cli.general).map(|()| code));
+    done.unwrap_or_else(|error| {
+        print::complain(one_line(&error));
+        let used_wrongly =
+            error.is::<Usage>() || matches!(error.downcast_ref(), Some(FileError::Choice { .. }));
+        ExitCode::from(if used_wrongly { 2 } else { 1 })
+    })
+}
+
+fn run(command: Command) -> anyhow::Result<ExitCode> {
+    match command {
         Command::Demo(args) => demo::run(&args),
         Command::Example(args) => example::run(&args),
         Command::Reconstruct(args) => reconstruct::run(&args),
@@ -146,41 +165,7 @@ fn main() -> ExitCode {
         Command::Train(args) => train::run(&args),
         Command::Completions(args) => packaging::completions(&args),
         Command::Man(args) => packaging::man(&args),
-    };
-    match result {
-        Ok(code) => code,
-        Err(error) => {
-            print::complain(one_line(&error));
-            let used_wrongly = error.is::<Usage>()
-                || matches!(error.downcast_ref(), Some(FileError::Choice { .. }));
-            ExitCode::from(if used_wrongly { 2 } else { 1 })
-        }
     }
-}
-
-fn is_help(error: &clap::Error) -> bool {
-    use clap::error::ErrorKind;
-    matches!(
-        error.kind(),
-        ErrorKind::DisplayHelp
-            | ErrorKind::DisplayVersion
-            | ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand
-    )
-}
-
-/// clap's message of several paragraphs without its usage and its pointer to --help.
-fn mistake_in_one_line(message: &str) -> String {
-    let mut line = String::new();
-    let told = |text: &&str| !text.starts_with("Usage:") && !text.starts_with("For more");
-    for part in message.lines().map(str::trim).take_while(told).filter(|part| !part.is_empty()) {
-        match line.chars().last() {
-            None => {}
-            Some(':') => line.push(' '),
-            Some(_) => line.push_str("; "),
-        }
-        line.push_str(part.strip_prefix("error: ").unwrap_or(part));
-    }
-    line
 }
 
 /// The error and its causes in one line.

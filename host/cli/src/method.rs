@@ -2,8 +2,8 @@
 
 use super::Usage;
 use anyhow::{Context, Result, bail};
-use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::{Args, FromArgMatches};
 use nirspi::files::npy::read_stack;
 use nirspi::imaging::MethodReport;
 use nirspi_recon::omp::Backend;
@@ -16,60 +16,50 @@ use std::path::{Path, PathBuf};
 
 /// How to make the image.
 #[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Picture")]
 pub struct MethodArgs {
-    /// How to make the image
-    #[arg(long, default_value = Method::OMP.argument(), value_parser = methods())]
+    /// The method that makes the image
+    #[arg(long, default_value = Method::default().argument(), value_parser = methods())]
     pub method: Method,
     #[arg(long, value_name = "BASIS", default_value = "dct",
-          help = format!("Basis in which the image is sparse: {}", Basis::expected()))]
+          help = format!("Basis of the image for omp, tikhonov and fista: {}", Basis::expected()))]
     pub basis: String,
-    /// OMP: images of your own (N, n, n) as atoms, instead of a basis
+    /// OMP: images of your own, (N, n, n), as atoms instead of a basis
     #[arg(long, value_name = "NPY", conflicts_with = "basis")]
     pub dictionary: Option<PathBuf>,
-    /// Atoms to choose; without it, the number that predicts held-back measurements best
+    /// OMP: number of atoms [default: the number that predicts held-back measurements best]
     #[arg(long, value_name = "K")]
     pub sparsity: Option<usize>,
-    /// Stop when the residual's norm is this share of the measurements'
-    #[arg(long, value_name = "0..1", default_value_t = 0.0, allow_negative_numbers = true)]
+    /// OMP: stop when the norm of the residual is this share of the norm of the measurements
+    #[arg(long, value_name = "0..1", default_value_t = 0.0)]
     pub residual: f64,
-    /// OMP: choose atoms until no more than the estimated noise is left of the measurements
+    /// OMP: choose atoms until the residual is no larger than the estimated noise
     #[arg(long, conflicts_with_all = ["sparsity", "as_printed"])]
     pub stop_at_noise: bool,
-    /// Strength of the penalty of tikhonov, fista and tv, relative to what noise and prior call for; without it, the one
-    /// that predicts held-back measurements best
-    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    /// Strength of the penalty of tikhonov, fista and tv. 1 is the strength that follows from the estimated noise [default:
+    /// the strength that predicts held-back measurements best]
+    #[arg(long, value_name = "S")]
     pub strength: Option<f64>,
-    /// The paper's Algorithm 1 as printed: no prior, no cross-validation, an exactly sparse image
+    /// OMP: the paper's Algorithm 1 as printed, with no prior and no cross-validation; the image is exactly sparse
     #[arg(long, requires = "sparsity", conflicts_with = "keep")]
     pub as_printed: bool,
-    /// OMP: no negative light, in single pixels (--basis pixel) or images of your own (--dictionary)
+    /// OMP: no negative light. This needs --basis pixel or --dictionary
     #[arg(long, conflicts_with = "as_printed")]
     pub non_negative: bool,
-    /// Keep the values of patterns that were measured (`measured`), or replace them by the sparse fit (`sparse`). Default:
-    /// measured; sparse with --non-negative, because measurement noise would make pixels negative
+    /// Keep the values of patterns that were measured (`measured`), or replace them by the fit (`sparse`) [default:
+    /// measured; sparse with --non-negative, because measurement noise would make pixels negative]
     #[arg(long, value_parser = completions())]
     pub keep: Option<Completion>,
-    /// OMP: what computes: auto, cpu, wgpu, cuda; one image is too little for a GPU, so auto is the cpu
+    /// OMP: where to compute: auto, cpu, wgpu or cuda. One image is too little work for a GPU, so auto is the cpu
     #[arg(long, value_name = "BACKEND", default_value_t = Backend::Auto)]
     pub backend: Backend,
 }
 
 impl Default for MethodArgs {
-    /// The defaults of all arguments.
+    /// The arguments of a command line without any.
     fn default() -> Self {
-        Self {
-            method: Method::OMP,
-            basis: "dct".to_owned(),
-            dictionary: None,
-            sparsity: None,
-            residual: 0.0,
-            stop_at_noise: false,
-            strength: None,
-            as_printed: false,
-            non_negative: false,
-            keep: None,
-            backend: Backend::Auto,
-        }
+        let mut matches = Self::augment_args(clap::Command::new("")).get_matches_from([""]);
+        Self::from_arg_matches_mut(&mut matches).unwrap_or_else(|error| error.exit())
     }
 }
 

@@ -1,9 +1,10 @@
 //! `nirspi metrics`: the similarity of two stacks of images, one by one and as sets.
 
+use super::progress::Progress;
+use super::report::ReportArgs;
 use super::{print, refused};
 use anyhow::{Context, Result};
 use clap::ValueEnum;
-use indicatif::{ProgressBar, ProgressStyle};
 use nirspi_eval::Fid;
 use nirspi_eval::sets::{self, Align, Comparison, Options, Scaled};
 use serde::Serialize;
@@ -12,10 +13,10 @@ use std::process::ExitCode;
 
 /// Compare two stacks of images: PSNR, SSIM, and how far apart they are as sets
 ///
-/// Each is a .npy file of (N, H, W) or (H, W) numbers, a .npz file with `recon`, `image` or `images`, a PNG or JPEG picture, a folder of
-/// pictures, or a folder that `reconstruct` or `demo` has written. Numbers are in [0, 1], and nothing is scaled or fitted unless
-/// --data-range or --align say so. The Fréchet character distance, on the
-/// features of this program's classifier, needs 64 x 64 and two images; FID needs your Inception weights.
+/// A stack is a .npy file of (N, H, W) or (H, W) numbers, a .npz file with `recon`, `image` or `images`, a PNG or JPEG
+/// picture, a folder of pictures, or a folder that `reconstruct` or `demo` has written. Numbers are in [0, 1]; nothing is
+/// scaled or fitted without --data-range or --align. The Fréchet character distance uses the features of this program's
+/// classifier and needs at least two images of 64 x 64 pixels; FID needs your own Inception weights. The report is JSON.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi metrics demo/truth.npy demo/reconstruction.npy\n\
@@ -30,22 +31,21 @@ pub struct Args {
     /// Which character each image shows, (N,), 0 to 61 for 0-9, A-Z, a-z: for the character accuracy
     #[arg(long, value_name = "FILE.npy")]
     labels: Option<PathBuf>,
-    /// Inception-v3's weights in safetensors with torchvision's names, for FID (pytorch-fid's file:
-    /// host/nets/scripts/inception_to_safetensors.py)
+    /// Weights of Inception-v3 in safetensors with torchvision's names, for FID.
+    /// host/nets/scripts/inception_to_safetensors.py converts the file of pytorch-fid
     #[arg(long, value_name = "FILE")]
     inception: Option<PathBuf>,
-    /// Ask Tesseract to read the characters, where this machine has it
+    /// Let Tesseract read the characters, if it is installed on this machine
     #[arg(long, requires = "labels")]
     legibility: bool,
     /// Bring each test image to its reference by the gain (0 or more) and offset of least squares
     #[arg(long, value_enum)]
     align: Option<AlignArg>,
-    /// Range of the data for PSNR and SSIM; default: 1, or with --align the reference's own if that is not in [0, 1]
-    #[arg(long, value_name = "R", allow_negative_numbers = true)]
+    /// Range of the data for PSNR and SSIM [default: 1; with --align, the reference's own range if it is not in [0, 1]]
+    #[arg(long, value_name = "R")]
     data_range: Option<f64>,
-    /// Print JSON, as it does anyway
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    _report: ReportArgs,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -75,12 +75,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let fid = args.inception.as_deref().map(Fid::read).transpose()?;
     let options =
         Options { labels: labels.as_deref(), fid: fid.as_ref(), legibility: args.legibility };
-    let style = ProgressStyle::with_template("inception {bar:30} {pos}/{len}, {eta} left")
-        .unwrap_or_else(|_| ProgressStyle::default_bar());
-    let bar = ProgressBar::new(2 * test.count as u64).with_style(style);
+    let bar = Progress::of("inception", 2 * test.count, "images");
     let comparison =
-        sets::compare(&reference, &test, &options, &|| bar.inc(1)).with_context(named)?;
-    bar.finish_and_clear();
+        sets::compare(&reference, &test, &options, &|| bar.add(1)).with_context(named)?;
+    drop(bar);
     let align = if args.align.is_some() { "gain-offset" } else { "none" };
     print::json(&Report { align, data_range, comparison })?;
     Ok(ExitCode::SUCCESS)

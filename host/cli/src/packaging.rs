@@ -1,5 +1,6 @@
 //! `nirspi completions` and `nirspi man`: what a package of the program contains beside it.
 
+use super::headings::arranged;
 use super::{Cli, print};
 use anyhow::{Context, Result};
 use clap::CommandFactory;
@@ -28,13 +29,13 @@ pub struct ManArgs {
 
 pub fn completions(args: &CompletionsArgs) -> Result<ExitCode> {
     let mut script = Vec::new();
-    clap_complete::generate(args.shell, &mut Cli::command(), "nirspi", &mut script);
+    clap_complete::generate(args.shell, &mut arranged(Cli::command()), "nirspi", &mut script);
     print::line(String::from_utf8_lossy(&script).trim_end())?;
     Ok(ExitCode::SUCCESS)
 }
 
 pub fn man(args: &ManArgs) -> Result<ExitCode> {
-    let mut command = Cli::command().disable_help_subcommand(true);
+    let mut command = arranged(Cli::command()).disable_help_subcommand(true);
     command.build();
     let mut out = OutputDir::create(&args.out)?;
     write_page(command, &mut out)?;

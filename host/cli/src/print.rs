@@ -1,4 +1,4 @@
-//! Prints results on stdout, and one line on stderr after an error.
+//! Prints results on stdout, and remarks and errors on stderr.
 //!
 //! # Invariant
 //! Printing never makes the program panic, also if the reader has closed the pipe
@@ -8,6 +8,21 @@ use anyhow::{Context, Result};
 use serde::Serialize;
 use std::fmt;
 use std::io::{self, Write};
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+
+static QUIET: AtomicBool = AtomicBool::new(false);
+static VERBOSE: AtomicBool = AtomicBool::new(false);
+
+/// How much the program says from now on.
+pub fn say(quiet: bool, verbose: bool) {
+    QUIET.store(quiet, Relaxed);
+    VERBOSE.store(verbose, Relaxed);
+}
+
+/// Whether notes, remarks and progress are switched off.
+pub fn is_quiet() -> bool {
+    QUIET.load(Relaxed)
+}
 
 /// Prints one line. A reader that has closed the pipe (`nirspi demo | head -1`) does not count as a
 /// failure.
@@ -18,12 +33,36 @@ pub fn line(text: impl fmt::Display) -> Result<()> {
     }
 }
 
+/// Prints a note beside a result, unless the user wants none.
+pub fn note(text: impl fmt::Display) -> Result<()> {
+    if is_quiet() { Ok(()) } else { line(format_args!("note: {text}")) }
+}
+
+/// Prints several notes.
+pub fn notes(notes: &[String]) -> Result<()> {
+    notes.iter().try_for_each(note)
+}
+
 /// Prints a report as JSON.
-pub fn json(report: &impl Serialize) -> Result<()> {
+pub fn json(report: &(impl Serialize + ?Sized)) -> Result<()> {
     line(serde_json::to_string_pretty(report)?)
 }
 
 /// Prints one line on stderr. If stderr is closed too, the exit code alone reports the failure.
 pub fn complain(text: impl fmt::Display) {
     let _ = writeln!(io::stderr(), "nirspi: {text}");
+}
+
+/// Prints one line on stderr that is no error, unless the user wants none.
+pub fn remark(text: impl fmt::Display) {
+    if !is_quiet() {
+        complain(text);
+    }
+}
+
+/// Prints one line on stderr for a user who wants more detail.
+pub fn detail(text: impl fmt::Display) {
+    if VERBOSE.load(Relaxed) {
+        complain(text);
+    }
 }

@@ -3,7 +3,7 @@
 
 use super::camera::ModelArgs;
 use super::{Usage, print, refused};
-use crate::report::to_json;
+use crate::report::{ReportArgs, to_json};
 use anyhow::{Context, Result};
 use nirspi::files::image::encode_rgb;
 use nirspi::files::output::OutputDir;
@@ -13,16 +13,15 @@ use nirspi_eval::rain::budget::{self, Settings, Term};
 use nirspi_eval::rain::{self, RainReport, curves, rig};
 use nirspi_optics::mie::Index;
 use nirspi_optics::rain::{DropLaw, Drops, PaperRain};
-use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Say what rain does to light: extinction, scattering, photon budget; one sphere; a rain simulator's uniformity
 ///
-/// Without --mie, --budget, --uniformity or --rig: extinction, scattering and absorption of the rain or fog at each
-/// wavelength. Water's index is Segelstein's, 400 to 2000 nm. With --out, curves of these against wavelength and drop
-/// size, drop sizes, fall speeds, and extinction against rain rate beside laws of measured optical links, each as PNG
-/// and CSV, with rain.json.
+/// Without --mie, --budget, --uniformity or --rig, the command prints extinction, scattering and absorption of the rain or
+/// fog at each wavelength. The refractive index of water is Segelstein's, 400 to 2000 nm. --out writes curves of these
+/// against wavelength and drop size, of drop sizes and fall speeds, and of extinction against rain rate beside laws of
+/// measured optical links, each as PNG and CSV, and rain.json.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi rain --rate-mm-h 5.6\n\
@@ -34,67 +33,42 @@ pub struct Args {
     #[command(flatten)]
     drops: DropArgs,
     /// Wavelengths, in nm
-    #[arg(long, value_name = "NM,...", value_delimiter = ',', default_values_t = [550.0, 850.0, 1550.0],
-          allow_negative_numbers = true)]
+    #[arg(long, value_name = "NM,...", value_delimiter = ',', default_values_t = [550.0, 850.0, 1550.0])]
     wavelengths_nm: Vec<f64>,
-    /// Length of the path that a share of light is given for (there and back), or distance of the target, in metres
-    #[arg(long, value_name = "M", default_value_t = 1.0, allow_negative_numbers = true)]
+    /// Distance of the target in metres; light passes it there and back
+    #[arg(long, value_name = "M", default_value_t = 1.0)]
     distance_m: f64,
     /// One sphere: efficiencies for --x, --m-re and --m-im
     #[arg(long, requires_all = ["x", "m_re"], group = "what")]
     mie: bool,
     /// Size parameter, pi times diameter over wavelength
-    #[arg(long, value_name = "X", requires = "mie", allow_negative_numbers = true)]
+    #[arg(long, value_name = "X", requires = "mie")]
     x: Option<f64>,
     /// Real part of the refractive index
-    #[arg(long, value_name = "N", requires = "mie", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", requires = "mie")]
     m_re: Option<f64>,
     /// Imaginary part of the refractive index, positive for a sphere that absorbs
-    #[arg(
-        long,
-        value_name = "K",
-        requires = "mie",
-        default_value_t = 0.0,
-        allow_negative_numbers = true
-    )]
+    #[arg(long, value_name = "K", requires = "mie", default_value_t = 0.0)]
     m_im: f64,
     /// The photon budget of one pixel, term by term
     #[arg(long, group = "what")]
     budget: bool,
     /// Reflectance of the target, for --budget
-    #[arg(
-        long,
-        value_name = "0..1",
-        requires = "budget",
-        default_value_t = 1.0,
-        allow_negative_numbers = true
-    )]
+    #[arg(long, value_name = "0..1", requires = "budget", default_value_t = 1.0)]
     reflectance: f64,
-    /// Exposure of each pattern in us, for --budget
-    #[arg(
-        long,
-        value_name = "US",
-        requires = "budget",
-        default_value_t = 25.0,
-        allow_negative_numbers = true
-    )]
+    /// Exposure of each pattern in µs, for --budget
+    #[arg(long, value_name = "US", requires = "budget", default_value_t = 25.0)]
     exposure_us: f64,
     #[command(flatten)]
     model: ModelArgs,
     /// Christiansen's uniformity coefficient of collected volumes: a CSV file whose last column holds them
     #[arg(long, value_name = "FILE", group = "what")]
     uniformity: Option<PathBuf>,
-    /// The same for a simulated rain simulator of six nozzles, 1.2 x 0.6 x 0.5 m
+    /// Christiansen's uniformity coefficient of a simulated rain simulator of six nozzles, 1.2 x 0.6 x 0.5 m
     #[arg(long, group = "what")]
     rig: bool,
     /// Tilt of the simulated rig's floor, in degrees
-    #[arg(
-        long,
-        value_name = "DEG",
-        requires = "rig",
-        default_value_t = 0.0,
-        allow_negative_numbers = true
-    )]
+    #[arg(long, value_name = "DEG", requires = "rig", default_value_t = 0.0)]
     tilt_deg: f64,
     /// Seed of the simulated rig
     #[arg(long, value_name = "N", requires = "rig", default_value_t = 1)]
@@ -102,18 +76,17 @@ pub struct Args {
     /// Folder for curves of rain, as PNG and CSV, and rain.json
     #[arg(long, value_name = "DIR", conflicts_with = "what")]
     out: Option<PathBuf>,
-    /// Print the report as JSON
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    report: ReportArgs,
 }
 
 /// What falls.
 #[derive(Debug, Clone, clap::Args)]
 pub struct DropArgs {
     /// Rain rate, in mm/h
-    #[arg(long, value_name = "R", default_value_t = PaperRain::HEAVY.rate_mm_per_h, allow_negative_numbers = true)]
+    #[arg(long, value_name = "R", default_value_t = PaperRain::HEAVY.rate_mm_per_h)]
     pub rate_mm_h: f64,
-    /// Drop sizes: marshall-palmer, mono:MM, gamma:SHAPE,SLOPE (slope per mm), fog:UM,G (mode in um, water in g/m3),
+    /// Drop sizes: marshall-palmer, mono:MM, gamma:SHAPE,SLOPE (slope per mm), fog:UM,G (most frequent diameter in µm, water in g/m3),
     /// or a CSV file of diameters in mm and drops per m3
     #[arg(long, value_name = "LAW", default_value = "marshall-palmer")]
     pub drops: String,
@@ -137,14 +110,14 @@ impl DropArgs {
 
 pub fn run(args: &Args) -> Result<ExitCode> {
     if args.mie {
-        sphere(args)?;
+        sphere(args)
     } else if let Some(path) = &args.uniformity {
         let volumes = Table::read(path)?.last_column()?;
         let report = rig::measured(&volumes).with_context(|| path.display().to_string())?;
-        say_or_json(&report, args.json, say_uniformity)?;
+        args.report.print(&report, say_uniformity)
     } else if args.rig {
         let report = rig::simulated(args.tilt_deg, args.seed).map_err(refused)?;
-        say_or_json(&report, args.json, say_uniformity)?;
+        args.report.print(&report, say_uniformity)
     } else if args.budget {
         let settings = Settings {
             drops: args.drops.drops()?,
@@ -155,7 +128,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             camera: args.model.read()?,
         };
         let report = budget::budget(&settings).map_err(refused)?;
-        say_or_json(&report, args.json, say_budget)?;
+        args.report.print(&report, say_budget)
     } else {
         let (name, drops) = (&args.drops.drops, args.drops.drops()?);
         let radar = !name.starts_with("fog");
@@ -172,36 +145,30 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             out.write("rain.json", to_json(&report)?.as_bytes())?;
             out.commit()?;
         }
-        say_or_json(&report, args.json, say)?;
-        if let (Some(path), false) = (&args.out, args.json) {
-            print::line(format_args!(
-                "wrote curves as PNG and CSV, and rain.json, to {}",
-                path.display()
-            ))?;
-        }
+        args.report.print(&report, |report| {
+            say(report)?;
+            args.out.as_ref().map_or(Ok(()), |path| {
+                let path = path.display();
+                print::line(format_args!("wrote curves as PNG and CSV, and rain.json, to {path}"))
+            })
+        })
     }
-    Ok(ExitCode::SUCCESS)
 }
 
-fn say_or_json<R: Serialize>(report: &R, json: bool, say: fn(&R) -> Result<()>) -> Result<()> {
-    if json { print::json(report) } else { say(report) }
-}
-
-fn sphere(args: &Args) -> Result<()> {
+fn sphere(args: &Args) -> Result<ExitCode> {
     let (Some(x), Some(m_re)) = (args.x, args.m_re) else {
         return Err(Usage("--mie needs --x and --m-re".to_owned()).into());
     };
     let index = Index { real: m_re, imaginary: args.m_im };
     let report = rain::sphere(x, index).map_err(refused)?;
-    if args.json {
-        return print::json(&report);
-    }
-    print::line(format_args!("x = {x}, m = {m_re} + {}i", args.m_im))?;
-    print::line(format_args!("Q_ext  {:.9e}", report.qext))?;
-    print::line(format_args!("Q_sca  {:.9e}", report.qsca))?;
-    print::line(format_args!("Q_abs  {:.9e}", report.qabs))?;
-    print::line(format_args!("Q_back {:.9e}", report.qback))?;
-    print::line(format_args!("g      {:.9}", report.g))
+    args.report.print(&report, |report| {
+        print::line(format_args!("x = {x}, m = {m_re} + {}i", args.m_im))?;
+        print::line(format_args!("Q_ext  {:.9e}", report.qext))?;
+        print::line(format_args!("Q_sca  {:.9e}", report.qsca))?;
+        print::line(format_args!("Q_abs  {:.9e}", report.qabs))?;
+        print::line(format_args!("Q_back {:.9e}", report.qback))?;
+        print::line(format_args!("g      {:.9}", report.g))
+    })
 }
 
 fn say(report: &RainReport) -> Result<()> {
@@ -231,7 +198,7 @@ fn say(report: &RainReport) -> Result<()> {
     if let Some(fall) = &report.fall {
         print::line(format_args!(
             "a drop of {} mm falls at {:.2} m/s, twice its diameter in {:.3} ms; \
-             beta is {:.2} for 25 us, {:.4} for 20 ms",
+             beta is {:.2} for 25 µs, {:.4} for 20 ms",
             fall.diameter_mm,
             fall.speed_m_per_s,
             fall.time_constant_ms,
@@ -251,7 +218,7 @@ fn say(report: &RainReport) -> Result<()> {
 fn say_budget(report: &budget::Report) -> Result<()> {
     let budget::Report { reflectance, distance_m, exposure_us, .. } = report;
     print::line(format_args!(
-        "one pixel, target of reflectance {reflectance} at {distance_m} m, {exposure_us} us a pattern (simulated)"
+        "one pixel, target of reflectance {reflectance} at {distance_m} m, {exposure_us} µs a pattern (simulated)"
     ))?;
     for Term { name, value, unit, how } in &report.terms {
         print::line(format_args!("{name:<28} {:>12} {unit:<10} {how}", figure(*value)))?;

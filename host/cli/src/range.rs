@@ -2,7 +2,7 @@
 
 use super::camera::ModelArgs;
 use super::{print, refused};
-use crate::report::to_json;
+use crate::report::{ReportArgs, to_json};
 use anyhow::Result;
 use nirspi::files::image::encode_rgb;
 use nirspi::files::output::OutputDir;
@@ -13,24 +13,24 @@ use std::process::ExitCode;
 
 /// Say how far the camera sees in rain, beside the paper's Table 2
 ///
-/// The farthest distance at which one pixel of a white target still has the signal-to-noise ratio asked for, from the
-/// photon budget and the rain's Mie extinction; Algorithm 2 as printed, and with the gain of all patterns; the exposure
-/// that a pixel needs against distance; and what would have to be assumed to agree with the paper. With --out, the same as
-/// charts, and how fine and how well this camera and the shipped ones see.
+/// The range is the farthest distance at which one pixel of a white target still has the signal-to-noise ratio of --snr. It
+/// follows from the photon budget and from the extinction of the rain (Mie scattering). Beside it are the ranges of the
+/// paper's Algorithm 2 as printed and with the gain of all patterns, the exposure that a pixel needs against distance, and
+/// the assumptions that would be needed to agree with the paper. --out writes charts of the same, and of resolution and SNR
+/// of this camera and of the shipped ones.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi range\n\
     \x20 nirspi range --snr 2 --reflectance 0.5 --out range/")]
 pub struct Args {
     /// Signal of a pixel over its noise at the farthest distance
-    #[arg(long, value_name = "SNR", default_value_t = 1.0, allow_negative_numbers = true)]
+    #[arg(long, value_name = "SNR", default_value_t = 1.0)]
     snr: f64,
     /// Reflectance of the target
-    #[arg(long, value_name = "0..1", default_value_t = 1.0, allow_negative_numbers = true)]
+    #[arg(long, value_name = "0..1", default_value_t = 1.0)]
     reflectance: f64,
-    /// Exposures of a pattern, in us
-    #[arg(long, value_name = "US,...", value_delimiter = ',', default_values_t = [8.0, 25.0],
-          allow_negative_numbers = true)]
+    /// Exposures of a pattern, in µs
+    #[arg(long, value_name = "US,...", value_delimiter = ',', default_values_t = [8.0, 25.0])]
     exposures_us: Vec<f64>,
     #[command(flatten)]
     model: ModelArgs,
@@ -38,9 +38,8 @@ pub struct Args {
     /// distance of this camera and the shipped ones
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Print the report as JSON
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    report: ReportArgs,
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
@@ -61,12 +60,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         out.write("range.json", to_json(&report)?.as_bytes())?;
         out.commit()?;
     }
-    if args.json {
-        print::json(&report)?;
-    } else {
-        say(args, &report)?;
-    }
-    Ok(ExitCode::SUCCESS)
+    args.report.print(&report, |report| say(args, report))
 }
 
 fn say(args: &Args, report: &Report) -> Result<()> {
@@ -75,7 +69,7 @@ fn say(args: &Args, report: &Report) -> Result<()> {
         report.camera, report.snr, report.reflectance
     ))?;
     print::line(
-        "rain    mm/h  drop mm  exposure us   paper m    physics m  dry air m  as printed m  with gain m",
+        "rain    mm/h  drop mm  exposure µs   paper m    physics m  dry air m  as printed m  with gain m",
     )?;
     let metres =
         |range: Option<f64>| range.map_or_else(|| "none".to_owned(), |m| format!("{m:.3}"));
@@ -95,7 +89,7 @@ fn say(args: &Args, report: &Report) -> Result<()> {
         ))?;
     }
     print::line(format_args!(
-        "exposure needed in heavy rain, us: distance m, for SNR {}, for SNR {}, the paper's",
+        "exposure needed in heavy rain, µs: distance m, for SNR {}, for SNR {}, the paper's",
         report.snr,
         5.0 * report.snr
     ))?;

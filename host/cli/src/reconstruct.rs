@@ -1,71 +1,70 @@
 //! `nirspi reconstruct`: an image from measurements of nirspi or of another lab.
 
-mod enhanced;
 mod matrix;
 mod stack;
 
-use super::camera::{check_sampling, parse_order};
+use super::camera::parse_order;
 use super::method::{MethodArgs, Solved, solve};
-use super::report::{StageTimes, to_json};
+use super::progress::Progress;
+use super::report::{ReportArgs, StageTimes, stages, to_json};
 use super::source::SourceArgs;
 use super::{Usage, print};
 use anyhow::{Context, Result, bail};
-use indicatif::ProgressBar;
 use nirspi::account::LossCounters;
 use nirspi::calibration::KeptFlatField;
 use nirspi::capture::Capture;
 use nirspi::files::image::{encode_grey, encode_rgb};
 use nirspi::files::npy;
 use nirspi::files::output::OutputDir;
-use nirspi::imaging::MethodReport;
+use nirspi::imaging::{FrameReport, MethodReport, enhance_frames};
 use nirspi::picture::{Panel, Range, SideBySide};
 use nirspi::source::{FirstPatterns, Index, Part, Source};
-use nirspi_recon::{Image, metrics};
+use nirspi_recon::words::count_of;
+use nirspi_recon::{Image, Sampling, metrics};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::time::Duration;
 
 /// Make an image from a measurement file (.npz, .npy, .mat, .h5, .csv, .txt) or a recording (.mcap)
 ///
-/// Writes image.npy (float32, n x n), image.png and report.json; of complex readings real.npy and imaginary.npy, too.
+/// The command writes image.npy (float32, n x n), image.png and report.json. For complex readings it also writes real.npy
+/// and imaginary.npy.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
-    \x20 nirspi reconstruct wing.npz --method hadamard --out out/\n\
-    \x20 nirspi reconstruct wing.npz --method omp --sampling 0.3 --basis dct --out out/\n\
+    \x20 nirspi reconstruct wing.npz --out out/\n\
+    \x20 nirspi reconstruct wing.npz --method omp --sampling 30% --basis dct --out out/\n\
     \x20 nirspi reconstruct spyrit.npy --shown walsh-2d --out out/\n\
     \x20 nirspi reconstruct dmd.npz --matrix patterns.npy --method tv --out out/\n\
-    \x20 nirspi reconstruct rec.mcap --index all --warm-start --sampling 0.3 --out video/")]
+    \x20 nirspi reconstruct rec.mcap --index all --method omp --warm-start --sampling 0.3 --out video/")]
 pub struct Args {
-    #[command(flatten)]
-    method: MethodArgs,
-    /// Use only this share of all n x n patterns
-    #[arg(long, value_name = "0..1", default_value_t = 1.0, allow_negative_numbers = true)]
-    sampling: f64,
-    /// Which patterns come first when sampling: an order's name, or recorded, the first as they were shown; default: those of
-    /// the lowest sequencies, whatever order was recorded
+    /// Share of all n x n patterns to use: 0.3, 30% or 30
+    #[arg(long, value_name = "SHARE", default_value_t = Sampling::ALL)]
+    sampling: Sampling,
+    /// Which patterns --sampling uses: the first of this order, by its name, or of the order in which they were shown
+    /// (recorded) [default: the patterns of the lowest sequencies, whatever order was recorded]
     #[arg(long, value_name = "ORDER")]
     order: Option<String>,
-    /// Patterns of your own instead of Hadamard rows: (M, n * n) weights, a pattern a row, of which `y` in the input has one
-    /// reading each. --strength is then relative to the readings' variance
+    #[command(flatten)]
+    method: MethodArgs,
+    /// Patterns of your own instead of Hadamard rows: (M, n * n) weights, one pattern in each row. `y` in the input then has
+    /// one reading for each pattern, and --strength is relative to the variance of the readings
     #[arg(long, value_name = "NPY", conflicts_with_all = ["order", "keep", "residual", "stop_at_noise", "as_printed",
           "non_differential", "readings", "shown", "side", "transpose", "keep_leak", "warm_start"])]
     matrix: Option<PathBuf>,
-    /// OMP of --index all: start each frame from the one before, as long as that explains it as well
+    /// OMP with --index all: start each frame from the frame before, as long as the result explains the readings as well
     #[arg(long, conflicts_with_all = ["dictionary", "non_negative"])]
     warm_start: bool,
-    #[command(flatten)]
-    source: SourceArgs,
-    /// Also enlarge and deblur the image, of 32 x 32 or 64 x 64 pixels, by the learned stages (enhanced.npy and .png);
-    /// its brightest 2 x 2 pixels are taken for white, of --index all their median
+    /// Also enlarge and deblur an image of 32 x 32 or 64 x 64 pixels by networks (enhanced.npy and enhanced.png). The mean
+    /// of the brightest 2 x 2 pixels counts as white; with --index all, the median of these means
     #[arg(long, conflicts_with = "matrix")]
     enhance: bool,
+    #[command(flatten)]
+    source: SourceArgs,
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
-    /// Print the report as JSON
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    report: ReportArgs,
 }
 
 #[derive(Debug, Serialize)]
@@ -96,13 +95,12 @@ struct Report {
     #[serde(skip_serializing_if = "Option::is_none")]
     correlation_with_files_recon: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    enhancement: Option<enhanced::Report>,
+    enhancement: Option<FrameReport>,
     notes: Vec<String>,
     stage_ms: StageTimes,
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
-    check_sampling(args.sampling)?;
     let first = match args.order.as_deref() {
         None => FirstPatterns::LowestSequencies,
         Some("recorded") => FirstPatterns::Recorded,
@@ -118,23 +116,18 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if args.warm_start {
         return Err(Usage("--warm-start belongs to --index all".to_owned()).into());
     }
-    let mut times = StageTimes::default();
+    let mut times = stages();
     let source = times.time("read", || args.source.load())?;
     let request = Request {
         input: &args.source.input,
         method: &args.method,
         first: &first,
-        sampling: args.sampling,
+        sampling: args.sampling.share(),
         enhance: args.enhance,
         out: &args.out,
     };
     let report = one_image(&request, source, times)?;
-    if args.json {
-        print::json(&report)?;
-    } else {
-        say(args, &report)?;
-    }
-    Ok(ExitCode::SUCCESS)
+    args.report.print(&report, |report| say(args, report))
 }
 
 /// Reconstructs and enhances the frames of a capture as one image. The folder `out` gets the files
@@ -157,7 +150,7 @@ pub fn picture(
     if let Some(kept) = flat_field {
         source = source.with_flat_field(kept);
     }
-    let report = one_image(&request, source, StageTimes::default())?;
+    let report = one_image(&request, source, stages())?;
     Ok(report.enhancement.map(|enhancement| enhancement.warnings).unwrap_or_default())
 }
 
@@ -206,7 +199,8 @@ fn one_image(request: &Request<'_>, source: Source, mut times: StageTimes) -> Re
         metrics::correlation(reference.pixels(), image.pixels(), side, side).ok()
     });
     let (sharp, enhancement) = if request.enhance {
-        let (sharp, mut reports) = enhanced::run(&[(&image, used.rows())], &mut times)?;
+        let (sharp, mut reports) =
+            enhance_frames(&[(&image, used.rows())], &mut times).context("--enhance")?;
         (Some(sharp), reports.pop())
     } else {
         (None, None)
@@ -242,13 +236,10 @@ fn one_image(request: &Request<'_>, source: Source, mut times: StageTimes) -> Re
     Ok(report)
 }
 
-/// Shows a spinner, because OMP takes seconds for thousands of patterns.
+/// Shows that the program works, because OMP takes seconds for thousands of patterns.
 fn spinning<T>(work: impl FnOnce() -> T) -> T {
-    let spinner = ProgressBar::new_spinner().with_message("reconstructing");
-    spinner.enable_steady_tick(Duration::from_millis(100));
-    let done = work();
-    spinner.finish_and_clear();
-    done
+    let _progress = Progress::working("reconstructing");
+    work()
 }
 
 fn check_finite(input: &Path, image: &Image) -> Result<()> {
@@ -318,12 +309,8 @@ fn not_read_words(places: &[usize]) -> String {
     const SHOWN: usize = 5;
     let first: Vec<String> = places.iter().take(SHOWN).map(usize::to_string).collect();
     let more = if places.len() > SHOWN { ", ..." } else { "" };
-    let patterns = if places.len() == 1 { "pattern" } else { "patterns" };
-    format!(
-        "not read: {} {patterns} left out, at [{}{more}] of those shown",
-        places.len(),
-        first.join(", ")
-    )
+    let patterns = count_of(places.len(), "pattern");
+    format!("not read: {patterns} left out, at [{}{more}] of those shown", first.join(", "))
 }
 
 fn say(args: &Args, report: &Report) -> Result<()> {
@@ -339,10 +326,10 @@ fn say(args: &Args, report: &Report) -> Result<()> {
     ))?;
     for dropout in &report.dropouts {
         print::line(format_args!(
-            "drop-out: {} readings from y[{}] on, {} patterns left out",
-            dropout.readings,
+            "drop-out: {} from y[{}] on, {} left out",
+            count_of(dropout.readings, "reading"),
             dropout.first_reading,
-            dropout.rows.len()
+            count_of(dropout.rows.len(), "pattern")
         ))?;
     }
     if !report.not_read.is_empty() {
@@ -363,9 +350,7 @@ fn say(args: &Args, report: &Report) -> Result<()> {
             print::line(format_args!("warning: {warning}"))?;
         }
     }
-    for note in &report.notes {
-        print::line(format_args!("note: {note}"))?;
-    }
+    print::notes(&report.notes)?;
     let enhanced = if args.enhance { ", enhanced.npy, enhanced.png" } else { "" };
     let parts =
         if report.part.is_some() { " (the magnitude), real.npy, imaginary.npy" } else { "" };

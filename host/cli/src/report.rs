@@ -1,31 +1,41 @@
 //! Parts that several reports share.
 
+use super::print;
 use anyhow::Result;
+pub use nirspi::stage_times::StageTimes;
 use serde::Serialize;
-use std::time::Instant;
+use std::process::ExitCode;
+
+/// How a command prints its report.
+#[derive(Debug, Clone, Copy, clap::Args)]
+pub struct ReportArgs {
+    /// Print the report as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl ReportArgs {
+    /// Prints the report of a command that has done its work, as JSON or in words.
+    pub fn print<R: Serialize + ?Sized>(
+        self,
+        report: &R,
+        say: impl FnOnce(&R) -> Result<()>,
+    ) -> Result<ExitCode> {
+        if self.json {
+            print::json(report)?
+        } else {
+            say(report)?
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+}
 
 /// A report as written to a file, in a readable form.
 pub fn to_json(report: &impl Serialize) -> Result<String> {
     Ok(format!("{}\n", serde_json::to_string_pretty(report)?))
 }
 
-/// The time of each stage, in the order of the stages.
-#[derive(Debug, Default, Serialize)]
-#[serde(transparent)]
-pub struct StageTimes(serde_json::Map<String, serde_json::Value>);
-
-impl StageTimes {
-    /// Runs a stage and records its time in milliseconds.
-    pub fn time<T>(&mut self, stage: &str, work: impl FnOnce() -> T) -> T {
-        let start = Instant::now();
-        let result = work();
-        let ms = start.elapsed().as_secs_f64() * 1e3;
-        self.0.insert(stage.to_owned(), serde_json::json!((ms * 1e3).round() / 1e3));
-        result
-    }
-
-    /// Milliseconds of a stage; 0 if the stage did not run.
-    pub fn of(&self, stage: &str) -> f64 {
-        self.0.get(stage).and_then(serde_json::Value::as_f64).unwrap_or(0.0)
-    }
+/// Times of stages, which a user who wants detail is told.
+pub fn stages() -> StageTimes {
+    StageTimes::watched(|stage, ms| print::detail(format_args!("{stage}: {ms:.1} ms")))
 }

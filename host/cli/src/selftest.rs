@@ -1,10 +1,10 @@
 //! `nirspi selftest`: checks a camera end to end, and keeps its calibration.
 
-use super::address::{self, CameraAddress};
-use super::camera::SceneArgs;
-use super::print;
+use super::camera::{CameraArgs, SceneArgs};
+use super::progress::Progress;
+use super::report::ReportArgs;
+use super::{address, print};
 use anyhow::Result;
-use indicatif::{ProgressBar, ProgressStyle};
 use nirspi::calibration::{KeptCalibration, path_of};
 use nirspi::selftest::{Check, LinkDemands, STAGES, SelfTest, Verdict, run as test};
 use nirspi::session::CameraIdentity;
@@ -18,25 +18,23 @@ const LINK_DURATION: Duration = Duration::from_secs(1);
 
 /// Check a camera from its LEDs to this program, and keep its calibration
 ///
-/// Point it at something bright and evenly lit, such as white paper. `nirspi capture` then uses the calibration. Exit
-/// code 1 if a check has failed.
+/// Point the camera at something bright and evenly lit, such as white paper. `nirspi capture` then uses the calibration.
+/// The exit code is 1 if a check has failed.
 #[derive(Debug, clap::Args)]
 #[command(mut_arg("scene", |scene| scene.default_value("white")))]
 #[command(after_help = "Examples:\n\
     \x20 nirspi selftest --camera usb\n\
     \x20 nirspi selftest --camera virtual --json")]
 pub struct Args {
-    /// Which camera: virtual, usb, usb:SERIAL, tcp:HOST:PORT or serial:PATH[:BAUD]
-    #[arg(long, value_name = "CAMERA", default_value = "virtual")]
-    camera: CameraAddress,
-    /// Keep the calibration in this file, rather than under the camera's serial number in the user's data directory
+    #[command(flatten)]
+    camera: CameraArgs,
+    /// Keep the calibration in this file [default: a file for the camera's serial number in the user's data directory]
     #[arg(long, value_name = "FILE")]
     calibration: Option<PathBuf>,
     #[command(flatten)]
     scene: SceneArgs,
-    /// Print a JSON report
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    report: ReportArgs,
 }
 
 #[derive(Debug, Serialize)]
@@ -50,19 +48,18 @@ struct Report<'r> {
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let mut session = address::open(&args.camera, &args.scene)?;
+    let mut session = address::open(&args.camera.camera, &args.scene)?;
     let camera = session.identity().clone();
-    let style = ProgressStyle::with_template("{spinner} {pos}/{len} {msg}")
-        .unwrap_or_else(|_| ProgressStyle::default_bar());
-    let bar = ProgressBar::new(STAGES.len() as u64).with_style(style);
-    bar.enable_steady_tick(Duration::from_millis(100));
-    let demands =
-        LinkDemands { min_frames_per_s: args.camera.min_frames_per_s(), duration: LINK_DURATION };
+    let bar = Progress::of("self-test", STAGES.len(), "stages");
+    let demands = LinkDemands {
+        min_frames_per_s: args.camera.camera.min_frames_per_s(),
+        duration: LINK_DURATION,
+    };
     let found = test(&mut session, demands, &mut |stage| {
-        bar.set_position(stage as u64 + 1);
-        bar.set_message(STAGES.get(stage).copied().unwrap_or_default());
+        bar.set(stage + 1);
+        bar.say(STAGES.get(stage).copied().unwrap_or_default());
     });
-    bar.finish_and_clear();
+    drop(bar);
     let found = found?;
     let kept = keep(args, &camera, &found)?;
     let report = Report {
@@ -72,11 +69,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         measured: kept.as_ref().map(|(kept, _)| kept.measured().to_owned()),
         calibration: kept.map(|(_, path)| path),
     };
-    if args.json {
-        print::json(&report)?;
-    } else {
-        say(&report)?;
-    }
+    args.report.print(&report, say)?;
     Ok(if report.passed { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 

@@ -1,11 +1,10 @@
 //! `nirspi serve`: a camera live on a web page.
 
-use super::address::{self, CameraAddress};
 use super::calibration::CalibrationArgs;
-use super::camera::{SceneArgs, SetupArgs};
+use super::camera::{CameraArgs, SceneArgs, SetupArgs};
 use super::method::MethodArgs;
-use super::print;
 use super::serve_virtual::stop_on_signal;
+use super::{address, print};
 use anyhow::{Context, Result};
 use nirspi::calibration::Choice;
 use nirspi::imaging::Enhance;
@@ -14,25 +13,23 @@ use nirspi::serve::{CameraSource, Connect, Connected, Imaging, serve};
 use nirspi::session::Session;
 use nirspi::setup::MeasurementSetup;
 use nirspi_nets::Device;
-use nirspi_recon::Side;
 use nirspi_recon::omp::Backend;
 use nirspi_recon::reconstruct::{Method, Reconstruct};
+use nirspi_recon::{Sampling, Side};
 use std::net::TcpListener;
 use std::process::ExitCode;
 
-/// Half of the patterns, which give twice the frames; OMP predicts the other half.
-const DEFAULT_SAMPLING: f64 = 0.5;
-
 /// Show a camera live on a web page: reconstructed, fused with depth and deblurred, with every frame accounted for
 ///
-/// Prints the address to open. The page shows images, estimated blur and noise, rates, the account of all frames and the
-/// camera's events; it switches the method, the enhancement and how many frames are summed. A camera that goes away is looked
-/// for again; after a fault somebody has to say on the page that LEDs may go on. Only this machine can look, unless
-/// --listen says otherwise. Ctrl-C switches the LEDs off and ends it.
+/// The command prints the address of the page. The page shows images, estimated blur and noise, rates, the account of all
+/// frames and the camera's events. Controls on the page choose the method, switch the enhancement, and say how many frames
+/// are summed. If the link to the camera is lost, the program opens the camera again. After a fault, a person must allow the
+/// LEDs to go on, on the page. Only browsers on this machine can open the page, unless --listen says otherwise. Ctrl-C
+/// switches the LEDs off and ends the program.
 ///
 /// For scripts: GET /api/state (JSON: account, rates, versions, settings), /image.png (32 x 32), /enhanced.png (64 x 64) and
-/// /events (a stream of all of it); POST /api/settings takes {"method": "omp", "enhance": true, "frames": 64, "resume": true} or a
-/// part of it. --backend holds for the networks too.
+/// /events (a stream of states with images). POST /api/settings takes {"method": "tv", "enhance": true, "frames": 64, "resume": true}
+/// or a part of that; "frames" is --sum. --backend holds for the networks, too.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi serve\n\
@@ -40,16 +37,15 @@ const DEFAULT_SAMPLING: f64 = 0.5;
     \x20 curl http://127.0.0.1:8080/api/state\n\
     \x20 curl -d '{\"method\": \"hadamard\"}' http://127.0.0.1:8080/api/settings")]
 pub struct Args {
-    /// Which camera: virtual, usb, usb:SERIAL, tcp:HOST:PORT or serial:PATH[:BAUD]
-    #[arg(long, value_name = "CAMERA", default_value = "virtual")]
-    camera: CameraAddress,
-    /// Where to listen; port 0 takes a free one
+    /// Address of the page; port 0 takes a free port
     #[arg(long, value_name = "ADDR", default_value = "127.0.0.1:8080")]
     listen: String,
-    /// Newest frames that are summed into each image
-    #[arg(long, value_name = "N", default_value_t = 64,
+    /// Newest frames to sum into each image
+    #[arg(long, alias = "frames", value_name = "N", default_value_t = 64,
           value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_FRAMES)))]
-    frames: u32,
+    sum: u32,
+    #[command(flatten)]
+    camera: CameraArgs,
     #[command(flatten)]
     calibration: CalibrationArgs,
     #[command(flatten)]
@@ -62,7 +58,7 @@ pub struct Args {
 
 pub fn run(args: Args) -> Result<ExitCode> {
     args.method.check()?;
-    let mut setup = args.setup.setup(DEFAULT_SAMPLING, &args.scene.model)?;
+    let mut setup = args.setup.setup(Sampling::HALF, &args.scene.model)?;
     setup.adc_latency = args.calibration.adc_latency();
     let listener = TcpListener::bind(&args.listen)
         .with_context(|| format!("--listen {}: cannot listen there", args.listen))?;
@@ -70,9 +66,9 @@ pub fn run(args: Args) -> Result<ExitCode> {
     let methods = methods(&args.method)?;
     let imaging = Imaging { methods, enhance: enhance(args.method.backend)? };
     let settings =
-        Settings { method: args.method.method.argument(), enhance: true, frames: args.frames };
+        Settings { method: args.method.method.argument(), enhance: true, frames: args.sum };
     let stop = stop_on_signal()?;
-    let session = address::open(&args.camera, &args.scene)?;
+    let session = address::open(&args.camera.camera, &args.scene)?;
     let connected = prepared(session, &args.calibration, &setup)?;
 
     let machine = match address.ip() {
@@ -81,13 +77,13 @@ pub fn run(args: Args) -> Result<ExitCode> {
     };
     print::line(format_args!(
         "open http://{machine} to see camera {}; Ctrl-C ends it",
-        args.camera
+        args.camera.camera
     ))?;
     if !address.ip().is_loopback() {
-        print::line("everybody in the network can look at it and switch it")?;
+        print::line("every machine in this network can open the page and switch the camera")?;
     }
     let camera = CameraSource {
-        address: args.camera.to_string(),
+        address: args.camera.camera.to_string(),
         setup: setup.clone(),
         model: args.scene.model.read()?,
         connect: connect(args, setup),
@@ -126,7 +122,7 @@ fn prepared(
 /// A function that connects to the camera again.
 fn connect(args: Args, setup: MeasurementSetup) -> Connect {
     let found = move || {
-        let mut session = address::open_quietly(&args.camera, &args.scene)?;
+        let mut session = address::open_quietly(&args.camera.camera, &args.scene)?;
         session.await_reports()?;
         prepared(session, &args.calibration, &setup)
     };

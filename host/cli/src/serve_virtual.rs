@@ -13,27 +13,27 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Serve the virtual camera over TCP, for `capture --camera tcp:ADDR` in another process
 ///
-/// One host at a time. Port 0 takes a free one; the first line says which.
+/// The virtual camera serves one host at a time. Port 0 takes a free port; the first line of output names it.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi virtual --listen 127.0.0.1:1550 --scene letter:R\n\
     \x20 nirspi virtual --tunnel 127.0.0.1:1551      the firmware in QEMU: boards/mps2-an505")]
 pub struct Args {
-    /// Where to listen
-    #[arg(long, value_name = "ADDR", default_value = super::devices::DEFAULT_TCP)]
+    /// Address to listen on
+    #[arg(long, value_name = "ADDR", default_value = nirspi::devices::DEFAULT_TCP)]
     listen: String,
     #[command(flatten)]
     scene: SceneArgs,
     /// Compute this many frames of each run, then repeat them at full speed (for load tests)
     #[arg(long, value_name = "N")]
     precompute: Option<usize>,
-    /// Be the FPGA alone, with the light before it, for firmware in an emulator that listens here
+    /// Simulate the FPGA and the light alone, for firmware in an emulator that listens at this address
     #[arg(long, value_name = "ADDR", conflicts_with_all = ["listen", "precompute", "once", "drop_when_full"])]
     tunnel: Option<String>,
-    /// End when the first host has gone
+    /// End when the first host disconnects
     #[arg(long)]
     once: bool,
-    /// Drop frames, as a real camera must, when the host is too slow; otherwise simulated time waits for it
+    /// Drop frames when the host is too slow, as a real camera must. Without this option, simulated time waits for the host
     #[arg(long)]
     drop_when_full: bool,
 }
@@ -51,7 +51,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         ))?;
         serve_tunnel(line, &mut optics.fpga(args.scene.seed)?, &AtomicBool::new(true))
             .with_context(|| format!("--tunnel {address}"))?;
-        print::line("the emulator has gone")?;
+        print::line("the emulator disconnected")?;
         return Ok(ExitCode::SUCCESS);
     }
     let listener = TcpListener::bind(&args.listen)
@@ -92,7 +92,7 @@ fn run_server<F: SimulatedFpga>(
                 print::line(format_args!("{host} turned away: one host at a time"))
             }
             ServerEvent::Disconnected(host, None) => {
-                print::line(format_args!("{host} has gone, LEDs off"))
+                print::line(format_args!("{host} disconnected, LEDs off"))
             }
             ServerEvent::Disconnected(host, Some(error)) => {
                 print::line(format_args!("{host} was cut off ({error}), LEDs off"))

@@ -11,43 +11,44 @@ use std::path::PathBuf;
 
 /// Which measurements.
 #[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Input")]
 pub struct SourceArgs {
     /// Measurement file (.npz, .npy, .mat, .h5, .csv, .txt) or recording (.mcap)
     pub input: PathBuf,
-    /// Which measurement of a file that holds several: a number, or all of them, as frames of a video; all frames of a
-    /// recording likewise, which are summed otherwise
+    /// Which measurement of a file that holds several: a number from 0, or all. With all, each measurement of a file and
+    /// each frame of a recording is one frame of a video; without this option, the frames of a recording are summed
     #[arg(long, value_name = "N|all")]
     pub index: Option<Index>,
     #[arg(long, value_name = "ORDER", help = shown_help())]
     pub shown: Option<String>,
-    /// Side of the image, for a file that does not say it and holds part of a sweep
+    /// Side of the image in pixels, for a file that does not say its side and holds part of a sweep
     #[arg(long, value_name = "N")]
     pub side: Option<u64>,
-    /// The field of the file that holds the readings; default: y, or else d
+    /// The field of the file that holds the readings [default: y if the file has it, else d]
     #[arg(long, value_name = "NAME")]
     pub field: Option<String>,
-    /// How readings belong to patterns; default: pairs, or differences in the field d
+    /// How readings belong to patterns [default: pairs; differences in the field d]
     #[arg(long, value_name = "FORM", value_parser = forms())]
     pub readings: Option<Form>,
     /// The same as --readings single
     #[arg(long, conflicts_with = "readings")]
     pub non_differential: bool,
-    /// Patterns are along the first axis of the readings, not along the last
+    /// The patterns are along the first axis of the readings, not along the last axis
     #[arg(long)]
     pub patterns_first: bool,
-    /// Pixels were numbered down the columns of the image, as MATLAB does
+    /// The pixels are numbered down the columns of the image, as in MATLAB
     #[arg(long)]
     pub transpose: bool,
-    /// Every comma of a text file is a decimal one
+    /// Every comma in a text file is a decimal comma
     #[arg(long)]
     pub decimal_comma: bool,
-    /// What to show of complex readings; of both parts, image.npy is the magnitude
+    /// Which part of complex readings to show
     #[arg(long, value_name = "PART", default_value = Part::Magnitude.name(), value_parser = parts())]
     pub part: Part,
-    /// Leave the settling leak of a recording as it is
+    /// Do not correct the readings of a recording for the leak from pattern to pattern
     #[arg(long)]
     pub keep_leak: bool,
-    /// Leave the pattern of unequal LEDs of a recording as it is, though a flat field is kept for its camera
+    /// Do not correct the image of a recording for unequal LEDs, even if a flat field is kept for its camera
     #[arg(long)]
     pub no_flat_field: bool,
 }

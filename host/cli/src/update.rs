@@ -1,7 +1,8 @@
 //! `nirspi update`: brings a camera to the versions of a release.
 
-use super::address::{self, CameraAddress};
-use super::camera::SceneArgs;
+use super::address::CameraAddress;
+use super::progress::Progress;
+use super::report::ReportArgs;
 use super::{flash, gateware, print};
 use anyhow::{Context, Result};
 use nirspi::update::{Plan, Release, await_firmware, load_gateware};
@@ -30,34 +31,26 @@ pub struct Args {
     #[arg(long, value_name = "PROBE")]
     probe: Option<String>,
     #[command(flatten)]
-    scene: SceneArgs,
-    /// Print JSON
-    #[arg(long)]
-    json: bool,
+    report: ReportArgs,
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
     let release = Release::open(&args.release)?;
-    let mut session = address::open(&args.camera, &args.scene)?;
+    let mut session = gateware::open(&args.camera)?;
     let plan = Plan::new(&release, session.identity())?;
     if !args.check {
         if let Some(firmware) = &plan.firmware {
             let chip = plan.chip().with_context(|| format!("{}: no chip to flash", plan.board))?;
             drop(session);
             flash::write(chip, &firmware.path, &firmware.content, args.probe.as_deref())?;
-            session = await_firmware(firmware, || address::open(&args.camera, &args.scene))?;
+            session = await_firmware(firmware, || gateware::open(&args.camera))?;
         }
         if let Some(change) = &plan.gateware {
-            let bar = gateware::progress(change.content.len());
-            let loaded = load_gateware(&mut session, change, &mut |n| bar.set_position(n.into()));
-            bar.finish_and_clear();
+            let bar = Progress::of("loading", change.content.len(), "bytes");
+            let loaded = load_gateware(&mut session, change, &mut |bytes| bar.set(bytes));
+            drop(bar);
             loaded.with_context(|| change.path.display().to_string())?;
         }
     }
-    if args.json {
-        print::json(&plan)?
-    } else {
-        print::line(&plan)?
-    }
-    Ok(ExitCode::SUCCESS)
+    args.report.print(&plan, |plan| print::line(plan))
 }

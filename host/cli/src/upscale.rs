@@ -1,18 +1,20 @@
 //! `nirspi upscale`: the fusion stage alone.
 
-use super::networks::{ImageArgs, bar, checked};
+use super::networks::{ImageArgs, checked};
 use super::print;
-use super::report::StageTimes;
+use super::progress::Progress;
+use super::report::stages;
 use anyhow::{Context, Result};
 use nirspi::files::npy::{self, Stack};
 use nirspi_nets::{DepthMaps, Images, fusion};
+use nirspi_recon::words::count_of;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Enlarge images from 32 x 32 to 64 x 64, with their depth maps if there are any (FSRCNN)
 ///
-/// Reads .npy ((N, 32, 32) or (32, 32), in [0, 1] or 8-bit grey levels), a PNG or a folder of PNGs. Noise goes, blur
-/// stays: `nirspi enhance` takes both away.
+/// The command reads .npy ((N, 32, 32) or (32, 32), in [0, 1] or 8-bit grey levels), a PNG or JPEG picture, or a folder of
+/// pictures. It removes noise but not blur; `nirspi enhance` removes both.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi upscale measured.npy --out large.npy\n\
@@ -27,8 +29,8 @@ pub struct Args {
 /// Depth beside the images, the same for `upscale` and `enhance`.
 #[derive(Debug, clap::Args)]
 pub struct DepthArgs {
-    /// Depth maps in metres (.npy): one for all images or one for each, 8 x 8 to 32 x 32 zones, 0 or NaN where nothing
-    /// was seen
+    /// Depth maps in metres (.npy), one for all images or one for each: 8 x 8 to 32 x 32 zones, 0 or NaN in zones without a
+    /// distance
     #[arg(long, value_name = "FILE")]
     depth: Option<PathBuf>,
 }
@@ -45,7 +47,7 @@ impl DepthArgs {
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let mut times = StageTimes::default();
+    let mut times = stages();
     let input = times.time("read", || args.images.read(fusion::SIDE))?;
     let images: Images<'_, { fusion::SIDE }> = checked(&input)?;
     let target = input.target(&args.images.out)?;
@@ -53,21 +55,18 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let mut networks = args.images.networks.open(&["fsrcnn"])?;
     let fusion = times.time("load", || networks.fusion())?;
 
-    let bar = bar("upscaling", input.count());
+    let bar = Progress::of("upscaling", input.count(), "images");
     let large = times.time("upscale", || fusion.upscale(images, depth.as_ref()));
-    bar.finish_and_clear();
+    drop(bar);
     target.write(2 * fusion::SIDE, &large)?;
 
     let report = args.images.report(&input, &networks, None, times);
-    if args.images.json {
-        print::json(&report)?;
-    } else {
+    args.images.report.print(&report, |report| {
         print::line(format_args!(
-            "{} images upscaled to 64 x 64 on {}, in {}",
-            report.images,
+            "{} upscaled to 64 x 64 on {}, in {}",
+            count_of(report.images, "image"),
             report.device,
             report.output.display()
-        ))?;
-    }
-    Ok(ExitCode::SUCCESS)
+        ))
+    })
 }

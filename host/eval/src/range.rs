@@ -237,11 +237,11 @@ fn reading(
     let at_2_m = snr_at(light, 2000.0, 25.0)?;
     let agreed = |exposure_us| Wanted { reflectance, exposure_us, snr: at_2_m };
     let mut lines = vec![format!(
-        "2 m in light rain at 25 us agrees with the paper if a pixel may have an SNR of {at_2_m:.2}"
+        "2 m in light rain at 25 µs agrees with the paper if a pixel may have an SNR of {at_2_m:.2}"
     )];
     if let Some(mm) = farthest_mm(instrument, heavy, &agreed(25.0))? {
         lines.push(format!(
-            "the same SNR in heavy rain at 25 us: {:.3} m, not 1.5: 2 m of this rain take out {:.2} % of the light",
+            "the same SNR in heavy rain at 25 µs: {:.3} m, not 1.5: 2 m of this rain take out {:.2} % of the light",
             mm * 1e-3,
             100.0 * (1.0 - heavy.medium().transmission(2.0))
         ));

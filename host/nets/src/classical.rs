@@ -9,11 +9,13 @@
 //! An image without blur and noise comes back unchanged
 //! (`tests::what_nothing_has_touched_comes_back_as_it_was`).
 
+mod estimated;
 pub mod richardson_lucy;
 pub mod total_variation;
 pub mod wiener;
 
 pub use crate::blur::Blur;
+pub use estimated::deblur_all;
 
 use std::fmt;
 use std::str::FromStr;

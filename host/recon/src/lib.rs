@@ -15,6 +15,8 @@
 //! | [`reconstruct`] | measurements | an image |
 //! | [`metrics`] | two images | a number that compares them |
 //! | [`backend`] | the name of a backend | a [`Backend`] |
+//! | [`Sampling`] | `0.3`, `30%` or `30` | a checked share of the patterns |
+//! | [`words`] | a count, a number | the same as people write it |
 
 pub mod backend;
 pub mod basis;
@@ -28,9 +30,11 @@ pub mod omp;
 pub mod order;
 pub mod reconstruct;
 mod rows;
+mod sampling;
 mod side;
 #[cfg(test)]
 mod testing;
+pub mod words;
 
 pub use backend::{Backend, ParseBackendError};
 pub use basis::{Basis, ParseBasisError};
@@ -41,4 +45,5 @@ pub use leak::{Leak, LeakError, Sweep};
 pub use measurements::{MeasurementError, Measurements};
 pub use order::{NamedOrder, Order, ParseOrderError};
 pub use rows::{Rows, RowsError};
+pub use sampling::{Sampling, SamplingError};
 pub use side::{Side, SideError};

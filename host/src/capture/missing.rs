@@ -2,6 +2,7 @@
 
 use super::{Capture, Ended};
 use crate::causes;
+use nirspi_recon::words::count;
 
 impl Capture {
     /// What is missing, in one line; `None` if the capture is whole. A capture is whole if all
@@ -28,19 +29,20 @@ impl Capture {
                 Some(format!("the camera switched its LEDs off{made}: {fault}"))
             }
             Ended::WrongNumber { made, asked: Some(asked) } => {
-                Some(format!("the camera made {made} frames, {asked} were asked for"))
+                Some(format!("the camera made {}, {asked} were asked for", count(*made, "frame")))
             }
             Ended::WrongNumber { made, asked: None } => {
-                Some(format!("the camera ended the run by itself after {made} frames"))
+                Some(format!("the camera ended the run by itself after {}", count(*made, "frame")))
             }
             Ended::Unconfirmed(error) => Some(format!(
                 "the camera did not say after the run whether a fault stands: {}",
                 causes::in_one_line(error)
             )),
             Ended::Junk { bytes } => {
-                let (received, megabytes) = (self.counters.received, bytes / 1_000_000);
+                let received = count(self.counters.received, "frame");
+                let megabytes = bytes / 1_000_000;
                 Some(format!(
-                    "{megabytes} MB of damaged packets and packets of other runs came with {received} frames, and the \
+                    "{megabytes} MB of damaged packets and packets of other runs came with {received}, and the \
                      capture was ended"
                 ))
             }
@@ -54,7 +56,7 @@ impl Capture {
     fn of_asked(&self) -> String {
         match (self.made, self.asked) {
             (Some(made), Some(asked)) => format!(" after {made} of {asked} frames"),
-            (Some(made), None) => format!(" after {made} frames"),
+            (Some(made), None) => format!(" after {}", count(made, "frame")),
             (None, _) => String::new(),
         }
     }
@@ -64,7 +66,7 @@ impl Capture {
         let counters = self.counters;
         (!counters.is_complete()).then(|| {
             let made = counters.total();
-            format!("of {made} frames made: {counters}")
+            format!("of {} made: {counters}", count(made, "frame"))
         })
     }
 

@@ -17,6 +17,7 @@ pub mod npy;
 pub mod order_table;
 pub mod output;
 pub mod problem;
+pub mod settings;
 #[cfg(feature = "pictures")]
 pub mod stack;
 pub mod table;

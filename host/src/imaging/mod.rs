@@ -9,16 +9,24 @@
 
 #[cfg(feature = "enhance")]
 mod enhance;
+#[cfg(feature = "enhance")]
+mod frames;
 mod method_report;
 mod quality;
+#[cfg(feature = "enhance")]
+mod stack_report;
 #[cfg(feature = "enhance")]
 mod warning;
 mod white;
 
 #[cfg(feature = "enhance")]
 pub use enhance::{Enhance, EnhanceError, EnhancedImage, ImageContext, White};
+#[cfg(feature = "enhance")]
+pub use frames::{FrameReport, FramesError, enhance_frames};
 pub use method_report::MethodReport;
 pub use quality::{Fit, Fitted, Quality, compare};
+#[cfg(feature = "enhance")]
+pub use stack_report::{Deblurring, StackReport};
 #[cfg(feature = "enhance")]
 pub use warning::{Warning, warnings};
 pub use white::{SteadyWhite, brightest};

@@ -123,7 +123,7 @@ pub fn run(shared: &Shared, imaging: &Imaging, publish: &watch::Sender<Arc<Publi
             ledger,
             rates,
             settings,
-            offered: Offered::new(&shared.methods),
+            offered: Offered::new(&shared.methods, &shared.about),
             picture: picture.as_deref(),
             problem: problem.as_deref(),
             viewers: shared.viewers(),

@@ -26,6 +26,7 @@ pub use slot::{ImageCounters, Ledger};
 
 use crate::capture::CaptureError;
 use camera_log::CameraLog;
+use nirspi_recon::reconstruct::Method;
 use settings::Settings;
 use slot::Slot;
 use state::Published;
@@ -62,6 +63,8 @@ struct Shared {
     settings: Mutex<Settings>,
     /// Names of the methods that settings can choose.
     methods: Vec<&'static str>,
+    /// What each of these methods does; empty for a method that is not built in.
+    about: Vec<&'static str>,
     /// Set when a person allows the LEDs to go on again.
     resume: AtomicBool,
     over: AtomicBool,
@@ -74,6 +77,7 @@ impl Shared {
             slot: Slot::default(),
             camera: Mutex::new(camera),
             settings: Mutex::new(settings),
+            about: methods.iter().map(|name| name.parse().map_or("", Method::about)).collect(),
             methods,
             resume: AtomicBool::new(false),
             over: AtomicBool::new(false),

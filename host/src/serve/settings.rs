@@ -4,6 +4,7 @@
 //! A change is applied whole, or refused whole with a one-line reason
 //! (`tests::what_cannot_be_is_refused_in_one_line_that_names_it`).
 
+use nirspi_recon::words::count;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use thiserror::Error;
@@ -56,7 +57,7 @@ pub enum ChangeError {
         found: u32,
     },
     /// The message does not have the form of a change.
-    #[error("{0}, expected for example {{\"method\": \"omp\", \"enhance\": true, \"frames\": 64}}")]
+    #[error("{0}, expected for example {{\"method\": \"tv\", \"enhance\": true, \"frames\": 64}}")]
     Form(String),
 }
 
@@ -104,7 +105,8 @@ impl fmt::Display for Settings {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { method, enhance, frames } = self;
         let enhanced = if *enhance { "enhanced" } else { "not enhanced" };
-        write!(f, "{method}, {frames} frames an image, {enhanced}")
+        let frames = count(*frames, "frame");
+        write!(f, "{method}, sum of {frames}, {enhanced}")
     }
 }
 

@@ -56,13 +56,15 @@ pub struct Rates {
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct Offered<'s> {
     methods: &'s [&'static str],
+    /// What each method does, in one line.
+    about: &'s [&'static str],
     max_frames: u32,
 }
 
 impl<'s> Offered<'s> {
-    /// The offer of these methods.
-    pub fn new(methods: &'s [&'static str]) -> Self {
-        Self { methods, max_frames: MAX_FRAMES }
+    /// The offer of these methods, with what each does.
+    pub fn new(methods: &'s [&'static str], about: &'s [&'static str]) -> Self {
+        Self { methods, about, max_frames: MAX_FRAMES }
     }
 }
 

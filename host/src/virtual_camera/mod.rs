@@ -18,6 +18,8 @@ mod optics;
 mod precomputed;
 mod server;
 mod shot;
+#[cfg(feature = "enhance")]
+mod stages;
 mod tunnel;
 
 pub use fpga::{OpticalFpga, SimulatedFpga, Wiring};
@@ -28,6 +30,8 @@ pub use optics::{VirtualOptics, VirtualOpticsError};
 pub use precomputed::PrecomputedFpga;
 pub use server::{ServeOptions, ServerEvent, serve};
 pub use shot::{Shot, ShotError, calibrate_against_white, flat_field_against_white, shoot};
+#[cfg(feature = "enhance")]
+pub use stages::{Stages, StagesError, StagesReport, enhance_stages};
 pub use tunnel::serve_tunnel;
 
 use nirspi_mcu::{

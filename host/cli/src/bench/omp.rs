@@ -1,5 +1,6 @@
 //! `nirspi bench omp`: times sparse representations of many frames.
 
+use crate::report::ReportArgs;
 use crate::{backend, print, refused};
 use anyhow::{Context, Result};
 use clap::ValueEnum;
@@ -21,10 +22,10 @@ use std::process::ExitCode;
     \x20 nirspi bench omp --frames 4096 --backend cuda\n\
     \x20 nirspi bench omp --input problem.npz --out solution.npz")]
 pub struct Args {
-    /// Problem file; without it, random rows of a Hadamard matrix see cosines of a 32 x 32 image
+    /// Problem file [default: a random problem: random rows of a Hadamard matrix measure a 32 x 32 image of cosines]
     #[arg(long, value_name = "NPZ", conflicts_with_all = ["measurements", "sparsity", "frames"])]
     input: Option<PathBuf>,
-    /// Where the solution goes: `support` (B x k) and `coef`
+    /// File for the solution: `support` (B x k) and `coef`
     #[arg(long, value_name = "NPZ")]
     out: Option<PathBuf>,
     /// Measurements of a frame, of 1024
@@ -33,7 +34,7 @@ pub struct Args {
     /// Atoms to choose
     #[arg(long, value_name = "K", default_value_t = 64)]
     sparsity: usize,
-    /// Frames
+    /// Frames in the batch
     #[arg(long, value_name = "B", default_value_t = 1)]
     frames: usize,
     /// Seed of a random problem
@@ -42,18 +43,17 @@ pub struct Args {
     /// f32, f64, or auto: f32, and f64 for frames where f32 cannot tell two atoms apart
     #[arg(long, value_enum, default_value_t = Precision::Auto)]
     precision: Precision,
-    /// What computes: auto (a GPU from 64 frames on, if there is one), cpu, wgpu, cuda
+    /// Where to compute: auto (a GPU if there is one and the batch has 64 frames or more), cpu, wgpu or cuda
     #[arg(long, value_name = "BACKEND", default_value = "auto")]
     backend: Backend,
-    /// Times to solve it
+    /// Number of runs
     #[arg(long, value_name = "R", default_value_t = 15, value_parser = clap::value_parser!(u32).range(1..))]
     repeats: u32,
-    /// Choose atoms by correlation whatever the norms of the columns of `D`
+    /// Choose atoms by their correlation, whatever the norms of the columns of `D` are
     #[arg(long)]
     normalise: bool,
-    /// Print JSON, as it does anyway
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    _report: ReportArgs,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

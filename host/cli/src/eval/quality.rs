@@ -1,9 +1,9 @@
 //! `nirspi eval quality`: the quality of enhanced images, on characters outside the training data
 //! and on other scenes.
 
-use super::progress;
 use crate::print;
-use crate::report::to_json;
+use crate::progress::Progress;
+use crate::report::{ReportArgs, to_json};
 use anyhow::Result;
 use nirspi::files::image::encode_rgb;
 use nirspi::files::output::OutputDir;
@@ -23,11 +23,11 @@ pub struct Args {
     /// Characters: .npz stacks (x, label, family or writer) or Chars74K's folder
     #[arg(long, value_name = "DIR")]
     data: PathBuf,
-    /// Groups of each stack that training has not seen, as JSON; those of the embedded weights if not given. A stack
-    /// that is not named there is taken whole
+    /// Groups of each stack that training has not seen, as JSON [default: those of the built-in weights]. A stack that the
+    /// file does not name is used whole
     #[arg(long, value_name = "FILE")]
     held_out: Option<PathBuf>,
-    /// Folder of PNG pictures, parts of which are enhanced as scenes that are no letters
+    /// Folder of PNG pictures; parts of them are enhanced as scenes that are no letters
     #[arg(long, value_name = "DIR")]
     scenes: Option<PathBuf>,
     /// Folder of real measurements (.npz), reconstructed and enhanced
@@ -40,7 +40,7 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value_t = 20,
           value_parser = clap::value_parser!(u32).range(2..=100_000))]
     count: u32,
-    /// Images of each stack for the curve over steps: its samplers take up to 500 network calls an image
+    /// Images of each stack for the curve over steps, which takes up to 500 network calls for each image
     #[arg(long, value_name = "N", default_value_t = 4,
           value_parser = clap::value_parser!(u32).range(2..=100_000))]
     sampler_count: u32,
@@ -48,15 +48,14 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value_t = 500,
           value_parser = clap::value_parser!(u32).range(1..=500))]
     most_steps: u32,
-    /// Seed of choice and noise
+    /// Seed of the choice of images and of the noise
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "quality")]
     out: PathBuf,
-    /// Print the numbers as JSON
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    report: ReportArgs,
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
@@ -71,21 +70,16 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         most_steps: args.most_steps,
         seed: args.seed,
     })?;
-    let bar = progress(study.images(), "quality");
-    let Measured { report, pictures } = study.run(&|images| bar.inc(images as u64))?;
-    bar.finish_and_clear();
+    let bar = Progress::of("quality", study.images(), "pictures");
+    let Measured { report, pictures } = study.run(&|images| bar.add(images as u64))?;
+    drop(bar);
     let mut out = OutputDir::create(&args.out)?;
     for (name, picture) in &pictures {
         out.write(name, &encode_rgb(picture))?;
     }
     out.write("quality.json", to_json(&report)?.as_bytes())?;
     out.commit()?;
-    if args.json {
-        print::json(&report)?;
-    } else {
-        say(args, &report)?;
-    }
-    Ok(ExitCode::SUCCESS)
+    args.report.print(&report, |report| say(args, report))
 }
 
 fn say(args: &Args, report: &Report) -> Result<()> {
@@ -120,8 +114,6 @@ fn say(args: &Args, report: &Report) -> Result<()> {
             figures.images
         ))?;
     }
-    for note in &report.notes {
-        print::line(format_args!("note: {note}"))?;
-    }
+    print::notes(&report.notes)?;
     print::line(format_args!("wrote charts, others.png and quality.json to {}", args.out.display()))
 }

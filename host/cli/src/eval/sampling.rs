@@ -1,19 +1,20 @@
 //! `nirspi eval sampling`: the quality by share of the patterns, for every order, basis and method.
 
 use crate::camera::parse_order;
-use crate::report::to_json;
+use crate::progress::Progress;
+use crate::report::{ReportArgs, to_json};
 use crate::source::SourceArgs;
 use crate::{print, refused};
 use anyhow::{Context, Result};
-use indicatif::ProgressBar;
 use nirspi::files::output::OutputDir;
 use nirspi_eval::sampling::{RECORDED, Study, default_orders};
+use nirspi_recon::Sampling;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Compare orders, bases and methods at partial sampling, on measurements of a full sweep
 ///
-/// The image of all patterns is the reference. Writes sampling.md (tables), sampling.json (every number) and
+/// The image of all patterns is the reference. The command writes sampling.md (tables), sampling.json (every number) and
 /// sampling.svg (a plot for the best order).
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n\
@@ -21,18 +22,17 @@ use std::process::ExitCode;
 pub struct Args {
     #[command(flatten)]
     source: SourceArgs,
-    /// Shares of the patterns
-    #[arg(long, value_name = "LIST", value_delimiter = ',', default_values_t = [0.1, 0.2, 0.3, 0.5])]
-    sampling: Vec<f64>,
-    /// Orders: `recorded`, or an order's name
+    /// Shares of all patterns to compare: 0.3, 30% or 30 each
+    #[arg(long, value_name = "SHARE,...", value_delimiter = ',', default_values = ["0.1", "0.2", "0.3", "0.5"])]
+    sampling: Vec<Sampling>,
+    /// Orders to compare, by their names; `recorded` is the order in which the patterns were shown
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_values_t = default_orders())]
     orders: Vec<String>,
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "sampling")]
     out: PathBuf,
-    /// Print the numbers as JSON
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    report: ReportArgs,
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
@@ -44,26 +44,24 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             Ok((name.clone(), order))
         })
         .collect::<Result<_>>()?;
-    let study = Study::new(orders, args.sampling.clone()).map_err(refused)?;
+    let shares = args.sampling.iter().map(|sampling| sampling.share()).collect();
+    let study = Study::new(orders, shares).map_err(refused)?;
     let input = &args.source.input;
     let measurements = args.source.load_real()?;
-    let bar = ProgressBar::new(study.images() as u64);
+    let bar = Progress::of("sampling", study.images(), "images");
     let report = study
-        .run(input.clone(), &measurements, &|| bar.inc(1))
+        .run(input.clone(), &measurements, &|| bar.add(1))
         .with_context(|| input.display().to_string())?;
-    bar.finish_and_clear();
+    drop(bar);
     let tables = study.tables(&report);
     let mut out = OutputDir::create(&args.out)?;
     out.write("sampling.md", tables.as_bytes())?;
     out.write("sampling.json", to_json(&report)?.as_bytes())?;
     out.write("sampling.svg", study.plot(&report).as_bytes())?;
     out.commit()?;
-    if args.json {
-        print::json(&report)?;
-    } else {
+    args.report.print(&report, |_| {
         print::line(tables.trim_end())?;
         let folder = args.out.display();
-        print::line(format_args!("wrote sampling.md, sampling.json and sampling.svg to {folder}"))?;
-    }
-    Ok(ExitCode::SUCCESS)
+        print::line(format_args!("wrote sampling.md, sampling.json and sampling.svg to {folder}"))
+    })
 }

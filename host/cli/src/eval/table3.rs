@@ -1,8 +1,9 @@
 //! `nirspi eval table3`: image quality in rain and without: NIR-SPI, VIS, and NIR-SPI enhanced by
 //! networks.
 
-use super::{AncestralArgs, ExposureArgs, OutputArgs, progress};
+use super::{AncestralArgs, ExposureArgs, OutputArgs};
 use crate::print;
+use crate::progress::Progress;
 use anyhow::Result;
 use nirspi::files::image::encode_rgb;
 use nirspi_eval::table3::{Report, Row, Settings, Table};
@@ -11,9 +12,9 @@ use std::process::ExitCode;
 
 /// Image quality in rain beside the paper's Table 3: NIR-SPI, VIS and the networks
 ///
-/// Targets of 43 mm, each with one of 62 characters in one of six typefaces that training has not seen, in 15 klx of
-/// daylight at 0.3, 0.6 and 1 m, with rain and noise of their own, through the whole virtual camera; an ordinary camera
-/// sees the same, and networks enhance what NIR-SPI saw. Intervals are 95 %, over characters and typefaces.
+/// Each target of 43 mm shows one of 62 characters in one of six typefaces that training has not seen. The virtual camera
+/// takes each target in 15 klx of daylight at 0.3, 0.6 and 1 m, with rain and noise of its own. An ordinary camera (VIS)
+/// takes the same targets, and networks enhance the images of NIR-SPI. Intervals are 95 %, over characters and typefaces.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n\
     \x20 nirspi eval table3 --scenes 186 --out table3/")]
@@ -26,7 +27,7 @@ pub struct Args {
     exposure: ExposureArgs,
     #[command(flatten)]
     ancestral: AncestralArgs,
-    /// Inception-v3's weights in safetensors with torchvision's names, for FID; a second or so a picture
+    /// Weights of Inception-v3 in safetensors with torchvision's names, for FID, which takes about a second for each picture
     #[arg(long, value_name = "FILE")]
     inception: Option<PathBuf>,
     #[command(flatten)]
@@ -42,13 +43,12 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         ancestral_steps: args.ancestral.steps,
         inception: args.inception.clone(),
     };
-    let bar = progress(settings.pictures(), "table 3");
-    let table = Table::take(settings, &|| bar.inc(1))?;
-    bar.finish_and_clear();
+    let bar = Progress::of("table 3", settings.pictures(), "pictures");
+    let table = Table::take(settings, &|| bar.add(1))?;
+    drop(bar);
     let report = table.report()?;
     let picture = || Ok(encode_rgb(&table.picture()?));
-    args.output.hand_over("table3", &report, picture, say)?;
-    Ok(ExitCode::SUCCESS)
+    args.output.hand_over("table3", &report, picture, say)
 }
 
 fn say(report: &Report) -> Result<()> {

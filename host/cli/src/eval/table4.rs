@@ -1,8 +1,9 @@
 //! `nirspi eval table4`: spatial resolution in rain, NIR-SPI, VIS and networks, by slanted edge and
 //! by bars.
 
-use super::{AncestralArgs, ExposureArgs, OutputArgs, progress};
+use super::{AncestralArgs, ExposureArgs, OutputArgs};
 use crate::print;
+use crate::progress::Progress;
 use anyhow::Result;
 use nirspi::files::image::encode_rgb;
 use nirspi_eval::estimate::Estimate;
@@ -11,10 +12,10 @@ use std::process::ExitCode;
 
 /// Spatial resolution in rain beside the paper's Table 4: NIR-SPI, VIS and networks, in mm on the target
 ///
-/// Width of a line at which the transfer of a slanted edge falls to a half (MTF50) and to a tenth (MTF10), and the
-/// finest bars that keep a tenth of their contrast. The edge is taken --scenes times, with rain and noise that differ in
-/// every picture; the noise's own power is left out, so that more scenes narrow an interval and move nothing. `lens` is
-/// what geometry says of disc and emitter alone.
+/// MTF50 and MTF10 are the line widths at which the transfer of a slanted edge falls to a half and to a tenth; bars are the
+/// finest bars that keep a tenth of their contrast. The edge is taken --scenes times, with other rain and other noise in each
+/// picture. The power of the noise is subtracted, so more scenes narrow the intervals and do not move the figures. `lens` is
+/// computed from lens and emitter alone.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n\
     \x20 nirspi eval table4 --scenes 200 --out table4/")]
@@ -39,12 +40,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         camera,
         ancestral_steps: args.ancestral.steps,
     };
-    let bar = progress(settings.pictures(), "table 4");
-    let report = table4(&settings, &|| bar.inc(1))?;
-    bar.finish_and_clear();
+    let bar = Progress::of("table 4", settings.pictures(), "pictures");
+    let report = table4(&settings, &|| bar.add(1))?;
+    drop(bar);
     let picture = || Ok(encode_rgb(&chart(&report).render()));
-    args.output.hand_over("table4", &report, picture, say)?;
-    Ok(ExitCode::SUCCESS)
+    args.output.hand_over("table4", &report, picture, say)
 }
 
 fn say(report: &Report) -> Result<()> {

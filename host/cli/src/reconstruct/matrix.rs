@@ -3,12 +3,13 @@
 use super::{Args, print, spinning};
 use crate::Usage;
 use crate::method::read_atoms;
-use crate::report::StageTimes;
+use crate::report::{StageTimes, stages};
 use anyhow::{Context, Result, bail};
 use nirspi::files::measurement::{Plain, Selection, read_plain};
 use nirspi::files::npy;
-use nirspi_recon::Side;
 use nirspi_recon::reconstruct::{MatrixSettings, Method, OwnMatrix, Setting};
+use nirspi_recon::words::count_of;
+use nirspi_recon::{Sampling, Side};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -41,7 +42,7 @@ struct Report {
 pub fn run(args: &Args, path: &Path) -> Result<ExitCode> {
     let mut settings = settings(args)?;
     let index = args.source.one()?;
-    let mut times = StageTimes::default();
+    let mut times = stages();
     let matrix = times.time("read", || npy::read_matrix(path))?;
     let n = matrix.columns.isqrt();
     let side = Side::new(n as u64).ok().filter(|side| side.area() == matrix.columns);
@@ -59,8 +60,8 @@ pub fn run(args: &Args, path: &Path) -> Result<ExitCode> {
     if let Some(atoms) = &args.method.dictionary {
         settings.atoms = Some(read_atoms(atoms, n)?);
     }
-    let most = ((args.sampling * side.area() as f64).round() as usize).max(1);
-    let used = if args.sampling < 1.0 { y.len().min(most) } else { y.len() };
+    let most = ((args.sampling.share() * side.area() as f64).round() as usize).max(1);
+    let used = if args.sampling < Sampling::ALL { y.len().min(most) } else { y.len() };
     let named = || path.display().to_string();
     let kept = matrix.select(&patterns[..used]);
     let own = times.time("rank", || OwnMatrix::new(side, &kept)).with_context(named)?;
@@ -74,10 +75,11 @@ pub fn run(args: &Args, path: &Path) -> Result<ExitCode> {
     }
     if own.rank() < used.min(side.area()) {
         let others = used - own.rank();
-        notes.push(format!("{others} of {used} patterns are combinations of others"));
+        let are = if others == 1 { "is a combination" } else { "are combinations" };
+        notes.push(format!("{others} of {used} patterns {are} of others"));
     }
     if own.unseen_pixels() > 0 {
-        notes.push(format!("{} pixels are seen by no pattern", own.unseen_pixels()));
+        notes.push(format!("no pattern sees {}", count_of(own.unseen_pixels(), "pixel")));
     }
     let basis = match &args.method.dictionary {
         Some(path) => path.display().to_string(),
@@ -102,12 +104,7 @@ pub fn run(args: &Args, path: &Path) -> Result<ExitCode> {
         stage_ms: times,
     };
     super::write(&args.out, &found.image, None, None, &report)?;
-    if args.json {
-        print::json(&report)?;
-    } else {
-        say(args, &report)?;
-    }
-    Ok(ExitCode::SUCCESS)
+    args.report.print(&report, |report| say(args, report))
 }
 
 fn settings(args: &Args) -> Result<MatrixSettings> {
@@ -140,16 +137,14 @@ fn say(args: &Args, report: &Report) -> Result<()> {
         report.rank
     ))?;
     let strength = report.strength.map(|t| format!(", strength {t}")).unwrap_or_default();
-    let atoms = report.sparsity.map(|k| format!(", {k} atoms")).unwrap_or_default();
+    let atoms = report.sparsity.map(|k| format!(", {}", count_of(k, "atom"))).unwrap_or_default();
     let basis = report.basis.as_ref().map(|b| format!(", {b} basis")).unwrap_or_default();
     print::line(format_args!(
         "{}{basis}{atoms}{strength}, relative residual {:.3}",
         args.method.method.name(),
         report.relative_residual
     ))?;
-    for note in &report.notes {
-        print::line(format_args!("note: {note}"))?;
-    }
+    print::notes(&report.notes)?;
     print::line(format_args!(
         "wrote image.npy, image.png and report.json to {}",
         args.out.display()

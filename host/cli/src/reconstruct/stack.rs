@@ -1,17 +1,18 @@
 //! `nirspi reconstruct --index all`: every measurement of a file or frame of a recording, as a
 //! video.
 
-use super::{Args, enhanced, print, spinning};
+use super::{Args, print, spinning};
 use crate::Usage;
 use crate::method::Solved;
-use crate::report::{StageTimes, to_json};
+use crate::report::{StageTimes, stages, to_json};
 use anyhow::{Context, Result, bail};
 use nirspi::files::npy;
 use nirspi::files::output::OutputDir;
-use nirspi::imaging::MethodReport;
+use nirspi::imaging::{FrameReport as Enhanced, MethodReport, enhance_frames};
 use nirspi::picture::contact_sheet;
 use nirspi::source::FirstPatterns;
 use nirspi_recon::reconstruct::{Method, Reconstruction, Setting};
+use nirspi_recon::words::count_of;
 use nirspi_recon::{Image, Measurements, Rows, Side};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -35,7 +36,7 @@ struct FrameReport {
     #[serde(flatten)]
     method: MethodReport,
     #[serde(skip_serializing_if = "Option::is_none")]
-    enhancement: Option<enhanced::Report>,
+    enhancement: Option<Enhanced>,
     notes: Vec<String>,
 }
 
@@ -44,7 +45,7 @@ pub fn run(args: &Args, first: &FirstPatterns) -> Result<ExitCode> {
         let methods = Method::listed(|method| method.takes(Setting::WarmStart));
         return Err(Usage(format!("--warm-start belongs to --method {methods}")).into());
     }
-    let mut times = StageTimes::default();
+    let mut times = stages();
     let sources = times.time("read", || args.source.load_all())?;
     let named = || args.source.input.display().to_string();
     if sources.is_empty() {
@@ -52,7 +53,7 @@ pub fn run(args: &Args, first: &FirstPatterns) -> Result<ExitCode> {
     }
     let (used, orders): (Vec<Measurements>, Vec<String>) = sources
         .iter()
-        .map(|source| first.take(&source.measurements, args.sampling))
+        .map(|source| first.take(&source.measurements, args.sampling.share()))
         .collect::<Result<_, _>>()
         .with_context(named)?;
     let solved = times.time("reconstruct", || spinning(|| solve_all(args, &used)))?;
@@ -60,7 +61,7 @@ pub fn run(args: &Args, first: &FirstPatterns) -> Result<ExitCode> {
     let imaginary: Vec<Measurements> = sources
         .iter()
         .filter_map(|source| source.imaginary.as_ref())
-        .map(|imaginary| Ok(first.take(imaginary, args.sampling)?.0))
+        .map(|imaginary| Ok(first.take(imaginary, args.sampling.share())?.0))
         .collect::<Result<_>>()
         .with_context(named)?;
     if args.enhance && !imaginary.is_empty() {
@@ -81,7 +82,7 @@ pub fn run(args: &Args, first: &FirstPatterns) -> Result<ExitCode> {
         super::check_finite(&args.source.input, &image)?;
         let image = source.flattened(image);
         let dropped = |d: &nirspi_recon::Dropout| {
-            format!("drop-out: {} readings from y[{}] on", d.length, d.start)
+            format!("drop-out: {} from y[{}] on", count_of(d.length, "reading"), d.start)
         };
         let mut notes: Vec<String> = source.dropouts.iter().map(dropped).collect();
         if !source.not_read.is_empty() {
@@ -96,7 +97,8 @@ pub fn run(args: &Args, first: &FirstPatterns) -> Result<ExitCode> {
     if args.enhance {
         let made: Vec<(&Image, &Rows)> =
             images.iter().zip(&used).map(|(image, used)| (image, used.rows())).collect();
-        let (pixels, reports) = spinning(|| enhanced::run(&made, &mut times))?;
+        let (pixels, reports) =
+            spinning(|| enhance_frames(&made, &mut times)).context("--enhance")?;
         for (frame, report) in frames.iter_mut().zip(reports) {
             frame.enhancement = Some(report);
         }
@@ -124,12 +126,7 @@ pub fn run(args: &Args, first: &FirstPatterns) -> Result<ExitCode> {
     }
     out.write("report.json", to_json(&report)?.as_bytes())?;
     out.commit()?;
-    if args.json {
-        print::json(&report)?;
-    } else {
-        say(args, &report)?;
-    }
-    Ok(ExitCode::SUCCESS)
+    args.report.print(&report, |report| say(args, report))
 }
 
 /// The image of each frame.
@@ -145,16 +142,20 @@ fn solve_all(args: &Args, used: &[Measurements]) -> Result<Vec<Reconstruction>> 
 fn say(args: &Args, report: &Report) -> Result<()> {
     let warm = report.frames.iter().filter(|frame| frame.warm).count();
     print::line(format_args!(
-        "{}: {} frames of {} x {}, order {}, {warm} started from the one before, {:.2} ms a frame",
+        "{}: {} of {} x {}, order {}, {warm} started from the frame before, {:.2} ms a frame",
         report.input.display(),
-        report.frames.len(),
+        count_of(report.frames.len(), "frame"),
         report.n,
         report.n,
         report.order,
         report.stage_ms.of("reconstruct") / report.frames.len() as f64,
     ))?;
     if let Some(last) = report.frames.last() {
-        print::line(format_args!("the last: {} measurements, {}", last.used, last.method))?;
+        print::line(format_args!(
+            "the last: {}, {}",
+            count_of(last.used, "measurement"),
+            last.method
+        ))?;
     }
     for (at, frame) in report.frames.iter().enumerate() {
         let warnings = frame.enhancement.iter().flat_map(|enhancement| &enhancement.warnings);
@@ -162,7 +163,7 @@ fn say(args: &Args, report: &Report) -> Result<()> {
             print::line(format_args!("warning: frame {at}: {warning}"))?;
         }
         for note in &frame.notes {
-            print::line(format_args!("note: frame {at}: {note}"))?;
+            print::note(format_args!("frame {at}: {note}"))?;
         }
     }
     let enhanced = if args.enhance { ", enhanced.npy, enhanced.png" } else { "" };

@@ -3,12 +3,14 @@
 use super::data::DataArgs;
 use crate::camera::ModelArgs;
 use crate::print;
+use crate::progress::Progress;
+use crate::report::ReportArgs;
 use anyhow::Result;
-use indicatif::{ProgressBar, ProgressStyle};
 use nirspi::files::output::write_atomic;
 use nirspi::training::{LinearCamera, pairs};
 use nirspi_eval::train::Found;
 use nirspi_nets::data::Part;
+use nirspi_recon::words::count_of;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -30,18 +32,17 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value_t = 1000,
           value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     count: u32,
-    /// Seed: the same gives the same file, and pair k of a longer one is the same too
+    /// Seed. The same seed gives the same file; pair k is the same in a longer file
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Take held-out groups, as they are, instead of those to train on
+    /// Use the held-out groups instead of the groups to train on
     #[arg(long)]
     only_held_out: bool,
     /// File to write
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Print the report as JSON
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    report: ReportArgs,
 }
 
 #[derive(Debug, Serialize)]
@@ -57,14 +58,11 @@ struct Report {
 pub fn run(args: &Args) -> Result<ExitCode> {
     let (scenes, data) = args.data.data().scenes(args.seed)?;
     let camera = LinearCamera::new(&args.model.read()?, args.seed)?;
-    let bar = ProgressBar::new(u64::from(args.count)).with_style(
-        ProgressStyle::with_template("degrade {bar:30} {pos}/{len} pairs, {eta} left")
-            .unwrap_or_else(|_| ProgressStyle::default_bar()),
-    );
+    let bar = Progress::of("degrade", args.count, "pairs");
     let part = if args.only_held_out { Part::HeldOut } else { Part::Training };
     let count = args.count as usize;
-    let pairs = pairs::take(&scenes, part, &camera, count, args.seed, &|| bar.inc(1))?;
-    bar.finish_and_clear();
+    let pairs = pairs::take(&scenes, part, &camera, count, args.seed, &|| bar.add(1))?;
+    drop(bar);
     write_atomic(&args.out, &pairs::encode(&args.out, &scenes, &pairs)?)?;
     let report = Report {
         simulated: true,
@@ -74,15 +72,14 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         data,
         out: args.out.clone(),
     };
-    if args.json {
-        print::json(&report)?;
-    } else {
+    args.report.print(&report, |report| {
+        let Found { held_out_images, training_images, .. } = report.data;
+        let images = if report.held_out { held_out_images } else { training_images };
         print::line(format_args!(
-            "{} pairs (simulated) of {} images in {}",
-            report.pairs,
-            if report.held_out { report.data.held_out_images } else { report.data.training_images },
+            "{} (simulated) of {} in {}",
+            count_of(report.pairs, "pair"),
+            count_of(images, "image"),
             args.out.display()
-        ))?;
-    }
-    Ok(ExitCode::SUCCESS)
+        ))
+    })
 }

@@ -1,11 +1,12 @@
 //! `nirspi train NETWORK`: trains one network and stores the run in a folder.
 
 use super::network::Args;
+use crate::progress::Progress;
 use crate::{print, refused};
 use anyhow::{Context, Result};
-use indicatif::{ProgressBar, ProgressStyle};
 use nirspi_eval::train::{Report, Request, Watch, run as train};
 use nirspi_nets::train::{Ended, Entry, Model, Settings};
+use nirspi_recon::words::count;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -25,15 +26,10 @@ pub fn run(args: &Args, model: Model) -> Result<ExitCode> {
     let asked = Arc::clone(&stop);
     ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed))
         .context("cannot listen for interrupts")?;
-    let mut shown = Shown { bar: ProgressBar::hidden(), stop };
+    let mut shown = Shown { bar: None, stop };
     let report = train(&request, &mut shown).map_err(refused)?;
-    shown.bar.finish_and_clear();
-    if args.json {
-        print::json(&report)?;
-    } else {
-        say(&report)?;
-    }
-    Ok(ExitCode::SUCCESS)
+    drop(shown);
+    args.report.print(&report, say)
 }
 
 impl Args {
@@ -55,32 +51,30 @@ impl Args {
 
 /// The progress bar, and whether the user has asked to stop.
 struct Shown {
-    bar: ProgressBar,
+    bar: Option<Progress>,
     stop: Arc<AtomicBool>,
 }
 
 impl Watch for Shown {
     fn starts(&mut self, settings: &Settings, step: u64) {
-        let template = "{prefix} {bar:24} {pos}/{len} steps, {eta} left, {msg}";
-        let style =
-            ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
-        self.bar = ProgressBar::new(settings.steps).with_style(style);
-        self.bar.set_prefix(settings.model.to_string());
-        if step > 0 {
-            self.bar.set_position(step);
-            self.bar.reset_eta();
-        }
+        let bar = Progress::of(&settings.model.to_string(), settings.steps, "steps");
+        bar.start_at(step);
+        self.bar = Some(bar);
     }
 
     fn entry(&mut self, entry: &Entry, held_out: Option<f64>) {
         let unit = entry.score.unit();
         let held_out =
             held_out.map_or_else(String::new, |score| format!(", held out {score:.2} {unit}"));
-        self.bar.set_message(format!("loss {:.5}{held_out}", entry.loss));
+        if let Some(bar) = &self.bar {
+            bar.say(format!("loss {:.5}{held_out}", entry.loss));
+        }
     }
 
     fn stepped(&mut self, step: u64) -> bool {
-        self.bar.set_position(step);
+        if let Some(bar) = &self.bar {
+            bar.set(step);
+        }
         !self.stop.load(Ordering::Relaxed)
     }
 }
@@ -93,8 +87,12 @@ fn say(report: &Report) -> Result<()> {
         Ended::Stopped => "stopped; go on with --resume",
     };
     print::line(format_args!(
-        "{}: {} steps in {:.0} s, {:.2} steps/s on {}: {ended}",
-        report.model, outcome.step, outcome.seconds, outcome.steps_per_second, outcome.device
+        "{}: {} in {:.0} s, {:.2} steps/s on {}: {ended}",
+        report.model,
+        count(outcome.step, "step"),
+        outcome.seconds,
+        outcome.steps_per_second,
+        outcome.device
     ))?;
     match outcome.best {
         Some((score, step)) => print::line(format_args!(
@@ -102,6 +100,6 @@ fn say(report: &Report) -> Result<()> {
             outcome.score.unit(),
             report.weights.display()
         )),
-        None => print::line("held-out examples were not looked at yet"),
+        None => print::line("no test on held-out examples so far"),
     }
 }

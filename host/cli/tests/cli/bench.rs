@@ -10,6 +10,9 @@ use tempfile::TempDir;
 /// No command of these tests takes longer, on a busy machine either.
 const LIMIT: Duration = Duration::from_secs(120);
 
+/// How a line of progress begins.
+pub const PROGRESS: &str = "nirspi: progress: ";
+
 /// A folder of its own for one test.
 pub struct Bench {
     folder: TempDir,
@@ -51,6 +54,13 @@ impl Bench {
     /// Starts `nirspi` with these arguments, in the folder.
     pub fn start(&self, arguments: &[&str]) -> Process {
         self.spawn(&mut Command::new(env!("CARGO_BIN_EXE_nirspi")), arguments)
+    }
+
+    /// Runs `nirspi` with these variables in its environment, to its end.
+    pub fn run_with(&self, variables: &[(&str, &str)], arguments: &[&str]) -> Outcome {
+        let mut program = Command::new(env!("CARGO_BIN_EXE_nirspi"));
+        program.envs(variables.iter().copied());
+        self.spawn(&mut program, arguments).wait()
     }
 
     /// Runs `nirspi` under limits that a shell sets, `ulimit -n 64` or the like.
@@ -123,12 +133,22 @@ impl Process {
     pub fn wait(mut self) -> Outcome {
         let status = self.until("end", |process| process.child.try_wait().unwrap());
         let text = |path: &Path| fs::read_to_string(path).unwrap();
+        // A busy machine makes any command slow enough for a line of progress.
+        let stderr = text(&self.err);
+        let said = stderr.split_inclusive('\n').filter(|line| !line.starts_with(PROGRESS));
         Outcome {
             code: status.code(),
             stdout: text(&self.out),
-            stderr: text(&self.err),
+            stderr: said.collect(),
             command: self.command.clone(),
         }
+    }
+
+    /// Waits for its end, and returns all of stderr.
+    #[cfg(unix)]
+    pub fn wait_raw(mut self) -> String {
+        self.until("end", |process| process.child.try_wait().unwrap());
+        fs::read_to_string(&self.err).unwrap()
     }
 
     /// Waits until stdout has a line with `text`, and returns the line.
@@ -137,6 +157,15 @@ impl Process {
             let output = fs::read_to_string(&process.out).unwrap();
             let whole = output.rfind('\n').map_or("", |end| &output[..end]);
             whole.lines().find(|line| line.contains(text)).map(str::to_owned)
+        })
+    }
+
+    /// Waits until stderr has a line that begins like this, and returns the line.
+    pub fn remarks(&mut self, start: &str) -> String {
+        self.until(start, |process| {
+            let output = fs::read_to_string(&process.err).unwrap();
+            let whole = output.rfind('\n').map_or("", |end| &output[..end]);
+            whole.lines().find(|line| line.starts_with(start)).map(str::to_owned)
         })
     }
 

@@ -14,6 +14,7 @@ mod capture_tcp;
 mod demo;
 mod dishonest_cameras;
 mod enhance;
+mod everyday;
 mod foreign_devices;
 mod metrics;
 mod other_forms;
@@ -30,6 +31,7 @@ mod selftest;
 #[cfg(unix)]
 mod serial;
 mod serve;
+mod settings;
 mod sparse_problems;
 mod train;
 mod update;

@@ -28,7 +28,9 @@ fn a_measurement_comes_back_as_the_image_it_was_made_from() {
 fn the_printed_algorithm_chooses_as_many_atoms_as_asked_and_keeps_no_measurement() {
     let (bench, measured) = (Bench::new(), Measured::new(32));
     bench.write("in.npz", &measured.npz());
-    bench.run(&["reconstruct", "in.npz", "--as-printed", "--sparsity", "7"]).succeeded();
+    let printed = ["reconstruct", "in.npz", "--as-printed", "--sparsity", "7"];
+    bench.run(&printed).failed(2, &["--as-printed belongs to --method omp"]);
+    bench.run(&[&printed[..], &["--method", "omp"]].concat()).succeeded();
     let report = bench.json("out/report.json");
     assert_eq!((&report["omp"]["sparsity"], &report["omp"]["keep"]), (&7.into(), &"sparse".into()));
     bench.run(&["reconstruct", "in.npz", "--as-printed"]).failed(2, &["--sparsity"]);
@@ -57,6 +59,16 @@ fn every_method_predicts_a_phantom_better_than_zero_does_and_says_how() {
         bench.run(&[&part, arguments].concat()).succeeded();
         correlation(&bench.pixels("out/image.npy"), &measured.image)
     };
+    // However the share is written, and with the default of the library's list.
+    let share = |share: &str| {
+        bench.run(&["reconstruct", "in.npz", "--sampling", share, "--json"]).succeeded().json()
+    };
+    for written in ["0.3", "30%", "30"] {
+        assert_eq!(
+            (&share(written)["used"], &share(written)["method"]),
+            (&307.into(), &"tikhonov".into())
+        );
+    }
     let zero = correlation_by(&["hadamard"]);
     assert_eq!(correlation_by(&["pseudo-inverse"]), zero);
     for method in ["tikhonov", "fista", "tv"] {
@@ -136,14 +148,15 @@ fn a_run_that_fails_leaves_older_results_alone() {
 fn light_that_may_not_be_negative_is_not() {
     let (bench, measured) = (Bench::new(), Measured::new(16));
     bench.write("in.npz", &measured.npz());
-    let part = ["reconstruct", "in.npz", "--sampling", "0.5", "--non-negative"];
+    let lit = ["reconstruct", "in.npz", "--sampling", "0.5", "--non-negative"];
+    let part = [&lit[..], &["--method", "omp"]].concat();
     bench.run(&[&part[..], &["--basis", "pixel", "--sparsity", "40"]].concat()).succeeded();
     assert!(bench.pixels("out/image.npy").iter().all(|&p| p > -1e-5));
     assert_eq!(bench.json("out/report.json")["omp"]["keep"], "sparse");
     bench
         .run(&part)
         .failed(2, &["--non-negative in the dct basis", "--basis pixel or --dictionary"]);
-    let tv = [&part[..], &["--basis", "pixel", "--method", "tv"]].concat();
+    let tv = [&lit[..], &["--basis", "pixel", "--method", "tv"]].concat();
     bench.run(&tv).failed(2, &["--non-negative belongs to --method omp"]);
 }
 
@@ -165,8 +178,7 @@ fn stack(measured: &Measured, frames: usize) -> Vec<u8> {
 fn all_measurements_of_a_file_are_reconstructed_one_by_one_or_each_from_the_one_before() {
     let (bench, measured) = (Bench::new(), Measured::new(16));
     bench.write("in.npz", &stack(&measured, 4));
-    let part =
-        ["reconstruct", "in.npz", "--index", "all", "--sampling", "0.4", "--order", "zig-zag"];
+    let part = ["reconstruct", "in.npz", "--index", "all", "--method", "omp", "--sampling", "0.4"];
     let cold = bench.run(&[&part[..], &["--out", "cold", "--json"]].concat()).succeeded().json();
     let warm = bench.run(&[&part[..], &["--out", "warm", "--warm-start"]].concat()).succeeded();
     assert!(warm.stdout.contains("4 frames of 16 x 16") && warm.stdout.contains("3 started from"));
@@ -181,7 +193,7 @@ fn all_measurements_of_a_file_are_reconstructed_one_by_one_or_each_from_the_one_
         assert!(correlation(cold, warm) > 0.99);
     }
     bench
-        .run(&["reconstruct", "in.npz", "--index", "1", "--warm-start"])
+        .run(&["reconstruct", "in.npz", "--index", "1", "--method", "omp", "--warm-start"])
         .failed(2, &["--warm-start belongs to --index all"]);
     bench.run(&["reconstruct", "in.npz", "--index", "some"]).failed(2, &["a number or all"]);
     bench.run(&["eval", "sampling", "in.npz", "--index", "all"]).failed(2, &["one measurement"]);

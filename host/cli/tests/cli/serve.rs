@@ -221,11 +221,16 @@ fn browsers_that_never_read_hold_up_nobody_not_even_the_end() {
 #[test]
 fn pages_switch_method_enhancement_and_number_of_frames() {
     let bench = Bench::new();
-    let server = serve(&bench, &["--method", "tikhonov"]);
+    let server = serve(&bench, &["--sum", "5"]);
     let state = server.state("enhanced", shows_enhanced);
+    assert_eq!(state["settings"]["frames"], 5);
+    let about = state["offered"]["about"].as_array().unwrap();
+    assert!(about.iter().all(|line| line.as_str().unwrap().len() > 20), "{about:?}");
     let every = ["hadamard", "omp", "pseudo-inverse", "tikhonov", "fista", "tv"];
     assert_eq!(state["offered"]["methods"], serde_json::json!(every));
-    assert_eq!(state["picture"]["method"], "tikhonov");
+    // Without a word of the user's, the default of the library's list.
+    let default = nirspi_recon::reconstruct::Method::default();
+    assert_eq!(state["picture"]["method"], default.argument());
     let set = server.change(r#"{"method": "hadamard", "enhance": false, "frames": 3}"#).json();
     assert_eq!(set, serde_json::json!({"method": "hadamard", "enhance": false, "frames": 3}));
     server.state("switched", |state| {
@@ -303,9 +308,11 @@ fn what_cannot_be_served_is_said_in_one_line() {
     bench.run(&["serve", "--listen", "nonsense"]).failed(1, &["--listen nonsense"]);
     let nobody = ["serve", "--listen", "127.0.0.1:0", "--camera", "tcp:127.0.0.1:1"];
     bench.run(&nobody).failed(1, &["no camera at tcp:127.0.0.1:1"]);
-    bench.run(&["serve", "--frames", "2000"]).failed(2, &["--frames", "1024"]);
+    for name in ["--sum", "--frames"] {
+        bench.run(&["serve", name, "2000"]).failed(2, &["--sum", "1024"]);
+    }
     bench.run(&["serve", "--method", "magic"]).failed(2, &["--method", "magic"]);
-    let none = ["serve", "--listen", "127.0.0.1:0", "--dictionary", "none.npy"];
+    let none = ["serve", "--listen", "127.0.0.1:0", "--method=omp", "--dictionary", "none.npy"];
     bench.run(&none).failed(1, &["none.npy"]);
     // The camera itself refuses.
     let late = ["--no-calibration", "--adc-latency", "200"];

@@ -100,7 +100,8 @@ fn a_device_asked_for_by_name_computes_and_is_named() {
     let measured = Measured::new(16);
     bench.write("in.npz", &measured.npz());
     let image = |backend: &str| {
-        let arguments = ["reconstruct", "in.npz", "--sampling", "0.4", "--sparsity", "20"];
+        let arguments =
+            ["reconstruct", "in.npz", "--method=omp", "--sampling", "0.4", "--sparsity", "20"];
         let to = ["--out", backend, "--backend", backend];
         bench.run(&[&arguments[..], &to].concat()).succeeded();
         let report = bench.json(&format!("{backend}/report.json"));

@@ -82,8 +82,11 @@ impl Method {
     /// Every built-in method, the simplest first.
     pub const ALL: &'static [Self] = methods::ALL;
 
-    /// Orthogonal matching pursuit, the default.
+    /// Orthogonal matching pursuit, the paper's method.
     pub const OMP: Self = methods::OMP;
+
+    /// Tikhonov's method, the default: `docs/reconstruction.md` has the comparison.
+    pub const TIKHONOV: Self = methods::TIKHONOV;
 
     /// The method's name in a few words, for example `total variation`.
     #[must_use]
@@ -145,7 +148,7 @@ impl Method {
 
 impl Default for Method {
     fn default() -> Self {
-        Self::OMP
+        Self::TIKHONOV
     }
 }
 
@@ -194,6 +197,12 @@ pub enum Setting {
     Basis,
     /// [`MethodSettings::dictionary`].
     Dictionary,
+    /// [`MethodSettings::sparsity`], if it is not cross-validated.
+    Sparsity,
+    /// [`MethodSettings::residual`], if it is not 0.
+    Residual,
+    /// [`MethodSettings::as_printed`].
+    AsPrinted,
     /// [`MethodSettings::strength`], if it is fixed.
     Strength,
     /// [`MethodSettings::non_negative`].
@@ -209,6 +218,9 @@ impl fmt::Display for Setting {
         f.write_str(match self {
             Self::Basis => "basis",
             Self::Dictionary => "dictionary",
+            Self::Sparsity => "sparsity",
+            Self::Residual => "residual",
+            Self::AsPrinted => "as-printed",
             Self::Strength => "strength",
             Self::NonNegative => "non-negative",
             Self::Backend => "backend",
@@ -297,6 +309,9 @@ impl MethodSettings {
         let gpu = matches!(self.backend, Backend::Wgpu | Backend::Cuda);
         [
             (self.dictionary.is_some(), Setting::Dictionary),
+            (self.as_printed, Setting::AsPrinted),
+            (self.sparsity != Self::default().sparsity, Setting::Sparsity),
+            (self.residual != 0.0, Setting::Residual),
             (gpu, Setting::Backend),
             (self.non_negative, Setting::NonNegative),
             (matches!(self.strength, Strength::Fixed(_)), Setting::Strength),
@@ -315,6 +330,9 @@ impl MethodSettings {
         for setting in self.asked().into_iter().filter(|setting| !method.takes(*setting)) {
             match setting {
                 Setting::Dictionary => taken.dictionary = None,
+                Setting::Sparsity => taken.sparsity = default.sparsity,
+                Setting::Residual => taken.residual = default.residual,
+                Setting::AsPrinted => taken.as_printed = false,
                 Setting::Strength => taken.strength = default.strength,
                 Setting::NonNegative => taken.non_negative = false,
                 Setting::Backend => taken.backend = default.backend,

@@ -11,6 +11,7 @@ mod total_variation;
 use super::Method;
 pub use hadamard::hadamard;
 pub(super) use omp::METHOD as OMP;
+pub(super) use tikhonov::METHOD as TIKHONOV;
 
 /// Every built-in method, in the order in which help texts and comparisons show them.
 pub(super) const ALL: &[Method] = &[

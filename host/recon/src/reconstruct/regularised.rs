@@ -21,7 +21,7 @@ pub(super) mod total_variation;
 use super::selection::{self, TRUST, Trusted};
 use super::{Completion, NoiseLevel, Problem, ReconstructError, image_of};
 use crate::basis::Basis;
-use crate::{Image, Measurements, fwht};
+use crate::{Image, Measurements, fwht, words};
 
 /// A penalty on an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -185,7 +185,10 @@ pub fn regularised(
     let image = image_of(&problem, predicted, settings.completion, trust);
     Ok(Regularised {
         image,
-        strength: f64::from(strengths[at]),
+        strength: match settings.strength {
+            Strength::Fixed(strength) => strength,
+            Strength::CrossValidated { .. } => words::shortest(strengths[at]),
+        },
         trust: f64::from(trust),
         residual,
         noise,

@@ -1,6 +1,7 @@
 //! A method's report on its image, in numbers and in words.
 
 use super::Completion;
+use crate::words::count_of;
 use crate::{Backend, Image};
 use std::fmt;
 
@@ -72,8 +73,10 @@ impl Report {
     pub fn short(&self) -> String {
         let name = &self.name;
         match (self.sparsity, &self.basis) {
-            (Some(atoms), Some(basis)) => format!("{name}, {atoms} atoms of the {basis} basis"),
-            (Some(atoms), None) => format!("{name}, {atoms} atoms"),
+            (Some(atoms), Some(basis)) => {
+                format!("{name}, {} of the {basis} basis", count_of(atoms, "atom"))
+            }
+            (Some(atoms), None) => format!("{name}, {}", count_of(atoms, "atom")),
             (None, Some(basis)) => format!("{name}, {basis} basis"),
             (None, None) => name.clone(),
         }
@@ -85,7 +88,8 @@ impl fmt::Display for Report {
         let mut parts = vec![self.short()];
         parts.extend(self.strength.map(|strength| format!("strength {strength}")));
         parts.extend(self.residual.map(|residual| format!("relative residual {residual:.3}")));
-        parts.extend(self.unseen_atoms.map(|atoms| format!("{atoms} atoms not seen")));
+        parts
+            .extend(self.unseen_atoms.map(|atoms| format!("{} not seen", count_of(atoms, "atom"))));
         parts.extend(
             self.trust.map(|trust| format!("{:.0} % of the prediction used", 100.0 * trust)),
         );

@@ -15,7 +15,7 @@ fn words_are_read_as_they_are_written_and_stand_once() {
     let error = "svd".parse::<Method>().unwrap_err().to_string();
     assert!(error.starts_with("unknown method \"svd\", expected hadamard, omp, "), "{error}");
     assert!(error.ends_with(" or tv"), "{error}");
-    assert_eq!(Method::default().argument(), "omp");
+    assert_eq!(Method::default().argument(), "tikhonov");
 }
 
 #[test]
@@ -84,6 +84,8 @@ fn settings_of_other_methods_are_refused_with_the_methods_that_take_them() {
     assert_eq!(refused("fista", &own), "dictionary belongs to omp, not to fista");
     let lit = MethodSettings { non_negative: true, ..sound.clone() };
     assert!(refused("omp", &lit).contains("dct basis"));
+    let few = MethodSettings { sparsity: Sparsity::Fixed(9), ..sound.clone() };
+    assert_eq!(refused("tikhonov", &few), "sparsity belongs to omp, not to tikhonov");
     let residual = MethodSettings { residual: 1.0, ..sound.clone() };
     assert_eq!(refused("omp", &residual), "residual is 1, expected 0 or more, below 1");
     let none = MethodSettings { sparsity: Sparsity::Fixed(0), ..sound.clone() };
@@ -97,12 +99,20 @@ fn one_list_of_settings_makes_every_method_ready() {
     let asked = MethodSettings {
         strength: Strength::Fixed(2.0),
         non_negative: true,
+        sparsity: Sparsity::Fixed(5),
+        residual: 0.1,
         basis: Basis::Pixel,
         ..MethodSettings::default()
     };
     for &method in Method::ALL {
         let taken = asked.taken_by(method);
         assert_eq!(taken.non_negative, method.takes(Setting::NonNegative), "{method}");
+        assert_eq!(
+            taken.sparsity == Sparsity::Fixed(5),
+            method.takes(Setting::Sparsity),
+            "{method}"
+        );
+        assert_eq!(taken.residual > 0.0, method.takes(Setting::Residual), "{method}");
         let made = method.prepare(&taken).unwrap().reconstruct(&part()).unwrap();
         assert!(made.report.strength.is_none_or(|strength| strength == 2.0), "{method}");
     }

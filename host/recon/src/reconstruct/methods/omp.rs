@@ -18,6 +18,9 @@ pub(in super::super) const METHOD: Method = Method(&Entry {
     takes: &[
         Setting::Basis,
         Setting::Dictionary,
+        Setting::Sparsity,
+        Setting::Residual,
+        Setting::AsPrinted,
         Setting::NonNegative,
         Setting::Backend,
         Setting::WarmStart,

@@ -1,33 +1,72 @@
-//! The demo's learned stages and their quality: the image divided by white, fused with depth,
-//! deblurred.
+//! The learned stages on an image of a virtual camera, whose true scene is known, and the quality of
+//! each stage.
 
-use super::super::report::StageTimes;
-use anyhow::Result;
-use nirspi::imaging::{Enhance, ImageContext, Quality, Warning, White, compare, warnings};
-use nirspi::virtual_camera::VirtualOptics;
-use nirspi_nets::{DepthMaps, Device, deblur, upscale_2x};
+use super::VirtualOptics;
+use crate::imaging::{
+    Enhance, EnhanceError, ImageContext, Quality, Warning, White, compare, warnings,
+};
+use crate::stage_times::StageTimes;
+use nirspi_nets::{DepthError, DepthMaps, Device, UpscaleError, WeightsError, deblur, upscale_2x};
 use nirspi_optics::SIDE;
-use nirspi_recon::{Image, Rows, Side};
+use nirspi_recon::metrics::MetricError;
+use nirspi_recon::{Image, Rows, Side, SideError};
 use serde::Serialize;
+use thiserror::Error;
 
 /// The scene as taken by a perfect camera of 64 x 64 pixels, and the results of the stages.
+///
+/// Images are 64 x 64 pixels in [0, 1].
+#[derive(Debug)]
 pub struct Stages {
+    /// The scene.
     pub truth: Vec<f32>,
+    /// Lanczos interpolation, without learning.
     pub upscaled: Vec<f32>,
+    /// The image fused with depth.
     pub fused: Vec<f32>,
+    /// The deblurred image.
     pub deblurred: Vec<f32>,
-    pub report: Report,
+    /// Qualities and estimates.
+    pub report: StagesReport,
+}
+
+/// Why the stages gave no image.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum StagesError {
+    /// The depth sensor cannot be simulated.
+    #[error(transparent)]
+    Sensor(#[from] nirspi_optics::DepthError),
+    /// The depth map does not fit the image.
+    #[error(transparent)]
+    Depth(#[from] DepthError),
+    /// The built-in weights cannot be used.
+    #[error(transparent)]
+    Weights(#[from] WeightsError),
+    /// The networks failed.
+    #[error(transparent)]
+    Enhance(#[from] EnhanceError),
+    /// The image cannot be enlarged.
+    #[error(transparent)]
+    Upscale(#[from] UpscaleError),
+    /// The output has no valid size.
+    #[error(transparent)]
+    Side(#[from] SideError),
+    /// The images cannot be compared.
+    #[error(transparent)]
+    Metric(#[from] MetricError),
 }
 
 /// Quality of each 64 x 64 stage, and the estimates of the networks.
 #[derive(Debug, Serialize)]
-pub struct Report {
+pub struct StagesReport {
     /// Lanczos interpolation, without learning.
     pub upscaled: Quality,
     /// FSRCNN with depth.
     pub fused: Quality,
     /// The diffusion bridge.
     pub deblurred: Quality,
+    /// Steps of the bridge.
     pub steps: u32,
     /// Removed blur in pixels of the 64 x 64 grid: the larger of estimate and lens.
     pub sigma_px: f32,
@@ -41,22 +80,28 @@ pub struct Report {
     pub inconsistency: f32,
     /// Number of depth zones that see the field and have a distance.
     pub depth_zones: usize,
+    /// Name of the device that computed.
     pub device: String,
     /// Reasons not to trust the result.
     pub warnings: Vec<String>,
+    /// Short forms of the warnings, for the picture.
     #[serde(skip)]
     pub short_warnings: Vec<String>,
+    /// What the qualities compare.
     pub quality_note: &'static str,
 }
 
 /// Runs the stages on an image in ADC counts that was reconstructed from these Hadamard rows.
-pub fn run(
+///
+/// # Errors
+/// [`StagesError`] if a stage failed.
+pub fn enhance_stages(
     image: &Image,
     rows: &Rows,
     optics: &VirtualOptics,
     seed: u64,
     times: &mut StageTimes,
-) -> Result<Stages> {
+) -> Result<Stages, StagesError> {
     let view = optics.depth_view(seed)?;
     let pixels_m = view.pixels_mm.iter().map(|&mm| f32::from(mm) * 1e-3).collect();
     let depth = DepthMaps::new(pixels_m, [1, SIDE, SIDE], 1)?;
@@ -80,7 +125,7 @@ pub fn run(
         judge(&made.pixels)?,
     );
     let warnings = warnings(&made);
-    let report = Report {
+    let report = StagesReport {
         upscaled: upscaled.quality,
         fused: fused.quality,
         deblurred: deblurred.quality,

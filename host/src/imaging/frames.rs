@@ -1,15 +1,15 @@
-//! `nirspi reconstruct --enhance`: the learned stages on images of unknown white level.
+//! The learned stages on images of unknown white level: one image, or the frames of a video.
 
-use super::super::report::StageTimes;
-use anyhow::{Context, Result, bail};
-use nirspi::imaging::{Enhance, EnhancedImage, ImageContext, Warning, White, warnings};
-use nirspi_nets::Device;
+use super::{Enhance, EnhanceError, EnhancedImage, ImageContext, Warning, White, warnings};
+use crate::stage_times::StageTimes;
+use nirspi_nets::{Device, WeightsError};
 use nirspi_recon::{Image, Rows};
 use serde::Serialize;
+use thiserror::Error;
 
 /// The results of the learned stages.
 #[derive(Debug, Serialize)]
-pub struct Report {
+pub struct FrameReport {
     /// The image's value that was used as white.
     white: f32,
     /// Estimated blur in pixels of the 64 x 64 grid.
@@ -25,7 +25,7 @@ pub struct Report {
     pub short: Vec<String>,
 }
 
-impl Report {
+impl FrameReport {
     fn of(image: &EnhancedImage) -> Self {
         let warnings = warnings(image);
         Self {
@@ -39,6 +39,7 @@ impl Report {
     }
 
     /// One line for the user.
+    #[must_use]
     pub fn line(&self) -> String {
         format!(
             "enhanced: blur {:.2} px, noise {:.4}, inconsistency {:.2}; white is {:.4} of the image's units",
@@ -47,22 +48,41 @@ impl Report {
     }
 }
 
+/// Why frames are not enhanced.
+#[derive(Debug, Error)]
+pub enum FramesError {
+    /// There is no image.
+    #[error("no image")]
+    Empty,
+    /// The built-in weights cannot be used.
+    #[error(transparent)]
+    Weights(#[from] WeightsError),
+    /// The learned stages failed.
+    #[error(transparent)]
+    Enhance(#[from] EnhanceError),
+}
+
 /// Enhances images of 32 x 32 or 64 x 64 pixels, each with the Hadamard rows from which it was
 /// made. Each result is 64 x 64 pixels in [0, 1]. All images have the same white level, the median
 /// of their own levels, so that a video does not flicker.
-pub fn run(frames: &[(&Image, &Rows)], times: &mut StageTimes) -> Result<(Vec<f32>, Vec<Report>)> {
+///
+/// # Errors
+/// [`FramesError`] if there is no image, or the learned stages fail.
+pub fn enhance_frames(
+    frames: &[(&Image, &Rows)],
+    times: &mut StageTimes,
+) -> Result<(Vec<f32>, Vec<FrameReport>), FramesError> {
     if frames.is_empty() {
-        bail!("--enhance: no image");
+        return Err(FramesError::Empty);
     }
     let white = White::Brightest.median_level(frames.iter().map(|(image, _)| *image));
     let enhance = Enhance::built_in(&Device::cpu())?;
     let (mut pixels, mut reports) = (Vec::new(), Vec::new());
-    times.time("enhance", || -> Result<()> {
+    times.time("enhance", || -> Result<(), FramesError> {
         for (image, rows) in frames {
             let known = ImageContext { rows: Some(rows), ..ImageContext::default() };
-            let mut made =
-                enhance.enhance(image, White::Known(white), &known).context("--enhance")?;
-            reports.push(Report::of(&made));
+            let mut made = enhance.enhance(image, White::Known(white), &known)?;
+            reports.push(FrameReport::of(&made));
             pixels.append(&mut made.pixels);
         }
         Ok(())
