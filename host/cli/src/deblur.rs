@@ -165,7 +165,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             let estimator = networks.estimator()?;
             let result = times.time("deblur", || {
                 classical::deblur_all(method, images, &estimator, options.estimate, &mut || {
-                    bar.add(1)
+                    bar.add(1);
                 })
             })?;
             (networks, result)

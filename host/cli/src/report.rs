@@ -22,9 +22,9 @@ impl ReportArgs {
         say: impl FnOnce(&R) -> Result<()>,
     ) -> Result<ExitCode> {
         if self.json {
-            print::json(report)?
+            print::json(report)?;
         } else {
-            say(report)?
+            say(report)?;
         }
         Ok(ExitCode::SUCCESS)
     }

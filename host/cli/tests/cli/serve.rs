@@ -281,7 +281,7 @@ fn pages_of_other_sites_get_nothing_and_change_nothing() {
 fn who_lets_the_network_look_is_told_so() {
     let bench = Bench::new();
     let mut server = serve(&bench, &["--listen", "0.0.0.0:0"]);
-    server.process.says("everybody in the network");
+    server.process.says("every machine in this network");
     server.ask("GET", "/", &["Host: camera.evil.example"], "").refuses(403, "by that name");
     assert_eq!(server.ask("GET", "/", &["Host: 192.0.2.7"], "").status, 200);
 }
