@@ -48,11 +48,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     })?;
     bar.finish_and_clear();
     args.sharpening.write_spread(&input, result.spread.as_deref())?;
-    target.write(2 * fusion::SIDE, &result.images)?;
+    let shown = target.write_and_show(2 * fusion::SIDE, &result.images, "enhanced")?;
 
     let steps = args.steps.get();
     let deblurring = Deblurring::of("diffusion", steps, options.consistency, options.seed, &result);
-    let report = args.images.report(&input, &networks, Some(deblurring), times);
+    let report = args.images.report(&input, &networks, Some(deblurring), shown, times);
     print_report(&report, args.images.json)?;
     Ok(ExitCode::SUCCESS)
 }
@@ -66,9 +66,10 @@ pub fn print_report(report: &Report, json: bool) -> Result<()> {
         print::line(deblurring.line())?;
     }
     print::line(format_args!(
-        "{} images on {}, in {}",
+        "{} images on {}, in {}; to look at: {}",
         report.images,
         report.device,
-        report.output.display()
+        report.output.display(),
+        report.pictures
     ))
 }

@@ -5,6 +5,7 @@ use super::report::StageTimes;
 use anyhow::{Context, Result};
 use indicatif::{ProgressBar, ProgressStyle};
 use nirspi::files::stack::ImageStack;
+use nirspi::picture::Pictures;
 use nirspi_nets::{Backend, Device, Enhanced, Images, Networks, UsedWeights, WeightsError};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -75,6 +76,7 @@ impl ImageArgs {
         input: &ImageStack,
         networks: &Networks,
         deblurring: Option<Deblurring>,
+        pictures: Pictures,
         stage_ms: StageTimes,
     ) -> Report {
         Report {
@@ -84,6 +86,7 @@ impl ImageArgs {
             device: networks.device().name().to_owned(),
             weights: networks.used().to_vec(),
             deblurring,
+            pictures,
             stage_ms,
         }
     }
@@ -104,6 +107,8 @@ pub struct Report {
     pub weights: Vec<UsedWeights>,
     #[serde(flatten)]
     pub deblurring: Option<Deblurring>,
+    /// The picture for people.
+    pub pictures: Pictures,
     pub stage_ms: StageTimes,
 }
 

@@ -56,17 +56,18 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let bar = bar("upscaling", input.count());
     let large = times.time("upscale", || fusion.upscale(images, depth.as_ref()));
     bar.finish_and_clear();
-    target.write(2 * fusion::SIDE, &large)?;
+    let shown = target.write_and_show(2 * fusion::SIDE, &large, "upscaled")?;
 
-    let report = args.images.report(&input, &networks, None, times);
+    let report = args.images.report(&input, &networks, None, shown, times);
     if args.images.json {
         print::json(&report)?;
     } else {
         print::line(format_args!(
-            "{} images upscaled to 64 x 64 on {}, in {}",
+            "{} images upscaled to 64 x 64 on {}, in {}; to look at: {}",
             report.images,
             report.device,
-            report.output.display()
+            report.output.display(),
+            report.pictures
         ))?;
     }
     Ok(ExitCode::SUCCESS)

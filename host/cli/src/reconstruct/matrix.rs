@@ -7,6 +7,7 @@ use crate::report::StageTimes;
 use anyhow::{Context, Result, bail};
 use nirspi::files::measurement::{Plain, Selection, read_plain};
 use nirspi::files::npy;
+use nirspi::picture::{Pictures, Unit};
 use nirspi_recon::Side;
 use nirspi_recon::reconstruct::{MatrixSettings, Method, OwnMatrix, Setting};
 use serde::Serialize;
@@ -35,6 +36,7 @@ struct Report {
     relative_residual: f64,
     not_read: Vec<usize>,
     notes: Vec<String>,
+    pictures: Pictures,
     stage_ms: StageTimes,
 }
 
@@ -99,9 +101,10 @@ pub fn run(args: &Args, path: &Path) -> Result<ExitCode> {
         relative_residual: found.residual,
         not_read,
         notes,
+        pictures: Pictures::of_image(&found.image, Unit::Readings, None),
         stage_ms: times,
     };
-    super::write(&args.out, &found.image, None, None, &report)?;
+    super::write(&args.out, &found.image, None, None, &report.pictures, &report)?;
     if args.json {
         print::json(&report)?;
     } else {
