@@ -1,7 +1,7 @@
 //! The virtual camera looks at a letter; the picture is reconstructed, enhanced and saved as letter.png.
 
-use nirspi::files::image::encode_grey;
 use nirspi::imaging::{Enhance, ImageContext, White, warnings};
+use nirspi::picture::{Panel, SideBySide, Unit};
 use nirspi::scene::SceneSource;
 use nirspi::setup::MeasurementSetup;
 use nirspi::virtual_camera::{CameraModel, VirtualOptics, calibrate_against_white, shoot};
@@ -26,7 +26,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let context = ImageContext { rows: Some(measurements.rows()), ..ImageContext::default() };
     let picture = networks.enhance(&image, White::Brightest, &context)?;
     warnings(&picture).iter().for_each(|warning| eprintln!("warning: {warning}"));
-    std::fs::write("letter.png", encode_grey(64, 64, &picture.pixels))?;
+    let panel = Panel::square("enhanced (simulated)", 64, &picture.pixels, Unit::OfWhite);
+    std::fs::write("letter.png", SideBySide::from(panel).png())?;
     println!("blur {:.2} px, inconsistency {:.2}", picture.blur_px, picture.inconsistency);
     Ok(())
 }

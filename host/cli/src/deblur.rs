@@ -173,13 +173,13 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     };
     drop(bar);
     args.sharpening.write_spread(&input, result.spread.as_deref())?;
-    target.write(deblur::SIDE, &result.images)?;
+    let shown = target.write_and_show(deblur::SIDE, &result.images, "deblurred")?;
 
     let (steps, consistency) = match way {
         Way::Network(method) => (method.steps(), options.consistency),
         Way::Classical(_) => (1, false),
     };
     let deblurring = Deblurring::of(way.name(), steps, consistency, options.seed, &result);
-    let report = args.images.report(&input, &networks, Some(deblurring), times);
+    let report = args.images.report(&input, &networks, Some(deblurring), shown, times);
     args.images.report.print(&report, say)
 }

@@ -4,17 +4,16 @@ use super::camera::{SceneArgs, SetupArgs};
 use super::method::{MethodArgs, Solved, solve};
 use super::print;
 use super::progress::Progress;
-use super::reconstruct::enlarged_png;
 use super::report::{ReportArgs, StageTimes, stages, to_json};
 use anyhow::Result;
 use nirspi::account::LossCounters;
-use nirspi::files::image::{encode_grey, encode_rgb};
+use nirspi::files::image::encode_grey;
 use nirspi::files::measurement::encode as encode_measurement;
 use nirspi::files::npy;
 use nirspi::files::output::OutputDir;
 use nirspi::imaging::MethodReport;
 use nirspi::imaging::{Quality, compare};
-use nirspi::picture::{Panel, Range, SideBySide};
+use nirspi::picture::{Panel, Pictures, SideBySide, Unit};
 use nirspi::scene::SceneMap;
 use nirspi::session::CameraIdentity;
 use nirspi::virtual_camera::{
@@ -90,6 +89,8 @@ struct Report {
     #[serde(flatten)]
     method: MethodReport,
     notes: Vec<String>,
+    /// What is black and white in the pictures.
+    pictures: Pictures,
     stage_ms: StageTimes,
 }
 
@@ -160,7 +161,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             "the image is darker where the scene is brighter: it is scored as blank".to_owned(),
         );
     }
-    let report = Report {
+    let mut report = Report {
         scene: map.name.clone(),
         simulated: true,
         camera_model: model.name.clone(),
@@ -188,19 +189,19 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         enhancement: stages.report,
         method,
         notes,
+        pictures: Pictures::default(),
         stage_ms: times,
     };
-    write(args, &map, &optics, &images, &report)?;
+    let mut all = side_by_side(&map, &optics, &images, &report);
+    report.pictures.add("side_by_side.png", &all);
+    all.panels.push(Panel::square("upscaled", 64, &images.upscaled, Unit::Reflectance));
+    let names = ["raw", "reconstruction", "fused", "deblurred", "upscaled"];
+    report.pictures.each(&names, &all.panels[2..]);
+    write(args, &map, &images, &report)?;
     args.report.print(&report, |report| say(args, report))
 }
 
-fn write(
-    args: &Args,
-    map: &SceneMap,
-    optics: &VirtualOptics,
-    images: &Images,
-    report: &Report,
-) -> Result<()> {
+fn write(args: &Args, map: &SceneMap, images: &Images, report: &Report) -> Result<()> {
     let side = images.result.side().pixels();
     let grid = [side, side];
     let mut out = OutputDir::create(&args.out)?;
@@ -208,11 +209,7 @@ fn write(
     out.write("scene.png", &encode_grey(map.size_px, map.size_px, scene))?;
     out.write("scene.npy", &npy::encode(&[map.size_px, map.size_px], scene))?;
     out.write("truth.npy", &npy::encode(&grid, images.truth.pixels()))?;
-    let raw = Image::new(Side::INSTRUMENT, images.raw.clone());
-    out.write("raw.png", &enlarged_png(&raw))?;
     out.write("raw.npy", &npy::encode(&grid, &images.raw))?;
-    let result = Image::new(Side::INSTRUMENT, images.fitted.clone());
-    out.write("reconstruction.png", &enlarged_png(&result))?;
     out.write("reconstruction.npy", &npy::encode(&grid, &images.fitted))?;
     // The input of `enhance` and `reconstruct`.
     out.write("frames.npy", &npy::encode(&[1, side, side], &images.fitted))?;
@@ -222,13 +219,9 @@ fn write(
     for (name, image) in
         [("upscaled", &images.upscaled), ("fused", &images.fused), ("deblurred", &images.deblurred)]
     {
-        out.write(&format!("{name}.png"), &encode_grey(2 * side, 2 * side, image))?;
         out.write(&format!("{name}.npy"), &npy::encode(&[2 * side, 2 * side], image))?;
     }
-    out.write(
-        "side_by_side.png",
-        &encode_rgb(&side_by_side(map, optics, images, report).render()),
-    )?;
+    report.pictures.write(&mut out)?;
     out.write("report.json", to_json(report)?.as_bytes())?;
     out.commit()?;
     Ok(())
@@ -242,13 +235,8 @@ fn side_by_side(
 ) -> SideBySide {
     let side = images.result.side().pixels();
     let panel = |title: &str, width, values: &[f32], caption: Vec<String>| Panel {
-        title: title.to_owned(),
-        width,
-        height: width,
-        values: values.to_vec(),
-        range: Range::Unit,
         caption,
-        warnings: Vec::new(),
+        ..Panel::square(title, width, values, Unit::Reflectance)
     };
     let metrics = |q: &Quality| format!("PSNR {:.1} dB  SSIM {:.2}", q.psnr_db, q.ssim);
     SideBySide {

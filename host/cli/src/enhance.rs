@@ -51,11 +51,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     })?;
     drop(bar);
     args.sharpening.write_spread(&input, result.spread.as_deref())?;
-    target.write(2 * fusion::SIDE, &result.images)?;
+    let shown = target.write_and_show(2 * fusion::SIDE, &result.images, "enhanced")?;
 
     let steps = args.steps.get();
     let deblurring = Deblurring::of("diffusion", steps, options.consistency, options.seed, &result);
-    let report = args.images.report(&input, &networks, Some(deblurring), times);
+    let report = args.images.report(&input, &networks, Some(deblurring), shown, times);
     args.images.report.print(&report, say)
 }
 
@@ -65,9 +65,10 @@ pub fn say(report: &StackReport) -> Result<()> {
         print::line(deblurring.line())?;
     }
     print::line(format_args!(
-        "{} on {}, in {}",
+        "{} on {}, in {}; to look at: {}",
         count_of(report.images, "image"),
         report.device,
-        report.output.display()
+        report.output.display(),
+        report.pictures
     ))
 }

@@ -5,6 +5,7 @@ use super::report::{ReportArgs, StageTimes};
 use anyhow::{Context, Result};
 use nirspi::files::stack::ImageStack;
 use nirspi::imaging::{Deblurring, StackReport};
+use nirspi::picture::Pictures;
 use nirspi_nets::{Backend, Device, Images, Networks, WeightsError};
 use std::path::PathBuf;
 
@@ -73,6 +74,7 @@ impl ImageArgs {
         input: &ImageStack,
         networks: &Networks,
         deblurring: Option<Deblurring>,
+        pictures: Pictures,
         stage_ms: StageTimes,
     ) -> StackReport {
         StackReport {
@@ -82,6 +84,7 @@ impl ImageArgs {
             device: networks.device().name().to_owned(),
             weights: networks.used().to_vec(),
             deblurring,
+            pictures,
             stage_ms,
         }
     }

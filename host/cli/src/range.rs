@@ -7,7 +7,7 @@ use anyhow::Result;
 use nirspi::files::image::encode_rgb;
 use nirspi::files::output::OutputDir;
 use nirspi_eval::camera_model::{resolution_chart, snr_chart};
-use nirspi_eval::range::{Report, Settings, chart, exposure_chart, range};
+use nirspi_eval::range::{Report, Settings, exposure_chart, picture, range};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -52,7 +52,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let report = range(&settings).map_err(refused)?;
     if let Some(out) = &args.out {
         let mut out = OutputDir::create(out)?;
-        out.write("range.png", &encode_rgb(&chart(&settings)?.render()))?;
+        out.write("range.png", &encode_rgb(&picture(&settings)?))?;
         out.write("exposure.png", &encode_rgb(&exposure_chart(&settings)?.render()))?;
         let camera = &settings.camera;
         out.write("resolution.png", &encode_rgb(&resolution_chart(camera)?.render()))?;

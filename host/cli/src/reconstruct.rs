@@ -13,11 +13,10 @@ use anyhow::{Context, Result, bail};
 use nirspi::account::LossCounters;
 use nirspi::calibration::KeptFlatField;
 use nirspi::capture::Capture;
-use nirspi::files::image::{encode_grey, encode_rgb};
 use nirspi::files::npy;
 use nirspi::files::output::OutputDir;
 use nirspi::imaging::{FrameReport, MethodReport, enhance_frames};
-use nirspi::picture::{Panel, Range, SideBySide};
+use nirspi::picture::{Pictures, Unit};
 use nirspi::source::{FirstPatterns, Index, Part, Source};
 use nirspi_recon::words::count_of;
 use nirspi_recon::{Image, Sampling, metrics};
@@ -97,6 +96,8 @@ struct Report {
     #[serde(skip_serializing_if = "Option::is_none")]
     enhancement: Option<FrameReport>,
     notes: Vec<String>,
+    /// What is black and white in the pictures.
+    pictures: Pictures,
     stage_ms: StageTimes,
 }
 
@@ -205,7 +206,10 @@ fn one_image(request: &Request<'_>, source: Source, mut times: StageTimes) -> Re
     } else {
         (None, None)
     };
+    let unit = Unit::of_readings(source.frames.is_some());
+    let short = enhancement.as_ref().map(|enhancement| enhancement.short.clone());
     let report = Report {
+        pictures: Pictures::of_image(&image, unit, sharp.as_deref().zip(short)),
         input: request.input.to_owned(),
         n: side,
         measurements: all,
@@ -230,9 +234,7 @@ fn one_image(request: &Request<'_>, source: Source, mut times: StageTimes) -> Re
         notes: source.notes,
         stage_ms: times,
     };
-    let short = report.enhancement.as_ref().map_or(&[][..], |enhancement| &enhancement.short);
-    let sharp = sharp.as_deref().map(|sharp| (sharp, short));
-    write(request.out, &image, parts.as_ref(), sharp, &report)?;
+    write(request.out, &image, parts.as_ref(), sharp.as_deref(), &report.pictures, &report)?;
     Ok(report)
 }
 
@@ -249,59 +251,30 @@ fn check_finite(input: &Path, image: &Image) -> Result<()> {
     bail!("{}: the readings are too large for an image of 32-bit floats", input.display())
 }
 
-/// Writes an image, the real and imaginary part of a complex image, and the enhanced image with its
-/// warnings, if there is one.
+/// Writes an image, the real and imaginary part of a complex image, the enhanced image, if there is
+/// one, and the pictures.
 fn write(
     out: &Path,
     image: &Image,
     parts: Option<&[Image; 2]>,
-    sharp: Option<(&[f32], &[String])>,
+    sharp: Option<&[f32]>,
+    pictures: &Pictures,
     report: &impl Serialize,
 ) -> Result<()> {
     let side = image.side().pixels();
     let mut out = OutputDir::create(out)?;
     out.write("image.npy", &npy::encode(&[side, side], image.pixels()))?;
-    out.write("image.png", &enlarged_png(&image.stretched()))?;
     for (name, part) in ["real.npy", "imaginary.npy"].iter().zip(parts.into_iter().flatten()) {
         out.write(name, &npy::encode(&[side, side], part.pixels()))?;
     }
-    if let Some((sharp, warnings)) = sharp {
+    if let Some(sharp) = sharp {
         let side = nirspi_nets::deblur::SIDE;
         out.write("enhanced.npy", &npy::encode(&[side, side], sharp))?;
-        out.write("enhanced.png", &warned_png(side, sharp, warnings))?;
     }
+    pictures.write(&mut out)?;
     out.write("report.json", to_json(report)?.as_bytes())?;
     out.commit()?;
     Ok(())
-}
-
-/// The image, with any reasons not to trust it below.
-fn warned_png(side: usize, pixels: &[f32], warnings: &[String]) -> Vec<u8> {
-    if warnings.is_empty() {
-        return encode_grey(side, side, pixels);
-    }
-    let panel = Panel {
-        title: String::new(),
-        width: side,
-        height: side,
-        values: pixels.to_vec(),
-        range: Range::Unit,
-        caption: Vec::new(),
-        warnings: warnings.to_vec(),
-    };
-    let (header, footer) = (String::new(), String::new());
-    encode_rgb(&SideBySide { header, panels: vec![panel], footer }.render())
-}
-
-/// A PNG with visible pixels: squares, at least 256 px for the whole image.
-pub fn enlarged_png(image: &Image) -> Vec<u8> {
-    let side = image.side().pixels();
-    let factor = (256 / side).max(1);
-    let width = side * factor;
-    let pixels: Vec<f32> = (0..width * width)
-        .map(|p| image.pixels()[p / width / factor * side + p % width / factor])
-        .collect();
-    encode_grey(width, width, &pixels)
 }
 
 /// The number of patterns that were not read, and the first of them, in words.

@@ -58,15 +58,16 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let bar = Progress::of("upscaling", input.count(), "images");
     let large = times.time("upscale", || fusion.upscale(images, depth.as_ref()));
     drop(bar);
-    target.write(2 * fusion::SIDE, &large)?;
+    let shown = target.write_and_show(2 * fusion::SIDE, &large, "upscaled")?;
 
-    let report = args.images.report(&input, &networks, None, times);
+    let report = args.images.report(&input, &networks, None, shown, times);
     args.images.report.print(&report, |report| {
         print::line(format_args!(
-            "{} upscaled to 64 x 64 on {}, in {}",
+            "{} upscaled to 64 x 64 on {}, in {}; to look at: {}",
             count_of(report.images, "image"),
             report.device,
-            report.output.display()
+            report.output.display(),
+            report.pictures
         ))
     })
 }

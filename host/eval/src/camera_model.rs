@@ -139,7 +139,8 @@ fn chart(
             * 1e-3;
         let name = format!("{}, {ms:.0} ms", camera.name);
         let colour = lines.len();
-        lines.push(Line { name, colour, dashed: false, points: points.collect() });
+        // Cameras with the same optics have the same line: dashes leave the one below visible.
+        lines.push(Line { name, colour, dashed: colour % 2 == 1, points: points.collect() });
     }
     Ok(Chart {
         header: header.to_owned(),

@@ -44,5 +44,12 @@ mod fid;
 pub use error::{EvalError, Result};
 pub use fid::Fid;
 
+/// The number of lines of a chart that can be told apart by colour and dashes.
+#[cfg(test)]
+fn looks(chart: &nirspi::picture::Chart) -> usize {
+    let looks = chart.lines.iter().map(nirspi::picture::Line::look);
+    looks.collect::<std::collections::BTreeSet<_>>().len()
+}
+
 /// The paper's distances, in m (section 5).
 pub const DISTANCES_M: [f64; 3] = [0.3, 0.6, 1.0];

@@ -2,7 +2,8 @@
 //! Table 2.
 
 use crate::error::{EvalError, Result};
-use nirspi::picture::{Axis, Chart, Line};
+use image::RgbImage;
+use nirspi::picture::{Axis, Chart, Line, below};
 use nirspi_optics::CameraModel;
 use nirspi_optics::pixel::{Instrument, PixelBudget, PixelError};
 use nirspi_optics::rain::blur::DEEPEST_SINGLE;
@@ -287,55 +288,79 @@ fn reading(
     Ok(lines)
 }
 
-/// Signal divided by noise of a pixel against its distance, in dry air, heavy rain and fog.
+/// The [`charts`] in one picture.
 ///
 /// # Errors
 /// Does not occur: the air is the paper's.
-pub fn chart(settings: &Settings) -> Result<Chart> {
+pub fn picture(settings: &Settings) -> Result<RgbImage> {
+    Ok(below(&charts(settings)?.map(|chart| chart.render())))
+}
+
+/// Distances of the lines, in m: 0.1 to 10.
+fn distances_m() -> impl Iterator<Item = f64> {
+    (0..=200).map(|i| 0.1 * 100.0_f64.powf(f64::from(i) / 200.0))
+}
+
+/// Two charts against the distance: signal divided by noise of a pixel in dry air, with each
+/// exposure, and the part of the SNR that light rain, heavy rain and fog take.
+///
+/// # Errors
+/// Does not occur: the air is the paper's.
+pub fn charts(settings: &Settings) -> Result<[Chart; 2]> {
     let Air { instrument, dry, wet } = &Air::new(&settings.camera)?;
+    let snr = |weather: &Weather, m: f64, exposure_us| {
+        PixelBudget::new(instrument, weather, m * 1e3, settings.reflectance, exposure_us)
+            .map(|pixel| pixel.pixel_snr)
+    };
+    let x = || Axis::of("distance, m", vec![0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0], true);
+    let mut lines = Vec::new();
+    for &exposure_us in &settings.exposures_us {
+        let points = distances_m().filter_map(|m| Some((m, snr(dry, m, exposure_us).ok()?)));
+        let (name, points) = (format!("{exposure_us} us"), points.collect());
+        lines.push(Line { name, colour: lines.len(), dashed: false, points });
+    }
+    let name = format!("SNR {}", settings.snr);
+    let points = distances_m().map(|m| (m, settings.snr)).collect();
+    lines.push(Line { name, colour: lines.len(), dashed: true, points });
+    let far = Chart {
+        header: "How far one pixel is seen in dry air".to_owned(),
+        x: x(),
+        y: Axis::of("SNR of one pixel", vec![0.01, 0.1, 1.0, 10.0, 100.0, 1000.0], true),
+        lines,
+        footer:
+            "simulated: photon budget of a uniform sheet; each line is an exposure of a pattern"
+                .to_owned(),
+    };
+
+    let longest = settings.exposures_us.iter().copied().fold(0.0, f64::max);
     let fog = Drops::fog(10.0, 0.1)
         .and_then(|fog| Weather::new(fog, instrument.budget.wavelength_nm, Water::Segelstein));
-    let mut kinds: Vec<(&str, &Weather, bool)> = vec![("dry", dry, false)];
-    kinds.extend(wet.last().map(|heavy| ("heavy rain, 2 mm", heavy, true)));
-    kinds.extend(fog.iter().map(|fog| ("fog, 0.1 g/m3", fog, false)));
+    let rains = TABLE_2.iter().zip(wet).map(|(row, weather)| {
+        (format!("{} rain, {} mm drops", row.name, row.rain.drop_mm), weather)
+    });
+    let fogs = fog.iter().map(|fog| ("fog, 0.1 g/m3".to_owned(), fog));
     let mut lines = Vec::new();
-    for (name, weather, dashed) in kinds {
-        for &exposure_us in &settings.exposures_us {
-            let points = (0..=200).filter_map(|i| {
-                let mm = 100.0 * 100.0_f64.powf(f64::from(i) / 200.0);
-                let pixel =
-                    PixelBudget::new(instrument, weather, mm, settings.reflectance, exposure_us);
-                pixel.ok().map(|pixel| (mm * 1e-3, pixel.pixel_snr))
-            });
-            let name = format!("{name}, {exposure_us} us");
-            // A dashed line leaves the line below visible.
-            lines.push(Line { name, colour: lines.len(), dashed, points: points.collect() });
-        }
+    for (name, weather) in rains.chain(fogs) {
+        let lost = |m| {
+            let dry = snr(dry, m, longest).ok()?;
+            Some((m, 100.0 * (1.0 - snr(weather, m, longest).ok()? / dry)))
+        };
+        let points = distances_m().filter_map(lost).collect();
+        lines.push(Line { name, colour: 3 + lines.len(), dashed: false, points });
     }
-    let along = (0..=100).map(|i| 0.1 * 10_f64.powf(f64::from(i) / 50.0));
-    let threshold = along.map(|m| (m, settings.snr)).collect();
-    let name = format!("SNR {}", settings.snr);
-    lines.push(Line { name, colour: lines.len(), dashed: true, points: threshold });
-    Ok(Chart {
-        header: "How far one pixel is seen in rain".to_owned(),
-        x: Axis {
-            name: "distance, m".to_owned(),
-            from: 0.1,
-            to: 10.0,
-            logarithmic: true,
-            ticks: vec![0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0],
-        },
-        y: Axis {
-            name: "SNR of one pixel".to_owned(),
-            from: 0.01,
-            to: 1000.0,
-            logarithmic: true,
-            ticks: vec![0.01, 0.1, 1.0, 10.0, 100.0, 1000.0],
-        },
+    let values = lines.iter().flat_map(|line| &line.points).map(|point| point.1);
+    let lost = Chart {
+        header: "What rain and fog take of that".to_owned(),
+        x: x(),
+        y: Axis::decades("loss of SNR, %", values, 6),
         lines,
-        footer: "simulated; rain of 5.6 mm/h and dry air differ by less than a line's width"
-            .to_owned(),
-    })
+        footer: format!(
+            "simulated: light rain of {} mm/h, heavy rain of {} mm/h, {longest} us",
+            PaperRain::LIGHT.rate_mm_per_h,
+            PaperRain::HEAVY.rate_mm_per_h
+        ),
+    };
+    Ok([far, lost])
 }
 
 /// The exposure of a pattern that a pixel needs, against distance, in heavy rain, with the paper's
@@ -438,8 +463,14 @@ mod tests {
     }
 
     #[test]
-    fn a_chart_has_a_line_for_each_air_and_exposure_and_one_for_the_threshold() {
-        assert_eq!(chart(&settings(&[8.0, 25.0])).unwrap().lines.len(), 3 * 2 + 1);
+    fn the_charts_have_a_line_for_each_exposure_and_for_each_weather() {
+        let [far, lost] = charts(&settings(&[8.0, 25.0])).unwrap();
+        assert_eq!((crate::looks(&far), crate::looks(&lost)), (2 + 1, 3));
+        // No two lines coincide: at 2 m the losses differ by a tenth of themselves and more.
+        let at_2_m = |line: &Line| line.points.iter().find(|point| point.0 > 2.0).unwrap().1;
+        let mut losses: Vec<f64> = lost.lines.iter().map(at_2_m).collect();
+        losses.sort_unstable_by(f64::total_cmp);
+        assert!(losses.windows(2).all(|pair| pair[1] > 1.1 * pair[0]), "{losses:?}");
     }
 
     #[test]

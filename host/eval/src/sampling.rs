@@ -2,18 +2,25 @@
 //! image of all patterns.
 
 mod plot;
+mod tables;
 
 use crate::error::{EvalError, Result};
+use image::RgbImage;
 use nirspi_recon::reconstruct::{
     self, Method, MethodSettings, Reconstruct, ReconstructError, Setting, Sparsity,
 };
 use nirspi_recon::{Basis, Image, Measurements, NamedOrder, Order, metrics};
 use serde::Serialize;
-use std::fmt::Write;
 use std::path::PathBuf;
 
 /// The name of the order of the measurements.
 pub const RECORDED: &str = "recorded";
+
+/// The method that all others are compared with: what was not measured is 0.
+const ZERO_FILLING: &str = "hadamard";
+
+/// Number of methods of each order and share whose images are kept.
+const KEPT: usize = 3;
 
 /// The orders that are compared by default: the recorded order, every named order except deepinv's,
 /// which are transposes of others, and a shuffle.
@@ -67,6 +74,9 @@ pub struct Row {
     pub method: String,
     /// PSNR against the image of all patterns, whose range of values is the peak.
     pub psnr_db: f64,
+    /// PSNR minus that of zero filling of the same patterns; `null` if either is the image of all
+    /// patterns itself.
+    pub gain_db: Option<f64>,
     /// Pearson's correlation with the image of all patterns.
     pub correlation: f64,
 }
@@ -82,6 +92,77 @@ pub struct Report {
     pub measurements: usize,
     /// Each share, order and method.
     pub rows: Vec<Row>,
+    /// The image of all patterns.
+    #[serde(skip)]
+    full: Option<Image>,
+    /// The images of the best methods of each share and order.
+    #[serde(skip)]
+    shown: Vec<Shown>,
+}
+
+/// Images of one share and order.
+#[derive(Debug, Clone, PartialEq)]
+struct Shown {
+    sampling: f64,
+    order: String,
+    zero: Made,
+    /// The best methods, the best first, without those that are zero filling by another name.
+    best: Vec<Made>,
+}
+
+/// The image of a method.
+#[derive(Debug, Clone, PartialEq)]
+struct Made {
+    method: String,
+    image: Image,
+    psnr_db: f64,
+}
+
+impl Shown {
+    fn best_gain_db(&self) -> f64 {
+        let gain = self.best.first().and_then(|best| gain_db(best.psnr_db, self.zero.psnr_db));
+        gain.unwrap_or(0.0)
+    }
+}
+
+/// A PSNR beyond this is the image itself but for rounding.
+const ITSELF_DB: f64 = 100.0;
+
+fn gain_db(psnr_db: f64, zero_db: f64) -> Option<f64> {
+    (psnr_db.is_finite() && zero_db < ITSELF_DB).then_some(psnr_db - zero_db)
+}
+
+impl Report {
+    fn empty(input: PathBuf, n: usize) -> Self {
+        Self { input, n, measurements: 0, rows: Vec::new(), full: None, shown: Vec::new() }
+    }
+
+    /// Adds the images of all methods with their PSNR and correlation, and keeps the best images.
+    fn add(&mut self, sampling: f64, order: &str, made: Vec<(Made, f64)>) {
+        let zero = made.iter().find(|(made, _)| made.method == ZERO_FILLING);
+        let Some(zero) = zero.map(|(made, _)| made.clone()) else { return };
+        let row = |(made, correlation): &(Made, f64)| Row {
+            sampling,
+            order: order.to_owned(),
+            method: made.method.clone(),
+            psnr_db: made.psnr_db,
+            gain_db: gain_db(made.psnr_db, zero.psnr_db),
+            correlation: *correlation,
+        };
+        self.rows.extend(made.iter().map(row));
+        let other = |made: &Made| gain_db(made.psnr_db, zero.psnr_db).is_some_and(|db| db != 0.0);
+        let mut best: Vec<Made> = made.into_iter().map(|(made, _)| made).filter(other).collect();
+        best.sort_by(|a, b| b.psnr_db.total_cmp(&a.psnr_db));
+        best.truncate(KEPT);
+        self.shown.push(Shown { sampling, order: order.to_owned(), zero, best });
+    }
+
+    /// PSNR of a method; NaN if there is none.
+    fn psnr_db(&self, share: f64, order: &str, method: &str) -> f64 {
+        let sought =
+            |row: &&Row| row.sampling == share && row.order == order && row.method == method;
+        self.rows.iter().find(sought).map_or(f64::NAN, |row| row.psnr_db)
+    }
 }
 
 /// What to compare.
@@ -122,34 +203,42 @@ impl Study {
             return Err(EvalError::PartialSweep { found, expected });
         }
         let full = reconstruct::hadamard(all);
-        let mut rows = Vec::with_capacity(self.images());
+        let mut report = Report::empty(input, full.side().pixels());
+        report.measurements = all.rows().len();
         for &sampling in &self.shares {
             for (name, order) in &self.orders {
                 let part = all.take(order.as_ref(), sampling)?;
+                let mut made = Vec::with_capacity(self.methods.len());
                 for candidate in &self.methods {
                     let image = candidate.method.reconstruct(&part)?.image;
-                    rows.push(judge(&full, &image, sampling, name, &candidate.name)?);
+                    let (psnr_db, correlation) = judge(&full, &image)?;
+                    made.push((
+                        Made { method: candidate.name.clone(), image, psnr_db },
+                        correlation,
+                    ));
                     done();
                 }
+                report.add(sampling, name, made);
             }
         }
-        let n = full.side().pixels();
-        Ok(Report { input, n, measurements: all.rows().len(), rows })
+        report.full = Some(full);
+        Ok(report)
     }
 
-    /// PSNR as Markdown tables, one for each share: methods down, orders across, the best of each
-    /// order in bold.
+    /// Markdown tables for each share: the best methods of each order, then PSNR of every method.
     #[must_use]
     pub fn tables(&self, report: &Report) -> String {
-        table(report, &self.order_names(), &self.method_names(), &self.shares)
+        tables::all(report, &self.order_names(), &self.method_names(), &self.shares)
     }
 
-    /// PSNR over the share for each method in the best order, as an SVG picture.
+    /// The best images; and for each order the gain over zero filling of the best methods against
+    /// the share, with their images. An order that repeats another is left out.
     #[must_use]
-    pub fn plot(&self, report: &Report) -> String {
-        let orders = self.order_names();
-        let best = best_order(report, &orders);
-        plot::draw(&curves(report, best, &self.method_names()), best)
+    pub fn plot(&self, report: &Report) -> RgbImage {
+        let methods = self.method_names();
+        let (orders, _) =
+            tables::telling_orders(report, &self.order_names(), &methods, &self.shares);
+        plot::draw(report, &orders, &methods)
     }
 
     fn order_names(&self) -> Vec<String> {
@@ -162,91 +251,18 @@ impl Study {
 }
 
 /// Compares an image with the full image: PSNR with the full image's range of values as the peak,
-/// without a fit.
-fn judge(
-    full: &Image,
-    image: &Image,
-    sampling: f64,
-    order: &str,
-    method: &str,
-) -> Result<Row, metrics::MetricError> {
+/// without a fit, and correlation.
+fn judge(full: &Image, image: &Image) -> Result<(f64, f64), metrics::MetricError> {
     let side = full.side().pixels();
     let (low, high) = full
         .pixels()
         .iter()
         .fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), &p| (low.min(p), high.max(p)));
     let range = f64::from(high) - f64::from(low);
-    Ok(Row {
-        sampling,
-        order: order.to_owned(),
-        method: method.to_owned(),
-        psnr_db: metrics::psnr(full.pixels(), image.pixels(), side, side, range)?,
-        correlation: metrics::correlation(full.pixels(), image.pixels(), side, side)?,
-    })
-}
-
-/// A table of PSNR for each share: methods down, orders across, the best of each order in bold.
-fn table(report: &Report, orders: &[String], methods: &[String], shares: &[f64]) -> String {
-    let mut text = String::new();
-    // Writing to a string cannot fail.
-    for &share in shares {
-        let _ = writeln!(
-            text,
-            "PSNR in dB against the image of all patterns, {:.0} % sampling\n",
-            100.0 * share
-        );
-        let _ = writeln!(text, "| method | {} |", orders.join(" | "));
-        let _ = writeln!(text, "|---|{}", "---|".repeat(orders.len()));
-        let at = |order: &str, method: &str| {
-            let sought =
-                |row: &&Row| row.sampling == share && row.order == order && row.method == method;
-            report.rows.iter().find(sought).map_or(f64::NAN, |row| row.psnr_db)
-        };
-        for method in methods {
-            let _ = write!(text, "| {method} |");
-            for order in orders {
-                let best = methods.iter().map(|m| at(order, m)).fold(f64::NEG_INFINITY, f64::max);
-                let found = at(order, method);
-                let mark = if found == best { "**" } else { "" };
-                let _ = write!(text, " {mark}{found:.2}{mark} |");
-            }
-            text.push('\n');
-        }
-        text.push('\n');
-    }
-    text
-}
-
-/// The order whose best method is best over all shares.
-fn best_order<'a>(report: &Report, orders: &'a [String]) -> &'a str {
-    let merit = |order: &str| {
-        let of_order = report.rows.iter().filter(|row| row.order == order);
-        let mut best = std::collections::BTreeMap::new();
-        for row in of_order {
-            let entry = best.entry(row.sampling.to_bits()).or_insert(row.psnr_db);
-            *entry = row.psnr_db.max(*entry);
-        }
-        best.values().filter(|psnr| psnr.is_finite()).sum::<f64>()
-    };
-    let better = |a: &&String, b: &&String| merit(a).total_cmp(&merit(b));
-    orders.iter().max_by(better).map_or("", String::as_str)
-}
-
-/// PSNR over share for each method, in one order.
-fn curves(report: &Report, order: &str, methods: &[String]) -> Vec<plot::Curve> {
-    methods
-        .iter()
-        .map(|method| {
-            let points = report
-                .rows
-                .iter()
-                .filter(|row| row.order == order && row.method == *method)
-                .filter(|row| row.psnr_db.is_finite())
-                .map(|row| (row.sampling, row.psnr_db))
-                .collect();
-            plot::Curve { name: method.clone(), points }
-        })
-        .collect()
+    Ok((
+        metrics::psnr(full.pixels(), image.pixels(), side, side, range)?,
+        metrics::correlation(full.pixels(), image.pixels(), side, side)?,
+    ))
 }
 
 #[cfg(test)]
@@ -291,7 +307,56 @@ mod tests {
         assert!(tables.contains("| method | recorded | zig-zag |"), "{tables}");
         // At each share, the best method of each order is bold.
         assert!(tables.matches("**").count() >= 2 * 2 * 2, "{tables}");
-        assert!(study.plot(&report).contains("order zig-zag"));
+    }
+
+    #[test]
+    fn the_picture_has_a_panel_for_each_order_with_lines_that_differ() {
+        let study = study(&[0.25, 0.75]);
+        let report = study.run("disc".into(), &disc(), &|| {}).unwrap();
+        let charts = plot::charts(&report, &study.order_names(), &study.method_names());
+        assert_eq!(charts.len(), 2);
+        for chart in &charts {
+            assert_eq!(crate::looks(chart), 2, "{chart:?}");
+            let gains = &chart.lines[0].points;
+            assert_eq!(gains.len(), 2);
+            let row = |row: &&Row| row.order == chart.header && row.method == "tikhonov, dct";
+            let row = report.rows.iter().find(row).unwrap();
+            assert_eq!(gains[0], (25.0, row.gain_db.unwrap()));
+        }
+        // The image of the best method is kept beside zero filling's.
+        assert!(
+            report.shown.iter().all(|shown| shown.best.len() == 1 && shown.best_gain_db() > 0.0)
+        );
+        let drawn = study.plot(&report);
+        assert!(drawn.width() > 800 && drawn.height() > 1000, "{:?}", drawn.dimensions());
+    }
+
+    #[test]
+    fn many_methods_have_looks_of_their_own() {
+        let mut report = Report::empty("many".into(), 16);
+        let methods: Vec<String> = std::iter::once(ZERO_FILLING.to_owned())
+            .chain((0..14).map(|m| format!("m{m}")))
+            .collect();
+        let orders: Vec<String> = (0..7).map(|order| format!("o{order}")).collect();
+        for (o, order) in orders.iter().enumerate() {
+            for (m, method) in methods.iter().enumerate() {
+                let gain_db = if m == 0 { 0.0 } else { 1.0 + ((m + 2 * o) % 14) as f64 };
+                let (order, method) = (order.clone(), method.clone());
+                let (sampling, correlation, psnr_db) = (0.5, 1.0, 10.0 + gain_db);
+                let gain_db = Some(gain_db);
+                report.rows.push(Row { sampling, order, method, psnr_db, gain_db, correlation });
+            }
+        }
+        let charts = plot::charts(&report, &orders, &methods);
+        let mut looks = std::collections::BTreeMap::new();
+        for chart in &charts {
+            assert_eq!(crate::looks(chart), chart.lines.len());
+            for line in &chart.lines {
+                assert_eq!(*looks.entry(line.name.clone()).or_insert(line.look()), line.look());
+            }
+        }
+        let distinct: std::collections::BTreeSet<_> = looks.values().collect();
+        assert_eq!(distinct.len(), looks.len(), "{looks:?}");
     }
 
     #[test]

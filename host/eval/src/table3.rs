@@ -20,7 +20,7 @@ use crate::shot::{CalibratedCamera, Conditions, Exposure, Shots};
 use crate::typefaces::{self, CHARACTERS, of_scene};
 use image::RgbImage;
 use nirspi::imaging::{Quality, compare};
-use nirspi::picture::{Panel, Range, SideBySide, Typeface, stacked};
+use nirspi::picture::{Panel, SideBySide, Typeface, Unit, stacked};
 use nirspi::scene::SceneMap;
 use nirspi_nets::images::Images;
 use nirspi_nets::metrics::{CharacterJudge, Judged as Features};
@@ -212,17 +212,13 @@ impl Table {
         for paper in self.images() {
             let judged =
                 judged(paper.image, &taken, |t| &t.wet, &self.wet_whites, &self.enhancers)?;
+            let title = format!("{}, {distance_m} m", paper.image.name());
             panels.extend(judged.into_iter().map(|judged| Panel {
-                title: format!("{}, {distance_m} m", paper.image.name()),
-                width: 64,
-                height: 64,
-                values: judged.fine,
-                range: Range::Unit,
                 caption: vec![format!(
                     "PSNR {:.1} dB  SSIM {:.2}",
                     judged.quality.psnr_db, judged.quality.ssim
                 )],
-                warnings: Vec::new(),
+                ..Panel::square(&title, 64, &judged.fine, Unit::Reflectance)
             }));
         }
         let face = of_scene(SHOWN as usize, typefaces.len()).1;

@@ -338,7 +338,7 @@ pub fn chart(report: &Report) -> Chart {
     let lines = report.rows.iter().enumerate().map(|(k, row)| Line {
         name: format!("{}, {} m", row.image.name(), row.distance_m),
         colour: k,
-        dashed: k >= 6,
+        dashed: false,
         points: row.bar_contrast.iter().map(|&(mm, contrast)| (mm, contrast.max(0.0))).collect(),
     });
     Chart {
@@ -353,10 +353,9 @@ pub fn chart(report: &Report) -> Chart {
         y: Axis {
             name: "contrast kept".to_owned(),
             from: 0.0,
-            // Room for the legend.
-            to: 1.5,
+            to: 1.0,
             logarithmic: false,
-            ticks: vec![0.0, 0.1, 0.5, 1.0],
+            ticks: vec![0.0, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0],
         },
         lines: lines.collect(),
         footer: format!("simulated: rain {}, {BAR_PICTURES} pictures a point", report.rain),

@@ -43,36 +43,4 @@ impl Image {
         let parts = real.pixels.iter().zip(&imaginary.pixels);
         Self { side: real.side, pixels: parts.map(|(re, im)| re.hypot(*im)).collect() }
     }
-
-    /// The image stretched to `[0, 1]` for display. The darkest and the brightest half per cent of
-    /// the pixels saturate, so that a few outliers (for example the pixel that takes the offset of
-    /// a non-differential measurement) do not reduce the contrast of the rest. A flat image becomes
-    /// 0.
-    #[must_use]
-    pub fn stretched(&self) -> Self {
-        let mut sorted = self.pixels.clone();
-        sorted.sort_unstable_by(f32::total_cmp);
-        let tail = sorted.len() / 200;
-        let (low, high) = (sorted[tail], sorted[sorted.len() - 1 - tail]);
-        let span = high - low;
-        let scale = if span > 0.0 { 1.0 / span } else { 0.0 };
-        let pixels = self.pixels.iter().map(|p| ((p - low) * scale).clamp(0.0, 1.0)).collect();
-        Self { side: self.side, pixels }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn one_outlier_does_not_grey_out_the_rest() {
-        let side = Side::INSTRUMENT;
-        let mut pixels: Vec<f32> = (0..1024).map(|p| (p % 32) as f32).collect();
-        pixels[0] = 1e6;
-        let shown = Image::new(side, pixels).stretched();
-        assert_eq!((shown.pixels()[1], shown.pixels()[31]), (1.0 / 31.0, 1.0));
-        assert_eq!(shown.pixels()[0], 1.0);
-        assert!(Image::new(side, vec![3.0; 1024]).stretched().pixels().iter().all(|&p| p == 0.0));
-    }
 }

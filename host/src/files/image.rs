@@ -5,6 +5,11 @@
 //! was written (`tests::all_256_grey_levels_survive_a_round_trip`), and metrics against a user's
 //! own file use the user's numbers. Undoing the tone curve of a photograph would not give a
 //! reflectance at 1550 nm: a visible picture does not show what a surface reflects there.
+//!
+//! A picture with labels that this program has written (title, grey bar, warnings) is read as the
+//! image in it.
+
+mod labelled;
 
 use super::FileError;
 use super::archive::{kind_by_start, open_file};
@@ -15,7 +20,9 @@ use ::image::{
     ImageFormat, ImageReader, Limits, Luma, RgbImage,
 };
 use std::io::{BufRead, BufReader, Seek};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+pub(crate) use labelled::{Placed, encode_labelled};
 
 const EXPECTED: &str = "a PNG or JPEG image";
 /// The largest edge that the reader accepts. A scene is later averaged down to hundreds of pixels.
@@ -100,6 +107,11 @@ fn decode(path: &Path) -> Result<DynamicImage, FileError> {
         return Err(FileError::kind(path, kind_by_start(start), EXPECTED));
     };
     stream.rewind().map_err(read)?;
+    let labels = match format {
+        ImageFormat::Png => labelled::labels_of(&mut stream),
+        _ => None,
+    };
+    stream.rewind().map_err(read)?;
 
     let mut limits = Limits::default();
     limits.max_image_width = Some(MAX_EDGE_PX);
@@ -116,7 +128,7 @@ fn decode(path: &Path) -> Result<DynamicImage, FileError> {
         picture.apply_orientation(orientation);
         Ok(picture)
     };
-    decoded().map_err(|error| match error {
+    let picture = decoded().map_err(|error| match error {
         ::image::ImageError::Limits(_) => FileError::kind(
             path,
             "an image that is too large",
@@ -127,7 +139,43 @@ fn decode(path: &Path) -> Result<DynamicImage, FileError> {
             found: error.to_string(),
             expected: EXPECTED,
         },
-    })
+    })?;
+    let wrong = |(found, expected): (String, &'static str)| FileError::kind(path, found, expected);
+    match labels {
+        None => Ok(picture),
+        Some(labels) => {
+            let labels = labels.map_err(|e| wrong((format!("labels: {e}"), EXPECTED)))?;
+            labelled::image_in(&picture, &labels).map_err(wrong)
+        }
+    }
+}
+
+/// The ending of pictures for people beside results for programs. Folders are read without them.
+pub const FOR_PEOPLE: &str = ".picture.png";
+
+/// Whether a file's name is that of a PNG or JPEG.
+#[must_use]
+pub fn is_picture(path: &Path) -> bool {
+    let has = |ending: &str| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending));
+    ["png", "jpg", "jpeg"].into_iter().any(has)
+}
+
+/// The PNG and JPEG files of a folder, sorted by name, without the pictures for people.
+///
+/// # Errors
+/// [`FileError`] if the folder cannot be read.
+pub fn pictures_in(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
+    let io = |system| FileError::io(folder, "read", system);
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(io)? {
+        let file = entry.map_err(io)?.path();
+        let for_people = file.to_string_lossy().ends_with(FOR_PEOPLE);
+        if is_picture(&file) && !for_people {
+            files.push(file);
+        }
+    }
+    files.sort();
+    Ok(files)
 }
 
 /// The picture's grey levels, 0 to 1.

@@ -6,10 +6,10 @@
 //! first (`host/cli/tests/cli/enhance.rs`).
 
 use super::FileError;
-use super::image::{Grey, encode_grey, read_grey};
+use super::image::{FOR_PEOPLE, Grey, encode_grey, is_picture, pictures_in, read_grey};
 use super::npy;
 use super::output::{OutputDir, write_atomic};
-use std::fs;
+use crate::picture::{Panel, Pictures, Sheet, SideBySide, Unit};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -122,16 +122,7 @@ impl ImageStack {
     }
 
     fn folder(path: &Path, resize: Option<u32>) -> Result<Self> {
-        let io = |system| FileError::io(path, "read", system);
-        let entries = fs::read_dir(path).map_err(io)?;
-        let mut files = Vec::new();
-        for entry in entries {
-            let file = entry.map_err(io)?.path();
-            if is_picture(&file) {
-                files.push(file);
-            }
-        }
-        files.sort();
+        let files = pictures_in(path)?;
         let Some(first) = files.first() else {
             return Err(StackError::Empty(path.to_owned()));
         };
@@ -206,7 +197,11 @@ impl ImageStack {
             };
             Kind::Folder(names)
         };
-        Ok(StackTarget { path: out.to_owned(), kind })
+        let input = match self.count == 1 && self.height == self.width {
+            true => Shown::Single(Panel::square("input", self.width, &self.values, Unit::OfWhite)),
+            false => Shown::Many,
+        };
+        Ok(StackTarget { path: out.to_owned(), kind, input })
     }
 }
 
@@ -215,6 +210,14 @@ impl ImageStack {
 pub struct StackTarget {
     path: PathBuf,
     kind: Kind,
+    input: Shown,
+}
+
+/// What a picture shows beside the results: the image itself, if there is one.
+#[derive(Debug)]
+enum Shown {
+    Single(Panel),
+    Many,
 }
 
 #[derive(Debug)]
@@ -247,10 +250,38 @@ impl StackTarget {
         }
         Ok(())
     }
-}
 
-fn is_picture(path: &Path) -> bool {
-    ["png", "jpg", "jpeg"].iter().any(|extension| has_extension(path, extension))
+    /// Writes the images, and beside them a picture for people: input and result side by side, or a
+    /// contact sheet of the results. `title` names the results.
+    ///
+    /// # Errors
+    /// [`StackError::File`] if the images or the picture cannot be written.
+    pub fn write_and_show(&self, side: usize, values: &[f32], title: &str) -> Result<Pictures> {
+        self.write(side, values)?;
+        let name = match self.kind {
+            Kind::Folder(_) => self.path.file_name(),
+            Kind::Array(_) | Kind::Picture => self.path.file_stem(),
+        };
+        let name = name.map_or_else(|| "images".into(), |name| name.to_string_lossy());
+        let file = self.path.with_file_name(format!("{name}{FOR_PEOPLE}"));
+        let mut pictures = Pictures::default();
+        let named = file.display().to_string();
+        match &self.input {
+            Shown::Single(input) => {
+                let result = Panel::square(title, side, values, Unit::OfWhite);
+                let panels = vec![input.clone(), result];
+                let (header, footer) = (String::new(), String::new());
+                pictures.add(&named, &SideBySide { header, panels, footer });
+            }
+            Shown::Many => {
+                let images = values.chunks_exact(side * side).collect();
+                let header = title.to_owned();
+                pictures.sheet(&named, &Sheet::new(header, side, images, Unit::OfWhite));
+            }
+        }
+        pictures.write_files()?;
+        Ok(pictures)
+    }
 }
 
 fn read_picture(path: &Path, resize: Option<u32>) -> Result<Grey> {

@@ -1,5 +1,6 @@
 //! The report of learned stages or classical deblurring on a stack of images.
 
+use crate::picture::Pictures;
 use crate::stage_times::StageTimes;
 use nirspi_nets::{Enhanced, UsedWeights};
 use serde::Serialize;
@@ -21,6 +22,8 @@ pub struct StackReport {
     /// The estimates, if the images were deblurred.
     #[serde(flatten)]
     pub deblurring: Option<Deblurring>,
+    /// The picture for people, and what is black and white in it.
+    pub pictures: Pictures,
     /// The time of each stage.
     pub stage_ms: StageTimes,
 }

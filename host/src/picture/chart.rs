@@ -3,41 +3,41 @@
 //! # Invariant
 //! Every point lies where its axes say (`tests::a_point_lies_where_its_axes_say`), clipped to the
 //! frame (`tests::points_outside_the_frame_or_nowhere_are_left_out`). Every line is named in the
-//! legend. A legend of many lines is beside the frame, where it covers no line
-//! (`tests::many_lines_have_their_legend_beside_the_frame`).
+//! legend beside the frame, where it covers no line, and no two [`looks`](Line::look) are alike
+//! (`tests::no_two_looks_are_alike`). Labels of ticks do not touch
+//! (`tests::labels_that_would_touch_are_left_out`).
 
-use super::text::{Font, Style};
+use super::text::{Block, Font, Style};
+use super::ticks::{around, label};
+use super::{BRIGHT, DIM, GRID, GROUND};
 use image::{Rgb, RgbImage};
 
-const WIDTH_PX: u32 = 1100;
-const HEIGHT_PX: u32 = 720;
+/// The frame of a chart: columns and rows.
+const FRAME_PX: (u32, u32) = (950, 500);
 const LEFT_PX: u32 = 110;
-const RIGHT_PX: u32 = 40;
-const TOP_PX: u32 = 90;
-const BOTTOM_PX: u32 = 130;
-/// With more lines than this, the legend is beside the frame.
-const LINES_INSIDE: usize = 6;
-/// A line of up to this many points shows each point.
-const POINTS_MARKED: usize = 24;
+const MARGIN_PX: u32 = 24;
 /// Room for a piece of the line before its name in the legend.
 const LEGEND_LINE_PX: u32 = 50;
-/// Lengths drawn and left out along a dashed line.
-const DASH_PX: [f64; 2] = [10.0, 7.0];
+/// The widest name in a legend. A longer one has several lines.
+const LEGEND_PX: u32 = 330;
+/// A line of up to this many points shows each point.
+const POINTS_MARKED: usize = 24;
 
-const GROUND: Rgb<u8> = Rgb([19, 21, 26]);
-const GRID: Rgb<u8> = Rgb([44, 48, 57]);
-const BRIGHT: Rgb<u8> = Rgb([236, 238, 242]);
-const DIM: Rgb<u8> = Rgb([146, 152, 164]);
-
-/// Colours of the lines, chosen to differ for people who confuse red and green (Okabe and Ito).
-const COLOURS: [Rgb<u8>; 6] = [
+/// Colours of the lines, chosen to differ for people who confuse red and green (Okabe and Ito, on a
+/// dark ground).
+const COLOURS: [Rgb<u8>; 8] = [
     Rgb([86, 180, 233]),
     Rgb([230, 159, 0]),
     Rgb([0, 158, 115]),
     Rgb([204, 121, 167]),
     Rgb([240, 228, 66]),
     Rgb([213, 94, 0]),
+    Rgb([236, 238, 242]),
+    Rgb([118, 130, 255]),
 ];
+
+/// Lengths drawn and left out along a line, in turn; solid without any.
+const DASHES_PX: [&[f64]; 4] = [&[], &[10.0, 7.0], &[2.5, 6.0], &[14.0, 5.0, 2.5, 5.0]];
 
 /// One axis.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,6 +55,40 @@ pub struct Axis {
 }
 
 impl Axis {
+    /// A linear axis around all of these values, with a few ticks at 1, 2 or 5 times a power of
+    /// ten. Values that are not finite have no part in it.
+    #[must_use]
+    pub fn around(name: &str, values: impl IntoIterator<Item = f64>) -> Self {
+        let finite = values.into_iter().filter(|value| value.is_finite());
+        let (low, high) = finite
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
+        let ticks = if low <= high { around(low, high, 6) } else { around(0.0, 1.0, 6) };
+        Self::of(name, ticks, false)
+    }
+
+    /// A logarithmic axis of whole decades around all of these values, at most `most` decades from
+    /// the largest value down. Values that are not positive have no part in it.
+    #[must_use]
+    pub fn decades(name: &str, values: impl IntoIterator<Item = f64>, most: i32) -> Self {
+        let positive = values.into_iter().filter(|value| value.is_finite() && *value > 0.0);
+        let (low, high) = positive
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
+        let (low, high) = if low <= high { (low, high) } else { (1.0, 10.0) };
+        let end = high.log10().ceil() as i32;
+        let start = (low.log10().floor() as i32).max(end - most).min(end - 1);
+        Self::of(name, (start..=end).map(|power| 10_f64.powi(power)).collect(), true)
+    }
+
+    /// An axis from the first of these ticks to the last.
+    ///
+    /// # Panics
+    /// If there are fewer than two ticks.
+    #[must_use]
+    pub fn of(name: &str, ticks: Vec<f64>, logarithmic: bool) -> Self {
+        let &[from, .., to] = ticks.as_slice() else { panic!("an axis of two ticks at least") };
+        Self { name: name.to_owned(), from, to, logarithmic, ticks }
+    }
+
     /// The position of a value along the axis: 0 at `from`, 1 at `to`.
     fn at(&self, value: f64) -> f64 {
         if self.logarithmic {
@@ -70,12 +104,29 @@ impl Axis {
 pub struct Line {
     /// The name in the legend.
     pub name: String,
-    /// Which of the six colours.
+    /// Which of the eight colours. Beyond them the colours come again with dots.
     pub colour: usize,
     /// Whether the line is dashed.
     pub dashed: bool,
     /// Points as x and y.
     pub points: Vec<(f64, f64)>,
+}
+
+impl Line {
+    /// Colour and dashes as indices: equal for two lines that look alike.
+    #[must_use]
+    pub fn look(&self) -> (usize, usize) {
+        let again = self.colour / COLOURS.len() % 2;
+        (self.colour % COLOURS.len(), 2 * again + usize::from(self.dashed))
+    }
+
+    fn colour(&self) -> Rgb<u8> {
+        COLOURS[self.look().0]
+    }
+
+    fn dashes(&self) -> &'static [f64] {
+        DASHES_PX[self.look().1]
+    }
 }
 
 /// A chart.
@@ -89,52 +140,106 @@ pub struct Chart {
     pub y: Axis,
     /// The lines in the order of the legend.
     pub lines: Vec<Line>,
-    /// The line of text below the chart: the source.
+    /// The text below the chart: the source.
     pub footer: String,
+}
+
+const TITLE: fn() -> Style =
+    || Style { font: Font::sans(), size_px: 28.0, line_px: 34, colour: BRIGHT };
+const SMALL: fn() -> Style =
+    || Style { font: Font::sans(), size_px: 18.0, line_px: 22, colour: DIM };
+
+/// Where everything of a chart is, in pixels.
+struct Laid {
+    header: Block,
+    y_name: Block,
+    x_name: Block,
+    footer: Block,
+    names: Vec<Block>,
+    /// The frame: left and right, top and bottom.
+    x_px: (f64, f64),
+    y_px: (f64, f64),
+    size: (u32, u32),
 }
 
 impl Chart {
     /// Draws the chart; [`encode_rgb`](crate::files::image::encode_rgb) makes a PNG of it.
     #[must_use]
     pub fn render(&self) -> RgbImage {
-        let style =
-            |size_px, line_px, colour| Style { font: Font::sans(), size_px, line_px, colour };
-        let (title, small) = (style(28.0, 34, BRIGHT), style(18.0, 22, DIM));
-        let legend_px = if self.lines.len() > LINES_INSIDE {
-            self.widest(&small) as u32 + LEGEND_LINE_PX + RIGHT_PX
-        } else {
-            0
-        };
-        let mut canvas = RgbImage::from_pixel(WIDTH_PX + legend_px, HEIGHT_PX, GROUND);
-        let (width, height) =
-            (f64::from(WIDTH_PX - LEFT_PX - RIGHT_PX), f64::from(HEIGHT_PX - TOP_PX - BOTTOM_PX));
-        let x_px = |x: f64| f64::from(LEFT_PX) + self.x.at(x) * width;
-        let y_px = |y: f64| f64::from(TOP_PX) + (1.0 - self.y.at(y)) * height;
+        self.render_at(FRAME_PX)
+    }
 
-        title.draw(&mut canvas, &self.header, LEFT_PX as f32, 18.0);
-        small.draw(&mut canvas, &self.y.name, LEFT_PX as f32, 60.0);
-        let (bottom, right) = (f64::from(HEIGHT_PX - BOTTOM_PX), f64::from(WIDTH_PX - RIGHT_PX));
+    /// As [`render`](Self::render), with a frame of so many columns and rows.
+    #[must_use]
+    pub fn render_at(&self, frame_px: (u32, u32)) -> RgbImage {
+        let laid = self.lay(frame_px);
+        let mut canvas = RgbImage::from_pixel(laid.size.0, laid.size.1, GROUND);
+        let ((left, right), (top, bottom)) = (laid.x_px, laid.y_px);
+        let x_px = |x: f64| left + self.x.at(x) * (right - left);
+        let y_px = |y: f64| bottom - self.y.at(y) * (bottom - top);
+
+        laid.header.draw(&mut canvas, LEFT_PX, MARGIN_PX);
+        laid.y_name.draw(&mut canvas, LEFT_PX, top as u32 - laid.y_name.height() - 8);
+        let small = SMALL();
+        let mut free_from = 0.0;
         for &tick in &self.x.ticks {
-            stroke(&mut canvas, (x_px(tick), f64::from(TOP_PX)), (x_px(tick), bottom), GRID, 1.0);
+            stroke(&mut canvas, (x_px(tick), top), (x_px(tick), bottom), GRID, 1.0);
             let text = label(tick);
-            let left = x_px(tick) as f32 - small.width(&text) / 2.0;
-            small.draw(&mut canvas, &text, left, bottom as f32 + 6.0);
+            let wide = small.width(&text);
+            let at = x_px(tick) as f32 - wide / 2.0;
+            if at >= free_from {
+                small.draw(&mut canvas, &text, at, bottom as f32 + 6.0);
+                free_from = at + wide + 8.0;
+            }
         }
+        let mut free_to = f64::INFINITY;
         for &tick in &self.y.ticks {
-            stroke(&mut canvas, (f64::from(LEFT_PX), y_px(tick)), (right, y_px(tick)), GRID, 1.0);
+            stroke(&mut canvas, (left, y_px(tick)), (right, y_px(tick)), GRID, 1.0);
             let text = label(tick);
-            let left = LEFT_PX as f32 - small.width(&text) - 10.0;
-            small.draw(&mut canvas, &text, left, y_px(tick) as f32 - 11.0);
+            if y_px(tick) <= free_to {
+                let at = LEFT_PX as f32 - small.width(&text) - 10.0;
+                small.draw(&mut canvas, &text, at.max(0.0), y_px(tick) as f32 - 11.0);
+                free_to = y_px(tick) - 20.0;
+            }
         }
-        let name_left = right as f32 - small.width(&self.x.name);
-        small.draw(&mut canvas, &self.x.name, name_left, bottom as f32 + 32.0);
-        small.draw(&mut canvas, &self.footer, LEFT_PX as f32, HEIGHT_PX as f32 - 40.0);
+        let x_left = right - f64::from(laid.x_name.width());
+        laid.x_name.draw(&mut canvas, x_left as u32, bottom as u32 + 32);
+        let footer_top = laid.size.1 - MARGIN_PX - laid.footer.height();
+        laid.footer.draw(&mut canvas, LEFT_PX, footer_top);
 
         for line in &self.lines {
             self.draw(&mut canvas, line, x_px, y_px);
         }
-        self.legend(&mut canvas, &small, right + f64::from(legend_px));
+        self.legend(&mut canvas, &laid);
         canvas
+    }
+
+    fn lay(&self, (wide, high): (u32, u32)) -> Laid {
+        let names: Vec<Block> = self
+            .lines
+            .iter()
+            .map(|line| Block::new(SMALL, [line.name.as_str()], LEGEND_PX))
+            .collect();
+        let widest = names.iter().map(Block::width).fold(0.0, f32::max).ceil() as u32;
+        let legend_px = if names.is_empty() { 0 } else { LEGEND_LINE_PX + widest + MARGIN_PX };
+        let header = Block::new(TITLE, [self.header.as_str()], wide + legend_px);
+        let footer = Block::new(SMALL, [self.footer.as_str()], wide + legend_px);
+        let y_name = Block::new(SMALL, [self.y.name.as_str()], wide);
+        let x_name = Block::new(SMALL, [self.x.name.as_str()], wide);
+        let top = MARGIN_PX + header.height() + 8 + y_name.height() + 8;
+        let legend_bottom = top + 10 + names.iter().map(|name| name.height() + 2).sum::<u32>();
+        let below = (top + high + 32 + x_name.height()).max(legend_bottom);
+        let height = below + footer.height() + 16 + MARGIN_PX;
+        Laid {
+            x_px: (f64::from(LEFT_PX), f64::from(LEFT_PX + wide)),
+            y_px: (f64::from(top), f64::from(top + high)),
+            size: (LEFT_PX + wide + MARGIN_PX + legend_px, height),
+            header,
+            y_name,
+            x_name,
+            footer,
+            names,
+        }
     }
 
     fn draw(
@@ -144,7 +249,7 @@ impl Chart {
         x_px: impl Fn(f64) -> f64,
         y_px: impl Fn(f64) -> f64,
     ) {
-        let colour = COLOURS[line.colour % COLOURS.len()];
+        let colour = line.colour();
         let inside = |at: f64| (0.0..=1.0).contains(&at);
         let seen = |&(x, y): &(f64, f64)| inside(self.x.at(x)) && inside(self.y.at(y));
         // Dashes continue from one piece to the next.
@@ -152,11 +257,7 @@ impl Chart {
         for pair in line.points.windows(2) {
             if pair.iter().all(seen) {
                 let [from, to] = [pair[0], pair[1]].map(|(x, y)| (x_px(x), y_px(y)));
-                if line.dashed {
-                    along = dashes(canvas, from, to, colour, along);
-                } else {
-                    stroke(canvas, from, to, colour, 2.5);
-                }
+                along = dashes(canvas, (from, to), colour, line.dashes(), along);
             }
         }
         if line.points.len() <= POINTS_MARKED {
@@ -167,60 +268,51 @@ impl Chart {
         }
     }
 
-    fn widest(&self, style: &Style) -> f32 {
-        self.lines.iter().map(|line| style.width(&line.name)).fold(0.0, f32::max)
-    }
-
-    /// Draws the legend in the upper right corner, where falling lines leave room, or right of the
-    /// frame.
-    fn legend(&self, canvas: &mut RgbImage, style: &Style, right: f64) {
-        let left = right - f64::from(self.widest(style)) - 20.0;
-        for (k, line) in self.lines.iter().enumerate() {
-            let top = f64::from(TOP_PX) + 10.0 + 24.0 * k as f64;
-            let colour = COLOURS[line.colour % COLOURS.len()];
-            let ends =
-                if line.dashed { vec![(0.0, 14.0), (24.0, 38.0)] } else { vec![(0.0, 38.0)] };
-            for (from, to) in ends {
-                let at = |dx: f64| (left - f64::from(LEGEND_LINE_PX) + dx, top + 11.0);
-                stroke(canvas, at(from), at(to), colour, 2.5);
-            }
-            style.draw(canvas, &line.name, left as f32, top as f32);
+    /// Draws the legend right of the frame.
+    fn legend(&self, canvas: &mut RgbImage, laid: &Laid) {
+        let left = laid.x_px.1 + f64::from(MARGIN_PX);
+        let mut top = laid.y_px.0 + 10.0;
+        for (line, name) in self.lines.iter().zip(&laid.names) {
+            let ends = ((left, top + 11.0), (left + 38.0, top + 11.0));
+            dashes(canvas, ends, line.colour(), line.dashes(), 0.0);
+            name.draw(canvas, left as u32 + LEGEND_LINE_PX, top as u32);
+            top += f64::from(name.height() + 2);
         }
     }
 }
 
-/// Draws a dashed line. `along` is the position in the dash pattern at the start; the result is the
-/// position at the end.
+/// Draws a line with this pattern of dashes; solid without any. `along` is the position in the
+/// pattern at the start; the result is the position at the end.
 fn dashes(
     canvas: &mut RgbImage,
-    from: (f64, f64),
-    to: (f64, f64),
+    (from, to): ((f64, f64), (f64, f64)),
     colour: Rgb<u8>,
+    pattern: &[f64],
     along: f64,
 ) -> f64 {
+    const WIDTH_PX: f64 = 2.5;
+    if pattern.is_empty() {
+        stroke(canvas, from, to, colour, WIDTH_PX);
+        return 0.0;
+    }
     let length = (to.0 - from.0).hypot(to.1 - from.1);
     let at = |px: f64| {
         let part = px.clamp(0.0, length) / length;
         (from.0 + part * (to.0 - from.0), from.1 + part * (to.1 - from.1))
     };
-    let period = DASH_PX[0] + DASH_PX[1];
+    let period: f64 = pattern.iter().sum();
     let mut start = -along;
     while start < length && length > 0.0 {
-        if start + DASH_PX[0] > 0.0 {
-            stroke(canvas, at(start), at(start + DASH_PX[0]), colour, 2.5);
+        let mut dash = start;
+        for pair in pattern.chunks(2) {
+            if dash + pair[0] > 0.0 && dash < length {
+                stroke(canvas, at(dash), at(dash + pair[0]), colour, WIDTH_PX);
+            }
+            dash += pair.iter().sum::<f64>();
         }
         start += period;
     }
     (along + length) % period
-}
-
-fn label(tick: f64) -> String {
-    // Values that three digits would round away, and values wider than the margin.
-    if tick != 0.0 && !(1e-3..1e6).contains(&tick.abs()) {
-        return format!("{tick:e}");
-    }
-    let text = format!("{tick:.3}");
-    text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
 /// Draws a straight line of some width. Parts outside the canvas are cut.
@@ -258,6 +350,7 @@ fn stroke(canvas: &mut RgbImage, from: (f64, f64), to: (f64, f64), colour: Rgb<u
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
     fn chart(points: Vec<(f64, f64)>) -> Chart {
         let axis = |logarithmic| Axis {
@@ -277,30 +370,106 @@ mod tests {
         }
     }
 
+    /// The middle of the frame.
+    fn middle(chart: &Chart) -> (u32, u32) {
+        let laid = chart.lay(FRAME_PX);
+        let middle = |(from, to): (f64, f64)| ((from + to) / 2.0) as u32;
+        (middle(laid.x_px), middle(laid.y_px))
+    }
+
     #[test]
     fn a_point_lies_where_its_axes_say() {
         // A short line at x = 1, the middle of a logarithmic axis of 0.1 to 10, and y = 5.05, the
         // middle of a linear one.
-        let canvas = chart(vec![(0.99, 5.05), (1.01, 5.05)]).render();
-        let x = LEFT_PX + (WIDTH_PX - LEFT_PX - RIGHT_PX) / 2;
-        let y = TOP_PX + (HEIGHT_PX - TOP_PX - BOTTOM_PX) / 2;
-        assert_eq!(*canvas.get_pixel(x, y), COLOURS[0]);
+        let chart = chart(vec![(0.99, 5.05), (1.01, 5.05)]);
+        let (x, y) = middle(&chart);
+        assert_eq!(*chart.render().get_pixel(x, y), COLOURS[0]);
     }
 
     #[test]
-    fn ticks_are_written_so_that_they_can_be_told_apart() {
-        let labels = [0.0, 1e-4, 0.001, 0.25, 2.0, 1e5, 1e10].map(label);
-        assert_eq!(labels, ["0", "1e-4", "0.001", "0.25", "2", "100000", "1e10"]);
+    fn no_two_looks_are_alike() {
+        let look = |k: usize| {
+            let (name, points) = (String::new(), Vec::new());
+            Line { name, colour: k / 2, dashed: k % 2 == 1, points }.look()
+        };
+        let looks: std::collections::BTreeSet<_> = (0..32).map(look).collect();
+        assert_eq!(looks.len(), 32);
+        let distance = |a: Rgb<u8>, b: Rgb<u8>| {
+            let square = |(a, b): (u8, u8)| (f64::from(a) - f64::from(b)).powi(2);
+            a.0.into_iter().zip(b.0).map(square).sum::<f64>().sqrt()
+        };
+        for (k, a) in COLOURS.iter().enumerate() {
+            assert!(distance(*a, GROUND) > 150.0, "{a:?} on the ground");
+            assert!(COLOURS[..k].iter().all(|b| distance(*a, *b) > 60.0), "{a:?}");
+        }
     }
 
     #[test]
-    fn many_lines_have_their_legend_beside_the_frame() {
-        let mut many = chart(vec![(1.0, 5.0)]);
-        let frame = many.render().width();
-        many.lines = vec![many.lines[0].clone(); LINES_INSIDE];
-        assert_eq!(many.render().width(), frame);
-        many.lines.push(many.lines[0].clone());
-        assert!(many.render().width() > frame + LEGEND_LINE_PX);
+    fn labels_that_would_touch_are_left_out() {
+        let mut crowded = chart(vec![]);
+        crowded.lines.clear();
+        crowded.x = Axis::of("x", (0..=200).map(f64::from).collect(), false);
+        crowded.y = Axis::of("y", (0..=200).map(f64::from).collect(), false);
+        let canvas = crowded.render();
+        let laid = crowded.lay(FRAME_PX);
+        let blank = |x: u32, y: u32| *canvas.get_pixel(x, y) == GROUND;
+        // Between labels there are blank columns below the frame, and blank rows beside it.
+        let below = laid.y_px.1 as u32 + 6..laid.y_px.1 as u32 + 28;
+        let columns =
+            (LEFT_PX..laid.x_px.1 as u32).filter(|&x| below.clone().all(|y| blank(x, y))).count();
+        assert!(columns > 200, "{columns}");
+        let beside = LEFT_PX - 60..LEFT_PX - 8;
+        let rows = (laid.y_px.0 as u32..laid.y_px.1 as u32)
+            .filter(|&y| beside.clone().all(|x| blank(x, y)))
+            .count();
+        assert!(rows > 100, "{rows}");
+    }
+
+    #[test]
+    fn an_axis_holds_its_values_between_round_ticks() {
+        for (values, ticks) in [
+            (vec![17.2, 31.4], vec![15.0, 20.0, 25.0, 30.0, 35.0]),
+            (vec![0.46, 0.99], vec![0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0]),
+            (vec![3.0], vec![3.0, 3.001]),
+            (vec![f64::NAN], vec![0.0, 0.2, 0.4, 0.6, 0.8, 1.0]),
+        ] {
+            let axis = Axis::around("", values);
+            assert_eq!(axis.ticks.len(), ticks.len(), "{:?}", axis.ticks);
+            assert!(axis.ticks.iter().zip(&ticks).all(|(a, b)| (a - b).abs() < 1e-9));
+        }
+        assert_eq!(Axis::decades("", [0.02, 3.0, -1.0], 9).ticks, [0.01, 0.1, 1.0, 10.0]);
+        assert_eq!(Axis::decades("", [1e-30, 3.0], 2).ticks, [0.1, 1.0, 10.0]);
+        assert_eq!(Axis::decades("", [], 2).ticks, [1.0, 10.0]);
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(12))]
+        #[test]
+        fn text_of_any_length_stays_inside_the_chart(
+            texts in prop::collection::vec("[ -~µ×−\n]{0,200}|[a-zW@]{60,160}", 4..16),
+        ) {
+            let mut chart = chart(vec![]);
+            chart.header = texts[0].clone();
+            chart.footer = texts[1].clone();
+            chart.x.name = texts[2].clone();
+            chart.y.name = texts[3].clone();
+            chart.lines = texts[3..]
+                .iter()
+                .enumerate()
+                .map(|(colour, name)| {
+                    Line { name: name.clone(), colour, dashed: false, points: vec![] }
+                })
+                .collect();
+            let canvas = chart.render_at((420, 200));
+            let (width, height) = canvas.dimensions();
+            let lean = 3;
+            for (x, y, pixel) in canvas.enumerate_pixels() {
+                let edge = MARGIN_PX - lean;
+                let inside =
+                    (edge..width - edge).contains(&x) && (edge..height - edge).contains(&y);
+                prop_assert!(inside || *pixel == GROUND, "{} {} of {} x {}", x, y, width, height);
+            }
+        }
     }
 
     #[test]
@@ -310,11 +479,9 @@ mod tests {
         let drawn = |dashed, points: &[(f64, f64)]| {
             let mut chart = chart(points.to_vec());
             chart.lines[0].dashed = dashed;
-            let canvas = chart.render();
-            let y = TOP_PX + (HEIGHT_PX - TOP_PX - BOTTOM_PX) / 2;
-            (LEFT_PX..WIDTH_PX - RIGHT_PX)
-                .filter(|&x| *canvas.get_pixel(x, y) == COLOURS[0])
-                .count()
+            let (canvas, (_, y)) = (chart.render(), middle(&chart));
+            let right = chart.lay(FRAME_PX).x_px.1 as u32;
+            (LEFT_PX..right).filter(|&x| *canvas.get_pixel(x, y) == COLOURS[0]).count()
         };
         let whole = drawn(false, &across);
         for points in [across.clone(), vec![across[0], across[200]]] {

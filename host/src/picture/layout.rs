@@ -1,38 +1,27 @@
-//! A picture of panels in a row, with a header above and a footer below.
+//! A picture of panels in a row, with a header above and a footer below. Below each image is a grey
+//! bar with ticks in the image's unit, and the range of its values.
 //!
 //! # Invariant
 //! The picture grows with its text
 //! (`tests::more_text_makes_a_taller_picture_and_less_a_lower_one`). No text is cut or overlaps
-//! (`tests::text_of_any_length_stays_inside_its_panel`).
+//! (`tests::text_of_any_length_stays_inside_its_panel`). A square image has at least 256 pixels an
+//! edge (`tests::an_image_is_enlarged_by_a_whole_factor_to_256_pixels_at_least`).
 
-use super::text::{Font, Style};
-use crate::files::image::to_level;
+use super::bar::{self, draw_bar};
+use super::scale::{PERCENTILES, Range, Scale, Unit};
+use super::text::{Block, Font, Style};
+use super::{AMBER, BRIGHT, DIM, FRAME, GROUND, MIDDLE};
+use crate::files::image::{Placed, encode_labelled, to_level};
 use image::imageops::{self, FilterType};
 use image::{ImageBuffer, Luma, Rgb, RgbImage};
 
-/// Edge of every panel's image: a multiple of the sides 32, 64 and 128, so that their pixels stay
-/// square.
+/// Edge of a panel's image, unless a panel needs more: a multiple of the sides 32, 64 and 128, so
+/// that their pixels stay square.
 const PANEL_PX: u32 = 384;
+/// The least shorter edge of an image that is enlarged.
+pub(super) const LEAST_PX: u32 = 256;
 const GAP_PX: u32 = 28;
 const MARGIN_PX: u32 = 36;
-
-const GROUND: Rgb<u8> = Rgb([19, 21, 26]);
-const FRAME: Rgb<u8> = Rgb([52, 56, 66]);
-const BRIGHT: Rgb<u8> = Rgb([236, 238, 242]);
-const MIDDLE: Rgb<u8> = Rgb([176, 181, 191]);
-const DIM: Rgb<u8> = Rgb([146, 152, 164]);
-const AMBER: Rgb<u8> = Rgb([255, 184, 77]);
-
-/// How a panel's values become grey levels.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Range {
-    /// 0 is black and 1 is white, so that panels can be compared.
-    Unit,
-    /// The panel's own lowest value is black and its highest is white.
-    Stretched,
-    /// These values are black and white.
-    Fixed(f32, f32),
-}
 
 /// One image with its title and notes.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,10 +36,71 @@ pub struct Panel {
     pub values: Vec<f32>,
     /// How values become grey levels.
     pub range: Range,
+    /// The unit of the values.
+    pub unit: Unit,
     /// Lines below the image, such as `PSNR 23.4 dB  SSIM 0.81`.
     pub caption: Vec<String>,
-    /// Reasons not to trust the image, directly below the image in amber.
+    /// Reasons not to trust the image, below the image in amber.
     pub warnings: Vec<String>,
+}
+
+impl Panel {
+    /// A square image of `side` x `side` values, stretched, without caption and warnings.
+    #[must_use]
+    pub fn square(title: &str, side: usize, values: &[f32], unit: Unit) -> Self {
+        Self {
+            title: title.to_owned(),
+            width: side,
+            height: side,
+            values: values.to_vec(),
+            range: Range::Stretched,
+            unit,
+            caption: Vec::new(),
+            warnings: Vec::new(),
+        }
+    }
+
+    /// The values that are black and white in the picture.
+    #[must_use]
+    pub fn scale(&self) -> Scale {
+        Scale::of(self.range, self.unit, self.values.iter().copied())
+    }
+
+    /// Where readers find the image in the picture; nowhere if the image is made smaller.
+    fn placed(&self, scale: &Scale, shown: (u32, u32), at: (u32, u32)) -> Option<Placed> {
+        let (width, height) = (self.width as u32, self.height as u32);
+        // Readers give values from 0 to 1.
+        let (black, white) =
+            if self.unit.is_fraction() { (scale.black, scale.white) } else { (0.0, 1.0) };
+        let (left, top) = at;
+        let cell = shown.0 / width;
+        (cell > 0 && shown.0.is_multiple_of(width)).then_some(Placed {
+            left,
+            top,
+            cell,
+            width,
+            height,
+            black,
+            white,
+        })
+    }
+
+    /// Columns and rows of the image in the picture, in a panel of this edge. Beside other panels
+    /// an image that is nearly as large as a panel fills the panel.
+    fn shown_px(&self, panel_px: u32, is_alone: bool) -> (u32, u32) {
+        let (width, height) = (self.width as u32, self.height as u32);
+        let (longer, shorter) = (width.max(height), width.min(height));
+        let fills = longer > panel_px || (!is_alone && 2 * longer > panel_px);
+        if fills {
+            let scaled = |edge| (u64::from(edge) * u64::from(panel_px) / u64::from(longer)) as u32;
+            return (scaled(width).max(1), scaled(height).max(1));
+        }
+        let mut factor = panel_px / longer;
+        if longer == shorter {
+            factor = factor.max(LEAST_PX.div_ceil(shorter));
+        }
+        (width * factor, height * factor)
+    }
 }
 
 /// A row of panels with a header and a footer line. Empty texts take no room.
@@ -64,6 +114,12 @@ pub struct SideBySide {
     pub footer: String,
 }
 
+impl From<Panel> for SideBySide {
+    fn from(panel: Panel) -> Self {
+        Self { header: String::new(), panels: vec![panel], footer: String::new() }
+    }
+}
+
 impl SideBySide {
     /// Draws the picture; [`encode_rgb`](crate::files::image::encode_rgb) makes a PNG of it.
     ///
@@ -72,50 +128,154 @@ impl SideBySide {
     /// one.
     #[must_use]
     pub fn render(&self) -> RgbImage {
+        self.draw(PANEL_PX).0
+    }
+
+    /// As [`render`](Self::render), with panels of another edge.
+    #[must_use]
+    pub fn render_at(&self, panel_px: u32) -> RgbImage {
+        self.draw(panel_px).0
+    }
+
+    /// The picture as a PNG. Readers of this program find the image of a single panel in the
+    /// picture, and refuse a picture of several.
+    ///
+    /// # Panics
+    /// As [`render`](Self::render).
+    #[must_use]
+    pub fn png(&self) -> Vec<u8> {
+        let (picture, placed) = self.draw(PANEL_PX);
+        encode_labelled(&picture, self.panels.len(), placed)
+    }
+
+    /// Rows of the picture.
+    pub(super) fn height(&self) -> u32 {
+        self.lay(PANEL_PX).height
+    }
+
+    fn lay(&self, panel_px: u32) -> Laid {
         assert!(!self.panels.is_empty(), "a picture of at least one panel");
         let columns = self.panels.len() as u32;
-        let inner = columns * PANEL_PX + (columns - 1) * GAP_PX;
+        let shown = |panel: &Panel| panel.shown_px(panel_px, columns == 1);
+        let shown: Vec<(u32, u32)> = self.panels.iter().map(shown).collect();
+        let edge = shown.iter().map(|&(w, h)| w.max(h)).max().unwrap_or(0).max(LEAST_PX);
+        let edge = if columns == 1 { edge } else { edge.max(panel_px) };
+        let inner = columns * edge + (columns - 1) * GAP_PX;
+        let scales: Vec<Scale> = self.panels.iter().map(Panel::scale).collect();
 
         let header = Block::new(HEADER, [self.header.as_str()], inner);
-        let titles = self.blocks(TITLE, |panel| vec![panel.title.as_str()]);
+        let titles = self.blocks(TITLE, edge, |panel| vec![panel.title.as_str()]);
+        let ranges: Vec<Block> =
+            scales.iter().map(|scale| Block::new(RANGE, [scale.line().as_str()], edge)).collect();
         let warnings =
-            self.blocks(WARNING, |panel| panel.warnings.iter().map(String::as_str).collect());
+            self.blocks(WARNING, edge, |panel| panel.warnings.iter().map(String::as_str).collect());
         let captions =
-            self.blocks(CAPTION, |panel| panel.caption.iter().map(String::as_str).collect());
-        let footer = Block::new(FOOTER, [self.footer.as_str()], inner);
+            self.blocks(CAPTION, edge, |panel| panel.caption.iter().map(String::as_str).collect());
+        let footer = Block::new(FOOTER, [self.footer.as_str(), &self.stretch_line()], inner);
         let tallest = |blocks: &[Block]| blocks.iter().map(Block::height).max().unwrap_or(0);
 
-        let header_top = MARGIN_PX;
-        let title_top = header_top + header.height_and(18);
+        let title_top = MARGIN_PX + header.height_and(18);
         let image_top = title_top + spaced(tallest(&titles), 10);
-        let warning_top = image_top + PANEL_PX + 12;
+        let bar_top = image_top + edge + 12;
+        let range_top = bar_top + bar::HEIGHT_PX + 4;
+        let warning_top = range_top + spaced(tallest(&ranges), 8);
         let caption_top = warning_top + spaced(tallest(&warnings), 8);
         let footer_top = caption_top + spaced(tallest(&captions), 16);
         let height = footer_top + footer.height() + MARGIN_PX;
+        Laid {
+            shown,
+            edge,
+            inner,
+            scales,
+            header,
+            titles,
+            ranges,
+            warnings,
+            captions,
+            footer,
+            image_top,
+            bar_top,
+            range_top,
+            warning_top,
+            caption_top,
+            footer_top,
+            height,
+        }
+    }
 
-        let mut canvas = RgbImage::from_pixel(inner + 2 * MARGIN_PX, height, GROUND);
-        header.draw(&mut canvas, MARGIN_PX, header_top);
+    /// The picture, and the place of a single image in it.
+    fn draw(&self, panel_px: u32) -> (RgbImage, Option<Placed>) {
+        let laid = self.lay(panel_px);
+        let mut canvas = RgbImage::from_pixel(laid.inner + 2 * MARGIN_PX, laid.height, GROUND);
+        laid.header.draw(&mut canvas, MARGIN_PX, MARGIN_PX);
+        let mut placed = None;
         for (column, panel) in self.panels.iter().enumerate() {
-            let left = MARGIN_PX + column as u32 * (PANEL_PX + GAP_PX);
-            let title = &titles[column];
+            let left = MARGIN_PX + column as u32 * (laid.edge + GAP_PX);
+            let title = &laid.titles[column];
             // A short title is directly above its image, also if a neighbour's title has more
             // lines.
-            title.draw(&mut canvas, left, image_top - spaced(title.height(), 10));
-            draw_image(&mut canvas, panel, left, image_top);
-            warnings[column].draw(&mut canvas, left, warning_top);
-            captions[column].draw(&mut canvas, left, caption_top);
+            title.draw(&mut canvas, left, laid.image_top - spaced(title.height(), 10));
+            let (scale, (wide, high)) = (&laid.scales[column], laid.shown[column]);
+            let (x, y) = (left + (laid.edge - wide) / 2, laid.image_top + (laid.edge - high) / 2);
+            draw_image(&mut canvas, panel, scale, (wide, high), (x, y));
+            if self.panels.len() == 1 {
+                placed = panel.placed(scale, (wide, high), (x, y));
+            }
+            draw_bar(&mut canvas, scale, (left, laid.bar_top), laid.edge);
+            laid.ranges[column].draw(&mut canvas, left, laid.range_top);
+            laid.warnings[column].draw(&mut canvas, left, laid.warning_top);
+            laid.captions[column].draw(&mut canvas, left, laid.caption_top);
         }
-        footer.draw(&mut canvas, MARGIN_PX, footer_top);
-        canvas
+        laid.footer.draw(&mut canvas, MARGIN_PX, laid.footer_top);
+        (canvas, placed)
+    }
+
+    /// What the bars show of stretched images.
+    fn stretch_line(&self) -> String {
+        match self.panels.iter().any(|panel| panel.range == Range::Stretched) {
+            true => stretch_words("each image"),
+            false => String::new(),
+        }
     }
 
     fn blocks<'a>(
         &'a self,
         style: fn() -> Style,
+        width_px: u32,
         texts: impl Fn(&'a Panel) -> Vec<&'a str>,
     ) -> Vec<Block> {
-        self.panels.iter().map(|panel| Block::new(style, texts(panel), PANEL_PX)).collect()
+        self.panels.iter().map(|panel| Block::new(style, texts(panel), width_px)).collect()
     }
+}
+
+/// The texts of a picture in lines, and where everything is.
+struct Laid {
+    /// Columns and rows of each image in the picture.
+    shown: Vec<(u32, u32)>,
+    /// Edge of a panel.
+    edge: u32,
+    /// Width without margins.
+    inner: u32,
+    scales: Vec<Scale>,
+    header: Block,
+    titles: Vec<Block>,
+    ranges: Vec<Block>,
+    warnings: Vec<Block>,
+    captions: Vec<Block>,
+    footer: Block,
+    image_top: u32,
+    bar_top: u32,
+    range_top: u32,
+    warning_top: u32,
+    caption_top: u32,
+    footer_top: u32,
+    height: u32,
+}
+
+/// The rule of stretched pictures in words.
+pub(super) fn stretch_words(of: &str) -> String {
+    let [low, high] = PERCENTILES;
+    format!("black and white: percentiles {low} and {high} of {of}")
 }
 
 /// Rows of panels below each other, with aligned left edges.
@@ -124,91 +284,81 @@ impl SideBySide {
 /// As [`SideBySide::render`].
 #[must_use]
 pub fn stacked(rows: &[SideBySide]) -> RgbImage {
-    let drawn: Vec<RgbImage> = rows.iter().map(SideBySide::render).collect();
-    let width = drawn.iter().map(RgbImage::width).max().unwrap_or(1);
-    let height = drawn.iter().map(RgbImage::height).sum::<u32>().max(1);
+    below(&rows.iter().map(SideBySide::render).collect::<Vec<_>>())
+}
+
+/// Ground of so many columns and rows.
+#[must_use]
+pub fn blank(width: u32, height: u32) -> RgbImage {
+    RgbImage::from_pixel(width, height, GROUND)
+}
+
+/// Pictures below each other, with aligned left edges.
+#[must_use]
+pub fn below(pictures: &[RgbImage]) -> RgbImage {
+    let width = pictures.iter().map(RgbImage::width).max().unwrap_or(1);
+    let height = pictures.iter().map(RgbImage::height).sum::<u32>().max(1);
     let mut canvas = RgbImage::from_pixel(width, height, GROUND);
     let mut top = 0;
-    for row in &drawn {
-        imageops::replace(&mut canvas, row, 0, i64::from(top));
-        top += row.height();
+    for picture in pictures {
+        imageops::replace(&mut canvas, picture, 0, i64::from(top));
+        top += picture.height();
     }
     canvas
 }
 
-const HEADER: fn() -> Style =
+/// Pictures beside each other, with aligned upper edges.
+#[must_use]
+pub fn beside(pictures: &[RgbImage]) -> RgbImage {
+    let width = pictures.iter().map(RgbImage::width).sum::<u32>().max(1);
+    let height = pictures.iter().map(RgbImage::height).max().unwrap_or(1);
+    let mut canvas = RgbImage::from_pixel(width, height, GROUND);
+    let mut left = 0;
+    for picture in pictures {
+        imageops::replace(&mut canvas, picture, i64::from(left), 0);
+        left += picture.width();
+    }
+    canvas
+}
+
+pub(super) const HEADER: fn() -> Style =
     || Style { font: Font::sans(), size_px: 32.0, line_px: 40, colour: BRIGHT };
 const TITLE: fn() -> Style =
     || Style { font: Font::sans(), size_px: 23.0, line_px: 28, colour: BRIGHT };
+const RANGE: fn() -> Style =
+    || Style { font: Font::sans(), size_px: 17.0, line_px: 22, colour: MIDDLE };
 const CAPTION: fn() -> Style =
     || Style { font: Font::mono(), size_px: 16.0, line_px: 22, colour: MIDDLE };
-const WARNING: fn() -> Style =
+pub(super) const WARNING: fn() -> Style =
     || Style { font: Font::sans(), size_px: 19.0, line_px: 26, colour: AMBER };
-const FOOTER: fn() -> Style =
+pub(super) const FOOTER: fn() -> Style =
     || Style { font: Font::sans(), size_px: 18.0, line_px: 24, colour: DIM };
 
-/// Text broken into lines.
-struct Block {
-    style: Style,
-    lines: Vec<String>,
-}
-
-impl Block {
-    fn new<'a>(
-        style: fn() -> Style,
-        texts: impl IntoIterator<Item = &'a str>,
-        width_px: u32,
-    ) -> Self {
-        let style = style();
-        let lines = texts.into_iter().flat_map(|text| style.wrap(text, width_px as f32)).collect();
-        Self { style, lines }
-    }
-
-    fn height(&self) -> u32 {
-        self.lines.len() as u32 * self.style.line_px
-    }
-
-    fn height_and(&self, space_px: u32) -> u32 {
-        spaced(self.height(), space_px)
-    }
-
-    fn draw(&self, canvas: &mut RgbImage, left: u32, top: u32) {
-        for (k, line) in self.lines.iter().enumerate() {
-            self.style.draw(
-                canvas,
-                line,
-                left as f32,
-                (top + k as u32 * self.style.line_px) as f32,
-            );
-        }
-    }
-}
-
 /// A height and the space after it. A height of 0 gets no space.
-fn spaced(height_px: u32, space_px: u32) -> u32 {
+pub(super) fn spaced(height_px: u32, space_px: u32) -> u32 {
     if height_px == 0 { 0 } else { height_px + space_px }
 }
 
-fn draw_image(canvas: &mut RgbImage, panel: &Panel, left: u32, top: u32) {
+fn draw_image(
+    canvas: &mut RgbImage,
+    panel: &Panel,
+    scale: &Scale,
+    (wide, high): (u32, u32),
+    (x0, y0): (u32, u32),
+) {
     let (width, height) = (panel.width as u32, panel.height as u32);
     assert!(
         panel.values.len() == panel.width * panel.height && !panel.values.is_empty(),
         "values of a panel"
     );
-    let (black, white) = panel.range.limits(&panel.values);
-    let span = if white > black { white - black } else { 1.0 };
-    let grey: Vec<f32> = panel.values.iter().map(|&value| (value - black) / span).collect();
+    let grey: Vec<f32> = panel.values.iter().map(|&value| scale.level(value)).collect();
     let grey: ImageBuffer<Luma<f32>, _> =
         ImageBuffer::from_raw(width, height, grey).expect("a panel has width * height values");
 
-    // The longer edge fills the panel. Whole multiples keep the camera's pixels square.
-    let longer = width.max(height);
-    let (wide, high) = (scaled(width, longer), scaled(height, longer));
-    let filter =
-        if PANEL_PX.is_multiple_of(longer) { FilterType::Nearest } else { FilterType::Triangle };
+    // Whole multiples keep the camera's pixels square and unmixed.
+    let whole = wide.is_multiple_of(width) && high.is_multiple_of(height);
+    let filter = if whole { FilterType::Nearest } else { FilterType::Triangle };
     let shown = imageops::resize(&grey, wide, high, filter);
-
-    let (x0, y0) = (left + (PANEL_PX - wide) / 2, top + (PANEL_PX - high) / 2);
     for y in 0..high + 2 {
         for x in 0..wide + 2 {
             canvas.put_pixel(x0 + x - 1, y0 + y - 1, FRAME);
@@ -217,26 +367,6 @@ fn draw_image(canvas: &mut RgbImage, panel: &Panel, left: u32, top: u32) {
     for (x, y, pixel) in shown.enumerate_pixels() {
         let level = to_level(pixel.0[0]);
         canvas.put_pixel(x0 + x, y0 + y, Rgb([level; 3]));
-    }
-}
-
-fn scaled(edge: u32, longer: u32) -> u32 {
-    ((u64::from(edge) * u64::from(PANEL_PX) / u64::from(longer)) as u32).max(1)
-}
-
-impl Range {
-    /// The values of black and of white.
-    fn limits(self, values: &[f32]) -> (f32, f32) {
-        match self {
-            Self::Unit => (0.0, 1.0),
-            Self::Fixed(black, white) => (black, white),
-            Self::Stretched => values
-                .iter()
-                .filter(|value| value.is_finite())
-                .fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), &v| {
-                    (low.min(v), high.max(v))
-                }),
-        }
     }
 }
 
@@ -252,9 +382,42 @@ mod tests {
             height: side,
             values: (0..side * side).map(|i| i as f32 / (side * side - 1) as f32).collect(),
             range: Range::Unit,
+            unit: Unit::OfWhite,
             caption: caption.iter().map(|&line| line.to_owned()).collect(),
             warnings: Vec::new(),
         }
+    }
+
+    #[test]
+    fn an_image_is_enlarged_by_a_whole_factor_to_256_pixels_at_least() {
+        for side in (1..300).chain([512]) {
+            let panel = Panel::square("", side, &vec![0.0; side * side], Unit::OfWhite);
+            let (wide, high) = panel.shown_px(PANEL_PX, true);
+            assert!(wide == high && wide >= LEAST_PX, "{side}: {wide} x {high}");
+            assert!(side > 384 || (wide as usize).is_multiple_of(side), "{side}: {wide}");
+        }
+        let of = |width, height| {
+            let values = vec![0.0; width * height];
+            Panel { width, height, values, ..Panel::square("", 0, &[], Unit::OfWhite) }
+        };
+        assert_eq!(of(7, 3).shown_px(PANEL_PX, true), (378, 162));
+        assert_eq!(of(3, 700).shown_px(PANEL_PX, true), (1, 384));
+        assert_eq!(of(100, 900).shown_px(PANEL_PX, true), (42, 384));
+        // A scene of 256 pixels beside the camera's image.
+        assert_eq!(of(256, 256).shown_px(PANEL_PX, false), (384, 384));
+        assert_eq!(of(128, 128).shown_px(PANEL_PX, false), (384, 384));
+    }
+
+    #[test]
+    fn the_bar_goes_from_black_to_white_and_has_ticks_in_the_units_of_the_image() {
+        let canvas = side_by_side("", vec![panel("", 32, &[])], "").render();
+        let row = MARGIN_PX + PANEL_PX + 12 + 7;
+        let greys: Vec<u8> =
+            (1..PANEL_PX - 1).map(|x| canvas.get_pixel(MARGIN_PX + x, row).0[0]).collect();
+        assert!(greys.is_sorted() && greys[0] <= 1 && greys[381] >= 254, "{greys:?}");
+        // A tick at 0.2 of 0 to 1, below the bar.
+        let tick = MARGIN_PX + (0.2 * f64::from(PANEL_PX - 1)).round() as u32;
+        assert_eq!(*canvas.get_pixel(tick, MARGIN_PX + PANEL_PX + 12 + 15), MIDDLE);
     }
 
     fn side_by_side(header: &str, panels: Vec<Panel>, footer: &str) -> SideBySide {
@@ -324,6 +487,7 @@ mod tests {
                 .map(|(x, y)| canvas.get_pixel(MARGIN_PX + x, MARGIN_PX + y).0[0])
         };
         assert_eq!(levels(Range::Unit), [0, 0, 128, 255]);
+        // 200 values and more have percentiles of their own; of four, these are the ends.
         assert_eq!(levels(Range::Stretched), [0, 64, 96, 255]);
         assert_eq!(levels(Range::Fixed(0.0, 0.5)), [0, 0, 255, 255]);
     }
@@ -337,7 +501,8 @@ mod tests {
                 let values = vec![value; width * height];
                 let odd = Panel { width, height, values, range, ..panel("odd", 2, &["x"]) };
                 let canvas = side_by_side("h", vec![odd], "f").render();
-                assert!(canvas.width() == PANEL_PX + 2 * MARGIN_PX);
+                let wide = LEAST_PX + 2 * MARGIN_PX..=PANEL_PX + 2 * MARGIN_PX;
+                assert!(wide.contains(&canvas.width()), "{width} x {height}");
             }
         }
     }
@@ -366,7 +531,8 @@ mod tests {
     fn more_text_makes_a_taller_picture_and_less_a_lower_one() {
         let height =
             |caption: &str| side_by_side("", vec![panel("", 2, &[caption])], "").render().height();
-        assert_eq!(height(""), 2 * MARGIN_PX + PANEL_PX + 12);
+        let below = 12 + bar::HEIGHT_PX + 4 + 22 + 8;
+        assert_eq!(height(""), 2 * MARGIN_PX + PANEL_PX + below);
         assert!(height(&"word ".repeat(40)) > height("word") && height("word") > height(""));
     }
 }

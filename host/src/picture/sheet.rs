@@ -1,33 +1,335 @@
-//! A contact sheet: many images of a video in one picture.
+//! A contact sheet: many images in one picture, each with its number.
+//!
+//! # Invariant
+//! A sheet shows every image, or evenly chosen ones from the first to the last, and says how many
+//! of how many (`tests::a_sheet_shows_the_first_and_the_last_and_says_how_many`).
 
-use crate::files::image::encode_grey;
-use nirspi_recon::Image;
+use super::bar::{self, draw_bar};
+use super::layout::{FOOTER, HEADER, WARNING, spaced, stretch_words};
+use super::scale::{Range, Scale, Unit};
+use super::text::{Block, Font, Style};
+use super::ticks::number;
+use super::{AMBER, FRAME, GROUND, MIDDLE};
+use crate::files::image::{encode_labelled, to_level};
+use image::{Rgb, RgbImage};
 
 /// Number of images in a row.
 const COLUMNS: usize = 8;
-
 /// The most images in the picture.
-const SHOWN: usize = 64;
-
-/// Edge of an image in the picture, in pixels, unless the image itself is larger.
+const MOST: usize = 64;
+/// Least edge of an image in the picture, of many images and of few.
 const TILE_PX: usize = 128;
+const FEW_TILE_PX: usize = 256;
+/// So many images are few.
+const FEW: usize = 4;
+const GAP_PX: u32 = 12;
+const MARGIN_PX: u32 = 24;
+/// The grey bar is at most so wide.
+const BAR_PX: u32 = 512;
+/// An image of a smaller share of the common range would not be seen: then each has its own.
+const VISIBLE_SHARE: f32 = 0.125;
 
-/// The first 64 images in rows of eight as a PNG, each stretched to its own black and white. All
-/// images must have the same side. Without images the picture is empty.
-#[must_use]
-pub fn contact_sheet(images: &[Image]) -> Vec<u8> {
-    let shown = &images[..images.len().min(SHOWN)];
-    let n = shown.first().map_or(1, |image| image.side().pixels());
-    let factor = (TILE_PX / n).max(1);
-    let (columns, tile) = (shown.len().clamp(1, COLUMNS), n * factor);
-    let (width, height) = (columns * tile, shown.len().div_ceil(columns).max(1) * tile);
-    let mut pixels = vec![0.0; width * height];
-    for (at, image) in shown.iter().enumerate() {
-        let (top, left) = (at / columns * tile, at % columns * tile);
-        let stretched = image.stretched();
-        for (r, c) in (0..tile).flat_map(|r| (0..tile).map(move |c| (r, c))) {
-            pixels[(top + r) * width + left + c] = stretched.pixels()[r / factor * n + c / factor];
+/// Many images of one size and unit.
+#[derive(Debug, Clone)]
+pub struct Sheet<'a> {
+    header: String,
+    side: usize,
+    images: Vec<&'a [f32]>,
+    unit: Unit,
+    warned: Vec<usize>,
+    scale: CommonOrOwn,
+}
+
+#[derive(Debug, Clone)]
+enum CommonOrOwn {
+    Common(Scale),
+    Own(Vec<Scale>),
+}
+
+impl<'a> Sheet<'a> {
+    /// A sheet of images of `side * side` values each.
+    ///
+    /// All images have one scale. If some images would not be seen on the common scale, each has
+    /// its own.
+    ///
+    /// # Panics
+    /// If an image does not have `side * side` values, at least one.
+    #[must_use]
+    pub fn new(header: String, side: usize, images: Vec<&'a [f32]>, unit: Unit) -> Self {
+        let whole = images.iter().all(|image| image.len() == side * side);
+        assert!(side > 0 && whole, "images of {side} x {side}");
+        let of = |values: &[f32]| Scale::of(Range::Stretched, unit, values.iter().copied());
+        let all = images.iter().flat_map(|image| image.iter().copied());
+        let common = Scale::of(Range::Stretched, unit, all);
+        let own: Vec<Scale> = images.iter().map(|image| of(image)).collect();
+        let span = |scale: &Scale| scale.white - scale.black;
+        // A flat image is dark on every scale.
+        let hidden =
+            |scale: &Scale| span(scale) > 0.0 && span(scale) < VISIBLE_SHARE * span(&common);
+        let scale = match own.iter().any(hidden) {
+            true => CommonOrOwn::Own(own),
+            false => CommonOrOwn::Common(common),
+        };
+        Self { header, side, images, unit, warned: Vec::new(), scale }
+    }
+
+    /// The same sheet, with these images marked as not to be trusted.
+    #[must_use]
+    pub fn with_warned(mut self, warned: Vec<usize>) -> Self {
+        self.warned = warned;
+        self
+    }
+
+    /// Number of images that there are.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.images.len()
+    }
+
+    /// The images in the picture.
+    pub(super) fn shown(&self) -> Vec<usize> {
+        evenly(self.images.len(), MOST)
+    }
+
+    /// The common scale, or each image's with its number.
+    pub(super) fn scales(&self) -> Vec<(String, Scale)> {
+        match &self.scale {
+            CommonOrOwn::Common(scale) => vec![("all".to_owned(), *scale)],
+            CommonOrOwn::Own(own) => {
+                own.iter().enumerate().map(|(k, scale)| (k.to_string(), *scale)).collect()
+            }
         }
     }
-    encode_grey(width, height, &pixels)
+
+    pub(super) fn side(&self) -> usize {
+        self.side
+    }
+
+    pub(super) fn unit(&self) -> Unit {
+        self.unit
+    }
+
+    pub(super) fn image(&self, index: usize) -> &'a [f32] {
+        self.images[index]
+    }
+
+    pub(super) fn scale_of(&self, index: usize) -> Scale {
+        match &self.scale {
+            CommonOrOwn::Common(scale) => *scale,
+            CommonOrOwn::Own(own) => own[index],
+        }
+    }
+
+    pub(super) fn is_warned(&self, index: usize) -> bool {
+        self.warned.contains(&index)
+    }
+
+    /// The sheet as a PNG, which this program's readers refuse as an image.
+    #[must_use]
+    pub fn png(&self) -> Vec<u8> {
+        encode_labelled(&self.render(), self.images.len(), None)
+    }
+
+    /// What is shown of how many, and on which scale.
+    fn lines(&self) -> Vec<String> {
+        let (shown, count) = (self.shown().len(), self.count());
+        let chosen = match shown < count {
+            true => format!("{shown} of {count} images shown, evenly chosen"),
+            false if count == 1 => "1 image".to_owned(),
+            false => format!("all {count} images"),
+        };
+        match &self.scale {
+            CommonOrOwn::Common(scale) => {
+                vec![chosen, scale.line(), stretch_words("all images together")]
+            }
+            CommonOrOwn::Own(_) => {
+                let unit = self.unit;
+                vec![
+                    format!("{chosen}; each has its own scale, below it, in {unit}"),
+                    stretch_words("each image"),
+                ]
+            }
+        }
+    }
+
+    fn label(&self, index: usize) -> String {
+        match &self.scale {
+            CommonOrOwn::Common(_) => index.to_string(),
+            CommonOrOwn::Own(own) => {
+                let Scale { black, white, .. } = own[index];
+                format!("{index}: {} to {}", number(black), number(white))
+            }
+        }
+    }
+
+    /// Draws the sheet. Without images it has its text alone.
+    #[must_use]
+    pub fn render(&self) -> RgbImage {
+        let shown = self.shown();
+        let columns = shown.len().clamp(1, COLUMNS);
+        let least = if shown.len() <= FEW { FEW_TILE_PX } else { TILE_PX };
+        let cell = least.div_ceil(self.side).max(1);
+        let tile = (cell * self.side) as u32;
+        let inner = (columns as u32 * (tile + GAP_PX) - GAP_PX).max(FEW_TILE_PX as u32);
+
+        let header = Block::new(HEADER, [self.header.as_str()], inner);
+        let labels: Vec<Block> = shown
+            .iter()
+            .map(|&index| {
+                let style = if self.is_warned(index) { WARNED } else { LABEL };
+                Block::new(style, [self.label(index).as_str()], tile)
+            })
+            .collect();
+        let label_px = labels.iter().map(Block::height).max().unwrap_or(0);
+        let warning = Block::new(WARNING, [self.warning().as_str()], inner);
+        let lines = self.lines();
+        let footer = Block::new(FOOTER, lines.iter().map(String::as_str), inner);
+        let has_bar = matches!(self.scale, CommonOrOwn::Common(_));
+        let rows = shown.len().div_ceil(columns) as u32;
+
+        let grid_top = MARGIN_PX + header.height_and(14);
+        let row_px = tile + 4 + label_px + GAP_PX;
+        let bar_top = grid_top + rows * row_px;
+        let warning_top = bar_top + if has_bar { bar::HEIGHT_PX + 8 } else { 0 };
+        let footer_top = warning_top + spaced(warning.height(), 8);
+        let height = footer_top + footer.height() + MARGIN_PX;
+        let mut canvas = RgbImage::from_pixel(inner + 2 * MARGIN_PX, height, GROUND);
+        header.draw(&mut canvas, MARGIN_PX, MARGIN_PX);
+        for (at, &index) in shown.iter().enumerate() {
+            let left = MARGIN_PX + (at % columns) as u32 * (tile + GAP_PX);
+            let top = grid_top + (at / columns) as u32 * row_px;
+            let border = if self.is_warned(index) { AMBER } else { FRAME };
+            self.draw_tile(&mut canvas, index, cell as u32, (left, top), border);
+            labels[at].draw(&mut canvas, left, top + tile + 4);
+        }
+        if let CommonOrOwn::Common(scale) = &self.scale {
+            draw_bar(&mut canvas, scale, (MARGIN_PX, bar_top), inner.min(BAR_PX));
+        }
+        warning.draw(&mut canvas, MARGIN_PX, warning_top);
+        footer.draw(&mut canvas, MARGIN_PX, footer_top);
+        canvas
+    }
+
+    fn warning(&self) -> String {
+        match self.warned.len() {
+            0 => String::new(),
+            count => format!("{count} of {} with warnings: numbers in amber", self.count()),
+        }
+    }
+
+    fn draw_tile(
+        &self,
+        canvas: &mut RgbImage,
+        index: usize,
+        cell: u32,
+        (left, top): (u32, u32),
+        border: Rgb<u8>,
+    ) {
+        let (scale, tile) = (self.scale_of(index), cell * self.side as u32);
+        for y in 0..tile + 2 {
+            for x in 0..tile + 2 {
+                canvas.put_pixel(left + x - 1, top + y - 1, border);
+            }
+        }
+        let image = self.image(index);
+        for y in 0..tile {
+            for x in 0..tile {
+                let at = (y / cell) as usize * self.side + (x / cell) as usize;
+                let level = to_level(scale.level(image[at]));
+                canvas.put_pixel(left + x, top + y, Rgb([level; 3]));
+            }
+        }
+    }
+}
+
+const LABEL: fn() -> Style =
+    || Style { font: Font::sans(), size_px: 16.0, line_px: 20, colour: MIDDLE };
+const WARNED: fn() -> Style = || Style { colour: AMBER, ..LABEL() };
+
+/// At most `most` of `count` indices, evenly from the first to the last.
+pub(super) fn evenly(count: usize, most: usize) -> Vec<usize> {
+    if count <= most {
+        return (0..count).collect();
+    }
+    (0..most).map(|k| k * (count - 1) / (most - 1)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn sheet<'a>(header: &str, values: &'a [f32], side: usize) -> Sheet<'a> {
+        let images = values.chunks_exact(side * side).collect();
+        Sheet::new(header.to_owned(), side, images, Unit::Readings)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(16))]
+        #[test]
+        fn text_of_any_length_stays_inside_the_sheet(
+            header in "[ -~µ×−\n]{0,90}|[a-zW@]{60,90}", count in 1usize..20, gain in -1e9f32..1e9,
+        ) {
+            let values: Vec<f32> = (0..count * 16)
+                .map(|p| gain * (1.0 + (p / 16) as f32).powi(3) * ((p % 16) as f32))
+                .collect();
+            let canvas = sheet(&header, &values, 4).render();
+            let (width, height) = canvas.dimensions();
+            let lean = 3;
+            for (x, y, pixel) in canvas.enumerate_pixels() {
+                let inside = (MARGIN_PX - lean..width - MARGIN_PX + lean).contains(&x)
+                    && (MARGIN_PX - lean..height - MARGIN_PX + lean).contains(&y);
+                prop_assert!(inside || *pixel == GROUND, "{} {} of {} x {}", x, y, width, height);
+            }
+        }
+
+        #[test]
+        fn chosen_images_are_evenly_spread(count in 0usize..5000, most in 2usize..70) {
+            let chosen = evenly(count, most);
+            prop_assert_eq!(chosen.len(), count.min(most));
+            prop_assert!(chosen.is_sorted_by(|a, b| a < b));
+            if count > 0 {
+                prop_assert_eq!((chosen[0], chosen[chosen.len() - 1]), (0, count - 1));
+            }
+            let gaps: Vec<usize> = chosen.windows(2).map(|pair| pair[1] - pair[0]).collect();
+            let (least, most) = (gaps.iter().min(), gaps.iter().max());
+            prop_assert!(least.zip(most).is_none_or(|(least, most)| most - least <= 1));
+        }
+    }
+
+    #[test]
+    fn a_sheet_shows_the_first_and_the_last_and_says_how_many() {
+        let values = vec![0.5; 1000 * 16];
+        let many = sheet("", &values, 4);
+        let shown = many.shown();
+        assert_eq!((shown.len(), shown[0], shown[63]), (64, 0, 999));
+        assert_eq!(many.lines()[0], "64 of 1000 images shown, evenly chosen");
+        let few = sheet("", &values[..99 * 16], 4);
+        assert_eq!(few.lines()[0], "64 of 99 images shown, evenly chosen");
+        assert_eq!(sheet("", &values[..64 * 16], 4).lines()[0], "all 64 images");
+    }
+
+    #[test]
+    fn images_have_one_scale_unless_some_would_be_black_on_it() {
+        let ramp = |gain: f32| (0..16).map(move |p| gain * p as f32);
+        let alike: Vec<f32> = ramp(1.0).chain(ramp(0.5)).collect();
+        assert_eq!(sheet("", &alike, 4).scales().len(), 1);
+        let unlike: Vec<f32> = ramp(1.0).chain(ramp(0.01)).collect();
+        let own = sheet("", &unlike, 4);
+        assert_eq!(own.scales().len(), 2);
+        assert_eq!(own.label(1), "1: 0 to 0.15");
+        assert!(own.lines()[0].contains("its own scale"));
+    }
+
+    #[test]
+    fn pixels_of_tiles_are_square_and_warned_images_are_marked() {
+        let values: Vec<f32> = (0..16).map(|p| p as f32).collect();
+        let canvas = sheet("", &values, 4).with_warned(vec![0]).render();
+        assert_eq!(*canvas.get_pixel(MARGIN_PX - 1, MARGIN_PX), AMBER);
+        let cell = FEW_TILE_PX as u32 / 4;
+        for (dx, dy, level) in [(0, 0, 0), (cell - 1, cell - 1, 0), (4 * cell - 1, 3 * cell, 255)] {
+            let found = *canvas.get_pixel(MARGIN_PX + dx, MARGIN_PX + dy);
+            assert_eq!(found, Rgb([level; 3]), "{dx} {dy}");
+        }
+    }
 }

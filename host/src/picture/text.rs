@@ -118,6 +118,46 @@ impl Style {
     }
 }
 
+/// Text broken into lines.
+pub(super) struct Block {
+    pub(super) style: Style,
+    lines: Vec<String>,
+}
+
+impl Block {
+    /// These texts below each other, each in lines of at most `width_px`. An empty text has no line.
+    pub(super) fn new<'a>(
+        style: fn() -> Style,
+        texts: impl IntoIterator<Item = &'a str>,
+        width_px: u32,
+    ) -> Self {
+        let style = style();
+        let lines = texts.into_iter().flat_map(|text| style.wrap(text, width_px as f32)).collect();
+        Self { style, lines }
+    }
+
+    pub(super) fn height(&self) -> u32 {
+        self.lines.len() as u32 * self.style.line_px
+    }
+
+    /// The height with a space below; 0 without text.
+    pub(super) fn height_and(&self, space_px: u32) -> u32 {
+        if self.lines.is_empty() { 0 } else { self.height() + space_px }
+    }
+
+    /// The width of the widest line.
+    pub(super) fn width(&self) -> f32 {
+        self.lines.iter().map(|line| self.style.width(line)).fold(0.0, f32::max)
+    }
+
+    pub(super) fn draw(&self, canvas: &mut RgbImage, left: u32, top: u32) {
+        for (k, line) in self.lines.iter().enumerate() {
+            let y = top + k as u32 * self.style.line_px;
+            self.style.draw(canvas, line, left as f32, y as f32);
+        }
+    }
+}
+
 fn blend(ground: &mut Rgb<u8>, ink: Rgb<u8>, coverage: f32) {
     for (ground, ink) in ground.0.iter_mut().zip(ink.0) {
         let mixed =

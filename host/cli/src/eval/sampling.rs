@@ -6,6 +6,7 @@ use crate::report::{ReportArgs, to_json};
 use crate::source::SourceArgs;
 use crate::{print, refused};
 use anyhow::{Context, Result};
+use nirspi::files::image::encode_rgb;
 use nirspi::files::output::OutputDir;
 use nirspi_eval::sampling::{RECORDED, Study, default_orders};
 use nirspi_recon::Sampling;
@@ -15,7 +16,7 @@ use std::process::ExitCode;
 /// Compare orders, bases and methods at partial sampling, on measurements of a full sweep
 ///
 /// The image of all patterns is the reference. The command writes sampling.md (tables), sampling.json (every number) and
-/// sampling.svg (a plot for the best order).
+/// sampling.png (each order's gain over zero filling, and the best images).
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n\
     \x20 nirspi eval sampling wing.npz --out sampling/")]
@@ -57,11 +58,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let mut out = OutputDir::create(&args.out)?;
     out.write("sampling.md", tables.as_bytes())?;
     out.write("sampling.json", to_json(&report)?.as_bytes())?;
-    out.write("sampling.svg", study.plot(&report).as_bytes())?;
+    out.write("sampling.png", &encode_rgb(&study.plot(&report)))?;
     out.commit()?;
     args.report.print(&report, |_| {
         print::line(tables.trim_end())?;
         let folder = args.out.display();
-        print::line(format_args!("wrote sampling.md, sampling.json and sampling.svg to {folder}"))
+        print::line(format_args!("wrote sampling.md, sampling.json and sampling.png to {folder}"))
     })
 }

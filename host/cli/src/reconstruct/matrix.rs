@@ -7,6 +7,7 @@ use crate::report::{StageTimes, stages};
 use anyhow::{Context, Result, bail};
 use nirspi::files::measurement::{Plain, Selection, read_plain};
 use nirspi::files::npy;
+use nirspi::picture::{Pictures, Unit};
 use nirspi_recon::reconstruct::{MatrixSettings, Method, OwnMatrix, Setting};
 use nirspi_recon::words::count_of;
 use nirspi_recon::{Sampling, Side};
@@ -36,6 +37,7 @@ struct Report {
     relative_residual: f64,
     not_read: Vec<usize>,
     notes: Vec<String>,
+    pictures: Pictures,
     stage_ms: StageTimes,
 }
 
@@ -101,9 +103,10 @@ pub fn run(args: &Args, path: &Path) -> Result<ExitCode> {
         relative_residual: found.residual,
         not_read,
         notes,
+        pictures: Pictures::of_image(&found.image, Unit::Readings, None),
         stage_ms: times,
     };
-    super::write(&args.out, &found.image, None, None, &report)?;
+    super::write(&args.out, &found.image, None, None, &report.pictures, &report)?;
     args.report.print(&report, |report| say(args, report))
 }
 

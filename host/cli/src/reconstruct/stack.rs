@@ -9,11 +9,11 @@ use anyhow::{Context, Result, bail};
 use nirspi::files::npy;
 use nirspi::files::output::OutputDir;
 use nirspi::imaging::{FrameReport as Enhanced, MethodReport, enhance_frames};
-use nirspi::picture::contact_sheet;
+use nirspi::picture::{Pictures, Unit};
 use nirspi::source::FirstPatterns;
 use nirspi_recon::reconstruct::{Method, Reconstruction, Setting};
 use nirspi_recon::words::count_of;
-use nirspi_recon::{Image, Measurements, Rows, Side};
+use nirspi_recon::{Image, Measurements, Rows};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -25,6 +25,7 @@ struct Report {
     order: String,
     warm_start: bool,
     frames: Vec<FrameReport>,
+    pictures: Pictures,
     stage_ms: StageTimes,
 }
 
@@ -73,6 +74,7 @@ pub fn run(args: &Args, first: &FirstPatterns) -> Result<ExitCode> {
     let others = times.time("reconstruct", || spinning(|| solve_all(args, &imaginary)))?;
     let mut others = others.into_iter();
     let (mut images, mut frames) = (Vec::new(), Vec::new());
+    let unit = Unit::of_readings(sources[0].frames.is_some());
     for (made, (used, source)) in solved.into_iter().zip(used.iter().zip(sources)) {
         let warm = made.report.warm;
         let Solved { mut image, report } = args.method.solved(made);
@@ -105,25 +107,27 @@ pub fn run(args: &Args, first: &FirstPatterns) -> Result<ExitCode> {
         sharp = Some(pixels);
     }
     let n = images[0].side().pixels();
+    let short = |at: &usize| frames[*at].enhancement.as_ref().is_some_and(|e| !e.short.is_empty());
+    let warned = (0..frames.len()).filter(short).collect();
+    let sharp_and_warned = sharp.as_deref().map(|sharp| (sharp, warned));
+    let pictures = Pictures::of_video(&named(), &images, unit, sharp_and_warned);
     let report = Report {
         input: args.source.input.clone(),
         n,
         order: orders.into_iter().next().unwrap_or_default(),
         warm_start: args.warm_start,
         frames,
+        pictures,
         stage_ms: times,
     };
     let mut out = OutputDir::create(&args.out)?;
     let pixels: Vec<f32> = images.iter().flat_map(Image::pixels).copied().collect();
     out.write("image.npy", &npy::encode(&[images.len(), n, n], &pixels))?;
-    out.write("image.png", &contact_sheet(&images))?;
     if let Some(sharp) = sharp {
         let side = nirspi_nets::deblur::SIDE;
         out.write("enhanced.npy", &npy::encode(&[images.len(), side, side], &sharp))?;
-        let at = Side::new(side as u64)?;
-        let sharp = sharp.chunks_exact(at.area()).map(|pixels| Image::new(at, pixels.to_vec()));
-        out.write("enhanced.png", &contact_sheet(&sharp.collect::<Vec<_>>()))?;
     }
+    report.pictures.write(&mut out)?;
     out.write("report.json", to_json(&report)?.as_bytes())?;
     out.commit()?;
     args.report.print(&report, |report| say(args, report))
@@ -166,9 +170,10 @@ fn say(args: &Args, report: &Report) -> Result<()> {
             print::note(format_args!("frame {at}: {note}"))?;
         }
     }
-    let enhanced = if args.enhance { ", enhanced.npy, enhanced.png" } else { "" };
+    let enhanced = if args.enhance { ", enhanced.npy" } else { "" };
     print::line(format_args!(
-        "wrote image.npy, image.png{enhanced} and report.json to {}",
+        "wrote image.npy{enhanced}, {} and report.json to {}",
+        report.pictures,
         args.out.display()
     ))
 }

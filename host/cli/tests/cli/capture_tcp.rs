@@ -48,6 +48,8 @@ fn a_capture_ends_with_a_picture_of_what_was_seen() {
     assert!(report["enhancement"]["inconsistency"].as_f64().unwrap() < 1.5, "{report}");
     let png = std::fs::read(bench.path("seen/enhanced.png")).unwrap();
     assert_eq!(&png[1..4], b"PNG");
+    assert_eq!(report["pictures"][0]["images"][0]["unit"], "ADC counts");
+    assert_eq!(report["pictures"][1]["images"][0]["unit"], "of white");
     // The same frames as a video: each enhanced, with one white for all.
     let video = ["reconstruct", "rec.mcap", "--index", "all", "--enhance", "--out", "video"];
     let report = bench.run(&[&video[..], &["--json"]].concat()).succeeded().json();
@@ -55,6 +57,15 @@ fn a_capture_ends_with_a_picture_of_what_was_seen() {
     assert_eq!(frames.len(), 6);
     assert!(frames.iter().all(|f| f["enhancement"]["white"] == frames[0]["enhancement"]["white"]));
     assert_eq!(bench.pixels("video/enhanced.npy").len(), 6 * 64 * 64);
+    let files: Vec<&str> = report["pictures"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|p| p["file"].as_str().unwrap())
+        .collect();
+    assert_eq!(files, ["image.png", "image.apng", "enhanced.png", "enhanced.apng"]);
+    assert!(files.iter().all(|file| bench.path(&format!("video/{file}")).exists()));
+    assert_eq!(report["pictures"][1]["shown"], 6);
 }
 
 #[cfg(unix)]

@@ -87,6 +87,9 @@ fn a_folder_of_pictures_becomes_a_folder_of_the_same_names() {
         .collect();
     names.sort();
     assert_eq!(names, ["a.png", "b.png"]);
+    // The picture for people is beside the folder, and a folder is read without one.
+    std::fs::copy(bench.path("sharp.picture.png"), bench.path("in/sharp.picture.png")).unwrap();
+    bench.run(&["deblur", "in", "--out", "sharper"]).succeeded();
     bench.write("in/c.png", &encode_grey(32, 32, &bar(32)));
     bench
         .run(&["deblur", "in", "--out", "again"])

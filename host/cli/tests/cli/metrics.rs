@@ -1,6 +1,6 @@
 //! `nirspi metrics`. That the figures are right is tested in `nirspi-recon`.
 
-use crate::bench::Bench;
+use crate::bench::{Bench, Measured};
 use nirspi::files::npy;
 
 #[test]
@@ -15,6 +15,22 @@ fn two_stacks_are_compared_image_by_image() {
     // The first is identical, which has no finite PSNR; the second is off by 0.05 everywhere: 26.02 dB.
     assert!(report["each"][0]["psnr_db"].is_null() && report["each"][0]["ssim"] == 1.0, "{report}");
     assert!((report["each"][1]["psnr_db"].as_f64().unwrap() - 26.0206).abs() < 1e-3, "{report}");
+}
+
+#[test]
+fn pictures_with_labels_are_compared_by_the_images_in_them() {
+    let bench = Bench::new();
+    let measured = Measured::new(16);
+    bench.write("in.npz", &measured.npz());
+    for (out, share) in [("all", "1"), ("part", "0.5")] {
+        bench.run(&["reconstruct", "in.npz", "--sampling", share, "--out", out]).succeeded();
+    }
+    let compare = |test: &str| bench.run(&["metrics", "all/image.png", test]).succeeded().json();
+    assert_eq!(compare("all/image.png")["mean_ssim"], 1.0);
+    let part = compare("part/image.png")["mean_ssim"].as_f64().unwrap();
+    // As the arrays: labels, which are alike in both pictures, have no part in it.
+    let range = bench.run(&["metrics", "all", "part", "--align", "gain-offset"]).succeeded().json();
+    assert!((part - range["mean_ssim"].as_f64().unwrap()).abs() < 0.1, "{part} {range}");
 }
 
 /// Three images of 64 x 64 with stripes of their own.

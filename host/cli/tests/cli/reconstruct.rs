@@ -18,9 +18,19 @@ fn a_measurement_comes_back_as_the_image_it_was_made_from() {
         assert_eq!(said.json(), report);
         assert_eq!((&report["n"], &report["used"]), (&n.into(), &(n * n).into()));
         assert!(report["correlation_with_files_recon"].as_f64().unwrap() > 0.9999, "{report}");
-        let png = std::fs::read(bench.path("out/image.png")).unwrap();
-        assert!(png.starts_with(b"\x89PNG"));
         assert_eq!(bench.names(), ["in.npz", "out"]);
+        // The picture has labels, and programs find the image in it; its range is in the report.
+        let [picture] = report["pictures"].as_array().unwrap().as_slice() else { panic!() };
+        assert_eq!(picture["file"], "image.png");
+        let range = |name: &str| picture["images"][0][name].as_f64().unwrap();
+        assert!(range("least") <= range("black") && range("white") <= range("most"), "{picture}");
+        assert_eq!(picture["images"][0]["unit"], "units of the readings");
+        let found = nirspi::files::image::read_grey(&bench.path("out/image.png")).unwrap();
+        assert_eq!((found.width, found.height), (n as u32, n as u32));
+        let level = |p: &f32| (f64::from(*p) - range("black")) / (range("white") - range("black"));
+        for (pixel, found) in pixels.iter().zip(&found.values) {
+            assert!((level(pixel).clamp(0.0, 1.0) - f64::from(*found)).abs() < 0.005, "{pixel}");
+        }
     }
 }
 

@@ -5,8 +5,8 @@ use super::MIDDLE;
 use super::characters::Characters;
 use super::contenders::Method;
 use super::measure::{Condition, Figures};
-use image::{GenericImage, RgbImage};
-use nirspi::picture::{Axis, Chart, Line};
+use image::RgbImage;
+use nirspi::picture::{Axis, Chart, Line, below};
 use nirspi_nets::classical::Method as Classical;
 
 /// The classical method in the charts over steps.
@@ -104,13 +104,7 @@ fn by_steps(steps: &[Figures]) -> Vec<Row<'_>> {
 }
 
 fn linear(name: &str, ticks: &[f64]) -> Axis {
-    Axis {
-        name: name.to_owned(),
-        from: ticks[0],
-        to: ticks[ticks.len() - 1],
-        logarithmic: false,
-        ticks: ticks.to_vec(),
-    }
+    Axis::of(name, ticks.to_vec(), false)
 }
 
 /// The three charts of one axis, below each other.
@@ -122,8 +116,7 @@ fn column(header: &str, x: &Axis, rows: &[Row<'_>], images: usize) -> RgbImage {
             .map(|(k, (name, points))| Line {
                 name: name.clone(),
                 colour: k,
-                // The colours repeat with dashes.
-                dashed: k >= 6,
+                dashed: false,
                 points: points.iter().map(|(x, f)| (*x, (measure.of)(f))).collect(),
             })
             .collect();
@@ -131,54 +124,11 @@ fn column(header: &str, x: &Axis, rows: &[Row<'_>], images: usize) -> RgbImage {
         let chart = Chart {
             header: header.to_owned(),
             x: x.clone(),
-            y: Axis { name: measure.name.to_owned(), ..rounded(values) },
+            y: Axis::around(measure.name, values),
             lines,
             footer: format!("simulated: {images} characters that training has not seen"),
         };
         chart.render()
     });
-    let (width, height) = (charts[0].width(), charts.iter().map(RgbImage::height).sum());
-    let mut picture = RgbImage::new(width, height);
-    let mut top = 0;
-    for chart in &charts {
-        // All charts have the same width, because their legends have the same names.
-        let _ = picture.copy_from(chart, 0, top);
-        top += chart.height();
-    }
-    picture
-}
-
-/// An axis that holds all values, with a few ticks at 1, 2 or 5 times a power of ten.
-fn rounded(values: impl Iterator<Item = f64>) -> Axis {
-    let (low, high) = values
-        .filter(|value| value.is_finite())
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
-    let (low, high) = if low <= high { (low, high) } else { (0.0, 1.0) };
-    let rough = ((high - low) / 6.0).max(1e-3);
-    let power = 10_f64.powf(rough.log10().floor());
-    let step = [1.0, 2.0, 5.0].map(|m| m * power).into_iter().find(|s| *s >= rough);
-    let step = step.unwrap_or(10.0 * power);
-    let (first, last) =
-        ((low / step).floor(), (high / step).ceil().max((low / step).floor() + 1.0));
-    let ticks = (0..=(last - first) as usize).map(|k| (first + k as f64) * step).collect();
-    Axis { name: String::new(), from: first * step, to: last * step, logarithmic: false, ticks }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn an_axis_holds_its_values_between_round_ticks() {
-        for (values, ticks) in [
-            (vec![17.2, 31.4], vec![15.0, 20.0, 25.0, 30.0, 35.0]),
-            (vec![0.46, 0.99], vec![0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0]),
-            (vec![3.0], vec![3.0, 3.001]),
-            (vec![f64::NAN], vec![0.0, 0.2, 0.4, 0.6, 0.8, 1.0]),
-        ] {
-            let axis = rounded(values.into_iter());
-            assert_eq!(axis.ticks.len(), ticks.len(), "{:?}", axis.ticks);
-            assert!(axis.ticks.iter().zip(&ticks).all(|(a, b)| (a - b).abs() < 1e-9));
-        }
-    }
+    below(&charts)
 }

@@ -8,7 +8,7 @@ use super::measure::{Condition, SIDE, halved};
 use super::{MIDDLE, UNTOUCHED};
 use crate::error::{EvalError, On, Result};
 use nirspi::files::image::read_reflectance;
-use nirspi::picture::{Panel, Range, SideBySide};
+use nirspi::picture::{Panel, Range, SideBySide, Unit};
 use nirspi::source::{Index, Source, SourceOptions};
 use nirspi_nets::consistency::Consistency;
 use nirspi_nets::upscale_2x;
@@ -183,6 +183,7 @@ pub fn enhance(scenes: &[Scene], contender: &Contender) -> Result<Shown> {
             height: CASES_A_PANEL * SIDE,
             values: vec![0.0; 3 * SIDE * CASES_A_PANEL * SIDE],
             range: Range::Unit,
+            unit: Unit::OfWhite,
             caption: Vec::new(),
             warnings: Vec::new(),
         };

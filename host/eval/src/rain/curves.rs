@@ -89,28 +89,22 @@ fn factors((low, high, count): (f64, f64, usize)) -> Vec<f64> {
 }
 
 fn axis(name: &str, ticks: &[f64], logarithmic: bool) -> Axis {
-    let ends = (ticks.first(), ticks.last());
-    let (from, to) = (ends.0.copied().unwrap_or(0.0), ends.1.copied().unwrap_or(1.0));
-    Axis { name: name.to_owned(), from, to, logarithmic, ticks: ticks.to_vec() }
+    Axis::of(name, ticks.to_vec(), logarithmic)
 }
 
 fn line(name: &str, colour: usize, points: Vec<(f64, f64)>) -> Line {
     Line { name: name.to_owned(), colour, dashed: false, points }
 }
 
-/// Decades that hold all values that can be drawn, at most ten, from the largest down.
-fn decades(lines: &[Line]) -> Vec<f64> {
-    let values = || lines.iter().flat_map(|l| &l.points).map(|p| p.1).filter(|y| *y > 0.0);
-    let most = values().fold(f64::MIN_POSITIVE, f64::max).log10().ceil() as i32;
-    let least = values().fold(f64::MAX, f64::min).log10().floor().max(f64::from(most - 10)) as i32;
-    (least.min(most - 1)..=most).map(|power| 10_f64.powi(power)).collect()
-}
-
 const SHARES: [f64; 6] = [0.0, 0.2, 0.4, 0.6, 0.8, 1.0];
 
-/// An axis of shares, with room for the height of two legends above.
 fn share_axis(name: &str) -> Axis {
-    Axis { to: 1.4, ..axis(name, &SHARES, false) }
+    axis(name, &SHARES, false)
+}
+
+/// Decades around the values of all lines.
+fn decades(name: &str, lines: &[Line]) -> Axis {
+    Axis::decades(name, lines.iter().flat_map(|line| &line.points).map(|point| point.1), 10)
 }
 
 fn over_wavelength(airs: &[Air]) -> Result<Vec<Curves>> {
@@ -123,23 +117,22 @@ fn over_wavelength(airs: &[Air]) -> Result<Vec<Curves>> {
     let media: Vec<Vec<Medium>> = airs.iter().map(of).collect::<Result<_>>()?;
     let lines = |value: fn(&Medium) -> f64| -> Vec<Line> {
         let of = |(k, (air, media)): (usize, (&Air, &Vec<Medium>))| {
-            line(&air.name, k, media.iter().map(|m| (m.wavelength_nm, value(m))).collect())
+            let points = media.iter().map(|m| (m.wavelength_nm, value(m))).collect();
+            // The rain asked for may be one of the paper's: dashes leave its line visible.
+            Line { dashed: k == 1 || k == 2, ..line(&air.name, k, points) }
         };
         airs.iter().zip(&media).enumerate().map(of).collect()
     };
     let x = || axis("wavelength, nm", &[400.0, 800.0, 1200.0, 1600.0, 2000.0], false);
     let footer = "simulated: Mie, water of Segelstein (1981)".to_owned();
     let extinction = lines(|m| m.extinction_per_m);
-    let mut extinction_ticks = decades(&extinction);
-    // Room for the legend.
-    extinction_ticks.extend(extinction_ticks.last().map(|most| most * 10.0));
     Ok(vec![
         Curves {
             name: "extinction_wavelength",
             chart: Chart {
                 header: "Extinction against wavelength".to_owned(),
                 x: x(),
-                y: axis("extinction, 1/m", &extinction_ticks, true),
+                y: decades("extinction, 1/m", &extinction),
                 lines: extinction,
                 footer: footer.clone(),
             },
@@ -238,13 +231,12 @@ fn sizes(airs: &[Air]) -> Curves {
             lines.push(line(&format!("Marshall-Palmer, {rate} mm/h"), airs.len() + k, density));
         }
     }
-    let ticks = decades(&lines);
     Curves {
         name: "drop_sizes",
         chart: Chart {
             header: "Drops by size".to_owned(),
             x: axis("drop diameter, mm", &[0.001, 0.01, 0.1, 1.0, 10.0], true),
-            y: axis("N(D), drops per m3 and mm", &ticks, true),
+            y: decades("N(D), drops per m3 and mm", &lines),
             lines,
             footer: "a measured distribution is drawn by its first two classes' distance; one size has no curve".to_owned(),
         },
@@ -295,9 +287,10 @@ fn rates(wavelengths_nm: &[f64]) -> Result<Curves> {
         chart: Chart {
             header: "Rain on an optical link".to_owned(),
             x: axis("rain rate, mm/h", &[0.5, 1.0, 5.0, 10.0, 50.0, 100.0], true),
-            y: axis("extinction, dB/km", &[0.1, 1.0, 10.0, 100.0, 1000.0], true),
+            y: decades("extinction, dB/km", &lines),
             lines,
-            footer: "simulated: Mie; dashed: laws fitted to measured free-space optical links"
+            footer: "simulated: Mie, in which wavelengths differ by less than a line's width; dashed: laws fitted to \
+                     measured free-space optical links"
                 .to_owned(),
         },
     })
@@ -328,6 +321,7 @@ mod tests {
         );
         for Curves { name, chart } in &all {
             assert!(!chart.lines.is_empty(), "{name}");
+            assert_eq!(crate::looks(chart), chart.lines.len(), "{name}: two lines look alike");
             for Line { name: line, points, .. } in &chart.lines {
                 let shown = |&&(x, y): &&(f64, f64)| {
                     (chart.x.from..=chart.x.to).contains(&x)

@@ -1,94 +1,160 @@
-//! Curves as an SVG picture, laid out without font metrics.
+//! The picture of a sampling study: the best image at each share; and for each order the gain over
+//! zero filling of the best methods, with their images.
+//!
+//! # Invariant
+//! A method has the same colour in all orders, and no two methods of one order look alike
+//! (`super::tests::the_picture_has_a_panel_for_each_order_with_lines_that_differ`).
 
-use std::fmt::Write;
+use super::tables::signed;
+use super::{Report, Shown, ZERO_FILLING};
+use image::RgbImage;
+use nirspi::picture::{
+    Axis, Chart, Line, Panel, Range, Scale, SideBySide, Unit, below, beside, blank,
+};
+use nirspi_recon::Image;
 
-/// PSNR in dB over the share of patterns.
-pub struct Curve {
-    /// The name in the legend.
-    pub name: String,
-    /// Points as share and dB.
-    pub points: Vec<(f64, f64)>,
+/// Number of methods with a line in the chart of an order.
+const LINES: usize = 4;
+/// Frame of a chart, and edge of an image.
+const FRAME_PX: (u32, u32) = (460, 270);
+const IMAGE_PX: u32 = 256;
+
+/// The whole picture.
+pub(super) fn draw(report: &Report, orders: &[String], methods: &[String]) -> RgbImage {
+    let mut rows: Vec<RgbImage> =
+        summary(report).map(|row| row.render_at(IMAGE_PX)).into_iter().collect();
+    let share = telling_share(report);
+    let charts = charts(report, orders, methods);
+    let drawn: Vec<RgbImage> = charts.iter().map(|chart| chart.render_at(FRAME_PX)).collect();
+    // Images of all orders below each other, also where the names of methods are short.
+    let widest = drawn.iter().map(RgbImage::width).max().unwrap_or(1);
+    for (chart, drawn) in charts.iter().zip(drawn) {
+        let space = blank(widest - drawn.width(), 1);
+        let mut row = vec![drawn, space];
+        row.extend(images(report, &chart.header, share).map(|row| row.render_at(IMAGE_PX)));
+        rows.push(beside(&row));
+    }
+    below(&rows)
 }
 
-const WIDTH: f64 = 900.0;
-const HEIGHT: f64 = 520.0;
-const LEFT: f64 = 60.0;
-const RIGHT: f64 = 660.0;
-const TOP: f64 = 40.0;
-const BOTTOM: f64 = 470.0;
-/// Okabe and Ito's colours, which most people can distinguish.
-const COLOURS: [&str; 8] =
-    ["#000000", "#e69f00", "#56b4e9", "#009e73", "#f0e442", "#0072b2", "#d55e00", "#cc79a7"];
-/// After the last colour, the colours repeat with dashes.
-const DASHES: [&str; 3] = ["none", "8 3", "2 3"];
-
-/// The picture of these curves, measured in one order.
-pub fn draw(curves: &[Curve], order: &str) -> String {
-    let points = || curves.iter().flat_map(|curve| curve.points.iter().copied());
-    let bounds = |pick: fn((f64, f64)) -> f64| {
-        points().map(pick).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
-            (low.min(value), high.max(value))
-        })
-    };
-    let mut svg = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" font-family=\"sans-serif\" \
-         font-size=\"12\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n"
-    );
-    let mut line = |text: String| {
-        svg.push_str(&text);
-        svg.push('\n');
-    };
-    line(format!(
-        "<text x=\"{LEFT}\" y=\"24\" font-size=\"15\">PSNR in dB over the share of patterns, order {order}</text>"
-    ));
-    let ((left, right), (low, high)) = (bounds(|p| p.0), bounds(|p| p.1));
-    let (low, high) = ((low / 5.0).floor() * 5.0, (high / 5.0).ceil() * 5.0);
-    if left.is_finite() && low.is_finite() {
-        let x = |share: f64| LEFT + (RIGHT - LEFT) * (share - left) / (right - left).max(1e-9);
-        let y = |db: f64| BOTTOM - (BOTTOM - TOP) * (db - low) / (high - low).max(1e-9);
-        let mut db = low;
-        while db <= high {
-            let at = y(db);
-            line(format!(
-                "<path d=\"M{LEFT} {at:.1}H{RIGHT}\" stroke=\"#ddd\"/><text x=\"28\" y=\"{:.1}\">{db}</text>",
-                at + 4.0
-            ));
-            db += 5.0;
-        }
-        let mut shares: Vec<f64> = points().map(|p| p.0).collect();
-        shares.sort_unstable_by(f64::total_cmp);
-        shares.dedup();
-        for share in shares {
-            let at = x(share);
-            line(format!(
-                "<text x=\"{:.1}\" y=\"{:.1}\">{:.0} %</text>",
-                at - 10.0,
-                BOTTOM + 20.0,
-                100.0 * share
-            ));
-        }
-        for (index, curve) in curves.iter().enumerate() {
-            let (colour, dash) = (COLOURS[index % 8], DASHES[index / 8 % 3]);
-            let mut path = String::new();
-            for (k, &(share, db)) in curve.points.iter().enumerate() {
-                // Writing to a string cannot fail.
-                let _ =
-                    write!(path, "{}{:.1} {:.1}", if k == 0 { 'M' } else { 'L' }, x(share), y(db));
-            }
-            let style = format!(
-                "fill=\"none\" stroke=\"{colour}\" stroke-width=\"2\" stroke-dasharray=\"{dash}\""
-            );
-            line(format!("<path d=\"{path}\" {style}/>"));
-            let row = TOP + 22.0 * index as f64;
-            line(format!("<path d=\"M{:.1} {row:.1}h28\" {style}/>", RIGHT + 20.0));
-            line(format!(
-                "<text x=\"{:.1}\" y=\"{:.1}\">{}</text>",
-                RIGHT + 56.0,
-                row + 4.0,
-                curve.name
-            ));
-        }
+/// The gain of the best methods of each order against the share.
+pub(super) fn charts(report: &Report, orders: &[String], methods: &[String]) -> Vec<Chart> {
+    // Colours in the order in which methods appear, so that few orders have few colours.
+    let mut coloured: Vec<&str> = Vec::new();
+    let mut shares: Vec<f64> = report.rows.iter().map(|row| 100.0 * row.sampling).collect();
+    shares.sort_unstable_by(f64::total_cmp);
+    shares.dedup();
+    let mut ticks = shares.clone();
+    if ticks.len() < 2 {
+        ticks.insert(0, 0.0);
     }
-    svg.push_str("</svg>\n");
-    svg
+    if ticks.len() < 2 {
+        ticks.push(100.0);
+    }
+    let ends = [ticks[0], ticks.last().copied().unwrap_or(100.0)];
+    let mut charts = Vec::new();
+    for order in orders {
+        let mut ranked: Vec<(&str, f64, Vec<(f64, f64)>)> = Vec::new();
+        for method in methods.iter().filter(|method| *method != ZERO_FILLING) {
+            let of = |row: &&super::Row| row.order == *order && row.method == *method;
+            let rows = report.rows.iter().filter(of);
+            let mut gains: Vec<(f64, f64)> =
+                rows.filter_map(|row| Some((100.0 * row.sampling, row.gain_db?))).collect();
+            gains.sort_by(|a, b| a.0.total_cmp(&b.0));
+            if gains.iter().any(|gain| gain.1.abs() >= 0.005) {
+                let mean = gains.iter().map(|gain| gain.1).sum::<f64>() / gains.len() as f64;
+                ranked.push((method, mean, gains));
+            }
+        }
+        ranked.sort_by(|a, b| b.1.total_cmp(&a.1));
+        ranked.truncate(LINES);
+        let mut lines: Vec<Line> = Vec::new();
+        for (method, _, points) in ranked {
+            let known = coloured.iter().position(|name| *name == method);
+            let colour = known.unwrap_or_else(|| {
+                coloured.push(method);
+                coloured.len() - 1
+            });
+            // Six colours, then the same with dots, and with dashes; the seventh is zero filling's.
+            let (round, colour) = (colour / 6, colour % 6 + colour / 6 % 2 * 8);
+            let name = method.to_owned();
+            lines.push(Line { name, colour, dashed: round / 2 % 2 == 1, points });
+        }
+        let values = lines.iter().flat_map(|line| &line.points).map(|point| point.1);
+        let y = Axis::around("gain over zero filling, dB", values.chain([0.0]));
+        let zero = ends.map(|share| (share, 0.0)).to_vec();
+        lines.push(Line { name: "zero filling".to_owned(), colour: 6, dashed: true, points: zero });
+        charts.push(Chart {
+            header: order.clone(),
+            x: Axis::of("share of the patterns, %", ticks.clone(), false),
+            y,
+            lines,
+            footer: String::new(),
+        });
+    }
+    charts
+}
+
+/// The share at which methods differ most from zero filling.
+fn telling_share(report: &Report) -> f64 {
+    let gain = |share: f64| -> f64 {
+        let of = |shown: &&Shown| shown.sampling == share;
+        report.shown.iter().filter(of).map(Shown::best_gain_db).sum()
+    };
+    let shares = report.shown.iter().map(|shown| shown.sampling);
+    shares.max_by(|a, b| gain(*a).total_cmp(&gain(*b)).then(b.total_cmp(a))).unwrap_or(1.0)
+}
+
+fn panel(report: &Report, title: &str, image: &Image, caption: Vec<String>) -> Panel {
+    // All images have the scale of the image of all patterns.
+    let scale = report
+        .full
+        .as_ref()
+        .map(|full| Scale::of(Range::Stretched, Unit::Readings, full.pixels().iter().copied()));
+    let range = scale.map_or(Range::Stretched, |scale| Range::Fixed(scale.black, scale.white));
+    let side = image.side().pixels();
+    Panel { range, caption, ..Panel::square(title, side, image.pixels(), Unit::Readings) }
+}
+
+/// The image of all patterns, and the best image at each share.
+fn summary(report: &Report) -> Option<SideBySide> {
+    let full = report.full.as_ref()?;
+    let mut panels = vec![panel(report, "all patterns", full, vec!["the reference".to_owned()])];
+    let mut shares: Vec<f64> = report.shown.iter().map(|shown| shown.sampling).collect();
+    shares.sort_unstable_by(f64::total_cmp);
+    shares.dedup();
+    for share in shares {
+        let of = |shown: &&Shown| shown.sampling == share && !shown.best.is_empty();
+        let at = report.shown.iter().filter(of);
+        let Some(best) = at.max_by(|a, b| a.best[0].psnr_db.total_cmp(&b.best[0].psnr_db)) else {
+            continue;
+        };
+        let winner = &best.best[0];
+        let caption = vec![format!("{:.2} dB", winner.psnr_db), format!("order {}", best.order)];
+        let title = format!("{:.0} %: {}", 100.0 * share, winner.method);
+        panels.push(panel(report, &title, &winner.image, caption));
+    }
+    Some(SideBySide {
+        header: format!("Best image at each share of the patterns: {}", report.input.display()),
+        panels,
+        footer: "PSNR against the image of all patterns, on whose scale all images are. Below: each order; the \
+                 charts have their own axes"
+            .to_owned(),
+    })
+}
+
+/// Zero filling and the best methods of an order.
+fn images(report: &Report, order: &str, share: f64) -> Option<SideBySide> {
+    let of = |shown: &&Shown| shown.sampling == share && shown.order == order;
+    let shown = report.shown.iter().find(of)?;
+    let zero = &shown.zero;
+    let caption = vec![format!("{:.2} dB", zero.psnr_db)];
+    let title = format!("{:.0} %: zero filling", 100.0 * share);
+    let mut panels = vec![panel(report, &title, &zero.image, caption)];
+    panels.extend(shown.best.iter().map(|best| {
+        let gain = signed(best.psnr_db - zero.psnr_db);
+        let caption = format!("{:.2} dB, {gain}", best.psnr_db);
+        panel(report, &best.method, &best.image, vec![caption])
+    }));
+    Some(SideBySide { header: String::new(), panels, footer: String::new() })
 }

@@ -5,11 +5,11 @@
 //! (`tests::nothing_is_fitted_unless_asked_for`).
 
 use crate::error::{EvalError, Result};
-use nirspi::files::image::read_grey;
+use nirspi::files::image::{is_picture, pictures_in, read_grey};
 use nirspi::files::measurement::read_images_of;
 use nirspi::files::npy::{Stack, read_stack};
 use nirspi::imaging::Fit;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Images that `reconstruct` and `demo` write, in the order of search in a folder.
 const OWN: [&str; 2] = ["image.npy", "reconstruction.npy"];
@@ -41,25 +41,13 @@ fn read_file(path: &Path) -> Result<Stack> {
     Ok(read_stack(path)?)
 }
 
-fn is_picture(path: &Path) -> bool {
-    let is = |extension: &str| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension));
-    is("png") || is("jpg") || is("jpeg")
-}
-
 fn read_folder(path: &Path) -> Result<Stack> {
     if let Some(own) = OWN.iter().map(|name| path.join(name)).find(|file| file.is_file()) {
         return Ok(read_stack(&own)?);
     }
     let wrong = |what: String| EvalError::Content(format!("{}: {what}", path.display()));
-    let entries =
-        std::fs::read_dir(path).map_err(|error| wrong(format!("cannot read it: {error}")))?;
-    let mut files: Vec<PathBuf> = entries
-        .filter_map(|entry| Some(entry.ok()?.path()))
-        .filter(|file| is_picture(file))
-        .collect();
-    files.sort();
     let mut all: Option<Stack> = None;
-    for file in &files {
+    for file in &pictures_in(path)? {
         let one = read_file(file)?;
         match &mut all {
             None => all = Some(one),

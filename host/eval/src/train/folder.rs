@@ -9,7 +9,7 @@ use super::data::Found;
 use crate::error::{EvalError, On, Result};
 use nirspi::files::image::encode_rgb;
 use nirspi::files::output::{OutputDir, write_atomic};
-use nirspi::picture::{Axis, Chart, Line};
+use nirspi::picture::{Axis, Chart, Line, below};
 use nirspi_nets::train::Entry;
 use nirspi_nets::train::checkpoint::Checkpoint;
 use std::fs::{File, OpenOptions};
@@ -114,8 +114,9 @@ impl RunFolder {
     /// [`EvalError`] for a file that cannot be written.
     pub fn checkpoint(&self, bytes: &[u8], log: &[Entry]) -> Result<()> {
         write_atomic(&self.file(Self::CHECKPOINT), bytes)?;
-        if let Some(chart) = plot(log) {
-            write_atomic(&self.file(Self::PLOT), &encode_rgb(&chart.render()))?;
+        let charts: Vec<_> = plot(log).iter().map(Chart::render).collect();
+        if !charts.is_empty() {
+            write_atomic(&self.file(Self::PLOT), &encode_rgb(&below(&charts)))?;
         }
         Ok(())
     }
@@ -129,48 +130,28 @@ impl RunFolder {
     }
 }
 
-/// Loss and held-out score by step. Each is scaled to the range of its values, because the two have
-/// different units.
-fn plot(log: &[Entry]) -> Option<Chart> {
-    let last = log.last()?;
+/// The loss by step on a logarithmic axis, and the held-out score by step in its own unit: one chart
+/// or two.
+fn plot(log: &[Entry]) -> Vec<Chart> {
+    let Some(last) = log.last() else { return Vec::new() };
     let losses: Vec<(f64, f64)> = log.iter().map(|e| (e.step as f64, e.loss)).collect();
     let scores: Vec<(f64, f64)> =
         log.iter().filter_map(|e| e.held_out.map(|score| (e.step as f64, score))).collect();
-    let line = |name: &str, colour, points: &[(f64, f64)], decimals: usize| {
-        let low = points.iter().map(|p| p.1).fold(f64::INFINITY, f64::min);
-        let high = points.iter().map(|p| p.1).fold(f64::NEG_INFINITY, f64::max);
-        let span = if high > low { high - low } else { 1.0 };
-        Line {
-            name: format!("{name}: {low:.decimals$} to {high:.decimals$}"),
-            colour,
-            dashed: false,
-            points: points.iter().map(|&(x, y)| (x, (y - low) / span)).collect(),
-        }
-    };
-    let steps = last.step as f64;
-    let mut lines = vec![line("loss", 1, &losses, 5)];
-    if !scores.is_empty() {
-        lines.push(line(&format!("held out, {}", last.score.unit()), 0, &scores, 2));
-    }
-    Some(Chart {
-        header: "Loss and held-out score".to_owned(),
-        x: Axis {
-            name: "steps".to_owned(),
-            from: 0.0,
-            to: steps,
-            logarithmic: false,
-            ticks: (0..=4).map(|k| (steps * f64::from(k) / 4.0).round()).collect(),
-        },
-        y: Axis {
-            name: "least to most of each line".to_owned(),
-            from: -0.05,
-            to: 1.05,
-            logarithmic: false,
-            ticks: vec![0.0, 0.5, 1.0],
-        },
-        lines,
+    let chart = |header: &str, y: Axis, colour, points| Chart {
+        header: header.to_owned(),
+        x: Axis::around("steps", [0.0, last.step as f64]),
+        y,
+        lines: vec![Line { name: header.to_lowercase(), colour, dashed: false, points }],
         footer: format!("{} steps in {:.0} s", last.step, last.seconds),
-    })
+    };
+    let values = |points: &[(f64, f64)]| points.iter().map(|point| point.1).collect::<Vec<_>>();
+    let loss = Axis::decades("loss", values(&losses), 8);
+    let mut charts = vec![chart("Loss", loss, 1, losses)];
+    if !scores.is_empty() {
+        let score = Axis::around(last.score.unit(), values(&scores));
+        charts.push(chart("Held-out score", score, 0, scores));
+    }
+    charts
 }
 
 #[cfg(test)]
@@ -184,14 +165,18 @@ mod tests {
     }
 
     #[test]
-    fn a_plot_brings_each_line_to_its_own_range() {
-        assert!(plot(&[]).is_none());
+    fn a_plot_shows_loss_and_score_as_they_are_on_axes_of_their_own() {
+        assert!(plot(&[]).is_empty());
+        assert_eq!(plot(&[entry(1, None)]).len(), 1);
         let log = [entry(1, None), entry(2, Some(20.0)), entry(4, Some(24.0))];
-        let chart = plot(&log).unwrap();
-        let [loss, score] = &chart.lines[..] else { panic!("{}", chart.lines.len()) };
-        assert_eq!(loss.points, [(1.0, 1.0), (2.0, 1.0 / 3.0), (4.0, 0.0)]);
-        assert_eq!(score.points, [(2.0, 0.0), (4.0, 1.0)]);
-        assert_eq!(score.name, "held out, dB: 20.00 to 24.00");
+        let [loss, score] = &plot(&log)[..] else { panic!("two charts") };
+        assert_eq!(loss.lines[0].points, [(1.0, 1.0), (2.0, 0.5), (4.0, 0.25)]);
+        assert!(loss.y.logarithmic && loss.y.from <= 0.25 && loss.y.to >= 1.0, "{:?}", loss.y);
+        assert_eq!(score.lines[0].points, [(2.0, 20.0), (4.0, 24.0)]);
+        assert_eq!((score.y.name.as_str(), score.y.from, score.y.to), ("dB", 20.0, 24.0));
+        assert!(
+            (score.x.from, score.x.to) == (0.0, 4.0) && score.lines[0].name == "held-out score"
+        );
     }
 
     #[test]

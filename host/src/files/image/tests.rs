@@ -166,3 +166,60 @@ fn no_damage_panics(whole: &[u8]) {
         }
     }
 }
+
+#[test]
+fn a_picture_with_labels_is_read_as_the_image_in_it() {
+    use crate::picture::{Panel, Range, SideBySide, Unit};
+    let values: Vec<f32> = (0..1024).map(|p| p as f32 / 1023.0).collect();
+    let written = |range, unit| {
+        let panel = Panel { range, ..Panel::square("image", 32, &values, unit) };
+        read(&SideBySide::from(panel).png()).unwrap()
+    };
+    let found = written(Range::Unit, Unit::OfWhite);
+    assert_eq!(found.size_px, 32);
+    let off = |(a, b): (&f32, &f32)| (a - b).abs();
+    assert!(found.values.iter().zip(&values).map(off).all(|off| off < 0.6 / 255.0));
+    // Of a stretched image, all but the ends come back.
+    let found = written(Range::Stretched, Unit::Reflectance);
+    assert!(found.values.iter().zip(&values).map(off).all(|off| off < 0.01));
+    // Counts have no white: the levels are read.
+    let found = written(Range::Fixed(0.0, 0.5), Unit::AdcCounts);
+    assert!((found.values[256] - 0.5).abs() < 0.01 && found.values[1023] == 1.0);
+}
+
+#[test]
+fn labels_are_never_read_as_an_image() {
+    use crate::picture::{Panel, Sheet, SideBySide, Unit};
+    let values = vec![0.5; 1024];
+    let one = || Panel::square("image", 32, &values, Unit::OfWhite);
+    let (header, footer) = (String::new(), String::new());
+    let two = SideBySide { header, panels: vec![one(), one()], footer };
+    let told = line(&read(&two.png()).unwrap_err(), "scene.png");
+    assert!(told.contains("a picture of 2 images with labels, expected one image"), "{told}");
+    let sheet = Sheet::new(String::new(), 32, vec![&values; 3], Unit::OfWhite);
+    let told = line(&read(&sheet.png()).unwrap_err(), "scene.png");
+    assert!(told.contains("a picture of 3 images"), "{told}");
+    // Another program has resized the picture and kept its text.
+    let placed = Placed { left: 0, top: 0, cell: 1, width: 2, height: 2, black: 0.0, white: 1.0 };
+    let picture = RgbImage::new(4, 4);
+    for damaged in [
+        Placed { cell: 0, ..placed },
+        Placed { left: 3, ..placed },
+        Placed { cell: u32::MAX, ..placed },
+        Placed { width: 0, ..placed },
+    ] {
+        let told =
+            line(&read(&encode_labelled(&picture, 1, Some(damaged))).unwrap_err(), "scene.png");
+        assert!(told.contains("damaged labels"), "{told}");
+    }
+    let bytes = encode_labelled(&picture, 1, Some(placed));
+    assert_eq!(read(&bytes).unwrap().size_px, 2);
+    let mut resized = Vec::new();
+    let mut encoder = ::png::Encoder::new(&mut resized, 1, 1);
+    encoder
+        .add_text_chunk("nirspi-picture".into(), r#"{"size":[4,4],"images":1,"image":null}"#.into())
+        .unwrap();
+    encoder.write_header().unwrap().write_image_data(&[0]).unwrap();
+    let told = line(&read(&resized).unwrap_err(), "scene.png");
+    assert!(told.contains("resized"), "{told}");
+}

@@ -1,0 +1,211 @@
+//! The pictures of a run, with the ranges of their images for the run's report.
+//!
+//! # Invariant
+//! A picture that shows fewer images than there are says so, in the picture, in the report and in
+//! words (`tests::what_is_left_out_is_said_in_the_report_and_in_words`).
+
+use super::layout::{Panel, SideBySide};
+use super::scale::{PERCENTILES, Range, Scale, Unit};
+use super::sheet::Sheet;
+use super::video;
+use crate::files::FileError;
+use crate::files::output::{OutputDir, write_atomic};
+use nirspi_recon::Image;
+use serde::Serialize;
+use std::fmt;
+use std::path::Path;
+
+/// Pictures that are drawn but not yet written. As JSON: each file with the ranges of its images.
+#[derive(Debug, Clone, Default, Serialize)]
+#[serde(transparent)]
+pub struct Pictures(Vec<Entry>);
+
+#[derive(Debug, Clone, Serialize)]
+struct Entry {
+    file: String,
+    /// Number of images in the file, and of those that there are.
+    shown: usize,
+    of: usize,
+    /// The percentiles that are black and white, if an image is stretched.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    percentiles: Option<[f64; 2]>,
+    /// A range for each image, or one for all.
+    images: Vec<Shown>,
+    #[serde(skip)]
+    bytes: Vec<u8>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct Shown {
+    #[serde(skip_serializing_if = "String::is_empty")]
+    title: String,
+    #[serde(flatten)]
+    scale: Scale,
+}
+
+impl Pictures {
+    /// Draws panels side by side.
+    ///
+    /// # Panics
+    /// As [`SideBySide::render`].
+    pub fn add(&mut self, file: &str, picture: &SideBySide) {
+        let shown = |panel: &Panel| Shown { title: panel.title.clone(), scale: panel.scale() };
+        let count = picture.panels.len();
+        let stretched = picture.panels.iter().any(|panel| panel.range == Range::Stretched);
+        self.0.push(Entry {
+            file: file.to_owned(),
+            shown: count,
+            of: count,
+            percentiles: stretched.then_some(PERCENTILES),
+            images: picture.panels.iter().map(shown).collect(),
+            bytes: picture.png(),
+        });
+    }
+
+    /// Draws one image.
+    ///
+    /// # Panics
+    /// As [`SideBySide::render`].
+    pub fn single(&mut self, file: &str, panel: Panel) {
+        self.add(file, &panel.into());
+    }
+
+    /// Draws each panel of a picture by itself, in files of these names.
+    ///
+    /// # Panics
+    /// As [`SideBySide::render`].
+    pub fn each(&mut self, names: &[&str], panels: &[Panel]) {
+        for (name, panel) in names.iter().zip(panels) {
+            self.single(&format!("{name}.png"), panel.clone());
+        }
+    }
+
+    /// The pictures of a reconstruction: `image.png`, and `enhanced.png` of the enhanced image in
+    /// `[0, 1]` with its warnings, if there is one.
+    #[must_use]
+    pub fn of_image(image: &Image, unit: Unit, enhanced: Option<(&[f32], Vec<String>)>) -> Self {
+        let mut pictures = Self::default();
+        let side = image.side().pixels();
+        let panel = Panel::square("reconstructed", side, image.pixels(), unit);
+        pictures.single("image.png", panel);
+        if let Some((values, warnings)) = enhanced {
+            let panel = Panel::square("enhanced", values.len().isqrt(), values, Unit::OfWhite);
+            pictures.single("enhanced.png", Panel { warnings, ..panel });
+        }
+        pictures
+    }
+
+    /// The pictures of a video: a contact sheet and a video of the images, and of the enhanced ones
+    /// in `[0, 1]`, if there are any. `warned` says which enhanced images have warnings.
+    ///
+    /// # Panics
+    /// If there is no image, or images differ in size.
+    #[must_use]
+    pub fn of_video(
+        header: &str,
+        images: &[Image],
+        unit: Unit,
+        enhanced: Option<(&[f32], Vec<usize>)>,
+    ) -> Self {
+        let mut pictures = Self::default();
+        let header = format!("{header}, {} frames", images.len());
+        let side = images[0].side().pixels();
+        let values = images.iter().map(Image::pixels).collect();
+        pictures.sheet_and_video("image", &Sheet::new(header.clone(), side, values, unit));
+        if let Some((values, warned)) = enhanced {
+            let area = values.len() / images.len();
+            let each = values.chunks_exact(area).collect();
+            let sheet =
+                Sheet::new(format!("{header}, enhanced"), area.isqrt(), each, Unit::OfWhite);
+            pictures.sheet_and_video("enhanced", &sheet.with_warned(warned));
+        }
+        pictures
+    }
+
+    /// Draws a contact sheet.
+    pub fn sheet(&mut self, file: &str, sheet: &Sheet<'_>) {
+        let bytes = sheet.png();
+        self.many(file, sheet, sheet.shown().len(), bytes);
+    }
+
+    /// Draws a contact sheet, `NAME.png`, and the same images as a video, `NAME.apng`.
+    pub fn sheet_and_video(&mut self, name: &str, sheet: &Sheet<'_>) {
+        self.sheet(&format!("{name}.png"), sheet);
+        let video = video::encode(sheet);
+        self.many(&format!("{name}.apng"), sheet, video.frames, video.bytes);
+    }
+
+    fn many(&mut self, file: &str, sheet: &Sheet<'_>, shown: usize, bytes: Vec<u8>) {
+        let of_scale = |(title, scale)| Shown { title, scale };
+        let images = sheet.scales().into_iter().map(of_scale).collect();
+        let (file, of) = (file.to_owned(), sheet.count());
+        self.0.push(Entry { file, shown, of, percentiles: Some(PERCENTILES), images, bytes });
+    }
+
+    /// Stages the files in a folder.
+    ///
+    /// # Errors
+    /// [`FileError`] names the file and the system's reason.
+    pub fn write(&self, out: &mut OutputDir) -> Result<(), FileError> {
+        self.0.iter().try_for_each(|entry| out.write(&entry.file, &entry.bytes))
+    }
+
+    /// Writes the files, whose names are paths here.
+    ///
+    /// # Errors
+    /// [`FileError`] names the file and the system's reason.
+    pub fn write_files(&self) -> Result<(), FileError> {
+        self.0.iter().try_for_each(|entry| write_atomic(Path::new(&entry.file), &entry.bytes))
+    }
+}
+
+/// The files in words, with what each leaves out.
+impl fmt::Display for Pictures {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (k, Entry { file, shown, of, .. }) in self.0.iter().enumerate() {
+            let comma = if k == 0 { "" } else { ", " };
+            write!(f, "{comma}{file}")?;
+            if shown < of {
+                write!(f, " ({shown} of {of} frames)")?;
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_range_of_every_picture_is_in_the_report() {
+        let mut pictures = Pictures::default();
+        let mut values = vec![1.0; 1024];
+        values[..100].fill(-2.0);
+        values[7] = 99.0;
+        pictures.single("image.png", Panel::square("image", 32, &values, Unit::AdcCounts));
+        let report = serde_json::to_value(&pictures).unwrap();
+        let expected = serde_json::json!([{
+            "file": "image.png", "shown": 1, "of": 1, "percentiles": [0.5, 99.5],
+            "images": [{
+                "title": "image", "unit": "ADC counts",
+                "black": -2.0, "white": 1.0, "least": -2.0, "most": 99.0
+            }]
+        }]);
+        assert_eq!(report, expected);
+        assert_eq!(pictures.to_string(), "image.png");
+    }
+
+    #[test]
+    fn what_is_left_out_is_said_in_the_report_and_in_words() {
+        let values: Vec<f32> = (0..100 * 16).map(|p| (p % 16) as f32).collect();
+        let images = values.chunks_exact(16).collect();
+        let sheet = Sheet::new("frames".to_owned(), 4, images, Unit::Readings);
+        let mut pictures = Pictures::default();
+        pictures.sheet_and_video("image", &sheet);
+        assert_eq!(pictures.to_string(), "image.png (64 of 100 frames), image.apng");
+        let report = serde_json::to_value(&pictures).unwrap();
+        assert_eq!((&report[0]["shown"], &report[0]["of"]), (&64.into(), &100.into()));
+        assert_eq!((&report[1]["shown"], &report[1]["of"]), (&100.into(), &100.into()));
+    }
+}

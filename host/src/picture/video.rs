@@ -1,0 +1,138 @@
+//! Many images as a video: an animated PNG, which browsers play.
+//!
+//! # Invariant
+//! The video has a frame for every image, or evenly chosen ones, and each frame names its image
+//! (`tests::a_video_decodes_to_as_many_frames_as_it_has_images`). All frames have one size.
+
+use super::layout::{Panel, SideBySide};
+use super::scale::Range;
+use super::sheet::{Sheet, evenly};
+use image::{GenericImageView, RgbImage, imageops};
+
+/// The most frames.
+const MOST: usize = 1000;
+/// Frames a second.
+const RATE_HZ: u16 = 10;
+
+/// An animated PNG.
+pub(super) struct Video {
+    pub(super) bytes: Vec<u8>,
+    pub(super) frames: usize,
+}
+
+/// The images of a sheet, one after another, on the sheet's scale.
+///
+/// # Panics
+/// If there is no image.
+pub(super) fn encode(sheet: &Sheet<'_>) -> Video {
+    let shown = evenly(sheet.count(), MOST);
+    let pictures: Vec<SideBySide> = shown.iter().map(|&index| frame(sheet, index)).collect();
+    // The text below an image may be longer than that of another.
+    let height = pictures.iter().map(SideBySide::height).max().unwrap_or(1);
+    let mut bytes = Vec::new();
+    let encoded = (|| {
+        let mut pictures = pictures.iter().map(|picture| padded(picture.render(), height));
+        let mut before = pictures.next().unwrap_or_else(|| RgbImage::new(1, 1));
+        let mut encoder = png::Encoder::new(&mut bytes, before.width(), before.height());
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        encoder.set_animated(shown.len() as u32, 0)?;
+        encoder.set_frame_delay(1, RATE_HZ)?;
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(before.as_raw())?;
+        for picture in pictures {
+            // A frame is what has changed since the one before.
+            let (left, top, width, height) = changed(&before, &picture);
+            // The place is checked against the size before it, and the size against the place.
+            writer.reset_frame_position()?;
+            writer.set_frame_dimension(width, height)?;
+            writer.set_frame_position(left, top)?;
+            let part = picture.view(left, top, width, height).to_image();
+            writer.write_image_data(part.as_raw())?;
+            before = picture;
+        }
+        writer.finish()
+    })();
+    encoded.expect("pictures of one size encode into memory");
+    Video { bytes, frames: shown.len() }
+}
+
+fn frame(sheet: &Sheet<'_>, index: usize) -> SideBySide {
+    let scale = sheet.scale_of(index);
+    let title = format!("frame {index}, of 0 to {}", sheet.count() - 1);
+    let warning = sheet.is_warned(index).then(|| "a warning stands in the report".to_owned());
+    Panel {
+        range: Range::Fixed(scale.black, scale.white),
+        warnings: warning.into_iter().collect(),
+        ..Panel::square(&title, sheet.side(), sheet.image(index), sheet.unit())
+    }
+    .into()
+}
+
+fn padded(picture: RgbImage, height: u32) -> RgbImage {
+    if picture.height() == height {
+        return picture;
+    }
+    let mut canvas = RgbImage::from_pixel(picture.width(), height, super::GROUND);
+    imageops::replace(&mut canvas, &picture, 0, 0);
+    canvas
+}
+
+/// The smallest part that holds all changes, at least a pixel: left, top, width, height.
+fn changed(before: &RgbImage, after: &RgbImage) -> (u32, u32, u32, u32) {
+    let (mut left, mut top, mut right, mut bottom) = (u32::MAX, u32::MAX, 0, 0);
+    let wide = 3 * after.width() as usize;
+    let rows = before.as_raw().chunks_exact(wide).zip(after.as_raw().chunks_exact(wide));
+    for (y, (old, new)) in rows.enumerate().filter(|(_, (old, new))| old != new) {
+        let differs = |x: &usize| old[*x] != new[*x];
+        let first = (0..wide).find(differs).unwrap_or(0) as u32 / 3;
+        let last = (0..wide).rev().find(differs).unwrap_or(0) as u32 / 3;
+        (left, right) = (left.min(first), right.max(last));
+        (top, bottom) = (top.min(y as u32), y as u32);
+    }
+    match left {
+        u32::MAX => (0, 0, 1, 1),
+        _ => (left, top, right - left + 1, bottom - top + 1),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::scale::Unit;
+    use super::*;
+    use image::codecs::png::PngDecoder;
+    use image::{AnimationDecoder, DynamicImage};
+    use std::io::Cursor;
+
+    #[test]
+    fn a_video_decodes_to_as_many_frames_as_it_has_images() {
+        // The third image is the second again, and the last is brighter than all.
+        let images: Vec<Vec<f32>> = [1.0_f32, 2.0, 2.0, 9.0]
+            .iter()
+            .map(|gain| (0..64).map(|p| gain * p as f32).collect())
+            .collect();
+        let images: Vec<&[f32]> = images.iter().map(Vec::as_slice).collect();
+        let sheet = Sheet::new(String::new(), 8, images, Unit::AdcCounts);
+        let video = encode(&sheet);
+        assert_eq!(video.frames, 4);
+        let frames = PngDecoder::new(Cursor::new(&video.bytes)).unwrap().apng().unwrap();
+        let frames = frames.into_frames().collect_frames().unwrap();
+        assert_eq!(frames.len(), 4);
+        for (index, found) in frames.into_iter().enumerate() {
+            assert_eq!(found.delay().numer_denom_ms(), (100, 1));
+            let wanted = frame(&sheet, index).render();
+            let found = DynamicImage::from(found.into_buffer()).to_rgb8();
+            let (width, height) = wanted.dimensions();
+            let part = found.view(0, 0, width, height).to_image();
+            assert!(found.height() >= height && part == wanted, "frame {index}");
+        }
+    }
+
+    #[test]
+    fn a_video_of_very_many_images_says_how_many_it_leaves_out() {
+        assert_eq!(evenly(20_000, MOST).len(), 1000);
+        let one = vec![0.0; 4];
+        let sheet = Sheet::new(String::new(), 2, vec![&one; 1234], Unit::AdcCounts);
+        assert_eq!(frame(&sheet, 17).panels[0].title, "frame 17, of 0 to 1233");
+    }
+}
