@@ -55,9 +55,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         }
     }
     if args.json {
-        print::json(&plan)?
+        print::json(&plan)?;
     } else {
-        print::line(&plan)?
+        print::line(&plan)?;
     }
     Ok(ExitCode::SUCCESS)
 }
