@@ -30,7 +30,6 @@ use embassy_stm32::usb::{self, Driver};
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{bind_interrupts, dma, interrupt};
 use embassy_time::Instant;
-use embassy_usb::UsbDevice;
 use fpga::Fpga;
 use nirspi_app::link::{HostIn, HostOut, Link, Packet};
 use nirspi_app::{Board, DepthMailbox, Device, board_info, measure_depth, run};
@@ -68,7 +67,7 @@ static USB_MEMORY: StaticCell<Memory> = StaticCell::new();
 static USB_BUFFER: ConstStaticCell<[u8; OUT_BUFFER_BYTES]> = ConstStaticCell::new([0; _]);
 
 #[embassy_executor::task]
-async fn usb_device(mut device: UsbDevice<'static, UsbDriver>) -> ! {
+async fn usb_device(mut device: nirspi_usb::Device<UsbDriver>) -> ! {
     device.run().await
 }
 
