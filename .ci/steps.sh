@@ -12,7 +12,7 @@ steps=(
     "features        the library alone, and with its features that bring the others"
     "training        networks on burn, and the commands that need it"
     "emulation       the firmware's budgets, and its machine code against the virtual camera; QEMU, firmware"
-    "application     the firmware's application and USB device on the host"
+    "application     the firmware's application and USB device on the host, its driver on a simulated core"
     "lints           clippy of both workspaces; firmware's targets"
     "docs            documentation without warnings"
     "demo            the README's demo command"
@@ -112,6 +112,7 @@ step_application() {
     local host
     host=$(rustc -vV | sed -n 's/^host: //p')
     (cd boards && RUSTUP_TOOLCHAIN=$toolchain cargo test --locked -p nirspi-app -p nirspi-usb --target "$host")
+    bash boards/otg/check.sh
 }
 
 step_lints() {

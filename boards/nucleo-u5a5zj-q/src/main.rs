@@ -88,13 +88,14 @@ async fn depth_sensor(sensor: Depth, mailbox: &'static DepthMailbox) -> ! {
 #[embassy_executor::main]
 async fn main(spawner: Spawner) {
     restart::enter_bootloader_if_wished(board::BOOTLOADER);
+    clocks::start_watchdog();
     let p = embassy_stm32::init(clocks::config());
     let pins = pins::take_pins!(p);
     let led_enable = Output::new(pins.led_enable, Level::Low, Speed::Low);
     crash::on_crash(pins::leds_off);
     clocks::enable_cache();
     clocks::watch_supply();
-    while clocks::supply_is_low() {}
+    clocks::wait_for_supply();
 
     let mut watchdog = IndependentWatchdog::new(p.IWDG, board::WATCHDOG_US);
     watchdog.unleash();

@@ -84,7 +84,7 @@ pub enum Answer {
 struct Side {
     ctl: u32,
     int: u32,
-    siz: u32,
+    size: u32,
     /// Words that wait to be sent.
     fifo: VecDeque<u32>,
     nak_in: u32,
@@ -93,16 +93,16 @@ struct Side {
 
 impl Side {
     fn bytes(&self) -> usize {
-        (self.siz & 0x7FFFF) as usize
+        (self.size & 0x7FFFF) as usize
     }
 
     fn packets(&self) -> u32 {
-        self.siz >> 19 & 0x3FF
+        self.size >> 19 & 0x3FF
     }
 
     fn take(&mut self, bytes: usize) {
         let left = (self.bytes() - bytes) as u32;
-        self.siz = self.siz & !0x1FFF_FFFF | (self.packets() - 1) << 19 | left;
+        self.size = self.size & !0x1FFF_FFFF | (self.packets() - 1) << 19 | left;
     }
 
     fn is(&self, bits: u32) -> bool {
@@ -429,7 +429,7 @@ impl Core for OtgCore {
                     0x00 => side.ctl,
                     0x08 if is_in && side.fifo.is_empty() => side.int | TXFE,
                     0x08 => side.int,
-                    0x10 => side.siz,
+                    0x10 => side.size,
                     0x18 if is_in => room as u32,
                     _ => 0,
                 }
@@ -463,9 +463,9 @@ impl Core for OtgCore {
                         if self.ins[index].is(EPENA) {
                             self.violation(format!("DIEPTSIZ{index} written while armed"));
                         }
-                        self.ins[index].siz = value;
+                        self.ins[index].size = value;
                     }
-                    0x10 => self.outs[index].siz = value,
+                    0x10 => self.outs[index].size = value,
                     _ => {}
                 }
             }
