@@ -14,7 +14,7 @@ steps=(
     "licences        licences, sources and bans of all dependencies; crates.io"
     "training        networks on burn, and the commands that need it"
     "emulation       the firmware's budgets, and its machine code against the virtual camera; QEMU, firmware"
-    "application     the firmware's application and USB device on the host"
+    "application     the firmware's application and USB device on the host, its driver on a simulated core"
     "lints           clippy of both workspaces; firmware's targets"
     "docs            documentation without warnings"
     "book            the documentation as a book without warnings; builds mdBook"
@@ -162,6 +162,7 @@ step_application() {
     local host
     host=$(rustc -vV | sed -n 's/^host: //p')
     (cd boards && RUSTUP_TOOLCHAIN=$toolchain cargo test --locked -p nirspi-app -p nirspi-usb --target "$host")
+    bash boards/otg/check.sh
 }
 
 step_lints() {

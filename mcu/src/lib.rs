@@ -4,7 +4,8 @@
 //! (safety rules, then one step) drive the `machine`, which holds the state. The parts of the
 //! machine do not use the machine: `run` and `burst` (data), `selftest`, `gateware`, `configure`
 //! (checks), `safety` (sensors), `fpga` (registers), `notices` (replies and events that wait for
-//! the link), `packets` (a message into the link). `host_port` says which bytes a board transfers.
+//! the link), `packets` (a message into the link). `host_port` says which bytes a board transfers,
+//! `patience` how long a transfer to the host may wait.
 #![no_std]
 #![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 #![deny(clippy::arithmetic_side_effects)]
@@ -37,6 +38,7 @@ mod merge;
 mod notices;
 pub mod ntc;
 mod packets;
+mod patience;
 mod poll;
 mod ports;
 mod run;
@@ -54,6 +56,7 @@ pub use crash::{CRASH_WORDS, Crash};
 pub use host_port::{HostPort, PortBus};
 pub use limits::Limits;
 pub use merge::Merger;
+pub use patience::{PATIENCE, Patience, Remedy};
 pub use ports::{
     BoardInfo, BusError, FpgaBus, GatewareLoader, Inputs, LoadError, NAME_BYTES, NoLoader,
     PacketSink, Ports, Progress,

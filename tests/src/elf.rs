@@ -108,9 +108,29 @@ impl Firmware {
             .collect()
     }
 
+    /// The function to which the first branch of the function with this name leads, of those that
+    /// lead to the beginning of a function.
+    #[must_use]
+    pub fn first_call(&self, name: &str) -> Option<&str> {
+        let caller = self.functions.iter().find(|function| function.name.contains(name))?;
+        let called = |target| self.functions.iter().find(|function| function.start == target);
+        self.branches(caller).find_map(called).map(|function| function.name.as_str())
+    }
+
     /// Addresses of instructions of the floating-point unit, each with its function.
     #[must_use]
     pub fn float_instructions(&self) -> Vec<(u64, &str)> {
+        self.instructions(is_float)
+    }
+
+    /// Addresses of instructions that set the limit of the main stack (`MSR MSPLIM`, ARMv8-M ARM),
+    /// each with its function.
+    #[must_use]
+    pub fn stack_limit_instructions(&self) -> Vec<(u64, &str)> {
+        self.instructions(|first, second| first & 0xFFF0 == 0xF380 && second == 0x880A)
+    }
+
+    fn instructions(&self, is_wanted: impl Fn(u16, u16) -> bool) -> Vec<(u64, &str)> {
         let name = |address: u64| {
             let within = |f: &&Function| (f.start..f.start + f.length).contains(&address);
             self.functions.iter().find(within).map_or("?", |function| function.name.as_str())
@@ -131,7 +151,7 @@ impl Firmware {
                     && let Some(first) = half(address)
                 {
                     let is_wide = first >= 0xE800;
-                    if is_wide && half(address + 2).is_some_and(|second| is_float(first, second)) {
+                    if is_wide && half(address + 2).is_some_and(|second| is_wanted(first, second)) {
                         found.push((address, name(address)));
                     }
                     address += if is_wide { 4 } else { 2 };

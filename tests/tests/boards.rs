@@ -154,6 +154,22 @@ fn the_crash_handler_turns_off_the_pin_that_enables_the_leds() {
 }
 
 #[test]
+fn a_watchdog_runs_before_anything_waits() {
+    for (board, _) in wired() {
+        let code = read(&format!("boards/{board}/src/main.rs"));
+        let steps = [
+            "enter_bootloader_if_wished(",
+            "clocks::start_watchdog();",
+            "embassy_stm32::init(",
+            "crash::on_crash(",
+            "clocks::wait_for_supply();",
+        ];
+        let places = steps.map(|step| code.find(step).unwrap_or_else(|| panic!("{board}: {step}")));
+        assert!(places.is_sorted(), "{board}: {steps:?} in this order");
+    }
+}
+
+#[test]
 fn the_udev_rule_names_the_camera() {
     let rules = read("boards/60-nirspi.rules");
     let rule = rules.lines().find(|line| !line.starts_with('#')).expect("a rule");

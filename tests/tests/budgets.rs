@@ -92,6 +92,32 @@ fn no_firmware_computes_with_floating_point() {
     }
 }
 
+/// A boot loader whose stack lies below a limit of ours faults at its first push.
+#[test]
+fn the_boot_loader_is_entered_without_our_stack_limit() {
+    for (board, firmware) in built() {
+        if board.chip.is_none() {
+            continue;
+        }
+        let found = firmware.stack_limit_instructions();
+        let at_start = found.iter().filter(|(_, name)| *name == "Reset").count();
+        let later = found.len() - at_start;
+        // Set at the start, and undone before the boot loader.
+        assert_eq!(at_start > 0, later > 0, "{}: {found:x?}", board.name);
+    }
+}
+
+#[test]
+fn a_hard_fault_switches_the_leds_off_before_anything_else() {
+    for (board, firmware) in built() {
+        if board.chip.is_none() {
+            continue;
+        }
+        let first = firmware.first_call("nirspi_nucleo::crash::fault");
+        assert_eq!(first, Some("nirspi_nucleo::crash::darken"), "{}", board.name);
+    }
+}
+
 /// Functions of `core` in which every panic begins.
 const PANICS: &[&str] = &[
     "core::panicking::",

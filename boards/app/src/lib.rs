@@ -13,9 +13,11 @@
 //! only at an `await`.
 #![no_std]
 
-#[cfg(test)]
+#[cfg(any(test, feature = "bench"))]
 extern crate std;
 
+#[cfg(any(test, feature = "bench"))]
+pub mod bench;
 pub mod crash;
 pub mod link;
 

@@ -1,140 +1,24 @@
 //! Tests of the loop and its link, polled by hand: no executor, and a clock that a test moves.
 
+use crate::bench::{FakeBoard, FakeFpga, Pins, configuration, packet};
 use crate::link::{HostIn, HostOut, Link, Packet};
-use crate::{Board, DepthMailbox, Device, FpgaPort, board_info, run};
-use core::cell::Cell;
+use crate::{DepthMailbox, Device, board_info, run};
 use core::future::Future;
 use core::pin::Pin;
-use core::sync::atomic::{AtomicU64, Ordering};
 use core::task::{Context, Waker};
 use embassy_futures::poll_once;
-use nirspi_mcu::{BusError, HostPort, Inputs, Limits, NoLoader};
-use nirspi_wire::fpga::{Header, MAX_FRAME_BYTES, Sums};
+use nirspi_mcu::{Limits, NoLoader};
+use nirspi_wire::fpga::MAX_FRAME_BYTES;
 use nirspi_wire::packet::{MAX_DEVICE_PACKET, MAX_HOST_PACKET};
-use nirspi_wire::register::{IDENTITY, Register, control, status};
 use nirspi_wire::{
-    Answer, Command, Configuration, Deframed, Deframer, DeviceMessage, FrameFlags, PatternOrder,
-    RebootInto, Reply, Request, RunLength, SampleSource, encode, open, version,
+    Answer, Command, Deframed, Deframer, DeviceMessage, Reply, RunLength, open, version,
 };
 use std::boxed::Box;
 use std::rc::Rc;
 use std::vec::Vec;
 
-/// A clock that advances ten microseconds at every read.
-struct Clock(AtomicU64);
-
-impl embassy_time_driver::Driver for Clock {
-    fn now(&self) -> u64 {
-        self.0.fetch_add(10, Ordering::Relaxed)
-    }
-
-    fn schedule_wake(&self, _at: u64, _waker: &Waker) {}
-}
-
-embassy_time_driver::time_driver_impl!(static CLOCK: Clock = Clock(AtomicU64::new(0)));
-
 const TRANSFER: usize = 64;
 const PATTERNS: u16 = 2;
-
-/// The board's pins, as a test reads and sets them.
-#[derive(Default)]
-struct Pins {
-    leds_enabled: Cell<bool>,
-    running: Cell<bool>,
-    sequence: Cell<u32>,
-    fed: Cell<u32>,
-    /// Number of polls that a transfer takes.
-    transfer_polls: Cell<u32>,
-}
-
-struct Fake(Rc<Pins>);
-
-impl Board for Fake {
-    fn inputs(&mut self) -> Inputs {
-        Inputs { interlock_closed: true, temperature_centi_celsius: Some(2500) }
-    }
-
-    fn enable_leds(&mut self, enabled: bool) {
-        self.0.leds_enabled.set(enabled);
-    }
-
-    fn feed_watchdog(&mut self) {
-        self.0.fed.set(self.0.fed.get() + 1);
-    }
-
-    fn restart(&mut self, _into: RebootInto) -> ! {
-        panic!("restarted")
-    }
-}
-
-/// A fake FPGA: registers in memory, and a frame that is ready during every run.
-struct Fpga {
-    pins: Rc<Pins>,
-    registers: [u32; 32],
-}
-
-impl HostPort for Fpga {
-    fn write(&mut self, address: u16, value: u32) -> Result<(), BusError> {
-        if address == Register::Control.address() {
-            let bits = |bits: u32| value & bits != 0;
-            self.pins
-                .running
-                .set(bits(control::START) || self.pins.running.get() && !bits(control::STOP));
-            self.pins.sequence.set(self.pins.sequence.get() + u32::from(bits(control::RELEASE)));
-        } else {
-            self.registers[usize::from(address)] = value;
-        }
-        Ok(())
-    }
-
-    fn read(&mut self, address: u16) -> Result<u32, BusError> {
-        let running = if self.pins.running.get() { status::RUNNING | status::LEDS_ON } else { 0 };
-        Ok(match Register::at(address) {
-            Some(Register::Identity) => IDENTITY,
-            Some(Register::Status) => status::INTERLOCK_CLOSED | running,
-            Some(Register::FramesMade) => self.pins.sequence.get(),
-            _ => self.registers[usize::from(address)],
-        })
-    }
-
-    fn frame_ready(&mut self) -> bool {
-        self.pins.running.get()
-    }
-
-    fn raw_ready(&mut self) -> bool {
-        false
-    }
-}
-
-impl FpgaPort for Fpga {
-    async fn read_bytes(&mut self, _opcode: u8, into: &mut [u8]) -> Result<(), BusError> {
-        for _ in 0..self.pins.transfer_polls.get() {
-            embassy_futures::yield_now().await;
-        }
-        let header = Header {
-            patterns: PATTERNS,
-            flags: FrameFlags::DIFFERENTIAL,
-            sequence: self.pins.sequence.get(),
-            sweeps: 1,
-            over_range: 0,
-            lost: 0,
-            clock: 0,
-        };
-        let mut bytes = header.to_bytes().to_vec();
-        for k in 0..u64::from(PATTERNS) {
-            bytes.extend(Sums { positive: 100 + k, negative: 7 }.to_bytes());
-        }
-        bytes.extend(nirspi_wire::crc32(&bytes).to_le_bytes());
-        into.copy_from_slice(&bytes);
-        Ok(())
-    }
-
-    async fn ready(&mut self) {
-        if !self.frame_ready() {
-            core::future::pending::<()>().await;
-        }
-    }
-}
 
 /// A running board, and the task that serves its host.
 struct Bench {
@@ -151,8 +35,8 @@ impl Bench {
         let link = Box::leak(Box::new(Link::new(std::vec![Packet::EMPTY; places].leak())));
         let (camera_end, from_host, to_host) = link.split();
         let device = Device {
-            board: Fake(Rc::clone(&pins)),
-            port: Fpga { pins: Rc::clone(&pins), registers: [0; 32] },
+            board: FakeBoard(Rc::clone(&pins)),
+            port: FakeFpga::new(Rc::clone(&pins)),
             frame: Box::leak(Box::new([0; MAX_FRAME_BYTES])),
             loader: NoLoader,
             info: board_info("bench", "0001"),
@@ -214,26 +98,9 @@ enum Heard {
     Other(std::string::String),
 }
 
-fn packet(id: u16, command: Command<'_>) -> Vec<u8> {
-    let mut room = [0; MAX_HOST_PACKET + 1];
-    encode(&Request { id, command }, &mut room).unwrap().to_vec()
-}
-
 fn hello(id: u16) -> Vec<u8> {
     packet(id, Command::Hello { protocol: version::CURRENT })
 }
-
-const TWO_PATTERNS: Configuration<'static> = Configuration {
-    order: PatternOrder::Natural,
-    patterns: PATTERNS,
-    differential: true,
-    clocks_per_pattern: 5,
-    blanked: 2,
-    adc_latency: 3,
-    sweeps: 1,
-    source: SampleSource::Detector,
-    over_range_trip: 0,
-};
 
 #[test]
 fn a_greeting_is_answered_and_the_watchdog_fed() {
@@ -252,7 +119,7 @@ fn leds_are_let_on_from_the_configuration_until_the_host_is_gone() {
     bench.send(&hello(1));
     bench.turn();
     assert!(!bench.pins.leds_enabled.get());
-    bench.send(&packet(2, Command::Configure(TWO_PATTERNS)));
+    bench.send(&packet(2, Command::Configure(configuration(PATTERNS))));
     bench.turn();
     assert!(bench.pins.leds_enabled.get(), "before anything is lit");
     bench.send(&packet(3, Command::Start(RunLength::Continuous)));
@@ -282,7 +149,7 @@ fn frames_come_in_order_and_a_full_link_drops_whole_ones() {
     let mut bench = Bench::new(4);
     for (id, command) in [
         (1, Command::Hello { protocol: version::CURRENT }),
-        (2, Command::Configure(TWO_PATTERNS)),
+        (2, Command::Configure(configuration(PATTERNS))),
         (3, Command::Start(RunLength::Continuous)),
     ] {
         bench.send(&packet(id, command));
@@ -303,9 +170,10 @@ fn frames_come_in_order_and_a_full_link_drops_whole_ones() {
 #[test]
 fn a_long_transfer_delays_the_answer_and_loses_nothing() {
     let mut bench = Bench::new(64);
-    for (id, command) in
-        [(1, Command::Hello { protocol: version::CURRENT }), (2, Command::Configure(TWO_PATTERNS))]
-    {
+    for (id, command) in [
+        (1, Command::Hello { protocol: version::CURRENT }),
+        (2, Command::Configure(configuration(PATTERNS))),
+    ] {
         bench.send(&packet(id, command));
         bench.turn();
     }

@@ -41,6 +41,14 @@ pub fn config() -> Config {
     config
 }
 
+/// Starts the watchdog before anything waits, with the chip's setting after a reset: 4096 clocks of
+/// LSI / 4, 0.5 s. A crystal that does not start or a supply that stays low restarts the chip, and
+/// the LEDs' enable is low meanwhile.
+pub fn start_watchdog() {
+    use embassy_stm32::pac::{IWDG, iwdg::vals::Key};
+    IWDG.kr().write(|key| key.set_key(Key::START));
+}
+
 /// Enables the instruction cache, because flash needs several wait states. The data cache stays
 /// off, so that the processor reads what DMA has written.
 pub fn enable_cache() {
@@ -60,6 +68,14 @@ pub fn watch_supply() {
     if FLASH.obw1sr().read().bor_lev() == BorLev::DISABLED {
         defmt::warn!("no brown-out reset: set the option byte BOR_LEV to 3 (2.7 V)");
     }
+}
+
+/// Waits until the supply is good. The watchdog restarts a chip that waits for long.
+pub fn wait_for_supply() {
+    if supply_is_low() {
+        defmt::warn!("the supply is below 2.85 V");
+    }
+    while supply_is_low() {}
 }
 
 /// Whether the supply is below 2.85 V.

@@ -30,6 +30,14 @@ pub fn config() -> Config {
     config
 }
 
+/// Starts the watchdog before anything waits, with the chip's setting after a reset: 4096 clocks of
+/// LSI / 4, 0.5 s. A crystal that does not start or a supply that stays low restarts the chip, and
+/// the LEDs' enable is low meanwhile.
+pub fn start_watchdog() {
+    use embassy_stm32::pac::{IWDG, iwdg::vals::Key};
+    IWDG.kr().write(|key| key.set_key(Key::START));
+}
+
 /// Enables the instruction cache: flash needs four wait states, the cache mostly none (RM0456, 8).
 pub fn enable_cache() {
     ICACHE.cr().modify(|cache| cache.set_en(true));
@@ -46,6 +54,14 @@ pub fn watch_supply() {
     if FLASH.optr().read().bor_lev() == BorLev::LEVEL0 {
         defmt::warn!("brown-out reset at 1.7 V: set the option byte BOR_LEV to 4 (2.8 V)");
     }
+}
+
+/// Waits until the supply is good. The watchdog restarts a chip that waits for long.
+pub fn wait_for_supply() {
+    if supply_is_low() {
+        defmt::warn!("the supply is below 2.8 V");
+    }
+    while supply_is_low() {}
 }
 
 /// Whether the supply is below 2.8 V.

@@ -30,7 +30,6 @@ use embassy_stm32::usb::{self, Driver};
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{bind_interrupts, dma, interrupt};
 use embassy_time::Instant;
-use embassy_usb::UsbDevice;
 use fpga::Fpga;
 use nirspi_app::link::{HostIn, HostOut, Link, Packet};
 use nirspi_app::{Board, DepthMailbox, Device, board_info, measure_depth, run};
@@ -68,7 +67,7 @@ static USB_MEMORY: StaticCell<Memory> = StaticCell::new();
 static USB_BUFFER: ConstStaticCell<[u8; OUT_BUFFER_BYTES]> = ConstStaticCell::new([0; _]);
 
 #[embassy_executor::task]
-async fn usb_device(mut device: UsbDevice<'static, UsbDriver>) -> ! {
+async fn usb_device(mut device: nirspi_usb::Device<UsbDriver>) -> ! {
     device.run().await
 }
 
@@ -89,13 +88,14 @@ async fn depth_sensor(sensor: Depth, mailbox: &'static DepthMailbox) -> ! {
 #[embassy_executor::main]
 async fn main(spawner: Spawner) {
     restart::enter_bootloader_if_wished(board::BOOTLOADER);
+    clocks::start_watchdog();
     let p = embassy_stm32::init(clocks::config());
     let pins = pins::take_pins!(p);
     let led_enable = Output::new(pins.led_enable, Level::Low, Speed::Low);
     crash::on_crash(pins::leds_off);
     clocks::enable_cache();
     clocks::watch_supply();
-    while clocks::supply_is_low() {}
+    clocks::wait_for_supply();
 
     let mut watchdog = IndependentWatchdog::new(p.IWDG, board::WATCHDOG_US);
     watchdog.unleash();

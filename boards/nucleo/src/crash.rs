@@ -27,12 +27,19 @@ pub fn on_crash(leds_off: fn()) {
     critical_section::with(|token| LEDS_OFF.borrow(token).set(Some(leds_off)));
 }
 
-/// Ends the firmware: LEDs off, crash record, restart.
-pub fn die(text: Arguments<'_>) -> ! {
+/// Stops all other code and switches the LEDs off.
+// A function of its own in the ELF, where `tests/tests/budgets.rs` looks for it.
+#[inline(never)]
+fn darken() {
     cortex_m::interrupt::disable();
     if let Some(leds_off) = critical_section::with(|token| LEDS_OFF.borrow(token).get()) {
         leds_off();
     }
+}
+
+/// Ends the firmware: LEDs off, crash record, restart.
+pub fn die(text: Arguments<'_>) -> ! {
+    darken();
     // A second crash, for example in a logger that was interrupted, restarts here.
     if DYING.swap(true, Ordering::Relaxed) {
         SCB::sys_reset();
@@ -73,6 +80,9 @@ mod entry {
 
 /// Takes the processor's exception frame: r0 to r3, r12, lr, pc, psr (ARMv7-M ARM, B1.5.6).
 extern "C" fn fault(frame: *const [u32; 8]) -> ! {
+    // Where the stack pointer was wrong, reading the frame is another fault, in which the processor
+    // stands still until the watchdog restarts it.
+    darken();
     #[expect(
         unsafe_code,
         reason = "what the processor has put on the stack, and its fault register"

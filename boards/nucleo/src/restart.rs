@@ -26,9 +26,14 @@ pub fn restart(into: RebootInto) -> ! {
 pub fn enter_bootloader_if_wished(vectors: usize) {
     if WISHED.swap(0, Ordering::Relaxed) == WISH {
         #[expect(unsafe_code, reason = "jumps into code that is not ours")]
-        // SAFETY: the chip is as after a reset, and its reference manual gives the address of its
-        // boot loader, whose vector table begins with a stack pointer and an entry.
+        // SAFETY: the chip is as after a reset but for what cortex-m-rt has set, which is undone
+        // here: the boot loader's stack lies below our limit, and its interrupts are in its own
+        // table. The chip's reference manual gives the address of the boot loader, whose vector
+        // table begins with a stack pointer and an entry.
         unsafe {
+            #[cfg(feature = "stack-limit")]
+            cortex_m::register::msplim::write(0);
+            (*SCB::PTR).vtor.write(vectors as u32);
             cortex_m::asm::bootload(vectors as *const u32)
         }
     }

@@ -7,28 +7,38 @@
 //!     └ bulk IN  0x81, 512 bytes: replies, events, frames, merged into full packets
 //! ```
 //!
+//! On a full-speed bus the packets have 64 bytes ([`Speeds`]).
+//!
 //! # Invariant
 //! A session lasts as long as the USB configuration. A reset, another configuration or a suspend
 //! ends the session, and with it the light
-//! (`tests::a_session_lasts_from_configuration_to_suspend_reset_or_another_configuration`). A
-//! pulled cable looks like a suspend to a board with its own supply.
+//! (`tests::a_session_lasts_from_configuration_to_suspend_reset_or_another_configuration`). So does
+//! a host that fetches nothing for five seconds
+//! (`tests::stuck::a_host_that_stops_reading_ends_its_session_and_the_light`). A pulled cable looks
+//! like a suspend to a board with its own supply.
 #![no_std]
 
 #[cfg(test)]
 extern crate std;
 
+mod serve;
+mod speeds;
+
 #[cfg(test)]
 mod tests;
 
-use embassy_futures::select::{Either3, select3};
+use embassy_futures::select::{Either, select};
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_sync::signal::Signal;
+use embassy_time::{Duration, Timer};
 use embassy_usb::descriptor::capability_type;
-use embassy_usb::driver::{Driver, EndpointAddress, EndpointIn, EndpointOut};
+use embassy_usb::driver::{Driver, EndpointAddress};
 use embassy_usb::msos::{self, PropertyData};
 use embassy_usb::{Builder, Config, Handler, UsbDevice};
-use nirspi_app::link::{HostIn, HostOut};
 use nirspi_wire::{Version, usb};
+
+pub use serve::{Abort, serve};
+pub use speeds::{BusSpeed, Speeds};
 
 /// Size of a high-speed bulk packet in bytes (USB 2.0, 5.8.3).
 pub const PACKET_BYTES: usize = 512;
@@ -39,8 +49,11 @@ pub const OUT_BUFFER_BYTES: usize = PACKET_BYTES + CONTROL_BYTES;
 
 const CONTROL_BYTES: usize = 64;
 
-/// Fields of the device descriptor. A full-speed bus does not allow the packet size above, so hosts
-/// refuse the device there.
+/// How long the device stays off the bus when the link is stuck. A host sees a device that is gone
+/// for 100 ms, however slow its hub is.
+const AWAY: Duration = Duration::from_millis(100);
+
+/// Fields of the device descriptor.
 fn identity(serial: &'static str, firmware: Version) -> Config<'static> {
     let mut config = Config::new(usb::VENDOR_ID, usb::PRODUCT_ID);
     config.manufacturer = Some(usb::MANUFACTURER);
@@ -100,9 +113,28 @@ impl Memory {
     }
 }
 
-/// Number of the session that the host may have now, if any. Each configuration and each resume
-/// begins another session.
-pub type Presence = Signal<NoopRawMutex, Option<u32>>;
+/// What the device and [`serve`] tell each other.
+pub struct Presence {
+    /// Number of the session that the host may have now, if any. Each configuration and each resume
+    /// begins another session.
+    session: Signal<NoopRawMutex, Option<u32>>,
+    /// The link is stuck: leave the bus and come back.
+    leave: Signal<NoopRawMutex, ()>,
+}
+
+impl Presence {
+    /// No host, and nothing to say.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { session: Signal::new(), leave: Signal::new() }
+    }
+}
+
+impl Default for Presence {
+    fn default() -> Self {
+        Self::new()
+    }
+}
 
 struct Watch {
     presence: &'static Presence,
@@ -115,7 +147,7 @@ impl Watch {
     fn tell(&mut self) {
         let there = self.configured && !self.suspended;
         self.session = self.session.wrapping_add(1);
-        self.presence.signal(there.then_some(self.session));
+        self.presence.session.signal(there.then_some(self.session));
     }
 }
 
@@ -150,16 +182,51 @@ pub struct Endpoints<D: Driver<'static>> {
     presence: &'static Presence,
 }
 
-/// Builds the device. A board awaits the first's `run`, and [`serve`] of the second.
-pub fn device<D: Driver<'static>>(
+/// The device on the bus.
+pub struct Device<D>
+where
+    D: Driver<'static>,
+    D::ControlPipe: BusSpeed,
+{
+    usb: UsbDevice<'static, Speeds<D>>,
+    presence: &'static Presence,
+}
+
+impl<D> Device<D>
+where
+    D: Driver<'static>,
+    D::ControlPipe: BusSpeed,
+{
+    /// Answers the host's control requests for ever, and leaves the bus for a moment when [`serve`]
+    /// finds the link stuck.
+    pub async fn run(&mut self) -> ! {
+        loop {
+            match select(self.usb.run(), self.presence.leave.wait()).await {
+                Either::First(never) => never,
+                Either::Second(()) => {
+                    self.usb.disable().await;
+                    Timer::after(AWAY).await;
+                }
+            }
+        }
+    }
+}
+
+/// Builds the device. A board awaits the first's [`run`](Device::run), and [`serve`] of the second.
+pub fn device<D>(
     driver: D,
     serial: &'static str,
     firmware: Version,
     memory: &'static mut Memory,
-) -> (UsbDevice<'static, D>, Endpoints<D>) {
+) -> (Device<D>, Endpoints<D>)
+where
+    D: Driver<'static>,
+    D::ControlPipe: BusSpeed,
+{
     let Memory { configuration, bos, msos, control, watch } = memory;
     let presence = watch.presence;
     let config = identity(serial, firmware);
+    let driver = Speeds(driver);
     let mut builder = Builder::new(driver, config, configuration, bos, msos, control);
     builder.msos_descriptor(msos::windows_version::WIN8_1, usb::MS_OS_VENDOR_CODE);
     builder.msos_feature(msos::CompatibleIdFeatureDescriptor::new("WINUSB", ""));
@@ -180,48 +247,5 @@ pub fn device<D: Driver<'static>>(
     let from_host = setting.endpoint_bulk_out(address(usb::ENDPOINT_OUT), packet_bytes);
     let to_host = setting.endpoint_bulk_in(address(usb::ENDPOINT_IN), packet_bytes);
     drop(function);
-    (builder.build(), Endpoints { from_host, to_host, presence })
-}
-
-/// Serves one host after the other.
-pub async fn serve<D: Driver<'static>>(
-    endpoints: Endpoints<D>,
-    mut commands: HostIn<'_>,
-    mut packets: HostOut<'_, PACKET_BYTES>,
-) -> ! {
-    let Endpoints { mut from_host, mut to_host, presence } = endpoints;
-    let mut session = None;
-    loop {
-        while session.is_none() {
-            session = presence.wait().await;
-        }
-        let news = select3(
-            listen(&mut from_host, &mut commands),
-            talk(&mut to_host, &mut packets),
-            presence.wait(),
-        );
-        let next = match news.await {
-            Either3::Third(next) => next,
-            // The endpoint is gone: the host has gone, or is about to.
-            _ => None,
-        };
-        commands.closed().await;
-        packets.discard();
-        session = next;
-    }
-}
-
-/// Returns when the endpoint is disabled.
-async fn listen(endpoint: &mut impl EndpointOut, commands: &mut HostIn<'_>) {
-    let mut bytes = [0; PACKET_BYTES];
-    endpoint.wait_enabled().await;
-    while let Ok(length) = endpoint.read(&mut bytes).await {
-        commands.received(bytes.get(..length).unwrap_or(&[])).await;
-    }
-}
-
-/// Returns when the endpoint is disabled.
-async fn talk(endpoint: &mut impl EndpointIn, packets: &mut HostOut<'_, PACKET_BYTES>) {
-    endpoint.wait_enabled().await;
-    while endpoint.write(packets.transfer().await).await.is_ok() {}
+    (Device { usb: builder.build(), presence }, Endpoints { from_host, to_host, presence })
 }

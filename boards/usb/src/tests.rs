@@ -1,6 +1,11 @@
 //! Tests of what a host sees of the device, with requests as hosts make them, over a simulated bus.
 
 mod fake;
+mod otg_core;
+mod speeds;
+mod stuck;
+mod unplug;
+mod world;
 
 use super::*;
 use embassy_usb::driver::Event;
@@ -15,7 +20,7 @@ const SERIAL: &str = "0123456789ABCDEF01234567";
 struct Bench {
     wire: Wire,
     presence: &'static Presence,
-    device: UsbDevice<'static, FakeDriver>,
+    device: Device<FakeDriver>,
 }
 
 impl Bench {
@@ -34,7 +39,7 @@ impl Bench {
     fn after(&mut self, event: Event) -> Option<Option<u32>> {
         self.wire.happen(event);
         self.run();
-        self.presence.try_take()
+        self.presence.session.try_take()
     }
 
     fn run(&mut self) {
@@ -61,7 +66,7 @@ impl Bench {
     fn configure(&mut self, configuration: u16) -> Option<Option<u32>> {
         self.wire.ask(0x00, 9, configuration, 0, 0);
         self.run();
-        self.presence.try_take()
+        self.presence.session.try_take()
     }
 }
 
@@ -146,11 +151,12 @@ fn browsers_are_told_that_they_may_ask_for_it() {
 
 #[test]
 fn all_descriptors_fit_their_memory() {
-    let report = Bench::new().device.buffer_usage();
+    let report = Bench::new().device.usb.buffer_usage();
     let memory: [usize; 3] = [64, 96, 192];
     let used =
         [report.config_descriptor_used, report.bos_descriptor_used, report.msos_descriptor_used];
     assert!(used.iter().zip(memory).all(|(used, memory)| *used <= memory), "{used:?}");
+    assert!(report.config_descriptor_used <= CONTROL_BYTES, "one packet: {used:?}");
 }
 
 #[test]

@@ -3,7 +3,7 @@
 //! A conversation does not know the camera yet. [`Session::open`](super::Session::open) greets the
 //! camera and makes a session of the conversation.
 
-use super::request::Request;
+use super::request::{Hello, Request};
 use super::{ANSWER_TIMEOUT, Listener, SessionError};
 use crate::link::{Link, Received};
 use nirspi_wire::packet::{
@@ -11,6 +11,7 @@ use nirspi_wire::packet::{
 };
 use nirspi_wire::{
     Answer, Command, Deframed, Deframer, DeviceMessage, PacketError, Refusal, Reply, encode,
+    version,
 };
 use std::time::{Duration, Instant};
 
@@ -89,6 +90,11 @@ impl Conversation {
                 None => {}
                 Some(Ok(Some(reply))) => return Ok(reply),
                 Some(Ok(None)) => return Err(SessionError::WrongAnswer { command }),
+                Some(Err(Refusal::Protocol { device }))
+                    if command != Hello::NAME && version::speaks(device) =>
+                {
+                    return Err(SessionError::Ended { command });
+                }
                 Some(Err(Refusal::Protocol { device })) => {
                     return Err(SessionError::Version { camera: device });
                 }

@@ -2,6 +2,7 @@
 
 use super::ANSWER_TIMEOUT;
 use super::request::{Hello, Request};
+use nirspi_wire::message::HOST_SILENCE_US;
 use nirspi_wire::{Refusal, version};
 use thiserror::Error;
 
@@ -33,6 +34,16 @@ pub enum SessionError {
     Version {
         /// The camera's version.
         camera: u16,
+    },
+    /// The camera has ended the session, and asks for a greeting.
+    #[error(
+        "the camera ended the session before {command}: the bus was asleep, or this program read nothing for {} s; \
+         start again",
+        HOST_SILENCE_US / 1_000_000
+    )]
+    Ended {
+        /// The name of the command.
+        command: &'static str,
     },
     /// The camera refused a command.
     #[error("the camera refused {command}: {}", refusal_in_words(.refusal))]

@@ -4,7 +4,7 @@ use super::*;
 use crate::link::Received;
 use nirspi_wire::packet::MAX_DEVICE_PACKET;
 use nirspi_wire::{
-    Answer, Capabilities, Event, EventKind, Fault, Reply, State, Tail, Version, encode,
+    Answer, Capabilities, Event, EventKind, Fault, Refusal, Reply, State, Tail, Version, encode,
 };
 use std::io;
 
@@ -145,6 +145,20 @@ fn an_answer_that_belongs_to_another_command_names_the_command_that_was_asked() 
     let mut session = session(vec![reply(1, Answer::Done)]);
     let error = session.status(&mut IgnorePackets).unwrap_err();
     assert!(matches!(error, SessionError::WrongAnswer { command: "Status" }), "{error}");
+}
+
+#[test]
+fn a_camera_that_has_ended_the_session_is_not_taken_for_one_of_another_version() {
+    let refused = |device| {
+        let outcome = Err(Refusal::Protocol { device });
+        let mut session = session(vec![packet(DeviceMessage::Reply(Reply { id: 1, outcome }))]);
+        session.status(&mut IgnorePackets).unwrap_err()
+    };
+    let ended = refused(version::CURRENT);
+    assert!(matches!(ended, SessionError::Ended { command: "Status" }), "{ended}");
+    assert!(ended.to_string().contains(" 5 s; start again"), "{ended}");
+    let foreign = refused(version::CURRENT + 1);
+    assert!(matches!(foreign, SessionError::Version { .. }), "{foreign}");
 }
 
 /// A camera with fixed answers that keeps the bytes it receives.

@@ -10,6 +10,7 @@ mod host_port;
 mod laws;
 mod loading;
 mod merge;
+mod patience;
 mod safety;
 mod selftest;
 pub(crate) mod support;

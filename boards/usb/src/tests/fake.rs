@@ -141,6 +141,12 @@ impl Bus for FakeBus {
     }
 }
 
+impl crate::BusSpeed for FakeControl {
+    fn is_full_speed(&self) -> bool {
+        false
+    }
+}
+
 pub struct FakeControl {
     wire: Wire,
     packet: usize,

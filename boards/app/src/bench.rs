@@ -1,0 +1,204 @@
+//! A board, an FPGA and a clock without hardware, for tests on the host (feature `bench`).
+//!
+//! The clock belongs to the thread, so tests beside each other do not move each other's time.
+
+use crate::{Board, FpgaPort};
+use core::cell::{Cell, RefCell};
+use core::task::Waker;
+use nirspi_mcu::{BusError, HostPort, Inputs};
+use nirspi_wire::fpga::{CRC_BYTES, HEADER_BYTES, Header, PATTERN_BYTES, Sums};
+use nirspi_wire::packet::MAX_HOST_PACKET;
+use nirspi_wire::register::{IDENTITY, Register, control, status};
+use nirspi_wire::{
+    Command, Configuration, FrameFlags, PatternOrder, RebootInto, Request, SampleSource, encode,
+};
+use std::rc::Rc;
+use std::vec::Vec;
+
+std::thread_local! {
+    static NOW: Cell<u64> = const { Cell::new(0) };
+    static ALARMS: RefCell<Vec<(u64, Waker)>> = const { RefCell::new(Vec::new()) };
+}
+
+/// A clock that advances ten microseconds at every read.
+struct Clock;
+
+impl embassy_time_driver::Driver for Clock {
+    fn now(&self) -> u64 {
+        NOW.with(|now| now.replace(now.get() + 10))
+    }
+
+    fn schedule_wake(&self, at: u64, waker: &Waker) {
+        ALARMS.with(|alarms| alarms.borrow_mut().push((at, waker.clone())));
+    }
+}
+
+embassy_time_driver::time_driver_impl!(static CLOCK: Clock = Clock);
+
+/// The time of this thread's clock in microseconds.
+#[must_use]
+pub fn now_us() -> u64 {
+    NOW.with(Cell::get)
+}
+
+/// Moves this thread's clock, and wakes the tasks whose time has come.
+pub fn advance(micros: u64) {
+    let now = NOW.with(|now| {
+        now.set(now.get() + micros);
+        now.get()
+    });
+    let due: Vec<Waker> = ALARMS.with(|alarms| {
+        let mut alarms = alarms.borrow_mut();
+        let (due, later) = alarms.drain(..).partition(|(at, _)| *at <= now);
+        *alarms = later;
+        let due: Vec<(u64, Waker)> = due;
+        due.into_iter().map(|(_, waker)| waker).collect()
+    });
+    due.iter().for_each(Waker::wake_by_ref);
+}
+
+/// The board's pins, as a test reads and sets them.
+#[derive(Default)]
+pub struct Pins {
+    /// The pin that enables the LED drivers.
+    pub leds_enabled: Cell<bool>,
+    /// The FPGA lights LEDs.
+    pub running: Cell<bool>,
+    /// Number of the frame that the FPGA has ready.
+    pub sequence: Cell<u32>,
+    /// How often the watchdog was fed.
+    pub fed: Cell<u32>,
+    /// Number of polls that a transfer takes.
+    pub transfer_polls: Cell<u32>,
+    /// Microseconds from one frame to the next. With 0 a frame is ready during every run.
+    pub frame_us: Cell<u64>,
+    next_frame_us: Cell<u64>,
+}
+
+/// A board that is pins only.
+pub struct FakeBoard(pub Rc<Pins>);
+
+impl Board for FakeBoard {
+    fn inputs(&mut self) -> Inputs {
+        Inputs { interlock_closed: true, temperature_centi_celsius: Some(2500) }
+    }
+
+    fn enable_leds(&mut self, enabled: bool) {
+        self.0.leds_enabled.set(enabled);
+    }
+
+    fn feed_watchdog(&mut self) {
+        self.0.fed.set(self.0.fed.get() + 1);
+    }
+
+    fn restart(&mut self, _into: RebootInto) -> ! {
+        panic!("restarted")
+    }
+}
+
+/// A fake FPGA: registers in memory, and frames during every run.
+pub struct FakeFpga {
+    pins: Rc<Pins>,
+    registers: [u32; 32],
+}
+
+impl FakeFpga {
+    /// An FPGA without a configuration.
+    #[must_use]
+    pub fn new(pins: Rc<Pins>) -> Self {
+        Self { pins, registers: [0; 32] }
+    }
+}
+
+impl HostPort for FakeFpga {
+    fn write(&mut self, address: u16, value: u32) -> Result<(), BusError> {
+        if address == Register::Control.address() {
+            let bits = |bits: u32| value & bits != 0;
+            let pins = &self.pins;
+            if bits(control::START) {
+                pins.sequence.set(0);
+            }
+            pins.running.set(bits(control::START) || pins.running.get() && !bits(control::STOP));
+            pins.sequence.set(pins.sequence.get() + u32::from(bits(control::RELEASE)));
+            if bits(control::START | control::RELEASE) {
+                pins.next_frame_us.set(now_us() + pins.frame_us.get());
+            }
+        } else {
+            self.registers[usize::from(address)] = value;
+        }
+        Ok(())
+    }
+
+    fn read(&mut self, address: u16) -> Result<u32, BusError> {
+        let running = if self.pins.running.get() { status::RUNNING | status::LEDS_ON } else { 0 };
+        Ok(match Register::at(address) {
+            Some(Register::Identity) => IDENTITY,
+            Some(Register::Status) => status::INTERLOCK_CLOSED | running,
+            Some(Register::FramesMade) => self.pins.sequence.get(),
+            _ => self.registers[usize::from(address)],
+        })
+    }
+
+    fn frame_ready(&mut self) -> bool {
+        self.pins.running.get() && now_us() >= self.pins.next_frame_us.get()
+    }
+
+    fn raw_ready(&mut self) -> bool {
+        false
+    }
+}
+
+impl FpgaPort for FakeFpga {
+    async fn read_bytes(&mut self, _opcode: u8, into: &mut [u8]) -> Result<(), BusError> {
+        for _ in 0..self.pins.transfer_polls.get() {
+            embassy_futures::yield_now().await;
+        }
+        let patterns = ((into.len() - HEADER_BYTES - CRC_BYTES) / PATTERN_BYTES) as u16;
+        let header = Header {
+            patterns,
+            flags: FrameFlags::DIFFERENTIAL,
+            sequence: self.pins.sequence.get(),
+            sweeps: 1,
+            over_range: 0,
+            lost: 0,
+            clock: 0,
+        };
+        let mut bytes = header.to_bytes().to_vec();
+        for k in 0..u64::from(patterns) {
+            bytes.extend(Sums { positive: 100 + k, negative: 7 }.to_bytes());
+        }
+        bytes.extend(nirspi_wire::crc32(&bytes).to_le_bytes());
+        into.copy_from_slice(&bytes);
+        Ok(())
+    }
+
+    async fn ready(&mut self) {
+        if !self.frame_ready() {
+            core::future::pending::<()>().await;
+        }
+    }
+}
+
+/// A configuration that the camera takes.
+#[must_use]
+pub fn configuration(patterns: u16) -> Configuration<'static> {
+    Configuration {
+        order: PatternOrder::Natural,
+        patterns,
+        differential: true,
+        clocks_per_pattern: 5,
+        blanked: 2,
+        adc_latency: 3,
+        sweeps: 1,
+        source: SampleSource::Detector,
+        over_range_trip: 0,
+    }
+}
+
+/// A command as it is on the wire.
+#[must_use]
+pub fn packet(id: u16, command: Command<'_>) -> Vec<u8> {
+    let mut room = [0; MAX_HOST_PACKET + 1];
+    let encoded = encode(&Request { id, command }, &mut room);
+    encoded.expect("a command fits a packet").to_vec()
+}
