@@ -103,7 +103,8 @@ def figures_of(deck: str) -> dict[str, float]:
     said = run.stdout + run.stderr
     found = dict(re.findall(r"^figure (\S+) (\S+)$", said, re.M))
     # A waveform is what chain.cir gives; every other deck gives figures.
-    if re.search(r"failed!|^Error|cannot open|singular|aborted", said, re.M) or (deck != "chain" and not found):
+    complaint = re.search(r"failed!|^Error|cannot open|singular|aborted", said, re.M)
+    if run.returncode != 0 or complaint or (deck != "chain" and not found):
         raise Failure(f"{deck}.cir failed:\n{said[-3000:]}")
     return {f"{deck}.{name}": float(value) for name, value in found.items()}
 
@@ -119,7 +120,8 @@ def deck_value(path: Path, element: str) -> float:
 
 def input_pf() -> float:
     """Capacitance of the transimpedance amplifier's input and its pads, as the deck has it."""
-    amplifier = re.search(r"^xtia .* common=([0-9.]+)p differential=([0-9.]+)p$", (HERE / "receiver.lib").read_text(), re.M)
+    text = (HERE / "receiver.lib").read_text()
+    amplifier = re.search(r"^xtia .* common=([0-9.]+)p differential=([0-9.]+)p$", text, re.M)
     if amplifier is None:
         raise Failure("receiver.lib: no xtia with common=...p differential=...p")
     return float(amplifier[1]) + float(amplifier[2]) + deck_value(HERE / "receiver.lib", "cpads") * 1e12
@@ -337,13 +339,16 @@ def main() -> int:
     problems += [f"this check is blind: a wrong constant of `{name}` is not seen" for name in self_test(table)]
     for problem in problems:
         print(problem, file=sys.stderr)
-    print(f"\n{len(table)} figures, {sum(row.rule == 'gap' for row in table)} known gaps; each constant made wrong in turn: "
-          f"{'seen' if not self_test(table) else 'NOT SEEN'}")
+    gaps = sum(row.rule == "gap" for row in table)
+    seen = "NOT SEEN" if self_test(table) else "seen"
+    print(f"\n{len(table)} figures, {gaps} known gaps; each constant made wrong in turn: {seen}")
     return 1 if problems else 0
 
 
 if __name__ == "__main__":
     try:
         sys.exit(main())
-    except (Failure, KeyError, FileNotFoundError) as error:
+    except KeyError as error:
+        sys.exit(f"boards/electronics/check.py: no figure of a deck and no key of a description is named {error}")
+    except (Failure, OSError, subprocess.TimeoutExpired, tomllib.TOMLDecodeError) as error:
         sys.exit(f"boards/electronics/check.py: {error}")

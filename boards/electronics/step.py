@@ -95,9 +95,13 @@ def draw(chain: Chain, edge_ns: float, bandwidth_mhz: float, path: Path) -> None
                     f'<text x="10" y="{float(y) + 4}">{share:g}</text>')
     for ns in range(0, SPAN_NS + 1, SAMPLE_NS):
         grid.append(f'<text x="{point(ns, 0).split(",")[0]}" y="{bottom + 16}" text-anchor="middle">{ns}</text>')
-    words = [("#c33", "circuit, dark to lit"), ("#36c", "circuit, lit to dark, turned over"), ("#000", "simulator, and its samples")]
-    legend = [f'<text x="340" y="{150 + 18 * i}" fill="{colour}">{text}</text>' for i, (colour, text) in enumerate(words)]
-    axis = f'<text x="{WIDTH / 2}" y="{HEIGHT - 6}" text-anchor="middle">ns after the line, the circuit\'s delay taken off; computed, never built</text>'
-    head = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" font-family="sans-serif" font-size="12">'
+    words = [("#c33", "circuit, dark to lit"), ("#36c", "circuit, lit to dark, turned over"),
+             ("#000", "simulator, and its samples")]
+    legend = [f'<text x="340" y="{150 + 18 * i}" fill="{colour}">{text}</text>'
+              for i, (colour, text) in enumerate(words)]
+    axis = (f'<text x="{WIDTH / 2}" y="{HEIGHT - 6}" text-anchor="middle">ns after the line, '
+            "the circuit's delay taken off; computed, never built</text>")
+    head = (f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" '
+            'font-family="sans-serif" font-size="12">')
     background = f'<rect width="{WIDTH}" height="{HEIGHT}" fill="#fff"/>'
     path.write_text("\n".join([head, background, *grid, *curves, *legend, axis, "</svg>"]) + "\n")
