@@ -10,11 +10,14 @@ steps=(
     "gpu             GPU kernels on software Vulkan; Debian"
     "rtl             the gateware's RTL in the Veryl simulator, alone and in the whole camera"
     "features        the library alone, and with its features that bring the others"
+    "publish         each library crate builds from its package alone; crates.io"
+    "licences        licences, sources and bans of all dependencies; crates.io"
     "training        networks on burn, and the commands that need it"
     "emulation       the firmware's budgets, and its machine code against the virtual camera; QEMU, firmware"
     "application     the firmware's application and USB device on the host"
     "lints           clippy of both workspaces; firmware's targets"
     "docs            documentation without warnings"
+    "book            the documentation as a book without warnings; builds mdBook"
     "demo            the README's demo command"
     "examples        examples of the libraries"
     "page            the live page in a browser; Debian's Chromium, demo"
@@ -27,6 +30,8 @@ steps=(
     "proofs          LED safety, FIFO and crossing proven; PyPI"
     "electronics     circuits beside the simulator's constants, the LED tile's netlist; Debian's ngspice, PyPI"
     "place-route     place and route of the gateware, five seeds; PyPI"
+    "deb             the Debian package; crates.io, licences"
+    "release-folder  the folder that nirspi update takes; firmware, place-route"
 )
 
 # Debian packages, where this machine may install them. The lists of a machine that has just begun may name packages
@@ -61,6 +66,8 @@ step_typos() {
     # Tests write docs/protocol.md and docs/commands.md.
     python_with mdformat mdformat==1.0.0 mdformat-gfm==1.0.0
     git ls-files -z '*.md' ':!docs/protocol.md' ':!docs/commands.md' | xargs -0 target/mdformat/bin/mdformat --check
+    python_with just rust-just==1.59.0
+    target/just/bin/just --unstable --fmt --check
 }
 
 step_firmware() { bash boards/build.sh; }
@@ -98,6 +105,49 @@ step_features() {
     done
 }
 
+step_publish() { cargo publish --workspace --dry-run --locked; }
+
+# A tool from crates.io, under target/.
+tool() {
+    [ -x "target/tools/bin/$1" ] || cargo install --quiet --locked --root target/tools "$1@$2" "${@:3}"
+    PATH=$PWD/target/tools/bin:$PATH
+}
+
+step_licences() {
+    tool cargo-deny 0.20.2
+    cargo deny --all-features check licenses bans sources
+    cargo deny --manifest-path boards/Cargo.toml --config .deny.toml check --allow license-not-encountered licenses bans sources
+    # Advisories are in a repository on GitHub.
+    if timeout 20 git ls-remote -q https://github.com/RustSec/advisory-db HEAD >/dev/null 2>&1; then
+        cargo deny --all-features check advisories
+    else
+        echo "skipped: advisories, no GitHub"
+    fi
+    tool cargo-about 0.9.3 --features cli
+    cargo about generate --locked --fail --config .github/about.toml --manifest-path host/cli/Cargo.toml \
+        --features flash --output-file target/licences.html .github/about.hbs
+}
+
+# What a package of the program contains beside it.
+step_deb() {
+    tool cargo-deb 3.8.0
+    [ -f target/licences.html ] || step_licences
+    cargo build --locked --release --features flash
+    local nirspi=target/release/nirspi shell
+    "$nirspi" man target/package/man
+    for shell in bash zsh fish; do "$nirspi" completions "$shell" >"target/package/nirspi.$shell"; done
+    cargo deb --locked --no-build -p nirspi-cli --output target/package/
+    ls -l target/package
+}
+
+# The folder that `nirspi update` takes, from firmware and bitstream as they were built here.
+step_release_folder() {
+    step_firmware
+    [ -f target/gateware/ecp5-evn/nirspi.bit ] || step_place_route
+    cargo run --locked -p nirspi --no-default-features --example release_folder -- target/package/firmware
+    ls -l target/package/firmware
+}
+
 step_training() {
     cargo test --locked -p nirspi-nets --features train
     # Their code is checked by the lints; running them compiles burn for every crate above the networks.
@@ -130,6 +180,13 @@ step_lints() {
 }
 
 step_docs() { RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps --workspace; }
+
+# mdBook warns and ends well all the same.
+step_book() {
+    cargo install --quiet --locked --root target/mdbook mdbook@0.5.4
+    target/mdbook/bin/mdbook build docs 2>&1 | tee "$out/book.log"
+    if grep -E ' (WARN|ERROR) ' "$out/book.log"; then return 1; fi
+}
 
 step_demo() {
     cargo run --locked --release -- demo --out "$out/demo"

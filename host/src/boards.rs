@@ -1,5 +1,9 @@
-//! The boards for which firmware is built: every `boards/NAME/board.toml` of the repository. The
-//! build of this crate reads the files.
+//! The boards for which firmware is built: every `boards/NAME/board.toml` of the repository.
+//!
+//! # Invariant
+//! The list is that of the files (`the_list_of_the_host_program_is_that_of_the_files` in
+//! `tests/tests/boards.rs`, which writes it). So this crate builds without the repository around
+//! it.
 
 mod board;
 
@@ -7,7 +11,7 @@ pub use board::{Board, Pins};
 use std::path::PathBuf;
 
 /// All boards, by name.
-pub static BOARDS: &[Board] = include!(concat!(env!("OUT_DIR"), "/boards.rs"));
+pub static BOARDS: &[Board] = include!("boards/list.in");
 
 /// Names and titles of the boards that can be flashed, for messages and help.
 #[must_use]

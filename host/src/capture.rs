@@ -139,6 +139,7 @@ pub struct Capture {
 
 /// Why a capture has no result.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum CaptureError {
     /// The camera did not answer or refused to measure.
     #[error(transparent)]

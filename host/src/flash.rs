@@ -44,6 +44,7 @@ impl fmt::Display for Probe {
 
 /// Why a board was not flashed.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum FlashingError {
     /// No probe is connected.
     #[error(

@@ -2,7 +2,9 @@
 //!
 //! # Invariant
 //! A piece is sent only when the camera has asked for this piece. A lost reply costs one more piece
-//! and never a wrong bitstream (`tests::a_lost_piece_is_sent_again`).
+//! and never a wrong bitstream (`tests::a_lost_piece_is_sent_again`). A camera that has the first
+//! pieces of this bitstream, from a session that was cut, gets the rest alone
+//! (`tests::a_load_that_was_cut_goes_on_where_it_stopped`).
 
 use crate::session::{IgnorePackets, Session, SessionError};
 use nirspi_mcu::staging;
@@ -20,6 +22,7 @@ const START_TIME: Duration = Duration::from_secs(5);
 
 /// Why a bitstream does not run.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum GatewareError {
     /// The file is not one that `ecppack` or Lattice's tools write.
     #[error("no bitstream for an ECP5: it begins with neither a comment nor the preamble")]
@@ -63,7 +66,9 @@ pub fn load(
         u32::try_from(bitstream.len()).map_err(|_| GatewareError::TooLong(bitstream.len()))?;
     let crc = crc32(bitstream);
     // A camera that asks for the same pieces repeatedly makes no progress.
-    let (mut offset, mut furthest, mut setbacks) = (0, 0, 0);
+    let mut offset = first_missing(session, total, crc)?;
+    progress(offset);
+    let (mut furthest, mut setbacks) = (offset, 0);
     while offset < total {
         let rest = bitstream.get(offset as usize..).unwrap_or(&[]);
         let data = rest.get(..GATEWARE_CHUNK_MAX).unwrap_or(rest);
@@ -91,6 +96,22 @@ pub fn load(
     await_start(session)
 }
 
+/// The offset of the first byte of this bitstream that the camera does not have: 0, or more after a
+/// session that was cut. An empty piece at the end cannot be the next one, so the camera answers with
+/// the piece that it waits for.
+fn first_missing(session: &mut Session, total: u32, crc: u32) -> Result<u32, GatewareError> {
+    let question = GatewareChunk { offset: total, total, crc, data: &[] };
+    match session.load_gateware(question, &mut IgnorePackets) {
+        Err(SessionError::Refused { refusal: Refusal::GatewareOffset { expected }, .. })
+            if expected < total =>
+        {
+            Ok(expected)
+        }
+        Ok(_) | Err(SessionError::NoAnswer { .. } | SessionError::Refused { .. }) => Ok(0),
+        Err(error) => Err(error.into()),
+    }
+}
+
 /// Waits until the FPGA identifies itself.
 fn await_start(session: &mut Session) -> Result<u32, GatewareError> {
     let begun = Instant::now();
@@ -113,10 +134,12 @@ fn await_start(session: &mut Session) -> Result<u32, GatewareError> {
 
 #[cfg(test)]
 #[cfg(feature = "virtual-camera")]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::link::{Link, Received};
-    use crate::virtual_camera::{MemoryLink, VirtualCamera, VirtualOptics};
+    use crate::virtual_camera::{
+        MemoryLink, OpticalFpga, SimulatedFpga, VirtualCamera, VirtualOptics,
+    };
     use nirspi_mcu::{GatewareLoader, LoadError, Micros};
     use nirspi_optics::Scene;
     use std::io;
@@ -124,13 +147,13 @@ mod tests {
 
     /// The bitstream that a camera was given to load.
     #[derive(Debug, Default)]
-    struct Loaded {
-        bytes: Vec<u8>,
+    pub(crate) struct Loaded {
+        pub bytes: Vec<u8>,
         is_finished: bool,
     }
 
     /// Keeps the bitstream, and is busy for a while after the last piece.
-    struct Keeper {
+    pub(crate) struct Keeper {
         loaded: Arc<Mutex<Loaded>>,
         busy: u32,
     }
@@ -163,14 +186,14 @@ mod tests {
         VirtualOptics::new(sheet, 300.0).unwrap()
     }
 
-    fn camera() -> (impl Link, Arc<Mutex<Loaded>>) {
+    pub(crate) fn camera() -> (MemoryLink<OpticalFpga, Keeper>, Arc<Mutex<Loaded>>) {
         let loaded = Arc::new(Mutex::new(Loaded::default()));
         let keeper = Keeper { loaded: loaded.clone(), busy: 0 };
         let (fpga, depth) = (optics().fpga(1).unwrap(), optics().depth(1).unwrap());
         (MemoryLink::new(VirtualCamera::with_loader(fpga, keeper, depth, "loaded")), loaded)
     }
 
-    fn bitstream() -> Vec<u8> {
+    pub(crate) fn bitstream() -> Vec<u8> {
         let body = (0..5_000_u32).map(|i| ((i * i) >> 3) as u8);
         [0xFF, 0x00].into_iter().chain(body).chain([0xFF; 40]).collect()
     }
@@ -202,14 +225,54 @@ mod tests {
         assert_eq!(version, Register::Version.reset());
         let loaded = loaded.lock().unwrap();
         assert!(loaded.is_finished && loaded.bytes == bitstream());
-        assert_eq!(heard, [2048, 4096, 5042]);
+        assert_eq!(heard, [0, 2048, 4096, 5042]);
+    }
+
+    /// A link that a camera outlives, and that breaks after some packets of the host.
+    struct Cable<L> {
+        camera: Arc<Mutex<L>>,
+        packets_left: u32,
+    }
+
+    impl<F: SimulatedFpga, G: GatewareLoader + Send> Link for Cable<MemoryLink<F, G>> {
+        fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+            let mut camera = self.camera.lock().unwrap();
+            let Some(left) = self.packets_left.checked_sub(1) else {
+                camera.unplug();
+                return Err(io::ErrorKind::BrokenPipe.into());
+            };
+            self.packets_left = left;
+            camera.send(bytes)
+        }
+
+        fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<Received> {
+            self.camera.lock().unwrap().receive(buffer, timeout)
+        }
+    }
+
+    #[test]
+    fn a_load_that_was_cut_goes_on_where_it_stopped() {
+        let (link, loaded) = camera();
+        let link = Arc::new(Mutex::new(link));
+        let session = |packets_left| {
+            Session::open(Box::new(Cable { camera: link.clone(), packets_left })).unwrap()
+        };
+        // A delimiter, the greeting, the question where to begin, and two of three pieces.
+        let error = load(&mut session(5), &bitstream(), &mut |_| {}).unwrap_err();
+        assert!(matches!(error, GatewareError::Session(_)), "{error}");
+        assert!(!loaded.lock().unwrap().is_finished);
+        let mut heard = Vec::new();
+        let version = load(&mut session(99), &bitstream(), &mut |bytes| heard.push(bytes)).unwrap();
+        assert_eq!((version, &heard[..]), (Register::Version.reset(), &[4096, 5042][..]));
+        let loaded = loaded.lock().unwrap();
+        assert!(loaded.is_finished && loaded.bytes == bitstream());
     }
 
     #[test]
     fn a_lost_piece_is_sent_again() {
         let (link, loaded) = camera();
-        // The packets before are a delimiter, the greeting and the first piece.
-        let mut session = Session::open(Box::new(Lossy { link, sent: 0, lost: 4 })).unwrap();
+        // The packets before are a delimiter, the greeting, the question where to begin, and the first piece.
+        let mut session = Session::open(Box::new(Lossy { link, sent: 0, lost: 5 })).unwrap();
         load(&mut session, &bitstream(), &mut |_| {}).unwrap();
         assert!(loaded.lock().unwrap().bytes == bitstream());
     }

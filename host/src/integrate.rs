@@ -165,6 +165,7 @@ impl Newest {
 
 /// Why a sum of frames gives no measurements.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum IntegrateError {
     /// The setup and the sums give no measurements.
     #[error(transparent)]

@@ -24,6 +24,7 @@ const PAGE_END: char = '\u{c}';
 
 /// Why the images were not read. `Display` is one line.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum LegibilityError {
     /// Tesseract is not on this machine.
     #[error("no tesseract on this machine (Debian: apt install tesseract-ocr)")]

@@ -1,12 +1,12 @@
-//! nirspi: an open near-infrared single-pixel camera.
+#![doc = include_str!("../README.md")]
 //!
 //! Data flows one way: bytes -> frames -> measurements -> image -> picture.
 //!
 //! * [`link`] moves bytes, [`session`] exchanges commands with a camera, [`account`] counts every
 //!   frame,
-//! * [`versions`] checks whether camera and program fit together, [`events`] words a camera's
-//!   reports,
-//! * [`gateware`] loads a camera's FPGA,
+//! * [`about`] says what a build contains, [`versions`] checks whether camera and program fit
+//!   together, [`events`] words a camera's reports,
+//! * [`gateware`] loads a camera's FPGA, [`update`] brings a camera to the versions of a release,
 //! * [`calibration`] measures, keeps and chooses latency and settling, [`selftest`] checks a
 //!   camera,
 //! * [`capture`] runs a measurement, [`recording`] stores it,
@@ -30,6 +30,7 @@
 //! `pictures`, `virtual-camera`, `serve` and `training` add the other parts; `gpu` adds the kernels
 //! for GPUs.
 
+pub mod about;
 pub mod account;
 pub mod boards;
 pub mod calibration;
@@ -63,6 +64,7 @@ pub mod tally;
 #[cfg(feature = "training")]
 pub mod training;
 pub mod udev;
+pub mod update;
 pub mod versions;
 #[cfg(feature = "virtual-camera")]
 pub mod virtual_camera;

@@ -42,6 +42,7 @@ pub enum Installed {
 
 /// Why the rule was not changed.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum RuleError {
     /// A file of another program has the rule's name.
     #[error("{0}: not written by nirspi, so left as it is")]

@@ -5,7 +5,9 @@
 //! (`tests::loading::pieces_in_order_make_a_bitstream`,
 //! `tests::loading::a_piece_out_of_order_is_refused_and_the_right_one_still_taken`) and the
 //! checksum over all bytes is right
-//! (`tests::loading::a_wrong_checksum_is_found_at_the_end_and_nothing_is_finished`).
+//! (`tests::loading::a_wrong_checksum_is_found_at_the_end_and_nothing_is_finished`). The pieces
+//! outlive their session: a host that comes back goes on with the next one
+//! (`tests::loading::a_bitstream_goes_on_where_a_lost_link_stopped_it`).
 
 use crate::{GatewareLoader, LoadError};
 use nirspi_wire::{Crc32, GatewareChunk, Refusal};

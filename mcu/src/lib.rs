@@ -1,26 +1,4 @@
-//! Firmware logic of the nirspi camera: every decision, no hardware.
-//!
-//! A board owns the peripherals and a loop; [`Camera`] owns all logic that tests check. The board
-//! passes bytes from the host to [`Camera::receive`] and calls [`Camera::poll`] as often as it can,
-//! with the time, its sensors and its [`Ports`]. Neither call waits, allocates, panics or reads a
-//! clock.
-//!
-//! ```
-//! use nirspi_mcu::{Camera, FpgaBus, GatewareLoader, Inputs, Micros, PacketSink, Ports, Progress};
-//!
-//! /// One turn of a board's loop; `inbox` holds what came from the host and was not taken yet.
-//! fn turn<B: FpgaBus, S: PacketSink, G: GatewareLoader>(
-//!     camera: &mut Camera,
-//!     now: Micros,
-//!     inputs: &Inputs,
-//!     inbox: &mut Vec<u8>,
-//!     ports: &mut Ports<'_, B, S, G>,
-//! ) -> Progress {
-//!     let taken = camera.receive(now, inbox, inputs, ports);
-//!     inbox.drain(..taken);
-//!     camera.poll(now, inputs, ports)
-//! }
-//! ```
+#![doc = include_str!("../README.md")]
 //!
 //! Each module has one idea. `camera` is what a board calls; `commands` (of the host) and `poll`
 //! (safety rules, then one step) drive the `machine`, which holds the state. The parts of the

@@ -326,7 +326,13 @@ impl Machine {
         self.reply(id, Outcome::Other(Ok(Answer::SelfTest(report))));
     }
 
-    /// Ends the session: LEDs off, and everything begun for that host is forgotten.
+    /// Whether a host is loading a bitstream, so that the FPGA may have no host port.
+    pub fn is_loading(&self) -> bool {
+        self.loading.is_some() && !matches!(self.session, Session::Closed)
+    }
+
+    /// Ends the session: LEDs off, and everything begun for that host is forgotten but the pieces of
+    /// a bitstream, which a host that comes back goes on with.
     pub fn close(&mut self, bus: &mut impl FpgaBus) {
         self.leds_off(bus);
         if let Activity::Run(_) = self.activity {
@@ -337,6 +343,5 @@ impl Machine {
         self.session = Session::Closed;
         self.notices.clear();
         self.setup = None;
-        self.loading = None;
     }
 }

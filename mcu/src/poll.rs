@@ -21,7 +21,7 @@ impl Machine {
     ) -> Progress {
         let Ports { bus, sink, .. } = ports;
         // While a bitstream is loaded, the FPGA has no host port and lights no LED.
-        if self.off_pending && self.loading.is_none() {
+        if self.off_pending && !self.is_loading() {
             self.leds_off(*bus);
         }
         self.guard_sensors(now, inputs, *bus);
@@ -64,7 +64,7 @@ impl Machine {
         let resting = matches!(self.activity, Activity::Resting);
         let period = if resting { self.limits.resting_check } else { self.limits.running_check };
         let early = self.last_check.is_some_and(|last| now.since(last) < period);
-        if early || self.loading.is_some() {
+        if early || self.is_loading() {
             return;
         }
         self.last_check = Some(now);

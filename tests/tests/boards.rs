@@ -1,5 +1,5 @@
 //! Tests that the files of a board agree with its `board.toml` and with each other: pins in the
-//! code, on its page and at the FPGA, settings, scripts, tables of the pages.
+//! code, on its page and at the FPGA, settings, scripts, tables of the pages, the host's list.
 
 use nirspi::boards::{BOARDS, Board, Pins};
 use nirspi_tests::root;
@@ -7,10 +7,23 @@ use nirspi_wire::usb;
 use std::collections::BTreeSet;
 use std::io::Write;
 use std::process::Command;
+use std::sync::LazyLock;
+
+/// Every `boards/NAME/board.toml`, read anew: the host's list may be stale.
+fn boards() -> &'static [Board] {
+    static READ: LazyLock<Vec<Board>> = LazyLock::new(|| {
+        let board = |name: String| {
+            let text = read(&format!("boards/{name}/board.toml"));
+            Board::parse(name.leak(), text.leak()).unwrap_or_else(|error| panic!("{error}"))
+        };
+        folders_with("board.toml").into_iter().map(board).collect()
+    });
+    &READ
+}
 
 /// Boards with a pin table.
 fn wired() -> impl Iterator<Item = (&'static str, Pins)> {
-    BOARDS.iter().filter_map(|board| Some((board.name, board.pins?)))
+    boards().iter().filter_map(|board| Some((board.name, board.pins?)))
 }
 
 /// Signal, pin, place on the board, where the wire goes.
@@ -166,13 +179,24 @@ fn folders_with(file: &str) -> BTreeSet<String> {
 fn every_folder_with_a_memory_layout_is_a_board() {
     let described = folders_with("board.toml");
     assert_eq!(folders_with("memory.x"), described, "each needs a board.toml");
-    let built: BTreeSet<String> = BOARDS.iter().map(|board| board.name.to_owned()).collect();
-    assert_eq!(built, described, "the host crate has an old list: touch host/build.rs");
+}
+
+#[test]
+fn the_list_of_the_host_program_is_that_of_the_files() {
+    let path = root().join("host/src/boards/list.in");
+    // What `Debug` prints of texts, numbers and `Option`s is Rust.
+    let expected = format!("&{:#?}\n", boards());
+    if std::env::var_os("NIRSPI_BLESS").is_some() {
+        std::fs::write(&path, &expected).expect("a written list");
+    }
+    let stale = "host/src/boards/list.in is stale: NIRSPI_BLESS=1 cargo test -p nirspi-tests --test boards writes it anew";
+    assert!(std::fs::read_to_string(&path).unwrap_or_default() == expected, "{stale}");
+    assert!(std::env::var_os("NIRSPI_BLESS").is_some() || BOARDS == boards(), "{stale}");
 }
 
 #[test]
 fn a_boards_folder_is_its_package_and_its_settings_name_its_target_and_chip() {
-    for Board { name, target, chip, .. } in BOARDS {
+    for Board { name, target, chip, .. } in boards() {
         let manifest = read(&format!("boards/{name}/Cargo.toml"));
         let package = format!("[package]\nname = \"{name}\"\n");
         assert!(manifest.starts_with(&package), "boards/{name}/Cargo.toml: no package {name}");
@@ -202,8 +226,8 @@ fn shell_scripts_read_the_same_facts() {
     let Ok((true, names)) = shell("boards") else {
         return say("skipped: no bash");
     };
-    assert_eq!(names, BOARDS.iter().map(|board| board.name).collect::<Vec<_>>().join("\n"));
-    for board in BOARDS {
+    assert_eq!(names, boards().iter().map(|board| board.name).collect::<Vec<_>>().join("\n"));
+    for board in boards() {
         let name = board.name;
         let fact = |key: &str| shell(&format!("fact {name} {key}")).expect("bash");
         assert_eq!(fact("target"), (true, board.target.to_owned()));
@@ -257,7 +281,7 @@ fn in_thousands(number: u64) -> String {
 
 #[test]
 fn tables_of_the_pages_show_what_board_toml_says() {
-    let rows = |row: &dyn Fn(&Board) -> String| BOARDS.iter().map(row).collect::<Vec<_>>();
+    let rows = |row: &dyn Fn(&Board) -> String| boards().iter().map(row).collect::<Vec<_>>();
     let boards = rows(&|board| {
         let Board { name, title, processor, target, host_link, fpga_link, state, .. } = board;
         let folder = format!("[`{name}`]({name}/README.md)");

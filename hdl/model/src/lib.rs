@@ -1,4 +1,4 @@
-//! Bit-exact golden model of the camera's gateware: what the FPGA does, clock by clock, in plain Rust.
+#![doc = include_str!("../README.md")]
 //!
 //! [`Gateware`] is the whole FPGA seen from its pins: registers and frames on the host port, LED
 //! lines, ADC, interlock. One [`Gateware::tick`] is one ADC clock of 8 ns. The virtual camera runs
@@ -49,23 +49,6 @@
 //! - LEDs go out 3 clocks after the interlock pin opens.
 //! - Lines are at the pins 6 clocks after the choice of a slot. `Latency` counts from there: 0 is a
 //!   sample that is at the ADC's pins in the clock in which its light is at the LEDs' pins.
-//!
-//! ```
-//! use nirspi_hdl_model::{AdcSample, Gateware};
-//! use nirspi_wire::{fpga::FpgaFrame, register::{Register, control}};
-//!
-//! let mut gateware = Gateware::new();
-//! gateware.set_interlock(true);
-//! gateware.write(Register::Frames.address(), 1);
-//! gateware.write(Register::Control.address(), control::START);
-//! while gateware.running() {
-//!     let light = if gateware.lines().lit(0, 0) { 100 } else { 0 };
-//!     gateware.tick(AdcSample { code: light, over_range: false });
-//! }
-//! let frame = FpgaFrame::parse(gateware.frame().unwrap()).unwrap();
-//! // Every Hadamard pattern lights the LED (0, 0), for 5 clocks of which 2 are blanked.
-//! assert!(frame.sums().all(|sums| sums.positive == 300));
-//! ```
 
 mod format;
 mod frames;

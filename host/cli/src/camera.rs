@@ -122,10 +122,10 @@ impl SceneArgs {
 
     /// The weather in front of this camera.
     pub fn air(&self, model: &CameraModel) -> Result<Air> {
-        let rainfall = || self.rain.map_or(model.weather.rain, Rain::rainfall);
-        match self.weather.read()? {
-            Some(air) => Ok(air),
-            None => Ok(Air::of_rainfall(rainfall())?),
+        match (self.weather.read()?, self.rain) {
+            (Some(air), _) => Ok(air),
+            (None, Some(rain)) => Ok(Air::of_rainfall(rain.rainfall())?),
+            (None, None) => Ok(model.weather.air.clone()),
         }
     }
 

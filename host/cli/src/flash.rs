@@ -3,7 +3,7 @@
 use super::Usage;
 use anyhow::Result;
 use nirspi::boards::{Board, flashable};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Program a board with its firmware, through a debug probe
@@ -52,6 +52,13 @@ fn board(name: &str) -> Result<(&'static Board, &'static str)> {
 
 #[cfg(not(feature = "flash"))]
 fn act(_: &Args, _: Option<(&'static Board, &'static str)>) -> Result<ExitCode> {
+    write("", Path::new(""), &[], None)?;
+    Ok(ExitCode::FAILURE)
+}
+
+/// Writes firmware, the content of an ELF file, into a board's chip.
+#[cfg(not(feature = "flash"))]
+pub fn write(_chip: &str, _elf: &Path, _firmware: &[u8], _probe: Option<&str>) -> Result<()> {
     anyhow::bail!(
         "this build cannot flash: cargo run --release --features flash -- flash ... (minutes to build), or flash with \
          probe-rs run from the board's folder"
@@ -62,11 +69,9 @@ fn act(_: &Args, _: Option<(&'static Board, &'static str)>) -> Result<ExitCode> 
 fn act(args: &Args, board: Option<(&'static Board, &'static str)>) -> Result<ExitCode> {
     use super::print;
     use anyhow::Context;
-    use indicatif::{ProgressBar, ProgressStyle};
-    use nirspi::flash::{Step, choose, flash, probes};
 
-    let found = probes();
     let Some((board, chip)) = board else {
+        let found = nirspi::flash::probes();
         if found.is_empty() {
             print::line("no debug probe: plug in the board's ST-LINK connector")?;
         }
@@ -84,12 +89,29 @@ fn act(args: &Args, board: Option<(&'static Board, &'static str)>) -> Result<Exi
         };
         format!("{}{hint}", elf.display())
     })?;
-    let probe = choose(&found, args.probe.as_deref())?;
+    write(chip, &elf, &firmware, args.probe.as_deref())?;
+    print::line(format_args!(
+        "{} written to {} and verified; it is running",
+        elf.display(),
+        board.name
+    ))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Writes firmware, the content of an ELF file, into a board's chip.
+#[cfg(feature = "flash")]
+pub fn write(chip: &str, elf: &Path, firmware: &[u8], probe: Option<&str>) -> Result<()> {
+    use anyhow::Context;
+    use indicatif::{ProgressBar, ProgressStyle};
+    use nirspi::flash::{Step, choose, flash, probes};
+
+    let found = probes();
+    let probe = choose(&found, probe)?;
     let bar = ProgressBar::new(0).with_style(
         ProgressStyle::with_template("{msg:9} {bar:30} {bytes}/{total_bytes}")
             .unwrap_or_else(|_| ProgressStyle::default_bar()),
     );
-    let written = flash(probe, chip, &firmware, &mut |step| match step {
+    let written = flash(probe, chip, firmware, &mut |step| match step {
         Step::Begins { what, bytes } => {
             bar.reset();
             bar.set_message(what);
@@ -98,11 +120,5 @@ fn act(args: &Args, board: Option<(&'static Board, &'static str)>) -> Result<Exi
         Step::Done { bytes } => bar.inc(bytes),
     });
     bar.finish_and_clear();
-    written.with_context(|| format!("{} through {probe}", elf.display()))?;
-    print::line(format_args!(
-        "{} written to {} and verified; it is running",
-        elf.display(),
-        board.name
-    ))?;
-    Ok(ExitCode::SUCCESS)
+    written.with_context(|| format!("{} through {probe}", elf.display()))
 }

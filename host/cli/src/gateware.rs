@@ -38,13 +38,18 @@ struct Report {
     gateware: String,
 }
 
+/// A bar for a bitstream of this many bytes.
+pub fn progress(bytes: usize) -> ProgressBar {
+    let style = ProgressStyle::with_template("loading {bar:30} {bytes}/{total_bytes}, {eta} left")
+        .unwrap_or_else(|_| ProgressStyle::default_bar());
+    ProgressBar::new(bytes as u64).with_style(style)
+}
+
 pub fn run(args: &Args) -> Result<ExitCode> {
     let file = args.bitstream.display();
     let bitstream = std::fs::read(&args.bitstream).with_context(|| file.to_string())?;
     let mut session = address::open(&args.camera, &args.scene)?;
-    let style = ProgressStyle::with_template("loading {bar:30} {bytes}/{total_bytes}, {eta} left")
-        .unwrap_or_else(|_| ProgressStyle::default_bar());
-    let bar = ProgressBar::new(bitstream.len() as u64).with_style(style);
+    let bar = progress(bitstream.len());
     let loaded =
         gateware::load(&mut session, &bitstream, &mut |bytes| bar.set_position(bytes.into()));
     bar.finish_and_clear();

@@ -23,6 +23,7 @@ mod info;
 mod method;
 mod metrics;
 mod networks;
+mod packaging;
 mod print;
 mod rain;
 mod range;
@@ -34,16 +35,22 @@ mod serve_virtual;
 mod setup;
 mod source;
 mod train;
+mod update;
 mod upscale;
 
 use clap::{Parser, Subcommand};
+use nirspi::about::About;
 use nirspi::files::FileError;
 use nirspi_eval::EvalError;
 use std::process::ExitCode;
+use std::sync::LazyLock;
+
+static VERSION: LazyLock<String> =
+    LazyLock::new(|| About::this_build(option_env!("NIRSPI_COMMIT")).to_string());
 
 /// An open near-infrared single-pixel camera: capture, virtual camera, reconstruction.
 #[derive(Debug, Parser)]
-#[command(name = "nirspi", version, arg_required_else_help = true)]
+#[command(name = "nirspi", version, long_version = VERSION.as_str(), arg_required_else_help = true)]
 #[command(after_help = "Example, with no camera at hand:\n\
     \x20 nirspi demo --out demo/")]
 struct Cli {
@@ -66,6 +73,7 @@ enum Command {
     Selftest(selftest::Args),
     Flash(flash::Args),
     Gateware(gateware::Args),
+    Update(update::Args),
     Setup(setup::Args),
     Upscale(upscale::Args),
     Deblur(deblur::Args),
@@ -76,6 +84,8 @@ enum Command {
     Bench(bench::Args),
     Eval(eval::EvalArgs),
     Train(train::TrainArgs),
+    Completions(packaging::CompletionsArgs),
+    Man(packaging::ManArgs),
 }
 
 /// A mistake in how the program was called, rather than in what it was given.
@@ -123,6 +133,7 @@ fn main() -> ExitCode {
         Command::Selftest(args) => selftest::run(&args),
         Command::Flash(args) => flash::run(&args),
         Command::Gateware(args) => gateware::run(&args),
+        Command::Update(args) => update::run(&args),
         Command::Setup(args) => setup::run(&args),
         Command::Upscale(args) => upscale::run(&args),
         Command::Deblur(args) => deblur::run(&args),
@@ -133,6 +144,8 @@ fn main() -> ExitCode {
         Command::Bench(args) => bench::run(&args),
         Command::Eval(args) => eval::run(&args),
         Command::Train(args) => train::run(&args),
+        Command::Completions(args) => packaging::completions(&args),
+        Command::Man(args) => packaging::man(&args),
     };
     match result {
         Ok(code) => code,

@@ -1,4 +1,4 @@
-//! Evaluation of the nirspi camera: image quality, range, and speed of the host.
+#![doc = include_str!("../README.md")]
 //!
 //! Every report is a plain struct that serialises to JSON, and the library prints nothing. Long
 //! functions call `done` after each unit of work, so that a caller can show progress.

@@ -62,6 +62,7 @@ impl FromStr for Method {
 
 /// Why a stack of images cannot be deblurred.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum ClassicalError {
     /// No method has this name.
     #[error("method \"{found}\", expected wiener, rl or tv")]

@@ -22,6 +22,7 @@ const DEPTH_SCALE_M: f32 = 3.0;
 
 /// Why depth maps are refused.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum DepthError {
     /// The maps' side does not divide 32, or their number is neither one nor the number of images.
     #[error(

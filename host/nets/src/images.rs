@@ -7,6 +7,7 @@ use thiserror::Error;
 
 /// Why a stack of images is refused.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum ImagesError {
     /// There is no image, or the values are not whole images.
     #[error("{found} values, expected whole images of {side} x {side}, at least one")]

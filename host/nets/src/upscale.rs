@@ -22,6 +22,7 @@ const TAPS: usize = 2 * LOBES;
 
 /// Why a stack of images cannot be upscaled.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum UpscaleError {
     /// The stack has no pixel, or its size does not fit the number of values.
     #[error(

@@ -14,7 +14,7 @@ use std::{fs, io};
 
 use half::f16;
 use safetensors::tensor::TensorView;
-use safetensors::{Dtype, SafeTensors};
+use safetensors::{Dtype, SafeTensorError, SafeTensors};
 use sha2::{Digest, Sha256};
 use thiserror::Error;
 
@@ -28,10 +28,11 @@ pub const VERSION: &str = "version";
 pub const RECIPE: &str = "recipe";
 
 /// Metadata key of the checksum.
-const CHECKSUM: &str = "sha256";
+pub(crate) const CHECKSUM: &str = "sha256";
 
 /// Why weights cannot be used.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum WeightsError {
     /// The file cannot be read.
     #[error("{file}: {source}")]
@@ -172,6 +173,14 @@ pub enum WeightsError {
         /// The network.
         model: String,
     },
+    /// This build was made without the weights of the baselines.
+    #[error(
+        "this build has no weights of {model}: build with the feature `baselines`, or name a file of weights"
+    )]
+    LeftOut {
+        /// The network.
+        model: String,
+    },
     /// A number in the metadata is missing, not a number, or out of range.
     #[error("{file}: metadata {key} is {found}, expected {expected}")]
     Number {
@@ -212,6 +221,20 @@ pub struct Weights {
     tensors: BTreeMap<String, Array>,
 }
 
+fn unreadable(label: &str, error: &SafeTensorError) -> WeightsError {
+    WeightsError::Format { file: label.to_owned(), reason: error.to_string() }
+}
+
+/// Length of the header of a safetensors file in bytes, and the file's metadata.
+pub(crate) fn header(
+    label: &str,
+    bytes: &[u8],
+) -> Result<(usize, BTreeMap<String, String>), WeightsError> {
+    let (length, header) =
+        SafeTensors::read_metadata(bytes).map_err(|error| unreadable(label, &error))?;
+    Ok((length, header.metadata().iter().flatten().map(|(k, v)| (k.clone(), v.clone())).collect()))
+}
+
 impl Weights {
     /// Empty weights. `label` names them in errors.
     pub fn new(label: &str) -> Self {
@@ -241,12 +264,10 @@ impl Weights {
     /// # Errors
     /// As [`Weights::read`].
     pub fn parse(label: &str, bytes: &[u8]) -> Result<Self, WeightsError> {
-        let format = |reason: String| WeightsError::Format { file: label.to_owned(), reason };
-        let file = SafeTensors::deserialize(bytes).map_err(|e| format(e.to_string()))?;
-        let (header, metadata) =
-            SafeTensors::read_metadata(bytes).map_err(|e| format(e.to_string()))?;
+        let file = SafeTensors::deserialize(bytes).map_err(|e| unreadable(label, &e))?;
+        let (header, metadata) = header(label, bytes)?;
         let mut weights = Self::new(label);
-        weights.metadata.extend(metadata.metadata().clone().unwrap_or_default());
+        weights.metadata = metadata;
         if let Some(expected) = weights.metadata.remove(CHECKSUM) {
             // The header's length, eight bytes, is before the header.
             let found = checksum(&bytes[size_of::<u64>() + header..]);

@@ -12,6 +12,7 @@ from safetensors import safe_open
 from safetensors.torch import save_file
 
 LARGE_BYTES = 1 << 20
+BASELINES = ("gan", "ancestral")
 
 
 def main(source, out):
@@ -21,7 +22,8 @@ def main(source, out):
             tensors = {name: file.get_tensor(name) for name in file.keys()}
         if path.stat().st_size > LARGE_BYTES:
             tensors = {name: tensor.to(torch.float16) for name, tensor in tensors.items()}
-        target = Path(out) / path.name
+        folder = Path(out) / ("baselines" if path.stem in BASELINES else "")
+        target = folder / path.name
         save_file(tensors, target, metadata)
         raw = target.read_bytes()
         header = 8 + int.from_bytes(raw[:8], "little")

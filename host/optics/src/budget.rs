@@ -35,6 +35,7 @@ const LIGHT_M_PER_S: f64 = 299_792_458.0;
 
 /// Why a budget cannot be computed.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum BudgetError {
     /// A setting is outside its physical range.
     #[error("photon budget: {name} is {value}, expected {expected}")]

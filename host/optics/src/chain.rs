@@ -55,6 +55,7 @@ const fn gains() -> [f64; 32] {
 
 /// Why a receiver with these settings is not possible.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum ChainError {
     /// A setting is outside its range.
     #[error("receiver: {name} is {value}, expected {expected}")]

@@ -23,6 +23,7 @@ pub const DEPTH_ZONES: usize = DEPTH_SIDE * DEPTH_SIDE;
 
 /// Why a depth sensor cannot be simulated.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum DepthError {
     /// The distance is outside the sensor's range.
     #[error("depth: distance is {0} mm, expected more than 0 and at most 65535")]

@@ -1,4 +1,4 @@
-//! Optics of the virtual camera: the light at the detector, and the ADC's reading of the light.
+#![doc = include_str!("../README.md")]
 //!
 //! The light takes one path through this crate, and each module is one stage of it:
 //!
@@ -29,27 +29,6 @@
 //!
 //! Light is counted in **electrons per ADC sample** from [`budget`] on, without rescaling. A weak
 //! signal stays weak; the gain is a setting.
-//!
-//! ```
-//! use nirspi_optics::{Budget, BudgetSettings, Chain, ChainSettings, LedArray, Projector, Scene};
-//!
-//! let scene = Scene::new(vec![1.0; 64 * 64], 64, 43.0)?;
-//! let projector = Projector::default();
-//! let distance_mm = 300.0;
-//! let footprint = projector.footprint(&scene, distance_mm)?;
-//! let budget = Budget::new(&BudgetSettings::default(), &projector, distance_mm)?;
-//!
-//! let mut settings = ChainSettings::default();
-//! settings.electrons_per_count = settings.auto_gain(&budget)?;
-//! settings.ambient_electrons = budget.ambient_electrons(footprint.mean());
-//! let mut chain = Chain::new(settings, 1)?;
-//! let mut leds = LedArray::new(&footprint, budget.electrons_per_led);
-//!
-//! let all_lit = leds.light(0, 0, true);
-//! let sample = chain.sample(all_lit);
-//! assert!(!sample.over_range);
-//! # Ok::<(), Box<dyn std::error::Error>>(())
-//! ```
 
 pub mod array;
 pub mod budget;

@@ -29,6 +29,7 @@ pub const IMAGINARY_INDICES: RangeInclusive<f64> = 0.0..=10.0;
 
 /// Why a sphere cannot be solved.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum MieError {
     /// A number is outside the checked range.
     #[error("Mie: {name} is {value}, expected {} to {}", allowed.start(), allowed.end())]

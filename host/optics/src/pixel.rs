@@ -23,6 +23,7 @@ use thiserror::Error;
 
 /// Why the budget of a pixel cannot be computed.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum PixelError {
     /// Light.
     #[error(transparent)]

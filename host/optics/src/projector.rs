@@ -26,6 +26,7 @@ const MAX_BLUR_FIELDS: f64 = 4.0;
 
 /// Why the projection cannot be computed.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum ProjectorError {
     /// A length is not positive and finite.
     #[error("projector: {name} is {value_mm} mm, expected a positive length")]

@@ -62,6 +62,7 @@ use thiserror::Error;
 
 /// Why the weather is not possible.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum RainError {
     /// A number is outside its physical or checked range.
     #[error("rain: {name} is {value}, expected {expected}")]

@@ -11,6 +11,7 @@ use thiserror::Error;
 
 /// Why the uniformity cannot be computed.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum RigError {
     /// There are fewer than two containers.
     #[error("rain simulator: {0} collected volumes, expected at least 2")]

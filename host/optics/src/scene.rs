@@ -11,6 +11,7 @@ use thiserror::Error;
 
 /// Why a reflectance map is not a scene.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum SceneError {
     /// The number of values does not fit a square with this side.
     #[error(

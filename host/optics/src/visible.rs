@@ -32,6 +32,7 @@ const LOOKS: usize = 8;
 
 /// Why the picture cannot be computed.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum VisibleError {
     /// Scene or distance.
     #[error(transparent)]

@@ -1,4 +1,4 @@
-//! Single-pixel reconstruction: from measurements to an image.
+#![doc = include_str!("../README.md")]
 //!
 //! Every function is a pure function of its arguments: no file, no clock, no thread that outlives a
 //! call. Random numbers come from a seed that is an argument or a constant.
@@ -15,21 +15,6 @@
 //! | [`reconstruct`] | measurements | an image |
 //! | [`metrics`] | two images | a number that compares them |
 //! | [`backend`] | the name of a backend | a [`Backend`] |
-//!
-//! ```
-//! use nirspi_recon::{Measurements, Order, Rows, Side, reconstruct};
-//!
-//! let side = Side::new(8)?;
-//! // A scene, and its measurements.
-//! let mut d: Vec<f64> = (0..64).map(|p| if p % 8 > 3 { 1.0 } else { 0.0 }).collect();
-//! nirspi_recon::fwht(&mut d)?;
-//! let all = Measurements::from_differential(&Rows::natural(side), &d)?;
-//! // A quarter of the patterns is enough for a coarse scene, if it is the coarse quarter.
-//! let quarter = all.take(Some(&Order::CakeCutting), 0.25)?;
-//! let image = reconstruct::hadamard(&quarter);
-//! assert!((image.pixels()[3]).abs() < 1e-6 && (image.pixels()[4] - 1.0).abs() < 1e-6);
-//! # Ok::<(), Box<dyn std::error::Error>>(())
-//! ```
 
 pub mod backend;
 pub mod basis;

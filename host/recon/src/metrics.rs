@@ -16,6 +16,7 @@ use thiserror::Error;
 
 /// Why no metric is defined for two images.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum MetricError {
     /// A slice is not `width * height` long.
     #[error("the {which} image has {found} pixels, expected {width} x {height}")]

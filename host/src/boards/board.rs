@@ -1,5 +1,4 @@
-//! One board, as described in `boards/NAME/board.toml`. The library and its build script both use
-//! this file, so a wrong `board.toml` stops the build.
+//! One board, as described in `boards/NAME/board.toml`.
 //!
 //! `board.toml` is TOML of the simplest form, which a shell script can read too
 //! (`boards/facts.sh`): one `key = value` a line. A value is a `"text"` or a whole number. A

@@ -56,6 +56,7 @@ pub struct Settling {
 
 /// Why a burst gives no calibration.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum CalibrationError {
     /// The session with the camera ended.
     #[error(transparent)]

@@ -248,6 +248,7 @@ impl Records {
 
 /// Why a file cannot be read as a recording.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum RecordingError {
     /// The file cannot be read.
     #[error("{path}: cannot read the recording")]

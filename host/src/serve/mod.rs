@@ -39,6 +39,7 @@ use tokio::sync::watch;
 
 /// Why serving ended without a request of the user.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum ServeError {
     /// The camera could not measure.
     #[error(transparent)]

@@ -39,6 +39,7 @@ pub struct Change {
 
 /// Why a change is refused.
 #[derive(Debug, Error, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum ChangeError {
     /// The method does not exist.
     #[error("method is {found:?}, expected {}", alternatives(.offered))]

@@ -7,6 +7,7 @@ use thiserror::Error;
 
 /// Why a session ended.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum SessionError {
     /// The link failed.
     #[error("the link to the camera failed")]

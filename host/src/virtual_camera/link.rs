@@ -23,6 +23,11 @@ impl<F: SimulatedFpga, G: GatewareLoader> MemoryLink<F, G> {
     pub fn new(camera: VirtualCamera<F, G>) -> Self {
         Self { camera }
     }
+
+    /// Tells the camera that its host has gone.
+    pub fn unplug(&mut self) {
+        self.camera.link_closed();
+    }
 }
 
 impl<F: SimulatedFpga, G: GatewareLoader + Send> Link for MemoryLink<F, G> {

@@ -26,6 +26,7 @@ pub struct VirtualOptics {
 
 /// Why optics cannot be built.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum VirtualOpticsError {
     /// The distance or the lens is out of range.
     #[error(transparent)]
@@ -158,7 +159,7 @@ impl VirtualOptics {
             let camera = CameraModel {
                 name: paper.name.clone(),
                 light: paper.light,
-                weather: paper.weather,
+                weather: paper.weather.clone(),
                 ..camera.clone()
             };
             // Gain and daylight depend on distance and scene, and change neither latency nor
@@ -371,7 +372,7 @@ mod tests {
         let near = of("", Scene::white(), 300.0);
         assert_eq!(near, "virtual-3");
         assert_eq!(near, of("", Scene::new(vec![0.1], 1, 10.0).unwrap(), 700.0));
-        let dusk = "name = \"dusk\"\n[light]\nilluminance_klx = 0.1\n[weather]\nrain = \"heavy\"";
+        let dusk = "name = \"dusk\"\n[light]\nilluminance_klx = 0.1\n[weather]\nair = \"fog:5m\"";
         assert_eq!(near, of(dusk, Scene::white(), 300.0));
         let mut serials = vec![near];
         for toml in [

@@ -1,7 +1,7 @@
 //! Tests that gateware arrives in order and whole, or not at all.
 
 use super::support::*;
-use nirspi_wire::{Answer, Command, GatewareChunk, Refusal, State, crc32};
+use nirspi_wire::{Answer, Command, GatewareChunk, Refusal, State, crc32, version};
 use std::vec::Vec;
 
 fn bitstream() -> Vec<u8> {
@@ -111,6 +111,32 @@ fn an_absent_fpga_can_be_given_its_gateware() {
     bench.ask(Command::LoadGateware(chunk(&data, 0, 1000))).unwrap();
     bench.fpga.reset();
     assert_eq!(bench.ask(Command::Configure(SMALL)), Ok(Answer::Done));
+}
+
+#[test]
+fn a_bitstream_goes_on_where_a_lost_link_stopped_it() {
+    let data = bitstream();
+    let mut bench = Bench::open();
+    bench.ask(Command::LoadGateware(chunk(&data, 0, 500))).unwrap();
+    bench.close_link();
+    bench.ask(Command::Hello { protocol: version::CURRENT }).unwrap();
+    // A piece that cannot be the next one asks for the next one.
+    let question = bench.ask(Command::LoadGateware(chunk(&data, 1000, 0)));
+    assert_eq!(question, Err(Refusal::GatewareOffset { expected: 500 }));
+    let end = bench.ask(Command::LoadGateware(chunk(&data, 500, 500)));
+    assert_eq!(end, Ok(Answer::Gateware { next_offset: 1000 }));
+    assert_eq!((bench.loader.data, bench.loader.finished), (data, 1));
+}
+
+#[test]
+fn with_no_host_the_fpga_is_checked_in_the_middle_of_a_bitstream_too() {
+    let data = bitstream();
+    let mut bench = Bench::open();
+    bench.ask(Command::LoadGateware(chunk(&data, 0, 500))).unwrap();
+    bench.close_link();
+    bench.fpga.identity = 0;
+    bench.after(1_000_000);
+    assert_eq!(bench.camera.state(), State::Fault);
 }
 
 #[test]

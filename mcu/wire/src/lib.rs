@@ -1,4 +1,4 @@
-//! The contract of the camera: everything that crosses a boundary between two machines.
+#![doc = include_str!("../README.md")]
 //!
 //! * [`message`]: commands of the host, replies and stream of the device,
 //! * [`version`]: versions of the protocol, and the rules by which it grows,

@@ -3,7 +3,7 @@
 use crate::bench::{Bench, first_bytes};
 use std::process::{Command, Stdio};
 
-const COMMANDS: [&str; 19] = [
+const COMMANDS: [&str; 22] = [
     "demo",
     "reconstruct",
     "capture",
@@ -14,6 +14,9 @@ const COMMANDS: [&str; 19] = [
     "selftest",
     "flash",
     "gateware",
+    "update",
+    "completions",
+    "man",
     "setup",
     "upscale",
     "deblur",
@@ -37,8 +40,19 @@ fn every_command_explains_itself_with_an_example() {
     }
     let help = bench.run(&["--help"]).succeeded().stdout;
     assert!(COMMANDS.iter().all(|command| help.contains(command)), "{help}");
-    let version = bench.run(&["--version"]).succeeded().stdout;
+    let version = bench.run(&["-V"]).succeeded().stdout;
     assert_eq!(version, format!("nirspi {}\n", env!("CARGO_PKG_VERSION")));
+}
+
+#[test]
+fn the_long_version_says_which_build_this_is() {
+    let said = Bench::new().run(&["--version"]).succeeded().stdout;
+    assert!(said.starts_with(&format!("nirspi {}\ncommit: ", env!("CARGO_PKG_VERSION"))), "{said}");
+    assert!(said.contains("\nprotocol: versions 1 to ") && said.contains("\nfeatures: "), "{said}");
+    for network in ["estimator", "fsrcnn", "diffusion", "classifier"] {
+        let line = said.lines().find(|line| line.trim().starts_with(network)).unwrap();
+        assert_eq!(line.split(' ').next_back().unwrap().len(), 64, "{line}");
+    }
 }
 
 #[test]

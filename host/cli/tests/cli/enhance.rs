@@ -139,8 +139,9 @@ fn what_is_no_image_for_the_networks_gets_one_line_and_nothing_is_written() {
 fn weights_of_another_network_are_refused() {
     let bench = Bench::new();
     bench.write("in.npy", &npy::encode(&[32, 32], &bar(32)));
-    let classifier = include_bytes!("../../../nets/weights/classifier.safetensors");
-    bench.write("classifier.safetensors", classifier);
+    let classifier = nirspi_nets::Weights::embedded("classifier").unwrap();
+    let classifier = classifier.to_bytes(nirspi_nets::weights::Precision::Half).unwrap();
+    bench.write("classifier.safetensors", &classifier);
     bench
         .run(&["upscale", "in.npy", "--weights", "classifier.safetensors", "--out", "out.npy"])
         .failed(2, &["classifier.safetensors", "network classifier", "expected fsrcnn"]);

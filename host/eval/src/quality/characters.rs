@@ -6,6 +6,7 @@
 
 use crate::error::{EvalError, On, Result};
 use nirspi::files::characters;
+use nirspi_nets::HELD_OUT;
 use nirspi_nets::data::Stack;
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
@@ -13,9 +14,6 @@ use rand_pcg::Pcg64Mcg;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
-
-/// Groups that were held out from training the embedded weights, by the stack's name.
-const HELD_OUT: &str = include_str!("../../../nets/weights/held_out.json");
 
 /// The least number of images of a stack, because a distance of sets needs two.
 const LEAST: usize = 2;

@@ -57,6 +57,7 @@ pub trait Degrade: Sync {
 
 /// Why a scene cannot be degraded. `Display` is one line.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum DegradeError {
     /// The scene is not 64 x 64.
     #[error("a scene of {found} pixels, expected 64 x 64")]

@@ -19,6 +19,7 @@ use crate::weights::{Weights, WeightsError};
 
 /// Why images on a device cannot be enhanced there.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum DeviceEnhancerError {
     /// The networks run on the processor.
     #[error("the networks are on the processor, expected a GPU")]

@@ -18,6 +18,7 @@ use thiserror::Error;
 
 /// Why two sets have no distance.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum FrechetError {
     /// A set has fewer than two images, so it has no covariance.
     #[error("the {which} set has {found} images, expected at least 2")]

@@ -7,7 +7,8 @@ use super::{CameraModel, SHIPPED};
 use crate::SIDE;
 use crate::instrument::{FULL_SCALE_COUNTS, MAX_ADC_LATENCY_CLOCKS};
 use crate::lamp::LightSource;
-use crate::rain::Rainfall;
+use crate::rain::{Air, AirError};
+use std::str::FromStr;
 use thiserror::Error;
 use toml::{Table, Value};
 
@@ -59,6 +60,7 @@ pub(super) const RANGES: &[(&str, f64, f64)] = &[
 
 /// Why a text is not a camera description. `Display` is one line.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum CameraModelError {
     /// The text is not TOML.
     #[error("line {line}: {reason}, expected TOML such as `power_mw = 4.0`")]
@@ -208,13 +210,12 @@ fn check_value(key: &str, found: &Value) -> Result<(), CameraModelError> {
             }
             true
         }
-        ("weather.rain", ..) => {
-            let name = found.as_str().unwrap_or_default();
-            if Rainfall::ALL.iter().all(|rain| rain.name() != name) {
-                return Err(value(key, found, Rainfall::ALL.map(Rainfall::name).join(", ")));
-            }
-            true
-        }
+        ("weather.air", ..) => match Air::from_str(found.as_str().unwrap_or_default()) {
+            Ok(_) => true,
+            Err(AirError::Unknown { .. }) => return Err(value(key, found, Air::EXPECTED)),
+            Err(AirError::Numbers(error)) => return Err(value(key, found, error.expected)),
+            Err(error) => return Err(value(key, found, format!("possible weather ({error})"))),
+        },
         ("leds.dead", ..) => found.as_array().is_some_and(|leds| leds.iter().all(is_place)),
         _ => true,
     };

@@ -15,7 +15,7 @@ pub use file::CameraModelError;
 
 use crate::Projector;
 use crate::lamp::LightSource;
-use crate::rain::Rainfall;
+use crate::rain::Air;
 use serde::{Deserialize, Serialize};
 use std::sync::LazyLock;
 
@@ -53,7 +53,7 @@ pub struct CameraModel {
     pub readout: Readout,
     /// The light on the target besides the LEDs.
     pub light: Light,
-    /// The rain between camera and target.
+    /// The weather between camera and target.
     pub weather: WeatherSection,
     /// The time-of-flight sensor.
     pub tof: TofSensor,
@@ -159,12 +159,12 @@ pub struct Light {
     pub illuminance_klx: f64,
 }
 
-/// The rain between camera and target.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+/// The weather between camera and target.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WeatherSection {
-    /// Dry air or the paper's rain.
-    pub rain: Rainfall,
+    /// Dry air, rain, fog, smoke, dust, drops on the window.
+    pub air: Air,
 }
 
 /// The time-of-flight sensor of 8 x 8 zones.

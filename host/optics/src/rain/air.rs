@@ -5,6 +5,7 @@ use super::law::numbers_between;
 use super::{DropLaw, Drops, Medium, ParseDropLawError, RainError, Rainfall, Weather, Window};
 use crate::mie::Index;
 use crate::substance::Substance;
+use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;
@@ -39,7 +40,10 @@ const DUST_G_PER_CM3: f64 = 2.6;
 const DUST_INDEX: Index = Index { real: 1.53, imaginary: 0.003 };
 
 /// The particles in the air, and the window in front of the camera.
-#[derive(Debug, Clone, PartialEq)]
+///
+/// As text, in a camera description or on the command line: [`Air::EXPECTED`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
 pub struct Air {
     name: String,
     drops: Drops,
@@ -49,6 +53,7 @@ pub struct Air {
 
 /// Error: the text does not name a weather. `Display` is one line.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum AirError {
     /// The kind does not exist.
     #[error("found {found}, expected {}", Air::EXPECTED)]
@@ -244,6 +249,20 @@ impl Default for Air {
 impl fmt::Display for Air {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.name)
+    }
+}
+
+impl From<Air> for String {
+    fn from(air: Air) -> Self {
+        air.name
+    }
+}
+
+impl TryFrom<String> for Air {
+    type Error = AirError;
+
+    fn try_from(text: String) -> Result<Self, AirError> {
+        text.parse()
     }
 }
 

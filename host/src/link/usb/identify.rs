@@ -108,6 +108,7 @@ pub fn check_version(oldest: u16) -> Result<(), UsbError> {
 
 /// Why a USB camera cannot be used.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum UsbError {
     /// The camera is not connected.
     #[error("{}", none(.wanted.as_deref(), .there))]

@@ -1,0 +1,40 @@
+# Short names for what contributors do most. `just` lists them (https://just.systems); each is one
+# command that works without `just` too.
+
+[private]
+default:
+    @just --list
+
+# Show what the camera does, without hardware
+demo *args:
+    cargo run --release --locked -- demo {{ args }}
+
+# Run every test but those of the RTL
+test *args:
+    cargo test --locked {{ args }}
+
+# Format Rust
+format:
+    cargo fmt
+
+# Lint what `test` builds
+lint:
+    cargo clippy --locked --all-targets -- -D warnings
+
+# Write the generated parts of the documentation again
+bless:
+    NIRSPI_BLESS=1 cargo test --locked -p nirspi-wire
+    NIRSPI_BLESS=1 cargo test --locked --test boards --test glossary
+    NIRSPI_BLESS=1 cargo test --locked --test cli reference
+
+# Build the book (needs mdBook) into target/book
+book:
+    mdbook build docs
+
+# Build a board's firmware, or every board's
+firmware *board:
+    bash boards/build.sh {{ board }}
+
+# Run steps of CI; without a name, all of them. `just ci --list` says what each one needs
+ci *steps:
+    bash .ci/run {{ steps }}

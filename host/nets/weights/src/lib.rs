@@ -1,0 +1,13 @@
+#![doc = include_str!("../README.md")]
+#![no_std]
+
+/// Each network's name and the bytes of its safetensors file.
+pub const FILES: [(&str, &[u8]); 4] = [
+    ("estimator", include_bytes!("../estimator.safetensors")),
+    ("fsrcnn", include_bytes!("../fsrcnn.safetensors")),
+    ("diffusion", include_bytes!("../diffusion.safetensors")),
+    ("classifier", include_bytes!("../classifier.safetensors")),
+];
+
+/// JSON lists of the font families, writers and photographs that no training has seen.
+pub const HELD_OUT: &str = include_str!("../held_out.json");
