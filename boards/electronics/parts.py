@@ -67,7 +67,7 @@ PARTS: dict[str, Kind] = {
                     ("8", "VOUT2", "PASSIVE"), ("9", "PAD", "PWRIN"))),
     "fet": Kind("Q", "BSS138", "onsemi", "BSS138", "SOT-23", "Package_TO_SOT_SMD:SOT-23",
                 (("1", "G", "INPUT"), ("2", "S", "PASSIVE"), ("3", "D", "PASSIVE"))),
-    "led": Kind("D", "LED 1550 nm, 50 mA", "Thorlabs, for example", "LED1550L", "TO-18", "LED_THT:LED_D5.0mm",
+    "led": Kind("D", "LED 1550 nm, 50 mA", "Thorlabs, for example", "LED1550L", "TO-18", "Package_TO_SOT_THT:TO-18-2_Lens",
                 passive("A", "K"), TO_FIND),
     "r27": Kind("R", "27 ohm 1 %", YAGEO, "RC0603FR-0727RL", *R0603, TWO),
     "r10": Kind("R", "10 ohm 1 %", YAGEO, "RC0402FR-0710RL", *R0402, TWO),
