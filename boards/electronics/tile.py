@@ -4,7 +4,7 @@
     python3 boards/electronics/tile.py           # check; exit 1 if a rule is broken or a written file is stale
     python3 boards/electronics/tile.py --write   # also write tile.net.txt and bom.csv
 
-Computed, never built. target/electronics/tile.net is the netlist for KiCad's layout editor.
+Computed, never built. target/electronics/tile.net is the netlist in KiCad's format.
 The checks test themselves: faults are made in the netlist, one at a time, and each must be seen.
 """
 
