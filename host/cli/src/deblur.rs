@@ -6,9 +6,11 @@ use super::networks::{ImageArgs, checked};
 use super::progress::Progress;
 use super::report::stages;
 use anyhow::Result;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use nirspi::files::stack::ImageStack;
 use nirspi::imaging::Deblurring;
 use nirspi_nets::classical;
+use nirspi_nets::deblur::Model;
 use nirspi_nets::{Images, KnownEstimate, Method, Options, deblur};
 use std::num::NonZeroU32;
 use std::path::PathBuf;
@@ -27,44 +29,46 @@ pub struct Args {
     #[command(flatten)]
     sharpening: Sharpening,
     /// The network or method that deblurs
-    #[arg(long, value_enum, default_value_t = Model::Diffusion)]
-    model: Model,
+    #[arg(long, value_parser = Way::parser(), default_value = Model::ALL[0].name())]
+    model: Way,
     /// Steps of the network, 1 to 500 [default: 1 for diffusion, 500 for ancestral]
-    #[arg(long, value_name = "S", value_parser = clap::value_parser!(u32).range(1..=500))]
-    steps: Option<u32>,
+    #[arg(long, value_name = "S")]
+    steps: Option<NonZeroU32>,
     #[command(flatten)]
     images: ImageArgs,
 }
 
-/// What deblurs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Model {
-    /// A diffusion network that goes from the blurred image to the sharp one in few steps
-    Diffusion,
-    /// The paper's diffusion network of 500 steps
-    Ancestral,
-    /// The generator of a generative adversarial network
-    Gan,
-    /// Wiener's filter
-    Wiener,
-    /// Richardson-Lucy deconvolution
-    Rl,
-    /// Deconvolution with least total variation
-    Tv,
-}
-
-/// How the model deblurs.
+/// How to deblur: by a network of the library's list, or by a classical method.
+#[derive(Debug, Clone, Copy)]
 enum Way {
     Network(Method),
     Classical(classical::Method),
 }
 
 impl Way {
-    fn name(&self) -> &'static str {
+    fn all() -> impl Iterator<Item = Self> {
+        let networks = Model::ALL.into_iter().map(|model| Self::Network(model.into()));
+        networks.chain(classical::Method::ALL.into_iter().map(Self::Classical))
+    }
+
+    fn name(self) -> &'static str {
         match self {
-            Self::Network(method) => method.model(),
+            Self::Network(method) => method.model().name(),
             Self::Classical(method) => method.name(),
         }
+    }
+
+    fn about(self) -> &'static str {
+        match self {
+            Self::Network(method) => method.model().about(),
+            Self::Classical(method) => method.about(),
+        }
+    }
+
+    fn parser() -> impl TypedValueParser<Value = Self> {
+        let values = Self::all().map(|way| PossibleValue::new(way.name()).help(way.about()));
+        let named = |found: String| Self::all().find(|way| way.name() == found);
+        PossibleValuesParser::new(values).try_map(move |found| named(found).ok_or("unknown"))
     }
 }
 
@@ -90,6 +94,11 @@ pub struct Sharpening {
     /// error that the network makes every time does not show in this number
     #[arg(long, value_name = "FILE")]
     spread: Option<PathBuf>,
+}
+
+/// A network with the steps that --steps asks for.
+pub fn in_steps(model: Model, steps: Option<NonZeroU32>) -> Result<Method> {
+    Method::new(model, steps).map_err(|error| Usage(format!("--steps: {error}")).into())
 }
 
 /// Number of simulated measurements for the spread.
@@ -124,23 +133,15 @@ impl Sharpening {
 }
 
 impl Args {
+    /// What the arguments ask for, together.
     fn way(&self) -> Result<Way> {
-        let only =
-            |flag: &str, whose: &str| Err(Usage(format!("{flag} belongs to {whose}")).into());
-        let steps =
-            |default| NonZeroU32::new(self.steps.unwrap_or(default)).unwrap_or(NonZeroU32::MIN);
-        Ok(match self.model {
-            Model::Diffusion => Way::Network(Method::Diffusion { steps: steps(1) }),
-            Model::Ancestral => Way::Network(Method::Ancestral { steps: steps(500) }),
-            _ if self.steps.is_some_and(|steps| steps > 1) => {
-                return only("--steps", "diffusion and ancestral");
-            }
-            Model::Gan => Way::Network(Method::Gan),
-            _ if self.sharpening.spread.is_some() => return only("--spread", "networks"),
-            Model::Wiener => Way::Classical(classical::Method::Wiener),
-            Model::Rl => Way::Classical(classical::Method::RichardsonLucy),
-            Model::Tv => Way::Classical(classical::Method::TotalVariation),
-        })
+        let only = |flag: &str| Err(Usage(format!("{flag} belongs to networks")).into());
+        match self.model {
+            Way::Network(method) => Ok(Way::Network(in_steps(method.model(), self.steps)?)),
+            Way::Classical(_) if self.steps.is_some_and(|steps| steps.get() > 1) => only("--steps"),
+            Way::Classical(_) if self.sharpening.spread.is_some() => only("--spread"),
+            way => Ok(way),
+        }
     }
 }
 
@@ -154,7 +155,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let bar = Progress::of("deblurring", input.count(), "images");
     let (networks, result) = match way {
         Way::Network(method) => {
-            let mut networks = args.images.networks.open(&["estimator", method.model()])?;
+            let model = method.model().name();
+            let mut networks = args.images.networks.open(&["estimator", model])?;
             let sharpener = times.time("load", || networks.sharpener(method))?;
             let result = times
                 .time("deblur", || sharpener.deblur(images, &options, &mut |done| bar.set(done)))?;
@@ -176,7 +178,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let shown = target.write_and_show(deblur::SIDE, &result.images, "deblurred")?;
 
     let (steps, consistency) = match way {
-        Way::Network(method) => (method.steps(), options.consistency),
+        Way::Network(method) => (method.steps().get(), options.consistency),
         Way::Classical(_) => (1, false),
     };
     let deblurring = Deblurring::of(way.name(), steps, consistency, options.seed, &result);

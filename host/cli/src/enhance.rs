@@ -1,6 +1,6 @@
 //! `nirspi enhance`: fusion and deblurring, from the camera's 32 x 32 to the 64 x 64 output.
 
-use super::deblur::Sharpening;
+use super::deblur::{Sharpening, in_steps};
 use super::networks::{ImageArgs, checked};
 use super::print;
 use super::progress::Progress;
@@ -8,7 +8,8 @@ use super::report::stages;
 use super::upscale::DepthArgs;
 use anyhow::Result;
 use nirspi::imaging::{Deblurring, StackReport};
-use nirspi_nets::{Images, Method, fusion};
+use nirspi_nets::deblur::Model;
+use nirspi_nets::{Images, fusion};
 use nirspi_recon::words::count_of;
 use std::num::NonZeroU32;
 use std::process::ExitCode;
@@ -36,7 +37,7 @@ pub struct Args {
 
 pub fn run(args: &Args) -> Result<ExitCode> {
     let options = args.sharpening.options()?;
-    let method = Method::Diffusion { steps: args.steps };
+    let method = in_steps(Model::DIFFUSION, Some(args.steps))?;
     let mut times = stages();
     let input = times.time("read", || args.images.read(fusion::SIDE))?;
     let images: Images<'_, { fusion::SIDE }> = checked(&input)?;

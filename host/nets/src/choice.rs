@@ -5,7 +5,6 @@
 //! A user's file is used for the network that the file names, or refused, so no network runs with
 //! weights of another network (`tests::a_file_is_taken_for_the_network_that_it_names_or_refused`).
 
-use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
@@ -126,7 +125,7 @@ impl Networks {
     /// As [`weights`](Self::weights).
     pub fn sharpener(&mut self, method: Method) -> Result<Sharpener, WeightsError> {
         let estimator = self.estimator()?;
-        let weights = self.weights(method.model())?;
+        let weights = self.weights(method.model().name())?;
         Ok(Sharpener::new(estimator, Deblurrer::new(&self.device, &weights, method)?))
     }
 
@@ -166,8 +165,7 @@ impl Enhancer {
     /// # Errors
     /// [`WeightsError::Checksum`] if the embedded weights are damaged.
     pub fn built_in(device: &Device) -> Result<Self, WeightsError> {
-        let method = Method::Diffusion { steps: NonZeroU32::MIN };
-        Networks::built_in(device.clone()).enhancer(method)
+        Networks::built_in(device.clone()).enhancer(Method::default())
     }
 }
 

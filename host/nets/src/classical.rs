@@ -47,6 +47,18 @@ impl Method {
     }
 }
 
+impl Method {
+    /// One line about the method.
+    #[must_use]
+    pub fn about(self) -> &'static str {
+        match self {
+            Self::Wiener => "Wiener's filter",
+            Self::RichardsonLucy => "Richardson-Lucy deconvolution",
+            Self::TotalVariation => "Deconvolution with least total variation",
+        }
+    }
+}
+
 impl fmt::Display for Method {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())

@@ -10,6 +10,7 @@
 mod ancestral;
 mod bridge;
 mod constraint;
+mod model;
 mod sharpen;
 
 use std::num::NonZeroU32;
@@ -21,6 +22,8 @@ use crate::weights::{Weights, WeightsError};
 
 pub use ancestral::Schedule;
 pub(crate) use constraint::DataConstraint;
+use model::PathKind;
+pub use model::{Method, MethodError, Model};
 use sharpen::Residual;
 pub use sharpen::{Blurred, Sharpen, SharpenError};
 
@@ -28,43 +31,6 @@ pub use sharpen::{Blurred, Sharpen, SharpenError};
 pub const SIDE: usize = 64;
 
 pub(crate) const AREA: usize = SIDE * SIDE;
-
-/// A network for deblurring, and how to use it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Method {
-    /// The bridge from the degraded image to the sharp one (model `diffusion`), with this number of
-    /// steps.
-    Diffusion {
-        /// Number of steps; 1 to 4 are useful.
-        steps: NonZeroU32,
-    },
-    /// The ancestral sampler (model `ancestral`), with this number of its 500 steps.
-    Ancestral {
-        /// 1 to 500.
-        steps: NonZeroU32,
-    },
-    /// The GAN's generator (model `gan`), in one step.
-    Gan,
-}
-
-impl Method {
-    /// The name of the method's weights.
-    pub fn model(self) -> &'static str {
-        match self {
-            Self::Diffusion { .. } => "diffusion",
-            Self::Ancestral { .. } => "ancestral",
-            Self::Gan => "gan",
-        }
-    }
-
-    /// Number of calls of the network for one image.
-    pub fn steps(self) -> u32 {
-        match self {
-            Self::Diffusion { steps } | Self::Ancestral { steps } => steps.get(),
-            Self::Gan => 1,
-        }
-    }
-}
 
 /// A batch of images to deblur.
 #[derive(Debug, Clone, Copy)]
@@ -96,12 +62,11 @@ impl Deblurrer {
     /// # Errors
     /// [`WeightsError`] if the weights belong to another network.
     pub fn new(device: &Device, weights: &Weights, method: Method) -> Result<Self, WeightsError> {
-        weights.expect_model(method.model())?;
-        let (unet, batch) = (device.unet(weights)?, device.batch());
-        Ok(match method {
-            Method::Diffusion { steps } => Self::own(Box::new(Residual { unet, batch }), steps),
-            Method::Gan => Self::own(Box::new(Residual { unet, batch }), NonZeroU32::MIN),
-            Method::Ancestral { steps } => {
+        weights.expect_model(method.model().name())?;
+        let (unet, batch, steps) = (device.unet(weights)?, device.batch(), method.steps());
+        Ok(match method.model().path() {
+            PathKind::Bridge => Self::own(Box::new(Residual { unet, batch }), steps),
+            PathKind::Ancestral => {
                 let schedule = Schedule::of(weights)?;
                 Self { path: Path::Ancestral { network: unet, schedule, steps }, batch }
             }

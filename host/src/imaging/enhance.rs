@@ -7,7 +7,6 @@ use nirspi_nets::{
     MeasuredRowsError, Method, Networks, Options, Sharpener, WeightsError, deblur, fusion,
 };
 use nirspi_recon::{Image, Rows};
-use std::num::NonZeroU32;
 use thiserror::Error;
 
 /// The level of one pixel that sees a white target.
@@ -115,8 +114,7 @@ impl Enhance {
     /// # Errors
     /// [`WeightsError`] if the built-in weights are damaged.
     pub fn built_in(device: &Device) -> Result<Self, WeightsError> {
-        let method = Method::Diffusion { steps: NonZeroU32::MIN };
-        let second = Networks::built_in(device.clone()).sharpener(method)?;
+        let second = Networks::built_in(device.clone()).sharpener(Method::default())?;
         Ok(Self::of(Enhancer::built_in(device)?, second, device.clone()))
     }
 

@@ -1,10 +1,12 @@
 //! `nirspi bench enhance`: times the learned stages.
 
 use super::RunArgs;
+use crate::deblur::in_steps;
 use crate::print;
 use anyhow::Result;
 use nirspi_eval::bench::enhance::{Stages, Timed, time};
-use nirspi_nets::{Method, Options, UsedWeights};
+use nirspi_nets::deblur::Model;
+use nirspi_nets::{Options, UsedWeights};
 use serde::Serialize;
 use std::num::NonZeroU32;
 use std::process::ExitCode;
@@ -41,7 +43,7 @@ struct Report {
 pub fn run(args: &Args) -> Result<ExitCode> {
     let run = &args.run;
     let mut networks = run.networks.open(&["fsrcnn", "estimator", "diffusion"])?;
-    let method = Method::Diffusion { steps: args.steps };
+    let method = in_steps(Model::DIFFUSION, Some(args.steps))?;
     let stages = Stages {
         estimator: networks.estimator()?,
         fusion: networks.fusion()?,

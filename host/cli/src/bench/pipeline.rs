@@ -6,7 +6,6 @@ use anyhow::Result;
 use nirspi_eval::bench::pipeline::{Settings, Timed, Work, on_cpu};
 use nirspi_nets::{Method, Networks, UsedWeights};
 use serde::Serialize;
-use std::num::NonZeroU32;
 use std::process::ExitCode;
 
 /// Time all that the host does to many frames: orthogonal matching pursuit, estimate, fusion, deblurring
@@ -75,8 +74,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 
 /// The times on the networks' device, and whether the processor plays it.
 fn time(work: &Work, networks: &mut Networks) -> Result<(Timed, bool)> {
-    let method = Method::Diffusion { steps: NonZeroU32::MIN };
-    let enhancer = networks.enhancer(method)?;
+    let enhancer = networks.enhancer(Method::default())?;
     #[cfg(feature = "gpu")]
     if networks.device().backend() != nirspi_nets::Backend::Cpu {
         use anyhow::Context;

@@ -5,10 +5,11 @@
 //! does not come from more knowledge (`tests::only_classical_methods_get_the_condition`).
 
 use super::measure::{Condition, sampling_variance};
-use crate::error::Result;
+use crate::error::{EvalError, Result};
 use nirspi_nets::classical::{self, Method as Classical};
+use nirspi_nets::deblur::{self, Model};
 use nirspi_nets::weights::VERSION;
-use nirspi_nets::{Enhancer, Fusion, Images, Networks, Options, deblur, upscale_2x};
+use nirspi_nets::{Enhancer, Fusion, Images, Networks, Options, upscale_2x};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::num::NonZeroU32;
@@ -118,18 +119,19 @@ impl Contender {
     /// # Errors
     /// `EvalError` for weights that cannot be read.
     pub fn new(method: Method, networks: &mut Networks) -> Result<Self> {
-        let count = |steps| NonZeroU32::new(steps).unwrap_or(NonZeroU32::MIN);
-        let network = match method {
+        let (model, steps) = match method {
             Method::Lanczos | Method::Classical(_) => {
                 return Ok(Self { method, runner: Runner::None });
             }
             Method::Fusion => {
                 return Ok(Self { method, runner: Runner::Fusion(networks.fusion()?) });
             }
-            Method::Gan => deblur::Method::Gan,
-            Method::Diffusion(steps) => deblur::Method::Diffusion { steps: count(steps) },
-            Method::Ancestral(steps) => deblur::Method::Ancestral { steps: count(steps) },
+            Method::Gan => (Model::GAN, 1),
+            Method::Diffusion(steps) => (Model::DIFFUSION, steps),
+            Method::Ancestral(steps) => (Model::ANCESTRAL, steps),
         };
+        let network = deblur::Method::new(model, NonZeroU32::new(steps))
+            .map_err(|error| EvalError::Refused { name: "steps", why: error.to_string() })?;
         Ok(Self { method, runner: Runner::Chain(Box::new(networks.enhancer(network)?)) })
     }
 

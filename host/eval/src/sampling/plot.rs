@@ -37,6 +37,15 @@ pub(super) fn draw(report: &Report, orders: &[String], methods: &[String]) -> Rg
     below(&rows)
 }
 
+/// A method's gains over zero filling.
+struct Ranked<'a> {
+    method: &'a str,
+    /// In dB, over the shares.
+    mean: f64,
+    /// Share in percent, gain in dB.
+    points: Vec<(f64, f64)>,
+}
+
 /// The gain of the best methods of each order against the share.
 pub(super) fn charts(report: &Report, orders: &[String], methods: &[String]) -> Vec<Chart> {
     // Colours in the order in which methods appear, so that few orders have few colours.
@@ -54,7 +63,7 @@ pub(super) fn charts(report: &Report, orders: &[String], methods: &[String]) -> 
     let ends = [ticks[0], ticks.last().copied().unwrap_or(100.0)];
     let mut charts = Vec::new();
     for order in orders {
-        let mut ranked: Vec<(&str, f64, Vec<(f64, f64)>)> = Vec::new();
+        let mut ranked: Vec<Ranked> = Vec::new();
         for method in methods.iter().filter(|method| *method != ZERO_FILLING) {
             let of = |row: &&super::Row| row.order == *order && row.method == *method;
             let rows = report.rows.iter().filter(of);
@@ -63,13 +72,13 @@ pub(super) fn charts(report: &Report, orders: &[String], methods: &[String]) -> 
             gains.sort_by(|a, b| a.0.total_cmp(&b.0));
             if gains.iter().any(|gain| gain.1.abs() >= 0.005) {
                 let mean = gains.iter().map(|gain| gain.1).sum::<f64>() / gains.len() as f64;
-                ranked.push((method, mean, gains));
+                ranked.push(Ranked { method, mean, points: gains });
             }
         }
-        ranked.sort_by(|a, b| b.1.total_cmp(&a.1));
+        ranked.sort_by(|a, b| b.mean.total_cmp(&a.mean));
         ranked.truncate(LINES);
         let mut lines: Vec<Line> = Vec::new();
-        for (method, _, points) in ranked {
+        for Ranked { method, points, .. } in ranked {
             let known = coloured.iter().position(|name| *name == method);
             let colour = known.unwrap_or_else(|| {
                 coloured.push(method);

@@ -1,7 +1,7 @@
 //! Tests with the embedded weights.
 
 use super::*;
-use crate::deblur::Method;
+use crate::deblur::{Method, Model};
 use crate::device::Device;
 use crate::weights::Weights;
 
@@ -10,7 +10,7 @@ const SIDE: usize = 32;
 pub(super) fn enhancer(steps: u32) -> Enhancer {
     let device = Device::cpu();
     let weights = |model| Weights::embedded(model).unwrap();
-    let method = Method::Diffusion { steps: NonZeroU32::new(steps).unwrap() };
+    let method = Method::new(Model::DIFFUSION, NonZeroU32::new(steps)).unwrap();
     let deblurrer = Deblurrer::new(&device, &weights("diffusion"), method).unwrap();
     let estimator = BlurEstimator::new(&device, &weights("estimator")).unwrap();
     let fusion = Fusion::new(&device, &weights("fsrcnn")).unwrap();
