@@ -1,4 +1,4 @@
-# The steps of .ci/run: a list of `name  what it checks; what it needs`, and a function `step_NAME` for each.
+# The steps of .ci/run: lists of `name  what it checks; what it needs`, and a function `step_NAME` for each.
 # A step can run alone: what it needs of another step it makes itself.
 # shellcheck shell=bash disable=SC2034,SC2154
 
@@ -30,7 +30,12 @@ steps=(
     "proofs          LED safety, FIFO and crossing proven; PyPI"
     "electronics     circuits beside the simulator's constants, the LED tile's netlist; Debian's ngspice, PyPI"
     "place-route     place and route of the gateware, five seeds; PyPI"
-    "deb             the Debian package; crates.io, licences"
+)
+
+# Run by name alone: what a release needs and a change does not. Tools and builds of their own take half an hour.
+by_name=(
+    "licence-texts   the licences of all dependencies in one page; crates.io"
+    "deb             the Debian package; crates.io"
     "release-folder  the folder that nirspi update takes; firmware, place-route"
 )
 
@@ -123,6 +128,9 @@ step_licences() {
     else
         echo "skipped: advisories, no GitHub"
     fi
+}
+
+step_licence_texts() {
     tool cargo-about 0.9.3 --features cli
     cargo about generate --locked --fail --config .github/about.toml --manifest-path host/cli/Cargo.toml \
         --features flash --output-file target/licences.html .github/about.hbs
@@ -131,7 +139,7 @@ step_licences() {
 # What a package of the program contains beside it.
 step_deb() {
     tool cargo-deb 3.8.0
-    [ -f target/licences.html ] || step_licences
+    [ -f target/licences.html ] || step_licence_texts
     cargo build --locked --release --features flash
     local nirspi=target/release/nirspi shell
     "$nirspi" man target/package/man

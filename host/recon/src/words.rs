@@ -3,8 +3,8 @@
 /// A count with its noun: `1 atom`, `2 atoms`. The plural is the noun with an `s`.
 ///
 /// ```
-/// assert_eq!(nirspi_recon::words::count(1, "atom"), "1 atom");
-/// assert_eq!(nirspi_recon::words::count(0, "frame"), "0 frames");
+/// assert_eq!(nirspi_recon::words::count(1_u32, "atom"), "1 atom");
+/// assert_eq!(nirspi_recon::words::count(0_u64, "frame"), "0 frames");
 /// ```
 #[must_use]
 pub fn count(number: impl Into<u128>, noun: &str) -> String {

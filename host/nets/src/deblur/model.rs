@@ -39,7 +39,7 @@ impl Model {
     /// The bridge from the degraded image to the sharp one; 1 to 4 steps are useful.
     pub const DIFFUSION: Self = Self(&Entry {
         name: "diffusion",
-        about: "The bridge from the degraded image to the sharp one, in 1 to 4 steps",
+        about: "A diffusion network that goes from the blurred image to the sharp one in few steps",
         path: PathKind::Bridge,
         default_steps: count(1),
         most_steps: count(500),
@@ -48,7 +48,7 @@ impl Model {
     /// The paper's diffusion, sampled backwards.
     pub const ANCESTRAL: Self = Self(&Entry {
         name: "ancestral",
-        about: "The paper's diffusion from noise, in 500 steps",
+        about: "The paper's diffusion network of 500 steps",
         path: PathKind::Ancestral,
         default_steps: count(500),
         most_steps: count(500),
@@ -57,7 +57,7 @@ impl Model {
     /// The generator of a GAN.
     pub const GAN: Self = Self(&Entry {
         name: "gan",
-        about: "The generator of a GAN, in one step",
+        about: "The generator of a generative adversarial network",
         path: PathKind::Bridge,
         default_steps: count(1),
         most_steps: count(1),
