@@ -10,7 +10,7 @@ steps=(
     "gpu             GPU kernels on software Vulkan; Debian"
     "rtl             the gateware's RTL in the Veryl simulator, alone and in the whole camera"
     "features        the library alone, and with its features that bring the others"
-    "publish         each library crate builds from its package alone; crates.io"
+    "package         each library crate makes a package; crates.io"
     "licences        licences, sources and bans of all dependencies; crates.io"
     "training        networks on burn, and the commands that need it"
     "emulation       the firmware's budgets, and its machine code against the virtual camera; QEMU, firmware"
@@ -32,8 +32,9 @@ steps=(
     "place-route     place and route of the gateware, five seeds; PyPI"
 )
 
-# Run by name alone: what a release needs and a change does not. Tools and builds of their own take half an hour.
+# Run by name alone, by GitHub or for a release. Their tools and builds take half an hour.
 by_name=(
+    "publish         each library crate builds from its package alone; crates.io"
     "licence-texts   the licences of all dependencies in one page; crates.io"
     "deb             the Debian package; crates.io"
     "release-folder  the folder that nirspi update takes; firmware, place-route"
@@ -109,6 +110,9 @@ step_features() {
         cargo check --locked -p nirspi --no-default-features --features "$feature"
     done
 }
+
+# Without building from the packages, which takes ten minutes: `publish` does that.
+step_package() { cargo package --workspace --no-verify --locked; }
 
 step_publish() { cargo publish --workspace --dry-run --locked; }
 
