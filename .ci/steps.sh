@@ -112,7 +112,7 @@ step_features() {
 }
 
 # Without building from the packages, which takes ten minutes: `publish` does that.
-step_package() { cargo package --workspace --no-verify --locked; }
+step_package() { cargo publish --workspace --dry-run --no-verify --locked; }
 
 step_publish() { cargo publish --workspace --dry-run --locked; }
 
