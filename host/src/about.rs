@@ -54,9 +54,10 @@ impl fmt::Display for About {
         let unknown = "not known: a debug build, or built without git";
         writeln!(f, "commit: {}", self.commit.unwrap_or(unknown))?;
         writeln!(f, "protocol: versions {oldest} to {newest}")?;
-        let none = ["none of baselines, flash, gpu, hdf5, train"];
-        let features = if self.features.is_empty() { &none[..] } else { &self.features };
-        write!(f, "features: {}", features.join(", "))?;
+        match self.features.is_empty() {
+            true => write!(f, "features: none of {}", FEATURES.map(|(name, _)| name).join(", "))?,
+            false => write!(f, "features: {}", self.features.join(", "))?,
+        }
         #[cfg(feature = "enhance")]
         {
             write!(f, "\nweights, with the SHA-256 of their tensors:")?;

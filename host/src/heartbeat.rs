@@ -19,7 +19,7 @@ pub struct Heartbeat {
 impl Heartbeat {
     /// Calls `beat` once every `period`, with the time since the start.
     ///
-    /// If the system gives no thread, there is no beat, and the work goes on.
+    /// If the system cannot start a thread, the work goes on without signs of life.
     pub fn every(period: Duration, mut beat: impl FnMut(Duration) + Send + 'static) -> Self {
         let (alive, ended) = channel::<()>();
         let work = move || {

@@ -24,7 +24,7 @@ pub fn arranged(command: Command) -> Command {
         let heading = HEADINGS.iter().find(named).map(|(heading, _)| *heading);
         let arg = match heading {
             Some(heading) => arg.help_heading(heading),
-            // The heading of the group before is none of an argument without a dash.
+            // A positional argument does not stand under the heading of the group before it.
             None if arg.is_positional() => arg.help_heading(Resettable::Reset),
             None => arg,
         };

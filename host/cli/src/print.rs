@@ -53,7 +53,7 @@ pub fn complain(text: impl fmt::Display) {
     let _ = writeln!(io::stderr(), "nirspi: {text}");
 }
 
-/// Prints one line on stderr that is no error, unless the user wants none.
+/// Prints one line on stderr that is not an error. With --quiet the line is left out.
 pub fn remark(text: impl fmt::Display) {
     if !is_quiet() {
         complain(text);

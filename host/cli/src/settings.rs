@@ -269,8 +269,8 @@ fn in_words(error: &clap::Error, defaults: &Defaults) -> String {
 
 fn in_line(message: &str) -> String {
     let mut line = String::new();
-    let told = |text: &&str| !text.starts_with("Usage:") && !text.starts_with("For more");
-    for part in message.lines().map(str::trim).take_while(told).filter(|part| !part.is_empty()) {
+    let wanted = |text: &&str| !text.starts_with("Usage:") && !text.starts_with("For more");
+    for part in message.lines().map(str::trim).take_while(wanted).filter(|part| !part.is_empty()) {
         match line.chars().last() {
             None => {}
             Some(':') => line.push(' '),

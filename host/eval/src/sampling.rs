@@ -157,7 +157,7 @@ impl Report {
         self.shown.push(Shown { sampling, order: order.to_owned(), zero, best });
     }
 
-    /// PSNR of a method; NaN if there is none.
+    /// PSNR of a method; NaN if the study did not run the method.
     fn psnr_db(&self, share: f64, order: &str, method: &str) -> f64 {
         let sought =
             |row: &&Row| row.sampling == share && row.order == order && row.method == method;

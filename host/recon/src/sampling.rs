@@ -22,7 +22,7 @@ use thiserror::Error;
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
 pub struct Sampling(f64);
 
-/// What is no share of the patterns.
+/// Why a text is not a share of the patterns.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum SamplingError {
     /// No number, or a number that is out of range.

@@ -194,13 +194,14 @@ fn walk(
             file,
             key,
             section,
-            format!("is no {kind}"),
+            format!("is not the name of {kind}"),
             "a long option of the program, without dashes; or a table of a command",
         )
     };
     for (key, value) in table.iter().filter(|(_, value)| !value.is_table()) {
         let own = path.and_then(|_| leaf.own.get(key)).copied();
-        let takes = own.or_else(|| command.anywhere(key)).ok_or_else(|| unknown(key, "option"))?;
+        let takes =
+            own.or_else(|| command.anywhere(key)).ok_or_else(|| unknown(key, "an option"))?;
         let given = values(file, key, section, value, takes)?;
         if own.is_some() {
             let place = if section.is_empty() { String::new() } else { format!(", [{section}]") };
@@ -210,7 +211,7 @@ fn walk(
     }
     for (key, value) in table {
         let Value::Table(inner) = value else { continue };
-        let below = command.commands.get(key).ok_or_else(|| unknown(key, "command"))?;
+        let below = command.commands.get(key).ok_or_else(|| unknown(key, "a command"))?;
         let section = if section.is_empty() { key.clone() } else { format!("{section}.{key}") };
         let path = path.and_then(|path| path.split_first()).filter(|(first, _)| *first == key);
         walk(file, inner, &section, (below, leaf), path.map(|(_, rest)| rest), found)?;
@@ -254,7 +255,7 @@ pub struct Used {
     pub name: String,
     /// The option's values; none for an option that takes nothing.
     pub values: Vec<String>,
-    /// Whether somebody gave the option. Otherwise the values are the program's own default.
+    /// Whether the user gave the option. Otherwise the values are the program's own default.
     pub given: bool,
 }
 
@@ -262,7 +263,7 @@ pub struct Used {
 /// is. Options at the program's defaults are comments.
 ///
 /// # Errors
-/// [`FileError`] if the file cannot be read or written, or is no settings file.
+/// [`FileError`] if the file cannot be read or written, or is not a settings file.
 pub fn save(file: &Path, path: &[String], used: &[Used]) -> Result<(), FileError> {
     let before = if file.exists() { read_text(file, EXPECTED)? } else { String::new() };
     parse(file, &before)?;
@@ -377,10 +378,10 @@ mod tests {
     #[test]
     fn what_no_command_has_is_refused_in_one_line() {
         for (text, words) in [
-            ("frame = 5", "`frame` is no option"),
-            ("[capture]\nscenes = 5", "`[capture] scenes` is no option"),
-            ("[replay]\nframes = 5", "`replay` is no command"),
-            ("[eval.table9]\nframes = 5", "`[eval] table9` is no command"),
+            ("frame = 5", "`frame` is not the name of an option"),
+            ("[capture]\nscenes = 5", "`[capture] scenes` is not the name of an option"),
+            ("[replay]\nframes = 5", "`replay` is not the name of a command"),
+            ("[eval.table9]\nframes = 5", "`[eval] table9` is not the name of a command"),
             ("[capture]\ncalibrate = 1", "expected true or false"),
             ("[capture]\nframes = true", "expected a text, a number"),
             ("[capture]\nframes = [[1]]", "expected a list of texts or numbers"),

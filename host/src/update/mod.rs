@@ -75,7 +75,7 @@ pub enum UpdateError {
         expected: String,
     },
     /// A file does not begin as firmware or gateware does.
-    #[error("{}: no {component}, expected {}", path.display(), match component {
+    #[error("{}: this file is not {component}, expected {}", path.display(), match component {
         Component::Firmware => "an ELF file",
         Component::Gateware => "a bitstream for an ECP5",
     })]

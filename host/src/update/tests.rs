@@ -144,7 +144,7 @@ fn no_release_is_made_of_files_of_another_kind() {
     let source = Source { path, component: Component::Gateware, board: "ecp5-evn".into() };
     let out = folder.path().join("release");
     let error = pack(&[source], &out).unwrap_err();
-    assert!(error.to_string().contains("no gateware, expected a bitstream"), "{error}");
+    assert!(error.to_string().contains("not gateware, expected a bitstream"), "{error}");
     assert!(!out.exists());
 }
 

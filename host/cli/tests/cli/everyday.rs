@@ -34,7 +34,7 @@ fn options_stand_under_headings_each_once() {
             "Every command:"
         ]
     );
-    // A camera that is no simulation has no scene.
+    // Only a simulated camera has a scene.
     assert!(!headings(&["gateware"]).contains(&scene.to_owned()));
 }
 

@@ -28,7 +28,7 @@ fn pictures_with_labels_are_compared_by_the_images_in_them() {
     let compare = |test: &str| bench.run(&["metrics", "all/image.png", test]).succeeded().json();
     assert_eq!(compare("all/image.png")["mean_ssim"], 1.0);
     let part = compare("part/image.png")["mean_ssim"].as_f64().unwrap();
-    // As the arrays: labels, which are alike in both pictures, have no part in it.
+    // The labels are equal in both pictures, so the comparison leaves them out.
     let range = bench.run(&["metrics", "all", "part", "--align", "gain-offset"]).succeeded().json();
     assert!((part - range["mean_ssim"].as_f64().unwrap()).abs() < 0.1, "{part} {range}");
 }

@@ -38,7 +38,7 @@ pub(super) fn all(
     text
 }
 
-/// A gain in dB with its sign; one that rounds to 0 is no loss.
+/// A gain in dB with its sign; one that rounds to 0 has a plus sign.
 pub(super) fn signed(gain_db: f64) -> String {
     let gain_db = if gain_db.abs() < EQUAL_DB { 0.0 } else { gain_db };
     format!("{gain_db:+.2}")

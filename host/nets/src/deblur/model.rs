@@ -168,7 +168,7 @@ impl Default for Method {
     }
 }
 
-/// Why there is no such method.
+/// Why a network and its steps are refused.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum MethodError {

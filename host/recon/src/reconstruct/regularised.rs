@@ -163,7 +163,7 @@ pub fn regularised(
     let (at, trust, strengths) = match settings.strength {
         Strength::Fixed(strength) => (0, 1.0, vec![strength as f32]),
         Strength::CrossValidated { folds } => {
-            // Total variation draws edges into noise where there are none. The limit gains on real
+            // Total variation draws edges into plain noise. The limit gains on real
             // measurements and in scatter; the other penalties lose by it (scatter_tests.rs).
             let trusted = match settings.penalty {
                 Penalty::TotalVariation => Trusted::AsFarAsFine,
