@@ -38,7 +38,7 @@ REFUSED = [
     (lambda: H(3.0), "expected (..., 8, 8)"),
     (lambda: H(np.array([["a"] * 8] * 8)), "expected real numbers"),
     (lambda: H(np.array([[object()] * 8] * 8)), "expected real numbers"),
-    (lambda: H(np.zeros((8, 8), np.longdouble)), "up to 8 bytes"),
+    (lambda: H(np.zeros((8, 8), "M8[s]")), "expected real numbers"),
     (lambda: H([[1, 2], [3]]), "x is no array"),
     (lambda: H.adjoint(np.zeros(63)), "y has shape (63,), expected (..., 64)"),
     (lambda: H.pinv(np.zeros(65)), "expected (..., 64)"),
@@ -181,6 +181,7 @@ def test_a_child_of_fork_computes():
             assert pool.map_async(work, range(3)).get(timeout=60) == expected
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="no signal of Ctrl-C to a process")
 def test_ctrl_c_ends_long_work():
     program = """
         import os, signal, threading, time

@@ -89,6 +89,21 @@ def test_single_patterns_weather_and_models():
         assert any("no calibration" in note for note in camera.capture(3).notes)
 
 
+def test_unequal_leds_leave_no_pattern():
+    uneven = ns.CameraModel(toml="[leds]\npower_spread = 0.2")
+    with ns.Camera("virtual", scene="white", model=uneven) as camera:
+        m = camera.capture(300)
+    assert m.flat_field is not None
+
+    def unevenness(measurement):
+        image = ns.reconstruct(measurement, method="hadamard")
+        return float(image.std() / image.mean())
+
+    flat = unevenness(pickle.loads(pickle.dumps(m)))
+    m.flat_field = None
+    assert flat < 0.3 * unevenness(m)
+
+
 def test_the_leds_are_off_after_an_exception():
     with virtual() as camera:
         with pytest.raises(ZeroDivisionError):
@@ -139,9 +154,8 @@ def test_the_leds_of_a_camera_elsewhere_are_off_in_whatever_way_a_run_ends(serve
         frames = camera.frames()
         next(frames)
         camera.close()
-        with pytest.raises(StopIteration):
-            while True:
-                next(frames)
+        # What had come before is still there, and no more.
+        assert sum(1 for _ in zip(frames, range(100_000), strict=False)) < 100_000
 
     for leave in (leave_by_exception, leave_by_garbage, leave_by_close):
         leave()
@@ -155,6 +169,7 @@ def test_the_leds_of_a_camera_elsewhere_are_off_in_whatever_way_a_run_ends(serve
             assert off(camera), leave.__name__
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="no signal of Ctrl-C to a process")
 @pytest.mark.parametrize("call", ["list(camera.frames())", "camera.read(10**9)", "camera.capture(10**9)"])
 def test_ctrl_c_ends_the_run_at_once(call):
     """In a process of its own, because the signal goes to the main thread."""

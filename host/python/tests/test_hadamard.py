@@ -36,6 +36,17 @@ def test_patterns_are_the_rows_and_their_complements():
     assert (ns.patterns(rows, 4, split=False) == signed).all()
 
 
+def test_a_few_patterns_of_a_large_image_take_little_memory():
+    shown = ns.patterns([0, 1, 65535], 256)
+    assert shown.shape == (6, 256, 256) and shown.nbytes < 1 << 20
+    assert (
+        shown[4]
+        == (-1) ** np.array([[bin(r).count("1") + bin(c).count("1") for c in range(256)] for r in range(256)])
+        + 1
+        >> 1
+    ).all()
+
+
 @pytest.mark.parametrize("split", [False, True])
 @pytest.mark.parametrize("scale", ["sum", "ortho"])
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])

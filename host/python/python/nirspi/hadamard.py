@@ -72,7 +72,7 @@ def patterns(rows: Any, n: int, *, split: bool = True) -> np.ndarray:
     [[[1, 0], [1, 0]], [[0, 1], [0, 1]]]
     """
     operator = Hadamard(n, rows=rows)
-    signed = operator.matrix().reshape(-1, operator.n, operator.n).astype(np.int8)
+    signed = operator.matrix(np.int8).reshape(-1, operator.n, operator.n)
     if not split:
         return signed
     shown = np.empty((2 * len(signed), operator.n, operator.n), np.uint8)
@@ -229,9 +229,16 @@ class Hadamard:
         >>> ns.Hadamard(2, rows=[0, 3]).matrix().tolist()
         [[1.0, 1.0, 1.0, 1.0], [1.0, -1.0, -1.0, 1.0]]
         """
-        area = self.n * self.n
-        columns = self._operator.forward(np.eye(area, dtype=np.float64).reshape(-1))
-        return np.ascontiguousarray(columns.reshape(area, -1).T, dtype=dtype)
+        readings, area = self.shape
+        whole = np.empty((readings, area), dtype)
+        # A few rows at a time: of a large image, all of them in float64 would not fit into memory.
+        step = max(1, (1 << 22) // max(readings, area))
+        for first in range(0, readings, step):
+            last = min(first + step, readings)
+            units = np.zeros((last - first, readings))
+            units[np.arange(last - first), np.arange(first, last)] = 1
+            whole[first:last] = self._operator.adjoint(units.reshape(-1)).reshape(-1, area)
+        return whole
 
     def _axes(self, what: str) -> tuple[tuple[int, ...], tuple[int, ...]]:
         image, readings = (self.n, self.n), (self.shape[0],)

@@ -59,6 +59,17 @@ def test_the_same_coefficients(problem, precompute):
         assert np.allclose(ours, theirs(X, y, precompute=precompute, **options)), options
 
 
+def test_longer_atoms_win_as_in_scikit_learn(problem, random):
+    y, X, _ = problem
+    X = X * random.uniform(0.2, 5, N_FEATURES)
+    expected = theirs(X, y, n_nonzero_coefs=4)
+    assert np.allclose(ns.omp.orthogonal_mp(X, y, n_nonzero_coefs=4), expected)
+    dictionary = ns.omp.Dictionary(X, normalised=False)
+    assert np.allclose(dictionary.solve(y, n_nonzero_coefs=4).toarray(), expected)
+    by_correlation = ns.omp.Dictionary(X).solve(y, n_nonzero_coefs=4).toarray()
+    assert ((by_correlation != 0) != (expected != 0)).any()
+
+
 def test_paths_and_numbers_of_atoms(problem):
     y, X, _ = problem
     for options in ({"n_nonzero_coefs": 5}, {"tol": 0.5}):
