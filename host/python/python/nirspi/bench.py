@@ -153,7 +153,8 @@ def main(arguments: list[str] | None = None) -> int:
             title = f"Hadamard {name}, {asked.n} x {asked.n}, batch of {batch}"
             results[title] = time_in_turn(contestants, asked.seconds)
     for frames in asked.frames:
-        for name, contestants in omp(*asked.problem, frames).items():
+        measurements, atoms, sparsity = asked.problem
+        for name, contestants in omp(measurements, atoms, sparsity, frames).items():
             title = "OMP {} x {}, {} atoms, {}, {} frames".format(*asked.problem, name, frames)
             results[title] = time_in_turn(contestants, asked.seconds)
     report = {"machine": before, "load_afterwards": machine()["load"], "results": results}

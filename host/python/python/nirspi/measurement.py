@@ -170,18 +170,19 @@ class Measurement:
         part = self.d[index]
         if part.ndim < 1 or part.shape[-1] != self.d.shape[-1]:
             raise IndexError("an index into the patterns, expected one of measurements")
-        chosen = dataclasses.asdict(self) | {"d": part, "flat_field": self.flat_field}
-        chosen["rows"], chosen["frames"] = self.rows, self.frames
-        if isinstance(index, (int, np.integer)) and len(self.dropouts) == len(self.d):
-            chosen["dropouts"] = [self.dropouts[index]]
-        return Measurement(**chosen)
+        dropouts = self.dropouts
+        if isinstance(index, (int, np.integer)) and len(dropouts) == len(self.d):
+            dropouts = [dropouts[index]]
+        return self._with(d=part, dropouts=dropouts)
 
     def take(self, count: int) -> Measurement:
         """The first patterns as they were shown."""
         count = _arrays.count(count, "count", least=1) or 1
-        chosen = dataclasses.asdict(self) | {"d": self.d[..., :count], "rows": self.rows[:count]}
-        chosen["flat_field"], chosen["frames"] = self.flat_field, self.frames
-        return Measurement(**chosen)
+        return self._with(d=self.d[..., :count], rows=self.rows[:count])
+
+    def _with(self, **changed: Any) -> Measurement:
+        kept = {one.name: getattr(self, one.name) for one in dataclasses.fields(self)}
+        return Measurement(**(kept | changed))
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes an ``.npz`` that :func:`load` and ``nirspi reconstruct`` read.
