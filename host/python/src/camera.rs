@@ -330,8 +330,8 @@ impl Camera {
             return Err(refused("frames is 0, expected at least 1"));
         }
         let session = self.take()?;
-        let options = match self.options(&session, &wanted) {
-            Ok(options) => options,
+        let (options, flat) = match self.options(&session, &wanted) {
+            Ok(found) => found,
             Err(error) => {
                 put_back(&self.state, session);
                 return Err(error);
@@ -361,7 +361,7 @@ impl Camera {
             thread: Mutex::new(Some(thread)),
             made: Mutex::new(None),
             shared,
-            flat: self.flat.clone(),
+            flat,
             process: self.process,
         })
     }
@@ -399,8 +399,13 @@ impl Camera {
         }
     }
 
-    fn options(&self, session: &Session, wanted: &Wanted) -> PyResult<CaptureOptions> {
+    fn options(
+        &self,
+        session: &Session,
+        wanted: &Wanted,
+    ) -> PyResult<(CaptureOptions, Option<nirspi::calibration::FlatField>)> {
         let setup = self.setup.clone();
+        let mut flat = self.flat.clone();
         let calibration = match &self.calibrated {
             Calibrated::White(settling) if setup.differential => {
                 Calibration::Kept(settling.clone())
@@ -408,14 +413,16 @@ impl Camera {
             // Single patterns need the dark level in front of this scene.
             Calibrated::White(settling) => Calibration::MeasureOr(settling.clone()),
             Calibrated::Policy(policy) => {
-                policy.choose(&setup, session.identity()).map_err(refusal)?.calibration
+                let choice = policy.choose(&setup, session.identity()).map_err(refusal)?;
+                flat = choice.flat_field.map(|kept| kept.flat);
+                choice.calibration
             }
         };
         let record = wanted.record.as_ref().map(|path| match wanted.overwrite {
             true => Target::Replace(path.clone()),
             false => Target::New(path.clone()),
         });
-        Ok(CaptureOptions { setup, frames: wanted.frames, calibration, record })
+        Ok((CaptureOptions { setup, frames: wanted.frames, calibration, record }, flat))
     }
 }
 

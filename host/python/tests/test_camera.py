@@ -104,6 +104,42 @@ def test_unequal_leds_leave_no_pattern():
     assert flat < 0.3 * unevenness(m)
 
 
+def test_a_kept_flat_field_of_a_camera_is_used(cli, tmp_path, monkeypatch):
+    """As `nirspi calibrate --white` keeps it by serial number."""
+    for variable in ("HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_STATE_HOME"):
+        monkeypatch.setenv(variable, str(tmp_path))
+    (tmp_path / "uneven.toml").write_text("[leds]\npower_spread = 0.2\n")
+    server = subprocess.Popen(
+        [
+            cli,
+            "virtual",
+            "--listen",
+            "127.0.0.1:0",
+            "--scene",
+            "white",
+            "--precompute",
+            "64",
+            "--camera-model",
+            str(tmp_path / "uneven.toml"),
+        ],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        address = next(m[0] for line in server.stdout if (m := re.search(r"tcp:[0-9.:]*[0-9]", line)))
+        made = subprocess.run(
+            [cli, "calibrate", "--camera", address, "--white"], capture_output=True, text=True, check=False
+        )
+        assert made.returncode == 0, made.stderr
+        with ns.Camera(address) as camera:
+            m = camera.capture(100)
+        assert m.flat_field is not None and not any("no calibration" in note for note in m.notes)
+    finally:
+        server.kill()
+        server.wait()
+        server.stdout.close()
+
+
 def test_the_leds_are_off_after_an_exception():
     with virtual() as camera:
         with pytest.raises(ZeroDivisionError):
