@@ -6,6 +6,40 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+__all__ = [
+    "Camera",
+    "Dictionary",
+    "Error",
+    "FlatField",
+    "Operator",
+    "Run",
+    "_panic_for_tests",
+    "bases",
+    "camera_model",
+    "correlation",
+    "deblur",
+    "deblur_models",
+    "devices",
+    "enhance",
+    "enhance_readings",
+    "fit",
+    "load",
+    "methods",
+    "mie",
+    "order",
+    "orders",
+    "picture",
+    "psnr",
+    "rain",
+    "read_recording",
+    "readings",
+    "reconstruct",
+    "reconstruct_matrix",
+    "scaled",
+    "sheet",
+    "ssim",
+]
+
 _F32 = NDArray[np.float32]
 _F64 = NDArray[np.float64]
 _I32 = NDArray[np.int32]
