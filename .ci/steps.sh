@@ -20,6 +20,7 @@ steps=(
     "book            the documentation as a book without warnings; builds mdBook"
     "demo            the README's demo command"
     "examples        examples of the libraries"
+    "python          the Python package, its types, and its numbers beside the program's; PyPI"
     "page            the live page in a browser; Debian's Chromium, demo"
     "tcp             two processes over TCP; demo"
     "dissector       Wireshark's dissector on a recording; Debian's tshark"
@@ -38,6 +39,7 @@ by_name=(
     "licence-texts   the licences of all dependencies in one page; crates.io"
     "deb             the Debian package; crates.io"
     "release-folder  the folder that nirspi update takes; firmware, place-route"
+    "python-peers    the Python package beside SPyRiT, deepinv, scikit-learn, SPAMS; PyPI, 6 GB for torch"
 )
 
 # Debian packages, where this machine may install them. The lists of a machine that has just begun may name packages
@@ -126,6 +128,7 @@ step_licences() {
     tool cargo-deny 0.20.2
     cargo deny --all-features check licenses bans sources
     cargo deny --manifest-path boards/Cargo.toml --config .deny.toml check --allow license-not-encountered licenses bans sources
+    cargo deny --manifest-path host/python/Cargo.toml --config .deny.toml check --allow license-not-encountered licenses bans sources
     # Advisories are in a repository on GitHub.
     if timeout 20 git ls-remote -q https://github.com/RustSec/advisory-db HEAD >/dev/null 2>&1; then
         cargo deny --all-features check advisories
@@ -224,6 +227,36 @@ step_examples() {
             echo "skipped: your_measurements, no data"
         fi
     )
+}
+
+# The package and what its tests need in target/python. Builds of the package share target/python-build.
+python_package() {
+    python_with python "$@"
+    CARGO_TARGET_DIR=$PWD/target/python-build target/python/bin/pip install --quiet --force-reinstall --no-deps ./host/python
+}
+
+step_python() {
+    (cd host/python && cargo fmt --check)
+    CARGO_TARGET_DIR=$PWD/target/python-build \
+        cargo clippy --locked --release --manifest-path host/python/Cargo.toml -- -D warnings
+    python_package numpy matplotlib mypy==2.4.1 pyarrow pytest==9.2.0 ruff==0.17.6 scipy xarray
+    local bin=$PWD/target/python/bin
+    cargo build --locked --release
+    (
+        cd host/python
+        "$bin/ruff" format --check python tests
+        "$bin/ruff" check python tests
+        "$bin/mypy" python/nirspi
+        "$bin/python" -m mypy.stubtest nirspi._nirspi
+        "$bin/python" -X dev -m pytest --ignore tests/peers
+    )
+}
+
+step_python_peers() {
+    python_package numpy matplotlib pytest==9.2.0 scipy deepinv==0.5.0 spyrit==3.1.1 scikit-learn==1.9.1 torch
+    # Has wheels for few systems.
+    target/python/bin/pip install --quiet spams-bin==2.6.14 || echo "skipped: SPAMS, no wheel"
+    (cd host/python && "$OLDPWD/target/python/bin/python" -m pytest tests/peers)
 }
 
 step_page() {

@@ -1,0 +1,342 @@
+"""Measurements: from files, from recordings, from readings in memory."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from . import _arrays, _nirspi
+from ._nirspi import Error
+from .hadamard import order
+
+
+@dataclass(eq=False)
+class Measurement:
+    """Signed measurements of Hadamard rows, one set or many.
+
+    Give ``d`` (pattern less complement) or ``y`` (readings as they came).
+
+    Parameters
+    ----------
+    d : array_like, (..., M)
+        Differences. NaN: the pattern was not read. Complex numbers are taken.
+    y : array_like, (..., 2 M) or (..., M)
+        Readings, in the form that ``readings`` says. Drop-outs of pairs are found and become NaN.
+    rows : array_like of int, (M,), or str
+        The natural-order Hadamard row that was shown k-th; negative: not read. Or the name of an
+        order, see :func:`nirspi.order`.
+    n : int
+        Side of the image, a power of two from 2 to 256.
+    readings : {"pairs", "halves", "single"}
+        Form of ``y``: pattern, complement, pattern, complement; all patterns, then all complements;
+        patterns alone.
+    transpose : bool
+        Whether pixels are numbered down the columns, as in MATLAB.
+    unit : str
+        Unit of the readings, for pictures.
+
+    Attributes
+    ----------
+    d : ndarray of float64 or complex128, (..., M)
+    rows : ndarray of int64, (M,)
+    n : int
+    dropouts : list
+        Of each measurement, ``(first reading, readings, rows)`` of each drop-out.
+    not_read : ndarray of int64
+        Places, in the order shown, of patterns that were not read in any measurement.
+    reference : ndarray or None
+        The file's own image of the same scene.
+    frames : Account or None
+        The account of a recording's frames.
+    notes : list of str
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import nirspi as ns
+    >>> scene = np.arange(64.0).reshape(8, 8)
+    >>> split = ns.Hadamard(8, split=True)
+    >>> measurement = ns.Measurement(y=split(scene), rows="natural", n=8)
+    >>> measurement.d.shape, bool(np.allclose(measurement.d, ns.Hadamard(8)(scene)))
+    ((64,), True)
+    """
+
+    d: Any = None
+    y: dataclasses.InitVar[Any] = None
+    rows: Any = None
+    n: Any = None
+    readings: dataclasses.InitVar[str] = "pairs"
+    transpose: dataclasses.InitVar[bool] = False
+    unit: str = "units of the readings"
+    dropouts: list[Any] = field(default_factory=list)
+    not_read: Any = None
+    reference: Any = None
+    frames: Any = None
+    notes: list[str] = field(default_factory=list)
+    flat_field: Any = field(default=None, repr=False)
+
+    def __post_init__(self, y: Any, readings: str, transpose: bool) -> None:
+        if (self.d is None) == (y is None):
+            raise Error(
+                "a measurement of d and y, expected one of them"
+                if y is not None
+                else "a measurement without numbers, expected d or y"
+            )
+        if self.n is None:
+            raise Error("no n, expected the side of the image")
+        self.n = _arrays.side(self.n)
+        if self.rows is None:
+            raise Error("no rows, expected Hadamard rows or the name of an order")
+        named = isinstance(self.rows, str)
+        rows = order(self.rows, self.n) if named else _arrays.whole_numbers(self.rows, "rows").copy()
+        if transpose:
+            shown = rows >= 0
+            rows[shown] = rows[shown] % self.n * self.n + rows[shown] // self.n
+        form = "differences" if y is None else readings
+        each = {"pairs": 2, "halves": 2, "single": 1, "differences": 1}.get(form)
+        if each is None or (y is not None and form == "differences"):
+            raise Error(f'readings is {readings!r}, expected "pairs", "halves" or "single"')
+        values = _numbers(self.d if y is None else y, "d" if y is None else "y")
+        if named and values.ndim:
+            # The name of an order stands for its first patterns.
+            rows = rows[: max(values.shape[-1] // each, 1)]
+        if values.ndim < 1 or values.shape[-1] != each * len(rows):
+            wanted = each * len(rows)
+            raise Error(
+                f"{'d' if y is None else 'y'} has shape {values.shape}, expected (..., {wanted}):"
+                f" {each} a row"
+            )
+        kept = rows >= 0
+        self.not_read = np.flatnonzero(~kept) if self.not_read is None else self.not_read
+        if y is not None:
+            self._of_readings(values, rows, form)
+        else:
+            self.rows, self.d = rows[kept], values[..., kept]
+        # The compiled part checks that rows are in range and different.
+        _nirspi.Operator(self.n, self.rows, False, False)
+        infinite = np.argwhere(np.isinf(self.d))
+        if len(infinite):
+            at = ", ".join(str(int(k)) for k in infinite[0])
+            raise Error(f"d is {self.d[tuple(infinite[0])]} at [{at}], expected finite numbers")
+
+    def _of_readings(self, values: np.ndarray, rows: np.ndarray, form: str) -> None:
+        """Differences of each measurement, with NaN where patterns were not read."""
+        if values.dtype.kind == "c":
+            raise Error("y is complex, expected real readings: give d")
+        count = len(rows)
+        each = values.shape[-1] // count
+        if form == "halves":
+            pairs = values.reshape(-1, each, count).swapaxes(1, 2)
+        else:
+            pairs = values.reshape(-1, count, each)
+        found = np.full((len(pairs), count), np.nan)
+        for frame, one in enumerate(pairs):
+            read = (rows >= 0) & ~np.isnan(one).any(axis=1)
+            if not read.any():
+                raise Error("y has no pattern that was read, expected at least one")
+            shown = np.ascontiguousarray(rows[read])
+            kept, d, lost, notes = _nirspi.readings(
+                self.n,
+                shown,
+                np.ascontiguousarray(one[read]).reshape(-1),
+                "single" if form == "single" else "pairs",
+            )
+            at = np.flatnonzero(read)[np.isin(shown, kept)]
+            found[frame, at] = d
+            self.dropouts.append(lost)
+            self.notes.extend(note for note in notes if note not in self.notes)
+        shown = rows >= 0
+        self.rows = rows[shown]
+        self.d = found[:, shown].reshape(*values.shape[:-1], int(shown.sum()))
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The shape of ``d``."""
+        return self.d.shape
+
+    def __len__(self) -> int:
+        if self.d.ndim < 2:
+            raise TypeError("one measurement has no length")
+        return len(self.d)
+
+    def __getitem__(self, index: Any) -> Measurement:
+        """Some of several measurements."""
+        if self.d.ndim < 2:
+            raise IndexError("one measurement, expected several")
+        part = self.d[index]
+        if part.ndim < 1 or part.shape[-1] != self.d.shape[-1]:
+            raise IndexError("an index into the patterns, expected one of measurements")
+        dropouts = self.dropouts
+        if isinstance(index, (int, np.integer)) and len(dropouts) == len(self.d):
+            dropouts = [dropouts[index]]
+        return self._with(d=part, dropouts=dropouts)
+
+    def take(self, count: int) -> Measurement:
+        """The first patterns as they were shown."""
+        count = _arrays.count(count, "count", least=1) or 1
+        return self._with(d=self.d[..., :count], rows=self.rows[:count])
+
+    def _with(self, **changed: Any) -> Measurement:
+        kept = {one.name: getattr(self, one.name) for one in dataclasses.fields(self)}
+        return Measurement(**(kept | changed))
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes an ``.npz`` that :func:`load` and ``nirspi reconstruct`` read.
+
+        Parameters
+        ----------
+        path : path
+            Name of the file; ``.npz`` is added if it is missing.
+        """
+        fields: dict[str, Any] = {"n": self.n, "h_row": self.rows, "d": self.d}
+        if self.reference is not None:
+            fields["recon"] = np.asarray(self.reference)
+        np.savez(path, **fields)
+
+
+def _numbers(values: Any, name: str) -> np.ndarray:
+    array = _arrays.array_of(values, name)
+    if array.dtype.kind == "c":
+        return np.ascontiguousarray(array, np.complex128)
+    return np.ascontiguousarray(_arrays.real(array, name), np.float64)
+
+
+def load(
+    path: str | os.PathLike[str],
+    *,
+    index: int | str | None = None,
+    shown: str | None = None,
+    side: int | None = None,
+    field: str | None = None,
+    readings: str | None = None,
+    patterns_first: bool = False,
+    transpose: bool = False,
+    decimal_comma: bool = False,
+    part: str = "magnitude",
+    keep_leak: bool = False,
+    no_flat_field: bool = False,
+) -> Measurement:
+    """Reads measurements from a file of nirspi or of another lab, or from a recording.
+
+    The files are those of ``nirspi reconstruct``: ``.npz``, ``.npy``, ``.mat``, HDF5, ``.csv``,
+    ``.txt``, ``.mcap``. What does not fit is refused in one line and never guessed.
+
+    Parameters
+    ----------
+    path : path
+    index : int, "all" or None
+        Which of several measurements. With "all", each measurement of a file, or each frame of a
+        recording; without, the frames of a recording are summed.
+    shown : str, optional
+        The order in which patterns were shown, for a file without ``h_row``.
+    side : int, optional
+        Side of the image, for a file that does not say it.
+    field : str, optional
+        Name of the readings, if it is neither ``y`` nor ``d``.
+    readings : {"pairs", "halves", "single", "differences"}, optional
+        How readings belong to patterns.
+    patterns_first : bool
+        Whether patterns are along the first axis of the readings.
+    transpose : bool
+        Whether pixels are numbered down the columns, as in MATLAB.
+    decimal_comma : bool
+        Whether every comma of a text file is a decimal comma.
+    part : {"magnitude", "real", "imaginary"}
+        Of complex readings: "magnitude" keeps both parts (``d`` is complex).
+    keep_leak : bool
+        Whether the leak between patterns of a recording stays.
+    no_flat_field : bool
+        Whether the flat field kept for a recording's camera is ignored.
+
+    Returns
+    -------
+    Measurement
+
+    Raises
+    ------
+    FileNotFoundError, OSError
+        If the system refuses the file.
+    Error
+        If the content is wrong: one line with the file, the field, what was found and expected.
+
+    Examples
+    --------
+    >>> import numpy as np, os, tempfile
+    >>> import nirspi as ns
+    >>> path = os.path.join(tempfile.mkdtemp(), "wing.npz")
+    >>> ns.Measurement(d=np.arange(16.0), rows="zig-zag", n=4).save(path)
+    >>> ns.load(path).rows[:4].tolist()
+    [0, 2, 8, 12]
+    """
+    from .camera import Account
+
+    options = {
+        "index": None if index is None else str(index),
+        "shown": shown,
+        "side": None if side is None else _arrays.side(side),
+        "field": field,
+        "readings": readings,
+        "patterns_first": bool(patterns_first),
+        "transpose": bool(transpose),
+        "decimal_comma": bool(decimal_comma),
+        "part": part,
+        "keep_leak": bool(keep_leak),
+        "no_flat_field": bool(no_flat_field),
+    }
+    found = _nirspi.load(os.fspath(path), options)
+    first = found[0]
+    n, rows = first["n"], first["rows"]
+    if any(len(one["rows"]) != len(rows) or (one["rows"] != rows).any() for one in found):
+        rows = _merged([one["rows"] for one in found])
+    every = [_aligned(one, rows) for one in found]
+    several = index == "all"
+    unread = [one["not_read"] for one in found]
+    reference = first["reference"]
+    notes: list[str] = []
+    for one in found:
+        notes.extend(note for note in one["notes"] if note not in notes)
+    frames = first["frames"]
+    references = [one["reference"] for one in found]
+    if several and all(reference is not None for reference in references):
+        reference = np.stack(references).reshape(-1, n, n)
+    elif reference is not None:
+        reference = reference.reshape(n, n)
+    return Measurement(
+        d=np.stack(every) if several else every[0],
+        rows=rows,
+        n=n,
+        unit="units of the readings" if frames is None else "ADC counts",
+        dropouts=[one["dropouts"] for one in found],
+        not_read=np.asarray(sorted(set.intersection(*map(set, unread))), np.int64),
+        reference=reference,
+        frames=None if frames is None else Account(*frames),
+        notes=notes,
+        flat_field=first["flat_field"],
+    )
+
+
+def _aligned(one: dict[str, Any], rows: np.ndarray) -> np.ndarray:
+    d = one["d"] if one["imaginary"] is None else one["d"] + 1j * one["imaginary"]
+    if len(one["rows"]) == len(rows):
+        return d
+    whole = np.full(len(rows), np.nan, d.dtype)
+    whole[np.isin(rows, one["rows"])] = d
+    return whole
+
+
+def _merged(lists: list[np.ndarray]) -> np.ndarray:
+    """All rows of parts of one order, in an order of which each part is a part."""
+    merged = max(lists, key=len).tolist()
+    known = set(merged)
+    for rows in lists:
+        before = None
+        for row in rows.tolist():
+            if row not in known:
+                merged.insert(0 if before is None else merged.index(before) + 1, row)
+                known.add(row)
+            before = row
+    return np.asarray(merged, np.int64)

@@ -1,0 +1,200 @@
+"""From measurements to images."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+
+from . import _arrays, _nirspi
+from ._nirspi import Error
+from .images import Image
+from .measurement import Measurement
+
+
+def methods() -> dict[str, str]:
+    """The methods of reconstruction, each with one line about it.
+
+    Examples
+    --------
+    >>> import nirspi as ns
+    >>> list(ns.methods())
+    ['hadamard', 'omp', 'pseudo-inverse', 'tikhonov', 'fista', 'tv']
+    """
+    return {word: about for word, _name, about in _nirspi.methods()}
+
+
+def bases() -> list[str]:
+    """The names of the bases in which images are sparse.
+
+    Examples
+    --------
+    >>> import nirspi as ns
+    >>> ns.bases()
+    ['pixel', 'dct', 'haar', 'daubechies4']
+    """
+    return _nirspi.bases()
+
+
+def reconstruct(
+    measurement: Measurement,
+    *,
+    method: str = "tikhonov",
+    sampling: float | str = 1.0,
+    order: str | None = None,
+    basis: str | None = None,
+    index: int | None = None,
+    dictionary: Any = None,
+    sparsity: int | None = None,
+    residual: float | None = None,
+    stop_at_noise: bool = False,
+    strength: float | None = None,
+    as_printed: bool = False,
+    non_negative: bool = False,
+    keep: str | None = None,
+    warm_start: bool = False,
+    matrix: Any = None,
+    n: int | None = None,
+    device: str = "auto",
+) -> Image:
+    """Reconstructs the image of a measurement, or the images of many.
+
+    Parameters
+    ----------
+    measurement : Measurement
+        Or, with ``matrix``, the readings ``(..., M)``.
+    method : str
+        A name of :func:`methods`.
+    sampling : float or str
+        Share of all ``n * n`` patterns to use: 0.3, "30%" or 30.
+    order : str, optional
+        Which patterns ``sampling`` uses: the first of this order, or "recorded". Default: those of
+        the lowest sequencies.
+    basis : str, optional
+        Of omp, tikhonov and fista: a name of :func:`bases`. Default "dct".
+    index : int, optional
+        Which of several measurements. Default: all of them.
+    dictionary : array_like, (N, n, n), optional
+        OMP: images of your own as atoms.
+    sparsity : int, optional
+        OMP: number of atoms. Default: the number that predicts held-back measurements best.
+    residual : float, optional
+        OMP: relative norm of the residual at which to stop.
+    stop_at_noise : bool
+        OMP: choose atoms until the residual is no larger than the estimated noise.
+    strength : float, optional
+        Of tikhonov, fista and tv. Default: the strength that predicts held-back measurements best.
+    as_printed : bool
+        OMP: Algorithm 1 as printed in the paper.
+    non_negative : bool
+        OMP: no negative light; needs the pixel basis or a dictionary.
+    keep : {"measured", "sparse"}, optional
+        Whether measured coefficients stay or take the values of the fit.
+    warm_start : bool
+        OMP: start each measurement from the one before.
+    matrix : array_like, (M, n * n), optional
+        Patterns of your own instead of Hadamard rows.
+    n : int, optional
+        With ``matrix``: side of the image, if it is not the root of the matrix's columns.
+    device : str
+        Where OMP computes: "auto", "cpu", or another name of :func:`devices`.
+
+    Returns
+    -------
+    Image, (..., n, n) of float32
+        In the units of the readings. Of complex measurements, the magnitude.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import nirspi as ns
+    >>> scene = np.zeros((16, 16)); scene[3:9, 5:12] = 1
+    >>> H = ns.Hadamard(16)
+    >>> m = ns.Measurement(d=H(scene), rows=H.rows, n=16)
+    >>> image = ns.reconstruct(m, method="tv", sampling="40%")
+    >>> image.report["used"], round(float(ns.metrics.correlation(scene, image)), 2) > 0.95
+    (102, True)
+    """
+    options: dict[str, Any] = {
+        "method": str(method),
+        "sampling": _arrays.share(sampling),
+        "order": order,
+        "basis": basis,
+        "dictionary": None,
+        "sparsity": _arrays.count(sparsity, "sparsity"),
+        "residual": None if residual is None else float(residual),
+        "stop_at_noise": bool(stop_at_noise),
+        "strength": None if strength is None else float(strength),
+        "as_printed": bool(as_printed),
+        "non_negative": bool(non_negative),
+        "keep": keep,
+        "warm_start": bool(warm_start),
+        "device": str(device),
+    }
+    if matrix is not None:
+        return _by_matrix(measurement, matrix, n, dictionary, options)
+    if not isinstance(measurement, Measurement):
+        raise Error(
+            f"found {type(measurement).__name__}, expected a Measurement: nirspi.Measurement(d=...,"
+            " rows=..., n=...) or nirspi.load(path)"
+        )
+    if index is not None:
+        measurement = measurement[index]
+    n = measurement.n
+    if dictionary is not None:
+        options["dictionary"] = _atoms(dictionary, n)
+    d = measurement.d
+    leading = d.shape[:-1]
+    if d.dtype.kind == "c":
+        parts = [_run(n, measurement.rows, part, options) for part in (d.real, d.imag)]
+        pixels = np.hypot(parts[0][0], parts[1][0])
+        reports, rows = parts[0][1], parts[0][2]
+    else:
+        pixels, reports, rows = _run(n, measurement.rows, d, options)
+    if measurement.flat_field is not None:
+        pixels = measurement.flat_field.correct(pixels)
+    return Image(
+        pixels.reshape(*leading, n, n),
+        report=reports if leading else reports[0],
+        unit=measurement.unit,
+        rows=rows[0] if len(rows) == 1 else rows,
+    )
+
+
+def _run(
+    n: int, rows: np.ndarray, d: np.ndarray, options: dict[str, Any]
+) -> tuple[np.ndarray, list[Any], list[np.ndarray]]:
+    pixels, reports, used = _nirspi.reconstruct(
+        n, rows, np.ascontiguousarray(d, np.float64).reshape(-1), options
+    )
+    return pixels, [json.loads(report) for report in reports], used
+
+
+def _atoms(dictionary: Any, n: int) -> np.ndarray:
+    atoms = _arrays.real(dictionary, "dictionary")
+    if atoms.ndim != 3 or atoms.shape[1:] != (n, n):
+        raise Error(f"dictionary has shape {atoms.shape}, expected (N, {n}, {n})")
+    return _arrays.flat(atoms, "dictionary", np.float32)
+
+
+def _by_matrix(readings: Any, matrix: Any, n: int | None, dictionary: Any, options: dict[str, Any]) -> Image:
+    weights = _arrays.real(matrix, "matrix")
+    if weights.ndim != 2:
+        raise Error(f"matrix has shape {weights.shape}, expected (M, n * n)")
+    n = int(weights.shape[1] ** 0.5 + 0.5) if n is None else _arrays.side(n)
+    if n * n != weights.shape[1]:
+        raise Error(f"matrix has shape {weights.shape}, expected (M, {n * n})")
+    y = readings.d if isinstance(readings, Measurement) else _arrays.real(readings, "y")
+    if y.ndim < 1 or y.shape[-1] != weights.shape[0]:
+        raise Error(f"y has shape {y.shape}, expected (..., {weights.shape[0]}): one a pattern")
+    if options["warm_start"] or options["order"] is not None or options["keep"] is not None:
+        raise Error("warm_start, order and keep belong to Hadamard rows, not to a matrix")
+    if dictionary is not None:
+        options["dictionary"] = _atoms(dictionary, n)
+    pixels, reports = _nirspi.reconstruct_matrix(
+        n, _arrays.flat(weights, "matrix", np.float64), _arrays.flat(y, "y", np.float64), options
+    )
+    made = [json.loads(report) for report in reports]
+    leading = y.shape[:-1]
+    return Image(pixels.reshape(*leading, n, n), report=made if leading else made[0])

@@ -1,0 +1,108 @@
+"""Measurements in memory and from files."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+import nirspi as ns
+from conftest import asymmetric
+
+N = 16
+
+
+def of(scene, order="zig-zag", split=False):
+    return ns.Hadamard(N, rows=ns.order(order, N), split=split)(scene)
+
+
+@pytest.mark.parametrize("form", ["pairs", "halves", "single"])
+def test_every_form_of_readings_gives_the_same_differences(form):
+    scene = asymmetric(N)
+    y = of(scene, split=True)
+    shaped = {"pairs": y, "halves": np.concatenate([y[0::2], y[1::2]]), "single": y[0::2]}[form]
+    found = ns.Measurement(y=shaped, rows="zig-zag", n=N, readings=form)
+    assert np.allclose(found.d, of(scene), atol=1e-9)
+
+
+def test_several_measurements_keep_their_leading_axes():
+    scenes = np.stack([asymmetric(N, seed) for seed in range(6)]).reshape(2, 3, N, N)
+    y = of(scenes, split=True)
+    found = ns.Measurement(y=y, rows="zig-zag", n=N)
+    assert found.d.shape == (2, 3, N * N) and np.allclose(found.d, of(scenes))
+    images = ns.reconstruct(found, method="hadamard")
+    assert images.shape == (2, 3, N, N) and np.allclose(images, scenes, atol=1e-4)
+
+
+def test_a_pattern_that_was_not_read_is_left_out():
+    scene = asymmetric(N)
+    d, rows = of(scene), ns.order("zig-zag", N).copy()
+    gone = [5, 9, 200]
+    missing = d.copy()
+    missing[gone] = np.nan
+    rest = np.setdiff1d(np.arange(N * N), gone)
+    expected = ns.reconstruct(ns.Measurement(d=d[rest], rows=rows[rest], n=N))
+    assert (ns.reconstruct(ns.Measurement(d=missing, rows=rows, n=N)) == expected).all()
+    rows[gone] = -1
+    negative = ns.Measurement(d=d, rows=rows, n=N)
+    assert negative.not_read.tolist() == gone
+    assert (ns.reconstruct(negative) == expected).all()
+
+
+def test_drop_outs_of_pairs_are_found_and_left_out():
+    scene = 5 + asymmetric(N)
+    y = of(scene, split=True)
+    y[100:108] = 0.01 * y[100:108]
+    found = ns.Measurement(y=y, rows="zig-zag", n=N)
+    (lost,) = found.dropouts
+    assert lost and lost[0][0] == 100 and np.isnan(found.d[50:54]).all()
+    assert np.isfinite(np.delete(found.d, range(50, 54))).all()
+
+
+def test_transposed_pixels_give_the_transposed_image():
+    scene = asymmetric(N)
+    m = ns.Measurement(d=of(scene.T, "natural"), rows="natural", n=N, transpose=True)
+    assert np.allclose(ns.reconstruct(m, method="hadamard"), scene, atol=1e-4)
+
+
+def test_a_file_comes_back_and_the_reader_is_the_command_lines(tmp_path):
+    scene = asymmetric(N)
+    m = ns.Measurement(d=of(scene), rows="zig-zag", n=N, reference=scene)
+    m.save(tmp_path / "a.npz")
+    found = ns.load(tmp_path / "a.npz")
+    assert (found.d == m.d).all() and (found.rows == m.rows).all()
+    assert np.allclose(found.reference, scene)
+    np.savez(tmp_path / "many.npz", n=N, h_row=m.rows, y=np.stack([of(scene, split=True)] * 3))
+    assert ns.load(tmp_path / "many.npz", index="all").d.shape == (3, N * N)
+    assert ns.load(tmp_path / "many.npz", index=2).d.shape == (N * N,)
+    np.save(tmp_path / "alone.npy", of(scene))
+    alone = ns.load(tmp_path / "alone.npy", shown="zig-zag", side=N, readings="differences")
+    assert (alone.d == m.d).all()
+    (tmp_path / "t.csv").write_text("\n".join(map(str, of(scene, split=True))))
+    assert np.allclose(ns.load(tmp_path / "t.csv", shown="zig-zag").d, m.d)
+
+
+def test_measurements_of_a_file_with_different_gaps_share_their_rows(tmp_path):
+    d = np.stack([of(asymmetric(N, seed)) for seed in range(3)])
+    d[0, 3] = d[1, 7] = d[2, 3] = np.nan
+    np.savez(tmp_path / "gaps.npz", n=N, h_row=ns.order("zig-zag", N), d=d)
+    found = ns.load(tmp_path / "gaps.npz", index="all")
+    assert found.d.shape == d.shape and np.array_equal(found.d, d, equal_nan=True)
+    assert (found.rows == ns.order("zig-zag", N)).all()
+
+
+def test_complex_readings_give_the_magnitude(tmp_path):
+    scene = asymmetric(N) * np.exp(0.5j)
+    m = ns.Measurement(d=of(scene), rows="zig-zag", n=N)
+    assert np.allclose(ns.reconstruct(m, method="hadamard"), abs(scene), atol=1e-4)
+    np.savez(tmp_path / "c.npz", n=N, h_row=m.rows, d=m.d)
+    assert np.allclose(ns.load(tmp_path / "c.npz").d, m.d)
+    assert np.allclose(ns.load(tmp_path / "c.npz", part="imaginary").d, m.d.imag)
+
+
+def test_parts_and_pickles_are_measurements():
+    d = np.stack([of(asymmetric(N, seed)) for seed in range(4)])
+    m = ns.Measurement(d=d, rows="zig-zag", n=N)
+    assert len(m) == 4 and (m[1].d == d[1]).all() and m[1:3].d.shape == (2, N * N)
+    assert (m.take(10).rows == m.rows[:10]).all()
+    other = pickle.loads(pickle.dumps(m))
+    assert (other.d == m.d).all() and other.n == N
