@@ -22,7 +22,7 @@ steps=(
     "examples        examples of the libraries"
     "python          the Python package, its types, and its numbers beside the program's; PyPI"
     "page            the live page in a browser; Debian's Chromium, demo"
-    "tcp             two processes over TCP; demo"
+    "tcp             two processes over TCP, and boards/hil.sh; demo"
     "dissector       Wireshark's dissector on a recording; Debian's tshark"
     "flash           probe-rs knows every board's chip"
     "mie             Mie scattering against miepython and scattnlay; PyPI"
@@ -282,6 +282,7 @@ step_tcp() {
     grep -q '"received": 2000' "$out/capture.json"
     wait "$server"
     "$nirspi" reconstruct "$out/rec.mcap" --method hadamard --out "$out/rec"
+    NIRSPI=$PWD/$nirspi bash boards/hil.sh --minutes 0.2 --out "$out/hil"
 }
 
 step_dissector() {

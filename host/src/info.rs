@@ -2,6 +2,7 @@
 //! connected.
 
 use crate::session::{CameraIdentity, Reports, Session, SessionError};
+use crate::signal::Signal;
 use crate::versions::{Part, compare};
 use nirspi_wire::Status;
 use nirspi_wire::register::{IDENTITY, Register};
@@ -24,6 +25,8 @@ pub struct Info {
     pub temperature_celsius: Option<f64>,
     /// Whether the interlock is closed.
     pub interlock_closed: bool,
+    /// What the detector saw in the last run; `null` before one.
+    pub signal: Option<Signal>,
     /// Events of the camera while no host was connected.
     pub reports: Vec<String>,
 }
@@ -50,6 +53,7 @@ pub fn info(session: &mut Session) -> Result<Info, SessionError> {
         uptime_s: status.uptime_us as f64 * 1e-6,
         temperature_celsius: temperature(&status),
         interlock_closed: status.interlock_closed,
+        signal: Signal::of(&status),
         reports: reports.0,
     })
 }

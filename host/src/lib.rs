@@ -64,6 +64,7 @@ pub mod selftest;
 pub mod serve;
 pub mod session;
 pub mod setup;
+pub mod signal;
 pub mod source;
 pub mod stage_times;
 pub mod tally;

@@ -120,7 +120,14 @@ impl FirstPatterns {
                 let name = format!("{order} (lowest sequencies first)");
                 (Some(order), name)
             }
-            Self::LowestSequencies | Self::Recorded => (None, RECORDED.to_owned()),
+            Self::LowestSequencies | Self::Recorded => {
+                let known = Order::of(measurements.rows().as_slice(), measurements.side());
+                let name = known.map_or_else(
+                    || RECORDED.to_owned(),
+                    |order| format!("{RECORDED}, which is {order}"),
+                );
+                (None, name)
+            }
         };
         Ok((measurements.take(order.as_ref(), sampling)?, name))
     }

@@ -13,7 +13,7 @@ use nirspi_wire::packet::{MAX_HOST_PACKET, parse, request_id, unseal};
 use nirspi_wire::samples::Words;
 use nirspi_wire::{Deframed, Deframer, Depth, DeviceMessage, Request, State};
 
-/// The camera's firmware. One value is one camera; a value takes less than 8 KB and uses no other
+/// The camera's firmware. One value is one camera; a value takes 8.4 KB at most and uses no other
 /// memory.
 #[derive(Debug)]
 pub struct Camera {
@@ -96,6 +96,7 @@ impl Camera {
             return;
         }
         let values = distances_mm.iter().copied();
+        machine.meter.forget();
         let Ok(distances_mm) = Words::pack(values, &mut machine.scratch) else { return };
         let depth = Depth { device_time_us: now.0, side, distances_mm };
         let payload = zones.saturating_mul(2).saturating_add(STREAM_HEADER_BYTES);

@@ -15,7 +15,7 @@ use crate::{
 use nirspi_wire::register::{ORDER_TABLE, Register, status};
 use nirspi_wire::{
     Answer, Command, Configuration, DeviceMessage, GatewareChunk, PATTERNS, PatternOrder, Refusal,
-    Reply, Request, State, Status, version,
+    Reply, Request, Signal, State, Status, Tail, version,
 };
 
 impl Machine {
@@ -139,6 +139,7 @@ impl Machine {
         // If the FPGA does not answer, the reply assumes that the LEDs are on.
         let leds_on = fpga::read(bus, Register::Status)
             .map_or(!resting, |status| status & status::LEDS_ON != 0);
+        let has_signal = self.protocol().is_some_and(|protocol| protocol >= Signal::SINCE);
         Status {
             state: self.state(),
             fault: self.fault,
@@ -154,6 +155,7 @@ impl Machine {
             duty_permille: self.setup.map_or(0, |setup| setup.duty_permille),
             leds_on,
             interlock_closed: inputs.interlock_closed,
+            signal: Tail(has_signal.then(|| self.meter.signal())),
         }
     }
 

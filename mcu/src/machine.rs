@@ -12,6 +12,7 @@
 use crate::burst::{self, Burst};
 use crate::configure::Setup;
 use crate::gateware::Loading;
+use crate::meter::Meter;
 use crate::notices::{Notice, Notices, Outcome};
 use crate::run::{self, Counters, Fpga, Run, SAMPLE_BYTES};
 use crate::selftest::{self, TestFrame};
@@ -53,6 +54,7 @@ pub(crate) struct Machine {
     pub setup: Option<Setup>,
     pub fault: Option<Fault>,
     pub counters: Counters,
+    pub meter: Meter,
     pub loading: Option<Loading>,
     pub reboot: Option<RebootInto>,
     /// The crash that ended the last start, until a host has got the crash report.
@@ -80,6 +82,7 @@ impl Machine {
             setup: None,
             fault: None,
             counters: Counters::default(),
+            meter: Meter::new(),
             loading: None,
             reboot: None,
             crash: None,
@@ -185,6 +188,7 @@ impl Machine {
             Err(refusal) => return Err(self.refused_start(now, refusal, bus)),
         };
         self.counters = self.counters.of_next_run();
+        self.meter.start(now, &setup);
         self.release_pending = false;
         self.activity = Activity::Run(run);
         Ok(())
@@ -202,6 +206,7 @@ impl Machine {
         let Activity::Run(run) = &mut self.activity else { return false };
         let path = run::Path {
             counters: &mut self.counters,
+            meter: &mut self.meter,
             release_pending: &mut self.release_pending,
             scratch: &mut self.scratch,
             absent,

@@ -6,6 +6,7 @@
 //! (`tests::laws::every_frame_made_is_sent_or_counted_and_the_run_ends_once`).
 
 use crate::configure::Setup;
+use crate::meter::Meter;
 use crate::notices::Outcome;
 use crate::packets::{STREAM_HEADER_BYTES, send};
 use crate::time::Anchor;
@@ -110,6 +111,7 @@ struct Ending {
 /// What a frame needs on its way from the FPGA to the link.
 pub(crate) struct Path<'m> {
     pub counters: &'m mut Counters,
+    pub meter: &'m mut Meter,
     /// The bus failed during the release of the frame before.
     pub release_pending: &'m mut bool,
     /// Memory for the frame's packed samples.
@@ -235,14 +237,14 @@ impl Run {
         bus: &mut impl FpgaBus,
         sink: &mut impl PacketSink,
     ) -> bool {
-        let Path { counters, release_pending, scratch, absent, may_send } = path;
+        let Path { counters, meter, release_pending, scratch, absent, may_send } = path;
         // After a failed release, the line still signals the frame that was taken before.
         if *release_pending || absent || !bus.frame_ready() {
             return false;
         }
         let taken = match bus.frame() {
             Ok(None) => return false,
-            Ok(Some(bytes)) => assemble(bytes, self.patterns, scratch),
+            Ok(Some(bytes)) => assemble(bytes, self.patterns, (meter, now), scratch),
             Err(_) => None,
         };
         // The FPGA needs its buffer back before the next frame is complete, so the release comes
@@ -306,14 +308,17 @@ impl Run {
     }
 }
 
-/// The header and packed samples of an intact frame with this many patterns.
-fn assemble<'s>(
+/// The header and packed samples of an intact frame with this many patterns, which the meter sees too.
+pub(crate) fn assemble<'s>(
     bytes: &[u8],
     patterns: u16,
+    (meter, now): (&mut Meter, Micros),
     scratch: &'s mut [u8],
 ) -> Option<(Header, Samples<'s>)> {
     let frame = FpgaFrame::parse(bytes).ok().filter(|frame| frame.header.patterns == patterns)?;
+    meter.compare(&frame, scratch);
     let samples = Samples::pack(frame.sums().map(|sums| sums.difference()), scratch).ok()?;
+    meter.keep(now, &frame.header, samples.shift());
     Some((frame.header, samples))
 }
 
@@ -337,8 +342,10 @@ mod tests {
         bus.make_frame();
         let mut scratch = [0; SAMPLE_BYTES];
         let mut release_pending = false;
+        let mut meter = Meter::new();
         let path = Path {
             counters: &mut counters,
+            meter: &mut meter,
             release_pending: &mut release_pending,
             scratch: &mut scratch,
             absent: false,

@@ -20,6 +20,8 @@ pub struct Firmware {
     /// symbols.
     mapping: BTreeMap<u64, bool>,
     text: Vec<(u64, Vec<u8>)>,
+    /// Addresses in the vector table after the initial stack pointer and the reset handler.
+    handlers: Vec<u64>,
 }
 
 struct Function {
@@ -38,11 +40,19 @@ impl Firmware {
         let invalid = |error| io::Error::new(io::ErrorKind::InvalidData, error);
         let file = object::File::parse(&bytes[..]).map_err(invalid)?;
         let (mut flash_bytes, mut static_bytes, mut text) = (0, 0, Vec::new());
+        let mut handlers = Vec::new();
         for section in file.sections() {
             let SectionFlags::Elf { sh_flags, .. } = section.flags() else { continue };
             let has = |flag: u32| sh_flags & u64::from(flag) != 0;
             if !has(elf::SHF_ALLOC) {
                 continue;
+            }
+            if section.name() == Ok(".vector_table") {
+                let (words, _) = section.data().map_err(invalid)?.as_chunks::<4>();
+                let words = words.iter().skip(2).map(|word| u32::from_le_bytes(*word));
+                // Bit 0 of an address means Thumb; 0 stands for an interrupt that the chip lacks.
+                handlers =
+                    words.filter(|&word| word != 0).map(|word| u64::from(word & !1)).collect();
             }
             let is_filled = section.file_range().is_some();
             flash_bytes += if is_filled { section.size() } else { 0 };
@@ -71,7 +81,7 @@ impl Firmware {
         if !mapping.values().any(|&is_code| is_code) {
             return Err(io::Error::new(io::ErrorKind::InvalidData, "stripped: no mapping symbols"));
         }
-        Ok(Self { flash_bytes, static_bytes, symbols, functions, mapping, text })
+        Ok(Self { flash_bytes, static_bytes, symbols, functions, mapping, text, handlers })
     }
 
     /// Address of a symbol.
@@ -115,6 +125,23 @@ impl Firmware {
         let caller = self.functions.iter().find(|function| function.name.contains(name))?;
         let called = |target| self.functions.iter().find(|function| function.start == target);
         self.branches(caller).find_map(called).map(|function| function.name.as_str())
+    }
+
+    /// Functions that an interrupt or a fault runs: the handlers in the vector table, and what they
+    /// call by branches to fixed addresses. A waker's call through a pointer is not followed.
+    #[must_use]
+    pub fn run_by_interrupts(&self) -> BTreeSet<&str> {
+        let starts: BTreeMap<u64, &Function> =
+            self.functions.iter().map(|function| (function.start, function)).collect();
+        let mut found = BTreeSet::new();
+        let mut open = self.handlers.clone();
+        while let Some(address) = open.pop() {
+            let Some(function) = starts.get(&address) else { continue };
+            if found.insert(function.name.as_str()) {
+                open.extend(self.branches(function));
+            }
+        }
+        found
     }
 
     /// Addresses of instructions of the floating-point unit, each with its function.
@@ -161,8 +188,8 @@ impl Firmware {
         found
     }
 
-    /// Targets of a function's 32-bit branches. A constant between instructions may look like a
-    /// branch; such a constant almost never points to the first byte of a function.
+    /// Targets of a function's branches without a condition. A constant between instructions may
+    /// look like a branch; such a constant almost never points to the first byte of a function.
     fn branches(&self, function: &Function) -> impl Iterator<Item = u64> {
         let words = |address: u64| {
             self.text.iter().find_map(|(base, bytes)| {
@@ -181,9 +208,13 @@ fn plain(mangled: &str) -> String {
     format!("{:#}", rustc_demangle::demangle(mangled))
 }
 
-/// Target of a `BL` (T1) or `B.W` (T4) at this address (Armv8-M Architecture Reference Manual,
-/// C2.4).
+/// Target of a `BL` (T1), `B.W` (T4) or short `B` (T2) at this address (Armv8-M Architecture
+/// Reference Manual, C2.4).
 fn branch(address: u64, (first, second): (u16, u16)) -> Option<u64> {
+    if first & 0xF800 == 0xE000 {
+        let offset = (i64::from(first & 0x7FF) << 53 >> 53) * 2;
+        return Some((address + 4).wrapping_add_signed(offset));
+    }
     let is_branch = first & 0xF800 == 0xF000 && second & 0x9000 == 0x9000;
     if !is_branch {
         return None;
@@ -229,6 +260,8 @@ mod tests {
     fn branches_lead_where_a_disassembler_says() {
         assert_eq!(branch(0x1000_AB1E, (0xF000, 0xFB9F)), Some(0x1000_B260));
         assert_eq!(branch(0x0800_1000, (0xF7FF, 0xFFFE)), Some(0x0800_1000));
+        assert_eq!(branch(0x1000, (0xE7FE, 0)), Some(0x1000));
+        assert_eq!(branch(0x1000, (0xE001, 0)), Some(0x1006));
         assert_eq!(branch(0, (0x4770, 0xBF00)), None);
         // A conditional branch has a shorter range and never calls a panic.
         assert_eq!(branch(0, (0xF000, 0x8001)), None);

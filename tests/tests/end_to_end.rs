@@ -8,6 +8,7 @@ use nirspi::link::Link;
 use nirspi::recording::{Recording, Target};
 use nirspi::session::{Session, SessionError};
 use nirspi::setup::MeasurementSetup;
+use nirspi::signal::Signal;
 use nirspi::tally::{Tally, tally_recording};
 use nirspi::virtual_camera::{MemoryLink, VirtualCamera, VirtualOptics};
 use nirspi_optics::Scene;
@@ -316,4 +317,29 @@ fn stopping_keeps_what_has_come() {
     .unwrap();
     assert!(matches!(captured.ended, Ended::Stopped));
     assert!(captured.counters.received >= 3 && captured.counters.is_complete());
+}
+
+/// Noise and signal computed on the host, from all that the host gets: the frames.
+#[test]
+fn the_camera_s_own_meter_says_what_its_frames_show() {
+    let setup = MeasurementSetup::new(&Order::Natural, 1.0).unwrap();
+    let link = Box::new(MemoryLink::new(optics().camera(3).unwrap()));
+    let (captured, shots) = nirspi_tests::tapped::run(link, &setup, 2);
+    let seen = Signal::of(captured.status.as_ref().unwrap()).unwrap();
+
+    let samples = f64::from(setup.window()) * f64::from(setup.sweeps);
+    let [first, second] = &shots[..] else { panic!("{} frames", shots.len()) };
+    let pairs = || first.samples.iter().zip(&second.samples).map(|(&a, &b)| (a as f64, b as f64));
+    let count = pairs().count() as f64;
+    let noise =
+        (pairs().map(|(a, b)| (b - a).powi(2)).sum::<f64>() / (2.0 * count)).sqrt() / samples;
+    let mean = pairs().map(|(_, b)| b).sum::<f64>() / count;
+    let variance = pairs().map(|(_, b)| (b - mean).powi(2)).sum::<f64>() / count / samples.powi(2);
+    let signal = (variance - noise.powi(2)).sqrt();
+    assert!(noise > 0.1, "the virtual camera has noise: {noise}");
+    assert!((seen.noise_counts / noise - 1.0).abs() < 0.01, "{seen}: {noise}");
+    assert!((seen.signal_counts / signal - 1.0).abs() < 0.01, "{seen}: {signal}");
+    let decibels = 20.0 * (signal / noise).log10();
+    assert!((seen.snr_db - decibels).abs() < 0.1, "{seen}: {decibels}");
+    assert_eq!(seen.over_range_share, 0.0);
 }

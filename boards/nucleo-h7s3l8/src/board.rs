@@ -7,9 +7,9 @@ use embassy_stm32::peripherals::{ADC1, IWDG};
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_time::{Duration, Instant};
 use nirspi_app::Board;
-use nirspi_mcu::{Inputs, ntc};
-use nirspi_nucleo::crash;
+use nirspi_mcu::Inputs;
 use nirspi_nucleo::restart::restart;
+use nirspi_nucleo::{THERMISTOR, crash};
 use nirspi_wire::RebootInto;
 
 /// The system memory's boot loader (AN2606, STM32H7Rx and H7Sx).
@@ -45,7 +45,7 @@ impl Board for Nucleo {
         }
         if Instant::now() >= self.temperature_due {
             let reading = self.adc.blocking_read(&mut self.thermistor, SampleTime::CYCLES47_5);
-            self.temperature = ntc::centi_celsius(reading << 4);
+            self.temperature = THERMISTOR.centi_celsius(reading << 4);
             self.temperature_due = Instant::now() + TEMPERATURE_PERIOD;
         }
         Inputs {

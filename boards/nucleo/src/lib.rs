@@ -8,3 +8,9 @@ pub mod crash;
 pub mod gateware;
 pub mod port;
 pub mod restart;
+
+use nirspi_mcu::ntc::Thermistor;
+
+/// The thermistor at the LED array, and the resistor in series with it. An array with another
+/// thermistor needs other numbers here.
+pub const THERMISTOR: Thermistor = Thermistor::REFERENCE;

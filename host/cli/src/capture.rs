@@ -134,7 +134,8 @@ fn say(args: &Args, report: &CaptureReport<'_>) -> Result<ExitCode> {
             report.frames_per_s,
             report.seconds,
             report.bytes as f64 / 1e6,
-        ))
+        ))?;
+        report.signal.iter().try_for_each(print::line)
     })?;
     if let Some(missing) = &report.missing {
         let received = count(frames.received, "received frame");

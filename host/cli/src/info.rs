@@ -45,6 +45,7 @@ fn say(report: &Info) -> Result<()> {
         .map_or_else(|| "no temperature sensor".to_owned(), |celsius| format!("{celsius:.1} °C"));
     let interlock = if report.interlock_closed { "closed" } else { "open" };
     print::line(format_args!("{}, {sensor}, interlock {interlock}", report.state))?;
+    report.signal.iter().try_for_each(print::line)?;
     for Part { name, camera, expected, advice, .. } in &report.parts {
         let verdict = advice.as_deref().unwrap_or("as expected");
         print::line(format_args!("{name:<13} {camera:<9} expected {expected:<9} {verdict}"))?;

@@ -103,6 +103,12 @@ impl DropArgs {
         law.drops(self.rate_mm_h).map_err(|error| Usage(error.to_string()).into())
     }
 
+    /// The rate asked for, where the drops of the law carry another one.
+    fn asked_mm_per_h(&self) -> Option<f64> {
+        let law = self.drops.parse::<DropLaw>().ok()?;
+        law.is_fitted().then_some(self.rate_mm_h)
+    }
+
     fn is_file(&self) -> bool {
         is_drop_file(&self.drops)
     }
@@ -134,6 +140,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         let radar = !name.starts_with("fog");
         let report = rain::rain(name, &drops, &args.wavelengths_nm, args.distance_m, radar)
             .map_err(refused)?;
+        let report = RainReport { asked_mm_per_h: args.drops.asked_mm_per_h(), ..report };
         if let Some(path) = &args.out {
             let curves = curves::curves(name, &drops, &args.wavelengths_nm).map_err(refused)?;
             let mut out = OutputDir::create(path)?;
@@ -173,9 +180,12 @@ fn sphere(args: &Args) -> Result<ExitCode> {
 
 fn say(report: &RainReport) -> Result<()> {
     print::line(format_args!(
-        "{}: {:.2} mm/h, {:.4} g/m3 of water in {:.0} drops a cubic metre{}",
+        "{}: {:.2} mm/h{}, {:.4} g/m3 of water in {:.0} drops a cubic metre{}",
         report.drops,
         report.rate_mm_per_h,
+        report.asked_mm_per_h.map_or_else(String::new, |asked| format!(
+            " by the drops that the law gives for {asked} mm/h"
+        )),
         report.water_g_per_m3,
         report.drops_per_m3,
         report.z_dr_db.map_or_else(String::new, |db| format!(", Z_dr {db:.2} dB"))

@@ -58,8 +58,10 @@ pub fn sphere(x: f64, index: Index) -> Result<SphereReport> {
 pub struct RainReport {
     /// The caller's name for the drops.
     pub drops: String,
-    /// Rain rate.
+    /// Rain rate: the volume of the drops at the speeds at which they fall.
     pub rate_mm_per_h: f64,
+    /// The rate for which a fitted law was asked; `null` where the drops carry the rate asked for.
+    pub asked_mm_per_h: Option<f64>,
     /// Drops in a cubic metre.
     pub drops_per_m3: f64,
     /// Water in the air.
@@ -182,6 +184,7 @@ pub fn rain(
     Ok(RainReport {
         drops: name.to_owned(),
         rate_mm_per_h: drops.rate_mm_per_h(),
+        asked_mm_per_h: None,
         drops_per_m3: drops.concentration_per_m3(),
         water_g_per_m3: drops.liquid_water_g_per_m3(),
         z_dr_db: drops_reflectivity_db(drops).filter(|_| radar),

@@ -209,6 +209,14 @@ impl Order {
         Ok(Rows::trusted(side, rows))
     }
 
+    /// The first named order that shows these rows in this sequence; `None` if none does. One row
+    /// alone is no order.
+    #[must_use]
+    pub fn of(rows: &[u32], side: Side) -> Option<Self> {
+        let mut named = Self::NAMED.iter().filter(|_| rows.len() > 1);
+        named.find(|named| (named.rows)(side).starts_with(rows)).map(|named| named.order.clone())
+    }
+
     /// The order's entry in the list, if it has a name.
     #[must_use]
     pub fn entry(&self) -> Option<&'static NamedOrder> {

@@ -5,6 +5,7 @@ use crate::account::LossCounters;
 use crate::calibration::{Choice, Origin};
 use crate::causes::in_one_line;
 use crate::session::CameraIdentity;
+use crate::signal::Signal;
 use serde::Serialize;
 use std::io;
 use std::path::Path;
@@ -40,6 +41,8 @@ pub struct CaptureReport<'r> {
     pub seconds: f64,
     /// Received frames a second.
     pub frames_per_s: f64,
+    /// What the camera's signal meter saw; `null` for a single frame.
+    pub signal: Option<Signal>,
     /// The ADC latency that was used.
     pub adc_latency_clocks: u8,
     /// Whether readings are corrected for the leak.
@@ -83,6 +86,7 @@ impl<'r> CaptureReport<'r> {
             missing,
             seconds,
             frames_per_s: counters.received as f64 / seconds,
+            signal: captured.status.as_ref().and_then(Signal::of),
             adc_latency_clocks: captured.setup.adc_latency,
             calibrated: captured.settling.is_some(),
             calibration: choice.used(captured).cloned(),

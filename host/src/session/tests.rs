@@ -62,6 +62,7 @@ const STATUS: Status = Status {
     duty_permille: 0,
     leds_on: false,
     interlock_closed: true,
+    signal: Tail(None),
 };
 
 fn reply(id: u16, answer: Answer<'_>) -> Vec<u8> {

@@ -2,7 +2,9 @@
 
 use super::support::*;
 use nirspi_wire::packet::{encode, unseal};
-use nirspi_wire::{Answer, Capabilities, Command, EventKind, Refusal, State, Tail, version};
+use nirspi_wire::{
+    Answer, Capabilities, Command, EventKind, Refusal, RunLength, State, Tail, version,
+};
 use std::vec::Vec;
 
 /// A whole packet with this payload.
@@ -98,4 +100,19 @@ fn a_host_greets_again_with_the_cameras_version() {
     assert!(matches!(newer, Ok(Answer::Hello(identity)) if identity.protocol == version::CURRENT));
     assert!(bench.ask(Command::Hello { protocol: version::CURRENT }).is_ok());
     bench.status();
+}
+
+#[test]
+fn the_signal_is_in_the_status_of_version_2_alone() {
+    for (protocol, has_signal) in [(1, false), (2, true)] {
+        let mut bench = Bench::new();
+        bench.ask(Command::Hello { protocol }).unwrap();
+        assert_eq!(bench.status().signal, Tail(has_signal.then_some(None)), "no run yet");
+        bench.ask(Command::Configure(SMALL)).unwrap();
+        bench.ask(Command::Start(RunLength::Frames(2))).unwrap();
+        bench.frame();
+        bench.frame();
+        let Tail(signal) = bench.status().signal;
+        assert_eq!(signal.map(|signal| signal.is_some()), has_signal.then_some(true));
+    }
 }

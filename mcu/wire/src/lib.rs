@@ -47,7 +47,7 @@ pub use message::{
     Answer, Capabilities, Command, ConfigField, ConfigProblem, Configuration, CrashReport, Depth,
     DeviceMessage, Event, EventKind, Fault, Frame, FrameFlags, GatewareChunk, Identity,
     PatternOrder, Raw, RebootInto, Refusal, Reply, Request, RunLength, SampleSource,
-    SelfTestReport, State, Status, Version,
+    SelfTestReport, Signal, State, Status, Version,
 };
 pub use packet::{Deframed, Deframer, PacketError, encode, open};
 pub use samples::Samples;

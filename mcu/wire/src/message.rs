@@ -569,6 +569,30 @@ pub struct Status {
     pub leds_on: bool,
     /// Whether the interlock is closed.
     pub interlock_closed: bool,
+    /// What the detector saw lately; `None` before a run has shown two frames. Since version 2.
+    pub signal: Tail<Option<Signal>>,
+}
+
+/// What the detector saw in two successive frames of this run or the last one, for alignment and gain. Counts are those of
+/// a single ADC sample: sums are divided by their samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Signal {
+    /// Mean of the samples, in thousandths of a count: light, ambient light and the ADC's zero.
+    pub mean_milli_counts: u32,
+    /// What the readings of the patterns differ by, root mean square, without the noise, in thousandths of a count.
+    pub signal_milli_counts: u32,
+    /// What a reading changes by from frame to frame, root mean square over the square root of 2, in thousandths of a
+    /// count. A moving scene counts as noise.
+    pub noise_milli_counts: u32,
+    /// Signal to noise, in hundredths of a decibel: -20 dB where the noise hides the signal, 120 dB where no reading changes.
+    pub snr_centi_db: i16,
+    /// Samples outside the ADC's range, in millionths of all samples of the second frame.
+    pub over_range_ppm: u32,
+}
+
+impl Signal {
+    /// The first protocol version that has a signal.
+    pub const SINCE: u16 = 2;
 }
 
 /// Outcome of the device's checks, one bit each.

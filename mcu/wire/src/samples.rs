@@ -52,10 +52,14 @@ impl<'a> Samples<'a> {
                 word.copy_from_slice(&(rounded(value, shift) as i32).to_le_bytes());
             }
         }
-        Self::from_parts(shift, buffer)
+        Self::packed(shift, buffer)
     }
 
-    fn from_parts(shift: u8, words: &'a [u8]) -> Result<Self, SamplesError> {
+    /// Samples that [`pack`](Self::pack) has packed with this shift.
+    ///
+    /// # Errors
+    /// If the shift is above [`MAX_SHIFT`], or the bytes are not whole words.
+    pub fn packed(shift: u8, words: &'a [u8]) -> Result<Self, SamplesError> {
         if shift > MAX_SHIFT || !words.len().is_multiple_of(4) {
             return Err(SamplesError);
         }
@@ -123,7 +127,7 @@ impl Serialize for Samples<'_> {
 impl<'de: 'a, 'a> Deserialize<'de> for Samples<'a> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let (shift, Block(words)) = Deserialize::deserialize(deserializer)?;
-        Self::from_parts(shift, words).map_err(|_| D::Error::custom("samples"))
+        Self::packed(shift, words).map_err(|_| D::Error::custom("samples"))
     }
 }
 

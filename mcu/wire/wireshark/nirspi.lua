@@ -190,6 +190,13 @@ local answers = {
         r:number("duty_permille")
         r:flag("leds_on")
         r:flag("interlock_closed")
+        if r:left() > 0 and r:flag("signal known") == "yes" then
+            for _, name in ipairs({ "mean_milli_counts", "signal_milli_counts", "noise_milli_counts" }) do
+                r:number(name)
+            end
+            r:signed("snr_centi_db")
+            r:number("over_range_ppm")
+        end
     end,
     SelfTest = function(r)
         r:number("checks that ran")

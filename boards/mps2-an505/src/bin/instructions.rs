@@ -30,7 +30,8 @@ use nirspi_wire::{
 };
 use static_cell::ConstStaticCell;
 
-const FRAMES: u32 = 16;
+/// A tenth of a second at 1000 frames a second: the signal meter compares one pair of frames.
+const FRAMES: u32 = 100;
 /// Instructions in a count of SysTick.
 const GRAIN: u32 = 50;
 const TRANSFER_BYTES: usize = 512;

@@ -132,6 +132,7 @@ impl Camera {
             duty_permille: 0,
             leds_on: false,
             interlock_closed: fault.is_none(),
+            signal: Tail(None),
         }
     }
 

@@ -47,6 +47,13 @@ impl DropLaw {
     /// The allowed texts.
     pub const EXPECTED: &str = "marshall-palmer, mono:MM, gamma:SHAPE,SLOPE or fog:UM,G";
 
+    /// Whether the law was fitted to measured drops of a rain rate, so that its own drops carry another
+    /// rate at the speeds at which they fall.
+    #[must_use]
+    pub fn is_fitted(&self) -> bool {
+        matches!(self, Self::MarshallPalmer)
+    }
+
     /// The drops of this law at a rain rate.
     ///
     /// # Errors

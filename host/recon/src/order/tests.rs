@@ -1,4 +1,19 @@
 use super::*;
+
+#[test]
+fn an_order_is_known_by_its_first_rows() {
+    let side = Side::INSTRUMENT;
+    for named in Order::NAMED {
+        let rows = named.order.rows(side).unwrap();
+        let found = Order::of(&rows.as_slice()[..700], side).unwrap();
+        assert_eq!(found.rows(side).unwrap().as_slice()[..700], rows.as_slice()[..700]);
+    }
+    let mut rows = Order::ZigZag.rows(side).unwrap().as_slice().to_vec();
+    rows.swap(5, 600);
+    assert_eq!(Order::of(&rows, side), None);
+    assert_eq!(Order::of(&rows[..1], side), None);
+}
+
 use proptest::prelude::*;
 
 fn side(n: u64) -> Side {

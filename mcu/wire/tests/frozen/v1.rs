@@ -136,6 +136,7 @@ pub fn device_messages() -> Vec<(DeviceMessage<'static>, &'static str)> {
                     duty_permille: 500,
                     leds_on: true,
                     interlock_closed: true,
+                    signal: Tail(None),
                 })),
             }),
             "00 03 00 02 02 00 c0 84 3d 03 de be 01 da be 01 03 01 02 04 d2 24 f4 03 01 01",
@@ -158,6 +159,7 @@ pub fn device_messages() -> Vec<(DeviceMessage<'static>, &'static str)> {
                     duty_permille: 0,
                     leds_on: false,
                     interlock_closed: false,
+                    signal: Tail(None),
                 })),
             }),
             "00 04 00 02 03 01 01 bf 3e ff ff ff ff ff ff ff ff ff 01 ff ff 03 00 00 00 00 00 00 \

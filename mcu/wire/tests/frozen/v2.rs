@@ -6,7 +6,8 @@
 use super::bytes::{holds, packet, unhex};
 use nirspi_wire::packet::{request_id, unseal};
 use nirspi_wire::{
-    Answer, Capabilities, DeviceMessage, Identity, Refusal, Reply, Request, Tail, Version, open,
+    Answer, Capabilities, DeviceMessage, Identity, Refusal, Reply, Request, Signal, State, Status,
+    Tail, Version, open,
 };
 
 /// Every message that is new, and the greeting with its tail.
@@ -18,6 +19,17 @@ pub fn device_messages() -> Vec<(DeviceMessage<'static>, &'static str)> {
             "00 01 00 00 02 01 02 03 00 01 02 01 62 01 73 20 c0 b2 cd 3b 0e 8e 0c 05",
         ),
         (DeviceMessage::Reply(Reply { id: 300, outcome: Err(Refusal::Unknown) }), "00 ac 02 01 0a"),
+        (status(Some(None)), "00 07 00 02 01 00 00 00 00 00 00 00 00 00 c4 13 f4 03 00 01 00"),
+        (
+            status(Some(Some(Signal {
+                mean_milli_counts: 8_192_000,
+                signal_milli_counts: 1_000,
+                noise_milli_counts: 10,
+                snr_centi_db: -150,
+                over_range_ppm: 3,
+            }))),
+            "00 07 00 02 01 00 00 00 00 00 00 00 00 00 c4 13 f4 03 00 01 01 80 80 f4 03 e8 07 0a ab 02 03",
+        ),
     ]
 }
 
@@ -35,6 +47,27 @@ fn greeting(capabilities: Tail<Capabilities>) -> DeviceMessage<'static> {
         capabilities,
     };
     DeviceMessage::Reply(Reply { id: 1, outcome: Ok(Answer::Hello(identity)) })
+}
+
+fn status(signal: Option<Option<Signal>>) -> DeviceMessage<'static> {
+    let status = Status {
+        state: State::Configured,
+        fault: None,
+        uptime_us: 0,
+        run: 0,
+        frames_made: 0,
+        frames_sent: 0,
+        frames_dropped: 0,
+        fpga_frames_lost: 0,
+        fpga_frames_corrupt: 0,
+        commands_damaged: 0,
+        temperature_centi_celsius: 1_250,
+        duty_permille: 500,
+        leds_on: false,
+        interlock_closed: true,
+        signal: Tail(signal),
+    };
+    DeviceMessage::Reply(Reply { id: 7, outcome: Ok(Answer::Status(status)) })
 }
 
 #[test]

@@ -6,7 +6,8 @@ use nirspi_wire::{
     Answer, Capabilities, Command, ConfigField, ConfigProblem, Configuration, CrashReport, Depth,
     DeviceMessage, Event, EventKind, Fault, Frame, FrameFlags, GatewareChunk, Identity,
     PatternOrder, Raw, RebootInto, Refusal, Reply, Request, RunLength, SampleSource, Samples,
-    SelfTestReport, State, Status, Tail, Version, message::GATEWARE_CHUNK_MAX, samples::Words,
+    SelfTestReport, Signal, State, Status, Tail, Version, message::GATEWARE_CHUNK_MAX,
+    samples::Words,
 };
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -163,6 +164,17 @@ prop_compose! {
 }
 
 prop_compose! {
+    fn signal()(
+        (mean_milli_counts, signal_milli_counts, noise_milli_counts) in any::<(u32, u32, u32)>(),
+        (snr_centi_db, over_range_ppm) in any::<(i16, u32)>(),
+    ) -> Signal {
+        Signal {
+            mean_milli_counts, signal_milli_counts, noise_milli_counts, snr_centi_db, over_range_ppm,
+        }
+    }
+}
+
+prop_compose! {
     fn status()(
         state in state(), fault in prop::option::of(fault()),
         (uptime_us, run, frames_made, frames_sent, frames_dropped)
@@ -170,11 +182,12 @@ prop_compose! {
         (fpga_frames_lost, fpga_frames_corrupt, commands_damaged) in any::<(u32, u32, u32)>(),
         (temperature_centi_celsius, duty_permille) in any::<(i16, u16)>(),
         (leds_on, interlock_closed) in any::<(bool, bool)>(),
+        signal in prop::option::of(prop::option::of(signal())),
     ) -> Status {
         Status {
             state, fault, uptime_us, run, frames_made, frames_sent, frames_dropped,
             fpga_frames_lost, fpga_frames_corrupt, commands_damaged, temperature_centi_celsius,
-            duty_permille, leds_on, interlock_closed,
+            duty_permille, leds_on, interlock_closed, signal: Tail(signal),
         }
     }
 }

@@ -1,0 +1,228 @@
+//! Signal meter: how strong the light is, how much of it depends on the pattern, and how much is
+//! noise. It helps to align the optics and to set the gain, without a reconstruction.
+//!
+//! Ten times a second the meter compares two successive frames of a run, reading by reading. What a
+//! reading changes by from one frame to the next is noise; what the readings of one frame differ by
+//! is signal and noise. The meter adds up integers while frames pass; [`Tally::signal`] computes
+//! counts and decibels in floating point when the host asks for the status.
+//!
+//! # Invariant
+//! No frame passes through floating point (`tests/tests/budgets.rs`:
+//! `only_the_telemetry_computes_with_floating_point`).
+
+use crate::configure::Setup;
+use crate::{Micros, float};
+use nirspi_wire::fpga::{FpgaFrame, Header};
+use nirspi_wire::register::mode;
+use nirspi_wire::{ADC_BITS, FrameFlags, Samples, Signal};
+
+/// Time between two comparisons.
+const PERIOD: Micros = Micros(100_000);
+
+/// Bits of a reading as the meter keeps it, sign included: the squares of 1024 differences of two
+/// such readings fit in 64 bits.
+const READING_BITS: u32 = 26;
+
+/// Decibels, in hundredths, where the signal drowns in the noise and where there is no noise.
+const SNR_CENTI_DB: (f32, f32) = (-2_000.0, 12_000.0);
+
+/// What one reading is the sum of.
+#[derive(Debug, Clone, Copy, Default)]
+struct Exposure {
+    /// ADC samples in each of the two sums of a pattern.
+    samples: u64,
+    /// Sums of a pattern in which there are samples: 2 with complements, else 1.
+    halves: u32,
+    /// ADC samples of a frame, blanked ones included.
+    clocks: u64,
+}
+
+impl Exposure {
+    fn of(setup: &Setup) -> Self {
+        let summed = u64::from(setup.dwell.saturating_sub(setup.blank));
+        Self {
+            samples: summed.saturating_mul(setup.sweeps.into()),
+            halves: if setup.mode & mode::DIFFERENTIAL == 0 { 1 } else { 2 },
+            clocks: setup.frame_clocks(),
+        }
+    }
+
+    /// Bits by which a reading is shifted right.
+    fn shift(&self) -> u32 {
+        let sample_bits = u64::BITS.saturating_sub(self.samples.leading_zeros());
+        let bits = sample_bits.saturating_add(u32::from(ADC_BITS)).saturating_add(1);
+        bits.saturating_sub(READING_BITS)
+    }
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Pair {
+    /// The next pair begins at this time.
+    Due(Micros),
+    /// The first frame of a pair has passed: its packed samples have this shift, and still lie in
+    /// the memory into which samples are packed.
+    Begun { sequence: u32, at: Micros, shift: u8 },
+}
+
+#[derive(Debug)]
+pub(crate) struct Meter {
+    exposure: Exposure,
+    pair: Pair,
+    last: Option<Tally>,
+}
+
+impl Meter {
+    pub const fn new() -> Self {
+        let exposure = Exposure { samples: 0, halves: 1, clocks: 0 };
+        Self { exposure, pair: Pair::Due(Micros(0)), last: None }
+    }
+
+    /// Forgets what the run before has shown.
+    pub fn start(&mut self, now: Micros, setup: &Setup) {
+        self.exposure = Exposure::of(setup);
+        self.pair = Pair::Due(now);
+        self.last = None;
+    }
+
+    /// Looks at an intact frame of the run before its samples are packed into `packed`, which still
+    /// holds the samples of the frame before.
+    pub fn compare(&mut self, frame: &FpgaFrame<'_>, packed: &[u8]) {
+        let Pair::Begun { sequence, at, shift } = self.pair else { return };
+        let header = &frame.header;
+        let length = usize::from(header.patterns).saturating_mul(4);
+        let before = packed.get(..length).and_then(|words| Samples::packed(shift, words).ok());
+        let follows = header.sequence == sequence.wrapping_add(1) && !has_wrapped(header);
+        self.pair = match before.filter(|_| follows) {
+            Some(before) => {
+                self.last = Some(self.tally(frame, before));
+                Pair::Due(Micros(at.0.saturating_add(PERIOD.0)))
+            }
+            None => Pair::Due(at),
+        };
+    }
+
+    /// Notes that the samples of an intact frame have been packed with this shift. Most frames cost
+    /// a comparison of two times.
+    pub fn keep(&mut self, now: Micros, header: &Header, shift: u8) {
+        if let Pair::Due(at) = self.pair
+            && now >= at
+            && !has_wrapped(header)
+        {
+            self.pair = Pair::Begun { sequence: header.sequence, at: now, shift };
+        }
+    }
+
+    /// Notes that the memory of packed samples holds something else now.
+    pub fn forget(&mut self) {
+        if let Pair::Begun { at, .. } = self.pair {
+            self.pair = Pair::Due(at);
+        }
+    }
+
+    /// What the last pair of this run or the last one has shown.
+    pub fn signal(&self) -> Option<Signal> {
+        self.last.as_ref().map(Tally::signal)
+    }
+
+    fn tally(&self, frame: &FpgaFrame<'_>, before: Samples<'_>) -> Tally {
+        let mut tally = Tally {
+            exposure: self.exposure,
+            over_range: frame.header.over_range,
+            ..Tally::default()
+        };
+        let shift = self.exposure.shift();
+        for (sums, before) in frame.sums().zip(before.iter()) {
+            let reading = shifted(sums.difference(), shift);
+            let change = reading.wrapping_sub(shifted(before, shift));
+            tally.readings = tally.readings.wrapping_add(1);
+            tally.levels = tally.levels.wrapping_add(sums.positive).wrapping_add(sums.negative);
+            tally.sum = tally.sum.wrapping_add(reading.into());
+            tally.squares = tally.squares.wrapping_add(square(reading));
+            tally.changes = tally.changes.wrapping_add(square(change));
+        }
+        tally
+    }
+}
+
+/// The frame's sums have wrapped, so they say nothing.
+fn has_wrapped(header: &Header) -> bool {
+    header.flags.contains(FrameFlags::OVERFLOW)
+}
+
+/// A pattern's reading in at most [`READING_BITS`].
+fn shifted(reading: i64, shift: u32) -> i32 {
+    // Up to 682 sweeps of three samples there is no shift, and a shift of 64 bits takes a dozen
+    // instructions.
+    if shift == 0 { reading as i32 } else { reading.wrapping_shr(shift) as i32 }
+}
+
+/// One instruction for the product of two words.
+fn square(value: i32) -> i64 {
+    i64::from(value).wrapping_mul(value.into())
+}
+
+/// Sums over the readings of a frame and the frame before.
+#[derive(Debug, Clone, Copy, Default)]
+struct Tally {
+    exposure: Exposure,
+    readings: u32,
+    /// Both sums of each pattern, added.
+    levels: u64,
+    sum: i64,
+    squares: i64,
+    /// Squares of the change of each reading.
+    changes: i64,
+    over_range: u32,
+}
+
+impl Tally {
+    /// Squares of the readings' distances from their mean. The products wrap, their sum does not:
+    /// it is at most `squares`, so it is right modulo 2^64 and in its range.
+    fn centred_squares(&self) -> u64 {
+        let readings = i64::from(self.readings);
+        let mean = self.sum.checked_div(readings).unwrap_or(0);
+        let twice = self.sum.wrapping_mul(2);
+        let shift = readings.wrapping_mul(mean).wrapping_sub(twice).wrapping_mul(mean);
+        self.squares.wrapping_add(shift).max(0).unsigned_abs()
+    }
+
+    /// Never inlined, so that a check of the machine code finds the floating point in this function
+    /// alone.
+    #[inline(never)]
+    fn signal(&self) -> Signal {
+        let Self { exposure: Exposure { samples, halves, clocks }, readings, .. } = *self;
+        let readings = readings as f32;
+        let samples = float::from_u64(samples.max(1));
+        let mean = float::from_u64(self.levels) / (samples * halves as f32 * readings);
+        // Mean squares, in shifted readings.
+        let noise = float::from_u64(self.changes.unsigned_abs()) / (2.0 * readings);
+        let signal = float::from_u64(self.centred_squares()) / readings - noise;
+        let counts = float::power_of_two(self.exposure.shift()) / samples;
+        let (least, most) = SNR_CENTI_DB;
+        let snr = if noise > 0.0 && signal > 0.0 {
+            1_000.0 * core::f32::consts::LOG10_E * float::ln(signal / noise)
+        } else if noise > 0.0 {
+            least
+        } else {
+            most
+        };
+        let over_range = u64::from(self.over_range).saturating_mul(1_000_000);
+        Signal {
+            mean_milli_counts: rounded(1_000.0 * mean),
+            signal_milli_counts: rounded(1_000.0 * counts * float::root(signal)),
+            noise_milli_counts: rounded(1_000.0 * counts * float::root(noise)),
+            snr_centi_db: snr.clamp(least, most) as i16,
+            over_range_ppm: u32::try_from(over_range.checked_div(clocks).unwrap_or(0))
+                .unwrap_or(u32::MAX),
+        }
+    }
+}
+
+/// The nearest integer; numbers out of range end at the range.
+fn rounded(value: f32) -> u32 {
+    (value + 0.5) as u32
+}
+
+#[cfg(test)]
+#[path = "tests/meter.rs"]
+mod tests;
