@@ -23,13 +23,13 @@ use std::process::ExitCode;
 ///
 /// The command prints the address of the page. The page shows images, estimated blur and noise, rates, the account of all
 /// frames and the camera's events. Controls on the page choose the method, switch the enhancement, and say how many frames
-/// are summed. If the link to the camera is lost, the program opens the camera again. After a fault, a person must allow the
-/// LEDs to go on, on the page. Only browsers on this machine can open the page, unless --listen says otherwise. Ctrl-C
-/// switches the LEDs off and ends the program.
+/// are summed. The stop button, Escape and the space bar switch the LEDs off. If the link to the camera is lost, the program
+/// opens the camera again. After a stop or a fault, a person must allow the LEDs to go on, on the page. Only browsers on this
+/// machine can open the page, unless --listen says otherwise. Ctrl-C switches the LEDs off and ends the program.
 ///
 /// For scripts: GET /api/state (JSON: account, rates, versions, settings), /image.png (32 x 32), /enhanced.png (64 x 64) and
-/// /events (a stream of states with images). POST /api/settings takes {"method": "tv", "enhance": true, "frames": 64, "resume": true}
-/// or a part of that; "frames" is --sum. --backend holds for the networks, too.
+/// /events (a stream of states with images). POST /api/settings takes {"method": "tv", "enhance": true, "frames": 64} or a part
+/// of that; "frames" is --sum. POST /api/stop switches the LEDs off, POST /api/start on. --backend holds for the networks, too.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi serve\n\

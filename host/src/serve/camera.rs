@@ -2,10 +2,12 @@
 //! the camera has gone.
 //!
 //! # Invariant
-//! The thread waits for the camera only. After a fault the LEDs go on again only when a person asks
-//! (`after_a_fault_leds_go_on_again_only_when_a_person_says_so` in `host/src/serve/tests.rs`).
+//! The thread waits for the camera only. After a fault or a stop the LEDs go on again only when a
+//! person asks (`after_a_fault_leds_go_on_again_only_when_a_person_says_so` and
+//! `a_person_stops_a_camera_and_only_a_person_starts_it_again` in `host/src/serve/tests.rs`).
 
 use super::camera_log::Phase;
+use super::light::Leds;
 use super::slot::{Look, RunSetup};
 use super::{ForeignError, Shared, lock};
 use crate::account::LossCounters;
@@ -14,21 +16,24 @@ use crate::capture::{
     Calibration, CaptureError, CaptureOptions, Ended, Observer, Progress, observe,
 };
 use crate::integrate::Newest;
-use crate::session::{IgnorePackets, Session, SessionError};
+use crate::session::{IgnorePackets, Listener, Session, SessionError, request};
 use crate::setup::MeasurementSetup;
 use crate::{causes, events};
 use nirspi_nets::DepthMaps;
 use nirspi_optics::{CameraModel, SIDE};
-use nirspi_wire::{Depth, DeviceMessage, EventKind, Fault, Frame, Refusal};
+use nirspi_wire::{
+    Depth, DeviceMessage, EventKind, Fault, Frame, PacketError, Refusal, State as Device,
+};
 use std::ops::ControlFlow;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 /// Time between two attempts to reconnect.
 const RETRY: Duration = Duration::from_secs(1);
 /// Time between two checks whether to stop.
 const TICK: Duration = Duration::from_millis(50);
+/// Time between two questions to a camera whose LEDs a person switched off.
+const ASK: Duration = Duration::from_secs(1);
 
 /// A camera that has answered, and its response.
 pub struct Connected {
@@ -57,7 +62,7 @@ pub struct CameraSource {
     pub connect: Connect,
 }
 
-/// Why a run ended.
+/// Why a session ended.
 enum End {
     /// The server is stopping.
     Told,
@@ -103,7 +108,7 @@ pub fn run(
                 }
                 Err(problem) => {
                     let problem = causes::in_one_line(&*problem);
-                    lock(&shared.camera).enter(Phase::Lost, format!("{problem}; trying again"));
+                    shared.enter(Phase::Lost, Leds::Unknown, format!("{problem}; trying again"));
                     shared.rest(RETRY);
                     continue;
                 }
@@ -113,7 +118,7 @@ pub fn run(
         person_said = false;
         let end = match standing {
             Some(fault) => End::Fault(fault),
-            None => live.measure(&mut connected, source.setup.clone())?,
+            None => live.session(&mut connected, &source.setup)?,
         };
         // The old link is closed before reconnecting.
         drop(connected);
@@ -145,23 +150,75 @@ fn standing_fault(session: &mut Session) -> Option<Fault> {
 
 /// Reports that the link is gone, and waits before reconnecting.
 fn gone(shared: &Shared, why: &str) {
-    let mut log = lock(&shared.camera);
-    log.event(why.to_owned());
-    log.enter(Phase::Lost, format!("{why}; trying again"));
-    drop(log);
+    lock(&shared.camera).event(why.to_owned());
+    shared.enter(Phase::Lost, Leds::Unknown, format!("{why}; trying again"));
     shared.rest(RETRY);
 }
 
-/// Waits until a person allows the LEDs to go on again.
+/// Switches light off, and waits until a person switches it on again.
 fn await_person(shared: &Shared, phase: Phase, line: String) {
-    lock(&shared.camera).enter(phase, line);
-    shared.resume.store(false, Ordering::Relaxed);
-    while !shared.is_over() && !shared.resume.swap(false, Ordering::Relaxed) {
+    shared.light.set(false);
+    shared.enter(phase, Leds::Off, line);
+    while !shared.is_over() && !shared.light.is_on() {
         std::thread::sleep(TICK);
     }
 }
 
+/// Keeps a camera whose LEDs a person switched off, until a person switches them on again.
+///
+/// # Errors
+/// If the link ends.
+fn stopped(shared: &Shared, session: &mut Session) -> Result<(), SessionError> {
+    let mut asked: Option<Instant> = None;
+    let line = "stopped: a person switched the LEDs off";
+    while !shared.is_over() && !shared.light.is_on() {
+        if asked.is_none_or(|asked| asked.elapsed() > ASK) {
+            // The camera's own word counts, whatever was sent before.
+            let dark = session.status(&mut EventLog(shared))?.state != Device::Running;
+            if !dark {
+                session.command(request::Stop, &mut EventLog(shared))?;
+            }
+            asked = dark.then(Instant::now);
+            let leds = if dark { Leds::Off } else { Leds::On };
+            shared.enter(Phase::Stopped, leds, line.to_owned());
+        }
+        session.listen(TICK, &mut EventLog(shared))?;
+        // The link in memory does not wait.
+        std::thread::sleep(TICK);
+    }
+    Ok(())
+}
+
+/// Adds events to the log, and ignores frames.
+struct EventLog<'s>(&'s Shared);
+
+impl Listener for EventLog<'_> {
+    fn packet(&mut self, _: &[u8], content: &Result<DeviceMessage<'_>, PacketError>) {
+        if let Some(text) = content.as_ref().ok().and_then(in_words) {
+            lock(&self.0.camera).event(text);
+        }
+    }
+}
+
+/// An event or a crash in words; `None` for any other message.
+fn in_words(message: &DeviceMessage<'_>) -> Option<String> {
+    match message {
+        DeviceMessage::Event(event) => Some(events::as_it_happens(&event.kind)),
+        DeviceMessage::Crash(report) => Some(events::crash(report)),
+        _ => None,
+    }
+}
+
 impl Shared {
+    /// Records a new phase, and tells pages at once.
+    fn enter(&self, phase: Phase, leds: Leds, line: String) {
+        let mut log = lock(&self.camera);
+        log.camera.leds = leds;
+        log.enter(phase, line);
+        drop(log);
+        self.slot.wake();
+    }
+
     /// Waits for `time`, or until the server stops.
     fn rest(&self, time: Duration) {
         let started = Instant::now();
@@ -188,13 +245,14 @@ struct Live<'s> {
 }
 
 impl Live<'_> {
-    /// One run. Fails only if the run is the first and cannot begin.
-    fn measure(
+    /// One session: runs, and pauses without light between the runs. Fails only if the first run of
+    /// all cannot begin.
+    fn session(
         &mut self,
         connected: &mut Connected,
-        setup: MeasurementSetup,
+        setup: &MeasurementSetup,
     ) -> Result<End, CaptureError> {
-        let Connected { session, calibration, note, flat_field } = connected;
+        let Connected { session, note, flat_field, .. } = connected;
         for text in session.reports().iter().cloned().chain(note.take()) {
             lock(&self.shared.camera).event(text);
         }
@@ -202,37 +260,66 @@ impl Live<'_> {
             lock(&self.shared.camera).event(kept.summary());
         }
         self.flat_field = flat_field.as_ref().map(|kept| kept.flat.clone());
-        let calibration = calibration.clone();
-        let options = CaptureOptions { setup, frames: None, calibration, record: None };
+        while !self.shared.is_over() {
+            let end = if self.shared.light.is_on() {
+                self.measure(connected, setup.clone())?
+            } else {
+                let stopped = stopped(self.shared, &mut connected.session);
+                stopped.err().map(|error| End::Gone(causes::in_one_line(&error)))
+            };
+            if let Some(end) = end {
+                return Ok(end);
+            }
+        }
+        Ok(End::Told)
+    }
+
+    /// One run. `None` if the run was stopped from here. Fails only if the run is the first of all
+    /// and cannot begin.
+    fn measure(
+        &mut self,
+        connected: &mut Connected,
+        setup: MeasurementSetup,
+    ) -> Result<Option<End>, CaptureError> {
+        let Connected { session, calibration, .. } = connected;
+        let options =
+            CaptureOptions { setup, frames: None, calibration: calibration.clone(), record: None };
         (self.now, self.fault) = (None, None);
+        let line = "preparing: latency and settling are measured, or the setup is sent";
+        self.shared.enter(Phase::Preparing, Leds::On, line.to_owned());
         let captured = match observe(session, &options, self) {
             Ok(captured) => captured,
             Err(error @ CaptureError::Calibration(_)) => {
-                return Ok(End::Uncalibrated(causes::in_one_line(&error)));
+                return Ok(Some(End::Uncalibrated(causes::in_one_line(&error))));
             }
-            Err(CaptureError::Stopped) => return Ok(End::Told),
+            Err(CaptureError::Stopped) => return Ok(None),
             Err(error) if !self.begun => return Err(error),
             // The cause of the fault persists. When the cause is gone, the LEDs must not go on by
             // themselves.
             Err(CaptureError::Session(SessionError::Refused {
                 refusal: Refusal::Fault(fault),
                 ..
-            })) => return Ok(End::Fault(fault)),
-            Err(error) => return Ok(End::Gone(causes::in_one_line(&error))),
+            })) => return Ok(Some(End::Fault(fault))),
+            Err(error) => return Ok(Some(End::Gone(causes::in_one_line(&error)))),
         };
         self.earlier = self.earlier + captured.counters;
         self.shared.slot.account(self.earlier);
         let missing = captured.missing();
+        // A calibration holds for all runs of a session. Patterns without complements need the dark
+        // level of each run.
+        if let Some(settling) = captured.settling.filter(|_| captured.setup.differential) {
+            connected.calibration = Calibration::Kept(settling);
+        }
         Ok(match (self.fault, captured.ended) {
             // The link may be lost right after the fault.
-            (Some(fault), _) | (None, Ended::Fault(fault)) => End::Fault(fault),
+            (Some(fault), _) | (None, Ended::Fault(fault)) => Some(End::Fault(fault)),
             (None, Ended::LinkLost(error) | Ended::Unconfirmed(error)) => {
-                End::Gone(causes::in_one_line(&error))
+                Some(End::Gone(causes::in_one_line(&error)))
             }
             (None, Ended::WrongNumber { .. } | Ended::Junk { .. }) => {
-                End::Gone(missing.unwrap_or_default())
+                Some(End::Gone(missing.unwrap_or_default()))
             }
-            (None, Ended::Complete | Ended::Stopped) => End::Told,
+            (None, Ended::Complete | Ended::Stopped) => None,
         })
     }
 }
@@ -267,26 +354,26 @@ impl Observer for Live<'_> {
     }
 
     fn message(&mut self, message: &DeviceMessage<'_>) {
-        let text = match message {
+        match message {
+            DeviceMessage::Depth(depth) => {
+                self.depth = depth_map(&self.model, depth).map(Arc::new);
+            }
             DeviceMessage::Event(event) => {
                 if let EventKind::Fault(fault) = event.kind {
                     self.fault = Some(fault);
                 }
-                events::as_it_happens(&event.kind)
             }
-            DeviceMessage::Crash(report) => events::crash(report),
-            DeviceMessage::Depth(depth) => {
-                self.depth = depth_map(&self.model, depth).map(Arc::new);
-                return;
-            }
-            _ => return,
-        };
-        lock(&self.shared.camera).event(text);
+            _ => {}
+        }
+        if let Some(text) = in_words(message) {
+            lock(&self.shared.camera).event(text);
+        }
     }
 
     fn watch(&mut self, progress: &Progress) -> ControlFlow<()> {
         self.shared.slot.account(self.earlier + progress.counters);
-        if self.shared.is_over() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        let goes_on = !self.shared.is_over() && self.shared.light.is_on();
+        if goes_on { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
     }
 }
 

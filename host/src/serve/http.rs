@@ -8,19 +8,20 @@
 
 use super::settings::Change;
 use super::state::Published;
-use super::{Shared, guard, lock};
+use super::{Shared, guard, lock, page};
 use crate::files::image::encode_grey;
 use axum::body::Bytes;
 use axum::extract::{DefaultBodyLimit, Request, State};
 use axum::http::{HeaderName, HeaderValue, StatusCode, header};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::sse::{Event, Sse};
-use axum::response::{Html, IntoResponse, Response};
+use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use axum::serve::ListenerExt;
 use axum::{Router, serve};
 use futures_util::stream::{Stream, unfold};
 use nirspi_nets::{deblur, fusion};
+use serde::Serialize;
 use std::convert::Infallible;
 use std::io;
 use std::net::{SocketAddr, TcpListener};
@@ -34,14 +35,12 @@ const TICK: Duration = Duration::from_millis(50);
 /// The most bytes of a settings message.
 const MAX_CHANGE_BYTES: usize = 4096;
 
-const PAGE: &str = include_str!("page.html");
-
 /// Security headers for every response: no external content, no framing, no caching.
 const HEADERS: [(HeaderName, &str); 5] = [
     (
         header::CONTENT_SECURITY_POLICY,
-        "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; connect-src 'self'; img-src data:; \
-         base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+        "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src data: blob:; base-uri 'none'; \
+         form-action 'none'; frame-ancestors 'none'",
     ),
     (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
     (header::REFERRER_POLICY, "no-referrer"),
@@ -66,10 +65,12 @@ pub fn run(
 ) -> io::Result<()> {
     let app = App { shared, published, listen: listener.local_addr()? };
     let router = Router::new()
-        .route("/", get(Html(PAGE)))
+        .merge(page::routes())
         .route("/events", get(events))
         .route("/api/state", get(state))
         .route("/api/settings", post(settings))
+        .route("/api/stop", post(stop))
+        .route("/api/start", post(start))
         .route("/image.png", get(image))
         .route("/enhanced.png", get(enhanced))
         .fallback(nothing_there)
@@ -112,7 +113,8 @@ fn line(status: StatusCode, text: &impl ToString) -> Response {
 }
 
 async fn nothing_there() -> Response {
-    let there = "nothing there, expected /, /events, /api/state, /api/settings, /image.png or /enhanced.png";
+    let there = "nothing there, expected /, /events, /api/state, /api/settings, /api/stop, /api/start, \
+                 /image.png or /enhanced.png";
     line(StatusCode::NOT_FOUND, &there)
 }
 
@@ -148,23 +150,55 @@ fn png(side: usize, pixels: Option<&[f32]>) -> Response {
 
 /// Applies a change, and answers with the new settings.
 async fn settings(State(app): State<App>, body: Bytes) -> Response {
-    let mut settings = lock(&app.shared.settings);
+    let shared = &app.shared;
+    let mut settings = lock(&shared.settings);
     let changed = Change::parse(&body).and_then(|change| {
-        let settings = settings.with(&change, &app.shared.methods)?;
-        Ok((settings, change.resume))
+        let settings = settings.with(&change, &shared.methods)?;
+        Ok((settings, change.run))
     });
     match changed {
         Err(error) => line(StatusCode::BAD_REQUEST, &error),
-        Ok((changed, resume)) => {
+        Ok((changed, run)) => {
             *settings = changed;
-            if resume {
-                app.shared.resume.store(true, Ordering::Relaxed);
+            drop(settings);
+            if let Some(on) = run {
+                shared.light.set(on);
             }
-            match serde_json::to_string(&changed) {
-                Ok(text) => json(format!("{text}\n")),
-                Err(error) => line(StatusCode::INTERNAL_SERVER_ERROR, &error),
-            }
+            shared.slot.wake();
+            answer(&changed)
         }
+    }
+}
+
+/// Switches the LEDs off. The request needs no body, so nothing in it can be refused.
+async fn stop(State(app): State<App>) -> Response {
+    switch(&app.shared, false)
+}
+
+/// Allows the LEDs to go on.
+async fn start(State(app): State<App>) -> Response {
+    switch(&app.shared, true)
+}
+
+/// The answer to a command for the LEDs.
+#[derive(Serialize)]
+struct Switched {
+    /// Whether light is allowed now.
+    run: bool,
+    /// The number of this command; later commands have larger numbers.
+    command: u64,
+}
+
+fn switch(shared: &Shared, on: bool) -> Response {
+    let command = shared.light.set(on);
+    shared.slot.wake();
+    answer(&Switched { run: on, command })
+}
+
+fn answer(value: &impl Serialize) -> Response {
+    match serde_json::to_string(value) {
+        Ok(text) => json(format!("{text}\n")),
+        Err(error) => line(StatusCode::INTERNAL_SERVER_ERROR, &error),
     }
 }
 

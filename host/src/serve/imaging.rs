@@ -6,7 +6,7 @@
 
 use super::settings::Settings;
 use super::slot::Look;
-use super::state::{Offered, Published, Rate, Rates, State};
+use super::state::{Light, Offered, Published, Rate, Rates, State};
 use super::{Shared, lock};
 use crate::causes;
 use crate::imaging::{
@@ -120,6 +120,7 @@ pub fn run(shared: &Shared, imaging: &Imaging, publish: &watch::Sender<Arc<Publi
         let state = State {
             program: env!("CARGO_PKG_VERSION"),
             camera: &log.camera,
+            light: Light { allowed: shared.light.is_on(), commands: shared.light.commands() },
             ledger,
             rates,
             settings,

@@ -16,6 +16,8 @@ mod camera_log;
 mod guard;
 mod http;
 mod imaging;
+mod light;
+mod page;
 pub mod settings;
 mod slot;
 mod state;
@@ -26,6 +28,7 @@ pub use slot::{ImageCounters, Ledger};
 
 use crate::capture::CaptureError;
 use camera_log::CameraLog;
+use light::LightSwitch;
 use nirspi_recon::reconstruct::Method;
 use settings::Settings;
 use slot::Slot;
@@ -65,8 +68,7 @@ struct Shared {
     methods: Vec<&'static str>,
     /// What each of these methods does; empty for a method that is not built in.
     about: Vec<&'static str>,
-    /// Set when a person allows the LEDs to go on again.
-    resume: AtomicBool,
+    light: LightSwitch,
     over: AtomicBool,
     viewers: AtomicUsize,
 }
@@ -79,7 +81,7 @@ impl Shared {
             settings: Mutex::new(settings),
             about: methods.iter().map(|name| name.parse().map_or("", Method::about)).collect(),
             methods,
-            resume: AtomicBool::new(false),
+            light: LightSwitch::on(),
             over: AtomicBool::new(false),
             viewers: AtomicUsize::new(0),
         }

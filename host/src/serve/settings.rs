@@ -33,9 +33,9 @@ pub struct Change {
     pub enhance: Option<bool>,
     /// Another number of frames.
     pub frames: Option<u32>,
-    /// Measures again after a fault: the LEDs go on.
-    #[serde(default)]
-    pub resume: bool,
+    /// Switches the LEDs on (and measures) or off. Of two changes the later one counts.
+    #[serde(alias = "resume")]
+    pub run: Option<bool>,
 }
 
 /// Why a change is refused.
@@ -125,7 +125,7 @@ mod tests {
     fn what_is_left_out_stays() {
         assert_eq!(asked("{}"), Ok(SETTINGS));
         assert_eq!(asked(r#"{"enhance": false}"#), Ok(Settings { enhance: false, ..SETTINGS }));
-        let all = asked(r#"{"method": "hadamard", "frames": 1024, "resume": true}"#);
+        let all = asked(r#"{"method": "hadamard", "frames": 1024, "run": true}"#);
         assert_eq!(all, Ok(Settings { method: "hadamard", frames: 1024, ..SETTINGS }));
     }
 

@@ -52,6 +52,15 @@ pub struct Rates {
     pub images_per_s: f64,
 }
 
+/// Whether persons allow light.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct Light {
+    /// The position of the switch.
+    pub allowed: bool,
+    /// The number of commands so far.
+    pub commands: u64,
+}
+
 /// The values that settings can have.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct Offered<'s> {
@@ -75,6 +84,8 @@ pub struct State<'s> {
     pub program: &'static str,
     /// The camera.
     pub camera: &'s CameraState,
+    /// Whether persons allow light.
+    pub light: Light,
     /// The account: `frames` and `images`.
     #[serde(flatten)]
     pub ledger: Ledger,

@@ -1,4 +1,5 @@
 use super::camera_log::Phase;
+use super::light::Leds;
 use super::*;
 use crate::capture::Calibration;
 use crate::link::{Link, Received};
@@ -41,15 +42,23 @@ struct Enclosed {
 struct Hands {
     open: AtomicBool,
     pulled: AtomicBool,
+    /// No byte arrives, in either direction.
+    stuck: AtomicBool,
 }
 
 impl Link for Enclosed {
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
-        self.camera.receive(bytes);
+        if !self.hands.stuck.load(Ordering::Relaxed) {
+            self.camera.receive(bytes);
+        }
         Ok(())
     }
 
-    fn receive(&mut self, buffer: &mut [u8], _: Duration) -> io::Result<Received> {
+    fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<Received> {
+        if self.hands.stuck.load(Ordering::Relaxed) {
+            std::thread::sleep(timeout);
+            return Ok(Received::Nothing);
+        }
         if self.hands.pulled.load(Ordering::Relaxed) {
             return Ok(Received::Closed);
         }
@@ -95,6 +104,7 @@ impl Lab {
             let setup = MeasurementSetup::new(&Order::CakeCutting, 0.125).unwrap();
             let connect: Connect = Box::new(move || {
                 hands.pulled.store(false, Ordering::Relaxed);
+                hands.stuck.store(false, Ordering::Relaxed);
                 Ok(enclosed(&hands, open_while_unplugged))
             });
             let model = nirspi_optics::CameraModel::default();
@@ -108,6 +118,10 @@ impl Lab {
 
     fn phase(&self) -> Phase {
         lock(&self.shared.camera).camera.phase
+    }
+
+    fn leds(&self) -> Leds {
+        lock(&self.shared.camera).camera.leds
     }
 
     fn received(&self) -> u64 {
@@ -125,7 +139,7 @@ impl Lab {
     #[track_caller]
     fn resumes(&self) {
         let before = self.received();
-        self.shared.resume.store(true, Ordering::Relaxed);
+        self.shared.light.set(true);
         until("on again", || self.received() > before + 10);
         assert_eq!(self.phase(), Phase::Measuring);
     }
@@ -150,7 +164,7 @@ fn after_a_fault_leds_go_on_again_only_when_a_person_says_so() {
         log.events().iter().filter(|event| event.text.starts_with("connected to")).count()
     };
     let before = connections();
-    lab.shared.resume.store(true, Ordering::Relaxed);
+    lab.shared.light.set(true);
     until("tried again", || connections() > before && lab.phase() == Phase::Fault);
     // The cause is gone, but a person has not asked.
     lab.hands.open.store(false, Ordering::Relaxed);
@@ -158,6 +172,38 @@ fn after_a_fault_leds_go_on_again_only_when_a_person_says_so() {
     lab.resumes();
     let told = lab.end();
     assert!(told.iter().any(|text| text.contains("LEDs off: the enclosure")), "{told:?}");
+}
+
+#[test]
+fn a_person_stops_a_camera_and_only_a_person_starts_it_again() {
+    let lab = Lab::new(false);
+    lab.shared.light.set(false);
+    until("stopped", || lab.phase() == Phase::Stopped && lab.leds() == Leds::Off);
+    let before = lab.received();
+    // A camera that was lost meanwhile comes back dark.
+    lab.hands.pulled.store(true, Ordering::Relaxed);
+    until("lost", || lab.phase() == Phase::Lost && lab.leds() == Leds::Unknown);
+    until("back", || lab.phase() == Phase::Stopped && lab.leds() == Leds::Off);
+    std::thread::sleep(Duration::from_millis(1500));
+    assert_eq!((lab.phase(), lab.received()), (Phase::Stopped, before));
+    lab.resumes();
+    assert_eq!(lab.leds(), Leds::On);
+    // A stop and a start at once: the later one counts.
+    lab.shared.light.set(false);
+    lab.resumes();
+    lab.end();
+}
+
+#[test]
+fn a_stop_counts_although_the_stream_is_stuck() {
+    let lab = Lab::new(false);
+    lab.hands.stuck.store(true, Ordering::Relaxed);
+    lab.shared.light.set(false);
+    // The camera does not answer the stop: what its LEDs do is not known, and the session is closed.
+    until("given up", || lab.phase() == Phase::Lost && lab.leds() == Leds::Unknown);
+    until("dark", || lab.phase() == Phase::Stopped && lab.leds() == Leds::Off);
+    lab.resumes();
+    lab.end();
 }
 
 #[test]

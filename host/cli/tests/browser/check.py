@@ -77,25 +77,80 @@ def switches(page):
     expect(page.locator("#no-enhanced")).to_be_visible()
 
 
+def leds(page, browser, address):
+    """Stop by button, by Escape and by space; start by a person; two pages show the same."""
+    other = browser.new_page()
+    other.goto(address)
+
+    def both(words, phase):
+        for each in [page, other]:
+            expect(each.locator("#leds")).to_have_text(words)
+            expect(each.locator("body")).to_have_attribute("data-phase", phase)
+
+    both("LEDs on", "measuring")
+    expect(page.locator("#stop")).to_contain_text("Esc")
+    page.locator("#stop").click()
+    both("LEDs off, stopped", "stopped")
+    other.locator("#start").click()
+    both("LEDs on", "measuring")
+    # A control has the focus: Escape stops all the same, and space presses the control.
+    page.get_by_label("hadamard").focus()
+    page.keyboard.press("Escape")
+    both("LEDs off, stopped", "stopped")
+    page.locator("#start").click()
+    both("LEDs on", "measuring")
+    page.get_by_label("omp").focus()
+    page.keyboard.press("Space")
+    expect(page.locator("#about-image")).to_contain_text("omp")
+    both("LEDs on", "measuring")
+    # After a click the button does not keep the focus.
+    with page.expect_download():
+        page.locator("#save").click()
+    page.keyboard.press("Space")
+    both("LEDs off, stopped", "stopped")
+    # A stop that does not arrive is said, and sent again.
+    page.locator("#start").click()
+    both("LEDs on", "measuring")
+    page.route("**/api/stop", lambda route: route.abort())
+    page.keyboard.press("Escape")
+    expect(page.locator("#alarm")).to_be_visible()
+    both_on = page.locator("#leds")
+    expect(both_on).to_have_text("LEDs on")
+    page.unroute("**/api/stop")
+    both("LEDs off, stopped", "stopped")
+    expect(page.locator("#alarm")).to_be_hidden()
+    other.locator("#start").click()
+    both("LEDs on", "measuring")
+    other.close()
+
+
 def fault(browser, address):
     """A camera that has switched its LEDs off, told to a page by hand."""
     page = browser.new_page()
     state = json.loads(page.request.get(f"{address}/api/state").body())
-    state["camera"] |= {"phase": "fault", "line": "the camera switched its LEDs off: Interlock"}
+    hostile = "<img src=x onerror=alert(1)>\u202egnp"
+    state["camera"] |= {"phase": "fault", "leds": "off", "line": f"the camera switched its LEDs off: {hostile}"}
+    state["camera"]["identity"] |= {"board": hostile, "serial": hostile}
+    state["light"]["allowed"] = False
     state["frames"]["lost"] = 7
     state["events"] = [{"unix_ms": 0, "text": "<b>not markup</b>"}]
     message = json.dumps({"state": state, "image": None, "enhanced": None})
     page.route("**/events", lambda route: route.fulfill(
         content_type="text/event-stream", body=f"retry: 100000\ndata: {message}\n\n"))
     wishes = []
-    page.route("**/api/settings", lambda route: (wishes.append(route.request.post_data_json), route.fulfill(json={})))
+    page.on("dialog", lambda dialog: wishes.append(dialog.message))
+    page.route("**/api/*", lambda route: (wishes.append(route.request.url), route.fulfill(json={})))
     page.goto(address)
     expect(page.locator("#account .loss")).to_have_text("7")
     expect(page.locator("#losses")).to_contain_text("7 lost, 0 corrupt")
     expect(page.locator("#events")).to_contain_text("<b>not markup</b>")
+    for name in ["camera", "line"]:
+        expect(page.locator(f"#{name}")).to_contain_text("<img src=x onerror=alert(1)>\\u{202e}gnp")
+    expect(page.locator("#start")).to_be_hidden()
     page.locator("#resume").click()
     page.wait_for_timeout(100)
-    assert wishes == [{"resume": True}], wishes
+    assert wishes == [f"{address}/api/start"], wishes
+    assert page.locator("img").count() == 0
     page.close()
 
 
@@ -125,12 +180,16 @@ def main():
             page.on("pageerror", lambda error: complaints.append(str(error)))
             page.on("console", lambda said: complaints.append(said.text) if said.type == "error" else None)
             live(page, address, arguments.screenshot)
+            leds(page, browser, address)
+            # The browser itself reports the request that was cut off.
+            complaints = [said for said in complaints if "ERR_FAILED" not in said]
             switches(page)
             assert not complaints, complaints
             fault(browser, address)
             phone(browser, address)
             server.send_signal(signal.SIGINT)
             expect(page.locator("#line")).to_contain_text("does not answer")
+            expect(page.locator("#leds")).to_have_text("LEDs unknown: the host program is gone")
             browser.close()
         said = server.stdout.read()
         assert server.wait(10) == 0 and said.startswith("stopped: "), said

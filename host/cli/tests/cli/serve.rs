@@ -139,9 +139,19 @@ fn a_browser_gets_the_page_and_a_script_the_images_of_the_scene() {
     let server = serve(&bench, &[]);
     let page = server.get("/");
     let html = String::from_utf8_lossy(&page.body);
-    assert!(page.head.contains("text/html") && html.contains("EventSource(\"/events\")"), "{html}");
-    // It works where there is no other network.
-    assert!(!html.contains("://"), "something from elsewhere");
+    assert!(page.head.contains("text/html") && html.contains("/page/main.js"), "{html}");
+    let modules =
+        ["main", "words", "dom", "light", "display", "controls", "facts", "save", "requests"];
+    let files = modules.map(|name| format!("/page/{name}.js"));
+    let mut scripts = String::new();
+    for file in files.iter().map(String::as_str).chain(["/page/style.css"]) {
+        let answer = server.get(file);
+        assert_eq!(answer.status, 200, "{file}");
+        scripts += &String::from_utf8(answer.body).unwrap();
+    }
+    assert!(scripts.contains("EventSource(\"/events"));
+    // The page works without any other network.
+    assert!(!(html + scripts.as_str()).contains("://"), "something from elsewhere");
     assert!(page.head.contains("frame-ancestors 'none'"), "{}", page.head);
 
     let state = server.state("enhanced", shows_enhanced);
@@ -257,6 +267,54 @@ fn pages_switch_method_enhancement_and_number_of_frames() {
 }
 
 #[test]
+fn a_page_switches_the_leds_off_and_on_and_the_last_of_two_commands_counts() {
+    let bench = Bench::new();
+    let server = serve(&bench, &[]);
+    let (mut first, mut second) = (server.browser(), server.browser());
+    let measuring = |state: &Value| state["camera"]["phase"] == "measuring";
+    server.state("measuring", measuring);
+    let stopped = server.ask("POST", "/api/stop", &[], "").json();
+    assert_eq!(stopped["run"], false);
+    // Both pages show the camera's own word.
+    let dark = |moment: &Value| {
+        let (camera, light) = (&moment["state"]["camera"], &moment["state"]["light"]);
+        camera["phase"] == "stopped" && camera["leds"] == "off" && light["allowed"] == false
+    };
+    assert!(first.any(|moment| dark(&moment)) && second.any(|moment| dark(&moment)));
+    let received = server.state("there", |_| true)["frames"]["received"].clone();
+    std::thread::sleep(Duration::from_millis(1500));
+    let state = server.state("there", |_| true);
+    assert_eq!(
+        (&state["camera"]["phase"], &state["frames"]["received"]),
+        (&"stopped".into(), &received)
+    );
+
+    // Commands of two pages at once, in turns.
+    let commands: Vec<Value> = std::thread::scope(|scope| {
+        let ask = |path: &'static str| scope.spawn(|| server.ask("POST", path, &[], "").json());
+        let paths = ["/api/start", "/api/stop", "/api/start", "/api/stop", "/api/start"];
+        let asked: Vec<_> = paths.into_iter().map(ask).collect();
+        asked.into_iter().map(|asked| asked.join().unwrap()).collect()
+    });
+    let last = commands.iter().max_by_key(|answer| answer["command"].as_u64()).unwrap();
+    let phase = if last["run"] == true { "measuring" } else { "stopped" };
+    for browser in [&mut first, &mut second] {
+        assert!(browser.any(|moment| {
+            let state = &moment["state"];
+            state["light"]["commands"] == last["command"]
+                && state["light"]["allowed"] == last["run"]
+                && state["camera"]["phase"] == phase
+        }));
+    }
+    server.change(r#"{"run": true}"#).json();
+    server.state("measuring again", |state| {
+        measuring(state)
+            && state["camera"]["leds"] == "on"
+            && state["frames"]["received"].as_u64() > received.as_u64()
+    });
+}
+
+#[test]
 fn pages_of_other_sites_get_nothing_and_change_nothing() {
     let bench = Bench::new();
     let server = serve(&bench, &[]);
@@ -269,7 +327,9 @@ fn pages_of_other_sites_get_nothing_and_change_nothing() {
         server.ask("GET", path, &origin, "").refuses(403, "another site");
     }
     for header in ["Host: evil.example:8080", "Origin: http://localhost:3000", "Origin: null"] {
-        assert_eq!(server.ask("POST", "/api/settings", &[header], wish).status, 403, "{header}");
+        for path in ["/api/settings", "/api/stop", "/api/start"] {
+            assert_eq!(server.ask("POST", path, &[header], wish).status, 403, "{header}");
+        }
     }
     assert_eq!(server.raw(b"GET / HTTP/1.0\r\n\r\n").status, 403);
     assert_eq!(server.state("there", |_| true)["settings"], state["settings"]);
