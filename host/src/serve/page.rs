@@ -10,7 +10,7 @@ const SCRIPT: &str = "text/javascript; charset=utf-8";
 const STYLE: &str = "text/css; charset=utf-8";
 
 /// Path, type and content of each file that the page loads.
-const FILES: [(&str, &str, &str); 10] = [
+const FILES: [(&str, &str, &str); 14] = [
     ("/page/style.css", STYLE, include_str!("page/style.css")),
     ("/page/main.js", SCRIPT, include_str!("page/main.js")),
     ("/page/words.js", SCRIPT, include_str!("page/words.js")),
@@ -21,6 +21,10 @@ const FILES: [(&str, &str, &str); 10] = [
     ("/page/facts.js", SCRIPT, include_str!("page/facts.js")),
     ("/page/save.js", SCRIPT, include_str!("page/save.js")),
     ("/page/requests.js", SCRIPT, include_str!("page/requests.js")),
+    ("/page/colours.js", SCRIPT, include_str!("page/colours.js")),
+    ("/page/history.js", SCRIPT, include_str!("page/history.js")),
+    ("/page/plots.js", SCRIPT, include_str!("page/plots.js")),
+    ("/page/scene.js", SCRIPT, include_str!("page/scene.js")),
 ];
 
 /// The routes of all files.

@@ -26,6 +26,15 @@ pub struct RunSetup {
     pub flat_field: Option<FlatField>,
 }
 
+/// A depth map in the camera's image.
+#[derive(Debug)]
+pub struct DepthImage {
+    /// The map for the networks.
+    pub map: DepthMaps,
+    /// (32, 32) distances in metres.
+    pub pixels_m: Vec<f32>,
+}
+
 /// The newest frames, and the newest depth map.
 #[derive(Debug, Clone)]
 pub struct Look {
@@ -34,7 +43,7 @@ pub struct Look {
     /// How the frames were measured.
     pub run: Arc<RunSetup>,
     /// The newest depth map.
-    pub depth: Option<Arc<DepthMaps>>,
+    pub depth: Option<Arc<DepthImage>>,
 }
 
 /// The account of all frames of all runs.

@@ -1,5 +1,7 @@
 use super::camera_log::Phase;
 use super::light::Leds;
+use super::settings::Measuring;
+use super::settings::tests::{offer, settings};
 use super::*;
 use crate::capture::Calibration;
 use crate::link::{Link, Received};
@@ -15,10 +17,16 @@ use std::time::{Duration, Instant};
 /// The longest wait of a test, enough for a busy machine.
 const LIMIT: Duration = Duration::from_secs(30);
 
-const SETTINGS: Settings = Settings { method: "hadamard", enhance: false, frames: 8 };
+fn setup() -> MeasurementSetup {
+    MeasurementSetup::new(&Order::CakeCutting, 0.125).unwrap()
+}
 
-fn shared(identity: &CameraIdentity) -> Arc<Shared> {
-    Arc::new(Shared::new(CameraLog::new("test", identity), vec!["hadamard"], SETTINGS))
+fn shared(identity: &CameraIdentity, scene: Option<StagedScene>) -> Arc<Shared> {
+    let measuring = Measuring::of(&setup());
+    let settings =
+        Settings { method: "hadamard", enhance: false, frames: 8, measuring, ..settings() };
+    let offer = Offer { base: Some(setup()), ..offer() };
+    Arc::new(Shared::new(CameraLog::new("test", identity), offer, settings, Stage::of(scene)))
 }
 
 /// Waits until `is_so` returns true.
@@ -98,17 +106,23 @@ impl Lab {
     fn new(open_while_unplugged: bool) -> Self {
         let hands = Arc::<Hands>::default();
         let first = enclosed(&hands, false);
-        let shared = shared(first.session.identity());
+        let shared = shared(first.session.identity(), None);
         let measuring = {
             let (shared, hands) = (Arc::clone(&shared), Arc::clone(&hands));
-            let setup = MeasurementSetup::new(&Order::CakeCutting, 0.125).unwrap();
-            let connect: Connect = Box::new(move || {
+            let connect: Connect = Box::new(move |_| {
                 hands.pulled.store(false, Ordering::Relaxed);
                 hands.stuck.store(false, Ordering::Relaxed);
                 Ok(enclosed(&hands, open_while_unplugged))
             });
             let model = nirspi_optics::CameraModel::default();
-            let source = CameraSource { address: "test".to_owned(), setup, model, connect };
+            let source = CameraSource {
+                address: "test".to_owned(),
+                setup: setup(),
+                model,
+                scene: None,
+                record_to: None,
+                connect,
+            };
             std::thread::spawn(move || camera::run(&shared, source, first))
         };
         let lab = Self { hands, shared, measuring };
@@ -225,15 +239,15 @@ fn a_camera_that_comes_back_measures_on_unless_it_was_opened_meanwhile() {
 #[test]
 fn a_browser_that_does_not_read_costs_nobody_and_then_sees_the_newest() {
     const LAST: usize = 60;
-    let shared = shared(enclosed(&Arc::default(), false).session.identity());
+    let shared = shared(enclosed(&Arc::default(), false).session.identity(), None);
     let (publish, published) = watch::channel(Arc::new(Published::default()));
-    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-    let address = listener.local_addr().unwrap();
+    let server = Server::bind("127.0.0.1:0", None).unwrap();
+    let address = server.address;
     let serving = {
         let shared = Arc::clone(&shared);
         std::thread::spawn(move || {
             let over = Arc::clone(&shared);
-            http::run(listener, shared, published, || over.is_over())
+            http::run(server, shared, published, || over.is_over())
         })
     };
     let browser = || {

@@ -10,6 +10,8 @@ export const MEANINGS = {
   "order": "Which rows of the Hadamard matrix are shown, and in which sequence.",
   "patterns": "Which of the 1024 LEDs are lit at one time: a row of the Hadamard matrix.",
   "received": "Frames that arrived intact and in sequence.",
+  "sampling": "Share of all 1024 patterns that is shown.",
   "settling": "How the light of a pattern rises and falls in time, measured once against a white sheet; with it, the leak from pattern to pattern is undone.",
+  "sweep": "All patterns of the order shown once, each followed by its complement in a differential measurement.",
   "white": "The reading that counts as 1 in an image: the mean of the brightest 2 x 2 pixels, or what a white sheet gives.",
 };
