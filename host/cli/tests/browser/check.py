@@ -11,10 +11,13 @@ import json
 import signal
 import struct
 import subprocess
+import sys
 import tempfile
 
 from playwright.sync_api import expect, sync_playwright
 
+# No compiled files beside the sources.
+sys.dont_write_bytecode = True
 import controls
 from pictures import LEVELS, fits, levels, seen
 
