@@ -196,7 +196,7 @@ def main():
             phone(browser, address)
             server.send_signal(signal.SIGINT)
             expect(page.locator("#line")).to_contain_text("does not answer")
-            expect(page.locator("#leds")).to_have_text("LEDs unknown: the host program is gone")
+            expect(page.locator("#leds")).to_have_text("LEDs unknown: no answer from nirspi serve")
             browser.close()
         said = server.stdout.read()
         assert server.wait(10) == 0 and said.startswith("stopped: "), said

@@ -68,6 +68,6 @@ export function show({ camera, light }) {
 // The server does not answer.
 export function showGone() {
   document.body.dataset.leds = "unknown";
-  text($("leds"), "LEDs unknown: the host program is gone");
+  text($("leds"), "LEDs unknown: no answer from nirspi serve");
   $("start").hidden = true;
 }
