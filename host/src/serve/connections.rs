@@ -185,7 +185,7 @@ impl Listener for Door {
             };
             let peer = Peer { connections: self.connections.clone(), number };
             let silent = Box::pin(sleep(SILENT));
-            return (Guarded { stream, peer: peer.clone(), closed, silent }, peer);
+            return (Guarded { stream, peer: peer.clone(), closed, silent, ended: false }, peer);
         }
     }
 
@@ -207,16 +207,17 @@ pub struct Guarded {
     peer: Peer,
     closed: oneshot::Receiver<()>,
     silent: Pin<Box<Sleep>>,
+    ended: bool,
 }
 
 impl Guarded {
     /// Fails if the connection must end. Otherwise the task is woken when it must.
     fn check(&mut self, context: &mut Context<'_>) -> io::Result<()> {
-        let replaced = Pin::new(&mut self.closed).poll(context).is_ready();
-        if replaced || self.silent.as_mut().poll(context).is_ready() {
-            return Err(io::ErrorKind::TimedOut.into());
-        }
-        Ok(())
+        // A receiver that has answered must not be asked again.
+        self.ended = self.ended
+            || Pin::new(&mut self.closed).poll(context).is_ready()
+            || self.silent.as_mut().poll(context).is_ready();
+        if self.ended { Err(io::ErrorKind::TimedOut.into()) } else { Ok(()) }
     }
 
     /// Records the result of writing.

@@ -113,6 +113,13 @@ fn a_page_goes_on_among_hundreds_of_clients_that_misbehave() {
             Ok(bytes) => panic!("{bytes} bytes for half a request"),
         }
     }
+    // The program had nothing to complain of.
+    #[cfg(unix)]
+    {
+        server.process.signal("INT");
+        let said = server.process.wait().succeeded();
+        assert!(said.stdout.contains("\nstopped: "), "{said:?}");
+    }
 }
 
 #[test]
