@@ -5,31 +5,29 @@ use super::camera::{CameraArgs, SceneArgs, SetupArgs};
 use super::method::MethodArgs;
 use super::serve_virtual::stop_on_signal;
 use super::{address, print};
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use nirspi::calibration::Choice;
-use nirspi::imaging::Enhance;
-use nirspi::serve::settings::{MAX_FRAMES, Settings};
-use nirspi::serve::{CameraSource, Connect, Connected, Imaging, serve};
+use nirspi::link::CameraAddress;
+use nirspi::serve::settings::{MAX_FRAMES, Measuring, Settings};
+use nirspi::serve::{CameraSource, Connect, Connected, Imaging, Server, StagedScene, Token, serve};
 use nirspi::session::Session;
 use nirspi::setup::MeasurementSetup;
-use nirspi_nets::Device;
+use nirspi::virtual_camera::MemoryLink;
+use nirspi_nets::{Device, deblur::Model};
 use nirspi_recon::omp::Backend;
-use nirspi_recon::reconstruct::{Method, Reconstruct};
 use nirspi_recon::{Sampling, Side};
-use std::net::TcpListener;
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Show a camera live on a web page: reconstructed, fused with depth and deblurred, with every frame accounted for
 ///
-/// The command prints the address of the page. The page shows images, estimated blur and noise, rates, the account of all
-/// frames and the camera's events. Controls on the page choose the method, switch the enhancement, and say how many frames
-/// are summed. If the link to the camera is lost, the program opens the camera again. After a fault, a person must allow the
-/// LEDs to go on, on the page. Only browsers on this machine can open the page, unless --listen says otherwise. Ctrl-C
-/// switches the LEDs off and ends the program.
+/// The command prints the address of the page, on which every setting can be changed (docs/live-page.md). The stop button,
+/// Escape and the space bar switch the LEDs off. If the link to the camera is lost, the program opens the camera again. After
+/// a stop or a fault, a person must allow the LEDs to go on, on the page. Only browsers on this machine can open the page,
+/// unless --listen says otherwise; then the page demands a token. Ctrl-C switches the LEDs off and ends the program.
 ///
-/// For scripts: GET /api/state (JSON: account, rates, versions, settings), /image.png (32 x 32), /enhanced.png (64 x 64) and
-/// /events (a stream of states with images). POST /api/settings takes {"method": "tv", "enhance": true, "frames": 64, "resume": true}
-/// or a part of that; "frames" is --sum. --backend holds for the networks, too.
+/// For scripts: GET /api/state, /events, /image.png, /image.npy, /enhanced.png and /enhanced.npy; POST /api/settings, /api/scene,
+/// /api/stop and /api/start. "frames" of the settings is --sum. --backend holds for the networks, too.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi serve\n\
@@ -37,9 +35,16 @@ use std::process::ExitCode;
     \x20 curl http://127.0.0.1:8080/api/state\n\
     \x20 curl -d '{\"method\": \"hadamard\"}' http://127.0.0.1:8080/api/settings")]
 pub struct Args {
-    /// Address of the page; port 0 takes a free port
+    /// Address of the page; port 0 takes a free port. An address that other machines reach demands a token
     #[arg(long, value_name = "ADDR", default_value = "127.0.0.1:8080")]
     listen: String,
+    /// Token that browsers and scripts must know, 16 characters or more [default: none for an address that only this machine
+    /// reaches, else a random one, in the printed address]
+    #[arg(long, value_name = "TOKEN")]
+    token: Option<Token>,
+    /// Folder for recordings, which the page begins and ends. Without it, the page cannot record
+    #[arg(long, value_name = "DIR")]
+    record_to: Option<PathBuf>,
     /// Newest frames to sum into each image
     #[arg(long, alias = "frames", value_name = "N", default_value_t = 64,
           value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_FRAMES)))]
@@ -60,53 +65,59 @@ pub fn run(args: Args) -> Result<ExitCode> {
     args.method.check()?;
     let mut setup = args.setup.setup(Sampling::HALF, &args.scene.model)?;
     setup.adc_latency = args.calibration.adc_latency();
-    let listener = TcpListener::bind(&args.listen)
+    if let Some(folder) = args.record_to.as_ref().filter(|folder| !folder.is_dir()) {
+        bail!("--record-to {}: found no such folder", folder.display());
+    }
+    let server = Server::bind(&args.listen, args.token.clone())
         .with_context(|| format!("--listen {}: cannot listen there", args.listen))?;
-    let address = listener.local_addr()?;
-    let methods = methods(&args.method)?;
-    let imaging = Imaging { methods, enhance: enhance(args.method.backend)? };
-    let settings =
-        Settings { method: args.method.method.argument(), enhance: true, frames: args.sum };
+    let imaging =
+        Imaging::new(&args.method.settings_for(Side::INSTRUMENT.pixels())?, device(&args)?)?;
+    let settings = Settings {
+        method: args.method.method.argument(),
+        strength: args.method.strength,
+        enhance: true,
+        model: Model::DIFFUSION.name(),
+        frames: args.sum,
+        measuring: Measuring::of(&setup),
+        record: false,
+    };
     let stop = stop_on_signal()?;
     let session = address::open(&args.camera.camera, &args.scene)?;
     let connected = prepared(session, &args.calibration, &setup)?;
-
-    let machine = match address.ip() {
-        ip if ip.is_unspecified() => format!("localhost:{}", address.port()),
-        _ => address.to_string(),
-    };
-    print::line(format_args!(
-        "open http://{machine} to see camera {}; Ctrl-C ends it",
-        args.camera.camera
-    ))?;
-    if !address.ip().is_loopback() {
-        print::line("every machine in this network can open the page and switch the camera")?;
+    let (url, name) = (server.url(), &args.camera.camera);
+    print::line(format_args!("open {url} to see camera {name}; Ctrl-C ends it"))?;
+    if let Some(notice) = server.notice() {
+        print::line(notice)?;
     }
     let camera = CameraSource {
         address: args.camera.camera.to_string(),
         setup: setup.clone(),
         model: args.scene.model.read()?,
+        scene: scene(&args)?,
+        record_to: args.record_to.clone(),
         connect: connect(args, setup),
     };
-    let ledger = serve(listener, camera, connected, imaging, settings, &stop)?;
+    let ledger = serve(server, camera, connected, imaging, settings, &stop)?;
     let shown = ledger.images.shown;
     print::line(format_args!("stopped: {}; {shown} shown", ledger.frames))?;
     Ok(ExitCode::SUCCESS)
 }
 
-/// Every method, each with the settings that it accepts, because a page can switch to any method.
-fn methods(args: &MethodArgs) -> Result<Vec<(&'static str, Box<dyn Reconstruct>)>> {
-    let settings = args.settings_for(Side::INSTRUMENT.pixels())?;
-    let ready =
-        |method: &Method| Ok((method.argument(), method.prepare(&settings.taken_by(*method))?));
-    Method::ALL.iter().map(ready).collect()
+/// The device of the networks: the backend of OMP. One image at a time is too little work for a GPU
+/// that was not requested.
+fn device(args: &Args) -> Result<Device> {
+    let backend = args.method.backend;
+    Ok(Device::open(if backend == Backend::Auto { Backend::Cpu } else { backend })?)
 }
 
-/// The learned stages, on the backend of OMP. One image at a time is too little work for a GPU that
-/// was not requested.
-fn enhance(backend: Backend) -> Result<Enhance> {
-    let backend = if backend == Backend::Auto { Backend::Cpu } else { backend };
-    Ok(Enhance::built_in(&Device::open(backend)?)?)
+/// The scene before a virtual camera in this process.
+fn scene(args: &Args) -> Result<Option<StagedScene>> {
+    if args.camera.camera != CameraAddress::Virtual {
+        return Ok(None);
+    }
+    let (map, optics) = args.scene.optics()?;
+    let air = args.scene.air(optics.camera_model())?;
+    Ok(Some(StagedScene { map, distance_m: optics.distance_mm() / 1e3, air }))
 }
 
 /// A camera with its calibration.
@@ -121,10 +132,16 @@ fn prepared(
 
 /// A function that connects to the camera again.
 fn connect(args: Args, setup: MeasurementSetup) -> Connect {
-    let found = move || {
-        let mut session = address::open_quietly(&args.camera.camera, &args.scene)?;
+    let found = move |scene: Option<&StagedScene>| {
+        let mut session = match scene {
+            Some(scene) => {
+                let camera = scene.camera(&args.scene.model.read()?, args.scene.seed)?;
+                Session::open(Box::new(MemoryLink::new(camera)))?
+            }
+            None => address::open_quietly(&args.camera.camera, &args.scene)?,
+        };
         session.await_reports()?;
         prepared(session, &args.calibration, &setup)
     };
-    Box::new(move || found().map_err(Into::into))
+    Box::new(move |scene| found(scene).map_err(Into::into))
 }

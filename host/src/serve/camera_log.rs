@@ -1,5 +1,6 @@
 //! The state of the camera and its events, in words.
 
+use super::light::Leds;
 use crate::boards;
 use crate::session::CameraIdentity;
 use crate::setup::MeasurementSetup;
@@ -20,6 +21,8 @@ pub enum Phase {
     Preparing,
     /// Frames arrive.
     Measuring,
+    /// A person switched the LEDs off. A person must switch them on again.
+    Stopped,
     /// The camera switched its LEDs off and waits for a person to allow them again.
     Fault,
     /// The camera's latency could not be measured and no calibration is kept, so every picture
@@ -40,6 +43,8 @@ pub struct CameraState {
     pub phase: Phase,
     /// The phase in words.
     line: String,
+    /// What is known of the LEDs.
+    pub leds: Leds,
     identity: CameraIdentity,
     versions: Vec<Part>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -84,6 +89,7 @@ impl CameraLog {
             simulated: false,
             phase: Phase::Preparing,
             line: String::new(),
+            leds: Leds::Off,
             identity: identity.clone(),
             versions: Vec::new(),
             measurement: None,
@@ -99,6 +105,8 @@ impl CameraLog {
         self.camera.simulated = boards::is_simulated(&identity.board);
         self.camera.versions = versions::compare(identity, None);
         self.camera.measurement = None;
+        // A greeting ends the session before, and light with it.
+        self.camera.leds = Leds::Off;
         self.enter(Phase::Preparing, "preparing: latency and settling are measured".to_owned());
         self.event(format!("connected to {} {}", identity.board, identity.serial));
     }

@@ -10,7 +10,7 @@
 //! `tests::foreign_pages_are_refused`). The check comes before any other use of the request.
 
 use axum::http::uri::Authority;
-use axum::http::{HeaderMap, HeaderName, HeaderValue, header};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, header};
 use std::net::{IpAddr, SocketAddr};
 use thiserror::Error;
 
@@ -34,7 +34,7 @@ pub enum Refused {
 ///
 /// # Errors
 /// [`Refused`].
-pub fn check(headers: &HeaderMap, listen: SocketAddr) -> Result<(), Refused> {
+pub fn check(method: &Method, headers: &HeaderMap, listen: SocketAddr) -> Result<(), Refused> {
     let host = only(headers, &header::HOST).ok_or(Refused::Host)?;
     let authority: Authority = host.parse().map_err(|_| Refused::Host)?;
     if !is_ours(authority.host(), listen) {
@@ -49,7 +49,8 @@ pub fn check(headers: &HeaderMap, listen: SocketAddr) -> Result<(), Refused> {
     // Images embedded in pages of other sites come without `Origin`. Following a link is harmless.
     let told = |name| headers.get(HeaderName::from_static(name)).map(HeaderValue::as_bytes);
     let foreign = matches!(told("sec-fetch-site"), Some(b"cross-site" | b"same-site"));
-    if foreign && told("sec-fetch-mode") != Some(b"navigate") {
+    let follows = method == Method::GET && told("sec-fetch-mode") == Some(b"navigate");
+    if foreign && !follows {
         return Err(Refused::Origin);
     }
     Ok(())
@@ -76,12 +77,18 @@ fn is_ours(host: &str, listen: SocketAddr) -> bool {
 mod tests {
     use super::*;
 
-    fn asked(listen: &str, headers: &[(&'static str, &'static str)]) -> Result<(), Refused> {
+    type Headers<'h> = &'h [(&'static str, &'static str)];
+
+    fn asked(listen: &str, headers: Headers<'_>) -> Result<(), Refused> {
+        asked_by(Method::GET, listen, headers)
+    }
+
+    fn asked_by(method: Method, listen: &str, headers: Headers<'_>) -> Result<(), Refused> {
         let mut map = HeaderMap::new();
         for &(name, value) in headers {
             map.append(HeaderName::from_static(name), value.parse().unwrap());
         }
-        check(&map, listen.parse().unwrap())
+        check(&method, &map, listen.parse().unwrap())
     }
 
     #[test]
@@ -130,6 +137,9 @@ mod tests {
         for site in ["cross-site", "same-site"] {
             let picture = [host, ("sec-fetch-site", site), ("sec-fetch-mode", "no-cors")];
             assert_eq!(asked("127.0.0.1:8080", &picture), Err(Refused::Origin), "{site}");
+            let form = [host, ("sec-fetch-site", site), ("sec-fetch-mode", "navigate")];
+            let posted = asked_by(Method::POST, "127.0.0.1:8080", &form);
+            assert_eq!(posted, Err(Refused::Origin), "{site}");
         }
     }
 }

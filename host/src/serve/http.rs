@@ -6,24 +6,29 @@
 //! (`a_browser_that_does_not_read_costs_nobody_and_then_sees_the_newest` in
 //! `host/src/serve/tests.rs`).
 
+use super::connections::{Door, Peer, Streaming};
+use super::server::Server;
 use super::settings::Change;
 use super::state::Published;
-use super::{Shared, guard, lock};
+use super::token::{self, Token};
+use super::{Shared, guard, lock, page};
 use crate::files::image::encode_grey;
+use crate::files::npy;
+use axum::Router;
 use axum::body::Bytes;
-use axum::extract::{DefaultBodyLimit, Request, State};
-use axum::http::{HeaderName, HeaderValue, StatusCode, header};
+use axum::extract::{ConnectInfo, DefaultBodyLimit, Request, State};
+use axum::http::{HeaderName, HeaderValue, Method, StatusCode, header};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::sse::{Event, Sse};
-use axum::response::{Html, IntoResponse, Response};
+use axum::response::{IntoResponse, Redirect, Response};
 use axum::routing::{get, post};
-use axum::serve::ListenerExt;
-use axum::{Router, serve};
+use axum::serve;
 use futures_util::stream::{Stream, unfold};
 use nirspi_nets::{deblur, fusion};
+use serde::Serialize;
 use std::convert::Infallible;
 use std::io;
-use std::net::{SocketAddr, TcpListener};
+use std::net::SocketAddr;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -33,15 +38,17 @@ use tokio::sync::watch;
 const TICK: Duration = Duration::from_millis(50);
 /// The most bytes of a settings message.
 const MAX_CHANGE_BYTES: usize = 4096;
-
-const PAGE: &str = include_str!("page.html");
+/// The most bytes of a message with a scene.
+const MAX_SCENE_BYTES: usize = 1 << 16;
+/// The path of messages with scenes.
+const SCENE: &str = "/api/scene";
 
 /// Security headers for every response: no external content, no framing, no caching.
 const HEADERS: [(HeaderName, &str); 5] = [
     (
         header::CONTENT_SECURITY_POLICY,
-        "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; connect-src 'self'; img-src data:; \
-         base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+        "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src data: blob:; base-uri 'none'; \
+         form-action 'none'; frame-ancestors 'none'",
     ),
     (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
     (header::REFERRER_POLICY, "no-referrer"),
@@ -54,24 +61,31 @@ struct App {
     shared: Arc<Shared>,
     published: watch::Receiver<Arc<Published>>,
     listen: SocketAddr,
+    token: Option<Token>,
 }
 
 /// Serves until `is_over`. Open requests are then cut off, because the page detects the end of the
 /// server by the closed connection.
 pub fn run(
-    listener: TcpListener,
+    server: Server,
     shared: Arc<Shared>,
     published: watch::Receiver<Arc<Published>>,
     is_over: impl Fn() -> bool,
 ) -> io::Result<()> {
-    let app = App { shared, published, listen: listener.local_addr()? };
+    let Server { listener, token, address: listen } = server;
+    let app = App { shared, published, listen, token };
     let router = Router::new()
-        .route("/", get(Html(PAGE)))
+        .merge(page::routes())
         .route("/events", get(events))
         .route("/api/state", get(state))
         .route("/api/settings", post(settings))
+        .route("/api/stop", post(stop))
+        .route("/api/start", post(start))
+        .route(SCENE, post(scene).layer(DefaultBodyLimit::max(MAX_SCENE_BYTES)))
         .route("/image.png", get(image))
         .route("/enhanced.png", get(enhanced))
+        .route("/image.npy", get(image_numbers))
+        .route("/enhanced.npy", get(enhanced_numbers))
         .fallback(nothing_there)
         .layer(DefaultBodyLimit::max(MAX_CHANGE_BYTES))
         .layer(from_fn_with_state(app.clone(), only_ours))
@@ -79,11 +93,9 @@ pub fn run(
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
     listener.set_nonblocking(true)?;
     runtime.block_on(async move {
-        let listener = tokio::net::TcpListener::from_std(listener)?.tap_io(|stream| {
-            // A socket that cannot set the option works with more delay.
-            let _ = stream.set_nodelay(true);
-        });
-        let serving = tokio::spawn(async move { serve(listener, router).await });
+        let door = Door::new(tokio::net::TcpListener::from_std(listener)?);
+        let service = router.into_make_service_with_connect_info::<Peer>();
+        let serving = tokio::spawn(async move { serve(door, service).await });
         while !is_over() && !serving.is_finished() {
             tokio::time::sleep(TICK).await;
         }
@@ -94,16 +106,48 @@ pub fn run(
     })
 }
 
-/// Refuses every request that [`guard`] refuses, before any other handler.
+/// Refuses every request that [`guard`] refuses, that lacks the token, or that announces too much,
+/// before any other handler.
 async fn only_ours(State(app): State<App>, request: Request, next: Next) -> Response {
-    let mut response = match guard::check(request.headers(), app.listen) {
-        Ok(()) => next.run(request).await,
-        Err(refused) => line(StatusCode::FORBIDDEN, &refused),
+    let mut response = match refused(&app, &request) {
+        None => next.run(request).await,
+        Some(response) => response,
     };
     for (name, value) in HEADERS {
         response.headers_mut().insert(name, HeaderValue::from_static(value));
     }
     response
+}
+
+/// The answer to a request that no handler may see.
+fn refused(app: &App, request: &Request) -> Option<Response> {
+    let (headers, uri) = (request.headers(), request.uri());
+    if let Err(refused) = guard::check(request.method(), headers, app.listen) {
+        return Some(line(StatusCode::FORBIDDEN, &refused));
+    }
+    if let Some(token) = &app.token {
+        let port = app.listen.port();
+        if !token.is_in(headers, uri, port) {
+            let words =
+                "this camera's page needs its token: open the address that nirspi serve printed";
+            return Some(line(StatusCode::UNAUTHORIZED, &words));
+        }
+        // The browser keeps the token as a cookie, and the address without the token.
+        if request.method() == Method::GET && uri.path() == "/" && token::in_query(uri).is_some() {
+            let cookie = [(header::SET_COOKIE, token.cookie(port))];
+            return Some((cookie, Redirect::to("/")).into_response());
+        }
+    }
+    let most = if uri.path() == SCENE { MAX_SCENE_BYTES } else { MAX_CHANGE_BYTES };
+    let announced = headers.get(header::CONTENT_LENGTH).map(|value| value.to_str().map(str::parse));
+    match announced {
+        None => None,
+        Some(Ok(Ok::<u64, _>(length))) if length <= most as u64 => None,
+        Some(_) => {
+            let words = format!("the request has too long a body, expected at most {most} bytes");
+            Some(line(StatusCode::PAYLOAD_TOO_LARGE, &words))
+        }
+    }
 }
 
 /// A response of one line.
@@ -112,7 +156,8 @@ fn line(status: StatusCode, text: &impl ToString) -> Response {
 }
 
 async fn nothing_there() -> Response {
-    let there = "nothing there, expected /, /events, /api/state, /api/settings, /image.png or /enhanced.png";
+    let there = "nothing there, expected /, /events, /api/state, /api/settings, /api/scene, /api/stop, \
+                 /api/start, /image.png, /enhanced.png, /image.npy or /enhanced.npy";
     line(StatusCode::NOT_FOUND, &there)
 }
 
@@ -129,7 +174,7 @@ async fn state(State(app): State<App>) -> Response {
 
 async fn image(State(app): State<App>) -> Response {
     let picture = app.published.borrow().picture.clone();
-    png(fusion::SIDE, picture.as_ref().map(|picture| picture.image.as_slice()))
+    png(fusion::SIDE, picture.map(|picture| picture.shares_of_white()).as_deref())
 }
 
 async fn enhanced(State(app): State<App>) -> Response {
@@ -137,59 +182,130 @@ async fn enhanced(State(app): State<App>) -> Response {
     png(deblur::SIDE, picture.as_ref().and_then(|picture| picture.enhanced.as_deref()))
 }
 
+/// ADC counts.
+async fn image_numbers(State(app): State<App>) -> Response {
+    let picture = app.published.borrow().picture.clone();
+    numbers(fusion::SIDE, picture.as_ref().map(|picture| picture.counts.as_slice()))
+}
+
+/// Shares of white.
+async fn enhanced_numbers(State(app): State<App>) -> Response {
+    let picture = app.published.borrow().picture.clone();
+    numbers(deblur::SIDE, picture.as_ref().and_then(|picture| picture.enhanced.as_deref()))
+}
+
+fn no_image() -> Response {
+    line(StatusCode::SERVICE_UNAVAILABLE, &"there is no such image now")
+}
+
 fn png(side: usize, pixels: Option<&[f32]>) -> Response {
-    match pixels {
-        None => line(StatusCode::SERVICE_UNAVAILABLE, &"there is no such image now"),
-        Some(pixels) => {
-            ([(header::CONTENT_TYPE, "image/png")], encode_grey(side, side, pixels)).into_response()
-        }
-    }
+    let Some(pixels) = pixels else { return no_image() };
+    ([(header::CONTENT_TYPE, "image/png")], encode_grey(side, side, pixels)).into_response()
+}
+
+fn numbers(side: usize, pixels: Option<&[f32]>) -> Response {
+    let Some(pixels) = pixels else { return no_image() };
+    let kind = [(header::CONTENT_TYPE, "application/octet-stream")];
+    (kind, npy::encode(&[side, side], pixels)).into_response()
 }
 
 /// Applies a change, and answers with the new settings.
 async fn settings(State(app): State<App>, body: Bytes) -> Response {
-    let mut settings = lock(&app.shared.settings);
+    let shared = &app.shared;
+    let mut settings = lock(&shared.settings);
     let changed = Change::parse(&body).and_then(|change| {
-        let settings = settings.with(&change, &app.shared.methods)?;
-        Ok((settings, change.resume))
+        let settings = settings.with(&change, &shared.offer)?;
+        Ok((settings, change.run))
     });
     match changed {
         Err(error) => line(StatusCode::BAD_REQUEST, &error),
-        Ok((changed, resume)) => {
-            *settings = changed;
-            if resume {
-                app.shared.resume.store(true, Ordering::Relaxed);
+        Ok((changed, run)) => {
+            settings.clone_from(&changed);
+            drop(settings);
+            if let Some(on) = run {
+                shared.light.set(on);
             }
-            match serde_json::to_string(&changed) {
-                Ok(text) => json(format!("{text}\n")),
-                Err(error) => line(StatusCode::INTERNAL_SERVER_ERROR, &error),
-            }
+            shared.slot.wake();
+            answer(&changed)
         }
     }
 }
 
+/// Changes the scene of a virtual camera.
+async fn scene(State(app): State<App>, body: Bytes) -> Response {
+    match app.shared.stage.change(&body) {
+        Err(error) => line(StatusCode::BAD_REQUEST, &error),
+        Ok(()) => answer(&app.shared.stage.state()),
+    }
+}
+
+/// Switches the LEDs off. The request needs no body, so nothing in it can be refused.
+async fn stop(State(app): State<App>) -> Response {
+    switch(&app.shared, false)
+}
+
+/// Allows the LEDs to go on.
+async fn start(State(app): State<App>) -> Response {
+    switch(&app.shared, true)
+}
+
+/// The answer to a command for the LEDs.
+#[derive(Serialize)]
+struct Switched {
+    /// Whether light is allowed now.
+    run: bool,
+    /// The number of this command; later commands have larger numbers.
+    command: u64,
+}
+
+fn switch(shared: &Shared, on: bool) -> Response {
+    let command = shared.light.set(on);
+    shared.slot.wake();
+    answer(&Switched { run: on, command })
+}
+
+fn answer(value: &impl Serialize) -> Response {
+    match serde_json::to_string(value) {
+        Ok(text) => json(format!("{text}\n")),
+        Err(error) => line(StatusCode::INTERNAL_SERVER_ERROR, &error),
+    }
+}
+
 /// Counts a page for as long as the page is connected.
-struct Viewer(Arc<Shared>);
+struct Viewer {
+    shared: Arc<Shared>,
+    _streaming: Streaming,
+}
 
 impl Viewer {
-    fn new(shared: Arc<Shared>) -> Self {
+    fn new(shared: Arc<Shared>, streaming: Streaming) -> Self {
         shared.viewers.fetch_add(1, Ordering::Relaxed);
-        Self(shared)
+        Self { shared, _streaming: streaming }
     }
 }
 
 impl Drop for Viewer {
     fn drop(&mut self) {
-        self.0.viewers.fetch_sub(1, Ordering::Relaxed);
+        self.shared.viewers.fetch_sub(1, Ordering::Relaxed);
     }
 }
 
-async fn events(State(app): State<App>) -> Sse<impl Stream<Item = Result<Event, Infallible>>> {
-    let mut published = app.published;
+async fn events(State(app): State<App>, ConnectInfo(peer): ConnectInfo<Peer>) -> Response {
+    let Some(streaming) = peer.stream() else {
+        let words = "too many pages are open: close one, then open this one again";
+        return line(StatusCode::SERVICE_UNAVAILABLE, &words);
+    };
+    Sse::new(states(app.published, Viewer::new(app.shared, streaming))).into_response()
+}
+
+/// The states for one page, each after the page has taken the one before.
+fn states(
+    mut published: watch::Receiver<Arc<Published>>,
+    viewer: Viewer,
+) -> impl Stream<Item = Result<Event, Infallible>> {
     // The first message is the current state.
     published.mark_changed();
-    let viewer = Viewer::new(app.shared);
-    Sse::new(unfold((published, viewer), |(mut published, viewer)| async move {
+    unfold((published, viewer), |(mut published, viewer)| async move {
         loop {
             // The receiver fails when the server stops.
             published.changed().await.ok()?;
@@ -198,5 +314,5 @@ async fn events(State(app): State<App>) -> Sse<impl Stream<Item = Result<Event, 
                 return Some((Ok(Event::default().data(&moment.message)), (published, viewer)));
             }
         }
-    }))
+    })
 }

@@ -4,17 +4,21 @@
 //! The imaging thread always takes the newest frames, and the camera's thread never waits for the
 //! imaging thread.
 
-use super::settings::Settings;
-use super::slot::Look;
-use super::state::{Offered, Published, Rate, Rates, State};
+use super::settings::{Offer, Settings};
+use super::slot::{DepthImage, Look};
+use super::state::{Light, Offered, Published, Rate, Rates, State};
 use super::{Shared, lock};
 use crate::causes;
 use crate::imaging::{
     Enhance, EnhanceError, ImageContext, SteadyWhite, Warning, White, brightest, warnings,
 };
 use crate::integrate::IntegrateError;
+use nirspi_nets::deblur::Model;
+use nirspi_nets::{Device, Method as Network, Networks, WeightsError};
 use nirspi_recon::Side;
-use nirspi_recon::reconstruct::{Reconstruct, ReconstructError};
+use nirspi_recon::reconstruct::{
+    Method, MethodSettings, Reconstruct, ReconstructError, Setting, Strength,
+};
 use serde::Serialize;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -41,28 +45,148 @@ enum PictureError {
     /// The image does not have the instrument's size, or has a pixel that is not finite.
     #[error("the frames gave no image of finite numbers")]
     NotFinite,
+    /// The weights of the network are damaged.
+    #[error(transparent)]
+    Weights(#[from] WeightsError),
     /// The networks refuse the image.
     #[error(transparent)]
     Enhance(#[from] EnhanceError),
 }
 
+/// Why methods and networks cannot be prepared.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum ImagingError {
+    /// A method of reconstruction.
+    #[error(transparent)]
+    Method(#[from] ReconstructError),
+    /// The built-in weights.
+    #[error(transparent)]
+    Weights(#[from] WeightsError),
+}
+
 /// The methods and networks that make images.
 pub struct Imaging {
-    /// Methods of reconstruction by name. The settings name one of the methods.
-    pub methods: Vec<(&'static str, Box<dyn Reconstruct>)>,
-    /// Fusion and deblurring.
-    pub enhance: Enhance,
+    settings: MethodSettings,
+    methods: Vec<Prepared>,
+    device: Device,
+    models: Vec<Model>,
+    /// The learned stages with the network of this name.
+    enhance: (&'static str, Enhance),
+}
+
+/// A method of reconstruction that is ready.
+struct Prepared {
+    name: &'static str,
+    method: Box<dyn Reconstruct>,
+    /// The method of the library's list, and the strength for which it is prepared, if it has one.
+    built_in: Option<(Method, Option<f64>)>,
+}
+
+impl Imaging {
+    /// Every method of the library's list with these settings, and the built-in networks on this
+    /// device. A network that needs many steps for one image is left out.
+    ///
+    /// # Errors
+    /// [`ImagingError`] if a setting is out of range, or the built-in weights are damaged.
+    pub fn new(settings: &MethodSettings, device: Device) -> Result<Self, ImagingError> {
+        let strength = strength_of(settings);
+        let ready = |method: &Method| {
+            let prepared = method.prepare(&settings.taken_by(*method))?;
+            let built_in = Some((*method, strength.filter(|_| method.takes(Setting::Strength))));
+            Ok(Prepared { name: method.argument(), method: prepared, built_in })
+        };
+        let methods = Method::ALL.iter().map(ready).collect::<Result<_, ReconstructError>>()?;
+        let mut networks = Networks::built_in(device.clone());
+        let mut is_live = |model: &Model| {
+            model.default_steps().get() == 1 && networks.weights(model.name()).is_ok()
+        };
+        let models = Model::ALL.into_iter().filter(|model| is_live(model)).collect();
+        let model = Network::default().model();
+        let enhance = (model.name(), enhance_by(model, &device)?);
+        Ok(Self { settings: settings.clone(), methods, device, models, enhance })
+    }
+
+    /// The same with a method of your own. Pages offer the method by this name.
+    #[must_use]
+    pub fn with_method(mut self, name: &'static str, method: Box<dyn Reconstruct>) -> Self {
+        self.methods.push(Prepared { name, method, built_in: None });
+        self
+    }
+
+    /// What pages can choose.
+    pub(super) fn offer(&self) -> Offer {
+        let with_strength = |prepared: &&Prepared| {
+            prepared.built_in.is_some_and(|(method, _)| method.takes(Setting::Strength))
+        };
+        let about =
+            |prepared: &Prepared| prepared.built_in.map_or("", |(method, _)| method.about());
+        Offer {
+            methods: self.methods.iter().map(|prepared| prepared.name).collect(),
+            about: self.methods.iter().map(about).collect(),
+            with_strength: self.methods.iter().filter(with_strength).map(|p| p.name).collect(),
+            models: self.models.iter().map(|model| model.name()).collect(),
+            ..Offer::default()
+        }
+    }
+
+    /// The method that these settings choose, prepared for their strength.
+    fn method(&mut self, settings: &Settings) -> Result<&dyn Reconstruct, PictureError> {
+        let mut all = self.methods.iter_mut();
+        let prepared = all
+            .find(|prepared| prepared.name == settings.method)
+            .ok_or(PictureError::Method(settings.method))?;
+        if let Some((method, strength)) = &mut prepared.built_in
+            && method.takes(Setting::Strength)
+            && *strength != settings.strength
+        {
+            let wanted = settings.strength.map_or_else(Strength::default, Strength::Fixed);
+            let with = MethodSettings { strength: wanted, ..self.settings.clone() };
+            prepared.method = method.prepare(&with.taken_by(*method))?;
+            *strength = settings.strength;
+        }
+        Ok(prepared.method.as_ref())
+    }
+
+    /// The learned stages with the network that these settings choose.
+    fn enhance(&mut self, settings: &Settings) -> Result<&Enhance, PictureError> {
+        if self.enhance.0 != settings.model {
+            let mut models = self.models.iter();
+            if let Some(model) = models.find(|model| model.name() == settings.model) {
+                self.enhance = (model.name(), enhance_by(*model, &self.device)?);
+            }
+        }
+        Ok(&self.enhance.1)
+    }
+}
+
+/// The strength of these settings; `None` if it is chosen by the measurements.
+fn strength_of(settings: &MethodSettings) -> Option<f64> {
+    match settings.strength {
+        Strength::Fixed(strength) => Some(strength),
+        Strength::CrossValidated { .. } => None,
+    }
+}
+
+/// The learned stages with this network.
+fn enhance_by(model: Model, device: &Device) -> Result<Enhance, WeightsError> {
+    let mut networks = Networks::built_in(device.clone());
+    let (both, second) = (networks.enhancer(model.into())?, networks.sharpener(model.into())?);
+    Ok(Enhance::of(both, second, device.clone()))
 }
 
 /// The images of one state, and their properties.
 #[derive(Debug, Serialize)]
 pub struct Picture {
-    /// The reconstructed image, (32, 32) in [0, 1], with white at 1.
+    /// The reconstructed image, (32, 32) ADC counts.
     #[serde(skip)]
-    pub image: Vec<f32>,
-    /// The enhanced image, (64, 64) in [0, 1].
+    pub counts: Vec<f32>,
+    /// The enhanced image, (64, 64) in [0, 1], with white at 1.
     #[serde(skip)]
     pub enhanced: Option<Vec<f32>>,
+    /// The depth map that was fused.
+    #[serde(skip)]
+    pub depth: Option<Arc<DepthImage>>,
     method: &'static str,
     /// Number of summed frames.
     frames: u64,
@@ -73,13 +197,25 @@ pub struct Picture {
     enhancement: Option<Enhancement>,
     /// Reasons not to trust the images: the frames' flags, and the results of the learned stages.
     warnings: Vec<String>,
-    /// Short forms of the warnings, for the image itself.
+    /// The warnings of the frames' flags, for the image itself.
+    frame_warnings: Vec<&'static str>,
+    /// Short forms of the learned stages' warnings, for the enhanced image itself.
     short_warnings: Vec<&'static str>,
+}
+
+impl Picture {
+    /// The reconstructed image, (32, 32) in [0, 1], with white at 1.
+    pub fn shares_of_white(&self) -> Vec<f32> {
+        let scale = if self.white_counts > 0.0 { 1.0 / self.white_counts } else { 0.0 };
+        self.counts.iter().map(|value| (value * scale).clamp(0.0, 1.0)).collect()
+    }
 }
 
 /// The results of the learned stages.
 #[derive(Debug, Clone, Copy, Serialize)]
 struct Enhancement {
+    /// The network that deblurred.
+    model: &'static str,
     /// Estimated blur in pixels of the 64 x 64 grid.
     blur_px: f32,
     /// Estimated noise of a pixel; white is 1.
@@ -93,7 +229,7 @@ struct Enhancement {
 }
 
 /// Makes images and publishes them until the server stops.
-pub fn run(shared: &Shared, imaging: &Imaging, publish: &watch::Sender<Arc<Published>>) {
+pub fn run(shared: &Shared, mut imaging: Imaging, publish: &watch::Sender<Arc<Published>>) {
     let mut white = SteadyWhite::default();
     let (mut picture, mut problem) = (None, None);
     let started = Instant::now();
@@ -101,8 +237,8 @@ pub fn run(shared: &Shared, imaging: &Imaging, publish: &watch::Sender<Arc<Publi
     while !shared.is_over() {
         let turn = Instant::now();
         if let Some(look) = shared.slot.take(HEARTBEAT) {
-            let settings = *lock(&shared.settings);
-            match imaging.picture(&look, settings, &mut white) {
+            let settings = lock(&shared.settings).clone();
+            match imaging.picture(&look, &settings, &mut white) {
                 Ok(made) => (picture, problem) = (Some(Arc::new(made)), None),
                 Err(why) => problem = Some(causes::in_one_line(&why)),
             }
@@ -114,18 +250,20 @@ pub fn run(shared: &Shared, imaging: &Imaging, publish: &watch::Sender<Arc<Publi
             camera_frames_per_s: frames.at(now, ledger.frames.received),
             images_per_s: images.at(now, ledger.images.shown),
         };
-        let settings = *lock(&shared.settings);
+        let settings = lock(&shared.settings).clone();
         // The log is copied, so that the camera's thread can add to the log meanwhile.
         let log = lock(&shared.camera).clone();
         let state = State {
             program: env!("CARGO_PKG_VERSION"),
             camera: &log.camera,
+            light: Light { allowed: shared.light.is_on(), commands: shared.light.commands() },
             ledger,
             rates,
-            settings,
-            offered: Offered::new(&shared.methods, &shared.about),
+            settings: &settings,
+            offered: Offered::new(&shared.offer),
             picture: picture.as_deref(),
             problem: problem.as_deref(),
+            scene: shared.stage.state(),
             viewers: shared.viewers(),
             events: log.events(),
         };
@@ -140,20 +278,15 @@ pub fn run(shared: &Shared, imaging: &Imaging, publish: &watch::Sender<Arc<Publi
 impl Imaging {
     /// The images of the newest frames.
     fn picture(
-        &self,
+        &mut self,
         look: &Look,
-        settings: Settings,
+        settings: &Settings,
         white: &mut SteadyWhite,
     ) -> Result<Picture, PictureError> {
         let started = Instant::now();
-        let (_, method) = self
-            .methods
-            .iter()
-            .find(|(name, _)| *name == settings.method)
-            .ok_or(PictureError::Method(settings.method))?;
         let measurements =
             look.sum.measurements(&look.run.setup, look.run.settling.as_ref(), false)?;
-        let image = method.reconstruct(&measurements)?.image;
+        let image = self.method(settings)?.reconstruct(&measurements)?.image;
         let image = match &look.run.flat_field {
             Some(flat) => flat.correct(&image),
             None => image,
@@ -164,20 +297,23 @@ impl Imaging {
             return Err(PictureError::NotFinite);
         }
         let white_counts = white.follow(brightest(image.pixels(), side));
-        let mut all: Vec<String> = look.sum.warnings().into_iter().map(str::to_owned).collect();
+        let frame_warnings = look.sum.warnings();
+        let mut all: Vec<String> = frame_warnings.iter().map(|&text| text.to_owned()).collect();
         let (mut enhanced, mut enhancement, mut short) = (None, None, Vec::new());
         if settings.enhance && white_counts > 0.0 {
             let started = Instant::now();
             let known = ImageContext {
                 rows: Some(measurements.rows()),
-                depth: look.depth.as_deref(),
+                depth: look.depth.as_ref().map(|depth| &depth.map),
                 ..ImageContext::default()
             };
-            let made = self.enhance.enhance(&image, White::Known(white_counts), &known)?;
+            let made =
+                self.enhance(settings)?.enhance(&image, White::Known(white_counts), &known)?;
             let doubts = warnings(&made);
             short.extend(doubts.iter().map(Warning::short));
             all.extend(doubts.iter().map(Warning::to_string));
             enhancement = Some(Enhancement {
+                model: settings.model,
                 blur_px: made.blur_px,
                 noise: made.noise,
                 inconsistency: made.inconsistency,
@@ -186,16 +322,17 @@ impl Imaging {
             });
             enhanced = Some(made.pixels);
         }
-        let scale = if white_counts > 0.0 { 1.0 / white_counts } else { 0.0 };
         Ok(Picture {
-            image: image.pixels().iter().map(|v| (v * scale).clamp(0.0, 1.0)).collect(),
+            counts: image.pixels().to_vec(),
             enhanced,
+            depth: look.depth.clone(),
             method: settings.method,
             frames: look.sum.frames(),
             white_counts,
             reconstruct_ms,
             enhancement,
             warnings: all,
+            frame_warnings,
             short_warnings: short,
         })
     }

@@ -13,25 +13,34 @@
 
 mod camera;
 mod camera_log;
+mod connections;
 mod guard;
 mod http;
 mod imaging;
+mod light;
+mod page;
+mod server;
 pub mod settings;
 mod slot;
+mod stage;
 mod state;
+mod token;
 
 pub use camera::{CameraSource, Connect, Connected};
-pub use imaging::Imaging;
+pub use imaging::{Imaging, ImagingError};
+pub use server::{BindError, Server};
 pub use slot::{ImageCounters, Ledger};
+pub use stage::StagedScene;
+pub use token::{Token, TokenError};
 
 use crate::capture::CaptureError;
 use camera_log::CameraLog;
-use nirspi_recon::reconstruct::Method;
-use settings::Settings;
+use light::LightSwitch;
+use settings::{Offer, Settings};
 use slot::Slot;
+use stage::Stage;
 use state::Published;
 use std::io;
-use std::net::TcpListener;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
@@ -61,25 +70,23 @@ struct Shared {
     slot: Slot,
     camera: Mutex<CameraLog>,
     settings: Mutex<Settings>,
-    /// Names of the methods that settings can choose.
-    methods: Vec<&'static str>,
-    /// What each of these methods does; empty for a method that is not built in.
-    about: Vec<&'static str>,
-    /// Set when a person allows the LEDs to go on again.
-    resume: AtomicBool,
+    /// The values that settings can have.
+    offer: Offer,
+    stage: Stage,
+    light: LightSwitch,
     over: AtomicBool,
     viewers: AtomicUsize,
 }
 
 impl Shared {
-    fn new(camera: CameraLog, methods: Vec<&'static str>, settings: Settings) -> Self {
+    fn new(camera: CameraLog, offer: Offer, settings: Settings, stage: Stage) -> Self {
         Self {
             slot: Slot::default(),
             camera: Mutex::new(camera),
             settings: Mutex::new(settings),
-            about: methods.iter().map(|name| name.parse().map_or("", Method::about)).collect(),
-            methods,
-            resume: AtomicBool::new(false),
+            offer,
+            stage,
+            light: LightSwitch::on(),
             over: AtomicBool::new(false),
             viewers: AtomicUsize::new(0),
         }
@@ -100,22 +107,24 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Serves `camera` to the browsers that connect to `listener`, until `stop` is set. Returns the
+/// Serves `camera` to the browsers that connect to `server`, until `stop` is set. Returns the
 /// account of all frames.
 ///
 /// # Errors
 /// [`ServeError`], after the camera is stopped.
 pub fn serve(
-    listener: TcpListener,
-    camera: CameraSource,
+    server: Server,
+    mut camera: CameraSource,
     connected: Connected,
     imaging: Imaging,
     settings: Settings,
     stop: &AtomicBool,
 ) -> Result<Ledger, ServeError> {
     let log = CameraLog::new(&camera.address, connected.session.identity());
-    let methods = imaging.methods.iter().map(|(name, _)| *name).collect();
-    let shared = Arc::new(Shared::new(log, methods, settings));
+    let records = camera.record_to.is_some();
+    let offer = Offer { records, base: Some(camera.setup.clone()), ..imaging.offer() };
+    let stage = Stage::of(camera.scene.take());
+    let shared = Arc::new(Shared::new(log, offer, settings, stage));
     let (publish, published) = watch::channel(Arc::new(Published::default()));
     let measuring = {
         let shared = Arc::clone(&shared);
@@ -123,11 +132,11 @@ pub fn serve(
     };
     let making = {
         let shared = Arc::clone(&shared);
-        spawn("imaging", move || imaging::run(&shared, &imaging, &publish))?
+        spawn("imaging", move || imaging::run(&shared, imaging, &publish))?
     };
     let is_over =
         || stop.load(Ordering::Relaxed) || measuring.is_finished() || making.is_finished();
-    let served = http::run(listener, Arc::clone(&shared), published, is_over);
+    let served = http::run(server, Arc::clone(&shared), published, is_over);
     shared.over.store(true, Ordering::Relaxed);
     // The camera is stopped even if the other threads failed.
     let measured = measuring.join().map_err(|_| ServeError::Thread("camera"))?;

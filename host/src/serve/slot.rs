@@ -26,6 +26,15 @@ pub struct RunSetup {
     pub flat_field: Option<FlatField>,
 }
 
+/// A depth map in the camera's image.
+#[derive(Debug)]
+pub struct DepthImage {
+    /// The map for the networks.
+    pub map: DepthMaps,
+    /// (32, 32) distances in metres.
+    pub pixels_m: Vec<f32>,
+}
+
 /// The newest frames, and the newest depth map.
 #[derive(Debug, Clone)]
 pub struct Look {
@@ -34,7 +43,7 @@ pub struct Look {
     /// How the frames were measured.
     pub run: Arc<RunSetup>,
     /// The newest depth map.
-    pub depth: Option<Arc<DepthMaps>>,
+    pub depth: Option<Arc<DepthImage>>,
 }
 
 /// The account of all frames of all runs.
@@ -64,6 +73,8 @@ pub struct ImageCounters {
 struct Inner {
     next: Option<Look>,
     ledger: Ledger,
+    /// Whether pages should learn of something else than a frame.
+    news: bool,
 }
 
 /// A slot for one [`Look`].
@@ -91,12 +102,21 @@ impl Slot {
         lock(&self.inner).ledger.frames = frames;
     }
 
-    /// Takes the newest look, if there is one within `patience`. The caller must then call
-    /// [`done`](Self::done).
+    /// Wakes the imaging thread without a frame, so that pages learn of a new state at once.
+    pub fn wake(&self) {
+        lock(&self.inner).news = true;
+        self.filled.notify_one();
+    }
+
+    /// Takes the newest look, if there is one within `patience` and before [`wake`](Self::wake).
+    /// The caller must then call [`done`](Self::done).
     pub fn take(&self, patience: Duration) -> Option<Look> {
         let inner = lock(&self.inner);
-        let waited = self.filled.wait_timeout_while(inner, patience, |inner| inner.next.is_none());
-        waited.unwrap_or_else(std::sync::PoisonError::into_inner).0.next.take()
+        let idle = |inner: &mut Inner| inner.next.is_none() && !inner.news;
+        let waited = self.filled.wait_timeout_while(inner, patience, idle);
+        let mut inner = waited.unwrap_or_else(std::sync::PoisonError::into_inner).0;
+        inner.news = false;
+        inner.next.take()
     }
 
     /// Records that the taken look became an image, or failed.

@@ -5,10 +5,11 @@
 
 use super::camera_log::{CameraState, EventLine};
 use super::imaging::Picture;
-use super::settings::{MAX_FRAMES, Settings};
+use super::settings::{MAX_FRAMES, MAX_SWEEPS, Offer, Settings};
 use super::slot::Ledger;
-use crate::files::image::to_level;
+use super::stage::SceneState;
 use data_encoding::BASE64;
+use nirspi_recon::Order;
 use serde::Serialize;
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -52,19 +53,43 @@ pub struct Rates {
     pub images_per_s: f64,
 }
 
+/// Whether persons allow light.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct Light {
+    /// The position of the switch.
+    pub allowed: bool,
+    /// The number of commands so far.
+    pub commands: u64,
+}
+
 /// The values that settings can have.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct Offered<'s> {
-    methods: &'s [&'static str],
-    /// What each method does, in one line.
-    about: &'s [&'static str],
+    #[serde(flatten)]
+    offer: &'s Offer,
     max_frames: u32,
+    max_sweeps: u32,
+    orders: [OfferedOrder; ORDERS],
 }
 
+/// An order of patterns, and what the order is.
+#[derive(Debug, Clone, Copy, Serialize)]
+struct OfferedOrder {
+    name: &'static str,
+    about: &'static str,
+}
+
+/// Number of orders that pages offer.
+const ORDERS: usize = Order::NAMED.len();
+
 impl<'s> Offered<'s> {
-    /// The offer of these methods, with what each does.
-    pub fn new(methods: &'s [&'static str], about: &'s [&'static str]) -> Self {
-        Self { methods, about, max_frames: MAX_FRAMES }
+    /// This offer, and what every server offers.
+    pub fn new(offer: &'s Offer) -> Self {
+        let orders = std::array::from_fn(|at| {
+            let order = &Order::NAMED[at];
+            OfferedOrder { name: order.name, about: order.about }
+        });
+        Self { offer, max_frames: MAX_FRAMES, max_sweeps: MAX_SWEEPS, orders }
     }
 }
 
@@ -75,34 +100,39 @@ pub struct State<'s> {
     pub program: &'static str,
     /// The camera.
     pub camera: &'s CameraState,
+    /// Whether persons allow light.
+    pub light: Light,
     /// The account: `frames` and `images`.
     #[serde(flatten)]
     pub ledger: Ledger,
     /// Rates.
     pub rates: Rates,
     /// The current settings.
-    pub settings: Settings,
+    pub settings: &'s Settings,
     /// The values that settings can have.
     pub offered: Offered<'s>,
     /// Properties of the images shown; `null` before the first.
     pub picture: Option<&'s Picture>,
     /// Why the newest frame gave no image; `null` if it gave one.
     pub problem: Option<&'s str>,
+    /// The scene of a virtual camera; `null` for a real one.
+    pub scene: Option<SceneState>,
     /// Number of connected pages.
     pub viewers: usize,
     /// Events, oldest first.
     pub events: &'s VecDeque<EventLine>,
 }
 
-/// The message to pages.
+/// The message to pages. Images are 32-bit floating-point numbers, little-endian, in base64.
 #[derive(Serialize)]
 struct Message<'s> {
     state: &'s State<'s>,
-    /// 8-bit grey levels of 32 x 32 pixels in base64.
+    /// (32, 32) ADC counts.
     image: Option<String>,
-    /// 8-bit grey levels of 64 x 64 pixels in base64; `null` if the learned stages are switched
-    /// off.
+    /// (64, 64) shares of white; `null` if the learned stages are switched off.
     enhanced: Option<String>,
+    /// (32, 32) distances in metres; `null` without a depth sensor.
+    depth: Option<String>,
 }
 
 /// One state, encoded for sending.
@@ -124,8 +154,9 @@ impl Published {
     pub fn new(state: &State<'_>, picture: Option<&Arc<Picture>>) -> serde_json::Result<Self> {
         let message = Message {
             state,
-            image: picture.map(|picture| levels(&picture.image)),
-            enhanced: picture.and_then(|picture| picture.enhanced.as_deref().map(levels)),
+            image: picture.map(|picture| numbers(&picture.counts)),
+            enhanced: picture.and_then(|picture| picture.enhanced.as_deref().map(numbers)),
+            depth: picture.and_then(|picture| Some(numbers(&picture.depth.as_ref()?.pixels_m))),
         };
         Ok(Self {
             message: serde_json::to_string(&message)?,
@@ -135,8 +166,8 @@ impl Published {
     }
 }
 
-fn levels(pixels: &[f32]) -> String {
-    BASE64.encode(&pixels.iter().map(|&value| to_level(value)).collect::<Vec<_>>())
+fn numbers(pixels: &[f32]) -> String {
+    BASE64.encode(&pixels.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<_>>())
 }
 
 #[cfg(test)]

@@ -1,4 +1,7 @@
 use super::camera_log::Phase;
+use super::light::Leds;
+use super::settings::Measuring;
+use super::settings::tests::{offer, settings};
 use super::*;
 use crate::capture::Calibration;
 use crate::link::{Link, Received};
@@ -14,10 +17,16 @@ use std::time::{Duration, Instant};
 /// The longest wait of a test, enough for a busy machine.
 const LIMIT: Duration = Duration::from_secs(30);
 
-const SETTINGS: Settings = Settings { method: "hadamard", enhance: false, frames: 8 };
+fn setup() -> MeasurementSetup {
+    MeasurementSetup::new(&Order::CakeCutting, 0.125).unwrap()
+}
 
-fn shared(identity: &CameraIdentity) -> Arc<Shared> {
-    Arc::new(Shared::new(CameraLog::new("test", identity), vec!["hadamard"], SETTINGS))
+fn shared(identity: &CameraIdentity, scene: Option<StagedScene>) -> Arc<Shared> {
+    let measuring = Measuring::of(&setup());
+    let settings =
+        Settings { method: "hadamard", enhance: false, frames: 8, measuring, ..settings() };
+    let offer = Offer { base: Some(setup()), ..offer() };
+    Arc::new(Shared::new(CameraLog::new("test", identity), offer, settings, Stage::of(scene)))
 }
 
 /// Waits until `is_so` returns true.
@@ -41,15 +50,23 @@ struct Enclosed {
 struct Hands {
     open: AtomicBool,
     pulled: AtomicBool,
+    /// No byte arrives, in either direction.
+    stuck: AtomicBool,
 }
 
 impl Link for Enclosed {
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
-        self.camera.receive(bytes);
+        if !self.hands.stuck.load(Ordering::Relaxed) {
+            self.camera.receive(bytes);
+        }
         Ok(())
     }
 
-    fn receive(&mut self, buffer: &mut [u8], _: Duration) -> io::Result<Received> {
+    fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<Received> {
+        if self.hands.stuck.load(Ordering::Relaxed) {
+            std::thread::sleep(timeout);
+            return Ok(Received::Nothing);
+        }
         if self.hands.pulled.load(Ordering::Relaxed) {
             return Ok(Received::Closed);
         }
@@ -89,16 +106,23 @@ impl Lab {
     fn new(open_while_unplugged: bool) -> Self {
         let hands = Arc::<Hands>::default();
         let first = enclosed(&hands, false);
-        let shared = shared(first.session.identity());
+        let shared = shared(first.session.identity(), None);
         let measuring = {
             let (shared, hands) = (Arc::clone(&shared), Arc::clone(&hands));
-            let setup = MeasurementSetup::new(&Order::CakeCutting, 0.125).unwrap();
-            let connect: Connect = Box::new(move || {
+            let connect: Connect = Box::new(move |_| {
                 hands.pulled.store(false, Ordering::Relaxed);
+                hands.stuck.store(false, Ordering::Relaxed);
                 Ok(enclosed(&hands, open_while_unplugged))
             });
             let model = nirspi_optics::CameraModel::default();
-            let source = CameraSource { address: "test".to_owned(), setup, model, connect };
+            let source = CameraSource {
+                address: "test".to_owned(),
+                setup: setup(),
+                model,
+                scene: None,
+                record_to: None,
+                connect,
+            };
             std::thread::spawn(move || camera::run(&shared, source, first))
         };
         let lab = Self { hands, shared, measuring };
@@ -108,6 +132,10 @@ impl Lab {
 
     fn phase(&self) -> Phase {
         lock(&self.shared.camera).camera.phase
+    }
+
+    fn leds(&self) -> Leds {
+        lock(&self.shared.camera).camera.leds
     }
 
     fn received(&self) -> u64 {
@@ -125,7 +153,7 @@ impl Lab {
     #[track_caller]
     fn resumes(&self) {
         let before = self.received();
-        self.shared.resume.store(true, Ordering::Relaxed);
+        self.shared.light.set(true);
         until("on again", || self.received() > before + 10);
         assert_eq!(self.phase(), Phase::Measuring);
     }
@@ -150,7 +178,7 @@ fn after_a_fault_leds_go_on_again_only_when_a_person_says_so() {
         log.events().iter().filter(|event| event.text.starts_with("connected to")).count()
     };
     let before = connections();
-    lab.shared.resume.store(true, Ordering::Relaxed);
+    lab.shared.light.set(true);
     until("tried again", || connections() > before && lab.phase() == Phase::Fault);
     // The cause is gone, but a person has not asked.
     lab.hands.open.store(false, Ordering::Relaxed);
@@ -158,6 +186,38 @@ fn after_a_fault_leds_go_on_again_only_when_a_person_says_so() {
     lab.resumes();
     let told = lab.end();
     assert!(told.iter().any(|text| text.contains("LEDs off: the enclosure")), "{told:?}");
+}
+
+#[test]
+fn a_person_stops_a_camera_and_only_a_person_starts_it_again() {
+    let lab = Lab::new(false);
+    lab.shared.light.set(false);
+    until("stopped", || lab.phase() == Phase::Stopped && lab.leds() == Leds::Off);
+    let before = lab.received();
+    // A camera that was lost meanwhile comes back dark.
+    lab.hands.pulled.store(true, Ordering::Relaxed);
+    until("lost", || lab.phase() == Phase::Lost && lab.leds() == Leds::Unknown);
+    until("back", || lab.phase() == Phase::Stopped && lab.leds() == Leds::Off);
+    std::thread::sleep(Duration::from_millis(1500));
+    assert_eq!((lab.phase(), lab.received()), (Phase::Stopped, before));
+    lab.resumes();
+    assert_eq!(lab.leds(), Leds::On);
+    // A stop and a start at once: the later one counts.
+    lab.shared.light.set(false);
+    lab.resumes();
+    lab.end();
+}
+
+#[test]
+fn a_stop_counts_although_the_stream_is_stuck() {
+    let lab = Lab::new(false);
+    lab.hands.stuck.store(true, Ordering::Relaxed);
+    lab.shared.light.set(false);
+    // The camera does not answer the stop: what its LEDs do is not known, and the session is closed.
+    until("given up", || lab.phase() == Phase::Lost && lab.leds() == Leds::Unknown);
+    until("dark", || lab.phase() == Phase::Stopped && lab.leds() == Leds::Off);
+    lab.resumes();
+    lab.end();
 }
 
 #[test]
@@ -179,15 +239,15 @@ fn a_camera_that_comes_back_measures_on_unless_it_was_opened_meanwhile() {
 #[test]
 fn a_browser_that_does_not_read_costs_nobody_and_then_sees_the_newest() {
     const LAST: usize = 60;
-    let shared = shared(enclosed(&Arc::default(), false).session.identity());
+    let shared = shared(enclosed(&Arc::default(), false).session.identity(), None);
     let (publish, published) = watch::channel(Arc::new(Published::default()));
-    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-    let address = listener.local_addr().unwrap();
+    let server = Server::bind("127.0.0.1:0", None).unwrap();
+    let address = server.address;
     let serving = {
         let shared = Arc::clone(&shared);
         std::thread::spawn(move || {
             let over = Arc::clone(&shared);
-            http::run(listener, shared, published, || over.is_over())
+            http::run(server, shared, published, || over.is_over())
         })
     };
     let browser = || {

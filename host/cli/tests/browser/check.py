@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The page of `nirspi serve` in a real browser: every switch, the saved picture, a phone's screen, a fault, the end.
+"""The page of `nirspi serve` in a real browser: every control, the LEDs' switch, a fault, the token, a phone, the end.
 
     python3 check.py target/release/nirspi [--screenshot docs/serve.png]
 
@@ -11,35 +11,18 @@ import json
 import signal
 import struct
 import subprocess
+import sys
+import tempfile
 
 from playwright.sync_api import expect, sync_playwright
 
+# No compiled files beside the sources.
+sys.dont_write_bytecode = True
+import controls
+from pictures import LEVELS, fits, levels, seen
+
 # No wait takes longer, on a busy machine either.
 LIMIT_MS = 40_000
-
-# Grey levels of a canvas, left to right and top to bottom.
-LEVELS = """canvas => {
-  const pixels = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
-  return Array.from({ length: pixels.length / 4 }, (_, at) => pixels[4 * at]);
-}"""
-
-
-def levels(page, name):
-    return page.locator(f"#{name}").evaluate(LEVELS)
-
-
-def seen(page, name, side):
-    """Waits for an image of light and dark."""
-    page.wait_for_function(
-        f"() => {{ const levels = ({LEVELS})(document.getElementById('{name}'));"
-        f" return levels.length === {side * side} && Math.max(...levels) > 200 && Math.min(...levels) < 30; }}"
-    )
-
-
-def fits(page):
-    """Nothing sticks out of the screen sideways."""
-    width, screen = page.evaluate("[document.documentElement.scrollWidth, window.innerWidth]")
-    assert width <= screen, f"{width} px of page on {screen} px of screen"
 
 
 def live(page, address, screenshot):
@@ -63,40 +46,110 @@ def live(page, address, screenshot):
         page.screenshot(path=screenshot)
 
 
-def switches(page):
-    page.get_by_label("hadamard").check()
-    expect(page.locator("#about-image")).to_contain_text("hadamard, 64 frames")
-    page.locator("#frames").fill("3")
-    expect(page.locator("#about-image")).to_contain_text("hadamard, 8 frames")
+def saved(page):
     with page.expect_download() as saved:
         page.locator("#save").click()
     png = open(saved.value.path(), "rb").read()
     assert struct.unpack(">II", png[16:24]) == (1072, 612), "size of the saved picture"
-    page.get_by_label("enhance", exact=True).uncheck()
-    expect(page.locator("#no-enhanced")).to_have_text("switched off")
-    expect(page.locator("#no-enhanced")).to_be_visible()
+
+
+def leds(page, browser, address):
+    """Stop by button, by Escape and by space; start by a person; two pages show the same."""
+    other = browser.new_page()
+    other.goto(address)
+
+    def both(words, phase):
+        for each in [page, other]:
+            expect(each.locator("#leds")).to_have_text(words)
+            expect(each.locator("body")).to_have_attribute("data-phase", phase)
+
+    both("LEDs on", "measuring")
+    expect(page.locator("#stop")).to_contain_text("Esc")
+    page.locator("#stop").click()
+    both("LEDs off, stopped", "stopped")
+    other.locator("#start").click()
+    both("LEDs on", "measuring")
+    # A control has the focus: Escape stops all the same, and space presses the control.
+    page.get_by_label("hadamard").focus()
+    page.keyboard.press("Escape")
+    both("LEDs off, stopped", "stopped")
+    page.locator("#start").click()
+    both("LEDs on", "measuring")
+    page.get_by_label("omp").focus()
+    page.keyboard.press("Space")
+    expect(page.locator("#about-image")).to_contain_text("omp")
+    both("LEDs on", "measuring")
+    # After a click the button does not keep the focus.
+    with page.expect_download():
+        page.locator("#save").click()
+    page.keyboard.press("Space")
+    both("LEDs off, stopped", "stopped")
+    # A stop that does not arrive is said, and sent again.
+    page.locator("#start").click()
+    both("LEDs on", "measuring")
+    page.route("**/api/stop", lambda route: route.abort())
+    page.keyboard.press("Escape")
+    expect(page.locator("#alarm")).to_be_visible()
+    both_on = page.locator("#leds")
+    expect(both_on).to_have_text("LEDs on")
+    page.unroute("**/api/stop")
+    both("LEDs off, stopped", "stopped")
+    expect(page.locator("#alarm")).to_be_hidden()
+    other.locator("#start").click()
+    both("LEDs on", "measuring")
+    other.close()
 
 
 def fault(browser, address):
     """A camera that has switched its LEDs off, told to a page by hand."""
     page = browser.new_page()
     state = json.loads(page.request.get(f"{address}/api/state").body())
-    state["camera"] |= {"phase": "fault", "line": "the camera switched its LEDs off: Interlock"}
+    hostile = "<img src=x onerror=alert(1)>\u202egnp"
+    state["camera"] |= {"phase": "fault", "leds": "off", "line": f"the camera switched its LEDs off: {hostile}"}
+    state["camera"]["identity"] |= {"board": hostile, "serial": hostile}
+    state["light"]["allowed"] = False
     state["frames"]["lost"] = 7
-    state["events"] = [{"unix_ms": 0, "text": "<b>not markup</b>"}]
+    state["events"] = [{"unix_ms": 0, "text": f"<b>not markup</b> {hostile}"}]
     message = json.dumps({"state": state, "image": None, "enhanced": None})
     page.route("**/events", lambda route: route.fulfill(
         content_type="text/event-stream", body=f"retry: 100000\ndata: {message}\n\n"))
     wishes = []
-    page.route("**/api/settings", lambda route: (wishes.append(route.request.post_data_json), route.fulfill(json={})))
+    page.on("dialog", lambda dialog: wishes.append(dialog.message))
+    page.route("**/api/st*", lambda route: (
+        wishes.append(route.request.url) if route.request.method == "POST" else None, route.fulfill(json={})))
     page.goto(address)
     expect(page.locator("#account .loss")).to_have_text("7")
     expect(page.locator("#losses")).to_contain_text("7 lost, 0 corrupt")
     expect(page.locator("#events")).to_contain_text("<b>not markup</b>")
+    # The names are text, and cannot turn the direction of other text.
+    for name in ["camera", "events"]:
+        expect(page.locator(f"#{name}")).to_contain_text("<img src=x onerror=alert(1)>\\u{202e}gnp")
+    expect(page.locator("#start")).to_be_hidden()
     page.locator("#resume").click()
     page.wait_for_timeout(100)
-    assert wishes == [{"resume": True}], wishes
+    assert wishes == [f"{address}/api/start"], wishes
+    assert page.locator("img").count() == 0
     page.close()
+
+
+def token(browser, program):
+    """The printed address opens the page of a server that other machines reach; without its token nothing does."""
+    server = subprocess.Popen([program, "serve", "--listen", "0.0.0.0:0"], stdout=subprocess.PIPE, text=True)
+    try:
+        address = next(word for word in server.stdout.readline().split() if word.startswith("http://"))
+        plain = address.split("/?token=")[0]
+        page = browser.new_context().new_page()
+        page.goto(plain)
+        expect(page.locator("body")).to_contain_text("needs its token")
+        page.goto(address)
+        assert page.url == f"{plain}/", page.url
+        seen(page, "image", 32)
+        page.keyboard.press("Escape")
+        expect(page.locator("#leds")).to_have_text("LEDs off, stopped")
+        page.context.close()
+    finally:
+        server.send_signal(signal.SIGINT)
+        server.wait(10)
 
 
 def phone(browser, address):
@@ -112,7 +165,8 @@ def main():
     arguments.add_argument("nirspi")
     arguments.add_argument("--screenshot")
     arguments = arguments.parse_args()
-    server = subprocess.Popen([arguments.nirspi, "serve", "--listen", "127.0.0.1:0"],
+    folder = tempfile.TemporaryDirectory()
+    server = subprocess.Popen([arguments.nirspi, "serve", "--listen", "127.0.0.1:0", "--record-to", folder.name],
                               stdout=subprocess.PIPE, text=True)
     try:
         address = next(word for word in server.stdout.readline().split() if word.startswith("http://"))
@@ -125,12 +179,24 @@ def main():
             page.on("pageerror", lambda error: complaints.append(str(error)))
             page.on("console", lambda said: complaints.append(said.text) if said.type == "error" else None)
             live(page, address, arguments.screenshot)
-            switches(page)
+            leds(page, browser, address)
+            # The browser itself reports the request that was cut off.
+            complaints = [said for said in complaints if "ERR_FAILED" not in said]
+            saved(page)
+            controls.picture(page)
+            controls.measurement(page, folder.name)
+            controls.display(page)
+            controls.scene(page)
+            controls.names(page)
+            # The browser itself reports answers that refuse.
+            complaints = [said for said in complaints if "400 (Bad Request)" not in said]
             assert not complaints, complaints
             fault(browser, address)
+            token(browser, arguments.nirspi)
             phone(browser, address)
             server.send_signal(signal.SIGINT)
             expect(page.locator("#line")).to_contain_text("does not answer")
+            expect(page.locator("#leds")).to_have_text("LEDs unknown: no answer from nirspi serve")
             browser.close()
         said = server.stdout.read()
         assert server.wait(10) == 0 and said.startswith("stopped: "), said

@@ -31,6 +31,8 @@ mod selftest;
 #[cfg(unix)]
 mod serial;
 mod serve;
+mod serve_controls;
+mod serve_guarded;
 mod settings;
 mod sparse_problems;
 mod train;

@@ -10,48 +10,51 @@ use std::net::{TcpListener, TcpStream};
 use std::time::{Duration, Instant};
 
 /// No answer takes longer, on a busy machine either.
-const LIMIT: Duration = Duration::from_secs(40);
+pub const LIMIT: Duration = Duration::from_secs(40);
 
 /// A server that has said where it is.
-struct Server {
-    process: Process,
-    address: String,
+pub struct Server {
+    pub process: Process,
+    pub address: String,
+    /// The query of the address, with the token if there is one.
+    pub query: String,
 }
 
 /// What was answered.
 #[derive(Debug)]
-struct Answer {
-    status: u16,
-    head: String,
-    body: Vec<u8>,
+pub struct Answer {
+    pub status: u16,
+    pub head: String,
+    pub body: Vec<u8>,
 }
 
 impl Answer {
     #[track_caller]
-    fn json(&self) -> Value {
+    pub fn json(&self) -> Value {
         assert_eq!(self.status, 200, "{self:?}");
         serde_json::from_slice(&self.body).unwrap()
     }
 
     /// One line, with this status and these words.
     #[track_caller]
-    fn refuses(&self, status: u16, words: &str) {
+    pub fn refuses(&self, status: u16, words: &str) {
         let text = String::from_utf8_lossy(&self.body);
         assert_eq!((self.status, text.lines().count()), (status, 1), "{text}");
         assert!(text.contains(words), "{text}");
     }
 }
 
-fn serve(bench: &Bench, more: &[&str]) -> Server {
+pub fn serve(bench: &Bench, more: &[&str]) -> Server {
     let listen = if more.contains(&"--listen") { &[][..] } else { &["--listen", "127.0.0.1:0"] };
     let mut process = bench.start(&[&["serve"], listen, more].concat());
     let line = process.says("open http://");
-    let address = line.split_whitespace().find_map(|word| word.strip_prefix("http://")).unwrap();
-    Server { address: address.to_owned(), process }
+    let url = line.split_whitespace().find_map(|word| word.strip_prefix("http://")).unwrap();
+    let (address, query) = url.split_once("/?").unwrap_or((url, ""));
+    Server { address: address.to_owned(), query: query.to_owned(), process }
 }
 
 impl Server {
-    fn connect(&self) -> TcpStream {
+    pub fn connect(&self) -> TcpStream {
         let stream = TcpStream::connect(&self.address).unwrap();
         stream.set_read_timeout(Some(LIMIT)).unwrap();
         stream
@@ -70,7 +73,7 @@ impl Server {
         Answer { status, head, body: answer.split_off((head_end + 4).min(answer.len())) }
     }
 
-    fn ask(&self, method: &str, path: &str, headers: &[&str], body: &str) -> Answer {
+    pub fn ask(&self, method: &str, path: &str, headers: &[&str], body: &str) -> Answer {
         let mut lines = vec![format!("{method} {path} HTTP/1.1")];
         if !headers.iter().any(|header| header.starts_with("Host:")) {
             lines.push(format!("Host: {}", self.address));
@@ -80,17 +83,17 @@ impl Server {
         self.raw(lines.join("\r\n").as_bytes())
     }
 
-    fn get(&self, path: &str) -> Answer {
+    pub fn get(&self, path: &str) -> Answer {
         self.ask("GET", path, &[], "")
     }
 
-    fn change(&self, body: &str) -> Answer {
+    pub fn change(&self, body: &str) -> Answer {
         self.ask("POST", "/api/settings", &[], body)
     }
 
     /// Asks for the state until it is as wanted.
     #[track_caller]
-    fn state(&self, what: &str, mut wanted: impl FnMut(&Value) -> bool) -> Value {
+    pub fn state(&self, what: &str, mut wanted: impl FnMut(&Value) -> bool) -> Value {
         let deadline = Instant::now() + LIMIT;
         loop {
             let answer = self.get("/api/state");
@@ -113,7 +116,7 @@ impl Server {
     }
 
     /// The moments as a browser gets them.
-    fn browser(&self) -> impl Iterator<Item = Value> + use<> {
+    pub fn browser(&self) -> impl Iterator<Item = Value> + use<> {
         let mut stream = self.connect();
         write!(stream, "GET /events HTTP/1.1\r\nHost: {}\r\n\r\n", self.address).unwrap();
         let lines = BufReader::new(stream).lines().map(Result::unwrap);
@@ -139,9 +142,25 @@ fn a_browser_gets_the_page_and_a_script_the_images_of_the_scene() {
     let server = serve(&bench, &[]);
     let page = server.get("/");
     let html = String::from_utf8_lossy(&page.body);
-    assert!(page.head.contains("text/html") && html.contains("EventSource(\"/events\")"), "{html}");
-    // It works where there is no other network.
-    assert!(!html.contains("://"), "something from elsewhere");
+    assert!(page.head.contains("text/html") && html.contains("/page/main.js"), "{html}");
+    // Every module that a module needs is there.
+    let mut files = vec!["style.css".to_owned(), "main.js".to_owned()];
+    let (mut scripts, mut at) = (String::new(), 0);
+    while let Some(file) = files.get(at) {
+        let answer = server.get(&format!("/page/{file}"));
+        assert_eq!(answer.status, 200, "{file}");
+        let text = String::from_utf8(answer.body).unwrap();
+        let needs = text.split("from \"./").skip(1).filter_map(|rest| rest.split('"').next());
+        let new: Vec<String> =
+            needs.map(str::to_owned).filter(|name| !files.contains(name)).collect();
+        files.extend(new);
+        scripts += &text;
+        at += 1;
+    }
+    assert!(files.len() > 8, "{files:?}");
+    assert!(scripts.contains("EventSource(\"/events"));
+    // The page works without any other network.
+    assert!(!(html + scripts.as_str()).contains("://"), "something from elsewhere");
     assert!(page.head.contains("frame-ancestors 'none'"), "{}", page.head);
 
     let state = server.state("enhanced", shows_enhanced);
@@ -175,7 +194,7 @@ fn two_browsers_see_the_same_images_and_an_account_that_adds_up() {
         adds_up(&a["state"]);
         if number(&a) > 0 && number(&a) == number(&b) {
             assert_eq!(a["image"], b["image"]);
-            assert_eq!(a["image"].as_str().unwrap().len(), 1368, "32 x 32 in base64");
+            assert_eq!(a["image"].as_str().unwrap().len(), 5464, "32 x 32 numbers in base64");
             different.insert(a["image"].to_string());
             same += 1;
             (a, b) = (first.next().unwrap(), second.next().unwrap());
@@ -232,7 +251,11 @@ fn pages_switch_method_enhancement_and_number_of_frames() {
     let default = nirspi_recon::reconstruct::Method::default();
     assert_eq!(state["picture"]["method"], default.argument());
     let set = server.change(r#"{"method": "hadamard", "enhance": false, "frames": 3}"#).json();
-    assert_eq!(set, serde_json::json!({"method": "hadamard", "enhance": false, "frames": 3}));
+    let expected = serde_json::json!({
+        "method": "hadamard", "strength": null, "enhance": false, "model": "diffusion", "frames": 3,
+        "order": "cake-cutting", "sampling": 0.5, "sweeps": 1, "record": false
+    });
+    assert_eq!(set, expected);
     server.state("switched", |state| {
         let picture = &state["picture"];
         picture["method"] == "hadamard"
@@ -240,6 +263,10 @@ fn pages_switch_method_enhancement_and_number_of_frames() {
             && picture["enhancement"].is_null()
     });
     server.get("/enhanced.png").refuses(503, "no such image");
+    server.get("/enhanced.npy").refuses(503, "no such image");
+    bench.write("got.npy", &server.get("/image.npy").body);
+    let counts = bench.pixels("got.npy");
+    assert!(counts.len() == 1024 && counts.iter().any(|&count| count > 1.0), "{counts:?}");
 
     server
         .change(r#"{"method": "magic", "enhance": true}"#)
@@ -257,6 +284,54 @@ fn pages_switch_method_enhancement_and_number_of_frames() {
 }
 
 #[test]
+fn a_page_switches_the_leds_off_and_on_and_the_last_of_two_commands_counts() {
+    let bench = Bench::new();
+    let server = serve(&bench, &[]);
+    let (mut first, mut second) = (server.browser(), server.browser());
+    let measuring = |state: &Value| state["camera"]["phase"] == "measuring";
+    server.state("measuring", measuring);
+    let stopped = server.ask("POST", "/api/stop", &[], "").json();
+    assert_eq!(stopped["run"], false);
+    // Both pages show the camera's own word.
+    let dark = |moment: &Value| {
+        let (camera, light) = (&moment["state"]["camera"], &moment["state"]["light"]);
+        camera["phase"] == "stopped" && camera["leds"] == "off" && light["allowed"] == false
+    };
+    assert!(first.any(|moment| dark(&moment)) && second.any(|moment| dark(&moment)));
+    let received = server.state("there", |_| true)["frames"]["received"].clone();
+    std::thread::sleep(Duration::from_millis(1500));
+    let state = server.state("there", |_| true);
+    assert_eq!(
+        (&state["camera"]["phase"], &state["frames"]["received"]),
+        (&"stopped".into(), &received)
+    );
+
+    // Commands of two pages at once, in turns.
+    let commands: Vec<Value> = std::thread::scope(|scope| {
+        let ask = |path: &'static str| scope.spawn(|| server.ask("POST", path, &[], "").json());
+        let paths = ["/api/start", "/api/stop", "/api/start", "/api/stop", "/api/start"];
+        let asked: Vec<_> = paths.into_iter().map(ask).collect();
+        asked.into_iter().map(|asked| asked.join().unwrap()).collect()
+    });
+    let last = commands.iter().max_by_key(|answer| answer["command"].as_u64()).unwrap();
+    let phase = if last["run"] == true { "measuring" } else { "stopped" };
+    for browser in [&mut first, &mut second] {
+        assert!(browser.any(|moment| {
+            let state = &moment["state"];
+            state["light"]["commands"] == last["command"]
+                && state["light"]["allowed"] == last["run"]
+                && state["camera"]["phase"] == phase
+        }));
+    }
+    server.change(r#"{"run": true}"#).json();
+    server.state("measuring again", |state| {
+        measuring(state)
+            && state["camera"]["leds"] == "on"
+            && state["frames"]["received"].as_u64() > received.as_u64()
+    });
+}
+
+#[test]
 fn pages_of_other_sites_get_nothing_and_change_nothing() {
     let bench = Bench::new();
     let server = serve(&bench, &[]);
@@ -269,21 +344,14 @@ fn pages_of_other_sites_get_nothing_and_change_nothing() {
         server.ask("GET", path, &origin, "").refuses(403, "another site");
     }
     for header in ["Host: evil.example:8080", "Origin: http://localhost:3000", "Origin: null"] {
-        assert_eq!(server.ask("POST", "/api/settings", &[header], wish).status, 403, "{header}");
+        for path in ["/api/settings", "/api/stop", "/api/start"] {
+            assert_eq!(server.ask("POST", path, &[header], wish).status, 403, "{header}");
+        }
     }
     assert_eq!(server.raw(b"GET / HTTP/1.0\r\n\r\n").status, 403);
     assert_eq!(server.state("there", |_| true)["settings"], state["settings"]);
     let own = format!("Origin: http://{}", server.address);
     server.ask("POST", "/api/settings", &[&own], wish).json();
-}
-
-#[test]
-fn who_lets_the_network_look_is_told_so() {
-    let bench = Bench::new();
-    let mut server = serve(&bench, &["--listen", "0.0.0.0:0"]);
-    server.process.says("every machine in this network");
-    server.ask("GET", "/", &["Host: camera.evil.example"], "").refuses(403, "by that name");
-    assert_eq!(server.ask("GET", "/", &["Host: 192.0.2.7"], "").status, 200);
 }
 
 #[test]
@@ -308,6 +376,9 @@ fn what_cannot_be_served_is_said_in_one_line() {
     bench.run(&["serve", "--listen", "nonsense"]).failed(1, &["--listen nonsense"]);
     let nobody = ["serve", "--listen", "127.0.0.1:0", "--camera", "tcp:127.0.0.1:1"];
     bench.run(&nobody).failed(1, &["no camera at tcp:127.0.0.1:1"]);
+    let lost = ["serve", "--listen", "127.0.0.1:0", "--record-to", "nowhere"];
+    bench.run(&lost).failed(1, &["--record-to nowhere", "no such folder"]);
+    bench.run(&["serve", "--token", "short"]).failed(2, &["--token", "expected 16 to 128"]);
     for name in ["--sum", "--frames"] {
         bench.run(&["serve", name, "2000"]).failed(2, &["--sum", "1024"]);
     }

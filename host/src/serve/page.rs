@@ -1,0 +1,40 @@
+//! The files of the page, which are part of the program.
+
+use axum::Router;
+use axum::http::header;
+use axum::response::{Html, IntoResponse, Response};
+use axum::routing::get;
+
+const INDEX: &str = include_str!("page/index.html");
+const SCRIPT: &str = "text/javascript; charset=utf-8";
+const STYLE: &str = "text/css; charset=utf-8";
+
+/// Path, type and content of each file that the page loads.
+const FILES: [(&str, &str, &str); 14] = [
+    ("/page/style.css", STYLE, include_str!("page/style.css")),
+    ("/page/main.js", SCRIPT, include_str!("page/main.js")),
+    ("/page/words.js", SCRIPT, include_str!("page/words.js")),
+    ("/page/dom.js", SCRIPT, include_str!("page/dom.js")),
+    ("/page/light.js", SCRIPT, include_str!("page/light.js")),
+    ("/page/display.js", SCRIPT, include_str!("page/display.js")),
+    ("/page/controls.js", SCRIPT, include_str!("page/controls.js")),
+    ("/page/facts.js", SCRIPT, include_str!("page/facts.js")),
+    ("/page/save.js", SCRIPT, include_str!("page/save.js")),
+    ("/page/requests.js", SCRIPT, include_str!("page/requests.js")),
+    ("/page/colours.js", SCRIPT, include_str!("page/colours.js")),
+    ("/page/history.js", SCRIPT, include_str!("page/history.js")),
+    ("/page/plots.js", SCRIPT, include_str!("page/plots.js")),
+    ("/page/scene.js", SCRIPT, include_str!("page/scene.js")),
+];
+
+/// The routes of all files.
+pub fn routes<S: Clone + Send + Sync + 'static>() -> Router<S> {
+    let index = Router::new().route("/", get(Html(INDEX)));
+    FILES.iter().fold(index, |router, &(path, kind, content)| {
+        router.route(path, get(move || async move { file(kind, content) }))
+    })
+}
+
+fn file(kind: &'static str, content: &'static str) -> Response {
+    ([(header::CONTENT_TYPE, kind)], content).into_response()
+}

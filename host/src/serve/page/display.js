@@ -1,0 +1,140 @@
+// Draws the images: colour map, range, value under the cursor, warnings.
+
+import { gradient, table } from "./colours.js";
+import { $, fixed, frames, text } from "./dom.js";
+
+export const rates = { drawn: 0 };
+let shown = null, lastShown = -1, drawn = 0, since = performance.now();
+
+// An image of a message: 32-bit floating-point numbers, little-endian, in base64.
+export function values(base64) {
+  if (!base64) return null;
+  const bytes = Uint8Array.from(atob(base64), sign => sign.charCodeAt(0)), view = new DataView(bytes.buffer);
+  return Float32Array.from({ length: bytes.length / 4 }, (_, at) => view.getFloat32(4 * at, true));
+}
+
+// What each image shows: its unit, the value that counts as white, and a number in words.
+const PANELS = {
+  image: { side: 32, of: "image", white: picture => picture.white_counts, scale: 1, unit: "ADC counts", digits: 1 },
+  enhanced: { side: 64, of: "enhanced", white: () => 1, scale: 100, unit: "% of white", digits: 1 },
+  depth: { side: 32, of: "depth", white: null, scale: 1, unit: "m", digits: 3 },
+};
+for (const [id, panel] of Object.entries(PANELS)) Object.assign(panel, { id, values: null, cell: null });
+
+function percentile(sorted, share) { return sorted[Math.round(share * (sorted.length - 1))]; }
+
+// The range of values from black to white.
+function range(panel, picture) {
+  const white = panel.white?.(picture);
+  if (white === undefined || $("range").value === "auto") {
+    const sorted = Float32Array.from(panel.values).sort();
+    const tail = panel.white ? .005 : 0;
+    return [percentile(sorted, tail), percentile(sorted, 1 - tail)];
+  }
+  if ($("range").value === "white") return [0, white];
+  return [$("low").value / 100 * white, $("high").value / 100 * white];
+}
+
+const inWords = (panel, value) => `${(panel.scale * value).toFixed(panel.digits)} ${panel.unit}`;
+
+function draw(panel, picture) {
+  const canvas = $(panel.id), pen = canvas.getContext("2d"), bar = $(`${panel.id}-bar`);
+  canvas.width = canvas.height = panel.side;
+  bar.hidden = !panel.values;
+  if (!panel.values) return;
+  const [low, high] = range(panel, picture), map = $("colours").value, colours = table(map);
+  const pixels = new ImageData(panel.side, panel.side), step = 255 / Math.max(high - low, 1e-12);
+  panel.values.forEach((value, at) => {
+    const level = Math.max(0, Math.min(255, Math.round((value - low) * step)));
+    for (let part = 0; part < 3; part++) pixels.data[4 * at + part] = colours[3 * level + part];
+    pixels.data[4 * at + 3] = 255;
+  });
+  pen.putImageData(pixels, 0, 0);
+  bar.firstElementChild.style.background = gradient(map);
+  text(bar.children[1], inWords(panel, low));
+  text(bar.children[2], inWords(panel, high));
+}
+
+// The value under the cursor.
+function point(panel) {
+  const cell = $(`${panel.id}-cell`), says = $(`${panel.id}-value`);
+  const is = panel.cell !== null && panel.values !== null;
+  cell.hidden = !is;
+  if (!is) return text(says, "");
+  const [x, y] = panel.cell, value = panel.values[y * panel.side + x], share = 100 / panel.side;
+  Object.assign(cell.style, { left: `${x * share}%`, top: `${y * share}%`, width: `${share}%`, height: `${share}%` });
+  const white = panel.id === "image" && shown.state.picture.white_counts;
+  text(says, `row ${y}, column ${x}: ${inWords(panel, value)}${white ? `, ${(100 * value / white).toFixed(0)} % of white` : ""}`);
+}
+
+function move(panel, x, y) {
+  const inside = at => Math.max(0, Math.min(panel.side - 1, at));
+  panel.cell = [inside(x), inside(y)];
+  point(panel);
+}
+
+for (const panel of Object.values(PANELS)) {
+  const canvas = $(panel.id);
+  const at = event => {
+    const box = canvas.getBoundingClientRect(), cell = offset => Math.floor(offset / box.width * panel.side);
+    move(panel, cell(event.clientX - box.left), cell(event.clientY - box.top));
+  };
+  canvas.onpointermove = canvas.onpointerdown = at;
+  canvas.onpointerleave = canvas.onblur = () => { panel.cell = null; point(panel); };
+  canvas.onfocus = () => { if (!panel.cell) move(panel, panel.side / 2, panel.side / 2); };
+  const STEPS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+  canvas.onkeydown = event => {
+    const step = STEPS[event.key];
+    if (!step || !panel.cell) return;
+    event.preventDefault();
+    move(panel, panel.cell[0] + step[0], panel.cell[1] + step[1]);
+  };
+}
+
+function redraw() {
+  if (!shown) return;
+  for (const panel of Object.values(PANELS)) { draw(panel, shown.state.picture); point(panel); }
+}
+for (const name of ["colours", "range", "low", "high"]) $(name).addEventListener("input", () => {
+  $("limits").hidden = $("range").value !== "fixed";
+  redraw();
+});
+
+// The images of a message: the newest one, or an earlier one.
+export function show(message) {
+  const { state } = message, { images, picture, settings } = state;
+  const isNew = shown?.state.images.shown !== images.shown || shown?.enhanced !== message.enhanced;
+  shown = message;
+  if (isNew) {
+    for (const panel of Object.values(PANELS)) panel.values = values(message[panel.of]);
+    redraw();
+  }
+  $("no-image").hidden = message.image !== null;
+  $("no-enhanced").hidden = message.enhanced !== null;
+  text($("no-enhanced"), settings.enhance ? "no image yet" : "switched off");
+  $("depth-panel").hidden = message.depth === null;
+  const found = picture?.enhancement;
+  text($("about-image"), picture
+    ? `${picture.method}, ${frames(picture.frames)}, ${fixed(picture.reconstruct_ms, 1)} ms` : "");
+  text($("about-enhanced"), found
+    ? `${found.model}, ${fixed(found.enhance_ms, 1)} ms${found.depth ? "" : ", no depth yet"}` : "");
+  warn("doubt", picture?.short_warnings ?? []);
+  warn("alert", picture?.frame_warnings ?? []);
+}
+
+function warn(id, words) {
+  text($(id), words.join("; "));
+  $(id).hidden = words.length === 0;
+}
+
+// Counts the images that arrive, for their rate.
+export function count({ state, image }) {
+  if (image && state.images.shown !== lastShown) drawn++;
+  lastShown = state.images.shown;
+  const now = performance.now();
+  if (now - since < 1000) return;
+  rates.drawn = 1000 * drawn / (now - since);
+  [drawn, since] = [0, now];
+}
+
+export const onScreen = () => shown;

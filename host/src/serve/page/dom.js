@@ -1,0 +1,35 @@
+// Finds elements of the page, and writes text and numbers into them.
+
+import { MEANINGS } from "./words.js";
+
+export const $ = id => document.getElementById(id);
+
+export const whole = n => n.toLocaleString("en-US").replaceAll(",", "\u202f");
+export const rate = n => n >= 100 ? whole(Math.round(n)) : n.toFixed(1);
+// A number that is not finite comes as null.
+export const fixed = (n, digits) => n === null || n === undefined ? "–" : n.toFixed(digits);
+export const frames = n => `${whole(n)} frame${n === 1 ? "" : "s"}`;
+
+// Text of a camera or a file. Control characters and characters that turn the direction of text are shown by their
+// numbers, so that no name can imitate other text of the page.
+export const foreign = text => String(text).replace(
+  /[\u0000-\u001f\u007f-\u009f\u061c\u200b-\u200f\u2028-\u202e\u2060-\u2069\ufeff]/g,
+  sign => `\\u{${sign.codePointAt(0).toString(16)}}`);
+
+// Text stays text; it is never read as HTML.
+export function text(element, value) {
+  if (element.textContent !== value) element.textContent = value;
+}
+
+// Rows of a definition list: name, value, whether the value is bad news. Names of the glossary get its sentence.
+export function list(element, rows) {
+  while (element.children.length > 2 * rows.length) element.lastChild.remove();
+  while (element.children.length < 2 * rows.length)
+    element.append(document.createElement(element.children.length % 2 ? "dd" : "dt"));
+  rows.forEach(([name, value, bad], at) => {
+    text(element.children[2 * at], name);
+    element.children[2 * at].title = MEANINGS[name] ?? "";
+    text(element.children[2 * at + 1], value);
+    element.children[2 * at + 1].className = bad ? "loss" : "";
+  });
+}

@@ -1,0 +1,63 @@
+// The account, the rates, the estimates, the camera and the events, in words.
+
+import { $, fixed, foreign, list, rate, text, whole } from "./dom.js";
+import { answer } from "./requests.js";
+
+export function show(state, drawnPerSecond) {
+  const { camera, frames: account, images, picture } = state, found = picture?.enhancement;
+  text($("losses"), `${whole(account.received)} received, ${whole(account.lost)} lost, ${whole(account.corrupt)} corrupt, `
+    + `${whole(account.late)} late`);
+  $("losses").className = account.lost + account.corrupt + account.late > 0 ? "loss" : "";
+  list($("account"), [
+    ["received", whole(account.received)],
+    ["lost", whole(account.lost), account.lost > 0],
+    ["corrupt", whole(account.corrupt), account.corrupt > 0],
+    ["late", whole(account.late), account.late > 0],
+    ["shown", `${whole(images.shown)} of ${whole(account.received)}`],
+    ...(images.failed ? [["frames without an image", whole(images.failed), true]] : []),
+  ]);
+  list($("rates"), [
+    ["frames from the camera", rate(state.rates.camera_frames_per_s)],
+    ["images reconstructed", rate(state.rates.images_per_s)],
+    ["images on this page", rate(drawnPerSecond)],
+    ["open pages", whole(state.viewers)],
+  ]);
+  list($("estimates"), [
+    ["blur", found ? `${fixed(found.blur_px, 2)} of 64 px` : "–"],
+    ["noise", found ? `${fixed(found.noise, 3)} of white` : "–"],
+    ["inconsistency", found ? fixed(found.inconsistency, 2) : "–"],
+    ["white", picture ? `${fixed(picture.white_counts, 1)} ADC counts` : "–"],
+  ]);
+  const { identity, measurement } = camera;
+  list($("identity"), [
+    ["address", foreign(camera.address)],
+    ...camera.versions.map(part => [part.name, foreign(
+      part.advice ? `${part.camera}, expected ${part.expected}` : part.camera), part.advice]),
+    ["LEDs", `${identity.wavelength_nm} nm`],
+    ["ADC", `${identity.adc_hz / 1e6} MS/s, ${identity.adc_bits} bit`],
+    ...(measurement ? [
+      ["patterns", `${whole(measurement.patterns)} of ${whole(1024)}`],
+      ["order", measurement.order],
+      ["light for one frame", `${fixed(measurement.frame_us, 1)} µs`],
+      ["settling", measurement.calibrated ? "corrected" : "not measured"],
+    ] : []),
+  ]);
+  const advice = camera.versions.map(part => part.advice);
+  const notes = [answer.refused, state.problem, ...(picture?.warnings ?? []), ...advice];
+  text($("notes"), foreign(notes.filter(Boolean).map(note => note.trim()).join("; ")));
+  events(state.events);
+}
+
+let told = "";
+function events(all) {
+  const last = all.at(-1), key = last ? `${all.length} ${last.unix_ms} ${last.text}` : "";
+  if (key === told) return;
+  told = key;
+  $("events").replaceChildren(...all.toReversed().map(event => {
+    const item = document.createElement("li"), time = document.createElement("time"), span = document.createElement("span");
+    time.textContent = new Date(event.unix_ms).toLocaleTimeString("en-GB");
+    span.textContent = foreign(event.text);
+    item.append(time, span);
+    return item;
+  }));
+}

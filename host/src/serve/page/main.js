@@ -1,0 +1,85 @@
+// Connects to the server, and hands each state to the parts of the page.
+
+import * as controls from "./controls.js";
+import * as display from "./display.js";
+import { $, foreign, text } from "./dom.js";
+import * as facts from "./facts.js";
+import * as light from "./light.js";
+import * as history from "./history.js";
+import * as plots from "./plots.js";
+import { onGone } from "./requests.js";
+import { download, npy, sheet } from "./save.js";
+import * as scene from "./scene.js";
+
+let newest = null;
+
+// Images may be earlier ones; everything else on the page is of the newest message.
+function showImages() {
+  if (newest) display.show(history.looked(newest));
+}
+history.onLook.call = showImages;
+
+function show(message) {
+  newest = message;
+  history.keep(message);
+  display.count(message);
+  const { camera } = message.state;
+  document.body.dataset.phase = camera.phase;
+  text($("line"), foreign(camera.line));
+  text($("camera"), foreign(`${camera.identity.board} ${camera.identity.serial}`));
+  document.title = `nirspi ${foreign(camera.identity.serial)}`;
+  text($("wavelength"), String(camera.identity.wavelength_nm));
+  $("simulated").hidden = !camera.simulated;
+  $("fault").hidden = camera.phase !== "fault";
+  $("uncalibrated").hidden = camera.phase !== "uncalibrated";
+  light.show(message.state);
+  showImages();
+  facts.show(message.state, display.rates.drawn);
+  controls.show(message.state);
+  scene.show(message.state);
+  plots.show(message.state);
+}
+
+// What is on the screen is saved, the newest image or an earlier one.
+$("save").onclick = () => {
+  const shown = display.onScreen();
+  if (shown?.image) sheet(shown).toBlob(blob => download(blob, "png"));
+};
+$("save-npy").onclick = () => {
+  const shown = display.onScreen();
+  if (!shown?.image) return;
+  download(npy(display.values(shown.image), 32), "image.npy");
+  if (shown.enhanced) download(npy(display.values(shown.enhanced), 64), "enhanced.npy");
+};
+
+function gone() {
+  document.body.dataset.phase = "unserved";
+  text($("line"), "nirspi serve does not answer; trying again");
+  light.showGone();
+}
+onGone.call = gone;
+
+// A hidden page closes its connection: browsers keep few connections to one address open.
+let source = null, again = 0;
+function look() {
+  clearTimeout(again);
+  source?.close();
+  source = null;
+  if (document.hidden) return;
+  source = new EventSource("/events");
+  source.onmessage = event => show(JSON.parse(event.data));
+  source.onerror = () => { gone(); source.close(); again = setTimeout(look, 1000); explain(); };
+}
+
+// Why there is no stream, if the server answers: it may want another token, or have too many pages.
+async function explain() {
+  try {
+    const answer = await fetch("/api/state");
+    text($("line"), answer.ok ? "the stream of images has ended, or too many pages are open; trying again"
+      : (await answer.text()).trim());
+  } catch {
+    // Nobody answers: the page says so already.
+  }
+}
+document.addEventListener("visibilitychange", look);
+look();

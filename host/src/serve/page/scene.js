@@ -1,0 +1,108 @@
+// The scene of the virtual camera: a letter, a drawing, a picture; distance and weather.
+
+import { $, foreign, text } from "./dom.js";
+import { post } from "./requests.js";
+
+const SIDE = 64;
+const canvas = $("drawing"), pen = canvas.getContext("2d", { willReadFrequently: true });
+canvas.width = canvas.height = SIDE;
+let brush = [SIDE / 2, SIDE / 2], last = null, sending = 0;
+
+function clear() {
+  pen.fillStyle = "#000";
+  pen.fillRect(0, 0, SIDE, SIDE);
+}
+clear();
+
+function levels() {
+  const { data } = pen.getImageData(0, 0, SIDE, SIDE);
+  const bytes = Array.from({ length: SIDE * SIDE }, (_, at) => (data[4 * at] + data[4 * at + 1] + data[4 * at + 2]) / 3);
+  return btoa(bytes.map(level => String.fromCharCode(Math.round(level))).join(""));
+}
+
+// Why the last picture could not be read.
+let unread = "";
+function apply(wish) {
+  unread = "";
+  return post("/api/scene", wish);
+}
+const drawing = () => apply({ scene: { side: SIDE, levels: levels() } });
+function soon() {
+  clearTimeout(sending);
+  sending = setTimeout(drawing, 300);
+}
+
+function paint(from, to) {
+  const level = Math.round(255 * $("brush-level").value);
+  pen.strokeStyle = `rgb(${level} ${level} ${level})`;
+  pen.lineWidth = Number($("brush-size").value);
+  pen.lineCap = "round";
+  pen.beginPath();
+  pen.moveTo(...from);
+  pen.lineTo(to[0] + .01, to[1]);
+  pen.stroke();
+  soon();
+}
+
+// Where the canvas was when the pen came down: a page that moves meanwhile does not bend the stroke.
+let box = null;
+const at = event => [(event.clientX - box.left) / box.width * SIDE, (event.clientY - box.top) / box.height * SIDE];
+canvas.onpointerdown = event => {
+  canvas.setPointerCapture(event.pointerId);
+  box = canvas.getBoundingClientRect();
+  last = at(event);
+  paint(last, last);
+};
+canvas.onpointermove = event => {
+  if (last === null) return;
+  const to = at(event);
+  paint(last, to);
+  last = to;
+};
+canvas.onpointerup = canvas.onpointercancel = () => { last = null; };
+
+const STEPS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+canvas.onkeydown = event => {
+  const step = STEPS[event.key];
+  if (event.key !== " " && event.key !== "Enter" && !step) return;
+  event.preventDefault();
+  const from = brush;
+  if (step) brush = brush.map((was, axis) => Math.max(0, Math.min(SIDE - 1, was + 2 * step[axis])));
+  if (!step || event.shiftKey) paint(from, brush);
+  text($("drawing-says"), `brush at row ${brush[1]}, column ${brush[0]}`);
+};
+
+$("clear").onclick = () => { clear(); soon(); };
+$("letter-form").onsubmit = event => {
+  event.preventDefault();
+  const word = $("letter").value;
+  if (word) apply({ scene: [...word].length === 1 ? `letter:${word}` : `word:${word}` });
+};
+$("white").onclick = () => apply({ scene: "white" });
+$("distance").onchange = () => apply({ distance_m: Number($("distance").value) });
+$("weather").onchange = () => apply({ weather: $("weather").value || "none" });
+$("picture").onchange = async () => {
+  const [file] = $("picture").files;
+  if (!file) return;
+  try {
+    const picture = await createImageBitmap(file), side = Math.max(picture.width, picture.height);
+    clear();
+    const [width, height] = [picture.width, picture.height].map(length => SIDE * length / side);
+    pen.drawImage(picture, (SIDE - width) / 2, (SIDE - height) / 2, width, height);
+    drawing();
+  } catch {
+    unread = `${foreign(file.name)} is not a picture that this browser can read`;
+    text($("scene-problem"), unread);
+  }
+  $("picture").value = "";
+};
+
+export function show({ scene }) {
+  $("scene").hidden = !scene;
+  if (!scene) return;
+  text($("scene-name"), foreign(`${scene.name}, ${scene.distance_m} m, ${scene.weather}`));
+  text($("scene-problem"), unread || foreign(scene.problem ?? ""));
+  const isFree = id => document.activeElement !== $(id);
+  if (isFree("distance")) $("distance").value = scene.distance_m;
+  if (isFree("weather")) $("weather").value = scene.weather;
+}
