@@ -17,6 +17,7 @@ mod devices;
 mod enhance;
 mod eval;
 mod example;
+mod export;
 mod flash;
 mod gateware;
 mod headings;
@@ -69,6 +70,7 @@ enum Command {
     Example(example::Args),
     Reconstruct(reconstruct::Args),
     Capture(capture::Args),
+    Export(export::Args),
     Serve(serve::Args),
     Virtual(serve_virtual::Args),
     Devices(devices::Args),
@@ -143,6 +145,7 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Example(args) => example::run(&args),
         Command::Reconstruct(args) => reconstruct::run(&args),
         Command::Capture(args) => capture::run(&args),
+        Command::Export(args) => export::run(args),
         Command::Serve(args) => serve::run(args),
         Command::Virtual(args) => serve_virtual::run(&args),
         Command::Devices(args) => devices::run(&args),

@@ -16,12 +16,14 @@
 //! If the computer loses power, everything flushed five seconds before is on the disk.
 
 mod file;
+mod info;
 mod lengths;
 mod reader;
 mod run;
 mod writer;
 
 pub use file::Target;
+pub use info::RecordingInfo;
 pub use reader::{End, Packet, Recording, RecordingError};
 pub use run::RunAccount;
 pub use writer::Recorder;
