@@ -11,7 +11,7 @@
 //! * [`calibration`] measures, keeps and chooses latency and settling, [`selftest`] checks a
 //!   camera,
 //! * [`capture`] runs a measurement, [`recording`] stores it, [`export`] writes it for other
-//!   programs,
+//!   programs, [`replay`] plays it back as a camera,
 //! * [`tally`] and [`integrate`] make measurements of frames; `nirspi-recon` reconstructs an image
 //!   from measurements,
 //! * [`source`] reads measurements from a file, a recording or a capture,
@@ -58,6 +58,7 @@ pub mod link;
 #[cfg(feature = "pictures")]
 pub mod picture;
 pub mod recording;
+pub mod replay;
 pub mod resolution;
 #[cfg(feature = "pictures")]
 pub mod scene;
