@@ -300,6 +300,9 @@ impl Listener for RunListener<'_> {
         self.record(|recorder| recorder.packet(raw));
         let before = self.tally.account().counters();
         let received = self.tally.packet(content);
+        if let (Some(recorder), None) = (&mut self.recorder, &self.recorder_error) {
+            self.recorder_error = recorder.heard(content, &self.tally).err();
+        }
         let after = self.tally.account().counters();
         let frames = (after.received + after.late) - (before.received + before.late);
         self.junk.packet(raw.len(), content, frames > 0, now);

@@ -1,5 +1,4 @@
-//! `nirspi info`: the identity of a camera, whether it fits this program, and what to update; or what
-//! a recording holds.
+//! `nirspi info`: who a camera is and what to update on it, or what a recording holds.
 
 use super::camera::{CameraArgs, ModelArgs, SceneArgs};
 use super::report::ReportArgs;

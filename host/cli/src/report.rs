@@ -5,7 +5,6 @@ use anyhow::Result;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 pub use nirspi::stage_times::StageTimes;
 use serde::Serialize;
-use std::fmt;
 use std::process::ExitCode;
 use std::str::FromStr;
 
@@ -44,14 +43,12 @@ pub fn stages() -> StageTimes {
 }
 
 /// Reads one of these words; the help lists each with a line about it.
-pub fn words<
-    T: FromStr<Err: fmt::Display + Into<Box<dyn std::error::Error + Send + Sync>>> + Copy,
->(
+pub fn words<T>(
     all: &[T],
     word: impl Fn(T) -> (&'static str, &'static str),
 ) -> impl TypedValueParser<Value = T>
 where
-    T: Send + Sync + 'static,
+    T: FromStr<Err: Into<Box<dyn std::error::Error + Send + Sync>>> + Copy + Send + Sync + 'static,
 {
     let shown = |&value: &T| PossibleValue::new(word(value).0).help(word(value).1);
     PossibleValuesParser::new(all.iter().map(shown)).try_map(|word| word.parse::<T>())

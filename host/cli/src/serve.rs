@@ -56,7 +56,7 @@ pub struct Args {
     scene: SceneArgs,
 }
 
-pub fn run(args: Args) -> Result<ExitCode> {
+pub fn run(args: &Args) -> Result<ExitCode> {
     args.method.check()?;
     let mut setup = args.setup.setup(Sampling::HALF, &args.scene.model)?;
     setup.adc_latency = args.calibration.adc_latency();
@@ -120,11 +120,13 @@ fn prepared(
 }
 
 /// A function that connects to the camera again.
-fn connect(args: Args, setup: MeasurementSetup) -> Connect {
+fn connect(args: &Args, setup: MeasurementSetup) -> Connect {
+    let (camera, scene, calibration) =
+        (args.camera.camera.clone(), args.scene.clone(), args.calibration.clone());
     let found = move || {
-        let mut session = address::open_quietly(&args.camera.camera, &args.scene)?;
+        let mut session = address::open_quietly(&camera, &scene)?;
         session.await_reports()?;
-        prepared(session, &args.calibration, &setup)
+        prepared(session, &calibration, &setup)
     };
     Box::new(move || found().map_err(Into::into))
 }

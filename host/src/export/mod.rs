@@ -1,5 +1,5 @@
-//! Exports a recording for other programs: arrays for NumPy, a table, a dataset in Parquet, a
-//! video.
+//! Exports a recording for other programs: arrays for NumPy, a table, a dataset in Parquet, a video,
+//! a recording with images.
 //!
 //! # Invariant
 //! An exported file holds the numbers that `reconstruct` uses: the image of the exported file is
@@ -8,13 +8,14 @@
 //! Frames are read one by one, so memory does not grow with the readings of a recording.
 
 mod arrays;
+mod mcap;
 mod parquet;
 #[cfg(feature = "pictures")]
 mod video;
 
 use crate::files::{FileError, npy};
 use crate::integrate::{IntegrateError, Integrated};
-use crate::recording::{Recording, RecordingError};
+use crate::recording::{Pinhole, Recording, RecordingError};
 use crate::session::CameraIdentity;
 use crate::setup::MeasurementSetup;
 use crate::source::{self, Source, SourceError, SourceOptions};
@@ -41,6 +42,8 @@ pub enum Format {
     Csv,
     /// The dataset form.
     Parquet,
+    /// A recording with images, for viewers of MCAP files.
+    Mcap,
     /// A video.
     #[cfg(feature = "pictures")]
     Apng,
@@ -53,6 +56,7 @@ impl Format {
         Self::Npy,
         Self::Csv,
         Self::Parquet,
+        Self::Mcap,
         #[cfg(feature = "pictures")]
         Self::Apng,
     ];
@@ -65,6 +69,7 @@ impl Format {
             Self::Npy => "npy",
             Self::Csv => "csv",
             Self::Parquet => "parquet",
+            Self::Mcap => "mcap",
             #[cfg(feature = "pictures")]
             Self::Apng => "apng",
         }
@@ -91,6 +96,7 @@ impl Format {
             Self::Parquet => {
                 "the dataset: one frame a row, with set-up, time, serial, depth, truth"
             }
+            Self::Mcap => "the recording with images for Foxglove and Rerun, 30 a second at most",
             #[cfg(feature = "pictures")]
             Self::Apng => "a video of the reconstructed frames",
         }
@@ -123,6 +129,8 @@ pub struct ExportOptions {
     pub distance_m: Option<f64>,
     /// An image of the scene as it is, `.npy` of shape (n, n); a field of Parquet files.
     pub truth: Option<PathBuf>,
+    /// The geometry of the images, from the description of the camera; a channel of MCAP files.
+    pub pinhole: Option<Pinhole>,
 }
 
 /// What was exported.
@@ -210,6 +218,7 @@ pub fn export(
         Format::Npy => arrays::npy(&whole, out)?,
         Format::Csv => arrays::csv(&whole, out)?,
         Format::Parquet => parquet::write(&whole, out, options)?,
+        Format::Mcap => images = mcap::write(&whole, out, options)?,
         #[cfg(feature = "pictures")]
         Format::Apng => images = video::apng(&whole, out)?,
     }
