@@ -23,6 +23,7 @@ steps=(
     "python          the Python package, its types, and its numbers beside the program's; PyPI"
     "page            the live page in a browser; Debian's Chromium, demo"
     "tcp             two processes over TCP, and boards/hil.sh; demo"
+    "recordings      other programs read recordings and exported files; demo, PyPI"
     "dissector       Wireshark's dissector on a recording; Debian's tshark"
     "flash           probe-rs knows every board's chip"
     "mie             Mie scattering against miepython and scattnlay; PyPI"
@@ -283,6 +284,14 @@ step_tcp() {
     wait "$server"
     "$nirspi" reconstruct "$out/rec.mcap" --method hadamard --out "$out/rec"
     NIRSPI=$PWD/$nirspi bash boards/hil.sh --minutes 0.2 --out "$out/hil"
+}
+
+step_recordings() {
+    cargo build --locked --release
+    python_with recordings mcap==1.6.0 mcap-protobuf-support==0.6.0 numpy==2.4.6 pyarrow==26.0.1
+    # 200 MB, which not every machine gets.
+    target/recordings/bin/pip install --quiet rerun-sdk==0.41.0 || echo "no rerun installed here"
+    target/recordings/bin/python host/cli/tests/recordings/check.py target/release/nirspi
 }
 
 step_dissector() {

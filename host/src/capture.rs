@@ -20,6 +20,7 @@ use crate::account::LossCounters;
 use crate::calibration::{CalibrationError, Settling, calibrate, calibrate_or};
 use crate::integrate::Integrated;
 use crate::recording::{Recorder, Recording, RunAccount, Target};
+use crate::replay::Recorded;
 use crate::session::{
     ANSWER_TIMEOUT, IgnorePackets, Listener, Request, Session, SessionError, request,
 };
@@ -46,9 +47,10 @@ const STOP_TIMEOUT: Duration = Duration::from_secs(10);
 /// Options of a capture.
 #[derive(Debug, Clone)]
 pub struct CaptureOptions {
-    /// The measurement. If there is a calibration, its latency replaces the latency of the setup.
+    /// The measurement. If there is a calibration, its latency replaces the latency of the setup. A
+    /// replayed camera uses the setup and settling of its recording instead.
     pub setup: MeasurementSetup,
-    /// Frames to make; `None` means until stopped.
+    /// Frames to make; `None` means until stopped, and for a replay until the recorded run ends.
     pub frames: Option<u32>,
     /// The source of latency and settling.
     pub calibration: Calibration,
@@ -298,6 +300,9 @@ impl Listener for RunListener<'_> {
         self.record(|recorder| recorder.packet(raw));
         let before = self.tally.account().counters();
         let received = self.tally.packet(content);
+        if let (Some(recorder), None) = (&mut self.recorder, &self.recorder_error) {
+            self.recorder_error = recorder.heard(content, &self.tally).err();
+        }
         let after = self.tally.account().counters();
         let frames = (after.received + after.late) - (before.received + before.late);
         self.junk.packet(raw.len(), content, frames > 0, now);
@@ -342,9 +347,16 @@ pub fn observe(
     options: &CaptureOptions,
     observer: &mut dyn Observer,
 ) -> Result<Capture, CaptureError> {
-    let mut setup = options.setup.clone();
+    // A replayed camera has the setup and settling of its recording.
+    let replayed = session.recorded().cloned();
+    let mut setup = replayed.as_ref().map_or(&options.setup, |recorded| &recorded.setup).clone();
+    let calibration = match &replayed {
+        Some(Recorded { settling: Some(settling), .. }) => &Calibration::Kept(settling.clone()),
+        Some(_) => &Calibration::None,
+        None => &options.calibration,
+    };
     let calibrating = &mut Calibrating { observer: &mut *observer, began: Instant::now() };
-    let (settling, calibration_problem) = match &options.calibration {
+    let (settling, calibration_problem) = match calibration {
         Calibration::None => (None, None),
         Calibration::Kept(settling) => (Some(settling.clone()), None),
         Calibration::Measure => (Some(calibrate(session, calibrating)?), None),
@@ -512,7 +524,12 @@ fn stream(
     let made = run.tally.made().unwrap_or(accounted);
     // The number that the camera reports and the number that arrived must both be the number
     // requested.
-    let all_made = [made, accounted].iter().all(|&made| frames.map(u64::from) == Some(made));
+    // A replay is whole when the recorded run is over.
+    let is_all = |made: u64| match frames {
+        Some(frames) => made == u64::from(frames),
+        None => session.recorded().is_some() && stopped.is_none(),
+    };
+    let all_made = is_all(made) && is_all(accounted);
     let made = if frames.map(u64::from) == Some(made) { accounted } else { made };
     Ok(match (run.fault, status) {
         (Some(fault), _) | (None, Ok(Status { fault: Some(fault), .. })) => Ended::Fault(fault),

@@ -10,7 +10,8 @@
 //! * [`gateware`] loads a camera's FPGA, [`update`] brings a camera to the versions of a release,
 //! * [`calibration`] measures, keeps and chooses latency and settling, [`selftest`] checks a
 //!   camera,
-//! * [`capture`] runs a measurement, [`recording`] stores it,
+//! * [`capture`] runs a measurement, [`recording`] stores it, [`export`] writes it for other
+//!   programs, [`replay`] plays it back as a camera,
 //! * [`tally`] and [`integrate`] make measurements of frames; `nirspi-recon` reconstructs an image
 //!   from measurements,
 //! * [`source`] reads measurements from a file, a recording or a capture,
@@ -42,6 +43,7 @@ pub mod devices;
 pub mod events;
 #[cfg(feature = "virtual-camera")]
 pub mod example;
+pub mod export;
 pub mod files;
 #[cfg(feature = "flash")]
 pub mod flash;
@@ -56,6 +58,7 @@ pub mod link;
 #[cfg(feature = "pictures")]
 pub mod picture;
 pub mod recording;
+pub mod replay;
 pub mod resolution;
 #[cfg(feature = "pictures")]
 pub mod scene;

@@ -13,6 +13,7 @@ pub use request::Request;
 
 use crate::events;
 use crate::link::Link;
+use crate::replay::Recorded;
 use conversation::Conversation;
 use nirspi_wire::register::Register;
 use nirspi_wire::{
@@ -136,6 +137,7 @@ pub struct Session {
     conversation: Conversation,
     identity: CameraIdentity,
     reports: Vec<String>,
+    recorded: Option<Recorded>,
 }
 
 impl Session {
@@ -159,12 +161,24 @@ impl Session {
         };
         match identity {
             Ok(identity) if version::speaks(identity.protocol) => {
-                Ok(Self { conversation, identity, reports: reports.0 })
+                Ok(Self { conversation, identity, reports: reports.0, recorded: None })
             }
             Ok(identity) => Err(SessionError::Version { camera: identity.protocol }),
             Err(SessionError::Closed { mid_packet: false }) => Err(SessionError::TurnedAway),
             Err(error) => Err(error),
         }
+    }
+
+    /// The same session, with a camera that plays back this measurement.
+    #[must_use]
+    pub fn with_recorded(self, recorded: Recorded) -> Self {
+        Self { recorded: Some(recorded), ..self }
+    }
+
+    /// The measurement that the camera plays back; `None` for a camera that measures.
+    #[must_use]
+    pub fn recorded(&self) -> Option<&Recorded> {
+        self.recorded.as_ref()
     }
 
     /// The camera's identity.

@@ -415,7 +415,7 @@ fn from_recording(path: &Path, options: &SourceOptions) -> Result<Source, Source
 }
 
 /// Why a recording has no valid frame.
-fn no_frame(path: &Path, tally: &Tally) -> SourceError {
+pub(crate) fn no_frame(path: &Path, tally: &Tally) -> SourceError {
     let path = path.to_owned();
     match tally.misfit() {
         Some(misfit) => SourceError::Misfit { path, misfit },
@@ -433,7 +433,7 @@ fn frames_of_recording(path: &Path, options: &SourceOptions) -> Result<Vec<Sourc
 }
 
 /// The measurements of the sum of some frames.
-fn of_frames(
+pub(crate) fn of_frames(
     path: &Path,
     options: &SourceOptions,
     recording: &Recording,

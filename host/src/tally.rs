@@ -5,7 +5,7 @@
 
 use crate::account::{Arrival, LossAccount};
 use crate::integrate::Integrated;
-use crate::recording::{Packet, Recording, RecordingError};
+use crate::recording::{Recording, RecordingError};
 use crate::setup::MeasurementSetup;
 use nirspi_wire::{DeviceMessage, EventKind, Frame, FrameFlags, PacketError, open};
 use thiserror::Error;
@@ -181,16 +181,59 @@ impl Tally {
     }
 }
 
+/// A packet of a recording, with its content.
+#[derive(Debug)]
+pub struct Heard<'p> {
+    /// The packet as received, delimiter included.
+    pub raw: &'p [u8],
+    /// Time of arrival in ns of the host's clock.
+    pub time_ns: u64,
+    /// The message in the packet.
+    pub content: &'p Result<DeviceMessage<'p>, PacketError>,
+    /// Whether the packet is a frame that arrived in order, and counts.
+    pub counts: bool,
+}
+
+impl Heard<'_> {
+    /// The frame that arrived in order; `None` for any other packet.
+    #[must_use]
+    pub fn frame(&self) -> Option<&Frame<'_>> {
+        match self.content {
+            Ok(DeviceMessage::Frame(frame)) if self.counts => Some(frame),
+            _ => None,
+        }
+    }
+}
+
+/// Reads every packet of a recording, and counts it. `hear` gets each packet after it was counted,
+/// and the tally so far.
+///
+/// # Errors
+/// [`RecordingError`] if the file cannot be read, and the errors of `hear`.
+pub fn hear_recording<E: From<RecordingError>>(
+    recording: &mut Recording,
+    mut hear: impl FnMut(&Heard<'_>, &Tally) -> Result<(), E>,
+) -> Result<Tally, E> {
+    let mut tally = Tally::new(&recording.setup, recording.run);
+    let mut scratch = Vec::new();
+    for packet in recording {
+        let packet = packet?;
+        scratch.clear();
+        scratch.extend_from_slice(packet.bytes.strip_suffix(&[0]).unwrap_or(&packet.bytes));
+        let content = &open(&mut scratch);
+        let counts = tally.packet(content);
+        let heard = Heard { raw: &packet.bytes, time_ns: packet.time_ns, content, counts };
+        hear(&heard, &tally)?;
+    }
+    Ok(tally)
+}
+
 /// Counts the packets of a recording again.
 ///
 /// # Errors
 /// [`RecordingError`] if the file cannot be read.
 pub fn tally_recording(recording: &mut Recording) -> Result<Tally, RecordingError> {
-    let mut tally = Tally::new(&recording.setup, recording.run);
-    for packet in recording {
-        tally.packet(&open(encoded(&mut packet?)));
-    }
-    Ok(tally)
+    hear_recording(recording, |_, _| Ok(()))
 }
 
 /// The sum of each frame of a recording that arrived in order, and the account of all frames.
@@ -201,25 +244,14 @@ pub fn frames_of_recording(
     recording: &mut Recording,
 ) -> Result<(Vec<Integrated>, Tally), RecordingError> {
     let setup = recording.setup.clone();
-    let mut tally = Tally::new(&setup, recording.run);
     let mut frames = Vec::new();
-    for packet in recording {
-        let mut packet = packet?;
-        let content = open(encoded(&mut packet));
-        if let (true, Ok(DeviceMessage::Frame(frame))) = (tally.packet(&content), &content) {
+    let tally = hear_recording(recording, |heard, _| {
+        if let Some(frame) = heard.frame() {
             let mut alone = Integrated::new(&setup);
             alone.add(frame);
             frames.push(alone);
         }
-    }
+        Ok::<(), RecordingError>(())
+    })?;
     Ok((frames, tally))
-}
-
-/// The packet without its delimiter, for decoding in place.
-fn encoded(packet: &mut Packet) -> &mut [u8] {
-    let bytes = &mut packet.bytes;
-    if bytes.last() == Some(&0) {
-        bytes.pop();
-    }
-    bytes
 }

@@ -21,7 +21,8 @@ const SCENE_PX: usize = 256;
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Camera")]
 pub struct CameraArgs {
-    /// Which camera: virtual, usb, usb:SERIAL, tcp:HOST:PORT or serial:PATH[:BAUD]
+    /// Which camera: virtual, usb, usb:SERIAL, tcp:HOST:PORT, serial:PATH[:BAUD], or replay:REC[,SPEED]: a recording that
+    /// is played back with its own setup and calibration, at 1, 0.5, ... times the camera's time or at max speed
     #[arg(long, value_name = "CAMERA", default_value = "virtual")]
     pub camera: CameraAddress,
 }

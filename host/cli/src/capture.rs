@@ -69,10 +69,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let captured = capture(&mut session, &options, &mut |progress: &Progress| {
         bar.set(progress.counters.total());
         bar.say(progress.counters.to_string());
-        if stop.load(Ordering::Relaxed) {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
+        match stop.load(Ordering::Relaxed) {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
         }
     });
     drop(bar);

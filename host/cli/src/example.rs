@@ -1,8 +1,8 @@
 //! `nirspi example`: a measurement for trying the program.
 
+use super::report::words;
 use super::{Usage, print};
 use anyhow::Result;
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use nirspi::example::Example;
 use nirspi::files::measurement;
 use nirspi::files::output::write_atomic;
@@ -17,7 +17,7 @@ use std::process::ExitCode;
     \x20 nirspi example wing --out wing.npz")]
 pub struct Args {
     /// Which example
-    #[arg(value_parser = examples())]
+    #[arg(value_parser = words(&Example::ALL, |example| (example.name(), example.about())))]
     example: Example,
     /// File to write [default: the example's name with .npz]
     #[arg(long, value_name = "FILE.npz")]
@@ -25,11 +25,6 @@ pub struct Args {
     /// Seed of the simulated noise
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-}
-
-fn examples() -> impl TypedValueParser<Value = Example> {
-    let word = |example: Example| PossibleValue::new(example.name()).help(example.about());
-    PossibleValuesParser::new(Example::ALL.map(word)).try_map(|word| word.parse::<Example>())
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {

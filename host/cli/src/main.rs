@@ -17,6 +17,7 @@ mod devices;
 mod enhance;
 mod eval;
 mod example;
+mod export;
 mod flash;
 mod gateware;
 mod headings;
@@ -63,34 +64,47 @@ struct Cli {
     command: Command,
 }
 
-#[derive(Debug, Subcommand)]
-enum Command {
-    Demo(demo::Args),
-    Example(example::Args),
-    Reconstruct(reconstruct::Args),
-    Capture(capture::Args),
-    Serve(serve::Args),
-    Virtual(serve_virtual::Args),
-    Devices(devices::Args),
-    Info(info::Args),
-    Calibrate(calibrate::Args),
-    CameraModel(camera_model::Args),
-    Selftest(selftest::Args),
-    Flash(flash::Args),
-    Gateware(gateware::Args),
-    Update(update::Args),
-    Setup(setup::Args),
-    Upscale(upscale::Args),
-    Deblur(deblur::Args),
-    Enhance(enhance::Args),
-    Metrics(metrics::Args),
-    Rain(rain::Args),
-    Range(range::Args),
-    Bench(bench::Args),
-    Eval(eval::EvalArgs),
-    Train(train::TrainArgs),
-    Completions(packaging::CompletionsArgs),
-    Man(packaging::ManArgs),
+/// The commands: each with its arguments and the function that runs it.
+macro_rules! commands {
+    ($($name:ident($args:ty) => $run:path,)*) => {
+        #[derive(Debug, Subcommand)]
+        enum Command { $($name($args),)* }
+
+        fn run(command: Command) -> anyhow::Result<ExitCode> {
+            match command { $(Command::$name(args) => $run(&args),)* }
+        }
+    };
+}
+
+commands! {
+    Demo(demo::Args) => demo::run,
+    Example(example::Args) => example::run,
+    Reconstruct(reconstruct::Args) => reconstruct::run,
+    Capture(capture::Args) => capture::run,
+    Export(export::Args) => export::run,
+    Recover(export::RecoverArgs) => export::recover,
+    Serve(serve::Args) => serve::run,
+    Virtual(serve_virtual::Args) => serve_virtual::run,
+    Devices(devices::Args) => devices::run,
+    Info(info::Args) => info::run,
+    Calibrate(calibrate::Args) => calibrate::run,
+    CameraModel(camera_model::Args) => camera_model::run,
+    Selftest(selftest::Args) => selftest::run,
+    Flash(flash::Args) => flash::run,
+    Gateware(gateware::Args) => gateware::run,
+    Update(update::Args) => update::run,
+    Setup(setup::Args) => setup::run,
+    Upscale(upscale::Args) => upscale::run,
+    Deblur(deblur::Args) => deblur::run,
+    Enhance(enhance::Args) => enhance::run,
+    Metrics(metrics::Args) => metrics::run,
+    Rain(rain::Args) => rain::run,
+    Range(range::Args) => range::run,
+    Bench(bench::Args) => bench::run,
+    Eval(eval::EvalArgs) => eval::run,
+    Train(train::TrainArgs) => train::run,
+    Completions(packaging::CompletionsArgs) => packaging::completions,
+    Man(packaging::ManArgs) => packaging::man,
 }
 
 /// A mistake in how the program was called, rather than in what it was given.
@@ -135,37 +149,6 @@ fn main() -> ExitCode {
             error.is::<Usage>() || matches!(error.downcast_ref(), Some(FileError::Choice { .. }));
         ExitCode::from(if used_wrongly { 2 } else { 1 })
     })
-}
-
-fn run(command: Command) -> anyhow::Result<ExitCode> {
-    match command {
-        Command::Demo(args) => demo::run(&args),
-        Command::Example(args) => example::run(&args),
-        Command::Reconstruct(args) => reconstruct::run(&args),
-        Command::Capture(args) => capture::run(&args),
-        Command::Serve(args) => serve::run(args),
-        Command::Virtual(args) => serve_virtual::run(&args),
-        Command::Devices(args) => devices::run(&args),
-        Command::Info(args) => info::run(&args),
-        Command::CameraModel(args) => camera_model::run(&args),
-        Command::Calibrate(args) => calibrate::run(&args),
-        Command::Selftest(args) => selftest::run(&args),
-        Command::Flash(args) => flash::run(&args),
-        Command::Gateware(args) => gateware::run(&args),
-        Command::Update(args) => update::run(&args),
-        Command::Setup(args) => setup::run(&args),
-        Command::Upscale(args) => upscale::run(&args),
-        Command::Deblur(args) => deblur::run(&args),
-        Command::Enhance(args) => enhance::run(&args),
-        Command::Metrics(args) => metrics::run(&args),
-        Command::Rain(args) => rain::run(&args),
-        Command::Range(args) => range::run(&args),
-        Command::Bench(args) => bench::run(&args),
-        Command::Eval(args) => eval::run(&args),
-        Command::Train(args) => train::run(&args),
-        Command::Completions(args) => packaging::completions(&args),
-        Command::Man(args) => packaging::man(&args),
-    }
 }
 
 /// The error and its causes in one line.

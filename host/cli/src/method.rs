@@ -1,8 +1,9 @@
 //! Arguments for the reconstruction, and its part of the report.
 
 use super::Usage;
+use super::report::words;
 use anyhow::{Context, Result, bail};
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, FromArgMatches};
 use nirspi::files::npy::read_stack;
 use nirspi::imaging::MethodReport;
@@ -19,7 +20,8 @@ use std::path::{Path, PathBuf};
 #[command(next_help_heading = "Picture")]
 pub struct MethodArgs {
     /// The method that makes the image
-    #[arg(long, default_value = Method::default().argument(), value_parser = methods())]
+    #[arg(long, default_value = Method::default().argument(),
+          value_parser = words(Method::ALL, |method| (method.argument(), method.about())))]
     pub method: Method,
     #[arg(long, value_name = "BASIS", default_value = "dct",
           help = format!("Basis of the image for omp, tikhonov and fista: {}", Basis::expected()))]
@@ -61,12 +63,6 @@ impl Default for MethodArgs {
         let mut matches = Self::augment_args(clap::Command::new("")).get_matches_from([""]);
         Self::from_arg_matches_mut(&mut matches).unwrap_or_else(|error| error.exit())
     }
-}
-
-/// The words of --method, each with its description.
-fn methods() -> impl TypedValueParser<Value = Method> {
-    let word = |method: &Method| PossibleValue::new(method.argument()).help(method.about());
-    PossibleValuesParser::new(Method::ALL.iter().map(word)).try_map(|word| word.parse::<Method>())
 }
 
 fn completions() -> impl TypedValueParser<Value = Completion> {

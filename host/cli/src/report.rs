@@ -2,9 +2,11 @@
 
 use super::print;
 use anyhow::Result;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 pub use nirspi::stage_times::StageTimes;
 use serde::Serialize;
 use std::process::ExitCode;
+use std::str::FromStr;
 
 /// How a command prints its report.
 #[derive(Debug, Clone, Copy, clap::Args)]
@@ -38,4 +40,16 @@ pub fn to_json(report: &impl Serialize) -> Result<String> {
 /// Times of stages, which a user who wants detail is told.
 pub fn stages() -> StageTimes {
     StageTimes::watched(|stage, ms| print::detail(format_args!("{stage}: {ms:.1} ms")))
+}
+
+/// Reads one of these words; the help lists each with a line about it.
+pub fn words<T>(
+    all: &[T],
+    word: impl Fn(T) -> (&'static str, &'static str),
+) -> impl TypedValueParser<Value = T>
+where
+    T: FromStr<Err: Into<Box<dyn std::error::Error + Send + Sync>>> + Copy + Send + Sync + 'static,
+{
+    let shown = |&value: &T| PossibleValue::new(word(value).0).help(word(value).1);
+    PossibleValuesParser::new(all.iter().map(shown)).try_map(|word| word.parse::<T>())
 }

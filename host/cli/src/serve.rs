@@ -61,7 +61,7 @@ pub struct Args {
     scene: SceneArgs,
 }
 
-pub fn run(args: Args) -> Result<ExitCode> {
+pub fn run(args: &Args) -> Result<ExitCode> {
     args.method.check()?;
     let mut setup = args.setup.setup(Sampling::HALF, &args.scene.model)?;
     setup.adc_latency = args.calibration.adc_latency();
@@ -71,7 +71,7 @@ pub fn run(args: Args) -> Result<ExitCode> {
     let server = Server::bind(&args.listen, args.token.clone())
         .with_context(|| format!("--listen {}: cannot listen there", args.listen))?;
     let imaging =
-        Imaging::new(&args.method.settings_for(Side::INSTRUMENT.pixels())?, device(&args)?)?;
+        Imaging::new(&args.method.settings_for(Side::INSTRUMENT.pixels())?, device(args)?)?;
     let settings = Settings {
         method: args.method.method.argument(),
         strength: args.method.strength,
@@ -93,7 +93,7 @@ pub fn run(args: Args) -> Result<ExitCode> {
         address: args.camera.camera.to_string(),
         setup: setup.clone(),
         model: args.scene.model.read()?,
-        scene: scene(&args)?,
+        scene: scene(args)?,
         record_to: args.record_to.clone(),
         connect: connect(args, setup),
     };
@@ -131,17 +131,19 @@ fn prepared(
 }
 
 /// A function that connects to the camera again.
-fn connect(args: Args, setup: MeasurementSetup) -> Connect {
+fn connect(args: &Args, setup: MeasurementSetup) -> Connect {
+    let (camera, staged, calibration) =
+        (args.camera.camera.clone(), args.scene.clone(), args.calibration.clone());
     let found = move |scene: Option<&StagedScene>| {
         let mut session = match scene {
             Some(scene) => {
-                let camera = scene.camera(&args.scene.model.read()?, args.scene.seed)?;
+                let camera = scene.camera(&staged.model.read()?, staged.seed)?;
                 Session::open(Box::new(MemoryLink::new(camera)))?
             }
-            None => address::open_quietly(&args.camera.camera, &args.scene)?,
+            None => address::open_quietly(&camera, &staged)?,
         };
         session.await_reports()?;
-        prepared(session, &args.calibration, &setup)
+        prepared(session, &calibration, &setup)
     };
     Box::new(move |scene| found(scene).map_err(Into::into))
 }

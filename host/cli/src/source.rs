@@ -2,8 +2,9 @@
 
 use super::Usage;
 use super::camera::parse_order;
+use super::report::words;
 use anyhow::Result;
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use nirspi::files::measurement::{Form, Selection};
 use nirspi::source::{Index, Part, Source, SourceError, SourceOptions};
 use nirspi_recon::{Measurements, Order, Side};
@@ -28,7 +29,7 @@ pub struct SourceArgs {
     #[arg(long, value_name = "NAME")]
     pub field: Option<String>,
     /// How readings belong to patterns [default: pairs; differences in the field d]
-    #[arg(long, value_name = "FORM", value_parser = forms())]
+    #[arg(long, value_name = "FORM", value_parser = words(&Form::ALL, |form| (form.name(), form.about())))]
     pub readings: Option<Form>,
     /// The same as --readings single
     #[arg(long, conflicts_with = "readings")]
@@ -59,11 +60,6 @@ fn shown_help() -> String {
          natural-order Hadamard row shown k-th)",
         Order::expected()
     )
-}
-
-fn forms() -> impl TypedValueParser<Value = Form> {
-    let word = |form: Form| PossibleValue::new(form.name()).help(form.about());
-    PossibleValuesParser::new(Form::ALL.map(word)).try_map(|word| word.parse::<Form>())
 }
 
 fn parts() -> impl TypedValueParser<Value = Part> {

@@ -123,7 +123,7 @@ fn file_name(serial: &str) -> String {
 /// A time as `2026-11-20 08:30 UTC`. The Gregorian calendar is computed with years that begin in
 /// March, so that a leap day is the last day of a year (H. Hinnant, *chrono-Compatible Low-Level
 /// Date Algorithms*, `civil_from_days`).
-pub(super) fn date(unix_s: u64) -> String {
+pub(crate) fn date(unix_s: u64) -> String {
     // Days from 1 March of year 0 to 1 January 1970; an era is 400 years.
     const DAYS_BEFORE_1970: u64 = 719_468;
     const DAYS_OF_ERA: u64 = 146_097;

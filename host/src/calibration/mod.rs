@@ -23,5 +23,6 @@ pub use flat::{
     FlatField, FlatFieldError, FramesError, KeptFlatField, Measured, Sweeps, flat_field_path_of,
     measure_dark, measure_flat_field, pattern_noise,
 };
+pub(crate) use kept::date;
 pub use kept::{KeptCalibration, path_of};
 pub use policy::{CalibrationPolicy, Choice, Origin, PolicyError};

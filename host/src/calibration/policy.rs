@@ -126,7 +126,8 @@ impl Choice {
     /// calibration or used none.
     #[must_use]
     pub fn used(&self, captured: &Capture) -> Option<&Origin> {
-        let kept = matches!(self.calibration, Calibration::Kept(_))
+        // A replay uses the settling of its recording.
+        let kept = matches!(&self.calibration, Calibration::Kept(kept) if captured.settling.as_ref() == Some(kept))
             || captured.calibration_problem.is_some();
         self.origin.as_ref().filter(|_| kept)
     }

@@ -117,6 +117,11 @@ impl Fields {
         matches!(self.format, Format::Unnamed(_))
     }
 
+    /// Whether the fields are columns of a text.
+    pub(super) fn is_columns(&self) -> bool {
+        matches!(self.format, Format::Columns(_))
+    }
+
     pub(super) fn holds(&self, field: &str) -> bool {
         self.names.iter().any(|name| name == field)
     }

@@ -257,13 +257,24 @@ element!(i64, "<i8");
 /// If the product of `shape` is not the number of values, or there are more than a hundred axes.
 #[must_use]
 pub fn encode<T: Element>(shape: &[usize], values: &[T]) -> Vec<u8> {
-    /// The data start at a multiple of this number of bytes, so that NumPy can map the file.
-    const ALIGNMENT: usize = 64;
     assert_eq!(
         shape.iter().product::<usize>(),
         values.len(),
         "values of an array of shape {shape:?}"
     );
+    let mut bytes = header::<T>(shape);
+    bytes.reserve(size_of_val(values));
+    values.iter().for_each(|value| value.append(&mut bytes));
+    bytes
+}
+
+/// The bytes of a `.npy` file before its numbers, which follow in C order.
+///
+/// # Panics
+/// If there are more than a hundred axes.
+pub(crate) fn header<T: Element>(shape: &[usize]) -> Vec<u8> {
+    /// The data start at a multiple of this number of bytes, so that NumPy can map the file.
+    const ALIGNMENT: usize = 64;
     let axes: Vec<u64> = shape.iter().map(|&axis| axis as u64).collect();
     let mut header = format!(
         "{{'descr': '{}', 'fortran_order': False, 'shape': {}, }}",
@@ -277,12 +288,11 @@ pub fn encode<T: Element>(shape: &[usize], values: &[T]) -> Vec<u8> {
     header.push(b'\n');
     let length = u16::try_from(header.len()).expect("a header of fewer than a hundred axes");
 
-    let mut bytes = Vec::with_capacity(end + size_of_val(values));
+    let mut bytes = Vec::with_capacity(end);
     bytes.extend_from_slice(MAGIC);
     bytes.extend_from_slice(&[1, 0]);
     bytes.extend_from_slice(&length.to_le_bytes());
     bytes.extend_from_slice(&header);
-    values.iter().for_each(|value| value.append(&mut bytes));
     bytes
 }
 

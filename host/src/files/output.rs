@@ -10,7 +10,7 @@
 
 use super::FileError;
 use std::fs;
-use std::io::{self, Write};
+use std::io::{self, BufWriter, IntoInnerError, Write};
 use std::path::{Path, PathBuf};
 use tempfile::TempPath;
 
@@ -75,7 +75,9 @@ impl OutputDir {
     /// [`FileError`] names the file and the system's reason.
     pub fn write(&mut self, name: &str, bytes: &[u8]) -> Result<(), FileError> {
         let target = self.path.join(name);
-        let staged = stage(&self.path, &target, bytes)?;
+        let staged = stage(&self.path, &target, |file| {
+            file.write_all(bytes).map_err(|error| FileError::io(&target, "write", error))
+        })?;
         self.staged.push((staged, target));
         Ok(())
     }
@@ -109,12 +111,25 @@ impl OutputDir {
 /// # Errors
 /// [`FileError`] if the folder is missing, the path is a folder, or the system refuses.
 pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
+    write_in_pieces(path, |file| {
+        file.write_all(bytes).map_err(|error| FileError::io(path, "write", error))
+    })
+}
+
+/// Writes one file piece by piece, whole or not at all: results that are larger than the memory.
+///
+/// # Errors
+/// As [`write_atomic`], and the errors of `write`.
+pub fn write_in_pieces<E: From<FileError>>(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<fs::File>) -> Result<(), E>,
+) -> Result<(), E> {
     let folder = match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
     };
-    place(stage(folder, path, bytes)?, path)?;
-    sync_folder(folder).map_err(|error| FileError::io(folder, "write to", error))
+    place(stage(folder, path, write)?, path)?;
+    Ok(sync_folder(folder).map_err(|error| FileError::io(folder, "write to", error))?)
 }
 
 /// Syncs the names in a folder to the disk, on systems that can do so.
@@ -152,13 +167,17 @@ impl Drop for MadeFolders {
     }
 }
 
-fn stage(folder: &Path, target: &Path, bytes: &[u8]) -> Result<TempPath, FileError> {
+fn stage<E: From<FileError>>(
+    folder: &Path,
+    target: &Path,
+    fill: impl FnOnce(&mut BufWriter<fs::File>) -> Result<(), E>,
+) -> Result<TempPath, E> {
     if target.is_dir() {
-        return Err(FileError::kind(target, "a folder", "a file to write"));
+        return Err(FileError::kind(target, "a folder", "a file to write").into());
     }
     // The error names the missing folder, not the hidden file in it.
     if let Err(error) = fs::metadata(folder) {
-        return Err(FileError::io(folder, "write to", error));
+        return Err(FileError::io(folder, "write to", error).into());
     }
     let write = |error: io::Error| FileError::io(target, "write", error);
     // This function makes the file itself, because errors of `tempfile` hide the system's reason.
@@ -167,8 +186,13 @@ fn stage(folder: &Path, target: &Path, bytes: &[u8]) -> Result<TempPath, FileErr
         .prefix(STAGED_PREFIX)
         .make_in(folder, |path| fs::File::create_new(path))
         .map_err(write)?;
-    let (mut file, path) = staged.into_parts();
-    file.write_all(bytes).and_then(|()| file.sync_all()).map_err(write)?;
+    let (file, path) = staged.into_parts();
+    let mut file = BufWriter::new(file);
+    fill(&mut file)?;
+    file.into_inner()
+        .map_err(IntoInnerError::into_error)
+        .and_then(|file| file.sync_all())
+        .map_err(write)?;
     Ok(path)
 }
 

@@ -1,7 +1,10 @@
-//! The addresses of cameras: `virtual`, `usb`, `usb:SERIAL`, `tcp:HOST:PORT`, `serial:PATH[:BAUD]`.
+//! The addresses of cameras: `virtual`, `usb`, `usb:SERIAL`, `tcp:HOST:PORT`, `serial:PATH[:BAUD]`,
+//! `replay:REC[,SPEED]`.
 
 use super::usb::UsbError;
 use super::{DEFAULT_BAUD, Link, SerialLink, TcpLink, UsbLink};
+use crate::recording::RecordingError;
+use crate::replay::{ReplayAddress, ReplayLink};
 use crate::session::{Session, SessionError};
 use std::fmt;
 use std::io;
@@ -25,6 +28,8 @@ pub enum CameraAddress {
     },
     /// A camera on USB: the camera with this serial number, or the only camera.
     Usb(Option<String>),
+    /// A recording that is played back as a camera.
+    Replay(ReplayAddress),
 }
 
 impl FromStr for CameraAddress {
@@ -35,6 +40,7 @@ impl FromStr for CameraAddress {
             None if text == "virtual" => Ok(Self::Virtual),
             None if text == "usb" => Ok(Self::Usb(None)),
             Some(("usb", serial)) if !serial.is_empty() => Ok(Self::Usb(Some(serial.to_owned()))),
+            Some(("replay", recording)) => recording.parse().map(Self::Replay),
             Some(("tcp", address)) if address.contains(':') => Ok(Self::Tcp(address.to_owned())),
             Some(("serial", port)) if !port.is_empty() => {
                 let speed = port.rsplit_once(':').and_then(|(path, baud)| {
@@ -45,7 +51,7 @@ impl FromStr for CameraAddress {
                 Ok(Self::Serial { path: PathBuf::from(path), baud })
             }
             _ => {
-                Err("expected virtual, usb, usb:SERIAL, tcp:HOST:PORT or serial:PATH[:BAUD]"
+                Err("expected virtual, usb, usb:SERIAL, tcp:HOST:PORT, serial:PATH[:BAUD] or replay:REC[,SPEED]"
                     .to_owned())
             }
         }
@@ -60,6 +66,7 @@ impl fmt::Display for CameraAddress {
             Self::Serial { path, .. } => write!(f, "serial:{}", path.display()),
             Self::Usb(None) => f.write_str("usb"),
             Self::Usb(Some(serial)) => write!(f, "usb:{serial}"),
+            Self::Replay(recording) => recording.fmt(f),
         }
     }
 }
@@ -85,6 +92,9 @@ pub enum OpenError {
         /// The system's error.
         problem: io::Error,
     },
+    /// The recording cannot be played back.
+    #[error(transparent)]
+    Replay(#[from] RecordingError),
     /// There is no such camera on USB, or the camera cannot be used.
     #[error(transparent)]
     Usb(#[from] UsbError),
@@ -112,7 +122,14 @@ impl CameraAddress {
         &self,
         virtual_link: impl FnOnce() -> Result<Box<dyn Link>, E>,
     ) -> Result<Session, OpenError> {
+        let session_error = |problem| OpenError::Session { camera: self.to_string(), problem };
         let link: Box<dyn Link> = match self {
+            Self::Replay(recording) => {
+                let link = ReplayLink::open(recording)?;
+                let recorded = link.recorded().clone();
+                let session = Session::open(Box::new(link)).map_err(session_error)?;
+                return Ok(session.with_recorded(recorded));
+            }
             Self::Virtual => {
                 virtual_link().map_err(|problem| OpenError::Virtual(problem.into()))?
             }
@@ -127,8 +144,7 @@ impl CameraAddress {
             // The link's errors name the camera and say what to do.
             Self::Usb(serial) => Box::new(UsbLink::open(serial.as_deref())?),
         };
-        Session::open(link)
-            .map_err(|problem| OpenError::Session { camera: self.to_string(), problem })
+        Session::open(link).map_err(session_error)
     }
 
     /// Frames of 1024 patterns a second that the link must carry; 0 if any speed is enough.
@@ -156,22 +172,31 @@ fn serial_problem(error: &io::Error) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::replay::Speed;
 
     #[test]
     fn every_form_is_understood_and_said_again() {
         let serial = |path: &str, baud| CameraAddress::Serial { path: path.into(), baud };
+        let replay =
+            |path: &str, speed| CameraAddress::Replay(ReplayAddress { path: path.into(), speed });
         for (text, expected) in [
             ("virtual", CameraAddress::Virtual),
             ("usb", CameraAddress::Usb(None)),
+            ("replay:a.mcap", replay("a.mcap", Speed::Times(1.0))),
+            ("replay:a,b.mcap,2.5", replay("a,b.mcap", Speed::Times(2.5))),
+            ("replay:a,b.mcap,max", replay("a,b.mcap", Speed::Max)),
+            ("replay:a,b.mcap", replay("a,b.mcap", Speed::Times(1.0))),
             ("usb:0042:A", CameraAddress::Usb(Some("0042:A".to_owned()))),
             ("tcp:[::1]:1550", CameraAddress::Tcp("[::1]:1550".to_owned())),
             ("serial:/dev/ttyACM0", serial("/dev/ttyACM0", DEFAULT_BAUD)),
             ("serial:COM7:3000000", serial("COM7", 3_000_000)),
             ("serial:/dev/by-path/pci:0", serial("/dev/by-path/pci:0", DEFAULT_BAUD)),
         ] {
-            assert_eq!(text.parse(), Ok(expected), "{text}");
+            let plain = !matches!(expected, CameraAddress::Serial { .. });
+            assert_eq!(text.parse(), Ok(expected.clone()), "{text}");
+            assert!(!plain || expected.to_string() == text, "{expected}");
         }
-        for text in ["", "usb:", "tcp:nowhere", "serial:", "fax:1"] {
+        for text in ["", "replay:", "replay:,max", "usb:", "tcp:nowhere", "serial:", "fax:1"] {
             assert!(text.parse::<CameraAddress>().is_err(), "{text}");
         }
     }

@@ -30,6 +30,7 @@ pub use layout::{Panel, SideBySide, below, beside, blank, stacked};
 pub use report::Pictures;
 pub use scale::{PERCENTILES, Range, Scale, Unit};
 pub use sheet::Sheet;
+pub(crate) use video::of_images as video;
 
 use image::Rgb;
 

@@ -5,9 +5,10 @@
 //! (`tests::a_video_decodes_to_as_many_frames_as_it_has_images`). All frames have one size.
 
 use super::layout::{Panel, SideBySide};
-use super::scale::Range;
+use super::scale::{Range, Unit};
 use super::sheet::{Sheet, evenly};
 use image::{GenericImageView, RgbImage, imageops};
+use nirspi_recon::Image;
 
 /// The most frames.
 const MOST: usize = 1000;
@@ -55,6 +56,13 @@ pub(super) fn encode(sheet: &Sheet<'_>) -> Video {
     })();
     encoded.expect("pictures of one size encode into memory");
     Video { bytes, frames: shown.len() }
+}
+
+/// The bytes of a video of these images, all on one scale. There must be at least one image.
+pub(crate) fn of_images(header: &str, images: &[Image], unit: Unit) -> Vec<u8> {
+    let side = images.first().map_or(1, |image| image.side().pixels());
+    let values = images.iter().map(Image::pixels).collect();
+    encode(&Sheet::new(header.to_owned(), side, values, unit)).bytes
 }
 
 fn frame(sheet: &Sheet<'_>, index: usize) -> SideBySide {

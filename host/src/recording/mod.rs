@@ -5,25 +5,38 @@
 //! message encoding names the protocol version of the session. Recordings of all versions from
 //! `version::MIN` on are read. Metadata records hold the camera's identity, the setup, the
 //! calibration, the number of the run and, at the end, the account of the run; each is one JSON
-//! text. Times are nanoseconds of the host's clock. Records follow each other without chunks. A
-//! file that ends anywhere, or has one damaged packet, loses no other packet. The crate's chunk
-//! reader, which panics on some damage, is never used.
+//! text with a checksum, and stands once more at the end. Channels `/telemetry` and `/log`, and
+//! `/image` and `/calibration` in an exported file, say the same in forms that other programs show
+//! (`schemas.rs`); nothing is read from them. Times are nanoseconds of the host's clock. Records are
+//! in chunks of about 1 MiB, not compressed, each with a checksum and an index.
 //!
 //! # Invariant
 //! A capture that is killed keeps everything up to its last flush, half a second before at most
 //! (test
 //! `reader::tests::a_recording_cut_anywhere_gives_what_is_before_the_cut_or_says_what_is_missing`).
-//! If the computer loses power, everything flushed five seconds before is on the disk.
+//! If the computer loses power, everything flushed five seconds before is on the disk. Damage in
+//! the middle of a file costs what it hits, and is reported (`host/tests/damaged_recordings.rs`).
 
+mod book;
 mod file;
-mod lengths;
+mod info;
+mod monitor;
+mod protobuf;
 mod reader;
+mod recover;
 mod run;
+mod scan;
+mod schemas;
 mod writer;
 
+pub(crate) use book::{Book, Opening};
 pub use file::Target;
+pub use info::RecordingInfo;
 pub use reader::{End, Packet, Recording, RecordingError};
+pub use recover::{RecoverError, Recovered, recover};
 pub use run::RunAccount;
+pub use scan::Damage;
+pub use schemas::Pinhole;
 pub use writer::Recorder;
 
 /// MCAP profile of nirspi's files.
@@ -51,5 +64,7 @@ const SETTLING: &str = "nirspi.settling";
 /// number.
 const RUN: &str = "nirspi.run";
 const ACCOUNT: &str = "nirspi.account";
-/// The only key of each metadata record.
+/// The key of the text in each metadata record.
 const JSON: &str = "json";
+/// The key of the text's checksum.
+const CHECKSUM: &str = "crc32";

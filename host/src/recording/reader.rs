@@ -1,24 +1,21 @@
 //! Reads a recording in one pass, whole or cut short: first the setup, then packet by packet.
 
-use super::lengths;
+use super::scan::{Damage, Entry, Scan};
 use super::{
-    ACCOUNT, IDENTITY, JSON, PROFILE, RUN, RunAccount, SETTLING, SETUP, TOPIC, protocol_of,
+    ACCOUNT, CHECKSUM, IDENTITY, JSON, PROFILE, RUN, RunAccount, SETTLING, SETUP, TOPIC,
+    protocol_of,
 };
 use crate::calibration::Settling;
 use crate::session::CameraIdentity;
 use crate::setup::MeasurementSetup;
-use mcap::McapError;
-use mcap::records::{Metadata, Record, op};
-use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
-use nirspi_wire::version;
+use nirspi_wire::packet::MAX_DEVICE_PACKET;
+use nirspi_wire::{crc32, version};
 use serde::de::DeserializeOwned;
+use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{self, Read};
+use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
-
-/// The longest record of nirspi. A longer record is damaged.
-const LONGEST_RECORD: usize = 64 << 20;
 
 /// An open recording: the information before its packets, and the packets as an iterator.
 ///
@@ -65,32 +62,56 @@ pub struct End {
     pub account: Option<RunAccount>,
     /// Packets read.
     pub packets: u64,
-    /// The problem, if the file ends early or is damaged. Everything before the problem was read.
+    /// The problem in words, if the file ends early or is damaged. Everything else was read.
     pub cut_short: Option<String>,
+    /// What is damaged.
+    pub damage: Damage,
 }
 
 impl Recording {
-    /// Opens `path` and reads the information before its packets.
+    /// Opens `path` and reads the information before its packets. A recording says the information
+    /// once more at its end; if the first copy is damaged, the second one counts.
     ///
     /// # Errors
-    /// [`RecordingError`] if the file is not a recording, or is cut short before its first packet.
+    /// [`RecordingError`] if the file is not a recording, or both copies are damaged or missing.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
         let mut records = Records::open(path)?;
         let (mut parts, mut end) = (Parts::default(), End::default());
         let first = loop {
             match records.next(&mut end)? {
                 Some(Found::Packet(packet)) => break Some(packet),
-                Some(Found::Metadata(metadata)) => parts.keep(path, &metadata)?,
+                Some(Found::Metadata { name, texts }) => parts.keep(path, &name, &texts),
                 None => break None,
             }
         };
-        let missing = |missing| RecordingError::Missing {
-            path: path.to_owned(),
-            missing,
-            cut_short: end.cut_short.clone(),
+        if parts.lacks() && first.is_some() {
+            let mut again = Records::open(path)?;
+            let mut far = End::default();
+            while let Some(found) = again.next(&mut far)? {
+                if let Found::Metadata { name, texts } = found {
+                    parts.keep(path, &name, &texts);
+                }
+            }
+            end.cut_short = far.cut_short;
+        }
+        // A damaged version in the channel is outvoted by an identity with a right checksum.
+        if let (Some(found), false) = (records.unspoken.take(), parts.is_vouched) {
+            return Err(RecordingError::Version { path: path.to_owned(), found });
+        }
+        let mut problem = parts.problem.take();
+        let mut missing = |missing| {
+            let (path, cut_short) = (path.to_owned(), end.cut_short.clone());
+            problem.take().unwrap_or(RecordingError::Missing { path, missing, cut_short })
         };
         let identity = parts.identity.ok_or_else(|| missing("identity"))?;
         let setup = parts.setup.ok_or_else(|| missing("setup"))?;
+        if let Some(problem) = problem {
+            return Err(problem);
+        }
+        // What is wrong with the file is said at its end.
+        if first.is_some() {
+            end = End::default();
+        }
         end.account = parts.account;
         Ok(Self { identity, setup, settling: parts.settling, run: parts.run, records, first, end })
     }
@@ -110,8 +131,8 @@ impl Recording {
         loop {
             match self.records.next(&mut self.end)? {
                 Some(Found::Packet(packet)) => return Ok(Some(packet)),
-                Some(Found::Metadata(metadata)) => {
-                    parts.keep(&self.records.path, &metadata)?;
+                Some(Found::Metadata { name, texts }) => {
+                    parts.keep(&self.records.path, &name, &texts);
                     if let Some(account) = parts.account.take() {
                         self.end.account = Some(account);
                     }
@@ -141,108 +162,124 @@ impl Iterator for Recording {
 /// The records of a file that the reader needs, one by one.
 struct Records {
     path: PathBuf,
-    file: File,
-    reader: LinearReader,
-    /// Whether the header says that nirspi wrote the file.
-    ours: bool,
+    scan: Scan,
+    /// The profile in the header of the file.
+    profile: Option<String>,
+    /// The channel of the packets.
+    wire: Option<u16>,
+    /// Other channels.
+    others: Vec<u16>,
+    /// Topic and encoding of packets in a protocol version that this program does not speak.
+    unspoken: Option<String>,
     over: bool,
 }
 
 /// A record that the reader needs.
 enum Found {
     Packet(Packet),
-    Metadata(Metadata),
+    Metadata { name: String, texts: BTreeMap<String, String> },
 }
 
 impl Records {
     fn open(path: &Path) -> Result<Self, RecordingError> {
         let io_error = |source| RecordingError::Io { path: path.to_owned(), source };
+        let refuse = |found: &str| {
+            Err(RecordingError::NotARecording { path: path.to_owned(), found: found.to_owned() })
+        };
         // Opening a pipe would wait for a writer, and a device may never end.
         if !std::fs::metadata(path).map_err(io_error)?.is_file() {
-            let found = "a folder, a device or a pipe".to_owned();
-            return Err(RecordingError::NotARecording { path: path.to_owned(), found });
+            return refuse("a folder, a device or a pipe");
         }
-        let file = File::open(path).map_err(io_error)?;
-        let reader = LinearReader::new_with_options(
-            LinearReaderOptions::default()
-                // Each packet has its own checksum. The checksum of the data section covers the
-                // information about the packets.
-                .with_validate_data_section_crc(true)
-                // Whole chunks are refused below, because the crate panics on some damaged chunks
-                // (0.26, found by fuzzing).
-                .with_emit_chunks(true)
-                .with_record_length_limit(LONGEST_RECORD),
-        );
-        Ok(Self { path: path.to_owned(), file, reader, ours: false, over: false })
+        let mut scan = Scan::new(File::open(path).map_err(io_error)?);
+        if scan.is_empty().map_err(io_error)? {
+            return refuse("an empty or cut file");
+        }
+        if !scan.begin().map_err(io_error)? {
+            return refuse("a file of another kind");
+        }
+        Ok(Self {
+            path: path.to_owned(),
+            scan,
+            profile: None,
+            wire: None,
+            others: Vec::new(),
+            unspoken: None,
+            over: false,
+        })
     }
 
-    /// The next record that the reader needs; `None` at the end of the file, or at damage, which
-    /// `end` then reports.
+    /// The next record that the reader needs; `None` at the end of the file. `end` then says what
+    /// is wrong with the file.
     fn next(&mut self, end: &mut End) -> Result<Option<Found>, RecordingError> {
-        let Self { path, file, reader, ours, over } = self;
-        let io_error = |source| RecordingError::Io { path: path.clone(), source };
-        let not_ours = |found: String| RecordingError::NotARecording { path: path.clone(), found };
-        if *over {
+        if self.over {
             return Ok(None);
         }
-        while let Some(event) = reader.next_event() {
-            let record = match event {
-                Ok(LinearReadEvent::ReadRequest(need)) => {
-                    let read = file.read(reader.insert(need)).map_err(io_error)?;
-                    reader.notify_read(read);
-                    continue;
+        let path = &self.path;
+        let io_error = |source| RecordingError::Io { path: path.clone(), source };
+        while let Some(entry) = self.scan.next().map_err(io_error)? {
+            match entry {
+                Entry::Header { profile } => self.profile = Some(profile),
+                // One of the two may be damaged.
+                Entry::Channel { id, topic, encoding }
+                    if topic == TOPIC || protocol_of(&encoding).is_some() =>
+                {
+                    if !protocol_of(&encoding).is_some_and(version::speaks) {
+                        self.unspoken = Some(format!("{topic:?} {encoding:?}"));
+                    }
+                    self.wire = Some(id);
                 }
-                // Only records that nirspi writes are parsed, because the crate panics on some
-                // damaged attachments (0.26, found by fuzzing).
-                Ok(LinearReadEvent::Record {
-                    opcode: opcode @ (op::HEADER | op::CHANNEL | op::MESSAGE | op::METADATA),
-                    data,
-                }) if lengths::fit(opcode, data) => mcap::parse_record(opcode, data),
-                Ok(LinearReadEvent::Record {
-                    opcode: op::HEADER | op::CHANNEL | op::METADATA,
-                    ..
-                }) => Err(McapError::UnexpectedEof),
-                Ok(LinearReadEvent::Record { opcode: op::CHUNK, .. }) => {
-                    return Err(not_ours(
-                        "records in chunks, as other tools write them,".to_owned(),
-                    ));
+                Entry::Channel { id, .. } => self.others.push(id),
+                Entry::Compressed(_) => {
+                    return Err(RecordingError::NotARecording {
+                        path: path.clone(),
+                        found: "records in compressed chunks, as other tools write them,"
+                            .to_owned(),
+                    });
                 }
-                Ok(LinearReadEvent::Record { .. }) => continue,
-                Err(error) => Err(error),
-            };
-            match record {
-                Ok(Record::Header(header)) if header.profile == PROFILE => *ours = true,
-                Ok(Record::Header(header)) => {
-                    return Err(not_ours(format!("an MCAP file of profile {:?}", header.profile)));
-                }
-                Ok(Record::Channel(channel)) => {
-                    let protocol = protocol_of(&channel.message_encoding);
-                    if channel.topic != TOPIC || !protocol.is_some_and(version::speaks) {
-                        let found = format!("{:?} {:?}", channel.topic, channel.message_encoding);
-                        return Err(RecordingError::Version { path: path.clone(), found });
+                Entry::Message { channel, time_ns, data } => {
+                    self.check_ours()?;
+                    if self.is_packet(channel, &data) {
+                        return Ok(Some(Found::Packet(Packet { bytes: data, time_ns })));
                     }
                 }
-                Ok(Record::Message { header, data }) => {
-                    let packet = Packet { bytes: data.into_owned(), time_ns: header.log_time };
-                    return Ok(Some(Found::Packet(packet)));
-                }
-                Ok(Record::Metadata(metadata)) => return Ok(Some(Found::Metadata(metadata))),
-                Ok(_) => {}
-                Err(McapError::UnexpectedEof) if !*ours => {
-                    return Err(not_ours("an empty or cut file".to_owned()));
-                }
-                Err(McapError::BadMagic) => {
-                    return Err(not_ours("a file of another kind".to_owned()));
-                }
-                Err(error) if !*ours => return Err(not_ours(one_line(&error))),
-                Err(error) => {
-                    end.cut_short = Some(one_line(&error));
-                    break;
+                Entry::Metadata { name, texts } => {
+                    self.check_ours()?;
+                    return Ok(Some(Found::Metadata { name, texts }));
                 }
             }
         }
-        *over = true;
-        if *ours { Ok(None) } else { Err(not_ours("an empty or foreign file".to_owned())) }
+        self.over = true;
+        self.check_ours()?;
+        end.damage = self.scan.damage.clone();
+        if end.damage != Damage::default() {
+            end.cut_short = Some(end.damage.to_string());
+        }
+        Ok(None)
+    }
+
+    /// Whether a message is a packet. In a channel that is not known, because a record is damaged,
+    /// the message has to look like a packet.
+    fn is_packet(&self, channel: u16, data: &[u8]) -> bool {
+        match (self.wire == Some(channel), self.others.contains(&channel)) {
+            (true, false) => true,
+            (false, true) => false,
+            (true, true) | (false, false) => {
+                data.len() <= MAX_DEVICE_PACKET + 1
+                    && data.iter().position(|&byte| byte == 0) == data.len().checked_sub(1)
+            }
+        }
+    }
+
+    /// Refuses a file of another program.
+    fn check_ours(&self) -> Result<(), RecordingError> {
+        let refuse =
+            |found: String| Err(RecordingError::NotARecording { path: self.path.clone(), found });
+        match &self.profile {
+            _ if self.wire.is_some() => Ok(()),
+            Some(profile) if profile == PROFILE => Ok(()),
+            Some(profile) => refuse(format!("an MCAP file of profile {profile:?}")),
+            None => refuse("an empty or foreign file".to_owned()),
+        }
     }
 }
 
@@ -304,13 +341,6 @@ fn cut_note(cut_short: &Option<String>) -> String {
     cut_short.as_ref().map_or_else(String::new, |reason| format!(", which is cut short: {reason}"))
 }
 
-/// One line of the parser's messages, which are drawings of several lines.
-fn one_line(error: &McapError) -> String {
-    let text = error.to_string();
-    let words: Vec<&str> = text.split_whitespace().take(16).collect();
-    words.join(" ")
-}
-
 #[derive(Default)]
 struct Parts {
     identity: Option<CameraIdentity>,
@@ -318,41 +348,78 @@ struct Parts {
     settling: Option<Settling>,
     run: Option<u16>,
     account: Option<RunAccount>,
+    /// Whether the identity has a checksum, and this program speaks its protocol.
+    is_vouched: bool,
+    /// Why a part could not be read. A later copy of the part clears the problem.
+    problem: Option<RecordingError>,
 }
 
 impl Parts {
-    fn keep(&mut self, path: &Path, metadata: &Metadata) -> Result<(), RecordingError> {
-        match metadata.name.as_str() {
-            IDENTITY => self.identity = Some(parse(path, "identity", metadata)?),
-            SETUP => {
-                let setup: MeasurementSetup = parse(path, "setup", metadata)?;
-                setup.check().map_err(|problem| damaged(path, "setup", &problem))?;
-                self.setup = Some(setup);
+    /// Keeps a part. The first sound copy counts.
+    fn keep(&mut self, path: &Path, name: &str, texts: &BTreeMap<String, String>) {
+        let kept = match name {
+            IDENTITY => fill(&mut self.identity, path, "identity", texts, |_| Ok(())),
+            SETUP => fill(&mut self.setup, path, "setup", texts, |setup: &MeasurementSetup| {
+                setup.check().map_err(|problem| problem.to_string())
+            }),
+            SETTLING => fill(&mut self.settling, path, "settling", texts, |found: &Settling| {
+                found.check().map_err(|problem| problem.to_string())
+            }),
+            RUN => fill(&mut self.run, path, "run", texts, |_| Ok(())),
+            ACCOUNT => fill(&mut self.account, path, "account", texts, |_| Ok(())),
+            _ => Ok(false),
+        };
+        match kept {
+            Ok(true) => {
+                if let (IDENTITY, Some(identity)) = (name, &self.identity) {
+                    let has_checksum = texts.contains_key(CHECKSUM);
+                    self.is_vouched = has_checksum && version::speaks(identity.protocol);
+                }
+                let cleared = |problem: &mut RecordingError| matches!(problem, RecordingError::Damaged { part, .. } if name.ends_with(*part));
+                self.problem.take_if(cleared);
             }
-            SETTLING => {
-                let settling: Settling = parse(path, "settling", metadata)?;
-                settling.check().map_err(|problem| damaged(path, "settling", &problem))?;
-                self.settling = Some(settling);
+            Ok(false) => {}
+            Err(problem) => {
+                self.problem.get_or_insert(problem);
             }
-            RUN => self.run = Some(parse(path, "run", metadata)?),
-            ACCOUNT => self.account = Some(parse(path, "account", metadata)?),
-            _ => {}
         }
-        Ok(())
+    }
+
+    /// Whether a part is missing that every recording has, or damaged.
+    fn lacks(&self) -> bool {
+        self.identity.is_none() || self.setup.is_none() || self.problem.is_some()
     }
 }
 
-fn parse<T: DeserializeOwned>(
+/// Fills a part that is not known yet. Returns whether the part is filled now.
+fn fill<T: DeserializeOwned>(
+    part: &mut Option<T>,
     path: &Path,
-    part: &'static str,
-    metadata: &Metadata,
-) -> Result<T, RecordingError> {
-    let json = metadata.metadata.get(JSON).map_or("", String::as_str);
-    serde_json::from_str(json).map_err(|error| damaged(path, part, &error))
+    name: &'static str,
+    texts: &BTreeMap<String, String>,
+    check: impl Fn(&T) -> Result<(), String>,
+) -> Result<bool, RecordingError> {
+    if part.is_some() {
+        return Ok(false);
+    }
+    let damaged =
+        |reason: String| RecordingError::Damaged { path: path.to_owned(), part: name, reason };
+    let json = texts.get(JSON).map_or("", String::as_str);
+    // Recordings before 0.2 have no checksum.
+    if let Some(expected) = texts.get(CHECKSUM)
+        && *expected != checksum(json)
+    {
+        return Err(damaged("its checksum is wrong".to_owned()));
+    }
+    let value = serde_json::from_str(json).map_err(|error| damaged(error.to_string()))?;
+    check(&value).map_err(damaged)?;
+    *part = Some(value);
+    Ok(true)
 }
 
-fn damaged(path: &Path, part: &'static str, problem: &impl ToString) -> RecordingError {
-    RecordingError::Damaged { path: path.to_owned(), part, reason: problem.to_string() }
+/// The checksum of a part's text.
+pub(super) fn checksum(json: &str) -> String {
+    format!("{:08x}", crc32(json.as_bytes()))
 }
 
 #[cfg(test)]
@@ -405,7 +472,7 @@ mod tests {
             assert_eq!(packet.unwrap().bytes, vec![count as u8; 5000]);
         }
         let account = Some(account(700));
-        assert_eq!(recording.end(), &End { account, packets: 700, cut_short: None });
+        assert_eq!(recording.end(), &End { account, packets: 700, ..End::default() });
     }
 
     #[test]
@@ -442,7 +509,7 @@ mod tests {
         // marks its end.
         let mut bytes = std::fs::read(&path).unwrap();
         let header = 8 + 9 + u64::from_le_bytes(bytes[9..17].try_into().unwrap()) as usize;
-        bytes.splice(header..header, [op::ATTACHMENT, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
+        bytes.splice(header..header, [9, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
         std::fs::write(&path, bytes).unwrap();
         assert_eq!(Recording::open(&path).unwrap().filter_map(Result::ok).count(), 3);
     }

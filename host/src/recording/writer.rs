@@ -1,17 +1,15 @@
 //! Writes a recording while the packets arrive.
 
+use super::RunAccount;
+use super::book::{Book, Opening};
 use super::file::{Place, Target};
-use super::{ACCOUNT, IDENTITY, JSON, PROFILE, RUN, RunAccount, SETTLING, SETUP, TOPIC, encoding};
 use crate::calibration::Settling;
 use crate::session::CameraIdentity;
 use crate::setup::MeasurementSetup;
-use mcap::records::{MessageHeader, Metadata};
-use mcap::write::NoSeek;
-use mcap::{McapResult, WriteOptions, Writer};
-use serde::Serialize;
-use std::collections::BTreeMap;
+use crate::tally::Tally;
+use nirspi_wire::{DeviceMessage, PacketError};
 use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
@@ -21,21 +19,14 @@ const FLUSH_EVERY: Duration = Duration::from_millis(500);
 /// An open recording.
 pub struct Recorder {
     place: Place,
-    writer: Records,
+    book: Book<BufWriter<File>>,
     /// The same file, for syncing to the disk.
     file: File,
-    channel: u16,
-    packets: u32,
     epoch: u64,
     started: Instant,
     flushed: Instant,
-}
-
-fn to_io(error: mcap::McapError) -> io::Error {
-    match error {
-        mcap::McapError::Io(error) => error,
-        other => io::Error::other(other),
-    }
+    /// Time of the newest packet.
+    newest: u64,
 }
 
 impl Recorder {
@@ -53,21 +44,21 @@ impl Recorder {
         run: Option<u16>,
     ) -> io::Result<Self> {
         let (place, file) = Place::make(target)?;
-        let begun = file.try_clone().map_err(Into::into).and_then(|clone| {
-            let buffered = BufWriter::with_capacity(1 << 20, clone);
-            begun(buffered, identity, setup, settling, run)
+        let begun = file.try_clone().and_then(|clone| {
+            let opening = Opening { identity, setup, settling, run };
+            Book::begin(BufWriter::with_capacity(1 << 20, clone), &opening)
         });
-        let (writer, channel) = match begun {
-            Ok(begun) => begun,
+        let book = match begun {
+            Ok(book) => book,
             Err(error) => {
                 place.remove();
-                return Err(to_io(error));
+                return Err(error);
             }
         };
         let epoch = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos();
         let epoch = u64::try_from(epoch).unwrap_or(u64::MAX);
         let now = Instant::now();
-        Ok(Self { place, writer, file, channel, packets: 0, epoch, started: now, flushed: now })
+        Ok(Self { place, book, file, epoch, started: now, flushed: now, newest: epoch })
     }
 
     /// The current path of the file.
@@ -81,17 +72,31 @@ impl Recorder {
     /// # Errors
     /// If the disk is full or gone.
     pub fn packet(&mut self, raw: &[u8]) -> io::Result<()> {
-        let age = self.started.elapsed();
-        let time = self.epoch.saturating_add(u64::try_from(age.as_nanos()).unwrap_or(u64::MAX));
-        let header = MessageHeader {
-            channel_id: self.channel,
-            sequence: self.packets,
-            log_time: time,
-            publish_time: time,
-        };
-        self.writer.write_to_known_channel(&header, raw).map_err(to_io)?;
-        self.packets = self.packets.wrapping_add(1);
+        let age = u64::try_from(self.started.elapsed().as_nanos()).unwrap_or(u64::MAX);
+        self.packet_of(self.epoch.saturating_add(age), raw)?;
         self.flush_if_due()
+    }
+
+    /// Appends one packet that was received at this time of the host's clock, in ns.
+    ///
+    /// # Errors
+    /// If the disk is full or gone.
+    pub(crate) fn packet_of(&mut self, time_ns: u64, raw: &[u8]) -> io::Result<()> {
+        self.newest = time_ns;
+        self.book.packet(time_ns, raw)
+    }
+
+    /// Writes what the newest packet means into the channels of log and telemetry. `tally` has
+    /// counted the packet.
+    ///
+    /// # Errors
+    /// If the disk is full or gone.
+    pub fn heard(
+        &mut self,
+        content: &Result<DeviceMessage<'_>, PacketError>,
+        tally: &Tally,
+    ) -> io::Result<()> {
+        self.book.heard(self.newest, content, tally)
     }
 
     /// Writes the received packets to the file, unless the last flush is recent.
@@ -103,7 +108,7 @@ impl Recorder {
             return Ok(());
         }
         self.flushed = Instant::now();
-        self.writer.flush().map_err(to_io)
+        self.book.flush()
     }
 
     /// Writes the account of the run and syncs the file to the disk. The recording of a whole run
@@ -112,58 +117,17 @@ impl Recorder {
     /// # Errors
     /// The file's path, and why the file could not be finished.
     pub fn finish(self, account: &RunAccount) -> Result<PathBuf, (PathBuf, io::Error)> {
-        let Self { mut place, writer, file, .. } = self;
-        let settled = closed(writer, account)
-            .map_err(to_io)
-            .and_then(|()| place.settle(&file, account.missing.is_none()));
+        let Self { mut place, book, file, .. } = self;
+        let settled =
+            book.end(Some(account)).and_then(|()| place.settle(&file, account.missing.is_none()));
         let path = place.path().to_owned();
         settled.map(|()| path.clone()).map_err(|error| (path, error))
     }
 
     /// Removes the file, because nothing was recorded.
     pub fn discard(self) {
-        let Self { place, writer, .. } = self;
-        drop(writer);
+        let Self { place, book, .. } = self;
+        drop(book);
         place.remove();
     }
-}
-
-type Records = Writer<NoSeek<BufWriter<File>>>;
-
-/// Writes the information before the packets. Returns the channel of the packets.
-fn begun(
-    file: BufWriter<File>,
-    identity: &CameraIdentity,
-    setup: &MeasurementSetup,
-    settling: Option<&Settling>,
-    run: Option<u16>,
-) -> McapResult<(Records, u16)> {
-    let options = WriteOptions::new().use_chunks(false).profile(PROFILE).disable_seeking(true);
-    let mut writer = options.create(NoSeek::new(file))?;
-    let channel = writer.add_channel(0, TOPIC, &encoding(identity.protocol), &BTreeMap::new())?;
-    note(&mut writer, IDENTITY, identity)?;
-    note(&mut writer, SETUP, setup)?;
-    if let Some(settling) = settling {
-        note(&mut writer, SETTLING, settling)?;
-    }
-    if let Some(run) = run {
-        note(&mut writer, RUN, &run)?;
-    }
-    // After this flush the file identifies itself, whatever happens.
-    writer.flush()?;
-    Ok((writer, channel))
-}
-
-/// Writes the information after the packets.
-fn closed(mut writer: Records, account: &RunAccount) -> McapResult<()> {
-    note(&mut writer, ACCOUNT, account)?;
-    writer.finish()?;
-    Ok(writer.into_inner().into_inner().flush()?)
-}
-
-fn note(writer: &mut Records, name: &str, value: &impl Serialize) -> McapResult<()> {
-    let json = serde_json::to_string(value).map_err(io::Error::other)?;
-    let metadata = BTreeMap::from([(JSON.to_owned(), json)]);
-    writer.write_metadata(&Metadata { name: name.to_owned(), metadata })?;
-    Ok(())
 }

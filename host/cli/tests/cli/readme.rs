@@ -67,6 +67,12 @@ fn every_line_of_the_page_about_measurements_runs_as_it_stands() {
 }
 
 #[test]
+fn every_line_of_the_page_about_recordings_runs_as_it_stands() {
+    let page = include_str!("../../../../docs/recordings.md");
+    runs_as_it_stands("docs/recordings.md", page, 6, &[]);
+}
+
+#[test]
 fn every_line_of_how_it_works_and_of_bring_up_runs_as_it_stands() {
     let page = include_str!("../../../../docs/how-it-works.md");
     runs_as_it_stands("docs/how-it-works.md", page, 2, &[]);

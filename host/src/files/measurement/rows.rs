@@ -79,10 +79,16 @@ pub(super) fn read_side(fields: &mut Fields, want: &Selection) -> Result<Option<
     if !fields.holds("n") {
         return Ok(want.side);
     }
+    let is_columns = fields.is_columns();
     let n = fields.read_real("n", |shape| match shape.iter().all(|&axis| axis == 1) {
-        true => Ok(()),
-        false => Err("one number".to_owned()),
+        false if !is_columns => Err("one number".to_owned()),
+        _ => Ok(()),
     })?;
+    // A column of a text repeats the number in every line.
+    if let Some(line) = n.iter().position(|value| *value != n[0]) {
+        let found = format!("is {} in line {line} of the column, {} before", n[line], n[0]);
+        return Err(FileError::field(fields.path(), "n", found, "one number"));
+    }
     let refuse =
         |found: String, expected: String| FileError::field(fields.path(), "n", found, expected);
     let value = n[0];

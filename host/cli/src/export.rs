@@ -1,0 +1,76 @@
+//! `nirspi export` and `nirspi recover`: a recording in another form, or repaired.
+
+use super::camera::ModelArgs;
+use super::print;
+use super::report::{ReportArgs, words};
+use anyhow::Result;
+use nirspi::export::{ExportOptions, Format, export};
+use nirspi::recording::{Target, recover as recovered};
+use nirspi::virtual_camera::pinhole_of;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Write a recording in a form for other programs
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  nirspi export rec.mcap --to npz --out rec.npz")]
+pub struct Args {
+    /// Recording (.mcap)
+    recording: PathBuf,
+    /// Form of the file
+    #[arg(long, value_parser = words(Format::ALL, |format| (format.name(), format.about())))]
+    to: Format,
+    /// File to write [default: the recording's name with the ending of the format]
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Do not correct the readings for the leak from pattern to pattern
+    #[arg(long)]
+    keep_leak: bool,
+    /// parquet: what the camera looked at
+    #[arg(long, value_name = "TEXT")]
+    scene: Option<String>,
+    /// parquet: distance to the target in metres
+    #[arg(long, value_name = "M")]
+    distance_m: Option<f64>,
+    /// parquet: an image of the scene as it is, (n, n)
+    #[arg(long, value_name = "FILE.npy")]
+    truth: Option<PathBuf>,
+    #[command(flatten)]
+    model: ModelArgs,
+    #[command(flatten)]
+    report: ReportArgs,
+}
+
+pub fn run(args: &Args) -> Result<ExitCode> {
+    let out = args.out.clone().unwrap_or_else(|| args.to.beside(&args.recording));
+    let options = ExportOptions {
+        keep_leak: args.keep_leak,
+        scene: args.scene.clone(),
+        distance_m: args.distance_m,
+        truth: args.truth.clone(),
+        pinhole: Some(pinhole_of(&args.model.read()?)),
+        ..ExportOptions::default()
+    };
+    let exported = export(&args.recording, &out, args.to, &options)?;
+    args.report.print(&exported, |exported| {
+        print::notes(&exported.notes)?;
+        print::line(exported)
+    })
+}
+
+/// Copy what can be read of a damaged recording into a new one, and say what is lost
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  nirspi recover rec.mcap --out whole.mcap")]
+pub struct RecoverArgs {
+    /// Recording (.mcap) that is damaged or cut short; the file stays as it is
+    recording: PathBuf,
+    /// The new recording
+    #[arg(long, value_name = "FILE.mcap")]
+    out: PathBuf,
+    #[command(flatten)]
+    report: ReportArgs,
+}
+
+pub fn recover(args: &RecoverArgs) -> Result<ExitCode> {
+    let recovered = recovered(&args.recording, &Target::New(args.out.clone()))?;
+    args.report.print(&recovered, |recovered| print::line(recovered))
+}

@@ -1,0 +1,106 @@
+"""Checks that other programs read what nirspi records and exports: the Python packages mcap,
+mcap-protobuf-support, pyarrow, numpy and, where there is one, rerun.
+
+Usage: check.py path/to/nirspi
+"""
+
+import json
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+from mcap.reader import make_reader
+from mcap_protobuf.decoder import DecoderFactory
+
+nirspi = str(Path(sys.argv[1]).resolve())
+folder = Path(tempfile.mkdtemp())
+
+
+def run(*arguments):
+    done = subprocess.run([nirspi, *arguments], cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 0, (arguments, done.stderr)
+    return done.stdout
+
+
+def messages(name):
+    """Every message of a file, decoded where its channel is protobuf."""
+    with open(folder / name, "rb") as file:
+        reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
+        topics = [t for t in ("/telemetry", "/log", "/image", "/calibration")]
+        decoded = list(reader.iter_decoded_messages(topics=topics))
+        raw = list(reader.iter_messages(topics=["/wire"]))
+        return decoded, raw, reader.get_summary()
+
+
+run("capture", "--frames", "12", "--sampling", "0.5", "--out", "rec.mcap")
+for kind in ("mcap", "npz", "npy", "csv", "parquet", "apng"):
+    run("export", "rec.mcap", "--to", kind, "--out", f"out.{kind}")
+run("reconstruct", "rec.mcap", "--out", "sum", "--no-flat-field")
+
+# The image channel holds the image of `reconstruct`, scaled from 0 to 1 in float32.
+recorded, wire, summary = messages("rec.mcap")
+exported, wire_again, _ = messages("out.mcap")
+assert [m.data for _, _, m in wire] == [m.data for _, _, m in wire_again]
+assert [m.log_time for _, _, m in wire] == [m.log_time for _, _, m in wire_again]
+images = [image for schema, channel, _, image in exported if channel.topic == "/image"]
+assert len(images) == 1, len(images)
+image = images[0]
+assert (image.width, image.height, image.encoding, image.step) == (32, 32, "32FC1", 128)
+pixels = np.frombuffer(image.data, "<f4").reshape(32, 32)
+truth = np.load(folder / "sum" / "image.npy").reshape(32, 32)
+least, most = truth.min(), truth.max()
+scaled = (truth - least) * (np.float32(1) / (most - least))
+assert np.array_equal(pixels, scaled), np.abs(pixels - scaled).max()
+assert pixels.min() == 0 and abs(pixels.max() - 1) < 1e-6
+print(f"image: {pixels.shape} float32 from {pixels.min()} to {pixels.max()}, as reconstructed")
+
+# Telemetry and log are in the recording itself.
+for found in (recorded, exported):
+    telemetry = [m for _, c, _, m in found if c.topic == "/telemetry"]
+    log = [m for _, c, _, m in found if c.topic == "/log"]
+    assert telemetry and telemetry[0].timestamp.seconds > 1_500_000_000
+    assert any("has ended: 12 frames made" in line.message for line in log), log
+    assert all(line.level == 2 for line in log)
+calibration = [m for _, c, _, m in exported if c.topic == "/calibration"]
+assert len(calibration) == 1 and calibration[0].K[2] == 16 and calibration[0].K[0] > 16
+names = sorted(schema.name for schema in summary.schemas.values())
+print("schemas:", ", ".join(names))
+assert names[-1] == "nirspi.wire.v2" and summary.chunk_indexes
+assert summary.statistics.message_count >= len(wire)
+
+# The dataset.
+table = pq.read_table(folder / "out.parquet", page_checksum_verification=True)
+frames = np.load(folder / "out.npy")
+npz = np.load(folder / "out.npz")
+assert table.num_rows == 12 and frames.shape == (12, 512)
+assert np.array_equal(np.array(table["d"].to_pylist()), frames)
+assert np.array_equal(npz["frames"], frames)
+assert np.array_equal(np.array(table["rows"].to_pylist()), np.tile(npz["h_row"], (12, 1)))
+assert table["sequence"].to_pylist() == list(range(12))
+assert table["time"].cast("int64").to_pylist() == npz["time_ns"].tolist()
+assert set(table["simulated"].to_pylist()) == {True} and set(table["n"].to_pylist()) == {32}
+assert table["truth"].null_count == 12 and table["scene"].null_count == 12
+assert json.loads(table["meta"][0].as_py())["camera"]["board"] == "virtual"
+print("parquet:", ", ".join(f"{field.name} {field.type}" for field in table.schema))
+
+# With what is known of the scene.
+np.save(folder / "truth.npy", scaled)
+known = ("--scene", "letter R", "--distance-m", "0.3", "--truth", "truth.npy")
+run("export", "rec.mcap", "--to", "parquet", "--out", "known.parquet", *known)
+table = pq.read_table(folder / "known.parquet")
+assert np.array_equal(np.array(table["truth"].to_pylist(), "<f4")[3], scaled.ravel())
+assert set(table["scene"].to_pylist()) == {"letter R"} and set(table["distance_m"].to_pylist()) == {0.3}
+
+csv = np.genfromtxt(folder / "out.csv", delimiter=",", names=True, skip_header=1)
+assert np.array_equal(csv["d"], npz["d"]) and np.array_equal(csv["h_row"], npz["h_row"])
+
+rerun = Path(sys.executable).with_name("rerun")
+if rerun.exists():
+    for name in ("rec.mcap", "out.mcap"):
+        subprocess.run([rerun, "mcap", "check", folder / name], check=True, timeout=120)
+    print("rerun: both files are sound")
+else:
+    print("skipped: rerun is not here")

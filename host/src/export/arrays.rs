@@ -1,0 +1,91 @@
+//! Arrays for NumPy, and a table for spreadsheets.
+
+use super::{ExportError, Whole};
+use crate::files::FileError;
+use crate::files::npy::{Element, encode, header};
+use crate::files::output::write_in_pieces;
+use std::io::{self, Seek, Write};
+use std::path::Path;
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, ZipWriter};
+
+/// Writes a `.npz` file. Its members are not compressed, because readings are noise for a
+/// compressor.
+pub(super) fn npz(whole: &Whole, out: &Path) -> Result<(), ExportError> {
+    write_in_pieces(out, |file| {
+        let mut zip = Members { zip: ZipWriter::new(file), out };
+        let rows = whole.source.measurements.rows();
+        let h_row: Vec<i64> = rows.iter().map(|&row| row.into()).collect();
+        let [m, count] = [h_row.len(), whole.frames()];
+        zip.add("n", &encode(&[], &[rows.side().pixels() as i64]))?;
+        zip.add("h_row", &encode(&[m], &h_row))?;
+        zip.add("d", &encode(&[m], whole.source.measurements.values()))?;
+        zip.add("sequence", &encode(&[count], &whole.sequence))?;
+        zip.add("device_time_us", &encode(&[count], &whole.device_time_us))?;
+        zip.add("time_ns", &encode(&[count], &whole.time_ns))?;
+        zip.add("simulated", &encode(&[], &[i64::from(whole.is_simulated())]))?;
+        zip.begin("frames")?;
+        frames(whole, out, &mut zip.zip)?;
+        let wrong = |error: zip::result::ZipError| FileError::io(out, "write", error.into());
+        zip.zip.finish().map_err(wrong)?;
+        Ok(())
+    })
+}
+
+struct Members<'o, W: Write + Seek> {
+    zip: ZipWriter<W>,
+    out: &'o Path,
+}
+
+impl<W: Write + Seek> Members<'_, W> {
+    fn begin(&mut self, field: &str) -> Result<(), FileError> {
+        let options = SimpleFileOptions::default()
+            .compression_method(CompressionMethod::Stored)
+            .large_file(true);
+        self.zip
+            .start_file(format!("{field}.npy"), options)
+            .map_err(|error| FileError::io(self.out, "write", error.into()))
+    }
+
+    fn add(&mut self, field: &str, bytes: &[u8]) -> Result<(), FileError> {
+        self.begin(field)?;
+        self.zip.write_all(bytes).map_err(|error| FileError::io(self.out, "write", error))
+    }
+}
+
+/// Writes the readings of each frame as one array (F, M).
+pub(super) fn npy(whole: &Whole, out: &Path) -> Result<(), ExportError> {
+    write_in_pieces(out, |file| frames(whole, out, file))
+}
+
+fn frames(whole: &Whole, out: &Path, to: &mut impl Write) -> Result<(), ExportError> {
+    let write = |to: &mut dyn Write, bytes: &[u8]| {
+        to.write_all(bytes).map_err(|error| FileError::io(out, "write", error))
+    };
+    let shape = [whole.frames(), whole.source.measurements.rows().len()];
+    write(to, &header::<f64>(&shape))?;
+    let mut bytes = Vec::new();
+    whole.each(|frame| {
+        bytes.clear();
+        frame.measurements.values().iter().for_each(|value| value.append(&mut bytes));
+        Ok(write(to, &bytes)?)
+    })
+}
+
+/// Writes the mean of all frames, one pattern a line, under the heading `n,h_row,d`. The numbers
+/// read back as they were.
+pub(super) fn csv(whole: &Whole, out: &Path) -> Result<(), ExportError> {
+    let measurements = &whole.source.measurements;
+    let n = measurements.side().pixels();
+    write_in_pieces(out, |file| {
+        let lines = measurements.rows().iter().zip(measurements.values());
+        let write = || -> io::Result<()> {
+            let what = if whole.is_simulated() { ", simulated" } else { "" };
+            writeln!(file, "# mean of {} frames, ADC counts{what}", whole.frames())?;
+            writeln!(file, "n,h_row,d")?;
+            // A point shows that commas separate numbers.
+            lines.into_iter().try_for_each(|(row, d)| writeln!(file, "{n},{row},{d:?}"))
+        };
+        Ok(write().map_err(|error| FileError::io(out, "write", error))?)
+    })
+}

@@ -1,0 +1,111 @@
+//! A recording with images, for viewers of MCAP files such as Foxglove and Rerun.
+//!
+//! The packets, their times and the information before them are those of the recording, so the
+//! exported file is a recording itself.
+
+use super::{ExportError, ExportOptions, Whole};
+use crate::files::FileError;
+use crate::files::output::write_in_pieces;
+use crate::integrate::Integrated;
+use crate::recording::{Book, Opening, Recording};
+use crate::tally::{Heard, Tally, hear_recording};
+use nirspi_recon::Image;
+use nirspi_recon::reconstruct::{Method, MethodSettings, Reconstruct};
+use std::path::Path;
+
+/// The camera's time of one image: 30 images a second.
+const IMAGE_US: u64 = 33_333;
+
+/// Writes the file. Returns the number of images.
+pub(super) fn write(
+    whole: &Whole,
+    out: &Path,
+    options: &ExportOptions,
+) -> Result<usize, ExportError> {
+    let (mut images, mut range) = (0, [f32::INFINITY, f32::NEG_INFINITY]);
+    let mut recording = Recording::open(&whole.path)?;
+    each(whole, &mut recording, |what| {
+        if let What::Image(_, image) = what {
+            images += 1;
+            range = image
+                .pixels()
+                .iter()
+                .fold(range, |[least, most], &pixel| [least.min(pixel), most.max(pixel)]);
+        }
+        Ok(())
+    })?;
+    write_in_pieces(out, |file| {
+        let io_error = |error| FileError::io(out, "write", error);
+        let mut recording = Recording::open(&whole.path)?;
+        let (identity, setup) = (recording.identity.clone(), recording.setup.clone());
+        let (settling, run) = (recording.settling.clone(), recording.run);
+        let settling = settling.as_ref();
+        let opening = Opening { identity: &identity, setup: &setup, settling, run };
+        let mut book = Book::begin(file, &opening).map_err(io_error)?;
+        if let Some(pinhole) = &options.pinhole {
+            let time = whole.time_ns.first().map_or(0, |&time| time as u64);
+            book.pinhole(time, pinhole).map_err(io_error)?;
+        }
+        each(whole, &mut recording, |what| {
+            let written = match what {
+                What::Packet(heard, tally) => book
+                    .packet(heard.time_ns, heard.raw)
+                    .and_then(|()| book.heard(heard.time_ns, heard.content, tally)),
+                What::Image(time_ns, image) => book.image(time_ns, &image, range),
+            };
+            Ok(written.map_err(io_error)?)
+        })?;
+        Ok(book.end(recording.end().account.as_ref()).map_err(io_error)?)
+    })
+    .map(|()| images)
+}
+
+enum What<'p> {
+    Packet(&'p Heard<'p>, &'p Tally),
+    /// An image, and the time at which its last frame arrived.
+    Image(u64, Image),
+}
+
+/// Goes through the packets of a recording, and the images of its frames.
+fn each(
+    whole: &Whole,
+    recording: &mut Recording,
+    mut on: impl FnMut(What<'_>) -> Result<(), ExportError>,
+) -> Result<(), ExportError> {
+    let (setup, settling) = (recording.setup.clone(), recording.settling.clone());
+    let path = &whole.path;
+    let problem = |frame| move |problem| ExportError::Image { path: path.clone(), frame, problem };
+    let method: Box<dyn Reconstruct> =
+        Method::default().prepare(&MethodSettings::default()).map_err(problem(0))?;
+    let image = |sum: &Integrated, frame: usize| -> Result<Image, ExportError> {
+        let measurements = sum
+            .measurements(&setup, settling.as_ref(), whole.keep_leak)
+            .map_err(|problem| whole.integrate(problem))?;
+        let made = method.reconstruct(&measurements).map_err(problem(frame))?;
+        Ok(whole.source.flattened(made.image))
+    };
+    let mut sum = Integrated::new(&setup);
+    // The image that is being summed: its number, and the time of its newest frame.
+    let mut open: Option<(u64, u64)> = None;
+    let first = whole.device_time_us.first().map_or(0, |&time| time as u64);
+    let mut frames = 0;
+    hear_recording(recording, |heard, tally| {
+        if let Some(frame) = heard.frame() {
+            let number = frame.device_time_us.saturating_sub(first) / IMAGE_US;
+            if let Some((before, time_ns)) = open
+                && before != number
+            {
+                on(What::Image(time_ns, image(&sum, frames)?))?;
+                sum = Integrated::new(&setup);
+            }
+            sum.add(frame);
+            open = Some((number, heard.time_ns));
+            frames += 1;
+        }
+        on(What::Packet(heard, tally))
+    })?;
+    match open {
+        Some((_, time_ns)) => on(What::Image(time_ns, image(&sum, frames)?)),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,356 @@
+//! Exports a recording for other programs: arrays for NumPy, a table, a dataset in Parquet, a video,
+//! a recording with images.
+//!
+//! # Invariant
+//! An exported file holds the numbers that `reconstruct` uses: the image of the exported file is
+//! the image of the recording, to the bit
+//! (`an_exported_file_gives_the_image_of_the_recording_to_the_bit` in `host/tests/export.rs`).
+//! Frames are read one by one, so memory does not grow with the readings of a recording.
+
+mod arrays;
+mod mcap;
+mod parquet;
+#[cfg(feature = "pictures")]
+mod video;
+
+use crate::files::{FileError, npy};
+use crate::integrate::{IntegrateError, Integrated};
+use crate::recording::{Pinhole, Recording, RecordingError};
+use crate::session::CameraIdentity;
+use crate::setup::MeasurementSetup;
+use crate::source::{self, Source, SourceError, SourceOptions};
+use crate::tally::{Tally, hear_recording};
+use nirspi_recon::Measurements;
+use nirspi_recon::reconstruct::ReconstructError;
+use nirspi_recon::words::count;
+use nirspi_wire::{Depth, DeviceMessage, Frame};
+use serde::Serialize;
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+use thiserror::Error;
+
+/// The form of an exported file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Format {
+    /// NumPy: several arrays.
+    Npz,
+    /// NumPy: one array.
+    Npy,
+    /// A table for spreadsheets.
+    Csv,
+    /// The dataset form.
+    Parquet,
+    /// A recording with images, for viewers of MCAP files.
+    Mcap,
+    /// A video.
+    #[cfg(feature = "pictures")]
+    Apng,
+}
+
+impl Format {
+    /// Every format.
+    pub const ALL: &'static [Self] = &[
+        Self::Npz,
+        Self::Npy,
+        Self::Csv,
+        Self::Parquet,
+        Self::Mcap,
+        #[cfg(feature = "pictures")]
+        Self::Apng,
+    ];
+
+    /// The name on the command line, and the ending of the file's name.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Npz => "npz",
+            Self::Npy => "npy",
+            Self::Csv => "csv",
+            Self::Parquet => "parquet",
+            Self::Mcap => "mcap",
+            #[cfg(feature = "pictures")]
+            Self::Apng => "apng",
+        }
+    }
+
+    /// The name of an exported file beside the recording: the same name with another ending.
+    #[must_use]
+    pub fn beside(self, recording: &Path) -> PathBuf {
+        let name = recording.with_extension(self.name());
+        if name == recording {
+            recording.with_extension(format!("export.{}", self.name()))
+        } else {
+            name
+        }
+    }
+
+    /// What a file of this format holds, in one line.
+    #[must_use]
+    pub fn about(self) -> &'static str {
+        match self {
+            Self::Npz => "n, h_row, d (mean of all frames), frames (F, M), sequence, times",
+            Self::Npy => "the readings of each frame alone, (F, M)",
+            Self::Csv => "n, h_row and d, the mean of all frames, one pattern a line",
+            Self::Parquet => {
+                "the dataset: one frame a row, with set-up, time, serial, depth, truth"
+            }
+            Self::Mcap => "the recording with images for Foxglove and Rerun, 30 a second at most",
+            #[cfg(feature = "pictures")]
+            Self::Apng => "a video of the reconstructed frames",
+        }
+    }
+}
+
+impl FromStr for Format {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Self, String> {
+        let names: Vec<&str> = Self::ALL.iter().map(|format| format.name()).collect();
+        Self::ALL
+            .iter()
+            .copied()
+            .find(|format| format.name() == name)
+            .ok_or_else(|| format!("expected {}", names.join(", ")))
+    }
+}
+
+/// How to export, and what the recording does not say.
+#[derive(Debug, Clone, Default)]
+pub struct ExportOptions {
+    /// Whether to leave the leak between patterns uncorrected.
+    pub keep_leak: bool,
+    /// Whether to ignore the flat field that is kept for the camera.
+    pub no_flat_field: bool,
+    /// What is known of the scene; a field of Parquet files.
+    pub scene: Option<String>,
+    /// Distance to the target in metres, if known; a field of Parquet files.
+    pub distance_m: Option<f64>,
+    /// An image of the scene as it is, `.npy` of shape (n, n); a field of Parquet files.
+    pub truth: Option<PathBuf>,
+    /// The geometry of the images, from the description of the camera; a channel of MCAP files.
+    pub pinhole: Option<Pinhole>,
+}
+
+/// What was exported.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Exported {
+    /// The file.
+    pub file: PathBuf,
+    /// The form of the file.
+    pub format: Format,
+    /// Size of the file.
+    pub bytes: u64,
+    /// Frames of the recording that are in the file or in its mean.
+    pub frames: usize,
+    /// Patterns of a frame.
+    pub patterns: usize,
+    /// Images in the file.
+    pub images: usize,
+    /// Notes about the recording.
+    pub notes: Vec<String>,
+}
+
+impl fmt::Display for Exported {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { file, format, bytes, frames, patterns, images, .. } = self;
+        let frames = count(*frames as u64, "frame");
+        write!(f, "{}: {}, {frames} of {patterns} patterns", file.display(), format.name())?;
+        if *images > 0 {
+            write!(f, ", {}", count(*images as u64, "image"))?;
+        }
+        write!(f, ", {:.1} MB", *bytes as f64 / 1e6)
+    }
+}
+
+/// Why a recording cannot be exported.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum ExportError {
+    /// The recording gives no measurements.
+    #[error(transparent)]
+    Source(#[from] SourceError),
+    /// The recording cannot be read.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// The file cannot be written, or the image of the scene cannot be read.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// The recording would be replaced.
+    #[error("{}: the file to write is the recording itself, expected another name", .0.display())]
+    Itself(PathBuf),
+    /// The recording changed between two readings.
+    #[error("{}: the recording changed while it was read: export it when its capture has ended", .0.display())]
+    Changed(PathBuf),
+    /// An image cannot be made of a frame.
+    #[error("{}: frame {frame}", .path.display())]
+    Image {
+        /// The recording.
+        path: PathBuf,
+        /// The frame, from 0.
+        frame: usize,
+        /// The problem.
+        #[source]
+        problem: ReconstructError,
+    },
+}
+
+/// Exports a recording to the file `out`, which is whole or not made.
+///
+/// # Errors
+/// [`ExportError`] names the file and the problem.
+pub fn export(
+    input: &Path,
+    out: &Path,
+    format: Format,
+    options: &ExportOptions,
+) -> Result<Exported, ExportError> {
+    if let (Ok(from), Ok(to)) = (input.canonicalize(), out.canonicalize())
+        && from == to
+    {
+        return Err(ExportError::Itself(out.to_owned()));
+    }
+    let whole = Whole::read(input, options)?;
+    let mut images = 0;
+    match format {
+        Format::Npz => arrays::npz(&whole, out)?,
+        Format::Npy => arrays::npy(&whole, out)?,
+        Format::Csv => arrays::csv(&whole, out)?,
+        Format::Parquet => parquet::write(&whole, out, options)?,
+        Format::Mcap => images = mcap::write(&whole, out, options)?,
+        #[cfg(feature = "pictures")]
+        Format::Apng => images = video::apng(&whole, out)?,
+    }
+    let bytes = std::fs::metadata(out).map_or(0, |file| file.len());
+    let (frames, patterns) = (whole.sequence.len(), whole.source.measurements.rows().len());
+    let (file, notes) = (out.to_owned(), whole.source.notes);
+    Ok(Exported { file, format, bytes, frames, patterns, images, notes })
+}
+
+/// A recording that was read once: the mean of its frames, and the numbers and times of the frames.
+struct Whole {
+    path: PathBuf,
+    keep_leak: bool,
+    identity: CameraIdentity,
+    setup: MeasurementSetup,
+    /// The mean of all frames.
+    source: Source,
+    sequence: Vec<i64>,
+    device_time_us: Vec<i64>,
+    time_ns: Vec<i64>,
+}
+
+/// One frame of a recording.
+struct OneFrame<'w> {
+    /// Number of the frame in the recording.
+    index: usize,
+    run: u16,
+    sweeps: u32,
+    measurements: Measurements,
+    /// The newest depth map, in mm.
+    depth_mm: Option<&'w [u16]>,
+}
+
+impl Whole {
+    fn read(path: &Path, options: &ExportOptions) -> Result<Self, ExportError> {
+        let source_options = SourceOptions {
+            keep_leak: options.keep_leak,
+            no_flat_field: options.no_flat_field,
+            ..SourceOptions::default()
+        };
+        let mut recording = Recording::open(path)?;
+        let (mut sequence, mut device_time_us, mut time_ns) = (Vec::new(), Vec::new(), Vec::new());
+        let tally = hear_recording(&mut recording, |heard, tally| {
+            if let Some(frame) = heard.frame() {
+                sequence.push(number_of(tally));
+                device_time_us.push(frame.device_time_us as i64);
+                time_ns.push(heard.time_ns as i64);
+            }
+            Ok::<(), RecordingError>(())
+        })?;
+        if sequence.is_empty() {
+            return Err(source::no_frame(path, &tally).into());
+        }
+        let integrated = tally.integrated();
+        let source = source::of_frames(path, &source_options, &recording, integrated, &tally)?;
+        let Recording { identity, setup, .. } = recording;
+        Ok(Self {
+            path: path.to_owned(),
+            keep_leak: options.keep_leak,
+            identity,
+            setup,
+            source,
+            sequence,
+            device_time_us,
+            time_ns,
+        })
+    }
+
+    fn frames(&self) -> usize {
+        self.sequence.len()
+    }
+
+    /// Whether no real light was measured.
+    fn is_simulated(&self) -> bool {
+        self.identity.board == "virtual"
+    }
+
+    /// Reads the frames one by one.
+    fn each(
+        &self,
+        mut on: impl FnMut(&OneFrame<'_>) -> Result<(), ExportError>,
+    ) -> Result<(), ExportError> {
+        let mut recording = Recording::open(&self.path)?;
+        let (setup, settling) = (recording.setup.clone(), recording.settling.clone());
+        let mut depth: Option<Vec<u16>> = None;
+        let mut index = 0;
+        hear_recording(&mut recording, |heard, _| {
+            if let Ok(DeviceMessage::Depth(Depth { distances_mm, .. })) = heard.content {
+                depth = Some(distances_mm.iter().collect());
+            }
+            let Some(frame) = heard.frame() else { return Ok(()) };
+            if index == self.frames() || setup != self.setup {
+                return Err(ExportError::Changed(self.path.clone()));
+            }
+            let measurements = alone(frame, &setup)
+                .measurements(&setup, settling.as_ref(), self.keep_leak)
+                .map_err(|problem| self.integrate(problem))?;
+            on(&OneFrame {
+                index,
+                run: frame.run,
+                sweeps: frame.sweeps,
+                measurements,
+                depth_mm: depth.as_deref(),
+            })?;
+            index += 1;
+            Ok(())
+        })?;
+        if index == self.frames() { Ok(()) } else { Err(ExportError::Changed(self.path.clone())) }
+    }
+
+    fn integrate(&self, problem: IntegrateError) -> ExportError {
+        SourceError::Integrate { path: self.path.clone(), problem }.into()
+    }
+}
+
+/// The number of the newest frame that arrived in order.
+fn number_of(tally: &Tally) -> i64 {
+    tally.account().accounted() as i64 - 1
+}
+
+fn alone(frame: &Frame<'_>, setup: &MeasurementSetup) -> Integrated {
+    let mut alone = Integrated::new(setup);
+    alone.add(frame);
+    alone
+}
+
+/// Reads an image of side `n` from a `.npy` file.
+fn read_truth(path: &Path, n: usize) -> Result<Vec<f32>, FileError> {
+    let stack = npy::read_stack(path)?;
+    if (stack.count, stack.height, stack.width) != (1, n, n) {
+        let found = format!("has shape ({}, {}, {})", stack.count, stack.height, stack.width);
+        return Err(FileError::field(path, "array", found, format!("one image, ({n}, {n})")));
+    }
+    Ok(stack.values)
+}

@@ -1,0 +1,215 @@
+//! Damage in a recording costs what it hits, and is reported.
+
+use nirspi::account::LossCounters;
+use nirspi::causes::in_one_line;
+use nirspi::recording::{Recorder, Recording, RunAccount, Target, recover};
+use nirspi::session::CameraIdentity;
+use nirspi::setup::MeasurementSetup;
+use nirspi::tally::tally_recording;
+use nirspi_recon::Order;
+use nirspi_wire::packet::MAX_DEVICE_PACKET;
+use nirspi_wire::samples::Samples;
+use nirspi_wire::{DeviceMessage, Event, EventKind, Frame, FrameFlags, encode};
+use std::path::{Path, PathBuf};
+
+const RUN: u16 = 3;
+const FRAMES: u32 = 150;
+
+fn packet(message: &DeviceMessage<'_>) -> Vec<u8> {
+    let mut buffer = vec![0; MAX_DEVICE_PACKET + 1];
+    encode(message, &mut buffer).unwrap().to_vec()
+}
+
+/// A whole recording of 150 frames of 51 patterns.
+fn recorded(folder: &Path) -> PathBuf {
+    let path = folder.join("rec.mcap");
+    let identity = CameraIdentity {
+        protocol: 2,
+        firmware: "0.3.1".into(),
+        gateware: "1.2.0".into(),
+        board: "virtual".into(),
+        serial: "A-17".into(),
+        adc_hz: 125_000_000,
+        adc_bits: 14,
+        wavelength_nm: 1550,
+        capabilities: vec!["depth".into()],
+    };
+    let setup = MeasurementSetup::new(&Order::CakeCutting, 0.05).unwrap();
+    let target = Target::New(path.clone());
+    let mut recorder = Recorder::create(&target, &identity, &setup, None, Some(RUN)).unwrap();
+    for sequence in 0..FRAMES {
+        let mut buffer = vec![0; 4 * setup.rows.len()];
+        let values = (0..setup.rows.len() as i32).map(|k| i64::from(k * 77 - sequence as i32 * 13));
+        let frame = Frame {
+            run: RUN,
+            sequence,
+            device_time_us: u64::from(sequence) * 82,
+            sweeps: 1,
+            flags: FrameFlags::DIFFERENTIAL,
+            samples: Samples::pack(values, &mut buffer).unwrap(),
+        };
+        recorder.packet(&packet(&DeviceMessage::Frame(frame))).unwrap();
+    }
+    let kind = EventKind::RunEnded {
+        run: RUN,
+        frames_made: FRAMES,
+        frames_dropped: 0,
+        fpga_frames_lost: 0,
+        fpga_frames_corrupt: 0,
+    };
+    let event = Event { device_time_us: 12_300, kind };
+    recorder.packet(&packet(&DeviceMessage::Event(event))).unwrap();
+    let counters = LossCounters { received: FRAMES.into(), ..Default::default() };
+    let made = Some(FRAMES.into());
+    recorder.finish(&RunAccount { counters, asked: Some(FRAMES), made, missing: None }).unwrap();
+    path
+}
+
+/// The packets of a recording, and what is wrong with the file.
+fn read(path: &Path) -> (Vec<Vec<u8>>, Option<String>) {
+    let mut recording = Recording::open(path).unwrap();
+    let packets = recording.by_ref().map(|packet| packet.unwrap().bytes).collect();
+    (packets, recording.end().cut_short.clone())
+}
+
+/// Number of the found packets that are packets of the recording, in their order.
+fn in_order(found: &[Vec<u8>], of: &[Vec<u8>]) -> usize {
+    let (mut rest, mut count) = (of, 0);
+    for packet in found {
+        if let Some(at) = rest.iter().position(|other| other == packet) {
+            rest = &rest[at + 1..];
+            count += 1;
+        }
+    }
+    count
+}
+
+#[test]
+fn one_damaged_byte_costs_no_more_than_two_packets() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = recorded(folder.path());
+    let (packets, cut_short) = read(&path);
+    assert_eq!((packets.len(), cut_short), (FRAMES as usize + 1, None));
+    let whole = std::fs::read(&path).unwrap();
+    let head = [15, 4, 0, 0, 0, 0, 0, 0, 0];
+    let data_end = whole.windows(9).rposition(|bytes| bytes == head).unwrap();
+    let damaged = folder.path().join("damaged.mcap");
+    for at in (0..whole.len()).step_by(97).chain(0..400) {
+        for flip in [0x01, 0x80] {
+            let mut bytes = whole.clone();
+            bytes[at] ^= flip;
+            std::fs::write(&damaged, &bytes).unwrap();
+            let (found, told) = read(&damaged);
+            let sound = in_order(&found, &packets);
+            assert!(
+                sound + 2 >= packets.len(),
+                "{sound} packets with byte {at} ^ {flip}: {told:?}"
+            );
+            assert!(told.is_some() || at > data_end, "byte {at} ^ {flip} went unnoticed");
+        }
+    }
+}
+
+#[test]
+fn many_damaged_places_cost_what_they_hit() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = recorded(folder.path());
+    let (packets, _) = read(&path);
+    let mut bytes = std::fs::read(&path).unwrap();
+    let length = bytes.len();
+    // A block of a disk that is gone, and scattered bits.
+    bytes[length / 2..length / 2 + 512].fill(0);
+    for at in (length / 8..length / 4).step_by(997) {
+        bytes[at] ^= 0x10;
+    }
+    let scattered = (length / 8).div_ceil(997) + 1;
+    std::fs::write(&path, &bytes).unwrap();
+    let (found, told) = read(&path);
+    let sound = in_order(&found, &packets);
+    // A packet with its record is 250 bytes.
+    assert!(sound + 2 * scattered + 5 >= packets.len(), "{sound} of {}", packets.len());
+    assert!(told.as_ref().is_some_and(|told| told.contains("bytes lost at")), "{told:?}");
+
+    let whole = folder.path().join("whole.mcap");
+    let recovered = recover(&path, &Target::New(whole.clone())).unwrap();
+    assert!(recovered.bytes_lost > 0 && recovered.frames_lost.unwrap() > 0, "{recovered}");
+    let (again, told) = read(&whole);
+    assert_eq!((again, told), (found, None));
+    let mut recording = Recording::open(&whole).unwrap();
+    let counters = tally_recording(&mut recording).unwrap().account().counters();
+    let account = recording.end().account.clone().unwrap();
+    assert_eq!((account.counters, counters), (recovered.frames, recovered.frames));
+    assert_eq!(counters.total(), u64::from(FRAMES));
+    assert!(account.missing.unwrap().contains("recovered, "));
+}
+
+#[test]
+fn a_recording_cut_at_any_place_keeps_what_is_before() {
+    let folder = tempfile::tempdir().unwrap();
+    let v1 = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/recordings/v1.mcap");
+    for path in [recorded(folder.path()), v1] {
+        let (packets, _) = read(&path);
+        let whole = std::fs::read(&path).unwrap();
+        let cut = folder.path().join("cut.mcap");
+        let mut most = 0;
+        for at in (0..whole.len()).step_by(997).chain(whole.len() - 60..whole.len()) {
+            std::fs::write(&cut, &whole[..at]).unwrap();
+            match Recording::open(&cut) {
+                Ok(_) => {
+                    let (found, told) = read(&cut);
+                    assert!(told.is_some(), "cut at {at} went unnoticed");
+                    assert_eq!(found, packets[..found.len()], "cut at {at}");
+                    assert!(found.len() >= most);
+                    most = found.len();
+                }
+                Err(error) => assert_eq!(in_one_line(&error).lines().count(), 1, "{error}"),
+            }
+        }
+        assert_eq!(most, packets.len());
+    }
+}
+
+#[test]
+fn what_stands_before_the_packets_stands_at_the_end_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = recorded(folder.path());
+    let mut bytes = std::fs::read(&path).unwrap();
+    let setup = Recording::open(&path).unwrap().setup;
+    let rows = bytes.windows(8).position(|part| part == b"\"rows\":[").unwrap();
+    // Another row, which the setup's own checks do not notice.
+    let digit = rows + 8 + bytes[rows + 8..].iter().position(|byte| *byte == b'3').unwrap();
+    bytes[digit] = b'5';
+    std::fs::write(&path, &bytes).unwrap();
+    let opened = Recording::open(&path).unwrap();
+    assert_eq!(opened.setup, setup);
+    // Without its end, the recording says that the setup is damaged.
+    std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+    let error = Recording::open(&path).err().unwrap().to_string();
+    assert!(
+        error.contains("the recording's setup does not read: its checksum is wrong"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_file_of_another_program_is_refused_in_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("other.mcap");
+    for use_chunks in [false, true] {
+        let file = std::io::BufWriter::new(std::fs::File::create(&path).unwrap());
+        let options = mcap::WriteOptions::new().profile("ros2").use_chunks(use_chunks);
+        let mut writer = options.create(file).unwrap();
+        let channel = writer.add_channel(0, "/image", "cdr", &Default::default()).unwrap();
+        let header = mcap::records::MessageHeader {
+            channel_id: channel,
+            sequence: 0,
+            log_time: 1,
+            publish_time: 1,
+        };
+        writer.write_to_known_channel(&header, b"abc\0").unwrap();
+        writer.finish().unwrap();
+        let error = Recording::open(&path).err().unwrap().to_string();
+        assert!(error.contains("other.mcap: an MCAP file of profile \"ros2\""), "{error}");
+        assert_eq!(error.lines().count(), 1);
+    }
+}

@@ -1,0 +1,87 @@
+//! What an exported file holds is what `reconstruct` takes of the recording.
+
+use nirspi::export::{ExportOptions, Format, export};
+use nirspi::files::measurement::Selection;
+use nirspi::recording::Recording;
+use nirspi::source::{Source, SourceOptions};
+use nirspi_recon::reconstruct::{Method, MethodSettings};
+use nirspi_recon::{Order, Side};
+use std::path::{Path, PathBuf};
+
+fn recording() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/recordings/v1.mcap")
+}
+
+fn image_bits(source: &Source) -> Vec<u32> {
+    let method = Method::default().prepare(&MethodSettings::default()).unwrap();
+    let image = method.reconstruct(&source.measurements).unwrap().image;
+    image.pixels().iter().map(|pixel| pixel.to_bits()).collect()
+}
+
+fn exported(format: Format, options: &ExportOptions) -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join(format!("rec.{}", format.name()));
+    let exported = export(&recording(), &out, format, options).unwrap();
+    assert_eq!((exported.frames, exported.patterns), (12, 256));
+    assert_eq!(exported.bytes, std::fs::metadata(&out).unwrap().len());
+    (folder, out)
+}
+
+#[test]
+fn an_exported_file_gives_the_image_of_the_recording_to_the_bit() {
+    for keep_leak in [false, true] {
+        let plain = SourceOptions { keep_leak, ..SourceOptions::default() };
+        let options = ExportOptions { keep_leak, ..ExportOptions::default() };
+        let whole = Source::read(&recording(), &plain).unwrap();
+        let frames = Source::read_all(&recording(), &plain).unwrap();
+        for format in [Format::Npz, Format::Csv] {
+            let (_folder, out) = exported(format, &options);
+            let read = Source::read(&out, &SourceOptions::default()).unwrap();
+            assert_eq!(read.measurements, whole.measurements, "{format:?}");
+            assert_eq!(image_bits(&read), image_bits(&whole), "{format:?}");
+        }
+        let (_folder, npz) = exported(Format::Npz, &options);
+        let (_other, npy) = exported(Format::Npy, &options);
+        let of_npz = Selection {
+            field: Some("frames".to_owned()),
+            form: Some("differences".parse().unwrap()),
+            ..Selection::default()
+        };
+        let of_npy = Selection {
+            shown: Some(Order::CakeCutting),
+            side: Some(Side::INSTRUMENT),
+            form: of_npz.form,
+            ..Selection::default()
+        };
+        for (path, file) in [(npz, of_npz), (npy, of_npy)] {
+            let options = SourceOptions { file, ..SourceOptions::default() };
+            let read = Source::read_all(&path, &options).unwrap();
+            assert_eq!(read.len(), 12);
+            for (read, frame) in read.iter().zip(&frames) {
+                assert_eq!(read.measurements, frame.measurements, "{}", path.display());
+                assert_eq!(image_bits(read), image_bits(frame));
+            }
+        }
+    }
+}
+
+#[test]
+fn nothing_is_left_of_an_export_that_fails() {
+    let folder = tempfile::tempdir().unwrap();
+    let cut = folder.path().join("cut.mcap");
+    let bytes = std::fs::read(recording()).unwrap();
+    std::fs::write(&cut, &bytes[..200]).unwrap();
+    for (input, out, told) in [
+        (cut.clone(), "rec.npz", "no identity in the recording"),
+        (recording(), "none/rec.npz", "none: cannot write to it: no such file or folder"),
+        (cut.clone(), "cut.mcap", "the file to write is the recording itself"),
+    ] {
+        let out = folder.path().join(out);
+        let error = export(&input, &out, Format::Npz, &ExportOptions::default()).unwrap_err();
+        let line = nirspi::causes::in_one_line(&error);
+        assert!(line.contains(told), "{line}");
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    assert_eq!(Format::Npz.beside(Path::new("a/rec.mcap")), Path::new("a/rec.npz"));
+    assert!(Recording::open(&recording()).is_ok());
+}

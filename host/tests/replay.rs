@@ -1,0 +1,197 @@
+//! A recording that is played back is the camera that was recorded.
+
+use nirspi::capture::{Calibration, Capture, CaptureOptions, Ended, capture};
+use nirspi::link::CameraAddress;
+use nirspi::recording::{Recorder, Recording, RunAccount, Target};
+use nirspi::session::{CameraIdentity, Session};
+use nirspi::setup::MeasurementSetup;
+use nirspi::tally::tally_recording;
+use nirspi_recon::Order;
+use nirspi_wire::packet::MAX_DEVICE_PACKET;
+use nirspi_wire::samples::{Samples, Words};
+use nirspi_wire::{Depth, DeviceMessage, Event, EventKind, Frame, FrameFlags, encode, open};
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+const RUN: u16 = 7;
+const FRAMES: u32 = 20;
+/// Time of the camera between two frames.
+const FRAME_US: u64 = 10_000;
+
+fn packet(message: &DeviceMessage<'_>) -> Vec<u8> {
+    let mut buffer = vec![0; MAX_DEVICE_PACKET + 1];
+    encode(message, &mut buffer).unwrap().to_vec()
+}
+
+fn frame(sequence: u32, patterns: usize) -> Vec<u8> {
+    let mut buffer = vec![0; 4 * patterns];
+    let values = (0..patterns as i32).map(|k| i64::from(sequence) * 1000 - 7 * i64::from(k));
+    packet(&DeviceMessage::Frame(Frame {
+        run: RUN,
+        sequence,
+        device_time_us: 5_000_000 + u64::from(sequence) * FRAME_US,
+        sweeps: 1,
+        flags: FrameFlags::DIFFERENTIAL,
+        samples: Samples::pack(values, &mut buffer).unwrap(),
+    }))
+}
+
+/// A recording of 20 frames with a depth map, a frame that came damaged, a packet that was too
+/// long, and a frame of an earlier run.
+fn recorded(folder: &Path, is_whole: bool) -> PathBuf {
+    let path = folder.join("rec.mcap");
+    let identity = CameraIdentity {
+        protocol: 2,
+        firmware: "0.3.1".into(),
+        gateware: "1.2.0".into(),
+        board: "nucleo-u5a5zj-q".into(),
+        serial: "A-17".into(),
+        adc_hz: 125_000_000,
+        adc_bits: 14,
+        wavelength_nm: 1550,
+        capabilities: vec!["depth".into(), "boot loader".into()],
+    };
+    let mut setup = MeasurementSetup::new(&Order::CakeCutting, 0.25).unwrap();
+    setup.adc_latency = 6;
+    let patterns = setup.rows.len();
+    let target = Target::New(path.clone());
+    let mut recorder = Recorder::create(&target, &identity, &setup, None, Some(RUN)).unwrap();
+    for sequence in 0..FRAMES {
+        let mut bytes = frame(sequence, patterns);
+        match sequence {
+            3 => bytes[100] ^= 0x55,
+            5 => {
+                let mut buffer = [0; 128];
+                let zones = Words::pack((0..64u16).map(|zone| 300 + zone), &mut buffer).unwrap();
+                let depth = Depth { device_time_us: 5_051_000, side: 8, distances_mm: zones };
+                recorder.packet(&packet(&DeviceMessage::Depth(depth))).unwrap();
+            }
+            8 => recorder.packet(&[0]).unwrap(),
+            _ => {}
+        }
+        recorder.packet(&bytes).unwrap();
+    }
+    if is_whole {
+        let kind = EventKind::RunEnded {
+            run: RUN,
+            frames_made: FRAMES,
+            frames_dropped: 0,
+            fpga_frames_lost: 0,
+            fpga_frames_corrupt: 0,
+        };
+        let event = Event { device_time_us: 5_200_000, kind };
+        recorder.packet(&packet(&DeviceMessage::Event(event))).unwrap();
+    }
+    recorder.finish(&RunAccount::default()).unwrap();
+    path
+}
+
+fn replay(path: &Path, speed: &str, frames: Option<u32>, record: Option<&Path>) -> Capture {
+    let address: CameraAddress = format!("replay:{}{speed}", path.display()).parse().unwrap();
+    let link = || Err("no virtual camera here");
+    let mut session: Session = address.open(link).unwrap();
+    let options = CaptureOptions {
+        // A replay has the setup and the settling of its recording, not these.
+        setup: MeasurementSetup::new(&Order::Natural, 1.0).unwrap(),
+        frames,
+        calibration: Calibration::Measure,
+        record: record.map(|path| Target::New(path.to_owned())),
+    };
+    capture(&mut session, &options, &mut |_| ControlFlow::Continue(())).unwrap()
+}
+
+/// The packets of a recording that are not replies.
+fn packets(path: &Path) -> Vec<Vec<u8>> {
+    let all = Recording::open(path).unwrap().map(|packet| packet.unwrap().bytes);
+    let is_reply = |bytes: &Vec<u8>| {
+        let mut scratch = bytes[..bytes.len() - 1].to_vec();
+        matches!(open(&mut scratch), Ok(DeviceMessage::Reply(_)))
+    };
+    all.filter(|bytes| !is_reply(bytes)).collect()
+}
+
+#[test]
+fn a_capture_of_a_replay_has_the_packets_of_the_recording() {
+    let folder = tempfile::tempdir().unwrap();
+    let v1 = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/recordings/v1.mcap");
+    let made = recorded(folder.path(), true);
+    for (name, path, frames) in [("a", made, FRAMES), ("b", v1, 12)] {
+        for (at, asked) in [None, Some(frames)].into_iter().enumerate() {
+            let copy = folder.path().join(format!("{name}{at}.mcap"));
+            let captured = replay(&path, ",max", asked, Some(&copy));
+            assert!(matches!(captured.ended, Ended::Complete), "{:?}", captured.ended);
+            assert!(packets(&copy) == packets(&path), "{name}: other packets");
+            let (mut copy, mut first) =
+                (Recording::open(&copy).unwrap(), Recording::open(&path).unwrap());
+            assert_eq!(
+                (&copy.identity, &copy.setup, &copy.settling),
+                (&first.identity, &first.setup, &first.settling)
+            );
+            let [copy, first] = [&mut copy, &mut first].map(|rec| tally_recording(rec).unwrap());
+            assert_eq!(copy.account().counters(), first.account().counters());
+            assert_eq!(copy.account().damaged_packets(), first.account().damaged_packets());
+            assert_eq!(captured.setup.rows.len(), 256);
+        }
+    }
+}
+
+#[test]
+fn a_replay_takes_the_time_that_the_camera_took_or_a_share_of_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = recorded(folder.path(), true);
+    let took = |speed| {
+        let began = Instant::now();
+        let captured = replay(&path, speed, None, None);
+        assert!(matches!(captured.ended, Ended::Complete), "{:?}", captured.ended);
+        began.elapsed()
+    };
+    // From the first frame to the end of the run.
+    let camera = Duration::from_micros(u64::from(FRAMES) * FRAME_US);
+    assert!(took("") >= camera);
+    assert!(took(",0.5") >= 2 * camera);
+    assert!(took(",max") < camera, "a replay at full speed waits for nothing");
+}
+
+#[test]
+fn a_shorter_run_ends_where_it_should_and_a_longer_one_says_what_was_recorded() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = recorded(folder.path(), true);
+    let short = replay(&path, ",max", Some(2), None);
+    assert!(matches!(short.ended, Ended::Complete), "{:?}", short.ended);
+    assert_eq!((short.counters.received, short.made), (2, Some(2)));
+    let long = replay(&path, ",max", Some(99), None);
+    let missing = long.missing().unwrap();
+    assert!(missing.contains("made 20 frames, 99 were asked for"), "{missing}");
+}
+
+#[test]
+fn a_recording_without_its_end_is_a_camera_that_goes_away() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = recorded(folder.path(), false);
+    let captured = replay(&path, ",max", None, None);
+    assert!(matches!(captured.ended, Ended::LinkLost(_)), "{:?}", captured.ended);
+    assert_eq!(captured.counters.received, 19);
+}
+
+#[test]
+fn a_replay_that_is_stopped_loses_no_frame() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = recorded(folder.path(), true);
+    let address: CameraAddress = format!("replay:{}", path.display()).parse().unwrap();
+    let mut session = address.open(|| Err("no virtual camera here")).unwrap();
+    let options = CaptureOptions {
+        setup: MeasurementSetup::new(&Order::Natural, 1.0).unwrap(),
+        frames: None,
+        calibration: Calibration::None,
+        record: None,
+    };
+    let captured =
+        capture(&mut session, &options, &mut |progress| match progress.counters.received {
+            0..2 => ControlFlow::Continue(()),
+            _ => ControlFlow::Break(()),
+        })
+        .unwrap();
+    assert!(matches!(captured.ended, Ended::Stopped), "{:?}", captured.ended);
+    assert_eq!(captured.counters.lost, 0, "{}", captured.counters);
+}
