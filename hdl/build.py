@@ -2,7 +2,7 @@
 """Builds the bitstream of one board, from a clean tree, and says how fast it is.
 
     python3 hdl/build.py                             # ecp5-evn, 5 seeds, into target/gateware/ecp5-evn
-    python3 hdl/build.py --board ecp5-evn-bring-up   # the same board without an ADC, for a bring-up
+    python3 hdl/build.py --board ecp5-evn/bring-up   # the same board without an ADC, for a bring-up
     python3 hdl/build.py --seeds 1                   # quicker
 
 Synthesises `hdl/sv` with the board's top (yosys), places and routes it once a seed (nextpnr), packs the seed
@@ -63,7 +63,7 @@ ECP5_EVN = Board(
 )
 BOARDS = {
     "ecp5-evn": ECP5_EVN,
-    "ecp5-evn-bring-up": replace(
+    "ecp5-evn/bring-up": replace(
         ECP5_EVN,
         name=f"{ECP5_EVN.name}, bring-up without ADC",
         shares=tuple(f"ecp5-evn/{file}" for file in ("board.lpf", "clock_guard.sv", "reset_synchroniser.sv", "resets.sv", "shell.sv")),

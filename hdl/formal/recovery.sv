@@ -98,14 +98,21 @@ module recovery (
     assign ring = {
         dut.asked, dut.there.first, dut.asked_here, dut.asked_last, dut.told, dut.here.first, dut.seen, dut.seen_last
     };
+    logic [4:0] write_on_its_way;
+    logic [4:0] read_on_its_way;
+    for (genvar i = 0; i < 5; i++) begin : g_on_the_way
+        assign write_on_its_way[i] = bytes.g_pointers[i].to_read.first;
+        assign read_on_its_way[i]  = bytes.g_pointers[i].to_write.first;
+    end
     logic host_stands_at_0;
     logic adc_stands_at_0;
-    assign host_stands_at_0 = {dut.asked, dut.here.first, dut.seen, dut.seen_last, bytes.taken, bytes.taken_gray} == '0;
+    assign host_stands_at_0 = {dut.asked, dut.here.first, dut.seen, dut.seen_last, bytes.taken, bytes.taken_gray,
+        write_on_its_way, bytes.written_there} == '0;
     assign adc_stands_at_0  = {dut.there.first, dut.asked_here, dut.asked_last, dut.told, engine.busy, answered,
-        bytes.written, bytes.written_gray} == '0;
+        bytes.written, bytes.written_gray, read_on_its_way, bytes.taken_there} == '0;
 
     function automatic logic shifted(input logic [7:0] late);
-        return (late & 8'(~late << 1)) == '0;
+        return (~late & 8'(late << 1)) == '0;
     endfunction
 
     always_comb begin
@@ -123,6 +130,7 @@ module recovery (
         invariant_opened:     assert (rst_adc || accepted || host_stands_at_0 && adc_stands_at_0);
         invariant_one_edge:   assert (rst_adc || $countones(ring[7:1] ^ ring[6:0]) <= 1);
         invariant_waits:      assert (rst_adc || !(engine.busy || answered) || dut.asked_last != dut.told);
+        invariant_done:       assert (rst_adc || !(engine.busy && answered));
 `endif
     end
 endmodule

@@ -19,6 +19,9 @@ module tick_reset (CLK, ALOAD, AD, D, Q);
     input CLK, ALOAD;
     input [WIDTH-1:0] AD, D;
     output [WIDTH-1:0] Q;
+    parameter [WIDTH-1:0] _TECHMAP_WIREINIT_Q_ = {WIDTH{1'bx}};
+    wire [WIDTH-1:0] _TECHMAP_REMOVEINIT_Q_ = {WIDTH{1'b1}};
+    (* init = _TECHMAP_WIREINIT_Q_ *)
     wire [WIDTH-1:0] held;
     assign Q = ALOAD ? AD : held;
     \$ff #(.WIDTH(WIDTH)) state (.D(ALOAD ? AD : CLK ? D : held), .Q(held));

@@ -12,9 +12,10 @@ pub use error::SessionError;
 pub use request::Request;
 
 use crate::events;
+use crate::fpga::design_in_words;
 use crate::link::Link;
 use conversation::Conversation;
-use nirspi_wire::register::Register;
+use nirspi_wire::register::{Design, Register};
 use nirspi_wire::{
     Capabilities, Command, DeviceMessage, GatewareChunk, Identity, PacketError, SelfTestReport,
     Status, version,
@@ -65,6 +66,9 @@ impl From<&Identity<'_>> for CameraIdentity {
         }
     }
 }
+
+/// The name of [`Capabilities::BRING_UP`].
+const BRING_UP: &str = "bring-up";
 
 /// The name of each capability; the number of the bit for a capability that this program does not
 /// know.
@@ -159,6 +163,11 @@ impl Session {
         };
         match identity {
             Ok(identity) if version::speaks(identity.protocol) => {
+                // Every command shows it: such a picture is not of the scene.
+                if identity.capabilities.iter().any(|name| name == BRING_UP) {
+                    let what = design_in_words(Design::BringUp);
+                    reports.keep(Some(format!("the camera runs the gateware for {what}")));
+                }
                 Ok(Self { conversation, identity, reports: reports.0 })
             }
             Ok(identity) => Err(SessionError::Version { camera: identity.protocol }),

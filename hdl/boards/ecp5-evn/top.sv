@@ -26,8 +26,9 @@ module top (
 );
     // Clocks: the ADC's, cleaned of its insertion delay by a PLL; the FPGA's own oscillator, which needs
     // nothing from outside, for the host port and for the watch over the other.
-    logic clk_adc;
-    logic clk_host;
+    // `build.py` and `board.lpf` know them by these names.
+    (* keep *) logic clk_adc;
+    (* keep *) logic clk_host;
     logic locked;
     logic restart;
     logic healthy;

@@ -99,6 +99,12 @@ impl Gateware {
         self.adc_hz = hz;
     }
 
+    /// Whether the ADC's clock ticks.
+    #[must_use]
+    pub fn has_adc_clock(&self) -> bool {
+        self.adc_hz.is_some()
+    }
+
     fn clocks(&self) -> u32 {
         let Some(hz) = self.adc_hz else { return 0 };
         let frequency = (hz / clocks::UNIT_HZ).min(clocks::FREQUENCY);

@@ -128,6 +128,13 @@ pub const IDENTITY: u32 = 0x4E53_5049;
 /// What a read gives while the ADC's domain has no clock or is in reset. No register holds this value by
 /// itself but [`Register::Scratch`] and settings into which it was written.
 pub const NO_CLOCK: u32 = 0xDEAD_C10C;
+/// Whether gateware with this [`Register::Version`] has the registers of this table: the same major and minor
+/// version. Gateware and firmware of one release fit.
+#[must_use]
+pub const fn has_this_map(version: u32) -> bool {
+    version >> 8 == Register::Version.reset() >> 8
+}
+
 /// Address of the order table's first entry; entry `i` is at `ORDER_TABLE + i`, read and write, 10
 /// bits.
 pub const ORDER_TABLE: u16 = 0x0400;
@@ -198,6 +205,16 @@ pub mod clocks {
     pub const PRESCALER: u32 = 4;
     /// Largest error of the FPGA's own oscillator.
     pub const TOLERANCE_PERCENT: u32 = 15;
+
+    /// Whether the ADC's domain answers, and its clock is that of [`ADC_HZ`](crate::ADC_HZ) as far as the
+    /// FPGA's oscillator can tell.
+    #[must_use]
+    pub const fn fit(word: u32) -> bool {
+        const EXPECTED: u32 = crate::ADC_HZ / UNIT_HZ;
+        const OFF: u32 = EXPECTED * TOLERANCE_PERCENT / 100;
+        let ready = LOCKED | ALIVE | READY;
+        word & ready == ready && (word & FREQUENCY).abs_diff(EXPECTED) <= OFF
+    }
 }
 
 /// What gateware is built for: the value of [`Register::Design`].
@@ -223,6 +240,8 @@ impl Design {
     }
 }
 
+/// Clock of [`Design::BringUp`]: the board's 12 MHz through a PLL.
+pub const BRING_UP_HZ: u32 = 124_800_000;
 /// Counts of one LED of the scene that [`loopback`] sees.
 pub const LOOPBACK_COUNTS: u16 = 384;
 /// Counts of [`loopback`] without light.

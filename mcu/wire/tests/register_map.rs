@@ -101,6 +101,8 @@ fn bits_codes_and_limits_are_these() {
         "16 temperature sensor",
         "32 interlock",
         "64 frame memory",
+        "128 gateware",
+        "256 ADC clock",
     ];
     assert_eq!(checks, expected);
     assert_eq!(register::ORDER_TABLE, 0x0400);
@@ -113,6 +115,13 @@ fn bits_codes_and_limits_are_these() {
     let clocks = [clocks::FREQUENCY, clocks::LOCKED, clocks::ALIVE, clocks::READY];
     assert_eq!(clocks, [0xFFFF, 1 << 16, 1 << 17, 1 << 18]);
     assert_eq!([clocks::UNIT_HZ, clocks::WINDOW, clocks::PRESCALER], [10_000, 41_333, 4]);
+    let good = clocks::LOCKED | clocks::ALIVE | clocks::READY;
+    let fit = |units: u32| clocks::fit(good | units);
+    assert_eq!([10_624, 10_625, 12_500, 14_375, 14_376].map(fit), [false, true, true, true, false]);
+    assert!(!clocks::fit(12_500 | good & !clocks::READY) && !clocks::fit(0));
+    let fits = [0x0000_0100, 0x0000_0200, 0x0000_0203, 0x0000_0300, 0x0001_0200]
+        .map(register::has_this_map);
+    assert_eq!(fits, [false, true, true, false, false]);
     let designs: Vec<_> = (0..=3).map(Design::from_register).collect();
     assert_eq!(designs, [None, Some(Design::Camera), Some(Design::BringUp), None]);
 }

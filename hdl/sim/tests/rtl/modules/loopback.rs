@@ -5,9 +5,9 @@ use crate::project::Project;
 use crate::scenario::Dice;
 use nirspi_wire::register::loopback;
 
-laws![a_sample_is_the_light_of_the_diagonal_three_clocks_before];
+laws![a_sample_is_the_light_of_the_diagonal_four_clocks_before];
 
-fn a_sample_is_the_light_of_the_diagonal_three_clocks_before(project: &Project) {
+fn a_sample_is_the_light_of_the_diagonal_four_clocks_before(project: &Project) {
     let mut bench = Bench::new(project, "loopback");
     let dice = &mut Dice::new(81);
     let mut inside = std::collections::VecDeque::new();
@@ -19,7 +19,7 @@ fn a_sample_is_the_light_of_the_diagonal_three_clocks_before(project: &Project) 
         bench.set("rows", rows);
         bench.set("columns", columns);
         bench.set("enable", enable);
-        if inside.len() == 3 {
+        if inside.len() == 4 {
             let expected: u16 = inside.pop_front().unwrap();
             assert_eq!(bench.get("code"), u64::from(expected), "clock {clock}");
         }

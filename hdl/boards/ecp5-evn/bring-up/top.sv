@@ -22,8 +22,9 @@ module top (
     output logic        shows_light_n,
     output logic        shows_frame_n
 );
-    logic clk_adc;
-    logic clk_host;
+    // `build.py` and `board.lpf` know them by these names.
+    (* keep *) logic clk_adc;
+    (* keep *) logic clk_host;
     logic locked;
     logic restart;
     logic healthy;
