@@ -61,7 +61,7 @@ package nirspi_register_map;
     localparam logic [32-1:0] CLOCKS_READY            = 32'h00040000;
     localparam logic [32-1:0] DESIGN_CAMERA           = 32'h00000001;
     localparam logic [32-1:0] DESIGN_BRING_UP         = 32'h00000002;
-    localparam logic [32-1:0] LOOPBACK_COUNTS         = 32'h00000180;
+    localparam logic [32-1:0] LOOPBACK_COUNTS         = 32'h00000100;
     localparam logic [32-1:0] LOOPBACK_DARK           = 32'h00000200;
     localparam logic [32-1:0] CONTROL_STOP            = 32'h00000001;
     localparam logic [32-1:0] CONTROL_CLEAR_FAULT     = 32'h00000002;

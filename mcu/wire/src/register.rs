@@ -243,7 +243,7 @@ impl Design {
 /// Clock of [`Design::BringUp`]: the board's 12 MHz through a PLL.
 pub const BRING_UP_HZ: u32 = 124_800_000;
 /// Counts of one LED of the scene that [`loopback`] sees.
-pub const LOOPBACK_COUNTS: u16 = 384;
+pub const LOOPBACK_COUNTS: u16 = 256;
 /// Counts of [`loopback`] without light.
 pub const LOOPBACK_DARK: u16 = 512;
 

@@ -137,8 +137,8 @@ fn the_test_generator_begins_like_this() {
 
 #[test]
 fn the_bring_up_design_sees_the_lit_leds_of_the_diagonal() {
-    assert_eq!(register::loopback(0, 0, true), 512 + 32 * 384);
-    assert_eq!(register::loopback(0x8000_0001, 0x8000_0000, true), 512 + 31 * 384);
+    assert_eq!(register::loopback(0, 0, true), 512 + 32 * 256);
+    assert_eq!(register::loopback(0x8000_0001, 0x8000_0000, true), 512 + 31 * 256);
     assert_eq!(register::loopback(0, u32::MAX, true), 512);
     assert_eq!(register::loopback(0, 0, false), 512);
 }
