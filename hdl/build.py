@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 """Builds the bitstream of one board, from a clean tree, and says how fast it is.
 
-    python3 hdl/build.py                 # ecp5-evn, 5 seeds, into target/gateware/ecp5-evn
-    python3 hdl/build.py --seeds 1       # quicker
+    python3 hdl/build.py                             # ecp5-evn, 5 seeds, into target/gateware/ecp5-evn
+    python3 hdl/build.py --board ecp5-evn/bring-up   # the same board without an ADC, for a bring-up
+    python3 hdl/build.py --seeds 1                   # quicker
 
 Synthesises `hdl/sv` with the board's top (yosys), places and routes it once a seed (nextpnr), packs the seed
 with the best margin (ecppack). Exits 1 when a seed misses a clock's frequency and margin.
@@ -15,7 +16,7 @@ import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from tools import HDL, ROOT, TARGET, tool
@@ -44,18 +45,29 @@ class Board:
     part: str
     nextpnr: tuple[str, ...]
     clocks: tuple[Clock, ...]
+    # Files under `boards/` of another design that are part of this one.
+    shares: tuple[str, ...] = ()
+    # Ports of the other design's pins that this one does not have.
+    lacks: str = ""
 
 
+ECP5_EVN = Board(
+    name="Lattice ECP5 Evaluation Board LFE5UM5G-85F-EVN",
+    part="LFE5UM5G-85F-8BG381",
+    nextpnr=("--um5g-85k", "--package", "CABGA381", "--speed", "8"),
+    clocks=(
+        Clock("clk_adc", 125.0, margin=0.08),
+        # The FPGA's own oscillator: 310 MHz / 3, of which 15 % more is allowed for.
+        Clock("clk_host", 310.0 / 3, margin=0.15),
+    ),
+)
 BOARDS = {
-    "ecp5-evn": Board(
-        name="Lattice ECP5 Evaluation Board LFE5UM5G-85F-EVN",
-        part="LFE5UM5G-85F-8BG381",
-        nextpnr=("--um5g-85k", "--package", "CABGA381", "--speed", "8"),
-        clocks=(
-            Clock("clk_adc", 125.0, margin=0.08),
-            # The FPGA's own oscillator: 310 MHz / 3, of which 15 % more is allowed for.
-            Clock("clk_host", 310.0 / 3, margin=0.15),
-        ),
+    "ecp5-evn": ECP5_EVN,
+    "ecp5-evn/bring-up": replace(
+        ECP5_EVN,
+        name=f"{ECP5_EVN.name}, bring-up without ADC",
+        shares=tuple(f"ecp5-evn/{file}" for file in ("board.lpf", "clock_guard.sv", "reset_synchroniser.sv", "resets.sv", "shell.sv")),
+        lacks="adc_",
     ),
 }
 RESOURCES = ("TRELLIS_COMB", "TRELLIS_FF", "TRELLIS_RAMW", "DP16KD", "IOLOGIC", "SIOLOGIC", "TRELLIS_IO", "EHXPLLL", "OSCG")
@@ -73,12 +85,27 @@ def run(log: Path, *command: object) -> None:
         sys.exit("\n".join(log.read_text().splitlines()[-30:]) + f"\n{command[0]} failed: {log}")
 
 
-def synthesise(board: Path, out: Path) -> Path:
+def files(board: Board, folder: Path, extension: str) -> list[Path]:
+    """The board's files with this extension, those of another design included."""
+    shared = [HDL / "boards" / file for file in board.shares]
+    return [file for file in (*sorted(folder.glob("*")), *shared) if file.suffix == extension]
+
+
+def pins(board: Board, folder: Path, out: Path) -> Path:
+    """One file of pins, without those of ports that the design does not have."""
+    lines = "\n".join(file.read_text() for file in files(board, folder, ".lpf")).splitlines()
+    whole = out / "pins.lpf"
+    whole.write_text("\n".join(line for line in lines if not board.lacks or f'"{board.lacks}' not in line) + "\n")
+    return whole
+
+
+def synthesise(board: Board, folder: Path, out: Path) -> Path:
     netlist = out / "top.json"
     sources = " ".join(str(p.relative_to(ROOT)) for p in sorted((HDL / "sv").glob("*.sv")))
-    top = " ".join(str(p.relative_to(ROOT)) for p in sorted(board.glob("*.sv")))
+    top = " ".join(str(p.relative_to(ROOT)) for p in files(board, folder, ".sv"))
+    roots = " ".join(f"--top {name}" for name in ("nirspi_core", "nirspi_loopback"))
     script = (
-        f"read_slang --threads 1 --top nirspi_core {sources}; "
+        f"read_slang --threads 1 {roots} {sources}; "
         f"read_verilog -sv {top}; "
         f"synth_ecp5 -top top -json {netlist.relative_to(ROOT)}"
     )
@@ -119,10 +146,11 @@ def main() -> None:
     out = TARGET / asked.board
     out.mkdir(parents=True, exist_ok=True)
     began = time.monotonic()
-    netlist = synthesise(folder, out)
+    netlist = synthesise(board, folder, out)
+    lpf = pins(board, folder, out)
     seeds = range(1, asked.seeds + 1)
     with ThreadPoolExecutor(asked.jobs) as pool:
-        reports = list(pool.map(lambda seed: place_and_route(board, folder / "board.lpf", netlist, seed), seeds))
+        reports = list(pool.map(lambda seed: place_and_route(board, lpf, netlist, seed), seeds))
 
     print(f"{board.name}, {board.part}\n")
     print("| seed | " + " | ".join(f"{c.net} (needs {c.needed_mhz:.1f} MHz)" for c in board.clocks) + " | margin |")

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Proves the safety rules, the FIFO, the crossing and the clock guard, and that the proofs notice faults.
+"""Proves the safety rules, the FIFO, the crossing, its resets, the clock guard and the LED enable at the pin, and that the proofs notice faults.
 
     python3 hdl/formal/prove.py
 
@@ -79,7 +79,16 @@ SAFETY = Proof("safety", ENGINE, depth=50)
 FIFO = Proof("byte_fifo", TWO_CLOCKS, depth=45)
 CROSSING = Proof("crossing", TWO_CLOCKS, depth=30)
 GUARD = Proof("clock_guard_proof", ANY_STATE, depth=40, sources=("boards/ecp5-evn/clock_guard.sv",))
-PROOFS = (SAFETY, FIFO, CROSSING, GUARD)
+RECOVERY = Proof(
+    "recovery", TWO_CLOCKS, depth=60, sources=("sv/*.sv", "boards/ecp5-evn/resets.sv", "boards/ecp5-evn/reset_synchroniser.sv")
+)
+SHELL = Proof(
+    "shell_proof",
+    "setundef -undriven -anyseq" + ANY_STATE,
+    depth=40,
+    sources=tuple(f"boards/ecp5-evn/{name}.sv" for name in ("shell", "clock_guard", "resets", "reset_synchroniser")),
+)
+PROOFS = (SAFETY, FIFO, CROSSING, RECOVERY, GUARD, SHELL)
 
 
 @dataclass(frozen=True)
@@ -155,6 +164,30 @@ FAULTS = (
         "the host does not wait for the answer",
         "stands_still",
         (("crossing", "asked == seen_last", "1'b1"),),
+    ),
+    Fault(
+        RECOVERY,
+        "the ADC's domain does not wait until the host port's half is reset",
+        "nothing_old",
+        (("resets", ".holds(!healthy || first)", ".holds(!healthy)"),),
+    ),
+    Fault(
+        RECOVERY,
+        "the host port's half does not wait until the ADC's domain is out of reset",
+        "nothing_early",
+        (("resets", ".holds(rst_adc)", ".holds(!healthy)"),),
+    ),
+    Fault(
+        SHELL,
+        "the enable goes past the gate",
+        "dark_when_stopped",
+        (("shell", "assign led_enable = enable_at_pin && healthy;", "assign led_enable = enable_at_pin;"),),
+    ),
+    Fault(
+        SHELL,
+        "the button does not reach the gate",
+        "dark_at_once",
+        (("shell", "alive && locked && reset_n", "alive && locked"),),
     ),
     Fault(
         GUARD,

@@ -9,3 +9,20 @@ module tick (CLK, D, Q);
     output [WIDTH-1:0] Q;
     \$ff #(.WIDTH(WIDTH)) _TECHMAP_REPLACE_ (.D(CLK ? D : Q), .Q(Q));
 endmodule
+
+// An asynchronous reset holds at once, and for the step in which it is high, tick or none.
+(* techmap_celltype = "$aldff" *)
+module tick_reset (CLK, ALOAD, AD, D, Q);
+    parameter WIDTH = 1;
+    parameter CLK_POLARITY = 1;
+    parameter ALOAD_POLARITY = 1;
+    input CLK, ALOAD;
+    input [WIDTH-1:0] AD, D;
+    output [WIDTH-1:0] Q;
+    parameter [WIDTH-1:0] _TECHMAP_WIREINIT_Q_ = {WIDTH{1'bx}};
+    wire [WIDTH-1:0] _TECHMAP_REMOVEINIT_Q_ = {WIDTH{1'b1}};
+    (* init = _TECHMAP_WIREINIT_Q_ *)
+    wire [WIDTH-1:0] held;
+    assign Q = ALOAD ? AD : held;
+    \$ff #(.WIDTH(WIDTH)) state (.D(ALOAD ? AD : CLK ? D : held), .Q(held));
+endmodule

@@ -1,12 +1,20 @@
 /// The FPGA but for what is special to a board: PLL, pin cells, LVDS receivers.
 ///
 /// Two clocks: `clk_adc`, 125 MHz, for LEDs and samples alike; `clk_host` for the host port, which samples its
-/// pins with it. Resets are synchronous, each to its own clock, high.
+/// pins with it. Resets are synchronous, each to its own clock, high. The host port lives without the ADC's clock:
+/// `rst_host` holds it alone, and `rst_bridge` that half of it which talks to the ADC's domain. The board must hold
+/// `rst_bridge` as long as `rst_adc` and longer (`hdl/formal/recovery.sv`).
 module nirspi_core (
-    input var logic clk_adc ,
-    input var logic rst_adc ,
-    input var logic clk_host,
-    input var logic rst_host,
+    input var logic clk_adc   ,
+    input var logic rst_adc   ,
+    input var logic clk_host  ,
+    input var logic rst_host  ,
+    input var logic rst_bridge,
+    // What the board knows of itself and of the ADC's clock.
+    input var logic [8-1:0] design_id  , /// `Design` of `mcu/wire`
+    input var logic         adc_beat   , /// The ADC's clock, divided
+    input var logic         pll_locked ,
+    input var logic         clock_alive,
     // ADC, in step with `clk_adc`.
     input var logic [14-1:0] adc_code      ,
     input var logic          adc_over_range,
@@ -66,6 +74,9 @@ module nirspi_core (
     logic [32-1:0] data_in     ;
     logic          back        ;
     logic [32-1:0] value_out   ;
+    logic          answered_out;
+    logic [32-1:0] answer      ;
+    logic          ready       ;
     logic          epoch_host  ;
     logic          empty       ;
     logic          pop         ;
@@ -84,8 +95,8 @@ module nirspi_core (
         .operation (operation_in),
         .address   (address_in  ),
         .data      (data_in     ),
-        .back      (back        ),
-        .value     (value_out   ),
+        .back      (answered_out),
+        .value     (answer      ),
         .epoch     (epoch_host  ),
         .empty     (empty       ),
         .fifo_data (pop_data    ),
@@ -95,6 +106,30 @@ module nirspi_core (
 
     always_comb spi_drive = drive & {4{~spi_cs_n}};
 
+    always_ff @ (posedge clk_host) begin
+        if (rst_bridge) begin
+            ready <= 0;
+        end else begin
+            ready <= 1;
+        end
+    end
+    nirspi_host_registers answers (
+        .clk       (clk_host    ),
+        .rst       (rst_host    ),
+        .design_id (design_id   ),
+        .locked    (pll_locked  ),
+        .alive     (clock_alive ),
+        .ready     (ready       ),
+        .beat      (adc_beat    ),
+        .send      (send        ),
+        .address   (address_in  ),
+        .back      (back        ),
+        .value     (value_out   ),
+        .answered  (answered_out),
+        .answer    (answer      )
+    );
+
+    // To the engine and back.
     logic          request  ;
     logic [2-1:0]  operation;
     logic [16-1:0] address  ;
@@ -105,7 +140,7 @@ module nirspi_core (
 
     nirspi_crossing bridge (
         .clk_host     (clk_host    ),
-        .rst_host     (rst_host    ),
+        .rst_host     (rst_bridge  ),
         .clk_adc      (clk_adc     ),
         .rst_adc      (rst_adc     ),
         .send         (send        ),
@@ -145,7 +180,7 @@ module nirspi_core (
         .push_data ({tag, octet}),
         .full      (full        ),
         .clk_read  (clk_host    ),
-        .rst_read  (rst_host    ),
+        .rst_read  (rst_bridge  ),
         .pop       (pop         ),
         .empty     (empty       ),
         .pop_data  (pop_data    )

@@ -2,7 +2,8 @@
 ///
 /// The one law: what crosses on more than one wire stands still while it does. A toggle goes over when the
 /// access stands, a toggle comes back when the answer stands; an access that comes before that is dropped,
-/// which a host that keeps to `HOST_SCK_DIVIDER` never sees.
+/// which a host that keeps to `HOST_SCK_DIVIDER` never sees. Both sides begin at 0: the board lets the host's side
+/// out of reset last.
 module nirspi_crossing (
     input var logic clk_host,
     input var logic rst_host,

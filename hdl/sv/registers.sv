@@ -1,7 +1,7 @@
 /// The register bank, the settings copied from it, and what the host reads.
 ///
 /// The one law: reads give what was written, whatever it was; what it means is checked at a start. The map is
-/// `register_map`, made from `mcu/wire`.
+/// `register_map`, made from `mcu/wire`. `host_registers` answers those that need no ADC clock; here they read 0.
 module nirspi_registers
     import nirspi_register_map::*;
 (
@@ -136,26 +136,24 @@ module nirspi_registers
     end
 
     // Which word is asked for, worked out while the access waits.
-    logic [15-1:0] asked      ;
+    logic [13-1:0] asked      ;
     logic [5-1:0]  asked_live ;
     logic          asked_table;
 
     always_ff @ (posedge clk) begin
-        asked[0]      <= 32'(address) == ADDRESS_IDENTITY;
-        asked[1]      <= 32'(address) == ADDRESS_VERSION;
-        asked[2]      <= 32'(address) == ADDRESS_SCRATCH;
-        asked[3]      <= 32'(address) == ADDRESS_MODE;
-        asked[4]      <= 32'(address) == ADDRESS_PATTERNS;
-        asked[5]      <= 32'(address) == ADDRESS_DWELL;
-        asked[6]      <= 32'(address) == ADDRESS_BLANK;
-        asked[7]      <= 32'(address) == ADDRESS_LATENCY;
-        asked[8]      <= 32'(address) == ADDRESS_SWEEPS;
-        asked[9]      <= 32'(address) == ADDRESS_FRAMES;
-        asked[10]     <= 32'(address) == ADDRESS_RAW_LENGTH;
-        asked[11]     <= 32'(address) == ADDRESS_WATCHDOG;
-        asked[12]     <= 32'(address) == ADDRESS_DUTY_LIMIT;
-        asked[13]     <= 32'(address) == ADDRESS_OVER_RANGE_TRIP;
-        asked[14]     <= 32'(address) == ADDRESS_CLOCK_HIGH;
+        asked[0]      <= 32'(address) == ADDRESS_SCRATCH;
+        asked[1]      <= 32'(address) == ADDRESS_MODE;
+        asked[2]      <= 32'(address) == ADDRESS_PATTERNS;
+        asked[3]      <= 32'(address) == ADDRESS_DWELL;
+        asked[4]      <= 32'(address) == ADDRESS_BLANK;
+        asked[5]      <= 32'(address) == ADDRESS_LATENCY;
+        asked[6]      <= 32'(address) == ADDRESS_SWEEPS;
+        asked[7]      <= 32'(address) == ADDRESS_FRAMES;
+        asked[8]      <= 32'(address) == ADDRESS_RAW_LENGTH;
+        asked[9]      <= 32'(address) == ADDRESS_WATCHDOG;
+        asked[10]     <= 32'(address) == ADDRESS_DUTY_LIMIT;
+        asked[11]     <= 32'(address) == ADDRESS_OVER_RANGE_TRIP;
+        asked[12]     <= 32'(address) == ADDRESS_CLOCK_HIGH;
         asked_live[0] <= 32'(address) == ADDRESS_STATUS;
         asked_live[1] <= 32'(address) == ADDRESS_FAULT;
         asked_live[2] <= 32'(address) == ADDRESS_FRAMES_MADE;
@@ -177,12 +175,11 @@ module nirspi_registers
                 | (frames_made & {32{asked_live[2]}}) | (frames_lost & {32{asked_live[3]}})
                 | (clock_now[31:0] & {32{asked_live[4]}});
         end
-        stored_0 <= (RESET_IDENTITY & {32{asked[0]}}) | (RESET_VERSION & {32{asked[1]}}) | (scratch & {32{asked[2]}})
-            | (mode & {32{asked[3]}}) | (patterns & {32{asked[4]}}) | (dwell & {32{asked[5]}})
-            | (blank & {32{asked[6]}}) | (latency & {32{asked[7]}});
-        stored_1 <= (sweeps & {32{asked[8]}}) | (frames & {32{asked[9]}}) | (raw_length & {32{asked[10]}})
-            | (watchdog & {32{asked[11]}}) | (duty_limit & {32{asked[12]}}) | (trip & {32{asked[13]}})
-            | (clock_high & {32{asked[14]}});
+        stored_0 <= (scratch & {32{asked[0]}}) | (mode & {32{asked[1]}}) | (patterns & {32{asked[2]}})
+            | (dwell & {32{asked[3]}}) | (blank & {32{asked[4]}}) | (latency & {32{asked[5]}});
+        stored_1 <= (sweeps & {32{asked[6]}}) | (frames & {32{asked[7]}}) | (raw_length & {32{asked[8]}})
+            | (watchdog & {32{asked[9]}}) | (duty_limit & {32{asked[10]}}) | (trip & {32{asked[11]}})
+            | (clock_high & {32{asked[12]}});
         entry <= 32'(table_entry) & {32{asked_table}};
         value <= live | stored_0 | stored_1 | entry;
     end

@@ -13,8 +13,8 @@
 
 namespace {
 
-constexpr int INPUTS = 1 << 2, OUTPUTS = 1 << 3;
-enum Edge { ADC, HOST, ADC_RESET, HOST_RESET };
+constexpr int INPUTS = 1 << 3, OUTPUTS = 1 << 4;
+enum Edge { ADC, HOST, ADC_RESET, HOST_RESET, BRIDGE_RESET };
 
 struct Outputs {
     uint32_t rows, columns, rest;
@@ -27,18 +27,22 @@ void drive(Vnirspi_core& core, uint32_t inputs) {
     core.spi_sck = inputs >> 16 & 1;
     core.spi_cs_n = inputs >> 17 & 1;
     core.spi_in = inputs >> 18 & 15;
+    core.adc_beat = inputs >> 22 & 1;
+    core.pll_locked = core.clock_alive = inputs >> 23 & 1;
+    core.design_id = inputs >> 24;
 }
 
 // Inputs have settled before the clock rises, and outputs before it falls.
 void clock(Vnirspi_core& core, int edge) {
     core.rst_adc = edge == ADC_RESET;
     core.rst_host = edge == HOST_RESET;
+    core.rst_bridge = edge == BRIDGE_RESET;
     core.eval();
     CData& clock = edge == ADC || edge == ADC_RESET ? core.clk_adc : core.clk_host;
     clock = 1;
     core.eval();
     clock = 0;
-    core.rst_adc = core.rst_host = 0;
+    core.rst_adc = core.rst_host = core.rst_bridge = 0;
     core.eval();
 }
 
@@ -73,7 +77,7 @@ uint64_t repeat(const char* path) {
         if (head & INPUTS) fill(&inputs, sizeof inputs);
         if (head & OUTPUTS) fill(&expected, sizeof expected);
         drive(core, inputs);
-        clock(core, head & 3);
+        clock(core, head & 7);
         const Outputs found = outputs(core);
         if (!same(found, expected)) {
             std::fprintf(stderr,

@@ -1,11 +1,11 @@
 //! What a camera says of itself: identity, versions, state, and what happened while no host was
 //! connected.
 
+use crate::fpga::Fpga;
 use crate::session::{CameraIdentity, Reports, Session, SessionError};
 use crate::signal::Signal;
 use crate::versions::{Part, compare};
 use nirspi_wire::Status;
-use nirspi_wire::register::{IDENTITY, Register};
 use serde::Serialize;
 
 /// A camera's identity, versions and state.
@@ -17,6 +17,8 @@ pub struct Info {
     pub parts: Vec<Part>,
     /// Whether the FPGA answers.
     pub fpga_answers: bool,
+    /// What the FPGA is built for and its ADC clock, or what to check where it cannot be used.
+    pub fpga: String,
     /// The camera's state, and its fault if one is latched.
     pub state: String,
     /// Seconds since the camera was switched on.
@@ -37,15 +39,15 @@ pub struct Info {
 /// [`SessionError`] if the camera does not answer, or answers with something else.
 pub fn info(session: &mut Session) -> Result<Info, SessionError> {
     let mut reports = Reports(session.reports().to_vec());
-    let (identity_register, map) = registers(session, &mut reports)?;
+    let fpga = Fpga::ask(session, &mut reports)?;
     let status = session.status(&mut reports)?;
-    let fpga_answers = identity_register == Some(IDENTITY);
     let camera = session.identity().clone();
-    let parts = compare(&camera, map.filter(|_| fpga_answers));
+    let parts = compare(&camera, fpga.version());
     Ok(Info {
         camera,
         parts,
-        fpga_answers,
+        fpga_answers: fpga.answers(),
+        fpga: fpga.to_string(),
         state: match status.fault {
             Some(fault) => format!("{}: {fault}", status.state),
             None => status.state.to_string(),
@@ -56,19 +58,6 @@ pub fn info(session: &mut Session) -> Result<Info, SessionError> {
         signal: Signal::of(&status),
         reports: reports.0,
     })
-}
-
-/// The values of the FPGA's identity and version registers; `None` if the FPGA does not answer.
-fn registers(
-    session: &mut Session,
-    reports: &mut Reports,
-) -> Result<(Option<u32>, Option<u32>), SessionError> {
-    let mut read = |register| match session.register(register, reports) {
-        Ok(value) => Ok(Some(value)),
-        Err(SessionError::Refused { .. }) => Ok(None),
-        Err(error) => Err(error),
-    };
-    Ok((read(Register::Identity)?, read(Register::Version)?))
 }
 
 fn temperature(status: &Status) -> Option<f64> {

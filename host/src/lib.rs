@@ -7,7 +7,7 @@
 //! * [`devices`] lists cameras, [`mod@info`] asks one of them who it is,
 //! * [`about`] says what a build contains, [`versions`] checks whether camera and program fit
 //!   together, [`events`] words a camera's reports,
-//! * [`gateware`] loads a camera's FPGA, [`update`] brings a camera to the versions of a release,
+//! * [`fpga`] says in words what an FPGA answers, [`gateware`] loads a camera's FPGA, [`update`] brings a camera to the versions of a release,
 //! * [`calibration`] measures, keeps and chooses latency and settling, [`selftest`] checks a
 //!   camera,
 //! * [`capture`] runs a measurement, [`recording`] stores it, [`export`] writes it for other
@@ -47,6 +47,7 @@ pub mod export;
 pub mod files;
 #[cfg(feature = "flash")]
 pub mod flash;
+pub mod fpga;
 pub mod gateware;
 pub mod heartbeat;
 pub mod imaging;

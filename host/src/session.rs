@@ -12,10 +12,11 @@ pub use error::SessionError;
 pub use request::Request;
 
 use crate::events;
+use crate::fpga::design_in_words;
 use crate::link::Link;
 use crate::replay::Recorded;
 use conversation::Conversation;
-use nirspi_wire::register::Register;
+use nirspi_wire::register::{Design, Register};
 use nirspi_wire::{
     Capabilities, Command, DeviceMessage, GatewareChunk, Identity, PacketError, SelfTestReport,
     Status, version,
@@ -66,6 +67,9 @@ impl From<&Identity<'_>> for CameraIdentity {
         }
     }
 }
+
+/// The name of [`Capabilities::BRING_UP`].
+const BRING_UP: &str = "bring-up";
 
 /// The name of each capability; the number of the bit for a capability that this program does not
 /// know.
@@ -161,6 +165,11 @@ impl Session {
         };
         match identity {
             Ok(identity) if version::speaks(identity.protocol) => {
+                // Every command shows it: such a picture is not of the scene.
+                if identity.capabilities.iter().any(|name| name == BRING_UP) {
+                    let what = design_in_words(Design::BringUp);
+                    reports.keep(Some(format!("the camera runs the gateware for {what}")));
+                }
                 Ok(Self { conversation, identity, reports: reports.0, recorded: None })
             }
             Ok(identity) => Err(SessionError::Version { camera: identity.protocol }),

@@ -61,6 +61,29 @@ fn a_sound_camera_passes_and_gives_its_calibration() {
     assert_eq!(names, ["device: frame memory"], "{:#?}", found.checks);
 }
 
+fn note<'f>(found: &'f SelfTest, name: &str) -> &'f str {
+    found.checks.iter().find(|check| check.name() == name).unwrap().note()
+}
+
+#[test]
+fn two_boards_without_adc_pass_with_the_bring_up_design() {
+    let found = test(plugged(optics().fpga(1).unwrap().bring_up()));
+    assert!(found.passed(), "{:#?}", failures(&found));
+    assert_eq!(found.settling.as_ref().unwrap().adc_latency, 7);
+    assert!(note(&found, "device: FPGA identity").contains("0x4e535049"), "{:#?}", found.checks);
+    assert!(note(&found, "device: gateware").contains("bring-up"), "{:#?}", found.checks);
+    assert!(note(&found, "device: ADC clock").contains("124.80 MHz"), "{:#?}", found.checks);
+    assert!(note(&found, "LED lines").contains("64 lines"), "{:#?}", found.checks);
+}
+
+#[test]
+fn a_missing_adc_clock_is_the_one_failure_and_says_what_to_check() {
+    let found = test(plugged(optics().fpga(1).unwrap().adc_clock(None)));
+    only(&found, "device: ADC clock", &["0.00 MHz", "xpected 125 MHz", "supply"]);
+    let slow = test(plugged(optics().fpga(1).unwrap().adc_clock(Some(62_500_000))));
+    only(&slow, "device: ADC clock", &["62.50 MHz", "sample clock"]);
+}
+
 #[test]
 fn a_stuck_line_is_named() {
     let row = |stuck: u32| {

@@ -72,7 +72,7 @@ impl Burst {
         }
         fpga::verify(bus, setup, limits)
             .and_then(|()| Ok(fpga::write(bus, Register::RawLength, samples.into())?))
-            .map_err(|_| fpga::identify(bus).err().unwrap_or(Fault::FpgaConfiguration))
+            .map_err(|_| fpga::health(bus).err().unwrap_or(Fault::FpgaConfiguration))
             .and_then(|()| fpga::start(bus, control::START_RAW))
             .map_err(Refusal::Fault)?;
         Ok(Self { samples, sent: 0, since: now, recorded: false })

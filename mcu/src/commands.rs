@@ -12,10 +12,10 @@ use crate::notices::{Notice, Outcome};
 use crate::{
     FpgaBus, GatewareLoader, Inputs, Micros, PacketSink, Ports, configure, fpga, gateware, safety,
 };
-use nirspi_wire::register::{ORDER_TABLE, Register, status};
+use nirspi_wire::register::{Design, NO_CLOCK, ORDER_TABLE, Register, status};
 use nirspi_wire::{
-    Answer, Command, Configuration, DeviceMessage, GatewareChunk, PATTERNS, PatternOrder, Refusal,
-    Reply, Request, Signal, State, Status, Tail, version,
+    Answer, Capabilities, Command, Configuration, DeviceMessage, GatewareChunk, PATTERNS,
+    PatternOrder, Refusal, Reply, Request, Signal, State, Status, Tail, version,
 };
 
 impl Machine {
@@ -78,9 +78,13 @@ impl Machine {
     /// Opens a new session, and ends what the host before has left running.
     fn hello(&mut self, id: u16, now: Micros, protocol: u16, bus: &mut impl FpgaBus) {
         let gateware = fpga::version(bus);
+        let added = match fpga::design(bus) {
+            Ok(Design::BringUp) => Capabilities::BRING_UP,
+            Ok(Design::Camera) | Err(_) => Capabilities::default(),
+        };
         let spoken = version::speaks(protocol);
         let answered = if spoken { protocol } else { version::CURRENT };
-        self.stop(id, now, bus, Outcome::Hello { protocol: answered, gateware });
+        self.stop(id, now, bus, Outcome::Hello { protocol: answered, gateware, added });
         self.session = if spoken { Session::Open { protocol } } else { Session::Foreign };
         if spoken && self.crash.is_some() {
             self.notices.push(Notice::Crash);
@@ -138,7 +142,7 @@ impl Machine {
         }
         // If the FPGA does not answer, the reply assumes that the LEDs are on.
         let leds_on = fpga::read(bus, Register::Status)
-            .map_or(!resting, |status| status & status::LEDS_ON != 0);
+            .map_or(!resting, |status| status != NO_CLOCK && status & status::LEDS_ON != 0);
         let has_signal = self.protocol().is_some_and(|protocol| protocol >= Signal::SINCE);
         Status {
             state: self.state(),

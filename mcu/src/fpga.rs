@@ -9,7 +9,9 @@
 
 use crate::configure::Setup;
 use crate::{BusError, FpgaBus, Limits};
-use nirspi_wire::register::{FaultCode, IDENTITY, ORDER_TABLE, Register, control, status};
+use nirspi_wire::register::{
+    Design, FaultCode, IDENTITY, NO_CLOCK, ORDER_TABLE, Register, control, has_this_map, status,
+};
 use nirspi_wire::samples::Words;
 use nirspi_wire::{Fault, Version};
 
@@ -37,6 +39,13 @@ pub(crate) fn release(bus: &mut impl FpgaBus) -> Result<(), BusError> {
 /// Fault of an FPGA that does not answer at all.
 pub(crate) const SILENT: Fault = Fault::FpgaAbsent { identity: 0 };
 
+/// Fault of an FPGA whose gateware this firmware does not know.
+const FOREIGN: Fault = Fault::FpgaAbsent { identity: IDENTITY };
+
+/// Number of looks at the FPGA before a wrong answer is a fault. A single wrong bit on the wires, of which
+/// two registers a millisecond have many chances, must not end a run.
+const LOOKS: u8 = 3;
+
 /// Checks that the FPGA answers with its identity.
 pub(crate) fn identify(bus: &mut impl FpgaBus) -> Result<(), Fault> {
     match read(bus, Register::Identity) {
@@ -46,22 +55,49 @@ pub(crate) fn identify(bus: &mut impl FpgaBus) -> Result<(), Fault> {
     }
 }
 
-/// Status of an FPGA that answers and has no fault latched.
-pub(crate) fn health(bus: &mut impl FpgaBus) -> Result<u32, Fault> {
+/// What the FPGA is built for, if this firmware knows its gateware.
+pub(crate) fn design(bus: &mut impl FpgaBus) -> Result<Design, Fault> {
     identify(bus)?;
-    let status = read(bus, Register::Status).map_err(|_| SILENT)?;
-    if status & status::FAULT == 0 {
-        return Ok(status);
+    let version = read(bus, Register::Version).map_err(|_| SILENT)?;
+    let design = read(bus, Register::Design).map_err(|_| SILENT)?;
+    Design::from_register(design).filter(|_| has_this_map(version)).ok_or(FOREIGN)
+}
+
+/// Status of an FPGA that answers and has no fault latched. A fault is one that every look has shown.
+pub(crate) fn health(bus: &mut impl FpgaBus) -> Result<u32, Fault> {
+    let mut found = look(bus)?;
+    for _ in 1..LOOKS {
+        if found.is_ok() {
+            break;
+        }
+        found = look(bus)?;
     }
-    let code = read(bus, Register::Fault).map_err(|_| SILENT)?;
-    Err(match FaultCode::from_register(code) {
+    found
+}
+
+/// One look at identity, status and fault. The outer error is a transfer that did not complete.
+fn look(bus: &mut impl FpgaBus) -> Result<Result<u32, Fault>, Fault> {
+    let mut word = |register| read(bus, register).map_err(|_| SILENT);
+    let identity = word(Register::Identity)?;
+    if identity != IDENTITY {
+        return Ok(Err(Fault::FpgaAbsent { identity }));
+    }
+    let status = word(Register::Status)?;
+    if status == NO_CLOCK {
+        return Ok(Err(Fault::FpgaAbsent { identity: NO_CLOCK }));
+    }
+    if status & status::FAULT == 0 {
+        return Ok(Ok(status));
+    }
+    let code = word(Register::Fault)?;
+    Ok(Err(match FaultCode::from_register(code) {
         Some(FaultCode::Watchdog) => Fault::FpgaWatchdog,
         Some(FaultCode::Duty) => Fault::Duty,
         Some(FaultCode::OverRange) => Fault::OverRange,
         Some(FaultCode::Interlock) => Fault::Interlock,
         // A fault code that this firmware does not know comes from other gateware.
-        Some(FaultCode::None) | None => Fault::FpgaAbsent { identity: IDENTITY },
-    })
+        Some(FaultCode::None) | None => FOREIGN,
+    }))
 }
 
 /// Version of the gateware; 0.0.0 if no gateware answers.
@@ -95,13 +131,15 @@ impl From<BusError> for NotTaken {
 /// Stops a run, and checks that the LEDs are off.
 pub(crate) fn go_dark(bus: &mut impl FpgaBus) -> Result<(), NotTaken> {
     control(bus, control::STOP)?;
-    let lit = read(bus, Register::Status)? & (status::RUNNING | status::LEDS_ON);
-    if lit == 0 { Ok(()) } else { Err(NotTaken) }
+    let status = read(bus, Register::Status)?;
+    // Without the ADC's clock the FPGA holds the LEDs off by itself.
+    let dark = status == NO_CLOCK || status & (status::RUNNING | status::LEDS_ON) == 0;
+    if dark { Ok(()) } else { Err(NotTaken) }
 }
 
 /// Stops a run and clears the latched fault. The error is the fault that still forbids a start.
 pub(crate) fn acknowledge(bus: &mut impl FpgaBus) -> Result<(), Fault> {
-    identify(bus)?;
+    design(bus)?;
     control(bus, control::STOP | control::CLEAR_FAULT).map_err(|_| SILENT)?;
     if health(bus)? & status::INTERLOCK_CLOSED == 0 {
         return Err(Fault::Interlock);

@@ -23,6 +23,8 @@ pub(crate) enum Outcome {
         /// no session.
         protocol: u16,
         gateware: Version,
+        /// What the FPGA adds to the board's capabilities.
+        added: Capabilities,
     },
     Other(Result<Answer<'static>, Refusal>),
 }
@@ -117,7 +119,7 @@ fn message<'m>(
         Notice::Reply { id, outcome: Outcome::Other(outcome) } => {
             DeviceMessage::Reply(Reply { id, outcome })
         }
-        Notice::Reply { id, outcome: Outcome::Hello { protocol, gateware } } => {
+        Notice::Reply { id, outcome: Outcome::Hello { protocol, gateware, added } } => {
             let identity = Identity {
                 protocol,
                 firmware: info.firmware,
@@ -128,7 +130,9 @@ fn message<'m>(
                 adc_hz: ADC_HZ,
                 adc_bits: ADC_BITS,
                 wavelength_nm: WAVELENGTH_NM,
-                capabilities: Tail((protocol >= Capabilities::SINCE).then_some(info.capabilities)),
+                capabilities: Tail(
+                    (protocol >= Capabilities::SINCE).then_some(info.capabilities.with(added)),
+                ),
             };
             DeviceMessage::Reply(Reply { id, outcome: Ok(Answer::Hello(identity)) })
         }

@@ -74,7 +74,9 @@ impl Machine {
         };
         match &self.activity {
             Activity::Run(run) if run.is_lit() => {
-                if status & status::RUNNING == 0 {
+                // A second look: one wrong bit must not end a run.
+                let over = |status: u32| status & status::RUNNING == 0;
+                if over(status) && fpga::health(bus).is_ok_and(over) {
                     self.run_is_over(now, bus);
                 }
             }

@@ -12,7 +12,7 @@ use crate::packets::{STREAM_HEADER_BYTES, send};
 use crate::time::Anchor;
 use crate::{FpgaBus, Limits, Micros, PacketSink, configure, fpga};
 use nirspi_wire::fpga::{FpgaFrame, Header};
-use nirspi_wire::register::{Register, control};
+use nirspi_wire::register::{NO_CLOCK, Register, control};
 use nirspi_wire::{
     ConfigField, DeviceMessage, EventKind, Fault, Frame, PATTERNS, Refusal, RunLength, Samples,
 };
@@ -47,6 +47,9 @@ impl Counters {
     pub fn read(&mut self, bus: &mut impl FpgaBus) -> Result<(), Fault> {
         fpga::identify(bus)?;
         let made = fpga::read(bus, Register::FramesMade).map_err(|_| fpga::SILENT)?;
+        if made == NO_CLOCK {
+            return Err(Fault::FpgaAbsent { identity: NO_CLOCK });
+        }
         let lost = fpga::read(bus, Register::FramesLost).map_err(|_| fpga::SILENT)?;
         self.advance(made, lost);
         Ok(())
@@ -173,7 +176,7 @@ impl Run {
         let (anchor, started) = fpga::verify(bus, setup, limits)
             .and_then(|()| Ok(fpga::write(bus, Register::Frames, frames)?))
             .and_then(|()| Ok(fpga::clock(bus)?))
-            .map_err(|_| fpga::identify(bus).err().unwrap_or(Fault::FpgaConfiguration))
+            .map_err(|_| fpga::health(bus).err().unwrap_or(Fault::FpgaConfiguration))
             .and_then(|clock| {
                 let started = fpga::start(bus, control::START)?;
                 Ok((Anchor { clock, time: now }, started))

@@ -14,7 +14,7 @@
 use crate::configure::Setup;
 use crate::{BusError, FpgaBus, Inputs, Limits, Micros, fpga, safety};
 use nirspi_wire::fpga::{FpgaFrame, Sums};
-use nirspi_wire::register::{Register, TEST_SEED, control, mode, status, test_sample};
+use nirspi_wire::register::{Register, TEST_SEED, clocks, control, mode, status, test_sample};
 use nirspi_wire::{CLOCKS_PER_PATTERN, FrameFlags, PATTERNS, SelfTestReport};
 
 /// Longest time that the test frame may take. The frame needs 82 microseconds and a transfer.
@@ -45,11 +45,21 @@ pub(crate) struct TestFrame {
 /// Does the checks that are immediate.
 pub(crate) fn examine(bus: &mut impl FpgaBus, inputs: &Inputs, limits: &Limits) -> SelfTestReport {
     let mut report = SelfTestReport::default();
-    note(&mut report, SelfTestReport::FPGA_IDENTITY, fpga::identify(bus).is_ok());
-    note(&mut report, SelfTestReport::FPGA_BUS, every_bit_holds(bus).unwrap_or(false));
-    let dark = fpga::read(bus, Register::Status)
-        .is_ok_and(|status| status & (status::LEDS_ON | status::RUNNING) == 0);
-    note(&mut report, SelfTestReport::LEDS_OFF, dark);
+    let answers = fpga::identify(bus).is_ok();
+    note(&mut report, SelfTestReport::FPGA_IDENTITY, answers);
+    let mut clock = true;
+    if answers {
+        note(&mut report, SelfTestReport::GATEWARE, fpga::design(bus).is_ok());
+        clock = fpga::read(bus, Register::Clocks).is_ok_and(clocks::fit);
+        note(&mut report, SelfTestReport::ADC_CLOCK, clock);
+    }
+    // These registers need the ADC's clock.
+    if clock {
+        note(&mut report, SelfTestReport::FPGA_BUS, every_bit_holds(bus).unwrap_or(false));
+        let dark = fpga::read(bus, Register::Status)
+            .is_ok_and(|status| status & (status::LEDS_ON | status::RUNNING) == 0);
+        note(&mut report, SelfTestReport::LEDS_OFF, dark);
+    }
     let reading = inputs.temperature_centi_celsius;
     let plausible = reading.is_some_and(|reading| safety::plausible(reading, limits));
     note(&mut report, SelfTestReport::TEMPERATURE, plausible);

@@ -1,7 +1,6 @@
-/// Lattice ECP5 Evaluation Board, LFE5UM5G-85F-EVN: what of the FPGA is special to this board.
+/// The camera on the Lattice ECP5 Evaluation Board, LFE5UM5G-85F-EVN: its clocks and its pins.
 ///
-/// The one law: the LED enable at the pin falls by itself when the ADC's clock is lost, since everything
-/// else that could switch it off runs on that clock. Pins and levels are in `board.lpf` and `docs/gateware.md`.
+/// Pins and levels are in `board.lpf` and `docs/gateware.md`; `shell.sv` has what does not touch a pin.
 module top (
     // AD9246-125 or the like: 14 bit, offset binary, CMOS, with a data clock.
     input  logic        adc_dco,
@@ -27,11 +26,12 @@ module top (
 );
     // Clocks: the ADC's, cleaned of its insertion delay by a PLL; the FPGA's own oscillator, which needs
     // nothing from outside, for the host port and for the watch over the other.
-    logic clk_adc;
-    logic clk_host;
+    // `build.py` and `board.lpf` know them by these names.
+    (* keep *) logic clk_adc;
+    (* keep *) logic clk_host;
     logic locked;
-    logic alive;
     logic restart;
+    logic healthy;
 
     OSCG #(.DIV(3)) oscillator (.OSC(clk_host)); // 310 MHz / 3
 
@@ -42,51 +42,11 @@ module top (
         .locked (locked)
     );
 
-    clock_guard guard (
-        .clk    (clk_host),
-        .watched(clk_adc),
-        .locked (locked),
-        .alive  (alive),
-        .restart(restart)
-    );
-
-    // Both domains are reset together: a toggle that crosses must not differ from its copy by a reset.
-    logic rst_adc;
-    logic rst_host;
-    logic healthy;
-    assign healthy = alive && locked && reset_n;
-
-    reset_synchroniser to_adc (
-        .clk  (clk_adc),
-        .holds(!healthy),
-        .rst  (rst_adc)
-    );
-    reset_synchroniser to_host (
-        .clk  (clk_host),
-        .holds(!healthy),
-        .rst  (rst_host)
-    );
-
-    // One register in each input cell. On the way out two: one to cross the chip with, one in the output
-    // cell. These three clocks are part of the ADC latency, which is a setting anyway.
+    // One register in each input cell and each output cell.
     logic [13:0] code;
     logic        over_range;
     logic [31:0] rows;
     logic [31:0] columns;
-    logic        enable;
-    logic [31:0] rows_halfway;
-    logic [31:0] columns_halfway;
-    logic        enable_halfway;
-    logic        enable_at_pin;
-
-    always_ff @(posedge clk_adc) begin
-        rows_halfway    <= rows;
-        columns_halfway <= columns;
-        enable_halfway  <= enable;
-        // Not in its output cell: a gate that needs no clock is to be the last thing before the pin.
-        enable_at_pin   <= enable_halfway;
-    end
-    assign led_enable = enable_at_pin && healthy;
 
     IFS1P3DX code_in [13:0] (
         .D   (adc_code),
@@ -103,45 +63,46 @@ module top (
         .Q   (over_range)
     );
     OFS1P3DX rows_out [31:0] (
-        .D   (rows_halfway),
+        .D   (rows),
         .SP  (1'b1),
         .SCLK(clk_adc),
         .CD  (1'b0),
         .Q   (led_rows)
     );
     OFS1P3DX columns_out [31:0] (
-        .D   (columns_halfway),
+        .D   (columns),
         .SP  (1'b1),
         .SCLK(clk_adc),
         .CD  (1'b0),
         .Q   (led_columns)
     );
-    // The interlock loop passes an input cell of its own and is synchronised in the core.
     logic [3:0] spi_out;
     logic [3:0] spi_drive;
     for (genvar i = 0; i < 4; i++) begin : g_line
         assign spi_io[i] = spi_drive[i] ? spi_out[i] : 1'bz;
     end
 
-    nirspi_core core (
-        .clk_adc,
-        .rst_adc,
+    shell #(.DESIGN(8'd1)) camera (
         .clk_host,
-        .rst_host,
-        .adc_code      (code),
-        .adc_over_range(over_range),
-        .led_rows      (rows),
-        .led_columns   (columns),
-        .led_enable    (enable),
+        .clk_adc,
+        .measured(adc_dco),
+        .locked,
+        .restart,
+        .reset_n,
+        .code,
+        .over_range,
+        .rows,
+        .columns,
+        .led_enable,
         .interlock,
         .spi_sck,
         .spi_cs_n,
-        .spi_in        (spi_io),
+        .spi_in  (spi_io),
         .spi_out,
         .spi_drive,
         .frame_ready,
         .raw_ready,
-        .access        ()
+        .healthy
     );
 
     assign shows_locked_n = !healthy;

@@ -14,7 +14,8 @@ use crate::safety::{Clock, Safety};
 use crate::settings::Settings;
 use crate::source::{AdcSample, Source};
 use crate::window::Window;
-use nirspi_wire::register::{FaultCode, Register, control, status};
+use nirspi_wire::ADC_HZ;
+use nirspi_wire::register::{Design, FaultCode, NO_CLOCK, Register, clocks, control, status};
 
 /// Where the samples of a run go.
 #[derive(Debug, Clone)]
@@ -34,9 +35,12 @@ struct Run {
 
 /// The FPGA.
 ///
-/// `Default` is the state after power-up: registers at reset, interlock open, LEDs off.
+/// `Default` is the state after power-up: registers at reset, interlock open, LEDs off, ADC clock present.
 #[derive(Debug, Clone)]
 pub struct Gateware {
+    design: Design,
+    /// Frequency of the ADC's clock in Hz; `None` without a clock.
+    adc_hz: Option<u32>,
     /// Clocks since reset.
     clock: u64,
     /// High word of the clock at the last read of the low word.
@@ -54,6 +58,8 @@ pub struct Gateware {
 impl Default for Gateware {
     fn default() -> Self {
         Self {
+            design: Design::Camera,
+            adc_hz: Some(ADC_HZ),
             clock: 0,
             clock_high: 0,
             registers: Registers::new(),
@@ -75,9 +81,47 @@ impl Gateware {
         Self::default()
     }
 
-    /// Reads a register or an entry of the order table; `None` if the address has neither.
+    /// The state after power-up of this design.
+    #[must_use]
+    pub fn of(design: Design) -> Self {
+        Self { design, ..Self::default() }
+    }
+
+    /// Sets the frequency of the ADC's clock in Hz; `None` takes the clock away. Without a clock only
+    /// `Identity`, `Version`, `Clocks` and `Design` answer, and no clock may be ticked. A clock that comes back
+    /// finds everything as after power-up but the level of the interlock input.
+    pub fn set_adc_clock(&mut self, hz: Option<u32>) {
+        if self.adc_hz.is_some() != hz.is_some() {
+            let closed = self.safety.interlock_closed();
+            *self = Self { design: self.design, ..Self::default() };
+            self.set_interlock(closed);
+        }
+        self.adc_hz = hz;
+    }
+
+    /// Whether the ADC's clock ticks.
+    #[must_use]
+    pub fn has_adc_clock(&self) -> bool {
+        self.adc_hz.is_some()
+    }
+
+    fn clocks(&self) -> u32 {
+        let Some(hz) = self.adc_hz else { return 0 };
+        let frequency = (hz / clocks::UNIT_HZ).min(clocks::FREQUENCY);
+        frequency | clocks::LOCKED | clocks::ALIVE | clocks::READY
+    }
+
+    /// Reads a register or an entry of the order table; `None` if the address has neither. Without a clock
+    /// of the ADC, every address but those of the host port's own registers reads [`NO_CLOCK`].
     pub fn read(&mut self, address: u16) -> Option<u32> {
         self.safety.feed();
+        match Register::at(address) {
+            Some(Register::Clocks) => return Some(self.clocks()),
+            Some(Register::Design) => return Some(self.design as u32),
+            Some(Register::Identity | Register::Version) => {}
+            _ if self.adc_hz.is_none() => return Some(NO_CLOCK),
+            _ => {}
+        }
         let Some(register) = Register::at(address) else {
             return self.table.at(address);
         };
@@ -97,9 +141,13 @@ impl Gateware {
     }
 
     /// Writes a register or an entry of the order table; false if the address has neither. Writes
-    /// to read-only registers, and to the order table during a run, return true and change nothing.
+    /// to read-only registers, to the order table during a run, and without a clock of the ADC return true and
+    /// change nothing.
     pub fn write(&mut self, address: u16, value: u32) -> bool {
         self.safety.feed();
+        if self.adc_hz.is_none() {
+            return true;
+        }
         match Register::at(address) {
             Some(Register::Control) => self.control(value),
             Some(register) => self.registers.set(register, value),
@@ -124,6 +172,7 @@ impl Gateware {
     /// Ends the current clock, for which the ADC delivers `sample`.
     #[inline]
     pub fn tick(&mut self, sample: AdcSample) {
+        debug_assert!(self.adc_hz.is_some(), "a clock without a clock");
         let now = self.clock;
         self.clock = now.wrapping_add(1);
         self.safety.enter(now);

@@ -5,15 +5,35 @@
 use crate::project::Project;
 use crate::trace::{Edge, Levels, Trace};
 use nirspi_hdl_model::{AdcSample, Lines};
+use nirspi_wire::register::{Design, clocks};
 use veryl_analyzer::ir::{VarId, VarPath};
 use veryl_analyzer::value::Value;
 use veryl_simulator::{Simulator, ir::Event};
 
-/// The core; the caller drives both clocks.
+/// Clocks for which the board holds each of its resets: `hdl/boards/ecp5-evn/reset_synchroniser.sv`.
+const RESET_CLOCKS: u8 = 8;
+
+/// Where the board's resets stand after the ADC's clock was lost: `hdl/boards/ecp5-evn/resets.sv`. Each number is of
+/// the edges that the reset still lasts.
+#[derive(Debug, Clone, Copy, Default)]
+struct Resets {
+    first: u8,
+    adc: u8,
+    bridge: u8,
+}
+
+/// The core on its board; the caller drives both clocks.
 pub struct Pins {
     sim: Simulator,
     adc: Event,
     host: Event,
+    reset_adc: Event,
+    reset_bridge: Event,
+    /// The ADC's clock ticks.
+    clocked: bool,
+    resets: Resets,
+    /// Edges of the ADC's clock, of which the board makes `adc_beat`.
+    beats: u32,
     inputs: Inputs,
     outputs: Outputs,
     trace: Option<Trace>,
@@ -27,6 +47,10 @@ struct Inputs {
     sck: VarId,
     cs_n: VarId,
     lines: VarId,
+    design: VarId,
+    beat: VarId,
+    locked: VarId,
+    alive: VarId,
 }
 
 struct Outputs {
@@ -59,6 +83,10 @@ impl Pins {
             sck: input("spi_sck"),
             cs_n: input("spi_cs_n"),
             lines: input("spi_in"),
+            design: input("design_id"),
+            beat: input("adc_beat"),
+            locked: input("pll_locked"),
+            alive: input("clock_alive"),
         };
         let outputs = Outputs {
             rows: "led_rows".into(),
@@ -72,17 +100,76 @@ impl Pins {
         };
         let reset_adc = sim.get_reset("rst_adc").unwrap();
         let reset_host = sim.get_reset("rst_host").unwrap();
+        let reset_bridge = sim.get_reset("rst_bridge").unwrap();
         sim.step(&Event::Initial);
         let (trace, levels) = (Trace::asked_for(), Levels::default());
-        let mut pins = Self { sim, adc, host, inputs, outputs, trace, levels };
+        let mut pins = Self {
+            sim,
+            adc,
+            host,
+            reset_adc,
+            reset_bridge,
+            clocked: true,
+            resets: Resets::default(),
+            beats: 0,
+            inputs,
+            outputs,
+            trace,
+            levels,
+        };
         pins.select(false);
+        pins.design(Design::Camera);
+        pins.clock_levels(true);
         for _ in 0..4 {
-            pins.sim.step_reset(&pins.adc, &reset_adc);
-            pins.record(Edge::AdcReset);
+            pins.adc_reset_edge();
             pins.sim.step_reset(&pins.host, &reset_host);
             pins.record(Edge::HostReset);
+            pins.bridge_reset_edge();
         }
         pins
+    }
+
+    fn adc_reset_edge(&mut self) {
+        self.sim.step_reset(&self.adc, &self.reset_adc);
+        self.record(Edge::AdcReset);
+    }
+
+    fn bridge_reset_edge(&mut self) {
+        self.sim.step_reset(&self.host, &self.reset_bridge);
+        self.record(Edge::BridgeReset);
+    }
+
+    /// Which design the board says that it is; a camera without this call.
+    pub fn design(&mut self, design: Design) {
+        self.levels.design = design as u8;
+        self.set(self.inputs.design, design as u64, 8);
+    }
+
+    fn clock_levels(&mut self, healthy: bool) {
+        self.levels.healthy = healthy;
+        self.set(self.inputs.locked, healthy.into(), 1);
+        self.set(self.inputs.alive, healthy.into(), 1);
+    }
+
+    /// Takes the ADC's clock away, or brings it back. The board then holds its resets one after the other: until the
+    /// host port's clock has ticked, until the ADC's has, and until the host port's has again.
+    pub fn adc_clock(&mut self, ticks: bool) {
+        self.clocked = ticks;
+        self.clock_levels(ticks);
+        let each = RESET_CLOCKS;
+        self.resets = Resets { first: each, adc: each, bridge: each };
+    }
+
+    /// Whether accesses reach the ADC's domain: every reset is over.
+    #[must_use]
+    pub fn adc_answers(&self) -> bool {
+        self.adc_runs() && self.resets.bridge == 0
+    }
+
+    /// Whether the ADC's domain is out of reset.
+    #[must_use]
+    pub fn adc_runs(&self) -> bool {
+        self.clocked && self.resets.adc == 0
     }
 
     /// Records an edge, with the inputs before it and the outputs after it.
@@ -114,16 +201,42 @@ impl Pins {
         value.to_u64().expect("undefined")
     }
 
-    /// A rising edge of the ADC's clock.
+    /// A rising edge of the ADC's clock, if it ticks.
     pub fn adc_edge(&mut self) {
-        self.sim.step(&self.adc);
-        self.record(Edge::Adc);
+        if !self.clocked {
+            return;
+        }
+        self.beats = self.beats.wrapping_add(1);
+        let beat = self.beats / clocks::PRESCALER % 2 != 0;
+        if beat != self.levels.beat {
+            self.levels.beat = beat;
+            self.set(self.inputs.beat, beat.into(), 1);
+        }
+        if self.resets.adc == 0 {
+            self.sim.step(&self.adc);
+            return self.record(Edge::Adc);
+        }
+        self.adc_reset_edge();
+        if self.resets.first == 0 {
+            self.resets.adc -= 1;
+        }
     }
 
     /// A rising edge of the host port's clock.
     pub fn host_edge(&mut self) {
-        self.sim.step(&self.host);
-        self.record(Edge::Host);
+        let Resets { first, adc, bridge } = &mut self.resets;
+        if *bridge == 0 {
+            self.sim.step(&self.host);
+            return self.record(Edge::Host);
+        }
+        if self.clocked {
+            if *first > 0 {
+                *first -= 1;
+            } else if *adc == 0 {
+                *bridge -= 1;
+            }
+        }
+        self.bridge_reset_edge();
     }
 
     /// Sets the ADC's output.

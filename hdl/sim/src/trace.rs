@@ -5,8 +5,8 @@
 //!
 //! | bytes | field |
 //! |---|---|
-//! | 1 | bits 0 and 1: [`Edge`]; bit 2: inputs follow; bit 3: outputs follow. What does not follow is as before, and all 0 before the first |
-//! | 4 | inputs before the edge: sample (14 bits), over range, interlock, `sck`, `cs_n`, lines (4 bits) |
+//! | 1 | bits 0 to 2: [`Edge`]; bit 3: inputs follow; bit 4: outputs follow. What does not follow is as before, and all 0 before the first |
+//! | 4 | inputs before the edge: sample (14 bits), over range, interlock, `sck`, `cs_n`, lines (4 bits), beat, PLL locked and clock alive together, design (8 bits) |
 //! | 12 | outputs after it: rows; columns; enable, frame ready, raw ready, access, lines (4 bits), drive (4 bits) |
 
 use nirspi_hdl_model::AdcSample;
@@ -24,10 +24,11 @@ pub(crate) enum Edge {
     Host = 1,
     AdcReset = 2,
     HostReset = 3,
+    BridgeReset = 4,
 }
 
-const INPUTS: u8 = 1 << 2;
-const OUTPUTS: u8 = 1 << 3;
+const INPUTS: u8 = 1 << 3;
+const OUTPUTS: u8 = 1 << 4;
 
 /// Levels of the inputs.
 #[derive(Debug, Clone, Copy, Default)]
@@ -37,6 +38,10 @@ pub(crate) struct Levels {
     pub sck: bool,
     pub selected: bool,
     pub lines: u8,
+    pub beat: bool,
+    /// The PLL is locked and the clock alive.
+    pub healthy: bool,
+    pub design: u8,
 }
 
 impl Levels {
@@ -47,6 +52,9 @@ impl Levels {
             | u32::from(self.sck) << 16
             | u32::from(!self.selected) << 17
             | u32::from(self.lines & 0xF) << 18
+            | u32::from(self.beat) << 22
+            | u32::from(self.healthy) << 23
+            | u32::from(self.design) << 24
     }
 }
 

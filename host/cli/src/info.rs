@@ -58,8 +58,6 @@ fn say(report: &Info) -> Result<()> {
         let verdict = advice.as_deref().unwrap_or("as expected");
         print::line(format_args!("{name:<13} {camera:<9} expected {expected:<9} {verdict}"))?;
     }
-    if !report.fpga_answers {
-        print::line("the FPGA does not answer: is it powered, and is its gateware loaded?")?;
-    }
+    print::line(&report.fpga)?;
     report.reports.iter().try_for_each(print::line)
 }

@@ -21,8 +21,11 @@ pub use check::{Check, Limit, Verdict};
 
 use crate::calibration::{CalibrationError, Settling, calibrate};
 use crate::causes;
+use crate::fpga::{Fpga, FpgaProblem, design_in_words};
 use crate::session::{IgnorePackets, Session, SessionError};
-use nirspi_wire::{ADC_MAX, CLOCKS_PER_PATTERN, SelfTestReport};
+use crate::versions::of_register;
+use nirspi_wire::register::{IDENTITY, clocks};
+use nirspi_wire::{ADC_HZ, ADC_MAX, CLOCKS_PER_PATTERN, SelfTestReport};
 use std::time::Duration;
 
 /// Least step of all LEDs together, as a share of the ADC's range. With a smaller step, a single
@@ -33,6 +36,12 @@ const BLANKED: u16 = 2;
 /// Least share of a slot's light that must be read in its own slot at the fastest setting. With a
 /// smaller share, correcting the leak more than doubles the noise.
 const MIN_OWN_SHARE: f64 = 0.5;
+
+/// Without these, every later check would fail for the reason that they name.
+const NEEDED: u32 =
+    SelfTestReport::FPGA_IDENTITY | SelfTestReport::GATEWARE | SelfTestReport::ADC_CLOCK;
+const STEP: &str = "light of all LEDs";
+const OWN: &str = "settling at 25 MHz";
 
 /// The demands on a link.
 #[derive(Debug, Clone, Copy)]
@@ -74,7 +83,22 @@ pub fn run(
     begin: &mut dyn FnMut(usize),
 ) -> Result<SelfTest, SessionError> {
     begin(0);
-    let mut checks = device(session.self_test(&mut IgnorePackets)?);
+    let report = session.self_test(&mut IgnorePackets)?;
+    let mut checks = device(report, &Fpga::ask(session, &mut IgnorePackets)?);
+    if report.failed & NEEDED != 0 {
+        let later = [
+            generator::NAME,
+            STEP,
+            OWN,
+            latency::NAME,
+            leds::LINES,
+            leds::SUPPLY,
+            link::SPEED,
+            link::LOSSES,
+        ];
+        checks.extend(later.map(|name| Check::skipped(name, "needs the FPGA and its ADC clock")));
+        return Ok(SelfTest { checks, settling: None });
+    }
     begin(1);
     checks.extend(unless_refused(&[generator::NAME], generator::check(session))?);
     begin(2);
@@ -138,8 +162,23 @@ fn min_step_counts() -> f64 {
 }
 
 /// One check for each bit of the device's report, named as in the protocol. A bit that this program
-/// does not know has its number as name.
-fn device(report: SelfTestReport) -> Vec<Check> {
+/// does not know has its number as name. What the FPGA's registers say stands beside the checks of the FPGA.
+fn device(report: SelfTestReport, fpga: &Fpga) -> Vec<Check> {
+    let told = |words: Result<String, FpgaProblem>| words.unwrap_or_else(|p| p.to_string());
+    let note = |bit: u32| match 1 << bit {
+        SelfTestReport::FPGA_IDENTITY => {
+            told(fpga.check_identity().map(|()| format!("{IDENTITY:#010x} as expected")))
+        }
+        SelfTestReport::GATEWARE => told(fpga.check_gateware().map(|design| {
+            let version = of_register(fpga.version().unwrap_or_default());
+            format!("{version}, {}", design_in_words(design))
+        })),
+        SelfTestReport::ADC_CLOCK => told(fpga.check_clock().map(|mhz| {
+            let (expected, off) = (ADC_HZ / 1_000_000, clocks::TOLERANCE_PERCENT);
+            format!("{mhz:.2} MHz by the FPGA's oscillator, expected {expected} MHz within {off} %")
+        })),
+        _ => String::new(),
+    };
     let named = |bit: u32| SelfTestReport::NAMES.iter().find(|(mask, _)| *mask == 1 << bit);
     (0..u32::BITS)
         .filter_map(|bit| {
@@ -150,7 +189,7 @@ fn device(report: SelfTestReport) -> Vec<Check> {
             };
             Some(match (report.ran >> bit & 1 != 0, report.failed >> bit & 1 != 0) {
                 (false, _) => Check::skipped(&name, "left out by the device"),
-                (true, failed) => Check::told(&name, !failed, ""),
+                (true, failed) => Check::told(&name, !failed, &note(bit)),
             })
         })
         .collect()
@@ -158,8 +197,6 @@ fn device(report: SelfTestReport) -> Vec<Check> {
 
 /// The checks of the raw bursts.
 fn light_and_settling(settling: Result<&Settling, &String>) -> Vec<Check> {
-    const STEP: &str = "light of all LEDs";
-    const OWN: &str = "settling at 25 MHz";
     let settling = match settling {
         Err(problem) => {
             return vec![
@@ -197,7 +234,7 @@ mod tests {
     #[test]
     fn a_bit_that_only_a_newer_device_knows_is_shown_by_its_number() {
         let report = SelfTestReport { ran: 1 << 30 | 1, failed: 1 << 30 };
-        let checks = device(report);
+        let checks = device(report, &Fpga::default());
         let verdict = |name: &str| {
             checks.iter().find(|check| check.name() == name).map(Check::verdict).unwrap()
         };

@@ -11,10 +11,11 @@ mod tests;
 
 use crate::boards::Board;
 use crate::files::FileError;
+use crate::fpga::Fpga;
 use crate::gateware::{self, GatewareError};
-use crate::session::{CameraIdentity, Session};
+use crate::session::{CameraIdentity, IgnorePackets, Session};
 use crate::versions::of_register;
-use nirspi_wire::version;
+use nirspi_wire::{register::Design, version};
 pub use release::{Asset, Component, MANIFEST, Manifest, Release, Source, pack};
 use serde::Serialize;
 use std::fmt;
@@ -115,6 +116,14 @@ pub enum UpdateError {
     NewerProtocol {
         /// Newest protocol version of the release.
         release: u16,
+    },
+    /// The gateware is not a camera's.
+    #[error(
+        "{file}: this gateware is the bring-up design, expected a camera's; load another with nirspi gateware FILE"
+    )]
+    BringUp {
+        /// The file of the release.
+        file: String,
     },
     /// The gateware does not run.
     #[error(transparent)]
@@ -235,7 +244,12 @@ pub fn load_gateware(
     progress: &mut dyn FnMut(u32),
 ) -> Result<(), UpdateError> {
     let register = gateware::load(session, &change.content, progress)?;
-    expect(Component::Gateware, &of_register(register), &change.asset.version)
+    expect(Component::Gateware, &of_register(register), &change.asset.version)?;
+    let fpga = Fpga::ask(session, &mut IgnorePackets).map_err(GatewareError::from)?;
+    match fpga.check_gateware() {
+        Ok(Design::BringUp) => Err(UpdateError::BringUp { file: change.asset.file.clone() }),
+        _ => Ok(()),
+    }
 }
 
 /// Opens a session with a camera whose firmware was just written, as soon as the camera answers, and

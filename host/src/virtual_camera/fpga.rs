@@ -4,6 +4,8 @@ use nirspi_hdl_model::{AdcSample, Gateware, Lines};
 use nirspi_mcu::{BusError, FpgaBus};
 use nirspi_optics::rain::RainySpots;
 use nirspi_optics::{Chain, LedArray};
+use nirspi_wire::register::{BRING_UP_HZ, Design, loopback};
+use std::collections::VecDeque;
 
 /// ADC clocks between two updates of the drops: one differential sweep, in which a 2 mm drop falls
 /// half a millimetre.
@@ -33,7 +35,13 @@ pub struct OpticalFpga {
     chain: Chain,
     clock: u64,
     rain: Option<Rain>,
+    /// The levels at the LED pins in the last clocks, of a bring-up design.
+    loopback: Option<VecDeque<Lines>>,
 }
+
+/// Clocks from the choice of the levels at the LED pins to the sample that `Design::BringUp` makes of them: two
+/// registers on the way out, one on the way in, four of `loopback`.
+const LOOPBACK_CLOCKS: usize = 7;
 
 /// Rain between the array and the scene.
 struct Rain {
@@ -49,7 +57,44 @@ impl OpticalFpga {
     pub fn new(array: LedArray, chain: Chain) -> Self {
         let mut gateware = Gateware::new();
         gateware.set_interlock(true);
-        Self { gateware, array, wiring: None, chain, clock: 0, rain: None }
+        Self { gateware, array, wiring: None, chain, clock: 0, rain: None, loopback: None }
+    }
+
+    /// The bring-up design on the same boards: neither ADC nor LEDs.
+    #[must_use]
+    pub fn bring_up(self) -> Self {
+        let mut gateware = Gateware::of(Design::BringUp);
+        gateware.set_adc_clock(Some(BRING_UP_HZ));
+        gateware.set_interlock(true);
+        let loopback = Some(VecDeque::from([Lines::default(); LOOPBACK_CLOCKS]));
+        Self { gateware, loopback, ..self }
+    }
+
+    /// The same camera with another frequency of the ADC's clock in Hz; `None` is no clock at all.
+    #[must_use]
+    pub fn adc_clock(mut self, hz: Option<u32>) -> Self {
+        self.gateware.set_adc_clock(hz);
+        self
+    }
+
+    /// The sample of a clock in a run.
+    fn sample(&mut self, at: u64) -> AdcSample {
+        let lines = self.gateware.lines();
+        if let Some(late) = &mut self.loopback {
+            late.push_back(lines);
+            let seen = late.pop_front().unwrap_or_default();
+            let code = loopback(seen.rows, seen.columns, seen.enable);
+            return AdcSample { code, over_range: false };
+        }
+        if self.rain.is_some() {
+            self.look_at_the_rain(at);
+        }
+        let light = match &mut self.wiring {
+            None => self.array.light(lines.rows, lines.columns, lines.enable),
+            Some(wiring) => wiring(&mut self.array, lines),
+        };
+        let sample = self.chain.sample(light);
+        AdcSample { code: sample.counts, over_range: sample.over_range }
     }
 
     /// The same camera with other wiring between FPGA and LEDs.
@@ -83,19 +128,13 @@ impl SimulatedFpga for OpticalFpga {
     fn advance(&mut self, clocks: u32) {
         let begun = self.clock;
         self.clock += u64::from(clocks);
+        if !self.gateware.has_adc_clock() {
+            return;
+        }
         for passed in 0..clocks {
             // The ADC is not read outside a run, and drawing its noise is most of the work.
             let sample = if self.gateware.running() {
-                if self.rain.is_some() {
-                    self.look_at_the_rain(begun + u64::from(passed));
-                }
-                let lines = self.gateware.lines();
-                let light = match &mut self.wiring {
-                    None => self.array.light(lines.rows, lines.columns, lines.enable),
-                    Some(wiring) => wiring(&mut self.array, lines),
-                };
-                let sample = self.chain.sample(light);
-                AdcSample { code: sample.counts, over_range: sample.over_range }
+                self.sample(begun + u64::from(passed))
             } else {
                 AdcSample { code: 0, over_range: false }
             };

@@ -2,7 +2,7 @@
 
 use super::support::*;
 use nirspi_wire::packet::MAX_HOST_PACKET;
-use nirspi_wire::register::{IDENTITY, ORDER_TABLE, Register, mode};
+use nirspi_wire::register::{Design, IDENTITY, ORDER_TABLE, Register, mode};
 use nirspi_wire::samples::Words;
 use nirspi_wire::{
     Answer, Capabilities, Command, ConfigField, ConfigProblem, Configuration, DeviceMessage,
@@ -21,7 +21,7 @@ fn hello_tells_who_the_device_is() {
     let expected = Identity {
         protocol: version::CURRENT,
         firmware: Version(1, 2, 3),
-        gateware: Version(0, 1, 0),
+        gateware: Version(0, 2, 0),
         board: "bench",
         serial: "0001",
         side: 32,
@@ -31,6 +31,18 @@ fn hello_tells_who_the_device_is() {
         capabilities: Tail(Some(Capabilities::LOAD_GATEWARE)),
     };
     assert_eq!(identity, expected);
+}
+
+#[test]
+fn a_camera_says_in_its_greeting_that_its_fpga_runs_the_bring_up_design() {
+    let mut bench = Bench::new();
+    bench.fpga.registers.insert(Register::Design.address(), Design::BringUp as u32);
+    let Ok(Answer::Hello(identity)) = bench.ask(Command::Hello { protocol: version::CURRENT })
+    else {
+        panic!("no identity");
+    };
+    let capabilities = Capabilities::LOAD_GATEWARE.with(Capabilities::BRING_UP);
+    assert_eq!(identity.capabilities, Tail(Some(capabilities)));
 }
 
 #[test]

@@ -3,10 +3,10 @@
 use crate::{BusError, FpgaBus};
 use nirspi_wire::fpga::{Header, Sums};
 use nirspi_wire::register::{
-    DUTY_LIMIT_MAX, FaultCode, IDENTITY, ORDER_TABLE, Register, TEST_SEED, control, mode, status,
-    test_sample,
+    DUTY_LIMIT_MAX, FaultCode, IDENTITY, NO_CLOCK, ORDER_TABLE, Register, TEST_SEED, clocks,
+    control, mode, status, test_sample,
 };
-use nirspi_wire::{FrameFlags, crc32};
+use nirspi_wire::{ADC_HZ, FrameFlags, crc32};
 use std::collections::BTreeMap;
 use std::vec::Vec;
 
@@ -35,13 +35,20 @@ pub struct FakeFpga {
     /// Bits of the data bus that always read 1.
     pub stuck_ones: u32,
     pub accesses: u32,
+    /// The ADC has no clock.
+    pub clockless: bool,
+    /// Bits that the wires invert in the read after this many others.
+    pub noise: Option<(u32, u32)>,
     config_error: bool,
     after_loss: bool,
 }
 
 impl Default for FakeFpga {
     fn default() -> Self {
-        let registers = Register::ALL.iter().map(|r| (r.address(), r.reset())).collect();
+        let mut registers: BTreeMap<_, _> =
+            Register::ALL.iter().map(|r| (r.address(), r.reset())).collect();
+        let ready = clocks::LOCKED | clocks::ALIVE | clocks::READY;
+        registers.insert(Register::Clocks.address(), ready | ADC_HZ / clocks::UNIT_HZ);
         Self {
             registers,
             identity: IDENTITY,
@@ -60,6 +67,8 @@ impl Default for FakeFpga {
             lost_address: None,
             stuck_ones: 0,
             accesses: 0,
+            clockless: false,
+            noise: None,
             config_error: false,
             after_loss: false,
         }
@@ -72,7 +81,7 @@ impl FakeFpga {
     }
 
     pub fn leds_on(&self) -> bool {
-        self.running && self.interlock_closed && self.fault == FaultCode::None
+        self.running && self.interlock_closed && self.fault == FaultCode::None && !self.clockless
     }
 
     /// Latches a fault, which ends the run.
@@ -226,6 +235,10 @@ impl FpgaBus for FakeFpga {
         }
         let value = match Register::at(address) {
             Some(Register::Identity) => self.identity,
+            Some(Register::Version | Register::Design) => self.registers[&address],
+            Some(Register::Clocks) if self.clockless => 0,
+            Some(Register::Clocks) => self.registers[&address],
+            _ if self.clockless => NO_CLOCK,
             Some(Register::Status) => self.status(),
             Some(Register::Fault) => self.fault as u32,
             Some(Register::FramesMade) => self.made,
@@ -235,7 +248,15 @@ impl FpgaBus for FakeFpga {
             Some(Register::Control) => 0,
             _ => self.registers.get(&address).copied().unwrap_or(0),
         };
-        Ok(value | self.stuck_ones)
+        let flipped = match &mut self.noise {
+            Some((0, bits)) => std::mem::take(bits),
+            Some((reads, _)) => {
+                *reads -= 1;
+                0
+            }
+            None => 0,
+        };
+        Ok((value ^ flipped) | self.stuck_ones)
     }
 
     fn write(&mut self, address: u16, value: u32) -> Result<(), BusError> {
@@ -243,7 +264,7 @@ impl FpgaBus for FakeFpga {
         if self.dead {
             return Err(BusError::Timeout);
         }
-        if self.deaf || self.lost_address == Some(address) {
+        if self.deaf || self.clockless || self.lost_address == Some(address) {
             return Ok(());
         }
         if address == Register::Control.address() {

@@ -254,5 +254,5 @@ fn the_self_test_tries_the_frame_memory_too() {
     else {
         panic!("{heard:?}");
     };
-    assert_eq!(report, SelfTestReport { ran: 0b111_1111, failed: 0 });
+    assert_eq!(report, SelfTestReport { ran: 0b1_1111_1111, failed: 0 });
 }

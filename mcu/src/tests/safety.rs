@@ -3,7 +3,7 @@
 
 use super::support::*;
 use crate::Micros;
-use nirspi_wire::register::{FaultCode, IDENTITY, Register};
+use nirspi_wire::register::{FaultCode, IDENTITY, NO_CLOCK, Register};
 use nirspi_wire::{Answer, Command, Configuration, EventKind, Fault, Refusal, RunLength, State};
 
 /// Breaks something in a running camera, lets `wait` pass, polls once, and checks everything that a
@@ -100,6 +100,46 @@ fn an_fpga_of_another_identity() {
         Fault::FpgaAbsent { identity: 0xFFFF_FFFF },
         |bench| bench.fpga.identity = IDENTITY,
     );
+}
+
+#[test]
+fn an_adc_clock_that_is_lost_and_comes_back() {
+    expect_fault(
+        |bench| bench.fpga.clockless = true,
+        1_000,
+        Fault::FpgaAbsent { identity: NO_CLOCK },
+        |bench| bench.fpga.reset(),
+    );
+}
+
+#[test]
+fn one_wrong_bit_in_a_check_ends_no_run_and_a_wrong_bit_in_each_does() {
+    for read in 0..2 {
+        for bit in 0..u32::BITS {
+            let mut bench = Bench::running(RunLength::Continuous);
+            bench.fpga.noise = Some((read, 1 << bit));
+            bench.after(1_000);
+            assert_eq!(bench.fpga.noise, Some((0, 0)), "no check has read it");
+            assert!(bench.fpga.leds_on(), "bit {bit} of read {read}");
+            assert_eq!(bench.heard_events(), []);
+        }
+    }
+    let mut bench = Bench::running(RunLength::Continuous);
+    bench.fpga.identity = IDENTITY ^ 1;
+    bench.after(1_000);
+    assert!(!bench.fpga.leds_on());
+}
+
+#[test]
+fn gateware_of_another_version_or_design_is_refused_before_light() {
+    for (register, other) in [(Register::Version, 0x0000_0100), (Register::Design, 9)] {
+        let mut bench = Bench::open();
+        bench.fpga.registers.insert(register.address(), other);
+        let refused = Err(Refusal::Fault(Fault::FpgaAbsent { identity: IDENTITY }));
+        assert_eq!(bench.ask(Command::Configure(SMALL)), refused, "{register:?}");
+        bench.fpga.reset();
+        assert_eq!(bench.ask(Command::Configure(SMALL)), Ok(Answer::Done));
+    }
 }
 
 #[test]

@@ -1,12 +1,12 @@
 //! Tests that each check passes on a good device and fails on a device with one matching fault.
 
 use super::support::*;
-use nirspi_wire::register::{Register, mode};
+use nirspi_wire::register::{Register, clocks, mode};
 use nirspi_wire::{
     Answer, Command, EventKind, Fault, Refusal, RunLength, SelfTestReport as Report, State,
 };
 
-const ALL: u32 = 0b11_1111;
+const ALL: u32 = 0b1_1011_1111;
 
 fn self_test(bench: &mut Bench) -> Report {
     bench.fpga.instant = true;
@@ -90,11 +90,32 @@ fn a_bit_of_the_bus_that_is_stuck_is_found_without_light() {
     let mut bench = Bench::configured();
     bench.fpga.stuck_ones = 1 << 18;
     let report = self_test(&mut bench);
-    assert_eq!(report.ran, ALL & !Report::TEST_FRAME);
+    let left_out = Report::TEST_FRAME | Report::GATEWARE | Report::ADC_CLOCK;
+    assert_eq!(report.ran, ALL & !left_out);
     assert_eq!(report.failed, Report::FPGA_IDENTITY | Report::FPGA_BUS);
     let mut bench = Bench::configured();
     bench.fpga.deaf = true;
     assert_eq!(self_test(&mut bench).failed, Report::FPGA_BUS);
+}
+
+#[test]
+fn a_missing_adc_clock_and_other_gateware_fail_their_own_check_alone() {
+    let mut bench = Bench::open();
+    bench.fpga.clockless = true;
+    let needs_clock = Report::FPGA_BUS | Report::LEDS_OFF | Report::TEST_FRAME;
+    let expected = Report { ran: ALL & !needs_clock, failed: Report::ADC_CLOCK };
+    assert_eq!(self_test(&mut bench), expected);
+
+    let mut bench = Bench::open();
+    let half_as_fast = bench.fpga.get(Register::Clocks) & !clocks::FREQUENCY | 6_250;
+    bench.fpga.registers.insert(Register::Clocks.address(), half_as_fast);
+    assert_eq!(self_test(&mut bench).failed, Report::ADC_CLOCK);
+
+    for (register, other) in [(Register::Version, 0x0000_0100), (Register::Design, 9)] {
+        let mut bench = Bench::open();
+        bench.fpga.registers.insert(register.address(), other);
+        assert_eq!(self_test(&mut bench).failed, Report::GATEWARE, "{register:?}");
+    }
 }
 
 #[test]

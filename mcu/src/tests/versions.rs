@@ -2,6 +2,7 @@
 
 use super::support::*;
 use nirspi_wire::packet::{encode, unseal};
+use nirspi_wire::register::Register;
 use nirspi_wire::{
     Answer, Capabilities, Command, EventKind, Refusal, RunLength, State, Tail, version,
 };
@@ -37,6 +38,8 @@ fn payloads(bench: &mut Bench) -> Vec<Vec<u8>> {
 #[test]
 fn a_host_of_version_1_gets_the_bytes_of_version_1() {
     let mut bench = Bench::new();
+    // The gateware of that time.
+    bench.fpga.registers.insert(Register::Version.address(), 0x0000_0100);
     // Id 1, Hello, protocol 1: the bytes that a host of version 1 sends.
     bench.receive(&packet_of(&[1, 0, 1]));
     bench.poll();

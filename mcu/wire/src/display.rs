@@ -3,7 +3,7 @@
 //! The firmware sends values and no text, so the firmware does not link this module.
 
 use crate::message::HOST_SILENCE_US;
-use crate::register::IDENTITY;
+use crate::register::{IDENTITY, NO_CLOCK};
 use crate::{ConfigField, Fault, State};
 use core::fmt::{Display, Formatter, Result};
 
@@ -41,7 +41,10 @@ impl Display for Fault {
             Self::FpgaWatchdog => f.write_str("the firmware left the FPGA alone for too long"),
             Self::FpgaAbsent { identity: 0 | u32::MAX } => f.write_str("the FPGA does not answer"),
             Self::FpgaAbsent { identity: IDENTITY } => {
-                f.write_str("the FPGA reports a fault that this firmware does not know")
+                f.write_str("the FPGA's gateware is of another version than the firmware")
+            }
+            Self::FpgaAbsent { identity: NO_CLOCK } => {
+                f.write_str("the FPGA answers, but the ADC's clock does not reach it")
             }
             Self::FpgaAbsent { identity } => {
                 write!(f, "the FPGA's identity is {identity:#010x}, expected {IDENTITY:#010x}")
@@ -94,7 +97,8 @@ mod tests {
         assert_eq!(told(0), "the FPGA does not answer");
         assert_eq!(told(u32::MAX), told(0));
         assert!(told(0x1234).contains("0x00001234"), "{}", told(0x1234));
-        assert_ne!(told(IDENTITY), told(0));
+        let all = [told(IDENTITY), told(0), told(NO_CLOCK), told(7)];
+        assert!(all.iter().enumerate().all(|(at, words)| !all[..at].contains(words)), "{all:?}");
     }
 
     #[test]

@@ -262,15 +262,18 @@ impl Capabilities {
     pub const LOAD_GATEWARE: Self = Self(1 << 1);
     /// The camera can restart into its chip's boot loader.
     pub const BOOTLOADER: Self = Self(1 << 2);
+    /// The FPGA runs the bring-up design: there is no ADC, and samples are made of the levels of the LED lines.
+    pub const BRING_UP: Self = Self(1 << 3);
 
     /// The first protocol version that has capabilities.
     pub const SINCE: u16 = 2;
 
     /// Name of every capability, by bit.
-    pub const NAMES: [(Self, &'static str); 3] = [
+    pub const NAMES: [(Self, &'static str); 4] = [
         (Self::DEPTH, "depth"),
         (Self::LOAD_GATEWARE, "load gateware"),
         (Self::BOOTLOADER, "boot loader"),
+        (Self::BRING_UP, "bring-up"),
     ];
 
     /// Whether all bits of `other` are set.
@@ -401,9 +404,11 @@ pub enum Fault {
     OverRange,
     /// The firmware did not access the FPGA in time.
     FpgaWatchdog,
-    /// The FPGA does not answer, or answers with another identity.
+    /// The FPGA does not answer, answers with another identity, or cannot be used.
     FpgaAbsent {
-        /// What the identity register read.
+        /// What the identity register read. [`NO_CLOCK`](crate::register::NO_CLOCK): the identity is right, and
+        /// the ADC's clock is missing. [`IDENTITY`](crate::register::IDENTITY): the gateware is of another
+        /// version than the firmware's.
         identity: u32,
     },
     /// The FPGA refused a configuration that the firmware had accepted.
@@ -619,9 +624,13 @@ impl SelfTestReport {
     pub const INTERLOCK: u32 = 1 << 5;
     /// The memory that frames pass through holds every pattern.
     pub const MEMORY: u32 = 1 << 6;
+    /// The FPGA's gateware is of a version and a design that the firmware knows.
+    pub const GATEWARE: u32 = 1 << 7;
+    /// The ADC's clock ticks at its frequency. Without it, the checks that need it are left out.
+    pub const ADC_CLOCK: u32 = 1 << 8;
 
     /// Name of every check, by bit.
-    pub const NAMES: [(u32, &'static str); 7] = [
+    pub const NAMES: [(u32, &'static str); 9] = [
         (Self::FPGA_IDENTITY, "FPGA identity"),
         (Self::FPGA_BUS, "FPGA bus"),
         (Self::LEDS_OFF, "LEDs off at rest"),
@@ -629,5 +638,7 @@ impl SelfTestReport {
         (Self::TEMPERATURE, "temperature sensor"),
         (Self::INTERLOCK, "interlock"),
         (Self::MEMORY, "frame memory"),
+        (Self::GATEWARE, "gateware"),
+        (Self::ADC_CLOCK, "ADC clock"),
     ];
 }

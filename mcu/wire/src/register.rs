@@ -13,6 +13,10 @@
 //!   table is not copied: writes to it while running are refused and set [`status::WRITE_REFUSED`].
 //! * A frame that is complete while the one before has not been released is lost: counted in
 //!   [`Register::FramesLost`], and the next frame delivered carries `AFTER_LOSS`.
+//! * The host port has a clock of its own. [`Register::Identity`], [`Register::Version`],
+//!   [`Register::Clocks`] and [`Register::Design`] are answered with or without the ADC's clock. Everything
+//!   else needs the ADC's clock: without it a read gives [`NO_CLOCK`], a write does nothing, and frames
+//!   and bursts are zeros. When the clock comes back, everything but these four is as after reset.
 //! * LEDs are on only while a run or raw burst is under way, no fault is latched and the interlock
 //!   input is closed. A fault ends the run at once, discards the unfinished frame and latches its
 //!   first code.
@@ -69,7 +73,7 @@ registers! {
     /// Always [`IDENTITY`].
     Identity = 0x00, ReadOnly, IDENTITY;
     /// Gateware version, `major << 16 | minor << 8 | patch`.
-    Version = 0x01, ReadOnly, 0x0000_0100;
+    Version = 0x01, ReadOnly, 0x0000_0200;
     /// Holds what was written, for bus tests.
     Scratch = 0x02, ReadWrite, 0;
     /// See [`control`].
@@ -78,6 +82,10 @@ registers! {
     Status = 0x04, ReadOnly, 0;
     /// Latched reason for LEDs off, see [`FaultCode`].
     Fault = 0x05, ReadOnly, 0;
+    /// The ADC's clock as the host port sees it, see [`clocks`].
+    Clocks = 0x06, ReadOnly, 0;
+    /// What the gateware is built for, see [`Design`].
+    Design = 0x07, ReadOnly, Design::Camera as u32;
     /// See [`mode`].
     Mode = 0x08, ReadWrite, 0;
     /// Patterns of a sweep, 1 to 1024.
@@ -117,6 +125,16 @@ registers! {
 
 /// `"NSPI"` in ASCII.
 pub const IDENTITY: u32 = 0x4E53_5049;
+/// What a read gives while the ADC's domain has no clock or is in reset. No register holds this value by
+/// itself but [`Register::Scratch`] and settings into which it was written.
+pub const NO_CLOCK: u32 = 0xDEAD_C10C;
+/// Whether gateware with this [`Register::Version`] has the registers of this table: the same major and minor
+/// version. Gateware and firmware of one release fit.
+#[must_use]
+pub const fn has_this_map(version: u32) -> bool {
+    version >> 8 == Register::Version.reset() >> 8
+}
+
 /// Address of the order table's first entry; entry `i` is at `ORDER_TABLE + i`, read and write, 10
 /// bits.
 pub const ORDER_TABLE: u16 = 0x0400;
@@ -166,6 +184,76 @@ pub mod status {
     pub const CONFIG_ERROR: u32 = 1 << 6;
     /// The order table was written while running; the next accepted start clears it.
     pub const WRITE_REFUSED: u32 = 1 << 7;
+}
+
+/// Fields of [`Register::Clocks`].
+pub mod clocks {
+    /// Frequency of the ADC's data clock in units of [`UNIT_HZ`], by the FPGA's own oscillator, which is
+    /// off by up to [`TOLERANCE_PERCENT`]. 0 without a clock, and in the first 0.4 ms.
+    pub const FREQUENCY: u32 = 0xFFFF;
+    /// The PLL that cleans the ADC's clock is locked.
+    pub const LOCKED: u32 = 1 << 16;
+    /// The PLL's output ticks.
+    pub const ALIVE: u32 = 1 << 17;
+    /// The ADC's domain is out of reset: its registers answer.
+    pub const READY: u32 = 1 << 18;
+    /// Unit of [`FREQUENCY`].
+    pub const UNIT_HZ: u32 = 10_000;
+    /// Clocks of the host port (310 MHz / 3) in which the ADC's clock is counted: 0.4 ms.
+    pub const WINDOW: u32 = 41_333;
+    /// Clocks of the ADC that count as one. In 0.4 ms, one stands for 10 kHz.
+    pub const PRESCALER: u32 = 4;
+    /// Largest error of the FPGA's own oscillator.
+    pub const TOLERANCE_PERCENT: u32 = 15;
+
+    /// Whether the ADC's domain answers, and its clock is that of [`ADC_HZ`](crate::ADC_HZ) as far as the
+    /// FPGA's oscillator can tell.
+    #[must_use]
+    pub const fn fit(word: u32) -> bool {
+        const EXPECTED: u32 = crate::ADC_HZ / UNIT_HZ;
+        const OFF: u32 = EXPECTED * TOLERANCE_PERCENT / 100;
+        let ready = LOCKED | ALIVE | READY;
+        word & ready == ready && (word & FREQUENCY).abs_diff(EXPECTED) <= OFF
+    }
+}
+
+/// What gateware is built for: the value of [`Register::Design`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Design {
+    /// The camera: clock and samples come from the ADC.
+    Camera = 1,
+    /// Two evaluation boards without an ADC: the clock comes from the FPGA board's oscillator, and samples
+    /// from the levels of the LED lines ([`loopback`]).
+    BringUp = 2,
+}
+
+impl Design {
+    /// The design with this number.
+    #[must_use]
+    pub const fn from_register(value: u32) -> Option<Self> {
+        match value {
+            1 => Some(Self::Camera),
+            2 => Some(Self::BringUp),
+            _ => None,
+        }
+    }
+}
+
+/// Clock of [`Design::BringUp`]: the board's 12 MHz through a PLL.
+pub const BRING_UP_HZ: u32 = 124_800_000;
+/// Counts of one LED of the scene that [`loopback`] sees.
+pub const LOOPBACK_COUNTS: u16 = 256;
+/// Counts of [`loopback`] without light.
+pub const LOOPBACK_DARK: u16 = 512;
+
+/// The sample that [`Design::BringUp`] makes of the levels at the LED pins: the light of an array of which
+/// only the LEDs on the diagonal reach the detector, all equally bright. A line that is stuck or joined to
+/// another shows in the picture.
+#[must_use]
+pub const fn loopback(rows: u32, columns: u32, enable: bool) -> u16 {
+    let lit = if enable { (!(rows ^ columns)).count_ones() } else { 0 };
+    LOOPBACK_DARK + LOOPBACK_COUNTS * lit as u16
 }
 
 /// Bits of [`Register::Mode`].

@@ -2,24 +2,27 @@
 //! field rely on them.
 //!
 //! If a test in this file fails, do not change the test: you have changed what a gateware of version 0.1
-//! means. A new register at a free address is appended here; anything else needs a new
+//! means. A new register at a free address is appended here, with a higher minor `Register::Version`: 0.2
+//! appended `Clocks` and `Design`. Anything else needs a new
 //! `Register::Identity` or major `Register::Version`, and a new file beside this one.
 
 use nirspi_wire::{
     FrameFlags, SelfTestReport,
     fpga::{self, FpgaFrame, Header, Sums},
-    register::{self, FaultCode, Register, control, mode, status, test_sample},
+    register::{self, Design, FaultCode, Register, clocks, control, mode, status, test_sample},
     usb,
 };
 
 /// Address, name, access, value after reset.
 const REGISTERS: &str = "\
 0x0000 Identity      ReadOnly  0x4e535049
-0x0001 Version       ReadOnly  0x00000100
+0x0001 Version       ReadOnly  0x00000200
 0x0002 Scratch       ReadWrite 0x00000000
 0x0003 Control       Command   0x00000000
 0x0004 Status        ReadOnly  0x00000000
 0x0005 Fault         ReadOnly  0x00000000
+0x0006 Clocks        ReadOnly  0x00000000
+0x0007 Design        ReadOnly  0x00000001
 0x0008 Mode          ReadWrite 0x00000000
 0x0009 Patterns      ReadWrite 0x00000400
 0x000a Dwell         ReadWrite 0x00000005
@@ -98,6 +101,8 @@ fn bits_codes_and_limits_are_these() {
         "16 temperature sensor",
         "32 interlock",
         "64 frame memory",
+        "128 gateware",
+        "256 ADC clock",
     ];
     assert_eq!(checks, expected);
     assert_eq!(register::ORDER_TABLE, 0x0400);
@@ -106,6 +111,19 @@ fn bits_codes_and_limits_are_these() {
     assert_eq!(register::DUTY_WINDOW, 1_048_576);
     assert_eq!(register::DUTY_LIMIT_MAX, 1_310_720);
     assert_eq!(register::LATENCY_MAX, 63);
+    assert_eq!(register::NO_CLOCK, 0xDEAD_C10C);
+    let clocks = [clocks::FREQUENCY, clocks::LOCKED, clocks::ALIVE, clocks::READY];
+    assert_eq!(clocks, [0xFFFF, 1 << 16, 1 << 17, 1 << 18]);
+    assert_eq!([clocks::UNIT_HZ, clocks::WINDOW, clocks::PRESCALER], [10_000, 41_333, 4]);
+    let good = clocks::LOCKED | clocks::ALIVE | clocks::READY;
+    let fit = |units: u32| clocks::fit(good | units);
+    assert_eq!([10_624, 10_625, 12_500, 14_375, 14_376].map(fit), [false, true, true, true, false]);
+    assert!(!clocks::fit(12_500 | good & !clocks::READY) && !clocks::fit(0));
+    let fits = [0x0000_0100, 0x0000_0200, 0x0000_0203, 0x0000_0300, 0x0001_0200]
+        .map(register::has_this_map);
+    assert_eq!(fits, [false, true, true, false, false]);
+    let designs: Vec<_> = (0..=3).map(Design::from_register).collect();
+    assert_eq!(designs, [None, Some(Design::Camera), Some(Design::BringUp), None]);
 }
 
 #[test]
@@ -115,6 +133,14 @@ fn the_test_generator_begins_like_this() {
             .take(12)
             .collect();
     assert_eq!(samples, [1, 3, 7, 14, 29, 59, 118, 236, 473, 946, 1893, 3786]);
+}
+
+#[test]
+fn the_bring_up_design_sees_the_lit_leds_of_the_diagonal() {
+    assert_eq!(register::loopback(0, 0, true), 512 + 32 * 256);
+    assert_eq!(register::loopback(0x8000_0001, 0x8000_0000, true), 512 + 31 * 256);
+    assert_eq!(register::loopback(0, u32::MAX, true), 512);
+    assert_eq!(register::loopback(0, 0, false), 512);
 }
 
 #[test]

@@ -2,14 +2,15 @@
 //!
 //! The FPGA is accessed only through its pins, and both of its clocks run all the time.
 
-use nirspi_hdl_model::AdcSample;
+use nirspi_hdl_model::{AdcSample, Lines};
 use nirspi_hdl_sim::{pins::Pins, project::Project};
 use nirspi_optics::{Chain, LedArray};
 use nirspi_wire::fpga::{FpgaFrame, HEADER_BYTES, frame_bytes};
 use nirspi_wire::host_port::{
     DUMMY_CYCLES, QUAD, READ_FRAME, READ_RAW, READ_REGISTER, SCK_DIVIDER, WRITE_REGISTER,
 };
-use nirspi_wire::register::Register;
+use nirspi_wire::register::{Design, Register, loopback};
+use std::collections::VecDeque;
 
 /// Period of the ADC's clock.
 const ADC_PS: u64 = 8_000;
@@ -19,11 +20,41 @@ const HOST_PS: u64 = 10_000;
 /// pins.
 const BETWEEN: u8 = 40;
 
+/// What is in front of the FPGA.
+pub enum Front {
+    /// LEDs, photodiode and ADC.
+    Camera(Box<LedArray>, Box<Chain>),
+    /// Nothing: the bring-up design. The levels at the LED pins come back after these clocks.
+    Loopback(VecDeque<Lines>),
+}
+
+impl Front {
+    /// The bring-up design: two registers on the way out, one on the way in, four of `loopback`.
+    pub fn loopback() -> Self {
+        Self::Loopback(VecDeque::from([Lines::default(); 7]))
+    }
+
+    /// The sample in a clock with these lines.
+    fn sample(&mut self, lines: Lines) -> AdcSample {
+        match self {
+            Self::Camera(array, chain) => {
+                let light = array.light(lines.rows, lines.columns, lines.enable);
+                let sample = chain.sample(light);
+                AdcSample { code: sample.counts, over_range: sample.over_range }
+            }
+            Self::Loopback(late) => {
+                late.push_back(lines);
+                let Lines { rows, columns, enable } = late.pop_front().unwrap_or_default();
+                AdcSample { code: loopback(rows, columns, enable), over_range: false }
+            }
+        }
+    }
+}
+
 /// A powered board.
 pub struct Board {
     pins: Pins,
-    array: LedArray,
-    chain: Chain,
+    front: Front,
     at_pins: AdcSample,
     /// ADC clocks since reset.
     clock: u64,
@@ -43,13 +74,15 @@ pub struct Seen {
 }
 
 impl Board {
-    pub fn new(array: LedArray, chain: Chain) -> Self {
+    pub fn new(front: Front) -> Self {
         let mut pins = Pins::new(&Project::read());
         pins.interlock(true);
+        if matches!(front, Front::Loopback(_)) {
+            pins.design(Design::BringUp);
+        }
         Self {
             pins,
-            array,
-            chain,
+            front,
             at_pins: AdcSample::default(),
             clock: 0,
             next_adc_ps: 0,
@@ -63,6 +96,11 @@ impl Board {
         Seen { clock: self.clock, lit: self.pins.leds().enable, frame_ready, raw_ready }
     }
 
+    /// Takes the ADC's clock away, or brings it back.
+    pub fn set_adc_clock(&mut self, ticks: bool) {
+        self.pins.adc_clock(ticks);
+    }
+
     pub fn interlock(&mut self, closed: bool) {
         self.pins.interlock(closed);
     }
@@ -71,9 +109,7 @@ impl Board {
     /// of the optical chain.
     fn adc_clock(&mut self) {
         let lines = self.pins.leds();
-        let light = self.array.light(lines.rows, lines.columns, lines.enable);
-        let sample = self.chain.sample(light);
-        let sample = AdcSample { code: sample.counts, over_range: sample.over_range };
+        let sample = self.front.sample(lines);
         if self.at_pins != sample {
             self.at_pins = sample;
             self.pins.sample(sample);

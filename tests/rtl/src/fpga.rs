@@ -3,7 +3,7 @@
 //! The simulator cannot leave its thread. Each call waits until the simulator has done its work, so
 //! a run is as repeatable as on one thread.
 
-use crate::board::{Board, Seen};
+use crate::board::{Board, Front, Seen};
 use nirspi::virtual_camera::{SimulatedFpga, VirtualOptics};
 use nirspi_mcu::{BusError, FpgaBus};
 use nirspi_optics::{Chain, LedArray};
@@ -13,6 +13,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 enum Ask {
     Advance(u32),
     Interlock(bool),
+    AdcClock(bool),
     Read(u16),
     Write(u16, u32),
     Frame,
@@ -40,15 +41,30 @@ impl RtlFpga {
     pub fn new(optics: &VirtualOptics, seed: u64) -> Self {
         let array = LedArray::new(optics.footprint(), optics.budget().electrons_per_led);
         let chain = Chain::new(*optics.chain(), seed).unwrap();
+        Self::behind(Front::Camera(Box::new(array), Box::new(chain)))
+    }
+
+    /// Two evaluation boards and the wires between them, with the bring-up design and the interlock closed.
+    pub fn bring_up() -> Self {
+        Self::behind(Front::loopback())
+    }
+
+    /// Takes the ADC's clock away, or brings it back.
+    pub fn adc_clock(&mut self, ticks: bool) {
+        self.ask(Ask::AdcClock(ticks));
+    }
+
+    fn behind(front: Front) -> Self {
         let (asks, asked) = channel();
         let (answer, answers) = channel();
         std::thread::spawn(move || {
-            let mut board = Board::new(array, chain);
+            let mut board = Board::new(front);
             for ask in asked {
                 let mut told = Told::default();
                 match ask {
                     Ask::Advance(clocks) => board.advance(clocks),
                     Ask::Interlock(closed) => board.interlock(closed),
+                    Ask::AdcClock(ticks) => board.set_adc_clock(ticks),
                     Ask::Read(address) => told.value = board.read(address),
                     Ask::Write(address, value) => board.write(address, value),
                     Ask::Frame => told.bytes = board.frame(),

@@ -53,9 +53,20 @@ fn windows() -> Suite {
     Suite { variant, scenario: scenario::across_a_window, rigs: 8, scenarios: 1 }
 }
 
+/// The ADC's clock is lost and comes back.
+fn losses() -> Suite {
+    Suite { variant: Variant::default(), scenario: scenario::clock_lost, rigs: 1, scenarios: 6 }
+}
+
 /// The first difference that a scenario shows. One FPGA's scenarios show nearly every difference.
 pub fn difference(project: &Project) -> Option<String> {
-    let suites = [(scenarios(1), 0), (long_sums(), 0), (windows(), 0), (scenarios(3), SCENARIOS)];
+    let suites = [
+        (scenarios(1), 0),
+        (losses(), 0),
+        (long_sums(), 0),
+        (windows(), 0),
+        (scenarios(3), SCENARIOS),
+    ];
     suites.iter().find_map(|(suite, first)| suite.run(project, *first).err())
 }
 
@@ -101,6 +112,12 @@ fn sums_that_wrap_say_so_in_their_own_frame_only() {
 fn duty_windows_and_both_words_of_the_clock_agree() {
     let tallies = windows().run(&Project::read(), 0).unwrap_or_else(|d| panic!("{d}"));
     assert!(count(&tallies, |t| t.faults[2]) >= 5 && count(&tallies, |t| t.faults[0]) >= 5);
+}
+
+#[test]
+fn a_lost_adc_clock_is_told_and_leaves_nothing_behind() {
+    let tallies = losses().run(&Project::read(), 0).unwrap_or_else(|d| panic!("{d}"));
+    assert!(count(&tallies, |t| t.starts) >= 40 && count(&tallies, |t| t.lit_clocks) > 1000);
 }
 
 /// The instrument's own measurement: 1024 patterns and complements of 5 clocks, once, read by four

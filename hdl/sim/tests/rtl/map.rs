@@ -6,7 +6,7 @@
 
 use nirspi_wire::{
     FrameFlags, PATTERNS, fpga, host_port,
-    register::{self, FaultCode, Register, control, mode, status},
+    register::{self, Design, FaultCode, Register, clocks, control, mode, status},
 };
 use std::fmt::Write;
 
@@ -39,6 +39,15 @@ pub fn package() -> String {
         ("DUTY_LIMIT_MAX", register::DUTY_LIMIT_MAX),
         ("LATENCY_MAX", register::LATENCY_MAX.into()),
         ("TEST_SEED", register::TEST_SEED.into()),
+        ("NO_CLOCK", register::NO_CLOCK),
+        ("CLOCKS_WINDOW", clocks::WINDOW),
+        ("CLOCKS_LOCKED", clocks::LOCKED),
+        ("CLOCKS_ALIVE", clocks::ALIVE),
+        ("CLOCKS_READY", clocks::READY),
+        ("DESIGN_CAMERA", Design::Camera as u32),
+        ("DESIGN_BRING_UP", Design::BringUp as u32),
+        ("LOOPBACK_COUNTS", register::LOOPBACK_COUNTS.into()),
+        ("LOOPBACK_DARK", register::LOOPBACK_DARK.into()),
         ("CONTROL_STOP", control::STOP),
         ("CONTROL_CLEAR_FAULT", control::CLEAR_FAULT),
         ("CONTROL_RELEASE", control::RELEASE),

@@ -15,7 +15,7 @@ use nirspi_hdl_model::{AdcSample, Gateware, Lines};
 use nirspi_wire::{
     FrameFlags, crc32,
     fpga::{FpgaFrame, Sums},
-    register::{Register, control},
+    register::{Design, Register, clocks, control},
 };
 use std::collections::VecDeque;
 
@@ -35,6 +35,9 @@ const STOP_CLOCKS: u64 = 9;
 /// Clocks for which LEDs may be lit longer than in the model after any other trip and after a raw
 /// burst.
 const TRIP_CLOCKS: u64 = 7;
+
+/// Period of the ADC's clock.
+const ADC_PS: u64 = 8000;
 
 /// An access of the host.
 #[derive(Debug, Clone, Copy)]
@@ -82,6 +85,9 @@ pub struct Rig {
     dark: std::ops::Range<u64>,
     /// The interlock pin has switched the LEDs off, and no run has begun since.
     put_out: bool,
+    /// Level of the interlock pin.
+    closed: bool,
+    design: Design,
     pub(crate) asked: Option<Access>,
     pub(crate) answer: Option<Answer>,
     start: Option<(u64, u32)>,
@@ -163,6 +169,8 @@ impl Rig {
             interlock: VecDeque::new(),
             dark: 0..u64::MAX,
             put_out: true,
+            closed: false,
+            design: Design::Camera,
             asked: None,
             answer: None,
             start: None,
@@ -256,8 +264,55 @@ impl Rig {
         }
     }
 
+    /// Takes the ADC's clock away. An access under way is forgotten.
+    pub fn lose_adc_clock(&mut self) {
+        self.pins.adc_clock(false);
+        self.model.set_adc_clock(None);
+        self.asked = None;
+        self.start = None;
+    }
+
+    /// Brings the ADC's clock back, as the clock of this design, and waits until accesses reach the ADC's domain.
+    pub fn bring_adc_clock_back(&mut self, design: Design) {
+        self.design = design;
+        self.pins.design(design);
+        self.pins.adc_clock(true);
+        while !self.pins.adc_answers() {
+            self.host_clock();
+        }
+    }
+
+    /// The ADC's domain has left its reset: RTL and model begin anew.
+    fn restart(&mut self) {
+        self.model = Gateware::of(self.design);
+        self.clock = 0;
+        self.seen.clear();
+        self.interlock.clear();
+        (self.dark, self.put_out) = (0..u64::MAX, true);
+        (self.grace, self.just_lit) = (0, false);
+        self.tell("the ADC's clock is back".into());
+        self.interlock(self.closed);
+    }
+
+    /// Checks what `Clocks` reads after two windows: the flags of the model, and the frequency of the two clocks
+    /// here to within one unit.
+    pub fn check_clocks(&mut self) {
+        self.wait(2 * clocks::WINDOW + 10);
+        let found = self.read(Register::Clocks.address()) & clocks::FREQUENCY;
+        let ticks = u64::from(clocks::WINDOW) * self.port.host_ps / ADC_PS;
+        let expected = ticks as u32 / clocks::PRESCALER * u32::from(self.pins.adc_answers());
+        self.expect("frequency is as measured", &(found.abs_diff(expected) <= 1), &true);
+    }
+
     /// One clock of the ADC.
     fn adc_clock(&mut self) {
+        if !self.pins.adc_runs() {
+            self.pins.adc_edge();
+            if self.pins.adc_runs() {
+                self.restart();
+            }
+            return;
+        }
         let now = self.clock;
         // Samples of a clock's light are at the pins together with the clock's lines.
         let mut sample = sample(self.seed, self.over_range_rate, now);
@@ -378,7 +433,7 @@ impl Rig {
     /// One clock of the host port, and the clocks of the ADC before it.
     pub(crate) fn host_clock(&mut self) {
         while self.next_adc_ps <= self.next_host_ps {
-            self.next_adc_ps += 8000;
+            self.next_adc_ps += ADC_PS;
             self.adc_clock();
         }
         self.next_host_ps += self.port.host_ps;
@@ -399,6 +454,7 @@ impl Rig {
     }
 
     pub fn interlock(&mut self, closed: bool) {
+        self.closed = closed;
         self.pins.interlock(closed);
         let at = self.clock + INTERLOCK - DEPTH;
         // A level that no clock has sampled has no effect.

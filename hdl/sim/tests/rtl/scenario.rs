@@ -3,7 +3,8 @@
 //! A scenario depends on its seed alone, and never on an answer of the RTL.
 
 use crate::rig::{Port, Rig};
-use nirspi_wire::register::{DUTY_LIMIT_MAX, ORDER_TABLE, Register as R, control, mode};
+use nirspi_wire::host_port::{READ_FRAME, READ_RAW};
+use nirspi_wire::register::{DUTY_LIMIT_MAX, Design, ORDER_TABLE, Register as R, control, mode};
 
 /// Random numbers (SplitMix64).
 pub struct Dice(u64);
@@ -244,5 +245,45 @@ pub fn across_a_window(rig: &mut Rig, seed: u64) {
         rig.read(R::ClockLow.address());
         rig.read(R::ClockHigh.address());
         rig.stream(false, usize::MAX);
+    }
+}
+
+/// The ADC's clock goes away in a run, in the middle of an access or between accesses, and comes back.
+pub fn clock_lost(rig: &mut Rig, seed: u64) {
+    let dice = &mut Dice::new(seed);
+    rig.port.host_ps = dice.range(8_500, 11_390);
+    rig.interlock(true);
+    rig.check_clocks();
+    for round in 0..12 {
+        rig.set(R::Patterns, dice.range(1, 8) as u32);
+        rig.set(R::Scratch, dice.next() as u32);
+        let start = (R::Control.address(), control::START);
+        let scratch = (R::Scratch.address(), dice.next() as u32);
+        let (address, value) = dice.pick(&[start, scratch]);
+        rig.set(R::Control, start.1);
+        rig.wait_adc(dice.range(0, 400));
+        if dice.once_in(3) {
+            rig.stream(false, dice.range(1, 40) as usize);
+        }
+        match dice.range(0, 2) {
+            0 => rig.lose_adc_clock(),
+            _ => rig.write_and_lose_adc_clock(address, value, dice.range(0, 30) as u32),
+        }
+        rig.wait(dice.range(20, 300) as u32);
+        for _ in 0..dice.range(1, 5) {
+            let register = dice.pick(R::ALL);
+            rig.write(register.address(), value);
+            rig.read(dice.pick(R::ALL).address());
+            rig.read(ORDER_TABLE + dice.range(0, 1023) as u16);
+        }
+        rig.stream_zeros(dice.pick(&[READ_FRAME, READ_RAW]), 5);
+        if round % 6 == 0 {
+            rig.check_clocks();
+        }
+        rig.bring_adc_clock_back(dice.pick(&[Design::Camera, Design::BringUp]));
+        rig.wait_adc(dice.range(5, 200));
+        for &register in R::ALL {
+            rig.read(register.address());
+        }
     }
 }

@@ -5,6 +5,7 @@
 //! bytes.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap in a helper fails its test")]
 
+mod bring_up;
 mod calibration;
 mod emulated;
 mod tap;

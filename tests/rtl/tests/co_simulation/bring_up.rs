@@ -1,0 +1,66 @@
+//! Tests of a bring-up through the RTL: two boards without ADC, and an ADC without clock.
+
+use crate::ideal;
+use nirspi::fpga::Fpga;
+use nirspi::selftest::{Check, LinkDemands, SelfTest, Verdict, run};
+use nirspi::session::{IgnorePackets, Session};
+use nirspi::virtual_camera::{MemoryLink, VirtualCamera};
+use nirspi_tests_rtl::RtlFpga;
+use std::time::Duration;
+
+fn session(fpga: RtlFpga) -> Session {
+    let camera = VirtualCamera::new(fpga, ideal().depth(1).unwrap(), "co-simulated");
+    Session::open(Box::new(MemoryLink::new(camera))).unwrap()
+}
+
+fn self_test(session: &mut Session) -> SelfTest {
+    let demands = LinkDemands { min_frames_per_s: 0.0, duration: Duration::from_millis(50) };
+    run(session, demands, &mut |_| {}).unwrap()
+}
+
+/// The failed checks but those of the link, which is timed by the clock on the wall: a simulator has no speed to judge.
+fn failures(found: &SelfTest) -> Vec<&Check> {
+    let failed = found.checks.iter().filter(|check| check.verdict() == Verdict::Failed);
+    failed.filter(|check| !check.name().starts_with("link ")).collect()
+}
+
+#[test]
+fn the_self_test_passes_through_the_rtl_without_any_adc() {
+    let mut fpga = RtlFpga::bring_up();
+    // A window of the frequency meter: 0.4 ms.
+    nirspi::virtual_camera::SimulatedFpga::advance(&mut fpga, 60_000);
+    let mut session = session(fpga);
+    assert!(
+        session.reports().iter().any(|line| line.contains("bring-up")),
+        "{:?}",
+        session.reports()
+    );
+    let found = self_test(&mut session);
+    assert!(failures(&found).is_empty(), "{:#?}", failures(&found));
+    let checked = |name: &str| {
+        let check = found.checks.iter().find(|check| check.name() == name).unwrap();
+        assert_eq!(check.verdict(), Verdict::Passed, "{check:?}");
+        check.note().to_owned()
+    };
+    checked("device: FPGA bus");
+    checked("device: test frame");
+    checked("LED lines");
+    let clock = checked("device: ADC clock");
+    assert!(
+        clock.contains("129.") || clock.contains("128."),
+        "125 MHz by a clock of 100 MHz: {clock}"
+    );
+}
+
+#[test]
+fn without_the_adc_clock_the_rtl_says_so_and_nothing_else_fails() {
+    let mut fpga = RtlFpga::new(&ideal(), 1);
+    fpga.adc_clock(false);
+    let mut session = session(fpga);
+    let told = Fpga::ask(&mut session, &mut IgnorePackets).unwrap().to_string();
+    assert!(told.contains("PLL not locked, ADC domain in reset"), "{told}");
+    let found = self_test(&mut session);
+    let failed = failures(&found);
+    assert_eq!(failed.len(), 1, "{failed:#?}");
+    assert_eq!(failed[0].name(), "device: ADC clock");
+}
