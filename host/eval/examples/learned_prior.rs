@@ -21,7 +21,7 @@ use std::time::Instant;
 type Result<T> = std::result::Result<T, Box<dyn Error>>;
 type Methods = Vec<(&'static str, Box<dyn Reconstruct>)>;
 
-const SHARES: [f64; 4] = [0.1, 0.2, 0.3, 0.5];
+const SHARES: [f64; 5] = [0.05, 0.1, 0.2, 0.3, 0.5];
 
 fn main() -> Result<()> {
     let mut arguments = std::env::args_os().skip(1);
@@ -227,29 +227,36 @@ fn instruments(data: &Path) -> Result<Vec<(String, Vec<Measurements>)>> {
     let rows = Rows::new(Side::new(32)?, array::<i32>(&car, "h_row")?.1)?;
     let d: Vec<f64> = array::<i32>(&car, "d")?.1.into_iter().map(f64::from).collect();
     let cars = d.chunks_exact(1024).map(|d| Measurements::from_differential(&rows, d));
+    let cars: Vec<Measurements> = cars.collect::<std::result::Result<_, _>>()?;
     Ok(vec![
         ("wing".to_owned(), vec![wing]),
-        ("car, mean of the detectors".to_owned(), cars.collect::<std::result::Result<_, _>>()?),
+        ("car, detector 0".to_owned(), cars[..1].to_vec()),
+        ("car, mean of the detectors".to_owned(), cars),
     ])
 }
 
-/// Correlation with the image of all patterns.
+/// Correlation with the image of all patterns, and PSNR as `eval sampling` has it.
 fn real(data: &Path, methods: &Methods) -> Result<()> {
     let zero_filling = &methods[0].1;
     for (name, all) in instruments(data)? {
-        println!("\n{name}: correlation with the image of all patterns, 10 / 20 / 30 / 50 %");
+        println!("\n{name}: correlation with the image of all patterns, dB; 10, 20, 30, 50 %");
         for (word, method) in methods {
             print!("| {word} |");
             for share in [0.1, 0.2, 0.3, 0.5] {
-                let mut sum = 0.0;
+                let (mut sum, mut sum_db) = (0.0, 0.0);
                 for measured in &all {
                     let n = measured.side().pixels();
                     let full = zero_filling.reconstruct(measured)?.image;
                     let part = measured.take(Some(&Order::ZigZag), share)?;
                     let found = method.reconstruct(&part)?.image;
-                    sum += metrics::correlation(full.pixels(), found.pixels(), n, n)?;
+                    let (full, found) = (full.pixels(), found.pixels());
+                    sum += metrics::correlation(full, found, n, n)?;
+                    let high = full.iter().copied().fold(f32::MIN, f32::max);
+                    let low = full.iter().copied().fold(f32::MAX, f32::min);
+                    sum_db += metrics::psnr(full, found, n, n, f64::from(high - low))?;
                 }
-                print!(" {:.4} |", sum / all.len() as f64);
+                let count = all.len() as f64;
+                print!(" {:.4}, {:.2} |", sum / count, sum_db / count);
             }
             println!();
         }
