@@ -87,6 +87,8 @@ mod tests {
     fn every_network_of_the_chain_is_listed_with_a_checksum() {
         let about = About::this_build(None);
         let listed = |model| about.weights.iter().any(|w| w.model == model && w.sha256.len() == 64);
-        assert!(["estimator", "fsrcnn", "diffusion", "classifier"].into_iter().all(listed));
+        assert!(
+            ["estimator", "fsrcnn", "diffusion", "prior", "classifier"].into_iter().all(listed)
+        );
     }
 }

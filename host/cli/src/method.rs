@@ -124,6 +124,7 @@ impl MethodArgs {
             strength: self.strength.map_or_else(Strength::default, Strength::Fixed),
             completion: self.keep,
             backend: self.backend,
+            network: Some(nirspi_nets::prior::shipped()),
         })
     }
 

@@ -11,6 +11,7 @@
 //! | [`table4`] | how fine is the spatial resolution in rain (Table 4)? |
 //! | [`quality`] | how good are enhanced images, against blur, noise and number of steps? |
 //! | [`sampling`] | how good are images of a part of the patterns, by order, basis and method? |
+//! | [`completion`] | how well does each method complete known scenes? |
 //! | [`sets`] | how alike are two stacks of images, one by one and as sets? |
 //! | [`mod@bench`] | how many frames a second does this machine reconstruct and enhance? |
 //! | [`camera_model`] | what follows from a camera description? |
@@ -24,6 +25,7 @@
 pub mod bench;
 pub mod bootstrap;
 pub mod camera_model;
+pub mod completion;
 pub mod estimate;
 pub mod pictures;
 pub mod quality;

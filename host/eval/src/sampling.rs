@@ -43,13 +43,15 @@ fn candidates() -> Result<Vec<Candidate>, ReconstructError> {
     let mut add = |name: String, method: Method, settings: MethodSettings| {
         method.prepare(&settings).map(|method| all.push(Candidate { name, method }))
     };
+    let network = Some(nirspi_nets::prior::shipped());
+    let default = MethodSettings { network, ..MethodSettings::default() };
     for &method in Method::ALL {
         if !method.takes(Setting::Basis) {
-            add(method.to_string(), method, MethodSettings::default())?;
+            add(method.to_string(), method, default.clone())?;
             continue;
         }
         for basis in Basis::ALL {
-            let settings = MethodSettings { basis, ..MethodSettings::default() };
+            let settings = MethodSettings { basis, ..default.clone() };
             add(format!("{method}, {basis}"), method, settings)?;
         }
     }

@@ -47,7 +47,8 @@ fn label(model: &str) -> String {
 }
 
 impl Weights {
-    /// The embedded weights of a network: `estimator`, `fsrcnn`, `diffusion` or `classifier`; with
+    /// The embedded weights of a network: `estimator`, `fsrcnn`, `diffusion`, `prior` or
+    /// `classifier`; with
     /// the feature `baselines` also `gan` or `ancestral`.
     ///
     /// # Errors

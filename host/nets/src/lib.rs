@@ -5,7 +5,8 @@
 //!
 //! Data flows from [`images`] through [`estimate`] (blur and noise), [`fusion`] and [`deblur`];
 //! [`enhance`] does all of these. [`Networks`] chooses the weights, [`Sharpen`] is the interface
-//! for your own network. [`upscale`] and [`classical`] work without learning.
+//! for your own network. [`upscale`] and [`classical`] work without learning. [`prior`] is apart from that line: the
+//! network of a reconstruction method of `nirspi_recon`.
 
 mod blur;
 mod choice;
@@ -30,6 +31,7 @@ pub mod metrics;
 #[cfg(feature = "train")]
 pub mod model;
 mod network;
+pub mod prior;
 mod random;
 mod schema;
 mod spread;

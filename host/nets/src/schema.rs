@@ -12,6 +12,7 @@
 
 use crate::network::CONDITIONS;
 use crate::weights::{Weights, WeightsError};
+use nirspi_recon::reconstruct::prior::Seen;
 
 /// The most levels of a UNet. Its images of 64 x 64 are halved before the first level and after
 /// each level except the last.
@@ -78,6 +79,13 @@ impl Schema {
     fn linear(&mut self, name: &str, outputs: Axis, inputs: Axis) {
         self.tensor(format!("{name}.weight"), &[outputs, inputs]);
         self.tensor(format!("{name}.bias"), &[outputs]);
+    }
+
+    /// A residual block with scale and shift by the conditions.
+    fn block(&mut self, name: &str, channels: Axis, embedding: Axis) {
+        self.convolution(&format!("{name}.conv1"), channels, channels, 3);
+        self.linear(&format!("{name}.film"), channels.times(2), embedding);
+        self.convolution(&format!("{name}.conv2"), channels, channels, 3);
     }
 
     /// Checks the weights against the schema. Returns the `count` widths of the network.
@@ -215,6 +223,50 @@ pub(crate) fn fsrcnn(weights: &Weights) -> Result<[usize; 3], WeightsError> {
     Ok([widths[0], widths[1], maps])
 }
 
+/// Bits of a pixel's place that the learned prior's first stage is given, down and across each.
+pub(crate) const GRID_BITS: usize = 3;
+
+/// Sizes of the learned prior's network.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct PriorSizes {
+    /// Steps towards the measurements.
+    pub(crate) stages: usize,
+    /// Residual blocks before each step.
+    pub(crate) blocks: usize,
+    /// Channels, and the length of the vector of the conditions.
+    pub(crate) widths: [usize; 2],
+}
+
+/// Sizes of the learned prior's network.
+///
+/// # Errors
+/// As [`estimator`].
+pub(crate) fn prior(weights: &Weights) -> Result<PriorSizes, WeightsError> {
+    let (mut stages, mut blocks) = (1, 1);
+    for list in ["input_conv.", "blocks.", "output_conv.", "weight."] {
+        stages = stages.max(listed(weights, list, LISTED)?);
+    }
+    for stage in 0..stages {
+        blocks = blocks.max(listed(weights, &format!("blocks.{stage}."), LISTED)?);
+    }
+    let (channels, embedding) = (width(0), width(1));
+    let mut schema = Schema::default();
+    schema.linear("embed1", embedding, Axis::Fixed(Seen::CONDITIONS));
+    schema.linear("embed2", embedding, embedding);
+    for stage in 0..stages {
+        let grid_bits = if stage == 0 { 2 * GRID_BITS } else { 0 };
+        let inputs = Axis::Fixed(PAIRED + grid_bits);
+        schema.convolution(&format!("input_conv.{stage}"), channels, inputs, 3);
+        for index in 0..blocks {
+            schema.block(&format!("blocks.{stage}.{index}"), channels, embedding);
+        }
+        schema.convolution(&format!("output_conv.{stage}"), Axis::Fixed(4), channels, 3);
+        schema.linear(&format!("weight.{stage}"), Axis::Fixed(2), embedding);
+    }
+    let widths = schema.check(weights, 2)?;
+    Ok(PriorSizes { stages, blocks, widths: [widths[0], widths[1]] })
+}
+
 /// Sizes of a UNet.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct UNetSizes {
@@ -246,14 +298,9 @@ pub(crate) fn unet(weights: &Weights) -> Result<UNetSizes, WeightsError> {
     schema.linear("embed1", embedding, Axis::Fixed(CONDITIONS));
     schema.linear("embed2", embedding, embedding);
     schema.convolution("input_conv", width(0), Axis::Fixed(PAIRED), 3);
-    let block = |schema: &mut Schema, name: &str, channels: Axis| {
-        schema.convolution(&format!("{name}.conv1"), channels, channels, 3);
-        schema.linear(&format!("{name}.film"), channels.times(2), embedding);
-        schema.convolution(&format!("{name}.conv2"), channels, channels, 3);
-    };
     for level in 0..levels {
         for index in 0..blocks {
-            block(&mut schema, &format!("encoder.{level}.{index}"), width(level));
+            schema.block(&format!("encoder.{level}.{index}"), width(level), embedding);
         }
     }
     for fine in 0..levels - 1 {
@@ -261,7 +308,7 @@ pub(crate) fn unet(weights: &Weights) -> Result<UNetSizes, WeightsError> {
         schema.convolution(&format!("reduce.{fine}"), coarse, width(fine), 2);
         schema.convolution(&format!("expand.{fine}"), width(fine).times(4), coarse, 1);
         for index in 0..blocks {
-            block(&mut schema, &format!("decoder.{fine}.{index}"), width(fine));
+            schema.block(&format!("decoder.{fine}.{index}"), width(fine), embedding);
         }
     }
     schema.convolution("output_conv", Axis::Fixed(4), width(0), 3);

@@ -177,6 +177,11 @@ impl Measurements {
         Ok(self.subset(positions))
     }
 
+    /// Measurements that are known to be one finite value for each row.
+    pub(crate) fn trusted(rows: Rows, values: Vec<f64>) -> Self {
+        Self { rows, values }
+    }
+
     /// The measurements at these positions, in that order.
     pub(crate) fn subset(&self, positions: impl IntoIterator<Item = usize>) -> Self {
         let (rows, values) = positions.into_iter().map(|k| (self.rows[k], self.values[k])).unzip();

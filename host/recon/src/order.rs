@@ -287,12 +287,18 @@ fn walsh_row(sequency: u32, count: u32) -> u32 {
     gray.reverse_bits() >> (u32::BITS - count.trailing_zeros())
 }
 
+/// Sequency of each natural row of the 1-D Walsh functions, `count` of them (a power of two).
+pub(crate) fn sequencies(count: u32) -> Vec<u32> {
+    let mut sequency = vec![0; count as usize];
+    for s in 0..count {
+        sequency[walsh_row(s, count) as usize] = s;
+    }
+    sequency
+}
+
 fn patterns(side: Side) -> Vec<Pattern> {
     let n = side.pixels() as u32;
-    let mut sequency = vec![0; side.pixels()];
-    for s in 0..n {
-        sequency[walsh_row(s, n) as usize] = s;
-    }
+    let sequency = sequencies(n);
     let at = |row: u32| sequency[row as usize];
     (0..n * n).map(|row| Pattern { row, down: at(row / n), across: at(row % n) }).collect()
 }

@@ -26,6 +26,7 @@ mod method;
 mod methods;
 mod own_atoms;
 mod own_matrix;
+pub mod prior;
 mod pursuit;
 mod regularised;
 mod report;

@@ -46,6 +46,7 @@ impl Serialize for MethodReport {
             unseen_atoms: made.unseen_atoms,
             trust_in_prediction: made.trust,
             noise_of_a_measurement: made.noise,
+            note: made.note.as_deref(),
         };
         let mut map = serializer.serialize_map(None)?;
         map.serialize_entry("method", self.method.argument())?;
@@ -81,4 +82,6 @@ struct Details<'r> {
     trust_in_prediction: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     noise_of_a_measurement: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    note: Option<&'r str>,
 }

@@ -15,11 +15,13 @@ pub(crate) mod estimator;
 mod fsrcnn;
 mod layers;
 mod planes;
+mod prior;
 mod unet;
 
 pub use classifier::Classifier;
 pub use estimator::Estimator;
 pub use fsrcnn::Fsrcnn;
+pub use prior::Prior;
 pub use unet::UNet;
 
 #[cfg(test)]

@@ -54,6 +54,30 @@ fn the_unet_gives_what_pytorch_gives() {
 }
 
 #[test]
+fn the_prior_gives_what_pytorch_gives_from_the_measurements_on() {
+    use nirspi_recon::reconstruct::prior::Seen;
+    use nirspi_recon::{Measurements, Rows, Side};
+    let (weights, reference) = fixture!("prior");
+    let network = Prior::new(&weights).unwrap();
+    let within = |ours: &[f32], theirs: &[f32], most: f32| {
+        assert_eq!(ours.len(), theirs.len());
+        let off = ours.iter().zip(theirs).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(off < most, "{off}");
+    };
+    for case in 0..3 {
+        let values = |name: &str| reference.get(&format!("{name}{case}")).unwrap().values.clone();
+        let side = Side::new(values("side")[0] as u64).unwrap();
+        let rows = Rows::new(side, values("rows").into_iter().map(|row| row as u32)).unwrap();
+        let d: Vec<f64> = values("d").into_iter().map(f64::from).collect();
+        let seen = Seen::new(&Measurements::from_differential(&rows, &d).unwrap()).unwrap();
+        within(seen.conditions(), &values("told"), 1e-5);
+        within(&[seen.noise()], &values("noise"), 1e-5);
+        within(&seen.image(seen.start()), &values("start"), 2e-3);
+        within(&seen.image(&network.forward(&seen)), &values("out"), 5e-3);
+    }
+}
+
+#[test]
 fn fsrcnn_gives_what_pytorch_gives() {
     let (weights, reference) = fixture!("fsrcnn");
     let fsrcnn = Fsrcnn::new(&weights).unwrap();

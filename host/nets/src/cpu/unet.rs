@@ -11,14 +11,14 @@ use crate::weights::{Weights, WeightsError};
 
 /// A residual block: convolution, scale and shift by the conditions, convolution.
 #[derive(Debug, Clone)]
-struct Block {
+pub(super) struct Block {
     conv1: Conv,
     film: Linear,
     conv2: Conv,
 }
 
 impl Block {
-    fn new(weights: &Weights, name: &str) -> Result<Self, WeightsError> {
+    pub fn new(weights: &Weights, name: &str) -> Result<Self, WeightsError> {
         Ok(Self {
             conv1: conv(weights, &format!("{name}.conv1"))?,
             film: Linear::new(weights, &format!("{name}.film"))?,
@@ -26,7 +26,8 @@ impl Block {
         })
     }
 
-    fn add_to(&self, arch: Arch, x: &mut Planes, embedding: &[f32]) {
+    /// Adds the block's output to `x`.
+    pub fn add_to(&self, arch: Arch, x: &mut Planes, embedding: &[f32]) {
         let mut h = x.like(x.channels());
         silu_into(arch, x.values(), h.values_mut());
         let mut h = self.conv1.apply(arch, &h);

@@ -22,13 +22,14 @@ macro_rules! network {
 
 /// The networks, and what takes weights for each: the forward passes themselves where there are
 /// some.
-fn networks() -> [(Weights, Check); 5] {
+fn networks() -> [(Weights, Check); 6] {
     [
         network!("unet", crate::cpu::UNet::new),
         network!("fsrcnn", crate::cpu::Fsrcnn::new),
         network!("estimator", crate::cpu::Estimator::new),
         network!("classifier", crate::cpu::Classifier::new),
         network!("discriminator", discriminator),
+        network!("prior", crate::cpu::Prior::new),
     ]
 }
 
@@ -41,7 +42,9 @@ fn trained(network: usize, weights: &Weights) -> Result<(), WeightsError> {
         1 => FsrcnnConfig::of(weights).map(drop),
         2 => EstimatorConfig::of(weights).map(drop),
         3 => ClassifierConfig::of(weights).map(drop),
-        _ => DiscriminatorConfig::of(weights).map(drop),
+        4 => DiscriminatorConfig::of(weights).map(drop),
+        // Trained in PyTorch alone.
+        _ => crate::cpu::Prior::new(weights).map(drop),
     }
 }
 
@@ -165,6 +168,8 @@ fn sound_weights_have_the_sizes_that_pytorch_made_them_with() {
     assert_eq!(estimator(&of("estimator")).unwrap(), [4, 6, 8, 10, 7]);
     assert_eq!(classifier(&of("classifier")).unwrap(), [4, 6, 8]);
     assert_eq!(discriminator(&of("discriminator")).unwrap(), [4, 5, 6]);
+    let sizes = PriorSizes { stages: 2, blocks: 2, widths: [6, 5] };
+    assert_eq!(prior(&of("prior")).unwrap(), sizes);
 }
 
 #[test]
@@ -176,6 +181,7 @@ fn the_embedded_weights_are_whole() {
     fsrcnn(&embedded("fsrcnn")).unwrap();
     estimator(&embedded("estimator")).unwrap();
     classifier(&embedded("classifier")).unwrap();
+    prior(&embedded("prior")).unwrap();
 }
 
 #[test]

@@ -4,12 +4,14 @@ import hashlib
 import sys
 from pathlib import Path
 
+import numpy as np
 import torch
-from safetensors.torch import save_file
+from safetensors.torch import load_file, save_file
 from torch import nn
 
 sys.path.insert(0, sys.argv[1])
 import networks as net  # noqa: E402
+import prior  # noqa: E402
 
 HERE = Path(__file__).parent
 
@@ -56,3 +58,29 @@ for i, (a, b) in enumerate([(2, 4), (4, 5), (5, 6)], 1):
     setattr(discriminator, f"conv{i}", nn.Conv2d(a, b, 4, 2, 1))
 discriminator.conv4 = nn.Conv2d(6, 1, 3, 1, 1)
 write("discriminator", "discriminator", discriminator, [y, x], lambda m: [m(y, x)])
+
+
+def measured(n, share, noise, skip_mean):
+    """A scene's measurements by natural row, in the units of a camera (d = H x), and what the network is given and gives."""
+    y, x = torch.meshgrid(torch.arange(n) / n, torch.arange(n) / n, indexing="ij")
+    scene = 0.2 + 0.5 * ((y - 0.4) ** 2 + (x - 0.6) ** 2 < 0.06).float() + 0.3 * (x + 0.5 * y < 0.5).float()
+    space = prior.space_of(n)
+    c = space.forward(scene[None]) + noise * torch.randn(1, n, n)
+    mask = torch.from_numpy(prior.shown("zigzag", n, round(share * n * n), np.random.default_rng(1)))[None].clone()
+    mask[:, 0, 0] = 0 if skip_mean else 1
+    natural = torch.tensor(prior.walsh_rows(n))
+    p, q = mask[0].nonzero().T
+    return prior.Seen(c.clone(), mask), (natural[p] * n + natural[q]).float(), c[0, p, q] * n
+
+
+small = prior.Prior(6, 2, 2, 5)
+cases = {}
+for case, (n, share, noise, skip_mean) in enumerate([(32, 0.3, 0.01, False), (64, 0.1, 0.0, False), (32, 0.6, 0.05, True)]):
+    seen, rows, d = measured(n, share, noise, skip_mean)
+    told = dict(side=torch.tensor([float(n)]), rows=rows, d=d, told=seen.told[0], noise=seen.noise, start=seen.images()[1].flatten())
+    cases |= {f"{name}{case}": tensor for name, tensor in told.items()} | {f"seen{case}": seen}
+inputs = {name: tensor for name, tensor in cases.items() if not name.startswith("seen")}
+prior.WITHIN = 1e9  # the last step, into the noise, is the method's
+write("prior", "prior", small, [], lambda m: [m(cases[f"seen{case}"]).flatten() for case in range(3)])
+reference = HERE / "prior_reference.safetensors"
+save_file({k: v.contiguous() for k, v in (inputs | load_file(reference)).items()}, reference)

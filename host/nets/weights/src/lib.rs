@@ -2,10 +2,11 @@
 #![no_std]
 
 /// Each network's name and the bytes of its safetensors file.
-pub const FILES: [(&str, &[u8]); 4] = [
+pub const FILES: [(&str, &[u8]); 5] = [
     ("estimator", include_bytes!("../estimator.safetensors")),
     ("fsrcnn", include_bytes!("../fsrcnn.safetensors")),
     ("diffusion", include_bytes!("../diffusion.safetensors")),
+    ("prior", include_bytes!("../prior.safetensors")),
     ("classifier", include_bytes!("../classifier.safetensors")),
 ];
 

@@ -9,6 +9,7 @@
 //! `methods.rs`. Argument parsers, help texts, comparisons, reports and the live page take their
 //! lists from [`Method::ALL`].
 
+use super::prior::SharedNetwork;
 use super::report::Reconstruction;
 use super::{Completion, MatrixMethod, OmpSettings, ReconstructError, Sparsity, Strength, methods};
 use crate::{Backend, Basis, Measurements};
@@ -87,6 +88,9 @@ impl Method {
 
     /// Tikhonov's method, the default: `docs/reconstruction.md` has the comparison.
     pub const TIKHONOV: Self = methods::TIKHONOV;
+
+    /// The learned prior, which needs [`MethodSettings::network`].
+    pub const PRIOR: Self = methods::PRIOR;
 
     /// The method's name in a few words, for example `total variation`.
     #[must_use]
@@ -262,6 +266,9 @@ pub struct MethodSettings {
     pub completion: Option<Completion>,
     /// The backend.
     pub backend: Backend,
+    /// The learned prior's network. Other methods ignore it. `nirspi_nets::prior::shipped` is the
+    /// shipped one; without any, `prior` is Tikhonov's method, and its report says so.
+    pub network: Option<SharedNetwork>,
 }
 
 impl Default for MethodSettings {
@@ -277,6 +284,7 @@ impl Default for MethodSettings {
             strength: Strength::default(),
             completion: None,
             backend,
+            network: None,
         }
     }
 }

@@ -4,6 +4,7 @@ mod fista;
 mod hadamard;
 mod omp;
 mod penalised;
+mod prior;
 mod pseudo_inverse;
 mod tikhonov;
 mod total_variation;
@@ -11,6 +12,7 @@ mod total_variation;
 use super::Method;
 pub use hadamard::hadamard;
 pub(super) use omp::METHOD as OMP;
+pub(super) use prior::METHOD as PRIOR;
 pub(super) use tikhonov::METHOD as TIKHONOV;
 
 /// Every built-in method, in the order in which help texts and comparisons show them.
@@ -21,4 +23,5 @@ pub(super) const ALL: &[Method] = &[
     tikhonov::METHOD,
     fista::METHOD,
     total_variation::METHOD,
+    prior::METHOD,
 ];

@@ -15,7 +15,7 @@
 //! | total variation | `abs(b - A x)^2 / 2 + sigma sum of abs(gradient of x)` | flat regions with edges |
 
 mod fista;
-mod tikhonov;
+pub(super) mod tikhonov;
 pub(super) mod total_variation;
 
 use super::selection::{self, TRUST, Trusted};

@@ -46,6 +46,8 @@ pub struct Report {
     pub noise: Option<f64>,
     /// Whether a video's frame started from the previous one.
     pub warm: bool,
+    /// What else the reader should know, in a few words: why a method fell back on another one.
+    pub note: Option<String>,
 }
 
 impl Report {
@@ -65,6 +67,7 @@ impl Report {
             trust: None,
             noise: None,
             warm: false,
+            note: None,
         }
     }
 
@@ -94,6 +97,7 @@ impl fmt::Display for Report {
             self.trust.map(|trust| format!("{:.0} % of the prediction used", 100.0 * trust)),
         );
         parts.extend(self.stop.map(|stop| format!("stopped: {stop}")));
+        parts.extend(self.note.clone());
         f.write_str(&parts.join(", "))
     }
 }

@@ -45,19 +45,28 @@ impl Miss {
     }
 }
 
-/// The fit of a prediction to the held-back measurements of the finer half of the measured rows, which
-/// are the nearest to the rows that were not measured.
+/// The line through the origin from predictions to held-back measurements.
 #[derive(Debug, Clone, Copy, Default)]
-struct Fine {
+pub(super) struct Line {
     count: usize,
-    /// Sums over these rows: prediction squared, prediction times measurement, measurement squared.
+    /// Sums: prediction squared, prediction times measurement, measurement squared.
     predicted: f64,
     product: f64,
     measured: f64,
 }
 
-impl Fine {
-    fn add(&mut self, other: Self) {
+impl Line {
+    /// Adds a prediction and its measurement.
+    pub fn add(&mut self, prediction: f64, measurement: f64) {
+        self.join(Self {
+            count: 1,
+            predicted: prediction * prediction,
+            product: prediction * measurement,
+            measured: measurement * measurement,
+        });
+    }
+
+    fn join(&mut self, other: Self) {
         self.count += other.count;
         self.predicted += other.predicted;
         self.product += other.product;
@@ -66,7 +75,7 @@ impl Fine {
 
     /// The most trust that these rows support: the factor on the prediction with the least squared
     /// error, plus one standard error of that factor.
-    fn most_trust(self) -> f64 {
+    pub fn most_trust(self) -> f64 {
         if self.predicted == 0.0 || self.count < 2 {
             return 1.0;
         }
@@ -88,7 +97,7 @@ pub(super) enum Trusted {
 }
 
 /// The miss for each number of atoms and each trust, and the fit of the finest rows.
-type Misses = Vec<([Miss; TRUST.len()], Fine)>;
+type Misses = Vec<([Miss; TRUST.len()], Line)>;
 
 /// The number of atoms, up to `most` and a quarter of the measurements, and the trust with the
 /// least error over `folds` held-back parts. The error is the sum of absolute and squared error,
@@ -149,7 +158,7 @@ pub(super) fn choose_among(
     for misses in results? {
         for ((total, total_fine), (misses, fine)) in total.iter_mut().zip(misses) {
             total.iter_mut().zip(misses).for_each(|(total, miss)| total.add(miss));
-            total_fine.add(fine);
+            total_fine.join(fine);
         }
     }
     let zero_filling = total[0].0[0];
@@ -178,16 +187,11 @@ fn misses_of(
     fine: &[bool],
 ) -> Misses {
     let fine_of = |predicted: &Vec<f32>| {
-        let mut fit = Fine::default();
+        let mut fit = Line::default();
         for &k in held.iter().filter(|&&k| fine[k]) {
             let value = f64::from(problem.values[k]);
             let guess = f64::from(predicted[problem.rows[k] as usize]);
-            fit.add(Fine {
-                count: 1,
-                predicted: guess * guess,
-                product: guess * value,
-                measured: value * value,
-            });
+            fit.add(guess, value);
         }
         fit
     };
@@ -233,7 +237,7 @@ fn split(problem: &Problem, folds: usize) -> Vec<Option<usize>> {
 }
 
 /// Ratio of a normal distribution's standard deviation to its median magnitude.
-const SIGMAS_PER_MEDIAN: f32 = 1.4826;
+pub(super) const SIGMAS_PER_MEDIAN: f32 = 1.4826;
 
 /// Noise of `f32` transforms, in units of the largest measurement. A simulated scene may have no
 /// other noise.

@@ -14,7 +14,7 @@ fn words_are_read_as_they_are_written_and_stand_once() {
     }
     let error = "svd".parse::<Method>().unwrap_err().to_string();
     assert!(error.starts_with("unknown method \"svd\", expected hadamard, omp, "), "{error}");
-    assert!(error.ends_with(" or tv"), "{error}");
+    assert!(error.ends_with(", tv or prior"), "{error}");
     assert_eq!(Method::default().argument(), "tikhonov");
 }
 

@@ -6,7 +6,7 @@
 use super::{Masked, Problem, dot, see, show};
 
 /// The predicted rows at each strength.
-pub(super) fn predict(
+pub(in crate::reconstruct) fn predict(
     problem: &Problem<'_>,
     positions: &[usize],
     strengths: &[f32],

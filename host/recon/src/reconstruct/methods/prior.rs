@@ -1,0 +1,37 @@
+//! A learned prior: a network that completes the measurements.
+
+use crate::Measurements;
+use crate::reconstruct::method::Entry;
+use crate::reconstruct::prior::{SharedNetwork, with_network};
+use crate::reconstruct::{Completion, Method, Reconstruct, ReconstructError, Reconstruction};
+
+const NAME: &str = "learned prior";
+
+/// The method of the network in [`MethodSettings::network`](crate::reconstruct::MethodSettings).
+pub(in super::super) const METHOD: Method = Method(&Entry {
+    argument: "prior",
+    name: NAME,
+    about: "Completed by a small network, as far as held-back measurements support the network; measured values stay within their noise",
+    takes: &[],
+    with_matrix: None,
+    prepare: |settings| {
+        let (network, completion) = (settings.network.clone(), settings.completion);
+        Ok(Box::new(Prior { network, completion }))
+    },
+});
+
+struct Prior {
+    network: Option<SharedNetwork>,
+    completion: Option<Completion>,
+}
+
+impl Reconstruct for Prior {
+    fn name(&self) -> &str {
+        NAME
+    }
+
+    fn reconstruct(&self, measurements: &Measurements) -> Result<Reconstruction, ReconstructError> {
+        let network = self.network.as_ref().map(SharedNetwork::get);
+        with_network(measurements, network, self.completion, NAME)
+    }
+}

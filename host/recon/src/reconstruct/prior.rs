@@ -1,0 +1,231 @@
+//! Reconstruction with a learned prior: a [`Network`] completes the coefficients that were not
+//! measured, and held-back measurements decide how far the network is believed.
+//!
+//! 1. [`Seen`] brings the measurements into units without gain and offset, and adds a start:
+//!    Tikhonov's image at strength 1.
+//! 2. The network gives every coefficient. This crate has no network of its own: `nirspi-nets` has
+//!    the shipped one, and [`Network`] is the interface for others.
+//! 3. A measured coefficient keeps the network's value only within [`WITHIN`] times the noise that
+//!    is estimated from the measurements.
+//! 4. The network completes the measurements a second time without some rows ([`held_back`]). The
+//!    share of the way from the start to the network's image that predicts these rows best, plus
+//!    one standard error, is the trust: 0 is the start, 1 the network's image.
+//!
+//! # Invariant
+//! Whatever the network gives, a measured coefficient of the image differs from its measurement by
+//! at most [`WITHIN`] times the noise (`tests::measured_values_stay_within_their_noise`), gain and
+//! offset of the measurements are those of the image (`tests::gain_and_offset_go_through`), and
+//! measurements that the network cannot take give Tikhonov's image and a line that says so
+//! (`tests::what_the_network_cannot_take_is_tikhonov_and_says_so`).
+
+mod seen;
+
+pub use seen::Seen;
+
+use super::selection::Line;
+use super::{
+    Completion, Penalty, ReconstructError, Reconstruction, RegularisedSettings, Report, regularised,
+};
+use crate::{Image, Measurements, Side, fwht, order, words};
+use std::fmt;
+use std::sync::Arc;
+
+/// Distance of a coefficient from its measurement that is allowed, in standard deviations of the
+/// estimated noise.
+pub const WITHIN: f32 = 2.0;
+
+/// The fewest patterns that a network completes: the estimates of noise and trust need some.
+pub const LEAST_PATTERNS: usize = 40;
+
+/// The least share of the patterns that a network completes. Training has 5 % and more.
+pub const LEAST_SHARE: f64 = 0.03;
+
+/// Trust below this is none: the image would differ from the start by less than the start's error.
+const LEAST_TRUST: f32 = 0.05;
+
+/// Completes measurements: the learned part of the method.
+pub trait Network: Send + Sync {
+    /// The network's name in reports.
+    fn name(&self) -> &str;
+
+    /// Whether the network completes images of this side.
+    fn takes(&self, side: Side) -> bool;
+
+    /// Every coefficient, by natural Hadamard row, in the units of [`Seen::values`].
+    ///
+    /// # Errors
+    /// A sentence that says why there is no image.
+    fn complete(&self, seen: &Seen) -> Result<Vec<f32>, String>;
+}
+
+/// A network that several methods share.
+#[derive(Clone)]
+pub struct SharedNetwork(Arc<dyn Network>);
+
+impl SharedNetwork {
+    /// Shares a network.
+    pub fn new(network: impl Network + 'static) -> Self {
+        Self(Arc::new(network))
+    }
+
+    /// The network.
+    #[must_use]
+    pub fn get(&self) -> &dyn Network {
+        &*self.0
+    }
+}
+
+impl fmt::Debug for SharedNetwork {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "SharedNetwork({})", self.0.name())
+    }
+}
+
+impl PartialEq for SharedNetwork {
+    /// Whether both are one network in memory.
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+}
+
+/// Reconstructs an image with a network, as far as held-back measurements support the network.
+/// `completion` is what becomes of measured coefficients; `None` keeps them within their noise.
+/// Without a network, or where the network cannot be used, the image is Tikhonov's, and
+/// [`Report::note`] says why.
+///
+/// # Errors
+/// [`ReconstructError::Failed`] if the network gives no image.
+pub fn with_network(
+    measurements: &Measurements,
+    network: Option<&dyn Network>,
+    completion: Option<Completion>,
+    name: &str,
+) -> Result<Reconstruction, ReconstructError> {
+    let (network, seen) = match usable(measurements, network) {
+        Ok(usable) => usable,
+        Err(why) => return classical(measurements, completion, name, &why),
+    };
+    let complete = |seen: &Seen| network.complete(seen).map_err(ReconstructError::Failed);
+    let trust = match held_back(measurements) {
+        None => 1.0,
+        Some((kept, held)) => match Seen::new(&measurements.subset(kept)) {
+            None => 0.0,
+            Some(part) => trust(&part, &complete(&part)?, measurements, &held),
+        },
+    };
+    if trust < LEAST_TRUST {
+        let why = "held-back measurements do not support the network";
+        return classical(measurements, completion, name, why);
+    }
+    let mut grid = complete(&seen)?;
+    for (row, value) in grid.iter_mut().enumerate() {
+        let start = seen.start()[row];
+        if seen.mask()[row] == 0.0 {
+            *value = start + trust * (*value - start);
+            continue;
+        }
+        let from = *value - seen.values()[row];
+        let within = WITHIN * seen.noise();
+        *value = seen.values()[row]
+            + trust
+                * match completion {
+                    None => from.clamp(-within, within),
+                    Some(Completion::Measured) => 0.0,
+                    Some(Completion::Sparse) => from,
+                };
+    }
+    let mut report = Report::new(name);
+    report.completion = completion;
+    report.trust = Some(f64::from(trust));
+    report.noise = Some(seen.noise_in_units());
+    report.residual = Some(seen.residual(&grid));
+    Ok(Reconstruction { image: image(&seen, grid), report })
+}
+
+/// The network and what it is given; or why there is no use for the network.
+fn usable<'n>(
+    measurements: &Measurements,
+    network: Option<&'n dyn Network>,
+) -> Result<(&'n dyn Network, Seen), String> {
+    let Some(network) = network else {
+        return Err("no network was given".to_owned());
+    };
+    let (side, count) = (measurements.side(), measurements.rows().len());
+    let n = side.pixels();
+    if !network.takes(side) {
+        return Err(format!("the network {} does not take {n} x {n} pixels", network.name()));
+    }
+    let least = LEAST_PATTERNS.max((LEAST_SHARE * side.area() as f64).ceil() as usize);
+    if count < least {
+        return Err(format!(
+            "{} measured, expected at least {least} for the network",
+            words::count_of(count, "pattern")
+        ));
+    }
+    match Seen::new(measurements) {
+        Some(seen) => Ok((network, seen)),
+        None => Err("the measurements show no contrast".to_owned()),
+    }
+}
+
+/// Tikhonov's image, with the reason for it.
+fn classical(
+    measurements: &Measurements,
+    completion: Option<Completion>,
+    name: &str,
+    why: &str,
+) -> Result<Reconstruction, ReconstructError> {
+    let settings = RegularisedSettings {
+        completion: completion.unwrap_or(Completion::Measured),
+        ..RegularisedSettings::new(Penalty::Tikhonov)
+    };
+    let found = regularised(measurements, &settings)?;
+    let mut report = Report::new(name);
+    report.completion = Some(settings.completion);
+    report.residual = Some(found.residual);
+    report.noise = Some(found.noise);
+    report.note = Some(format!("Tikhonov instead: {why}"));
+    Ok(Reconstruction { image: found.image, report })
+}
+
+/// Positions that are kept, and positions that are held back: every other row of the finest quarter
+/// of the measured rows. These rows are the nearest to the rows that were not measured, so a
+/// network that invents detail is found out there. `None` if there are too few.
+fn held_back(measurements: &Measurements) -> Option<(Vec<usize>, Vec<usize>)> {
+    let positions = order::positions_by_sequency(measurements.rows());
+    let fine = &positions[positions.len() - positions.len() / 4..];
+    let held: Vec<usize> = fine.iter().skip(1).step_by(2).copied().collect();
+    if held.len() < 2 {
+        return None;
+    }
+    let mut is_held = vec![false; measurements.rows().len()];
+    held.iter().for_each(|&k| is_held[k] = true);
+    let kept = (0..is_held.len()).filter(|&k| !is_held[k]).collect();
+    Some((kept, held))
+}
+
+/// The trust that the held-back measurements support, from `completed`, which was made without
+/// them.
+fn trust(part: &Seen, completed: &[f32], measurements: &Measurements, held: &[usize]) -> f32 {
+    let mut line = Line::default();
+    for &k in held {
+        let row = measurements.rows()[k] as usize;
+        let start = part.start()[row];
+        let value = part.in_units(measurements.values()[k]);
+        line.add(f64::from(completed[row] - start), f64::from(value - start));
+    }
+    line.most_trust() as f32
+}
+
+/// The image of normalised coefficients, in the measurements' units.
+fn image(seen: &Seen, mut grid: Vec<f32>) -> Image {
+    let side = seen.side();
+    grid[0] = 0.0;
+    fwht::transform(&mut grid);
+    let unit = seen.unit() / side.pixels() as f64;
+    let pixels = grid.iter().map(|&v| (f64::from(v) * unit + seen.mean()) as f32).collect();
+    Image::new(side, pixels)
+}
+
+#[cfg(test)]
+mod tests;
