@@ -52,6 +52,7 @@ pub(super) fn status(run: u16) -> Status {
         duty_permille: 0,
         leds_on: false,
         interlock_closed: true,
+        signal: Tail(None),
     }
 }
 
