@@ -88,6 +88,9 @@ fn every_method_predicts_a_phantom_better_than_zero_does_and_says_how() {
         assert_eq!(report["method"], method);
         assert!(report["penalty"]["strength"].as_f64().unwrap() > 0.0, "{report}");
     }
+    assert!(correlation_by(&["prior"]) > zero);
+    let prior = &bench.json("out/report.json")["prior"];
+    assert!(prior["trust_in_prediction"].is_number() || prior["note"].is_string(), "{prior}");
     correlation_by(&["tikhonov", "--strength", "2", "--basis", "daubechies4"]);
     let penalty = &bench.json("out/report.json")["penalty"];
     assert_eq!((&penalty["strength"], &penalty["basis"]), (&2.0.into(), &"daubechies4".into()));
