@@ -110,6 +110,7 @@ impl Options<'_> {
             non_negative: self.non_negative,
             strength: self.strength.map_or(default.strength, Strength::Fixed),
             completion: self.keep.as_ref().map(|keep| keep.parse().map_err(refusal)).transpose()?,
+            network: Some(nirspi_nets::prior::shipped()),
             backend: backend(&self.device)?.0,
         })
     }

@@ -20,7 +20,7 @@ def methods() -> dict[str, str]:
     --------
     >>> import nirspi as ns
     >>> list(ns.methods())
-    ['hadamard', 'omp', 'pseudo-inverse', 'tikhonov', 'fista', 'tv']
+    ['hadamard', 'omp', 'pseudo-inverse', 'tikhonov', 'fista', 'tv', 'prior']
     """
     return {word: about for word, _name, about in _nirspi.methods()}
 
