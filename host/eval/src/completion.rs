@@ -185,7 +185,8 @@ mod tests {
         let zero_filling = Method::ALL[0].prepare(&MethodSettings::default()).unwrap();
         let image = image(&scene, &part, &*zero_filling, 1).unwrap();
         let (psnr_db, _) = quality(&scene, &image).unwrap();
-        assert!((psnr_db - 20.0 * 50.0_f64.log10()).abs() < 0.3, "{psnr_db}");
+        // The mean of 1024 squares is known to 4 %, 0.19 dB.
+        assert!((psnr_db - 20.0 * 50.0_f64.log10()).abs() < 0.5, "{psnr_db}");
     }
 
     #[test]

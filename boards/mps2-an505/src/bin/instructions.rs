@@ -86,6 +86,7 @@ impl HostPort for Memory {
         let running = if self.running { status::RUNNING | status::LEDS_ON } else { 0 };
         Ok(match Register::at(address) {
             Some(Register::Identity) => IDENTITY,
+            Some(register @ (Register::Version | Register::Design)) => register.reset(),
             Some(Register::Status) => status::INTERLOCK_CLOSED | running,
             Some(Register::FramesMade) => self.sequence,
             _ => self.slot(address).map_or(0, |slot| *slot),

@@ -11,7 +11,8 @@ fn power_up_is_the_reset_column_of_the_map_with_leds_off() {
     assert!(!gateware.lines().enable && !gateware.running());
     assert!(!gateware.frame_ready() && gateware.frame().is_none());
     assert!(!gateware.raw_ready() && gateware.raw().is_none());
-    for &register in Register::ALL {
+    // `Clocks` says what runs now.
+    for &register in Register::ALL.iter().filter(|register| **register != Register::Clocks) {
         assert_eq!(gateware.read(register.address()), Some(register.reset()), "{register:?}");
     }
 }

@@ -85,8 +85,8 @@ pub(super) fn read_side(fields: &mut Fields, want: &Selection) -> Result<Option<
         _ => Ok(()),
     })?;
     // A column of a text repeats the number in every line.
-    if let Some(line) = n.iter().position(|value| *value != n[0]) {
-        let found = format!("is {} in line {line} of the column, {} before", n[line], n[0]);
+    if let Some(line) = n.iter().position(|value| value.to_bits() != n[0].to_bits()) {
+        let found = format!("is {} in row {} of the column, {} before", n[line], line + 1, n[0]);
         return Err(FileError::field(fields.path(), "n", found, "one number"));
     }
     let refuse =
