@@ -28,7 +28,8 @@ pub enum Remedy {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Patience {
     began: Micros,
-    /// A transfer of this session was handed over. Its end is known when the next one is.
+    /// The board has taken a transfer of this session. The transfer is known to be over when the board
+    /// takes the next one.
     handed_over: bool,
     /// The last session ended by a stuck transfer, and no transfer has got through since.
     stuck: bool,

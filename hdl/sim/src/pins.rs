@@ -160,7 +160,7 @@ impl Pins {
         self.resets = Resets { first: each, adc: each, bridge: each };
     }
 
-    /// Whether accesses reach the ADC's domain: every reset is over.
+    /// Whether the ADC's clock domain has left every reset, so that register accesses reach it.
     #[must_use]
     pub fn adc_answers(&self) -> bool {
         self.adc_runs() && self.resets.bridge == 0

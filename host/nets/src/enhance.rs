@@ -248,7 +248,8 @@ impl Stage<'_> {
         Job { start, seen, estimates, seed, first: self.first }
     }
 
-    /// Deblurs. An image that was sharp and clean is replaced by `plain` of its index.
+    /// Deblurs the images of a job. For an image that is sharp and clean already, the result is
+    /// `plain(index)` instead of the network's.
     fn sharpen<I: AsRef<[f32]>>(
         &self,
         job: &Job<'_>,

@@ -56,7 +56,8 @@ impl Geometry {
         self.kernel + self.kernel * self.kernel + steps * (1 + DEPTH)
     }
 
-    /// Largest number of input channels with which a kernel of this side stays within the rounds.
+    /// The most input channels of a convolution whose kernel has this side, so that no unit makes more
+    /// than [`ROUNDS`] rounds of loops.
     pub(super) fn most_inputs(kernel: usize) -> usize {
         let taps = kernel * kernel;
         (ROUNDS - kernel - taps) / (taps * (1 + DEPTH)) * DEPTH

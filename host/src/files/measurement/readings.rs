@@ -113,7 +113,7 @@ pub(super) fn readings_field(fields: &Fields, want: &Selection) -> Result<String
     }
 }
 
-/// The expected shape of readings of a form and a number of rows.
+/// The shape that readings of this form must have for so many rows, for an error message.
 pub(super) fn expected_of(form: Form, rows: usize) -> Expected<'static> {
     let hint = match form {
         Form::Pairs | Form::Halves => Hint {
