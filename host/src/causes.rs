@@ -20,6 +20,21 @@ pub fn in_one_line(error: &(dyn Error + 'static)) -> String {
     line.replace('\n', " ")
 }
 
+/// A text from a device as a part of one line: control characters, which could move a terminal's
+/// cursor or forge a line, are escaped.
+#[must_use]
+pub fn printable(text: &str) -> String {
+    let mut shown = String::with_capacity(text.len());
+    for c in text.chars() {
+        if c.is_control() || matches!(c, '\u{2028}' | '\u{2029}') {
+            shown.extend(c.escape_default());
+        } else {
+            shown.push(c);
+        }
+    }
+    shown
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

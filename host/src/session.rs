@@ -11,6 +11,7 @@ pub mod request;
 pub use error::SessionError;
 pub use request::Request;
 
+use crate::causes::printable;
 use crate::events;
 use crate::fpga::design_in_words;
 use crate::link::Link;
@@ -58,8 +59,8 @@ impl From<&Identity<'_>> for CameraIdentity {
             protocol: identity.protocol,
             firmware: identity.firmware.to_string(),
             gateware: identity.gateware.to_string(),
-            board: identity.board.to_owned(),
-            serial: identity.serial.to_owned(),
+            board: printable(identity.board),
+            serial: printable(identity.serial),
             adc_hz: identity.adc_hz,
             adc_bits: identity.adc_bits,
             wavelength_nm: identity.wavelength_nm,

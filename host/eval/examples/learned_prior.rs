@@ -125,7 +125,7 @@ fn print_table(
     println!("\n{title}: {} scenes, PSNR in dB / SSIM", scenes.len());
     print!("| method |");
     parts.iter().for_each(|part| {
-        print!(" {} %, {}, noise {} |", 100.0 * part.share, part.order, part.noise)
+        print!(" {} %, {}, noise {} |", 100.0 * part.share, part.order, part.noise);
     });
     println!();
     for (at, (word, _)) in methods.iter().enumerate() {

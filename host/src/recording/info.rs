@@ -60,7 +60,8 @@ impl RecordingInfo {
     /// [`RecordingError`] if the file is not a recording, or its first part is missing.
     pub fn read(path: &Path) -> Result<Self, RecordingError> {
         let mut recording = Recording::open(path)?;
-        let (mut times, mut device): (Option<(u64, u64)>, Option<(u64, u64)>) = (None, None);
+        let mut times: Option<(u64, u64)> = None;
+        let mut device: Option<(u64, u64)> = None;
         let widened = |span: Option<(u64, u64)>, at| {
             Some(span.map_or((at, at), |(first, last)| (first.min(at), last.max(at))))
         };

@@ -20,7 +20,7 @@ pub(super) fn identity(camera: &CameraIdentity) -> Identity<'_> {
         gateware: version(&camera.gateware),
         board: &camera.board,
         serial: &camera.serial,
-        side: SIDE as u8,
+        side: SIDE,
         adc_hz: camera.adc_hz,
         adc_bits: camera.adc_bits,
         wavelength_nm: camera.wavelength_nm,

@@ -227,3 +227,11 @@ fn a_message_of_a_later_version_is_passed_over() {
     assert_eq!(session.command(request::ReadRegister(0), &mut heard).unwrap(), 7);
     assert_eq!((heard.whole, heard.damaged), (1, 1), "heard, as unknown");
 }
+
+#[test]
+fn the_names_of_a_camera_cannot_steer_a_terminal() {
+    let forged = Identity { serial: "\u{1b}[2J\nnirspi: all is well", ..IDENTITY };
+    let greeting = reply(0, Answer::Hello(forged));
+    let session = Session::open(Box::new(Scripted(vec![greeting]))).unwrap();
+    assert_eq!(session.identity().serial, "\\u{1b}[2J\\nnirspi: all is well");
+}

@@ -36,6 +36,7 @@ pub use tunnel::serve_tunnel;
 
 use nirspi_mcu::{
     BoardInfo, Camera, GatewareLoader, Inputs, Limits, Micros, NoLoader, PacketSink, Ports,
+    Progress,
 };
 use nirspi_optics::SimulatedDepth;
 use nirspi_wire::{Capabilities, Version};
@@ -105,9 +106,13 @@ impl PacketsOut {
     }
 }
 
+/// Bytes that wait for the firmware, above which a link stops reading.
+const INBOX_BYTES: usize = 1 << 16;
+
 /// A camera without hardware. `F` simulates the FPGA and the optics, `G` receives bitstreams.
 pub struct VirtualCamera<F, G = NoLoader> {
     camera: Camera,
+    info: BoardInfo,
     fpga: F,
     loader: G,
     inbox: Vec<u8>,
@@ -139,7 +144,8 @@ impl<F: SimulatedFpga, G: GatewareLoader> VirtualCamera<F, G> {
 
     fn powered_up(fpga: F, loader: G, depth: SimulatedDepth, info: BoardInfo) -> Self {
         Self {
-            camera: Camera::new(info, Limits::default()),
+            camera: Camera::new(info.clone(), Limits::default()),
+            info,
             fpga,
             loader,
             inbox: Vec::new(),
@@ -148,6 +154,13 @@ impl<F: SimulatedFpga, G: GatewareLoader> VirtualCamera<F, G> {
             next_depth: Micros(0),
             inputs: Inputs { interlock_closed: true, temperature_centi_celsius: Some(2500) },
         }
+    }
+
+    /// Whether the camera takes more bytes. A link stops reading while it does not, so that a host that
+    /// sends and never reads takes no memory.
+    #[must_use]
+    pub fn takes_bytes(&self) -> bool {
+        self.inbox.len() < INBOX_BYTES
     }
 
     /// Receives bytes from the host. Bytes that the firmware does not accept now are offered again
@@ -177,7 +190,13 @@ impl<F: SimulatedFpga, G: GatewareLoader> VirtualCamera<F, G> {
             let taken = self.camera.receive(now, &self.inbox, &self.inputs, ports);
             self.inbox.drain(..taken);
         }
-        let worked = self.camera.poll(now, &self.inputs, ports).worked;
+        let Progress { worked, reboot } = self.camera.poll(now, &self.inputs, ports);
+        if reboot.is_some() {
+            // The reply that promises the restart is among the packets already.
+            self.camera = Camera::new(self.info.clone(), Limits::default());
+            self.inbox.clear();
+            return true;
+        }
         if now >= self.next_depth {
             self.next_depth = Micros(now.0 + DEPTH_PERIOD.0);
             if self.camera.state() == nirspi_wire::State::Running {

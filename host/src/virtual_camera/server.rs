@@ -129,7 +129,9 @@ fn converse<F: SimulatedFpga>(
     let mut buffer = vec![0; 1 << 16];
     while !stop.load(Ordering::Relaxed) {
         knock();
-        match stream.read(&mut buffer) {
+        let room = if camera.takes_bytes() { &mut buffer[..] } else { &mut [] };
+        match stream.read(room) {
+            Ok(0) if room.is_empty() => {}
             Ok(0) => return Ok(()),
             Ok(length) => camera.receive(buffer.get(..length).unwrap_or(&[])),
             Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
@@ -166,4 +168,78 @@ fn converse<F: SimulatedFpga>(
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::link::TcpLink;
+    use crate::session::Session;
+    use crate::virtual_camera::VirtualOptics;
+    use nirspi_optics::Scene;
+    use nirspi_wire::{Command, RebootInto, Request, encode, version};
+    use std::sync::Arc;
+
+    /// The packets of these commands.
+    fn packets(commands: &[Command<'_>]) -> Vec<u8> {
+        let mut room = [0; 256];
+        let one = |(id, command): (u16, &Command<'_>)| {
+            encode(&Request { id, command: *command }, &mut room).unwrap().to_vec()
+        };
+        (0..).zip(commands).map(one).collect::<Vec<_>>().concat()
+    }
+
+    /// A host that misbehaves, then the greeting of the next one.
+    fn after(misbehave: impl FnOnce(TcpStream)) {
+        let sheet = Scene::new(vec![0.9; 4], 2, 48.0).unwrap();
+        let optics = VirtualOptics::new(sheet, 300.0).unwrap();
+        let mut camera = optics.ideal().camera(1).unwrap();
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = listener.local_addr().unwrap();
+        let stop = Arc::new(AtomicBool::new(false));
+        let stopped = Arc::clone(&stop);
+        let server = std::thread::spawn(move || {
+            serve(&listener, &mut camera, ServeOptions::default(), &stopped, &mut |_| {}).unwrap();
+        });
+        misbehave(TcpStream::connect(address).unwrap());
+        let greeted = Session::open(Box::new(TcpLink::connect(&address.to_string()).unwrap()));
+        stop.store(true, Ordering::Relaxed);
+        server.join().unwrap();
+        assert_eq!(greeted.unwrap().identity().board, "virtual");
+    }
+
+    const HELLO: Command<'_> = Command::Hello { protocol: version::CURRENT };
+
+    #[test]
+    fn a_restart_that_a_host_asked_for_leaves_a_camera_for_the_next_host() {
+        after(|mut stream| {
+            let restart = Command::Reboot(RebootInto::Application);
+            stream.write_all(&packets(&[HELLO, restart])).unwrap();
+            stream.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
+            let mut replies = [0; 8];
+            stream.read_exact(&mut replies).unwrap();
+            std::thread::sleep(Duration::from_millis(50));
+        });
+    }
+
+    #[test]
+    fn a_host_that_sends_and_never_reads_takes_no_memory() {
+        after(|mut stream| {
+            let mut flood = packets(&[HELLO]);
+            flood.extend(packets(&[Command::Status]).repeat(1 << 16));
+            stream.set_write_timeout(Some(Duration::from_millis(300))).unwrap();
+            let mut sent = 0;
+            // The sockets of both sides hold a few megabytes.
+            while sent < 1 << 26 {
+                match stream.write(&flood) {
+                    Ok(length) => sent += length,
+                    Err(error) => {
+                        assert_eq!(error.kind(), io::ErrorKind::WouldBlock, "{error}");
+                        return;
+                    }
+                }
+            }
+            panic!("{sent} bytes taken from a host that reads nothing");
+        });
+    }
 }

@@ -102,9 +102,9 @@ fn add_grid(input: &mut Planes) {
     for bit in 0..GRID_BITS {
         for row in 0..height {
             input.row_mut(8 + bit, row).fill(sign(row, bit));
-            let line = input.row_mut(8 + GRID_BITS + bit, row);
-            for column in 0..width {
-                line[column] = sign(column, bit);
+            let line = &mut input.row_mut(8 + GRID_BITS + bit, row)[..width];
+            for (column, pixel) in line.iter_mut().enumerate() {
+                *pixel = sign(column, bit);
             }
         }
     }

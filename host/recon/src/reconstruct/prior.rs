@@ -7,9 +7,9 @@
 //!    the shipped one, and [`Network`] is the interface for others.
 //! 3. A measured coefficient keeps the network's value only within [`WITHIN`] times the noise that
 //!    is estimated from the measurements.
-//! 4. The network completes the measurements a second time without some rows ([`held_back`]). The
-//!    share of the way from the start to the network's image that predicts these rows best, plus
-//!    one standard error, is the trust: 0 is the start, 1 the network's image.
+//! 4. The network completes the measurements a second time without every other row of their finest
+//!    quarter. The share of the way from the start to the network's image that predicts these rows
+//!    best, plus one standard error, is the trust: 0 is the start, 1 the network's image.
 //!
 //! # Invariant
 //! Whatever the network gives, a measured coefficient of the image differs from its measurement by
