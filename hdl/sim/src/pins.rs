@@ -207,7 +207,7 @@ impl Pins {
             return;
         }
         self.beats = self.beats.wrapping_add(1);
-        let beat = self.beats / clocks::PRESCALER % 2 != 0;
+        let beat = !(self.beats / clocks::PRESCALER).is_multiple_of(2);
         if beat != self.levels.beat {
             self.levels.beat = beat;
             self.set(self.inputs.beat, beat.into(), 1);
