@@ -1,5 +1,7 @@
 //! Damage in a recording costs what it hits, and is reported.
 
+#![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
+
 use nirspi::account::LossCounters;
 use nirspi::causes::in_one_line;
 use nirspi::recording::{Recorder, Recording, RunAccount, Target, recover};

@@ -1,5 +1,7 @@
 //! What an exported file holds is what `reconstruct` takes of the recording.
 
+#![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
+
 use nirspi::export::{ExportOptions, Format, export};
 use nirspi::files::measurement::Selection;
 use nirspi::recording::Recording;

@@ -1,5 +1,7 @@
 //! A recording that is played back is the camera that was recorded.
 
+#![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
+
 use nirspi::capture::{Calibration, Capture, CaptureOptions, Ended, capture};
 use nirspi::link::CameraAddress;
 use nirspi::recording::{Recorder, Recording, RunAccount, Target};

@@ -48,7 +48,7 @@ impl Default for FakeFpga {
         let mut registers: BTreeMap<_, _> =
             Register::ALL.iter().map(|r| (r.address(), r.reset())).collect();
         let ready = clocks::LOCKED | clocks::ALIVE | clocks::READY;
-        registers.insert(Register::Clocks.address(), ready | ADC_HZ / clocks::UNIT_HZ);
+        registers.insert(Register::Clocks.address(), ready | (ADC_HZ / clocks::UNIT_HZ));
         Self {
             registers,
             identity: IDENTITY,
