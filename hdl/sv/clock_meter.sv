@@ -1,6 +1,6 @@
 /// Measures the frequency of another clock.
 ///
-/// The one law: `count` is the number of times that `beat` changed in the last whole window, and 0 before the
+/// Invariant: `count` is the number of times that `beat` changed in the last whole window, and 0 before the
 /// first window is over. It is true of any `beat` that stands for two clocks or more, and of one that stands still.
 module nirspi_clock_meter
     import nirspi_register_map::*;

@@ -1,6 +1,6 @@
 /// The registers that are answered in the host port's clock, with or without the ADC's.
 ///
-/// The one law: every read has an answer before its dummy cycles are over. Of the registers here it is their
+/// Invariant: every read has an answer before its dummy cycles are over. Of the registers here it is their
 /// value; of any other it is `NO_CLOCK`, until the engine's answer takes its place.
 module nirspi_host_registers
     import nirspi_register_map::*;

@@ -1,6 +1,6 @@
 /// A detector for a bring-up without ADC: the light that the levels at the LED pins would make.
 ///
-/// The one law: `code` is `loopback` of `mcu/wire` of what was at the pins four clocks before. Only the LEDs of the
+/// Invariant: `code` is `loopback` of `mcu/wire` of what was at the pins four clocks before. Only the LEDs of the
 /// diagonal reach this detector, so that each line has a pixel of its own.
 module nirspi_loopback
     import nirspi_register_map::*;

@@ -121,8 +121,6 @@ impl FromStr for Format {
 pub struct ExportOptions {
     /// Whether to leave the leak between patterns uncorrected.
     pub keep_leak: bool,
-    /// Whether to ignore the flat field that is kept for the camera.
-    pub no_flat_field: bool,
     /// What is known of the scene; a field of Parquet files.
     pub scene: Option<String>,
     /// Distance to the target in metres, if known; a field of Parquet files.
@@ -254,11 +252,8 @@ struct OneFrame<'w> {
 
 impl Whole {
     fn read(path: &Path, options: &ExportOptions) -> Result<Self, ExportError> {
-        let source_options = SourceOptions {
-            keep_leak: options.keep_leak,
-            no_flat_field: options.no_flat_field,
-            ..SourceOptions::default()
-        };
+        let source_options =
+            SourceOptions { keep_leak: options.keep_leak, ..SourceOptions::default() };
         let mut recording = Recording::open(path)?;
         let (mut sequence, mut device_time_us, mut time_ns) = (Vec::new(), Vec::new(), Vec::new());
         let tally = hear_recording(&mut recording, |heard, tally| {

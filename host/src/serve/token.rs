@@ -3,7 +3,7 @@
 //!
 //! # Invariant
 //! A server that listens beyond its own machine answers nothing without its token
-//! (`nobody_in_the_network_gets_anything_without_the_token` in
+//! (`a_client_in_the_network_gets_nothing_without_the_token` in
 //! `host/cli/tests/cli/serve_guarded.rs`). Tokens are compared in constant time.
 
 use axum::http::{HeaderMap, Uri, header};

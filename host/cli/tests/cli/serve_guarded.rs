@@ -9,7 +9,7 @@ use std::net::TcpStream;
 const TOKEN: &str = "a-token-for-the-tests";
 
 #[test]
-fn nobody_in_the_network_gets_anything_without_the_token() {
+fn a_client_in_the_network_gets_nothing_without_the_token() {
     let bench = Bench::new();
     let mut server = serve(&bench, &["--listen", "0.0.0.0:0"]);
     let notice = server.process.says("every machine in this network");
@@ -102,7 +102,7 @@ fn a_page_goes_on_among_hundreds_of_clients_that_misbehave() {
     assert!(page.any(|moment| moment["state"]["camera"]["phase"] == "stopped"));
     server.ask("POST", "/api/start", &[], "").json();
     assert!(page.any(|moment| shown(&moment) > last + 5));
-    // Streams that nobody reads are closed: the page is alone.
+    // The server has closed the streams that were not read, so the page is its only client.
     assert!(page.any(|moment| moment["state"]["viewers"] == 1));
     // Silent connections and half requests are closed, too.
     for (_, mut stream) in open.into_iter().filter(|(kind, _)| *kind != UNREAD) {

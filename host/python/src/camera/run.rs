@@ -272,7 +272,7 @@ impl Run {
             return Ok(());
         }
         self.shared.stop.store(true, Ordering::Relaxed);
-        // A thread that waits for room goes on when nobody receives.
+        // A thread that waits for room goes on once the receiver is dropped.
         drop(py.detach(|| lock(&self.receiver).take()));
         self.end(py);
         Ok(())
