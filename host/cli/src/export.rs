@@ -48,7 +48,6 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         distance_m: args.distance_m,
         truth: args.truth.clone(),
         pinhole: Some(pinhole_of(&args.model.read()?)),
-        ..ExportOptions::default()
     };
     let exported = export(&args.recording, &out, args.to, &options)?;
     args.report.print(&exported, |exported| {

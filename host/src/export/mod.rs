@@ -3,7 +3,7 @@
 //!
 //! # Invariant
 //! An exported file holds the numbers that `reconstruct` uses: the image of the exported file is
-//! the image of the recording, to the bit
+//! the image of the recording before the flat field, to the bit
 //! (`an_exported_file_gives_the_image_of_the_recording_to_the_bit` in `host/tests/export.rs`).
 //! Frames are read one by one, so memory does not grow with the readings of a recording.
 
@@ -84,6 +84,11 @@ impl Format {
         } else {
             name
         }
+    }
+
+    /// Whether the file holds readings alone. A flat field corrects images, not readings.
+    fn holds_readings(self) -> bool {
+        matches!(self, Self::Npz | Self::Npy | Self::Csv | Self::Parquet)
     }
 
     /// What a file of this format holds, in one line.
@@ -222,7 +227,14 @@ pub fn export(
     }
     let bytes = std::fs::metadata(out).map_or(0, |file| file.len());
     let (frames, patterns) = (whole.sequence.len(), whole.source.measurements.rows().len());
-    let (file, notes) = (out.to_owned(), whole.source.notes);
+    let (file, mut notes) = (out.to_owned(), whole.source.notes);
+    if whole.source.flat_field.is_some() && format.holds_readings() {
+        notes.push(
+            "readings are exported without the flat field that is kept for this camera, so their image has the \
+             pattern of its LEDs"
+                .to_owned(),
+        );
+    }
     Ok(Exported { file, format, bytes, frames, patterns, images, notes })
 }
 
