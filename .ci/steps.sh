@@ -6,7 +6,7 @@ steps=(
     "format          layout of the code"
     "typos           spelling, and prose wrapped at 100 columns; PyPI"
     "firmware        every board's ELF; rustup's targets, or Debian's compiler"
-    "test            the README's test command: cargo test; Debian for software Vulkan"
+    "test            the README's test command: cargo test"
     "gpu             GPU kernels on software Vulkan; Debian"
     "rtl             the gateware's RTL in the Veryl simulator, alone and in the whole camera"
     "features        the library alone, and with its features that bring the others"
@@ -92,14 +92,14 @@ emulated_firmware() {
 }
 
 step_test() {
-    software_vulkan
     cargo test --locked
 }
 
 step_gpu() {
     software_vulkan
-    cargo test --locked --lib -- omp:: gpu:: --nocapture 2>&1 | tee target/gpu-tests.log
-    if ls /usr/share/vulkan/icd.d/lvp_icd.* >/dev/null 2>&1 && grep -q '^skipped: no Vulkan' target/gpu-tests.log; then
+    cargo test --locked --features nirspi-cli/wgpu --lib --test cli -- \
+        omp:: gpu:: sparse_problems:: the_whole_of_the_pipeline weights:: --nocapture 2>&1 | tee target/gpu-tests.log
+    if ls /usr/share/vulkan/icd.d/lvp_icd.* >/dev/null 2>&1 && grep -q '^skipped: .*wgpu' target/gpu-tests.log; then
         echo "software Vulkan is there, and its tests were skipped" >&2
         return 1
     fi
@@ -141,14 +141,14 @@ step_licences() {
 step_licence_texts() {
     tool cargo-about 0.9.3 --features cli
     cargo about generate --locked --fail --config .github/about.toml --manifest-path host/cli/Cargo.toml \
-        --features flash --output-file target/licences.html .github/about.hbs
+        --features flash,wgpu --output-file target/licences.html .github/about.hbs
 }
 
 # What a package of the program contains beside it.
 step_deb() {
     tool cargo-deb 3.8.0
     [ -f target/licences.html ] || step_licence_texts
-    cargo build --locked --release --features flash
+    cargo build --locked --release --features flash,wgpu
     local nirspi=target/release/nirspi shell
     "$nirspi" man target/package/man
     for shell in bash zsh fish; do "$nirspi" completions "$shell" >"target/package/nirspi.$shell"; done
@@ -182,10 +182,11 @@ step_application() {
     bash boards/otg/check.sh
 }
 
+# The whole workspace at once, so that each dependency is checked once, for the documentation too.
 step_lints() {
-    cargo clippy --locked --all-targets -- -D warnings
-    cargo clippy --locked -p nirspi-hdl-sim -p nirspi-tests-rtl --all-targets -- -D warnings
-    cargo clippy --locked -p nirspi-nets -p nirspi -p nirspi-eval -p nirspi-cli --features train --all-targets -- -D warnings
+    cargo clippy --locked --workspace --all-targets -- -D warnings
+    cargo clippy --locked --workspace --all-targets \
+        --features nirspi-nets/train,nirspi/train,nirspi-eval/train,nirspi-cli/train -- -D warnings
     local name
     for name in $(boards); do
         if rustup target list --installed | grep -qx "$(fact "$name" target)"; then

@@ -12,8 +12,12 @@
 
 mod junk;
 mod missing;
+#[cfg(feature = "pictures")]
+mod preview;
 mod report;
 
+#[cfg(feature = "pictures")]
+pub use preview::Preview;
 pub use report::CaptureReport;
 
 use crate::account::LossCounters;

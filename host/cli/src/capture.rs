@@ -6,10 +6,11 @@ use super::report::ReportArgs;
 use super::{Usage, address, print, progress, serve_virtual::stop_on_signal};
 use anyhow::Result;
 use nirspi::calibration::Origin;
-use nirspi::capture::{CaptureOptions, CaptureReport, Progress, capture};
+use nirspi::capture::{CaptureOptions, CaptureReport, Preview, Progress, observe};
+use nirspi::picture::half_blocks;
 use nirspi::recording::Target;
-use nirspi_recon::Sampling;
 use nirspi_recon::words::count;
+use nirspi_recon::{Image, Sampling};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -19,7 +20,8 @@ use std::sync::atomic::Ordering;
 ///
 /// The command uses the ADC latency and settling that `nirspi calibrate` or `nirspi selftest` has kept for this camera. If
 /// none are kept, the command measures them on the scene first; if the scene is too dim, the command ends with an error.
-/// Ctrl-C ends the recording and keeps it. The exit code is 0 only if nothing is missing: every frame arrived intact, and
+/// Ctrl-C ends the recording and keeps it. On a terminal with colours a small image of the newest frames is shown (not
+/// with --quiet, and not if NO_COLOR is set). The exit code is 0 only if nothing is missing: every frame arrived intact, and
 /// the camera reports no fault. Otherwise one line says what is missing, the recording is kept, and the exit code is 1.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
@@ -66,14 +68,19 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         record: Some(target),
     };
     let bar = progress::Progress::new("capture", args.frames.map(u64::from), "frames");
-    let captured = capture(&mut session, &options, &mut |progress: &Progress| {
+    let mut seen = String::new();
+    let watch = |progress: &Progress, image: Option<Image>| {
+        if let (Some(image), Some(tones)) = (image, bar.tones()) {
+            seen = format!("\n{}", half_blocks(&image, tones).join("\n"));
+        }
         bar.set(progress.counters.total());
-        bar.say(progress.counters.to_string());
+        bar.say(format!("{}{seen}", progress.counters));
         match stop.load(Ordering::Relaxed) {
             true => ControlFlow::Break(()),
             false => ControlFlow::Continue(()),
         }
-    });
+    };
+    let captured = observe(&mut session, &options, &mut Preview::new(watch));
     drop(bar);
     let captured = captured?;
     let path = captured.recording.as_deref().unwrap_or(Path::new(""));

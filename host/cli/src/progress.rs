@@ -5,6 +5,7 @@ use super::print;
 use indicatif::{ProgressBar, ProgressStyle};
 use nirspi::capture;
 use nirspi::heartbeat::Heartbeat;
+use nirspi::picture::Tones;
 use std::io::{IsTerminal, stderr};
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -79,6 +80,12 @@ impl Progress {
     /// More things are done.
     pub fn add(&self, more: u64) {
         self.bar.inc(more);
+    }
+
+    /// The grey tones of the terminal on which the bar is seen; `None` if no image can be shown.
+    pub fn tones(&self) -> Option<Tones> {
+        let seen = !self.bar.is_hidden();
+        seen.then(|| Tones::announced(|name| std::env::var(name).ok())).flatten()
     }
 
     /// Words beside the bar.

@@ -10,7 +10,7 @@ pub use nirspi_recon::backend::{Backend, ParseBackendError};
 #[cfg(not(feature = "gpu"))]
 use nirspi_recon::backend::NOT_BUILT;
 #[cfg(feature = "gpu")]
-use nirspi_recon::backend::probe;
+use nirspi_recon::backend::probe::{self, Gpu};
 #[cfg(feature = "gpu")]
 use std::sync::Arc;
 use thiserror::Error;
@@ -38,7 +38,7 @@ pub struct Device {
 #[derive(Debug, Clone)]
 pub(crate) enum Kind {
     Cpu,
-    #[cfg(feature = "gpu")]
+    #[cfg(feature = "wgpu")]
     Wgpu(cubecl::wgpu::WgpuDevice),
     #[cfg(feature = "gpu")]
     Cuda(cubecl::cuda::CudaDevice),
@@ -56,12 +56,9 @@ impl Device {
     /// [`DeviceError`] if wgpu or CUDA was requested and was not found; `Auto` and `Cpu` never
     /// fail.
     pub fn open(backend: Backend) -> Result<Self, DeviceError> {
-        let absent = |why| DeviceError { backend, why };
-        match backend {
-            Backend::Cpu => Ok(Self::cpu()),
-            Backend::Auto => Ok(cuda().or_else(|_| wgpu(false)).unwrap_or_else(|_| Self::cpu())),
-            Backend::Wgpu => wgpu(true).map_err(absent),
-            Backend::Cuda => cuda().map_err(absent),
+        match find(backend) {
+            Err(_) if backend == Backend::Auto => Ok(Self::cpu()),
+            found => found.map_err(|why| DeviceError { backend, why }),
         }
     }
 
@@ -74,7 +71,7 @@ impl Device {
     pub fn backend(&self) -> Backend {
         match self.kind {
             Kind::Cpu => Backend::Cpu,
-            #[cfg(feature = "gpu")]
+            #[cfg(feature = "wgpu")]
             Kind::Wgpu(_) => Backend::Wgpu,
             #[cfg(feature = "gpu")]
             Kind::Cuda(_) => Backend::Cuda,
@@ -86,6 +83,7 @@ impl Device {
     pub(crate) fn engine(&self) -> Option<Arc<dyn Engine>> {
         match &self.kind {
             Kind::Cpu => None,
+            #[cfg(feature = "wgpu")]
             Kind::Wgpu(device) => Some(gpu::wgpu(device)),
             Kind::Cuda(device) => Some(gpu::cuda(device)),
         }
@@ -96,31 +94,27 @@ impl Device {
         match self.kind {
             Kind::Cpu => 32,
             #[cfg(feature = "gpu")]
-            Kind::Wgpu(_) | Kind::Cuda(_) => 256,
+            _ => 256,
         }
     }
 }
 
 #[cfg(feature = "gpu")]
-fn cuda() -> Result<Device, String> {
-    let found = probe::cuda().map_err(|absent| absent.to_string())?;
-    Ok(Device { kind: Kind::Cuda(found.device), name: found.name })
-}
-
-#[cfg(feature = "gpu")]
-fn wgpu(software_too: bool) -> Result<Device, String> {
-    let found = probe::wgpu(software_too).map_err(|absent| absent.to_string())?;
-    Ok(Device { kind: Kind::Wgpu(found.device), name: found.name })
-}
-
-#[cfg(not(feature = "gpu"))]
-fn cuda() -> Result<Device, String> {
-    Err(NOT_BUILT.to_owned())
+fn find(backend: Backend) -> Result<Device, String> {
+    let found = probe::find(backend).map_err(|missing| missing.to_string())?;
+    Ok(match found {
+        None => Device::cpu(),
+        Some(Gpu::Cuda(found)) => Device { kind: Kind::Cuda(found.device), name: found.name },
+        #[cfg(feature = "wgpu")]
+        Some(Gpu::Wgpu(found)) => Device { kind: Kind::Wgpu(found.device), name: found.name },
+        // A program may have given the feature wgpu to nirspi-recon alone.
+        Some(_) => return Err("this build of nirspi-nets is without the feature wgpu".to_owned()),
+    })
 }
 
 #[cfg(not(feature = "gpu"))]
-fn wgpu(_software_too: bool) -> Result<Device, String> {
-    Err(NOT_BUILT.to_owned())
+fn find(backend: Backend) -> Result<Device, String> {
+    if backend == Backend::Cpu { Ok(Device::cpu()) } else { Err(NOT_BUILT.to_owned()) }
 }
 
 #[cfg(test)]

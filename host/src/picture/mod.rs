@@ -20,6 +20,7 @@ mod layout;
 mod report;
 mod scale;
 mod sheet;
+mod terminal;
 mod text;
 mod ticks;
 mod video;
@@ -30,6 +31,7 @@ pub use layout::{Panel, SideBySide, below, beside, blank, stacked};
 pub use report::Pictures;
 pub use scale::{PERCENTILES, Range, Scale, Unit};
 pub use sheet::Sheet;
+pub use terminal::{Tones, half_blocks};
 pub(crate) use video::of_images as video;
 
 use image::Rgb;

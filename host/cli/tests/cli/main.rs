@@ -1,6 +1,7 @@
 //! The program as its users meet it: the real binary, real processes, real sockets, real files.
 //!
-//! The one law: every wait is bounded, and no process outlives its test.
+//! # Invariant
+//! Every wait is bounded, and no process outlives its test (`bench::Process`).
 
 #![allow(clippy::unwrap_used)] // helpers of tests are tests
 
@@ -19,6 +20,8 @@ mod foreign_devices;
 mod metrics;
 mod other_forms;
 mod packaging;
+#[cfg(unix)]
+mod preview;
 mod quality;
 mod rain;
 mod readme;

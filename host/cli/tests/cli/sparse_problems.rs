@@ -71,7 +71,7 @@ fn adapter(bench: &Bench) -> Option<String> {
     if said.code != Some(0) {
         assert!(said.stderr.contains("no GPU found (wgpu: "), "{said:?}");
         // Past the test harness's capture, so that a skipped test is seen.
-        let _ = writeln!(std::io::stderr(), "skipped: no Vulkan adapter");
+        let _ = writeln!(std::io::stderr(), "skipped: {}", said.stderr.trim());
         return None;
     }
     Some(said.json()["device"].as_str().unwrap().to_owned())

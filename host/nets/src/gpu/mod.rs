@@ -38,6 +38,7 @@ use std::sync::Arc;
 
 use cubecl::Runtime;
 use cubecl::cuda::{CudaDevice, CudaRuntime};
+#[cfg(feature = "wgpu")]
 use cubecl::wgpu::{WgpuDevice, WgpuRuntime};
 
 pub(crate) use chain::Chain;
@@ -47,6 +48,7 @@ pub(crate) use fsrcnn::Fsrcnn;
 pub(crate) use unet::UNet;
 
 /// The engine of a wgpu device.
+#[cfg(feature = "wgpu")]
 pub(crate) fn wgpu(device: &WgpuDevice) -> Arc<dyn Engine> {
     Arc::new(WgpuRuntime::client(device))
 }

@@ -13,13 +13,13 @@ use burn::tensor::backend::AutodiffBackend;
 pub(super) fn new(settings: &Settings, device: &Device) -> Result<Box<dyn Learner>, TrainError> {
     match &device.kind {
         Kind::Cpu => on::<Autodiff<Flex>>(settings, Default::default()),
-        #[cfg(all(feature = "gpu", not(test)))]
+        #[cfg(all(feature = "wgpu", not(test)))]
         Kind::Wgpu(device) => on::<Autodiff<burn::backend::Wgpu>>(settings, device.clone()),
         #[cfg(all(feature = "gpu", not(test)))]
         Kind::Cuda(device) => on::<Autodiff<burn::backend::Cuda>>(settings, device.clone()),
         // Training on GPUs takes minutes to compile, so unit tests train on the CPU.
         #[cfg(all(feature = "gpu", test))]
-        Kind::Wgpu(_) | Kind::Cuda(_) => Err(TrainError::Setting {
+        _ => Err(TrainError::Setting {
             name: "device",
             found: device.name().to_owned(),
             expected: "the CPU, in the library's own tests",

@@ -11,11 +11,10 @@
 
 use super::Backend;
 use cubecl::cuda::{CudaDevice, install::cuda_path};
-use cubecl::future::block_on;
-use cubecl::wgpu::{AutoGraphicsApi, GraphicsApi, WgpuDevice};
+#[cfg(feature = "wgpu")]
+use cubecl::wgpu::WgpuDevice;
 use cudarc::driver::{self, CudaContext, DriverError};
 use thiserror::Error;
-use wgpu::DeviceType;
 
 /// A device that was found.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -43,6 +42,9 @@ pub enum Absent {
     /// All libraries are there, but no GPU that they can use.
     #[error("no GPU")]
     Device,
+    /// This build can use no such device.
+    #[error("this build is without the feature {0}")]
+    NotBuilt(&'static str),
     /// The driver refused, for this reason.
     #[error("{0}")]
     Refused(String),
@@ -61,6 +63,7 @@ pub enum Gpu {
     /// Through CUDA.
     Cuda(Found<CudaDevice>),
     /// Through Vulkan, Metal or DirectX.
+    #[cfg(feature = "wgpu")]
     Wgpu(Found<WgpuDevice>),
 }
 
@@ -80,8 +83,7 @@ pub struct Missing {
 /// [`Missing`] names the backends that were tried, and why each is not usable.
 pub fn find(backend: Backend) -> Result<Option<Gpu>, Missing> {
     let through_cuda = || cuda().map(Gpu::Cuda).map_err(|absent| ("CUDA", absent));
-    let through_wgpu =
-        |software_too| wgpu(software_too).map(Gpu::Wgpu).map_err(|absent| ("wgpu", absent));
+    let through_wgpu = |software_too| any_adapter(software_too).map_err(|absent| ("wgpu", absent));
     let found = match backend {
         Backend::Cpu => return Ok(None),
         Backend::Cuda => through_cuda().map_err(|absent| vec![absent]),
@@ -120,12 +122,27 @@ fn installed() -> Result<(), Absent> {
     }
 }
 
+#[cfg(feature = "wgpu")]
+fn any_adapter(software_too: bool) -> Result<Gpu, Absent> {
+    wgpu(software_too).map(Gpu::Wgpu)
+}
+
+#[cfg(not(feature = "wgpu"))]
+fn any_adapter(_software_too: bool) -> Result<Gpu, Absent> {
+    Err(Absent::NotBuilt("wgpu"))
+}
+
 /// The best adapter of Vulkan, Metal or DirectX: discrete before integrated, and any other only if
 /// `software_too`.
 ///
 /// # Errors
 /// [`Absent`] if no GPU answers.
+#[cfg(feature = "wgpu")]
 pub fn wgpu(software_too: bool) -> Result<Found<WgpuDevice>, Absent> {
+    use cubecl::future::block_on;
+    use cubecl::wgpu::{AutoGraphicsApi, GraphicsApi};
+    use wgpu::DeviceType;
+
     let backends = AutoGraphicsApi::backend().into();
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
         backends,
@@ -160,6 +177,7 @@ mod tests {
         match find(Backend::Auto) {
             Ok(None) => panic!("the processor is no answer to a search for a GPU"),
             Ok(Some(Gpu::Cuda(found))) => assert!(!found.software),
+            #[cfg(feature = "wgpu")]
             Ok(Some(Gpu::Wgpu(found))) => assert!(!found.software),
             Err(missing) => {
                 let line = missing.to_string();
@@ -177,7 +195,10 @@ mod tests {
             Err(missing) => assert!(missing.to_string().starts_with("CUDA: "), "{missing}"),
         }
         match find(Backend::Wgpu) {
+            #[cfg(feature = "wgpu")]
             Ok(found) => assert!(matches!(found, Some(Gpu::Wgpu(_))), "{found:?}"),
+            #[cfg(not(feature = "wgpu"))]
+            Ok(found) => panic!("a build without wgpu found {found:?}"),
             Err(missing) => assert!(missing.to_string().starts_with("wgpu: "), "{missing}"),
         }
     }

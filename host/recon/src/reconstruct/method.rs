@@ -83,6 +83,9 @@ impl Method {
     /// Every built-in method, the simplest first.
     pub const ALL: &'static [Self] = methods::ALL;
 
+    /// The inverse transform, with zeros for the patterns that were not measured: the quickest.
+    pub const HADAMARD: Self = methods::HADAMARD;
+
     /// Orthogonal matching pursuit, the paper's method.
     pub const OMP: Self = methods::OMP;
 

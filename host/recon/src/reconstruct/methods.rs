@@ -10,6 +10,7 @@ mod tikhonov;
 mod total_variation;
 
 use super::Method;
+pub(super) use hadamard::METHOD as HADAMARD;
 pub use hadamard::hadamard;
 pub(super) use omp::METHOD as OMP;
 pub(super) use prior::METHOD as PRIOR;

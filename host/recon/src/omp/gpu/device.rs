@@ -6,6 +6,7 @@ use crate::backend::probe::{self, Found, Gpu};
 use crate::omp::{Backend, BackendError};
 use cubecl::Runtime;
 use cubecl::cuda::CudaRuntime;
+#[cfg(feature = "wgpu")]
 use cubecl::wgpu::WgpuRuntime;
 use std::fmt;
 use std::sync::Arc;
@@ -38,6 +39,7 @@ impl Device {
                 let engine = Arc::new(CudaRuntime::client(&device));
                 Self { engine, name, backend: Backend::Cuda, software }
             }
+            #[cfg(feature = "wgpu")]
             Gpu::Wgpu(Found { device, name, software }) => {
                 let engine = Arc::new(WgpuRuntime::client(&device));
                 Self { engine, name, backend: Backend::Wgpu, software }
