@@ -249,7 +249,7 @@ fn reading(
     }
     if let Some(mm) = farthest_mm(instrument, heavy, &agreed(8.0))? {
         lines.push(format!(
-            "the same SNR at 8 us: {:.2} m; the paper's 2 and 1.5 m differ as its two exposures do \
+            "the same SNR at 8 µs: {:.2} m; the paper's 2 and 1.5 m differ as its two exposures do \
              ((25/8)^(1/4) = 1.33), whatever falls",
             mm * 1e-3
         ));
@@ -272,7 +272,7 @@ fn reading(
     let (near, far) = (near?, far?);
     lines.push(format!(
         "the exposure needed grows as the fourth power of the distance: {:.0} times from 0.3 to 1 m; the paper's \
-         8 and 25 us grow by 3.1",
+         8 and 25 µs grow by 3.1",
         far / near
     ));
     lines.push(
@@ -316,7 +316,7 @@ pub fn charts(settings: &Settings) -> Result<[Chart; 2]> {
     let mut lines = Vec::new();
     for &exposure_us in &settings.exposures_us {
         let points = distances_m().filter_map(|m| Some((m, snr(dry, m, exposure_us).ok()?)));
-        let (name, points) = (format!("{exposure_us} us"), points.collect());
+        let (name, points) = (format!("{exposure_us} µs"), points.collect());
         lines.push(Line { name, colour: lines.len(), dashed: false, points });
     }
     let name = format!("SNR {}", settings.snr);
@@ -355,7 +355,7 @@ pub fn charts(settings: &Settings) -> Result<[Chart; 2]> {
         y: Axis::decades("loss of SNR, %", values, 6),
         lines,
         footer: format!(
-            "simulated: light rain of {} mm/h, heavy rain of {} mm/h, {longest} us",
+            "simulated: light rain of {} mm/h, heavy rain of {} mm/h, {longest} µs",
             PaperRain::LIGHT.rate_mm_per_h,
             PaperRain::HEAVY.rate_mm_per_h
         ),
@@ -407,7 +407,7 @@ fn exposures_against_distance(lines: Vec<Line>) -> Chart {
         header: "Exposure of a pattern that a pixel needs".to_owned(),
         x: distance_axis(),
         y: Axis {
-            name: "exposure, us".to_owned(),
+            name: "exposure, µs".to_owned(),
             from: 0.001,
             to: 1000.0,
             logarithmic: true,
