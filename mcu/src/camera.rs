@@ -81,6 +81,12 @@ impl Camera {
         self.machine.poll(now, inputs, ports)
     }
 
+    /// Sends or counts a frame that the bus has kept, while the board transfers the next one: the
+    /// frame of [`Wanted::kept`](crate::Wanted::kept).
+    pub fn pack(&mut self, now: Micros, frame: &[u8], sink: &mut impl PacketSink) {
+        self.machine.pack(now, frame, sink);
+    }
+
     /// Forwards a time-of-flight map of `side` x `side` distances in mm, measured now. The map is
     /// dropped if the link has no room, if no host is there, or if the map is not of that size.
     pub fn depth<B: FpgaBus, S: PacketSink, G: GatewareLoader>(

@@ -5,25 +5,29 @@
 //! long, so the board transfers them between two polls, by DMA where it has one:
 //!
 //! ```
-//! use nirspi_mcu::{BusError, HostPort, PortBus};
+//! use nirspi_mcu::{BusError, HostPort, PortBus, Wanted};
 //!
 //! /// One turn of a board's loop, after the camera's poll.
 //! async fn transfer<P: HostPort>(
 //!     bus: &mut PortBus<'_, P>,
 //!     read: impl AsyncFn(&mut P, u8, &mut [u8]) -> Result<(), BusError>,
 //! ) {
-//!     if let Some((port, opcode, bytes)) = bus.wanted() {
-//!         let done = read(port, opcode, bytes).await;
+//!     if let Some(Wanted { port, opcode, into, .. }) = bus.wanted() {
+//!         let done = read(port, opcode, into).await;
 //!         bus.transferred(done);
 //!     }
 //! }
 //! ```
 //!
+//! With a second buffer ([`PortBus::with_spare`]) a frame can be kept: the camera packs it while the
+//! next frame is transferred into the other buffer.
+//!
 //! # Invariant
 //! Transferred data is given unchanged until the FPGA gets a release or a new start
 //! (`tests::host_port::a_frame_is_transferred_once_and_given_until_it_is_released`). After a
 //! release, data from before it is never given again
-//! (`tests::host_port::after_a_release_an_older_frame_is_never_given`).
+//! (`tests::host_port::after_a_release_an_older_frame_is_never_given`), but for a kept frame, which
+//! is given once (`tests::host_port::a_kept_frame_outlives_its_release_and_is_given_once`).
 
 use crate::{BusError, FpgaBus};
 use nirspi_wire::fpga::{MAX_FRAME_BYTES, frame_bytes};
@@ -80,12 +84,29 @@ enum Transfer {
 pub struct PortBus<'b, P> {
     port: P,
     buffer: &'b mut [u8; MAX_FRAME_BYTES],
+    /// Memory of the kept frame.
+    spare: Option<&'b mut [u8; MAX_FRAME_BYTES]>,
+    /// `spare` holds a frame that has not been given.
+    keeps: bool,
     transfer: Transfer,
     /// The values written last. The FPGA copies both when it starts.
     patterns: u32,
     raw_samples: u32,
     frame_bytes: usize,
     raw_bytes: usize,
+}
+
+/// A transfer to carry out, and what there is to do meanwhile.
+#[derive(Debug)]
+pub struct Wanted<'w, P> {
+    /// The FPGA's port.
+    pub port: &'w mut P,
+    /// Opcode of the read.
+    pub opcode: u8,
+    /// The bytes to fill.
+    pub into: &'w mut [u8],
+    /// The frame before, for [`Camera::pack`](crate::Camera::pack) during the transfer.
+    pub kept: Option<&'w [u8]>,
 }
 
 impl<'b, P: HostPort> PortBus<'b, P> {
@@ -96,6 +117,8 @@ impl<'b, P: HostPort> PortBus<'b, P> {
         let mut bus = Self {
             port,
             buffer,
+            spare: None,
+            keeps: false,
             transfer: Transfer::None,
             patterns: Register::Patterns.reset(),
             raw_samples: Register::RawLength.reset(),
@@ -106,21 +129,30 @@ impl<'b, P: HostPort> PortBus<'b, P> {
         bus
     }
 
+    /// The bus with memory for a second frame, so that one frame is packed while the next comes.
+    #[must_use]
+    pub fn with_spare(mut self, spare: Option<&'b mut [u8; MAX_FRAME_BYTES]>) -> Self {
+        self.spare = spare;
+        self
+    }
+
     /// The port, for access to its other lines.
     pub fn port(&mut self) -> &mut P {
         &mut self.port
     }
 
-    /// The transfer to carry out now, if any: the port, the opcode, and the bytes to fill. After
-    /// the transfer, and before the next poll of the camera, the board must call
-    /// [`transferred`](Self::transferred).
-    pub fn wanted(&mut self) -> Option<(&mut P, u8, &mut [u8])> {
+    /// The transfer to carry out now, if any. After the transfer, and before the next poll of the
+    /// camera, the board must call [`transferred`](Self::transferred).
+    pub fn wanted(&mut self) -> Option<Wanted<'_, P>> {
         let Transfer::Wanted { data, .. } = self.transfer else { return None };
         let (opcode, length) = match data {
             Data::Frame => (READ_FRAME, self.frame_bytes),
             Data::Raw => (READ_RAW, self.raw_bytes),
         };
-        Some((&mut self.port, opcode, self.buffer.get_mut(..length)?))
+        let into = self.buffer.get_mut(..length)?;
+        let keeps = core::mem::take(&mut self.keeps);
+        let kept = self.spare.as_deref().filter(|_| keeps).and_then(|b| b.get(..self.frame_bytes));
+        Some(Wanted { port: &mut self.port, opcode, into, kept })
     }
 
     /// Reports the end of the wanted transfer.
@@ -165,6 +197,7 @@ impl<'b, P: HostPort> PortBus<'b, P> {
             self.transfer = Transfer::None;
         }
         if starts {
+            self.keeps = false;
             self.take_lengths();
         }
     }
@@ -204,6 +237,22 @@ impl<P: HostPort> FpgaBus for PortBus<'_, P> {
 
     fn frame(&mut self) -> Result<Option<&[u8]>, BusError> {
         self.data(Data::Frame)
+    }
+
+    fn keep(&mut self) -> bool {
+        let Some(spare) = &mut self.spare else { return false };
+        if self.transfer != Transfer::Held(Data::Frame) {
+            return false;
+        }
+        core::mem::swap(spare, &mut self.buffer);
+        self.keeps = true;
+        self.transfer = Transfer::None;
+        true
+    }
+
+    fn kept(&mut self) -> Option<&[u8]> {
+        let keeps = core::mem::take(&mut self.keeps);
+        self.spare.as_deref().filter(|_| keeps)?.get(..self.frame_bytes)
     }
 
     fn raw(&mut self) -> Result<Option<&[u8]>, BusError> {

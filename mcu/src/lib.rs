@@ -55,7 +55,7 @@ mod tests;
 pub use burst::RAW_PIECE_SAMPLES;
 pub use camera::Camera;
 pub use crash::{CRASH_WORDS, Crash};
-pub use host_port::{HostPort, PortBus};
+pub use host_port::{HostPort, PortBus, Wanted};
 pub use limits::Limits;
 pub use merge::Merger;
 pub use patience::{PATIENCE, Patience, Remedy};

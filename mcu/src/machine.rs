@@ -204,15 +204,11 @@ impl Machine {
         let may_send = self.may_stream();
         let absent = self.fpga_is_absent();
         let Activity::Run(run) = &mut self.activity else { return false };
-        let path = run::Path {
-            counters: &mut self.counters,
-            meter: &mut self.meter,
-            release_pending: &mut self.release_pending,
-            scratch: &mut self.scratch,
-            absent,
-            may_send,
-        };
-        let worked = run.take_frame(now, path, bus, sink);
+        let (counters, meter) = (&mut self.counters, &mut self.meter);
+        let path = run::Path { counters, meter, scratch: &mut self.scratch, may_send };
+        let may_come = !absent && !self.release_pending;
+        let release_pending = &mut self.release_pending;
+        let worked = run.take_frame(now, path, (may_come, release_pending), bus, sink);
         match run.progress(now, &self.counters) {
             run::Progress::Complete => self.end_run(now, None, bus),
             run::Progress::Stalled => {
@@ -222,6 +218,15 @@ impl Machine {
             run::Progress::UnderWay => self.wind_up(now, bus),
         }
         worked
+    }
+
+    /// Sends or counts a kept frame of this run.
+    pub fn pack(&mut self, now: Micros, frame: &[u8], sink: &mut impl PacketSink) {
+        let may_send = self.may_stream();
+        let Activity::Run(run) = &mut self.activity else { return };
+        let (counters, meter) = (&mut self.counters, &mut self.meter);
+        let path = run::Path { counters, meter, scratch: &mut self.scratch, may_send };
+        run.pack(now, path, frame, sink);
     }
 
     /// Switches the LEDs off. `reply` and `RunEnded` follow the last frame.

@@ -47,6 +47,18 @@ pub trait FpgaBus {
     /// [`BusError`]; the firmware then discards and releases the frame.
     fn frame(&mut self) -> Result<Option<&[u8]>, BusError>;
 
+    /// Puts the frame that [`frame`](Self::frame) gives where neither its release nor the transfer of
+    /// the next frame touches it, so that transfer and work overlap. False: this bus has no frame,
+    /// or no memory for a second one.
+    fn keep(&mut self) -> bool {
+        false
+    }
+
+    /// The kept frame. A kept frame is given once, and not after a start.
+    fn kept(&mut self) -> Option<&[u8]> {
+        None
+    }
+
     /// The whole raw burst that is ready, as little-endian `u16` samples; `None` during its
     /// transfer. Each call gives the same bytes until the next start.
     ///

@@ -21,6 +21,10 @@ use nirspi_wire::{
 /// transfer of the longest frame takes well under a millisecond.
 const DRAIN_PATIENCE: Micros = Micros(100_000);
 
+/// Longest time that a kept frame waits for the next transfer. Packing the longest frame takes about as
+/// long, so a longer wait gains nothing.
+const KEPT_PATIENCE: Micros = Micros(1_000);
+
 /// Bytes of the samples of the longest frame.
 pub(crate) const SAMPLE_BYTES: usize = 4 * PATTERNS as usize;
 
@@ -100,6 +104,8 @@ pub(crate) struct Run {
     stall_after: Micros,
     last_frame: Micros,
     last_sequence: Option<u32>,
+    /// The bus keeps a frame that has not been packed, since then.
+    kept: Option<Micros>,
     ending: Option<Ending>,
 }
 
@@ -112,15 +118,12 @@ struct Ending {
 }
 
 /// What a frame needs on its way from the FPGA to the link.
+#[derive(Debug)]
 pub(crate) struct Path<'m> {
     pub counters: &'m mut Counters,
     pub meter: &'m mut Meter,
-    /// The bus failed during the release of the frame before.
-    pub release_pending: &'m mut bool,
     /// Memory for the frame's packed samples.
     pub scratch: &'m mut [u8],
-    /// The FPGA does not answer.
-    pub absent: bool,
     /// A host listens, and no reply or event waits.
     pub may_send: bool,
 }
@@ -191,6 +194,7 @@ impl Run {
             stall_after: Micros(stall_after).max(limits.stall_min),
             last_frame: now,
             last_sequence: None,
+            kept: None,
             ending: None,
         };
         if started == fpga::Started::OverAlready {
@@ -232,35 +236,88 @@ impl Run {
         }
     }
 
-    /// Takes at most one frame, and sends or counts it; true if there was a frame.
+    /// Takes at most one frame; true if there was work. A frame that the bus can keep is released
+    /// at once, and packed while the next one comes, or when no next one comes in time. Any other
+    /// frame is sent or counted before this call returns.
+    ///
+    /// `may_come` is false if the FPGA does not answer, and after a failed release, when the line
+    /// still signals the frame that was taken before. `release_pending` is set if a release fails.
     pub fn take_frame(
         &mut self,
         now: Micros,
-        path: Path<'_>,
+        mut path: Path<'_>,
+        (may_come, release_pending): (bool, &mut bool),
         bus: &mut impl FpgaBus,
         sink: &mut impl PacketSink,
     ) -> bool {
-        let Path { counters, meter, release_pending, scratch, absent, may_send } = path;
-        // After a failed release, the line still signals the frame that was taken before.
-        if *release_pending || absent || !bus.frame_ready() {
-            return false;
+        let is_due = |since| !self.is_lit() || now.since(since) >= KEPT_PATIENCE;
+        let overdue = self.kept.is_some_and(is_due) || !may_come;
+        let packed = overdue && self.pack_kept(now, &mut path, bus, sink);
+        if !may_come || !bus.frame_ready() {
+            return packed;
         }
-        let taken = match bus.frame() {
-            Ok(None) => return false,
-            Ok(Some(bytes)) => assemble(bytes, self.patterns, (meter, now), scratch),
-            Err(_) => None,
+        let has_come = match bus.frame() {
+            Ok(None) => return packed,
+            Ok(Some(_)) => true,
+            Err(_) => false,
         };
+        // Frames go out in order.
+        self.pack_kept(now, &mut path, bus, sink);
+        self.last_frame = now;
+        // At the end of a run no next frame is worth waiting for.
+        if has_come && self.is_lit() && bus.keep() {
+            self.kept = Some(now);
+            *release_pending = fpga::release(bus).is_err();
+            return true;
+        }
+        let bytes = if has_come { bus.frame().ok().flatten() } else { None };
+        let taken =
+            bytes.and_then(|bytes| assemble(bytes, self.patterns, (path.meter, now), path.scratch));
         // The FPGA needs its buffer back before the next frame is complete, so the release comes
         // before the link.
         *release_pending = fpga::release(bus).is_err();
-        self.last_frame = now;
-        let Some((header, samples)) = taken else {
-            counters.count_corrupt();
-            return true;
-        };
+        self.deliver(path.counters, path.may_send, taken, sink);
+        true
+    }
+
+    /// Sends or counts the frame that the bus keeps, if any; true if there was one.
+    fn pack_kept(
+        &mut self,
+        now: Micros,
+        path: &mut Path<'_>,
+        bus: &mut impl FpgaBus,
+        sink: &mut impl PacketSink,
+    ) -> bool {
+        if self.kept.is_none() {
+            return false;
+        }
+        let Some(bytes) = bus.kept() else { return false };
+        let Path { counters, meter, scratch, may_send } = path;
+        let path = Path { counters, meter, scratch, may_send: *may_send };
+        self.pack(now, path, bytes, sink);
+        true
+    }
+
+    /// Sends or counts a kept frame.
+    pub fn pack(&mut self, now: Micros, path: Path<'_>, bytes: &[u8], sink: &mut impl PacketSink) {
+        if self.kept.take().is_some() {
+            let taken = assemble(bytes, self.patterns, (path.meter, now), path.scratch);
+            self.deliver(path.counters, path.may_send, taken, sink);
+        }
+    }
+
+    /// Sends or counts a frame that was assembled, or `None` if it was damaged.
+    fn deliver(
+        &mut self,
+        counters: &mut Counters,
+        may_send: bool,
+        taken: Option<(Header, Samples<'_>)>,
+        sink: &mut impl PacketSink,
+    ) {
+        let Some((header, samples)) = taken else { return counters.count_corrupt() };
         if self.last_sequence.replace(header.sequence) == Some(header.sequence) {
             // The bus lost the release of this frame.
-            return true;
+            return;
         }
         counters.advance(header.sequence.wrapping_add(1), header.lost);
         let payload = samples.len().saturating_mul(4).saturating_add(STREAM_HEADER_BYTES);
@@ -278,7 +335,6 @@ impl Run {
             &mut counters.dropped
         };
         *count = count.wrapping_add(1);
-        true
     }
 
     /// Reply and event of a run whose LEDs are off and whose last frame is through; `None` before.
@@ -349,12 +405,11 @@ mod tests {
         let path = Path {
             counters: &mut counters,
             meter: &mut meter,
-            release_pending: &mut release_pending,
             scratch: &mut scratch,
-            absent: false,
             may_send: true,
         };
-        assert!(run.take_frame(Micros(2), path, &mut bus, &mut link));
+        let coming = (true, &mut release_pending);
+        assert!(run.take_frame(Micros(2), path, coming, &mut bus, &mut link));
         assert_eq!((link.packets.len(), counters.sent, release_pending), (1, 1, false));
         assert_eq!(run.progress(Micros(3), &counters), Progress::Complete);
 

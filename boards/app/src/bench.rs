@@ -133,6 +133,7 @@ impl HostPort for FakeFpga {
         let running = if self.pins.running.get() { status::RUNNING | status::LEDS_ON } else { 0 };
         Ok(match Register::at(address) {
             Some(Register::Identity) => IDENTITY,
+            Some(register @ (Register::Version | Register::Design)) => register.reset(),
             Some(Register::Status) => status::INTERLOCK_CLOSED | running,
             Some(Register::FramesMade) => self.pins.sequence.get(),
             _ => self.registers[usize::from(address)],

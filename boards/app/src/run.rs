@@ -1,18 +1,20 @@
 //! The camera's loop.
 //!
-//! One turn of the loop takes at most a millisecond, or the transfer of the longest frame. While
-//! the loop waits, the tasks that serve the host run.
+//! One turn of the loop takes at most a millisecond, or the transfer of the longest frame. During the
+//! transfer the camera packs the frame before, if the board has memory for two. While the loop waits,
+//! the tasks that serve the host run.
 
 use crate::link::CameraEnd;
 use crate::{Board, DEPTH_SIDE, DepthMap, DepthSensor, FpgaPort};
-use core::future::pending;
+use core::future::{Future, pending, poll_fn};
+use core::pin::pin;
 use embassy_futures::select::select3;
 use embassy_futures::yield_now;
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Instant, Timer};
 use nirspi_mcu::{
-    BoardInfo, Camera, Crash, FpgaBus, GatewareLoader, Limits, Micros, PortBus, Ports,
+    BoardInfo, Camera, Crash, FpgaBus, GatewareLoader, Limits, Micros, PortBus, Ports, Wanted,
 };
 use nirspi_wire::fpga::MAX_FRAME_BYTES;
 use nirspi_wire::{State, Version};
@@ -34,6 +36,8 @@ pub struct Device<'b, B, P, G> {
     pub port: P,
     /// Memory for one frame, where the port's DMA can reach it.
     pub frame: &'b mut [u8; MAX_FRAME_BYTES],
+    /// The same for a second frame: with it a frame is packed while the next one is transferred.
+    pub spare: Option<&'b mut [u8; MAX_FRAME_BYTES]>,
     /// The destination of bitstreams.
     pub loader: G,
     /// Identity of the device, from [`board_info`].
@@ -76,8 +80,8 @@ pub async fn run<B: Board, P: FpgaPort, G: GatewareLoader>(
     mut link: CameraEnd<'_>,
     depth: &DepthMailbox,
 ) -> ! {
-    let Device { mut board, port, frame, mut loader, info, limits, crash } = device;
-    let mut bus = PortBus::new(port, frame);
+    let Device { mut board, port, frame, spare, mut loader, info, limits, crash } = device;
+    let mut bus = PortBus::new(port, frame).with_spare(spare);
     let mut camera = Camera::new(info, limits);
     if let Some(crash) = crash {
         camera.restarted_after(crash);
@@ -114,8 +118,13 @@ pub async fn run<B: Board, P: FpgaPort, G: GatewareLoader>(
             link.flush(FAREWELL).await;
             board.restart(into);
         }
-        if let Some((port, opcode, bytes)) = bus.wanted() {
-            let done = port.read_bytes(opcode, bytes).await;
+        if let Some(Wanted { port, opcode, into, kept }) = bus.wanted() {
+            let pack = || {
+                if let Some(frame) = kept {
+                    camera.pack(now(), frame, link.both().1);
+                }
+            };
+            let done = during(port.read_bytes(opcode, into), pack).await;
             bus.transferred(done);
         } else if progress.worked || taken > 0 {
             yield_now().await;
@@ -123,6 +132,20 @@ pub async fn run<B: Board, P: FpgaPort, G: GatewareLoader>(
             rest(&mut bus, &mut link).await;
         }
     }
+}
+
+/// Waits for a transfer. `work` runs once, when the transfer has begun.
+async fn during<T>(transfer: impl Future<Output = T>, work: impl FnOnce()) -> T {
+    let mut transfer = pin!(transfer);
+    let mut work = Some(work);
+    poll_fn(|context| {
+        let polled = transfer.as_mut().poll(context);
+        if let Some(work) = work.take() {
+            work();
+        }
+        polled
+    })
+    .await
 }
 
 /// Sleeps until there may be work.

@@ -61,6 +61,7 @@ static PACKETS: ConstStaticCell<[Packet; PLACES]> = ConstStaticCell::new([Packet
 static LINK: StaticCell<Link<'static>> = StaticCell::new();
 static MAILBOX: StaticCell<DepthMailbox> = StaticCell::new();
 static FRAME: ConstStaticCell<[u8; MAX_FRAME_BYTES]> = ConstStaticCell::new([0; _]);
+static SPARE: ConstStaticCell<[u8; MAX_FRAME_BYTES]> = ConstStaticCell::new([0; _]);
 static STAGING: ConstStaticCell<[u8; configuration::STAGING_BYTES]> = ConstStaticCell::new([0; _]);
 static PRESENCE: StaticCell<Presence> = StaticCell::new();
 static USB_MEMORY: StaticCell<Memory> = StaticCell::new();
@@ -179,6 +180,7 @@ async fn main(spawner: Spawner) {
         board,
         port,
         frame: FRAME.take(),
+        spare: Some(SPARE.take()),
         loader: gateware::Loader::new(configuration, STAGING.take()),
         info,
         limits: Limits::default(),

@@ -55,6 +55,7 @@ mod frames;
 mod gateware;
 mod leds;
 mod order;
+mod packet;
 mod raw;
 mod registers;
 mod safety;
@@ -65,4 +66,5 @@ mod window;
 
 pub use gateware::Gateware;
 pub use leds::Lines;
+pub use packet::{Stamp, packet};
 pub use source::AdcSample;

@@ -22,6 +22,11 @@ pub struct FakeFpga {
     pub clock: u64,
     pub frame: Option<Vec<u8>>,
     pub raw: Option<Vec<u8>>,
+    /// There is memory for a second frame.
+    pub keeps: bool,
+    kept: Option<Vec<u8>>,
+    /// The kept frame, once it has been given.
+    gone: Option<Vec<u8>>,
     /// A start completes all frames of the run before the next register read.
     pub instant: bool,
     /// Number of calls of `frame` and `raw` during which the transfer is still in progress.
@@ -60,6 +65,9 @@ impl Default for FakeFpga {
             clock: 0,
             frame: None,
             raw: None,
+            keeps: false,
+            kept: None,
+            gone: None,
             instant: false,
             transfer_polls: 0,
             dead: false,
@@ -92,7 +100,7 @@ impl FakeFpga {
 
     /// Loses its configuration: all registers as after power-up.
     pub fn reset(&mut self) {
-        *self = Self { accesses: self.accesses, ..Self::default() };
+        *self = Self { accesses: self.accesses, keeps: self.keeps, ..Self::default() };
     }
 
     /// Sums of frame `sequence`; sums of the test generator where the mode selects it.
@@ -212,6 +220,7 @@ impl FakeFpga {
             return;
         }
         (self.made, self.lost, self.frame, self.raw) = (0, 0, None, None);
+        self.kept = None;
         self.after_loss = false;
         if raw {
             let samples = self.get(Register::RawLength) as u16;
@@ -289,6 +298,19 @@ impl FpgaBus for FakeFpga {
             return Ok(None);
         }
         if self.dead { Err(BusError::Timeout) } else { Ok(self.frame.as_deref()) }
+    }
+
+    fn keep(&mut self) -> bool {
+        if self.keeps {
+            self.kept.clone_from(&self.frame);
+        }
+        self.keeps
+    }
+
+    fn kept(&mut self) -> Option<&[u8]> {
+        // The copy lives until the next frame is kept.
+        self.gone = self.kept.take();
+        self.gone.as_deref()
     }
 
     fn raw(&mut self) -> Result<Option<&[u8]>, BusError> {

@@ -5,6 +5,7 @@ use super::fake_fpga::FakeFpga;
 use super::support::*;
 use crate::{
     BoardInfo, BusError, Camera, FpgaBus, HostPort, Limits, Micros, NoLoader, PortBus, Ports,
+    Wanted,
 };
 use nirspi_wire::fpga::{MAX_FRAME_BYTES, frame_bytes};
 use nirspi_wire::host_port::{READ_FRAME, READ_RAW};
@@ -67,12 +68,24 @@ fn bus() -> PortBus<'static, Port> {
     PortBus::new(Port::default(), Box::leak(Box::new([0; MAX_FRAME_BYTES])))
 }
 
-/// Does a board's work between two polls; true if there was any.
+fn bus_of_two() -> PortBus<'static, Port> {
+    bus().with_spare(Some(Box::leak(Box::new([0; MAX_FRAME_BYTES]))))
+}
+
+/// Does a board's work between two polls, without the packing; true if there was any.
 fn serve(bus: &mut PortBus<'_, Port>) -> bool {
-    let Some((port, opcode, bytes)) = bus.wanted() else { return false };
-    let done = port.transfer(opcode, bytes);
+    let Some(Wanted { port, opcode, into, .. }) = bus.wanted() else { return false };
+    let done = port.transfer(opcode, into);
     bus.transferred(done);
     true
+}
+
+/// Asks for the frame that is ready, and transfers it.
+fn fetch(bus: &mut PortBus<'_, Port>) -> u8 {
+    bus.port().fpga.make_frame();
+    assert_eq!(bus.frame(), Ok(None));
+    assert!(serve(bus));
+    sequence(bus.frame().unwrap().unwrap())
 }
 
 fn start(bus: &mut PortBus<'_, Port>, patterns: u16) {
@@ -131,6 +144,51 @@ fn a_transfer_that_is_wanted_no_more_is_forgotten() {
     assert_eq!(bus.frame(), Ok(None));
 }
 
+#[test]
+fn a_kept_frame_outlives_its_release_and_is_given_once() {
+    let mut bus = bus_of_two();
+    start(&mut bus, 2);
+    assert!(!bus.keep(), "there is no frame");
+    assert_eq!(fetch(&mut bus), 0);
+    assert!(bus.keep());
+    control(&mut bus, control::RELEASE);
+
+    // During the transfer of the next frame, which comes into the other buffer.
+    bus.port().fpga.make_frame();
+    assert_eq!(bus.frame(), Ok(None));
+    let Wanted { port, opcode, into, kept } = bus.wanted().unwrap();
+    let done = port.transfer(opcode, into);
+    assert_eq!((sequence(kept.unwrap()), kept.unwrap().len()), (0, frame_bytes(2)));
+    bus.transferred(done);
+    assert_eq!(sequence(bus.frame().unwrap().unwrap()), 1);
+    assert_eq!(bus.kept(), None, "given once");
+
+    assert!(bus.keep());
+    control(&mut bus, control::RELEASE);
+    assert_eq!(bus.kept().map(sequence), Some(1), "without a transfer too");
+    assert_eq!(bus.kept(), None);
+}
+
+#[test]
+fn a_frame_kept_before_a_start_is_not_given_after_it() {
+    let mut bus = bus_of_two();
+    start(&mut bus, 2);
+    fetch(&mut bus);
+    assert!(bus.keep());
+    start(&mut bus, 3);
+    assert_eq!(bus.kept(), None);
+    assert!(!bus.keep());
+}
+
+#[test]
+fn a_bus_without_a_second_buffer_keeps_nothing() {
+    let mut bus = bus();
+    start(&mut bus, 2);
+    fetch(&mut bus);
+    assert!(!bus.keep());
+    assert_eq!(bus.frame().unwrap().map(sequence), Some(0), "still there");
+}
+
 /// The FPGA copies its settings when it starts.
 #[test]
 fn a_frame_is_as_long_as_the_run_was_started_with() {
@@ -138,13 +196,13 @@ fn a_frame_is_as_long_as_the_run_was_started_with() {
     start(&mut bus, 4);
     bus.write(Register::Patterns.address(), 9).unwrap();
     assert_eq!(bus.frame(), Ok(None));
-    assert_eq!(bus.wanted().unwrap().2.len(), frame_bytes(4));
+    assert_eq!(bus.wanted().unwrap().into.len(), frame_bytes(4));
     start(&mut bus, 9);
     assert_eq!(bus.frame(), Ok(None));
-    assert_eq!(bus.wanted().unwrap().2.len(), frame_bytes(9));
+    assert_eq!(bus.wanted().unwrap().into.len(), frame_bytes(9));
     start(&mut bus, u16::MAX);
     assert_eq!(bus.frame(), Ok(None));
-    assert_eq!(bus.wanted().unwrap().2.len(), MAX_FRAME_BYTES, "and never beyond the buffer");
+    assert_eq!(bus.wanted().unwrap().into.len(), MAX_FRAME_BYTES, "and never beyond the buffer");
 }
 
 #[test]
@@ -190,10 +248,10 @@ struct Device {
 }
 
 impl Device {
-    fn new() -> Self {
+    fn new(bus: PortBus<'static, Port>) -> Self {
         let info = BoardInfo::new("bench", "0001", nirspi_wire::Version(1, 2, 3));
         let camera = Camera::new(info, Limits::default());
-        let mut device = Self { camera, bus: bus(), link: Link::default(), now: Micros(1_000) };
+        let mut device = Self { camera, bus, link: Link::default(), now: Micros(1_000) };
         device.ask(Command::Hello { protocol: version::CURRENT });
         device
     }
@@ -204,7 +262,13 @@ impl Device {
         let taken = self.camera.receive(self.now, bytes, &GOOD_INPUTS, ports);
         assert_eq!(taken, bytes.len());
         self.camera.poll(self.now, &GOOD_INPUTS, ports);
-        serve(&mut self.bus);
+        if let Some(Wanted { port, opcode, into, kept }) = self.bus.wanted() {
+            let done = port.transfer(opcode, into);
+            if let Some(frame) = kept {
+                self.camera.pack(self.now, frame, &mut self.link);
+            }
+            self.bus.transferred(done);
+        }
     }
 
     fn ask(&mut self, command: Command<'_>) -> Vec<DeviceMessage<'static>> {
@@ -221,33 +285,74 @@ impl Device {
 
 #[test]
 fn the_camera_streams_over_the_port_and_counts_what_could_not_be_read() {
-    let mut device = Device::new();
-    device.ask(Command::Configure(SMALL));
-    device.ask(Command::Start(RunLength::Frames(5)));
-    let mut heard = Vec::new();
-    for number in 0..5 {
-        device.bus.port().failures = if number == 2 { 3 } else { 0 };
-        device.bus.port().fpga.make_frame();
-        for _ in 0..6 {
+    for bus in [bus(), bus_of_two()] {
+        let mut device = Device::new(bus);
+        device.ask(Command::Configure(SMALL));
+        device.ask(Command::Start(RunLength::Frames(5)));
+        let mut heard = Vec::new();
+        for number in 0..5 {
+            device.bus.port().failures = if number == 2 { 3 } else { 0 };
+            device.bus.port().fpga.make_frame();
+            for _ in 0..6 {
+                device.turn(&[]);
+            }
+            heard.extend(device.heard());
+        }
+        // The last frame waits a millisecond for the next, which does not come.
+        for _ in 0..10 {
             device.turn(&[]);
         }
         heard.extend(device.heard());
+        let sequences: Vec<u32> = frames(&heard).iter().map(|frame| frame.sequence).collect();
+        assert_eq!(sequences, [0, 1, 3, 4]);
+        let ended = EventKind::RunEnded {
+            run: 1,
+            frames_made: 5,
+            frames_dropped: 0,
+            fpga_frames_lost: 0,
+            fpga_frames_corrupt: 1,
+        };
+        assert_eq!(events(&heard), [ended]);
     }
-    let sequences: Vec<u32> = frames(&heard).iter().map(|frame| frame.sequence).collect();
-    assert_eq!(sequences, [0, 1, 3, 4]);
-    let ended = EventKind::RunEnded {
-        run: 1,
-        frames_made: 5,
-        frames_dropped: 0,
-        fpga_frames_lost: 0,
-        fpga_frames_corrupt: 1,
-    };
-    assert_eq!(events(&heard), [ended]);
+}
+
+#[test]
+fn with_a_second_buffer_the_fpga_has_its_own_back_before_the_frame_is_packed() {
+    let mut device = Device::new(bus_of_two());
+    device.ask(Command::Configure(SMALL));
+    device.ask(Command::Start(RunLength::Continuous));
+    device.bus.port().fpga.make_frame();
+    device.turn(&[]);
+    device.turn(&[]);
+    assert!(device.bus.port().fpga.frame.is_none(), "released");
+    assert!(frames(&device.heard()).is_empty(), "the frame waits for the next transfer");
+    device.bus.port().fpga.make_frame();
+    device.turn(&[]);
+    assert_eq!(frames(&device.heard()).len(), 1, "packed during the transfer");
+}
+
+/// A transfer over an emulated board's serial line takes longer than the end of a run waits.
+#[test]
+fn a_frame_that_comes_slowly_at_the_end_of_a_run_is_sent() {
+    for bus in [bus(), bus_of_two()] {
+        let mut device = Device::new(bus);
+        device.ask(Command::Configure(SMALL));
+        device.ask(Command::Start(RunLength::Frames(1)));
+        device.bus.port().fpga.make_frame();
+        device.now.0 += 2_000;
+        device.turn(&[]);
+        device.now.0 += 200_000;
+        device.turn(&[]);
+        device.turn(&[]);
+        let heard = device.heard();
+        assert_eq!(frames(&heard).len(), 1);
+        assert!(matches!(events(&heard)[..], [EventKind::RunEnded { fpga_frames_corrupt: 0, .. }]));
+    }
 }
 
 #[test]
 fn the_self_test_tries_the_frame_memory_too() {
-    let mut device = Device::new();
+    let mut device = Device::new(bus());
     device.bus.port().fpga.instant = true;
     let heard = device.ask(Command::SelfTest);
     let [DeviceMessage::Reply(Reply { outcome: Ok(Answer::SelfTest(report)), .. })] = heard[..]

@@ -78,9 +78,11 @@ proptest! {
         happenings in collection::vec(happening(), 0..80),
         afterwards in collection::vec(ending(), 0..10),
         end in prop_oneof![Just(End::Stop), Just(End::Fault), Just(End::Hello), Just(End::Interlock)],
+        keeps: bool,
     ) {
         let length = length.map_or(RunLength::Continuous, RunLength::Frames);
         let mut bench = Bench::running(length);
+        bench.fpga.keeps = keeps;
         for happening in &happenings {
             happen(&mut bench, happening);
         }

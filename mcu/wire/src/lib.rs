@@ -6,6 +6,7 @@
 //! * [`samples`]: the integrated ADC samples of a frame,
 //! * [`register`]: the register map of the FPGA, its fault codes and bits,
 //! * [`fpga`]: the layout of a frame as the FPGA's host port delivers it,
+//! * [`ready`]: the layout of a packet that the FPGA makes of a frame,
 //! * [`host_port`]: the format of accesses on the host port,
 //! * [`tunnel`]: the same accesses over a serial line to a simulator,
 //! * [`walsh`]: which sign of which Hadamard row an LED shows,
@@ -30,6 +31,7 @@ pub mod fpga;
 pub mod host_port;
 pub mod message;
 pub mod packet;
+pub mod ready;
 pub mod register;
 pub mod samples;
 pub mod tunnel;

@@ -94,12 +94,30 @@ impl Flavor for PacketWriter<'_> {
 /// # Errors
 /// [`PacketError::BufferTooSmall`].
 pub fn encode<'b, T: Serialize>(message: &T, out: &'b mut [u8]) -> Result<&'b [u8], PacketError> {
+    write(out, |writer| postcard::serialize_with_flavor(message, writer))
+}
+
+/// Makes a packet of the bytes of a message; returns the packet, delimiter included.
+///
+/// # Errors
+/// [`PacketError::BufferTooSmall`].
+pub fn seal<'b>(payload: &[u8], out: &'b mut [u8]) -> Result<&'b [u8], PacketError> {
+    write(out, |mut writer| {
+        writer.try_extend(payload)?;
+        writer.finalize()
+    })
+}
+
+/// `fill` gives the length of the packet without its delimiter.
+fn write(
+    out: &mut [u8],
+    fill: impl FnOnce(PacketWriter<'_>) -> postcard::Result<usize>,
+) -> Result<&[u8], PacketError> {
     if out.is_empty() {
         return Err(PacketError::BufferTooSmall);
     }
     let writer = PacketWriter { cobs: Stuffer::new(out), crc: Crc32::new() };
-    let length = postcard::serialize_with_flavor(message, writer)
-        .map_err(|_| PacketError::BufferTooSmall)?;
+    let length = fill(writer).map_err(|_| PacketError::BufferTooSmall)?;
     *out.get_mut(length).ok_or(PacketError::BufferTooSmall)? = 0;
     Ok(&out[..=length])
 }

@@ -9,7 +9,8 @@ use nirspi_wire::{
     PatternOrder, Request, SampleSource, Samples, encode,
     message::GATEWARE_CHUNK_MAX,
     open,
-    packet::{MAX_DEVICE_PACKET, MAX_HOST_PACKET, PacketError, overhead},
+    packet::{MAX_DEVICE_PACKET, MAX_HOST_PACKET, PacketError, overhead, seal, unseal},
+    ready,
     samples::Words,
 };
 use proptest::prelude::*;
@@ -60,6 +61,35 @@ where
     prop_assert!(encoded.len() < payload + overhead(payload));
     prop_assert_eq!(&open::<T>(encoded).unwrap(), message);
     Ok(())
+}
+
+proptest! {
+    #[test]
+    fn a_sealed_payload_is_the_packet_of_its_message(message in request()) {
+        let bytes = packet(&message);
+        let payload = unseal(&mut bytes[..bytes.len() - 1].to_vec()).unwrap().to_vec();
+        let mut room = [0; ROOM];
+        prop_assert_eq!(seal(&payload, &mut room).unwrap(), bytes);
+    }
+
+    #[test]
+    fn a_packet_with_padded_numbers_is_the_same_message(
+        run: u16, sequence: u32, device_time_us: u64, sweeps: u32, flags: u16,
+        values in prop::collection::vec(any::<i32>(), 0..=1024),
+    ) {
+        let flags = FrameFlags(flags);
+        let patterns = values.len() as u16;
+        let head = ready::Head { run, sequence, device_time_us, sweeps, flags, patterns };
+        let mut payload = head.to_bytes().to_vec();
+        payload.extend(values.iter().flat_map(|value| value.to_le_bytes()));
+        let mut bytes = seal(&payload, &mut [0; ROOM]).unwrap().to_vec();
+        let mut room = [0; ROOM];
+        let samples = Samples::pack(values.iter().map(|&value| value.into()), &mut room).unwrap();
+        let frame = Frame { run, sequence, device_time_us, sweeps, flags, samples };
+        let length = bytes.len() - 1;
+        let opened: DeviceMessage<'_> = open(&mut bytes[..length]).unwrap();
+        prop_assert_eq!(opened, DeviceMessage::Frame(frame));
+    }
 }
 
 proptest! {

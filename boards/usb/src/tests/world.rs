@@ -91,6 +91,7 @@ impl World {
             board: FakeBoard(Rc::clone(&pins)),
             port: FakeFpga::new(Rc::clone(&pins)),
             frame: Box::leak(Box::new([0; MAX_FRAME_BYTES])),
+            spare: Some(Box::leak(Box::new([0; MAX_FRAME_BYTES]))),
             loader: NoLoader,
             info,
             limits: Limits::default(),

@@ -1,0 +1,80 @@
+//! A frame that the FPGA has made into a packet, which the firmware forwards as it is.
+//!
+//! The packet is the one that [`encode`](crate::encode) makes of the same
+//! [`Frame`](crate::Frame), but for the length of its numbers: postcard's variable-length integers
+//! are padded with `0x80` to the longest form of their type, so every field has a fixed place.
+//! Postcard takes the padded form like the short one
+//! (`a_packet_with_padded_numbers_is_the_same_message` in `tests/packets.rs`).
+//!
+//! | bytes | field | form |
+//! |---|---|---|
+//! | 1 | 1: [`DeviceMessage::Frame`](crate::DeviceMessage::Frame) | byte |
+//! | 3 | run | padded |
+//! | 5 | sequence | padded |
+//! | 10 | device time in us | padded |
+//! | 5 | sweeps | padded |
+//! | 3 | [`FrameFlags`] | padded |
+//! | 1 | 0: no shift | byte |
+//! | 2 | 4 M, for M patterns | padded |
+//! | 4 M | positive less negative sum of each pattern in the order shown | little-endian `i32` |
+//! | 4 | CRC-32 of all before | little-endian |
+//!
+//! Then COBS and the delimiter, as in every packet.
+
+use crate::{CLOCKS_PER_PATTERN, FrameFlags};
+
+/// Bytes before the samples.
+pub const HEADER_BYTES: usize = 30;
+
+/// Most ADC samples in a sum with which no difference of two sums can leave 32 bits: the shift of
+/// [`Samples`](crate::Samples) is then always 0.
+pub const MAX_SUMMED_SAMPLES: u32 = 1 << 17;
+
+// One sweep at the fastest rate is far from it, and the largest sum is in range.
+const _: () = assert!(MAX_SUMMED_SAMPLES > CLOCKS_PER_PATTERN as u32);
+const _: () = assert!(MAX_SUMMED_SAMPLES as u64 * crate::ADC_MAX as u64 <= i32::MAX as u64);
+
+/// The fields before the samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Head {
+    /// Number of the run since power-up.
+    pub run: u16,
+    /// Number of the frame in its run.
+    pub sequence: u32,
+    /// Device time of the frame's first pattern.
+    pub device_time_us: u64,
+    /// Sweeps summed.
+    pub sweeps: u32,
+    /// What happened to the frame.
+    pub flags: FrameFlags,
+    /// Patterns of the sweep.
+    pub patterns: u16,
+}
+
+impl Head {
+    /// The bytes before the samples.
+    #[must_use]
+    pub fn to_bytes(&self) -> [u8; HEADER_BYTES] {
+        let mut bytes = [0; HEADER_BYTES];
+        bytes[0] = 1;
+        pad(self.run.into(), &mut bytes[1..4]);
+        pad(self.sequence.into(), &mut bytes[4..9]);
+        pad(self.device_time_us, &mut bytes[9..19]);
+        pad(self.sweeps.into(), &mut bytes[19..24]);
+        pad(self.flags.0.into(), &mut bytes[24..27]);
+        pad(4 * u64::from(self.patterns), &mut bytes[28..30]);
+        bytes
+    }
+}
+
+/// Writes a number as a variable-length integer of exactly this length.
+fn pad(value: u64, into: &mut [u8]) {
+    let mut rest = value;
+    for byte in into.iter_mut() {
+        *byte = rest as u8 | 0x80;
+        rest >>= 7;
+    }
+    if let Some(last) = into.last_mut() {
+        *last &= 0x7F;
+    }
+}
