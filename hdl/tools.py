@@ -1,6 +1,6 @@
 """Where the gateware's tools are: a virtual environment under `target/`, made on first use.
 
-The one law: what runs is what `requirements.txt` pins; nothing is taken from the machine but Python.
+Invariant: what runs is what `requirements.txt` pins; nothing is taken from the machine but Python.
 """
 
 import subprocess

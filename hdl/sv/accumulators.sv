@@ -1,6 +1,6 @@
 /// Adds slot sums to one of two banks of 48-bit words, one a clock; the host reads the other.
 ///
-/// The one law: a word is what its slots sum to, however soon a slot comes again. The addition takes a read,
+/// Invariant: a word is what its slots sum to, however soon a slot comes again. The addition takes a read,
 /// two halves and a write, so the sum of a slot that came up to five clocks ago is taken from the stages
 /// that still have it. Stage 0 is the clock of the slot's last sample; the word is written in stage 5.
 module nirspi_accumulators #(

@@ -1,6 +1,6 @@
 /// The bytes of frames and bursts on their way to the host port: 16 deep, two clocks.
 ///
-/// The one law: nothing is written when full and nothing read when empty; pointers cross in Gray code, of
+/// Invariant: nothing is written when full and nothing read when empty; pointers cross in Gray code, of
 /// which one bit changes at a time. With every byte goes the epoch it was asked for in, so that what an
 /// abandoned transfer has left can be told from what follows.
 module nirspi_byte_fifo (

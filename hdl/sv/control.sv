@@ -1,6 +1,6 @@
 /// Accesses of the host and what they set off: starts, stops, releases.
 ///
-/// The one law: an access takes effect between two clocks of those being done with, on all of the machine's
+/// Invariant: an access takes effect between two clocks of those being done with, on all of the machine's
 /// state at once; so it finds everything as the model has it at its moment. A start is followed by clock 0 of
 /// its run, which in turn is done with `DEPTH` clocks later; the next access waits for that.
 module nirspi_control

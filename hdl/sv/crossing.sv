@@ -1,6 +1,6 @@
 /// Carries accesses from the host port's clock to the ADC's, and answers back.
 ///
-/// The one law: what crosses on more than one wire stands still while it does. A toggle goes over when the
+/// Invariant: what crosses on more than one wire stands still while it does. A toggle goes over when the
 /// access stands, a toggle comes back when the answer stands; an access that comes before that is dropped,
 /// which a host that keeps to `HOST_SCK_DIVIDER` never sees. Both sides begin at 0: the board lets the host's side
 /// out of reset last.

@@ -1,6 +1,6 @@
 /// The light budget: half-arrays lit in the fixed windows of 2^20 clocks.
 ///
-/// The one law: what is spent is counted in and out of runs alike, so no start renews the budget. What the
+/// Invariant: what is spent is counted in and out of runs alike, so no start renews the budget. What the
 /// limit leaves is kept beside it, with its signs after 0, 1 and 2 more worked out a clock before they are
 /// asked for.
 module nirspi_duty (

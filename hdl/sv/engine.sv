@@ -1,6 +1,6 @@
 /// Everything on the ADC's clock: what the golden model in `hdl/model` describes.
 ///
-/// The one law: a clock of a run goes through here in fixed time. Its slot is chosen, its lines are at the
+/// Invariant: a clock of a run goes through here in fixed time. Its slot is chosen, its lines are at the
 /// pins six clocks later, its sample leaves the source eight clocks later, and it is done with thirteen
 /// (`types::DEPTH`) clocks later: what is counted, latched or delivered changes then and only then.
 module nirspi_engine

@@ -1,6 +1,6 @@
 /// Turns a delivered bank or burst into the bytes of the host port.
 ///
-/// The one law: the layout is that of `mcu/wire/src/fpga.rs`; without complements the negative half reads 0,
+/// Invariant: the layout is that of `mcu/wire/src/fpga.rs`; without complements the negative half reads 0,
 /// whatever an earlier run has left in its RAM. Bytes stop when all are out; what the host reads beyond is
 /// its own port's padding.
 module nirspi_formatter (

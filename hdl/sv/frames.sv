@@ -1,6 +1,6 @@
 /// Which bank the host has, the header that goes with it, and the counters of the run.
 ///
-/// The one law: a bank is either being summed into or delivered, never both; so no frame mixes two.
+/// Invariant: a bank is either being summed into or delivered, never both; so no frame mixes two.
 module nirspi_frames (
     input  var logic                           clk       ,
     input  var logic                           rst       ,

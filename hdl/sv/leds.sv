@@ -1,6 +1,6 @@
 /// Drives the LED lines from the sequencer's slot, six clocks after it was chosen.
 ///
-/// The one law: lines change only at a slot's first clock and are all 0 outside a run. The last stage asks
+/// Invariant: lines change only at a slot's first clock and are all 0 outside a run. The last stage asks
 /// for the permission once more, whatever the stages before it say: `enable` falls in the clock after it is
 /// withdrawn, the other lines, which light nothing without it, a clock later.
 module nirspi_leds (

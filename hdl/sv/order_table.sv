@@ -1,6 +1,6 @@
 /// The order table, twice: the host reads one copy while the sequencer reads the other.
 ///
-/// The one law: both copies are written together, and only between runs. It is all 0 after power-up. An entry
+/// Invariant: both copies are written together, and only between runs. It is all 0 after power-up. An entry
 /// read in the clock of its writing is undefined: the sequencer then shows nothing, and the host's address
 /// stands until it is read anew.
 module nirspi_order_table (

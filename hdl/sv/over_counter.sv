@@ -1,6 +1,6 @@
 /// Counts over-range samples of a frame or burst and compares with the trip.
 ///
-/// The one law: the count is that of the frame's samples so far, this one included, and stops at its largest
+/// Invariant: the count is that of the frame's samples so far, this one included, and stops at its largest
 /// value. Stage 0 is the clock of the sample; count and comparison are ready in stage 5.
 module nirspi_over_counter (
     input  var logic          clk    ,

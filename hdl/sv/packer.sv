@@ -1,6 +1,6 @@
 /// Makes a delivered bank into a packet that the firmware forwards as it is: differences, postcard, CRC-32, COBS.
 ///
-/// The one law: the bytes are those of `mcu/wire/src/ready.rs`, and nothing follows the delimiter. A block of COBS
+/// Invariant: the bytes are those of `mcu/wire/src/ready.rs`, and nothing follows the delimiter. A block of COBS
 /// begins with its length, so bytes wait in a ring until their block is closed: the first byte comes up to 254 bytes
 /// after `open`, and then one in three clocks.
 module nirspi_packer (

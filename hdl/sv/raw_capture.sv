@@ -1,6 +1,6 @@
 /// Records a burst of plain samples.
 ///
-/// The one law: word `t` is the sample of the burst's clock `t`, and the clock that makes a burst whole is
+/// Invariant: word `t` is the sample of the burst's clock `t`, and the clock that makes a burst whole is
 /// marked.
 module nirspi_raw_capture (
     input  var logic                           clk         ,

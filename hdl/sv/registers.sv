@@ -1,6 +1,6 @@
 /// The register bank, the settings copied from it, and what the host reads.
 ///
-/// The one law: reads give what was written, whatever it was; what it means is checked at a start. The map is
+/// Invariant: reads give what was written, whatever it was; what it means is checked at a start. The map is
 /// `register_map`, made from `mcu/wire`. `host_registers` answers those that need no ADC clock; here they read 0.
 module nirspi_registers
     import nirspi_register_map::*;

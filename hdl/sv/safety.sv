@@ -1,6 +1,6 @@
 /// What switches the LEDs off whatever the firmware does: interlock, over-range, duty, watchdog.
 ///
-/// The one law: the first cause is latched, and nothing is lit until it is cleared. `permit` falls in the
+/// Invariant: the first cause is latched, and nothing is lit until it is cleared. `permit` falls in the
 /// clock of the trip, so no clock sees both a fault and a lit LED.
 module nirspi_safety (
     input  var logic                          clk             ,

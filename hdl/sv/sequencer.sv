@@ -1,6 +1,6 @@
 /// The chain of counters clock, complement, pattern, sweep, frame.
 ///
-/// It is there twice: one drives the LEDs, one attributes samples. The one law: both count alike. Every
+/// It is there twice: one drives the LEDs, one attributes samples. Invariant: both count alike. Every
 /// counter counts down and its end is a flip-flop, so that no comparison is in the way of another.
 module nirspi_sequencer (
     input  var logic                  clk     ,

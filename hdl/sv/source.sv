@@ -1,6 +1,6 @@
 /// Where samples come from: the ADC's pins or the test generator.
 ///
-/// The one law: everything behind this block cannot tell which. A sample leaves it two clocks after it was
+/// Invariant: everything behind this block cannot tell which. A sample leaves it two clocks after it was
 /// at the pins.
 module nirspi_source (
     input  var logic                         clk       ,

@@ -1,6 +1,6 @@
 /// The host port: an SPI slave (mode 0) that also goes by four lines.
 ///
-/// The one law: the pins are sampled, never clocked by; so `sck` may stop anywhere and a transfer that is cut
+/// Invariant: the pins are sampled, never clocked by; so `sck` may stop anywhere and a transfer that is cut
 /// short leaves nothing behind. The command set is `mcu/wire/src/host_port.rs`.
 module nirspi_spi_slave
     import nirspi_register_map::*;

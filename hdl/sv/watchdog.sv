@@ -1,6 +1,6 @@
 /// Ends a run when the host has been silent for too long.
 ///
-/// The one law: only clocks of a run count, and any access starts the count again.
+/// Invariant: only clocks of a run count, and any access starts the count again.
 module nirspi_watchdog (
     input  var logic          clk    ,
     input  var logic          rst    ,

@@ -1,6 +1,6 @@
 /// Attributes samples to slots: latency, blanking, and the sum over a slot.
 ///
-/// The one law: the sample of clock `t` belongs to what was shown at clock `t - latency`, and counts in
+/// Invariant: the sample of clock `t` belongs to what was shown at clock `t - latency`, and counts in
 /// exactly one slot. Latency is not a delay line of samples: the sequencer here begins that much later.
 module nirspi_window (
     input  var logic                           clk     ,

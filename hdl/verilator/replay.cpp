@@ -1,6 +1,6 @@
 // Repeats records of the pins (hdl/sim/src/trace.rs has their layout) with the Verilated core.
 //
-// The one law: after every edge every output is what the record says; the first that is not ends it with status 1.
+// Invariant: after every edge every output is what the record says; the first that is not ends it with status 1.
 
 #include "Vnirspi_core.h"
 #include "verilated.h"

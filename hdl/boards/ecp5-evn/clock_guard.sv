@@ -1,6 +1,6 @@
 /// Watches a clock with another that needs nothing from outside.
 ///
-/// The one law: `alive` falls within 36 clocks of `clk` after the last edge of `watched`, whatever state
+/// Invariant: `alive` falls within 36 clocks of `clk` after the last edge of `watched`, whatever state
 /// that one stopped in. It also starts the PLL anew while there is no lock: the ADC may come up later than the FPGA.
 module clock_guard (
     input  logic clk,

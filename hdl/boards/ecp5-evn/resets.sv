@@ -1,6 +1,6 @@
 /// The resets of the core: one for each clock, and one for the host port's half of the bridge between them.
 ///
-/// The one law: wherever the ADC's clock stops and begins again, both halves of the bridge stand at 0 when the
+/// Invariant: wherever the ADC's clock stops and begins again, both halves of the bridge stand at 0 when the
 /// first access may cross. The ADC's domain is held until the host's half has been reset, and the host's half
 /// until the ADC's domain is out of reset. `hdl/formal/recovery.sv` proves that for clocks in any relation.
 module resets (

@@ -1,6 +1,6 @@
 /// What every design on this board has around the core: watch over the ADC's clock, resets, and the LED enable.
 ///
-/// The one law: the LED enable at the pin falls by itself when the ADC's clock is lost, since everything
+/// Invariant: the LED enable at the pin falls by itself when the ADC's clock is lost, since everything
 /// else that could switch it off runs on that clock (`hdl/formal/shell_proof.sv`).
 module shell #(
     parameter logic [7:0] DESIGN = 8'd1 /// `Design` of `mcu/wire`
