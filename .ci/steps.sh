@@ -22,7 +22,7 @@ steps=(
     "examples        examples of the libraries"
     "python          the Python package, its types, and its numbers beside the program's; PyPI"
     "page            the live page in a browser; Debian's Chromium, demo"
-    "web             the camera in a browser: its numbers beside native ones; Debian's Chromium, rustup's target, book"
+    "web             the camera in a browser: its numbers beside native ones; Debian's Chromium, rustup's target, demo"
     "tcp             two processes over TCP, and boards/hil.sh; demo"
     "recordings      other programs read recordings and exported files; demo, PyPI"
     "dissector       Wireshark's dissector on a recording; Debian's tshark"
@@ -286,8 +286,7 @@ step_web() {
     [ "$bytes" -lt 12000000 ]
     debian chromium || echo "no chromium installed here"
     if [ -x /usr/bin/chromium ]; then
-        # Not with the program's features: this links in seconds, and needs no GPU.
-        cargo build --locked --release -p nirspi --no-default-features --features live,virtual-camera --example in_turns
+        cargo build --locked --release --example in_turns
         python_with browser playwright==1.65.2
         target/browser/bin/python host/web/tests/check.py target/book/camera "${CARGO_TARGET_DIR:-target}/release/examples/in_turns"
     else
