@@ -45,7 +45,7 @@ enum Doing {
     /// A session without a run.
     Dark { connected: Connected, asked: Option<Instant> },
     /// A run.
-    Measuring { connected: Connected, run: Run },
+    Measuring { connected: Connected, run: Box<Run> },
     /// Waits for a person to allow light.
     Waiting,
 }
@@ -169,7 +169,7 @@ impl Turns {
     fn begin(&mut self, mut connected: Connected) -> Doing {
         let options = self.live.prepare(&connected);
         match Run::begin(&mut connected.session, &options, &mut self.live) {
-            Ok(run) => self.measure(connected, run),
+            Ok(run) => self.measure(connected, Box::new(run)),
             Err(error) => match self.live.captured(&connected, Err(error)) {
                 Ok(None) => Doing::Dark { connected, asked: None },
                 Ok(Some(end)) => self.ended(end),
@@ -178,7 +178,7 @@ impl Turns {
         }
     }
 
-    fn measure(&mut self, mut connected: Connected, mut run: Run) -> Doing {
+    fn measure(&mut self, mut connected: Connected, mut run: Box<Run>) -> Doing {
         let session = &mut connected.session;
         let goes_on = self.live.goes_on();
         if !goes_on {
@@ -232,5 +232,6 @@ fn answer<E: Display>(done: Result<impl Serialize, E>) -> Result<String, String>
     serde_json::to_string(&value).map_err(|error| error.to_string())
 }
 
-#[cfg(all(test, feature = "virtual-camera"))]
+#[cfg(test)]
+#[cfg(feature = "virtual-camera")]
 mod tests;
