@@ -22,6 +22,7 @@ steps=(
     "examples        examples of the libraries"
     "python          the Python package, its types, and its numbers beside the program's; PyPI"
     "page            the live page in a browser; Debian's Chromium, demo"
+    "web             the camera in a browser: its numbers beside native ones; Debian's Chromium, rustup's target, demo"
     "tcp             two processes over TCP, and boards/hil.sh; demo"
     "recordings      other programs read recordings and exported files; demo, PyPI"
     "dissector       Wireshark's dissector on a recording; Debian's tshark"
@@ -109,7 +110,7 @@ step_rtl() { cargo test --locked -p nirspi-hdl-sim -p nirspi-tests-rtl; }
 
 step_features() {
     cargo check --locked -p nirspi --no-default-features
-    for feature in serve training; do
+    for feature in live serve training; do
         cargo check --locked -p nirspi --no-default-features --features "$feature"
     done
 }
@@ -269,6 +270,28 @@ step_page() {
         target/browser/bin/python host/cli/tests/browser/check.py target/release/nirspi
     else
         echo "skipped: the page, no chromium"
+    fi
+}
+
+# After the book, which would remove the page.
+step_web() {
+    if ! rustup target add wasm32-unknown-unknown >&2; then
+        echo "skipped: the camera in a browser, no target from rustup"
+        return
+    fi
+    bash host/web/build.sh target/book/camera
+    # A page that people wait for.
+    local bytes
+    bytes=$(tar -cz -C target/book camera | wc -c)
+    echo "compressed: $bytes bytes"
+    [ "$bytes" -lt 12000000 ]
+    debian chromium || echo "no chromium installed here"
+    if [ -x /usr/bin/chromium ]; then
+        cargo build --locked --release --example in_turns
+        python_with browser playwright==1.65.2
+        target/browser/bin/python host/web/tests/check.py target/book/camera "${CARGO_TARGET_DIR:-target}/release/examples/in_turns"
+    else
+        echo "skipped: the camera in a browser, no chromium"
     fi
 }
 

@@ -19,7 +19,7 @@
 //!   the finest detail, [`legibility`] reads characters,
 //! * [`imaging`] scales, enhances and judges images, and gives warnings,
 //! * [`serve`] shows a camera live on a web page,
-//! * [`causes`] prints an error with its causes, [`heartbeat`] gives signs of life of long work, [`stage_times`]
+//! * [`causes`] prints an error with its causes, [`clock`] says the time, [`heartbeat`] gives signs of life of long work, [`stage_times`]
 //!   measures it,
 //! * [`training`] makes pairs for training networks, with the virtual camera,
 //! * [`udev`] gives users access to cameras on USB; [`boards`] lists the boards with firmware; with
@@ -30,8 +30,13 @@
 //!
 //! Without its features (`default-features = false`) the library captures, records, calibrates and
 //! reads measurements, without web server, typefaces, optics or networks. The features `enhance`,
-//! `pictures`, `virtual-camera`, `serve` and `training` add the other parts; `gpu` adds the kernels
+//! `pictures`, `virtual-camera`, `live`, `serve` and `training` add the other parts; `gpu` adds the kernels
 //! for GPUs.
+
+#![cfg_attr(
+    target_family = "wasm",
+    allow(dead_code, unused_imports, reason = "a browser has no files, and nothing to export to")
+)]
 
 pub mod about;
 pub mod account;
@@ -39,10 +44,13 @@ pub mod boards;
 pub mod calibration;
 pub mod capture;
 pub mod causes;
+pub mod clock;
+#[cfg(not(target_family = "wasm"))]
 pub mod devices;
 pub mod events;
-#[cfg(feature = "virtual-camera")]
+#[cfg(all(feature = "virtual-camera", not(target_family = "wasm")))]
 pub mod example;
+#[cfg(not(target_family = "wasm"))]
 pub mod export;
 pub mod files;
 #[cfg(feature = "flash")]
@@ -64,11 +72,12 @@ pub mod resolution;
 #[cfg(feature = "pictures")]
 pub mod scene;
 pub mod selftest;
-#[cfg(feature = "serve")]
+#[cfg(feature = "live")]
 pub mod serve;
 pub mod session;
 pub mod setup;
 pub mod signal;
+#[cfg(not(target_family = "wasm"))]
 pub mod source;
 pub mod stage_times;
 pub mod tally;

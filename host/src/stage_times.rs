@@ -1,7 +1,7 @@
 //! How long each stage of a piece of work takes.
 
+use crate::clock::Instant;
 use serde::Serialize;
-use std::time::Instant;
 
 /// The time of each stage, in the order of the stages.
 #[derive(Debug, Default, Serialize)]

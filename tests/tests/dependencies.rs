@@ -139,9 +139,10 @@ fn capture_alone_builds_no_server_no_typefaces_no_optics_and_no_networks() {
     }
 }
 
-/// Plain `cargo test` builds no hardware simulator and says so; CI runs the tests left out.
+/// Plain `cargo test` builds no hardware simulator and nothing for browsers, and says so; CI runs the
+/// tests left out.
 #[test]
-fn plain_cargo_test_leaves_out_the_simulator_only_and_ci_runs_the_rest() {
+fn plain_cargo_test_leaves_out_simulator_and_browser_only_and_ci_runs_the_rest() {
     let metadata = metadata();
     let default: Vec<&Value> =
         metadata["workspace_default_members"].as_array().unwrap().iter().collect();
@@ -149,6 +150,9 @@ fn plain_cargo_test_leaves_out_the_simulator_only_and_ci_runs_the_rest() {
     let name = |package: &Value| package["name"].as_str().unwrap().to_owned();
     let (default, left_out): (Vec<&Value>, Vec<&Value>) =
         packages.iter().partition(|package| default.contains(&&package["id"]));
+    // The program for browsers has its own step.
+    let (browser, left_out): (Vec<&Value>, Vec<&Value>) =
+        left_out.into_iter().partition(|package| name(package) == "nirspi-web");
     let uses_simulator = |package: &&Value| {
         let mut used = package["dependencies"].as_array().unwrap().iter().map(name);
         name(package) == "nirspi-hdl-sim" || used.any(|used| used == "nirspi-hdl-sim")
@@ -162,6 +166,8 @@ fn plain_cargo_test_leaves_out_the_simulator_only_and_ci_runs_the_rest() {
     let packages: String =
         left_out.iter().map(|package| format!(" -p {}", name(package))).collect();
     let steps = std::fs::read_to_string(root().join(".ci/steps.sh")).unwrap();
+    assert_eq!(browser.len(), 1, "the program for browsers is left out");
+    assert!(steps.contains("bash host/web/build.sh"), ".ci/steps.sh builds no page for browsers");
     for command in ["cargo test --locked".to_owned(), format!("cargo test --locked{packages}")] {
         let runs =
             |line: &str| line.trim() == command || line.contains(&format!("{{ {command}; }}"));

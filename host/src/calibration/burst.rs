@@ -14,13 +14,14 @@
 //! (`tests::a_burst_too_dim_or_without_an_edge_is_an_error`). With a wrong latency every picture is
 //! wrong, and most pictures are inverted.
 
+use crate::clock::Instant;
 use crate::session::{Listener, Session, SessionError, request};
 use crate::setup::MeasurementSetup;
 use nirspi_recon::{Leak, LeakError, Rows, Side};
 use nirspi_wire::register::RAW_SAMPLES_MAX;
 use nirspi_wire::{DeviceMessage, PacketError, Raw, State};
 use serde::{Deserialize, Serialize};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use thiserror::Error;
 
 /// Clocks that the LEDs stay on, and off, in the calibration burst: 1 us.

@@ -5,8 +5,9 @@
 //! counting a trickle of other messages (`tests::junk_alone_is_too_much_after_the_allowance`,
 //! `tests::frames_pay_for_as_much_junk`).
 
+use crate::clock::Instant;
 use nirspi_wire::{DeviceMessage, PacketError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Bytes of junk that every run may have.
 const ALLOWED: u64 = 64 << 20;

@@ -12,7 +12,7 @@ use super::error::Shown;
 use std::io::{self, Read};
 
 /// The first bytes of every `.npy` file.
-pub(super) const MAGIC: &[u8; 6] = b"\x93NUMPY";
+pub(super) use super::plain::NUMPY as MAGIC;
 /// The most axes that NumPy allows.
 pub(super) const MAX_AXES: usize = 32;
 /// NumPy refuses headers over 10 000 characters; the larger limit here leaves room for other

@@ -5,11 +5,12 @@
 //! the file uses.
 
 use super::FileError;
-use super::archive::{Archive, kind_by_start, open_file};
+use super::archive::Archive;
 #[cfg(feature = "hdf5")]
 use super::hdf5::Hdf5;
 use super::mat::Mat;
 use super::npy;
+use super::plain::{kind_by_start, open_file};
 use super::text;
 use std::io::Read;
 use std::path::{Path, PathBuf};

@@ -12,7 +12,7 @@
 mod labelled;
 
 use super::FileError;
-use super::archive::{kind_by_start, open_file};
+use super::plain::{kind_by_start, open_file};
 use ::image::codecs::png::PngEncoder;
 use ::image::imageops::{self, FilterType};
 use ::image::{

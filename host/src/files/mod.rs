@@ -7,30 +7,41 @@
 //! (`output::tests::one_file_is_whole_or_not_there`). A file can claim any size: memory grows with
 //! the data that arrived, never with a claim
 //! (`array::tests::a_claim_beyond_the_limit_takes_no_memory`).
+//!
+//! A browser has no files: there, only pictures and tables are built.
 
 #[cfg(feature = "training")]
 pub mod characters;
 #[cfg(feature = "pictures")]
 pub mod image;
+#[cfg(not(target_family = "wasm"))]
 pub mod measurement;
+#[cfg(not(target_family = "wasm"))]
 pub mod npy;
 pub mod order_table;
 pub mod output;
+#[cfg(not(target_family = "wasm"))]
 pub mod problem;
 pub mod settings;
-#[cfg(feature = "pictures")]
+#[cfg(all(feature = "pictures", not(target_family = "wasm")))]
 pub mod stack;
 pub mod table;
 
+#[cfg(not(target_family = "wasm"))]
 mod archive;
+#[cfg(not(target_family = "wasm"))]
 mod array;
 mod error;
+#[cfg(not(target_family = "wasm"))]
 mod fields;
 #[cfg(feature = "hdf5")]
 mod hdf5;
+#[cfg(not(target_family = "wasm"))]
 mod mat;
+mod plain;
 #[cfg(test)]
 mod testing;
+#[cfg(not(target_family = "wasm"))]
 mod text;
 
 #[cfg(feature = "training")]

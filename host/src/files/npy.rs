@@ -6,9 +6,10 @@
 //! (`tests::what_is_written_reads_back_bit_for_bit`).
 
 use super::FileError;
-use super::archive::{NUMBERS, kind_by_start, open_file};
+use super::archive::NUMBERS;
 use super::array::{ArrayError, Header, MAGIC, MAX_AXES, Sample, shape_text};
 use super::fields::Field;
+use super::plain::{kind_by_start, open_file};
 use std::borrow::Cow;
 use std::fs::File;
 use std::io::{BufReader, Read, Seek};

@@ -6,7 +6,7 @@
 //! (`tests::what_is_no_table_is_refused_in_one_line_that_names_the_place`).
 
 use super::FileError;
-use super::archive::read_text;
+use super::plain::read_text;
 use std::path::Path;
 
 const EXPECTED: &str = "a text file of pattern numbers";

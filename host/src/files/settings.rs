@@ -22,8 +22,8 @@
 //! (`tests::what_is_saved_is_read_back`).
 
 use super::FileError;
-use super::archive::read_text;
 use super::output::write_atomic;
+use super::plain::read_text;
 use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::path::Path;

@@ -4,7 +4,7 @@
 //! are skipped. A first line without a number is a heading and is skipped too.
 
 use super::FileError;
-use super::archive::read_text;
+use super::plain::read_text;
 use std::path::{Path, PathBuf};
 
 const EXPECTED: &str = "a text file with a row of numbers a line";

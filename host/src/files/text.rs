@@ -10,8 +10,8 @@
 //! line, under a heading with one comma, separates two columns.
 
 use super::FileError;
-use super::archive::read_large_text;
 use super::fields::{EXPECTED, Field};
+use super::plain::read_large_text;
 use std::path::Path;
 
 /// Words for a reading that was not taken.

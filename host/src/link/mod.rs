@@ -1,17 +1,24 @@
 //! Byte links to a camera: TCP, a serial port, USB. The link in memory is in
 //! [`virtual_camera`](crate::virtual_camera).
 //!
-//! A link moves bytes and does not interpret packets.
+//! A link moves bytes and does not interpret packets. A browser has none of these links.
 
+#[cfg(not(target_family = "wasm"))]
 mod address;
+#[cfg(not(target_family = "wasm"))]
 mod serial;
+#[cfg(not(target_family = "wasm"))]
 mod tcp;
+#[cfg(not(target_family = "wasm"))]
 pub mod usb;
 
-pub use address::{CameraAddress, OpenError};
-pub use serial::{DEFAULT_BAUD, SerialLink, serial_ports};
-pub use tcp::TcpLink;
-pub use usb::UsbLink;
+#[cfg(not(target_family = "wasm"))]
+pub use self::{
+    address::{CameraAddress, OpenError},
+    serial::{DEFAULT_BAUD, SerialLink, serial_ports},
+    tcp::TcpLink,
+    usb::UsbLink,
+};
 
 use std::io;
 use std::time::Duration;

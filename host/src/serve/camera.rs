@@ -1,9 +1,7 @@
-//! The camera's thread: receives every frame, puts the newest into the slot, and reconnects after
-//! the camera has gone.
+//! The camera of a page: connects, receives every frame, and puts the newest into the slot.
 //!
 //! # Invariant
-//! The thread waits for the camera only. After a fault or a stop the LEDs go on again only when a
-//! person asks (`after_a_fault_leds_go_on_again_only_when_a_person_says_so` and
+//! After a fault or a stop the LEDs go on again only when a person asks (`after_a_fault_leds_go_on_again_only_when_a_person_says_so` and
 //! `a_person_stops_a_camera_and_only_a_person_starts_it_again` in `host/src/serve/tests.rs`).
 
 use super::camera_log::Phase;
@@ -15,7 +13,7 @@ use super::{ForeignError, Shared, lock};
 use crate::account::LossCounters;
 use crate::calibration::{CalibrationError, FlatField, KeptFlatField, Settling};
 use crate::capture::{
-    Calibration, CaptureError, CaptureOptions, Ended, Observer, Progress, observe,
+    Calibration, Capture, CaptureError, CaptureOptions, Ended, Observer, Progress,
 };
 use crate::integrate::Newest;
 use crate::recording::Target;
@@ -31,14 +29,6 @@ use nirspi_wire::{
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::{Duration, Instant};
-
-/// Time between two attempts to reconnect.
-const RETRY: Duration = Duration::from_secs(1);
-/// Time between two checks whether to stop.
-const TICK: Duration = Duration::from_millis(50);
-/// Time between two questions to a camera whose LEDs a person switched off.
-const ASK: Duration = Duration::from_secs(1);
 
 /// A camera that has answered, and its response.
 pub struct Connected {
@@ -72,7 +62,7 @@ pub struct CameraSource {
 }
 
 /// Why a session ended.
-enum End {
+pub(super) enum End {
     /// The server is stopping.
     Told,
     /// The link to the camera is gone, for this reason in one line.
@@ -85,78 +75,25 @@ enum End {
     Scene,
 }
 
-/// Measures until the server stops.
-///
-/// # Errors
-/// [`CaptureError`] if the first run cannot begin.
-pub fn run(
-    shared: &Shared,
-    mut source: CameraSource,
-    first: Connected,
-) -> Result<(), CaptureError> {
-    let mut live = Live {
-        shared,
-        model: source.model.clone(),
-        base: source.setup.clone(),
-        record_to: source.record_to.take(),
-        plan: Plan::default(),
-        known: None,
-        earlier: LossCounters::default(),
-        now: None,
-        flat_field: None,
-        depth: None,
-        fault: None,
-        begun: false,
-    };
-    let mut next = Some(first);
-    // A person who starts this program can see the camera.
-    let mut person_said = true;
-    while !shared.is_over() {
-        let mut connected = match next.take() {
-            Some(connected) => connected,
-            None => match reconnect(shared, &mut source.connect) {
-                Ok(connected) => connected,
-                Err(None) => continue,
-                Err(Some(problem)) => {
-                    shared.enter(Phase::Lost, Leds::Unknown, format!("{problem}; trying again"));
-                    shared.rest(RETRY);
-                    continue;
-                }
-            },
-        };
-        let standing = if person_said { None } else { standing_fault(&mut connected.session) };
-        person_said = false;
-        let end = match standing {
-            Some(fault) => End::Fault(fault),
-            None => live.session(&mut connected)?,
-        };
-        // The old link is closed before reconnecting.
-        drop(connected);
-        // A camera that was away may have other gateware.
-        live.known = live.known.filter(|_| matches!(end, End::Scene));
-        match end {
-            End::Told => {}
-            // A person allowed light before another scene.
-            End::Scene => person_said = true,
-            End::Gone(why) => gone(shared, &why),
-            End::Fault(fault) => {
-                let line = format!("the camera switched its LEDs off: {fault}");
-                await_person(shared, Phase::Fault, line);
-                person_said = true;
-            }
-            End::Uncalibrated(why) => {
-                lock(&shared.camera).event(why.clone());
-                await_person(shared, Phase::Uncalibrated, why);
-                person_said = true;
-            }
-        }
-    }
-    Ok(())
+/// What comes after a session.
+pub(super) enum Next {
+    /// Another session at once. Light was allowed by a person, or is allowed unless a fault stands.
+    Connect {
+        /// Whether a person allowed light.
+        person_said: bool,
+    },
+    /// Another session after a while.
+    Retry,
+    /// Another session after a person has allowed light.
+    Person,
 }
 
 /// Connects to the camera again, before the scene that is wanted. Fails without a reason if the
 /// scene is refused and the scene before it can be shown.
-fn reconnect(shared: &Shared, connect: &mut Connect) -> Result<Connected, Option<String>> {
+pub(super) fn reconnect(
+    shared: &Shared,
+    connect: &mut Connect,
+) -> Result<Connected, Option<String>> {
     let scene = shared.stage.wanted();
     match connect(scene.as_deref()) {
         Ok(connected) => {
@@ -177,55 +114,30 @@ fn reconnect(shared: &Shared, connect: &mut Connect) -> Result<Connected, Option
 
 /// The fault still latched after reconnecting. `HostSilent` does not count: reconnecting clears its
 /// cause.
-fn standing_fault(session: &mut Session) -> Option<Fault> {
+pub(super) fn standing_fault(session: &mut Session) -> Option<Fault> {
     // A camera that does not answer will not measure either; the measurement then reports the
     // reason.
     session.status(&mut IgnorePackets).ok()?.fault.filter(|fault| *fault != Fault::HostSilent)
 }
 
-/// Reports that the link is gone, and waits before reconnecting.
-fn gone(shared: &Shared, why: &str) {
-    lock(&shared.camera).event(why.to_owned());
-    shared.enter(Phase::Lost, Leds::Unknown, format!("{why}; trying again"));
-    shared.rest(RETRY);
-}
-
-/// Switches light off, and waits until a person switches it on again.
-fn await_person(shared: &Shared, phase: Phase, line: String) {
-    shared.light.set(false);
-    shared.enter(phase, Leds::Off, line);
-    while !shared.is_over() && !shared.light.is_on() {
-        std::thread::sleep(TICK);
-    }
-}
-
-/// Keeps a camera whose LEDs a person switched off, until a person switches them on again.
+/// Asks a camera whose LEDs a person switched off whether they are off, and stops it if they are
+/// not. Returns the camera's answer.
 ///
 /// # Errors
 /// If the link ends.
-fn stopped(shared: &Shared, session: &mut Session) -> Result<(), SessionError> {
-    let mut asked: Option<Instant> = None;
-    let line = "stopped: a person switched the LEDs off";
-    while !shared.is_over() && !shared.light.is_on() && !shared.stage.has_changed() {
-        if asked.is_none_or(|asked| asked.elapsed() > ASK) {
-            // The camera's own word counts, whatever was sent before.
-            let dark = session.status(&mut EventLog(shared))?.state != Device::Running;
-            if !dark {
-                session.command(request::Stop, &mut EventLog(shared))?;
-            }
-            asked = dark.then(Instant::now);
-            let leds = if dark { Leds::Off } else { Leds::On };
-            shared.enter(Phase::Stopped, leds, line.to_owned());
-        }
-        session.listen(TICK, &mut EventLog(shared))?;
-        // The link in memory does not wait.
-        std::thread::sleep(TICK);
+pub(super) fn darken(shared: &Shared, session: &mut Session) -> Result<bool, SessionError> {
+    // The camera's own word counts, whatever was sent before.
+    let dark = session.status(&mut EventLog(shared))?.state != Device::Running;
+    if !dark {
+        session.command(request::Stop, &mut EventLog(shared))?;
     }
-    Ok(())
+    let leds = if dark { Leds::Off } else { Leds::On };
+    shared.enter(Phase::Stopped, leds, "stopped: a person switched the LEDs off".to_owned());
+    Ok(dark)
 }
 
 /// Adds events to the log, and ignores frames.
-struct EventLog<'s>(&'s Shared);
+pub(super) struct EventLog<'s>(pub(super) &'s Shared);
 
 impl Listener for EventLog<'_> {
     fn packet(&mut self, _: &[u8], content: &Result<DeviceMessage<'_>, PacketError>) {
@@ -246,20 +158,12 @@ fn in_words(message: &DeviceMessage<'_>) -> Option<String> {
 
 impl Shared {
     /// Records a new phase, and tells pages at once.
-    fn enter(&self, phase: Phase, leds: Leds, line: String) {
+    pub(super) fn enter(&self, phase: Phase, leds: Leds, line: String) {
         let mut log = lock(&self.camera);
         log.camera.leds = leds;
         log.enter(phase, line);
         drop(log);
         self.slot.wake();
-    }
-
-    /// Waits for `time`, or until the server stops.
-    fn rest(&self, time: Duration) {
-        let started = Instant::now();
-        while !self.is_over() && started.elapsed() < time {
-            std::thread::sleep(TICK);
-        }
     }
 }
 
@@ -271,8 +175,8 @@ struct Plan {
 }
 
 /// Receives every frame of a run and puts the newest into the slot.
-struct Live<'s> {
-    shared: &'s Shared,
+pub(super) struct Live {
+    shared: Arc<Shared>,
     model: CameraModel,
     /// The setup of the command line, with the timing for all runs.
     base: MeasurementSetup,
@@ -289,14 +193,65 @@ struct Live<'s> {
     depth: Option<Arc<DepthImage>>,
     /// The fault that switched the LEDs off, as reported by the camera.
     fault: Option<Fault>,
+    /// Frames put into the slot.
+    offered: u64,
     /// Whether any run has begun.
     begun: bool,
 }
 
-impl Live<'_> {
-    /// One session: runs, and pauses without light between the runs. Fails only if the first run of
-    /// all cannot begin.
-    fn session(&mut self, connected: &mut Connected) -> Result<End, CaptureError> {
+impl Live {
+    /// Takes over the source's measurement and its folder.
+    pub(super) fn new(shared: Arc<Shared>, source: &mut CameraSource) -> Self {
+        Self {
+            shared,
+            model: source.model.clone(),
+            base: source.setup.clone(),
+            record_to: source.record_to.take(),
+            plan: Plan::default(),
+            known: None,
+            earlier: LossCounters::default(),
+            now: None,
+            flat_field: None,
+            depth: None,
+            fault: None,
+            offered: 0,
+            begun: false,
+        }
+    }
+
+    /// Records why a session ended. Returns what comes next.
+    pub(super) fn ended(&mut self, end: End) -> Next {
+        // A camera that was away may have other gateware.
+        if !matches!(end, End::Scene) {
+            self.known = None;
+        }
+        let shared = &self.shared;
+        let dark = |phase, line| {
+            shared.light.set(false);
+            shared.enter(phase, Leds::Off, line);
+            Next::Person
+        };
+        match end {
+            End::Told => Next::Connect { person_said: false },
+            // A person allowed light before another scene.
+            End::Scene => Next::Connect { person_said: true },
+            End::Gone(why) => {
+                lock(&shared.camera).event(why.clone());
+                shared.enter(Phase::Lost, Leds::Unknown, format!("{why}; trying again"));
+                Next::Retry
+            }
+            End::Fault(fault) => {
+                dark(Phase::Fault, format!("the camera switched its LEDs off: {fault}"))
+            }
+            End::Uncalibrated(why) => {
+                lock(&shared.camera).event(why.clone());
+                dark(Phase::Uncalibrated, why)
+            }
+        }
+    }
+
+    /// Records that a session begins.
+    pub(super) fn greeted(&mut self, connected: &mut Connected) {
         let Connected { session, note, flat_field, .. } = connected;
         for text in session.reports().iter().cloned().chain(note.take()) {
             lock(&self.shared.camera).event(text);
@@ -305,20 +260,6 @@ impl Live<'_> {
             lock(&self.shared.camera).event(kept.summary());
         }
         self.flat_field = flat_field.as_ref().map(|kept| kept.flat.clone());
-        while !self.shared.is_over() {
-            let end = if self.shared.stage.has_changed() {
-                Some(End::Scene)
-            } else if self.shared.light.is_on() {
-                self.measure(connected)?
-            } else {
-                let stopped = stopped(self.shared, &mut connected.session);
-                stopped.err().map(|error| End::Gone(causes::in_one_line(&error)))
-            };
-            if let Some(end) = end {
-                return Ok(end);
-            }
-        }
-        Ok(End::Told)
     }
 
     /// The plan that pages want.
@@ -327,13 +268,29 @@ impl Live<'_> {
         Plan { measuring: Some(settings.measuring.clone()), record: settings.record }
     }
 
+    /// Whether the run that was prepared last is still wanted.
+    pub(super) fn goes_on(&self) -> bool {
+        !self.shared.is_over()
+            && self.shared.light.is_on()
+            && !self.shared.stage.has_changed()
+            && self.wanted() == self.plan
+    }
+
+    /// Number of frames that were put into the slot.
+    pub(super) fn offered(&self) -> u64 {
+        self.offered
+    }
+
     /// Ends recording. A person must begin another one.
     fn record_no_more(&self) {
         lock(&self.shared.settings).record = false;
     }
 
-    /// The setup and the options of the next run.
-    fn options(&mut self, connected: &Connected) -> CaptureOptions {
+    /// The setup and the options of the next run, which begins now.
+    pub(super) fn prepare(&mut self, connected: &Connected) -> CaptureOptions {
+        (self.now, self.fault) = (None, None);
+        let line = "preparing: latency and settling are measured, or the setup is sent";
+        self.shared.enter(Phase::Preparing, Leds::On, line.to_owned());
         self.plan = self.wanted();
         // Settings are checked before they are kept.
         let setup = self.plan.measuring.as_ref().and_then(|m| m.setup(&self.base).ok());
@@ -352,15 +309,14 @@ impl Live<'_> {
         CaptureOptions { setup, frames: None, calibration, record: folder.map(Target::FirstFree) }
     }
 
-    /// One run. `None` if the run was stopped from here. Fails only if the run is the first of all
-    /// and cannot begin.
-    fn measure(&mut self, connected: &mut Connected) -> Result<Option<End>, CaptureError> {
-        let options = self.options(connected);
-        let session = &mut connected.session;
-        (self.now, self.fault) = (None, None);
-        let line = "preparing: latency and settling are measured, or the setup is sent";
-        self.shared.enter(Phase::Preparing, Leds::On, line.to_owned());
-        let captured = match observe(session, &options, self) {
+    /// Records the end of a run. `None` if the run was stopped from here. Fails only if the run is
+    /// the first of all and could not begin.
+    pub(super) fn captured(
+        &mut self,
+        connected: &Connected,
+        captured: Result<Capture, CaptureError>,
+    ) -> Result<Option<End>, CaptureError> {
+        let captured = match captured {
             Ok(captured) => captured,
             Err(error @ CaptureError::Calibration(_)) => {
                 return Ok(Some(End::Uncalibrated(causes::in_one_line(&error))));
@@ -419,7 +375,7 @@ impl Live<'_> {
     }
 }
 
-impl Observer for Live<'_> {
+impl Observer for Live {
     fn begins(
         &mut self,
         setup: &MeasurementSetup,
@@ -446,6 +402,7 @@ impl Observer for Live<'_> {
         newest.push(frame, lock(&self.shared.settings).frames as usize);
         let look = Look { sum: newest.sum(), run: Arc::clone(run), depth: self.depth.clone() };
         self.shared.slot.offer(look, self.earlier + *counters);
+        self.offered += 1;
     }
 
     fn message(&mut self, message: &DeviceMessage<'_>) {
@@ -467,11 +424,7 @@ impl Observer for Live<'_> {
 
     fn watch(&mut self, progress: &Progress) -> ControlFlow<()> {
         self.shared.slot.account(self.earlier + progress.counters);
-        let goes_on = !self.shared.is_over()
-            && self.shared.light.is_on()
-            && !self.shared.stage.has_changed()
-            && self.wanted() == self.plan;
-        if goes_on { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+        if self.goes_on() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
     }
 }
 

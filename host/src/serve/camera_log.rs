@@ -2,12 +2,12 @@
 
 use super::light::Leds;
 use crate::boards;
+use crate::clock;
 use crate::session::CameraIdentity;
 use crate::setup::MeasurementSetup;
 use crate::versions::{self, Part};
 use serde::Serialize;
 use std::collections::VecDeque;
-use std::time::{SystemTime, UNIX_EPOCH};
 
 /// Number of events kept for pages that connect later.
 const EVENTS: usize = 100;
@@ -132,8 +132,8 @@ impl CameraLog {
 
     /// Records an event.
     pub fn event(&mut self, text: String) {
-        let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-        self.events.push_back(EventLine { unix_ms: now.as_millis() as u64, text });
+        let unix_ms = clock::since_1970().as_millis() as u64;
+        self.events.push_back(EventLine { unix_ms, text });
         if self.events.len() > EVENTS {
             self.events.pop_front();
         }

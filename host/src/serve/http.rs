@@ -8,10 +8,9 @@
 
 use super::connections::{Door, Peer, Streaming};
 use super::server::Server;
-use super::settings::Change;
 use super::state::Published;
 use super::token::{self, Token};
-use super::{Shared, guard, lock, page};
+use super::{Shared, commands, guard, page};
 use crate::files::image::encode_grey;
 use crate::files::npy;
 use axum::Router;
@@ -211,63 +210,30 @@ fn numbers(side: usize, pixels: Option<&[f32]>) -> Response {
 
 /// Applies a change, and answers with the new settings.
 async fn settings(State(app): State<App>, body: Bytes) -> Response {
-    let shared = &app.shared;
-    let mut settings = lock(&shared.settings);
-    let changed = Change::parse(&body).and_then(|change| {
-        let settings = settings.with(&change, &shared.offer)?;
-        Ok((settings, change.run))
-    });
-    match changed {
-        Err(error) => line(StatusCode::BAD_REQUEST, &error),
-        Ok((changed, run)) => {
-            settings.clone_from(&changed);
-            drop(settings);
-            if let Some(on) = run {
-                shared.light.set(on);
-            }
-            shared.slot.wake();
-            answer(&changed)
-        }
-    }
+    answer(commands::settings(&app.shared, &body))
 }
 
 /// Changes the scene of a virtual camera.
 async fn scene(State(app): State<App>, body: Bytes) -> Response {
-    match app.shared.stage.change(&body) {
-        Err(error) => line(StatusCode::BAD_REQUEST, &error),
-        Ok(()) => answer(&app.shared.stage.state()),
-    }
+    answer(commands::scene(&app.shared, &body))
 }
 
 /// Switches the LEDs off. The request needs no body, so nothing in it can be refused.
 async fn stop(State(app): State<App>) -> Response {
-    switch(&app.shared, false)
+    answer(Ok::<_, Infallible>(commands::switch(&app.shared, false)))
 }
 
 /// Allows the LEDs to go on.
 async fn start(State(app): State<App>) -> Response {
-    switch(&app.shared, true)
+    answer(Ok::<_, Infallible>(commands::switch(&app.shared, true)))
 }
 
-/// The answer to a command for the LEDs.
-#[derive(Serialize)]
-struct Switched {
-    /// Whether light is allowed now.
-    run: bool,
-    /// The number of this command; later commands have larger numbers.
-    command: u64,
-}
-
-fn switch(shared: &Shared, on: bool) -> Response {
-    let command = shared.light.set(on);
-    shared.slot.wake();
-    answer(&Switched { run: on, command })
-}
-
-fn answer(value: &impl Serialize) -> Response {
-    match serde_json::to_string(value) {
-        Ok(text) => json(format!("{text}\n")),
-        Err(error) => line(StatusCode::INTERNAL_SERVER_ERROR, &error),
+/// The answer to a command: what the command has set, or why the command is refused.
+fn answer<E: ToString>(done: Result<impl Serialize, E>) -> Response {
+    match done.map(|value| serde_json::to_string(&value)) {
+        Ok(Ok(text)) => json(format!("{text}\n")),
+        Ok(Err(error)) => line(StatusCode::INTERNAL_SERVER_ERROR, &error),
+        Err(refused) => line(StatusCode::BAD_REQUEST, &refused),
     }
 }
 

@@ -1,34 +1,26 @@
-//! The imaging thread: takes the newest frames, reconstructs and enhances their image, and
-//! publishes the state.
-//!
-//! The imaging thread always takes the newest frames, and the camera's thread never waits for the
-//! imaging thread.
+//! Imaging of a page: takes the newest frames, reconstructs and enhances their image, and makes the
+//! state for pages.
 
+use super::line::Line;
 use super::settings::{Offer, Settings};
 use super::slot::{DepthImage, Look};
 use super::state::{Light, Offered, Published, Rate, Rates, State};
 use super::{Shared, lock};
 use crate::causes;
+use crate::clock::Instant;
 use crate::imaging::{
     Enhance, EnhanceError, ImageContext, SteadyWhite, Warning, White, brightest, warnings,
 };
 use crate::integrate::IntegrateError;
 use nirspi_nets::deblur::Model;
 use nirspi_nets::{Device, Method as Network, Networks, WeightsError};
-use nirspi_recon::Side;
 use nirspi_recon::reconstruct::{
     Method, MethodSettings, Reconstruct, ReconstructError, Setting, Strength,
 };
+use nirspi_recon::{Measurements, Side};
 use serde::Serialize;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
 use thiserror::Error;
-use tokio::sync::watch;
-
-/// Least time from image to image. Screens show no more images a second.
-const PACE: Duration = Duration::from_millis(33);
-/// Time between two states that pages receive while the camera sends nothing.
-const HEARTBEAT: Duration = Duration::from_millis(500);
 
 /// Why the newest frames gave no picture.
 #[derive(Debug, Error)]
@@ -184,6 +176,10 @@ pub struct Picture {
     /// The enhanced image, (64, 64) in [0, 1], with white at 1.
     #[serde(skip)]
     pub enhanced: Option<Vec<f32>>,
+    /// The readings, (32, 32) ADC counts: that of Hadamard row `32 r + c` at (r, c); NaN for a row
+    /// that was not measured.
+    #[serde(skip)]
+    pub readings: Vec<f32>,
     /// The depth map that was fused.
     #[serde(skip)]
     pub depth: Option<Arc<DepthImage>>,
@@ -228,27 +224,46 @@ struct Enhancement {
     enhance_ms: f64,
 }
 
-/// Makes images and publishes them until the server stops.
-pub fn run(shared: &Shared, mut imaging: Imaging, publish: &watch::Sender<Arc<Published>>) {
-    let mut white = SteadyWhite::default();
-    let (mut picture, mut problem) = (None, None);
-    let started = Instant::now();
-    let (mut frames, mut images) = (Rate::new(started), Rate::new(started));
-    while !shared.is_over() {
-        let turn = Instant::now();
-        if let Some(look) = shared.slot.take(HEARTBEAT) {
+/// Makes one image after the other, and the state around it.
+pub(super) struct Studio {
+    imaging: Imaging,
+    white: SteadyWhite,
+    picture: Option<Arc<Picture>>,
+    problem: Option<String>,
+    frames: Rate,
+    images: Rate,
+}
+
+impl Studio {
+    /// A studio without images.
+    pub(super) fn new(imaging: Imaging) -> Self {
+        let (white, started) = (SteadyWhite::default(), Instant::now());
+        let (frames, images) = (Rate::new(started), Rate::new(started));
+        Self { imaging, white, picture: None, problem: None, frames, images }
+    }
+
+    /// Makes the image of a look taken from the slot, if there is one, and the state of this moment.
+    ///
+    /// # Errors
+    /// Does not occur: every field can be written as JSON.
+    pub(super) fn turn(
+        &mut self,
+        shared: &Shared,
+        look: Option<&Look>,
+    ) -> serde_json::Result<Published> {
+        if let Some(look) = look {
             let settings = lock(&shared.settings).clone();
-            match imaging.picture(&look, &settings, &mut white) {
-                Ok(made) => (picture, problem) = (Some(Arc::new(made)), None),
-                Err(why) => problem = Some(causes::in_one_line(&why)),
+            match self.imaging.picture(look, &settings, &mut self.white) {
+                Ok(made) => (self.picture, self.problem) = (Some(Arc::new(made)), None),
+                Err(why) => self.problem = Some(causes::in_one_line(&why)),
             }
-            shared.slot.done(problem.is_none());
+            shared.slot.done(self.problem.is_none());
         }
         let now = Instant::now();
         let ledger = shared.slot.ledger();
         let rates = Rates {
-            camera_frames_per_s: frames.at(now, ledger.frames.received),
-            images_per_s: images.at(now, ledger.images.shown),
+            camera_frames_per_s: self.frames.at(now, ledger.frames.received),
+            images_per_s: self.images.at(now, ledger.images.shown),
         };
         let settings = lock(&shared.settings).clone();
         // The log is copied, so that the camera's thread can add to the log meanwhile.
@@ -261,17 +276,14 @@ pub fn run(shared: &Shared, mut imaging: Imaging, publish: &watch::Sender<Arc<Pu
             rates,
             settings: &settings,
             offered: Offered::new(&shared.offer),
-            picture: picture.as_deref(),
-            problem: problem.as_deref(),
+            picture: self.picture.as_deref(),
+            problem: self.problem.as_deref(),
             scene: shared.stage.state(),
+            line: shared.line.as_ref().map(Line::state),
             viewers: shared.viewers(),
             events: log.events(),
         };
-        let published = Published::new(&state, picture.as_ref());
-        if let Ok(published) = published {
-            publish.send_replace(Arc::new(published));
-        }
-        std::thread::sleep(PACE.saturating_sub(turn.elapsed()));
+        Published::new(&state, self.picture.as_ref())
     }
 }
 
@@ -325,6 +337,7 @@ impl Imaging {
         Ok(Picture {
             counts: image.pixels().to_vec(),
             enhanced,
+            readings: readings(&measurements),
             depth: look.depth.clone(),
             method: settings.method,
             frames: look.sum.frames(),
@@ -336,6 +349,15 @@ impl Imaging {
             short_warnings: short,
         })
     }
+}
+
+/// The measurements by Hadamard row; NaN for a row that was not measured.
+fn readings(measurements: &Measurements) -> Vec<f32> {
+    let mut readings = vec![f32::NAN; measurements.side().area()];
+    for (&row, &value) in measurements.rows().iter().zip(measurements.values()) {
+        readings[row as usize] = value as f32;
+    }
+    readings
 }
 
 fn ms_since(started: Instant) -> f64 {

@@ -10,59 +10,60 @@
 //! the camera does not wait for networks, the networks do not wait for a browser, and a browser
 //! does not wait for another browser. Pages change settings by one small message
 //! ([`settings::Change`]). Two threads compute; all of HTTP runs asynchronously on a third thread.
+//! Without threads and server, the same parts take turns ([`Turns`]).
 
 mod camera;
 mod camera_log;
+mod commands;
+#[cfg(feature = "serve")]
 mod connections;
+#[cfg(feature = "serve")]
 mod guard;
+#[cfg(feature = "serve")]
 mod http;
 mod imaging;
 mod light;
+mod line;
+#[cfg(feature = "serve")]
 mod page;
+#[cfg(feature = "serve")]
 mod server;
 pub mod settings;
+#[cfg(feature = "virtual-camera")]
+mod simulated;
 mod slot;
 mod stage;
 mod state;
+#[cfg(feature = "serve")]
+mod threads;
+#[cfg(feature = "serve")]
 mod token;
+mod turns;
 
 pub use camera::{CameraSource, Connect, Connected};
 pub use imaging::{Imaging, ImagingError};
+pub use line::Line;
+#[cfg(feature = "serve")]
 pub use server::{BindError, Server};
+#[cfg(feature = "virtual-camera")]
+pub use simulated::SimulatedError;
 pub use slot::{ImageCounters, Ledger};
 pub use stage::StagedScene;
+#[cfg(feature = "serve")]
+pub use threads::{ServeError, serve};
+#[cfg(feature = "serve")]
 pub use token::{Token, TokenError};
+pub use turns::Turns;
 
-use crate::capture::CaptureError;
 use camera_log::CameraLog;
 use light::LightSwitch;
 use settings::{Offer, Settings};
 use slot::Slot;
 use stage::Stage;
-use state::Published;
-use std::io;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::thread::JoinHandle;
-use thiserror::Error;
-use tokio::sync::watch;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// Why serving ended without a request of the user.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum ServeError {
-    /// The camera could not measure.
-    #[error(transparent)]
-    Camera(#[from] CaptureError),
-    /// The network failed.
-    #[error("the web server failed")]
-    Network(#[from] io::Error),
-    /// A thread panicked because of a bug in this program.
-    #[error("the {0} thread died")]
-    Thread(&'static str),
-}
-
-/// An error of the functions that the caller passes to [`serve`].
+/// An error of the functions that the caller passes to this module.
 pub type ForeignError = Box<dyn std::error::Error + Send + Sync>;
 
 /// The data that the threads share.
@@ -74,6 +75,8 @@ struct Shared {
     offer: Offer,
     stage: Stage,
     light: LightSwitch,
+    /// The line between firmware and host, if pages can damage its bytes.
+    line: Option<Line>,
     over: AtomicBool,
     viewers: AtomicUsize,
 }
@@ -87,6 +90,7 @@ impl Shared {
             offer,
             stage,
             light: LightSwitch::on(),
+            line: None,
             over: AtomicBool::new(false),
             viewers: AtomicUsize::new(0),
         }
@@ -107,51 +111,6 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Serves `camera` to the browsers that connect to `server`, until `stop` is set. Returns the
-/// account of all frames.
-///
-/// # Errors
-/// [`ServeError`], after the camera is stopped.
-pub fn serve(
-    server: Server,
-    mut camera: CameraSource,
-    connected: Connected,
-    imaging: Imaging,
-    settings: Settings,
-    stop: &AtomicBool,
-) -> Result<Ledger, ServeError> {
-    let log = CameraLog::new(&camera.address, connected.session.identity());
-    let records = camera.record_to.is_some();
-    let offer = Offer { records, base: Some(camera.setup.clone()), ..imaging.offer() };
-    let stage = Stage::of(camera.scene.take());
-    let shared = Arc::new(Shared::new(log, offer, settings, stage));
-    let (publish, published) = watch::channel(Arc::new(Published::default()));
-    let measuring = {
-        let shared = Arc::clone(&shared);
-        spawn("camera", move || camera::run(&shared, camera, connected))?
-    };
-    let making = {
-        let shared = Arc::clone(&shared);
-        spawn("imaging", move || imaging::run(&shared, imaging, &publish))?
-    };
-    let is_over =
-        || stop.load(Ordering::Relaxed) || measuring.is_finished() || making.is_finished();
-    let served = http::run(server, Arc::clone(&shared), published, is_over);
-    shared.over.store(true, Ordering::Relaxed);
-    // The camera is stopped even if the other threads failed.
-    let measured = measuring.join().map_err(|_| ServeError::Thread("camera"))?;
-    making.join().map_err(|_| ServeError::Thread("imaging"))?;
-    measured?;
-    served?;
-    Ok(shared.slot.ledger())
-}
-
-fn spawn<T: Send + 'static>(
-    name: &str,
-    work: impl FnOnce() -> T + Send + 'static,
-) -> io::Result<JoinHandle<T>> {
-    std::thread::Builder::new().name(name.to_owned()).spawn(work)
-}
-
 #[cfg(test)]
+#[cfg(feature = "serve")]
 mod tests;

@@ -10,9 +10,10 @@ const SCRIPT: &str = "text/javascript; charset=utf-8";
 const STYLE: &str = "text/css; charset=utf-8";
 
 /// Path, type and content of each file that the page loads.
-const FILES: [(&str, &str, &str); 14] = [
+const FILES: [(&str, &str, &str); 16] = [
     ("/page/style.css", STYLE, include_str!("page/style.css")),
     ("/page/main.js", SCRIPT, include_str!("page/main.js")),
+    ("/page/connection.js", SCRIPT, include_str!("page/connection.js")),
     ("/page/words.js", SCRIPT, include_str!("page/words.js")),
     ("/page/dom.js", SCRIPT, include_str!("page/dom.js")),
     ("/page/light.js", SCRIPT, include_str!("page/light.js")),
@@ -25,6 +26,7 @@ const FILES: [(&str, &str, &str); 14] = [
     ("/page/history.js", SCRIPT, include_str!("page/history.js")),
     ("/page/plots.js", SCRIPT, include_str!("page/plots.js")),
     ("/page/scene.js", SCRIPT, include_str!("page/scene.js")),
+    ("/page/line.js", SCRIPT, include_str!("page/line.js")),
 ];
 
 /// The routes of all files.

@@ -119,6 +119,14 @@ impl Slot {
         inner.next.take()
     }
 
+    /// Takes the newest look, if there is one now. As after [`take`](Self::take), the caller must
+    /// then call [`done`](Self::done).
+    pub fn take_now(&self) -> Option<Look> {
+        let mut inner = lock(&self.inner);
+        inner.news = false;
+        inner.next.take()
+    }
+
     /// Records that the taken look became an image, or failed.
     pub fn done(&self, shown: bool) {
         let images = &mut lock(&self.inner).ledger.images;

@@ -5,15 +5,17 @@
 
 use super::camera_log::{CameraState, EventLine};
 use super::imaging::Picture;
+use super::line::LineState;
 use super::settings::{MAX_FRAMES, MAX_SWEEPS, Offer, Settings};
 use super::slot::Ledger;
 use super::stage::SceneState;
+use crate::clock::Instant;
 use data_encoding::BASE64;
 use nirspi_recon::Order;
 use serde::Serialize;
 use std::collections::VecDeque;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// The window over which a rate counts frames.
 const RATE_WINDOW: Duration = Duration::from_secs(1);
@@ -117,6 +119,8 @@ pub struct State<'s> {
     pub problem: Option<&'s str>,
     /// The scene of a virtual camera; `null` for a real one.
     pub scene: Option<SceneState>,
+    /// The line between firmware and host; `null` if its bytes cannot be damaged from the page.
+    pub line: Option<LineState>,
     /// Number of connected pages.
     pub viewers: usize,
     /// Events, oldest first.
@@ -131,6 +135,9 @@ struct Message<'s> {
     image: Option<String>,
     /// (64, 64) shares of white; `null` if the learned stages are switched off.
     enhanced: Option<String>,
+    /// (32, 32) ADC counts: the reading of Hadamard row `32 r + c` at (r, c); NaN for a row that
+    /// was not measured.
+    readings: Option<String>,
     /// (32, 32) distances in metres; `null` without a depth sensor.
     depth: Option<String>,
 }
@@ -156,6 +163,7 @@ impl Published {
             state,
             image: picture.map(|picture| numbers(&picture.counts)),
             enhanced: picture.and_then(|picture| picture.enhanced.as_deref().map(numbers)),
+            readings: picture.map(|picture| numbers(&picture.readings)),
             depth: picture.and_then(|picture| Some(numbers(&picture.depth.as_ref()?.pixels_m))),
         };
         Ok(Self {

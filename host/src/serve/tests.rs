@@ -2,17 +2,22 @@ use super::camera_log::Phase;
 use super::light::Leds;
 use super::settings::Measuring;
 use super::settings::tests::{offer, settings};
+use super::state::Published;
+use super::threads::measure;
 use super::*;
-use crate::capture::Calibration;
+use crate::capture::{Calibration, CaptureError};
 use crate::link::{Link, Received};
 use crate::session::{CameraIdentity, Session};
 use crate::setup::MeasurementSetup;
 use crate::virtual_camera::{OpticalFpga, VirtualCamera, VirtualOptics};
 use nirspi_optics::Scene;
 use nirspi_recon::Order;
-use std::io::{BufRead, BufReader, Write};
+use std::io::{self, BufRead, BufReader, Write};
 use std::net::TcpStream;
+use std::sync::Arc;
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
+use tokio::sync::watch;
 
 /// The longest wait of a test, enough for a busy machine.
 const LIMIT: Duration = Duration::from_secs(30);
@@ -123,7 +128,7 @@ impl Lab {
                 record_to: None,
                 connect,
             };
-            std::thread::spawn(move || camera::run(&shared, source, first))
+            std::thread::spawn(move || measure(&shared, source, first))
         };
         let lab = Self { hands, shared, measuring };
         until("measuring", || lab.received() > 10);

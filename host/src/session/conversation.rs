@@ -5,6 +5,7 @@
 
 use super::request::{Hello, Request};
 use super::{ANSWER_TIMEOUT, Listener, SessionError};
+use crate::clock::Instant;
 use crate::link::{Link, Received};
 use nirspi_wire::packet::{
     MAX_DEVICE_PACKET, MAX_HOST_PACKET, hello_of_any_version, parse, unseal,
@@ -13,7 +14,7 @@ use nirspi_wire::{
     Answer, Command, Deframed, Deframer, DeviceMessage, PacketError, Refusal, Reply, encode,
     version,
 };
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// The longest wait for bytes between two checks of the time while an answer is awaited.
 const LOOK: Duration = Duration::from_millis(100);

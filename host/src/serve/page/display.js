@@ -15,6 +15,7 @@ export function values(base64) {
 
 // What each image shows: its unit, the value that counts as white, and a number in words.
 const PANELS = {
+  readings: { side: 32, of: "readings", white: null, even: true, scale: 1, unit: "ADC counts", digits: 2 },
   image: { side: 32, of: "image", white: picture => picture.white_counts, scale: 1, unit: "ADC counts", digits: 1 },
   enhanced: { side: 64, of: "enhanced", white: () => 1, scale: 100, unit: "% of white", digits: 1 },
   depth: { side: 32, of: "depth", white: null, scale: 1, unit: "m", digits: 3 },
@@ -26,6 +27,11 @@ function percentile(sorted, share) { return sorted[Math.round(share * (sorted.le
 // The range of values from black to white.
 function range(panel, picture) {
   const white = panel.white?.(picture);
+  // Readings are as often below 0 as above: 0 is in the middle. The first ones are far larger than the others.
+  if (panel.even) {
+    const most = percentile(panel.values.filter(Number.isFinite).map(Math.abs).sort(), .95);
+    return [-most, most];
+  }
   if (white === undefined || $("range").value === "auto") {
     const sorted = Float32Array.from(panel.values).sort();
     const tail = panel.white ? .005 : 0;
@@ -35,7 +41,9 @@ function range(panel, picture) {
   return [$("low").value / 100 * white, $("high").value / 100 * white];
 }
 
-const inWords = (panel, value) => `${(panel.scale * value).toFixed(panel.digits)} ${panel.unit}`;
+// A pattern that was not shown has no reading.
+const inWords = (panel, value) => Number.isNaN(value) ? "not measured"
+  : `${(panel.scale * value).toFixed(panel.digits)} ${panel.unit}`;
 
 function draw(panel, picture) {
   const canvas = $(panel.id), pen = canvas.getContext("2d"), bar = $(`${panel.id}-bar`);
@@ -47,7 +55,7 @@ function draw(panel, picture) {
   panel.values.forEach((value, at) => {
     const level = Math.max(0, Math.min(255, Math.round((value - low) * step)));
     for (let part = 0; part < 3; part++) pixels.data[4 * at + part] = colours[3 * level + part];
-    pixels.data[4 * at + 3] = 255;
+    pixels.data[4 * at + 3] = Number.isNaN(value) ? 0 : 255;
   });
   pen.putImageData(pixels, 0, 0);
   bar.firstElementChild.style.background = gradient(map);
@@ -64,7 +72,8 @@ function point(panel) {
   const [x, y] = panel.cell, value = panel.values[y * panel.side + x], share = 100 / panel.side;
   Object.assign(cell.style, { left: `${x * share}%`, top: `${y * share}%`, width: `${share}%`, height: `${share}%` });
   const white = panel.id === "image" && shown.state.picture.white_counts;
-  text(says, `row ${y}, column ${x}: ${inWords(panel, value)}${white ? `, ${(100 * value / white).toFixed(0)} % of white` : ""}`);
+  const where = panel.id === "readings" ? `pattern ${y * panel.side + x}` : `row ${y}, column ${x}`;
+  text(says, `${where}: ${inWords(panel, value)}${white ? `, ${(100 * value / white).toFixed(0)} % of white` : ""}`);
 }
 
 function move(panel, x, y) {
@@ -112,6 +121,7 @@ export function show(message) {
   $("no-image").hidden = message.image !== null;
   $("no-enhanced").hidden = message.enhanced !== null;
   text($("no-enhanced"), settings.enhance ? "no image yet" : "switched off");
+  $("no-readings").hidden = message.readings !== null;
   $("depth-panel").hidden = message.depth === null;
   const found = picture?.enhancement;
   text($("about-image"), picture

@@ -1,5 +1,6 @@
 // The switch of the LEDs: always in reach, by button and by key.
 
+import { GONE, send } from "./connection.js";
 import { $, text } from "./dom.js";
 
 // A stop that does not arrive is sent again until it arrives. Only a person's start ends that.
@@ -9,8 +10,7 @@ let wanted = 0;
 async function command(path) {
   const abort = new AbortController(), late = setTimeout(() => abort.abort(), PATIENCE_MS);
   try {
-    const got = await fetch(path, { method: "POST", signal: abort.signal, priority: "high", keepalive: true });
-    return got.ok;
+    return (await send(path, undefined, { signal: abort.signal, priority: "high" })).ok;
   } catch {
     return false;
   } finally {
@@ -68,6 +68,6 @@ export function show({ camera, light }) {
 // The server does not answer.
 export function showGone() {
   document.body.dataset.leds = "unknown";
-  text($("leds"), "LEDs unknown: no answer from nirspi serve");
+  text($("leds"), `LEDs unknown: ${GONE.leds}`);
   $("start").hidden = true;
 }

@@ -1,11 +1,13 @@
-// Connects to the server, and hands each state to the parts of the page.
+// Connects to the camera's program, and hands each state to the parts of the page.
 
+import { GONE, listen } from "./connection.js";
 import * as controls from "./controls.js";
 import * as display from "./display.js";
 import { $, foreign, text } from "./dom.js";
 import * as facts from "./facts.js";
 import * as light from "./light.js";
 import * as history from "./history.js";
+import * as line from "./line.js";
 import * as plots from "./plots.js";
 import { onGone } from "./requests.js";
 import { download, npy, sheet } from "./save.js";
@@ -37,6 +39,7 @@ function show(message) {
   facts.show(message.state, display.rates.drawn);
   controls.show(message.state);
   scene.show(message.state);
+  line.show(message.state);
   plots.show(message.state);
 }
 
@@ -52,34 +55,10 @@ $("save-npy").onclick = () => {
   if (shown.enhanced) download(npy(display.values(shown.enhanced), 64), "enhanced.npy");
 };
 
-function gone() {
+function gone(why = GONE.line) {
   document.body.dataset.phase = "unserved";
-  text($("line"), "nirspi serve does not answer; trying again");
+  text($("line"), why);
   light.showGone();
 }
 onGone.call = gone;
-
-// A hidden page closes its connection: browsers keep few connections to one address open.
-let source = null, again = 0;
-function look() {
-  clearTimeout(again);
-  source?.close();
-  source = null;
-  if (document.hidden) return;
-  source = new EventSource("/events");
-  source.onmessage = event => show(JSON.parse(event.data));
-  source.onerror = () => { gone(); source.close(); again = setTimeout(look, 1000); explain(); };
-}
-
-// Why there is no stream, if the server answers: it may want another token, or have too many pages.
-async function explain() {
-  try {
-    const answer = await fetch("/api/state");
-    text($("line"), answer.ok ? "the stream of images has ended, or too many pages are open; trying again"
-      : (await answer.text()).trim());
-  } catch {
-    // Nobody answers: the page says so already.
-  }
-}
-document.addEventListener("visibilitychange", look);
-look();
+listen(show, gone);

@@ -1,5 +1,7 @@
 // Sends commands to the server. A refusal is kept, and shown with the notes.
 
+import { send } from "./connection.js";
+
 export const answer = { refused: "" };
 
 // The server is gone: set by main.js.
@@ -7,9 +9,9 @@ export const onGone = { call: () => {} };
 
 export async function post(path, body) {
   try {
-    const got = await fetch(path, { method: "POST", body: body === undefined ? undefined : JSON.stringify(body) });
-    answer.refused = got.ok ? "" : await got.text();
-    return got.ok ? await got.json() : null;
+    const got = await send(path, body === undefined ? undefined : JSON.stringify(body));
+    answer.refused = got.ok ? "" : got.text;
+    return got.ok ? JSON.parse(got.text) : null;
   } catch {
     onGone.call();
     return null;

@@ -1,0 +1,215 @@
+//! Camera, imaging and HTTP, each on a thread of its own.
+//!
+//! # Invariant
+//! The camera's thread waits for the camera only: never for the imaging thread, and never for a
+//! browser.
+
+use super::camera::{End, EventLog, Live, Next, darken, reconnect, standing_fault};
+use super::camera_log::{CameraLog, Phase};
+use super::imaging::Studio;
+use super::light::Leds;
+use super::settings::{Offer, Settings};
+use super::stage::Stage;
+use super::state::Published;
+use super::{CameraSource, Connected, Imaging, Ledger, Server, Shared, http};
+use crate::capture::{CaptureError, observe};
+use crate::causes;
+use crate::session::{Session, SessionError};
+use std::io;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+use thiserror::Error;
+use tokio::sync::watch;
+
+/// Time between two attempts to reconnect.
+const RETRY: Duration = Duration::from_secs(1);
+/// Time between two checks whether to stop.
+const TICK: Duration = Duration::from_millis(50);
+/// Time between two questions to a camera whose LEDs a person switched off.
+const ASK: Duration = Duration::from_secs(1);
+
+/// Least time from image to image. Screens show no more images a second.
+const PACE: Duration = Duration::from_millis(33);
+/// Time between two states that pages receive while the camera sends nothing.
+const HEARTBEAT: Duration = Duration::from_millis(500);
+
+/// Why serving ended without a request of the user.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum ServeError {
+    /// The camera could not measure.
+    #[error(transparent)]
+    Camera(#[from] CaptureError),
+    /// The network failed.
+    #[error("the web server failed")]
+    Network(#[from] io::Error),
+    /// A thread panicked because of a bug in this program.
+    #[error("the {0} thread died")]
+    Thread(&'static str),
+}
+
+/// Serves `camera` to the browsers that connect to `server`, until `stop` is set. Returns the
+/// account of all frames.
+///
+/// # Errors
+/// [`ServeError`], after the camera is stopped.
+pub fn serve(
+    server: Server,
+    mut camera: CameraSource,
+    connected: Connected,
+    imaging: Imaging,
+    settings: Settings,
+    stop: &AtomicBool,
+) -> Result<Ledger, ServeError> {
+    let log = CameraLog::new(&camera.address, connected.session.identity());
+    let records = camera.record_to.is_some();
+    let offer = Offer { records, base: Some(camera.setup.clone()), ..imaging.offer() };
+    let stage = Stage::of(camera.scene.take());
+    let shared = Arc::new(Shared::new(log, offer, settings, stage));
+    let (publish, published) = watch::channel(Arc::new(Published::default()));
+    let measuring = {
+        let shared = Arc::clone(&shared);
+        spawn("camera", move || measure(&shared, camera, connected))?
+    };
+    let making = {
+        let shared = Arc::clone(&shared);
+        spawn("imaging", move || images(&shared, imaging, &publish))?
+    };
+    let is_over =
+        || stop.load(Ordering::Relaxed) || measuring.is_finished() || making.is_finished();
+    let served = http::run(server, Arc::clone(&shared), published, is_over);
+    shared.over.store(true, Ordering::Relaxed);
+    // The camera is stopped even if the other threads failed.
+    let measured = measuring.join().map_err(|_| ServeError::Thread("camera"))?;
+    making.join().map_err(|_| ServeError::Thread("imaging"))?;
+    measured?;
+    served?;
+    Ok(shared.slot.ledger())
+}
+
+fn spawn<T: Send + 'static>(
+    name: &str,
+    work: impl FnOnce() -> T + Send + 'static,
+) -> io::Result<JoinHandle<T>> {
+    std::thread::Builder::new().name(name.to_owned()).spawn(work)
+}
+
+/// Measures until the server stops.
+///
+/// # Errors
+/// [`CaptureError`] if the first run cannot begin.
+pub(super) fn measure(
+    shared: &Arc<Shared>,
+    mut source: CameraSource,
+    first: Connected,
+) -> Result<(), CaptureError> {
+    let mut live = Live::new(Arc::clone(shared), &mut source);
+    let mut next = Some(first);
+    // A person who starts this program can see the camera.
+    let mut person_said = true;
+    while !shared.is_over() {
+        let mut connected = match next.take() {
+            Some(connected) => connected,
+            None => match reconnect(shared, &mut source.connect) {
+                Ok(connected) => connected,
+                Err(None) => continue,
+                Err(Some(problem)) => {
+                    shared.enter(Phase::Lost, Leds::Unknown, format!("{problem}; trying again"));
+                    rest(shared, RETRY);
+                    continue;
+                }
+            },
+        };
+        let standing = if person_said { None } else { standing_fault(&mut connected.session) };
+        person_said = false;
+        let end = match standing {
+            Some(fault) => End::Fault(fault),
+            None => session(&mut live, shared, &mut connected)?,
+        };
+        // The old link is closed before reconnecting.
+        drop(connected);
+        match live.ended(end) {
+            Next::Connect { person_said: said } => person_said = said,
+            Next::Retry => rest(shared, RETRY),
+            Next::Person => {
+                while !shared.is_over() && !shared.light.is_on() {
+                    std::thread::sleep(TICK);
+                }
+                person_said = true;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// One session: runs, and pauses without light between the runs. Fails only if the first run of
+/// all cannot begin.
+fn session(
+    live: &mut Live,
+    shared: &Shared,
+    connected: &mut Connected,
+) -> Result<End, CaptureError> {
+    live.greeted(connected);
+    while !shared.is_over() {
+        let end = if shared.stage.has_changed() {
+            Some(End::Scene)
+        } else if shared.light.is_on() {
+            one_run(live, connected)?
+        } else {
+            let stopped = stopped(shared, &mut connected.session);
+            stopped.err().map(|error| End::Gone(causes::in_one_line(&error)))
+        };
+        if let Some(end) = end {
+            return Ok(end);
+        }
+    }
+    Ok(End::Told)
+}
+
+/// One run. `None` if the run was stopped from here. Fails only if the run is the first of all
+/// and cannot begin.
+fn one_run(live: &mut Live, connected: &mut Connected) -> Result<Option<End>, CaptureError> {
+    let options = live.prepare(connected);
+    let captured = observe(&mut connected.session, &options, live);
+    live.captured(connected, captured)
+}
+
+/// Keeps a camera whose LEDs a person switched off, until a person switches them on again.
+///
+/// # Errors
+/// If the link ends.
+fn stopped(shared: &Shared, session: &mut Session) -> Result<(), SessionError> {
+    let mut asked: Option<Instant> = None;
+    while !shared.is_over() && !shared.light.is_on() && !shared.stage.has_changed() {
+        if asked.is_none_or(|asked| asked.elapsed() > ASK) {
+            asked = darken(shared, session)?.then(Instant::now);
+        }
+        session.listen(TICK, &mut EventLog(shared))?;
+        // The link in memory does not wait.
+        std::thread::sleep(TICK);
+    }
+    Ok(())
+}
+
+/// Waits for `time`, or until the server stops.
+fn rest(shared: &Shared, time: Duration) {
+    let started = Instant::now();
+    while !shared.is_over() && started.elapsed() < time {
+        std::thread::sleep(TICK);
+    }
+}
+
+/// Makes images and publishes them until the server stops.
+fn images(shared: &Shared, imaging: Imaging, publish: &watch::Sender<Arc<Published>>) {
+    let mut studio = Studio::new(imaging);
+    while !shared.is_over() {
+        let turn = Instant::now();
+        let look = shared.slot.take(HEARTBEAT);
+        if let Ok(published) = studio.turn(shared, look.as_ref()) {
+            publish.send_replace(Arc::new(published));
+        }
+        std::thread::sleep(PACE.saturating_sub(turn.elapsed()));
+    }
+}

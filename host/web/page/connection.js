@@ -1,0 +1,47 @@
+// The connection to the camera's program, which runs in this page: in a worker, as WebAssembly.
+
+import { $, text } from "./dom.js";
+
+// What the page says when the program has stopped.
+export const GONE = { line: "the program in this page has stopped; reload the page", leds: "the program has stopped" };
+
+const worker = new Worker(new URL("worker.js", import.meta.url));
+const waiting = new Map();
+let commands = 0, stopped = false;
+
+// Sends a command. Returns whether the program has executed the command, and the text of the answer.
+export function send(path, body) {
+  // The LEDs of a program that has stopped are gone with it.
+  if (stopped) return Promise.resolve({ ok: path === "/api/stop", text: GONE.line });
+  return new Promise(answered => {
+    waiting.set(++commands, answered);
+    worker.postMessage({ id: commands, path, body: body ?? "" });
+  });
+}
+
+// Calls `show` with each message, and `gone` with a line of text when no more messages come.
+export function listen(show, gone) {
+  const stop = why => {
+    stopped = true;
+    worker.terminate();
+    for (const answered of waiting.values()) answered({ ok: false, text: why });
+    waiting.clear();
+    gone(`${why}. Reload the page to start again.`);
+  };
+  worker.onmessage = ({ data }) => {
+    if (data.stopped) stop(data.stopped);
+    else if (data.loading) text($("line"), data.loading);
+    else if (data.message) show(JSON.parse(data.message));
+    else { waiting.get(data.id)?.(data); waiting.delete(data.id); }
+  };
+  worker.onerror = event => stop(`The program of this page did not start: ${event.message ?? "worker.js cannot be read"}`);
+  // A hidden page does not compute.
+  const look = () => worker.postMessage({ paused: document.hidden });
+  document.addEventListener("visibilitychange", look);
+  look();
+}
+
+// The scene comes first here.
+$("scene").open = true;
+document.querySelector("main").prepend($("scene"));
+text($("no-record"), "recordings: with nirspi serve");
