@@ -15,6 +15,8 @@
 //! * [`tally`] and [`integrate`] make measurements of frames; `nirspi-recon` reconstructs an image
 //!   from measurements,
 //! * [`source`] reads measurements from a file, a recording or a capture,
+//! * [`reconstruct`] makes an image or many of what was read, [`archive`] one table of a whole folder,
+//!   whose columns are in [`dataset`],
 //! * [`files`], [`picture`] and [`scene`] read and write what users see, [`resolution`] measures
 //!   the finest detail, [`legibility`] reads characters,
 //! * [`imaging`] scales, enhances and judges images, and gives warnings,
@@ -35,10 +37,12 @@
 
 pub mod about;
 pub mod account;
+pub mod archive;
 pub mod boards;
 pub mod calibration;
 pub mod capture;
 pub mod causes;
+pub mod dataset;
 pub mod devices;
 pub mod events;
 #[cfg(feature = "virtual-camera")]
@@ -56,8 +60,10 @@ pub mod integrate;
 #[cfg(feature = "training")]
 pub mod legibility;
 pub mod link;
+mod parquet;
 #[cfg(feature = "pictures")]
 pub mod picture;
+pub mod reconstruct;
 pub mod recording;
 pub mod replay;
 pub mod resolution;
