@@ -71,7 +71,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let options = args.folder.options(&args.out, "this set")?;
     let solver = args.method.solver(FirstPatterns::Recorded, Sampling::ALL)?;
     let grid = Grid::new(axes, args.model.read()?, solver).map_err(|error| {
-        if error.is_setting() { Usage(error.to_string()).into() } else { anyhow::Error::from(error) }
+        if error.is_setting() {
+            Usage(error.to_string()).into()
+        } else {
+            anyhow::Error::from(error)
+        }
     })?;
     let (report, code) = args.folder.run(&grid, &options, "measurements", args.report)?;
     let card = args.out.with_extension("md");

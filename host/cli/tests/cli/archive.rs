@@ -89,7 +89,8 @@ fn shares_of_a_folder_are_disjoint_and_complete() {
 #[test]
 fn a_set_of_the_virtual_camera_is_one_command_with_a_card() {
     let bench = Bench::new();
-    let axes = ["--weathers", "none", "heavy", "--seeds", "1,2", "--samplings", "10%", "--frames", "2"];
+    let axes =
+        ["--weathers", "none", "heavy", "--seeds", "1,2", "--samplings", "10%", "--frames", "2"];
     let set = [&["dataset"][..], &axes, &["--out", "set.parquet"]].concat();
     let said = bench.run(&set).succeeded();
     assert!(said.stdout.contains("4 images of 4 measurements"), "{said:?}");
