@@ -146,7 +146,7 @@ impl RowReader {
     }
 
     #[cfg(not(feature = "enhance"))]
-    #[expect(clippy::unnecessary_wraps, clippy::unused_self, reason = "there are no networks")]
+    #[allow(clippy::unnecessary_wraps, clippy::unused_self, reason = "there are no networks")]
     fn enhance_all(
         &self,
         _path: &Path,
