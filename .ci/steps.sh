@@ -41,6 +41,7 @@ by_name=(
     "licence-texts   the licences of all dependencies in one page; crates.io"
     "deb             the Debian package; crates.io"
     "release-folder  the folder that nirspi update takes; firmware, place-route"
+    "cluster         archives and sweeps on a Ray cluster of two nodes, and by Dask; PyPI, 700 MB"
     "python-peers    the Python package beside SPyRiT, deepinv, scikit-learn, SPAMS; PyPI, 6 GB for torch"
 )
 
@@ -251,7 +252,7 @@ step_python() {
         "$bin/ruff" check python tests
         "$bin/mypy" python/nirspi
         "$bin/python" -m mypy.stubtest nirspi._nirspi
-        "$bin/python" -X dev -m pytest --ignore tests/peers
+        "$bin/python" -X dev -m pytest --ignore tests/peers --ignore tests/cluster
     )
 }
 
@@ -260,6 +261,11 @@ step_python_peers() {
     # Has wheels for few systems.
     target/python/bin/pip install --quiet spams-bin==2.6.14 || echo "skipped: SPAMS, no wheel"
     (cd host/python && "$OLDPWD/target/python/bin/python" -m pytest tests/peers)
+}
+
+step_cluster() {
+    python_package numpy pyarrow pytest==9.2.0 'ray[data]==2.60.0' 'dask[distributed]==2026.8.0'
+    (cd host/python && "$OLDPWD/target/python/bin/python" -m pytest tests/cluster)
 }
 
 step_page() {

@@ -15,6 +15,8 @@
 //! * [`tally`] and [`integrate`] make measurements of frames; `nirspi-recon` reconstructs an image
 //!   from measurements,
 //! * [`source`] reads measurements from a file, a recording or a capture,
+//! * [`reconstruct`] makes an image or many of what was read, [`archive`] one table of a whole folder,
+//!   whose columns are in [`dataset`],
 //! * [`files`], [`picture`] and [`scene`] read and write what users see, [`resolution`] measures
 //!   the finest detail, [`legibility`] reads characters,
 //! * [`imaging`] scales, enhances and judges images, and gives warnings,
@@ -40,11 +42,15 @@
 
 pub mod about;
 pub mod account;
+#[cfg(not(target_family = "wasm"))]
+pub mod archive;
 pub mod boards;
 pub mod calibration;
 pub mod capture;
 pub mod causes;
 pub mod clock;
+#[cfg(not(target_family = "wasm"))]
+pub mod dataset;
 #[cfg(not(target_family = "wasm"))]
 pub mod devices;
 pub mod events;
@@ -64,8 +70,10 @@ pub mod integrate;
 #[cfg(feature = "training")]
 pub mod legibility;
 pub mod link;
+mod parquet;
 #[cfg(feature = "pictures")]
 pub mod picture;
+pub mod reconstruct;
 pub mod recording;
 pub mod replay;
 pub mod resolution;

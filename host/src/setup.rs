@@ -63,6 +63,13 @@ impl MeasurementSetup {
         }
     }
 
+    /// A short name that is the same for all frames of one setup, for tables.
+    #[must_use]
+    pub fn id(&self) -> String {
+        let setup = serde_json::to_value(self).unwrap_or_default();
+        format!("{:08x}", nirspi_wire::crc32(setup.to_string().as_bytes()))
+    }
+
     /// The first `round(sampling * 1024)` patterns of `order` (at least one), differential, at 25
     /// MHz, with two of five samples blanked.
     ///

@@ -1,6 +1,7 @@
 //! Reads measurements from a file of nirspi or another lab, a recording, or a finished capture.
 
 use crate::account::LossCounters;
+use crate::boards;
 use crate::calibration::{FlatField, KeptFlatField};
 use crate::capture::Capture;
 use crate::causes;
@@ -204,6 +205,8 @@ pub struct Source {
     pub reference: Option<Image>,
     /// The account of a recording's frames.
     pub frames: Option<LossCounters>,
+    /// Whether no real light was measured; `None` if that is not known.
+    pub simulated: Option<bool>,
     /// Notes for the user.
     pub notes: Vec<String>,
     /// The flat field of the recorded camera, if one is kept.
@@ -280,6 +283,7 @@ impl Source {
             not_read: Vec::new(),
             reference: None,
             frames: Some(*counters),
+            simulated: None,
             notes,
             flat_field: None,
         })
@@ -307,7 +311,7 @@ impl SourceOptions {
     }
 
     /// Whether the file is a recording. An error if options do not apply to recordings.
-    fn fits_recording(&self, path: &Path) -> Result<bool, SourceError> {
+    pub(crate) fn fits_recording(&self, path: &Path) -> Result<bool, SourceError> {
         let mut magic = [0; 4];
         // Opening a pipe would wait for a writer. Reading the file later refuses everything that is
         // not a file.
@@ -364,8 +368,18 @@ fn from_file(path: &Path, file: MeasurementFile, part: Part) -> Result<Source, S
         }
     });
     let not_read = file.not_read;
-    let (frames, flat_field) = (None, None);
-    Ok(Source { measurements, imaginary, dropouts, not_read, reference, frames, notes, flat_field })
+    let (frames, simulated, flat_field) = (None, file.simulated, None);
+    Ok(Source {
+        measurements,
+        imaginary,
+        dropouts,
+        not_read,
+        reference,
+        frames,
+        simulated,
+        notes,
+        flat_field,
+    })
 }
 
 /// The part of a complex reference to compare with; for real readings, the real part.
@@ -469,6 +483,7 @@ pub(crate) fn of_frames(
         not_read,
         reference,
         frames,
+        simulated: Some(boards::is_simulated(&recording.identity.board)),
         notes,
         flat_field,
     };

@@ -2,18 +2,18 @@
 
 use super::Usage;
 use super::report::words;
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, FromArgMatches};
-use nirspi::files::npy::read_stack;
 use nirspi::imaging::MethodReport;
+use nirspi::reconstruct::{Recipe, Solver, own_atoms, read_atoms};
+use nirspi::source::FirstPatterns;
 use nirspi_recon::omp::Backend;
 use nirspi_recon::reconstruct::{
-    self, Completion, Method, MethodSettings, OwnAtoms, Reconstruct, ReconstructError, Sparsity,
-    Strength,
+    self, Completion, Method, MethodSettings, Reconstruct, ReconstructError, Sparsity, Strength,
 };
-use nirspi_recon::{Basis, Image, Measurements};
-use std::path::{Path, PathBuf};
+use nirspi_recon::{Basis, Image, Measurements, Sampling};
+use std::path::PathBuf;
 
 /// How to make the image.
 #[derive(Debug, Clone, Args)]
@@ -135,6 +135,13 @@ impl MethodArgs {
         Ok(MethodSettings { dictionary, ..self.settings()? })
     }
 
+    /// The method, ready for measurements of any side.
+    pub fn solver(&self, first: FirstPatterns, sampling: Sampling) -> Result<Solver> {
+        let (method, settings, dictionary) =
+            (self.method, self.settings()?, self.dictionary.clone());
+        Ok(Solver::new(Recipe { method, settings, dictionary, first, sampling })?)
+    }
+
     /// The method, ready for images of this side.
     pub fn prepare(&self, side: usize) -> Result<Box<dyn Reconstruct>> {
         Ok(self.method.prepare(&self.settings_for(side)?)?)
@@ -147,20 +154,6 @@ impl MethodArgs {
             report: MethodReport { method: self.method, made: made.report },
         }
     }
-}
-
-fn own_atoms(path: &Path, values: Vec<f32>) -> OwnAtoms {
-    OwnAtoms { name: path.display().to_string(), values: values.into() }
-}
-
-/// A user's own images as atoms, which must have the measurements' side.
-pub fn read_atoms(path: &Path, side: usize) -> Result<Vec<f32>> {
-    let atoms = read_stack(path)?;
-    let shape = (atoms.height, atoms.width);
-    if shape != (side, side) {
-        bail!("{}: images of {shape:?}, expected {:?}", path.display(), (side, side));
-    }
-    Ok(atoms.values)
 }
 
 /// An image and its report.

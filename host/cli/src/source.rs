@@ -83,7 +83,8 @@ impl SourceArgs {
         })
     }
 
-    fn options(&self) -> Result<SourceOptions> {
+    /// How to read measurements.
+    pub fn options(&self) -> Result<SourceOptions> {
         let Self { index, part, keep_leak, no_flat_field, .. } = *self;
         Ok(SourceOptions { index, file: self.selection()?, part, keep_leak, no_flat_field })
     }

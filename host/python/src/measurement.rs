@@ -54,7 +54,7 @@ impl FlatField {
 /// Options that say what a file does not.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-struct Options {
+pub(crate) struct Options {
     index: Option<String>,
     shown: Option<String>,
     side: Option<u64>,
@@ -74,7 +74,7 @@ fn word<T: FromStr<Err = String>>(option: &str, text: &str) -> PyResult<T> {
 }
 
 impl Options {
-    fn checked(self) -> PyResult<SourceOptions> {
+    pub(crate) fn checked(self) -> PyResult<SourceOptions> {
         let file = Selection {
             index: None,
             form: self

@@ -8,16 +8,18 @@ use crate::errors::{refusal, refused};
 use crate::orders::named;
 use crate::work::{backend, long};
 use nirspi::imaging::MethodReport;
+use nirspi::reconstruct::Recipe;
 use nirspi::source::FirstPatterns;
 use nirspi_recon::reconstruct::{
     MatrixSettings, Method, MethodSettings, OwnAtoms, OwnMatrix, ReconstructError, Reconstruction,
     Setting, Sparsity, Strength,
 };
-use nirspi_recon::{Basis, Measurements, Rows, Sampling, Side};
+use nirspi_recon::{Basis, Measurements, Rows, Sampling, SamplingError, Side};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Word, name, description and settings of every method.
@@ -35,7 +37,7 @@ pub fn bases() -> Vec<String> {
 /// Options of a reconstruction.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-struct Options<'py> {
+pub(crate) struct Options<'py> {
     method: String,
     sampling: String,
     order: Option<String>,
@@ -53,15 +55,31 @@ struct Options<'py> {
 }
 
 impl Options<'_> {
+    /// These options, with atoms of a file.
+    pub(crate) fn recipe(&self, dictionary: Option<PathBuf>) -> PyResult<Recipe> {
+        if self.warm_start {
+            return Err(refused("warm_start belongs to the frames of one file, not to a table"));
+        }
+        let sampling = self.sampling.parse().map_err(|error| self.of_sampling(&error))?;
+        Ok(Recipe {
+            method: self.method()?,
+            settings: self.settings()?,
+            dictionary,
+            first: self.first()?,
+            sampling,
+        })
+    }
+
+    fn of_sampling(&self, error: &SamplingError) -> PyErr {
+        refused(format!("sampling is {}, {error}", self.sampling))
+    }
+
     fn method(&self) -> PyResult<Method> {
         self.method.parse().map_err(refusal)
     }
 
     fn sampling(&self) -> PyResult<f64> {
-        let share: Sampling = self
-            .sampling
-            .parse()
-            .map_err(|error| refused(format!("sampling is {}, {error}", self.sampling)))?;
+        let share: Sampling = self.sampling.parse().map_err(|error| self.of_sampling(&error))?;
         Ok(share.share())
     }
 

@@ -10,7 +10,7 @@ import pytest
 import nirspi
 
 # Modules that need a package which is not installed with nirspi.
-PEERS = {"nirspi._torch", "nirspi._deepinv", "nirspi._spyrit"}
+PEERS = {"nirspi._torch", "nirspi._deepinv", "nirspi._spyrit", "nirspi.ray"}
 MODULES = ["nirspi"] + [
     found.name
     for found in pkgutil.iter_modules(nirspi.__path__, "nirspi.")

@@ -3,13 +3,14 @@
 use super::{Observer, Progress};
 use crate::account::LossCounters;
 use crate::calibration::{CalibrationError, Settling};
+use crate::clock::Instant;
 use crate::integrate::Integrated;
 use crate::setup::MeasurementSetup;
 use nirspi_recon::Image;
 use nirspi_recon::reconstruct::{Method, MethodSettings, Reconstruct};
 use nirspi_wire::Frame;
 use std::ops::ControlFlow;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Time between two images.
 const PERIOD: Duration = Duration::from_millis(250);

@@ -214,7 +214,8 @@ pub fn export(
     {
         return Err(ExportError::Itself(out.to_owned()));
     }
-    let whole = Whole::read(input, options)?;
+    let source = SourceOptions { keep_leak: options.keep_leak, ..SourceOptions::default() };
+    let whole = Whole::read(input, &source)?;
     let mut images = 0;
     match format {
         Format::Npz => arrays::npz(&whole, out)?,
@@ -239,33 +240,31 @@ pub fn export(
 }
 
 /// A recording that was read once: the mean of its frames, and the numbers and times of the frames.
-struct Whole {
+pub(crate) struct Whole {
     path: PathBuf,
     keep_leak: bool,
     identity: CameraIdentity,
     setup: MeasurementSetup,
     /// The mean of all frames.
-    source: Source,
+    pub(crate) source: Source,
     sequence: Vec<i64>,
     device_time_us: Vec<i64>,
     time_ns: Vec<i64>,
 }
 
 /// One frame of a recording.
-struct OneFrame<'w> {
+pub(crate) struct OneFrame<'w> {
     /// Number of the frame in the recording.
-    index: usize,
+    pub(crate) index: usize,
     run: u16,
     sweeps: u32,
-    measurements: Measurements,
+    pub(crate) measurements: Measurements,
     /// The newest depth map, in mm.
     depth_mm: Option<&'w [u16]>,
 }
 
 impl Whole {
-    fn read(path: &Path, options: &ExportOptions) -> Result<Self, ExportError> {
-        let source_options =
-            SourceOptions { keep_leak: options.keep_leak, ..SourceOptions::default() };
+    pub(crate) fn read(path: &Path, options: &SourceOptions) -> Result<Self, ExportError> {
         let mut recording = Recording::open(path)?;
         let (mut sequence, mut device_time_us, mut time_ns) = (Vec::new(), Vec::new(), Vec::new());
         let tally = hear_recording(&mut recording, |heard, tally| {
@@ -280,7 +279,7 @@ impl Whole {
             return Err(source::no_frame(path, &tally).into());
         }
         let integrated = tally.integrated();
-        let source = source::of_frames(path, &source_options, &recording, integrated, &tally)?;
+        let source = source::of_frames(path, options, &recording, integrated, &tally)?;
         let Recording { identity, setup, .. } = recording;
         Ok(Self {
             path: path.to_owned(),
@@ -304,7 +303,7 @@ impl Whole {
     }
 
     /// Reads the frames one by one.
-    fn each(
+    pub(crate) fn each(
         &self,
         mut on: impl FnMut(&OneFrame<'_>) -> Result<(), ExportError>,
     ) -> Result<(), ExportError> {

@@ -16,6 +16,7 @@
 //! | `h_row` | `(M,)`: row of the natural-order Hadamard matrix of order n^2 that was shown k-th; negative or NaN: not read; or [`Selection::shown`] |
 //! | `y` | `(..., 2 M)` raw readings in time order +, -, +, -; other forms by [`Selection::form`]; NaN: not read |
 //! | `d` | `(..., M)` differential readings; NaN: not read |
+//! | `simulated` | optional: 1 if no real light was measured |
 //! | `recon` | optional `(n, n)`, or one for each measurement: someone's reconstruction, to compare with |
 //!
 //! `...` are any leading axes; the measurements in the leading axes are numbered in C order. Axes
@@ -93,6 +94,8 @@ pub struct MeasurementFile {
     pub not_read: Vec<usize>,
     /// The file's own reconstruction, if it holds one.
     pub reference: Option<Reference>,
+    /// Whether the file says that no real light was measured; `None` if it does not say.
+    pub simulated: Option<bool>,
     /// Oddities of the file that do not make it unusable, one line each.
     pub notes: Vec<String>,
 }

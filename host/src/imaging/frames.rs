@@ -72,11 +72,22 @@ pub fn enhance_frames(
     frames: &[(&Image, &Rows)],
     times: &mut StageTimes,
 ) -> Result<(Vec<f32>, Vec<FrameReport>), FramesError> {
+    enhance_frames_by(&Enhance::built_in(&Device::cpu())?, frames, times)
+}
+
+/// As [`enhance_frames`], by learned stages that the caller keeps.
+///
+/// # Errors
+/// As [`enhance_frames`].
+pub fn enhance_frames_by(
+    enhance: &Enhance,
+    frames: &[(&Image, &Rows)],
+    times: &mut StageTimes,
+) -> Result<(Vec<f32>, Vec<FrameReport>), FramesError> {
     if frames.is_empty() {
         return Err(FramesError::Empty);
     }
     let white = White::Brightest.median_level(frames.iter().map(|(image, _)| *image));
-    let enhance = Enhance::built_in(&Device::cpu())?;
     let (mut pixels, mut reports) = (Vec::new(), Vec::new());
     times.time("enhance", || -> Result<(), FramesError> {
         for (image, rows) in frames {

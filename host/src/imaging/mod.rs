@@ -22,7 +22,7 @@ mod white;
 #[cfg(feature = "enhance")]
 pub use enhance::{Enhance, EnhanceError, EnhancedImage, ImageContext, White};
 #[cfg(feature = "enhance")]
-pub use frames::{FrameReport, FramesError, enhance_frames};
+pub use frames::{FrameReport, FramesError, enhance_frames, enhance_frames_by};
 pub use method_report::MethodReport;
 pub use quality::{Fit, Fitted, Quality, compare};
 #[cfg(feature = "enhance")]

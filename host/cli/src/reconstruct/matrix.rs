@@ -2,12 +2,12 @@
 
 use super::{Args, print, spinning};
 use crate::Usage;
-use crate::method::read_atoms;
 use crate::report::{StageTimes, stages};
 use anyhow::{Context, Result, bail};
 use nirspi::files::measurement::{Plain, Selection, read_plain};
 use nirspi::files::npy;
 use nirspi::picture::{Pictures, Unit};
+use nirspi::reconstruct::{check_finite, not_read_words, read_atoms, write_image};
 use nirspi_recon::reconstruct::{MatrixSettings, Method, OwnMatrix, Setting};
 use nirspi_recon::words::count_of;
 use nirspi_recon::{Sampling, Side};
@@ -69,11 +69,11 @@ pub fn run(args: &Args, path: &Path) -> Result<ExitCode> {
     let own = times.time("rank", || OwnMatrix::new(side, &kept)).with_context(named)?;
     let solve = || spinning(|| own.reconstruct(&y[..used], &settings));
     let found = times.time("reconstruct", solve).with_context(named)?;
-    super::check_finite(&args.source.input, &found.image)?;
+    check_finite(&args.source.input, &found.image)?;
 
     let mut notes = Vec::new();
     if !not_read.is_empty() {
-        notes.push(super::not_read_words(&not_read));
+        notes.push(not_read_words(&not_read));
     }
     if own.rank() < used.min(side.area()) {
         let others = used - own.rank();
@@ -106,7 +106,7 @@ pub fn run(args: &Args, path: &Path) -> Result<ExitCode> {
         pictures: Pictures::of_image(&found.image, Unit::Readings, None),
         stage_ms: times,
     };
-    super::write(&args.out, &found.image, None, None, &report.pictures, &report)?;
+    write_image(&args.out, &found.image, None, None, &report.pictures, &report)?;
     args.report.print(&report, |report| say(args, report))
 }
 

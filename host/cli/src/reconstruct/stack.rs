@@ -10,6 +10,7 @@ use nirspi::files::npy;
 use nirspi::files::output::OutputDir;
 use nirspi::imaging::{FrameReport as Enhanced, MethodReport, enhance_frames};
 use nirspi::picture::{Pictures, Unit};
+use nirspi::reconstruct::{check_finite, not_read_words};
 use nirspi::source::FirstPatterns;
 use nirspi_recon::reconstruct::{Method, Reconstruction, Setting};
 use nirspi_recon::words::count_of;
@@ -81,14 +82,14 @@ pub fn run(args: &Args, first: &FirstPatterns) -> Result<ExitCode> {
         if let Some(other) = others.next() {
             image = Image::magnitude(&image, &other.image);
         }
-        super::check_finite(&args.source.input, &image)?;
+        check_finite(&args.source.input, &image)?;
         let image = source.flattened(image);
         let dropped = |d: &nirspi_recon::Dropout| {
             format!("drop-out: {} from y[{}] on", count_of(d.length, "reading"), d.start)
         };
         let mut notes: Vec<String> = source.dropouts.iter().map(dropped).collect();
         if !source.not_read.is_empty() {
-            notes.push(super::not_read_words(&source.not_read));
+            notes.push(not_read_words(&source.not_read));
         }
         notes.extend(source.notes);
         let used = used.rows().len();

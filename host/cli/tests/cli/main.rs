@@ -5,6 +5,7 @@
 
 #![allow(clippy::unwrap_used)] // helpers of tests are tests
 
+mod archive;
 mod arguments;
 mod bad_files;
 mod bench;

@@ -13,6 +13,7 @@ __all__ = [
     "FlatField",
     "Operator",
     "Run",
+    "Table",
     "_panic_for_tests",
     "bases",
     "camera_model",
@@ -52,6 +53,30 @@ def orders() -> list[tuple[str, str, str | None, bool]]: ...
 def methods() -> list[tuple[str, str, str]]: ...
 def bases() -> list[str]: ...
 def devices() -> list[tuple[str, str]]: ...
+
+@final
+class Table:
+    @staticmethod
+    def files(
+        folder: str,
+        names: list[str] | None,
+        source: dict[str, Any],
+        options: dict[str, Any],
+        dictionary: str | None,
+        enhance: str | None,
+    ) -> Table: ...
+    @staticmethod
+    def grid(
+        axes: dict[str, Any],
+        model: str | None,
+        model_text: str | None,
+        options: dict[str, Any],
+        dictionary: str | None,
+    ) -> Table: ...
+    def names(self) -> list[str]: ...
+    def settings(self) -> str: ...
+    def run(self, out: str, jobs: int | None, resume: bool, shard: str | None) -> tuple[str, str | None]: ...
+    def part(self, out: str, start: int, end: int) -> str: ...
 
 @final
 class Operator:

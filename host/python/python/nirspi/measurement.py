@@ -205,6 +205,36 @@ def _numbers(values: Any, name: str) -> np.ndarray:
     return np.ascontiguousarray(_arrays.real(array, name), np.float64)
 
 
+def source_options(
+    *,
+    index: int | str | None = None,
+    shown: str | None = None,
+    side: int | None = None,
+    field: str | None = None,
+    readings: str | None = None,
+    patterns_first: bool = False,
+    transpose: bool = False,
+    decimal_comma: bool = False,
+    part: str = "magnitude",
+    keep_leak: bool = False,
+    no_flat_field: bool = False,
+) -> dict[str, Any]:
+    """The options of :func:`load` as the compiled part takes them."""
+    return {
+        "index": None if index is None else str(index),
+        "shown": shown,
+        "side": None if side is None else _arrays.side(side),
+        "field": field,
+        "readings": readings,
+        "patterns_first": bool(patterns_first),
+        "transpose": bool(transpose),
+        "decimal_comma": bool(decimal_comma),
+        "part": part,
+        "keep_leak": bool(keep_leak),
+        "no_flat_field": bool(no_flat_field),
+    }
+
+
 def load(
     path: str | os.PathLike[str],
     *,
@@ -274,19 +304,19 @@ def load(
     """
     from .camera import Account
 
-    options = {
-        "index": None if index is None else str(index),
-        "shown": shown,
-        "side": None if side is None else _arrays.side(side),
-        "field": field,
-        "readings": readings,
-        "patterns_first": bool(patterns_first),
-        "transpose": bool(transpose),
-        "decimal_comma": bool(decimal_comma),
-        "part": part,
-        "keep_leak": bool(keep_leak),
-        "no_flat_field": bool(no_flat_field),
-    }
+    options = source_options(
+        index=index,
+        shown=shown,
+        side=side,
+        field=field,
+        readings=readings,
+        patterns_first=patterns_first,
+        transpose=transpose,
+        decimal_comma=decimal_comma,
+        part=part,
+        keep_leak=keep_leak,
+        no_flat_field=no_flat_field,
+    )
     found = _nirspi.load(os.fspath(path), options)
     first = found[0]
     n, rows = first["n"], first["rows"]

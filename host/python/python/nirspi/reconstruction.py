@@ -116,22 +116,21 @@ def reconstruct(
     >>> image.report["used"], round(float(ns.metrics.correlation(scene, image)), 2) > 0.95
     (102, True)
     """
-    options: dict[str, Any] = {
-        "method": str(method),
-        "sampling": _arrays.share(sampling),
-        "order": order,
-        "basis": basis,
-        "dictionary": None,
-        "sparsity": _arrays.count(sparsity, "sparsity"),
-        "residual": None if residual is None else float(residual),
-        "stop_at_noise": bool(stop_at_noise),
-        "strength": None if strength is None else float(strength),
-        "as_printed": bool(as_printed),
-        "non_negative": bool(non_negative),
-        "keep": keep,
-        "warm_start": bool(warm_start),
-        "device": str(device),
-    }
+    options = method_options(
+        method=method,
+        sampling=sampling,
+        order=order,
+        basis=basis,
+        sparsity=sparsity,
+        residual=residual,
+        stop_at_noise=stop_at_noise,
+        strength=strength,
+        as_printed=as_printed,
+        non_negative=non_negative,
+        keep=keep,
+        warm_start=warm_start,
+        device=device,
+    )
     if matrix is not None:
         return _by_matrix(measurement, matrix, n, dictionary, options)
     if not isinstance(measurement, Measurement):
@@ -160,6 +159,41 @@ def reconstruct(
         unit=measurement.unit,
         rows=rows[0] if len(rows) == 1 else rows,
     )
+
+
+def method_options(
+    *,
+    method: str = "tikhonov",
+    sampling: float | str = 1.0,
+    order: str | None = None,
+    basis: str | None = None,
+    sparsity: int | None = None,
+    residual: float | None = None,
+    stop_at_noise: bool = False,
+    strength: float | None = None,
+    as_printed: bool = False,
+    non_negative: bool = False,
+    keep: str | None = None,
+    warm_start: bool = False,
+    device: str = "auto",
+) -> dict[str, Any]:
+    """The options of :func:`reconstruct` as the compiled part takes them."""
+    return {
+        "method": str(method),
+        "sampling": _arrays.share(sampling),
+        "order": order,
+        "basis": basis,
+        "dictionary": None,
+        "sparsity": _arrays.count(sparsity, "sparsity"),
+        "residual": None if residual is None else float(residual),
+        "stop_at_noise": bool(stop_at_noise),
+        "strength": None if strength is None else float(strength),
+        "as_printed": bool(as_printed),
+        "non_negative": bool(non_negative),
+        "keep": keep,
+        "warm_start": bool(warm_start),
+        "device": str(device),
+    }
 
 
 def _run(

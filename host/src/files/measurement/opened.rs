@@ -17,6 +17,7 @@ pub(super) struct Opened {
     form: Form,
     pub(super) readings: NamedReadings,
     reference: Option<(Field, usize)>,
+    simulated: Option<bool>,
     notes: Vec<String>,
 }
 
@@ -75,7 +76,8 @@ impl Opened {
                 notes.push(format!("not compared with the reconstruction in the file: {error}"));
                 None
             });
-        Ok(Self { fields, side, rows, form, readings, reference, notes })
+        let simulated = read_simulated(&mut fields);
+        Ok(Self { fields, side, rows, form, readings, reference, simulated, notes })
     }
 
     /// Reads the measurement of this index, without the patterns that were not read.
@@ -133,7 +135,22 @@ impl Opened {
             places,
             not_read,
             reference,
+            simulated: self.simulated,
             notes: self.notes.clone(),
         })
     }
+}
+
+/// Whether the file says that no real light was measured. A field of another kind says nothing.
+fn read_simulated(fields: &mut Fields) -> Option<bool> {
+    const FIELD: &str = "simulated";
+    if fields.is_unnamed() || !fields.holds(FIELD) {
+        return None;
+    }
+    let one = |shape: &[u64]| match shape.iter().all(|&axis| axis == 1) {
+        true => Ok(()),
+        false => Err("one number".to_owned()),
+    };
+    let field = fields.read(FIELD, one).ok()?;
+    field.real.first().map(|&value| value != 0.0)
 }

@@ -8,7 +8,7 @@ use super::thrift::{Struct, varint};
 
 /// The type of a column's values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(crate) enum Kind {
     Bool,
     I32,
     I64,
@@ -49,13 +49,15 @@ impl Kind {
 
 /// A column, as the file's schema names it.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Field {
-    pub(super) name: &'static str,
+pub(crate) struct Field {
+    name: &'static str,
     pub(super) kind: Kind,
     /// Whether a row may have no value.
-    pub(super) optional: bool,
+    optional: bool,
     /// Whether a row has a list of values.
-    pub(super) list: bool,
+    list: bool,
+    /// Whether the values are not worth compressing.
+    pub(super) noise: bool,
 }
 
 const REQUIRED: i32 = 0;
@@ -63,6 +65,26 @@ const OPTIONAL: i32 = 1;
 const REPEATED: i32 = 2;
 
 impl Field {
+    /// A column with one value a row.
+    pub(crate) const fn one(name: &'static str, kind: Kind) -> Self {
+        Self { name, kind, optional: false, list: false, noise: false }
+    }
+
+    /// A column with a list of values a row.
+    pub(crate) const fn list(name: &'static str, kind: Kind) -> Self {
+        Self { list: true, ..Self::one(name, kind) }
+    }
+
+    /// The same column, where a row may have no value.
+    pub(crate) const fn maybe(self) -> Self {
+        Self { optional: true, ..self }
+    }
+
+    /// The same column, whose values are not worth compressing.
+    pub(crate) const fn noise(self) -> Self {
+        Self { noise: true, ..self }
+    }
+
     /// The elements of the schema for this column.
     pub(super) fn schema(&self) -> Vec<Struct> {
         let repetition = if self.optional { OPTIONAL } else { REQUIRED };
@@ -129,7 +151,7 @@ impl Levels {
 
 /// The values of a column in a group of rows.
 #[derive(Debug)]
-pub(super) struct Column {
+pub(crate) struct Column {
     pub(super) field: Field,
     values: Vec<u8>,
     /// Bits of `values` that are used, for truth values.
@@ -141,7 +163,7 @@ pub(super) struct Column {
 }
 
 impl Column {
-    pub(super) fn new(field: Field) -> Self {
+    pub(crate) fn new(field: Field) -> Self {
         let (repetition, definition) = (Levels::default(), Levels::default());
         Self { field, values: Vec::new(), bits: 0, repetition, definition, count: 0 }
     }
@@ -152,13 +174,21 @@ impl Column {
         self.count += 1;
     }
 
-    pub(super) fn absent(&mut self) {
+    /// Appends a value by `append`, or the absence of one.
+    pub(crate) fn maybe<T>(&mut self, value: Option<T>, append: impl FnOnce(&mut Self, T)) {
+        match value {
+            Some(value) => append(self, value),
+            None => self.absent(),
+        }
+    }
+
+    fn absent(&mut self) {
         self.repetition.push(1, 0);
         self.definition.push(1, 0);
         self.count += 1;
     }
 
-    pub(super) fn bool(&mut self, value: bool) {
+    pub(crate) fn bool(&mut self, value: bool) {
         self.value();
         if self.bits.is_multiple_of(8) {
             self.values.push(0);
@@ -169,29 +199,29 @@ impl Column {
         self.bits += 1;
     }
 
-    pub(super) fn i32(&mut self, value: i32) {
+    pub(crate) fn i32(&mut self, value: i32) {
         self.value();
         self.values.extend(value.to_le_bytes());
     }
 
-    pub(super) fn i64(&mut self, value: i64) {
+    pub(crate) fn i64(&mut self, value: i64) {
         self.value();
         self.values.extend(value.to_le_bytes());
     }
 
-    pub(super) fn text(&mut self, text: &str) {
+    pub(crate) fn text(&mut self, text: &str) {
         self.value();
         self.values.extend((text.len() as u32).to_le_bytes());
         self.values.extend_from_slice(text.as_bytes());
     }
 
-    pub(super) fn f64(&mut self, value: f64) {
+    pub(crate) fn f64(&mut self, value: f64) {
         self.value();
         self.values.extend(value.to_le_bytes());
     }
 
     /// Appends a list, whose values are little-endian.
-    pub(super) fn list<const N: usize>(&mut self, values: impl ExactSizeIterator<Item = [u8; N]>) {
+    pub(crate) fn list<const N: usize>(&mut self, values: impl ExactSizeIterator<Item = [u8; N]>) {
         let count = values.len() as u64;
         let most = self.field.most_definition();
         if count == 0 {
@@ -205,6 +235,11 @@ impl Column {
         self.definition.push(count, most);
         self.count += count;
         values.for_each(|value| self.values.extend(value));
+    }
+
+    /// Number of bytes of the values.
+    pub(crate) fn bytes(&self) -> usize {
+        self.values.len()
     }
 
     /// Number of values and absences.
@@ -232,7 +267,7 @@ mod tests {
 
     #[test]
     fn a_list_column_has_the_levels_of_the_specification() {
-        let field = Field { name: "d", kind: Kind::I32, optional: true, list: true };
+        let field = Field::list("d", Kind::I32).maybe();
         let mut column = Column::new(field);
         column.list([1i32, 2, 3].into_iter().map(i32::to_le_bytes));
         column.absent();

@@ -1,0 +1,12 @@
+//! Makes images of measurements as they were read: one image for a folder of results, or any
+//! number of images by one prepared method.
+
+#[cfg(all(feature = "enhance", feature = "pictures"))]
+mod one;
+mod solver;
+
+#[cfg(all(feature = "enhance", feature = "pictures"))]
+pub use one::{DropoutReport, OneError, OneImage, OneReport, one_image, write_image};
+pub use solver::{
+    Recipe, Solved, Solver, SolverError, check_finite, not_read_words, own_atoms, read_atoms,
+};

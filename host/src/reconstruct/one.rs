@@ -1,0 +1,215 @@
+//! One image, its pictures and its report, in a folder.
+
+use super::{Solved, Solver, SolverError, not_read_words};
+use crate::account::LossCounters;
+use crate::files::output::OutputDir;
+use crate::files::{FileError, npy};
+use crate::imaging::{FrameReport, FramesError, MethodReport, enhance_frames};
+use crate::picture::{Pictures, Unit};
+use crate::source::{Part, Source};
+use crate::stage_times::StageTimes;
+use nirspi_recon::words::count_of;
+use nirspi_recon::{Image, metrics};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// The reconstruction of one measurement.
+pub struct OneImage<'r> {
+    /// The file or recording of the measurement, for messages and the report.
+    pub input: &'r Path,
+    /// The method.
+    pub solver: &'r Solver,
+    /// Whether networks also enlarge and deblur the image.
+    pub enhance: bool,
+    /// Folder for the results.
+    pub out: &'r Path,
+}
+
+/// Readings that were lost.
+#[derive(Debug, Serialize)]
+pub struct DropoutReport {
+    /// The first lost reading.
+    pub first_reading: usize,
+    /// Number of lost readings.
+    pub readings: usize,
+    /// The rows that they affect.
+    pub rows: Vec<u32>,
+}
+
+/// The report of one image.
+#[derive(Debug, Serialize)]
+pub struct OneReport {
+    /// The file or recording.
+    pub input: PathBuf,
+    /// Side of the image.
+    pub n: usize,
+    /// Number of measurements.
+    pub measurements: usize,
+    /// Number of measurements used.
+    pub used: usize,
+    /// Share of all n x n patterns used.
+    pub sampling: f64,
+    /// The name of the order that chose them.
+    pub order: String,
+    /// The method.
+    #[serde(flatten)]
+    pub method: MethodReport,
+    /// Readings that were lost.
+    pub dropouts: Vec<DropoutReport>,
+    /// Positions in the order shown of patterns that the file marks as not read.
+    pub not_read: Vec<usize>,
+    /// The part of complex readings in image.npy.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub part: Option<&'static str>,
+    /// The account of a recording's frames.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub frames: Option<LossCounters>,
+    /// How alike the image is to the file's own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub correlation_with_files_recon: Option<f64>,
+    /// What the networks report.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub enhancement: Option<FrameReport>,
+    /// Notes for the user.
+    pub notes: Vec<String>,
+    /// What is black and white in the pictures.
+    pub pictures: Pictures,
+    /// The time of each stage.
+    pub stage_ms: StageTimes,
+}
+
+impl OneReport {
+    /// The report in words, a line each: measurements, losses, method, enhancement and its warnings.
+    #[must_use]
+    pub fn words(&self) -> Vec<String> {
+        let Self { input, n, used, .. } = self;
+        let percent = self.sampling * 100.0;
+        let mut lines = vec![format!(
+            "{}: {n} x {n}, {used} of {} measurements ({percent:.1} %), order {}",
+            input.display(),
+            n * n,
+            self.order
+        )];
+        lines.extend(self.dropouts.iter().map(|dropout| {
+            format!(
+                "drop-out: {} from y[{}] on, {} left out",
+                count_of(dropout.readings, "reading"),
+                dropout.first_reading,
+                count_of(dropout.rows.len(), "pattern")
+            )
+        }));
+        lines.extend((!self.not_read.is_empty()).then(|| not_read_words(&self.not_read)));
+        lines.extend(self.frames.map(|frames| format!("frames: {frames}")));
+        lines.push(self.method.to_string());
+        lines.extend(self.correlation_with_files_recon.map(|correlation| {
+            format!("correlation with the file's own reconstruction: {correlation:.6}")
+        }));
+        if let Some(enhancement) = &self.enhancement {
+            lines.push(enhancement.line());
+            lines.extend(enhancement.warnings.iter().map(|warning| format!("warning: {warning}")));
+        }
+        lines
+    }
+}
+
+/// Why there is no image.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum OneError {
+    /// The measurement gives no image.
+    #[error(transparent)]
+    Solver(#[from] SolverError),
+    /// Networks take real images only.
+    #[error("--enhance needs a real image: choose --part real or --part imaginary")]
+    Complex,
+    /// The networks failed.
+    #[error("--enhance")]
+    Enhance(#[from] FramesError),
+    /// A result cannot be written.
+    #[error(transparent)]
+    File(#[from] FileError),
+}
+
+/// Reconstructs one image and writes it with its pictures and its report.
+///
+/// # Errors
+/// [`OneError`] names the file and the problem. Nothing is left behind.
+pub fn one_image(
+    request: &OneImage<'_>,
+    source: Source,
+    mut times: StageTimes,
+) -> Result<OneReport, OneError> {
+    if request.enhance && source.imaginary.is_some() {
+        return Err(OneError::Complex);
+    }
+    let solved = times.time("reconstruct", || request.solver.solve(request.input, &source))?;
+    let Solved { image, parts, used, order, report: method } = solved;
+    let side = image.side().pixels();
+    let correlation = source.reference.as_ref().and_then(|reference| {
+        metrics::correlation(reference.pixels(), image.pixels(), side, side).ok()
+    });
+    let (sharp, enhancement) = if request.enhance {
+        let (sharp, mut reports) = enhance_frames(&[(&image, used.rows())], &mut times)?;
+        (Some(sharp), reports.pop())
+    } else {
+        (None, None)
+    };
+    let unit = Unit::of_readings(source.frames.is_some());
+    let short = enhancement.as_ref().map(|enhancement| enhancement.short.clone());
+    let dropouts = source.dropouts.into_iter().map(|d| DropoutReport {
+        first_reading: d.start,
+        readings: d.length,
+        rows: d.rows,
+    });
+    let report = OneReport {
+        pictures: Pictures::of_image(&image, unit, sharp.as_deref().zip(short)),
+        input: request.input.to_owned(),
+        n: side,
+        measurements: source.measurements.rows().len(),
+        used: used.rows().len(),
+        sampling: used.rows().len() as f64 / image.side().area() as f64,
+        order,
+        method,
+        dropouts: dropouts.collect(),
+        not_read: source.not_read,
+        part: parts.as_ref().map(|_| Part::Magnitude.name()),
+        frames: source.frames,
+        correlation_with_files_recon: correlation,
+        enhancement,
+        notes: source.notes,
+        stage_ms: times,
+    };
+    write_image(request.out, &image, parts.as_ref(), sharp.as_deref(), &report.pictures, &report)?;
+    Ok(report)
+}
+
+/// Writes an image, the real and imaginary part of a complex image, the enhanced image, if there is
+/// one, the pictures, and the report.
+///
+/// # Errors
+/// [`FileError`] names the file. Nothing is left behind.
+pub fn write_image(
+    out: &Path,
+    image: &Image,
+    parts: Option<&[Image; 2]>,
+    sharp: Option<&[f32]>,
+    pictures: &Pictures,
+    report: &impl Serialize,
+) -> Result<(), FileError> {
+    let side = image.side().pixels();
+    let mut out = OutputDir::create(out)?;
+    out.write("image.npy", &npy::encode(&[side, side], image.pixels()))?;
+    for (name, part) in ["real.npy", "imaginary.npy"].iter().zip(parts.into_iter().flatten()) {
+        out.write(name, &npy::encode(&[side, side], part.pixels()))?;
+    }
+    if let Some(sharp) = sharp {
+        let side = nirspi_nets::deblur::SIDE;
+        out.write("enhanced.npy", &npy::encode(&[side, side], sharp))?;
+    }
+    pictures.write(&mut out)?;
+    let text = serde_json::to_string_pretty(report).unwrap_or_default();
+    out.write("report.json", format!("{text}\n").as_bytes())?;
+    out.commit()?;
+    Ok(())
+}

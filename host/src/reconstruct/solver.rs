@@ -1,0 +1,226 @@
+//! A method of reconstruction with its settings, prepared once for each side of images.
+
+use crate::files::{FileError, npy};
+use crate::imaging::MethodReport;
+use crate::source::{FirstPatterns, Source};
+use nirspi_recon::reconstruct::{
+    Method, MethodSettings, OwnAtoms, Reconstruct, ReconstructError, Reconstruction,
+};
+use nirspi_recon::words::count_of;
+use nirspi_recon::{Image, MeasurementError, Measurements, Sampling};
+use serde_json::{Map, Value};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+use thiserror::Error;
+
+/// How to make images of measurements.
+#[derive(Debug, Clone)]
+pub struct Recipe {
+    /// The method.
+    pub method: Method,
+    /// Its settings, without a user's own atoms.
+    pub settings: MethodSettings,
+    /// A file of a user's own atoms: images of the measurements' side.
+    pub dictionary: Option<PathBuf>,
+    /// Which patterns a share uses.
+    pub first: FirstPatterns,
+    /// Share of the patterns to use.
+    pub sampling: Sampling,
+}
+
+/// A recipe, ready for measurements of any side.
+pub struct Solver {
+    recipe: Recipe,
+    prepared: Mutex<BTreeMap<usize, Arc<dyn Reconstruct>>>,
+}
+
+/// The image of one measurement.
+#[derive(Debug)]
+pub struct Solved {
+    /// The image in the readings' units, corrected by the flat field; of complex readings, the
+    /// magnitude.
+    pub image: Image,
+    /// Of complex readings, the images of the real and of the imaginary part.
+    pub parts: Option<[Image; 2]>,
+    /// The measurements that were used.
+    pub used: Measurements,
+    /// The name of the order that chose them.
+    pub order: String,
+    /// The method's report.
+    pub report: MethodReport,
+}
+
+/// Why measurements give no image.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum SolverError {
+    /// The share of the patterns cannot be taken of these measurements.
+    #[error("{}", .path.display())]
+    Measurements {
+        /// The file.
+        path: PathBuf,
+        /// The problem.
+        #[source]
+        problem: MeasurementError,
+    },
+    /// The method gives no image.
+    #[error(transparent)]
+    Method(#[from] ReconstructError),
+    /// The method gives no image with the user's own atoms.
+    #[error("{}", .path.display())]
+    WithAtoms {
+        /// The file of the atoms.
+        path: PathBuf,
+        /// The problem.
+        #[source]
+        problem: ReconstructError,
+    },
+    /// The file of the user's own atoms cannot be read.
+    #[error(transparent)]
+    Atoms(#[from] FileError),
+    /// The atoms have another side than the measurements.
+    #[error("{}: images of {found:?}, expected {:?}", .path.display(), (side, side))]
+    AtomsSide {
+        /// The file of the atoms.
+        path: PathBuf,
+        /// Height and width of the atoms.
+        found: (usize, usize),
+        /// Side of the measurements.
+        side: usize,
+    },
+    /// A pixel is infinite.
+    #[error("{}: the readings are too large for an image of 32-bit floats", .0.display())]
+    TooLarge(PathBuf),
+}
+
+impl Solver {
+    /// Checks the recipe. Files are read when they are needed.
+    ///
+    /// # Errors
+    /// [`SolverError::Method`] if a setting is out of range or belongs to another method.
+    pub fn new(recipe: Recipe) -> Result<Self, SolverError> {
+        let mut settings = recipe.settings.clone();
+        let atoms = |path: &PathBuf| own_atoms(path, Vec::new());
+        settings.dictionary = recipe.dictionary.as_ref().map(atoms);
+        settings.check(recipe.method)?;
+        Ok(Self { recipe, prepared: Mutex::default() })
+    }
+
+    /// The recipe.
+    #[must_use]
+    pub fn recipe(&self) -> &Recipe {
+        &self.recipe
+    }
+
+    /// What images depend on beside the measurements, in words.
+    #[must_use]
+    pub fn settings(&self) -> Map<String, Value> {
+        let Recipe { method, settings, dictionary, first, sampling } = &self.recipe;
+        // The network belongs to the version of the program.
+        let settings = MethodSettings { network: None, ..settings.clone() };
+        let words = [
+            ("method", method.argument().to_owned()),
+            ("sampling", sampling.to_string()),
+            ("first patterns", format!("{first:?}")),
+            ("settings", format!("{settings:?}")),
+            ("dictionary", format!("{dictionary:?}")),
+        ];
+        words.into_iter().map(|(key, value)| (key.to_owned(), value.into())).collect()
+    }
+
+    /// The method for images of this side, prepared once.
+    ///
+    /// # Errors
+    /// [`SolverError`] if the atoms cannot be read or do not fit.
+    pub fn prepared(&self, side: usize) -> Result<Arc<dyn Reconstruct>, SolverError> {
+        let mut prepared = self.prepared.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(ready) = prepared.get(&side) {
+            return Ok(Arc::clone(ready));
+        }
+        let Recipe { method, settings, dictionary, .. } = &self.recipe;
+        let mut settings = settings.clone();
+        if let Some(path) = dictionary {
+            settings.dictionary = Some(own_atoms(path, read_atoms(path, side)?));
+        }
+        let ready: Arc<dyn Reconstruct> = Arc::from(method.prepare(&settings)?);
+        prepared.insert(side, Arc::clone(&ready));
+        Ok(ready)
+    }
+
+    fn solve_one(&self, measurements: &Measurements) -> Result<Reconstruction, SolverError> {
+        let made = self.prepared(measurements.side().pixels())?.reconstruct(measurements);
+        match &self.recipe.dictionary {
+            Some(path) => {
+                made.map_err(|problem| SolverError::WithAtoms { path: path.clone(), problem })
+            }
+            None => Ok(made?),
+        }
+    }
+
+    /// The image of measurements that were read from `path`.
+    ///
+    /// # Errors
+    /// [`SolverError`] names the file and the problem.
+    pub fn solve(&self, path: &Path, source: &Source) -> Result<Solved, SolverError> {
+        let Recipe { method, first, sampling, .. } = &self.recipe;
+        let take = |measurements| {
+            first
+                .take(measurements, sampling.share())
+                .map_err(|problem| SolverError::Measurements { path: path.to_owned(), problem })
+        };
+        let (used, order) = take(&source.measurements)?;
+        let Reconstruction { image, report: made } = self.solve_one(&used)?;
+        let parts = match &source.imaginary {
+            None => None,
+            Some(imaginary) => Some([image.clone(), self.solve_one(&take(imaginary)?.0)?.image]),
+        };
+        let image = match &parts {
+            None => image,
+            Some([real, imaginary]) => Image::magnitude(real, imaginary),
+        };
+        check_finite(path, &image)?;
+        let image = source.flattened(image);
+        Ok(Solved { image, parts, used, order, report: MethodReport { method: *method, made } })
+    }
+}
+
+/// Refuses an image with a pixel that is not finite.
+///
+/// # Errors
+/// [`SolverError::TooLarge`], which names the file.
+pub fn check_finite(path: &Path, image: &Image) -> Result<(), SolverError> {
+    match image.pixels().iter().all(|pixel| pixel.is_finite()) {
+        true => Ok(()),
+        false => Err(SolverError::TooLarge(path.to_owned())),
+    }
+}
+
+/// A user's own images as atoms, named by their file.
+#[must_use]
+pub fn own_atoms(path: &Path, values: Vec<f32>) -> OwnAtoms {
+    OwnAtoms { name: path.display().to_string(), values: values.into() }
+}
+
+/// A user's own images as atoms, which must have the measurements' side.
+///
+/// # Errors
+/// [`SolverError`] if the file cannot be read, or its images have another side.
+pub fn read_atoms(path: &Path, side: usize) -> Result<Vec<f32>, SolverError> {
+    let atoms = npy::read_stack(path)?;
+    let found = (atoms.height, atoms.width);
+    match found == (side, side) {
+        true => Ok(atoms.values),
+        false => Err(SolverError::AtomsSide { path: path.to_owned(), found, side }),
+    }
+}
+
+/// The number of patterns that were not read, and the first of them, in words.
+#[must_use]
+pub fn not_read_words(places: &[usize]) -> String {
+    const SHOWN: usize = 5;
+    let first: Vec<String> = places.iter().take(SHOWN).map(usize::to_string).collect();
+    let more = if places.len() > SHOWN { ", ..." } else { "" };
+    let patterns = count_of(places.len(), "pattern");
+    format!("not read: {patterns} left out, at [{}{more}] of those shown", first.join(", "))
+}
