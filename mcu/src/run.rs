@@ -52,16 +52,29 @@ impl Counters {
         }
         let lost = fpga::read(bus, Register::FramesLost).map_err(|_| fpga::SILENT)?;
         self.advance(made, lost);
+        self.reconcile();
         Ok(())
     }
 
-    /// Counts a frame that was ready and could not be read. The frame was made, but its number is
-    /// unknown.
-    fn count_corrupt(&mut self) {
-        if self.missing() == 0 {
-            self.made = self.made.wrapping_add(1);
+    /// Counts a frame that was ready and could not be read, whose number is unknown. `false`: every
+    /// frame that the FPGA has made is counted already, so the bus has lost the release of this frame; or the
+    /// FPGA does not answer, and the end of the run will count what is missing.
+    fn count_corrupt(&mut self, bus: &mut impl FpgaBus) -> bool {
+        let is_new = self.read(bus).is_ok() && self.missing() > 0;
+        self.corrupt = self.corrupt.wrapping_add(is_new.into());
+        is_new
+    }
+
+    /// Takes back what was counted as damaged and is counted elsewhere too. A frame that could not be
+    /// read has no number, so a frame whose release the bus has lost is counted twice until its number, or the
+    /// FPGA's own count, is known.
+    fn reconcile(&mut self) {
+        let Self { made, sent, dropped, lost, corrupt, .. } = *self;
+        let found = [dropped, lost, corrupt].into_iter().fold(sent, u32::wrapping_add);
+        let twice = found.wrapping_sub(made);
+        if twice < 1 << 31 {
+            self.corrupt = corrupt.saturating_sub(twice);
         }
-        self.corrupt = self.corrupt.wrapping_add(1);
     }
 
     /// Counters of the next run.
@@ -93,6 +106,7 @@ impl Counters {
 }
 
 #[derive(Debug)]
+#[cfg_attr(test, derive(Clone))]
 pub(crate) struct Run {
     length: RunLength,
     patterns: u16,
@@ -105,6 +119,7 @@ pub(crate) struct Run {
 
 /// State of a run whose LEDs are off and whose frames may still be in transfer.
 #[derive(Debug)]
+#[cfg_attr(test, derive(Clone))]
 struct Ending {
     since: Micros,
     /// Reply that waits for the end of the run.
@@ -202,6 +217,24 @@ impl Run {
         Ok(run)
     }
 
+    /// What the rest of the run depends on, with ages for times.
+    #[cfg(test)]
+    pub fn key(&self, age: impl Fn(Micros) -> u64) -> [u64; 6] {
+        let ending = self.ending.as_ref();
+        let length = match self.length {
+            RunLength::Continuous => 0,
+            RunLength::Frames(frames) => u64::from(frames),
+        };
+        [
+            length,
+            self.patterns.into(),
+            age(self.last_frame),
+            self.last_sequence.map_or(0, |last| u64::from(last) + 1),
+            ending.map_or(u64::MAX, |ending| age(ending.since)),
+            ending.and_then(|ending| ending.reply).map_or(0, |(id, _)| u64::from(id) + 1),
+        ]
+    }
+
     /// Whether the LEDs are on.
     pub fn is_lit(&self) -> bool {
         self.ending.is_none()
@@ -253,15 +286,17 @@ impl Run {
         // The FPGA needs its buffer back before the next frame is complete, so the release comes
         // before the link.
         *release_pending = fpga::release(bus).is_err();
-        self.last_frame = now;
         let Some((header, samples)) = taken else {
-            counters.count_corrupt();
+            if counters.count_corrupt(bus) {
+                self.last_frame = now;
+            }
             return true;
         };
         if self.last_sequence.replace(header.sequence) == Some(header.sequence) {
-            // The bus lost the release of this frame.
+            // The bus lost the release of this frame. A frame that comes again is no progress.
             return true;
         }
+        self.last_frame = now;
         counters.advance(header.sequence.wrapping_add(1), header.lost);
         let payload = samples.len().saturating_mul(4).saturating_add(STREAM_HEADER_BYTES);
         let frame = DeviceMessage::Frame(Frame {
@@ -278,6 +313,7 @@ impl Run {
             &mut counters.dropped
         };
         *count = count.wrapping_add(1);
+        counters.reconcile();
         true
     }
 
