@@ -25,6 +25,8 @@ pub(super) const NUMBERS: &str = "real numbers of up to 8 bytes";
 /// The largest field read into memory. A 256 x 256 sweep of raw pairs in float64 is 1 MiB; the
 /// limit is 256 times as much.
 const MAX_FIELD_BYTES: u64 = 256 << 20;
+/// The most memory that the numbers of a field may take: 512 sweeps of 256 x 256 pairs in float64.
+const MAX_MEMORY_BYTES: u64 = 512 << 20;
 
 /// An open archive.
 pub(super) struct Archive {
@@ -75,6 +77,33 @@ pub(super) fn read_text(path: &Path, expected: &'static str) -> Result<String, F
 pub(super) fn read_large_text(path: &Path, expected: &'static str) -> Result<String, FileError> {
     let bytes = read_bytes(path, expected, MAX_LARGE_TEXT_MIB)?;
     Ok(String::from_utf8_lossy(&bytes).into_owned())
+}
+
+/// The largest file that [`read_small`] reads. The bitstream of the largest ECP5 has 2 MB.
+const MAX_SMALL_BYTES: u64 = 32 << 20;
+
+/// The bytes of a file of at most 32 MiB: descriptions, calibrations, bitstreams. A pipe is refused,
+/// because opening a pipe waits for a writer, and so is a device, which may never end.
+///
+/// # Errors
+/// The system's error; [`ErrorKind::InvalidInput`](std::io::ErrorKind::InvalidInput) for anything
+/// but a file of that size.
+pub fn read_small(path: &Path) -> std::io::Result<Vec<u8>> {
+    use std::io::{Error, ErrorKind};
+    let metadata = std::fs::metadata(path)?;
+    if metadata.is_dir() {
+        return Err(ErrorKind::IsADirectory.into());
+    }
+    if !metadata.is_file() {
+        return Err(Error::new(ErrorKind::InvalidInput, "a device or pipe, expected a file"));
+    }
+    let mut bytes = Vec::new();
+    File::open(path)?.take(MAX_SMALL_BYTES + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > MAX_SMALL_BYTES {
+        let reason = format!("more than {} MiB", MAX_SMALL_BYTES >> 20);
+        return Err(Error::new(ErrorKind::InvalidInput, reason));
+    }
+    Ok(bytes)
 }
 
 fn read_bytes(path: &Path, expected: &'static str, most_mib: u64) -> Result<Vec<u8>, FileError> {
@@ -156,8 +185,11 @@ impl Archive {
         field: &str,
         accept: impl FnOnce(&[u64]) -> Result<(), String>,
     ) -> Result<Numbers<T>, FileError> {
-        let (shape, values) =
-            self.member(field, accept, |header, member| header.read_data(member, MAX_FIELD_BYTES))?;
+        let (shape, values) = self.member(field, accept, |header, member| {
+            header.data_bytes(MAX_FIELD_BYTES)?;
+            header.fits::<T>(MAX_MEMORY_BYTES)?;
+            header.read_data(member, MAX_FIELD_BYTES)
+        })?;
         Ok(Numbers { shape, values })
     }
 
@@ -167,8 +199,11 @@ impl Archive {
         field: &str,
         accept: impl FnOnce(&[u64]) -> Result<(), String>,
     ) -> Result<Field, FileError> {
-        let (shape, (real, imaginary)) = self
-            .member(field, accept, |header, member| header.read_parts(member, MAX_FIELD_BYTES))?;
+        let (shape, (real, imaginary)) = self.member(field, accept, |header, member| {
+            header.data_bytes(MAX_FIELD_BYTES)?;
+            header.fits::<f64>(MAX_MEMORY_BYTES)?;
+            header.read_parts(member, MAX_FIELD_BYTES)
+        })?;
         Ok(Field { shape, real, imaginary })
     }
 

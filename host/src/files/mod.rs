@@ -12,6 +12,7 @@
 pub mod characters;
 #[cfg(feature = "pictures")]
 pub mod image;
+pub mod interrupt;
 pub mod measurement;
 pub mod npy;
 pub mod order_table;
@@ -35,4 +36,5 @@ mod text;
 
 #[cfg(feature = "training")]
 pub(crate) use archive::encode as encode_archive;
+pub use archive::read_small;
 pub use error::FileError;

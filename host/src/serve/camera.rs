@@ -79,6 +79,8 @@ enum End {
     Gone(String),
     /// The camera switched its LEDs off.
     Fault(Fault),
+    /// The camera has come back and must stay dark until a person agrees, for this reason in one line.
+    Dark(String),
     /// The camera's latency is not known, for this reason in one line.
     Uncalibrated(String),
     /// Another scene is wanted.
@@ -124,10 +126,10 @@ pub fn run(
                 }
             },
         };
-        let standing = if person_said { None } else { standing_fault(&mut connected.session) };
+        let dark = if person_said { None } else { why_dark(&mut connected.session) };
         person_said = false;
-        let end = match standing {
-            Some(fault) => End::Fault(fault),
+        let end = match dark {
+            Some(why) => End::Dark(why),
             None => live.session(&mut connected)?,
         };
         // The old link is closed before reconnecting.
@@ -140,8 +142,12 @@ pub fn run(
             End::Scene => person_said = true,
             End::Gone(why) => gone(shared, &why),
             End::Fault(fault) => {
-                let line = format!("the camera switched its LEDs off: {fault}");
-                await_person(shared, Phase::Fault, line);
+                await_person(shared, Phase::Fault, switched_off(fault));
+                person_said = true;
+            }
+            End::Dark(why) => {
+                lock(&shared.camera).event(why.clone());
+                await_person(shared, Phase::Fault, why);
                 person_said = true;
             }
             End::Uncalibrated(why) => {
@@ -175,12 +181,18 @@ fn reconnect(shared: &Shared, connect: &mut Connect) -> Result<Connected, Option
     }
 }
 
-/// The fault still latched after reconnecting. `HostSilent` does not count: reconnecting clears its
-/// cause.
-fn standing_fault(session: &mut Session) -> Option<Fault> {
+/// Why a camera that has come back stays dark until a person agrees: a fault that is still latched, whatever
+/// its kind, or a crash of the firmware since the last session.
+fn why_dark(session: &mut Session) -> Option<String> {
     // A camera that does not answer will not measure either; the measurement then reports the
     // reason.
-    session.status(&mut IgnorePackets).ok()?.fault.filter(|fault| *fault != Fault::HostSilent)
+    let crash = session.await_reports().ok()?.iter().find(|told| events::is_crash(told)).cloned();
+    let fault = session.status(&mut IgnorePackets).ok()?.fault;
+    fault.map(switched_off).or(crash)
+}
+
+fn switched_off(fault: Fault) -> String {
+    format!("the camera switched its LEDs off: {fault}")
 }
 
 /// Reports that the link is gone, and waits before reconnecting.
