@@ -10,7 +10,9 @@ use crate::files::measurement::{self, MeasurementFile, Readings, Reference, Sele
 use crate::integrate::{IntegrateError, Integrated};
 use crate::recording::{End, Recording, RecordingError};
 use crate::tally::{self, Misfit, Tally, tally_recording};
-use nirspi_recon::{Dropout, Image, MeasurementError, Measurements, Order, Rows, reconstruct};
+use nirspi_recon::{
+    Dropout, Image, MeasurementError, Measurements, Order, Rows, Side, reconstruct,
+};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -184,6 +186,16 @@ pub enum SourceError {
     /// The readings are complex, but real readings are needed.
     #[error("{}: complex readings, expected real ones here: choose a part with --part real or --part imaginary", .0.display())]
     Complex(PathBuf),
+    /// All measurements of a file are too many for the memory.
+    #[error("{}: {count} measurements, expected at most {most} of this size at a time: choose one with --index N, or export a recording with nirspi export", .path.display())]
+    TooMany {
+        /// The file.
+        path: PathBuf,
+        /// Number of measurements in the file.
+        count: usize,
+        /// The most that are reconstructed at a time.
+        most: u64,
+    },
     /// The choice is of several measurements, but one is needed.
     #[error("--index all, expected one measurement here")]
     One,
@@ -252,8 +264,9 @@ impl Source {
         if options.fits_recording(path)? {
             return frames_of_recording(path, options);
         }
-        let files = measurement::read_all(path, &options.file)?;
-        files.into_iter().map(|file| from_file(path, file, options.part)).collect()
+        let mut file = measurement::Several::open(path, &options.file)?;
+        fits_together(path, file.len(), file.patterns(), file.side())?;
+        (0..file.len()).map(|index| from_file(path, file.read(index)?, options.part)).collect()
     }
 
     /// The measurements, for uses that need real ones.
@@ -382,6 +395,25 @@ fn from_file(path: &Path, file: MeasurementFile, part: Part) -> Result<Source, S
     })
 }
 
+/// The most memory for the measurements and images of a whole file.
+const MOST_BYTES: u64 = 4 << 30;
+
+/// Checks that all measurements and their images fit into memory together: for each pattern a row and its
+/// reading, for each pixel the image as it is computed and as it is written.
+fn fits_together(
+    path: &Path,
+    count: usize,
+    patterns: usize,
+    side: Side,
+) -> Result<(), SourceError> {
+    let each = 512 + 24 * patterns as u64 + 12 * side.area() as u64;
+    let most = MOST_BYTES / each;
+    match count as u64 <= most {
+        true => Ok(()),
+        false => Err(SourceError::TooMany { path: path.to_owned(), count, most }),
+    }
+}
+
 /// The part of a complex reference to compare with; for real readings, the real part.
 fn imaginary_of(part: Part, complex: bool) -> Part {
     if complex { part } else { Part::Real }
@@ -439,7 +471,9 @@ pub(crate) fn no_frame(path: &Path, tally: &Tally) -> SourceError {
 
 fn frames_of_recording(path: &Path, options: &SourceOptions) -> Result<Vec<Source>, SourceError> {
     let mut recording = Recording::open(path)?;
-    let (frames, tally) = tally::frames_of_recording(&mut recording)?;
+    let (rows, area) = (recording.setup.rows.len(), recording.setup.rows.side());
+    let fits = |count| fits_together(path, count, rows, area);
+    let (frames, tally) = tally::frames_of_recording(&mut recording, fits)?;
     if frames.is_empty() {
         return Err(no_frame(path, &tally));
     }
@@ -499,4 +533,28 @@ pub(crate) fn of_frames(
             source
         }
     })
+}
+
+#[cfg(all(test, feature = "training"))]
+mod tests {
+    use super::*;
+    use crate::files::{encode_archive, npy};
+
+    #[test]
+    fn more_measurements_than_the_memory_holds_are_refused_by_their_number() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("many.npz");
+        // One pattern of a 2 x 2 image, eight million times: 30 KB in the file.
+        let members = [
+            ("n", npy::encode(&[], &[2.0_f32])),
+            ("h_row", npy::encode(&[1], &[0.0_f32])),
+            ("d", npy::encode(&[8_000_000, 1], &vec![0.0_f32; 8_000_000])),
+        ];
+        std::fs::write(&path, encode_archive(&path, &members).unwrap()).unwrap();
+        let error = Source::read_all(&path, &SourceOptions::default()).unwrap_err().to_string();
+        assert!(error.contains("8000000 measurements, expected at most"), "{error}");
+        assert!(error.contains("--index N") && error.lines().count() == 1, "{error}");
+        let one = SourceOptions { index: Some(Index::One(7)), ..SourceOptions::default() };
+        assert!(Source::read(&path, &one).is_ok());
+    }
 }

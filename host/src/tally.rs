@@ -236,22 +236,25 @@ pub fn tally_recording(recording: &mut Recording) -> Result<Tally, RecordingErro
     hear_recording(recording, |_, _| Ok(()))
 }
 
-/// The sum of each frame of a recording that arrived in order, and the account of all frames.
+/// The sum of each frame of a recording that arrived in order, and the account of all frames. `fits` is
+/// asked for each number of frames before they are kept.
 ///
 /// # Errors
-/// [`RecordingError`] if the file cannot be read.
-pub fn frames_of_recording(
+/// [`RecordingError`] if the file cannot be read, and errors of `fits`.
+pub fn frames_of_recording<E: From<RecordingError>>(
     recording: &mut Recording,
-) -> Result<(Vec<Integrated>, Tally), RecordingError> {
+    fits: impl Fn(usize) -> Result<(), E>,
+) -> Result<(Vec<Integrated>, Tally), E> {
     let setup = recording.setup.clone();
     let mut frames = Vec::new();
     let tally = hear_recording(recording, |heard, _| {
         if let Some(frame) = heard.frame() {
+            fits(frames.len() + 1)?;
             let mut alone = Integrated::new(&setup);
             alone.add(frame);
             frames.push(alone);
         }
-        Ok::<(), RecordingError>(())
+        Ok::<(), E>(())
     })?;
     Ok((frames, tally))
 }

@@ -24,6 +24,7 @@ const BURST_PATIENCE: Micros = Micros(100_000);
 const PIECE_PATIENCE: Micros = Micros(500_000);
 
 #[derive(Debug)]
+#[cfg_attr(test, derive(Clone))]
 pub(crate) struct Burst {
     samples: u16,
     sent: u16,
@@ -76,6 +77,12 @@ impl Burst {
             .and_then(|()| fpga::start(bus, control::START_RAW))
             .map_err(Refusal::Fault)?;
         Ok(Self { samples, sent: 0, since: now, recorded: false })
+    }
+
+    /// What the rest of the burst depends on, with ages for times.
+    #[cfg(test)]
+    pub fn key(&self, age: impl Fn(Micros) -> u64) -> [u64; 4] {
+        [self.samples.into(), self.sent.into(), age(self.since), self.recorded.into()]
     }
 
     /// Sends at most one piece.

@@ -16,6 +16,7 @@ use nirspi_wire::{Deframed, Deframer, Depth, DeviceMessage, Request, State};
 /// The camera's firmware. One value is one camera; a value takes 8.4 KB at most and uses no other
 /// memory.
 #[derive(Debug)]
+#[cfg_attr(test, derive(Clone))]
 pub struct Camera {
     deframer: Deframer<MAX_HOST_PACKET>,
     machine: Machine,
@@ -125,5 +126,19 @@ impl Camera {
     #[must_use]
     pub fn state(&self) -> State {
         self.machine.state()
+    }
+
+    /// Whether the board's own LED-enable pin may be high: from a configuration until a fault, the
+    /// end of the session, or a stop that the FPGA has not confirmed. The board sets the pin after every
+    /// [`poll`](Self::poll) (`tests::model::every_reachable_state_keeps_the_laws_of_light`).
+    #[must_use]
+    pub fn may_light(&self) -> bool {
+        self.machine.may_light()
+    }
+
+    /// What the calls act on, for the exhaustive walk of `tests::model`.
+    #[cfg(test)]
+    pub(crate) const fn machine(&self) -> &Machine {
+        &self.machine
     }
 }

@@ -14,11 +14,20 @@ use nirspi_wire::{Crc32, GatewareChunk, Refusal};
 
 /// A bitstream whose first bytes have come.
 #[derive(Debug)]
+#[cfg_attr(test, derive(Clone))]
 pub(crate) struct Loading {
     total: u32,
     crc: u32,
     next_offset: u32,
     received: Crc32,
+}
+
+#[cfg(test)]
+impl Loading {
+    /// What the pieces that follow depend on.
+    pub const fn key(&self) -> (u32, u32, u32) {
+        (self.total, self.crc, self.next_offset)
+    }
 }
 
 /// Takes a piece and returns the offset of the next piece. A piece at offset 0 starts a new

@@ -35,6 +35,7 @@ pub(crate) enum Session {
 
 /// What occupies the FPGA.
 #[derive(Debug)]
+#[cfg_attr(test, derive(Clone))]
 pub(crate) enum Activity {
     Resting,
     Run(Run),
@@ -44,6 +45,7 @@ pub(crate) enum Activity {
 
 /// The whole camera except the bytes of a half-received command.
 #[derive(Debug)]
+#[cfg_attr(test, derive(Clone))]
 pub(crate) struct Machine {
     pub info: BoardInfo,
     pub limits: Limits,
@@ -102,6 +104,11 @@ impl Machine {
             (None, Activity::Resting, None) => State::Idle,
             (None, ..) => State::Running,
         }
+    }
+
+    /// Whether the board's LED-enable pin may be high.
+    pub fn may_light(&self) -> bool {
+        !self.off_pending && matches!(self.state(), State::Configured | State::Running)
     }
 
     /// The configuration for a start, if nothing forbids a start.

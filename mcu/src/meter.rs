@@ -65,6 +65,7 @@ enum Pair {
 }
 
 #[derive(Debug)]
+#[cfg_attr(test, derive(Clone))]
 pub(crate) struct Meter {
     exposure: Exposure,
     pair: Pair,

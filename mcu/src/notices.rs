@@ -57,6 +57,7 @@ const NOTICE_BYTES: usize = 16 + CRASH_TEXT_MAX;
 
 /// Replies and events in the order in which they came.
 #[derive(Debug, Default)]
+#[cfg_attr(test, derive(Clone))]
 pub(crate) struct Notices(Deque<Notice, CAPACITY>);
 
 impl Notices {
@@ -67,6 +68,11 @@ impl Notices {
 
     pub fn has_room_for_a_command(&self) -> bool {
         CAPACITY.saturating_sub(self.0.len()) >= NOTICES_OF_A_COMMAND
+    }
+
+    #[cfg(test)]
+    pub fn iter(&self) -> impl Iterator<Item = &Notice> {
+        self.0.iter()
     }
 
     pub fn is_empty(&self) -> bool {

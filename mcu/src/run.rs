@@ -56,16 +56,29 @@ impl Counters {
         }
         let lost = fpga::read(bus, Register::FramesLost).map_err(|_| fpga::SILENT)?;
         self.advance(made, lost);
+        self.reconcile();
         Ok(())
     }
 
-    /// Counts a frame that was ready and could not be read. The frame was made, but its number is
-    /// unknown.
-    fn count_corrupt(&mut self) {
-        if self.missing() == 0 {
-            self.made = self.made.wrapping_add(1);
+    /// Counts a frame that was ready and could not be read, whose number is unknown. `false`: every
+    /// frame that the FPGA has made is counted already, so the bus has lost the release of this frame; or the
+    /// FPGA does not answer, and the end of the run will count what is missing.
+    fn count_corrupt(&mut self, bus: &mut impl FpgaBus) -> bool {
+        let is_new = self.read(bus).is_ok() && self.missing() > 0;
+        self.corrupt = self.corrupt.wrapping_add(is_new.into());
+        is_new
+    }
+
+    /// Takes back what was counted as damaged and is counted elsewhere too. A frame that could not be
+    /// read has no number, so a frame whose release the bus has lost is counted twice until its number, or the
+    /// FPGA's own count, is known.
+    fn reconcile(&mut self) {
+        let Self { made, sent, dropped, lost, corrupt, .. } = *self;
+        let found = [dropped, lost, corrupt].into_iter().fold(sent, u32::wrapping_add);
+        let twice = found.wrapping_sub(made);
+        if twice < 1 << 31 {
+            self.corrupt = corrupt.saturating_sub(twice);
         }
-        self.corrupt = self.corrupt.wrapping_add(1);
     }
 
     /// Counters of the next run.
@@ -97,6 +110,7 @@ impl Counters {
 }
 
 #[derive(Debug)]
+#[cfg_attr(test, derive(Clone))]
 pub(crate) struct Run {
     length: RunLength,
     patterns: u16,
@@ -106,11 +120,14 @@ pub(crate) struct Run {
     last_sequence: Option<u32>,
     /// The bus keeps a frame that has not been packed, since then.
     kept: Option<Micros>,
+    /// The kept frame could not be read, and is not counted yet.
+    damaged: bool,
     ending: Option<Ending>,
 }
 
 /// State of a run whose LEDs are off and whose frames may still be in transfer.
 #[derive(Debug)]
+#[cfg_attr(test, derive(Clone))]
 struct Ending {
     since: Micros,
     /// Reply that waits for the end of the run.
@@ -195,6 +212,7 @@ impl Run {
             last_frame: now,
             last_sequence: None,
             kept: None,
+            damaged: false,
             ending: None,
         };
         if started == fpga::Started::OverAlready {
@@ -204,6 +222,26 @@ impl Run {
             }
         }
         Ok(run)
+    }
+
+    /// What the rest of the run depends on, with ages for times.
+    #[cfg(test)]
+    pub fn key(&self, age: impl Fn(Micros) -> u64) -> [u64; 8] {
+        let ending = self.ending.as_ref();
+        let length = match self.length {
+            RunLength::Continuous => 0,
+            RunLength::Frames(frames) => u64::from(frames),
+        };
+        [
+            length,
+            self.patterns.into(),
+            age(self.last_frame),
+            self.kept.map_or(u64::MAX, &age),
+            self.damaged.into(),
+            self.last_sequence.map_or(0, |last| u64::from(last) + 1),
+            ending.map_or(u64::MAX, |ending| age(ending.since)),
+            ending.and_then(|ending| ending.reply).map_or(0, |(id, _)| u64::from(id) + 1),
+        ]
     }
 
     /// Whether the LEDs are on.
@@ -250,6 +288,9 @@ impl Run {
         bus: &mut impl FpgaBus,
         sink: &mut impl PacketSink,
     ) -> bool {
+        if self.damaged {
+            self.count_damaged(now, path.counters, bus);
+        }
         let is_due = |since| !self.is_lit() || now.since(since) >= KEPT_PATIENCE;
         let overdue = self.kept.is_some_and(is_due) || !may_come;
         let packed = overdue && self.pack_kept(now, &mut path, bus, sink);
@@ -263,7 +304,6 @@ impl Run {
         };
         // Frames go out in order.
         self.pack_kept(now, &mut path, bus, sink);
-        self.last_frame = now;
         // At the end of a run no next frame is worth waiting for.
         if has_come && self.is_lit() && bus.keep() {
             self.kept = Some(now);
@@ -276,8 +316,19 @@ impl Run {
         // The FPGA needs its buffer back before the next frame is complete, so the release comes
         // before the link.
         *release_pending = fpga::release(bus).is_err();
-        self.deliver(path.counters, path.may_send, taken, sink);
+        match taken {
+            Some(taken) => self.deliver(now, path.counters, path.may_send, taken, sink),
+            None => self.count_damaged(now, path.counters, bus),
+        }
         true
+    }
+
+    /// Counts a frame that could not be read.
+    fn count_damaged(&mut self, now: Micros, counters: &mut Counters, bus: &mut impl FpgaBus) {
+        self.damaged = false;
+        if counters.count_corrupt(bus) {
+            self.last_frame = now;
+        }
     }
 
     /// Sends or counts the frame that the bus keeps, if any; true if there was one.
@@ -293,32 +344,37 @@ impl Run {
         }
         let Some(bytes) = bus.kept() else { return false };
         let Path { counters, meter, scratch, may_send } = path;
-        let path = Path { counters, meter, scratch, may_send: *may_send };
-        self.pack(now, path, bytes, sink);
+        self.pack(now, Path { counters, meter, scratch, may_send: *may_send }, bytes, sink);
+        if self.damaged {
+            self.count_damaged(now, path.counters, bus);
+        }
         true
     }
 
-    /// Sends or counts a kept frame.
+    /// Sends a kept frame. A damaged one is counted when the FPGA can be asked again.
     pub fn pack(&mut self, now: Micros, path: Path<'_>, bytes: &[u8], sink: &mut impl PacketSink) {
         if self.kept.take().is_some() {
-            let taken = assemble(bytes, self.patterns, (path.meter, now), path.scratch);
-            self.deliver(path.counters, path.may_send, taken, sink);
+            match assemble(bytes, self.patterns, (path.meter, now), path.scratch) {
+                Some(taken) => self.deliver(now, path.counters, path.may_send, taken, sink),
+                None => self.damaged = true,
+            }
         }
     }
 
-    /// Sends or counts a frame that was assembled, or `None` if it was damaged.
+    /// Sends or counts a frame that was assembled.
     fn deliver(
         &mut self,
+        now: Micros,
         counters: &mut Counters,
         may_send: bool,
-        taken: Option<(Header, Samples<'_>)>,
+        (header, samples): (Header, Samples<'_>),
         sink: &mut impl PacketSink,
     ) {
-        let Some((header, samples)) = taken else { return counters.count_corrupt() };
         if self.last_sequence.replace(header.sequence) == Some(header.sequence) {
-            // The bus lost the release of this frame.
+            // The bus lost the release of this frame. A frame that comes again is no progress.
             return;
         }
+        self.last_frame = now;
         counters.advance(header.sequence.wrapping_add(1), header.lost);
         let payload = samples.len().saturating_mul(4).saturating_add(STREAM_HEADER_BYTES);
         let frame = DeviceMessage::Frame(Frame {
@@ -335,6 +391,7 @@ impl Run {
             &mut counters.dropped
         };
         *count = count.wrapping_add(1);
+        counters.reconcile();
     }
 
     /// Reply and event of a run whose LEDs are off and whose last frame is through; `None` before.

@@ -36,6 +36,7 @@ const TEST_FLAGS: FrameFlags = FrameFlags::TEST_SOURCE.with(FrameFlags::DIFFEREN
 
 /// A test frame in progress.
 #[derive(Debug)]
+#[cfg_attr(test, derive(Clone))]
 pub(crate) struct TestFrame {
     id: u16,
     report: SelfTestReport,
@@ -151,6 +152,12 @@ impl TestFrame {
     /// `report` holds the immediate checks; `id` is the command that waits for the reply.
     pub fn new(id: u16, report: SelfTestReport, now: Micros) -> Self {
         Self { id, report, since: now }
+    }
+
+    /// What the rest of the test depends on, with ages for times.
+    #[cfg(test)]
+    pub fn key(&self, age: impl Fn(Micros) -> u64) -> [u64; 2] {
+        [self.id.into(), age(self.since)]
     }
 
     /// Whether the test frame was right; `None` while the frame may still come.

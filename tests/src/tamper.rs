@@ -17,8 +17,14 @@ pub enum Fate {
     Lose(u8),
     /// It arrives after the next packet that is at least half as long.
     Delay,
+    /// It arrives twice.
+    Repeat,
+    /// It arrives after so many looks that find nothing.
+    Hold(u32),
     /// The link ends in the middle of the packet.
     Unplug,
+    /// The link ends before the packet.
+    Close,
 }
 
 /// Chooses the fate of a packet from its number and length.
@@ -33,6 +39,8 @@ pub struct Tampered {
     delayed: Vec<u8>,
     ready: Vec<u8>,
     unplugged: bool,
+    /// Looks that find nothing.
+    held: u32,
 }
 
 impl Tampered {
@@ -49,6 +57,7 @@ impl Tampered {
             delayed: Vec::new(),
             ready: Vec::new(),
             unplugged: false,
+            held: 0,
         }
     }
 
@@ -59,6 +68,12 @@ impl Tampered {
             Fate::Drop => return,
             Fate::Delay => return self.delayed.append(&mut packet),
             Fate::Pass => {}
+            Fate::Repeat => self.ready.extend_from_slice(&packet),
+            Fate::Hold(looks) => self.held += looks,
+            Fate::Close => {
+                self.unplugged = true;
+                return;
+            }
             Fate::Flip(share) => {
                 let at = usize::from(share) * (packet.len() - 1) / 256;
                 // A delimiter is never hit: that would damage two packets, and has a test of its
@@ -87,6 +102,10 @@ impl Link for Tampered {
     }
 
     fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<Received> {
+        if self.held > 0 {
+            self.held -= 1;
+            return Ok(Received::Nothing);
+        }
         if self.ready.is_empty() && !self.unplugged {
             let mut chunk = vec![0; 1 << 16];
             match self.inner.receive(&mut chunk, timeout)? {

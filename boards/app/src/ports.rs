@@ -31,8 +31,8 @@ pub trait Board {
     fn inputs(&mut self) -> Inputs;
 
     /// Sets the pin that enables the LED drivers; low after reset. The pin is high from a
-    /// configuration until a fault, the end of the session or a crash. It is high before the FPGA
-    /// lights any LED, so no frame begins dark.
+    /// configuration until a fault, the end of the session, a crash, or a stop that the FPGA has not
+    /// confirmed. It is high before the FPGA lights any LED, so no frame begins dark.
     fn enable_leds(&mut self, enabled: bool);
 
     /// Feeds the chip's watchdog. The firmware calls this at least once in 10 ms.

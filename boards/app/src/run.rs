@@ -109,7 +109,7 @@ pub async fn run<B: Board, P: FpgaPort, G: GatewareLoader>(
         {
             camera.depth(now(), DEPTH_SIDE, &map, &mut ports);
         }
-        board.enable_leds(matches!(camera.state(), State::Configured | State::Running));
+        board.enable_leds(camera.may_light());
         if has_gone {
             link.clear();
         }

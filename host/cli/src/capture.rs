@@ -3,7 +3,7 @@
 use super::calibration::CalibrationArgs;
 use super::camera::{CameraArgs, SceneArgs, SetupArgs};
 use super::report::ReportArgs;
-use super::{Usage, address, print, progress, serve_virtual::stop_on_signal};
+use super::{Usage, address, print, progress, stop_on_signal};
 use anyhow::Result;
 use nirspi::calibration::Origin;
 use nirspi::capture::{CaptureOptions, CaptureReport, Preview, Progress, observe};

@@ -2,7 +2,7 @@
 
 use super::print;
 use super::report::ReportArgs;
-use anyhow::Result;
+use anyhow::{Result, bail};
 use nirspi::devices::{Device, list};
 use std::process::ExitCode;
 
@@ -28,6 +28,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         let line = |device: &Device| print::line(format_args!("{:<28} {device}", device.camera));
         devices.iter().try_for_each(line)
     })?;
-    let failed = devices.iter().any(|device| device.problem.is_some());
-    Ok(if failed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+    match devices.iter().find_map(|device| device.problem.as_ref().map(|why| (device, why))) {
+        Some((device, why)) => bail!("{}: {why}", device.camera),
+        None => Ok(ExitCode::SUCCESS),
+    }
 }

@@ -45,7 +45,7 @@ pub fn open(camera: &CameraAddress) -> Result<Session> {
 
 pub fn run(args: &Args) -> Result<ExitCode> {
     let file = args.bitstream.display();
-    let bitstream = std::fs::read(&args.bitstream).with_context(|| file.to_string())?;
+    let bitstream = nirspi::files::read_small(&args.bitstream).with_context(|| file.to_string())?;
     let mut session = open(&args.camera)?;
     let bar = Progress::of("loading", bitstream.len(), "bytes");
     let loaded = gateware::load(&mut session, &bitstream, &mut |bytes| bar.set(bytes));

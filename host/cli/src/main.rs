@@ -43,12 +43,14 @@ mod train;
 mod update;
 mod upscale;
 
+use anyhow::Context;
 use clap::{CommandFactory, Parser, Subcommand};
 use nirspi::about::About;
-use nirspi::files::FileError;
+use nirspi::files::{FileError, interrupt};
 use nirspi_eval::EvalError;
 use std::process::ExitCode;
-use std::sync::LazyLock;
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, LazyLock};
 
 static VERSION: LazyLock<String> =
     LazyLock::new(|| About::this_build(option_env!("NIRSPI_COMMIT")).to_string());
@@ -127,6 +129,12 @@ fn refused(error: EvalError) -> anyhow::Error {
     }
 }
 
+/// A flag that is set by the first signal. The second signal ends the program at once.
+fn stop_on_signal() -> anyhow::Result<Arc<AtomicBool>> {
+    interrupt::catch(ctrlc::set_handler).context("signals cannot be caught")?;
+    Ok(interrupt::stop_flag())
+}
+
 fn main() -> ExitCode {
     let (cli, settings) = match settings::parse::<Cli>(
         headings::arranged(Cli::command()),
@@ -144,6 +152,10 @@ fn main() -> ExitCode {
         }
     };
     settings.begin(&cli.general);
+    if !interrupt::ignores_hangup() {
+        // Without a handler, signals end the program as usual.
+        let _ = interrupt::catch(ctrlc::set_handler);
+    }
     let done = run(cli.command).and_then(|code| settings.save(&cli.general).map(|()| code));
     done.unwrap_or_else(|error| {
         print::complain(one_line(&error));

@@ -4,7 +4,7 @@ use super::camera::{CameraArgs, SceneArgs};
 use super::progress::Progress;
 use super::report::ReportArgs;
 use super::{address, print};
-use anyhow::Result;
+use anyhow::{Result, bail};
 use nirspi::calibration::{KeptCalibration, path_of};
 use nirspi::selftest::{Check, LinkDemands, STAGES, SelfTest, Verdict, run as test};
 use nirspi::session::CameraIdentity;
@@ -70,7 +70,12 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         calibration: kept.map(|(_, path)| path),
     };
     args.report.print(&report, say)?;
-    Ok(if report.passed { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    let failed = report.checks.iter().filter(|check| check.verdict() == Verdict::Failed);
+    let failed: Vec<_> = failed.map(Check::name).collect();
+    match failed.is_empty() {
+        true => Ok(ExitCode::SUCCESS),
+        false => bail!("the self-test failed: {}", failed.join(", ")),
+    }
 }
 
 /// Keeps the calibration of a camera that has passed. A camera with a fault cannot measure itself

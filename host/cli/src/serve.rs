@@ -3,7 +3,7 @@
 use super::calibration::CalibrationArgs;
 use super::camera::{CameraArgs, SceneArgs, SetupArgs};
 use super::method::MethodArgs;
-use super::serve_virtual::stop_on_signal;
+use super::stop_on_signal;
 use super::{address, print};
 use anyhow::{Context, Result, bail};
 use nirspi::calibration::Choice;

@@ -1,15 +1,14 @@
 //! `nirspi virtual`: the virtual camera behind a TCP port.
 
 use super::camera::SceneArgs;
-use super::print;
+use super::{print, stop_on_signal};
 use anyhow::{Context, Result};
 use nirspi::virtual_camera::{
     PrecomputedFpga, ServeOptions, ServerEvent, SimulatedFpga, VirtualCamera, serve, serve_tunnel,
 };
 use std::net::{TcpListener, TcpStream};
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 /// Serve the virtual camera over TCP, for `capture --camera tcp:ADDR` in another process
 ///
@@ -102,18 +101,4 @@ fn run_server<F: SimulatedFpga>(
         told.unwrap_or_default();
     })?;
     Ok(())
-}
-
-/// A flag that is set by Ctrl-C and by a termination signal.
-pub fn stop_on_signal() -> Result<Arc<AtomicBool>> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let flag = Arc::clone(&stop);
-    ctrlc::set_handler(move || {
-        // The second signal ends the program at once.
-        if flag.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-    })
-    .context("signals cannot be caught")?;
-    Ok(stop)
 }

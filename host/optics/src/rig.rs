@@ -17,7 +17,7 @@ pub enum RigError {
     #[error("rain simulator: {0} collected volumes, expected at least 2")]
     TooFew(usize),
     /// The volume of a container is not possible.
-    #[error("rain simulator: volume {value} at place {place}, expected 0 or more")]
+    #[error("rain simulator: volume {value} at place {place}, expected 0 to 1e100")]
     Volume {
         /// Number of the container, from 1.
         place: usize,
@@ -44,12 +44,12 @@ pub enum RigError {
 /// even; irrigation needs more than 80.
 ///
 /// # Errors
-/// [`RigError`] for fewer than two volumes, negative volumes, or only zeros.
+/// [`RigError`] for fewer than two volumes, volumes that are negative or beyond 1e100, or only zeros.
 pub fn uniformity_percent(volumes: &[f64]) -> Result<f64, RigError> {
     if volumes.len() < 2 {
         return Err(RigError::TooFew(volumes.len()));
     }
-    if let Some(at) = volumes.iter().position(|v| !(v.is_finite() && *v >= 0.0)) {
+    if let Some(at) = volumes.iter().position(|v| !(0.0..=1e100).contains(v)) {
         return Err(RigError::Volume { place: at + 1, value: volumes[at] });
     }
     let mean = volumes.iter().sum::<f64>() / volumes.len() as f64;

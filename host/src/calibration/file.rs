@@ -1,7 +1,7 @@
 //! Files that are kept for a camera between sessions: what calibrations and flat fields share.
 
-use crate::files::FileError;
 use crate::files::output::{OutputDir, write_atomic};
+use crate::files::{FileError, read_small};
 use etcetera::HomeDirError;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -146,7 +146,7 @@ impl Kept {
             _kind: Kind,
             version: u32,
         }
-        let text = std::fs::read(path).map_err(|source| KeptFileError::Io {
+        let text = read_small(path).map_err(|source| KeptFileError::Io {
             path: path.to_owned(),
             kept: self,
             source,

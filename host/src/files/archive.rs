@@ -26,6 +26,8 @@ pub(super) const NUMBERS: &str = "real numbers of up to 8 bytes";
 /// The largest field read into memory. A 256 x 256 sweep of raw pairs in float64 is 1 MiB; the
 /// limit is 256 times as much.
 const MAX_FIELD_BYTES: u64 = 256 << 20;
+/// The most memory that the numbers of a field may take: 512 sweeps of 256 x 256 pairs in float64.
+const MAX_MEMORY_BYTES: u64 = 512 << 20;
 
 /// An open archive.
 pub(super) struct Archive {
@@ -89,8 +91,11 @@ impl Archive {
         field: &str,
         accept: impl FnOnce(&[u64]) -> Result<(), String>,
     ) -> Result<Numbers<T>, FileError> {
-        let (shape, values) =
-            self.member(field, accept, |header, member| header.read_data(member, MAX_FIELD_BYTES))?;
+        let (shape, values) = self.member(field, accept, |header, member| {
+            header.data_bytes(MAX_FIELD_BYTES)?;
+            header.fits::<T>(MAX_MEMORY_BYTES)?;
+            header.read_data(member, MAX_FIELD_BYTES)
+        })?;
         Ok(Numbers { shape, values })
     }
 
@@ -100,8 +105,11 @@ impl Archive {
         field: &str,
         accept: impl FnOnce(&[u64]) -> Result<(), String>,
     ) -> Result<Field, FileError> {
-        let (shape, (real, imaginary)) = self
-            .member(field, accept, |header, member| header.read_parts(member, MAX_FIELD_BYTES))?;
+        let (shape, (real, imaginary)) = self.member(field, accept, |header, member| {
+            header.data_bytes(MAX_FIELD_BYTES)?;
+            header.fits::<f64>(MAX_MEMORY_BYTES)?;
+            header.read_parts(member, MAX_FIELD_BYTES)
+        })?;
         Ok(Field { shape, real, imaginary })
     }
 

@@ -147,6 +147,16 @@ impl Header {
         Ok(self.in_c_order(self.dtype.decode(&bytes)))
     }
 
+    /// Refuses an array whose elements, as `T`, take more than `limit_bytes` of memory. A byte of a packed
+    /// file can become a thousand numbers of eight bytes.
+    pub(super) fn fits<T>(&self, limit_bytes: u64) -> Result<(), ArrayError> {
+        let elements = self.data_bytes(u64::MAX)? / self.dtype.size.max(1) as u64;
+        match elements.checked_mul(size_of::<T>() as u64) {
+            Some(bytes) if bytes <= limit_bytes => Ok(()),
+            _ => Err(ArrayError::TooLarge { shape: self.shape.clone(), limit_bytes }),
+        }
+    }
+
     fn read_bytes(&self, stream: &mut impl Read, limit_bytes: u64) -> Result<Vec<u8>, ArrayError> {
         let expected = self.data_bytes(limit_bytes)?;
         let mut bytes = Vec::new();

@@ -51,8 +51,8 @@ pub fn read_reflectance(path: &Path) -> Result<Reflectance, FileError> {
     let picture = decode(path)?;
     let (width, height) = (picture.width(), picture.height());
     let edge = width.min(height);
-    let square = picture.crop_imm((width - edge) / 2, (height - edge) / 2, edge, edge);
-    Ok(Reflectance { size_px: edge as usize, values: grey(&square) })
+    let corner = ((width - edge) / 2, (height - edge) / 2);
+    Ok(Reflectance { size_px: edge as usize, values: grey_of(&picture, corner, (edge, edge)) })
 }
 
 /// A grey picture in `[0, 1]`.
@@ -104,7 +104,12 @@ fn decode(path: &Path) -> Result<DynamicImage, FileError> {
     let start = stream.fill_buf().map_err(read)?;
     let format = ::image::guess_format(start).ok();
     let Some(format @ (ImageFormat::Png | ImageFormat::Jpeg)) = format else {
-        return Err(FileError::kind(path, kind_by_start(start), EXPECTED));
+        // The signature goes on behind what names the kind.
+        let found = match start.starts_with(b"\x89PNG") {
+            true => "a PNG image with a damaged signature",
+            false => kind_by_start(start),
+        };
+        return Err(FileError::kind(path, found, EXPECTED));
     };
     stream.rewind().map_err(read)?;
     let labels = match format {
@@ -180,18 +185,25 @@ pub fn pictures_in(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
 
 /// The picture's grey levels, 0 to 1.
 fn grey(picture: &DynamicImage) -> Vec<f32> {
-    match picture.color() {
-        // A grey picture is converted directly, because a conversion through colour would round.
-        ColorType::L8 | ColorType::L16 => picture.to_luma32f().into_raw(),
-        _ => picture
-            .to_rgba32f()
-            .pixels()
-            .map(|pixel| {
+    grey_of(picture, (0, 0), (picture.width(), picture.height()))
+}
+
+/// The grey levels of a part of the picture, 0 to 1. Colour is converted line by line, because 16
+/// bytes a pixel of a whole picture are far more than its file.
+fn grey_of(picture: &DynamicImage, corner: (u32, u32), size: (u32, u32)) -> Vec<f32> {
+    let mut levels = Vec::with_capacity(size.0 as usize * size.1 as usize);
+    for row in 0..size.1 {
+        let line = picture.crop_imm(corner.0, corner.1 + row, size.0, 1);
+        match line.color() {
+            // A grey picture is converted directly, because a conversion through colour would round.
+            ColorType::L8 | ColorType::L16 => levels.extend(line.to_luma32f().into_raw()),
+            _ => levels.extend(line.to_rgba32f().pixels().map(|pixel| {
                 let [r, g, b, alpha] = pixel.0;
                 ((0.2126 * r + 0.7152 * g + 0.0722 * b) * alpha).clamp(0.0, 1.0)
-            })
-            .collect(),
+            })),
+        }
     }
+    levels
 }
 
 /// The bytes of an 8-bit grey PNG of values in `[0, 1]`, row-major. Values outside the range are

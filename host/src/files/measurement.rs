@@ -119,13 +119,49 @@ pub fn read(path: &Path, want: &Selection) -> Result<MeasurementFile, FileError>
     file.measurement(index)
 }
 
-/// Reads and checks every measurement of a file in order, as the frames of a video.
-///
-/// # Errors
-/// As [`read`].
-pub fn read_all(path: &Path, want: &Selection) -> Result<Vec<MeasurementFile>, FileError> {
-    let mut file = Opened::open(path, want)?;
-    (0..file.readings.layout.count).map(|index| file.measurement(index)).collect()
+/// A file of several measurements, such as the frames of a video, read one by one.
+pub struct Several(Opened);
+
+impl Several {
+    /// Opens the file and checks that its shapes fit together.
+    ///
+    /// # Errors
+    /// As [`read`].
+    pub fn open(path: &Path, want: &Selection) -> Result<Self, FileError> {
+        Opened::open(path, want).map(Self)
+    }
+
+    /// Number of measurements.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.0.readings.layout.count
+    }
+
+    /// Whether there is no measurement.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Number of patterns of a measurement, those that were not read included.
+    #[must_use]
+    pub fn patterns(&self) -> usize {
+        self.0.patterns()
+    }
+
+    /// Side of the images.
+    #[must_use]
+    pub fn side(&self) -> Side {
+        self.0.side
+    }
+
+    /// Reads and checks the measurement with this index.
+    ///
+    /// # Errors
+    /// As [`read`].
+    pub fn read(&mut self, index: usize) -> Result<MeasurementFile, FileError> {
+        self.0.measurement(index)
+    }
 }
 
 #[cfg(test)]

@@ -14,6 +14,7 @@
 pub mod characters;
 #[cfg(feature = "pictures")]
 pub mod image;
+pub mod interrupt;
 #[cfg(not(target_family = "wasm"))]
 pub mod measurement;
 #[cfg(not(target_family = "wasm"))]
@@ -47,3 +48,4 @@ mod text;
 #[cfg(feature = "training")]
 pub(crate) use archive::encode as encode_archive;
 pub use error::FileError;
+pub use plain::read_small;

@@ -9,6 +9,7 @@
 //! (`tests::a_folder_keeps_no_file_open_however_many_it_takes`).
 
 use super::FileError;
+use super::interrupt::Noted;
 use std::fs;
 use std::io::{self, BufWriter, IntoInnerError, Write};
 use std::path::{Path, PathBuf};
@@ -27,7 +28,7 @@ const STAGED_PREFIX: &str = ".nirspi-";
 pub struct OutputDir {
     path: PathBuf,
     /// `staged` comes before `made`, so that the files are removed before the folders.
-    staged: Vec<(TempPath, PathBuf)>,
+    staged: Vec<(Staged, PathBuf)>,
     made: MadeFolders,
 }
 
@@ -45,8 +46,8 @@ impl OutputDir {
             .take_while(|p| !p.as_os_str().is_empty() && fs::symlink_metadata(p).is_err())
             .collect();
         for folder in missing.into_iter().rev() {
-            match fs::create_dir(folder) {
-                Ok(()) => made.0.push(folder.to_owned()),
+            match Noted::make(folder, || fs::create_dir(folder)) {
+                Ok(((), noted)) => made.0.push((folder.to_owned(), noted)),
                 Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
                 Err(error) if error.kind() == io::ErrorKind::NotADirectory => {
                     let file = folder.parent().unwrap_or(folder);
@@ -88,8 +89,9 @@ impl OutputDir {
     /// [`FileError`] names the first file that could not be placed. New files placed before the
     /// error are removed again. Older files that were already replaced stay replaced, whole.
     pub fn commit(mut self) -> Result<Vec<PathBuf>, FileError> {
+        let _undisturbed = super::interrupt::undisturbed();
         let mut placed: Vec<(PathBuf, bool)> = Vec::new();
-        for (staged, target) in self.staged.drain(..) {
+        for (staged, target) in std::mem::take(&mut self.staged) {
             let replaces = target.exists();
             if let Err(error) = place(staged, &target) {
                 for (new, _) in placed.iter().filter(|(_, replaced)| !replaced) {
@@ -155,11 +157,11 @@ pub(crate) fn sync_folder(folder: &Path) -> io::Result<()> {
 
 /// Folders to remove when a run fails, outermost first.
 #[derive(Debug)]
-struct MadeFolders(Vec<PathBuf>);
+struct MadeFolders(Vec<(PathBuf, Noted)>);
 
 impl Drop for MadeFolders {
     fn drop(&mut self) {
-        for folder in self.0.iter().rev() {
+        for (folder, _) in self.0.iter().rev() {
             // The removal fails if another program put a file into the folder meanwhile; the folder
             // then stays.
             let _ = fs::remove_dir(folder);
@@ -171,7 +173,7 @@ fn stage<E: From<FileError>>(
     folder: &Path,
     target: &Path,
     fill: impl FnOnce(&mut BufWriter<fs::File>) -> Result<(), E>,
-) -> Result<TempPath, E> {
+) -> Result<Staged, E> {
     if target.is_dir() {
         return Err(FileError::kind(target, "a folder", "a file to write").into());
     }
@@ -184,20 +186,28 @@ fn stage<E: From<FileError>>(
     // Other users may read results as far as the umask allows.
     let staged = tempfile::Builder::new()
         .prefix(STAGED_PREFIX)
-        .make_in(folder, |path| fs::File::create_new(path))
+        .make_in(folder, |path| Noted::make(path, || fs::File::create_new(path)))
         .map_err(write)?;
-    let (file, path) = staged.into_parts();
+    let ((file, noted), path) = staged.into_parts();
+    let staged = Staged { path, _noted: noted };
     let mut file = BufWriter::new(file);
     fill(&mut file)?;
     file.into_inner()
         .map_err(IntoInnerError::into_error)
         .and_then(|file| file.sync_all())
         .map_err(write)?;
-    Ok(path)
+    Ok(staged)
 }
 
-fn place(staged: TempPath, target: &Path) -> Result<(), FileError> {
-    staged.persist(target).map_err(|error| FileError::io(target, "write", error.error))
+/// A file under its hidden name.
+#[derive(Debug)]
+struct Staged {
+    path: TempPath,
+    _noted: Noted,
+}
+
+fn place(staged: Staged, target: &Path) -> Result<(), FileError> {
+    staged.path.persist(target).map_err(|error| FileError::io(target, "write", error.error))
 }
 
 #[cfg(test)]

@@ -45,6 +45,33 @@ pub(super) fn read_large_text(path: &Path, expected: &'static str) -> Result<Str
     Ok(String::from_utf8_lossy(&bytes).into_owned())
 }
 
+/// The largest file that [`read_small`] reads. The bitstream of the largest ECP5 has 2 MB.
+const MAX_SMALL_BYTES: u64 = 32 << 20;
+
+/// The bytes of a file of at most 32 MiB: descriptions, calibrations, bitstreams. A pipe is refused,
+/// because opening a pipe waits for a writer, and so is a device, which may never end.
+///
+/// # Errors
+/// The system's error; [`ErrorKind::InvalidInput`](std::io::ErrorKind::InvalidInput) for anything
+/// but a file of that size.
+pub fn read_small(path: &Path) -> std::io::Result<Vec<u8>> {
+    use std::io::{Error, ErrorKind};
+    let metadata = std::fs::metadata(path)?;
+    if metadata.is_dir() {
+        return Err(ErrorKind::IsADirectory.into());
+    }
+    if !metadata.is_file() {
+        return Err(Error::new(ErrorKind::InvalidInput, "a device or pipe, expected a file"));
+    }
+    let mut bytes = Vec::new();
+    File::open(path)?.take(MAX_SMALL_BYTES + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > MAX_SMALL_BYTES {
+        let reason = format!("more than {} MiB", MAX_SMALL_BYTES >> 20);
+        return Err(Error::new(ErrorKind::InvalidInput, reason));
+    }
+    Ok(bytes)
+}
+
 fn read_bytes(path: &Path, expected: &'static str, most_mib: u64) -> Result<Vec<u8>, FileError> {
     let (file, _) = open_file(path, expected)?;
     let mut bytes = Vec::new();

@@ -69,6 +69,8 @@ pub(super) enum End {
     Gone(String),
     /// The camera switched its LEDs off.
     Fault(Fault),
+    /// The camera has come back and must stay dark until a person agrees, for this reason in one line.
+    Dark(String),
     /// The camera's latency is not known, for this reason in one line.
     Uncalibrated(String),
     /// Another scene is wanted.
@@ -112,12 +114,18 @@ pub(super) fn reconnect(
     }
 }
 
-/// The fault still latched after reconnecting. `HostSilent` does not count: reconnecting clears its
-/// cause.
-pub(super) fn standing_fault(session: &mut Session) -> Option<Fault> {
+/// Why a camera that has come back stays dark until a person agrees: a fault that is still latched,
+/// whatever its kind, or a crash of the firmware since the last session.
+pub(super) fn why_dark(session: &mut Session) -> Option<String> {
     // A camera that does not answer will not measure either; the measurement then reports the
     // reason.
-    session.status(&mut IgnorePackets).ok()?.fault.filter(|fault| *fault != Fault::HostSilent)
+    let crash = session.await_reports().ok()?.iter().find(|told| events::is_crash(told)).cloned();
+    let fault = session.status(&mut IgnorePackets).ok()?.fault;
+    fault.map(switched_off).or(crash)
+}
+
+fn switched_off(fault: Fault) -> String {
+    format!("the camera switched its LEDs off: {fault}")
 }
 
 /// Asks a camera whose LEDs a person switched off whether they are off, and stops it if they are
@@ -240,8 +248,10 @@ impl Live {
                 shared.enter(Phase::Lost, Leds::Unknown, format!("{why}; trying again"));
                 Next::Retry
             }
-            End::Fault(fault) => {
-                dark(Phase::Fault, format!("the camera switched its LEDs off: {fault}"))
+            End::Fault(fault) => dark(Phase::Fault, switched_off(fault)),
+            End::Dark(why) => {
+                lock(&shared.camera).event(why.clone());
+                dark(Phase::Fault, why)
             }
             End::Uncalibrated(why) => {
                 lock(&shared.camera).event(why.clone());

@@ -10,8 +10,10 @@ use crate::link::{Link, Received};
 use crate::session::{CameraIdentity, Session};
 use crate::setup::MeasurementSetup;
 use crate::virtual_camera::{OpticalFpga, VirtualCamera, VirtualOptics};
+use nirspi_mcu::{Limits, Micros};
 use nirspi_optics::Scene;
 use nirspi_recon::Order;
+use nirspi_wire::{Command, Request, RunLength, State, encode, version};
 use std::io::{self, BufRead, BufReader, Write};
 use std::net::TcpStream;
 use std::sync::Arc;
@@ -87,15 +89,52 @@ impl Link for Enclosed {
     }
 }
 
-/// Connects a virtual camera, whose enclosure may have been open before.
-fn enclosed(hands: &Arc<Hands>, was_open: bool) -> Connected {
+/// What has happened to a camera before a host connects to it.
+#[derive(Clone, Copy, PartialEq)]
+enum Before {
+    Nothing,
+    WasOpen,
+    /// Its host went silent with the LEDs on.
+    WasSilent,
+    Crashed,
+}
+
+/// Connects a virtual camera.
+fn enclosed(hands: &Arc<Hands>, before: Before) -> Connected {
     let scene = Scene::new(vec![1.0; 16], 4, 40.0).unwrap();
     let mut camera = VirtualOptics::new(scene, 300.0).unwrap().camera(1).unwrap();
-    camera.set_interlock(!was_open);
+    camera.set_interlock(before != Before::WasOpen);
     camera.step(1000);
+    if before == Before::WasSilent {
+        camera = silenced(camera);
+    }
+    if before == Before::Crashed {
+        camera.crash("main.rs:7");
+    }
     let link = Enclosed { camera, hands: Arc::clone(hands) };
     let session = Session::open(Box::new(link)).unwrap();
     Connected { session, calibration: Calibration::None, note: None, flat_field: None }
+}
+
+/// A camera whose host has asked for light and then for nothing.
+fn silenced(camera: VirtualCamera<OpticalFpga>) -> VirtualCamera<OpticalFpga> {
+    let silence = Micros(1_000);
+    let limits = Limits { host_silence: silence, ..Limits::default() };
+    let mut camera = camera.with_limits(limits);
+    let mut send = |id, command: Command<'_>| {
+        let mut room = [0; 4096];
+        camera.receive(encode(&Request { id, command }, &mut room).unwrap());
+        camera.step(1000);
+    };
+    send(0, Command::Hello { protocol: version::CURRENT });
+    setup().with_configuration(|configuration| send(1, Command::Configure(configuration)));
+    send(2, Command::Start(RunLength::Continuous));
+    assert_eq!(camera.state(), State::Running);
+    while camera.state() == State::Running {
+        camera.step(1000);
+    }
+    camera.link_closed();
+    camera
 }
 
 /// A camera's thread under test.
@@ -106,18 +145,18 @@ struct Lab {
 }
 
 impl Lab {
-    /// Starts the thread and waits for frames. `open_while_unplugged`: the enclosure is opened
-    /// while the camera is unplugged.
-    fn new(open_while_unplugged: bool) -> Self {
+    /// Starts the thread and waits for frames. `unplugged`: what happens while the camera is
+    /// unplugged.
+    fn new(unplugged: Before) -> Self {
         let hands = Arc::<Hands>::default();
-        let first = enclosed(&hands, false);
+        let first = enclosed(&hands, Before::Nothing);
         let shared = shared(first.session.identity(), None);
         let measuring = {
             let (shared, hands) = (Arc::clone(&shared), Arc::clone(&hands));
             let connect: Connect = Box::new(move |_| {
                 hands.pulled.store(false, Ordering::Relaxed);
                 hands.stuck.store(false, Ordering::Relaxed);
-                Ok(enclosed(&hands, open_while_unplugged))
+                Ok(enclosed(&hands, unplugged))
             });
             let model = nirspi_optics::CameraModel::default();
             let source = CameraSource {
@@ -173,7 +212,7 @@ impl Lab {
 
 #[test]
 fn after_a_fault_leds_go_on_again_only_when_a_person_says_so() {
-    let lab = Lab::new(false);
+    let lab = Lab::new(Before::Nothing);
     lab.hands.open.store(true, Ordering::Relaxed);
     until("off", || lab.phase() == Phase::Fault);
     // The cause of the fault persists: when asked to go on, the thread reconnects and the LEDs stay
@@ -194,8 +233,23 @@ fn after_a_fault_leds_go_on_again_only_when_a_person_says_so() {
 }
 
 #[test]
+fn after_host_silence_or_a_crash_only_a_person_switches_the_leds_on_again() {
+    for (unplugged, words) in [
+        (Before::WasSilent, "the camera switched its LEDs off: the host"),
+        (Before::Crashed, "the firmware crashed"),
+    ] {
+        let lab = Lab::new(unplugged);
+        lab.hands.pulled.store(true, Ordering::Relaxed);
+        until("back and dark", || lab.phase() == Phase::Fault);
+        lab.stays_dark();
+        let told = lab.end();
+        assert!(told.iter().any(|text| text.starts_with(words)), "{told:?}");
+    }
+}
+
+#[test]
 fn a_person_stops_a_camera_and_only_a_person_starts_it_again() {
-    let lab = Lab::new(false);
+    let lab = Lab::new(Before::Nothing);
     lab.shared.light.set(false);
     until("stopped", || lab.phase() == Phase::Stopped && lab.leds() == Leds::Off);
     let before = lab.received();
@@ -215,7 +269,7 @@ fn a_person_stops_a_camera_and_only_a_person_starts_it_again() {
 
 #[test]
 fn a_stop_counts_although_the_stream_is_stuck() {
-    let lab = Lab::new(false);
+    let lab = Lab::new(Before::Nothing);
     lab.hands.stuck.store(true, Ordering::Relaxed);
     lab.shared.light.set(false);
     // The camera does not answer the stop: what its LEDs do is not known, and the session is closed.
@@ -227,13 +281,13 @@ fn a_stop_counts_although_the_stream_is_stuck() {
 
 #[test]
 fn a_camera_that_comes_back_measures_on_unless_it_was_opened_meanwhile() {
-    let lab = Lab::new(false);
+    let lab = Lab::new(Before::Nothing);
     let before = lab.received();
     lab.hands.pulled.store(true, Ordering::Relaxed);
     until("measuring again", || lab.received() > before + 100 && lab.phase() == Phase::Measuring);
     lab.end();
 
-    let lab = Lab::new(true);
+    let lab = Lab::new(Before::WasOpen);
     lab.hands.pulled.store(true, Ordering::Relaxed);
     until("off", || lab.phase() == Phase::Fault);
     lab.stays_dark();
@@ -244,7 +298,7 @@ fn a_camera_that_comes_back_measures_on_unless_it_was_opened_meanwhile() {
 #[test]
 fn a_browser_that_does_not_read_costs_nobody_and_then_sees_the_newest() {
     const LAST: usize = 60;
-    let shared = shared(enclosed(&Arc::default(), false).session.identity(), None);
+    let shared = shared(enclosed(&Arc::default(), Before::Nothing).session.identity(), None);
     let (publish, published) = watch::channel(Arc::new(Published::default()));
     let server = Server::bind("127.0.0.1:0", None).unwrap();
     let address = server.address;

@@ -4,7 +4,7 @@
 //! The camera's thread waits for the camera only: never for the imaging thread, and never for a
 //! browser.
 
-use super::camera::{End, EventLog, Live, Next, darken, reconnect, standing_fault};
+use super::camera::{End, EventLog, Live, Next, darken, reconnect, why_dark};
 use super::camera_log::{CameraLog, Phase};
 use super::imaging::Studio;
 use super::light::Leds;
@@ -122,10 +122,10 @@ pub(super) fn measure(
                 }
             },
         };
-        let standing = if person_said { None } else { standing_fault(&mut connected.session) };
+        let dark = if person_said { None } else { why_dark(&mut connected.session) };
         person_said = false;
-        let end = match standing {
-            Some(fault) => End::Fault(fault),
+        let end = match dark {
+            Some(why) => End::Dark(why),
             None => session(&mut live, shared, &mut connected)?,
         };
         // The old link is closed before reconnecting.

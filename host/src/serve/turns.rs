@@ -9,7 +9,7 @@
 //! the same images on every machine (`host/web/tests/check.py` compares WebAssembly with native
 //! code).
 
-use super::camera::{End, Live, Next, darken, reconnect, standing_fault};
+use super::camera::{End, Live, Next, darken, reconnect, why_dark};
 use super::camera_log::{CameraLog, Phase};
 use super::imaging::Studio;
 use super::light::Leds;
@@ -148,10 +148,9 @@ impl Turns {
     fn connect(&mut self, now: Instant, person_said: bool) -> Doing {
         match reconnect(&self.shared, &mut self.source.connect) {
             Ok(mut connected) => {
-                let standing =
-                    if person_said { None } else { standing_fault(&mut connected.session) };
-                if let Some(fault) = standing {
-                    return self.ended(End::Fault(fault));
+                let dark = if person_said { None } else { why_dark(&mut connected.session) };
+                if let Some(why) = dark {
+                    return self.ended(End::Dark(why));
                 }
                 self.live.greeted(&mut connected);
                 Doing::Dark { connected, asked: None }

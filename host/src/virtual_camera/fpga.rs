@@ -70,6 +70,19 @@ impl OpticalFpga {
         Self { gateware, loopback, ..self }
     }
 
+    /// Loses everything, as after a dip of the supply: registers, frames, LEDs off. The clock starts again at 0
+    /// in the gateware; the time of the simulation goes on.
+    pub fn reset(&mut self) {
+        self.gateware = Gateware::new();
+        self.gateware.set_interlock(true);
+    }
+
+    /// Whether the FPGA lets LEDs shine now.
+    #[must_use]
+    pub fn leds_on(&self) -> bool {
+        self.gateware.lines().enable
+    }
+
     /// The same camera with another frequency of the ADC's clock in Hz; `None` is no clock at all.
     #[must_use]
     pub fn adc_clock(mut self, hz: Option<u32>) -> Self {

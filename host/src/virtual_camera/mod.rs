@@ -35,7 +35,7 @@ pub use stages::{Stages, StagesError, StagesReport, enhance_stages};
 pub use tunnel::serve_tunnel;
 
 use nirspi_mcu::{
-    BoardInfo, Camera, GatewareLoader, Inputs, Limits, Micros, NoLoader, PacketSink, Ports,
+    BoardInfo, Camera, Crash, GatewareLoader, Inputs, Limits, Micros, NoLoader, PacketSink, Ports,
     Progress,
 };
 use nirspi_optics::SimulatedDepth;
@@ -113,6 +113,7 @@ const INBOX_BYTES: usize = 1 << 16;
 pub struct VirtualCamera<F, G = NoLoader> {
     camera: Camera,
     info: BoardInfo,
+    limits: Limits,
     fpga: F,
     loader: G,
     inbox: Vec<u8>,
@@ -143,9 +144,11 @@ impl<F: SimulatedFpga, G: GatewareLoader> VirtualCamera<F, G> {
     }
 
     fn powered_up(fpga: F, loader: G, depth: SimulatedDepth, info: BoardInfo) -> Self {
+        let limits = Limits::default();
         Self {
-            camera: Camera::new(info.clone(), Limits::default()),
+            camera: Camera::new(info.clone(), limits),
             info,
+            limits,
             fpga,
             loader,
             inbox: Vec::new(),
@@ -193,7 +196,7 @@ impl<F: SimulatedFpga, G: GatewareLoader> VirtualCamera<F, G> {
         let Progress { worked, reboot } = self.camera.poll(now, &self.inputs, ports);
         if reboot.is_some() {
             // The reply that promises the restart is among the packets already.
-            self.camera = Camera::new(self.info.clone(), Limits::default());
+            self.camera = Camera::new(self.info.clone(), self.limits);
             self.inbox.clear();
             return true;
         }
@@ -219,6 +222,34 @@ impl<F: SimulatedFpga, G: GatewareLoader> VirtualCamera<F, G> {
         self.camera.link_closed(now, ports);
         self.inbox.clear();
         self.packets.clear();
+    }
+
+    /// The same camera after power-up with other limits: a test need not wait for five seconds of silence.
+    #[must_use]
+    pub fn with_limits(mut self, limits: Limits) -> Self {
+        self.limits = limits;
+        self.camera = Camera::new(self.info.clone(), limits);
+        self
+    }
+
+    /// The firmware crashes and restarts, and its link with it. The FPGA notices nothing.
+    pub fn crash(&mut self, text: &str) {
+        let crash = Crash::new(self.now(), format_args!("{text}"));
+        self.camera = Camera::new(self.info.clone(), self.limits);
+        self.camera.restarted_after(crash);
+        self.inbox.clear();
+        self.packets.clear();
+    }
+
+    /// What the firmware says that the camera does.
+    #[must_use]
+    pub fn state(&self) -> nirspi_wire::State {
+        self.camera.state()
+    }
+
+    /// The simulated FPGA, for faults of its own.
+    pub fn fpga_mut(&mut self) -> &mut F {
+        &mut self.fpga
     }
 
     /// Opens or closes the enclosure.

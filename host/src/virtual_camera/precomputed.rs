@@ -12,10 +12,12 @@ use nirspi_wire::crc32;
 use nirspi_wire::fpga::{CRC_BYTES, FpgaFrame, HEADER_BYTES, Header};
 use nirspi_wire::register::{Register, control, status};
 
-/// Clocks after which the wait for a frame of the model ends.
-const PATIENCE_CLOCKS: u64 = 1 << 32;
+/// Clocks of the model that one start computes at most: 0.13 s of the camera's time. The server
+/// answers no host meanwhile.
+const PATIENCE_CLOCKS: u64 = 1 << 24;
 
-/// An FPGA that repeats its first frames.
+/// An FPGA that repeats its first frames. Frames that take longer than [`PATIENCE_CLOCKS`] are not
+/// repeated: the model then makes each of them.
 pub struct PrecomputedFpga<F> {
     model: F,
     /// Number of frames of each run that the model computes.
@@ -94,6 +96,9 @@ impl<F: SimulatedFpga> PrecomputedFpga<F> {
         self.model.write(Register::Control.address(), control::STOP)?;
         self.model.write(Register::Frames.address(), length)?;
         self.run = None;
+        if frames.is_empty() && self.model.clock() - begun >= PATIENCE_CLOCKS {
+            return self.model.write(Register::Control.address(), control::START);
+        }
         if let Some(frame_clocks) = frame_clocks(&frames) {
             self.run = Some(Run {
                 frames,
@@ -192,5 +197,46 @@ impl<F: SimulatedFpga> FpgaBus for PrecomputedFpga<F> {
 
     fn raw(&mut self) -> Result<Option<&[u8]>, BusError> {
         self.model.raw()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::virtual_camera::VirtualOptics;
+    use nirspi_optics::Scene;
+    use nirspi_wire::register::mode;
+
+    fn fpga(sweeps: u32) -> PrecomputedFpga<impl SimulatedFpga> {
+        let sheet = Scene::new(vec![0.9; 4], 2, 48.0).unwrap();
+        let model = VirtualOptics::new(sheet, 300.0).unwrap().ideal().fpga(1).unwrap();
+        let mut fpga = PrecomputedFpga::new(model, 2);
+        fpga.write(Register::Patterns.address(), 4).unwrap();
+        fpga.write(Register::Mode.address(), mode::DIFFERENTIAL).unwrap();
+        fpga.write(Register::Sweeps.address(), sweeps).unwrap();
+        fpga
+    }
+
+    #[test]
+    fn frames_longer_than_a_start_may_take_come_from_the_model() {
+        // A frame of 4 patterns takes 40 clocks a sweep, with complements.
+        let mut fpga = fpga(u32::MAX);
+        let begun = std::time::Instant::now();
+        fpga.write(Register::Control.address(), control::START).unwrap();
+        assert!(fpga.run.is_none() && fpga.running());
+        assert!(!fpga.frame_ready());
+        // A start of such a run once took minutes.
+        assert!(begun.elapsed() < std::time::Duration::from_secs(60));
+    }
+
+    #[test]
+    fn short_frames_are_repeated() {
+        let mut fpga = fpga(1);
+        fpga.write(Register::Control.address(), control::START).unwrap();
+        for _ in 0..5 {
+            assert!(fpga.frame().unwrap().is_some());
+            fpga.write(Register::Control.address(), control::RELEASE).unwrap();
+        }
+        assert_eq!(fpga.read(Register::FramesMade.address()).unwrap(), 5);
     }
 }

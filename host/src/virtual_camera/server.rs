@@ -21,6 +21,10 @@ const IDLE_WAIT: Duration = Duration::from_millis(2);
 const ACCEPT_WAIT: Duration = Duration::from_millis(20);
 /// How long a second host waits for the first host to leave.
 const KNOCK_WAIT: Duration = Duration::from_millis(500);
+/// The longest time from a connection to its first byte. Longer connections are of no host.
+const GREETING_WAIT: Duration = Duration::from_secs(5);
+/// The longest silence of a host while another host waits.
+const SILENCE: Duration = Duration::from_secs(60);
 
 /// Options of the server.
 #[derive(Debug, Clone, Copy, Default)]
@@ -96,9 +100,10 @@ impl Door<'_> {
 
     /// Checks from time to time for a second host while the first is connected, and turns away a
     /// host that has waited too long.
-    fn knock(&mut self, tell: &mut dyn FnMut(ServerEvent)) {
+    /// Returns whether another host waits.
+    fn knock(&mut self, tell: &mut dyn FnMut(ServerEvent)) -> bool {
         if self.looked.elapsed() < ACCEPT_WAIT {
-            return;
+            return self.waiting.is_some();
         }
         self.looked = Instant::now();
         match &self.waiting {
@@ -113,6 +118,7 @@ impl Door<'_> {
             }
             Some(_) => {}
         }
+        self.waiting.is_some()
     }
 }
 
@@ -122,18 +128,27 @@ fn converse<F: SimulatedFpga>(
     camera: &mut VirtualCamera<F>,
     options: ServeOptions,
     stop: &AtomicBool,
-    knock: &mut dyn FnMut(),
+    knock: &mut dyn FnMut() -> bool,
 ) -> io::Result<()> {
     stream.set_nodelay(true)?;
     stream.set_nonblocking(true)?;
     let mut buffer = vec![0; 1 << 16];
+    let (mut heard, mut greeted) = (Instant::now(), false);
     while !stop.load(Ordering::Relaxed) {
-        knock();
+        let another_waits = knock();
+        let silent = heard.elapsed();
+        if (!greeted && silent > GREETING_WAIT) || (another_waits && silent > SILENCE) {
+            let reason = format!("silent for {} s", silent.as_secs());
+            return Err(io::Error::new(io::ErrorKind::TimedOut, reason));
+        }
         let room = if camera.takes_bytes() { &mut buffer[..] } else { &mut [] };
         match stream.read(room) {
             Ok(0) if room.is_empty() => {}
             Ok(0) => return Ok(()),
-            Ok(length) => camera.receive(buffer.get(..length).unwrap_or(&[])),
+            Ok(length) => {
+                (heard, greeted) = (Instant::now(), true);
+                camera.receive(buffer.get(..length).unwrap_or(&[]));
+            }
             Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
             Err(error) if is_hangup(&error) => return Err(error),
             Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
@@ -219,6 +234,15 @@ mod tests {
             let mut replies = [0; 8];
             stream.read_exact(&mut replies).unwrap();
             std::thread::sleep(Duration::from_millis(50));
+        });
+    }
+
+    #[test]
+    fn a_connection_that_never_greets_keeps_no_host_out() {
+        after(|silent| {
+            // The connection stays open beyond the greeting of the next host.
+            std::mem::forget(silent.try_clone().unwrap());
+            std::thread::sleep(GREETING_WAIT + Duration::from_millis(300));
         });
     }
 

@@ -11,6 +11,7 @@ use std::collections::BTreeMap;
 use std::vec::Vec;
 
 /// Register file and frame buffer. A run makes frames only when the test calls `make_frame`.
+#[derive(Clone)]
 pub struct FakeFpga {
     pub registers: BTreeMap<u16, u32>,
     pub identity: u32,
@@ -84,6 +85,11 @@ impl Default for FakeFpga {
 }
 
 impl FakeFpga {
+    /// Whether the last start was refused, and whether a frame was lost since the last one.
+    pub fn flags(&self) -> (bool, bool) {
+        (self.config_error, self.after_loss)
+    }
+
     pub fn get(&self, register: Register) -> u32 {
         self.registers[&register.address()]
     }

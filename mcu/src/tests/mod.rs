@@ -10,6 +10,7 @@ mod host_port;
 mod laws;
 mod loading;
 mod merge;
+mod model;
 mod patience;
 mod safety;
 mod selftest;

@@ -15,6 +15,7 @@ use std::boxed::Box;
 use std::vec::Vec;
 
 /// A link that takes `room` more packets.
+#[derive(Clone)]
 pub struct Link {
     pub room: usize,
     /// Number of claims that find no room before the next claim succeeds.
@@ -49,7 +50,7 @@ impl PacketSink for Link {
 }
 
 /// A loader that keeps the bytes it gets.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub struct Loader {
     pub unsupported: bool,
     pub data: Vec<u8>,
@@ -79,6 +80,7 @@ impl GatewareLoader for Loader {
 }
 
 /// A camera with a fake FPGA, a link and a loader.
+#[derive(Clone)]
 pub struct Bench {
     pub camera: Camera,
     pub fpga: FakeFpga,

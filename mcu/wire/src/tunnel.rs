@@ -17,6 +17,7 @@
 //! (`tests::a_request_comes_back_and_no_damaged_one_does`).
 
 use crate::crc32;
+use crate::fpga::MAX_FRAME_BYTES;
 use crate::host_port::{READ_FRAME, READ_RAW, READ_REGISTER, WRITE_REGISTER};
 
 /// Opcode without an access: time passes, and the reply has the state of the lines.
@@ -53,7 +54,7 @@ impl Request {
         [self.opcode, self.number, a0, a1, v0, v1, v2, v3, c0, c1, c2, c3]
     }
 
-    /// The request; `None` if the bytes are not a request.
+    /// The request; `None` if the bytes are not a request, or ask for more than the longest frame.
     #[must_use]
     pub fn from_bytes(bytes: &[u8; REQUEST_BYTES]) -> Option<Self> {
         let (head, crc) = bytes.split_last_chunk::<CRC_BYTES>()?;
@@ -67,7 +68,9 @@ impl Request {
         let &[opcode, number, a0, a1, v0, v1, v2, v3, ..] = bytes;
         let (address, argument) =
             (u16::from_le_bytes([a0, a1]), u32::from_le_bytes([v0, v1, v2, v3]));
-        Some(Self { opcode, number, address, argument })
+        // No frame or burst is longer, and the reply has as many bytes as were asked for.
+        let request = Self { opcode, number, address, argument };
+        (request.reply_data() <= MAX_FRAME_BYTES).then_some(request)
     }
 
     /// Number of data bytes in the reply.
@@ -141,7 +144,8 @@ mod tests {
         ) {
             let request = Request { opcode, number, address, argument };
             let mut bytes = request.to_bytes();
-            prop_assert_eq!(Request::from_bytes(&bytes), Some(request));
+            let fits = request.reply_data() <= MAX_FRAME_BYTES;
+            prop_assert_eq!(Request::from_bytes(&bytes), fits.then_some(request));
             bytes[at] ^= flip;
             prop_assert_eq!(Request::from_bytes(&bytes), None);
         }
@@ -155,6 +159,17 @@ mod tests {
             let lines = Lines { frame_ready, raw_ready, interlock_closed, temperature_centi_celsius };
             prop_assert_eq!(Lines::from_reply_head(lines.to_reply_head(number)), (number, lines));
         }
+    }
+
+    #[test]
+    fn nobody_is_asked_for_more_than_a_frame() {
+        let ask = |argument| {
+            let request = Request { opcode: READ_FRAME, number: 1, address: 0, argument };
+            Request::from_bytes(&request.to_bytes())
+        };
+        assert!(ask(MAX_FRAME_BYTES as u32).is_some());
+        assert_eq!(ask(MAX_FRAME_BYTES as u32 + 1), None);
+        assert_eq!(ask(u32::MAX), None);
     }
 
     #[test]

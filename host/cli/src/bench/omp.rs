@@ -3,7 +3,7 @@
 use crate::report::ReportArgs;
 use crate::{backend, print, refused};
 use anyhow::{Context, Result};
-use clap::ValueEnum;
+use clap::{ValueEnum, builder::RangedU64ValueParser};
 use nirspi::files::output::write_atomic;
 use nirspi::files::problem;
 use nirspi_eval::bench::omp::{self, Settings};
@@ -35,7 +35,7 @@ pub struct Args {
     #[arg(long, value_name = "K", default_value_t = 64)]
     sparsity: usize,
     /// Frames in the batch
-    #[arg(long, value_name = "B", default_value_t = 1)]
+    #[arg(long, value_name = "B", default_value_t = 1, value_parser = RangedU64ValueParser::<usize>::new().range(1..=65_536))]
     frames: usize,
     /// Seed of a random problem
     #[arg(long, default_value_t = 1)]

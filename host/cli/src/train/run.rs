@@ -2,8 +2,8 @@
 
 use super::network::Args;
 use crate::progress::Progress;
-use crate::{print, refused};
-use anyhow::{Context, Result};
+use crate::{print, refused, stop_on_signal};
+use anyhow::Result;
 use nirspi_eval::train::{Report, Request, Watch, run as train};
 use nirspi_nets::train::{Ended, Entry, Model, Settings};
 use nirspi_recon::words::count;
@@ -22,10 +22,7 @@ pub fn run(args: &Args, model: Model) -> Result<ExitCode> {
         resume: args.resume,
         backend: args.backend,
     };
-    let stop = Arc::new(AtomicBool::new(false));
-    let asked = Arc::clone(&stop);
-    ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed))
-        .context("cannot listen for interrupts")?;
+    let stop = stop_on_signal()?;
     let mut shown = Shown { bar: None, stop };
     let report = train(&request, &mut shown).map_err(refused)?;
     drop(shown);

@@ -224,3 +224,36 @@ fn a_pipe_or_a_device_is_refused_and_not_waited_for() {
         outcome.failed(1, &[weights, "not a file"]);
     }
 }
+
+#[cfg(unix)]
+#[test]
+fn a_pipe_or_a_device_is_no_calibration_description_or_bitstream() {
+    let bench = Bench::new();
+    let made = std::process::Command::new("mkfifo").arg(bench.path("pipe.json")).status().unwrap();
+    assert!(made.success());
+    for file in ["pipe.json", "/dev/zero"] {
+        let capture = ["capture", "--frames", "1", "--calibration", file, "--out", "rec.mcap"];
+        bench.run(&capture).failed(1, &[file, "a device or pipe"]);
+        bench
+            .run(&["gateware", file, "--camera", "virtual"])
+            .failed(1, &[file, "a device or pipe"]);
+        bench.run(&["camera-model", file]).failed(1, &[file, "a device or pipe"]);
+    }
+    assert!(!bench.path("rec.mcap").exists());
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_command_leaves_nothing_of_its_own() {
+    let bench = Bench::new();
+    let many = vec![0.5; 4000 * 64 * 64];
+    bench.write("many.npy", &nirspi::files::npy::encode(&[4000, 64, 64], &many));
+    for signal in ["INT", "TERM", "HUP"] {
+        let before = bench.names();
+        let mut deblur = bench.start(&["deblur", "many.npy", "--model", "wiener", "--out", "of"]);
+        deblur.has_made(&bench.path("of"));
+        deblur.signal(signal);
+        let outcome = deblur.wait();
+        assert_eq!((outcome.code, bench.names()), (Some(130), before), "{signal}: {outcome:?}");
+    }
+}

@@ -169,6 +169,12 @@ impl Process {
         })
     }
 
+    /// Waits until a file or folder is there.
+    #[cfg(unix)]
+    pub fn has_made(&mut self, path: &Path) {
+        self.until("file", |_| path.exists().then_some(()));
+    }
+
     /// Waits until a file has at least this many bytes.
     pub fn has_written(&mut self, path: &Path, bytes: u64) {
         self.until("bytes on disk", |_| {

@@ -172,6 +172,8 @@ fn devices_lists_the_camera_that_answers_and_says_why_another_does_not() {
     assert_eq!(devices[1]["camera"], camera);
     assert_eq!(devices[1]["identity"]["serial"], "virtual-42");
     assert!(devices[2]["problem"].as_str().unwrap().contains("refused"), "{devices}");
+    // An exit code of 1 is explained on stderr.
+    outcome.failed(1, &[&nobody, "refused"]);
 }
 
 /// Stands between camera and host, and hands what the camera says to `tamper`, which returns `false` to hang up.

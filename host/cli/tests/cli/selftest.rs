@@ -80,7 +80,8 @@ fn a_failed_self_test_names_the_fault_and_exits_with_1() {
         serve(&listener, &mut camera, options, &AtomicBool::new(false), &mut |_| {}).unwrap();
     });
     let outcome = bench.run(&["selftest", "--camera", &address]);
-    assert_eq!((outcome.code, outcome.stderr.as_str()), (Some(1), ""), "{outcome:?}");
+    let said = "nirspi: the self-test failed: LED lines\n";
+    assert_eq!((outcome.code, outcome.stderr.as_str()), (Some(1), said), "{outcome:?}");
     let failed: Vec<&str> =
         outcome.stdout.lines().filter(|line| line.starts_with("FAIL")).collect();
     assert_eq!(failed.len(), 1, "{outcome:?}");

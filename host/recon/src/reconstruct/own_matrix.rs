@@ -422,6 +422,12 @@ fn energies_if_orthogonal(patterns: &DMatrix<f64>) -> Option<DVector<f64>> {
 /// The rank by pivoted Cholesky factorisation of the smaller Gram matrix, as far as the
 /// factorisation goes.
 fn rank(patterns: &DMatrix<f64>) -> usize {
+    // The squares of very large or very small weights leave the range of floating point.
+    let largest = patterns.amax();
+    if largest == 0.0 {
+        return 0;
+    }
+    let patterns = &(patterns / largest);
     let mut gram = match patterns.nrows() <= patterns.ncols() {
         true => patterns * patterns.transpose(),
         false => patterns.transpose() * patterns,

@@ -223,3 +223,14 @@ fn labels_are_never_read_as_an_image() {
     let told = line(&read(&resized).unwrap_err(), "scene.png");
     assert!(told.contains("resized"), "{told}");
 }
+
+#[test]
+fn a_damaged_signature_is_no_other_kind_of_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.png");
+    let mut bytes = encode_grey(2, 2, &[0.5; 4]);
+    bytes[6] ^= 1;
+    std::fs::write(&path, bytes).unwrap();
+    let error = read_grey(&path).unwrap_err().to_string();
+    assert!(error.contains("found a PNG image with a damaged signature"), "{error}");
+}

@@ -11,7 +11,7 @@ use std::path::Path;
 /// An open file whose shapes fit together.
 pub(super) struct Opened {
     fields: Fields,
-    side: Side,
+    pub(super) side: Side,
     /// The row shown k-th; `None` for a row that was not read.
     rows: Vec<Option<u32>>,
     form: Form,
@@ -78,6 +78,11 @@ impl Opened {
             });
         let simulated = read_simulated(&mut fields);
         Ok(Self { fields, side, rows, form, readings, reference, simulated, notes })
+    }
+
+    /// Number of patterns, those that were not read included.
+    pub(super) fn patterns(&self) -> usize {
+        self.rows.len()
     }
 
     /// Reads the measurement of this index, without the patterns that were not read.

@@ -69,6 +69,17 @@ fn a_good_file_reads_however_it_was_zipped() {
 }
 
 #[test]
+fn bytes_that_would_become_gigabytes_of_numbers_are_refused_before_they_are_read() {
+    // 90 MiB in the file, 720 MiB as numbers; zeros are packed a thousandfold.
+    let y = npy("'|u1'", true, "(31457280, 3)", &[]);
+    let refused = refusal(&with("d.npy", y), &Selection { field: Some("d".into()), ..as_is() });
+    assert!(
+        refused.contains("`d` claims shape (31457280, 3), expected at most 512 MiB"),
+        "{refused}"
+    );
+}
+
+#[test]
 fn differences_are_taken_where_there_are_no_raw_readings() {
     let found = read_members(&with("y.npy", vec![]), &as_is()).unwrap();
     assert_eq!(found.readings, Readings::Differential(vec![4.0, -1.0, -0.5]));

@@ -175,6 +175,10 @@ fn what_is_wrong_with_a_matrix_is_named() {
     weights[6] = f64::NAN;
     assert!(refused(&weights).contains("matrix is NaN at [1, 2]"), "{}", refused(&weights));
     assert!(refused(&[0.0; 8]).contains("rank 0"));
+    // One weight whose square leaves the range of floating point is a weight all the same.
+    for weight in [1e160, 1e-160] {
+        assert_eq!(OwnMatrix::new(side, &[weight, 0.0, 0.0, 0.0]).unwrap().rank(), 1);
+    }
     let own = OwnMatrix::new(side, &[1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0]).unwrap();
     assert_eq!((own.rank(), own.unseen_pixels(), own.patterns()), (2, 2, 2));
     let sound = MatrixSettings::new(MatrixMethod::Omp);
