@@ -3,6 +3,7 @@
 use super::ArchiveError;
 use crate::files::FileError;
 use serde::Serialize;
+use std::ffi::OsStr;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -53,7 +54,7 @@ fn collect(folder: &Path, prefix: &str, names: &mut Vec<String>) -> Result<(), F
 }
 
 fn is_measurement(path: &Path) -> bool {
-    let ending = path.extension().map(|ending| ending.to_ascii_lowercase());
+    let ending = path.extension().map(OsStr::to_ascii_lowercase);
     ENDINGS.iter().any(|known| ending.as_deref().is_some_and(|ending| ending == *known))
 }
 

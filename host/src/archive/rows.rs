@@ -35,7 +35,7 @@ pub enum RowsError {
     Source(#[from] SourceError),
     /// The recording cannot be read.
     #[error(transparent)]
-    Recording(#[from] ExportError),
+    Recording(Box<ExportError>),
     /// A measurement gives no image.
     #[error(transparent)]
     Solver(#[from] SolverError),
@@ -47,7 +47,7 @@ pub enum RowsError {
         path: PathBuf,
         /// The problem.
         #[source]
-        problem: FramesError,
+        problem: Box<FramesError>,
     },
     /// Networks take real images only.
     #[error("{}: complex readings, expected real ones for the networks: choose a part with --part real or --part imaginary", .0.display())]
@@ -91,7 +91,7 @@ impl RowReader {
     /// gives none.
     pub fn rows(&self, path: &Path, name: &str) -> Result<Vec<Row>, RowsError> {
         let read = match self.source.fits_recording(path)? {
-            true => self.of_recording(path)?,
+            true => self.of_recording(path).map_err(|error| RowsError::Recording(error.into()))?,
             false => self.of_file(path)?,
         };
         if self.enhances() && read.iter().any(|(_, source)| source.imaginary.is_some()) {
@@ -133,8 +133,9 @@ impl RowReader {
     ) -> Result<(), RowsError> {
         let Some(device) = &self.enhance else { return Ok(()) };
         let frames: Vec<_> = used.iter().map(|(image, used)| (image, used.rows())).collect();
-        let (pixels, reports) = super::networks::enhance(device, &frames)
-            .map_err(|problem| RowsError::Enhance { path: path.to_owned(), problem })?;
+        let (pixels, reports) = super::networks::enhance(device, &frames).map_err(|problem| {
+            RowsError::Enhance { path: path.to_owned(), problem: problem.into() }
+        })?;
         let images = pixels.chunks_exact(pixels.len() / rows.len().max(1));
         for ((row, image), report) in rows.iter_mut().zip(images).zip(reports) {
             row.enhanced = Some(image.to_vec());
