@@ -40,7 +40,7 @@ fn a_terminal_shows_the_newest_frames_as_an_image() {
     let written = written_to_a_terminal(None, &[]);
     let pixels = written.matches('▀').count();
     // Each drawing has 16 lines of 32 characters.
-    assert!(pixels > 0 && pixels % 512 == 0, "{pixels}");
+    assert!(pixels > 0 && pixels.is_multiple_of(512), "{pixels}");
     assert!(written.contains("received"), "{written:?}");
 }
 
