@@ -70,9 +70,11 @@ pub mod integrate;
 #[cfg(feature = "training")]
 pub mod legibility;
 pub mod link;
+#[cfg(not(target_family = "wasm"))]
 mod parquet;
 #[cfg(feature = "pictures")]
 pub mod picture;
+#[cfg(not(target_family = "wasm"))]
 pub mod reconstruct;
 pub mod recording;
 pub mod replay;
