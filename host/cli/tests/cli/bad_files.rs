@@ -248,12 +248,22 @@ fn an_interrupted_command_leaves_nothing_of_its_own() {
     let bench = Bench::new();
     let many = vec![0.5; 4000 * 64 * 64];
     bench.write("many.npy", &nirspi::files::npy::encode(&[4000, 64, 64], &many));
-    for signal in ["INT", "TERM", "HUP"] {
-        let before = bench.names();
+    let before = bench.names();
+    let interrupted = |signal| {
         let mut deblur = bench.start(&["deblur", "many.npy", "--model", "wiener", "--out", "of"]);
         deblur.has_made(&bench.path("of"));
         deblur.signal(signal);
         let outcome = deblur.wait();
-        assert_eq!((outcome.code, bench.names()), (Some(130), before), "{signal}: {outcome:?}");
+        // On a busy machine the command may end before the signal comes; then it is done again.
+        if outcome.code == Some(0) {
+            std::fs::remove_dir_all(bench.path("of")).unwrap();
+            std::fs::remove_file(bench.path("of.picture.png")).unwrap();
+            return None;
+        }
+        Some(outcome)
+    };
+    for signal in ["INT", "TERM", "HUP"] {
+        let outcome = (0..5).find_map(|_| interrupted(signal)).expect("always too late");
+        assert_eq!((outcome.code, bench.names()), (Some(130), before.clone()), "{outcome:?}");
     }
 }
