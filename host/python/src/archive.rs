@@ -20,14 +20,14 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 enum Kind {
-    Files(ImageFiles),
+    Files(Box<ImageFiles>),
     Grid(Box<Grid>),
 }
 
 impl Kind {
     fn work(&self) -> &dyn Work {
         match self {
-            Self::Files(files) => files,
+            Self::Files(files) => &**files,
             Self::Grid(grid) => &**grid,
         }
     }
@@ -96,10 +96,11 @@ impl Table {
             if let Some(device) = device {
                 reader = reader.enhanced(device);
             }
-            Ok(Self(Kind::Files(match names {
+            let files = match names {
                 Some(names) => ImageFiles::named(&folder, names, reader),
                 None => ImageFiles::of(&folder, reader).map_err(of_archive)?,
-            })))
+            };
+            Ok(Self(Kind::Files(Box::new(files))))
         })
     }
 

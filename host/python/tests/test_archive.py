@@ -118,7 +118,7 @@ def test_a_sweep_is_measured_and_has_a_card(tmp_path):
         (lambda p: ns.Archive([]), "no file, expected at least one"),
         (lambda p: ns.Archive([p / "a", p / "a"]), "stands twice"),
         (lambda p: ns.Archive(p), "no measurement files in the folder"),
-        (lambda p: ns.Archive([p / "a"], methd="omp"), "unknown option 'methd'"),
+        (lambda p: ns.Archive([p / "a"], how="omp"), "unknown option 'how'"),
         (lambda p: ns.Archive([p / "a"], method="magic"), "magic"),
         (lambda p: ns.Archive([p / "a"], sparsity=3), "sparsity belongs to"),
         (lambda p: ns.Archive([p / "a"], dictionary=np.zeros(3)), "expected the path"),
