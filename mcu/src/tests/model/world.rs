@@ -526,9 +526,9 @@ impl World {
         }
         let head = fpga.frame.as_ref().map(|frame| &frame[..40]);
         if busy {
-            head.hash(hash)
+            head.hash(hash);
         } else {
-            head.is_some().hash(hash)
+            head.is_some().hash(hash);
         }
         // Whether the FPGA holds the settings of the only configuration decides whether it starts.
         if machine.setup.is_some() {
