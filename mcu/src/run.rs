@@ -297,16 +297,20 @@ impl Run {
         if !may_come || !bus.frame_ready() {
             return packed;
         }
-        let has_come = match bus.frame() {
+        let (has_come, sequence) = match bus.frame() {
             Ok(None) => return packed,
-            Ok(Some(_)) => true,
-            Err(_) => false,
+            Ok(Some(bytes)) => (true, FpgaFrame::parse_header(bytes).map(|found| found.sequence)),
+            Err(_) => (false, None),
         };
         // Frames go out in order.
         self.pack_kept(now, &mut path, bus, sink);
         // At the end of a run no next frame is worth waiting for.
         if has_come && self.is_lit() && bus.keep() {
             self.kept = Some(now);
+            // Its checksum is looked at when it is packed. A frame that comes again is no progress.
+            if sequence.is_some() && sequence != self.last_sequence {
+                self.last_frame = now;
+            }
             *release_pending = fpga::release(bus).is_err();
             return true;
         }

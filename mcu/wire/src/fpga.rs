@@ -167,7 +167,7 @@ impl<'a> FpgaFrame<'a> {
         Ok(Self { header, sums: covered.get(HEADER_BYTES..).ok_or(FrameError::Length)? })
     }
 
-    /// The header alone, of which only the magic is checked, for tools that make frames.
+    /// The header alone, of which only the magic is checked.
     #[must_use]
     pub fn parse_header(bytes: &[u8]) -> Option<Header> {
         bytes.first_chunk().and_then(Header::from_bytes)
