@@ -165,7 +165,12 @@ def run(
     ray = _ray()
     began = time.monotonic()
     folder = _Folder(os.fspath(out))
-    plan: dict[str, Any] = {"nirspi": __version__, "settings": work.settings, "items": items, "names": work.names}
+    plan: dict[str, Any] = {
+        "nirspi": __version__,
+        "settings": work.settings,
+        "items": items,
+        "names": work.names,
+    }
     there = folder.names()
     if _PLAN in there:
         if not resume:
