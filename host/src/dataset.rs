@@ -58,7 +58,7 @@ pub(crate) const ARCHIVE: [Field; 23] = [
 ];
 
 /// One measurement, with what is known of it. A dataset needs every field that is no `Option` in
-/// [`DATASET`].
+/// `DATASET`.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Row {
     /// Name of the measurement, unlike that of any other.

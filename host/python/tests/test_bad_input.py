@@ -185,6 +185,8 @@ def test_a_child_of_fork_computes():
 def test_ctrl_c_ends_long_work():
     program = """
         import os, signal, threading, time
+        # A shell that runs the tests in the background has it ignored.
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         import numpy as np
         import nirspi as ns
         H = ns.Hadamard(32)

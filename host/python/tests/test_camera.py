@@ -211,6 +211,8 @@ def test_ctrl_c_ends_the_run_at_once(call):
     """In a process of its own, because the signal goes to the main thread."""
     program = f"""
         import os, signal, threading, time
+        # A shell that runs the tests in the background has it ignored.
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         import nirspi as ns
         camera = ns.Camera("virtual", sampling=0.05, sweeps=50)
         threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()

@@ -16,7 +16,7 @@ use nirspi_wire::register::{Register, control, status};
 /// answers no host meanwhile.
 const PATIENCE_CLOCKS: u64 = 1 << 24;
 
-/// An FPGA that repeats its first frames. Frames that take longer than [`PATIENCE_CLOCKS`] are not
+/// An FPGA that repeats its first frames. Frames that take longer than 0.13 s of the camera's time are not
 /// repeated: the model then makes each of them.
 pub struct PrecomputedFpga<F> {
     model: F,
