@@ -120,6 +120,8 @@ pub(crate) struct Run {
     last_sequence: Option<u32>,
     /// The bus keeps a frame that has not been packed, since then.
     kept: Option<Micros>,
+    /// Number of the frame that was kept last, which may be a damaged one.
+    last_kept: Option<u32>,
     /// The kept frame could not be read, and is not counted yet.
     damaged: bool,
     ending: Option<Ending>,
@@ -212,6 +214,7 @@ impl Run {
             last_frame: now,
             last_sequence: None,
             kept: None,
+            last_kept: None,
             damaged: false,
             ending: None,
         };
@@ -226,7 +229,7 @@ impl Run {
 
     /// What the rest of the run depends on, with ages for times.
     #[cfg(test)]
-    pub fn key(&self, age: impl Fn(Micros) -> u64) -> [u64; 8] {
+    pub fn key(&self, age: impl Fn(Micros) -> u64) -> [u64; 9] {
         let ending = self.ending.as_ref();
         let length = match self.length {
             RunLength::Continuous => 0,
@@ -239,6 +242,7 @@ impl Run {
             self.kept.map_or(u64::MAX, &age),
             self.damaged.into(),
             self.last_sequence.map_or(0, |last| u64::from(last) + 1),
+            self.last_kept.map_or(0, |last| u64::from(last) + 1),
             ending.map_or(u64::MAX, |ending| age(ending.since)),
             ending.and_then(|ending| ending.reply).map_or(0, |(id, _)| u64::from(id) + 1),
         ]
@@ -307,10 +311,12 @@ impl Run {
         // At the end of a run no next frame is worth waiting for.
         if has_come && self.is_lit() && bus.keep() {
             self.kept = Some(now);
-            // Its checksum is looked at when it is packed. A frame that comes again is no progress.
-            if sequence.is_some() && sequence != self.last_sequence {
+            // Its checksum is looked at when it is packed. A frame that comes again, whole or damaged,
+            // is no progress.
+            if sequence.is_some() && ![self.last_sequence, self.last_kept].contains(&sequence) {
                 self.last_frame = now;
             }
+            self.last_kept = sequence;
             *release_pending = fpga::release(bus).is_err();
             return true;
         }

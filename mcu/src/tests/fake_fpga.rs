@@ -25,7 +25,7 @@ pub struct FakeFpga {
     pub raw: Option<Vec<u8>>,
     /// There is memory for a second frame.
     pub keeps: bool,
-    kept: Option<Vec<u8>>,
+    pub kept: Option<Vec<u8>>,
     /// The kept frame, once it has been given.
     gone: Option<Vec<u8>>,
     /// A start completes all frames of the run before the next register read.

@@ -331,6 +331,26 @@ fn with_a_second_buffer_the_fpga_has_its_own_back_before_the_frame_is_packed() {
     assert_eq!(frames(&device.heard()).len(), 1, "packed during the transfer");
 }
 
+#[test]
+fn a_run_of_frames_that_come_slowly_goes_on() {
+    for bus in [bus(), bus_of_two()] {
+        let mut device = Device::new(bus);
+        device.ask(Command::Configure(SMALL));
+        device.ask(Command::Start(RunLength::Continuous));
+        for _ in 0..5 {
+            device.bus.port().fpga.make_frame();
+            device.turn(&[]);
+            // The transfer takes longer than the patience with an FPGA that makes no frame.
+            device.now.0 += Limits::default().stall_min.0 + 50_000;
+            device.turn(&[]);
+        }
+        device.now.0 += 2_000;
+        device.turn(&[]);
+        let heard = device.heard();
+        assert_eq!((frames(&heard).len(), events(&heard).len()), (5, 0));
+    }
+}
+
 /// A transfer over an emulated board's serial line takes longer than the end of a run waits.
 #[test]
 fn a_frame_that_comes_slowly_at_the_end_of_a_run_is_sent() {

@@ -11,7 +11,7 @@ use nirspi_wire::{
     RunLength, State, crc32, version,
 };
 use std::format;
-use std::hash::{Hash, Hasher};
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::string::String;
 
 /// One step of time: longer than every patience of 100 ms in the firmware.
@@ -62,6 +62,8 @@ pub enum Action {
     Latch,
     /// The firmware crashes and restarts. The FPGA goes on.
     Crash,
+    /// The board packs the kept frame, while it transfers the next one.
+    Pack,
     Begin(Trouble),
     End(Trouble),
 }
@@ -125,8 +127,8 @@ fn age(now: Micros) -> impl Fn(Micros) -> u64 + Copy {
 }
 
 impl World {
-    /// Power-up, and the first poll.
-    pub fn new() -> Self {
+    /// Power-up, and the first poll. `keeps`: the bus has memory for a second frame.
+    pub fn new(keeps: bool) -> Self {
         let limits = Limits {
             host_silence: Micros(2 * TICK),
             stall_min: Micros(TICK + TICK / 2),
@@ -134,6 +136,7 @@ impl World {
         };
         let mut bench = Bench::new();
         bench.camera = Camera::new(bench.camera.machine().info.clone(), limits);
+        bench.fpga.keeps = keeps;
         let mut world =
             Self { bench, troubles: 0, seen: Seen::default(), last_command: Micros(0), starved: 0 };
         world.poll().expect("a camera after power-up");
@@ -153,6 +156,7 @@ impl World {
             Action::Close => !matches!(self.bench.camera.machine().session, Session::Closed),
             Action::Frame => fpga.running && fpga.made < FRAMES,
             Action::Spoil => fpga.frame.is_some(),
+            Action::Pack => fpga.kept.is_some(),
             Action::Latch => fpga.fault == FaultCode::None,
             Action::Begin(trouble) => {
                 !self.stands(trouble) && self.troubles.count_ones() < troubles
@@ -185,6 +189,11 @@ impl World {
                     frame[33] ^= 0x10;
                 }
                 Ok(())
+            }
+            Pack => {
+                let Bench { camera, fpga, link, now, .. } = &mut self.bench;
+                camera.pack(*now, &fpga.kept.take().unwrap_or_default(), link);
+                self.hear()
             }
             Reset => {
                 self.bench.fpga.reset();
@@ -465,7 +474,7 @@ impl World {
     /// What decides everything that can follow. Left out: absolute times, numbers of runs, the signal
     /// meter, the count of damaged commands, and counters and buffers of a run that is over.
     pub fn key(&self) -> u64 {
-        let hash = &mut Mixer::default();
+        let hash = &mut DefaultHasher::new();
         let Bench { camera, fpga, now, .. } = &self.bench;
         let machine = camera.machine();
         let age = age(*now);
@@ -530,6 +539,7 @@ impl World {
         } else {
             head.is_some().hash(hash);
         }
+        fpga.kept.as_ref().filter(|_| in_run).map(|frame| &frame[..40]).hash(hash);
         // Whether the FPGA holds the settings of the only configuration decides whether it starts.
         if machine.setup.is_some() {
             let configured = crate::configure::check(&SMALL, &machine.limits).ok();
@@ -551,26 +561,5 @@ fn id_of(action: Action) -> u16 {
         Action::Stranger => 2,
         Action::StartEndless | Action::StartTwo => 3,
         _ => 4,
-    }
-}
-
-/// Mixes words as wyhash does: the keys of a walk are hashed millions of times.
-#[derive(Default)]
-struct Mixer(u64);
-
-impl Hasher for Mixer {
-    fn write(&mut self, bytes: &[u8]) {
-        for chunk in bytes.chunks(8) {
-            let mut word = [0; 8];
-            word[..chunk.len()].copy_from_slice(chunk);
-            let word = u64::from_le_bytes(word) ^ (chunk.len() as u64) << 56;
-            let wide = u128::from(self.0 ^ word ^ 0xA076_1D64_78BD_642F)
-                .wrapping_mul(0xE703_7ED1_A0B4_28DB_8EBC_6AF0_9C88_C6E3);
-            self.0 = (wide >> 64) as u64 ^ wide as u64;
-        }
-    }
-
-    fn finish(&self) -> u64 {
-        self.0
     }
 }
