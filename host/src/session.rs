@@ -103,19 +103,25 @@ impl Listener for IgnorePackets {
 }
 
 /// Keeps the reports that a camera sends with its greeting, in words. At most [`Reports::MOST`]
-/// lines are kept, and the last line says that more arrived.
-#[derive(Debug, Default)]
-pub struct Reports(pub Vec<String>);
+/// lines are kept, and the last line says that more arrived. A crash is kept after any number of
+/// lines, because light depends on it.
+#[derive(Debug, Clone, Default)]
+pub struct Reports {
+    /// The reports, one line each.
+    pub lines: Vec<String>,
+    /// The firmware's last crash, in one line.
+    pub crash: Option<String>,
+}
 
 impl Reports {
     /// The most lines that are kept.
     pub const MOST: usize = 100;
 
     fn keep(&mut self, report: Option<String>) {
-        match (report, self.0.len() + 1) {
-            (Some(report), ..Self::MOST) => self.0.push(report),
+        match (report, self.lines.len() + 1) {
+            (Some(report), ..Self::MOST) => self.lines.push(report),
             (Some(_), Self::MOST) => {
-                self.0.push("the camera reported more than is shown".to_owned());
+                self.lines.push("the camera reported more than is shown".to_owned());
             }
             _ => {}
         }
@@ -124,6 +130,9 @@ impl Reports {
 
 impl Listener for Reports {
     fn packet(&mut self, _: &[u8], content: &Result<DeviceMessage<'_>, PacketError>) {
+        if let Ok(DeviceMessage::Crash(report)) = content {
+            self.crash = Some(events::crash(report));
+        }
         self.keep(match content {
             Ok(DeviceMessage::Event(event)) => events::at_greeting(&event.kind),
             Ok(DeviceMessage::Crash(report)) => Some(events::crash(report)),
@@ -141,7 +150,7 @@ impl Listener for Reports {
 pub struct Session {
     conversation: Conversation,
     identity: CameraIdentity,
-    reports: Vec<String>,
+    reports: Reports,
     recorded: Option<Recorded>,
 }
 
@@ -171,7 +180,7 @@ impl Session {
                     let what = design_in_words(Design::BringUp);
                     reports.keep(Some(format!("the camera runs the gateware for {what}")));
                 }
-                Ok(Self { conversation, identity, reports: reports.0, recorded: None })
+                Ok(Self { conversation, identity, reports, recorded: None })
             }
             Ok(identity) => Err(SessionError::Version { camera: identity.protocol }),
             Err(SessionError::Closed { mid_packet: false }) => Err(SessionError::TurnedAway),
@@ -200,7 +209,7 @@ impl Session {
     /// Reports that the camera sent with its greeting: events while no host was connected, in
     /// words.
     #[must_use]
-    pub fn reports(&self) -> &[String] {
+    pub fn reports(&self) -> &Reports {
         &self.reports
     }
 
@@ -208,11 +217,11 @@ impl Session {
     ///
     /// # Errors
     /// As [`command`](Self::command).
-    pub fn await_reports(&mut self) -> Result<&[String], SessionError> {
+    pub fn await_reports(&mut self) -> Result<&Reports, SessionError> {
         // Reports come before the answer to the next command.
-        let mut reports = Reports(std::mem::take(&mut self.reports));
+        let mut reports = std::mem::take(&mut self.reports);
         let answered = self.status(&mut reports);
-        self.reports = reports.0;
+        self.reports = reports;
         answered.map(|_| self.reports())
     }
 

@@ -20,6 +20,8 @@ use nirspi::virtual_camera::{MemoryLink, VirtualOptics, read_camera_model};
 use nirspi_optics::{CameraModel, Scene};
 use nirspi_recon::Order;
 use nirspi_wire::tunnel::{REQUEST_BYTES, Request};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
 use std::fmt::Display;
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -37,25 +39,7 @@ fn told<T>(result: Result<T, impl Display>) -> Result<(), String> {
     result.map(drop).map_err(|error| error.to_string())
 }
 
-/// A generator of numbers from a seed (splitmix64).
-struct Dice(u64);
-
-impl Dice {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    }
-
-    /// A number below `end`.
-    fn below(&mut self, end: usize) -> usize {
-        (self.next() % end.max(1) as u64) as usize
-    }
-}
-
-/// What files lie about most: lengths, counts, numbers that are none.
+/// Values that damaged files often have: wrong lengths and counts, NaN and infinity.
 const LIES: [&[u8]; 10] = [
     &[0xFF; 8],
     &[0; 8],
@@ -70,33 +54,33 @@ const LIES: [&[u8]; 10] = [
 ];
 
 /// A damaged copy: one to four changes, each of a kind that damage or malice makes.
-fn damaged(whole: &[u8], dice: &mut Dice) -> Vec<u8> {
+fn damaged(whole: &[u8], dice: &mut Pcg64Mcg) -> Vec<u8> {
     let mut bytes = whole.to_vec();
-    for _ in 0..=dice.below(4) {
-        let at = dice.below(bytes.len());
-        match dice.below(7) {
-            0 if !bytes.is_empty() => bytes[at] ^= 1 << dice.below(8),
+    for _ in 0..=dice.random_range(0..4) {
+        let at = dice.random_range(0..bytes.len().max(1));
+        match dice.random_range(0..7) {
+            0 if !bytes.is_empty() => bytes[at] ^= 1 << dice.random_range(0..8),
             1 => bytes.truncate(at),
-            2 => bytes.insert(at, dice.next() as u8),
+            2 => bytes.insert(at, dice.random()),
             3 => {
-                let end = (at + dice.below(16)).min(bytes.len());
+                let end = (at + dice.random_range(0..16)).min(bytes.len());
                 bytes.drain(at..end);
             }
             4 => {
-                let lie = LIES[dice.below(LIES.len())];
+                let lie = LIES[dice.random_range(0..LIES.len())];
                 let end = (at + lie.len()).min(bytes.len());
                 drop(bytes.splice(at..end, lie.iter().copied()));
             }
             5 => {
                 // A part of the file comes twice.
-                let end = (at + dice.below(64)).min(bytes.len());
+                let end = (at + dice.random_range(0..64)).min(bytes.len());
                 let part = bytes[at..end].to_vec();
                 drop(bytes.splice(at..at, part));
             }
             // A digit of a text is another digit.
             _ => {
                 if let Some(digit) = bytes.iter_mut().skip(at).find(|byte| byte.is_ascii_digit()) {
-                    *digit = b'0' + dice.below(10) as u8;
+                    *digit = b'0' + dice.random_range(0..10) as u8;
                 }
             }
         }
@@ -112,7 +96,7 @@ fn survives(name: &str, whole: &[u8], read: Reader<'_>) {
     assert_eq!(read(&path), Ok(()), "the file as it is");
     let mut refused = 0;
     for case in 0..CASES {
-        let bytes = damaged(whole, &mut Dice(case));
+        let bytes = damaged(whole, &mut Pcg64Mcg::seed_from_u64(case));
         std::fs::write(&path, &bytes).unwrap();
         let begun = Instant::now();
         if let Err(line) = read(&path) {
@@ -253,11 +237,11 @@ fn bitstreams() {
 
 #[test]
 fn requests_of_the_tunnel() {
-    let mut dice = Dice(1);
+    let mut dice = Pcg64Mcg::seed_from_u64(1);
     let mut taken = 0;
     for _ in 0..100_000 {
         let mut bytes = [0; REQUEST_BYTES];
-        bytes.fill_with(|| dice.next() as u8);
+        bytes.fill_with(|| dice.random());
         let mut head = Request::from_bytes(&bytes);
         if head.is_none() {
             // The same with a right checksum.

@@ -12,7 +12,7 @@ use nirspi::virtual_camera::MemoryLink;
 /// virtual camera.
 pub fn open(address: &CameraAddress, scene: &SceneArgs) -> Result<Session> {
     let mut session = open_quietly(address, scene)?;
-    for report in session.await_reports().with_context(|| address.to_string())? {
+    for report in &session.await_reports().with_context(|| address.to_string())?.lines {
         print::remark(format_args!("before this, {report}"));
     }
     Ok(session)

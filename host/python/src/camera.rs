@@ -134,7 +134,7 @@ impl Camera {
         let identity = serde_json::to_string(session.identity());
         Ok(Self {
             identity: identity.map_err(|error| refused(error.to_string()))?,
-            reports: session.reports().to_vec(),
+            reports: session.reports().lines.clone(),
             state: Arc::new(Mutex::new(State::Idle(Box::new(session)))),
             setup,
             calibrated,

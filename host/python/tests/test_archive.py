@@ -12,7 +12,7 @@ import nirspi as ns
 
 @pytest.fixture
 def folder(tmp_path, random):
-    """Seven measurements in six good files, a file that is none, and one that is no measurement."""
+    """Six good files with seven measurements, one damaged file, and one without a measurement."""
     place = tmp_path / "archive"
     (place / "b").mkdir(parents=True)
     for k in range(5):

@@ -49,6 +49,11 @@ const GROUP_ROWS: usize = 256;
 /// Bytes of values from which on a group is full.
 const GROUP_BYTES: usize = 32 << 20;
 
+/// Whether rows are enough for a group.
+fn is_full(rows: &Rows) -> bool {
+    rows.count() >= GROUP_ROWS || rows.bytes() >= GROUP_BYTES
+}
+
 /// What gives the rows of a table, item by item.
 pub trait Work: Sync {
     /// The name of each item. A table has the items in this order.
@@ -62,7 +67,7 @@ pub trait Work: Sync {
     /// What the rows depend on. A run is continued only with the same settings.
     fn settings(&self) -> Map<String, Value>;
 
-    /// The rows of an item. The error is the reason why there is none, in one line.
+    /// The rows of an item. The error says in one line why an item has no rows.
     ///
     /// # Errors
     /// The reason in one line.
@@ -147,7 +152,7 @@ pub fn archive(
             Ok(made) => {
                 for row in &made {
                     rows.add(row);
-                    if rows.count() == GROUP_ROWS || rows.bytes() >= GROUP_BYTES {
+                    if is_full(&rows) {
                         journal.add_group(rows.take().map_err(|error| io_error(out, error))?);
                     }
                 }
@@ -221,7 +226,7 @@ pub fn archive_part(
                     for row in &made {
                         rows.add(row);
                         total += 1;
-                        if rows.count() == GROUP_ROWS || rows.bytes() >= GROUP_BYTES {
+                        if is_full(&rows) {
                             table.group(&rows.take().map_err(failed)?).map_err(failed)?;
                         }
                     }

@@ -119,7 +119,7 @@ pub(super) fn reconnect(
 pub(super) fn why_dark(session: &mut Session) -> Option<String> {
     // A camera that does not answer will not measure either; the measurement then reports the
     // reason.
-    let crash = session.await_reports().ok()?.iter().find(|told| events::is_crash(told)).cloned();
+    let crash = session.await_reports().ok()?.crash.clone();
     let fault = session.status(&mut IgnorePackets).ok()?.fault;
     fault.map(switched_off).or(crash)
 }
@@ -263,7 +263,7 @@ impl Live {
     /// Records that a session begins.
     pub(super) fn greeted(&mut self, connected: &mut Connected) {
         let Connected { session, note, flat_field, .. } = connected;
-        for text in session.reports().iter().cloned().chain(note.take()) {
+        for text in session.reports().lines.iter().cloned().chain(note.take()) {
             lock(&self.shared.camera).event(text);
         }
         if let Some(kept) = flat_field {

@@ -4,6 +4,8 @@
 
 use super::lock;
 use crate::link::{Link, Received};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
 use serde::{Deserialize, Serialize};
 use std::io;
 use std::sync::{Arc, Mutex};
@@ -53,7 +55,7 @@ pub struct LineState {
 #[derive(Debug)]
 struct Inner {
     state: LineState,
-    random: u64,
+    random: Pcg64Mcg,
 }
 
 /// A line, shared by the page and the links of all sessions.
@@ -64,7 +66,10 @@ impl Line {
     /// A line without damage, whose later damage is drawn by this seed.
     #[must_use]
     pub fn new(seed: u64) -> Self {
-        Self(Arc::new(Mutex::new(Inner { state: LineState::default(), random: seed })))
+        Self(Arc::new(Mutex::new(Inner {
+            state: LineState::default(),
+            random: Pcg64Mcg::seed_from_u64(seed),
+        })))
     }
 
     /// Changes the share of damaged bytes. Returns the line's state.
@@ -102,33 +107,18 @@ impl Line {
         let mut kept = 0;
         for at in 0..bytes.len() {
             let mut byte = bytes[at];
-            if inner.share() < inner.state.damage {
-                if inner.share() < DROPPED {
+            if inner.random.random_bool(inner.state.damage) {
+                if inner.random.random_bool(DROPPED) {
                     inner.state.dropped += 1;
                     continue;
                 }
-                byte ^= 1 << (inner.next() % 8);
+                byte ^= 1 << inner.random.random_range(0..8);
                 inner.state.flipped += 1;
             }
             bytes[kept] = byte;
             kept += 1;
         }
         kept
-    }
-}
-
-impl Inner {
-    /// SplitMix64 (G. Steele, D. Lea, C. Flood, OOPSLA 2014).
-    fn next(&mut self) -> u64 {
-        self.random = self.random.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mixed = (self.random ^ (self.random >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        mixed ^ (mixed >> 31)
-    }
-
-    /// A number in [0, 1).
-    fn share(&mut self) -> f64 {
-        (self.next() >> 11) as f64 / (1u64 << 53) as f64
     }
 }
 

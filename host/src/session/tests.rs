@@ -4,7 +4,8 @@ use super::*;
 use crate::link::Received;
 use nirspi_wire::packet::MAX_DEVICE_PACKET;
 use nirspi_wire::{
-    Answer, Capabilities, Event, EventKind, Fault, Refusal, Reply, State, Tail, Version, encode,
+    Answer, Capabilities, CrashReport, Event, EventKind, Fault, Refusal, Reply, State, Tail,
+    Version, encode,
 };
 use std::io;
 
@@ -85,8 +86,8 @@ fn what_a_camera_reports_with_its_greeting_is_kept_and_an_earlier_hosts_mess_is_
     let later = [event(EventKind::Fault(Fault::Duty)), reply(1, Answer::Status(STATUS))].concat();
     let link = Scripted(vec![greeting.concat(), later]);
     let mut session = Session::open(Box::new(link)).unwrap();
-    assert_eq!(session.reports().len(), 1, "{:?}", session.reports());
-    let reports = session.await_reports().unwrap();
+    assert_eq!(session.reports().lines.len(), 1, "{:?}", session.reports());
+    let reports = &session.await_reports().unwrap().lines;
     assert!(
         reports[0].contains("no command") && reports[1].contains("lit over time"),
         "{reports:?}"
@@ -98,11 +99,13 @@ fn a_camera_that_never_stops_reporting_fills_no_memory() {
     let fault = event(EventKind::Fault(Fault::Duty));
     let greeting = [fault.repeat(5000), reply(0, Answer::Hello(IDENTITY))].concat();
     let mut chunks: Vec<Vec<u8>> = greeting.chunks(4096).map(<[u8]>::to_vec).collect();
-    chunks.push([fault.repeat(1000), reply(1, Answer::Status(STATUS))].concat());
+    let crash = packet(DeviceMessage::Crash(CrashReport { uptime_us: 1, text: "main.rs:7" }));
+    chunks.push([fault.repeat(1000), crash, reply(1, Answer::Status(STATUS))].concat());
     let mut session = Session::open(Box::new(Scripted(chunks))).unwrap();
-    let reports = session.await_reports().unwrap();
-    assert_eq!(reports.len(), Reports::MOST);
-    assert!(reports.last().unwrap().contains("more"), "{reports:?}");
+    let Reports { lines, crash } = session.await_reports().unwrap();
+    assert_eq!(lines.len(), Reports::MOST);
+    assert!(lines.last().unwrap().contains("more"), "{lines:?}");
+    assert!(crash.as_ref().is_some_and(|told| told.contains("main.rs:7")), "{crash:?}");
 }
 
 /// Counts the received packets, with a separate count of damaged ones.

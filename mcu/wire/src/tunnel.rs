@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn nobody_is_asked_for_more_than_a_frame() {
+    fn a_request_for_more_than_a_frame_is_refused() {
         let ask = |argument| {
             let request = Request { opcode: READ_FRAME, number: 1, address: 0, argument };
             Request::from_bytes(&request.to_bytes())

@@ -22,7 +22,7 @@ use std::time::Duration;
 
 /// 8 us, the step of the virtual camera.
 const STEP_CLOCKS: u32 = 1000;
-/// The longest host silence of these cameras, so that nobody waits for five seconds of it. A host that listens
+/// The longest host silence of these cameras, shorter than the usual five seconds to save time. A host that listens
 /// asks for the status every second of its own clock.
 const SILENCE: Micros = Micros(3_000_000);
 

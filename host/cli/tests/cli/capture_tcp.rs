@@ -163,9 +163,9 @@ fn a_second_host_is_told_that_the_camera_is_taken() {
 fn devices_lists_the_camera_that_answers_and_says_why_another_does_not() {
     let bench = Bench::new();
     let (_server, camera) = serve(&bench, &["--seed", "42"]);
-    let nobody = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();
+    let closed = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();
     let address = camera.strip_prefix("tcp:").unwrap();
-    let outcome = bench.run(&["devices", "--json", "--tcp", address, "--tcp", &nobody]);
+    let outcome = bench.run(&["devices", "--json", "--tcp", address, "--tcp", &closed]);
     assert_eq!(outcome.code, Some(1), "{outcome:?}");
     let devices = outcome.json();
     assert_eq!(devices[0]["camera"], "virtual");
@@ -173,7 +173,7 @@ fn devices_lists_the_camera_that_answers_and_says_why_another_does_not() {
     assert_eq!(devices[1]["identity"]["serial"], "virtual-42");
     assert!(devices[2]["problem"].as_str().unwrap().contains("refused"), "{devices}");
     // An exit code of 1 is explained on stderr.
-    outcome.failed(1, &[&nobody, "refused"]);
+    outcome.failed(1, &[&closed, "refused"]);
 }
 
 /// Stands between camera and host, and hands what the camera says to `tamper`, which returns `false` to hang up.

@@ -117,7 +117,7 @@ fn without_a_gpu_auto_says_so_once_and_goes_on() {
     let bench = Bench::new();
     let arguments = ["bench", "omp", "--measurements", "64", "--sparsity", "4", "--repeats", "1"];
     let run = |more: &[&str]| bench.run(&[&arguments[..], more].concat());
-    // Too little for a GPU, or none asked for: nobody looks.
+    // The batch is too small for a GPU, or the CPU was chosen: the program looks for no GPU.
     assert_eq!(run(&["--frames", "63"]).succeeded().json()["backend"], "cpu");
     assert_eq!(run(&["--frames", "64", "--backend", "cpu"]).succeeded().json()["backend"], "cpu");
     let said = run(&["--frames", "64"]);

@@ -79,7 +79,7 @@ def cluster(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def archive(tmp_path_factory):
-    """Two hundred measurements, and three files that are none."""
+    """200 measurement files, and three files that hold no measurement."""
     place = tmp_path_factory.mktemp("archive")
     random = np.random.default_rng(20261121)
     for k in range(200):

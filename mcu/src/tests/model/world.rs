@@ -408,7 +408,7 @@ impl World {
         let seen = &mut self.seen;
         match message {
             DeviceMessage::Reply(Reply { id, outcome }) => {
-                seen.owed = seen.owed.checked_sub(1).ok_or("a reply that nobody waits for")?;
+                seen.owed = seen.owed.checked_sub(1).ok_or("a reply to no command")?;
                 if let Ok(Answer::Hello(_)) = outcome {
                     seen.strange = *id == id_of(Action::Stranger);
                     seen.fresh = true;

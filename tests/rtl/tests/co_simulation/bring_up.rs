@@ -31,7 +31,7 @@ fn the_self_test_passes_through_the_rtl_without_any_adc() {
     nirspi::virtual_camera::SimulatedFpga::advance(&mut fpga, 60_000);
     let mut session = session(fpga);
     assert!(
-        session.reports().iter().any(|line| line.contains("bring-up")),
+        session.reports().lines.iter().any(|line| line.contains("bring-up")),
         "{:?}",
         session.reports()
     );
