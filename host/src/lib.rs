@@ -26,7 +26,7 @@
 //! * [`training`] makes pairs for training networks, with the virtual camera,
 //! * [`udev`] gives users access to cameras on USB; [`boards`] lists the boards with firmware; with
 //!   the feature `flash`, `flash` programs the boards,
-//! * [`example`] makes example measurements,
+//! * [`example`] makes example measurements, [`safety_case`] says what eye and skin receive and what each fault leaves lit,
 //! * [`virtual_camera`] is a camera without hardware: optics simulator, gateware model, real
 //!   firmware logic.
 //!
@@ -79,6 +79,8 @@ pub mod reconstruct;
 pub mod recording;
 pub mod replay;
 pub mod resolution;
+#[cfg(feature = "virtual-camera")]
+pub mod safety_case;
 #[cfg(feature = "pictures")]
 pub mod scene;
 pub mod selftest;

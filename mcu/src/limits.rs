@@ -6,6 +6,13 @@ use crate::time::Micros;
 use nirspi_wire::message::HOST_SILENCE_US;
 use nirspi_wire::{ADC_HZ, register};
 
+/// The board's own watchdog restarts the firmware after this long without a feed. The FPGA's
+/// watchdog has ended the run by then.
+pub const BOARD_WATCHDOG_US: u32 = 500_000;
+
+/// Time between two readings of the array's temperature. A thermistor is slow.
+pub const TEMPERATURE_PERIOD_US: u64 = 10_000;
+
 /// Limits of one board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Limits {
@@ -36,6 +43,13 @@ pub struct Limits {
 }
 
 impl Default for Limits {
+    /// [`Limits::REFERENCE`].
+    fn default() -> Self {
+        Self::REFERENCE
+    }
+}
+
+impl Limits {
     /// For the reference board:
     ///
     /// | limit | value | because |
@@ -47,24 +61,20 @@ impl Default for Limits {
     /// | stall | 8 frames, at least 250 ms | longer than any pause of a board that is well, and than the watchdog |
     /// | checks | 1 ms, 100 ms | two reads each: under 1 % of the bus |
     /// | watchdog | 200 ms | the gateware's own reset value |
-    fn default() -> Self {
-        Self {
-            host_silence: Micros(HOST_SILENCE_US),
-            duty_permille_max: 625,
-            trip_centi_celsius: 6_000,
-            release_centi_celsius: 5_000,
-            plausible_min_centi_celsius: -4_000,
-            plausible_max_centi_celsius: 12_500,
-            stall_frames: 8,
-            stall_min: Micros(250_000),
-            running_check: Micros(1_000),
-            resting_check: Micros(100_000),
-            watchdog_clocks: ADC_HZ / 5,
-        }
-    }
-}
+    pub const REFERENCE: Self = Self {
+        host_silence: Micros(HOST_SILENCE_US),
+        duty_permille_max: 625,
+        trip_centi_celsius: 6_000,
+        release_centi_celsius: 5_000,
+        plausible_min_centi_celsius: -4_000,
+        plausible_max_centi_celsius: 12_500,
+        stall_frames: 8,
+        stall_min: Micros(250_000),
+        running_check: Micros(1_000),
+        resting_check: Micros(100_000),
+        watchdog_clocks: ADC_HZ / 5,
+    };
 
-impl Limits {
     /// Light that the FPGA allows in each window; the full array lit costs 2 a clock.
     pub(crate) fn duty_budget(&self) -> u32 {
         let full = 2 * u64::from(register::DUTY_WINDOW);

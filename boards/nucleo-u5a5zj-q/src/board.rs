@@ -15,12 +15,8 @@ use nirspi_wire::RebootInto;
 /// The system memory's boot loader (AN2606, STM32U59x and U5Ax).
 pub const BOOTLOADER: usize = 0x0BF9_0000;
 
-/// The watchdog restarts the firmware after this long without a feed; the FPGA's own watchdog has
-/// ended the run by then.
-pub const WATCHDOG_US: u32 = 500_000;
-
-/// Time between two readings: a thermistor is slow, and a conversion takes 22 us.
-const TEMPERATURE_PERIOD: Duration = Duration::from_millis(10);
+/// A conversion takes 22 us.
+const TEMPERATURE_PERIOD: Duration = Duration::from_micros(nirspi_mcu::TEMPERATURE_PERIOD_US);
 
 /// 14 bits, the mean of 16 conversions.
 pub fn adc_config() -> AdcConfig {

@@ -98,7 +98,7 @@ async fn main(spawner: Spawner) {
     clocks::watch_supply();
     clocks::wait_for_supply();
 
-    let mut watchdog = IndependentWatchdog::new(p.IWDG, board::WATCHDOG_US);
+    let mut watchdog = IndependentWatchdog::new(p.IWDG, nirspi_mcu::BOARD_WATCHDOG_US);
     watchdog.unleash();
     let mut board = Nucleo {
         led_enable,

@@ -33,6 +33,7 @@ mod rain;
 mod range;
 mod reconstruct;
 mod report;
+mod safety;
 mod selftest;
 mod serve;
 mod serve_virtual;
@@ -93,6 +94,7 @@ commands! {
     Info(info::Args) => info::run,
     Calibrate(calibrate::Args) => calibrate::run,
     CameraModel(camera_model::Args) => camera_model::run,
+    Safety(safety::Args) => safety::run,
     Selftest(selftest::Args) => selftest::run,
     Flash(flash::Args) => flash::run,
     Gateware(gateware::Args) => gateware::run,

@@ -147,13 +147,18 @@ impl BudgetSettings {
         erf(2.0_f64.ln().sqrt() * self.filter_width_nm / self.led_spectrum_nm)
     }
 
+    /// The exponent m of an LED whose intensity goes with cos^m of the angle to its axis.
+    #[must_use]
+    pub fn led_exponent(&self) -> f64 {
+        0.5_f64.ln() / self.led_half_angle_deg.to_radians().cos().ln()
+    }
+
     /// Part of an LED's light that enters the projection lens: for an intensity cos^m of the angle,
     /// `1 - cos^(m+1)` of the angle of the lens's edge.
     #[must_use]
     pub fn projected_fraction(&self, projector: &Projector) -> f64 {
-        let m = 0.5_f64.ln() / self.led_half_angle_deg.to_radians().cos().ln();
         let edge = (projector.aperture_mm / 2.0 / projector.array_distance_mm()).atan();
-        1.0 - edge.cos().powf(m + 1.0)
+        1.0 - edge.cos().powf(self.led_exponent() + 1.0)
     }
 }
 
