@@ -24,7 +24,7 @@ lint:
 # Write the generated parts of the documentation again
 bless:
     NIRSPI_BLESS=1 cargo test --locked -p nirspi-wire
-    NIRSPI_BLESS=1 cargo test --locked --test boards --test glossary
+    NIRSPI_BLESS=1 cargo test --locked --test boards --test glossary --test safety_page --test security_page
     NIRSPI_BLESS=1 cargo test --locked --test cli reference
 
 # Build the book (needs mdBook) into target/book

@@ -1,6 +1,7 @@
 //! Files of every kind that the program reads, damaged in many ways: each is read, or refused in one line that
 //! is no panic, soon, whatever the bytes. The cases are few enough for every run and always the same; the fuzz
-//! targets under `tests/fuzz` search for longer, on nightly Rust.
+//! targets under `tests/fuzz` search for longer, on nightly Rust. Damaged `.mat`, HDF5 and JPEG files are in the unit
+//! tests of their readers (`files::fields`, `files::image`).
 
 #![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
 
@@ -12,11 +13,13 @@ use nirspi::files::table::Table;
 use nirspi::files::{image, npy, problem};
 use nirspi::gateware;
 use nirspi::recording::{Recording, Target};
+use nirspi::serve::settings::Change;
 use nirspi::session::{CameraIdentity, Session};
 use nirspi::setup::MeasurementSetup;
 use nirspi::source::{Source, SourceOptions};
 use nirspi::tally::tally_recording;
 use nirspi::virtual_camera::{MemoryLink, VirtualOptics, read_camera_model};
+use nirspi_nets::weights::{Array, Precision, Weights};
 use nirspi_optics::{CameraModel, Scene};
 use nirspi_recon::Order;
 use nirspi_wire::tunnel::{REQUEST_BYTES, Request};
@@ -217,6 +220,30 @@ fn recordings_are_read_tallied_and_reconstructed() {
         told(tally_recording(&mut recording))?;
         told(Source::read_all(path, &SourceOptions::default()))
     });
+}
+
+#[test]
+fn weights_of_networks() {
+    let mut weights = Weights::new("small");
+    for (name, shape) in [("a.weight", vec![4, 3, 3]), ("a.bias", vec![4])] {
+        let count: usize = shape.iter().product();
+        let values = (0..count).map(|k| k as f32 / 8.0).collect();
+        weights.insert(name.to_owned(), Array { shape, values });
+    }
+    weights.set_metadata("model", "small");
+    let whole = weights.to_bytes(Precision::Single).unwrap();
+    survives("small.safetensors", &whole, &|path| {
+        let weights = Weights::read(path).map_err(|error| error.to_string())?;
+        told(weights.expect_model("small"))?;
+        told(weights.tensor("a.weight", &[4, 3, 3]))?;
+        told(weights.tensor("a.bias", &[4]))
+    });
+}
+
+#[test]
+fn what_a_page_asks_for() {
+    let whole = br#"{"method":"omp","strength":0.5,"frames":10,"order":"zig-zag","sampling":0.3,"run":true}"#;
+    survives("change.json", whole, &|path| told(Change::parse(&std::fs::read(path).unwrap())));
 }
 
 #[test]
