@@ -245,13 +245,13 @@ step_python() {
     (cd host/python && cargo fmt --check)
     CARGO_TARGET_DIR=$PWD/target/python-build \
         cargo clippy --locked --release --manifest-path host/python/Cargo.toml -- -D warnings
-    python_package numpy matplotlib mypy==2.4.1 pyarrow pytest==9.2.0 ruff==0.17.6 scipy xarray
+    python_package numpy ipykernel==7.4.0 matplotlib mypy==2.4.1 nbclient==0.11.0 pyarrow pytest==9.2.0 ruff==0.17.6 scipy xarray
     local bin=$PWD/target/python/bin
     cargo build --locked --release
     (
         cd host/python
-        "$bin/ruff" format --check python tests
-        "$bin/ruff" check python tests
+        "$bin/ruff" format --check --config pyproject.toml python tests ../../docs/notebooks
+        "$bin/ruff" check --config pyproject.toml python tests ../../docs/notebooks
         "$bin/mypy" python/nirspi
         "$bin/python" -m mypy.stubtest nirspi._nirspi
         "$bin/python" -X dev -m pytest --ignore tests/peers --ignore tests/cluster
@@ -259,7 +259,8 @@ step_python() {
 }
 
 step_python_peers() {
-    python_package numpy matplotlib pytest==9.2.0 scipy deepinv==0.5.0 spyrit==3.1.1 scikit-learn==1.9.1 torch
+    python_package numpy ipykernel==7.4.0 matplotlib nbclient==0.11.0 pyarrow pytest==9.2.0 scipy \
+        deepinv==0.5.0 spyrit==3.1.1 scikit-learn==1.9.1 torch
     # Has wheels for few systems.
     target/python/bin/pip install --quiet spams-bin==2.6.14 || echo "skipped: SPAMS, no wheel"
     (cd host/python && "$OLDPWD/target/python/bin/python" -m pytest tests/peers)

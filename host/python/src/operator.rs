@@ -121,38 +121,67 @@ impl Operator {
         }
     }
 
-    fn apply<'py, T: Number>(
+    /// All results of these values, one after another.
+    fn fill<T: Number>(
         &self,
-        py: Python<'py>,
+        py: Python<'_>,
         what: What,
-        values: &Bound<'py, PyArray1<T>>,
-    ) -> PyResult<Bound<'py, PyArray1<T>>> {
+        values: &[T],
+        made: &mut [T],
+    ) -> PyResult<()> {
         let (from, to) = self.lengths(what);
-        let values = values.try_readonly().map_err(|error| refused(error.to_string()))?;
-        let values = crate::arrays::slice(&values)?;
-        let count = whole("the array", values.len(), from)?;
         let grid = if what == What::Forward { self.area() } else { 0 };
-        let made = if count * self.area() >= PARALLEL && count > 1 {
+        let count = values.len() / from;
+        if count * self.area() >= PARALLEL && count > 1 {
             heavy(py, || {
-                let mut made = vec![T::default(); count * to];
                 let pairs = values.par_chunks_exact(from).zip(made.par_chunks_exact_mut(to));
                 pairs.for_each_init(
                     || vec![T::default(); grid],
                     |grid, (from, to)| self.one(what, from, to, grid),
                 );
-                Ok(made)
-            })?
+                Ok(())
+            })
         } else {
             quick(py, || {
-                let (mut made, mut grid) =
-                    (vec![T::default(); count * to], vec![T::default(); grid]);
+                let mut grid = vec![T::default(); grid];
                 for (from, to) in values.chunks_exact(from).zip(made.chunks_exact_mut(to)) {
                     self.one(what, from, to, &mut grid);
                 }
-                Ok(made)
-            })?
+                Ok(())
+            })
+        }
+    }
+
+    fn apply<'py, T: Number>(
+        &self,
+        py: Python<'py>,
+        what: What,
+        values: &Bound<'py, PyArray1<T>>,
+        out: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let (from, to) = self.lengths(what);
+        let values = values.try_readonly().map_err(|error| refused(error.to_string()))?;
+        let values = crate::arrays::slice(&values)?;
+        let length = whole("the array", values.len(), from)? * to;
+        let Some(out) = out else {
+            let mut made = vec![T::default(); length];
+            self.fill(py, what, values, &mut made)?;
+            return Ok(array(py, made).into_any());
         };
-        Ok(array(py, made))
+        let wanted = || {
+            refused("out is an array of another kind, expected one axis of the type of the values")
+        };
+        let mut place = out
+            .cast::<PyArray1<T>>()
+            .map_err(|_| wanted())?
+            .try_readwrite()
+            .map_err(|error| refused(format!("out: {error}")))?;
+        let made = place.as_slice_mut().map_err(|error| refused(format!("out: {error}")))?;
+        if made.len() != length {
+            return Err(refused(format!("out holds {} values, expected {length}", made.len())));
+        }
+        self.fill(py, what, values, made)?;
+        Ok(out.clone())
     }
 
     fn of_type<'py>(
@@ -160,12 +189,13 @@ impl Operator {
         py: Python<'py>,
         what: What,
         values: &Bound<'py, PyAny>,
+        out: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         if let Ok(values) = values.cast::<PyArray1<f32>>() {
-            return Ok(self.apply(py, what, values)?.into_any());
+            return self.apply(py, what, values, out);
         }
         match values.cast::<PyArray1<f64>>() {
-            Ok(values) => Ok(self.apply(py, what, values)?.into_any()),
+            Ok(values) => self.apply(py, what, values, out),
             Err(_) => {
                 Err(refused("an array of another kind, expected one axis of float32 or float64"))
             }
@@ -192,23 +222,36 @@ impl Operator {
         Ok(Self { rows: rows(side(n)?, &shown)?, split, ortho })
     }
 
-    /// Images of `n * n` values to readings, one after another.
-    #[pyo3(name = "forward")]
+    /// Images of `n * n` values to readings, one after another, into a new array or into `out`.
+    #[pyo3(name = "forward", signature = (x, out=None))]
     fn forward_of<'py>(
         &self,
         py: Python<'py>,
         x: &Bound<'py, PyAny>,
+        out: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        self.of_type(py, What::Forward, x)
+        self.of_type(py, What::Forward, x, out)
     }
 
     /// Readings to images by the transpose.
-    fn adjoint<'py>(&self, py: Python<'py>, y: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-        self.of_type(py, What::Adjoint, y)
+    #[pyo3(signature = (y, out=None))]
+    fn adjoint<'py>(
+        &self,
+        py: Python<'py>,
+        y: &Bound<'py, PyAny>,
+        out: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        self.of_type(py, What::Adjoint, y, out)
     }
 
     /// Readings to images by the pseudo-inverse; of pairs, by the one of their differences.
-    fn pinv<'py>(&self, py: Python<'py>, y: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-        self.of_type(py, What::Inverse, y)
+    #[pyo3(signature = (y, out=None))]
+    fn pinv<'py>(
+        &self,
+        py: Python<'py>,
+        y: &Bound<'py, PyAny>,
+        out: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        self.of_type(py, What::Inverse, y, out)
     }
 }

@@ -141,3 +141,68 @@ def test_scipys_solvers_run_on_the_operator(random):
     assert np.allclose(linear.H @ np.eye(200)[:, :5], operator.matrix(np.float64).T[:, :5])
     y = operator(asymmetric(16))
     assert np.allclose(linalg.lsqr(linear, y)[0], operator.pinv(y).reshape(-1))
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("split", [False, True])
+@pytest.mark.parametrize("count", [1, 300])
+def test_out_takes_the_result(count, split, dtype, random):
+    operator = ns.Hadamard(16, rows=ns.order("zig-zag", 16)[:100], split=split)
+    x = random.random((count, 16, 16)).astype(dtype)
+    y = operator(x)
+    for what, values in [("forward", x), ("adjoint", y), ("pinv", y)]:
+        expected = getattr(operator, what)(values)
+        out = np.full_like(expected, np.nan)
+        assert getattr(operator, what)(values, out=out) is out
+        assert (out == expected).all()
+
+
+def test_an_out_that_does_not_fit_is_refused_and_stays_as_it_was(random):
+    operator = ns.Hadamard(16)
+    x = random.random((3, 16, 16))
+    kept = np.zeros((3, 256))
+    kept.flags.writeable = False
+    for out, words in [
+        (np.zeros((3, 255)), "out has shape (3, 255) of float64, expected (3, 256) of float64"),
+        (np.zeros((3, 256), np.float32), "of float32"),
+        (np.zeros((256, 3)).T, "not contiguous"),
+        (kept, "read-only"),
+        (x.reshape(3, 256), "out shares memory with x"),
+        ([0.0] * 768, "out is a list, expected a NumPy array"),
+    ]:
+        before = np.array(out)
+        with pytest.raises(ns.Error) as error:
+            operator(x, out=out)
+        assert words in str(error.value), error.value
+        assert (np.asarray(out) == before).all()
+    with pytest.raises(ns.Error, match="out beside complex numbers"):
+        operator(x + 1j, out=np.zeros((3, 256), complex))
+
+
+class OnlyDlpack:
+    """An array of a library that offers DLPack alone."""
+
+    def __init__(self, array):
+        self._array = array
+
+    def __dlpack__(self, **options):
+        return self._array.__dlpack__(**options)
+
+    def __dlpack_device__(self):
+        return self._array.__dlpack_device__()
+
+
+class OnGpu(OnlyDlpack):
+    def __dlpack__(self, **options):
+        raise BufferError("on a GPU")
+
+
+def test_an_array_of_dlpack_alone_is_taken(random):
+    operator = ns.Hadamard(16)
+    x = random.random((2, 16, 16))
+    assert (operator(OnlyDlpack(x)) == operator(x)).all()
+    d = operator(x[0])
+    m = ns.Measurement(d=OnlyDlpack(d), rows=operator.rows, n=16)
+    assert (m.d == d).all()
+    with pytest.raises(ns.Error, match="x is no array of the processor: on a GPU"):
+        operator(OnGpu(x))

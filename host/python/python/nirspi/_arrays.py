@@ -11,7 +11,13 @@ from ._nirspi import Error
 
 
 def array_of(values: Any, name: str) -> np.ndarray:
-    """An array of anything."""
+    """An array of anything. What has DLPack and no other way into NumPy is taken by DLPack."""
+    others = ("__array__", "__array_interface__", "__array_struct__", "__buffer__")
+    if hasattr(values, "__dlpack__") and not any(hasattr(values, other) for other in others):
+        try:
+            return np.from_dlpack(values)
+        except (BufferError, RuntimeError, TypeError, ValueError) as error:
+            raise Error(f"{name} is no array of the processor: {error}") from None
     try:
         return np.asarray(values)
     except (ValueError, TypeError) as error:
@@ -37,6 +43,24 @@ def floating(values: Any, name: str) -> np.ndarray:
     """The array in float32, or in float64 if float32 cannot hold its type."""
     array = real(values, name)
     return np.ascontiguousarray(array, dtype=np.result_type(array.dtype, np.float32))
+
+
+def no_out(out: Any, beside: str) -> None:
+    """Refuses ``out`` where the result is no array of NumPy's real numbers."""
+    if out is not None:
+        raise Error(f"out beside {beside}, expected none")
+
+
+def place(out: Any, shape: tuple[int, ...], values: np.ndarray, name: str) -> None:
+    """Refuses an ``out`` into which the result of these values cannot be written."""
+    if not isinstance(out, np.ndarray):
+        raise Error(f"out is a {type(out).__name__}, expected a NumPy array")
+    if out.shape != shape or out.dtype != values.dtype:
+        raise Error(f"out has shape {out.shape} of {out.dtype}, expected {shape} of {values.dtype}")
+    if not (out.flags.c_contiguous and out.flags.writeable):
+        raise Error("out is read-only or not contiguous, expected memory to write to, rows first")
+    if np.may_share_memory(out, values):
+        raise Error(f"out shares memory with {name}, expected memory of its own")
 
 
 def whole_numbers(values: Any, name: str) -> np.ndarray:

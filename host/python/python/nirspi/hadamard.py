@@ -143,12 +143,15 @@ class Hadamard:
 
     # ---- the operator
 
-    def forward(self, x: Any) -> Any:
+    def forward(self, x: Any, *, out: Any = None) -> Any:
         """The readings of images.
 
         Parameters
         ----------
         x : array or tensor, (..., n, n)
+        out : ndarray, optional
+            Where the result is written, with the result's shape and type, contiguous; not with a
+            tensor. Default: a new array.
 
         Returns
         -------
@@ -157,17 +160,20 @@ class Hadamard:
         if _is_tensor(x):
             from . import _torch
 
+            _arrays.no_out(out, "a tensor")
             return _torch.forward(self, x)
-        return self._numpy("forward", x)
+        return self._numpy("forward", x, out)
 
     __call__ = measure = A = forward
 
-    def adjoint(self, y: Any) -> Any:
+    def adjoint(self, y: Any, *, out: Any = None) -> Any:
         """The transpose of :meth:`forward`.
 
         Parameters
         ----------
         y : array or tensor, (..., M), or (..., 2 M) with split
+        out : ndarray, optional
+            As of :meth:`forward`.
 
         Returns
         -------
@@ -176,12 +182,13 @@ class Hadamard:
         if _is_tensor(y):
             from . import _torch
 
+            _arrays.no_out(out, "a tensor")
             return _torch.adjoint(self, y)
-        return self._numpy("adjoint", y)
+        return self._numpy("adjoint", y, out)
 
     A_adjoint = adjoint
 
-    def pinv(self, y: Any) -> Any:
+    def pinv(self, y: Any, *, out: Any = None) -> Any:
         """The image by the pseudo-inverse: patterns that were not shown count as zero.
 
         With split, the pseudo-inverse of the differences (:meth:`unsplit`), in which a dark level
@@ -190,6 +197,8 @@ class Hadamard:
         Parameters
         ----------
         y : array or tensor, (..., M), or (..., 2 M) with split
+        out : ndarray, optional
+            As of :meth:`forward`.
 
         Returns
         -------
@@ -198,8 +207,9 @@ class Hadamard:
         if _is_tensor(y):
             from . import _torch
 
+            _arrays.no_out(out, "a tensor")
             return _torch.pinv(self, y)
-        return self._numpy("pinv", y)
+        return self._numpy("pinv", y, out)
 
     A_dagger = pinv
 
@@ -244,18 +254,23 @@ class Hadamard:
         image, readings = (self.n, self.n), (self.shape[0],)
         return (image, readings) if what == "forward" else (readings, image)
 
-    def _numpy(self, what: str, values: Any) -> np.ndarray:
+    def _numpy(self, what: str, values: Any, out: Any = None) -> np.ndarray:
         name = "x" if what == "forward" else "y"
         values = _arrays.array_of(values, name)
         if values.dtype.kind == "c":
+            _arrays.no_out(out, "complex numbers")
             return self._numpy(what, values.real) + 1j * self._numpy(what, values.imag)
         array = _arrays.floating(values, name)
         before, after = self._axes(what)
         if array.shape[array.ndim - len(before) :] != before:
             wanted = ", ".join(["..."] + [str(edge) for edge in before])
             raise Error(f"{name} has shape {array.shape}, expected ({wanted})")
-        made = getattr(self._operator, what)(array.reshape(-1))
-        return made.reshape(array.shape[: array.ndim - len(before)] + after)
+        shape = array.shape[: array.ndim - len(before)] + after
+        if out is None:
+            return getattr(self._operator, what)(array.reshape(-1)).reshape(shape)
+        _arrays.place(out, shape, array, name)
+        getattr(self._operator, what)(array.reshape(-1), out.reshape(-1))
+        return out
 
     # ---- other packages
 
