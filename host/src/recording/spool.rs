@@ -299,5 +299,7 @@ mod tests {
         drop(allow);
         disk.settle().unwrap();
         assert_eq!((taken.lock().unwrap().as_slice(), disk.queued()), (&b"opening"[..], 0.0));
+        drop(spool);
+        disk.end().unwrap();
     }
 }
