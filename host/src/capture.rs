@@ -24,6 +24,7 @@ pub use run::Run;
 
 use crate::account::LossCounters;
 use crate::calibration::{CalibrationError, Settling};
+use crate::clock::Instant;
 use crate::integrate::Integrated;
 use crate::recording::Target;
 use crate::session::{Session, SessionError};
@@ -63,12 +64,17 @@ pub enum Calibration {
 }
 
 /// The progress of a capture.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub struct Progress {
     /// The current counters.
     pub counters: LossCounters,
     /// Time since the start of the run.
     pub elapsed: Duration,
+    /// Time of the session in which this thread waited for the link. In the rest of the time the
+    /// thread was busy. `None` during calibration.
+    pub waited: Option<Duration>,
+    /// Share of the recording's queue that waits for the disk, 0 to 1; 0 without a recording.
+    pub queued: f64,
 }
 
 /// What ended a capture.
@@ -213,7 +219,11 @@ pub trait Observer {
     ) {
     }
 
-    /// A frame was received, in order. `counters` already count the frame.
+    /// The last bytes of the next frames and messages came out of the link at this moment.
+    fn arrived(&mut self, _at: Instant) {}
+
+    /// A frame was received, in order. `counters` already count the frame, and the recording has the
+    /// frame if there is a recording.
     fn frame(&mut self, _frame: &Frame<'_>, _counters: &LossCounters) {}
 
     /// Another intact message was received.

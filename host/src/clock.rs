@@ -22,7 +22,7 @@ pub fn since_1970() -> Duration {
 
 #[cfg(target_family = "wasm")]
 mod page {
-    use std::ops::Add;
+    use std::ops::{Add, AddAssign};
     use std::sync::OnceLock;
     use std::time::Duration;
 
@@ -72,6 +72,12 @@ mod page {
 
         fn add(self, time: Duration) -> Self {
             Self(self.0 + time)
+        }
+    }
+
+    impl AddAssign<Duration> for Instant {
+        fn add_assign(&mut self, time: Duration) {
+            self.0 += time;
         }
     }
 }

@@ -12,6 +12,7 @@ pub use error::SessionError;
 pub use request::Request;
 
 use crate::causes::printable;
+use crate::clock::Instant;
 use crate::events;
 use crate::fpga::design_in_words;
 use crate::link::Link;
@@ -87,6 +88,9 @@ fn in_words(capabilities: Capabilities) -> Vec<String> {
 pub trait Listener {
     /// Receives a packet. `raw` are the bytes on the wire, delimiter included.
     fn packet(&mut self, raw: &[u8], content: &Result<DeviceMessage<'_>, PacketError>);
+
+    /// The last bytes of the next packets came out of the link at this moment.
+    fn arrived(&mut self, _at: Instant) {}
 
     /// Whether to go on waiting; called several times a second during a long wait.
     fn goes_on(&mut self) -> bool {
@@ -223,6 +227,13 @@ impl Session {
         let answered = self.status(&mut reports);
         self.reports = reports;
         answered.map(|_| self.reports())
+    }
+
+    /// Time that the link has been waited for since the session began. In the rest of the time this
+    /// program was busy with packets, or with other work.
+    #[must_use]
+    pub fn waited(&self) -> Duration {
+        self.conversation.waited()
     }
 
     /// Listens for up to `timeout`, or until a packet has arrived. Every packet goes to `listener`.

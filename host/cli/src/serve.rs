@@ -97,9 +97,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         record_to: args.record_to.clone(),
         connect: connect(args, setup),
     };
-    let ledger = serve(server, camera, connected, imaging, settings, &stop)?;
-    let shown = ledger.images.shown;
-    print::line(format_args!("stopped: {}; {shown} shown", ledger.frames))?;
+    let served = serve(server, camera, connected, imaging, settings, &stop)?;
+    print::line(format_args!("stopped: {served}"))?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -27,7 +27,7 @@ pub struct Args {
     #[arg(long, value_name = "N")]
     precompute: Option<usize>,
     /// Simulate the FPGA and the light alone, for firmware in an emulator that listens at this address
-    #[arg(long, value_name = "ADDR", conflicts_with_all = ["listen", "precompute", "once", "drop_when_full"])]
+    #[arg(long, value_name = "ADDR", conflicts_with_all = ["listen", "precompute", "once", "drop_when_full", "real_time"])]
     tunnel: Option<String>,
     /// End when the first host disconnects
     #[arg(long)]
@@ -35,20 +35,20 @@ pub struct Args {
     /// Drop frames when the host is too slow, as a real camera must. Without this option, simulated time waits for the host
     #[arg(long)]
     drop_when_full: bool,
+    /// Let the camera's time run no faster than the clock on the wall: the patterns' clock and --sweeps set the frames a second
+    #[arg(long)]
+    real_time: bool,
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
     let (map, optics) = args.scene.optics()?;
+    let (name, distance_m, seed) = (map.name, optics.distance_mm() / 1e3, args.scene.seed);
+    let scene = format!("{name} at {distance_m} m (simulated), seed {seed}");
     if let Some(address) = &args.tunnel {
         let line = TcpStream::connect(address)
             .with_context(|| format!("--tunnel {address}: no emulator there"))?;
-        print::line(format_args!(
-            "FPGA behind {address}: {} at {} m (simulated), seed {}",
-            map.name,
-            optics.distance_mm() / 1e3,
-            args.scene.seed
-        ))?;
-        serve_tunnel(line, &mut optics.fpga(args.scene.seed)?, &AtomicBool::new(true))
+        print::line(format_args!("FPGA behind {address}: {scene}"))?;
+        serve_tunnel(line, &mut optics.fpga(seed)?, &AtomicBool::new(true))
             .with_context(|| format!("--tunnel {address}"))?;
         print::line("the emulator disconnected")?;
         return Ok(ExitCode::SUCCESS);
@@ -57,16 +57,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         .with_context(|| format!("--listen {}: cannot listen there", args.listen))?;
     let stop = stop_on_signal()?;
     let address = listener.local_addr()?;
-    print::line(format_args!(
-        "virtual camera on tcp:{address}: {} at {} m (simulated), seed {}",
-        map.name,
-        optics.distance_mm() / 1e3,
-        args.scene.seed
-    ))?;
-    let options = ServeOptions { once: args.once, drop_when_full: args.drop_when_full };
-    let fpga = optics.fpga(args.scene.seed)?;
-    let depth = optics.depth(args.scene.seed)?;
-    let serial = optics.serial(args.scene.seed);
+    print::line(format_args!("virtual camera on tcp:{address}: {scene}"))?;
+    let (once, drop_when_full, real_time) = (args.once, args.drop_when_full, args.real_time);
+    let options = ServeOptions { once, drop_when_full, real_time };
+    let (fpga, depth) = (optics.fpga(seed)?, optics.depth(seed)?);
+    let serial = optics.serial(seed);
     match args.precompute {
         Some(frames) => {
             let fpga = PrecomputedFpga::new(fpga, frames);

@@ -2,7 +2,6 @@
 
 use super::junk::Junk;
 use super::{Calibration, Capture, CaptureError, CaptureOptions, Ended, Observer, Progress};
-use crate::account::LossCounters;
 use crate::calibration::{CalibrationError, Settling, calibrate, calibrate_or};
 use crate::clock::Instant;
 use crate::recording::{Recorder, Recording, RunAccount};
@@ -39,8 +38,7 @@ impl Listener for Calibrating<'_> {
     fn packet(&mut self, _: &[u8], _: &Result<DeviceMessage<'_>, PacketError>) {}
 
     fn goes_on(&mut self) -> bool {
-        let progress =
-            Progress { counters: LossCounters::default(), elapsed: self.began.elapsed() };
+        let progress = Progress { elapsed: self.began.elapsed(), ..Progress::default() };
         self.observer.watch(&progress).is_continue()
     }
 }
@@ -83,6 +81,10 @@ struct Packets<'r> {
 }
 
 impl Listener for Packets<'_> {
+    fn arrived(&mut self, at: Instant) {
+        self.observer.arrived(at);
+    }
+
     fn packet(&mut self, raw: &[u8], content: &Result<DeviceMessage<'_>, PacketError>) {
         let Self { run, observer } = self;
         if run.junk.is_too_much() {
@@ -240,7 +242,12 @@ impl Run {
             self.watched = Instant::now();
             self.record(Recorder::flush_if_due);
             let counters = self.tally.account().counters();
-            let progress = Progress { counters, elapsed: self.started.elapsed() };
+            let progress = Progress {
+                counters,
+                elapsed: self.started.elapsed(),
+                waited: Some(session.waited()),
+                queued: self.recorder.as_ref().map_or(0.0, Recorder::queued),
+            };
             let wants_stop = observer.watch(&progress).is_break() || self.recorder_error.is_some();
             if wants_stop && self.stopped.is_none() && !self.tally.has_ended() {
                 self.stop_at_once(session, observer)?;

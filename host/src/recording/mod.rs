@@ -11,7 +11,8 @@
 //! in chunks of about 1 MiB, not compressed, each with a checksum and an index.
 //!
 //! # Invariant
-//! A capture that is killed keeps everything up to its last flush, half a second before at most
+//! A capture that is killed keeps everything up to its last flush, half a second before at most if the
+//! disk keeps up
 //! (test
 //! `reader::tests::a_recording_cut_anywhere_gives_what_is_before_the_cut_or_says_what_is_missing`).
 //! If the computer loses power, everything flushed five seconds before is on the disk. Damage in
@@ -27,6 +28,7 @@ mod recover;
 mod run;
 mod scan;
 mod schemas;
+mod spool;
 mod writer;
 
 pub(crate) use book::{Book, Opening};

@@ -1,25 +1,31 @@
 //! Writes a recording while the packets arrive.
+//!
+//! The disk has a thread of its own behind a queue (`spool`), so the thread that reads the camera waits
+//! for the disk only when the queue is full.
 
 use super::RunAccount;
 use super::book::{Book, Opening};
 use super::file::{Place, Target};
+use super::spool::{self, Disk, Spool};
 use crate::calibration::Settling;
 use crate::session::CameraIdentity;
 use crate::setup::MeasurementSetup;
 use crate::tally::Tally;
 use nirspi_wire::{DeviceMessage, PacketError};
 use std::fs::File;
-use std::io::{self, BufWriter};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-/// The longest time that packets stay in memory.
+/// The longest time after which packets are handed to the disk's queue.
 const FLUSH_EVERY: Duration = Duration::from_millis(500);
 
 /// An open recording.
 pub struct Recorder {
     place: Place,
-    book: Book<BufWriter<File>>,
+    book: Book<Spool>,
+    /// Behind the book, whose end ends the disk's thread.
+    disk: Disk,
     /// The same file, for syncing to the disk.
     file: File,
     epoch: u64,
@@ -46,10 +52,13 @@ impl Recorder {
         let (place, file) = Place::make(target)?;
         let begun = file.try_clone().and_then(|clone| {
             let opening = Opening { identity, setup, settling, run };
-            Book::begin(BufWriter::with_capacity(1 << 20, clone), &opening)
+            let (spool, disk) = spool::start(clone)?;
+            let book = Book::begin(spool, &opening)?;
+            disk.settle()?;
+            Ok((book, disk))
         });
-        let book = match begun {
-            Ok(book) => book,
+        let (book, disk) = match begun {
+            Ok(begun) => begun,
             Err(error) => {
                 place.remove();
                 return Err(error);
@@ -58,13 +67,19 @@ impl Recorder {
         let epoch = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos();
         let epoch = u64::try_from(epoch).unwrap_or(u64::MAX);
         let now = Instant::now();
-        Ok(Self { place, book, file, epoch, started: now, flushed: now, newest: epoch })
+        Ok(Self { place, book, disk, file, epoch, started: now, flushed: now, newest: epoch })
     }
 
     /// The current path of the file.
     #[must_use]
     pub fn path(&self) -> &Path {
         self.place.path()
+    }
+
+    /// Share of the queue that waits for the disk, 0 to 1.
+    #[must_use]
+    pub fn queued(&self) -> f64 {
+        self.disk.queued()
     }
 
     /// Appends one packet as received.
@@ -99,7 +114,7 @@ impl Recorder {
         self.book.heard(self.newest, content, tally)
     }
 
-    /// Writes the received packets to the file, unless the last flush is recent.
+    /// Hands the received packets to the disk's queue, unless the last flush is recent.
     ///
     /// # Errors
     /// As [`packet`](Self::packet).
@@ -117,17 +132,17 @@ impl Recorder {
     /// # Errors
     /// The file's path, and why the file could not be finished.
     pub fn finish(self, account: &RunAccount) -> Result<PathBuf, (PathBuf, io::Error)> {
-        let Self { mut place, book, file, .. } = self;
-        let settled =
-            book.end(Some(account)).and_then(|()| place.settle(&file, account.missing.is_none()));
+        let Self { mut place, book, disk, file, .. } = self;
+        let written = book.end(Some(account)).and_then(|()| disk.end());
+        let settled = written.and_then(|()| place.settle(&file, account.missing.is_none()));
         let path = place.path().to_owned();
         settled.map(|()| path.clone()).map_err(|error| (path, error))
     }
 
     /// Removes the file, because nothing was recorded.
     pub fn discard(self) {
-        let Self { place, book, .. } = self;
-        drop(book);
+        let Self { place, book, disk, .. } = self;
+        drop((book, disk));
         place.remove();
     }
 }

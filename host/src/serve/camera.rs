@@ -5,7 +5,9 @@
 //! `a_person_stops_a_camera_and_only_a_person_starts_it_again` in `host/src/serve/tests.rs`).
 
 use super::camera_log::Phase;
+use super::delays::Passed;
 use super::light::Leds;
+use super::overload::Load;
 use super::settings::Measuring;
 use super::slot::{DepthImage, Look, RunSetup};
 use super::stage::StagedScene;
@@ -15,6 +17,7 @@ use crate::calibration::{CalibrationError, FlatField, KeptFlatField, Settling};
 use crate::capture::{
     Calibration, Capture, CaptureError, CaptureOptions, Ended, Observer, Progress,
 };
+use crate::clock::Instant;
 use crate::integrate::Newest;
 use crate::recording::Target;
 use crate::session::{IgnorePackets, Listener, Session, SessionError, request};
@@ -29,6 +32,7 @@ use nirspi_wire::{
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Duration;
 
 /// A camera that has answered, and its response.
 pub struct Connected {
@@ -205,7 +209,15 @@ pub(super) struct Live {
     offered: u64,
     /// Whether any run has begun.
     begun: bool,
+    /// When the newest packets came out of the link.
+    arrived: Instant,
+    /// The moment of the last look at the load, and how long the link had been waited for. `None` where
+    /// camera and images take turns: the load then says nothing of the camera.
+    load: Option<(Instant, Duration)>,
 }
+
+/// Time between two looks at the load: the link may be waited for as long without a packet.
+const LOAD_EVERY: Duration = Duration::from_millis(100);
 
 impl Live {
     /// Takes over the source's measurement and its folder.
@@ -224,7 +236,32 @@ impl Live {
             fault: None,
             offered: 0,
             begun: false,
+            arrived: Instant::now(),
+            load: None,
         }
+    }
+
+    /// The same on a thread of its own, whose load decides what the page gives up.
+    #[cfg(feature = "serve")]
+    pub(super) fn with_load(self) -> Self {
+        Self { load: Some((Instant::now(), Duration::ZERO)), ..self }
+    }
+
+    /// Takes the load since the last time.
+    fn look_at_load(&mut self, progress: &Progress) {
+        let (Some((since, waited)), Some(waited_now)) = (self.load, progress.waited) else {
+            return;
+        };
+        let now = Instant::now();
+        let passed = now.saturating_duration_since(since);
+        if passed < LOAD_EVERY {
+            return;
+        }
+        self.load = Some((now, waited_now));
+        // Another session has waited for less.
+        let Some(idle) = waited_now.checked_sub(waited) else { return };
+        let camera_thread = 1.0 - (idle.as_secs_f64() / passed.as_secs_f64()).min(1.0);
+        self.shared.loaded(Load { camera_thread, recording_queue: progress.queued });
     }
 
     /// Records why a session ended. Returns what comes next.
@@ -407,10 +444,20 @@ impl Observer for Live {
         log.measuring(setup, settling.is_some());
     }
 
+    fn arrived(&mut self, at: Instant) {
+        self.arrived = at;
+    }
+
     fn frame(&mut self, frame: &Frame<'_>, counters: &LossCounters) {
         let Some((run, newest)) = &mut self.now else { return };
+        self.shared.passed(Passed::Counted, self.arrived);
         newest.push(frame, lock(&self.shared.settings).frames as usize);
-        let look = Look { sum: newest.sum(), run: Arc::clone(run), depth: self.depth.clone() };
+        let look = Look {
+            sum: newest.sum(),
+            run: Arc::clone(run),
+            depth: self.depth.clone(),
+            arrived: self.arrived,
+        };
         self.shared.slot.offer(look, self.earlier + *counters);
         self.offered += 1;
     }
@@ -434,6 +481,7 @@ impl Observer for Live {
 
     fn watch(&mut self, progress: &Progress) -> ControlFlow<()> {
         self.shared.slot.account(self.earlier + progress.counters);
+        self.look_at_load(progress);
         if self.goes_on() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
     }
 }

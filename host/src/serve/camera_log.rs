@@ -144,3 +144,30 @@ impl CameraLog {
         &self.events
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_newest_events_are_kept_and_no_more() {
+        let identity = CameraIdentity {
+            protocol: 1,
+            firmware: "1".to_owned(),
+            gateware: "1".to_owned(),
+            board: "test".to_owned(),
+            serial: "T".to_owned(),
+            adc_hz: 1,
+            adc_bits: 1,
+            wavelength_nm: 1,
+            capabilities: Vec::new(),
+        };
+        let mut log = CameraLog::new("test", &identity);
+        for number in 1..=3 * EVENTS {
+            log.event(number.to_string());
+        }
+        let texts: Vec<&str> = log.events().iter().map(|event| event.text.as_str()).collect();
+        let expected: Vec<String> = (2 * EVENTS + 1..=3 * EVENTS).map(|n| n.to_string()).collect();
+        assert_eq!(texts, expected);
+    }
+}

@@ -11,22 +11,28 @@
 //! stream, so connections that ask nothing keep no page away
 //! (`tests::a_new_connection_takes_the_place_of_the_oldest_without_a_stream`,
 //! `a_page_goes_on_among_hundreds_of_clients_that_misbehave` in `host/cli/tests/cli/serve_guarded.rs`).
+//!
+//! An event stream has one state in this program and [`SENDING`] bytes in the system that its client
+//! has not taken, so a slow connection shows new images and not old ones
+//! (`a_slow_browser_has_few_old_images_before_it` in `host/src/serve/tests.rs`).
 
 use super::lock;
 use axum::extract::connect_info::Connected;
 use axum::serve::{IncomingStream, Listener};
+use socket2::SockRef;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::future::Future;
 use std::io;
 use std::net::{IpAddr, Ipv6Addr, SocketAddr};
 use std::pin::Pin;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::task::{Context, Poll};
 use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::{TcpListener, TcpStream};
-use tokio::sync::oneshot;
+use tokio::sync::{Notify, oneshot};
 use tokio::time::{Instant, Sleep, sleep};
 
 /// The most connections.
@@ -41,6 +47,8 @@ pub const STREAMS_OF_CLIENT: usize = 16;
 pub const SILENT: Duration = Duration::from_secs(10);
 /// An event stream that has taken nothing for this long gives its place to a new stream.
 const STALLED: Duration = Duration::from_secs(2);
+/// Bytes that the system keeps for sending. Linux doubles the number for its own needs.
+const SENDING: usize = 128 << 10;
 /// Time until the next attempt to accept a connection, if the system has no room for one.
 const NO_ROOM: Duration = Duration::from_millis(100);
 
@@ -122,11 +130,19 @@ impl Table {
 #[derive(Clone, Default)]
 pub struct Connections(Arc<Mutex<Table>>);
 
+/// The number of bytes that the system has taken for a connection.
+#[derive(Default)]
+struct Written {
+    bytes: AtomicU64,
+    more: Notify,
+}
+
 /// One open connection, for handlers of its requests.
 #[derive(Clone)]
 pub struct Peer {
     connections: Connections,
     number: u64,
+    written: Arc<Written>,
 }
 
 impl Peer {
@@ -145,6 +161,24 @@ impl fmt::Debug for Peer {
 
 /// An open event stream.
 pub struct Streaming(Peer);
+
+impl Streaming {
+    /// Number of bytes that the system has taken so far.
+    pub fn written(&self) -> u64 {
+        self.0.written.bytes.load(Ordering::Relaxed)
+    }
+
+    /// Waits until the system has taken so many bytes.
+    pub async fn has_written(&self, bytes: u64) {
+        loop {
+            let more = self.0.written.more.notified();
+            if self.written() >= bytes {
+                return;
+            }
+            more.await;
+        }
+    }
+}
 
 impl Drop for Streaming {
     fn drop(&mut self) {
@@ -177,20 +211,23 @@ impl Listener for Door {
                 sleep(NO_ROOM).await;
                 continue;
             };
-            // A socket that cannot set the option works with more delay.
+            // A socket that cannot set the options works with more delay.
             let _ = stream.set_nodelay(true);
+            let _ = SockRef::from(&stream).set_send_buffer_size(SENDING);
             let (close, closed) = oneshot::channel();
             let Some(number) = lock(&self.connections.0).admit(client(address), close) else {
                 continue;
             };
-            let peer = Peer { connections: self.connections.clone(), number };
+            let written = Arc::default();
+            let peer = Peer { connections: self.connections.clone(), number, written };
             let silent = Box::pin(sleep(SILENT));
             return (Guarded { stream, peer: peer.clone(), closed, silent, ended: false }, peer);
         }
     }
 
     fn local_addr(&self) -> io::Result<Peer> {
-        Ok(Peer { connections: self.connections.clone(), number: u64::MAX })
+        let connections = self.connections.clone();
+        Ok(Peer { connections, number: u64::MAX, written: Arc::default() })
     }
 }
 
@@ -222,7 +259,9 @@ impl Guarded {
 
     /// Records the result of writing.
     fn wrote(&mut self, result: Poll<io::Result<usize>>) -> Poll<io::Result<usize>> {
-        if matches!(result, Poll::Ready(Ok(1..))) {
+        if let Poll::Ready(Ok(bytes @ 1..)) = result {
+            self.peer.written.bytes.fetch_add(bytes as u64, Ordering::Relaxed);
+            self.peer.written.more.notify_waiters();
             let now = Instant::now();
             self.silent.as_mut().reset(now + SILENT);
             if let Some(entry) = lock(&self.peer.connections.0).entries.get_mut(&self.peer.number) {

@@ -1,12 +1,14 @@
 //! HTTP: the page, the stream of states to each browser, and the interface for scripts.
 //!
 //! # Invariant
-//! A browser receives the newest state only after it has taken the state before. A slow or dead
+//! A browser receives the newest state only after its connection has taken the state before. A slow or dead
 //! browser therefore delays no other part and uses the memory of one state
-//! (`a_browser_that_does_not_read_costs_nobody_and_then_sees_the_newest` in
-//! `host/src/serve/tests.rs`).
+//! (`a_browser_that_does_not_read_costs_nobody_and_then_sees_the_newest` and
+//! `a_slow_browser_has_few_old_images_before_it` in `host/src/serve/tests.rs`).
 
 use super::connections::{Door, Peer, Streaming};
+use super::delays::Passed;
+use super::imaging::Picture;
 use super::server::Server;
 use super::state::Published;
 use super::token::{self, Token};
@@ -240,13 +242,15 @@ fn answer<E: ToString>(done: Result<impl Serialize, E>) -> Response {
 /// Counts a page for as long as the page is connected.
 struct Viewer {
     shared: Arc<Shared>,
-    _streaming: Streaming,
+    streaming: Streaming,
+    /// The bytes of the connection when the last state has been written.
+    written: u64,
 }
 
 impl Viewer {
     fn new(shared: Arc<Shared>, streaming: Streaming) -> Self {
         shared.viewers.fetch_add(1, Ordering::Relaxed);
-        Self { shared, _streaming: streaming }
+        Self { shared, streaming, written: 0 }
     }
 }
 
@@ -264,21 +268,35 @@ async fn events(State(app): State<App>, ConnectInfo(peer): ConnectInfo<Peer>) ->
     Sse::new(states(app.published, Viewer::new(app.shared, streaming))).into_response()
 }
 
-/// The states for one page, each after the page has taken the one before.
+/// The states for one page, each after the system has taken the one before for sending.
 fn states(
     mut published: watch::Receiver<Arc<Published>>,
     viewer: Viewer,
 ) -> impl Stream<Item = Result<Event, Infallible>> {
-    // The first message is the current state.
+    // The first message is the current state, whose image may be old.
     published.mark_changed();
-    unfold((published, viewer), |(mut published, viewer)| async move {
+    let first = published.borrow().picture.clone();
+    unfold((published, viewer, first), |(mut published, mut viewer, before)| async move {
+        viewer.streaming.has_written(viewer.written).await;
         loop {
             // The receiver fails when the server stops.
             published.changed().await.ok()?;
             let moment = Arc::clone(&published.borrow_and_update());
             if !moment.message.is_empty() {
-                return Some((Ok(Event::default().data(&moment.message)), (published, viewer)));
+                let picture = moment.picture.clone();
+                if let Some(new) = picture.as_ref().filter(|new| !is_same(new, before.as_ref())) {
+                    viewer.shared.passed(Passed::Sent, new.arrived);
+                }
+                // The frame of the message has some bytes more, which do not add up: a state that is
+                // written whole ends with all bytes before it.
+                viewer.written = viewer.streaming.written() + moment.message.len() as u64;
+                let event = Event::default().data(&moment.message);
+                return Some((Ok(event), (published, viewer, picture)));
             }
         }
     })
+}
+
+fn is_same(a: &Arc<Picture>, b: Option<&Arc<Picture>>) -> bool {
+    b.is_some_and(|b| Arc::ptr_eq(a, b))
 }

@@ -1,13 +1,14 @@
 //! Imaging of a page: takes the newest frames, reconstructs and enhances their image, and makes the
 //! state for pages.
 
+use super::delays::Passed;
 use super::line::Line;
 use super::settings::{Offer, Settings};
 use super::slot::{DepthImage, Look};
 use super::state::{Light, Offered, Published, Rate, Rates, State};
 use super::{Shared, lock};
 use crate::causes;
-use crate::clock::Instant;
+use crate::clock::{self, Instant};
 use crate::imaging::{
     Enhance, EnhanceError, ImageContext, SteadyWhite, Warning, White, brightest, warnings,
 };
@@ -183,6 +184,11 @@ pub struct Picture {
     /// The depth map that was fused.
     #[serde(skip)]
     pub depth: Option<Arc<DepthImage>>,
+    /// When the newest frame came out of the link.
+    #[serde(skip)]
+    pub arrived: Instant,
+    /// The same on the clock of the computer that reads the camera, in milliseconds since 1970.
+    arrived_unix_ms: u64,
     method: &'static str,
     /// Number of summed frames.
     frames: u64,
@@ -252,8 +258,9 @@ impl Studio {
         look: Option<&Look>,
     ) -> serde_json::Result<Published> {
         if let Some(look) = look {
-            let settings = lock(&shared.settings).clone();
-            match self.imaging.picture(look, &settings, &mut self.white) {
+            let mut settings = lock(&shared.settings).clone();
+            settings.enhance &= !shared.shed().enhancement_off;
+            match self.imaging.picture(look, &settings, &mut self.white, shared) {
                 Ok(made) => (self.picture, self.problem) = (Some(Arc::new(made)), None),
                 Err(why) => self.problem = Some(causes::in_one_line(&why)),
             }
@@ -281,6 +288,8 @@ impl Studio {
             scene: shared.stage.state(),
             line: shared.line.as_ref().map(Line::state),
             viewers: shared.viewers(),
+            delays: lock(&shared.delays).state(now),
+            overload: lock(&shared.overload).state(),
             events: log.events(),
         };
         Published::new(&state, self.picture.as_ref())
@@ -294,6 +303,7 @@ impl Imaging {
         look: &Look,
         settings: &Settings,
         white: &mut SteadyWhite,
+        shared: &Shared,
     ) -> Result<Picture, PictureError> {
         let started = Instant::now();
         let measurements =
@@ -308,6 +318,7 @@ impl Imaging {
         if side != Side::INSTRUMENT.pixels() || image.pixels().iter().any(|p| !p.is_finite()) {
             return Err(PictureError::NotFinite);
         }
+        shared.passed(Passed::Reconstructed, look.arrived);
         let white_counts = white.follow(brightest(image.pixels(), side));
         let frame_warnings = look.sum.warnings();
         let mut all: Vec<String> = frame_warnings.iter().map(|&text| text.to_owned()).collect();
@@ -333,12 +344,16 @@ impl Imaging {
                 enhance_ms: ms_since(started),
             });
             enhanced = Some(made.pixels);
+            shared.passed(Passed::Enhanced, look.arrived);
         }
         Ok(Picture {
             counts: image.pixels().to_vec(),
             enhanced,
             readings: readings(&measurements),
             depth: look.depth.clone(),
+            arrived: look.arrived,
+            arrived_unix_ms: (clock::since_1970().saturating_sub(look.arrived.elapsed()))
+                .as_millis() as u64,
             method: settings.method,
             frames: look.sum.frames(),
             white_counts,

@@ -11,12 +11,17 @@
 //! does not wait for another browser. Pages change settings by one small message
 //! ([`settings::Change`]). Two threads compute; all of HTTP runs asynchronously on a third thread.
 //! Without threads and server, the same parts take turns ([`Turns`]).
+//!
+//! `docs/live-page.md` lists what each stage holds at most, and where a test says so. Each frame's
+//! delay to each stage is measured (`delays.rs`). If the computer is too slow for the camera, the page
+//! gives up images, then enhancement (`overload.rs`).
 
 mod camera;
 mod camera_log;
 mod commands;
 #[cfg(feature = "serve")]
 mod connections;
+mod delays;
 #[cfg(feature = "serve")]
 mod guard;
 #[cfg(feature = "serve")]
@@ -24,6 +29,7 @@ mod http;
 mod imaging;
 mod light;
 mod line;
+mod overload;
 #[cfg(feature = "serve")]
 mod page;
 #[cfg(feature = "serve")]
@@ -50,13 +56,16 @@ pub use simulated::SimulatedError;
 pub use slot::{ImageCounters, Ledger};
 pub use stage::StagedScene;
 #[cfg(feature = "serve")]
-pub use threads::{ServeError, serve};
+pub use threads::{ServeError, Served, serve};
 #[cfg(feature = "serve")]
 pub use token::{Token, TokenError};
 pub use turns::Turns;
 
+use crate::clock::Instant;
 use camera_log::CameraLog;
+use delays::{Delays, Passed};
 use light::LightSwitch;
+use overload::{Load, Overload, Shed};
 use settings::{Offer, Settings};
 use slot::Slot;
 use stage::Stage;
@@ -77,6 +86,10 @@ struct Shared {
     light: LightSwitch,
     /// The line between firmware and host, if pages can damage its bytes.
     line: Option<Line>,
+    /// How long frames take to each stage.
+    delays: Mutex<Delays>,
+    /// What the page gives up.
+    overload: Mutex<Overload>,
     over: AtomicBool,
     viewers: AtomicUsize,
 }
@@ -91,6 +104,8 @@ impl Shared {
             stage,
             light: LightSwitch::on(),
             line: None,
+            delays: Mutex::new(Delays::new(Instant::now())),
+            overload: Mutex::default(),
             over: AtomicBool::new(false),
             viewers: AtomicUsize::new(0),
         }
@@ -102,6 +117,24 @@ impl Shared {
 
     fn viewers(&self) -> usize {
         self.viewers.load(Ordering::Relaxed)
+    }
+
+    /// A frame that arrived at this moment, or its image, has passed this stage now.
+    fn passed(&self, stage: Passed, arrived: Instant) {
+        lock(&self.delays).passed(stage, arrived, Instant::now());
+    }
+
+    /// Takes the load of the camera's thread. A change of what the page gives up becomes an event.
+    fn loaded(&self, load: Load) {
+        let change = lock(&self.overload).at(Instant::now(), load);
+        if let Some(line) = change {
+            lock(&self.camera).event(line);
+        }
+    }
+
+    /// What the page gives up now.
+    fn shed(&self) -> Shed {
+        lock(&self.overload).shed()
     }
 }
 

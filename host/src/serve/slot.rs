@@ -8,6 +8,7 @@
 use super::lock;
 use crate::account::LossCounters;
 use crate::calibration::{FlatField, Settling};
+use crate::clock::Instant;
 use crate::integrate::Integrated;
 use crate::setup::MeasurementSetup;
 use nirspi_nets::DepthMaps;
@@ -44,6 +45,8 @@ pub struct Look {
     pub run: Arc<RunSetup>,
     /// The newest depth map.
     pub depth: Option<Arc<DepthImage>>,
+    /// When the newest frame came out of the link.
+    pub arrived: Instant,
 }
 
 /// The account of all frames of all runs.
@@ -119,6 +122,13 @@ impl Slot {
         inner.next.take()
     }
 
+    /// Waits for [`wake`](Self::wake) alone, and leaves the newest look in the slot.
+    pub fn await_news(&self, patience: Duration) {
+        let waited =
+            self.filled.wait_timeout_while(lock(&self.inner), patience, |inner| !inner.news);
+        waited.unwrap_or_else(std::sync::PoisonError::into_inner).0.news = false;
+    }
+
     /// Takes the newest look, if there is one now. As after [`take`](Self::take), the caller must
     /// then call [`done`](Self::done).
     pub fn take_now(&self) -> Option<Look> {
@@ -154,7 +164,21 @@ mod tests {
         let sum = Integrated::new(&setup);
         let run = Arc::new(RunSetup { setup, settling: None, flat_field: None });
         let frames = LossCounters { received: number, lost: 2, ..LossCounters::default() };
-        (Look { sum, run, depth: None }, frames)
+        (Look { sum, run, depth: None, arrived: Instant::now() }, frames)
+    }
+
+    #[test]
+    fn news_wake_a_resting_thread_and_leave_the_look_in_the_slot() {
+        let slot = Slot::default();
+        let (first, frames) = look(1);
+        slot.offer(first, frames);
+        let began = Instant::now();
+        slot.await_news(Duration::from_millis(50));
+        assert!(began.elapsed() >= Duration::from_millis(50), "a frame is no news");
+        slot.wake();
+        slot.await_news(Duration::from_secs(60));
+        assert!(began.elapsed() < Duration::from_secs(30));
+        assert!(slot.take_now().is_some());
     }
 
     #[test]

@@ -4,8 +4,10 @@
 //! Each state is one message made at one moment, so its counters add up and belong to its image.
 
 use super::camera_log::{CameraState, EventLine};
+use super::delays::DelayState;
 use super::imaging::Picture;
 use super::line::LineState;
+use super::overload::OverloadState;
 use super::settings::{MAX_FRAMES, MAX_SWEEPS, Offer, Settings};
 use super::slot::Ledger;
 use super::stage::SceneState;
@@ -121,6 +123,10 @@ pub struct State<'s> {
     pub scene: Option<SceneState>,
     /// The line between firmware and host; `null` if its bytes cannot be damaged from the page.
     pub line: Option<LineState>,
+    /// How long frames take to each stage.
+    pub delays: DelayState,
+    /// The load of the camera's thread, and what the page gives up because of the load.
+    pub overload: OverloadState,
     /// Number of connected pages.
     pub viewers: usize,
     /// Events, oldest first.

@@ -3,7 +3,7 @@ use super::light::Leds;
 use super::settings::Measuring;
 use super::settings::tests::{offer, settings};
 use super::state::Published;
-use super::threads::measure;
+use super::threads::{images, measure};
 use super::*;
 use crate::capture::{Calibration, CaptureError};
 use crate::link::{Link, Received};
@@ -12,7 +12,10 @@ use crate::setup::MeasurementSetup;
 use crate::virtual_camera::{OpticalFpga, VirtualCamera, VirtualOptics};
 use nirspi_mcu::{Limits, Micros};
 use nirspi_optics::Scene;
-use nirspi_recon::Order;
+use nirspi_recon::reconstruct::{
+    Method, MethodSettings, Reconstruct, ReconstructError, Reconstruction,
+};
+use nirspi_recon::{Measurements, Order};
 use nirspi_wire::{Command, Request, RunLength, State, encode, version};
 use std::io::{self, BufRead, BufReader, Write};
 use std::net::TcpStream;
@@ -295,38 +298,132 @@ fn a_camera_that_comes_back_measures_on_unless_it_was_opened_meanwhile() {
     lab.end();
 }
 
+/// A server whose states the test publishes.
+struct Paper {
+    shared: Arc<Shared>,
+    publish: watch::Sender<Arc<Published>>,
+    address: std::net::SocketAddr,
+    serving: JoinHandle<io::Result<()>>,
+}
+
+impl Paper {
+    fn new() -> Self {
+        let shared = shared(enclosed(&Arc::default(), Before::Nothing).session.identity(), None);
+        let (publish, published) = watch::channel(Arc::new(Published::default()));
+        let server = Server::bind("127.0.0.1:0", None).unwrap();
+        let address = server.address;
+        let serving = {
+            let shared = Arc::clone(&shared);
+            std::thread::spawn(move || {
+                let over = Arc::clone(&shared);
+                http::run(server, shared, published, || over.is_over())
+            })
+        };
+        Self { shared, publish, address, serving }
+    }
+
+    /// The numbers of the states that a browser gets.
+    fn browser(&self) -> impl Iterator<Item = usize> + use<> {
+        let mut stream = TcpStream::connect(self.address).unwrap();
+        stream.set_read_timeout(Some(LIMIT)).unwrap();
+        write!(stream, "GET /events HTTP/1.1\r\nHost: {}\r\n\r\n", self.address).unwrap();
+        let lines = BufReader::new(stream).lines().map(Result::unwrap);
+        lines.filter_map(|line| line.strip_prefix("data: ")?.trim_end_matches('.').parse().ok())
+    }
+
+    /// Publishes a state of this number and of so many bytes.
+    fn publish(&self, number: usize, bytes: usize) {
+        let message = format!("{number}{}", ".".repeat(bytes));
+        self.publish.send_replace(Arc::new(Published { message, ..Published::default() }));
+    }
+
+    fn end(self) {
+        self.shared.over.store(true, Ordering::Relaxed);
+        self.serving.join().unwrap().unwrap();
+    }
+}
+
 #[test]
 fn a_browser_that_does_not_read_costs_nobody_and_then_sees_the_newest() {
     const LAST: usize = 60;
-    let shared = shared(enclosed(&Arc::default(), Before::Nothing).session.identity(), None);
-    let (publish, published) = watch::channel(Arc::new(Published::default()));
-    let server = Server::bind("127.0.0.1:0", None).unwrap();
-    let address = server.address;
-    let serving = {
-        let shared = Arc::clone(&shared);
-        std::thread::spawn(move || {
-            let over = Arc::clone(&shared);
-            http::run(server, shared, published, || over.is_over())
-        })
-    };
-    let browser = || {
-        let mut stream = TcpStream::connect(address).unwrap();
-        stream.set_read_timeout(Some(LIMIT)).unwrap();
-        write!(stream, "GET /events HTTP/1.1\r\nHost: {address}\r\n\r\n").unwrap();
-        let lines = BufReader::new(stream).lines().map(Result::unwrap);
-        lines.filter_map(|line| line.strip_prefix("data: ")?.trim_end_matches('.').parse().ok())
-    };
-    let mut idle = browser();
-    let mut keen = browser();
-    until("seen by two", || shared.viewers() == 2);
+    let paper = Paper::new();
+    let (mut idle, mut keen) = (paper.browser(), paper.browser());
+    until("seen by two", || paper.shared.viewers() == 2);
     // Numbered states, far larger than the socket buffers of common systems.
     for number in 1..=LAST {
-        let message = format!("{number}{}", ".".repeat(1 << 20));
-        publish.send_replace(Arc::new(Published { message, ..Published::default() }));
+        paper.publish(number, 1 << 20);
         assert_eq!(keen.next(), Some(number));
     }
     let seen: Vec<usize> = idle.by_ref().take_while(|&number| number < LAST).collect();
     assert!(seen.is_sorted() && seen.len() < LAST / 2, "{seen:?}");
+    paper.end();
+}
+
+#[test]
+fn a_slow_browser_has_few_old_images_before_it() {
+    // States as large as those of a camera with depth.
+    const BYTES: usize = 48 << 10;
+    let paper = Paper::new();
+    let (mut slow, mut keen) = (paper.browser(), paper.browser());
+    until("seen by two", || paper.shared.viewers() == 2);
+    let mut behind = Vec::new();
+    // The slow browser takes one state of five: its system's buffers grow, as those of a slow line.
+    for number in 1..=600 {
+        paper.publish(number, BYTES);
+        assert_eq!(keen.next(), Some(number));
+        if number % 5 == 0 {
+            behind.push((number - slow.next().unwrap()) / 5);
+        }
+    }
+    let most = behind.split_off(60).into_iter().max();
+    assert!(most <= Some(16), "{most:?} states behind");
+    paper.end();
+}
+
+/// A method that takes its time.
+struct Slow(Duration);
+
+impl Reconstruct for Slow {
+    fn name(&self) -> &str {
+        "slow"
+    }
+
+    fn reconstruct(&self, measured: &Measurements) -> Result<Reconstruction, ReconstructError> {
+        std::thread::sleep(self.0);
+        let hadamard = Method::HADAMARD.prepare(&MethodSettings::default())?;
+        hadamard.reconstruct(measured)
+    }
+}
+
+#[test]
+fn images_that_are_given_up_are_counted_and_frames_are_not_waited_for() {
+    const TOOK: Duration = Duration::from_millis(60);
+    let shared = shared(enclosed(&Arc::default(), Before::Nothing).session.identity(), None);
+    lock(&shared.settings).method = "slow";
+    *lock(&shared.overload) = overload::tests::given_up(3);
+    let making = {
+        let shared = Arc::clone(&shared);
+        let imaging = Imaging::new(&MethodSettings::default(), nirspi_nets::Device::cpu()).unwrap();
+        let imaging = imaging.with_method("slow", Box::new(Slow(TOOK)));
+        let (publish, _) = watch::channel(Arc::new(Published::default()));
+        std::thread::spawn(move || images(&shared, imaging, &publish))
+    };
+    let run = Arc::new(slot::RunSetup { setup: setup(), settling: None, flat_field: None });
+    let began = Instant::now();
+    let mut offered = 0;
+    while shared.slot.ledger().images.shown < 4 {
+        let sum = crate::integrate::Integrated::new(&run.setup);
+        let look = slot::Look { sum, run: Arc::clone(&run), depth: None, arrived: Instant::now() };
+        offered += 1;
+        shared.slot.offer(look, crate::account::LossCounters::default());
+        std::thread::sleep(Duration::from_millis(2));
+        assert!(began.elapsed() < LIMIT, "{:?}", shared.slot.ledger());
+    }
+    // The first image is made at once; each of the others after a rest of seven images.
+    assert!(began.elapsed() >= 3 * 8 * TOOK, "{:?}", began.elapsed());
+    let images = shared.slot.ledger().images;
+    assert_eq!(images.shown + images.passed_over + images.failed + images.waiting, offered);
+    assert!(images.passed_over > 10 && images.failed == 0, "{images:?}");
     shared.over.store(true, Ordering::Relaxed);
-    serving.join().unwrap().unwrap();
+    making.join().unwrap();
 }

@@ -6,15 +6,18 @@
 
 use super::camera::{End, EventLog, Live, Next, darken, reconnect, why_dark};
 use super::camera_log::{CameraLog, Phase};
+use super::delays::DelayState;
 use super::imaging::Studio;
 use super::light::Leds;
+use super::overload::Shed;
 use super::settings::{Offer, Settings};
 use super::stage::Stage;
 use super::state::Published;
-use super::{CameraSource, Connected, Imaging, Ledger, Server, Shared, http};
+use super::{CameraSource, Connected, Imaging, Ledger, Server, Shared, http, lock};
 use crate::capture::{CaptureError, observe};
 use crate::causes;
 use crate::session::{Session, SessionError};
+use std::fmt;
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -50,8 +53,24 @@ pub enum ServeError {
     Thread(&'static str),
 }
 
+/// What was served.
+#[derive(Debug, Clone, Copy)]
+pub struct Served {
+    /// The account of all frames.
+    pub ledger: Ledger,
+    /// The delays of the last seconds.
+    delays: DelayState,
+}
+
+impl fmt::Display for Served {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { ledger: Ledger { frames, images }, delays } = self;
+        write!(f, "{frames}; {} shown{delays}", images.shown)
+    }
+}
+
 /// Serves `camera` to the browsers that connect to `server`, until `stop` is set. Returns the
-/// account of all frames.
+/// account of all frames and their delays.
 ///
 /// # Errors
 /// [`ServeError`], after the camera is stopped.
@@ -62,7 +81,7 @@ pub fn serve(
     imaging: Imaging,
     settings: Settings,
     stop: &AtomicBool,
-) -> Result<Ledger, ServeError> {
+) -> Result<Served, ServeError> {
     let log = CameraLog::new(&camera.address, connected.session.identity());
     let records = camera.record_to.is_some();
     let offer = Offer { records, base: Some(camera.setup.clone()), ..imaging.offer() };
@@ -86,7 +105,8 @@ pub fn serve(
     making.join().map_err(|_| ServeError::Thread("imaging"))?;
     measured?;
     served?;
-    Ok(shared.slot.ledger())
+    let delays = lock(&shared.delays).state(Instant::now());
+    Ok(Served { ledger: shared.slot.ledger(), delays })
 }
 
 fn spawn<T: Send + 'static>(
@@ -105,7 +125,7 @@ pub(super) fn measure(
     mut source: CameraSource,
     first: Connected,
 ) -> Result<(), CaptureError> {
-    let mut live = Live::new(Arc::clone(shared), &mut source);
+    let mut live = Live::new(Arc::clone(shared), &mut source).with_load();
     let mut next = Some(first);
     // A person who starts this program can see the camera.
     let mut person_said = true;
@@ -201,15 +221,32 @@ fn rest(shared: &Shared, time: Duration) {
     }
 }
 
-/// Makes images and publishes them until the server stops.
-fn images(shared: &Shared, imaging: Imaging, publish: &watch::Sender<Arc<Published>>) {
+/// Makes images and publishes them until the server stops. While the page gives up images, the thread
+/// rests after each image, and pages learn of news alone.
+pub(super) fn images(shared: &Shared, imaging: Imaging, publish: &watch::Sender<Arc<Published>>) {
     let mut studio = Studio::new(imaging);
+    let mut next_image = Instant::now();
     while !shared.is_over() {
         let turn = Instant::now();
-        let look = shared.slot.take(HEARTBEAT);
+        let look = match next_image.checked_duration_since(turn) {
+            None | Some(Duration::ZERO) => shared.slot.take(HEARTBEAT),
+            Some(rest) => {
+                shared.slot.await_news(rest.min(HEARTBEAT));
+                None
+            }
+        };
+        let began = Instant::now();
         if let Ok(published) = studio.turn(shared, look.as_ref()) {
             publish.send_replace(Arc::new(published));
         }
+        if look.is_some() {
+            next_image = Instant::now() + given_up(shared.shed(), began.elapsed());
+        }
         std::thread::sleep(PACE.saturating_sub(turn.elapsed()));
     }
+}
+
+/// The time of the images that are given up after an image that took so long.
+fn given_up(shed: Shed, took: Duration) -> Duration {
+    (shed.show_every - 1) * took.max(PACE)
 }

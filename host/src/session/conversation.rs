@@ -27,13 +27,20 @@ pub(super) struct Conversation {
     link: Box<dyn Link>,
     incoming: Incoming,
     next_id: u16,
+    /// Time spent in waiting for the link.
+    waited: Duration,
 }
 
 impl Conversation {
     /// Begins a conversation. A delimiter ends what an earlier host may have left half sent.
     pub(super) fn begin(mut link: Box<dyn Link>) -> Result<Self, SessionError> {
         link.send(&[0])?;
-        Ok(Self { link, incoming: Incoming::new(), next_id: 0 })
+        Ok(Self { link, incoming: Incoming::new(), next_id: 0, waited: Duration::ZERO })
+    }
+
+    /// Time that the link has been waited for.
+    pub(super) fn waited(&self) -> Duration {
+        self.waited
     }
 
     /// Sends a command without waiting for its answer. Returns the number that the answer will
@@ -63,8 +70,15 @@ impl Conversation {
         listener: &mut dyn Listener,
         answered: &mut Answered<'_>,
     ) -> Result<(), SessionError> {
-        match self.link.receive(&mut self.incoming.chunk, timeout)? {
-            Received::Bytes(length) => self.incoming.take(length, listener, answered),
+        let asked = Instant::now();
+        let received = self.link.receive(&mut self.incoming.chunk, timeout)?;
+        let arrived = Instant::now();
+        self.waited += arrived.saturating_duration_since(asked);
+        match received {
+            Received::Bytes(length) => {
+                listener.arrived(arrived);
+                self.incoming.take(length, listener, answered);
+            }
             Received::Nothing => {}
             Received::Closed => return Err(self.closed()),
         }

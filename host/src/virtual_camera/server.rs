@@ -3,7 +3,8 @@
 //!
 //! The simulation waits for the network: while the link is full, the camera's time stands still, so
 //! a slow host loses nothing. With [`ServeOptions::drop_when_full`] the time goes on, and the
-//! firmware drops frames as on the real camera.
+//! firmware drops frames as on the real camera. With [`ServeOptions::real_time`] the time runs no
+//! faster than the clock on the wall.
 
 use super::{SimulatedFpga, VirtualCamera};
 use crate::link::is_hangup;
@@ -33,6 +34,39 @@ pub struct ServeOptions {
     pub once: bool,
     /// Whether the camera's time goes on while the link is full.
     pub drop_when_full: bool,
+    /// Whether the camera's time runs no faster than the clock on the wall.
+    pub real_time: bool,
+}
+
+/// Keeps the camera's time from running faster than the clock on the wall.
+///
+/// # Invariant
+/// The camera is never ahead of the clock since the last time that the camera was [`LATE`] behind
+/// (`tests::a_camera_in_real_time_is_never_ahead_and_does_not_make_up_for_long_delays`).
+struct Pace {
+    /// The moment on the wall that is `clocks` of the camera.
+    since: Instant,
+    clocks: u64,
+}
+
+/// A camera that is further behind the clock on the wall does not make up for the delay.
+const LATE: Duration = Duration::from_millis(100);
+/// Length of an ADC clock.
+const NS_PER_CLOCK: u64 = 1_000_000_000 / nirspi_wire::ADC_HZ as u64;
+/// The longest sleep of a camera that is ahead, so that its host is heard.
+const AHEAD_WAIT: Duration = Duration::from_micros(500);
+
+impl Pace {
+    /// How far the camera is ahead of the clock on the wall; `None` if it is not ahead.
+    fn ahead(&mut self, now: Instant, clocks: u64) -> Option<Duration> {
+        let passed = clocks.saturating_sub(self.clocks);
+        let light = Duration::from_nanos(passed * NS_PER_CLOCK);
+        let wall = now.saturating_duration_since(self.since);
+        if wall > light + LATE {
+            (self.since, self.clocks) = (now, clocks);
+        }
+        light.checked_sub(wall).filter(|ahead| !ahead.is_zero())
+    }
 }
 
 /// An event that the server reports to its user.
@@ -134,6 +168,7 @@ fn converse<F: SimulatedFpga>(
     stream.set_nonblocking(true)?;
     let mut buffer = vec![0; 1 << 16];
     let (mut heard, mut greeted) = (Instant::now(), false);
+    let mut pace = Pace { since: heard, clocks: camera.fpga().clock() };
     while !stop.load(Ordering::Relaxed) {
         let another_waits = knock();
         let silent = heard.elapsed();
@@ -154,11 +189,17 @@ fn converse<F: SimulatedFpga>(
             Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
             Err(error) => return Err(error),
         }
-        let mut worked = false;
+        let (mut worked, mut ahead) = (false, None);
         // A batch of steps between two reads of the socket, because system calls cost more than
         // frames.
         for _ in 0..64 {
             if camera.packets_out().is_full() && !options.drop_when_full {
+                break;
+            }
+            if options.real_time {
+                ahead = pace.ahead(Instant::now(), camera.fpga().clock());
+            }
+            if ahead.is_some() {
                 break;
             }
             worked |= camera.step(STEP_CLOCKS);
@@ -178,6 +219,8 @@ fn converse<F: SimulatedFpga>(
         }
         if blocked && !options.drop_when_full {
             std::thread::sleep(Duration::from_micros(50));
+        } else if let Some(ahead) = ahead {
+            std::thread::sleep(ahead.min(AHEAD_WAIT));
         } else if !worked && !camera.fpga().running() {
             std::thread::sleep(IDLE_WAIT);
         }
@@ -221,6 +264,20 @@ mod tests {
         stop.store(true, Ordering::Relaxed);
         server.join().unwrap();
         assert_eq!(greeted.unwrap().identity().board, "virtual");
+    }
+
+    #[test]
+    fn a_camera_in_real_time_is_never_ahead_and_does_not_make_up_for_long_delays() {
+        let start = Instant::now();
+        let after = |ms| start + Duration::from_millis(ms);
+        let ms = u64::from(nirspi_wire::ADC_HZ) / 1000;
+        let mut pace = Pace { since: start, clocks: 7 };
+        assert_eq!(pace.ahead(after(0), 7), None);
+        assert_eq!(pace.ahead(after(10), 7 + 30 * ms), Some(Duration::from_millis(20)));
+        assert_eq!(pace.ahead(after(90), 7 + 30 * ms), None, "a short delay");
+        assert_eq!(pace.ahead(after(91), 7 + 95 * ms), Some(Duration::from_millis(4)), "made up");
+        assert_eq!(pace.ahead(after(500), 7 + 95 * ms), None, "a long delay");
+        assert_eq!(pace.ahead(after(500), 7 + 97 * ms), Some(Duration::from_millis(2)), "lost");
     }
 
     const HELLO: Command<'_> = Command::Hello { protocol: version::CURRENT };

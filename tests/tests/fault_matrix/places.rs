@@ -208,7 +208,7 @@ impl Server {
         let stop = Arc::<AtomicBool>::default();
         let stopped = Arc::clone(&stop);
         let thread = std::thread::spawn(move || {
-            let options = ServeOptions { once: false, drop_when_full: false };
+            let options = ServeOptions::default();
             serve(&listener, &mut camera, options, &stopped, &mut |_| {}).unwrap();
             camera
         });

@@ -8,6 +8,7 @@ Needs playwright (PyPI) and chromium (Debian). Says what is wrong and exits 1, o
 
 import argparse
 import json
+import re
 import signal
 import struct
 import subprocess
@@ -39,6 +40,11 @@ def live(page, address, screenshot):
         expect(account).to_contain_text(name)
     expect(page.locator("#rates dd").nth(2)).not_to_have_text("0.0")
     expect(page.locator("#estimates")).to_contain_text("of 64 px")
+    delays = page.locator("#delays")
+    for name in ["counted", "reconstructed", "enhanced", "sent"]:
+        expect(delays).to_contain_text(re.compile(rf"{name}\d[\d.]*, \d[\d.]* ms"))
+        assert delays.get_by_text(name, exact=True).get_attribute("title"), f"no tooltip for {name}"
+    expect(page.locator("#overload")).to_be_hidden()
     fits(page)
     if screenshot:
         # Rates are those of whole seconds.
@@ -109,6 +115,7 @@ def fault(browser, address):
     state["camera"]["identity"] |= {"board": hostile, "serial": hostile}
     state["light"]["allowed"] = False
     state["frames"]["lost"] = 7
+    state["overload"] |= {"show_every": 8, "enhancement_off": True, "line": f"the page shows every 8th image {hostile}"}
     state["events"] = [{"unix_ms": 0, "text": f"<b>not markup</b> {hostile}"}]
     message = json.dumps({"state": state, "image": None, "enhanced": None})
     page.route("**/events", lambda route: route.fulfill(
@@ -120,6 +127,8 @@ def fault(browser, address):
     page.goto(address)
     expect(page.locator("#account .loss")).to_have_text("7")
     expect(page.locator("#losses")).to_contain_text("7 lost, 0 corrupt")
+    expect(page.locator("#overload")).to_contain_text("the page shows every 8th image <img")
+    expect(page.locator("#no-enhanced")).to_have_text("off: this computer is too slow")
     expect(page.locator("#events")).to_contain_text("<b>not markup</b>")
     # The names are text, and cannot turn the direction of other text.
     for name in ["camera", "events"]:

@@ -37,6 +37,18 @@ fn a_thousand_frames_are_captured_recorded_and_reconstructed() {
 }
 
 #[test]
+fn a_camera_in_real_time_takes_the_time_of_its_light() {
+    let bench = Bench::new();
+    let (_server, camera) = serve(&bench, &["--once", "--precompute", "4", "--real-time"]);
+    let began = std::time::Instant::now();
+    // A frame of 122 sweeps is 10 ms of light; the precomputed frames alone come at any speed.
+    let capture = ["capture", "--camera", &camera, "--frames", "100", "--sweeps", "122", "--json"];
+    let report = bench.run(&capture).succeeded().json();
+    assert_eq!(report["frames"]["received"], 100);
+    assert!(began.elapsed() >= std::time::Duration::from_millis(950), "{:?}", began.elapsed());
+}
+
+#[test]
 fn a_capture_ends_with_a_picture_of_what_was_seen() {
     let bench = Bench::new();
     let capture = ["capture", "--frames", "6", "--sweeps", "100", "--out", "rec.mcap"];

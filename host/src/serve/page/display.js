@@ -120,7 +120,8 @@ export function show(message) {
   }
   $("no-image").hidden = message.image !== null;
   $("no-enhanced").hidden = message.enhanced !== null;
-  text($("no-enhanced"), settings.enhance ? "no image yet" : "switched off");
+  text($("no-enhanced"), !settings.enhance ? "switched off"
+    : state.overload.enhancement_off ? "off: this computer is too slow" : "no image yet");
   $("no-readings").hidden = message.readings !== null;
   $("depth-panel").hidden = message.depth === null;
   const found = picture?.enhancement;

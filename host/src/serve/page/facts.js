@@ -22,6 +22,17 @@ export function show(state, drawnPerSecond) {
     ["images on this page", rate(drawnPerSecond)],
     ["open pages", whole(state.viewers)],
   ]);
+  const { delays, overload } = state, share = n => `${Math.round(100 * n)} %`;
+  list($("delays"), [
+    [state.settings.record ? "recorded" : "counted", delay(delays.counted)],
+    ["reconstructed", delay(delays.reconstructed)],
+    ["enhanced", delay(delays.enhanced)],
+    ...(delays.sent ? [["sent", delay(delays.sent)]] : []),
+    ["load", share(overload.camera_thread), overload.line !== null],
+    ...(state.settings.record ? [["recording queue", share(overload.recording_queue)]] : []),
+  ]);
+  text($("overload"), overload.line ?? "");
+  $("overload").hidden = overload.line === null;
   list($("estimates"), [
     ["blur", found ? `${fixed(found.blur_px, 2)} of 64 px` : "–"],
     ["noise", found ? `${fixed(found.noise, 3)} of white` : "–"],
@@ -47,6 +58,10 @@ export function show(state, drawnPerSecond) {
   text($("notes"), foreign(notes.filter(Boolean).map(note => note.trim()).join("; ")));
   events(state.events);
 }
+
+// p50 and p99 in milliseconds.
+const ms = n => n < 10 ? n.toFixed(1) : whole(Math.round(n));
+const delay = of => of ? `${ms(of.p50_ms)}, ${ms(of.p99_ms)} ms` : "–";
 
 let told = "";
 function events(all) {

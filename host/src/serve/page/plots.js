@@ -1,4 +1,4 @@
-// Small plots of the last two minutes: rates, losses, signal, signal-to-noise ratio.
+// Small plots of the last two minutes: rates, delay, losses, signal, signal-to-noise ratio.
 
 import { $, rate, text } from "./dom.js";
 
@@ -7,6 +7,8 @@ const EVERY_MS = 500, KEPT = 240;
 const PLOTS = [
   { id: "frames-plot", name: "frames a second", words: rate, value: state => state.rates.camera_frames_per_s },
   { id: "images-plot", name: "images a second", words: rate, value: state => state.rates.images_per_s },
+  { id: "delay-plot", name: "delay, p99, ms", words: n => n.toFixed(n < 10 ? 1 : 0), value: ({ delays }) =>
+    (delays.sent ?? delays.enhanced ?? delays.reconstructed)?.p99_ms },
   { id: "losses-plot", name: "frames not received", words: rate, bars: true, value: lossesSinceLast },
   { id: "signal-plot", name: "signal, ADC counts", words: n => n.toFixed(1), value: state => state.picture?.white_counts },
   { id: "snr-plot", name: "signal to noise", words: n => n.toFixed(1), value: ({ picture }) =>

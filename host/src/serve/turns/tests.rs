@@ -1,4 +1,6 @@
 use super::*;
+use crate::serve::lock;
+use crate::serve::overload::tests::given_up;
 use serde_json::Value;
 
 /// The page of a virtual camera without networks, whose images sum 8 frames.
@@ -40,6 +42,39 @@ fn only_a_person_starts_a_stopped_camera_again() {
     let again = state(&mut page, 2);
     assert_eq!(again["camera"]["phase"], "measuring");
     assert!(count(&again, "received") > count(&stopped, "received"));
+}
+
+#[test]
+fn an_overloaded_page_leaves_enhancement_out_and_says_so() {
+    let mut page = Turns::virtual_camera(1).unwrap();
+    page.command("/api/settings", br#"{"method": "hadamard", "frames": 8}"#).unwrap();
+    let all = state(&mut page, 1);
+    assert!(all["picture"]["enhancement"].is_object() && all["overload"]["line"].is_null());
+    *lock(&page.shared.overload) = given_up(4);
+    let less = state(&mut page, 1);
+    assert!(less["picture"]["enhancement"].is_null(), "{}", less["picture"]);
+    assert_eq!(
+        (&less["overload"]["show_every"], &less["settings"]["enhance"]),
+        (&8.into(), &true.into())
+    );
+    let line = less["overload"]["line"].as_str().unwrap();
+    assert!(line.starts_with("the page shows every 8th image and enhancement is off"), "{line}");
+    assert_eq!(count(&less, "received"), 2 * FRAMES);
+    *lock(&page.shared.overload) = given_up(3);
+    assert!(state(&mut page, 1)["picture"]["enhancement"].is_object());
+}
+
+#[test]
+fn each_stage_says_how_long_its_frames_took() {
+    let mut page = page();
+    let after = state(&mut page, 3);
+    let delays = &after["delays"];
+    assert_eq!(delays["counted"]["count"], 3 * FRAMES);
+    assert_eq!(delays["reconstructed"]["count"], 3);
+    // Nothing was enhanced, and there is no server that sends.
+    assert!(delays["enhanced"].is_null() && delays["sent"].is_null(), "{delays}");
+    let p50 = |stage: &str| delays[stage]["p50_ms"].as_f64().unwrap();
+    assert!(p50("reconstructed") > p50("counted"), "{delays}");
 }
 
 #[test]
