@@ -4,21 +4,52 @@
 //! answer to the same access.
 
 use crate::rig::{Access, Answer, Rig};
+use crate::scenario::Dice;
 use nirspi_wire::{
     host_port,
     register::{Register, clocks},
 };
 
+/// A line that the host drives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Line {
+    Sck,
+    Select,
+    Data,
+}
+
 impl Rig {
     /// One period of `sck`; returns what the FPGA drives when the host samples.
     fn sck(&mut self, lines: u8) -> (u8, u8) {
+        let half = self.port.half;
+        let glitch = self.glitch();
         self.pins.drive(lines);
-        self.pins.sck(false);
-        self.wait(self.port.half);
-        let driven = self.pins.driven();
-        self.pins.sck(true);
-        self.wait(self.port.half);
+        let mut driven = (0, 0);
+        for clock in 0..2 * half {
+            let high = clock >= half;
+            if clock == half {
+                driven = self.pins.driven();
+            }
+            let wrong = glitch.filter(|&(at, _)| at == clock).map(|(_, line)| line);
+            self.pins.sck(high != (wrong == Some(Line::Sck)));
+            self.pins.select(wrong != Some(Line::Select));
+            self.pins.drive(if wrong == Some(Line::Data) { !lines & 0xF } else { lines });
+            self.host_clock();
+            // The FPGA lets its lines go with the level of `cs_n` at the pin, so a glitch is over before the
+            // host samples.
+            self.pins.select(true);
+        }
+        self.pins.drive(lines);
         driven
+    }
+
+    /// The clock of this period in which a line of the host's is wrong, and that line.
+    fn glitch(&mut self) -> Option<(u32, Line)> {
+        self.periods += 1;
+        let chance = Dice::new(self.periods).next();
+        let line = [Line::Sck, Line::Sck, Line::Select, Line::Data][chance as usize % 4];
+        let at = (chance >> 32) as u32 % (2 * self.port.half);
+        (self.port.glitches && self.periods.is_multiple_of(2)).then_some((at, line))
     }
 
     /// Sends the lowest `bits` of a word, quad or on `io0`.

@@ -110,6 +110,8 @@ const FAULTS: &[Fault] = &[
     ("a register reads as its neighbour", "registers", "(blank & {asked[4] repeat 32})", "(dwell & {asked[4] repeat 32})"),
     ("a stop may trip", "safety", "assign counts    = running && !opens && !stop;", "assign counts    = (running || stop) && !opens;"),
     ("a burst is summed like a frame", "window", "waiting = !settings.raw;", "waiting = 1;"),
+    ("a glitch of one clock is an edge", "glitch_filter", "level && last || last && earlier || level && earlier", "last"),
+    ("a glitch in a level ends the level", "glitch_filter", "level && last || last && earlier || level && earlier", "level && last"),
     ("without clock a read gives 0", "host_registers", "answer   = if here == 0 ? NO_CLOCK :", "answer   = if here == 0 ? 0 :"),
     ("the engine answers for the host port", "host_registers", "answered = back && !own;\n            if back && !own {", "answered = back;\n            if back {"),
     ("the lock is not told", "host_registers", "(if locked_here ? CLOCKS_LOCKED : 0)", "(if locked_here ? 0 : CLOCKS_LOCKED)"),

@@ -64,6 +64,8 @@ pub struct Port {
     /// half.
     pub half: u32,
     pub quad: bool,
+    /// In every second period of `sck`, one sample of a line of the host's is wrong.
+    pub glitches: bool,
 }
 
 pub struct Rig {
@@ -88,6 +90,8 @@ pub struct Rig {
     /// Level of the interlock pin.
     closed: bool,
     design: Design,
+    /// Periods of `sck`.
+    pub(crate) periods: u64,
     pub(crate) asked: Option<Access>,
     pub(crate) answer: Option<Answer>,
     start: Option<(u64, u32)>,
@@ -158,7 +162,7 @@ impl Rig {
         Self {
             pins: Pins::new(project),
             model: Gateware::new(),
-            port: Port { host_ps: 10_000, half: 3, quad: true },
+            port: Port { host_ps: 10_000, half: 3, quad: true, glitches: false },
             seed,
             over_range_rate: 0,
             fade: 63,
@@ -171,6 +175,7 @@ impl Rig {
             put_out: true,
             closed: false,
             design: Design::Camera,
+            periods: 0,
             asked: None,
             answer: None,
             start: None,

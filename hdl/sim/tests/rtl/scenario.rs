@@ -164,6 +164,7 @@ pub fn run(rig: &mut Rig, seed: u64) {
         host_ps: dice.pick(&[10_000, 8_000, 7_000, 13_000]),
         half: dice.pick(&[3, 3, 4]),
         quad: !dice.once_in(8),
+        glitches: seed % 2 == 1,
     };
     rig.over_range_rate = dice.pick(&[0, 1, 8, 64, 255]);
     rig.interlock(!dice.once_in(32));
