@@ -34,7 +34,7 @@ module nirspi_core (
     output var logic         raw_ready  ,
     output var logic         access      /// An access of the host takes effect: for an activity LED
 );
-    // Pins to the clocks that look at them.
+    // Pins to the clocks that look at them. All six of the host port are equally late.
     logic         closed  ;
     logic         sck     ;
     logic         cs_n    ;
@@ -46,20 +46,20 @@ module nirspi_core (
         .from (interlock),
         .to   (closed   )
     );
-    nirspi_synchroniser to_sck (
+    nirspi_glitch_filter to_sck (
         .clk  (clk_host),
         .rst  (rst_host),
         .from (spi_sck ),
         .to   (sck     )
     );
-    nirspi_synchroniser to_cs_n (
+    nirspi_glitch_filter to_cs_n (
         .clk  (clk_host),
         .rst  (rst_host),
         .from (spi_cs_n),
         .to   (cs_n    )
     );
     for (genvar i = 0; i < 4; i++) begin :g_line
-        nirspi_synchroniser to_line (
+        nirspi_glitch_filter to_line (
             .clk  (clk_host   ),
             .rst  (rst_host   ),
             .from (spi_in[i]  ),

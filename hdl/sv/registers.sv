@@ -37,6 +37,7 @@ module nirspi_registers
     logic [32-1:0] watchdog  ;
     logic [32-1:0] duty_limit;
     logic [32-1:0] trip      ;
+    logic [32-1:0] writes    ;
 
     always_ff @ (posedge clk) begin
         if (rst) begin
@@ -69,6 +70,14 @@ module nirspi_registers
                 default                : begin
                 end
             endcase
+        end
+    end
+
+    always_ff @ (posedge clk) begin
+        if (rst) begin
+            writes <= RESET_WRITES;
+        end else if (write) begin
+            writes <= writes + 1;
         end
     end
 
@@ -136,7 +145,7 @@ module nirspi_registers
     end
 
     // Which word is asked for, worked out while the access waits.
-    logic [13-1:0] asked      ;
+    logic [14-1:0] asked      ;
     logic [5-1:0]  asked_live ;
     logic          asked_table;
 
@@ -154,6 +163,7 @@ module nirspi_registers
         asked[10]     <= 32'(address) == ADDRESS_DUTY_LIMIT;
         asked[11]     <= 32'(address) == ADDRESS_OVER_RANGE_TRIP;
         asked[12]     <= 32'(address) == ADDRESS_CLOCK_HIGH;
+        asked[13]     <= 32'(address) == ADDRESS_WRITES;
         asked_live[0] <= 32'(address) == ADDRESS_STATUS;
         asked_live[1] <= 32'(address) == ADDRESS_FAULT;
         asked_live[2] <= 32'(address) == ADDRESS_FRAMES_MADE;
@@ -179,7 +189,7 @@ module nirspi_registers
             | (dwell & {32{asked[3]}}) | (blank & {32{asked[4]}}) | (latency & {32{asked[5]}});
         stored_1 <= (sweeps & {32{asked[6]}}) | (frames & {32{asked[7]}}) | (raw_length & {32{asked[8]}})
             | (watchdog & {32{asked[9]}}) | (duty_limit & {32{asked[10]}}) | (trip & {32{asked[11]}})
-            | (clock_high & {32{asked[12]}});
+            | (clock_high & {32{asked[12]}}) | (writes & {32{asked[13]}});
         entry <= 32'(table_entry) & {32{asked_table}};
         value <= live | stored_0 | stored_1 | entry;
     end

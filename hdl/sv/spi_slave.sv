@@ -1,7 +1,8 @@
 /// The host port: an SPI slave (mode 0) that also goes by four lines.
 ///
 /// Invariant: the pins are sampled, never clocked by; so `sck` may stop anywhere and a transfer that is cut
-/// short leaves nothing behind. The command set is `mcu/wire/src/host_port.rs`.
+/// short leaves nothing behind. A write whose check is wrong does nothing. The command set is
+/// `mcu/wire/src/host_port.rs`.
 module nirspi_spi_slave
     import nirspi_register_map::*;
 (
@@ -32,6 +33,7 @@ module nirspi_spi_slave
         Phase_Opcode,
         Phase_Address,
         Phase_Data,
+        Phase_Check,
         Phase_Dummy,
         Phase_Answer,
         Phase_Over
@@ -50,6 +52,13 @@ module nirspi_spi_slave
     logic          streams ;
     logic          stale   ;
     logic [8-1:0]  byte_now;
+    logic [16-1:0] check   ; // of address and value so far
+    logic [16-1:0] one     ; // with so many of the bits
+    logic [16-1:0] two     ;
+    logic [16-1:0] three   ;
+    logic [16-1:0] four    ;
+    logic [16-1:0] extended; // with the bits of this cycle
+    logic [4-1:0]  bits    ; // those bits, the first on the left; one line has one
     logic          takes   ;
 
     always_comb rises = sck && !sck_last;
@@ -62,6 +71,27 @@ module nirspi_spi_slave
     always_comb takes    = rises && selected && streams
         && (phase == Phase_Dummy && left == 0 || phase == Phase_Answer && out_left == 0);
     always_comb pop = stale || takes;
+
+    /// The check after one more bit.
+    function automatic logic [16-1:0] extend(
+        input var logic [16-1:0] so_far,
+        input var logic          first
+    ) ;
+        return {so_far[14:0], 1'b0} ^ (HOST_CHECK_POLYNOMIAL[15:0] & {16{so_far[15] ^ first}});
+    endfunction
+
+    always_comb begin
+        if (phase == Phase_Answer) begin
+            bits = out[31:28];
+        end else begin
+            bits = ((quad) ? ( lines_in ) : ( {lines_in[0], 3'b0} ));
+        end
+    end
+    always_comb one      = extend(check, bits[3]);
+    always_comb two      = extend(one, bits[2]);
+    always_comb three    = extend(two, bits[1]);
+    always_comb four     = extend(three, bits[0]);
+    always_comb extended = ((quad) ? ( four ) : ( one ));
 
     always_comb lines_out = ((quad) ? ( out[31:28] ) : ( {2'b0, out[31], 1'b0} ));
 
@@ -80,6 +110,7 @@ module nirspi_spi_slave
             operation <= 0;
             address   <= 0;
             data      <= 0;
+            check     <= 0;
         end else begin
             sck_last <= sck;
             send     <= 0;
@@ -99,39 +130,59 @@ module nirspi_spi_slave
                         streams   <= next[1];
                         phase     <= ((known) ? ( Phase_Address ) : ( Phase_Over ));
                         left      <= ((next[7]) ? ( 3 ) : ( 15 ));
+                        check     <= HOST_CHECK_SEED[15:0];
                     end
-                    Phase_Address: if (left == 0) begin
-                        address <= next[15:0];
-                        if (operation == HOST_WRITE[1:0]) begin
-                            phase <= Phase_Data;
-                            left  <= ((quad) ? ( 7 ) : ( 31 ));
-                        end else begin
-                            phase <= Phase_Dummy;
-                            left  <= 6'((HOST_DUMMY_CYCLES - 1));
-                            send  <= 1;
+                    Phase_Address: begin
+                        check <= extended;
+                        if (left == 0) begin
+                            address <= next[15:0];
+                            if (operation == HOST_WRITE[1:0]) begin
+                                phase <= Phase_Data;
+                                left  <= ((quad) ? ( 7 ) : ( 31 ));
+                            end else begin
+                                phase <= Phase_Dummy;
+                                left  <= 6'((HOST_DUMMY_CYCLES - 1));
+                                send  <= 1;
+                            end
                         end
                     end
-                    Phase_Data   : if (left == 0) begin
-                        data  <= next;
-                        phase <= Phase_Over;
-                        send  <= 1;
+                    Phase_Data: begin
+                        check <= extended;
+                        if (left == 0) begin
+                            data  <= next;
+                            phase <= Phase_Check;
+                            left  <= ((quad) ? ( 3 ) : ( 15 ));
+                        end
                     end
-                    Phase_Dummy  : if (left == 0) begin
+                    Phase_Check: begin
+                        check <= extended;
+                        if (left == 0) begin
+                            // A check that is extended by itself is 0.
+                            phase <= Phase_Over;
+                            send  <= extended == 0;
+                        end
+                    end
+                    Phase_Dummy : if (left == 0) begin
                         phase    <= Phase_Answer;
+                        left     <= ((quad) ? ( 7 ) : ( 31 ));
                         drive    <= ((quad) ? ( 4'b1111 ) : ( 4'b0010 ));
                         out_left <= ((quad) ? ( 1 ) : ( 7 ));
                         if (streams) begin
                             out <= {byte_now, 24'b0};
                         end
                     end
-                    Phase_Answer : if (streams && out_left == 0) begin
+                    Phase_Answer: if (streams && out_left == 0) begin
                         out      <= {byte_now, 24'b0};
                         out_left <= ((quad) ? ( 1 ) : ( 7 ));
                     end else begin
+                        check    <= extended;
                         out      <= ((quad) ? ( out << 4 ) : ( out << 1 ));
                         out_left <= out_left - 1;
+                        if (!streams && left == 0) begin
+                            out <= {extended, 16'b0};
+                        end
                     end
-                    default      : begin
+                    default     : begin
                     end
                 endcase
             end

@@ -11,7 +11,10 @@ use nirspi_wire::{CrashReport, EventKind};
 pub fn at_greeting(kind: &EventKind) -> Option<String> {
     match kind {
         EventKind::Fault(_) => Some(as_it_happens(kind)),
-        EventKind::RunEnded { .. } | EventKind::RawDropped | EventKind::CommandDamaged => None,
+        EventKind::RunEnded { .. }
+        | EventKind::RawDropped
+        | EventKind::CommandDamaged
+        | EventKind::FpgaAccessesDamaged { .. } => None,
     }
 }
 
@@ -38,6 +41,10 @@ pub fn as_it_happens(kind: &EventKind) -> String {
         }
         EventKind::RawDropped => "a raw burst was dropped for want of room on the link".to_owned(),
         EventKind::CommandDamaged => "a command came damaged to the camera".to_owned(),
+        EventKind::FpgaAccessesDamaged { total } => format!(
+            "register accesses between firmware and FPGA came damaged and were repeated, {total} since \
+             power-up: check the wires of the host port"
+        ),
     }
 }
 

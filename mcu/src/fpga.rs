@@ -10,7 +10,8 @@
 use crate::configure::Setup;
 use crate::{BusError, FpgaBus, Limits};
 use nirspi_wire::register::{
-    Design, FaultCode, IDENTITY, NO_CLOCK, ORDER_TABLE, Register, control, has_this_map, status,
+    DAMAGED, Design, FaultCode, IDENTITY, NO_CLOCK, ORDER_TABLE, Register, control, has_this_map,
+    status,
 };
 use nirspi_wire::samples::Words;
 use nirspi_wire::{Fault, Version};
@@ -37,13 +38,26 @@ pub(crate) fn release(bus: &mut impl FpgaBus) -> Result<(), BusError> {
 }
 
 /// Fault of an FPGA that does not answer at all.
-pub(crate) const SILENT: Fault = Fault::FpgaAbsent { identity: 0 };
+const SILENT: Fault = Fault::FpgaAbsent { identity: 0 };
 
 /// Fault of an FPGA whose gateware this firmware does not know.
 const FOREIGN: Fault = Fault::FpgaAbsent { identity: IDENTITY };
 
-/// Number of looks at the FPGA before a wrong answer is a fault. A single wrong bit on the wires, of which
-/// two registers a millisecond have many chances, must not end a run.
+/// The fault of an access that failed. Accesses to gateware of another version fail as if they were
+/// damaged, because that gateware checks none.
+pub(crate) fn failed(error: BusError, bus: &mut impl FpgaBus) -> Fault {
+    if error != BusError::Damaged {
+        return SILENT;
+    }
+    match (read(bus, Register::Identity), read(bus, Register::Version)) {
+        (Ok(IDENTITY), Ok(version)) if !has_this_map(version) => FOREIGN,
+        (Ok(identity), _) if identity != IDENTITY => Fault::FpgaAbsent { identity },
+        _ => Fault::FpgaAbsent { identity: DAMAGED },
+    }
+}
+
+/// Number of looks at the FPGA before a wrong answer is a fault. The check of the host port lets one
+/// damaged answer in 65 536 pass, and that one must not end a run.
 const LOOKS: u8 = 3;
 
 /// Checks that the FPGA answers with its identity.
@@ -51,15 +65,15 @@ pub(crate) fn identify(bus: &mut impl FpgaBus) -> Result<(), Fault> {
     match read(bus, Register::Identity) {
         Ok(IDENTITY) => Ok(()),
         Ok(identity) => Err(Fault::FpgaAbsent { identity }),
-        Err(_) => Err(SILENT),
+        Err(error) => Err(failed(error, bus)),
     }
 }
 
 /// What the FPGA is built for, if this firmware knows its gateware.
 pub(crate) fn design(bus: &mut impl FpgaBus) -> Result<Design, Fault> {
     identify(bus)?;
-    let version = read(bus, Register::Version).map_err(|_| SILENT)?;
-    let design = read(bus, Register::Design).map_err(|_| SILENT)?;
+    let version = read(bus, Register::Version).map_err(|error| failed(error, bus))?;
+    let design = read(bus, Register::Design).map_err(|error| failed(error, bus))?;
     Design::from_register(design).filter(|_| has_this_map(version)).ok_or(FOREIGN)
 }
 
@@ -77,7 +91,7 @@ pub(crate) fn health(bus: &mut impl FpgaBus) -> Result<u32, Fault> {
 
 /// One look at identity, status and fault. The outer error is a transfer that did not complete.
 fn look(bus: &mut impl FpgaBus) -> Result<Result<u32, Fault>, Fault> {
-    let mut word = |register| read(bus, register).map_err(|_| SILENT);
+    let mut word = |register| read(bus, register).map_err(|error| failed(error, bus));
     let identity = word(Register::Identity)?;
     if identity != IDENTITY {
         return Ok(Err(Fault::FpgaAbsent { identity }));
@@ -140,7 +154,7 @@ pub(crate) fn go_dark(bus: &mut impl FpgaBus) -> Result<(), NotTaken> {
 /// Stops a run and clears the latched fault. The error is the fault that still forbids a start.
 pub(crate) fn acknowledge(bus: &mut impl FpgaBus) -> Result<(), Fault> {
     design(bus)?;
-    control(bus, control::STOP | control::CLEAR_FAULT).map_err(|_| SILENT)?;
+    control(bus, control::STOP | control::CLEAR_FAULT).map_err(|error| failed(error, bus))?;
     if health(bus)? & status::INTERLOCK_CLOSED == 0 {
         return Err(Fault::Interlock);
     }
@@ -199,7 +213,7 @@ pub(crate) fn set_table(bus: &mut impl FpgaBus, table: &Words<'_>) -> Result<(),
 /// Starts a run (`control::START`) or raw burst (`control::START_RAW`), and reads how the FPGA
 /// responded.
 pub(crate) fn start(bus: &mut impl FpgaBus, command: u32) -> Result<Started, Fault> {
-    control(bus, command).map_err(|_| SILENT)?;
+    control(bus, command).map_err(|error| failed(error, bus))?;
     let status = health(bus)?;
     if status & status::RUNNING != 0 {
         Ok(Started::Running)

@@ -19,6 +19,13 @@
 //! }
 //! ```
 //!
+//! Wires damage what they carry, so every register access has a check, and the bus decides what to
+//! believe. A read whose check is wrong is repeated: reads have no side effect that a second read would
+//! not have. A write whose check is wrong is not taken by the FPGA, which counts the writes that it
+//! took ([`Register::Writes`]): the bus reads that count after every write to a register, and repeats
+//! a write that was not taken. So a start or a release acts once. The entries of the order table are
+//! not asked for one by one, because the camera reads the whole table back.
+//!
 //! With a second buffer ([`PortBus::with_spare`]) a frame can be kept: the camera packs it while the
 //! next frame is transferred into the other buffer.
 //!
@@ -28,29 +35,35 @@
 //! release, data from before it is never given again
 //! (`tests::host_port::after_a_release_an_older_frame_is_never_given`), but for a kept frame, which
 //! is given once (`tests::host_port::a_kept_frame_outlives_its_release_and_is_given_once`).
+//!
+//! A damaged answer is never given, and a damaged write is repeated or an error
+//! (`tests::wires::no_damaged_answer_is_believed_and_no_damaged_write_is_taken_for_done`).
 
 use crate::{BusError, FpgaBus};
 use nirspi_wire::fpga::{MAX_FRAME_BYTES, frame_bytes};
-use nirspi_wire::host_port::{READ_FRAME, READ_RAW};
-use nirspi_wire::register::{Register, control};
+use nirspi_wire::host_port::{READ_FRAME, READ_RAW, SEALED_BYTES, seal, unchecked, unseal};
+use nirspi_wire::register::{NO_CLOCK, ORDER_TABLE, Register, control};
 
 /// Number of attempts at a transfer. The FPGA keeps the data until the release.
 const ATTEMPTS: u8 = 3;
 
-/// Single accesses of the FPGA's host port (see [`nirspi_wire::host_port`]), and the port's two
-/// lines.
-pub trait HostPort {
-    /// Writes a register.
-    ///
-    /// # Errors
-    /// [`BusError`].
-    fn write(&mut self, address: u16, value: u32) -> Result<(), BusError>;
+/// Number of attempts at a register access whose check is wrong.
+const REGISTER_ATTEMPTS: u8 = 3;
 
-    /// Reads a register.
+/// Single accesses of the FPGA's host port (see [`nirspi_wire::host_port`]), and the port's two
+/// lines. A board carries bytes and judges none.
+pub trait HostPort {
+    /// Sends a write of these bytes: value and check.
     ///
     /// # Errors
     /// [`BusError`].
-    fn read(&mut self, address: u16) -> Result<u32, BusError>;
+    fn write(&mut self, address: u16, sealed: [u8; SEALED_BYTES]) -> Result<(), BusError>;
+
+    /// Reads as many bytes of a register's answer: value and check.
+    ///
+    /// # Errors
+    /// [`BusError`].
+    fn read(&mut self, address: u16) -> Result<[u8; SEALED_BYTES], BusError>;
 
     /// Level of the line: a frame is ready.
     fn frame_ready(&mut self) -> bool;
@@ -94,6 +107,10 @@ pub struct PortBus<'b, P> {
     raw_samples: u32,
     frame_bytes: usize,
     raw_bytes: usize,
+    /// The FPGA's count of writes when it was last read.
+    writes: Option<u32>,
+    /// Accesses that came damaged since power-up.
+    damaged: u32,
 }
 
 /// A transfer to carry out, and what there is to do meanwhile.
@@ -124,6 +141,8 @@ impl<'b, P: HostPort> PortBus<'b, P> {
             raw_samples: Register::RawLength.reset(),
             frame_bytes: 0,
             raw_bytes: 0,
+            writes: None,
+            damaged: 0,
         };
         bus.take_lengths();
         bus
@@ -164,6 +183,62 @@ impl<'b, P: HostPort> PortBus<'b, P> {
             Err(_) if failed < ATTEMPTS => Transfer::Wanted { data, failed },
             Err(error) => Transfer::Failed(data, error),
         };
+    }
+
+    fn count_damage(&mut self) {
+        self.damaged = self.damaged.saturating_add(1);
+    }
+
+    /// Reads a register, at most [`REGISTER_ATTEMPTS`] times.
+    ///
+    /// Two answers count without a check if they are the same every time, because all that follows from
+    /// them is a refusal that names the cause: an identity, whose value shows crossed wires, and the
+    /// version of gateware that sends no check.
+    fn read_checked(&mut self, address: u16) -> Result<u32, BusError> {
+        let mut steady = None;
+        for attempt in 0..REGISTER_ATTEMPTS {
+            let sealed = self.port.read(address)?;
+            if let Some(value) = unseal(address, sealed) {
+                return Ok(value);
+            }
+            self.count_damage();
+            steady = if attempt == 0 { Some(sealed) } else { steady.filter(|&s| s == sealed) };
+        }
+        let value = match Register::at(address) {
+            Some(Register::Identity) => {
+                steady.map(|[v0, v1, v2, v3, ..]| u32::from_be_bytes([v0, v1, v2, v3]))
+            }
+            Some(Register::Version) => steady.and_then(unchecked),
+            _ => None,
+        };
+        value.ok_or(BusError::Damaged)
+    }
+
+    /// Writes a register, at most [`REGISTER_ATTEMPTS`] times until the FPGA has taken the write. The
+    /// write is sent even if the count before cannot be read, because it may be a stop.
+    fn write_checked(&mut self, address: u16, value: u32) -> Result<(), BusError> {
+        let register = Register::Writes.address();
+        for _ in 0..REGISTER_ATTEMPTS {
+            let before = match self.writes.take() {
+                Some(writes) => Ok(writes),
+                None => self.read_checked(register),
+            };
+            self.port.write(address, seal(address, value))?;
+            let (before, after) = (before?, self.read_checked(register)?);
+            if after == NO_CLOCK {
+                // Without the ADC's clock no write does anything, and the FPGA says so in every answer.
+                return Ok(());
+            }
+            self.writes = Some(after);
+            if after == before.wrapping_add(1) {
+                return Ok(());
+            }
+            // Any other count is that of an FPGA that was reset, or of one whose clock has come back.
+            if after == before {
+                self.count_damage();
+            }
+        }
+        Err(BusError::Damaged)
     }
 
     fn data(&mut self, data: Data) -> Result<Option<&[u8]>, BusError> {
@@ -214,7 +289,7 @@ impl<'b, P: HostPort> PortBus<'b, P> {
 
 impl<P: HostPort> FpgaBus for PortBus<'_, P> {
     fn read(&mut self, address: u16) -> Result<u32, BusError> {
-        self.port.read(address)
+        self.read_checked(address)
     }
 
     fn write(&mut self, address: u16, value: u32) -> Result<(), BusError> {
@@ -224,7 +299,17 @@ impl<P: HostPort> FpgaBus for PortBus<'_, P> {
             Some(Register::Control) => self.note_control(value),
             _ => {}
         }
-        self.port.write(address, value)
+        if address < ORDER_TABLE {
+            self.write_checked(address, value)
+        } else {
+            // The write counts, unless it comes damaged.
+            self.writes = None;
+            self.port.write(address, seal(address, value))
+        }
+    }
+
+    fn damaged(&self) -> u32 {
+        self.damaged
     }
 
     fn frame_ready(&mut self) -> bool {

@@ -69,6 +69,8 @@ pub(crate) struct Machine {
     pub off_pending: bool,
     /// The bus failed during the release of a frame.
     pub release_pending: bool,
+    /// The damaged accesses that a host was last told of, and when.
+    pub damage_told: (u32, Micros),
     /// Samples of a frame or distances of a map, on their way into a packet.
     pub scratch: [u8; SAMPLE_BYTES],
 }
@@ -93,6 +95,7 @@ impl Machine {
             last_check: None,
             off_pending: false,
             release_pending: false,
+            damage_told: (0, Micros(0)),
             scratch: [0; SAMPLE_BYTES],
         }
     }
@@ -307,6 +310,7 @@ impl Machine {
         let report = selftest::examine(bus, inputs, &self.limits);
         let may_light = report.failed == 0
             && self.fault.is_none()
+            && !self.is_loading()
             && safety::objection(inputs, &self.limits, None).is_none();
         if !may_light {
             return self.reply(id, Outcome::Other(Ok(Answer::SelfTest(report))));

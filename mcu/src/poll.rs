@@ -12,6 +12,9 @@ use crate::{FpgaBus, GatewareLoader, Inputs, Micros, PacketSink, Ports, Progress
 use nirspi_wire::register::{Register, status};
 use nirspi_wire::{EventKind, Fault};
 
+/// Shortest time between two events about damaged accesses.
+const DAMAGE_PERIOD: Micros = Micros(1_000_000);
+
 impl Machine {
     pub fn poll<B: FpgaBus, S: PacketSink, G: GatewareLoader>(
         &mut self,
@@ -31,6 +34,7 @@ impl Machine {
             self.release_pending = fpga::release(*bus).is_err();
         }
 
+        self.tell_damage(now, *bus);
         let mut worked = self.flush(*sink);
         worked |= match self.activity {
             Activity::Resting => false,
@@ -111,6 +115,18 @@ impl Machine {
             Activity::TestFrame(_) => true,
         };
         !busy && self.reboot.is_none() && self.notices.has_room_for_a_command()
+    }
+
+    /// Tells the host of damaged accesses between firmware and FPGA. The event waits until the link has
+    /// taken every other notice.
+    fn tell_damage(&mut self, now: Micros, bus: &impl FpgaBus) {
+        let (told, at) = self.damage_told;
+        let total = bus.damaged();
+        let is_new = total != told && (told == 0 || now.since(at) >= DAMAGE_PERIOD);
+        if is_new && self.may_stream() {
+            self.damage_told = (total, now);
+            self.notify(now, EventKind::FpgaAccessesDamaged { total });
+        }
     }
 
     pub fn count_damage(&mut self, now: Micros) {

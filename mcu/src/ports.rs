@@ -15,12 +15,15 @@ pub enum BusError {
     Timeout,
     /// The bus peripheral reported an error.
     Transfer,
+    /// The access came damaged, however often it was repeated.
+    Damaged,
 }
 
 /// The FPGA's host port: registers of [`nirspi_wire::register`], frames of [`nirspi_wire::fpga`].
 ///
-/// A register access is a few bytes and is complete when the call returns. Every access, to a
-/// register or to data, restarts the FPGA's watchdog.
+/// A register access is a few bytes and is complete when the call returns: a value that was read is the
+/// FPGA's, and a write to a register has been taken. The order table's entries are read back by the
+/// camera. Every access, to a register or to data, restarts the FPGA's watchdog.
 pub trait FpgaBus {
     /// Reads a register.
     ///
@@ -33,6 +36,12 @@ pub trait FpgaBus {
     /// # Errors
     /// [`BusError`].
     fn write(&mut self, address: u16, value: u32) -> Result<(), BusError>;
+
+    /// Register accesses since power-up that came damaged, each repetition counted. A bus without
+    /// wires damages none.
+    fn damaged(&self) -> u32 {
+        0
+    }
 
     /// Level of the FPGA's line: a frame is ready. The line falls with `CONTROL.RELEASE`.
     fn frame_ready(&mut self) -> bool;

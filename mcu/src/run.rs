@@ -50,11 +50,13 @@ impl Counters {
     /// change nothing.
     pub fn read(&mut self, bus: &mut impl FpgaBus) -> Result<(), Fault> {
         fpga::identify(bus)?;
-        let made = fpga::read(bus, Register::FramesMade).map_err(|_| fpga::SILENT)?;
+        let made =
+            fpga::read(bus, Register::FramesMade).map_err(|error| fpga::failed(error, bus))?;
         if made == NO_CLOCK {
             return Err(Fault::FpgaAbsent { identity: NO_CLOCK });
         }
-        let lost = fpga::read(bus, Register::FramesLost).map_err(|_| fpga::SILENT)?;
+        let lost =
+            fpga::read(bus, Register::FramesLost).map_err(|error| fpga::failed(error, bus))?;
         self.advance(made, lost);
         self.reconcile();
         Ok(())

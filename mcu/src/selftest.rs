@@ -9,7 +9,8 @@
 //! The FPGA drives the LEDs in every run, so the test frame cannot be dark. The test frame is one
 //! sweep at the fastest rate, each pattern followed by its complement, so every LED is lit for half
 //! of 82 microseconds. The test frame is left out (not in [`SelfTestReport::ran`]) if a fault is
-//! latched, a sensor forbids light, or the bus has failed.
+//! latched, a sensor forbids light, the bus has failed, or a bitstream is being loaded: meanwhile no
+//! poll repeats a stop that was lost.
 
 use crate::configure::Setup;
 use crate::{BusError, FpgaBus, Inputs, Limits, Micros, fpga, safety};

@@ -7,6 +7,7 @@ use core::cell::{Cell, RefCell};
 use core::task::Waker;
 use nirspi_mcu::{BusError, HostPort, Inputs};
 use nirspi_wire::fpga::{CRC_BYTES, HEADER_BYTES, Header, PATTERN_BYTES, Sums};
+use nirspi_wire::host_port::{SEALED_BYTES, seal, unseal};
 use nirspi_wire::packet::MAX_HOST_PACKET;
 use nirspi_wire::register::{IDENTITY, Register, control, status};
 use nirspi_wire::{
@@ -111,7 +112,9 @@ impl FakeFpga {
 }
 
 impl HostPort for FakeFpga {
-    fn write(&mut self, address: u16, value: u32) -> Result<(), BusError> {
+    fn write(&mut self, address: u16, sealed: [u8; SEALED_BYTES]) -> Result<(), BusError> {
+        let value = unseal(address, sealed).expect("no wire damages a write");
+        self.registers[usize::from(Register::Writes.address())] += 1;
         if address == Register::Control.address() {
             let bits = |bits: u32| value & bits != 0;
             let pins = &self.pins;
@@ -129,15 +132,16 @@ impl HostPort for FakeFpga {
         Ok(())
     }
 
-    fn read(&mut self, address: u16) -> Result<u32, BusError> {
+    fn read(&mut self, address: u16) -> Result<[u8; SEALED_BYTES], BusError> {
         let running = if self.pins.running.get() { status::RUNNING | status::LEDS_ON } else { 0 };
-        Ok(match Register::at(address) {
+        let value = match Register::at(address) {
             Some(Register::Identity) => IDENTITY,
             Some(register @ (Register::Version | Register::Design)) => register.reset(),
             Some(Register::Status) => status::INTERLOCK_CLOSED | running,
             Some(Register::FramesMade) => self.pins.sequence.get(),
             _ => self.registers[usize::from(address)],
-        })
+        };
+        Ok(seal(address, value))
     }
 
     fn frame_ready(&mut self) -> bool {

@@ -1,6 +1,8 @@
 //! The FPGA behind a tunnel: one request and one reply over a UART for each access of its host
 //! port.
 //!
+//! The tunnel has a checksum of its own, so the checks of the host port are made and looked at here.
+//!
 //! Levels of lines and readings of sensors are those of the last reply. They stay true until the
 //! next access, because simulated time passes only during accesses.
 
@@ -11,7 +13,7 @@ use embassy_time::{Duration, with_timeout};
 use nirspi_app::FpgaPort;
 use nirspi_mcu::{BusError, HostPort};
 use nirspi_wire::Crc32;
-use nirspi_wire::host_port::{READ_REGISTER, WRITE_REGISTER};
+use nirspi_wire::host_port::{READ_REGISTER, SEALED_BYTES, WRITE_REGISTER, seal, unseal};
 use nirspi_wire::tunnel::{CRC_BYTES, LOOK, Lines, REPLY_HEAD_BYTES, Request};
 
 /// Longest time for a register access: a simulator of the RTL needs some milliseconds.
@@ -133,16 +135,17 @@ impl<'b> Tunnel<'b> {
 }
 
 impl HostPort for Tunnel<'_> {
-    fn write(&mut self, address: u16, value: u32) -> Result<(), BusError> {
+    fn write(&mut self, address: u16, sealed: [u8; SEALED_BYTES]) -> Result<(), BusError> {
+        let value = unseal(address, sealed).ok_or(BusError::Transfer)?;
         let request = self.next(WRITE_REGISTER, address, value);
         self.access(request, &mut [])
     }
 
-    fn read(&mut self, address: u16) -> Result<u32, BusError> {
+    fn read(&mut self, address: u16) -> Result<[u8; SEALED_BYTES], BusError> {
         let request = self.next(READ_REGISTER, address, 0);
         let mut value = [0; 4];
         self.access(request, &mut value)?;
-        Ok(u32::from_le_bytes(value))
+        Ok(seal(address, u32::from_le_bytes(value)))
     }
 
     fn frame_ready(&mut self) -> bool {

@@ -16,7 +16,7 @@ use embassy_stm32::peripherals::OCTOSPI1;
 use nirspi_app::FpgaPort;
 use nirspi_mcu::{BusError, HostPort};
 use nirspi_nucleo::port::prescaler;
-use nirspi_wire::host_port::{QUAD, READ_REGISTER, WRITE_REGISTER};
+use nirspi_wire::host_port::{QUAD, READ_REGISTER, SEALED_BYTES, WRITE_REGISTER};
 
 /// Settings of the peripheral. Addresses and lengths must lie within the memory size given here.
 pub fn config() -> Config {
@@ -56,16 +56,16 @@ pub struct Fpga {
 }
 
 impl HostPort for Fpga {
-    fn write(&mut self, address: u16, value: u32) -> Result<(), BusError> {
+    fn write(&mut self, address: u16, sealed: [u8; SEALED_BYTES]) -> Result<(), BusError> {
         let access = access(WRITE_REGISTER, address, DummyCycles::_0);
-        self.ospi.blocking_write(&value.to_be_bytes(), access).map_err(failed)
+        self.ospi.blocking_write(&sealed, access).map_err(failed)
     }
 
-    fn read(&mut self, address: u16) -> Result<u32, BusError> {
-        let mut bytes = [0; 4];
+    fn read(&mut self, address: u16) -> Result<[u8; SEALED_BYTES], BusError> {
+        let mut sealed = [0; SEALED_BYTES];
         let access = access(READ_REGISTER, address, DummyCycles::_8);
-        self.ospi.blocking_read(&mut bytes, access).map_err(failed)?;
-        Ok(u32::from_be_bytes(bytes))
+        self.ospi.blocking_read(&mut sealed, access).map_err(failed)?;
+        Ok(sealed)
     }
 
     fn frame_ready(&mut self) -> bool {

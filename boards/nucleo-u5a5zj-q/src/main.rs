@@ -38,6 +38,7 @@ use nirspi_nucleo::{crash, gateware, restart};
 use nirspi_usb::{Endpoints, Memory, OUT_BUFFER_BYTES, PACKET_BYTES, Presence, serve};
 use nirspi_wire::Capabilities;
 use nirspi_wire::fpga::MAX_FRAME_BYTES;
+use nirspi_wire::host_port::seal;
 use nirspi_wire::register::{IDENTITY, Register};
 use static_cell::{ConstStaticCell, StaticCell};
 
@@ -139,7 +140,8 @@ async fn main(spawner: Spawner) {
         done: Input::new(pins.config_done, Pull::Down),
     };
     if let Some(stored) = configuration::stored() {
-        let is_nirspi = port.read(Register::Identity.address()) == Ok(IDENTITY);
+        let identity = Register::Identity.address();
+        let is_nirspi = port.read(identity) == Ok(seal(identity, IDENTITY));
         let feed = || board.feed_watchdog();
         gateware::load_stored(&mut configuration, stored, is_nirspi, feed).await;
     }

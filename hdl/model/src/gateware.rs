@@ -46,6 +46,8 @@ pub struct Gateware {
     /// High word of the clock at the last read of the low word.
     clock_high: u32,
     registers: Registers,
+    /// Writes taken since reset.
+    writes: u32,
     table: OrderTable,
     config_error: bool,
     write_refused: bool,
@@ -63,6 +65,7 @@ impl Default for Gateware {
             clock: 0,
             clock_high: 0,
             registers: Registers::new(),
+            writes: 0,
             table: OrderTable::new(),
             config_error: false,
             write_refused: false,
@@ -127,6 +130,7 @@ impl Gateware {
         };
         Some(match register {
             Register::Control => 0,
+            Register::Writes => self.writes,
             Register::Status => self.status(),
             Register::Fault => self.safety.fault() as u32,
             Register::FramesMade => self.frames.made(),
@@ -148,6 +152,7 @@ impl Gateware {
         if self.adc_hz.is_none() {
             return true;
         }
+        self.writes = self.writes.wrapping_add(1);
         match Register::at(address) {
             Some(Register::Control) => self.control(value),
             Some(register) => self.registers.set(register, value),

@@ -27,7 +27,9 @@ impl Monitor {
                 let level = match event.kind {
                     EventKind::RunEnded { .. } => Level::Info,
                     EventKind::Fault(_) => Level::Error,
-                    EventKind::RawDropped | EventKind::CommandDamaged => Level::Warning,
+                    EventKind::RawDropped
+                    | EventKind::CommandDamaged
+                    | EventKind::FpgaAccessesDamaged { .. } => Level::Warning,
                 };
                 Some((level, events::as_it_happens(&event.kind)))
             }

@@ -41,6 +41,8 @@ pub struct FakeFpga {
     /// Bits of the data bus that always read 1.
     pub stuck_ones: u32,
     pub accesses: u32,
+    /// Writes taken.
+    pub writes: u32,
     /// The ADC has no clock.
     pub clockless: bool,
     /// Bits that the wires invert in the read after this many others.
@@ -76,6 +78,7 @@ impl Default for FakeFpga {
             lost_address: None,
             stuck_ones: 0,
             accesses: 0,
+            writes: 0,
             clockless: false,
             noise: None,
             config_error: false,
@@ -261,6 +264,7 @@ impl FpgaBus for FakeFpga {
             Some(Register::ClockLow) => self.clock as u32,
             Some(Register::ClockHigh) => (self.clock >> 32) as u32,
             Some(Register::Control) => 0,
+            Some(Register::Writes) => self.writes,
             _ => self.registers.get(&address).copied().unwrap_or(0),
         };
         let flipped = match &mut self.noise {
@@ -282,6 +286,7 @@ impl FpgaBus for FakeFpga {
         if self.deaf || self.clockless || self.lost_address == Some(address) {
             return Ok(());
         }
+        self.writes = self.writes.wrapping_add(1);
         if address == Register::Control.address() {
             self.control(value);
         } else if address >= ORDER_TABLE || Register::at(address).is_some() {

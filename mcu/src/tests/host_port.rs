@@ -8,31 +8,68 @@ use crate::{
     Wanted,
 };
 use nirspi_wire::fpga::{MAX_FRAME_BYTES, frame_bytes};
-use nirspi_wire::host_port::{READ_FRAME, READ_RAW};
+use nirspi_wire::host_port::{READ_FRAME, READ_RAW, SEALED_BYTES, seal, unseal};
 use nirspi_wire::register::{Register, control};
 use nirspi_wire::{
     Answer, Command, DeviceMessage, EventKind, Reply, RunLength, SelfTestReport, version,
 };
 use std::boxed::Box;
+use std::collections::VecDeque;
 use std::vec::Vec;
 
-/// An FPGA whose data needs a transfer.
+/// An FPGA whose data needs a transfer, behind wires.
 #[derive(Default)]
-struct Port {
-    fpga: FakeFpga,
+pub(super) struct Port {
+    pub fpga: FakeFpga,
     /// Opcode and length of every transfer.
     transfers: Vec<(u8, usize)>,
     /// Number of transfers that fail before the next one succeeds.
     failures: u32,
+    /// Bits that the wires invert in the next register accesses: address, value and check.
+    pub wrong: VecDeque<u64>,
+    /// Bits that the wires invert in every register access after those.
+    pub always_wrong: u64,
+    /// Each access has other wrong bits than the one before.
+    pub is_noisy: bool,
+    /// The gateware checks nothing, and sends zeros in place of a check.
+    pub is_old: bool,
+}
+
+impl Port {
+    /// Address and bytes as they come out of the wires.
+    fn carry(&mut self, address: u16, sealed: [u8; SEALED_BYTES]) -> (u16, [u8; SEALED_BYTES]) {
+        let [w0, w1, wrong @ ..] =
+            self.wrong.pop_front().unwrap_or(self.always_wrong).to_be_bytes();
+        if self.is_noisy {
+            self.always_wrong = self.always_wrong.rotate_left(1);
+        }
+        let mut carried = sealed;
+        carried.iter_mut().zip(wrong).for_each(|(byte, wrong)| *byte ^= wrong);
+        (address ^ u16::from_be_bytes([w0, w1]), carried)
+    }
 }
 
 impl HostPort for Port {
-    fn write(&mut self, address: u16, value: u32) -> Result<(), BusError> {
+    fn write(&mut self, address: u16, sealed: [u8; SEALED_BYTES]) -> Result<(), BusError> {
+        let (address, sealed) = self.carry(address, sealed);
+        let [v0, v1, v2, v3, ..] = sealed;
+        let value = match unseal(address, sealed) {
+            _ if self.is_old => u32::from_be_bytes([v0, v1, v2, v3]),
+            Some(value) => value,
+            None => return Ok(()),
+        };
         self.fpga.write(address, value)
     }
 
-    fn read(&mut self, address: u16) -> Result<u32, BusError> {
-        self.fpga.read(address)
+    fn read(&mut self, address: u16) -> Result<[u8; SEALED_BYTES], BusError> {
+        // The same wires for both ways: first the address, then the answer.
+        let (seen, wrong) = self.carry(address, [0; SEALED_BYTES]);
+        let mut sealed = seal(seen, self.fpga.read(seen)?);
+        if self.is_old {
+            sealed[4..].fill(0);
+        }
+        sealed.iter_mut().zip(wrong).for_each(|(byte, wrong)| *byte ^= wrong);
+        Ok(sealed)
     }
 
     fn frame_ready(&mut self) -> bool {
@@ -64,7 +101,7 @@ impl Port {
     }
 }
 
-fn bus() -> PortBus<'static, Port> {
+pub(super) fn bus() -> PortBus<'static, Port> {
     PortBus::new(Port::default(), Box::leak(Box::new([0; MAX_FRAME_BYTES])))
 }
 
@@ -240,15 +277,15 @@ fn a_failed_transfer_is_tried_again_and_given_up_after_three() {
 }
 
 /// The camera over a host port, polled as a board does.
-struct Device {
-    camera: Camera,
-    bus: PortBus<'static, Port>,
+pub(super) struct Device {
+    pub camera: Camera,
+    pub bus: PortBus<'static, Port>,
     link: Link,
-    now: Micros,
+    pub now: Micros,
 }
 
 impl Device {
-    fn new(bus: PortBus<'static, Port>) -> Self {
+    pub(super) fn new(bus: PortBus<'static, Port>) -> Self {
         let info = BoardInfo::new("bench", "0001", nirspi_wire::Version(1, 2, 3));
         let camera = Camera::new(info, Limits::default());
         let mut device = Self { camera, bus, link: Link::default(), now: Micros(1_000) };
@@ -256,7 +293,7 @@ impl Device {
         device
     }
 
-    fn turn(&mut self, bytes: &[u8]) {
+    pub(super) fn turn(&mut self, bytes: &[u8]) {
         self.now.0 += 100;
         let ports = &mut Ports { bus: &mut self.bus, sink: &mut self.link, loader: &mut NoLoader };
         let taken = self.camera.receive(self.now, bytes, &GOOD_INPUTS, ports);
@@ -271,14 +308,14 @@ impl Device {
         }
     }
 
-    fn ask(&mut self, command: Command<'_>) -> Vec<DeviceMessage<'static>> {
+    pub(super) fn ask(&mut self, command: Command<'_>) -> Vec<DeviceMessage<'static>> {
         self.turn(&packet(1, command));
         self.turn(&[]);
         self.turn(&[]);
         self.heard()
     }
 
-    fn heard(&mut self) -> Vec<DeviceMessage<'static>> {
+    pub(super) fn heard(&mut self) -> Vec<DeviceMessage<'static>> {
         self.link.packets.drain(..).map(|packet| message(&packet)).collect()
     }
 }

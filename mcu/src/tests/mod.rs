@@ -16,3 +16,4 @@ mod safety;
 mod selftest;
 pub(crate) mod support;
 mod versions;
+mod wires;

@@ -3,7 +3,7 @@
 //! The firmware sends values and no text, so the firmware does not link this module.
 
 use crate::message::HOST_SILENCE_US;
-use crate::register::{IDENTITY, NO_CLOCK};
+use crate::register::{DAMAGED, IDENTITY, NO_CLOCK};
 use crate::{ConfigField, Fault, State};
 use core::fmt::{Display, Formatter, Result};
 
@@ -46,6 +46,9 @@ impl Display for Fault {
             Self::FpgaAbsent { identity: NO_CLOCK } => {
                 f.write_str("the FPGA answers, but the ADC's clock does not reach it")
             }
+            Self::FpgaAbsent { identity: DAMAGED } => f.write_str(
+                "what passes between the FPGA and the firmware comes damaged: check the wires of the host port",
+            ),
             Self::FpgaAbsent { identity } => {
                 write!(f, "the FPGA's identity is {identity:#010x}, expected {IDENTITY:#010x}")
             }
@@ -97,7 +100,7 @@ mod tests {
         assert_eq!(told(0), "the FPGA does not answer");
         assert_eq!(told(u32::MAX), told(0));
         assert!(told(0x1234).contains("0x00001234"), "{}", told(0x1234));
-        let all = [told(IDENTITY), told(0), told(NO_CLOCK), told(7)];
+        let all = [told(IDENTITY), told(0), told(NO_CLOCK), told(DAMAGED), told(7)];
         assert!(all.iter().enumerate().all(|(at, words)| !all[..at].contains(words)), "{all:?}");
     }
 

@@ -408,7 +408,8 @@ pub enum Fault {
     FpgaAbsent {
         /// What the identity register read. [`NO_CLOCK`](crate::register::NO_CLOCK): the identity is right, and
         /// the ADC's clock is missing. [`IDENTITY`](crate::register::IDENTITY): the gateware is of another
-        /// version than the firmware's.
+        /// version than the firmware's. [`DAMAGED`](crate::register::DAMAGED): answers or writes came damaged,
+        /// however often they were repeated.
         identity: u32,
     },
     /// The FPGA refused a configuration that the firmware had accepted.
@@ -531,6 +532,12 @@ pub enum EventKind {
     RawDropped,
     /// The host sent bytes that are not a command.
     CommandDamaged,
+    /// Register accesses between firmware and FPGA came damaged and were repeated. At most once a second.
+    /// Since version 2.
+    FpgaAccessesDamaged {
+        /// All since power-up.
+        total: u32,
+    },
 }
 
 impl EventKind {
@@ -539,6 +546,7 @@ impl EventKind {
     pub const fn since(&self) -> u16 {
         match self {
             Self::Fault(_) | Self::RunEnded { .. } | Self::RawDropped | Self::CommandDamaged => 1,
+            Self::FpgaAccessesDamaged { .. } => 2,
         }
     }
 }

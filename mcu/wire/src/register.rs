@@ -73,7 +73,7 @@ registers! {
     /// Always [`IDENTITY`].
     Identity = 0x00, ReadOnly, IDENTITY;
     /// Gateware version, `major << 16 | minor << 8 | patch`.
-    Version = 0x01, ReadOnly, 0x0000_0200;
+    Version = 0x01, ReadOnly, 0x0000_0300;
     /// Holds what was written, for bus tests.
     Scratch = 0x02, ReadWrite, 0;
     /// See [`control`].
@@ -121,6 +121,9 @@ registers! {
     ClockLow = 0x15, ReadOnly, 0;
     /// Clocks since reset, high word as of the last read of the low one.
     ClockHigh = 0x16, ReadOnly, 0;
+    /// Writes taken since reset, to registers and to the order table, modulo 2^32. A write whose check is
+    /// wrong is not taken.
+    Writes = 0x17, ReadOnly, 0;
 }
 
 /// `"NSPI"` in ASCII.
@@ -128,6 +131,9 @@ pub const IDENTITY: u32 = 0x4E53_5049;
 /// What a read gives while the ADC's domain has no clock or is in reset. No register holds this value by
 /// itself but [`Register::Scratch`] and settings into which it was written.
 pub const NO_CLOCK: u32 = 0xDEAD_C10C;
+/// What stands for the identity of an FPGA whose answers come damaged, in
+/// [`Fault::FpgaAbsent`](crate::Fault::FpgaAbsent). No register holds this value by itself.
+pub const DAMAGED: u32 = 0xBAD0_C4EC;
 /// Whether gateware with this [`Register::Version`] has the registers of this table: the same major and minor
 /// version. Gateware and firmware of one release fit.
 #[must_use]

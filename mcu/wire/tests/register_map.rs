@@ -3,7 +3,7 @@
 //!
 //! If a test in this file fails, do not change the test: you have changed what a gateware of version 0.1
 //! means. A new register at a free address is appended here, with a higher minor `Register::Version`: 0.2
-//! appended `Clocks` and `Design`. Anything else needs a new
+//! appended `Clocks` and `Design`, 0.3 `Writes` and the check of every access. Anything else needs a new
 //! `Register::Identity` or major `Register::Version`, and a new file beside this one.
 
 use nirspi_wire::{
@@ -16,7 +16,7 @@ use nirspi_wire::{
 /// Address, name, access, value after reset.
 const REGISTERS: &str = "\
 0x0000 Identity      ReadOnly  0x4e535049
-0x0001 Version       ReadOnly  0x00000200
+0x0001 Version       ReadOnly  0x00000300
 0x0002 Scratch       ReadWrite 0x00000000
 0x0003 Control       Command   0x00000000
 0x0004 Status        ReadOnly  0x00000000
@@ -38,6 +38,7 @@ const REGISTERS: &str = "\
 0x0014 FramesLost    ReadOnly  0x00000000
 0x0015 ClockLow      ReadOnly  0x00000000
 0x0016 ClockHigh     ReadOnly  0x00000000
+0x0017 Writes        ReadOnly  0x00000000
 ";
 
 #[test]
@@ -111,7 +112,7 @@ fn bits_codes_and_limits_are_these() {
     assert_eq!(register::DUTY_WINDOW, 1_048_576);
     assert_eq!(register::DUTY_LIMIT_MAX, 1_310_720);
     assert_eq!(register::LATENCY_MAX, 63);
-    assert_eq!(register::NO_CLOCK, 0xDEAD_C10C);
+    assert_eq!([register::NO_CLOCK, register::DAMAGED], [0xDEAD_C10C, 0xBAD0_C4EC]);
     let clocks = [clocks::FREQUENCY, clocks::LOCKED, clocks::ALIVE, clocks::READY];
     assert_eq!(clocks, [0xFFFF, 1 << 16, 1 << 17, 1 << 18]);
     assert_eq!([clocks::UNIT_HZ, clocks::WINDOW, clocks::PRESCALER], [10_000, 41_333, 4]);
@@ -119,7 +120,7 @@ fn bits_codes_and_limits_are_these() {
     let fit = |units: u32| clocks::fit(good | units);
     assert_eq!([10_624, 10_625, 12_500, 14_375, 14_376].map(fit), [false, true, true, true, false]);
     assert!(!clocks::fit(12_500 | good & !clocks::READY) && !clocks::fit(0));
-    let fits = [0x0000_0100, 0x0000_0200, 0x0000_0203, 0x0000_0300, 0x0001_0200]
+    let fits = [0x0000_0200, 0x0000_0300, 0x0000_0303, 0x0000_0400, 0x0001_0300]
         .map(register::has_this_map);
     assert_eq!(fits, [false, true, true, false, false]);
     let designs: Vec<_> = (0..=3).map(Design::from_register).collect();

@@ -25,7 +25,7 @@ local ConfigProblem = { "OutOfRange", "OrderEntry" }
 local ConfigField = { "Patterns", "ClocksPerPattern", "Blanked", "AdcLatency", "Sweeps", "OrderLength", "DutyPermille", "Frames" }
 local State = { "Idle", "Configured", "Running", "Fault" }
 local Fault = { "Interlock", "OverTemperature", "TemperatureSensor", "Duty", "OverRange", "FpgaWatchdog", "FpgaAbsent", "FpgaConfiguration", "FpgaStalled", "HostSilent" }
-local EventKind = { "Fault", "RunEnded", "RawDropped", "CommandDamaged" }
+local EventKind = { "Fault", "RunEnded", "RawDropped", "CommandDamaged", "FpgaAccessesDamaged" }
 
 local fields = {
     damaged = ProtoField.string("nirspi.damaged", "Damaged"),

@@ -7,7 +7,8 @@ use nirspi_hdl_sim::{pins::Pins, project::Project};
 use nirspi_optics::{Chain, LedArray};
 use nirspi_wire::fpga::{FpgaFrame, HEADER_BYTES, frame_bytes};
 use nirspi_wire::host_port::{
-    DUMMY_CYCLES, QUAD, READ_FRAME, READ_RAW, READ_REGISTER, SCK_DIVIDER, WRITE_REGISTER,
+    DUMMY_CYCLES, QUAD, READ_FRAME, READ_RAW, READ_REGISTER, SCK_DIVIDER, SEALED_BYTES,
+    WRITE_REGISTER, check, unseal,
 };
 use nirspi_wire::register::{Design, Register, loopback};
 use std::collections::VecDeque;
@@ -194,17 +195,27 @@ impl Board {
         if address == Register::RawLength.address() {
             self.raw_length = value;
         }
+        self.write_sealed(address, seal(address, value));
+    }
+
+    pub fn write_sealed(&mut self, address: u16, sealed: [u8; SEALED_BYTES]) {
         self.begin(WRITE_REGISTER, address);
-        self.send(value, 32);
+        for byte in sealed {
+            self.send(byte.into(), 8);
+        }
         self.end();
     }
 
     pub fn read(&mut self, address: u16) -> u32 {
+        unseal(address, self.read_sealed(address)).unwrap()
+    }
+
+    pub fn read_sealed(&mut self, address: u16) -> [u8; SEALED_BYTES] {
         self.begin(READ_REGISTER, address);
         self.dummy();
-        let value = self.receive(32);
+        let sealed = [(); SEALED_BYTES].map(|()| self.receive(8) as u8);
         self.end();
-        value
+        sealed
     }
 
     /// Reads the frame, whose header gives its length.

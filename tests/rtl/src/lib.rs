@@ -4,5 +4,7 @@
 
 mod board;
 mod fpga;
+mod port;
 
 pub use fpga::RtlFpga;
+pub use port::RtlPort;

@@ -22,6 +22,7 @@ use nirspi_mcu::{
     PortBus, Ports, Wanted,
 };
 use nirspi_wire::fpga::{FpgaFrame, Header, MAX_FRAME_BYTES, Sums, frame_bytes};
+use nirspi_wire::host_port::{SEALED_BYTES, seal, unseal};
 use nirspi_wire::packet::{MAX_DEVICE_PACKET, MAX_HOST_PACKET, encode};
 use nirspi_wire::register::{IDENTITY, Register, control, status};
 use nirspi_wire::{
@@ -41,6 +42,7 @@ struct Memory {
     registers: [u32; 32],
     running: bool,
     sequence: u32,
+    writes: u32,
 }
 
 impl Memory {
@@ -70,7 +72,9 @@ impl Memory {
 }
 
 impl HostPort for Memory {
-    fn write(&mut self, address: u16, value: u32) -> Result<(), BusError> {
+    fn write(&mut self, address: u16, sealed: [u8; SEALED_BYTES]) -> Result<(), BusError> {
+        let value = unseal(address, sealed).ok_or(BusError::Transfer)?;
+        self.writes += 1;
         if address == Register::Control.address() {
             self.running |= value & control::START != 0;
             if value & control::RELEASE != 0 {
@@ -82,15 +86,17 @@ impl HostPort for Memory {
         Ok(())
     }
 
-    fn read(&mut self, address: u16) -> Result<u32, BusError> {
+    fn read(&mut self, address: u16) -> Result<[u8; SEALED_BYTES], BusError> {
         let running = if self.running { status::RUNNING | status::LEDS_ON } else { 0 };
-        Ok(match Register::at(address) {
+        let value = match Register::at(address) {
             Some(Register::Identity) => IDENTITY,
             Some(register @ (Register::Version | Register::Design)) => register.reset(),
             Some(Register::Status) => status::INTERLOCK_CLOSED | running,
             Some(Register::FramesMade) => self.sequence,
+            Some(Register::Writes) => self.writes,
             _ => self.slot(address).map_or(0, |slot| *slot),
-        })
+        };
+        Ok(seal(address, value))
     }
 
     fn frame_ready(&mut self) -> bool {
@@ -204,7 +210,7 @@ fn main() -> ! {
     }
     let sink = SINK.take();
     let packet = PACKET.take();
-    let memory = Memory { registers: [0; 32], running: false, sequence: 0 };
+    let memory = Memory { registers: [0; 32], running: false, sequence: 0, writes: 0 };
     let mut bus = PortBus::new(memory, BUFFER.take()).with_spare(Some(SPARE.take()));
     let mut camera =
         Camera::new(BoardInfo::new("counted", "", Version(0, 0, 0)), Limits::default());

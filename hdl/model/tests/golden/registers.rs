@@ -25,7 +25,12 @@ proptest! {
         for &register in Register::ALL.iter().filter(|r| r.access() != Access::Command) {
             let before = bench.get(register);
             bench.set(register, value);
-            let after = if register.access() == Access::ReadWrite { value } else { before };
+            let after = match register {
+                // This write counts too.
+                Register::Writes => before + 1,
+                _ if register.access() == Access::ReadWrite => value,
+                _ => before,
+            };
             prop_assert_eq!(bench.get(register), after, "{:?}", register);
         }
     }
@@ -55,6 +60,21 @@ fn nothing_answers_between_the_registers_and_beyond_the_table() {
         answers += usize::from(expected);
     }
     assert_eq!(answers, Register::ALL.len() + 1024);
+}
+
+#[test]
+fn every_write_that_is_taken_counts() {
+    let mut gateware = Gateware::new();
+    for address in [Register::Control.address(), Register::Identity.address(), ORDER_TABLE, 0x8000]
+    {
+        gateware.write(address, 0);
+    }
+    let writes = Register::Writes.address();
+    assert_eq!(gateware.read(writes), Some(4));
+    gateware.set_adc_clock(None);
+    gateware.write(Register::Scratch.address(), 1);
+    gateware.set_adc_clock(Some(nirspi_wire::ADC_HZ));
+    assert_eq!(gateware.read(writes), Some(0));
 }
 
 #[test]

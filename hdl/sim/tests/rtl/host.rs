@@ -4,21 +4,52 @@
 //! answer to the same access.
 
 use crate::rig::{Access, Answer, Rig};
+use crate::scenario::Dice;
 use nirspi_wire::{
     host_port,
     register::{Register, clocks},
 };
 
+/// A line that the host drives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Line {
+    Sck,
+    Select,
+    Data,
+}
+
 impl Rig {
     /// One period of `sck`; returns what the FPGA drives when the host samples.
     fn sck(&mut self, lines: u8) -> (u8, u8) {
+        let half = self.port.half;
+        let glitch = self.glitch();
         self.pins.drive(lines);
-        self.pins.sck(false);
-        self.wait(self.port.half);
-        let driven = self.pins.driven();
-        self.pins.sck(true);
-        self.wait(self.port.half);
+        let mut driven = (0, 0);
+        for clock in 0..2 * half {
+            let high = clock >= half;
+            if clock == half {
+                driven = self.pins.driven();
+            }
+            let wrong = glitch.filter(|&(at, _)| at == clock).map(|(_, line)| line);
+            self.pins.sck(high != (wrong == Some(Line::Sck)));
+            self.pins.select(wrong != Some(Line::Select));
+            self.pins.drive(if wrong == Some(Line::Data) { !lines & 0xF } else { lines });
+            self.host_clock();
+            // The FPGA lets its lines go with the level of `cs_n` at the pin, so a glitch is over before the
+            // host samples.
+            self.pins.select(true);
+        }
+        self.pins.drive(lines);
         driven
+    }
+
+    /// The clock of this period in which a line of the host's is wrong, and that line.
+    fn glitch(&mut self) -> Option<(u32, Line)> {
+        self.periods += 1;
+        let chance = Dice::new(self.periods).next();
+        let line = [Line::Sck, Line::Sck, Line::Select, Line::Data][chance as usize % 4];
+        let at = (chance >> 32) as u32 % (2 * self.port.half);
+        (self.port.glitches && self.periods.is_multiple_of(2)).then_some((at, line))
     }
 
     /// Sends the lowest `bits` of a word, quad or on `io0`.
@@ -83,21 +114,33 @@ impl Rig {
         self.asked = None;
     }
 
-    pub fn write(&mut self, address: u16, value: u32) {
-        self.asked = self.pins.adc_answers().then_some(Access::Write(address, value));
+    /// Sends a write whose value and check have these wrong bits.
+    fn send_write(&mut self, address: u16, value: u32, wrong: u64) {
         self.begin(host_port::WRITE_REGISTER, address);
         let quad = self.port.quad;
-        self.send(value, 32, quad);
+        self.send(value ^ (wrong >> 16) as u32, 32, quad);
+        self.send(u32::from(host_port::check(address, value) ^ wrong as u16), 16, quad);
+    }
+
+    pub fn write(&mut self, address: u16, value: u32) {
+        self.asked = self.pins.adc_answers().then_some(Access::Write(address, value));
+        self.send_write(address, value, 0);
         self.end();
         self.settled();
+    }
+
+    /// Sends a write that comes damaged: one to three bits of value and check are wrong.
+    pub fn write_damaged(&mut self, address: u16, value: u32, bits: [u64; 3]) {
+        let wrong = bits.iter().fold(0, |wrong, bit| wrong | 1 << (bit % 48));
+        self.send_write(address, value, wrong);
+        self.end();
+        self.wait(50);
     }
 
     /// Sends a write, and takes the ADC's clock away some clocks after its last bit.
     pub fn write_and_lose_adc_clock(&mut self, address: u16, value: u32, after: u32) {
         self.asked = Some(Access::Write(address, value));
-        self.begin(host_port::WRITE_REGISTER, address);
-        let quad = self.port.quad;
-        self.send(value, 32, quad);
+        self.send_write(address, value, 0);
         self.wait(after);
         self.lose_adc_clock();
         self.end();
@@ -114,11 +157,12 @@ impl Rig {
         self.end();
     }
 
-    /// Sends a write that ends before its last bit.
+    /// Sends a write that ends before its last bits.
     pub fn write_cut_short(&mut self, address: u16, value: u32) {
         self.begin(host_port::WRITE_REGISTER, address);
         let quad = self.port.quad;
-        self.send(value >> 4, 28, quad);
+        self.send(value, 32, quad);
+        self.send(u32::from(host_port::check(address, value) >> 4), 12, quad);
         self.end();
         self.wait(50);
     }
@@ -136,8 +180,10 @@ impl Rig {
         self.begin(host_port::READ_REGISTER, address);
         self.dummy();
         let value = self.receive(32);
+        let check = self.receive(16);
         self.end();
         self.settled();
+        self.expect("check of a register", &check, &host_port::check(address, value).into());
         // The frequency is measured: `check_clocks` compares it.
         let measured = if address == Register::Clocks.address() { clocks::FREQUENCY } else { 0 };
         let answer = self.answer.take().map(|answer| match answer {

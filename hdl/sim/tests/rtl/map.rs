@@ -81,6 +81,8 @@ pub fn package() -> String {
         ("HOST_RAW", host_port::READ_RAW.into()),
         ("HOST_QUAD", host_port::QUAD.into()),
         ("HOST_DUMMY_CYCLES", host_port::DUMMY_CYCLES.into()),
+        ("HOST_CHECK_POLYNOMIAL", host_port::CHECK_POLYNOMIAL.into()),
+        ("HOST_CHECK_SEED", host_port::CHECK_SEED.into()),
     ] {
         constants.push((name.into(), value));
     }

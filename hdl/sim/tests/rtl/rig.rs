@@ -64,6 +64,8 @@ pub struct Port {
     /// half.
     pub half: u32,
     pub quad: bool,
+    /// In every second period of `sck`, one sample of a line of the host's is wrong.
+    pub glitches: bool,
 }
 
 pub struct Rig {
@@ -88,9 +90,13 @@ pub struct Rig {
     /// Level of the interlock pin.
     closed: bool,
     design: Design,
+    /// Periods of `sck`.
+    pub(crate) periods: u64,
     pub(crate) asked: Option<Access>,
     pub(crate) answer: Option<Answer>,
     start: Option<(u64, u32)>,
+    /// Starts, which the model gets as two writes: what comes at once, and the start itself.
+    written_twice: u32,
     grace: u64,
     /// LEDs were enabled in the clock before.
     just_lit: bool,
@@ -158,7 +164,7 @@ impl Rig {
         Self {
             pins: Pins::new(project),
             model: Gateware::new(),
-            port: Port { host_ps: 10_000, half: 3, quad: true },
+            port: Port { host_ps: 10_000, half: 3, quad: true, glitches: false },
             seed,
             over_range_rate: 0,
             fade: 63,
@@ -171,9 +177,11 @@ impl Rig {
             put_out: true,
             closed: false,
             design: Design::Camera,
+            periods: 0,
             asked: None,
             answer: None,
             start: None,
+            written_twice: 0,
             grace: 0,
             just_lit: false,
             told: VecDeque::new(),
@@ -235,6 +243,7 @@ impl Rig {
                 self.clock_held as u32
             }
             Some(Register::ClockHigh) => (self.clock_held >> 32) as u32,
+            Some(Register::Writes) => value - self.written_twice,
             Some(Register::Fault) => {
                 self.seen_so_far.faults[value as usize] += 1;
                 value
@@ -286,6 +295,7 @@ impl Rig {
     fn restart(&mut self) {
         self.model = Gateware::of(self.design);
         self.clock = 0;
+        self.written_twice = 0;
         self.seen.clear();
         self.interlock.clear();
         (self.dark, self.put_out) = (0..u64::MAX, true);
@@ -404,6 +414,7 @@ impl Rig {
             Access::Write(address, value) => {
                 let control = address == Register::Control.address();
                 if control && value & STARTS != 0 {
+                    self.written_twice += 1;
                     self.model.write(address, value & !STARTS);
                     if self.model.running() {
                         self.model.write(address, value & STARTS);

@@ -144,7 +144,15 @@ fn deed(rig: &mut Rig, dice: &mut Dice, frame: u64) {
                 dice.pick(&[R::Patterns, R::Dwell, R::Blank, R::Sweeps, R::Mode, R::Latency]);
             rig.set(register, dice.range(0, 8) as u32);
         }
-        20 => rig.write_cut_short(R::Control.address(), control::STOP),
+        20 if dice.once_in(2) => rig.write_cut_short(R::Control.address(), control::STOP),
+        20 => {
+            let register = dice.pick(&[R::Control, R::Dwell, R::Sweeps, R::Scratch]);
+            rig.write_damaged(
+                register.address(),
+                dice.next() as u32,
+                [(); 3].map(|()| dice.next()),
+            );
+        }
         21 if dice.once_in(3) => {
             rig.interlock(false);
             rig.wait(dice.range(0, 60) as u32);
@@ -164,6 +172,7 @@ pub fn run(rig: &mut Rig, seed: u64) {
         host_ps: dice.pick(&[10_000, 8_000, 7_000, 13_000]),
         half: dice.pick(&[3, 3, 4]),
         quad: !dice.once_in(8),
+        glitches: seed % 2 == 1,
     };
     rig.over_range_rate = dice.pick(&[0, 1, 8, 64, 255]);
     rig.interlock(!dice.once_in(32));
@@ -178,7 +187,9 @@ pub fn run(rig: &mut Rig, seed: u64) {
     }
     rig.interlock(true);
     rig.wait_adc(dice.range(0, frame + 100));
-    for register in [R::Status, R::Fault, R::FramesMade, R::FramesLost, R::ClockLow, R::ClockHigh] {
+    for register in
+        [R::Status, R::Fault, R::FramesMade, R::FramesLost, R::ClockLow, R::ClockHigh, R::Writes]
+    {
         rig.read(register.address());
     }
     rig.stream(false, usize::MAX);

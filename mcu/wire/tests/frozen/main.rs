@@ -44,5 +44,5 @@ fn what_is_new_says_since_which_version() {
     assert!(v1::device_messages().iter().all(|(message, _)| message.since() == 1));
     let since: Vec<u16> =
         v2::device_messages().iter().map(|(message, _)| message.since()).collect();
-    assert_eq!(since, [1, 2, 1, 1], "greeting and status are as old as the protocol");
+    assert_eq!(since, [1, 2, 2, 1, 1], "greeting and status are as old as the protocol");
 }

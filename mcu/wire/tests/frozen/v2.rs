@@ -6,8 +6,8 @@
 use super::bytes::{holds, packet, unhex};
 use nirspi_wire::packet::{request_id, unseal};
 use nirspi_wire::{
-    Answer, Capabilities, DeviceMessage, Identity, Refusal, Reply, Request, Signal, State, Status,
-    Tail, Version, open,
+    Answer, Capabilities, DeviceMessage, Event, EventKind, Identity, Refusal, Reply, Request,
+    Signal, State, Status, Tail, Version, open,
 };
 
 /// Every message that is new, and the greeting with its tail.
@@ -19,6 +19,13 @@ pub fn device_messages() -> Vec<(DeviceMessage<'static>, &'static str)> {
             "00 01 00 00 02 01 02 03 00 01 02 01 62 01 73 20 c0 b2 cd 3b 0e 8e 0c 05",
         ),
         (DeviceMessage::Reply(Reply { id: 300, outcome: Err(Refusal::Unknown) }), "00 ac 02 01 0a"),
+        (
+            DeviceMessage::Event(Event {
+                device_time_us: 4_000,
+                kind: EventKind::FpgaAccessesDamaged { total: 300 },
+            }),
+            "04 a0 1f 04 ac 02",
+        ),
         (status(Some(None)), "00 07 00 02 01 00 00 00 00 00 00 00 00 00 c4 13 f4 03 00 01 00"),
         (
             status(Some(Some(Signal {

@@ -48,7 +48,7 @@ variants! {
         Interlock, OverTemperature, TemperatureSensor, Duty, OverRange, FpgaWatchdog, FpgaAbsent,
         FpgaConfiguration, FpgaStalled, HostSilent,
     }
-    event_kind: EventKind { Fault, RunEnded, RawDropped, CommandDamaged }
+    event_kind: EventKind { Fault, RunEnded, RawDropped, CommandDamaged, FpgaAccessesDamaged }
 }
 
 /// Notes every variant in a request.

@@ -218,6 +218,7 @@ fn event() -> impl Strategy<Value = EventKind> {
         }),
         Just(EventKind::RawDropped),
         Just(EventKind::CommandDamaged),
+        any::<u32>().prop_map(|total| EventKind::FpgaAccessesDamaged { total }),
     ]
 }
 

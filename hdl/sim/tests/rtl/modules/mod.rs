@@ -34,6 +34,7 @@ mod duty;
 mod engine;
 mod formatter;
 mod frames;
+mod glitch_filter;
 mod host_registers;
 mod leds;
 mod loopback;
@@ -66,6 +67,7 @@ pub const BENCHES: &[(&str, &[Law])] = &[
     ("engine", engine::LAWS),
     ("formatter", formatter::LAWS),
     ("frames", frames::LAWS),
+    ("glitch_filter", glitch_filter::LAWS),
     ("host_registers", host_registers::LAWS),
     ("leds", leds::LAWS),
     ("loopback", loopback::LAWS),

@@ -4,12 +4,13 @@ use crate::bench::Bench;
 use crate::project::Project;
 use crate::scenario::Dice;
 use nirspi_wire::host_port::{
-    DUMMY_CYCLES, QUAD, READ_FRAME, READ_RAW, READ_REGISTER, WRITE_REGISTER,
+    DUMMY_CYCLES, QUAD, READ_FRAME, READ_RAW, READ_REGISTER, WRITE_REGISTER, check,
 };
 use std::collections::VecDeque;
 
 laws![
     a_write_goes_on_once_with_its_last_bit,
+    a_write_with_wrong_bits_does_nothing,
     a_read_gives_the_answer_after_the_dummy_cycles,
     a_stream_gives_the_bytes_of_its_own_epoch_and_zeros_beyond,
     a_transfer_cut_short_leaves_nothing_behind,
@@ -33,6 +34,9 @@ struct Rig {
     /// The value of a register, and the clocks until the answer.
     value: u64,
     answer_in: u32,
+    /// Bits that the wires invert on the way to the FPGA: of the address, and of value and check.
+    wrong_address: u64,
+    wrong: [u64; 2],
 }
 
 impl Rig {
@@ -40,7 +44,9 @@ impl Rig {
         let bench = Bench::new(project, "spi_slave");
         let fifo = VecDeque::new();
         let sent = Vec::new();
-        Self { bench, quad: false, half: 3, fifo, sent, value: 0, answer_in: 0 }
+        let (quad, half, value, answer_in) = (false, 3, 0, 0);
+        let (wrong_address, wrong) = (0, [0; 2]);
+        Self { bench, quad, half, fifo, sent, value, answer_in, wrong_address, wrong }
     }
 
     fn clock(&mut self) {
@@ -107,9 +113,12 @@ impl Rig {
         self.bench.set("selected", true);
         let opcode = opcode | if self.quad { QUAD } else { 0 };
         self.send(opcode.into(), 8, false, &mut periods);
-        self.send(address, 16, self.quad, &mut periods);
+        self.send(address ^ self.wrong_address, 16, self.quad, &mut periods);
         if let Some(data) = data {
-            self.send(data, 32, self.quad, &mut periods);
+            let check = u64::from(check(address as u16, data as u32));
+            let [wrong_data, wrong_check] = self.wrong;
+            self.send(data ^ wrong_data, 32, self.quad, &mut periods);
+            self.send(check ^ wrong_check, 16, self.quad, &mut periods);
         }
     }
 
@@ -161,6 +170,7 @@ impl Rig {
         assert_eq!([operation, at], [u64::from(READ_REGISTER & 3), address]);
         self.dummy();
         assert_eq!(self.receive(32), self.value);
+        assert_eq!(self.receive(16), u64::from(check(address as u16, self.value as u32)));
         self.end();
     }
 
@@ -198,6 +208,27 @@ fn a_write_goes_on_once_with_its_last_bit(project: &Project) {
     }
 }
 
+fn a_write_with_wrong_bits_does_nothing(project: &Project) {
+    let mut rig = Rig::new(project);
+    let dice = &mut Dice::new(38);
+    for _ in 0..60 {
+        rig.vary(dice);
+        let wrong = (0..3).fold(0u64, |wrong, _| wrong | 1 << dice.range(0, 63));
+        rig.wrong_address = wrong >> 48;
+        rig.wrong = [wrong >> 16 & 0xFFFF_FFFF, wrong & 0xFFFF];
+        rig.begin(
+            WRITE_REGISTER,
+            dice.range(0, 0xFFFF),
+            Some(dice.range(0, 0xFFFF_FFFF)),
+            u32::MAX,
+        );
+        rig.end();
+        assert!(rig.sent().is_empty(), "{wrong:#x}");
+        (rig.wrong_address, rig.wrong) = (0, [0; 2]);
+        rig.write(dice);
+    }
+}
+
 fn a_read_gives_the_answer_after_the_dummy_cycles(project: &Project) {
     let mut rig = Rig::new(project);
     let dice = &mut Dice::new(34);
@@ -221,7 +252,7 @@ fn a_transfer_cut_short_leaves_nothing_behind(project: &Project) {
     let dice = &mut Dice::new(36);
     for _ in 0..60 {
         rig.vary(dice);
-        let all = 8 + if rig.quad { 4 + 8 } else { 16 + 32 };
+        let all = 8 + if rig.quad { 4 + 12 } else { 16 + 48 };
         let periods = dice.range(0, all - 1) as u32;
         // A transfer cut off one bit before its end is cut off like any other.
         let periods = if dice.once_in(3) { all as u32 - 1 } else { periods };
