@@ -8,7 +8,7 @@ use nirspi_optics::{Chain, LedArray};
 use nirspi_wire::fpga::{FpgaFrame, HEADER_BYTES, frame_bytes};
 use nirspi_wire::host_port::{
     DUMMY_CYCLES, QUAD, READ_FRAME, READ_RAW, READ_REGISTER, SCK_DIVIDER, SEALED_BYTES,
-    WRITE_REGISTER, check, unseal,
+    WRITE_REGISTER, seal, unseal,
 };
 use nirspi_wire::register::{Design, Register, loopback};
 use std::collections::VecDeque;
