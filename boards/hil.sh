@@ -124,13 +124,23 @@ step_silent() {
     "$nirspi" capture --camera "$camera" --frames 100000000 --calibration "$calibration" --out "$out/silent.mcap" >"$out/silent.out" 2>"$out/silent.log" &
     local host=$!
     sleep 2
-    kill -STOP $host 2>/dev/null || { report 'a host silent for 7 s is told in one line' FAIL "$(said silent)"; return; }
+    kill -STOP $host 2>/dev/null || { report 'a host silent for 7 s is told in one line' FAIL "$(tail -1 "$out/silent.log")"; return; }
     sleep 7
     kill -CONT $host
+    # A camera has switched its LEDs off, and the host says so and ends. The virtual camera's time stands still while its
+    # host reads nothing, so its capture may go on.
+    local waited=0
+    while kill -0 $host 2>/dev/null && [ $waited -lt 100 ]; do
+        sleep 0.1
+        waited=$((waited + 1))
+    done
+    if kill -INT $host 2>/dev/null; then waited=on; fi
     wait $host
     local code=$?
-    if [ $code = 1 ] && [ -s "$out/silent.log" ]; then report 'a host silent for 7 s is told in one line' ok "$(said silent)"
-    else report 'a host silent for 7 s is told in one line' FAIL "exit $code: $(said silent)"; fi
+    if [ $code = 1 ] && [ -s "$out/silent.log" ]; then report 'a host silent for 7 s is told in one line' ok "$(tail -1 "$out/silent.log")"
+    elif [ $waited = on ] && [ -n "$served" ]; then report 'a host silent for 7 s is told in one line' skipped 'the virtual camera waited for its host'
+    else report 'a host silent for 7 s is told in one line' FAIL "exit $code: $(tail -1 "$out/silent.log")"; fi
+    rm -f "$out/silent.mcap"
     film after-silence 10
     checked after-silence 'a capture after that'
 }
