@@ -35,6 +35,11 @@ off, and [Firmware](firmware.md#every-state-of-a-session) what was checked in ev
 firmware can reach. USB's own faults are tested on a simulated core
 ([Firmware](firmware.md#usb-simulated)); no cable of a real camera was ever pulled.
 
+`cargo run --release -p nirspi-tests --example soak` sends ten million frames, one of 256 with a
+fault at random and one session of ten cut off, through capture, recording and reconstruction. It
+ends at the first frame that is not accounted for or image that is wrong, and draws the memory that
+it takes.
+
 ";
 
 #[test]
