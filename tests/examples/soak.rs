@@ -34,6 +34,9 @@ type Failure = Box<dyn std::error::Error>;
 const SESSION: u32 = 100_000;
 /// One frame of so many meets a fault.
 const RARITY: u32 = 256;
+/// Sound frames after each fault. Which frame a damaged packet was, its neighbours tell: next to a frame that comes late,
+/// the host counts the damaged one as lost, and the late one as received.
+const BETWEEN: u32 = 4;
 /// Frames are the only packets of at least this length.
 const FRAME_BYTES: usize = 2000;
 /// Sides of the scene and of the image.
@@ -92,7 +95,7 @@ fn session(
     let mut random = Pcg64Mcg::seed_from_u64(number);
     let unplugged = number % 10 == 9;
     let end = if unplugged { random.random_range(SESSION / 4..SESSION) } else { SESSION };
-    let mut frame = 0;
+    let (mut frame, mut sound_until) = (0, 0);
     let link = Tampered::new(Box::new(MemoryLink::new(camera)), move |_, length| {
         if length < FRAME_BYTES {
             return Fate::Pass;
@@ -102,7 +105,11 @@ fn session(
             return Fate::Close;
         }
         // A frame that comes late needs a successor.
-        let fate = if frame + 2 < end { fate(&mut random) } else { Fate::Pass };
+        let may_fail = frame >= sound_until && frame + 2 < end;
+        let fate = if may_fail { fate(&mut random) } else { Fate::Pass };
+        if fate != Fate::Pass {
+            sound_until = frame + 1 + BETWEEN;
+        }
         #[expect(clippy::unwrap_used, reason = "poisoned only by a panic")]
         let mut log = injected.lock().unwrap();
         match fate {
