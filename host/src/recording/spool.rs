@@ -147,7 +147,7 @@ impl Write for Spool {
 
 impl Drop for Spool {
     fn drop(&mut self) {
-        // An error has nobody to go to: a writer that wants to know flushes first.
+        // A drop cannot return an error. A writer that wants to know flushes first.
         let _ = self.hand_over();
     }
 }

@@ -3,7 +3,7 @@
 //! # Invariant
 //! A browser receives the newest state only after its connection has taken the state before. A slow or dead
 //! browser therefore delays no other part and uses the memory of one state
-//! (`a_browser_that_does_not_read_costs_nobody_and_then_sees_the_newest` and
+//! (`a_browser_that_does_not_read_delays_no_other_and_then_sees_the_newest` and
 //! `a_slow_browser_has_few_old_images_before_it` in `host/src/serve/tests.rs`).
 
 use super::connections::{Door, Peer, Streaming};

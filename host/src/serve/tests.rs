@@ -344,7 +344,7 @@ impl Paper {
 }
 
 #[test]
-fn a_browser_that_does_not_read_costs_nobody_and_then_sees_the_newest() {
+fn a_browser_that_does_not_read_delays_no_other_and_then_sees_the_newest() {
     const LAST: usize = 60;
     let paper = Paper::new();
     let (mut idle, mut keen) = (paper.browser(), paper.browser());
