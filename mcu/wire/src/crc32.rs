@@ -3,23 +3,62 @@
 //!
 //! The CRC processes several bytes in one step with as many tables ("slicing", Kounavis and Berry
 //! 2005): table `k` holds the effect of a byte `k` bytes later. With one table, CRC took two thirds
-//! of a frame's instructions.
+//! of a frame's instructions. A chip whose flash is full has a table for half a byte.
 
 /// The polynomial; bit 0 is its highest power.
 const POLYNOMIAL: u32 = 0xEDB8_8320;
 
-/// Bytes per step, a KB of tables each. 16 KB let the host process 24 414 frames a second; a
-/// microcontroller can spare 4 KB, and one of 64 KB of flash 1 KB (feature `one-crc-table`).
-const STEP: usize = if cfg!(not(target_os = "none")) {
-    16
-} else if cfg!(feature = "one-crc-table") {
-    1
-} else {
-    4
-};
+/// 16 KB of tables let the host process 24 414 frames a second.
+#[cfg(not(target_os = "none"))]
+static TABLES: Tables<16> = Tables::new();
 
-static TABLES: Tables<STEP> = Tables::new();
+/// A microcontroller can spare 4 KB.
+#[cfg(all(target_os = "none", not(feature = "small-crc-table")))]
+static TABLES: Tables<4> = Tables::new();
 
+/// One of 64 KB of flash cannot.
+#[cfg(all(target_os = "none", feature = "small-crc-table"))]
+static TABLES: HalfBytes = HalfBytes::new();
+
+/// Register after `bits` zero bits, from `crc`.
+const fn shifted(mut crc: u32, bits: u32) -> u32 {
+    let mut bit = 0;
+    while bit < bits {
+        crc = (crc >> 1) ^ ((crc & 1) * POLYNOMIAL);
+        bit += 1;
+    }
+    crc
+}
+
+/// Processes half a byte in one step, with a table of 64 bytes.
+#[cfg(any(test, all(target_os = "none", feature = "small-crc-table")))]
+struct HalfBytes([u32; 16]);
+
+#[cfg(any(test, all(target_os = "none", feature = "small-crc-table")))]
+impl HalfBytes {
+    const fn new() -> Self {
+        let mut table = [0; 16];
+        let mut half = 0;
+        while half < 16 {
+            table[half] = shifted(half as u32, 4);
+            half += 1;
+        }
+        Self(table)
+    }
+
+    /// The register after `bytes`.
+    fn update(&self, mut crc: u32, bytes: &[u8]) -> u32 {
+        for &byte in bytes {
+            crc ^= u32::from(byte);
+            for _ in 0..2 {
+                crc = (crc >> 4) ^ self.0[(crc & 15) as usize];
+            }
+        }
+        crc
+    }
+}
+
+/// Processes `N` bytes in one step, with a table of 1 KB for each.
 struct Tables<const N: usize>([[u32; 256]; N]);
 
 impl<const N: usize> Tables<N> {
@@ -30,11 +69,7 @@ impl<const N: usize> Tables<N> {
             let mut crc = byte as u32;
             let mut k = 0;
             while k < N {
-                let mut bit = 0;
-                while bit < 8 {
-                    crc = (crc >> 1) ^ ((crc & 1) * POLYNOMIAL);
-                    bit += 1;
-                }
+                crc = shifted(crc, 8);
                 tables[k][byte] = crc;
                 k += 1;
             }
@@ -46,7 +81,8 @@ impl<const N: usize> Tables<N> {
     /// The register after `bytes`.
     fn update(&self, mut crc: u32, bytes: &[u8]) -> u32 {
         // A step is of whole words.
-        let (steps, rest) = if N < 4 { (&[][..], bytes) } else { bytes.as_chunks::<N>() };
+        const { assert!(N.is_multiple_of(4)) }
+        let (steps, rest) = bytes.as_chunks::<N>();
         for step in steps {
             let (words, _) = step.as_chunks::<4>();
             let mut next = 0;
@@ -123,7 +159,7 @@ mod tests {
         ) {
             let expected = by_definition(&bytes);
             prop_assert_eq!(crc32(&bytes), expected);
-            prop_assert_eq!(!Tables::<1>::new().update(u32::MAX, &bytes), expected);
+            prop_assert_eq!(!HalfBytes::new().update(u32::MAX, &bytes), expected);
             prop_assert_eq!(!Tables::<4>::new().update(u32::MAX, &bytes), expected);
             let (first, rest): (Vec<u8>, Vec<u8>) = {
                 let (a, b) = bytes.split_at(at.index(bytes.len() + 1));
