@@ -169,6 +169,31 @@ fn a_watchdog_runs_before_anything_waits() {
     }
 }
 
+/// A camera that hangs restarts only if nothing but its own loop resets the watchdog: no interrupt
+/// and no second task.
+#[test]
+fn the_cameras_loop_alone_feeds_the_watchdog() {
+    let mut fed_in = Vec::new();
+    for folder in boards().iter().map(|board| board.name).chain(["app", "nucleo", "usb"]) {
+        for (path, code) in sources(&format!("boards/{folder}/src")) {
+            let calls = code.matches(".feed_watchdog()").count() + code.matches(".pet()").count();
+            fed_in.extend(std::iter::repeat_n(path, calls));
+        }
+    }
+    fed_in.sort();
+    // The loop; each board's register; the load of the stored gateware, before the loop begins.
+    let expected = [
+        "boards/app/src/run.rs",
+        "boards/nucleo-h7s3l8/src/board.rs",
+        "boards/nucleo-u5a5zj-q/src/board.rs",
+        "boards/nucleo-u5a5zj-q/src/main.rs",
+    ];
+    assert_eq!(fed_in, expected);
+    let run = read("boards/app/src/run.rs");
+    let calls_in_loop = run.split_once("    loop {\n        board.feed_watchdog();");
+    assert!(calls_in_loop.is_some(), "once in each turn of the loop, first");
+}
+
 #[test]
 fn the_udev_rule_names_the_camera() {
     let rules = read("boards/60-nirspi.rules");
@@ -181,6 +206,14 @@ fn the_udev_rule_names_the_camera() {
     ] {
         assert!(rule.contains(&part), "{part}");
     }
+}
+
+/// Rust files directly in a folder, with their paths from the root.
+fn sources(folder: &str) -> Vec<(String, String)> {
+    let entries = std::fs::read_dir(root().join(folder)).expect(folder);
+    let names = entries.filter_map(|entry| entry.expect("an entry").file_name().into_string().ok());
+    let paths = names.filter(|name| name.ends_with(".rs")).map(|name| format!("{folder}/{name}"));
+    paths.map(|path| (path.clone(), read(&path))).collect()
 }
 
 /// Folders of `boards/` that have a file of this name.

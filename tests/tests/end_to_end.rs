@@ -17,6 +17,7 @@ use nirspi_tests::tamper::{Fate, Tampered, only_frames};
 use nirspi_wire::packet::MAX_DEVICE_PACKET;
 use nirspi_wire::{DeviceMessage, Fault, Frame, FrameFlags, Samples, encode, open, walsh};
 use std::ops::ControlFlow;
+use std::time::Duration;
 
 const FRAMES: u32 = 6;
 const PX: usize = 64;
@@ -317,6 +318,27 @@ fn stopping_keeps_what_has_come() {
     .unwrap();
     assert!(matches!(captured.ended, Ended::Stopped));
     assert!(captured.counters.received >= 3 && captured.counters.is_complete());
+}
+
+/// The virtual camera's time stands still meanwhile. A real one switches its LEDs off and says so,
+/// which a host that wakes reads first.
+#[test]
+fn a_host_that_was_suspended_does_not_blame_its_camera() {
+    let mut session = Session::open(ideal_link()).unwrap();
+    let options = CaptureOptions { frames: None, ..options(&Order::Natural, false) };
+    let mut before = None;
+    let captured = capture(&mut session, &options, &mut |progress| match before {
+        None => {
+            std::thread::sleep(Duration::from_secs(6));
+            before = Some(progress.counters.received);
+            ControlFlow::Continue(())
+        }
+        Some(before) if progress.counters.received > before => ControlFlow::Break(()),
+        Some(_) => ControlFlow::Continue(()),
+    })
+    .unwrap();
+    assert!(matches!(captured.ended, Ended::Stopped), "{:?}", captured.ended);
+    assert!(captured.counters.is_complete());
 }
 
 /// Noise and signal computed on the host, from all that the host gets: the frames.

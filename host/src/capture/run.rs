@@ -27,6 +27,9 @@ const STOP_TIMEOUT: Duration = Duration::from_secs(10);
 /// The longest time that one turn waits for packets, and the time between two calls of
 /// [`Observer::watch`].
 const TURN: Duration = Duration::from_millis(50);
+/// A turn that takes this long means that this program itself stood still: its computer slept, or
+/// a person suspended it. What the camera sent meanwhile is read next.
+const STOOD_STILL: Duration = ANSWER_TIMEOUT.checked_div(2).expect("two is not zero");
 
 /// Watches the calibration of the camera.
 struct Calibrating<'o> {
@@ -65,6 +68,8 @@ pub struct Run {
     started: Instant,
     /// Time of the last intact packet.
     last_intact: Instant,
+    /// When the last turn ended.
+    turned: Instant,
     /// Time at which the observer wanted to stop.
     stopped: Option<Instant>,
     kept_alive: Instant,
@@ -185,6 +190,7 @@ impl Run {
             junk: Junk::new(now),
             started: now,
             last_intact: now,
+            turned: now,
             stopped: None,
             kept_alive: now,
             kept_alive_us: 0,
@@ -256,6 +262,10 @@ impl Run {
         if self.stopped.is_some_and(|stopped| stopped.elapsed() > STOP_TIMEOUT) {
             return Err(SessionError::NoAnswer { command: request::Stop::NAME });
         }
+        if self.turned.elapsed() > STOOD_STILL {
+            self.last_intact = Instant::now();
+        }
+        self.turned = Instant::now();
         if self.last_intact.elapsed() > ANSWER_TIMEOUT {
             return Err(SessionError::NoAnswer { command: request::Status::NAME });
         }

@@ -193,7 +193,7 @@ pub const FAULTS: &[SingleFault] = &[
         Lit::Half,
         "the board's watchdog restarts the firmware, whose LED enable is low after a reset",
         BOARD_WATCHDOG,
-        &["the_crash_handler_turns_off_the_pin_that_enables_the_leds"],
+        &["a_watchdog_runs_before_anything_waits", "the_cameras_loop_alone_feeds_the_watchdog"],
     ),
     fault(
         "the firmware panics, faults or overflows its stack",

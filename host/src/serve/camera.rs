@@ -68,6 +68,7 @@ pub struct CameraSource {
 /// Why a session ended.
 pub(super) enum End {
     /// The server is stopping.
+    #[cfg(feature = "serve")]
     Told,
     /// The link to the camera is gone, for this reason in one line.
     Gone(String),
@@ -277,6 +278,7 @@ impl Live {
             Next::Person
         };
         match end {
+            #[cfg(feature = "serve")]
             End::Told => Next::Connect { person_said: false },
             // A person allowed light before another scene.
             End::Scene => Next::Connect { person_said: true },

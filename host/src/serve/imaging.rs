@@ -185,6 +185,7 @@ pub struct Picture {
     #[serde(skip)]
     pub depth: Option<Arc<DepthImage>>,
     /// When the newest frame came out of the link.
+    #[cfg(feature = "serve")]
     #[serde(skip)]
     pub arrived: Instant,
     /// The same on the clock of the computer that reads the camera, in milliseconds since 1970.
@@ -207,6 +208,7 @@ pub struct Picture {
 
 impl Picture {
     /// The reconstructed image, (32, 32) in [0, 1], with white at 1.
+    #[cfg(feature = "serve")]
     pub fn shares_of_white(&self) -> Vec<f32> {
         let scale = if self.white_counts > 0.0 { 1.0 / self.white_counts } else { 0.0 };
         self.counts.iter().map(|value| (value * scale).clamp(0.0, 1.0)).collect()
@@ -351,6 +353,7 @@ impl Imaging {
             enhanced,
             readings: readings(&measurements),
             depth: look.depth.clone(),
+            #[cfg(feature = "serve")]
             arrived: look.arrived,
             arrived_unix_ms: (clock::since_1970().saturating_sub(look.arrived.elapsed()))
                 .as_millis() as u64,

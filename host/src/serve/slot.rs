@@ -14,6 +14,7 @@ use crate::setup::MeasurementSetup;
 use nirspi_nets::DepthMaps;
 use serde::Serialize;
 use std::sync::{Arc, Condvar, Mutex};
+#[cfg(any(test, feature = "serve"))]
 use std::time::Duration;
 
 /// One run's setup and the camera's response: everything needed to interpret its frames.
@@ -113,6 +114,7 @@ impl Slot {
 
     /// Takes the newest look, if there is one within `patience` and before [`wake`](Self::wake).
     /// The caller must then call [`done`](Self::done).
+    #[cfg(any(test, feature = "serve"))]
     pub fn take(&self, patience: Duration) -> Option<Look> {
         let inner = lock(&self.inner);
         let idle = |inner: &mut Inner| inner.next.is_none() && !inner.news;
@@ -123,14 +125,14 @@ impl Slot {
     }
 
     /// Waits for [`wake`](Self::wake) alone, and leaves the newest look in the slot.
+    #[cfg(any(test, feature = "serve"))]
     pub fn await_news(&self, patience: Duration) {
         let waited =
             self.filled.wait_timeout_while(lock(&self.inner), patience, |inner| !inner.news);
         waited.unwrap_or_else(std::sync::PoisonError::into_inner).0.news = false;
     }
 
-    /// Takes the newest look, if there is one now. As after [`take`](Self::take), the caller must
-    /// then call [`done`](Self::done).
+    /// Takes the newest look, if there is one now. The caller must then call [`done`](Self::done).
     pub fn take_now(&self) -> Option<Look> {
         let mut inner = lock(&self.inner);
         inner.news = false;

@@ -152,10 +152,12 @@ struct Message<'s> {
 #[derive(Debug, Default)]
 pub struct Published {
     /// The state as JSON, without pixels.
+    #[cfg(feature = "serve")]
     pub state: String,
     /// The state as JSON, with pixels.
     pub message: String,
     /// The images.
+    #[cfg(feature = "serve")]
     pub picture: Option<Arc<Picture>>,
 }
 
@@ -174,7 +176,9 @@ impl Published {
         };
         Ok(Self {
             message: serde_json::to_string(&message)?,
+            #[cfg(feature = "serve")]
             state: serde_json::to_string_pretty(state)?,
+            #[cfg(feature = "serve")]
             picture: picture.cloned(),
         })
     }

@@ -1,6 +1,6 @@
 //! The learned prior on one simulated measurement, beside Tikhonov's method: error and time.
 //!
-//! `cargo run --release -p nirspi-nets --example learned_prior`
+//! `cargo run --release -p nirspi-nets --example prior`
 
 use nirspi_recon::reconstruct::{Method, MethodSettings};
 use nirspi_recon::{Measurements, Order, Rows, Side};
