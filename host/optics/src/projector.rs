@@ -173,17 +173,9 @@ impl Projector {
     /// `cycles_per_mm`: a square's transfer times a disc's.
     #[must_use]
     pub fn transfer(&self, cycles_per_mm: f64, distance_mm: f64) -> f64 {
-        const PARTS: u32 = 400;
         let spot_mm = self.emitter_mm * self.magnification(distance_mm);
         let square = sinc(PI * cycles_per_mm * spot_mm);
-        // The projection of a disc onto one axis: chords of a unit circle, `cos^2` of an angle.
-        let phase = PI * cycles_per_mm * self.blur_mm(distance_mm);
-        let part = |i: u32| {
-            let angle = PI * ((f64::from(i) + 0.5) / f64::from(PARTS) - 0.5);
-            angle.cos().powi(2) * (phase * angle.sin()).cos()
-        };
-        let disc = (0..PARTS).map(part).sum::<f64>() * 2.0 / f64::from(PARTS);
-        square * disc
+        square * disc(PI * cycles_per_mm * self.blur_mm(distance_mm))
     }
 
     /// The mean reflectance that each LED's spot sees on a scene at `distance_mm`, centred on the
@@ -216,8 +208,14 @@ impl Projector {
     }
 }
 
+/// Transfer of a square of width w, with x = pi f w.
 fn sinc(x: f64) -> f64 {
     if x == 0.0 { 1.0 } else { x.sin() / x }
+}
+
+/// Transfer of a disc of diameter d, with x = pi f d (Goodman, Introduction to Fourier Optics, 2.1.5).
+fn disc(x: f64) -> f64 {
+    if x == 0.0 { 1.0 } else { 2.0 * libm::j1(x) / x }
 }
 
 fn positive(name: &'static str, value_mm: f64) -> Result<(), ProjectorError> {
@@ -302,5 +300,24 @@ impl Footprint {
     #[must_use]
     pub fn mean(&self) -> f64 {
         self.weights.iter().map(|&w| f64::from(w)).sum::<f64>() / LEDS as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The projection of a disc onto one axis is made of chords.
+    #[test]
+    fn the_transfer_of_a_disc_is_that_of_its_chords() {
+        const PARTS: u32 = 1000;
+        for x in [0.0, 1e-9, 0.1, 1.0, 3.8317, 10.0, 60.0] {
+            let chord = |i: u32| {
+                let angle = PI * ((f64::from(i) + 0.5) / f64::from(PARTS) - 0.5);
+                angle.cos().powi(2) * (x * angle.sin()).cos()
+            };
+            let chords = (0..PARTS).map(chord).sum::<f64>() * 2.0 / f64::from(PARTS);
+            assert!((disc(x) - chords).abs() < 1e-12, "{x}: {} {chords}", disc(x));
+        }
     }
 }
