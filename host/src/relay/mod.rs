@@ -6,8 +6,8 @@
 //! * [`RelayLink`] is what was published, as a link to a camera: greeting, setup and start are
 //!   answered here, frames are numbered from the start of the host's own run.
 //!
-//! The way between them is a [`Publish`] and a [`Subscribe`]. With the feature `zenoh`,
-//! [`zenoh`](self::zenoh) is one.
+//! The way between them is a [`Publish`] and a [`Subscribe`]. With the feature `zenoh`, the module
+//! `relay::zenoh` is one.
 //!
 //! # Invariant
 //! A host that joins in the middle of a run counts the frames from its own start on, and every frame

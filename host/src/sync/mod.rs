@@ -4,7 +4,7 @@
 //! * [`Clock`] fits offset and drift of one camera's clock,
 //! * [`Merge`] brings frames of several cameras into the order of common time as they come,
 //! * [`Cameras`] is both, for a program that reads several cameras,
-//! * [`recordings`] does the same for recordings that were made side by side, and writes a table of
+//! * [`recordings()`] does the same for recordings that were made side by side, and writes a table of
 //!   all frames.
 //!
 //! ```
