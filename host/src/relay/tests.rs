@@ -139,9 +139,12 @@ fn the_end_of_the_cameras_run_ends_that_of_the_host() {
     }
 }
 
+/// Announcements, and packets.
+type Published = (Vec<String>, Vec<Vec<u8>>);
+
 /// Keeps what is published.
 #[derive(Clone, Default)]
-struct Kept(Arc<Mutex<(Vec<String>, Vec<Vec<u8>>)>>);
+struct Kept(Arc<Mutex<Published>>);
 
 impl Publish for Kept {
     fn announce(&mut self, json: &str) {
