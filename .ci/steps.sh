@@ -38,6 +38,7 @@ by_name=(
     "seeds           place and route of the gateware with five seeds, the best of which is packed; PyPI"
     "licences        licences, sources and bans of all dependencies; crates.io"
     "flash           probe-rs knows every board's chip"
+    "zenoh           a camera over Zenoh: router, camera and host as processes; crates.io, 219 crates of which 95 are its own"
     "publish         each library crate builds from its package alone; crates.io"
     "licence-texts   the licences of all dependencies in one page; crates.io"
     "deb             the Debian package; crates.io"
@@ -245,7 +246,7 @@ step_python() {
     (cd host/python && cargo fmt --check)
     CARGO_TARGET_DIR=$PWD/target/python-build \
         cargo clippy --locked --release --manifest-path host/python/Cargo.toml -- -D warnings
-    python_package numpy ipykernel==7.4.0 matplotlib mypy==2.4.1 nbclient==0.11.0 pyarrow pytest==9.2.0 ruff==0.17.6 scipy xarray
+    python_package numpy ipykernel==7.4.0 matplotlib mypy==2.4.1 nbclient==0.11.0 pyarrow pytest==9.2.0 rosbags==0.11.9 ruff==0.17.6 scipy xarray
     local bin=$PWD/target/python/bin
     cargo build --locked --release
     (
@@ -340,6 +341,12 @@ step_flash() {
     # Without optimisation and GPUs: it is built for this alone.
     cargo test --locked -p nirspi --no-default-features --features flash --lib \
         --config 'profile.dev.package."*".opt-level=0' -- boards flash
+}
+
+# Without optimisation: it is built for this alone, three minutes of one core.
+step_zenoh() {
+    cargo test --locked -p nirspi --no-default-features --features zenoh --lib --test zenoh \
+        --config 'profile.dev.package."*".opt-level=0' -- relay:: late_host no_camera address::
 }
 
 step_mie() {

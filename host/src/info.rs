@@ -7,6 +7,7 @@ use crate::signal::Signal;
 use crate::versions::{Part, compare};
 use nirspi_wire::Status;
 use serde::Serialize;
+use std::fmt;
 
 /// A camera's identity, versions and state.
 #[derive(Debug, Serialize)]
@@ -31,6 +32,33 @@ pub struct Info {
     pub signal: Option<Signal>,
     /// Events of the camera while no host was connected.
     pub reports: Vec<String>,
+}
+
+impl fmt::Display for Info {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let camera = &self.camera;
+        writeln!(f, "{} {}", camera.board, camera.serial)?;
+        let (mega, bits, nm) = (camera.adc_hz / 1_000_000, camera.adc_bits, camera.wavelength_nm);
+        writeln!(f, "ADC {mega} MS/s, {bits} bit; LEDs {nm} nm")?;
+        if !camera.capabilities.is_empty() {
+            writeln!(f, "capabilities: {}", camera.capabilities.join(", "))?;
+        }
+        let sensor = self.temperature_celsius.map_or_else(
+            || "no temperature sensor".to_owned(),
+            |celsius| format!("{celsius:.1} °C"),
+        );
+        let interlock = if self.interlock_closed { "closed" } else { "open" };
+        writeln!(f, "{}, {sensor}, interlock {interlock}", self.state)?;
+        if let Some(signal) = &self.signal {
+            writeln!(f, "{signal}")?;
+        }
+        for Part { name, camera, expected, advice, .. } in &self.parts {
+            let verdict = advice.as_deref().unwrap_or("as expected");
+            writeln!(f, "{name:<13} {camera:<9} expected {expected:<9} {verdict}")?;
+        }
+        write!(f, "{}", self.fpga)?;
+        self.reports.iter().try_for_each(|report| write!(f, "\n{report}"))
+    }
 }
 
 /// Asks a camera for its identity, versions and state.

@@ -27,6 +27,12 @@ impl Integrated {
         Self { sums: vec![0; patterns], frames: 0, sweeps: 0, flags: FrameFlags::default() }
     }
 
+    /// A sum that another program made: of this many frames, which sum this many sweeps together.
+    #[must_use]
+    pub fn of_sums(sums: Vec<i64>, frames: u64, sweeps: u64) -> Self {
+        Self { sums, frames, sweeps, flags: FrameFlags::default() }
+    }
+
     /// Number of patterns of a sweep.
     #[must_use]
     pub fn patterns(&self) -> usize {

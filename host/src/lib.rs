@@ -12,6 +12,8 @@
 //!   camera,
 //! * [`capture`] runs a measurement, [`recording`] stores it, [`export`] writes it for other
 //!   programs, [`replay`] plays it back as a camera,
+//! * [`relay`] gives the frames of a camera to other programs,
+//! * [`sync`] brings frames of several cameras into one time and order,
 //! * [`tally`] and [`integrate`] make measurements of frames; `nirspi-recon` reconstructs an image
 //!   from measurements,
 //! * [`source`] reads measurements from a file, a recording or a capture,
@@ -77,6 +79,8 @@ pub mod picture;
 #[cfg(not(target_family = "wasm"))]
 pub mod reconstruct;
 pub mod recording;
+#[cfg(not(target_family = "wasm"))]
+pub mod relay;
 pub mod replay;
 pub mod resolution;
 #[cfg(feature = "virtual-camera")]
@@ -92,6 +96,7 @@ pub mod signal;
 #[cfg(not(target_family = "wasm"))]
 pub mod source;
 pub mod stage_times;
+pub mod sync;
 pub mod tally;
 #[cfg(feature = "training")]
 pub mod training;

@@ -4,7 +4,7 @@ use super::camera::SceneArgs;
 use super::{print, stop_on_signal};
 use anyhow::{Context, Result};
 use nirspi::virtual_camera::{
-    PrecomputedFpga, ServeOptions, ServerEvent, SimulatedFpga, VirtualCamera, serve, serve_tunnel,
+    PrecomputedFpga, ServeOptions, SimulatedFpga, VirtualCamera, serve, serve_tunnel,
 };
 use std::net::{TcpListener, TcpStream};
 use std::process::ExitCode;
@@ -38,6 +38,9 @@ pub struct Args {
     /// Let the camera's time run no faster than the clock on the wall: the patterns' clock and --sweeps set the frames a second
     #[arg(long)]
     real_time: bool,
+    /// Millionths by which the camera's simulated clock gains on the clock on the wall
+    #[arg(long, value_name = "PPM", default_value_t = 0, requires = "real_time", value_parser = clap::value_parser!(i32).range(-10_000..=10_000))]
+    clock_ppm: i32,
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
@@ -58,8 +61,12 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let stop = stop_on_signal()?;
     let address = listener.local_addr()?;
     print::line(format_args!("virtual camera on tcp:{address}: {scene}"))?;
-    let (once, drop_when_full, real_time) = (args.once, args.drop_when_full, args.real_time);
-    let options = ServeOptions { once, drop_when_full, real_time };
+    let options = ServeOptions {
+        once: args.once,
+        drop_when_full: args.drop_when_full,
+        real_time: args.real_time,
+        clock_error_ppm: args.clock_ppm.into(),
+    };
     let (fpga, depth) = (optics.fpga(seed)?, optics.depth(seed)?);
     let serial = optics.serial(seed);
     match args.precompute {
@@ -79,21 +86,7 @@ fn run_server<F: SimulatedFpga>(
     options: ServeOptions,
     stop: &AtomicBool,
 ) -> Result<()> {
-    serve(listener, &mut camera, options, stop, &mut |event| {
-        let told = match event {
-            ServerEvent::Connected(host) => print::line(format_args!("{host} connected")),
-            ServerEvent::TurnedAway(host) => {
-                print::line(format_args!("{host} turned away: one host at a time"))
-            }
-            ServerEvent::Disconnected(host, None) => {
-                print::line(format_args!("{host} disconnected, LEDs off"))
-            }
-            ServerEvent::Disconnected(host, Some(error)) => {
-                print::line(format_args!("{host} was cut off ({error}), LEDs off"))
-            }
-        };
-        // The camera goes on even if its log cannot be written.
-        told.unwrap_or_default();
-    })?;
-    Ok(())
+    // The camera goes on even if its log cannot be written.
+    let mut tell = |event| print::line(event).unwrap_or_default();
+    Ok(serve(listener, &mut camera, options, stop, &mut tell)?)
 }

@@ -19,6 +19,7 @@ use nirspi::link::{CameraAddress, Link};
 use nirspi::recording::Target;
 use nirspi::session::{IgnorePackets, Session, SessionError};
 use nirspi::setup::MeasurementSetup;
+use nirspi::sync::HostClock;
 use nirspi::virtual_camera::{MemoryLink, calibrate_against_white, flat_field_against_white};
 use options::Options;
 use pyo3::exceptions::{PyConnectionError, PyOSError};
@@ -223,6 +224,9 @@ impl Camera {
             frames: wanted.stream.then_some(sender),
             waits: self.is_virtual,
             shared: Arc::clone(&shared),
+            host: HostClock::new(),
+            clock: None,
+            arrived_ns: 0,
         };
         let state = Arc::clone(&self.state);
         let thread = py.detach(|| {

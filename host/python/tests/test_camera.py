@@ -394,3 +394,19 @@ def test_what_does_not_fit_is_refused_in_one_line(tmp_path):
             camera.record(tmp_path / "taken.mcap", frames=1)
         assert (tmp_path / "taken.mcap").read_text() == "precious"
         assert camera.read(1).shape == (1, 102)
+
+
+def test_frames_have_the_computers_time_and_give_measurements_while_the_run_goes_on(served):
+    with ns.Camera(served, sampling=0.1, calibration="off", adc_latency=6) as camera:
+        before = time.time_ns()
+        with camera.frames() as frames:
+            taken = [next(frames) for _ in range(50)]
+            summed = frames.measurement(taken)
+            with pytest.raises(ns.Error, match="at least one frame"):
+                frames.measurement([])
+        after = time.time_ns()
+        assert summed.d.shape == (102,) and (summed.rows == camera.rows).all()
+        scale = sum(frame.sweeps for frame in taken) * 3
+        sums = np.sum([frame.sums for frame in taken], axis=0)
+        assert np.allclose(summed.d, sums / scale)
+    assert all(before - 10**9 < frame.time_ns <= after for frame in taken)

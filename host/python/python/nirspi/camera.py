@@ -8,7 +8,7 @@ import json
 import os
 import warnings
 import weakref
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -53,6 +53,9 @@ class Frame:
     flags : int
         1: a sample was outside the ADC's range; 2: a sum overflowed; 4: the FPGA lost a frame
         before; 8: samples of the test generator; 16: differences.
+    time_ns : int
+        The computer's time of the first pattern, in ns since 1970: the camera's time by a running
+        fit of its clock. It is later than the true time by the link's shortest delay.
     """
 
     sums: np.ndarray
@@ -60,6 +63,7 @@ class Frame:
     device_time_us: int
     sweeps: int
     flags: int
+    time_ns: int
 
 
 class Frames(Iterator[Frame]):
@@ -101,6 +105,26 @@ class Frames(Iterator[Frame]):
     def account(self) -> Account:
         """The account of the run so far."""
         return Account(*self._run.account)
+
+    def measurement(self, frames: Sequence[Frame]) -> Measurement:
+        """The measurement of some frames of this run together, in mean ADC counts, with the leak
+        between patterns corrected.
+
+        Examples
+        --------
+        >>> import itertools
+        >>> import nirspi as ns
+        >>> with ns.Camera("virtual", sampling=0.1) as camera, camera.frames() as frames:
+        ...     ten = list(itertools.islice(frames, 10))
+        ...     frames.measurement(ten).d.shape
+        (102,)
+        """
+        if not frames:
+            raise Error("frames is empty, expected at least one frame")
+        sums = np.sum([frame.sums for frame in frames], axis=0, dtype=np.int64)
+        sweeps = sum(frame.sweeps for frame in frames)
+        n, rows, d, flat = self._run.readings(sums, len(frames), sweeps)
+        return Measurement(d=d, rows=rows, n=n, unit="ADC counts", flat_field=flat)
 
     def close(self) -> None:
         """Ends the run; the LEDs are off."""

@@ -6,10 +6,14 @@ use crate::errors::{refusal, refused};
 use crate::measurement::FlatField;
 use crate::work::SIGNALS;
 use nirspi::account::LossCounters;
+use nirspi::calibration::{CalibrationError, Settling};
 use nirspi::capture::{Capture, CaptureError, CaptureOptions, Ended, Observer, Progress, observe};
 use nirspi::events;
+use nirspi::integrate::Integrated;
 use nirspi::session::Session;
+use nirspi::setup::MeasurementSetup;
 use nirspi::source::Source;
+use nirspi::sync::{Clock, HostClock};
 use nirspi_wire::{DeviceMessage, Frame};
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -20,6 +24,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
+use std::time::Instant;
 
 /// What the thread of a run and its user share.
 #[derive(Default)]
@@ -28,6 +33,8 @@ pub(super) struct Shared {
     counters: Mutex<LossCounters>,
     passed_over: AtomicU64,
     pub(super) events: Mutex<Vec<String>>,
+    /// How the run measures: the setup that the camera has accepted, and its settling.
+    measures: Mutex<Option<(MeasurementSetup, Option<Settling>)>>,
 }
 
 /// Received, lost, corrupt, late; and passed over because the user was slow.
@@ -51,6 +58,8 @@ pub(super) struct Item {
     device_time_us: u64,
     sweeps: u32,
     flags: u16,
+    /// The host's time of the first pattern in ns since 1970, by the fit so far.
+    time_ns: u64,
 }
 
 /// Gives the frames of a run to its user.
@@ -59,14 +68,39 @@ pub(super) struct Streaming {
     /// Whether the camera waits for the user.
     pub(super) waits: bool,
     pub(super) shared: Arc<Shared>,
+    pub(super) host: HostClock,
+    /// The camera's clock in the host's time, from the start of the run on.
+    pub(super) clock: Option<Clock>,
+    /// The time at which the next frames came out of the link.
+    pub(super) arrived_ns: u64,
 }
 
 impl Observer for Streaming {
+    fn begins(
+        &mut self,
+        setup: &MeasurementSetup,
+        settling: Option<&Settling>,
+        _: Option<&CalibrationError>,
+    ) {
+        *lock(&self.shared.measures) = Some((setup.clone(), settling.cloned()));
+        self.clock = Some(Clock::new(setup.frame_ns()));
+    }
+
+    fn arrived(&mut self, at: Instant) {
+        self.arrived_ns = self.host.ns_of(at);
+    }
+
     fn frame(&mut self, frame: &Frame<'_>, counters: &LossCounters) {
         *lock(&self.shared.counters) = *counters;
         let Some(frames) = &self.frames else { return };
         if self.shared.stop.load(Ordering::Relaxed) {
             return;
+        }
+        let mut time_ns = self.arrived_ns;
+        if let Some(clock) = &mut self.clock {
+            clock.arrived(frame.run, frame.device_time_us, self.arrived_ns);
+            let at = clock.device_time_us(frame.device_time_us);
+            time_ns = clock.fit().map_or(time_ns, |fit| fit.host_ns(at));
         }
         let item = Item {
             sums: frame.samples.iter().collect(),
@@ -74,6 +108,7 @@ impl Observer for Streaming {
             device_time_us: frame.device_time_us,
             sweeps: frame.sweeps,
             flags: frame.flags.0,
+            time_ns,
         };
         let gone = if self.waits {
             frames.send(item).is_err()
@@ -156,7 +191,7 @@ pub(super) enum Made {
     Failed(PyErr),
 }
 
-type FrameTuple<'py> = (Bound<'py, PyArray1<i64>>, u32, u64, u32, u16);
+type FrameTuple<'py> = (Bound<'py, PyArray1<i64>>, u32, u64, u32, u16, u64);
 
 impl Run {
     /// The next frame; `None` at the end of the run. At Ctrl-C the LEDs are off before the exception is.
@@ -212,10 +247,13 @@ impl Run {
 
 #[pymethods]
 impl Run {
-    /// The next frame: `(sums, sequence, device_time_us, sweeps, flags)`; `None` at the end.
+    /// The next frame: `(sums, sequence, device_time_us, sweeps, flags, time_ns)`; `None` at the end.
     fn next<'py>(&self, py: Python<'py>) -> PyResult<Option<FrameTuple<'py>>> {
         let item = self.receive(py)?;
-        Ok(item.map(|i| (array(py, i.sums), i.sequence, i.device_time_us, i.sweeps, i.flags)))
+        Ok(item.map(|i| {
+            let sums = array(py, i.sums);
+            (sums, i.sequence, i.device_time_us, i.sweeps, i.flags, i.time_ns)
+        }))
     }
 
     /// All frames until the end: sums, sequence numbers and device times.
@@ -305,6 +343,35 @@ impl Run {
                 )))
             }
         }
+    }
+
+    /// The measurement of the sums of some frames of the run: `(n, rows, d, flat field)`.
+    #[expect(clippy::type_complexity, reason = "a tuple for Python")]
+    fn readings<'py>(
+        &self,
+        py: Python<'py>,
+        sums: Vec<i64>,
+        frames: u64,
+        sweeps: u64,
+    ) -> PyResult<(usize, Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<f64>>, Option<FlatField>)>
+    {
+        let measures = lock(&self.shared.measures).clone();
+        let Some((setup, settling)) = measures else {
+            return Err(refused("the run has not begun, take a frame first"));
+        };
+        if sums.len() != setup.rows.len() {
+            let (found, expected) = (sums.len(), setup.rows.len());
+            return Err(refused(format!("sums of {found} patterns, expected {expected}")));
+        }
+        let summed = Integrated::of_sums(sums, frames, sweeps);
+        let measured = summed.measurements(&setup, settling.as_ref(), false).map_err(refusal)?;
+        let rows = measured.rows().iter().map(|&row| i64::from(row)).collect();
+        Ok((
+            measured.side().pixels(),
+            array(py, rows),
+            array(py, measured.values().to_vec()),
+            self.flat.clone().map(FlatField),
+        ))
     }
 
     /// The measurement of all frames together: `(n, rows, d, notes, flat field)`.
