@@ -2,6 +2,7 @@
 
 use crate::bench::{Bench, random_sample};
 use crate::oracle::setup;
+use nirspi_wire::fpga::Sums;
 use nirspi_wire::register::{Register, control, mode};
 use nirspi_wire::{DeviceMessage, Frame, Samples, open};
 use proptest::prelude::*;
@@ -43,7 +44,7 @@ proptest! {
             let mut bytes = bench.0.frame().expect("no frame").to_vec();
             bench.control(control::RELEASE);
             prop_assert_eq!(bytes.pop(), Some(0), "no delimiter");
-            let differences = expected.sums.iter().map(|sums| sums.difference());
+            let differences = expected.sums.iter().map(Sums::difference);
             let mut words = vec![0; 4 * expected.sums.len()];
             let header = expected.header;
             let frame = Frame {

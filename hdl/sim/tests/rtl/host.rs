@@ -230,8 +230,8 @@ impl Rig {
         }
     }
 
-    /// The first byte of a packet. Zeros come before it, for as long as [`LEAD_BYTES`] take a host of the fastest `sck` that
-    /// the host port allows.
+    /// The first byte of a packet. Zeros come before the packet, for as long as [`LEAD_BYTES`] take a host of the
+    /// fastest `sck` that the host port allows.
     fn first_of_a_packet(&mut self) -> u8 {
         let periods = if self.port.quad { 2 } else { 8 };
         let byte_ps = periods * u64::from(2 * self.port.half) * self.port.host_ps;
