@@ -30,6 +30,7 @@ module nirspi_engine
 
 
     nirspi_types::Settings settings;
+    nirspi_types::Stamp    stamp   ;
 
     // Time since reset, of the clock that is being done with.
     logic [64-1:0] clock_now   ;
@@ -351,6 +352,7 @@ module nirspi_engine
         .copy_raw    (begins_raw                           ),
         .in_range    (in_range                             ),
         .settings    (settings                             ),
+        .stamp       (stamp                                ),
         .status      (status                               ),
         .fault       (fault_seen                           ),
         .frames_made (frames_made                          ),
@@ -360,25 +362,51 @@ module nirspi_engine
         .value       (value                                )
     );
 
-    logic opens_frame;
-    logic opens_raw  ;
-    always_comb opens_frame = access && operation == HOST_FRAME[1:0];
-    always_comb opens_raw   = access && operation == HOST_RAW[1:0];
+    // The bytes that the host reads. Whatever is opened ends both modules' bytes.
+    logic          opens_frame ;
+    logic          opens_raw   ;
+    logic          opens_any   ;
+    logic [11-1:0] format_sum  ;
+    logic [8-1:0]  format_octet;
+    logic          format_valid;
+    logic [11-1:0] packet_sum  ;
+    logic [8-1:0]  packet_octet;
+    logic          packet_valid;
+    always_comb opens_frame  = access && operation == HOST_FRAME[1:0] && frame_ready;
+    always_comb opens_raw    = access && operation == HOST_RAW[1:0] && raw_ready;
+    always_comb opens_any    = access && (operation == HOST_FRAME[1:0] || operation == HOST_RAW[1:0]);
+    always_comb sum_at       = ((settings.packets) ? ( packet_sum ) : ( format_sum ));
+    always_comb octet        = ((packet_valid) ? ( packet_octet ) : ( format_octet ));
+    always_comb byte_valid   = packet_valid || format_valid;
 
     nirspi_formatter format (
-        .clk         (clk                       ),
-        .rst         (rst                       ),
-        .settings    (settings                  ),
-        .header      (header                    ),
-        .open_frame  (opens_frame && frame_ready),
-        .open_raw    (opens_raw && raw_ready    ),
-        .open_none   (opens_frame || opens_raw  ),
-        .sum_address (sum_at                    ),
-        .sum_word    (sum_word                  ),
-        .raw_address (raw_at                    ),
-        .raw_word    (raw_word                  ),
-        .octet       (octet                     ),
-        .valid       (byte_valid                ),
-        .taken       (byte_taken                )
+        .clk         (clk                             ),
+        .rst         (rst                             ),
+        .settings    (settings                        ),
+        .header      (header                          ),
+        .open_frame  (opens_frame && !settings.packets),
+        .open_raw    (opens_raw                       ),
+        .open_none   (opens_any                       ),
+        .sum_address (format_sum                      ),
+        .sum_word    (sum_word                        ),
+        .raw_address (raw_at                          ),
+        .raw_word    (raw_word                        ),
+        .octet       (format_octet                    ),
+        .valid       (format_valid                    ),
+        .taken       (byte_taken                      )
+    );
+    nirspi_packer pack (
+        .clk         (clk                            ),
+        .rst         (rst                            ),
+        .settings    (settings                       ),
+        .header      (header                         ),
+        .stamp       (stamp                          ),
+        .open        (opens_frame && settings.packets),
+        .close       (opens_any                      ),
+        .sum_address (packet_sum                     ),
+        .sum_word    (sum_word                       ),
+        .octet       (packet_octet                   ),
+        .valid       (packet_valid                   ),
+        .taken       (byte_taken                     )
     );
 endmodule

@@ -1,16 +1,15 @@
 /// Makes a delivered bank into a packet that the firmware forwards as it is: differences, postcard, CRC-32, COBS.
 ///
 /// Invariant: the bytes are those of `mcu/wire/src/ready.rs`, and nothing follows the delimiter. A block of COBS
-/// begins with its length, so bytes wait in a ring until their block is closed: the first byte comes up to 254 bytes
-/// after `open`, and then one in three clocks.
+/// begins with its length, so bytes wait in a ring until their block is closed. The first byte waits until 64 bytes
+/// are final: they take a host 640 clocks at least, and the next block is closed in 590. So a host that takes at most
+/// one byte in ten clocks finds no gap.
 module nirspi_packer (
     input  var logic                           clk        ,
     input  var logic                           rst        ,
     input  var nirspi_types::Settings          settings   ,
     input  var nirspi_types::Header            header     ,
-    input  var logic                  [16-1:0] run        , /// Number of the run since the firmware's start
-    input  var logic                  [64-1:0] clock_base , /// A clock before the run
-    input  var logic                  [64-1:0] time_base  , /// Device time of that clock in microseconds
+    input  var nirspi_types::Stamp             stamp      ,
     input  var logic                           open       , /// Begins with the first byte of the packet
     input  var logic                           close      , /// Ends whatever was going on
     output var logic                  [11-1:0] sum_address,
@@ -59,13 +58,13 @@ module nirspi_packer (
 
     always_ff @ (posedge clk) begin
         if (open) begin
-            quotient  <= header.shown_at - clock_base;
+            quotient  <= header.shown_at - stamp.clock_base;
             remainder <= 0;
         end else if (bits_left != 0) begin
             quotient  <= {quotient[62:0], fits};
             remainder <= ((fits) ? ( reduced[6:0] ) : ( partial[6:0] ));
         end
-        micros <= quotient + time_base;
+        micros <= quotient + stamp.time_base;
     end
 
     // The next sample is fetched while the one before goes out.
@@ -183,7 +182,7 @@ module nirspi_packer (
                             padded     <= 0;
                         end
                         1: begin
-                            word       <= 64'(run);
+                            word       <= 64'(stamp.run);
                             bytes_left <= 3;
                         end
                         2: begin
@@ -246,8 +245,19 @@ module nirspi_packer (
         end
     end
 
-    // What is final goes out.
-    logic seen;
+    // What is final goes out, once there is enough of it.
+    logic seen ;
+    logic flows;
+    always_ff @ (posedge clk) begin
+        if (rst) begin
+            flows <= 0;
+        end else if (open || close) begin
+            flows <= 0;
+        end else if (code_at[10:6] != 0 || part == Part_Idle) begin
+            flows <= 1;
+        end
+    end
+
     always_ff @ (posedge clk) begin
         if (rst) begin
             read_at <= 0;
@@ -263,7 +273,7 @@ module nirspi_packer (
                 seen    <= 0;
                 valid   <= 0;
             end
-        end else if (read_at != code_at) begin
+        end else if (flows && read_at != code_at) begin
             seen  <= 1;
             valid <= seen;
         end

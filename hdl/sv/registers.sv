@@ -15,6 +15,7 @@ module nirspi_registers
     input  var logic                           copy_raw   , /// It is a raw burst
     output var logic                           in_range   , /// Every setting is
     output var nirspi_types::Settings          settings   ,
+    output var nirspi_types::Stamp             stamp      , /// Copied with the settings
     input  var logic                  [32-1:0] status     ,
     input  var logic                  [3-1:0]  fault      ,
     input  var logic                  [32-1:0] frames_made,
@@ -37,7 +38,11 @@ module nirspi_registers
     logic [32-1:0] watchdog  ;
     logic [32-1:0] duty_limit;
     logic [32-1:0] trip      ;
+    logic [32-1:0] run       ;
+    logic [32-1:0] time_low  ;
+    logic [32-1:0] time_high ;
     logic [32-1:0] writes    ;
+    logic [64-1:0] clock_read; // as of the last read of its low word
 
     always_ff @ (posedge clk) begin
         if (rst) begin
@@ -53,6 +58,9 @@ module nirspi_registers
             watchdog   <= RESET_WATCHDOG;
             duty_limit <= RESET_DUTY_LIMIT;
             trip       <= RESET_OVER_RANGE_TRIP;
+            run        <= RESET_RUN;
+            time_low   <= RESET_TIME_LOW;
+            time_high  <= RESET_TIME_HIGH;
         end else if (write) begin
             case (32'(address)) inside
                 ADDRESS_SCRATCH        : scratch    <= data;
@@ -67,6 +75,9 @@ module nirspi_registers
                 ADDRESS_WATCHDOG       : watchdog   <= data;
                 ADDRESS_DUTY_LIMIT     : duty_limit <= data;
                 ADDRESS_OVER_RANGE_TRIP: trip       <= data;
+                ADDRESS_RUN            : run        <= data;
+                ADDRESS_TIME_LOW       : time_low   <= data;
+                ADDRESS_TIME_HIGH      : time_high  <= data;
                 default                : begin
                 end
             endcase
@@ -82,15 +93,14 @@ module nirspi_registers
     end
 
     // The verdict stands a few clocks after a write, long before the next access can ask for it.
-    localparam logic [32-1:0] DEFINED = MODE_DIFFERENTIAL | MODE_ORDER_SEQUENCY | MODE_ORDER_TABLE | MODE_TEST_SOURCE;
-    logic [10-1:0] good   ;
+    logic [10-1:0] good;
 
     always_ff @ (posedge clk) begin
         if (rst) begin
             good     <= 0;
             in_range <= 0;
         end else begin
-            good[0]  <= (mode & ~DEFINED) == 0;
+            good[0]  <= (mode & ~MODE_DEFINED) == 0;
             good[1]  <= patterns != 0 && patterns <= PATTERNS;
             good[2]  <= dwell != 0 && dwell[31:16] == 0;
             good[3]  <= blank < dwell;
@@ -113,6 +123,7 @@ module nirspi_registers
         next.order_sequency   <= (mode & MODE_ORDER_SEQUENCY) != 0;
         next.differential     <= (mode & MODE_DIFFERENTIAL) != 0;
         next.test_source      <= (mode & MODE_TEST_SOURCE) != 0;
+        next.packets          <= (mode & MODE_PACKETS) != 0;
         next.patterns         <= patterns[10:0];
         next.patterns_less_1  <= patterns[9:0] - 1;
         next.single_pattern   <= patterns == 1;
@@ -143,9 +154,16 @@ module nirspi_registers
             settings.endless <= next.endless || copy_raw;
         end
     end
+    always_ff @ (posedge clk) begin
+        if (copy) begin
+            stamp.run        <= run[15:0];
+            stamp.clock_base <= clock_read;
+            stamp.time_base  <= {time_high, time_low};
+        end
+    end
 
     // Which word is asked for, worked out while the access waits.
-    logic [14-1:0] asked      ;
+    logic [17-1:0] asked      ;
     logic [5-1:0]  asked_live ;
     logic          asked_table;
 
@@ -164,6 +182,9 @@ module nirspi_registers
         asked[11]     <= 32'(address) == ADDRESS_OVER_RANGE_TRIP;
         asked[12]     <= 32'(address) == ADDRESS_CLOCK_HIGH;
         asked[13]     <= 32'(address) == ADDRESS_WRITES;
+        asked[14]     <= 32'(address) == ADDRESS_RUN;
+        asked[15]     <= 32'(address) == ADDRESS_TIME_LOW;
+        asked[16]     <= 32'(address) == ADDRESS_TIME_HIGH;
         asked_live[0] <= 32'(address) == ADDRESS_STATUS;
         asked_live[1] <= 32'(address) == ADDRESS_FAULT;
         asked_live[2] <= 32'(address) == ADDRESS_FRAMES_MADE;
@@ -173,11 +194,11 @@ module nirspi_registers
     end
 
     // What changes by itself is held as of the clock of the read; the rest stands.
-    logic [32-1:0] clock_high;
-    logic [32-1:0] live      ;
-    logic [32-1:0] stored_0  ;
-    logic [32-1:0] stored_1  ;
-    logic [32-1:0] entry     ;
+    logic [32-1:0] live    ;
+    logic [32-1:0] stored_0;
+    logic [32-1:0] stored_1;
+    logic [32-1:0] stored_2;
+    logic [32-1:0] entry   ;
 
     always_ff @ (posedge clk) begin
         if (read) begin
@@ -189,16 +210,17 @@ module nirspi_registers
             | (dwell & {32{asked[3]}}) | (blank & {32{asked[4]}}) | (latency & {32{asked[5]}});
         stored_1 <= (sweeps & {32{asked[6]}}) | (frames & {32{asked[7]}}) | (raw_length & {32{asked[8]}})
             | (watchdog & {32{asked[9]}}) | (duty_limit & {32{asked[10]}}) | (trip & {32{asked[11]}})
-            | (clock_high & {32{asked[12]}}) | (writes & {32{asked[13]}});
+            | (clock_read[63:32] & {32{asked[12]}}) | (writes & {32{asked[13]}});
+        stored_2 <= (run & {32{asked[14]}}) | (time_low & {32{asked[15]}}) | (time_high & {32{asked[16]}});
         entry <= 32'(table_entry) & {32{asked_table}};
-        value <= live | stored_0 | stored_1 | entry;
+        value <= live | stored_0 | stored_1 | stored_2 | entry;
     end
 
     always_ff @ (posedge clk) begin
         if (rst) begin
-            clock_high <= 0;
+            clock_read <= 0;
         end else if (read && 32'(address) == ADDRESS_CLOCK_LOW) begin
-            clock_high <= clock_now[63:32];
+            clock_read <= clock_now;
         end
     end
 endmodule

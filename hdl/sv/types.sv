@@ -7,6 +7,7 @@ package nirspi_types;
         logic          order_sequency  ;
         logic          differential    ;
         logic          test_source     ;
+        logic          packets         ; /// Frames are sent as packets
         logic [11-1:0] patterns        ;
         logic [10-1:0] patterns_less_1 ;
         logic          single_pattern  ;
@@ -27,6 +28,13 @@ package nirspi_types;
         logic          trips_over_range;
         logic [32-1:0] over_range_trip ;
     } Settings;
+
+    /// What a packet carries beside its frame, as of the start of the run.
+    typedef struct packed {
+        logic [16-1:0] run       ; /// Number of the run since the firmware's start
+        logic [64-1:0] clock_base; /// A clock before the run
+        logic [64-1:0] time_base ; /// Device time of that clock in microseconds
+    } Stamp;
 
     /// Where a clock lies in a run. Outside, `index`, `complement` and `sweep_first` mean nothing; the rest is 0.
     typedef struct packed {

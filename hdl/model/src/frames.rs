@@ -6,6 +6,7 @@
 //! (`golden::runs::a_slow_host_loses_whole_frames_and_every_loss_is_counted_once`).
 
 use crate::format;
+use crate::packet::{Stamp, packet};
 use crate::settings::Settings;
 use nirspi_wire::{
     FrameFlags, PATTERNS,
@@ -35,6 +36,8 @@ pub(crate) struct Summary {
 #[derive(Debug, Clone)]
 struct Delivered {
     header: Header,
+    /// What the packet carries beside the frame, if the frame is sent as one.
+    stamp: Option<Stamp>,
     /// The frame's bytes, serialised at the first request.
     bytes: Option<Vec<u8>>,
 }
@@ -52,6 +55,8 @@ pub(crate) struct Frames {
     lost: u32,
     /// A frame was lost after the last delivered frame.
     after_loss: bool,
+    /// As of the start of the run.
+    stamp: Stamp,
 }
 
 impl Frames {
@@ -65,11 +70,13 @@ impl Frames {
             made: 0,
             lost: 0,
             after_loss: false,
+            stamp: Stamp::default(),
         }
     }
 
     /// Begins a run and forgets all earlier runs.
-    pub(crate) fn restart(&mut self) {
+    pub(crate) fn restart(&mut self, stamp: Stamp) {
+        self.stamp = stamp;
         self.overflow = false;
         self.delivered = None;
         self.made = 0;
@@ -137,15 +144,19 @@ impl Frames {
             lost: self.lost,
             clock: summary.shown_at,
         };
-        self.delivered = Some(Delivered { header, bytes: None });
+        let stamp = settings.packets.then_some(self.stamp);
+        self.delivered = Some(Delivered { header, stamp, bytes: None });
         self.filling = 1 - self.filling;
     }
 
     /// The host's frame as it crosses the host port.
     pub(crate) fn bytes(&mut self) -> Option<&[u8]> {
         let bank = &self.banks[1 - self.filling];
-        let Delivered { header, bytes } = self.delivered.as_mut()?;
-        Some(bytes.get_or_insert_with(|| format::frame(header, bank)))
+        let Delivered { header, stamp, bytes } = self.delivered.as_mut()?;
+        Some(bytes.get_or_insert_with(|| match stamp {
+            Some(stamp) => packet(header, bank, stamp),
+            None => format::frame(header, bank),
+        }))
     }
 }
 

@@ -8,6 +8,7 @@
 use crate::frames::Frames;
 use crate::leds::{Leds, Lines};
 use crate::order::OrderTable;
+use crate::packet::Stamp;
 use crate::raw::RawCapture;
 use crate::registers::Registers;
 use crate::safety::{Clock, Safety};
@@ -43,8 +44,8 @@ pub struct Gateware {
     adc_hz: Option<u32>,
     /// Clocks since reset.
     clock: u64,
-    /// High word of the clock at the last read of the low word.
-    clock_high: u32,
+    /// The clock at the last read of its low word.
+    clock_read: u64,
     registers: Registers,
     /// Writes taken since reset.
     writes: u32,
@@ -63,7 +64,7 @@ impl Default for Gateware {
             design: Design::Camera,
             adc_hz: Some(ADC_HZ),
             clock: 0,
-            clock_high: 0,
+            clock_read: 0,
             registers: Registers::new(),
             writes: 0,
             table: OrderTable::new(),
@@ -136,10 +137,10 @@ impl Gateware {
             Register::FramesMade => self.frames.made(),
             Register::FramesLost => self.frames.lost(),
             Register::ClockLow => {
-                self.clock_high = (self.clock >> 32) as u32;
+                self.clock_read = self.clock;
                 self.clock as u32
             }
-            Register::ClockHigh => self.clock_high,
+            Register::ClockHigh => (self.clock_read >> 32) as u32,
             constant_or_stored => self.registers.get(constant_or_stored),
         })
     }
@@ -219,8 +220,8 @@ impl Gateware {
         self.frames.ready()
     }
 
-    /// The delivered frame in the layout of [`nirspi_wire::fpga`]. The frame stays until `RELEASE`
-    /// or the next start.
+    /// The delivered frame in the layout of [`nirspi_wire::fpga`], or with `PACKETS` as the packet of
+    /// [`nirspi_wire::ready`]. The frame stays until `RELEASE` or the next start.
     pub fn frame(&mut self) -> Option<&[u8]> {
         self.safety.feed();
         self.frames.bytes()
@@ -285,6 +286,17 @@ impl Gateware {
         }
     }
 
+    /// What packets of a run that starts now carry beside their frames.
+    fn stamp(&self) -> Stamp {
+        let word = |register| self.registers.get(register);
+        let (low, high) = (word(Register::TimeLow), word(Register::TimeHigh));
+        Stamp {
+            run: word(Register::Run) as u16,
+            clock: self.clock_read,
+            time_us: u64::from(high) << 32 | u64::from(low),
+        }
+    }
+
     fn start(&mut self, capture: impl FnOnce(&mut Settings, u64) -> Capture) {
         if self.running() || !self.safety.permits() {
             return;
@@ -296,7 +308,7 @@ impl Gateware {
         let capture = capture(&mut settings, self.clock);
         self.config_error = false;
         self.write_refused = false;
-        self.frames.restart();
+        self.frames.restart(self.stamp());
         self.raw = None;
         self.run = Some(Run {
             source: Source::new(settings.test_source),

@@ -14,7 +14,7 @@ use nirspi_wire::{ADC_HZ, FrameFlags};
 const CLOCKS_PER_MICRO: u64 = ADC_HZ as u64 / 1_000_000;
 
 /// What the firmware tells the FPGA before a run of packets.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Stamp {
     /// Number of the run since power-up.
     pub run: u16,

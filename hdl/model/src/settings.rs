@@ -19,6 +19,8 @@ pub(crate) struct Settings {
     pub(crate) order: Order,
     pub(crate) differential: bool,
     pub(crate) test_source: bool,
+    /// Frames are sent as packets.
+    pub(crate) packets: bool,
     pub(crate) patterns: u16,
     /// In clocks.
     pub(crate) dwell: u16,
@@ -42,9 +44,7 @@ impl Settings {
     /// Copies the registers; `None` if one is out of range.
     pub(crate) fn copy(registers: &Registers) -> Option<Self> {
         let bits = registers.get(Register::Mode);
-        let defined =
-            mode::DIFFERENTIAL | mode::ORDER_SEQUENCY | mode::ORDER_TABLE | mode::TEST_SOURCE;
-        if bits & !defined != 0 {
+        if bits & !mode::DEFINED != 0 {
             return None;
         }
         let within = |register, range: RangeInclusive<u32>| {
@@ -61,6 +61,7 @@ impl Settings {
             },
             differential: bits & mode::DIFFERENTIAL != 0,
             test_source: bits & mode::TEST_SOURCE != 0,
+            packets: bits & mode::PACKETS != 0,
             patterns: within(Register::Patterns, 1..=PATTERNS.into())? as u16,
             dwell: dwell as u16,
             blank: within(Register::Blank, 0..=dwell - 1)? as u16,

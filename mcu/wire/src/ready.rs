@@ -20,6 +20,10 @@
 //! | 4 | CRC-32 of all before | little-endian |
 //!
 //! Then COBS and the delimiter, as in every packet.
+//!
+//! A read of the frame ([`READ_FRAME`](crate::host_port::READ_FRAME)) gives zeros until the packet begins, at most
+//! [`LEAD_BYTES`] of them, then the packet without a gap, then zeros. On the host's link zeros are empty packets, which
+//! every receiver skips.
 
 use crate::{CLOCKS_PER_PATTERN, FrameFlags};
 
@@ -33,6 +37,17 @@ pub const MAX_SUMMED_SAMPLES: u32 = 1 << 17;
 // One sweep at the fastest rate is far from it, and the largest sum is in range.
 const _: () = assert!(MAX_SUMMED_SAMPLES > CLOCKS_PER_PATTERN as u32);
 const _: () = assert!(MAX_SUMMED_SAMPLES as u64 * crate::ADC_MAX as u64 <= i32::MAX as u64);
+
+/// Most zeros before a packet, at the fastest `sck` that the host port allows: the FPGA begins when it has so many bytes
+/// of the packet that it never has to wait, which takes it 5.3 us at most.
+pub const LEAD_BYTES: usize = 64;
+
+/// Bytes to read of a frame of so many patterns, with which the whole packet has come.
+#[must_use]
+pub const fn read_bytes(patterns: u16) -> usize {
+    let payload = HEADER_BYTES + 4 * patterns as usize;
+    LEAD_BYTES + payload + crate::packet::overhead(payload)
+}
 
 /// The fields before the samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

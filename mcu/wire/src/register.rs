@@ -13,6 +13,9 @@
 //!   table is not copied: writes to it while running are refused and set [`status::WRITE_REFUSED`].
 //! * A frame that is complete while the one before has not been released is lost: counted in
 //!   [`Register::FramesLost`], and the next frame delivered carries `AFTER_LOSS`.
+//! * With [`mode::PACKETS`] a frame is read as a packet of the host's link in the layout of [`ready`](crate::ready).
+//!   Its device time is `Time + (clock of its first slot - clock of the last read of ClockLow) / 125`, all as of
+//!   the start.
 //! * The host port has a clock of its own. [`Register::Identity`], [`Register::Version`],
 //!   [`Register::Clocks`] and [`Register::Design`] are answered with or without the ADC's clock. Everything
 //!   else needs the ADC's clock: without it a read gives [`NO_CLOCK`], a write does nothing, and frames
@@ -73,7 +76,7 @@ registers! {
     /// Always [`IDENTITY`].
     Identity = 0x00, ReadOnly, IDENTITY;
     /// Gateware version, `major << 16 | minor << 8 | patch`.
-    Version = 0x01, ReadOnly, 0x0000_0300;
+    Version = 0x01, ReadOnly, 0x0000_0301;
     /// Holds what was written, for bus tests.
     Scratch = 0x02, ReadWrite, 0;
     /// See [`control`].
@@ -124,6 +127,13 @@ registers! {
     /// Writes taken since reset, to registers and to the order table, modulo 2^32. A write whose check is
     /// wrong is not taken.
     Writes = 0x17, ReadOnly, 0;
+    /// Number of the run that packets carry, bits 0 to 15. With [`mode::PACKETS`] alone, like the next two.
+    Run = 0x18, ReadWrite, 0;
+    /// Device time in microseconds of the clock that the last read of `ClockLow` before the start gave, low
+    /// word.
+    TimeLow = 0x19, ReadWrite, 0;
+    /// High word of that time.
+    TimeHigh = 0x1A, ReadWrite, 0;
 }
 
 /// `"NSPI"` in ASCII.
@@ -139,6 +149,12 @@ pub const DAMAGED: u32 = 0xBAD0_C4EC;
 #[must_use]
 pub const fn has_this_map(version: u32) -> bool {
     version >> 8 == Register::Version.reset() >> 8
+}
+
+/// Whether gateware with this [`Register::Version`] knows [`mode::PACKETS`]: 0.3.1 and later of the same map.
+#[must_use]
+pub const fn sends_packets(version: u32) -> bool {
+    has_this_map(version) && version & 0xFF >= 1
 }
 
 /// Address of the order table's first entry; entry `i` is at `ORDER_TABLE + i`, read and write, 10
@@ -272,6 +288,10 @@ pub mod mode {
     pub const ORDER_TABLE: u32 = 1 << 2;
     /// Samples from the test generator instead of the ADC.
     pub const TEST_SOURCE: u32 = 1 << 3;
+    /// Frames are sent as packets of the host's link ([`ready`](crate::ready)). Since gateware 0.3.1.
+    pub const PACKETS: u32 = 1 << 4;
+    /// Every bit that has a meaning; a start with any other is refused.
+    pub const DEFINED: u32 = DIFFERENTIAL | ORDER_SEQUENCY | ORDER_TABLE | TEST_SOURCE | PACKETS;
 }
 
 /// Reason latched in [`Register::Fault`].

@@ -3,7 +3,7 @@
 //!
 //! If a test in this file fails, do not change the test: you have changed what a gateware of version 0.1
 //! means. A new register at a free address is appended here, with a higher minor `Register::Version`: 0.2
-//! appended `Clocks` and `Design`, 0.3 `Writes` and the check of every access. Anything else needs a new
+//! appended `Clocks` and `Design`, 0.3 `Writes` and the check of every access, 0.3.1 packets. Anything else needs a new
 //! `Register::Identity` or major `Register::Version`, and a new file beside this one.
 
 use nirspi_wire::{
@@ -16,7 +16,7 @@ use nirspi_wire::{
 /// Address, name, access, value after reset.
 const REGISTERS: &str = "\
 0x0000 Identity      ReadOnly  0x4e535049
-0x0001 Version       ReadOnly  0x00000300
+0x0001 Version       ReadOnly  0x00000301
 0x0002 Scratch       ReadWrite 0x00000000
 0x0003 Control       Command   0x00000000
 0x0004 Status        ReadOnly  0x00000000
@@ -39,6 +39,9 @@ const REGISTERS: &str = "\
 0x0015 ClockLow      ReadOnly  0x00000000
 0x0016 ClockHigh     ReadOnly  0x00000000
 0x0017 Writes        ReadOnly  0x00000000
+0x0018 Run           ReadWrite 0x00000000
+0x0019 TimeLow       ReadWrite 0x00000000
+0x001a TimeHigh      ReadWrite 0x00000000
 ";
 
 #[test]
@@ -70,8 +73,14 @@ fn bits_codes_and_limits_are_these() {
         status::WRITE_REFUSED,
     ];
     assert_eq!(status, [1, 2, 4, 8, 16, 32, 64, 128]);
-    let mode = [mode::DIFFERENTIAL, mode::ORDER_SEQUENCY, mode::ORDER_TABLE, mode::TEST_SOURCE];
-    assert_eq!(mode, [1, 2, 4, 8]);
+    let mode = [
+        mode::DIFFERENTIAL,
+        mode::ORDER_SEQUENCY,
+        mode::ORDER_TABLE,
+        mode::TEST_SOURCE,
+        mode::PACKETS,
+    ];
+    assert_eq!((mode, mode::DEFINED), ([1, 2, 4, 8, 16], 31));
     let flags = [
         FrameFlags::OVER_RANGE,
         FrameFlags::OVERFLOW,
@@ -123,6 +132,9 @@ fn bits_codes_and_limits_are_these() {
     let fits = [0x0000_0200, 0x0000_0300, 0x0000_0303, 0x0000_0400, 0x0001_0300]
         .map(register::has_this_map);
     assert_eq!(fits, [false, true, true, false, false]);
+    let packets = [0x0000_0201, 0x0000_0300, 0x0000_0301, 0x0000_0310, 0x0000_0401]
+        .map(register::sends_packets);
+    assert_eq!(packets, [false, false, true, true, false]);
     let designs: Vec<_> = (0..=3).map(Design::from_register).collect();
     assert_eq!(designs, [None, Some(Design::Camera), Some(Design::BringUp), None]);
 }

@@ -7,6 +7,7 @@
 mod bench;
 mod measurement;
 mod oracle;
+mod packets;
 mod raw;
 mod registers;
 mod runs;

@@ -264,7 +264,7 @@ fn a_run_without_end_goes_on_until_stopped() {
 fn every_setting_is_checked_at_a_start_and_only_there() {
     use Register as R;
     let cases: &[(R, &[u32], &[u32])] = &[
-        (R::Mode, &[0, 0b1111], &[1 << 4, 1 << 31]),
+        (R::Mode, &[0, 0b1_1111], &[1 << 5, 1 << 31]),
         (R::Patterns, &[1, 1024], &[0, 1025, 1 << 16 | 1]),
         (R::Dwell, &[3, 65_535], &[0, 2, 65_536, 1 << 16 | 5]),
         (R::Blank, &[0, 4], &[5, 1 << 16]),
@@ -275,6 +275,9 @@ fn every_setting_is_checked_at_a_start_and_only_there() {
         (R::Watchdog, &[1, 125_000_000], &[0, 125_000_001]),
         (R::DutyLimit, &[0, 1_310_720], &[1_310_721]),
         (R::OverRangeTrip, &[0, u32::MAX], &[]),
+        (R::Run, &[0, u32::MAX], &[]),
+        (R::TimeLow, &[0, u32::MAX], &[]),
+        (R::TimeHigh, &[0, u32::MAX], &[]),
     ];
     for start in [control::START, control::START_RAW] {
         for &(register, good, bad) in cases {

@@ -320,7 +320,7 @@ fn deed() -> impl Strategy<Value = Deed> {
     prop_oneof![
         4 => (0u32..32).prop_map(move |bits| Deed::Write(control, bits)),
         2 => lively.prop_map(|(register, value)| Deed::Write(register.address(), value)),
-        1 => (0u16..0x18, any::<u32>()).prop_map(|(address, value)| Deed::Write(address, value)),
+        1 => (0u16..0x1B, any::<u32>()).prop_map(|(address, value)| Deed::Write(address, value)),
         1 => any::<(u16, u32)>().prop_map(|(address, value)| Deed::Write(address, value)),
         6 => (any::<u8>(), prop::bool::weighted(0.2)).prop_map(|(n, over)| Deed::Ticks(n, over)),
         1 => prop::bool::weighted(0.8).prop_map(Deed::Interlock),

@@ -58,15 +58,33 @@ fn losses() -> Suite {
     Suite { variant: Variant::default(), scenario: scenario::clock_lost, rigs: 1, scenarios: 6 }
 }
 
-/// The first difference that a scenario shows. One FPGA's scenarios show nearly every difference.
-pub fn difference(project: &Project) -> Option<String> {
-    let suites = [
+/// Frames that are sent as packets.
+fn packets(rigs: u64) -> Suite {
+    Suite { scenario: scenario::packets, ..scenarios(rigs) }
+}
+
+/// Packets of long blocks.
+fn long_blocks() -> Suite {
+    Suite { scenario: scenario::long_blocks, scenarios: 8, ..scenarios(1) }
+}
+
+/// The first difference that a scenario shows. One FPGA's scenarios of frames and of packets show nearly every
+/// difference.
+pub fn difference(project: &Project, file: &str) -> Option<String> {
+    let mut suites = [
         (scenarios(1), 0),
+        (packets(1), 0),
+        (long_blocks(), 0),
         (losses(), 0),
         (long_sums(), 0),
         (windows(), 0),
         (scenarios(3), SCENARIOS),
+        (packets(3), SCENARIOS),
     ];
+    if file == "packer" {
+        // A run of frames shows nothing of it.
+        suites[..3].rotate_left(1);
+    }
     suites.iter().find_map(|(suite, first)| suite.run(project, *first).err())
 }
 
@@ -74,12 +92,15 @@ fn count(tallies: &[Tally], of: impl Fn(&Tally) -> u64) -> u64 {
     tallies.iter().map(of).sum()
 }
 
-/// `NIRSPI_RTL_SCENARIOS` sets the number of scenarios.
+/// Simulated FPGAs of [`SCENARIOS`] each. `NIRSPI_RTL_SCENARIOS` sets the number of scenarios.
+fn rigs() -> u64 {
+    let asked = std::env::var("NIRSPI_RTL_SCENARIOS").ok().and_then(|n| n.parse().ok());
+    asked.unwrap_or(4 * SCENARIOS).div_ceil(SCENARIOS)
+}
+
 #[test]
 fn random_scenarios_agree_bit_for_bit() {
-    let asked = std::env::var("NIRSPI_RTL_SCENARIOS").ok().and_then(|n| n.parse().ok());
-    let asked: u64 = asked.unwrap_or(4 * SCENARIOS);
-    let tallies = scenarios(asked.div_ceil(SCENARIOS)).run(&Project::read(), 0);
+    let tallies = scenarios(rigs()).run(&Project::read(), 0);
     let tallies = tallies.unwrap_or_else(|difference| panic!("{difference}"));
     println!("{tallies:#?}");
     for (what, seen) in [
@@ -98,6 +119,29 @@ fn random_scenarios_agree_bit_for_bit() {
     ] {
         assert!(seen >= 5, "only {seen} {what}");
     }
+}
+
+/// Its name begins as that of `random_scenarios_agree_bit_for_bit`: `hdl/verilator/run.sh` repeats both.
+#[test]
+fn random_scenarios_of_packets_agree_bit_for_bit() {
+    let tallies = packets(rigs()).run(&Project::read(), 0);
+    let tallies = tallies.unwrap_or_else(|difference| panic!("{difference}"));
+    println!("{tallies:#?}");
+    for (what, seen) in [
+        ("packets", count(&tallies, |t| t.packets)),
+        ("packets after a loss", count(&tallies, |t| t.packets_after_loss)),
+        ("frames that are none", count(&tallies, |t| t.frames)),
+        ("raw bursts", count(&tallies, |t| t.bursts)),
+    ] {
+        assert!(seen >= 5, "only {seen} {what}");
+    }
+}
+
+#[test]
+fn packets_of_long_blocks_have_no_gap() {
+    let tallies = long_blocks().run(&Project::read(), 0).unwrap_or_else(|d| panic!("{d}"));
+    assert!(count(&tallies, |t| t.packets) >= 16);
+    println!("{tallies:#?}");
 }
 
 #[test]
@@ -127,13 +171,18 @@ fn a_whole_differential_sweep_agrees() {
     let mut rig = Rig::new(&Project::read(), 1);
     rig.interlock(true);
     rig.wait_adc(100);
-    rig.set(Register::Mode, mode::DIFFERENTIAL | mode::ORDER_SEQUENCY);
     rig.set(Register::Frames, 1);
-    let started = std::time::Instant::now();
-    rig.set(Register::Control, control::START);
-    rig.wait_adc(2 * 1024 * 5 + 100);
-    rig.stream(false, usize::MAX);
-    println!("simulated and read out in {:?}", started.elapsed());
-    assert_eq!(rig.mismatch, None);
-    assert_eq!((rig.seen_so_far.frames, rig.seen_so_far.lit_clocks), (1, 2 * 1024 * 5));
+    for (bits, packets) in [(0, 0), (mode::PACKETS, 1)] {
+        rig.set(Register::Mode, mode::DIFFERENTIAL | mode::ORDER_SEQUENCY | bits);
+        rig.seen_so_far = Tally::default();
+        let started = std::time::Instant::now();
+        rig.set(Register::Control, control::START);
+        rig.wait_adc(2 * 1024 * 5 + 100);
+        rig.stream(false, usize::MAX);
+        println!("simulated and read out in {:?}", started.elapsed());
+        assert_eq!(rig.mismatch, None);
+        let seen = rig.seen_so_far;
+        let expected = (1 - packets, packets, 2 * 1024 * 5);
+        assert_eq!((seen.frames, seen.packets, seen.lit_clocks), expected);
+    }
 }

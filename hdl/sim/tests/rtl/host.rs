@@ -7,8 +7,12 @@ use crate::rig::{Access, Answer, Rig};
 use crate::scenario::Dice;
 use nirspi_wire::{
     host_port,
+    ready::LEAD_BYTES,
     register::{Register, clocks},
 };
+
+/// Time that [`LEAD_BYTES`] take at 14.6 MHz by four lines.
+const LEAD_PS: u64 = LEAD_BYTES as u64 * 2 * 68_300;
 
 /// A line that the host drives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -188,7 +192,7 @@ impl Rig {
         let measured = if address == Register::Clocks.address() { clocks::FREQUENCY } else { 0 };
         let answer = self.answer.take().map(|answer| match answer {
             Answer::Value(word) => Answer::Value(word & !measured),
-            bytes => bytes,
+            other => other,
         });
         let found = Some(Answer::Value(value & !measured));
         self.expect(&format!("register {address:#x}"), &found, &answer);
@@ -206,17 +210,43 @@ impl Rig {
         self.begin(opcode, 0);
         self.dummy();
         self.settled();
-        let Some(Answer::Bytes(mut expected)) = self.answer.take() else {
-            return self.expect("a stream begun", &0, &1);
+        let mut bytes = Vec::new();
+        let mut expected = match self.answer.take() {
+            Some(Answer::Bytes(expected)) => expected,
+            Some(Answer::Packet(expected)) => {
+                bytes.push(self.first_of_a_packet());
+                expected
+            }
+            _ => return self.expect("a stream begun", &0, &1),
         };
         expected.extend([0; 3]);
         expected.truncate(at_most);
-        let bytes: Vec<u8> = expected.iter().map(|_| self.receive(8) as u8).collect();
+        bytes.extend((bytes.len()..expected.len()).map(|_| self.receive(8) as u8));
         self.end();
         if let Some(at) = (0..bytes.len()).find(|&at| bytes[at] != expected[at]) {
             let what =
                 format!("byte {at} of {} ({})", bytes.len(), if raw { "raw" } else { "frame" });
             self.expect(&what, &bytes[at], &expected[at]);
         }
+    }
+
+    /// The first byte of a packet. Zeros come before the packet, for as long as [`LEAD_BYTES`] take a host of the
+    /// fastest `sck` that the host port allows.
+    fn first_of_a_packet(&mut self) -> u8 {
+        let periods = if self.port.quad { 2 } else { 8 };
+        let byte_ps = periods * u64::from(2 * self.port.half) * self.port.host_ps;
+        for zeros in 0.. {
+            let byte = self.receive(8) as u8;
+            if byte != 0 {
+                let lead = &mut self.seen_so_far.lead;
+                *lead = std::cmp::max_by_key(*lead, (zeros, byte_ps), |(zeros, ps)| zeros * ps);
+                return byte;
+            }
+            if zeros * byte_ps > LEAD_PS {
+                self.expect("a packet begun", &0, &1);
+                return byte;
+            }
+        }
+        0
     }
 }

@@ -13,8 +13,9 @@ use crate::pins::Pins;
 use crate::project::Project;
 use nirspi_hdl_model::{AdcSample, Gateware, Lines};
 use nirspi_wire::{
-    FrameFlags, crc32,
+    DeviceMessage, FrameFlags, crc32,
     fpga::{FpgaFrame, Sums},
+    open,
     register::{Design, Register, clocks, control},
 };
 use std::collections::VecDeque;
@@ -53,6 +54,8 @@ pub(crate) enum Access {
 pub(crate) enum Answer {
     Value(u32),
     Bytes(Vec<u8>),
+    /// Zeros may come before it.
+    Packet(Vec<u8>),
 }
 
 /// How the host drives its port.
@@ -75,6 +78,9 @@ pub struct Rig {
     seed: u64,
     /// Number of over-range samples among 256.
     pub over_range_rate: u8,
+    /// Period in clocks with which codes are in the lower and in the upper half of their range, half a period each; 0: in
+    /// both. Where the period is that of a pattern and its complement, all differences have one sign.
+    pub tilt: u64,
     /// Codes fade to an eighth and come back. This is the logarithm of a quarter of that period, in
     /// clocks.
     pub fade: u32,
@@ -134,6 +140,10 @@ pub struct Tally {
     pub frames_overflow: u64,
     pub frames_after_loss: u64,
     pub bursts: u64,
+    pub packets: u64,
+    pub packets_after_loss: u64,
+    /// Zeros before the packet of which most came, with the time of a byte in ps.
+    pub lead: (u64, u64),
     pub starts: u64,
     pub starts_refused: u64,
     pub stops: u64,
@@ -167,6 +177,7 @@ impl Rig {
             port: Port { host_ps: 10_000, half: 3, quad: true, glitches: false },
             seed,
             over_range_rate: 0,
+            tilt: 0,
             fade: 63,
             clock: 0,
             next_adc_ps: 0,
@@ -209,9 +220,15 @@ impl Rig {
         rig
     }
 
-    /// A frame of the model in the form that this variant delivers.
-    fn frame_of_variant(&mut self, bytes: &[u8]) -> Vec<u8> {
-        let Ok(frame) = FpgaFrame::parse(bytes) else { return Vec::new() };
+    /// A frame of the model in the form that this variant delivers, or a packet as it is.
+    fn frame_of_variant(&mut self, bytes: Vec<u8>) -> Answer {
+        if bytes.is_empty() {
+            return Answer::Bytes(bytes);
+        }
+        let Ok(frame) = FpgaFrame::parse(&bytes) else {
+            self.count_packet(&bytes);
+            return Answer::Packet(bytes);
+        };
         let mut header = frame.header;
         header.clock = header.clock.wrapping_add(self.variant.clock_ahead);
         let modulus = 1u64 << self.variant.sum_bits;
@@ -229,7 +246,16 @@ impl Rig {
             bytes.extend(Sums { positive, negative }.to_bytes());
         }
         bytes.extend(crc32(&bytes).to_le_bytes());
-        bytes
+        Answer::Bytes(bytes)
+    }
+
+    fn count_packet(&mut self, bytes: &[u8]) {
+        let mut packet = bytes[..bytes.len() - 1].to_vec();
+        self.seen_so_far.packets += 1;
+        let opened: DeviceMessage<'_> = open(&mut packet).expect("the model's packet");
+        let DeviceMessage::Frame(frame) = opened else { panic!("{opened:?}") };
+        let after_loss = frame.flags.contains(FrameFlags::AFTER_LOSS);
+        self.seen_so_far.packets_after_loss += u64::from(after_loss);
     }
 
     /// A register read of the model, with the clock of this variant.
@@ -327,6 +353,9 @@ impl Rig {
         // Samples of a clock's light are at the pins together with the clock's lines.
         let mut sample = sample(self.seed, self.over_range_rate, now);
         sample.code >>= (now >> self.fade) & 3;
+        if self.tilt > 0 {
+            sample.code = sample.code >> 1 | u16::from(now % self.tilt < self.tilt / 2) << 13;
+        }
         self.pins.sample(sample);
         let mut leds = self.pins.leds();
         // Without `enable` the other lines light nothing, and may follow a clock later.
@@ -430,7 +459,7 @@ impl Rig {
             Access::Read(address) => Answer::Value(self.read_of_variant(address)),
             Access::Frame => {
                 let bytes = self.model.frame().unwrap_or_default().to_vec();
-                Answer::Bytes(self.frame_of_variant(&bytes))
+                self.frame_of_variant(bytes)
             }
             Access::Raw => {
                 let bytes = self.model.raw().unwrap_or_default().to_vec();

@@ -40,9 +40,21 @@ impl Dice {
 /// Clocks of the ADC that a frame may take at most.
 const FRAME_CLOCKS: u64 = 6000;
 
-/// Writes settings, of which one set in sixteen is invalid; returns the number of clocks of a
-/// frame.
-fn set_up(rig: &mut Rig, dice: &mut Dice) -> u64 {
+/// What packets carry beside their frames: some registers of it, and the base of the clock.
+fn stamp(rig: &mut Rig, dice: &mut Dice) {
+    for register in [R::Run, R::TimeLow, R::TimeHigh] {
+        if !dice.once_in(4) {
+            rig.set(register, (dice.next() >> dice.range(0, 63)) as u32);
+        }
+    }
+    if !dice.once_in(4) {
+        rig.read(R::ClockLow.address());
+    }
+}
+
+/// Writes settings with these bits of `Mode`, of which one set in sixteen is invalid; returns the number of clocks of
+/// a frame.
+fn set_up(rig: &mut Rig, dice: &mut Dice, more: u32) -> u64 {
     let patterns = match dice.range(0, 9) {
         0..=3 => dice.range(1, 3),
         4..=8 => dice.range(1, 24),
@@ -53,7 +65,7 @@ fn set_up(rig: &mut Rig, dice: &mut Dice) -> u64 {
     let dwell = dwell.min(FRAME_CLOCKS / patterns).max(1);
     let sweeps = dice.range(1, (FRAME_CLOCKS / (patterns * dwell)).clamp(1, 5));
     let differential = dice.once_in(2);
-    let mut bits = if differential { mode::DIFFERENTIAL } else { 0 };
+    let mut bits = more | if differential { mode::DIFFERENTIAL } else { 0 };
     bits |= match dice.range(0, 3) {
         0 => 0,
         1 => mode::ORDER_SEQUENCY,
@@ -90,7 +102,7 @@ fn set_up(rig: &mut Rig, dice: &mut Dice) -> u64 {
     rig.set(R::OverRangeTrip, if dice.once_in(4) { trip } else { 0 });
     if dice.once_in(16) {
         let (register, value) = dice.pick(&[
-            (R::Mode, 1 << 4),
+            (R::Mode, 1 << 5),
             (R::Patterns, 1025),
             (R::Patterns, 0),
             (R::Dwell, 0),
@@ -167,6 +179,32 @@ fn deed(rig: &mut Rig, dice: &mut Dice, frame: u64) {
 
 /// Configures, starts, runs and reads out one scenario.
 pub fn run(rig: &mut Rig, seed: u64) {
+    act(rig, seed, 0, |_| {});
+}
+
+/// The same with frames that are sent as packets, but where an action of the host has ended that. After every eighth
+/// scenario, a run sends frames as they are.
+pub fn packets(rig: &mut Rig, seed: u64) {
+    let mut dice = Dice::new(!seed);
+    act(rig, seed, mode::PACKETS, |rig| {
+        if dice.once_in(3) {
+            stamp(rig, &mut dice);
+        }
+    });
+    if seed % 8 == 7 {
+        let start = control::STOP | control::CLEAR_FAULT | control::START;
+        for (register, value) in [(R::Mode, 0), (R::Patterns, 9), (R::Dwell, 3), (R::Blank, 0)] {
+            rig.set(register, value);
+        }
+        rig.set(R::Sweeps, 1);
+        rig.set(R::Control, start);
+        rig.wait_adc(300);
+        rig.stream(false, usize::MAX);
+    }
+}
+
+/// A scenario with these bits of `Mode`, and what comes before the start and before each action.
+fn act(rig: &mut Rig, seed: u64, more: u32, mut before: impl FnMut(&mut Rig)) {
     let dice = &mut Dice::new(seed);
     rig.port = Port {
         host_ps: dice.pick(&[10_000, 8_000, 7_000, 13_000]),
@@ -176,10 +214,12 @@ pub fn run(rig: &mut Rig, seed: u64) {
     };
     rig.over_range_rate = dice.pick(&[0, 1, 8, 64, 255]);
     rig.interlock(!dice.once_in(32));
-    let frame = set_up(rig, dice);
+    let frame = set_up(rig, dice, more);
+    before(rig);
     let start = if dice.once_in(5) { control::START_RAW } else { control::START };
     rig.set(R::Control, control::STOP | control::CLEAR_FAULT | start);
     for _ in 0..dice.range(1, 12) {
+        before(rig);
         deed(rig, dice, frame);
         if rig.mismatch.is_some() {
             return;
@@ -236,6 +276,33 @@ pub fn long_sums(rig: &mut Rig, seed: u64) {
     rig.set(R::Control, control::STOP | control::CLEAR_FAULT | control::RELEASE | control::START);
     for _ in 0..3 {
         rig.wait_adc(dice.range(2, 9) * samples + 300);
+        rig.stream(false, usize::MAX);
+        rig.set(R::Control, control::RELEASE);
+    }
+}
+
+/// Packets of many patterns whose differences have one sign, so that most bytes are not zero and blocks of COBS are
+/// as long as they can be.
+pub fn long_blocks(rig: &mut Rig, seed: u64) {
+    let dice = &mut Dice::new(seed);
+    rig.port.host_ps = dice.range(8_420, 11_390);
+    rig.interlock(true);
+    let (patterns, dwell) = (dice.range(65, 300), dice.range(1, 4));
+    rig.tilt = 2 * dwell;
+    stamp(rig, dice);
+    rig.set(R::Mode, mode::DIFFERENTIAL | mode::PACKETS);
+    rig.set(R::Patterns, patterns as u32);
+    rig.set(R::Dwell, dwell as u32);
+    rig.set(R::Blank, 0);
+    rig.set(R::Sweeps, 1);
+    rig.set(R::Frames, 0);
+    rig.set(R::Latency, dice.range(0, 63) as u32);
+    rig.set(R::Watchdog, 1_000_000);
+    rig.set(R::OverRangeTrip, 0);
+    rig.set(R::DutyLimit, DUTY_LIMIT_MAX);
+    rig.set(R::Control, control::STOP | control::CLEAR_FAULT | control::RELEASE | control::START);
+    for _ in 0..2 {
+        rig.wait_adc(2 * patterns * dwell + 200);
         rig.stream(false, usize::MAX);
         rig.set(R::Control, control::RELEASE);
     }

@@ -14,6 +14,7 @@ pub struct Settings {
     pub order_sequency: bool,
     pub differential: bool,
     pub test_source: bool,
+    pub packets: bool,
     pub patterns: u64,
     pub dwell: u64,
     pub blank: u64,
@@ -37,6 +38,7 @@ impl Default for Settings {
             order_sequency: false,
             differential: false,
             test_source: false,
+            packets: false,
             patterns: reset(Register::Patterns),
             dwell: reset(Register::Dwell),
             blank: reset(Register::Blank),
@@ -52,8 +54,10 @@ impl Default for Settings {
 }
 
 /// Bits of the fields of `types::Settings`.
-pub const SETTINGS: [usize; 24] =
-    [1, 1, 1, 1, 1, 11, 10, 1, 16, 1, 16, 1, 6, 32, 32, 1, 32, 1, 1, 12, 27, 21, 1, 32];
+pub const SETTINGS: [usize; 25] =
+    [1, 1, 1, 1, 1, 1, 11, 10, 1, 16, 1, 16, 1, 6, 32, 32, 1, 32, 1, 1, 12, 27, 21, 1, 32];
+/// Bits of the fields of `types::Stamp`.
+pub const STAMP: [usize; 3] = [16, 64, 64];
 /// Bits of the fields of `types::Place`.
 pub const PLACE: [usize; 10] = [1, 1, 1, 1, 10, 1, 1, 1, 1, 1];
 /// Bits of the fields of `types::Header`.
@@ -83,6 +87,7 @@ impl Settings {
             self.order_sequency.into(),
             self.differential.into(),
             self.test_source.into(),
+            self.packets.into(),
             self.patterns,
             self.patterns - 1,
             (self.patterns == 1).into(),

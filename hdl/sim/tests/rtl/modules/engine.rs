@@ -5,8 +5,9 @@ use crate::bench::Bench;
 use crate::project::Project;
 use crate::scenario::Dice;
 use nirspi_wire::fpga::{FpgaFrame, HEADER_BYTES, frame_bytes};
-use nirspi_wire::host_port::{READ_FRAME, READ_REGISTER, WRITE_REGISTER};
+use nirspi_wire::host_port::{READ_FRAME, READ_RAW, READ_REGISTER, WRITE_REGISTER};
 use nirspi_wire::register::{FaultCode, Register as R, control, mode};
+use nirspi_wire::{DeviceMessage, open};
 
 /// Clocks from the access that starts a run to the lines of its first slot.
 const TO_LIGHT: u64 = 7;
@@ -20,6 +21,7 @@ laws![
     over_range_counts_from_the_first_light_on,
     leds_are_lit_for_the_watchdogs_clocks_after_any_access,
     light_costs_what_the_register_map_says,
+    a_run_of_packets_sends_them_whole_and_a_burst_stays_a_burst,
 ];
 
 /// The engine, its host and a count of clocks.
@@ -97,7 +99,13 @@ impl Engine {
 
     /// Writes settings and begins a run; returns the clock of its first light.
     fn start(&mut self, settings: &Settings) -> u64 {
+        self.begin(settings, control::START)
+    }
+
+    /// The same, with these bits of `Control`.
+    fn begin(&mut self, settings: &Settings, bits: u32) -> u64 {
         let mode = if settings.differential { mode::DIFFERENTIAL } else { 0 };
+        let mode = if settings.packets { mode | mode::PACKETS } else { mode };
         for (register, value) in [
             (R::Mode, mode.into()),
             (R::Patterns, settings.patterns),
@@ -106,6 +114,7 @@ impl Engine {
             (R::Latency, settings.latency),
             (R::Sweeps, settings.sweeps),
             (R::Frames, settings.frames),
+            (R::RawLength, settings.raw_length),
             (R::Watchdog, settings.watchdog),
             (R::DutyLimit, settings.duty_limit),
             (R::OverRangeTrip, settings.over_range_trip),
@@ -114,7 +123,7 @@ impl Engine {
         }
         self.bench.set("operation", WRITE_REGISTER & 3);
         self.bench.set("address", R::Control.address());
-        self.bench.set("data", control::START);
+        self.bench.set("data", bits);
         self.bench.set("request", true);
         self.tick();
         self.bench.set("request", false);
@@ -137,18 +146,32 @@ impl Engine {
     fn frame(&mut self, count: usize) -> Vec<u8> {
         self.until("frame_ready");
         self.access(READ_FRAME, 0, 0);
-        let byte = |engine: &mut Self| {
-            engine.bench.set("byte_taken", false);
-            engine.until("byte_valid");
-            engine.bench.set("byte_taken", true);
-            let byte = engine.bench.get("octet") as u8;
-            engine.tick();
-            byte
-        };
-        let bytes = (0..count).map(|_| byte(self)).collect();
-        self.bench.set("byte_taken", false);
+        let bytes = (0..count).map(|_| self.byte()).collect();
         self.set(R::Control, control::RELEASE.into());
         bytes
+    }
+
+    /// The next byte, which is taken.
+    fn byte(&mut self) -> u8 {
+        self.until("byte_valid");
+        self.bench.set("byte_taken", true);
+        let byte = self.bench.get("octet") as u8;
+        self.tick();
+        self.bench.set("byte_taken", false);
+        byte
+    }
+
+    /// The sums of a run's first frame, of noise; the run's first light was at this clock.
+    fn sums_of_noise(settings: &Settings, light: u64) -> Vec<[u64; 2]> {
+        let mut sums = vec![[0; 2]; settings.patterns as usize];
+        for t in 0..settings.frame_clocks() {
+            let place = Place::of(settings, t).unwrap();
+            if place.counts {
+                let code = noise(light + t + settings.latency);
+                sums[place.index as usize][usize::from(place.complement)] += code;
+            }
+        }
+        sums
     }
 }
 
@@ -169,14 +192,7 @@ fn a_sample_is_summed_with_what_was_lit_latency_clocks_before(project: &Project)
         let light = engine.start(&settings);
         let bytes = engine.frame(frame_bytes(settings.patterns as u16));
         let frame = FpgaFrame::parse(&bytes).unwrap();
-        let mut expected = vec![[0; 2]; settings.patterns as usize];
-        for t in 0..settings.frame_clocks() {
-            let place = Place::of(&settings, t).unwrap();
-            if place.counts {
-                let code = noise(light + t + settings.latency);
-                expected[place.index as usize][usize::from(place.complement)] += code;
-            }
-        }
+        let expected = Engine::sums_of_noise(&settings, light);
         let seen: Vec<_> = frame.sums().map(|sums| [sums.positive, sums.negative]).collect();
         assert_eq!(seen, expected, "{settings:?}");
     }
@@ -263,5 +279,50 @@ fn light_costs_what_the_register_map_says(project: &Project) {
         });
         assert_eq!(engine.lit_clocks(), trips.unwrap() + 1 + TO_DARK, "{settings:?}");
         assert_eq!(engine.read(R::Fault), FaultCode::Duty as u32);
+    }
+}
+
+fn a_run_of_packets_sends_them_whole_and_a_burst_stays_a_burst(project: &Project) {
+    let mut engine = Engine::new(project);
+    engine.code = noise;
+    let dice = &mut Dice::new(43);
+    for round in 0..12 {
+        let settings = Settings { packets: true, frames: 0, raw_length: 40, ..random(dice) };
+        let (run, time) = (dice.next() as u16, dice.next() >> 1);
+        engine.set(R::Run, run.into());
+        engine.set(R::TimeLow, time);
+        engine.set(R::TimeHigh, time >> 32);
+        engine.read(R::ClockLow);
+        let read_at = engine.accessed;
+        let light = engine.start(&settings);
+        engine.until("frame_ready");
+        engine.access(READ_FRAME, 0, 0);
+        let mut packet = Vec::new();
+        while !packet.ends_with(&[0]) {
+            packet.push(engine.byte());
+        }
+        engine.set(R::Control, control::RELEASE.into());
+        packet.pop();
+        let opened: DeviceMessage<'_> = open(&mut packet).unwrap();
+        let DeviceMessage::Frame(frame) = opened else { panic!("{opened:?}") };
+        let shown = light - TO_LIGHT + 14;
+        let expected = (run, 0, time + (shown - read_at) / 125);
+        assert_eq!((frame.run, frame.sequence, frame.device_time_us), expected, "{settings:?}");
+        let sums = Engine::sums_of_noise(&settings, light);
+        let differences =
+            sums.iter().map(|[positive, negative]| *positive as i64 - *negative as i64);
+        assert!(frame.samples.iter().eq(differences), "{settings:?}");
+
+        // Neither goes on in the other when it is abandoned.
+        engine.frame(3);
+        engine.set(R::Control, control::STOP.into());
+        engine.clocks(20);
+        let light = engine.begin(&settings, control::START_RAW);
+        engine.until("raw_ready");
+        engine.access(READ_RAW, 0, 0);
+        for t in 0..if round % 2 == 0 { settings.raw_length } else { 3 } {
+            let word = u16::from_le_bytes([engine.byte(), engine.byte()]);
+            assert_eq!(u64::from(word), noise(light + t), "{settings:?}");
+        }
     }
 }

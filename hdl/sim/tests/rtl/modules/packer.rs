@@ -1,6 +1,6 @@
 //! Tests of packets as bytes, against the golden model.
 
-use super::bundles::{HEADER, Settings};
+use super::bundles::{HEADER, STAMP, Settings};
 use crate::bench::Bench;
 use crate::project::Project;
 use crate::scenario::Dice;
@@ -11,8 +11,13 @@ use nirspi_wire::fpga::{Header, Sums};
 laws![
     a_packet_is_that_of_the_golden_model_and_nothing_follows_it,
     a_reader_may_wait_for_any_time,
+    a_packet_begins_soon_and_then_has_no_gap,
     whatever_is_opened_ends_what_was_going_on,
 ];
+
+/// Clocks in which the slowest host reads `LEAD_BYTES` zeros, less what it takes to cross to its clock: 64 bytes of two
+/// periods of 68.3 ns each.
+const LEAD_CLOCKS: u64 = 1000;
 
 /// A bank behind the module, with the clocks that it needs to answer.
 struct Rig<'d> {
@@ -110,9 +115,8 @@ impl<'d> Rig<'d> {
         let fields: Vec<_> = values.into_iter().zip(HEADER).collect();
         self.bench.set_fields("header", &fields);
         self.bench.set_fields("settings", &settings.fields());
-        self.bench.set("run", run);
-        self.bench.set("clock_base", clock);
-        self.bench.set("time_base", time_us);
+        let fields: Vec<_> = [run.into(), clock, time_us].into_iter().zip(STAMP).collect();
+        self.bench.set_fields("stamp", &fields);
         let (positive, negative) = self.sums.split_at(1024);
         let bank: Vec<Sums> = positive
             .iter()
@@ -157,6 +161,33 @@ fn a_reader_may_wait_for_any_time(project: &Project) {
         }
         assert!(found == expected);
     }
+}
+
+/// The fastest host takes a byte in 80 ns.
+fn a_packet_begins_soon_and_then_has_no_gap(project: &Project) {
+    const PACE: u64 = 10;
+    let dice = &mut Dice::new(34);
+    let mut rig = Rig::new(project, dice);
+    let mut longest = 0;
+    for scenario in 0..40 {
+        let patterns = if scenario < 4 { 1024 } else { rig.dice.range(1, 200) };
+        let expected = rig.frame(patterns, scenario % 2 == 0);
+        rig.begin("open");
+        let mut wait = 0;
+        while !rig.bench.is("valid") {
+            rig.tick(false);
+            wait += 1;
+            assert!(wait < LEAD_CLOCKS, "{patterns} patterns: nothing yet");
+        }
+        longest = longest.max(wait);
+        for (at, &byte) in expected.iter().enumerate() {
+            assert_eq!(rig.tick(true), Some(byte), "byte {at} of {}", expected.len());
+            for _ in 1..PACE {
+                rig.tick(false);
+            }
+        }
+    }
+    println!("the longest wait was of {longest} clocks");
 }
 
 fn whatever_is_opened_ends_what_was_going_on(project: &Project) {

@@ -1,6 +1,6 @@
 //! Tests of the register bank and of the settings made from it.
 
-use super::bundles::{SETTINGS, Settings};
+use super::bundles::{SETTINGS, STAMP, Settings};
 use crate::bench::Bench;
 use crate::project::Project;
 use crate::scenario::Dice;
@@ -44,7 +44,7 @@ fn a_register_reads_what_was_written_to_it_and_to_no_other(project: &Project) {
         for (register, &word) in R::ALL.iter().zip(&words) {
             assert_eq!(read(&mut bench, register.address()), word, "{register:?}, round {round}");
         }
-        for nothing in [0x06, 0x07, 0x18, 0x3FF, 0x800, 0x8000] {
+        for nothing in [0x06, 0x07, 0x1B, 0x3FF, 0x800, 0x8000] {
             assert_eq!(read(&mut bench, nothing), 0, "{nothing:#x}");
         }
         for _ in 0..3 {
@@ -71,6 +71,7 @@ fn write_all(bench: &mut Bench, dice: &mut Dice) -> Settings {
         order_sequency: flag(dice),
         differential: flag(dice),
         test_source: flag(dice),
+        packets: flag(dice),
         patterns: dice.pick(&[1, 2, 513, 1024]),
         dwell,
         blank: dice.pick(&[0, dwell / 2, dwell - 1]),
@@ -87,6 +88,7 @@ fn write_all(bench: &mut Bench, dice: &mut Dice) -> Settings {
         (settings.order_sequency, mode::ORDER_SEQUENCY),
         (settings.order_table, mode::ORDER_TABLE),
         (settings.test_source, mode::TEST_SOURCE),
+        (settings.packets, mode::PACKETS),
     ];
     let bits = modes.iter().map(|&(set, bit)| if set { bit } else { 0 }).sum::<u32>();
     for (register, value) in [
@@ -107,6 +109,17 @@ fn write_all(bench: &mut Bench, dice: &mut Dice) -> Settings {
     settings
 }
 
+/// Says what packets carry beside their frames; only a read of the clock's low word is a base.
+fn write_stamp(bench: &mut Bench, run: u64, clock: u64, time: u64) {
+    write(bench, R::Run.address(), run as u32);
+    write(bench, R::TimeLow.address(), time as u32);
+    write(bench, R::TimeHigh.address(), (time >> 32) as u32);
+    bench.set("clock_now", clock);
+    read(bench, R::ClockLow.address());
+    bench.set("clock_now", clock.rotate_left(7));
+    read(bench, R::ClockHigh.address());
+}
+
 fn a_run_has_the_settings_of_its_start_whatever_is_written_later(project: &Project) {
     let mut bench = Bench::new(project, "registers");
     let dice = &mut Dice::new(29);
@@ -114,6 +127,8 @@ fn a_run_has_the_settings_of_its_start_whatever_is_written_later(project: &Proje
         let mut settings = write_all(&mut bench, dice);
         assert!(bench.is("in_range"), "{settings:?}");
         settings.raw = dice.once_in(3);
+        let [run, clock, time] = [(); 3].map(|()| dice.next());
+        write_stamp(&mut bench, run, clock, time);
         bench.set("copy_raw", settings.raw);
         bench.set("copy", true);
         bench.tick();
@@ -121,7 +136,10 @@ fn a_run_has_the_settings_of_its_start_whatever_is_written_later(project: &Proje
         let expected: Vec<u64> = settings.fields().iter().map(|&(value, _)| value).collect();
         assert_eq!(bench.get_fields("settings", &SETTINGS), expected, "{settings:?}");
         write_all(&mut bench, dice);
+        write_stamp(&mut bench, !run, !clock, !time);
         assert_eq!(bench.get_fields("settings", &SETTINGS), expected, "after writes");
+        let stamp = bench.get_fields("stamp", &STAMP);
+        assert_eq!(stamp, [run & 0xFFFF, clock, time], "stamp after writes");
     }
 }
 
@@ -130,7 +148,7 @@ fn every_setting_has_its_range(project: &Project) {
     let rest = u32::MAX;
     let raw = u32::from(RAW_SAMPLES_MAX);
     for (register, within, without) in [
-        (R::Mode, vec![0, 0xF], vec![0x10, 1 << 31, rest]),
+        (R::Mode, vec![0, 0x1F], vec![0x20, 1 << 31, rest]),
         (R::Patterns, vec![1, 1024], vec![0, 1025, 2048, 1 << 16 | 1, rest]),
         // Values above the reset value of `Blank`.
         (R::Dwell, vec![3, 65_535], vec![0, 1, 2, 65_536, 1 << 16 | 5, rest]),
@@ -143,6 +161,9 @@ fn every_setting_has_its_range(project: &Project) {
         (R::Watchdog, vec![1, WATCHDOG_MAX], vec![0, WATCHDOG_MAX + 1, rest]),
         (R::DutyLimit, vec![0, DUTY_LIMIT_MAX], vec![DUTY_LIMIT_MAX + 1, rest]),
         (R::OverRangeTrip, vec![0, rest], vec![]),
+        (R::Run, vec![0, rest], vec![]),
+        (R::TimeLow, vec![0, rest], vec![]),
+        (R::TimeHigh, vec![0, rest], vec![]),
         (R::Scratch, vec![0, rest], vec![]),
     ] {
         for (values, good) in [(within, true), (without, false)] {
