@@ -6,7 +6,6 @@ use super::report::{ReportArgs, words};
 use anyhow::Result;
 use nirspi::export::{ExportOptions, Format, export};
 use nirspi::recording::{Target, recover as recovered};
-use nirspi::virtual_camera::pinhole_of;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -47,7 +46,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         scene: args.scene.clone(),
         distance_m: args.distance_m,
         truth: args.truth.clone(),
-        pinhole: Some(pinhole_of(&args.model.read()?)),
+        model: Some(args.model.read()?),
     };
     let exported = export(&args.recording, &out, args.to, &options)?;
     args.report.print(&exported, |exported| {
