@@ -226,6 +226,10 @@ impl From<&nirspi_optics::CameraModel> for Pinhole {
 }
 
 impl Pinhole {
+    #[cfg_attr(
+        not(any(feature = "live", feature = "virtual-camera")),
+        allow(dead_code, reason = "no description of a camera gives a geometry")
+    )]
     pub(crate) fn encode(&self, time_ns: u64) -> Vec<u8> {
         let Self { side, focal_px: f } = *self;
         let c = f64::from(side) / 2.0;
