@@ -4,8 +4,10 @@
 
 use nirspi::export::{ExportOptions, Format, export};
 use nirspi::files::measurement::Selection;
+use nirspi::imaging::{Enhance, ImageContext, SPREAD_COPIES, White};
 use nirspi::recording::Recording;
 use nirspi::source::{Source, SourceOptions};
+use nirspi_nets::Device;
 use nirspi_recon::reconstruct::{Method, MethodSettings};
 use nirspi_recon::{Order, Side};
 use serde_json::{Value, json};
@@ -116,6 +118,47 @@ fn a_zarr_store_has_the_numbers_of_the_recording_in_the_order_of_its_description
         (&json!(32), &json!(true))
     );
     assert_eq!(group["consolidated_metadata"]["metadata"]["frames"], description);
+}
+
+/// The pixels of the images of a topic of an MCAP file.
+fn images(file: &[u8], topic: &str, side: usize) -> Vec<Vec<f32>> {
+    let all = mcap::MessageStream::new(file).unwrap().map(Result::unwrap);
+    let of_topic = all.filter(|message| message.channel.topic == topic);
+    of_topic
+        .map(|message| {
+            // After the pixels stands the frame of reference: key, length and "nirspi".
+            let end = message.data.len() - 8;
+            let bytes = &message.data[end - 4 * side * side..end];
+            bytes
+                .chunks_exact(4)
+                .map(|pixel| f32::from_le_bytes(pixel.try_into().unwrap()))
+                .collect()
+        })
+        .collect()
+}
+
+#[test]
+fn an_exported_recording_has_enhanced_images_and_their_spread_if_asked() {
+    let (_folder, plain) = exported(Format::Mcap, &ExportOptions::default());
+    let plain = std::fs::read(plain).unwrap();
+    assert!(images(&plain, "/enhanced", 64).is_empty() && images(&plain, "/spread", 64).is_empty());
+    let options = ExportOptions { enhance: true, ..ExportOptions::default() };
+    let (_folder, out) = exported(Format::Mcap, &options);
+    let out = std::fs::read(out).unwrap();
+    assert_eq!(images(&out, "/image", 32), images(&plain, "/image", 32));
+
+    let whole = Source::read(&recording(), &SourceOptions::default()).unwrap();
+    let method = Method::default().prepare(&MethodSettings::default()).unwrap();
+    let image = method.reconstruct(&whole.measurements).unwrap().image;
+    let rows = Some(whole.measurements.rows());
+    let context = ImageContext { rows, copies: SPREAD_COPIES, ..ImageContext::default() };
+    let enhance = Enhance::built_in(&Device::cpu()).unwrap();
+    let made = enhance.enhance(&image, White::Brightest, &context).unwrap();
+    assert_eq!(images(&out, "/enhanced", 64), [made.pixels]);
+    let spread = made.spread.unwrap();
+    assert!(spread.iter().all(|&spread| (0.0..0.5).contains(&spread)), "a standard deviation");
+    assert!(spread.iter().any(|&spread| spread > 0.0));
+    assert_eq!(images(&out, "/spread", 64), [spread]);
 }
 
 #[test]

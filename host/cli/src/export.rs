@@ -24,6 +24,9 @@ pub struct Args {
     /// Do not correct the readings for the leak from pattern to pattern
     #[arg(long)]
     keep_leak: bool,
+    /// mcap: also enhanced images, and the spread of each pixel if the scene were measured again (9 runs of the network each)
+    #[arg(long)]
+    enhance: bool,
     /// parquet: what the camera looked at
     #[arg(long, value_name = "TEXT")]
     scene: Option<String>,
@@ -47,6 +50,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         distance_m: args.distance_m,
         truth: args.truth.clone(),
         model: Some(args.model.read()?),
+        enhance: args.enhance,
     };
     let exported = export(&args.recording, &out, args.to, &options)?;
     args.report.print(&exported, |exported| {

@@ -28,10 +28,14 @@ pub(super) fn write(
     options: &ExportOptions,
 ) -> Result<usize, ExportError> {
     let (mut images, mut range) = (0, [f32::INFINITY, f32::NEG_INFINITY]);
+    #[cfg(feature = "enhance")]
+    let mut enhancing = super::enhancing::Enhancing::new(options)?;
     let mut recording = Recording::open(&whole.path)?;
     each(whole, &mut recording, |what| {
         if let What::Image(_, image) = what {
             images += 1;
+            #[cfg(feature = "enhance")]
+            enhancing.look_at(&image);
             range = image
                 .pixels()
                 .iter()
@@ -58,7 +62,14 @@ pub(super) fn write(
                     .packet(heard.time_ns, heard.raw)
                     .and_then(|()| book.heard(heard.time_ns, heard.content, tally))
                     .and_then(|()| depth(&mut book, heard, options)),
-                What::Image(time_ns, image) => book.image(time_ns, &image, range),
+                What::Image(time_ns, image) => {
+                    #[cfg(feature = "enhance")]
+                    if let Some(made) = enhancing.enhance(whole, time_ns, &image)? {
+                        let spread = made.spread.as_deref();
+                        book.enhanced(time_ns, &made.pixels, spread).map_err(io_error)?;
+                    }
+                    book.image(time_ns, &image, range)
+                }
             };
             Ok(written.map_err(io_error)?)
         })?;

@@ -8,6 +8,8 @@
 //! Frames are read one by one, so memory does not grow with the readings of a recording.
 
 mod arrays;
+#[cfg(feature = "enhance")]
+mod enhancing;
 mod mcap;
 mod parquet;
 #[cfg(feature = "pictures")]
@@ -144,6 +146,9 @@ pub struct ExportOptions {
     /// two channels of MCAP files.
     #[cfg(any(feature = "live", feature = "virtual-camera"))]
     pub model: Option<CameraModel>,
+    /// Whether MCAP files also get the enhanced images, and how well each of their pixels repeats.
+    #[cfg(feature = "enhance")]
+    pub enhance: bool,
 }
 
 /// What was exported.
@@ -196,6 +201,22 @@ pub enum ExportError {
     /// The recording changed between two readings.
     #[error("{}: the recording changed while it was read: export it when its capture has ended", .0.display())]
     Changed(PathBuf),
+    /// The networks cannot be used.
+    #[cfg(feature = "enhance")]
+    #[error(transparent)]
+    Weights(#[from] nirspi_nets::WeightsError),
+    /// An image cannot be enhanced.
+    #[cfg(feature = "enhance")]
+    #[error("{}: the image of {time_ns} ns", .path.display())]
+    Enhance {
+        /// The recording.
+        path: PathBuf,
+        /// The time of the image.
+        time_ns: u64,
+        /// The problem.
+        #[source]
+        problem: crate::imaging::EnhanceError,
+    },
     /// An image cannot be made of a frame.
     #[error("{}: frame {frame}", .path.display())]
     Image {

@@ -145,6 +145,23 @@ impl<W: Write> Book<W> {
         self.other(Channel::Image, time_ns, &schemas::image(time_ns, image, range))
     }
 
+    /// Writes an enhanced image in [0, 1], and its spread.
+    ///
+    /// # Errors
+    /// The writer's error.
+    #[cfg(feature = "enhance")]
+    pub(crate) fn enhanced(
+        &mut self,
+        time_ns: u64,
+        pixels: &[f32],
+        spread: Option<&[f32]>,
+    ) -> io::Result<()> {
+        let side = nirspi_nets::deblur::SIDE;
+        self.other(Channel::Enhanced, time_ns, &schemas::raw_image(time_ns, side, pixels))?;
+        let Some(spread) = spread else { return Ok(()) };
+        self.other(Channel::Spread, time_ns, &schemas::raw_image(time_ns, side, spread))
+    }
+
     /// Writes a depth map in the camera's image, in metres.
     ///
     /// # Errors

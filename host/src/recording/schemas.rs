@@ -34,14 +34,22 @@ pub(crate) enum Channel {
     /// The depth map in the camera's image.
     Depth,
     /// The enhanced image.
-    #[cfg_attr(not(feature = "serve"), allow(dead_code, reason = "a channel of live cameras"))]
     Enhanced,
+    /// How well each pixel of the enhanced image repeats.
+    Spread,
 }
 
 impl Channel {
     /// The channels of a recording.
-    pub(super) const RECORDED: [Self; 5] =
-        [Self::Telemetry, Self::Log, Self::Image, Self::Calibration, Self::Depth];
+    pub(super) const RECORDED: [Self; 7] = [
+        Self::Telemetry,
+        Self::Log,
+        Self::Image,
+        Self::Calibration,
+        Self::Depth,
+        Self::Enhanced,
+        Self::Spread,
+    ];
 
     /// The channels of a live camera.
     #[cfg(feature = "serve")]
@@ -56,6 +64,7 @@ impl Channel {
             Self::Calibration => "/calibration",
             Self::Enhanced => "/enhanced",
             Self::Depth => "/depth",
+            Self::Spread => "/spread",
         }
     }
 
@@ -64,7 +73,7 @@ impl Channel {
         match self {
             Self::Telemetry => "nirspi.Telemetry",
             Self::Log => "foxglove.Log",
-            Self::Image | Self::Enhanced | Self::Depth => "foxglove.RawImage",
+            Self::Image | Self::Enhanced | Self::Depth | Self::Spread => "foxglove.RawImage",
             Self::Calibration => "foxglove.CameraCalibration",
         }
     }
@@ -93,7 +102,7 @@ impl Channel {
                 (5, "file", Type::Text),
                 (6, "line", Type::Fixed32),
             ],
-            Self::Image | Self::Enhanced | Self::Depth => &[
+            Self::Image | Self::Enhanced | Self::Depth | Self::Spread => &[
                 (1, "timestamp", TIME),
                 (7, "frame_id", Type::Text),
                 (2, "width", Type::Fixed32),

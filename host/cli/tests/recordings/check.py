@@ -32,7 +32,7 @@ def messages(name):
     """Every message of a file, decoded where its channel is protobuf."""
     with open(folder / name, "rb") as file:
         reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
-        topics = ["/telemetry", "/log", "/image", "/calibration", "/depth"]
+        topics = ["/telemetry", "/log", "/image", "/calibration", "/depth", "/enhanced", "/spread"]
         decoded = list(reader.iter_decoded_messages(topics=topics))
         raw = list(reader.iter_messages(topics=["/wire"]))
         return decoded, raw, reader.get_summary()
@@ -134,6 +134,15 @@ assert maps and {time for time, _ in maps} <= {m.log_time for _, _, m in wire}
 depth_m = np.frombuffer(maps[0][1].data, "<f4").reshape(32, 32)
 assert maps[0][1].encoding == "32FC1" and 0.25 < np.median(depth_m) < 0.35, np.median(depth_m)
 print(f"depth: {len(maps)} maps, median {np.median(depth_m):.3f} m (simulated)")
+
+# Enhanced images are those of `reconstruct --enhance`, each with its spread.
+run("export", "rec.mcap", "--to", "mcap", "--enhance", "--out", "enhanced.mcap")
+run("reconstruct", "rec.mcap", "--enhance", "--out", "enhanced", "--no-flat-field")
+made = {c.topic: m for _, c, _, m in messages("enhanced.mcap")[0]}
+enhanced, spread = (np.frombuffer(made[t].data, "<f4").reshape(64, 64) for t in ("/enhanced", "/spread"))
+assert np.array_equal(enhanced, np.load(folder / "enhanced" / "enhanced.npy").reshape(64, 64))
+assert 0 < spread.max() < 0.5 and spread.min() >= 0, (spread.min(), spread.max())
+print(f"spread: median {np.median(spread):.4f}, greatest {spread.max():.3f} of white (simulated)")
 
 rerun = Path(sys.executable).with_name("rerun")
 if rerun.exists():

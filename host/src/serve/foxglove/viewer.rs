@@ -116,6 +116,8 @@ impl Viewer {
                         news.messages.push(messages::data(id, now_ns, &payload));
                     }
                 }
+                // A live camera has no spread (`Channel::LIVE`).
+                Channel::Spread => {}
                 Channel::Image | Channel::Enhanced | Channel::Depth => {
                     if let Some(picture) = picture
                         && picture.number > subscribed.seen
