@@ -1,7 +1,7 @@
 //! Writes the records of a recording, wherever they go.
 
 use super::monitor::Monitor;
-use super::schemas::{self, Channel, Pinhole};
+use super::schemas::{self, Channel};
 use super::{
     ACCOUNT, CHECKSUM, IDENTITY, JSON, PROFILE, RUN, RunAccount, SETTLING, SETUP, TOPIC, encoding,
     reader::checksum,
@@ -177,7 +177,7 @@ impl<W: Write> Book<W> {
     /// # Errors
     /// The writer's error.
     #[cfg(any(feature = "live", feature = "virtual-camera"))]
-    pub(crate) fn pinhole(&mut self, time_ns: u64, pinhole: &Pinhole) -> io::Result<()> {
+    pub(crate) fn pinhole(&mut self, time_ns: u64, pinhole: &schemas::Pinhole) -> io::Result<()> {
         self.other(Channel::Calibration, time_ns, &pinhole.encode(time_ns))
     }
 
