@@ -73,6 +73,10 @@ pub struct Progress {
     /// Time of the session in which this thread waited for the link. In the rest of the time the
     /// thread was busy. `None` during calibration.
     pub waited: Option<Duration>,
+    /// The camera's time of the newest frame.
+    pub device_time_us: u64,
+    /// Number of damaged packets of any kind.
+    pub damaged_packets: u64,
     /// Share of the recording's queue that waits for the disk, 0 to 1; 0 without a recording.
     pub queued: f64,
 }

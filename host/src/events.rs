@@ -3,7 +3,39 @@
 
 use nirspi_recon::words::count;
 use nirspi_wire::message::CRASH_TEXT_MAX;
-use nirspi_wire::{CrashReport, EventKind};
+use nirspi_wire::{CrashReport, DeviceMessage, EventKind};
+use serde::Serialize;
+
+/// How serious an event is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Level {
+    /// The event belongs to ordinary work.
+    Info,
+    /// Something was lost or damaged, and the camera goes on.
+    Warning,
+    /// The camera stopped or crashed.
+    Error,
+}
+
+/// An event or a crash in words, and how serious it is; `None` for any other message.
+#[must_use]
+pub fn line(message: &DeviceMessage<'_>) -> Option<(Level, String)> {
+    match message {
+        DeviceMessage::Event(event) => {
+            let level = match event.kind {
+                EventKind::RunEnded { .. } => Level::Info,
+                EventKind::Fault(_) => Level::Error,
+                EventKind::RawDropped
+                | EventKind::CommandDamaged
+                | EventKind::FpgaAccessesDamaged { .. } => Level::Warning,
+            };
+            Some((level, as_it_happens(&event.kind)))
+        }
+        DeviceMessage::Crash(report) => Some((Level::Error, crash(report))),
+        _ => None,
+    }
+}
 
 /// The words for an event that happened before the greeting; `None` for an event that an earlier
 /// host caused.

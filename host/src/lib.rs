@@ -53,6 +53,8 @@ pub mod causes;
 pub mod clock;
 #[cfg(not(target_family = "wasm"))]
 pub mod dataset;
+#[cfg(any(feature = "live", feature = "virtual-camera"))]
+mod depth_image;
 #[cfg(not(target_family = "wasm"))]
 pub mod devices;
 pub mod events;

@@ -4,10 +4,13 @@
 
 use nirspi::export::{ExportOptions, Format, export};
 use nirspi::files::measurement::Selection;
+use nirspi::imaging::{Enhance, ImageContext, SPREAD_COPIES, White};
 use nirspi::recording::Recording;
 use nirspi::source::{Source, SourceOptions};
+use nirspi_nets::Device;
 use nirspi_recon::reconstruct::{Method, MethodSettings};
 use nirspi_recon::{Order, Side};
+use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 fn recording() -> PathBuf {
@@ -65,6 +68,97 @@ fn an_exported_file_gives_the_image_of_the_recording_to_the_bit() {
             }
         }
     }
+}
+
+/// The numbers of an array of a Zarr store in one chunk, and its description.
+fn array(store: &Path, name: &str) -> (Value, Vec<[u8; 8]>) {
+    let description = std::fs::read(store.join(name).join("zarr.json")).unwrap();
+    let chunk = if name == "frames" { "c/0/0" } else { "c/0" };
+    let bytes = std::fs::read(store.join(name).join(chunk)).unwrap();
+    let numbers = bytes.chunks_exact(8).map(|number| number.try_into().unwrap()).collect();
+    (serde_json::from_slice(&description).unwrap(), numbers)
+}
+
+#[test]
+fn a_zarr_store_has_the_numbers_of_the_recording_in_the_order_of_its_description() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("rec.zarr");
+    let options = ExportOptions::default();
+    // The second time replaces the first.
+    for _ in 0..2 {
+        let exported = export(&recording(), &out, Format::Zarr, &options).unwrap();
+        assert_eq!((exported.frames, exported.patterns), (12, 256));
+        assert!(exported.bytes > 12 * 256 * 8, "{}", exported.bytes);
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    let whole = Source::read(&recording(), &SourceOptions::default()).unwrap();
+    let frames = Source::read_all(&recording(), &SourceOptions::default()).unwrap();
+
+    let (description, numbers) = array(&out, "frames");
+    assert_eq!(description["shape"], json!([12, 256]));
+    assert_eq!(description["chunk_grid"]["configuration"]["chunk_shape"], json!([12, 256]));
+    assert_eq!(description["data_type"], "float64");
+    let all = frames.iter().flat_map(|frame| frame.measurements.values());
+    assert!(numbers.into_iter().map(f64::from_le_bytes).eq(all.copied()));
+    let (_, mean) = array(&out, "d");
+    let mean: Vec<f64> = mean.into_iter().map(f64::from_le_bytes).collect();
+    assert_eq!(mean, whole.measurements.values());
+    let (rows, shown) = array(&out, "h_row");
+    assert_eq!(
+        (&rows["data_type"], &rows["dimension_names"]),
+        (&json!("int64"), &json!(["pattern"]))
+    );
+    let expected = whole.measurements.rows().iter().map(|&row| i64::from(row));
+    assert!(shown.into_iter().map(i64::from_le_bytes).eq(expected));
+
+    let group = std::fs::read(out.join("zarr.json")).unwrap();
+    let group: Value = serde_json::from_slice(&group).unwrap();
+    assert_eq!(
+        (&group["attributes"]["n"], &group["attributes"]["simulated"]),
+        (&json!(32), &json!(true))
+    );
+    assert_eq!(group["consolidated_metadata"]["metadata"]["frames"], description);
+}
+
+/// The pixels of the images of a topic of an MCAP file.
+fn images(file: &[u8], topic: &str, side: usize) -> Vec<Vec<f32>> {
+    let all = mcap::MessageStream::new(file).unwrap().map(Result::unwrap);
+    let of_topic = all.filter(|message| message.channel.topic == topic);
+    of_topic
+        .map(|message| {
+            // After the pixels stands the frame of reference: key, length and "nirspi".
+            let end = message.data.len() - 8;
+            let bytes = &message.data[end - 4 * side * side..end];
+            bytes
+                .chunks_exact(4)
+                .map(|pixel| f32::from_le_bytes(pixel.try_into().unwrap()))
+                .collect()
+        })
+        .collect()
+}
+
+#[test]
+fn an_exported_recording_has_enhanced_images_and_their_spread_if_asked() {
+    let (_folder, plain) = exported(Format::Mcap, &ExportOptions::default());
+    let plain = std::fs::read(plain).unwrap();
+    assert!(images(&plain, "/enhanced", 64).is_empty() && images(&plain, "/spread", 64).is_empty());
+    let options = ExportOptions { enhance: true, ..ExportOptions::default() };
+    let (_folder, out) = exported(Format::Mcap, &options);
+    let out = std::fs::read(out).unwrap();
+    assert_eq!(images(&out, "/image", 32), images(&plain, "/image", 32));
+
+    let whole = Source::read(&recording(), &SourceOptions::default()).unwrap();
+    let method = Method::default().prepare(&MethodSettings::default()).unwrap();
+    let image = method.reconstruct(&whole.measurements).unwrap().image;
+    let rows = Some(whole.measurements.rows());
+    let context = ImageContext { rows, copies: SPREAD_COPIES, ..ImageContext::default() };
+    let enhance = Enhance::built_in(&Device::cpu()).unwrap();
+    let made = enhance.enhance(&image, White::Brightest, &context).unwrap();
+    assert_eq!(images(&out, "/enhanced", 64), [made.pixels]);
+    let spread = made.spread.unwrap();
+    assert!(spread.iter().all(|&spread| (0.0..0.5).contains(&spread)), "a standard deviation");
+    assert!(spread.iter().any(|&spread| spread > 0.0));
+    assert_eq!(images(&out, "/spread", 64), [spread]);
 }
 
 #[test]

@@ -8,7 +8,7 @@ use super::report::stages;
 use anyhow::Result;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use nirspi::files::stack::ImageStack;
-use nirspi::imaging::Deblurring;
+use nirspi::imaging::{Deblurring, SPREAD_COPIES};
 use nirspi_nets::classical;
 use nirspi_nets::deblur::Model;
 use nirspi_nets::{Images, KnownEstimate, Method, Options, deblur};
@@ -100,9 +100,6 @@ pub struct Sharpening {
 pub fn in_steps(model: Model, steps: Option<NonZeroU32>) -> Result<Method> {
     Method::new(model, steps).map_err(|error| Usage(format!("--steps: {error}")).into())
 }
-
-/// Number of simulated measurements for the spread.
-const SPREAD_COPIES: u32 = 8;
 
 impl Sharpening {
     pub fn options(&self) -> Result<Options> {

@@ -7,7 +7,6 @@ use anyhow::Result;
 use nirspi::export::{ExportOptions, Format, export};
 use nirspi::recording::{Target, recover as recovered};
 use nirspi::sync::recordings;
-use nirspi::virtual_camera::pinhole_of;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -26,6 +25,9 @@ pub struct Args {
     /// Do not correct the readings for the leak from pattern to pattern
     #[arg(long)]
     keep_leak: bool,
+    /// mcap: also enhanced images, and the spread of each pixel if the scene were measured again (9 runs of the network each)
+    #[arg(long)]
+    enhance: bool,
     /// parquet: what the camera looked at
     #[arg(long, value_name = "TEXT")]
     scene: Option<String>,
@@ -48,7 +50,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         scene: args.scene.clone(),
         distance_m: args.distance_m,
         truth: args.truth.clone(),
-        pinhole: Some(pinhole_of(&args.model.read()?)),
+        model: Some(args.model.read()?),
+        enhance: args.enhance,
     };
     let exported = export(&args.recording, &out, args.to, &options)?;
     args.report.print(&exported, |exported| {

@@ -252,6 +252,8 @@ impl Run {
                 counters,
                 elapsed: self.started.elapsed(),
                 waited: Some(session.waited()),
+                device_time_us: self.tally.device_time_us(),
+                damaged_packets: self.tally.account().damaged_packets(),
                 queued: self.recorder.as_ref().map_or(0.0, Recorder::queued),
             };
             let wants_stop = observer.watch(&progress).is_break() || self.recorder_error.is_some();

@@ -1,4 +1,4 @@
-//! A recording with images, for viewers of MCAP files such as Foxglove and Rerun.
+//! A recording with images and depth maps, for viewers of MCAP files such as Foxglove and Rerun.
 //!
 //! The packets, their times and the information before them are those of the recording, so the
 //! exported file is a recording itself.
@@ -9,8 +9,13 @@ use crate::files::output::write_in_pieces;
 use crate::integrate::Integrated;
 use crate::recording::{Book, Opening, Recording};
 use crate::tally::{Heard, Tally, hear_recording};
+#[cfg(any(feature = "live", feature = "virtual-camera"))]
+use crate::{depth_image, recording::Pinhole};
 use nirspi_recon::Image;
 use nirspi_recon::reconstruct::{Method, MethodSettings, Reconstruct};
+#[cfg(any(feature = "live", feature = "virtual-camera"))]
+use nirspi_wire::DeviceMessage;
+use std::io::{self, Write};
 use std::path::Path;
 
 /// The camera's time of one image: 30 images a second.
@@ -23,10 +28,14 @@ pub(super) fn write(
     options: &ExportOptions,
 ) -> Result<usize, ExportError> {
     let (mut images, mut range) = (0, [f32::INFINITY, f32::NEG_INFINITY]);
+    #[cfg(feature = "enhance")]
+    let mut enhancing = super::enhancing::Enhancing::new(options)?;
     let mut recording = Recording::open(&whole.path)?;
     each(whole, &mut recording, |what| {
         if let What::Image(_, image) = what {
             images += 1;
+            #[cfg(feature = "enhance")]
+            enhancing.look_at(&image);
             range = image
                 .pixels()
                 .iter()
@@ -42,22 +51,52 @@ pub(super) fn write(
         let settling = settling.as_ref();
         let opening = Opening { identity: &identity, setup: &setup, settling, run };
         let mut book = Book::begin(file, &opening).map_err(io_error)?;
-        if let Some(pinhole) = &options.pinhole {
+        #[cfg(any(feature = "live", feature = "virtual-camera"))]
+        if let Some(model) = &options.model {
             let time = whole.time_ns.first().map_or(0, |&time| time as u64);
-            book.pinhole(time, pinhole).map_err(io_error)?;
+            book.pinhole(time, &Pinhole::from(model)).map_err(io_error)?;
         }
         each(whole, &mut recording, |what| {
             let written = match what {
                 What::Packet(heard, tally) => book
                     .packet(heard.time_ns, heard.raw)
-                    .and_then(|()| book.heard(heard.time_ns, heard.content, tally)),
-                What::Image(time_ns, image) => book.image(time_ns, &image, range),
+                    .and_then(|()| book.heard(heard.time_ns, heard.content, tally))
+                    .and_then(|()| depth(&mut book, heard, options)),
+                What::Image(time_ns, image) => {
+                    #[cfg(feature = "enhance")]
+                    if let Some(made) = enhancing.enhance(whole, time_ns, &image)? {
+                        let spread = made.spread.as_deref();
+                        book.enhanced(time_ns, &made.pixels, spread).map_err(io_error)?;
+                    }
+                    book.image(time_ns, &image, range)
+                }
             };
             Ok(written.map_err(io_error)?)
         })?;
         Ok(book.end(recording.end().account.as_ref()).map_err(io_error)?)
     })
     .map(|()| images)
+}
+
+/// Writes the depth map of a packet that has one, if the camera is described.
+#[cfg(any(feature = "live", feature = "virtual-camera"))]
+fn depth<W: Write>(
+    book: &mut Book<W>,
+    heard: &Heard<'_>,
+    options: &ExportOptions,
+) -> io::Result<()> {
+    let (Ok(DeviceMessage::Depth(depth)), Some(model)) = (heard.content, &options.model) else {
+        return Ok(());
+    };
+    match depth_image::pixels_m(model, depth) {
+        Some(pixels_m) => book.depth(heard.time_ns, &pixels_m),
+        None => Ok(()),
+    }
+}
+
+#[cfg(not(any(feature = "live", feature = "virtual-camera")))]
+fn depth<W: Write>(_: &mut Book<W>, _: &Heard<'_>, _: &ExportOptions) -> io::Result<()> {
+    Ok(())
 }
 
 enum What<'p> {

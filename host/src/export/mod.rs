@@ -1,5 +1,5 @@
-//! Exports a recording for other programs: arrays for NumPy, a table, a dataset in Parquet, a video,
-//! a recording with images.
+//! Exports a recording for other programs: arrays for NumPy and Zarr, a table, a dataset in Parquet, a
+//! video, a recording with images.
 //!
 //! # Invariant
 //! An exported file holds the numbers that `reconstruct` uses: the image of the exported file is
@@ -8,18 +8,23 @@
 //! Frames are read one by one, so memory does not grow with the readings of a recording.
 
 mod arrays;
+#[cfg(feature = "enhance")]
+mod enhancing;
 mod mcap;
 mod parquet;
 #[cfg(feature = "pictures")]
 mod video;
+mod zarr;
 
 use crate::files::{FileError, npy};
 use crate::integrate::{IntegrateError, Integrated};
-use crate::recording::{Pinhole, Recording, RecordingError};
+use crate::recording::{Recording, RecordingError};
 use crate::session::CameraIdentity;
 use crate::setup::MeasurementSetup;
 use crate::source::{self, Source, SourceError, SourceOptions};
 use crate::tally::{Tally, hear_recording};
+#[cfg(any(feature = "live", feature = "virtual-camera"))]
+use nirspi_optics::CameraModel;
 use nirspi_recon::Measurements;
 use nirspi_recon::reconstruct::ReconstructError;
 use nirspi_recon::words::count;
@@ -38,6 +43,8 @@ pub enum Format {
     Npz,
     /// NumPy: one array.
     Npy,
+    /// A folder of arrays for Python's `zarr` and `xarray`.
+    Zarr,
     /// A table for spreadsheets.
     Csv,
     /// The dataset form.
@@ -54,6 +61,7 @@ impl Format {
     pub const ALL: &'static [Self] = &[
         Self::Npz,
         Self::Npy,
+        Self::Zarr,
         Self::Csv,
         Self::Parquet,
         Self::Mcap,
@@ -67,6 +75,7 @@ impl Format {
         match self {
             Self::Npz => "npz",
             Self::Npy => "npy",
+            Self::Zarr => "zarr",
             Self::Csv => "csv",
             Self::Parquet => "parquet",
             Self::Mcap => "mcap",
@@ -88,7 +97,7 @@ impl Format {
 
     /// Whether the file holds readings alone. A flat field corrects images, not readings.
     fn holds_readings(self) -> bool {
-        matches!(self, Self::Npz | Self::Npy | Self::Csv | Self::Parquet)
+        matches!(self, Self::Npz | Self::Npy | Self::Zarr | Self::Csv | Self::Parquet)
     }
 
     /// What a file of this format holds, in one line.
@@ -97,6 +106,7 @@ impl Format {
         match self {
             Self::Npz => "n, h_row, d (mean of all frames), frames (F, M), sequence, times",
             Self::Npy => "the readings of each frame alone, (F, M)",
+            Self::Zarr => "a folder with the arrays of npz, for Python's zarr and xarray",
             Self::Csv => "n, h_row and d, the mean of all frames, one pattern a line",
             Self::Parquet => {
                 "the dataset: one frame a row, with set-up, time, serial, depth, truth"
@@ -132,14 +142,19 @@ pub struct ExportOptions {
     pub distance_m: Option<f64>,
     /// An image of the scene as it is, `.npy` of shape (n, n); a field of Parquet files.
     pub truth: Option<PathBuf>,
-    /// The geometry of the images, from the description of the camera; a channel of MCAP files.
-    pub pinhole: Option<Pinhole>,
+    /// The description of the camera: the geometry of the images and the place of depth maps in them,
+    /// two channels of MCAP files.
+    #[cfg(any(feature = "live", feature = "virtual-camera"))]
+    pub model: Option<CameraModel>,
+    /// Whether MCAP files also get the enhanced images, and how well each of their pixels repeats.
+    #[cfg(feature = "enhance")]
+    pub enhance: bool,
 }
 
 /// What was exported.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Exported {
-    /// The file.
+    /// The file, or the folder of arrays.
     pub file: PathBuf,
     /// The form of the file.
     pub format: Format,
@@ -186,6 +201,22 @@ pub enum ExportError {
     /// The recording changed between two readings.
     #[error("{}: the recording changed while it was read: export it when its capture has ended", .0.display())]
     Changed(PathBuf),
+    /// The networks cannot be used.
+    #[cfg(feature = "enhance")]
+    #[error(transparent)]
+    Weights(#[from] nirspi_nets::WeightsError),
+    /// An image cannot be enhanced.
+    #[cfg(feature = "enhance")]
+    #[error("{}: the image of {time_ns} ns", .path.display())]
+    Enhance {
+        /// The recording.
+        path: PathBuf,
+        /// The time of the image.
+        time_ns: u64,
+        /// The problem.
+        #[source]
+        problem: crate::imaging::EnhanceError,
+    },
     /// An image cannot be made of a frame.
     #[error("{}: frame {frame}", .path.display())]
     Image {
@@ -199,7 +230,7 @@ pub enum ExportError {
     },
 }
 
-/// Exports a recording to the file `out`, which is whole or not made.
+/// Exports a recording to the file or folder `out`, which is whole or not made.
 ///
 /// # Errors
 /// [`ExportError`] names the file and the problem.
@@ -220,13 +251,14 @@ pub fn export(
     match format {
         Format::Npz => arrays::npz(&whole, out)?,
         Format::Npy => arrays::npy(&whole, out)?,
+        Format::Zarr => zarr::write(&whole, out)?,
         Format::Csv => arrays::csv(&whole, out)?,
         Format::Parquet => parquet::write(&whole, out, options)?,
         Format::Mcap => images = mcap::write(&whole, out, options)?,
         #[cfg(feature = "pictures")]
         Format::Apng => images = video::apng(&whole, out)?,
     }
-    let bytes = std::fs::metadata(out).map_or(0, |file| file.len());
+    let bytes = size_of(out);
     let (frames, patterns) = (whole.sequence.len(), whole.source.measurements.rows().len());
     let (file, mut notes) = (out.to_owned(), whole.source.notes);
     if whole.source.flat_field.is_some() && format.holds_readings() {
@@ -237,6 +269,14 @@ pub fn export(
         );
     }
     Ok(Exported { file, format, bytes, frames, patterns, images, notes })
+}
+
+/// Bytes of a file, or of all files of a folder.
+fn size_of(path: &Path) -> u64 {
+    let Ok(entries) = std::fs::read_dir(path) else {
+        return std::fs::metadata(path).map_or(0, |file| file.len());
+    };
+    entries.filter_map(Result::ok).map(|entry| size_of(&entry.path())).sum()
 }
 
 /// A recording that was read once: the mean of its frames, and the numbers and times of the frames.

@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use tempfile::TempPath;
 
 /// Prefix of the hidden names of files that are still being written, next to their final paths.
-const STAGED_PREFIX: &str = ".nirspi-";
+pub(super) const STAGED_PREFIX: &str = ".nirspi-";
 
 /// A folder that receives all the results of a run at once.
 ///

@@ -9,6 +9,9 @@ use nirspi_nets::{
 use nirspi_recon::{Image, Rows};
 use thiserror::Error;
 
+/// Number of simulated repetitions for the spread of an image.
+pub const SPREAD_COPIES: u32 = 8;
+
 /// The level of one pixel that sees a white target.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum White {
@@ -50,6 +53,8 @@ pub struct ImageContext<'c> {
     pub least_blur_px: Option<f32>,
     /// Seed of the networks' random numbers.
     pub seed: u64,
+    /// Number of simulated repetitions for [`EnhancedImage::spread`]; 0 for no spread.
+    pub copies: u32,
 }
 
 /// Why an image cannot be enhanced.
@@ -99,6 +104,10 @@ pub struct EnhancedImage {
     /// Distance of the readings from the readings of the result, divided by their noise. A value
     /// near 1 or below means that they agree.
     pub inconsistency: f32,
+    /// 64 x 64: the standard deviation of each pixel of the result if the same scene were measured
+    /// again, from readings with simulated noise (`nirspi_nets::Options::copies`). An error that the
+    /// network makes each time is not in this number.
+    pub spread: Option<Vec<f32>>,
 }
 
 /// The learned stages, ready for images of 32 x 32 and 64 x 64.
@@ -161,6 +170,7 @@ impl Enhance {
         let options = Options {
             measured,
             seed: context.seed,
+            copies: context.copies,
             estimate: KnownEstimate { sigma_px, ..KnownEstimate::default() },
             ..Options::default()
         };
@@ -180,6 +190,7 @@ impl Enhance {
             estimated_blur_px: estimated.sigma_px,
             noise: used.noise,
             inconsistency: result.inconsistency[0],
+            spread: result.spread,
         })
     }
 }

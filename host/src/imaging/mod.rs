@@ -20,7 +20,7 @@ mod warning;
 mod white;
 
 #[cfg(feature = "enhance")]
-pub use enhance::{Enhance, EnhanceError, EnhancedImage, ImageContext, White};
+pub use enhance::{Enhance, EnhanceError, EnhancedImage, ImageContext, SPREAD_COPIES, White};
 #[cfg(feature = "enhance")]
 pub use frames::{FrameReport, FramesError, enhance_frames, enhance_frames_by};
 pub use method_report::MethodReport;

@@ -99,6 +99,7 @@ mod tests {
             estimated_blur_px: blur_px,
             noise,
             inconsistency,
+            spread: None,
         }
     }
 

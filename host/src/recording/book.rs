@@ -1,7 +1,7 @@
 //! Writes the records of a recording, wherever they go.
 
 use super::monitor::Monitor;
-use super::schemas::{self, Channel, Pinhole};
+use super::schemas::{self, Channel};
 use super::{
     ACCOUNT, CHECKSUM, IDENTITY, JSON, PROFILE, RUN, RunAccount, SETTLING, SETUP, TOPIC, encoding,
     reader::checksum,
@@ -36,9 +36,9 @@ pub(crate) struct Opening<'o> {
 pub(crate) struct Book<W: Write> {
     writer: Writer<NoSeek<W>>,
     wire: u16,
-    channels: [u16; Channel::ALL.len()],
+    channels: [u16; Channel::RECORDED.len()],
     /// Number of messages in each channel, the packets first.
-    sequences: [u32; Channel::ALL.len() + 1],
+    sequences: [u32; Channel::RECORDED.len() + 1],
     opening: Vec<(&'static str, String)>,
     monitor: Monitor,
 }
@@ -71,16 +71,17 @@ impl<W: Write> Book<W> {
             let name = format!("nirspi.wire.v{}", opening.identity.protocol);
             let schema = writer.add_schema(&name, "text", schemas::WIRE.as_bytes())?;
             let wire = writer.add_channel(schema, TOPIC, &encoding, &none)?;
-            let mut channels = [0; Channel::ALL.len()];
-            for (id, channel) in channels.iter_mut().zip(Channel::ALL) {
+            let mut channels = [0; Channel::RECORDED.len()];
+            for (id, channel) in channels.iter_mut().zip(Channel::RECORDED) {
                 let descriptors = channel.descriptors();
-                let schema = writer.add_schema(channel.schema(), "protobuf", &descriptors)?;
-                *id = writer.add_channel(schema, channel.topic(), "protobuf", &none)?;
+                let schema =
+                    writer.add_schema(channel.schema(), schemas::ENCODING, &descriptors)?;
+                *id = writer.add_channel(schema, channel.topic(), schemas::ENCODING, &none)?;
             }
             Ok((writer, wire, channels))
         };
         let (writer, wire, channels) = begun().map_err(to_io)?;
-        let sequences = [0; Channel::ALL.len() + 1];
+        let sequences = [0; Channel::RECORDED.len() + 1];
         let monitor = Monitor::default();
         let mut book = Self { writer, wire, channels, sequences, opening: parts, monitor };
         book.write_opening()?;
@@ -105,7 +106,7 @@ impl<W: Write> Book<W> {
     }
 
     fn other(&mut self, channel: Channel, time_ns: u64, data: &[u8]) -> io::Result<()> {
-        let at = Channel::ALL.iter().position(|&other| other == channel).unwrap_or(0);
+        let at = Channel::RECORDED.iter().position(|&other| other == channel).unwrap_or(0);
         self.message(self.channels[at], at + 1, time_ns, data)
     }
 
@@ -144,11 +145,39 @@ impl<W: Write> Book<W> {
         self.other(Channel::Image, time_ns, &schemas::image(time_ns, image, range))
     }
 
+    /// Writes an enhanced image in [0, 1], and its spread.
+    ///
+    /// # Errors
+    /// The writer's error.
+    #[cfg(feature = "enhance")]
+    pub(crate) fn enhanced(
+        &mut self,
+        time_ns: u64,
+        pixels: &[f32],
+        spread: Option<&[f32]>,
+    ) -> io::Result<()> {
+        let side = nirspi_nets::deblur::SIDE;
+        self.other(Channel::Enhanced, time_ns, &schemas::raw_image(time_ns, side, pixels))?;
+        let Some(spread) = spread else { return Ok(()) };
+        self.other(Channel::Spread, time_ns, &schemas::raw_image(time_ns, side, spread))
+    }
+
+    /// Writes a depth map in the camera's image, in metres.
+    ///
+    /// # Errors
+    /// The writer's error.
+    #[cfg(any(feature = "live", feature = "virtual-camera"))]
+    pub(crate) fn depth(&mut self, time_ns: u64, pixels_m: &[f32]) -> io::Result<()> {
+        let image = schemas::raw_image(time_ns, nirspi_optics::SIDE, pixels_m);
+        self.other(Channel::Depth, time_ns, &image)
+    }
+
     /// Writes the geometry of the images.
     ///
     /// # Errors
     /// The writer's error.
-    pub(crate) fn pinhole(&mut self, time_ns: u64, pinhole: &Pinhole) -> io::Result<()> {
+    #[cfg(any(feature = "live", feature = "virtual-camera"))]
+    pub(crate) fn pinhole(&mut self, time_ns: u64, pinhole: &schemas::Pinhole) -> io::Result<()> {
         self.other(Channel::Calibration, time_ns, &pinhole.encode(time_ns))
     }
 

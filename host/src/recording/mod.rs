@@ -27,7 +27,7 @@ mod reader;
 mod recover;
 mod run;
 mod scan;
-mod schemas;
+pub(crate) mod schemas;
 mod spool;
 mod writer;
 

@@ -1,9 +1,9 @@
 //! Makes telemetry and log of the packets of a run.
 
-use super::schemas::{Level, Telemetry};
-use crate::events;
+use super::schemas::Telemetry;
+use crate::events::{self, Level};
 use crate::tally::Tally;
-use nirspi_wire::{Answer, DeviceMessage, EventKind, PacketError, Reply, Status};
+use nirspi_wire::{Answer, DeviceMessage, PacketError, Reply, Status};
 
 /// Time between two records of telemetry.
 const EVERY_NS: u64 = 100_000_000;
@@ -22,24 +22,11 @@ impl Monitor {
         &mut self,
         content: &Result<DeviceMessage<'_>, PacketError>,
     ) -> Option<(Level, String)> {
-        match content {
-            Ok(DeviceMessage::Event(event)) => {
-                let level = match event.kind {
-                    EventKind::RunEnded { .. } => Level::Info,
-                    EventKind::Fault(_) => Level::Error,
-                    EventKind::RawDropped
-                    | EventKind::CommandDamaged
-                    | EventKind::FpgaAccessesDamaged { .. } => Level::Warning,
-                };
-                Some((level, events::as_it_happens(&event.kind)))
-            }
-            Ok(DeviceMessage::Crash(report)) => Some((Level::Error, events::crash(report))),
-            Ok(DeviceMessage::Reply(Reply { outcome: Ok(Answer::Status(status)), .. })) => {
-                self.status = Some(*status);
-                None
-            }
-            _ => None,
+        let message = content.as_ref().ok()?;
+        if let DeviceMessage::Reply(Reply { outcome: Ok(Answer::Status(status)), .. }) = message {
+            self.status = Some(*status);
         }
+        events::line(message)
     }
 
     /// The telemetry at `time_ns`, ten times a second.

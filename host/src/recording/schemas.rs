@@ -1,10 +1,12 @@
-//! The channels of a recording, and the schemas by which other programs read them.
+//! The channels of a recording and of a live camera, and the schemas by which other programs read
+//! them.
 //!
 //! Images, log and calibration have the schemas of Foxglove, which Foxglove and Rerun show
 //! (<https://github.com/foxglove/foxglove-sdk>, `schemas/proto`). Telemetry has one of our own.
 
 use super::protobuf::{Field, Kind, Message, Type, descriptor, file};
 use crate::account::LossCounters;
+use crate::events::Level;
 use nirspi_recon::Image;
 
 /// The frame of reference of the images.
@@ -19,33 +21,59 @@ The number of the protocol's version is in the encoding of the channel's message
 docs/protocol.md of nirspi describes every message; mcu/wire is the code.
 ";
 
+/// The encoding of the messages and of their descriptions in all channels of this module.
+pub(crate) const ENCODING: &str = "protobuf";
+
 /// A channel beside the packets.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Channel {
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Channel {
     Telemetry,
     Log,
     Image,
     Calibration,
+    /// The depth map in the camera's image.
+    Depth,
+    /// The enhanced image.
+    Enhanced,
+    /// How well each pixel of the enhanced image repeats.
+    Spread,
 }
 
 impl Channel {
-    pub(super) const ALL: [Self; 4] = [Self::Telemetry, Self::Log, Self::Image, Self::Calibration];
+    /// The channels of a recording.
+    pub(super) const RECORDED: [Self; 7] = [
+        Self::Telemetry,
+        Self::Log,
+        Self::Image,
+        Self::Calibration,
+        Self::Depth,
+        Self::Enhanced,
+        Self::Spread,
+    ];
 
-    pub(super) fn topic(self) -> &'static str {
+    /// The channels of a live camera.
+    #[cfg(feature = "serve")]
+    pub(crate) const LIVE: [Self; 6] =
+        [Self::Telemetry, Self::Log, Self::Image, Self::Calibration, Self::Depth, Self::Enhanced];
+
+    pub(crate) fn topic(self) -> &'static str {
         match self {
             Self::Telemetry => "/telemetry",
             Self::Log => "/log",
             Self::Image => "/image",
             Self::Calibration => "/calibration",
+            Self::Enhanced => "/enhanced",
+            Self::Depth => "/depth",
+            Self::Spread => "/spread",
         }
     }
 
     /// The full name of the channel's messages.
-    pub(super) fn schema(self) -> &'static str {
+    pub(crate) fn schema(self) -> &'static str {
         match self {
             Self::Telemetry => "nirspi.Telemetry",
             Self::Log => "foxglove.Log",
-            Self::Image => "foxglove.RawImage",
+            Self::Image | Self::Enhanced | Self::Depth | Self::Spread => "foxglove.RawImage",
             Self::Calibration => "foxglove.CameraCalibration",
         }
     }
@@ -74,7 +102,7 @@ impl Channel {
                 (5, "file", Type::Text),
                 (6, "line", Type::Fixed32),
             ],
-            Self::Image => &[
+            Self::Image | Self::Enhanced | Self::Depth | Self::Spread => &[
                 (1, "timestamp", TIME),
                 (7, "frame_id", Type::Text),
                 (2, "width", Type::Fixed32),
@@ -98,7 +126,7 @@ impl Channel {
     }
 
     /// The description of the channel's messages, a `FileDescriptorSet`.
-    pub(super) fn descriptors(self) -> Vec<u8> {
+    pub(crate) fn descriptors(self) -> Vec<u8> {
         static LEVELS: [(&str, &[&str]); 1] =
             [("Level", &["UNKNOWN", "DEBUG", "INFO", "WARNING", "ERROR", "FATAL"])];
         let (package, name) = self.schema().split_once('.').unwrap_or_default();
@@ -120,17 +148,17 @@ fn stamped(time_ns: u64) -> Message {
 
 /// The state of a capture at one moment.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Telemetry {
-    pub(super) device_time_us: u64,
-    pub(super) counters: LossCounters,
-    pub(super) damaged_packets: u64,
-    pub(super) frames_per_s: f64,
+pub(crate) struct Telemetry {
+    pub(crate) device_time_us: u64,
+    pub(crate) counters: LossCounters,
+    pub(crate) damaged_packets: u64,
+    pub(crate) frames_per_s: f64,
     /// What the camera reported last; `None` before its first status.
-    pub(super) status: Option<nirspi_wire::Status>,
+    pub(crate) status: Option<nirspi_wire::Status>,
 }
 
 impl Telemetry {
-    pub(super) fn encode(&self, time_ns: u64) -> Vec<u8> {
+    pub(crate) fn encode(&self, time_ns: u64) -> Vec<u8> {
         let LossCounters { received, lost, corrupt, late } = self.counters;
         let message = stamped(time_ns)
             .uint(2, self.device_time_us)
@@ -154,25 +182,28 @@ impl Telemetry {
     }
 }
 
-/// How serious a line of the log is, by its number in the schema.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Level {
-    Info = 2,
-    Warning = 3,
-    Error = 4,
-}
-
-pub(super) fn log(time_ns: u64, level: Level, text: &str) -> Vec<u8> {
-    stamped(time_ns).uint(2, level as u64).text(3, text).text(4, FRAME_ID).end()
+/// A line of the log.
+pub(crate) fn log(time_ns: u64, level: Level, text: &str) -> Vec<u8> {
+    let number = match level {
+        Level::Info => 2,
+        Level::Warning => 3,
+        Level::Error => 4,
+    };
+    stamped(time_ns).uint(2, number).text(3, text).text(4, FRAME_ID).end()
 }
 
 /// An image in float32. Values from `least` to `most` become 0 to 1, because viewers show that
 /// range.
 pub(super) fn image(time_ns: u64, image: &Image, [least, most]: [f32; 2]) -> Vec<u8> {
-    let side = image.side().pixels() as u32;
     let scale = if most > least { 1.0 / (most - least) } else { 0.0 };
-    let pixels = image.pixels().iter().map(|pixel| (pixel - least) * scale);
-    let data: Vec<u8> = pixels.flat_map(f32::to_le_bytes).collect();
+    let pixels: Vec<f32> = image.pixels().iter().map(|pixel| (pixel - least) * scale).collect();
+    raw_image(time_ns, image.side().pixels(), &pixels)
+}
+
+/// A square image of these pixels, row by row, in float32.
+pub(crate) fn raw_image(time_ns: u64, side: usize, pixels: &[f32]) -> Vec<u8> {
+    let side = side as u32;
+    let data: Vec<u8> = pixels.iter().flat_map(|pixel| pixel.to_le_bytes()).collect();
     stamped(time_ns)
         .fixed32(2, side)
         .fixed32(3, side)
@@ -192,8 +223,23 @@ pub struct Pinhole {
     pub focal_px: f64,
 }
 
+/// The geometry of the images of a camera, as its description has the projector: the images have no
+/// distortion.
+#[cfg(any(feature = "live", feature = "virtual-camera"))]
+impl From<&nirspi_optics::CameraModel> for Pinhole {
+    fn from(camera: &nirspi_optics::CameraModel) -> Self {
+        let side = nirspi_optics::SIDE;
+        let focal_px = side as f64 / camera.projector().field_over_distance();
+        Self { side: side as u32, focal_px }
+    }
+}
+
 impl Pinhole {
-    pub(super) fn encode(&self, time_ns: u64) -> Vec<u8> {
+    #[cfg_attr(
+        not(any(feature = "live", feature = "virtual-camera")),
+        allow(dead_code, reason = "no description of a camera gives a geometry")
+    )]
+    pub(crate) fn encode(&self, time_ns: u64) -> Vec<u8> {
         let Self { side, focal_px: f } = *self;
         let c = f64::from(side) / 2.0;
         stamped(time_ns)

@@ -18,16 +18,18 @@ use crate::capture::{
     Calibration, Capture, CaptureError, CaptureOptions, Ended, Observer, Progress,
 };
 use crate::clock::Instant;
+use crate::events::{self, Level};
 use crate::integrate::Newest;
 use crate::recording::Target;
 use crate::session::{IgnorePackets, Listener, Session, SessionError, request};
 use crate::setup::MeasurementSetup;
-use crate::{causes, events};
+use crate::{causes, depth_image};
 use nirspi_nets::DepthMaps;
 use nirspi_optics::{CameraModel, SIDE};
 use nirspi_recon::words::count;
 use nirspi_wire::{
-    Depth, DeviceMessage, EventKind, Fault, Frame, PacketError, Refusal, State as Device,
+    Answer, Depth, DeviceMessage, EventKind, Fault, Frame, PacketError, Refusal, Reply,
+    State as Device,
 };
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -112,7 +114,8 @@ pub(super) fn reconnect(
             let problem = causes::in_one_line(&*problem);
             let refused = shared.stage.refuse(scene.as_ref(), &problem);
             if refused {
-                lock(&shared.camera).event(format!("the scene is not shown: {problem}"));
+                let line = format!("the scene is not shown: {problem}");
+                lock(&shared.camera).event(Level::Warning, line);
             }
             Err((!refused).then_some(problem))
         }
@@ -154,22 +157,23 @@ pub(super) struct EventLog<'s>(pub(super) &'s Shared);
 
 impl Listener for EventLog<'_> {
     fn packet(&mut self, _: &[u8], content: &Result<DeviceMessage<'_>, PacketError>) {
-        if let Some(text) = content.as_ref().ok().and_then(in_words) {
-            lock(&self.0.camera).event(text);
+        if let Ok(message) = content {
+            self.0.note(message);
         }
     }
 }
 
-/// An event or a crash in words; `None` for any other message.
-fn in_words(message: &DeviceMessage<'_>) -> Option<String> {
-    match message {
-        DeviceMessage::Event(event) => Some(events::as_it_happens(&event.kind)),
-        DeviceMessage::Crash(report) => Some(events::crash(report)),
-        _ => None,
-    }
-}
-
 impl Shared {
+    /// Records what a camera says of itself: events, crashes and its status.
+    fn note(&self, message: &DeviceMessage<'_>) {
+        if let Some((level, text)) = events::line(message) {
+            lock(&self.camera).event(level, text);
+        }
+        if let DeviceMessage::Reply(Reply { outcome: Ok(Answer::Status(status)), .. }) = message {
+            lock(&self.camera).camera.said.status = Some(*status);
+        }
+    }
+
     /// Records a new phase, and tells pages at once.
     pub(super) fn enter(&self, phase: Phase, leds: Leds, line: String) {
         let mut log = lock(&self.camera);
@@ -200,6 +204,8 @@ pub(super) struct Live {
     known: Option<(String, Settling)>,
     /// The loss counters of all earlier runs.
     earlier: LossCounters,
+    /// The damaged packets of all earlier runs.
+    damaged: u64,
     now: Option<(Arc<RunSetup>, Newest)>,
     /// The flat field of the connected camera.
     flat_field: Option<FlatField>,
@@ -231,6 +237,7 @@ impl Live {
             plan: Plan::default(),
             known: None,
             earlier: LossCounters::default(),
+            damaged: 0,
             now: None,
             flat_field: None,
             depth: None,
@@ -283,17 +290,17 @@ impl Live {
             // A person allowed light before another scene.
             End::Scene => Next::Connect { person_said: true },
             End::Gone(why) => {
-                lock(&shared.camera).event(why.clone());
+                lock(&shared.camera).event(Level::Error, why.clone());
                 shared.enter(Phase::Lost, Leds::Unknown, format!("{why}; trying again"));
                 Next::Retry
             }
             End::Fault(fault) => dark(Phase::Fault, switched_off(fault)),
             End::Dark(why) => {
-                lock(&shared.camera).event(why.clone());
+                lock(&shared.camera).event(Level::Error, why.clone());
                 dark(Phase::Fault, why)
             }
             End::Uncalibrated(why) => {
-                lock(&shared.camera).event(why.clone());
+                lock(&shared.camera).event(Level::Error, why.clone());
                 dark(Phase::Uncalibrated, why)
             }
         }
@@ -303,10 +310,10 @@ impl Live {
     pub(super) fn greeted(&mut self, connected: &mut Connected) {
         let Connected { session, note, flat_field, .. } = connected;
         for text in session.reports().lines.iter().cloned().chain(note.take()) {
-            lock(&self.shared.camera).event(text);
+            lock(&self.shared.camera).event(Level::Info, text);
         }
         if let Some(kept) = flat_field {
-            lock(&self.shared.camera).event(kept.summary());
+            lock(&self.shared.camera).event(Level::Info, kept.summary());
         }
         self.flat_field = flat_field.as_ref().map(|kept| kept.flat.clone());
     }
@@ -375,9 +382,10 @@ impl Live {
             Err(error @ (CaptureError::Recording { .. } | CaptureError::RecordingCut { .. })) => {
                 if let CaptureError::RecordingCut { counters, .. } = &error {
                     self.earlier = self.earlier + *counters;
+                    self.damaged = lock(&self.shared.camera).camera.said.damaged_packets;
                 }
                 self.record_no_more();
-                lock(&self.shared.camera).event(causes::in_one_line(&error));
+                lock(&self.shared.camera).event(Level::Error, causes::in_one_line(&error));
                 return Ok(None);
             }
             Err(error) if !self.begun => return Err(error),
@@ -390,6 +398,7 @@ impl Live {
             Err(error) => return Ok(Some(End::Gone(causes::in_one_line(&error)))),
         };
         self.earlier = self.earlier + captured.counters;
+        self.damaged += captured.damaged_packets;
         self.shared.slot.account(self.earlier);
         let missing = captured.missing();
         if let Some(path) = &captured.recording {
@@ -420,7 +429,7 @@ impl Live {
     fn recorded(&self, path: &Path, frames: u64) {
         let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
         let frames = count(frames, "frame");
-        lock(&self.shared.camera).event(format!("recorded {frames} in {name}"));
+        lock(&self.shared.camera).event(Level::Info, format!("recorded {frames} in {name}"));
     }
 }
 
@@ -441,7 +450,7 @@ impl Observer for Live {
         let mut log = lock(&self.shared.camera);
         if let Some(problem) = problem {
             let problem = causes::in_one_line(problem);
-            log.event(format!("the kept calibration is used: {problem}"));
+            log.event(Level::Warning, format!("the kept calibration is used: {problem}"));
         }
         log.measuring(setup, settling.is_some());
     }
@@ -476,25 +485,21 @@ impl Observer for Live {
             }
             _ => {}
         }
-        if let Some(text) = in_words(message) {
-            lock(&self.shared.camera).event(text);
-        }
+        self.shared.note(message);
     }
 
     fn watch(&mut self, progress: &Progress) -> ControlFlow<()> {
         self.shared.slot.account(self.earlier + progress.counters);
+        let damaged = self.damaged + progress.damaged_packets;
+        lock(&self.shared.camera).camera.said.counted(progress.device_time_us, damaged);
         self.look_at_load(progress);
         if self.goes_on() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
     }
 }
 
-/// The depth map in the camera's image; `None` for a sensor with other than 8 x 8 zones, because
-/// the positions of its zones are not known.
+/// The depth map in the camera's image; `None` for a sensor whose zones are not known.
 fn depth_map(model: &CameraModel, depth: &Depth<'_>) -> Option<DepthImage> {
-    let zones_mm: Vec<u16> = depth.distances_mm.iter().collect();
-    let field = model.projector().field_over_distance();
-    let view = model.depth_geometry().view(zones_mm.as_slice().try_into().ok()?, field);
-    let pixels_m: Vec<f32> = view.pixels_mm.iter().map(|&mm| f32::from(mm) * 1e-3).collect();
+    let pixels_m = depth_image::pixels_m(model, depth)?;
     let map = DepthMaps::new(pixels_m.clone(), [1, SIDE, SIDE], 1).ok()?;
     Some(DepthImage { map, pixels_m })
 }

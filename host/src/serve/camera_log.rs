@@ -3,9 +3,11 @@
 use super::light::Leds;
 use crate::boards;
 use crate::clock;
+use crate::events::Level;
 use crate::session::CameraIdentity;
 use crate::setup::MeasurementSetup;
 use crate::versions::{self, Part};
+use nirspi_wire::Status;
 use serde::Serialize;
 use std::collections::VecDeque;
 
@@ -49,6 +51,26 @@ pub struct CameraState {
     versions: Vec<Part>,
     #[serde(skip_serializing_if = "Option::is_none")]
     measurement: Option<Measurement>,
+    /// What the camera last said of itself.
+    pub said: Said,
+}
+
+/// What a camera last said of itself beside its frames.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct Said {
+    /// The camera's time of the newest frame of the run.
+    pub device_time_us: u64,
+    /// Damaged packets of all runs.
+    pub damaged_packets: u64,
+    /// The last status; `null` before the first.
+    pub status: Option<Status>,
+}
+
+impl Said {
+    /// Records what the host has counted of a run so far.
+    pub fn counted(&mut self, device_time_us: u64, damaged_packets: u64) {
+        (self.device_time_us, self.damaged_packets) = (device_time_us, damaged_packets);
+    }
 }
 
 /// A short description of the measurement.
@@ -67,7 +89,9 @@ struct Measurement {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EventLine {
     /// Time of the event, in milliseconds since 1970.
-    unix_ms: u64,
+    pub unix_ms: u64,
+    /// How serious the event is.
+    pub level: Level,
     /// The event in one line.
     pub text: String,
 }
@@ -79,6 +103,8 @@ pub struct CameraLog {
     pub camera: CameraState,
     /// The newest events, oldest first.
     events: VecDeque<EventLine>,
+    /// Number of all events.
+    count: u64,
 }
 
 impl CameraLog {
@@ -93,8 +119,9 @@ impl CameraLog {
             identity: identity.clone(),
             versions: Vec::new(),
             measurement: None,
+            said: Said::default(),
         };
-        let mut log = Self { camera, events: VecDeque::new() };
+        let mut log = Self { camera, events: VecDeque::new(), count: 0 };
         log.greeted(identity);
         log
     }
@@ -108,7 +135,16 @@ impl CameraLog {
         // A greeting ends the session before, and light with it.
         self.camera.leds = Leds::Off;
         self.enter(Phase::Preparing, "preparing: latency and settling are measured".to_owned());
-        self.event(format!("connected to {} {}", identity.board, identity.serial));
+        self.camera.said.status = None;
+        self.event(Level::Info, format!("connected to {} {}", identity.board, identity.serial));
+    }
+
+    /// The camera's name for other programs.
+    #[cfg(feature = "serve")]
+    pub fn name(&self) -> String {
+        let CameraState { identity, simulated, .. } = &self.camera;
+        let simulated = if *simulated { " (simulated)" } else { "" };
+        format!("nirspi {} {}{simulated}", identity.board, identity.serial)
     }
 
     /// Records that frames arrive from now on.
@@ -131,9 +167,10 @@ impl CameraLog {
     }
 
     /// Records an event.
-    pub fn event(&mut self, text: String) {
+    pub fn event(&mut self, level: Level, text: String) {
         let unix_ms = clock::since_1970().as_millis() as u64;
-        self.events.push_back(EventLine { unix_ms, text });
+        self.events.push_back(EventLine { unix_ms, level, text });
+        self.count += 1;
         if self.events.len() > EVENTS {
             self.events.pop_front();
         }
@@ -142,6 +179,14 @@ impl CameraLog {
     /// The newest events, oldest first.
     pub fn events(&self) -> &VecDeque<EventLine> {
         &self.events
+    }
+
+    /// The events after the first `seen` ones, as far as they are kept, and the number of all
+    /// events.
+    #[cfg(feature = "serve")]
+    pub fn after(&self, seen: u64) -> (impl Iterator<Item = &EventLine>, u64) {
+        let new = usize::try_from(self.count.saturating_sub(seen)).unwrap_or(usize::MAX);
+        (self.events.iter().skip(self.events.len().saturating_sub(new)), self.count)
     }
 }
 
@@ -164,10 +209,18 @@ mod tests {
         };
         let mut log = CameraLog::new("test", &identity);
         for number in 1..=3 * EVENTS {
-            log.event(number.to_string());
+            log.event(Level::Info, number.to_string());
         }
         let texts: Vec<&str> = log.events().iter().map(|event| event.text.as_str()).collect();
         let expected: Vec<String> = (2 * EVENTS + 1..=3 * EVENTS).map(|n| n.to_string()).collect();
         assert_eq!(texts, expected);
+        let all = 3 * EVENTS as u64 + 1;
+        let after = |seen| {
+            let (lines, count) = log.after(seen);
+            (lines.map(|line| line.text.clone()).collect::<Vec<_>>(), count)
+        };
+        assert_eq!(after(0), (expected.clone(), all));
+        assert_eq!(after(all - 2), (expected[EVENTS - 2..].to_vec(), all));
+        assert_eq!(after(all), (Vec::new(), all));
     }
 }

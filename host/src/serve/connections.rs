@@ -3,7 +3,8 @@
 //!
 //! One rule closes silent connections, half requests, and streams that are not read: a connection
 //! to which nothing could be written for [`SILENT`] is closed. An open event stream gets a state
-//! twice a second at least, so its connection stays open as long as its client reads.
+//! twice a second at least, so its connection stays open as long as its client reads. The connection
+//! of a viewer such as Foxglove counts as an event stream; it gets a ping each second.
 //!
 //! # Invariant
 //! At most [`MOST`] connections are open, [`MOST_OF_CLIENT`] of one client, and [`STREAMS_OF_CLIENT`]
@@ -195,9 +196,9 @@ pub struct Door {
 }
 
 impl Door {
-    /// A door at this listener.
-    pub fn new(listener: TcpListener) -> Self {
-        Self { listener, connections: Connections::default() }
+    /// A door at this listener. The limits hold for all doors with the same connections together.
+    pub fn new(listener: TcpListener, connections: Connections) -> Self {
+        Self { listener, connections }
     }
 }
 

@@ -6,13 +6,13 @@
 //! (`a_browser_that_does_not_read_delays_no_other_and_then_sees_the_newest` and
 //! `a_slow_browser_has_few_old_images_before_it` in `host/src/serve/tests.rs`).
 
-use super::connections::{Door, Peer, Streaming};
+use super::connections::{Connections, Door, Peer, Streaming};
 use super::delays::Passed;
 use super::imaging::Picture;
 use super::server::Server;
 use super::state::Published;
 use super::token::{self, Token};
-use super::{Shared, commands, guard, page};
+use super::{Shared, commands, foxglove, guard, page};
 use crate::files::image::encode_grey;
 use crate::files::npy;
 use axum::Router;
@@ -57,12 +57,13 @@ const HEADERS: [(HeaderName, &str); 5] = [
     (header::CACHE_CONTROL, "no-store"),
 ];
 
+/// What the handlers of one server use.
 #[derive(Clone)]
-struct App {
-    shared: Arc<Shared>,
-    published: watch::Receiver<Arc<Published>>,
-    listen: SocketAddr,
-    token: Option<Token>,
+pub struct App {
+    pub shared: Arc<Shared>,
+    pub published: watch::Receiver<Arc<Published>>,
+    pub listen: SocketAddr,
+    pub token: Option<Token>,
 }
 
 /// Serves until `is_over`. Open requests are then cut off, because the page detects the end of the
@@ -73,9 +74,41 @@ pub fn run(
     published: watch::Receiver<Arc<Published>>,
     is_over: impl Fn() -> bool,
 ) -> io::Result<()> {
-    let Server { listener, token, address: listen } = server;
+    let Server { listener, token, address: listen, foxglove } = server;
     let app = App { shared, published, listen, token };
-    let router = Router::new()
+    let mut servers = Vec::new();
+    if let Some(foxglove) = foxglove {
+        let Server { listener, token, address: listen, .. } = *foxglove;
+        servers.push((listener, foxglove::routes(App { listen, token, ..app.clone() })));
+    }
+    servers.push((listener, routes(app)));
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+    runtime.block_on(async move {
+        // The limits hold for both servers together.
+        let connections = Connections::default();
+        let mut serving = Vec::new();
+        for (listener, router) in servers {
+            listener.set_nonblocking(true)?;
+            let listener = tokio::net::TcpListener::from_std(listener)?;
+            let door = Door::new(listener, connections.clone());
+            let service = router.into_make_service_with_connect_info::<Peer>();
+            serving.push(tokio::spawn(async move { serve(door, service).await }));
+        }
+        loop {
+            if let Some(ended) = serving.iter_mut().find(|serving| serving.is_finished()) {
+                return ended.await.map_err(io::Error::other)?;
+            }
+            if is_over() {
+                return Ok(());
+            }
+            tokio::time::sleep(TICK).await;
+        }
+    })
+}
+
+/// The page and its interface for scripts.
+fn routes(app: App) -> Router {
+    Router::new()
         .merge(page::routes())
         .route("/events", get(events))
         .route("/api/state", get(state))
@@ -90,21 +123,7 @@ pub fn run(
         .fallback(nothing_there)
         .layer(DefaultBodyLimit::max(MAX_CHANGE_BYTES))
         .layer(from_fn_with_state(app.clone(), only_ours))
-        .with_state(app);
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
-    listener.set_nonblocking(true)?;
-    runtime.block_on(async move {
-        let door = Door::new(tokio::net::TcpListener::from_std(listener)?);
-        let service = router.into_make_service_with_connect_info::<Peer>();
-        let serving = tokio::spawn(async move { serve(door, service).await });
-        while !is_over() && !serving.is_finished() {
-            tokio::time::sleep(TICK).await;
-        }
-        if serving.is_finished() {
-            return serving.await.map_err(io::Error::other)?;
-        }
-        Ok(())
-    })
+        .with_state(app)
 }
 
 /// Refuses every request that [`guard`] refuses, that lacks the token, or that announces too much,
@@ -152,7 +171,7 @@ fn refused(app: &App, request: &Request) -> Option<Response> {
 }
 
 /// A response of one line.
-fn line(status: StatusCode, text: &impl ToString) -> Response {
+pub fn line(status: StatusCode, text: &impl ToString) -> Response {
     (status, format!("{}\n", text.to_string())).into_response()
 }
 

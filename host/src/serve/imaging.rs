@@ -171,6 +171,8 @@ fn enhance_by(model: Model, device: &Device) -> Result<Enhance, WeightsError> {
 /// The images of one state, and their properties.
 #[derive(Debug, Serialize)]
 pub struct Picture {
+    /// The first image has number 1, each further one the next number.
+    pub number: u64,
     /// The reconstructed image, (32, 32) ADC counts.
     #[serde(skip)]
     pub counts: Vec<f32>,
@@ -189,7 +191,7 @@ pub struct Picture {
     #[serde(skip)]
     pub arrived: Instant,
     /// The same on the clock of the computer that reads the camera, in milliseconds since 1970.
-    arrived_unix_ms: u64,
+    pub arrived_unix_ms: u64,
     method: &'static str,
     /// Number of summed frames.
     frames: u64,
@@ -212,6 +214,30 @@ impl Picture {
     pub fn shares_of_white(&self) -> Vec<f32> {
         let scale = if self.white_counts > 0.0 { 1.0 / self.white_counts } else { 0.0 };
         self.counts.iter().map(|value| (value * scale).clamp(0.0, 1.0)).collect()
+    }
+}
+
+#[cfg(test)]
+impl Picture {
+    /// A picture of these counts, of which 2 are white.
+    pub fn of_counts(number: u64, counts: Vec<f32>, enhanced: Option<Vec<f32>>) -> Self {
+        Self {
+            number,
+            counts,
+            enhanced,
+            readings: Vec::new(),
+            depth: None,
+            arrived: Instant::now(),
+            arrived_unix_ms: clock::since_1970().as_millis() as u64,
+            method: "hadamard",
+            frames: 1,
+            white_counts: 2.0,
+            reconstruct_ms: 0.0,
+            enhancement: None,
+            warnings: Vec::new(),
+            frame_warnings: Vec::new(),
+            short_warnings: Vec::new(),
+        }
     }
 }
 
@@ -290,6 +316,7 @@ impl Studio {
             scene: shared.stage.state(),
             line: shared.line.as_ref().map(Line::state),
             viewers: shared.viewers(),
+            foxglove: shared.foxglove(),
             delays: lock(&shared.delays).state(now),
             overload: lock(&shared.overload).state(),
             events: log.events(),
@@ -349,6 +376,7 @@ impl Imaging {
             shared.passed(Passed::Enhanced, look.arrived);
         }
         Ok(Picture {
+            number: shared.slot.ledger().images.shown + 1,
             counts: image.pixels().to_vec(),
             enhanced,
             readings: readings(&measurements),

@@ -12,6 +12,8 @@
 //! ([`settings::Change`]). Two threads compute; all of HTTP runs asynchronously on a third thread.
 //! Without threads and server, the same parts take turns ([`Turns`]).
 //!
+//! Viewers such as Foxglove get the same images over a protocol of their own (`foxglove.rs`).
+//!
 //! `docs/live-page.md` lists what each stage holds at most, and where a test says so. Each frame's
 //! delay to each stage is measured (`delays.rs`). If the computer is too slow for the camera, the page
 //! gives up images, then enhancement (`overload.rs`).
@@ -22,6 +24,8 @@ mod commands;
 #[cfg(feature = "serve")]
 mod connections;
 mod delays;
+#[cfg(feature = "serve")]
+mod foxglove;
 #[cfg(feature = "serve")]
 mod guard;
 #[cfg(feature = "serve")]
@@ -62,6 +66,7 @@ pub use token::{Token, TokenError};
 pub use turns::Turns;
 
 use crate::clock::Instant;
+use crate::events::Level;
 use camera_log::CameraLog;
 use delays::{Delays, Passed};
 use light::LightSwitch;
@@ -69,6 +74,7 @@ use overload::{Load, Overload, Shed};
 use settings::{Offer, Settings};
 use slot::Slot;
 use stage::Stage;
+use state::FoxgloveState;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -92,6 +98,9 @@ struct Shared {
     overload: Mutex<Overload>,
     over: AtomicBool,
     viewers: AtomicUsize,
+    /// What viewers such as Foxglove get, if there is a server for them.
+    #[cfg(feature = "serve")]
+    foxglove: Option<foxglove::Foxglove>,
 }
 
 impl Shared {
@@ -108,6 +117,8 @@ impl Shared {
             overload: Mutex::default(),
             over: AtomicBool::new(false),
             viewers: AtomicUsize::new(0),
+            #[cfg(feature = "serve")]
+            foxglove: None,
         }
     }
 
@@ -119,6 +130,17 @@ impl Shared {
         self.viewers.load(Ordering::Relaxed)
     }
 
+    /// The numbers of the viewers such as Foxglove; `None` without a server for them.
+    fn foxglove(&self) -> Option<FoxgloveState> {
+        #[cfg(feature = "serve")]
+        return self.foxglove.as_ref().map(|foxglove| {
+            let (viewers, images_sent, images_dropped) = foxglove.counts();
+            FoxgloveState { viewers, images_sent, images_dropped }
+        });
+        #[cfg(not(feature = "serve"))]
+        return None;
+    }
+
     /// A frame that arrived at this moment, or its image, has passed this stage now.
     fn passed(&self, stage: Passed, arrived: Instant) {
         lock(&self.delays).passed(stage, arrived, Instant::now());
@@ -128,7 +150,8 @@ impl Shared {
     fn loaded(&self, load: Load) {
         let change = lock(&self.overload).at(Instant::now(), load);
         if let Some(line) = change {
-            lock(&self.camera).event(line);
+            let level = if self.shed().show_every == 1 { Level::Info } else { Level::Warning };
+            lock(&self.camera).event(level, line);
         }
     }
 

@@ -1,6 +1,7 @@
 //! Where the page is served, and who may open it.
 
 use super::token::{Token, TokenError};
+use std::fmt::Display;
 use std::io;
 use std::net::{SocketAddr, TcpListener};
 use thiserror::Error;
@@ -20,6 +21,8 @@ pub enum BindError {
 /// A listening server.
 #[derive(Debug)]
 pub struct Server {
+    /// The server for viewers such as Foxglove.
+    pub(super) foxglove: Option<Box<Server>>,
     pub(super) listener: TcpListener,
     pub(super) token: Option<Token>,
     /// Where the server listens.
@@ -39,25 +42,53 @@ impl Server {
             None if !address.ip().is_loopback() => Some(Token::random()?),
             token => token,
         };
-        Ok(Self { listener, token, address })
+        Ok(Self { listener, token, address, foxglove: None })
     }
 
-    /// The address of the page, with the token if there is one.
+    /// Also listens for viewers such as Foxglove: at a port beside the page, or at `host:port`. The
+    /// token is that of the page. If the page has none and other machines reach the viewers' address,
+    /// that address gets a random one.
+    ///
+    /// # Errors
+    /// [`BindError`].
+    pub fn with_foxglove(mut self, place: &str) -> Result<Self, BindError> {
+        let address = match place.parse() {
+            Ok(port) => SocketAddr::new(self.address.ip(), port).to_string(),
+            Err(_) => place.to_owned(),
+        };
+        self.foxglove = Some(Box::new(Self::bind(&address, self.token.clone())?));
+        Ok(self)
+    }
+
+    /// What a user must know to see this camera: the addresses with their tokens, and who else can open
+    /// them.
     #[must_use]
-    pub fn url(&self) -> String {
+    pub fn invitation(&self, camera: &impl Display) -> String {
+        let mut text = format!("open {} to see camera {camera}; Ctrl-C ends it", self.url("http"));
+        let foxglove = self.foxglove.as_deref();
+        if let Some(foxglove) = foxglove {
+            text += &format!("\nopen {} in Foxglove or Lichtblick", foxglove.url("ws"));
+        }
+        if let Some(notice) = self.notice().or_else(|| foxglove?.notice()) {
+            text += &format!("\n{notice}");
+        }
+        text
+    }
+
+    /// The address, with the token if there is one.
+    fn url(&self, scheme: &str) -> String {
         let machine = match self.address.ip() {
             ip if ip.is_unspecified() => format!("localhost:{}", self.address.port()),
             _ => self.address.to_string(),
         };
         match &self.token {
-            Some(token) => format!("http://{machine}/?token={token}"),
-            None => format!("http://{machine}"),
+            Some(token) => format!("{scheme}://{machine}/?token={token}"),
+            None => format!("{scheme}://{machine}"),
         }
     }
 
     /// What a user must know about other machines; `None` if only this machine reaches the server.
-    #[must_use]
-    pub fn notice(&self) -> Option<String> {
+    fn notice(&self) -> Option<String> {
         if self.address.ip().is_loopback() {
             return None;
         }

@@ -24,7 +24,7 @@ mod tunnel;
 
 pub use fpga::{OpticalFpga, SimulatedFpga, Wiring};
 pub use link::MemoryLink;
-pub use model::{CameraFileError, pinhole_of, read_camera_model};
+pub use model::{CameraFileError, read_camera_model};
 pub use nirspi_optics::CameraModel;
 pub use optics::{VirtualOptics, VirtualOpticsError};
 pub use precomputed::PrecomputedFpga;

@@ -1,7 +1,6 @@
 //! Reads a camera description by the name of a shipped camera, or from a TOML file.
 
 use crate::files::read_small;
-use crate::recording::Pinhole;
 use nirspi_optics::{CameraModel, CameraModelError};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -34,14 +33,6 @@ pub enum CameraFileError {
 
 fn names() -> String {
     CameraModel::names().collect::<Vec<_>>().join(", ")
-}
-
-/// The geometry of the images of a camera, as its description has the projector: the images have no
-/// distortion.
-#[must_use]
-pub fn pinhole_of(camera: &CameraModel) -> Pinhole {
-    let side = nirspi_optics::SIDE;
-    Pinhole { side: side as u32, focal_px: side as f64 / camera.projector().field_over_distance() }
 }
 
 /// The shipped camera of this name; without one, the camera of the file at this path.

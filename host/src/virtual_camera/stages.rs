@@ -110,8 +110,13 @@ pub fn enhance_stages(
     // The photon budget gives the counts of a white target at this distance, which a user would
     // measure with a white sheet.
     let white = White::Known(optics.white_counts() as f32);
-    let known =
-        ImageContext { rows: Some(rows), depth: Some(&depth), least_blur_px: defocus_px, seed };
+    let known = ImageContext {
+        rows: Some(rows),
+        depth: Some(&depth),
+        least_blur_px: defocus_px,
+        seed,
+        copies: 0,
+    };
     let made = times.time("enhance", || enhance.enhance(image, white, &known))?;
     let side = image.side().pixels();
     let upscaled = times.time("upscale", || upscale_2x(&made.scaled, 1, side, side))?;

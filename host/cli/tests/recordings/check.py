@@ -1,5 +1,5 @@
 """Checks that other programs read what nirspi records and exports: the Python packages mcap,
-mcap-protobuf-support, pyarrow, numpy and, where there is one, rerun.
+mcap-protobuf-support, pyarrow, numpy, zarr, xarray and, where there is one, rerun.
 
 Usage: check.py path/to/nirspi
 """
@@ -8,10 +8,13 @@ import json
 import subprocess
 import sys
 import tempfile
+import warnings
 from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
+import xarray as xr
+import zarr
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
@@ -29,14 +32,14 @@ def messages(name):
     """Every message of a file, decoded where its channel is protobuf."""
     with open(folder / name, "rb") as file:
         reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
-        topics = [t for t in ("/telemetry", "/log", "/image", "/calibration")]
+        topics = ["/telemetry", "/log", "/image", "/calibration", "/depth", "/enhanced", "/spread"]
         decoded = list(reader.iter_decoded_messages(topics=topics))
         raw = list(reader.iter_messages(topics=["/wire"]))
         return decoded, raw, reader.get_summary()
 
 
 run("capture", "--frames", "12", "--sampling", "0.5", "--out", "rec.mcap")
-for kind in ("mcap", "npz", "npy", "csv", "parquet", "apng"):
+for kind in ("mcap", "npz", "npy", "zarr", "csv", "parquet", "apng"):
     run("export", "rec.mcap", "--to", kind, "--out", f"out.{kind}")
 run("reconstruct", "rec.mcap", "--out", "sum", "--no-flat-field")
 
@@ -45,7 +48,7 @@ recorded, wire, summary = messages("rec.mcap")
 exported, wire_again, _ = messages("out.mcap")
 assert [m.data for _, _, m in wire] == [m.data for _, _, m in wire_again]
 assert [m.log_time for _, _, m in wire] == [m.log_time for _, _, m in wire_again]
-images = [image for schema, channel, _, image in exported if channel.topic == "/image"]
+images = [image for _, channel, _, image in exported if channel.topic == "/image"]
 assert len(images) == 1, len(images)
 image = images[0]
 assert (image.width, image.height, image.encoding, image.step) == (32, 32, "32FC1", 128)
@@ -96,6 +99,50 @@ assert set(table["scene"].to_pylist()) == {"letter R"} and set(table["distance_m
 
 csv = np.genfromtxt(folder / "out.csv", delimiter=",", names=True, skip_header=1)
 assert np.array_equal(csv["d"], npz["d"]) and np.array_equal(csv["h_row"], npz["h_row"])
+
+# The Zarr store has the arrays of the npz file, with names of the dimensions.
+store = zarr.open_group(folder / "out.zarr", mode="r")
+assert sorted(store.array_keys()) == ["d", "device_time_us", "frames", "h_row", "sequence", "time"]
+for name in ("d", "device_time_us", "frames", "h_row", "sequence"):
+    assert np.array_equal(store[name][...], npz[name]), name
+    assert store[name].dtype == npz[name].dtype, name
+assert np.array_equal(store["time"][...], npz["time_ns"])
+assert store.attrs["n"] == 32 and store.attrs["simulated"] and store.attrs["camera"]["board"] == "virtual"
+with warnings.catch_warnings():
+    warnings.simplefilter("error")
+    dataset = xr.open_zarr(folder / "out.zarr")
+assert dict(dataset.sizes) == {"frame": 12, "pattern": 512}, dataset.sizes
+assert np.array_equal(dataset["frames"].to_numpy(), npz["frames"])
+assert np.array_equal(dataset["time"].to_numpy().astype("int64"), npz["time_ns"])
+print("zarr:", ", ".join(f"{name} {array.dims}" for name, array in dataset.variables.items()))
+
+# A store of several chunks, the last of which is not full. The camera's time is longer than that of
+# one depth map.
+run("capture", "--frames", "1100", "--sampling", "0.02", "--sweeps", "60", "--out", "long.mcap")
+for kind in ("npz", "zarr", "mcap"):
+    run("export", "long.mcap", "--to", kind, "--out", f"long-out.{kind}")
+long = zarr.open_group(folder / "long-out.zarr", mode="r")["frames"]
+assert long.shape[0] == 1100 and long.chunks[0] == 1024, (long.shape, long.chunks)
+assert np.array_equal(long[...], np.load(folder / "long-out.npz")["frames"])
+
+# Depth maps are in the exported file alone, at the times of their packets.
+recorded, wire, _ = messages("long.mcap")
+exported, _, _ = messages("long-out.mcap")
+assert not any(channel.topic == "/depth" for _, channel, _, _ in recorded)
+maps = [(m.log_time, decoded) for _, c, m, decoded in exported if c.topic == "/depth"]
+assert maps and {time for time, _ in maps} <= {m.log_time for _, _, m in wire}
+depth_m = np.frombuffer(maps[0][1].data, "<f4").reshape(32, 32)
+assert maps[0][1].encoding == "32FC1" and 0.25 < np.median(depth_m) < 0.35, np.median(depth_m)
+print(f"depth: {len(maps)} maps, median {np.median(depth_m):.3f} m (simulated)")
+
+# Enhanced images are those of `reconstruct --enhance`, each with its spread.
+run("export", "rec.mcap", "--to", "mcap", "--enhance", "--out", "enhanced.mcap")
+run("reconstruct", "rec.mcap", "--enhance", "--out", "enhanced", "--no-flat-field")
+made = {c.topic: m for _, c, _, m in messages("enhanced.mcap")[0]}
+enhanced, spread = (np.frombuffer(made[t].data, "<f4").reshape(64, 64) for t in ("/enhanced", "/spread"))
+assert np.array_equal(enhanced, np.load(folder / "enhanced" / "enhanced.npy").reshape(64, 64))
+assert 0 < spread.max() < 0.5 and spread.min() >= 0, (spread.min(), spread.max())
+print(f"spread: median {np.median(spread):.4f}, greatest {spread.max():.3f} of white (simulated)")
 
 rerun = Path(sys.executable).with_name("rerun")
 if rerun.exists():
