@@ -49,7 +49,7 @@ def live(page, address, screenshot):
     if screenshot:
         # Rates are those of whole seconds.
         page.wait_for_timeout(4000)
-        page.screenshot(path=screenshot)
+        page.screenshot(path=screenshot, full_page=True)
 
 
 def saved(page):

@@ -14,6 +14,7 @@ import subprocess
 import sys
 import tempfile
 import urllib.request
+from pathlib import Path
 
 import numpy as np
 from mcap.records import Schema
@@ -22,10 +23,10 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 server = subprocess.Popen(
-    [sys.argv[1], "serve", "--listen", "127.0.0.1:0", "--foxglove", "0"],
+    [Path(sys.argv[1]).resolve(), "serve", "--listen", "127.0.0.1:0", "--foxglove", "0"],
     stdout=subprocess.PIPE,
     text=True,
-    cwd=tempfile.mkdtemp(),
+    cwd=tempfile.gettempdir(),
 )
 page = re.search(r"http://\S+", server.stdout.readline())[0]
 url = re.search(r"ws://\S+", server.stdout.readline())[0]
