@@ -10,7 +10,8 @@ use nirspi_wire::{
     Answer, Command, Deframed, Deframer, DeviceMessage, Event, EventKind, Frame, Refusal, Reply,
     Request, RunLength, State, Status, encode, open, version,
 };
-use std::io;
+use std::collections::VecDeque;
+use std::io::{self, Read};
 use std::time::{Duration, Instant};
 
 /// The longest time without any packet. The program at the camera publishes a status each second.
@@ -35,9 +36,8 @@ pub struct RelayLink {
     identity: CameraIdentity,
     recorded: Recorded,
     incoming: Box<Deframer<MAX_HOST_PACKET>>,
-    /// Bytes for the host, and how many of them it has.
-    waiting: Vec<u8>,
-    taken: usize,
+    /// Bytes that the host has yet to read.
+    waiting: VecDeque<u8>,
     /// Number of the host's own run.
     run: u16,
     running: bool,
@@ -60,8 +60,7 @@ impl RelayLink {
             identity,
             recorded: Recorded { setup, settling },
             incoming: Box::default(),
-            waiting: Vec::new(),
-            taken: 0,
+            waiting: VecDeque::new(),
             run: 0,
             running: false,
             asked: None,
@@ -83,7 +82,7 @@ impl RelayLink {
         let mut packet = vec![0; MAX_DEVICE_PACKET + 1];
         // Every message of a camera has room.
         if let Ok(packet) = encode(message, &mut packet) {
-            self.waiting.extend_from_slice(packet);
+            self.waiting.extend(packet.iter());
         }
     }
 
@@ -246,18 +245,8 @@ impl Link for RelayLink {
                     break;
                 }
             }
-            let waiting = self.waiting.get(self.taken..).unwrap_or(&[]);
-            if !waiting.is_empty() {
-                let length = waiting.len().min(buffer.len());
-                if let (Some(to), Some(from)) = (buffer.get_mut(..length), waiting.get(..length)) {
-                    to.copy_from_slice(from);
-                }
-                self.taken += length;
-                if self.taken == self.waiting.len() {
-                    self.waiting.clear();
-                    self.taken = 0;
-                }
-                return Ok(Received::Bytes(length));
+            if !self.waiting.is_empty() {
+                return self.waiting.read(buffer).map(Received::Bytes);
             }
             if self.running && self.heard.elapsed() > SILENCE {
                 return Ok(Received::Closed);

@@ -11,7 +11,8 @@ use nirspi_wire::{
     Answer, Command, Deframed, Deframer, DeviceMessage, Refusal, Reply, Request, RunLength, State,
     Status, encode, open, version,
 };
-use std::io;
+use std::collections::VecDeque;
+use std::io::{self, Read};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -29,9 +30,8 @@ pub struct ReplayLink {
     run: u16,
     status: Status,
     incoming: Box<Deframer<MAX_HOST_PACKET>>,
-    /// Bytes for the host, and how many of them it has.
-    waiting: Vec<u8>,
-    taken: usize,
+    /// Bytes that the host has yet to read.
+    waiting: VecDeque<u8>,
     playing: Option<Playing>,
     /// Whether the recording ended before its run did. The camera is gone then.
     is_gone: bool,
@@ -57,8 +57,7 @@ impl ReplayLink {
             run,
             status: status(run.wrapping_sub(1)),
             incoming: Box::default(),
-            waiting: Vec::new(),
-            taken: 0,
+            waiting: VecDeque::new(),
             playing: None,
             is_gone: false,
         })
@@ -174,11 +173,11 @@ fn first_run(recording: &mut Recording) -> Result<u16, RecordingError> {
     Ok(0)
 }
 
-fn append(bytes: &mut Vec<u8>, message: &DeviceMessage<'_>) {
+fn append(bytes: &mut VecDeque<u8>, message: &DeviceMessage<'_>) {
     let mut packet = vec![0; MAX_DEVICE_PACKET + 1];
     // A reply is shorter than the longest packet.
     if let Ok(packet) = encode(message, &mut packet) {
-        bytes.extend_from_slice(packet);
+        bytes.extend(packet.iter());
     }
 }
 
@@ -202,18 +201,8 @@ impl Link for ReplayLink {
         loop {
             let now = Instant::now();
             let due = self.play(now)?;
-            let waiting = self.waiting.get(self.taken..).unwrap_or(&[]);
-            if !waiting.is_empty() {
-                let length = waiting.len().min(buffer.len());
-                if let (Some(to), Some(from)) = (buffer.get_mut(..length), waiting.get(..length)) {
-                    to.copy_from_slice(from);
-                }
-                self.taken += length;
-                if self.taken == self.waiting.len() {
-                    self.waiting.clear();
-                    self.taken = 0;
-                }
-                return Ok(Received::Bytes(length));
+            if !self.waiting.is_empty() {
+                return self.waiting.read(buffer).map(Received::Bytes);
             }
             if self.is_gone {
                 return Ok(Received::Closed);

@@ -29,7 +29,7 @@ pub struct Synced {
     pub cameras: Vec<CameraClock>,
     /// Each recording but the first beside the first.
     pub pairs: Vec<Pair>,
-    /// Time in which all recordings have frames; 0 if there is none.
+    /// Time in which all recordings have frames; 0 if their times do not overlap.
     pub common_s: f64,
     /// The table.
     pub out: Option<PathBuf>,

@@ -130,7 +130,7 @@ fn random_scenarios_of_packets_agree_bit_for_bit() {
     for (what, seen) in [
         ("packets", count(&tallies, |t| t.packets)),
         ("packets after a loss", count(&tallies, |t| t.packets_after_loss)),
-        ("frames that are none", count(&tallies, |t| t.frames)),
+        ("frames in runs without packets", count(&tallies, |t| t.frames)),
         ("raw bursts", count(&tallies, |t| t.bursts)),
     ] {
         assert!(seen >= 5, "only {seen} {what}");
