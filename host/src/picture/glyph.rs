@@ -117,33 +117,45 @@ fn outline_mask(
     Some(mask)
 }
 
-/// Every pixel within `radius` of a covered pixel. Each row of the disc is a running count along
-/// the row.
+/// Every pixel within `radius` of a covered pixel: a covered pixel `dy` rows away covers, in this
+/// row, the pixels up to `sqrt(radius^2 - dy^2)` to its left and right. The nearest covered pixel of
+/// a column covers the most, so each column gives one interval, and a row is the union of these.
 fn thicken(mask: &[bool], edge: usize, radius: f32) -> Vec<bool> {
-    let mut thick = vec![false; mask.len()];
-    let reach = radius.floor() as isize;
-    // covered[y][x] is the number of covered pixels of row y left of x.
-    let covered: Vec<u32> = mask
-        .chunks_exact(edge)
-        .flat_map(|row| {
-            let mut count = 0;
-            std::iter::once(0).chain(row.iter().map(move |&pixel| {
-                count += u32::from(pixel);
-                count
-            }))
-        })
+    let reach = radius.floor() as usize;
+    let half_widths: Vec<usize> = (0..=reach)
+        .map(|dy| (radius * radius - (dy * dy) as f32).max(0.0).sqrt().floor() as usize)
         .collect();
-    for dy in -reach..=reach {
-        let half = (radius * radius - (dy * dy) as f32).max(0.0).sqrt().floor() as usize;
-        for (y, row) in thick.chunks_exact_mut(edge).enumerate() {
-            let Some(from) = y.checked_add_signed(dy).filter(|&from| from < edge) else { continue };
-            let counts = &covered[from * (edge + 1)..(from + 1) * (edge + 1)];
-            for (x, pixel) in row.iter_mut().enumerate() {
-                *pixel |= counts[(x + half + 1).min(edge)] > counts[x.saturating_sub(half)];
-            }
+    let rows_away = rows_to_covered(mask, edge);
+    let mut thick = Vec::with_capacity(mask.len());
+    let mut begins_less_ends = vec![0_i32; edge + 1];
+    for away in rows_away.chunks_exact(edge) {
+        begins_less_ends.fill(0);
+        for (x, &dy) in away.iter().enumerate() {
+            let Some(&half) = half_widths.get(dy as usize) else { continue };
+            begins_less_ends[x.saturating_sub(half)] += 1;
+            begins_less_ends[(x + half + 1).min(edge)] -= 1;
         }
+        let mut open = 0;
+        thick.extend(begins_less_ends[..edge].iter().map(|change| {
+            open += change;
+            open > 0
+        }));
     }
     thick
+}
+
+/// How many rows each pixel is away from the nearest covered pixel of its column; `u32::MAX` in a
+/// column without one.
+fn rows_to_covered(mask: &[bool], edge: usize) -> Vec<u32> {
+    let mut away: Vec<u32> =
+        mask.iter().map(|&covered| if covered { 0 } else { u32::MAX }).collect();
+    for at in edge..away.len() {
+        away[at] = away[at].min(away[at - edge].saturating_add(1));
+    }
+    for at in (0..away.len().saturating_sub(edge)).rev() {
+        away[at] = away[at].min(away[at + edge].saturating_add(1));
+    }
+    away
 }
 
 fn average(mask: &[bool], size_px: usize) -> Vec<f32> {
@@ -158,6 +170,7 @@ fn average(mask: &[bool], size_px: usize) -> Vec<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
     const SIZE_PX: usize = 200;
     const FILL: f32 = 0.9;
@@ -192,6 +205,29 @@ mod tests {
                 "{character}: columns {left} to {right}"
             );
             assert!((top + bottom).abs_diff(SIZE_PX) <= 2, "{character}: rows {top} to {bottom}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn a_thick_stroke_is_every_pixel_within_the_radius_of_a_thin_one(
+            edge in 1_usize..30,
+            covered in prop::collection::vec((0_usize..30, 0_usize..30), 0..12),
+            radius in 0.0_f32..40.0,
+        ) {
+            let mut mask = vec![false; edge * edge];
+            for &(x, y) in covered.iter().filter(|&&(x, y)| x < edge && y < edge) {
+                mask[y * edge + x] = true;
+            }
+            let near = |at: usize| {
+                (0..edge * edge).filter(|&other| mask[other]).any(|other| {
+                    let dx = (at % edge).abs_diff(other % edge);
+                    let dy = (at / edge).abs_diff(other / edge);
+                    (dx * dx + dy * dy) as f32 <= radius * radius
+                })
+            };
+            let expected: Vec<bool> = (0..edge * edge).map(near).collect();
+            prop_assert_eq!(thicken(&mask, edge, radius), expected);
         }
     }
 
