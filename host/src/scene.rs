@@ -221,6 +221,14 @@ fn drawn(word: &str, size_px: usize) -> Result<Vec<f32>, SceneError> {
 }
 
 impl SceneMap {
+    /// The name with a capital letter at its start.
+    #[must_use]
+    pub fn title(&self) -> String {
+        let mut letters = self.name.chars();
+        let first = letters.next().into_iter().flat_map(char::to_uppercase);
+        first.chain(letters).collect()
+    }
+
     /// One bright character of a typeface on the dark target of [`LETTER_SIDE_MM`]. The character's
     /// longer side takes 0.9 of the target's edge.
     ///

@@ -141,7 +141,9 @@ fn images(file: &[u8], topic: &str, side: usize) -> Vec<Vec<f32>> {
 fn an_exported_recording_has_enhanced_images_and_their_spread_if_asked() {
     let (_folder, plain) = exported(Format::Mcap, &ExportOptions::default());
     let plain = std::fs::read(plain).unwrap();
-    assert!(images(&plain, "/enhanced", 64).is_empty() && images(&plain, "/spread", 64).is_empty());
+    for topic in ["/enhanced", "/spread", "/interval"] {
+        assert!(images(&plain, topic, 64).is_empty(), "{topic}");
+    }
     let options = ExportOptions { enhance: true, ..ExportOptions::default() };
     let (_folder, out) = exported(Format::Mcap, &options);
     let out = std::fs::read(out).unwrap();
@@ -159,6 +161,9 @@ fn an_exported_recording_has_enhanced_images_and_their_spread_if_asked() {
     assert!(spread.iter().all(|&spread| (0.0..0.5).contains(&spread)), "a standard deviation");
     assert!(spread.iter().any(|&spread| spread > 0.0));
     assert_eq!(images(&out, "/spread", 64), [spread]);
+    let half_width = made.half_width.unwrap();
+    assert!(half_width.iter().all(|&width| (0.0..1.0).contains(&width)), "of white");
+    assert_eq!(images(&out, "/interval", 64), [half_width]);
 }
 
 #[test]

@@ -13,7 +13,7 @@ use nirspi::files::npy;
 use nirspi::files::output::OutputDir;
 use nirspi::imaging::MethodReport;
 use nirspi::imaging::{Quality, compare};
-use nirspi::picture::{Panel, Pictures, SideBySide, Unit};
+use nirspi::picture::{Panel, Pictures, Range, SideBySide, Unit};
 use nirspi::scene::SceneMap;
 use nirspi::session::CameraIdentity;
 use nirspi::virtual_camera::{
@@ -105,6 +105,7 @@ struct Images {
     upscaled: Vec<f32>,
     fused: Vec<f32>,
     deblurred: Vec<f32>,
+    half_width: Vec<f32>,
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
@@ -155,6 +156,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         upscaled: stages.upscaled,
         fused: stages.fused,
         deblurred: stages.deblurred,
+        half_width: stages.half_width,
     };
     if fitted.quality.inverted {
         notes.push(
@@ -195,7 +197,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let mut all = side_by_side(&map, &optics, &images, &report);
     report.pictures.add("side_by_side.png", &all);
     all.panels.push(Panel::square("upscaled", 64, &images.upscaled, Unit::Reflectance));
-    let names = ["raw", "reconstruction", "fused", "deblurred", "upscaled"];
+    let names = ["raw", "reconstruction", "fused", "deblurred", "interval", "upscaled"];
     report.pictures.each(&names, &all.panels[2..]);
     write(args, &map, &images, &report)?;
     args.report.print(&report, |report| say(args, report))
@@ -216,9 +218,12 @@ fn write(args: &Args, map: &SceneMap, images: &Images, report: &Report) -> Resul
     let measurement = args.out.join("measurement.npz");
     out.write("measurement.npz", &encode_measurement(&measurement, &images.measurements, true)?)?;
     out.write("truth_64.npy", &npy::encode(&[2 * side, 2 * side], &images.output_truth))?;
-    for (name, image) in
-        [("upscaled", &images.upscaled), ("fused", &images.fused), ("deblurred", &images.deblurred)]
-    {
+    for (name, image) in [
+        ("upscaled", &images.upscaled),
+        ("fused", &images.fused),
+        ("deblurred", &images.deblurred),
+        ("interval", &images.half_width),
+    ] {
         out.write(&format!("{name}.npy"), &npy::encode(&[2 * side, 2 * side], image))?;
     }
     report.pictures.write(&mut out)?;
@@ -240,11 +245,7 @@ fn side_by_side(
     };
     let metrics = |q: &Quality| format!("PSNR {:.1} dB  SSIM {:.2}", q.psnr_db, q.ssim);
     SideBySide {
-        header: format!(
-            "{} at {} m, seen with one pixel",
-            capitalised(&report.scene),
-            report.distance_m
-        ),
+        header: format!("{} at {} m, seen with one pixel", map.title(), report.distance_m),
         panels: vec![
             panel(
                 "scene",
@@ -297,7 +298,17 @@ fn side_by_side(
                             "bridge, 1 step; inconsistency {:.2}",
                             report.enhancement.inconsistency
                         ),
+                        report.enhancement.reading.to_string(),
                     ],
+                )
+            },
+            Panel {
+                range: Range::Fixed(0.0, 0.5),
+                ..panel(
+                    "trust: 95 % interval, ±",
+                    2 * side,
+                    &images.half_width,
+                    report.enhancement.trust(),
                 )
             },
         ],
@@ -313,13 +324,6 @@ fn side_by_side(
             report.frames.late
         ),
     }
-}
-
-fn capitalised(text: &str) -> String {
-    let mut characters = text.chars();
-    characters
-        .next()
-        .map_or_else(String::new, |first| first.to_uppercase().chain(characters).collect())
 }
 
 fn say(args: &Args, report: &Report) -> Result<()> {
@@ -341,25 +345,16 @@ fn say(args: &Args, report: &Report) -> Result<()> {
     print::line(format_args!(
         "deblurred:           {} (blur {}, noise {:.4} estimated, inconsistency {:.2})",
         quality_line(&enhancement.deblurred),
-        blur_line(enhancement),
+        enhancement.blur_line(),
         enhancement.noise,
         enhancement.inconsistency
     ))?;
+    print::line(enhancement.trust_line())?;
     for warning in &enhancement.warnings {
         print::line(format_args!("warning: {warning}"))?;
     }
     print::notes(&report.notes)?;
     print::line(format_args!("look at {}", args.out.join("side_by_side.png").display()))
-}
-
-/// A line about the blur and its source.
-fn blur_line(enhancement: &StagesReport) -> String {
-    let (taken, estimated) = (enhancement.sigma_px, enhancement.estimated_sigma_px);
-    if taken > estimated {
-        format!("{taken:.2} px by lens and distance, {estimated:.2} px estimated")
-    } else {
-        format!("{taken:.2} px estimated")
-    }
 }
 
 fn quality_line(quality: &Quality) -> String {

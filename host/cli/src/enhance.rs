@@ -12,6 +12,7 @@ use nirspi_nets::deblur::Model;
 use nirspi_nets::{Images, fusion};
 use nirspi_recon::words::count_of;
 use std::num::NonZeroU32;
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Enlarge and deblur images, from 32 x 32 to 64 x 64: fusion with depth, then deblurring by a diffusion network
@@ -31,6 +32,9 @@ pub struct Args {
     /// Steps of the deblurring network: 1 has the least error and takes the least time
     #[arg(long, value_name = "S", default_value = "1")]
     steps: NonZeroU32,
+    /// Also write the half-width of the calibrated 95 % interval of each pixel (.npy)
+    #[arg(long, value_name = "FILE")]
+    interval: Option<PathBuf>,
     #[command(flatten)]
     images: ImageArgs,
 }
@@ -46,12 +50,18 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let mut networks = args.images.networks.open(&["fsrcnn", "estimator", "diffusion"])?;
     let enhancer = times.time("load", || networks.enhancer(method))?;
 
+    let wanted = args.interval.as_ref();
+    let intervals = wanted.map(|_| networks.intervals(method, &options)).transpose()?;
+
     let bar = Progress::of("enhancing", input.count(), "images");
     let result = times.time("enhance", || {
         enhancer.enhance(images, depth.as_ref(), &options, &mut |done| bar.set(done))
     })?;
     drop(bar);
     args.sharpening.write_spread(&input, result.spread.as_deref())?;
+    if let (Some(file), Some(intervals)) = (wanted, intervals) {
+        input.target(file)?.write(2 * fusion::SIDE, &intervals.of(&result)?)?;
+    }
     let shown = target.write_and_show(2 * fusion::SIDE, &result.images, "enhanced")?;
 
     let steps = args.steps.get();

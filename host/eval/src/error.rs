@@ -141,6 +141,8 @@ from_libraries!(
     nirspi_nets::degrade::DegradeError,
     nirspi_nets::device::DeviceError,
     nirspi_nets::images::ImagesError,
+    nirspi_nets::interval::NoIntervals,
+    nirspi_nets::interval::TableError,
     nirspi_nets::metrics::FrechetError,
     nirspi_nets::upscale::UpscaleError,
     nirspi_nets::weights::WeightsError,

@@ -10,6 +10,7 @@
 //! | [`table3`] | how good are images in rain (Table 3)? |
 //! | [`table4`] | how fine is the spatial resolution in rain (Table 4)? |
 //! | [`quality`] | how good are enhanced images, against blur, noise and number of steps? |
+//! | [`trust`] | how far can a pixel of an enhanced image be from the truth, and which character does the image show? |
 //! | [`sampling`] | how good are images of a part of the patterns, by order, basis and method? |
 //! | [`completion`] | how well does each method complete known scenes? |
 //! | [`sets`] | how alike are two stacks of images, one by one and as sets? |
@@ -38,6 +39,7 @@ pub mod table1;
 pub mod table3;
 pub mod table4;
 pub mod train;
+pub mod trust;
 pub mod typefaces;
 
 mod error;

@@ -19,6 +19,7 @@ pub use contenders::{Contender, Method, Version};
 pub use measure::{Condition, Figures};
 pub use others::Case;
 
+pub(crate) use characters::groups;
 pub(crate) use measure::halved;
 
 use crate::error::Result;

@@ -5,7 +5,8 @@
 //!
 //! Data flows from [`images`] through [`estimate`] (blur and noise), [`fusion`] and [`deblur`];
 //! [`enhance`] does all of these. [`Networks`] chooses the weights, [`Sharpen`] is the interface
-//! for your own network. [`upscale`] and [`classical`] work without learning. [`prior`] is apart from that line: the
+//! for your own network. [`interval`] says how far a pixel may be from the truth, and [`reading`]
+//! which character an image shows. [`upscale`] and [`classical`] work without learning. [`prior`] is apart from that line: the
 //! network of a reconstruction method of `nirspi_recon`.
 
 mod blur;
@@ -27,12 +28,14 @@ mod gate;
 #[cfg(feature = "gpu")]
 mod gpu;
 pub mod images;
+pub mod interval;
 pub mod metrics;
 #[cfg(feature = "train")]
 pub mod model;
 mod network;
 pub mod prior;
 mod random;
+pub mod reading;
 mod schema;
 mod spread;
 #[cfg(feature = "train")]
@@ -50,6 +53,7 @@ pub use enhance::{EnhanceError, Enhanced, Enhancer, Known, KnownEstimate, Option
 pub use estimate::{BlurEstimator, Estimate};
 pub use fusion::{DepthError, DepthMaps, Fusion};
 pub use images::{Images, ImagesError};
+pub use interval::{Intervals, NoIntervals};
 pub use nirspi_weights::HELD_OUT;
 pub use upscale::{UpscaleError, upscale_2x};
 pub use weights::{Weights, WeightsError};

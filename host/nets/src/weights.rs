@@ -320,6 +320,18 @@ impl Weights {
         &self.label
     }
 
+    /// SHA-256 of the tensors' names, shapes and numbers, in hexadecimal: the same for the same
+    /// network, in whatever precision and order a file has it.
+    pub fn fingerprint(&self) -> String {
+        let mut bytes = Vec::new();
+        for (name, array) in &self.tensors {
+            bytes.extend(name.as_bytes());
+            bytes.extend(array.shape.iter().flat_map(|&length| (length as u64).to_le_bytes()));
+            bytes.extend(array.bytes(Precision::Single));
+        }
+        checksum(&bytes)
+    }
+
     /// A text of the metadata.
     pub fn metadata(&self, key: &str) -> Option<&str> {
         self.metadata.get(key).map(String::as_str)

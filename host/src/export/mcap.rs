@@ -65,8 +65,8 @@ pub(super) fn write(
                 What::Image(time_ns, image) => {
                     #[cfg(feature = "enhance")]
                     if let Some(made) = enhancing.enhance(whole, time_ns, &image)? {
-                        let spread = made.spread.as_deref();
-                        book.enhanced(time_ns, &made.pixels, spread).map_err(io_error)?;
+                        let (spread, width) = (made.spread.as_deref(), made.half_width.as_deref());
+                        book.enhanced(time_ns, &made.pixels, spread, width).map_err(io_error)?;
                     }
                     book.image(time_ns, &image, range)
                 }

@@ -3,8 +3,9 @@
 
 use super::white::brightest;
 use nirspi_nets::{
-    DepthMaps, Device, Enhancer, Images, ImagesError, Known, KnownEstimate, MeasuredRows,
-    MeasuredRowsError, Method, Networks, Options, Sharpener, WeightsError, deblur, fusion,
+    DepthMaps, Device, Enhancer, Images, ImagesError, Intervals, Known, KnownEstimate,
+    MeasuredRows, MeasuredRowsError, Method, Networks, Options, Sharpener, WeightsError, deblur,
+    fusion,
 };
 use nirspi_recon::{Image, Rows};
 use thiserror::Error;
@@ -108,6 +109,10 @@ pub struct EnhancedImage {
     /// again, from readings with simulated noise (`nirspi_nets::Options::copies`). An error that the
     /// network makes each time is not in this number.
     pub spread: Option<Vec<f32>>,
+    /// 64 x 64: half-width of the calibrated 95 % interval of each pixel of the result
+    /// ([`nirspi_nets::interval`]); `None` for an input of 64 x 64 and for other networks than the
+    /// calibrated ones.
+    pub half_width: Option<Vec<f32>>,
 }
 
 /// The learned stages, ready for images of 32 x 32 and 64 x 64.
@@ -115,6 +120,7 @@ pub struct Enhance {
     both: Enhancer,
     second: Sharpener,
     device: Device,
+    intervals: Option<Intervals>,
 }
 
 impl Enhance {
@@ -123,15 +129,25 @@ impl Enhance {
     /// # Errors
     /// [`WeightsError`] if the built-in weights are damaged.
     pub fn built_in(device: &Device) -> Result<Self, WeightsError> {
-        let second = Networks::built_in(device.clone()).sharpener(Method::default())?;
-        Ok(Self::of(Enhancer::built_in(device)?, second, device.clone()))
+        Self::by(Method::default(), device)
+    }
+
+    /// The learned stages with a built-in network for deblurring.
+    ///
+    /// # Errors
+    /// [`WeightsError`] if this build does not have the weights.
+    pub fn by(method: Method, device: &Device) -> Result<Self, WeightsError> {
+        let mut networks = Networks::built_in(device.clone());
+        let (both, second) = (networks.enhancer(method)?, networks.sharpener(method)?);
+        let intervals = networks.intervals(method, &Options::default()).ok();
+        Ok(Self { intervals, ..Self::of(both, second, device.clone()) })
     }
 
     /// The learned stages with other networks: both stages for 32 x 32, the second stage alone for
-    /// 64 x 64.
+    /// 64 x 64. There are no calibrated intervals.
     #[must_use]
     pub fn of(both: Enhancer, second: Sharpener, device: Device) -> Self {
-        Self { both, second, device }
+        Self { both, second, device, intervals: None }
     }
 
     /// The device on which the networks run.
@@ -180,6 +196,7 @@ impl Enhance {
             self.second.deblur(Images::new(&scaled)?, &options, &mut |_| {})?
         };
         let used = result.estimates[0];
+        let half_width = self.intervals.as_ref().and_then(|intervals| intervals.of(&result).ok());
         let estimated = result.estimated.as_ref().map_or(used, |estimated| estimated[0]);
         Ok(EnhancedImage {
             scaled,
@@ -191,6 +208,7 @@ impl Enhance {
             noise: used.noise,
             inconsistency: result.inconsistency[0],
             spread: result.spread,
+            half_width,
         })
     }
 }

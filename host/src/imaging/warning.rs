@@ -100,6 +100,7 @@ mod tests {
             noise,
             inconsistency,
             spread: None,
+            half_width: None,
         }
     }
 

@@ -145,7 +145,7 @@ impl<W: Write> Book<W> {
         self.other(Channel::Image, time_ns, &schemas::image(time_ns, image, range))
     }
 
-    /// Writes an enhanced image in [0, 1], and its spread.
+    /// Writes an enhanced image in [0, 1], its spread, and the half-widths of its intervals.
     ///
     /// # Errors
     /// The writer's error.
@@ -155,11 +155,16 @@ impl<W: Write> Book<W> {
         time_ns: u64,
         pixels: &[f32],
         spread: Option<&[f32]>,
+        half_width: Option<&[f32]>,
     ) -> io::Result<()> {
         let side = nirspi_nets::deblur::SIDE;
         self.other(Channel::Enhanced, time_ns, &schemas::raw_image(time_ns, side, pixels))?;
-        let Some(spread) = spread else { return Ok(()) };
-        self.other(Channel::Spread, time_ns, &schemas::raw_image(time_ns, side, spread))
+        for (channel, values) in [(Channel::Spread, spread), (Channel::Interval, half_width)] {
+            if let Some(values) = values {
+                self.other(channel, time_ns, &schemas::raw_image(time_ns, side, values))?;
+            }
+        }
+        Ok(())
     }
 
     /// Writes a depth map in the camera's image, in metres.

@@ -37,11 +37,13 @@ pub(crate) enum Channel {
     Enhanced,
     /// How well each pixel of the enhanced image repeats.
     Spread,
+    /// Half-width of the 95 % interval of each pixel of the enhanced image.
+    Interval,
 }
 
 impl Channel {
     /// The channels of a recording.
-    pub(super) const RECORDED: [Self; 7] = [
+    pub(super) const RECORDED: [Self; 8] = [
         Self::Telemetry,
         Self::Log,
         Self::Image,
@@ -49,6 +51,7 @@ impl Channel {
         Self::Depth,
         Self::Enhanced,
         Self::Spread,
+        Self::Interval,
     ];
 
     /// The channels of a live camera.
@@ -65,6 +68,7 @@ impl Channel {
             Self::Enhanced => "/enhanced",
             Self::Depth => "/depth",
             Self::Spread => "/spread",
+            Self::Interval => "/interval",
         }
     }
 
@@ -73,7 +77,9 @@ impl Channel {
         match self {
             Self::Telemetry => "nirspi.Telemetry",
             Self::Log => "foxglove.Log",
-            Self::Image | Self::Enhanced | Self::Depth | Self::Spread => "foxglove.RawImage",
+            Self::Image | Self::Enhanced | Self::Depth | Self::Spread | Self::Interval => {
+                "foxglove.RawImage"
+            }
             Self::Calibration => "foxglove.CameraCalibration",
         }
     }
@@ -102,7 +108,7 @@ impl Channel {
                 (5, "file", Type::Text),
                 (6, "line", Type::Fixed32),
             ],
-            Self::Image | Self::Enhanced | Self::Depth | Self::Spread => &[
+            Self::Image | Self::Enhanced | Self::Depth | Self::Spread | Self::Interval => &[
                 (1, "timestamp", TIME),
                 (7, "frame_id", Type::Text),
                 (2, "width", Type::Fixed32),

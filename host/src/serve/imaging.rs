@@ -96,7 +96,7 @@ impl Imaging {
         };
         let models = Model::ALL.into_iter().filter(|model| is_live(model)).collect();
         let model = Network::default().model();
-        let enhance = (model.name(), enhance_by(model, &device)?);
+        let enhance = (model.name(), Enhance::by(model.into(), &device)?);
         Ok(Self { settings: settings.clone(), methods, device, models, enhance })
     }
 
@@ -146,7 +146,7 @@ impl Imaging {
         if self.enhance.0 != settings.model {
             let mut models = self.models.iter();
             if let Some(model) = models.find(|model| model.name() == settings.model) {
-                self.enhance = (model.name(), enhance_by(*model, &self.device)?);
+                self.enhance = (model.name(), Enhance::by((*model).into(), &self.device)?);
             }
         }
         Ok(&self.enhance.1)
@@ -161,13 +161,6 @@ fn strength_of(settings: &MethodSettings) -> Option<f64> {
     }
 }
 
-/// The learned stages with this network.
-fn enhance_by(model: Model, device: &Device) -> Result<Enhance, WeightsError> {
-    let mut networks = Networks::built_in(device.clone());
-    let (both, second) = (networks.enhancer(model.into())?, networks.sharpener(model.into())?);
-    Ok(Enhance::of(both, second, device.clone()))
-}
-
 /// The images of one state, and their properties.
 #[derive(Debug, Serialize)]
 pub struct Picture {
@@ -179,6 +172,10 @@ pub struct Picture {
     /// The enhanced image, (64, 64) in [0, 1], with white at 1.
     #[serde(skip)]
     pub enhanced: Option<Vec<f32>>,
+    /// Half-width of the 95 % interval of each pixel of the enhanced image; `None` for a network
+    /// without calibrated intervals.
+    #[serde(skip)]
+    pub half_width: Option<Vec<f32>>,
     /// The readings, (32, 32) ADC counts: that of Hadamard row `32 r + c` at (r, c); NaN for a row
     /// that was not measured.
     #[serde(skip)]
@@ -225,6 +222,7 @@ impl Picture {
             number,
             counts,
             enhanced,
+            half_width: None,
             readings: Vec::new(),
             depth: None,
             arrived: Instant::now(),
@@ -352,6 +350,7 @@ impl Imaging {
         let frame_warnings = look.sum.warnings();
         let mut all: Vec<String> = frame_warnings.iter().map(|&text| text.to_owned()).collect();
         let (mut enhanced, mut enhancement, mut short) = (None, None, Vec::new());
+        let mut half_width = None;
         if settings.enhance && white_counts > 0.0 {
             let started = Instant::now();
             let known = ImageContext {
@@ -372,13 +371,14 @@ impl Imaging {
                 depth: look.depth.is_some(),
                 enhance_ms: ms_since(started),
             });
-            enhanced = Some(made.pixels);
+            (enhanced, half_width) = (Some(made.pixels), made.half_width);
             shared.passed(Passed::Enhanced, look.arrived);
         }
         Ok(Picture {
             number: shared.slot.ledger().images.shown + 1,
             counts: image.pixels().to_vec(),
             enhanced,
+            half_width,
             readings: readings(&measurements),
             depth: look.depth.clone(),
             #[cfg(feature = "serve")]

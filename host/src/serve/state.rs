@@ -155,6 +155,9 @@ struct Message<'s> {
     image: Option<String>,
     /// (64, 64) shares of white; `null` if the learned stages are switched off.
     enhanced: Option<String>,
+    /// (64, 64) shares of white: half-width of the 95 % interval of each pixel of `enhanced`; `null`
+    /// without calibrated intervals.
+    interval: Option<String>,
     /// (32, 32) ADC counts: the reading of Hadamard row `32 r + c` at (r, c); NaN for a row that
     /// was not measured.
     readings: Option<String>,
@@ -185,6 +188,7 @@ impl Published {
             state,
             image: picture.map(|picture| numbers(&picture.counts)),
             enhanced: picture.and_then(|picture| picture.enhanced.as_deref().map(numbers)),
+            interval: picture.and_then(|picture| picture.half_width.as_deref().map(numbers)),
             readings: picture.map(|picture| numbers(&picture.readings)),
             depth: picture.and_then(|picture| Some(numbers(&picture.depth.as_ref()?.pixels_m))),
         };

@@ -6,7 +6,11 @@ use crate::imaging::{
     Enhance, EnhanceError, ImageContext, Quality, Warning, White, compare, warnings,
 };
 use crate::stage_times::StageTimes;
-use nirspi_nets::{DepthError, DepthMaps, Device, UpscaleError, WeightsError, deblur, upscale_2x};
+use nirspi_nets::interval::{Intervals, NoIntervals, share_of_prior};
+use nirspi_nets::reading::{Reader, Reading};
+use nirspi_nets::{
+    DepthError, DepthMaps, Device, Images, UpscaleError, Weights, WeightsError, deblur, upscale_2x,
+};
 use nirspi_optics::SIDE;
 use nirspi_recon::metrics::MetricError;
 use nirspi_recon::{Image, Rows, Side, SideError};
@@ -26,6 +30,8 @@ pub struct Stages {
     pub fused: Vec<f32>,
     /// The deblurred image.
     pub deblurred: Vec<f32>,
+    /// Half-width of the 95 % interval of each pixel of the deblurred image; white is 1.
+    pub half_width: Vec<f32>,
     /// Qualities and estimates.
     pub report: StagesReport,
 }
@@ -40,6 +46,9 @@ pub enum StagesError {
     /// The depth map does not fit the image.
     #[error(transparent)]
     Depth(#[from] DepthError),
+    /// The built-in calibration of the intervals cannot be used.
+    #[error(transparent)]
+    Intervals(#[from] NoIntervals),
     /// The built-in weights cannot be used.
     #[error(transparent)]
     Weights(#[from] WeightsError),
@@ -78,6 +87,16 @@ pub struct StagesReport {
     pub noise: f32,
     /// Distance of the readings from the readings of the result, divided by their noise.
     pub inconsistency: f32,
+    /// Mean half-width of the 95 % intervals of the pixels; white is 1.
+    pub mean_half_width: f32,
+    /// Share of the pixels whose interval is so wide that the image is the prior's there and not
+    /// the data's.
+    pub prior_share: f32,
+    /// What the intervals are calibrated for.
+    pub interval_note: &'static str,
+    /// The character in the image as the classifier reads it: the likeliest alternatives, or that
+    /// none is legible. The classifier knows 62 characters and nothing else.
+    pub reading: Reading,
     /// Number of depth zones that see the field and have a distance.
     pub depth_zones: usize,
     /// Name of the device that computed.
@@ -89,6 +108,34 @@ pub struct StagesReport {
     pub short_warnings: Vec<String>,
     /// What the qualities compare.
     pub quality_note: &'static str,
+}
+
+impl StagesReport {
+    /// The blur and its source, in words.
+    #[must_use]
+    pub fn blur_line(&self) -> String {
+        let (taken, estimated) = (self.sigma_px, self.estimated_sigma_px);
+        if taken > estimated {
+            format!("{taken:.2} px by lens and distance, {estimated:.2} px estimated")
+        } else {
+            format!("{taken:.2} px estimated")
+        }
+    }
+
+    /// How far the deblurred image can be trusted, in two short lines.
+    #[must_use]
+    pub fn trust(&self) -> Vec<String> {
+        vec![
+            format!("mean ± {:.3} of white", self.mean_half_width),
+            format!("{:.1} % of the pixels are the prior's", 100.0 * self.prior_share),
+        ]
+    }
+
+    /// The same and the character in the image, in one line.
+    #[must_use]
+    pub fn trust_line(&self) -> String {
+        format!("95 % intervals: {}; read as: {}", self.trust().join(", "), self.reading)
+    }
 }
 
 /// Runs the stages on an image in ADC counts that was reconstructed from these Hadamard rows.
@@ -130,6 +177,8 @@ pub fn enhance_stages(
         judge(&made.pixels)?,
     );
     let warnings = warnings(&made);
+    let half_width = made.half_width.clone().unwrap_or_default();
+    let reading = times.time("read_character", || reading(&made.pixels))?;
     let report = StagesReport {
         upscaled: upscaled.quality,
         fused: fused.quality,
@@ -140,6 +189,11 @@ pub fn enhance_stages(
         defocus_px,
         noise: made.noise,
         inconsistency: made.inconsistency,
+        mean_half_width: half_width.iter().sum::<f32>() / half_width.len().max(1) as f32,
+        prior_share: share_of_prior(&half_width),
+        interval_note: "calibrated on images of all patterns, with white noise and Gaussian blur; fewer patterns are not \
+                        in the calibration",
+        reading,
         depth_zones: view.zones,
         device: enhance.device().name().to_owned(),
         warnings: warnings.iter().map(Warning::to_string).collect(),
@@ -152,6 +206,15 @@ pub fn enhance_stages(
         upscaled: upscaled.values,
         fused: fused.values,
         deblurred: deblurred.values,
+        half_width,
         report,
     })
+}
+
+/// Reads the character in an image of 64 x 64.
+fn reading(pixels: &[f32]) -> Result<Reading, StagesError> {
+    let scale = Intervals::shipped()?.calibration().characters;
+    let reader = Reader::new(&Weights::embedded("classifier")?, scale)?;
+    let mut read = reader.read(Images::new(pixels).map_err(EnhanceError::from)?);
+    Ok(read.swap_remove(0))
 }

@@ -3,12 +3,14 @@
 use crate::bench::Bench;
 use nirspi::files::image::encode_grey;
 
-const FILES: [&str; 18] = [
+const FILES: [&str; 20] = [
     "deblurred.npy",
     "deblurred.png",
     "frames.npy",
     "fused.npy",
     "fused.png",
+    "interval.npy",
+    "interval.png",
     "measurement.npz",
     "raw.npy",
     "raw.png",
@@ -48,6 +50,15 @@ fn the_letter_is_captured_without_loss_and_plain_to_see() {
     let stage = |name: &str| report["enhancement"][name]["psnr_db"].as_f64().unwrap();
     assert!(stage("fused") > stage("upscaled"), "{report}");
     assert!(stage("deblurred") > stage("fused") + 1.0, "{report}");
+    // What an enhanced pixel may be off by, and what the character may be.
+    let enhancement = &report["enhancement"];
+    let widths = bench.pixels("demo/interval.npy");
+    let mean = widths.iter().map(|&width| f64::from(width)).sum::<f64>() / widths.len() as f64;
+    assert!((enhancement["mean_half_width"].as_f64().unwrap() - mean).abs() < 1e-5, "{mean}");
+    assert!(enhancement["prior_share"].as_f64().unwrap() < 0.2, "{enhancement}");
+    let reading = &enhancement["reading"];
+    assert_eq!(reading["alternatives"][0]["characters"], "R", "{reading}");
+    assert_eq!(reading["legible"], true);
     // What was written is what was judged.
     let judged =
         bench.run(&["metrics", "demo/truth.npy", "demo/reconstruction.npy"]).succeeded().json();

@@ -27,6 +27,8 @@ fn a_stack_comes_out_at_64_pixels_with_its_estimates_and_its_inconsistency() {
             "tof.npy",
             "--spread",
             "spread.npy",
+            "--interval",
+            "interval.npy",
             "--out",
             "out.npy",
             "--backend",
@@ -40,6 +42,12 @@ fn a_stack_comes_out_at_64_pixels_with_its_estimates_and_its_inconsistency() {
     assert!(stack.values.iter().all(|v| (0.0..=1.0).contains(v)));
     assert_eq!(stack.values[..4096], stack.values[4096..], "the same image, the same result");
     assert_eq!(npy::read_stack(&bench.path("spread.npy")).unwrap().count, 2);
+    let widths = npy::read_stack(&bench.path("interval.npy")).unwrap();
+    assert_eq!((widths.count, widths.height), (2, 64));
+    assert!(widths.values.iter().all(|width| (0.0..1.0).contains(width)));
+    let several = ["enhance", "in.npy", "--steps", "2", "--interval", "i.npy", "--out", "o.npy"];
+    bench.run(&several).failed(1, &["no intervals", "not for diffusion in 2 steps"]);
+    assert!(!bench.path("i.npy").exists());
     assert_eq!((&report["images"], &report["model"]), (&2.into(), &"diffusion".into()));
     for key in ["sigma_px", "noise", "inconsistency"] {
         assert!(report[key][1].as_f64().is_some_and(|v| (0.0..10.0).contains(&v)), "{report}");

@@ -32,7 +32,7 @@ def messages(name):
     """Every message of a file, decoded where its channel is protobuf."""
     with open(folder / name, "rb") as file:
         reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
-        topics = ["/telemetry", "/log", "/image", "/calibration", "/depth", "/enhanced", "/spread"]
+        topics = ["/telemetry", "/log", "/image", "/calibration", "/depth", "/enhanced", "/spread", "/interval"]
         decoded = list(reader.iter_decoded_messages(topics=topics))
         raw = list(reader.iter_messages(topics=["/wire"]))
         return decoded, raw, reader.get_summary()
@@ -139,9 +139,10 @@ print(f"depth: {len(maps)} maps, median {np.median(depth_m):.3f} m (simulated)")
 run("export", "rec.mcap", "--to", "mcap", "--enhance", "--out", "enhanced.mcap")
 run("reconstruct", "rec.mcap", "--enhance", "--out", "enhanced", "--no-flat-field")
 made = {c.topic: m for _, c, _, m in messages("enhanced.mcap")[0]}
-enhanced, spread = (np.frombuffer(made[t].data, "<f4").reshape(64, 64) for t in ("/enhanced", "/spread"))
+enhanced, spread, width = (np.frombuffer(made[t].data, "<f4").reshape(64, 64) for t in ("/enhanced", "/spread", "/interval"))
 assert np.array_equal(enhanced, np.load(folder / "enhanced" / "enhanced.npy").reshape(64, 64))
 assert 0 < spread.max() < 0.5 and spread.min() >= 0, (spread.min(), spread.max())
+assert 0 < width.max() < 1 and width.min() >= 0, (width.min(), width.max())
 print(f"spread: median {np.median(spread):.4f}, greatest {spread.max():.3f} of white (simulated)")
 
 rerun = Path(sys.executable).with_name("rerun")

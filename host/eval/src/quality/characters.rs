@@ -67,16 +67,28 @@ impl Characters {
                 groups(&text).on_file(file)?
             }
         };
-        let stacks = characters::read(path)?;
-        let mut all = Self { all: Vec::new(), origins: Vec::new(), notes: Vec::new() };
-        for stack in &stacks {
-            all.add(stack, groups.get(stack.name()).map(Vec::as_slice), count, seed);
-        }
+        let all = Self::of(&characters::read(path)?, &groups, count, seed);
         if all.all.is_empty() {
             let path = path.display();
             return Err(EvalError::Content(format!("{path}: no image that training has not seen")));
         }
         Ok(all)
+    }
+
+    /// `count` images of each stack, chosen by the seed from these groups of the stack. A stack
+    /// that is not named is taken whole.
+    #[must_use]
+    pub fn of(
+        stacks: &[Stack],
+        groups: &BTreeMap<String, Vec<u32>>,
+        count: usize,
+        seed: u64,
+    ) -> Self {
+        let mut all = Self { all: Vec::new(), origins: Vec::new(), notes: Vec::new() };
+        for stack in stacks {
+            all.add(stack, groups.get(stack.name()).map(Vec::as_slice), count, seed);
+        }
+        all
     }
 
     fn add(&mut self, stack: &Stack, groups: Option<&[u32]>, count: usize, seed: u64) {
@@ -166,7 +178,8 @@ impl Characters {
     }
 }
 
-fn groups(text: &str) -> Result<BTreeMap<String, Vec<u32>>> {
+/// Groups of each stack, from JSON.
+pub(crate) fn groups(text: &str) -> Result<BTreeMap<String, Vec<u32>>> {
     serde_json::from_str(text).on(|| "expected {\"stack\": [group, ...], ...}".to_owned())
 }
 

@@ -62,6 +62,14 @@ impl CharacterJudge {
         all
     }
 
+    /// Logits of the 62 classes for each image.
+    #[must_use]
+    pub fn logits(&self, images: Images<'_, SIDE>) -> Vec<Vec<f32>> {
+        let images = images.values().par_chunks_exact(SIDE * SIDE);
+        let logits = |image| self.network.logits(&self.network.features(image, (SIDE, SIDE)));
+        images.map(logits).collect()
+    }
+
     /// Fréchet character distance between two judged stacks of at least two images each.
     ///
     /// # Errors

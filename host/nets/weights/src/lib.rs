@@ -12,3 +12,6 @@ pub const FILES: [(&str, &[u8]); 5] = [
 
 /// JSON lists of the font families, writers and photographs that no training has seen.
 pub const HELD_OUT: &str = include_str!("../held_out.json");
+
+/// The calibration of intervals and of readings of characters, as JSON.
+pub const INTERVALS: &str = include_str!("../intervals.json");

@@ -116,8 +116,8 @@ impl Viewer {
                         news.messages.push(messages::data(id, now_ns, &payload));
                     }
                 }
-                // A live camera has no spread (`Channel::LIVE`).
-                Channel::Spread => {}
+                // A live camera has neither (`Channel::LIVE`).
+                Channel::Spread | Channel::Interval => {}
                 Channel::Image | Channel::Enhanced | Channel::Depth => {
                     if let Some(picture) = picture
                         && picture.number > subscribed.seen

@@ -18,6 +18,7 @@ const PANELS = {
   readings: { side: 32, of: "readings", white: null, even: true, scale: 1, unit: "ADC counts", digits: 2 },
   image: { side: 32, of: "image", white: picture => picture.white_counts, scale: 1, unit: "ADC counts", digits: 1 },
   enhanced: { side: 64, of: "enhanced", white: () => 1, scale: 100, unit: "% of white", digits: 1 },
+  interval: { side: 64, of: "interval", fixed: [0, .5], scale: 100, unit: "% of white either way", digits: 1 },
   depth: { side: 32, of: "depth", white: null, scale: 1, unit: "m", digits: 3 },
 };
 for (const [id, panel] of Object.entries(PANELS)) Object.assign(panel, { id, values: null, cell: null });
@@ -26,6 +27,7 @@ function percentile(sorted, share) { return sorted[Math.round(share * (sorted.le
 
 // The range of values from black to white.
 function range(panel, picture) {
+  if (panel.fixed) return panel.fixed;
   const white = panel.white?.(picture);
   // Readings are as often below 0 as above: 0 is in the middle. The first ones are far larger than the others.
   if (panel.even) {
@@ -124,6 +126,7 @@ export function show(message) {
     : state.overload.enhancement_off ? "off: this computer is too slow" : "no image yet");
   $("no-readings").hidden = message.readings !== null;
   $("depth-panel").hidden = message.depth === null;
+  $("interval-panel").hidden = !message.interval;
   const found = picture?.enhancement;
   text($("about-image"), picture
     ? `${picture.method}, ${frames(picture.frames)}, ${fixed(picture.reconstruct_ms, 1)} ms` : "");

@@ -1,0 +1,240 @@
+//! Calibrated intervals: how far a pixel of an enhanced image may be from the truth.
+//!
+//! A half-width is read from a table, which was made from images that neither training nor judging
+//! used. The table says how large the error was, in 95 % of the pixels that look alike. Pixels look
+//! alike if the same error is expected from what is known without the truth (the contrast around
+//! the pixel, the change by deblurring, estimated blur and noise, ...), in an image that is as busy.
+//!
+//! # Invariant
+//! Networks with other weights than those of the calibration get no interval
+//! (`tests::other_weights_get_no_interval_and_one_line_says_so`).
+
+mod features;
+mod table;
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use crate::choice::Networks;
+use crate::deblur::{AREA, Method};
+use crate::enhance::{Enhanced, Options};
+use crate::estimate::Estimate;
+use crate::weights::{Weights, WeightsError};
+
+pub use table::{LEVEL, LEVELS, Sample, Table, TableError};
+
+/// A half-width from which the interval says no more than that the pixel is somewhere between dark
+/// and bright: the pixel is the prior's and not the data's.
+pub const PRIORS_HALF_WIDTH: f32 = 0.25;
+
+/// The networks whose weights decide about an enhanced image.
+pub const NETWORKS: [&str; 3] = ["fsrcnn", "estimator", "diffusion"];
+
+/// One enhanced image, as far as it is known without the truth.
+#[derive(Debug, Clone, Copy)]
+pub struct Seen<'a> {
+    /// The enhanced image, 64 x 64 in [0, 1].
+    pub image: &'a [f32],
+    /// The image before deblurring, 64 x 64.
+    pub fused: &'a [f32],
+    /// Blur and noise, as used.
+    pub estimate: Estimate,
+    /// Inconsistency of the enhanced image.
+    pub inconsistency: f32,
+}
+
+/// A calibration and its origin: what the file of the calibration contains.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Calibration {
+    /// The command that made the file.
+    pub made_by: String,
+    /// Fingerprint of the weights of each network.
+    pub weights: BTreeMap<String, String>,
+    /// Seed of all random numbers.
+    pub seed: u64,
+    /// The calibration images of each stack.
+    pub stacks: Vec<CalibrationStack>,
+    /// The range of blur and noise.
+    pub conditions: String,
+    /// Number of enhanced images.
+    pub images: usize,
+    /// The table of errors.
+    pub pixels: Table,
+    /// The reading of characters.
+    pub characters: crate::reading::ReadingScale,
+}
+
+/// The calibration images of one stack.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct CalibrationStack {
+    /// The stack's name.
+    pub stack: String,
+    /// The font families, writers or photographs.
+    pub groups: Vec<u32>,
+    /// Number of sharp images.
+    pub images: usize,
+}
+
+/// Why there is no interval. `Display` is one line.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum NoIntervals {
+    /// The weights are not those of the calibration.
+    #[error(
+        "no intervals: the weights of {network} are not those that the intervals were calibrated for; \
+         `cargo run --release -p nirspi-eval --example trust` calibrates others"
+    )]
+    OtherWeights {
+        /// The network.
+        network: String,
+    },
+    /// The network is not the calibrated one.
+    #[error("no intervals: they are calibrated for {expected}, not for {found}")]
+    OtherMethod {
+        /// The calibrated network and steps.
+        expected: &'static str,
+        /// The network and steps.
+        found: String,
+    },
+    /// The images were not enhanced from 32 x 32 pixels.
+    #[error("no intervals: they are calibrated for images enhanced from 32 x 32 pixels")]
+    OtherSize,
+    /// The calibration cannot be read.
+    #[error("the calibration of the intervals cannot be read: {0}")]
+    Format(String),
+    /// The calibration does not belong to this program.
+    #[error(transparent)]
+    Table(#[from] TableError),
+    /// Weights cannot be read.
+    #[error(transparent)]
+    Weights(#[from] WeightsError),
+}
+
+/// The calibrated intervals of enhanced images.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Intervals {
+    calibration: Calibration,
+}
+
+impl Intervals {
+    /// The intervals of a calibration.
+    ///
+    /// # Errors
+    /// [`NoIntervals::Table`] if the calibration is of another program.
+    pub fn new(calibration: Calibration) -> Result<Self, NoIntervals> {
+        let pixels = calibration.pixels.checked()?;
+        Ok(Self { calibration: Calibration { pixels, ..calibration } })
+    }
+
+    /// The shipped calibration.
+    ///
+    /// # Errors
+    /// [`NoIntervals`] if the file is damaged.
+    pub fn shipped() -> Result<Self, NoIntervals> {
+        Self::parse(nirspi_weights::INTERVALS)
+    }
+
+    /// The calibration in a JSON text.
+    ///
+    /// # Errors
+    /// [`NoIntervals`] if the text is no calibration.
+    pub fn parse(json: &str) -> Result<Self, NoIntervals> {
+        let calibration =
+            serde_json::from_str(json).map_err(|error| NoIntervals::Format(error.to_string()))?;
+        Self::new(calibration)
+    }
+
+    /// The calibration and its origin.
+    pub fn calibration(&self) -> &Calibration {
+        &self.calibration
+    }
+
+    /// Checks that these weights are those of the calibration.
+    ///
+    /// # Errors
+    /// [`NoIntervals::OtherWeights`] if they are not.
+    pub fn expect(&self, network: &str, weights: &Weights) -> Result<(), NoIntervals> {
+        match self.calibration.weights.get(network) {
+            Some(calibrated) if *calibrated == weights.fingerprint() => Ok(()),
+            _ => Err(NoIntervals::OtherWeights { network: network.to_owned() }),
+        }
+    }
+
+    /// Half-width of the 95 % interval of each pixel.
+    pub fn half_widths(&self, seen: &Seen<'_>) -> Vec<f32> {
+        self.calibration.pixels.half_widths(seen, LEVEL)
+    }
+
+    /// Half-width of the 95 % interval of each pixel of a stack, (N, 64, 64).
+    ///
+    /// # Errors
+    /// [`NoIntervals::OtherSize`] if the images were not enhanced from 32 x 32 pixels.
+    pub fn of(&self, enhanced: &Enhanced) -> Result<Vec<f32>, NoIntervals> {
+        Ok(enhanced
+            .seen()
+            .ok_or(NoIntervals::OtherSize)?
+            .flat_map(|s| self.half_widths(&s))
+            .collect())
+    }
+}
+
+impl Enhanced {
+    /// The images one by one; `None` if the input was not 32 x 32.
+    pub fn seen(&self) -> Option<impl Iterator<Item = Seen<'_>>> {
+        let fused = self.upscaled.as_ref()?.chunks_exact(AREA);
+        let numbers = self.estimates.iter().zip(&self.inconsistency);
+        let images = self.images.chunks_exact(AREA).zip(fused).zip(numbers);
+        Some(images.map(|((image, fused), (&estimate, &inconsistency))| Seen {
+            image,
+            fused,
+            estimate,
+            inconsistency,
+        }))
+    }
+}
+
+/// The calibrated network and steps, in words.
+const METHOD: &str = "diffusion in 1 step";
+
+impl Networks {
+    /// The shipped intervals, if they were calibrated for the chosen weights, this method and these
+    /// options.
+    ///
+    /// # Errors
+    /// [`NoIntervals`] says why there are none.
+    pub fn intervals(
+        &mut self,
+        method: Method,
+        options: &Options,
+    ) -> Result<Intervals, NoIntervals> {
+        let other = |found| Err(NoIntervals::OtherMethod { expected: METHOD, found });
+        if method != Method::default() {
+            let (name, steps) = (method.model().name(), method.steps());
+            return other(format!(
+                "{name} in {steps} step{}",
+                if steps.get() == 1 { "" } else { "s" }
+            ));
+        }
+        if !options.consistency || !options.gate {
+            return other("a result that is not held against the readings".to_owned());
+        }
+        let intervals = Intervals::shipped()?;
+        for network in NETWORKS {
+            let weights = self.weights(network)?;
+            intervals.expect(network, &weights)?;
+        }
+        Ok(intervals)
+    }
+}
+
+/// Share of the pixels that are the prior's and not the data's: their half-width is at least
+/// [`PRIORS_HALF_WIDTH`].
+pub fn share_of_prior(half_widths: &[f32]) -> f32 {
+    let wide = half_widths.iter().filter(|width| **width >= PRIORS_HALF_WIDTH).count();
+    wide as f32 / half_widths.len().max(1) as f32
+}
+
+#[cfg(test)]
+mod tests;
