@@ -14,6 +14,7 @@ mod model;
 mod patience;
 mod safety;
 mod selftest;
+mod silence;
 pub(crate) mod support;
 mod versions;
 mod wires;
