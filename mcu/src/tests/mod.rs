@@ -1,5 +1,6 @@
 //! The camera against a scripted FPGA and a scripted link.
 
+mod access;
 mod commands;
 mod configuring;
 mod crash;
@@ -16,5 +17,6 @@ mod safety;
 mod selftest;
 mod silence;
 pub(crate) mod support;
+mod timing;
 mod versions;
 mod wires;

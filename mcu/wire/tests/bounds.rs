@@ -1,7 +1,5 @@
 //! How long packets are: buffers and transfers are laid out by these numbers.
 
-#![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
-
 use nirspi_wire::packet::{hello_of_any_version, overhead, parse, seal, unseal};
 use nirspi_wire::ready::{HEADER_BYTES, LEAD_BYTES, read_bytes};
 use nirspi_wire::{Answer, DeviceMessage, PATTERNS, Reply, encode};

@@ -1,7 +1,5 @@
 //! What a receiver may take from a frame of the FPGA.
 
-#![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
-
 use nirspi_wire::fpga::{FpgaFrame, FrameError, Header, SUM_MODULUS, Sums};
 use nirspi_wire::{FrameFlags, crc32};
 
