@@ -38,6 +38,7 @@ by_name=(
     "seeds           place and route of the gateware with five seeds, the best of which is packed; PyPI"
     "licences        licences, sources and bans of all dependencies; crates.io"
     "flash           probe-rs knows every board's chip"
+    "mutants         deliberate faults in the Rust code are seen: in lines changed since main, or in MUTANTS='CRATE...'; crates.io"
     "zenoh           a camera over Zenoh: router, camera and host as processes; crates.io, 219 crates of which 95 are its own"
     "publish         each library crate builds from its package alone; crates.io"
     "licence-texts   the licences of all dependencies in one page; crates.io"
@@ -360,6 +361,28 @@ step_mie() {
 
 step_mutations() {
     cargo test --locked -p nirspi-hdl-sim -p nirspi-tests-rtl --test rtl every_deliberate -- --ignored
+}
+
+# One fault after another in a copy of the tree, each against the tests of its own crate: docs/mutants.md. Crates in
+# MUTANTS are tried whole; without it, lines that differ from MUTANTS_SINCE (default: main). MUTANTS_SHARD=0/8 tries an
+# eighth of the faults. The exit status is that of cargo-mutants: 2 if a fault was missed.
+step_mutants() {
+    tool cargo-mutants 27.1.0
+    local chosen=() crate since
+    for crate in ${MUTANTS:-}; do chosen+=(--package "$crate"); done
+    if [ ${#chosen[@]} = 0 ]; then
+        since=$(git merge-base HEAD "${MUTANTS_SINCE:-main}")
+        git diff "$since" -- '*.rs' >"$out/changed.diff"
+        if [ ! -s "$out/changed.diff" ]; then
+            echo "skipped: no Rust code differs from ${MUTANTS_SINCE:-main}"
+            return
+        fi
+        chosen=(--workspace --in-diff "$out/changed.diff")
+    fi
+    if [ -n "${MUTANTS_SHARD:-}" ]; then chosen+=(--shard "$MUTANTS_SHARD" --sharding round-robin); fi
+    mkdir -p target/mutants
+    # Dependencies stay from one fault to the next, and for the next time.
+    CARGO_TARGET_DIR=$PWD/target/mutants/build cargo mutants "${chosen[@]}" --output target/mutants -- --lib --bins --tests
 }
 
 step_verilator() { bash hdl/verilator/run.sh; }

@@ -1,5 +1,6 @@
 //! The camera against a scripted FPGA and a scripted link.
 
+mod access;
 mod commands;
 mod configuring;
 mod crash;
@@ -14,6 +15,8 @@ mod model;
 mod patience;
 mod safety;
 mod selftest;
+mod silence;
 pub(crate) mod support;
+mod timing;
 mod versions;
 mod wires;
