@@ -299,9 +299,10 @@ step_web() {
     [ "$bytes" -lt 12000000 ]
     debian chromium || echo "no chromium installed here"
     if [ -x /usr/bin/chromium ]; then
-        cargo build --locked --release --example in_turns
+        cargo build --locked --release --bin nirspi --example in_turns
         python_with browser playwright==1.65.2
-        target/browser/bin/python host/web/tests/check.py target/book/camera "${CARGO_TARGET_DIR:-target}/release/examples/in_turns"
+        local built=${CARGO_TARGET_DIR:-target}/release
+        target/browser/bin/python host/web/tests/check.py target/book/camera "$built/examples/in_turns" "$built/nirspi"
     else
         echo "skipped: the camera in a browser, no chromium"
     fi

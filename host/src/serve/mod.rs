@@ -18,6 +18,7 @@
 //! delay to each stage is measured (`delays.rs`). If the computer is too slow for the camera, the page
 //! gives up images, then enhancement (`overload.rs`).
 
+mod begin;
 mod camera;
 mod camera_log;
 mod commands;
@@ -50,13 +51,12 @@ mod threads;
 mod token;
 mod turns;
 
+pub use begin::TurnsError;
 pub use camera::{CameraSource, Connect, Connected};
 pub use imaging::{Imaging, ImagingError};
 pub use line::Line;
 #[cfg(feature = "serve")]
 pub use server::{BindError, Server};
-#[cfg(feature = "virtual-camera")]
-pub use simulated::SimulatedError;
 pub use slot::{ImageCounters, Ledger};
 pub use stage::StagedScene;
 #[cfg(feature = "serve")]

@@ -1,46 +1,16 @@
 //! The page of the virtual camera, in turns.
 
-use super::imaging::ImagingError;
+use super::begin::TurnsError;
 use super::line::Line;
-use super::settings::{Measuring, Settings};
-use super::{CameraSource, Connected, ForeignError, Imaging, StagedScene, Turns};
+use super::{CameraSource, Connected, ForeignError, StagedScene, Turns};
 use crate::calibration::Settling;
 use crate::capture::Calibration;
-use crate::scene::{SceneError, SceneSource};
+use crate::scene::SceneSource;
 use crate::session::Session;
-use crate::virtual_camera::{
-    MemoryLink, ShotError, VirtualOptics, VirtualOpticsError, calibrate_against_white,
-};
-use nirspi_nets::{Device, deblur::Model};
+use crate::virtual_camera::{MemoryLink, VirtualOptics, calibrate_against_white};
 use nirspi_optics::CameraModel;
 use nirspi_optics::rain::Air;
-use nirspi_recon::reconstruct::{Method, MethodSettings};
-use nirspi_recon::{Order, RowsError};
-use thiserror::Error;
-
-/// Why the virtual camera's page cannot begin.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum SimulatedError {
-    /// The scene cannot be drawn.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// The optics cannot be built.
-    #[error(transparent)]
-    Optics(#[from] VirtualOpticsError),
-    /// The camera cannot be calibrated.
-    #[error(transparent)]
-    Calibration(#[from] ShotError),
-    /// The patterns cannot be computed.
-    #[error(transparent)]
-    Rows(#[from] RowsError),
-    /// The camera does not answer.
-    #[error("the virtual camera does not answer")]
-    Camera(#[source] ForeignError),
-    /// Methods or networks cannot be prepared.
-    #[error(transparent)]
-    Imaging(#[from] ImagingError),
-}
+use nirspi_recon::Order;
 
 impl Turns {
     /// The paper's camera with this seed before a letter, half of the patterns, with every method
@@ -48,8 +18,8 @@ impl Turns {
     /// white sheet first.
     ///
     /// # Errors
-    /// [`SimulatedError`] if the built-in weights are damaged, or because of a bug.
-    pub fn virtual_camera(seed: u64) -> Result<Self, SimulatedError> {
+    /// [`TurnsError`] if the built-in weights are damaged, or because of a bug.
+    pub fn virtual_camera(seed: u64) -> Result<Self, TurnsError> {
         let model = CameraModel::paper().clone();
         let map = "letter:R".parse::<SceneSource>()?.load(256)?;
         let scene = StagedScene { map, distance_m: 0.3, air: Air::default() };
@@ -71,19 +41,7 @@ impl Turns {
             record_to: None,
             connect: Box::new(connect),
         };
-        let network = Some(nirspi_nets::prior::shipped());
-        let methods = MethodSettings { network, ..MethodSettings::default() };
-        let imaging = Imaging::new(&methods, Device::cpu())?;
-        let settings = Settings {
-            method: Method::default().argument(),
-            strength: None,
-            enhance: true,
-            model: Model::DIFFUSION.name(),
-            frames: 64,
-            measuring: Measuring::of(&source.setup),
-            record: false,
-        };
-        Self::new(source, imaging, settings, Some(line)).map_err(SimulatedError::Camera)
+        Self::with_every_method(source, Some(line))
     }
 }
 

@@ -1,18 +1,20 @@
 // The connection to the camera's program, which runs in this page: in a worker, as WebAssembly.
 
 import { $, text } from "./dom.js";
+import { choose, isAsked, isOffered } from "./usb.js";
 
 // What the page says when the program has stopped.
 export const GONE = { line: "the program in this page has stopped; reload the page", leds: "the program has stopped" };
 
-const worker = new Worker(new URL("worker.js", import.meta.url));
+const isReal = isAsked(location.href);
+const worker = new Worker(new URL(`worker.js${location.search}`, import.meta.url), { type: "module" });
 const waiting = new Map();
 let commands = 0, stopped = false;
 
 // Sends a command. Returns whether the program has executed the command, and the text of the answer.
 export function send(path, body) {
-  // The LEDs of a program that has stopped are gone with it.
-  if (stopped) return Promise.resolve({ ok: path === "/api/stop", text: GONE.line });
+  // The simulated LEDs of a program that has stopped are gone with it; those of a real camera go out when it misses its host.
+  if (stopped) return Promise.resolve({ ok: path === "/api/stop" && !isReal, text: GONE.line });
   return new Promise(answered => {
     waiting.set(++commands, answered);
     worker.postMessage({ id: commands, path, body: body ?? "" });
@@ -44,4 +46,21 @@ export function listen(show, gone) {
 // The scene comes first here.
 $("scene").open = true;
 document.querySelector("main").prepend($("scene"));
+
+// From the virtual camera to one on USB and back, by loading the page again.
+if (isReal || isOffered()) {
+  const button = document.createElement("button"), answer = document.createElement("span");
+  button.id = "other-camera";
+  button.textContent = isReal ? "Use the virtual camera" : "Use a camera on USB";
+  answer.setAttribute("role", "status");
+  button.onclick = async () => {
+    try {
+      if (!isReal) await choose();
+      location.search = isReal ? "" : "?camera=usb";
+    } catch (error) {
+      text(answer, `no camera was chosen: ${error.message}`);
+    }
+  };
+  $("camera").after(button, answer);
+}
 text($("no-record"), "recordings: with nirspi serve");

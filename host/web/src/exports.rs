@@ -2,8 +2,9 @@
 //!
 //! ```text
 //! room(n) -> address          the page writes n bytes there
-//! begin(seed) -> ok           powers the camera up
-//! turn() -> ok                one turn; the answer is a message of the live page
+//! begin(seed) -> ok           powers the virtual camera up
+//! begin_usb() -> ok           connects to the camera on USB, for which it waits
+//! turn() -> ok                one turn, which may wait for the camera; the answer is a message of the live page
 //! command(path_bytes) -> ok   the bytes are a path and a body; the answer is the command's
 //! answer(), answer_bytes()    address and length of the answer, or of an error in one line
 //! ```
@@ -11,8 +12,9 @@
 #![allow(unsafe_code, reason = "the names of functions that another language calls are exported")]
 
 use crate::page;
+use crate::usb::PageLink;
 use nirspi::causes::in_one_line;
-use nirspi::serve::Turns;
+use nirspi::serve::{Turns, TurnsError};
 use std::cell::RefCell;
 
 /// The program and its buffers. A browser calls from one thread.
@@ -49,8 +51,18 @@ extern "C" fn room(bytes: usize) -> *mut u8 {
 /// Powers the virtual camera up. The answer is empty.
 #[unsafe(no_mangle)]
 extern "C" fn begin(seed: u32) -> bool {
+    began(|| Turns::virtual_camera(seed.into()))
+}
+
+/// Connects to the camera on USB that a person has chosen. The answer is empty.
+#[unsafe(no_mangle)]
+extern "C" fn begin_usb() -> bool {
+    began(|| Turns::linked("usb", || Ok(Box::new(PageLink::open()?))))
+}
+
+fn began(turns: impl FnOnce() -> Result<Turns, TurnsError>) -> bool {
     page::connect();
-    PROGRAM.with_borrow_mut(|program| match Turns::virtual_camera(seed.into()) {
+    PROGRAM.with_borrow_mut(|program| match turns() {
         Ok(turns) => {
             program.turns = Some(turns);
             program.says(Ok(String::new()))

@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""The camera in a browser: its numbers beside the native ones, an R drawn by mouse, a shaken line, a phone, and what breaks.
+"""The camera in a browser: its numbers beside the native ones, an R drawn by mouse, a shaken line, a phone, a camera on USB,
+and what breaks.
 
-    python3 check.py FOLDER IN_TURNS [--screenshots DIR] [--least IMAGES_PER_S]
+    python3 check.py FOLDER IN_TURNS NIRSPI [--screenshots DIR] [--least IMAGES_PER_S]
 
-FOLDER is that of `host/web/build.sh`, IN_TURNS the program of `cargo build --release --example in_turns`. Needs playwright
-(PyPI) and chromium (Debian). Says what is wrong and exits 1, or prints what it saw.
+FOLDER is that of `host/web/build.sh`, IN_TURNS the program of `cargo build --release --example in_turns`, NIRSPI that of
+`cargo build --release`. Needs playwright (PyPI) and chromium (Debian). Says what is wrong and exits 1, or prints what it saw.
 """
 
 import argparse
@@ -15,6 +16,7 @@ import json
 import math
 import os
 import pathlib
+import socket
 import struct
 import subprocess
 import sys
@@ -44,26 +46,111 @@ CASES = [(method, 8, 0.3) for method in ["tikhonov", "omp", "tv", "fista", "hada
 CLOSE = 1e-5
 
 
+# A device as WebUSB shows it, for page and worker. Its transfers go to the file server, which hands them to a virtual camera.
+DEVICE = """
+{
+  let last = Promise.resolve();
+  // Transfers of one direction end in their order.
+  const ask = (...given) => last = last.then(() => fetch(...given));
+  const alternate = { interfaceClass: 0xff, interfaceSubclass: 0x53 };
+  const device = {
+    vendorId: 0x1209, productId: 1, configuration: null, claimed: [],
+    async open() {
+      if (!(await fetch("/usb/open", { method: "POST" })).ok) throw new DOMException("The device was disconnected.", "NotFoundError");
+    },
+    async close() { this.claimed = []; },
+    async selectConfiguration(number) {
+      if (number !== 1) throw new Error(`there is no configuration ${number}`);
+      this.configuration = { interfaces: [{ interfaceNumber: 2, alternates: [alternate] }] };
+    },
+    async claimInterface(number) { this.claimed.push(number); },
+    async transferOut(endpoint, data) {
+      if (endpoint !== 1 || !this.claimed.includes(2)) throw new Error("the interface is not claimed");
+      await fetch("/usb/out", { method: "POST", body: data });
+      return { status: "ok", bytesWritten: data.byteLength };
+    },
+    async transferIn(endpoint, length) {
+      if (endpoint !== 1 || !this.claimed.includes(2)) throw new Error("the interface is not claimed");
+      const got = await ask(`/usb/in/${length}`, { cache: "no-store" });
+      if (!got.ok) throw new DOMException("The device was disconnected.", "NetworkError");
+      return { status: "ok", data: new DataView(await got.arrayBuffer()) };
+    },
+  };
+  const usb = {
+    async requestDevice(asked) { globalThis.askedFor = asked; return device; },
+    async getDevices() { return [device]; },
+  };
+  Object.defineProperty(navigator, "usb", { value: usb });
+}
+"""
+
+
+class Camera:
+    """A virtual camera in a process of its own, behind TCP."""
+
+    def __init__(self, program):
+        self.process = subprocess.Popen(
+            [program, "virtual", "--listen", "127.0.0.1:0"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        )
+        address = self.process.stdout.readline().split("tcp:")[1].split(": ")[0]
+        self.place = (address.rsplit(":", 1)[0], int(address.rsplit(":", 1)[1]))
+        threading.Thread(target=self.process.stdout.read, daemon=True).start()
+        self.socket = None
+
+    def open(self):
+        if self.socket:
+            self.socket.close()
+        self.socket = socket.create_connection(self.place)
+        self.socket.settimeout(0.2)
+
+    def read(self, most):
+        try:
+            return self.socket.recv(most) or None
+        except TimeoutError:
+            return b""
+        except OSError:
+            return None
+
+
 class Files(http.server.SimpleHTTPRequestHandler):
-    """A plain file server. Under /missing, /cut and /panic it serves the same folder with one thing wrong."""
+    """A plain file server. Under /missing, /cut and /panic it serves the same folder with one thing wrong, under /usb-camera
+    with a device in place of the browser's own USB. /usb is that device's other side."""
+
+    camera = None
+
+    def do_POST(self):
+        body = self.rfile.read(int(self.headers["Content-Length"] or 0))
+        try:
+            Files.camera.open() if self.path == "/usb/open" else Files.camera.socket.sendall(body)
+            self.answer(b"")
+        except OSError as error:
+            self.send_error(503, str(error))
+
+    def answer(self, content, kind="application/octet-stream"):
+        self.send_response(200)
+        self.send_header("Content-Type", kind)
+        self.send_header("Content-Length", str(len(content)))
+        self.end_headers()
+        self.wfile.write(content)
 
     def do_GET(self):
         _, *parts = self.path.split("?")[0].split("/")
-        wrong = parts.pop(0) if parts[0] in ("missing", "cut", "panic") else None
+        if parts[:2] == ["usb", "in"]:
+            got = Files.camera.read(int(parts[2]))
+            return self.send_error(503) if got is None else self.answer(got)
+        wrong = parts.pop(0) if parts[0] in ("missing", "cut", "panic", "usb-camera") else None
         self.path = "/" + "/".join(parts)
         name = parts[-1]
         if wrong == "missing" and name.endswith(".wasm"):
             return self.send_error(404)
-        if (wrong, name[-5:]) not in [("cut", ".wasm"), ("panic", "er.js")]:
+        if (wrong, name[-5:]) not in [("cut", ".wasm"), ("panic", "er.js"), ("usb-camera", "er.js")]:
             return super().do_GET()
         content = open(self.translate_path(self.path), "rb").read()
+        if wrong == "usb-camera":
+            return self.answer(content + DEVICE.encode(), "text/javascript")
         # No memory has so much room.
-        content = content[: len(content) // 2] if wrong == "cut" else content.replace(b"program.turn()", b"program.room(-1)")
-        self.send_response(200)
-        self.send_header("Content-Type", self.guess_type(self.path))
-        self.send_header("Content-Length", str(len(content)))
-        self.end_headers()
-        self.wfile.write(content)
+        content = content[: len(content) // 2] if wrong == "cut" else content.replace(b"patient(program.turn)()", b"program.room(-1)")
+        self.answer(content, self.guess_type(self.path))
 
     def log_message(self, *_):
         pass
@@ -76,7 +163,9 @@ def in_the_browser(page, script):
           const bytes = await (await fetch("nirspi_web.wasm")).arrayBuffer();
           let panic = "", program = null;
           const text = (at, length) => new TextDecoder().decode(new Uint8Array(program.memory.buffer, at >>> 0, length));
-          const imports = { page: { now_ms: () => Date.now(), panicked: (at, length) => { panic = text(at, length); } } };
+          const none = () => { throw "a virtual camera needs no USB"; };
+          const imports = { page: { now_ms: () => Date.now(), panicked: (at, length) => { panic = text(at, length); },
+            usb_open: none, usb_send: none, usb_receive: none, usb_problem: none } };
           program = (await WebAssembly.instantiate(bytes, imports)).instance.exports;
           const answer = () => text(program.answer(), program.answer_bytes());
           if (!program.begin(1)) throw answer();
@@ -236,6 +325,43 @@ def stopped(page):
     expect(page.locator("#line")).to_have_text("measuring")
 
 
+def on_usb(browser, base, program, wanted, folder):
+    """A camera on USB: chosen by a person, shown, switched, unplugged, plugged in again."""
+    Files.camera = Camera(program)
+    page = browser.new_page(viewport={"width": 1300, "height": 900})
+    problems = []
+    page.on("pageerror", lambda error: problems.append(str(error)))
+    page.add_init_script(DEVICE)
+    page.goto(f"{base}/usb-camera/index.html")
+    page.get_by_role("button", name="Use a camera on USB").click()
+    page.wait_for_url("**?camera=usb", wait_until="commit", timeout=LIMIT_MS)
+    expect(page.locator("#line")).to_have_text("measuring", timeout=LIMIT_MS)
+    seen(page, "image", 32)
+    looks_like(page, "image", wanted, 0.9)
+    expect(page.locator("#scene")).to_be_hidden()
+    # Nothing is lost between camera, page and program.
+    page.wait_for_timeout(3000)
+    received, *missed = counters(page)
+    assert received > 100 and missed == [0, 0, 0], (received, missed)
+    page.get_by_label("hadamard", exact=True).check()
+    expect(page.locator("#about-image")).to_contain_text("hadamard, ")
+    shot(page, folder, "usb")
+    stopped(page)
+    # Unplugged: the page says so, and measures again when the camera is back.
+    Files.camera.process.kill()
+    expect(page.locator("#line")).to_contain_text("trying again")
+    Files.camera = Camera(program)
+    expect(page.locator("#line")).to_have_text("measuring")
+    page.get_by_role("button", name="Use the virtual camera").click()
+    page.wait_for_url(lambda address: "camera=usb" not in address, wait_until="commit", timeout=LIMIT_MS)
+    expect(page.locator("#line")).to_have_text("measuring", timeout=LIMIT_MS)
+    expect(page.locator("#scene")).to_be_visible()
+    assert not problems, problems
+    page.close()
+    Files.camera.process.kill()
+    print(f"a camera on USB, by a device in place of the browser's own: {received} frames, none lost")
+
+
 def rate(page, seconds=10):
     """Enhanced images a second."""
     shown = "() => Number(document.querySelectorAll('#account dd')[4].textContent.split(' of ')[0].replaceAll('\\u202f', ''))"
@@ -267,6 +393,7 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("folder")
     parser.add_argument("in_turns")
+    parser.add_argument("nirspi")
     parser.add_argument("--screenshots")
     parser.add_argument("--least", type=float, default=0.0)
     given = parser.parse_args()
@@ -287,6 +414,7 @@ def main():
         page.on("console", lambda said: problems.append(said.text) if said.type == "error" else None)
         measuring(page, f"{base}/index.html")
         got = rate(page)
+        letter = page.locator("#image").evaluate(LEVELS)
         drawn(page)
         shot(page, given.screenshots, "light")
         controls(page)
@@ -304,6 +432,7 @@ def main():
             page.wait_for_timeout(3000)
             shot(page, given.screenshots, name)
             context.close()
+        on_usb(browser, base, given.nirspi, letter, given.screenshots)
         broken(browser, base)
         browser.close()
     assert got >= given.least, f"{got:.1f} enhanced images/s, expected {given.least}"
