@@ -21,7 +21,7 @@ fn hello_tells_who_the_device_is() {
     let expected = Identity {
         protocol: version::CURRENT,
         firmware: Version(1, 2, 3),
-        gateware: Version(0, 3, 2),
+        gateware: Version(0, 3, 0),
         board: "bench",
         serial: "0001",
         side: 32,
