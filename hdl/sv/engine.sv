@@ -181,6 +181,7 @@ module nirspi_engine
     logic                [48-1:0] sum_word  ;
     logic                [12-1:0] raw_at    ;
     logic                [16-1:0] raw_word  ;
+    logic                [64-1:0] total     ;
 
     nirspi_source samples (
         .clk        (clk                 ),
@@ -235,6 +236,14 @@ module nirspi_engine
         .count   (over_count                    ),
         .any     (over_any                      ),
         .reached (over_trips                    )
+    );
+
+    nirspi_sample_total level (
+        .clk    (clk              ),
+        .counts (place.counts     ),
+        .first  (place.frame_first),
+        .code   (sample.code      ),
+        .total  (total            )
     );
 
     // Done with.
@@ -303,6 +312,7 @@ module nirspi_engine
         .done       (frame_done ),
         .over_range (over_count ),
         .over_any   (over_any   ),
+        .total      (total      ),
         .overflow   (overflow   ),
         .counts     (counts     ),
         .filling    (filling    ),
@@ -357,6 +367,8 @@ module nirspi_engine
         .fault       (fault_seen                           ),
         .frames_made (frames_made                          ),
         .frames_lost (frames_lost                          ),
+        .delivered   (frame_ready                          ),
+        .header      (header                               ),
         .clock_now   (clock_now                            ),
         .table_entry (host_entry                           ),
         .value       (value                                )

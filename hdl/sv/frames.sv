@@ -13,6 +13,7 @@ module nirspi_frames (
     input  var logic                           done      , /// This clock completes a frame
     input  var logic                  [32-1:0] over_range, /// Over-range samples of the frame
     input  var logic                           over_any  , /// There are some
+    input  var logic                  [64-1:0] total     , /// Sum of the frame's samples
     input  var logic                           overflow  , /// A sum wraps with this clock
     input  var logic                           counts    , /// This clock is one of a run
     output var logic                           filling   ,
@@ -90,6 +91,7 @@ module nirspi_frames (
             header.number     <= made;
             header.over_range <= over_range;
             header.lost       <= lost;
+            header.total      <= total;
             header.shown_at   <= ((first) ? ( clock_now ) : ( shown ));
         end
     end

@@ -20,6 +20,8 @@ module nirspi_registers
     input  var logic                  [3-1:0]  fault      ,
     input  var logic                  [32-1:0] frames_made,
     input  var logic                  [32-1:0] frames_lost,
+    input  var logic                           delivered  , /// There is a frame
+    input  var nirspi_types::Header            header     , /// Of that frame
     input  var logic                  [64-1:0] clock_now  ,
     input  var logic                  [10-1:0] table_entry,
     output var logic                  [32-1:0] value       /// Two clocks after `read`, and from then on
@@ -164,7 +166,7 @@ module nirspi_registers
 
     // Which word is asked for, worked out while the access waits.
     logic [17-1:0] asked      ;
-    logic [5-1:0]  asked_live ;
+    logic [8-1:0]  asked_live ;
     logic          asked_table;
 
     always_ff @ (posedge clk) begin
@@ -190,6 +192,9 @@ module nirspi_registers
         asked_live[2] <= 32'(address) == ADDRESS_FRAMES_MADE;
         asked_live[3] <= 32'(address) == ADDRESS_FRAMES_LOST;
         asked_live[4] <= 32'(address) == ADDRESS_CLOCK_LOW;
+        asked_live[5] <= 32'(address) == ADDRESS_SUM_LOW;
+        asked_live[6] <= 32'(address) == ADDRESS_SUM_HIGH;
+        asked_live[7] <= 32'(address) == ADDRESS_OVER_RANGE;
         asked_table   <= address[15:10] == ORDER_TABLE[15:10];
     end
 
@@ -204,7 +209,9 @@ module nirspi_registers
         if (read) begin
             live <= (status & {32{asked_live[0]}}) | (32'(fault) & {32{asked_live[1]}})
                 | (frames_made & {32{asked_live[2]}}) | (frames_lost & {32{asked_live[3]}})
-                | (clock_now[31:0] & {32{asked_live[4]}});
+                | (clock_now[31:0] & {32{asked_live[4]}}) | (header.total[31:0] & {32{asked_live[5] && delivered}})
+                | (header.total[63:32] & {32{asked_live[6] && delivered}})
+                | (header.over_range & {32{asked_live[7] && delivered}});
         end
         stored_0 <= (scratch & {32{asked[0]}}) | (mode & {32{asked[1]}}) | (patterns & {32{asked[2]}})
             | (dwell & {32{asked[3]}}) | (blank & {32{asked[4]}}) | (latency & {32{asked[5]}});

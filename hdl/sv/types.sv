@@ -63,6 +63,7 @@ package nirspi_types;
         logic [32-1:0] over_range;
         logic [32-1:0] lost      ;
         logic [64-1:0] shown_at  ;
+        logic [64-1:0] total     ; /// Sum of its samples, which is in registers only
     } Header;
 
     /// Depth of the machine: clock `t` of a run is done with `DEPTH` clocks after its slot was chosen.

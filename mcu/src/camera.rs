@@ -83,9 +83,22 @@ impl Camera {
     }
 
     /// Sends or counts a frame that the bus has kept, while the board transfers the next one: the
-    /// frame of [`Wanted::kept`](crate::Wanted::kept).
+    /// frame of [`Target::Bus`](crate::Target::Bus).
     pub fn pack(&mut self, now: Micros, frame: &[u8], sink: &mut impl PacketSink) {
         self.machine.pack(now, frame, sink);
+    }
+
+    /// Sends or counts the packet that the board has transferred into the link's room
+    /// ([`Target::Link`](crate::Target::Link)). Call this straight after the transfer: the next claim takes the room back.
+    /// After any other transfer the call does nothing.
+    pub fn forward<B: FpgaBus, S: PacketSink, G: GatewareLoader>(
+        &mut self,
+        now: Micros,
+        ports: &mut Ports<'_, B, S, G>,
+    ) {
+        if self.machine.setup.is_some_and(|setup| setup.sends_packets()) {
+            self.machine.step_run(now, ports.bus, ports.sink);
+        }
     }
 
     /// Forwards a time-of-flight map of `side` x `side` distances in mm, measured now. The map is

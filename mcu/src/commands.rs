@@ -12,7 +12,7 @@ use crate::notices::{Notice, Outcome};
 use crate::{
     FpgaBus, GatewareLoader, Inputs, Micros, PacketSink, Ports, configure, fpga, gateware, safety,
 };
-use nirspi_wire::register::{Design, NO_CLOCK, ORDER_TABLE, Register, status};
+use nirspi_wire::register::{Design, NO_CLOCK, ORDER_TABLE, Register, mode, status};
 use nirspi_wire::{
     Answer, Capabilities, Command, Configuration, DeviceMessage, GatewareChunk, PATTERNS,
     PatternOrder, Refusal, Reply, Request, Signal, State, Status, Tail, version,
@@ -113,7 +113,7 @@ impl Machine {
         if self.state() == State::Running {
             return Err(Refusal::State(State::Running));
         }
-        let setup =
+        let mut setup =
             configure::check(configuration, &self.limits).map_err(Refusal::Configuration)?;
         if let Some(fault) = safety::objection(inputs, &self.limits, self.fault) {
             return Err(Refusal::Fault(fault));
@@ -124,6 +124,9 @@ impl Machine {
         }
         self.loading = None;
         self.setup = None;
+        if setup.fits_packets() && fpga::makes_packets(bus).map_err(|_| Refusal::Bus)? {
+            setup.mode |= mode::PACKETS;
+        }
         let table = match &configuration.order {
             PatternOrder::Table(table) => fpga::set_table(bus, table),
             PatternOrder::Natural | PatternOrder::Sequency => Ok(()),

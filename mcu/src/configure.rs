@@ -6,6 +6,7 @@
 //! that the FPGA accepts (`crate::tests::commands::a_number_out_of_range_is_named_with_its_range`).
 
 use crate::Limits;
+use nirspi_wire::ready::MAX_SUMMED_SAMPLES;
 use nirspi_wire::register::{DUTY_WINDOW, LATENCY_MAX, mode};
 use nirspi_wire::samples::Words;
 use nirspi_wire::{
@@ -31,6 +32,17 @@ impl Setup {
     pub fn sweep_clocks(&self) -> u64 {
         let halves = if self.mode & mode::DIFFERENTIAL == 0 { 1 } else { 2 };
         u64::from(self.patterns).saturating_mul(self.dwell.into()).saturating_mul(halves)
+    }
+
+    /// Whether the FPGA may make packets of the frames: a packet has no room for larger sums.
+    pub fn fits_packets(&self) -> bool {
+        let samples = u32::from(self.dwell.saturating_sub(self.blank));
+        samples.saturating_mul(self.sweeps) <= MAX_SUMMED_SAMPLES
+    }
+
+    /// Whether the FPGA makes packets of the frames.
+    pub fn sends_packets(&self) -> bool {
+        self.mode & mode::PACKETS != 0
     }
 
     /// ADC clocks of a frame.

@@ -8,10 +8,10 @@
 //! `tests::commands::one_entry_of_the_order_that_does_not_arrive_is_noticed`).
 
 use crate::configure::Setup;
-use crate::{BusError, FpgaBus, Limits};
+use crate::{BusError, FpgaBus, Limits, Micros};
 use nirspi_wire::register::{
     DAMAGED, Design, FaultCode, IDENTITY, NO_CLOCK, ORDER_TABLE, Register, control, has_this_map,
-    status,
+    measures_frames, status,
 };
 use nirspi_wire::samples::Words;
 use nirspi_wire::{Fault, Version};
@@ -45,6 +45,10 @@ const FOREIGN: Fault = Fault::FpgaAbsent { identity: IDENTITY };
 
 /// The fault of an access that failed. Accesses to gateware of another version fail as if they were
 /// damaged, because that gateware checks none.
+///
+/// Never inlined, so that the many places where an access can fail share the code.
+#[cold]
+#[inline(never)]
 pub(crate) fn failed(error: BusError, bus: &mut impl FpgaBus) -> Fault {
     if error != BusError::Damaged {
         return SILENT;
@@ -123,6 +127,19 @@ pub(crate) fn version(bus: &mut impl FpgaBus) -> Version {
         }
         _ => Version(0, 0, 0),
     }
+}
+
+/// Whether the gateware makes packets, and gives the signal meter what they leave out.
+pub(crate) fn makes_packets(bus: &mut impl FpgaBus) -> Result<bool, BusError> {
+    read(bus, Register::Version).map(measures_frames)
+}
+
+/// Says what the packets of the next run carry beside their frames: the number of the run, and the device time of the
+/// next read of the clock.
+pub(crate) fn stamp(bus: &mut impl FpgaBus, run: u16, time: Micros) -> Result<(), BusError> {
+    write(bus, Register::Run, run.into())?;
+    write(bus, Register::TimeLow, time.0 as u32)?;
+    write(bus, Register::TimeHigh, (time.0 >> 32) as u32)
 }
 
 /// Clocks since the FPGA's reset.

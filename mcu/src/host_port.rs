@@ -5,16 +5,28 @@
 //! long, so the board transfers them between two polls, by DMA where it has one:
 //!
 //! ```
-//! use nirspi_mcu::{BusError, HostPort, PortBus, Wanted};
+//! use nirspi_mcu::{BusError, HostPort, PacketSink, PortBus, Target, Wanted};
 //!
-//! /// One turn of a board's loop, after the camera's poll.
-//! async fn transfer<P: HostPort>(
+//! /// One turn of a board's loop, after the camera's poll. `forward` is the camera's.
+//! async fn transfer<P: HostPort, S: PacketSink>(
 //!     bus: &mut PortBus<'_, P>,
+//!     link: &mut S,
+//!     forward: impl FnOnce(&mut PortBus<'_, P>, &mut S),
 //!     read: impl AsyncFn(&mut P, u8, &mut [u8]) -> Result<(), BusError>,
 //! ) {
-//!     if let Some(Wanted { port, opcode, into, .. }) = bus.wanted() {
-//!         let done = read(port, opcode, into).await;
-//!         bus.transferred(done);
+//!     match bus.wanted() {
+//!         None => {}
+//!         Some(Wanted { port, opcode, into: Target::Bus { bytes, .. } }) => {
+//!             let done = read(port, opcode, bytes).await;
+//!             bus.transferred(done);
+//!         }
+//!         Some(Wanted { port, opcode, into: Target::Link(length) }) => {
+//!             if let Some(room) = link.claim(length) {
+//!                 let done = read(port, opcode, room).await;
+//!                 bus.transferred(done);
+//!             }
+//!             forward(bus, link);
+//!         }
 //!     }
 //! }
 //! ```
@@ -25,6 +37,9 @@
 //! took ([`Register::Writes`]): the bus reads that count after every write to a register, and repeats
 //! a write that was not taken. So a start or a release acts once. The entries of the order table are
 //! not asked for one by one, because the camera reads the whole table back.
+//!
+//! A frame that the FPGA has made into a packet ([`nirspi_wire::ready`]) goes straight into the link's
+//! room, and needs no buffer of the bus.
 //!
 //! With a second buffer ([`PortBus::with_spare`]) a frame can be kept: the camera packs it while the
 //! next frame is transferred into the other buffer.
@@ -42,7 +57,8 @@
 use crate::{BusError, FpgaBus};
 use nirspi_wire::fpga::{MAX_FRAME_BYTES, frame_bytes};
 use nirspi_wire::host_port::{READ_FRAME, READ_RAW, SEALED_BYTES, seal, unchecked, unseal};
-use nirspi_wire::register::{NO_CLOCK, ORDER_TABLE, Register, control};
+use nirspi_wire::ready;
+use nirspi_wire::register::{NO_CLOCK, ORDER_TABLE, Register, control, mode};
 
 /// Number of attempts at a transfer. The FPGA keeps the data until the release.
 const ATTEMPTS: u8 = 3;
@@ -102,9 +118,13 @@ pub struct PortBus<'b, P> {
     /// `spare` holds a frame that has not been given.
     keeps: bool,
     transfer: Transfer,
-    /// The values written last. The FPGA copies both when it starts.
+    /// The values written last. The FPGA copies them when it starts.
+    mode: u32,
     patterns: u32,
     raw_samples: u32,
+    /// Frames of this run are packets, which go into the link's room.
+    packets: bool,
+    /// Bytes of a frame or packet.
     frame_bytes: usize,
     raw_bytes: usize,
     /// The FPGA's count of writes when it was last read.
@@ -120,10 +140,24 @@ pub struct Wanted<'w, P> {
     pub port: &'w mut P,
     /// Opcode of the read.
     pub opcode: u8,
-    /// The bytes to fill.
-    pub into: &'w mut [u8],
-    /// The frame before, for [`Camera::pack`](crate::Camera::pack) during the transfer.
-    pub kept: Option<&'w [u8]>,
+    /// Where the bytes go.
+    pub into: Target<'w>,
+}
+
+/// Where the bytes of a transfer go.
+#[derive(Debug)]
+pub enum Target<'w> {
+    /// Into memory of the bus.
+    Bus {
+        /// The bytes to fill.
+        bytes: &'w mut [u8],
+        /// The frame before, for [`Camera::pack`](crate::Camera::pack) during the transfer.
+        kept: Option<&'w [u8]>,
+    },
+    /// Into room of the link for so many bytes, which the board claims. After the transfer and before anything
+    /// else is claimed, the board must call [`Camera::forward`](crate::Camera::forward); without room it makes
+    /// that call alone.
+    Link(usize),
 }
 
 impl<'b, P: HostPort> PortBus<'b, P> {
@@ -137,8 +171,10 @@ impl<'b, P: HostPort> PortBus<'b, P> {
             spare: None,
             keeps: false,
             transfer: Transfer::None,
+            mode: Register::Mode.reset(),
             patterns: Register::Patterns.reset(),
             raw_samples: Register::RawLength.reset(),
+            packets: false,
             frame_bytes: 0,
             raw_bytes: 0,
             writes: None,
@@ -168,10 +204,15 @@ impl<'b, P: HostPort> PortBus<'b, P> {
             Data::Frame => (READ_FRAME, self.frame_bytes),
             Data::Raw => (READ_RAW, self.raw_bytes),
         };
-        let into = self.buffer.get_mut(..length)?;
-        let keeps = core::mem::take(&mut self.keeps);
-        let kept = self.spare.as_deref().filter(|_| keeps).and_then(|b| b.get(..self.frame_bytes));
-        Some(Wanted { port: &mut self.port, opcode, into, kept })
+        let into = if self.packets && data == Data::Frame {
+            Target::Link(length)
+        } else {
+            let bytes = self.buffer.get_mut(..length)?;
+            let keeps = core::mem::take(&mut self.keeps);
+            let kept = self.spare.as_deref().filter(|_| keeps);
+            Target::Bus { bytes, kept: kept.and_then(|kept| kept.get(..self.frame_bytes)) }
+        };
+        Some(Wanted { port: &mut self.port, opcode, into })
     }
 
     /// Reports the end of the wanted transfer.
@@ -241,6 +282,7 @@ impl<'b, P: HostPort> PortBus<'b, P> {
         Err(BusError::Damaged)
     }
 
+    #[inline(never)]
     fn data(&mut self, data: Data) -> Result<Option<&[u8]>, BusError> {
         match self.transfer {
             Transfer::Held(held) if held == data => {
@@ -281,7 +323,9 @@ impl<'b, P: HostPort> PortBus<'b, P> {
     fn take_lengths(&mut self) {
         let within = |length: usize| length.min(MAX_FRAME_BYTES);
         let patterns = u16::try_from(self.patterns).unwrap_or(u16::MAX);
-        self.frame_bytes = within(frame_bytes(patterns));
+        self.packets = self.mode & mode::PACKETS != 0;
+        self.frame_bytes =
+            within(if self.packets { ready::read_bytes(patterns) } else { frame_bytes(patterns) });
         let samples = usize::try_from(self.raw_samples).unwrap_or(usize::MAX);
         self.raw_bytes = within(samples.saturating_mul(2));
     }
@@ -294,6 +338,7 @@ impl<P: HostPort> FpgaBus for PortBus<'_, P> {
 
     fn write(&mut self, address: u16, value: u32) -> Result<(), BusError> {
         match Register::at(address) {
+            Some(Register::Mode) => self.mode = value,
             Some(Register::Patterns) => self.patterns = value,
             Some(Register::RawLength) => self.raw_samples = value,
             Some(Register::Control) => self.note_control(value),
@@ -322,6 +367,15 @@ impl<P: HostPort> FpgaBus for PortBus<'_, P> {
 
     fn frame(&mut self) -> Result<Option<&[u8]>, BusError> {
         self.data(Data::Frame)
+    }
+
+    fn packet(&mut self, _room: &mut [u8]) -> Result<bool, BusError> {
+        // The bytes came into the room by themselves. They are given once, because the room is the link's.
+        let has_come = self.data(Data::Frame)?.is_some();
+        if has_come {
+            self.transfer = Transfer::None;
+        }
+        Ok(has_come)
     }
 
     fn keep(&mut self) -> bool {

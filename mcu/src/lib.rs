@@ -55,7 +55,7 @@ mod tests;
 pub use burst::RAW_PIECE_SAMPLES;
 pub use camera::Camera;
 pub use crash::{CRASH_WORDS, Crash};
-pub use host_port::{HostPort, PortBus, Wanted};
+pub use host_port::{HostPort, PortBus, Target, Wanted};
 pub use limits::{BOARD_WATCHDOG_US, Limits, TEMPERATURE_PERIOD_US};
 pub use merge::Merger;
 pub use patience::{PATIENCE, Patience, Remedy};

@@ -193,11 +193,12 @@ impl Machine {
         bus: &mut impl FpgaBus,
     ) -> Result<(), Refusal> {
         let setup = self.ready_setup()?;
-        let run = match Run::start(now, length, &setup, &self.limits, bus) {
+        let counters = self.counters.of_next_run();
+        let run = match Run::start(now, (counters.run, length), &setup, &self.limits, bus) {
             Ok(run) => run,
             Err(refusal) => return Err(self.refused_start(now, refusal, bus)),
         };
-        self.counters = self.counters.of_next_run();
+        self.counters = counters;
         self.meter.start(now, &setup);
         self.release_pending = false;
         self.activity = Activity::Run(run);
@@ -205,6 +206,9 @@ impl Machine {
     }
 
     /// Sends at most one frame, then ends the run if it is over.
+    ///
+    /// Never inlined, because one of the boards has little flash, and both the poll and the end of a transfer call this.
+    #[inline(never)]
     pub fn step_run(
         &mut self,
         now: Micros,

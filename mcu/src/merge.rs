@@ -47,6 +47,16 @@ impl<const N: usize> Merger<N> {
         self.filled == 0 && !self.open
     }
 
+    /// Whether bytes that fill a transfer may pass by without a copy, which they may where nothing is gathered. Their
+    /// transfer counts as a full one.
+    pub const fn lets_pass(&mut self) -> bool {
+        let is_empty = self.filled == 0;
+        if is_empty {
+            self.open = true;
+        }
+        is_empty
+    }
+
     /// The transfer to send now, because it is full or no bytes follow. An empty transfer only ends
     /// a bulk read.
     pub fn transfer(&mut self) -> &[u8] {

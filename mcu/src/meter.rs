@@ -6,14 +6,19 @@
 //! is signal and noise. The meter adds up integers while frames pass; [`Tally::signal`] computes
 //! counts and decibels in floating point when the host asks for the status.
 //!
+//! Of a frame that the FPGA has made into a packet, the meter reads the samples in the packet, and the sum of all
+//! samples and the number over range in registers of the FPGA. A packet that the wires have damaged is no
+//! frame.
+//!
 //! # Invariant
 //! No frame passes through floating point (`tests/tests/budgets.rs`:
 //! `only_the_telemetry_computes_with_floating_point`).
 
 use crate::configure::Setup;
-use crate::{Micros, float};
+use crate::{BusError, FpgaBus, Micros, float, fpga};
 use nirspi_wire::fpga::{FpgaFrame, Header};
-use nirspi_wire::register::mode;
+use nirspi_wire::ready::Reader;
+use nirspi_wire::register::{Register, mode};
 use nirspi_wire::{ADC_BITS, FrameFlags, Samples, Signal};
 
 /// Time between two comparisons.
@@ -95,11 +100,57 @@ impl Meter {
         let follows = header.sequence == sequence.wrapping_add(1) && !has_wrapped(header);
         self.pair = match before.filter(|_| follows) {
             Some(before) => {
-                self.last = Some(self.tally(frame, before));
+                let (mut levels, mut sums) = (0u64, frame.sums());
+                let mut reading = || {
+                    let sums = sums.next().unwrap_or_default();
+                    levels = levels.wrapping_add(sums.positive).wrapping_add(sums.negative);
+                    sums.difference()
+                };
+                let tally = self.tally(&mut reading, before);
+                self.last = Some(Tally { levels, over_range: header.over_range, ..tally });
                 Pair::Due(Micros(at.0.saturating_add(PERIOD.0)))
             }
             None => Pair::Due(at),
         };
+    }
+
+    /// Looks at the packet of a frame that the FPGA still delivers, if a pair begins or ends with it. The samples of
+    /// a pair's first frame lie in `scratch`.
+    pub fn look(
+        &mut self,
+        now: Micros,
+        (packet, patterns): (&[u8], u16),
+        scratch: &mut [u8],
+        bus: &mut impl FpgaBus,
+    ) {
+        let due = match self.pair {
+            Pair::Due(at) if now < at => return,
+            Pair::Due(at) | Pair::Begun { at, .. } => at,
+        };
+        let mut reader = Reader::new(packet, patterns);
+        let sequence = reader.sequence;
+        let counts = !reader.flags.contains(FrameFlags::OVERFLOW);
+        let follows = matches!(self.pair, Pair::Begun { sequence: before, .. }
+            if sequence == before.wrapping_add(1));
+        let length = usize::from(patterns).saturating_mul(4);
+        let Some(memory) = scratch.get_mut(..length) else { return };
+        self.pair = Pair::Due(due);
+        if follows && counts {
+            let Ok(before) = Samples::packed(0, memory) else { return };
+            let tally = self.tally(&mut || reader.sample().into(), before);
+            if let (true, Ok((levels, over_range))) = (reader.is_intact(), measures(bus)) {
+                self.last = Some(Tally { levels, over_range, ..tally });
+                self.pair = Pair::Due(Micros(due.0.saturating_add(PERIOD.0)));
+            }
+        } else {
+            let (words, _) = memory.as_chunks_mut::<4>();
+            for word in words {
+                *word = reader.sample().to_le_bytes();
+            }
+            if counts && reader.is_intact() {
+                self.pair = Pair::Begun { sequence, at: now, shift: 0 };
+            }
+        }
     }
 
     /// Notes that the samples of an intact frame have been packed with this shift. Most frames cost
@@ -125,24 +176,27 @@ impl Meter {
         self.last.as_ref().map(Tally::signal)
     }
 
-    fn tally(&self, frame: &FpgaFrame<'_>, before: Samples<'_>) -> Tally {
-        let mut tally = Tally {
-            exposure: self.exposure,
-            over_range: frame.header.over_range,
-            ..Tally::default()
-        };
+    /// Sums over the readings of a frame, which `next` gives one by one, and of the frame before.
+    fn tally(&self, next: &mut dyn FnMut() -> i64, before: Samples<'_>) -> Tally {
+        let mut tally = Tally { exposure: self.exposure, ..Tally::default() };
         let shift = self.exposure.shift();
-        for (sums, before) in frame.sums().zip(before.iter()) {
-            let reading = shifted(sums.difference(), shift);
+        for before in before.iter() {
+            let reading = shifted(next(), shift);
             let change = reading.wrapping_sub(shifted(before, shift));
             tally.readings = tally.readings.wrapping_add(1);
-            tally.levels = tally.levels.wrapping_add(sums.positive).wrapping_add(sums.negative);
             tally.sum = tally.sum.wrapping_add(reading.into());
             tally.squares = tally.squares.wrapping_add(square(reading));
             tally.changes = tally.changes.wrapping_add(square(change));
         }
         tally
     }
+}
+
+/// Sum of all samples of the delivered frame, and the number over range.
+fn measures(bus: &mut impl FpgaBus) -> Result<(u64, u32), BusError> {
+    let mut word = |register| fpga::read(bus, register);
+    let (low, high) = (word(Register::SumLow)?, word(Register::SumHigh)?);
+    Ok((u64::from(high) << 32 | u64::from(low), word(Register::OverRange)?))
 }
 
 /// The frame's sums have wrapped, so they say nothing.

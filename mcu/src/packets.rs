@@ -21,6 +21,6 @@ pub(crate) fn send(
         return false;
     };
     let length = packet.len();
-    sink.commit(length);
+    sink.commit(0..length);
     true
 }

@@ -5,6 +5,7 @@
 //! poll.
 
 use crate::Micros;
+use core::ops::Range;
 use heapless::String;
 use nirspi_wire::{Capabilities, RebootInto, Version};
 
@@ -56,6 +57,21 @@ pub trait FpgaBus {
     /// [`BusError`]; the firmware then discards and releases the frame.
     fn frame(&mut self) -> Result<Option<&[u8]>, BusError>;
 
+    /// Reads the packet that is ready into `room`, which is of the link and has
+    /// [`read_bytes`](nirspi_wire::ready::read_bytes): zeros, the packet, zeros. False during the transfer, which
+    /// a board carries out into the same room before the next call.
+    ///
+    /// # Errors
+    /// [`BusError`]; the firmware then discards and releases the frame.
+    fn packet(&mut self, room: &mut [u8]) -> Result<bool, BusError> {
+        let Some(bytes) = self.frame()? else { return Ok(false) };
+        room.fill(0);
+        if let Some(place) = room.get_mut(..bytes.len()) {
+            place.copy_from_slice(bytes);
+        }
+        Ok(true)
+    }
+
     /// Puts the frame that [`frame`](Self::frame) gives where neither its release nor the transfer of
     /// the next frame touches it, so that transfer and work overlap. False: this bus has no frame,
     /// or no memory for a second one.
@@ -85,11 +101,12 @@ pub trait FpgaBus {
 /// The link towards the host. It takes whole packets or nothing.
 pub trait PacketSink {
     /// Room for one packet of at most `length` bytes; `None`: the link is full, which is
-    /// back-pressure and not an error. The next claim takes back room that was not committed.
+    /// back-pressure and not an error. The next claim takes back room that was not committed: a claim
+    /// of the same length gives the same room, with the bytes that were written into it.
     fn claim(&mut self, length: usize) -> Option<&mut [u8]>;
 
-    /// Sends the first `length` bytes of the claimed room.
-    fn commit(&mut self, length: usize);
+    /// Sends this part of the claimed room.
+    fn commit(&mut self, part: Range<usize>);
 }
 
 /// Why a bitstream could not be loaded.

@@ -12,6 +12,7 @@ use crate::packets::{STREAM_HEADER_BYTES, send};
 use crate::time::Anchor;
 use crate::{FpgaBus, Limits, Micros, PacketSink, configure, fpga};
 use nirspi_wire::fpga::{FpgaFrame, Header};
+use nirspi_wire::ready::{self, BEGINNING_BYTES};
 use nirspi_wire::register::{NO_CLOCK, Register, control};
 use nirspi_wire::{
     ConfigField, DeviceMessage, EventKind, Fault, Frame, PATTERNS, Refusal, RunLength, Samples,
@@ -48,15 +49,19 @@ pub(crate) struct Counters {
 impl Counters {
     /// Reads the FPGA's own counters, if the FPGA answers. Counters of an FPGA that was reset
     /// change nothing.
+    ///
+    /// The lost frames are read first: a frame that is lost between the two reads is then one that is missing for
+    /// a moment, and hides no frame that waits.
+    #[inline(never)]
     pub fn read(&mut self, bus: &mut impl FpgaBus) -> Result<(), Fault> {
         fpga::identify(bus)?;
+        let lost =
+            fpga::read(bus, Register::FramesLost).map_err(|error| fpga::failed(error, bus))?;
         let made =
             fpga::read(bus, Register::FramesMade).map_err(|error| fpga::failed(error, bus))?;
         if made == NO_CLOCK {
             return Err(Fault::FpgaAbsent { identity: NO_CLOCK });
         }
-        let lost =
-            fpga::read(bus, Register::FramesLost).map_err(|error| fpga::failed(error, bus))?;
         self.advance(made, lost);
         self.reconcile();
         Ok(())
@@ -116,10 +121,14 @@ impl Counters {
 pub(crate) struct Run {
     length: RunLength,
     patterns: u16,
+    /// The FPGA makes packets of the frames.
+    packets: bool,
     anchor: Anchor,
     stall_after: Micros,
     last_frame: Micros,
     last_sequence: Option<u32>,
+    /// How the packet that was sent last began.
+    last_beginning: [u8; BEGINNING_BYTES],
     /// The bus keeps a frame that has not been packed, since then.
     kept: Option<Micros>,
     /// Number of the frame that was kept last, which may be a damaged one.
@@ -183,7 +192,7 @@ impl Run {
     /// [`Refusal::Fault`] if the FPGA did not take the start; LEDs may then be on.
     pub fn start(
         now: Micros,
-        length: RunLength,
+        (number, length): (u16, RunLength),
         setup: &Setup,
         limits: &Limits,
         bus: &mut impl FpgaBus,
@@ -197,8 +206,10 @@ impl Run {
                 frames
             }
         };
+        let packets = setup.sends_packets();
         let (anchor, started) = fpga::verify(bus, setup, limits)
             .and_then(|()| Ok(fpga::write(bus, Register::Frames, frames)?))
+            .and_then(|()| if packets { Ok(fpga::stamp(bus, number, now)?) } else { Ok(()) })
             .and_then(|()| Ok(fpga::clock(bus)?))
             .map_err(|_| fpga::health(bus).err().unwrap_or(Fault::FpgaConfiguration))
             .and_then(|clock| {
@@ -211,10 +222,12 @@ impl Run {
         let run = Self {
             length,
             patterns: setup.patterns,
+            packets,
             anchor,
             stall_after: Micros(stall_after).max(limits.stall_min),
             last_frame: now,
             last_sequence: None,
+            last_beginning: [0; _],
             kept: None,
             last_kept: None,
             damaged: false,
@@ -231,7 +244,7 @@ impl Run {
 
     /// What the rest of the run depends on, with ages for times.
     #[cfg(test)]
-    pub fn key(&self, age: impl Fn(Micros) -> u64) -> [u64; 9] {
+    pub fn key(&self, age: impl Fn(Micros) -> u64) -> [u64; 11] {
         let ending = self.ending.as_ref();
         let length = match self.length {
             RunLength::Continuous => 0,
@@ -247,6 +260,9 @@ impl Run {
             self.last_kept.map_or(0, |last| u64::from(last) + 1),
             ending.map_or(u64::MAX, |ending| age(ending.since)),
             ending.and_then(|ending| ending.reply).map_or(0, |(id, _)| u64::from(id) + 1),
+            self.packets.into(),
+            // The sequence: the rest of the beginning is absolute.
+            self.last_beginning[5..9].iter().fold(0, |key, &byte| key << 8 | u64::from(byte)),
         ]
     }
 
@@ -280,6 +296,60 @@ impl Run {
         }
     }
 
+    /// Takes at most one packet of the FPGA, which goes to the host as it is; true if there was work. It is asked for
+    /// only if the link has room; a frame without room is released unread.
+    ///
+    /// The wires may have damaged the packet. Its CRC-32 is the host's to look at; here a packet counts as sent, and
+    /// as damaged only if none can be found.
+    fn take_packet(
+        &mut self,
+        now: Micros,
+        path: Path<'_>,
+        release_pending: &mut bool,
+        bus: &mut impl FpgaBus,
+        sink: &mut impl PacketSink,
+    ) -> bool {
+        let Path { counters, meter, scratch, may_send } = path;
+        let mut room = if may_send { sink.claim(ready::read_bytes(self.patterns)) } else { None };
+        let mut place = None;
+        if let Some(room) = &mut room {
+            match bus.packet(room) {
+                Ok(false) => return false,
+                Ok(true) => place = ready::packet_in(room, self.patterns),
+                Err(_) => {}
+            }
+        }
+        if counters.read(bus).is_err() {
+            // The FPGA keeps the frame until it is known whether the frame is counted already.
+            return false;
+        }
+        let packet = match (&room, &place) {
+            (Some(room), Some(place)) => room.get(place.clone()),
+            _ => None,
+        };
+        let beginning = packet.and_then(<[u8]>::first_chunk);
+        // Otherwise the bus has lost the release of a frame that is counted already.
+        if counters.missing() > 0 && beginning != Some(&self.last_beginning) {
+            self.last_frame = now;
+            let has_room = room.is_some();
+            if let (Some(packet), Some(beginning)) = (packet, beginning) {
+                self.last_beginning = *beginning;
+                meter.look(now, (packet, self.patterns), scratch, bus);
+            }
+            let count = match place {
+                Some(place) => {
+                    sink.commit(place);
+                    &mut counters.sent
+                }
+                None if has_room => &mut counters.corrupt,
+                None => &mut counters.dropped,
+            };
+            *count = count.wrapping_add(1);
+        }
+        *release_pending = fpga::release(bus).is_err();
+        true
+    }
+
     /// Takes at most one frame; true if there was work. A frame that the bus can keep is released
     /// at once, and packed while the next one comes, or when no next one comes in time. Any other
     /// frame is sent or counted before this call returns.
@@ -294,6 +364,11 @@ impl Run {
         bus: &mut impl FpgaBus,
         sink: &mut impl PacketSink,
     ) -> bool {
+        if self.packets {
+            return may_come
+                && bus.frame_ready()
+                && self.take_packet(now, path, release_pending, bus, sink);
+        }
         if self.damaged {
             self.count_damaged(now, path.counters, bus);
         }
@@ -374,6 +449,7 @@ impl Run {
     }
 
     /// Sends or counts a frame that was assembled.
+    #[inline(never)]
     fn deliver(
         &mut self,
         now: Micros,
@@ -437,6 +513,7 @@ impl Run {
 }
 
 /// The header and packed samples of an intact frame with this many patterns, which the meter sees too.
+#[inline(never)]
 pub(crate) fn assemble<'s>(
     bytes: &[u8],
     patterns: u16,
@@ -462,7 +539,7 @@ mod tests {
         let setup = configure::check(&SMALL, &limits).unwrap();
         fpga::set(&mut bus, &setup, &limits).unwrap();
         let mut run =
-            Run::start(Micros(0), RunLength::Frames(1), &setup, &limits, &mut bus).unwrap();
+            Run::start(Micros(0), (1, RunLength::Frames(1)), &setup, &limits, &mut bus).unwrap();
         let mut counters = Counters::default().of_next_run();
         assert_eq!(run.progress(Micros(1), &counters), Progress::UnderWay);
         assert_eq!(run.progress(Micros(10_000_000), &counters), Progress::Stalled);

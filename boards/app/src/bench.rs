@@ -6,12 +6,13 @@ use crate::{Board, FpgaPort};
 use core::cell::{Cell, RefCell};
 use core::task::Waker;
 use nirspi_mcu::{BusError, HostPort, Inputs};
-use nirspi_wire::fpga::{CRC_BYTES, HEADER_BYTES, Header, PATTERN_BYTES, Sums};
+use nirspi_wire::fpga::{Header, Sums};
 use nirspi_wire::host_port::{SEALED_BYTES, seal, unseal};
-use nirspi_wire::packet::MAX_HOST_PACKET;
-use nirspi_wire::register::{IDENTITY, Register, control, status};
+use nirspi_wire::packet::{MAX_HOST_PACKET, seal as seal_packet};
+use nirspi_wire::register::{IDENTITY, Register, control, mode, status};
 use nirspi_wire::{
     Command, Configuration, FrameFlags, PatternOrder, RebootInto, Request, SampleSource, encode,
+    ready,
 };
 use std::rc::Rc;
 use std::vec::Vec;
@@ -59,8 +60,9 @@ pub fn advance(micros: u64) {
 }
 
 /// The board's pins, as a test reads and sets them.
-#[derive(Default)]
 pub struct Pins {
+    /// The gateware's version.
+    pub version: Cell<u32>,
     /// The pin that enables the LED drivers.
     pub leds_enabled: Cell<bool>,
     /// The FPGA lights LEDs.
@@ -74,6 +76,24 @@ pub struct Pins {
     /// Microseconds from one frame to the next. With 0 a frame is ready during every run.
     pub frame_us: Cell<u64>,
     next_frame_us: Cell<u64>,
+    /// A frame is ready that was ready before a write to `Control`.
+    held: Cell<bool>,
+}
+
+impl Default for Pins {
+    fn default() -> Self {
+        Self {
+            version: Cell::new(Register::Version.reset()),
+            leds_enabled: Cell::default(),
+            running: Cell::default(),
+            sequence: Cell::default(),
+            fed: Cell::default(),
+            transfer_polls: Cell::default(),
+            frame_us: Cell::default(),
+            next_frame_us: Cell::default(),
+            held: Cell::default(),
+        }
+    }
 }
 
 /// A board that is pins only.
@@ -117,10 +137,13 @@ impl HostPort for FakeFpga {
         self.registers[usize::from(Register::Writes.address())] += 1;
         if address == Register::Control.address() {
             let bits = |bits: u32| value & bits != 0;
+            let is_ready = self.frame_ready();
             let pins = &self.pins;
             if bits(control::START) {
                 pins.sequence.set(0);
             }
+            // A frame that is ready outlives a stop.
+            pins.held.set(is_ready && !bits(control::START | control::RELEASE));
             pins.running.set(bits(control::START) || pins.running.get() && !bits(control::STOP));
             pins.sequence.set(pins.sequence.get() + u32::from(bits(control::RELEASE)));
             if bits(control::START | control::RELEASE) {
@@ -136,20 +159,42 @@ impl HostPort for FakeFpga {
         let running = if self.pins.running.get() { status::RUNNING | status::LEDS_ON } else { 0 };
         let value = match Register::at(address) {
             Some(Register::Identity) => IDENTITY,
-            Some(register @ (Register::Version | Register::Design)) => register.reset(),
+            Some(Register::Version) => self.pins.version.get(),
+            Some(Register::Design) => Register::Design.reset(),
             Some(Register::Status) => status::INTERLOCK_CLOSED | running,
-            Some(Register::FramesMade) => self.pins.sequence.get(),
+            // The frame that is ready is made already.
+            Some(Register::FramesMade) => self.pins.sequence.get() + u32::from(self.frame_ready()),
             _ => self.registers[usize::from(address)],
         };
         Ok(seal(address, value))
     }
 
     fn frame_ready(&mut self) -> bool {
-        self.pins.running.get() && now_us() >= self.pins.next_frame_us.get()
+        let pins = &self.pins;
+        pins.held.get() || pins.running.get() && now_us() >= pins.next_frame_us.get()
     }
 
     fn raw_ready(&mut self) -> bool {
         false
+    }
+}
+
+impl FakeFpga {
+    /// The same frame as a packet, between zeros.
+    fn packet(&self, patterns: u16, into: &mut [u8]) {
+        let head = ready::Head {
+            run: self.registers[usize::from(Register::Run.address())] as u16,
+            sequence: self.pins.sequence.get(),
+            device_time_us: now_us(),
+            sweeps: 1,
+            flags: FrameFlags::DIFFERENTIAL,
+            patterns,
+        };
+        let mut payload = head.to_bytes().to_vec();
+        payload.extend((0..i32::from(patterns)).flat_map(|k| (93 + k).to_le_bytes()));
+        into.fill(0);
+        let (_, room) = into.split_at_mut(ready::LEAD_BYTES / 2);
+        seal_packet(&payload, room).expect("a packet fits its read");
     }
 }
 
@@ -158,7 +203,11 @@ impl FpgaPort for FakeFpga {
         for _ in 0..self.pins.transfer_polls.get() {
             embassy_futures::yield_now().await;
         }
-        let patterns = ((into.len() - HEADER_BYTES - CRC_BYTES) / PATTERN_BYTES) as u16;
+        let patterns = self.registers[usize::from(Register::Patterns.address())] as u16;
+        if self.registers[usize::from(Register::Mode.address())] & mode::PACKETS != 0 {
+            self.packet(patterns, into);
+            return Ok(());
+        }
         let header = Header {
             patterns,
             flags: FrameFlags::DIFFERENTIAL,

@@ -6,6 +6,7 @@
 //! (`tests::frames_come_in_order_and_a_full_link_drops_whole_ones`). So a slow host never blocks
 //! the camera.
 
+use core::ops::Range;
 use embassy_futures::select::{Either, select};
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_sync::pipe::{self, Pipe};
@@ -14,20 +15,29 @@ use embassy_sync::zerocopy_channel::{self, Channel};
 use embassy_time::{Duration, Timer};
 use nirspi_mcu::{Merger, PacketSink};
 use nirspi_wire::packet::{MAX_DEVICE_PACKET, MAX_HOST_PACKET};
+use nirspi_wire::ready::MAX_READ_BYTES;
+
+/// Bytes of a place: the longest packet of the firmware, or a read of the longest packet that the FPGA makes.
+const PLACE_BYTES: usize =
+    if MAX_READ_BYTES > MAX_DEVICE_PACKET { MAX_READ_BYTES } else { MAX_DEVICE_PACKET };
+
+/// Transfers that a packet has to fill before a short one is sent ahead of it, so that it need not be copied.
+const LONG: usize = 4;
 
 /// A place for one packet on its way to the host.
 #[derive(Debug, Clone, Copy)]
 pub struct Packet {
-    bytes: [u8; MAX_DEVICE_PACKET],
-    length: usize,
+    bytes: [u8; PLACE_BYTES],
+    start: usize,
+    end: usize,
 }
 
 impl Packet {
     /// A place without a packet.
-    pub const EMPTY: Self = Self { bytes: [0; MAX_DEVICE_PACKET], length: 0 };
+    pub const EMPTY: Self = Self { bytes: [0; PLACE_BYTES], start: 0, end: 0 };
 
     fn after(&self, offset: usize) -> &[u8] {
-        self.bytes.get(offset..self.length).unwrap_or(&[])
+        self.bytes.get(self.start..self.end).and_then(|bytes| bytes.get(offset..)).unwrap_or(&[])
     }
 }
 
@@ -68,7 +78,7 @@ impl<'m> Link<'m> {
         (
             CameraEnd { commands, sink: Sink { sender }, hangup },
             HostIn { bytes, hangup },
-            HostOut { packets, sent: 0, merger: Merger::new() },
+            HostOut { packets, sent: 0, lent: false, merger: Merger::new() },
         )
     }
 }
@@ -105,32 +115,55 @@ pub struct HostOut<'l, const N: usize> {
     packets: zerocopy_channel::Receiver<'l, NoopRawMutex, Packet>,
     /// Bytes of the first packet that are already in transfers.
     sent: usize,
+    /// The last transfer was `N` bytes of the first packet itself.
+    lent: bool,
     merger: Merger<N>,
 }
 
 impl<const N: usize> HostOut<'_, N> {
     /// Waits for bytes to send. Returns a full transfer, or a short or empty transfer if no bytes
-    /// follow now.
+    /// follow now or a long packet does. The bytes of a long packet go out where they lie, without a copy.
+    ///
+    /// The bytes of the transfer before must have been sent.
     pub async fn transfer(&mut self) -> &[u8] {
+        let lent = if core::mem::take(&mut self.lent) { N } else { 0 };
+        self.pass(lent);
         if self.merger.is_done() {
             self.packets.receive().await;
         }
         while !self.merger.is_full()
             && let Some(packet) = self.packets.try_receive()
         {
-            self.sent += self.merger.take(packet.after(self.sent));
-            if self.sent >= packet.length {
-                self.sent = 0;
-                self.packets.receive_done();
+            let bytes = packet.after(self.sent);
+            self.lent = bytes.len() >= N && self.merger.lets_pass();
+            if self.lent || bytes.len() >= LONG * N {
+                break;
             }
+            let taken = self.merger.take(bytes);
+            self.pass(taken);
         }
-        self.merger.transfer()
+        match self.packets.try_receive() {
+            Some(packet) if self.lent => packet.after(self.sent).get(..N).unwrap_or(&[]),
+            _ => self.merger.transfer(),
+        }
+    }
+
+    /// Notes that so many bytes of the first packet are in transfers, and gives the place back after the last.
+    fn pass(&mut self, bytes: usize) {
+        self.sent += bytes;
+        if let Some(packet) = self.packets.try_receive()
+            && packet.after(self.sent).is_empty()
+        {
+            self.sent = 0;
+            self.packets.receive_done();
+        }
     }
 
     /// Drops a half-sent packet, after [`HostIn::closed`].
     pub fn discard(&mut self) {
         self.packets.clear();
         self.sent = 0;
+        self.lent = false;
         self.merger = Merger::new();
     }
 }
@@ -155,7 +188,7 @@ impl<'l> CameraEnd<'l> {
     }
 
     /// Bytes from the host, and the place where packets go.
-    pub(crate) fn both(&mut self) -> (&[u8], &mut Sink<'l>) {
+    pub fn both(&mut self) -> (&[u8], &mut Sink<'l>) {
         (self.commands.try_fill_buf().unwrap_or(&[]), &mut self.sink)
     }
 
@@ -205,9 +238,9 @@ impl PacketSink for Sink<'_> {
         self.sender.try_send()?.bytes.get_mut(..length)
     }
 
-    fn commit(&mut self, length: usize) {
+    fn commit(&mut self, part: Range<usize>) {
         if let Some(packet) = self.sender.try_send() {
-            packet.length = length;
+            (packet.start, packet.end) = (part.start, part.end);
             self.sender.send_done();
         }
     }

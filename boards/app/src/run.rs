@@ -1,8 +1,9 @@
 //! The camera's loop.
 //!
-//! One turn of the loop takes at most a millisecond, or the transfer of the longest frame. During the
-//! transfer the camera packs the frame before, if the board has memory for two. While the loop waits,
-//! the tasks that serve the host run.
+//! One turn of the loop takes at most a millisecond, or the transfer of the longest frame. A packet of
+//! the FPGA goes straight into the link's memory. Of older gateware, the camera packs the frame before
+//! during a transfer, if the board has memory for two. While the loop waits, the tasks that serve the host
+//! run.
 
 use crate::link::CameraEnd;
 use crate::{Board, DEPTH_SIDE, DepthMap, DepthSensor, FpgaPort};
@@ -14,7 +15,8 @@ use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Instant, Timer};
 use nirspi_mcu::{
-    BoardInfo, Camera, Crash, FpgaBus, GatewareLoader, Limits, Micros, PortBus, Ports, Wanted,
+    BoardInfo, Camera, Crash, FpgaBus, GatewareLoader, Limits, Micros, PacketSink, PortBus, Ports,
+    Target, Wanted,
 };
 use nirspi_wire::fpga::MAX_FRAME_BYTES;
 use nirspi_wire::{State, Version};
@@ -118,18 +120,28 @@ pub async fn run<B: Board, P: FpgaPort, G: GatewareLoader>(
             link.flush(FAREWELL).await;
             board.restart(into);
         }
-        if let Some(Wanted { port, opcode, into, kept }) = bus.wanted() {
-            let pack = || {
-                if let Some(frame) = kept {
-                    camera.pack(now(), frame, link.both().1);
+        match bus.wanted() {
+            Some(Wanted { port, opcode, into }) => {
+                let (_, sink) = link.both();
+                // The link either gives the room, or takes the frame that is packed meanwhile.
+                let (bytes, kept) = match into {
+                    Target::Bus { bytes, kept } => (Some(bytes), kept.map(|kept| (kept, sink))),
+                    Target::Link(length) => (sink.claim(length), None),
+                };
+                if let Some(bytes) = bytes {
+                    let pack = || {
+                        if let Some((frame, sink)) = kept {
+                            camera.pack(now(), frame, sink);
+                        }
+                    };
+                    let done = during(port.read_bytes(opcode, bytes), pack).await;
+                    bus.transferred(done);
                 }
-            };
-            let done = during(port.read_bytes(opcode, into), pack).await;
-            bus.transferred(done);
-        } else if progress.worked || taken > 0 {
-            yield_now().await;
-        } else {
-            rest(&mut bus, &mut link).await;
+                let (_, sink) = link.both();
+                camera.forward(now(), &mut Ports { bus: &mut bus, sink, loader: &mut loader });
+            }
+            None if progress.worked || taken > 0 => yield_now().await,
+            None => rest(&mut bus, &mut link).await,
         }
     }
 }

@@ -7,9 +7,10 @@ use core::future::Future;
 use core::pin::Pin;
 use core::task::{Context, Waker};
 use embassy_futures::poll_once;
-use nirspi_mcu::{Limits, NoLoader};
+use nirspi_mcu::{Limits, NoLoader, PacketSink};
 use nirspi_wire::fpga::MAX_FRAME_BYTES;
 use nirspi_wire::packet::{MAX_DEVICE_PACKET, MAX_HOST_PACKET};
+use nirspi_wire::register::Register;
 use nirspi_wire::{
     Answer, Command, Deframed, Deframer, DeviceMessage, Reply, RunLength, open, version,
 };
@@ -19,6 +20,8 @@ use std::vec::Vec;
 
 const TRANSFER: usize = 64;
 const PATTERNS: u16 = 2;
+/// Gateware that makes no packets.
+const OLDER: u32 = 0x0000_0300;
 
 /// A running board, and the task that serves its host.
 struct Bench {
@@ -31,7 +34,13 @@ struct Bench {
 
 impl Bench {
     fn new(places: usize) -> Self {
+        Self::with_gateware(places, Register::Version.reset())
+    }
+
+    /// A board whose FPGA has gateware of this version.
+    fn with_gateware(places: usize, version: u32) -> Self {
         let pins: Rc<Pins> = Rc::default();
+        pins.version.set(version);
         let link = Box::leak(Box::new(Link::new(std::vec![Packet::EMPTY; places].leak())));
         let (camera_end, from_host, to_host) = link.split();
         let device = Device {
@@ -147,32 +156,40 @@ fn leds_are_let_on_from_the_configuration_until_the_host_is_gone() {
 
 #[test]
 fn frames_come_in_order_and_a_full_link_drops_whole_ones() {
-    let mut bench = Bench::new(4);
-    for (id, command) in [
-        (1, Command::Hello { protocol: version::CURRENT }),
-        (2, Command::Configure(configuration(PATTERNS))),
-        (3, Command::Start(RunLength::Continuous)),
-    ] {
-        bench.send(&packet(id, command));
-        bench.turn();
-        bench.heard();
+    for version in [OLDER, Register::Version.reset()] {
+        let mut bench = Bench::with_gateware(4, version);
+        for (id, command) in [
+            (1, Command::Hello { protocol: version::CURRENT }),
+            (2, Command::Configure(configuration(PATTERNS))),
+            (3, Command::Start(RunLength::Continuous)),
+        ] {
+            bench.send(&packet(id, command));
+            bench.turn();
+            bench.heard();
+        }
+        let next = bench.pins.sequence.get();
+        for _ in 0..10 {
+            bench.turn();
+        }
+        // The host has taken no packet: four packets wait, and the other frames were dropped.
+        let heard = bench.heard();
+        // Older gateware has its buffer back before the frame is packed.
+        let first = next - u32::from(version == OLDER);
+        let expected: Vec<Heard> = (0..4).map(|k| Heard::Frame(first + k)).collect();
+        assert_eq!(heard, expected);
+        assert!(bench.pins.sequence.get() > next + 10);
     }
-    let next = bench.pins.sequence.get();
-    for _ in 0..10 {
-        bench.turn();
-    }
-    // The host has taken no packet: four packets wait, and the other frames were dropped.
-    let heard = bench.heard();
-    // The FPGA has its buffer back before the frame is packed.
-    let kept = next - 1;
-    let expected: Vec<Heard> = (0..4).map(|k| Heard::Frame(kept + k)).collect();
-    assert_eq!(heard, expected);
-    assert!(bench.pins.sequence.get() > next + 10);
 }
 
 #[test]
 fn a_long_transfer_delays_the_answer_and_loses_nothing() {
-    let mut bench = Bench::new(64);
+    for version in [OLDER, Register::Version.reset()] {
+        delay_the_answer(version);
+    }
+}
+
+fn delay_the_answer(version: u32) {
+    let mut bench = Bench::with_gateware(64, version);
     for (id, command) in [
         (1, Command::Hello { protocol: version::CURRENT }),
         (2, Command::Configure(configuration(PATTERNS))),
@@ -239,4 +256,64 @@ fn bytes_that_find_no_room_wait_and_are_not_lost() {
     }
     let answers = heard.iter().filter(|&&byte| byte == 0).count();
     assert_eq!(answers, 400);
+}
+
+/// A link without a camera: packets of these lengths are put in, with bytes before and after that are not to go out.
+/// Returns what went in and the transfers that came out.
+fn carried(lengths: &[usize], places: usize) -> (Vec<u8>, Vec<Vec<u8>>) {
+    let mut link = Link::new(std::vec![Packet::EMPTY; places].leak());
+    let (mut camera, _, mut to_host) = link.split::<TRANSFER>();
+    let (mut sent, mut transfers) = (Vec::new(), Vec::new());
+    let mut take = |transfers: &mut Vec<Vec<u8>>| {
+        while let core::task::Poll::Ready(transfer) = poll_once(to_host.transfer()) {
+            transfers.push(transfer.to_vec());
+        }
+    };
+    for (&length, number) in lengths.iter().zip(0usize..) {
+        let (_, sink) = camera.both();
+        if sink.claim(1).is_none() {
+            take(&mut transfers);
+        }
+        let before = number % 7;
+        let room = sink.claim(before + length + 3).expect("a place is free");
+        room.fill(0xEE);
+        let bytes = (0..length).map(|at| (number * 31 + at * 7) as u8);
+        room[before..before + length].iter_mut().zip(bytes).for_each(|(place, byte)| *place = byte);
+        sent.extend_from_slice(&room[before..before + length]);
+        sink.commit(before..before + length);
+    }
+    take(&mut transfers);
+    (sent, transfers)
+}
+
+#[test]
+fn packets_of_any_length_go_out_whole_and_in_order_and_the_end_is_told() {
+    let mut seed = 1usize;
+    for places in [1, 2, 5] {
+        for _ in 0..200 {
+            let lengths: Vec<usize> = (0..12)
+                .map(|_| {
+                    seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(99);
+                    1 + (seed >> 33) % [10, 70, 300, 1000][(seed >> 20) % 4]
+                })
+                .collect();
+            let (sent, transfers) = carried(&lengths, places);
+            assert_eq!(transfers.concat(), sent, "{lengths:?}");
+            assert!(transfers.iter().all(|transfer| transfer.len() <= TRANSFER));
+            assert!(transfers.last().unwrap().len() < TRANSFER, "the reader is told the end");
+        }
+    }
+}
+
+#[test]
+fn a_long_packet_fills_transfers_of_its_own_and_short_ones_share() {
+    let lengths = |lengths: &[usize]| {
+        let (_, transfers) = carried(lengths, 8);
+        transfers.iter().map(Vec::len).collect::<Vec<_>>()
+    };
+    // 10 bytes that wait go ahead of a packet of four transfers.
+    assert_eq!(lengths(&[10, 4 * TRANSFER + 5]), [10, 64, 64, 64, 64, 5]);
+    assert_eq!(lengths(&[4 * TRANSFER, 4 * TRANSFER]), [64, 64, 64, 64, 64, 64, 64, 64, 0]);
+    // Shorter ones fill up what is begun.
+    assert_eq!(lengths(&[10, 2 * TRANSFER, 30]), [64, 64, 40]);
 }

@@ -28,6 +28,8 @@ pub(crate) struct Slot {
 pub(crate) struct Summary {
     /// Over-range samples.
     pub(crate) over_range: u32,
+    /// Sum of its samples, modulo 2^64.
+    pub(crate) total: u64,
     /// Clock of the first slot.
     pub(crate) shown_at: u64,
 }
@@ -36,6 +38,8 @@ pub(crate) struct Summary {
 #[derive(Debug, Clone)]
 struct Delivered {
     header: Header,
+    /// Sum of its samples, modulo 2^64.
+    total: u64,
     /// What the packet carries beside the frame, if the frame is sent as one.
     stamp: Option<Stamp>,
     /// The frame's bytes, serialised at the first request.
@@ -99,6 +103,11 @@ impl Frames {
         self.delivered.is_some()
     }
 
+    /// Sum of the samples and number of over-range samples of the delivered frame; 0 without one.
+    pub(crate) fn measures(&self) -> (u64, u32) {
+        self.delivered.as_ref().map_or((0, 0), |frame| (frame.total, frame.header.over_range))
+    }
+
     /// Takes the delivered frame back.
     pub(crate) fn release(&mut self) {
         self.delivered = None;
@@ -145,14 +154,14 @@ impl Frames {
             clock: summary.shown_at,
         };
         let stamp = settings.packets.then_some(self.stamp);
-        self.delivered = Some(Delivered { header, stamp, bytes: None });
+        self.delivered = Some(Delivered { header, total: summary.total, stamp, bytes: None });
         self.filling = 1 - self.filling;
     }
 
     /// The host's frame as it crosses the host port.
     pub(crate) fn bytes(&mut self) -> Option<&[u8]> {
         let bank = &self.banks[1 - self.filling];
-        let Delivered { header, stamp, bytes } = self.delivered.as_mut()?;
+        let Delivered { header, stamp, bytes, .. } = self.delivered.as_mut()?;
         Some(bytes.get_or_insert_with(|| match stamp {
             Some(stamp) => packet(header, bank, stamp),
             None => format::frame(header, bank),
@@ -172,7 +181,7 @@ mod tests {
     fn a_sum_wraps_at_48_bits_and_only_its_own_frame_says_so() {
         let settings = Settings::copy(&Registers::new()).unwrap();
         let slot = |first_sweep| Slot { index: 7, complement: false, first_sweep };
-        let summary = Summary { over_range: 0, shown_at: 0 };
+        let summary = Summary { over_range: 0, total: 0, shown_at: 0 };
         let mut frames = Frames::new();
 
         frames.add(slot(true), u32::MAX);
@@ -209,7 +218,7 @@ mod tests {
         frames.add(slot(false), 1);
         assert_eq!(frames.banks[0][0].negative, 0);
         assert!(frames.overflow);
-        frames.complete(&settings, Summary { over_range: 0, shown_at: 0 });
+        frames.complete(&settings, Summary { over_range: 0, total: 0, shown_at: 0 });
         let frame = FpgaFrame::parse(frames.bytes().unwrap()).unwrap();
         assert_eq!(frame.header.flags, FrameFlags::OVERFLOW);
     }

@@ -136,6 +136,9 @@ impl Gateware {
             Register::Fault => self.safety.fault() as u32,
             Register::FramesMade => self.frames.made(),
             Register::FramesLost => self.frames.lost(),
+            Register::SumLow => self.frames.measures().0 as u32,
+            Register::SumHigh => (self.frames.measures().0 >> 32) as u32,
+            Register::OverRange => self.frames.measures().1,
             Register::ClockLow => {
                 self.clock_read = self.clock;
                 self.clock as u32

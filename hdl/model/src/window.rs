@@ -19,6 +19,8 @@ pub(crate) struct Window {
     slot_sum: u32,
     /// Over-range samples of the frame.
     over_range: u32,
+    /// Sum of the frame's samples, modulo 2^64.
+    total: u64,
     /// Clock at which the frame's first slot was shown.
     shown_at: u64,
 }
@@ -31,6 +33,7 @@ impl Window {
             sequencer: Sequencer::default(),
             slot_sum: 0,
             over_range: 0,
+            total: 0,
             shown_at: now,
         }
     }
@@ -63,13 +66,19 @@ impl Window {
         if ended == Ended::Clock {
             return false;
         }
-        frames.add(slot, std::mem::take(&mut self.slot_sum));
+        let sum = std::mem::take(&mut self.slot_sum);
+        self.total = self.total.wrapping_add(sum.into());
+        frames.add(slot, sum);
         if ended == Ended::Slot {
             return false;
         }
         frames.complete(
             settings,
-            Summary { over_range: std::mem::take(&mut self.over_range), shown_at: self.shown_at },
+            Summary {
+                over_range: std::mem::take(&mut self.over_range),
+                total: std::mem::take(&mut self.total),
+                shown_at: self.shown_at,
+            },
         );
         self.shown_at = (now + 1).wrapping_sub(settings.latency.into());
         ended == Ended::Run

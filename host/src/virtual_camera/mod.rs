@@ -40,10 +40,14 @@ use nirspi_mcu::{
 };
 use nirspi_optics::SimulatedDepth;
 use nirspi_wire::{Capabilities, Version};
+use std::ops::Range;
 
 /// Bytes waiting for the host at which the link counts as full: the capacity of a real device's USB
 /// stack.
 const PACKETS_BYTES: usize = 1 << 18;
+/// Room that a frame claims: with the zeros around a packet of the FPGA.
+const FRAME_BYTES: usize = nirspi_wire::ready::MAX_READ_BYTES;
+const _: () = assert!(FRAME_BYTES >= nirspi_wire::packet::MAX_DEVICE_PACKET);
 /// Device time between depth maps: 15 Hz, the rate of 8 x 8 time-of-flight sensors.
 const DEPTH_PERIOD: Micros = Micros(66_667);
 /// Zones along one edge of the depth map.
@@ -69,7 +73,10 @@ impl PacketSink for PacketsOut {
         self.bytes.get_mut(self.committed..end)
     }
 
-    fn commit(&mut self, length: usize) {
+    fn commit(&mut self, part: Range<usize>) {
+        let length = part.len();
+        let part = self.committed + part.start..self.committed + part.end;
+        self.bytes.copy_within(part, self.committed);
         self.committed += length;
     }
 }
@@ -84,7 +91,7 @@ impl PacketsOut {
     /// Whether there is no room for a further frame.
     #[must_use]
     pub fn is_full(&self) -> bool {
-        self.waiting().len() + nirspi_wire::packet::MAX_DEVICE_PACKET > PACKETS_BYTES
+        self.waiting().len() + FRAME_BYTES > PACKETS_BYTES
     }
 
     /// Removes the first `length` waiting bytes, which were sent.

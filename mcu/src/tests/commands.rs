@@ -21,7 +21,7 @@ fn hello_tells_who_the_device_is() {
     let expected = Identity {
         protocol: version::CURRENT,
         firmware: Version(1, 2, 3),
-        gateware: Version(0, 3, 1),
+        gateware: Version(0, 3, 0),
         board: "bench",
         serial: "0001",
         side: 32,
@@ -247,7 +247,7 @@ fn a_register_is_read_and_one_that_is_not_there_is_named() {
     let read = |bench: &mut Bench, address| bench.ask(Command::ReadRegister { address });
     assert_eq!(read(&mut bench, 0), Ok(Answer::Register(IDENTITY)));
     assert_eq!(read(&mut bench, ORDER_TABLE + 1023), Ok(Answer::Register(0)));
-    for address in [0x1B, ORDER_TABLE - 1, ORDER_TABLE + 1024, u16::MAX] {
+    for address in [0x1E, ORDER_TABLE - 1, ORDER_TABLE + 1024, u16::MAX] {
         assert_eq!(read(&mut bench, address), Err(Refusal::NoSuchRegister { address }));
     }
     bench.fpga.dead = true;

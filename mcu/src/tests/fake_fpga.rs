@@ -1,7 +1,10 @@
-//! A fake FPGA for tests: its registers, one frame, and every kind of failure.
+//! A fake FPGA for tests: its registers, one frame, and every kind of failure. Its gateware makes no packets unless a
+//! test says so.
 
 use crate::{BusError, FpgaBus};
 use nirspi_wire::fpga::{Header, Sums};
+use nirspi_wire::packet::{MAX_DEVICE_PACKET, seal};
+use nirspi_wire::ready::Head;
 use nirspi_wire::register::{
     DUTY_LIMIT_MAX, FaultCode, IDENTITY, NO_CLOCK, ORDER_TABLE, Register, TEST_SEED, clocks,
     control, mode, status, test_sample,
@@ -22,6 +25,12 @@ pub struct FakeFpga {
     pub lost: u32,
     pub clock: u64,
     pub frame: Option<Vec<u8>>,
+    /// Samples over range in every frame.
+    pub over_range: u32,
+    /// What is added to the positive sums of a frame, by its sequence.
+    pub noise_of: fn(u32, u64) -> u64,
+    /// After a read of this register, a frame is made, once.
+    pub frame_after_read_of: Option<Register>,
     pub raw: Option<Vec<u8>>,
     /// There is memory for a second frame.
     pub keeps: bool,
@@ -49,7 +58,15 @@ pub struct FakeFpga {
     pub noise: Option<(u32, u32)>,
     config_error: bool,
     after_loss: bool,
+    /// Sum of the samples and samples over range of the delivered frame.
+    measures: (u64, u32),
+    clock_read: u64,
+    /// Run, clock and time of packets, as of the start.
+    stamp: (u16, u64, u64),
 }
+
+/// Gateware that makes no packets.
+const OLDER: u32 = 0x0000_0300;
 
 impl Default for FakeFpga {
     fn default() -> Self {
@@ -57,6 +74,7 @@ impl Default for FakeFpga {
             Register::ALL.iter().map(|r| (r.address(), r.reset())).collect();
         let ready = clocks::LOCKED | clocks::ALIVE | clocks::READY;
         registers.insert(Register::Clocks.address(), ready | (ADC_HZ / clocks::UNIT_HZ));
+        registers.insert(Register::Version.address(), OLDER);
         Self {
             registers,
             identity: IDENTITY,
@@ -67,6 +85,9 @@ impl Default for FakeFpga {
             lost: 0,
             clock: 0,
             frame: None,
+            over_range: 0,
+            noise_of: |_, _| 0,
+            frame_after_read_of: None,
             raw: None,
             keeps: false,
             kept: None,
@@ -83,6 +104,9 @@ impl Default for FakeFpga {
             noise: None,
             config_error: false,
             after_loss: false,
+            measures: (0, 0),
+            clock_read: 0,
+            stamp: (0, 0, 0),
         }
     }
 }
@@ -91,6 +115,16 @@ impl FakeFpga {
     /// Whether the last start was refused, and whether a frame was lost since the last one.
     pub fn flags(&self) -> (bool, bool) {
         (self.config_error, self.after_loss)
+    }
+
+    /// The same FPGA with the gateware of today, which makes packets.
+    pub fn make_packets(&mut self) {
+        self.registers.insert(Register::Version.address(), Register::Version.reset());
+    }
+
+    /// Whether frames are delivered as packets.
+    pub fn sends_packets(&self) -> bool {
+        self.get(Register::Mode) & mode::PACKETS != 0
     }
 
     pub fn get(&self, register: Register) -> u32 {
@@ -109,7 +143,9 @@ impl FakeFpga {
 
     /// Loses its configuration: all registers as after power-up.
     pub fn reset(&mut self) {
+        let version = self.get(Register::Version);
         *self = Self { accesses: self.accesses, keeps: self.keeps, ..Self::default() };
+        self.registers.insert(Register::Version.address(), version);
     }
 
     /// Sums of frame `sequence`; sums of the test generator where the mode selects it.
@@ -119,7 +155,10 @@ impl FakeFpga {
             return self.test_sums(patterns);
         }
         (0..patterns as u64)
-            .map(|k| Sums { positive: 1000 * u64::from(sequence) + k, negative: 7 })
+            .map(|k| {
+                let noise = (self.noise_of)(sequence, k);
+                Sums { positive: 1000 * u64::from(sequence) + k + noise, negative: 7 }
+            })
             .collect()
     }
 
@@ -160,6 +199,9 @@ impl FakeFpga {
                 FrameFlags::default()
             };
             self.frame = Some(self.frame_bytes(sequence, flags));
+            let sums = self.sums(sequence);
+            let total = sums.iter().map(|sums| sums.positive + sums.negative).sum();
+            self.measures = (total, self.over_range);
         }
         if self.made == self.get(Register::Frames) {
             self.running = false;
@@ -179,16 +221,42 @@ impl FakeFpga {
             flags,
             sequence,
             sweeps: self.get(Register::Sweeps),
-            over_range: 0,
+            over_range: self.over_range,
             lost: self.lost,
             clock: self.clock,
         };
+        if self.sends_packets() {
+            return self.packet(&header);
+        }
         let mut bytes = header.to_bytes().to_vec();
         for sum in self.sums(sequence) {
             bytes.extend(sum.to_bytes());
         }
         bytes.extend(crc32(&bytes).to_le_bytes());
         bytes
+    }
+
+    /// The packet of a frame, without zeros around it.
+    fn packet(&self, header: &Header) -> Vec<u8> {
+        let (run, clock, time) = self.stamp;
+        let head = Head {
+            run,
+            sequence: header.sequence,
+            device_time_us: time + (header.clock - clock) / 125,
+            sweeps: header.sweeps,
+            flags: header.flags,
+            patterns: header.patterns,
+        };
+        let mut payload = head.to_bytes().to_vec();
+        for sums in self.sums(header.sequence) {
+            payload.extend((sums.difference() as i32).to_le_bytes());
+        }
+        seal(&payload, &mut [0; MAX_DEVICE_PACKET]).unwrap().to_vec()
+    }
+
+    /// What the signal meter asks of the delivered frame.
+    fn measures(&self) -> (u64, u32) {
+        if self.frame.is_some() { self.measures } else { (0, 0) }
     }
 
     fn status(&self) -> u32 {
@@ -229,6 +297,9 @@ impl FakeFpga {
             return;
         }
         (self.made, self.lost, self.frame, self.raw) = (0, 0, None, None);
+        let time = u64::from(self.get(Register::TimeHigh)) << 32;
+        let time = time | u64::from(self.get(Register::TimeLow));
+        self.stamp = (self.get(Register::Run) as u16, self.clock_read, time);
         self.kept = None;
         self.after_loss = false;
         if raw {
@@ -261,12 +332,22 @@ impl FpgaBus for FakeFpga {
             Some(Register::Fault) => self.fault as u32,
             Some(Register::FramesMade) => self.made,
             Some(Register::FramesLost) => self.lost,
-            Some(Register::ClockLow) => self.clock as u32,
-            Some(Register::ClockHigh) => (self.clock >> 32) as u32,
+            Some(Register::ClockLow) => {
+                self.clock_read = self.clock;
+                self.clock as u32
+            }
+            Some(Register::ClockHigh) => (self.clock_read >> 32) as u32,
+            Some(Register::SumLow) => self.measures().0 as u32,
+            Some(Register::SumHigh) => (self.measures().0 >> 32) as u32,
+            Some(Register::OverRange) => self.measures().1,
             Some(Register::Control) => 0,
             Some(Register::Writes) => self.writes,
             _ => self.registers.get(&address).copied().unwrap_or(0),
         };
+        if self.frame_after_read_of.is_some_and(|register| register.address() == address) {
+            self.frame_after_read_of = None;
+            self.make_frame();
+        }
         let flipped = match &mut self.noise {
             Some((0, bits)) => std::mem::take(bits),
             Some((reads, _)) => {

@@ -4,8 +4,8 @@
 use super::fake_fpga::FakeFpga;
 use super::support::*;
 use crate::{
-    BoardInfo, BusError, Camera, FpgaBus, HostPort, Limits, Micros, NoLoader, PortBus, Ports,
-    Wanted,
+    BoardInfo, BusError, Camera, FpgaBus, HostPort, Limits, Micros, NoLoader, PacketSink, PortBus,
+    Ports, Target, Wanted,
 };
 use nirspi_wire::fpga::{MAX_FRAME_BYTES, frame_bytes};
 use nirspi_wire::host_port::{READ_FRAME, READ_RAW, SEALED_BYTES, seal, unseal};
@@ -22,9 +22,9 @@ use std::vec::Vec;
 pub(super) struct Port {
     pub fpga: FakeFpga,
     /// Opcode and length of every transfer.
-    transfers: Vec<(u8, usize)>,
+    pub transfers: Vec<(u8, usize)>,
     /// Number of transfers that fail before the next one succeeds.
-    failures: u32,
+    pub failures: u32,
     /// Bits that the wires invert in the next register accesses: address, value and check.
     pub wrong: VecDeque<u64>,
     /// Bits that the wires invert in every register access after those.
@@ -95,8 +95,10 @@ impl Port {
             other => panic!("opcode {other:#x}"),
         };
         into.fill(0);
-        let length = into.len().min(there.len());
-        into[..length].copy_from_slice(&there[..length]);
+        // A packet comes between zeros.
+        let start = if opcode == READ_FRAME && self.fpga.sends_packets() { 5 } else { 0 };
+        let length = (into.len() - start).min(there.len());
+        into[start..start + length].copy_from_slice(&there[..length]);
         Ok(())
     }
 }
@@ -111,10 +113,19 @@ fn bus_of_two() -> PortBus<'static, Port> {
 
 /// Does a board's work between two polls, without the packing; true if there was any.
 fn serve(bus: &mut PortBus<'_, Port>) -> bool {
-    let Some(Wanted { port, opcode, into, .. }) = bus.wanted() else { return false };
-    let done = port.transfer(opcode, into);
+    let Some(Wanted { port, opcode, into }) = bus.wanted() else { return false };
+    let Target::Bus { bytes, .. } = into else { panic!("{into:?}") };
+    let done = port.transfer(opcode, bytes);
     bus.transferred(done);
     true
+}
+
+/// Bytes of the transfer that is wanted.
+fn wanted(bus: &mut PortBus<'_, Port>) -> usize {
+    match bus.wanted().unwrap().into {
+        Target::Bus { bytes, .. } => bytes.len(),
+        Target::Link(length) => length,
+    }
 }
 
 /// Asks for the frame that is ready, and transfers it.
@@ -125,7 +136,7 @@ fn fetch(bus: &mut PortBus<'_, Port>) -> u8 {
     sequence(bus.frame().unwrap().unwrap())
 }
 
-fn start(bus: &mut PortBus<'_, Port>, patterns: u16) {
+pub(super) fn start(bus: &mut PortBus<'_, Port>, patterns: u16) {
     bus.write(Register::Patterns.address(), patterns.into()).unwrap();
     control(bus, control::START);
 }
@@ -193,8 +204,9 @@ fn a_kept_frame_outlives_its_release_and_is_given_once() {
     // During the transfer of the next frame, which comes into the other buffer.
     bus.port().fpga.make_frame();
     assert_eq!(bus.frame(), Ok(None));
-    let Wanted { port, opcode, into, kept } = bus.wanted().unwrap();
-    let done = port.transfer(opcode, into);
+    let Wanted { port, opcode, into } = bus.wanted().unwrap();
+    let Target::Bus { bytes, kept } = into else { panic!("{into:?}") };
+    let done = port.transfer(opcode, bytes);
     assert_eq!((sequence(kept.unwrap()), kept.unwrap().len()), (0, frame_bytes(2)));
     bus.transferred(done);
     assert_eq!(sequence(bus.frame().unwrap().unwrap()), 1);
@@ -233,13 +245,13 @@ fn a_frame_is_as_long_as_the_run_was_started_with() {
     start(&mut bus, 4);
     bus.write(Register::Patterns.address(), 9).unwrap();
     assert_eq!(bus.frame(), Ok(None));
-    assert_eq!(bus.wanted().unwrap().into.len(), frame_bytes(4));
+    assert_eq!(wanted(&mut bus), frame_bytes(4));
     start(&mut bus, 9);
     assert_eq!(bus.frame(), Ok(None));
-    assert_eq!(bus.wanted().unwrap().into.len(), frame_bytes(9));
+    assert_eq!(wanted(&mut bus), frame_bytes(9));
     start(&mut bus, u16::MAX);
     assert_eq!(bus.frame(), Ok(None));
-    assert_eq!(bus.wanted().unwrap().into.len(), MAX_FRAME_BYTES, "and never beyond the buffer");
+    assert_eq!(wanted(&mut bus), MAX_FRAME_BYTES, "and never beyond the buffer");
 }
 
 #[test]
@@ -280,7 +292,7 @@ fn a_failed_transfer_is_tried_again_and_given_up_after_three() {
 pub(super) struct Device {
     pub camera: Camera,
     pub bus: PortBus<'static, Port>,
-    link: Link,
+    pub link: Link,
     pub now: Micros,
 }
 
@@ -299,12 +311,24 @@ impl Device {
         let taken = self.camera.receive(self.now, bytes, &GOOD_INPUTS, ports);
         assert_eq!(taken, bytes.len());
         self.camera.poll(self.now, &GOOD_INPUTS, ports);
-        if let Some(Wanted { port, opcode, into, kept }) = self.bus.wanted() {
-            let done = port.transfer(opcode, into);
-            if let Some(frame) = kept {
-                self.camera.pack(self.now, frame, &mut self.link);
+        match self.bus.wanted() {
+            None => {}
+            Some(Wanted { port, opcode, into: Target::Bus { bytes, kept } }) => {
+                let done = port.transfer(opcode, bytes);
+                if let Some(frame) = kept {
+                    self.camera.pack(self.now, frame, &mut self.link);
+                }
+                self.bus.transferred(done);
             }
-            self.bus.transferred(done);
+            Some(Wanted { port, opcode, into: Target::Link(length) }) => {
+                if let Some(room) = self.link.claim(length) {
+                    let done = port.transfer(opcode, room);
+                    self.bus.transferred(done);
+                }
+                let ports =
+                    &mut Ports { bus: &mut self.bus, sink: &mut self.link, loader: &mut NoLoader };
+                self.camera.forward(self.now, ports);
+            }
         }
     }
 

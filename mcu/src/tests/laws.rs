@@ -7,7 +7,7 @@ use nirspi_wire::packet::encode;
 use nirspi_wire::register::FaultCode;
 use nirspi_wire::{
     Answer, Command, Configuration, DeviceMessage, EventKind, GatewareChunk, PatternOrder,
-    RebootInto, RunLength, SampleSource, State, version,
+    RebootInto, RunLength, SampleSource, State, open, version,
 };
 use proptest::collection;
 use proptest::prelude::*;
@@ -63,6 +63,13 @@ fn happen(bench: &mut Bench, happening: &Happening) {
     }
 }
 
+/// Whether a packet has come undamaged.
+fn opens(packet: &[u8]) -> bool {
+    let mut packet = packet.to_vec();
+    packet.pop();
+    open::<DeviceMessage<'_>>(&mut packet).is_ok()
+}
+
 #[derive(Debug, Clone)]
 enum End {
     Stop,
@@ -79,9 +86,10 @@ proptest! {
         afterwards in collection::vec(ending(), 0..10),
         end in prop_oneof![Just(End::Stop), Just(End::Fault), Just(End::Hello), Just(End::Interlock)],
         keeps: bool,
+        packets: bool,
     ) {
         let length = length.map_or(RunLength::Continuous, RunLength::Frames);
-        let mut bench = Bench::running(length);
+        let mut bench = Bench::running_with(length, packets);
         bench.fpga.keeps = keeps;
         for happening in &happenings {
             happen(&mut bench, happening);
@@ -105,6 +113,11 @@ proptest! {
             bench.after(50_000);
         }
         let made = bench.fpga.made;
+        // Whatever the wires have made of a packet goes to the host, which sees the damage.
+        let all = bench.link.packets.len();
+        bench.link.packets.retain(|packet| opens(packet));
+        let damaged = (all - bench.link.packets.len()) as u32;
+        prop_assert!(packets || damaged == 0);
         let heard = bench.heard();
         let sent = frames(&heard);
         prop_assert!(sent.windows(2).all(|pair| pair[0].sequence < pair[1].sequence));
@@ -123,7 +136,7 @@ proptest! {
             frames_made, frames_dropped, fpga_frames_lost, fpga_frames_corrupt, ..
         } = event.kind else { unreachable!() };
         let accounted =
-            sent.len() as u32 + frames_dropped + fpga_frames_lost + fpga_frames_corrupt;
+            sent.len() as u32 + damaged + frames_dropped + fpga_frames_lost + fpga_frames_corrupt;
         prop_assert_eq!(accounted, frames_made);
         // A bus that died during the transfer of a frame may have hidden the last frames from the
         // firmware.

@@ -12,6 +12,7 @@ mod laws;
 mod loading;
 mod merge;
 mod model;
+mod packets;
 mod patience;
 mod safety;
 mod selftest;

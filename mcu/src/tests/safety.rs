@@ -138,6 +138,7 @@ fn gateware_of_another_version_or_design_is_refused_before_light() {
         let refused = Err(Refusal::Fault(Fault::FpgaAbsent { identity: IDENTITY }));
         assert_eq!(bench.ask(Command::Configure(SMALL)), refused, "{register:?}");
         bench.fpga.reset();
+        bench.fpga.make_packets();
         assert_eq!(bench.ask(Command::Configure(SMALL)), Ok(Answer::Done));
     }
 }

@@ -6,6 +6,7 @@ use crate::{
     BoardInfo, Camera, GatewareLoader, Inputs, Limits, LoadError, Micros, PacketSink, Ports,
     Progress,
 };
+use core::ops::Range;
 use nirspi_wire::packet::{MAX_HOST_PACKET, encode, open};
 use nirspi_wire::{
     Answer, Capabilities, Command, Configuration, DeviceMessage, Event, EventKind, Frame,
@@ -43,9 +44,9 @@ impl PacketSink for Link {
         Some(&mut self.staging[..length])
     }
 
-    fn commit(&mut self, length: usize) {
+    fn commit(&mut self, part: Range<usize>) {
         self.room -= 1;
-        self.packets.push(self.staging[..length].to_vec());
+        self.packets.push(self.staging[part].to_vec());
     }
 }
 
@@ -142,7 +143,17 @@ impl Bench {
 
     /// A bench with the LEDs on.
     pub fn running(length: RunLength) -> Self {
-        let mut bench = Self::configured();
+        Self::running_with(length, false)
+    }
+
+    /// A bench with the LEDs on, whose gateware makes packets or is older.
+    pub fn running_with(length: RunLength, packets: bool) -> Self {
+        let mut bench = Self::open();
+        if packets {
+            bench.fpga.make_packets();
+        }
+        assert_eq!(bench.ask(Command::Configure(SMALL)), Ok(Answer::Done));
+        assert_eq!(bench.fpga.sends_packets(), packets);
         assert_eq!(bench.ask(Command::Start(length)), Ok(Answer::Done));
         assert!(bench.fpga.leds_on());
         bench

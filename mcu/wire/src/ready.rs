@@ -25,7 +25,9 @@
 //! [`LEAD_BYTES`] of them, then the packet without a gap, then zeros. On the host's link zeros are empty packets, which
 //! every receiver skips.
 
-use crate::{CLOCKS_PER_PATTERN, FrameFlags};
+use crate::packet::overhead;
+use crate::{CLOCKS_PER_PATTERN, Crc32, FrameFlags, PATTERNS};
+use core::ops::Range;
 
 /// Bytes before the samples.
 pub const HEADER_BYTES: usize = 30;
@@ -46,7 +48,114 @@ pub const LEAD_BYTES: usize = 64;
 #[must_use]
 pub const fn read_bytes(patterns: u16) -> usize {
     let payload = HEADER_BYTES + 4 * patterns as usize;
-    LEAD_BYTES + payload + crate::packet::overhead(payload)
+    LEAD_BYTES + payload + overhead(payload)
+}
+
+/// Bytes to read of the longest frame.
+pub const MAX_READ_BYTES: usize = read_bytes(PATTERNS);
+
+/// Where the packet lies in the bytes of a read, delimiter included: without the zeros before and after. `None` if
+/// there is none, or one whose length is not that of a frame of so many patterns.
+///
+/// Bytes inside the packet are not looked at. The receiver's CRC-32 finds damage there.
+#[must_use]
+pub fn packet_in(read: &[u8], patterns: u16) -> Option<Range<usize>> {
+    let is_byte = |byte: &u8| *byte != 0;
+    let start = read.iter().position(is_byte)?;
+    let end = read.iter().rposition(is_byte)? + 2;
+    let payload = HEADER_BYTES + 4 * usize::from(patterns);
+    // COBS adds a byte at least, and one for each 254 at most; the CRC has four, the delimiter one.
+    let fits = (payload + 6..=payload + overhead(payload)).contains(&(end - start));
+    (fits && end <= read.len()).then_some(start..end)
+}
+
+/// Encoded bytes at the beginning of a packet that tell frames apart: run, sequence and device time.
+pub const BEGINNING_BYTES: usize = 20;
+
+/// The samples of a packet, one after the other, straight from its encoded bytes. They count only if the packet
+/// [is intact](Self::is_intact), which shows after the last.
+#[derive(Debug, Clone)]
+pub struct Reader<'p> {
+    bytes: Unstuffed<'p>,
+    crc: Crc32,
+    left: u16,
+    /// Number of the frame in its run.
+    pub sequence: u32,
+    /// What happened to the frame.
+    pub flags: FrameFlags,
+}
+
+impl<'p> Reader<'p> {
+    /// The reader of a packet of so many patterns.
+    #[must_use]
+    pub fn new(packet: &'p [u8], patterns: u16) -> Self {
+        let mut bytes = Unstuffed { bytes: packet, left: 0, owes_zero: false };
+        let head: [u8; HEADER_BYTES] = bytes.array();
+        let mut crc = Crc32::new();
+        crc.update(&head);
+        let number = |bytes: &[u8]| {
+            bytes.iter().rev().fold(0u32, |number, byte| number << 7 | u32::from(byte & 0x7F))
+        };
+        let flags = FrameFlags(number(&head[24..27]) as u16);
+        Self { bytes, crc, left: patterns, sequence: number(&head[4..9]), flags }
+    }
+
+    /// The next sample; 0 after the last.
+    #[inline(never)]
+    pub fn sample(&mut self) -> i32 {
+        let Some(left) = self.left.checked_sub(1) else { return 0 };
+        self.left = left;
+        let word = self.bytes.array();
+        self.crc.update(&word);
+        i32::from_le_bytes(word)
+    }
+
+    /// Whether all samples have been read and the packet ends with the CRC-32 of its bytes.
+    #[must_use]
+    pub fn is_intact(&mut self) -> bool {
+        self.left == 0 && self.bytes.array() == self.crc.value().to_le_bytes()
+    }
+}
+
+/// The bytes behind COBS. Beyond the end there are zeros.
+#[derive(Debug, Clone)]
+struct Unstuffed<'p> {
+    bytes: &'p [u8],
+    /// Bytes left of the open block.
+    left: u8,
+    /// The open block stands for a zero after it, if another block follows.
+    owes_zero: bool,
+}
+
+impl Unstuffed<'_> {
+    fn array<const N: usize>(&mut self) -> [u8; N] {
+        let mut array = [0; N];
+        self.fill(&mut array);
+        array
+    }
+
+    #[inline(never)]
+    fn fill(&mut self, bytes: &mut [u8]) {
+        for byte in bytes {
+            *byte = self.next();
+        }
+    }
+
+    fn next(&mut self) -> u8 {
+        loop {
+            let Some((&byte, rest)) = self.bytes.split_first() else { return 0 };
+            self.bytes = rest;
+            if self.left > 0 {
+                self.left -= 1;
+                return byte;
+            }
+            self.left = byte.saturating_sub(1);
+            let owed = core::mem::replace(&mut self.owes_zero, byte < 0xFF);
+            if owed {
+                return 0;
+            }
+        }
+    }
 }
 
 /// The fields before the samples.

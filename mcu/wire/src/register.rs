@@ -76,7 +76,7 @@ registers! {
     /// Always [`IDENTITY`].
     Identity = 0x00, ReadOnly, IDENTITY;
     /// Gateware version, `major << 16 | minor << 8 | patch`.
-    Version = 0x01, ReadOnly, 0x0000_0301;
+    Version = 0x01, ReadOnly, 0x0000_0302;
     /// Holds what was written, for bus tests.
     Scratch = 0x02, ReadWrite, 0;
     /// See [`control`].
@@ -134,6 +134,14 @@ registers! {
     TimeLow = 0x19, ReadWrite, 0;
     /// High word of that time.
     TimeHigh = 0x1A, ReadWrite, 0;
+    /// Sum of all samples of the delivered frame that were not blanked, low word; modulo 2^64, however its
+    /// sums wrapped. 0 while no frame is delivered. Since gateware 0.3.2, like the next two.
+    SumLow = 0x1B, ReadOnly, 0;
+    /// High word of that sum.
+    SumHigh = 0x1C, ReadOnly, 0;
+    /// Samples of the delivered frame that were over range, blanked ones included. 0 while no frame is
+    /// delivered.
+    OverRange = 0x1D, ReadOnly, 0;
 }
 
 /// `"NSPI"` in ASCII.
@@ -155,6 +163,13 @@ pub const fn has_this_map(version: u32) -> bool {
 #[must_use]
 pub const fn sends_packets(version: u32) -> bool {
     has_this_map(version) && version & 0xFF >= 1
+}
+
+/// Whether gateware with this [`Register::Version`] has what a packet leaves out of its frame in
+/// [`Register::SumLow`], [`Register::SumHigh`] and [`Register::OverRange`]: 0.3.2 and later of the same map.
+#[must_use]
+pub const fn measures_frames(version: u32) -> bool {
+    has_this_map(version) && version & 0xFF >= 2
 }
 
 /// Address of the order table's first entry; entry `i` is at `ORDER_TABLE + i`, read and write, 10

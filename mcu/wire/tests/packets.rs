@@ -73,6 +73,63 @@ proptest! {
     }
 
     #[test]
+    fn a_packet_of_the_fpga_is_found_between_zeros_and_read_sample_by_sample(
+        run: u16, sequence: u32, device_time_us: u64, sweeps: u32, flags: u16,
+        values in prop::collection::vec(prop_oneof![any::<i32>(), -300..300], 1..=1024),
+        lead in 0..=ready::LEAD_BYTES, damage: (prop::sample::Index, u8),
+    ) {
+        let flags = FrameFlags(flags);
+        let patterns = values.len() as u16;
+        let head = ready::Head { run, sequence, device_time_us, sweeps, flags, patterns };
+        let mut payload = head.to_bytes().to_vec();
+        payload.extend(values.iter().flat_map(|value| value.to_le_bytes()));
+        let packet = seal(&payload, &mut [0; ROOM]).unwrap().to_vec();
+        let mut read = vec![0; ready::read_bytes(patterns)];
+        read[lead..lead + packet.len()].copy_from_slice(&packet);
+        let place = ready::packet_in(&read, patterns);
+        prop_assert_eq!(place.clone(), Some(lead..lead + packet.len()));
+        // A packet of twice as many patterns has another length.
+        prop_assert_eq!(ready::packet_in(&read, 2 * patterns), None);
+
+        let mut reader = ready::Reader::new(&read[place.clone().unwrap()], patterns);
+        prop_assert_eq!((reader.sequence, reader.flags), (sequence, flags));
+        prop_assert!(!reader.is_intact(), "nothing has been read");
+        let mut reader = ready::Reader::new(&read[place.unwrap()], patterns);
+        let found: Vec<i32> = values.iter().map(|_| reader.sample()).collect();
+        prop_assert_eq!(&found, &values);
+        prop_assert!(reader.is_intact());
+
+        // Whatever byte is damaged, the reader believes no other samples: a wrong length of the last block changes none.
+        let (at, flip) = damage;
+        let mut damaged = packet;
+        let at = at.index(damaged.len() - 1);
+        damaged[at] ^= flip.max(1);
+        let mut reader = ready::Reader::new(&damaged, patterns);
+        let found: Vec<i32> = values.iter().map(|_| reader.sample()).collect();
+        prop_assert!(!reader.is_intact() || found == values);
+    }
+
+    #[test]
+    fn bytes_without_a_packet_have_none(
+        patterns in 1..=1024u16, bytes in prop::collection::vec(any::<u8>(), 0..200),
+    ) {
+        prop_assert_eq!(ready::packet_in(&[0; 300], patterns), None);
+        prop_assert_eq!(ready::packet_in(&[], patterns), None);
+        if let Some(place) = ready::packet_in(&bytes, patterns) {
+            prop_assert!(place.len() >= ready::HEADER_BYTES + 4 * usize::from(patterns) + 6);
+            prop_assert_eq!(bytes[place.end - 1], 0);
+        }
+        // Its delimiter is cut off.
+        prop_assert_eq!(ready::packet_in(&vec![1; ready::HEADER_BYTES + 4 * usize::from(patterns) + 6], patterns), None);
+        // Any bytes are read to their end.
+        let mut reader = ready::Reader::new(&bytes, patterns);
+        for _ in 0..=patterns {
+            reader.sample();
+        }
+        prop_assert_eq!(reader.sample(), 0, "beyond the last");
+    }
+
+    #[test]
     fn a_packet_with_padded_numbers_is_the_same_message(
         run: u16, sequence: u32, device_time_us: u64, sweeps: u32, flags: u16,
         values in prop::collection::vec(any::<i32>(), 0..=1024),

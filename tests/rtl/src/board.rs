@@ -10,7 +10,8 @@ use nirspi_wire::host_port::{
     DUMMY_CYCLES, QUAD, READ_FRAME, READ_RAW, READ_REGISTER, SCK_DIVIDER, SEALED_BYTES,
     WRITE_REGISTER, seal, unseal,
 };
-use nirspi_wire::register::{Design, Register, loopback};
+use nirspi_wire::ready;
+use nirspi_wire::register::{Design, Register, loopback, mode};
 use std::collections::VecDeque;
 
 /// Period of the ADC's clock.
@@ -61,8 +62,10 @@ pub struct Board {
     clock: u64,
     next_adc_ps: u64,
     next_host_ps: u64,
-    /// Length of a raw burst as written last: only the host knows that length.
+    /// Length of a raw burst, mode and patterns as written last: only the host knows how much it has to read.
     raw_length: u32,
+    mode: u32,
+    patterns: u32,
 }
 
 /// Levels at the microcontroller's other pins.
@@ -89,6 +92,8 @@ impl Board {
             next_adc_ps: 0,
             next_host_ps: 1,
             raw_length: Register::RawLength.reset(),
+            mode: Register::Mode.reset(),
+            patterns: Register::Patterns.reset(),
         }
     }
 
@@ -192,8 +197,11 @@ impl Board {
     }
 
     pub fn write(&mut self, address: u16, value: u32) {
-        if address == Register::RawLength.address() {
-            self.raw_length = value;
+        match Register::at(address) {
+            Some(Register::RawLength) => self.raw_length = value,
+            Some(Register::Mode) => self.mode = value,
+            Some(Register::Patterns) => self.patterns = value,
+            _ => {}
         }
         self.write_sealed(address, seal(address, value));
     }
@@ -218,10 +226,15 @@ impl Board {
         sealed
     }
 
-    /// Reads the frame, whose header gives its length.
+    /// Reads the frame, whose header gives its length, or as much as a packet of so many patterns may take.
     pub fn frame(&mut self) -> Vec<u8> {
         self.begin(READ_FRAME, 0);
         self.dummy();
+        if self.mode & mode::PACKETS != 0 {
+            let bytes = self.receive_bytes(ready::read_bytes(self.patterns as u16));
+            self.end();
+            return bytes;
+        }
         let mut bytes = self.receive_bytes(HEADER_BYTES);
         if let Some(header) = FpgaFrame::parse_header(&bytes) {
             let rest = frame_bytes(header.patterns) - HEADER_BYTES;

@@ -1,5 +1,5 @@
 //! Counts the instructions that one frame costs: the streaming path alone, with memory in place of
-//! the buses.
+//! the buses. Once with gateware that makes packets, and once with older gateware.
 //!
 //! Run under `-icount shift=0`, where one instruction is one nanosecond of the emulated clock, so
 //! one count of SysTick at 20 MHz is fifty instructions. The result is in instructions and not in
@@ -11,34 +11,42 @@
 
 use core::hint::black_box;
 use core::panic::PanicInfo;
+use core::task::Poll;
 use cortex_m::Peripherals;
 use cortex_m::peripheral::SYST;
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m_rt::entry;
 use cortex_m_semihosting::debug::{EXIT_FAILURE, EXIT_SUCCESS, exit};
 use cortex_m_semihosting::hprintln;
+use embassy_futures::poll_once;
+use nirspi_app::link::{CameraEnd, HostOut, Link, Packet};
 use nirspi_mcu::{
-    BoardInfo, BusError, Camera, HostPort, Inputs, Limits, Merger, Micros, NoLoader, PacketSink,
-    PortBus, Ports, Wanted,
+    BoardInfo, BusError, Camera, HostPort, Inputs, Limits, Micros, NoLoader, PacketSink, PortBus,
+    Ports, Target, Wanted,
 };
 use nirspi_wire::fpga::{FpgaFrame, Header, MAX_FRAME_BYTES, Sums, frame_bytes};
 use nirspi_wire::host_port::{SEALED_BYTES, seal, unseal};
-use nirspi_wire::packet::{MAX_DEVICE_PACKET, MAX_HOST_PACKET, encode};
+use nirspi_wire::packet::{self, MAX_DEVICE_PACKET, MAX_HOST_PACKET, encode};
 use nirspi_wire::register::{IDENTITY, Register, control, status};
 use nirspi_wire::{
     Command, Configuration, DeviceMessage, Frame, FrameFlags, PATTERNS, PatternOrder, Request,
-    RunLength, SampleSource, Samples, Version, crc32, version,
+    RunLength, SampleSource, Samples, Version, crc32, ready, version,
 };
-use static_cell::ConstStaticCell;
+use static_cell::{ConstStaticCell, StaticCell};
 
 /// A tenth of a second at 1000 frames a second: the signal meter compares one pair of frames.
 const FRAMES: u32 = 100;
 /// Instructions in a count of SysTick.
 const GRAIN: u32 = 50;
 const TRANSFER_BYTES: usize = 512;
+/// Gateware that makes no packets.
+const OLDER: u32 = 0x0000_0300;
+/// Bytes of the message in a packet of the FPGA.
+const PAYLOAD_BYTES: usize = ready::HEADER_BYTES + 4 * PATTERNS as usize;
 
 /// A fake FPGA: registers in memory, and a frame that is ready during every run.
 struct Memory {
+    version: u32,
     registers: [u32; 32],
     running: bool,
     sequence: u32,
@@ -71,6 +79,27 @@ impl Memory {
     }
 }
 
+impl Memory {
+    /// The same frame as a packet between zeros. `payload` is room for its message.
+    fn packet(&self, payload: &mut [u8; PAYLOAD_BYTES], into: &mut [u8]) {
+        let head = ready::Head {
+            run: 1,
+            sequence: self.sequence,
+            device_time_us: u64::from(self.sequence) * 82,
+            sweeps: 1,
+            flags: FrameFlags::DIFFERENTIAL,
+            patterns: PATTERNS,
+        };
+        let samples = (0..i32::from(PATTERNS)).flat_map(|k| (500 + k).to_le_bytes());
+        let mut bytes = head.to_bytes().into_iter().chain(samples);
+        payload.fill_with(|| bytes.next().unwrap_or(0));
+        into.fill(0);
+        if let Some(room) = into.get_mut(ready::LEAD_BYTES / 2 + 1..) {
+            let _ = packet::seal(payload, room);
+        }
+    }
+}
+
 impl HostPort for Memory {
     fn write(&mut self, address: u16, sealed: [u8; SEALED_BYTES]) -> Result<(), BusError> {
         let value = unseal(address, sealed).ok_or(BusError::Transfer)?;
@@ -90,9 +119,11 @@ impl HostPort for Memory {
         let running = if self.running { status::RUNNING | status::LEDS_ON } else { 0 };
         let value = match Register::at(address) {
             Some(Register::Identity) => IDENTITY,
-            Some(register @ (Register::Version | Register::Design)) => register.reset(),
+            Some(Register::Version) => self.version,
+            Some(Register::Design) => Register::Design.reset(),
             Some(Register::Status) => status::INTERLOCK_CLOSED | running,
-            Some(Register::FramesMade) => self.sequence,
+            // With the frame that is ready.
+            Some(Register::FramesMade) => self.sequence + 1,
             Some(Register::Writes) => self.writes,
             _ => self.slot(address).map_or(0, |slot| *slot),
         };
@@ -105,22 +136,6 @@ impl HostPort for Memory {
 
     fn raw_ready(&mut self) -> bool {
         false
-    }
-}
-
-/// Room for one packet.
-struct OnePacket {
-    bytes: [u8; MAX_DEVICE_PACKET],
-    length: usize,
-}
-
-impl PacketSink for OnePacket {
-    fn claim(&mut self, length: usize) -> Option<&mut [u8]> {
-        self.bytes.get_mut(..length)
-    }
-
-    fn commit(&mut self, length: usize) {
-        self.length = length;
     }
 }
 
@@ -147,12 +162,11 @@ fn counts(work: impl FnOnce()) -> u32 {
 }
 
 /// The firmware's three steps with a frame: the FPGA's checksum, the differences, the packet.
-fn parts(bus: &mut PortBus<'_, Memory>, sink: &mut OnePacket) -> [u32; 3] {
-    static FRAME: ConstStaticCell<[u8; MAX_FRAME_BYTES]> =
-        ConstStaticCell::new([0; MAX_FRAME_BYTES]);
+fn parts(memory: &Memory, frame: &mut [u8]) -> [u32; 3] {
     static WORDS: ConstStaticCell<[u8; 4 * PATTERNS as usize]> = ConstStaticCell::new([0; _]);
-    let (frame, words) = (FRAME.take(), WORDS.take());
-    bus.port().frame(frame);
+    static ROOM: ConstStaticCell<[u8; MAX_DEVICE_PACKET]> = ConstStaticCell::new([0; _]);
+    let (words, room) = (WORDS.take(), ROOM.take());
+    memory.frame(frame);
     let (mut pack, mut send) = (0, 0);
     let check = counts(|| {
         let _ = black_box(FpgaFrame::parse(black_box(frame)));
@@ -171,36 +185,115 @@ fn parts(bus: &mut PortBus<'_, Memory>, sink: &mut OnePacket) -> [u32; 3] {
                 samples: black_box(samples),
             };
             send = counts(|| {
-                let _ = black_box(encode(&DeviceMessage::Frame(frame), &mut sink.bytes));
+                let _ = black_box(encode(&DeviceMessage::Frame(frame), room));
             });
         }
     }
     [check, pack, send]
 }
 
-/// Number of SysTick counts of a poll.
-fn poll(
-    camera: &mut Camera,
-    now: Micros,
-    bus: &mut PortBus<'_, Memory>,
-    sink: &mut OnePacket,
-) -> u32 {
-    counts(|| {
-        let ports = &mut Ports { bus, sink, loader: &mut NoLoader };
-        camera.poll(now, &INPUTS, ports);
-    })
+/// What the frames of a run cost, in SysTick counts.
+#[derive(Default)]
+struct Cost {
+    /// Between the transfers of two frames.
+    between: u32,
+    /// The same for the frame that costs least, which the signal meter does not look at.
+    least: u32,
+    /// During the transfer of the next frame.
+    during: u32,
+    /// On the link, up to the driver of the bus to the host.
+    merging: u32,
+    /// Bytes that went to the host.
+    bytes: u32,
+}
+
+/// Where a run has its memory.
+struct Room<'r> {
+    frame: &'r mut [u8; MAX_FRAME_BYTES],
+    spare: &'r mut [u8; MAX_FRAME_BYTES],
+    payload: &'r mut [u8; PAYLOAD_BYTES],
+    command: &'r mut [u8; MAX_HOST_PACKET],
+}
+
+/// Streams [`FRAMES`] frames of gateware of this version.
+fn stream(
+    version: u32,
+    room: &mut Room<'_>,
+    link: &mut CameraEnd<'_>,
+    to_host: &mut HostOut<'_, TRANSFER_BYTES>,
+) -> Cost {
+    let memory = Memory { version, registers: [0; 32], running: false, sequence: 0, writes: 0 };
+    let mut bus = PortBus::new(memory, room.frame).with_spare(Some(room.spare));
+    let mut camera =
+        Camera::new(BoardInfo::new("counted", "", Version(0, 0, 0)), Limits::default());
+    let mut now = Micros(0);
+    for command in [
+        Command::Hello { protocol: version::CURRENT },
+        Command::Configure(CONFIGURATION),
+        Command::Start(RunLength::Continuous),
+    ] {
+        let Ok(bytes) = encode(&Request { id: 0, command }, room.command) else { panic!("encode") };
+        let (_, sink) = link.both();
+        let ports = &mut Ports { bus: &mut bus, sink: &mut *sink, loader: &mut NoLoader };
+        let _ = camera.receive(now, bytes, &INPUTS, ports);
+        while poll_once(to_host.transfer()).is_ready() {}
+    }
+
+    let mut cost = Cost { least: u32::MAX, ..Cost::default() };
+    for _ in 0..FRAMES {
+        let (_, sink) = link.both();
+        let before = cost.between;
+        let mut ports = Ports { bus: &mut bus, sink: &mut *sink, loader: &mut NoLoader };
+        // The camera asks for the frame. Of older gateware, the camera packs the one before while this one comes.
+        cost.between += counts(|| {
+            camera.poll(now, &INPUTS, &mut ports);
+        });
+        let mut packs = false;
+        match bus.wanted() {
+            Some(Wanted { port, into: Target::Bus { bytes, kept }, .. }) => {
+                port.frame(bytes);
+                if let Some(frame) = kept {
+                    cost.during += counts(|| camera.pack(now, frame, sink));
+                }
+                packs = true;
+                bus.transferred(Ok(()));
+            }
+            Some(Wanted { port, into: Target::Link(length), .. }) => {
+                if let Some(bytes) = sink.claim(length) {
+                    port.packet(room.payload, bytes);
+                }
+                bus.transferred(Ok(()));
+                let mut ports = Ports { bus: &mut bus, sink: &mut *sink, loader: &mut NoLoader };
+                cost.between += counts(|| camera.forward(now, &mut ports));
+            }
+            None => {}
+        }
+        // The firmware checks the FPGA once in a millisecond: here once for each frame.
+        now.0 += 1_000;
+        if packs {
+            let mut ports = Ports { bus: &mut bus, sink: &mut *sink, loader: &mut NoLoader };
+            cost.between += counts(|| {
+                camera.poll(now, &INPUTS, &mut ports);
+            });
+        }
+        cost.least = cost.least.min(cost.between - before);
+        cost.merging += counts(|| {
+            while let Poll::Ready(transfer) = poll_once(to_host.transfer()) {
+                cost.bytes += black_box(transfer).len() as u32;
+            }
+        });
+    }
+    cost
 }
 
 #[entry]
 fn main() -> ! {
-    static BUFFER: ConstStaticCell<[u8; MAX_FRAME_BYTES]> =
-        ConstStaticCell::new([0; MAX_FRAME_BYTES]);
-    static SPARE: ConstStaticCell<[u8; MAX_FRAME_BYTES]> =
-        ConstStaticCell::new([0; MAX_FRAME_BYTES]);
-    static SINK: ConstStaticCell<OnePacket> =
-        ConstStaticCell::new(OnePacket { bytes: [0; MAX_DEVICE_PACKET], length: 0 });
-    static PACKET: ConstStaticCell<[u8; MAX_HOST_PACKET]> =
-        ConstStaticCell::new([0; MAX_HOST_PACKET]);
+    static FRAME: ConstStaticCell<[u8; MAX_FRAME_BYTES]> = ConstStaticCell::new([0; _]);
+    static SPARE: ConstStaticCell<[u8; MAX_FRAME_BYTES]> = ConstStaticCell::new([0; _]);
+    static PAYLOAD: ConstStaticCell<[u8; PAYLOAD_BYTES]> = ConstStaticCell::new([0; _]);
+    static COMMAND: ConstStaticCell<[u8; MAX_HOST_PACKET]> = ConstStaticCell::new([0; _]);
+    static PLACES: ConstStaticCell<[Packet; 4]> = ConstStaticCell::new([Packet::EMPTY; 4]);
+    static LINK: StaticCell<Link<'static>> = StaticCell::new();
 
     if let Some(mut peripherals) = Peripherals::take() {
         peripherals.SYST.set_clock_source(SystClkSource::Core);
@@ -208,64 +301,34 @@ fn main() -> ! {
         peripherals.SYST.clear_current();
         peripherals.SYST.enable_counter();
     }
-    let sink = SINK.take();
-    let packet = PACKET.take();
-    let memory = Memory { registers: [0; 32], running: false, sequence: 0, writes: 0 };
-    let mut bus = PortBus::new(memory, BUFFER.take()).with_spare(Some(SPARE.take()));
-    let mut camera =
-        Camera::new(BoardInfo::new("counted", "", Version(0, 0, 0)), Limits::default());
-    let mut now = Micros(0);
-
-    for command in [
-        Command::Hello { protocol: version::CURRENT },
-        Command::Configure(CONFIGURATION),
-        Command::Start(RunLength::Continuous),
-    ] {
-        let Ok(bytes) = encode(&Request { id: 0, command }, packet) else { panic!("encode") };
-        let ports = &mut Ports { bus: &mut bus, sink, loader: &mut NoLoader };
-        let _ = camera.receive(now, bytes, &INPUTS, ports);
-    }
-
-    let (mut between, mut during, mut merge, mut bytes) = (0, 0, 0, 0);
-    let mut merger = Merger::<TRANSFER_BYTES>::new();
-    for _ in 0..FRAMES {
-        sink.length = 0;
-        // The camera asks for the frame, and packs the one before while this one comes.
-        between += poll(&mut camera, now, &mut bus, sink);
-        if let Some(Wanted { port, into, kept, .. }) = bus.wanted() {
-            port.frame(into);
-            if let Some(frame) = kept {
-                during += counts(|| camera.pack(now, frame, sink));
-            }
-            bus.transferred(Ok(()));
-        }
-        // The transfer takes a millisecond or more, so the firmware checks the FPGA once for each frame.
-        now.0 += 1_000;
-        between += poll(&mut camera, now, &mut bus, sink);
-        bytes += sink.length as u32;
-        merge += counts(|| {
-            let mut rest = sink.bytes.get(..sink.length).unwrap_or(&[]);
-            while !rest.is_empty() {
-                let taken = merger.take(rest);
-                rest = rest.get(taken..).unwrap_or(&[]);
-                if merger.is_full() {
-                    black_box(merger.transfer());
-                }
-            }
-        });
-    }
-    let [check, pack, send] = parts(&mut bus, sink);
-    // The last frame still waits.
+    let mut room = Room {
+        frame: FRAME.take(),
+        spare: SPARE.take(),
+        payload: PAYLOAD.take(),
+        command: COMMAND.take(),
+    };
+    let (mut link, _, mut to_host) = LINK.init(Link::new(PLACES.take())).split();
+    let packets = stream(Register::Version.reset(), &mut room, &mut link, &mut to_host);
+    let older = stream(OLDER, &mut room, &mut link, &mut to_host);
+    let memory =
+        Memory { version: OLDER, registers: [0; 32], running: false, sequence: 0, writes: 0 };
+    let [check, pack, send] = parts(&memory, room.frame);
+    // The last frame of older gateware still waits.
     const PACKED: u32 = FRAMES - 1;
-    if bytes < PACKED * 4 * u32::from(PATTERNS) {
-        hprintln!("no frames came: {} bytes", bytes);
+    let least = 4 * u32::from(PATTERNS);
+    if packets.bytes < FRAMES * least || older.bytes < PACKED * least {
+        hprintln!("no frames came: {} and {} bytes", packets.bytes, older.bytes);
         exit(EXIT_FAILURE);
     }
+    hprintln!("packet_link_bytes {}", packets.bytes / FRAMES);
+    hprintln!("packet_forwarding {}", packets.between * GRAIN / FRAMES);
+    hprintln!("packet_without_meter {}", packets.least * GRAIN);
+    hprintln!("packet_merging {}", packets.merging * GRAIN / FRAMES);
     hprintln!("fpga_bytes {}", frame_bytes(PATTERNS));
-    hprintln!("link_bytes {}", bytes / PACKED);
-    hprintln!("between_transfers {}", between * GRAIN / FRAMES);
-    hprintln!("during_transfer {}", during * GRAIN / PACKED);
-    hprintln!("merging {}", merge * GRAIN / PACKED);
+    hprintln!("link_bytes {}", older.bytes / PACKED);
+    hprintln!("between_transfers {}", older.between * GRAIN / FRAMES);
+    hprintln!("during_transfer {}", older.during * GRAIN / PACKED);
+    hprintln!("merging {}", older.merging * GRAIN / PACKED);
     hprintln!("of_these_check {}", check * GRAIN);
     hprintln!("of_these_differences {}", pack * GRAIN);
     hprintln!("of_these_packet {}", send * GRAIN);

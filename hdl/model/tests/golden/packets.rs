@@ -42,7 +42,14 @@ proptest! {
             }
             let expected = setup.frame(f, rest + between, &samples);
             let mut bytes = bench.0.frame().expect("no frame").to_vec();
+            let total: u64 = expected.sums.iter().map(|sums| sums.positive + sums.negative).sum();
+            let measures = |bench: &mut Bench| {
+                [Register::SumLow, Register::SumHigh, Register::OverRange].map(|r| bench.get(r))
+            };
+            let over_range = expected.header.over_range;
+            prop_assert_eq!(measures(&mut bench), [total as u32, (total >> 32) as u32, over_range]);
             bench.control(control::RELEASE);
+            prop_assert_eq!(measures(&mut bench), [0; 3], "released");
             prop_assert_eq!(bytes.pop(), Some(0), "no delimiter");
             let differences = expected.sums.iter().map(Sums::difference);
             let mut words = vec![0; 4 * expected.sums.len()];

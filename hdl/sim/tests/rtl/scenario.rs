@@ -121,6 +121,13 @@ fn set_up(rig: &mut Rig, dice: &mut Dice, more: u32) -> u64 {
     frame
 }
 
+/// Reads what the signal meter asks of a delivered frame, if there is one.
+fn measures(rig: &mut Rig) {
+    for register in [R::SumLow, R::SumHigh, R::OverRange] {
+        rig.read(register.address());
+    }
+}
+
 /// An action of the host, or an accident, during a run.
 fn deed(rig: &mut Rig, dice: &mut Dice, frame: u64) {
     match dice.range(0, 25) {
@@ -128,6 +135,7 @@ fn deed(rig: &mut Rig, dice: &mut Dice, frame: u64) {
         4 => rig.wait_adc(dice.range(0, 100)),
         5..=9 => {
             rig.stream(false, usize::MAX);
+            measures(rig);
             if !dice.once_in(5) {
                 rig.set(R::Control, control::RELEASE);
             }
@@ -233,6 +241,7 @@ fn act(rig: &mut Rig, seed: u64, more: u32, mut before: impl FnMut(&mut Rig)) {
         rig.read(register.address());
     }
     rig.stream(false, usize::MAX);
+    measures(rig);
     rig.stream(true, 100);
 }
 

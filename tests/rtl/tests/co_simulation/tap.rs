@@ -1,6 +1,6 @@
 //! A tap that records what an FPGA gives its firmware.
 //!
-//! A tap changes nothing, except the clock of a start where a test asks for that.
+//! A tap changes nothing, except the clock of a start and the version of the gateware where a test asks for that.
 
 use nirspi::virtual_camera::SimulatedFpga;
 use nirspi_mcu::{BusError, FpgaBus};
@@ -22,17 +22,26 @@ pub struct Tap<F> {
     fpga: F,
     log: Log,
     start_at: Option<u64>,
+    is_older: bool,
 }
+
+/// Gateware that makes no packets.
+const OLDER: u32 = 0x0000_0300;
 
 impl<F: SimulatedFpga> Tap<F> {
     pub fn new(fpga: F) -> (Self, Log) {
         let log = Log::default();
-        (Self { fpga, log: log.clone(), start_at: None }, log)
+        (Self { fpga, log: log.clone(), start_at: None, is_older: false }, log)
     }
 
     /// Delays starts to this clock: firmware behind another bus starts at another time.
     pub fn starting_at(self, clock: u64) -> Self {
         Self { start_at: Some(clock), ..self }
+    }
+
+    /// Says that the gateware is of a version that makes no packets.
+    pub fn older(self) -> Self {
+        Self { is_older: true, ..self }
     }
 
     /// Records new bytes once. The bus gives the same bytes again until their release.
@@ -48,7 +57,10 @@ impl<F: SimulatedFpga> Tap<F> {
 
 impl<F: SimulatedFpga> FpgaBus for Tap<F> {
     fn read(&mut self, address: u16) -> Result<u32, BusError> {
-        self.fpga.read(address)
+        match self.fpga.read(address)? {
+            _ if self.is_older && address == Register::Version.address() => Ok(OLDER),
+            value => Ok(value),
+        }
     }
 
     fn write(&mut self, address: u16, value: u32) -> Result<(), BusError> {

@@ -61,7 +61,7 @@ pub const STAMP: [usize; 3] = [16, 64, 64];
 /// Bits of the fields of `types::Place`.
 pub const PLACE: [usize; 10] = [1, 1, 1, 1, 10, 1, 1, 1, 1, 1];
 /// Bits of the fields of `types::Header`.
-pub const HEADER: [usize; 5] = [16, 32, 32, 32, 64];
+pub const HEADER: [usize; 6] = [16, 32, 32, 32, 64, 64];
 
 impl Settings {
     /// Random settings of a run of some hundred clocks at most.

@@ -22,6 +22,7 @@ laws![
     leds_are_lit_for_the_watchdogs_clocks_after_any_access,
     light_costs_what_the_register_map_says,
     a_run_of_packets_sends_them_whole_and_a_burst_stays_a_burst,
+    a_delivered_frame_can_be_asked_for_its_sum_and_its_over_range_samples,
 ];
 
 /// The engine, its host and a count of clocks.
@@ -324,5 +325,30 @@ fn a_run_of_packets_sends_them_whole_and_a_burst_stays_a_burst(project: &Project
             let word = u16::from_le_bytes([engine.byte(), engine.byte()]);
             assert_eq!(u64::from(word), noise(light + t), "{settings:?}");
         }
+    }
+}
+
+fn a_delivered_frame_can_be_asked_for_its_sum_and_its_over_range_samples(project: &Project) {
+    let mut engine = Engine::new(project);
+    engine.code = noise;
+    let dice = &mut Dice::new(46);
+    for round in 0..16 {
+        let over = round % 2 == 0;
+        let packets = dice.once_in(2);
+        let settings = Settings { packets, over_range_trip: 0, ..random(dice) };
+        engine.bench.set("over_range", over);
+        let light = engine.start(&settings);
+        engine.until("frame_ready");
+        let sums = Engine::sums_of_noise(&settings, light);
+        let total: u64 = sums.iter().flatten().sum();
+        let over_range = if over { settings.frame_clocks() } else { 0 };
+        let expected = [total as u32, (total >> 32) as u32, over_range as u32];
+        let read = |engine: &mut Engine| {
+            [R::SumLow, R::SumHigh, R::OverRange].map(|register| engine.read(register))
+        };
+        assert_eq!(read(&mut engine), expected, "{settings:?}");
+        engine.set(R::Control, control::RELEASE.into());
+        assert_eq!(read(&mut engine), [0; 3], "released");
+        engine.clocks(100);
     }
 }

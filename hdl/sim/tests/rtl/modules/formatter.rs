@@ -89,6 +89,8 @@ impl<'d> Rig<'d> {
             header.over_range.into(),
             header.lost.into(),
             header.clock,
+            // The sum of its samples, which no byte shows.
+            self.dice.next(),
         ];
         let fields: Vec<_> = values.into_iter().zip(HEADER).collect();
         self.bench.set_fields("header", &fields);

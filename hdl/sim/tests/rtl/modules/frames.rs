@@ -19,8 +19,8 @@ struct Host {
     made: u64,
     lost: u64,
     /// The delivered frame at its completion: flags, number, over-range samples, lost frames, clock
-    /// of its first slot.
-    delivered: Option<[u64; 5]>,
+    /// of its first slot, sum of its samples.
+    delivered: Option<[u64; 6]>,
     /// A sum of the current frame has wrapped.
     overflow: bool,
     after_loss: bool,
@@ -32,7 +32,7 @@ impl Host {
         *self = Self { filling: self.filling, shown_at: self.shown_at, ..Self::default() };
     }
 
-    fn complete(&mut self, settings: &Settings, over_range: u64) {
+    fn complete(&mut self, settings: &Settings, over_range: u64, total: u64) {
         let flags = [
             (over_range > 0, FrameFlags::OVER_RANGE),
             (self.overflow, FrameFlags::OVERFLOW),
@@ -41,7 +41,7 @@ impl Host {
             (settings.differential, FrameFlags::DIFFERENTIAL),
         ];
         let flags = flags.iter().map(|&(set, flag)| if set { u64::from(flag.0) } else { 0 }).sum();
-        let header = [flags, self.made, over_range, self.lost, self.shown_at];
+        let header = [flags, self.made, over_range, self.lost, self.shown_at, total];
         self.made += 1;
         self.overflow = false;
         self.after_loss = self.delivered.is_some();
@@ -78,7 +78,7 @@ fn live(project: &Project, seed: u64, restart_in: u64, give_back_in: u64) -> Hos
         let give_back = dice.once_in(give_back_in);
         let overflow = dice.once_in(12);
         let over_range = dice.range(0, 2);
-        let light_next = dice.next();
+        let [light_next, total] = [(); 2].map(|()| dice.next());
 
         bench.set_fields("settings", &settings.fields());
         bench.set("clock_now", clock);
@@ -91,6 +91,7 @@ fn live(project: &Project, seed: u64, restart_in: u64, give_back_in: u64) -> Hos
         bench.set("overflow", overflow);
         bench.set("over_range", over_range);
         bench.set("over_any", over_range > 0);
+        bench.set("total", total);
         bench.tick();
 
         if give_back {
@@ -103,7 +104,7 @@ fn live(project: &Project, seed: u64, restart_in: u64, give_back_in: u64) -> Hos
         if restart {
             host.restart();
         } else if done {
-            host.complete(&settings, over_range);
+            host.complete(&settings, over_range, total);
             host.shown_at = light_next;
         }
         // The clock of a restart does not belong to the run before.

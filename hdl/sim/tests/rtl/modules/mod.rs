@@ -44,6 +44,7 @@ mod packer;
 mod raw_capture;
 mod registers;
 mod safety;
+mod sample_total;
 mod sequencer;
 mod source;
 mod spi_slave;
@@ -77,6 +78,7 @@ pub const BENCHES: &[(&str, &[Law])] = &[
     ("raw_capture", raw_capture::LAWS),
     ("registers", registers::LAWS),
     ("safety", safety::LAWS),
+    ("sample_total", sample_total::LAWS),
     ("sequencer", sequencer::LAWS),
     ("source", source::LAWS),
     ("spi_slave", spi_slave::LAWS),

@@ -1,6 +1,6 @@
 //! Tests of the register bank and of the settings made from it.
 
-use super::bundles::{SETTINGS, STAMP, Settings};
+use super::bundles::{HEADER, SETTINGS, STAMP, Settings};
 use crate::bench::Bench;
 use crate::project::Project;
 use crate::scenario::Dice;
@@ -13,6 +13,7 @@ laws![
     a_run_has_the_settings_of_its_start_whatever_is_written_later,
     every_setting_has_its_range,
     what_changes_by_itself_is_as_of_its_read,
+    a_delivered_frame_has_its_sum_and_its_over_range_samples,
 ];
 
 fn write(bench: &mut Bench, address: u16, data: u32) {
@@ -44,7 +45,7 @@ fn a_register_reads_what_was_written_to_it_and_to_no_other(project: &Project) {
         for (register, &word) in R::ALL.iter().zip(&words) {
             assert_eq!(read(&mut bench, register.address()), word, "{register:?}, round {round}");
         }
-        for nothing in [0x06, 0x07, 0x1B, 0x3FF, 0x800, 0x8000] {
+        for nothing in [0x06, 0x07, 0x1E, 0x3FF, 0x800, 0x8000] {
             assert_eq!(read(&mut bench, nothing), 0, "{nothing:#x}");
         }
         for _ in 0..3 {
@@ -215,5 +216,31 @@ fn what_changes_by_itself_is_as_of_its_read(project: &Project) {
         // The high word belongs to the last low word that was read.
         bench.set("clock_now", dice.next());
         assert_eq!(read(&mut bench, R::ClockHigh.address()), (clock >> 32) as u32);
+    }
+}
+
+fn a_delivered_frame_has_its_sum_and_its_over_range_samples(project: &Project) {
+    let mut bench = Bench::new(project, "registers");
+    let dice = &mut Dice::new(45);
+    for round in 0..60 {
+        let values: Vec<u64> = HEADER.iter().map(|bits| dice.next() >> (64 - bits)).collect();
+        let fields: Vec<_> = values.iter().copied().zip(HEADER).collect();
+        let delivered = !dice.once_in(3);
+        bench.set_fields("header", &fields);
+        bench.set("delivered", delivered);
+        let (over_range, total) = (values[2], values[5]);
+        for (register, value) in [
+            (R::SumLow, total & 0xFFFF_FFFF),
+            (R::SumHigh, total >> 32),
+            (R::OverRange, over_range),
+        ] {
+            let expected = if delivered { value as u32 } else { 0 };
+            assert_eq!(read(&mut bench, register.address()), expected, "{register:?}, {round}");
+            // As of the read: a release changes nothing in an answer that is on its way.
+            bench.set("delivered", !delivered);
+            bench.tick();
+            assert_eq!(bench.get("value") as u32, expected, "{register:?} after a change");
+            bench.set("delivered", delivered);
+        }
     }
 }

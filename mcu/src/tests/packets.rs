@@ -1,0 +1,354 @@
+//! Tests of frames that the FPGA has made into packets: they go to the host as they are, and each is counted once.
+
+use super::host_port::{Device, bus};
+use super::support::*;
+use crate::Micros;
+use nirspi_wire::host_port::READ_FRAME;
+use nirspi_wire::ready;
+use nirspi_wire::register::{Register, mode};
+use nirspi_wire::{
+    Answer, Command, Configuration, DeviceMessage, EventKind, Frame, RunLength, Signal, State, Tail,
+};
+use proptest::prelude::*;
+use std::vec::Vec;
+
+fn running() -> Bench {
+    Bench::running_with(RunLength::Continuous, true)
+}
+
+fn ended(made: u32, dropped: u32, lost: u32, corrupt: u32) -> EventKind {
+    EventKind::RunEnded {
+        run: 1,
+        frames_made: made,
+        frames_dropped: dropped,
+        fpga_frames_lost: lost,
+        fpga_frames_corrupt: corrupt,
+    }
+}
+
+fn sequences(heard: &[DeviceMessage<'static>]) -> Vec<u32> {
+    frames(heard).iter().map(|frame| frame.sequence).collect()
+}
+
+#[test]
+fn a_packet_goes_to_the_host_as_the_fpga_made_it() {
+    let mut bench = Bench::open();
+    bench.fpga.make_packets();
+    bench.fpga.clock = 1_000_000;
+    assert_eq!(bench.ask(Command::Configure(SMALL)), Ok(Answer::Done));
+    bench.now = Micros((7 << 32) + 50_000);
+    // A host that was not silent.
+    bench.status();
+    assert_eq!(bench.ask(Command::Start(RunLength::Continuous)), Ok(Answer::Done));
+    for sequence in 0..3u32 {
+        bench.fpga.clock += 125 * 300;
+        bench.fpga.make_frame();
+        let made = bench.fpga.frame.clone().unwrap();
+        bench.after(100);
+        assert_eq!(bench.link.packets, [made]);
+        let heard = bench.heard();
+        let [Frame { run, device_time_us, samples, .. }] = frames(&heard)[..] else { panic!() };
+        let time = (7 << 32) + 50_000 + 300 * (1 + u64::from(sequence));
+        assert_eq!((run, device_time_us), (1, time));
+        let expected: Vec<i64> = (0..4).map(|k| 1000 * i64::from(sequence) + k - 7).collect();
+        assert_eq!(samples.iter().collect::<Vec<_>>(), expected);
+    }
+    assert_eq!(bench.status().frames_sent, 3);
+}
+
+/// What a host gets is the same by either way.
+#[test]
+fn packets_and_frames_of_older_gateware_carry_the_same() {
+    let shots = [false, true].map(|packets| {
+        let mut bench = Bench::running_with(RunLength::Frames(5), packets);
+        for _ in 0..5 {
+            bench.fpga.clock += 12_345;
+            bench.frame();
+        }
+        let heard = bench.heard();
+        assert_eq!(events(&heard), [ended(5, 0, 0, 0)]);
+        frames(&heard)
+    });
+    assert_eq!(shots[0].len(), 5);
+    assert_eq!(shots[0], shots[1]);
+}
+
+#[test]
+fn sums_that_a_packet_has_no_room_for_go_the_older_way() {
+    // Three samples are summed in a sweep.
+    let most = ready::MAX_SUMMED_SAMPLES / 3;
+    for (sweeps, packets) in [(most, true), (most + 1, false), (u32::MAX, false)] {
+        let mut bench = Bench::open();
+        bench.fpga.make_packets();
+        let setup = Command::Configure(Configuration { sweeps, ..SMALL });
+        assert_eq!(bench.ask(setup), Ok(Answer::Done));
+        assert_eq!(bench.fpga.sends_packets(), packets, "{sweeps}");
+        assert_eq!(bench.ask(Command::Start(RunLength::Frames(1))), Ok(Answer::Done));
+        bench.frame();
+        assert_eq!(frames(&bench.heard()).len(), 1);
+    }
+}
+
+#[test]
+fn older_gateware_is_not_asked_for_packets() {
+    for (version, packets) in [(0x0300, false), (0x0301, false), (0x0302, true), (0x03FF, true)] {
+        let mut bench = Bench::open();
+        bench.fpga.registers.insert(Register::Version.address(), version);
+        assert_eq!(bench.ask(Command::Configure(SMALL)), Ok(Answer::Done));
+        assert_eq!(bench.fpga.sends_packets(), packets, "{version:#x}");
+    }
+}
+
+#[test]
+fn a_frame_that_the_link_has_no_room_for_is_released_unread_and_counted() {
+    let mut bench = running();
+    bench.link.room = 2;
+    for _ in 0..5 {
+        bench.frame();
+        assert!(bench.fpga.frame.is_none(), "released");
+    }
+    bench.link.room = usize::MAX;
+    bench.frame();
+    assert_eq!(sequences(&bench.heard()), [0, 1, 5]);
+    assert_eq!(bench.status().frames_dropped, 3);
+    bench.ask(Command::Stop).unwrap();
+    assert_eq!(bench.heard_events(), [ended(6, 3, 0, 0)]);
+}
+
+#[test]
+fn a_packet_does_not_overtake_a_reply_that_waits() {
+    let mut bench = Bench::open();
+    bench.fpga.make_packets();
+    bench.ask(Command::Configure(SMALL)).unwrap();
+    // The link refuses the reply twice, then has room.
+    bench.link.refusals = 2;
+    bench.send(Command::Start(RunLength::Continuous));
+    bench.frame();
+    bench.frame();
+    let heard = bench.heard();
+    assert!(matches!(heard[0], DeviceMessage::Reply(_)));
+    assert_eq!(sequences(&heard), [1]);
+    assert_eq!(bench.status().frames_dropped, 1);
+}
+
+#[test]
+fn a_release_that_is_lost_on_the_bus_sends_no_packet_twice_and_drops_none_twice() {
+    for room in [0, usize::MAX] {
+        let mut bench = running();
+        bench.fpga.lost_address = Some(Register::Control.address());
+        bench.link.room = room;
+        bench.frame();
+        bench.after(10);
+        bench.after(10);
+        assert!(bench.fpga.frame.is_some(), "the release is lost");
+        bench.fpga.lost_address = None;
+        bench.link.room = usize::MAX;
+        bench.after(10);
+        assert!(bench.fpga.frame.is_none());
+        let sent = u32::from(room > 0);
+        assert_eq!(frames(&bench.heard()).len() as u32, sent);
+        let status = bench.status();
+        assert_eq!((status.frames_sent, status.frames_dropped), (sent, 1 - sent));
+    }
+}
+
+#[test]
+fn a_frame_that_is_lost_while_the_counters_are_read_hides_no_other_and_doubles_none() {
+    for lost_release in [false, true] {
+        for register in [Register::FramesMade, Register::FramesLost] {
+            let mut bench = running();
+            bench.frame();
+            if lost_release {
+                bench.fpga.lost_address = Some(Register::Control.address());
+                bench.frame();
+                bench.fpga.lost_address = None;
+            } else {
+                bench.fpga.make_frame();
+            }
+            // The frame that waits is not released yet, so the next is lost.
+            bench.fpga.frame_after_read_of = Some(register);
+            bench.after(10);
+            bench.frame();
+            assert_eq!(sequences(&bench.heard()), [0, 1, 3], "{register:?}, {lost_release}");
+            bench.ask(Command::Stop).unwrap();
+            assert_eq!(bench.heard_events(), [ended(4, 0, 1, 0)]);
+        }
+    }
+}
+
+#[test]
+fn damage_inside_a_packet_is_the_hosts_to_see() {
+    let mut bench = running();
+    bench.fpga.make_frame();
+    bench.fpga.frame.as_mut().unwrap()[40] ^= 1;
+    let damaged = bench.fpga.frame.clone().unwrap();
+    bench.after(10);
+    assert!(bench.fpga.frame.is_none());
+    assert_eq!(bench.link.packets, [damaged]);
+    bench.link.packets.clear();
+    let status = bench.status();
+    assert_eq!((status.frames_sent, status.fpga_frames_corrupt), (1, 0));
+}
+
+#[test]
+fn bytes_without_a_packet_count_as_damaged() {
+    type Spoil = fn(&mut Vec<u8>);
+    let spoils: [Spoil; 4] = [
+        // The ADC's clock is lost, and the port gives zeros.
+        |frame| frame.fill(0),
+        |frame| frame.truncate(20),
+        |frame| frame.clear(),
+        // Noise in the zeros after the packet.
+        |frame| frame.extend([0, 0, 0, 1, 0]),
+    ];
+    for spoil in spoils {
+        let mut bench = running();
+        bench.fpga.make_frame();
+        spoil(bench.fpga.frame.as_mut().unwrap());
+        bench.after(10);
+        assert!(bench.fpga.frame.is_none(), "released");
+        assert!(bench.link.packets.is_empty());
+        assert_eq!(bench.status().fpga_frames_corrupt, 1);
+        bench.frame();
+        assert_eq!(sequences(&bench.heard()), [1], "the run goes on");
+    }
+}
+
+#[test]
+fn packets_that_cannot_be_found_are_no_reason_for_a_stall_and_silence_is() {
+    let mut bench = running();
+    for _ in 0..10 {
+        bench.fpga.make_frame();
+        bench.fpga.frame.as_mut().unwrap().fill(0);
+        bench.after(200_000);
+    }
+    assert_eq!(bench.camera.state(), State::Running);
+    bench.after(300_000);
+    assert_eq!(bench.camera.state(), State::Fault);
+}
+
+#[test]
+fn a_self_test_and_a_burst_get_no_packets_and_the_run_after_them_does() {
+    let mut bench = Bench::open();
+    bench.fpga.make_packets();
+    bench.ask(Command::Configure(SMALL)).unwrap();
+    bench.fpga.instant = true;
+    let Ok(Answer::SelfTest(report)) = bench.ask(Command::SelfTest) else { panic!() };
+    assert_eq!(report.failed, 0, "{report:?}");
+    assert!(bench.fpga.sends_packets(), "as it was");
+    bench.ask(Command::RawBurst { samples: 8 }).unwrap();
+    bench.after(10);
+    assert!(matches!(bench.heard()[..], [DeviceMessage::Raw(_)]));
+    bench.ask(Command::Start(RunLength::Frames(1))).unwrap();
+    bench.poll();
+    assert_eq!(frames(&bench.heard()).len(), 1);
+}
+
+/// Readings that change from frame to frame.
+fn noise(sequence: u32, k: u64) -> u64 {
+    (u64::from(sequence) * 7919 + k * 104_729) % 97
+}
+
+fn signal(bench: &mut Bench) -> Option<Signal> {
+    let Tail(signal) = bench.status().signal;
+    signal.unwrap()
+}
+
+proptest! {
+    #[test]
+    fn the_signal_of_packets_is_that_of_frames(
+        happenings in prop::collection::vec(0..40_000u64, 0..30), over_range in 0..40u32,
+        misses in 1..6u32,
+    ) {
+        let signals = [false, true].map(|packets| {
+            let mut bench = Bench::running_with(RunLength::Continuous, packets);
+            bench.fpga.noise_of = noise;
+            bench.fpga.over_range = over_range;
+            let mut signals = Vec::new();
+            for (number, &micros) in (0..).zip(&happenings) {
+                bench.now.0 += micros;
+                if number % misses == 3 {
+                    // This frame and the one before are not in succession.
+                    bench.fpga.make_frame();
+                }
+                bench.fpga.make_frame();
+                bench.after(10);
+                signals.push(signal(&mut bench));
+            }
+            signals
+        });
+        prop_assert_eq!(&signals[0], &signals[1]);
+    }
+}
+
+#[test]
+fn the_meter_sees_no_packet_that_the_wires_have_damaged() {
+    for damaged in 0..3 {
+        let mut bench = running();
+        bench.fpga.noise_of = noise;
+        for number in 0..2 {
+            bench.fpga.make_frame();
+            if number == damaged {
+                bench.fpga.frame.as_mut().unwrap()[44] ^= 0x20;
+            }
+            bench.after(10);
+        }
+        bench.link.packets.clear();
+        assert_eq!(signal(&mut bench).is_some(), damaged == 2, "{damaged}");
+    }
+}
+
+#[test]
+fn a_packet_goes_straight_into_the_links_room() {
+    let mut device = Device::new(bus());
+    device.bus.port().fpga.make_packets();
+    device.ask(Command::Configure(SMALL));
+    device.ask(Command::Start(RunLength::Continuous));
+    for _ in 0..3 {
+        device.bus.port().fpga.make_frame();
+        let made = device.bus.port().fpga.frame.clone().unwrap();
+        device.turn(&[]);
+        assert!(device.bus.port().fpga.frame.is_none(), "released in the same turn");
+        assert_eq!(device.link.packets, [made]);
+        device.heard();
+    }
+    let transfer = (READ_FRAME, ready::read_bytes(4));
+    assert_eq!(device.bus.port().transfers, [transfer; 3]);
+    assert_ne!(device.bus.port().fpga.get(Register::Mode) & mode::PACKETS, 0);
+}
+
+#[test]
+fn a_packet_that_could_not_be_read_three_times_is_counted() {
+    let mut device = Device::new(bus());
+    device.bus.port().fpga.make_packets();
+    device.ask(Command::Configure(SMALL));
+    device.ask(Command::Start(RunLength::Frames(5)));
+    let mut heard = Vec::new();
+    for number in 0..5 {
+        device.bus.port().failures = [0, 2, 3, 0, 1][number];
+        device.bus.port().fpga.make_frame();
+        for _ in 0..6 {
+            device.turn(&[]);
+        }
+        heard.extend(device.heard());
+    }
+    assert_eq!(sequences(&heard), [0, 1, 3, 4]);
+    assert_eq!(events(&heard), [ended(5, 0, 0, 1)]);
+}
+
+#[test]
+fn a_link_that_is_full_costs_no_transfer() {
+    let mut device = Device::new(bus());
+    device.bus.port().fpga.make_packets();
+    device.ask(Command::Configure(SMALL));
+    device.ask(Command::Start(RunLength::Continuous));
+    device.link.room = 0;
+    for _ in 0..3 {
+        device.bus.port().fpga.make_frame();
+        device.turn(&[]);
+    }
+    assert_eq!(device.bus.port().transfers, []);
+    device.link.room = usize::MAX;
+    device.ask(Command::Stop);
+    assert!(device.bus.port().fpga.frame.is_none());
+}
