@@ -59,7 +59,6 @@ pub enum DeviceEnhancerError {
 ///
 /// Images, FSRCNN's output and the UNet's input stay on the GPU. The last steps, agreement with the
 /// readings and the gate, run on the host.
-/// are the last thing that is done to an image before it is looked at.
 pub struct DeviceEnhancer {
     chain: Box<dyn RunChain>,
     backend: Backend,
