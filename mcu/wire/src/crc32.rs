@@ -59,8 +59,10 @@ impl HalfBytes {
 }
 
 /// Processes `N` bytes in one step, with a table of 1 KB for each.
+#[cfg(any(test, not(all(target_os = "none", feature = "small-crc-table"))))]
 struct Tables<const N: usize>([[u32; 256]; N]);
 
+#[cfg(any(test, not(all(target_os = "none", feature = "small-crc-table"))))]
 impl<const N: usize> Tables<N> {
     const fn new() -> Self {
         let mut tables = [[0; 256]; N];
