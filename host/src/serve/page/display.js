@@ -18,7 +18,7 @@ const PANELS = {
   readings: { side: 32, of: "readings", white: null, even: true, scale: 1, unit: "ADC counts", digits: 2 },
   image: { side: 32, of: "image", white: picture => picture.white_counts, scale: 1, unit: "ADC counts", digits: 1 },
   enhanced: { side: 64, of: "enhanced", white: () => 1, scale: 100, unit: "% of white", digits: 1 },
-  interval: { side: 64, of: "interval", fixed: [0, .5], scale: 100, unit: "% of white either way", digits: 1 },
+  interval: { side: 64, of: "interval", fixed: [0, .5], scale: 100, unit: "% of white", digits: 1 },
   depth: { side: 32, of: "depth", white: null, scale: 1, unit: "m", digits: 3 },
 };
 for (const [id, panel] of Object.entries(PANELS)) Object.assign(panel, { id, values: null, cell: null });
