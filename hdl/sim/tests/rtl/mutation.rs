@@ -182,8 +182,10 @@ const FAULTS: &[Fault] = &[
     ("one dummy cycle too few", "spi_slave", "left  = (HOST_DUMMY_CYCLES - 1) as 6;", "left  = (HOST_DUMMY_CYCLES - 2) as 6;"),
 ];
 
-/// Faults that no host can notice: beyond the packet the host port sends zeros, which are delimiters too.
-const BENCH_ALONE: &[&str] = &["the packet has no delimiter"];
+/// Faults that only the module's own bench notices. Beyond the packet the host port sends zeros, which are delimiters
+/// too. The equivalence runs are too short for a sum of 2^31.
+const BENCH_ALONE: &[&str] =
+    &["the packet has no delimiter", "the upper part of the sum has a bit less"];
 
 /// Whether the equivalence runs do not reach a fault, so that the module's own bench alone must notice the fault.
 fn is_beside((what, file, ..): &Fault) -> bool {
