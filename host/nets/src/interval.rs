@@ -203,7 +203,7 @@ impl Networks {
     /// options.
     ///
     /// # Errors
-    /// [`NoIntervals`] says why there are none.
+    /// [`NoIntervals`] names the weights, method or options for which the table was not made.
     pub fn intervals(
         &mut self,
         method: Method,

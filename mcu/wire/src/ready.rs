@@ -55,7 +55,7 @@ pub const fn read_bytes(patterns: u16) -> usize {
 pub const MAX_READ_BYTES: usize = read_bytes(PATTERNS);
 
 /// Where the packet lies in the bytes of a read, delimiter included: without the zeros before and after. `None` if
-/// there is none, or one whose length is not that of a frame of so many patterns.
+/// the bytes hold no packet, or a packet that is longer or shorter than a frame of so many patterns.
 ///
 /// Bytes inside the packet are not looked at. The receiver's CRC-32 finds damage there.
 #[must_use]

@@ -35,7 +35,7 @@ fn a_read_of_a_packet_ends_with_its_last_byte_if_the_packet_begins_as_late_as_it
 /// future speaks.
 #[test]
 fn the_version_of_a_camera_of_the_future_is_read_from_its_answer_alone() {
-    // DeviceMessage::Reply, its id in two bytes, Ok, Answer::Hello, version 300, and fields that nobody knows yet.
+    // DeviceMessage::Reply, its id in two bytes, Ok, Answer::Hello, version 300, and fields of that later protocol.
     let future = [0, 0xC8, 0x01, 0, 0, 0xAC, 0x02, 9, 9, 9];
     assert_eq!(hello_of_any_version(&future), Some((200, 300)));
     // Cut short, and an answer to another command.
