@@ -103,8 +103,8 @@ step_test() {
 step_gpu() {
     software_vulkan
     # The packages that have such tests: their features are other than in step `test`, so each one is built again.
-    cargo test --locked -p nirspi-recon -p nirspi-nets -p nirspi-eval -p nirspi-cli --features nirspi-cli/wgpu --lib --test cli -- \
-        omp:: gpu:: sparse_problems:: the_whole_of_the_pipeline weights:: --nocapture 2>&1 | tee target/gpu-tests.log
+    cargo test --locked -p nirspi-gpu -p nirspi-recon -p nirspi-nets -p nirspi-eval -p nirspi-cli --features nirspi-cli/wgpu --lib --test cli -- \
+        omp:: gpu:: pursuit:: network:: sparse_problems:: the_whole_of_the_pipeline weights:: --nocapture 2>&1 | tee target/gpu-tests.log
     if ls /usr/share/vulkan/icd.d/lvp_icd.* >/dev/null 2>&1 && grep -q '^skipped: .*wgpu' target/gpu-tests.log; then
         echo "software Vulkan is there, and its tests were skipped" >&2
         return 1

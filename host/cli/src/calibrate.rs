@@ -136,9 +136,8 @@ fn say(report: &Report, flat_field: Option<impl std::fmt::Display>) -> Result<()
 /// All patterns and their complements, with the timing of the camera.
 fn setup(args: &Args, settling: &Settling) -> Result<MeasurementSetup> {
     let readout = args.model.read()?.readout;
-    // The ranges were checked when the description was read.
-    let (clocks, blanked) = (readout.clocks_per_pattern as u16, readout.blanked as u16);
-    let setup = MeasurementSetup::new(&Order::Natural, 1.0)?.timed(clocks, blanked);
+    let setup = MeasurementSetup::new(&Order::Natural, 1.0)?
+        .timed(readout.clocks_per_pattern, readout.blanked);
     Ok(MeasurementSetup { adc_latency: settling.adc_latency, ..setup })
 }
 

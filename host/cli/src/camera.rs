@@ -198,8 +198,8 @@ impl SetupArgs {
     pub fn setup(&self, default_sampling: Sampling, model: &ModelArgs) -> Result<MeasurementSetup> {
         let order = parse_order("--order", &self.order)?;
         let readout = model.read()?.readout;
-        let clocks = self.clocks_per_pattern.unwrap_or(readout.clocks_per_pattern as u16);
-        let blanked = self.blanked.unwrap_or(readout.blanked as u16);
+        let clocks = self.clocks_per_pattern.unwrap_or(readout.clocks_per_pattern);
+        let blanked = self.blanked.unwrap_or(readout.blanked);
         if blanked >= clocks {
             return Err(Usage(format!(
                 "--blanked is {blanked}, expected less than the {clocks} of --clocks-per-pattern"

@@ -7,16 +7,15 @@
 
 pub use nirspi_recon::backend::{Backend, ParseBackendError};
 
+#[cfg(feature = "gpu")]
+use nirspi_gpu::{Gpu, Kernels};
 #[cfg(not(feature = "gpu"))]
 use nirspi_recon::backend::NOT_BUILT;
 #[cfg(feature = "gpu")]
-use nirspi_recon::backend::probe::{self, Gpu};
+use nirspi_recon::backend::probe;
 #[cfg(feature = "gpu")]
 use std::sync::Arc;
 use thiserror::Error;
-
-#[cfg(feature = "gpu")]
-use crate::gpu::{self, Engine};
 
 /// The backend requested by name was not found.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -38,10 +37,8 @@ pub struct Device {
 #[derive(Debug, Clone)]
 pub(crate) enum Kind {
     Cpu,
-    #[cfg(feature = "wgpu")]
-    Wgpu(cubecl::wgpu::WgpuDevice),
     #[cfg(feature = "gpu")]
-    Cuda(cubecl::cuda::CudaDevice),
+    Gpu(Gpu),
 }
 
 impl Device {
@@ -69,23 +66,19 @@ impl Device {
 
     /// The backend of the device; never [`Backend::Auto`].
     pub fn backend(&self) -> Backend {
-        match self.kind {
+        match &self.kind {
             Kind::Cpu => Backend::Cpu,
-            #[cfg(feature = "wgpu")]
-            Kind::Wgpu(_) => Backend::Wgpu,
             #[cfg(feature = "gpu")]
-            Kind::Cuda(_) => Backend::Cuda,
+            Kind::Gpu(gpu) => probe::backend(gpu),
         }
     }
 
     /// The engine that launches kernels on the device; `None` for the processor.
     #[cfg(feature = "gpu")]
-    pub(crate) fn engine(&self) -> Option<Arc<dyn Engine>> {
+    pub(crate) fn engine(&self) -> Option<Arc<dyn Kernels>> {
         match &self.kind {
             Kind::Cpu => None,
-            #[cfg(feature = "wgpu")]
-            Kind::Wgpu(device) => Some(gpu::wgpu(device)),
-            Kind::Cuda(device) => Some(gpu::cuda(device)),
+            Kind::Gpu(gpu) => Some(nirspi_gpu::open(gpu)),
         }
     }
 
@@ -102,14 +95,10 @@ impl Device {
 #[cfg(feature = "gpu")]
 fn find(backend: Backend) -> Result<Device, String> {
     let found = probe::find(backend).map_err(|missing| missing.to_string())?;
-    Ok(match found {
-        None => Device::cpu(),
-        Some(Gpu::Cuda(found)) => Device { kind: Kind::Cuda(found.device), name: found.name },
-        #[cfg(feature = "wgpu")]
-        Some(Gpu::Wgpu(found)) => Device { kind: Kind::Wgpu(found.device), name: found.name },
-        // A program may have given the feature wgpu to nirspi-recon alone.
-        Some(_) => return Err("this build of nirspi-nets is without the feature wgpu".to_owned()),
-    })
+    Ok(found.map_or_else(Device::cpu, |gpu| {
+        let name = gpu.name().to_owned();
+        Device { kind: Kind::Gpu(gpu), name }
+    }))
 }
 
 #[cfg(not(feature = "gpu"))]

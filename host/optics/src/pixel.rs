@@ -166,8 +166,8 @@ impl PixelBudget {
             (chain.amplifier_noise_electrons, chain.shot_variance(light).sqrt());
         let noise = chain.variance_of_mean(light, 1).sqrt();
         let Readout { clocks_per_pattern, blanked, .. } = instrument.readout;
-        let window = clocks_per_pattern.saturating_sub(blanked).max(1);
-        let own = chain.own_share(clocks_per_pattern, blanked);
+        let window = u32::from(clocks_per_pattern.saturating_sub(blanked).max(1));
+        let own = chain.own_share(clocks_per_pattern.into(), blanked.into());
         let settled = own - (1.0 - own) / 2.0;
         let clocks = exposure_us * 1e3 / instrument.budget.sample_ns;
         let samples = clocks * f64::from(window) / f64::from(clocks_per_pattern);

@@ -57,9 +57,9 @@ impl Turns {
         mut open: impl FnMut() -> Result<Box<dyn Link>, ForeignError> + Send + 'static,
     ) -> Result<Self, TurnsError> {
         let model = CameraModel::paper().clone();
-        let (clocks, blanked) =
-            (model.readout.clocks_per_pattern as u16, model.readout.blanked as u16);
-        let setup = MeasurementSetup::new(&Order::CakeCutting, 0.5)?.timed(clocks, blanked);
+        let readout = model.readout;
+        let setup = MeasurementSetup::new(&Order::CakeCutting, 0.5)?
+            .timed(readout.clocks_per_pattern, readout.blanked);
         let connect = move |_: Option<&StagedScene>| {
             let mut session = Session::open(open()?)?;
             session.await_reports()?;

@@ -272,8 +272,7 @@ fn white_counts(optics: &VirtualOptics) -> f64 {
 
 /// Clocks of a pattern, and number of clocks at its start whose samples are excluded.
 fn timing(camera: &CameraModel) -> (u16, u16) {
-    // The ranges were checked when the description was read.
-    (camera.readout.clocks_per_pattern as u16, camera.readout.blanked as u16)
+    (camera.readout.clocks_per_pattern, camera.readout.blanked)
 }
 
 /// Variance of the mean of a slot's samples in `sweeps` sweeps, in counts squared: shot noise of

@@ -120,9 +120,8 @@ impl VirtualOptics {
     /// As [`MeasurementSetup::new`].
     pub fn setup(&self, order: &Order, sampling: f64) -> Result<MeasurementSetup, RowsError> {
         let readout = self.camera.readout;
-        // The ranges were checked when the description was read.
-        let (clocks, blanked) = (readout.clocks_per_pattern as u16, readout.blanked as u16);
-        Ok(MeasurementSetup::new(order, sampling)?.timed(clocks, blanked))
+        let setup = MeasurementSetup::new(order, sampling)?;
+        Ok(setup.timed(readout.clocks_per_pattern, readout.blanked))
     }
 
     /// The same camera in dry air before a white sheet that fills its field, at the lens's focus.

@@ -8,9 +8,10 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use nirspi_gpu::network::Degraded;
+use nirspi_gpu::{Buffer, Kernels};
 use nirspi_recon::omp::gpu::DeviceImages;
 
-use super::engine::{Buffer, Degraded, Engine};
 use super::{Estimator, Fsrcnn, UNet};
 use crate::deblur::SIDE;
 use crate::enhance::KnownEstimate;
@@ -21,7 +22,7 @@ use crate::weights::{Weights, WeightsError};
 
 /// The three networks on one device.
 pub(crate) struct Chain {
-    engine: Arc<dyn Engine>,
+    engine: Arc<dyn Kernels>,
     fsrcnn: Fsrcnn,
     estimator: Estimator,
     unet: UNet,
@@ -33,7 +34,7 @@ impl Chain {
     /// # Errors
     /// [`WeightsError`] if a tensor is missing, of another shape, not finite, unknown, or too wide.
     pub(crate) fn new(
-        engine: &Arc<dyn Engine>,
+        engine: &Arc<dyn Kernels>,
         fsrcnn: &Weights,
         estimator: &Weights,
         bridge: &Weights,
@@ -67,7 +68,7 @@ impl Chain {
         let conditions = on.conditions(&outputs, &bounds, grid);
         let seen = Degraded::Coarse(&readings);
         let sharp = self.unet.forward((frames, SIDE), &start, seen, &conditions, Some(&start));
-        let read = on.read(&[&readings, &outputs, &start, &sharp]);
+        let read = super::read(on, &[&readings, &outputs, &start, &sharp]);
         let [readings, outputs, start, sharp] =
             <[Vec<f32>; 4]>::try_from(read).unwrap_or_else(|_| unreachable!("four were asked for"));
         let estimates = outputs.as_chunks().0.iter();
@@ -86,8 +87,7 @@ impl RunChain for Chain {
         depth: &[f32],
         known: KnownEstimate,
     ) -> Guess {
-        let pixels = images.frames() * images.pixels();
-        let images = Buffer::of(images.handle(), pixels);
+        let images = images.buffer();
         let coarse = self.fsrcnn.at_once(fusion::SIDE).min(self.estimator.at_once(fusion::SIDE));
         let at_once = self.unet.at_once(SIDE).min(coarse);
         let planes = 2 * fusion::SIDE * fusion::SIDE;
@@ -98,7 +98,7 @@ impl RunChain for Chain {
                 [] => &[],
                 _ => &depth[(first - part.start) * planes..][..frames * planes],
             };
-            all.append(self.part(&images, (first, frames), white, depth, known));
+            all.append(self.part(images, (first, frames), white, depth, known));
         }
         all
     }

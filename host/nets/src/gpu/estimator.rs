@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
-use super::engine::{Buffer, Engine, Finish};
-use super::kernels::Activation;
-use super::layer::{Layer, checked};
+use nirspi_gpu::network::plan::frames_at_once;
+use nirspi_gpu::network::{Activation, Finish, Layer};
+use nirspi_gpu::{Buffer, Kernels};
+
+use super::layer::{self, checked};
 use super::pack::Order;
-use super::plan::frames_at_once;
 use super::unet::AT_ONCE;
 use crate::cpu::estimator::{LOG_FLOOR, LOG_OFFSET};
 use crate::filter::Filter;
@@ -19,7 +20,7 @@ const STRIDES: [usize; 4] = [1, 2, 2, 2];
 
 /// The network, with its weights on a device.
 pub(crate) struct Estimator {
-    engine: Arc<dyn Engine>,
+    engine: Arc<dyn Kernels>,
     convs: Vec<Layer>,
     fc1: Layer,
     fc2: Layer,
@@ -30,26 +31,26 @@ impl Estimator {
     ///
     /// # Errors
     /// [`WeightsError`] if a tensor is missing, of another shape, not finite, unknown, or too wide.
-    pub(crate) fn new(engine: &Arc<dyn Engine>, weights: &Weights) -> Result<Self, WeightsError> {
+    pub(crate) fn new(engine: &Arc<dyn Kernels>, weights: &Weights) -> Result<Self, WeightsError> {
         schema::estimator(weights)?;
         let on = engine.as_ref();
         let convs = STRIDES.into_iter().enumerate().map(|(index, stride)| {
             let name = format!("conv{}", index + 1);
             let filter = checked(weights, &name, Filter::convolution(weights, &name)?)?;
-            Ok(Layer::new(on, &filter, (stride, filter.side / 2), None, Order::AsStored))
+            Ok(layer::layer(on, &filter, (stride, filter.side / 2), None, Order::AsStored))
         });
         Ok(Self {
             engine: Arc::clone(engine),
             convs: convs.collect::<Result<_, WeightsError>>()?,
-            fc1: Layer::linear(on, weights, "fc1")?,
-            fc2: Layer::linear(on, weights, "fc2")?,
+            fc1: layer::linear(on, weights, "fc1")?,
+            fc2: layer::linear(on, weights, "fc2")?,
         })
     }
 
     /// Number of images of `side` x `side` that the network processes at once.
     pub(super) fn at_once(&self, side: usize) -> usize {
-        let widest = self.convs.iter().map(|layer| layer.geometry.outputs).max().unwrap_or(0);
-        frames_at_once(widest * side * side, self.engine.buffer_bytes(), AT_ONCE)
+        let widest = self.convs.iter().map(|layer| layer.geometry().outputs).max().unwrap_or(0);
+        frames_at_once(widest * side * side, self.engine.limits().buffer_bytes, AT_ONCE)
     }
 
     /// The two outputs for each of `frames` images of `side` x `side`.
@@ -60,7 +61,7 @@ impl Estimator {
         let (mut h, mut side, mut channels) = (images.clone(), side, 1);
         for conv in &self.convs {
             h = on.convolve(conv, &h, frames, side, relu).out;
-            (side, channels) = (conv.geometry.side(side), conv.geometry.outputs);
+            (side, channels) = (conv.geometry().side(side), conv.geometry().outputs);
         }
         let features = on.pooled(&h, side * side, channels, (LOG_FLOOR, LOG_OFFSET));
         let hidden = on.convolve(&self.fc1, &features, frames, 1, relu).out;
@@ -75,7 +76,7 @@ impl RunEstimator for Estimator {
         let area = side * side;
         let parts = images.chunks(self.at_once(side) * area).map(|part| {
             let out = self.forward((part.len() / area, side), &on.upload(part));
-            on.read(&[&out]).swap_remove(0)
+            super::read(on, &[&out]).swap_remove(0)
         });
         parts.flat_map(|outputs| outputs.as_chunks().0.to_vec()).collect()
     }

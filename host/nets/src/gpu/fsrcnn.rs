@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
-use super::engine::{Buffer, Engine, Finish};
-use super::kernels::{Activation, Add};
-use super::layer::{Layer, checked};
+use nirspi_gpu::network::plan::frames_at_once;
+use nirspi_gpu::network::{Activation, Add, Finish, Layer};
+use nirspi_gpu::{Buffer, Kernels};
+
+use super::layer::{self, checked};
 use super::pack::Order;
-use super::plan::frames_at_once;
 use super::unet::AT_ONCE;
 use crate::filter::Filter;
 use crate::network::RunFsrcnn;
@@ -18,7 +19,7 @@ const CHANNELS: usize = 3;
 
 /// The network, with its weights on a device.
 pub(crate) struct Fsrcnn {
-    engine: Arc<dyn Engine>,
+    engine: Arc<dyn Kernels>,
     /// Convolutions, each followed by PReLU.
     layers: Vec<Layer>,
     /// The transposed convolution, as a convolution followed by a pixel shuffle.
@@ -30,7 +31,7 @@ impl Fsrcnn {
     ///
     /// # Errors
     /// [`WeightsError`] if a tensor is missing, of another shape, not finite, unknown, or too wide.
-    pub(crate) fn new(engine: &Arc<dyn Engine>, weights: &Weights) -> Result<Self, WeightsError> {
+    pub(crate) fn new(engine: &Arc<dyn Kernels>, weights: &Weights) -> Result<Self, WeightsError> {
         let on = engine.as_ref();
         let [_, _, maps] = schema::fsrcnn(weights)?;
         let names = ["feature".to_owned(), "shrink".to_owned()]
@@ -42,18 +43,22 @@ impl Fsrcnn {
             let filter = checked(weights, &name, Filter::convolution(weights, &name)?)?;
             let slopes = weights.tensor(&format!("{act}.weight"), &[filter.outputs])?;
             let reach = (1, filter.side / 2);
-            Ok(Layer::new(on, &filter, reach, Some(&slopes.values), Order::AsStored))
+            Ok(layer::layer(on, &filter, reach, Some(&slopes.values), Order::AsStored))
         });
         let layers = layers.collect::<Result<_, WeightsError>>()?;
         let filter = checked(weights, "deconv", Filter::transposed(weights, "deconv")?)?;
-        let doubling = Layer::new(on, &filter, (1, filter.side / 2), None, Order::Shuffled);
+        let doubling = layer::layer(on, &filter, (1, filter.side / 2), None, Order::Shuffled);
         Ok(Self { engine: Arc::clone(engine), layers, doubling })
     }
 
     /// Number of images of `side` x `side` that the network processes at once.
     pub(super) fn at_once(&self, side: usize) -> usize {
-        let widest = self.layers.iter().map(|layer| layer.geometry.outputs).max().unwrap_or(0);
-        frames_at_once(widest.max(CHANNELS + 1) * side * side, self.engine.buffer_bytes(), AT_ONCE)
+        let widest = self.layers.iter().map(|layer| layer.geometry().outputs).max().unwrap_or(0);
+        frames_at_once(
+            widest.max(CHANNELS + 1) * side * side,
+            self.engine.limits().buffer_bytes,
+            AT_ONCE,
+        )
     }
 
     /// Enlarges `readings` (frames, side, side) to twice the side; `depth` is (frames, 2, side,
@@ -88,6 +93,6 @@ impl RunFsrcnn for Fsrcnn {
             let [readings, depth] = [&readings, &depth].map(|numbers| on.upload(numbers));
             self.forward((images().len(), side), &readings, Some(&depth), false)
         });
-        parts.flat_map(|out| on.read(&[&out]).swap_remove(0)).collect()
+        parts.flat_map(|out| super::read(on, &[&out]).swap_remove(0)).collect()
     }
 }

@@ -4,8 +4,8 @@
 //! input channels, the weights of the whole tile stand side by side. Weights beyond the last input
 //! or output channel are zero.
 
-use super::kernels::DEPTH;
 use crate::filter::Filter;
+use nirspi_gpu::network::plan::DEPTH;
 
 /// The order in which the kernel stores its output channels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

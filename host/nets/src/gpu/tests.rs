@@ -1,13 +1,14 @@
 //! Tests of every kernel against its definition in double precision, on each GPU of this machine
-//! and on software Vulkan. A machine without either prints that the tests are skipped. Buffers are
-//! full of NaN before a kernel writes them, so a test notices each number that the kernel left
+//! and on software Vulkan. A machine without either prints that the tests are skipped. With debug assertions,
+//! buffers are full of NaN before a kernel writes them, so a test notices each number that the kernel left
 //! unwritten.
 
 use std::sync::Arc;
 
-use super::engine::{Buffer, Degraded, Engine, Finish};
-use super::kernels::{Activation, Add};
-use super::layer::Layer;
+use nirspi_gpu::network::{Activation, Add, Degraded, Finish};
+use nirspi_gpu::{Buffer, Kernels};
+
+use super::layer;
 use super::pack::Order;
 use crate::Known;
 use crate::cpu;
@@ -60,7 +61,7 @@ pub(super) fn definition(
     made
 }
 
-fn engines() -> Vec<(Backend, Arc<dyn Engine>)> {
+fn engines() -> Vec<(Backend, Arc<dyn Kernels>)> {
     let open = |backend| match Device::open(backend) {
         Ok(device) => device.engine().map(|engine| (backend, engine)),
         Err(absent) => {
@@ -83,8 +84,8 @@ fn assert_close(ours: &[f32], expected: &[f32], what: &str) {
     }
 }
 
-fn read(engine: &dyn Engine, buffer: &Buffer) -> Vec<f32> {
-    engine.read(&[buffer]).swap_remove(0)
+fn read(engine: &dyn Kernels, buffer: &Buffer) -> Vec<f32> {
+    super::read(engine, &[buffer]).swap_remove(0)
 }
 
 fn silu(x: f32) -> f32 {
@@ -126,9 +127,12 @@ fn every_shape_of_layer_is_its_definition_for_few_and_many_pixels_a_unit() {
                 .collect();
             let input = engine.upload(&images);
             for pixels in [Some(2), Some(8), None] {
-                let mut layer =
-                    Layer::new(engine.as_ref(), &filter, (stride, centre), None, Order::AsStored);
-                layer.pixels = pixels;
+                let on = engine.as_ref();
+                let layer = layer::layer(on, &filter, (stride, centre), None, Order::AsStored);
+                let layer = match pixels {
+                    Some(pixels) => layer.with_pixels(pixels),
+                    None => layer,
+                };
                 let made = engine.convolve(&layer, &input, frames, side, Finish::default());
                 let what =
                     format!("{backend}: {inputs} to {outputs}, {kernel} x {kernel}, {pixels:?}");
@@ -157,7 +161,7 @@ fn activations_are_what_they_are_called() {
     };
     for (backend, engine) in engines() {
         let on = engine.as_ref();
-        let layer = Layer::new(on, &filter, (1, 1), Some(&slopes), Order::AsStored);
+        let layer = layer::layer(on, &filter, (1, 1), Some(&slopes), Order::AsStored);
         let (input, film) = (on.upload(&images), on.upload(&film));
         let expect = |activation, film, of: &dyn Fn(usize, f32) -> f32| {
             let finish = Finish { activation, film, ..Finish::default() };
@@ -205,7 +209,7 @@ fn sums_shuffles_and_clamps_go_where_they_belong() {
         let [input, alike_there, pixel_there] = [&images, &alike, &pixel].map(|v| on.upload(v));
         let make = |finish: Finish<'_>| {
             let order = if finish.shuffle { Order::Shuffled } else { Order::AsStored };
-            let layer = Layer::new(on, &filter, (1, 0), None, order);
+            let layer = layer::layer(on, &filter, (1, 0), None, order);
             on.convolve(&layer, &input, frames, side, finish)
         };
         let added = Finish { add: Some((Add::Alike, &alike_there)), ..Finish::default() };
@@ -354,7 +358,7 @@ fn a_layer_that_is_too_wide_is_refused_by_name() {
     };
     weights.insert("conv.weight".to_owned(), array(&[1, 6000, 3, 3]));
     weights.insert("conv.bias".to_owned(), array(&[1]));
-    let error = Layer::named(engine.as_ref(), &weights, "conv").err().unwrap();
+    let error = layer::named(engine.as_ref(), &weights, "conv").err().unwrap();
     assert_eq!(
         error.to_string(),
         "wide: layer conv has 6000 input channels, expected at most 5920 on a GPU; use the processor (--backend cpu)"

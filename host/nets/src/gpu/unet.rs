@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
-use super::engine::{Buffer, Degraded, Engine, Finish, Made};
-use super::kernels::{Activation, Add};
-use super::layer::{Layer, checked};
+use nirspi_gpu::network::plan::frames_at_once;
+use nirspi_gpu::network::{Activation, Add, Degraded, Finish, Layer, Made};
+use nirspi_gpu::{Buffer, Kernels};
+
+use super::layer::{self, checked};
 use super::pack::Order;
-use super::plan::frames_at_once;
 use crate::filter::Filter;
 use crate::network::{CONDITIONS, Conditions, RunUNet};
 use crate::schema::{self, UNetSizes};
@@ -25,7 +26,7 @@ struct Block {
 
 /// The network, with its weights on a device.
 pub(crate) struct UNet {
-    engine: Arc<dyn Engine>,
+    engine: Arc<dyn Kernels>,
     embed: [Layer; 2],
     /// Scales and shifts of all blocks.
     film: Layer,
@@ -44,7 +45,7 @@ impl UNet {
     ///
     /// # Errors
     /// [`WeightsError`] if a tensor is missing, of another shape, not finite, unknown, or too wide.
-    pub(crate) fn new(engine: &Arc<dyn Engine>, weights: &Weights) -> Result<Self, WeightsError> {
+    pub(crate) fn new(engine: &Arc<dyn Kernels>, weights: &Weights) -> Result<Self, WeightsError> {
         let on = engine.as_ref();
         let UNetSizes { channels, blocks: count, .. } = schema::unet(weights)?;
         let levels = channels.len();
@@ -52,7 +53,7 @@ impl UNet {
         let mut blocks = |side: &str, level: usize| -> Result<Vec<Block>, WeightsError> {
             let block = |j| {
                 let name = format!("{side}.{level}.{j}");
-                let conv = |which: &str| Layer::named(on, weights, &format!("{name}.{which}"));
+                let conv = |which: &str| layer::named(on, weights, &format!("{name}.{which}"));
                 let film = films.push(Filter::linear(weights, &format!("{name}.film"))?);
                 Ok(Block { conv1: conv("conv1")?, conv2: conv("conv2")?, film })
             };
@@ -66,35 +67,35 @@ impl UNet {
         let reduce = |i| {
             let name = format!("reduce.{i}");
             let filter = checked(weights, &name, Filter::convolution(weights, &name)?)?;
-            Ok(Layer::new(on, &filter, (2, 0), None, Order::AsStored))
+            Ok(layer::layer(on, &filter, (2, 0), None, Order::AsStored))
         };
-        let input = Layer::named(on, weights, "input_conv")?;
+        let input = layer::named(on, weights, "input_conv")?;
         Ok(Self {
             engine: Arc::clone(engine),
-            embed: [Layer::linear(on, weights, "embed1")?, Layer::linear(on, weights, "embed2")?],
-            film: Layer::new(
+            embed: [layer::linear(on, weights, "embed1")?, layer::linear(on, weights, "embed2")?],
+            film: layer::layer(
                 on,
                 &checked(weights, "film", films.all)?,
                 (1, 0),
                 None,
                 Order::AsStored,
             ),
-            channels: input.geometry.outputs.max(8),
+            channels: input.geometry().outputs.max(8),
             input,
             encoder,
             reduce: (0..below).map(reduce).collect::<Result<_, _>>()?,
             expand: (0..below)
-                .map(|i| Layer::shuffled(on, weights, &format!("expand.{i}")))
+                .map(|i| layer::shuffled(on, weights, &format!("expand.{i}")))
                 .collect::<Result<_, _>>()?,
             decoder,
-            output: Layer::shuffled(on, weights, "output_conv")?,
+            output: layer::shuffled(on, weights, "output_conv")?,
         })
     }
 
     /// Number of images of `side` x `side` that the network processes at once.
     pub(super) fn at_once(&self, side: usize) -> usize {
         let largest = self.channels * (side / 2) * (side / 2);
-        frames_at_once(largest.max(2 * side * side), self.engine.buffer_bytes(), AT_ONCE)
+        frames_at_once(largest.max(2 * side * side), self.engine.limits().buffer_bytes, AT_ONCE)
     }
 
     /// The network's output for `frames` images of `side` x `side`, given their conditions (frames,
@@ -126,7 +127,7 @@ impl UNet {
             if let Some(reduce) = self.reduce.get(level) {
                 let coarse = on.convolve(reduce, &h.out, frames, side, activated);
                 skips.push((h.out, side));
-                (h, side) = (coarse, reduce.geometry.side(side));
+                (h, side) = (coarse, reduce.geometry().side(side));
             }
         }
         for ((expand, blocks), (skip, fine)) in
@@ -211,6 +212,6 @@ impl RunUNet for UNet {
                 let size = (conditions.len(), side);
                 self.forward(size, &current, Degraded::Fine(&degraded), &told, None)
             });
-        parts.flat_map(|out| on.read(&[&out]).swap_remove(0)).collect()
+        parts.flat_map(|out| super::read(on, &[&out]).swap_remove(0)).collect()
     }
 }

@@ -8,21 +8,28 @@ use super::{Model, Settings, TrainError};
 use crate::device::{Device, Kind};
 use burn::backend::{Autodiff, Flex};
 use burn::tensor::backend::AutodiffBackend;
+#[cfg(all(feature = "gpu", not(test)))]
+use nirspi_gpu::Gpu;
 
 /// The learner of a model on a device, with its initial weights.
 pub(super) fn new(settings: &Settings, device: &Device) -> Result<Box<dyn Learner>, TrainError> {
     match &device.kind {
         Kind::Cpu => on::<Autodiff<Flex>>(settings, Default::default()),
         #[cfg(all(feature = "wgpu", not(test)))]
-        Kind::Wgpu(device) => on::<Autodiff<burn::backend::Wgpu>>(settings, device.clone()),
+        Kind::Gpu(Gpu::Wgpu(gpu)) => {
+            on::<Autodiff<burn::backend::Wgpu>>(settings, gpu.device.clone())
+        }
         #[cfg(all(feature = "gpu", not(test)))]
-        Kind::Cuda(device) => on::<Autodiff<burn::backend::Cuda>>(settings, device.clone()),
-        // Training on GPUs takes minutes to compile, so unit tests train on the CPU.
-        #[cfg(all(feature = "gpu", test))]
-        _ => Err(TrainError::Setting {
+        Kind::Gpu(Gpu::Cuda(gpu)) => {
+            on::<Autodiff<burn::backend::Cuda>>(settings, gpu.device.clone())
+        }
+        // Training on GPUs takes minutes to compile, so unit tests train on the CPU. A program may
+        // have given the feature wgpu to nirspi-gpu alone.
+        #[cfg(feature = "gpu")]
+        Kind::Gpu(_) => Err(TrainError::Setting {
             name: "device",
             found: device.name().to_owned(),
-            expected: "the CPU, in the library's own tests",
+            expected: "a device that this build can train on, such as the CPU",
         }),
     }
 }

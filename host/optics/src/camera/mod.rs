@@ -142,9 +142,9 @@ pub struct Adc {
 #[serde(deny_unknown_fields)]
 pub struct Readout {
     /// ADC clocks of 8 ns for which each pattern is shown.
-    pub clocks_per_pattern: u32,
+    pub clocks_per_pattern: u16,
     /// Samples excluded at the start of each pattern.
-    pub blanked: u32,
+    pub blanked: u16,
     /// Differential sweeps summed into one picture.
     pub sweeps_per_picture: u32,
 }

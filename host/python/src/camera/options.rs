@@ -54,9 +54,8 @@ impl Options<'_> {
             .parse()
             .map_err(|error| refused(format!("sampling is {}, {error}", self.sampling)))?;
         let mut setup = MeasurementSetup::new(&order, sampling.share()).map_err(refusal)?;
-        // The ranges were checked when the description was read.
-        let clocks = self.clocks_per_pattern.unwrap_or(model.readout.clocks_per_pattern as u16);
-        setup = setup.timed(clocks, self.blanked.unwrap_or(model.readout.blanked as u16));
+        let clocks = self.clocks_per_pattern.unwrap_or(model.readout.clocks_per_pattern);
+        setup = setup.timed(clocks, self.blanked.unwrap_or(model.readout.blanked));
         setup.sweeps = self.sweeps;
         setup.differential = self.differential;
         setup.adc_latency = self.adc_latency.unwrap_or(0);

@@ -32,6 +32,25 @@ pub enum BackendError {
     Failed(String),
 }
 
+#[cfg(feature = "gpu")]
+impl From<nirspi_gpu::GpuError> for BackendError {
+    fn from(error: nirspi_gpu::GpuError) -> Self {
+        use nirspi_gpu::GpuError;
+        match error {
+            GpuError::TooLarge { what, needed, limit } => Self::TooLarge { what, needed, limit },
+            GpuError::Failed(why) => Self::Failed(why),
+            other => Self::Failed(other.to_string()),
+        }
+    }
+}
+
+#[cfg(feature = "gpu")]
+impl From<nirspi_gpu::GpuError> for super::OmpError {
+    fn from(error: nirspi_gpu::GpuError) -> Self {
+        BackendError::from(error).into()
+    }
+}
+
 impl BackendError {
     /// Error: this build has no kernels.
     #[must_use]

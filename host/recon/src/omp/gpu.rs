@@ -15,27 +15,15 @@
 //! | [`DeviceFrames`], [`DeviceSolutions`], [`DeviceImages`] | measurements, sparse representations and images that stay on the device |
 //! | [`solve_batch_over`], [`path_over`] | any other [`Dictionary`](super::Dictionary), its Gram matrix uploaded for one call |
 //!
-//! # How
-//! One workgroup pursues one frame, with its projections in registers: four atoms a unit for 1024
-//! atoms. As on the CPU, the columns of the chosen atoms in the Gram matrix are orthogonalised one
-//! by one (a pivoted partial Cholesky factorisation), so a step solves no triangular system. A step
-//! reads the earlier rows once, 4 bytes per atom and row, and writes one row. The rows are in the
-//! device's memory. Shared memory holds three numbers for each unit and one weight for each chosen
-//! atom: 16 KB are enough for 2048 atoms, 32 KB for 4096, so one variant of the kernel serves all
-//! sizes. The number of loop rounds grows with the atoms, and `budget` splits a pursuit into as
-//! many launches as necessary.
+//! The kernels, and how they pursue a frame, are in [`nirspi_gpu::pursuit`].
 //!
 //! Not on the GPU: non-negative coefficients, warm starts, and `f64`.
 
-mod budget;
 mod choice;
 mod device;
 mod dictionary;
-mod engine;
 mod gram;
 mod images;
-mod kernels;
-mod layout;
 
 pub use choice::{Choice, FRAMES_WORTH_A_GPU, choose};
 pub use device::Device;

@@ -1,20 +1,16 @@
 //! The device that computes. [`probe::find`] finds it.
 
-use super::budget::DeviceLimits;
-use super::engine::Engine;
-use crate::backend::probe::{self, Found, Gpu};
+use crate::backend::probe;
 use crate::omp::{Backend, BackendError};
-use cubecl::Runtime;
-use cubecl::cuda::CudaRuntime;
-#[cfg(feature = "wgpu")]
-use cubecl::wgpu::WgpuRuntime;
+use nirspi_gpu::Kernels;
+use nirspi_gpu::limits::DeviceLimits;
 use std::fmt;
 use std::sync::Arc;
 
 /// A device, ready to compute.
 #[derive(Clone)]
 pub struct Device {
-    pub(super) engine: Arc<dyn Engine>,
+    pub(super) engine: Arc<dyn Kernels>,
     name: String,
     backend: Backend,
     software: bool,
@@ -34,16 +30,11 @@ impl Device {
     pub fn open(backend: Backend) -> Result<Option<Self>, BackendError> {
         let found = probe::find(backend)
             .map_err(|missing| BackendError::Absent { why: missing.to_string() })?;
-        Ok(found.map(|gpu| match gpu {
-            Gpu::Cuda(Found { device, name, software }) => {
-                let engine = Arc::new(CudaRuntime::client(&device));
-                Self { engine, name, backend: Backend::Cuda, software }
-            }
-            #[cfg(feature = "wgpu")]
-            Gpu::Wgpu(Found { device, name, software }) => {
-                let engine = Arc::new(WgpuRuntime::client(&device));
-                Self { engine, name, backend: Backend::Wgpu, software }
-            }
+        Ok(found.map(|gpu| Self {
+            engine: nirspi_gpu::open(&gpu),
+            name: gpu.name().to_owned(),
+            backend: probe::backend(&gpu),
+            software: gpu.is_software(),
         }))
     }
 

@@ -12,17 +12,16 @@
 //! [`DeviceSolutions`], [`DeviceImages`]); the networks of `nirspi-nets` read the images there.
 
 use super::device::Device;
-use super::engine::Buffer;
 use super::gram::{DeviceGram, DeviceSolutions, FRAMES_A_THREAD, width};
 use super::images::DeviceImages;
-use super::layout::TOGETHER;
 use crate::omp::dictionary::Atoms;
 use crate::omp::pursuit::energy;
 use crate::omp::{
     BackendError, Dictionary, Limits, MixedDictionary, OmpError, Path, Scalar, Solution, finite,
 };
-use cubecl::prelude::CubeElement;
 use nalgebra::DMatrix;
+use nirspi_gpu::pursuit::layout::TOGETHER;
+use nirspi_gpu::{Buffer, limits};
 use rayon::prelude::*;
 use std::sync::OnceLock;
 
@@ -90,7 +89,7 @@ impl DeviceDictionary {
         let atoms = if normalised {
             let like = (1.0 - f32::DEPENDENT) as f32;
             let marks = engine.read(&[&engine.doubles(&gram, width, like)])?;
-            let doubles = confirmed(&matrix, &atoms, u32::from_bytes(&marks[0]));
+            let doubles = confirmed(&matrix, &atoms, marks[0].words());
             atoms.with_doubles(doubles)
         } else {
             atoms.unnormalised()
@@ -173,7 +172,7 @@ impl DeviceDictionary {
         frames: &DeviceFrames,
     ) -> Result<DeviceSolutions, OmpError> {
         let limit = self.frames_at_once(limits.sparsity)?;
-        super::budget::check("frames at once", frames.energies.len(), limit)?;
+        limits::check("frames at once", frames.energies.len(), limit)?;
         let (engine, width) = (&self.device().engine, self.gram.width());
         let projection = engine.products(&frames.y, &self.matrix, self.measurements, width);
         self.gram.pursue(projection, frames.energies.clone(), self.measurements, limits)

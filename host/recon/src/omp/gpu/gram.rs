@@ -6,16 +6,15 @@
 //! rounding may have decided is flagged
 //! (`omp::tests::gpu::ties_and_ends_that_single_precision_cannot_see_go_to_double`).
 
-use super::budget;
 use super::device::Device;
-use super::engine::{Buffer, Pursuit, Rounding};
-use super::layout::{
-    CLOSEST, COUNT, ENERGY, ENOUGH, LEAD, Progress, REMAINING, STATE, STOP, TOGETHER,
-};
 use crate::omp::dictionary::Atoms;
 use crate::omp::referee::{BELIEVED, BELIEVED_ENERGY};
 use crate::omp::{BackendError, Limits, OmpError, Path, Scalar, Solution, Stop};
-use cubecl::prelude::CubeElement;
+use nirspi_gpu::pursuit::layout::{
+    CLOSEST, COUNT, ENERGY, ENOUGH, LEAD, Progress, REMAINING, STATE, STOP, TOGETHER,
+};
+use nirspi_gpu::pursuit::{Pursuit, Rounding};
+use nirspi_gpu::{Buffer, limits};
 use rayon::prelude::*;
 
 /// Least number of frames that a thread unpacks.
@@ -75,7 +74,7 @@ impl DeviceGram {
     /// [`BackendError`] if one frame does not fit.
     pub(super) fn frames_at_once(&self, sparsity: usize) -> Result<usize, BackendError> {
         let numbers = self.width * self.most(sparsity).max(TOGETHER);
-        self.device.limits().frames(numbers)
+        Ok(self.device.limits().frames(numbers)?)
     }
 
     /// Limit of the atoms of a pursuit: one more than the dictionary has, which shows that no atom
@@ -123,7 +122,7 @@ impl DeviceGram {
         if frames > 0 {
             let rounding = Rounding { score: f32::ROUNDING as f32, pivot: f32::DEPENDENT as f32 };
             let steps = limits.sparsity.min(sparsity);
-            for launch in shape.launches(steps, budget::ROUNDS)? {
+            for launch in shape.launches(steps, limits::ROUNDS)? {
                 engine.pursue(&pursuit, launch, rounding);
             }
             engine.coefficients(&pursuit);
@@ -136,8 +135,7 @@ impl DeviceGram {
     /// The pursuit of one frame, with a solution for every number of atoms.
     pub(super) fn path(&self, solutions: &DeviceSolutions) -> Result<Path<f32>, BackendError> {
         let factor = self.device.engine.factor(&solutions.pursuit);
-        let bytes = self.device.engine.read(&[&factor])?;
-        let mut factor = f32::from_bytes(&bytes[0]).to_vec();
+        let mut factor = self.device.engine.read(&[&factor])?[0].floats().to_vec();
         let Some(found) = self.read(solutions)?.into_iter().next() else {
             return Err(BackendError::Failed("it pursued nothing".to_owned()));
         };
@@ -161,14 +159,14 @@ impl DeviceGram {
         if pursuit.frames == 0 {
             return Ok(Vec::new());
         }
-        let bytes = self.device.engine.read(&[
+        let read = self.device.engine.read(&[
             &pursuit.state,
             &pursuit.support,
             &pursuit.values,
             &pursuit.coefficients,
         ])?;
-        let (state, support) = (f32::from_bytes(&bytes[0]), u32::from_bytes(&bytes[1]));
-        let (values, coefficients) = (f32::from_bytes(&bytes[2]), f32::from_bytes(&bytes[3]));
+        let (state, support) = (read[0].floats(), read[1].words());
+        let (values, coefficients) = (read[2].floats(), read[3].floats());
         let frames =
             (0..pursuit.frames).into_par_iter().with_min_len(FRAMES_A_THREAD).map(|frame| {
                 let chosen = frame * pursuit.sparsity..(frame + 1) * pursuit.sparsity;
@@ -250,7 +248,7 @@ pub(super) fn width(device: &Device, atoms: usize) -> Result<usize, BackendError
     let limits = device.limits();
     let shape = limits.shape(atoms, 1)?;
     let width = shape.width();
-    budget::check("atoms at most", width, budget::ROUNDS)?;
+    limits::check("atoms at most", width, limits::ROUNDS)?;
     limits.fits("bytes of a buffer for the Gram matrix", width.saturating_mul(width))?;
     Ok(width)
 }

@@ -2,11 +2,8 @@
 //! the host.
 
 use super::device::Device;
-use super::engine::Buffer;
 use crate::omp::{OmpError, finite};
-use cubecl::bytes::Bytes;
-use cubecl::prelude::CubeElement;
-use cubecl::server::Handle;
+use nirspi_gpu::{Buffer, Numbers};
 
 /// Images on a device, `frames x pixels`, row-major `f32`.
 #[derive(Debug)]
@@ -20,7 +17,7 @@ pub struct DeviceImages {
 /// Images on the host, `frames x pixels`.
 #[derive(Debug)]
 pub struct HostImages {
-    bytes: Bytes,
+    numbers: Numbers,
     count: usize,
 }
 
@@ -28,7 +25,7 @@ impl std::ops::Deref for HostImages {
     type Target = [f32];
 
     fn deref(&self) -> &[f32] {
-        &f32::from_bytes(&self.bytes)[..self.count]
+        &self.numbers.floats()[..self.count]
     }
 }
 
@@ -56,8 +53,8 @@ impl DeviceImages {
     /// # Errors
     /// [`OmpError`] if the device failed.
     pub fn download(&self) -> Result<HostImages, OmpError> {
-        let bytes = self.device.engine.read(&[&self.buffer])?.swap_remove(0);
-        Ok(HostImages { bytes, count: self.frames * self.pixels })
+        let numbers = self.device.engine.read(&[&self.buffer])?.swap_remove(0);
+        Ok(HostImages { numbers, count: self.frames * self.pixels })
     }
 
     /// The images' device.
@@ -78,10 +75,10 @@ impl DeviceImages {
         self.pixels
     }
 
-    /// The memory in which the images begin, for other code on the same device. CubeCL has one
-    /// client for each device.
+    /// The images' buffer, for other kernels on the same device. It has at least `frames x pixels`
+    /// numbers.
     #[must_use]
-    pub fn handle(&self) -> &Handle {
-        self.buffer.handle()
+    pub fn buffer(&self) -> &Buffer {
+        &self.buffer
     }
 }

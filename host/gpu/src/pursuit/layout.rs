@@ -1,31 +1,31 @@
 //! The layout of a pursuit's numbers in a device's memory, which kernels and host share.
 
 /// Number of vectors whose products one unit computes together.
-pub(super) const TOGETHER: usize = 8;
+pub const TOGETHER: usize = 8;
 
 /// Number of state values of a frame.
-pub(super) const STATE: usize = 8;
+pub const STATE: usize = 8;
 /// Energy of the measurement.
-pub(super) const ENERGY: usize = 0;
+pub const ENERGY: usize = 0;
 /// Energy of the residual at which the pursuit stops.
-pub(super) const ENOUGH: usize = 1;
+pub const ENOUGH: usize = 1;
 /// Energy of the residual.
-pub(super) const REMAINING: usize = 2;
+pub const REMAINING: usize = 2;
 /// The first atom's score.
-pub(super) const FIRST_BEST: usize = 3;
+pub const FIRST_BEST: usize = 3;
 /// Number of atoms in the support.
-pub(super) const COUNT: usize = 4;
+pub const COUNT: usize = 4;
 /// Whether the pursuit goes on: the number of a [`Progress`].
-pub(super) const STOP: usize = 5;
+pub const STOP: usize = 5;
 /// Smallest lead of a chosen atom's score over the next best score.
-pub(super) const LEAD: usize = 6;
+pub const LEAD: usize = 6;
 /// Smallest distance of the residual's energy from the limit, over the steps that checked it.
-pub(super) const CLOSEST: usize = 7;
+pub const CLOSEST: usize = 7;
 
 /// Whether a pursuit goes on, and if not, why. Kernels store it as a number of the state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
-pub(super) enum Progress {
+pub enum Progress {
     /// Looking for the next atom, or the requested number of atoms is reached.
     Looking = 0,
     /// The residual is within the limit.
@@ -37,13 +37,13 @@ pub(super) enum Progress {
 }
 
 /// [`Progress::Looking`] as a number for kernels; new buffers hold it, because it is zero.
-pub(super) const LOOKING: f32 = Progress::Looking.number();
+pub const LOOKING: f32 = Progress::Looking.number();
 /// [`Progress::Explained`] as a number for kernels.
-pub(super) const EXPLAINED: f32 = Progress::Explained.number();
+pub const EXPLAINED: f32 = Progress::Explained.number();
 /// [`Progress::NoAtomLeft`] as a number for kernels.
-pub(super) const NO_ATOM_LEFT: f32 = Progress::NoAtomLeft.number();
+pub const NO_ATOM_LEFT: f32 = Progress::NoAtomLeft.number();
 /// [`Progress::Dependent`] as a number for kernels.
-pub(super) const DEPENDENT: f32 = Progress::Dependent.number();
+pub const DEPENDENT: f32 = Progress::Dependent.number();
 
 impl Progress {
     const ALL: [Self; 4] = [Self::Looking, Self::Explained, Self::NoAtomLeft, Self::Dependent];
@@ -54,7 +54,7 @@ impl Progress {
 
     /// The progress that a kernel wrote. Any unknown number is [`Progress::Dependent`], whose
     /// frames are solved again.
-    pub(super) fn read(number: f32) -> Self {
+    pub fn read(number: f32) -> Self {
         let found = Self::ALL.into_iter().find(|progress| progress.number() == number);
         found.unwrap_or(Self::Dependent)
     }
@@ -62,7 +62,7 @@ impl Progress {
 
 /// Facts about a pursuit that its kernel is compiled for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(super) struct Shape {
+pub struct Shape {
     /// Number of units in the workgroup of a frame; a power of two.
     pub units: usize,
     /// Number of atoms of each unit: `atom = unit + units * i`.
@@ -73,13 +73,13 @@ pub(super) struct Shape {
 
 impl Shape {
     /// Number of atoms with padding: the length of a vector over all atoms.
-    pub(super) fn width(&self) -> usize {
+    pub fn width(&self) -> usize {
         self.units * self.per_unit
     }
 
     /// Bytes of shared memory of a pursuit: three numbers for each unit, the weights, and the
     /// chosen atom's projection.
-    pub(super) fn shared_bytes(&self) -> usize {
+    pub fn shared_bytes(&self) -> usize {
         4 * (3 * self.units + self.capacity + 1)
     }
 }

@@ -8,14 +8,8 @@
 // arguments.
 #![allow(clippy::too_many_arguments)]
 
+use super::plan::{COLUMNS, DEPTH};
 use cubecl::prelude::*;
-
-/// Number of input channels in one step through shared memory. It equals [`COLUMNS`], so a unit
-/// loads the pixels that it computes.
-pub(super) const DEPTH: usize = 8;
-
-/// Number of units side by side in a workgroup; each has other channels.
-pub(super) const COLUMNS: usize = 8;
 
 /// Number of units below each other; each has other pixels.
 pub(super) const ROWS: usize = 32;
@@ -47,7 +41,8 @@ pub(super) struct Shape {
 
 /// The activation of a sum, before anything is added.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(crate) enum Activation {
+pub enum Activation {
+    /// None.
     Nothing,
     /// x / (1 + e^-x).
     Silu,
@@ -61,7 +56,8 @@ pub(crate) enum Activation {
 
 /// What is added after the activation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(crate) enum Add {
+pub enum Add {
+    /// Nothing.
     Nothing,
     /// One number for each output.
     Alike,
@@ -75,7 +71,7 @@ fn silu(x: f32) -> f32 {
 }
 
 /// A convolution: pixels of all frames as rows, channels as columns, one workgroup for a tile of
-/// both. The input is `frame x side x side x inputs`; `pack` makes `weights` and `table`; the
+/// both. The input is `frame x side x side x inputs`; [`super::Layer`] says how `weights` and `table` are packed; the
 /// output is `frame x out_side x out_side x outputs`, or with twice the side after a shuffle.
 #[cube(launch_unchecked)]
 pub(super) fn convolve(

@@ -1,50 +1,88 @@
-//! Launches kernels on one device, for any runtime of CubeCL.
+//! Convolutional networks, for any number of images at once.
 //!
-//! A kernel does not check its indices. So every function here checks the lengths of the buffers
-//! before its launch.
+//! | module | contents |
+//! |---|---|
+//! | [`plan`] | distribution of a convolution to workgroups within a device's limits: pure functions |
+//! | `kernels` | the kernels |
+//!
+//! # How
+//! Activations are `frame x row x column x channel`. Nearly all work is in one kernel, `convolve`:
+//! a convolution as a product of matrices (pixels by taps, and taps by channels), tile by tile
+//! through shared memory. The operations after a convolution (bias, modulation by the conditions,
+//! activation, residual, pixel shuffle) are done in registers before the output is stored. Fully
+//! connected layers are convolutions of 1 x 1 over images of one pixel.
 
-use super::kernels::{self, Activation, Add, ROWS, Shape, UNITS};
-use super::layer::Layer;
-use super::plan::pixels_a_unit;
+mod kernels;
+pub mod plan;
+
+pub use kernels::{Activation, Add};
+
+use crate::Buffer;
+use crate::engine::Engine;
 use cubecl::prelude::*;
-use cubecl::reader::read_sync;
-use cubecl::server::Handle;
+use kernels::{ROWS, Shape, UNITS};
+use plan::{COLUMNS, DEPTH, Geometry, pixels_a_unit};
 
-/// A buffer of four-byte numbers on a device.
-#[derive(Clone, Debug)]
-pub(crate) struct Buffer {
-    handle: Handle,
-    count: usize,
+/// A convolution whose weights are on a device, in the order of its kernel.
+#[derive(Debug)]
+pub struct Layer {
+    geometry: Geometry,
+    /// Number of channels of a unit.
+    channels: usize,
+    pixels: Option<usize>,
+    weights: Buffer,
+    table: Buffer,
 }
 
-impl Buffer {
-    /// A buffer of memory that other kernels of the same device have written, with at least `count`
-    /// numbers.
-    pub(super) fn of(handle: &Handle, count: usize) -> Self {
-        Self { handle: handle.clone(), count }
+impl Layer {
+    /// A convolution. A workgroup computes a tile of [`COLUMNS`] times `channels` output channels.
+    /// For each tile, each tap and each input channel, `weights` has the weights of the whole tile
+    /// side by side; input channels go to the next multiple of [`DEPTH`], output channels to that of
+    /// the tile, and what is added is 0. `table` has the bias of each output channel, then the slope
+    /// of its PReLU.
+    ///
+    /// # Panics
+    /// If the lengths do not fit the geometry.
+    #[must_use]
+    pub fn new(geometry: Geometry, channels: usize, weights: Buffer, table: Buffer) -> Self {
+        let outputs = geometry.outputs.next_multiple_of(COLUMNS * channels);
+        assert!(weights.count() >= outputs * geometry.steps() * DEPTH);
+        assert!(table.count() >= 2 * geometry.outputs);
+        Self { geometry, channels, pixels: None, weights, table }
     }
 
-    #[expect(
-        unsafe_code,
-        reason = "CubeCL trusts the length; it is the one the buffer was made with"
-    )]
-    fn arg<R: Runtime>(&self) -> ArrayArg<R> {
-        // SAFETY: every constructor of a buffer takes the count from what it allocates or uploads,
-        // or from a caller that has allocated the memory.
-        unsafe { ArrayArg::from_raw_parts(self.handle.clone(), self.count) }
+    /// The same layer with this number of pixels for each unit, 2 or 8. Otherwise the number of
+    /// pixels in all decides.
+    #[must_use]
+    pub fn with_pixels(self, pixels: usize) -> Self {
+        Self { pixels: Some(pixels), ..self }
+    }
+
+    /// The sizes of the convolution.
+    #[must_use]
+    pub fn geometry(&self) -> &Geometry {
+        &self.geometry
+    }
+
+    /// Number of channels that a workgroup computes.
+    fn tile(&self) -> usize {
+        COLUMNS * self.channels
     }
 }
 
 /// What is done with the sums of a convolution before they are stored.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Finish<'a> {
+pub struct Finish<'a> {
+    /// The activation.
     pub activation: Activation,
     /// For [`Activation::FilmSilu`]: scales and shifts of all layers, one row for each frame, and
     /// the index of this layer's first scale.
     pub film: Option<(&'a Buffer, usize)>,
+    /// What is added after the activation.
     pub add: Option<(Add, &'a Buffer)>,
     /// Rearrange four channels into one of twice the side.
     pub shuffle: bool,
+    /// Clamp the output to [0, 1].
     pub clamp: bool,
     /// Also store SiLU of the output.
     pub activated: bool,
@@ -64,7 +102,10 @@ impl Default for Finish<'_> {
 }
 
 /// The output of a convolution.
-pub(crate) struct Made {
+#[derive(Debug)]
+pub struct Made {
+    /// The output: `frame x out_side x out_side x outputs`, or with twice the side and a fourth of
+    /// the channels after a shuffle.
     pub out: Buffer,
     /// SiLU of the output, if requested.
     pub activated: Option<Buffer>,
@@ -72,7 +113,7 @@ pub(crate) struct Made {
 
 /// The UNet's input for the degraded image.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum Degraded<'a> {
+pub enum Degraded<'a> {
     /// An image with as many pixels as the current image.
     Fine(&'a Buffer),
     /// An image with one pixel for each block of 2 x 2.
@@ -81,18 +122,11 @@ pub(crate) enum Degraded<'a> {
 
 /// Parameters of the kernel that makes the conditions: two numbers of the bridge's path, then the
 /// minimum and maximum of blur and of noise, on the scale of the networks.
-pub(crate) type Bounds = [f32; 6];
+pub type Bounds = [f32; 6];
 
-/// One device. Calls only queue work; a failed launch appears in [`read`](Self::read).
-pub(crate) trait Engine: Send + Sync {
-    /// Size of the device's largest buffer in bytes.
-    fn buffer_bytes(&self) -> usize;
-    fn upload(&self, numbers: &[f32]) -> Buffer;
-    /// A buffer with undefined numbers; in tests, NaN.
-    fn empty(&self, count: usize) -> Buffer;
-    /// The numbers of each buffer.
-    fn read(&self, buffers: &[&Buffer]) -> Vec<Vec<f32>>;
-    /// See [`kernels::convolve`]; `input` has `frames` images of `side` x `side`.
+/// The kernels of convolutional networks, on one device.
+pub trait Convolve: Engine {
+    /// A convolution of `frames` images of `side` x `side`: `frame x side x side x inputs`.
     fn convolve(
         &self,
         layer: &Layer,
@@ -101,15 +135,21 @@ pub(crate) trait Engine: Send + Sync {
         side: usize,
         finish: Finish<'_>,
     ) -> Made;
-    /// See [`kernels::readings`].
+    /// `count` numbers of `images` from number `first` on, divided by `white` and clamped to
+    /// [0, 1].
     fn readings(&self, images: &Buffer, first: usize, white: f32, count: usize) -> Buffer;
-    /// See [`kernels::stacked`].
+    /// FSRCNN's input: intensity, depth and validity of each pixel side by side. `area` is the
+    /// number of pixels of a frame; `depth`, if there is any, has the two planes of a frame one
+    /// after the other.
     fn stacked(&self, readings: &Buffer, depth: Option<&Buffer>, area: usize) -> Buffer;
-    /// See [`kernels::paired`]; `side` is that of the blocks.
+    /// The UNet's input: blocks of 2 x 2 pixels of `current` (channels 0 to 3) and of `degraded`
+    /// (4 to 7); `side` is the number of blocks in a row.
     fn paired(&self, current: &Buffer, degraded: Degraded<'_>, side: usize) -> Buffer;
-    /// See [`kernels::pooled`].
+    /// ln(mean + floor) + offset of each channel of each frame, for `log`: (floor, offset).
     fn pooled(&self, input: &Buffer, pixels: usize, channels: usize, log: (f32, f32)) -> Buffer;
-    /// See [`kernels::conditions`].
+    /// The UNet's six conditions for each frame from the estimator's two outputs: the path, then
+    /// blur and noise on the scale of the networks, within their bounds, and their squares. `scale`
+    /// converts blur to the grid of the UNet.
     fn conditions(&self, estimates: &Buffer, bounds: &Bounds, scale: f32) -> Buffer;
 }
 
@@ -122,34 +162,7 @@ fn groups(count: usize) -> CubeCount {
     CubeCount::Static(count.div_ceil(UNITS) as u32, 1, 1)
 }
 
-impl<R: Runtime> Engine for ComputeClient<R> {
-    fn buffer_bytes(&self) -> usize {
-        usize::try_from(self.properties().memory.max_page_size).unwrap_or(usize::MAX)
-    }
-
-    fn upload(&self, numbers: &[f32]) -> Buffer {
-        Buffer { handle: self.create_from_slice(f32::as_bytes(numbers)), count: numbers.len() }
-    }
-
-    fn empty(&self, count: usize) -> Buffer {
-        if cfg!(test) {
-            return self.upload(&vec![f32::NAN; count]);
-        }
-        Buffer { handle: ComputeClient::empty(self, count * size_of::<f32>()), count }
-    }
-
-    fn read(&self, buffers: &[&Buffer]) -> Vec<Vec<f32>> {
-        let handles = buffers.iter().map(|buffer| buffer.handle.clone()).collect();
-        match read_sync(self.read_async(handles)) {
-            Ok(all) => all
-                .iter()
-                .zip(buffers)
-                .map(|(bytes, buffer)| f32::from_bytes(bytes)[..buffer.count].to_vec())
-                .collect(),
-            Err(error) => panic!("the GPU stopped: {error}"),
-        }
-    }
-
+impl<R: Runtime> Convolve for ComputeClient<R> {
     #[expect(unsafe_code, reason = "bounds checks would double the loads of the inner loop")]
     fn convolve(
         &self,
@@ -168,18 +181,18 @@ impl<R: Runtime> Engine for ComputeClient<R> {
             None => (Add::Nothing, None),
             Some((add, addend)) => (add, Some(addend)),
         };
-        assert!(geometry.fits() && input.count >= frames * side * side * geometry.inputs);
+        assert!(geometry.fits() && input.count() >= frames * side * side * geometry.inputs);
         assert!(!finish.shuffle || geometry.outputs.is_multiple_of(4));
         match (add, addend) {
-            (Add::Alike, Some(addend)) => assert!(addend.count >= count),
-            (Add::Pixel, Some(addend)) => assert!(addend.count >= pixels),
+            (Add::Alike, Some(addend)) => assert!(addend.count() >= count),
+            (Add::Pixel, Some(addend)) => assert!(addend.count() >= pixels),
             _ => {}
         }
         let (film, film_width, film_first) = match finish.film {
             None => (&layer.table, 0, 0),
             Some((film, first)) => {
-                assert!(film.count.is_multiple_of(frames));
-                let width = film.count / frames;
+                assert!(film.count().is_multiple_of(frames));
+                let width = film.count() / frames;
                 assert!(first + 2 * geometry.outputs <= width);
                 (film, width, first)
             }
@@ -231,7 +244,7 @@ impl<R: Runtime> Engine for ComputeClient<R> {
 
     #[expect(unsafe_code, reason = "the kernel checks its one index itself")]
     fn readings(&self, images: &Buffer, first: usize, white: f32, count: usize) -> Buffer {
-        assert!(images.count >= first + count);
+        assert!(images.count() >= first + count);
         let out = Engine::empty(self, count);
         // SAFETY: indices are below `count`, or `first + count`, by the assert above.
         unsafe {
@@ -251,8 +264,8 @@ impl<R: Runtime> Engine for ComputeClient<R> {
 
     #[expect(unsafe_code, reason = "the kernel checks its one index itself")]
     fn stacked(&self, readings: &Buffer, depth: Option<&Buffer>, area: usize) -> Buffer {
-        assert!(depth.is_none_or(|depth| depth.count >= 2 * readings.count));
-        let count = 3 * readings.count;
+        assert!(depth.is_none_or(|depth| depth.count() >= 2 * readings.count()));
+        let count = 3 * readings.count();
         let out = Engine::empty(self, count);
         // SAFETY: indices are below `count` of the output; a third of it are readings, two thirds
         // depth.
@@ -274,13 +287,13 @@ impl<R: Runtime> Engine for ComputeClient<R> {
 
     #[expect(unsafe_code, reason = "the kernel checks its one index itself")]
     fn paired(&self, current: &Buffer, degraded: Degraded<'_>, side: usize) -> Buffer {
-        assert!(current.count.is_multiple_of(4 * side * side));
+        assert!(current.count().is_multiple_of(4 * side * side));
         let (degraded, coarse) = match degraded {
             Degraded::Fine(degraded) => (degraded, false),
             Degraded::Coarse(degraded) => (degraded, true),
         };
-        assert!(degraded.count >= current.count / if coarse { 4 } else { 1 });
-        let count = 2 * current.count;
+        assert!(degraded.count() >= current.count() / if coarse { 4 } else { 1 });
+        let count = 2 * current.count();
         let out = Engine::empty(self, count);
         // SAFETY: indices are below `count` of the output; half of it are images, an eighth blocks.
         unsafe {
@@ -307,8 +320,8 @@ impl<R: Runtime> Engine for ComputeClient<R> {
         channels: usize,
         (floor, offset): (f32, f32),
     ) -> Buffer {
-        assert!(input.count.is_multiple_of(pixels * channels));
-        let count = input.count / pixels;
+        assert!(input.count().is_multiple_of(pixels * channels));
+        let count = input.count() / pixels;
         let out = Engine::empty(self, count);
         // SAFETY: the input has `pixels` numbers for each number of the output.
         unsafe {
@@ -330,7 +343,7 @@ impl<R: Runtime> Engine for ComputeClient<R> {
 
     #[expect(unsafe_code, reason = "the kernel checks its one index itself")]
     fn conditions(&self, estimates: &Buffer, bounds: &Bounds, scale: f32) -> Buffer {
-        let frames = estimates.count / 2;
+        let frames = estimates.count() / 2;
         let out = Engine::empty(self, 6 * frames);
         let bounds = self.upload(bounds);
         // SAFETY: a frame below `frames` has two estimates and six conditions.

@@ -1,27 +1,8 @@
-//! Limits of a device: shared memory, buffers, and the length of its loops.
-//!
-//! A problem that exceeds a limit is refused before the launch, with the amount needed and the
-//! limit. Software Vulkan ends an invocation's loops after some 65 535 rounds without an error, so
-//! the rounds are counted here, and a longer pursuit is split over several launches.
+//! Distributes pursuits to workgroups and launches within the limits of a device.
 
 use super::layout::{Shape, TOGETHER};
-use crate::omp::BackendError;
-
-/// Limits that a device reports.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct DeviceLimits {
-    /// Largest shared memory of a workgroup, in bytes.
-    pub shared_bytes: usize,
-    /// Largest buffer, in bytes.
-    pub buffer_bytes: usize,
-    /// Largest number of units in a workgroup.
-    pub units: usize,
-    /// Largest number of buffers of a kernel.
-    pub buffers: usize,
-}
-
-/// Largest number of rounds of all loops of one invocation, below the limit of software Vulkan.
-pub(super) const ROUNDS: usize = 60_000;
+use crate::GpuError;
+use crate::limits::{BUFFER_BYTES, DeviceLimits, GROUPS, ROUNDS, check};
 
 /// Largest number of buffers that a kernel here uses.
 const BUFFERS: usize = 7;
@@ -33,20 +14,17 @@ const PER_UNIT: usize = 4;
 /// Fewest and most units of a workgroup: four planes of 16, and the number that every GPU has.
 const UNITS: std::ops::RangeInclusive<usize> = 64..=256;
 
-/// Memory in bytes for the rows of all frames pursued together, if a buffer may be that large.
-const ROWS_BYTES: usize = 1 << 30;
-
 /// Largest number of frames at once: the number of workgroups that every device takes in one
 /// direction.
-const FRAMES: usize = 65_535 / TOGETHER * TOGETHER;
+const FRAMES: usize = GROUPS / TOGETHER * TOGETHER;
 
 impl DeviceLimits {
     /// Distribution of `atoms` atoms to the units of a workgroup, with room for the weights of
     /// `sparsity` atoms.
     ///
     /// # Errors
-    /// [`BackendError`] if the device has too few buffers, or too little shared memory.
-    pub(super) fn shape(&self, atoms: usize, sparsity: usize) -> Result<Shape, BackendError> {
+    /// [`GpuError`] if the device has too few buffers, or too little shared memory.
+    pub fn shape(&self, atoms: usize, sparsity: usize) -> Result<Shape, GpuError> {
         check("buffers of a kernel", BUFFERS, self.buffers)?;
         check("units of a workgroup", *UNITS.start(), self.units)?;
         let most = UNITS.end().min(&self.units);
@@ -59,22 +37,14 @@ impl DeviceLimits {
         Ok(shape)
     }
 
-    /// Checks that a buffer of `count` four-byte numbers fits.
-    ///
-    /// # Errors
-    /// [`BackendError`] if it does not.
-    pub(super) fn fits(&self, what: &'static str, count: usize) -> Result<(), BackendError> {
-        check(what, count.saturating_mul(4), self.buffer_bytes)
-    }
-
     /// Number of frames that can be pursued together if the largest buffer has `numbers` numbers
     /// for each frame.
     ///
     /// # Errors
-    /// [`BackendError`] if not even one frame fits.
-    pub(super) fn frames(&self, numbers: usize) -> Result<usize, BackendError> {
+    /// [`GpuError`] if not even one frame fits.
+    pub fn frames(&self, numbers: usize) -> Result<usize, GpuError> {
         self.fits("bytes of memory for a frame", numbers)?;
-        let within = self.buffer_bytes.min(ROWS_BYTES) / (4 * numbers.max(1));
+        let within = self.buffer_bytes.min(BUFFER_BYTES) / (4 * numbers.max(1));
         Ok(within.clamp(1, FRAMES))
     }
 }
@@ -85,12 +55,12 @@ impl Shape {
     /// fetch the weights. A launch starts with a pass over the atoms chosen before.
     ///
     /// # Errors
-    /// [`BackendError`] if one step takes more rounds than allowed.
-    pub(super) fn launches(
+    /// [`GpuError`] if one step takes more rounds than allowed.
+    pub fn launches(
         &self,
         sparsity: usize,
         rounds: usize,
-    ) -> Result<Vec<(usize, usize)>, BackendError> {
+    ) -> Result<Vec<(usize, usize)>, GpuError> {
         let step = |k: usize| 1 + k + k.div_ceil(self.units);
         let mut launches = Vec::new();
         let mut first = 0;
@@ -116,15 +86,6 @@ pub(super) fn row_launches(rows: usize) -> Vec<(usize, usize)> {
     (0..rows).step_by(ROUNDS).map(|first| (first, rows.min(first + ROUNDS))).collect()
 }
 
-/// # Errors
-/// [`BackendError`] if `needed` is more than `limit`.
-pub(super) fn check(what: &'static str, needed: usize, limit: usize) -> Result<(), BackendError> {
-    if needed > limit {
-        return Err(BackendError::TooLarge { what, needed, limit });
-    }
-    Ok(())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -148,7 +109,7 @@ mod tests {
         let expected = 4 * (3 * 256 + 4096 + 1);
         assert_eq!(
             refused,
-            BackendError::TooLarge {
+            GpuError::TooLarge {
                 what: "bytes of shared memory",
                 needed: expected,
                 limit: 16 << 10
@@ -173,7 +134,7 @@ mod tests {
             assert_eq!(launches.len() > 1, sparsity > 345, "{sparsity}: {launches:?}");
         }
         let shape = Shape { units: 64, per_unit: 4, capacity: 1 };
-        assert!(matches!(shape.launches(40_000, ROUNDS), Err(BackendError::TooLarge { .. })));
+        assert!(matches!(shape.launches(40_000, ROUNDS), Err(GpuError::TooLarge { .. })));
         assert_eq!(row_launches(0), []);
         assert_eq!(row_launches(ROUNDS + 1), [(0, ROUNDS), (ROUNDS, ROUNDS + 1)]);
     }

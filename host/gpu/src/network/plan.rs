@@ -5,10 +5,15 @@
 //! loop after some 65 535 rounds without an error
 //! (`tests::a_convolution_of_too_many_rounds_is_refused`).
 
-use super::kernels::{COLUMNS, DEPTH, ROWS};
+use super::kernels::ROWS;
+use crate::limits::{BUFFER_BYTES, GROUPS, ROUNDS};
 
-/// Largest number of rounds of all loops of one unit.
-const ROUNDS: usize = 60_000;
+/// Number of input channels in one step through shared memory. It equals [`COLUMNS`], so a unit
+/// loads the pixels that it computes.
+pub const DEPTH: usize = 8;
+
+/// Number of units side by side in a workgroup; each has other channels.
+pub const COLUMNS: usize = 8;
 
 /// Possible numbers of channels that one unit computes for each of its pixels.
 const CHANNELS_A_UNIT: [usize; 4] = [8, 6, 4, 2];
@@ -20,19 +25,16 @@ const PIXELS_A_UNIT: [usize; 2] = [8, 2];
 /// Number of pixels times tiles of channels from which units take the larger number of pixels.
 const ENOUGH_PIXELS: usize = 1 << 16;
 
-/// Largest buffer in bytes, where a device allows more.
-const BUFFER_BYTES: usize = 1 << 30;
-
-/// Number of workgroups that every device takes in one direction.
-const GROUPS: usize = 65_535;
-
 /// Sizes of a convolution of square kernels over square images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Geometry {
+pub struct Geometry {
+    /// Number of input channels.
     pub inputs: usize,
+    /// Number of output channels.
     pub outputs: usize,
     /// Side of a kernel.
     pub kernel: usize,
+    /// Distance of two neighbouring outputs in the input.
     pub stride: usize,
     /// The tap, in both directions, that lies on the pixel itself; this many zeros surround the
     /// image.
@@ -41,12 +43,12 @@ pub(crate) struct Geometry {
 
 impl Geometry {
     /// Side of the output for an input of `side` x `side`.
-    pub(super) fn side(&self, side: usize) -> usize {
+    pub fn side(&self, side: usize) -> usize {
         (side + 2 * self.centre - self.kernel) / self.stride + 1
     }
 
     /// Number of steps of [`DEPTH`] input channels.
-    pub(super) fn steps(&self) -> usize {
+    pub fn steps(&self) -> usize {
         self.kernel * self.kernel * self.inputs.div_ceil(DEPTH)
     }
 
@@ -58,34 +60,34 @@ impl Geometry {
 
     /// The most input channels of a convolution whose kernel has this side, so that no unit makes more
     /// than [`ROUNDS`] rounds of loops.
-    pub(super) fn most_inputs(kernel: usize) -> usize {
+    pub fn most_inputs(kernel: usize) -> usize {
         let taps = kernel * kernel;
         (ROUNDS - kernel - taps) / (taps * (1 + DEPTH)) * DEPTH
     }
 
     /// Whether a unit stays within the rounds.
-    pub(super) fn fits(&self) -> bool {
+    pub(crate) fn fits(&self) -> bool {
         self.rounds() <= ROUNDS
     }
 }
 
 /// Number of channels of one unit. The tiles of `outputs` channels then waste least; of equal
 /// choices the widest wins.
-pub(super) fn channels_a_unit(outputs: usize) -> usize {
+pub fn channels_a_unit(outputs: usize) -> usize {
     let padded = |channels: usize| outputs.next_multiple_of(COLUMNS * channels);
     let best = CHANNELS_A_UNIT.into_iter().min_by_key(|&channels| padded(channels));
     best.unwrap_or(CHANNELS_A_UNIT[0])
 }
 
 /// Number of pixels of one unit, for `pixels` in all and `tiles` tiles of channels.
-pub(super) fn pixels_a_unit(pixels: usize, tiles: usize) -> usize {
+pub(crate) fn pixels_a_unit(pixels: usize, tiles: usize) -> usize {
     let [many, few] = PIXELS_A_UNIT;
     if pixels * tiles >= ENOUGH_PIXELS || pixels > GROUPS * ROWS * few { many } else { few }
 }
 
 /// Number of frames that a network processes at once, if the largest activation of a frame has
 /// `numbers` numbers and a buffer `buffer_bytes`: at least one, at most `most`.
-pub(super) fn frames_at_once(numbers: usize, buffer_bytes: usize, most: usize) -> usize {
+pub fn frames_at_once(numbers: usize, buffer_bytes: usize, most: usize) -> usize {
     let bytes = buffer_bytes.min(BUFFER_BYTES);
     (bytes / (size_of::<f32>() * numbers.max(1))).clamp(1, most)
 }

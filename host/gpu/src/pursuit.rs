@@ -1,54 +1,56 @@
-//! Launches the kernels on one device, for any runtime of CubeCL.
+//! Orthogonal matching pursuit of many frames at once.
 //!
-//! A kernel does not check its indices. So every function here checks the lengths of the buffers
-//! before its launch.
+//! | module | contents |
+//! |---|---|
+//! | [`layout`] | the order of a pursuit's numbers in memory, which kernels and host share |
+//! | `budget` | distribution of a pursuit to workgroups and launches within a device's limits |
+//! | `kernels` | the kernels |
+//!
+//! # How
+//! One workgroup pursues one frame, with its projections in registers: four atoms a unit for 1024
+//! atoms. As on the CPU, the columns of the chosen atoms in the Gram matrix are orthogonalised one
+//! by one (a pivoted partial Cholesky factorisation), so a step solves no triangular system. A step
+//! reads the earlier rows once, 4 bytes per atom and row, and writes one row. The rows are in the
+//! device's memory. Shared memory holds three numbers for each unit and one weight for each chosen
+//! atom: 16 KB are enough for 2048 atoms, 32 KB for 4096, so one variant of the kernel serves all
+//! sizes. The number of loop rounds grows with the atoms, and `budget` splits a pursuit into as
+//! many launches as necessary.
 
-use super::budget::{DeviceLimits, ROUNDS, row_launches};
-use super::kernels;
-use super::layout::{STATE, Shape, TOGETHER};
-use crate::omp::BackendError;
+mod budget;
+mod kernels;
+pub mod layout;
+
+use crate::Buffer;
+use crate::engine::Engine;
+use crate::limits::ROUNDS;
+use budget::row_launches;
 use cubecl::prelude::*;
-use cubecl::reader::read_sync;
-use cubecl::server::Handle;
-
-/// A buffer of four-byte numbers on a device.
-#[derive(Clone, Debug)]
-pub(super) struct Buffer {
-    handle: Handle,
-    count: usize,
-}
-
-impl Buffer {
-    pub(super) fn handle(&self) -> &Handle {
-        &self.handle
-    }
-
-    #[expect(
-        unsafe_code,
-        reason = "CubeCL trusts the length; it is the one the buffer was made with"
-    )]
-    fn arg<R: Runtime>(&self) -> ArrayArg<R> {
-        // SAFETY: every constructor of a buffer takes the count from what it allocates or uploads.
-        unsafe { ArrayArg::from_raw_parts(self.handle.clone(), self.count) }
-    }
-}
+use layout::{STATE, Shape, TOGETHER};
 
 /// The buffers of a batch of pursuits.
 #[derive(Clone, Debug)]
-pub(super) struct Pursuit {
+pub struct Pursuit {
+    /// The distribution of atoms to units.
     pub shape: Shape,
+    /// Number of frames.
     pub frames: usize,
     /// Largest number of atoms of a frame.
     pub sparsity: usize,
+    /// The Gram matrix, `width x width`.
     pub gram: Buffer,
     /// One over each norm, followed by each squared norm.
     pub atoms: Buffer,
+    /// The measurements' inner products with the atoms, `frames x width`; overwritten.
     pub projection: Buffer,
+    /// Orthogonalised columns of the chosen atoms, `frames x sparsity x width`.
     pub rows: Buffer,
+    /// The chosen atoms, `frames x sparsity`, as `u32`.
     pub support: Buffer,
     /// For each atom of the support, a step and one over the root of its pivot.
     pub values: Buffer,
+    /// The state of each frame ([`layout`]).
     pub state: Buffer,
+    /// The coefficients of the chosen atoms, `frames x sparsity`.
     pub coefficients: Buffer,
 }
 
@@ -59,48 +61,45 @@ impl Pursuit {
 
     fn is_whole(&self) -> bool {
         let (width, chosen) = (self.width(), self.frames * self.sparsity);
-        self.gram.count == width * width
-            && self.atoms.count == 2 * width
-            && self.projection.count >= self.frames * width
-            && self.rows.count >= chosen * width
-            && self.support.count >= chosen
-            && self.values.count >= 2 * chosen
-            && self.state.count >= self.frames * STATE
-            && self.coefficients.count >= chosen
+        self.gram.count() == width * width
+            && self.atoms.count() == 2 * width
+            && self.projection.count() >= self.frames * width
+            && self.rows.count() >= chosen * width
+            && self.support.count() >= chosen
+            && self.values.count() >= 2 * chosen
+            && self.state.count() >= self.frames * STATE
+            && self.coefficients.count() >= chosen
             && self.sparsity <= self.shape.capacity
     }
 }
 
-/// Scores and pivots below these shares count as zero. The thresholds are the CPU's,
+/// Scores and pivots below these shares count as zero. `nirspi-recon` takes those of the processor,
 /// `Scalar::ROUNDING` and `Scalar::DEPENDENT`.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Rounding {
+pub struct Rounding {
+    /// The share for scores, of the first atom's score.
     pub score: f32,
+    /// The share for pivots, of the atom's squared norm.
     pub pivot: f32,
 }
 
-/// One device. Calls only queue work; errors appear in [`read`](Self::read).
-pub(super) trait Engine: Send + Sync {
-    fn limits(&self) -> DeviceLimits;
-    fn upload(&self, numbers: &[f32]) -> Buffer;
-    /// A buffer with undefined numbers; at least one.
-    fn empty(&self, count: usize) -> Buffer;
-    /// The bytes of each buffer.
-    fn read(&self, buffers: &[&Buffer]) -> Result<Vec<cubecl::bytes::Bytes>, BackendError>;
-    /// `vectors * matrix`, see [`kernels::products`]. A vector has `rows` numbers; `width`, the
-    /// number of columns, is a multiple of 64.
+/// The kernels of orthogonal matching pursuit, on one device.
+pub trait Pursue: Engine {
+    /// `vectors * matrix`. A vector has `rows` numbers, and the number of vectors is a multiple of
+    /// [`TOGETHER`]; `width`, the number of columns, is a multiple of 64.
     fn products(&self, vectors: &Buffer, matrix: &Buffer, rows: usize, width: usize) -> Buffer;
-    /// A mark for each atom, see [`kernels::doubles`].
+    /// A 1 (`u32`) for each atom that is parallel to a lower one: the square of their cosine is at
+    /// least `like`. 0 for the others.
     fn doubles(&self, gram: &Buffer, width: usize, like: f32) -> Buffer;
-    /// Steps `first..last` of the pursuits, see [`kernels::pursue`].
+    /// Steps `first..last` of the pursuits.
     fn pursue(&self, pursuit: &Pursuit, steps: (usize, usize), rounding: Rounding);
-    /// See [`kernels::coefficients`].
+    /// Computes the coefficients of each support.
     fn coefficients(&self, pursuit: &Pursuit);
-    /// See [`kernels::factor`].
+    /// The Cholesky factor of each support, row after row of its lower triangle.
     fn factor(&self, pursuit: &Pursuit) -> Buffer;
-    /// See [`kernels::images`]; `pictures` are `atoms x pixels`.
+    /// Images, `frames x pixels`: each atom's picture (`atoms x pixels`) times its coefficient.
     fn images(&self, pursuit: &Pursuit, pictures: &Buffer, pixels: usize) -> Buffer;
-    /// See [`kernels::scatter`].
+    /// Each coefficient at the place of its atom, 0 elsewhere: `frames x atoms`.
     fn scatter(&self, pursuit: &Pursuit, atoms: usize) -> Buffer;
 }
 
@@ -115,41 +114,12 @@ fn units(count: usize) -> CubeDim {
     CubeDim::new_1d(count as u32)
 }
 
-impl<R: Runtime> Engine for ComputeClient<R> {
-    fn limits(&self) -> DeviceLimits {
-        let properties = self.properties();
-        let hardware = &properties.hardware;
-        DeviceLimits {
-            shared_bytes: hardware.max_shared_memory_size,
-            buffer_bytes: usize::try_from(properties.memory.max_page_size).unwrap_or(usize::MAX),
-            units: hardware.max_units_per_cube.min(hardware.max_cube_dim.0) as usize,
-            buffers: hardware.max_bindings as usize,
-        }
-    }
-
-    fn upload(&self, numbers: &[f32]) -> Buffer {
-        Buffer { handle: self.create_from_slice(f32::as_bytes(numbers)), count: numbers.len() }
-    }
-
-    fn empty(&self, count: usize) -> Buffer {
-        let count = count.max(1);
-        Buffer { handle: ComputeClient::empty(self, count * size_of::<f32>()), count }
-    }
-
-    fn read(&self, buffers: &[&Buffer]) -> Result<Vec<cubecl::bytes::Bytes>, BackendError> {
-        let handles = buffers.iter().map(|buffer| buffer.handle.clone()).collect();
-        read_sync(self.read_async(handles)).map_err(|error| {
-            // The second line of the message has the cause; a backtrace follows.
-            let text = error.to_string();
-            BackendError::Failed(text.lines().take(3).map(str::trim).collect::<Vec<_>>().join(" "))
-        })
-    }
-
+impl<R: Runtime> Pursue for ComputeClient<R> {
     #[expect(unsafe_code, reason = "bounds checks would double the loads of the inner loop")]
     fn products(&self, vectors: &Buffer, matrix: &Buffer, rows: usize, width: usize) -> Buffer {
-        let count = vectors.count / rows;
+        let count = vectors.count() / rows;
         assert!(count.is_multiple_of(TOGETHER) && width.is_multiple_of(UNITS));
-        assert_eq!(matrix.count, rows * width);
+        assert_eq!(matrix.count(), rows * width);
         let out = Engine::empty(self, count * width);
         for (first, last) in row_launches(rows) {
             // SAFETY: vectors are below `count`, rows below `rows` and columns below `width`, by
@@ -173,7 +143,7 @@ impl<R: Runtime> Engine for ComputeClient<R> {
     }
 
     fn doubles(&self, gram: &Buffer, width: usize, like: f32) -> Buffer {
-        assert_eq!(gram.count, width * width);
+        assert_eq!(gram.count(), width * width);
         assert!(width <= ROUNDS);
         let out = Engine::empty(self, width);
         let (gram, marks) = (gram.arg(), out.arg());

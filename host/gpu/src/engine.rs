@@ -1,0 +1,153 @@
+//! Buffers on a device, and what every engine does with them.
+
+use crate::Gpu;
+use crate::limits::DeviceLimits;
+use crate::network::Convolve;
+use crate::pursuit::Pursue;
+use cubecl::bytes::Bytes;
+use cubecl::cuda::CudaRuntime;
+use cubecl::prelude::*;
+use cubecl::reader::read_sync;
+use cubecl::server::Handle;
+#[cfg(feature = "wgpu")]
+use cubecl::wgpu::WgpuRuntime;
+use std::fmt;
+use std::sync::Arc;
+use thiserror::Error;
+
+/// Why a device cannot compute. `Display` is one line.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum GpuError {
+    /// The problem exceeds a limit of the device.
+    #[error("the GPU has {limit} {what}, this problem needs {needed}")]
+    TooLarge {
+        /// What the device has too little of, with its unit.
+        what: &'static str,
+        /// How much the problem needs.
+        needed: usize,
+        /// How much the device has.
+        limit: usize,
+    },
+    /// The device or its driver failed.
+    #[error("the GPU failed: {0}")]
+    Failed(String),
+}
+
+/// A buffer of four-byte numbers on a device.
+#[derive(Clone, Debug)]
+pub struct Buffer {
+    handle: Handle,
+    count: usize,
+}
+
+impl Buffer {
+    /// Number of four-byte numbers.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    #[expect(
+        unsafe_code,
+        reason = "CubeCL trusts the length; it is the one the buffer was made with"
+    )]
+    pub(crate) fn arg<R: Runtime>(&self) -> ArrayArg<R> {
+        // SAFETY: every constructor of a buffer takes the count from what it allocates or uploads.
+        unsafe { ArrayArg::from_raw_parts(self.handle.clone(), self.count) }
+    }
+}
+
+/// Numbers that were read from a device, in the memory into which the driver copied them.
+pub struct Numbers {
+    bytes: Bytes,
+    count: usize,
+}
+
+impl fmt::Debug for Numbers {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Numbers({})", self.count)
+    }
+}
+
+impl Numbers {
+    /// The numbers as `f32`.
+    #[must_use]
+    pub fn floats(&self) -> &[f32] {
+        &f32::from_bytes(&self.bytes)[..self.count]
+    }
+
+    /// The numbers as `u32`.
+    #[must_use]
+    pub fn words(&self) -> &[u32] {
+        &u32::from_bytes(&self.bytes)[..self.count]
+    }
+}
+
+/// One device. Calls only queue work; a failed launch appears in [`read`](Self::read).
+pub trait Engine: Send + Sync {
+    /// The limits of the device.
+    fn limits(&self) -> DeviceLimits;
+    /// A buffer with these numbers.
+    fn upload(&self, numbers: &[f32]) -> Buffer;
+    /// A buffer of `count` undefined numbers, at least one. With debug assertions they are NaN, so
+    /// that tests see each number that a kernel leaves unwritten.
+    fn empty(&self, count: usize) -> Buffer;
+    /// The numbers of each buffer.
+    ///
+    /// # Errors
+    /// [`GpuError::Failed`] if the device, its driver, or an earlier launch failed.
+    fn read(&self, buffers: &[&Buffer]) -> Result<Vec<Numbers>, GpuError>;
+}
+
+/// Every kernel of this crate.
+pub trait Kernels: Pursue + Convolve {}
+
+impl<E: Pursue + Convolve> Kernels for E {}
+
+/// The engine of a device. CubeCL has one client for each device, so buffers of one engine can be
+/// used with every other engine of the same device.
+#[must_use]
+pub fn open(gpu: &Gpu) -> Arc<dyn Kernels> {
+    match gpu {
+        Gpu::Cuda(found) => Arc::new(CudaRuntime::client(&found.device)),
+        #[cfg(feature = "wgpu")]
+        Gpu::Wgpu(found) => Arc::new(WgpuRuntime::client(&found.device)),
+    }
+}
+
+impl<R: Runtime> Engine for ComputeClient<R> {
+    fn limits(&self) -> DeviceLimits {
+        let properties = self.properties();
+        let hardware = &properties.hardware;
+        DeviceLimits {
+            shared_bytes: hardware.max_shared_memory_size,
+            buffer_bytes: usize::try_from(properties.memory.max_page_size).unwrap_or(usize::MAX),
+            units: hardware.max_units_per_cube.min(hardware.max_cube_dim.0) as usize,
+            buffers: hardware.max_bindings as usize,
+        }
+    }
+
+    fn upload(&self, numbers: &[f32]) -> Buffer {
+        Buffer { handle: self.create_from_slice(f32::as_bytes(numbers)), count: numbers.len() }
+    }
+
+    fn empty(&self, count: usize) -> Buffer {
+        let count = count.max(1);
+        if cfg!(debug_assertions) {
+            return self.upload(&vec![f32::NAN; count]);
+        }
+        Buffer { handle: ComputeClient::empty(self, count * size_of::<f32>()), count }
+    }
+
+    fn read(&self, buffers: &[&Buffer]) -> Result<Vec<Numbers>, GpuError> {
+        let handles = buffers.iter().map(|buffer| buffer.handle.clone()).collect();
+        let all = read_sync(self.read_async(handles)).map_err(|error| {
+            // The second line of the message has the cause; a backtrace follows.
+            let text = error.to_string();
+            GpuError::Failed(text.lines().take(3).map(str::trim).collect::<Vec<_>>().join(" "))
+        })?;
+        let counts = buffers.iter().map(|buffer| buffer.count);
+        Ok(all.into_iter().zip(counts).map(|(bytes, count)| Numbers { bytes, count }).collect())
+    }
+}

@@ -1,0 +1,26 @@
+//! The GPU kernels of nirspi: one source for CUDA, Vulkan, Metal and DirectX, through CubeCL.
+//!
+//! | module | contents |
+//! |---|---|
+//! | [`probe`] | finds GPUs |
+//! | `engine` | [`Buffer`]s, [`open`], and what any engine does: upload, read, say its limits |
+//! | [`limits`] | the limits of a device |
+//! | [`pursuit`] | orthogonal matching pursuit of many frames, for `nirspi-recon` |
+//! | [`network`] | convolutional networks, for `nirspi-nets` |
+//!
+//! This crate alone uses CubeCL, for two reasons. Generic code of CubeCL's runtimes is compiled
+//! once, where each crate that launches a kernel would compile its own copy. And all launches, with
+//! their `unsafe` code, are in two files.
+//!
+//! # Invariant
+//! A kernel does not check its indices. Each function that launches one checks the lengths of the
+//! buffers first, and panics if the caller gave other lengths than it promises.
+
+mod engine;
+pub mod limits;
+pub mod network;
+pub mod probe;
+pub mod pursuit;
+
+pub use engine::{Buffer, Engine, GpuError, Kernels, Numbers, open};
+pub use probe::Gpu;
