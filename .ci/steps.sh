@@ -39,6 +39,7 @@ by_name=(
     "licences        licences, sources and bans of all dependencies; crates.io"
     "flash           probe-rs knows every board's chip"
     "mutants         deliberate faults in the Rust code are seen: in lines changed since main, or in MUTANTS='CRATE...'; crates.io"
+    "crowd           nirspi serve among 1000 clients that misbehave, for CROWD_S seconds (600)"
     "zenoh           a camera over Zenoh: router, camera and host as processes; crates.io, 219 crates of which 95 are its own"
     "publish         each library crate builds from its package alone; crates.io"
     "licence-texts   the licences of all dependencies in one page; crates.io"
@@ -384,6 +385,11 @@ step_mutants() {
     mkdir -p target/mutants
     # Dependencies stay from one fault to the next, and for the next time.
     CARGO_TARGET_DIR=$PWD/target/mutants/build cargo mutants "${chosen[@]}" --output target/mutants -- --lib --bins --tests
+}
+
+step_crowd() {
+    cargo build --locked --release
+    python3 host/scripts/serve_soak.py "${CARGO_TARGET_DIR:-target}/release/nirspi" --seconds "${CROWD_S:-600}"
 }
 
 step_verilator() { bash hdl/verilator/run.sh; }

@@ -1,8 +1,8 @@
-//! Which answer belongs to which command, and what is left of a session that does not begin.
+//! Which answer belongs to which command, when a run is over, and what is left of a session that does not begin.
 
 #![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
 
-use nirspi::capture::{Calibration, CaptureOptions, capture};
+use nirspi::capture::{Calibration, Capture, CaptureError, CaptureOptions, capture};
 use nirspi::link::{Link, Received};
 use nirspi::recording::Target;
 use nirspi::replay::ReplayLink;
@@ -11,11 +11,12 @@ use nirspi::setup::MeasurementSetup;
 use nirspi_recon::Order;
 use nirspi_wire::packet::MAX_DEVICE_PACKET;
 use nirspi_wire::{
-    Answer, Capabilities, Command, Configuration, DeviceMessage, Identity, Refusal, Reply, Request,
-    RunLength, State, Status, Tail, Version, encode, open, version,
+    Answer, Capabilities, Command, Configuration, DeviceMessage, Event, EventKind, Frame,
+    FrameFlags, Identity, Refusal, Reply, Request, RunLength, Samples, State, Status, Tail,
+    Version, encode, open, version,
 };
 use std::io;
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -69,65 +70,200 @@ fn the_late_answer_to_an_earlier_command_is_not_taken_for_that_of_this_one() {
     session.command(request::Stop, &mut IgnorePackets).unwrap();
 }
 
-/// A camera that does everything but start.
-#[derive(Default)]
-struct NeverStarts(Vec<u8>);
+/// The state of a camera after so many frames of a run.
+fn status(state: State, run: u16, frames_made: u32) -> Answer<'static> {
+    Answer::Status(Status {
+        state,
+        fault: None,
+        uptime_us: 0,
+        run,
+        frames_made,
+        frames_sent: frames_made,
+        frames_dropped: 0,
+        fpga_frames_lost: 0,
+        fpga_frames_corrupt: 0,
+        commands_damaged: 0,
+        temperature_centi_celsius: 2500,
+        duty_permille: 500,
+        leds_on: state == State::Running,
+        interlock_closed: true,
+        signal: Tail(None),
+    })
+}
 
-impl Link for NeverStarts {
+/// What a camera has sent and the host has not read.
+#[derive(Default)]
+struct Waiting(Vec<u8>);
+
+impl Waiting {
+    fn message(&mut self, message: &DeviceMessage<'_>) {
+        self.0.extend(encode(message, &mut [0; MAX_DEVICE_PACKET]).unwrap());
+    }
+
+    fn reply(&mut self, id: u16, outcome: Result<Answer<'_>, Refusal>) {
+        self.message(&DeviceMessage::Reply(Reply { id, outcome }));
+    }
+
+    /// Frames of one pattern of run 1.
+    fn frames(&mut self, sequences: Range<u32>) {
+        for sequence in sequences {
+            self.message(&DeviceMessage::Frame(Frame {
+                run: 1,
+                sequence,
+                device_time_us: 100 * u64::from(sequence),
+                sweeps: 1,
+                flags: FrameFlags::DIFFERENTIAL,
+                samples: Samples::pack([5].into_iter(), &mut [0; 4]).unwrap(),
+            }));
+        }
+    }
+
+    fn ended(&mut self, frames_made: u32) {
+        let kind = EventKind::RunEnded {
+            run: 1,
+            frames_made,
+            frames_dropped: 0,
+            fpga_frames_lost: 0,
+            fpga_frames_corrupt: 0,
+        };
+        self.message(&DeviceMessage::Event(Event { device_time_us: 0, kind }));
+    }
+}
+
+/// A camera that greets and takes a configuration, and does with the commands of a run what a test says.
+struct Scripted<F> {
+    waiting: Waiting,
+    starts: bool,
+    run: F,
+}
+
+impl<F: FnMut(u16, Command<'_>, &mut Waiting)> Scripted<F> {
+    fn new(run: F) -> Self {
+        Self { waiting: Waiting::default(), starts: false, run }
+    }
+}
+
+impl<F: FnMut(u16, Command<'_>, &mut Waiting) + Send> Link for Scripted<F> {
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
         // The first byte of a session ends what another host has left.
         let mut packet = bytes.strip_suffix(&[0]).unwrap_or(bytes).to_vec();
         let Ok(Request { id, command }) = open(&mut packet) else { return Ok(()) };
-        let state = State::Configured;
-        let status = Status {
-            state,
-            fault: None,
-            uptime_us: 0,
-            run: 0,
-            frames_made: 0,
-            frames_sent: 0,
-            frames_dropped: 0,
-            fpga_frames_lost: 0,
-            fpga_frames_corrupt: 0,
-            commands_damaged: 0,
-            temperature_centi_celsius: 2500,
-            duty_permille: 500,
-            leds_on: false,
-            interlock_closed: true,
-            signal: Tail(None),
-        };
-        let outcome = match command {
-            Command::Hello { .. } => Ok(Answer::Hello(IDENTITY)),
-            Command::Status => Ok(Answer::Status(status)),
-            Command::Start(_) => Err(Refusal::State(state)),
-            _ => Ok(Answer::Done),
-        };
-        let reply = DeviceMessage::Reply(Reply { id, outcome });
-        self.0.extend(encode(&reply, &mut [0; MAX_DEVICE_PACKET]).map_err(io::Error::other)?);
+        self.starts |= matches!(command, Command::Start(_));
+        match command {
+            _ if self.starts => (self.run)(id, command, &mut self.waiting),
+            Command::Hello { .. } => self.waiting.reply(id, Ok(Answer::Hello(IDENTITY))),
+            Command::Status => self.waiting.reply(id, Ok(status(State::Configured, 0, 0))),
+            _ => self.waiting.reply(id, Ok(Answer::Done)),
+        }
         Ok(())
     }
 
-    fn receive(&mut self, buffer: &mut [u8], _: Duration) -> io::Result<Received> {
-        let waiting = std::mem::take(&mut self.0);
+    fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<Received> {
+        let waiting = std::mem::take(&mut self.waiting.0);
         buffer[..waiting.len()].copy_from_slice(&waiting);
-        Ok(if waiting.is_empty() { Received::Nothing } else { Received::Bytes(waiting.len()) })
+        if waiting.is_empty() {
+            std::thread::sleep(timeout);
+            return Ok(Received::Nothing);
+        }
+        Ok(Received::Bytes(waiting.len()))
     }
+}
+
+/// Captures so many frames of one pattern.
+fn capture_of(
+    camera: impl Link + 'static,
+    frames: u32,
+    record: Option<Target>,
+) -> Result<Capture, CaptureError> {
+    let mut session = Session::open(Box::new(camera)).unwrap();
+    let options = CaptureOptions {
+        setup: MeasurementSetup::new(&Order::Natural, 0.001).unwrap(),
+        frames: Some(frames),
+        calibration: Calibration::None,
+        record,
+    };
+    capture(&mut session, &options, &mut |_| ControlFlow::Continue(()))
 }
 
 /// An empty file would take the name of the capture that works the next time.
 #[test]
 fn a_run_that_the_camera_does_not_start_leaves_no_recording() {
     let folder = tempfile::tempdir().unwrap();
-    let mut session = Session::open(Box::new(NeverStarts::default())).unwrap();
-    let options = CaptureOptions {
-        setup: MeasurementSetup::new(&Order::Natural, 1.0).unwrap(),
-        frames: Some(1),
-        calibration: Calibration::None,
-        record: Some(Target::New(folder.path().join("rec.mcap"))),
-    };
-    let captured = capture(&mut session, &options, &mut |_| ControlFlow::Continue(()));
-    assert!(captured.is_err());
+    let camera = Scripted::new(|id, _, host: &mut Waiting| {
+        host.reply(id, Err(Refusal::State(State::Configured)));
+    });
+    let record = Target::New(folder.path().join("rec.mcap"));
+    assert!(capture_of(camera, 1, Some(record)).is_err());
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
+/// Frames, and a report of how many there are, of which one number is not the number asked for.
+#[test]
+fn a_run_is_complete_if_the_frames_and_the_cameras_report_are_both_as_many_as_asked_for() {
+    for (sent, reported, words) in [
+        (5, 5, None),
+        (6, 5, Some("the camera made 6 frames, 5 were asked for")),
+        (5, 4, Some("the camera made 4 frames, 5 were asked for")),
+        (5, 6, Some("1 lost")),
+    ] {
+        let camera = Scripted::new(move |id, command, host: &mut Waiting| match command {
+            Command::Start(_) => {
+                host.reply(id, Ok(Answer::Done));
+                host.frames(0..sent);
+                host.ended(reported);
+            }
+            _ => host.reply(id, Ok(status(State::Configured, 1, reported))),
+        });
+        let missing = capture_of(camera, 5, None).unwrap().missing();
+        match words {
+            None => assert_eq!(missing, None),
+            Some(words) => {
+                assert!(missing.as_ref().is_some_and(|m| m.contains(words)), "{missing:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_status_of_an_earlier_run_does_not_end_this_one() {
+    let mut asked = 0;
+    let camera = Scripted::new(move |id, command, host: &mut Waiting| match command {
+        Command::Start(_) => {
+            host.reply(id, Ok(Answer::Done));
+            host.frames(0..3);
+        }
+        // The host asks each second in which it only listens.
+        Command::Status if asked == 0 => {
+            asked += 1;
+            host.reply(id, Ok(status(State::Configured, 0, 99)));
+        }
+        _ => {
+            if asked == 1 {
+                asked += 1;
+                host.frames(3..10);
+                host.ended(10);
+            }
+            host.reply(id, Ok(status(State::Configured, 1, 10)));
+        }
+    });
+    let captured = capture_of(camera, 10, None).unwrap();
+    assert_eq!((captured.missing(), captured.counters.received), (None, 10));
+}
+
+/// A serial port stays open when the firmware restarts, and the firmware then asks for a greeting.
+#[test]
+fn a_camera_that_restarts_in_a_run_ends_it() {
+    let camera = Scripted::new(|id, command, host: &mut Waiting| match command {
+        Command::Start(_) => {
+            host.reply(id, Ok(Answer::Done));
+            host.frames(0..3);
+        }
+        _ => host.reply(id, Err(Refusal::Protocol { device: version::CURRENT })),
+    });
+    let captured = capture_of(camera, 10, None).unwrap();
+    let missing = captured.missing().unwrap();
+    assert!(missing.contains("the camera ended the session"), "{missing}");
+    assert_eq!(captured.counters.received, 3);
 }
 
 /// A replay that outlives its host.

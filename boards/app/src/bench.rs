@@ -5,7 +5,7 @@
 use crate::{Board, FpgaPort};
 use core::cell::{Cell, RefCell};
 use core::task::Waker;
-use nirspi_mcu::{BusError, HostPort, Inputs};
+use nirspi_mcu::{BusError, GatewareLoader, HostPort, Inputs, LoadError, Micros};
 use nirspi_wire::fpga::{Header, Sums};
 use nirspi_wire::host_port::{SEALED_BYTES, seal, unseal};
 use nirspi_wire::packet::{MAX_HOST_PACKET, seal as seal_packet};
@@ -75,6 +75,8 @@ pub struct Pins {
     pub transfer_polls: Cell<u32>,
     /// Microseconds from one frame to the next. With 0 a frame is ready during every run.
     pub frame_us: Cell<u64>,
+    /// The FPGA is being loaded with gateware, and has no host port.
+    pub loading: Cell<bool>,
     next_frame_us: Cell<u64>,
     /// A frame is ready that was ready before a write to `Control`.
     held: Cell<bool>,
@@ -90,6 +92,7 @@ impl Default for Pins {
             fed: Cell::default(),
             transfer_polls: Cell::default(),
             frame_us: Cell::default(),
+            loading: Cell::default(),
             next_frame_us: Cell::default(),
             held: Cell::default(),
         }
@@ -114,6 +117,28 @@ impl Board for FakeBoard {
 
     fn restart(&mut self, _into: RebootInto) -> ! {
         panic!("restarted")
+    }
+}
+
+/// A loader that takes as long as [`Pins::loading`] says, and loads nothing.
+pub struct FakeLoader(pub Rc<Pins>);
+
+impl GatewareLoader for FakeLoader {
+    fn begin(&mut self, _total: u32) -> Result<(), LoadError> {
+        Ok(())
+    }
+
+    fn write(&mut self, _data: &[u8]) -> Result<(), LoadError> {
+        Ok(())
+    }
+
+    fn finish(&mut self) -> Result<(), LoadError> {
+        self.0.loading.set(true);
+        Ok(())
+    }
+
+    fn step(&mut self, _now: Micros) -> bool {
+        self.0.loading.get()
     }
 }
 

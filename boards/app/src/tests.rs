@@ -1,25 +1,28 @@
 //! Tests of the loop and its link, polled by hand: no executor, and a clock that a test moves.
 
-use crate::bench::{FakeBoard, FakeFpga, Pins, configuration, packet};
-use crate::link::{HostIn, HostOut, Link, Packet};
-use crate::{DepthMailbox, Device, board_info, run};
+use crate::bench::{FakeBoard, FakeFpga, FakeLoader, Pins, configuration, packet};
+use crate::link::{CameraEnd, HostIn, HostOut, Link, Packet};
+use crate::{DepthMailbox, Device, board_info, crash, run};
 use core::future::Future;
 use core::pin::Pin;
 use core::task::{Context, Waker};
 use embassy_futures::poll_once;
-use nirspi_mcu::{Limits, NoLoader, PacketSink};
+use nirspi_mcu::{Crash, Limits, PacketSink};
 use nirspi_wire::fpga::MAX_FRAME_BYTES;
 use nirspi_wire::packet::{MAX_DEVICE_PACKET, MAX_HOST_PACKET};
 use nirspi_wire::register::Register;
 use nirspi_wire::{
     Answer, Command, Deframed, Deframer, DeviceMessage, Reply, RunLength, open, version,
 };
+use std::borrow::ToOwned;
 use std::boxed::Box;
 use std::rc::Rc;
 use std::vec::Vec;
 
 const TRANSFER: usize = 64;
 const PATTERNS: u16 = 2;
+/// So many bytes go out where they lie.
+const LONGEST: usize = 4 * TRANSFER;
 /// Gateware that makes no packets.
 const OLDER: u32 = 0x0000_0300;
 
@@ -48,7 +51,7 @@ impl Bench {
             port: FakeFpga::new(Rc::clone(&pins)),
             frame: Box::leak(Box::new([0; MAX_FRAME_BYTES])),
             spare: Some(Box::leak(Box::new([0; MAX_FRAME_BYTES]))),
-            loader: NoLoader,
+            loader: FakeLoader(Rc::clone(&pins)),
             info: board_info("bench", "0001"),
             limits: Limits::default(),
             crash: None,
@@ -152,6 +155,40 @@ fn leds_are_let_on_from_the_configuration_until_the_host_is_gone() {
     bench.send(&hello(5));
     bench.turn();
     assert_eq!(bench.heard(), [Heard::Hello(5)], "nothing of the session before");
+}
+
+#[test]
+fn leds_are_off_and_the_watchdog_is_fed_while_the_fpga_is_loaded() {
+    let mut bench = Bench::new(8);
+    bench.send(&hello(1));
+    bench.send(&packet(2, Command::Configure(configuration(PATTERNS))));
+    bench.turn();
+    assert!(bench.pins.leds_enabled.get());
+    bench.heard();
+
+    bench.pins.loading.set(true);
+    let fed = bench.pins.fed.get();
+    bench.send(&packet(3, Command::Status));
+    bench.turn();
+    assert!(!bench.pins.leds_enabled.get(), "the pins of an FPGA without gateware may float");
+    assert!(bench.pins.fed.get() > fed);
+    assert_eq!(bench.heard(), [], "the camera is not polled");
+    bench.pins.loading.set(false);
+    bench.turn();
+    assert_eq!(bench.heard(), [Heard::Done(3)]);
+}
+
+/// The first crash is the cause, and those that follow from it are not.
+#[test]
+fn the_first_of_two_crashes_is_kept_until_it_is_taken() {
+    let text = |crash: Option<Crash>| crash.map(|crash| crash.text.as_str().to_owned());
+    assert_eq!(crash::take(), None);
+    crash::store(format_args!("the stack ran into its guard"));
+    crash::store(format_args!("a fault in the logger"));
+    assert_eq!(text(crash::take()).as_deref(), Some("the stack ran into its guard"));
+    assert_eq!(crash::take(), None);
+    crash::store(format_args!("another day"));
+    assert_eq!(text(crash::take()).as_deref(), Some("another day"));
 }
 
 #[test]
@@ -316,4 +353,36 @@ fn a_long_packet_fills_transfers_of_its_own_and_short_ones_share() {
     assert_eq!(lengths(&[4 * TRANSFER, 4 * TRANSFER]), [64, 64, 64, 64, 64, 64, 64, 64, 0]);
     // Shorter ones fill up what is begun.
     assert_eq!(lengths(&[10, 2 * TRANSFER, 30]), [64, 64, 40]);
+}
+
+/// A host may go in the middle of a packet. The next one must get its own packets from their first byte on.
+#[test]
+fn a_host_that_goes_in_the_middle_of_a_packet_leaves_nothing_for_the_next() {
+    let next: Vec<u8> = (0..2 * LONGEST).map(|at| (at * 13) as u8).collect();
+    for before in [10, TRANSFER, TRANSFER + 10, 3 * TRANSFER, LONGEST, LONGEST + 10] {
+        for taken in 0..=before / TRANSFER + 1 {
+            for length in [7, TRANSFER, TRANSFER + 1, 2 * TRANSFER + 7, next.len()] {
+                let mut link = Link::new(std::vec![Packet::EMPTY; 4].leak());
+                let (mut camera, _, mut to_host) = link.split::<TRANSFER>();
+                let put = |camera: &mut CameraEnd<'_>, bytes: &[u8]| {
+                    let (_, sink) = camera.both();
+                    sink.claim(bytes.len()).expect("a place is free").copy_from_slice(bytes);
+                    sink.commit(0..bytes.len());
+                };
+                put(&mut camera, &std::vec![0xEE; before]);
+                put(&mut camera, &[0xDD; 20]);
+                for _ in 0..taken {
+                    let _ = poll_once(to_host.transfer());
+                }
+                to_host.discard();
+                assert!(poll_once(to_host.transfer()).is_pending(), "not even an empty transfer");
+                put(&mut camera, &next[..length]);
+                let mut got = Vec::new();
+                while let core::task::Poll::Ready(transfer) = poll_once(to_host.transfer()) {
+                    got.extend_from_slice(transfer);
+                }
+                assert_eq!(got, next[..length], "{taken} transfers of {before} bytes were taken");
+            }
+        }
+    }
 }

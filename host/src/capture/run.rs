@@ -12,7 +12,8 @@ use crate::session::{
 use crate::setup::MeasurementSetup;
 use crate::tally::{Tally, tally_recording};
 use nirspi_wire::{
-    Answer, DeviceMessage, Event, EventKind, Fault, PacketError, Reply, RunLength, State, Status,
+    Answer, DeviceMessage, Event, EventKind, Fault, PacketError, Refusal, Reply, RunLength, State,
+    Status,
 };
 use std::io;
 use std::path::{Path, PathBuf};
@@ -64,6 +65,8 @@ pub struct Run {
     recorder_error: Option<io::Error>,
     fault: Option<Fault>,
     status: Option<Status>,
+    /// The camera knows of no session, so it has restarted.
+    forgotten: bool,
     junk: Junk,
     started: Instant,
     /// Time of the last intact packet.
@@ -121,6 +124,9 @@ impl Listener for Packets<'_> {
             }
             Ok(DeviceMessage::Reply(Reply { outcome: Ok(Answer::Status(status)), .. })) => {
                 run.status = Some(*status);
+            }
+            Ok(DeviceMessage::Reply(Reply { outcome: Err(Refusal::Protocol { .. }), .. })) => {
+                run.forgotten = true;
             }
             _ => {}
         }
@@ -187,6 +193,7 @@ impl Run {
             recorder_error: None,
             fault: None,
             status: None,
+            forgotten: false,
             junk: Junk::new(now),
             started: now,
             last_intact: now,
@@ -244,6 +251,9 @@ impl Run {
         observer: &mut dyn Observer,
     ) -> Result<(), SessionError> {
         session.listen(TURN, &mut Packets { run: self, observer })?;
+        if self.forgotten {
+            return Err(SessionError::Ended { command: request::Status::NAME });
+        }
         if self.watched.elapsed() > TURN {
             self.watched = Instant::now();
             self.record(Recorder::flush_if_due);

@@ -10,37 +10,87 @@ use std::path::Path;
 /// The most images. A longer recording gives sums of neighbouring frames.
 const MOST: usize = 1000;
 
+/// Means of neighbouring frames: groups of one size, and a smaller one of what is left.
+struct Groups {
+    frames: usize,
+    /// Frames of a group.
+    each: usize,
+    /// Frames so far.
+    seen: usize,
+    /// The sum of the frames of the group that has begun.
+    sum: Vec<f64>,
+}
+
+impl Groups {
+    /// At most `most` groups of so many frames.
+    fn new(frames: usize, most: usize) -> Self {
+        Self { frames, each: frames.div_ceil(most), seen: 0, sum: Vec::new() }
+    }
+
+    /// Adds the values of the next frame. Returns the mean of its group after the group's last frame.
+    fn add(&mut self, values: &[f64]) -> Option<Vec<f64>> {
+        if self.sum.is_empty() {
+            self.sum = values.to_vec();
+        } else {
+            self.sum.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
+        }
+        let in_group = self.seen % self.each + 1;
+        self.seen += 1;
+        if in_group < self.each && self.seen < self.frames {
+            return None;
+        }
+        // A mean of one frame is the frame itself.
+        let mut mean = std::mem::take(&mut self.sum);
+        mean.iter_mut().for_each(|value| *value /= in_group as f64);
+        Some(mean)
+    }
+}
+
 /// Writes the video. Returns the number of images.
 pub(super) fn apng(whole: &Whole, out: &Path) -> Result<usize, ExportError> {
     let frames = whole.frames();
-    let each = frames.div_ceil(MOST);
+    let mut groups = Groups::new(frames, MOST);
     let problem = |frame| {
         let path = whole.path.clone();
         move |problem| ExportError::Image { path, frame, problem }
     };
     let method = Method::default().prepare(&MethodSettings::default()).map_err(problem(0))?;
     let mut images: Vec<Image> = Vec::new();
-    let mut sum: Vec<f64> = Vec::new();
     whole.each(|frame| {
-        let values = frame.measurements.values();
-        if sum.is_empty() {
-            sum = values.to_vec();
-        } else {
-            sum.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
-        }
-        let in_sum = frame.index % each + 1;
-        if in_sum == each || frame.index + 1 == frames {
-            // A mean of one frame is the frame itself.
-            sum.iter_mut().for_each(|value| *value /= in_sum as f64);
-            let mean = Measurements::from_differential(frame.measurements.rows(), &sum)
+        if let Some(mean) = groups.add(frame.measurements.values()) {
+            let mean = Measurements::from_differential(frame.measurements.rows(), &mean)
                 .map_err(|problem| whole.integrate(problem.into()))?;
             let made = method.reconstruct(&mean).map_err(problem(frame.index))?;
             images.push(whole.source.flattened(made.image));
-            sum.clear();
         }
         Ok(())
     })?;
     let header = format!("{}, {frames} frames", whole.path.display());
     write_atomic(out, &video(&header, &images, Unit::AdcCounts))?;
     Ok(images.len())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The means of frames whose values are 0, 1, 2, ... and ten times that.
+    fn means(frames: u32, most: usize) -> Vec<Vec<f64>> {
+        let mut groups = Groups::new(frames as usize, most);
+        (0..frames).map(f64::from).filter_map(|k| groups.add(&[k, 10.0 * k])).collect()
+    }
+
+    #[test]
+    fn every_frame_is_in_one_image_and_the_last_group_may_be_smaller() {
+        assert_eq!(means(3, 1000), [[0.0, 0.0], [1.0, 10.0], [2.0, 20.0]]);
+        assert_eq!(means(7, 3), [[1.0, 10.0], [4.0, 40.0], [6.0, 60.0]]);
+        assert_eq!(means(8, 3), [[1.0, 10.0], [4.0, 40.0], [6.5, 65.0]]);
+        assert_eq!(means(6, 3), [[0.5, 5.0], [2.5, 25.0], [4.5, 45.0]]);
+        for frames in [1, 999, 1000, 1001, 2000, 2001, 12_345] {
+            let means = means(frames, MOST);
+            let each = (frames as usize).div_ceil(MOST);
+            assert_eq!(means.len(), (frames as usize).div_ceil(each));
+            assert!(means.len() <= MOST, "{frames}");
+        }
+    }
 }

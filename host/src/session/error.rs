@@ -37,8 +37,8 @@ pub enum SessionError {
     },
     /// The camera has ended the session, and asks for a greeting.
     #[error(
-        "the camera ended the session before {command}: the bus was asleep, or this program read nothing for {} s; \
-         start again",
+        "the camera ended the session before {command}: its firmware restarted, the bus was asleep, or this program \
+         read nothing for {} s; start again",
         HOST_SILENCE_US / 1_000_000
     )]
     Ended {

@@ -377,6 +377,37 @@ fn the_camera_streams_over_the_port_and_counts_what_could_not_be_read() {
     }
 }
 
+/// Until the FPGA takes the release, its line still signals the frame that was read before.
+#[test]
+fn a_frame_is_read_once_however_long_its_release_does_not_come_through() {
+    for (mut bus, packets) in [(bus(), false), (bus_of_two(), false), (bus(), true)] {
+        if packets {
+            bus.port().fpga.make_packets();
+        }
+        let mut device = Device::new(bus);
+        device.ask(Command::Configure(SMALL));
+        device.ask(Command::Start(RunLength::Continuous));
+        device.bus.port().fpga.lost_address = Some(Register::Control.address());
+        device.bus.port().fpga.make_frame();
+        for _ in 0..20 {
+            device.turn(&[]);
+        }
+        assert!(device.bus.port().fpga.frame.is_some(), "the release is lost");
+        assert_eq!(device.bus.port().transfers.len(), 1);
+
+        device.bus.port().fpga.lost_address = None;
+        device.turn(&[]);
+        device.bus.port().fpga.make_frame();
+        for _ in 0..20 {
+            device.turn(&[]);
+        }
+        assert_eq!(device.bus.port().transfers.len(), 2);
+        let heard = device.heard();
+        let sequences: Vec<u32> = frames(&heard).iter().map(|frame| frame.sequence).collect();
+        assert_eq!(sequences, [0, 1]);
+    }
+}
+
 #[test]
 fn with_a_second_buffer_the_fpga_has_its_own_back_before_the_frame_is_packed() {
     let mut device = Device::new(bus_of_two());

@@ -3,6 +3,8 @@
 use crate::bench::Bench;
 use nirspi::files::image::encode_grey;
 use nirspi::files::npy;
+use std::collections::BTreeSet;
+use std::ops::Range;
 
 /// A blurred bar on `side` x `side` pixels, brightness from 0 to 1.
 fn bar(side: usize) -> Vec<f32> {
@@ -44,7 +46,14 @@ fn a_stack_comes_out_at_64_pixels_with_its_estimates_and_its_inconsistency() {
     assert_eq!(npy::read_stack(&bench.path("spread.npy")).unwrap().count, 2);
     let widths = npy::read_stack(&bench.path("interval.npy")).unwrap();
     assert_eq!((widths.count, widths.height), (2, 64));
-    assert!(widths.values.iter().all(|width| (0.0..1.0).contains(width)));
+    assert!(widths.values.iter().all(|width| *width > 0.0 && *width < 1.0));
+    // A width is one of the calibration's table, and the bar's edges are less sure than the dark beside it.
+    let kinds: BTreeSet<u32> = widths.values[..4096].iter().map(|width| width.to_bits()).collect();
+    assert!((2..100).contains(&kinds.len()), "{}", kinds.len());
+    assert_eq!(widths.values[..4096], widths.values[4096..], "the same image, the same widths");
+    let most =
+        |columns: Range<usize>| columns.map(|x| widths.values[32 * 64 + x]).fold(0.0_f32, f32::max);
+    assert!(most(20..30) > most(0..8), "{} {}", most(20..30), most(0..8));
     let several = ["enhance", "in.npy", "--steps", "2", "--interval", "i.npy", "--out", "o.npy"];
     bench.run(&several).failed(1, &["no intervals", "not for diffusion in 2 steps"]);
     assert!(!bench.path("i.npy").exists());
