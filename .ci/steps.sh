@@ -41,6 +41,7 @@ by_name=(
     "mutants         deliberate faults in the Rust code are seen: in lines changed since main, or in MUTANTS='CRATE...'; crates.io"
     "crowd           nirspi serve among 1000 clients that misbehave, for CROWD_S seconds (600)"
     "zenoh           a camera over Zenoh: router, camera and host as processes; crates.io, 219 crates of which 95 are its own"
+    "stores          archives in object stores: S3 and WebDAV servers as processes; crates.io, PyPI"
     "publish         each library crate builds from its package alone; crates.io"
     "licence-texts   the licences of all dependencies in one page; crates.io"
     "deb             the Debian package; crates.io"
@@ -258,7 +259,7 @@ step_python() {
         "$bin/ruff" check --config pyproject.toml python tests ../../docs/notebooks
         "$bin/mypy" python/nirspi
         "$bin/python" -m mypy.stubtest nirspi._nirspi
-        "$bin/python" -X dev -m pytest --ignore tests/peers --ignore tests/cluster
+        "$bin/python" -X dev -m pytest --ignore tests/peers --ignore tests/cluster --ignore tests/stores
     )
 }
 
@@ -273,6 +274,15 @@ step_python_peers() {
 step_cluster() {
     python_package numpy pyarrow pytest==9.2.0 'ray[data]==2.60.0' 'dask[distributed]==2026.8.0'
     (cd host/python && "$OLDPWD/target/python/bin/python" -m pytest tests/cluster)
+}
+
+step_stores() {
+    cargo test --locked -p nirspi --no-default-features --features object-store --lib \
+        --config 'profile.dev.package."*".opt-level=0' -- archive::
+    python_package numpy pyarrow pytest==9.2.0 boto3==1.44.5 cheroot==11.1.2 \
+        'moto[server]==5.2.5' wsgidav==4.4.0
+    cargo build --locked --release --features object-store
+    (cd host/python && "$OLDPWD/target/python/bin/python" -X dev -m pytest tests/stores)
 }
 
 step_page() {

@@ -6,8 +6,7 @@ use super::reconstruct::FolderArgs;
 use super::report::ReportArgs;
 use super::{Usage, print};
 use anyhow::Result;
-use nirspi::archive::{Grid, GridAxes};
-use nirspi::files::output::write_atomic;
+use nirspi::archive::{Grid, GridAxes, write_file};
 use nirspi::source::FirstPatterns;
 use nirspi_recon::Sampling;
 use std::path::PathBuf;
@@ -78,9 +77,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         }
     })?;
     let (report, code) = args.folder.run(&grid, &options, "measurements", args.report)?;
-    let card = args.out.with_extension("md");
-    write_atomic(&card, grid.card(&report).as_bytes())?;
+    write_file(&args.out.with_extension("md"), grid.card(&report).as_bytes())?;
     if !args.report.json {
+        let card = report.out.with_extension("md");
         print::line(format_args!("wrote the data card to {}", card.display()))?;
     }
     Ok(code)

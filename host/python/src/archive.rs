@@ -98,9 +98,9 @@ impl Table {
             }
             let files = match names {
                 Some(names) => ImageFiles::named(&folder, names, reader),
-                None => ImageFiles::of(&folder, reader).map_err(of_archive)?,
+                None => ImageFiles::of(&folder, reader),
             };
-            Ok(Self(Kind::Files(Box::new(files))))
+            Ok(Self(Kind::Files(Box::new(files.map_err(of_archive)?))))
         })
     }
 

@@ -20,6 +20,17 @@ pub const ENDINGS: [&str; 8] = ["npz", "npy", "mat", "h5", "hdf5", "csv", "txt",
 pub fn find(folder: &Path) -> Result<Vec<String>, ArchiveError> {
     let mut names = Vec::new();
     collect(folder, "", &mut names)?;
+    measurements_of(folder, names)
+}
+
+/// The measurement files among these names of a folder, in order. Hidden names are left out.
+pub(super) fn measurements_of(
+    folder: &Path,
+    names: impl IntoIterator<Item = String>,
+) -> Result<Vec<String>, ArchiveError> {
+    let is_seen = |name: &String| !name.split('/').any(|part| part.starts_with('.'));
+    let is_wanted = |name: &String| is_measurement(Path::new(name)) && is_seen(name);
+    let mut names: Vec<String> = names.into_iter().filter(is_wanted).collect();
     if names.is_empty() {
         let expected = ENDINGS.map(|ending| format!(".{ending}")).join(", ");
         return Err(ArchiveError::NoFiles { folder: folder.to_owned(), expected });
@@ -46,7 +57,7 @@ fn collect(folder: &Path, prefix: &str, names: &mut Vec<String>) -> Result<(), F
         let name = format!("{prefix}{name}");
         if kind.is_dir() {
             collect(&path, &format!("{name}/"), names)?;
-        } else if is_measurement(&path) && !path.is_dir() {
+        } else if !path.is_dir() {
             names.push(name);
         }
     }

@@ -1,25 +1,17 @@
-//! The folder of a run that is not finished: groups of rows as they will stand in the table, and a
-//! list that says which are whole.
-//!
-//! # Invariant
-//! A part counts when its line is in the list, and its line is written when its file is whole and
-//! synced. So a run that is killed at any moment can be continued from the last line
-//! (`super::tests::a_killed_run_loses_the_group_in_hand_alone`).
+//! A run that is not finished: groups of rows as they will stand in the table, and a list that says
+//! which are whole.
 
+use super::place::Place;
+use super::shelf::Shelf;
 use super::{ArchiveError, Skipped};
 use crate::dataset::{ARCHIVE, DATASET_VERSION};
 use crate::files::FileError;
-use crate::files::output::{write_atomic, write_in_pieces};
 use crate::parquet::{Group, GroupShape, Table};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
-use std::fs::{File, OpenOptions, TryLockError};
-use std::io::{BufReader, Read, Seek, SeekFrom, Write};
-use std::path::{Path, PathBuf};
 
 /// Version of the list and of the table's metadata.
 const VERSION: u32 = 1;
-const LIST: &str = "list.jsonl";
 
 /// The first line of the list.
 #[derive(Debug, Serialize, Deserialize)]
@@ -82,10 +74,9 @@ pub(super) struct Written {
 }
 
 /// An open run.
-pub(super) struct Journal {
-    out: PathBuf,
-    folder: PathBuf,
-    list: File,
+pub(super) struct Journal<'p> {
+    out: &'p Place,
+    shelf: Box<dyn Shelf + 'p>,
     head: Head,
     parts: Vec<Part>,
     /// Groups and skipped items of the part in hand.
@@ -93,77 +84,46 @@ pub(super) struct Journal {
     skipped: Vec<Skipped>,
 }
 
-/// The folder of a run that makes the table `out`.
-pub(super) fn folder_of(out: &Path) -> PathBuf {
-    let mut name = out.as_os_str().to_owned();
-    name.push(".parts");
-    name.into()
-}
-
-impl Journal {
+impl<'p> Journal<'p> {
     /// Begins a run, or continues one.
     pub(super) fn open(
-        out: &Path,
+        out: &'p Place,
+        mut shelf: Box<dyn Shelf + 'p>,
         resume: bool,
         settings: &Map<String, Value>,
         names: &[&str],
     ) -> Result<Self, ArchiveError> {
-        let folder = folder_of(out);
-        let path = folder.join(LIST);
-        if path.exists() && !resume {
-            return Err(ArchiveError::Unfinished(folder));
+        match shelf.is_begun()? {
+            true if !resume => return Err(ArchiveError::Unfinished(shelf.folder().to_owned())),
+            true => {}
+            false => {
+                let names = names.iter().map(|&name| name.to_owned()).collect();
+                let head = Head { version: VERSION, settings: settings.clone(), names };
+                shelf.begin(&line_of(&head))?;
+            }
         }
-        if out.is_dir() {
-            return Err(FileError::kind(out, "a folder", "a file to write").into());
-        }
-        let parent = out.parent().filter(|parent| !parent.as_os_str().is_empty());
-        if let Err(error) = std::fs::metadata(parent.unwrap_or(Path::new("."))) {
-            let parent = parent.unwrap_or(Path::new("."));
-            return Err(FileError::io(parent, "write to", error).into());
-        }
-        if !path.exists() {
-            // A list appears whole: a folder without one is of a run that was killed at once.
-            std::fs::create_dir_all(&folder)
-                .map_err(|error| FileError::io(&folder, "create", error))?;
-            let names = names.iter().map(|&name| name.to_owned()).collect();
-            let head = Head { version: VERSION, settings: settings.clone(), names };
-            write_atomic(&path, line_of(&head).as_bytes())?;
-        }
-        let io_error = |error| FileError::io(&path, "read", error);
-        let mut list = OpenOptions::new().read(true).write(true).open(&path).map_err(io_error)?;
-        match list.try_lock() {
-            Ok(()) => {}
-            Err(TryLockError::WouldBlock) => return Err(ArchiveError::Busy(out.to_owned())),
-            // A file system without locks.
-            Err(TryLockError::Error(_)) => {}
-        }
-        let mut text = Vec::new();
-        list.read_to_end(&mut text).map_err(io_error)?;
-        let mut lines = text.split_inclusive(|&byte| byte == b'\n');
-        let first = lines.next().unwrap_or_default();
+        let list = shelf.take()?;
+        let mut lines = list.iter();
+        let first = lines.next().map_or(&[][..], Vec::as_slice);
         let head: Head = serde_json::from_slice(first)
             .ok()
             .filter(|head: &Head| head.version == VERSION)
-            .ok_or_else(|| ArchiveError::Journal(folder.clone()))?;
+            .ok_or_else(|| ArchiveError::Journal(shelf.folder().to_owned()))?;
         if let Some(difference) = difference(&head.settings, settings) {
-            return Err(ArchiveError::Settings { path: folder, difference });
+            return Err(ArchiveError::Settings { path: shelf.folder().to_owned(), difference });
         }
         let (mut parts, mut end): (Vec<Part>, usize) = (Vec::new(), first.len());
         for line in lines {
             // The last line may be torn, and a disk may have lost a part.
             let part = serde_json::from_slice::<Part>(line).ok().filter(|part| {
-                let file = std::fs::metadata(part_path(&folder, parts.len()));
-                line.ends_with(b"\n") && file.is_ok_and(|file| file.len() == part.bytes())
+                line.ends_with(b"\n") && shelf.bytes_of(parts.len()) == Some(part.bytes())
             });
             let Some(part) = part else { break };
             end += line.len();
             parts.push(part);
         }
-        list.set_len(end as u64)
-            .and_then(|()| list.seek(SeekFrom::End(0)))
-            .map_err(|error| FileError::io(&path, "write", error))?;
-        let (groups, skipped) = (Vec::new(), Vec::new());
-        Ok(Self { out: out.to_owned(), folder, list, head, parts, groups, skipped })
+        shelf.keep(1 + parts.len(), end as u64)?;
+        Ok(Self { out, shelf, head, parts, groups: Vec::new(), skipped: Vec::new() })
     }
 
     /// The items of the table.
@@ -200,51 +160,33 @@ impl Journal {
             return Ok(());
         }
         let groups = std::mem::take(&mut self.groups);
-        let path = part_path(&self.folder, self.parts.len());
-        write_in_pieces(&path, |file| {
-            let write = |group: &Group| file.write_all(&group.bytes);
-            groups.iter().try_for_each(write).map_err(|error| FileError::io(&path, "write", error))
-        })?;
-        let shapes = groups.into_iter().map(|group| group.shape).collect();
+        let shapes = groups.iter().map(|group| group.shape.clone()).collect();
         let part = Part { done, groups: shapes, skipped: std::mem::take(&mut self.skipped) };
-        self.list
-            .write_all(line_of(&part).as_bytes())
-            .and_then(|()| self.list.sync_data())
-            .map_err(|error| FileError::io(&self.folder.join(LIST), "write", error))?;
+        self.shelf.add(self.parts.len(), &groups, &line_of(&part))?;
         self.parts.push(part);
         Ok(())
     }
 
-    /// Puts the parts together to the table, and removes their folder.
+    /// Puts the parts together to the table, and removes them.
     pub(super) fn join(self, settings: &Map<String, Value>) -> Result<Written, ArchiveError> {
-        let Self { out, folder, parts, head, .. } = &self;
         let skipped = self.skipped();
+        let Self { out, shelf, parts, head, .. } = self;
         let rows = parts.iter().flat_map(|part| &part.groups).map(GroupShape::rows).sum();
         let about = About::new(settings.clone(), head.names.len(), rows, skipped.clone());
-        write_in_pieces(out, |file| -> Result<(), FileError> {
-            let failed = |error| FileError::io(out, "write", error);
+        let failed = |error| FileError::io(out.shown(), "write", error);
+        let bytes = out.write_whole(|file| -> Result<(), ArchiveError> {
             let mut table = Table::begin(file, &ARCHIVE).map_err(failed)?;
             for (k, part) in parts.iter().enumerate() {
-                let path = part_path(folder, k);
-                let unread = |error| FileError::io(&path, "read", error);
-                let mut bytes = BufReader::new(File::open(&path).map_err(unread)?);
+                let mut bytes = shelf.part(k)?;
                 for group in &part.groups {
                     table.kept(group, &mut bytes).map_err(failed)?;
                 }
             }
-            table.end(&about.metadata()).map_err(failed)
+            Ok(table.end(&about.metadata()).map_err(failed)?)
         })?;
-        let bytes = std::fs::metadata(out).map_or(0, |file| file.len());
-        // The table is whole. If the folder cannot be removed, --resume joins it again.
-        let folder = folder.clone();
-        drop(self);
-        let _ = std::fs::remove_dir_all(folder);
+        shelf.clear();
         Ok(Written { rows, bytes, skipped })
     }
-}
-
-fn part_path(folder: &Path, part: usize) -> PathBuf {
-    folder.join(format!("{part:06}.rows"))
 }
 
 fn line_of(value: &impl Serialize) -> String {

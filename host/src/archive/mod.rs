@@ -21,20 +21,25 @@ mod journal;
 #[cfg(feature = "enhance")]
 mod networks;
 mod pipeline;
+mod place;
 mod report;
 mod rows;
+mod shelf;
+#[cfg(feature = "object-store")]
+mod store;
 #[cfg(test)]
 mod tests;
 
 use crate::dataset::{ARCHIVE, Row, Rows};
 use crate::files::FileError;
-use crate::files::output::write_in_pieces;
 use crate::parquet::Table;
 pub use error::ArchiveError;
 pub use files::{Shard, find};
 #[cfg(feature = "virtual-camera")]
 pub use grid::{Grid, GridAxes, GridError};
 use journal::{About, Journal};
+use place::Place;
+pub use place::{is_folder, write_file};
 pub use report::{ArchiveReport, Skipped};
 pub use rows::{ImageFiles, RowReader, RowsError};
 use serde_json::{Map, Value};
@@ -77,7 +82,7 @@ pub trait Work: Sync {
 /// How to make a table.
 #[derive(Debug, Clone)]
 pub struct ArchiveOptions {
-    /// The table to write, a Parquet file.
+    /// The table to write, a Parquet file: a path, or an address in an object store.
     pub out: PathBuf,
     /// Number of items to work on at a time; `None` means as many as the machine has cores.
     pub jobs: Option<NonZeroUsize>,
@@ -110,8 +115,19 @@ pub fn archive(
     stop: &AtomicBool,
     watch: &mut dyn FnMut(Progress),
 ) -> Result<ArchiveReport, ArchiveError> {
+    archive_to(&Place::of(&options.out)?, work, options, stop, watch)
+}
+
+fn archive_to(
+    place: &Place,
+    work: &(impl Work + ?Sized),
+    options: &ArchiveOptions,
+    stop: &AtomicBool,
+    watch: &mut dyn FnMut(Progress),
+) -> Result<ArchiveReport, ArchiveError> {
     let began = Instant::now();
-    let ArchiveOptions { out, resume, shard, .. } = options;
+    let ArchiveOptions { resume, shard, .. } = options;
+    let out = place.shown();
     let jobs = options.jobs.or_else(|| std::thread::available_parallelism().ok());
     let jobs = jobs.map_or(1, NonZeroUsize::get);
     let mine: Vec<usize> = shard.of(work.names().len()).collect();
@@ -119,10 +135,14 @@ pub fn archive(
     let mut settings = work.settings();
     settings.insert("shard".to_owned(), shard.to_string().into());
     settings.insert("nirspi".to_owned(), env!("CARGO_PKG_VERSION").into());
-    if *resume && !journal::folder_of(out).exists() && out.exists() {
-        return report::of_whole_table(out, &settings, work.noun());
+    let shelf = place.shelf()?;
+    if *resume
+        && !shelf.is_begun()?
+        && let Some((mut table, bytes)) = place.open()?
+    {
+        return report::of_whole_table(out, &mut table, bytes, &settings, work.noun());
     }
-    let mut journal = Journal::open(out, *resume, &settings, &names)?;
+    let mut journal = Journal::open(place, shelf, *resume, &settings, &names)?;
     let before = journal.done();
     // The list of the first run counts: files that came later are not in this table.
     let names = journal.names().to_vec();
@@ -146,7 +166,11 @@ pub fn archive(
     };
     pipeline::in_order(before..names.len(), jobs, make, |at, made| {
         if stop.load(Ordering::Relaxed) {
-            return Err(ArchiveError::Stopped { out: out.clone(), done: at, items: names.len() });
+            return Err(ArchiveError::Stopped {
+                out: out.to_owned(),
+                done: at,
+                items: names.len(),
+            });
         }
         match made {
             Ok(made) => {
@@ -178,7 +202,7 @@ pub fn archive(
     journal.write_part(names.len())?;
     let written = journal.join(&settings)?;
     Ok(ArchiveReport {
-        out: out.clone(),
+        out: out.to_owned(),
         files: names.len(),
         files_before: before,
         rows: written.rows,
@@ -204,12 +228,14 @@ pub fn archive_part(
     stop: &AtomicBool,
 ) -> Result<ArchiveReport, ArchiveError> {
     let began = Instant::now();
+    let place = Place::of(out)?;
+    let out = place.shown();
     let failed = |error| io_error(out, error);
     let count = work.names().len();
     let names = work.names().get(items.clone());
     let names = names.ok_or(ArchiveError::Range { start: items.start, end: items.end, count })?;
     let (mut total, mut skipped) = (0, Vec::new());
-    write_in_pieces(out, |file| -> Result<(), ArchiveError> {
+    let bytes = place.write_whole(|file| -> Result<(), ArchiveError> {
         let mut table = Table::begin(file, &ARCHIVE).map_err(failed)?;
         let mut rows = Rows::new(&ARCHIVE);
         for (done, (item, name)) in items.clone().zip(names).enumerate() {
@@ -246,7 +272,7 @@ pub fn archive_part(
         files: names.len(),
         files_before: 0,
         rows: total,
-        bytes: std::fs::metadata(out).map_or(0, |file| file.len()),
+        bytes,
         skipped,
         jobs: 1,
         shard: Shard::WHOLE,

@@ -8,7 +8,7 @@ use nirspi_recon::words::count;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::fmt;
-use std::fs::File;
+use std::io::{Read, Seek};
 use std::path::{Path, PathBuf};
 
 /// An item without rows.
@@ -23,7 +23,7 @@ pub struct Skipped {
 /// What was made of an archive.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ArchiveReport {
-    /// The table.
+    /// The table, a path or an address without its password.
     pub out: PathBuf,
     /// Number of files, or of other items.
     pub files: usize,
@@ -84,13 +84,13 @@ impl fmt::Display for ArchiveReport {
 /// The report of a table that an earlier run made.
 pub(super) fn of_whole_table(
     out: &Path,
+    mut table: impl Read + Seek,
+    bytes: u64,
     settings: &Map<String, Value>,
     noun: &'static str,
 ) -> Result<ArchiveReport, ArchiveError> {
-    let unread = |error| FileError::io(out, "read", error);
-    let mut file = File::open(out).map_err(unread)?;
-    let bytes = file.metadata().map_err(unread)?.len();
-    let about = parquet::about(&mut file, ABOUT).map_err(unread)?;
+    let about = parquet::about(&mut table, ABOUT);
+    let about = about.map_err(|error| FileError::io(out, "read", error))?;
     let about: Option<About> = about.and_then(|text| serde_json::from_slice(&text).ok());
     let about = about.ok_or_else(|| ArchiveError::NoTable(out.to_owned()))?;
     if let Some(difference) = difference(&about.settings, settings) {

@@ -1,7 +1,7 @@
 //! The rows of one file: its measurements, their images, and what is known of them.
 
-use super::files::path_of;
-use super::{Work, find};
+use super::place::Place;
+use super::{ArchiveError, Work};
 use crate::causes::in_one_line;
 use crate::dataset::Row;
 use crate::export::{ExportError, Whole};
@@ -218,25 +218,36 @@ pub(super) fn meta(of_camera: &str, source: &Source, solved: &Solved) -> String 
 
 /// The files of a folder, each of which becomes rows.
 pub struct ImageFiles {
-    folder: PathBuf,
+    folder: Place,
     names: Vec<String>,
     reader: RowReader,
 }
 
 impl ImageFiles {
-    /// The measurement files in a folder and the folders below.
+    /// The measurement files in a folder and the folders below. `folder` is a path, or an address in
+    /// an object store.
     ///
     /// # Errors
-    /// [`super::ArchiveError`] if there are none.
-    pub fn of(folder: &Path, reader: RowReader) -> Result<Self, super::ArchiveError> {
-        Ok(Self { folder: folder.to_owned(), names: find(folder)?, reader })
+    /// [`ArchiveError`] if there are none, or the store cannot be used.
+    pub fn of(folder: &Path, reader: RowReader) -> Result<Self, ArchiveError> {
+        Self::at(Place::of(folder)?, reader)
+    }
+
+    pub(super) fn at(folder: Place, reader: RowReader) -> Result<Self, ArchiveError> {
+        Ok(Self { names: folder.find()?, folder, reader })
     }
 
     /// These files, as paths relative to the folder with `/` between names. Files that are not there
     /// give no rows.
-    #[must_use]
-    pub fn named(folder: &Path, names: Vec<String>, reader: RowReader) -> Self {
-        Self { folder: folder.to_owned(), names, reader }
+    ///
+    /// # Errors
+    /// [`ArchiveError`] if `folder` is an address of no store.
+    pub fn named(
+        folder: &Path,
+        names: Vec<String>,
+        reader: RowReader,
+    ) -> Result<Self, ArchiveError> {
+        Ok(Self { folder: Place::of(folder)?, names, reader })
     }
 }
 
@@ -254,7 +265,7 @@ impl Work for ImageFiles {
 
     fn rows(&self, item: usize) -> Result<Vec<Row>, String> {
         let name = &self.names[item];
-        let path = path_of(&self.folder, name);
-        self.reader.rows(&path, name).map_err(|error| in_one_line(&error))
+        let rows = |path: &Path| self.reader.rows(path, name).map_err(|error| in_one_line(&error));
+        self.folder.with_file(name, rows)
     }
 }

@@ -17,12 +17,12 @@ fn solver() -> Solver {
     Solver::new(recipe).unwrap()
 }
 
-fn reader() -> RowReader {
+pub(super) fn reader() -> RowReader {
     RowReader::new(SourceOptions::default(), solver())
 }
 
 /// A folder with `count` measurements of 4 x 4, and a folder for results.
-fn folder_of(count: usize) -> (tempfile::TempDir, PathBuf, PathBuf) {
+pub(super) fn folder_of(count: usize) -> (tempfile::TempDir, PathBuf, PathBuf) {
     let root = tempfile::tempdir().unwrap();
     let (files, out) = (root.path().join("files"), root.path().join("table.parquet"));
     std::fs::create_dir(&files).unwrap();
@@ -36,7 +36,7 @@ fn folder_of(count: usize) -> (tempfile::TempDir, PathBuf, PathBuf) {
     (root, files, out)
 }
 
-fn options(out: &Path, jobs: usize, resume: bool) -> ArchiveOptions {
+pub(super) fn options(out: &Path, jobs: usize, resume: bool) -> ArchiveOptions {
     let jobs = NonZeroUsize::new(jobs);
     ArchiveOptions { out: out.to_owned(), jobs, resume, shard: Shard::WHOLE }
 }
@@ -46,11 +46,11 @@ fn run(work: &impl Work, options: &ArchiveOptions) -> Result<ArchiveReport, Arch
 }
 
 /// Items that count how often they are made, and stop the run at one of them.
-struct Stopping<'w> {
-    files: &'w ImageFiles,
-    stop: &'w AtomicBool,
-    at: usize,
-    made: std::sync::Mutex<Vec<usize>>,
+pub(super) struct Stopping<'w> {
+    pub(super) files: &'w ImageFiles,
+    pub(super) stop: &'w AtomicBool,
+    pub(super) at: usize,
+    pub(super) made: std::sync::Mutex<Vec<usize>>,
 }
 
 impl Work for Stopping<'_> {
@@ -93,7 +93,7 @@ fn jobs_and_interruptions_change_no_byte() {
     let report = run(&files, &options(&out, 3, true)).unwrap();
     assert_eq!((report.rows, report.files_before), (600, 512));
     assert!(std::fs::read(&out).unwrap() == one);
-    assert!(!journal::folder_of(&out).exists());
+    assert!(!shelf::folder_of(&out).exists());
     // The table is whole: nothing is done again.
     let again = run(&files, &options(&out, 3, true)).unwrap();
     assert_eq!((again.rows, again.files_before, again.jobs), (600, 600, 0));
@@ -111,7 +111,7 @@ fn a_killed_run_loses_the_group_in_hand_alone() {
     archive(&work, &options(&out, 1, false), &stop, &mut |_| {}).unwrap_err();
 
     // What a kill leaves: a torn line, a part that no line names, or a part that is cut.
-    let folder = journal::folder_of(&out);
+    let folder = shelf::folder_of(&out);
     let list = folder.join("list.jsonl");
     let text = std::fs::read_to_string(&list).unwrap();
     assert_eq!(text.lines().count(), 3, "a head and two parts");
@@ -211,7 +211,7 @@ fn a_run_that_does_not_fit_is_refused_and_nothing_is_lost() {
     let error = run(&files, &other).unwrap_err().to_string();
     assert!(error.contains(r#"(shard: found "1/1", expected "1/2")"#), "{error}");
 
-    let list = std::fs::File::open(journal::folder_of(&out).join("list.jsonl")).unwrap();
+    let list = std::fs::File::open(shelf::folder_of(&out).join("list.jsonl")).unwrap();
     list.lock().unwrap();
     let error = run(&files, &options(&out, 1, true)).unwrap_err().to_string();
     assert!(error.contains("another process writes this table"), "{error}");

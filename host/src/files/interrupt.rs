@@ -34,11 +34,11 @@ fn unfinished() -> MutexGuard<'static, Vec<PathBuf>> {
 
 /// A file or folder that an interrupted run removes, as long as this value lives.
 #[derive(Debug)]
-pub(super) struct Noted(PathBuf);
+pub(crate) struct Noted(PathBuf);
 
 impl Noted {
     /// Makes it, so that no interrupt comes between the making and the note.
-    pub(super) fn make<T>(
+    pub(crate) fn make<T>(
         path: &Path,
         make: impl FnOnce() -> io::Result<T>,
     ) -> io::Result<(T, Self)> {

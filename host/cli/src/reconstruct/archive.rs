@@ -70,7 +70,7 @@ impl FolderArgs {
             print::line(report)
         })?;
         let Some(missing) = report.complaint() else { return Ok((report, code)) };
-        print::complain(format_args!("{}: {missing}", options.out.display()));
+        print::complain(format_args!("{}: {missing}", report.out.display()));
         Ok((report, ExitCode::FAILURE))
     }
 }

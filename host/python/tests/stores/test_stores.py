@@ -1,0 +1,261 @@
+"""Archives in object stores: an S3 server (moto) and a WebDAV server (wsgidav) as processes of their own, read and
+written by the program."""
+
+import io
+import json
+import os
+import pathlib
+import signal
+import socket
+import subprocess
+import sys
+import time
+import urllib.request
+
+import numpy as np
+import pytest
+
+import nirspi as ns
+
+boto3 = pytest.importorskip("boto3")
+BIN = pathlib.Path(sys.executable).parent
+
+
+def free_port():
+    with socket.socket() as s:
+        s.bind(("127.0.0.1", 0))
+        return s.getsockname()[1]
+
+
+def started(command, port, log):
+    """A server as a process of its own, once it listens."""
+    with open(log, "wb") as out:
+        server = subprocess.Popen([str(word) for word in command], stdout=out, stderr=out)
+    for _ in range(600):
+        with socket.socket() as s:
+            if s.connect_ex(("127.0.0.1", port)) == 0:
+                return server
+        assert server.poll() is None, pathlib.Path(log).read_text()
+        time.sleep(0.1)
+    raise AssertionError(pathlib.Path(log).read_text())
+
+
+def ended(server):
+    server.terminate()
+    try:
+        server.wait(10)
+    except subprocess.TimeoutExpired:
+        server.kill()
+
+
+@pytest.fixture(scope="module")
+def archive(tmp_path_factory):
+    """1100 measurement files in two folders, of which two hold none."""
+    place = tmp_path_factory.mktemp("stores") / "archive"
+    (place / "b b").mkdir(parents=True)
+    random = np.random.default_rng(20261122)
+    for k in range(1100):
+        folder = place / "b b" if k % 3 else place
+        d = random.normal(size=1024) + 200 * (np.arange(1024) < 1)
+        ns.Measurement(d=d, rows="zig-zag", n=32).save(folder / f"{k:04}.npz")
+    (place / "0000.npz").write_bytes(b"PK damaged")
+    (place / "empty.csv").write_bytes(b"")
+    (place / "notes.md").write_text("none")
+    return place
+
+
+OPTIONS = ["--method", "omp", "--sampling", "30%", "--sparsity", "60"]
+
+
+def run(cli, *words, options=OPTIONS):
+    command = [cli, "reconstruct", *map(str, words), *options, "--json"]
+    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
+
+
+@pytest.fixture(scope="module")
+def local(cli, archive, tmp_path_factory):
+    """The table of the same files on this machine."""
+    out = tmp_path_factory.mktemp("local") / "table.parquet"
+    made = run(cli, archive, "--out", out)
+    assert made.returncode == 1 and "2 of 1101 files" in made.stderr, made.stderr
+    return out.read_bytes()
+
+
+def same(table, local, archive, address):
+    """Whether two tables have the same bytes, but for the place that reasons of bad files name."""
+    pq = pytest.importorskip("pyarrow.parquet")
+
+    def rows(content):
+        return content[: -8 - int.from_bytes(content[-8:-4], "little")]
+
+    def about(content):
+        return pq.read_metadata(io.BytesIO(content)).metadata[b"nirspi.archive"].decode()
+
+    assert about(table).count(address) == 2
+    return rows(table) == rows(local) and about(table).replace(address, str(archive)) == about(local)
+
+
+@pytest.fixture(scope="module")
+def s3(archive, tmp_path_factory):
+    """A bucket with the files under `archive/`."""
+    port = free_port()
+    log = tmp_path_factory.mktemp("s3") / "log"
+    server = started([BIN / "moto_server", "-H", "127.0.0.1", "-p", port], port, log)
+    set_before = dict(os.environ)
+    os.environ.update(
+        AWS_ENDPOINT=f"http://127.0.0.1:{port}",
+        AWS_ALLOW_HTTP="true",
+        AWS_ACCESS_KEY_ID="test",
+        AWS_SECRET_ACCESS_KEY="test",
+        AWS_DEFAULT_REGION="us-east-1",
+    )
+    try:
+        client = boto3.client("s3", endpoint_url=os.environ["AWS_ENDPOINT"])
+        client.create_bucket(Bucket="lab")
+        for path in sorted(archive.rglob("*.*")):
+            client.upload_file(str(path), "lab", "archive/" + path.relative_to(archive).as_posix())
+        yield client
+    finally:
+        os.environ.clear()
+        os.environ.update(set_before)
+        ended(server)
+
+
+def keys(client, prefix):
+    pages = client.get_paginator("list_objects_v2").paginate(Bucket="lab", Prefix=prefix)
+    return [one["Key"] for page in pages for one in page.get("Contents", [])]
+
+
+def content(client, key):
+    return client.get_object(Bucket="lab", Key=key)["Body"].read()
+
+
+def test_s3_gives_and_takes_the_bytes_of_a_local_run(cli, s3, archive, local):
+    made = run(cli, "s3://lab/archive", "--out", "s3://lab/tables/all.parquet", "--jobs", 4)
+    assert made.returncode == 1, made.stderr
+    told = json.loads(made.stdout)
+    assert (told["rows"], told["files"], told["out"]) == (1099, 1101, "s3://lab/tables/all.parquet")
+    assert [one["file"] for one in told["skipped"]] == ["0000.npz", "empty.csv"]
+    assert told["skipped"][0]["reason"].startswith("s3://lab/archive/0000.npz: ")
+    assert told["skipped"][1]["reason"].startswith("s3://lab/archive/empty.csv: ")
+    table = content(s3, "tables/all.parquet")
+    assert same(table, local, archive, "s3://lab/archive") and told["bytes"] == len(table)
+    assert keys(s3, "tables/") == ["tables/all.parquet"]
+    again = run(cli, "s3://lab/archive", "--out", "s3://lab/tables/all.parquet", "--resume")
+    assert json.loads(again.stdout)["jobs"] == 0
+
+
+def test_a_run_that_is_killed_loses_a_group_and_goes_on(cli, s3, archive, local, tmp_path):
+    out = "s3://lab/killed/table.parquet"
+    parts = "killed/table.parquet.parts/"
+    command = [cli, "reconstruct", "s3://lab/archive", "--out", out, *OPTIONS, "--jobs", "1"]
+    with open(tmp_path / "log", "wb") as log:
+        running = subprocess.Popen(command, stdout=log, stderr=log)
+    try:
+        for _ in range(1200):
+            if f"{parts}000001.json" in keys(s3, parts):
+                break
+            assert running.poll() is None, (tmp_path / "log").read_text()
+            time.sleep(0.05)
+    finally:
+        os.kill(running.pid, signal.SIGKILL)
+        running.wait()
+    assert "killed/table.parquet" not in keys(s3, "killed/")
+    refused = run(cli, "s3://lab/archive", "--out", out)
+    assert refused.returncode == 1 and "an earlier run was interrupted" in refused.stderr
+    assert f"{out}.parts" in refused.stderr and refused.stderr.count("\n") == 1
+    lines = [key for key in keys(s3, parts) if key.endswith(".json")]
+    kept = json.loads(content(s3, lines[-1]).splitlines()[0])["done"]
+    resumed = run(cli, "s3://lab/archive", "--out", out, "--resume")
+    told = json.loads(resumed.stdout)
+    assert 512 <= told["files_before"] == kept and told["rows"] == 1099
+    assert same(content(s3, "killed/table.parquet"), local, archive, "s3://lab/archive")
+    assert keys(s3, "killed/") == ["killed/table.parquet"]
+
+
+def test_shards_and_sets_are_written_to_a_store(cli, s3, archive):
+    shards = [f"shards/{k}.parquet" for k in (1, 2)]
+    for k, key in enumerate(shards, 1):
+        options = ["--method", "hadamard", "--shard", f"{k}/2"]
+        run(cli, "s3://lab/archive/b b", "--out", f"s3://lab/{key}", options=options)
+    pq = pytest.importorskip("pyarrow.parquet")
+    tables = [pq.read_table(io.BytesIO(content(s3, key))) for key in shards]
+    names = [name for table in tables for name in table.column("file").to_pylist()]
+    assert sorted(names) == sorted(path.name for path in (archive / "b b").iterdir())
+    command = [cli, "dataset", "--samplings", "10%", "--frames", "2", "--out", "s3://lab/set.parquet"]
+    made = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert "wrote the data card to s3://lab/set.md" in made.stdout
+    assert "**simulated**" in content(s3, "set.md").decode()
+    assert pq.read_table(io.BytesIO(content(s3, "set.parquet"))).num_rows == 1
+
+
+def test_a_large_table_goes_in_pieces(cli, s3, archive, tmp_path):
+    # More than one piece of 8 MiB.
+    options = ["--method", "hadamard"]
+    run(cli, archive, "--out", tmp_path / "t.parquet", options=options)
+    expected = (tmp_path / "t.parquet").read_bytes()
+    assert len(expected) > 8 << 20
+    run(cli, archive, "--out", "s3://lab/large.parquet", options=options)
+    assert content(s3, "large.parquet") == expected
+
+
+@pytest.mark.parametrize(
+    ("folder", "out", "told"),
+    [
+        ("s3://lab/none", "t.parquet", "s3://lab/none: no measurement files in the folder"),
+        ("s3://gone/a", "t.parquet", "s3://gone/a: "),
+        ("s3://lab/archive", "s3://gone/t.parquet", "s3://gone/t.parquet"),
+        ("s3://", "t.parquet", "expected an address such as s3://bucket/folder"),
+        ("http://127.0.0.1:9/a", "t.parquet", "http://127.0.0.1:9/a: cannot list it: "),
+    ],
+)
+def test_what_cannot_be_reached_is_one_line(cli, s3, tmp_path, folder, out, told):
+    out = out if "://" in out else tmp_path / out
+    began = time.monotonic()
+    made = run(cli, folder, "--out", out, options=["--method", "hadamard"])
+    assert made.returncode == 1 and told in made.stderr, made.stderr
+    assert made.stderr.count("\n") == 1 and time.monotonic() - began < 60
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.fixture(scope="module")
+def webdav(archive, tmp_path_factory):
+    """A WebDAV server of the folder above the archive, for one user."""
+    port = free_port()
+    place = tmp_path_factory.mktemp("webdav")
+    settings = {
+        "host": "127.0.0.1",
+        "port": port,
+        "provider_mapping": {"/": str(archive.parent)},
+        "http_authenticator": {"domain_controller": None, "accept_basic": True, "accept_digest": False},
+        "simple_dc": {"user_mapping": {"*": {"me": {"password": "secret"}}}},
+        "lock_storage": False,
+        "verbose": 1,
+    }
+    (place / "wsgidav.json").write_text(json.dumps(settings))
+    server = started([BIN / "wsgidav", "--config", place / "wsgidav.json"], port, place / "log")
+    try:
+        yield f"127.0.0.1:{port}"
+    finally:
+        ended(server)
+
+
+def test_webdav_gives_and_takes_the_bytes_of_a_local_run(cli, webdav, archive, local):
+    address = f"http://me:secret@{webdav}"
+    made = run(cli, f"{address}/archive", "--out", f"{address}/made/t.parquet", "--jobs", 4)
+    assert made.returncode == 1 and "secret" not in made.stderr + made.stdout, made.stderr
+    told = json.loads(made.stdout)
+    assert (told["rows"], told["files"]) == (1099, 1101)
+    assert told["out"] == f"http://me:***@{webdav}/made/t.parquet"
+    table = (archive.parent / "made/t.parquet").read_bytes()
+    assert same(table, local, archive, f"http://me:***@{webdav}/archive")
+    wrong = run(cli, f"http://me:wrong@{webdav}/archive", "--out", "t.parquet")
+    assert wrong.returncode == 1 and "the store refuses these credentials" in wrong.stderr, wrong.stderr
+    with pytest.raises(urllib.error.HTTPError, match="401"):
+        urllib.request.urlopen(f"http://{webdav}/archive/0001.npz")
+
+
+def test_a_file_address_is_a_folder_of_this_machine(cli, archive, local, tmp_path):
+    made = run(cli, archive.as_uri(), "--out", (tmp_path / "a b.parquet").as_uri())
+    assert made.returncode == 1, made.stderr
+    assert (tmp_path / "a b.parquet").read_bytes() == local
