@@ -40,6 +40,9 @@ fn the_version_of_a_camera_of_the_future_is_read_from_its_answer_alone() {
     assert_eq!(hello_of_any_version(&future), Some((200, 300)));
     // Cut short, and an answer to another command.
     assert_eq!(hello_of_any_version(&future[..5]), None);
+    // Reply, Ok, and another answer that begins with a number; an event.
+    assert_eq!(hello_of_any_version(&[0, 0xC8, 0x01, 0, 4, 0xAC, 0x02, 9, 9, 9]), None);
+    assert_eq!(hello_of_any_version(&[1, 0xC8, 0x01, 0, 0, 0xAC, 0x02, 9, 9, 9]), None);
     let mut room = [0; 64];
     let done = DeviceMessage::Reply(Reply { id: 200, outcome: Ok(Answer::Done) });
     let mut packet = encode(&done, &mut room).unwrap().to_vec();
