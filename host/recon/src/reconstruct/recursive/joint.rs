@@ -5,8 +5,15 @@ use super::past::{Past, Pose};
 
 /// The readings of all positions, as seen from the last one.
 pub(super) struct Joint {
-    /// For each position: the motion back to it, unless it is the last one; values; weights.
-    pub poses: Vec<(Option<[Operator; 2]>, Vec<f32>, Vec<f32>)>,
+    poses: Vec<Rows>,
+}
+
+/// The rows of one position.
+struct Rows {
+    /// The motion back to the position and the transposed motion, unless it is the last position.
+    back: Option<[Operator; 2]>,
+    values: Vec<f32>,
+    weights: Vec<f32>,
 }
 
 impl Joint {
@@ -17,8 +24,8 @@ impl Joint {
                 let transposed = back.transposed();
                 [back, transposed]
             });
-            let weight = known.precision(noise).iter().map(|p| p * noise * noise).collect();
-            (back, known.value.clone(), weight)
+            let weights = known.precision(noise).iter().map(|p| p * noise * noise).collect();
+            Rows { back, values: known.value.clone(), weights }
         };
         Self { poses: past.poses.iter().map(of).collect() }
     }
@@ -30,9 +37,9 @@ impl Joint {
         weighted: impl Fn(Option<&Operator>, &[f32], &[f32]) -> Vec<f32>,
     ) -> Vec<f32> {
         let mut sum: Vec<f32> = Vec::new();
-        for (operators, values, weights) in &self.poses {
-            let there = weighted(operators.as_ref().map(|[back, _]| back), values, weights);
-            let here = match operators {
+        for Rows { back, values, weights } in &self.poses {
+            let there = weighted(back.as_ref().map(|[back, _]| back), values, weights);
+            let here = match back {
                 Some([_, transposed]) => transposed.apply(&there),
                 None => there,
             };
