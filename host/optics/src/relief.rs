@@ -195,7 +195,7 @@ mod tests {
 
     /// A stripe pattern whose left half is at `left_mm` and whose right half is at `right_mm`.
     fn halves(left_mm: f32, right_mm: f32) -> Relief {
-        let stripe = |at: usize| if at % SIZE / 4 % 2 == 0 { 0.9 } else { 0.1 };
+        let stripe = |at: usize| if (at % SIZE / 4).is_multiple_of(2) { 0.9 } else { 0.1 };
         let half = |at: usize| if at % SIZE < SIZE / 2 { left_mm } else { right_mm };
         let all = || 0..SIZE * SIZE;
         Relief::new(all().map(stripe).collect(), all().map(half).collect(), SIZE).unwrap()
