@@ -278,7 +278,7 @@ fn side_by_side(
                 vec![metrics(&report.reconstruction), report.method.short()],
             ),
             panel(
-                "fused with depth",
+                "enlarged by a network",
                 2 * side,
                 &images.fused,
                 vec![
@@ -341,7 +341,7 @@ fn say(args: &Args, report: &Report) -> Result<()> {
     print::line(format_args!("{}", report.method))?;
     let enhancement = &report.enhancement;
     print::line(format_args!("at 64 x 64, Lanczos: {}", quality_line(&enhancement.upscaled)))?;
-    print::line(format_args!("fused with depth:    {}", quality_line(&enhancement.fused)))?;
+    print::line(format_args!("enlarged by network: {}", quality_line(&enhancement.fused)))?;
     print::line(format_args!(
         "deblurred:           {} (blur {}, noise {:.4} estimated, inconsistency {:.2})",
         quality_line(&enhancement.deblurred),

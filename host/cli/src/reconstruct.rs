@@ -34,7 +34,7 @@ use std::process::ExitCode;
     \x20 nirspi reconstruct wing.npz --method omp --sampling 30% --basis dct --out out/\n\
     \x20 nirspi reconstruct spyrit.npy --shown walsh-2d --out out/\n\
     \x20 nirspi reconstruct dmd.npz --matrix patterns.npy --method tv --out out/\n\
-    \x20 nirspi reconstruct rec.mcap --index all --method omp --warm-start --sampling 0.3 --out video/\n\
+    \x20 nirspi reconstruct rec.mcap --index all --warm-start --sampling 0.3 --out video/\n\
     \x20 nirspi reconstruct archive/ --jobs 8 --resume --shard 2/4 --out table-2.parquet")]
 pub struct Args {
     /// Share of all n x n patterns to use: 0.3, 30% or 30
@@ -51,7 +51,8 @@ pub struct Args {
     #[arg(long, value_name = "NPY", conflicts_with_all = ["order", "keep", "residual", "stop_at_noise", "as_printed",
           "non_differential", "readings", "shown", "side", "transpose", "keep_leak", "warm_start"])]
     matrix: Option<PathBuf>,
-    /// OMP with --index all: start each frame from the frame before, as long as the result explains the readings as well
+    /// With --index all: start each frame from the frames before. omp starts from their atoms, as long as the result explains
+    /// the readings as well; the other methods from their patterns, moved with the scene and weighted by what is left of them
     #[arg(long, conflicts_with_all = ["dictionary", "non_negative"])]
     warm_start: bool,
     /// Also enlarge and deblur an image of 32 x 32 or 64 x 64 pixels by networks (enhanced.npy and enhanced.png). The mean

@@ -19,7 +19,7 @@ use nirspi_recon::{Sampling, Side};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Show a camera live on a web page: reconstructed, fused with depth and deblurred, with every frame accounted for
+/// Show a camera live on a web page: reconstructed, enlarged and deblurred, with every frame accounted for
 ///
 /// The command prints the address of the page, on which every setting can be changed (docs/live-page.md). The stop button,
 /// Escape and the space bar switch the LEDs off. If the link to the camera is lost, the program opens the camera again. After

@@ -146,6 +146,8 @@ from_libraries!(
     nirspi_nets::metrics::FrechetError,
     nirspi_nets::upscale::UpscaleError,
     nirspi_nets::weights::WeightsError,
+    nirspi_nets::DepthError,
+    nirspi_optics::ReliefError,
     nirspi_optics::SceneError,
     nirspi_optics::ProjectorError,
     nirspi_optics::rig::RigError,

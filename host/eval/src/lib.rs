@@ -13,6 +13,7 @@
 //! | [`trust`] | how far can a pixel of an enhanced image be from the truth, and which character does the image show? |
 //! | [`sampling`] | how good are images of a part of the patterns, by order, basis and method? |
 //! | [`completion`] | how well does each method complete known scenes? |
+//! | [`video`] | what do the frames before add to a frame of a moving scene? |
 //! | [`sets`] | how alike are two stacks of images, one by one and as sets? |
 //! | [`mod@bench`] | how many frames a second does this machine reconstruct and enhance? |
 //! | [`camera_model`] | what follows from a camera description? |
@@ -41,6 +42,7 @@ pub mod table4;
 pub mod train;
 pub mod trust;
 pub mod typefaces;
+pub mod video;
 
 mod error;
 mod fid;

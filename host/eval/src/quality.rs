@@ -11,11 +11,13 @@
 mod characters;
 mod charts;
 mod contenders;
+mod depth;
 mod measure;
 mod others;
 
 pub use characters::{Character, Characters, Origin};
 pub use contenders::{Contender, Method, Version};
+pub use depth::{Depth, DepthRow, Use as DepthUse};
 pub use measure::{Condition, Figures};
 pub use others::Case;
 
@@ -83,6 +85,8 @@ pub struct Report {
     pub conditions: Vec<Figures>,
     /// Each method with each number of steps at the middle condition.
     pub steps: Vec<Figures>,
+    /// What the depth sensor adds, on scenes with two characters at two distances.
+    pub depth: Vec<DepthRow>,
     /// Results for scenes other than characters.
     pub others: Vec<Case>,
     /// Notes about stacks with fewer images than requested.
@@ -102,6 +106,7 @@ pub struct Study {
     characters: Characters,
     few: Characters,
     scenes: Vec<others::Scene>,
+    depth: depth::Tools,
 }
 
 /// The report, and its pictures by file name.
@@ -134,7 +139,19 @@ impl Study {
         let (contenders, stepped) = (ready(&Method::ALL)?, ready(&stepped(settings.most_steps))?);
         let bridge = Contender::new(Method::Diffusion(1), &mut networks)?;
         let weights = Version::all(&mut networks)?;
-        Ok(Self { settings, contenders, stepped, bridge, weights, judges, characters, few, scenes })
+        let depth = depth::Tools::new(&mut networks)?;
+        Ok(Self {
+            settings,
+            contenders,
+            stepped,
+            bridge,
+            weights,
+            judges,
+            characters,
+            few,
+            scenes,
+            depth,
+        })
     }
 
     /// Number of images to enhance.
@@ -142,6 +159,7 @@ impl Study {
     pub fn images(&self) -> usize {
         self.contenders.len() * conditions().len() * self.characters.len()
             + self.stepped.len() * self.few.len()
+            + depth::images(&self.characters)
     }
 
     /// Measures. `done` is called with the number of images just enhanced.
@@ -156,6 +174,8 @@ impl Study {
         let shown = others::enhance(&self.scenes, &self.bridge)?;
         let mut pictures = charts::all(&measured, &steps, characters, few);
         pictures.push(("others.png", shown.picture.render()));
+        let depth = depth::ablation(characters, &self.depth, seed, done)?;
+        pictures.push(("depth.png", depth.picture.render()));
         let report = Report {
             simulated: true,
             seed,
@@ -163,6 +183,7 @@ impl Study {
             weights: self.weights.clone(),
             conditions: measured,
             steps,
+            depth: depth.rows,
             others: shown.cases,
             notes: characters.notes().to_vec(),
         };

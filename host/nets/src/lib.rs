@@ -42,6 +42,7 @@ mod spread;
 pub mod train;
 pub mod upscale;
 pub mod weights;
+pub mod zones;
 
 pub use choice::{Networks, UsedWeights};
 pub use consistency::{MeasuredRows, MeasuredRowsError};
@@ -57,3 +58,4 @@ pub use interval::{Intervals, NoIntervals};
 pub use nirspi_weights::HELD_OUT;
 pub use upscale::{UpscaleError, upscale_2x};
 pub use weights::{Weights, WeightsError};
+pub use zones::BlurZones;

@@ -6,6 +6,7 @@
 //! |---|---|---|
 //! | [`scene`] | a picture | reflectance on a target plane, in millimetres |
 //! | [`projector`] | scene and distance | [`Footprint`]: the reflectance that each LED's spot sees |
+//! | [`relief`] | a picture and the distance of each pixel | the light of each LED, with the defocus of each distance |
 //! | [`budget`] | watts, apertures, distance | electrons per ADC sample for one LED, and for daylight |
 //! | [`mod@array`] | 32 row and 32 column lines | electrons per ADC sample for the LEDs they light |
 //! | [`chain`] | electrons, one clock at a time | 14-bit ADC samples with noise, settling and latency |
@@ -43,6 +44,7 @@ pub mod pixel;
 pub mod projector;
 pub mod rain;
 pub mod range;
+pub mod relief;
 pub mod rig;
 pub mod safety;
 pub mod scene;
@@ -57,4 +59,5 @@ pub use chain::{AdcSample, Chain, ChainError, ChainSettings};
 pub use depth::{DEPTH_SIDE, DepthError, DepthGeometry, DepthView, SimulatedDepth};
 pub use instrument::{LEDS, SIDE, WAVELENGTH_NM};
 pub use projector::{Footprint, Projector, ProjectorError};
+pub use relief::{Relief, ReliefError};
 pub use scene::{Scene, SceneError};

@@ -70,7 +70,7 @@ REFUSED = [
     (lambda: ns.reconstruct(GOOD, method="omp", non_negative=True), "pixel basis"),
     (lambda: ns.reconstruct(GOOD, method="omp", dictionary=np.zeros((1, 4, 4))), "expected (N, 8, 8)"),
     (lambda: ns.reconstruct(GOOD, method="omp", dictionary=np.full((1, 8, 8), np.nan)), "NaN"),
-    (lambda: ns.reconstruct(GOOD, warm_start=True), "warm-start belongs to omp"),
+    (lambda: ns.reconstruct(GOOD, method="hadamard", warm_start=True), "warm-start belongs to omp"),
     (lambda: ns.reconstruct(GOOD, keep="some"), "unknown completion"),
     (lambda: ns.reconstruct(GOOD, as_printed=True, method="omp"), "as_printed needs sparsity"),
     (lambda: ns.reconstruct(GOOD, device="tpu"), "unknown backend"),

@@ -18,7 +18,7 @@ pub enum Passed {
     Counted,
     /// The image is reconstructed.
     Reconstructed,
-    /// The image is fused with depth and deblurred.
+    /// The image is enlarged and deblurred.
     Enhanced,
     /// The image is handed to the connection of a page.
     Sent,

@@ -15,7 +15,8 @@ use std::process::ExitCode;
 ///
 /// Sharp 64 x 64 images are blurred (Gaussian, sigma in pixels of 64), sampled to 32 x 32 by means of 2 x 2, given
 /// noise, and enhanced by every row: Lanczos, three classical methods that get blur and noise, and the networks, which
-/// get neither. Writes quality.json, charts and a picture of scenes that are no letters.
+/// get neither. Also says what the depth sensor adds to scenes with two characters at two distances. Writes quality.json,
+/// charts, and pictures of scenes that are no letters and of the two distances.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n\
     \x20 nirspi eval quality --data chars74k/ --scenes scenes/ --spi spi/ --out quality/")]
@@ -93,27 +94,18 @@ fn say(args: &Args, report: &Report) -> Result<()> {
     let versions: Vec<String> = report.weights.iter().map(version).collect();
     print::line(format_args!("weights: {}", versions.join(", ")))?;
     print::line("PSNR dB / SSIM / Fréchet character distance / characters seen right")?;
-    let at = |c: &Condition| format!("sigma {} px, noise {}", c.sigma_px, c.noise);
     let mut shown: Option<Condition> = None;
     for figures in report.conditions.iter().chain(&report.steps).filter(|f| f.stack.is_none()) {
         if shown.replace(figures.condition) != Some(figures.condition) {
-            print::line(at(&figures.condition))?;
+            print::line(figures.condition)?;
         }
-        let accuracy = figures.character_accuracy.map_or_else(String::new, |a| format!("  {a:.2}"));
-        let over_gan = figures
-            .psnr_minus_gan_db
-            .map_or_else(String::new, |d| format!("  minus GAN {} dB", d.text(2)));
-        print::line(format_args!(
-            "  {:<22} {:5.2} [{:5.2}, {:5.2}]  {:.3}  {:7.2}{accuracy}{over_gan}  ({} images)",
-            figures.row,
-            figures.psnr_db.value,
-            figures.psnr_db.low,
-            figures.psnr_db.high,
-            figures.ssim.value,
-            figures.frechet_character_distance.value,
-            figures.images
-        ))?;
+        print::line(figures)?;
     }
+    print::line("two characters at two distances, by what is known of the distances:")?;
+    report.depth.iter().try_for_each(print::line)?;
     print::notes(&report.notes)?;
-    print::line(format_args!("wrote charts, others.png and quality.json to {}", args.out.display()))
+    print::line(format_args!(
+        "wrote charts, others.png, depth.png and quality.json to {}",
+        args.out.display()
+    ))
 }

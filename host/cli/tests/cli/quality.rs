@@ -51,7 +51,13 @@ fn every_row_is_measured_on_the_same_unseen_images() {
     };
     // A bar is what total variation is made for.
     assert!(psnr("total variation", 2.0, 0.03) > psnr("Lanczos", 2.0, 0.03) + 2.0);
-    for name in ["blur.png", "noise.png", "steps.png", "others.png", "quality.json"] {
+    // 4 cases, 4 uses, 4 kinds of depth, on the one pair of characters.
+    let depth = report["depth"].as_array().unwrap();
+    assert_eq!(depth.len(), 4 * 4 * 4);
+    let none = depth.iter().filter(|row| row["depth"] == "none");
+    assert!(none.clone().all(|row| row["psnr_minus_none_db"]["value"] == 0.0), "{report}");
+    assert_eq!(none.count(), 16);
+    for name in ["blur.png", "noise.png", "steps.png", "others.png", "depth.png", "quality.json"] {
         assert!(bench.path("quality").join(name).is_file(), "{name}");
     }
 }

@@ -212,6 +212,39 @@ fn all_measurements_of_a_file_are_reconstructed_one_by_one_or_each_from_the_one_
     bench.run(&["eval", "sampling", "in.npz", "--index", "all"]).failed(2, &["one measurement"]);
 }
 
+#[test]
+fn frames_of_some_patterns_each_make_up_one_scene_with_those_before() {
+    let (bench, measured) = (Bench::new(), Measured::new(16));
+    let count = measured.h_row.len();
+    // Each frame has every fourth pattern, and NaN for the others.
+    let of = |frame: usize, k: usize| k % 4 == frame % 4 || measured.h_row[k] < 64.0;
+    let d: Vec<f32> = (0..8 * count)
+        .map(|at| if of(at / count, at % count) { measured.d[at % count] } else { f32::NAN })
+        .collect();
+    let fields: [(&str, &[usize], &[f32]); 3] = [
+        ("n", &[], &[measured.n as f32]),
+        ("h_row", &[count], &measured.h_row),
+        ("d", &[8, count], &d),
+    ];
+    bench.write("in.npz", &npz(&fields));
+    let all = ["reconstruct", "in.npz", "--index", "all"];
+    bench.run(&[&all[..], &["--out", "cold"]].concat()).succeeded();
+    let warm = bench.run(&[&all[..], &["--out", "warm", "--warm-start"]].concat()).succeeded();
+    assert!(warm.stdout.contains("7 started from the frame before"), "{}", warm.stdout);
+    let note = bench.json("warm/report.json")["frames"][7]["penalty"]["note"].to_string();
+    assert!(note.contains("patterns known, scene moved by 0 px down and 0 px right"), "{note}");
+    let last = |path: &str| correlation(&bench.pixels(path)[7 * 256..], &measured.image);
+    let (cold, warm) = (last("cold/image.npy"), last("warm/image.npy"));
+    assert!(warm > cold, "{cold} {warm}");
+    let haar = [&all[..], &["--warm-start", "--basis", "haar"]].concat();
+    bench.run(&haar).failed(1, &["frame before", "dct basis, found haar"]);
+    let tv = [&all[..], &["--warm-start", "--method", "tv", "--out", "tv"]].concat();
+    bench.run(&tv).succeeded();
+    assert!(last("tv/image.npy") > 0.9, "{cold}");
+    let zeros = [&all[..], &["--warm-start", "--method", "hadamard"]].concat();
+    bench.run(&zeros).failed(2, &["--warm-start belongs to --method omp, tikhonov, fista"]);
+}
+
 /// Patterns of zeros and ones that no one has a name for, and what they measure of the phantom.
 fn own_patterns(measured: &Measured, patterns: usize) -> (Vec<f32>, Vec<f32>) {
     let area = measured.n * measured.n;

@@ -202,7 +202,7 @@ fn classical_chain(method: Classical, readings: &[f32], condition: Condition) ->
 
 /// Factor by which interpolation changes the standard deviation of white noise: the root of the
 /// mean, over the four positions of an output pixel, of the sum of its squared weights.
-fn interpolation_gain() -> Result<f32> {
+pub(super) fn interpolation_gain() -> Result<f32> {
     const STEP: f32 = 0.25;
     let mut grey = vec![0.5; 16 * 16];
     grey[8 * 16 + 8] += STEP;

@@ -18,6 +18,7 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 use serde::Serialize;
+use std::fmt;
 
 /// Side of an image.
 pub const SIDE: usize = 64;
@@ -106,6 +107,31 @@ pub struct Figures {
     /// Distance of the readings from the readings of the images, divided by the noise: near 1 they
     /// agree. `null` without noise.
     pub inconsistency: Option<Interval>,
+}
+
+impl fmt::Display for Condition {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "sigma {} px, noise {}", self.sigma_px, self.noise)
+    }
+}
+
+impl fmt::Display for Figures {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Interval { value, low, high } = self.psnr_db;
+        let (ssim, distance) = (self.ssim.value, self.frechet_character_distance.value);
+        write!(
+            f,
+            "  {:<22} {value:5.2} [{low:5.2}, {high:5.2}]  {ssim:.3}  {distance:7.2}",
+            self.row
+        )?;
+        if let Some(accuracy) = self.character_accuracy {
+            write!(f, "  {accuracy:.2}")?;
+        }
+        if let Some(difference) = self.psnr_minus_gan_db {
+            write!(f, "  minus GAN {} dB", difference.text(2))?;
+        }
+        write!(f, "  ({} images)", self.images)
+    }
 }
 
 /// The judge of characters.

@@ -92,7 +92,7 @@ def reconstruct(
     keep : {"measured", "sparse"}, optional
         Whether measured coefficients stay or take the values of the fit.
     warm_start : bool
-        OMP: start each measurement from the one before.
+        Start each measurement from those before it; not for ``hadamard`` and ``pseudo-inverse``.
     matrix : array_like, (M, n * n), optional
         Patterns of your own instead of Hadamard rows.
     n : int, optional

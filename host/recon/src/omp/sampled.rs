@@ -32,9 +32,9 @@ use super::dictionary::{Atoms, Dictionary, padded};
 use crate::basis::{Basis, Transform};
 use crate::fwht;
 use pulp::Arch;
-use walsh::WalshCosines;
 
 pub(crate) use visible::visible_energy;
+pub(crate) use walsh::WalshCosines;
 
 mod visible;
 mod walsh;

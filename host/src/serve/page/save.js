@@ -19,7 +19,7 @@ export function sheet({ state, enhanced }) {
     `${camera.simulated ? "simulated; " : ""}${foreign(camera.identity.board)} ${foreign(camera.identity.serial)}, `
       + new Date().toISOString(),
     `${picture.method}, ${frames(picture.frames)}, white ${fixed(picture.white_counts, 1)} ADC counts` + (found
-      ? `; fused with depth and deblurred: blur ${fixed(found.blur_px, 2)} px, noise ${fixed(found.noise, 3)} of white` : ""),
+      ? `; enlarged and deblurred: blur ${fixed(found.blur_px, 2)} px, noise ${fixed(found.noise, 3)} of white` : ""),
     `${account.received} received, ${account.lost} lost, ${account.corrupt} corrupt, ${account.late} late`,
   ];
   lines.forEach((line, at) => pen.fillText(line, gap, gap + side + 24 + 22 * at, sheet.width - 2 * gap));

@@ -5,7 +5,7 @@ export const MEANINGS = {
   "corrupt": "Frames that arrived damaged; their checksums did not match.",
   "counted": "The frame is in the account of all frames.",
   "delay": "Time from the moment at which the last bytes of a frame reached the program until a stage was done with the frame. An image has the delay of its newest frame.",
-  "enhanced": "The image is fused with depth and deblurred.",
+  "enhanced": "The image is enlarged and deblurred.",
   "inconsistency": "Distance between the readings and those that the enhanced image would give, over their noise. Near 1 or below, the readings support the image; far above, the network has invented something.",
   "late": "Frames that arrived after a later frame and were left out of the image.",
   "load": "Share of the time in which the thread that reads the camera is busy. Above 85 %, the page shows fewer images, then without enhancement; every frame is still counted and recorded.",

@@ -11,7 +11,7 @@ pub(in super::super) const METHOD: Method = Method(&Entry {
     argument: "fista",
     name: NAME,
     about: "Small sum of magnitudes of the coefficients (FISTA)",
-    takes: &[Setting::Basis, Setting::Strength],
+    takes: &[Setting::Basis, Setting::Strength, Setting::WarmStart],
     with_matrix: Some(MatrixMethod::Penalty(Penalty::Sparse)),
     prepare: |settings| penalised::prepare(NAME, Penalty::Sparse, settings),
 });

@@ -3,7 +3,7 @@
 use crate::Measurements;
 use crate::reconstruct::{
     MethodSettings, Penalty, Reconstruct, ReconstructError, Reconstruction, RegularisedSettings,
-    Report, regularised,
+    Report, fused_video, regularised,
 };
 
 struct Penalised {
@@ -42,5 +42,12 @@ impl Reconstruct for Penalised {
         report.trust = Some(found.trust);
         report.noise = Some(found.noise);
         Ok(Reconstruction { image: found.image, report })
+    }
+
+    fn reconstruct_video(
+        &self,
+        frames: &[Measurements],
+    ) -> Result<Vec<Reconstruction>, ReconstructError> {
+        fused_video(self, frames)
     }
 }

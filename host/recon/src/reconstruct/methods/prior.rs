@@ -1,9 +1,11 @@
 //! A learned prior: a network that completes the measurements.
 
 use crate::Measurements;
-use crate::reconstruct::method::Entry;
+use crate::reconstruct::method::{Entry, Setting};
 use crate::reconstruct::prior::{SharedNetwork, with_network};
-use crate::reconstruct::{Completion, Method, Reconstruct, ReconstructError, Reconstruction};
+use crate::reconstruct::{
+    Completion, Method, Reconstruct, ReconstructError, Reconstruction, fused_video,
+};
 
 const NAME: &str = "learned prior";
 
@@ -12,7 +14,7 @@ pub(in super::super) const METHOD: Method = Method(&Entry {
     argument: "prior",
     name: NAME,
     about: "Completed by a small network, as far as held-back measurements support the network; measured values stay within their noise",
-    takes: &[],
+    takes: &[Setting::WarmStart],
     with_matrix: None,
     prepare: |settings| {
         let (network, completion) = (settings.network.clone(), settings.completion);
@@ -33,5 +35,12 @@ impl Reconstruct for Prior {
     fn reconstruct(&self, measurements: &Measurements) -> Result<Reconstruction, ReconstructError> {
         let network = self.network.as_ref().map(SharedNetwork::get);
         with_network(measurements, network, self.completion, NAME)
+    }
+
+    fn reconstruct_video(
+        &self,
+        frames: &[Measurements],
+    ) -> Result<Vec<Reconstruction>, ReconstructError> {
+        fused_video(self, frames)
     }
 }

@@ -1,8 +1,12 @@
-//! Tikhonov's method, with a covariance prior.
+//! Tikhonov's method, with a covariance prior; for videos, the recursive estimate.
 
 use super::penalised;
 use crate::reconstruct::method::{Entry, Setting};
-use crate::reconstruct::{MatrixMethod, Method, Penalty};
+use crate::reconstruct::{
+    Completion, MatrixMethod, Method, MethodSettings, Penalty, Reconstruct, ReconstructError,
+    Reconstruction, Recursive, RecursiveFrame, RecursiveSettings, Report,
+};
+use crate::{Basis, Measurements};
 
 const NAME: &str = "Tikhonov";
 
@@ -11,7 +15,65 @@ pub(in super::super) const METHOD: Method = Method(&Entry {
     argument: "tikhonov",
     name: NAME,
     about: "Most likely image if coefficients fall as one over frequency (Tikhonov, a covariance prior)",
-    takes: &[Setting::Basis, Setting::Strength],
+    takes: &[Setting::Basis, Setting::Strength, Setting::WarmStart],
     with_matrix: Some(MatrixMethod::Penalty(Penalty::Tikhonov)),
-    prepare: |settings| penalised::prepare(NAME, Penalty::Tikhonov, settings),
+    prepare: |settings| Ok(Box::new(Tikhonov::new(settings)?)),
 });
+
+struct Tikhonov {
+    alone: Box<dyn Reconstruct>,
+    basis: Basis,
+    video: RecursiveSettings,
+}
+
+impl Tikhonov {
+    fn new(settings: &MethodSettings) -> Result<Self, ReconstructError> {
+        let (strength, completion) = (settings.strength, settings.completion());
+        Ok(Self {
+            alone: penalised::prepare(NAME, Penalty::Tikhonov, settings)?,
+            basis: settings.basis,
+            video: RecursiveSettings { strength, completion, ..RecursiveSettings::default() },
+        })
+    }
+}
+
+impl Reconstruct for Tikhonov {
+    fn name(&self) -> &str {
+        NAME
+    }
+
+    fn reconstruct(&self, measurements: &Measurements) -> Result<Reconstruction, ReconstructError> {
+        self.alone.reconstruct(measurements)
+    }
+
+    fn reconstruct_video(
+        &self,
+        frames: &[Measurements],
+    ) -> Result<Vec<Reconstruction>, ReconstructError> {
+        if self.basis != Basis::Dct {
+            return Err(ReconstructError::Failed(format!(
+                "frames that start from the frame before need the dct basis, found {}",
+                self.basis
+            )));
+        }
+        let mut estimate = Recursive::new(self.video)?;
+        let each = frames.iter().enumerate().map(|(at, frame)| {
+            let made = estimate.add(frame)?;
+            let report = report(&made, at, self.video.completion);
+            Ok(Reconstruction { image: made.image, report })
+        });
+        each.collect()
+    }
+}
+
+fn report(made: &RecursiveFrame, at: usize, completion: Completion) -> Report {
+    let mut report = Report::new(NAME);
+    report.basis = Some(Basis::Dct.to_string());
+    report.strength = Some(made.strength);
+    report.completion = Some(completion);
+    report.residual = Some(made.residual);
+    report.noise = Some(made.noise);
+    report.warm = made.warm;
+    report.note = made.note(at == 0);
+    report
+}

@@ -11,7 +11,7 @@ pub(in super::super) const METHOD: Method = Method(&Entry {
     argument: "tv",
     name: NAME,
     about: "Small total variation (Chambolle and Pock)",
-    takes: &[Setting::Strength],
+    takes: &[Setting::Strength, Setting::WarmStart],
     with_matrix: Some(MatrixMethod::Penalty(Penalty::TotalVariation)),
     prepare: |settings| penalised::prepare(NAME, Penalty::TotalVariation, settings),
 });

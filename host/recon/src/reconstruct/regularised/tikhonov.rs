@@ -12,8 +12,21 @@ pub(in crate::reconstruct) fn predict(
     strengths: &[f32],
     iterations: usize,
 ) -> Vec<Vec<f32>> {
+    let Masked { grid, mask } = Masked::new(problem, positions);
+    let seen = |rows: &mut Vec<f32>| rows.iter_mut().zip(&mask).for_each(|(v, mask)| *v *= mask);
+    solve(problem, grid, seen, strengths, iterations)
+}
+
+/// The predicted rows at each strength. `weigh` multiplies rows by the weights of what is known of
+/// them, where 1 is one reading, and `grid` has the known values, weighted so.
+pub(in crate::reconstruct) fn solve(
+    problem: &Problem<'_>,
+    mut grid: Vec<f32>,
+    weigh: impl Fn(&mut Vec<f32>),
+    strengths: &[f32],
+    iterations: usize,
+) -> Vec<Vec<f32>> {
     let scale = &problem.prior.scale;
-    let Masked { mut grid, mask } = Masked::new(problem, positions);
     see(problem, &mut grid);
     let right: Vec<f32> = grid.iter().zip(scale).map(|(v, s)| v * s).collect();
     let noise = problem.prior.noise.powi(2);
@@ -24,7 +37,7 @@ pub(in crate::reconstruct) fn predict(
             let operate = |z: &[f32]| -> Vec<f32> {
                 let mut seen: Vec<f32> = z.iter().zip(scale).map(|(z, s)| z * s).collect();
                 show(problem, &mut seen);
-                seen.iter_mut().zip(&mask).for_each(|(v, mask)| *v *= mask);
+                weigh(&mut seen);
                 see(problem, &mut seen);
                 seen.iter_mut()
                     .zip(scale)

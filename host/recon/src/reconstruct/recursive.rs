@@ -1,0 +1,311 @@
+//! A recursive estimate of a moving scene: each frame starts from what the frames before have
+//! shown.
+//!
+//! The state is one value and one variance for each Hadamard row (a Kalman filter with a diagonal
+//! covariance; R. E. Kalman, *A new approach to linear filtering and prediction problems*, 1960).
+//! The frames may measure different rows: a row that this frame leaves out keeps its value, and
+//! loses weight as the scene moves on. A frame is added in five steps:
+//!
+//! 1. **Motion**: the estimate is moved as a whole to where it agrees best with the readings, if
+//!    the gain in likelihood pays for two more parameters.
+//! 2. **Ageing**: the scene is taken as a Gaussian process whose cosine of frequency `f` (half
+//!    periods per side `n`) keeps the share `exp(-(pi f v / n)^2 / 2)` from frame to frame. That is
+//!    the mean over normal displacements of `v` pixels. The speed `v` is the likeliest of a list.
+//! 3. **Cut**: if a scene without any past is likelier than each speed, the frame starts anew.
+//! 4. **Fusion**: each measured row becomes the mean of old value and reading, weighted by their
+//!    variances.
+//! 5. **Completion**: the image is the most likely one given all rows with their own variances and
+//!    amplitudes that fall as one over frequency (Tikhonov's method with weights). Rows that were
+//!    read at earlier positions of the scene, six at most, count where they were read.
+//!
+//! # Invariant
+//! A frame without a past is the image of [`regularised`] with Tikhonov's penalty, bit for bit
+//! (`tests::a_cut_starts_anew_and_costs_nothing`). While nothing moves and all rows are measured,
+//! the image is the mean of the frames (`tests::a_still_scene_is_the_mean_of_its_frames`).
+
+mod joint;
+mod motion;
+mod past;
+mod rows;
+mod view;
+
+use super::regularised::tikhonov;
+use super::{
+    Completion, NoiseLevel, Penalty, Problem, Reconstruct, ReconstructError, Reconstruction,
+    RegularisedSettings, Strength, regularised,
+};
+use crate::basis::Basis;
+use crate::{Image, Measurements, Side, fwht};
+use joint::Joint;
+use motion::{SHIFTS, Shift, best_shift};
+use past::{Known, Past, Pose};
+use rows::Spectrum;
+use std::collections::VecDeque;
+use view::{Guess, View};
+
+/// Smallest noise, in units of the largest measurement: rounding.
+const LEAST_NOISE: f32 = 1e-6;
+
+/// Settings of [`Recursive`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RecursiveSettings {
+    /// Noise of a measurement.
+    pub noise: NoiseLevel,
+    /// Strength of the penalty. A cross-validated strength is chosen for frames without a past;
+    /// later frames take 1, what noise and prior call for.
+    pub strength: Strength,
+    /// Whether rows that are known at least as well as by one reading keep their fused values, or
+    /// take those of the fit.
+    pub completion: Completion,
+    /// Speed in pixels a frame; `None`: the likeliest for each frame.
+    pub speed_px: Option<f64>,
+    /// Whether the estimate is moved with the scene.
+    pub follow: bool,
+}
+
+impl Default for RecursiveSettings {
+    fn default() -> Self {
+        Self {
+            noise: NoiseLevel::Estimated,
+            strength: Strength::default(),
+            completion: Completion::Measured,
+            speed_px: None,
+            follow: true,
+        }
+    }
+}
+
+/// A frame of a recursive estimate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RecursiveFrame {
+    /// The image, in the measurements' units.
+    pub image: Image,
+    /// Whether the frames before had a part in the image.
+    pub warm: bool,
+    /// Motion of the whole scene since the frame before: down and to the right, in pixels.
+    pub shift_px: [f64; 2],
+    /// Motion that the common motion leaves out, in pixels a frame.
+    pub speed_px: f64,
+    /// The rows that are known nearly as well as by one reading, and their values: measurements
+    /// of a still scene, for any other method. Without a past these are the frame's.
+    pub fused: Measurements,
+    /// Norm of the difference between this frame's measurements and the image, relative to the
+    /// measurements' norm.
+    pub residual: f64,
+    /// Noise of a measurement, in the measurements' units.
+    pub noise: f64,
+    /// Strength of the penalty.
+    pub strength: f64,
+}
+
+impl RecursiveFrame {
+    /// What a reader should know about the frame, in a few words; nothing for a first frame.
+    #[must_use]
+    pub fn note(&self, is_first: bool) -> Option<String> {
+        let [down, right] = self.shift_px;
+        let (known, speed) = (self.fused.rows().len(), self.speed_px as f32);
+        match (self.warm, is_first) {
+            (true, _) => Some(format!(
+                "{known} patterns known, scene moved by {down} px down and {right} px right, other motion {speed} px"
+            )),
+            (false, false) => {
+                Some("another scene than in the frame before, so the frame started anew".to_owned())
+            }
+            (false, true) => None,
+        }
+    }
+}
+
+/// The images of a video by a method that gets, for each frame, the rows that this and earlier
+/// frames have shown.
+///
+/// # Errors
+/// The errors of the method and of [`Recursive::add`].
+pub fn fused_video(
+    method: &dyn Reconstruct,
+    frames: &[Measurements],
+) -> Result<Vec<Reconstruction>, ReconstructError> {
+    let mut estimate = Recursive::new(RecursiveSettings::default())?;
+    let each = frames.iter().enumerate().map(|(at, frame)| {
+        let fused = estimate.add(frame)?;
+        let mut made = method.reconstruct(&fused.fused)?;
+        made.report.warm = fused.warm;
+        let notes = [made.report.note.take(), fused.note(at == 0)];
+        let notes: Vec<String> = notes.into_iter().flatten().collect();
+        made.report.note = (!notes.is_empty()).then(|| notes.join(", "));
+        Ok(made)
+    });
+    each.collect()
+}
+
+/// What the frames so far have shown.
+#[derive(Debug, Clone)]
+pub struct Recursive {
+    settings: RecursiveSettings,
+    past: Option<Past>,
+}
+
+impl Recursive {
+    /// An estimate without a past.
+    ///
+    /// # Errors
+    /// [`ReconstructError`] if a setting is out of range.
+    pub fn new(settings: RecursiveSettings) -> Result<Self, ReconstructError> {
+        if let Some(found) = settings.speed_px
+            && !(0.0..=1e3).contains(&found)
+        {
+            let (setting, expected) = ("speed", "0 to 1000 pixels a frame");
+            return Err(ReconstructError::Setting { setting, found, expected });
+        }
+        settings.strength.check()?;
+        super::check_prior(FALLOFF, settings.noise)?;
+        Ok(Self { settings, past: None })
+    }
+
+    /// Forgets the past.
+    pub fn restart(&mut self) {
+        self.past = None;
+    }
+
+    /// Adds a frame. A frame of another side starts anew.
+    ///
+    /// # Errors
+    /// The errors of [`regularised`] for a frame without a past.
+    pub fn add(&mut self, frame: &Measurements) -> Result<RecursiveFrame, ReconstructError> {
+        let past = self.past.take().filter(|past| past.side == frame.side());
+        match past.and_then(|past| self.next(past, frame)) {
+            Some(made) => Ok(made),
+            None => self.start(frame),
+        }
+    }
+
+    /// The first frame of a scene.
+    fn start(&mut self, frame: &Measurements) -> Result<RecursiveFrame, ReconstructError> {
+        let RecursiveSettings { noise, strength, completion, .. } = self.settings;
+        let base = RegularisedSettings::new(Penalty::Tikhonov);
+        let found =
+            regularised(frame, &RegularisedSettings { noise, strength, completion, ..base })?;
+        let problem = Problem::of(frame, Basis::Dct, FALLOFF, noise);
+        let scale = (1.0 / problem.unit) as f32;
+        let mut mean: Vec<f32> = found.image.pixels().iter().map(|v| v * scale).collect();
+        walsh(problem.side, &mut mean);
+        let mut known = Known::nothing(problem.side);
+        known.add(&problem, problem.prior.noise.max(LEAST_NOISE));
+        self.past = Some(Past {
+            side: problem.side,
+            unit: problem.unit,
+            spectrum: Spectrum::new(problem.side),
+            mean,
+            poses: VecDeque::from([Pose { since: Shift::default(), known }]),
+            shift: Shift::default(),
+            noises: VecDeque::from([problem.prior.noise]),
+        });
+        Ok(RecursiveFrame {
+            image: found.image,
+            warm: false,
+            shift_px: [0.0; 2],
+            speed_px: 0.0,
+            fused: frame.clone(),
+            residual: found.residual,
+            noise: found.noise,
+            strength: found.strength,
+        })
+    }
+
+    /// A frame of the scene of the frames before; `None` if there is a cut.
+    fn next(&mut self, mut past: Past, frame: &Measurements) -> Option<RecursiveFrame> {
+        let mut problem = past.problem_of(frame, self.settings.noise);
+        let view = View::new(&past, &problem, self.settings.speed_px);
+        let stay = Guess {
+            shift: Shift::default(),
+            mean: past.mean.clone(),
+            information: past.information(view.noise),
+        };
+        let mut best = view.likeliest(&stay);
+        let mut guess = stay;
+        // Two more parameters must gain what the Bayesian information criterion asks for, and the
+        // best of many shifts more than that. A cut, which cannot be undone, must gain as much.
+        let cost = (problem.rows.len() as f32 * SHIFTS).ln();
+        if self.settings.follow {
+            let shift = best_shift(&past.spectrum, &past.mean, &view.weighted(&guess), past.shift);
+            if shift != Shift::default() {
+                let moved = guess.moved(&past.spectrum, shift);
+                let with = view.likeliest(&moved);
+                if with.gain > best.gain + cost {
+                    (best, guess) = (with, moved);
+                }
+            }
+        }
+        if self.settings.speed_px.is_none() && view.without_a_past() > best.gain + cost {
+            return None;
+        }
+        let (kept, prior) = (view.kept(best.speed_px), view.prior);
+        past.poses.iter_mut().for_each(|pose| pose.known.age(&kept, &prior));
+        past.move_by(guess.shift);
+        problem.prior.noise = past.noise(&problem, &guess.mean, self.settings.noise);
+        past.poses[0].known.add(&problem, problem.prior.noise);
+        let strength = match self.settings.strength {
+            Strength::Fixed(strength) => strength,
+            Strength::CrossValidated { .. } => 1.0,
+        };
+        Some(self.finish(past, &problem, strength, best.speed_px))
+    }
+
+    /// The image of the fused rows, and the new past.
+    fn finish(
+        &mut self,
+        mut past: Past,
+        problem: &Problem<'_>,
+        strength: f64,
+        speed_px: f32,
+    ) -> RecursiveFrame {
+        let noise = problem.prior.noise;
+        let joint = Joint::new(&past, noise);
+        let weigh = |rows: &mut Vec<f32>| *rows = joint.weigh(rows);
+        let mut made =
+            tikhonov::solve(problem, joint.right(), weigh, &[strength as f32], ITERATIONS)
+                .remove(0);
+        past.mean.clone_from(&made);
+        let fused = past.fused(noise);
+        if self.settings.completion == Completion::Measured && past.poses.len() == 1 {
+            let known = &past.poses[0].known;
+            for (row, precision) in known.precision(noise).into_iter().enumerate() {
+                if precision * noise.powi(2) >= 0.999 {
+                    made[row] = known.value[row];
+                }
+            }
+        }
+        let residual = problem.residual_of(&made);
+        walsh(past.side, &mut made);
+        let unit = past.unit;
+        let pixels = made.iter().map(|v| (f64::from(*v) * unit) as f32).collect();
+        let (side, shift_px) = (past.side, past.shift.pixels());
+        self.past = Some(past);
+        RecursiveFrame {
+            image: Image::new(side, pixels),
+            warm: true,
+            shift_px,
+            speed_px: speed_px.into(),
+            fused,
+            residual,
+            noise: f64::from(noise) * unit * side.pixels() as f64,
+            strength,
+        }
+    }
+}
+
+/// Power of the frequency with which amplitudes fall.
+const FALLOFF: f64 = 1.0;
+
+/// The most iterations of a frame.
+const ITERATIONS: usize = 200;
+
+/// Orthonormal Walsh-Hadamard transform: its own inverse.
+fn walsh(side: Side, grid: &mut [f32]) {
+    fwht::transform(grid);
+    let n = side.pixels() as f32;
+    grid.iter_mut().for_each(|v| *v /= n);
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,169 @@
+use super::*;
+use crate::testing::{normal, scene, side};
+use crate::{Order, Rows};
+use proptest::prelude::*;
+use rand::SeedableRng;
+use rand_pcg::Pcg64;
+
+/// The rows of a frame: the first of zig-zag order always, the others in turn.
+fn rows_of(side: Side, frame: usize, always: usize, of_others: usize) -> Rows {
+    let order = Order::ZigZag.rows(side).unwrap();
+    let turns = (side.area() - always).div_ceil(of_others);
+    let others = (always..side.area()).filter(|at| at % turns == frame % turns);
+    Rows::trusted(side, (0..always).chain(others).map(|at| order[at]).collect())
+}
+
+/// Readings of an image by some rows, with noise of a pixel of the image of all patterns.
+fn read(rows: &Rows, image: &[f64], noise: f64, seed: u64) -> Measurements {
+    let mut d = image.to_vec();
+    fwht::transform(&mut d);
+    let n = rows.side().pixels() as f64;
+    let mut random = Pcg64::seed_from_u64(seed);
+    let values =
+        rows.iter().map(|&row| d[row as usize] + n * noise * normal(&mut random)).collect();
+    Measurements::trusted(rows.clone(), values)
+}
+
+fn rms(image: &Image, truth: &[f64]) -> f64 {
+    let squares = image.pixels().iter().zip(truth).map(|(a, b)| (f64::from(*a) - b).powi(2));
+    (squares.sum::<f64>() / truth.len() as f64).sqrt()
+}
+
+/// A letter-like figure, moved by whole pixels.
+fn figure(side: Side, down: i64, right: i64) -> Vec<f64> {
+    let n = side.pixels() as i64;
+    let image = scene(side, 2);
+    let at = |r: i64, c: i64| image[(r.clamp(0, n - 1) * n + c.clamp(0, n - 1)) as usize];
+    (0..n * n).map(|p| at(p / n - down, p % n - right)).collect()
+}
+
+fn estimate(settings: RecursiveSettings, frames: &[Measurements]) -> Vec<RecursiveFrame> {
+    let mut estimate = Recursive::new(settings).unwrap();
+    frames.iter().map(|frame| estimate.add(frame).unwrap()).collect()
+}
+
+fn still() -> RecursiveSettings {
+    RecursiveSettings { speed_px: Some(0.0), follow: false, ..RecursiveSettings::default() }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(12))]
+    #[test]
+    fn a_still_scene_is_the_mean_of_its_frames(
+        kind in 0_u8..5, noise in 0.001_f64..0.2, count in 2_usize..9, seed in 0_u64..100,
+    ) {
+        let side = side(16);
+        let truth = scene(side, kind);
+        let all = Rows::natural(side);
+        let frames: Vec<Measurements> =
+            (0..count as u64).map(|k| read(&all, &truth, noise, 1000 * seed + k)).collect();
+        let settings = RecursiveSettings { noise: NoiseLevel::Known(16.0 * noise), ..still() };
+        let last = estimate(settings, &frames).pop().unwrap();
+        let mean: Vec<f64> = (0..side.area())
+            .map(|k| frames.iter().map(|f| f.values()[k]).sum::<f64>() / count as f64)
+            .collect();
+        let mean = super::super::hadamard(&Measurements::trusted(all, mean));
+        let mean: Vec<f64> = mean.pixels().iter().map(|&v| v.into()).collect();
+        prop_assert!(rms(&last.image, &mean) < 1e-3 * noise, "{}", rms(&last.image, &mean));
+        prop_assert!(last.warm && last.fused.rows().len() == side.area());
+    }
+
+    #[test]
+    fn while_nothing_moves_the_error_falls_with_the_root_of_the_number_of_frames(
+        noise in 0.01_f64..0.1, seed in 0_u64..100,
+    ) {
+        let side = side(32);
+        let truth = scene(side, 1);
+        let frames: Vec<Measurements> = (0..64)
+            .map(|k| read(&rows_of(side, k, 64, 240), &truth, noise, 1000 * seed + k as u64))
+            .collect();
+        // Four frames show every row once.
+        let made = estimate(still(), &frames);
+        let error = |frame: usize| rms(&made[frame].image, &truth);
+        prop_assert_eq!(made[3].fused.rows().len(), 1024);
+        for (frame, looks) in [(15, 4.0_f64), (63, 16.0)] {
+            let (found, expected) = (error(frame), noise / looks.sqrt());
+            prop_assert!(found < 1.1 * expected, "frame {}: {} {}", frame, found, expected);
+        }
+        prop_assert!(error(63) < 0.6 * error(15));
+    }
+}
+
+#[test]
+fn motion_and_speed_that_are_estimated_cost_a_still_scene_little() {
+    let side = side(32);
+    let truth = scene(side, 1);
+    for noise in [0.01, 0.1] {
+        let frame = |k: usize| read(&rows_of(side, k, 64, 240), &truth, noise, k as u64);
+        let frames: Vec<Measurements> = (0..64).map(frame).collect();
+        let error = |settings| rms(&estimate(settings, &frames)[63].image, &truth);
+        let (found, told) = (error(RecursiveSettings::default()), error(still()));
+        assert!(found < 1.5 * told, "noise {noise}: {found} against {told}");
+    }
+}
+
+#[test]
+fn a_cut_starts_anew_and_costs_nothing() {
+    let side = side(32);
+    let noise = 0.03;
+    let (before, after) = (scene(side, 2), scene(side, 1));
+    let frame = |k: usize, truth: &[f64]| read(&rows_of(side, k, 100, 200), truth, noise, k as u64);
+    let mut frames: Vec<Measurements> = (0..5).map(|k| frame(k, &before)).collect();
+    frames.push(frame(5, &after));
+    frames.push(frame(6, &after));
+    let made = estimate(RecursiveSettings::default(), &frames);
+    let warm: Vec<bool> = made.iter().map(|frame| frame.warm).collect();
+    assert_eq!(warm, [false, true, true, true, true, false, true]);
+    for k in [0, 5] {
+        let alone = regularised(&frames[k], &RegularisedSettings::new(Penalty::Tikhonov)).unwrap();
+        assert_eq!(made[k].image, alone.image);
+    }
+}
+
+#[test]
+fn a_moving_figure_is_followed_and_better_than_frame_by_frame() {
+    let side = side(32);
+    let noise = 0.05;
+    for (down, right) in [(0, 1), (1, -2), (0, 0)] {
+        let truths: Vec<Vec<f64>> =
+            (0..8).map(|k| figure(side, down * (k - 3), right * (k - 3))).collect();
+        let frames: Vec<Measurements> = truths
+            .iter()
+            .enumerate()
+            .map(|(k, truth)| read(&rows_of(side, k, 100, 200), truth, noise, k as u64))
+            .collect();
+        let made = estimate(RecursiveSettings::default(), &frames);
+        let (mut error, mut of_alone) = (0.0, 0.0);
+        for k in 4..8 {
+            let (found, motion) = (made[k].shift_px, [down as f64, right as f64]);
+            assert!(made[k].warm, "frame {k} of {motion:?}");
+            let near = |axis: usize| (found[axis] - motion[axis]).abs() <= 0.5;
+            assert!(near(0) && near(1), "{found:?} {motion:?}");
+            let settings = RegularisedSettings::new(Penalty::Tikhonov);
+            let alone = regularised(&frames[k], &settings).unwrap();
+            error += rms(&made[k].image, &truths[k]);
+            of_alone += rms(&alone.image, &truths[k]);
+        }
+        assert!(error < 0.65 * of_alone, "({down}, {right}): {error} against {of_alone}");
+    }
+}
+
+#[test]
+fn frames_without_light_of_another_side_and_out_of_range_are_no_trouble() {
+    let dark = |n: u64| read(&Rows::natural(side(n)), &vec![0.0; (n * n) as usize], 0.0, 0);
+    let frames = [dark(16), dark(16), dark(32), dark(32)];
+    let made = estimate(RecursiveSettings::default(), &frames);
+    for (frame, warm) in made.iter().zip([false, true, false, true]) {
+        assert!(frame.image.pixels().iter().all(|v| v.abs() < 1e-6), "{frame:?}");
+        assert_eq!(frame.warm, warm);
+    }
+    let mut estimate = Recursive::new(RecursiveSettings::default()).unwrap();
+    estimate.add(&frames[0]).unwrap();
+    estimate.restart();
+    assert!(!estimate.add(&frames[0]).unwrap().warm);
+    for speed in [-1.0, f64::NAN, 1e4] {
+        let settings = RecursiveSettings { speed_px: Some(speed), ..still() };
+        let error = Recursive::new(settings).err().unwrap();
+        assert!(matches!(error, ReconstructError::Setting { setting: "speed", .. }));
+    }
+}
