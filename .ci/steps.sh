@@ -42,6 +42,7 @@ by_name=(
     "crowd           nirspi serve among 1000 clients that misbehave, for CROWD_S seconds (600)"
     "zenoh           a camera over Zenoh: router, camera and host as processes; crates.io, 219 crates of which 95 are its own"
     "stores          archives in object stores: S3 and WebDAV servers as processes; crates.io, PyPI"
+    "memory          tests of the Python package under Valgrind; Debian's valgrind, PyPI"
     "publish         each library crate builds from its package alone; crates.io"
     "licence-texts   the licences of all dependencies in one page; crates.io"
     "deb             the Debian package; crates.io"
@@ -240,10 +241,12 @@ step_examples() {
     )
 }
 
-# The package and what its tests need in target/python. Builds of the package share target/python-build.
+# The package, with the features in FEATURES, and what its tests need in target/python. Builds of the package share
+# target/python-build.
 python_package() {
     python_with python "$@"
-    CARGO_TARGET_DIR=$PWD/target/python-build target/python/bin/pip install --quiet --force-reinstall --no-deps ./host/python
+    CARGO_TARGET_DIR=$PWD/target/python-build target/python/bin/pip install --quiet --force-reinstall --no-deps \
+        ${FEATURES:+--config-settings=build-args="--features $FEATURES"} ./host/python
 }
 
 step_python() {
@@ -276,10 +279,20 @@ step_cluster() {
     (cd host/python && "$OLDPWD/target/python/bin/python" -m pytest tests/cluster)
 }
 
+step_memory() {
+    debian valgrind || echo "no valgrind installed here"
+    if command -v valgrind >/dev/null; then
+        python_package numpy pytest==9.2.0
+        target/python/bin/python host/python/tests/memory.py
+    else
+        echo "skipped: the package under Valgrind, no valgrind"
+    fi
+}
+
 step_stores() {
     cargo test --locked -p nirspi --no-default-features --features object-store --lib \
         --config 'profile.dev.package."*".opt-level=0' -- archive::
-    python_package numpy pyarrow pytest==9.2.0 boto3==1.44.5 cheroot==11.1.2 \
+    FEATURES=object-store python_package numpy pyarrow pytest==9.2.0 boto3==1.44.5 cheroot==11.1.2 \
         'moto[server]==5.2.5' wsgidav==4.4.0
     cargo build --locked --release --features object-store
     (cd host/python && "$OLDPWD/target/python/bin/python" -X dev -m pytest tests/stores)

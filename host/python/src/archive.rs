@@ -9,7 +9,7 @@ use crate::work::{backend, long};
 use crate::{measurement, reconstruct};
 use nirspi::archive::{
     ArchiveError, ArchiveOptions, Grid, GridAxes, ImageFiles, RowReader, Shard, Work, archive,
-    archive_part,
+    archive_part, write_file,
 };
 use nirspi::reconstruct::Solver;
 use nirspi::virtual_camera::{CameraModel, read_camera_model};
@@ -138,7 +138,7 @@ impl Table {
         serde_json::Value::Object(self.0.work().settings()).to_string()
     }
 
-    /// Makes the table: the report as JSON, and the data card of a set.
+    /// Makes the table, and the data card of a set: the report as JSON.
     fn run(
         &self,
         py: Python<'_>,
@@ -146,7 +146,7 @@ impl Table {
         jobs: Option<usize>,
         resume: bool,
         shard: Option<&str>,
-    ) -> PyResult<(String, Option<String>)> {
+    ) -> PyResult<String> {
         let shard = match shard {
             None => Shard::WHOLE,
             Some(text) => {
@@ -162,11 +162,11 @@ impl Table {
         let options = ArchiveOptions { out, jobs, resume, shard };
         long(py, |stop| {
             let made = archive(self.0.work(), &options, stop, &mut |_| {}).map_err(of_archive)?;
-            let card = match &self.0 {
-                Kind::Grid(grid) => Some(grid.card(&made)),
-                Kind::Files(_) => None,
-            };
-            Ok((json(&made)?, card))
+            if let Kind::Grid(grid) = &self.0 {
+                let card = options.out.with_extension("md");
+                write_file(&card, grid.card(&made).as_bytes()).map_err(of_archive)?;
+            }
+            json(&made)
         })
     }
 

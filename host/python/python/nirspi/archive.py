@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import os
-import pathlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -115,7 +114,8 @@ class Work:
         Parameters
         ----------
         out : path
-            The table, a name that ends in ``.parquet``.
+            The table, a name that ends in ``.parquet``: a path, or an address in an object store such
+            as ``s3://bucket/table.parquet``.
         jobs : int, optional
             Items to work on at a time. Default: the number of cores.
         resume : bool
@@ -136,10 +136,7 @@ class Work:
         path = os.fspath(out)
         if not path.endswith(".parquet"):
             raise Error(f"out is {path!r}, expected a name that ends in .parquet")
-        report, card = self.table().run(path, _arrays.count(jobs, "jobs"), bool(resume), shard)
-        if card is not None:
-            pathlib.Path(path).with_suffix(".md").write_text(card, encoding="utf-8")
-        return Report.of(report)
+        return Report.of(self.table().run(path, _arrays.count(jobs, "jobs"), bool(resume), shard))
 
     def part(self, out: str | os.PathLike[str], start: int, end: int) -> Report:
         """Makes a table of the items ``start`` to ``end`` (exclusive), whole or not at all. The bytes
@@ -170,6 +167,8 @@ class Archive(Work):
     ----------
     files : path, or list of paths
         A folder, with the folders below; hidden files and links to folders are left out. Or files.
+        A folder may be an address in an object store such as ``"s3://bucket/archive"``, if the
+        package was built with the feature ``object-store``.
     enhance : bool
         Whether networks also enlarge and deblur images of 32 x 32 and 64 x 64.
     **options
@@ -199,7 +198,11 @@ class Archive(Work):
         **options: Any,
     ) -> None:
         _known(options, _OF_SOURCES | _OF_METHODS | {"dictionary"})
-        if isinstance(files, (str, os.PathLike)):
+        folder: str
+        names: list[str] | None
+        if isinstance(files, str) and "://" in files:
+            folder, names = files, None
+        elif isinstance(files, (str, os.PathLike)):
             folder, names = os.path.abspath(files), None
             if not os.path.isdir(folder):
                 raise Error(f"{os.fspath(files)}: expected a folder of measurements, or a list of files")

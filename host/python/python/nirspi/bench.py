@@ -12,6 +12,7 @@ import json
 import os
 import platform
 import sys
+import tempfile
 import time
 from collections.abc import Callable
 from typing import Any
@@ -20,7 +21,9 @@ import numpy as np
 
 from . import devices, order
 from .hadamard import Hadamard
+from .measurement import Measurement, load
 from .omp import Dictionary, orthogonal_mp
+from .reconstruction import reconstruct
 
 Contestants = dict[str, Callable[[], Any]]
 
@@ -113,6 +116,40 @@ def omp(measurements: int, atoms: int, sparsity: int, frames: int) -> dict[str, 
     return {"prepared": solve, "with preparation": whole}
 
 
+def file(path: str, count: int, n: int, threads: int | None) -> dict[str, Contestants]:
+    """A file of measurements, read and inverted: all rows, so that every package has the same images."""
+    rows = order("walsh-2d", n)
+    images = np.random.default_rng(1).random((count, n, n), np.float32)
+    Measurement(d=Hadamard(n, rows=rows)(images), rows=rows, n=n).save(path)
+    whole: Contestants = {"nirspi": lambda: reconstruct(load(path, index="all"), method="hadamard")}
+    try:
+        import torch
+    except ImportError:
+        return {"load and reconstruct": whole}
+    if threads:
+        torch.set_num_threads(threads)
+
+    def readings() -> Any:
+        with np.load(path) as found:
+            return torch.from_numpy(found["d"].astype(np.float32))
+
+    try:
+        from spyrit.core.meas import HadamSplit2d
+
+        spyrit = HadamSplit2d(n, fast=True)
+        whole["SPyRiT, fast_pinv"] = lambda: spyrit.fast_pinv(readings())
+    except ImportError:
+        pass
+    try:
+        from deepinv.physics import SinglePixelCamera
+
+        camera = SinglePixelCamera(n * n, (1, n, n))
+        whole["deepinv, A_dagger"] = lambda: camera.A_dagger(readings()[:, None])
+    except ImportError:
+        pass
+    return {"load and reconstruct": whole}
+
+
 def machine() -> dict[str, Any]:
     """What the times hold for."""
     load = os.getloadavg() if hasattr(os, "getloadavg") else None
@@ -132,7 +169,8 @@ def main(arguments: list[str] | None = None) -> int:
     Examples
     --------
     >>> from nirspi.bench import main
-    >>> main(["--seconds", "0.01", "--batch", "2", "--frames", "1", "--n", "8", "--json"]) == 0
+    >>> few = ["--batch", "2", "--frames", "1", "--n", "8", "--measurements", "3"]
+    >>> main(["--seconds", "0.01", *few, "--json"]) == 0
     ... # doctest: +ELLIPSIS
     {...}
     True
@@ -141,6 +179,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--n", type=int, default=64, help="side of the image (default 64)")
     parser.add_argument("--batch", type=int, nargs="*", default=[32, 256], help="images at once")
     parser.add_argument("--frames", type=int, nargs="*", default=[1, 16, 256], help="measurements of OMP")
+    parser.add_argument("--measurements", type=int, default=10_000, help="of a file (default 10000)")
     parser.add_argument("--problem", type=int, nargs=3, default=[512, 1024, 64], metavar=("M", "N", "K"))
     parser.add_argument("--threads", type=int, help="threads of torch (default: its own choice)")
     parser.add_argument("--seconds", type=float, default=2.0, help="for each comparison (default 2)")
@@ -156,6 +195,11 @@ def main(arguments: list[str] | None = None) -> int:
         measurements, atoms, sparsity = asked.problem
         for name, contestants in omp(measurements, atoms, sparsity, frames).items():
             title = "OMP {} x {}, {} atoms, {}, {} frames".format(*asked.problem, name, frames)
+            results[title] = time_in_turn(contestants, asked.seconds)
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "measurements.npz")
+        for name, contestants in file(path, asked.measurements, 32, asked.threads).items():
+            title = f"{name}, a file of {asked.measurements} measurements of 32 x 32"
             results[title] = time_in_turn(contestants, asked.seconds)
     report = {"machine": before, "load_afterwards": machine()["load"], "results": results}
     if asked.json:

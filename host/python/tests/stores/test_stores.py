@@ -1,8 +1,9 @@
 """Archives in object stores: an S3 server (moto) and a WebDAV server (wsgidav) as processes of their own, read and
-written by the program."""
+written by the program and by the package."""
 
 import io
 import json
+import multiprocessing
 import os
 import pathlib
 import signal
@@ -11,6 +12,7 @@ import subprocess
 import sys
 import time
 import urllib.request
+import warnings
 
 import numpy as np
 import pytest
@@ -189,6 +191,28 @@ def test_shards_and_sets_are_written_to_a_store(cli, s3, archive):
     assert pq.read_table(io.BytesIO(content(s3, "set.parquet"))).num_rows == 1
 
 
+def test_the_package_gives_the_programs_bytes(s3, archive, local):
+    work = ns.Archive("s3://lab/archive", method="omp", sampling="30%", sparsity=60)
+    report = work.run("s3://lab/package.parquet", jobs=2)
+    assert (report.rows, len(report.skipped)) == (1099, 2)
+    assert same(content(s3, "package.parquet"), local, archive, "s3://lab/archive")
+
+
+def of_child(archive):
+    return archive.part(f"s3://lab/child-{os.getpid()}.parquet", 1, 4).rows
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
+def test_a_child_of_fork_reads_a_store(s3):
+    archive = ns.Archive("s3://lab/archive", method="hadamard")
+    assert of_child(archive) == 3
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        context = multiprocessing.get_context("fork")
+        with context.Pool(2) as pool:
+            assert pool.map_async(of_child, [archive] * 2).get(timeout=60) == [3, 3]
+
+
 def test_a_large_table_goes_in_pieces(cli, s3, archive, tmp_path):
     # More than one piece of 8 MiB.
     options = ["--method", "hadamard"]
@@ -216,6 +240,9 @@ def test_what_cannot_be_reached_is_one_line(cli, s3, tmp_path, folder, out, told
     assert made.returncode == 1 and told in made.stderr, made.stderr
     assert made.stderr.count("\n") == 1 and time.monotonic() - began < 60
     assert list(tmp_path.iterdir()) == []
+    with pytest.raises((ns.Error, OSError)) as error:
+        ns.Archive(folder, method="hadamard").run(out)
+    assert told in str(error.value)
 
 
 @pytest.fixture(scope="module")
