@@ -38,7 +38,7 @@ pub use files::{Shard, find};
 #[cfg(feature = "virtual-camera")]
 pub use grid::{Grid, GridAxes, GridError};
 use journal::{About, Journal};
-use place::Place;
+use place::{Opened, Place};
 pub use place::{is_folder, write_file};
 pub use report::{ArchiveReport, Skipped};
 pub use rows::{ImageFiles, RowReader, RowsError};
@@ -138,9 +138,9 @@ fn archive_to(
     let shelf = place.shelf()?;
     if *resume
         && !shelf.is_begun()?
-        && let Some((mut table, bytes)) = place.open()?
+        && let Some(Opened { mut source, bytes }) = place.open()?
     {
-        return report::of_whole_table(out, &mut table, bytes, &settings, work.noun());
+        return report::of_whole_table(out, &mut source, bytes, &settings, work.noun());
     }
     let mut journal = Journal::open(place, shelf, *resume, &settings, &names)?;
     let before = journal.done();

@@ -18,6 +18,13 @@ const SCHEMES: [&str; 11] =
 pub(super) trait Source: Read + Seek {}
 impl<T: Read + Seek> Source for T {}
 
+/// An open file.
+pub(super) struct Opened<'p> {
+    pub source: Box<dyn Source + 'p>,
+    /// Size of the file.
+    pub bytes: u64,
+}
+
 /// Whether a path is a folder of measurements and not a single file: a folder of this computer, or an
 /// address in an object store (`s3://bucket/folder`).
 #[must_use]
@@ -123,19 +130,19 @@ impl Place {
         }
     }
 
-    /// Opens this file, with its size in bytes; `None` if there is none.
-    pub(super) fn open(&self) -> Result<Option<(Box<dyn Source + '_>, u64)>, FileError> {
+    /// Opens this file; `None` if there is none.
+    pub(super) fn open(&self) -> Result<Option<Opened<'_>>, FileError> {
         match self {
             Self::Here(path) if !path.exists() => Ok(None),
             Self::Here(path) => {
                 let unread = |error| FileError::io(path, "read", error);
                 let file = File::open(path).map_err(unread)?;
                 let bytes = file.metadata().map_err(unread)?.len();
-                Ok(Some((Box::new(file), bytes)))
+                Ok(Some(Opened { source: Box::new(file), bytes }))
             }
             #[cfg(feature = "object-store")]
             Self::Store(object) => match object.size()? {
-                Some(bytes) => Ok(Some((Box::new(object.reader(bytes)), bytes))),
+                Some(bytes) => Ok(Some(Opened { source: Box::new(object.reader(bytes)), bytes })),
                 None => Ok(None),
             },
         }
