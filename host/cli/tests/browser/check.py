@@ -47,6 +47,8 @@ def live(page, address, screenshot):
     expect(page.locator("#overload")).to_be_hidden()
     fits(page)
     if screenshot:
+        # Wide enough for all pictures in one row.
+        page.set_viewport_size({"width": 1500, "height": 960})
         # Rates are those of whole seconds.
         page.wait_for_timeout(4000)
         page.screenshot(path=screenshot, full_page=True)
