@@ -294,13 +294,23 @@ def counters(page):
     return [int(text.replace("\u202f", "").split(" ")[0]) for text in page.locator("#losses").text_content().split(", ")]
 
 
+def pressed(page, button):
+    """Holds a button down. A page whose pictures have just come may move between pointing and pressing."""
+    for _ in range(5):
+        page.locator(button).hover()
+        page.mouse.down()
+        try:
+            return expect(page.locator(button)).to_have_attribute("aria-pressed", "true", timeout=5000)
+        except AssertionError:
+            page.mouse.up()
+    raise AssertionError(f"{button} does not stay pressed")
+
+
 def shaken(page):
     """Frames are lost while the line is shaken, and only then."""
     before = counters(page)
     assert before[1:] == [0, 0, 0], before
-    page.locator("#shake").hover()
-    page.mouse.down()
-    expect(page.locator("#shake")).to_have_attribute("aria-pressed", "true")
+    pressed(page, "#shake")
     page.wait_for_function("() => !document.getElementById('losses').textContent.includes(' 0 corrupt')")
     page.mouse.up()
     expect(page.locator("#damage-text")).to_have_text("steady")
