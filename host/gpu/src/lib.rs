@@ -1,4 +1,6 @@
-//! The GPU kernels of nirspi: one source for CUDA, Vulkan, Metal and DirectX, through CubeCL.
+#![doc = include_str!("../README.md")]
+//!
+//! # Modules
 //!
 //! | module | contents |
 //! |---|---|

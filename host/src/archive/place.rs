@@ -130,7 +130,7 @@ impl Place {
         }
     }
 
-    /// Opens this file; `None` if there is none.
+    /// Opens this file; `None` if no such file exists.
     pub(super) fn open(&self) -> Result<Option<Opened<'_>>, FileError> {
         match self {
             Self::Here(path) if !path.exists() => Ok(None),

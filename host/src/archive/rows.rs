@@ -228,7 +228,7 @@ impl ImageFiles {
     /// an object store.
     ///
     /// # Errors
-    /// [`ArchiveError`] if there are none, or the store cannot be used.
+    /// [`ArchiveError`] if the folder has no measurement files, or the store cannot be used.
     pub fn of(folder: &Path, reader: RowReader) -> Result<Self, ArchiveError> {
         Self::at(Place::of(folder)?, reader)
     }

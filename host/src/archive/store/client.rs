@@ -26,7 +26,8 @@ use std::time::Duration;
 use tokio::runtime::Runtime;
 use url::{Position, Url};
 
-/// The longest time of one request, retries not counted: a piece over a slow line.
+/// The longest time of one request to a WebDAV server, retries not counted: it takes a table in one
+/// piece. The other stores have the time limits of `object_store`, which the environment can change.
 const PATIENCE: Duration = Duration::from_secs(300);
 /// A request that fails is repeated for this long.
 const RETRY: Duration = Duration::from_secs(30);
@@ -195,7 +196,6 @@ fn store_of(url: &Url, scheme: &ObjectStoreScheme) -> object_store::Result<Arc<d
     let _ = rustls::crypto::ring::default_provider().install_default();
     let retry =
         RetryConfig { max_retries: RETRIES, retry_timeout: RETRY, ..RetryConfig::default() };
-    let options = ClientOptions::new().with_timeout(PATIENCE);
     Ok(match scheme {
         ObjectStoreScheme::AmazonS3 => {
             Arc::new(AmazonS3Builder::from_env().with_url(url.as_str()).with_retry(retry).build()?)
@@ -209,6 +209,7 @@ fn store_of(url: &Url, scheme: &ObjectStoreScheme) -> object_store::Result<Arc<d
             Arc::new(builder.with_retry(retry).build()?)
         }
         _ => {
+            let options = ClientOptions::new().with_timeout(PATIENCE);
             let mut options = options.with_allow_http(url.scheme() == "http");
             if let Some(headers) = authorization(url) {
                 options = options.with_default_headers(headers);

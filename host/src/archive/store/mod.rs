@@ -113,12 +113,12 @@ impl Stored {
         Ok(found.into_iter().filter_map(relative).collect())
     }
 
-    /// Size of the object in bytes; `None` if there is none.
+    /// Size of the object in bytes; `None` if the store has no such object.
     pub(super) fn size(&self) -> Result<Option<u64>, FileError> {
         self.client.size(&self.key).map_err(|error| self.error("read", error))
     }
 
-    /// The whole object; `None` if there is none.
+    /// The whole object; `None` if the store has no such object.
     fn get(&self) -> Result<Option<Vec<u8>>, FileError> {
         let mut bytes = Vec::new();
         match self.client.copy_to(&self.key, &mut bytes) {
@@ -134,7 +134,7 @@ impl Stored {
         put.map_err(|error| self.error("write", error))
     }
 
-    /// Writes the object if there is none. Returns whether this call has written it. A store that
+    /// Writes the object unless the store has one of this name. Returns whether this call has written it. A store that
     /// knows no such condition writes it in any case.
     fn create(&self, bytes: &[u8]) -> Result<bool, FileError> {
         match self.client.put(&self.key, bytes.to_vec(), PutMode::Create) {

@@ -3,7 +3,7 @@
 //!
 //! # Invariant
 //! Of two processes that make one table, one ends with [`ArchiveError::Busy`] and the table is that
-//! of one process, where the store writes objects on condition that there are none
+//! of one process, where the store can refuse to write over an object
 //! (`super::tests::of_two_processes_one_is_told`).
 
 use super::Stored;
