@@ -7,7 +7,8 @@
 use crate::machine::Machine;
 use crate::packets::{STREAM_HEADER_BYTES, send};
 use crate::{
-    BoardInfo, Crash, FpgaBus, GatewareLoader, Inputs, Limits, Micros, PacketSink, Ports, Progress,
+    BoardInfo, Crash, FpgaBus, GatewareLoader, Inputs, Lamps, Limits, Micros, PacketSink, Ports,
+    Progress,
 };
 use nirspi_wire::packet::{MAX_HOST_PACKET, parse, request_id, unseal};
 use nirspi_wire::samples::Words;
@@ -147,6 +148,14 @@ impl Camera {
     #[must_use]
     pub fn may_light(&self) -> bool {
         self.machine.may_light()
+    }
+
+    /// What the board's lamps show now. The board sets them once in every turn of its loop.
+    #[must_use]
+    pub fn lamps(&self, now: Micros) -> Lamps {
+        let machine = &self.machine;
+        let light = machine.off_pending || machine.state() == State::Running;
+        Lamps::at(now, machine.protocol().is_some(), light, machine.fault)
     }
 
     /// What the calls act on, for the exhaustive walk of `tests::model`.

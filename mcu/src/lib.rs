@@ -5,7 +5,7 @@
 //! machine do not use the machine: `run` and `burst` (data), `selftest`, `gateware`, `configure`
 //! (checks), `safety` (sensors), `meter` (signal and noise), `fpga` (registers), `notices` (replies and events that wait for
 //! the link), `packets` (a message into the link). `host_port` says which bytes a board transfers,
-//! `patience` how long a transfer to the host may wait.
+//! `patience` how long a transfer to the host may wait, `lamps` what the board shows to somebody beside it.
 #![no_std]
 #![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 #![deny(clippy::arithmetic_side_effects)]
@@ -33,6 +33,7 @@ mod float;
 mod fpga;
 mod gateware;
 mod host_port;
+mod lamps;
 mod limits;
 mod machine;
 mod merge;
@@ -56,6 +57,7 @@ pub use burst::RAW_PIECE_SAMPLES;
 pub use camera::Camera;
 pub use crash::{CRASH_WORDS, Crash};
 pub use host_port::{HostPort, PortBus, Target, Wanted};
+pub use lamps::{Lamps, flashes};
 pub use limits::{BOARD_WATCHDOG_US, Limits, TEMPERATURE_PERIOD_US};
 pub use merge::Merger;
 pub use patience::{PATIENCE, Patience, Remedy};

@@ -382,3 +382,46 @@ fn the_electronics_are_a_camera_description_and_have_the_noise_of_their_circuit(
     }
     assert!((na(rows[1][2]) / amplifier_noise_na(&camera) - 1.0).abs() < 0.03, "{rows:?}");
 }
+
+/// Whether a page shows this text as `shown`, in which `...` stands for anything.
+fn is_shown_as(text: &str, shown: &str) -> bool {
+    let mut pieces = shown.split("...");
+    let first = pieces.next().expect("a first piece");
+    let rest = text.strip_prefix(first).map(|rest| {
+        pieces.try_fold(rest, |rest, piece| rest.split_once(piece).map(|(_, after)| after))
+    });
+    matches!(rest, Some(Some(rest)) if rest.is_empty() || shown.ends_with("..."))
+}
+
+#[test]
+fn troubleshooting_lists_every_fault_with_the_flashes_of_its_lamp() {
+    use nirspi_wire::Fault;
+    use nirspi_wire::register::{DAMAGED, IDENTITY, NO_CLOCK};
+    let absent =
+        [0, IDENTITY, NO_CLOCK, DAMAGED, 0x1234].map(|identity| Fault::FpgaAbsent { identity });
+    let others = [
+        Fault::Interlock,
+        Fault::OverTemperature { centi_celsius: 6_000 },
+        Fault::TemperatureSensor,
+        Fault::Duty,
+        Fault::OverRange,
+        Fault::FpgaConfiguration,
+        Fault::FpgaStalled,
+        Fault::FpgaWatchdog,
+        Fault::HostSilent,
+    ];
+    let page = read("docs/troubleshooting.md");
+    let (_, table) = page.split_once("| the line says | red flashes |").expect("a table of faults");
+    let rows: Vec<Vec<&str>> = table
+        .lines()
+        .skip(2)
+        .take_while(|line| line.starts_with('|'))
+        .map(|line| line.trim_matches('|').split(" | ").map(str::trim).collect())
+        .collect();
+    for fault in others.into_iter().chain(absent) {
+        let text = fault.to_string();
+        let row = rows.iter().find(|row| is_shown_as(&text, row[0].trim_matches('`')));
+        let row = row.unwrap_or_else(|| panic!("no row for {text:?}"));
+        assert_eq!(row[1], nirspi_mcu::flashes(fault).to_string(), "{text}");
+    }
+}

@@ -5,7 +5,7 @@
 use crate::{Board, FpgaPort};
 use core::cell::{Cell, RefCell};
 use core::task::Waker;
-use nirspi_mcu::{BusError, GatewareLoader, HostPort, Inputs, LoadError, Micros};
+use nirspi_mcu::{BusError, GatewareLoader, HostPort, Inputs, Lamps, LoadError, Micros};
 use nirspi_wire::fpga::{Header, Sums};
 use nirspi_wire::host_port::{SEALED_BYTES, seal, unseal};
 use nirspi_wire::packet::{MAX_HOST_PACKET, seal as seal_packet};
@@ -65,6 +65,8 @@ pub struct Pins {
     pub version: Cell<u32>,
     /// The pin that enables the LED drivers.
     pub leds_enabled: Cell<bool>,
+    /// The lamps that people see.
+    pub lamps: Cell<Lamps>,
     /// The FPGA lights LEDs.
     pub running: Cell<bool>,
     /// Number of the frame that the FPGA has ready.
@@ -87,6 +89,7 @@ impl Default for Pins {
         Self {
             version: Cell::new(Register::Version.reset()),
             leds_enabled: Cell::default(),
+            lamps: Cell::default(),
             running: Cell::default(),
             sequence: Cell::default(),
             fed: Cell::default(),
@@ -109,6 +112,10 @@ impl Board for FakeBoard {
 
     fn enable_leds(&mut self, enabled: bool) {
         self.0.leds_enabled.set(enabled);
+    }
+
+    fn show(&mut self, lamps: Lamps) {
+        self.0.lamps.set(lamps);
     }
 
     fn feed_watchdog(&mut self) {

@@ -4,7 +4,7 @@
 //! the firmware gives.
 
 use core::future::Future;
-use nirspi_mcu::{BusError, HostPort, Inputs};
+use nirspi_mcu::{BusError, HostPort, Inputs, Lamps};
 use nirspi_wire::RebootInto;
 
 /// The FPGA's host port, with long reads during which the processor does other work.
@@ -34,6 +34,9 @@ pub trait Board {
     /// configuration until a fault, the end of the session, a crash, or a stop that the FPGA has not
     /// confirmed. It is high before the FPGA lights any LED, so no frame begins dark.
     fn enable_leds(&mut self, enabled: bool);
+
+    /// Sets the lamps that people see. A board without lamps does nothing.
+    fn show(&mut self, lamps: Lamps);
 
     /// Feeds the chip's watchdog. The firmware calls this at least once in 10 ms.
     fn feed_watchdog(&mut self);

@@ -90,6 +90,7 @@ pub async fn run<B: Board, P: FpgaPort, G: GatewareLoader>(
     }
     loop {
         board.feed_watchdog();
+        board.show(camera.lamps(now()));
         if loader.step(now()) {
             board.enable_leds(false);
             yield_now().await;

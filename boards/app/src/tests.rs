@@ -7,7 +7,7 @@ use core::future::Future;
 use core::pin::Pin;
 use core::task::{Context, Waker};
 use embassy_futures::poll_once;
-use nirspi_mcu::{Crash, Limits, PacketSink};
+use nirspi_mcu::{Crash, Lamps, Limits, PacketSink};
 use nirspi_wire::fpga::MAX_FRAME_BYTES;
 use nirspi_wire::packet::{MAX_DEVICE_PACKET, MAX_HOST_PACKET};
 use nirspi_wire::register::Register;
@@ -138,6 +138,7 @@ fn leds_are_let_on_from_the_configuration_until_the_host_is_gone() {
     bench.send(&packet(3, Command::Start(RunLength::Continuous)));
     bench.turn();
     assert!(bench.pins.running.get());
+    assert_eq!(bench.pins.lamps.get(), Lamps { ready: true, light: true, fault: false });
 
     // The first host leaves half a command behind.
     bench.send(&hello(4)[..5]);
@@ -151,6 +152,7 @@ fn leds_are_let_on_from_the_configuration_until_the_host_is_gone() {
         assert!(closed.as_mut().poll(&mut context).is_ready());
     }
     assert!(!bench.pins.leds_enabled.get() && !bench.pins.running.get());
+    assert!(!bench.pins.lamps.get().light);
     bench.to_host.discard();
     bench.send(&hello(5));
     bench.turn();

@@ -24,7 +24,7 @@ use embassy_futures::join::join;
 use fpga::Tunnel;
 use nirspi_app::link::{CameraEnd, HostIn, HostOut, Link, Packet};
 use nirspi_app::{Board, DepthMailbox, Device, board_info, crash};
-use nirspi_mcu::{Inputs, Limits, NoLoader};
+use nirspi_mcu::{Inputs, Lamps, Limits, NoLoader};
 use nirspi_wire::RebootInto;
 use nirspi_wire::fpga::MAX_FRAME_BYTES;
 use nirspi_wire::tunnel::Lines;
@@ -103,6 +103,8 @@ impl Board for Emulated {
     }
 
     fn enable_leds(&mut self, _enabled: bool) {}
+
+    fn show(&mut self, _lamps: Lamps) {}
 
     fn feed_watchdog(&mut self) {}
 

@@ -37,6 +37,10 @@ pin_table! { ($)
     led_enable: PF3 => "CN10 D4", "LED array, second input of the enable's AND gate, 2.2 kilohm to ground";
     interlock: PF15 => "CN10 D2", "interlock loop, 3.3 V when closed; the FPGA's J3.3 (D2) is on the same loop";
     thermistor: PA3 => "CN9 A0", "NTC 10 kilohm at the LED array to ground, 10 kilohm to AVDD";
+    // Lamps on the board.
+    lamp_ready: PD10 => "LD1", "nothing: green, the camera waits for a host or has one";
+    lamp_light: PD13 => "LD2", "nothing: yellow, LEDs may be lit";
+    lamp_fault: PB7 => "LD3", "nothing: red, flashes the number of a fault";
     // The ECP5's configuration port, SPI1.
     config_sck: PA5 => "CN7 D13", "ECP5 CCLK";
     config_mosi: PB5 => "CN7 D11", "ECP5 SI (MOSI)";

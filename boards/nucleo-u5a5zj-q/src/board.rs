@@ -7,7 +7,7 @@ use embassy_stm32::peripherals::{ADC1, IWDG};
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_time::{Duration, Instant};
 use nirspi_app::Board;
-use nirspi_mcu::Inputs;
+use nirspi_mcu::{Inputs, Lamps};
 use nirspi_nucleo::restart::restart;
 use nirspi_nucleo::{THERMISTOR, crash};
 use nirspi_wire::RebootInto;
@@ -26,6 +26,8 @@ pub fn adc_config() -> AdcConfig {
 /// The board's own parts.
 pub struct Nucleo {
     pub led_enable: Output<'static>,
+    /// Ready, light, fault.
+    pub lamps: [Output<'static>; 3],
     pub interlock: Input<'static>,
     pub adc: Adc<'static, ADC1>,
     pub thermistor: AnyAdcChannel<'static, ADC1>,
@@ -52,6 +54,12 @@ impl Board for Nucleo {
 
     fn enable_leds(&mut self, enabled: bool) {
         self.led_enable.set_level(enabled.into());
+    }
+
+    fn show(&mut self, Lamps { ready, light, fault }: Lamps) {
+        for (lamp, lit) in self.lamps.iter_mut().zip([ready, light, fault]) {
+            lamp.set_level(lit.into());
+        }
     }
 
     fn feed_watchdog(&mut self) {

@@ -103,6 +103,11 @@ async fn main(spawner: Spawner) {
     watchdog.unleash();
     let mut board = Nucleo {
         led_enable,
+        lamps: [
+            Output::new(pins.lamp_ready, Level::Low, Speed::Low),
+            Output::new(pins.lamp_light, Level::Low, Speed::Low),
+            Output::new(pins.lamp_fault, Level::Low, Speed::Low),
+        ],
         interlock: Input::new(pins.interlock, Pull::Down),
         adc: Adc::new_with_config(p.ADC1, board::adc_config()),
         thermistor: pins.thermistor.degrade_adc(),

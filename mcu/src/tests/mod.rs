@@ -8,6 +8,7 @@ mod fake_ecp5;
 pub(crate) mod fake_fpga;
 mod frames;
 mod host_port;
+mod lamps;
 mod laws;
 mod loading;
 mod merge;

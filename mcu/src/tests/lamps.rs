@@ -1,0 +1,75 @@
+//! What the lamps of the board show in each state.
+
+use super::support::*;
+use crate::{Lamps, Micros, flashes};
+use nirspi_wire::{Command, Fault, RunLength};
+use std::vec::Vec;
+
+const FAULTS: [Fault; 10] = [
+    Fault::Interlock,
+    Fault::OverTemperature { centi_celsius: 7_000 },
+    Fault::TemperatureSensor,
+    Fault::Duty,
+    Fault::OverRange,
+    Fault::FpgaAbsent { identity: 0 },
+    Fault::FpgaConfiguration,
+    Fault::FpgaStalled,
+    Fault::FpgaWatchdog,
+    Fault::HostSilent,
+];
+
+/// Flashes and the longest dark time of the fault lamp in milliseconds, over one minute.
+fn seen(fault: Fault) -> (Vec<u32>, u64) {
+    let (mut groups, mut group, mut dark, mut longest) = (Vec::new(), 0, 0u64, 0);
+    let mut was_lit = true;
+    for ms in 0..60_000 {
+        let lit = Lamps::at(Micros(ms * 1_000), true, false, Some(fault)).fault;
+        if lit && !was_lit {
+            // A pause is much longer than the dark time between two flashes.
+            if dark > 1_000 {
+                groups.push(core::mem::take(&mut group));
+            }
+            group += 1;
+        }
+        dark = if lit { 0 } else { dark + 1 };
+        longest = longest.max(dark);
+        was_lit = lit;
+    }
+    (groups, longest)
+}
+
+#[test]
+fn a_person_can_count_the_flashes_of_each_fault_and_no_two_faults_flash_alike() {
+    for (fault, number) in FAULTS.into_iter().zip(1..) {
+        assert_eq!(u32::from(flashes(fault)), number, "{fault:?}");
+        let (groups, longest) = seen(fault);
+        assert!(groups.len() > 6, "{fault:?}: {groups:?}");
+        // The first group began before the minute.
+        assert!(groups[1..].iter().all(|&count| count == number), "{fault:?}: {groups:?}");
+        assert!((1_000..=2_000).contains(&longest), "{fault:?}: dark for {longest} ms");
+    }
+}
+
+#[test]
+fn the_ready_lamp_blinks_until_a_host_has_come() {
+    let bench = Bench::new();
+    let states = |bench: &Bench| -> Vec<bool> {
+        (0..8).map(|beat| bench.camera.lamps(Micros(beat * 250_000)).ready).collect()
+    };
+    assert_eq!(states(&bench), [true, false, true, false, true, false, true, false]);
+    assert_eq!(states(&Bench::open()), [true; 8]);
+}
+
+#[test]
+fn the_light_lamp_is_on_while_the_fpga_may_light_leds() {
+    let mut bench = Bench::open();
+    let lamp = |bench: &Bench| bench.camera.lamps(bench.now).light;
+    assert!(!lamp(&bench));
+    bench.ask(Command::Configure(SMALL)).unwrap();
+    assert!(!lamp(&bench), "configured, and dark");
+    bench.ask(Command::Start(RunLength::Continuous)).unwrap();
+    assert!(bench.fpga.leds_on() && lamp(&bench));
+    bench.inputs.interlock_closed = false;
+    bench.poll();
+    assert!(!bench.fpga.leds_on() && !lamp(&bench), "dark, and the run's last frames still come");
+}
