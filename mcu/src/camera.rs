@@ -150,7 +150,7 @@ impl Camera {
         self.machine.may_light()
     }
 
-    /// What the board's lamps show now. The board sets them once in every turn of its loop.
+    /// What the board's lamps show now. The board sets them in every turn of its loop.
     #[must_use]
     pub fn lamps(&self, now: Micros) -> Lamps {
         let machine = &self.machine;

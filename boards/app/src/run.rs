@@ -90,9 +90,9 @@ pub async fn run<B: Board, P: FpgaPort, G: GatewareLoader>(
     }
     loop {
         board.feed_watchdog();
-        board.show(camera.lamps(now()));
         if loader.step(now()) {
             board.enable_leds(false);
+            board.show(camera.lamps(now()));
             yield_now().await;
             continue;
         }
@@ -113,6 +113,7 @@ pub async fn run<B: Board, P: FpgaPort, G: GatewareLoader>(
             camera.depth(now(), DEPTH_SIDE, &map, &mut ports);
         }
         board.enable_leds(camera.may_light());
+        board.show(camera.lamps(now()));
         if has_gone {
             link.clear();
         }
