@@ -108,7 +108,11 @@ impl Past {
         if matches!(given, NoiseLevel::Known(_)) {
             return problem.prior.noise.max(LEAST_NOISE);
         }
-        let known = &self.poses[self.poses.len().min(2) - 1].known;
+        // Where nothing moved, the rows themselves are what is expected. The image of a scene that moved
+        // lacks what its prior has smoothed away, which would count as noise.
+        let has_moved = self.poses[0].known.changes.iter().all(|changes| changes.is_infinite());
+        let known = &self.poses[usize::from(has_moved && self.poses.len() > 1)].known;
+        let expected = if has_moved { predicted } else { &known.value };
         let again = problem.rows.iter().zip(&problem.values);
         let (rows, missed): (Vec<u32>, Vec<f32>) = again
             .filter(|(row, _)| known.readings[**row as usize] <= 1.0)
@@ -116,7 +120,7 @@ impl Past {
             .map(|(&row, value)| {
                 let at = row as usize;
                 // The value itself has a share of a reading's noise.
-                (row, (value - predicted[at]) / (1.0 + known.readings[at]).sqrt())
+                (row, (value - expected[at]) / (1.0 + known.readings[at]).sqrt())
             })
             .unzip();
         let mut noise = problem.prior.noise;

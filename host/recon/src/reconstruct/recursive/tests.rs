@@ -102,6 +102,26 @@ fn motion_and_speed_that_are_estimated_cost_a_still_scene_little() {
     }
 }
 
+/// The detail of a scene hides its noise within one frame: only a second look at the same rows tells the two apart.
+#[test]
+fn the_noise_of_a_scene_that_stands_still_again_is_found_however_small_it_is() {
+    let side = side(32);
+    for noise in [1e-4, 1e-3, 1e-2] {
+        let frames: Vec<Measurements> = (0..32)
+            .map(|k| {
+                let truth = figure(side, 0, i64::from(k >= 8));
+                read(&rows_of(side, k, 64, 240), &truth, noise, 7 + k as u64)
+            })
+            .collect();
+        let made = estimate(RecursiveSettings::default(), &frames);
+        assert_eq!(made[8].shift_px, [0.0, 1.0]);
+        for k in [7, 31] {
+            let found = made[k].noise / (32.0 * noise);
+            assert!((0.6..1.6).contains(&found), "noise {noise}, frame {k}: {found} times that");
+        }
+    }
+}
+
 #[test]
 fn a_cut_starts_anew_and_costs_nothing() {
     let side = side(32);
