@@ -148,7 +148,7 @@ impl<const N: usize> HostOut<'_, N> {
         }
     }
 
-    /// Notes that so many bytes of the first packet are in transfers, and gives the place back after the last.
+    /// Counts bytes of the first packet that went into transfers, and frees its place after the last of them.
     fn pass(&mut self, bytes: usize) {
         self.sent += bytes;
         if let Some(packet) = self.packets.try_receive()

@@ -86,7 +86,7 @@ pub struct DaylightReport {
 /// The budget of one pixel.
 ///
 /// # Errors
-/// [`EvalError::is_setting`] holds for every error, because a setting is out of range.
+/// A setting out of range: [`EvalError::is_setting`] holds for every error.
 pub fn budget(settings: &Settings) -> Result<Report> {
     super::check_distance(settings.distance_m)?;
     if !DISTANCES_M.contains(&settings.distance_m) {

@@ -214,7 +214,7 @@ fn trust(part: &Seen, completed: &[f32], measurements: &Measurements, held: &[us
         let value = part.in_units(measurements.values()[k]);
         line.add(f64::from(completed[row] - start), f64::from(value - start));
     }
-    line.most_trust() as f32
+    line.most_trust(1.0) as f32
 }
 
 /// The image of normalised coefficients, in the measurements' units.

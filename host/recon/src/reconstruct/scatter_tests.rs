@@ -44,11 +44,10 @@ struct Tally {
 }
 
 #[test]
-fn where_nearly_all_light_is_scattered_no_method_loses_much_against_zero_filling() {
-    // The most correlation that a method may lose. As measured: omp 0.0020 in 1 of 72 cases, fista 0,
-    // tv 0.0005 in 3, tikhonov 0.0014 in 2.
-    let limits =
-        [(METHODS[0], 0.003), (METHODS[1], 0.0005), (METHODS[2], 0.001), (METHODS[3], 0.002)];
+fn where_nearly_all_light_is_scattered_no_method_loses_against_zero_filling() {
+    // The most correlation that a method may lose: less than anybody sees. As measured, `tv` loses
+    // 0.00003 in 1 of 72 cases, and the others nothing.
+    const MOST_LOST: f64 = 1e-4;
     let mut random = Pcg64::seed_from_u64(5);
     let mut tallies = METHODS.map(|_| Tally { lost: 0, worst: 0.0, sum: 0.0 });
     let mut cases = 0;
@@ -78,13 +77,13 @@ fn where_nearly_all_light_is_scattered_no_method_loses_much_against_zero_filling
             }
         }
     }
-    for ((method, limit), tally) in limits.iter().zip(&tallies) {
+    for (method, tally) in METHODS.iter().zip(&tallies) {
         let mean = tally.sum / f64::from(cases);
         println!(
-            "{method}: {} of {cases} lost, at most {:.4}, mean {mean:+.4}",
+            "{method}: {} of {cases} lost, at most {:.5}, mean {mean:+.4}",
             tally.lost, -tally.worst
         );
-        assert!(tally.worst > -limit, "{method} loses {}", -tally.worst);
+        assert!(tally.worst > -MOST_LOST, "{method} loses {}", -tally.worst);
         assert!(mean > 0.003, "{method} gains {mean}");
     }
 }
