@@ -134,7 +134,7 @@ fn completion(scene: &Scene, order: &Order, share: f64) -> Result<()> {
         let milliseconds = 1e3 * start.elapsed().as_secs_f64();
         let correlation = correlation(&found.image, &full)?;
         print!(
-            " {correlation:.3} (k = {}, trust {}, {milliseconds:.0} ms) |",
+            " {correlation:.3} (k = {}, trust {:.2}, {milliseconds:.0} ms) |",
             found.sparsity, found.trust
         );
     }
