@@ -249,12 +249,8 @@ fn act(rig: &mut Rig, seed: u64, more: u32, mut before: impl FnMut(&mut Rig)) {
 /// and some are lost.
 pub fn slow_readers(rig: &mut Rig, seed: u64) {
     let dice = &mut Dice::new(!seed);
-    rig.port = Port {
-        host_ps: dice.range(8_420, 11_390),
-        half: 3,
-        quad: true,
-        glitches: seed % 2 == 1,
-    };
+    rig.port =
+        Port { host_ps: dice.range(8_420, 11_390), half: 3, quad: true, glitches: seed % 2 == 1 };
     rig.over_range_rate = 2;
     rig.interlock(true);
     let (patterns, dwell, sweeps) = (dice.range(1, 6), dice.range(10, 120), dice.range(1, 3));
