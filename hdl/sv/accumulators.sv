@@ -1,4 +1,4 @@
-/// Adds slot sums to one of two banks of 48-bit words, one a clock; the host reads the other.
+/// Adds slot sums to one of three banks of 48-bit words, one a clock; the host reads another.
 ///
 /// Invariant: a word is what its slots sum to, however soon a slot comes again. The addition takes a read,
 /// two halves and a write, so the sum of a slot that came up to five clocks ago is taken from the stages
@@ -8,12 +8,13 @@ module nirspi_accumulators #(
 ) (
     input  var logic                                clk         ,
     input  var logic                                rst         ,
-    input  var logic                                filling     , /// Bank being summed into; changes only after a frame's last stage 5
+    input  var logic               [3-1:0]          filling     , /// Bank being summed into, one bit; changes only after a frame's last stage 5
+    input  var logic               [3-1:0]          reading     , /// Bank that the host reads, one bit
     input  var nirspi_types::Place                  place       , /// Stage 0
     input  var logic               [30-1:0]         sum         , /// Stage 1
     output var logic                                overflow    , /// Stage 5: a word has wrapped
     input  var logic               [11-1:0]         host_address, /// Complement, index
-    output var logic               [(2 * HALF)-1:0] host_word    /// Three clocks after its address, of the bank not being filled
+    output var logic               [(2 * HALF)-1:0] host_word    /// Three clocks after its address
 );
     localparam int unsigned WIDTH = 2 * HALF;
     localparam int unsigned CARRY = HALF + 1;
@@ -70,16 +71,16 @@ module nirspi_accumulators #(
     end
 
     // The banks.
-    logic             bank_1     ;
-    logic             bank_2     ;
+    logic [3-1:0]     bank_1     ;
+    logic [3-1:0]     bank_2     ;
     logic [WIDTH-1:0] fetched    ;
-    logic [WIDTH-1:0] word    [2];
+    logic [WIDTH-1:0] word    [3];
     logic [HALF-1:0]  high_5     ;
     logic [HALF-1:0]  low_5      ;
 
-    for (genvar i = 0; i < 2; i++) begin :g_bank
+    for (genvar i = 0; i < 3; i++) begin :g_bank
         logic ours;
-        always_comb ours = filling == 1'(i);
+        always_comb ours = filling[i];
         nirspi_bank_ram #(
             .WIDTH (WIDTH)
         ) bank (
@@ -95,9 +96,9 @@ module nirspi_accumulators #(
     always_ff @ (posedge clk) begin
         bank_1    <= filling;
         bank_2    <= bank_1;
-        host_word <= ((filling) ? ( word[0] ) : ( word[1] ));
+        host_word <= ((reading[0]) ? ( word[0] ) : (reading[1]) ? ( word[1] ) : ( word[2] ));
     end
-    always_comb fetched = ((bank_2) ? ( word[1] ) : ( word[0] ));
+    always_comb fetched = ((bank_2[0]) ? ( word[0] ) : (bank_2[1]) ? ( word[1] ) : ( word[2] ));
 
     // Stage 3: what is added to. Its low half may still be in stage 4, its high half then is not yet known.
     logic [HALF-1:0]        low_3 ;

@@ -170,7 +170,8 @@ module nirspi_engine
     nirspi_types::Place           place     ;
     logic                [30-1:0] sum       ;
     logic                         overflow  ;
-    logic                         filling   ;
+    logic                [3-1:0]  filling   ;
+    logic                [3-1:0]  reading   ;
     logic                         raw_active;
     logic                         raw_first ;
     logic                         raw_last  ;
@@ -206,6 +207,7 @@ module nirspi_engine
         .clk          (clk     ),
         .rst          (rst     ),
         .filling      (filling ),
+        .reading      (reading ),
         .place        (place   ),
         .sum          (sum     ),
         .overflow     (overflow),
@@ -316,6 +318,7 @@ module nirspi_engine
         .overflow   (overflow   ),
         .counts     (counts     ),
         .filling    (filling    ),
+        .reading    (reading    ),
         .ready      (frame_ready),
         .made       (frames_made),
         .lost       (frames_lost),

@@ -1,6 +1,8 @@
-/// Which bank the host has, the header that goes with it, and the counters of the run.
+/// Which of the three banks the host has, which one waits behind it, the headers that go with them, and the counters
+/// of the run.
 ///
-/// Invariant: a bank is either being summed into or delivered, never both; so no frame mixes two.
+/// Invariant: a bank is being summed into, delivered, waiting or free, and only one of these; so no frame mixes two.
+/// Banks are filled in turn, and frames are delivered in the order in which they were made.
 module nirspi_frames (
     input  var logic                           clk       ,
     input  var logic                           rst       ,
@@ -8,7 +10,7 @@ module nirspi_frames (
     input  var logic                  [64-1:0] clock_now , /// Since reset, of this clock
     input  var logic                  [64-1:0] light_next, /// Clock at which the sample after this one's light was shown
     input  var logic                           restart   , /// Forgets everything of earlier runs
-    input  var logic                           give_back , /// The host gives its frame back before this clock
+    input  var logic                           give_back , /// The host gives its frame back before this clock; the one behind is next
     input  var logic                           first     , /// This clock is the first of a run
     input  var logic                           done      , /// This clock completes a frame
     input  var logic                  [32-1:0] over_range, /// Over-range samples of the frame
@@ -16,8 +18,9 @@ module nirspi_frames (
     input  var logic                  [64-1:0] total     , /// Sum of the frame's samples
     input  var logic                           overflow  , /// A sum wraps with this clock
     input  var logic                           counts    , /// This clock is one of a run
-    output var logic                           filling   ,
-    output var logic                           ready     ,
+    output var logic                  [3-1:0]  filling   , /// Bank being summed into; one bit is set
+    output var logic                  [3-1:0]  reading   , /// Bank of the host's frame, in which no sum changes while `ready`
+    output var logic                           ready     , /// The host has a frame
     output var logic                  [32-1:0] made      ,
     output var logic                  [32-1:0] lost      ,
     output var nirspi_types::Header            header
@@ -25,10 +28,19 @@ module nirspi_frames (
     logic [64-1:0] shown     ;
     logic          wrapped   ;
     logic          after_loss;
-    logic          held      ;
     logic [16-1:0] flags     ;
 
-    always_comb held = ready && !give_back;
+    // The oldest frame is the host's, the other waits.
+    logic                behind    ; // there is one that waits
+    logic                gives     ; // the host gives a frame back
+    logic                held      ; // the host has a frame all the same
+    logic                full      ; // both wait for the host, so that no bank is left for a third
+    nirspi_types::Header newest    ; // of the frame that this clock completes
+    nirspi_types::Header header_two; // of the frame that waits
+
+    always_comb gives = give_back && ready;
+    always_comb held  = ((give_back) ? ( behind ) : ( ready ));
+    always_comb full  = behind && !give_back;
 
     always_comb begin
         flags = 0;
@@ -51,14 +63,18 @@ module nirspi_frames (
 
     always_ff @ (posedge clk) begin
         if (rst) begin
-            filling    <= 0;
+            filling    <= 3'b001;
+            reading    <= 3'b001;
             ready      <= 0;
+            behind     <= 0;
             made       <= 0;
             lost       <= 0;
             wrapped    <= 0;
             after_loss <= 0;
         end else if (restart) begin
+            reading    <= filling;
             ready      <= 0;
+            behind     <= 0;
             made       <= 0;
             lost       <= 0;
             wrapped    <= 0;
@@ -67,17 +83,34 @@ module nirspi_frames (
             wrapped <= 0;
             made    <= made + 1;
             ready   <= 1;
-            if (held) begin
+            behind  <= held;
+            if (full) begin
                 lost       <= lost + 1;
                 after_loss <= 1;
             end else begin
-                filling    <= ~filling;
+                filling    <= {filling[1:0], filling[2]};
                 after_loss <= 0;
+            end
+            if (gives) begin
+                reading <= {reading[1:0], reading[2]};
             end
         end else begin
             ready   <= held;
+            behind  <= full;
             wrapped <= wrapped || overflow && counts;
+            if (gives) begin
+                reading <= {reading[1:0], reading[2]};
+            end
         end
+    end
+
+    always_comb begin
+        newest.flags      = flags;
+        newest.number     = made;
+        newest.over_range = over_range;
+        newest.lost       = lost;
+        newest.total      = total;
+        newest.shown_at   = ((first) ? ( clock_now ) : ( shown ));
     end
 
     always_ff @ (posedge clk) begin
@@ -87,12 +120,13 @@ module nirspi_frames (
             shown <= clock_now;
         end
         if (done && !held) begin
-            header.flags      <= flags;
-            header.number     <= made;
-            header.over_range <= over_range;
-            header.lost       <= lost;
-            header.total      <= total;
-            header.shown_at   <= ((first) ? ( clock_now ) : ( shown ));
+            header <= newest;
+        end else if (gives) begin
+            header <= header_two;
+        end
+        // Without a frame at the host nothing waits, and the header of what waits means nothing.
+        if (done && !full) begin
+            header_two <= newest;
         end
     end
 endmodule

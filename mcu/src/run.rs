@@ -55,6 +55,13 @@ impl Counters {
     #[inline(never)]
     pub fn read(&mut self, bus: &mut impl FpgaBus) -> Result<(), Fault> {
         fpga::identify(bus)?;
+        self.update(bus)
+    }
+
+    /// The same without a look at the identity, for every packet: the bus checks each answer, and the poll looks at the
+    /// identity once in [`Limits::running_check`].
+    #[inline(never)]
+    fn update(&mut self, bus: &mut impl FpgaBus) -> Result<(), Fault> {
         let lost =
             fpga::read(bus, Register::FramesLost).map_err(|error| fpga::failed(error, bus))?;
         let made =
@@ -319,7 +326,7 @@ impl Run {
                 Err(_) => {}
             }
         }
-        if counters.read(bus).is_err() {
+        if counters.update(bus).is_err() {
             // The FPGA keeps the frame until it is known whether the frame is counted already.
             return false;
         }

@@ -6,6 +6,7 @@ pub mod firmware;
 pub mod pages;
 pub mod tamper;
 pub mod tapped;
+pub mod throughput;
 
 use std::path::{Path, PathBuf};
 

@@ -1,9 +1,10 @@
-//! The two banks of 48-bit accumulators: one bank sums the current frame, the other holds the frame
-//! delivered to the host.
+//! The three banks of 48-bit accumulators: one bank sums the current frame, one holds the frame
+//! delivered to the host, and one the frame that waits behind the delivered frame.
 //!
 //! # Invariant
 //! A frame never mixes with another frame: it is delivered whole or lost whole
-//! (`golden::runs::a_slow_host_loses_whole_frames_and_every_loss_is_counted_once`).
+//! (`golden::runs::a_slow_host_loses_whole_frames_and_every_loss_is_counted_once`). Frames are delivered in
+//! the order in which they were made (`golden::runs::a_frame_that_waits_is_delivered_at_the_release`).
 
 use crate::format;
 use crate::packet::{Stamp, packet};
@@ -11,7 +12,12 @@ use crate::settings::Settings;
 use nirspi_wire::{
     FrameFlags, PATTERNS,
     fpga::{Header, SUM_MODULUS, Sums},
+    register::WAITING_FRAMES,
 };
+use std::collections::VecDeque;
+
+/// The banks of the frames that wait, and the one that is being filled.
+const BANKS: usize = WAITING_FRAMES + 1;
 
 /// Which sum a slot adds to.
 #[derive(Debug, Clone, Copy)]
@@ -34,9 +40,10 @@ pub(crate) struct Summary {
     pub(crate) shown_at: u64,
 }
 
-/// A delivered frame.
+/// A frame that is delivered or waits to be delivered.
 #[derive(Debug, Clone)]
-struct Delivered {
+struct Complete {
+    bank: usize,
     header: Header,
     /// Sum of its samples, modulo 2^64.
     total: u64,
@@ -46,18 +53,19 @@ struct Delivered {
     bytes: Option<Vec<u8>>,
 }
 
-/// Both banks and the counters of the run.
+/// The banks and the counters of the run.
 #[derive(Debug, Clone)]
 pub(crate) struct Frames {
-    banks: [Vec<Sums>; 2],
-    /// The bank being summed into. The other bank holds the delivered frame, if there is one.
+    banks: [Vec<Sums>; BANKS],
+    /// The bank being summed into.
     filling: usize,
     /// A sum of the current frame has wrapped.
     overflow: bool,
-    delivered: Option<Delivered>,
+    /// Frames in banks of their own, oldest first. The first one is delivered, the other waits behind it.
+    waiting: VecDeque<Complete>,
     made: u32,
     lost: u32,
-    /// A frame was lost after the last delivered frame.
+    /// A frame was lost after the last one that found a bank.
     after_loss: bool,
     /// As of the start of the run.
     stamp: Stamp,
@@ -67,10 +75,10 @@ impl Frames {
     pub(crate) fn new() -> Self {
         let bank = || vec![Sums::default(); PATTERNS.into()];
         Self {
-            banks: [bank(), bank()],
+            banks: std::array::from_fn(|_| bank()),
             filling: 0,
             overflow: false,
-            delivered: None,
+            waiting: VecDeque::new(),
             made: 0,
             lost: 0,
             after_loss: false,
@@ -82,7 +90,7 @@ impl Frames {
     pub(crate) fn restart(&mut self, stamp: Stamp) {
         self.stamp = stamp;
         self.overflow = false;
-        self.delivered = None;
+        self.waiting.clear();
         self.made = 0;
         self.lost = 0;
         self.after_loss = false;
@@ -100,17 +108,17 @@ impl Frames {
 
     /// Whether a frame is delivered.
     pub(crate) fn ready(&self) -> bool {
-        self.delivered.is_some()
+        !self.waiting.is_empty()
     }
 
     /// Sum of the samples and number of over-range samples of the delivered frame; 0 without one.
     pub(crate) fn measures(&self) -> (u64, u32) {
-        self.delivered.as_ref().map_or((0, 0), |frame| (frame.total, frame.header.over_range))
+        self.waiting.front().map_or((0, 0), |frame| (frame.total, frame.header.over_range))
     }
 
-    /// Takes the delivered frame back.
+    /// Takes the delivered frame back. The frame that waits behind it is delivered.
     pub(crate) fn release(&mut self) {
-        self.delivered = None;
+        self.waiting.pop_front();
     }
 
     /// Adds the sum of one slot.
@@ -123,13 +131,13 @@ impl Frames {
         *half = after % SUM_MODULUS;
     }
 
-    /// Delivers the completed frame, or loses the frame if the host has not released the one
-    /// before.
+    /// Delivers the completed frame, now or at a release, or loses the frame if so many wait for the host that
+    /// no bank is left.
     pub(crate) fn complete(&mut self, settings: &Settings, summary: Summary) {
         let sequence = self.made;
         self.made = self.made.wrapping_add(1);
         let overflow = std::mem::take(&mut self.overflow);
-        if self.delivered.is_some() {
+        if self.waiting.len() == WAITING_FRAMES {
             self.lost = self.lost.wrapping_add(1);
             self.after_loss = true;
             return;
@@ -154,14 +162,16 @@ impl Frames {
             clock: summary.shown_at,
         };
         let stamp = settings.packets.then_some(self.stamp);
-        self.delivered = Some(Delivered { header, total: summary.total, stamp, bytes: None });
-        self.filling = 1 - self.filling;
+        let (bank, total) = (self.filling, summary.total);
+        self.waiting.push_back(Complete { bank, header, total, stamp, bytes: None });
+        // Banks are filled in turn, and frames come and go in one order, so the next bank is free.
+        self.filling = (bank + 1) % BANKS;
     }
 
     /// The host's frame as it crosses the host port.
     pub(crate) fn bytes(&mut self) -> Option<&[u8]> {
-        let bank = &self.banks[1 - self.filling];
-        let Delivered { header, stamp, bytes, .. } = self.delivered.as_mut()?;
+        let Complete { bank, header, stamp, bytes, .. } = self.waiting.front_mut()?;
+        let bank = &self.banks[*bank];
         Some(bytes.get_or_insert_with(|| match stamp {
             Some(stamp) => packet(header, bank, stamp),
             None => format::frame(header, bank),

@@ -12,7 +12,7 @@
 //!                   │            │
 //!              order table ── sequencer ── leds ──────────── row and column lines
 //!                                              └─ safety ─── enable (watchdog, duty, over-range, interlock)
-//!  ADC ─ source ─ window (latency, blanking, slot sum) ── frames (two banks) ── format ── host port
+//!  ADC ─ source ─ window (latency, blanking, slot sum) ── frames (three banks) ── format ── host port
 //!            └─── raw ──────────────────────────────────────────────────────────────────── host port
 //! ```
 //!

@@ -1,4 +1,4 @@
-//! A fake FPGA for tests: its registers, one frame, and every kind of failure. Its gateware makes no packets unless a
+//! A fake FPGA for tests: its registers, one frame or two, and every kind of failure. Its gateware makes no packets unless a
 //! test says so.
 
 use crate::{BusError, FpgaBus};
@@ -25,6 +25,10 @@ pub struct FakeFpga {
     pub lost: u32,
     pub clock: u64,
     pub frame: Option<Vec<u8>>,
+    /// A second frame can wait, as since gateware 0.3.3.
+    pub two_wait: bool,
+    /// The frame that waits behind the delivered one, and what the signal meter will ask of it.
+    pub behind: Option<(Vec<u8>, (u64, u32))>,
     /// Samples over range in every frame.
     pub over_range: u32,
     /// What is added to the positive sums of a frame, by its sequence.
@@ -85,6 +89,8 @@ impl Default for FakeFpga {
             lost: 0,
             clock: 0,
             frame: None,
+            two_wait: false,
+            behind: None,
             over_range: 0,
             noise_of: |_, _| 0,
             frame_after_read_of: None,
@@ -144,7 +150,8 @@ impl FakeFpga {
     /// Loses its configuration: all registers as after power-up.
     pub fn reset(&mut self) {
         let version = self.get(Register::Version);
-        *self = Self { accesses: self.accesses, keeps: self.keeps, ..Self::default() };
+        let Self { accesses, keeps, two_wait, .. } = *self;
+        *self = Self { accesses, keeps, two_wait, ..Self::default() };
         self.registers.insert(Register::Version.address(), version);
     }
 
@@ -189,7 +196,7 @@ impl FakeFpga {
         }
         let sequence = self.made;
         self.made = self.made.wrapping_add(1);
-        if self.frame.is_some() {
+        if self.frame.is_some() && (!self.two_wait || self.behind.is_some()) {
             self.lost += 1;
             self.after_loss = true;
         } else {
@@ -198,10 +205,15 @@ impl FakeFpga {
             } else {
                 FrameFlags::default()
             };
-            self.frame = Some(self.frame_bytes(sequence, flags));
+            let bytes = self.frame_bytes(sequence, flags);
             let sums = self.sums(sequence);
             let total = sums.iter().map(|sums| sums.positive + sums.negative).sum();
-            self.measures = (total, self.over_range);
+            let measures = (total, self.over_range);
+            if self.frame.is_some() {
+                self.behind = Some((bytes, measures));
+            } else {
+                (self.frame, self.measures) = (Some(bytes), measures);
+            }
         }
         if self.made == self.get(Register::Frames) {
             self.running = false;
@@ -280,7 +292,10 @@ impl FakeFpga {
             self.fault = FaultCode::None;
         }
         if bits & control::RELEASE != 0 {
-            self.frame = None;
+            self.frame = self.behind.take().map(|(bytes, measures)| {
+                self.measures = measures;
+                bytes
+            });
         }
         if bits & (control::START | control::START_RAW) != 0 {
             self.start(bits & control::START_RAW != 0);
@@ -296,7 +311,7 @@ impl FakeFpga {
         if self.config_error {
             return;
         }
-        (self.made, self.lost, self.frame, self.raw) = (0, 0, None, None);
+        (self.made, self.lost, self.frame, self.behind, self.raw) = (0, 0, None, None, None);
         let time = u64::from(self.get(Register::TimeHigh)) << 32;
         let time = time | u64::from(self.get(Register::TimeLow));
         self.stamp = (self.get(Register::Run) as u16, self.clock_read, time);

@@ -152,6 +152,71 @@ fn a_release_that_is_lost_on_the_bus_sends_no_packet_twice_and_drops_none_twice(
     }
 }
 
+/// What lies between two transfers decides how many packets a second come.
+#[test]
+fn a_packet_costs_two_reads_and_a_release() {
+    let mut bench = running();
+    // The signal meter looks at these two.
+    bench.frame();
+    bench.frame();
+    bench.fpga.make_frame();
+    // The status of the FPGA is not due yet.
+    let before = bench.fpga.accesses;
+    bench.after(10);
+    assert_eq!(sequences(&bench.heard()), [0, 1, 2]);
+    assert_eq!(bench.fpga.accesses - before, 3);
+}
+
+#[test]
+fn a_frame_that_waits_behind_another_follows_it() {
+    let mut bench = running();
+    bench.fpga.two_wait = true;
+    for _ in 0..4 {
+        bench.fpga.make_frame();
+    }
+    // Two wait, two are lost; the fifth finds the room of the first.
+    bench.after(10);
+    bench.fpga.make_frame();
+    for _ in 0..3 {
+        bench.after(10);
+    }
+    assert!(bench.fpga.frame.is_none());
+    assert_eq!(sequences(&bench.heard()), [0, 1, 4]);
+    bench.fpga.make_frame();
+    bench.fpga.make_frame();
+    bench.ask(Command::Stop).unwrap();
+    let heard = bench.heard();
+    assert_eq!(sequences(&heard), [5, 6], "both come after the stop");
+    assert_eq!(events(&heard), [ended(7, 0, 2, 0)]);
+}
+
+#[test]
+fn a_lost_release_sends_no_packet_twice_while_another_waits_behind_it() {
+    for room in [0, usize::MAX] {
+        let mut bench = running();
+        bench.fpga.two_wait = true;
+        bench.fpga.lost_address = Some(Register::Control.address());
+        bench.link.room = room;
+        bench.fpga.make_frame();
+        bench.after(10);
+        bench.fpga.make_frame();
+        bench.link.room = usize::MAX;
+        bench.after(10);
+        assert!(bench.fpga.behind.is_some(), "the release is lost");
+        bench.fpga.lost_address = None;
+        for _ in 0..3 {
+            bench.after(10);
+        }
+        assert!(bench.fpga.frame.is_none());
+        // A frame whose first release was lost before it was read comes in the place of the one behind it.
+        let dropped = u32::from(room == 0);
+        let expected: &[u32] = if room == 0 { &[0] } else { &[0, 1] };
+        assert_eq!(sequences(&bench.heard()), expected);
+        let status = bench.status();
+        assert_eq!((status.frames_sent, status.frames_dropped), (2 - dropped, dropped));
+    }
+}
+
 #[test]
 fn a_frame_that_is_lost_while_the_counters_are_read_hides_no_other_and_doubles_none() {
     for lost_release in [false, true] {

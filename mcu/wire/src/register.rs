@@ -11,8 +11,9 @@
 //!   unless its clock within that slot is below [`Register::Blank`].
 //! * Settings are copied when a run starts: writes while it runs hold for the next one. The order
 //!   table is not copied: writes to it while running are refused and set [`status::WRITE_REFUSED`].
-//! * A frame that is complete while the one before has not been released is lost: counted in
-//!   [`Register::FramesLost`], and the next frame delivered carries `AFTER_LOSS`.
+//! * Up to [`WAITING_FRAMES`] frames wait for the host. The oldest is the delivered frame, and its release delivers
+//!   the next. A frame that is complete while so many wait is lost: counted in [`Register::FramesLost`], and the next
+//!   frame that is not lost carries `AFTER_LOSS`.
 //! * With [`mode::PACKETS`] a frame is read as a packet of the host's link in the layout of [`ready`](crate::ready).
 //!   Its device time is `Time + (clock of its first slot - clock of the last read of ClockLow) / 125`, all as of
 //!   the start.
@@ -76,7 +77,7 @@ registers! {
     /// Always [`IDENTITY`].
     Identity = 0x00, ReadOnly, IDENTITY;
     /// Gateware version, `major << 16 | minor << 8 | patch`.
-    Version = 0x01, ReadOnly, 0x0000_0302;
+    Version = 0x01, ReadOnly, 0x0000_0303;
     /// Holds what was written, for bus tests.
     Scratch = 0x02, ReadWrite, 0;
     /// See [`control`].
@@ -118,7 +119,7 @@ registers! {
     OverRangeTrip = 0x12, ReadWrite, 4096;
     /// Frames completed in this run, lost ones too.
     FramesMade = 0x13, ReadOnly, 0;
-    /// Frames of this run that were lost because the one before was not released.
+    /// Frames of this run that were lost because [`WAITING_FRAMES`] before them were not released.
     FramesLost = 0x14, ReadOnly, 0;
     /// Clocks since reset, low word; reading it holds the high word for the next read.
     ClockLow = 0x15, ReadOnly, 0;
@@ -172,6 +173,8 @@ pub const fn measures_frames(version: u32) -> bool {
     has_this_map(version) && version & 0xFF >= 2
 }
 
+/// Frames that can wait for the host, the delivered one included. Gateware before 0.3.3 has room for one.
+pub const WAITING_FRAMES: usize = 2;
 /// Address of the order table's first entry; entry `i` is at `ORDER_TABLE + i`, read and write, 10
 /// bits.
 pub const ORDER_TABLE: u16 = 0x0400;
@@ -192,7 +195,7 @@ pub mod control {
     pub const STOP: u32 = 1 << 0;
     /// Forgets a latched fault. Ignored while running.
     pub const CLEAR_FAULT: u32 = 1 << 1;
-    /// Gives the delivered frame's buffer back.
+    /// Gives the delivered frame's buffer back. A frame that waits behind it is delivered at once.
     pub const RELEASE: u32 = 1 << 2;
     /// Starts a run, unless one is under way, a fault is latched, the interlock is open or a
     /// setting is out of range (then [`status::CONFIG_ERROR`](super::status::CONFIG_ERROR) is set).

@@ -4,7 +4,7 @@
 //! If a test in this file fails, do not change the test: you have changed what a gateware of version 0.1
 //! means. A new register at a free address is appended here, with a higher minor `Register::Version`: 0.2
 //! appended `Clocks` and `Design`, 0.3 `Writes` and the check of every access, 0.3.1 packets, 0.3.2 `SumLow`,
-//! `SumHigh` and `OverRange`. Anything else needs a new `Register::Identity` or major `Register::Version`, and a new file beside this one.
+//! `SumHigh` and `OverRange`, 0.3.3 a second frame that waits. Anything else needs a new `Register::Identity` or major `Register::Version`, and a new file beside this one.
 
 use nirspi_wire::{
     FrameFlags, SelfTestReport,
@@ -16,7 +16,7 @@ use nirspi_wire::{
 /// Address, name, access, value after reset.
 const REGISTERS: &str = "\
 0x0000 Identity      ReadOnly  0x4e535049
-0x0001 Version       ReadOnly  0x00000302
+0x0001 Version       ReadOnly  0x00000303
 0x0002 Scratch       ReadWrite 0x00000000
 0x0003 Control       Command   0x00000000
 0x0004 Status        ReadOnly  0x00000000
@@ -120,6 +120,7 @@ fn bits_codes_and_limits_are_these() {
     assert_eq!(checks, expected);
     assert_eq!(register::ORDER_TABLE, 0x0400);
     assert_eq!(register::RAW_SAMPLES_MAX, 4096);
+    assert_eq!(register::WAITING_FRAMES, 2);
     assert_eq!(register::WATCHDOG_MAX, 125_000_000);
     assert_eq!(register::DUTY_WINDOW, 1_048_576);
     assert_eq!(register::DUTY_LIMIT_MAX, 1_310_720);

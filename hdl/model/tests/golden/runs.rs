@@ -5,9 +5,10 @@ use crate::bench::{Bench, random_sample};
 use crate::oracle::{Order, Setup, setup};
 use nirspi_wire::{
     FrameFlags,
-    register::{Access, ORDER_TABLE, Register, control, status},
+    register::{Access, ORDER_TABLE, Register, WAITING_FRAMES, control, status},
 };
 use proptest::prelude::*;
+use std::collections::VecDeque;
 
 /// A short frame of 24 clocks that still uses every path.
 fn small() -> Setup {
@@ -36,22 +37,24 @@ proptest! {
         let mut bench = Bench::new();
         setup.apply(&mut bench);
         bench.start();
-        // The host keeps each frame for a random time. Only that time decides whether frame f is
+        // The host keeps each frame for a random time. Only those times decide whether frame f is
         // lost.
         let mut held_until = 0;
         let mut lost = 0;
         let mut after_loss = false;
-        let mut in_hand = None;
+        let mut waiting = VecDeque::new();
+        let hold = |t: u64, hurry: f64| t + (hurry * setup.clocks_per_frame() as f64) as u64;
         let mut f = 0;
         for t in 1..=setup.complete_after(frames - 1) {
-            if in_hand.is_some() && t > held_until {
+            if !waiting.is_empty() && t > held_until {
                 // A late read must give the frame unchanged.
                 let frame = bench.take_frame();
-                prop_assert_eq!(Some(frame), in_hand.take());
+                prop_assert_eq!(Some(frame), waiting.pop_front());
+                held_until = hold(t, hurry[f as usize]);
             }
             bench.0.tick(samples(t - 1));
             if t == setup.complete_after(f) {
-                if in_hand.is_some() {
+                if waiting.len() == WAITING_FRAMES {
                     lost += 1;
                     after_loss = true;
                 } else {
@@ -60,19 +63,21 @@ proptest! {
                     if std::mem::take(&mut after_loss) {
                         frame.header.flags = frame.header.flags.with(FrameFlags::AFTER_LOSS);
                     }
-                    in_hand = Some(frame);
-                    let hold = hurry[f as usize] * setup.clocks_per_frame() as f64;
-                    held_until = t + hold as u64;
+                    if waiting.is_empty() {
+                        held_until = hold(t, hurry[f as usize]);
+                    }
+                    waiting.push_back(frame);
                 }
                 f += 1;
             }
-            prop_assert_eq!(bench.0.frame_ready(), in_hand.is_some(), "clock {}", t);
+            prop_assert_eq!(bench.0.frame_ready(), !waiting.is_empty(), "clock {}", t);
         }
         prop_assert_eq!(bench.get(Register::FramesMade), frames);
         prop_assert_eq!(bench.get(Register::FramesLost), lost);
-        if let Some(last) = in_hand {
-            prop_assert_eq!(bench.take_frame(), last);
+        for frame in waiting {
+            prop_assert_eq!(bench.take_frame(), frame);
         }
+        prop_assert!(!bench.0.frame_ready());
     }
 
     #[test]
@@ -161,6 +166,42 @@ fn the_order_table_is_the_sequencers_during_a_run() {
     assert_eq!(bench.0.read(ORDER_TABLE + 3), Some(78));
     bench.start();
     assert!(!bench.status(status::WRITE_REFUSED));
+}
+
+/// Three frames are in the banks at a time: one delivered, one that waits, one that is being summed.
+#[test]
+fn a_frame_that_waits_is_delivered_at_the_release() {
+    let setup = Setup { frames: 5, ..small() };
+    let samples = |t| random_sample(3, t);
+    let mut bench = Bench::new();
+    setup.apply(&mut bench);
+    bench.start();
+    let mut t = 0;
+    let mut run_to = |bench: &mut Bench, end: u64| {
+        for t in std::mem::replace(&mut t, end)..end {
+            bench.0.tick(samples(t));
+        }
+    };
+    // Two wait, and half of the third frame is summed.
+    run_to(&mut bench, setup.complete_after(1) + setup.clocks_per_frame() / 2);
+    let first = setup.frame(0, 0, &samples);
+    let again = bench.0.frame().unwrap().to_vec();
+    assert_eq!(bench.take_frame(), first);
+    assert!(bench.0.frame_ready(), "the one behind is there at once");
+    assert_ne!(bench.0.frame().unwrap(), again);
+    // The release makes room for the third, but not for the fourth.
+    run_to(&mut bench, setup.complete_after(3));
+    assert_eq!((bench.get(Register::FramesMade), bench.get(Register::FramesLost)), (4, 1));
+    for sequence in [1, 2] {
+        assert_eq!(bench.take_frame(), setup.frame(sequence, 0, &samples));
+    }
+    assert!(!bench.0.frame_ready());
+    bench.control(control::RELEASE);
+    run_to(&mut bench, setup.complete_after(4));
+    let last = bench.take_frame();
+    assert_eq!(last.sums, setup.frame(4, 0, &samples).sums);
+    assert_eq!((last.header.sequence, last.header.lost), (4, 1));
+    assert!(last.header.flags.contains(FrameFlags::AFTER_LOSS));
 }
 
 #[test]

@@ -142,6 +142,8 @@ pub struct Tally {
     pub bursts: u64,
     pub packets: u64,
     pub packets_after_loss: u64,
+    /// Releases behind which another frame waited.
+    pub followed: u64,
     /// Zeros before the packet of which most came, with the time of a byte in ps.
     pub lead: (u64, u64),
     pub starts: u64,
@@ -452,7 +454,10 @@ impl Rig {
                         self.put_out = self.dark.contains(&self.clock);
                     }
                 } else {
+                    let gives = control && value & control::RELEASE != 0;
+                    let gives = gives && self.model.frame_ready();
                     self.model.write(address, value);
+                    self.seen_so_far.followed += u64::from(gives && self.model.frame_ready());
                 }
                 return;
             }

@@ -245,6 +245,64 @@ fn act(rig: &mut Rig, seed: u64, more: u32, mut before: impl FnMut(&mut Rig)) {
     rig.stream(true, 100);
 }
 
+/// Short frames and a host that is slow by turns: none, one or two frames wait while a third is made, some come again,
+/// and some are lost.
+pub fn slow_readers(rig: &mut Rig, seed: u64) {
+    let dice = &mut Dice::new(!seed);
+    rig.port =
+        Port { host_ps: dice.range(8_420, 11_390), half: 3, quad: true, glitches: seed % 2 == 1 };
+    rig.over_range_rate = 2;
+    rig.interlock(true);
+    let (patterns, dwell, sweeps) = (dice.range(1, 6), dice.range(10, 120), dice.range(1, 3));
+    let halves = dice.range(1, 2);
+    let frame = patterns * dwell * sweeps * halves;
+    let packets = if seed % 4 < 2 { 0 } else { mode::PACKETS };
+    stamp(rig, dice);
+    rig.set(R::Mode, packets | if halves == 2 { mode::DIFFERENTIAL } else { 0 });
+    for (register, value) in [(R::Patterns, patterns), (R::Dwell, dwell), (R::Sweeps, sweeps)] {
+        rig.set(register, value as u32);
+    }
+    rig.set(R::Blank, dice.range(0, 9) as u32);
+    rig.set(R::Latency, dice.range(0, 63) as u32);
+    rig.set(R::Frames, if dice.once_in(2) { 0 } else { dice.range(2, 12) as u32 });
+    rig.set(R::Watchdog, 1_000_000);
+    rig.set(R::DutyLimit, DUTY_LIMIT_MAX);
+    rig.set(R::OverRangeTrip, 0);
+    rig.set(R::Control, control::STOP | control::CLEAR_FAULT | control::START);
+    for _ in 0..dice.range(6, 14) {
+        match dice.range(0, 9) {
+            0..=2 => rig.wait_adc(dice.range(0, 3 * frame)),
+            3 => rig.stream(false, dice.range(1, 40) as usize),
+            // The frame comes again unless it is released.
+            4 => rig.stream(false, usize::MAX),
+            // The FPGA does not take this release, so the frame comes again too.
+            5 => rig.write_damaged(
+                R::Control.address(),
+                control::RELEASE,
+                [(); 3].map(|()| dice.next()),
+            ),
+            // The second release is one of the frame behind, or of nothing.
+            6 => (0..dice.range(1, 3)).for_each(|_| rig.set(R::Control, control::RELEASE)),
+            _ => {
+                rig.stream(false, usize::MAX);
+                measures(rig);
+                rig.set(R::Control, control::RELEASE);
+            }
+        }
+        rig.read(R::FramesMade.address());
+        rig.read(R::FramesLost.address());
+        if rig.mismatch.is_some() {
+            return;
+        }
+    }
+    rig.set(R::Control, control::STOP);
+    for _ in 0..3 {
+        rig.stream(false, usize::MAX);
+        measures(rig);
+        rig.set(R::Control, control::RELEASE);
+    }
+}
+
 /// Patterns, dwell and complements with which a sum is used again after 1 to 6 clocks, and after
 /// many.
 const RETURNS: [(u64, u64, bool); 10] = [

@@ -127,8 +127,8 @@ fn age(now: Micros) -> impl Fn(Micros) -> u64 + Copy {
 }
 
 impl World {
-    /// Power-up, and the first poll. `keeps`: the bus has memory for a second frame; `packets`: the gateware makes
-    /// packets.
+    /// Power-up, and the first poll. `keeps`: the bus has memory for a second frame; `packets`: the gateware is that
+    /// of today, which makes packets and lets two frames wait.
     pub fn new(keeps: bool, packets: bool) -> Self {
         let limits = Limits {
             host_silence: Micros(2 * TICK),
@@ -140,6 +140,7 @@ impl World {
         bench.fpga.keeps = keeps;
         if packets {
             bench.fpga.make_packets();
+            bench.fpga.two_wait = true;
         }
         let mut world =
             Self { bench, troubles: 0, seen: Seen::default(), last_command: Micros(0), starved: 0 };
@@ -543,11 +544,13 @@ impl World {
         }
         // Of a packet the sequence: number of the run and time are absolute.
         let seen = if fpga.sends_packets() { 5..9 } else { 0..40 };
-        let head = fpga.frame.as_ref().map(|frame| &frame[seen.clone()]);
-        if busy {
-            head.hash(hash);
-        } else {
-            head.is_some().hash(hash);
+        let waiting = [fpga.frame.as_ref(), fpga.behind.as_ref().map(|(frame, _)| frame)];
+        for head in waiting.map(|frame| frame.map(|frame| &frame[seen.clone()])) {
+            if busy {
+                head.hash(hash);
+            } else {
+                head.is_some().hash(hash);
+            }
         }
         fpga.kept.as_ref().filter(|_| in_run).map(|frame| &frame[seen]).hash(hash);
         // Whether the FPGA holds the settings of the only configuration decides whether it starts.

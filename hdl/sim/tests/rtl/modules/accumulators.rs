@@ -1,4 +1,4 @@
-//! Tests of the two banks of sums.
+//! Tests of the three banks of sums.
 
 use super::bundles::Place;
 use crate::bench::Bench;
@@ -8,7 +8,7 @@ use crate::scenario::Dice;
 laws![
     every_slot_is_added_once_however_soon_it_comes_again,
     a_word_wraps_at_48_bits_and_says_so_in_that_clock,
-    the_host_reads_the_bank_that_is_not_being_filled,
+    the_host_reads_any_bank_while_another_is_being_filled,
 ];
 
 /// The place of a slot's last sample, as a number.
@@ -28,7 +28,7 @@ struct Accumulators {
 impl Accumulators {
     fn new(project: &Project) -> Self {
         let mut bench = Bench::new(project, "accumulators");
-        bench.set("filling", false);
+        bench.set("filling", 1u64);
         Self { bench, sum: 0, overflows: 0 }
     }
 
@@ -44,13 +44,14 @@ impl Accumulators {
         for _ in 0..8 {
             self.clock(0, 0);
         }
-        self.bench.set("filling", true);
+        self.bench.set("filling", 2u64);
+        self.bench.set("reading", 1u64);
         self.bench.set("host_address", u64::from(complement) << 10 | index);
         for _ in 0..3 {
             self.bench.tick();
         }
         let word = self.bench.get("host_word");
-        self.bench.set("filling", false);
+        self.bench.set("filling", 1u64);
         word
     }
 }
@@ -105,26 +106,33 @@ fn a_word_wraps_at_48_bits_and_says_so_in_that_clock(project: &Project) {
     assert_eq!(sums.overflows, 1);
 }
 
-fn the_host_reads_the_bank_that_is_not_being_filled(project: &Project) {
+fn the_host_reads_any_bank_while_another_is_being_filled(project: &Project) {
     let mut sums = Accumulators::new(project);
     // One bank after the other, each with its own sums.
-    for (bank, offset) in [(false, 100), (true, 200)] {
-        sums.bench.set("filling", bank);
+    for bank in 0..3u64 {
+        sums.bench.set("filling", 1u64 << bank);
         for index in 0..1024 {
-            sums.clock(last_sample(index, true, true), offset + index);
+            sums.clock(last_sample(index, true, true), 100 * bank + index);
         }
         for _ in 0..8 {
             sums.clock(0, 0);
         }
     }
-    for (filling, offset) in [(true, 100), (false, 200)] {
-        sums.bench.set("filling", filling);
+    for (filling, reading) in [(0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1)] {
+        // The bank changes after the last stage of what was summed.
+        for _ in 0..8 {
+            sums.clock(0, 0);
+        }
+        sums.bench.set("filling", 1u64 << filling);
+        sums.bench.set("reading", 1u64 << reading);
         for index in [0, 1, 700, 1023] {
             sums.bench.set("host_address", 1 << 10 | index);
+            // Meanwhile the other bank is summed into.
+            let slot = last_sample(index, true, false);
             for _ in 0..3 {
-                sums.clock(0, 0);
+                sums.clock(slot, 0);
             }
-            assert_eq!(sums.bench.get("host_word"), offset + index);
+            assert_eq!(sums.bench.get("host_word"), 100 * reading + index, "{filling} {reading}");
         }
     }
 }

@@ -4,23 +4,27 @@ use super::bundles::{HEADER, Settings};
 use crate::bench::Bench;
 use crate::project::Project;
 use crate::scenario::Dice;
-use nirspi_wire::FrameFlags;
+use nirspi_wire::{FrameFlags, register::WAITING_FRAMES};
+use std::collections::VecDeque;
 
 laws![
     a_frame_is_delivered_or_lost_and_never_mixed_with_another,
+    two_frames_wait_and_come_in_order_while_a_third_is_summed,
     a_restart_forgets_everything_of_earlier_runs,
 ];
 
 /// What the host can observe.
 #[derive(Debug, Clone, Default)]
 struct Host {
-    /// Bank being filled.
-    filling: u64,
+    /// Number of the bank being filled.
+    filling: u32,
     made: u64,
     lost: u64,
-    /// The delivered frame at its completion: flags, number, over-range samples, lost frames, clock
-    /// of its first slot, sum of its samples.
-    delivered: Option<[u64; 6]>,
+    /// Frames that wait for the host, the delivered one first: bank, and the header at completion (flags, number,
+    /// over-range samples, lost frames, clock of its first slot, sum of its samples).
+    waiting: VecDeque<(u32, [u64; 6])>,
+    /// Clocks in which a frame was completed and another given back, by the number of frames that waited.
+    both: [u32; WAITING_FRAMES + 1],
     /// A sum of the current frame has wrapped.
     overflow: bool,
     after_loss: bool,
@@ -44,12 +48,12 @@ impl Host {
         let header = [flags, self.made, over_range, self.lost, self.shown_at, total];
         self.made += 1;
         self.overflow = false;
-        self.after_loss = self.delivered.is_some();
-        if self.delivered.is_some() {
+        self.after_loss = self.waiting.len() == WAITING_FRAMES;
+        if self.after_loss {
             self.lost += 1;
         } else {
-            self.delivered = Some(header);
-            self.filling = 1 - self.filling;
+            self.waiting.push_back((self.filling, header));
+            self.filling = (self.filling + 1) % 3;
         }
     }
 }
@@ -94,8 +98,11 @@ fn live(project: &Project, seed: u64, restart_in: u64, give_back_in: u64) -> Hos
         bench.set("total", total);
         bench.tick();
 
+        if give_back && done && !restart {
+            host.both[host.waiting.len()] += 1;
+        }
         if give_back {
-            host.delivered = None;
+            host.waiting.pop_front();
         }
         if first {
             host.shown_at = clock;
@@ -111,9 +118,11 @@ fn live(project: &Project, seed: u64, restart_in: u64, give_back_in: u64) -> Hos
         run_clock += 1;
 
         let seen = ["filling", "made", "lost", "ready"].map(|port| bench.get(port));
-        let ready = u64::from(host.delivered.is_some());
-        assert_eq!(seen, [host.filling, host.made, host.lost, ready], "clock {clock}: {host:?}");
-        if let Some(header) = host.delivered {
+        let ready = u64::from(!host.waiting.is_empty());
+        let expected = [1 << host.filling, host.made, host.lost, ready];
+        assert_eq!(seen, expected, "clock {clock}: {host:?}");
+        if let Some(&(bank, header)) = host.waiting.front() {
+            assert_eq!(bench.get("reading"), 1 << bank, "clock {clock}");
             assert_eq!(bench.get_fields("header", &HEADER), header, "clock {clock}");
         }
     }
@@ -123,6 +132,13 @@ fn live(project: &Project, seed: u64, restart_in: u64, give_back_in: u64) -> Hos
 fn a_frame_is_delivered_or_lost_and_never_mixed_with_another(project: &Project) {
     let host = live(project, 19, u64::MAX, 20);
     assert!(host.made > 300 && host.lost > 50 && host.lost < host.made - 50, "{host:?}");
+}
+
+fn two_frames_wait_and_come_in_order_while_a_third_is_summed(project: &Project) {
+    // Releases as rare as frames, so that none, one or two frames wait.
+    let host = live(project, 21, u64::MAX, 9);
+    assert!(host.both.iter().all(|&clocks| clocks > 5), "{host:?}");
+    assert!(host.lost > 20 && host.lost < host.made / 2, "{host:?}");
 }
 
 fn a_restart_forgets_everything_of_earlier_runs(project: &Project) {
