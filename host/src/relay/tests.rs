@@ -19,6 +19,7 @@ fn identity() -> CameraIdentity {
         adc_bits: 14,
         wavelength_nm: 1550,
         capabilities: Vec::new(),
+        detectors: 1,
     }
 }
 

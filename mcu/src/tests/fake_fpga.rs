@@ -25,6 +25,8 @@ pub struct FakeFpga {
     pub lost: u32,
     pub clock: u64,
     pub frame: Option<Vec<u8>>,
+    /// Frames of further detectors, which stay until the test replaces them.
+    pub channels: Vec<Vec<u8>>,
     /// Samples over range in every frame.
     pub over_range: u32,
     /// What is added to the positive sums of a frame, by its sequence.
@@ -85,6 +87,7 @@ impl Default for FakeFpga {
             lost: 0,
             clock: 0,
             frame: None,
+            channels: Vec::new(),
             over_range: 0,
             noise_of: |_, _| 0,
             frame_after_read_of: None,
@@ -390,6 +393,14 @@ impl FpgaBus for FakeFpga {
             return Ok(None);
         }
         if self.dead { Err(BusError::Timeout) } else { Ok(self.frame.as_deref()) }
+    }
+
+    fn detectors(&self) -> u8 {
+        1 + self.channels.len() as u8
+    }
+
+    fn channel(&mut self, detector: u8) -> Result<Option<&[u8]>, BusError> {
+        Ok(self.channels.get(usize::from(detector) - 1).map(Vec::as_slice))
     }
 
     fn keep(&mut self) -> bool {
