@@ -64,7 +64,8 @@ fn recorded(folder: &Path) -> PathBuf {
     recorder.packet(&packet(&DeviceMessage::Event(event))).unwrap();
     let counters = LossCounters { received: FRAMES.into(), ..Default::default() };
     let made = Some(FRAMES.into());
-    recorder.finish(&RunAccount { counters, asked: Some(FRAMES), made, missing: None }).unwrap();
+    let account = RunAccount { counters, asked: Some(FRAMES), made, ..RunAccount::default() };
+    recorder.finish(&account).unwrap();
     path
 }
 

@@ -13,14 +13,14 @@ use nirspi::session::Session;
 use nirspi::setup::MeasurementSetup;
 use nirspi::source::{Index, Source, SourceOptions};
 use nirspi::tally::tally_recording;
-use nirspi::virtual_camera::{CameraModel, MemoryLink, VirtualOptics};
-use nirspi_optics::Scene;
+use nirspi::virtual_camera::{CameraModel, MemoryLink, VirtualCamera, VirtualOptics};
+use nirspi_optics::{Chain, LedArray, Scene};
 use nirspi_recon::{Order, reconstruct};
 use nirspi_tests::tamper::{Fate, Tampered, only_frames};
 use nirspi_wire::packet::MAX_HOST_PACKET;
 use nirspi_wire::{
-    Answer, Command, Configuration, DeviceMessage, PatternOrder, Reply, Request, RunLength,
-    SampleSource, Tail, encode, open,
+    Answer, Command, Configuration, DeviceMessage, EventKind, Fault, PatternOrder, Reply, Request,
+    RunLength, SampleSource, encode, open,
 };
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -128,33 +128,38 @@ fn what_is_lost_or_damaged_is_counted_at_its_detector_exactly_once() {
     }
 }
 
-#[test]
-fn a_host_of_version_2_gets_detector_0_alone() {
-    let mut link = link(&three());
-    let send = |link: &mut Box<dyn Link>, id, command| {
+/// What a camera says to a host of this protocol version in a run.
+#[derive(Default)]
+struct Said {
+    detectors: Option<u8>,
+    /// Detector and sequence number.
+    frames: Vec<(u8, u32)>,
+    faults: Vec<Fault>,
+}
+
+fn said(mut link: Box<dyn Link>, protocol: u16, over_range_trip: u32) -> Said {
+    let configuration = Configuration {
+        order: PatternOrder::Natural,
+        patterns: 1024,
+        differential: true,
+        clocks_per_pattern: 5,
+        blanked: 2,
+        adc_latency: 0,
+        sweeps: 1,
+        source: SampleSource::Detector,
+        over_range_trip,
+    };
+    let commands = [
+        Command::Hello { protocol },
+        Command::Configure(configuration),
+        Command::Start(RunLength::Frames(FRAMES)),
+    ];
+    for (id, command) in (1..).zip(commands) {
         let mut packet = vec![0; MAX_HOST_PACKET];
         link.send(encode(&Request { id, command }, &mut packet).unwrap()).unwrap();
-    };
-    send(&mut link, 1, Command::Hello { protocol: 2 });
-    send(
-        &mut link,
-        2,
-        Command::Configure(Configuration {
-            order: PatternOrder::Natural,
-            patterns: 1024,
-            differential: true,
-            clocks_per_pattern: 5,
-            blanked: 2,
-            adc_latency: 0,
-            sweeps: 1,
-            source: SampleSource::Detector,
-            over_range_trip: 0,
-        }),
-    );
-    send(&mut link, 3, Command::Start(RunLength::Frames(FRAMES)));
-    let (mut frames, mut bytes, mut chunk) = (Vec::new(), Vec::new(), vec![0; 1 << 16]);
-    let mut ended = false;
-    while !ended {
+    }
+    let (mut said, mut bytes, mut chunk) = (Said::default(), Vec::new(), vec![0; 1 << 16]);
+    loop {
         let Received::Bytes(length) = link.receive(&mut chunk, Duration::ZERO).unwrap() else {
             continue;
         };
@@ -162,18 +167,46 @@ fn a_host_of_version_2_gets_detector_0_alone() {
         while let Some(end) = bytes.iter().position(|&byte| byte == 0) {
             let mut packet: Vec<u8> = bytes.drain(..=end).collect();
             packet.pop();
-            match open::<DeviceMessage<'_>>(&mut packet).unwrap() {
+            let message = open::<DeviceMessage<'_>>(&mut packet).unwrap();
+            said.frames.extend(message.frame().map(|(at, frame)| (at, frame.sequence)));
+            match message {
                 DeviceMessage::Reply(Reply { outcome: Ok(Answer::Hello(identity)), .. }) => {
-                    assert_eq!((identity.protocol, identity.detectors), (2, Tail(None)));
+                    assert_eq!(identity.protocol, protocol);
+                    said.detectors = identity.detectors.0;
                 }
-                DeviceMessage::Frame(frame) => frames.push(frame.sequence),
-                DeviceMessage::Event(_) => ended = true,
-                DeviceMessage::Reply(_) | DeviceMessage::Depth(_) => {}
-                other => panic!("{other:?}"),
+                DeviceMessage::Event(event) => match event.kind {
+                    EventKind::Fault(fault) => said.faults.push(fault),
+                    EventKind::RunEnded { .. } => return said,
+                    other => panic!("{other:?}"),
+                },
+                _ => {}
             }
         }
     }
-    assert_eq!(frames, Vec::from_iter(0..FRAMES));
+}
+
+#[test]
+fn a_host_of_version_2_gets_detector_0_alone() {
+    let of_two = said(link(&three()), 2, 0);
+    assert_eq!(of_two.detectors, None);
+    assert_eq!(of_two.frames, Vec::from_iter((0..FRAMES).map(|frame| (0, frame))));
+    let of_three = said(link(&three()), 3, 0);
+    assert_eq!(of_three.detectors, Some(3));
+    let all = (0..FRAMES).flat_map(|frame| (0..3).map(move |detector| (detector, frame)));
+    assert_eq!(of_three.frames, Vec::from_iter(all));
+}
+
+#[test]
+fn too_much_light_at_a_further_detector_switches_the_leds_off() {
+    let optics = optics("[]").ideal();
+    let camera = |times: f64| -> Box<dyn Link> {
+        let array = LedArray::new(optics.footprint(), times * optics.budget().electrons_per_led);
+        let chain = Chain::new(*optics.chain(), 9).unwrap();
+        let fpga = optics.fpga(1).unwrap().with_detector(array, chain);
+        Box::new(MemoryLink::new(VirtualCamera::new(fpga, optics.depth(1).unwrap(), "bright")))
+    };
+    assert_eq!(said(camera(1.0), 3, 1).faults, []);
+    assert_eq!(said(camera(100.0), 3, 1).faults, [Fault::OverRange]);
 }
 
 /// Values of each source.
