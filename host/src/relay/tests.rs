@@ -115,7 +115,8 @@ fn a_host_gets_every_detector_of_the_camera() {
     let three = CameraIdentity { protocol: Channel::SINCE, detectors: 3, ..identity() };
     // The host joins somewhere. Of every fifth frame, detector 1 is lost.
     let script = |n: u32| {
-        let (sequence, detector) = (999 + (n + 2) / 3, ((n + 2) % 3) as u8);
+        let number = n + 2;
+        let (sequence, detector) = (999 + number / 3, (number % 3) as u8);
         let message = |frame: Frame<'_>| match detector {
             0 => packet(&DeviceMessage::Frame(frame)),
             1 if sequence % 5 == 0 => Vec::new(),
