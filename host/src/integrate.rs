@@ -23,7 +23,7 @@ impl Integrated {
         Self::of_patterns(setup.rows.len())
     }
 
-    fn of_patterns(patterns: usize) -> Self {
+    pub(crate) fn of_patterns(patterns: usize) -> Self {
         Self { sums: vec![0; patterns], frames: 0, sweeps: 0, flags: FrameFlags::default() }
     }
 
@@ -104,6 +104,22 @@ impl Integrated {
         settling: Option<&Settling>,
         keep_leak: bool,
     ) -> Result<Measurements, IntegrateError> {
+        self.measurements_of(0, setup, settling, keep_leak)
+    }
+
+    /// As [`measurements`](Self::measurements), for the sums of this detector. The response is measured at
+    /// detector 0. Detectors of one type have the same leak, but each one its own dark level, which is
+    /// estimated for the further ones.
+    ///
+    /// # Errors
+    /// As [`measurements`](Self::measurements).
+    pub fn measurements_of(
+        &self,
+        detector: u8,
+        setup: &MeasurementSetup,
+        settling: Option<&Settling>,
+        keep_leak: bool,
+    ) -> Result<Measurements, IntegrateError> {
         let mut values = self.means(setup);
         let leak = settling
             .filter(|_| !keep_leak)
@@ -115,13 +131,13 @@ impl Integrated {
             }
             return Ok(Measurements::from_differential(&setup.rows, &values)?);
         }
-        let dark = settling.map_or(0.0, |settling| settling.dark_counts);
-        values.iter_mut().for_each(|value| *value -= dark);
+        let dark = settling.filter(|_| detector == 0).map(|settling| settling.dark_counts);
+        values.iter_mut().for_each(|value| *value -= dark.unwrap_or(0.0));
         if let Some(leak) = &leak {
             leak.correct_single(&mut values, Sweep::Repeating);
         }
         let mut measurements = Measurements::from_single(&setup.rows, &values)?;
-        if settling.is_none() {
+        if dark.is_none() {
             measurements.remove_dark_level();
         }
         Ok(measurements)

@@ -1,15 +1,14 @@
 //! Reads measurements from a file of nirspi or another lab, a recording, or a finished capture.
 
 use crate::account::LossCounters;
-use crate::boards;
 use crate::calibration::{FlatField, KeptFlatField};
 use crate::capture::Capture;
-use crate::causes;
 use crate::files::FileError;
 use crate::files::measurement::{self, MeasurementFile, Readings, Reference, Selection};
-use crate::integrate::{IntegrateError, Integrated};
-use crate::recording::{End, Recording, RecordingError};
-use crate::tally::{self, Misfit, Tally, tally_recording};
+use crate::integrate::IntegrateError;
+use crate::recording::RecordingError;
+use crate::session::CameraIdentity;
+use crate::tally::Misfit;
 use nirspi_recon::{
     Dropout, Image, MeasurementError, Measurements, Order, Rows, Side, reconstruct,
 };
@@ -18,12 +17,19 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use thiserror::Error;
 
+mod recording;
+
+use recording::{detectors_of_recording, frames_of_recording, from_recording};
+pub(crate) use recording::{no_frame, of_sum};
+
 /// How to read measurements.
 #[derive(Debug, Clone, Default)]
 pub struct SourceOptions {
     /// The measurement in a file that holds several. For a recording, `All` gives each frame and
     /// any other choice gives their sum.
     pub index: Option<Index>,
+    /// The detector of a recording. `None` is detector 0. `All` gives the sum of the frames of each detector.
+    pub detector: Option<Index>,
     /// What a measurement file does not state itself; its `index` is ignored.
     pub file: Selection,
     /// The part of complex readings to use.
@@ -197,8 +203,47 @@ pub enum SourceError {
         most: u64,
     },
     /// The choice is of several measurements, but one is needed.
-    #[error("--index all, expected one measurement here")]
-    One,
+    #[error("--{0} all, expected one measurement here")]
+    One(&'static str),
+    /// The recorded camera has no such detector.
+    #[error("{}: detector {asked}, expected 0 to {} of the recorded camera", .path.display(), .detectors - 1)]
+    Detector {
+        /// The recording.
+        path: PathBuf,
+        /// The detector that was asked for.
+        asked: usize,
+        /// Number of detectors of the camera.
+        detectors: u8,
+    },
+    /// No frame of a further detector arrived.
+    #[error("{}: no intact frame of detector {detector} in the recording, expected at least one", .path.display())]
+    NoFrameOf {
+        /// The recording.
+        path: PathBuf,
+        /// The detector.
+        detector: u8,
+    },
+    /// A choice of the detector for a measurement file.
+    #[error(
+        "--detector belongs to recordings, not to measurement files: --index chooses from the detectors of a file"
+    )]
+    DetectorOfFile,
+    /// All frames of all detectors.
+    #[error(
+        "--index all and --detector all, expected one of them: --index all --detector N gives the frames of detector N"
+    )]
+    AllOfAll,
+}
+
+impl SourceError {
+    /// Whether options contradict each other or the kind of the file.
+    #[must_use]
+    pub fn is_of_options(&self) -> bool {
+        matches!(
+            self,
+            Self::NotForRecordings | Self::One(_) | Self::DetectorOfFile | Self::AllOfAll
+        )
+    }
 }
 
 /// Measurements and their origin.
@@ -256,13 +301,18 @@ impl Source {
         from_file(path, measurement::read(path, &want)?, options.part)
     }
 
-    /// Reads all measurements of a file, or each frame of a recording.
+    /// Reads all measurements of a file, each frame of a recording, or with [`SourceOptions::detector`] `All` the sum
+    /// of a recording's frames at each detector.
     ///
     /// # Errors
     /// As [`read`](Self::read).
     pub fn read_all(path: &Path, options: &SourceOptions) -> Result<Vec<Self>, SourceError> {
         if options.fits_recording(path)? {
-            return frames_of_recording(path, options);
+            return match (options.detector, options.index) {
+                (Some(Index::All), Some(Index::All)) => Err(SourceError::AllOfAll),
+                (Some(Index::All), _) => detectors_of_recording(path, options),
+                _ => frames_of_recording(path, options),
+            };
         }
         let mut file = measurement::Several::open(path, &options.file)?;
         fits_together(path, file.len(), file.patterns(), file.side())?;
@@ -289,6 +339,7 @@ impl Source {
         let mut notes: Vec<String> = integrated.warnings().into_iter().map(str::to_owned).collect();
         notes.extend(settling.is_none().then(|| NOT_CALIBRATED.to_owned()));
         notes.extend(capture.missing().as_deref().map(not_whole));
+        notes.extend(first_of(1 + capture.further.len()));
         Ok(Self {
             measurements: integrated.measurements(setup, settling.as_ref(), false)?,
             imaginary: None,
@@ -301,6 +352,15 @@ impl Source {
             flat_field: None,
         })
     }
+}
+
+/// A note that a camera has further detectors.
+fn first_of(detectors: usize) -> Option<String> {
+    (detectors > 1).then(|| {
+        format!(
+            "detector 0 of {detectors}: --detector N gives another one of the recording, --detector all each of them"
+        )
+    })
 }
 
 /// A note about what a capture lacks. The text may come from a file.
@@ -319,7 +379,24 @@ impl SourceOptions {
         match self.index {
             None => Ok(None),
             Some(Index::One(index)) => Ok(Some(index)),
-            Some(Index::All) => Err(SourceError::One),
+            Some(Index::All) => Err(SourceError::One("index")),
+        }
+    }
+
+    /// The requested detector of a recorded camera.
+    pub(crate) fn detector_of(
+        &self,
+        path: &Path,
+        identity: &CameraIdentity,
+    ) -> Result<u8, SourceError> {
+        let detectors = identity.detectors.max(1);
+        match self.detector {
+            None => Ok(0),
+            Some(Index::All) => Err(SourceError::One("detector")),
+            Some(Index::One(asked)) => u8::try_from(asked)
+                .ok()
+                .filter(|&found| found < detectors)
+                .ok_or_else(|| SourceError::Detector { path: path.to_owned(), asked, detectors }),
         }
     }
 
@@ -337,6 +414,9 @@ impl SourceOptions {
         let for_files = self.file != Selection::default() || self.part != Part::default();
         if (is_mcap || named_mcap) && (one || for_files) {
             return Err(SourceError::NotForRecordings);
+        }
+        if !is_mcap && !named_mcap && self.detector.is_some() {
+            return Err(SourceError::DetectorOfFile);
         }
         Ok(is_mcap || named_mcap)
     }
@@ -448,91 +528,6 @@ fn without_dropouts(rows: &Rows, readings: &Readings) -> Result<Measurements, Me
         Readings::Differential(d) => Measurements::from_differential(rows, d),
         Readings::Single(y) => Measurements::from_single(rows, y),
     }
-}
-
-/// Sums the frames of a recording, and makes their account again.
-fn from_recording(path: &Path, options: &SourceOptions) -> Result<Source, SourceError> {
-    let mut recording = Recording::open(path)?;
-    let tally = tally_recording(&mut recording)?;
-    if tally.integrated().frames() == 0 {
-        return Err(no_frame(path, &tally));
-    }
-    of_frames(path, options, &recording, tally.integrated(), &tally)
-}
-
-/// Why a recording has no valid frame.
-pub(crate) fn no_frame(path: &Path, tally: &Tally) -> SourceError {
-    let path = path.to_owned();
-    match tally.misfit() {
-        Some(misfit) => SourceError::Misfit { path, misfit },
-        None => SourceError::NoFrame(path),
-    }
-}
-
-fn frames_of_recording(path: &Path, options: &SourceOptions) -> Result<Vec<Source>, SourceError> {
-    let mut recording = Recording::open(path)?;
-    let (rows, area) = (recording.setup.rows.len(), recording.setup.rows.side());
-    let fits = |count| fits_together(path, count, rows, area);
-    let (frames, tally) = tally::frames_of_recording(&mut recording, fits)?;
-    if frames.is_empty() {
-        return Err(no_frame(path, &tally));
-    }
-    frames.iter().map(|frame| of_frames(path, options, &recording, frame, &tally)).collect()
-}
-
-/// The measurements of the sum of some frames.
-pub(crate) fn of_frames(
-    path: &Path,
-    options: &SourceOptions,
-    recording: &Recording,
-    integrated: &Integrated,
-    tally: &Tally,
-) -> Result<Source, SourceError> {
-    let counters = tally.account().counters();
-    let Recording { setup, settling, .. } = recording;
-    let End { cut_short, account, .. } = recording.end();
-    let mut notes: Vec<String> = integrated.warnings().into_iter().map(str::to_owned).collect();
-    if let Some(reason) = cut_short {
-        notes.push(format!("the recording is cut short or damaged: {reason}"));
-    }
-    if let Some(account) = account {
-        if account.counters != counters {
-            notes.push("the frames found are not those that the capture counted".to_owned());
-        }
-        notes.extend(account.missing.as_deref().map(not_whole));
-    }
-    notes.extend(tally.misfit().map(|misfit| format!("some frames are left out: {misfit}")));
-    if settling.is_none() {
-        notes.push(NOT_CALIBRATED.to_owned());
-    }
-    let measurements = integrated
-        .measurements(setup, settling.as_ref(), options.keep_leak)
-        .map_err(|problem| SourceError::Integrate { path: path.to_owned(), problem })?;
-    let (dropouts, not_read, frames) = (Vec::new(), Vec::new(), Some(counters));
-    let (imaginary, reference, flat_field) = (None, None, None);
-    let source = Source {
-        measurements,
-        imaginary,
-        dropouts,
-        not_read,
-        reference,
-        frames,
-        simulated: Some(boards::is_simulated(&recording.identity.board)),
-        notes,
-        flat_field,
-    };
-    if options.no_flat_field {
-        return Ok(source);
-    }
-    Ok(match KeptFlatField::of(&recording.identity) {
-        Ok(Some(kept)) => source.with_flat_field(kept),
-        Ok(None) => source,
-        Err(problem) => {
-            let mut source = source;
-            source.notes.push(format!("flat field not used: {}", causes::in_one_line(&problem)));
-            source
-        }
-    })
 }
 
 #[cfg(all(test, feature = "training"))]

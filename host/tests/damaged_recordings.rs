@@ -35,6 +35,7 @@ fn recorded(folder: &Path) -> PathBuf {
         adc_bits: 14,
         wavelength_nm: 1550,
         capabilities: vec!["depth".into()],
+        detectors: 1,
     };
     let setup = MeasurementSetup::new(&Order::CakeCutting, 0.05).unwrap();
     let target = Target::New(path.clone());
@@ -63,7 +64,8 @@ fn recorded(folder: &Path) -> PathBuf {
     recorder.packet(&packet(&DeviceMessage::Event(event))).unwrap();
     let counters = LossCounters { received: FRAMES.into(), ..Default::default() };
     let made = Some(FRAMES.into());
-    recorder.finish(&RunAccount { counters, asked: Some(FRAMES), made, missing: None }).unwrap();
+    let account = RunAccount { counters, asked: Some(FRAMES), made, ..RunAccount::default() };
+    recorder.finish(&account).unwrap();
     path
 }
 

@@ -90,6 +90,7 @@ fn camera(port: &str) {
         adc_bits: 14,
         wavelength_nm: 1550,
         capabilities: Vec::new(),
+        detectors: 1,
     };
     let mut beside = Nothing;
     let mut publishing = Publishing::new(&identity, address.publish().unwrap(), &mut beside);

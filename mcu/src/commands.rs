@@ -82,9 +82,10 @@ impl Machine {
             Ok(Design::BringUp) => Capabilities::BRING_UP,
             Ok(Design::Camera) | Err(_) => Capabilities::default(),
         };
+        let detectors = bus.detectors();
         let spoken = version::speaks(protocol);
         let answered = if spoken { protocol } else { version::CURRENT };
-        self.stop(id, now, bus, Outcome::Hello { protocol: answered, gateware, added });
+        self.stop(id, now, bus, Outcome::Hello { protocol: answered, gateware, added, detectors });
         self.session = if spoken { Session::Open { protocol } } else { Session::Foreign };
         if spoken && self.crash.is_some() {
             self.notices.push(Notice::Crash);
@@ -124,7 +125,8 @@ impl Machine {
         }
         self.loading = None;
         self.setup = None;
-        if setup.fits_packets() && fpga::makes_packets(bus).map_err(|_| Refusal::Bus)? {
+        let of_one = bus.detectors() == 1;
+        if of_one && setup.fits_packets() && fpga::makes_packets(bus).map_err(|_| Refusal::Bus)? {
             setup.mode |= mode::PACKETS;
         }
         let table = match &configuration.order {

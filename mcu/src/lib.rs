@@ -25,6 +25,7 @@ extern crate std;
 
 mod burst;
 mod camera;
+mod channels;
 mod commands;
 mod configure;
 mod crash;

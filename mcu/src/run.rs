@@ -5,6 +5,7 @@
 //! `frames_made = frames_sent + frames_dropped + fpga_frames_lost + fpga_frames_corrupt`
 //! (`tests::laws::every_frame_made_is_sent_or_counted_and_the_run_ends_once`).
 
+use crate::channels::Channels;
 use crate::configure::Setup;
 use crate::meter::Meter;
 use crate::notices::Outcome;
@@ -361,12 +362,15 @@ impl Run {
     /// at once, and packed while the next one comes, or when no next one comes in time. Any other
     /// frame is sent or counted before this call returns.
     ///
+    /// With `sends_channels`, the frames of further detectors go out right after that of detector 0.
+    ///
     /// `may_come` is false if the FPGA does not answer, and after a failed release, when the line
     /// still signals the frame that was taken before. `release_pending` is set if a release fails.
     pub fn take_frame(
         &mut self,
         now: Micros,
         mut path: Path<'_>,
+        sends_channels: bool,
         (may_come, release_pending): (bool, &mut bool),
         bus: &mut impl FpgaBus,
         sink: &mut impl PacketSink,
@@ -407,11 +411,26 @@ impl Run {
         let bytes = if has_come { bus.frame().ok().flatten() } else { None };
         let taken =
             bytes.and_then(|bytes| assemble(bytes, self.patterns, (path.meter, now), path.scratch));
+        if bus.detectors() > 1
+            && let Some((header, samples)) = taken
+        {
+            // The release takes the frames of all detectors, so they are sent before it.
+            let sent = self.deliver(now, path.counters, path.may_send, (header, samples), sink);
+            if sent && sends_channels {
+                let device_time_us = self.anchor.time_of(header.clock).0;
+                let set = Channels { run: path.counters.run, device_time_us, of: header };
+                set.send(path.scratch, bus, sink);
+            }
+            *release_pending = fpga::release(bus).is_err();
+            return true;
+        }
         // The FPGA needs its buffer back before the next frame is complete, so the release comes
         // before the link.
         *release_pending = fpga::release(bus).is_err();
         match taken {
-            Some(taken) => self.deliver(now, path.counters, path.may_send, taken, sink),
+            Some(taken) => {
+                self.deliver(now, path.counters, path.may_send, taken, sink);
+            }
             None => self.count_damaged(now, path.counters, bus),
         }
         true
@@ -449,13 +468,15 @@ impl Run {
     pub fn pack(&mut self, now: Micros, path: Path<'_>, bytes: &[u8], sink: &mut impl PacketSink) {
         if self.kept.take().is_some() {
             match assemble(bytes, self.patterns, (path.meter, now), path.scratch) {
-                Some(taken) => self.deliver(now, path.counters, path.may_send, taken, sink),
+                Some(taken) => {
+                    self.deliver(now, path.counters, path.may_send, taken, sink);
+                }
                 None => self.damaged = true,
             }
         }
     }
 
-    /// Sends or counts a frame that was assembled.
+    /// Sends or counts a frame that was assembled; true if the frame was sent.
     #[inline(never)]
     fn deliver(
         &mut self,
@@ -464,10 +485,10 @@ impl Run {
         may_send: bool,
         (header, samples): (Header, Samples<'_>),
         sink: &mut impl PacketSink,
-    ) {
+    ) -> bool {
         if self.last_sequence.replace(header.sequence) == Some(header.sequence) {
             // The bus lost the release of this frame. A frame that comes again is no progress.
-            return;
+            return false;
         }
         self.last_frame = now;
         counters.advance(header.sequence.wrapping_add(1), header.lost);
@@ -480,13 +501,11 @@ impl Run {
             flags: header.flags,
             samples,
         });
-        let count = if may_send && send(&frame, payload, sink) {
-            &mut counters.sent
-        } else {
-            &mut counters.dropped
-        };
+        let sent = may_send && send(&frame, payload, sink);
+        let count = if sent { &mut counters.sent } else { &mut counters.dropped };
         *count = count.wrapping_add(1);
         counters.reconcile();
+        sent
     }
 
     /// Reply and event of a run whose LEDs are off and whose last frame is through; `None` before.
@@ -562,7 +581,7 @@ mod tests {
             may_send: true,
         };
         let coming = (true, &mut release_pending);
-        assert!(run.take_frame(Micros(2), path, coming, &mut bus, &mut link));
+        assert!(run.take_frame(Micros(2), path, false, coming, &mut bus, &mut link));
         assert_eq!((link.packets.len(), counters.sent, release_pending), (1, 1, false));
         assert_eq!(run.progress(Micros(3), &counters), Progress::Complete);
 

@@ -20,6 +20,9 @@ pub struct SourceArgs {
     /// each frame of a recording is one frame of a video; without this option, the frames of a recording are summed
     #[arg(long, value_name = "N|all")]
     pub index: Option<Index>,
+    /// Which detector of a recorded camera that has several: a number from 0, or all for one image of each [default: 0]
+    #[arg(long, value_name = "N|all")]
+    pub detector: Option<Index>,
     #[arg(long, value_name = "ORDER", help = shown_help())]
     pub shown: Option<String>,
     /// Side of the image in pixels, for a file that does not say its side and holds part of a sweep
@@ -85,8 +88,9 @@ impl SourceArgs {
 
     /// How to read measurements.
     pub fn options(&self) -> Result<SourceOptions> {
-        let Self { index, part, keep_leak, no_flat_field, .. } = *self;
-        Ok(SourceOptions { index, file: self.selection()?, part, keep_leak, no_flat_field })
+        let Self { index, detector, part, keep_leak, no_flat_field, .. } = *self;
+        let file = self.selection()?;
+        Ok(SourceOptions { index, detector, file, part, keep_leak, no_flat_field })
     }
 
     /// Reads one measurement.
@@ -113,7 +117,7 @@ impl SourceArgs {
 /// Conflicting options count as wrong usage; every other error counts as a failure.
 fn usage_or_failure(error: SourceError) -> anyhow::Error {
     match error {
-        SourceError::NotForRecordings | SourceError::One => Usage(error.to_string()).into(),
+        error if error.is_of_options() => Usage(error.to_string()).into(),
         // The command line handles these errors by their own types.
         SourceError::File(error) => error.into(),
         SourceError::Recording(error) => error.into(),

@@ -56,6 +56,7 @@ impl FlatField {
 #[pyo3(from_item_all)]
 pub(crate) struct Options {
     index: Option<String>,
+    detector: Option<String>,
     shown: Option<String>,
     side: Option<u64>,
     field: Option<String>,
@@ -91,6 +92,7 @@ impl Options {
         };
         Ok(SourceOptions {
             index: self.index.as_deref().map(|index| word::<Index>("index", index)).transpose()?,
+            detector: self.detector.as_deref().map(|at| word::<Index>("detector", at)).transpose()?,
             file,
             part: word::<Part>("part", &self.part)?,
             keep_leak: self.keep_leak,
@@ -129,7 +131,7 @@ fn as_dict<'py>(py: Python<'py>, source: Source) -> PyResult<Bound<'py, PyDict>>
     Ok(dict)
 }
 
-/// The measurements of a file or recording: one, or all with `index` "all".
+/// The measurements of a file or recording: one, or all with `index` or `detector` "all".
 #[pyfunction]
 pub fn load<'py>(
     py: Python<'py>,
@@ -138,9 +140,9 @@ pub fn load<'py>(
 ) -> PyResult<Vec<Bound<'py, PyDict>>> {
     let options = options.extract::<Options>()?.checked()?;
     let sources = long(py, |_| {
-        let read = match options.index {
-            Some(Index::All) => Source::read_all(&path, &options),
-            _ => Source::read(&path, &options).map(|source| vec![source]),
+        let read = match [options.index, options.detector].contains(&Some(Index::All)) {
+            true => Source::read_all(&path, &options),
+            false => Source::read(&path, &options).map(|source| vec![source]),
         };
         read.map_err(of_source)
     })?;

@@ -1,6 +1,7 @@
 //! Says in words what a capture lacks.
 
 use super::{Capture, Ended};
+use crate::account::LossCounters;
 use crate::causes;
 use nirspi_recon::words::count;
 
@@ -11,8 +12,16 @@ impl Capture {
     /// stopped it and all frames made have arrived.
     #[must_use]
     pub fn missing(&self) -> Option<String> {
-        let parts: Vec<String> =
-            [self.end(), self.frames(), self.packets()].into_iter().flatten().collect();
+        let of_each = self.further_counters().into_iter().enumerate();
+        let of_each = of_each.filter_map(|(at, counters)| {
+            frames(counters).map(|lacks| format!("detector {}: {lacks}", at + 1))
+        });
+        let parts: Vec<String> = [self.end(), frames(self.counters)]
+            .into_iter()
+            .flatten()
+            .chain(of_each)
+            .chain(self.packets())
+            .collect();
         (!parts.is_empty()).then(|| parts.join("; "))
     }
 
@@ -61,18 +70,16 @@ impl Capture {
         }
     }
 
-    /// Frames made that did not arrive whole and in order.
-    fn frames(&self) -> Option<String> {
-        let counters = self.counters;
-        (!counters.is_complete()).then(|| {
-            let made = counters.total();
-            format!("of {} made: {counters}", count(made, "frame"))
-        })
+    /// The loss counters of each further detector, detector 1 first.
+    #[must_use]
+    pub fn further_counters(&self) -> Vec<LossCounters> {
+        self.further.iter().map(|detector| detector.account.counters()).collect()
     }
 
     /// Damaged packets that were not frames of the run. Their content is unknown.
     fn packets(&self) -> Option<String> {
-        let others = self.damaged_packets.saturating_sub(self.counters.corrupt);
+        let further: u64 = self.further_counters().iter().map(|counters| counters.corrupt).sum();
+        let others = self.damaged_packets.saturating_sub(self.counters.corrupt + further);
         (others > 0).then(|| {
             let packets = if others == 1 { "packet" } else { "packets" };
             format!("{others} damaged {packets} beyond these frames, of unknown content")
@@ -80,10 +87,15 @@ impl Capture {
     }
 }
 
+/// Frames made that did not arrive whole and in order.
+fn frames(counters: LossCounters) -> Option<String> {
+    (!counters.is_complete())
+        .then(|| format!("of {} made: {counters}", count(counters.total(), "frame")))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::account::LossCounters;
     use crate::integrate::Integrated;
     use crate::session::SessionError;
     use crate::setup::MeasurementSetup;
@@ -100,6 +112,7 @@ mod tests {
             settling: None,
             calibration_problem: None,
             counters: LossCounters { received: 50, ..Default::default() },
+            further: Vec::new(),
             damaged_packets: 0,
             unknown_packets: 0,
             repeated: 0,

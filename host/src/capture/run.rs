@@ -103,14 +103,12 @@ impl Listener for Packets<'_> {
             run.last_intact = now;
         }
         run.record(|recorder| recorder.packet(raw));
-        let before = run.tally.account().counters();
+        let before = run.tally.arrived();
         let received = run.tally.packet(content);
         if let (Some(recorder), None) = (&mut run.recorder, &run.recorder_error) {
             run.recorder_error = recorder.heard(content, &run.tally).err();
         }
-        let after = run.tally.account().counters();
-        let frames = (after.received + after.late) - (before.received + before.late);
-        run.junk.packet(raw.len(), content, frames > 0, now);
+        run.junk.packet(raw.len(), content, run.tally.arrived() > before, now);
         match content {
             Ok(DeviceMessage::Frame(frame)) if received => {
                 observer.frame(frame, &run.tally.account().counters());
@@ -181,7 +179,7 @@ impl Run {
         };
         observer.begins(&setup, settling.as_ref(), calibration_problem.as_ref());
         let now = Instant::now();
-        let tally = Tally::new(&setup, Some(number));
+        let tally = Tally::new(&setup, Some(number)).with_detectors(session.identity().detectors);
         let mut run = Self {
             setup,
             settling,
@@ -332,6 +330,7 @@ impl Run {
             calibration_problem: self.calibration_problem,
             integrated: self.tally.integrated().clone(),
             counters: account.counters(),
+            further: self.tally.further().to_vec(),
             damaged_packets: account.damaged_packets(),
             unknown_packets: self.tally.unknown_packets(),
             repeated: account.repeated(),
@@ -407,7 +406,8 @@ fn finish(
     captured: &Capture,
 ) -> Result<PathBuf, CaptureError> {
     let Capture { counters, asked, made, .. } = *captured;
-    let account = RunAccount { counters, asked, made, missing: captured.missing() };
+    let further = captured.further_counters();
+    let account = RunAccount { counters, further, asked, made, missing: captured.missing() };
     let finished = match failed {
         None => recorder.finish(&account),
         Some(error) => {

@@ -1,6 +1,6 @@
 //! Arrays for NumPy, and a table for spreadsheets.
 
-use super::{ExportError, Whole};
+use super::{ExportError, Whole, detectors};
 use crate::files::FileError;
 use crate::files::npy::{Element, encode, header};
 use crate::files::output::write_in_pieces;
@@ -11,7 +11,10 @@ use zip::{CompressionMethod, ZipWriter};
 
 /// Writes a `.npz` file. Its members are not compressed, because readings are noise for a
 /// compressor.
-pub(super) fn npz(whole: &Whole, out: &Path) -> Result<(), ExportError> {
+///
+/// With `every_detector`, `d` and `frames` of a camera with several detectors have an axis for them.
+pub(super) fn npz(whole: &Whole, out: &Path, every_detector: bool) -> Result<(), ExportError> {
+    let detectors = if every_detector { detectors::number(whole) } else { 1 };
     write_in_pieces(out, |file| {
         let mut zip = Members { zip: ZipWriter::new(file), out };
         let rows = whole.source.measurements.rows();
@@ -19,13 +22,19 @@ pub(super) fn npz(whole: &Whole, out: &Path) -> Result<(), ExportError> {
         let [m, count] = [h_row.len(), whole.frames()];
         zip.add("n", &encode(&[], &[rows.side().pixels() as i64]))?;
         zip.add("h_row", &encode(&[m], &h_row))?;
-        zip.add("d", &encode(&[m], whole.source.measurements.values()))?;
+        match detectors {
+            1 => zip.add("d", &encode(&[m], whole.source.measurements.values()))?,
+            _ => zip.add("d", &encode(&[detectors, m], &detectors::means(whole)?))?,
+        }
         zip.add("sequence", &encode(&[count], &whole.sequence))?;
         zip.add("device_time_us", &encode(&[count], &whole.device_time_us))?;
         zip.add("time_ns", &encode(&[count], &whole.time_ns))?;
         zip.add("simulated", &encode(&[], &[i64::from(whole.is_simulated())]))?;
         zip.begin("frames")?;
-        frames(whole, out, &mut zip.zip)?;
+        match detectors {
+            1 => frames(whole, out, &mut zip.zip)?,
+            _ => detectors::frames(whole, out, &mut zip.zip)?,
+        }
         let wrong = |error: zip::result::ZipError| FileError::io(out, "write", error.into());
         zip.zip.finish().map_err(wrong)?;
         Ok(())

@@ -118,7 +118,7 @@ fn each(
         Method::default().prepare(&MethodSettings::default()).map_err(problem(0))?;
     let image = |sum: &Integrated, frame: usize| -> Result<Image, ExportError> {
         let measurements = sum
-            .measurements(&setup, settling.as_ref(), whole.keep_leak)
+            .measurements_of(whole.detector, &setup, settling.as_ref(), whole.keep_leak)
             .map_err(|problem| whole.integrate(problem))?;
         let made = method.reconstruct(&measurements).map_err(problem(frame))?;
         Ok(whole.source.flattened(made.image))
@@ -129,7 +129,7 @@ fn each(
     let first = whole.device_time_us.first().map_or(0, |&time| time as u64);
     let mut frames = 0;
     hear_recording(recording, |heard, tally| {
-        if let Some(frame) = heard.frame() {
+        if let Some(frame) = heard.frame_of(whole.detector) {
             let number = frame.device_time_us.saturating_sub(first) / IMAGE_US;
             if let Some((before, time_ns)) = open
                 && before != number

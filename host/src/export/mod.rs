@@ -8,6 +8,7 @@
 //! Frames are read one by one, so memory does not grow with the readings of a recording.
 
 mod arrays;
+mod detectors;
 #[cfg(feature = "enhance")]
 mod enhancing;
 mod mcap;
@@ -21,7 +22,7 @@ use crate::integrate::{IntegrateError, Integrated};
 use crate::recording::{Recording, RecordingError};
 use crate::session::CameraIdentity;
 use crate::setup::MeasurementSetup;
-use crate::source::{self, Source, SourceError, SourceOptions};
+use crate::source::{self, Index, Source, SourceError, SourceOptions};
 use crate::tally::{Tally, hear_recording};
 #[cfg(any(feature = "live", feature = "virtual-camera"))]
 use nirspi_optics::CameraModel;
@@ -104,7 +105,10 @@ impl Format {
     #[must_use]
     pub fn about(self) -> &'static str {
         match self {
-            Self::Npz => "n, h_row, d (mean of all frames), frames (F, M), sequence, times",
+            Self::Npz => {
+                "n, h_row, d (mean of all frames), frames (F, M), sequence, times; of several detectors D: d \
+                 (D, M), frames (F, D, M)"
+            }
             Self::Npy => "the readings of each frame alone, (F, M)",
             Self::Zarr => "a folder with the arrays of npz, for Python's zarr and xarray",
             Self::Csv => "n, h_row and d, the mean of all frames, one pattern a line",
@@ -136,6 +140,8 @@ impl FromStr for Format {
 pub struct ExportOptions {
     /// Whether to leave the leak between patterns uncorrected.
     pub keep_leak: bool,
+    /// The detector to export. Without one, NPZ files have every detector, and other files detector 0.
+    pub detector: Option<u8>,
     /// What is known of the scene; a field of Parquet files.
     pub scene: Option<String>,
     /// Distance to the target in metres, if known; a field of Parquet files.
@@ -245,11 +251,20 @@ pub fn export(
     {
         return Err(ExportError::Itself(out.to_owned()));
     }
-    let source = SourceOptions { keep_leak: options.keep_leak, ..SourceOptions::default() };
+    let source = SourceOptions {
+        keep_leak: options.keep_leak,
+        detector: match (options.detector, format) {
+            (Some(detector), _) => Some(Index::One(detector.into())),
+            // The file has every detector.
+            (None, Format::Npz) => Some(Index::One(0)),
+            (None, _) => None,
+        },
+        ..SourceOptions::default()
+    };
     let whole = Whole::read(input, &source)?;
     let mut images = 0;
     match format {
-        Format::Npz => arrays::npz(&whole, out)?,
+        Format::Npz => arrays::npz(&whole, out, options.detector.is_none())?,
         Format::Npy => arrays::npy(&whole, out)?,
         Format::Zarr => zarr::write(&whole, out)?,
         Format::Csv => arrays::csv(&whole, out)?,
@@ -283,6 +298,8 @@ fn size_of(path: &Path) -> u64 {
 pub(crate) struct Whole {
     path: PathBuf,
     keep_leak: bool,
+    /// The detector whose frames these are.
+    detector: u8,
     identity: CameraIdentity,
     setup: MeasurementSetup,
     /// The mean of all frames.
@@ -306,24 +323,25 @@ pub(crate) struct OneFrame<'w> {
 impl Whole {
     pub(crate) fn read(path: &Path, options: &SourceOptions) -> Result<Self, ExportError> {
         let mut recording = Recording::open(path)?;
+        let detector = options.detector_of(path, &recording.identity)?;
         let (mut sequence, mut device_time_us, mut time_ns) = (Vec::new(), Vec::new(), Vec::new());
         let tally = hear_recording(&mut recording, |heard, tally| {
-            if let Some(frame) = heard.frame() {
-                sequence.push(number_of(tally));
+            if let Some(frame) = heard.frame_of(detector) {
+                sequence.push(number_of(tally, detector));
                 device_time_us.push(frame.device_time_us as i64);
                 time_ns.push(heard.time_ns as i64);
             }
             Ok::<(), RecordingError>(())
         })?;
         if sequence.is_empty() {
-            return Err(source::no_frame(path, &tally).into());
+            return Err(source::no_frame(path, detector, &tally).into());
         }
-        let integrated = tally.integrated();
-        let source = source::of_frames(path, options, &recording, integrated, &tally)?;
+        let source = source::of_sum(path, options, &recording, detector, &tally)?;
         let Recording { identity, setup, .. } = recording;
         Ok(Self {
             path: path.to_owned(),
             keep_leak: options.keep_leak,
+            detector,
             identity,
             setup,
             source,
@@ -355,12 +373,12 @@ impl Whole {
             if let Ok(DeviceMessage::Depth(Depth { distances_mm, .. })) = heard.content {
                 depth = Some(distances_mm.iter().collect());
             }
-            let Some(frame) = heard.frame() else { return Ok(()) };
+            let Some(frame) = heard.frame_of(self.detector) else { return Ok(()) };
             if index == self.frames() || setup != self.setup {
                 return Err(ExportError::Changed(self.path.clone()));
             }
             let measurements = alone(frame, &setup)
-                .measurements(&setup, settling.as_ref(), self.keep_leak)
+                .measurements_of(self.detector, &setup, settling.as_ref(), self.keep_leak)
                 .map_err(|problem| self.integrate(problem))?;
             on(&OneFrame {
                 index,
@@ -380,9 +398,10 @@ impl Whole {
     }
 }
 
-/// The number of the newest frame that arrived in order.
-fn number_of(tally: &Tally) -> i64 {
-    tally.account().accounted() as i64 - 1
+/// The number of the newest frame of this detector that arrived in order.
+fn number_of(tally: &Tally, detector: u8) -> i64 {
+    let (_, account) = tally.detector(detector).unwrap_or((tally.integrated(), tally.account()));
+    account.accounted() as i64 - 1
 }
 
 fn alone(frame: &Frame<'_>, setup: &MeasurementSetup) -> Integrated {

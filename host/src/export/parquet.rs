@@ -60,14 +60,20 @@ impl Whole {
             "blanked": self.setup.blanked,
             "adc_latency": self.setup.adc_latency,
             "leak_corrected": !self.keep_leak,
+            "detector": self.detector,
         })
     }
 
     /// The row of a frame.
     pub(crate) fn row_of(&self, fixed: &Row, frame: &OneFrame<'_>) -> Row {
         let number = self.sequence[frame.index];
+        // Rows of one frame at several detectors are different measurements.
+        let detector = match self.detector {
+            0 => String::new(),
+            detector => format!("/detector-{detector}"),
+        };
         Row {
-            image_id: format!("{}/{}/{number}", self.identity.serial, frame.run),
+            image_id: format!("{}/{}/{number}{detector}", self.identity.serial, frame.run),
             rows: frame.measurements.rows().as_slice().to_vec(),
             d: frame.measurements.values().to_vec(),
             time_ns: Some(self.time_ns[frame.index]),

@@ -7,8 +7,8 @@ use crate::replay::answers::{identity, misfit, status};
 use crate::session::CameraIdentity;
 use nirspi_wire::packet::{MAX_DEVICE_PACKET, MAX_HOST_PACKET};
 use nirspi_wire::{
-    Answer, Command, Deframed, Deframer, DeviceMessage, Event, EventKind, Frame, Refusal, Reply,
-    Request, RunLength, State, Status, encode, open, version,
+    Answer, Channel, Command, Deframed, Deframer, DeviceMessage, Event, EventKind, Frame, Refusal,
+    Reply, Request, RunLength, State, Status, encode, open, version,
 };
 use std::collections::VecDeque;
 use std::io::{self, Read};
@@ -171,6 +171,7 @@ impl RelayLink {
         }
         match message {
             DeviceMessage::Frame(frame) => self.frame(frame),
+            DeviceMessage::Channel(channel) => self.channel(channel),
             DeviceMessage::Event(Event {
                 device_time_us,
                 kind: EventKind::RunEnded { run, frames_made, .. },
@@ -208,7 +209,23 @@ impl RelayLink {
         }
         self.made = self.made.max(sequence.wrapping_add(1));
         self.send_on(&DeviceMessage::Frame(Frame { run: self.run, sequence, ..frame }));
-        if self.asked == Some(self.made) {
+        // Further detectors speak after the first one.
+        if self.asked == Some(self.made) && self.identity.detectors <= 1 {
+            self.end(frame.device_time_us);
+        }
+    }
+
+    /// Sends the frame of a further detector on, if the frame of detector 0 was sent on.
+    fn channel(&mut self, Channel { detector, frame }: Channel<'_>) {
+        let Some(joined) = self.joined.filter(|joined| joined.run == frame.run) else { return };
+        let sequence = frame.sequence.wrapping_sub(joined.base);
+        if sequence >= self.made {
+            return;
+        }
+        let frame = Frame { run: self.run, sequence, ..frame };
+        self.send_on(&DeviceMessage::Channel(Channel { detector, frame }));
+        let is_last = detector >= self.identity.detectors.saturating_sub(1);
+        if is_last && self.asked == Some(sequence + 1) {
             self.end(frame.device_time_us);
         }
     }

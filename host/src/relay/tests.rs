@@ -3,7 +3,7 @@ use crate::capture::{Calibration, Capture, CaptureOptions, Ended, capture};
 use crate::session::Session;
 use nirspi_recon::Order;
 use nirspi_wire::samples::Samples;
-use nirspi_wire::{Event, EventKind, FrameFlags, open};
+use nirspi_wire::{Channel, Event, EventKind, FrameFlags, open};
 use std::sync::{Arc, Mutex};
 
 const PATTERNS: usize = 10;
@@ -19,6 +19,7 @@ fn identity() -> CameraIdentity {
         adc_bits: 14,
         wavelength_nm: 1550,
         capabilities: Vec::new(),
+        detectors: 1,
     }
 }
 
@@ -70,10 +71,19 @@ fn captured(
     script: impl FnMut(u32) -> Option<Vec<u8>> + Send + 'static,
     frames: Option<u32>,
 ) -> Capture {
-    let link = RelayLink::new(announcement(), Box::new(Script(script, 0)));
+    captured_of(identity(), script, frames)
+}
+
+fn captured_of(
+    identity: CameraIdentity,
+    script: impl FnMut(u32) -> Option<Vec<u8>> + Send + 'static,
+    frames: Option<u32>,
+) -> Capture {
+    let announced = Announcement { identity: identity.clone(), ..announcement() };
+    let link = RelayLink::new(announced, Box::new(Script(script, 0)));
     let recorded = link.recorded().clone();
     let mut session = Session::open(Box::new(link)).unwrap().with_recorded(recorded);
-    assert_eq!(session.identity(), &identity());
+    assert_eq!(session.identity(), &identity);
     let options = CaptureOptions {
         // The setup of the camera counts, not this one.
         setup: MeasurementSetup::new(&Order::CakeCutting, 1.0).unwrap(),
@@ -98,6 +108,27 @@ fn a_late_host_counts_from_its_start_and_every_gap_is_a_loss() {
     let counters = capture.counters;
     assert_eq!((counters.received, counters.lost, counters.total()), (180, 20, 200));
     assert_eq!(capture.setup, setup());
+}
+
+#[test]
+fn a_host_gets_every_detector_of_the_camera() {
+    let three = CameraIdentity { protocol: Channel::SINCE, detectors: 3, ..identity() };
+    // The host joins somewhere. Of every fifth frame, detector 1 is lost.
+    let script = |n: u32| {
+        let number = n + 2;
+        let (sequence, detector) = (999 + number / 3, (number % 3) as u8);
+        let message = |frame: Frame<'_>| match detector {
+            0 => packet(&DeviceMessage::Frame(frame)),
+            1 if sequence % 5 == 0 => Vec::new(),
+            _ => packet(&DeviceMessage::Channel(Channel { detector, frame })),
+        };
+        Some(with_frame(7, sequence, message))
+    };
+    let capture = captured_of(three, script, Some(10));
+    let received = |received| LossCounters { received, ..LossCounters::default() };
+    assert_eq!((capture.made, capture.counters), (Some(10), received(10)));
+    let expected = [LossCounters { lost: 2, ..received(8) }, received(10)];
+    assert_eq!(capture.further_counters(), expected);
 }
 
 #[test]

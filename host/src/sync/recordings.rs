@@ -197,7 +197,8 @@ struct Stamp {
 impl Frames {
     fn open(path: &Path) -> Result<Self, RecordingError> {
         let recording = Recording::open(path)?;
-        let tally = Tally::new(&recording.setup, recording.run);
+        let tally = Tally::new(&recording.setup, recording.run)
+            .with_detectors(recording.identity.detectors);
         Ok(Self { recording, tally, scratch: Vec::new() })
     }
 

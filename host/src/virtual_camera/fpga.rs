@@ -4,7 +4,7 @@ use nirspi_hdl_model::{AdcSample, Gateware, Lines};
 use nirspi_mcu::{BusError, FpgaBus};
 use nirspi_optics::rain::RainySpots;
 use nirspi_optics::{Chain, LedArray};
-use nirspi_wire::register::{BRING_UP_HZ, Design, loopback};
+use nirspi_wire::register::{BRING_UP_HZ, Design, FaultCode, Register, loopback, status};
 use std::collections::VecDeque;
 
 /// ADC clocks between two updates of the drops: one differential sweep, in which a 2 mm drop falls
@@ -33,10 +33,20 @@ pub struct OpticalFpga {
     array: LedArray,
     wiring: Option<Wiring>,
     chain: Chain,
+    /// Detectors beside the first one.
+    further: Vec<Detector>,
     clock: u64,
     rain: Option<Rain>,
     /// The levels at the LED pins in the last clocks, of a bring-up design.
     loopback: Option<VecDeque<Lines>>,
+}
+
+/// A further detector behind an ADC of its own. Its gateware is a second copy of the model that gets every access of the
+/// first one, so both show the same patterns in the same clocks.
+struct Detector {
+    gateware: Gateware,
+    array: LedArray,
+    chain: Chain,
 }
 
 /// Clocks from the choice of the levels at the LED pins to the sample that `Design::BringUp` makes of them: two
@@ -57,7 +67,17 @@ impl OpticalFpga {
     pub fn new(array: LedArray, chain: Chain) -> Self {
         let mut gateware = Gateware::new();
         gateware.set_interlock(true);
-        Self { gateware, array, wiring: None, chain, clock: 0, rain: None, loopback: None }
+        let (wiring, further, rain, loopback) = (None, Vec::new(), None, None);
+        Self { gateware, array, wiring, chain, further, clock: 0, rain, loopback }
+    }
+
+    /// The same camera with a further detector, which has the light of `array`.
+    #[must_use]
+    pub fn with_detector(mut self, array: LedArray, chain: Chain) -> Self {
+        let mut gateware = Gateware::new();
+        gateware.set_interlock(true);
+        self.further.push(Detector { gateware, array, chain });
+        self
     }
 
     /// The bring-up design on the same boards: neither ADC nor LEDs.
@@ -67,32 +87,46 @@ impl OpticalFpga {
         gateware.set_adc_clock(Some(BRING_UP_HZ));
         gateware.set_interlock(true);
         let loopback = Some(VecDeque::from([Lines::default(); LOOPBACK_CLOCKS]));
-        Self { gateware, loopback, ..self }
+        Self { gateware, loopback, further: Vec::new(), ..self }
     }
 
     /// Loses everything, as after a dip of the supply: registers, frames, LEDs off. The clock starts again at 0
     /// in the gateware; the time of the simulation goes on.
     pub fn reset(&mut self) {
-        self.gateware = Gateware::new();
-        self.gateware.set_interlock(true);
+        for gateware in self.gatewares() {
+            *gateware = Gateware::new();
+            gateware.set_interlock(true);
+        }
+    }
+
+    fn gatewares(&mut self) -> impl Iterator<Item = &mut Gateware> {
+        std::iter::once(&mut self.gateware)
+            .chain(self.further.iter_mut().map(|detector| &mut detector.gateware))
     }
 
     /// Whether the FPGA lets LEDs shine now.
     #[must_use]
     pub fn leds_on(&self) -> bool {
-        self.gateware.lines().enable
+        self.lines().enable
+    }
+
+    /// The levels at the LED pins. Each detector's gateware can switch the LEDs off.
+    fn lines(&self) -> Lines {
+        let lines = self.gateware.lines();
+        let all_enable = self.further.iter().all(|detector| detector.gateware.lines().enable);
+        Lines { enable: lines.enable && all_enable, ..lines }
     }
 
     /// The same camera with another frequency of the ADC's clock in Hz; `None` is no clock at all.
     #[must_use]
     pub fn adc_clock(mut self, hz: Option<u32>) -> Self {
-        self.gateware.set_adc_clock(hz);
+        self.gatewares().for_each(|gateware| gateware.set_adc_clock(hz));
         self
     }
 
-    /// The sample of a clock in a run.
+    /// The sample of a clock in a run. The gateware of each further detector takes its own sample.
     fn sample(&mut self, at: u64) -> AdcSample {
-        let lines = self.gateware.lines();
+        let lines = self.lines();
         if let Some(late) = &mut self.loopback {
             late.push_back(lines);
             let seen = late.pop_front().unwrap_or_default();
@@ -101,6 +135,10 @@ impl OpticalFpga {
         }
         if self.rain.is_some() {
             self.look_at_the_rain(at);
+        }
+        for Detector { gateware, array, chain } in &mut self.further {
+            let sample = chain.sample(array.light(lines.rows, lines.columns, lines.enable));
+            gateware.tick(AdcSample { code: sample.counts, over_range: sample.over_range });
         }
         let light = match &mut self.wiring {
             None => self.array.light(lines.rows, lines.columns, lines.enable),
@@ -120,7 +158,10 @@ impl OpticalFpga {
     /// `electrons_per_led`.
     #[must_use]
     pub fn in_rain(mut self, spots: RainySpots, electrons_per_led: f64) -> Self {
-        self.array.relight(&spots.reflectance(), electrons_per_led);
+        let reflectance = spots.reflectance();
+        for array in self.arrays() {
+            array.relight(&reflectance, electrons_per_led);
+        }
         self.rain = Some(Rain { spots, electrons_per_led, seen: 0 });
         self
     }
@@ -133,7 +174,15 @@ impl OpticalFpga {
         };
         rain.spots.advance((clock - rain.seen) as f64 / f64::from(nirspi_wire::ADC_HZ));
         rain.seen = clock;
-        self.array.relight(&rain.spots.reflectance(), rain.electrons_per_led);
+        let (reflectance, electrons_per_led) = (rain.spots.reflectance(), rain.electrons_per_led);
+        for array in self.arrays() {
+            array.relight(&reflectance, electrons_per_led);
+        }
+    }
+
+    fn arrays(&mut self) -> impl Iterator<Item = &mut LedArray> {
+        std::iter::once(&mut self.array)
+            .chain(self.further.iter_mut().map(|detector| &mut detector.array))
     }
 }
 
@@ -149,7 +198,9 @@ impl SimulatedFpga for OpticalFpga {
             let sample = if self.gateware.running() {
                 self.sample(begun + u64::from(passed))
             } else {
-                AdcSample { code: 0, over_range: false }
+                let dark = AdcSample { code: 0, over_range: false };
+                self.further.iter_mut().for_each(|detector| detector.gateware.tick(dark));
+                dark
             };
             self.gateware.tick(sample);
         }
@@ -164,19 +215,41 @@ impl SimulatedFpga for OpticalFpga {
     }
 
     fn set_interlock(&mut self, closed: bool) {
-        self.gateware.set_interlock(closed);
+        self.gatewares().for_each(|gateware| gateware.set_interlock(closed));
     }
 }
 
 impl FpgaBus for OpticalFpga {
     fn read(&mut self, address: u16) -> Result<u32, BusError> {
         // An address without a register reads as zero, as on the real port.
-        Ok(self.gateware.read(address).unwrap_or(0))
+        let mut answer = self.gateware.read(address).unwrap_or(0);
+        for detector in &mut self.further {
+            let own = detector.gateware.read(address).unwrap_or(0);
+            // A fault that one detector has found, such as light over its range, is a fault of the camera.
+            match Register::at(address) {
+                Some(Register::Status) => answer |= own & status::FAULT,
+                Some(Register::Fault) if answer == FaultCode::None as u32 => answer = own,
+                _ => {}
+            }
+        }
+        Ok(answer)
     }
 
     fn write(&mut self, address: u16, value: u32) -> Result<(), BusError> {
-        self.gateware.write(address, value);
+        for gateware in self.gatewares() {
+            gateware.write(address, value);
+        }
         Ok(())
+    }
+
+    fn detectors(&self) -> u8 {
+        self.further.len().try_into().map_or(u8::MAX, |further: u8| further.saturating_add(1))
+    }
+
+    fn channel(&mut self, detector: u8) -> Result<Option<&[u8]>, BusError> {
+        let of_further = usize::from(detector).checked_sub(1);
+        let found = of_further.and_then(|at| self.further.get_mut(at));
+        Ok(found.and_then(|detector| detector.gateware.frame()))
     }
 
     fn frame_ready(&mut self) -> bool {

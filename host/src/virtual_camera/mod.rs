@@ -39,6 +39,7 @@ use nirspi_mcu::{
     Progress,
 };
 use nirspi_optics::SimulatedDepth;
+use nirspi_optics::camera::MOST_FURTHER_DETECTORS;
 use nirspi_wire::{Capabilities, Version};
 use std::ops::Range;
 
@@ -88,10 +89,10 @@ impl PacketsOut {
         self.bytes.get(self.sent..self.committed).unwrap_or(&[])
     }
 
-    /// Whether there is no room for a further frame.
+    /// Whether there is no room for a further frame of every detector.
     #[must_use]
     pub fn is_full(&self) -> bool {
-        self.waiting().len() + FRAME_BYTES > PACKETS_BYTES
+        self.waiting().len() + (1 + MOST_FURTHER_DETECTORS) * FRAME_BYTES > PACKETS_BYTES
     }
 
     /// Removes the first `length` waiting bytes, which were sent.

@@ -36,7 +36,8 @@ pub struct PrecomputedFpga<F> {
 
 /// A run of repeated frames.
 struct Run {
-    frames: Vec<Vec<u8>>,
+    /// The computed frames: each is the frame of every detector.
+    frames: Vec<Vec<Vec<u8>>>,
     frame_clocks: u64,
     /// Sequence number of the offered frame.
     sequence: u32,
@@ -44,7 +45,7 @@ struct Run {
     length: u32,
     ended: bool,
     first_clock: u64,
-    /// Whether the offered bytes already contain the sequence number.
+    /// Whether the offered frames already contain the sequence number.
     stamped: bool,
 }
 
@@ -57,21 +58,26 @@ impl Run {
         self.sequence as usize % self.frames.len()
     }
 
-    /// Writes header and checksum into the offered frame.
-    fn stamp(&mut self) -> Option<&[u8]> {
-        let slot = self.slot();
-        let frame = self.frames.get_mut(slot)?;
+    /// The offered frame of a detector, with header and checksum of this repetition.
+    fn stamp(&mut self, detector: usize) -> Option<&[u8]> {
+        let (slot, sequence) = (self.slot(), self.sequence);
+        let clock = self.first_clock + u64::from(sequence) * self.frame_clocks;
+        let frames = self.frames.get_mut(slot)?;
         if !self.stamped {
-            let header = FpgaFrame::parse_header(frame)?;
-            let clock = self.first_clock + u64::from(self.sequence) * self.frame_clocks;
-            let header = Header { sequence: self.sequence, lost: 0, clock, ..header };
-            frame.get_mut(..HEADER_BYTES)?.copy_from_slice(&header.to_bytes());
-            let (covered, crc) = frame.split_last_chunk_mut::<CRC_BYTES>()?;
-            *crc = crc32(covered).to_le_bytes();
+            frames.iter_mut().try_for_each(|frame| stamp(frame, sequence, clock))?;
             self.stamped = true;
         }
-        Some(frame)
+        frames.get(detector).map(Vec::as_slice)
     }
+}
+
+/// Writes header and checksum into a frame.
+fn stamp(frame: &mut [u8], sequence: u32, clock: u64) -> Option<()> {
+    let header = Header { sequence, lost: 0, clock, ..FpgaFrame::parse_header(frame)? };
+    frame.get_mut(..HEADER_BYTES)?.copy_from_slice(&header.to_bytes());
+    let (covered, crc) = frame.split_last_chunk_mut::<CRC_BYTES>()?;
+    *crc = crc32(covered).to_le_bytes();
+    Some(())
 }
 
 impl<F: SimulatedFpga> PrecomputedFpga<F> {
@@ -96,7 +102,12 @@ impl<F: SimulatedFpga> PrecomputedFpga<F> {
         {
             self.model.advance(64);
             if self.model.frame_ready() {
-                frames.extend(self.model.frame()?.map(<[u8]>::to_vec));
+                let mut made: Vec<_> =
+                    self.model.frame()?.map(<[u8]>::to_vec).into_iter().collect();
+                for detector in 1..self.model.detectors() {
+                    made.extend(self.model.channel(detector)?.map(<[u8]>::to_vec));
+                }
+                frames.extend((!made.is_empty()).then_some(made));
                 self.model.write(Register::Control.address(), control::RELEASE)?;
             }
         }
@@ -122,8 +133,8 @@ impl<F: SimulatedFpga> PrecomputedFpga<F> {
 }
 
 /// Clocks from one frame to the next in a sequence of frames.
-fn frame_clocks(frames: &[Vec<u8>]) -> Option<u64> {
-    let clock = |frame: &Vec<u8>| FpgaFrame::parse_header(frame).map(|header| header.clock);
+fn frame_clocks(frames: &[Vec<Vec<u8>>]) -> Option<u64> {
+    let clock = |made: &Vec<Vec<u8>>| Some(FpgaFrame::parse_header(made.first()?)?.clock);
     match frames {
         [] => None,
         [_] => Some(0),
@@ -202,7 +213,16 @@ impl<F: SimulatedFpga> FpgaBus for PrecomputedFpga<F> {
     }
 
     fn frame(&mut self) -> Result<Option<&[u8]>, BusError> {
-        Ok(self.run.as_mut().filter(|run| run.offers()).and_then(Run::stamp))
+        self.channel(0)
+    }
+
+    fn detectors(&self) -> u8 {
+        self.model.detectors()
+    }
+
+    fn channel(&mut self, detector: u8) -> Result<Option<&[u8]>, BusError> {
+        let run = self.run.as_mut().filter(|run| run.offers());
+        Ok(run.and_then(|run| run.stamp(detector.into())))
     }
 
     fn raw(&mut self) -> Result<Option<&[u8]>, BusError> {

@@ -5,6 +5,7 @@
 //! appended, everything else stays ([`version`](crate::version) has the rules; `tests/frozen` holds the bytes).
 
 use crate::Tail;
+use crate::identity::Received;
 use crate::samples::{Block, Samples, Words};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -181,9 +182,12 @@ pub enum DeviceMessage<'a> {
     /// A report of the crash that ended the firmware's last start: once, after the first `Hello`.
     #[serde(borrow)]
     Crash(CrashReport<'a>),
+    /// The measurement of a further detector under the patterns of a `Frame`: with the run, sequence number and device
+    /// time of that `Frame`, and right after it. Since version 3.
+    Channel(Channel<'a>),
 }
 
-impl DeviceMessage<'_> {
+impl<'a> DeviceMessage<'a> {
     /// The first protocol version that has this message. A session of an older version does not carry it.
     #[must_use]
     pub const fn since(&self) -> u16 {
@@ -191,6 +195,17 @@ impl DeviceMessage<'_> {
             Self::Reply(Reply { outcome: Err(Refusal::Unknown), .. }) => 2,
             Self::Reply(_) | Self::Frame(_) | Self::Raw(_) | Self::Depth(_) | Self::Crash(_) => 1,
             Self::Event(event) => event.kind.since(),
+            Self::Channel(_) => Channel::SINCE,
+        }
+    }
+
+    /// The frame in this message, with the number of its detector.
+    #[must_use]
+    pub const fn frame(&self) -> Option<(u8, &Frame<'a>)> {
+        match self {
+            Self::Frame(frame) => Some((0, frame)),
+            Self::Channel(Channel { detector, frame }) => Some((*detector, frame)),
+            _ => None,
         }
     }
 }
@@ -228,6 +243,7 @@ pub enum Answer<'a> {
 
 /// Who the device is.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(from = "Received<'a>")]
 pub struct Identity<'a> {
     /// Protocol version of the session; the device's own where there is no session. The first field in every version.
     pub protocol: u16,
@@ -249,6 +265,8 @@ pub struct Identity<'a> {
     pub wavelength_nm: u16,
     /// What the device can do. Since version 2.
     pub capabilities: Tail<Capabilities>,
+    /// Number of detectors, at least 1; a device whose tail is absent has one. Since version 3.
+    pub detectors: Tail<u8>,
 }
 
 /// What a camera can do, one bit each.
@@ -466,6 +484,21 @@ pub struct Frame<'a> {
     /// Summed ADC counts, one a pattern shown.
     #[serde(borrow)]
     pub samples: Samples<'a>,
+}
+
+/// The frame of a further detector. A session of an older version carries the frames of detector 0 alone.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Channel<'a> {
+    /// Number of the detector: 1, 2, ... Detector 0 sends `Frame`.
+    pub detector: u8,
+    /// What the detector measured.
+    #[serde(borrow)]
+    pub frame: Frame<'a>,
+}
+
+impl Channel<'_> {
+    /// The first protocol version that has further detectors.
+    pub const SINCE: u16 = 3;
 }
 
 /// A piece of a burst of plain ADC samples.

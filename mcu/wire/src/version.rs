@@ -26,7 +26,7 @@
 pub const MIN: u16 = 1;
 
 /// The version of this crate: what a host greets with.
-pub const CURRENT: u16 = 2;
+pub const CURRENT: u16 = 3;
 
 /// Whether this crate speaks `version`.
 #[must_use]

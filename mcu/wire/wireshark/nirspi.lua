@@ -2,7 +2,7 @@
 --
 -- Use it once:      wireshark -X lua_script:mcu/wire/wireshark/nirspi.lua
 -- Install it:       copy it into Wireshark's folder of personal Lua plugins (Help, About, Folders).
--- Filters:          nirspi.message, nirspi.command, nirspi.outcome, nirspi.event, nirspi.sequence, nirspi.damaged ...
+-- Filters:          nirspi.message, nirspi.command, nirspi.outcome, nirspi.event, nirspi.sequence, nirspi.detector, nirspi.damaged ...
 --
 -- A packet is COBS(postcard(message) ++ CRC-32) ++ 0x00. The messages are those of mcu/wire/src/message.rs; the test
 -- mcu/wire/tests/frozen/dissector.rs holds the lists of names below equal to it, and check.py beside this file runs the
@@ -18,7 +18,7 @@ local RunLength = { "Continuous", "Frames" }
 local RebootInto = { "Application", "Bootloader" }
 local SampleSource = { "Detector", "TestPattern" }
 local PatternOrder = { "Natural", "Sequency", "Table" }
-local DeviceMessage = { "Reply", "Frame", "Raw", "Depth", "Event", "Crash" }
+local DeviceMessage = { "Reply", "Frame", "Raw", "Depth", "Event", "Crash", "Channel" }
 local Answer = { "Hello", "Done", "Status", "SelfTest", "Register", "Gateware" }
 local Refusal = { "Protocol", "State", "Configuration", "Fault", "NoSuchRegister", "RawLength", "GatewareOffset", "GatewareCrc", "Unsupported", "Bus", "Unknown" }
 local ConfigProblem = { "OutOfRange", "OrderEntry" }
@@ -39,6 +39,7 @@ local fields = {
     protocol = ProtoField.uint16("nirspi.protocol", "Protocol version"),
     run = ProtoField.uint16("nirspi.run", "Run"),
     sequence = ProtoField.uint32("nirspi.sequence", "Sequence"),
+    detector = ProtoField.uint8("nirspi.detector", "Detector"),
     samples = ProtoField.uint32("nirspi.samples", "Samples"),
     tail = ProtoField.bytes("nirspi.tail", "Bytes of a newer version"),
 }
@@ -177,6 +178,7 @@ local answers = {
         r:byte("adc_bits")
         r:number("wavelength_nm")
         if r:left() > 0 then r:number("capabilities") end
+        if r:left() > 0 then r:byte("detectors") end
     end,
     Status = function(r)
         r:variant("state", State)
@@ -235,6 +237,17 @@ local events = {
     end,
 }
 
+local function frame(r)
+    local run = r:number("run")
+    local sequence = r:number("sequence")
+    r:number("device_time_us")
+    r:number("sweeps")
+    r:number("flags")
+    r:byte("shift")
+    local samples = r:block("samples", 4)
+    return string.format("frame %d of run %d, %d samples", sequence, run, samples)
+end
+
 local messages = {
     Reply = function(r)
         local id = r:number("id")
@@ -244,15 +257,9 @@ local messages = {
         if rest then rest(r) end
         return string.format("%s %d: %s", refused and "refusal" or "answer", id, outcome)
     end,
-    Frame = function(r)
-        local run = r:number("run")
-        local sequence = r:number("sequence")
-        r:number("device_time_us")
-        r:number("sweeps")
-        r:number("flags")
-        r:byte("shift")
-        local samples = r:block("samples", 4)
-        return string.format("frame %d of run %d, %d samples", sequence, run, samples)
+    Frame = frame,
+    Channel = function(r)
+        return string.format("detector %d, %s", r:byte("detector"), frame(r))
     end,
     Raw = function(r)
         local first = r:number("first_clock")

@@ -11,7 +11,7 @@ use nirspi::files::output::OutputDir;
 use nirspi::imaging::{FrameReport as Enhanced, MethodReport, enhance_frames};
 use nirspi::picture::{Pictures, Unit};
 use nirspi::reconstruct::{check_finite, not_read_words};
-use nirspi::source::FirstPatterns;
+use nirspi::source::{FirstPatterns, Index};
 use nirspi_recon::reconstruct::{Method, Reconstruction, Setting};
 use nirspi_recon::words::count_of;
 use nirspi_recon::{Image, Measurements, Rows};
@@ -146,10 +146,11 @@ fn solve_all(args: &Args, used: &[Measurements]) -> Result<Vec<Reconstruction>> 
 
 fn say(args: &Args, report: &Report) -> Result<()> {
     let warm = report.frames.iter().filter(|frame| frame.warm).count();
+    let what = if args.source.detector == Some(Index::All) { "detector" } else { "frame" };
     print::line(format_args!(
-        "{}: {} of {} x {}, order {}, {warm} started from the frame before, {:.2} ms a frame",
+        "{}: {} of {} x {}, order {}, {warm} started from the frame before, {:.2} ms a {what}",
         report.input.display(),
-        count_of(report.frames.len(), "frame"),
+        count_of(report.frames.len(), what),
         report.n,
         report.n,
         report.order,
@@ -165,10 +166,10 @@ fn say(args: &Args, report: &Report) -> Result<()> {
     for (at, frame) in report.frames.iter().enumerate() {
         let warnings = frame.enhancement.iter().flat_map(|enhancement| &enhancement.warnings);
         for warning in warnings {
-            print::line(format_args!("warning: frame {at}: {warning}"))?;
+            print::line(format_args!("warning: {what} {at}: {warning}"))?;
         }
         for note in &frame.notes {
-            print::note(format_args!("frame {at}: {note}"))?;
+            print::note(format_args!("{what} {at}: {note}"))?;
         }
     }
     let enhanced = if args.enhance { ", enhanced.npy" } else { "" };

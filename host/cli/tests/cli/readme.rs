@@ -1,6 +1,6 @@
 //! Every command line of the README and of the book's first pages runs as it stands, from a folder that holds nothing.
 
-use crate::bench::Bench;
+use crate::bench::{Bench, correlation};
 
 /// What follows `cargo run --release -- ` in blocks of shell commands, without comments.
 fn commands(page: &str) -> Vec<String> {
@@ -78,4 +78,28 @@ fn every_line_of_how_it_works_and_of_bring_up_runs_as_it_stands() {
     runs_as_it_stands("docs/how-it-works.md", page, 2, &[]);
     let page = include_str!("../../../../docs/bring-up.md");
     runs_as_it_stands("docs/bring-up.md", page, 3, &[]);
+}
+
+#[test]
+fn every_line_about_several_detectors_runs_as_it_stands() {
+    let page = include_str!("../../../../docs/several-cameras.md");
+    let (_, section) = page.split_once("## Several detectors").unwrap();
+    let (_, description) = section.split_once("```toml\n").unwrap();
+    let bench = Bench::new();
+    bench.write("three.toml", description.split("```").next().unwrap().as_bytes());
+    let commands = commands(section);
+    assert_eq!(commands.len(), 6, "{commands:?}");
+    let ran = commands.iter().map(|command| {
+        bench.run(&command.split_whitespace().collect::<Vec<_>>()).succeeded().stdout
+    });
+    let ran: Vec<String> = ran.collect();
+    for said in [&ran[0], &ran[1]] {
+        assert!(said.contains("detector 2: 100 received, 0 lost"), "{said}");
+    }
+    assert!(ran[2].contains("3 detectors of 32 x 32"), "{}", ran[2]);
+    assert!(ran[3].contains("100 frames of 32 x 32"), "{}", ran[3]);
+    // The sum of each detector's frames, from the recording and from its arrays.
+    assert_eq!(bench.pixels("three/image.npy").len(), 3 * 1024);
+    let same = correlation(&bench.pixels("three/image.npy"), &bench.pixels("same/image.npy"));
+    assert!(same > 0.999_999, "{same}");
 }

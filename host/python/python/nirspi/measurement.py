@@ -208,6 +208,7 @@ def _numbers(values: Any, name: str) -> np.ndarray:
 def source_options(
     *,
     index: int | str | None = None,
+    detector: int | str | None = None,
     shown: str | None = None,
     side: int | None = None,
     field: str | None = None,
@@ -222,6 +223,7 @@ def source_options(
     """The options of :func:`load` as the compiled part takes them."""
     return {
         "index": None if index is None else str(index),
+        "detector": None if detector is None else str(detector),
         "shown": shown,
         "side": None if side is None else _arrays.side(side),
         "field": field,
@@ -239,6 +241,7 @@ def load(
     path: str | os.PathLike[str],
     *,
     index: int | str | None = None,
+    detector: int | str | None = None,
     shown: str | None = None,
     side: int | None = None,
     field: str | None = None,
@@ -261,6 +264,9 @@ def load(
     index : int, "all" or None
         Which of several measurements. With "all", each measurement of a file, or each frame of a
         recording; without, the frames of a recording are summed.
+    detector : int, "all" or None
+        Which detector of a recorded camera that has several. With "all", ``d`` is (detectors, M);
+        without, it is detector 0.
     shown : str, optional
         The order in which patterns were shown, for a file without ``h_row``.
     side : int, optional
@@ -306,6 +312,7 @@ def load(
 
     options = source_options(
         index=index,
+        detector=detector,
         shown=shown,
         side=side,
         field=field,
@@ -323,7 +330,7 @@ def load(
     if any(len(one["rows"]) != len(rows) or (one["rows"] != rows).any() for one in found):
         rows = _merged([one["rows"] for one in found])
     every = [_aligned(one, rows) for one in found]
-    several = index == "all"
+    several = "all" in (index, detector)
     unread = [one["not_read"] for one in found]
     reference = first["reference"]
     notes: list[str] = []

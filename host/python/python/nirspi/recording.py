@@ -112,10 +112,15 @@ class Recording:
         """Flags of each frame, see :class:`Frame`, (F,)."""
         return self._frames["flags"]
 
+    @property
+    def detectors(self) -> int:
+        """Number of detectors of the recorded camera. The frames above are those of detector 0."""
+        return int(self.identity["detectors"])
+
     def measurement(self, **options: Any) -> Measurement:
         """The measurement of all frames together: :func:`nirspi.load` of this file.
 
-        ``index="all"`` gives one measurement a frame.
+        ``index="all"`` gives one measurement a frame, ``detector="all"`` one a detector.
         """
         return load(self.path, **options)
 

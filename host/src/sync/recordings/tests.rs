@@ -37,6 +37,7 @@ impl Camera {
             adc_bits: 14,
             wavelength_nm: 1550,
             capabilities: Vec::new(),
+            detectors: 1,
         };
         let mut setup = MeasurementSetup::new(&nirspi_recon::Order::Natural, 0.01).unwrap();
         setup.sweeps = 1000;

@@ -463,7 +463,10 @@ impl World {
                     None => return Err("the end of no run".into()),
                 }
             }
-            DeviceMessage::Raw(_) | DeviceMessage::Depth(_) | DeviceMessage::Crash(_) => {}
+            DeviceMessage::Raw(_)
+            | DeviceMessage::Depth(_)
+            | DeviceMessage::Crash(_)
+            | DeviceMessage::Channel(_) => {}
         }
         Ok(())
     }

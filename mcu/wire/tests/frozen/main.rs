@@ -13,13 +13,14 @@ mod dissector;
 mod page;
 mod v1;
 mod v2;
+mod v3;
 mod variants;
 
 use nirspi_wire::version;
 use std::collections::BTreeSet;
 
 /// The newest version that is frozen here.
-const NEWEST: u16 = 2;
+const NEWEST: u16 = 3;
 
 #[test]
 fn the_version_that_the_crate_speaks_is_frozen() {
@@ -32,7 +33,8 @@ fn every_variant_is_frozen() {
     for (request, _) in v1::requests() {
         variants::of_request(&request, &mut seen);
     }
-    for (message, _) in v1::device_messages().into_iter().chain(v2::device_messages()) {
+    let later = v2::device_messages().into_iter().chain(v3::device_messages());
+    for (message, _) in v1::device_messages().into_iter().chain(later) {
         variants::of_device_message(&message, &mut seen);
     }
     let missing: Vec<_> = variants::ALL.iter().filter(|name| !seen.contains(*name)).collect();
@@ -45,4 +47,7 @@ fn what_is_new_says_since_which_version() {
     let since: Vec<u16> =
         v2::device_messages().iter().map(|(message, _)| message.since()).collect();
     assert_eq!(since, [1, 2, 2, 1, 1], "greeting and status are as old as the protocol");
+    let since: Vec<u16> =
+        v3::device_messages().iter().map(|(message, _)| message.since()).collect();
+    assert_eq!(since, [1, 3]);
 }
