@@ -88,6 +88,17 @@ fn in_order(found: &[Vec<u8>], of: &[Vec<u8>]) -> usize {
     count
 }
 
+/// Bytes of a chunk without compression before its records: kind, length, times, sizes, checksum.
+const CHUNK_HEAD: usize = 49;
+
+/// Places of the chunks: their lengths decide how everything in them is read.
+fn chunk_heads(bytes: &[u8]) -> Vec<usize> {
+    let number = |at: usize| u64::from_le_bytes(*bytes[at..].first_chunk().unwrap());
+    let is_head =
+        |&at: &usize| bytes[at] == 6 && number(at + 1) == number(at + 41).wrapping_add(40);
+    (0..bytes.len() - CHUNK_HEAD).filter(is_head).collect()
+}
+
 #[test]
 fn one_damaged_byte_costs_no_more_than_two_packets() {
     let folder = tempfile::tempdir().unwrap();
@@ -98,7 +109,10 @@ fn one_damaged_byte_costs_no_more_than_two_packets() {
     let head = [15, 4, 0, 0, 0, 0, 0, 0, 0];
     let data_end = whole.windows(9).rposition(|bytes| bytes == head).unwrap();
     let damaged = folder.path().join("damaged.mcap");
-    for at in (0..whole.len()).step_by(97).chain(0..400) {
+    let heads = chunk_heads(&whole);
+    assert!(!heads.is_empty());
+    let heads = heads.into_iter().flat_map(|head| head..head + CHUNK_HEAD);
+    for at in (0..whole.len()).step_by(97).chain(0..400).chain(heads) {
         for flip in [0x01, 0x80] {
             let mut bytes = whole.clone();
             bytes[at] ^= flip;

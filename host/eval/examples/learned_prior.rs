@@ -9,6 +9,9 @@
 //! neither. `scenes=N` before a table takes the first N scenes, and `only=WORD,WORD` some of the
 //! methods: 128 x 128 pixels take minutes otherwise.
 
+mod natural;
+
+use natural::Scenes;
 use nirspi::files::image::encode_rgb;
 use nirspi::picture::{Axis, Chart, Line, Panel, Range, SideBySide, Unit, below};
 use nirspi_eval::completion::{Part, Row, Scene, compare, image, methods, quality};
@@ -70,33 +73,31 @@ fn parts(shares: &[f64], noise: f64) -> Vec<Part> {
 }
 
 /// One array of an `.npz` file.
-fn array<T: npyz::Deserialize>(file: &Path, name: &str) -> Result<(Vec<u64>, Vec<T>)> {
+fn array<T: npyz::Deserialize>(file: &Path, name: &str) -> Result<Vec<T>> {
     let open = std::fs::File::open(file).map_err(|error| format!("{}: {error}", file.display()))?;
     let mut archive = zip::ZipArchive::new(std::io::BufReader::new(open))?;
     let member = npyz::NpyFile::new(archive.by_name(&format!("{name}.npy"))?)?;
-    Ok((member.shape().to_vec(), member.into_vec()?))
+    Ok(member.into_vec()?)
 }
 
 /// The natural scenes that training has not seen.
 fn natural(data: &Path, n: u64, most: usize) -> Result<Vec<Scene>> {
-    let (shape, levels) = array::<u8>(&data.join("natural/bsds_train.npz"), "x")?;
-    let area = (shape[1] * shape[2]) as usize;
+    let scenes = Scenes::read(data)?;
     let side = Side::new(n)?;
-    let unseen = levels.chunks_exact(area).enumerate().filter(|(k, _)| k % 10 == 4).take(most);
-    Ok(unseen
-        .map(|(k, levels)| {
-            Scene::centre_of(&format!("natural {k}"), levels, shape[1] as usize, side)
-        })
-        .collect())
+    let unseen = scenes.iter().enumerate().filter(|(k, _)| k % 10 == 4).take(most);
+    let scene = |(k, levels): (usize, &[u8])| {
+        Scene::centre_of(&format!("natural {k}"), levels, scenes.height, side)
+    };
+    Ok(unseen.map(scene).collect())
 }
 
 /// Characters of groups that training has not seen, `count` of each stack.
 fn characters(data: &Path, stack: &str, group: Option<&str>, count: usize) -> Result<Vec<Scene>> {
     let file = data.join(format!("chars74k/{stack}_train.npz"));
-    let (_, levels) = array::<u8>(&file, "x")?;
+    let levels = array::<u8>(&file, "x")?;
     let groups: Vec<i64> = match group {
-        Some("writer") => array::<u8>(&file, "writer")?.1.into_iter().map(i64::from).collect(),
-        Some(group) => array::<i16>(&file, group)?.1.into_iter().map(i64::from).collect(),
+        Some("writer") => array::<u8>(&file, "writer")?.into_iter().map(i64::from).collect(),
+        Some(group) => array::<i16>(&file, group)?.into_iter().map(i64::from).collect(),
         None => (0..levels.len() as i64 / 4096).collect(),
     };
     let held_out: serde_json::Value = serde_json::from_str(nirspi_nets::HELD_OUT)?;
@@ -220,12 +221,12 @@ fn characters_tables(data: &Path, methods: &Methods) -> Result<()> {
 /// The wing, and detectors of the car: name and measurements.
 fn instruments(data: &Path) -> Result<Vec<(String, Vec<Measurements>)>> {
     let wing = data.join("spi/opar_ala1.npz");
-    let rows = Rows::new(Side::new(64)?, array::<i32>(&wing, "h_row")?.1)?;
-    let y: Vec<f64> = array::<f32>(&wing, "y")?.1.into_iter().map(f64::from).collect();
+    let rows = Rows::new(Side::new(64)?, array::<i32>(&wing, "h_row")?)?;
+    let y: Vec<f64> = array::<f32>(&wing, "y")?.into_iter().map(f64::from).collect();
     let wing = Measurements::from_pairs(&rows, &y)?.0;
     let car = data.join("spi/scheidt_car.npz");
-    let rows = Rows::new(Side::new(32)?, array::<i32>(&car, "h_row")?.1)?;
-    let d: Vec<f64> = array::<i32>(&car, "d")?.1.into_iter().map(f64::from).collect();
+    let rows = Rows::new(Side::new(32)?, array::<i32>(&car, "h_row")?)?;
+    let d: Vec<f64> = array::<i32>(&car, "d")?.into_iter().map(f64::from).collect();
     let cars = d.chunks_exact(1024).map(|d| Measurements::from_differential(&rows, d));
     let cars: Vec<Measurements> = cars.collect::<std::result::Result<_, _>>()?;
     Ok(vec![

@@ -10,6 +10,9 @@
 //!
 //! DATA has `chars74k/*_train.npz` and, for scenes that are no characters, `natural/bsds_train.npz`.
 
+mod natural;
+
+use natural::Scenes;
 use nirspi::files::characters;
 use nirspi::files::image::encode_rgb;
 use nirspi_eval::trust::{Report, Settings, calibrate, judge};
@@ -69,29 +72,21 @@ fn main() -> Result<()> {
 
 fn stacks(data: &Path) -> Result<Vec<Stack>> {
     let mut stacks = characters::read(&data.join("chars74k"))?;
-    let scenes = data.join("natural/bsds_train.npz");
-    if scenes.is_file() {
-        stacks.push(natural(&scenes)?);
+    if Scenes::file(data).is_file() {
+        stacks.push(natural(&Scenes::read(data)?)?);
     }
     Ok(stacks)
 }
 
 /// The middle 64 x 64 pixels of each scene, which is a group of its own.
-fn natural(file: &Path) -> Result<Stack> {
-    let mut archive = zip::ZipArchive::new(std::io::BufReader::new(std::fs::File::open(file)?))?;
-    let member = npyz::NpyFile::new(archive.by_name("x.npy")?)?;
-    let &[count, height, width] = member.shape() else {
-        return Err(format!("{}: expected (N, height, width)", file.display()).into());
-    };
-    let (height, width) = (height as usize, width as usize);
-    let all: Vec<u8> = member.into_vec()?;
-    let (top, left) = ((height - 64) / 2, (width - 64) / 2);
+fn natural(scenes: &Scenes) -> Result<Stack> {
+    let (top, left) = ((scenes.height - 64) / 2, (scenes.width - 64) / 2);
     let middle = |scene: &[u8]| {
-        let rows = scene.chunks_exact(width).skip(top).take(64);
+        let rows = scene.chunks_exact(scenes.width).skip(top).take(64);
         rows.flat_map(|row| row[left..left + 64].to_vec()).collect::<Vec<u8>>()
     };
-    let levels = all.chunks_exact(height * width).flat_map(middle).collect();
-    let groups = (0..count as u32).collect();
+    let levels = scenes.iter().flat_map(middle).collect();
+    let groups = (0..scenes.iter().count() as u32).collect();
     Ok(Stack::new("natural", Kind::Photograph, levels, None, groups)?)
 }
 

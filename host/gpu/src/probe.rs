@@ -116,23 +116,36 @@ fn installed() -> Result<(), Absent> {
     }
 }
 
-/// The best adapter of Vulkan, Metal or DirectX: discrete before integrated, and any other only if
-/// `software_too`.
+/// The kinds of adapters that a search may give.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Adapters {
+    /// Discrete and integrated GPUs.
+    Gpus,
+    /// GPUs first, then virtual and software adapters.
+    All,
+}
+
+/// The best adapter of Vulkan, Metal or DirectX: discrete before integrated, and any other only
+/// with [`Adapters::All`].
 ///
 /// # Errors
-/// [`Absent`] if no GPU answers, or this build is without the feature `wgpu`.
-pub fn adapter(software_too: bool) -> Result<Gpu, Absent> {
-    #[cfg(feature = "wgpu")]
-    return wgpu(software_too).map(Gpu::Wgpu);
-    #[cfg(not(feature = "wgpu"))]
-    {
-        let _ = software_too;
-        Err(Absent::NotBuilt("wgpu"))
-    }
+/// [`Absent`] if no adapter of these kinds answers.
+#[cfg(feature = "wgpu")]
+pub fn adapter(kinds: Adapters) -> Result<Gpu, Absent> {
+    wgpu(kinds).map(Gpu::Wgpu)
+}
+
+/// This build looks for no adapter.
+///
+/// # Errors
+/// [`Absent::NotBuilt`] always.
+#[cfg(not(feature = "wgpu"))]
+pub fn adapter(_: Adapters) -> Result<Gpu, Absent> {
+    Err(Absent::NotBuilt("wgpu"))
 }
 
 #[cfg(feature = "wgpu")]
-fn wgpu(software_too: bool) -> Result<Found<WgpuDevice>, Absent> {
+fn wgpu(kinds: Adapters) -> Result<Found<WgpuDevice>, Absent> {
     use cubecl::future::block_on;
     use cubecl::wgpu::{AutoGraphicsApi, GraphicsApi};
     use wgpu::DeviceType;
@@ -151,7 +164,7 @@ fn wgpu(software_too: bool) -> Result<Found<WgpuDevice>, Absent> {
     let other =
         [(DeviceType::VirtualGpu, WgpuDevice::VirtualGpu(0)), (DeviceType::Cpu, WgpuDevice::Cpu)];
     real.into_iter()
-        .chain(other.into_iter().filter(|_| software_too))
+        .chain(other.into_iter().filter(|_| kinds == Adapters::All))
         .find_map(|(kind, device)| {
             let info = infos.iter().find(|info| info.device_type == kind)?;
             Some(Found { device, name: info.name.clone(), software: kind == DeviceType::Cpu })

@@ -89,12 +89,15 @@ def test_images_are_in_the_units_of_the_readings_and_never_clipped():
 def test_a_computation_from_two_threads_at_once_gives_the_same():
     import threading
 
-    m = measured()
-    expected, found = ns.reconstruct(m, method="omp", sampling=0.3), []
-    work = lambda: found.append(ns.reconstruct(m, method="omp", sampling=0.3))  # noqa: E731
-    threads = [threading.Thread(target=work) for _ in range(4)]
+    one = measured()
+    # A measurement of its own for each thread, so that an image of another thread shows.
+    many = [ns.Measurement(d=k * one.d, rows=one.rows, n=one.n) for k in range(1, 5)]
+    make = lambda m: ns.reconstruct(m, method="omp", sampling=0.3)  # noqa: E731
+    expected, found = [make(m) for m in many], {}
+    work = lambda k: found.update({k: make(many[k])})  # noqa: E731
+    threads = [threading.Thread(target=work, args=(k,)) for k in range(len(many))]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
-    assert len(found) == 4 and all((one == expected).all() for one in found)
+    assert len(found) == 4 and all((found[k] == expected[k]).all() for k in found)

@@ -249,6 +249,21 @@ mod tests {
             let refused = Leak::new(vec![own, leaked]);
             assert_eq!(refused, Err(LeakError::NotDominant { own, leaked }));
         }
-        assert!(Leak::new(vec![1.0]).is_ok());
+        let taps = vec![0.5, -0.25, 0.125];
+        assert_eq!(Leak::new(taps.clone()).unwrap().taps(), taps);
+    }
+
+    /// The number of passes follows from the leaked share of a slot's own light, not from the leaked
+    /// light.
+    #[test]
+    fn the_largest_share_is_undone_however_small_the_signal() {
+        for own in [0.01, 1.0, 100.0] {
+            let taps = vec![own, Leak::LARGEST_SHARE * own];
+            let leak = Leak::new(taps.clone()).unwrap();
+            let x: Vec<f64> = (0..8).map(|i| f64::from(i * i % 5) - 2.0).collect();
+            let mut y = leaked(&taps, &x, Sweep::Repeating);
+            leak.correct_single(&mut y, Sweep::Repeating);
+            assert!(close(&y, &x), "{own}: {y:?}");
+        }
     }
 }

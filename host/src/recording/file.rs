@@ -262,4 +262,55 @@ mod tests {
         let (place, _) = Place::make(&Target::Replace(path.clone())).unwrap();
         assert_eq!(place.path(), path);
     }
+
+    #[test]
+    fn a_target_names_its_file_or_folder() {
+        let path = Path::new("lab/rec.mcap");
+        for target in [Target::New, Target::Replace, Target::FirstFree] {
+            assert_eq!(target(path.to_owned()).path(), path);
+        }
+    }
+
+    #[test]
+    fn a_folder_is_no_file_and_a_missing_folder_is_told_as_missing() {
+        let folder = tempfile::tempdir().unwrap();
+        let kind = |target| Place::make(&target).unwrap_err().kind();
+        assert_eq!(kind(Target::Replace(folder.path().to_owned())), io::ErrorKind::IsADirectory);
+        let gone = folder.path().join("gone");
+        assert_eq!(kind(Target::New(gone.join("rec.mcap"))), io::ErrorKind::NotFound);
+        assert_eq!(kind(Target::FirstFree(gone)), io::ErrorKind::NotFound);
+        assert_eq!(names(folder.path()), Vec::<String>::new());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_device_is_written_to_and_stays() {
+        let device = PathBuf::from("/dev/null");
+        for target in [Target::New(device.clone()), Target::Replace(device.clone())] {
+            let (mut place, mut file) = Place::make(&target).unwrap();
+            file.write_all(b"frames").unwrap();
+            // No system syncs this device.
+            place.settle(&file, true).unwrap();
+            assert_eq!(place.path(), device);
+            place.remove();
+            assert!(is_device(&device));
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn the_folder_of_a_name_is_synced() {
+        sync_folder_of(Path::new("a_name_alone.mcap")).unwrap();
+        let error = sync_folder_of(Path::new("/no/such/folder/rec.mcap")).unwrap_err();
+        assert_eq!(error.kind(), io::ErrorKind::NotFound);
+    }
+
+    #[test]
+    fn an_error_of_syncing_is_told_at_the_end() {
+        let (over, _) = mpsc::channel();
+        let full = || Err(io::ErrorKind::StorageFull.into());
+        let syncer = Syncer { over, thread: std::thread::spawn(full) };
+        assert_eq!(syncer.end().unwrap_err().kind(), io::ErrorKind::StorageFull);
+        Syncer::start(tempfile::tempfile().unwrap()).end().unwrap();
+    }
 }

@@ -178,4 +178,47 @@ mod tests {
         .concat();
         assert_eq!(message, expected);
     }
+
+    #[test]
+    fn a_value_of_its_types_default_is_left_out_and_any_other_is_written() {
+        let of = |make: fn(Message) -> Message| make(Message::default()).end();
+        assert_eq!(of(|m| m.bool(1, true)), [0x08, 1]);
+        assert_eq!(of(|m| m.doubles(2, &[1.0])), [0x12, 8, 0, 0, 0, 0, 0, 0, 0xf0, 0x3f]);
+        assert_eq!(of(|m| m.bytes(3, &[9, 8])), [0x1a, 2, 9, 8]);
+        let nothing = of(|m| {
+            m.bool(1, false).doubles(2, &[]).bytes(3, &[]).fixed32(4, 0).double(5, 0.0).text(6, "")
+        });
+        assert!(nothing.is_empty(), "{nothing:?}");
+    }
+
+    /// The bytes are those of Python's `protobuf` 7 (`descriptor_pb2.FileDescriptorProto`).
+    #[test]
+    fn a_description_has_the_bytes_of_googles_own() {
+        let fields: [Field; 11] = [
+            (1, "a", Type::Double),
+            (2, "b", Type::Uint64),
+            (3, "c", Type::Int64),
+            (4, "d", Type::Int32),
+            (5, "e", Type::Fixed32),
+            (6, "f", Type::Bool),
+            (7, "g", Type::Text),
+            (8, "h", Type::Bytes),
+            (9, "i", Type::Doubles),
+            (200, "j", Type::Of(".lab.At", Kind::Message)),
+            (11, "k", Type::Of(".lab.Seen.Level", Kind::Enum)),
+        ];
+        let message = descriptor("Seen", &fields, &[("Level", &["LOW", "HIGH"])]);
+        let made = file("lab/Seen.proto", "lab", &["lab/At.proto"], &message).end();
+        let hex: String = made.iter().map(|byte| format!("{byte:02x}")).collect();
+        let expected = [
+            "0a0e6c61622f5365656e2e70726f746f12036c61621a0c6c61622f41742e70726f746f22b6010a045365656e",
+            "12090a01611801200128011209",
+            "0a016218022001280412090a016318032001280312090a0164180420012805",
+            "12090a016518052001280712090a016618062001280812090a016718072001280912090a016818082001280c",
+            "12090a016918092003280112130a016a18c8012001280b32072e6c61622e4174121a0a016b180b2001280e32",
+            "0f2e6c61622e5365656e2e4c6576656c221a0a054c6576656c12070a034c4f57100012080a04484947481001",
+            "620670726f746f33",
+        ];
+        assert_eq!(hex, expected.concat());
+    }
 }

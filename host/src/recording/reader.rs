@@ -232,8 +232,7 @@ impl Records {
                 Entry::Compressed(_) => {
                     return Err(RecordingError::NotARecording {
                         path: path.clone(),
-                        found: "records in compressed chunks, as other tools write them,"
-                            .to_owned(),
+                        found: "records in compressed chunks, as other tools write them".to_owned(),
                     });
                 }
                 Entry::Message { channel, time_ns, data } => {

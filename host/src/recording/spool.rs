@@ -302,4 +302,72 @@ mod tests {
         drop(spool);
         disk.end().unwrap();
     }
+
+    #[test]
+    fn a_disk_that_is_dropped_has_written_everything() {
+        struct Late(Arc<Mutex<Vec<u8>>>);
+        impl Write for Late {
+            fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+                std::thread::sleep(Duration::from_millis(100));
+                self.0.lock().unwrap().extend_from_slice(bytes);
+                Ok(bytes.len())
+            }
+
+            fn flush(&mut self) -> io::Result<()> {
+                Ok(())
+            }
+        }
+        let taken = Arc::<Mutex<Vec<u8>>>::default();
+        let (mut spool, disk) = start(Late(Arc::clone(&taken))).unwrap();
+        spool.write_all(b"frames").unwrap();
+        drop(spool);
+        drop(disk);
+        assert_eq!(*taken.lock().unwrap(), b"frames");
+    }
+
+    #[test]
+    fn the_share_that_waits_is_of_the_whole_queue() {
+        let (mut spool, disk, allow, _) = slow(usize::MAX, 4);
+        let shares = [1, 2, 3, 4].map(|byte| {
+            spool.write_all(&[byte]).unwrap();
+            spool.flush().unwrap();
+            disk.queued()
+        });
+        // The disk ends after its spool, so nothing is asserted before.
+        drop((allow, spool));
+        disk.end().unwrap();
+        assert_eq!(shares, [0.25, 0.5, 0.75, 1.0]);
+    }
+
+    #[test]
+    fn a_buffer_takes_as_much_as_it_has_room_for() {
+        let (mut spool, disk, allow, taken) = slow(usize::MAX, 2);
+        drop(allow);
+        let bytes = vec![7; 3 * BUFFER];
+        let parts = [&bytes[..BUFFER / 4], &bytes, &bytes];
+        let took = parts.map(|part| spool.write(part).unwrap());
+        // The disk ends after its spool, so nothing is asserted before.
+        drop(spool);
+        disk.end().unwrap();
+        assert_eq!(took, [BUFFER / 4, BUFFER - BUFFER / 4, BUFFER]);
+        assert_eq!(taken.lock().unwrap().len(), 2 * BUFFER);
+    }
+
+    #[test]
+    fn a_panic_of_the_disk_is_an_error_at_the_end() {
+        struct Broken;
+        impl Write for Broken {
+            fn write(&mut self, _: &[u8]) -> io::Result<usize> {
+                panic!("a fault of the disk, as the test asks")
+            }
+
+            fn flush(&mut self) -> io::Result<()> {
+                Ok(())
+            }
+        }
+        let (mut spool, disk) = start(Broken).unwrap();
+        spool.write_all(b"frames").unwrap();
+        drop(spool);
+        assert!(disk.end().unwrap_err().to_string().contains("panicked"));
+    }
 }

@@ -8,7 +8,7 @@
 
 use super::Backend;
 use nirspi_gpu::Gpu;
-use nirspi_gpu::probe::{Absent, adapter, cuda};
+use nirspi_gpu::probe::{Absent, Adapters, adapter, cuda};
 use thiserror::Error;
 
 /// The device of a backend was not found. `Display` gives one line with everything that was looked
@@ -27,13 +27,14 @@ pub struct Missing {
 /// [`Missing`] names the backends that were tried, and why each is not usable.
 pub fn find(backend: Backend) -> Result<Option<Gpu>, Missing> {
     let through_cuda = || cuda().map(Gpu::Cuda).map_err(|absent| ("CUDA", absent));
-    let through_wgpu = |software_too| adapter(software_too).map_err(|absent| ("wgpu", absent));
+    let through_wgpu = |kinds| adapter(kinds).map_err(|absent| ("wgpu", absent));
     let found = match backend {
         Backend::Cpu => return Ok(None),
         Backend::Cuda => through_cuda().map_err(|absent| vec![absent]),
-        Backend::Wgpu => through_wgpu(true).map_err(|absent| vec![absent]),
-        Backend::Auto => through_cuda()
-            .or_else(|no_cuda| through_wgpu(false).map_err(|no_wgpu| vec![no_wgpu, no_cuda])),
+        Backend::Wgpu => through_wgpu(Adapters::All).map_err(|absent| vec![absent]),
+        Backend::Auto => through_cuda().or_else(|no_cuda| {
+            through_wgpu(Adapters::Gpus).map_err(|no_wgpu| vec![no_wgpu, no_cuda])
+        }),
     };
     found.map(Some).map_err(|looked_for| Missing { looked_for })
 }

@@ -83,6 +83,24 @@ fn names_round_trip() {
     for wrong in ["zigzag", "random", "random:", "random:-1", "table", ""] {
         assert_eq!(wrong.parse::<Order>(), Err(ParseOrderError { found: wrong.into() }));
     }
+    let told = "zigzag".parse::<Order>().unwrap_err().to_string();
+    assert!(
+        told.starts_with("unknown order \"zigzag\", expected natural, sequency, zig-zag, "),
+        "{told}"
+    );
+    assert!(told.ends_with(", deepinv:xy or random:SEED"), "{told}");
+    assert_eq!(Order::Table(vec![1, 0]).to_string(), "table");
+}
+
+#[test]
+fn positions_by_sequency_follow_the_zig_zag_and_leave_out_the_even_pattern() {
+    let shown = [9_u32, 0, 2, 15, 8];
+    let rows = Rows::new(side(4), shown).unwrap();
+    let found: Vec<u32> = positions_by_sequency(&rows).iter().map(|&k| shown[k]).collect();
+    let zig_zag = Order::ZigZag.rows(side(4)).unwrap();
+    let expected = zig_zag.iter().copied().filter(|row| *row != 0 && shown.contains(row));
+    assert!(expected.eq(found.iter().copied()), "{found:?}");
+    assert_eq!(found.len(), 4);
 }
 
 #[test]
