@@ -108,11 +108,14 @@ fn a_word_wraps_at_48_bits_and_says_so_in_that_clock(project: &Project) {
 
 fn the_host_reads_any_bank_while_another_is_being_filled(project: &Project) {
     let mut sums = Accumulators::new(project);
-    // One bank after the other, each with its own sums.
+    // One bank after the other, each with its own sums of two sweeps.
     for bank in 0..3u64 {
         sums.bench.set("filling", 1u64 << bank);
-        for index in 0..1024 {
-            sums.clock(last_sample(index, true, true), 100 * bank + index);
+        for first in [true, false] {
+            for index in 0..1024 {
+                let sum = if first { 100 * bank } else { index };
+                sums.clock(last_sample(index, true, first), sum);
+            }
         }
         for _ in 0..8 {
             sums.clock(0, 0);
