@@ -39,6 +39,7 @@ by_name=(
     "licences        licences, sources and bans of all dependencies; crates.io"
     "flash           probe-rs knows every board's chip"
     "mutants         deliberate faults in the Rust code are seen: in lines changed since main, or in MUTANTS='CRATE...'; crates.io"
+    "miri            unit tests of the wire protocol in Rust's interpreter, which sees undefined behaviour; rustup's nightly with miri"
     "crowd           nirspi serve among 1000 clients that misbehave, for CROWD_S seconds (600)"
     "zenoh           a camera over Zenoh: router, camera and host as processes; crates.io, 219 crates of which 95 are its own"
     "stores          archives in object stores: S3 and WebDAV servers as processes; crates.io, PyPI"
@@ -408,6 +409,18 @@ step_mutants() {
     mkdir -p target/mutants
     # Dependencies stay from one fault to the next, and for the next time.
     CARGO_TARGET_DIR=$PWD/target/mutants/build cargo mutants "${chosen[@]}" --output target/mutants -- --lib --bins --tests
+}
+
+# Miri runs some hundred times slower than the processor, so laws are tried on four cases, and one test, which takes
+# hours there, is left out.
+step_miri() {
+    if ! cargo +nightly miri --version >/dev/null 2>&1 &&
+        ! rustup toolchain install nightly --profile minimal --component miri,rust-src >&2; then
+        echo "skipped: the wire protocol in Miri, no nightly with miri from rustup"
+        return
+    fi
+    MIRIFLAGS=-Zmiri-disable-isolation PROPTEST_CASES=4 cargo +nightly miri test --locked -p nirspi-wire --lib -- \
+        --skip host_port::tests::an_access_with_up_to_three_wrong_bits
 }
 
 step_crowd() {
