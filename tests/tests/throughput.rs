@@ -34,7 +34,7 @@ impl Wires {
 impl HostPort for Wires {
     fn write(&mut self, address: u16, sealed: [u8; SEALED_BYTES]) -> Result<(), BusError> {
         self.sck(BEGIN + 2 * SEALED_BYTES as u64);
-        self.fpga.write(address, unseal(address, sealed).unwrap());
+        self.fpga.write(address, unseal(address, sealed).expect("the firmware seals every write"));
         Ok(())
     }
 
@@ -58,7 +58,7 @@ impl TimedPort for Wires {
     fn transfer(&mut self, opcode: u8, into: &mut [u8]) {
         assert_eq!(opcode, READ_FRAME);
         self.sck(BEGIN + u64::from(DUMMY_CYCLES));
-        let packet = self.fpga.frame().unwrap();
+        let packet = self.fpga.frame().expect("a frame is ready before it is read");
         into.fill(0);
         into[LEAD_BYTES / 2..][..packet.len()].copy_from_slice(packet);
         self.sck(2 * into.len() as u64);

@@ -119,11 +119,13 @@ fn read(bytes: &[u8]) -> (Vec<Entry>, Damage) {
 
 /// The packets among these entries.
 fn found(entries: &[Entry]) -> Vec<&[u8]> {
-    let packet = |entry| match entry {
-        &Entry::Message { ref data, .. } => Some(data.as_slice()),
-        _ => None,
-    };
-    entries.iter().filter_map(packet).collect()
+    entries
+        .iter()
+        .filter_map(|entry| match entry {
+            Entry::Message { data, .. } => Some(data.as_slice()),
+            _ => None,
+        })
+        .collect()
 }
 
 #[test]
