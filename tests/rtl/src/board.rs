@@ -17,7 +17,7 @@ use std::collections::VecDeque;
 /// Period of the ADC's clock.
 const ADC_PS: u64 = 8_000;
 /// Period of the host port's clock: 100 MHz, so `sck` has 16.7 MHz.
-const HOST_PS: u64 = 10_000;
+pub const HOST_PS: u64 = 10_000;
 /// Clocks of the host port between two accesses, enough for the effects of a write to reach the
 /// pins.
 const BETWEEN: u8 = 40;
@@ -62,6 +62,8 @@ pub struct Board {
     clock: u64,
     next_adc_ps: u64,
     next_host_ps: u64,
+    /// Period of the host port's clock.
+    host_ps: u64,
     /// Length of a raw burst, mode and patterns as written last: only the host knows how much it has to read.
     raw_length: u32,
     mode: u32,
@@ -78,7 +80,8 @@ pub struct Seen {
 }
 
 impl Board {
-    pub fn new(front: Front) -> Self {
+    /// A board whose host port's clock has this period.
+    pub fn new(front: Front, host_ps: u64) -> Self {
         let mut pins = Pins::new(&Project::read());
         pins.interlock(true);
         if matches!(front, Front::Loopback(_)) {
@@ -91,6 +94,7 @@ impl Board {
             clock: 0,
             next_adc_ps: 0,
             next_host_ps: 1,
+            host_ps,
             raw_length: Register::RawLength.reset(),
             mode: Register::Mode.reset(),
             patterns: Register::Patterns.reset(),
@@ -130,7 +134,7 @@ impl Board {
             self.next_adc_ps += ADC_PS;
             self.adc_clock();
         }
-        self.next_host_ps += HOST_PS;
+        self.next_host_ps += self.host_ps;
         self.pins.host_edge();
     }
 
@@ -138,6 +142,16 @@ impl Board {
         for _ in 0..host_clocks {
             self.host_clock();
         }
+    }
+
+    /// Time since reset.
+    pub fn now_ps(&self) -> u64 {
+        self.next_host_ps
+    }
+
+    /// Time that passes between two accesses without any.
+    pub fn pause_ps(&self) -> u64 {
+        (u64::from(BETWEEN) + u64::from(SCK_DIVIDER / 2)) * self.host_ps
     }
 
     pub fn advance(&mut self, adc_clocks: u32) {
@@ -228,18 +242,25 @@ impl Board {
 
     /// Reads the frame, whose header gives its length, or as much as a packet of so many patterns may take.
     pub fn frame(&mut self) -> Vec<u8> {
+        if self.mode & mode::PACKETS != 0 {
+            return self.frame_bytes(ready::read_bytes(self.patterns as u16));
+        }
         self.begin(READ_FRAME, 0);
         self.dummy();
-        if self.mode & mode::PACKETS != 0 {
-            let bytes = self.receive_bytes(ready::read_bytes(self.patterns as u16));
-            self.end();
-            return bytes;
-        }
         let mut bytes = self.receive_bytes(HEADER_BYTES);
         if let Some(header) = FpgaFrame::parse_header(&bytes) {
             let rest = frame_bytes(header.patterns) - HEADER_BYTES;
             bytes.extend(self.receive_bytes(rest));
         }
+        self.end();
+        bytes
+    }
+
+    /// Reads so many bytes of the frame or packet.
+    pub fn frame_bytes(&mut self, count: usize) -> Vec<u8> {
+        self.begin(READ_FRAME, 0);
+        self.dummy();
+        let bytes = self.receive_bytes(count);
         self.end();
         bytes
     }

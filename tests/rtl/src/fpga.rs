@@ -3,7 +3,7 @@
 //! The simulator cannot leave its thread. Each call waits until the simulator has done its work, so
 //! a run is as repeatable as on one thread.
 
-use crate::board::{Board, Front, Seen};
+use crate::board::{Board, Front, HOST_PS, Seen};
 use nirspi::virtual_camera::{SimulatedFpga, VirtualOptics};
 use nirspi_mcu::{BusError, FpgaBus};
 use nirspi_optics::{Chain, LedArray};
@@ -58,7 +58,7 @@ impl RtlFpga {
         let (asks, asked) = channel();
         let (answer, answers) = channel();
         std::thread::spawn(move || {
-            let mut board = Board::new(front);
+            let mut board = Board::new(front, HOST_PS);
             for ask in asked {
                 let mut told = Told::default();
                 match ask {

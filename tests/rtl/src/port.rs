@@ -1,8 +1,9 @@
 //! The pins of the RTL as the firmware's host port.
 
-use crate::board::{Board, Front};
+use crate::board::{Board, Front, HOST_PS};
 use nirspi_mcu::{BusError, HostPort};
-use nirspi_wire::host_port::SEALED_BYTES;
+use nirspi_tests::throughput::{SCK_PS, TimedPort};
+use nirspi_wire::host_port::{READ_FRAME, SCK_DIVIDER, SEALED_BYTES};
 
 /// The host port of a powered board with the bring-up design.
 pub struct RtlPort(Board);
@@ -10,7 +11,12 @@ pub struct RtlPort(Board);
 impl RtlPort {
     /// The board after power-up, with the interlock closed.
     pub fn bring_up() -> Self {
-        Self(Board::new(Front::loopback()))
+        Self(Board::new(Front::loopback(), HOST_PS))
+    }
+
+    /// The same with the `sck` of the reference board, which is as fast as the slowest clock of the FPGA allows.
+    pub fn bring_up_at_the_boards_sck() -> Self {
+        Self(Board::new(Front::loopback(), SCK_PS / u64::from(SCK_DIVIDER)))
     }
 }
 
@@ -30,5 +36,27 @@ impl HostPort for RtlPort {
 
     fn raw_ready(&mut self) -> bool {
         self.0.seen().raw_ready
+    }
+}
+
+impl TimedPort for RtlPort {
+    fn transfer(&mut self, opcode: u8, into: &mut [u8]) {
+        assert_eq!(opcode, READ_FRAME);
+        into.copy_from_slice(&self.0.frame_bytes(into.len()));
+    }
+
+    fn pass(&mut self, ps: u64) {
+        let end = self.now_ps() + ps;
+        while self.now_ps() < end {
+            self.0.advance(1);
+        }
+    }
+
+    fn now_ps(&self) -> u64 {
+        self.0.now_ps()
+    }
+
+    fn pause_ps(&self) -> u64 {
+        self.0.pause_ps()
     }
 }

@@ -9,6 +9,7 @@ mod bring_up;
 mod calibration;
 mod emulated;
 mod tap;
+mod throughput;
 mod wires;
 
 use nirspi::capture::{Calibration, Capture, CaptureOptions, Ended, capture};
