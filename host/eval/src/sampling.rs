@@ -325,10 +325,18 @@ mod tests {
             let row = report.rows.iter().find(row).unwrap();
             assert_eq!(gains[0], (25.0, row.gain_db.unwrap()));
         }
-        // The image of the best method is kept beside zero filling's.
-        assert!(
-            report.shown.iter().all(|shown| shown.best.len() == 1 && shown.best_gain_db() > 0.0)
-        );
+        // The image of the best method is kept beside zero filling's. Rows that only repeat each other, as
+        // the first ones in recorded order do, support no prediction: the images are then the same.
+        for shown in &report.shown {
+            let gain_db = shown.best_gain_db();
+            let gains = if shown.order == RECORDED { gain_db >= 0.0 } else { gain_db > 0.0 };
+            assert!(
+                shown.best.len() == 1 && gains,
+                "{} {}: {gain_db}",
+                shown.order,
+                shown.sampling
+            );
+        }
         let drawn = study.plot(&report);
         assert!(drawn.width() > 800 && drawn.height() > 1000, "{:?}", drawn.dimensions());
     }
