@@ -1,5 +1,6 @@
 """Checks that other programs read what nirspi records and exports: the Python packages mcap,
-mcap-protobuf-support, pyarrow, numpy, zarr, xarray and, where there is one, rerun.
+mcap-protobuf-support, pyarrow, DuckDB, pandas, datasets (Hugging Face), numpy, zarr, xarray and, where there is
+one, rerun.
 
 Usage: check.py path/to/nirspi
 """
@@ -11,7 +12,10 @@ import tempfile
 import warnings
 from pathlib import Path
 
+import datasets
+import duckdb
 import numpy as np
+import pandas as pd
 import pyarrow.parquet as pq
 import xarray as xr
 import zarr
@@ -89,6 +93,16 @@ assert table["truth"].null_count == 12 and table["scene"].null_count == 12
 assert json.loads(table["meta"][0].as_py())["camera"]["board"] == "virtual"
 print("parquet:", ", ".join(f"{field.name} {field.type}" for field in table.schema))
 
+# The same numbers in DuckDB, pandas and Hugging Face's datasets.
+file = folder / "out.parquet"
+said = duckdb.sql(f"SELECT sequence, list_sum(d), n, board, simulated FROM '{file}' ORDER BY sequence").fetchall()
+assert [row[0] for row in said] == list(range(12)) and {row[2:] for row in said} == {(32, "virtual", True)}, said
+assert np.allclose([row[1] for row in said], frames.sum(axis=1), rtol=1e-12)
+assert np.array_equal(np.stack(pd.read_parquet(file)["d"].to_list()), frames)
+split = datasets.load_dataset("parquet", data_files=str(file), split="train", cache_dir=str(folder / "cache"))
+assert np.array_equal(np.array(split["d"]), frames) and split["sequence"][11] == 11
+print(f"parquet: the same {len(said)} frames in DuckDB, pandas and datasets")
+
 # With what is known of the scene.
 np.save(folder / "truth.npy", scaled)
 known = ("--scene", "letter R", "--distance-m", "0.3", "--truth", "truth.npy")
@@ -145,10 +159,26 @@ assert 0 < spread.max() < 0.5 and spread.min() >= 0, (spread.min(), spread.max()
 assert 0 < width.max() < 1 and width.min() >= 0, (width.min(), width.max())
 print(f"spread: median {np.median(spread):.4f}, greatest {spread.max():.3f} of white (simulated)")
 
+
+def image_in_rerun(name):
+    """The pixels of the only image of a file, as Rerun reads and serves them."""
+    import rerun as rr
+
+    converted = (folder / name).with_suffix(".rrd")
+    subprocess.run([rerun, "mcap", "convert", folder / name, "-o", converted], check=True, timeout=120)
+    with rr.server.Server(host="127.0.0.1", datasets={"seen": [converted]}) as server:
+        seen = server.client().get_dataset("seen").filter_contents(["/image"])
+        table = seen.reader(index="message_log_time").to_arrow_table()
+    ((pixels,),) = table["/image:Image:buffer"].to_pylist()
+    ((form,),) = table["/image:Image:format"].to_pylist()
+    return np.frombuffer(bytes(pixels), "<f4").reshape(form["height"], form["width"])
+
+
 rerun = Path(sys.executable).with_name("rerun")
 if rerun.exists():
     for name in ("rec.mcap", "out.mcap"):
         subprocess.run([rerun, "mcap", "check", folder / name], check=True, timeout=120)
-    print("rerun: both files are sound")
+    assert np.array_equal(image_in_rerun("out.mcap"), scaled)
+    print("rerun: both files are sound, and the image is as reconstructed")
 else:
     print("skipped: rerun is not here")
