@@ -92,7 +92,11 @@ impl Options {
         };
         Ok(SourceOptions {
             index: self.index.as_deref().map(|index| word::<Index>("index", index)).transpose()?,
-            detector: self.detector.as_deref().map(|at| word::<Index>("detector", at)).transpose()?,
+            detector: self
+                .detector
+                .as_deref()
+                .map(|at| word::<Index>("detector", at))
+                .transpose()?,
             file,
             part: word::<Part>("part", &self.part)?,
             keep_leak: self.keep_leak,
