@@ -1,7 +1,8 @@
 //! Three lamps on the board, because the light of the LEDs is invisible: what the camera is doing, for
 //! somebody who stands beside it.
 //!
-//! Lamps inform and protect nobody. What keeps the LEDs off is in `safety`, `machine` and the FPGA.
+//! The lamps only inform: the camera works in the same way on a board without them. `safety`, `machine` and the FPGA
+//! keep the LEDs off.
 
 use crate::Micros;
 use nirspi_wire::Fault;
@@ -11,7 +12,7 @@ const BEAT_US: u64 = 250_000;
 /// Beats without a flash after the flashes of a fault, so that a person can count them.
 const PAUSE_BEATS: u64 = 5;
 
-/// Which lamps are lit at one moment. The default is none, as before the first turn of the loop.
+/// Which lamps are lit at one moment. By default every lamp is off, as before the first turn of the loop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Lamps {
     /// Blinks twice a second while the camera waits for a host, and stays on while a session is open. A lamp
