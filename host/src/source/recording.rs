@@ -12,6 +12,9 @@ use crate::recording::{End, Recording};
 use crate::tally::{self, Tally, tally_recording};
 use std::path::Path;
 
+/// A flat field also corrects what the place of its detector does to the light of each LED.
+const FLAT_FIELD_OF_FIRST: &str = "the flat field was measured at detector 0: it corrects unequal LEDs, and not what this detector's place does to the light";
+
 /// Sums the frames of a recording, and makes their account again.
 pub(super) fn from_recording(path: &Path, options: &SourceOptions) -> Result<Source, SourceError> {
     let mut recording = Recording::open(path)?;
@@ -124,7 +127,13 @@ fn of_frames(
         return Ok(source);
     }
     Ok(match KeptFlatField::of(&recording.identity) {
-        Ok(Some(kept)) => source.with_flat_field(kept),
+        Ok(Some(kept)) => {
+            let mut source = source.with_flat_field(kept);
+            if detector > 0 {
+                source.notes.push(FLAT_FIELD_OF_FIRST.to_owned());
+            }
+            source
+        }
         Ok(None) => source,
         Err(problem) => {
             let mut source = source;
