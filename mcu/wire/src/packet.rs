@@ -10,7 +10,7 @@
 //! byte (`a_stream_with_a_gap_is_in_step_after_the_next_delimiter` in `tests/packets.rs`). Damaged
 //! bytes never become a message (`a_damaged_byte_never_becomes_another_message`).
 
-use crate::stuffing::Stuffer;
+use crate::stuffing::{Stuffer, unstuff};
 use crate::{Crc32, crc32};
 use postcard::ser_flavors::Flavor;
 use serde::{Deserialize, Serialize};
@@ -135,7 +135,7 @@ pub fn open<'p, T: Deserialize<'p>>(packet: &'p mut [u8]) -> Result<T, PacketErr
 /// # Errors
 /// [`PacketError::Cobs`], [`Crc`](PacketError::Crc).
 pub fn unseal(packet: &mut [u8]) -> Result<&[u8], PacketError> {
-    let length = cobs::decode_in_place(packet).map_err(|_| PacketError::Cobs)?;
+    let length = unstuff(packet).ok_or(PacketError::Cobs)?;
     let framed = packet.get(..length).ok_or(PacketError::Cobs)?;
     let (payload, crc) = framed.split_last_chunk::<4>().ok_or(PacketError::Crc)?;
     if crc32(payload) == u32::from_le_bytes(*crc) { Ok(payload) } else { Err(PacketError::Crc) }
