@@ -58,8 +58,9 @@ def test_deblur(cli, tmp_path, model, random):
 def test_enhance(cli, tmp_path, random):
     x = random.random((2, 32, 32), np.float32)
     np.save(tmp_path / "x.npy", x)
-    run(cli, "enhance", tmp_path / "x.npy", "--backend", "cpu", "--seed", "3", "--out", tmp_path / "y.npy")
-    assert same(ns.enhance(x, seed=3), np.load(tmp_path / "y.npy"))
+    options = ["--backend", "cpu", "--steps", "2", "--seed", "3"]
+    run(cli, "enhance", tmp_path / "x.npy", *options, "--out", tmp_path / "y.npy")
+    assert same(ns.enhance(x, steps=2, seed=3), np.load(tmp_path / "y.npy"))
 
 
 def test_metrics(cli, tmp_path, random):
