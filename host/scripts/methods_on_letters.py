@@ -36,7 +36,9 @@ def demo(program, folder, scene, method, share, frames, distance_m):
 
 
 def main():
-    arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    arguments = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     arguments.add_argument("program", help="the program nirspi")
     program = arguments.parse_args().program
     print("PSNR in dB of the image / of the deblurred image, mean of", ", ".join(SCENES))
@@ -46,9 +48,13 @@ def main():
         for distance_m, frames, share in itertools.product(DISTANCES_M, FRAMES, SHARES):
             cells = []
             for method in METHODS:
-                reports = [demo(program, folder, scene, method, share, frames, distance_m) for scene in SCENES]
+                reports = [
+                    demo(program, folder, scene, method, share, frames, distance_m) for scene in SCENES
+                ]
                 image = statistics.mean(report["reconstruction"]["psnr_db"] for report in reports)
-                deblurred = statistics.mean(report["enhancement"]["deblurred"]["psnr_db"] for report in reports)
+                deblurred = statistics.mean(
+                    report["enhancement"]["deblurred"]["psnr_db"] for report in reports
+                )
                 cells.append(f"{image:.2f} / {deblurred:.2f}")
             print(f"| {distance_m} m | {frames} | {share} |", " | ".join(cells), "|", flush=True)
 
