@@ -19,8 +19,8 @@ use thiserror::Error;
 
 mod recording;
 
+pub(crate) use recording::of_sum;
 use recording::{detectors_of_recording, frames_of_recording, from_recording};
-pub(crate) use recording::{no_frame, of_sum};
 
 /// How to read measurements.
 #[derive(Debug, Clone, Default)]

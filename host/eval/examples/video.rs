@@ -1,7 +1,7 @@
 //! The recursive estimate of moving scenes beside frame-by-frame methods at equal light: the table
 //! and the pictures of `docs/reconstruction.md`.
 //!
-//! `cargo run --release -p nirspi-eval --example video -- OUT [FRAMES]`
+//! `cargo run --release -p nirspi-eval --example video -- OUT [FRAMES [NOISE]]`
 //!
 //! OUT gets `video.json` (every way on every scene), `video_curves.png` (PSNR against the speed of
 //! a letter), `video.png` (one frame of some scenes), and `image.apng` with its contact sheet
@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 
 type Result<T> = std::result::Result<T, Box<dyn Error>>;
 
-/// Noise of a pixel in the image of all patterns in a frame's time; white is 1.
+/// Noise of a pixel in the image of all patterns in a frame's time, unless NOISE says another; white is 1.
 const NOISE: f64 = 0.1;
 const FRAMES: usize = 16;
 const SEED: u64 = 1;
@@ -28,11 +28,12 @@ fn main() -> Result<()> {
     let mut arguments = std::env::args_os().skip(1);
     let out = arguments.next().map(PathBuf::from).ok_or("OUT is missing, expected a folder")?;
     let frames = arguments.next().map_or(Ok(FRAMES), |count| count.to_string_lossy().parse())?;
+    let noise = arguments.next().map_or(Ok(NOISE), |noise| noise.to_string_lossy().parse())?;
     std::fs::create_dir_all(&out)?;
     let mut all = Vec::new();
     let mut pictures = Vec::new();
     for motion in Motion::ALL {
-        let made = compare(motion, NOISE, frames, SEED)?;
+        let made = compare(motion, noise, frames, SEED)?;
         print(&made.rows);
         if SHOWN.contains(&motion) {
             pictures.push(picture(&made, frames * 3 / 4).render());
@@ -44,7 +45,7 @@ fn main() -> Result<()> {
     }
     std::fs::write(out.join("video.json"), serde_json::to_string_pretty(&all)?)?;
     std::fs::write(out.join("video.png"), encode_rgb(&below(&pictures)))?;
-    std::fs::write(out.join("video_curves.png"), encode_rgb(&chart(&all).render()))?;
+    std::fs::write(out.join("video_curves.png"), encode_rgb(&chart(&all, noise).render()))?;
     Ok(())
 }
 
@@ -124,7 +125,7 @@ fn animate(out: &Path, made: &Compared) -> Result<()> {
 }
 
 /// PSNR of the best way of each kind, and of the patterns in turn, against the speed of a letter.
-fn chart(all: &[VideoRow]) -> Chart {
+fn chart(all: &[VideoRow], noise: f64) -> Chart {
     let speeds = [0.0, 0.1, 0.25, 0.5, 1.0, 2.0];
     let of = |speed: f64, chosen: &dyn Fn(&VideoRow) -> bool| {
         let motion = Motion::Letter(speed).to_string();
@@ -151,7 +152,7 @@ fn chart(all: &[VideoRow]) -> Chart {
     ];
     let values = lines.iter().flat_map(|line| line.points.iter().map(|point| point.1));
     Chart {
-        header: format!("Moving letter, noise {NOISE}, equal light (simulated)"),
+        header: format!("Moving letter, noise {noise}, equal light (simulated)"),
         x: Axis::around("speed in pixels a frame", speeds),
         y: Axis::around("PSNR in dB", values.collect::<Vec<f64>>()),
         lines,

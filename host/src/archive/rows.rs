@@ -9,7 +9,6 @@ use crate::export::{ExportError, Whole};
 use crate::imaging::FramesError;
 use crate::imaging::MethodReport;
 use crate::reconstruct::{Solved, Solver, SolverError};
-use crate::recording::Recording;
 use crate::source::{Index, Source, SourceError, SourceOptions};
 #[cfg(feature = "enhance")]
 use nirspi_nets::Device;
@@ -171,28 +170,15 @@ impl RowReader {
     }
 
     fn of_recording(&self, path: &Path) -> Result<Vec<(Row, Source)>, ExportError> {
-        if self.source.detector == Some(Index::All) && self.source.index != Some(Index::All) {
-            let detectors = usize::from(Recording::open(path)?.identity.detectors.max(1));
-            let each = (0..detectors).map(|detector| {
-                let detector = Some(Index::One(detector));
-                self.of_detector(path, &SourceOptions { detector, ..self.source.clone() })
-            });
-            return Ok(each.collect::<Result<Vec<_>, _>>()?.concat());
-        }
-        self.of_detector(path, &self.source)
-    }
-
-    fn of_detector(
-        &self,
-        path: &Path,
-        source: &SourceOptions,
-    ) -> Result<Vec<(Row, Source)>, ExportError> {
-        let whole = Whole::read(path, source)?;
-        let fixed = whole.row();
         if self.source.index != Some(Index::All) {
-            let Row { rows, d, .. } = row_of(&whole.source.measurements);
-            return Ok(vec![(Row { rows, d, ..fixed }, whole.source)]);
+            let sum = |whole: Whole| {
+                let Row { rows, d, .. } = row_of(&whole.source.measurements);
+                (Row { rows, d, ..whole.row() }, whole.source)
+            };
+            return Ok(Whole::read_each(path, &self.source)?.into_iter().map(sum).collect());
         }
+        let whole = Whole::read(path, &self.source)?;
+        let fixed = whole.row();
         let mut frames = Vec::new();
         whole.each(|frame| {
             let source = whole.source.clone();

@@ -31,6 +31,7 @@ use nirspi_recon::reconstruct::ReconstructError;
 use nirspi_recon::words::count;
 use nirspi_wire::{Depth, DeviceMessage, Frame};
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -321,30 +322,50 @@ pub(crate) struct OneFrame<'w> {
 }
 
 impl Whole {
+    /// Reads a recording at the detector that `options` choose.
     pub(crate) fn read(path: &Path, options: &SourceOptions) -> Result<Self, ExportError> {
         let mut recording = Recording::open(path)?;
         let detector = options.detector_of(path, &recording.identity)?;
-        let (mut sequence, mut device_time_us, mut time_ns) = (Vec::new(), Vec::new(), Vec::new());
-        let tally = hear_recording(&mut recording, |heard, tally| {
-            if let Some(frame) = heard.frame_of(detector) {
-                sequence.push(number_of(tally, detector));
-                device_time_us.push(frame.device_time_us as i64);
-                time_ns.push(heard.time_ns as i64);
-            }
-            Ok::<(), RecordingError>(())
-        })?;
-        if sequence.is_empty() {
-            return Err(source::no_frame(path, detector, &tally).into());
+        let (tally, mut numbers) = numbers_of(&mut recording)?;
+        let numbers = numbers.remove(&detector).unwrap_or_default();
+        Self::at(detector, numbers, path, options, &recording, &tally)
+    }
+
+    /// Reads a recording at the detector that `options` choose, or at each one. The file is read
+    /// once, whatever the number of detectors.
+    pub(crate) fn read_each(
+        path: &Path,
+        options: &SourceOptions,
+    ) -> Result<Vec<Self>, ExportError> {
+        if options.detector != Some(Index::All) {
+            return Ok(vec![Self::read(path, options)?]);
         }
-        let source = source::of_sum(path, options, &recording, detector, &tally)?;
-        let Recording { identity, setup, .. } = recording;
+        let mut recording = Recording::open(path)?;
+        let (tally, mut numbers) = numbers_of(&mut recording)?;
+        let at = |detector| {
+            let numbers = numbers.remove(&detector).unwrap_or_default();
+            Self::at(detector, numbers, path, options, &recording, &tally)
+        };
+        (0..recording.identity.detectors.max(1)).map(at).collect()
+    }
+
+    /// A recording of which every packet was heard, at one detector.
+    fn at(
+        detector: u8,
+        numbers: Numbers,
+        path: &Path,
+        options: &SourceOptions,
+        recording: &Recording,
+        tally: &Tally,
+    ) -> Result<Self, ExportError> {
+        let Numbers { sequence, device_time_us, time_ns } = numbers;
         Ok(Self {
             path: path.to_owned(),
             keep_leak: options.keep_leak,
             detector,
-            identity,
-            setup,
-            source,
+            identity: recording.identity.clone(),
+            setup: recording.setup.clone(),
+            source: source::of_sum(path, options, recording, detector, tally)?,
             sequence,
             device_time_us,
             time_ns,
@@ -396,6 +417,29 @@ impl Whole {
     fn integrate(&self, problem: IntegrateError) -> ExportError {
         SourceError::Integrate { path: self.path.clone(), problem }.into()
     }
+}
+
+/// The numbers and times of the frames of one detector.
+#[derive(Default)]
+struct Numbers {
+    sequence: Vec<i64>,
+    device_time_us: Vec<i64>,
+    time_ns: Vec<i64>,
+}
+
+/// The account of a recording, and the numbers and times of the frames of each detector.
+fn numbers_of(recording: &mut Recording) -> Result<(Tally, BTreeMap<u8, Numbers>), RecordingError> {
+    let mut numbers: BTreeMap<u8, Numbers> = BTreeMap::new();
+    let tally = hear_recording(recording, |heard, tally| {
+        if let Some((detector, frame)) = heard.any_frame() {
+            let numbers = numbers.entry(detector).or_default();
+            numbers.sequence.push(number_of(tally, detector));
+            numbers.device_time_us.push(frame.device_time_us as i64);
+            numbers.time_ns.push(heard.time_ns as i64);
+        }
+        Ok::<(), RecordingError>(())
+    })?;
+    Ok((tally, numbers))
 }
 
 /// The number of the newest frame of this detector that arrived in order.

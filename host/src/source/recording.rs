@@ -52,7 +52,7 @@ pub(crate) fn of_sum(
 }
 
 /// Why a recording has no valid frame.
-pub(crate) fn no_frame(path: &Path, detector: u8, tally: &Tally) -> SourceError {
+fn no_frame(path: &Path, detector: u8, tally: &Tally) -> SourceError {
     let path = path.to_owned();
     match tally.misfit() {
         Some(misfit) => SourceError::Misfit { path, misfit },
