@@ -8,6 +8,10 @@
 //! dims without going out is no drop-out. A lost reading that would have been dark anyway is not
 //! found and does no harm.
 //!
+//! The dark level is the reading of the complement of the all-ones pattern. In a recording without
+//! that pattern the lowest reading counts as dark, so the readings of a lamp that dims by far may
+//! be taken for a drop-out.
+//!
 //! Next to a lost pair, a pair that is down by less is lost too: the run started or ended inside
 //! the integration time of a reading.
 

@@ -342,7 +342,9 @@ fn total_variation(side: Side) -> Vec<u32> {
     let n = side.pixels() as f64;
     sorted(side, |p| {
         let (i, j) = (f64::from(p.down), f64::from(p.across));
-        Ascending(2.0 * n * (i + j) - (4.0 - 2.0 * std::f64::consts::SQRT_2) * i * j)
+        let variation = 2.0 * n * (i + j) - (4.0 - 2.0 * std::f64::consts::SQRT_2) * i * j;
+        // The bits of numbers that are not negative ascend as the numbers do.
+        variation.to_bits()
     })
 }
 
@@ -366,25 +368,6 @@ fn shuffled(count: u32, seed: u64) -> Vec<u32> {
         rows.swap(last, below(last as u64 + 1));
     }
     rows
-}
-
-/// A finite number as a sort key.
-struct Ascending(f64);
-impl PartialEq for Ascending {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-impl Eq for Ascending {}
-impl PartialOrd for Ascending {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-impl Ord for Ascending {
-    fn cmp(&self, other: &Self) -> Ordering {
-        self.0.total_cmp(&other.0)
-    }
 }
 
 mod others;

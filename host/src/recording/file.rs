@@ -224,6 +224,7 @@ mod tests {
         fs::write(&path, b"precious").unwrap();
         let error = Place::make(&Target::New(path.clone())).unwrap_err();
         assert_eq!(error.kind(), io::ErrorKind::AlreadyExists);
+        assert_eq!(error.to_string(), "the file is there already, choose another name");
         assert_eq!(fs::read(&path).unwrap(), b"precious");
     }
 
@@ -274,7 +275,11 @@ mod tests {
     #[test]
     fn a_folder_is_no_file_and_a_missing_folder_is_told_as_missing() {
         let folder = tempfile::tempdir().unwrap();
-        let kind = |target| Place::make(&target).unwrap_err().kind();
+        let kind = |target| {
+            let error = Place::make(&target).unwrap_err();
+            assert!(!error.to_string().contains("choose another name"), "{error}");
+            error.kind()
+        };
         assert_eq!(kind(Target::Replace(folder.path().to_owned())), io::ErrorKind::IsADirectory);
         let gone = folder.path().join("gone");
         assert_eq!(kind(Target::New(gone.join("rec.mcap"))), io::ErrorKind::NotFound);
@@ -285,7 +290,11 @@ mod tests {
     #[cfg(unix)]
     #[test]
     fn a_device_is_written_to_and_stays() {
-        let device = PathBuf::from("/dev/null");
+        // A link to the device stands in for the device, because a program that removes the device
+        // itself, run as root, breaks the whole machine.
+        let folder = tempfile::tempdir().unwrap();
+        let device = folder.path().join("null");
+        std::os::unix::fs::symlink("/dev/null", &device).unwrap();
         for target in [Target::New(device.clone()), Target::Replace(device.clone())] {
             let (mut place, mut file) = Place::make(&target).unwrap();
             file.write_all(b"frames").unwrap();

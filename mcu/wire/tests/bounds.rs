@@ -1,8 +1,10 @@
 //! How long packets are: buffers and transfers are laid out by these numbers.
 
 use nirspi_wire::packet::{hello_of_any_version, overhead, parse, seal, unseal};
-use nirspi_wire::ready::{HEADER_BYTES, LEAD_BYTES, read_bytes};
-use nirspi_wire::{Answer, DeviceMessage, PATTERNS, Reply, encode};
+use nirspi_wire::ready::{HEADER_BYTES, LEAD_BYTES, packet_in, read_bytes};
+use nirspi_wire::samples::{MAX_SHIFT, Words};
+use nirspi_wire::version::{self, speaks};
+use nirspi_wire::{Answer, DeviceMessage, PATTERNS, Reply, Samples, encode};
 
 /// A payload without zeros is the longest for COBS. Its checksum may have zeros, so the longest packet
 /// has the bound, or is a byte short of it.
@@ -29,6 +31,42 @@ fn a_read_of_a_packet_ends_with_its_last_byte_if_the_packet_begins_as_late_as_it
             "{patterns}: {packet} of {most}"
         );
     }
+}
+
+/// Two packets that run together, or a packet that is cut, are not taken for one.
+#[test]
+fn what_is_longer_or_shorter_than_any_packet_of_a_frame_is_none() {
+    let patterns = 256;
+    let payload = HEADER_BYTES + 4 * usize::from(patterns);
+    let (least, most) = (payload + 6, payload + overhead(payload));
+    for length in least - 1..=most + 1 {
+        let read = [vec![0; 3], vec![0xA5; length - 1], vec![0; 5]].concat();
+        let expected = (least..=most).contains(&length).then_some(3..3 + length);
+        assert_eq!(packet_in(&read, patterns), expected, "{length}");
+    }
+}
+
+#[test]
+fn samples_are_whole_words_of_a_shift_that_exists() {
+    assert_eq!(Samples::packed(MAX_SHIFT, &[0; 8]).unwrap().len(), 2);
+    assert!(Samples::packed(MAX_SHIFT + 1, &[0; 8]).is_err());
+    assert!(Samples::packed(0, &[0; 7]).is_err());
+}
+
+#[test]
+fn words_are_counted_in_pairs_of_bytes() {
+    for count in [0, 1, 3] {
+        let words = [7; 6];
+        let words = Words::from_le_bytes(&words[..2 * count]).unwrap();
+        assert_eq!((words.len(), words.is_empty()), (count, count == 0));
+    }
+    assert!(Words::from_le_bytes(&[7; 3]).is_err());
+}
+
+#[test]
+fn every_version_from_the_oldest_to_the_newest_is_spoken_and_no_other() {
+    let spoken: Vec<u16> = (0..=u16::MAX).filter(|&version| speaks(version)).collect();
+    assert_eq!(spoken, (version::MIN..=version::CURRENT).collect::<Vec<u16>>());
 }
 
 /// The answer to a greeting begins alike in every version, so a host can say which version a camera of the

@@ -275,6 +275,18 @@ mod tests {
     }
 
     #[test]
+    fn a_photon_of_a_longer_wave_has_less_energy_in_proportion() {
+        let report = budget(&settings()).unwrap();
+        let per_photon: Vec<f64> = report
+            .daylight
+            .iter()
+            .map(|daylight| daylight.on_detector_nw / daylight.photons_per_sample)
+            .collect();
+        let share = per_photon[0] / per_photon[1];
+        assert!((share / (1550.0 / 550.0) - 1.0).abs() < 1e-9, "{share}");
+    }
+
+    #[test]
     fn settings_out_of_range_are_named() {
         let told = |settings: Settings| {
             let error = budget(&settings).unwrap_err();

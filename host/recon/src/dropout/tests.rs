@@ -131,6 +131,61 @@ fn a_detector_of_negative_polarity_is_the_same_upside_down() {
     assert_eq!((dropouts[0].start, dropouts[0].length), (60, 10));
 }
 
+/// Start and length of each drop-out.
+fn runs(rows: &Rows, y: &[f64]) -> Vec<(usize, usize)> {
+    let (_, dropouts) = Measurements::from_pairs(rows, y).unwrap();
+    dropouts.iter().map(|found| (found.start, found.length)).collect()
+}
+
+#[test]
+fn a_run_is_found_in_any_unit_and_under_any_ambient_light() {
+    for dark in [0.0, 30.0] {
+        let (all, whole) = recorded(32, 0, dark, Noise::Normal { sigma: 1e-4, seed: 2 });
+        let mut y = whole.clone();
+        y[600..800].fill(dark);
+        let mut dimmed = whole;
+        dimmed[600..620].iter_mut().for_each(|y| *y = dark + 0.7 * (*y - dark));
+        // The second recording lacks the all-ones pattern, whose complement shows the dark level.
+        for (unit, first) in [(1e-4, 0), (1.0, 0), (1e5, 0), (1e-4, 1), (1e5, 1)] {
+            let rows = Rows::new(side(32), all[first..].iter().copied()).unwrap();
+            let counted =
+                |y: &[f64]| -> Vec<f64> { y[2 * first..].iter().map(|y| y * unit).collect() };
+            let case = format!("dark {dark}, unit {unit}, from pair {first}");
+            assert_eq!(runs(&rows, &counted(&y)), [(600 - 2 * first, 200)], "{case}");
+            assert!(first == 1 || runs(&rows, &counted(&dimmed)).is_empty(), "{case}");
+        }
+    }
+}
+
+#[test]
+fn a_run_may_begin_with_the_first_reading_and_end_with_the_last() {
+    let (rows, whole) = recorded(16, 0, 0.0, Noise::Normal { sigma: 1e-3, seed: 5 });
+    let mut y = whole.clone();
+    y[..20].fill(0.0);
+    y[500..].fill(0.0);
+    assert_eq!(runs(&rows, &y), [(0, 20), (500, 12)]);
+}
+
+#[test]
+fn a_lamp_that_changes_makes_no_run_longer() {
+    let sinks_at_the_end = |k: f64| 1.0 - 0.3 * (k - 1648.0).max(0.0) / 400.0;
+    let grows_and_sinks = |k: f64| 0.4 + 0.6 * (std::f64::consts::PI * k / 2048.0).sin();
+    for lamp in [sinks_at_the_end, grows_and_sinks] {
+        let (rows, mut y) = recorded(32, 0, 0.0, Noise::Normal { sigma: 1e-5, seed: 3 });
+        y.iter_mut().enumerate().for_each(|(k, reading)| *reading *= lamp(k as f64));
+        y[1900..1910].fill(0.0);
+        assert_eq!(runs(&rows, &y), [(1900, 10)]);
+    }
+}
+
+#[test]
+fn a_run_is_found_under_noise_and_at_a_level_below_zero() {
+    let (rows, mut y) = recorded(32, 0, 0.0, Noise::Normal { sigma: 0.05, seed: 4 });
+    y[700..720].fill(-0.1);
+    let found = runs(&rows, &y);
+    assert!(matches!(found[..], [(699..=701, 19..=22)]), "{found:?}");
+}
+
 #[test]
 fn runs_cut_into_the_real_recording_are_found() {
     let Some(mut file) = real_data("opar_ala1.npz") else { return };

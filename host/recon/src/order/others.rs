@@ -43,17 +43,18 @@ pub(super) fn deepinv_xy(side: Side) -> Vec<u32> {
 }
 
 /// Four times what deepinv's `xy` sorts by.
-pub(super) fn xy(p: &Pattern) -> u64 {
+fn xy(p: &Pattern) -> u64 {
     let (x, y) = (u64::from(p.down), u64::from(p.across));
     4 * x * y + x * x + y * y
 }
 
-/// What an order sorts by, where it leaves ties to an unstable sort.
+/// What an order sorts by, where it leaves ties to an unstable sort. The formulas are not those of
+/// the orders, which they check.
 #[cfg(test)]
 pub(super) fn ties(name: &str) -> Option<fn(&Pattern) -> u64> {
     match name {
-        "deepinv:cake_cutting" => Some(|p| p.blocks().into()),
-        "deepinv:xy" => Some(xy),
+        "deepinv:cake_cutting" => Some(|p| ((p.down + 1) * (p.across + 1)).into()),
+        "deepinv:xy" => Some(|p| ((p.down + p.across).pow(2) + 2 * p.down * p.across).into()),
         _ => None,
     }
 }
