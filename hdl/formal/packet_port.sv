@@ -77,7 +77,8 @@ module packet_port (
         invariant_range: assert (left <= 5);
         invariant_calm:  assert (!calm || dut.reads || dut.written_once == 0);
         invariant_idle:  assert (dut.reads ? dut.clocks >= 8 && (left == 0 || left == 5) : dut.taken == 0);
-        invariant_fresh: assert (!dut.reads || dut.takes || dut.written == 0);
+        invariant_fresh: assert (!dut.reads || dut.takes || dut.written == 0 && dut.taken == 0 && dut.written_once == 0
+            && dut.written_here == 0 && taken_1 == 0 && taken_2 == 0);
         invariant_there: assert (!dut.takes || !dut.reads || dut.reads_there);
         invariant_order: assert (!dut.reads || ahead_1 <= ahead_taken && ahead_taken <= ahead_here
             && ahead_here <= ahead_once && ahead_once <= ahead_written && ahead_written <= 16);

@@ -180,9 +180,9 @@ FAULTS = (
     ),
     Fault(
         PACKET_PORT,
-        "the pin resets nothing",
+        "the lines are driven while the port is not selected",
         "silent_else",
-        (("packet_port", "drives       <= 0;", "drives       <= drives;"),),
+        (("packet_port", "drives       <= 0;", "drives       <= 1;"),),
     ),
     Fault(
         CROSSING,

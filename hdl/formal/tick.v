@@ -26,20 +26,3 @@ module tick_reset (CLK, ALOAD, AD, D, Q);
     assign Q = ALOAD ? AD : held;
     \$ff #(.WIDTH(WIDTH)) state (.D(ALOAD ? AD : CLK ? D : held), .Q(held));
 endmodule
-
-(* techmap_celltype = "$adff" *)
-module tick_clear (CLK, ARST, D, Q);
-    parameter WIDTH = 1;
-    parameter CLK_POLARITY = 1;
-    parameter ARST_POLARITY = 1;
-    parameter [WIDTH-1:0] ARST_VALUE = 0;
-    input CLK, ARST;
-    input [WIDTH-1:0] D;
-    output [WIDTH-1:0] Q;
-    parameter [WIDTH-1:0] _TECHMAP_WIREINIT_Q_ = {WIDTH{1'bx}};
-    wire [WIDTH-1:0] _TECHMAP_REMOVEINIT_Q_ = {WIDTH{1'b1}};
-    (* init = _TECHMAP_WIREINIT_Q_ *)
-    wire [WIDTH-1:0] held;
-    assign Q = ARST ? ARST_VALUE : held;
-    \$ff #(.WIDTH(WIDTH)) state (.D(ARST ? ARST_VALUE : CLK ? D : held), .Q(held));
-endmodule
