@@ -59,6 +59,8 @@ ECP5_EVN = Board(
         Clock("clk_adc", 125.0, margin=0.08),
         # The FPGA's own oscillator: 310 MHz / 3, of which 15 % more is allowed for.
         Clock("clk_host", 310.0 / 3, margin=0.15),
+        # Reads of packets: `PACKET_SCK_MAX_HZ` of `mcu/wire`.
+        Clock("spi_sck", 60.0, margin=0.15),
     ),
 )
 BOARDS = {

@@ -19,6 +19,7 @@ module crossing (
         .rst_adc   (1'b0),
         .back      (),
         .value_out (),
+        .idle      (),
         .epoch_host(),
         .epoch_adc (),
         .value     ('0),

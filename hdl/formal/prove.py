@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Proves the safety rules, the FIFO, the crossing, its resets, the clock guard and the LED enable at the pin, and that the proofs notice faults.
+"""Proves the safety rules, the FIFO, the port clocked by `sck`, the crossing, its resets, the clock guard and the LED enable at the pin, and that the proofs notice faults.
 
     python3 hdl/formal/prove.py
 
@@ -79,6 +79,7 @@ class Proof:
 
 SAFETY = Proof("safety", ENGINE, depth=50)
 FIFO = Proof("byte_fifo", TWO_CLOCKS, depth=45)
+PACKET_PORT = Proof("packet_port", TWO_CLOCKS, depth=45)
 CROSSING = Proof("crossing", TWO_CLOCKS, depth=30)
 GUARD = Proof("clock_guard_proof", ANY_STATE, depth=40, sources=("boards/ecp5-evn/clock_guard.sv",))
 RECOVERY = Proof(
@@ -90,7 +91,7 @@ SHELL = Proof(
     depth=40,
     sources=tuple(f"boards/ecp5-evn/{name}.sv" for name in ("shell", "clock_guard", "resets", "reset_synchroniser")),
 )
-PROOFS = (SAFETY, FIFO, CROSSING, RECOVERY, GUARD, SHELL)
+PROOFS = (SAFETY, FIFO, PACKET_PORT, CROSSING, RECOVERY, GUARD, SHELL)
 
 
 @dataclass(frozen=True)
@@ -160,6 +161,30 @@ FAULTS = (
         "it takes the newest word first",
         "order_kept",
         (("byte_fifo", "pop_data = words[taken[3:0]]", "pop_data = words[written_there[3:0]]"),),
+    ),
+    Fault(
+        PACKET_PORT,
+        "full is seen a byte late",
+        "never_over_full",
+        (("packet_port", "written_gray == (taken_there", "next_written == (taken_there"),),
+    ),
+    Fault(
+        PACKET_PORT,
+        "it gives the newest byte first",
+        "order_kept",
+        (("packet_port", "words[taken[3:0]]", "words[written_here[3:0]]"),),
+    ),
+    Fault(
+        PACKET_PORT,
+        "the last read's pointer stays",
+        "nothing_old",
+        (("packet_port", "else if (!reads_there) begin\n            takes        <= 0;\n            written      <= 0;\n            written_gray <= 0;", "else if (!reads_there) begin\n            takes        <= 0;"),),
+    ),
+    Fault(
+        PACKET_PORT,
+        "the lines are driven while the port is not selected",
+        "silent_else",
+        (("packet_port", "drives       <= 0;", "drives       <= 1;"),),
     ),
     Fault(
         CROSSING,

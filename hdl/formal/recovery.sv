@@ -35,6 +35,7 @@ module recovery (
         .rst_host  (rst_bridge),
         .back      (),
         .value_out (),
+        .idle      (),
         .epoch_host(),
         .epoch_adc (),
         .value     ('0),

@@ -1,7 +1,7 @@
 /// The FPGA but for what is special to a board: PLL, pin cells, LVDS receivers.
 ///
 /// Two clocks: `clk_adc`, 125 MHz, for LEDs and samples alike; `clk_host` for the host port, which samples its
-/// pins with it. Resets are synchronous, each to its own clock, high. The host port lives without the ADC's clock:
+/// pins with it. A third, `sck` itself, clocks reads of packets; its reset is the pin `spi_cs_n`. Other resets are synchronous, each to its own clock, high. The host port lives without the ADC's clock:
 /// `rst_host` holds it alone, and `rst_bridge` that half of it which talks to the ADC's domain. The board must hold
 /// `rst_bridge` as long as `rst_adc` and longer (`hdl/formal/recovery.sv`).
 module nirspi_core (
@@ -10,6 +10,8 @@ module nirspi_core (
     input var logic clk_host  ,
     input var logic rst_host  ,
     input var logic rst_bridge,
+    input var logic clk_sck   , /// `spi_sck`
+    input var logic rst_sck   , /// `spi_cs_n`
     // What the board knows of itself and of the ADC's clock.
     input var logic [8-1:0] design_id  , /// `Design` of `mcu/wire`
     input var logic         adc_beat   , /// The ADC's clock, divided
@@ -83,14 +85,32 @@ module nirspi_core (
     logic [9-1:0]  pop_data    ;
     logic [4-1:0]  drive       ;
 
+    logic [4-1:0] slow_lines  ;
+    logic         beginning   ;
+    logic         idle        ;
+    logic         packet      ;
+    logic         reads       ;
+    logic [4-1:0] packet_lines;
+    logic         drives      ;
+
+    nirspi_synchroniser to_packet (
+        .clk  (clk_host),
+        .rst  (rst_host),
+        .from (reads   ),
+        .to   (packet  )
+    );
+
     nirspi_spi_slave port (
         .clk       (clk_host    ),
         .rst       (rst_host    ),
         .sck       (sck         ),
         .selected  (!cs_n       ),
         .lines_in  (lines_in    ),
-        .lines_out (spi_out     ),
+        .lines_out (slow_lines  ),
         .drive     (drive       ),
+        .beginning (beginning   ),
+        .packet    (packet      ),
+        .idle      (idle        ),
         .send      (send        ),
         .operation (operation_in),
         .address   (address_in  ),
@@ -104,7 +124,8 @@ module nirspi_core (
     );
     // The lines are let go with the pin, not some clocks later.
 
-    always_comb spi_drive = drive & {4{~spi_cs_n}};
+    always_comb spi_out   = ((drives) ? ( packet_lines ) : ( slow_lines ));
+    always_comb spi_drive = (drive | {4{drives}}) & {4{~spi_cs_n}};
 
     always_ff @ (posedge clk_host) begin
         if (rst_bridge) begin
@@ -149,6 +170,7 @@ module nirspi_core (
         .data_in      (data_in     ),
         .back         (back        ),
         .value_out    (value_out   ),
+        .idle         (idle        ),
         .epoch_host   (epoch_host  ),
         .request      (request     ),
         .operation    (operation   ),
@@ -163,6 +185,8 @@ module nirspi_core (
     logic         byte_valid;
     logic         full      ;
     logic         tag       ;
+    logic         by_sck    ;
+    logic         full_sck  ;
 
     // A byte belongs to the epoch whose access made it, not to one that is still on its way.
     always_ff @ (posedge clk_adc) begin
@@ -174,38 +198,55 @@ module nirspi_core (
     end
 
     nirspi_byte_fifo bytes (
-        .clk_write (clk_adc     ),
-        .rst_write (rst_adc     ),
-        .push      (byte_valid  ),
-        .push_data ({tag, octet}),
-        .full      (full        ),
-        .clk_read  (clk_host    ),
-        .rst_read  (rst_bridge  ),
-        .pop       (pop         ),
-        .empty     (empty       ),
-        .pop_data  (pop_data    )
+        .clk_write (clk_adc              ),
+        .rst_write (rst_adc              ),
+        .push      (byte_valid && !by_sck),
+        .push_data ({tag, octet}         ),
+        .full      (full                 ),
+        .clk_read  (clk_host             ),
+        .rst_read  (rst_bridge           ),
+        .pop       (pop                  ),
+        .empty     (empty                ),
+        .pop_data  (pop_data             )
+    );
+
+    nirspi_packet_port packets (
+        .clk_adc    (clk_adc           ),
+        .rst_adc    (rst_adc           ),
+        .clk_sck    (clk_sck           ),
+        .rst_sck    (rst_sck           ),
+        .line       (spi_in[0]         ),
+        .lines_out  (packet_lines      ),
+        .drives     (drives            ),
+        .may_begin  (beginning && ready),
+        .reads      (reads             ),
+        .access     (access            ),
+        .octet      (octet             ),
+        .byte_valid (byte_valid        ),
+        .takes      (by_sck            ),
+        .full       (full_sck          )
     );
 
     nirspi_engine machine (
-        .clk         (clk_adc       ),
-        .rst         (rst_adc       ),
-        .code        (adc_code      ),
-        .over_range  (adc_over_range),
-        .interlock   (closed        ),
-        .rows        (led_rows      ),
-        .columns     (led_columns   ),
-        .enable      (led_enable    ),
-        .frame_ready (frame_ready   ),
-        .raw_ready   (raw_ready     ),
-        .access      (access        ),
-        .request     (request       ),
-        .operation   (operation     ),
-        .address     (address       ),
-        .data        (data          ),
-        .answered    (answered      ),
-        .value       (value         ),
-        .octet       (octet         ),
-        .byte_valid  (byte_valid    ),
-        .byte_taken  (!full         )
+        .clk         (clk_adc                               ),
+        .rst         (rst_adc                               ),
+        .code        (adc_code                              ),
+        .over_range  (adc_over_range                        ),
+        .interlock   (closed                                ),
+        .rows        (led_rows                              ),
+        .columns     (led_columns                           ),
+        .enable      (led_enable                            ),
+        .frame_ready (frame_ready                           ),
+        .raw_ready   (raw_ready                             ),
+        .access      (access                                ),
+        .request     (request                               ),
+        .operation   (operation                             ),
+        .address     (address                               ),
+        .data        (data                                  ),
+        .answered    (answered                              ),
+        .value       (value                                 ),
+        .octet       (octet                                 ),
+        .byte_valid  (byte_valid                            ),
+        .byte_taken  (((by_sck) ? ( !full_sck ) : ( !full )))
     );
 endmodule

@@ -16,6 +16,7 @@ module nirspi_crossing (
     input  var logic [32-1:0] data_in     ,
     output var logic          back        , /// The answer is there
     output var logic [32-1:0] value_out   ,
+    output var logic          idle        , /// The next access is taken
     output var logic          epoch_host  , /// Changes with every frame or burst that is asked for
     // Engine.
     output var logic          request  ,
@@ -32,7 +33,6 @@ module nirspi_crossing (
     logic [32-1:0] held_data;
     logic          seen     ;
     logic          seen_last;
-    logic          idle     ;
 
     always_comb idle = asked == seen_last;
 

@@ -14,6 +14,10 @@ module nirspi_spi_slave
     input  var logic [4-1:0] lines_in ,
     output var logic [4-1:0] lines_out,
     output var logic [4-1:0] drive    ,
+    // The port that is clocked by `sck`.
+    output var logic beginning, /// The access is younger than the opcode of the slowest host that may use that port
+    input  var logic packet   , /// That port reads: its opcode has come
+    input  var logic idle     , /// An access would be taken
     // Accesses.
     output var logic          send     ,
     output var logic [2-1:0]  operation,
@@ -39,6 +43,10 @@ module nirspi_spi_slave
         Phase_Over
     } Phase;
 
+    /// The opcode of a faster read has come by then (227 ns or more). Eight edges of this port's fastest `sck` take 45
+    /// clocks, and 30 with a glitch in every second period.
+    localparam logic [5-1:0] YOUNG = 5'd25;
+
     Phase          phase   ;
     logic [6-1:0]  left    ; // cycles of the phase after this one
     logic          quad    ;
@@ -46,6 +54,8 @@ module nirspi_spi_slave
     logic [32-1:0] next    ;
     logic          sck_last;
     logic          rises   ;
+    logic          asked   ; // for the frame that `packet` reads
+    logic [5-1:0]  age     ; // clocks since the port was selected, up to `YOUNG`
     logic          known   ;
     logic [32-1:0] out     ;
     logic [5-1:0]  out_left; // cycles until the next byte of a frame
@@ -61,9 +71,10 @@ module nirspi_spi_slave
     logic [4-1:0]  bits    ; // those bits, the first on the left; one line has one
     logic          takes   ;
 
-    always_comb rises = sck && !sck_last;
-    always_comb next  = ((quad) ? ( {shifted[27:0], lines_in} ) : ( {shifted[30:0], lines_in[0]} ));
-    always_comb known = next[6:2] == HOST_WRITE[6:2];
+    always_comb rises     = sck && !sck_last;
+    always_comb beginning = phase == Phase_Opcode && age != YOUNG;
+    always_comb next      = ((quad) ? ( {shifted[27:0], lines_in} ) : ( {shifted[30:0], lines_in[0]} ));
+    always_comb known     = next[6:2] == HOST_WRITE[6:2];
 
     // A byte of an earlier transfer is thrown away at once; a missing one reads 0.
     always_comb stale    = !empty && fifo_data[8] != epoch;
@@ -98,6 +109,8 @@ module nirspi_spi_slave
     always_ff @ (posedge clk) begin
         if (rst) begin
             sck_last  <= 0;
+            asked     <= 0;
+            age       <= 0;
             phase     <= Phase_Opcode;
             left      <= 7;
             quad      <= 0;
@@ -113,8 +126,15 @@ module nirspi_spi_slave
             check     <= 0;
         end else begin
             sck_last <= sck;
+            asked    <= packet && (asked || idle);
+            age      <= ((!selected) ? ( 0 ) : (age == YOUNG) ? ( age ) : ( age + 1 ));
             send     <= 0;
-            if (!selected) begin
+            if (packet) begin
+                // Before this port has seen twelve edges of `sck`, so nothing has been sent or driven.
+                phase     <= Phase_Over;
+                operation <= HOST_FRAME[1:0];
+                send      <= idle && !asked;
+            end else if (!selected) begin
                 phase   <= Phase_Opcode;
                 left    <= 7;
                 quad    <= 0;

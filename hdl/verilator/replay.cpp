@@ -14,7 +14,7 @@
 namespace {
 
 constexpr int INPUTS = 1 << 3, OUTPUTS = 1 << 4;
-enum Edge { ADC, HOST, ADC_RESET, HOST_RESET, BRIDGE_RESET };
+enum Edge { ADC, HOST, ADC_RESET, HOST_RESET, BRIDGE_RESET, SCK, DESELECTED };
 
 struct Outputs {
     uint32_t rows, columns, rest;
@@ -34,11 +34,18 @@ void drive(Vnirspi_core& core, uint32_t inputs) {
 
 // Inputs have settled before the clock rises, and outputs before it falls.
 void clock(Vnirspi_core& core, int edge) {
+    if (edge == DESELECTED) {
+        core.rst_sck = 1;
+        core.eval();
+        core.rst_sck = 0;
+        core.eval();
+        return;
+    }
     core.rst_adc = edge == ADC_RESET;
     core.rst_host = edge == HOST_RESET;
     core.rst_bridge = edge == BRIDGE_RESET;
     core.eval();
-    CData& clock = edge == ADC || edge == ADC_RESET ? core.clk_adc : core.clk_host;
+    CData& clock = edge == SCK ? core.clk_sck : edge == ADC || edge == ADC_RESET ? core.clk_adc : core.clk_host;
     clock = 1;
     core.eval();
     clock = 0;

@@ -39,7 +39,8 @@
 //! not asked for one by one, because the camera reads the whole table back.
 //!
 //! A frame that the FPGA has made into a packet ([`nirspi_wire::ready`]) goes straight into the link's
-//! room, and needs no buffer of the bus.
+//! room, and needs no buffer of the bus. Whether the FPGA can clock such a read by `sck` itself
+//! ([`READ_PACKET`]), the bus learns from the reads of [`Register::Version`] that pass through it.
 //!
 //! With a second buffer ([`PortBus::with_spare`]) a frame can be kept: the camera packs it while the
 //! next frame is transferred into the other buffer.
@@ -56,9 +57,11 @@
 
 use crate::{BusError, FpgaBus};
 use nirspi_wire::fpga::{MAX_FRAME_BYTES, frame_bytes};
-use nirspi_wire::host_port::{READ_FRAME, READ_RAW, SEALED_BYTES, seal, unchecked, unseal};
+use nirspi_wire::host_port::{
+    READ_FRAME, READ_PACKET, READ_RAW, SEALED_BYTES, seal, unchecked, unseal,
+};
 use nirspi_wire::ready;
-use nirspi_wire::register::{NO_CLOCK, ORDER_TABLE, Register, control, mode};
+use nirspi_wire::register::{NO_CLOCK, ORDER_TABLE, Register, clocks_packets, control, mode};
 
 /// Number of attempts at a transfer. The FPGA keeps the data until the release.
 const ATTEMPTS: u8 = 3;
@@ -124,6 +127,10 @@ pub struct PortBus<'b, P> {
     raw_samples: u32,
     /// Frames of this run are packets, which go into the link's room.
     packets: bool,
+    /// The gateware knows [`READ_PACKET`].
+    clocks_packets: bool,
+    /// Opcode that reads a frame or packet of this run.
+    opcode: u8,
     /// Bytes of a frame or packet.
     frame_bytes: usize,
     raw_bytes: usize,
@@ -175,6 +182,8 @@ impl<'b, P: HostPort> PortBus<'b, P> {
             patterns: Register::Patterns.reset(),
             raw_samples: Register::RawLength.reset(),
             packets: false,
+            clocks_packets: false,
+            opcode: READ_FRAME,
             frame_bytes: 0,
             raw_bytes: 0,
             writes: None,
@@ -201,7 +210,7 @@ impl<'b, P: HostPort> PortBus<'b, P> {
     pub fn wanted(&mut self) -> Option<Wanted<'_, P>> {
         let Transfer::Wanted { data, .. } = self.transfer else { return None };
         let (opcode, length) = match data {
-            Data::Frame => (READ_FRAME, self.frame_bytes),
+            Data::Frame => (self.opcode, self.frame_bytes),
             Data::Raw => (READ_RAW, self.raw_bytes),
         };
         let into = if self.packets && data == Data::Frame {
@@ -324,8 +333,11 @@ impl<'b, P: HostPort> PortBus<'b, P> {
         let within = |length: usize| length.min(MAX_FRAME_BYTES);
         let patterns = u16::try_from(self.patterns).unwrap_or(u16::MAX);
         self.packets = self.mode & mode::PACKETS != 0;
-        self.frame_bytes =
-            within(if self.packets { ready::read_bytes(patterns) } else { frame_bytes(patterns) });
+        (self.opcode, self.frame_bytes) = match (self.packets, self.clocks_packets) {
+            (true, true) => (READ_PACKET, within(ready::fast_read_bytes(patterns))),
+            (true, false) => (READ_FRAME, within(ready::read_bytes(patterns))),
+            (false, _) => (READ_FRAME, within(frame_bytes(patterns))),
+        };
         let samples = usize::try_from(self.raw_samples).unwrap_or(usize::MAX);
         self.raw_bytes = within(samples.saturating_mul(2));
     }
@@ -333,7 +345,11 @@ impl<'b, P: HostPort> PortBus<'b, P> {
 
 impl<P: HostPort> FpgaBus for PortBus<'_, P> {
     fn read(&mut self, address: u16) -> Result<u32, BusError> {
-        self.read_checked(address)
+        let value = self.read_checked(address)?;
+        if address == Register::Version.address() {
+            self.clocks_packets = clocks_packets(value);
+        }
+        Ok(value)
     }
 
     fn write(&mut self, address: u16, value: u32) -> Result<(), BusError> {
@@ -367,6 +383,10 @@ impl<P: HostPort> FpgaBus for PortBus<'_, P> {
 
     fn frame(&mut self) -> Result<Option<&[u8]>, BusError> {
         self.data(Data::Frame)
+    }
+
+    fn packet_bytes(&self, _patterns: u16) -> usize {
+        self.frame_bytes
     }
 
     fn packet(&mut self, _room: &mut [u8]) -> Result<bool, BusError> {

@@ -72,8 +72,13 @@ pub trait FpgaBus {
         Ok(None)
     }
 
+    /// Bytes to read of a packet of so many patterns.
+    fn packet_bytes(&self, patterns: u16) -> usize {
+        nirspi_wire::ready::read_bytes(patterns)
+    }
+
     /// Reads the packet that is ready into `room`, which is of the link and has
-    /// [`read_bytes`](nirspi_wire::ready::read_bytes): zeros, the packet, zeros. False during the transfer, which
+    /// [`packet_bytes`](Self::packet_bytes): zeros, the packet, zeros. False during the transfer, which
     /// a board carries out into the same room before the next call.
     ///
     /// # Errors

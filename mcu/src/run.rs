@@ -318,7 +318,7 @@ impl Run {
         sink: &mut impl PacketSink,
     ) -> bool {
         let Path { counters, meter, scratch, may_send } = path;
-        let mut room = if may_send { sink.claim(ready::read_bytes(self.patterns)) } else { None };
+        let mut room = if may_send { sink.claim(bus.packet_bytes(self.patterns)) } else { None };
         let mut place = None;
         if let Some(room) = &mut room {
             match bus.packet(room) {

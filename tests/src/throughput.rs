@@ -19,8 +19,11 @@ use nirspi_wire::{
 };
 use std::ops::Range;
 
-/// Period of `sck` of the reference board: 160 MHz / 11.
+/// Period of `sck` of the reference board, but for packets: 160 MHz / 11.
 pub const SCK_PS: u64 = 68_750;
+
+/// Period of `sck` of the reference board for packets that `sck` clocks: 160 MHz / 3.
+pub const PACKET_SCK_PS: u64 = 18_750;
 
 const INPUTS: Inputs = Inputs { interlock_closed: true, temperature_centi_celsius: Some(2500) };
 

@@ -89,7 +89,7 @@ fn no_pin_and_no_place_is_used_twice() {
     }
 }
 
-/// `FPGA J6.6 (D13) spi_sck` against `LOCATE COMP "spi_sck" SITE "H16"; # J6.6, D13`.
+/// `FPGA J6.5 (D12) spi_io[1]` against `LOCATE COMP "spi_io[1]" SITE "H18"; # J6.5, D12`.
 #[test]
 fn a_wire_to_the_fpga_ends_where_the_constraints_have_that_signal() {
     let constraints = read("hdl/boards/ecp5-evn/board.lpf");

@@ -8,6 +8,7 @@ use crate::clocks::BUS_HZ;
 use embassy_futures::select::select;
 use embassy_stm32::exti::ExtiInput;
 use embassy_stm32::mode::Async;
+use embassy_stm32::pac::XSPI1 as XSPI;
 use embassy_stm32::peripherals::XSPI1;
 use embassy_stm32::xspi::{
     AddressSize, Config, DummyCycles, MemorySize, MemoryType, TransferConfig, Xspi, XspiError,
@@ -16,14 +17,19 @@ use embassy_stm32::xspi::{
 use nirspi_app::FpgaPort;
 use nirspi_mcu::{BusError, HostPort};
 use nirspi_nucleo::port::prescaler;
-use nirspi_wire::host_port::{QUAD, READ_REGISTER, SEALED_BYTES, WRITE_REGISTER};
+use nirspi_wire::host_port::{QUAD, READ_PACKET, READ_REGISTER, SEALED_BYTES, WRITE_REGISTER};
+
+/// Prescaler of everything but packets.
+const SLOW: u8 = prescaler(BUS_HZ, READ_REGISTER);
+/// Prescaler of packets, which `sck` clocks through the FPGA.
+const FAST: u8 = prescaler(BUS_HZ, READ_PACKET);
 
 /// Settings of the peripheral. Addresses and lengths must lie within the memory size given here.
 pub fn config() -> Config {
     Config {
         memory_type: MemoryType::Standard,
         device_size: MemorySize::_1MiB,
-        clock_prescaler: prescaler(BUS_HZ),
+        clock_prescaler: SLOW,
         ..Config::default()
     }
 }
@@ -39,6 +45,16 @@ fn access(opcode: u8, address: u16, dummy: DummyCycles) -> TransferConfig {
         dummy,
         ..TransferConfig::default()
     }
+}
+
+/// Changes `sck` between two accesses. Lines that the FPGA changes with an edge of the faster clock are
+/// sampled one and a half periods after that edge (docs/gateware.md, Packets clocked by sck). The
+/// peripheral takes a new prescaler only when it is not busy, and is busy for a moment afterwards, for
+/// which the next access waits.
+fn set_prescaler(prescaler: u8) {
+    while XSPI.sr().read().busy() {}
+    XSPI.tcr().modify(|timing| timing.set_sshift(prescaler == FAST));
+    XSPI.dcr2().modify(|clock| clock.set_prescaler(prescaler));
 }
 
 fn failed(error: XspiError) -> BusError {
@@ -77,7 +93,10 @@ impl HostPort for Fpga {
 
 impl FpgaPort for Fpga {
     async fn read_bytes(&mut self, opcode: u8, into: &mut [u8]) -> Result<(), BusError> {
-        self.xspi.read(into, access(opcode, 0, DummyCycles::_8)).await.map_err(failed)
+        set_prescaler(if opcode == READ_PACKET { FAST } else { SLOW });
+        let read = self.xspi.read(into, access(opcode, 0, DummyCycles::_8)).await;
+        set_prescaler(SLOW);
+        read.map_err(failed)
     }
 
     async fn ready(&mut self) {

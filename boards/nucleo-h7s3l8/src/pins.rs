@@ -25,7 +25,7 @@ macro_rules! pin_table {
 
 pin_table! { ($)
     // The FPGA's host port, XSPI1.
-    fpga_sck: PO4 => "XSPIM_P1_CLK", "FPGA J6.6 (D13) spi_sck";
+    fpga_sck: PO4 => "XSPIM_P1_CLK", "FPGA J5.16 (PCLKT2_0) spi_sck";
     fpga_cs_n: PO0 => "XSPIM_P1_NCS1", "FPGA J6.3 (D10) spi_cs_n";
     fpga_io0: PP0 => "XSPIM_P1_IO0", "FPGA J6.4 (D11) spi_io0";
     fpga_io1: PP1 => "XSPIM_P1_IO1", "FPGA J6.5 (D12) spi_io1";

@@ -12,18 +12,25 @@ use embassy_stm32::ospi::{
     AddressSize, Config, DummyCycles, MemorySize, MemoryType, Ospi, OspiError, OspiWidth,
     TransferConfig,
 };
+use embassy_stm32::pac::OCTOSPI1 as OSPI;
+use embassy_stm32::pac::octospi::vals::SampleShift;
 use embassy_stm32::peripherals::OCTOSPI1;
 use nirspi_app::FpgaPort;
 use nirspi_mcu::{BusError, HostPort};
 use nirspi_nucleo::port::prescaler;
-use nirspi_wire::host_port::{QUAD, READ_REGISTER, SEALED_BYTES, WRITE_REGISTER};
+use nirspi_wire::host_port::{QUAD, READ_PACKET, READ_REGISTER, SEALED_BYTES, WRITE_REGISTER};
+
+/// Prescaler of everything but packets.
+const SLOW: u8 = prescaler(SYSTEM_HZ, READ_REGISTER);
+/// Prescaler of packets, which `sck` clocks through the FPGA.
+const FAST: u8 = prescaler(SYSTEM_HZ, READ_PACKET);
 
 /// Settings of the peripheral. Addresses and lengths must lie within the memory size given here.
 pub fn config() -> Config {
     Config {
         memory_type: MemoryType::Standard,
         device_size: MemorySize::_1MiB,
-        clock_prescaler: prescaler(SYSTEM_HZ),
+        clock_prescaler: SLOW,
         ..Config::default()
     }
 }
@@ -41,6 +48,17 @@ fn access(opcode: u8, address: u16, dummy: DummyCycles) -> TransferConfig {
         sioo: false,
         ..TransferConfig::default()
     }
+}
+
+/// Changes `sck` between two accesses. Lines that the FPGA changes with an edge of the faster clock are
+/// sampled one and a half periods after that edge (docs/gateware.md, Packets clocked by sck). The
+/// peripheral takes a new prescaler only when it is not busy, and is busy for a moment afterwards, for
+/// which the next access waits.
+fn set_prescaler(prescaler: u8) {
+    while OSPI.sr().read().busy() {}
+    let shift = if prescaler == FAST { SampleShift::HALF_CYCLE } else { SampleShift::NONE };
+    OSPI.tcr().modify(|timing| timing.set_sshift(shift));
+    OSPI.dcr2().modify(|clock| clock.set_prescaler(prescaler));
 }
 
 fn failed(error: OspiError) -> BusError {
@@ -79,7 +97,10 @@ impl HostPort for Fpga {
 
 impl FpgaPort for Fpga {
     async fn read_bytes(&mut self, opcode: u8, into: &mut [u8]) -> Result<(), BusError> {
-        self.ospi.read(into, access(opcode, 0, DummyCycles::_8)).await.map_err(failed)
+        set_prescaler(if opcode == READ_PACKET { FAST } else { SLOW });
+        let read = self.ospi.read(into, access(opcode, 0, DummyCycles::_8)).await;
+        set_prescaler(SLOW);
+        read.map_err(failed)
     }
 
     async fn ready(&mut self) {

@@ -25,7 +25,7 @@ macro_rules! pin_table {
 
 pin_table! { ($)
     // The FPGA's host port, OCTOSPI1.
-    fpga_sck: PE10 => "CN10 D40", "FPGA J6.6 (D13) spi_sck";
+    fpga_sck: PE10 => "CN10 D40", "FPGA J5.16 (PCLKT2_0) spi_sck";
     fpga_cs_n: PE11 => "CN10 D5", "FPGA J6.3 (D10) spi_cs_n";
     fpga_io0: PE12 => "CN10 D39", "FPGA J6.4 (D11) spi_io0";
     fpga_io1: PE13 => "CN10 D3", "FPGA J6.5 (D12) spi_io1";

@@ -78,6 +78,8 @@ module shell #(
         .clk_host,
         .rst_host,
         .rst_bridge,
+        .clk_sck       (spi_sck),
+        .rst_sck       (spi_cs_n),
         .design_id     (DESIGN),
         .adc_beat      (divided[2]),
         .pll_locked    (locked),

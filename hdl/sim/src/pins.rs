@@ -1,4 +1,4 @@
-//! The simulated FPGA seen from its pins, with its two clocks.
+//! The simulated FPGA seen from its pins, with its two clocks and `sck`, which is a third.
 //!
 //! Pins change between clock edges, and edges come in the order of their time.
 
@@ -27,6 +27,8 @@ pub struct Pins {
     sim: Simulator,
     adc: Event,
     host: Event,
+    sck: Event,
+    reset_sck: Event,
     reset_adc: Event,
     reset_bridge: Event,
     /// The ADC's clock ticks.
@@ -75,6 +77,7 @@ impl Pins {
         let mut sim = project.simulate("core");
         let adc = sim.get_clock("clk_adc").unwrap();
         let host = sim.get_clock("clk_host").unwrap();
+        let sck = sim.get_clock("clk_sck").unwrap();
         let input = |name: &str| *sim.ir.ports.get(&name.parse::<VarPath>().unwrap()).unwrap();
         let inputs = Inputs {
             code: input("adc_code"),
@@ -98,6 +101,7 @@ impl Pins {
             lines: "spi_out".into(),
             drive: "spi_drive".into(),
         };
+        let reset_sck = sim.get_reset("rst_sck").unwrap();
         let reset_adc = sim.get_reset("rst_adc").unwrap();
         let reset_host = sim.get_reset("rst_host").unwrap();
         let reset_bridge = sim.get_reset("rst_bridge").unwrap();
@@ -107,6 +111,8 @@ impl Pins {
             sim,
             adc,
             host,
+            sck,
+            reset_sck,
             reset_adc,
             reset_bridge,
             clocked: true,
@@ -117,6 +123,7 @@ impl Pins {
             trace,
             levels,
         };
+        pins.levels.selected = true;
         pins.select(false);
         pins.design(Design::Camera);
         pins.clock_levels(true);
@@ -252,16 +259,26 @@ impl Pins {
         self.set(self.inputs.interlock, closed.into(), 1);
     }
 
-    /// Drives `cs_n`: low when selected.
+    /// Drives `cs_n`: low when selected. The level resets what `sck` clocks, with or without a clock.
     pub fn select(&mut self, selected: bool) {
+        let falls = self.levels.selected && !selected;
         self.levels.selected = selected;
         self.set(self.inputs.cs_n, (!selected).into(), 1);
+        if falls {
+            self.sim.step_reset(&self.sck, &self.reset_sck);
+            self.record(Edge::Deselected);
+        }
     }
 
-    /// Drives the host port's `sck`.
+    /// Drives the host port's `sck`. What it clocks is in reset while the port is not selected.
     pub fn sck(&mut self, high: bool) {
+        let rises = high && !self.levels.sck;
         self.levels.sck = high;
         self.set(self.inputs.sck, high.into(), 1);
+        if rises && self.levels.selected {
+            self.sim.step(&self.sck);
+            self.record(Edge::Sck);
+        }
     }
 
     /// Sets the levels that the host drives on the four lines.

@@ -25,6 +25,9 @@ pub(crate) enum Edge {
     AdcReset = 2,
     HostReset = 3,
     BridgeReset = 4,
+    Sck = 5,
+    /// The pin resets what `sck` clocks.
+    Deselected = 6,
 }
 
 const INPUTS: u8 = 1 << 3;

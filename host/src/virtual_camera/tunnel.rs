@@ -7,7 +7,7 @@
 use super::SimulatedFpga;
 use crate::link::is_hangup;
 use nirspi_wire::crc32;
-use nirspi_wire::host_port::{READ_FRAME, READ_RAW, READ_REGISTER, WRITE_REGISTER};
+use nirspi_wire::host_port::{READ_FRAME, READ_PACKET, READ_RAW, READ_REGISTER, WRITE_REGISTER};
 use nirspi_wire::tunnel::{Lines, REQUEST_BYTES, Request};
 use std::io::{self, Read, Write};
 use std::net::TcpStream;
@@ -75,7 +75,7 @@ fn access(fpga: &mut impl SimulatedFpga, request: Request) -> Vec<u8> {
     let data = match opcode {
         WRITE_REGISTER => fpga.write(address, argument).map(|()| Vec::new()),
         READ_REGISTER => fpga.read(address).map(|value| value.to_le_bytes().to_vec()),
-        READ_FRAME => fpga.frame().map(|bytes| bytes.unwrap_or(&[]).to_vec()),
+        READ_FRAME | READ_PACKET => fpga.frame().map(|bytes| bytes.unwrap_or(&[]).to_vec()),
         READ_RAW => fpga.raw().map(|bytes| bytes.unwrap_or(&[]).to_vec()),
         _ => {
             wait(fpga);

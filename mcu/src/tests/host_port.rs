@@ -8,7 +8,7 @@ use crate::{
     Ports, Target, Wanted,
 };
 use nirspi_wire::fpga::{MAX_FRAME_BYTES, frame_bytes};
-use nirspi_wire::host_port::{READ_FRAME, READ_RAW, SEALED_BYTES, seal, unseal};
+use nirspi_wire::host_port::{READ_FRAME, READ_PACKET, READ_RAW, SEALED_BYTES, seal, unseal};
 use nirspi_wire::register::{Register, control};
 use nirspi_wire::{
     Answer, Command, DeviceMessage, EventKind, Reply, RunLength, SelfTestReport, version,
@@ -90,13 +90,13 @@ impl Port {
             return Err(BusError::Transfer);
         }
         let there = match opcode {
-            READ_FRAME => self.fpga.frame.clone().unwrap_or_default(),
+            READ_FRAME | READ_PACKET => self.fpga.frame.clone().unwrap_or_default(),
             READ_RAW => self.fpga.raw.clone().unwrap_or_default(),
             other => panic!("opcode {other:#x}"),
         };
         into.fill(0);
         // A packet comes between zeros.
-        let start = if opcode == READ_FRAME && self.fpga.sends_packets() { 5 } else { 0 };
+        let start = if opcode != READ_RAW && self.fpga.sends_packets() { 5 } else { 0 };
         let length = (into.len() - start).min(there.len());
         into[start..start + length].copy_from_slice(&there[..length]);
         Ok(())

@@ -3,7 +3,7 @@
 use super::host_port::{Device, bus};
 use super::support::*;
 use crate::Micros;
-use nirspi_wire::host_port::READ_FRAME;
+use nirspi_wire::host_port::{READ_FRAME, READ_PACKET};
 use nirspi_wire::ready;
 use nirspi_wire::register::{Register, mode};
 use nirspi_wire::{
@@ -377,9 +377,31 @@ fn a_packet_goes_straight_into_the_links_room() {
         assert_eq!(device.link.packets, [made]);
         device.heard();
     }
-    let transfer = (READ_FRAME, ready::read_bytes(4));
+    let transfer = (READ_PACKET, ready::fast_read_bytes(4));
     assert_eq!(device.bus.port().transfers, [transfer; 3]);
     assert_ne!(device.bus.port().fpga.get(Register::Mode) & mode::PACKETS, 0);
+}
+
+/// The FPGA may be loaded with other gateware between two configurations.
+#[test]
+fn only_gateware_that_knows_it_is_asked_for_a_read_that_sck_clocks() {
+    let slow = (READ_FRAME, ready::read_bytes(4));
+    let fast = (READ_PACKET, ready::fast_read_bytes(4));
+    let mut device = Device::new(bus());
+    let mut expected = Vec::new();
+    for (version, transfer) in [(0x0303, slow), (0x0304, fast), (0x0302, slow), (0x0304, fast)] {
+        device.bus.port().fpga.registers.insert(Register::Version.address(), version);
+        device.ask(Command::Configure(SMALL));
+        device.ask(Command::Start(RunLength::Continuous));
+        device.bus.port().fpga.make_frame();
+        let made = device.bus.port().fpga.frame.clone().unwrap();
+        device.turn(&[]);
+        assert_eq!(device.link.packets.last(), Some(&made), "{version:#x}");
+        device.heard();
+        device.ask(Command::Stop);
+        expected.push(transfer);
+        assert_eq!(device.bus.port().transfers, expected, "{version:#x}");
+    }
 }
 
 #[test]

@@ -17,6 +17,13 @@
 //! earlier, or whose check is wrong, has no effect. Bytes beyond the end of a frame or burst, or
 //! without a frame or burst, are 0; no frame begins with 0.
 //!
+//! # Packets at a faster clock
+//! [`READ_PACKET`] is a [`READ_FRAME`] by four lines whose bits are clocked by `sck` itself, from
+//! [`PACKET_SCK_MIN_HZ`] to [`PACKET_SCK_MAX_HZ`]. The phases and their clocks are the same. Only packets
+//! ([`mode::PACKETS`](crate::register::mode::PACKETS)) come without a gap at that speed. Without the
+//! ADC's clock, the FPGA does not drive the lines. Since gateware 0.3.4; older gateware ignores the
+//! opcode.
+//!
 //! # Check
 //! The check is a CRC-16 of address and value ([`check`]): 64 bits with itself. Up to three wrong bits,
 //! and wrong bits within four clocks of four lines, never pass; anything else passes once in 65 536
@@ -36,6 +43,11 @@ pub const READ_REGISTER: u8 = 0x55;
 pub const READ_FRAME: u8 = 0x56;
 /// Reads the raw burst from its first byte.
 pub const READ_RAW: u8 = 0x57;
+/// Reads the delivered frame from its first byte, clocked by `sck`. The opcode must have [`QUAD`].
+///
+/// The port looks at this opcode without a filter. With [`QUAD`] it differs in four bits or more from
+/// every other opcode, so that one wrong edge of `sck` does not turn another opcode into this one.
+pub const READ_PACKET: u8 = 0x0B;
 /// Bit of an opcode: address, value and bytes use four lines.
 pub const QUAD: u8 = 0x80;
 /// Clocks of `sck` between the address of a read and its first bit.
@@ -43,6 +55,11 @@ pub const DUMMY_CYCLES: u8 = 8;
 /// The host port samples its pins. The clock of `sck` must be at most the port's clock divided by
 /// this number.
 pub const SCK_DIVIDER: u8 = 6;
+/// Slowest `sck` of a [`READ_PACKET`], in Hz. Its opcode must be over 227 ns after `cs_n` fell, because no
+/// other opcode can be, whatever glitches do to it. Nine periods of this `sck` are 225 ns.
+pub const PACKET_SCK_MIN_HZ: u32 = 40_000_000;
+/// Fastest `sck` of a [`READ_PACKET`], in Hz. The FPGA makes the bytes of a packet faster than that.
+pub const PACKET_SCK_MAX_HZ: u32 = 60_000_000;
 /// Bytes of a value and its check.
 pub const SEALED_BYTES: usize = 6;
 /// Polynomial of the check: `x^16 + x^12 + x^5 + 1`, most significant bit first.
@@ -153,6 +170,27 @@ mod tests {
             }
         }
         assert_eq!(unchecked(seal(Register::Identity.address(), IDENTITY)), None);
+    }
+
+    /// One edge of `sck` too many repeats a bit, and one too few leaves a bit out.
+    #[test]
+    fn one_wrong_edge_or_three_wrong_bits_turn_no_opcode_into_a_read_of_a_packet() {
+        let wanted = READ_PACKET | QUAD;
+        for opcode in [WRITE_REGISTER, READ_REGISTER, READ_FRAME, READ_RAW] {
+            for opcode in [opcode, opcode | QUAD] {
+                assert!((opcode ^ wanted).count_ones() > 3, "{opcode:#x}");
+                for at in 0..8 {
+                    let (before, after) = (0xFF00 >> at & 0xFF, 0xFF >> at);
+                    let kept = u16::from(opcode) & before;
+                    let repeated = kept | (u16::from(opcode) >> 1) & after;
+                    // The first bit of the address follows.
+                    let left_out = kept | (u16::from(opcode) << 1) & after;
+                    for found in [repeated, left_out, left_out | 1] {
+                        assert_ne!(found & 0xFF, u16::from(wanted), "{opcode:#x}, bit {at}");
+                    }
+                }
+            }
+        }
     }
 
     proptest! {

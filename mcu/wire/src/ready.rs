@@ -22,8 +22,9 @@
 //! Then COBS and the delimiter, as in every packet.
 //!
 //! A read of the frame ([`READ_FRAME`](crate::host_port::READ_FRAME)) gives zeros until the packet begins, at most
-//! [`LEAD_BYTES`] of them, then the packet without a gap, then zeros. On the host's link zeros are empty packets, which
-//! every receiver skips.
+//! [`LEAD_BYTES`] of them, then the packet without a gap, then zeros. A read that is clocked by `sck`
+//! ([`READ_PACKET`](crate::host_port::READ_PACKET)) gives at most [`FAST_LEAD_BYTES`] zeros before the packet. On the
+//! host's link zeros are empty packets, which every receiver skips.
 
 use crate::packet::overhead;
 use crate::{CLOCKS_PER_PATTERN, Crc32, FrameFlags, PATTERNS};
@@ -41,8 +42,11 @@ const _: () = assert!(MAX_SUMMED_SAMPLES > CLOCKS_PER_PATTERN as u32);
 const _: () = assert!(MAX_SUMMED_SAMPLES as u64 * crate::ADC_MAX as u64 <= i32::MAX as u64);
 
 /// Most zeros before a packet, at the fastest `sck` that the host port allows: the FPGA begins when it has so many bytes
-/// of the packet that it never has to wait, which takes it 5.3 us at most.
+/// of the packet that it never has to wait. Gateware before 0.3.4 takes 5.3 us for that.
 pub const LEAD_BYTES: usize = 64;
+
+/// Most zeros before a packet that is read at [`PACKET_SCK_MAX_HZ`](crate::host_port::PACKET_SCK_MAX_HZ).
+pub const FAST_LEAD_BYTES: usize = 160;
 
 /// Bytes to read of a frame of so many patterns, with which the whole packet has come.
 #[must_use]
@@ -51,8 +55,14 @@ pub const fn read_bytes(patterns: u16) -> usize {
     LEAD_BYTES + payload + overhead(payload)
 }
 
+/// The same for a read that is clocked by `sck`.
+#[must_use]
+pub const fn fast_read_bytes(patterns: u16) -> usize {
+    read_bytes(patterns) + (FAST_LEAD_BYTES - LEAD_BYTES)
+}
+
 /// Bytes to read of the longest frame.
-pub const MAX_READ_BYTES: usize = read_bytes(PATTERNS);
+pub const MAX_READ_BYTES: usize = fast_read_bytes(PATTERNS);
 
 /// Where the packet lies in the bytes of a read, delimiter included: without the zeros before and after. `None` if
 /// the bytes hold no packet, or a packet that is longer or shorter than a frame of so many patterns.

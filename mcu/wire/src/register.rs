@@ -77,7 +77,7 @@ registers! {
     /// Always [`IDENTITY`].
     Identity = 0x00, ReadOnly, IDENTITY;
     /// Gateware version, `major << 16 | minor << 8 | patch`.
-    Version = 0x01, ReadOnly, 0x0000_0303;
+    Version = 0x01, ReadOnly, 0x0000_0304;
     /// Holds what was written, for bus tests.
     Scratch = 0x02, ReadWrite, 0;
     /// See [`control`].
@@ -171,6 +171,13 @@ pub const fn sends_packets(version: u32) -> bool {
 #[must_use]
 pub const fn measures_frames(version: u32) -> bool {
     has_this_map(version) && version & 0xFF >= 2
+}
+
+/// Whether gateware with this [`Register::Version`] knows
+/// [`READ_PACKET`](crate::host_port::READ_PACKET): 0.3.4 and later of the same map.
+#[must_use]
+pub const fn clocks_packets(version: u32) -> bool {
+    has_this_map(version) && version & 0xFF >= 4
 }
 
 /// Frames that can wait for the host, the delivered one included. Gateware before 0.3.3 has room for one.

@@ -18,7 +18,7 @@
 
 use crate::crc32;
 use crate::fpga::MAX_FRAME_BYTES;
-use crate::host_port::{READ_FRAME, READ_RAW, READ_REGISTER, WRITE_REGISTER};
+use crate::host_port::{READ_FRAME, READ_PACKET, READ_RAW, READ_REGISTER, WRITE_REGISTER};
 
 /// Opcode without an access: time passes, and the reply has the state of the lines.
 pub const LOOK: u8 = 0x00;
@@ -60,7 +60,7 @@ impl Request {
         let (head, crc) = bytes.split_last_chunk::<CRC_BYTES>()?;
         let known = matches!(
             head.first()?,
-            &LOOK | &WRITE_REGISTER | &READ_REGISTER | &READ_FRAME | &READ_RAW
+            &LOOK | &WRITE_REGISTER | &READ_REGISTER | &READ_FRAME | &READ_PACKET | &READ_RAW
         );
         if !known || crc32(head) != u32::from_le_bytes(*crc) {
             return None;
@@ -78,7 +78,7 @@ impl Request {
     pub const fn reply_data(self) -> usize {
         match self.opcode {
             READ_REGISTER => 4,
-            READ_FRAME | READ_RAW => self.argument as usize,
+            READ_FRAME | READ_PACKET | READ_RAW => self.argument as usize,
             _ => 0,
         }
     }
@@ -139,7 +139,7 @@ mod tests {
         #[test]
         fn a_request_comes_back_and_no_damaged_one_does(
             number: u8, address: u16, argument: u32,
-            opcode in prop::sample::select(&[LOOK, WRITE_REGISTER, READ_REGISTER, READ_FRAME, READ_RAW][..]),
+            opcode in prop::sample::select(&[LOOK, WRITE_REGISTER, READ_REGISTER, READ_FRAME, READ_PACKET, READ_RAW][..]),
             at in 0..REQUEST_BYTES, flip in 1u8..,
         ) {
             let request = Request { opcode, number, address, argument };

@@ -7,8 +7,8 @@ use nirspi_hdl_sim::{pins::Pins, project::Project};
 use nirspi_optics::{Chain, LedArray};
 use nirspi_wire::fpga::{FpgaFrame, HEADER_BYTES, frame_bytes};
 use nirspi_wire::host_port::{
-    DUMMY_CYCLES, QUAD, READ_FRAME, READ_RAW, READ_REGISTER, SCK_DIVIDER, SEALED_BYTES,
-    WRITE_REGISTER, seal, unseal,
+    DUMMY_CYCLES, QUAD, READ_FRAME, READ_PACKET, READ_RAW, READ_REGISTER, SCK_DIVIDER,
+    SEALED_BYTES, WRITE_REGISTER, seal, unseal,
 };
 use nirspi_wire::ready;
 use nirspi_wire::register::{Design, Register, loopback, mode};
@@ -263,6 +263,50 @@ impl Board {
         let bytes = self.receive_bytes(count);
         self.end();
         bytes
+    }
+
+    /// Reads the packet with an `sck` of this period, which has nothing to do with the FPGA's clocks.
+    pub fn packet(&mut self, into: &mut [u8], sck_ps: u64) {
+        self.pins.sck(false);
+        self.pins.select(true);
+        let mut at_ps = self.next_host_ps;
+        let opcode = READ_PACKET | QUAD;
+        for shift in (0..8).rev() {
+            self.sck_at(&mut at_ps, sck_ps, opcode >> shift & 1);
+        }
+        for _ in 0..4 + DUMMY_CYCLES {
+            self.sck_at(&mut at_ps, sck_ps, 0);
+        }
+        for byte in into {
+            let high = self.sck_at(&mut at_ps, sck_ps, 0);
+            *byte = high << 4 | self.sck_at(&mut at_ps, sck_ps, 0);
+        }
+        self.pins.select(false);
+        self.wait(BETWEEN);
+    }
+
+    /// One period of such an `sck`; returns the lines at its rising edge.
+    fn sck_at(&mut self, at_ps: &mut u64, sck_ps: u64, lines: u8) -> u8 {
+        self.pins.drive(lines);
+        *at_ps += sck_ps / 2;
+        self.wait_until(*at_ps);
+        let (driven, _) = self.pins.driven();
+        self.pins.sck(true);
+        *at_ps += sck_ps / 2;
+        self.wait_until(*at_ps);
+        self.pins.sck(false);
+        driven
+    }
+
+    /// Clocks of both domains up to this time.
+    fn wait_until(&mut self, ps: u64) {
+        while self.next_host_ps <= ps {
+            self.host_clock();
+        }
+        while self.next_adc_ps <= ps {
+            self.next_adc_ps += ADC_PS;
+            self.adc_clock();
+        }
     }
 
     pub fn raw(&mut self) -> Vec<u8> {

@@ -2,8 +2,8 @@
 
 use crate::board::{Board, Front, HOST_PS};
 use nirspi_mcu::{BusError, HostPort};
-use nirspi_tests::throughput::{SCK_PS, TimedPort};
-use nirspi_wire::host_port::{READ_FRAME, SCK_DIVIDER, SEALED_BYTES};
+use nirspi_tests::throughput::{PACKET_SCK_PS, SCK_PS, TimedPort};
+use nirspi_wire::host_port::{READ_FRAME, READ_PACKET, SCK_DIVIDER, SEALED_BYTES};
 
 /// The host port of a powered board with the bring-up design.
 pub struct RtlPort(Board);
@@ -41,8 +41,11 @@ impl HostPort for RtlPort {
 
 impl TimedPort for RtlPort {
     fn transfer(&mut self, opcode: u8, into: &mut [u8]) {
-        assert_eq!(opcode, READ_FRAME);
-        into.copy_from_slice(&self.0.frame_bytes(into.len()));
+        match opcode {
+            READ_FRAME => into.copy_from_slice(&self.0.frame_bytes(into.len())),
+            READ_PACKET => self.0.packet(into, PACKET_SCK_PS),
+            other => panic!("opcode {other:#x}"),
+        }
     }
 
     fn pass(&mut self, ps: u64) {

@@ -94,7 +94,7 @@ impl Memory {
         let mut bytes = head.to_bytes().into_iter().chain(samples);
         payload.fill_with(|| bytes.next().unwrap_or(0));
         into.fill(0);
-        if let Some(room) = into.get_mut(ready::LEAD_BYTES / 2 + 1..) {
+        if let Some(room) = into.get_mut(ready::FAST_LEAD_BYTES * 3 / 4 + 1..) {
             let _ = packet::seal(payload, room);
         }
     }

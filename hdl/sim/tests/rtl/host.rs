@@ -7,7 +7,7 @@ use crate::rig::{Access, Answer, Rig};
 use crate::scenario::Dice;
 use nirspi_wire::{
     host_port,
-    ready::LEAD_BYTES,
+    ready::{FAST_LEAD_BYTES, LEAD_BYTES},
     register::{Register, clocks},
 };
 
@@ -201,6 +201,13 @@ impl Rig {
 
     /// Reads the frame or burst: whole and some bytes beyond its end, or only its first bytes.
     pub fn stream(&mut self, raw: bool, at_most: usize) {
+        let dice = &mut Dice::new(self.periods ^ self.clock);
+        if self.by_sck && !raw && !dice.once_in(4) {
+            // 45 to 60 MHz.
+            let any = dice.range(8_334, 11_000);
+            let half_ps = dice.pick(&[8_334, 9_375, any]);
+            return self.packet(half_ps, at_most);
+        }
         let (access, opcode) = if raw {
             (Access::Raw, host_port::READ_RAW)
         } else {
@@ -248,5 +255,105 @@ impl Rig {
             }
         }
         0
+    }
+}
+
+/// A read that `sck` clocks, with clocks of the FPGA in any relation to it.
+impl Rig {
+    /// One period of `sck`; returns what the FPGA drives when the host samples.
+    fn fast_sck(&mut self, at_ps: &mut u64, half_ps: u64, lines: u8) -> (u8, u8) {
+        self.periods += 1;
+        self.pins.drive(lines);
+        *at_ps += half_ps;
+        self.wait_until(*at_ps);
+        let driven = self.pins.driven();
+        self.pins.sck(true);
+        *at_ps += half_ps;
+        self.wait_until(*at_ps);
+        self.pins.sck(false);
+        driven
+    }
+
+    /// Opcode, address and dummy cycles of such a read, of which only the first clocks come if it is cut short.
+    fn begin_packet(&mut self, at_ps: &mut u64, half_ps: u64, clocks: usize) {
+        self.pins.sck(false);
+        self.pins.select(true);
+        let opcode = host_port::READ_PACKET | host_port::QUAD;
+        let noise = self.clock as u8 & 0xE;
+        let bits = (0..8).rev().map(|bit| opcode >> bit & 1 | noise);
+        let rest = std::iter::repeat_n(0, 4 + usize::from(host_port::DUMMY_CYCLES));
+        for lines in bits.chain(rest).take(clocks) {
+            let (_, drive) = self.fast_sck(at_ps, half_ps, lines);
+            self.expect("lines driven before the bytes", &drive, &0);
+        }
+    }
+
+    /// A read of a packet while the ADC has no clock: the FPGA leaves the lines alone.
+    pub fn packet_undriven(&mut self) {
+        let at_ps = &mut self.now_ps();
+        self.begin_packet(at_ps, 9_375, usize::MAX);
+        for _ in 0..20 {
+            let (_, drive) = self.fast_sck(at_ps, 9_375, 0);
+            self.expect("lines driven without clock", &drive, &0);
+        }
+        self.end();
+    }
+
+    fn fast_byte(&mut self, at_ps: &mut u64, half_ps: u64) -> u8 {
+        (0..2).fold(0, |byte, _| {
+            let (lines, drive) = self.fast_sck(at_ps, half_ps, self.clock as u8 & 0xF);
+            self.expect("lines driven by `sck`", &drive, &0xF);
+            byte << 4 | lines
+        })
+    }
+
+    /// Reads the packet, whole and some bytes beyond its end, or only its first bytes, or cut in its opcode. Frames that
+    /// are no packets may have gaps, and are not compared.
+    pub fn packet(&mut self, half_ps: u64, at_most: usize) {
+        let at_ps = &mut self.now_ps();
+        let cut = Dice::new(*at_ps).range(0, 60);
+        if cut < 8 {
+            self.begin_packet(at_ps, half_ps, cut as usize);
+            self.end();
+            return self.wait(50);
+        }
+        self.asked = Some(Access::Frame);
+        self.begin_packet(at_ps, half_ps, usize::MAX);
+        let mut bytes: Vec<u8> = (0..3).map(|_| self.fast_byte(at_ps, half_ps)).collect();
+        // The access takes effect while zeros come.
+        let wanted = loop {
+            match self.answer.take() {
+                Some(Answer::Packet(packet)) => break Some(packet),
+                Some(Answer::Bytes(frame)) => break frame.is_empty().then(Vec::new),
+                _ if bytes.len() > 40 => return self.expect("a packet asked for", &0, &1),
+                _ => bytes.push(self.fast_byte(at_ps, half_ps)),
+            }
+        };
+        let length = wanted.as_ref().map_or(0, Vec::len);
+        let last = (FAST_LEAD_BYTES + length).min(at_most.saturating_add(3));
+        while bytes.len() < last {
+            let byte = self.fast_byte(at_ps, half_ps);
+            bytes.push(byte);
+        }
+        self.end();
+        let Some(wanted) = wanted else { return };
+        let zeros = bytes.iter().take_while(|&&byte| byte == 0).count();
+        let lead = &mut self.seen_so_far.lead;
+        if zeros < bytes.len() {
+            let byte_ps = 4 * half_ps;
+            *lead = std::cmp::max_by_key(*lead, (zeros as u64, byte_ps), |(zeros, ps)| zeros * ps);
+        }
+        self.seen_so_far.by_sck[usize::from(at_most != usize::MAX)] += 1;
+        let mut expected = vec![0; zeros];
+        expected.extend(&wanted);
+        expected.resize(expected.len().max(bytes.len()), 0);
+        expected.truncate(bytes.len());
+        if at_most == usize::MAX && !wanted.is_empty() && zeros + wanted.len() > bytes.len() {
+            self.expect("zeros before a packet", &zeros, &FAST_LEAD_BYTES);
+        }
+        if let Some(at) = (0..bytes.len()).find(|&at| bytes[at] != expected[at]) {
+            let what = format!("byte {at} ({zeros} zeros first) of a packet by `sck`");
+            self.expect(&what, &bytes[at], &expected[at]);
+        }
     }
 }

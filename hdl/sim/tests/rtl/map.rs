@@ -80,6 +80,7 @@ pub fn package() -> String {
         ("HOST_WRITE", host_port::WRITE_REGISTER.into()),
         ("HOST_READ", host_port::READ_REGISTER.into()),
         ("HOST_FRAME", host_port::READ_FRAME.into()),
+        ("HOST_PACKET", host_port::READ_PACKET.into()),
         ("HOST_RAW", host_port::READ_RAW.into()),
         ("HOST_QUAD", host_port::QUAD.into()),
         ("HOST_DUMMY_CYCLES", host_port::DUMMY_CYCLES.into()),

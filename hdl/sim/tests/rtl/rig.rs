@@ -96,6 +96,8 @@ pub struct Rig {
     /// Level of the interlock pin.
     closed: bool,
     design: Design,
+    /// Most frames are read by `READ_PACKET`, with an `sck` of any speed.
+    pub by_sck: bool,
     /// Periods of `sck`.
     pub(crate) periods: u64,
     pub(crate) asked: Option<Access>,
@@ -142,6 +144,8 @@ pub struct Tally {
     pub bursts: u64,
     pub packets: u64,
     pub packets_after_loss: u64,
+    /// Packets read with `sck` as their clock, whole, and reads that were cut short.
+    pub by_sck: [u64; 2],
     /// Releases behind which another frame waited.
     pub followed: u64,
     /// Zeros before the packet of which most came, with the time of a byte in ps.
@@ -190,6 +194,7 @@ impl Rig {
             put_out: true,
             closed: false,
             design: Design::Camera,
+            by_sck: false,
             periods: 0,
             asked: None,
             answer: None,
@@ -483,6 +488,21 @@ impl Rig {
         }
         self.next_host_ps += self.port.host_ps;
         self.pins.host_edge();
+    }
+
+    /// Clocks of both domains up to this time.
+    pub(crate) fn wait_until(&mut self, ps: u64) {
+        while self.next_host_ps <= ps {
+            self.host_clock();
+        }
+        while self.next_adc_ps <= ps {
+            self.next_adc_ps += ADC_PS;
+            self.adc_clock();
+        }
+    }
+
+    pub(crate) fn now_ps(&self) -> u64 {
+        self.next_host_ps.min(self.next_adc_ps)
     }
 
     pub fn wait(&mut self, host_clocks: u32) {

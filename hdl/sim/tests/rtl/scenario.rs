@@ -303,6 +303,18 @@ pub fn slow_readers(rig: &mut Rig, seed: u64) {
     }
 }
 
+/// The scenarios of packets, of slow readers and of long blocks, with reads that `sck` clocks.
+pub fn packets_by_sck(rig: &mut Rig, seed: u64) {
+    rig.by_sck = true;
+    match seed % 8 {
+        0..4 => packets(rig, seed),
+        // Those of packets.
+        4..7 => slow_readers(rig, seed | 2),
+        _ => long_blocks(rig, seed),
+    }
+    (rig.by_sck, rig.tilt) = (false, 0);
+}
+
 /// Patterns, dwell and complements with which a sum is used again after 1 to 6 clocks, and after
 /// many.
 const RETURNS: [(u64, u64, bool); 10] = [
@@ -422,6 +434,7 @@ pub fn clock_lost(rig: &mut Rig, seed: u64) {
             rig.read(ORDER_TABLE + dice.range(0, 1023) as u16);
         }
         rig.stream_zeros(dice.pick(&[READ_FRAME, READ_RAW]), 5);
+        rig.packet_undriven();
         if round % 6 == 0 {
             rig.check_clocks();
         }

@@ -41,6 +41,7 @@ mod loopback;
 mod order_table;
 mod over_counter;
 mod packer;
+mod packet_port;
 mod raw_capture;
 mod registers;
 mod safety;
@@ -75,6 +76,7 @@ pub const BENCHES: &[(&str, &[Law])] = &[
     ("order_table", order_table::LAWS),
     ("over_counter", over_counter::LAWS),
     ("packer", packer::LAWS),
+    ("packet_port", packet_port::LAWS),
     ("raw_capture", raw_capture::LAWS),
     ("registers", registers::LAWS),
     ("safety", safety::LAWS),

@@ -15,6 +15,7 @@ laws![
     a_stream_gives_the_bytes_of_its_own_epoch_and_zeros_beyond,
     a_transfer_cut_short_leaves_nothing_behind,
     an_unknown_opcode_does_nothing,
+    a_read_of_a_packet_by_the_other_port_is_one_access_and_drives_nothing,
 ];
 
 /// Clocks from an access to its answer: within the dummy cycles, at a third of `sck`'s half period.
@@ -281,4 +282,40 @@ fn an_unknown_opcode_does_nothing(project: &Project) {
         assert!(rig.sent().is_empty(), "{opcode:#x}");
     }
     rig.write(dice);
+}
+
+/// What this port sees of a faster `sck` may look like any opcode. Of its edges it sees as many as there are, or fewer:
+/// at most four of the address before it hears of the read.
+fn a_read_of_a_packet_by_the_other_port_is_one_access_and_drives_nothing(project: &Project) {
+    let mut rig = Rig::new(project);
+    let dice = &mut Dice::new(39);
+    for round in 0..80 {
+        rig.vary(dice);
+        let seen = dice.range(0, 11) as u32;
+        let opcode = dice.pick(&[WRITE_REGISTER, READ_REGISTER, READ_FRAME, READ_RAW]);
+        assert!(rig.bench.is("beginning"));
+        let busy = dice.range(0, 40) as u32;
+        rig.quad |= seen > 8;
+        rig.begin(opcode, dice.range(0, 0xFFFF), Some(0), seen);
+        let young = 2 * rig.half * seen < 25;
+        assert_eq!(rig.bench.is("beginning"), seen < 8 && young, "after {seen} edges");
+        rig.bench.set("idle", false);
+        rig.bench.set("packet", true);
+        rig.clocks(busy);
+        assert!(rig.sent().is_empty(), "an access before this one is under way");
+        rig.bench.set("idle", true);
+        for _ in 0..dice.range(10, 60) {
+            let [_, drive] = rig.sck(dice.range(0, 0xF));
+            assert_eq!(drive, 0, "round {round}: driven by both ports");
+        }
+        let accesses: Vec<_> = rig.sent().iter().map(|&[operation, ..]| operation).collect();
+        assert_eq!(accesses, [u64::from(READ_FRAME & 3)], "round {round}");
+        // The pin ends both: that of the other port at once, that of this port some clocks later.
+        rig.bench.set("packet", false);
+        rig.clocks(2);
+        rig.end();
+        assert!(rig.sent().is_empty());
+        rig.vary(dice);
+        rig.write(dice);
+    }
 }
