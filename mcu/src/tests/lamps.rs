@@ -73,3 +73,17 @@ fn the_light_lamp_is_on_while_the_fpga_may_light_leds() {
     bench.poll();
     assert!(!bench.fpga.leds_on() && !lamp(&bench), "dark, and the run's last frames still come");
 }
+
+/// The board drives the pin, and the FPGA cannot light LEDs while the pin is low.
+#[test]
+fn the_led_pin_may_be_high_from_the_configuration_until_a_fault() {
+    let mut bench = Bench::open();
+    assert!(!bench.camera.may_light());
+    bench.ask(Command::Configure(SMALL)).unwrap();
+    assert!(bench.camera.may_light());
+    bench.ask(Command::Start(RunLength::Continuous)).unwrap();
+    assert!(bench.camera.may_light());
+    bench.inputs.interlock_closed = false;
+    bench.poll();
+    assert!(!bench.camera.may_light());
+}
