@@ -211,7 +211,6 @@ const FAULTS: &[Fault] = &[
     ("an opcode within an access counts", "packet_port", "if clocks == 7 {", "if clocks >= 7 && !reads {"),
     ("a read begins where none may", "packet_port", "reads = may_begin && ", "reads = "),
     ("the pointers cross as they are", "packet_port", "written_gray = next_written ^ (next_written >> 1);", "written_gray = next_written;"),
-    ("the first byte comes a clock of sck before it is there", "packet_port", "written_here = written_once;", "written_here = written_gray;"),
     ("a packet by sck is asked for twice", "spi_slave", "send      = idle && !asked;", "send      = 1;"),
     ("a packet by sck is not asked for", "spi_slave", "send      = idle && !asked;", "send      = 0;"),
     ("a packet by sck is asked for as a burst", "spi_slave", "operation = HOST_FRAME[1:0];\n                send      = idle && !asked;", "operation = HOST_RAW[1:0];\n                send      = idle && !asked;"),
@@ -229,9 +228,14 @@ const FAULTS: &[Fault] = &[
 ];
 
 /// Faults that only the module's own bench notices. Beyond the packet the host port sends zeros, which are delimiters
-/// too. The equivalence runs are too short for a sum of 2^31.
-const BENCH_ALONE: &[&str] =
-    &["the packet has no delimiter", "the upper part of the sum has a bit less"];
+/// too. The equivalence runs are too short for a sum of 2^31. In the core, only the right opcode at the start of an access
+/// is fast enough to begin a read by `sck`.
+const BENCH_ALONE: &[&str] = &[
+    "the packet has no delimiter",
+    "the upper part of the sum has a bit less",
+    "the opcode counts by its last bits",
+    "an opcode within an access counts",
+];
 
 /// Whether the equivalence runs do not reach a fault, so that the module's own bench alone must notice the fault.
 fn is_beside((what, file, ..): &Fault) -> bool {
