@@ -53,6 +53,8 @@ module nirspi_core (
     input  logic        clk_host,
     input  logic        rst_host,
     input  logic        rst_bridge,
+    input  logic        clk_sck,
+    input  logic        rst_sck,
     input  logic [7:0]  design_id,
     input  logic        adc_beat,
     input  logic        pll_locked,
