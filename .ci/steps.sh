@@ -324,10 +324,12 @@ step_web() {
     [ "$bytes" -lt 12000000 ]
     debian chromium || echo "no chromium installed here"
     if [ -x /usr/bin/chromium ]; then
-        cargo build --locked --release --bin nirspi --example in_turns
+        cargo build --locked --release
+        # Of the units of step `test`: a release build of an example has other features than the program's.
+        cargo build --locked --example in_turns
         python_with browser playwright==1.65.2
-        local built=${CARGO_TARGET_DIR:-target}/release
-        target/browser/bin/python host/web/tests/check.py target/book/camera "$built/examples/in_turns" "$built/nirspi"
+        local built=${CARGO_TARGET_DIR:-target}
+        target/browser/bin/python host/web/tests/check.py target/book/camera "$built/debug/examples/in_turns" "$built/release/nirspi"
     else
         echo "skipped: the camera in a browser, no chromium"
     fi

@@ -10,7 +10,7 @@ use crate::recording::RecordingError;
 use crate::session::CameraIdentity;
 use crate::tally::Misfit;
 use nirspi_recon::{
-    Dropout, Image, MeasurementError, Measurements, Order, Rows, Side, reconstruct,
+    Dropout, Image, MeasurementError, Measurements, Order, Rows, ShorterSweep, Side, reconstruct,
 };
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -115,12 +115,26 @@ impl FirstPatterns {
     /// The first `sampling` (0 to 1) of all patterns, and the name of the order.
     ///
     /// # Errors
-    /// [`MeasurementError`] if the share is empty, or the order does not fit these patterns.
+    /// As [`FirstPatterns::among`].
     pub fn take(
         &self,
         measurements: &Measurements,
         sampling: f64,
     ) -> Result<(Measurements, String), MeasurementError> {
+        let (first, name) = self.among(measurements.rows(), sampling)?;
+        Ok((first.of(measurements), name))
+    }
+
+    /// Which of these rows [`take`](Self::take) takes of every measurement that has them, and the
+    /// name of the order.
+    ///
+    /// # Errors
+    /// [`MeasurementError`] if the share is empty, or the order does not fit these patterns.
+    pub fn among(
+        &self,
+        rows: &Rows,
+        sampling: f64,
+    ) -> Result<(ShorterSweep, String), MeasurementError> {
         let (order, name) = match self {
             Self::Of(order) => (Some(order.clone()), order.to_string()),
             // All patterns together give the same image in any order.
@@ -130,7 +144,7 @@ impl FirstPatterns {
                 (Some(order), name)
             }
             Self::LowestSequencies | Self::Recorded => {
-                let known = Order::of(measurements.rows().as_slice(), measurements.side());
+                let known = Order::of(rows.as_slice(), rows.side());
                 let name = known.map_or_else(
                     || RECORDED.to_owned(),
                     |order| format!("{RECORDED}, which is {order}"),
@@ -138,7 +152,7 @@ impl FirstPatterns {
                 (None, name)
             }
         };
-        Ok((measurements.take(order.as_ref(), sampling)?, name))
+        Ok((ShorterSweep::new(rows, order.as_ref(), sampling)?, name))
     }
 }
 

@@ -8,7 +8,7 @@ use nirspi::calibration;
 use nirspi::files::measurement::{Form, Selection};
 use nirspi::source::{Index, Part, Source, SourceOptions};
 use nirspi_recon::{Dropout, Image, Measurements, Rows, Side};
-use numpy::PyReadonlyArray1;
+use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
@@ -41,7 +41,7 @@ impl FlatField {
         &self,
         py: Python<'py>,
         pixels: PyReadonlyArray1<'py, f32>,
-    ) -> PyResult<Bound<'py, numpy::PyArray1<f32>>> {
+    ) -> PyResult<Bound<'py, PyArray1<f32>>> {
         let side = Side::INSTRUMENT;
         let values = slice(&pixels)?;
         crate::arrays::whole("the array", values.len(), side.area())?;
@@ -115,13 +115,17 @@ fn lost(dropouts: Vec<Dropout>) -> Vec<Lost> {
     dropouts.into_iter().map(|d| (d.start, d.length, d.rows)).collect()
 }
 
-fn as_dict<'py>(py: Python<'py>, source: Source) -> PyResult<Bound<'py, PyDict>> {
+/// A measurement with the rows `shown`, which measurements of one file share.
+fn as_dict<'py>(
+    py: Python<'py>,
+    source: Source,
+    shown: &Bound<'py, PyArray1<i64>>,
+) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
-    let measured = &source.measurements;
-    dict.set_item("n", measured.side().pixels())?;
-    dict.set_item("rows", array(py, numbers(measured.rows())))?;
-    dict.set_item("d", array(py, measured.values().to_vec()))?;
-    let imaginary = source.imaginary.as_ref().map(|part| array(py, part.values().to_vec()));
+    dict.set_item("n", source.measurements.side().pixels())?;
+    dict.set_item("rows", shown)?;
+    dict.set_item("d", array(py, source.measurements.into_values()))?;
+    let imaginary = source.imaginary.map(|part| array(py, part.into_values()));
     dict.set_item("imaginary", imaginary)?;
     dict.set_item("dropouts", lost(source.dropouts))?;
     dict.set_item("not_read", source.not_read)?;
@@ -150,7 +154,18 @@ pub fn load<'py>(
         };
         read.map_err(of_source)
     })?;
-    sources.into_iter().map(|source| as_dict(py, source)).collect()
+    let mut found = Vec::with_capacity(sources.len());
+    let mut known: Option<(Rows, Bound<'py, PyArray1<i64>>)> = None;
+    for source in sources {
+        let rows = source.measurements.rows();
+        let shown = match known.take() {
+            Some((before, shown)) if before == *rows => shown,
+            _ => array(py, numbers(rows)),
+        };
+        known = Some((rows.clone(), shown.clone()));
+        found.push(as_dict(py, source, &shown)?);
+    }
+    Ok(found)
 }
 
 /// The differences of readings in a form, one measurement: `(rows, d, dropouts, notes)`.
@@ -163,8 +178,8 @@ pub fn readings<'py>(
     y: PyReadonlyArray1<'py, f64>,
     form: &str,
 ) -> PyResult<(
-    Bound<'py, numpy::PyArray1<i64>>,
-    Bound<'py, numpy::PyArray1<f64>>,
+    Bound<'py, PyArray1<i64>>,
+    Bound<'py, PyArray1<f64>>,
     Vec<Lost>,
     Vec<String>,
 )> {
@@ -200,6 +215,6 @@ pub fn readings<'py>(
         };
         Ok((measured, dropouts, notes))
     })?;
-    let values = measured.values().to_vec();
-    Ok((array(py, numbers(measured.rows())), array(py, values), lost(dropouts), notes))
+    let rows = array(py, numbers(measured.rows()));
+    Ok((rows, array(py, measured.into_values()), lost(dropouts), notes))
 }

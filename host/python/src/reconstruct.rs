@@ -156,16 +156,40 @@ fn of_method(error: ReconstructError) -> PyErr {
     refusal(error)
 }
 
-fn report(method: Method, made: Reconstruction, used: usize, order: &str) -> PyResult<String> {
-    let words = made.report.to_string();
-    let warm = made.report.warm;
-    let named = MethodReport { method, made: made.report };
-    let mut report = serde_json::to_value(&named).map_err(|error| refused(error.to_string()))?;
-    report["used"] = used.into();
-    report["order"] = order.into();
-    report["warm"] = warm.into();
-    report["words"] = words.into();
-    Ok(report.to_string())
+/// An image, and what it was made of.
+struct Made {
+    made: Reconstruction,
+    used: Rows,
+    order: String,
+}
+
+impl Made {
+    /// Refuses an image that 32-bit floats cannot hold.
+    fn new(made: Reconstruction, used: &Measurements, order: String) -> PyResult<Self> {
+        if !made.image.pixels().iter().all(|pixel| pixel.is_finite()) {
+            return Err(refused("the readings are too large for an image of 32-bit floats"));
+        }
+        Ok(Self { made, used: used.rows().clone(), order })
+    }
+
+    fn has_report_of(&self, other: &Self) -> bool {
+        self.made.report == other.made.report
+            && self.used.len() == other.used.len()
+            && self.order == other.order
+    }
+
+    /// The report as JSON.
+    fn report(&self, method: Method) -> PyResult<String> {
+        let made = &self.made.report;
+        let named = MethodReport { method, made: made.clone() };
+        let mut report =
+            serde_json::to_value(&named).map_err(|error| refused(error.to_string()))?;
+        report["used"] = self.used.len().into();
+        report["order"] = self.order.as_str().into();
+        report["warm"] = made.warm.into();
+        report["words"] = made.to_string().into();
+        Ok(report.to_string())
+    }
 }
 
 /// The images of frames of differences, a report of each as JSON, and the rows used: of each, or those of all if they are
@@ -193,31 +217,46 @@ pub fn reconstruct<'py>(
     whole("d", d.len(), rows.len())?;
     let (pixels, reports, mut shown) = long(py, |stop| {
         let ready = method.prepare(&settings).map_err(of_method)?;
-        let taken = d.chunks_exact(rows.len()).map(|d| {
-            let (used, order) = first.take(&frame(&rows, d)?, sampling).map_err(refusal)?;
-            Ok((used, order))
-        });
-        let (used, orders): (Vec<Measurements>, Vec<String>) =
-            taken.collect::<PyResult<Vec<_>>>()?.into_iter().unzip();
-        let made: Vec<Reconstruction> = if warm {
-            ready.reconstruct_video(&used).map_err(of_method)?
+        // Worked out once, for all frames without a pattern that was not read.
+        let (whole, name) = first.among(&rows, sampling).map_err(refusal)?;
+        let taken = |d: &[f64]| {
+            let frame = frame(&rows, d)?;
+            if *frame.rows() == rows {
+                return Ok((whole.of(&frame), name.clone()));
+            }
+            first.take(&frame, sampling).map_err(refusal)
+        };
+        let frames = d.par_chunks_exact(rows.len());
+        let made: Vec<Made> = if warm {
+            let (used, orders): (Vec<Measurements>, Vec<String>) =
+                frames.map(taken).collect::<PyResult<Vec<_>>>()?.into_iter().unzip();
+            let made = ready.reconstruct_video(&used).map_err(of_method)?;
+            let parts = made.into_iter().zip(used.iter().zip(orders));
+            parts.map(|(made, (used, order))| Made::new(made, used, order)).collect::<PyResult<_>>()?
         } else {
-            let one = |used: &Measurements| match stop.load(Ordering::Relaxed) {
+            let one = |d| match stop.load(Ordering::Relaxed) {
                 true => Err(stopped()),
-                false => ready.reconstruct(used).map_err(of_method),
+                false => {
+                    let (used, order) = taken(d)?;
+                    let made = ready.reconstruct(&used).map_err(of_method)?;
+                    Made::new(made, &used, order)
+                }
             };
-            used.par_iter().map(one).collect::<PyResult<_>>()?
+            frames.map(one).collect::<PyResult<_>>()?
         };
         let mut pixels = Vec::with_capacity(made.len() * rows.side().area());
-        let mut reports = Vec::with_capacity(made.len());
-        for ((made, used), order) in made.into_iter().zip(&used).zip(&orders) {
-            if !made.image.pixels().iter().all(|pixel| pixel.is_finite()) {
-                return Err(refused("the readings are too large for an image of 32-bit floats"));
-            }
-            pixels.extend_from_slice(made.image.pixels());
-            reports.push(report(method, made, used.rows().len(), order)?);
+        let mut reports: Vec<String> = Vec::with_capacity(made.len());
+        for (k, one) in made.iter().enumerate() {
+            pixels.extend_from_slice(one.made.image.pixels());
+            // The reports of a simple method are all the same.
+            let before = k.checked_sub(1).filter(|&before| one.has_report_of(&made[before]));
+            let report = match before {
+                Some(before) => reports[before].clone(),
+                None => one.report(method)?,
+            };
+            reports.push(report);
         }
-        let shown: Vec<Rows> = used.iter().map(|used| used.rows().clone()).collect();
+        let shown: Vec<Rows> = made.into_iter().map(|one| one.used).collect();
         Ok((pixels, reports, shown))
     })?;
     if shown.windows(2).all(|two| two[0] == two[1]) {

@@ -42,7 +42,7 @@ pub use dropout::Dropout;
 pub use fwht::{FwhtLengthError, fwht};
 pub use image::Image;
 pub use leak::{Leak, LeakError, Sweep};
-pub use measurements::{MeasurementError, Measurements};
+pub use measurements::{MeasurementError, Measurements, ShorterSweep};
 pub use order::{NamedOrder, Order, ParseOrderError};
 pub use rows::{Rows, RowsError};
 pub use sampling::{Sampling, SamplingError};

@@ -4,6 +4,10 @@
 //! A [`Measurements`] has one finite value for each of its [`Rows`], whatever it was built from
 //! (`tests::each_fault_is_named`).
 
+mod shorter_sweep;
+
+pub use shorter_sweep::ShorterSweep;
+
 use crate::dropout::{self, Dropout};
 use crate::{Order, Rows, RowsError, Side, order};
 use thiserror::Error;
@@ -150,31 +154,13 @@ impl Measurements {
         Some(level)
     }
 
-    /// The part of these measurements that a shorter sweep would have taken: the first
-    /// `M = round(fraction * side^2)` (halves up, at least 1) patterns in the recorded order or,
-    /// with `order`, the first `M` of that order among the measured rows. Fewer than `M` come back
-    /// only if fewer were measured.
+    /// The part of these measurements that a shorter sweep would have taken: [`ShorterSweep::new`] says
+    /// which.
     ///
     /// # Errors
-    /// [`MeasurementError::Fraction`] unless `0 < fraction <= 1`; [`MeasurementError::Rows`] if the
-    /// order is a table that is not a permutation.
+    /// As [`ShorterSweep::new`].
     pub fn take(&self, order: Option<&Order>, fraction: f64) -> Result<Self, MeasurementError> {
-        if !(fraction > 0.0 && fraction <= 1.0) {
-            return Err(MeasurementError::Fraction { found: fraction });
-        }
-        let asked = ((fraction * self.side().area() as f64).round() as usize).max(1);
-        let positions: Vec<usize> = match order {
-            None => (0..self.rows.len()).take(asked).collect(),
-            Some(order) => {
-                let mut position = vec![None; self.side().area()];
-                for (k, &row) in self.rows.iter().enumerate() {
-                    position[row as usize] = Some(k);
-                }
-                let shown = order.rows(self.side())?;
-                shown.iter().filter_map(|&row| position[row as usize]).take(asked).collect()
-            }
-        };
-        Ok(self.subset(positions))
+        Ok(ShorterSweep::new(&self.rows, order, fraction)?.of(self))
     }
 
     /// Measurements that are known to be one finite value for each row.
@@ -192,6 +178,12 @@ impl Measurements {
     #[must_use]
     pub fn side(&self) -> Side {
         self.rows.side()
+    }
+
+    /// The values alone, one for each row.
+    #[must_use]
+    pub fn into_values(self) -> Vec<f64> {
+        self.values
     }
 
     /// Hadamard rows in the order of measurement.

@@ -4,7 +4,7 @@ and what breaks.
 
     python3 check.py FOLDER IN_TURNS NIRSPI [--screenshots DIR] [--least IMAGES_PER_S]
 
-FOLDER is that of `host/web/build.sh`, IN_TURNS the program of `cargo build --release --example in_turns`, NIRSPI that of
+FOLDER is that of `host/web/build.sh`, IN_TURNS the program of `cargo build --example in_turns`, NIRSPI that of
 `cargo build --release`. Needs playwright (PyPI) and chromium (Debian). Says what is wrong and exits 1, or prints what it saw.
 """
 

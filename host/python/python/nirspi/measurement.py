@@ -36,6 +36,8 @@ class Measurement:
         patterns alone.
     transpose : bool
         Whether pixels are numbered down the columns, as in MATLAB.
+    copy : bool
+        Whether ``d`` is copied. Without a copy, later changes of the array change the measurement.
     unit : str
         Unit of the readings, for pictures.
 
@@ -71,6 +73,7 @@ class Measurement:
     n: Any = None
     readings: dataclasses.InitVar[str] = "pairs"
     transpose: dataclasses.InitVar[bool] = False
+    copy: dataclasses.InitVar[bool] = True
     unit: str = "units of the readings"
     dropouts: list[Any] = field(default_factory=list)
     not_read: Any = None
@@ -79,7 +82,7 @@ class Measurement:
     notes: list[str] = field(default_factory=list)
     flat_field: Any = field(default=None, repr=False)
 
-    def __post_init__(self, y: Any, readings: str, transpose: bool) -> None:
+    def __post_init__(self, y: Any, readings: str, transpose: bool, copy: bool) -> None:
         if (self.d is None) == (y is None):
             raise Error(
                 "a measurement of d and y, expected one of them"
@@ -115,11 +118,13 @@ class Measurement:
         if y is not None:
             self._of_readings(values, rows, form)
         else:
-            self.rows, self.d = rows[kept], values[..., kept]
+            # A selection is a copy already.
+            self.rows, self.d = rows[kept], values[..., kept] if copy or not kept.all() else values
         # The compiled part checks that rows are in range and different.
         _nirspi.Operator(self.n, self.rows, False, False)
-        infinite = np.argwhere(np.isinf(self.d))
-        if len(infinite):
+        infinite = np.isinf(self.d)
+        if infinite.any():
+            infinite = np.argwhere(infinite)
             at = ", ".join(str(int(k)) for k in infinite[0])
             raise Error(f"d is {self.d[tuple(infinite[0])]} at [{at}], expected finite numbers")
 
@@ -327,7 +332,7 @@ def load(
     found = _nirspi.load(os.fspath(path), options)
     first = found[0]
     n, rows = first["n"], first["rows"]
-    if any(len(one["rows"]) != len(rows) or (one["rows"] != rows).any() for one in found):
+    if not all(one["rows"] is rows or np.array_equal(one["rows"], rows) for one in found):
         rows = _merged([one["rows"] for one in found])
     every = [_aligned(one, rows) for one in found]
     several = "all" in (index, detector)
@@ -346,6 +351,7 @@ def load(
         d=np.stack(every) if several else every[0],
         rows=rows,
         n=n,
+        copy=False,
         unit="units of the readings" if frames is None else "ADC counts",
         dropouts=[one["dropouts"] for one in found],
         not_read=np.asarray(sorted(set.intersection(*map(set, unread))), np.int64),

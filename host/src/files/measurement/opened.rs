@@ -14,6 +14,8 @@ pub(super) struct Opened {
     pub(super) side: Side,
     /// The row shown k-th; `None` for a row that was not read.
     rows: Vec<Option<u32>>,
+    /// All rows, if each was read: the measurements share them.
+    every_row: Option<Rows>,
     form: Form,
     pub(super) readings: NamedReadings,
     reference: Option<(Field, usize)>,
@@ -77,7 +79,10 @@ impl Opened {
                 None
             });
         let simulated = read_simulated(&mut fields);
-        Ok(Self { fields, side, rows, form, readings, reference, simulated, notes })
+        // A list that is not sound is refused with the first measurement.
+        let every_row: Option<Vec<u32>> = rows.iter().copied().collect();
+        let every_row = every_row.and_then(|rows| Rows::new(side, rows).ok());
+        Ok(Self { fields, side, rows, every_row, form, readings, reference, simulated, notes })
     }
 
     /// Number of patterns, those that were not read included.
@@ -95,15 +100,16 @@ impl Opened {
             check_infinite(path, name, values)?;
         }
         let count = self.rows.len();
-        let at = |k: usize| -> Vec<usize> {
-            match self.form {
-                Form::Pairs => vec![2 * k, 2 * k + 1],
-                Form::Halves => vec![k, count + k],
-                Form::Single | Form::Differences => vec![k],
-            }
+        let at = |k: usize| {
+            let (first, second) = match self.form {
+                Form::Pairs => (2 * k, Some(2 * k + 1)),
+                Form::Halves => (k, Some(count + k)),
+                Form::Single | Form::Differences => (k, None),
+            };
+            std::iter::once(first).chain(second)
         };
         let is_read = |k: usize| {
-            let finite = |values: &[f64]| at(k).iter().all(|&reading| values[reading].is_finite());
+            let finite = |values: &[f64]| at(k).all(|reading| values[reading].is_finite());
             self.rows[k].is_some() && finite(&real) && imaginary.as_deref().is_none_or(finite)
         };
         let (places, not_read): (Vec<usize>, Vec<usize>) = (0..count).partition(|&k| is_read(k));
@@ -111,19 +117,27 @@ impl Opened {
             let found = "has no pattern that was read: all are NaN";
             return Err(FileError::field(path, name.clone(), found, "finite readings"));
         }
+        let as_they_are = not_read.is_empty() && self.form != Form::Halves;
         let kept = |values: Vec<f64>| -> Readings {
-            let values =
-                places.iter().flat_map(|&k| at(k)).map(|reading| values[reading]).collect();
+            let values = match as_they_are {
+                true => values,
+                false => places.iter().flat_map(|&k| at(k)).map(|at| values[at]).collect(),
+            };
             match self.form {
                 Form::Pairs | Form::Halves => Readings::Pairs(values),
                 Form::Single => Readings::Single(values),
                 Form::Differences => Readings::Differential(values),
             }
         };
-        let rows = places.iter().filter_map(|&k| self.rows[k]);
-        let h_row = Rows::new(self.side, rows).map_err(|error| {
-            FileError::field(path, "h_row", format!("({error})"), "each row once")
-        })?;
+        let h_row = match &self.every_row {
+            Some(every) if not_read.is_empty() => every.clone(),
+            _ => {
+                let rows = places.iter().filter_map(|&k| self.rows[k]);
+                Rows::new(self.side, rows).map_err(|error| {
+                    FileError::field(path, "h_row", format!("({error})"), "each row once")
+                })?
+            }
+        };
         let reference = self.reference.as_ref().map(|(field, count)| {
             let area = self.side.area();
             let start = if *count == 1 { 0 } else { index * area };

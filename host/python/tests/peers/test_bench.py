@@ -1,0 +1,22 @@
+"""What is timed side by side gives the same."""
+
+import numpy as np
+import pytest
+from nirspi.bench import file, omp
+
+
+def test_every_package_makes_the_same_images_of_a_file(tmp_path):
+    pytest.importorskip("torch")
+    (contestants,) = file(str(tmp_path / "m.npz"), 5, 8, None).values()
+    truth = np.random.default_rng(1).random((5, 8, 8), np.float32)
+    for name, run in contestants.items():
+        found = np.asarray(run()).reshape(truth.shape)
+        assert np.allclose(found, truth, atol=1e-5), name
+
+
+def test_every_pursuit_finds_the_same_coefficients():
+    for contestants in omp(20, 30, 4, 6).values():
+        found = {name: run() for name, run in contestants.items() if "another pursuit" not in name}
+        dense = [one.toarray() if hasattr(one, "toarray") else np.asarray(one) for one in found.values()]
+        for name, one in zip(found, dense, strict=True):
+            assert np.allclose(one, dense[0], atol=1e-4), name
