@@ -2,8 +2,8 @@
 ///
 /// Invariant: the bytes are those of `mcu/wire/src/ready.rs`, and nothing follows the delimiter. A block of COBS
 /// begins with its length, so bytes wait in a ring until their block is closed. The first byte waits until 100 bytes
-/// are final: they take a host of 60 MHz 416 clocks, and the next block is closed in 390. So a host that takes at most
-/// six bytes in 25 clocks finds no gap.
+/// are final: they take a host of 60 MHz 416 clocks, and the next block is closed in 345, because a sample of 24 bits
+/// takes 4 clocks and one of 32 bits 5. So a host that takes at most six bytes in 25 clocks finds no gap.
 module nirspi_packer (
     input  var logic                           clk        ,
     input  var logic                           rst        ,
@@ -67,30 +67,51 @@ module nirspi_packer (
         micros <= quotient + stamp.time_base;
     end
 
-    // The next sample is fetched while the one before goes out.
+    // The next sample is fetched while the one before goes out. The address of its positive sum stands from then on; with
+    // that of its negative sum, which stands for a clock, the index goes on.
+    localparam logic [3-1:0] OPENED  = 4;
+    localparam logic [3-1:0] BEGINS  = 7;
+    localparam logic [3-1:0] FETCHED = 3;
+
     Part           part      ;
     logic [4-1:0]  bytes_left; // of `word`
     logic [10-1:0] index     ;
-    logic [3-1:0]  age       ; // clocks since the address of the positive sum, up to 5
+    logic [3-1:0]  age       ; // clocks since the address of the negative sum, up to `FETCHED`; at first from `OPENED` on
     logic [32-1:0] positive  ;
     logic [32-1:0] sample    ;
     logic          loads     ;
+    logic          fetches   ;
 
-    always_comb sum_address = {age[0], index};
-    always_comb loads       = part == Part_Sums && bytes_left == 0 && age == 5;
+    always_comb sum_address = {fetches, index};
+    always_comb loads       = part == Part_Sums && bytes_left == 0 && age == FETCHED;
+    always_comb fetches     = loads || age == BEGINS;
 
     always_ff @ (posedge clk) begin
-        if (open || loads) begin
-            age <= 0;
-        end else if (age != 5) begin
+        if (open) begin
+            age   <= OPENED;
+            index <= 0;
+        end else if (fetches) begin
+            age   <= 0;
+            index <= index + 1;
+        end else if (age != FETCHED) begin
             age <= age + 1;
         end
-        if (age == 3) begin
+        if (age == 1) begin
             positive <= sum_word[31:0];
         end
-        if (age == 4) begin
+        if (age == 2) begin
             sample <= positive - (((settings.differential) ? ( sum_word[31:0] ) : ( 0 )));
         end
+    end
+
+    // Bytes of all samples: 4 or 3 of each.
+    logic [13-1:0] all_of_four;
+    logic [13-1:0] length     ;
+
+    always_comb all_of_four = {settings.patterns, 2'b0};
+
+    always_ff @ (posedge clk) begin
+        length <= all_of_four - (((settings.narrow) ? ( {2'b0, settings.patterns} ) : ( 0 )));
     end
 
     // Bytes of the message, lowest first, and the ring in which their blocks grow.
@@ -145,7 +166,6 @@ module nirspi_packer (
             bytes_left <= 0;
             padded     <= 0;
             field      <= 0;
-            index      <= 0;
             code_at    <= 0;
             next_at    <= 1;
             distance   <= 1;
@@ -153,7 +173,6 @@ module nirspi_packer (
             part       <= ((open) ? ( Part_Head ) : ( Part_Idle ));
             bytes_left <= 0;
             field      <= 0;
-            index      <= 0;
             code_at    <= 0;
             next_at    <= 1;
             distance   <= 1;
@@ -206,12 +225,12 @@ module nirspi_packer (
                             bytes_left <= 3;
                         end
                         6: begin
-                            word       <= 0;
+                            word       <= ((settings.narrow) ? ( 64'(nirspi_register_map::SAMPLES_NARROW) ) : ( 0 ));
                             bytes_left <= 1;
                             padded     <= 0;
                         end
                         default: begin
-                            word       <= {51'b0, settings.patterns, 2'b0};
+                            word       <= 64'(length);
                             bytes_left <= 2;
                             part       <= Part_Sums;
                         end
@@ -219,10 +238,10 @@ module nirspi_packer (
                 end
                 Part_Sums: if (loads) begin
                     word       <= {32'b0, sample};
-                    bytes_left <= 4;
+                    bytes_left <= ((settings.narrow) ? ( 3 ) : ( 4 ));
                     padded     <= 0;
-                    index      <= index + 1;
-                    if (index == settings.patterns_less_1) begin
+                    // The index is that of the next sample; 1024 patterns count as 0.
+                    if (index == settings.patterns[9:0]) begin
                         part <= Part_Check;
                     end
                 end

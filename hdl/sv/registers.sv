@@ -126,6 +126,7 @@ module nirspi_registers
         next.differential     <= (mode & MODE_DIFFERENTIAL) != 0;
         next.test_source      <= (mode & MODE_TEST_SOURCE) != 0;
         next.packets          <= (mode & MODE_PACKETS) != 0;
+        next.narrow           <= (mode & MODE_NARROW) != 0;
         next.patterns         <= patterns[10:0];
         next.patterns_less_1  <= patterns[9:0] - 1;
         next.single_pattern   <= patterns == 1;

@@ -8,6 +8,7 @@ package nirspi_types;
         logic          differential    ;
         logic          test_source     ;
         logic          packets         ; /// Frames are sent as packets
+        logic          narrow          ; /// Samples of a packet have 24 bits
         logic [11-1:0] patterns        ;
         logic [10-1:0] patterns_less_1 ;
         logic          single_pattern  ;

@@ -82,6 +82,8 @@ impl From<&Identity<'_>> for CameraIdentity {
 
 /// The name of [`Capabilities::BRING_UP`].
 const BRING_UP: &str = "bring-up";
+/// The name of [`Capabilities::NARROW_SAMPLES`].
+const NARROW_SAMPLES: &str = "24-bit samples";
 
 /// The name of each capability; the number of the bit for a capability that this program does not
 /// know.
@@ -190,7 +192,11 @@ impl Session {
         match identity {
             Ok(identity) if version::speaks(identity.protocol) => {
                 // Every command shows it: such a picture is not of the scene.
-                if identity.capabilities.iter().any(|name| name == BRING_UP) {
+                let can = |name| identity.capabilities.iter().any(|word| word == name);
+                if can(NARROW_SAMPLES) {
+                    conversation.ask_narrow();
+                }
+                if can(BRING_UP) {
                     let what = design_in_words(Design::BringUp);
                     reports.keep(Some(format!("the camera runs the gateware for {what}")));
                 }

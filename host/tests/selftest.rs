@@ -262,8 +262,8 @@ impl<L: Link> Link for Lossy<L> {
                         self.packet.push(byte);
                         if byte == 0 {
                             // Frames of 1024 patterns; bursts come in shorter pieces.
-                            self.long += usize::from(self.packet.len() > 4000);
-                            if self.packet.len() > 4000 && self.long.is_multiple_of(3) {
+                            self.long += usize::from(self.packet.len() > 3000);
+                            if self.packet.len() > 3000 && self.long.is_multiple_of(3) {
                                 self.packet.clear();
                             }
                             self.ready.append(&mut self.packet);

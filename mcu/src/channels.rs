@@ -30,7 +30,7 @@ impl Channels {
                 flags: header.flags,
                 samples,
             };
-            let payload = samples.len().saturating_mul(4).saturating_add(STREAM_HEADER_BYTES);
+            let payload = samples.byte_len().saturating_add(STREAM_HEADER_BYTES);
             send(&DeviceMessage::Channel(Channel { detector, frame }), payload, sink);
         }
     }

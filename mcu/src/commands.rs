@@ -12,7 +12,8 @@ use crate::notices::{Notice, Outcome};
 use crate::{
     FpgaBus, GatewareLoader, Inputs, Micros, PacketSink, Ports, configure, fpga, gateware, safety,
 };
-use nirspi_wire::register::{Design, NO_CLOCK, ORDER_TABLE, Register, mode, status};
+use nirspi_wire::register::{Design, NO_CLOCK, ORDER_TABLE, Register, status};
+use nirspi_wire::samples::Width;
 use nirspi_wire::{
     Answer, Capabilities, Command, Configuration, DeviceMessage, GatewareChunk, PATTERNS,
     PatternOrder, Refusal, Reply, Request, Signal, State, Status, Tail, version,
@@ -78,10 +79,13 @@ impl Machine {
     /// Opens a new session, and ends what the host before has left running.
     fn hello(&mut self, id: u16, now: Micros, protocol: u16, bus: &mut impl FpgaBus) {
         let gateware = fpga::version(bus);
-        let added = match fpga::design(bus) {
+        let mut added = match fpga::design(bus) {
             Ok(Design::BringUp) => Capabilities::BRING_UP,
             Ok(Design::Camera) | Err(_) => Capabilities::default(),
         };
+        if protocol >= Width::NARROW_SINCE {
+            added = added.with(Capabilities::NARROW_SAMPLES);
+        }
         let detectors = bus.detectors();
         let spoken = version::speaks(protocol);
         let answered = if spoken { protocol } else { version::CURRENT };
@@ -125,9 +129,10 @@ impl Machine {
         }
         self.loading = None;
         self.setup = None;
-        let of_one = bus.detectors() == 1;
-        if of_one && setup.fits_packets() && fpga::makes_packets(bus).map_err(|_| Refusal::Bus)? {
-            setup.mode |= mode::PACKETS;
+        if bus.detectors() == 1 {
+            let version = fpga::read(bus, Register::Version).map_err(|_| Refusal::Bus)?;
+            let knows = self.protocol().is_some_and(|protocol| protocol >= Width::NARROW_SINCE);
+            setup.mode |= setup.packets(version, knows && configuration.narrow == Tail(Some(true)));
         }
         let table = match &configuration.order {
             PatternOrder::Table(table) => fpga::set_table(bus, table),

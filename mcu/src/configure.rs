@@ -6,9 +6,9 @@
 //! that the FPGA accepts (`crate::tests::commands::a_number_out_of_range_is_named_with_its_range`).
 
 use crate::Limits;
-use nirspi_wire::ready::MAX_SUMMED_SAMPLES;
-use nirspi_wire::register::{DUTY_WINDOW, LATENCY_MAX, mode};
-use nirspi_wire::samples::Words;
+use nirspi_wire::ready::{MAX_NARROW_SAMPLES, MAX_SUMMED_SAMPLES};
+use nirspi_wire::register::{DUTY_WINDOW, LATENCY_MAX, measures_frames, mode, narrows_packets};
+use nirspi_wire::samples::{Width, Words};
 use nirspi_wire::{
     ConfigField, ConfigProblem, Configuration, PATTERNS, PatternOrder, SampleSource,
 };
@@ -34,15 +34,29 @@ impl Setup {
         u64::from(self.patterns).saturating_mul(self.dwell.into()).saturating_mul(halves)
     }
 
-    /// Whether the FPGA may make packets of the frames: a packet has no room for larger sums.
-    pub fn fits_packets(&self) -> bool {
+    /// Bits of `Mode` for packets, which gateware of this version makes of the frames if no sum has too many samples
+    /// for it. With `asked`, the samples of packets have 24 bits where they hold every difference.
+    pub fn packets(&self, version: u32, asked: bool) -> u32 {
         let samples = u32::from(self.dwell.saturating_sub(self.blank));
-        samples.saturating_mul(self.sweeps) <= MAX_SUMMED_SAMPLES
+        let samples = samples.saturating_mul(self.sweeps);
+        // A packet leaves out what the signal meter asks the FPGA for.
+        if !measures_frames(version) || samples > MAX_SUMMED_SAMPLES {
+            0
+        } else if asked && narrows_packets(version) && samples <= MAX_NARROW_SAMPLES {
+            mode::PACKETS | mode::NARROW
+        } else {
+            mode::PACKETS
+        }
     }
 
     /// Whether the FPGA makes packets of the frames.
     pub fn sends_packets(&self) -> bool {
         self.mode & mode::PACKETS != 0
+    }
+
+    /// Bits of a sample of a packet.
+    pub fn width(&self) -> Width {
+        if self.mode & mode::NARROW == 0 { Width::Bits32 } else { Width::Bits24 }
     }
 
     /// ADC clocks of a frame.
@@ -167,6 +181,7 @@ impl Light<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nirspi_wire::Tail;
     use proptest::prelude::*;
 
     const PAIRS: Configuration<'static> = Configuration {
@@ -179,6 +194,7 @@ mod tests {
         sweeps: 10,
         source: SampleSource::Detector,
         over_range_trip: 0,
+        narrow: Tail(None),
     };
 
     fn permille(configuration: Configuration<'_>) -> Result<u16, ConfigProblem> {

@@ -11,7 +11,7 @@ use crate::configure::Setup;
 use crate::{BusError, FpgaBus, Limits, Micros};
 use nirspi_wire::register::{
     DAMAGED, Design, FaultCode, IDENTITY, NO_CLOCK, ORDER_TABLE, Register, control, has_this_map,
-    measures_frames, status,
+    status,
 };
 use nirspi_wire::samples::Words;
 use nirspi_wire::{Fault, Version};
@@ -127,11 +127,6 @@ pub(crate) fn version(bus: &mut impl FpgaBus) -> Version {
         }
         _ => Version(0, 0, 0),
     }
-}
-
-/// Whether the gateware makes packets, and gives the signal meter what they leave out.
-pub(crate) fn makes_packets(bus: &mut impl FpgaBus) -> Result<bool, BusError> {
-    read(bus, Register::Version).map(measures_frames)
 }
 
 /// Says what the packets of the next run carry beside their frames: the number of the run, and the device time of the

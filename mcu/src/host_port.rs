@@ -60,8 +60,9 @@ use nirspi_wire::fpga::{MAX_FRAME_BYTES, frame_bytes};
 use nirspi_wire::host_port::{
     READ_FRAME, READ_PACKET, READ_RAW, SEALED_BYTES, seal, unchecked, unseal,
 };
-use nirspi_wire::ready;
+use nirspi_wire::ready::{self, FAST_LEAD_BYTES, LEAD_BYTES};
 use nirspi_wire::register::{NO_CLOCK, ORDER_TABLE, Register, clocks_packets, control, mode};
+use nirspi_wire::samples::Width;
 
 /// Number of attempts at a transfer. The FPGA keeps the data until the release.
 const ATTEMPTS: u8 = 3;
@@ -333,11 +334,14 @@ impl<'b, P: HostPort> PortBus<'b, P> {
         let within = |length: usize| length.min(MAX_FRAME_BYTES);
         let patterns = u16::try_from(self.patterns).unwrap_or(u16::MAX);
         self.packets = self.mode & mode::PACKETS != 0;
-        (self.opcode, self.frame_bytes) = match (self.packets, self.clocks_packets) {
-            (true, true) => (READ_PACKET, within(ready::fast_read_bytes(patterns))),
-            (true, false) => (READ_FRAME, within(ready::read_bytes(patterns))),
-            (false, _) => (READ_FRAME, within(frame_bytes(patterns))),
-        };
+        let width = if self.mode & mode::NARROW == 0 { Width::Bits32 } else { Width::Bits24 };
+        let fast = self.packets && self.clocks_packets;
+        self.opcode = if fast { READ_PACKET } else { READ_FRAME };
+        let lead = if fast { FAST_LEAD_BYTES } else { LEAD_BYTES };
+        self.frame_bytes = within(match self.packets {
+            true => lead.saturating_add(ready::packet_bytes(patterns, width)),
+            false => frame_bytes(patterns),
+        });
         let samples = usize::try_from(self.raw_samples).unwrap_or(usize::MAX);
         self.raw_bytes = within(samples.saturating_mul(2));
     }
@@ -385,7 +389,7 @@ impl<P: HostPort> FpgaBus for PortBus<'_, P> {
         self.data(Data::Frame)
     }
 
-    fn packet_bytes(&self, _patterns: u16) -> usize {
+    fn packet_bytes(&self, _patterns: u16, _width: Width) -> usize {
         self.frame_bytes
     }
 

@@ -19,7 +19,7 @@ use crate::{BusError, FpgaBus, Micros, float, fpga};
 use nirspi_wire::fpga::{FpgaFrame, Header};
 use nirspi_wire::ready::Reader;
 use nirspi_wire::register::{Register, mode};
-use nirspi_wire::{ADC_BITS, FrameFlags, Samples, Signal};
+use nirspi_wire::{ADC_BITS, FrameFlags, Signal};
 
 /// Time between two comparisons.
 const PERIOD: Micros = Micros(100_000);
@@ -96,7 +96,7 @@ impl Meter {
         let Pair::Begun { sequence, at, shift } = self.pair else { return };
         let header = &frame.header;
         let length = usize::from(header.patterns).saturating_mul(4);
-        let before = packed.get(..length).and_then(|words| Samples::packed(shift, words).ok());
+        let before = packed.get(..length).map(|words| (words, shift));
         let follows = header.sequence == sequence.wrapping_add(1) && !has_wrapped(header);
         self.pair = match before.filter(|_| follows) {
             Some(before) => {
@@ -136,8 +136,7 @@ impl Meter {
         let Some(memory) = scratch.get_mut(..length) else { return };
         self.pair = Pair::Due(due);
         if follows && counts {
-            let Ok(before) = Samples::packed(0, memory) else { return };
-            let tally = self.tally(&mut || reader.sample().into(), before);
+            let tally = self.tally(&mut || reader.sample().into(), (memory, 0));
             if let (true, Ok((levels, over_range))) = (reader.is_intact(), measures(bus)) {
                 self.last = Some(Tally { levels, over_range, ..tally });
                 self.pair = Pair::Due(Micros(due.0.saturating_add(PERIOD.0)));
@@ -176,11 +175,14 @@ impl Meter {
         self.last.as_ref().map(Tally::signal)
     }
 
-    /// Sums over the readings of a frame, which `next` gives one by one, and of the frame before.
-    fn tally(&self, next: &mut dyn FnMut() -> i64, before: Samples<'_>) -> Tally {
+    /// Sums over the readings of a frame, which `next` gives one by one, and of the frame before, whose packed samples
+    /// of 32 bits have this shift.
+    fn tally(&self, next: &mut dyn FnMut() -> i64, (packed, of_packed): (&[u8], u8)) -> Tally {
         let mut tally = Tally { exposure: self.exposure, ..Tally::default() };
         let shift = self.exposure.shift();
-        for before in before.iter() {
+        let (words, _) = packed.as_chunks();
+        for word in words {
+            let before = i64::from(i32::from_le_bytes(*word)).wrapping_shl(of_packed.into());
             let reading = shifted(next(), shift);
             let change = reading.wrapping_sub(shifted(before, shift));
             tally.readings = tally.readings.wrapping_add(1);

@@ -7,6 +7,7 @@
 use crate::Micros;
 use core::ops::Range;
 use heapless::String;
+use nirspi_wire::samples::Width;
 use nirspi_wire::{Capabilities, RebootInto, Version};
 
 /// Why an access to the FPGA failed.
@@ -72,9 +73,9 @@ pub trait FpgaBus {
         Ok(None)
     }
 
-    /// Bytes to read of a packet of so many patterns.
-    fn packet_bytes(&self, patterns: u16) -> usize {
-        nirspi_wire::ready::read_bytes(patterns)
+    /// Bytes to read of a packet of so many patterns, with samples of this width.
+    fn packet_bytes(&self, patterns: u16, width: Width) -> usize {
+        nirspi_wire::ready::read_bytes(patterns, width)
     }
 
     /// Reads the packet that is ready into `room`, which is of the link and has

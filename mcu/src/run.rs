@@ -15,6 +15,7 @@ use crate::{FpgaBus, Limits, Micros, PacketSink, configure, fpga};
 use nirspi_wire::fpga::{FpgaFrame, Header};
 use nirspi_wire::ready::{self, BEGINNING_BYTES};
 use nirspi_wire::register::{NO_CLOCK, Register, control};
+use nirspi_wire::samples::Width;
 use nirspi_wire::{
     ConfigField, DeviceMessage, EventKind, Fault, Frame, PATTERNS, Refusal, RunLength, Samples,
 };
@@ -129,8 +130,8 @@ impl Counters {
 pub(crate) struct Run {
     length: RunLength,
     patterns: u16,
-    /// The FPGA makes packets of the frames.
-    packets: bool,
+    /// The FPGA makes packets of the frames, with samples of this width.
+    packets: Option<Width>,
     anchor: Anchor,
     stall_after: Micros,
     last_frame: Micros,
@@ -214,10 +215,12 @@ impl Run {
                 frames
             }
         };
-        let packets = setup.sends_packets();
+        let packets = setup.sends_packets().then(|| setup.width());
         let (anchor, started) = fpga::verify(bus, setup, limits)
             .and_then(|()| Ok(fpga::write(bus, Register::Frames, frames)?))
-            .and_then(|()| if packets { Ok(fpga::stamp(bus, number, now)?) } else { Ok(()) })
+            .and_then(
+                |()| if packets.is_some() { Ok(fpga::stamp(bus, number, now)?) } else { Ok(()) },
+            )
             .and_then(|()| Ok(fpga::clock(bus)?))
             .map_err(|_| fpga::health(bus).err().unwrap_or(Fault::FpgaConfiguration))
             .and_then(|clock| {
@@ -268,7 +271,7 @@ impl Run {
             self.last_kept.map_or(0, |last| u64::from(last) + 1),
             ending.map_or(u64::MAX, |ending| age(ending.since)),
             ending.and_then(|ending| ending.reply).map_or(0, |(id, _)| u64::from(id) + 1),
-            self.packets.into(),
+            self.packets.map_or(0, |width| width.bytes() as u64),
             // The sequence: the rest of the beginning is absolute.
             self.last_beginning[5..9].iter().fold(0, |key, &byte| key << 8 | u64::from(byte)),
         ]
@@ -313,17 +316,18 @@ impl Run {
         &mut self,
         now: Micros,
         path: Path<'_>,
-        release_pending: &mut bool,
+        (width, release_pending): (Width, &mut bool),
         bus: &mut impl FpgaBus,
         sink: &mut impl PacketSink,
     ) -> bool {
         let Path { counters, meter, scratch, may_send } = path;
-        let mut room = if may_send { sink.claim(bus.packet_bytes(self.patterns)) } else { None };
+        let length = bus.packet_bytes(self.patterns, width);
+        let mut room = if may_send { sink.claim(length) } else { None };
         let mut place = None;
         if let Some(room) = &mut room {
             match bus.packet(room) {
                 Ok(false) => return false,
-                Ok(true) => place = ready::packet_in(room, self.patterns),
+                Ok(true) => place = ready::packet_in(room, self.patterns, width),
                 Err(_) => {}
             }
         }
@@ -375,10 +379,10 @@ impl Run {
         bus: &mut impl FpgaBus,
         sink: &mut impl PacketSink,
     ) -> bool {
-        if self.packets {
+        if let Some(width) = self.packets {
             return may_come
                 && bus.frame_ready()
-                && self.take_packet(now, path, release_pending, bus, sink);
+                && self.take_packet(now, path, (width, release_pending), bus, sink);
         }
         if self.damaged {
             self.count_damaged(now, path.counters, bus);
@@ -492,7 +496,7 @@ impl Run {
         }
         self.last_frame = now;
         counters.advance(header.sequence.wrapping_add(1), header.lost);
-        let payload = samples.len().saturating_mul(4).saturating_add(STREAM_HEADER_BYTES);
+        let payload = samples.byte_len().saturating_add(STREAM_HEADER_BYTES);
         let frame = DeviceMessage::Frame(Frame {
             run: counters.run,
             sequence: header.sequence,

@@ -14,7 +14,7 @@ use nirspi_wire::host_port::SEALED_BYTES;
 use nirspi_wire::packet::MAX_HOST_PACKET;
 use nirspi_wire::register::Register;
 use nirspi_wire::{
-    Command, Configuration, PatternOrder, Request, RunLength, SampleSource, Version, encode,
+    Command, Configuration, PatternOrder, Request, RunLength, SampleSource, Tail, Version, encode,
     version,
 };
 use std::ops::Range;
@@ -153,6 +153,7 @@ pub fn stretch<P: TimedPort>(port: P, patterns: u16, frames: u32, processor: Pro
         sweeps: 1,
         source: SampleSource::Detector,
         over_range_trip: 0,
+        narrow: Tail(Some(true)),
     };
     for command in [
         Command::Hello { protocol: version::CURRENT },

@@ -23,7 +23,7 @@ use nirspi_tests::tamper::{Fate, Tampered, only_frames};
 use nirspi_wire::packet::MAX_HOST_PACKET;
 use nirspi_wire::{
     Answer, Command, Configuration, DeviceMessage, EventKind, Fault, PatternOrder, Reply, Request,
-    RunLength, SampleSource, encode, open,
+    RunLength, SampleSource, Tail, encode, open,
 };
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -152,6 +152,7 @@ fn said(mut link: Box<dyn Link>, protocol: u16, over_range_trip: u32) -> Said {
         sweeps: 1,
         source: SampleSource::Detector,
         over_range_trip,
+        narrow: Tail(None),
     };
     let commands = [
         Command::Hello { protocol },

@@ -11,8 +11,8 @@ use nirspi_wire::host_port::{SEALED_BYTES, seal, unseal};
 use nirspi_wire::packet::{MAX_HOST_PACKET, seal as seal_packet};
 use nirspi_wire::register::{IDENTITY, Register, control, mode, status};
 use nirspi_wire::{
-    Command, Configuration, FrameFlags, PatternOrder, RebootInto, Request, SampleSource, encode,
-    ready,
+    Command, Configuration, FrameFlags, PatternOrder, RebootInto, Request, SampleSource, Tail,
+    encode, ready,
 };
 use std::rc::Rc;
 use std::vec::Vec;
@@ -221,6 +221,7 @@ impl FakeFpga {
             sweeps: 1,
             flags: FrameFlags::DIFFERENTIAL,
             patterns,
+            width: nirspi_wire::samples::Width::Bits32,
         };
         let mut payload = head.to_bytes().to_vec();
         payload.extend((0..i32::from(patterns)).flat_map(|k| (93 + k).to_le_bytes()));
@@ -278,6 +279,7 @@ pub fn configuration(patterns: u16) -> Configuration<'static> {
         sweeps: 1,
         source: SampleSource::Detector,
         over_range_trip: 0,
+        narrow: Tail(None),
     }
 }
 

@@ -13,6 +13,7 @@ use nirspi_wire::{
     FrameFlags, PATTERNS,
     fpga::{Header, SUM_MODULUS, Sums},
     register::WAITING_FRAMES,
+    samples::Width,
 };
 use std::collections::VecDeque;
 
@@ -47,8 +48,8 @@ struct Complete {
     header: Header,
     /// Sum of its samples, modulo 2^64.
     total: u64,
-    /// What the packet carries beside the frame, if the frame is sent as one.
-    stamp: Option<Stamp>,
+    /// What the packet carries beside the frame, if the frame is sent as one, and the width of its samples.
+    packet: Option<(Stamp, Width)>,
     /// The frame's bytes, serialised at the first request.
     bytes: Option<Vec<u8>>,
 }
@@ -161,19 +162,19 @@ impl Frames {
             lost: self.lost,
             clock: summary.shown_at,
         };
-        let stamp = settings.packets.then_some(self.stamp);
+        let packet = settings.packets.then_some((self.stamp, settings.width));
         let (bank, total) = (self.filling, summary.total);
-        self.waiting.push_back(Complete { bank, header, total, stamp, bytes: None });
+        self.waiting.push_back(Complete { bank, header, total, packet, bytes: None });
         // Banks are filled in turn, and frames come and go in one order, so the next bank is free.
         self.filling = (bank + 1) % BANKS;
     }
 
     /// The host's frame as it crosses the host port.
     pub(crate) fn bytes(&mut self) -> Option<&[u8]> {
-        let Complete { bank, header, stamp, bytes, .. } = self.waiting.front_mut()?;
+        let Complete { bank, header, packet: form, bytes, .. } = self.waiting.front_mut()?;
         let bank = &self.banks[*bank];
-        Some(bytes.get_or_insert_with(|| match stamp {
-            Some(stamp) => packet(header, bank, stamp),
+        Some(bytes.get_or_insert_with(|| match form {
+            Some((stamp, width)) => packet(header, bank, stamp, *width),
             None => format::frame(header, bank),
         }))
     }

@@ -10,6 +10,7 @@ use crate::registers::Registers;
 use nirspi_wire::{
     PATTERNS,
     register::{DUTY_LIMIT_MAX, LATENCY_MAX, RAW_SAMPLES_MAX, Register, WATCHDOG_MAX, mode},
+    samples::Width,
 };
 use std::ops::RangeInclusive;
 
@@ -21,6 +22,8 @@ pub(crate) struct Settings {
     pub(crate) test_source: bool,
     /// Frames are sent as packets.
     pub(crate) packets: bool,
+    /// Bits of a sample of a packet.
+    pub(crate) width: Width,
     pub(crate) patterns: u16,
     /// In clocks.
     pub(crate) dwell: u16,
@@ -62,6 +65,7 @@ impl Settings {
             differential: bits & mode::DIFFERENTIAL != 0,
             test_source: bits & mode::TEST_SOURCE != 0,
             packets: bits & mode::PACKETS != 0,
+            width: if bits & mode::NARROW == 0 { Width::Bits32 } else { Width::Bits24 },
             patterns: within(Register::Patterns, 1..=PATTERNS.into())? as u16,
             dwell: dwell as u16,
             blank: within(Register::Blank, 0..=dwell - 1)? as u16,

@@ -2,10 +2,12 @@
 
 use super::*;
 use crate::link::Received;
+use crate::setup::MeasurementSetup;
+use nirspi_recon::Order;
 use nirspi_wire::packet::MAX_DEVICE_PACKET;
 use nirspi_wire::{
-    Answer, Capabilities, CrashReport, Event, EventKind, Fault, Refusal, Reply, State, Tail,
-    Version, encode,
+    Answer, Capabilities, Configuration, CrashReport, Event, EventKind, Fault, Refusal, Reply,
+    State, Tail, Version, encode,
 };
 use std::io;
 
@@ -200,6 +202,40 @@ fn an_older_camera_is_greeted_again_in_its_own_version() {
     };
     let expected = [vec![0], hello(0, version::CURRENT), hello(1, 1)].concat();
     assert_eq!(*requests.lock().unwrap(), expected);
+}
+
+/// What a host sends to a camera with these capabilities that it asks to measure in this way.
+fn configured(capabilities: Capabilities, narrow: Option<bool>) -> Tail<bool> {
+    let camera = Identity { capabilities: Tail(Some(capabilities)), ..IDENTITY };
+    let answers = vec![reply(0, Answer::Hello(camera)), reply(1, Answer::Done)];
+    let requests = std::sync::Arc::default();
+    let link = Heard { answers: Scripted(answers), requests: std::sync::Arc::clone(&requests) };
+    let mut session = Session::open(Box::new(link)).unwrap();
+    let setup = MeasurementSetup::new(&Order::Natural, 1.0).unwrap();
+    setup
+        .with_configuration(|configuration| {
+            let configuration = Configuration { narrow: Tail(narrow), ..configuration };
+            session.command(request::Configure(configuration), &mut IgnorePackets)
+        })
+        .unwrap();
+    let mut sent = requests.lock().unwrap().clone();
+    // Nothing, the greeting, the configuration.
+    let mut packets: Vec<&mut [u8]> = sent.split_mut(|&byte| byte == 0).collect();
+    assert_eq!(packets.len(), 4);
+    let request: nirspi_wire::Request<'_> = nirspi_wire::open(packets[2]).unwrap();
+    let Command::Configure(Configuration { narrow, .. }) = request.command else {
+        panic!("{request:?}");
+    };
+    narrow
+}
+
+#[test]
+fn a_camera_that_has_samples_of_24_bits_is_asked_for_them_and_no_other_is() {
+    let able = Capabilities::NARROW_SAMPLES.with(Capabilities::DEPTH);
+    assert_eq!(configured(able, None), Tail(Some(true)));
+    assert_eq!(configured(able, Some(false)), Tail(Some(false)), "what a caller says stays");
+    // Firmware of an earlier version gets the bytes of an earlier version.
+    assert_eq!(configured(Capabilities::DEPTH, None), Tail(None));
 }
 
 #[test]

@@ -28,7 +28,7 @@ fn hello_tells_who_the_device_is() {
         adc_hz: 125_000_000,
         adc_bits: 14,
         wavelength_nm: 1550,
-        capabilities: Tail(Some(Capabilities::LOAD_GATEWARE)),
+        capabilities: Tail(Some(Capabilities::LOAD_GATEWARE.with(Capabilities::NARROW_SAMPLES))),
         detectors: Tail(Some(1)),
     };
     assert_eq!(identity, expected);
@@ -42,7 +42,8 @@ fn a_camera_says_in_its_greeting_that_its_fpga_runs_the_bring_up_design() {
     else {
         panic!("no identity");
     };
-    let capabilities = Capabilities::LOAD_GATEWARE.with(Capabilities::BRING_UP);
+    let capabilities =
+        Capabilities::LOAD_GATEWARE.with(Capabilities::BRING_UP).with(Capabilities::NARROW_SAMPLES);
     assert_eq!(identity.capabilities, Tail(Some(capabilities)));
 }
 
@@ -119,6 +120,7 @@ fn a_configuration_is_in_the_registers_to_the_last_bit() {
         sweeps: 70_000,
         source: SampleSource::TestPattern,
         over_range_trip: 17,
+        narrow: Tail(None),
     };
     assert_eq!(bench.ask(Command::Configure(configuration)), Ok(Answer::Done));
     assert_eq!(bench.camera.state(), State::Configured);

@@ -9,6 +9,7 @@ use nirspi_wire::register::{
     DUTY_LIMIT_MAX, FaultCode, IDENTITY, NO_CLOCK, ORDER_TABLE, Register, TEST_SEED, clocks,
     control, mode, status, test_sample,
 };
+use nirspi_wire::samples::Width;
 use nirspi_wire::{ADC_HZ, FrameFlags, crc32};
 use std::collections::BTreeMap;
 use std::vec::Vec;
@@ -254,6 +255,8 @@ impl FakeFpga {
     /// The packet of a frame, without zeros around it.
     fn packet(&self, header: &Header) -> Vec<u8> {
         let (run, clock, time) = self.stamp;
+        let is_narrow = self.get(Register::Mode) & mode::NARROW != 0;
+        let width = if is_narrow { Width::Bits24 } else { Width::Bits32 };
         let head = Head {
             run,
             sequence: header.sequence,
@@ -261,10 +264,11 @@ impl FakeFpga {
             sweeps: header.sweeps,
             flags: header.flags,
             patterns: header.patterns,
+            width,
         };
         let mut payload = head.to_bytes().to_vec();
         for sums in self.sums(header.sequence) {
-            payload.extend((sums.difference() as i32).to_le_bytes());
+            payload.extend(&(sums.difference() as i32).to_le_bytes()[..width.bytes()]);
         }
         seal(&payload, &mut [0; MAX_DEVICE_PACKET]).unwrap().to_vec()
     }

@@ -7,7 +7,7 @@ use nirspi_wire::packet::encode;
 use nirspi_wire::register::FaultCode;
 use nirspi_wire::{
     Answer, Command, Configuration, DeviceMessage, EventKind, GatewareChunk, PatternOrder,
-    RebootInto, RunLength, SampleSource, State, open, version,
+    RebootInto, RunLength, SampleSource, State, Tail, open, version,
 };
 use proptest::collection;
 use proptest::prelude::*;
@@ -233,6 +233,7 @@ fn bytes_of(id: u16, order: &Order) -> Vec<u8> {
                 sweeps,
                 source: SampleSource::Detector,
                 over_range_trip: 0,
+                narrow: Tail(None),
             })
         }
         Order::Start(length) => {

@@ -14,6 +14,7 @@ mod laws;
 mod loading;
 mod merge;
 mod model;
+mod narrow;
 mod packets;
 mod patience;
 mod safety;

@@ -6,6 +6,7 @@ use crate::Micros;
 use nirspi_wire::host_port::{READ_FRAME, READ_PACKET};
 use nirspi_wire::ready;
 use nirspi_wire::register::{Register, mode};
+use nirspi_wire::samples::Width;
 use nirspi_wire::{
     Answer, Command, Configuration, DeviceMessage, EventKind, Frame, RunLength, Signal, State, Tail,
 };
@@ -377,7 +378,7 @@ fn a_packet_goes_straight_into_the_links_room() {
         assert_eq!(device.link.packets, [made]);
         device.heard();
     }
-    let transfer = (READ_PACKET, ready::fast_read_bytes(4));
+    let transfer = (READ_PACKET, ready::fast_read_bytes(4, Width::Bits32));
     assert_eq!(device.bus.port().transfers, [transfer; 3]);
     assert_ne!(device.bus.port().fpga.get(Register::Mode) & mode::PACKETS, 0);
 }
@@ -385,8 +386,8 @@ fn a_packet_goes_straight_into_the_links_room() {
 /// The FPGA may be loaded with other gateware between two configurations.
 #[test]
 fn only_gateware_that_knows_it_is_asked_for_a_read_that_sck_clocks() {
-    let slow = (READ_FRAME, ready::read_bytes(4));
-    let fast = (READ_PACKET, ready::fast_read_bytes(4));
+    let slow = (READ_FRAME, ready::read_bytes(4, Width::Bits32));
+    let fast = (READ_PACKET, ready::fast_read_bytes(4, Width::Bits32));
     let mut device = Device::new(bus());
     let mut expected = Vec::new();
     for (version, transfer) in [(0x0303, slow), (0x0304, fast), (0x0302, slow), (0x0304, fast)] {

@@ -10,7 +10,7 @@ use core::ops::Range;
 use nirspi_wire::packet::{MAX_HOST_PACKET, encode, open};
 use nirspi_wire::{
     Answer, Capabilities, Command, Configuration, DeviceMessage, Event, EventKind, Frame,
-    PatternOrder, Refusal, Reply, Request, RunLength, SampleSource, Status, Version, version,
+    PatternOrder, Refusal, Reply, Request, RunLength, SampleSource, Status, Tail, Version, version,
 };
 use std::boxed::Box;
 use std::vec::Vec;
@@ -106,6 +106,7 @@ pub const SMALL: Configuration<'static> = Configuration {
     sweeps: 1,
     source: SampleSource::Detector,
     over_range_trip: 100,
+    narrow: Tail(None),
 };
 
 impl Bench {

@@ -61,7 +61,8 @@ fn a_host_of_this_version_hears_what_the_camera_can_do() {
     let answer = bench.ask(Command::Hello { protocol: version::CURRENT });
     let Ok(Answer::Hello(identity)) = answer else { panic!("{answer:?}") };
     assert_eq!(identity.protocol, version::CURRENT);
-    assert_eq!(identity.capabilities, Tail(Some(Capabilities::LOAD_GATEWARE)));
+    let expected = Capabilities::LOAD_GATEWARE.with(Capabilities::NARROW_SAMPLES);
+    assert_eq!(identity.capabilities, Tail(Some(expected)));
 }
 
 #[test]

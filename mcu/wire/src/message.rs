@@ -6,7 +6,7 @@
 
 use crate::Tail;
 use crate::identity::Received;
-use crate::samples::{Block, Samples, Words};
+use crate::samples::{Block, Samples, Width, Words};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// A host that sends no valid command for this long while LEDs are on is taken for dead, and they go off.
@@ -133,6 +133,10 @@ pub struct Configuration<'a> {
     pub source: SampleSource,
     /// Over-range samples in one frame that switch the LEDs off; 0 only flags them.
     pub over_range_trip: u32,
+    /// Whether the host asks for samples of 24 bits. A camera that has them ([`Capabilities::NARROW_SAMPLES`]) sends them if
+    /// its gateware makes the packets and no sample of the run can leave 24 bits, and 32 bits otherwise. Absent: 32 bits.
+    /// Since version 4.
+    pub narrow: Tail<bool>,
 }
 
 /// A piece of an FPGA bitstream.
@@ -193,6 +197,12 @@ impl<'a> DeviceMessage<'a> {
     pub const fn since(&self) -> u16 {
         match self {
             Self::Reply(Reply { outcome: Err(Refusal::Unknown), .. }) => 2,
+            Self::Frame(Frame { samples, .. })
+            | Self::Channel(Channel { frame: Frame { samples, .. }, .. })
+                if matches!(samples.width(), Width::Bits24) =>
+            {
+                Width::NARROW_SINCE
+            }
             Self::Reply(_) | Self::Frame(_) | Self::Raw(_) | Self::Depth(_) | Self::Crash(_) => 1,
             Self::Event(event) => event.kind.since(),
             Self::Channel(_) => Channel::SINCE,
@@ -282,16 +292,20 @@ impl Capabilities {
     pub const BOOTLOADER: Self = Self(1 << 2);
     /// The FPGA runs the bring-up design: there is no ADC, and samples are made of the levels of the LED lines.
     pub const BRING_UP: Self = Self(1 << 3);
+    /// The camera sends samples of 24 bits to a host that asks for them ([`Configuration::narrow`]). A camera says so in
+    /// sessions of version 4 and later.
+    pub const NARROW_SAMPLES: Self = Self(1 << 4);
 
     /// The first protocol version that has capabilities.
     pub const SINCE: u16 = 2;
 
     /// Name of every capability, by bit.
-    pub const NAMES: [(Self, &'static str); 4] = [
+    pub const NAMES: [(Self, &'static str); 5] = [
         (Self::DEPTH, "depth"),
         (Self::LOAD_GATEWARE, "load gateware"),
         (Self::BOOTLOADER, "boot loader"),
         (Self::BRING_UP, "bring-up"),
+        (Self::NARROW_SAMPLES, "24-bit samples"),
     ];
 
     /// Whether all bits of `other` are set.
@@ -481,7 +495,7 @@ pub struct Frame<'a> {
     pub sweeps: u32,
     /// What happened to the frame.
     pub flags: FrameFlags,
-    /// Summed ADC counts, one a pattern shown.
+    /// Summed ADC counts, one a pattern shown; of 24 bits in a run for which the host asked for them.
     #[serde(borrow)]
     pub samples: Samples<'a>,
 }

@@ -14,10 +14,12 @@
 //! | 10 | device time in us | padded |
 //! | 5 | sweeps | padded |
 //! | 3 | [`FrameFlags`] | padded |
-//! | 1 | 0: no shift | byte |
-//! | 2 | 4 M, for M patterns | padded |
-//! | 4 M | positive less negative sum of each pattern in the order shown | little-endian `i32` |
+//! | 1 | 0: 32 bits and no shift; [`NARROW`](crate::samples::NARROW): 24 bits | byte |
+//! | 2 | 4 M or 3 M, for M patterns | padded |
+//! | 4 M or 3 M | positive less negative sum of each pattern in the order shown | little-endian, signed |
 //! | 4 | CRC-32 of all before | little-endian |
+//!
+//! The samples have 24 bits in a run with [`mode::NARROW`](crate::register::mode::NARROW).
 //!
 //! Then COBS and the delimiter, as in every packet.
 //!
@@ -27,6 +29,7 @@
 //! host's link zeros are empty packets, which every receiver skips.
 
 use crate::packet::overhead;
+use crate::samples::{NARROW, Width};
 use crate::{CLOCKS_PER_PATTERN, Crc32, FrameFlags, PATTERNS};
 use core::ops::Range;
 
@@ -41,6 +44,13 @@ pub const MAX_SUMMED_SAMPLES: u32 = 1 << 17;
 const _: () = assert!(MAX_SUMMED_SAMPLES > CLOCKS_PER_PATTERN as u32);
 const _: () = assert!(MAX_SUMMED_SAMPLES as u64 * crate::ADC_MAX as u64 <= i32::MAX as u64);
 
+/// Most ADC samples in a sum with which no difference of two sums can leave 24 bits.
+pub const MAX_NARROW_SAMPLES: u32 = 512;
+
+// The bound is exact: one sample more could leave 24 bits.
+const _: () = assert!(MAX_NARROW_SAMPLES * (crate::ADC_MAX as u32) < 1 << 23);
+const _: () = assert!((MAX_NARROW_SAMPLES + 1) * (crate::ADC_MAX as u32) >= 1 << 23);
+
 /// Most zeros before a packet, at the fastest `sck` that the host port allows: the FPGA begins when it has so many bytes
 /// of the packet that it never has to wait. Gateware before 0.3.4 takes 5.3 us for that.
 pub const LEAD_BYTES: usize = 64;
@@ -48,34 +58,45 @@ pub const LEAD_BYTES: usize = 64;
 /// Most zeros before a packet that is read at [`PACKET_SCK_MAX_HZ`](crate::host_port::PACKET_SCK_MAX_HZ).
 pub const FAST_LEAD_BYTES: usize = 160;
 
+/// Bytes of the message of so many patterns.
+const fn payload_bytes(patterns: u16, width: Width) -> usize {
+    HEADER_BYTES + width.bytes() * patterns as usize
+}
+
+/// Most bytes of the packet of a frame of so many patterns.
+#[must_use]
+pub const fn packet_bytes(patterns: u16, width: Width) -> usize {
+    let payload = payload_bytes(patterns, width);
+    payload + overhead(payload)
+}
+
 /// Bytes to read of a frame of so many patterns, with which the whole packet has come.
 #[must_use]
-pub const fn read_bytes(patterns: u16) -> usize {
-    let payload = HEADER_BYTES + 4 * patterns as usize;
-    LEAD_BYTES + payload + overhead(payload)
+pub const fn read_bytes(patterns: u16, width: Width) -> usize {
+    LEAD_BYTES + packet_bytes(patterns, width)
 }
 
 /// The same for a read that is clocked by `sck`.
 #[must_use]
-pub const fn fast_read_bytes(patterns: u16) -> usize {
-    read_bytes(patterns) + (FAST_LEAD_BYTES - LEAD_BYTES)
+pub const fn fast_read_bytes(patterns: u16, width: Width) -> usize {
+    FAST_LEAD_BYTES + packet_bytes(patterns, width)
 }
 
 /// Bytes to read of the longest frame.
-pub const MAX_READ_BYTES: usize = fast_read_bytes(PATTERNS);
+pub const MAX_READ_BYTES: usize = fast_read_bytes(PATTERNS, Width::Bits32);
 
 /// Where the packet lies in the bytes of a read, delimiter included: without the zeros before and after. `None` if
 /// the bytes hold no packet, or a packet that is longer or shorter than a frame of so many patterns.
 ///
 /// Bytes inside the packet are not looked at. The receiver's CRC-32 finds damage there.
 #[must_use]
-pub fn packet_in(read: &[u8], patterns: u16) -> Option<Range<usize>> {
+pub fn packet_in(read: &[u8], patterns: u16, width: Width) -> Option<Range<usize>> {
     let is_byte = |byte: &u8| *byte != 0;
     let start = read.iter().position(is_byte)?;
     let end = read.iter().rposition(is_byte)? + 2;
-    let payload = HEADER_BYTES + 4 * usize::from(patterns);
+    let payload = payload_bytes(patterns, width);
     // COBS adds a byte at least, and one for each 254 at most; the CRC has four, the delimiter one.
-    let fits = (payload + 6..=payload + overhead(payload)).contains(&(end - start));
+    let fits = (payload + 6..=packet_bytes(patterns, width)).contains(&(end - start));
     (fits && end <= read.len()).then_some(start..end)
 }
 
@@ -89,6 +110,7 @@ pub struct Reader<'p> {
     bytes: Unstuffed<'p>,
     crc: Crc32,
     left: u16,
+    is_narrow: bool,
     /// Number of the frame in its run.
     pub sequence: u32,
     /// What happened to the frame.
@@ -107,7 +129,8 @@ impl<'p> Reader<'p> {
             bytes.iter().rev().fold(0u32, |number, byte| number << 7 | u32::from(byte & 0x7F))
         };
         let flags = FrameFlags(number(&head[24..27]) as u16);
-        Self { bytes, crc, left: patterns, sequence: number(&head[4..9]), flags }
+        let is_narrow = head[27] == NARROW;
+        Self { bytes, crc, left: patterns, is_narrow, sequence: number(&head[4..9]), flags }
     }
 
     /// The next sample; 0 after the last.
@@ -115,9 +138,13 @@ impl<'p> Reader<'p> {
     pub fn sample(&mut self) -> i32 {
         let Some(left) = self.left.checked_sub(1) else { return 0 };
         self.left = left;
-        let word = self.bytes.array();
-        self.crc.update(&word);
-        i32::from_le_bytes(word)
+        // Three bytes are read as the upper ones of a word, so that the shift brings the sign down.
+        let mut word = [0; 4];
+        let (low, shift) = if self.is_narrow { (1, 8) } else { (0, 0) };
+        let bytes = word.get_mut(low..).unwrap_or(&mut []);
+        self.bytes.fill(bytes);
+        self.crc.update(bytes);
+        i32::from_le_bytes(word) >> shift
     }
 
     /// Whether all samples have been read and the packet ends with the CRC-32 of its bytes.
@@ -183,6 +210,8 @@ pub struct Head {
     pub flags: FrameFlags,
     /// Patterns of the sweep.
     pub patterns: u16,
+    /// Bits of a sample.
+    pub width: Width,
 }
 
 impl Head {
@@ -196,7 +225,8 @@ impl Head {
         pad(self.device_time_us, &mut bytes[9..19]);
         pad(self.sweeps.into(), &mut bytes[19..24]);
         pad(self.flags.0.into(), &mut bytes[24..27]);
-        pad(4 * u64::from(self.patterns), &mut bytes[28..30]);
+        bytes[27] = self.width.form();
+        pad(self.width.bytes() as u64 * u64::from(self.patterns), &mut bytes[28..30]);
         bytes
     }
 }

@@ -17,6 +17,7 @@
 //! * With [`mode::PACKETS`] a frame is read as a packet of the host's link in the layout of [`ready`](crate::ready).
 //!   Its device time is `Time + (clock of its first slot - clock of the last read of ClockLow) / 125`, all as of
 //!   the start.
+//! * With [`mode::NARROW`] too, the samples of a packet have three bytes.
 //! * The host port has a clock of its own. [`Register::Identity`], [`Register::Version`],
 //!   [`Register::Clocks`] and [`Register::Design`] are answered with or without the ADC's clock. Everything
 //!   else needs the ADC's clock: without it a read gives [`NO_CLOCK`], a write does nothing, and frames
@@ -77,7 +78,7 @@ registers! {
     /// Always [`IDENTITY`].
     Identity = 0x00, ReadOnly, IDENTITY;
     /// Gateware version, `major << 16 | minor << 8 | patch`.
-    Version = 0x01, ReadOnly, 0x0000_0304;
+    Version = 0x01, ReadOnly, 0x0000_0305;
     /// Holds what was written, for bus tests.
     Scratch = 0x02, ReadWrite, 0;
     /// See [`control`].
@@ -178,6 +179,12 @@ pub const fn measures_frames(version: u32) -> bool {
 #[must_use]
 pub const fn clocks_packets(version: u32) -> bool {
     has_this_map(version) && version & 0xFF >= 4
+}
+
+/// Whether gateware with this [`Register::Version`] knows [`mode::NARROW`]: 0.3.5 and later of the same map.
+#[must_use]
+pub const fn narrows_packets(version: u32) -> bool {
+    has_this_map(version) && version & 0xFF >= 5
 }
 
 /// Frames that can wait for the host, the delivered one included. Gateware before 0.3.3 has room for one.
@@ -315,8 +322,12 @@ pub mod mode {
     pub const TEST_SOURCE: u32 = 1 << 3;
     /// Frames are sent as packets of the host's link ([`ready`](crate::ready)). Since gateware 0.3.1.
     pub const PACKETS: u32 = 1 << 4;
+    /// Samples of packets have 24 bits instead of 32: the lower bits of the difference. Without `PACKETS` the bit
+    /// changes nothing. Since gateware 0.3.5.
+    pub const NARROW: u32 = 1 << 5;
     /// Every bit that has a meaning; a start with any other is refused.
-    pub const DEFINED: u32 = DIFFERENTIAL | ORDER_SEQUENCY | ORDER_TABLE | TEST_SOURCE | PACKETS;
+    pub const DEFINED: u32 =
+        DIFFERENTIAL | ORDER_SEQUENCY | ORDER_TABLE | TEST_SOURCE | PACKETS | NARROW;
 }
 
 /// Reason latched in [`Register::Fault`].

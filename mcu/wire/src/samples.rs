@@ -1,9 +1,13 @@
-//! The samples of a frame: one signed 32-bit number for each pattern, with one exponent for all.
+//! The samples of a frame: one signed number of 24 or 32 bits for each pattern, with one exponent for all.
 //!
 //! A pattern's integrated ADC sample is the difference of two 48-bit sums. The difference almost
 //! always fits into 32 bits (up to 2^17 / window sweeps). Otherwise all samples of the frame are
 //! shifted right by the same `shift` and rounded, so that a frame has 4 bytes for each pattern at
 //! any number of sweeps.
+//!
+//! A host may ask for samples of 24 bits ([`Configuration::narrow`](crate::Configuration::narrow)). It gets
+//! them in packets of the FPGA, where no difference of the run can leave 24 bits
+//! ([`MAX_NARROW_SAMPLES`](crate::ready::MAX_NARROW_SAMPLES)). The values are the same in both widths.
 
 use serde::{
     Deserialize, Deserializer, Serialize, Serializer, de::Error as _, ser::SerializeTuple,
@@ -12,10 +16,47 @@ use serde::{
 /// Largest shift: 49-bit differences into 32-bit words.
 pub const MAX_SHIFT: u8 = 18;
 
-/// Little-endian `i32` words; the sample is `word << shift`, in summed ADC counts.
+/// What stands in the place of the shift before samples of 24 bits, which have none.
+pub const NARROW: u8 = 0x80;
+
+/// How many bits a sample has on the wire.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Width {
+    /// Four bytes a sample.
+    #[default]
+    Bits32,
+    /// Three bytes a sample.
+    Bits24,
+}
+
+impl Width {
+    /// The first protocol version that has [`Width::Bits24`].
+    pub const NARROW_SINCE: u16 = 4;
+
+    /// Bytes of a sample.
+    #[must_use]
+    pub const fn bytes(self) -> usize {
+        match self {
+            Self::Bits32 => 4,
+            Self::Bits24 => 3,
+        }
+    }
+
+    /// The byte before samples of this width that have no shift.
+    #[must_use]
+    pub const fn form(self) -> u8 {
+        match self {
+            Self::Bits32 => 0,
+            Self::Bits24 => NARROW,
+        }
+    }
+}
+
+/// Little-endian signed words of 24 or 32 bits; the sample is `word << shift`, in summed ADC counts.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Samples<'a> {
-    shift: u8,
+    /// The shift of words of 32 bits, or [`NARROW`].
+    form: u8,
     words: &'a [u8],
 }
 
@@ -55,21 +96,60 @@ impl<'a> Samples<'a> {
         Self::packed(shift, buffer)
     }
 
-    /// Samples that [`pack`](Self::pack) has packed with this shift.
+    /// Packs `values` (summed ADC counts) into `buffer`, 3 bytes each.
     ///
     /// # Errors
-    /// If the shift is above [`MAX_SHIFT`], or the bytes are not whole words.
-    pub fn packed(shift: u8, words: &'a [u8]) -> Result<Self, SamplesError> {
-        if shift > MAX_SHIFT || !words.len().is_multiple_of(4) {
+    /// If the buffer is smaller than `3 * values.len()`, or a value has more than 24 bits.
+    pub fn pack_narrow<I>(values: I, buffer: &'a mut [u8]) -> Result<Self, SamplesError>
+    where
+        I: ExactSizeIterator<Item = i64>,
+    {
+        let buffer = buffer.get_mut(..3 * values.len()).ok_or(SamplesError)?;
+        let mut magnitude = 0u64;
+        for (word, value) in buffer.chunks_exact_mut(3).zip(values) {
+            magnitude |= (value ^ (value >> 63)) as u64;
+            let [low, middle, high, _] = (value as i32).to_le_bytes();
+            word.copy_from_slice(&[low, middle, high]);
+        }
+        // Folded as in `pack`, a value of 24 bits has 23.
+        if magnitude >> 23 == 0 { Self::packed(NARROW, buffer) } else { Err(SamplesError) }
+    }
+
+    /// Samples that were packed with this [`form`](Self::form).
+    ///
+    /// # Errors
+    /// If the form is neither [`NARROW`] nor a shift of at most [`MAX_SHIFT`], or the bytes are not whole words.
+    pub fn packed(form: u8, words: &'a [u8]) -> Result<Self, SamplesError> {
+        let samples = Self { form, words };
+        let exists = form == NARROW || form <= MAX_SHIFT;
+        if !exists || !words.len().is_multiple_of(samples.width().bytes()) {
             return Err(SamplesError);
         }
-        Ok(Self { shift, words })
+        Ok(samples)
+    }
+
+    /// The byte before the words: the shift of words of 32 bits, or [`NARROW`].
+    #[must_use]
+    pub fn form(&self) -> u8 {
+        self.form
+    }
+
+    /// Bits of a word.
+    #[must_use]
+    pub const fn width(&self) -> Width {
+        if self.form == NARROW { Width::Bits24 } else { Width::Bits32 }
     }
 
     /// Number of samples, one a pattern.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.words.len() / 4
+        self.words.len() / self.width().bytes()
+    }
+
+    /// Number of bytes of all samples.
+    #[must_use]
+    pub fn byte_len(&self) -> usize {
+        self.words.len()
     }
 
     /// Whether there is no sample at all.
@@ -81,15 +161,17 @@ impl<'a> Samples<'a> {
     /// Exponent: values are exact if it is 0, and rounded to multiples of `2^shift` otherwise.
     #[must_use]
     pub fn shift(&self) -> u8 {
-        self.shift
+        if self.form == NARROW { 0 } else { self.form }
     }
 
     /// The samples in summed ADC counts, in the order shown.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = i64> + Clone + use<'a> {
-        let shift = self.shift;
-        self.words
-            .chunks_exact(4)
-            .map(move |w| i64::from(i32::from_le_bytes([w[0], w[1], w[2], w[3]])) << shift)
+        let shift = self.shift();
+        self.words.chunks_exact(self.width().bytes()).map(move |word| match *word {
+            [b0, b1, b2, b3] => i64::from(i32::from_le_bytes([b0, b1, b2, b3])) << shift,
+            [b0, b1, b2] => i64::from(i32::from_le_bytes([0, b0, b1, b2]) >> 8),
+            _ => 0,
+        })
     }
 }
 
@@ -118,7 +200,7 @@ impl<'de: 'a, 'a> Deserialize<'de> for Block<'a> {
 impl Serialize for Samples<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut tuple = serializer.serialize_tuple(2)?;
-        tuple.serialize_element(&self.shift)?;
+        tuple.serialize_element(&self.form)?;
         tuple.serialize_element(&Block(self.words))?;
         tuple.end()
     }
@@ -126,8 +208,8 @@ impl Serialize for Samples<'_> {
 
 impl<'de: 'a, 'a> Deserialize<'de> for Samples<'a> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let (shift, Block(words)) = Deserialize::deserialize(deserializer)?;
-        Self::packed(shift, words).map_err(|_| D::Error::custom("samples"))
+        let (form, Block(words)) = Deserialize::deserialize(deserializer)?;
+        Self::packed(form, words).map_err(|_| D::Error::custom("samples"))
     }
 }
 
@@ -218,6 +300,36 @@ mod tests {
                 prop_assert!((back - value).abs() <= unit / 2, "{back} for {value}");
             }
         }
+    }
+
+    proptest! {
+        #[test]
+        fn narrow_samples_come_back_exact_or_are_refused(
+            values in prop::collection::vec(-(1i64 << 26)..(1i64 << 26), 0..64), narrow in 0u32..27,
+        ) {
+            let values: Vec<i64> = values.iter().map(|v| v >> narrow).collect();
+            let mut buffer = [0; 192];
+            let packed = Samples::pack_narrow(values.iter().copied(), &mut buffer);
+            let fits = values.iter().all(|v| (-(1 << 23)..1 << 23).contains(v));
+            prop_assert_eq!(packed.is_ok(), fits);
+            if let Ok(samples) = packed {
+                prop_assert_eq!((samples.form(), samples.shift()), (NARROW, 0));
+                prop_assert_eq!(samples.len(), values.len());
+                prop_assert_eq!(samples.iter().collect::<Vec<_>>(), values);
+            }
+        }
+    }
+
+    #[test]
+    fn the_ends_of_24_bits_are_the_last_values_that_fit() {
+        let (least, most) = (-(1i64 << 23), (1i64 << 23) - 1);
+        let mut buffer = [0; 6];
+        let samples = Samples::pack_narrow([least, most].into_iter(), &mut buffer).unwrap();
+        assert!(samples.iter().eq([least, most]));
+        for over in [least - 1, most + 1, i64::MIN, i64::MAX] {
+            assert_eq!(Samples::pack_narrow([over].into_iter(), &mut [0; 3]), Err(SamplesError));
+        }
+        assert_eq!(Samples::pack_narrow([1, 2].into_iter(), &mut [0; 5]), Err(SamplesError));
     }
 
     #[test]

@@ -8,6 +8,8 @@
 //!   file `tests/frozen/vNN.rs` freezes the bytes of what is new; the files of older versions stay as they are.
 //! * A camera sends nothing that is newer than the version of its session
 //!   ([`DeviceMessage::since`](crate::DeviceMessage::since)).
+//! * Samples of 24 bits came with version 4: a value of the byte before the samples that earlier versions refuse, as they
+//!   refuse a variant that they do not know. A camera sends them only to a host that asks for them.
 //! * A camera answers a request that it does not know with [`Refusal::Unknown`](crate::Refusal::Unknown). A host counts a
 //!   message that it does not know and goes on.
 //! * A recording names the version of its session. Every program reads the recordings of all versions from [`MIN`] on.
@@ -26,7 +28,7 @@
 pub const MIN: u16 = 1;
 
 /// The version of this crate: what a host greets with.
-pub const CURRENT: u16 = 3;
+pub const CURRENT: u16 = 4;
 
 /// Whether this crate speaks `version`.
 #[must_use]

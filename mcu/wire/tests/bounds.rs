@@ -2,7 +2,7 @@
 
 use nirspi_wire::packet::{hello_of_any_version, overhead, parse, seal, unseal};
 use nirspi_wire::ready::{HEADER_BYTES, LEAD_BYTES, packet_in, read_bytes};
-use nirspi_wire::samples::{MAX_SHIFT, Words};
+use nirspi_wire::samples::{MAX_SHIFT, NARROW, Width, Words};
 use nirspi_wire::version::{self, speaks};
 use nirspi_wire::{Answer, DeviceMessage, PATTERNS, Reply, Samples, encode};
 
@@ -22,14 +22,16 @@ fn the_overhead_is_what_a_payload_without_zeros_needs() {
 #[test]
 fn a_read_of_a_packet_ends_with_its_last_byte_if_the_packet_begins_as_late_as_it_may() {
     let mut room = [0; 2 * 4096];
-    for patterns in 1..=PATTERNS {
-        let payload = vec![0xA5; HEADER_BYTES + 4 * usize::from(patterns)];
-        let packet = seal(&payload, &mut room).unwrap().len();
-        let most = read_bytes(patterns);
-        assert!(
-            (most - 1..=most).contains(&(LEAD_BYTES + packet)),
-            "{patterns}: {packet} of {most}"
-        );
+    for (width, bytes) in [(Width::Bits32, 4), (Width::Bits24, 3)] {
+        for patterns in 1..=PATTERNS {
+            let payload = vec![0xA5; HEADER_BYTES + bytes * usize::from(patterns)];
+            let packet = seal(&payload, &mut room).unwrap().len();
+            let most = read_bytes(patterns, width);
+            assert!(
+                (most - 1..=most).contains(&(LEAD_BYTES + packet)),
+                "{patterns}, {width:?}: {packet} of {most}"
+            );
+        }
     }
 }
 
@@ -37,12 +39,14 @@ fn a_read_of_a_packet_ends_with_its_last_byte_if_the_packet_begins_as_late_as_it
 #[test]
 fn what_is_longer_or_shorter_than_any_packet_of_a_frame_is_none() {
     let patterns = 256;
-    let payload = HEADER_BYTES + 4 * usize::from(patterns);
-    let (least, most) = (payload + 6, payload + overhead(payload));
-    for length in least - 1..=most + 1 {
-        let read = [vec![0; 3], vec![0xA5; length - 1], vec![0; 5]].concat();
-        let expected = (least..=most).contains(&length).then_some(3..3 + length);
-        assert_eq!(packet_in(&read, patterns), expected, "{length}");
+    for (width, bytes) in [(Width::Bits32, 4), (Width::Bits24, 3)] {
+        let payload = HEADER_BYTES + bytes * usize::from(patterns);
+        let (least, most) = (payload + 6, payload + overhead(payload));
+        for length in least - 1..=most + 1 {
+            let read = [vec![0; 3], vec![0xA5; length - 1], vec![0; 5]].concat();
+            let expected = (least..=most).contains(&length).then_some(3..3 + length);
+            assert_eq!(packet_in(&read, patterns, width), expected, "{length}, {width:?}");
+        }
     }
 }
 
@@ -51,6 +55,9 @@ fn samples_are_whole_words_of_a_shift_that_exists() {
     assert_eq!(Samples::packed(MAX_SHIFT, &[0; 8]).unwrap().len(), 2);
     assert!(Samples::packed(MAX_SHIFT + 1, &[0; 8]).is_err());
     assert!(Samples::packed(0, &[0; 7]).is_err());
+    assert_eq!(Samples::packed(NARROW, &[0; 6]).unwrap().len(), 2);
+    assert!(Samples::packed(NARROW, &[0; 8]).is_err());
+    assert!(Samples::packed(NARROW + 1, &[0; 12]).is_err());
 }
 
 #[test]

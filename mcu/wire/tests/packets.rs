@@ -6,12 +6,12 @@ mod strategies;
 
 use nirspi_wire::{
     Command, Configuration, Deframed, Deframer, DeviceMessage, Frame, FrameFlags, GatewareChunk,
-    PatternOrder, Request, SampleSource, Samples, encode,
+    PatternOrder, Request, SampleSource, Samples, Tail, encode,
     message::GATEWARE_CHUNK_MAX,
     open,
     packet::{MAX_DEVICE_PACKET, MAX_HOST_PACKET, PacketError, overhead, seal, unseal},
     ready,
-    samples::Words,
+    samples::{Width, Words},
 };
 use proptest::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -63,6 +63,24 @@ where
     Ok(())
 }
 
+fn width() -> impl Strategy<Value = Width> {
+    prop_oneof![Just(Width::Bits32), Just(Width::Bits24)]
+}
+
+/// A value that a sample of this width can have.
+fn fitting(value: i32, width: Width) -> i32 {
+    value >> (32 - 8 * width.bytes())
+}
+
+/// The message of a frame as the FPGA makes it.
+fn payload_of(head: &ready::Head, values: &[i32]) -> Vec<u8> {
+    let mut payload = head.to_bytes().to_vec();
+    for value in values {
+        payload.extend(&value.to_le_bytes()[..head.width.bytes()]);
+    }
+    payload
+}
+
 proptest! {
     #[test]
     fn a_sealed_payload_is_the_packet_of_its_message(message in request()) {
@@ -76,20 +94,20 @@ proptest! {
     fn a_packet_of_the_fpga_is_found_between_zeros_and_read_sample_by_sample(
         run: u16, sequence: u32, device_time_us: u64, sweeps: u32, flags: u16,
         values in prop::collection::vec(prop_oneof![any::<i32>(), -300..300], 1..=1024),
-        lead in 0..=ready::LEAD_BYTES, damage: (prop::sample::Index, u8),
+        width in width(), lead in 0..=ready::LEAD_BYTES, damage: (prop::sample::Index, u8),
     ) {
         let flags = FrameFlags(flags);
         let patterns = values.len() as u16;
-        let head = ready::Head { run, sequence, device_time_us, sweeps, flags, patterns };
-        let mut payload = head.to_bytes().to_vec();
-        payload.extend(values.iter().flat_map(|value| value.to_le_bytes()));
+        let values: Vec<i32> = values.iter().map(|&value| fitting(value, width)).collect();
+        let head = ready::Head { run, sequence, device_time_us, sweeps, flags, patterns, width };
+        let payload = payload_of(&head, &values);
         let packet = seal(&payload, &mut [0; ROOM]).unwrap().to_vec();
-        let mut read = vec![0; ready::read_bytes(patterns)];
+        let mut read = vec![0; ready::read_bytes(patterns, width)];
         read[lead..lead + packet.len()].copy_from_slice(&packet);
-        let place = ready::packet_in(&read, patterns);
+        let place = ready::packet_in(&read, patterns, width);
         prop_assert_eq!(place.clone(), Some(lead..lead + packet.len()));
         // A packet of twice as many patterns has another length.
-        prop_assert_eq!(ready::packet_in(&read, 2 * patterns), None);
+        prop_assert_eq!(ready::packet_in(&read, 2 * patterns, width), None);
 
         let mut reader = ready::Reader::new(&read[place.clone().unwrap()], patterns);
         prop_assert_eq!((reader.sequence, reader.flags), (sequence, flags));
@@ -111,16 +129,18 @@ proptest! {
 
     #[test]
     fn bytes_without_a_packet_have_none(
-        patterns in 1..=1024u16, bytes in prop::collection::vec(any::<u8>(), 0..200),
+        patterns in 1..=1024u16, width in width(),
+        bytes in prop::collection::vec(any::<u8>(), 0..200),
     ) {
-        prop_assert_eq!(ready::packet_in(&[0; 300], patterns), None);
-        prop_assert_eq!(ready::packet_in(&[], patterns), None);
-        if let Some(place) = ready::packet_in(&bytes, patterns) {
-            prop_assert!(place.len() >= ready::HEADER_BYTES + 4 * usize::from(patterns) + 6);
+        let shortest = ready::HEADER_BYTES + width.bytes() * usize::from(patterns) + 6;
+        prop_assert_eq!(ready::packet_in(&[0; 300], patterns, width), None);
+        prop_assert_eq!(ready::packet_in(&[], patterns, width), None);
+        if let Some(place) = ready::packet_in(&bytes, patterns, width) {
+            prop_assert!(place.len() >= shortest);
             prop_assert_eq!(bytes[place.end - 1], 0);
         }
         // Its delimiter is cut off.
-        prop_assert_eq!(ready::packet_in(&vec![1; ready::HEADER_BYTES + 4 * usize::from(patterns) + 6], patterns), None);
+        prop_assert_eq!(ready::packet_in(&vec![1; shortest], patterns, width), None);
         // Any bytes are read to their end.
         let mut reader = ready::Reader::new(&bytes, patterns);
         for _ in 0..=patterns {
@@ -132,16 +152,21 @@ proptest! {
     #[test]
     fn a_packet_with_padded_numbers_is_the_same_message(
         run: u16, sequence: u32, device_time_us: u64, sweeps: u32, flags: u16,
-        values in prop::collection::vec(any::<i32>(), 0..=1024),
+        values in prop::collection::vec(any::<i32>(), 0..=1024), width in width(),
     ) {
         let flags = FrameFlags(flags);
         let patterns = values.len() as u16;
-        let head = ready::Head { run, sequence, device_time_us, sweeps, flags, patterns };
-        let mut payload = head.to_bytes().to_vec();
-        payload.extend(values.iter().flat_map(|value| value.to_le_bytes()));
+        let values: Vec<i32> = values.iter().map(|&value| fitting(value, width)).collect();
+        let head = ready::Head { run, sequence, device_time_us, sweeps, flags, patterns, width };
+        let payload = payload_of(&head, &values);
         let mut bytes = seal(&payload, &mut [0; ROOM]).unwrap().to_vec();
         let mut room = [0; ROOM];
-        let samples = Samples::pack(values.iter().map(|&value| value.into()), &mut room).unwrap();
+        let numbers = values.iter().map(|&value| i64::from(value));
+        let samples = match width {
+            Width::Bits32 => Samples::pack(numbers, &mut room),
+            Width::Bits24 => Samples::pack_narrow(numbers, &mut room),
+        };
+        let samples = samples.unwrap();
         let frame = Frame { run, sequence, device_time_us, sweeps, flags, samples };
         let length = bytes.len() - 1;
         let opened: DeviceMessage<'_> = open(&mut bytes[..length]).unwrap();
@@ -345,6 +370,7 @@ fn the_largest_messages_fit_the_largest_packets() {
         sweeps: u32::MAX,
         source: SampleSource::TestPattern,
         over_range_trip: u32::MAX,
+        narrow: Tail(Some(true)),
     };
     let chunk = GatewareChunk {
         offset: u32::MAX,

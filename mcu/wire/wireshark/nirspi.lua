@@ -151,6 +151,7 @@ local commands = {
         r:number("sweeps")
         r:variant("source", SampleSource)
         r:number("over_range_trip")
+        if r:left() > 0 then r:flag("narrow") end
     end,
     Start = function(r)
         if r:variant("length", RunLength) == "Frames" then r:number("frames") end
@@ -243,8 +244,9 @@ local function frame(r)
     r:number("device_time_us")
     r:number("sweeps")
     r:number("flags")
-    r:byte("shift")
-    local samples = r:block("samples", 4)
+    -- 0x80 stands for samples of 24 bits, which have no shift.
+    local form = r:byte("shift")
+    local samples = r:block("samples", form == 0x80 and 3 or 4)
     return string.format("frame %d of run %d, %d samples", sequence, run, samples)
 end
 

@@ -12,6 +12,7 @@ use nirspi_wire::host_port::{
 };
 use nirspi_wire::ready;
 use nirspi_wire::register::{Design, Register, loopback, mode};
+use nirspi_wire::samples::Width;
 use std::collections::VecDeque;
 
 /// Period of the ADC's clock.
@@ -243,7 +244,9 @@ impl Board {
     /// Reads the frame, whose header gives its length, or as much as a packet of so many patterns may take.
     pub fn frame(&mut self) -> Vec<u8> {
         if self.mode & mode::PACKETS != 0 {
-            return self.frame_bytes(ready::read_bytes(self.patterns as u16));
+            let is_narrow = self.mode & mode::NARROW != 0;
+            let width = if is_narrow { Width::Bits24 } else { Width::Bits32 };
+            return self.frame_bytes(ready::read_bytes(self.patterns as u16, width));
         }
         self.begin(READ_FRAME, 0);
         self.dummy();

@@ -167,7 +167,7 @@ fn injected(fault: Fault, link: Box<dyn Link>, log: &Arc<Mutex<Log>>) -> Box<dyn
     // Any fixed sequence: a multiplicative generator whose upper bits choose.
     let mut state = 0x2545_F491_u32;
     Box::new(Tampered::new(link, move |_, length| {
-        if length < 900 {
+        if length < 700 {
             return Fate::Pass;
         }
         frame += 1;

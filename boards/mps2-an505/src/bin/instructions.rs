@@ -28,9 +28,10 @@ use nirspi_wire::fpga::{FpgaFrame, Header, MAX_FRAME_BYTES, Sums, frame_bytes};
 use nirspi_wire::host_port::{SEALED_BYTES, seal, unseal};
 use nirspi_wire::packet::{self, MAX_DEVICE_PACKET, MAX_HOST_PACKET, encode};
 use nirspi_wire::register::{IDENTITY, Register, control, status};
+use nirspi_wire::samples::Width;
 use nirspi_wire::{
     Command, Configuration, DeviceMessage, Frame, FrameFlags, PATTERNS, PatternOrder, Request,
-    RunLength, SampleSource, Samples, Version, crc32, ready, version,
+    RunLength, SampleSource, Samples, Tail, Version, crc32, ready, version,
 };
 use static_cell::{ConstStaticCell, StaticCell};
 
@@ -89,6 +90,7 @@ impl Memory {
             sweeps: 1,
             flags: FrameFlags::DIFFERENTIAL,
             patterns: PATTERNS,
+            width: Width::Bits32,
         };
         let samples = (0..i32::from(PATTERNS)).flat_map(|k| (500 + k).to_le_bytes());
         let mut bytes = head.to_bytes().into_iter().chain(samples);
@@ -149,6 +151,7 @@ const CONFIGURATION: Configuration<'static> = Configuration {
     sweeps: 1,
     source: SampleSource::Detector,
     over_range_trip: 0,
+    narrow: Tail(None),
 };
 
 const INPUTS: Inputs = Inputs { interlock_closed: true, temperature_centi_celsius: Some(2500) };

@@ -18,12 +18,13 @@ proptest! {
     #[test]
     fn a_run_of_packets_has_the_frames_of_the_oracle_and_says_what_stood_at_its_start(
         setup in setup(), seed: u64, run: u32, time_us in 0..1u64 << 63,
-        rest in 0..400u64, between in 0..400u64, later: bool,
+        rest in 0..400u64, between in 0..400u64, later: bool, narrow: bool,
     ) {
         let mut bench = Bench::new();
         setup.apply(&mut bench);
         let bits = bench.get(Register::Mode);
-        bench.set(Register::Mode, bits | mode::PACKETS);
+        let more = if narrow { mode::PACKETS | mode::NARROW } else { mode::PACKETS };
+        bench.set(Register::Mode, bits | more);
         bench.ticks(rest);
         prop_assert_eq!(u64::from(bench.get(Register::ClockLow)), rest);
         bench.ticks(between);
@@ -31,6 +32,7 @@ proptest! {
         bench.start();
         if later {
             stamp(&mut bench, !run, !time_us);
+            bench.set(Register::Mode, bits ^ mode::NARROW);
             bench.get(Register::ClockLow);
         }
         let samples = |t| random_sample(seed, t);
@@ -54,13 +56,17 @@ proptest! {
             let differences = expected.sums.iter().map(Sums::difference);
             let mut words = vec![0; 4 * expected.sums.len()];
             let header = expected.header;
+            let samples = match narrow {
+                true => Samples::pack_narrow(differences, &mut words).unwrap(),
+                false => Samples::pack(differences, &mut words).unwrap(),
+            };
             let frame = Frame {
                 run: run as u16,
                 sequence: f,
                 device_time_us: time_us + (header.clock - rest) / 125,
                 sweeps: header.sweeps,
                 flags: header.flags,
-                samples: Samples::pack(differences, &mut words).unwrap(),
+                samples,
             };
             let opened: DeviceMessage<'_> = open(&mut bytes).expect("damaged packet");
             prop_assert_eq!(opened, DeviceMessage::Frame(frame));

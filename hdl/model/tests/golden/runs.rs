@@ -305,7 +305,7 @@ fn a_run_without_end_goes_on_until_stopped() {
 fn every_setting_is_checked_at_a_start_and_only_there() {
     use Register as R;
     let cases: &[(R, &[u32], &[u32])] = &[
-        (R::Mode, &[0, 0b1_1111], &[1 << 5, 1 << 31]),
+        (R::Mode, &[0, 0b11_1111], &[1 << 6, 1 << 31]),
         (R::Patterns, &[1, 1024], &[0, 1025, 1 << 16 | 1]),
         (R::Dwell, &[3, 65_535], &[0, 2, 65_536, 1 << 16 | 5]),
         (R::Blank, &[0, 4], &[5, 1 << 16]),

@@ -73,9 +73,14 @@ fn by_sck(rigs: u64) -> Suite {
     Suite { scenario: scenario::packets_by_sck, ..scenarios(rigs) }
 }
 
+/// Packets whose samples have 24 bits.
+fn narrow_packets(rigs: u64) -> Suite {
+    Suite { scenario: scenario::narrow_packets, ..scenarios(rigs) }
+}
+
 /// Packets of long blocks.
 fn long_blocks() -> Suite {
-    Suite { scenario: scenario::long_blocks, scenarios: 8, ..scenarios(1) }
+    Suite { scenario: scenario::long_blocks, scenarios: 16, ..scenarios(1) }
 }
 
 /// The first difference that a scenario shows. One FPGA's scenarios of frames and of packets show nearly every
@@ -84,6 +89,7 @@ pub fn difference(project: &Project, file: &str) -> Option<String> {
     let mut suites = [
         (scenarios(1), 0),
         (packets(1), 0),
+        (narrow_packets(1), 0),
         (slow_readers(1), 0),
         (by_sck(1), 0),
         (long_blocks(), 0),
@@ -95,14 +101,14 @@ pub fn difference(project: &Project, file: &str) -> Option<String> {
     ];
     if file == "packer" {
         // A run of frames shows nothing of it.
-        suites[..5].rotate_left(1);
+        suites[..6].rotate_left(1);
     }
     if matches!(file, "frames" | "accumulators") {
         // The third bank matters where frames wait.
-        suites[..3].rotate_right(1);
+        suites[..4].rotate_right(1);
     }
     if file == "packet_port" {
-        suites[..4].rotate_right(1);
+        suites[..5].rotate_right(1);
     }
     suites.iter().find_map(|(suite, first)| suite.run(project, *first).err())
 }
@@ -156,6 +162,22 @@ fn random_scenarios_of_packets_agree_bit_for_bit() {
     }
 }
 
+/// Samples of 24 bits, by the port that samples its pins and by the one that `sck` clocks.
+#[test]
+fn random_scenarios_of_narrow_packets_agree_bit_for_bit() {
+    let tallies = narrow_packets(rigs()).run(&Project::read(), 0);
+    let tallies = tallies.unwrap_or_else(|difference| panic!("{difference}"));
+    println!("{tallies:#?}");
+    for (what, seen) in [
+        ("packets of 24 bits", count(&tallies, |t| t.narrow)),
+        ("packets of 32 bits", count(&tallies, |t| t.packets - t.narrow)),
+        ("whole reads by `sck`", count(&tallies, |t| t.by_sck[0])),
+        ("packets after a loss", count(&tallies, |t| t.packets_after_loss)),
+    ] {
+        assert!(seen >= 5, "only {seen} {what}");
+    }
+}
+
 /// Three banks in use at a time, in every order in which frames can be made, read, read again, released and lost.
 #[test]
 fn random_scenarios_of_slow_readers_agree_bit_for_bit() {
@@ -192,7 +214,8 @@ fn random_scenarios_of_packets_by_sck_agree_bit_for_bit() {
 #[test]
 fn packets_of_long_blocks_have_no_gap() {
     let tallies = long_blocks().run(&Project::read(), 0).unwrap_or_else(|d| panic!("{d}"));
-    assert!(count(&tallies, |t| t.packets) >= 16);
+    let narrow = count(&tallies, |t| t.narrow);
+    assert!(narrow >= 16 && count(&tallies, |t| t.packets) - narrow >= 16);
     println!("{tallies:#?}");
 }
 
@@ -224,7 +247,7 @@ fn a_whole_differential_sweep_agrees() {
     rig.interlock(true);
     rig.wait_adc(100);
     rig.set(Register::Frames, 1);
-    for (bits, packets) in [(0, 0), (mode::PACKETS, 1)] {
+    for (bits, packets) in [(0, 0), (mode::PACKETS, 1), (mode::PACKETS | mode::NARROW, 1)] {
         rig.set(Register::Mode, mode::DIFFERENTIAL | mode::ORDER_SEQUENCY | bits);
         rig.seen_so_far = Tally::default();
         let started = std::time::Instant::now();

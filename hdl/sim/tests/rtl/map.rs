@@ -7,6 +7,7 @@
 use nirspi_wire::{
     FrameFlags, PATTERNS, fpga, host_port,
     register::{self, Design, FaultCode, Register, clocks, control, mode, status},
+    samples::NARROW,
 };
 use std::fmt::Write;
 
@@ -66,6 +67,7 @@ pub fn package() -> String {
         ("MODE_ORDER_TABLE", mode::ORDER_TABLE),
         ("MODE_TEST_SOURCE", mode::TEST_SOURCE),
         ("MODE_PACKETS", mode::PACKETS),
+        ("MODE_NARROW", mode::NARROW),
         ("MODE_DEFINED", mode::DEFINED),
         ("FAULT_WATCHDOG", FaultCode::Watchdog as u32),
         ("FAULT_DUTY", FaultCode::Duty as u32),
@@ -76,6 +78,7 @@ pub fn package() -> String {
         ("FLAG_AFTER_LOSS", FrameFlags::AFTER_LOSS.0.into()),
         ("FLAG_TEST_SOURCE", FrameFlags::TEST_SOURCE.0.into()),
         ("FLAG_DIFFERENTIAL", FrameFlags::DIFFERENTIAL.0.into()),
+        ("SAMPLES_NARROW", NARROW.into()),
         ("FRAME_MAGIC", u32::from_le_bytes(fpga::MAGIC)),
         ("HOST_WRITE", host_port::WRITE_REGISTER.into()),
         ("HOST_READ", host_port::READ_REGISTER.into()),

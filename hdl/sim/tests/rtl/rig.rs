@@ -17,6 +17,7 @@ use nirspi_wire::{
     fpga::{FpgaFrame, Sums},
     open,
     register::{Design, Register, clocks, control},
+    samples::Width,
 };
 use std::collections::VecDeque;
 
@@ -144,6 +145,8 @@ pub struct Tally {
     pub bursts: u64,
     pub packets: u64,
     pub packets_after_loss: u64,
+    /// Packets whose samples have 24 bits.
+    pub narrow: u64,
     /// Packets read with `sck` as their clock, whole, and reads that were cut short.
     pub by_sck: [u64; 2],
     /// Releases behind which another frame waited.
@@ -263,6 +266,7 @@ impl Rig {
         let DeviceMessage::Frame(frame) = opened else { panic!("{opened:?}") };
         let after_loss = frame.flags.contains(FrameFlags::AFTER_LOSS);
         self.seen_so_far.packets_after_loss += u64::from(after_loss);
+        self.seen_so_far.narrow += u64::from(frame.samples.width() == Width::Bits24);
     }
 
     /// A register read of the model, with the clock of this variant.

@@ -102,7 +102,7 @@ fn set_up(rig: &mut Rig, dice: &mut Dice, more: u32) -> u64 {
     rig.set(R::OverRangeTrip, if dice.once_in(4) { trip } else { 0 });
     if dice.once_in(16) {
         let (register, value) = dice.pick(&[
-            (R::Mode, 1 << 5),
+            (R::Mode, 1 << 6),
             (R::Patterns, 1025),
             (R::Patterns, 0),
             (R::Dwell, 0),
@@ -193,8 +193,20 @@ pub fn run(rig: &mut Rig, seed: u64) {
 /// The same with frames that are sent as packets, but where an action of the host has ended that. After every eighth
 /// scenario, a run sends frames as they are.
 pub fn packets(rig: &mut Rig, seed: u64) {
+    some_packets(rig, seed, mode::PACKETS);
+}
+
+/// The same with samples of 24 bits, but in every eighth scenario. Half of the reads are clocked by `sck`.
+pub fn narrow_packets(rig: &mut Rig, seed: u64) {
+    rig.by_sck = seed % 4 >= 2;
+    let width = if seed % 8 == 3 { 0 } else { mode::NARROW };
+    some_packets(rig, seed ^ 1 << 20, mode::PACKETS | width);
+    rig.by_sck = false;
+}
+
+fn some_packets(rig: &mut Rig, seed: u64, bits: u32) {
     let mut dice = Dice::new(!seed);
-    act(rig, seed, mode::PACKETS, |rig| {
+    act(rig, seed, bits, |rig| {
         if dice.once_in(3) {
             stamp(rig, &mut dice);
         }
@@ -256,7 +268,8 @@ pub fn slow_readers(rig: &mut Rig, seed: u64) {
     let (patterns, dwell, sweeps) = (dice.range(1, 6), dice.range(10, 120), dice.range(1, 3));
     let halves = dice.range(1, 2);
     let frame = patterns * dwell * sweeps * halves;
-    let packets = if seed % 4 < 2 { 0 } else { mode::PACKETS };
+    let narrow = if seed % 16 >= 8 { mode::NARROW } else { 0 };
+    let packets = if seed % 4 < 2 { 0 } else { mode::PACKETS | narrow };
     stamp(rig, dice);
     rig.set(R::Mode, packets | if halves == 2 { mode::DIFFERENTIAL } else { 0 });
     for (register, value) in [(R::Patterns, patterns), (R::Dwell, dwell), (R::Sweeps, sweeps)] {
@@ -369,7 +382,8 @@ pub fn long_blocks(rig: &mut Rig, seed: u64) {
     let (patterns, dwell) = (dice.range(65, 300), dice.range(1, 4));
     rig.tilt = 2 * dwell;
     stamp(rig, dice);
-    rig.set(R::Mode, mode::DIFFERENTIAL | mode::PACKETS);
+    let narrow = if seed % 16 >= 8 { mode::NARROW } else { 0 };
+    rig.set(R::Mode, mode::DIFFERENTIAL | mode::PACKETS | narrow);
     rig.set(R::Patterns, patterns as u32);
     rig.set(R::Dwell, dwell as u32);
     rig.set(R::Blank, 0);

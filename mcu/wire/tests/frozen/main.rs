@@ -14,13 +14,14 @@ mod page;
 mod v1;
 mod v2;
 mod v3;
+mod v4;
 mod variants;
 
 use nirspi_wire::version;
 use std::collections::BTreeSet;
 
 /// The newest version that is frozen here.
-const NEWEST: u16 = 3;
+const NEWEST: u16 = 4;
 
 #[test]
 fn the_version_that_the_crate_speaks_is_frozen() {
@@ -30,10 +31,11 @@ fn the_version_that_the_crate_speaks_is_frozen() {
 #[test]
 fn every_variant_is_frozen() {
     let mut seen = BTreeSet::new();
-    for (request, _) in v1::requests() {
+    for (request, _) in v1::requests().into_iter().chain(v4::requests()) {
         variants::of_request(&request, &mut seen);
     }
     let later = v2::device_messages().into_iter().chain(v3::device_messages());
+    let later = later.chain(v4::device_messages());
     for (message, _) in v1::device_messages().into_iter().chain(later) {
         variants::of_device_message(&message, &mut seen);
     }
@@ -50,4 +52,7 @@ fn what_is_new_says_since_which_version() {
     let since: Vec<u16> =
         v3::device_messages().iter().map(|(message, _)| message.since()).collect();
     assert_eq!(since, [1, 3]);
+    let since: Vec<u16> =
+        v4::device_messages().iter().map(|(message, _)| message.since()).collect();
+    assert_eq!(since, [1, 4, 4]);
 }

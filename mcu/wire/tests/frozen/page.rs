@@ -1,6 +1,6 @@
 //! `docs/protocol.md` is written from the definitions of the messages and from their frozen bytes. `NIRSPI_BLESS=1` writes it.
 
-use super::{v1, v2, v3};
+use super::{v1, v2, v3, v4};
 use nirspi_wire::version;
 use std::fmt::Write;
 use std::path::Path;
@@ -39,7 +39,7 @@ How [postcard](https://postcard.jamesmunns.com/wire-format) writes a value:
 | `Result` | 0 and the value, or 1 and the error |
 | `&str`, bytes | the length in bytes, then the bytes |
 | `Words` | the length in bytes, then little-endian 16-bit words |
-| `Samples` | one byte `shift`, the length in bytes, then little-endian signed 32-bit words; a sample is `word << shift` |
+| `Samples` | one byte `shift`, the length in bytes, then little-endian signed 32-bit words; a sample is `word << shift`. Or the byte 0x80, the length in bytes, then little-endian signed 24-bit words; a sample is `word` (since version 4) |
 | `Tail` | the value, or nothing where the version of the session does not have it |
 ";
 
@@ -175,10 +175,11 @@ fn page() -> String {
         }
     }
     page += "\n## Bytes\n\nBytes of messages before CRC and COBS, in hexadecimal, as the tests freeze them.\n\n```text\n";
-    for (request, bytes) in v1::requests() {
+    for (request, bytes) in v1::requests().into_iter().chain(v4::requests()) {
         writeln!(page, "{bytes}\n    {request:?}").unwrap();
     }
     let later = v2::device_messages().into_iter().chain(v3::device_messages());
+    let later = later.chain(v4::device_messages());
     for (message, bytes) in v1::device_messages().into_iter().chain(later) {
         writeln!(page, "{bytes}\n    {message:?}").unwrap();
     }

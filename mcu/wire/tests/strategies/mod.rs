@@ -30,10 +30,16 @@ fn words(most: usize) -> impl Strategy<Value = Words<'static>> {
 
 fn samples() -> impl Strategy<Value = Samples<'static>> {
     let values = length(1024).prop_flat_map(|n| vec(-(1i64 << 48)..(1i64 << 48), n));
-    (values, 0u32..48).prop_map(|(values, narrow)| {
+    (values, 0u32..48, any::<bool>()).prop_map(|(values, shift, narrow)| {
         let buffer = vec![0; 4 * values.len()].leak();
-        let narrowed: Vec<i64> = values.iter().map(|value| value >> narrow).collect();
-        Samples::pack(narrowed.into_iter(), buffer).unwrap()
+        let shift = if narrow { shift.max(25) } else { shift };
+        let values = values.iter().map(|value| value >> shift).collect::<Vec<i64>>().into_iter();
+        let packed = if narrow {
+            Samples::pack_narrow(values, buffer)
+        } else {
+            Samples::pack(values, buffer)
+        };
+        packed.unwrap()
     })
 }
 
@@ -55,10 +61,11 @@ prop_compose! {
         (patterns, clocks_per_pattern, blanked) in any::<(u16, u16, u16)>(),
         (differential, adc_latency, sweeps, over_range_trip) in any::<(bool, u8, u32, u32)>(),
         source in prop_oneof![Just(SampleSource::Detector), Just(SampleSource::TestPattern)],
+        narrow in any::<Option<bool>>(),
     ) -> Configuration<'static> {
         Configuration {
             order, patterns, differential, clocks_per_pattern, blanked, adc_latency, sweeps, source,
-            over_range_trip,
+            over_range_trip, narrow: Tail(narrow),
         }
     }
 }

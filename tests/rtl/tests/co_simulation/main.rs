@@ -22,6 +22,7 @@ use nirspi_tests::tapped;
 use nirspi_tests_rtl::RtlFpga;
 use nirspi_wire::fpga::FpgaFrame;
 use nirspi_wire::ready;
+use nirspi_wire::samples::Width;
 use nirspi_wire::{Fault, FrameFlags};
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -128,7 +129,7 @@ fn a_scene_comes_through_the_rtl_exactly_and_bit_for_bit_as_through_the_golden_m
     println!("one sweep of 1024 patterns and complements, shown, read and sent: {each:.2?}");
 }
 
-/// The packets that the RTL makes go through the firmware as they are.
+/// The packets that the RTL makes go through the firmware as they are. The host has asked for samples of 24 bits.
 #[test]
 fn packets_of_the_rtl_carry_the_samples_of_the_golden_models_frames() {
     let optics = ideal();
@@ -138,7 +139,7 @@ fn packets_of_the_rtl_carry_the_samples_of_the_golden_models_frames() {
     let (captured, packets) = tapped::run(Box::new(MemoryLink::new(camera)), &setup, 2);
     assert!(matches!(captured.ended, Ended::Complete), "{:?}", captured.ended);
     let read = log.bytes();
-    let place = ready::packet_in(&read[0], 1024).unwrap();
+    let place = ready::packet_in(&read[0], 1024, Width::Bits24).unwrap();
     assert!(FpgaFrame::parse(&read[0]).is_err() && place.start <= ready::LEAD_BYTES);
     println!("{} zeros, then a packet of {} bytes", place.start, place.len());
 

@@ -15,6 +15,7 @@ pub struct Settings {
     pub differential: bool,
     pub test_source: bool,
     pub packets: bool,
+    pub narrow: bool,
     pub patterns: u64,
     pub dwell: u64,
     pub blank: u64,
@@ -39,6 +40,7 @@ impl Default for Settings {
             differential: false,
             test_source: false,
             packets: false,
+            narrow: false,
             patterns: reset(Register::Patterns),
             dwell: reset(Register::Dwell),
             blank: reset(Register::Blank),
@@ -54,8 +56,8 @@ impl Default for Settings {
 }
 
 /// Bits of the fields of `types::Settings`.
-pub const SETTINGS: [usize; 25] =
-    [1, 1, 1, 1, 1, 1, 11, 10, 1, 16, 1, 16, 1, 6, 32, 32, 1, 32, 1, 1, 12, 27, 21, 1, 32];
+pub const SETTINGS: [usize; 26] =
+    [1, 1, 1, 1, 1, 1, 1, 11, 10, 1, 16, 1, 16, 1, 6, 32, 32, 1, 32, 1, 1, 12, 27, 21, 1, 32];
 /// Bits of the fields of `types::Stamp`.
 pub const STAMP: [usize; 3] = [16, 64, 64];
 /// Bits of the fields of `types::Place`.
@@ -88,6 +90,7 @@ impl Settings {
             self.differential.into(),
             self.test_source.into(),
             self.packets.into(),
+            self.narrow.into(),
             self.patterns,
             self.patterns - 1,
             (self.patterns == 1).into(),

@@ -7,6 +7,7 @@ use crate::scenario::Dice;
 use nirspi_hdl_model::{Stamp, packet};
 use nirspi_wire::FrameFlags;
 use nirspi_wire::fpga::{Header, Sums};
+use nirspi_wire::samples::Width;
 
 laws![
     a_packet_is_that_of_the_golden_model_and_nothing_follows_it,
@@ -79,7 +80,7 @@ impl<'d> Rig<'d> {
     }
 
     /// Gives the module a frame; returns the expected bytes.
-    fn frame(&mut self, patterns: u64, differential: bool) -> Vec<u8> {
+    fn frame(&mut self, patterns: u64, differential: bool, narrow: bool) -> Vec<u8> {
         let kind = self.dice.range(0, 2);
         for index in 0..patterns as usize {
             let wanted = self.difference(kind);
@@ -90,7 +91,7 @@ impl<'d> Rig<'d> {
             self.sums[1024 + index] = negative;
         }
         let sweeps = if self.dice.once_in(2) { 1 } else { self.dice.next() >> 32 };
-        let settings = Settings { patterns, differential, sweeps, ..Settings::default() };
+        let settings = Settings { patterns, differential, narrow, sweeps, ..Settings::default() };
         let any = self.dice.next() as u16;
         let rest = FrameFlags(any & !FrameFlags::DIFFERENTIAL.0);
         let run = self.dice.next() as u16;
@@ -126,31 +127,37 @@ impl<'d> Rig<'d> {
             .zip(negative)
             .map(|(&positive, &negative)| Sums { positive, negative })
             .collect();
-        packet(&header, &bank, &Stamp { run, clock, time_us })
+        let width = if narrow { Width::Bits24 } else { Width::Bits32 };
+        packet(&header, &bank, &Stamp { run, clock, time_us }, width)
     }
 }
 
 fn a_packet_is_that_of_the_golden_model_and_nothing_follows_it(project: &Project) {
     let dice = &mut Dice::new(31);
     let mut rig = Rig::new(project, dice);
-    let large = [(1024, true), (1024, false), (1023, true)];
+    let large =
+        [(1024, true), (1024, false), (1023, true), (1024, true), (1024, false), (1023, true)];
     for scenario in 0..300 {
         let (patterns, differential) = match large.get(scenario) {
             Some(&pair) => pair,
             None => (rig.dice.range(1, 150), rig.dice.once_in(2)),
         };
-        let expected = rig.frame(patterns, differential);
+        let narrow = if scenario < large.len() { scenario >= 3 } else { rig.dice.once_in(2) };
+        let expected = rig.frame(patterns, differential, narrow);
         rig.begin("open");
         let found = rig.bytes(usize::MAX, 4);
-        assert!(found == expected, "scenario {scenario}: {patterns} patterns, {differential}");
+        assert!(
+            found == expected,
+            "scenario {scenario}: {patterns} patterns, {differential}, narrow {narrow}"
+        );
     }
 }
 
 fn a_reader_may_wait_for_any_time(project: &Project) {
     let dice = &mut Dice::new(32);
     let mut rig = Rig::new(project, dice);
-    for _ in 0..4 {
-        let expected = rig.frame(1024, true);
+    for scenario in 0..4 {
+        let expected = rig.frame(1024, true, scenario % 2 == 1);
         rig.begin("open");
         let mut found = Vec::new();
         while found.len() < expected.len() {
@@ -171,10 +178,11 @@ fn a_packet_begins_soon_and_then_has_no_gap(project: &Project) {
     const PACE: [u64; 6] = [4, 4, 4, 4, 4, 5];
     let dice = &mut Dice::new(34);
     let mut rig = Rig::new(project, dice);
-    let mut longest = 0;
-    for scenario in 0..40 {
-        let patterns = if scenario < 4 { 1024 } else { rig.dice.range(1, 200) };
-        let expected = rig.frame(patterns, scenario % 2 == 0);
+    let mut longest = [0; 2];
+    for scenario in 0..80 {
+        let patterns = if scenario < 8 { 1024 } else { rig.dice.range(1, 200) };
+        let narrow = scenario % 4 >= 2;
+        let expected = rig.frame(patterns, scenario % 2 == 0, narrow);
         rig.begin("open");
         let mut wait = 0;
         while !rig.bench.is("valid") {
@@ -182,7 +190,8 @@ fn a_packet_begins_soon_and_then_has_no_gap(project: &Project) {
             wait += 1;
             assert!(wait < LEAD_CLOCKS, "{patterns} patterns: nothing yet");
         }
-        longest = longest.max(wait);
+        let longest = &mut longest[usize::from(narrow)];
+        *longest = wait.max(*longest);
         for (at, &byte) in expected.iter().enumerate() {
             assert_eq!(rig.tick(true), Some(byte), "byte {at} of {}", expected.len());
             for _ in 1..PACE[at % PACE.len()] {
@@ -190,14 +199,15 @@ fn a_packet_begins_soon_and_then_has_no_gap(project: &Project) {
             }
         }
     }
-    println!("the longest wait was of {longest} clocks");
+    println!("the longest waits were of {longest:?} clocks, with samples of 32 and of 24 bits");
 }
 
 fn whatever_is_opened_ends_what_was_going_on(project: &Project) {
     let dice = &mut Dice::new(33);
     let mut rig = Rig::new(project, dice);
     for _ in 0..60 {
-        let expected = rig.frame(90, true);
+        let narrow = rig.dice.once_in(2);
+        let expected = rig.frame(90, true, narrow);
         let abandoned = rig.dice.range(0, 300) as usize;
         rig.begin("open");
         assert!(rig.bytes(abandoned, 4) == expected[..abandoned.min(expected.len())]);

@@ -73,6 +73,7 @@ fn write_all(bench: &mut Bench, dice: &mut Dice) -> Settings {
         differential: flag(dice),
         test_source: flag(dice),
         packets: flag(dice),
+        narrow: flag(dice),
         patterns: dice.pick(&[1, 2, 513, 1024]),
         dwell,
         blank: dice.pick(&[0, dwell / 2, dwell - 1]),
@@ -90,6 +91,7 @@ fn write_all(bench: &mut Bench, dice: &mut Dice) -> Settings {
         (settings.order_table, mode::ORDER_TABLE),
         (settings.test_source, mode::TEST_SOURCE),
         (settings.packets, mode::PACKETS),
+        (settings.narrow, mode::NARROW),
     ];
     let bits = modes.iter().map(|&(set, bit)| if set { bit } else { 0 }).sum::<u32>();
     for (register, value) in [
@@ -149,7 +151,7 @@ fn every_setting_has_its_range(project: &Project) {
     let rest = u32::MAX;
     let raw = u32::from(RAW_SAMPLES_MAX);
     for (register, within, without) in [
-        (R::Mode, vec![0, 0x1F], vec![0x20, 1 << 31, rest]),
+        (R::Mode, vec![0, 0x3F], vec![0x40, 1 << 31, rest]),
         (R::Patterns, vec![1, 1024], vec![0, 1025, 2048, 1 << 16 | 1, rest]),
         // Values above the reset value of `Blank`.
         (R::Dwell, vec![3, 65_535], vec![0, 1, 2, 65_536, 1 << 16 | 5, rest]),
