@@ -21,6 +21,8 @@ pub(crate) struct Settings {
     pub(crate) test_source: bool,
     /// Frames are sent as packets.
     pub(crate) packets: bool,
+    /// The packets leave by the parallel port.
+    pub(crate) parallel: bool,
     pub(crate) patterns: u16,
     /// In clocks.
     pub(crate) dwell: u16,
@@ -44,7 +46,8 @@ impl Settings {
     /// Copies the registers; `None` if one is out of range.
     pub(crate) fn copy(registers: &Registers) -> Option<Self> {
         let bits = registers.get(Register::Mode);
-        if bits & !mode::DEFINED != 0 {
+        let has = |bit| bits & bit != 0;
+        if has(!mode::DEFINED) || has(mode::PARALLEL) && !has(mode::PACKETS) {
             return None;
         }
         let within = |register, range: RangeInclusive<u32>| {
@@ -62,6 +65,7 @@ impl Settings {
             differential: bits & mode::DIFFERENTIAL != 0,
             test_source: bits & mode::TEST_SOURCE != 0,
             packets: bits & mode::PACKETS != 0,
+            parallel: bits & mode::PARALLEL != 0,
             patterns: within(Register::Patterns, 1..=PATTERNS.into())? as u16,
             dwell: dwell as u16,
             blank: within(Register::Blank, 0..=dwell - 1)? as u16,

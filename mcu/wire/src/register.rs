@@ -17,6 +17,10 @@
 //! * With [`mode::PACKETS`] a frame is read as a packet of the host's link in the layout of [`ready`](crate::ready).
 //!   Its device time is `Time + (clock of its first slot - clock of the last read of ClockLow) / 125`, all as of
 //!   the start.
+//! * With [`mode::PARALLEL`] too, the FPGA sends each packet by its parallel port as soon as the frame is complete, and
+//!   takes the frame back itself: [`status::FRAME_READY`] stays 0, a read of the frame gives zeros, and
+//!   [`control::RELEASE`] gives back raw bursts alone. A frame that the receiver does not take in time is lost and
+//!   counted like any other. A start cuts a packet that is under way.
 //! * The host port has a clock of its own. [`Register::Identity`], [`Register::Version`],
 //!   [`Register::Clocks`] and [`Register::Design`] are answered with or without the ADC's clock. Everything
 //!   else needs the ADC's clock: without it a read gives [`NO_CLOCK`], a write does nothing, and frames
@@ -77,7 +81,7 @@ registers! {
     /// Always [`IDENTITY`].
     Identity = 0x00, ReadOnly, IDENTITY;
     /// Gateware version, `major << 16 | minor << 8 | patch`.
-    Version = 0x01, ReadOnly, 0x0000_0304;
+    Version = 0x01, ReadOnly, 0x0000_0306;
     /// Holds what was written, for bus tests.
     Scratch = 0x02, ReadWrite, 0;
     /// See [`control`].
@@ -178,6 +182,12 @@ pub const fn measures_frames(version: u32) -> bool {
 #[must_use]
 pub const fn clocks_packets(version: u32) -> bool {
     has_this_map(version) && version & 0xFF >= 4
+}
+
+/// Whether gateware with this [`Register::Version`] knows [`mode::PARALLEL`]: 0.3.6 and later of the same map.
+#[must_use]
+pub const fn has_parallel_port(version: u32) -> bool {
+    has_this_map(version) && version & 0xFF >= 6
 }
 
 /// Frames that can wait for the host, the delivered one included. Gateware before 0.3.3 has room for one.
@@ -315,8 +325,11 @@ pub mod mode {
     pub const TEST_SOURCE: u32 = 1 << 3;
     /// Frames are sent as packets of the host's link ([`ready`](crate::ready)). Since gateware 0.3.1.
     pub const PACKETS: u32 = 1 << 4;
+    /// Packets leave by the parallel port. A start with this bit and without `PACKETS` is refused. Since gateware 0.3.6.
+    pub const PARALLEL: u32 = 1 << 6;
     /// Every bit that has a meaning; a start with any other is refused.
-    pub const DEFINED: u32 = DIFFERENTIAL | ORDER_SEQUENCY | ORDER_TABLE | TEST_SOURCE | PACKETS;
+    pub const DEFINED: u32 =
+        DIFFERENTIAL | ORDER_SEQUENCY | ORDER_TABLE | TEST_SOURCE | PACKETS | PARALLEL;
 }
 
 /// Reason latched in [`Register::Fault`].

@@ -66,6 +66,7 @@ pub fn package() -> String {
         ("MODE_ORDER_TABLE", mode::ORDER_TABLE),
         ("MODE_TEST_SOURCE", mode::TEST_SOURCE),
         ("MODE_PACKETS", mode::PACKETS),
+        ("MODE_PARALLEL", mode::PARALLEL),
         ("MODE_DEFINED", mode::DEFINED),
         ("FAULT_WATCHDOG", FaultCode::Watchdog as u32),
         ("FAULT_DUTY", FaultCode::Duty as u32),

@@ -193,8 +193,13 @@ pub fn run(rig: &mut Rig, seed: u64) {
 /// The same with frames that are sent as packets, but where an action of the host has ended that. After every eighth
 /// scenario, a run sends frames as they are.
 pub fn packets(rig: &mut Rig, seed: u64) {
+    packets_with(rig, seed, mode::PACKETS);
+}
+
+/// The same with these bits of `Mode`.
+pub fn packets_with(rig: &mut Rig, seed: u64, bits: u32) {
     let mut dice = Dice::new(!seed);
-    act(rig, seed, mode::PACKETS, |rig| {
+    act(rig, seed, bits, |rig| {
         if dice.once_in(3) {
             stamp(rig, &mut dice);
         }
@@ -248,6 +253,11 @@ fn act(rig: &mut Rig, seed: u64, more: u32, mut before: impl FnMut(&mut Rig)) {
 /// Short frames and a host that is slow by turns: none, one or two frames wait while a third is made, some come again,
 /// and some are lost.
 pub fn slow_readers(rig: &mut Rig, seed: u64) {
+    slow_readers_with(rig, seed, if seed % 4 < 2 { 0 } else { mode::PACKETS });
+}
+
+/// The same with these bits of `Mode`.
+pub fn slow_readers_with(rig: &mut Rig, seed: u64, bits: u32) {
     let dice = &mut Dice::new(!seed);
     rig.port =
         Port { host_ps: dice.range(8_420, 11_390), half: 3, quad: true, glitches: seed % 2 == 1 };
@@ -256,9 +266,8 @@ pub fn slow_readers(rig: &mut Rig, seed: u64) {
     let (patterns, dwell, sweeps) = (dice.range(1, 6), dice.range(10, 120), dice.range(1, 3));
     let halves = dice.range(1, 2);
     let frame = patterns * dwell * sweeps * halves;
-    let packets = if seed % 4 < 2 { 0 } else { mode::PACKETS };
     stamp(rig, dice);
-    rig.set(R::Mode, packets | if halves == 2 { mode::DIFFERENTIAL } else { 0 });
+    rig.set(R::Mode, bits | if halves == 2 { mode::DIFFERENTIAL } else { 0 });
     for (register, value) in [(R::Patterns, patterns), (R::Dwell, dwell), (R::Sweeps, sweeps)] {
         rig.set(register, value as u32);
     }
