@@ -213,7 +213,8 @@ impl Pins {
         let (frame, raw) = self.ready();
         let flags = [enable, frame, raw, self.access()];
         let flags = flags.iter().rev().fold(0, |word, &flag| word << 1 | u32::from(flag));
-        [rows, columns, flags | u32::from(lines) << 4 | u32::from(drive) << 8]
+        let parallel = self.get("bundle_parallel") as u32;
+        [rows, columns, flags | u32::from(lines) << 4 | u32::from(drive) << 8 | parallel << 12]
     }
 
     fn set(&mut self, port: VarId, value: u64, width: usize) {
@@ -289,6 +290,7 @@ impl Pins {
 
     /// Drives `parallel_ready`.
     pub fn receives(&mut self, ready: bool) {
+        self.levels.ready = ready;
         self.set(self.inputs.ready, ready.into(), 1);
     }
 
