@@ -68,7 +68,7 @@ BOARDS = {
     "ecp5-evn/bring-up": replace(
         ECP5_EVN,
         name=f"{ECP5_EVN.name}, bring-up without ADC",
-        shares=tuple(f"ecp5-evn/{file}" for file in ("board.lpf", "clock_guard.sv", "reset_synchroniser.sv", "resets.sv", "shell.sv")),
+        shares=tuple(f"ecp5-evn/{file}" for file in ("board.lpf", "clock_guard.sv", "parallel_pins.sv", "reset_synchroniser.sv", "resets.sv", "shell.sv")),
         lacks="adc_",
     ),
 }

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Proves the safety rules, the FIFO, the port clocked by `sck`, the crossing, its resets, the clock guard and the LED enable at the pin, and that the proofs notice faults.
+"""Proves the safety rules, the FIFO, the port clocked by `sck`, the parallel port, the crossing, its resets, the clock guard and the LED enable at the pin, and that the proofs notice faults.
 
     python3 hdl/formal/prove.py
 
@@ -80,6 +80,7 @@ class Proof:
 SAFETY = Proof("safety", ENGINE, depth=50)
 FIFO = Proof("byte_fifo", TWO_CLOCKS, depth=45)
 PACKET_PORT = Proof("packet_port", TWO_CLOCKS, depth=45)
+PARALLEL_PORT = Proof("parallel_port", TWO_CLOCKS, depth=40)
 CROSSING = Proof("crossing", TWO_CLOCKS, depth=30)
 GUARD = Proof("clock_guard_proof", ANY_STATE, depth=40, sources=("boards/ecp5-evn/clock_guard.sv",))
 RECOVERY = Proof(
@@ -91,7 +92,7 @@ SHELL = Proof(
     depth=40,
     sources=tuple(f"boards/ecp5-evn/{name}.sv" for name in ("shell", "clock_guard", "resets", "reset_synchroniser")),
 )
-PROOFS = (SAFETY, FIFO, PACKET_PORT, CROSSING, RECOVERY, GUARD, SHELL)
+PROOFS = (SAFETY, FIFO, PACKET_PORT, PARALLEL_PORT, CROSSING, RECOVERY, GUARD, SHELL)
 
 
 @dataclass(frozen=True)
@@ -185,6 +186,32 @@ FAULTS = (
         "the lines are driven while the port is not selected",
         "silent_else",
         (("packet_port", "drives       <= 0;", "drives       <= 1;"),),
+    ),
+    Fault(
+        PARALLEL_PORT,
+        "a byte goes to a receiver that is not ready",
+        "ready_when_sent",
+        (("parallel_port", "phase == 2 && ready && there", "phase == 2 && there"),),
+    ),
+    Fault(
+        PARALLEL_PORT,
+        "a byte is taken and not sent",
+        "sent_once",
+        (("parallel_port", "taken     = puts &&", "taken     = phase == 2 && valid &&"),),
+    ),
+    Fault(
+        PARALLEL_PORT,
+        "a byte is sent that is not there",
+        "taken_if_there",
+        (("parallel_port", "Part_Packet && valid ||", "Part_Packet ||"),),
+    ),
+    Fault(PARALLEL_PORT, "no zero before a packet", "zero_before", (("parallel_port", "part <= Part_Before;", "part <= Part_Packet;"),)),
+    Fault(PARALLEL_PORT, "two zeros behind a packet", "zeros_behind", (("parallel_port", "left <= 2;", "left <= 1;"),)),
+    Fault(
+        PARALLEL_PORT,
+        "the clock stops in the middle of a period",
+        "no_short_level",
+        (("parallel_port", "strobe[1] <= runs &&", "strobe[1] <= on &&"),),
     ),
     Fault(
         CROSSING,

@@ -13,7 +13,8 @@ module safety (
     input logic [1:0]  operation,
     input logic [15:0] address,
     input logic [31:0] data,
-    input logic        byte_taken
+    input logic        byte_taken,
+    input logic        parallel_ready
 );
     localparam int unsigned DEPTH = nirspi_types::DEPTH;
 
@@ -28,6 +29,9 @@ module safety (
         .value      (),
         .octet      (),
         .byte_valid (),
+        .parallel_strobe(),
+        .parallel_lines (),
+        .parallel_enable(),
         .*
     );
 

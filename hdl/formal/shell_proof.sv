@@ -28,6 +28,10 @@ module shell_proof (
         .spi_drive  (),
         .frame_ready(),
         .raw_ready  (),
+        .parallel_ready (1'b0),
+        .parallel_strobe(),
+        .parallel_lines (),
+        .parallel_enable(),
         .healthy    ()
     );
 
@@ -72,6 +76,10 @@ module nirspi_core (
     output logic [3:0]  spi_drive,
     output logic        frame_ready,
     output logic        raw_ready,
+    input  logic        parallel_ready,
+    output logic [1:0]  parallel_strobe,
+    output logic [7:0]  parallel_lines,
+    output logic        parallel_enable,
     output logic        access
 );
 endmodule

@@ -26,6 +26,11 @@ module nirspi_core (
     output var logic          led_enable ,
     // Interlock loop, closed when high; in step with nothing.
     input var logic interlock,
+    // Parallel port.
+    input  var logic         parallel_ready , /// The receiver takes bytes; in step with nothing
+    output var logic [2-1:0] parallel_strobe, /// The clock's levels in the first and in the second half of `clk_adc`
+    output var logic [8-1:0] parallel_lines ,
+    output var logic         parallel_enable,
     // Host port.
     input  var logic         spi_sck    ,
     input  var logic         spi_cs_n   ,
@@ -38,6 +43,7 @@ module nirspi_core (
 );
     // Pins to the clocks that look at them. All six of the host port are equally late.
     logic         closed  ;
+    logic         receives;
     logic         sck     ;
     logic         cs_n    ;
     logic [4-1:0] lines_in;
@@ -59,6 +65,12 @@ module nirspi_core (
         .rst  (rst_host),
         .from (spi_cs_n),
         .to   (cs_n    )
+    );
+    nirspi_synchroniser to_receives (
+        .clk  (clk_adc       ),
+        .rst  (rst_adc       ),
+        .from (parallel_ready),
+        .to   (receives      )
     );
     for (genvar i = 0; i < 4; i++) begin :g_line
         nirspi_glitch_filter to_line (
@@ -228,25 +240,29 @@ module nirspi_core (
     );
 
     nirspi_engine machine (
-        .clk         (clk_adc                               ),
-        .rst         (rst_adc                               ),
-        .code        (adc_code                              ),
-        .over_range  (adc_over_range                        ),
-        .interlock   (closed                                ),
-        .rows        (led_rows                              ),
-        .columns     (led_columns                           ),
-        .enable      (led_enable                            ),
-        .frame_ready (frame_ready                           ),
-        .raw_ready   (raw_ready                             ),
-        .access      (access                                ),
-        .request     (request                               ),
-        .operation   (operation                             ),
-        .address     (address                               ),
-        .data        (data                                  ),
-        .answered    (answered                              ),
-        .value       (value                                 ),
-        .octet       (octet                                 ),
-        .byte_valid  (byte_valid                            ),
-        .byte_taken  (((by_sck) ? ( !full_sck ) : ( !full )))
+        .clk             (clk_adc                               ),
+        .rst             (rst_adc                               ),
+        .code            (adc_code                              ),
+        .over_range      (adc_over_range                        ),
+        .interlock       (closed                                ),
+        .rows            (led_rows                              ),
+        .columns         (led_columns                           ),
+        .enable          (led_enable                            ),
+        .frame_ready     (frame_ready                           ),
+        .raw_ready       (raw_ready                             ),
+        .access          (access                                ),
+        .request         (request                               ),
+        .operation       (operation                             ),
+        .address         (address                               ),
+        .data            (data                                  ),
+        .answered        (answered                              ),
+        .value           (value                                 ),
+        .octet           (octet                                 ),
+        .byte_valid      (byte_valid                            ),
+        .byte_taken      (((by_sck) ? ( !full_sck ) : ( !full ))),
+        .parallel_ready  (receives                              ),
+        .parallel_strobe (parallel_strobe                       ),
+        .parallel_lines  (parallel_lines                        ),
+        .parallel_enable (parallel_enable                       )
     );
 endmodule

@@ -25,7 +25,12 @@ module nirspi_engine
     output var logic [32-1:0] value      ,
     output var logic [8-1:0]  octet      ,
     output var logic          byte_valid ,
-    input  var logic          byte_taken
+    input  var logic          byte_taken ,
+    // Parallel port.
+    input  var logic         parallel_ready , /// In step with `clk`
+    output var logic [2-1:0] parallel_strobe,
+    output var logic [8-1:0] parallel_lines ,
+    output var logic         parallel_enable
 );
 
 
@@ -301,28 +306,33 @@ module nirspi_engine
     logic                [32-1:0] frames_made;
     logic                [32-1:0] frames_lost;
     nirspi_types::Header          header     ;
+    logic                         waits      ; // a frame, for the host or for the parallel port
+    logic                         sent       ; // the parallel port's frame
+    logic                         parallel   ; // packets of the run leave by the parallel port
+
+    always_comb frame_ready = waits && !parallel;
 
     nirspi_frames delivery (
-        .clk        (clk        ),
-        .rst        (rst        ),
-        .settings   (settings   ),
-        .clock_now  (clock_now  ),
-        .light_next (light_next ),
-        .restart    (begins     ),
-        .give_back  (give_back  ),
-        .first      (first      ),
-        .done       (frame_done ),
-        .over_range (over_count ),
-        .over_any   (over_any   ),
-        .total      (total      ),
-        .overflow   (overflow   ),
-        .counts     (counts     ),
-        .filling    (filling    ),
-        .reading    (reading    ),
-        .ready      (frame_ready),
-        .made       (frames_made),
-        .lost       (frames_lost),
-        .header     (header     )
+        .clk        (clk                                    ),
+        .rst        (rst                                    ),
+        .settings   (settings                               ),
+        .clock_now  (clock_now                              ),
+        .light_next (light_next                             ),
+        .restart    (begins                                 ),
+        .give_back  (((parallel) ? ( sent ) : ( give_back ))),
+        .first      (first                                  ),
+        .done       (frame_done                             ),
+        .over_range (over_count                             ),
+        .over_any   (over_any                               ),
+        .total      (total                                  ),
+        .overflow   (overflow                               ),
+        .counts     (counts                                 ),
+        .filling    (filling                                ),
+        .reading    (reading                                ),
+        .ready      (waits                                  ),
+        .made       (frames_made                            ),
+        .lost       (frames_lost                            ),
+        .header     (header                                 )
     );
 
     always_ff @ (posedge clk) begin
@@ -365,12 +375,13 @@ module nirspi_engine
         .copy_raw    (begins_raw                           ),
         .in_range    (in_range                             ),
         .settings    (settings                             ),
+        .parallel    (parallel                             ),
         .stamp       (stamp                                ),
         .status      (status                               ),
         .fault       (fault_seen                           ),
         .frames_made (frames_made                          ),
         .frames_lost (frames_lost                          ),
-        .delivered   (frame_ready                          ),
+        .delivered   (waits                                ),
         .header      (header                               ),
         .clock_now   (clock_now                            ),
         .table_entry (host_entry                           ),
@@ -387,12 +398,14 @@ module nirspi_engine
     logic [11-1:0] packet_sum  ;
     logic [8-1:0]  packet_octet;
     logic          packet_valid;
+    logic          opens_packet; // for the parallel port
+    logic          packet_taken;
     always_comb opens_frame  = access && operation == HOST_FRAME[1:0] && frame_ready;
     always_comb opens_raw    = access && operation == HOST_RAW[1:0] && raw_ready;
     always_comb opens_any    = access && (operation == HOST_FRAME[1:0] || operation == HOST_RAW[1:0]);
     always_comb sum_at       = ((settings.packets) ? ( packet_sum ) : ( format_sum ));
-    always_comb octet        = ((packet_valid) ? ( packet_octet ) : ( format_octet ));
-    always_comb byte_valid   = packet_valid || format_valid;
+    always_comb octet        = ((packet_valid && !parallel) ? ( packet_octet ) : ( format_octet ));
+    always_comb byte_valid   = packet_valid && !parallel || format_valid;
 
     nirspi_formatter format (
         .clk         (clk                             ),
@@ -411,17 +424,33 @@ module nirspi_engine
         .taken       (byte_taken                      )
     );
     nirspi_packer pack (
-        .clk         (clk                            ),
-        .rst         (rst                            ),
-        .settings    (settings                       ),
-        .header      (header                         ),
-        .stamp       (stamp                          ),
-        .open        (opens_frame && settings.packets),
-        .close       (opens_any                      ),
-        .sum_address (packet_sum                     ),
-        .sum_word    (sum_word                       ),
-        .octet       (packet_octet                   ),
-        .valid       (packet_valid                   ),
-        .taken       (byte_taken                     )
+        .clk         (clk                                             ),
+        .rst         (rst                                             ),
+        .settings    (settings                                        ),
+        .header      (header                                          ),
+        .stamp       (stamp                                           ),
+        .open        (opens_frame && settings.packets || opens_packet ),
+        .close       (opens_any && !parallel                          ),
+        .sum_address (packet_sum                                      ),
+        .sum_word    (sum_word                                        ),
+        .octet       (packet_octet                                    ),
+        .valid       (packet_valid                                    ),
+        .taken       (((parallel) ? ( packet_taken ) : ( byte_taken )))
+    );
+    nirspi_parallel_port port (
+        .clk       (clk            ),
+        .rst       (rst            ),
+        .on        (parallel       ),
+        .restart   (begins         ),
+        .frame     (waits          ),
+        .ready     (parallel_ready ),
+        .open      (opens_packet   ),
+        .octet     (packet_octet   ),
+        .valid     (packet_valid   ),
+        .taken     (packet_taken   ),
+        .give_back (sent           ),
+        .strobe    (parallel_strobe),
+        .lines     (parallel_lines ),
+        .enable    (parallel_enable)
     );
 endmodule

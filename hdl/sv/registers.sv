@@ -15,6 +15,7 @@ module nirspi_registers
     input  var logic                           copy_raw   , /// It is a raw burst
     output var logic                           in_range   , /// Every setting is
     output var nirspi_types::Settings          settings   ,
+    output var logic                           parallel   , /// Packets of the run leave by the parallel port
     output var nirspi_types::Stamp             stamp      , /// Copied with the settings
     input  var logic                  [32-1:0] status     ,
     input  var logic                  [3-1:0]  fault      ,
@@ -102,7 +103,7 @@ module nirspi_registers
             good     <= 0;
             in_range <= 0;
         end else begin
-            good[0]  <= (mode & ~MODE_DEFINED) == 0;
+            good[0]  <= (mode & ~MODE_DEFINED) == 0 && (mode & (MODE_PARALLEL | MODE_PACKETS)) != MODE_PARALLEL;
             good[1]  <= patterns != 0 && patterns <= PATTERNS;
             good[2]  <= dwell != 0 && dwell[31:16] == 0;
             good[3]  <= blank < dwell;
@@ -155,6 +156,13 @@ module nirspi_registers
             settings         <= next;
             settings.raw     <= copy_raw;
             settings.endless <= next.endless || copy_raw;
+        end
+    end
+    always_ff @ (posedge clk) begin
+        if (rst) begin
+            parallel <= 0;
+        end else if (copy) begin
+            parallel <= (mode & MODE_PARALLEL) != 0;
         end
     end
     always_ff @ (posedge clk) begin

@@ -29,7 +29,8 @@ void drive(Vnirspi_core& core, uint32_t inputs) {
     core.spi_in = inputs >> 18 & 15;
     core.adc_beat = inputs >> 22 & 1;
     core.pll_locked = core.clock_alive = inputs >> 23 & 1;
-    core.design_id = inputs >> 24;
+    core.design_id = inputs >> 24 & 127;
+    core.parallel_ready = inputs >> 31;
 }
 
 // Inputs have settled before the clock rises, and outputs before it falls.
@@ -55,7 +56,8 @@ void clock(Vnirspi_core& core, int edge) {
 
 Outputs outputs(const Vnirspi_core& core) {
     const uint32_t flags = core.led_enable | core.frame_ready << 1 | core.raw_ready << 2 | core.access << 3;
-    return {core.led_rows, core.led_columns, flags | core.spi_out << 4 | core.spi_drive << 8};
+    const uint32_t parallel = core.parallel_lines | core.parallel_enable << 8 | core.parallel_strobe << 9;
+    return {core.led_rows, core.led_columns, flags | core.spi_out << 4 | core.spi_drive << 8 | parallel << 12};
 }
 
 bool same(const Outputs& a, const Outputs& b) {

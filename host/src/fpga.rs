@@ -251,7 +251,7 @@ mod tests {
             (Fpga { identity: Some(u32::MAX), ..good() }, ["0xffffffff", "DONE"]),
             (Fpga { identity: None, ..good() }, ["0x4e535049", "cs_n"]),
             (Fpga { identity: Some(0x1234), ..good() }, ["0x00001234", "another design"]),
-            (Fpga { version: Some(0x0100), ..good() }, ["0.1.0", "0.3.5"]),
+            (Fpga { version: Some(0x0100), ..good() }, ["0.1.0", "0.3.6"]),
             (Fpga { design: Some(9), ..good() }, ["design 9", "2 (bring-up)"]),
             (Fpga { clocks: Some(0), ..good() }, ["0.00 MHz, PLL not locked", "bring-up gateware"]),
             (Fpga { clocks: Some(8_000), ..good() }, ["80.00 MHz, PLL not locked", "sample clock"]),

@@ -26,6 +26,11 @@ module shell #(
     output logic [3:0]  spi_drive,
     output logic        frame_ready,
     output logic        raw_ready,
+    input  logic        parallel_ready,
+    // In step with `clk_adc`.
+    output logic [1:0]  parallel_strobe,
+    output logic [7:0]  parallel_lines,
+    output logic        parallel_enable,
     output logic        healthy
 );
     logic alive;
@@ -71,6 +76,16 @@ module shell #(
     end
     assign led_enable = enable_at_pin && healthy;
 
+    // The parallel port has one register here and one in each output cell, its clock too.
+    logic [1:0] strobe_here;
+    logic [7:0] lines_here;
+    logic       valid_here;
+    always_ff @(posedge clk_adc) begin
+        parallel_strobe <= strobe_here;
+        parallel_lines  <= lines_here;
+        parallel_enable <= valid_here;
+    end
+
     // The interlock loop passes an input cell of its own and is synchronised in the core.
     nirspi_core core (
         .clk_adc,
@@ -97,6 +112,10 @@ module shell #(
         .spi_drive,
         .frame_ready,
         .raw_ready,
+        .parallel_ready,
+        .parallel_strobe(strobe_here),
+        .parallel_lines (lines_here),
+        .parallel_enable(valid_here),
         .access        ()
     );
 endmodule

@@ -18,6 +18,11 @@ module top (
     inout  wire  [3:0]  spi_io,
     output logic        frame_ready,
     output logic        raw_ready,
+    // Parallel port.
+    input  logic        parallel_ready,
+    output logic        parallel_clock,
+    output logic [7:0]  parallel_data,
+    output logic        parallel_valid,
     // On the board: push button SW2, LEDs D5 to D7 (lit when low).
     input  logic        reset_n,
     output logic        shows_locked_n,
@@ -76,6 +81,19 @@ module top (
         .CD  (1'b0),
         .Q   (led_columns)
     );
+    logic [1:0] strobe;
+    logic [7:0] lines;
+    logic       valid;
+    parallel_pins parallel (
+        .clk   (clk_adc),
+        .strobe,
+        .lines,
+        .enable(valid),
+        .pdck  (parallel_clock),
+        .data  (parallel_data),
+        .de    (parallel_valid)
+    );
+
     logic [3:0] spi_out;
     logic [3:0] spi_drive;
     for (genvar i = 0; i < 4; i++) begin : g_line
@@ -102,6 +120,10 @@ module top (
         .spi_drive,
         .frame_ready,
         .raw_ready,
+        .parallel_ready,
+        .parallel_strobe(strobe),
+        .parallel_lines (lines),
+        .parallel_enable(valid),
         .healthy
     );
 

@@ -70,6 +70,8 @@ pub(crate) struct Frames {
     after_loss: bool,
     /// As of the start of the run.
     stamp: Stamp,
+    /// Frames of the run leave by the parallel port.
+    parallel: bool,
 }
 
 impl Frames {
@@ -84,12 +86,14 @@ impl Frames {
             lost: 0,
             after_loss: false,
             stamp: Stamp::default(),
+            parallel: false,
         }
     }
 
     /// Begins a run and forgets all earlier runs.
-    pub(crate) fn restart(&mut self, stamp: Stamp) {
+    pub(crate) fn restart(&mut self, stamp: Stamp, parallel: bool) {
         self.stamp = stamp;
+        self.parallel = parallel;
         self.overflow = false;
         self.waiting.clear();
         self.made = 0;
@@ -107,9 +111,9 @@ impl Frames {
         self.lost
     }
 
-    /// Whether a frame is delivered.
+    /// Whether the host port can read a frame.
     pub(crate) fn ready(&self) -> bool {
-        !self.waiting.is_empty()
+        !self.parallel && !self.waiting.is_empty()
     }
 
     /// Sum of the samples and number of over-range samples of the delivered frame; 0 without one.
@@ -117,9 +121,23 @@ impl Frames {
         self.waiting.front().map_or((0, 0), |frame| (frame.total, frame.header.over_range))
     }
 
-    /// Takes the delivered frame back. The frame that waits behind it is delivered.
+    /// Takes the delivered frame back, unless it is the parallel port's. The frame that waits behind it is delivered.
     pub(crate) fn release(&mut self) {
-        self.waiting.pop_front();
+        if !self.parallel {
+            self.waiting.pop_front();
+        }
+    }
+
+    /// The packet that the parallel port sends next or is sending.
+    pub(crate) fn outgoing(&mut self) -> Option<&[u8]> {
+        if self.parallel { self.oldest() } else { None }
+    }
+
+    /// The parallel port has sent its packet and takes the frame back.
+    pub(crate) fn sent(&mut self) {
+        if self.parallel {
+            self.waiting.pop_front();
+        }
     }
 
     /// Adds the sum of one slot.
@@ -171,6 +189,11 @@ impl Frames {
 
     /// The host's frame as it crosses the host port.
     pub(crate) fn bytes(&mut self) -> Option<&[u8]> {
+        if self.parallel { None } else { self.oldest() }
+    }
+
+    /// The oldest frame that waits, as bytes.
+    fn oldest(&mut self) -> Option<&[u8]> {
         let Complete { bank, header, packet: form, bytes, .. } = self.waiting.front_mut()?;
         let bank = &self.banks[*bank];
         Some(bytes.get_or_insert_with(|| match form {

@@ -9,6 +9,7 @@ use crate::frames::Frames;
 use crate::leds::{Leds, Lines};
 use crate::order::OrderTable;
 use crate::packet::Stamp;
+use crate::parallel::on_lines;
 use crate::raw::RawCapture;
 use crate::registers::Registers;
 use crate::safety::{Clock, Safety};
@@ -230,6 +231,17 @@ impl Gateware {
         self.frames.bytes()
     }
 
+    /// What the parallel port sends next or is sending: the packet, with the zeros around it ([`on_lines`]). `None` while
+    /// no frame of a run with `PARALLEL` waits. How fast the bytes go, only the receiver and the RTL know.
+    pub fn outgoing(&mut self) -> Option<Vec<u8>> {
+        self.frames.outgoing().map(on_lines)
+    }
+
+    /// The parallel port has sent the last of those bytes: the frame is taken back.
+    pub fn sent(&mut self) {
+        self.frames.sent();
+    }
+
     /// Level of the `raw ready` pin.
     #[must_use]
     pub fn raw_ready(&self) -> bool {
@@ -311,7 +323,7 @@ impl Gateware {
         let capture = capture(&mut settings, self.clock);
         self.config_error = false;
         self.write_refused = false;
-        self.frames.restart(self.stamp());
+        self.frames.restart(self.stamp(), settings.parallel);
         self.raw = None;
         self.run = Some(Run {
             source: Source::new(settings.test_source),

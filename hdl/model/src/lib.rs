@@ -14,6 +14,7 @@
 //!                                              └─ safety ─── enable (watchdog, duty, over-range, interlock)
 //!  ADC ─ source ─ window (latency, blanking, slot sum) ── frames (three banks) ── format ── host port
 //!            └─── raw ──────────────────────────────────────────────────────────────────── host port
+//!                                                                  frames ── parallel ──── parallel port
 //! ```
 //!
 //! # Where the register map is silent
@@ -56,6 +57,7 @@ mod gateware;
 mod leds;
 mod order;
 mod packet;
+mod parallel;
 mod raw;
 mod registers;
 mod safety;
@@ -67,4 +69,5 @@ mod window;
 pub use gateware::Gateware;
 pub use leds::Lines;
 pub use packet::{Stamp, packet};
+pub use parallel::on_lines;
 pub use source::AdcSample;

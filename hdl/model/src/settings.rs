@@ -24,6 +24,8 @@ pub(crate) struct Settings {
     pub(crate) packets: bool,
     /// Bits of a sample of a packet.
     pub(crate) width: Width,
+    /// The packets leave by the parallel port.
+    pub(crate) parallel: bool,
     pub(crate) patterns: u16,
     /// In clocks.
     pub(crate) dwell: u16,
@@ -47,7 +49,8 @@ impl Settings {
     /// Copies the registers; `None` if one is out of range.
     pub(crate) fn copy(registers: &Registers) -> Option<Self> {
         let bits = registers.get(Register::Mode);
-        if bits & !mode::DEFINED != 0 {
+        let has = |bit| bits & bit != 0;
+        if has(!mode::DEFINED) || has(mode::PARALLEL) && !has(mode::PACKETS) {
             return None;
         }
         let within = |register, range: RangeInclusive<u32>| {
@@ -66,6 +69,7 @@ impl Settings {
             test_source: bits & mode::TEST_SOURCE != 0,
             packets: bits & mode::PACKETS != 0,
             width: if bits & mode::NARROW == 0 { Width::Bits32 } else { Width::Bits24 },
+            parallel: bits & mode::PARALLEL != 0,
             patterns: within(Register::Patterns, 1..=PATTERNS.into())? as u16,
             dwell: dwell as u16,
             blank: within(Register::Blank, 0..=dwell - 1)? as u16,

@@ -54,6 +54,18 @@ struct Inputs {
     beat: VarId,
     locked: VarId,
     alive: VarId,
+    ready: VarId,
+}
+
+/// Outputs of the parallel port in one clock of the ADC.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Parallel {
+    /// Level of its clock in the first half of this clock, bit 1, and in the second, bit 0.
+    pub strobe: u8,
+    /// The lines hold a byte.
+    pub enable: bool,
+    /// The eight lines.
+    pub lines: u8,
 }
 
 /// Outputs in bundles, because the simulator looks a port up by its name each time, which took a third of a run.
@@ -64,6 +76,7 @@ const BUNDLES: [(&str, &str); 2] = [
     bundle_leds : output 'adc logic<64>,
     bundle_adc  : output 'adc logic<5>,
     bundle_lines: output 'host logic<8>,
+    bundle_parallel: output 'adc logic<11>,
 ",
     ),
     (
@@ -73,6 +86,7 @@ const BUNDLES: [(&str, &str); 2] = [
     assign bundle_leds  = {led_rows, led_columns};
     assign bundle_adc   = {led_rows != 0 || led_columns != 0, led_enable, access, frame_ready, raw_ready};
     assign bundle_lines = {spi_out, spi_drive};
+    assign bundle_parallel = {parallel_strobe, parallel_enable, parallel_lines};
 ",
     ),
 ];
@@ -102,6 +116,7 @@ impl Pins {
             beat: input("adc_beat"),
             locked: input("pll_locked"),
             alive: input("clock_alive"),
+            ready: input("parallel_ready"),
         };
         let reset_sck = sim.get_reset("rst_sck").unwrap();
         let reset_adc = sim.get_reset("rst_adc").unwrap();
@@ -198,7 +213,8 @@ impl Pins {
         let (frame, raw) = self.ready();
         let flags = [enable, frame, raw, self.access()];
         let flags = flags.iter().rev().fold(0, |word, &flag| word << 1 | u32::from(flag));
-        [rows, columns, flags | u32::from(lines) << 4 | u32::from(drive) << 8]
+        let parallel = self.get("bundle_parallel") as u32;
+        [rows, columns, flags | u32::from(lines) << 4 | u32::from(drive) << 8 | parallel << 12]
     }
 
     fn set(&mut self, port: VarId, value: u64, width: usize) {
@@ -270,6 +286,18 @@ impl Pins {
     pub fn interlock(&mut self, closed: bool) {
         self.levels.interlock = closed;
         self.set(self.inputs.interlock, closed.into(), 1);
+    }
+
+    /// Drives `parallel_ready`.
+    pub fn receives(&mut self, ready: bool) {
+        self.levels.ready = ready;
+        self.set(self.inputs.ready, ready.into(), 1);
+    }
+
+    /// The parallel port.
+    pub fn parallel(&mut self) -> Parallel {
+        let word = self.get("bundle_parallel");
+        Parallel { strobe: (word >> 9) as u8, enable: word >> 8 & 1 != 0, lines: word as u8 }
     }
 
     /// Drives `cs_n`: low when selected. The level resets what `sck` clocks, with or without a clock.

@@ -6,8 +6,8 @@
 //! | bytes | field |
 //! |---|---|
 //! | 1 | bits 0 to 2: [`Edge`]; bit 3: inputs follow; bit 4: outputs follow. What does not follow is as before, and all 0 before the first |
-//! | 4 | inputs before the edge: sample (14 bits), over range, interlock, `sck`, `cs_n`, lines (4 bits), beat, PLL locked and clock alive together, design (8 bits) |
-//! | 12 | outputs after it: rows; columns; enable, frame ready, raw ready, access, lines (4 bits), drive (4 bits) |
+//! | 4 | inputs before the edge: sample (14 bits), over range, interlock, `sck`, `cs_n`, lines (4 bits), beat, PLL locked and clock alive together, design (7 bits), ready of the parallel port |
+//! | 12 | outputs after it: rows; columns; enable, frame ready, raw ready, access, lines (4 bits), drive (4 bits); the parallel port's lines (8 bits), enable, strobe (2 bits) |
 
 use nirspi_hdl_model::AdcSample;
 use std::{
@@ -45,6 +45,8 @@ pub(crate) struct Levels {
     /// The PLL is locked and the clock alive.
     pub healthy: bool,
     pub design: u8,
+    /// The parallel port's receiver takes bytes.
+    pub ready: bool,
 }
 
 impl Levels {
@@ -57,7 +59,8 @@ impl Levels {
             | u32::from(self.lines & 0xF) << 18
             | u32::from(self.beat) << 22
             | u32::from(self.healthy) << 23
-            | u32::from(self.design) << 24
+            | u32::from(self.design & 0x7F) << 24
+            | u32::from(self.ready) << 31
     }
 }
 

@@ -18,6 +18,10 @@
 //!   Its device time is `Time + (clock of its first slot - clock of the last read of ClockLow) / 125`, all as of
 //!   the start.
 //! * With [`mode::NARROW`] too, the samples of a packet have three bytes.
+//! * With [`mode::PARALLEL`] too, the FPGA sends each packet by its parallel port as soon as the frame is complete, and
+//!   takes the frame back itself: [`status::FRAME_READY`] stays 0, a read of the frame gives zeros, and
+//!   [`control::RELEASE`] gives back raw bursts alone. A frame that the receiver does not take in time is lost and
+//!   counted like any other. A start cuts a packet that is under way.
 //! * The host port has a clock of its own. [`Register::Identity`], [`Register::Version`],
 //!   [`Register::Clocks`] and [`Register::Design`] are answered with or without the ADC's clock. Everything
 //!   else needs the ADC's clock: without it a read gives [`NO_CLOCK`], a write does nothing, and frames
@@ -78,7 +82,7 @@ registers! {
     /// Always [`IDENTITY`].
     Identity = 0x00, ReadOnly, IDENTITY;
     /// Gateware version, `major << 16 | minor << 8 | patch`.
-    Version = 0x01, ReadOnly, 0x0000_0305;
+    Version = 0x01, ReadOnly, 0x0000_0306;
     /// Holds what was written, for bus tests.
     Scratch = 0x02, ReadWrite, 0;
     /// See [`control`].
@@ -185,6 +189,12 @@ pub const fn clocks_packets(version: u32) -> bool {
 #[must_use]
 pub const fn narrows_packets(version: u32) -> bool {
     has_this_map(version) && version & 0xFF >= 5
+}
+
+/// Whether gateware with this [`Register::Version`] knows [`mode::PARALLEL`]: 0.3.6 and later of the same map.
+#[must_use]
+pub const fn has_parallel_port(version: u32) -> bool {
+    has_this_map(version) && version & 0xFF >= 6
 }
 
 /// Frames that can wait for the host, the delivered one included. Gateware before 0.3.3 has room for one.
@@ -325,9 +335,11 @@ pub mod mode {
     /// Samples of packets have 24 bits instead of 32: the lower bits of the difference. Without `PACKETS` the bit
     /// changes nothing. Since gateware 0.3.5.
     pub const NARROW: u32 = 1 << 5;
+    /// Packets leave by the parallel port. A start with this bit and without `PACKETS` is refused. Since gateware 0.3.6.
+    pub const PARALLEL: u32 = 1 << 6;
     /// Every bit that has a meaning; a start with any other is refused.
     pub const DEFINED: u32 =
-        DIFFERENTIAL | ORDER_SEQUENCY | ORDER_TABLE | TEST_SOURCE | PACKETS | NARROW;
+        DIFFERENTIAL | ORDER_SEQUENCY | ORDER_TABLE | TEST_SOURCE | PACKETS | NARROW | PARALLEL;
 }
 
 /// Reason latched in [`Register::Fault`].

@@ -5,7 +5,8 @@
 //! means. A new register at a free address is appended here, with a higher minor `Register::Version`: 0.2
 //! appended `Clocks` and `Design`, 0.3 `Writes` and the check of every access, 0.3.1 packets, 0.3.2 `SumLow`,
 //! `SumHigh` and `OverRange`, 0.3.3 a second frame that waits, 0.3.4 the opcode `READ_PACKET`, 0.3.5 samples
-//! of 24 bits. Anything else needs a new `Register::Identity` or major `Register::Version`, and a new file beside this one.
+//! of 24 bits, 0.3.6 the bit `PARALLEL`. Anything else needs a new `Register::Identity` or major `Register::Version`, and a
+//! new file beside this one.
 
 use nirspi_wire::{
     FrameFlags, SelfTestReport,
@@ -17,7 +18,7 @@ use nirspi_wire::{
 /// Address, name, access, value after reset.
 const REGISTERS: &str = "\
 0x0000 Identity      ReadOnly  0x4e535049
-0x0001 Version       ReadOnly  0x00000305
+0x0001 Version       ReadOnly  0x00000306
 0x0002 Scratch       ReadWrite 0x00000000
 0x0003 Control       Command   0x00000000
 0x0004 Status        ReadOnly  0x00000000
@@ -84,8 +85,9 @@ fn bits_codes_and_limits_are_these() {
         mode::TEST_SOURCE,
         mode::PACKETS,
         mode::NARROW,
+        mode::PARALLEL,
     ];
-    assert_eq!((mode, mode::DEFINED), ([1, 2, 4, 8, 16, 32], 63));
+    assert_eq!((mode, mode::DEFINED), ([1, 2, 4, 8, 16, 32, 64], 127));
     let flags = [
         FrameFlags::OVER_RANGE,
         FrameFlags::OVERFLOW,
@@ -150,6 +152,9 @@ fn bits_codes_and_limits_are_these() {
     let narrows = [0x0000_0205, 0x0000_0304, 0x0000_0305, 0x0000_0310, 0x0000_0405]
         .map(register::narrows_packets);
     assert_eq!(narrows, [false, false, true, true, false]);
+    let parallel = [0x0000_0206, 0x0000_0305, 0x0000_0306, 0x0000_0310, 0x0000_0406]
+        .map(register::has_parallel_port);
+    assert_eq!(parallel, [false, false, true, true, false]);
     let designs: Vec<_> = (0..=3).map(Design::from_register).collect();
     assert_eq!(designs, [None, Some(Design::Camera), Some(Design::BringUp), None]);
 }

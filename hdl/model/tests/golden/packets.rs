@@ -1,9 +1,9 @@
-//! Tests of frames that are sent as packets.
+//! Tests of frames that are sent as packets, by the host port and by the parallel port.
 
 use crate::bench::{Bench, random_sample};
 use crate::oracle::setup;
 use nirspi_wire::fpga::Sums;
-use nirspi_wire::register::{Register, control, mode};
+use nirspi_wire::register::{Register, control, mode, status};
 use nirspi_wire::{DeviceMessage, Frame, Samples, open};
 use proptest::prelude::*;
 
@@ -72,4 +72,69 @@ proptest! {
             prop_assert_eq!(opened, DeviceMessage::Frame(frame));
         }
     }
+}
+
+/// A bench in which a run has made so many frames of 10 clocks each, which leave by the parallel port.
+fn by_parallel_port(frames: u64) -> Bench {
+    let mut bench = Bench::new();
+    bench.set(Register::Mode, mode::PACKETS | mode::PARALLEL);
+    for (register, value) in [(Register::Patterns, 5), (Register::Dwell, 2), (Register::Blank, 0)] {
+        bench.set(register, value);
+    }
+    bench.start();
+    bench.ticks(10 * frames);
+    bench
+}
+
+/// Number in its run of the frame that the parallel port sends next.
+fn next_number(bench: &mut Bench) -> Option<u32> {
+    let sent = bench.0.outgoing()?;
+    let (before, packet) = sent.split_first().unwrap();
+    let (packet, behind) = packet.split_at(packet.len() - 3);
+    assert_eq!((*before, behind), (0, &[0; 3][..]));
+    let (delimiter, packet) = packet.split_last().unwrap();
+    assert_eq!(*delimiter, 0);
+    let mut packet = packet.to_vec();
+    let opened: DeviceMessage<'_> = open(&mut packet).expect("damaged packet");
+    let DeviceMessage::Frame(frame) = opened else { panic!("{opened:?}") };
+    Some(frame.sequence)
+}
+
+#[test]
+fn the_parallel_port_has_the_frames_and_the_host_port_finds_none() {
+    let mut bench = by_parallel_port(2);
+    assert!(!bench.0.frame_ready() && bench.0.frame().is_none());
+    bench.control(control::RELEASE);
+    assert_eq!(next_number(&mut bench), Some(0), "the host gives nothing back");
+    bench.0.sent();
+    assert_eq!(next_number(&mut bench), Some(1));
+    bench.0.sent();
+    assert_eq!(next_number(&mut bench), None);
+    bench.control(control::STOP);
+    bench.set(Register::Mode, mode::PACKETS);
+    bench.start();
+    bench.ticks(10);
+    assert!(bench.0.frame_ready() && bench.0.outgoing().is_none(), "the next run's are the host's");
+    bench.0.sent();
+    assert!(bench.0.frame().is_some(), "the port gives nothing of them back");
+}
+
+#[test]
+fn frames_that_the_parallel_port_cannot_send_are_lost_whole_and_counted() {
+    let mut bench = by_parallel_port(5);
+    let counts = [Register::FramesMade, Register::FramesLost].map(|register| bench.get(register));
+    assert_eq!(counts, [5, 3]);
+    assert_eq!(next_number(&mut bench), Some(0));
+    bench.0.sent();
+    assert_eq!(next_number(&mut bench), Some(1));
+    bench.control(control::STOP | control::START);
+    assert_eq!(next_number(&mut bench), None, "a start forgets what waits");
+}
+
+#[test]
+fn a_start_with_the_parallel_port_and_without_packets_is_refused() {
+    let mut bench = Bench::new();
+    bench.set(Register::Mode, mode::PARALLEL);
+    bench.control(control::START);
+    assert!(!bench.0.running() && bench.status(status::CONFIG_ERROR));
 }

@@ -2,6 +2,7 @@
 //!
 //! Each kind of event is counted. A kind of event that never happened fails the test.
 
+use crate::parallel;
 use crate::project::Project;
 use crate::rig::{Rig, Tally, Variant};
 use crate::scenario;
@@ -78,6 +79,11 @@ fn narrow_packets(rigs: u64) -> Suite {
     Suite { scenario: scenario::narrow_packets, ..scenarios(rigs) }
 }
 
+/// Packets that leave by the parallel port.
+fn by_parallel_port(rigs: u64) -> Suite {
+    Suite { scenario: parallel::random, ..scenarios(rigs) }
+}
+
 /// Packets of long blocks.
 fn long_blocks() -> Suite {
     Suite { scenario: scenario::long_blocks, scenarios: 16, ..scenarios(1) }
@@ -98,6 +104,7 @@ pub fn difference(project: &Project, file: &str) -> Option<String> {
         (windows(), 0),
         (scenarios(3), SCENARIOS),
         (packets(3), SCENARIOS),
+        (by_parallel_port(1), 0),
     ];
     if file == "packer" {
         // A run of frames shows nothing of it.
@@ -109,6 +116,9 @@ pub fn difference(project: &Project, file: &str) -> Option<String> {
     }
     if file == "packet_port" {
         suites[..5].rotate_right(1);
+    }
+    if file == "parallel_port" {
+        suites.rotate_right(1);
     }
     suites.iter().find_map(|(suite, first)| suite.run(project, *first).err())
 }
@@ -209,6 +219,31 @@ fn random_scenarios_of_packets_by_sck_agree_bit_for_bit() {
     ] {
         assert!(seen >= 40, "only {seen} {what}");
     }
+}
+
+/// Receivers of any pace at the parallel port; reads and releases of the host, which find no frame; starts that cut a
+/// packet; a clock that is lost.
+#[test]
+fn random_scenarios_of_the_parallel_port_agree_bit_for_bit() {
+    let tallies = by_parallel_port(rigs()).run(&Project::read(), 0);
+    let tallies = tallies.unwrap_or_else(|difference| panic!("{difference}"));
+    println!("{tallies:#?}");
+    for (what, seen) in [
+        ("packets by the parallel port", count(&tallies, |t| t.sent)),
+        ("of them after a loss", count(&tallies, |t| t.sent_after_loss)),
+        ("packets of 24 bits, by either port", count(&tallies, |t| t.narrow)),
+        ("packets that a start has cut", count(&tallies, |t| t.cut)),
+    ] {
+        assert!(seen >= 40, "only {seen} {what}");
+    }
+}
+
+#[test]
+fn a_lost_adc_clock_ends_what_the_parallel_port_sends() {
+    let suite = Suite { scenario: parallel::clock_lost, scenarios: 8, ..scenarios(1) };
+    let tallies = suite.run(&Project::read(), 0).unwrap_or_else(|d| panic!("{d}"));
+    let sent = count(&tallies, |t| t.sent);
+    assert!(sent >= 40, "only {sent} packets");
 }
 
 #[test]

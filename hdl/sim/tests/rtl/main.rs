@@ -7,6 +7,7 @@ mod host;
 mod map;
 mod modules;
 mod mutation;
+mod parallel;
 mod rig;
 mod scenario;
 mod stale;

@@ -68,6 +68,7 @@ pub fn package() -> String {
         ("MODE_TEST_SOURCE", mode::TEST_SOURCE),
         ("MODE_PACKETS", mode::PACKETS),
         ("MODE_NARROW", mode::NARROW),
+        ("MODE_PARALLEL", mode::PARALLEL),
         ("MODE_DEFINED", mode::DEFINED),
         ("FAULT_WATCHDOG", FaultCode::Watchdog as u32),
         ("FAULT_DUTY", FaultCode::Duty as u32),

@@ -133,6 +133,28 @@ const FAULTS: &[Fault] = &[
     ("a write is not counted", "registers", "writes = writes + 1;", "writes = writes;"),
     ("a glitch of one clock is an edge", "glitch_filter", "level && last || last && earlier || level && earlier", "last"),
     ("a glitch in a level ends the level", "glitch_filter", "level && last || last && earlier || level && earlier", "level && last"),
+    ("the parallel port does not ask its receiver", "parallel_port", "phase == 2 && ready && there", "phase == 2 && there"),
+    ("the parallel port takes bytes that it does not send", "parallel_port", "assign taken     = puts && part == Part::Packet;", "assign taken     = phase == 2 && valid && part == Part::Packet;"),
+    ("the parallel port sends bytes that are not there", "parallel_port", "part == Part::Packet && valid ||", "part == Part::Packet ||"),
+    ("no zero goes before a packet", "parallel_port", "if open {\n                    part = Part::Before;", "if open {\n                    part = Part::Packet;"),
+    ("two zeros go behind a packet", "parallel_port", "left = 2;", "left = 1;"),
+    ("a start cuts no packet", "parallel_port", "} else if restart {", "} else if 1'b0 {"),
+    ("a sent frame is not given back", "parallel_port", "assign give_back = part == Part::Sent;", "assign give_back = 0;"),
+    ("a frame is given back before its last zeros", "parallel_port", "assign give_back = part == Part::Sent;", "assign give_back = part == Part::Behind && left == 2 && puts;"),
+    ("a packet is opened with the start that ends it", "parallel_port", "&& frame && !restart;", "&& frame;"),
+    ("a port that is off opens packets", "parallel_port", "part == Part::Idle && on && frame", "part == Part::Idle && frame"),
+    ("the strobe of a port that is off goes on", "parallel_port", "runs   = on;", "runs   = 1;"),
+    ("the strobe stops in the middle of a period", "parallel_port", "strobe[1] = runs && phase == 1;", "strobe[1] = on && phase == 1;"),
+    ("the strobe rises too late", "parallel_port", "strobe[0] = runs && phase != 2;", "strobe[0] = runs && phase == 1;"),
+    ("the lines keep the last byte", "parallel_port", "if taken ? octet : 0;", "if taken ? octet : lines;"),
+    ("a period has four clocks", "parallel_port", "if phase == 2 {\n                phase  = 0;", "if phase == 3 {\n                phase  = 0;"),
+    ("the host's release gives the parallel port's frame back", "engine", "if parallel ? sent : give_back,", "sent || give_back,"),
+    ("a frame of the parallel port is told to the host", "engine", "assign frame_ready = waits && !parallel;", "assign frame_ready = waits;"),
+    ("bytes of the parallel port go to the host too", "engine", "packet_valid && !parallel || format_valid;", "packet_valid || format_valid;"),
+    ("a read of the host ends the packet of the parallel port", "engine", "close      : opens_any && !parallel,", "close      : opens_any,"),
+    ("the parallel port is never on", "registers", "parallel = (mode & MODE_PARALLEL) != 0;", "parallel = 0;"),
+    ("the parallel port is switched in the run under way", "registers", "} else if copy {\n            parallel", "} else if write {\n            parallel"),
+    ("frames that are no packets may go by the parallel port", "registers", " && (mode & (MODE_PARALLEL | MODE_PACKETS)) != MODE_PARALLEL;", ";"),
     ("without clock a read gives 0", "host_registers", "answer   = if here == 0 ?\n                NO_CLOCK", "answer   = if here == 0 ?\n                0"),
     ("the engine answers for the host port", "host_registers", "answered = back && !own;\n            if back && !own {", "answered = back;\n            if back {"),
     ("the lock is not told", "host_registers", "(if locked_here ? CLOCKS_LOCKED : 0)", "(if locked_here ? 0 : CLOCKS_LOCKED)"),
@@ -182,7 +204,7 @@ const FAULTS: &[Fault] = &[
     ("packets have the sums of frames", "engine", "if settings.packets ? packet_sum : format_sum;", "format_sum;"),
     ("a frame is sent beside its packet", "engine", "open_frame : opens_frame && !settings.packets,", "open_frame : opens_frame,"),
     ("a burst goes on behind a packet", "engine", "open_none  : opens_any ", "open_none  : opens_raw "),
-    ("a packet goes on behind a burst", "engine", "close      : opens_any ", "close      : opens_frame "),
+    ("a packet goes on behind a burst", "engine", "close      : opens_any &&", "close      : opens_frame &&"),
     ("blanked samples are in the frame's sum", "sample_total", "code_1  = if counts ? code : 0;", "code_1  = code;"),
     ("the frame's sum goes on from the frame before", "sample_total", "(if first_1 ? 0 : low_2[LOW - 1:0])", "low_2[LOW - 1:0]"),
     ("the upper part of the sum goes on from the frame before", "sample_total", "(if first_2 ? 0 : high_3)", "high_3"),
@@ -240,7 +262,8 @@ const FAULTS: &[Fault] = &[
 /// Faults that only the module's own bench notices. Beyond the packet the host port sends zeros, which are delimiters
 /// too. The equivalence runs are too short for a sum of 2^31. In the core, only the right opcode at the start of an access
 /// is fast enough to begin a read by `sck`, the other port is released before it sees another edge, and the crossing takes
-/// no access while it is busy.
+/// no access while it is busy. A packet that is opened with a start gives nothing to anyone, and the equivalence runs look at
+/// the strobe only where it has to rise.
 const BENCH_ALONE: &[&str] = &[
     "the packet has no delimiter",
     "the upper part of the sum has a bit less",
@@ -248,6 +271,8 @@ const BENCH_ALONE: &[&str] = &[
     "an opcode within an access counts",
     "both ports listen",
     "a packet by sck is asked for while the crossing is busy",
+    "a packet is opened with the start that ends it",
+    "the strobe of a port that is off goes on",
 ];
 
 /// Whether the equivalence runs do not reach a fault, so that the module's own bench alone must notice the fault.

@@ -9,6 +9,7 @@
 //! [`TRIP_CLOCKS`] and [`START_CLOCKS`]. Everything else is exact: LED lines at every clock, both
 //! ready pins, every register read, every byte of a frame or burst.
 
+use crate::parallel::Receiver;
 use crate::pins::Pins;
 use crate::project::Project;
 use nirspi_hdl_model::{AdcSample, Gateware, Lines};
@@ -99,6 +100,8 @@ pub struct Rig {
     design: Design,
     /// Most frames are read by `READ_PACKET`, with an `sck` of any speed.
     pub by_sck: bool,
+    /// What is at the parallel port.
+    pub receiver: Option<Receiver>,
     /// Periods of `sck`.
     pub(crate) periods: u64,
     pub(crate) asked: Option<Access>,
@@ -151,6 +154,10 @@ pub struct Tally {
     pub by_sck: [u64; 2],
     /// Releases behind which another frame waited.
     pub followed: u64,
+    /// Packets sent by the parallel port: whole, after a loss, and cut by a start.
+    pub sent: u64,
+    pub sent_after_loss: u64,
+    pub cut: u64,
     /// Zeros before the packet of which most came, with the time of a byte in ps.
     pub lead: (u64, u64),
     pub starts: u64,
@@ -167,6 +174,15 @@ struct Seen {
     leds: Lines,
     /// The interlock pin has switched the LEDs off.
     put_out: bool,
+}
+
+/// Whether this packet of the model, delimiter included, is of the first frame after a loss, and the width of its
+/// samples.
+pub(crate) fn loss_and_width(packet: &[u8]) -> (bool, Width) {
+    let mut packet = packet[..packet.len() - 1].to_vec();
+    let opened: DeviceMessage<'_> = open(&mut packet).expect("the model's packet");
+    let DeviceMessage::Frame(frame) = opened else { panic!("{opened:?}") };
+    (frame.flags.contains(FrameFlags::AFTER_LOSS), frame.samples.width())
 }
 
 /// The sample at the pins in a clock.
@@ -198,6 +214,7 @@ impl Rig {
             closed: false,
             design: Design::Camera,
             by_sck: false,
+            receiver: None,
             periods: 0,
             asked: None,
             answer: None,
@@ -260,13 +277,10 @@ impl Rig {
     }
 
     fn count_packet(&mut self, bytes: &[u8]) {
-        let mut packet = bytes[..bytes.len() - 1].to_vec();
+        let (is_after_loss, width) = loss_and_width(bytes);
         self.seen_so_far.packets += 1;
-        let opened: DeviceMessage<'_> = open(&mut packet).expect("the model's packet");
-        let DeviceMessage::Frame(frame) = opened else { panic!("{opened:?}") };
-        let after_loss = frame.flags.contains(FrameFlags::AFTER_LOSS);
-        self.seen_so_far.packets_after_loss += u64::from(after_loss);
-        self.seen_so_far.narrow += u64::from(frame.samples.width() == Width::Bits24);
+        self.seen_so_far.packets_after_loss += u64::from(is_after_loss);
+        self.seen_so_far.narrow += u64::from(width == Width::Bits24);
     }
 
     /// A register read of the model, with the clock of this variant.
@@ -335,6 +349,7 @@ impl Rig {
         self.written_twice = 0;
         self.seen.clear();
         self.interlock.clear();
+        self.receiver.iter_mut().for_each(Receiver::forget);
         (self.dark, self.put_out) = (0..u64::MAX, true);
         (self.grace, self.just_lit) = (0, false);
         self.tell("the ADC's clock is back".into());
@@ -386,15 +401,16 @@ impl Rig {
             self.seen.pop_front();
         }
         let access = self.pins.access();
+        let sent = self.parallel_clock();
         if now >= DEPTH {
-            self.model_clock(now - DEPTH, access);
+            self.model_clock(now - DEPTH, access, sent);
         }
         self.pins.adc_edge();
         self.clock += 1;
     }
 
-    /// Runs clock `t` of the model, which the RTL has completed.
-    fn model_clock(&mut self, t: u64, access: bool) {
+    /// Runs clock `t` of the model, which the RTL has completed; the parallel port has sent a packet before that clock.
+    fn model_clock(&mut self, t: u64, access: bool, sent: bool) {
         if self.start.is_none() {
             let ready = self.pins.ready();
             let expected = (self.model.frame_ready(), self.model.raw_ready());
@@ -412,6 +428,9 @@ impl Rig {
                 None => self.expect("accesses", &1, &0),
             }
         }
+        if sent {
+            self.model.sent();
+        }
         if let Some((at, bits)) = self.start
             && at == t
         {
@@ -420,6 +439,9 @@ impl Rig {
             let running = self.model.running();
             self.tell(format!("clock {t}: started {running}"));
             self.seen_so_far.starts += u64::from(running);
+            if running {
+                self.seen_so_far.cut += u64::from(self.cut());
+            }
             self.seen_so_far.starts_refused += u64::from(!running);
         }
         if was_lit && !self.model.lines().enable {

@@ -193,18 +193,19 @@ pub fn run(rig: &mut Rig, seed: u64) {
 /// The same with frames that are sent as packets, but where an action of the host has ended that. After every eighth
 /// scenario, a run sends frames as they are.
 pub fn packets(rig: &mut Rig, seed: u64) {
-    some_packets(rig, seed, mode::PACKETS);
+    packets_with(rig, seed, mode::PACKETS);
 }
 
 /// The same with samples of 24 bits, but in every eighth scenario. Half of the reads are clocked by `sck`.
 pub fn narrow_packets(rig: &mut Rig, seed: u64) {
     rig.by_sck = seed % 4 >= 2;
     let width = if seed % 8 == 3 { 0 } else { mode::NARROW };
-    some_packets(rig, seed ^ 1 << 20, mode::PACKETS | width);
+    packets_with(rig, seed ^ 1 << 20, mode::PACKETS | width);
     rig.by_sck = false;
 }
 
-fn some_packets(rig: &mut Rig, seed: u64, bits: u32) {
+/// The same with these bits of `Mode`.
+pub fn packets_with(rig: &mut Rig, seed: u64, bits: u32) {
     let mut dice = Dice::new(!seed);
     act(rig, seed, bits, |rig| {
         if dice.once_in(3) {
@@ -260,6 +261,12 @@ fn act(rig: &mut Rig, seed: u64, more: u32, mut before: impl FnMut(&mut Rig)) {
 /// Short frames and a host that is slow by turns: none, one or two frames wait while a third is made, some come again,
 /// and some are lost.
 pub fn slow_readers(rig: &mut Rig, seed: u64) {
+    let narrow = if seed % 16 >= 8 { mode::NARROW } else { 0 };
+    slow_readers_with(rig, seed, if seed % 4 < 2 { 0 } else { mode::PACKETS | narrow });
+}
+
+/// The same with these bits of `Mode`.
+pub fn slow_readers_with(rig: &mut Rig, seed: u64, bits: u32) {
     let dice = &mut Dice::new(!seed);
     rig.port =
         Port { host_ps: dice.range(8_420, 11_390), half: 3, quad: true, glitches: seed % 2 == 1 };
@@ -268,10 +275,8 @@ pub fn slow_readers(rig: &mut Rig, seed: u64) {
     let (patterns, dwell, sweeps) = (dice.range(1, 6), dice.range(10, 120), dice.range(1, 3));
     let halves = dice.range(1, 2);
     let frame = patterns * dwell * sweeps * halves;
-    let narrow = if seed % 16 >= 8 { mode::NARROW } else { 0 };
-    let packets = if seed % 4 < 2 { 0 } else { mode::PACKETS | narrow };
     stamp(rig, dice);
-    rig.set(R::Mode, packets | if halves == 2 { mode::DIFFERENTIAL } else { 0 });
+    rig.set(R::Mode, bits | if halves == 2 { mode::DIFFERENTIAL } else { 0 });
     for (register, value) in [(R::Patterns, patterns), (R::Dwell, dwell), (R::Sweeps, sweeps)] {
         rig.set(register, value as u32);
     }

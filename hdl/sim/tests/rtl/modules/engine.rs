@@ -23,6 +23,7 @@ laws![
     light_costs_what_the_register_map_says,
     a_run_of_packets_sends_them_whole_and_a_burst_stays_a_burst,
     a_delivered_frame_can_be_asked_for_its_sum_and_its_over_range_samples,
+    packets_by_the_parallel_port_are_whole_whatever_the_host_reads,
 ];
 
 /// The engine, its host and a count of clocks.
@@ -33,13 +34,23 @@ struct Engine {
     accessed: u64,
     /// The ADC's code in each clock.
     code: fn(u64) -> u64,
+    /// Packets leave by the parallel port.
+    parallel: bool,
+    /// Bytes that the parallel port has sent.
+    sent: Vec<u8>,
 }
 
 impl Engine {
     /// The engine after reset, with the interlock closed.
     fn new(project: &Project) -> Self {
-        let mut engine =
-            Self { bench: Bench::new(project, "engine"), clock: 0, accessed: 0, code: |_| 0 };
+        let mut engine = Self {
+            bench: Bench::new(project, "engine"),
+            clock: 0,
+            accessed: 0,
+            code: |_| 0,
+            parallel: false,
+            sent: Vec::new(),
+        };
         engine.reset();
         engine
     }
@@ -57,6 +68,12 @@ impl Engine {
         self.bench.set("code", (self.code)(self.clock));
         if self.bench.is("access") {
             self.accessed = self.clock;
+        }
+        if self.parallel
+            && self.bench.get("parallel_strobe") == 0b01
+            && self.bench.is("parallel_enable")
+        {
+            self.sent.push(self.bench.get("parallel_lines") as u8);
         }
         self.bench.tick();
         self.clock += 1;
@@ -107,6 +124,7 @@ impl Engine {
     fn begin(&mut self, settings: &Settings, bits: u32) -> u64 {
         let mode = if settings.differential { mode::DIFFERENTIAL } else { 0 };
         let mode = if settings.packets { mode | mode::PACKETS } else { mode };
+        let mode = if self.parallel { mode | mode::PARALLEL } else { mode };
         for (register, value) in [
             (R::Mode, mode.into()),
             (R::Patterns, settings.patterns),
@@ -350,5 +368,47 @@ fn a_delivered_frame_can_be_asked_for_its_sum_and_its_over_range_samples(project
         engine.set(R::Control, control::RELEASE.into());
         assert_eq!(read(&mut engine), [0; 3], "released");
         engine.clocks(100);
+    }
+}
+
+fn packets_by_the_parallel_port_are_whole_whatever_the_host_reads(project: &Project) {
+    let mut engine = Engine::new(project);
+    engine.code = noise;
+    engine.parallel = true;
+    let dice = &mut Dice::new(47);
+    for _ in 0..12 {
+        let settings = Settings { packets: true, frames: 2, ..random(dice) };
+        let light = engine.start(&settings);
+        engine.sent.clear();
+        let ends = |sent: &[u8]| sent.windows(4).filter(|window| *window == [0; 4]).count();
+        while ends(&engine.sent) < 3 {
+            assert!(!engine.bench.is("frame_ready"), "the frame is not the host's");
+            assert!(!engine.bench.is("byte_valid"), "nor are its bytes");
+            engine.bench.set("parallel_ready", !dice.once_in(4));
+            engine.bench.set("byte_taken", dice.once_in(2));
+            engine.tick();
+            match dice.range(0, 300) {
+                0 => _ = engine.access(READ_FRAME, 0, 0),
+                1 => engine.set(R::Control, control::RELEASE.into()),
+                _ => {}
+            }
+            assert!(engine.clock - light < 9000, "never sent: {:x?}", engine.sent);
+        }
+        engine.bench.set("byte_taken", false);
+        let packets: Vec<_> = engine.sent.split(|&byte| byte == 0).collect();
+        let packets: Vec<_> = packets.into_iter().filter(|bytes| !bytes.is_empty()).collect();
+        for (number, packet) in packets.iter().enumerate() {
+            let mut packet = packet.to_vec();
+            let opened: DeviceMessage<'_> = open(&mut packet).unwrap();
+            let DeviceMessage::Frame(frame) = opened else { panic!("{opened:?}") };
+            assert_eq!(frame.sequence as usize, number);
+            if number == 0 {
+                let sums = Engine::sums_of_noise(&settings, light);
+                let differences = sums.iter().map(|[plus, minus]| *plus as i64 - *minus as i64);
+                assert!(frame.samples.iter().eq(differences), "{settings:?}");
+            }
+        }
+        assert_eq!(packets.len(), 2);
+        engine.clocks(50);
     }
 }

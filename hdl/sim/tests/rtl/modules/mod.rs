@@ -42,6 +42,7 @@ mod order_table;
 mod over_counter;
 mod packer;
 mod packet_port;
+mod parallel_port;
 mod raw_capture;
 mod registers;
 mod safety;
@@ -77,6 +78,7 @@ pub const BENCHES: &[(&str, &[Law])] = &[
     ("over_counter", over_counter::LAWS),
     ("packer", packer::LAWS),
     ("packet_port", packet_port::LAWS),
+    ("parallel_port", parallel_port::LAWS),
     ("raw_capture", raw_capture::LAWS),
     ("registers", registers::LAWS),
     ("safety", safety::LAWS),

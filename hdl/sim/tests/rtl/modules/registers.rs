@@ -14,6 +14,7 @@ laws![
     every_setting_has_its_range,
     what_changes_by_itself_is_as_of_its_read,
     a_delivered_frame_has_its_sum_and_its_over_range_samples,
+    packets_leave_by_the_parallel_port_in_runs_that_ask_for_it,
 ];
 
 fn write(bench: &mut Bench, address: u16, data: u32) {
@@ -244,5 +245,23 @@ fn a_delivered_frame_has_its_sum_and_its_over_range_samples(project: &Project) {
             assert_eq!(bench.get("value") as u32, expected, "{register:?} after a change");
             bench.set("delivered", delivered);
         }
+    }
+}
+
+fn packets_leave_by_the_parallel_port_in_runs_that_ask_for_it(project: &Project) {
+    let mut bench = Bench::new(project, "registers");
+    let dice = &mut Dice::new(34);
+    let mut on = false;
+    for _ in 0..80 {
+        let bits = dice.pick(&[0, mode::PACKETS, mode::PARALLEL, mode::PACKETS | mode::PARALLEL]);
+        write(&mut bench, R::Mode.address(), bits);
+        assert_eq!(bench.is("in_range"), bits != mode::PARALLEL, "{bits:#x}");
+        assert_eq!(bench.is("parallel"), on, "a setting of the next run");
+        let copy = bits != mode::PARALLEL && dice.once_in(2);
+        bench.set("copy", copy);
+        bench.tick();
+        bench.set("copy", false);
+        on = if copy { bits & mode::PARALLEL != 0 } else { on };
+        assert_eq!(bench.is("parallel"), on, "{bits:#x}");
     }
 }
