@@ -344,7 +344,7 @@ fn a_receiver_of_33_megabytes_a_second_gets_7900_frames_a_second() {
 }
 
 #[test]
-fn with_samples_of_24_bits_it_gets_10_500() {
+fn a_receiver_of_33_megabytes_a_second_gets_10_500_frames_of_24_bits() {
     let (frames, ..) = frames_per_second(OF_USB, mode::NARROW);
     println!("{frames} frames/s");
     assert!((10_500..10_650).contains(&frames), "{frames}");
@@ -359,7 +359,7 @@ fn a_receiver_that_is_always_ready_gets_9600_frames_a_second() {
 }
 
 #[test]
-fn with_samples_of_24_bits_it_gets_every_frame_that_is_made() {
+fn a_receiver_that_is_always_ready_gets_every_frame_of_24_bits() {
     let (frames, lost, made) = frames_per_second(Pace::Always, mode::NARROW);
     println!("{frames} frames/s");
     assert!((12_200..12_210).contains(&frames), "{frames}");
