@@ -152,17 +152,12 @@ module nirspi_registers
     always_ff @ (posedge clk) begin
         if (rst) begin
             settings <= nirspi_types::Settings'(0);
+            parallel <= 0;
         end else if (copy) begin
             settings         <= next;
             settings.raw     <= copy_raw;
             settings.endless <= next.endless || copy_raw;
-        end
-    end
-    always_ff @ (posedge clk) begin
-        if (rst) begin
-            parallel <= 0;
-        end else if (copy) begin
-            parallel <= (mode & MODE_PARALLEL) != 0;
+            parallel         <= (mode & MODE_PARALLEL) != 0;
         end
     end
     always_ff @ (posedge clk) begin
