@@ -4,7 +4,7 @@
 
 steps=(
     "format          layout of the code"
-    "typos           spelling, and prose wrapped at 100 columns; PyPI"
+    "typos           spelling, pages wrapped at 100 columns, the form of GitHub's workflows; PyPI"
     "firmware        every board's ELF; rustup's targets, or Debian's compiler"
     "test            the README's test command: cargo test"
     "gpu             GPU kernels on software Vulkan; Debian"
@@ -86,6 +86,9 @@ step_typos() {
     git ls-files -z '*.md' ':!docs/protocol.md' ':!docs/commands.md' | xargs -0 target/mdformat/bin/mdformat --check
     python_with just rust-just==1.59.0
     target/just/bin/just --unstable --fmt --check
+    # Not actionlint: its package on PyPI fetches the program from GitHub.
+    python_with workflows check-jsonschema==0.39.0
+    target/workflows/bin/check-jsonschema --builtin-schema vendor.github-workflows .github/workflows/*.yml
 }
 
 step_firmware() { bash boards/build.sh; }
@@ -234,11 +237,8 @@ step_examples() {
         run --example compare_methods
         run --example own_method
         run --example own_network
-        if [ -f "${NIRSPI_DATA:-}/spi/opar_ala1.npz" ]; then
-            run --example your_measurements -- "$NIRSPI_DATA/spi/opar_ala1.npz"
-        else
-            echo "skipped: your_measurements, no data"
-        fi
+        run --bin nirspi -- example wing --out wing.npz
+        run --example your_measurements -- wing.npz
     )
 }
 

@@ -10,7 +10,7 @@ module nirspi_frames (
     input  var logic                  [64-1:0] clock_now , /// Since reset, of this clock
     input  var logic                  [64-1:0] light_next, /// Clock at which the sample after this one's light was shown
     input  var logic                           restart   , /// Forgets everything of earlier runs
-    input  var logic                           give_back , /// The host gives its frame back before this clock; the one behind is next
+    input  var logic                           give_back , /// The host has released its frame; the waiting frame becomes the host's
     input  var logic                           first     , /// This clock is the first of a run
     input  var logic                           done      , /// This clock completes a frame
     input  var logic                  [32-1:0] over_range, /// Over-range samples of the frame

@@ -1,7 +1,7 @@
 /// The register bank, the settings copied from it, and what the host reads.
 ///
-/// Invariant: reads give what was written, whatever it was; what it means is checked at a start. The map is
-/// `register_map`, made from `mcu/wire`. `host_registers` answers those that need no ADC clock; here they read 0.
+/// Invariant: a read returns the last value written, valid or not; values are checked when a run starts. The map is
+/// `register_map`, made from `mcu/wire`. `host_registers` answers reads that need no ADC clock; they read 0 here.
 module nirspi_registers
     import nirspi_register_map::*;
 (

@@ -7,7 +7,7 @@ module nirspi_sequencer (
     input  var logic                  rst     ,
     input  var nirspi_types::Settings settings,
     input  var logic                  start   , /// The next clock is the first
-    input  var logic                  halt    , /// The next clock is none; `start` wins
+    input  var logic                  halt    , /// Ends the run after this clock, unless `start` is high too
     output var nirspi_types::Place    place
 );
     logic          active      ;

@@ -1,7 +1,8 @@
 //! Programs a board's flash through a debug probe, with the probe-rs library (feature `flash`).
 //!
 //! # Invariant
-//! Written firmware is read back and compared before it is started.
+//! Written firmware is read back and compared before it is started. No test holds this, because it
+//! takes a board; probe-rs does it, because `DownloadOptions::verify` is set.
 
 use probe_rs::flashing::{
     DownloadOptions, FileDownloadError, FlashError, FlashProgress, ProgressEvent,

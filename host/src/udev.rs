@@ -23,7 +23,8 @@ const OURS: &str = "# The nirspi camera";
 #[must_use]
 pub fn rule() -> String {
     format!(
-        "{OURS} (mcu/wire/src/usb.rs): whoever sits at this machine may use it. 60: before 73-seat-late.rules.\n\
+        "{OURS} (mcu/wire/src/usb.rs). The user logged in at this machine may open the camera.\n\
+         # The number 60 must be below 73, because the tag uaccess takes effect in 73-seat-late.rules.\n\
          SUBSYSTEM==\"usb\", ATTR{{idVendor}}==\"{VENDOR_ID:04x}\", ATTR{{idProduct}}==\"{PRODUCT_ID:04x}\", \
          ATTR{{product}}==\"{PRODUCT}\", TAG+=\"uaccess\"\n"
     )

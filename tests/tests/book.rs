@@ -1,4 +1,5 @@
-//! Tests that the pages under `docs/` make a book: every page is in the summary, and every link leads to something.
+//! Tests that the pages under `docs/` make a book: every page is in the summary, every link leads to something, and the
+//! table of variables names every variable of the code.
 
 #![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
 
@@ -139,6 +140,57 @@ fn every_link_leads_to_a_file_and_every_anchor_to_a_heading() {
     }
     assert!(checked > 100, "{checked} links");
     assert!(broken.is_empty(), "links that lead nowhere: {broken:#?}");
+}
+
+/// Files under a folder whose text may name a variable: sources, scripts, settings.
+fn code(folder: &Path, into: &mut Vec<PathBuf>) {
+    let endings = ["rs", "py", "sh", "toml", "yml"];
+    let is_code = |path: &Path| match path.extension() {
+        Some(ending) => endings.iter().any(|code| ending == *code),
+        None => path.ends_with(".ci/run"),
+    };
+    for entry in folder.read_dir().unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() && !path.ends_with("target") {
+            code(&path, into);
+        } else if is_code(&path) {
+            into.push(path);
+        }
+    }
+}
+
+/// Names of the variables in a text: `NIRSPI_`, then capitals.
+fn variables(text: &str) -> BTreeSet<String> {
+    let is_part = |c: char| c.is_ascii_uppercase() || c.is_ascii_digit() || c == '_';
+    let names = text.split("NIRSPI_").skip(1).map(|rest| {
+        let end = rest.find(|c| !is_part(c)).unwrap_or(rest.len());
+        rest[..end].trim_end_matches('_')
+    });
+    names.filter(|name| !name.is_empty()).map(|name| format!("NIRSPI_{name}")).collect()
+}
+
+#[test]
+fn the_table_of_variables_names_every_variable_of_the_code_that_is_no_option() {
+    let mut files = vec![root().join(".justfile")];
+    for folder in [".ci", ".github", "boards", "hdl", "host", "mcu", "tests"] {
+        code(&root().join(folder), &mut files);
+    }
+    let mut found: BTreeSet<String> =
+        files.iter().flat_map(|file| variables(&read(file))).collect();
+    // `NIRSPI_DISTANCE_M` is the option `--distance-m`.
+    let commands = read(&root().join("docs/commands.md"));
+    let options: BTreeSet<&str> = commands.split_whitespace().collect();
+    let option =
+        |name: &str| format!("--{}", name["NIRSPI_".len()..].to_lowercase().replace('_', "-"));
+    let page = read(&root().join("docs/contributing.md"));
+    let rows = page.lines().filter(|line| line.starts_with("| `NIRSPI_"));
+    let listed = variables(&rows.filter_map(|row| row.split(" | ").next()).collect::<String>());
+    // `NIRSPI_DATA` is both: the tests' folder, and the option `--data` of training.
+    found.retain(|name| listed.contains(name) || !options.contains(option(name).as_str()));
+    assert_eq!(
+        found, listed,
+        "left: variables of the code, right: the table of docs/contributing.md"
+    );
 }
 
 #[test]

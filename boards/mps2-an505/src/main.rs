@@ -51,7 +51,10 @@ enum Irq {
     FpgaTransmit = 35,
 }
 
-#[expect(unsafe_code, reason = "the numbers are a matter of the chip")]
+#[expect(
+    unsafe_code,
+    reason = "the compiler cannot check interrupt numbers; these come from the chip's manual"
+)]
 // SAFETY: each number is different and within the range that the chip has.
 unsafe impl cortex_m::interrupt::InterruptNumber for Irq {
     fn number(self) -> u16 {
@@ -61,7 +64,7 @@ unsafe impl cortex_m::interrupt::InterruptNumber for Irq {
 
 #[exception]
 // `allow` instead of `expect`: the macro repeats the attribute where the code is not unsafe.
-#[allow(unsafe_code, reason = "the form of this handler")]
+#[allow(unsafe_code, reason = "cortex-m-rt requires this handler to be an unsafe function")]
 unsafe fn DefaultHandler(number: i16) {
     match number {
         32 => HOST.on_receive(),
@@ -79,7 +82,7 @@ fn SysTick() {
 
 #[exception]
 // `allow` instead of `expect`: the macro repeats the attribute where the code is not unsafe.
-#[allow(unsafe_code, reason = "the form of this handler")]
+#[allow(unsafe_code, reason = "cortex-m-rt requires this handler to be an unsafe function")]
 unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
     crash::store(format_args!("hard fault at {:#010x}, from {:#010x}", frame.pc(), frame.lr()));
     SCB::sys_reset()
@@ -168,7 +171,7 @@ fn main() -> ! {
     for irq in [Irq::HostReceive, Irq::HostTransmit, Irq::FpgaReceive, Irq::FpgaTransmit] {
         #[expect(
             unsafe_code,
-            reason = "interrupts are enabled by the one who knows their handlers"
+            reason = "unmasking an interrupt is unsafe unless its handler is ready, and main has set it up"
         )]
         // SAFETY: outside of any critical section; the handlers are those above.
         unsafe {

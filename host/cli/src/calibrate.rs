@@ -22,7 +22,7 @@ use std::time::SystemTime;
 
 /// Measure a camera's ADC latency, settling and flat field, and keep them for the captures after it
 ///
-/// Hold a white sheet before the camera, as near as the sheet is still sharp. Latency and settling belong to the camera and
+/// Hold a white sheet before the camera, at the shortest distance at which the image is in focus. Latency and settling belong to the camera and
 /// its gateware, so one calibration is enough until the gateware or the amplifier changes. `nirspi selftest` measures the
 /// same and checks the rest of the camera, too. A virtual camera is shown a white sheet automatically.
 ///

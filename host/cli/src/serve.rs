@@ -21,7 +21,7 @@ use std::process::ExitCode;
 
 /// Show a camera live on a web page: reconstructed, enlarged and deblurred, with every frame accounted for
 ///
-/// The command prints the address of the page, on which every setting can be changed (docs/live-page.md). The stop button,
+/// The command prints the address of the page. docs/live-page.md lists the settings that the page changes. The stop button,
 /// Escape and the space bar switch the LEDs off. If the link to the camera is lost, the program opens the camera again. After
 /// a stop or a fault, a person must allow the LEDs to go on, on the page. Only browsers on this machine can open the page,
 /// unless --listen says otherwise; then the page demands a token. Ctrl-C switches the LEDs off and ends the program.

@@ -16,7 +16,8 @@
 //!
 //! # Invariant
 //! A kernel does not check its indices. Each function that launches one checks the lengths of the
-//! buffers first, and panics if the caller gave other lengths than it promises.
+//! buffers first, and panics if the caller gave other lengths than it promises. No test gives wrong
+//! lengths; the tests of OMP and of the networks on a GPU (`.ci/run gpu`) run every kernel.
 
 mod engine;
 pub mod limits;

@@ -21,10 +21,8 @@ struct Scene {
 }
 
 fn main() -> Result<()> {
-    let data = std::env::args_os().nth(1).map_or_else(
-        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"),
-        PathBuf::from,
-    );
+    let given = std::env::args_os().nth(1).or_else(|| std::env::var_os("NIRSPI_DATA"));
+    let data = PathBuf::from(given.ok_or("which folder of data? docs/data.md says what is in it")?);
     let scenes = [
         wing(&data)?,
         car(&data, 0)?,

@@ -141,7 +141,7 @@ pub enum OmpError {
         found: f64,
     },
     /// The start names an atom that the dictionary does not have.
-    #[error("a start from atom {found} of a dictionary of {atoms}")]
+    #[error("start atom {found} does not exist, expected an atom below {atoms}")]
     Start {
         /// Number of the atom.
         found: usize,

@@ -22,7 +22,6 @@
 //! | `russian-dolls` | complete `2 x 2`, then `4 x 4`, ... bases, one inside the other; what each adds comes as the quarter finer across (`j` new), the quarter finer down (its transposes, in the same order), the quarter finer both ways; within a quarter ascending number of blocks (which of the two half-finer quarters comes first is our choice) | M.-J. Sun et al., *A Russian Dolls ordering of the Hadamard basis for compressive single-pixel imaging*, 2017 |
 //! | `total-variation` | ascending total variation of the pattern: the sum of the lengths of its forward-difference gradients (isotropic, which the paper's text was not at hand to confirm), `2 n (i + j) - (4 - 2 sqrt 2) i j` | X. Yu et al., *Super sub-Nyquist single-pixel imaging by total variation ascending ordering of the Hadamard basis*, 2020 |
 //! | `random:SEED` | Fisher-Yates from the last entry down, driven by `rand_pcg::Pcg64` | R. Durstenfeld, *Algorithm 235: random permutation*, 1964; M. E. O'Neill, *PCG*, 2014 |
-//!
 //! | `walsh-2d` | the `(i, j)` grid row by row: `p(i) n + p(j)`, `p(s)` being the row of 1-D sequency `s` | SPyRiT 3.1.1, `HadamSplit2d(n)` without an order |
 //! | `deepinv:sequency` | ours, transposed | deepinv 0.5.0, `SinglePixelCamera(ordering="sequency")` |
 //! | `deepinv:cake_cutting` | ascending `(i + 1)(j + 1)`; its ties are not defined | the same, `"cake_cutting"` |

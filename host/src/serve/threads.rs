@@ -1,8 +1,10 @@
 //! Camera, imaging and HTTP, each on a thread of its own.
 //!
 //! # Invariant
-//! The camera's thread waits for the camera only: never for the imaging thread, and never for a
-//! browser.
+//! The camera's thread waits for the camera only: never for the imaging thread
+//! (`images_that_are_given_up_are_counted_and_frames_are_not_waited_for`), and never for a browser
+//! (`a_browser_that_does_not_read_delays_no_other_and_then_sees_the_newest`), both in
+//! `host/src/serve/tests.rs`.
 
 use super::camera::{End, EventLog, Live, Next, darken, reconnect, why_dark};
 use super::camera_log::{CameraLog, Phase};

@@ -3,7 +3,7 @@
 //!
 //! # Invariant
 //! A font gives either all 62 characters or none, because networks would learn the boxes of missing
-//! characters.
+//! characters (`tests::a_font_that_lacks_one_character_gives_none`).
 
 use crate::files::FileError;
 use crate::files::characters::{GLYPH_PX, entries, refused};
@@ -170,6 +170,34 @@ mod tests {
             let longer = (right - left).max(bottom - top) + 1;
             assert!((46..=49).contains(&longer), "{at}: {longer}");
         }
+    }
+
+    /// Ubuntu Light without the outline of this character: its place in the table `loca` is empty.
+    fn without(character: char) -> Vec<u8> {
+        let mut bytes = epaint_default_fonts::UBUNTU_LIGHT.to_vec();
+        let id = FontVec::try_from_vec(bytes.clone()).unwrap().glyph_id(character).0;
+        let table = |name: &[u8]| {
+            // The table directory: 12 bytes, then 16 bytes a table, the place at the ninth byte.
+            let entry = bytes[12..].chunks(16).find(|entry| entry.starts_with(name)).unwrap();
+            u32::from_be_bytes(entry[8..12].try_into().unwrap()) as usize
+        };
+        let (head, loca) = (table(b"head"), table(b"loca"));
+        let width = if bytes[head + 51] == 0 { 2 } else { 4 };
+        let at = loca + usize::from(id) * width;
+        bytes.copy_within(at + width..at + 2 * width, at);
+        bytes
+    }
+
+    #[test]
+    fn a_font_that_lacks_one_character_gives_none() {
+        let folder = tempfile::tempdir().unwrap();
+        let lacking = folder.path().join("Lacking.ttf");
+        std::fs::write(&lacking, without('z')).unwrap();
+        std::fs::write(folder.path().join("Whole.ttf"), epaint_default_fonts::UBUNTU_LIGHT)
+            .unwrap();
+        let rendered = render(folder.path()).unwrap();
+        assert_eq!((rendered.fonts, rendered.stack.len()), (1, 62));
+        assert_eq!(rendered.skipped, [lacking]);
     }
 
     #[test]

@@ -2,7 +2,9 @@
 //! ([`nirspi_wire::tunnel`]).
 //!
 //! # Invariant
-//! Simulated time advances only with accesses, so the speed of the emulator changes no frame.
+//! Simulated time advances only with accesses, so the speed of the emulator changes no frame
+//! (`frames_from_the_emulated_board_are_those_of_the_virtual_camera_bit_for_bit` in
+//! `tests/tests/qemu`).
 
 use super::SimulatedFpga;
 use crate::link::is_hangup;

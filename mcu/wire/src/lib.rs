@@ -20,7 +20,7 @@
 //!
 //! | second place | test |
 //! |---|---|
-//! | `hdl/rtl/register_map.veryl`, generated from here | `hdl/tests/rtl/stale.rs` |
+//! | `hdl/rtl/register_map.veryl`, generated from here | `hdl/sim/tests/rtl/stale.rs` |
 //! | `nirspi_optics::instrument` | `nirspi`: `the_optics_have_the_instruments_numbers` |
 #![no_std]
 

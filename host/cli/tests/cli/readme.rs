@@ -1,98 +1,215 @@
-//! Every command line of the README and of the book's first pages runs as it stands, from a folder that holds nothing.
+//! Every shell command of the README, the book and the boards' pages runs as it stands, from a folder that holds nothing,
+//! or is in a list that says why it does not run here.
 
 use crate::bench::{Bench, correlation};
+use std::fs;
+use std::path::Path;
 
-/// What follows `cargo run --release -- ` in blocks of shell commands, without comments.
-fn commands(page: &str) -> Vec<String> {
-    let mut found = Vec::new();
-    let mut is_shell = false;
-    for line in page.lines() {
-        match line.strip_prefix("```") {
-            Some(language) => is_shell = language == "sh",
-            None if is_shell => {
-                let command = line.split(" #").next().unwrap_or("").trim();
-                found.extend(command.strip_prefix("cargo run --release -- ").map(str::to_owned));
-            }
-            None => {}
+/// Commands that are not run: the page (every page, if empty), a part of the command, and the reason.
+const NOT_RUN: &[(&str, &str, &str)] = &[
+    ("", "rustup target add", "fetches from rustup; .ci/run firmware and web"),
+    ("", "cargo install", "builds from crates.io for minutes"),
+    ("", "cargo build", "builds for minutes; .ci/run"),
+    ("", "cargo test", "this test is a part of it"),
+    ("", "cargo run --release --example", "another program; .ci/run examples"),
+    (
+        "",
+        "cargo run --release -p nirspi-eval --example",
+        "needs data of other groups (docs/data.md)",
+    ),
+    ("", "pip install", "needs Python and PyPI; .ci/run python"),
+    ("", "bash boards/run.sh", "needs a board, or QEMU; tests/tests/qemu"),
+    ("", "sudo ", "changes the machine; tests/cli/versions.rs installs the udev rule in a folder"),
+    ("", "nirspi serve", "runs until it is stopped; tests/cli/serve.rs"),
+    ("", "-- serve", "runs until it is stopped; tests/cli/serve.rs"),
+    ("", "virtual --", "runs until it is stopped; tests/cli/capture_tcp.rs and tests/tests/qemu"),
+    ("", "--camera usb", "needs a camera on USB"),
+    ("", "--camera tcp:", "needs the camera of another terminal; tests/cli/capture_tcp.rs"),
+    ("", "nirspi train", "needs the feature train; .ci/run training"),
+    ("boards/electronics/README.md", "run.sh", "needs ngspice; .ci/run electronics"),
+    ("boards/mps2-an505/README.md", "install-qemu.sh", "fetches from Debian; .ci/run emulation"),
+    ("boards/mps2-an505/README.md", "qemu-system-arm", "needs QEMU and built firmware"),
+    ("host/cli/README.md", "nirspi demo", "the README's first command, which runs there"),
+    ("docs/bring-up.md", "hdl/build.py", "place and route; .ci/run place-route"),
+    ("docs/bring-up.md", "openFPGALoader", "needs the FPGA board"),
+    ("docs/bring-up.md", "nirspi devices", "opens every serial port of this machine"),
+    ("docs/browser.md", "host/web/build.sh", "builds WebAssembly; .ci/run web"),
+    ("docs/browser.md", "http.server", "runs until it is stopped; .ci/run web"),
+    ("docs/clusters.md", "reconstruct archive/", "the user's archive; tests/cli/archive.rs"),
+    (
+        "docs/clusters.md",
+        "nirspi dataset",
+        "8 s of a processor; tests/cli/archive.rs writes a smaller set",
+    ),
+    ("docs/clusters.md", "export AWS", "an account of the user; .ci/run stores"),
+    ("docs/clusters.md", "s3://", "needs an object store; .ci/run stores"),
+    ("docs/clusters.md", "ray start", "needs Ray; .ci/run cluster"),
+    ("docs/live-page.md", "curl", "needs the page of another terminal; tests/cli/serve.rs"),
+    ("docs/mutants.md", "cargo mutants", "hours; .ci/run mutants"),
+    ("docs/performance.md", "host/scripts/live_speed.py", "a minute, on a quiet machine"),
+    ("docs/performance.md", "host/recon/benches/gpu.sh", "needs a GPU"),
+    ("docs/quality.md", "eval quality", "needs data of other groups; tests/cli/quality.rs"),
+    ("docs/quality.md", "eval table", "minutes; tests/cli/rain.rs has fewer scenes"),
+    ("docs/quality.md", "metrics sharp.npy", "the user's stacks; tests/cli/metrics.rs"),
+    ("docs/reliability.md", "serve_soak.py", "ten minutes; .ci/run crowd"),
+    (
+        "docs/several-cameras.md",
+        "sync left.mcap",
+        "needs two recordings at the same time; tests/cli/sync.rs",
+    ),
+    ("docs/several-cameras.md", "--camera zenoh:", "needs the feature zenoh; .ci/run zenoh"),
+    ("docs/several-cameras.md", "/opt/ros", "needs ROS 2"),
+    ("docs/several-cameras.md", "nirspi.ros2", "needs ROS 2"),
+    ("docs/several-cameras.md", "scheidt_car.npz", "data of another group; tests/cli/real_data.rs"),
+    ("docs/several-cameras.md", "benches/", "the user's archive; tests/cli/archive.rs"),
+    ("docs/training.md", "python ", "needs torch and data of other groups"),
+    (
+        "docs/training.md",
+        "cd host/nets/training",
+        "a folder of the repository; the next lines need torch",
+    ),
+    ("docs/training.md", "cargo run -p nirspi-nets --example", "another program; .ci/run examples"),
+];
+
+/// Files that a page takes from another page or from a command in [`NOT_RUN`]: the command that writes the file instead.
+const BEFORE: &[(&str, &str)] = &[
+    ("README.md", "capture --frames 100 --out rec.mcap"),
+    ("docs/reconstruction.md", "capture --frames 20 --out rec.mcap"),
+];
+
+/// Pages with a test of their own, because their commands take seconds.
+const ALONE: [&str; 5] = [
+    "README.md",
+    "docs/first-picture.md",
+    "docs/measurements.md",
+    "docs/how-it-works.md",
+    "docs/several-cameras.md",
+];
+
+fn root() -> &'static Path {
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
+}
+
+fn text(page: &str) -> String {
+    fs::read_to_string(root().join(page)).unwrap_or_else(|error| panic!("{page}: {error}"))
+}
+
+/// The pages that tell people what to type.
+fn pages() -> Vec<String> {
+    let mut found = vec!["README.md".to_owned(), "host/cli/README.md".to_owned()];
+    for folder in ["docs", "boards"] {
+        for entry in fs::read_dir(root().join(folder)).unwrap() {
+            let name = format!("{folder}/{}", entry.unwrap().file_name().to_str().unwrap());
+            let readme = format!("{name}/README.md");
+            found.extend(
+                [name, readme]
+                    .into_iter()
+                    .filter(|page| page.ends_with(".md") && root().join(page).is_file()),
+            );
         }
     }
+    found.sort();
     found
 }
 
-/// Runs the lines of a page in turn, from one empty folder. `not_run` names lines that are left out, and why.
-fn runs_as_it_stands(name: &str, page: &str, least: usize, not_run: &[(&str, &str)]) {
-    let commands = commands(page);
-    assert!(commands.len() >= least, "{name}: {commands:?}");
-    let bench = Bench::new();
-    let mut left_out = Vec::new();
-    let mut recorded = false;
-    for command in &commands {
-        if let Some((line, _)) = not_run.iter().find(|(line, _)| command.starts_with(line)) {
-            left_out.push(*line);
-            if command.contains("--out rec.mcap") && !recorded {
-                // The recording that the next line reads, of the same camera in this process.
-                bench.run(&["capture", "--frames", "100", "--out", "rec.mcap"]).succeeded();
-                recorded = true;
+/// Lines of blocks of shell commands, without comments. A backslash joins a line and the next one.
+fn commands(page: &str) -> Vec<String> {
+    let mut found = Vec::new();
+    let mut is_shell = false;
+    let mut begun = String::new();
+    for line in page.lines() {
+        if let Some(language) = line.strip_prefix("```") {
+            is_shell = language == "sh";
+        } else if is_shell {
+            let line = format!(" {}", line.trim());
+            begun.push_str(line.split(" #").next().unwrap());
+            if let Some(first) = begun.strip_suffix('\\') {
+                begun = first.trim_end().to_owned();
+            } else {
+                found.push(std::mem::take(&mut begun).trim().to_owned());
             }
-            continue;
         }
+    }
+    found.retain(|command| !command.is_empty());
+    found
+}
+
+fn is_left_out(page: &str, command: &str) -> bool {
+    NOT_RUN.iter().any(|(of, part, _)| (of.is_empty() || *of == page) && command.contains(part))
+}
+
+/// Runs a command of `nirspi` in the folder of the bench. ` > FILE` at its end writes what it prints.
+fn run(bench: &Bench, page: &str, command: &str) -> String {
+    let by_cargo = command.strip_prefix("cargo run --release -- ");
+    let Some(line) = by_cargo.or_else(|| command.strip_prefix("nirspi ")) else {
+        panic!("{page}: `{command}` is no command of nirspi: add it to NOT_RUN with the reason");
+    };
+    let (arguments, file) = line.split_once(" > ").unwrap_or((line, ""));
+    let printed = bench.run(&arguments.split_whitespace().collect::<Vec<_>>()).succeeded().stdout;
+    if !file.is_empty() {
+        bench.write(file, printed.as_bytes());
+    }
+    printed
+}
+
+/// Runs the commands of a page in turn, and returns what each one printed.
+fn runs_as_it_stands(bench: &Bench, page: &str) -> Vec<String> {
+    for (_, command) in BEFORE.iter().filter(|(of, _)| *of == page) {
         bench.run(&command.split_whitespace().collect::<Vec<_>>()).succeeded();
     }
-    // The list says nothing of lines that are gone.
-    for (line, why) in not_run {
-        assert!(left_out.contains(line), "{line} ({why}) is no line of {name}");
-    }
+    let commands = commands(&text(page));
+    let run_here = commands.iter().filter(|command| !is_left_out(page, command));
+    run_here.map(|command| run(bench, page, command)).collect()
 }
 
 #[test]
 fn every_line_of_the_readme_runs_as_it_stands() {
-    let not_run = [
-        ("virtual", "runs until it is stopped; tests/cli/capture_tcp.rs"),
-        ("capture --camera tcp:", "needs the camera of another terminal; tests/cli/capture_tcp.rs"),
-    ];
-    runs_as_it_stands("README.md", include_str!("../../../../README.md"), 11, &not_run);
+    assert_eq!(runs_as_it_stands(&Bench::new(), "README.md").len(), 10);
 }
 
 #[test]
 fn every_line_of_the_first_picture_runs_as_it_stands() {
-    let page = include_str!("../../../../docs/first-picture.md");
-    let not_run = [("serve", "runs until it is stopped; tests/cli/serve.rs")];
-    runs_as_it_stands("docs/first-picture.md", page, 8, &not_run);
+    assert_eq!(runs_as_it_stands(&Bench::new(), "docs/first-picture.md").len(), 7);
 }
 
 #[test]
 fn every_line_of_the_page_about_measurements_runs_as_it_stands() {
-    let page = include_str!("../../../../docs/measurements.md");
-    runs_as_it_stands("docs/measurements.md", page, 10, &[]);
+    assert_eq!(runs_as_it_stands(&Bench::new(), "docs/measurements.md").len(), 10);
 }
 
 #[test]
-fn every_line_of_the_page_about_recordings_runs_as_it_stands() {
-    let page = include_str!("../../../../docs/recordings.md");
-    runs_as_it_stands("docs/recordings.md", page, 6, &[]);
+fn every_line_of_how_it_works_runs_as_it_stands() {
+    assert_eq!(runs_as_it_stands(&Bench::new(), "docs/how-it-works.md").len(), 2);
 }
 
 #[test]
-fn every_line_of_how_it_works_and_of_bring_up_runs_as_it_stands() {
-    let page = include_str!("../../../../docs/how-it-works.md");
-    runs_as_it_stands("docs/how-it-works.md", page, 2, &[]);
-    let page = include_str!("../../../../docs/bring-up.md");
-    runs_as_it_stands("docs/bring-up.md", page, 3, &[]);
+fn every_line_of_the_other_pages_runs_as_it_stands() {
+    for page in pages().iter().filter(|page| !ALONE.contains(&page.as_str())) {
+        runs_as_it_stands(&Bench::new(), page);
+    }
+}
+
+#[test]
+fn every_reason_for_not_running_a_command_has_its_command() {
+    let pages = pages();
+    let texts: Vec<_> = pages.iter().map(|page| (page, commands(&text(page)))).collect();
+    for (of, part, why) in NOT_RUN {
+        let mut on = texts.iter().filter(|(page, _)| of.is_empty() || page == of);
+        let there = on.any(|(_, commands)| commands.iter().any(|line| line.contains(part)));
+        assert!(there, "`{part}` ({why}) is in no command of {of:?}: remove it from NOT_RUN");
+    }
 }
 
 #[test]
 fn every_line_about_several_detectors_runs_as_it_stands() {
-    let page = include_str!("../../../../docs/several-cameras.md");
+    const PAGE: &str = "docs/several-cameras.md";
+    let page = text(PAGE);
     let (_, section) = page.split_once("## Several detectors").unwrap();
     let (_, description) = section.split_once("```toml\n").unwrap();
     let bench = Bench::new();
     bench.write("three.toml", description.split("```").next().unwrap().as_bytes());
-    let commands = commands(section);
-    assert_eq!(commands.len(), 6, "{commands:?}");
-    let ran = commands.iter().map(|command| {
-        bench.run(&command.split_whitespace().collect::<Vec<_>>()).succeeded().stdout
-    });
-    let ran: Vec<String> = ran.collect();
+    let ran = runs_as_it_stands(&bench, PAGE);
+    assert_eq!(ran.len(), 6, "{ran:?}");
     for said in [&ran[0], &ran[1]] {
         assert!(said.contains("detector 2: 100 received, 0 lost"), "{said}");
     }

@@ -45,7 +45,7 @@ pub enum DeviceEnhancerError {
         found: f32,
     },
     /// Copies were requested.
-    #[error("the spread over copies is not taken on a device, expected no copies")]
+    #[error("the spread needs the CPU: ask for no copies on a GPU")]
     Copies,
     /// The measured rows do not belong to these readings.
     #[error(transparent)]

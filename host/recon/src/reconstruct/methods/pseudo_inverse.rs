@@ -11,7 +11,7 @@ const NAME: &str = "pseudo-inverse";
 pub(in super::super) const METHOD: Method = Method(&Entry {
     argument: NAME,
     name: NAME,
-    about: "Least image that agrees with the measurements: as Hadamard rows are orthogonal, the same as hadamard",
+    about: "Image of smallest norm that agrees with the measurements. For Hadamard patterns, the same as hadamard; not with --matrix",
     takes: &[],
     with_matrix: Some(MatrixMethod::PseudoInverse),
     prepare: |_| Ok(Box::new(ZeroFilling { name: NAME })),
