@@ -255,7 +255,7 @@ fn a_pipe_or_a_device_is_no_table_of_numbers() {
         ["rain", "--uniformity", "pipe.csv"],
         ["rain", "--uniformity", "/dev/zero"],
         ["rain", "--drops", "pipe.csv"],
-        ["demo", "--rain", "pipe.csv"],
+        ["demo", "--weather", "pipe.csv"],
         ["demo", "--order", "table:pipe.txt"],
         ["reconstruct", "pipe.txt", "--method=hadamard"],
     ] {
