@@ -2,12 +2,14 @@
 """`nirspi serve` among clients that misbehave: does the page of a good client go on, and does the memory stay flat?
 
     python3 serve_soak.py target/release/nirspi [--clients 1000] [--seconds 600] [--files 256] [--plot memory.svg]
+        [--markdown]
 
 Starts `nirspi serve` with the virtual camera, a token and a server for Foxglove. One good page reads its events for the
 whole time, asks for the state each second and is opened anew every ten seconds. The other clients come from 40 addresses of
 this machine, each does one of the things in KINDS at random, and again. Prints JSON: what became of the connections of each
-kind, images a second, the longest silence on the page, memory, open files. Exits 1 if the page suffered, if a client
-without the token was answered, or if memory or files grew. Linux; needs Python alone.
+kind, images a second, the longest silence on the page, memory, open files; with --markdown the two tables of
+docs/reliability.md instead. Exits 1 if the page suffered, if a client without the token was answered, or if memory or files
+grew. Linux; needs Python alone.
 """
 
 import argparse
@@ -436,6 +438,57 @@ def unmet(report):
     return [words for is_so, words in checks if is_so]
 
 
+# The kinds in the order and words of docs/reliability.md.
+WORDS = {
+    "silent": "says nothing", "half_a_request": "sends half a request",
+    "a_byte_at_a_time": "sends a request a byte at a time", "half_a_body": "sends half a body",
+    "an_endless_body": "sends a body without end", "huge_headers": "sends headers of 1 MB", "noise": "sends noise",
+    "pages_never_read": "asks for 200 files and reads none", "events_never_read": "opens the events and reads none",
+    "leaves_at_once": "connects and leaves", "wrong_token": "has a wrong token",
+    "page_of_another_site": "is a page of another site", "viewer_with_wrong_token": "WebSocket, has a wrong token",
+    "viewer_sends_noise": "WebSocket, sends noise", "viewer_never_reads": "WebSocket, reads nothing",
+}
+
+
+def thousands(number):
+    return f"{number:,}".replace(",", " ")
+
+
+def markdown(report):
+    """The two tables of docs/reliability.md."""
+    rows = ["| a client that | connections | answered | closed by the program | left by the client |", "| -- | -- | -- | -- | -- |"]
+    for kind, words in WORDS.items():
+        ends = report["what_became_of_them"].get(kind, {})
+        answers = {status: count for status, count in ends.items() if status.isdigit()}
+        closed = sum(count for end, count in ends.items() if end.startswith("closed"))
+        left = ends.get("client left", 0)
+        told = [f"{thousands(count)} with {status}" for status, count in answers.items()]
+        # Errors of the clients' own system, such as no free address.
+        if other := sum(ends.values()) - sum(answers.values()) - closed - left:
+            told.append(f"{thousands(other)} with an error of the client")
+        told = ", ".join(told) or "0"
+        rows.append(f"| {words} | {thousands(sum(ends.values()))} | {told} | {thousands(closed)} | {thousands(left)} |")
+    trials = lambda of: f"{of['at_once']} of {of['made']}; {of['median_s']} s, {of['worst_s']} s" if of else "none"
+    memory, files, frames = report["memory_mib"], report["files"], report["frames"]
+    made = frames["received"] + frames["lost"] + frames["corrupt"] + frames["late"]
+    seen = [
+        ("images a second", report["images_per_s"]["before"], report["images_per_s"]["among_clients"]),
+        ("processors of `nirspi serve`", report["processor_cores"]["before"], report["processor_cores"]["among_clients"]),
+        (f"frames lost, of {thousands(made)}", "", thousands(frames["lost"])),
+        ("longest time without a new state on the page", "", f"{report['longest_silence_on_the_page_s']} s"),
+        ("ends of the page's stream", "", report["breaks_of_the_page"]),
+        ("requests of the page, answered at the first attempt; median and longest wait", "",
+         trials(report["requests_of_the_page"])),
+        ("pages opened anew, at the first attempt; median and longest wait", "", trials(report["pages_opened_anew"])),
+        ("memory: mean before, in the first and in the last quarter", f"{memory['before']:.0f} MiB",
+         f"{memory['first_quarter']:.0f} and {memory['last_quarter']:.0f} MiB"),
+        ("open files: before, most, afterwards", files["before"], f"{files['most']}, then {files['after']}"),
+    ]
+    rows += ["", "| what a good page and the program saw | before | among the clients |", "| -- | -- | -- |"]
+    rows += [f"| {what} | {before} | {among} |" for what, before, among in seen]
+    return "\n".join(rows)
+
+
 def main():
     arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     arguments.add_argument("nirspi")
@@ -443,10 +496,13 @@ def main():
     arguments.add_argument("--seconds", type=float, default=600)
     arguments.add_argument("--files", type=int, default=256, help="files that nirspi serve may open (ulimit -n)")
     arguments.add_argument("--plot", help="memory over time, SVG")
+    arguments.add_argument("--markdown", action="store_true", help="print the tables of docs/reliability.md instead of JSON")
     arguments = arguments.parse_args()
     report = soak(arguments)
     report["unmet"] = unmet(report)
-    print(json.dumps(report, indent=2))
+    print(markdown(report) if arguments.markdown else json.dumps(report, indent=2))
+    if arguments.markdown and report["unmet"]:
+        print("\n".join(report["unmet"]), file=sys.stderr)
     sys.exit(1 if report["unmet"] else 0)
 
 

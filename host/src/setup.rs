@@ -10,6 +10,9 @@ use nirspi_wire::{
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+// The reconstruction does not depend on the protocol, so each has the number of LEDs.
+const _: () = assert!(Side::INSTRUMENT.pixels() == nirspi_wire::SIDE as usize);
+
 /// One measurement setup, as sent to a camera and stored in a recording.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct MeasurementSetup {

@@ -115,6 +115,23 @@ fn the_command_line_computes_nothing() {
     }
 }
 
+/// The most lines of the command line's sources. What does not fit belongs into a library.
+const CLI_LINES: usize = 6000;
+
+#[test]
+fn the_command_line_has_fewer_lines_than_its_limit() {
+    fn lines(folder: &std::path::Path) -> usize {
+        let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+        let count = |path: std::path::PathBuf| match path.is_dir() {
+            true => lines(&path),
+            false => std::fs::read_to_string(&path).unwrap().lines().count(),
+        };
+        entries.map(count).sum()
+    }
+    let found = lines(&root().join("host/cli/src"));
+    assert!((1000..CLI_LINES).contains(&found), "host/cli/src has {found} lines");
+}
+
 /// The library without its features builds no web server, no typefaces, no optics and no networks.
 #[test]
 fn capture_alone_builds_no_server_no_typefaces_no_optics_and_no_networks() {

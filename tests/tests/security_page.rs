@@ -43,14 +43,61 @@ fn reasons(text: &str) -> BTreeMap<String, u32> {
     found
 }
 
+/// Crates that do not deny unsafe code, each with the reason in its `Cargo.toml`. Without a reason the crate may have none.
+fn crates_that_allow_it() -> BTreeMap<PathBuf, Option<String>> {
+    let mut found = BTreeMap::new();
+    for source in all_sources() {
+        let is_crate = |folder: &&Path| folder.join("Cargo.toml").is_file();
+        let folder = source.ancestors().find(is_crate).unwrap();
+        let text = std::fs::read_to_string(folder.join("Cargo.toml")).unwrap();
+        let own = concat!("unsafe", "_code = \"deny\"");
+        if !text.contains("[lints]\nworkspace = true\n") && !text.contains(own) {
+            let reason = text.split_once("[package.metadata.nirspi]\nunsafe = \"");
+            let reason = reason.and_then(|(_, rest)| rest.split_once("\"\n"));
+            found.insert(folder.to_owned(), reason.map(|(reason, _)| reason.to_owned()));
+        }
+    }
+    found
+}
+
+/// The number of times that code says the word.
+fn unsafe_places(text: &str) -> usize {
+    let code = text.lines().filter(|line| !line.trim_start().starts_with("//"));
+    let is_name = |letter: char| letter.is_alphanumeric() || letter == '_';
+    code.flat_map(|line| line.split(|letter| !is_name(letter)))
+        .filter(|&word| word == "unsafe")
+        .count()
+}
+
+/// Every workspace denies what its crates leave to their workspace.
+#[test]
+fn every_workspace_denies_unsafe_code() {
+    for workspace in ["Cargo.toml", "boards/Cargo.toml"] {
+        let text = std::fs::read_to_string(root().join(workspace)).unwrap();
+        let lints = text.split_once("[workspace.lints.rust]\n").unwrap().1;
+        let lints = lints.split("\n\n").next().unwrap();
+        assert!(lints.contains(concat!("unsafe", "_code = \"deny\"")), "{workspace}");
+    }
+}
+
 #[test]
 fn every_place_of_unsafe_code_is_listed_with_its_reason() {
     let mut table = "| file | places | reason |\n| -- | -- | -- |\n".to_owned();
+    let allowing = crates_that_allow_it();
     for path in all_sources() {
         let file = path.strip_prefix(root()).unwrap().display().to_string();
-        for (reason, places) in reasons(&std::fs::read_to_string(&path).unwrap()) {
+        let text = std::fs::read_to_string(&path).unwrap();
+        for (reason, places) in reasons(&text) {
             writeln!(table, "| `{file}` | {places} | {reason} |").unwrap();
         }
+        let allowed = path.ancestors().find_map(|folder| allowing.get(folder));
+        let (Some(reason), places @ 1..) = (allowed, unsafe_places(&text)) else { continue };
+        let Some(reason) = reason else {
+            panic!(
+                "{file}: unsafe code in a crate whose Cargo.toml neither denies it nor gives a reason"
+            );
+        };
+        writeln!(table, "| `{file}` | {places} | {reason} |").unwrap();
     }
     let path = root().join(PAGE);
     let page = std::fs::read_to_string(&path).unwrap();

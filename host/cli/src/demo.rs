@@ -11,17 +11,16 @@ use nirspi::files::image::encode_grey;
 use nirspi::files::measurement::encode as encode_measurement;
 use nirspi::files::npy;
 use nirspi::files::output::OutputDir;
-use nirspi::imaging::MethodReport;
-use nirspi::imaging::{Quality, compare};
-use nirspi::picture::{Panel, Pictures, Range, SideBySide, Unit};
+use nirspi::imaging::{Fitted, MethodReport, Quality, compare};
+use nirspi::picture::Pictures;
 use nirspi::scene::SceneMap;
 use nirspi::session::CameraIdentity;
 use nirspi::virtual_camera::{
-    StagesReport, VirtualOptics, calibrate_against_white, enhance_stages, flat_field_against_white,
-    shoot,
+    Panels, Stages, StagesReport, calibrate_against_white, enhance_stages,
+    flat_field_against_white, shoot,
 };
 use nirspi_recon::words::{count, count_of};
-use nirspi_recon::{Image, Measurements, Sampling, Side, reconstruct};
+use nirspi_recon::{Measurements, Sampling, reconstruct};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -54,7 +53,7 @@ pub struct Args {
 }
 
 #[derive(Debug, Serialize)]
-struct Report {
+struct Report<'a> {
     scene: String,
     simulated: bool,
     /// The camera description's name.
@@ -85,27 +84,13 @@ struct Report {
     /// The result, compared with the image of a perfect 32 x 32 camera.
     reconstruction: Quality,
     quality_note: &'static str,
-    enhancement: StagesReport,
+    enhancement: &'a StagesReport,
     #[serde(flatten)]
     method: MethodReport,
     notes: Vec<String>,
     /// What is black and white in the pictures.
     pictures: Pictures,
     stage_ms: StageTimes,
-}
-
-/// The images of the report's stages.
-struct Images {
-    measurements: Measurements,
-    truth: Image,
-    raw: Vec<f32>,
-    result: Image,
-    fitted: Vec<f32>,
-    output_truth: Vec<f32>,
-    upscaled: Vec<f32>,
-    fused: Vec<f32>,
-    deblurred: Vec<f32>,
-    half_width: Vec<f32>,
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
@@ -146,31 +131,35 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let raw = compare(&raw, &truth)?;
     let fitted = compare(&image, &truth)?;
     let stages = enhance_stages(&image, measurements.rows(), &optics, seed, &mut times)?;
-    let images = Images {
-        measurements,
-        truth: Image::new(Side::INSTRUMENT, truth),
-        raw: raw.values,
-        result: image,
-        fitted: fitted.values,
-        output_truth: stages.truth,
-        upscaled: stages.upscaled,
-        fused: stages.fused,
-        deblurred: stages.deblurred,
-        half_width: stages.half_width,
-    };
     if fitted.quality.inverted {
         notes.push(
             "the image is darker where the scene is brighter: it is scored as blank".to_owned(),
         );
     }
-    let mut report = Report {
+    let acquisition_ms = setup.frame_ns() * f64::from(frames) * 1e-6;
+    let rain = args.scene.air(model)?.name().to_owned();
+    let panels = Panels {
+        map: &map,
+        optics: &optics,
+        capture: captured,
+        acquisition_ms,
+        rain: &rain,
+        seed,
+        truth: &truth,
+        raw: &raw,
+        result: &fitted,
+        method: &method,
+        stages: &stages,
+    };
+    let pictures = panels.pictures();
+    let report = Report {
         scene: map.name.clone(),
         simulated: true,
         camera_model: model.name.clone(),
         distance_m: optics.distance_mm() / 1e3,
-        rain: args.scene.air(model)?.name().to_owned(),
+        rain,
         optical_depth: optics.optical_depth(),
-        seed: args.scene.seed,
+        seed,
         field_mm: optics.field_mm(),
         defocus_mm: optics.blur_mm(),
         electrons_per_led_and_sample: optics.budget().electrons_per_led,
@@ -179,7 +168,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         patterns: setup.rows.len(),
         order: setup.order.clone(),
         differential: setup.differential,
-        acquisition_ms: setup.frame_ns() * f64::from(frames) * 1e-6,
+        acquisition_ms,
         frames: captured.counters,
         adc_latency_clocks: setup.adc_latency,
         leak_taps: leak.map(|leak| leak.taps().to_vec()).unwrap_or_default(),
@@ -188,41 +177,48 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         reconstruction: fitted.quality,
         quality_note: "against the scene on the 32 x 32 LED grid without defocus, after the gain and offset of \
                        least squares",
-        enhancement: stages.report,
+        enhancement: &stages.report,
         method,
         notes,
-        pictures: Pictures::default(),
+        pictures,
         stage_ms: times,
     };
-    let mut all = side_by_side(&map, &optics, &images, &report);
-    report.pictures.add("side_by_side.png", &all);
-    all.panels.push(Panel::square("upscaled", 64, &images.upscaled, Unit::Reflectance));
-    let names = ["raw", "reconstruction", "fused", "deblurred", "interval", "upscaled"];
-    report.pictures.each(&names, &all.panels[2..]);
-    write(args, &map, &images, &report)?;
+    let images = Images { map: &map, truth, raw, fitted, measurements, stages: &stages };
+    write(args, &images, &report)?;
     args.report.print(&report, |report| say(args, report))
 }
 
-fn write(args: &Args, map: &SceneMap, images: &Images, report: &Report) -> Result<()> {
-    let side = images.result.side().pixels();
+/// The images of the report's stages.
+struct Images<'a> {
+    map: &'a SceneMap,
+    truth: Vec<f32>,
+    raw: Fitted,
+    fitted: Fitted,
+    measurements: Measurements,
+    stages: &'a Stages,
+}
+
+fn write(args: &Args, images: &Images, report: &Report) -> Result<()> {
+    let (map, stages) = (images.map, images.stages);
+    let side = images.measurements.rows().side().pixels();
     let grid = [side, side];
     let mut out = OutputDir::create(&args.out)?;
     let scene = &map.reflectance;
     out.write("scene.png", &encode_grey(map.size_px, map.size_px, scene))?;
     out.write("scene.npy", &npy::encode(&[map.size_px, map.size_px], scene))?;
-    out.write("truth.npy", &npy::encode(&grid, images.truth.pixels()))?;
-    out.write("raw.npy", &npy::encode(&grid, &images.raw))?;
-    out.write("reconstruction.npy", &npy::encode(&grid, &images.fitted))?;
+    out.write("truth.npy", &npy::encode(&grid, &images.truth))?;
+    out.write("raw.npy", &npy::encode(&grid, &images.raw.values))?;
+    out.write("reconstruction.npy", &npy::encode(&grid, &images.fitted.values))?;
     // The input of `enhance` and `reconstruct`.
-    out.write("frames.npy", &npy::encode(&[1, side, side], &images.fitted))?;
+    out.write("frames.npy", &npy::encode(&[1, side, side], &images.fitted.values))?;
     let measurement = args.out.join("measurement.npz");
     out.write("measurement.npz", &encode_measurement(&measurement, &images.measurements, true)?)?;
-    out.write("truth_64.npy", &npy::encode(&[2 * side, 2 * side], &images.output_truth))?;
+    out.write("truth_64.npy", &npy::encode(&[2 * side, 2 * side], &stages.truth))?;
     for (name, image) in [
-        ("upscaled", &images.upscaled),
-        ("fused", &images.fused),
-        ("deblurred", &images.deblurred),
-        ("interval", &images.half_width),
+        ("upscaled", &stages.upscaled),
+        ("fused", &stages.fused),
+        ("deblurred", &stages.deblurred),
+        ("interval", &stages.half_width),
     ] {
         out.write(&format!("{name}.npy"), &npy::encode(&[2 * side, 2 * side], image))?;
     }
@@ -230,100 +226,6 @@ fn write(args: &Args, map: &SceneMap, images: &Images, report: &Report) -> Resul
     out.write("report.json", to_json(report)?.as_bytes())?;
     out.commit()?;
     Ok(())
-}
-
-fn side_by_side(
-    map: &SceneMap,
-    optics: &VirtualOptics,
-    images: &Images,
-    report: &Report,
-) -> SideBySide {
-    let side = images.result.side().pixels();
-    let panel = |title: &str, width, values: &[f32], caption: Vec<String>| Panel {
-        caption,
-        ..Panel::square(title, width, values, Unit::Reflectance)
-    };
-    let metrics = |q: &Quality| format!("PSNR {:.1} dB  SSIM {:.2}", q.psnr_db, q.ssim);
-    SideBySide {
-        header: format!("{} at {} m, seen with one pixel", map.title(), report.distance_m),
-        panels: vec![
-            panel(
-                "scene",
-                map.size_px,
-                &map.reflectance,
-                vec![map.side_mm.map_or_else(
-                    || format!("fills the field, {:.0} mm", optics.field_mm()),
-                    |mm| format!("{mm:.0} mm target in a field of {:.0} mm", optics.field_mm()),
-                )],
-            ),
-            panel(
-                "what 32 x 32 LEDs can show",
-                side,
-                images.truth.pixels(),
-                vec!["the reference, no defocus, no noise".to_owned()],
-            ),
-            panel(
-                "raw reconstruction",
-                side,
-                &images.raw,
-                vec![
-                    metrics(&report.raw),
-                    format!("inverse transform, {} patterns", report.patterns),
-                ],
-            ),
-            panel(
-                "result",
-                side,
-                &images.fitted,
-                vec![metrics(&report.reconstruction), report.method.short()],
-            ),
-            panel(
-                "enlarged by a network",
-                2 * side,
-                &images.fused,
-                vec![
-                    metrics(&report.enhancement.fused),
-                    format!("FSRCNN, {} depth zones", report.enhancement.depth_zones),
-                ],
-            ),
-            Panel {
-                warnings: report.enhancement.short_warnings.clone(),
-                ..panel(
-                    "deblurred",
-                    2 * side,
-                    &images.deblurred,
-                    vec![
-                        metrics(&report.enhancement.deblurred),
-                        format!(
-                            "bridge, 1 step; inconsistency {:.2}",
-                            report.enhancement.inconsistency
-                        ),
-                        report.enhancement.reading.to_string(),
-                    ],
-                )
-            },
-            Panel {
-                range: Range::Fixed(0.0, 0.5),
-                ..panel(
-                    "trust: 95 % interval, ±",
-                    2 * side,
-                    &images.half_width,
-                    report.enhancement.trust(),
-                )
-            },
-        ],
-        footer: format!(
-            "simulated: virtual camera, weather {}, seed {}; {} frames of {} patterns, {:.1} ms of light; {} lost, {} corrupt, {} late",
-            report.rain,
-            report.seed,
-            report.frames.received,
-            report.patterns,
-            report.acquisition_ms,
-            report.frames.lost,
-            report.frames.corrupt,
-            report.frames.late
-        ),
-    }
 }
 
 fn say(args: &Args, report: &Report) -> Result<()> {

@@ -8,7 +8,7 @@
 use crate::error::Result;
 use crate::quality::{Contender, Method};
 use crate::shot::Shots;
-use nirspi_nets::{Device, Networks};
+use nirspi_nets::{Device, Networks, deblur};
 use serde::Serialize;
 
 /// Default steps of the ancestral sampler. The paper's 500 steps take fifty times as long, and
@@ -102,7 +102,7 @@ impl Enhancers {
         let readings: Vec<f32> =
             shots.iter().zip(whites).flat_map(|(shot, white)| scaled(shot, *white)).collect();
         let images = network.enhance_blind(&readings, &|_| {})?;
-        Ok(Some(images.chunks_exact(64 * 64).map(<[f32]>::to_vec).collect()))
+        Ok(Some(images.chunks_exact(deblur::SIDE * deblur::SIDE).map(<[f32]>::to_vec).collect()))
     }
 }
 

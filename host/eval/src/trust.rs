@@ -30,7 +30,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// Number of pixels of an enhanced image.
-const AREA: usize = 64 * 64;
+const AREA: usize = nirspi_nets::deblur::SIDE * nirspi_nets::deblur::SIDE;
 
 /// Seed of the halves. The halves belong to the shipped calibration and do not follow the seed of
 /// the images.

@@ -27,8 +27,8 @@ pub use model::{Method, MethodError, Model};
 use sharpen::Residual;
 pub use sharpen::{Blurred, Sharpen, SharpenError};
 
-/// Side of the images.
-pub const SIDE: usize = 64;
+/// Side of the images: twice that of the readings (paper, 2.C).
+pub const SIDE: usize = 2 * crate::fusion::SIDE;
 
 pub(crate) const AREA: usize = SIDE * SIDE;
 

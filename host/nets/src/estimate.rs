@@ -6,7 +6,7 @@ use crate::network::{Conditions, RunEstimator};
 use crate::weights::{Weights, WeightsError};
 
 /// Side of the grid whose pixels are the unit of blur.
-const OUTPUT_SIDE: usize = 64;
+const OUTPUT_SIDE: usize = crate::deblur::SIDE;
 
 /// The blur in pixels that is 1 on the networks' scale.
 pub(crate) const SIGMA_SCALE_PX: f32 = 4.0;

@@ -3,7 +3,8 @@
 //! # Invariant
 //! This crate does not depend on the wire protocol, so the numbers are both in this file and in
 //! `nirspi-wire`. The test `the_optics_have_the_instruments_numbers` of `nirspi`
-//! (`host/src/virtual_camera/mod.rs`) checks that they are equal.
+//! (`host/src/virtual_camera/mod.rs`) checks that they are equal, and the compiler checks the number
+//! of LEDs there.
 
 /// LEDs along one side of the array (paper, section 2.A).
 pub const SIDE: usize = 32;

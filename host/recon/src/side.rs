@@ -31,13 +31,13 @@ impl Side {
 
     /// Pixels along one edge, `n`.
     #[must_use]
-    pub fn pixels(self) -> usize {
-        usize::from(self.0)
+    pub const fn pixels(self) -> usize {
+        self.0 as usize
     }
 
     /// Pixels of the image and patterns of a full sweep, `n^2`.
     #[must_use]
-    pub fn area(self) -> usize {
+    pub const fn area(self) -> usize {
         self.pixels() * self.pixels()
     }
 }

@@ -25,6 +25,7 @@ pub struct Quality {
 /// # Invariant
 /// The gain is never negative: a fit must not turn a wrong picture into a right one
 /// (`tests::an_inverted_image_is_scored_as_blank`).
+#[derive(Debug)]
 pub struct Fitted {
     /// The image on the reference's scale, clamped to `[0, 1]`; flat if the image is inverted.
     pub values: Vec<f32>,

@@ -17,6 +17,7 @@
 //! has not taken, so a slow connection shows new images and not old ones
 //! (`a_slow_browser_has_few_old_images_before_it` in `host/src/serve/tests.rs`).
 
+use super::change_rate::ChangeRate;
 use super::lock;
 use axum::extract::connect_info::Connected;
 use axum::serve::{IncomingStream, Listener};
@@ -79,6 +80,7 @@ struct Entry {
 struct Table {
     entries: BTreeMap<u64, Entry>,
     next: u64,
+    changes: ChangeRate,
 }
 
 impl Table {
@@ -151,6 +153,13 @@ impl Peer {
     /// many event streams.
     pub fn stream(&self) -> Option<Streaming> {
         lock(&self.connections.0).stream(self.number).then(|| Streaming(self.clone()))
+    }
+
+    /// Whether the client of this connection may change the camera now; counts the change.
+    pub fn may_change(&self) -> bool {
+        let table = &mut *lock(&self.connections.0);
+        let entry = table.entries.get(&self.number);
+        entry.is_some_and(|entry| table.changes.admit(entry.client, Instant::now().into_std()))
     }
 }
 

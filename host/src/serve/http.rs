@@ -6,6 +6,7 @@
 //! (`a_browser_that_does_not_read_delays_no_other_and_then_sees_the_newest` and
 //! `a_slow_browser_has_few_old_images_before_it` in `host/src/serve/tests.rs`).
 
+use super::change_rate::PER_SECOND;
 use super::connections::{Connections, Door, Peer, Streaming};
 use super::delays::Passed;
 use super::imaging::Picture;
@@ -43,6 +44,8 @@ const MAX_CHANGE_BYTES: usize = 4096;
 const MAX_SCENE_BYTES: usize = 1 << 16;
 /// The path of messages with scenes.
 const SCENE: &str = "/api/scene";
+/// The path of messages that switch the light off.
+const STOP: &str = "/api/stop";
 
 /// Security headers for every response: no external content, no framing, no caching.
 const HEADERS: [(HeaderName, &str); 5] = [
@@ -113,7 +116,7 @@ fn routes(app: App) -> Router {
         .route("/events", get(events))
         .route("/api/state", get(state))
         .route("/api/settings", post(settings))
-        .route("/api/stop", post(stop))
+        .route(STOP, post(stop))
         .route("/api/start", post(start))
         .route(SCENE, post(scene).layer(DefaultBodyLimit::max(MAX_SCENE_BYTES)))
         .route("/image.png", get(image))
@@ -126,8 +129,8 @@ fn routes(app: App) -> Router {
         .with_state(app)
 }
 
-/// Refuses every request that [`guard`] refuses, that lacks the token, or that announces too much,
-/// before any other handler.
+/// Refuses every request that [`guard`] refuses, that lacks the token, that announces too much, or
+/// that is one of too many changes, before any other handler.
 async fn only_ours(State(app): State<App>, request: Request, next: Next) -> Response {
     let mut response = match refused(&app, &request) {
         None => next.run(request).await,
@@ -160,14 +163,23 @@ fn refused(app: &App, request: &Request) -> Option<Response> {
     }
     let most = if uri.path() == SCENE { MAX_SCENE_BYTES } else { MAX_CHANGE_BYTES };
     let announced = headers.get(header::CONTENT_LENGTH).map(|value| value.to_str().map(str::parse));
-    match announced {
-        None => None,
-        Some(Ok(Ok::<u64, _>(length))) if length <= most as u64 => None,
-        Some(_) => {
-            let words = format!("the request has too long a body, expected at most {most} bytes");
-            Some(line(StatusCode::PAYLOAD_TOO_LARGE, &words))
-        }
+    let fits = match announced {
+        None => true,
+        Some(length) => matches!(length, Ok(Ok::<u64, _>(length)) if length <= most as u64),
+    };
+    if !fits {
+        let words = format!("the request has too long a body, expected at most {most} bytes");
+        return Some(line(StatusCode::PAYLOAD_TOO_LARGE, &words));
     }
+    let changes = request.method() == Method::POST && uri.path() != STOP;
+    let peer = request.extensions().get::<ConnectInfo<Peer>>();
+    if changes && !peer.is_some_and(|ConnectInfo(peer)| peer.may_change()) {
+        let words = format!(
+            "too many changes: at most {PER_SECOND} a second; the light can be switched off at any time"
+        );
+        return Some(line(StatusCode::TOO_MANY_REQUESTS, &words));
+    }
+    None
 }
 
 /// A response of one line.

@@ -21,6 +21,8 @@
 mod begin;
 mod camera;
 mod camera_log;
+#[cfg(feature = "serve")]
+mod change_rate;
 mod commands;
 #[cfg(feature = "serve")]
 mod connections;

@@ -403,6 +403,36 @@ fn a_slow_browser_has_few_old_images_before_it() {
     paper.end();
 }
 
+#[test]
+fn a_client_that_changes_settings_without_end_is_slowed_down_and_can_always_stop() {
+    const MANY: u32 = 4 * change_rate::BURST;
+    let paper = Paper::new();
+    let mut stream = TcpStream::connect(paper.address).unwrap();
+    stream.set_read_timeout(Some(LIMIT)).unwrap();
+    let host = paper.address;
+    let post = |path: &str, body: &str| {
+        let length = body.len();
+        format!("POST {path} HTTP/1.1\r\nHost: {host}\r\nContent-Length: {length}\r\n\r\n{body}")
+    };
+    let change = post("/api/settings", r#"{"frames": 4}"#);
+    let stop = post("/api/stop", "");
+    write!(stream, "{}{stop}", change.repeat(MANY as usize)).unwrap();
+    let (mut done, mut refused) = (0, 0);
+    let mut lines = BufReader::new(stream).lines().map(Result::unwrap);
+    let mut status = || lines.find(|line| line.starts_with("HTTP/1.1")).unwrap();
+    for _ in 0..MANY {
+        match status().split(' ').nth(1) {
+            Some("200") => done += 1,
+            Some("429") => refused += 1,
+            other => panic!("{other:?}"),
+        }
+    }
+    assert!(done >= change_rate::BURST && refused > 0, "{done} done, {refused} refused");
+    assert!(status().contains(" 200 "));
+    assert!(!paper.shared.light.is_on());
+    paper.end();
+}
+
 /// A method that takes its time.
 struct Slow(Duration);
 

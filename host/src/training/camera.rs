@@ -26,6 +26,9 @@ use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 use thiserror::Error;
 
+// The networks do not depend on the optics, so each has the number of zones.
+const _: () = assert!(nirspi_nets::degrade::DEPTH_SIDE == nirspi_optics::DEPTH_SIDE);
+
 /// Farthest target, divided by the focus distance of the lens, which is the nearest: 0.3 to 1.2 m
 /// for the paper's camera.
 const FARTHEST_OVER_FOCUS: f64 = 4.0;

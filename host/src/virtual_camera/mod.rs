@@ -15,6 +15,8 @@ mod fpga;
 mod link;
 mod model;
 mod optics;
+#[cfg(feature = "enhance")]
+mod panels;
 mod precomputed;
 mod server;
 mod shot;
@@ -27,6 +29,8 @@ pub use link::MemoryLink;
 pub use model::{CameraFileError, read_camera_model};
 pub use nirspi_optics::CameraModel;
 pub use optics::{VirtualOptics, VirtualOpticsError};
+#[cfg(feature = "enhance")]
+pub use panels::Panels;
 pub use precomputed::PrecomputedFpga;
 pub use server::{ServeOptions, ServerEvent, serve};
 pub use shot::{Shot, ShotError, calibrate_against_white, flat_field_against_white, shoot};
@@ -53,6 +57,9 @@ const _: () = assert!(FRAME_BYTES >= nirspi_wire::packet::MAX_DEVICE_PACKET);
 const DEPTH_PERIOD: Micros = Micros(66_667);
 /// Zones along one edge of the depth map.
 const DEPTH_SIDE: u8 = nirspi_optics::DEPTH_SIDE as u8;
+const _: () = assert!(DEPTH_SIDE as usize == nirspi_optics::DEPTH_SIDE);
+// The optics do not depend on the protocol, so each has the number of LEDs.
+const _: () = assert!(nirspi_optics::SIDE == nirspi_wire::SIDE as usize);
 
 /// Packets to send to the host.
 #[derive(Debug, Default)]
@@ -295,17 +302,15 @@ fn crate_version() -> Version {
 
 #[cfg(test)]
 mod tests {
-    use nirspi_optics::{DEPTH_SIDE, instrument};
+    use nirspi_optics::instrument;
     use nirspi_wire::register::LATENCY_MAX;
 
     #[test]
     fn the_optics_have_the_instruments_numbers() {
-        assert_eq!(instrument::SIDE, usize::from(nirspi_wire::SIDE));
         assert_eq!(instrument::LEDS, usize::from(nirspi_wire::PATTERNS));
         assert_eq!(instrument::WAVELENGTH_NM, f64::from(nirspi_wire::WAVELENGTH_NM));
         assert_eq!(instrument::SAMPLE_NS * f64::from(nirspi_wire::ADC_HZ), 1e9);
         assert_eq!(instrument::FULL_SCALE_COUNTS, nirspi_wire::ADC_MAX);
         assert_eq!(instrument::MAX_ADC_LATENCY_CLOCKS, LATENCY_MAX);
-        assert_eq!(usize::from(super::DEPTH_SIDE), DEPTH_SIDE);
     }
 }

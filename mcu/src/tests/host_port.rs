@@ -288,6 +288,27 @@ fn a_failed_transfer_is_tried_again_and_given_up_after_three() {
     assert_eq!(bus.frame(), Ok(None), "told once; then it is asked for anew");
 }
 
+#[test]
+fn an_error_is_told_of_the_data_that_could_not_be_read_alone() {
+    let mut bus = bus();
+    start(&mut bus, 2);
+    bus.port().fpga.make_frame();
+    bus.port().failures = 3;
+    assert_eq!(bus.frame(), Ok(None));
+    while serve(&mut bus) {}
+    assert_eq!(bus.raw(), Ok(None), "no burst has failed");
+}
+
+#[test]
+fn a_stop_leaves_the_last_frame_until_its_release() {
+    let mut bus = bus();
+    start(&mut bus, 2);
+    assert_eq!(fetch(&mut bus), 0);
+    control(&mut bus, control::STOP);
+    assert_eq!(bus.frame().unwrap().map(sequence), Some(0));
+    assert_eq!(bus.port().transfers.len(), 1, "read once");
+}
+
 /// The camera over a host port, polled as a board does.
 pub(super) struct Device {
     pub camera: Camera,
@@ -421,6 +442,43 @@ fn with_a_second_buffer_the_fpga_has_its_own_back_before_the_frame_is_packed() {
     device.bus.port().fpga.make_frame();
     device.turn(&[]);
     assert_eq!(frames(&device.heard()).len(), 1, "packed during the transfer");
+}
+
+/// A device in a run, whose bus has just kept a frame.
+fn keeping(lost_address: Option<u16>) -> Device {
+    let mut device = Device::new(bus_of_two());
+    device.ask(Command::Configure(SMALL));
+    device.ask(Command::Start(RunLength::Continuous));
+    device.bus.port().fpga.make_frame();
+    device.turn(&[]);
+    device.bus.port().fpga.lost_address = lost_address;
+    device.turn(&[]);
+    assert!(frames(&device.heard()).is_empty(), "kept");
+    device
+}
+
+#[test]
+fn a_kept_frame_waits_a_millisecond_for_the_next_one_at_most() {
+    let mut device = keeping(None);
+    let kept = device.now;
+    // A turn takes 100 us.
+    for (age, sent) in [(999, 0), (1_000, 1), (2_000, 0)] {
+        device.now.0 = kept.0 + age - 100;
+        device.turn(&[]);
+        assert_eq!(frames(&device.heard()).len(), sent, "after {age} us");
+    }
+}
+
+#[test]
+fn a_kept_frame_does_not_wait_when_no_next_one_can_come() {
+    // The run has ended.
+    let mut device = keeping(None);
+    device.turn(&packet(1, Command::Stop));
+    assert_eq!(frames(&device.heard()).len(), 1);
+    // The FPGA has not taken the release.
+    let mut device = keeping(Some(Register::Control.address()));
+    device.turn(&[]);
+    assert_eq!(frames(&device.heard()).len(), 1);
 }
 
 #[test]

@@ -245,6 +245,30 @@ fn a_pipe_or_a_device_is_no_calibration_description_or_bitstream() {
 
 #[cfg(unix)]
 #[test]
+fn a_pipe_or_a_device_is_no_table_of_numbers() {
+    let bench = Bench::new();
+    for name in ["pipe.csv", "pipe.txt"] {
+        let made = std::process::Command::new("mkfifo").arg(bench.path(name)).status().unwrap();
+        assert!(made.success());
+    }
+    for arguments in [
+        ["rain", "--uniformity", "pipe.csv"],
+        ["rain", "--uniformity", "/dev/zero"],
+        ["rain", "--drops", "pipe.csv"],
+        ["demo", "--weather", "pipe.csv"],
+        ["demo", "--order", "table:pipe.txt"],
+        ["reconstruct", "pipe.txt", "--method=hadamard"],
+    ] {
+        let file = arguments.iter().find(|word| word.contains("pipe") || word.starts_with('/'));
+        let file = file.unwrap().trim_start_matches("table:");
+        let refused = bench.run(&arguments);
+        assert!(refused.stdout.is_empty(), "{refused:?}");
+        refused.failed(1, &[file, "a device or pipe"]);
+    }
+}
+
+#[cfg(unix)]
+#[test]
 fn an_interrupted_command_leaves_nothing_of_its_own() {
     // Half of the time of so many images passes after the first file is there.
     const MANY: usize = 800;

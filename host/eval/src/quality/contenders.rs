@@ -15,7 +15,7 @@ use serde::Serialize;
 use std::num::NonZeroU32;
 
 /// Number of values of a reading.
-const READING: usize = 32 * 32;
+const READING: usize = nirspi_recon::Side::INSTRUMENT.area();
 
 /// A method of the comparison.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

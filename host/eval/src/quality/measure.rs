@@ -21,7 +21,7 @@ use serde::Serialize;
 use std::fmt;
 
 /// Side of an image.
-pub const SIDE: usize = 64;
+pub const SIDE: usize = nirspi_nets::deblur::SIDE;
 /// Side of its readings.
 const READINGS: usize = SIDE / 2;
 /// Number of draws for the interval of a distance: each draw takes the roots of a matrix.

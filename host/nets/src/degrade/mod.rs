@@ -16,7 +16,7 @@ use rand_pcg::Pcg64Mcg;
 use thiserror::Error;
 
 /// Side of the camera's reading, in pixels.
-pub const READING_PX: usize = SIDE_PX / 2;
+pub const READING_PX: usize = crate::fusion::SIDE;
 /// Number of zones along one edge of a depth map.
 pub const DEPTH_SIDE: usize = 8;
 

@@ -27,7 +27,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 /// Number of pixels of the instrument's image, and of LEDs of its array.
-const PIXELS: usize = 32 * 32;
+const PIXELS: usize = Side::INSTRUMENT.area();
 /// An LED with less than this share of the median light counts as dead.
 const DEAD_BELOW: f32 = 0.2;
 /// A reading in the dark below this many standard deviations of noise counts as 0.

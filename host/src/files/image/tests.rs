@@ -234,3 +234,24 @@ fn a_damaged_signature_is_no_other_kind_of_file() {
     let error = read_grey(&path).unwrap_err().to_string();
     assert!(error.contains("found a PNG image with a damaged signature"), "{error}");
 }
+
+/// One bit a pixel in the file becomes three bytes a pixel: a file of some hundred bytes can ask for 768 MiB.
+#[test]
+fn a_picture_of_a_palette_that_would_take_too_much_memory_is_refused_before_it_takes_it() {
+    let of_edge = |edge| {
+        let mut bytes = Vec::new();
+        let mut encoder = ::png::Encoder::new(&mut bytes, edge, edge);
+        encoder.set_color(::png::ColorType::Indexed);
+        encoder.set_depth(::png::BitDepth::One);
+        encoder.set_palette(vec![0, 0, 0, 255, 255, 255]);
+        let mut writer = encoder.write_header().unwrap();
+        // The pixels are missing: whoever gets as far as to miss them has taken the memory.
+        writer.write_chunk(::png::chunk::IDAT, &[]).unwrap();
+        drop(writer);
+        line(&read(&bytes).unwrap_err(), "scene.png")
+    };
+    let told = of_edge(16_384);
+    assert!(told.contains("too large") && told.contains("512 MiB when decoded"), "{told}");
+    let told = of_edge(16);
+    assert!(!told.contains("too large"), "{told}");
+}

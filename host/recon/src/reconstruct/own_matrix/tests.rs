@@ -176,7 +176,7 @@ fn what_is_wrong_with_a_matrix_is_named() {
     assert!(refused(&weights).contains("matrix is NaN at [1, 2]"), "{}", refused(&weights));
     assert!(refused(&[0.0; 8]).contains("rank 0"));
     // One weight whose square leaves the range of floating point is a weight all the same.
-    for weight in [1e160, 1e-160] {
+    for weight in [f64::MAX, 1e160, 1e-160, f64::from_bits(1)] {
         assert_eq!(OwnMatrix::new(side, &[weight, 0.0, 0.0, 0.0]).unwrap().rank(), 1);
     }
     let own = OwnMatrix::new(side, &[1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0]).unwrap();
