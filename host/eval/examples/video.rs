@@ -54,7 +54,7 @@ fn print(rows: &[VideoRow]) {
     for row in rows {
         let (made, shown) = (&row.made, row.shown);
         println!(
-            "  {made:<22} {:<8} {:6.2} / {:.3} / {:6.2}",
+            "  {made:<22} {:<10} {:6.2} / {:.3} / {:6.2}",
             format!("{shown:?}"),
             row.psnr_db,
             row.ssim,
@@ -143,12 +143,12 @@ fn chart(all: &[VideoRow], noise: f64) -> Chart {
     };
     let lines = vec![
         line("best frame by frame", 0, false, &|row| !row.recursive),
-        line("frame by frame, tikhonov, lowest 30 %", 2, true, &named("tikhonov", "Lowest")),
+        line("frame by frame, tikhonov, lowest 30 %", 2, true, &named("tikhonov", "Lowest(30)")),
         line("recursive, all patterns", 1, false, &named("recursive", "All")),
-        line("recursive, lowest 30 %", 2, false, &named("recursive", "Lowest")),
+        line("recursive, lowest 30 %", 2, false, &named("recursive", "Lowest(30)")),
         line("recursive, 30 % in turn", 3, false, &named("recursive", "Turns")),
         line("the same, not moved", 3, true, &named("recursive, not moved", "Turns")),
-        line("recursive, prior, lowest 30 %", 4, false, &named("recursive, prior", "Lowest")),
+        line("recursive, prior, lowest 30 %", 4, false, &named("recursive, prior", "Lowest(30)")),
     ];
     let values = lines.iter().flat_map(|line| line.points.iter().map(|point| point.1));
     Chart {

@@ -24,10 +24,12 @@ use std::fmt;
 const GLYPH_PX: usize = 256;
 /// Points of a pixel along one side, over which the scene is averaged.
 const POINTS: usize = 4;
-/// Share of the patterns that a frame of [`Shown::Lowest`] and [`Shown::Turns`] shows.
-const SHARE: f64 = 0.3;
+/// Per cent of the patterns that a frame of the table shows, if not all.
+const PER_CENT: u8 = 30;
 /// Share of the patterns that each frame of [`Shown::Turns`] shows; the others are shown in turn.
 const ALWAYS: f64 = 0.1;
+/// The lowest sequencies of the table.
+const LOWEST: Shown = Shown::Lowest(PER_CENT);
 /// Frames that do not count: the estimate has no past yet.
 const WARM_UP: usize = 4;
 
@@ -140,8 +142,8 @@ impl Letters {
 pub enum Shown {
     /// All patterns.
     All,
-    /// The 30 % of the lowest sequencies.
-    Lowest,
+    /// The lowest sequencies: so many per cent of the patterns.
+    Lowest(u8),
     /// The 10 % of the lowest sequencies, and 20 % of the patterns from the others in turn.
     Turns,
 }
@@ -150,7 +152,11 @@ impl Shown {
     /// What part of the patterns a frame shows.
     #[must_use]
     pub fn share(self) -> f64 {
-        if self == Self::All { 1.0 } else { SHARE }
+        match self {
+            Self::All => 1.0,
+            Self::Lowest(per_cent) => f64::from(per_cent) / 100.0,
+            Self::Turns => f64::from(PER_CENT) / 100.0,
+        }
     }
 
     /// The rows of frame `frame`.
@@ -162,10 +168,10 @@ impl Shown {
         let count = |share: f64| (share * side.area() as f64).round() as usize;
         let rows: Vec<u32> = match self {
             Self::All => order.to_vec(),
-            Self::Lowest => order[..count(SHARE)].to_vec(),
+            Self::Lowest(_) => order[..count(self.share())].to_vec(),
             Self::Turns => {
                 let (always, others) = order.split_at(count(ALWAYS));
-                let turns = others.len().div_ceil(count(SHARE - ALWAYS));
+                let turns = others.len().div_ceil(count(self.share() - ALWAYS));
                 let turn = others.iter().skip(frame % turns).step_by(turns);
                 always.iter().chain(turn).copied().collect()
             }
@@ -272,14 +278,14 @@ pub struct Compared {
 pub fn ways() -> Vec<(Shown, Maker)> {
     let alone = Method::ALL.iter().filter(|m| ["tikhonov", "tv", "prior"].contains(&m.argument()));
     let mut ways: Vec<(Shown, Maker)> = alone
-        .flat_map(|&method| [Shown::All, Shown::Lowest].map(|shown| (shown, Maker::Alone(method))))
+        .flat_map(|&method| [Shown::All, LOWEST].map(|shown| (shown, Maker::Alone(method))))
         .collect();
     let recursive = |shown, follow| (shown, Maker::Recursive { follow });
     ways.push(recursive(Shown::All, true));
-    ways.push(recursive(Shown::Lowest, true));
+    ways.push(recursive(LOWEST, true));
     ways.push(recursive(Shown::Turns, false));
     ways.push(recursive(Shown::Turns, true));
-    for shown in [Shown::All, Shown::Lowest, Shown::Turns] {
+    for shown in [Shown::All, LOWEST, Shown::Turns] {
         ways.push((shown, Maker::Fused(Method::PRIOR)));
     }
     ways
@@ -290,38 +296,98 @@ pub fn ways() -> Vec<(Shown, Maker)> {
 /// # Errors
 /// [`EvalError`] if there are no frames to count, or a method fails.
 pub fn compare(motion: Motion, noise: f64, frames: usize, seed: u64) -> Result<Compared> {
-    if frames <= WARM_UP {
-        return Err(EvalError::setting("frames", frames, format!("more than {WARM_UP}")));
-    }
-    let letters = Letters::new()?;
-    let truths: Vec<Scene> = (0..frames).map(|k| motion.frame(&letters, k, frames)).collect();
+    let truths = scenes(motion, frames)?;
     let (mut rows, mut images) = (Vec::new(), Vec::new());
     for (shown, maker) in ways() {
-        let read = |(k, truth)| shown.read(truth, k, noise, seed + k as u64);
-        let readings: Vec<Measurements> =
-            truths.iter().enumerate().map(read).collect::<Result<_>>()?;
-        let made = maker.images(&readings)?;
-        let figures: Vec<(f64, f64)> = truths
-            .iter()
-            .zip(&made)
-            .skip(WARM_UP)
-            .map(|(truth, image)| quality(truth, image))
-            .collect::<Result<_>>()?;
-        let mean =
-            |of: fn(&(f64, f64)) -> f64| figures.iter().map(of).sum::<f64>() / figures.len() as f64;
+        let made = maker.images(&readings(&truths, shown, noise, seed)?)?;
+        let Qualities { psnr_db, ssim, worst_db } = Qualities::of(&truths, &made)?;
         rows.push(VideoRow {
             motion: motion.to_string(),
             noise,
             shown,
             made: maker.name(),
             recursive: !matches!(maker, Maker::Alone(_)),
-            psnr_db: mean(|figure| figure.0),
-            ssim: mean(|figure| figure.1),
-            worst_db: figures.iter().map(|figure| figure.0).fold(f64::INFINITY, f64::min),
+            psnr_db,
+            ssim,
+            worst_db,
         });
         images.push(made);
     }
     Ok(Compared { rows, truths, images })
+}
+
+/// The frames of a video.
+fn scenes(motion: Motion, frames: usize) -> Result<Vec<Scene>> {
+    if frames <= WARM_UP {
+        return Err(EvalError::setting("frames", frames, format!("more than {WARM_UP}")));
+    }
+    let letters = Letters::new()?;
+    Ok((0..frames).map(|k| motion.frame(&letters, k, frames)).collect())
+}
+
+/// Readings of each frame; frame `k` has the noise of seed `seed + k`.
+fn readings(truths: &[Scene], shown: Shown, noise: f64, seed: u64) -> Result<Vec<Measurements>> {
+    let read = |(k, truth)| shown.read(truth, k, noise, seed + k as u64);
+    truths.iter().enumerate().map(read).collect()
+}
+
+/// Figures of the images from the fifth on, against the scenes.
+struct Qualities {
+    psnr_db: f64,
+    ssim: f64,
+    worst_db: f64,
+}
+
+impl Qualities {
+    fn of(truths: &[Scene], images: &[Image]) -> Result<Self> {
+        let counted = truths.iter().zip(images).skip(WARM_UP);
+        let figures: Vec<(f64, f64)> =
+            counted.map(|(truth, image)| quality(truth, image)).collect::<Result<_>>()?;
+        let mean =
+            |of: fn(&(f64, f64)) -> f64| figures.iter().map(of).sum::<f64>() / figures.len() as f64;
+        Ok(Self {
+            psnr_db: mean(|figure| figure.0),
+            ssim: mean(|figure| figure.1),
+            worst_db: figures.iter().map(|figure| figure.0).fold(f64::INFINITY, f64::min),
+        })
+    }
+}
+
+/// What the frames before add to one method, with the same readings.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Gain {
+    /// Mean PSNR frame by frame over the frames from the fifth on, in dB.
+    pub alone_db: f64,
+    /// Mean PSNR over the same frames, each of which starts from the frames before.
+    pub past_db: f64,
+}
+
+impl Gain {
+    /// What the past adds, in dB; below 0 where the past costs.
+    #[must_use]
+    pub fn db(self) -> f64 {
+        self.past_db - self.alone_db
+    }
+}
+
+/// What the past adds to `method` on one video.
+///
+/// # Errors
+/// [`EvalError`] if there are no frames to count, or the method fails.
+pub fn gain(
+    method: Method,
+    motion: Motion,
+    shown: Shown,
+    noise: f64,
+    frames: usize,
+    seed: u64,
+) -> Result<Gain> {
+    let truths = scenes(motion, frames)?;
+    let readings = readings(&truths, shown, noise, seed)?;
+    let psnr_db = |maker: Maker| -> Result<f64> {
+        Ok(Qualities::of(&truths, &maker.images(&readings)?)?.psnr_db)
+    };
+    Ok(Gain { alone_db: psnr_db(Maker::Alone(method))?, past_db: psnr_db(Maker::Fused(method))? })
 }
 
 #[cfg(test)]
@@ -332,7 +398,7 @@ mod tests {
     fn equal_light_is_equal_light() {
         let scene = Motion::Letter(0.0).frame(&Letters::new().unwrap(), 0, 8);
         let clean = scene.measured(0.0, 0).unwrap();
-        for shown in [Shown::All, Shown::Lowest, Shown::Turns] {
+        for shown in [Shown::All, LOWEST, Shown::Turns] {
             let (mut squares, mut count) = (0.0, 0);
             for frame in 0..20 {
                 let read = shown.read(&scene, frame, 0.1, 7 + frame as u64).unwrap();
@@ -370,6 +436,26 @@ mod tests {
         };
         assert!(best(true) > best(false) + 2.0, "{} {}", best(true), best(false));
         assert!(compare(Motion::Cut, 0.1, 4, 1).is_err());
+    }
+
+    #[test]
+    fn the_past_costs_no_scene_half_a_decibel_with_much_light_and_with_little() {
+        for shown in [Shown::Lowest(10), Shown::Lowest(30), Shown::All] {
+            for noise in [0.001, 0.1] {
+                let gains: Vec<(Motion, f64)> = Motion::ALL
+                    .par_iter()
+                    .map(|&motion| {
+                        (motion, gain(Method::TIKHONOV, motion, shown, noise, 16, 1).unwrap().db())
+                    })
+                    .collect();
+                for (motion, db) in &gains {
+                    assert!(*db > -0.5, "{motion}, {shown:?}, noise {noise}: {db:.2} dB");
+                }
+                let still = gains[0].1;
+                let least = if shown == Shown::All { 8.0 } else { 0.5 };
+                assert!(still > least, "{shown:?}, noise {noise}: {still:.2} dB of a still scene");
+            }
+        }
     }
 
     #[test]

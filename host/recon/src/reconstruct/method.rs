@@ -11,7 +11,9 @@
 
 use super::prior::SharedNetwork;
 use super::report::Reconstruction;
-use super::{Completion, MatrixMethod, OmpSettings, ReconstructError, Sparsity, Strength, methods};
+use super::{
+    Completion, MatrixMethod, OmpSettings, ReconstructError, Recursive, Sparsity, Strength, methods,
+};
 use crate::{Backend, Basis, Measurements};
 use std::fmt;
 use std::str::FromStr;
@@ -46,8 +48,32 @@ pub trait Reconstruct: Send + Sync {
     /// [`ReconstructError::Failed`].
     fn reconstruct(&self, measurements: &Measurements) -> Result<Reconstruction, ReconstructError>;
 
-    /// The images of a video's frames. A method that can start a frame from the previous one
-    /// overrides this function, and marks such frames as [`warm`](super::Report::warm).
+    /// What the frames of a video have shown before the first frame, for
+    /// [`next_frame`](Self::next_frame); `None` for a method that makes each frame by itself, or
+    /// that needs all frames at once.
+    ///
+    /// # Errors
+    /// [`ReconstructError`] if the method's settings allow no video.
+    fn begin_video(&self) -> Result<Option<Recursive>, ReconstructError> {
+        Ok(None)
+    }
+
+    /// The image of the next frame of a video, which may start from the frames before. Such a frame
+    /// is marked as [`warm`](super::Report::warm).
+    ///
+    /// # Errors
+    /// As [`Reconstruct::reconstruct`].
+    fn next_frame(
+        &self,
+        _past: &mut Recursive,
+        frame: &Measurements,
+    ) -> Result<Reconstruction, ReconstructError> {
+        self.reconstruct(frame)
+    }
+
+    /// The images of a video's frames: each the [next](Self::next_frame) after
+    /// [the beginning](Self::begin_video). A method that can start a frame from the previous one in
+    /// another way overrides this function.
     ///
     /// # Errors
     /// As [`Reconstruct::reconstruct`].
@@ -55,7 +81,12 @@ pub trait Reconstruct: Send + Sync {
         &self,
         frames: &[Measurements],
     ) -> Result<Vec<Reconstruction>, ReconstructError> {
-        frames.iter().map(|frame| self.reconstruct(frame)).collect()
+        match self.begin_video()? {
+            Some(mut past) => {
+                frames.iter().map(|frame| self.next_frame(&mut past, frame)).collect()
+            }
+            None => frames.iter().map(|frame| self.reconstruct(frame)).collect(),
+        }
     }
 }
 

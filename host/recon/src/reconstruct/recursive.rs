@@ -4,17 +4,21 @@
 //! The state is one value and one variance for each Hadamard row (a Kalman filter with a diagonal
 //! covariance; R. E. Kalman, *A new approach to linear filtering and prediction problems*, 1960).
 //! The frames may measure different rows: a row that this frame leaves out keeps its value, and
-//! loses weight as the scene moves on. A frame is added in five steps:
+//! loses weight as the scene moves on. A frame is added in seven steps:
 //!
-//! 1. **Motion**: the estimate is moved as a whole to where it agrees best with the readings, if
+//! 1. **Noise**: of several upper bounds, by this frame alone and by what the past misses of the
+//!    frame, the smallest counts (`noise.rs`). Too much noise would make the past count too much.
+//! 2. **Motion**: the estimate is moved as a whole to where it agrees best with the readings, if
 //!    the gain in likelihood pays for two more parameters.
-//! 2. **Ageing**: the scene is taken as a Gaussian process whose cosine of frequency `f` (half
+//! 3. **Ageing**: the scene is taken as a Gaussian process whose cosine of frequency `f` (half
 //!    periods per side `n`) keeps the share `exp(-(pi f v / n)^2 / 2)` from frame to frame. That is
 //!    the mean over normal displacements of `v` pixels. The speed `v` is the likeliest of a list.
-//! 3. **Cut**: if a scene without any past is likelier than each speed, the frame starts anew.
-//! 4. **Fusion**: each measured row becomes the mean of old value and reading, weighted by their
+//! 4. **Cut**: if a scene without any past is likelier than each speed, the frame starts anew.
+//! 5. **Surprise**: rows of a band of frequencies lose as much weight as the past misses of their
+//!    readings beyond noise and ageing.
+//! 6. **Fusion**: each measured row becomes the mean of old value and reading, weighted by their
 //!    variances.
-//! 5. **Completion**: the image is the most likely one given all rows with their own variances and
+//! 7. **Completion**: the image is the most likely one given all rows with their own variances and
 //!    amplitudes that fall as one over frequency (Tikhonov's method with weights). Rows that were
 //!    read at earlier positions of the scene, six at most, count where they were read.
 //!
@@ -25,6 +29,7 @@
 
 mod joint;
 mod motion;
+mod noise;
 mod past;
 mod rows;
 mod view;
@@ -38,7 +43,7 @@ use crate::basis::Basis;
 use crate::{Image, Measurements, Side, fwht};
 use joint::Joint;
 use motion::{SHIFTS, Shift, best_shift};
-use past::{Known, Past, Pose};
+use past::{Known, Past, Pose, median};
 use rows::Spectrum;
 use std::collections::VecDeque;
 use view::{Guess, View};
@@ -80,6 +85,8 @@ impl Default for RecursiveSettings {
 pub struct RecursiveFrame {
     /// The image, in the measurements' units.
     pub image: Image,
+    /// Whether the frame is the first one of the estimate.
+    pub first: bool,
     /// Whether the frames before had a part in the image.
     pub warm: bool,
     /// Motion of the whole scene since the frame before: down and to the right, in pixels.
@@ -101,10 +108,10 @@ pub struct RecursiveFrame {
 impl RecursiveFrame {
     /// What a reader should know about the frame, in a few words; nothing for a first frame.
     #[must_use]
-    pub fn note(&self, is_first: bool) -> Option<String> {
+    pub fn note(&self) -> Option<String> {
         let [down, right] = self.shift_px;
         let (known, speed) = (self.fused.rows().len(), self.speed_px as f32);
-        match (self.warm, is_first) {
+        match (self.warm, self.first) {
             (true, _) => Some(format!(
                 "{known} patterns known, scene moved by {down} px down and {right} px right, other motion {speed} px"
             )),
@@ -116,26 +123,23 @@ impl RecursiveFrame {
     }
 }
 
-/// The images of a video by a method that gets, for each frame, the rows that this and earlier
-/// frames have shown.
+/// The image of the next frame by a method that gets the rows that this frame and earlier ones have
+/// shown.
 ///
 /// # Errors
 /// The errors of the method and of [`Recursive::add`].
-pub fn fused_video(
+pub fn fused_frame(
     method: &dyn Reconstruct,
-    frames: &[Measurements],
-) -> Result<Vec<Reconstruction>, ReconstructError> {
-    let mut estimate = Recursive::new(RecursiveSettings::default())?;
-    let each = frames.iter().enumerate().map(|(at, frame)| {
-        let fused = estimate.add(frame)?;
-        let mut made = method.reconstruct(&fused.fused)?;
-        made.report.warm = fused.warm;
-        let notes = [made.report.note.take(), fused.note(at == 0)];
-        let notes: Vec<String> = notes.into_iter().flatten().collect();
-        made.report.note = (!notes.is_empty()).then(|| notes.join(", "));
-        Ok(made)
-    });
-    each.collect()
+    past: &mut Recursive,
+    frame: &Measurements,
+) -> Result<Reconstruction, ReconstructError> {
+    let fused = past.add(frame)?;
+    let mut made = method.reconstruct(&fused.fused)?;
+    made.report.warm = fused.warm;
+    let notes: Vec<String> =
+        [made.report.note.take(), fused.note()].into_iter().flatten().collect();
+    made.report.note = (!notes.is_empty()).then(|| notes.join(", "));
+    Ok(made)
 }
 
 /// What the frames so far have shown.
@@ -143,6 +147,8 @@ pub fn fused_video(
 pub struct Recursive {
     settings: RecursiveSettings,
     past: Option<Past>,
+    /// Whether a frame has been added since the beginning.
+    begun: bool,
 }
 
 impl Recursive {
@@ -159,12 +165,12 @@ impl Recursive {
         }
         settings.strength.check()?;
         super::check_prior(FALLOFF, settings.noise)?;
-        Ok(Self { settings, past: None })
+        Ok(Self { settings, past: None, begun: false })
     }
 
     /// Forgets the past.
     pub fn restart(&mut self) {
-        self.past = None;
+        (self.past, self.begun) = (None, false);
     }
 
     /// Adds a frame. A frame of another side starts anew.
@@ -173,10 +179,12 @@ impl Recursive {
     /// The errors of [`regularised`] for a frame without a past.
     pub fn add(&mut self, frame: &Measurements) -> Result<RecursiveFrame, ReconstructError> {
         let past = self.past.take().filter(|past| past.side == frame.side());
-        match past.and_then(|past| self.next(past, frame)) {
-            Some(made) => Ok(made),
-            None => self.start(frame),
-        }
+        let made = match past.and_then(|past| self.next(past, frame)) {
+            Some(made) => made,
+            None => self.start(frame)?,
+        };
+        self.begun = true;
+        Ok(made)
     }
 
     /// The first frame of a scene.
@@ -189,8 +197,12 @@ impl Recursive {
         let scale = (1.0 / problem.unit) as f32;
         let mut mean: Vec<f32> = found.image.pixels().iter().map(|v| v * scale).collect();
         walsh(problem.side, &mut mean);
+        let noise = match noise {
+            NoiseLevel::Known(_) => problem.prior.noise,
+            NoiseLevel::Estimated => noise::of_frame(&problem),
+        };
         let mut known = Known::nothing(problem.side);
-        known.add(&problem, problem.prior.noise.max(LEAST_NOISE));
+        known.add(&problem, noise.max(LEAST_NOISE));
         self.past = Some(Past {
             side: problem.side,
             unit: problem.unit,
@@ -198,10 +210,11 @@ impl Recursive {
             mean,
             poses: VecDeque::from([Pose { since: Shift::default(), known }]),
             shift: Shift::default(),
-            noises: VecDeque::from([problem.prior.noise]),
+            noises: VecDeque::from([noise]),
         });
         Ok(RecursiveFrame {
             image: found.image,
+            first: !self.begun,
             warm: false,
             shift_px: [0.0; 2],
             speed_px: 0.0,
@@ -215,40 +228,57 @@ impl Recursive {
     /// A frame of the scene of the frames before; `None` if there is a cut.
     fn next(&mut self, mut past: Past, frame: &Measurements) -> Option<RecursiveFrame> {
         let mut problem = past.problem_of(frame, self.settings.noise);
-        let view = View::new(&past, &problem, self.settings.speed_px);
-        let stay = Guess {
+        let stay = |past: &Past, noise: f32| Guess {
             shift: Shift::default(),
             mean: past.mean.clone(),
-            information: past.information(view.noise),
+            information: past.information(noise),
         };
-        let mut best = view.likeliest(&stay);
-        let mut guess = stay;
+        let before = median(&past.noises);
+        let mut moved = None;
+        if self.settings.follow {
+            let view = View::new(&past, &problem, before, self.settings.speed_px);
+            let readings = view.weighted(&stay(&past, before));
+            let shift = best_shift(&past.spectrum, &past.mean, &readings, past.shift);
+            if shift != Shift::default() {
+                moved = Some((shift, past.spectrum.shift(shift).apply(&past.mean)));
+            }
+        }
+        // The noise comes first: what the past misses beyond it is change of the scene.
+        let expected: Vec<&[f32]> = moved.iter().map(|(_, mean)| mean.as_slice()).collect();
+        let noise = past.noise(&problem, &expected, self.settings.noise);
+        problem.prior.noise = noise;
+        let view = View::new(&past, &problem, noise, self.settings.speed_px);
+        let mut guess = stay(&past, noise);
+        let mut best = view.likeliest(&guess);
         // Two more parameters must gain what the Bayesian information criterion asks for, and the
         // best of many shifts more than that. A cut, which cannot be undone, must gain as much.
         let cost = (problem.rows.len() as f32 * SHIFTS).ln();
-        if self.settings.follow {
-            let shift = best_shift(&past.spectrum, &past.mean, &view.weighted(&guess), past.shift);
-            if shift != Shift::default() {
-                let moved = guess.moved(&past.spectrum, shift);
-                let with = view.likeliest(&moved);
-                if with.gain > best.gain + cost {
-                    (best, guess) = (with, moved);
-                }
+        if let Some((shift, _)) = moved {
+            let moved = guess.moved(&past.spectrum, shift);
+            let with = view.likeliest(&moved);
+            if with.gain > best.gain + cost {
+                (best, guess) = (with, moved);
             }
         }
         if self.settings.speed_px.is_none() && view.without_a_past() > best.gain + cost {
             return None;
         }
-        let (kept, prior) = (view.kept(best.speed_px), view.prior);
-        past.poses.iter_mut().for_each(|pose| pose.known.age(&kept, &prior));
+        let kept = view.kept(best.speed_px);
+        let surprise = view.surprise(&past, &guess, &kept);
+        let prior = view.prior;
+        for Pose { known, .. } in &mut past.poses {
+            known.age(&kept, &prior);
+            if self.settings.speed_px.is_none() {
+                known.doubt(&surprise, noise);
+            }
+        }
         past.move_by(guess.shift);
-        problem.prior.noise = past.noise(&problem, &guess.mean, self.settings.noise);
-        past.poses[0].known.add(&problem, problem.prior.noise);
+        past.poses[0].known.add(&problem, noise);
         let strength = match self.settings.strength {
             Strength::Fixed(strength) => strength,
             Strength::CrossValidated { .. } => 1.0,
         };
-        Some(self.finish(past, &problem, strength, best.speed_px))
+        Some(self.finish(past, &problem, &prior, strength, best.speed_px))
     }
 
     /// The image of the fused rows, and the new past.
@@ -256,6 +286,7 @@ impl Recursive {
         &mut self,
         mut past: Past,
         problem: &Problem<'_>,
+        prior: &[f32],
         strength: f64,
         speed_px: f32,
     ) -> RecursiveFrame {
@@ -265,13 +296,19 @@ impl Recursive {
         let mut made =
             tikhonov::solve(problem, joint.right(), weigh, &[strength as f32], ITERATIONS)
                 .remove(0);
-        past.mean.clone_from(&made);
+        // What the next frame is compared with has no less detail than the readings show.
+        let share = past.share_of_last(noise, Some(prior));
+        past.mean = past.with_readings(made.clone(), &share);
         let fused = past.fused(noise);
-        if self.settings.completion == Completion::Measured && past.poses.len() == 1 {
+        if self.settings.completion == Completion::Measured {
             let known = &past.poses[0].known;
-            for (row, precision) in known.precision(noise).into_iter().enumerate() {
-                if precision * noise.powi(2) >= 0.999 {
-                    made[row] = known.value[row];
+            if past.poses.len() > 1 {
+                made.clone_from(&past.mean);
+            } else {
+                for (row, precision) in known.precision(noise).into_iter().enumerate() {
+                    if precision * noise.powi(2) >= 0.999 {
+                        made[row] = known.value[row];
+                    }
                 }
             }
         }
@@ -283,6 +320,7 @@ impl Recursive {
         self.past = Some(past);
         RecursiveFrame {
             image: Image::new(side, pixels),
+            first: false,
             warm: true,
             shift_px,
             speed_px: speed_px.into(),

@@ -2,8 +2,8 @@
 
 use crate::Measurements;
 use crate::reconstruct::{
-    MethodSettings, Penalty, Reconstruct, ReconstructError, Reconstruction, RegularisedSettings,
-    Report, fused_video, regularised,
+    MethodSettings, Penalty, Reconstruct, ReconstructError, Reconstruction, Recursive,
+    RecursiveSettings, RegularisedSettings, Report, fused_frame, regularised,
 };
 
 struct Penalised {
@@ -44,10 +44,15 @@ impl Reconstruct for Penalised {
         Ok(Reconstruction { image: found.image, report })
     }
 
-    fn reconstruct_video(
+    fn begin_video(&self) -> Result<Option<Recursive>, ReconstructError> {
+        Recursive::new(RecursiveSettings::default()).map(Some)
+    }
+
+    fn next_frame(
         &self,
-        frames: &[Measurements],
-    ) -> Result<Vec<Reconstruction>, ReconstructError> {
-        fused_video(self, frames)
+        past: &mut Recursive,
+        frame: &Measurements,
+    ) -> Result<Reconstruction, ReconstructError> {
+        fused_frame(self, past, frame)
     }
 }

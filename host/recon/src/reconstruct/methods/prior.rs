@@ -4,7 +4,8 @@ use crate::Measurements;
 use crate::reconstruct::method::{Entry, Setting};
 use crate::reconstruct::prior::{SharedNetwork, with_network};
 use crate::reconstruct::{
-    Completion, Method, Reconstruct, ReconstructError, Reconstruction, fused_video,
+    Completion, Method, Reconstruct, ReconstructError, Reconstruction, Recursive,
+    RecursiveSettings, fused_frame,
 };
 
 const NAME: &str = "learned prior";
@@ -37,10 +38,15 @@ impl Reconstruct for Prior {
         with_network(measurements, network, self.completion, NAME)
     }
 
-    fn reconstruct_video(
+    fn begin_video(&self) -> Result<Option<Recursive>, ReconstructError> {
+        Recursive::new(RecursiveSettings::default()).map(Some)
+    }
+
+    fn next_frame(
         &self,
-        frames: &[Measurements],
-    ) -> Result<Vec<Reconstruction>, ReconstructError> {
-        fused_video(self, frames)
+        past: &mut Recursive,
+        frame: &Measurements,
+    ) -> Result<Reconstruction, ReconstructError> {
+        fused_frame(self, past, frame)
     }
 }

@@ -46,27 +46,28 @@ impl Reconstruct for Tikhonov {
         self.alone.reconstruct(measurements)
     }
 
-    fn reconstruct_video(
-        &self,
-        frames: &[Measurements],
-    ) -> Result<Vec<Reconstruction>, ReconstructError> {
+    fn begin_video(&self) -> Result<Option<Recursive>, ReconstructError> {
         if self.basis != Basis::Dct {
             return Err(ReconstructError::Failed(format!(
                 "frames that start from the frame before need the dct basis, found {}",
                 self.basis
             )));
         }
-        let mut estimate = Recursive::new(self.video)?;
-        let each = frames.iter().enumerate().map(|(at, frame)| {
-            let made = estimate.add(frame)?;
-            let report = report(&made, at, self.video.completion);
-            Ok(Reconstruction { image: made.image, report })
-        });
-        each.collect()
+        Recursive::new(self.video).map(Some)
+    }
+
+    fn next_frame(
+        &self,
+        past: &mut Recursive,
+        frame: &Measurements,
+    ) -> Result<Reconstruction, ReconstructError> {
+        let made = past.add(frame)?;
+        let report = report(&made, self.video.completion);
+        Ok(Reconstruction { image: made.image, report })
     }
 }
 
-fn report(made: &RecursiveFrame, at: usize, completion: Completion) -> Report {
+fn report(made: &RecursiveFrame, completion: Completion) -> Report {
     let mut report = Report::new(NAME);
     report.basis = Some(Basis::Dct.to_string());
     report.strength = Some(made.strength);
@@ -74,6 +75,6 @@ fn report(made: &RecursiveFrame, at: usize, completion: Completion) -> Report {
     report.residual = Some(made.residual);
     report.noise = Some(made.noise);
     report.warm = made.warm;
-    report.note = made.note(at == 0);
+    report.note = made.note();
     report
 }

@@ -1,10 +1,10 @@
 //! What the frames so far have shown: rows, read at one position of the scene or at several.
 
 use super::motion::Shift;
+use super::noise::{self, Missed};
 use super::rows::Spectrum;
 use super::{FALLOFF, LEAST_NOISE};
 use crate::basis::Basis;
-use crate::reconstruct::selection::noise_level;
 use crate::reconstruct::{NoiseLevel, Problem};
 use crate::{Measurements, Rows, Side};
 use std::collections::VecDeque;
@@ -88,49 +88,58 @@ impl Past {
         sum
     }
 
+    /// How much of each row is known by the readings of the last position alone: 1 where the
+    /// earlier positions and the `expected` variance of the scene say nothing beside them, 0 where
+    /// they say as much. Readings then count as they are, whatever else is believed.
+    pub fn share_of_last(&self, noise: f32, expected: Option<&[f32]>) -> Vec<f32> {
+        let last = self.poses[0].known.precision(noise);
+        let all = self.information(noise);
+        let share = |(row, (last, all)): (usize, (f32, f32))| {
+            let others = (all - last).max(0.0) + expected.map_or(0.0, |prior| prior[row].recip());
+            ((last - others) / (last + others)).max(0.0)
+        };
+        last.into_iter().zip(all).enumerate().map(share).collect()
+    }
+
+    /// Replaces a share of each row of an image by the readings of the last position.
+    pub fn with_readings(&self, mut rows: Vec<f32>, share: &[f32]) -> Vec<f32> {
+        let values = self.poses[0].known.value.iter().zip(share);
+        rows.iter_mut()
+            .zip(values)
+            .for_each(|(row, (value, share))| *row += share * (value - *row));
+        rows
+    }
+
     /// The rows that are known nearly as well as by one reading, in the measurements' units.
     pub fn fused(&self, noise: f32) -> Measurements {
         let unit = self.unit * self.side.pixels() as f64;
         let information = self.information(noise);
         let values = match self.poses.len() {
-            1 => &self.poses[0].known.value,
-            _ => &self.mean,
+            1 => self.poses[0].known.value.clone(),
+            _ => self.with_readings(self.mean.clone(), &self.share_of_last(noise, None)),
         };
         let rows = (0..values.len()).filter(|&row| information[row] * noise * noise >= LEAST_FUSED);
         let (rows, values) = rows.map(|row| (row as u32, f64::from(values[row]) * unit)).unzip();
         Measurements::trusted(Rows::trusted(self.side, rows), values)
     }
 
-    /// The noise: given, or the median of the last estimates. Where the rows were known before,
-    /// what the prediction misses is an estimate too, and counts if it is clearly smaller: both
-    /// contain detail or motion of the scene.
-    pub fn noise(&mut self, problem: &Problem<'_>, predicted: &[f32], given: NoiseLevel) -> f32 {
+    /// The noise of this frame: given, or the median of the last estimates. `predicted` are the
+    /// rows after each motion that is considered.
+    pub fn noise(&mut self, problem: &Problem<'_>, predicted: &[&[f32]], given: NoiseLevel) -> f32 {
         if matches!(given, NoiseLevel::Known(_)) {
             return problem.prior.noise.max(LEAST_NOISE);
         }
-        // Where nothing moved, the rows themselves are what is expected. The image of a scene that moved
+        // If nothing has moved, the rows themselves are what is expected: the image of a scene
         // lacks what its prior has smoothed away, which would count as noise.
-        let has_moved = self.poses[0].known.changes.iter().all(|changes| changes.is_infinite());
-        let known = &self.poses[usize::from(has_moved && self.poses.len() > 1)].known;
-        let expected = if has_moved { predicted } else { &known.value };
-        let again = problem.rows.iter().zip(&problem.values);
-        let (rows, missed): (Vec<u32>, Vec<f32>) = again
-            .filter(|(row, _)| known.readings[**row as usize] <= 1.0)
-            .filter(|(row, _)| known.changes[**row as usize].is_finite())
-            .map(|(&row, value)| {
-                let at = row as usize;
-                // The value itself has a share of a reading's noise.
-                (row, (value - expected[at]) / (1.0 + known.readings[at]).sqrt())
-            })
-            .unzip();
-        let mut noise = problem.prior.noise;
-        if rows.len() >= LEAST_ROWS {
-            let again = noise_level(&Rows::trusted(self.side, rows), &missed);
-            // The smaller of two equal estimates would be too small on average.
-            if again < CLEARLY * noise {
-                noise = again;
-            }
-        }
+        let known = &self.poses[0].known;
+        let by_rows = known.missed(problem, &known.value, |readings| (1.0 + readings).sqrt());
+        // A prior has smoothed the noise of an image, which counts as none.
+        let by_images = predicted.iter().map(|rows| known.missed(problem, rows, |_| 1.0));
+        let noise = std::iter::once(by_rows)
+            .chain(by_images)
+            .fold(noise::of_frame(problem), |noise, missed| {
+                noise::of_missed(self.side, missed, noise)
+            });
         self.noises.truncate(NOISES - 1);
         self.noises.push_front(noise);
         median(&self.noises)
@@ -140,12 +149,6 @@ impl Past {
 /// Least weight of a row among the fused ones; one reading has weight 1. A method that takes all
 /// rows for equally good is led astray by rows with more noise than the others.
 const LEAST_FUSED: f32 = 0.5;
-
-/// The fewest rows measured again that give an estimate of the noise.
-const LEAST_ROWS: usize = 32;
-
-/// How much smaller an estimate of the noise must be to replace another one.
-const CLEARLY: f32 = 0.8;
 
 /// The median of some estimates of the noise.
 pub(super) fn median(noises: &VecDeque<f32>) -> f32 {
@@ -163,26 +166,61 @@ impl Known {
         Self { value, readings, changes: vec![f32::INFINITY; area] }
     }
 
+    /// What `expected` misses of the readings of the rows that were read before, as noise of one
+    /// reading.
+    /// `noises` says by how much the noise of what is expected adds to that of a reading, for a row
+    /// with this share of a reading's variance.
+    fn missed(
+        &self,
+        problem: &Problem<'_>,
+        expected: &[f32],
+        noises: impl Fn(f32) -> f32,
+    ) -> Missed {
+        let again = problem.rows.iter().zip(&problem.values);
+        let (rows, values) = again
+            .filter(|(row, _)| self.readings[**row as usize] <= 1.0)
+            .filter(|(row, _)| self.changes[**row as usize].is_finite())
+            .map(|(&row, value)| {
+                let at = row as usize;
+                (row, (value - expected[at]) / noises(self.readings[at]))
+            })
+            .unzip();
+        Missed { rows, values }
+    }
+
     /// One over the variance of each row; 0 for a row without a value.
     pub fn precision(&self, noise: f32) -> Vec<f32> {
         let parts = self.readings.iter().zip(&self.changes);
         parts.map(|(readings, changes)| (readings * noise * noise + changes).recip()).collect()
     }
 
-    /// Lets values lose weight. `kept` is the share of each row that stays from frame to frame:
-    /// the value over the share is then a reading of the new scene, whose variance has grown by
-    /// what the scene has changed.
+    /// Value, share of a reading's variance and variance from changes of a row after the scene has
+    /// changed; `None` if nothing of the row is left. `kept` is the share of the row that stays
+    /// from frame to frame: the value over the share is then a reading of the new scene, whose
+    /// variance has grown by what the scene has changed.
+    pub fn aged(&self, row: usize, kept: f32, prior: f32) -> Option<[f32; 3]> {
+        let (square, changes) = (kept * kept, self.changes[row]);
+        (kept >= LEAST_KEPT && changes.is_finite()).then(|| {
+            let changes = (changes + prior * (1.0 - square)) / square;
+            [self.value[row] / kept, self.readings[row] / square, changes]
+        })
+    }
+
+    /// Lets values lose weight.
     pub fn age(&mut self, kept: &[f32], prior: &[f32]) {
         for (row, (kept, prior)) in kept.iter().zip(prior).enumerate() {
-            let (square, changes) = (kept * kept, self.changes[row]);
-            if *kept < LEAST_KEPT || !changes.is_finite() {
-                (self.value[row], self.readings[row]) = (0.0, 0.0);
-                self.changes[row] = f32::INFINITY;
-                continue;
+            [self.value[row], self.readings[row], self.changes[row]] =
+                self.aged(row, *kept, *prior).unwrap_or([0.0, 0.0, f32::INFINITY]);
+        }
+    }
+
+    /// Multiplies the variance of each row by 1 or more.
+    pub fn doubt(&mut self, surprise: &[f32], noise: f32) {
+        let parts = self.changes.iter_mut().zip(&self.readings).zip(surprise);
+        for ((changes, readings), surprise) in parts {
+            if changes.is_finite() {
+                *changes += (surprise - 1.0) * (readings * noise * noise + *changes);
             }
-            self.value[row] /= kept;
-            self.readings[row] /= square;
-            self.changes[row] = (changes + prior * (1.0 - square)) / square;
         }
     }
 

@@ -123,6 +123,24 @@ fn the_noise_of_a_scene_that_stands_still_again_is_found_however_small_it_is() {
 }
 
 #[test]
+fn a_part_that_moves_costs_nothing_where_the_readings_have_hardly_any_noise() {
+    let side = side(32);
+    let (all, noise) = (Rows::natural(side), 0.001);
+    let still = figure(side, 0, 0);
+    let alone = RegularisedSettings::new(Penalty::Tikhonov);
+    let mut estimate = Recursive::new(RecursiveSettings::default()).unwrap();
+    for k in 0..8 {
+        let mut truth = still.clone();
+        (0..side.area()).filter(|p| p % 32 / 4 == k).for_each(|p| truth[p] = 0.6);
+        let frame = read(&all, &truth, noise, k as u64);
+        let made = estimate.add(&frame).unwrap();
+        let (found, by_itself) =
+            (rms(&made.image, &truth), rms(&regularised(&frame, &alone).unwrap().image, &truth));
+        assert!(found < 1.06 * by_itself, "frame {k}: {found} against {by_itself}");
+    }
+}
+
+#[test]
 fn a_cut_starts_anew_and_costs_nothing() {
     let side = side(32);
     let noise = 0.03;

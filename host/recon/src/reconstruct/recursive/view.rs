@@ -1,9 +1,11 @@
 //! A frame as seen from the past: how likely motions and speeds are.
 
 use super::motion::Shift;
-use super::past::{Past, median};
+use super::past::Past;
 use super::rows::Spectrum;
+use crate::Rows;
 use crate::basis::Basis;
+use crate::order::positions_by_sequency;
 use crate::reconstruct::Problem;
 
 /// Speeds to try, in pixels a frame: how far parts of the scene move that the common motion leaves
@@ -40,6 +42,46 @@ pub(super) struct Likely {
     pub speed_px: f32,
 }
 
+/// Variance of a row of which the share `kept` stays.
+fn aged(kept: f32, variance: f32, prior: f32) -> f32 {
+    let square = kept * kept;
+    square * variance + (1.0 - square) * prior
+}
+
+/// Readings in the first band of rows after the mean, and in the largest: each band has twice as
+/// many as the one before.
+const BANDS: (usize, usize) = (8, 128);
+
+/// Standard errors above which the mean of some squares is no chance.
+const NO_CHANCE: f32 = 2.0;
+
+/// Squares of what a prediction misses in a band of rows, and their expected squares.
+#[derive(Default)]
+struct Squares {
+    count: usize,
+    found: f32,
+    expected: f32,
+}
+
+impl Squares {
+    fn add(&mut self, found: f32, expected: f32) {
+        self.count += 1;
+        self.found += found;
+        self.expected += expected;
+    }
+
+    /// Variance of a row that its expected variance leaves out.
+    fn excess(&self) -> f32 {
+        let count = self.count as f32;
+        let no_chance = 1.0 + NO_CHANCE * (2.0 / count).sqrt();
+        if self.found > no_chance * self.expected {
+            (self.found - self.expected) / count
+        } else {
+            0.0
+        }
+    }
+}
+
 /// A frame as seen from the past.
 pub(super) struct View<'p> {
     pub spectrum: &'p Spectrum,
@@ -52,12 +94,17 @@ pub(super) struct View<'p> {
 }
 
 impl<'p> View<'p> {
-    pub fn new(past: &'p Past, problem: &'p Problem<'p>, speed_px: Option<f64>) -> View<'p> {
+    pub fn new(
+        past: &'p Past,
+        problem: &'p Problem<'p>,
+        noise: f32,
+        speed_px: Option<f64>,
+    ) -> View<'p> {
         let squares: Vec<f32> = problem.prior.scale.iter().map(|scale| scale * scale).collect();
         View {
             spectrum: &past.spectrum,
             problem,
-            noise: median(&past.noises),
+            noise,
             prior: past.spectrum.rows(&squares),
             speeds_px: speed_px.map_or_else(|| SPEEDS_PX.to_vec(), |speed| vec![speed as f32]),
             frequencies: Basis::Dct.frequencies(past.side),
@@ -95,9 +142,7 @@ impl<'p> View<'p> {
         let at = |&speed_px: &f32| {
             let kept = self.kept(speed_px);
             let gain = self.gain(|row| {
-                let square = kept[row] * kept[row];
-                let variance = square * variance[row] + (1.0 - square) * self.prior[row];
-                (kept[row] * guess.mean[row], variance)
+                (kept[row] * guess.mean[row], aged(kept[row], variance[row], self.prior[row]))
             });
             // One more parameter must gain what the Bayesian information criterion asks for,
             // and the best of several speeds more than that.
@@ -106,6 +151,52 @@ impl<'p> View<'p> {
         let all = self.speeds_px.iter().map(at);
         all.reduce(|a, b| if b.gain > a.gain { b } else { a })
             .unwrap_or(Likely { gain: f32::MIN, speed_px: 0.0 })
+    }
+
+    /// How many times larger than expected the variance of each row is, 1 or more, after the scene
+    /// has aged at the likeliest speed. One speed for all rows misses how a scene turns, or how a
+    /// part of it moves; the readings show by how much, for the rows of each scale.
+    pub fn surprise(&self, past: &Past, guess: &Guess, kept: &[f32]) -> Vec<f32> {
+        let noise = self.noise.powi(2);
+        let variances = guess.variance(&self.prior);
+        let stays = guess.shift == Shift::default();
+        let expected = |row: usize| {
+            // If nothing has moved, the rows themselves are what is expected: the image lacks what
+            // its prior has smoothed away.
+            let known = &past.poses[0].known;
+            match known.aged(row, kept[row], self.prior[row]).filter(|_| stays) {
+                Some([value, readings, changes]) => (value, readings * noise + changes),
+                None => {
+                    (kept[row] * guess.mean[row], aged(kept[row], variances[row], self.prior[row]))
+                }
+            }
+        };
+        let mut reading = vec![None; self.prior.len()];
+        for (&row, value) in self.problem.rows.iter().zip(&self.problem.values) {
+            reading[row as usize] = Some(*value);
+        }
+        let by_sequency = positions_by_sequency(&Rows::natural(self.problem.side));
+        let mut surprise = vec![1.0; self.prior.len()];
+        let (mut rows, mut size, mut excess) = (Vec::new(), 1, 0.0);
+        let mut squares = Squares::default();
+        for (at, &row) in std::iter::once(&0).chain(&by_sequency).enumerate() {
+            rows.push(row);
+            let (mean, variance) = expected(row);
+            if let Some(value) = reading[row] {
+                squares.add((value - mean).powi(2), variance + noise);
+            }
+            let is_last = at == by_sequency.len();
+            if squares.count == size || is_last {
+                if squares.count * 2 >= size {
+                    excess = squares.excess();
+                }
+                for row in rows.drain(..) {
+                    surprise[row] = 1.0 + excess / expected(row).1;
+                }
+                (size, squares) = (BANDS.0.max((2 * size).min(BANDS.1)), Squares::default());
+            }
+        }
+        surprise
     }
 
     /// How likely the frame is without a past.
