@@ -388,7 +388,7 @@ step_mie() {
 }
 
 step_mutations() {
-    cargo test --locked -p nirspi-hdl-sim -p nirspi-tests-rtl --test rtl every_deliberate -- --ignored
+    cargo test --locked -p nirspi-hdl-sim -p nirspi-tests-rtl --test rtl every_deliberate -- --ignored --nocapture
 }
 
 # One fault after another in a copy of the tree, each against the tests of its own crate: docs/mutants.md. Crates in
