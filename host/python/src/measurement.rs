@@ -177,12 +177,7 @@ pub fn readings<'py>(
     shown: PyReadonlyArray1<'py, i64>,
     y: PyReadonlyArray1<'py, f64>,
     form: &str,
-) -> PyResult<(
-    Bound<'py, PyArray1<i64>>,
-    Bound<'py, PyArray1<f64>>,
-    Vec<Lost>,
-    Vec<String>,
-)> {
+) -> PyResult<(Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<f64>>, Vec<Lost>, Vec<String>)> {
     let form = word::<Form>("readings", form)?;
     let rows = rows(side(n)?, &shown)?;
     let y = slice(&y)?;

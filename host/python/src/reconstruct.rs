@@ -232,7 +232,9 @@ pub fn reconstruct<'py>(
                 frames.map(taken).collect::<PyResult<Vec<_>>>()?.into_iter().unzip();
             let made = ready.reconstruct_video(&used).map_err(of_method)?;
             let parts = made.into_iter().zip(used.iter().zip(orders));
-            parts.map(|(made, (used, order))| Made::new(made, used, order)).collect::<PyResult<_>>()?
+            parts
+                .map(|(made, (used, order))| Made::new(made, used, order))
+                .collect::<PyResult<_>>()?
         } else {
             let one = |d| match stop.load(Ordering::Relaxed) {
                 true => Err(stopped()),
