@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from nirspi.bench import file, omp
 
 
