@@ -14,7 +14,7 @@
 //! | 10 | device time in us | padded |
 //! | 5 | sweeps | padded |
 //! | 3 | [`FrameFlags`] | padded |
-//! | 1 | 0: 32 bits and no shift; [`NARROW`](crate::samples::NARROW): 24 bits | byte |
+//! | 1 | 0: 32 bits and no shift; [`NARROW`]: 24 bits | byte |
 //! | 2 | 4 M or 3 M, for M patterns | padded |
 //! | 4 M or 3 M | positive less negative sum of each pattern in the order shown | little-endian, signed |
 //! | 4 | CRC-32 of all before | little-endian |
