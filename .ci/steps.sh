@@ -325,7 +325,8 @@ step_web() {
     debian chromium || echo "no chromium installed here"
     if [ -x /usr/bin/chromium ]; then
         cargo build --locked --release
-        # Of the units of step `test`: a release build of an example has other features than the program's.
+        # Step `test` has built what it needs. A release build of an example has other features than the program, and would
+        # build the networks, the GPU kernels and the program once more.
         cargo build --locked --example in_turns
         python_with browser playwright==1.65.2
         local built=${CARGO_TARGET_DIR:-target}

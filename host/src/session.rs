@@ -80,11 +80,6 @@ impl From<&Identity<'_>> for CameraIdentity {
     }
 }
 
-/// The name of [`Capabilities::BRING_UP`].
-const BRING_UP: &str = "bring-up";
-/// The name of [`Capabilities::NARROW_SAMPLES`].
-const NARROW_SAMPLES: &str = "24-bit samples";
-
 /// The name of each capability; the number of the bit for a capability that this program does not
 /// know.
 fn in_words(capabilities: Capabilities) -> Vec<String> {
@@ -192,11 +187,13 @@ impl Session {
         match identity {
             Ok(identity) if version::speaks(identity.protocol) => {
                 // Every command shows it: such a picture is not of the scene.
-                let can = |name| identity.capabilities.iter().any(|word| word == name);
-                if can(NARROW_SAMPLES) {
+                let can = |wanted| {
+                    in_words(wanted).iter().all(|name| identity.capabilities.contains(name))
+                };
+                if can(Capabilities::NARROW_SAMPLES) {
                     conversation.ask_narrow();
                 }
-                if can(BRING_UP) {
+                if can(Capabilities::BRING_UP) {
                     let what = design_in_words(Design::BringUp);
                     reports.keep(Some(format!("the camera runs the gateware for {what}")));
                 }

@@ -33,6 +33,15 @@ def test_several_measurements_keep_their_leading_axes():
     assert images.shape == (2, 3, N, N) and np.allclose(images, scenes, atol=1e-4)
 
 
+@pytest.mark.parametrize("copy", [True, False])
+def test_a_measurement_shares_the_memory_of_its_array_only_if_told_to(copy):
+    d = of(asymmetric(N))
+    found = ns.Measurement(d=d, rows="zig-zag", n=N, copy=copy)
+    assert np.shares_memory(found.d, d) is not copy
+    d[3] = np.nan
+    assert np.isnan(found.d[3]) == (not copy)
+
+
 def test_a_pattern_that_was_not_read_is_left_out():
     scene = asymmetric(N)
     d, rows = of(scene), ns.order("zig-zag", N).copy()

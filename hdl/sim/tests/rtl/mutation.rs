@@ -149,7 +149,7 @@ const FAULTS: &[Fault] = &[
     ("the lines keep the last byte", "parallel_port", "if taken ? octet : 0;", "if taken ? octet : lines;"),
     ("a period has four clocks", "parallel_port", "if phase == 2 {\n                phase  = 0;", "if phase == 3 {\n                phase  = 0;"),
     ("the host's release gives the parallel port's frame back", "engine", "if parallel ? sent : give_back,", "sent || give_back,"),
-    ("a frame of the parallel port is told to the host", "engine", "assign frame_ready = waits && !parallel;", "assign frame_ready = waits;"),
+    ("the host sees a frame of the parallel port as ready", "engine", "assign frame_ready = waits && !parallel;", "assign frame_ready = waits;"),
     ("bytes of the parallel port go to the host too", "engine", "packet_valid && !parallel || format_valid;", "packet_valid || format_valid;"),
     ("a read of the host ends the packet of the parallel port", "engine", "close      : opens_any && !parallel,", "close      : opens_any,"),
     ("the parallel port is never on", "registers", "parallel         = (mode & MODE_PARALLEL) != 0;", "parallel         = 0;"),

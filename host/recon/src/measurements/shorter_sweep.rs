@@ -10,11 +10,13 @@ use crate::{Order, Rows};
 /// use nirspi_recon::{Measurements, Order, Rows, ShorterSweep, Side};
 ///
 /// let rows = Rows::natural(Side::INSTRUMENT);
-/// let frames = [1.0, 2.0].map(|level| Measurements::from_differential(&rows, &[level; 1024]));
 /// let half = ShorterSweep::new(&rows, Some(&Order::ZigZag), 0.5)?;
-/// for frame in frames {
-///     let frame = frame?;
-///     assert_eq!(half.of(&frame), frame.take(Some(&Order::ZigZag), 0.5)?);
+/// assert_eq!(*half.rows(), Order::ZigZag.rows(Side::INSTRUMENT)?.first(512));
+/// // Frames in which the reading of each row is the row's number, times a factor.
+/// for factor in [1.0, 2.0] {
+///     let values: Vec<f64> = rows.iter().map(|&row| factor * f64::from(row)).collect();
+///     let taken = half.of(&Measurements::from_differential(&rows, &values)?);
+///     assert!(taken.values().iter().zip(half.rows().iter()).all(|(&v, &row)| v == factor * f64::from(row)));
 /// }
 /// # Ok::<(), nirspi_recon::MeasurementError>(())
 /// ```

@@ -245,7 +245,7 @@ fn a_picture_of_a_palette_that_would_take_too_much_memory_is_refused_before_it_t
         encoder.set_depth(::png::BitDepth::One);
         encoder.set_palette(vec![0, 0, 0, 255, 255, 255]);
         let mut writer = encoder.write_header().unwrap();
-        // The pixels are missing: whoever gets as far as to miss them has taken the memory.
+        // The pixels are missing. A decoder that reports this has already taken the memory for them.
         writer.write_chunk(::png::chunk::IDAT, &[]).unwrap();
         drop(writer);
         line(&read(&bytes).unwrap_err(), "scene.png")

@@ -84,7 +84,10 @@ impl Rig {
             self.opened += 1;
         }
         if self.bench.is("taken") {
-            assert!(valid && self.ready, "a byte taken that is not there, or for nobody");
+            assert!(
+                valid && self.ready,
+                "a byte taken that is not there, or while the receiver is not ready"
+            );
             self.given = self.given.map(|at| at + 1);
             self.pause = dice.range(2, self.pace);
         }
@@ -155,7 +158,9 @@ fn a_period_has_a_byte_if_and_only_if_there_is_one_and_the_receiver_is_ready(pro
             assert_eq!(rig.lines[period..][..3], [byte; 3], "the lines stand for the period");
             let (ready, valid) = rig.asked[period - 1];
             match byte {
-                Some(byte) => assert!(ready && (byte == 0 || valid), "nobody asked for {byte:#x}"),
+                Some(byte) => {
+                    assert!(ready && (byte == 0 || valid), "sent without need: {byte:#x}")
+                }
                 None => assert!(!(ready && valid), "a byte was there, and the receiver ready"),
             }
             with += u64::from(byte.is_some());
