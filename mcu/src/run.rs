@@ -424,6 +424,7 @@ impl Run {
                 let device_time_us = self.anchor.time_of(header.clock).0;
                 let set = Channels { run: path.counters.run, device_time_us, of: header };
                 set.send(path.scratch, bus, sink);
+                path.meter.restore(|| bus.frame().ok().flatten(), path.scratch);
             }
             *release_pending = fpga::release(bus).is_err();
             return true;

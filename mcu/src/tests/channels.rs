@@ -1,8 +1,9 @@
 //! Tests of the frames of further detectors.
 
 use super::support::*;
+use nirspi_wire::fpga::{CRC_BYTES, HEADER_BYTES};
 use nirspi_wire::{
-    Answer, Channel, Command, DeviceMessage, Frame, Identity, RunLength, Tail, version,
+    Answer, Channel, Command, DeviceMessage, Frame, Identity, RunLength, Tail, crc32, version,
 };
 use std::vec;
 use std::vec::Vec;
@@ -10,9 +11,20 @@ use std::vec::Vec;
 /// A camera of three detectors that measures, for a host of this protocol version. Detector 2 has the frame of detector
 /// 0, and detector 1 the frame that `other` makes of it.
 fn three(protocol: u16, other: impl Fn(&mut Vec<u8>)) -> (Identity<'static>, Bench) {
+    cameras(2, protocol, other)
+}
+
+/// Such a camera with this many further detectors.
+fn cameras(
+    further: usize,
+    protocol: u16,
+    other: impl Fn(&mut Vec<u8>),
+) -> (Identity<'static>, Bench) {
     let mut bench = Bench::new();
-    bench.fpga.channels = vec![Vec::new(); 2];
-    bench.fpga.make_packets();
+    bench.fpga.channels = vec![Vec::new(); further];
+    if further > 0 {
+        bench.fpga.make_packets();
+    }
     let Ok(Answer::Hello(identity)) = bench.ask(Command::Hello { protocol }) else {
         panic!("no session");
     };
@@ -24,7 +36,7 @@ fn three(protocol: u16, other: impl Fn(&mut Vec<u8>)) -> (Identity<'static>, Ben
         let frame = bench.fpga.frame.clone().unwrap();
         let mut first = frame.clone();
         other(&mut first);
-        bench.fpga.channels = vec![first, frame];
+        bench.fpga.channels = [first, frame].into_iter().take(further).collect();
         bench.after(100);
     }
     (identity, bench)
@@ -81,4 +93,21 @@ fn a_full_link_sends_no_further_detector_without_the_first() {
     bench.after(100);
     assert_eq!(numbers(&bench.heard()), []);
     assert_eq!(bench.status().frames_dropped, 1);
+}
+
+/// The memory of packed samples holds the samples of the last detector when the next frame of detector 0 comes.
+#[test]
+fn the_signal_meter_compares_frames_of_detector_0_whatever_the_others_see() {
+    let dark = |frame: &mut Vec<u8>| {
+        let end = frame.len() - CRC_BYTES;
+        frame[HEADER_BYTES..end].fill(0);
+        let crc = crc32(&frame[..end]).to_le_bytes();
+        frame[end..].copy_from_slice(&crc);
+    };
+    let [alone, beside] = [0, 1].map(|further| {
+        let (_, mut bench) = cameras(further, version::CURRENT, dark);
+        assert_eq!(numbers(&bench.heard()).len(), 2 * (1 + further));
+        bench.status().signal.0.unwrap().unwrap()
+    });
+    assert_eq!(beside, alone);
 }
