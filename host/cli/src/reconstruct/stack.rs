@@ -148,7 +148,7 @@ fn say(args: &Args, report: &Report) -> Result<()> {
     let warm = report.frames.iter().filter(|frame| frame.warm).count();
     let what = if args.source.detector == Some(Index::All) { "detector" } else { "frame" };
     print::line(format_args!(
-        "{}: {} of {} x {}, order {}, {warm} started from the frame before, {:.2} ms a {what}",
+        "{}: {} of {} x {}, order {}, {warm} started from the frame before, {:.3} ms a {what}",
         report.input.display(),
         count_of(report.frames.len(), what),
         report.n,
