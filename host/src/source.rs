@@ -10,7 +10,7 @@ use crate::recording::RecordingError;
 use crate::session::CameraIdentity;
 use crate::tally::Misfit;
 use nirspi_recon::{
-    Dropout, Image, MeasurementError, Measurements, Order, Rows, ShorterSweep, Side, reconstruct,
+    Dropout, Image, MeasurementError, Measurements, Order, Rows, ShorterSweep, reconstruct,
 };
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -18,9 +18,11 @@ use std::str::FromStr;
 use thiserror::Error;
 
 mod recording;
+mod several;
 
 pub(crate) use recording::of_sum;
 use recording::{detectors_of_recording, frames_of_recording, from_recording};
+pub use several::Several;
 
 /// How to read measurements.
 #[derive(Debug, Clone, Default)]
@@ -328,9 +330,7 @@ impl Source {
                 _ => frames_of_recording(path, options),
             };
         }
-        let mut file = measurement::Several::open(path, &options.file)?;
-        fits_together(path, file.len(), file.patterns(), file.side())?;
-        (0..file.len()).map(|index| from_file(path, file.read(index)?, options.part)).collect()
+        Several::open(path, options)?.each()
     }
 
     /// The measurements, for uses that need real ones.
@@ -487,25 +487,6 @@ fn from_file(path: &Path, file: MeasurementFile, part: Part) -> Result<Source, S
         notes,
         flat_field,
     })
-}
-
-/// The most memory for the measurements and images of a whole file.
-const MOST_BYTES: u64 = 4 << 30;
-
-/// Checks that all measurements and their images fit into memory together: for each pattern a row and its
-/// reading, for each pixel the image as it is computed and as it is written.
-fn fits_together(
-    path: &Path,
-    count: usize,
-    patterns: usize,
-    side: Side,
-) -> Result<(), SourceError> {
-    let each = 512 + 24 * patterns as u64 + 12 * side.area() as u64;
-    let most = MOST_BYTES / each;
-    match count as u64 <= most {
-        true => Ok(()),
-        false => Err(SourceError::TooMany { path: path.to_owned(), count, most }),
-    }
 }
 
 /// The part of a complex reference to compare with; for real readings, the real part.

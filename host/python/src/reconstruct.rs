@@ -3,7 +3,7 @@
 //! # Invariant
 //! An image is that of `nirspi reconstruct` on the same measurement, to the bit (`test_cli.py`).
 
-use crate::arrays::{array, rows, side, slice, whole};
+use crate::arrays::{array, fill, room, rows, side, slice, whole};
 use crate::errors::{refusal, refused};
 use crate::orders::named;
 use crate::work::{backend, long};
@@ -12,10 +12,10 @@ use nirspi::reconstruct::Recipe;
 use nirspi::source::FirstPatterns;
 use nirspi_recon::reconstruct::{
     MatrixSettings, Method, MethodSettings, OwnAtoms, OwnMatrix, ReconstructError, Reconstruction,
-    Setting, Sparsity, Strength,
+    Report, Setting, Sparsity, Strength,
 };
 use nirspi_recon::{Basis, Measurements, Rows, Sampling, SamplingError, Side};
-use numpy::{PyArray1, PyReadonlyArray1};
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
@@ -136,7 +136,8 @@ impl Options<'_> {
 
 /// The measurements of a frame without the patterns that were not read (NaN).
 fn frame(rows: &Rows, d: &[f64]) -> PyResult<Measurements> {
-    if !d.iter().any(|value| value.is_nan()) {
+    // Without an early end, so that the compiler uses vectors.
+    if !d.iter().fold(false, |nan, value| nan | value.is_nan()) {
         return Measurements::from_differential(rows, d).map_err(refusal);
     }
     let read = || rows.iter().zip(d).filter(|(_, value)| !value.is_nan());
@@ -156,31 +157,38 @@ fn of_method(error: ReconstructError) -> PyErr {
     refusal(error)
 }
 
-/// An image, and what it was made of.
+/// What an image was made of.
 struct Made {
-    made: Reconstruction,
+    report: Report,
     used: Rows,
     order: String,
 }
 
 impl Made {
-    /// Refuses an image that 32-bit floats cannot hold.
-    fn new(made: Reconstruction, used: &Measurements, order: String) -> PyResult<Self> {
-        if !made.image.pixels().iter().all(|pixel| pixel.is_finite()) {
+    /// Writes an image to its place. Refuses an image that 32-bit floats cannot hold.
+    fn new(
+        made: Reconstruction,
+        used: &Measurements,
+        order: String,
+        place: &mut [f32],
+    ) -> PyResult<Self> {
+        // Without an early end, so that the compiler uses vectors.
+        if !made.image.pixels().iter().fold(true, |finite, pixel| finite & pixel.is_finite()) {
             return Err(refused("the readings are too large for an image of 32-bit floats"));
         }
-        Ok(Self { made, used: used.rows().clone(), order })
+        place.copy_from_slice(made.image.pixels());
+        Ok(Self { report: made.report, used: used.rows().clone(), order })
     }
 
     fn has_report_of(&self, other: &Self) -> bool {
-        self.made.report == other.made.report
+        self.report == other.report
             && self.used.len() == other.used.len()
             && self.order == other.order
     }
 
     /// The report as JSON.
     fn report(&self, method: Method) -> PyResult<String> {
-        let made = &self.made.report;
+        let made = &self.report;
         let named = MethodReport { method, made: made.clone() };
         let mut report =
             serde_json::to_value(&named).map_err(|error| refused(error.to_string()))?;
@@ -192,8 +200,8 @@ impl Made {
     }
 }
 
-/// The images of frames of differences, a report of each as JSON, and the rows used: of each, or those of all if they are
-/// the same.
+/// The images of frames of differences; reports as JSON, each with the number of images in a row that it is of; and the
+/// rows used: of each image, or those of all if they are the same.
 #[pyfunction]
 #[expect(clippy::type_complexity, reason = "a tuple for Python")]
 pub fn reconstruct<'py>(
@@ -202,7 +210,7 @@ pub fn reconstruct<'py>(
     shown: PyReadonlyArray1<'py, i64>,
     d: PyReadonlyArray1<'py, f64>,
     options: &Bound<'py, PyDict>,
-) -> PyResult<(Bound<'py, PyArray1<f32>>, Vec<String>, Vec<Bound<'py, PyArray1<i64>>>)> {
+) -> PyResult<(Bound<'py, PyArray1<f32>>, Vec<(String, usize)>, Vec<Bound<'py, PyArray1<i64>>>)> {
     let options: Options<'_> = options.extract()?;
     let (method, settings) = (options.method()?, options.settings()?);
     let (first, sampling) = (options.first()?, options.sampling()?);
@@ -214,8 +222,11 @@ pub fn reconstruct<'py>(
     settings.check(method).map_err(of_method)?;
     let rows = rows(side(n)?, &shown)?;
     let d = slice(&d)?;
-    whole("d", d.len(), rows.len())?;
-    let (pixels, reports, mut shown) = long(py, |stop| {
+    let area = rows.side().area();
+    let pixels = room::<f32>(py, whole("d", d.len(), rows.len())? * area)?;
+    let mut place = pixels.readwrite();
+    let places = fill(&mut place)?;
+    let (reports, mut shown) = long(py, |stop| {
         let ready = method.prepare(&settings).map_err(of_method)?;
         // Worked out once, for all frames without a pattern that was not read.
         let (whole, name) = first.among(&rows, sampling).map_err(refusal)?;
@@ -233,39 +244,33 @@ pub fn reconstruct<'py>(
             let made = ready.reconstruct_video(&used).map_err(of_method)?;
             let parts = made.into_iter().zip(used.iter().zip(orders));
             parts
-                .map(|(made, (used, order))| Made::new(made, used, order))
+                .zip(places.chunks_exact_mut(area))
+                .map(|((made, (used, order)), place)| Made::new(made, used, order, place))
                 .collect::<PyResult<_>>()?
         } else {
-            let one = |d| match stop.load(Ordering::Relaxed) {
+            let one = |(d, place): (&[f64], &mut [f32])| match stop.load(Ordering::Relaxed) {
                 true => Err(stopped()),
                 false => {
                     let (used, order) = taken(d)?;
                     let made = ready.reconstruct(&used).map_err(of_method)?;
-                    Made::new(made, &used, order)
+                    Made::new(made, &used, order, place)
                 }
             };
-            frames.map(one).collect::<PyResult<_>>()?
+            frames.zip(places.par_chunks_exact_mut(area)).map(one).collect::<PyResult<_>>()?
         };
-        let mut pixels = Vec::with_capacity(made.len() * rows.side().area());
-        let mut reports: Vec<String> = Vec::with_capacity(made.len());
-        for (k, one) in made.iter().enumerate() {
-            pixels.extend_from_slice(one.made.image.pixels());
-            // The reports of a simple method are all the same.
-            let before = k.checked_sub(1).filter(|&before| one.has_report_of(&made[before]));
-            let report = match before {
-                Some(before) => reports[before].clone(),
-                None => one.report(method)?,
-            };
-            reports.push(report);
-        }
+        // The reports of a simple method are all the same.
+        let alike = made.chunk_by(|one, next| next.has_report_of(one));
+        let reports = alike.map(|alike| Ok((alike[0].report(method)?, alike.len())));
+        let reports = reports.collect::<PyResult<Vec<_>>>()?;
         let shown: Vec<Rows> = made.into_iter().map(|one| one.used).collect();
-        Ok((pixels, reports, shown))
+        Ok((reports, shown))
     })?;
+    drop(place);
     if shown.windows(2).all(|two| two[0] == two[1]) {
         shown.truncate(1);
     }
     let numbers = |rows: &Rows| array(py, rows.iter().map(|&row| i64::from(row)).collect());
-    Ok((array(py, pixels), reports, shown.iter().map(numbers).collect()))
+    Ok((pixels, reports, shown.iter().map(numbers).collect()))
 }
 
 /// The images of readings by patterns of one's own, and a report of each as JSON.

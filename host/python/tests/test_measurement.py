@@ -33,6 +33,48 @@ def test_several_measurements_keep_their_leading_axes():
     assert images.shape == (2, 3, N, N) and np.allclose(images, scenes, atol=1e-4)
 
 
+@pytest.mark.parametrize("not_read", [False, True])
+def test_differences_lie_one_measurement_after_another(not_read):
+    rows = ns.order("zig-zag", N)
+    rows[3] = -1 if not_read else rows[3]
+    for d in (np.zeros((5, N * N)), np.zeros((5, N * N), order="F"), np.zeros((5, N * N), np.float32)):
+        assert ns.Measurement(d=d, rows=rows, n=N).d.flags.c_contiguous
+
+
+@pytest.mark.parametrize("order", ["C", "F"])
+@pytest.mark.parametrize("save", [np.savez, np.savez_compressed])
+def test_all_measurements_of_a_file_are_those_that_are_read_one_by_one(tmp_path, save, order):
+    random = np.random.default_rng(5)
+    rows = ns.order("cake-cutting", N)
+    # More than one thread reads a file of this size.
+    d = random.normal(size=(2100, N * N))
+    d[7, 3] = d[2099, 0] = np.nan
+    path = tmp_path / "many.npz"
+    images = random.normal(size=(2100, N, N)).astype(np.float32)
+    save(path, n=N, h_row=rows, d=np.asarray(d, order=order), recon=images)
+    every = ns.load(path, index="all")
+    assert np.array_equal(every.reference, images)
+    assert np.array_equal(every.d, d, equal_nan=True) and every.d.flags.c_contiguous
+    assert every.rows.tolist() == rows.tolist() and len(every.dropouts) == 2100 == len(every)
+    for k in (0, 7, 1024, 2099):
+        one = ns.load(path, index=k)
+        assert np.array_equal(one.d, d[k][~np.isnan(d[k])])
+        assert one.rows.tolist() == rows[~np.isnan(d[k])].tolist()
+    again = pickle.loads(pickle.dumps(every[:3]))
+    assert np.array_equal(again.d, d[:3]) and again.n == N
+
+
+def test_a_pattern_that_no_measurement_of_a_file_has_read_is_left_out(tmp_path):
+    rows = ns.order("zig-zag", N)
+    d = np.arange(3.0 * N * N).reshape(3, -1)
+    d[:, 5] = np.nan
+    d[1, 9] = np.nan
+    np.savez(tmp_path / "m.npz", n=N, h_row=rows, d=d)
+    found = ns.load(tmp_path / "m.npz", index="all")
+    assert found.not_read.tolist() == [5] and found.rows.tolist() == np.delete(rows, 5).tolist()
+    assert np.array_equal(found.d, np.delete(d, 5, axis=1), equal_nan=True)
+
+
 @pytest.mark.parametrize("copy", [True, False])
 def test_a_measurement_shares_the_memory_of_its_array_only_if_told_to(copy):
     d = of(asymmetric(N))

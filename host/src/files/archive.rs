@@ -2,20 +2,21 @@
 //!
 //! # Invariant
 //! A member is opened only when its field is read. Other members (text, pickled objects, large
-//! images) cost nothing (`measurement::tests::a_good_file_reads_however_it_was_zipped`). An opened
-//! member is read to its end, so its checksum is always verified
+//! images) cost nothing (`measurement::tests::a_good_file_reads_however_it_was_zipped`). A member whose
+//! numbers are read is read to its end, so the checksum of numbers is always verified
 //! (`measurement::tests::a_changed_reading_is_caught_by_the_checksum`).
 
 use super::FileError;
 use super::array::{ArrayError, Header, Sample, has_shape, shape_text};
 use super::fields::Field;
 use super::plain::{kind_by_start, open_file};
+use super::stored::Stored;
 use std::fs::File;
 use std::io::{BufReader, Cursor, Read, Seek};
 use std::path::{Path, PathBuf};
 use zip::read::ZipFile;
 use zip::write::SimpleFileOptions;
-use zip::{ZipArchive, ZipWriter};
+use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
 /// The kind of file that a path should lead to, for error messages.
 const EXPECTED: &str = "a NumPy .npz archive";
@@ -113,6 +114,47 @@ impl Archive {
         Ok(Field { shape, real, imaginary })
     }
 
+    /// The shape of a field whose numbers are not read yet. `accept` is that of
+    /// [`numbers`](Self::numbers).
+    pub(super) fn shape(
+        &mut self,
+        field: &str,
+        accept: impl FnOnce(&[u64]) -> Result<(), String>,
+    ) -> Result<Vec<usize>, FileError> {
+        let (shape, ()) = self.member(field, accept, |header, _| {
+            header.data_bytes(MAX_FIELD_BYTES)?;
+            header.fits::<f64>(MAX_MEMORY_BYTES)
+        })?;
+        Ok(shape)
+    }
+
+    /// A field whose real numbers lie in the file as they are; `None` for any other field.
+    pub(super) fn stored(&mut self, field: &str) -> Result<Option<Stored>, FileError> {
+        let path = self.path.clone();
+        let (_, found) = self.member(
+            field,
+            |_| Ok(()),
+            |header, member| {
+                let bytes = header.data_bytes(MAX_FIELD_BYTES)?;
+                let as_it_is = member.compression() == CompressionMethod::Stored
+                    && !member.encrypted()
+                    && header.is_plain()
+                    && member.size() == header.header_bytes + bytes
+                    && member.compressed_size() == member.size();
+                let start = member.data_start().filter(|_| as_it_is);
+                Ok(start.map(|start| Stored {
+                    path,
+                    field: field.to_owned(),
+                    header: header.clone(),
+                    start,
+                    crc32: member.crc32(),
+                    count: bytes as usize / header.number_bytes(),
+                }))
+            },
+        )?;
+        Ok(found)
+    }
+
     fn member<D>(
         &mut self,
         field: &str,
@@ -161,6 +203,6 @@ pub(crate) fn encode(path: &Path, members: &[(&str, Vec<u8>)]) -> Result<Vec<u8>
     Ok(bytes.into_inner())
 }
 
-fn damaged(path: &Path, found: String) -> FileError {
+pub(super) fn damaged(path: &Path, found: String) -> FileError {
     FileError::Damaged { path: path.to_owned(), found, expected: EXPECTED }
 }

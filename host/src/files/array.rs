@@ -147,6 +147,23 @@ impl Header {
         Ok(self.in_c_order(self.dtype.decode(&bytes)))
     }
 
+    /// Whether the data are real numbers in C order: each number is decoded by itself.
+    pub(super) fn is_plain(&self) -> bool {
+        let in_order =
+            !self.fortran_order || self.shape.iter().filter(|&&axis| axis != 1).count() < 2;
+        self.dtype.kind != Kind::Complex && in_order
+    }
+
+    /// Bytes of one number.
+    pub(super) fn number_bytes(&self) -> usize {
+        self.dtype.size
+    }
+
+    /// Converts the bytes of as many numbers as there are places.
+    pub(super) fn decode_into<T: Sample>(&self, bytes: &[u8], out: &mut [T]) {
+        self.dtype.decode_into(bytes, out);
+    }
+
     /// Refuses an array whose elements, as `T`, take more than `limit_bytes` of memory. A byte of a packed
     /// file can become a thousand numbers of eight bytes.
     pub(super) fn fits<T>(&self, limit_bytes: u64) -> Result<(), ArrayError> {
@@ -301,20 +318,26 @@ impl Dtype {
     }
 
     fn decode<T: Sample>(self, bytes: &[u8]) -> Vec<T> {
+        let mut values = vec![T::from_f64(0.0); bytes.len() / self.size];
+        self.decode_into(bytes, &mut values);
+        values
+    }
+
+    fn decode_into<T: Sample>(self, bytes: &[u8], out: &mut [T]) {
         match (self.kind, self.size) {
-            (Kind::Bool, _) => self.each(bytes, |[b]| f64::from(u8::from(b != 0))),
-            (Kind::Signed, 1) => self.each(bytes, |b| f64::from(i8::from_le_bytes(b))),
-            (Kind::Signed, 2) => self.each(bytes, |b| f64::from(i16::from_le_bytes(b))),
-            (Kind::Signed, 4) => self.each(bytes, |b| f64::from(i32::from_le_bytes(b))),
-            (Kind::Signed, _) => self.each(bytes, |b| i64::from_le_bytes(b) as f64),
-            (Kind::Unsigned, 1) => self.each(bytes, |b| f64::from(u8::from_le_bytes(b))),
-            (Kind::Unsigned, 2) => self.each(bytes, |b| f64::from(u16::from_le_bytes(b))),
-            (Kind::Unsigned, 4) => self.each(bytes, |b| f64::from(u32::from_le_bytes(b))),
-            (Kind::Unsigned, _) => self.each(bytes, |b| u64::from_le_bytes(b) as f64),
-            (Kind::Float, 2) => self.each(bytes, |b| half_to_f64(u16::from_le_bytes(b))),
-            (Kind::Float, 4) => self.each(bytes, |b| f64::from(f32::from_le_bytes(b))),
+            (Kind::Bool, _) => self.each(bytes, out, |[b]| f64::from(u8::from(b != 0))),
+            (Kind::Signed, 1) => self.each(bytes, out, |b| f64::from(i8::from_le_bytes(b))),
+            (Kind::Signed, 2) => self.each(bytes, out, |b| f64::from(i16::from_le_bytes(b))),
+            (Kind::Signed, 4) => self.each(bytes, out, |b| f64::from(i32::from_le_bytes(b))),
+            (Kind::Signed, _) => self.each(bytes, out, |b| i64::from_le_bytes(b) as f64),
+            (Kind::Unsigned, 1) => self.each(bytes, out, |b| f64::from(u8::from_le_bytes(b))),
+            (Kind::Unsigned, 2) => self.each(bytes, out, |b| f64::from(u16::from_le_bytes(b))),
+            (Kind::Unsigned, 4) => self.each(bytes, out, |b| f64::from(u32::from_le_bytes(b))),
+            (Kind::Unsigned, _) => self.each(bytes, out, |b| u64::from_le_bytes(b) as f64),
+            (Kind::Float, 2) => self.each(bytes, out, |b| half_to_f64(u16::from_le_bytes(b))),
+            (Kind::Float, 4) => self.each(bytes, out, |b| f64::from(f32::from_le_bytes(b))),
             // Complex numbers are decoded part by part.
-            (Kind::Float | Kind::Complex, _) => self.each(bytes, f64::from_le_bytes),
+            (Kind::Float | Kind::Complex, _) => self.each(bytes, out, f64::from_le_bytes),
         }
     }
 
@@ -322,19 +345,17 @@ impl Dtype {
     fn each<T: Sample, const N: usize>(
         self,
         bytes: &[u8],
+        out: &mut [T],
         number: impl Fn([u8; N]) -> f64,
-    ) -> Vec<T> {
+    ) {
         let (elements, _) = bytes.as_chunks::<N>();
-        elements
-            .iter()
-            .map(|&element| {
-                let mut element = element;
-                if self.big_endian {
-                    element.reverse();
-                }
-                T::from_f64(number(element))
-            })
-            .collect()
+        for (out, &element) in out.iter_mut().zip(elements) {
+            let mut element = element;
+            if self.big_endian {
+                element.reverse();
+            }
+            *out = T::from_f64(number(element));
+        }
     }
 }
 
@@ -353,6 +374,35 @@ fn half_to_f64(bits: u16) -> f64 {
 
 /// Reorders elements stored with the first axis fastest into C order, with the last axis fastest.
 pub(super) fn to_c_order<T: Copy>(values: &[T], shape: &[usize]) -> Vec<T> {
+    let axes: Vec<usize> = shape.iter().copied().filter(|&axis| axis != 1).collect();
+    match axes[..] {
+        [] | [_] => values.to_vec(),
+        [rows, columns] => transposed(values, rows, columns),
+        _ => one_by_one(values, &axes),
+    }
+}
+
+/// Side of the squares in which a matrix is transposed: both sides of a square stay in a
+/// processor's first cache.
+const SQUARE: usize = 32;
+
+/// A matrix of `rows` by `columns`, stored column by column, row by row.
+fn transposed<T: Copy>(values: &[T], rows: usize, columns: usize) -> Vec<T> {
+    let mut made = values.to_vec();
+    for (band, made) in made.chunks_mut(SQUARE * columns).enumerate() {
+        for left in (0..columns).step_by(SQUARE) {
+            for (r, row) in made.chunks_exact_mut(columns).enumerate() {
+                let end = columns.min(left + SQUARE);
+                for (c, place) in row[left..end].iter_mut().enumerate() {
+                    *place = values[(left + c) * rows + band * SQUARE + r];
+                }
+            }
+        }
+    }
+    made
+}
+
+fn one_by_one<T: Copy>(values: &[T], shape: &[usize]) -> Vec<T> {
     let mut index = vec![0; shape.len()];
     let strides: Vec<usize> = shape
         .iter()

@@ -11,6 +11,7 @@ use super::hdf5::Hdf5;
 use super::mat::Mat;
 use super::npy;
 use super::plain::{kind_by_start, open_file};
+use super::stored::Stored;
 use super::text;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -155,6 +156,31 @@ impl Fields {
 }
 
 impl Fields {
+    /// The shape of a field, and its numbers, if the file's format has them in memory already.
+    /// `accept` is that of [`read`](Self::read).
+    pub(super) fn open_field(
+        &mut self,
+        field: &str,
+        accept: impl Fn(&[u64]) -> Result<(), String>,
+    ) -> Result<(Vec<u64>, Option<Field>), FileError> {
+        let (shape, numbers) = match &mut self.format {
+            Format::Npz(archive) => (archive.shape(field, accept)?, None),
+            _ => {
+                let numbers = self.read(field, accept)?;
+                (numbers.shape.clone(), Some(numbers))
+            }
+        };
+        Ok((shape.into_iter().map(|axis| axis as u64).collect(), numbers))
+    }
+
+    /// A field whose real numbers lie in the file as they are; `None` for any other field.
+    pub(super) fn stored(&mut self, field: &str) -> Result<Option<Stored>, FileError> {
+        match &mut self.format {
+            Format::Npz(archive) => archive.stored(field),
+            _ => Ok(None),
+        }
+    }
+
     /// Reads a field as [`read`](Self::read) does, of real numbers only.
     pub(super) fn read_real(
         &mut self,

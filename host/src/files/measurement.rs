@@ -32,6 +32,7 @@ mod plain;
 mod readings;
 mod reference;
 mod rows;
+mod stack;
 mod write;
 
 use super::FileError;
@@ -40,6 +41,8 @@ pub use images::read_images_of;
 use nirspi_recon::{Image, Order, Rows, Side};
 use opened::Opened;
 pub use plain::{Plain, read_plain};
+use rayon::prelude::*;
+pub use stack::Stack;
 use std::path::Path;
 pub use write::encode;
 
@@ -116,10 +119,10 @@ pub struct Reference {
 pub fn read(path: &Path, want: &Selection) -> Result<MeasurementFile, FileError> {
     let mut file = Opened::open(path, want)?;
     let index = file.readings.layout.choose(path, &file.readings.name, want.index)?;
-    file.measurement(index)
+    file.loaded()?.measurement(index)
 }
 
-/// A file of several measurements, such as the frames of a video, read one by one.
+/// A file of several measurements, such as the frames of a video.
 pub struct Several(Opened);
 
 impl Several {
@@ -155,12 +158,28 @@ impl Several {
         self.0.side
     }
 
-    /// Reads and checks the measurement with this index.
+    /// Reads and checks every measurement, on all threads, and makes something of each.
+    ///
+    /// # Errors
+    /// As [`read`], of the first measurement that is refused; or the error of `make`.
+    pub fn each<T: Send, E: From<FileError> + Send>(
+        &mut self,
+        make: impl Fn(MeasurementFile) -> Result<T, E> + Sync,
+    ) -> Result<Vec<T>, E> {
+        let count = self.len();
+        let file = self.0.loaded()?;
+        let one = |index| make(file.measurement(index)?);
+        let made: Vec<Result<T, E>> = (0..count).into_par_iter().map(one).collect();
+        made.into_iter().collect()
+    }
+
+    /// All measurements as one block of numbers, if they are real differences of the same patterns
+    /// and lie one after another; `None` for any other file, which [`each`](Self::each) reads.
     ///
     /// # Errors
     /// As [`read`].
-    pub fn read(&mut self, index: usize) -> Result<MeasurementFile, FileError> {
-        self.0.measurement(index)
+    pub fn stack(&mut self) -> Result<Option<Stack<'_>>, FileError> {
+        Stack::of(&mut self.0)
     }
 }
 

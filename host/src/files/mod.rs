@@ -40,6 +40,8 @@ mod hdf5;
 #[cfg(not(target_family = "wasm"))]
 mod mat;
 mod plain;
+#[cfg(not(target_family = "wasm"))]
+mod stored;
 #[cfg(test)]
 mod testing;
 #[cfg(not(target_family = "wasm"))]

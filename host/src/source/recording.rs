@@ -1,8 +1,7 @@
 //! Reads the frames of a recording as measurements: their sum, each of them, or the sum at each detector.
 
-use super::{
-    NOT_CALIBRATED, Source, SourceError, SourceOptions, first_of, fits_together, not_whole,
-};
+use super::several::fits_together;
+use super::{NOT_CALIBRATED, Source, SourceError, SourceOptions, first_of, not_whole};
 use crate::account::{LossAccount, LossCounters};
 use crate::boards;
 use crate::calibration::KeptFlatField;

@@ -118,8 +118,12 @@ class Measurement:
         if y is not None:
             self._of_readings(values, rows, form)
         else:
-            # A selection is a copy already.
-            self.rows, self.d = rows[kept], values[..., kept] if copy or not kept.all() else values
+            self.rows, self.d = rows[kept], values
+            if not kept.all():
+                # An index by a mask could give the other memory order.
+                self.d = values.compress(kept, axis=-1)
+            elif copy:
+                self.d = values.copy()
         # The compiled part checks that rows are in range and different.
         _nirspi.Operator(self.n, self.rows, False, False)
         infinite = np.isinf(self.d)
@@ -329,7 +333,9 @@ def load(
         keep_leak=keep_leak,
         no_flat_field=no_flat_field,
     )
-    found = _nirspi.load(os.fspath(path), options)
+    block, found = _nirspi.load(os.fspath(path), options)
+    if block is not None:
+        return _of_block(block)
     first = found[0]
     n, rows = first["n"], first["rows"]
     if not all(one["rows"] is rows or np.array_equal(one["rows"], rows) for one in found):
@@ -360,6 +366,21 @@ def load(
         notes=notes,
         flat_field=first["flat_field"],
     )
+
+
+def _of_block(block: dict[str, Any]) -> Measurement:
+    """Measurements that the compiled part has read and checked as one array, which is not checked again."""
+    n, rows, count = block["n"], block["rows"], block["count"]
+    references = block["references"]
+    made = object.__new__(Measurement)
+    made.d = block["d"].reshape(count, len(rows))
+    made.rows, made.n = rows, n
+    made.unit = "units of the readings"
+    made.dropouts = [[] for _ in range(count)]
+    made.not_read = np.zeros(0, np.int64)
+    made.reference = None if references is None else references.reshape(count, n, n)
+    made.frames, made.flat_field, made.notes = None, None, list(block["notes"])
+    return made
 
 
 def _aligned(one: dict[str, Any], rows: np.ndarray) -> np.ndarray:

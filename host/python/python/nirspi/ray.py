@@ -16,6 +16,7 @@ import os
 import socket
 import tempfile
 import time
+from collections.abc import Callable
 from typing import Any
 
 from . import __version__
@@ -25,6 +26,8 @@ from .archive import Report, Work
 _PLAN = "plan.json"
 _REPORT = "report.json"
 _KEY = b"nirspi.archive"
+# Longer than a node takes to install the packages of a job's runtime environment.
+_ANSWER_S = 300.0
 
 
 class _Folder:
@@ -154,7 +157,8 @@ def run(
     ------
     Error
         If the folder holds parts and ``resume`` is False, if they are of other files or settings, or
-        if a node has no package or another version.
+        if a node that could run a worker has no package or another version. Then nothing has been
+        written, and the error names each such node.
     """
     if not isinstance(work, Work):
         raise Error(f"work is {type(work).__name__}, expected nirspi.Archive(...) or nirspi.Sweep(...)")
@@ -179,10 +183,8 @@ def run(
         for key in plan:
             if kept.get(key) != plan[key]:
                 raise Error(f"{folder.out}: made with other {key}: use the same, or another folder")
-    else:
-        if any(name.endswith(".parquet") for name in there):
-            raise Error(f"{folder.out}: tables of something else are there, expected an empty folder")
-        folder.write(_PLAN, json.dumps(plan).encode())
+    elif any(name.endswith(".parquet") for name in there):
+        raise Error(f"{folder.out}: tables of something else are there, expected an empty folder")
     count = len(plan["names"])
     parts = {
         f"part-{start // items:06}.parquet": (start, min(start + items, count))
@@ -195,8 +197,15 @@ def run(
             found = folder.skipped(name)
             rows, before = rows + found[0], before + parts[name][1] - parts[name][0]
             skipped.append((name, found[1]))
+    environment = {"env_vars": {"RAYON_NUM_THREADS": str(max(1, int(cpus)))}}
     if missing:
-        for told in _distribute(ray, work, folder.out, parts, missing, workers, cpus, gpus):
+        if not ray.is_initialized():
+            ray.init(log_to_driver=False)
+        _check_nodes(ray, cpus, gpus, environment)
+    if _PLAN not in there:
+        folder.write(_PLAN, json.dumps(plan).encode())
+    if missing:
+        for told in _distribute(ray, work, folder.out, parts, missing, workers, cpus, gpus, environment):
             rows += told["rows"]
             skipped.append((told["name"], told["skipped"]))
     report = Report(
@@ -211,6 +220,70 @@ def run(
     return report
 
 
+def _version_here() -> Callable[[], tuple[str | None, str, str]]:
+    """A function that says which nirspi its process has: version, reason if there is none, interpreter.
+
+    A function inside a function, because Ray sends the code of such a function, and of another one only
+    the module and the name, which a node without the package does not know.
+    """
+
+    def version() -> tuple[str | None, str, str]:
+        import sys
+
+        try:
+            import nirspi
+
+            return nirspi.__version__, "", sys.executable
+        except Exception as error:
+            return None, f"{type(error).__name__}: {error}".splitlines()[0], sys.executable
+
+    return version
+
+
+def _check_nodes(ray: Any, cpus: float, gpus: float, environment: dict[str, Any]) -> None:
+    """Refuses a cluster of which a node that could run a worker has another nirspi than this process."""
+    from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
+
+    def alive() -> dict[str, str]:
+        """Name of each node that has what a worker asks for."""
+        found = {}
+        for node in ray.nodes():
+            there = node["Resources"]
+            if node["Alive"] and there.get("CPU", 0) >= cpus and there.get("GPU", 0) >= gpus:
+                name = f"node {node['NodeManagerHostname']} ({node['NodeManagerAddress']}"
+                found[node["NodeID"]] = f"{name}, id {node['NodeID'][:8]})"
+        return found
+
+    asked = {}
+    probe = ray.remote(_version_here())
+    for node in alive():
+        there = NodeAffinitySchedulingStrategy(node_id=node, soft=False)
+        # A node whose processors are all taken answers too.
+        options = {"num_cpus": 0, "scheduling_strategy": there, "runtime_env": environment}
+        asked[probe.options(**options).remote()] = node
+    done, _ = ray.wait(list(asked), num_returns=len(asked), timeout=_ANSWER_S) if asked else ([], [])
+    wrong = []
+    # A node that has gone meanwhile gets no part.
+    names = alive()
+    for answer, node in asked.items():
+        if node not in names:
+            continue
+        if answer not in done:
+            wrong.append(f"{names[node]} did not answer in {_ANSWER_S:.0f} s")
+            continue
+        try:
+            version, reason, interpreter = ray.get(answer)
+        except ray.exceptions.RayError as error:
+            wrong.append(f"{names[node]}: {_last_line(error)}")
+            continue
+        if version is None:
+            wrong.append(f"{names[node]}: {interpreter} has no nirspi ({reason})")
+        elif version != __version__:
+            wrong.append(f"{names[node]}: {interpreter} has nirspi {version}")
+    if wrong:
+        raise Error(f"{'; '.join(wrong)}; expected {__version__}: install the same package on every node")
+
+
 def _distribute(
     ray: Any,
     work: Work,
@@ -220,17 +293,15 @@ def _distribute(
     workers: int | None,
     cpus: float,
     gpus: float,
+    environment: dict[str, Any],
 ) -> list[dict[str, Any]]:
     """What the workers tell of each part."""
-    if not ray.is_initialized():
-        ray.init(log_to_driver=False)
     if workers is None:
         there = ray.cluster_resources()
         workers = int(there.get("CPU", 1) // max(cpus, 0.01))
         if gpus > 0:
             workers = min(workers, int(there.get("GPU", 0) // gpus))
     workers = max(1, min(workers, len(missing)))
-    threads = str(max(1, int(cpus)))
     context = ray.data.DataContext.get_current().copy()
     context.enable_progress_bars = False
     try:
@@ -246,14 +317,14 @@ def _distribute(
                 compute=ray.data.ActorPoolStrategy(size=workers),
                 num_cpus=cpus,
                 num_gpus=gpus or None,
-                runtime_env={"env_vars": {"RAYON_NUM_THREADS": threads}},
+                runtime_env=environment,
             )
             return [json.loads(row["report"]) for row in done.iter_rows()]
     except ray.exceptions.RayError as error:
-        raise Error(_line_of(error)) from error
+        raise Error(f"the cluster failed: {_last_line(error)}") from error
 
 
-def _line_of(error: Exception) -> str:
-    """The innermost reason of a failure on the cluster, in one line."""
+def _last_line(error: Exception) -> str:
+    """The innermost reason of a failure on the cluster."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-    return f"the cluster failed: {lines[-1]}" if lines else "the cluster failed"
+    return lines[-1] if lines else type(error).__name__

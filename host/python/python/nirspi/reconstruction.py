@@ -202,9 +202,11 @@ def _run(
     pixels, reports, used = _nirspi.reconstruct(
         n, rows, np.ascontiguousarray(d, np.float64).reshape(-1), options
     )
-    # The reports of a simple method are all the same.
-    known = {report: json.loads(report) for report in set(reports)}
-    return pixels, [dict(known[report]) for report in reports], used
+    every: list[Any] = []
+    for report, count in reports:
+        known = json.loads(report)
+        every.extend(dict(known) for _ in range(count))
+    return pixels, every, used
 
 
 def _atoms(dictionary: Any, n: int) -> np.ndarray:

@@ -3,11 +3,7 @@
 import json
 import os
 import pathlib
-import shutil
 import signal
-import socket
-import subprocess
-import sys
 import threading
 import time
 
@@ -17,64 +13,17 @@ import pytest
 import nirspi as ns
 import nirspi.ray
 
-ray = pytest.importorskip("ray")
+pytest.importorskip("ray")
 pq = pytest.importorskip("pyarrow.parquet")
 
-
-def free_port():
-    with socket.socket() as s:
-        s.bind(("127.0.0.1", 0))
-        return s.getsockname()[1]
+from nodes import two_nodes  # noqa: E402 - it needs Ray
 
 
 @pytest.fixture(scope="module")
 def cluster(tmp_path_factory):
-    """The address of two nodes with one processor each, and the second node's processes."""
-    program = str(pathlib.Path(sys.executable).with_name("ray"))
-    place = tmp_path_factory.mktemp("ray", numbered=True)
-    # Sockets have short paths.
-    temporary = pathlib.Path("/tmp") / f"nirspi-ray-{os.getpid()}"
-    port = free_port()
-    common = ["--num-cpus", "1", "--object-store-memory", "100000000", "--disable-usage-stats"]
-    quiet = {"stdout": os.open(place / "log", os.O_WRONLY | os.O_CREAT), "stderr": subprocess.STDOUT}
-    head = [
-        "start",
-        "--block",
-        "--head",
-        "--port",
-        str(port),
-        "--temp-dir",
-        str(temporary),
-        "--include-dashboard=false",
-    ]
-    address = f"127.0.0.1:{port}"
-    own_group = {"start_new_session": True}
-    nodes = [subprocess.Popen([program, *head, *common], **quiet, **own_group)]
-    try:
-        for _ in range(120):
-            with socket.socket() as s:
-                if s.connect_ex(("127.0.0.1", port)) == 0:
-                    break
-            time.sleep(0.5)
-        more = ["start", "--block", "--address", address]
-        nodes.append(subprocess.Popen([program, *more, *common], **quiet, **own_group))
-        ray.init(address=address, log_to_driver=False)
-        for _ in range(240):
-            if ray.cluster_resources().get("CPU", 0) == 2:
-                break
-            time.sleep(0.5)
-        assert len([node for node in ray.nodes() if node["Alive"]]) == 2, (place / "log").read_text()
-        yield address
-    finally:
-        ray.shutdown()
-        # The head last: another node waits for it to say goodbye.
-        for node in reversed(nodes):
-            os.killpg(node.pid, signal.SIGTERM)
-            try:
-                node.wait(20)
-            except subprocess.TimeoutExpired:
-                os.killpg(node.pid, signal.SIGKILL)
-        shutil.rmtree(temporary, ignore_errors=True)
+    """Two nodes with one processor each."""
+    with two_nodes(tmp_path_factory.mktemp("ray", numbered=True)) as second:
+        yield second
 
 
 @pytest.fixture(scope="module")
@@ -187,7 +136,10 @@ def test_failures_of_the_cluster_are_errors_in_one_line(cluster, archive, tmp_pa
     monkeypatch.setattr(nirspi.ray, "__version__", "9.9")
     with pytest.raises(ns.Error, match=r"expected 9\.9: install the same package") as error:
         nirspi.ray.run(work, tmp_path / "other")
-    assert "\n" not in str(error.value)
+    assert "\n" not in str(error.value) and not (tmp_path / "other").exists()
+    # A worker on a node that came after the nodes were asked.
+    with pytest.raises(ns.Error, match=r"nirspi 9\.9 on node .*, expected 8\.8: install the same package"):
+        nirspi.ray._Worker(work, str(tmp_path / "other"), "8.8", False)
     for wrong, told in [
         (lambda: nirspi.ray.run("archive/", tmp_path / "x"), "expected nirspi.Archive"),
         (lambda: nirspi.ray.run(work, tmp_path / "x", items=0), "items is 0"),

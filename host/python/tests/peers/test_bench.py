@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from nirspi.bench import file, omp
+from nirspi.bench import file, omp, total_variation
 
 
 def test_every_package_makes_the_same_images_of_a_file(tmp_path):
@@ -21,3 +21,12 @@ def test_every_pursuit_finds_the_same_coefficients():
         dense = [one.toarray() if hasattr(one, "toarray") else np.asarray(one) for one in found.values()]
         for name, one in zip(found, dense, strict=True):
             assert np.allclose(one, dense[0], atol=1e-4), name
+
+
+def test_both_solvers_of_total_variation_find_the_same_image():
+    pytest.importorskip("deepinv")
+    (contestants,) = total_variation(16, None).values()
+    ours, theirs = (np.asarray(run()).reshape(16, 16) for run in contestants.values())
+    # They stop within 1 % of the same least sum, at scenes between 0 and 1.
+    assert len(contestants) == 2 and np.abs(ours - theirs).max() < 0.1
+    assert np.corrcoef(ours.ravel(), theirs.ravel())[0, 1] > 0.999

@@ -61,6 +61,21 @@ fn half_precision_follows_ieee_754() {
 }
 
 #[test]
+fn a_matrix_of_any_size_comes_out_in_c_order() {
+    for (rows, columns) in [(1, 5), (5, 1), (2, 3), (32, 32), (33, 70), (100, 31)] {
+        // Row r and column c as one number, stored column by column.
+        let number = |r: usize, c: usize| (r * 1000 + c) as u32;
+        let stored: Vec<u8> = (0..columns)
+            .flat_map(|c| (0..rows).flat_map(move |r| number(r, c).to_le_bytes()))
+            .collect();
+        let (_, values) =
+            read(&npy("'<u4'", true, &format!("({rows}, 1, {columns})"), &stored)).unwrap();
+        let wanted = (0..rows).flat_map(|r| (0..columns).map(move |c| f64::from(number(r, c))));
+        assert!(values.into_iter().eq(wanted), "{rows} x {columns}");
+    }
+}
+
+#[test]
 fn fortran_order_comes_out_in_c_order() {
     // The array [[[0 1 2 3] [4 ..] [8 ..]] ...] of shape (2, 3, 4), stored with the first axis
     // fastest.

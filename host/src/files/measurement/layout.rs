@@ -51,6 +51,11 @@ impl Layout {
         })
     }
 
+    /// Whether the readings of each measurement are adjacent, in the order of the measurements.
+    pub(super) fn is_adjacent(&self) -> bool {
+        !self.patterns_first || self.count == 1 || self.length == 1
+    }
+
     /// The readings of one measurement.
     pub(super) fn series(&self, values: &[f64], index: usize) -> Vec<f64> {
         match self.patterns_first {

@@ -1,4 +1,4 @@
-//! An open file whose shapes fit together. Measurements are read from the file one by one.
+//! An open file whose shapes fit together, and its measurements one by one.
 
 use super::readings::{NamedReadings, check_infinite, expected_of, found_names, readings_field};
 use super::reference::read_reference;
@@ -10,17 +10,23 @@ use std::path::Path;
 
 /// An open file whose shapes fit together.
 pub(super) struct Opened {
-    fields: Fields,
+    pub(super) fields: Fields,
     pub(super) side: Side,
     /// The row shown k-th; `None` for a row that was not read.
     rows: Vec<Option<u32>>,
     /// All rows, if each was read: the measurements share them.
-    every_row: Option<Rows>,
-    form: Form,
+    pub(super) every_row: Option<Rows>,
+    pub(super) form: Form,
     pub(super) readings: NamedReadings,
     reference: Option<(Field, usize)>,
-    simulated: Option<bool>,
-    notes: Vec<String>,
+    pub(super) simulated: Option<bool>,
+    pub(super) notes: Vec<String>,
+}
+
+/// An open file whose readings are in memory.
+pub(super) struct Loaded<'o> {
+    opened: &'o Opened,
+    numbers: Field,
 }
 
 impl Opened {
@@ -55,7 +61,7 @@ impl Opened {
                 };
                 let rows = read_rows(&mut fields, side)?;
                 let expected = expected_of(form, rows.len());
-                (side, rows, NamedReadings::read(&mut fields, name, want, &expected)?)
+                (side, rows, NamedReadings::open(&mut fields, name, want, &expected)?)
             }
             Some(order) => {
                 let entry = order.entry().filter(|entry| entry.has_undefined_ties);
@@ -90,18 +96,45 @@ impl Opened {
         self.rows.len()
     }
 
-    /// Reads the measurement of this index, without the patterns that were not read.
-    pub(super) fn measurement(&mut self, index: usize) -> Result<MeasurementFile, FileError> {
-        let path = self.fields.path();
-        let NamedReadings { name, field, layout } = &self.readings;
-        let real = layout.series(&field.real, index);
-        let imaginary = field.imaginary.as_ref().map(|values| layout.series(values, index));
+    /// The file with its readings in memory.
+    pub(super) fn loaded(&mut self) -> Result<Loaded<'_>, FileError> {
+        let numbers = self.readings.numbers(&mut self.fields)?;
+        Ok(Loaded { opened: self, numbers })
+    }
+
+    /// A measurement without any pattern that was read.
+    pub(super) fn no_pattern(&self) -> FileError {
+        let found = "has no pattern that was read: all are NaN";
+        FileError::field(self.fields.path(), self.readings.name.clone(), found, "finite readings")
+    }
+
+    /// The file's own reconstruction of the measurement of this index.
+    pub(super) fn reference(&self, index: usize) -> Option<Reference> {
+        let (field, count) = self.reference.as_ref()?;
+        let area = self.side.area();
+        let start = if *count == 1 { 0 } else { index * area };
+        let image = |values: &Vec<f64>| {
+            let pixels = values[start..start + area].iter().map(|&value| value as f32);
+            Image::new(self.side, pixels.collect())
+        };
+        Some(Reference { real: image(&field.real), imaginary: field.imaginary.as_ref().map(image) })
+    }
+}
+
+impl Loaded<'_> {
+    /// The measurement of this index, without the patterns that were not read.
+    pub(super) fn measurement(&self, index: usize) -> Result<MeasurementFile, FileError> {
+        let Self { opened, numbers } = self;
+        let path = opened.fields.path();
+        let NamedReadings { name, layout, .. } = &opened.readings;
+        let real = layout.series(&numbers.real, index);
+        let imaginary = numbers.imaginary.as_ref().map(|values| layout.series(values, index));
         for values in [Some(&real), imaginary.as_ref()].into_iter().flatten() {
             check_infinite(path, name, values)?;
         }
-        let count = self.rows.len();
+        let count = opened.rows.len();
         let at = |k: usize| {
-            let (first, second) = match self.form {
+            let (first, second) = match opened.form {
                 Form::Pairs => (2 * k, Some(2 * k + 1)),
                 Form::Halves => (k, Some(count + k)),
                 Form::Single | Form::Differences => (k, None),
@@ -110,52 +143,42 @@ impl Opened {
         };
         let is_read = |k: usize| {
             let finite = |values: &[f64]| at(k).all(|reading| values[reading].is_finite());
-            self.rows[k].is_some() && finite(&real) && imaginary.as_deref().is_none_or(finite)
+            opened.rows[k].is_some() && finite(&real) && imaginary.as_deref().is_none_or(finite)
         };
         let (places, not_read): (Vec<usize>, Vec<usize>) = (0..count).partition(|&k| is_read(k));
         if places.is_empty() {
-            let found = "has no pattern that was read: all are NaN";
-            return Err(FileError::field(path, name.clone(), found, "finite readings"));
+            return Err(opened.no_pattern());
         }
-        let as_they_are = not_read.is_empty() && self.form != Form::Halves;
+        let as_they_are = not_read.is_empty() && opened.form != Form::Halves;
         let kept = |values: Vec<f64>| -> Readings {
             let values = match as_they_are {
                 true => values,
                 false => places.iter().flat_map(|&k| at(k)).map(|at| values[at]).collect(),
             };
-            match self.form {
+            match opened.form {
                 Form::Pairs | Form::Halves => Readings::Pairs(values),
                 Form::Single => Readings::Single(values),
                 Form::Differences => Readings::Differential(values),
             }
         };
-        let h_row = match &self.every_row {
+        let h_row = match &opened.every_row {
             Some(every) if not_read.is_empty() => every.clone(),
             _ => {
-                let rows = places.iter().filter_map(|&k| self.rows[k]);
-                Rows::new(self.side, rows).map_err(|error| {
+                let rows = places.iter().filter_map(|&k| opened.rows[k]);
+                Rows::new(opened.side, rows).map_err(|error| {
                     FileError::field(path, "h_row", format!("({error})"), "each row once")
                 })?
             }
         };
-        let reference = self.reference.as_ref().map(|(field, count)| {
-            let area = self.side.area();
-            let start = if *count == 1 { 0 } else { index * area };
-            let image = |values: &Vec<f64>| {
-                let pixels = values[start..start + area].iter().map(|&value| value as f32);
-                Image::new(self.side, pixels.collect())
-            };
-            Reference { real: image(&field.real), imaginary: field.imaginary.as_ref().map(image) }
-        });
         Ok(MeasurementFile {
             h_row,
             readings: kept(real),
             imaginary: imaginary.map(kept),
             places,
             not_read,
-            reference,
-            simulated: self.simulated,
-            notes: self.notes.clone(),
+            reference: opened.reference(index),
+            simulated: opened.simulated,
+            notes: opened.notes.clone(),
         })
     }
 }

@@ -25,8 +25,10 @@ pub fn read_plain(path: &Path, want: &Selection, patterns: usize) -> Result<Plai
     let name = readings_field(&fields, want)?;
     let hint = Hint { length: 2 * patterns, words: "; of +, - pairs give the differences" };
     let expected = Expected { length: patterns, meaning: "one reading a pattern", hint };
-    let readings = NamedReadings::read(&mut fields, name, want, &expected)?;
-    if readings.field.imaginary.is_some() {
+    let mut readings = NamedReadings::open(&mut fields, name, want, &expected)?;
+    let layout = readings.layout;
+    let numbers = readings.numbers(&mut fields)?;
+    if numbers.imaginary.is_some() {
         return Err(FileError::field(
             path,
             readings.name,
@@ -34,8 +36,8 @@ pub fn read_plain(path: &Path, want: &Selection, patterns: usize) -> Result<Plai
             "real ones for patterns of one's own",
         ));
     }
-    let index = readings.layout.choose(path, &readings.name, want.index)?;
-    let all = readings.layout.series(&readings.field.real, index);
+    let index = layout.choose(path, &readings.name, want.index)?;
+    let all = layout.series(&numbers.real, index);
     check_infinite(path, &readings.name, &all)?;
     let (patterns, not_read): (Vec<usize>, Vec<usize>) =
         (0..all.len()).partition(|&k| all[k].is_finite());

@@ -4,12 +4,15 @@ use super::layout::Layout;
 use super::{FileError, Form, Selection};
 use crate::files::array::has_shape;
 use crate::files::fields::{Field, Fields, UNNAMED};
+use crate::files::stored::Stored;
 use std::path::Path;
 
 /// A field of readings, and the layout of its measurements.
 pub(super) struct NamedReadings {
+    /// The field's name for messages.
     pub(super) name: String,
-    pub(super) field: Field,
+    /// The numbers, if opening the field has read them.
+    numbers: Option<Field>,
     pub(super) layout: Layout,
 }
 
@@ -27,7 +30,29 @@ pub(super) struct Hint<'w> {
 }
 
 impl NamedReadings {
-    pub(super) fn read(
+    pub(super) fn new(name: String, layout: Layout, numbers: Option<Field>) -> Self {
+        Self { name, numbers, layout }
+    }
+
+    /// The numbers of these readings, all of them.
+    pub(super) fn numbers(&mut self, fields: &mut Fields) -> Result<Field, FileError> {
+        match self.numbers.take() {
+            Some(numbers) => Ok(numbers),
+            // The shape fits: it was checked when the field was opened.
+            None => fields.read(&self.name, |_| Ok(())),
+        }
+    }
+
+    /// The numbers in the file, if opening the field has not read them and they lie there as they
+    /// are.
+    pub(super) fn stored(&self, fields: &mut Fields) -> Result<Option<Stored>, FileError> {
+        match self.numbers {
+            Some(_) => Ok(None),
+            None => fields.stored(&self.name),
+        }
+    }
+
+    pub(super) fn open(
         fields: &mut Fields,
         name: String,
         want: &Selection,
@@ -35,7 +60,7 @@ impl NamedReadings {
     ) -> Result<Self, FileError> {
         let Expected { length, meaning, hint } = expected;
         let fits = |shape: &[u64], length| Layout::of(shape, length, want.patterns_first).is_some();
-        let field = fields.read(&name, |shape| {
+        let (shape, numbers) = fields.open_field(&name, |shape| {
             if fits(shape, *length) {
                 return Ok(());
             }
@@ -55,7 +80,6 @@ impl NamedReadings {
             };
             Err(format!("{axes}: {meaning}{hint}"))
         })?;
-        let shape: Vec<u64> = field.shape.iter().map(|&axis| axis as u64).collect();
         let name = if fields.is_unnamed() { UNNAMED.to_owned() } else { name };
         let layout = Layout::of(&shape, *length, want.patterns_first).ok_or_else(|| {
             FileError::field(
@@ -65,7 +89,7 @@ impl NamedReadings {
                 "the shape of its header",
             )
         })?;
-        Ok(Self { name, field, layout })
+        Ok(Self { name, numbers, layout })
     }
 }
 

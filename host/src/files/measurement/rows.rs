@@ -22,11 +22,10 @@ pub(super) fn shown(
     let label = if fields.is_unnamed() { UNNAMED.to_owned() } else { name.clone() };
     let refuse =
         |found: String, expected: String| FileError::field(&path, label.clone(), found, expected);
-    let field = fields.read(&name, |shape| match shape.contains(&0) {
+    let (shape, numbers) = fields.open_field(&name, |shape| match shape.contains(&0) {
         true => Err("readings".to_owned()),
         false => Ok(()),
     })?;
-    let shape: Vec<u64> = field.shape.iter().map(|&axis| axis as u64).collect();
     let mut axes = shape.iter().copied().filter(|&axis| axis != 1);
     let along = if want.patterns_first { axes.next() } else { axes.next_back() };
     let length = along.unwrap_or(1) as usize;
@@ -71,7 +70,7 @@ pub(super) fn shown(
     let layout = Layout::of(&shape, length, want.patterns_first)
         .ok_or_else(|| refuse(has_shape(&shape), "readings".to_owned()))?;
     let rows = rows.iter().take(count).map(|&row| Some(row)).collect();
-    Ok((side, rows, NamedReadings { name: label.clone(), field, layout }))
+    Ok((side, rows, NamedReadings::new(label.clone(), layout, numbers)))
 }
 
 pub(super) fn read_side(fields: &mut Fields, want: &Selection) -> Result<Option<Side>, FileError> {

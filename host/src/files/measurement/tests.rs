@@ -1,3 +1,5 @@
+mod stack;
+
 use super::super::testing::{Zip, file, line, npy, npy_f64, npy_i32, zip};
 use super::*;
 use proptest::prelude::*;

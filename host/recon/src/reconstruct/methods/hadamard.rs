@@ -41,6 +41,8 @@ pub fn hadamard(measurements: &Measurements) -> Image {
         grid[row as usize] = value;
     }
     fwht::transform(&mut grid);
-    let pixels = grid.into_iter().map(|v| (v / side.area() as f64) as f32).collect();
+    // Exact, as the number of pixels is a power of two.
+    let scale = 1.0 / side.area() as f64;
+    let pixels = grid.into_iter().map(|v| (v * scale) as f32).collect();
     Image::new(side, pixels)
 }

@@ -1,0 +1,68 @@
+//! All measurements of a measurement file, one by one or as one block of numbers.
+
+use super::{Source, SourceError, SourceOptions, from_file};
+use crate::files::measurement::{self, Stack};
+use nirspi_recon::Side;
+use std::path::Path;
+
+/// An open file of measurements, whose measurements fit into memory together.
+pub struct Several<'a> {
+    path: &'a Path,
+    options: &'a SourceOptions,
+    file: measurement::Several,
+}
+
+impl<'a> Several<'a> {
+    /// Opens a file, unless it is a recording.
+    ///
+    /// # Errors
+    /// [`SourceError`], which names the file and the problem.
+    pub fn of(path: &'a Path, options: &'a SourceOptions) -> Result<Option<Self>, SourceError> {
+        match options.fits_recording(path)? {
+            true => Ok(None),
+            false => Self::open(path, options).map(Some),
+        }
+    }
+
+    pub(super) fn open(path: &'a Path, options: &'a SourceOptions) -> Result<Self, SourceError> {
+        let file = measurement::Several::open(path, &options.file)?;
+        fits_together(path, file.len(), file.patterns(), file.side())?;
+        Ok(Self { path, options, file })
+    }
+
+    /// All measurements as one block of numbers, if they are differences of the same patterns and
+    /// lie one after another in the file; `None` for any other file.
+    ///
+    /// # Errors
+    /// As [`of`](Self::of).
+    pub fn stack(&mut self) -> Result<Option<Stack<'_>>, SourceError> {
+        Ok(self.file.stack()?)
+    }
+
+    /// All measurements, one by one.
+    ///
+    /// # Errors
+    /// As [`of`](Self::of).
+    pub fn each(&mut self) -> Result<Vec<Source>, SourceError> {
+        self.file.each(|file| from_file(self.path, file, self.options.part))
+    }
+}
+
+/// The most memory for the measurements and images of a whole file.
+const MOST_BYTES: u64 = 4 << 30;
+
+/// Checks that all measurements and their images fit into memory together: for each pattern a row and its
+/// reading, for each pixel the image as it is computed and as it is written.
+pub(super) fn fits_together(
+    path: &Path,
+    count: usize,
+    patterns: usize,
+    side: Side,
+) -> Result<(), SourceError> {
+    let each = 512 + 24 * patterns as u64 + 12 * side.area() as u64;
+    let most = MOST_BYTES / each;
+    match count as u64 <= most {
+        true => Ok(()),
+        false => Err(SourceError::TooMany { path: path.to_owned(), count, most }),
+    }
+}
