@@ -129,7 +129,7 @@ fn the_boot_loader_is_entered_without_our_stack_limit() {
         let found = firmware.stack_limit_instructions();
         let at_start = found.iter().filter(|(_, name)| *name == "Reset").count();
         let later = found.len() - at_start;
-        // Set at the start, and undone before the boot loader.
+        // Firmware that sets the limit at its start also clears it before it jumps to the boot loader.
         assert_eq!(at_start > 0, later > 0, "{}: {found:x?}", board.name);
     }
 }

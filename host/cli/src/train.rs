@@ -15,7 +15,7 @@ use std::process::ExitCode;
 
 /// Train the networks on your own characters, on the CPU or a GPU (builds with the feature `train`)
 ///
-/// Every few hundred steps the run is kept whole in its folder: checkpoint.bin to go on from (--resume), the best weights in
+/// Every few hundred steps the run is saved in its folder: checkpoint.bin to go on from (--resume), the best weights in
 /// weights.safetensors, log.jsonl and plot.png. Ctrl-C keeps it too.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\

@@ -16,9 +16,9 @@ pub const SPREAD_COPIES: u32 = 8;
 /// The level of one pixel that sees a white target.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum White {
-    /// Known, in the image's units (ADC counts for the instrument's own images).
+    /// The level is known, in the units of the image (ADC counts for images of the instrument).
     Known(f32),
-    /// Unknown: the brightest 2 x 2 pixels are used as white.
+    /// The level is unknown. The largest mean of 2 x 2 neighbouring pixels is used.
     Brightest,
 }
 

@@ -134,7 +134,11 @@ impl StagesReport {
     /// The same and the character in the image, in one line.
     #[must_use]
     pub fn trust_line(&self) -> String {
-        format!("95 % intervals: {}; as a single character: {}", self.trust().join(", "), self.reading)
+        format!(
+            "95 % intervals: {}; as a single character: {}",
+            self.trust().join(", "),
+            self.reading
+        )
     }
 }
 
