@@ -8,8 +8,8 @@
 //!
 //! Of a frame that the FPGA has made into a packet, the meter reads the samples in the packet, and the sum of all
 //! samples and the number over range in registers of the FPGA. A packet that the wires have damaged is no
-//! frame. When a packet of the parallel port is looked at, the registers are already those of a frame that the FPGA sends
-//! after it, and a look at a moment between two frames gives none.
+//! frame. When a packet of the parallel port is looked at, the registers are already those of a frame that the FPGA
+//! sends after it, and a look at a moment between two frames gives none.
 //!
 //! # Invariant
 //! No frame passes through floating point (`tests/tests/budgets.rs`:
@@ -198,8 +198,8 @@ impl Meter {
     }
 }
 
-/// Sum of all samples of the delivered frame, and the number over range. A board with a parallel port may ask between two
-/// frames, when the sum is 0: that is an error.
+/// Sum of all samples of the delivered frame, and the number over range. A board with a parallel port may ask between
+/// two frames, when the sum is 0: that is an error.
 fn measures(bus: &mut impl FpgaBus) -> Result<(u64, u32), BusError> {
     let mut word = |register| fpga::read(bus, register);
     let (low, high) = (word(Register::SumLow)?, word(Register::SumHigh)?);

@@ -75,7 +75,8 @@ impl Ring {
     }
 
     /// Notes that the channel writes next at this byte of the memory. A channel at the end of the memory may say so, or
-    /// that it is at the beginning. `now` is the time of this look, and the channel's place was read at most 16 us later.
+    /// that it is at the beginning. `now` is the time of this look, and the channel's place was read at most 16 us
+    /// later.
     pub fn came(&mut self, now: Micros, place: usize) {
         // What was in memory when the channel's place was read is read after it.
         fence(Ordering::SeqCst);
@@ -91,8 +92,8 @@ impl Ring {
         }
     }
 
-    /// Forgets all that has come until the last look. What comes is looked at from its first zero on: the FPGA sends one
-    /// before each packet.
+    /// Forgets all that has come until the last look. What comes is looked at from its first zero on: the FPGA sends
+    /// one before each packet.
     pub(crate) const fn restart(&mut self) {
         self.taken = self.written;
         self.is_between = false;
@@ -118,8 +119,8 @@ impl Ring {
             let is_zero = |at: &u32| self.byte(self.taken.wrapping_add(*at)) == 0;
             let last = shortest.saturating_sub(1);
             let end = (last..there.min(longest)).find(is_zero);
-            // What is left of a cut packet and a whole one after it are together as long as a packet only if the first is
-            // shorter than the lengths differ.
+            // What is left of a cut packet and a whole one after it are together as long as a packet only if the first
+            // is shorter than the lengths differ.
             let starts = (0..=longest.saturating_sub(shortest)).any(|at| is_zero(&at));
             let is_cut = starts || end.is_some_and(|end| is_zero(&end.saturating_sub(1)));
             match end {
@@ -175,7 +176,8 @@ impl Ring {
         begin..begin.saturating_add(found.length as usize)
     }
 
-    /// Takes the packet. False: the channel has written over the packet meanwhile, or a start has made the ring forget it.
+    /// Takes the packet. False: the channel has written over the packet meanwhile, or a start has made the ring forget
+    /// it.
     pub(crate) fn take(&mut self, found: &Found) -> bool {
         let is_there = self.is_between && self.taken == found.at;
         if is_there {

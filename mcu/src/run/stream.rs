@@ -1,8 +1,8 @@
 //! Packets that come by the FPGA's parallel port: out of the ring, into the link, each counted once.
 //!
-//! The FPGA takes its frames back by itself, so nothing is released. Frames that came to nothing on the way (overwritten
-//! in the ring, damaged, cut) show as numbers that are missing: those of them that the FPGA has not lost itself count as
-//! damaged.
+//! The FPGA takes its frames back by itself, so nothing is released. Frames that came to nothing on the way
+//! (overwritten in the ring, damaged, cut) show as numbers that are missing: those of them that the FPGA has not lost
+//! itself count as damaged.
 //!
 //! # Invariant
 //! Each packet of the run is sent or counted once, and no packet of another run is

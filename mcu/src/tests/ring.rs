@@ -24,7 +24,7 @@ fn packet(sequence: u32, samples: &[i32]) -> Vec<u8> {
     };
     let mut payload = head.to_bytes().to_vec();
     payload.extend(samples.iter().flat_map(|sample| sample.to_le_bytes()));
-    seal(&payload, &mut [0; 512]).unwrap().to_vec()
+    seal(&payload, &mut [0; 1024]).unwrap().to_vec()
 }
 
 /// The channel: moves whole words into the ring.
@@ -245,6 +245,19 @@ proptest! {
         got.extend(dma.take(70, [&[], &[]]).map(|(_, bytes, _)| bytes));
         got.retain(|bytes| intact.contains(bytes));
         prop_assert_eq!(got, intact);
+    }
+}
+
+/// Both together are no longer than a packet may be.
+#[test]
+fn what_is_left_of_a_cut_packet_is_not_taken_for_the_beginning_of_the_next() {
+    for left in 1..=2 {
+        let (cut, whole) = (packet(0, &[5; 220]), packet(1, &[0; 220]));
+        let mut dma = Dma::after(0);
+        dma.send(&[&[0], &cut[..left], &[0], &whole[..], &[0; 7]].concat());
+        let (_, bytes, is_there) = dma.take(220, [&[], &[]]).unwrap();
+        assert!(is_there);
+        assert_eq!(bytes, whole, "{left} bytes left");
     }
 }
 

@@ -1,4 +1,5 @@
-//! Tests of runs whose packets come by the FPGA's parallel port: a ring that a DMA channel fills, in front of the camera.
+//! Tests of runs whose packets come by the FPGA's parallel port: a ring that a DMA channel fills, in front of the
+//! camera.
 
 use super::fake_fpga::FakeFpga;
 use super::host_port::Port;
@@ -355,6 +356,20 @@ fn a_late_packet_is_not_taken_for_one_of_the_next_run() {
     assert_eq!(sequences(&device.heard()), [0, 1]);
 }
 
+/// The firmware counts its runs from 1 again after a restart, and the FPGA may send what it still has.
+#[test]
+fn packets_from_before_a_restart_are_not_taken_for_those_of_the_first_run() {
+    let old = Device::running(RunLength::Continuous).frame();
+    let mut device = Device::new();
+    device.ask(Command::Configure(SMALL));
+    device.bus.port().send(&[&[0], &old[..], &[0; 3]].concat());
+    let heard = device.ask(Command::Start(RunLength::Frames(1)));
+    assert_eq!(sequences(&heard), []);
+    let new = device.frame();
+    device.turn();
+    assert_eq!(device.link.packets[0], new);
+}
+
 /// Number of the frame, with a wrong bit: the next ones must not be taken for old ones.
 #[test]
 fn a_number_that_the_wires_have_damaged_ends_no_run() {
@@ -452,8 +467,8 @@ impl Device {
     }
 }
 
-/// The signal meter asks the FPGA for the level of the frame that is being sent, which is a later one; between two frames
-/// there is none, and the meter tries again at its next time.
+/// The signal meter asks the FPGA for the level of the frame that is being sent, which is a later one; between two
+/// frames there is none, and the meter tries again at its next time.
 #[test]
 fn the_meter_shows_a_signal_while_frames_are_being_sent() {
     let mut device = Device::running(RunLength::Continuous);
