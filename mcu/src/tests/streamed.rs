@@ -427,7 +427,7 @@ fn a_self_test_and_a_burst_use_the_host_port_and_the_run_after_them_the_ring() {
     let mut device = Device::new();
     device.ask(Command::Configure(SMALL));
     device.fpga().instant = true;
-    let mut serve = |device: &mut Device, command| {
+    let serve = |device: &mut Device, command| {
         device.after(10, &packet(1, command));
         let mut heard = Vec::new();
         for _ in 0..4 {
