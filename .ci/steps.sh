@@ -203,7 +203,8 @@ step_lints() {
     local name
     for name in $(boards); do
         if rustup target list --installed | grep -qx "$(fact "$name" target)"; then
-            (cd "boards/$name" && cargo clippy --locked --release -- -D warnings)
+            (cd "boards/$name" && cargo clippy --locked --release -- -D warnings &&
+                cargo clippy --locked --release --all-features -- -D warnings)
         else
             echo "skipped: lints of $name, no target from rustup"
         fi

@@ -133,6 +133,9 @@ impl Machine {
             let version = fpga::read(bus, Register::Version).map_err(|_| Refusal::Bus)?;
             let knows = self.protocol().is_some_and(|protocol| protocol >= Width::NARROW_SINCE);
             setup.mode |= setup.packets(version, knows && configuration.narrow == Tail(Some(true)));
+            if bus.ring().is_some() {
+                setup.mode |= setup.port(version);
+            }
         }
         let table = match &configuration.order {
             PatternOrder::Table(table) => fpga::set_table(bus, table),

@@ -5,13 +5,20 @@
 //! window of a run (`tests::no_window_is_brighter_than_the_peak`) and has every number in the range
 //! that the FPGA accepts (`crate::tests::commands::a_number_out_of_range_is_named_with_its_range`).
 
-use crate::Limits;
+use crate::{CLOCKS_PER_MICRO, Limits, Micros};
 use nirspi_wire::ready::{MAX_NARROW_SAMPLES, MAX_SUMMED_SAMPLES};
-use nirspi_wire::register::{DUTY_WINDOW, LATENCY_MAX, measures_frames, mode, narrows_packets};
+use nirspi_wire::register::{
+    DUTY_WINDOW, LATENCY_MAX, has_parallel_port, measures_frames, mode, narrows_packets,
+};
 use nirspi_wire::samples::{Width, Words};
 use nirspi_wire::{
     ConfigField, ConfigProblem, Configuration, PATTERNS, PatternOrder, SampleSource,
 };
+
+/// Frames that come slower than this leave by the host port also where there is a parallel port: the slowest packet
+/// takes 206 us by the host port (`docs/firmware.md`, Throughput), and only there can the signal meter ask for the
+/// level of the very frame that it looks at.
+const FAST_FRAME: Micros = Micros(220);
 
 /// A checked configuration, in the form of the FPGA's registers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,6 +53,17 @@ impl Setup {
             mode::PACKETS | mode::NARROW
         } else {
             mode::PACKETS
+        }
+    }
+
+    /// Bits of `Mode` for packets that leave by the parallel port, of gateware of this version on a board that has the
+    /// port's wires.
+    pub fn port(&self, version: u32) -> u32 {
+        let is_fast = self.frame_clocks() < FAST_FRAME.0.saturating_mul(CLOCKS_PER_MICRO);
+        if self.sends_packets() && is_fast && has_parallel_port(version) {
+            mode::PARALLEL
+        } else {
+            0
         }
     }
 

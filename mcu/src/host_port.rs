@@ -42,6 +42,9 @@
 //! room, and needs no buffer of the bus. Whether the FPGA can clock such a read by `sck` itself
 //! ([`READ_PACKET`]), the bus learns from the reads of [`Register::Version`] that pass through it.
 //!
+//! Packets of the FPGA's parallel port come by no transfer: a board that has the port's wires lends the
+//! [`Ring`] into which its DMA writes them. A start makes the ring forget what came before.
+//!
 //! With a second buffer ([`PortBus::with_spare`]) a frame can be kept: the camera packs it while the
 //! next frame is transferred into the other buffer.
 //!
@@ -55,7 +58,7 @@
 //! A damaged answer is never given, and a damaged write is repeated or an error
 //! (`tests::wires::no_damaged_answer_is_believed_and_no_damaged_write_is_taken_for_done`).
 
-use crate::{BusError, FpgaBus};
+use crate::{BusError, FpgaBus, Ring};
 use nirspi_wire::fpga::{MAX_FRAME_BYTES, frame_bytes};
 use nirspi_wire::host_port::{
     READ_FRAME, READ_PACKET, READ_RAW, SEALED_BYTES, seal, unchecked, unseal,
@@ -90,6 +93,12 @@ pub trait HostPort {
 
     /// Level of the line: a raw burst is ready.
     fn raw_ready(&mut self) -> bool;
+
+    /// The ring into which a DMA channel writes the bytes of the FPGA's parallel port, after [`Ring::came`] with the
+    /// channel's place of this moment. `None`: this board has no wires to that port.
+    fn ring(&mut self) -> Option<&mut Ring> {
+        None
+    }
 }
 
 /// What the FPGA delivers in one long read.
@@ -325,6 +334,9 @@ impl<'b, P: HostPort> PortBus<'b, P> {
         }
         if starts {
             self.keeps = false;
+            if let Some(ring) = self.port.ring() {
+                ring.restart();
+            }
             self.take_lengths();
         }
     }
@@ -400,6 +412,14 @@ impl<P: HostPort> FpgaBus for PortBus<'_, P> {
             self.transfer = Transfer::None;
         }
         Ok(has_come)
+    }
+
+    fn ring(&mut self) -> Option<&mut Ring> {
+        self.port.ring()
+    }
+
+    fn streams(&mut self) -> bool {
+        self.port.ring().is_some() && self.mode & mode::PARALLEL != 0
     }
 
     fn keep(&mut self) -> bool {

@@ -4,7 +4,7 @@
 //! No call waits. An operation that is not complete says so, and the firmware asks again on a later
 //! poll.
 
-use crate::Micros;
+use crate::{Micros, Ring};
 use core::ops::Range;
 use heapless::String;
 use nirspi_wire::samples::Width;
@@ -91,6 +91,17 @@ pub trait FpgaBus {
             place.copy_from_slice(bytes);
         }
         Ok(true)
+    }
+
+    /// The ring of the FPGA's parallel port, with what has come until now. `None`: this board has no wires to that
+    /// port, and the code that serves the port is left out of its firmware.
+    fn ring(&mut self) -> Option<&mut Ring> {
+        None
+    }
+
+    /// Whether the packets of the run under way come by that ring.
+    fn streams(&mut self) -> bool {
+        false
     }
 
     /// Puts the frame that [`frame`](Self::frame) gives where neither its release nor the transfer of

@@ -1,4 +1,5 @@
-//! How many frames a second reach the host's link: the firmware's own code and the FPGA's own answers, in simulated time.
+//! How many frames a second reach the host's link: the firmware's own code and the FPGA's own answers, in simulated
+//! time.
 //!
 //! Each access of the host port takes as long as its clocks of `sck`. The processor takes as long as the instructions
 //! that emulation counts, at an estimated number of clocks an instruction. What the peripherals cost beside that is an
@@ -7,7 +8,7 @@
 use crate::pages::{page, table};
 use nirspi_mcu::{
     BoardInfo, BusError, Camera, HostPort, Inputs, Limits, Micros, NoLoader, PacketSink, PortBus,
-    Ports, Target, Wanted,
+    Ports, Ring, Target, Wanted,
 };
 use nirspi_wire::fpga::MAX_FRAME_BYTES;
 use nirspi_wire::host_port::SEALED_BYTES;
@@ -17,6 +18,7 @@ use nirspi_wire::{
     Command, Configuration, PatternOrder, Request, RunLength, SampleSource, Tail, Version, encode,
     version,
 };
+use std::collections::VecDeque;
 use std::ops::Range;
 
 /// Period of `sck` of the reference board, but for packets: 160 MHz / 11.
@@ -24,6 +26,16 @@ pub const SCK_PS: u64 = 68_750;
 
 /// Period of `sck` of the reference board for packets that `sck` clocks: 160 MHz / 3.
 pub const PACKET_SCK_PS: u64 = 18_750;
+
+/// Packets that can wait for the host, as on the reference board.
+const PLACES: usize = 32;
+
+/// What a USB 2.0 host takes in a microsecond, as measured by others (`docs/gateware.md`, Parallel port). No board of
+/// ours has measured it.
+const USB_BYTES_PER_MICRO: u64 = 33;
+
+/// Instructions of the driver of USB for a transfer of 512 bytes (`docs/firmware.md`, USB on silicon).
+const DRIVER_INSTRUCTIONS: f64 = 650.0;
 
 const INPUTS: Inputs = Inputs { interlock_closed: true, temperature_centi_celsius: Some(2500) };
 
@@ -51,20 +63,47 @@ pub struct Processor {
     pub access_ps: u64,
     /// Setting up a transfer by DMA, its interrupt, and waking the camera's task.
     pub transfer_ps: u64,
+    /// The task that serves the host over USB, for each 512 bytes of a packet. 0: the host takes every packet at once.
+    pub usb_ps: u64,
+}
+
+/// The time that so many instructions take on the reference board, of 160 MHz.
+fn instructions_ps(instructions: f64) -> u64 {
+    (instructions * 1.3 / 160e6 * 1e12) as u64
+}
+
+/// A row of the page's table of instructions.
+fn instructions_of(part: &str) -> f64 {
+    let rows = table(&page("docs/firmware.md"), "### Instructions");
+    let row = rows.iter().find(|row| row[0] == part).expect("a row");
+    row[1].replace(' ', "").parse().expect("a number")
 }
 
 impl Processor {
-    /// The reference board, of 160 MHz: the instructions that `docs/firmware.md` has from emulation, at 1.3 clocks each.
+    /// The reference board, of 160 MHz: the instructions that `docs/firmware.md` has from emulation, at 1.3 clocks
+    /// each.
     ///
     /// # Panics
     /// If the page has no such row.
     #[must_use]
     pub fn reference() -> Self {
-        let rows = table(&page("docs/firmware.md"), "### Instructions");
-        let row = rows.iter().find(|row| row[0] == "packet_without_meter").expect("a row");
-        let instructions: f64 = row[1].replace(' ', "").parse().expect("a number");
-        let packet_ps = (instructions * 1.3 / 160e6 * 1e12) as u64;
-        Self { packet_ps, access_ps: 2_000_000, transfer_ps: 5_000_000 }
+        let packet_ps = instructions_ps(instructions_of("packet_without_meter"));
+        Self { packet_ps, access_ps: 2_000_000, transfer_ps: 5_000_000, usb_ps: 0 }
+    }
+
+    /// The reference board where packets come by the parallel port, with USB behind it.
+    ///
+    /// # Panics
+    /// If the page has no such rows.
+    #[must_use]
+    pub fn streaming() -> Self {
+        // Eight transfers of a packet of 32-bit samples are merged, and what is left.
+        let merging = instructions_of("packet_merging") / 8.0;
+        Self {
+            packet_ps: instructions_ps(instructions_of("streamed_packet")),
+            usb_ps: instructions_ps(merging + DRIVER_INSTRUCTIONS),
+            ..Self::reference()
+        }
     }
 }
 
@@ -98,21 +137,50 @@ impl<P: TimedPort> HostPort for Costly<P> {
     fn raw_ready(&mut self) -> bool {
         self.port.raw_ready()
     }
+
+    fn ring(&mut self) -> Option<&mut Ring> {
+        self.port.ring()
+    }
 }
 
-/// A link whose host takes every packet at once.
+/// A link whose host takes every packet at once, or as fast as USB carries them.
 struct Host {
     room: Vec<u8>,
     /// Lengths of the packets.
     packets: Vec<usize>,
+    is_usb: bool,
+    /// Bytes that wait of each packet in the link.
+    waiting: VecDeque<u64>,
+    /// Until when USB has carried bytes.
+    carried_us: u64,
+}
+
+impl Host {
+    /// USB carries what it can until now.
+    fn carry(&mut self, now: Micros) {
+        let micros = now.since(Micros(self.carried_us)).0;
+        self.carried_us = now.0;
+        let mut bytes = micros * USB_BYTES_PER_MICRO;
+        while let Some(first) = self.waiting.front_mut() {
+            if *first > bytes {
+                *first -= bytes;
+                break;
+            }
+            bytes -= *first;
+            self.waiting.pop_front();
+        }
+    }
 }
 
 impl PacketSink for Host {
     fn claim(&mut self, length: usize) -> Option<&mut [u8]> {
-        self.room.get_mut(..length)
+        if self.waiting.len() >= PLACES { None } else { self.room.get_mut(..length) }
     }
 
     fn commit(&mut self, part: Range<usize>) {
+        if self.is_usb {
+            self.waiting.push_back(part.len() as u64);
+        }
         self.packets.push(part.len());
     }
 }
@@ -130,19 +198,33 @@ pub struct Stretch {
     pub made: u32,
     /// Frames that reached the link since the start.
     pub sent: u32,
+    /// Share of the time in which the processor worked.
+    pub busy: f64,
 }
 
-/// Runs a camera of this many patterns, one differential sweep a frame, and measures the stretch in which so many frames
-/// go through, after the first four.
+/// Runs a camera of this many patterns, one differential sweep a frame, and measures the stretch in which so many
+/// frames go through, after the first `before` of them.
 ///
 /// # Panics
 /// If the camera refuses a command or nothing goes through for a second.
-pub fn stretch<P: TimedPort>(port: P, patterns: u16, frames: u32, processor: Processor) -> Stretch {
+pub fn stretch<P: TimedPort>(
+    port: P,
+    patterns: u16,
+    (before, frames): (u32, u32),
+    processor: Processor,
+    is_narrow: bool,
+) -> Stretch {
     let mut buffer = [0; MAX_FRAME_BYTES];
     let mut bus = PortBus::new(Costly { port, processor }, &mut buffer);
     let info = BoardInfo::new("timed", "", Version(0, 0, 0));
     let mut camera = Camera::new(info, Limits::default());
-    let mut host = Host { room: vec![0; MAX_FRAME_BYTES], packets: Vec::new() };
+    let mut host = Host {
+        room: vec![0; MAX_FRAME_BYTES],
+        packets: Vec::new(),
+        is_usb: processor.usb_ps > 0,
+        waiting: VecDeque::new(),
+        carried_us: 0,
+    };
     let configuration = Configuration {
         order: PatternOrder::Natural,
         patterns,
@@ -153,7 +235,7 @@ pub fn stretch<P: TimedPort>(port: P, patterns: u16, frames: u32, processor: Pro
         sweeps: 1,
         source: SampleSource::Detector,
         over_range_trip: 0,
-        narrow: Tail(Some(true)),
+        narrow: Tail(Some(is_narrow)),
     };
     for command in [
         Command::Hello { protocol: version::CURRENT },
@@ -168,19 +250,19 @@ pub fn stretch<P: TimedPort>(port: P, patterns: u16, frames: u32, processor: Pro
     }
     assert_eq!(camera.state(), nirspi_wire::State::Running, "the camera refused a command");
     host.packets.clear();
-    let (mut began, mut moving_ps) = (None, 0);
+    let (mut began, mut moving_ps, mut idle_ps) = (None, 0, 0);
     let deadline = bus.port().port.now_ps() + 1_000_000_000_000;
     loop {
         let sent = host.packets.len() as u32;
         let at = bus.port().port.now_ps();
         assert!(at < deadline, "{sent} frames in a second");
-        if sent >= 4 && began.is_none() {
-            (began, moving_ps) = (Some((at, sent)), 0);
+        if sent >= before && began.is_none() {
+            (began, moving_ps, idle_ps) = (Some((at, sent)), 0, 0);
         }
-        if let Some((since, before)) = began
-            && sent >= before + frames
+        if let Some((since, first)) = began
+            && sent >= first + frames
         {
-            let through = sent - before;
+            let through = sent - first;
             let seconds = (at - since) as f64 * 1e-12;
             let [lost, made] = [Register::FramesLost, Register::FramesMade].map(|register| {
                 let sealed = bus.port().read(register.address()).expect("an answer");
@@ -192,9 +274,12 @@ pub fn stretch<P: TimedPort>(port: P, patterns: u16, frames: u32, processor: Pro
                 lost,
                 made,
                 sent,
+                busy: 1.0 - (moving_ps + idle_ps) as f64 * 1e-12 / seconds,
             };
         }
-        moving_ps += turn(&mut camera, &mut bus, &mut host, processor);
+        let (moving, idle) = turn(&mut camera, &mut bus, &mut host, processor);
+        moving_ps += moving;
+        idle_ps += idle;
     }
 }
 
@@ -202,15 +287,17 @@ fn now<P: TimedPort>(bus: &mut PortBus<'_, Costly<P>>) -> Micros {
     Micros(bus.port().port.now_ps() / 1_000_000)
 }
 
-/// A turn of the camera's loop (`boards/app/src/run.rs`); returns the time of its transfer.
+/// A turn of the camera's loop (`boards/app/src/run.rs`); returns the time of its transfer and the time that it slept.
 fn turn<P: TimedPort>(
     camera: &mut Camera,
     bus: &mut PortBus<'_, Costly<P>>,
     host: &mut Host,
     processor: Processor,
-) -> u64 {
+) -> (u64, u64) {
     bus.port().port.pass(processor.packet_ps / 2);
     let at = now(bus);
+    host.carry(at);
+    let sent = host.packets.len();
     let ports = &mut Ports { bus: &mut *bus, sink: &mut *host, loader: &mut NoLoader };
     let worked = camera.poll(at, &INPUTS, ports).worked;
     match bus.wanted() {
@@ -226,16 +313,22 @@ fn turn<P: TimedPort>(
                 at,
                 &mut Ports { bus: &mut *bus, sink: &mut *host, loader: &mut NoLoader },
             );
-            moving
+            (moving, 0)
         }
         Some(wanted) => panic!("not a packet: {:?}", wanted.into),
         None => {
+            if let [length] = host.packets[sent..] {
+                // The loop yields to the task that serves the host.
+                bus.port().port.pass(processor.packet_ps / 2);
+                bus.port().port.pass(length.div_ceil(512) as u64 * processor.usb_ps);
+            }
             // The line of a ready frame wakes the loop.
-            let tick = bus.port().port.now_ps() + 1_000_000_000;
+            let slept = bus.port().port.now_ps();
+            let tick = slept + 1_000_000_000;
             while !worked && !bus.port().frame_ready() && bus.port().port.now_ps() < tick {
                 bus.port().port.pass(1_000_000);
             }
-            0
+            (0, bus.port().port.now_ps() - slept)
         }
     }
 }

@@ -98,20 +98,63 @@ fn a_wire_to_the_fpga_ends_where_the_constraints_have_that_signal() {
         let wires: Vec<_> = rows.iter().filter_map(|row| row[3].strip_prefix("FPGA ")).collect();
         assert_eq!(wires.len() as u64, pins.fpga_wires, "{board}: wires to the FPGA");
         for wire in wires {
-            let [place, arduino, signal] = wire.split(' ').collect::<Vec<_>>()[..] else {
-                panic!("{board}: {wire}")
-            };
-            let signal = match signal.split_once("spi_io") {
-                Some((_, index)) => format!("\"spi_io[{index}]\""),
-                None => format!("\"{signal}\""),
-            };
-            let place = format!("# {place}, {}", arduino.trim_matches(['(', ')']));
-            let line = constraints
-                .lines()
-                .find(|line| line.starts_with("LOCATE COMP") && line.contains(&signal))
-                .unwrap_or_else(|| panic!("no {signal} in the constraints"));
-            assert!(line.ends_with(&place), "{board}: {wire}, but {line}");
+            assert_located(&constraints, board, wire);
         }
+    }
+}
+
+fn assert_located(constraints: &str, board: &str, wire: &str) {
+    let [place, arduino, signal] = wire.split(' ').collect::<Vec<_>>()[..] else {
+        panic!("{board}: {wire}")
+    };
+    let signal = match signal.split_once("spi_io") {
+        Some((_, index)) => format!("\"spi_io[{index}]\""),
+        None => format!("\"{signal}\""),
+    };
+    let place = format!("# {place}, {}", arduino.trim_matches(['(', ')']));
+    let line = constraints
+        .lines()
+        .find(|line| line.starts_with("LOCATE COMP") && line.contains(&signal))
+        .unwrap_or_else(|| panic!("no {signal} in the constraints"));
+    assert!(line.ends_with(&place), "{board}: {wire}, but {line}");
+}
+
+/// The wires of a feature of one board's firmware: page, code and constraints.
+#[test]
+fn the_page_shows_the_wires_of_the_parallel_port() {
+    let board = "nucleo-u5a5zj-q";
+    let constraints = read("hdl/boards/ecp5-evn/board.lpf");
+    let page = read(&format!("boards/{board}/README.md"));
+    let (_, table) = page.split_once("| line | pin |").expect("a table of lines");
+    let rows: Vec<Vec<&str>> = table
+        .lines()
+        .skip(2)
+        .take_while(|line| line.starts_with('|'))
+        .map(|row| row.trim_matches('|').split('|').map(str::trim).collect())
+        .collect();
+    for row in &rows {
+        let wire = row[3].strip_prefix("FPGA ").expect("a wire to the FPGA");
+        assert_located(&constraints, board, wire);
+        let (_, signal) = wire.split_once("parallel_").expect("a line of the parallel port");
+        assert_eq!(row[0].replace(' ', ""), signal.replace(['[', ']'], ""), "{row:?}");
+    }
+    let signals = constraints.lines().filter(|line| line.starts_with("LOCATE COMP \"parallel_"));
+    assert_eq!(rows.len(), signals.count(), "every line has a wire");
+
+    // The first lamp's pin is a line of the port.
+    let code = read(&format!("boards/{board}/src/main.rs"));
+    let (_, pins) = code.split_once("parallel::Parallel::new(").expect("the port's pins");
+    let (pins, _) = pins.split_once("),\n    };").expect("an end of the pins");
+    let used = pins.split([' ', '(', ')', ',', '\n']).filter_map(|word| match word {
+        "pins.lamp_ready" => Some("PC7"),
+        "p.DCMI" | "p.GPDMA1_CH3" => None,
+        pin => pin.strip_prefix("p."),
+    });
+    assert!(used.eq(rows.iter().map(|row| row[1])), "{pins}");
+    let table = pins_in_code(board);
+    for row in rows.iter().filter(|row| row[1] != "PC7") {
+        let is_taken = table.iter().any(|other| other[1] == row[1] || other[2] == row[2]);
+        assert!(!is_taken, "{row:?} is in the table of pins too");
     }
 }
 

@@ -1,12 +1,13 @@
 //! Tests of the throughput of the FPGA's host port: the firmware in front of the gateware's model, in simulated time.
 
 use nirspi_hdl_model::{AdcSample, Gateware};
-use nirspi_mcu::{BusError, HostPort};
+use nirspi_mcu::{BusError, HostPort, Micros, Ring};
 use nirspi_tests::pages::{page, table};
 use nirspi_tests::throughput::{PACKET_SCK_PS, Processor, SCK_PS, Stretch, TimedPort, stretch};
 use nirspi_wire::host_port::{DUMMY_CYCLES, READ_FRAME, READ_PACKET, SEALED_BYTES, seal, unseal};
 use nirspi_wire::ready::{FAST_LEAD_BYTES, LEAD_BYTES};
 use nirspi_wire::register::Register;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Period of the ADC's clock.
 const ADC_PS: u64 = 8_000;
@@ -96,7 +97,7 @@ const WIDE: u32 = 0x0000_0304;
 const SAMPLED: u32 = 0x0000_0303;
 
 fn measured(version: u32, patterns: u16) -> Stretch {
-    let seen = stretch(Wires::new(version), patterns, 60, Processor::reference());
+    let seen = stretch(Wires::new(version), patterns, (4, 60), Processor::reference(), true);
     println!("gateware {version:#x}, {patterns} patterns: {seen:.1?}");
     seen
 }
@@ -151,4 +152,157 @@ fn no_transfer_waits_for_the_end_of_a_sweep() {
         1e6 / (8.0 * sweep_us) + 25.0 < seen.frames_per_second,
         "no faster than with two banks"
     );
+}
+
+/// Words of the reference board's ring: 128 KB.
+const RING_WORDS: usize = 32 * 1024;
+/// Clocks of the ADC for a byte by the parallel port.
+const BYTE: u64 = 3;
+/// Clocks between two packets, while the FPGA makes the beginning of the next one: with these the RTL's own figure
+/// comes out, 9927 frames/s of 32-bit samples to a receiver that is always ready (`docs/gateware.md`, Parallel port).
+const LEAD: u64 = 184;
+
+/// The golden model at the end of the same wires and of its parallel port, whose bytes a DMA channel writes into a
+/// ring.
+struct Parallel {
+    wires: Wires,
+    ring: Ring,
+    words: &'static [AtomicU32; RING_WORDS],
+    /// What the port sends, how much of it has been sent, and when the next byte goes.
+    sending: Option<(Vec<u8>, usize, u64)>,
+    clock: u64,
+    /// Bytes of the unfinished word, and bytes in the ring since power-up.
+    fifo: Vec<u8>,
+    written: usize,
+}
+
+impl Parallel {
+    fn new() -> Self {
+        let words: &'static [AtomicU32; RING_WORDS] =
+            Box::leak(Box::new([const { AtomicU32::new(0) }; RING_WORDS]));
+        Self {
+            wires: Wires::new(Register::Version.reset()),
+            ring: Ring::new(words),
+            words,
+            sending: None,
+            clock: 0,
+            fifo: Vec::new(),
+            written: 0,
+        }
+    }
+
+    /// A clock of the ADC. The receiver is always ready, because the DMA never waits.
+    fn tick(&mut self) {
+        let fpga = &mut self.wires.fpga;
+        fpga.tick(AdcSample { code: 8_000, over_range: false });
+        self.clock += 1;
+        let Some((bytes, sent, at)) = &mut self.sending else {
+            self.sending = fpga.outgoing().map(|bytes| (bytes, 0, self.clock + LEAD));
+            return;
+        };
+        if self.clock < *at {
+            return;
+        }
+        *at += BYTE;
+        self.fifo.push(bytes[*sent]);
+        *sent += 1;
+        if *sent == bytes.len() {
+            fpga.sent();
+            self.sending = None;
+        }
+        if let Ok(word) = <[u8; 4]>::try_from(&self.fifo[..]) {
+            let place = self.written / 4 % RING_WORDS;
+            self.words[place].store(u32::from_le_bytes(word), Ordering::Relaxed);
+            self.written += 4;
+            self.fifo.clear();
+        }
+    }
+
+    /// Time passes for the port too while the wires are busy.
+    fn follow<T>(&mut self, access: impl FnOnce(&mut Wires) -> T) -> T {
+        let before = self.wires.now_ps;
+        // The model ticks here and not in the wires.
+        self.wires.ticked_ps = u64::MAX / 2;
+        let done = access(&mut self.wires);
+        let passed = self.wires.now_ps - before;
+        self.wires.now_ps = before;
+        self.pass(passed);
+        done
+    }
+}
+
+impl HostPort for Parallel {
+    fn write(&mut self, address: u16, sealed: [u8; SEALED_BYTES]) -> Result<(), BusError> {
+        self.follow(|wires| wires.write(address, sealed))
+    }
+
+    fn read(&mut self, address: u16) -> Result<[u8; SEALED_BYTES], BusError> {
+        self.follow(|wires| wires.read(address))
+    }
+
+    fn frame_ready(&mut self) -> bool {
+        self.wires.frame_ready()
+    }
+
+    fn raw_ready(&mut self) -> bool {
+        self.wires.raw_ready()
+    }
+
+    fn ring(&mut self) -> Option<&mut Ring> {
+        self.ring.came(Micros(self.wires.now_ps / 1_000_000), self.written % (4 * RING_WORDS));
+        Some(&mut self.ring)
+    }
+}
+
+impl TimedPort for Parallel {
+    fn transfer(&mut self, opcode: u8, _into: &mut [u8]) {
+        panic!("a transfer by the host port, opcode {opcode:#x}");
+    }
+
+    fn pass(&mut self, ps: u64) {
+        self.wires.now_ps += ps;
+        while (self.clock + 1) * ADC_PS <= self.wires.now_ps {
+            self.tick();
+        }
+    }
+
+    fn now_ps(&self) -> u64 {
+        self.wires.now_ps
+    }
+
+    fn pause_ps(&self) -> u64 {
+        0
+    }
+}
+
+fn streamed(processor: Processor, is_narrow: bool) -> Stretch {
+    let seen = stretch(Parallel::new(), 1024, (150, 2400), processor, is_narrow);
+    println!("parallel port, narrow: {is_narrow}: {seen:.2?}");
+    seen
+}
+
+/// What the project asks for: as many frames as USB carries, in simulated time.
+#[test]
+fn packets_of_the_parallel_port_reach_7900_frames_a_second_and_those_of_24_bits_10_500() {
+    let wide = streamed(Processor::streaming(), false);
+    assert!(wide.frames_per_second >= 7900.0, "{wide:?}");
+    let narrow = streamed(Processor::streaming(), true);
+    assert!(narrow.frames_per_second >= 10_500.0, "{narrow:?}");
+    for seen in [wide, narrow] {
+        assert!(seen.busy < 0.95, "{seen:?}");
+    }
+}
+
+/// With a host that takes everything at once the FPGA's port is the limit, and the ring loses nothing.
+#[test]
+fn to_a_host_that_is_fast_enough_the_ring_forwards_all_that_the_port_sends() {
+    let processor = Processor { usb_ps: 0, ..Processor::streaming() };
+    let wide = streamed(processor, false);
+    assert!((wide.frames_per_second / 9927.0 - 1.0).abs() < 0.01, "{wide:?}");
+    let waiting = wide.made - wide.lost - wide.sent;
+    // What has come since the last look of the loop, and what waits in the FPGA.
+    assert!(waiting <= 14, "{wide:?}");
+    let narrow = streamed(processor, true);
+    assert!((narrow.frames_per_second / 12_207.0 - 1.0).abs() < 0.01, "{narrow:?}");
+    assert_eq!(narrow.lost, 0, "{narrow:?}");
 }

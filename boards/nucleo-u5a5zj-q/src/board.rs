@@ -26,8 +26,9 @@ pub fn adc_config() -> AdcConfig {
 /// The board's own parts.
 pub struct Nucleo {
     pub led_enable: Output<'static>,
-    /// Ready, light, fault.
-    pub lamps: [Output<'static>; 3],
+    pub lamp_ready: Option<Output<'static>>,
+    pub lamp_light: Output<'static>,
+    pub lamp_fault: Output<'static>,
     pub interlock: Input<'static>,
     pub adc: Adc<'static, ADC1>,
     pub thermistor: AnyAdcChannel<'static, ADC1>,
@@ -57,9 +58,11 @@ impl Board for Nucleo {
     }
 
     fn show(&mut self, Lamps { ready, light, fault }: Lamps) {
-        for (lamp, lit) in self.lamps.iter_mut().zip([ready, light, fault]) {
-            lamp.set_level(lit.into());
+        if let Some(lamp) = &mut self.lamp_ready {
+            lamp.set_level(ready.into());
         }
+        self.lamp_light.set_level(light.into());
+        self.lamp_fault.set_level(fault.into());
     }
 
     fn feed_watchdog(&mut self) {

@@ -71,6 +71,8 @@ pub struct Fpga {
     pub ospi: Ospi<'static, OCTOSPI1, Async>,
     pub frame_ready: ExtiInput<'static, Async>,
     pub raw_ready: ExtiInput<'static, Async>,
+    #[cfg(feature = "parallel")]
+    pub parallel: crate::parallel::Parallel,
 }
 
 impl HostPort for Fpga {
@@ -92,6 +94,11 @@ impl HostPort for Fpga {
 
     fn raw_ready(&mut self) -> bool {
         self.raw_ready.is_high()
+    }
+
+    #[cfg(feature = "parallel")]
+    fn ring(&mut self) -> Option<&mut nirspi_mcu::Ring> {
+        Some(self.parallel.ring())
     }
 }
 

@@ -12,6 +12,8 @@ mod clocks;
 mod configuration;
 mod depth;
 mod fpga;
+#[cfg(feature = "parallel")]
+mod parallel;
 mod pins;
 
 use board::Nucleo;
@@ -103,11 +105,13 @@ async fn main(spawner: Spawner) {
     watchdog.unleash();
     let mut board = Nucleo {
         led_enable,
-        lamps: [
-            Output::new(pins.lamp_ready, Level::Low, Speed::Low),
-            Output::new(pins.lamp_light, Level::Low, Speed::Low),
-            Output::new(pins.lamp_fault, Level::Low, Speed::Low),
-        ],
+        // The parallel port has the pin of the first lamp.
+        #[cfg(feature = "parallel")]
+        lamp_ready: None,
+        #[cfg(not(feature = "parallel"))]
+        lamp_ready: Some(Output::new(pins.lamp_ready, Level::Low, Speed::Low)),
+        lamp_light: Output::new(pins.lamp_light, Level::Low, Speed::Low),
+        lamp_fault: Output::new(pins.lamp_fault, Level::Low, Speed::Low),
         interlock: Input::new(pins.interlock, Pull::Down),
         adc: Adc::new_with_config(p.ADC1, board::adc_config()),
         thermistor: pins.thermistor.degrade_adc(),
@@ -131,6 +135,15 @@ async fn main(spawner: Spawner) {
         ),
         frame_ready: ExtiInput::new(pins.frame_ready, p.EXTI9, Pull::Down, Interrupts),
         raw_ready: ExtiInput::new(pins.raw_ready, p.EXTI13, Pull::Down, Interrupts),
+        #[cfg(feature = "parallel")]
+        parallel: parallel::Parallel::new(
+            p.DCMI,
+            p.GPDMA1_CH3,
+            (p.PC6, pins.lamp_ready, p.PC8, p.PC9, p.PC11, p.PD3, p.PE5, p.PE6),
+            p.PD9,
+            p.PD8,
+            p.PE3,
+        ),
     };
     let mut configuration = ConfigurationPort {
         spi: Spi::new_blocking(

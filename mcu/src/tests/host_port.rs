@@ -83,7 +83,7 @@ impl HostPort for Port {
 
 impl Port {
     /// Fills bytes beyond the end of the data with zeros, as the FPGA does.
-    fn transfer(&mut self, opcode: u8, into: &mut [u8]) -> Result<(), BusError> {
+    pub(super) fn transfer(&mut self, opcode: u8, into: &mut [u8]) -> Result<(), BusError> {
         self.transfers.push((opcode, into.len()));
         if self.failures > 0 {
             self.failures -= 1;

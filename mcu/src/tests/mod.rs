@@ -20,6 +20,7 @@ mod patience;
 mod safety;
 mod selftest;
 mod silence;
+mod streamed;
 pub(crate) mod support;
 mod timing;
 mod versions;

@@ -31,7 +31,7 @@
 use crate::packet::overhead;
 use crate::samples::{NARROW, Width};
 use crate::{CLOCKS_PER_PATTERN, Crc32, FrameFlags, PATTERNS};
-use core::ops::Range;
+use core::ops::{Range, RangeInclusive};
 
 /// Bytes before the samples.
 pub const HEADER_BYTES: usize = 30;
@@ -70,6 +70,13 @@ pub const fn packet_bytes(patterns: u16, width: Width) -> usize {
     payload + overhead(payload)
 }
 
+/// The lengths that the packet of a frame of so many patterns can have, delimiter included.
+#[must_use]
+pub const fn packet_lengths(patterns: u16, width: Width) -> RangeInclusive<usize> {
+    // COBS adds a byte at least, and one for each 254 at most; the CRC has four, the delimiter one.
+    payload_bytes(patterns, width) + 6..=packet_bytes(patterns, width)
+}
+
 /// Bytes to read of a frame of so many patterns, with which the whole packet has come.
 #[must_use]
 pub const fn read_bytes(patterns: u16, width: Width) -> usize {
@@ -94,14 +101,27 @@ pub fn packet_in(read: &[u8], patterns: u16, width: Width) -> Option<Range<usize
     let is_byte = |byte: &u8| *byte != 0;
     let start = read.iter().position(is_byte)?;
     let end = read.iter().rposition(is_byte)? + 2;
-    let payload = payload_bytes(patterns, width);
-    // COBS adds a byte at least, and one for each 254 at most; the CRC has four, the delimiter one.
-    let fits = (payload + 6..=packet_bytes(patterns, width)).contains(&(end - start));
+    let fits = packet_lengths(patterns, width).contains(&(end - start));
     (fits && end <= read.len()).then_some(start..end)
 }
 
 /// Encoded bytes at the beginning of a packet that tell frames apart: run, sequence and device time.
 pub const BEGINNING_BYTES: usize = 20;
+
+/// Encoded bytes at the beginning of a packet that hold run and sequence.
+pub const NUMBER_BYTES: usize = 10;
+
+/// Number of the run, and number of the frame in the run, of a packet that begins with these bytes.
+#[must_use]
+pub fn numbers(beginning: &[u8; NUMBER_BYTES]) -> (u16, u32) {
+    let mut bytes = Unstuffed { bytes: beginning, left: 0, owes_zero: false };
+    let head: [u8; NUMBER_BYTES - 1] = bytes.array();
+    let [_, run @ .., s0, s1, s2, s3, s4] = head;
+    let number = |bytes: &[u8]| {
+        bytes.iter().rev().fold(0, |number, byte| number << 7 | u32::from(byte & 0x7F))
+    };
+    (number(&run) as u16, number(&[s0, s1, s2, s3, s4]))
+}
 
 /// The samples of a packet, one after the other, straight from its encoded bytes. They count only if the packet
 /// [is intact](Self::is_intact), which shows after the last.

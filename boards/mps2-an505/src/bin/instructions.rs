@@ -11,6 +11,7 @@
 
 use core::hint::black_box;
 use core::panic::PanicInfo;
+use core::sync::atomic::{AtomicU32, Ordering};
 use core::task::Poll;
 use cortex_m::Peripherals;
 use cortex_m::peripheral::SYST;
@@ -22,7 +23,7 @@ use embassy_futures::poll_once;
 use nirspi_app::link::{CameraEnd, HostOut, Link, Packet};
 use nirspi_mcu::{
     BoardInfo, BusError, Camera, HostPort, Inputs, Limits, Micros, NoLoader, PacketSink, PortBus,
-    Ports, Target, Wanted,
+    Ports, Ring, Target, Wanted,
 };
 use nirspi_wire::fpga::{FpgaFrame, Header, MAX_FRAME_BYTES, Sums, frame_bytes};
 use nirspi_wire::host_port::{SEALED_BYTES, seal, unseal};
@@ -44,6 +45,10 @@ const TRANSFER_BYTES: usize = 512;
 const OLDER: u32 = 0x0000_0300;
 /// Bytes of the message in a packet of the FPGA.
 const PAYLOAD_BYTES: usize = ready::HEADER_BYTES + 4 * PATTERNS as usize;
+/// Words of the ring of a parallel port.
+const RING_WORDS: usize = 8 * 1024;
+
+static RING: [AtomicU32; RING_WORDS] = [const { AtomicU32::new(0) }; RING_WORDS];
 
 /// A fake FPGA: registers in memory, and a frame that is ready during every run.
 struct Memory {
@@ -52,6 +57,34 @@ struct Memory {
     running: bool,
     sequence: u32,
     writes: u32,
+    /// A parallel port, and how many bytes it has sent.
+    port: Option<(Ring, usize)>,
+    now: Micros,
+}
+
+impl Memory {
+    fn new(version: u32, has_port: bool) -> Self {
+        let port = has_port.then(|| (Ring::new(&RING), 0));
+        let mut registers = [0; 32];
+        // The signal meter asks for the level once in a tenth of a second, and again if there is none.
+        registers[usize::from(Register::SumLow.address())] = 1;
+        Self { version, registers, running: false, sequence: 0, writes: 0, port, now: Micros(0) }
+    }
+
+    /// Sends the next frame by the parallel port: a zero, the packet, and three to six zeros.
+    fn transmit(&mut self, payload: &mut [u8; PAYLOAD_BYTES], room: &mut [u8]) {
+        self.packet(payload, room);
+        self.sequence += 1;
+        let Some((_, sent)) = &mut self.port else { return };
+        let place = ready::packet_in(room, PATTERNS, Width::Bits32).unwrap_or(1..1);
+        let (words, _) = room[place.start - 1..(place.end + 6).min(room.len())].as_chunks();
+        for word in words {
+            if let Some(place) = RING.get(*sent / 4 % RING_WORDS) {
+                place.store(u32::from_le_bytes(*word), Ordering::Relaxed);
+            }
+            *sent += 4;
+        }
+    }
 }
 
 impl Memory {
@@ -139,6 +172,12 @@ impl HostPort for Memory {
     fn raw_ready(&mut self) -> bool {
         false
     }
+
+    fn ring(&mut self) -> Option<&mut Ring> {
+        let (ring, sent) = self.port.as_mut()?;
+        ring.came(self.now, *sent % (4 * RING_WORDS));
+        Some(ring)
+    }
 }
 
 const CONFIGURATION: Configuration<'static> = Configuration {
@@ -215,17 +254,19 @@ struct Room<'r> {
     frame: &'r mut [u8; MAX_FRAME_BYTES],
     spare: &'r mut [u8; MAX_FRAME_BYTES],
     payload: &'r mut [u8; PAYLOAD_BYTES],
+    /// A packet between zeros.
+    spare_packet: &'r mut [u8; ready::MAX_READ_BYTES],
     command: &'r mut [u8; MAX_HOST_PACKET],
 }
 
-/// Streams [`FRAMES`] frames of gateware of this version.
+/// Streams [`FRAMES`] frames of this FPGA.
 fn stream(
-    version: u32,
+    memory: Memory,
     room: &mut Room<'_>,
     link: &mut CameraEnd<'_>,
     to_host: &mut HostOut<'_, TRANSFER_BYTES>,
 ) -> Cost {
-    let memory = Memory { version, registers: [0; 32], running: false, sequence: 0, writes: 0 };
+    let is_streamed = memory.port.is_some();
     let mut bus = PortBus::new(memory, room.frame).with_spare(Some(room.spare));
     let mut camera =
         Camera::new(BoardInfo::new("counted", "", Version(0, 0, 0)), Limits::default());
@@ -244,6 +285,10 @@ fn stream(
 
     let mut cost = Cost { least: u32::MAX, ..Cost::default() };
     for _ in 0..FRAMES {
+        if is_streamed {
+            bus.port().now = now;
+            bus.port().transmit(room.payload, room.spare_packet);
+        }
         let (_, sink) = link.both();
         let before = cost.between;
         let mut ports = Ports { bus: &mut bus, sink: &mut *sink, loader: &mut NoLoader };
@@ -271,8 +316,8 @@ fn stream(
             }
             None => {}
         }
-        // The firmware checks the FPGA once in a millisecond: here once for each frame.
-        now.0 += 1_000;
+        // The firmware checks the FPGA once in a millisecond: here once for each frame. A ring's round takes less.
+        now.0 += if is_streamed { 125 } else { 1_000 };
         if packs {
             let mut ports = Ports { bus: &mut bus, sink: &mut *sink, loader: &mut NoLoader };
             cost.between += counts(|| {
@@ -294,6 +339,8 @@ fn main() -> ! {
     static FRAME: ConstStaticCell<[u8; MAX_FRAME_BYTES]> = ConstStaticCell::new([0; _]);
     static SPARE: ConstStaticCell<[u8; MAX_FRAME_BYTES]> = ConstStaticCell::new([0; _]);
     static PAYLOAD: ConstStaticCell<[u8; PAYLOAD_BYTES]> = ConstStaticCell::new([0; _]);
+    static SPARE_PACKET: ConstStaticCell<[u8; ready::MAX_READ_BYTES]> =
+        ConstStaticCell::new([0; _]);
     static COMMAND: ConstStaticCell<[u8; MAX_HOST_PACKET]> = ConstStaticCell::new([0; _]);
     static PLACES: ConstStaticCell<[Packet; 4]> = ConstStaticCell::new([Packet::EMPTY; 4]);
     static LINK: StaticCell<Link<'static>> = StaticCell::new();
@@ -308,25 +355,29 @@ fn main() -> ! {
         frame: FRAME.take(),
         spare: SPARE.take(),
         payload: PAYLOAD.take(),
+        spare_packet: SPARE_PACKET.take(),
         command: COMMAND.take(),
     };
     let (mut link, _, mut to_host) = LINK.init(Link::new(PLACES.take())).split();
-    let packets = stream(Register::Version.reset(), &mut room, &mut link, &mut to_host);
-    let older = stream(OLDER, &mut room, &mut link, &mut to_host);
-    let memory =
-        Memory { version: OLDER, registers: [0; 32], running: false, sequence: 0, writes: 0 };
+    let today = Register::Version.reset();
+    let packets = stream(Memory::new(today, false), &mut room, &mut link, &mut to_host);
+    let older = stream(Memory::new(OLDER, false), &mut room, &mut link, &mut to_host);
+    let streamed = stream(Memory::new(today, true), &mut room, &mut link, &mut to_host);
+    let memory = Memory::new(OLDER, false);
     let [check, pack, send] = parts(&memory, room.frame);
     // The last frame of older gateware still waits.
     const PACKED: u32 = FRAMES - 1;
     let least = 4 * u32::from(PATTERNS);
-    if packets.bytes < FRAMES * least || older.bytes < PACKED * least {
-        hprintln!("no frames came: {} and {} bytes", packets.bytes, older.bytes);
+    let bytes = [packets.bytes, older.bytes, streamed.bytes];
+    if bytes[0].min(bytes[2]) < FRAMES * least || bytes[1] < PACKED * least {
+        hprintln!("no frames came: {:?} bytes", bytes);
         exit(EXIT_FAILURE);
     }
     hprintln!("packet_link_bytes {}", packets.bytes / FRAMES);
     hprintln!("packet_forwarding {}", packets.between * GRAIN / FRAMES);
     hprintln!("packet_without_meter {}", packets.least * GRAIN);
     hprintln!("packet_merging {}", packets.merging * GRAIN / FRAMES);
+    hprintln!("streamed_packet {}", streamed.least * GRAIN);
     hprintln!("fpga_bytes {}", frame_bytes(PATTERNS));
     hprintln!("link_bytes {}", older.bytes / PACKED);
     hprintln!("between_transfers {}", older.between * GRAIN / FRAMES);

@@ -1,0 +1,580 @@
+//! Tests of runs whose packets come by the FPGA's parallel port: a ring that a DMA channel fills, in front of the
+//! camera.
+
+use super::fake_fpga::FakeFpga;
+use super::host_port::Port;
+use super::support::*;
+use crate::{
+    BoardInfo, BusError, Camera, FpgaBus, HostPort, Limits, Micros, NoLoader, PortBus, Ports, Ring,
+};
+use core::sync::atomic::{AtomicU32, Ordering};
+use nirspi_wire::fpga::MAX_FRAME_BYTES;
+use nirspi_wire::host_port::SEALED_BYTES;
+use nirspi_wire::packet::open;
+use nirspi_wire::register::{Register, control, mode};
+use nirspi_wire::{
+    Answer, Command, Configuration, DeviceMessage, EventKind, Fault, Reply, RunLength, State,
+    version,
+};
+use proptest::prelude::*;
+use std::boxed::Box;
+use std::vec::Vec;
+
+const WORDS: usize = 1024;
+
+/// A host port beside a parallel port.
+struct Wired {
+    port: Port,
+    ring: Ring,
+    words: &'static [AtomicU32; WORDS],
+    fifo: Vec<u8>,
+    written: usize,
+    now: Micros,
+}
+
+impl Wired {
+    fn new() -> Self {
+        let words: &'static [AtomicU32; WORDS] =
+            Box::leak(Box::new([const { AtomicU32::new(0) }; WORDS]));
+        let mut port = Port::default();
+        port.fpga.make_packets();
+        Self { port, ring: Ring::new(words), words, fifo: Vec::new(), written: 0, now: Micros(0) }
+    }
+
+    fn fpga(&mut self) -> &mut FakeFpga {
+        &mut self.port.fpga
+    }
+
+    /// The FPGA's port sends these bytes, and the DMA moves the whole words among them.
+    fn send(&mut self, bytes: &[u8]) {
+        self.fifo.extend(bytes);
+        let whole = self.fifo.len() / 4 * 4;
+        for word in self.fifo.drain(..whole).collect::<Vec<_>>().chunks(4) {
+            let value = u32::from_le_bytes(word.try_into().unwrap());
+            self.words[self.written / 4 % WORDS].store(value, Ordering::Relaxed);
+            self.written += 4;
+        }
+    }
+
+    /// The FPGA's port sends the frames that wait, after `spoil` has changed the first.
+    fn transmit(&mut self, spoil: impl FnOnce(&mut Vec<u8>)) -> Vec<Vec<u8>> {
+        let mut spoil = Some(spoil);
+        let mut sent = Vec::new();
+        while let Some(mut packet) = self.fpga().frame.clone() {
+            self.fpga().write(Register::Control.address(), control::RELEASE).unwrap();
+            sent.push(packet.clone());
+            if let Some(spoil) = spoil.take() {
+                spoil(&mut packet);
+            }
+            self.send(&[&[0], &packet[..], &[0; 3]].concat());
+        }
+        sent
+    }
+}
+
+impl HostPort for Wired {
+    fn write(&mut self, address: u16, sealed: [u8; SEALED_BYTES]) -> Result<(), BusError> {
+        self.port.write(address, sealed)
+    }
+
+    fn read(&mut self, address: u16) -> Result<[u8; SEALED_BYTES], BusError> {
+        self.port.read(address)
+    }
+
+    fn frame_ready(&mut self) -> bool {
+        self.port.fpga.raw.is_none()
+            && self.port.fpga.get(Register::Mode) & mode::PARALLEL == 0
+            && self.port.frame_ready()
+    }
+
+    fn raw_ready(&mut self) -> bool {
+        self.port.raw_ready()
+    }
+
+    fn ring(&mut self) -> Option<&mut Ring> {
+        self.ring.came(self.now, self.written % (4 * WORDS));
+        Some(&mut self.ring)
+    }
+}
+
+/// A camera whose board has both ports.
+struct Device {
+    camera: Camera,
+    bus: PortBus<'static, Wired>,
+    link: Link,
+    now: Micros,
+}
+
+impl Device {
+    fn new() -> Self {
+        let info = BoardInfo::new("bench", "0001", nirspi_wire::Version(1, 2, 3));
+        let bus = PortBus::new(Wired::new(), Box::leak(Box::new([0; MAX_FRAME_BYTES])));
+        let camera = Camera::new(info, Limits::default());
+        let mut device = Self { camera, bus, link: Link::default(), now: Micros(1_000) };
+        device.ask(Command::Hello { protocol: version::CURRENT });
+        device
+    }
+
+    fn running(length: RunLength) -> Self {
+        let mut device = Self::new();
+        device.start(SMALL, length);
+        device
+    }
+
+    fn start(&mut self, configuration: Configuration<'_>, length: RunLength) {
+        let answer = self.ask(Command::Configure(configuration));
+        assert!(
+            matches!(answer[..], [DeviceMessage::Reply(Reply { outcome: Ok(_), .. })]),
+            "{answer:?}"
+        );
+        let answer = self.ask(Command::Start(length));
+        assert!(
+            matches!(answer[..], [DeviceMessage::Reply(Reply { outcome: Ok(_), .. })]),
+            "{answer:?}"
+        );
+    }
+
+    fn fpga(&mut self) -> &mut FakeFpga {
+        self.bus.port().fpga()
+    }
+
+    /// So much time passes, in which no whole round of the ring can come.
+    fn after(&mut self, micros: u64, bytes: &[u8]) {
+        self.now.0 += micros;
+        let now = self.now;
+        self.bus.port().now = now;
+        let ports = &mut Ports { bus: &mut self.bus, sink: &mut self.link, loader: &mut NoLoader };
+        let taken = self.camera.receive(now, bytes, &GOOD_INPUTS, ports);
+        assert_eq!(taken, bytes.len());
+        self.camera.poll(now, &GOOD_INPUTS, ports);
+    }
+
+    fn turn(&mut self) {
+        self.after(10, &[]);
+    }
+
+    fn turns(&mut self, turns: u32) {
+        for _ in 0..turns {
+            self.turn();
+        }
+    }
+
+    fn ask(&mut self, command: Command<'_>) -> Vec<DeviceMessage<'static>> {
+        self.after(10, &packet(1, command));
+        self.turns(2);
+        self.heard()
+    }
+
+    /// The FPGA makes a frame and sends it.
+    fn frame(&mut self) -> Vec<u8> {
+        self.fpga().make_frame();
+        self.bus.port().transmit(|_| {}).remove(0)
+    }
+
+    fn heard(&mut self) -> Vec<DeviceMessage<'static>> {
+        self.link.packets.drain(..).map(|packet| message(&packet)).collect()
+    }
+
+    /// Stops the run, lets the patience with missing frames pass, and returns the event of its end.
+    fn end(&mut self) -> (Vec<DeviceMessage<'static>>, EventKind) {
+        let mut heard = self.ask(Command::Stop);
+        self.bus.port().transmit(|_| {});
+        self.turns(40);
+        self.after(100_001, &[]);
+        self.turns(2);
+        heard.extend(self.heard());
+        let [event] = events(&heard)[..] else { panic!("{heard:?}") };
+        (heard, event)
+    }
+}
+
+fn ended(made: u32, dropped: u32, lost: u32, corrupt: u32) -> EventKind {
+    EventKind::RunEnded {
+        run: 1,
+        frames_made: made,
+        frames_dropped: dropped,
+        fpga_frames_lost: lost,
+        fpga_frames_corrupt: corrupt,
+    }
+}
+
+fn sequences(heard: &[DeviceMessage<'static>]) -> Vec<u32> {
+    frames(heard).iter().map(|frame| frame.sequence).collect()
+}
+
+#[test]
+fn a_packet_goes_from_the_ring_to_the_host_as_the_fpga_made_it() {
+    let mut device = Device::running(RunLength::Continuous);
+    for _ in 0..100 {
+        let made = device.frame();
+        device.turn();
+        assert_eq!(device.link.packets, [made]);
+        device.link.packets.clear();
+    }
+    assert_eq!(device.bus.port().port.transfers, [], "nothing goes by the host port");
+    assert_eq!(device.end().1, ended(100, 0, 0, 0));
+}
+
+/// The FPGA of a board without wires to the port, older gateware, and frames that come slowly.
+#[test]
+fn packets_leave_by_the_parallel_port_only_where_there_is_one_and_frames_are_fast() {
+    // Four patterns and complements of 5 clocks are 40 clocks a sweep, and 27 500 clocks are 220 us.
+    let cases = [(0x0305, 1, false), (0x0306, 1, true), (0x0306, 687, true), (0x0306, 688, false)];
+    for (version, sweeps, streams) in cases {
+        let mut device = Device::new();
+        device.fpga().registers.insert(Register::Version.address(), version);
+        device.start(Configuration { sweeps, ..SMALL }, RunLength::Continuous);
+        let found = device.fpga().get(Register::Mode);
+        assert_eq!(found & mode::PARALLEL != 0, streams, "{version:#x}, {sweeps} sweeps");
+        assert_ne!(found & mode::PACKETS, 0);
+    }
+    let mut bench = Bench::open();
+    bench.fpga.make_packets();
+    bench.ask(Command::Configure(SMALL)).unwrap();
+    assert_eq!(bench.fpga.get(Register::Mode) & mode::PARALLEL, 0, "no ring");
+    // Sums that a packet has no room for.
+    let mut device = Device::new();
+    device.start(Configuration { patterns: 1, sweeps: 1 << 17, ..SMALL }, RunLength::Continuous);
+    assert_eq!(device.fpga().get(Register::Mode) & mode::PARALLEL, 0);
+}
+
+#[test]
+fn a_run_of_so_many_frames_ends_with_the_last() {
+    let mut device = Device::running(RunLength::Frames(3));
+    for _ in 0..3 {
+        device.frame();
+    }
+    device.turns(5);
+    let heard = device.heard();
+    assert_eq!(sequences(&heard), [0, 1, 2]);
+    assert_eq!(events(&heard), [ended(3, 0, 0, 0)]);
+    assert_eq!(device.camera.state(), State::Configured);
+}
+
+#[test]
+fn frames_that_wait_at_a_stop_still_come() {
+    let mut device = Device::running(RunLength::Continuous);
+    device.fpga().two_wait = true;
+    device.frame();
+    device.fpga().make_frame();
+    device.fpga().make_frame();
+    let (heard, event) = device.end();
+    assert_eq!(sequences(&heard), [0, 1, 2]);
+    assert_eq!(event, ended(3, 0, 0, 0));
+}
+
+#[test]
+fn a_full_link_drops_whole_packets_and_the_ring_goes_on() {
+    let mut device = Device::running(RunLength::Continuous);
+    device.link.room = 2;
+    for _ in 0..200 {
+        device.frame();
+        device.turn();
+    }
+    device.link.room = usize::MAX;
+    device.frame();
+    device.turn();
+    assert_eq!(sequences(&device.heard()), [0, 1, 200]);
+    assert_eq!(device.end().1, ended(201, 198, 0, 0));
+}
+
+/// The loop stood still while the DMA went round: some packets are gone, and the next ones come.
+#[test]
+fn packets_that_the_dma_has_overwritten_count_as_damaged() {
+    let mut device = Device::running(RunLength::Continuous);
+    device.frame();
+    device.turn();
+    for _ in 0..100 {
+        device.frame();
+    }
+    // As long as the FPGA takes to send more than a round.
+    device.after(150, &[]);
+    device.frame();
+    device.turns(2);
+    assert_eq!(sequences(&device.heard()), [0, 101]);
+    let Ok(status) = device.status() else { panic!() };
+    assert_eq!((status.frames_sent, status.fpga_frames_corrupt), (2, 100), "at once");
+    assert_eq!(device.end().1, ended(102, 0, 0, 100));
+}
+
+#[test]
+fn frames_that_the_fpga_has_lost_are_not_damaged() {
+    let mut device = Device::running(RunLength::Continuous);
+    device.frame();
+    for _ in 0..3 {
+        device.fpga().make_frame();
+    }
+    device.bus.port().transmit(|_| {});
+    device.frame();
+    device.turns(5);
+    assert_eq!(sequences(&device.heard()), [0, 1, 4]);
+    let Ok(status) = device.status() else { panic!() };
+    assert_eq!((status.fpga_frames_lost, status.fpga_frames_corrupt), (2, 0));
+    assert_eq!(device.end().1, ended(5, 0, 2, 0));
+}
+
+/// The FPGA's clock was lost in a packet, and a start cuts what is left: no run gets a packet of another.
+#[test]
+fn a_run_gets_no_packet_of_the_run_before() {
+    for cut in [7, 20, 70] {
+        let mut device = Device::running(RunLength::Continuous);
+        device.fpga().make_frame();
+        let last = device.fpga().frame.take().unwrap();
+        device.bus.port().send(&[&[0], &last[..cut.min(last.len())]].concat());
+        let (heard, event) = device.end();
+        assert_eq!((sequences(&heard), event), (Vec::new(), ended(1, 0, 0, 1)));
+        // What was on its way comes after the start.
+        device.after(10, &packet(2, Command::Start(RunLength::Frames(2))));
+        device.bus.port().send(&[&last[cut.min(last.len())..], &[0; 3]].concat());
+        device.frame();
+        device.frame();
+        device.turns(9);
+        let heard = device.heard();
+        assert_eq!(sequences(&heard), [0, 1]);
+        let [EventKind::RunEnded { run: 2, frames_made: 2, fpga_frames_corrupt: 0, .. }] =
+            events(&heard)[..]
+        else {
+            panic!("{heard:?}");
+        };
+    }
+}
+
+/// A whole packet of the run before that comes after the start of the next one is recognised by its number.
+#[test]
+fn a_late_packet_is_not_taken_for_one_of_the_next_run() {
+    let mut device = Device::running(RunLength::Continuous);
+    let first = device.frame();
+    device.turn();
+    device.end();
+    device.after(10, &packet(2, Command::Start(RunLength::Frames(2))));
+    device.bus.port().send(&[&[0], &first[..], &[0; 3]].concat());
+    device.turns(3);
+    assert_eq!(sequences(&device.heard()), []);
+    device.frame();
+    device.frame();
+    device.turns(5);
+    assert_eq!(sequences(&device.heard()), [0, 1]);
+}
+
+/// The firmware counts its runs from 1 again after a restart, and the FPGA may send what it still has.
+#[test]
+fn packets_from_before_a_restart_are_not_taken_for_those_of_the_first_run() {
+    let old = Device::running(RunLength::Continuous).frame();
+    let mut device = Device::new();
+    device.ask(Command::Configure(SMALL));
+    device.bus.port().send(&[&[0], &old[..], &[0; 3]].concat());
+    let heard = device.ask(Command::Start(RunLength::Frames(1)));
+    assert_eq!(sequences(&heard), []);
+    let new = device.frame();
+    device.turn();
+    assert_eq!(device.link.packets[0], new);
+}
+
+/// Number of the frame, with a wrong bit: the next ones must not be taken for old ones.
+#[test]
+fn a_number_that_the_wires_have_damaged_ends_no_run() {
+    for bit in 0..8 {
+        let mut device = Device::running(RunLength::Continuous);
+        device.frame();
+        device.turn();
+        device.fpga().make_frame();
+        // The fourth byte of the sequence.
+        device.bus.port().transmit(|packet| packet[8] ^= 1 << bit);
+        for _ in 0..3 {
+            device.frame();
+            device.turn();
+        }
+        device.turns(3);
+        let intact: Vec<_> =
+            device.link.packets.drain(..).filter_map(|packet| is_intact(&packet)).collect();
+        assert_eq!(intact, [0, 2, 3, 4], "bit {bit}");
+        let (_, EventKind::RunEnded { frames_made: 5, frames_dropped: 0, .. }) = device.end()
+        else {
+            panic!()
+        };
+    }
+}
+
+/// Number of the frame in a packet that is intact.
+fn is_intact(packet: &[u8]) -> Option<u32> {
+    let (_, encoded) = packet.split_last()?;
+    match open::<DeviceMessage<'_>>(&mut encoded.to_vec()) {
+        Ok(DeviceMessage::Frame(frame)) => Some(frame.sequence),
+        _ => None,
+    }
+}
+
+/// No wire, no clock on the wire, or a receiver that is never ready.
+#[test]
+fn a_run_whose_packets_never_come_ends_in_a_fault() {
+    let mut device = Device::running(RunLength::Continuous);
+    for _ in 0..30 {
+        device.fpga().make_frame();
+        device.after(10_000, &[]);
+    }
+    assert_eq!(device.camera.state(), State::Fault);
+    device.after(100_001, &[]);
+    device.turns(3);
+    let heard = device.heard();
+    let [EventKind::Fault(Fault::FpgaStalled), EventKind::RunEnded { .. }] = events(&heard)[..]
+    else {
+        panic!("{heard:?}");
+    };
+}
+
+#[test]
+fn a_self_test_and_a_burst_use_the_host_port_and_the_run_after_them_the_ring() {
+    let mut device = Device::new();
+    device.ask(Command::Configure(SMALL));
+    device.fpga().instant = true;
+    let serve = |device: &mut Device, command| {
+        device.after(10, &packet(1, command));
+        let mut heard = Vec::new();
+        for _ in 0..4 {
+            if let Some(crate::Wanted { port, opcode, into: crate::Target::Bus { bytes, .. } }) =
+                device.bus.wanted()
+            {
+                let done = port.port.transfer(opcode, bytes);
+                device.bus.transferred(done);
+            }
+            device.turn();
+            heard.extend(device.heard());
+        }
+        heard
+    };
+    let heard = serve(&mut device, Command::SelfTest);
+    let [DeviceMessage::Reply(Reply { outcome: Ok(Answer::SelfTest(report)), .. })] = heard[..]
+    else {
+        panic!("{heard:?}");
+    };
+    assert_eq!(report.failed, 0, "{report:?}");
+    let heard = serve(&mut device, Command::RawBurst { samples: 8 });
+    assert!(matches!(heard[..], [_, DeviceMessage::Raw(_)]), "{heard:?}");
+    device.fpga().instant = false;
+    device.ask(Command::Start(RunLength::Frames(1)));
+    device.frame();
+    device.turns(3);
+    assert_eq!(sequences(&device.heard()), [0]);
+}
+
+impl Device {
+    fn status(&mut self) -> Result<nirspi_wire::Status, Vec<DeviceMessage<'static>>> {
+        let heard = self.ask(Command::Status);
+        match heard[..] {
+            [DeviceMessage::Reply(Reply { outcome: Ok(Answer::Status(status)), .. })] => Ok(status),
+            _ => Err(heard),
+        }
+    }
+}
+
+/// The signal meter asks the FPGA for the level of the frame that is being sent, which is a later one; between two
+/// frames there is none, and the meter tries again at its next time.
+#[test]
+fn the_meter_shows_a_signal_while_frames_are_being_sent() {
+    let mut device = Device::running(RunLength::Continuous);
+    device.fpga().two_wait = true;
+    for is_sending in [false, true] {
+        for _ in 0..6 {
+            device.frame();
+            if is_sending {
+                device.fpga().make_frame();
+            }
+            device.turns(3);
+            // The meter looks ten times a second.
+            device.after(30_000, &[]);
+        }
+        device.heard();
+        let signal = device.status().unwrap().signal;
+        assert_eq!(signal.0.unwrap().is_some(), is_sending);
+    }
+}
+
+#[derive(Debug, Clone)]
+enum Step {
+    Make,
+    Transmit,
+    Spoil(prop::sample::Index, u8),
+    Cut(prop::sample::Index),
+    Turn,
+    Room(usize),
+    Pause,
+    Status,
+}
+
+proptest! {
+    #[test]
+    fn whatever_happens_to_the_ring_every_frame_is_counted_once(
+        steps in prop::collection::vec(
+            prop_oneof![
+                6 => Just(Step::Make),
+                5 => Just(Step::Transmit),
+                1 => (any::<prop::sample::Index>(), 1..=255u8).prop_map(|(at, bits)| Step::Spoil(at, bits)),
+                1 => any::<prop::sample::Index>().prop_map(Step::Cut),
+                6 => Just(Step::Turn),
+                1 => (0..5usize).prop_map(Step::Room),
+                1 => Just(Step::Pause),
+                1 => Just(Step::Status),
+            ],
+            1..200,
+        ),
+        two_wait: bool,
+    ) {
+        let mut device = Device::running(RunLength::Continuous);
+        device.fpga().two_wait = two_wait;
+        let (mut made, mut got) = (Vec::new(), Vec::new());
+        for step in steps {
+            match step {
+                Step::Make => device.fpga().make_frame(),
+                Step::Transmit => made.extend(device.bus.port().transmit(|_| {})),
+                Step::Spoil(at, bits) => made.extend(device.bus.port().transmit(|packet| {
+                    let at = at.index(packet.len());
+                    packet[at] ^= bits;
+                })),
+                Step::Cut(at) => made.extend(device.bus.port().transmit(|packet| {
+                    packet.truncate(at.index(packet.len()));
+                })),
+                Step::Turn => device.turn(),
+                Step::Room(room) => device.link.room = room,
+                Step::Pause => device.after(200, &[]),
+                Step::Status => {
+                    device.link.room = device.link.room.max(1);
+                    device.after(10, &packet(9, Command::Status));
+                }
+            }
+            got.append(&mut device.link.packets);
+        }
+        device.link.room = usize::MAX;
+        device.after(10, &packet(8, Command::Stop));
+        made.extend(device.bus.port().transmit(|_| {}));
+        device.turns(200);
+        device.after(100_001, &[]);
+        device.turns(3);
+        got.append(&mut device.link.packets);
+
+        let fpga = device.fpga();
+        let (frames_made, fpga_frames_lost) = (fpga.made, fpga.lost);
+        let mut sent = 0;
+        let mut last = None;
+        let mut counts = None;
+        for packet in got {
+            let (_, encoded) = packet.split_last().unwrap();
+            let mut encoded = encoded.to_vec();
+            match open::<DeviceMessage<'_>>(&mut encoded) {
+                Ok(DeviceMessage::Frame(frame)) => {
+                    prop_assert!(last < Some(frame.sequence), "{last:?}, then {}", frame.sequence);
+                    last = Some(frame.sequence);
+                    prop_assert!(made.contains(&packet), "the FPGA has sent no such packet");
+                    sent += 1;
+                }
+                Ok(DeviceMessage::Event(event)) => counts = Some(event.kind),
+                Ok(_) => {}
+                // A damaged frame, which the host sees by its checksum.
+                Err(_) => sent += 1,
+            }
+        }
+        let Some(EventKind::RunEnded { run: 1, frames_made: told, frames_dropped, fpga_frames_lost: lost, fpga_frames_corrupt }) = counts
+        else { panic!("{counts:?}") };
+        prop_assert_eq!((told, lost), (frames_made, fpga_frames_lost));
+        prop_assert_eq!(told, sent + frames_dropped + lost + fpga_frames_corrupt);
+    }
+}
