@@ -208,3 +208,14 @@ fn images_that_start_from_those_before_are_switched_on_by_an_option_and_off_by_t
         bench.run(&[&start[..], method].concat()).failed(2, &[words]);
     }
 }
+
+#[test]
+fn a_change_while_the_camera_is_prepared_holds_for_the_first_run() {
+    let bench = Bench::new();
+    let server = serve(&bench, &["--method", "hadamard"]);
+    for order in ["natural", "zig-zag"] {
+        server.change(&json!({ "order": order }).to_string()).json();
+    }
+    let state = server.state("measuring", measuring);
+    assert_eq!(state["camera"]["measurement"]["order"], "zig-zag");
+}
