@@ -112,9 +112,11 @@ mod tests {
     use std::sync::atomic::{AtomicU32, Ordering};
 
     /// Distance of the scene from the camera, in millimetres.
-    const DISTANCE_MM: f64 = 600.0;
+    const DISTANCE_MM: f64 = 300.0;
     /// Motion of the scene from frame to frame, in pixels of the camera.
     const STEP_PX: f64 = 0.5;
+    /// Frames that an image sums.
+    const FRAMES: u32 = 16;
 
     /// The scene, this many pixels of the camera further to the right.
     fn moved(map: &SceneMap, pixels: f64) -> SceneMap {
@@ -145,14 +147,14 @@ mod tests {
         };
         let settling = calibrate_against_white(&before(0), 1).unwrap();
         let method = Method::TIKHONOV.prepare(&MethodSettings::default()).unwrap();
-        let settings = Settings { warm_start: true, frames: 1, ..settings() };
+        let settings = Settings { warm_start: true, frames: FRAMES, ..settings() };
         let (mut moving, mut run) = (Moving::default(), None);
         let (mut recursive, mut alone) = (Vec::new(), Vec::new());
         for k in 0..10 {
             let shot = |optics: &VirtualOptics| -> Shot {
                 let setup = optics.setup(&Order::ZigZag, 1.0).unwrap();
                 let mut go_on = |_: &_| ControlFlow::Continue(());
-                shoot(optics, setup, &settling, 1, k + 1, &mut go_on).unwrap()
+                shoot(optics, setup, &settling, FRAMES, k + 1, &mut go_on).unwrap()
             };
             let truth = hadamard(&shot(&before(k).noiseless()).measurements().unwrap());
             let made = shot(&before(k));
@@ -166,7 +168,7 @@ mod tests {
                 run: Arc::clone(run),
                 depth: None,
                 arrived: Instant::now(),
-                newest: k + 1,
+                newest: u64::from(FRAMES) * (k + 1),
             };
             assert!(moving.awaits(&look, &settings));
             let image = moving.image(method.as_ref(), &measurements, &look, &settings).unwrap();

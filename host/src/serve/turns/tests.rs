@@ -118,8 +118,9 @@ fn are_those_of_a_video(method: Method, made: &[(Value, Measurements)]) {
         let sent = BASE64.encode(&pixels.collect::<Vec<u8>>());
         assert_eq!(message["image"], sent, "{method}, image {at}");
         let past = &message["state"]["picture"]["past"];
-        assert_eq!(past.is_string(), at > 0, "{method}, image {at}: {past}");
+        assert_eq!(past.is_string(), frame.report.warm, "{method}, image {at}: {past}");
     }
+    assert!(!video[0].report.warm && video[4].report.warm, "{method}");
 }
 
 #[test]
