@@ -3,17 +3,16 @@
 use super::calibration::CalibrationArgs;
 use super::camera::{CameraArgs, SceneArgs, SetupArgs};
 use super::method::MethodArgs;
-use super::stop_on_signal;
-use super::{address, print};
+use super::{Usage, address, print, stop_on_signal};
 use anyhow::{Context, Result, bail};
 use nirspi::calibration::Choice;
 use nirspi::link::CameraAddress;
-use nirspi::serve::settings::{MAX_FRAMES, Measuring, Settings};
+use nirspi::serve::settings::{MAX_FRAMES, Settings};
 use nirspi::serve::{CameraSource, Connect, Connected, Imaging, Server, StagedScene, Token, serve};
 use nirspi::session::Session;
 use nirspi::setup::MeasurementSetup;
 use nirspi::virtual_camera::MemoryLink;
-use nirspi_nets::{Device, deblur::Model};
+use nirspi_nets::Device;
 use nirspi_recon::omp::Backend;
 use nirspi_recon::{Sampling, Side};
 use std::path::PathBuf;
@@ -53,6 +52,10 @@ pub struct Args {
     #[arg(long, alias = "frames", value_name = "N", default_value_t = 64,
           value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_FRAMES)))]
     sum: u32,
+    /// Start each image from the images before, moved with the scene. Each frame is then in one image only: a new image
+    /// comes after --sum new frames
+    #[arg(long)]
+    warm_start: bool,
     #[command(flatten)]
     camera: CameraArgs,
     #[command(flatten)]
@@ -81,14 +84,14 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let imaging =
         Imaging::new(&args.method.settings_for(Side::INSTRUMENT.pixels())?, device(args)?)?;
     let settings = Settings {
-        method: args.method.method.argument(),
         strength: args.method.strength,
-        enhance: true,
-        model: Model::DIFFUSION.name(),
-        frames: args.sum,
-        measuring: Measuring::of(&setup),
-        record: false,
+        warm_start: args.warm_start,
+        ..Settings::new(args.method.method, args.sum, &setup)
     };
+    if args.warm_start {
+        let refused = |why| Usage(format!("--warm-start: {why}"));
+        imaging.check_warm_start(settings.method).map_err(refused)?;
+    }
     let stop = stop_on_signal()?;
     let session = address::open(&args.camera.camera, &args.scene)?;
     let connected = prepared(session, &args.calibration, &setup)?;

@@ -459,6 +459,23 @@ mod tests {
     }
 
     #[test]
+    fn the_past_costs_the_learned_prior_no_scene_half_a_decibel_and_adds_to_slow_motion() {
+        for (shown, noise) in [(LOWEST, 0.1), (LOWEST, 0.01), (Shown::Turns, 0.1)] {
+            let gains: Vec<(Motion, f64)> = Motion::ALL
+                .par_iter()
+                .map(|&motion| {
+                    (motion, gain(Method::PRIOR, motion, shown, noise, 16, 1).unwrap().db())
+                })
+                .collect();
+            for (motion, db) in &gains {
+                assert!(*db > -0.5, "{motion}, {shown:?}, noise {noise}: {db:.2} dB");
+            }
+            let slow = gains[1].1;
+            assert!(noise < 0.1 || slow > 0.5, "{shown:?}: {slow:.2} dB at 0.1 px a frame");
+        }
+    }
+
+    #[test]
     fn a_letter_goes_to_and_fro_at_its_speed() {
         let places: Vec<f64> = (0..30).map(|k| to_and_fro(f64::from(k), 6.0)).collect();
         assert!(places.windows(2).all(|w| ((w[1] - w[0]).abs() - 1.0).abs() < 1e-12));

@@ -38,7 +38,7 @@ pub use method::{Method, MethodSettings, OwnAtoms, ParseMethodError, Reconstruct
 pub use methods::hadamard;
 pub use own_atoms::omp_over;
 pub use own_matrix::{MatrixError, MatrixMethod, MatrixReconstruction, MatrixSettings, OwnMatrix};
-pub use recursive::{Recursive, RecursiveFrame, RecursiveSettings, fused_frame};
+pub use recursive::{Recursive, RecursiveFrame, RecursiveSettings, believed_frame, fused_frame};
 pub use regularised::{Penalty, Regularised, RegularisedSettings, Strength, regularised};
 pub use report::{Reconstruction, Report};
 pub use video::{VideoFrame, omp_video};

@@ -139,6 +139,8 @@ impl BurstListener<'_> {
             let asked = Instant::now();
             while !self.is_whole() && asked.elapsed() < ASK_EVERY {
                 if !self.inner.goes_on() {
+                    // A camera that runs takes no other setup, and a burst is a run.
+                    session.command(request::Stop, self)?;
                     return Err(CalibrationError::Stopped);
                 }
                 session.listen(Duration::from_millis(50), self)?;

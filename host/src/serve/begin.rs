@@ -2,7 +2,7 @@
 
 use super::imaging::ImagingError;
 use super::line::Line;
-use super::settings::{Measuring, Settings};
+use super::settings::Settings;
 use super::{CameraSource, Connected, ForeignError, Imaging, StagedScene, Turns};
 use crate::capture::Calibration;
 use crate::link::Link;
@@ -12,7 +12,7 @@ use crate::session::Session;
 use crate::setup::MeasurementSetup;
 #[cfg(feature = "virtual-camera")]
 use crate::virtual_camera::{ShotError, VirtualOpticsError};
-use nirspi_nets::{Device, deblur::Model};
+use nirspi_nets::Device;
 use nirspi_optics::CameraModel;
 use nirspi_recon::reconstruct::{Method, MethodSettings};
 use nirspi_recon::{Order, RowsError};
@@ -89,15 +89,7 @@ impl Turns {
         let network = Some(nirspi_nets::prior::shipped());
         let methods = MethodSettings { network, ..MethodSettings::default() };
         let imaging = Imaging::new(&methods, Device::cpu())?;
-        let settings = Settings {
-            method: Method::default().argument(),
-            strength: None,
-            enhance: true,
-            model: Model::DIFFUSION.name(),
-            frames: 64,
-            measuring: Measuring::of(&source.setup),
-            record: false,
-        };
+        let settings = Settings::new(Method::default(), 64, &source.setup);
         Self::new(source, imaging, settings, line).map_err(TurnsError::Camera)
     }
 }

@@ -463,14 +463,15 @@ impl Observer for Live {
         let Some((run, newest)) = &mut self.now else { return };
         self.shared.passed(Passed::Counted, self.arrived);
         newest.push(frame, lock(&self.shared.settings).frames as usize);
+        self.offered += 1;
         let look = Look {
             sum: newest.sum(),
             run: Arc::clone(run),
             depth: self.depth.clone(),
             arrived: self.arrived,
+            newest: self.offered,
         };
         self.shared.slot.offer(look, self.earlier + *counters);
-        self.offered += 1;
     }
 
     fn message(&mut self, message: &DeviceMessage<'_>) {

@@ -3,7 +3,8 @@
 
 use super::delays::Passed;
 use super::line::Line;
-use super::settings::{Offer, Settings};
+use super::moving::Moving;
+use super::settings::{Offer, Settings, alternatives};
 use super::slot::{DepthImage, Look};
 use super::state::{Light, Offered, Published, Rate, Rates, State};
 use super::{Shared, lock};
@@ -16,7 +17,7 @@ use crate::integrate::IntegrateError;
 use nirspi_nets::deblur::Model;
 use nirspi_nets::{Device, Method as Network, Networks, WeightsError};
 use nirspi_recon::reconstruct::{
-    Method, MethodSettings, Reconstruct, ReconstructError, Setting, Strength,
+    Method, MethodSettings, Reconstruct, ReconstructError, Reconstruction, Setting, Strength,
 };
 use nirspi_recon::{Measurements, Side};
 use serde::Serialize;
@@ -56,6 +57,17 @@ pub enum ImagingError {
     /// The built-in weights.
     #[error(transparent)]
     Weights(#[from] WeightsError),
+    /// The method makes each image by itself.
+    #[error(
+        "{method} makes each image by itself; {} can start from the images before",
+        alternatives(.methods)
+    )]
+    WarmStart {
+        /// The method.
+        method: &'static str,
+        /// The methods whose images can start from the images before.
+        methods: Vec<&'static str>,
+    },
 }
 
 /// The methods and networks that make images.
@@ -112,14 +124,34 @@ impl Imaging {
         let with_strength = |prepared: &&Prepared| {
             prepared.built_in.is_some_and(|(method, _)| method.takes(Setting::Strength))
         };
+        let with_warm_start =
+            |prepared: &&Prepared| matches!(prepared.method.begin_video(), Ok(Some(_)));
         let about =
             |prepared: &Prepared| prepared.built_in.map_or("", |(method, _)| method.about());
         Offer {
             methods: self.methods.iter().map(|prepared| prepared.name).collect(),
             about: self.methods.iter().map(about).collect(),
             with_strength: self.methods.iter().filter(with_strength).map(|p| p.name).collect(),
+            with_warm_start: self.methods.iter().filter(with_warm_start).map(|p| p.name).collect(),
             models: self.models.iter().map(|model| model.name()).collect(),
             ..Offer::default()
+        }
+    }
+
+    /// Whether the images of the method of this name can start from the images before. A command
+    /// line is refused if they cannot; pages ignore a setting that the method does not use.
+    ///
+    /// # Errors
+    /// [`ImagingError::WarmStart`] if the method makes each image by itself, and
+    /// [`ImagingError::Method`] if the method's settings allow no video.
+    pub fn check_warm_start(&self, method: &'static str) -> Result<(), ImagingError> {
+        let chosen = self.methods.iter().find(|prepared| prepared.name == method);
+        match chosen.map(|prepared| prepared.method.begin_video()).transpose()?.flatten() {
+            Some(_) => Ok(()),
+            None => {
+                let methods = self.offer().with_warm_start;
+                Err(ImagingError::WarmStart { method, methods })
+            }
         }
     }
 
@@ -190,6 +222,8 @@ pub struct Picture {
     /// The same on the clock of the computer that reads the camera, in milliseconds since 1970.
     pub arrived_unix_ms: u64,
     method: &'static str,
+    /// What the image takes from the images before, in words; `null` if it takes nothing.
+    past: Option<String>,
     /// Number of summed frames.
     frames: u64,
     /// ADC counts of one pixel that were used as white.
@@ -228,6 +262,7 @@ impl Picture {
             arrived: Instant::now(),
             arrived_unix_ms: clock::since_1970().as_millis() as u64,
             method: "hadamard",
+            past: None,
             frames: 1,
             white_counts: 2.0,
             reconstruct_ms: 0.0,
@@ -260,6 +295,7 @@ struct Enhancement {
 pub(super) struct Studio {
     imaging: Imaging,
     white: SteadyWhite,
+    moving: Moving,
     picture: Option<Arc<Picture>>,
     problem: Option<String>,
     frames: Rate,
@@ -271,7 +307,8 @@ impl Studio {
     pub(super) fn new(imaging: Imaging) -> Self {
         let (white, started) = (SteadyWhite::default(), Instant::now());
         let (frames, images) = (Rate::new(started), Rate::new(started));
-        Self { imaging, white, picture: None, problem: None, frames, images }
+        let moving = Moving::default();
+        Self { imaging, white, moving, picture: None, problem: None, frames, images }
     }
 
     /// Makes the image of a look taken from the slot, if there is one, and the state of this moment.
@@ -286,11 +323,16 @@ impl Studio {
         if let Some(look) = look {
             let mut settings = lock(&shared.settings).clone();
             settings.enhance &= !shared.shed().enhancement_off;
-            match self.imaging.picture(look, &settings, &mut self.white, shared) {
-                Ok(made) => (self.picture, self.problem) = (Some(Arc::new(made)), None),
-                Err(why) => self.problem = Some(causes::in_one_line(&why)),
+            if self.moving.awaits(look, &settings) {
+                let scene = (&mut self.white, &mut self.moving);
+                match self.imaging.picture(look, &settings, scene, shared) {
+                    Ok(made) => (self.picture, self.problem) = (Some(Arc::new(made)), None),
+                    Err(why) => self.problem = Some(causes::in_one_line(&why)),
+                }
+                shared.slot.done(self.problem.is_none());
+            } else {
+                shared.slot.leave();
             }
-            shared.slot.done(self.problem.is_none());
         }
         let now = Instant::now();
         let ledger = shared.slot.ledger();
@@ -329,13 +371,15 @@ impl Imaging {
         &mut self,
         look: &Look,
         settings: &Settings,
-        white: &mut SteadyWhite,
+        (white, moving): (&mut SteadyWhite, &mut Moving),
         shared: &Shared,
     ) -> Result<Picture, PictureError> {
         let started = Instant::now();
         let measurements =
             look.sum.measurements(&look.run.setup, look.run.settling.as_ref(), false)?;
-        let image = self.method(settings)?.reconstruct(&measurements)?.image;
+        let method = self.method(settings)?;
+        let Reconstruction { image, report } =
+            moving.image(method, &measurements, look, settings)?;
         let image = match &look.run.flat_field {
             Some(flat) => flat.correct(&image),
             None => image,
@@ -386,6 +430,7 @@ impl Imaging {
             arrived_unix_ms: (clock::since_1970().saturating_sub(look.arrived.elapsed()))
                 .as_millis() as u64,
             method: settings.method,
+            past: report.warm.then(|| report.note.unwrap_or_default()),
             frames: look.sum.frames(),
             white_counts,
             reconstruct_ms,

@@ -36,6 +36,7 @@ mod http;
 mod imaging;
 mod light;
 mod line;
+mod moving;
 mod overload;
 #[cfg(feature = "serve")]
 mod page;

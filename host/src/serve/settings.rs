@@ -5,6 +5,8 @@
 //! (`tests::what_cannot_be_is_refused_in_one_line_that_names_it`).
 
 use crate::setup::MeasurementSetup;
+use nirspi_nets::deblur::Model;
+use nirspi_recon::reconstruct::Method;
 use nirspi_recon::words::count;
 use nirspi_recon::{Order, RowsError, Sampling, Side};
 use serde::{Deserialize, Serialize};
@@ -26,6 +28,9 @@ pub struct Settings {
     /// Strength of the method's penalty; `None` is the strength that predicts held-back
     /// measurements best. Methods without a penalty ignore it.
     pub strength: Option<f64>,
+    /// Whether each image starts from the images before: the recursive estimate. Methods without
+    /// one ignore it.
+    pub warm_start: bool,
     /// Whether the learned stages run.
     pub enhance: bool,
     /// Name of the network that deblurs.
@@ -88,6 +93,8 @@ pub struct Offer {
     pub about: Vec<&'static str>,
     /// The methods that have a strength.
     pub with_strength: Vec<&'static str>,
+    /// The methods whose images can start from the images before.
+    pub with_warm_start: Vec<&'static str>,
     /// Names of the networks that deblur.
     pub models: Vec<&'static str>,
     /// Whether the server was given a folder for recordings.
@@ -105,6 +112,8 @@ pub struct Change {
     pub method: Option<String>,
     /// Another strength: a number above 0, or `auto`.
     pub strength: Option<StrengthWish>,
+    /// Whether each image starts from the images before.
+    pub warm_start: Option<bool>,
     /// Switches the learned stages on or off.
     pub enhance: Option<bool>,
     /// Another network that deblurs.
@@ -195,7 +204,7 @@ pub enum ChangeError {
 }
 
 /// A list for an error message: `a, b or c`.
-fn alternatives(words: &[&str]) -> String {
+pub(super) fn alternatives(words: &[&str]) -> String {
     match words {
         [others @ .., last] if !others.is_empty() => format!("{} or {last}", others.join(", ")),
         words => words.concat(),
@@ -231,6 +240,21 @@ impl StrengthWish {
 }
 
 impl Settings {
+    /// Sums of so many frames of this setup, each by itself, enhanced and not recorded.
+    #[must_use]
+    pub fn new(method: Method, frames: u32, setup: &MeasurementSetup) -> Self {
+        Self {
+            method: method.argument(),
+            strength: None,
+            warm_start: false,
+            enhance: true,
+            model: Model::DIFFUSION.name(),
+            frames,
+            measuring: Measuring::of(setup),
+            record: false,
+        }
+    }
+
     /// The settings after this change.
     ///
     /// # Errors
@@ -250,6 +274,7 @@ impl Settings {
                 || ChangeError::Model { found: found.clone(), offered: offer.models.clone() };
             new.model = known(&offer.models, found).ok_or_else(unknown)?;
         }
+        new.warm_start = change.warm_start.unwrap_or(self.warm_start);
         new.enhance = change.enhance.unwrap_or(self.enhance);
         new.frames = change.frames.unwrap_or(self.frames);
         if !(1..=MAX_FRAMES).contains(&new.frames) {
@@ -312,6 +337,7 @@ pub(super) mod tests {
         Settings {
             method: "omp",
             strength: None,
+            warm_start: false,
             enhance: true,
             model: "diffusion",
             frames: 64,
@@ -329,13 +355,14 @@ pub(super) mod tests {
         assert_eq!(asked("{}"), Ok(settings()));
         assert_eq!(asked(r#"{"enhance": false}"#), Ok(Settings { enhance: false, ..settings() }));
         let all = asked(
-            r#"{"method": "hadamard", "frames": 1024, "run": true, "strength": 0.5, "model": "gan", "record": true,
+            r#"{"method": "hadamard", "frames": 1024, "run": true, "strength": 0.5, "model": "gan", "record": true, "warm_start": true,
                 "order": "zig-zag", "sampling": 0.3, "sweeps": 4}"#,
         );
         let measuring = Measuring { order: "zig-zag".into(), sampling: 307.0 / 1024.0, sweeps: 4 };
         let expected = Settings {
             method: "hadamard",
             strength: Some(0.5),
+            warm_start: true,
             enhance: true,
             model: "gan",
             frames: 1024,

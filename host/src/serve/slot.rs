@@ -48,6 +48,8 @@ pub struct Look {
     pub depth: Option<Arc<DepthImage>>,
     /// When the newest frame came out of the link.
     pub arrived: Instant,
+    /// Number of the newest frame among those received, from 1 on.
+    pub newest: u64,
 }
 
 /// The account of all frames of all runs.
@@ -65,7 +67,7 @@ pub struct Ledger {
 pub struct ImageCounters {
     /// Frames that were the newest of an image.
     pub shown: u64,
-    /// Frames replaced by a newer one before the imaging thread took them.
+    /// Frames replaced by a newer one before they made an image.
     pub passed_over: u64,
     /// Frames that gave no image.
     pub failed: u64,
@@ -113,7 +115,7 @@ impl Slot {
     }
 
     /// Takes the newest look, if there is one within `patience` and before [`wake`](Self::wake).
-    /// The caller must then call [`done`](Self::done).
+    /// The caller must then call [`done`](Self::done) or [`leave`](Self::leave).
     #[cfg(any(test, feature = "serve"))]
     pub fn take(&self, patience: Duration) -> Option<Look> {
         let inner = lock(&self.inner);
@@ -132,7 +134,8 @@ impl Slot {
         waited.unwrap_or_else(std::sync::PoisonError::into_inner).0.news = false;
     }
 
-    /// Takes the newest look, if there is one now. The caller must then call [`done`](Self::done).
+    /// Takes the newest look, if there is one now. The caller must then call [`done`](Self::done) or
+    /// [`leave`](Self::leave).
     pub fn take_now(&self) -> Option<Look> {
         let mut inner = lock(&self.inner);
         inner.news = false;
@@ -148,6 +151,13 @@ impl Slot {
         } else {
             images.failed += 1;
         }
+    }
+
+    /// Records that the taken look makes no image: a later one shows its frames.
+    pub fn leave(&self) {
+        let images = &mut lock(&self.inner).ledger.images;
+        images.waiting -= 1;
+        images.passed_over += 1;
     }
 
     /// The current account.
@@ -166,7 +176,7 @@ mod tests {
         let sum = Integrated::new(&setup);
         let run = Arc::new(RunSetup { setup, settling: None, flat_field: None });
         let frames = LossCounters { received: number, lost: 2, ..LossCounters::default() };
-        (Look { sum, run, depth: None, arrived: Instant::now() }, frames)
+        (Look { sum, run, depth: None, arrived: Instant::now(), newest: number }, frames)
     }
 
     #[test]
@@ -195,7 +205,10 @@ mod tests {
                 if number % 2 == 0 {
                     assert_eq!(slot.ledger().images.waiting, 1);
                 }
-                slot.done(number % 3 != 0);
+                match number % 5 {
+                    0 => slot.leave(),
+                    _ => slot.done(number % 3 != 0),
+                }
             }
             let Ledger { frames, images } = slot.ledger();
             let counted = images.shown + images.passed_over + images.failed + images.waiting;
@@ -203,7 +216,7 @@ mod tests {
             assert_eq!(counted, number, "{images:?}");
         }
         let images = slot.ledger().images;
-        assert_eq!((images.shown, images.failed, images.waiting), (10, 4, 1));
+        assert_eq!((images.shown, images.failed, images.waiting), (8, 4, 1));
         assert!(slot.take(Duration::ZERO).is_some() && slot.take(Duration::ZERO).is_none());
     }
 }

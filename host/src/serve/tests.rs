@@ -466,8 +466,9 @@ fn images_that_are_given_up_are_counted_and_frames_are_not_waited_for() {
     let mut offered = 0;
     while shared.slot.ledger().images.shown < 4 {
         let sum = crate::integrate::Integrated::new(&run.setup);
-        let look = slot::Look { sum, run: Arc::clone(&run), depth: None, arrived: Instant::now() };
         offered += 1;
+        let (run, arrived) = (Arc::clone(&run), Instant::now());
+        let look = slot::Look { sum, run, depth: None, arrived, newest: offered };
         shared.slot.offer(look, crate::account::LossCounters::default());
         std::thread::sleep(Duration::from_millis(2));
         assert!(began.elapsed() < LIMIT, "{:?}", shared.slot.ledger());

@@ -36,8 +36,16 @@ def picture(page):
     expect(page.locator("#model")).to_be_disabled()
     page.get_by_label("enhance", exact=True).check()
     seen(page, "enhanced", 64)
+    expect(page.locator("#warm-start")).to_be_enabled()
+    page.get_by_label("hadamard", exact=True).check()
+    expect(page.locator("#warm-start")).to_be_disabled()
     page.get_by_label("tikhonov", exact=True).check()
     expect(about).to_contain_text("tikhonov, ")
+    page.locator("#warm-start").check()
+    settled(page, "warm_start", True)
+    expect(about).to_contain_text("tikhonov, recursive, ")
+    page.locator("#warm-start").uncheck()
+    settled(page, "warm_start", False)
 
 
 def settled(page, name, value):

@@ -184,3 +184,38 @@ fn the_scene_of_a_real_camera_cannot_be_changed() {
     let answer = server.ask("POST", "/api/scene", &[], r#"{"scene": "letter:A"}"#);
     answer.refuses(400, "only a virtual camera");
 }
+
+#[test]
+fn images_that_start_from_those_before_are_switched_on_by_an_option_and_off_by_the_page() {
+    let bench = Bench::new();
+    let server = serve(&bench, &["--method", "tikhonov", "--warm-start", "--sum", "8"]);
+    let state = server.state("recursive", |state| state["picture"]["past"].is_string());
+    let past = state["picture"]["past"].as_str().unwrap();
+    assert!(past.contains("patterns known, scene moved by"), "{past}");
+    assert_eq!(state["picture"]["frames"], 8);
+    assert_eq!(state["offered"]["with_warm_start"], json!(["tikhonov", "fista", "tv", "prior"]));
+    server.change(r#"{"warm_start": false}"#).json();
+    server.state("alone", |state| state["picture"]["past"].is_null());
+    server.change(r#"{"warm_start": "yes"}"#).refuses(400, "expected a boolean");
+    let start = ["serve", "--listen", "127.0.0.1:0", "--warm-start"];
+    for (method, words) in [
+        (&["--method", "omp"][..], "--warm-start: omp makes each image by itself"),
+        (
+            &["--basis", "haar"],
+            "--warm-start: frames that start from the frame before need the dct",
+        ),
+    ] {
+        bench.run(&[&start[..], method].concat()).failed(2, &[words]);
+    }
+}
+
+#[test]
+fn a_change_while_the_camera_is_prepared_holds_for_the_first_run() {
+    let bench = Bench::new();
+    let server = serve(&bench, &["--method", "hadamard"]);
+    for order in ["natural", "zig-zag"] {
+        server.change(&json!({ "order": order }).to_string()).json();
+    }
+    let state = server.state("measuring", measuring);
+    assert_eq!(state["camera"]["measurement"]["order"], "zig-zag");
+}

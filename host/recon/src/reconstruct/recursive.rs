@@ -27,6 +27,7 @@
 //! (`tests::a_cut_starts_anew_and_costs_nothing`). While nothing moves and all rows are measured,
 //! the image is the mean of the frames (`tests::a_still_scene_is_the_mean_of_its_frames`).
 
+mod belief;
 mod joint;
 mod motion;
 mod noise;
@@ -41,6 +42,7 @@ use super::{
 };
 use crate::basis::Basis;
 use crate::{Image, Measurements, Side, fwht};
+use belief::Belief;
 use joint::Joint;
 use motion::{SHIFTS, Shift, best_shift};
 use past::{Known, Past, Pose, median};
@@ -136,10 +138,62 @@ pub fn fused_frame(
     let fused = past.add(frame)?;
     let mut made = method.reconstruct(&fused.fused)?;
     made.report.warm = fused.warm;
-    let notes: Vec<String> =
-        [made.report.note.take(), fused.note()].into_iter().flatten().collect();
-    made.report.note = (!notes.is_empty()).then(|| notes.join(", "));
+    note(&mut made, fused.note());
     Ok(made)
+}
+
+/// As [`fused_frame`], for a method that takes the noise of its measurements for white: the image
+/// is part that of the fused rows and part that of the frame alone, as far as the readings of the
+/// last frames support the fused rows. The method makes two images.
+///
+/// # Errors
+/// The errors of the method and of [`Recursive::add`].
+pub fn believed_frame(
+    method: &dyn Reconstruct,
+    past: &mut Recursive,
+    frame: &Measurements,
+) -> Result<Reconstruction, ReconstructError> {
+    let mut made = method.reconstruct(frame)?;
+    let added = past.add(frame)?;
+    let share = past.share(frame, added.warm);
+    if !added.warm {
+        past.belief.remember(&made.image, &made.image);
+        note(&mut made, added.note());
+        return Ok(made);
+    }
+    let fused = method.reconstruct(&added.fused)?;
+    past.belief.remember(&made.image, &fused.image);
+    if share == 0.0 {
+        note(&mut made, Some("the readings do not support the frames before".to_owned()));
+        return Ok(made);
+    }
+    let pixels = made.image.pixels().iter().zip(fused.image.pixels());
+    let pixels = pixels.map(|(alone, fused)| alone + share as f32 * (fused - alone)).collect();
+    let mut mixed =
+        Reconstruction { image: Image::new(frame.side(), pixels), report: fused.report };
+    mixed.report.warm = true;
+    mixed.report.residual = Some(residual(&mixed.image, frame));
+    note(&mut mixed, added.note());
+    note(&mut mixed, Some(format!("{:.0} % by the frames before", 100.0 * share)));
+    Ok(mixed)
+}
+
+/// Adds a note to a report.
+fn note(made: &mut Reconstruction, more: Option<String>) {
+    let notes: Vec<String> = [made.report.note.take(), more].into_iter().flatten().collect();
+    made.report.note = (!notes.is_empty()).then(|| notes.join(", "));
+}
+
+/// Norm of what an image misses of the measurements, relative to their norm.
+fn residual(image: &Image, frame: &Measurements) -> f64 {
+    let mut rows = image.pixels().to_vec();
+    fwht::transform(&mut rows);
+    let (mut missed, mut all) = (0.0, 0.0);
+    for (&row, value) in frame.rows().iter().zip(frame.values()) {
+        missed += (f64::from(rows[row as usize]) - value).powi(2);
+        all += value * value;
+    }
+    if all > 0.0 { (missed / all).sqrt() } else { 0.0 }
 }
 
 /// What the frames so far have shown.
@@ -149,6 +203,8 @@ pub struct Recursive {
     past: Option<Past>,
     /// Whether a frame has been added since the beginning.
     begun: bool,
+    /// How far the fused rows are believed ([`believed_frame`]).
+    belief: Belief,
 }
 
 impl Recursive {
@@ -165,12 +221,22 @@ impl Recursive {
         }
         settings.strength.check()?;
         super::check_prior(FALLOFF, settings.noise)?;
-        Ok(Self { settings, past: None, begun: false })
+        Ok(Self { settings, past: None, begun: false, belief: Belief::default() })
     }
 
     /// Forgets the past.
     pub fn restart(&mut self) {
-        (self.past, self.begun) = (None, false);
+        (self.past, self.begun, self.belief) = (None, false, Belief::default());
+    }
+
+    /// The share of the fused rows' image in the image of a frame that has been added. A frame
+    /// without a past begins the judgement anew.
+    fn share(&mut self, frame: &Measurements, warm: bool) -> f64 {
+        match &self.past {
+            Some(past) if warm => self.belief.judge(past, frame),
+            _ => self.belief = Belief::default(),
+        }
+        self.belief.share()
     }
 
     /// Adds a frame. A frame of another side starts anew.

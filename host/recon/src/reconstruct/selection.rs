@@ -67,22 +67,41 @@ impl Line {
     }
 
     fn join(&mut self, other: Self) {
-        self.count += other.count;
-        self.predicted += other.predicted;
-        self.product += other.product;
-        self.measured += other.measured;
+        *self = self.and(other);
+    }
+
+    /// The line of both sets of rows.
+    pub fn and(self, other: Self) -> Self {
+        Self {
+            count: self.count + other.count,
+            predicted: self.predicted + other.predicted,
+            product: self.product + other.product,
+            measured: self.measured + other.measured,
+        }
     }
 
     /// The most trust that these rows support: the factor on the prediction with the least squared
     /// error, plus some standard errors of that factor.
     pub fn most_trust(self, standard_errors: f64) -> f64 {
+        self.factor()
+            .map_or(1.0, |(factor, error)| (factor + standard_errors * error).clamp(0.0, 1.0))
+    }
+
+    /// The least trust that these rows support: the same factor less some standard errors.
+    pub fn least_trust(self, standard_errors: f64) -> f64 {
+        self.factor()
+            .map_or(0.0, |(factor, error)| (factor - standard_errors * error).clamp(0.0, 1.0))
+    }
+
+    /// The factor on the prediction with the least squared error, and its standard error; `None` if
+    /// the rows say nothing of it.
+    fn factor(self) -> Option<(f64, f64)> {
         if self.predicted == 0.0 || self.count < 2 {
-            return 1.0;
+            return None;
         }
         let factor = self.product / self.predicted;
         let left = (self.measured - factor * self.product).max(0.0);
-        let error = (left / (self.count - 1) as f64 / self.predicted).sqrt();
-        (factor + standard_errors * error).clamp(0.0, 1.0)
+        Some((factor, (left / (self.count - 1) as f64 / self.predicted).sqrt()))
     }
 }
 

@@ -49,6 +49,8 @@ export function show({ settings, offered }) {
   for (const input of $("methods").querySelectorAll("input")) input.checked = input.value === settings.method;
   $("strength").disabled = !offered.with_strength.includes(settings.method);
   put("strength", settings.strength ?? "");
+  $("warm-start").disabled = !offered.with_warm_start.includes(settings.method);
+  $("warm-start").checked = settings.warm_start;
   $("enhance").checked = settings.enhance;
   $("model").disabled = !settings.enhance;
   put("model", settings.model);
@@ -65,6 +67,7 @@ export function show({ settings, offered }) {
 // A number from a field; a text that is no number goes to the server, which says what is expected.
 const number = id => Number.isNaN($(id).valueAsNumber) ? $(id).value : $(id).valueAsNumber;
 
+$("warm-start").onchange = () => change({ warm_start: $("warm-start").checked });
 $("enhance").onchange = () => change({ enhance: $("enhance").checked });
 $("model").onchange = () => change({ model: $("model").value });
 $("strength").onchange = () => change({ strength: $("strength").value === "" ? "auto" : number("strength") });

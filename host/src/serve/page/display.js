@@ -129,7 +129,8 @@ export function show(message) {
   $("interval-panel").hidden = !message.interval;
   const found = picture?.enhancement;
   text($("about-image"), picture
-    ? `${picture.method}, ${frames(picture.frames)}, ${fixed(picture.reconstruct_ms, 1)} ms` : "");
+    ? `${picture.method}${picture.past === null ? "" : ", recursive"}, ${frames(picture.frames)}, ${fixed(picture.reconstruct_ms, 1)} ms` : "");
+  $("about-image").title = picture?.past ?? "";
   text($("about-enhanced"), found
     ? `${found.model}, ${fixed(found.enhance_ms, 1)} ms${found.depth ? "" : ", no depth yet"}` : "");
   warn("doubt", picture?.short_warnings ?? []);

@@ -19,6 +19,7 @@ export const MEANINGS = {
   "reconstructed": "The image of the newest frames is computed from the readings.",
   "recorded": "The frame is in the account of all frames, and the recording has it. A recording writes to the disk twice a second.",
   "recording queue": "Share of the recording's queue, 64 MiB, that waits for the disk. When the queue is full, the program waits for the disk and the camera may drop frames.",
+  "recursive": "Each image starts from the images before, moved with the scene and weighted by what is left of them. Each frame is in one image only, so a new image comes after as many new frames as an image sums.",
   "sampling": "Share of all 1024 patterns that is shown.",
   "sent": "The image is handed to the connection of a page. The network and the browser need more time.",
   "settling": "How the light of a pattern rises and falls in time, measured once against a white sheet; with it, the leak from pattern to pattern is undone.",

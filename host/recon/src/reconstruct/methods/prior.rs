@@ -5,7 +5,7 @@ use crate::reconstruct::method::{Entry, Setting};
 use crate::reconstruct::prior::{SharedNetwork, with_network};
 use crate::reconstruct::{
     Completion, Method, Reconstruct, ReconstructError, Reconstruction, Recursive,
-    RecursiveSettings, fused_frame,
+    RecursiveSettings, believed_frame,
 };
 
 const NAME: &str = "learned prior";
@@ -47,6 +47,6 @@ impl Reconstruct for Prior {
         past: &mut Recursive,
         frame: &Measurements,
     ) -> Result<Reconstruction, ReconstructError> {
-        fused_frame(self, past, frame)
+        believed_frame(self, past, frame)
     }
 }

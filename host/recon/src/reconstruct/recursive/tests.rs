@@ -205,3 +205,52 @@ fn frames_without_light_of_another_side_and_out_of_range_are_no_trouble() {
         assert!(matches!(error, ReconstructError::Setting { setting: "speed", .. }));
     }
 }
+
+/// A method whose image is that of the measured rows, and of zeros elsewhere.
+struct ZeroFilled;
+
+impl Reconstruct for ZeroFilled {
+    fn name(&self) -> &str {
+        "zero-filled"
+    }
+
+    fn reconstruct(&self, measured: &Measurements) -> Result<Reconstruction, ReconstructError> {
+        Ok(Reconstruction {
+            image: crate::reconstruct::hadamard(measured),
+            report: crate::reconstruct::Report::new("zero-filled"),
+        })
+    }
+}
+
+#[test]
+fn a_past_that_misleads_a_method_is_not_believed_and_one_that_helps_is() {
+    let side = side(32);
+    let rows = Rows::natural(side);
+    // The motion is hidden from an estimate that holds the scene for still.
+    for (moves, helps) in [(0, true), (1, false)] {
+        let mut past = Recursive::new(still()).unwrap();
+        let mut shares = Vec::new();
+        for k in 0..8 {
+            let truth = figure(side, 0, moves * k);
+            let frame = read(&rows, &truth, 0.05, 7 + k as u64);
+            let alone = ZeroFilled.reconstruct(&frame).unwrap().image;
+            let made = believed_frame(&ZeroFilled, &mut past, &frame).unwrap();
+            let share = past.belief.share();
+            assert_eq!(made.report.warm, share > 0.0);
+            if share == 0.0 {
+                assert_eq!(made.image, alone, "frame {k}");
+            }
+            let (mixed, alone) = (rms(&made.image, &truth), rms(&alone, &truth));
+            // What misleads costs less than half a decibel.
+            let most = if helps && k > 3 { 0.7 } else { 1.059 };
+            assert!(mixed < most * alone, "frame {k}: {mixed} of {alone}, share {share}");
+            shares.push(share);
+        }
+        // The second frame is the first whose two images differ, and the third judges them.
+        assert_eq!(shares[..2], [0.0, 0.0]);
+        let expected = if helps { 0.5..=1.0 } else { 0.0..=0.2 };
+        assert!(shares[2..].iter().all(|share| expected.contains(share)), "{shares:?}");
+        past.restart();
+        assert_eq!(past.belief.share(), 0.0);
+    }
+}
