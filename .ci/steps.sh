@@ -12,7 +12,7 @@ steps=(
     "features        the library alone, and with its features that bring the others"
     "package         each library crate makes a package; crates.io"
     "training        networks on burn, and the commands that need it"
-    "emulation       the firmware's budgets, and its machine code against the virtual camera; QEMU, firmware"
+    "emulation       the firmware's budgets, its machine code against the virtual camera and under faults; QEMU, firmware"
     "application     the firmware's application and USB device on the host, its driver on a simulated core"
     "lints           clippy of both workspaces; firmware's targets"
     "docs            documentation without warnings"
@@ -185,7 +185,7 @@ step_training() {
 
 step_emulation() {
     emulated_firmware
-    cargo test --locked --test budgets --test qemu -- --nocapture
+    cargo test --locked --test budgets --test qemu --test faults -- --nocapture
 }
 
 step_application() {
