@@ -3,8 +3,8 @@
 
 use super::delays::Passed;
 use super::line::Line;
+use super::look::{DepthImage, Look};
 use super::settings::{Offer, Settings};
-use super::slot::{DepthImage, Look};
 use super::state::{Light, Offered, Published, Rate, Rates, State};
 use super::{Shared, lock};
 use crate::causes;
@@ -301,10 +301,11 @@ impl Studio {
         let settings = lock(&shared.settings).clone();
         // The log is copied, so that the camera's thread can add to the log meanwhile.
         let log = lock(&shared.camera).clone();
+        let (allowed, commands) = shared.light.position();
         let state = State {
             program: env!("CARGO_PKG_VERSION"),
             camera: &log.camera,
-            light: Light { allowed: shared.light.is_on(), commands: shared.light.commands() },
+            light: Light { allowed, commands },
             ledger,
             rates,
             settings: &settings,
