@@ -12,7 +12,7 @@ steps=(
     "features        the library alone, and with its features that bring the others"
     "package         each library crate makes a package; crates.io"
     "training        networks on burn, and the commands that need it"
-    "emulation       the firmware's budgets, and its machine code against the virtual camera; QEMU, firmware"
+    "emulation       the firmware's budgets, its machine code against the virtual camera and under faults; QEMU, firmware"
     "application     the firmware's application and USB device on the host, its driver on a simulated core"
     "lints           clippy of both workspaces; firmware's targets"
     "docs            documentation without warnings"
@@ -40,6 +40,7 @@ by_name=(
     "flash           probe-rs knows every board's chip"
     "mutants         deliberate faults in the Rust code are seen: in lines changed since main, or in MUTANTS='CRATE...'; crates.io"
     "miri            unit tests of the wire protocol in Rust's interpreter, which sees undefined behaviour; rustup's nightly with miri"
+    "loom            the live page's hand-overs between threads, in every order of the threads; crates.io"
     "crowd           nirspi serve among 1000 clients that misbehave, for CROWD_S seconds (600)"
     "zenoh           a camera over Zenoh: router, camera and host as processes; crates.io, 219 crates of which 95 are its own"
     "stores          archives in object stores: S3 and WebDAV servers as processes; crates.io, PyPI"
@@ -185,7 +186,7 @@ step_training() {
 
 step_emulation() {
     emulated_firmware
-    cargo test --locked --test budgets --test qemu -- --nocapture
+    cargo test --locked --test budgets --test qemu --test faults -- --nocapture
 }
 
 step_application() {
@@ -426,6 +427,9 @@ step_miri() {
     MIRIFLAGS=-Zmiri-disable-isolation PROPTEST_CASES=4 cargo +nightly miri test --locked -p nirspi-wire --lib -- \
         --skip host_port::tests::an_access_with_up_to_three_wrong_bits
 }
+
+# A workspace of its own, so that loom is in no other build.
+step_loom() { CARGO_TARGET_DIR=$PWD/target/loom cargo test --manifest-path tests/loom/Cargo.toml --test models; }
 
 step_crowd() {
     cargo build --locked --release

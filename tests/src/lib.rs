@@ -1,5 +1,6 @@
 //! Shared parts of the end-to-end tests.
 
+pub mod debugger;
 pub mod elf;
 pub mod emulated;
 pub mod firmware;

@@ -1,6 +1,7 @@
 //! Reads tables of the pages under `docs/`, for tests that compare a table with its subject.
 
 use crate::root;
+use std::collections::BTreeMap;
 
 /// A page, by its path in the repository.
 ///
@@ -29,4 +30,23 @@ pub fn table(page: &str, heading: &str) -> Vec<Vec<String>> {
         .skip(1)
         .map(|row| row.split(" | ").map(cell).collect())
         .collect()
+}
+
+/// The column under this title of the table under this heading, by the first cell of each row. Empty if the table has no
+/// such column.
+///
+/// # Panics
+/// If there is no such heading.
+#[must_use]
+pub fn column(page: &str, heading: &str, title: &str) -> BTreeMap<String, String> {
+    let Some((_, rest)) = page.split_once(&format!("\n{heading}\n")) else {
+        panic!("no heading {heading:?}");
+    };
+    let cells =
+        |row: &str| row.trim_matches('|').split(" | ").map(str::trim).position(|c| c == title);
+    let Some(at) = rest.lines().find(|line| line.starts_with('|')).and_then(cells) else {
+        return BTreeMap::new();
+    };
+    let cell = |row: Vec<String>| Some((row.first()?.clone(), row.get(at)?.clone()));
+    table(page, heading).into_iter().filter_map(cell).collect()
 }

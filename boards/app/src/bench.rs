@@ -80,6 +80,8 @@ pub struct Pins {
     /// The FPGA is being loaded with gateware, and has no host port.
     pub loading: Cell<bool>,
     next_frame_us: Cell<u64>,
+    /// The FPGA's registers have lost their values, which its next access finds out.
+    registers_lost: Cell<bool>,
     /// A frame is ready that was ready before a write to `Control`.
     held: Cell<bool>,
 }
@@ -97,8 +99,19 @@ impl Default for Pins {
             frame_us: Cell::default(),
             loading: Cell::default(),
             next_frame_us: Cell::default(),
+            registers_lost: Cell::default(),
             held: Cell::default(),
         }
+    }
+}
+
+impl Pins {
+    /// The FPGA loses its run, its frame and its registers.
+    pub fn reset_fpga(&self) {
+        self.running.set(false);
+        self.held.set(false);
+        self.sequence.set(0);
+        self.registers_lost.set(true);
     }
 }
 
@@ -165,6 +178,7 @@ impl FakeFpga {
 
 impl HostPort for FakeFpga {
     fn write(&mut self, address: u16, sealed: [u8; SEALED_BYTES]) -> Result<(), BusError> {
+        self.notice_reset();
         let value = unseal(address, sealed).expect("no wire damages a write");
         self.registers[usize::from(Register::Writes.address())] += 1;
         if address == Register::Control.address() {
@@ -178,6 +192,11 @@ impl HostPort for FakeFpga {
             pins.held.set(is_ready && !bits(control::START | control::RELEASE));
             pins.running.set(bits(control::START) || pins.running.get() && !bits(control::STOP));
             pins.sequence.set(pins.sequence.get() + u32::from(bits(control::RELEASE)));
+            // This FPGA makes a frame when the one before is released, so the last release ends the run.
+            let frames = self.registers[usize::from(Register::Frames.address())];
+            if bits(control::RELEASE) && frames == pins.sequence.get() {
+                pins.running.set(false);
+            }
             if bits(control::START | control::RELEASE) {
                 pins.next_frame_us.set(now_us() + pins.frame_us.get());
             }
@@ -188,6 +207,7 @@ impl HostPort for FakeFpga {
     }
 
     fn read(&mut self, address: u16) -> Result<[u8; SEALED_BYTES], BusError> {
+        self.notice_reset();
         let running = if self.pins.running.get() { status::RUNNING | status::LEDS_ON } else { 0 };
         let value = match Register::at(address) {
             Some(Register::Identity) => IDENTITY,
@@ -212,6 +232,12 @@ impl HostPort for FakeFpga {
 }
 
 impl FakeFpga {
+    fn notice_reset(&mut self) {
+        if self.pins.registers_lost.take() {
+            self.registers = [0; 32];
+        }
+    }
+
     /// The same frame as a packet, between zeros.
     fn packet(&self, patterns: u16, into: &mut [u8]) {
         let head = ready::Head {

@@ -1,6 +1,7 @@
 //! Tests of what a host sees of the device, with requests as hosts make them, over a simulated bus.
 
 mod fake;
+mod faults;
 mod otg_core;
 mod speeds;
 mod stuck;

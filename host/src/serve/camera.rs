@@ -7,9 +7,9 @@
 use super::camera_log::Phase;
 use super::delays::Passed;
 use super::light::Leds;
+use super::look::{DepthImage, Look, RunSetup};
 use super::overload::Load;
 use super::settings::Measuring;
-use super::slot::{DepthImage, Look, RunSetup};
 use super::stage::StagedScene;
 use super::{ForeignError, Shared, lock};
 use crate::account::LossCounters;

@@ -3,9 +3,9 @@
 
 use super::delays::Passed;
 use super::line::Line;
+use super::look::{DepthImage, Look};
 use super::moving::Moving;
 use super::settings::{Offer, Settings, alternatives};
-use super::slot::{DepthImage, Look};
 use super::state::{Light, Offered, Published, Rate, Rates, State};
 use super::{Shared, lock};
 use crate::causes;
@@ -343,10 +343,11 @@ impl Studio {
         let settings = lock(&shared.settings).clone();
         // The log is copied, so that the camera's thread can add to the log meanwhile.
         let log = lock(&shared.camera).clone();
+        let (allowed, commands) = shared.light.position();
         let state = State {
             program: env!("CARGO_PKG_VERSION"),
             camera: &log.camera,
-            light: Light { allowed: shared.light.is_on(), commands: shared.light.commands() },
+            light: Light { allowed, commands },
             ledger,
             rates,
             settings: &settings,

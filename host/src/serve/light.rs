@@ -3,10 +3,11 @@
 //! # Invariant
 //! Only a person switches to "on". Whatever switches to "off" (a person, a fault, a missing
 //! calibration) holds until a person switches to "on" again. Of two commands the later one counts
-//! (`tests::of_two_commands_the_later_one_counts`).
+//! (`tests::of_two_commands_the_later_one_counts`; in every order of the threads, `tests/loom`, which
+//! checks this file).
 
+use super::sync::{AtomicU64, Ordering};
 use serde::Serialize;
-use std::sync::atomic::{AtomicU64, Ordering};
 
 /// What is known of the LEDs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -41,12 +42,14 @@ impl LightSwitch {
 
     /// Whether light is allowed.
     pub fn is_on(&self) -> bool {
-        self.0.load(Ordering::SeqCst) & 1 == 1
+        self.position().0
     }
 
-    /// The number of the last command.
-    pub fn commands(&self) -> u64 {
-        self.0.load(Ordering::SeqCst) >> 1
+    /// Whether light is allowed, and the number of the command that said so. One load gives both, so
+    /// that no other command comes between them.
+    pub fn position(&self) -> (bool, u64) {
+        let held = self.0.load(Ordering::SeqCst);
+        (held & 1 == 1, held >> 1)
     }
 }
 
@@ -58,10 +61,10 @@ mod tests {
     #[test]
     fn of_two_commands_the_later_one_counts() {
         let switch = LightSwitch::on();
-        assert!(switch.is_on() && switch.commands() == 0);
+        assert_eq!(switch.position(), (true, 0));
         assert_eq!((switch.set(false), switch.is_on()), (1, false));
         assert_eq!((switch.set(false), switch.is_on()), (2, false));
-        assert_eq!((switch.set(true), switch.is_on(), switch.commands()), (3, true, 3));
+        assert_eq!((switch.set(true), switch.position()), (3, (true, 3)));
         // Of commands at the same time, the one with the largest number is the position.
         for _ in 0..200 {
             let (switch, barrier) = (LightSwitch::on(), Barrier::new(2));

@@ -36,6 +36,7 @@ mod http;
 mod imaging;
 mod light;
 mod line;
+mod look;
 mod moving;
 mod overload;
 #[cfg(feature = "serve")]
@@ -48,6 +49,7 @@ mod simulated;
 mod slot;
 mod stage;
 mod state;
+mod sync;
 #[cfg(feature = "serve")]
 mod threads;
 #[cfg(feature = "serve")]
@@ -73,6 +75,7 @@ use crate::events::Level;
 use camera_log::CameraLog;
 use delays::{Delays, Passed};
 use light::LightSwitch;
+use look::Look;
 use overload::{Load, Overload, Shed};
 use settings::{Offer, Settings};
 use slot::Slot;
@@ -86,7 +89,7 @@ pub type ForeignError = Box<dyn std::error::Error + Send + Sync>;
 
 /// The data that the threads share.
 struct Shared {
-    slot: Slot,
+    slot: Slot<Look>,
     camera: Mutex<CameraLog>,
     settings: Mutex<Settings>,
     /// The values that settings can have.

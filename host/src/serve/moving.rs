@@ -10,8 +10,8 @@
 //! The images are those of [`Reconstruct::reconstruct_video`] for the same sums of frames
 //! (`turns::tests::images_that_start_from_those_before_are_those_of_a_recorded_video`).
 
+use super::look::{Look, RunSetup};
 use super::settings::Settings;
-use super::slot::{Look, RunSetup};
 use nirspi_recon::Measurements;
 use nirspi_recon::reconstruct::{Reconstruct, ReconstructError, Reconstruction, Recursive};
 use std::sync::Arc;

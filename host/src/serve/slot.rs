@@ -3,54 +3,17 @@
 //! # Invariant
 //! The camera's thread never waits to put frames in. Every received frame is counted once: as
 //! shown, passed over, failed or waiting
-//! (`tests::every_frame_is_shown_passed_over_failed_or_waiting`).
+//! (`tests::every_frame_is_shown_passed_over_failed_or_waiting`). No order of the threads loses a
+//! frame's wake-up or counts a frame twice (`tests/loom`, which checks this file).
 
 use super::lock;
+use super::sync::{Condvar, Mutex};
 use crate::account::LossCounters;
-use crate::calibration::{FlatField, Settling};
-use crate::clock::Instant;
-use crate::integrate::Integrated;
-use crate::setup::MeasurementSetup;
-use nirspi_nets::DepthMaps;
 use serde::Serialize;
-use std::sync::{Arc, Condvar, Mutex};
+#[cfg(any(test, feature = "serve"))]
+use std::sync::PoisonError;
 #[cfg(any(test, feature = "serve"))]
 use std::time::Duration;
-
-/// One run's setup and the camera's response: everything needed to interpret its frames.
-#[derive(Debug)]
-pub struct RunSetup {
-    /// The measurement's setup.
-    pub setup: MeasurementSetup,
-    /// The camera's response, if known.
-    pub settling: Option<Settling>,
-    /// The flat field of its LEDs, if known.
-    pub flat_field: Option<FlatField>,
-}
-
-/// A depth map in the camera's image.
-#[derive(Debug)]
-pub struct DepthImage {
-    /// The map for the networks.
-    pub map: DepthMaps,
-    /// (32, 32) distances in metres.
-    pub pixels_m: Vec<f32>,
-}
-
-/// The newest frames, and the newest depth map.
-#[derive(Debug, Clone)]
-pub struct Look {
-    /// The sum of the frames.
-    pub sum: Integrated,
-    /// How the frames were measured.
-    pub run: Arc<RunSetup>,
-    /// The newest depth map.
-    pub depth: Option<Arc<DepthImage>>,
-    /// When the newest frame came out of the link.
-    pub arrived: Instant,
-    /// Number of the newest frame among those received, from 1 on.
-    pub newest: u64,
-}
 
 /// The account of all frames of all runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
@@ -75,24 +38,31 @@ pub struct ImageCounters {
     pub waiting: u64,
 }
 
-#[derive(Debug, Default)]
-struct Inner {
-    next: Option<Look>,
+#[derive(Debug)]
+struct Inner<T> {
+    next: Option<T>,
     ledger: Ledger,
     /// Whether pages should learn of something else than a frame.
     news: bool,
 }
 
-/// A slot for one [`Look`].
-#[derive(Debug, Default)]
-pub struct Slot {
-    inner: Mutex<Inner>,
+/// A slot for the look of one frame.
+#[derive(Debug)]
+pub struct Slot<T> {
+    inner: Mutex<Inner<T>>,
     filled: Condvar,
 }
 
-impl Slot {
+impl<T> Default for Slot<T> {
+    fn default() -> Self {
+        let inner = Inner { next: None, ledger: Ledger::default(), news: false };
+        Self { inner: Mutex::new(inner), filled: Condvar::default() }
+    }
+}
+
+impl<T> Slot<T> {
     /// Puts in the look of a received frame. A look that was not taken counts as passed over.
-    pub fn offer(&self, look: Look, frames: LossCounters) {
+    pub fn offer(&self, look: T, frames: LossCounters) {
         let mut inner = lock(&self.inner);
         inner.ledger.frames = frames;
         if inner.next.replace(look).is_some() {
@@ -117,11 +87,11 @@ impl Slot {
     /// Takes the newest look, if there is one within `patience` and before [`wake`](Self::wake).
     /// The caller must then call [`done`](Self::done) or [`leave`](Self::leave).
     #[cfg(any(test, feature = "serve"))]
-    pub fn take(&self, patience: Duration) -> Option<Look> {
+    pub fn take(&self, patience: Duration) -> Option<T> {
         let inner = lock(&self.inner);
-        let idle = |inner: &mut Inner| inner.next.is_none() && !inner.news;
+        let idle = |inner: &mut Inner<T>| inner.next.is_none() && !inner.news;
         let waited = self.filled.wait_timeout_while(inner, patience, idle);
-        let mut inner = waited.unwrap_or_else(std::sync::PoisonError::into_inner).0;
+        let mut inner = waited.unwrap_or_else(PoisonError::into_inner).0;
         inner.news = false;
         inner.next.take()
     }
@@ -131,12 +101,12 @@ impl Slot {
     pub fn await_news(&self, patience: Duration) {
         let waited =
             self.filled.wait_timeout_while(lock(&self.inner), patience, |inner| !inner.news);
-        waited.unwrap_or_else(std::sync::PoisonError::into_inner).0.news = false;
+        waited.unwrap_or_else(PoisonError::into_inner).0.news = false;
     }
 
     /// Takes the newest look, if there is one now. The caller must then call [`done`](Self::done) or
     /// [`leave`](Self::leave).
-    pub fn take_now(&self) -> Option<Look> {
+    pub fn take_now(&self) -> Option<T> {
         let mut inner = lock(&self.inner);
         inner.news = false;
         inner.next.take()
@@ -169,14 +139,12 @@ impl Slot {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nirspi_recon::Order;
+    use std::time::Instant;
 
-    fn look(number: u64) -> (Look, LossCounters) {
-        let setup = MeasurementSetup::new(&Order::Natural, 1.0).unwrap();
-        let sum = Integrated::new(&setup);
-        let run = Arc::new(RunSetup { setup, settling: None, flat_field: None });
+    /// A look that is the number of its frame.
+    fn look(number: u64) -> (u64, LossCounters) {
         let frames = LossCounters { received: number, lost: 2, ..LossCounters::default() };
-        (Look { sum, run, depth: None, arrived: Instant::now(), newest: number }, frames)
+        (number, frames)
     }
 
     #[test]

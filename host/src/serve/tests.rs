@@ -3,6 +3,7 @@ mod foxglove;
 use super::camera_log::Phase;
 use super::foxglove::Foxglove;
 use super::light::Leds;
+use super::look::RunSetup;
 use super::settings::Measuring;
 use super::settings::tests::{offer, settings};
 use super::state::Published;
@@ -461,14 +462,14 @@ fn images_that_are_given_up_are_counted_and_frames_are_not_waited_for() {
         let (publish, _) = watch::channel(Arc::new(Published::default()));
         std::thread::spawn(move || images(&shared, imaging, &publish))
     };
-    let run = Arc::new(slot::RunSetup { setup: setup(), settling: None, flat_field: None });
+    let run = Arc::new(RunSetup { setup: setup(), settling: None, flat_field: None });
     let began = Instant::now();
     let mut offered = 0;
     while shared.slot.ledger().images.shown < 4 {
         let sum = crate::integrate::Integrated::new(&run.setup);
         offered += 1;
         let (run, arrived) = (Arc::clone(&run), Instant::now());
-        let look = slot::Look { sum, run, depth: None, arrived, newest: offered };
+        let look = Look { sum, run, depth: None, arrived, newest: offered };
         shared.slot.offer(look, crate::account::LossCounters::default());
         std::thread::sleep(Duration::from_millis(2));
         assert!(began.elapsed() < LIMIT, "{:?}", shared.slot.ledger());

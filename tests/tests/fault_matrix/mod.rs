@@ -8,6 +8,7 @@ use nirspi::recording::Target;
 use nirspi::session::{IgnorePackets, Session, SessionError, request};
 use nirspi::setup::MeasurementSetup;
 use nirspi_recon::Order;
+use nirspi_tests::firmware;
 use nirspi_tests::tamper::{Fate, Tampered};
 use nirspi_wire::RunLength;
 use places::{Lab, Script};
@@ -109,9 +110,14 @@ pub enum Place {
     Tcp,
     /// A recording of the virtual camera, played back.
     Replay,
+    /// The firmware's machine code in QEMU, over a serial line.
+    Emulated,
+    /// The firmware and its USB driver on a simulated OTG core, whose cells the tests of `boards/usb` write.
+    Usb,
 }
 
-pub const PLACES: [Place; 3] = [Place::Virtual, Place::Tcp, Place::Replay];
+pub const PLACES: [Place; 5] =
+    [Place::Virtual, Place::Tcp, Place::Replay, Place::Emulated, Place::Usb];
 
 impl Place {
     pub fn title(self) -> &'static str {
@@ -119,6 +125,17 @@ impl Place {
             Self::Virtual => "virtual camera",
             Self::Tcp => "over TCP",
             Self::Replay => "replay",
+            Self::Emulated => "emulated board",
+            Self::Usb => "USB, simulated",
+        }
+    }
+
+    /// Whether this test can try faults there on this machine. If not, the page keeps its cells.
+    pub fn is_here(self) -> bool {
+        match self {
+            Self::Virtual | Self::Tcp | Self::Replay => true,
+            Self::Emulated => firmware::qemu().is_some() && firmware::elf().is_some(),
+            Self::Usb => false,
         }
     }
 }
@@ -134,6 +151,8 @@ pub enum Cell {
 /// What the injector has done to frames.
 #[derive(Debug, Default, Clone, Copy)]
 struct Log {
+    /// The camera has answered the greeting. Frames before that are of a run before, on a line that stayed open.
+    greeted: bool,
     passed: u64,
     damaged: u64,
     lost: u64,
@@ -167,7 +186,8 @@ fn injected(fault: Fault, link: Box<dyn Link>, log: &Arc<Mutex<Log>>) -> Box<dyn
     // Any fixed sequence: a multiplicative generator whose upper bits choose.
     let mut state = 0x2545_F491_u32;
     Box::new(Tampered::new(link, move |_, length| {
-        if length < 700 {
+        let mut log = log.lock().unwrap();
+        if length < 700 || !log.greeted {
             return Fate::Pass;
         }
         frame += 1;
@@ -175,7 +195,6 @@ fn injected(fault: Fault, link: Box<dyn Link>, log: &Arc<Mutex<Log>>) -> Box<dyn
         // A frame that is delayed needs a successor.
         let hit = state >> 29 == 0 && frame < FRAMES - 1;
         let share = (state >> 16) as u8;
-        let mut log = log.lock().unwrap();
         let fate = match fault {
             Fault::ByteLost if hit => Fate::Lose(share),
             Fault::BitFlipped if hit => Fate::Flip(share),
@@ -239,6 +258,9 @@ fn impossible(fault: Fault, place: Place) -> Option<&'static str> {
         }
         (Fault::TwoHosts, Place::Virtual) => Some("one link, one host"),
         (Fault::TwoHosts, Place::Replay) => Some("each reader has its own replay"),
+        (Fault::TwoHosts, Place::Emulated) => Some("a serial line has one host"),
+        (Fault::SlowReader, Place::Emulated) => Some("QEMU's line waits for its reader"),
+        (Fault::ClockJump, Place::Emulated) => Some("QEMU keeps the processor's clock"),
         _ => None,
     }
 }
@@ -248,6 +270,7 @@ fn one_capture(fault: Fault, lab: &Lab) -> Result<String, String> {
     let log = Arc::<Mutex<Log>>::default();
     let link = injected(fault, lab.connect(), &log);
     let mut session = Session::open(link).map_err(|error| format!("no session: {error}"))?;
+    log.lock().unwrap().greeted = true;
     let frames = if fault == Fault::SlowReader { FRAMES_OF_A_SLOW_READER } else { FRAMES };
     let captured =
         measure(&mut session, frames, None).map_err(|error| format!("no capture: {error}"))?;
@@ -296,8 +319,7 @@ fn one_capture(fault: Fault, lab: &Lab) -> Result<String, String> {
 
 /// The capture after the fault.
 fn after(fault: Fault, lab: &Lab) -> Result<(), String> {
-    let mut session =
-        Session::open(lab.connect()).map_err(|error| format!("no session after it: {error}"))?;
+    let mut session = lab.session().map_err(|error| format!("no session after it: {error}"))?;
     if fault == Fault::McuReset {
         let reports = session.await_reports().map_err(|error| error.to_string())?;
         if reports.crash.is_none() {
@@ -334,13 +356,15 @@ fn host_crash(lab: &Lab) -> Result<String, String> {
     Ok(match lab.place() {
         Place::Replay => "the replay ends",
         Place::Virtual | Place::Tcp => "LEDs off, the session is over",
+        Place::Emulated => "a serial line does not say so: LEDs off after 5 s of silence",
+        Place::Usb => unreachable!("tried in boards/usb"),
     }
     .to_owned())
 }
 
 fn host_hangs(lab: &Lab) -> Result<String, String> {
-    let session = streaming(lab)?;
-    lab.let_silence_pass()?;
+    let mut session = streaming(lab)?;
+    lab.let_silence_pass(&mut session)?;
     let told = format!("LEDs off: {}", nirspi_wire::Fault::HostSilent);
     drop(session);
     Ok(told)

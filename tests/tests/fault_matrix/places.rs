@@ -4,13 +4,15 @@ use super::{AFTER, FRAMES, Place, setup};
 use nirspi::link::{Link, Received, TcpLink};
 use nirspi::recording::Target;
 use nirspi::replay::{ReplayAddress, ReplayLink, Speed};
-use nirspi::session::Session;
+use nirspi::session::{IgnorePackets, Session, SessionError};
 use nirspi::setup::MeasurementSetup;
 use nirspi::virtual_camera::{
     OpticalFpga, ServeOptions, SimulatedFpga, VirtualCamera, VirtualOptics, serve,
 };
 use nirspi_mcu::{BusError, FpgaBus, Limits, Micros};
 use nirspi_optics::Scene;
+use nirspi_tests::debugger::{Debugger, NOWHERE, Waiting};
+use nirspi_tests::emulated::Emulated;
 use nirspi_wire::State;
 use nirspi_wire::register::{Register, control};
 use std::io;
@@ -25,6 +27,11 @@ const STEP_CLOCKS: u32 = 1000;
 /// The longest host silence of these cameras, shorter than the usual five seconds to save time. A host that listens
 /// asks for the status every second of its own clock.
 const SILENCE: Micros = Micros(3_000_000);
+
+/// Longest time until the emulated board is dark after its host is gone: five seconds of silence, on a busy machine.
+const DARK_WITHIN: Duration = Duration::from_secs(15);
+/// Greetings to a board that may be restarting, whose answers are lost.
+const GREETINGS: u32 = 5;
 
 /// What happens inside the camera, once, inside the frame after so many.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,9 +56,23 @@ struct Scripted {
     script: Script,
     released: u32,
     ahead: u64,
+    /// Whether LEDs shine or the FPGA runs, for a test whose FPGA is served by another thread.
+    lit: Arc<AtomicBool>,
+    /// The debugger that makes an emulated processor crash.
+    debugger: Arc<Mutex<Option<Debugger>>>,
 }
 
 impl Scripted {
+    fn new(script: Script) -> Self {
+        let inner = optics().fpga(1).unwrap();
+        let (lit, debugger) = Default::default();
+        Self { inner, script, released: 0, ahead: 0, lit, debugger }
+    }
+
+    fn look(&self) {
+        self.lit.store(self.inner.leds_on() || self.inner.running(), Ordering::SeqCst);
+    }
+
     fn is_due(&self, at: u32) -> bool {
         self.released == at && self.inner.running()
     }
@@ -60,10 +81,18 @@ impl Scripted {
 impl SimulatedFpga for Scripted {
     fn advance(&mut self, clocks: u32) {
         self.inner.advance(clocks);
+        self.look();
         match self.script {
             Script::Reset { frame } if self.is_due(frame) => self.inner.reset(),
             Script::Jump { frame } if self.is_due(frame) => {
                 self.ahead += 3600 * u64::from(nirspi_wire::ADC_HZ);
+            }
+            // The crash of a camera in this process is made by its cable.
+            Script::Crash { frame } if self.is_due(frame) => {
+                match &mut *self.debugger.lock().unwrap() {
+                    Some(debugger) => debugger.derail(NOWHERE),
+                    None => return,
+                }
             }
             _ => return,
         }
@@ -92,7 +121,9 @@ impl FpgaBus for Scripted {
         if address == Register::Control.address() && value & control::RELEASE != 0 {
             self.released += 1;
         }
-        self.inner.write(address, value)
+        let written = self.inner.write(address, value);
+        self.look();
+        written
     }
 
     fn frame_ready(&mut self) -> bool {
@@ -114,13 +145,49 @@ impl FpgaBus for Scripted {
 
 type Camera = VirtualCamera<Scripted>;
 
-fn camera(script: Script) -> Camera {
+fn optics() -> VirtualOptics {
     let scene = Scene::new(vec![0.5; 64], 8, 48.0).unwrap();
-    let optics = VirtualOptics::new(scene, 300.0).unwrap().ideal();
-    let inner = optics.fpga(1).unwrap();
-    let fpga = Scripted { inner, script, released: 0, ahead: 0 };
+    VirtualOptics::new(scene, 300.0).unwrap().ideal()
+}
+
+fn camera(script: Script) -> Camera {
     let limits = Limits { host_silence: SILENCE, ..Limits::default() };
-    VirtualCamera::new(fpga, optics.depth(1).unwrap(), "faults").with_limits(limits)
+    let depth = optics().depth(1).unwrap();
+    VirtualCamera::new(Scripted::new(script), depth, "faults").with_limits(limits)
+}
+
+/// The firmware's machine code in QEMU, with the FPGA of a script behind it.
+struct Board {
+    emulated: Emulated,
+    lit: Arc<AtomicBool>,
+}
+
+impl Board {
+    fn start(script: Script) -> Self {
+        let fpga = Scripted::new(script);
+        let (lit, debugger) = (Arc::clone(&fpga.lit), Arc::clone(&fpga.debugger));
+        let waiting = matches!(script, Script::Crash { .. }).then(Waiting::listen);
+        let arguments = waiting.iter().flat_map(Waiting::arguments).collect::<Vec<_>>();
+        let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+        let emulated = Emulated::start_with(fpga, &arguments).unwrap();
+        if let Some(waiting) = waiting {
+            let mut attached = waiting.attach();
+            attached.go();
+            *debugger.lock().unwrap() = Some(attached);
+        }
+        Self { emulated, lit }
+    }
+
+    fn darkens(&self) -> Result<(), String> {
+        let began = std::time::Instant::now();
+        while self.lit.load(Ordering::SeqCst) {
+            if began.elapsed() > DARK_WITHIN {
+                return Err(format!("an LED shines after {DARK_WITHIN:?}"));
+            }
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        Ok(())
+    }
 }
 
 fn is_dark(camera: &Camera) -> Result<(), String> {
@@ -226,6 +293,7 @@ enum Kind {
     /// The server is stopped and started again where the camera is looked at.
     Tcp(Mutex<Option<Server>>),
     Replay(tempfile::TempDir),
+    Emulated(Board),
 }
 
 /// One camera of a cell.
@@ -249,6 +317,8 @@ impl Lab {
                 assert_eq!(recorded.missing(), None);
                 Kind::Replay(folder)
             }
+            Place::Emulated => Kind::Emulated(Board::start(script)),
+            Place::Usb => unreachable!("tried in boards/usb"),
         };
         Self { place, kind }
     }
@@ -277,7 +347,19 @@ impl Lab {
                 let path = folder.path().join("rec.mcap");
                 Box::new(ReplayLink::open(&ReplayAddress { path, speed: Speed::Max }).unwrap())
             }
+            Kind::Emulated(board) => board.emulated.link(),
         }
+    }
+
+    /// A new session. An emulated board may have restarted, and a greeting sent
+    /// during the restart is lost.
+    pub fn session(&self) -> Result<Session, SessionError> {
+        let last = Session::open(self.connect());
+        let again = if self.place == Place::Emulated { GREETINGS - 1 } else { 0 };
+        (0..again).fold(last, |last, _| match last {
+            Err(SessionError::NoAnswer { .. }) => Session::open(self.connect()),
+            other => other,
+        })
     }
 
     /// That no LED shines and nothing runs, once no host is connected.
@@ -292,12 +374,24 @@ impl Lab {
                 dark
             }
             Kind::Replay(_) => Ok(()),
+            Kind::Emulated(board) => board.darkens(),
         }
     }
 
     /// Lets more than the longest silence of a host pass while the link stays open, and looks at the LEDs.
-    pub fn let_silence_pass(&self) -> Result<(), String> {
-        let Kind::Virtual(camera) = &self.kind else { return Err("no clock to turn".to_owned()) };
+    pub fn let_silence_pass(&self, session: &mut Session) -> Result<(), String> {
+        let camera = match &self.kind {
+            Kind::Virtual(camera) => camera,
+            Kind::Emulated(board) => {
+                board.darkens()?;
+                let status = session.status(&mut IgnorePackets).map_err(|e| e.to_string())?;
+                return match status.fault {
+                    Some(nirspi_wire::Fault::HostSilent) => Ok(()),
+                    fault => Err(format!("{fault:?} after host silence")),
+                };
+            }
+            Kind::Tcp(_) | Kind::Replay(_) => return Err("no clock to turn".to_owned()),
+        };
         let mut camera = camera.lock().unwrap();
         // The clock alone: seconds of samples would take minutes.
         camera.fpga_mut().ahead += 2 * SILENCE.0 * u64::from(nirspi_wire::ADC_HZ / 1_000_000);
@@ -312,6 +406,7 @@ impl Lab {
         match self.kind {
             Kind::Tcp(server) => is_dark(&server.into_inner().unwrap().unwrap().end()),
             Kind::Virtual(_) | Kind::Replay(_) => Ok(()),
+            Kind::Emulated(board) => board.darkens(),
         }
     }
 }

@@ -6,8 +6,6 @@
 //! same frames, bit for bit. Device times differ, because the two have different clocks.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap in a helper fails its test")]
 
-mod debugger;
-
 use nirspi::capture::{Capture, Ended};
 use nirspi::link::Link;
 use nirspi::session::{IgnorePackets, Session, SessionError, request};
@@ -16,6 +14,7 @@ use nirspi::signal::Signal;
 use nirspi::virtual_camera::{MemoryLink, VirtualOptics};
 use nirspi_optics::Scene;
 use nirspi_recon::{Order, Side, metrics, reconstruct};
+use nirspi_tests::debugger::{NOWHERE, Waiting};
 use nirspi_tests::elf::Firmware;
 use nirspi_tests::emulated::Emulated;
 use nirspi_tests::firmware;
@@ -165,12 +164,9 @@ fn an_fpga_that_falls_silent_is_a_fault_that_the_host_is_told() {
     assert_eq!(fault, Some(Fault::FpgaAbsent { identity: 0 }));
 }
 
-/// An address without memory: an instruction fetch there ends in a hard fault.
-const NOWHERE: u32 = 0x2FF0_0000;
-
 #[test]
 fn firmware_that_crashes_starts_again_and_tells_the_next_host_once() {
-    let debugger = debugger::Waiting::new();
+    let debugger = Waiting::listen();
     let arguments = debugger.arguments();
     let fpga = optics().fpga(SEED).unwrap();
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
@@ -209,7 +205,7 @@ fn the_stack_is_never_deeper_than_three_quarters_of_its_limit() {
     let elf = Firmware::read(elf).unwrap();
     let (end, start) = (elf.symbol("_stack_end").unwrap(), elf.symbol("_stack_start").unwrap());
 
-    let debugger = debugger::Waiting::new();
+    let debugger = Waiting::listen();
     let arguments = debugger.arguments();
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let Some(board) = Emulated::start_with(optics().fpga(SEED).unwrap(), &arguments) else {

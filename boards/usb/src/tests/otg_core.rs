@@ -391,6 +391,26 @@ impl OtgCore {
         answer
     }
 
+    /// Flips a bit, in the core's memory, of the packet that waits for the host. The byte is not 0 before or afterwards,
+    /// and so many bytes without a 0 lie before it in the packet. Returns whether there is such a byte.
+    pub fn damage(&mut self, endpoint: usize, before: usize) -> bool {
+        let side = &mut self.ins[endpoint];
+        let length = side.bytes().min(packet_bytes(endpoint, side.ctl));
+        if !side.is(EPENA) || side.fifo.len() < length.div_ceil(4) {
+            return false;
+        }
+        let mut packet: Vec<u8> = side.fifo.iter().flat_map(|word| word.to_ne_bytes()).collect();
+        let Some(start) = packet[..length].windows(before + 1).position(|part| !part.contains(&0))
+        else {
+            return false;
+        };
+        let byte = &mut packet[start + before];
+        *byte ^= if *byte == 1 { 2 } else { 1 };
+        let (words, _) = packet.as_chunks::<4>();
+        side.fifo = words.iter().map(|word| u32::from_ne_bytes(*word)).collect();
+        true
+    }
+
     /// Whether a transfer to the host is armed.
     pub fn is_armed(&self, endpoint: usize) -> bool {
         self.ins[endpoint].is(EPENA)

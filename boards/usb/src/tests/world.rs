@@ -9,18 +9,20 @@ use embassy_usb_synopsys_otg::{Config, Driver, OtgInstance, PhyType, State, simu
 use nirspi_app::bench::{self, FakeBoard, FakeFpga, Pins, configuration, packet};
 use nirspi_app::link::{Link, Packet};
 use nirspi_app::{DepthMailbox, board_info, run};
-use nirspi_mcu::{Limits, NoLoader};
+use nirspi_mcu::{Crash, Limits, Micros, NoLoader};
 use nirspi_wire::fpga::MAX_FRAME_BYTES;
 use nirspi_wire::packet::MAX_DEVICE_PACKET;
 use nirspi_wire::{
-    Answer as Reply, Command, Deframed, Deframer, DeviceMessage, Refusal, RunLength, Status, open,
-    usb, version,
+    Answer as Reply, Command, Deframed, Deframer, DeviceMessage, EventKind, Fault, Refusal,
+    RunLength, Status, open, usb, version,
 };
+use std::borrow::ToOwned;
 use std::boxed::Box;
 use std::cell::{Cell, RefCell};
 use std::future::Future;
 use std::pin::Pin;
 use std::rc::Rc;
+use std::string::String;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::task::{Context, Wake, Waker};
@@ -64,6 +66,19 @@ impl World {
     /// A camera that has just started, without a cable. With `as_released`, the driver is without
     /// its repairs.
     pub fn new(as_released: bool) -> Self {
+        Self::started(Rc::default(), None, as_released)
+    }
+
+    /// The camera after its firmware has crashed: the chip starts anew, and the FPGA has noticed nothing.
+    pub fn crashed(self, text: &str) -> Self {
+        let Self { pins, .. } = self;
+        // The chip's reset makes the pin an input, whose resistor switches the LED drivers off.
+        pins.leds_enabled.set(false);
+        let crash = Crash::new(Micros(bench::now_us()), format_args!("{text}"));
+        Self::started(pins, Some(crash), false)
+    }
+
+    fn started(pins: Rc<Pins>, crash: Option<Crash>, as_released: bool) -> Self {
         let core: Rc<RefCell<OtgCore>> = Rc::default();
         let registers = simulated::install(Rc::clone(&core) as Rc<_>, as_released);
         let state: &'static State<ENDPOINTS> = Box::leak(Box::new(State::new()));
@@ -83,7 +98,6 @@ impl World {
         let info = board_info("bench", SERIAL);
         let (mut usb, endpoints) = device(driver, SERIAL, info.firmware, memory);
 
-        let pins: Rc<Pins> = Rc::default();
         pins.frame_us.set(FRAME_US);
         let link = Box::leak(Box::new(Link::new(std::vec![Packet::EMPTY; 8].leak())));
         let (camera, commands, packets) = link.split();
@@ -95,7 +109,7 @@ impl World {
             loader: NoLoader,
             info,
             limits: Limits::default(),
-            crash: None,
+            crash,
         };
         let depth: &'static DepthMailbox = Box::leak(Box::new(DepthMailbox::new()));
         let futures: [Pin<Box<dyn Future<Output = ()>>>; 3] = [
@@ -185,11 +199,13 @@ impl World {
             deframer: Box::default(),
             replies: Vec::new(),
             next_id: 0,
+            patterns: PATTERNS,
+            begun: 0,
         }
     }
 
     pub fn assert_no_violation(&self) {
-        assert_eq!(self.core.borrow().violations, Vec::<std::string::String>::new());
+        assert_eq!(self.core.borrow().violations, Vec::<String>::new());
     }
 }
 
@@ -203,6 +219,12 @@ pub struct Log {
     pub random: Cell<u64>,
     /// Sessions that reached the stream.
     pub streams: Cell<u32>,
+    /// Packets that came damaged, where a test damages packets; `None` where none may be.
+    pub damaged: Cell<Option<u32>>,
+    /// Faults that the camera has reported.
+    pub faults: RefCell<Vec<Fault>>,
+    /// Texts of crash reports.
+    pub crashes: RefCell<Vec<String>>,
 }
 
 impl Log {
@@ -215,6 +237,17 @@ impl Log {
         self.random.set(x);
         (x >> 33) as u32 % bound
     }
+}
+
+/// What happens to a packet on the bus, and to the host's answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Way {
+    /// Both arrive.
+    Clear,
+    /// The packet is lost or damaged. The host's controller drops what it gets, and does not answer.
+    PacketLost,
+    /// The packet arrives, and its acknowledgement is lost.
+    AcknowledgementLost,
 }
 
 /// The device does not answer.
@@ -231,6 +264,10 @@ pub struct Host {
     deframer: Box<Deframer<MAX_DEVICE_PACKET>>,
     replies: Vec<(u16, Result<Option<Status>, Refusal>)>,
     next_id: u16,
+    /// Patterns of the frames that the host asks for.
+    pub patterns: u16,
+    /// Bytes that have arrived of a packet of the wire protocol.
+    pub begun: usize,
 }
 
 pub async fn tick() {
@@ -346,20 +383,45 @@ impl Host {
         Ok(self.next_id)
     }
 
+    /// Takes the place of a host whose program has ended, on a device that is still configured.
+    pub fn program_restarts(&mut self) {
+        self.deframer = Box::default();
+        self.begun = 0;
+    }
+
     /// Fetches one packet, if there is one.
     pub fn read(&mut self) {
         let lost = self.log.acknowledgements_lost.get();
         let acknowledged = lost == 0 || self.log.random(lost) != 0;
-        let fetched = self.core.borrow_mut().fetch(self.address, 1, acknowledged);
-        let Answer::Data(bytes, toggle) = fetched else { return };
-        if toggle != self.toggles[0] {
-            return; // Sent again.
+        self.fetch(if acknowledged { Way::Clear } else { Way::AcknowledgementLost });
+    }
+
+    /// Fetches one packet this way. Returns whether there was one.
+    pub fn fetch(&mut self, way: Way) -> bool {
+        let fetched = self.core.borrow_mut().fetch(self.address, 1, way == Way::Clear);
+        let Answer::Data(bytes, toggle) = fetched else { return false };
+        // A packet with the toggle of the one before is sent again.
+        if way != Way::PacketLost && toggle == self.toggles[0] {
+            self.toggles[0] ^= 1;
+            self.take(&bytes);
         }
-        self.toggles[0] ^= 1;
-        let mut rest = &bytes[..];
+        true
+    }
+
+    fn take(&mut self, bytes: &[u8]) {
+        self.begun = match bytes.iter().rposition(|&byte| byte == 0) {
+            Some(end) => bytes.len() - 1 - end,
+            None => self.begun + bytes.len(),
+        };
+        let mut rest = bytes;
         while let Some(found) = self.deframer.next(&mut rest) {
             let Deframed::Packet(packet) = found else { panic!("{found:?}") };
-            match open::<DeviceMessage<'_>>(packet).expect("a whole message") {
+            let message = open::<DeviceMessage<'_>>(packet);
+            if let (Err(_), Some(damaged)) = (&message, self.log.damaged.get()) {
+                self.log.damaged.set(Some(damaged + 1));
+                continue;
+            }
+            match message.expect("a whole message") {
                 DeviceMessage::Reply(reply) => {
                     let outcome = reply.outcome.map(|answer| match answer {
                         Reply::Status(status) => Some(status),
@@ -368,8 +430,16 @@ impl Host {
                     self.replies.push((reply.id, outcome));
                 }
                 DeviceMessage::Frame(frame) => {
-                    assert_eq!(frame.samples.len(), usize::from(PATTERNS));
+                    assert_eq!(frame.samples.len(), usize::from(self.patterns));
                     self.log.frames.borrow_mut().push((frame.run, frame.sequence));
+                }
+                DeviceMessage::Event(event) => {
+                    if let EventKind::Fault(fault) = event.kind {
+                        self.log.faults.borrow_mut().push(fault);
+                    }
+                }
+                DeviceMessage::Crash(report) => {
+                    self.log.crashes.borrow_mut().push(report.text.to_owned());
                 }
                 _ => {}
             }
@@ -389,8 +459,13 @@ impl Host {
 
     /// Configures the camera and starts the stream.
     pub async fn start(&mut self) -> Result<(), Deaf> {
-        assert_eq!(self.ask(Command::Configure(configuration(PATTERNS))).await?, Ok(None));
-        assert_eq!(self.ask(Command::Start(RunLength::Continuous)).await?, Ok(None));
+        self.start_run(RunLength::Continuous).await
+    }
+
+    /// Configures the camera and starts a run.
+    pub async fn start_run(&mut self, length: RunLength) -> Result<(), Deaf> {
+        assert_eq!(self.ask(Command::Configure(configuration(self.patterns))).await?, Ok(None));
+        assert_eq!(self.ask(Command::Start(length)).await?, Ok(None));
         Ok(())
     }
 

@@ -1,7 +1,7 @@
 use super::*;
 use crate::serve::lock;
+use crate::serve::look::Look;
 use crate::serve::overload::tests::given_up;
-use crate::serve::slot::Look;
 use data_encoding::BASE64;
 use nirspi_recon::Measurements;
 use nirspi_recon::reconstruct::{Method, MethodSettings};

@@ -7,7 +7,8 @@ use nirspi_tests_rtl::RtlPort;
 /// model; here each bit goes over a pin.
 #[test]
 fn packets_of_the_rtl_come_one_transfer_after_the_other() {
-    let seen = stretch(RtlPort::bring_up_at_the_boards_sck(), 1024, (4, 6), Processor::reference(), true);
+    let seen =
+        stretch(RtlPort::bring_up_at_the_boards_sck(), 1024, (4, 6), Processor::reference(), true);
     println!("simulated: {seen:.1?}");
     assert!(seen.frames_per_second > 5900.0, "{seen:?}");
     assert!(seen.made - seen.lost - seen.sent <= 2, "{seen:?}");

@@ -2,9 +2,13 @@
 //! break a program.
 //!
 //! Tests use it only to simulate radiation, a wild pointer or a bad solder joint.
+#![expect(clippy::unwrap_used, reason = "a failed unwrap here fails the test that uses it")]
 
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
+
+/// An address without memory: an instruction fetch there ends in a hard fault.
+pub const NOWHERE: u32 = 0x2FF0_0000;
 
 /// A debugger attached to a stopped processor; [`go`](Self::go) lets it run.
 pub struct Debugger {
@@ -17,17 +21,31 @@ pub struct Waiting {
 }
 
 impl Waiting {
-    pub fn new() -> Self {
+    /// A listener on a free port of this machine.
+    ///
+    /// # Panics
+    /// If the system gives no port.
+    #[must_use]
+    pub fn listen() -> Self {
         Self { listener: TcpListener::bind("127.0.0.1:0").unwrap() }
     }
 
     /// QEMU's arguments.
+    ///
+    /// # Panics
+    /// If the port is closed.
+    #[must_use]
     pub fn arguments(&self) -> [String; 4] {
         let port = self.listener.local_addr().unwrap().port();
         let socket = format!("socket,id=gdb,host=127.0.0.1,port={port}");
         ["-chardev".into(), socket, "-gdb".into(), "chardev:gdb".into()]
     }
 
+    /// Waits for QEMU's connection.
+    ///
+    /// # Panics
+    /// If QEMU does not speak the protocol.
+    #[must_use]
     pub fn attach(self) -> Debugger {
         let (line, _) = self.listener.accept().unwrap();
         let mut debugger = Debugger { line };
@@ -78,6 +96,9 @@ impl Debugger {
     }
 
     /// Stops the processor and reads memory.
+    ///
+    /// # Panics
+    /// If QEMU does not speak the protocol.
     pub fn read(&mut self, start: u64, end: u64) -> Vec<u8> {
         const PIECE: u64 = 1024;
         self.halt();
@@ -91,11 +112,17 @@ impl Debugger {
     }
 
     /// Lets the processor run.
+    ///
+    /// # Panics
+    /// If QEMU is gone.
     pub fn go(&mut self) {
         self.send("c");
     }
 
     /// Stops the processor and makes it continue at `address`.
+    ///
+    /// # Panics
+    /// If QEMU does not speak the protocol.
     pub fn derail(&mut self, address: u32) {
         self.halt();
         // Register 15, its bytes in the target's order.
