@@ -429,7 +429,7 @@ step_miri() {
 }
 
 # A workspace of its own, so that loom is in no other build.
-step_loom() { CARGO_TARGET_DIR=$PWD/target/loom cargo test --manifest-path tests/loom/Cargo.toml --test models; }
+step_loom() { CARGO_TARGET_DIR=$PWD/target/loom cargo test --locked --manifest-path tests/loom/Cargo.toml --test models; }
 
 step_crowd() {
     cargo build --locked --release
