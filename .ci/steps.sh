@@ -41,6 +41,7 @@ by_name=(
     "mutants         deliberate faults in the Rust code are seen: in lines changed since main, or in MUTANTS='CRATE...'; crates.io"
     "miri            unit tests of the wire protocol in Rust's interpreter, which sees undefined behaviour; rustup's nightly with miri"
     "loom            the live page's hand-overs between threads, in every order of the threads; crates.io"
+    "coverage        lines of each reader that its tests with damaged bytes reach; rustup's llvm-tools"
     "crowd           nirspi serve among 1000 clients that misbehave, for CROWD_S seconds (600)"
     "zenoh           a camera over Zenoh: router, camera and host as processes; crates.io, 219 crates of which 95 are its own"
     "stores          archives in object stores: S3 and WebDAV servers as processes; crates.io, PyPI"
@@ -430,6 +431,14 @@ step_miri() {
 
 # A workspace of its own, so that loom is in no other build.
 step_loom() { CARGO_TARGET_DIR=$PWD/target/loom cargo test --locked --manifest-path tests/loom/Cargo.toml --test models; }
+
+step_coverage() {
+    if ! rustup component add llvm-tools >&2; then
+        echo "skipped: coverage, no llvm-tools from rustup"
+        return
+    fi
+    python3 tests/coverage.py
+}
 
 step_crowd() {
     cargo build --locked --release

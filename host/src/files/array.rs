@@ -372,10 +372,12 @@ fn half_to_f64(bits: u16) -> f64 {
     }
 }
 
-/// Reorders elements stored with the first axis fastest into C order, with the last axis fastest.
+/// Reorders elements stored with the first axis fastest into C order, with the last axis fastest. An axis may have no
+/// elements.
 pub(super) fn to_c_order<T: Copy>(values: &[T], shape: &[usize]) -> Vec<T> {
     let axes: Vec<usize> = shape.iter().copied().filter(|&axis| axis != 1).collect();
     match axes[..] {
+        _ if values.is_empty() => Vec::new(),
         [] | [_] => values.to_vec(),
         [rows, columns] => transposed(values, rows, columns),
         _ => one_by_one(values, &axes),

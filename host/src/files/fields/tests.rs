@@ -79,3 +79,11 @@ fn damage_is_harmless_or_refused() {
         }
     }
 }
+
+#[test]
+fn a_matrix_without_numbers_is_read_whatever_its_shape() {
+    for shape in [vec![0, 0], vec![5, 0], vec![0, 5], vec![2, 0, 3]] {
+        let field = Field::from_column_major(shape.clone(), &[], Some(&[]));
+        assert_eq!(field, Field { shape, real: Vec::new(), imaginary: Some(Vec::new()) });
+    }
+}

@@ -159,7 +159,7 @@ fn a_period_has_a_byte_if_and_only_if_there_is_one_and_the_receiver_is_ready(pro
             let (ready, valid) = rig.asked[period - 1];
             match byte {
                 Some(byte) => {
-                    assert!(ready && (byte == 0 || valid), "sent without need: {byte:#x}")
+                    assert!(ready && (byte == 0 || valid), "sent without need: {byte:#x}");
                 }
                 None => assert!(!(ready && valid), "a byte was there, and the receiver ready"),
             }
