@@ -93,7 +93,8 @@ def tools() -> pathlib.Path:
 def build() -> dict[tuple[str, str | None], str]:
     """The test binaries, by package and name of the test file."""
     wanted = {(package, binary) for _, tests, _ in PLACES for package, binary, _ in tests}
-    command = ["cargo", "test", "--locked", "--no-run", "--message-format=json-render-diagnostics"]
+    command = ["cargo", "test", "--locked", "--no-run", "--message-format=json-render-diagnostics", "--lib"]
+    command += [part for _, binary in sorted(wanted, key=str) if binary for part in ("--test", binary)]
     found = {}
     # All at once, so that each dependency has one set of features.
     done = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True)

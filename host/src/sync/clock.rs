@@ -262,10 +262,10 @@ impl Clock {
         let middle = self.points.iter().map(|point| point.x).sum::<f64>() / count as f64;
         let edge = edge_at(&self.points, middle).unwrap_or(0.0);
         let mut excess = excess(&self.points, edge);
-        // A line that turns about its middle by this much departs by twice the excess at its ends.
-        // Of 6580 simulated links with delays of seven kinds, one in a hundred had an error above
-        // three quarters of this, and none above all of it.
-        let turn = 4.0 * (excess + 1e3) / (to - from);
+        // A line that turns about its middle by this much departs by two and a half times the excess
+        // at its ends. Of 59 743 simulated links with delays of four kinds, the largest error was
+        // 0.7 of this; one link of another draw had 0.95, with short delays at one end alone.
+        let turn = 5.0 * (excess + 1e3) / (to - from);
         let found = (count >= ENOUGH).then_some((edge, turn));
         let known = found.filter(|&(_, turn)| turn <= MOST_DRIFT);
         // Where the drift cannot be known, a clock without drift is the better guess.
