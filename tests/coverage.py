@@ -102,7 +102,8 @@ def build() -> dict[tuple[str, str | None], str]:
         message = json.loads(line)
         if message.get("reason") != "compiler-artifact" or not message.get("executable"):
             continue
-        package = re.search(r"[#/]([a-z-]+)[@#][^/]*$", message["package_id"])[1]
+        # path+file:///folder#name@version, or without the name where the folder has the same.
+        package = re.search(r"([a-z-]+)[@#][^@#/]*$", message["package_id"])[1]
         is_unit = "lib" in message["target"]["kind"]
         key = (package, None if is_unit else message["target"]["name"])
         if key in wanted and message["profile"]["test"]:
