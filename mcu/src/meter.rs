@@ -9,7 +9,7 @@
 //! Of a frame that the FPGA has made into a packet, the meter reads the samples in the packet, and the sum of all
 //! samples and the number over range in registers of the FPGA. A packet that the wires have damaged is no
 //! frame. When a packet of the parallel port is looked at, the registers are already those of a frame that the FPGA
-//! sends after it, and a look at a moment between two frames gives none.
+//! sends after it; between two frames the registers hold 0, and the meter measures nothing.
 //!
 //! # Invariant
 //! No frame passes through floating point (`tests/tests/budgets.rs`:

@@ -1,8 +1,8 @@
 //! The ring in memory into which a DMA channel writes what the FPGA's parallel port sends.
 //!
-//! The channel goes round and round and never waits, so the microcontroller's port always takes bytes. At how many free
-//! bytes the port's hardware would ask the FPGA to wait does therefore not matter. Bytes that nobody takes within one
-//! round are overwritten: the ring then forgets all that has come, and begins again behind the next zero.
+//! The channel goes round and round and never waits, so the microcontroller's port always takes bytes. It does not matter
+//! at how many free bytes the port's hardware would ask the FPGA to wait. Bytes that the firmware does not take within
+//! one round are overwritten: the ring then forgets all that has come, and begins again behind the next zero.
 //!
 //! The channel says where in the ring it writes next, and not how often it went round. Time tells: the FPGA cannot send
 //! a whole round between two looks that are less than a round's time apart. After a longer pause the ring counts as

@@ -8,27 +8,13 @@ use nirspi_wire::ready;
 use nirspi_wire::register::{Register, mode};
 use nirspi_wire::samples::Width;
 use nirspi_wire::{
-    Answer, Command, Configuration, DeviceMessage, EventKind, Frame, RunLength, Signal, State, Tail,
+    Answer, Command, Configuration, DeviceMessage, Frame, RunLength, Signal, State, Tail,
 };
 use proptest::prelude::*;
 use std::vec::Vec;
 
 fn running() -> Bench {
     Bench::running_with(RunLength::Continuous, true)
-}
-
-fn ended(made: u32, dropped: u32, lost: u32, corrupt: u32) -> EventKind {
-    EventKind::RunEnded {
-        run: 1,
-        frames_made: made,
-        frames_dropped: dropped,
-        fpga_frames_lost: lost,
-        fpga_frames_corrupt: corrupt,
-    }
-}
-
-fn sequences(heard: &[DeviceMessage<'static>]) -> Vec<u32> {
-    frames(heard).iter().map(|frame| frame.sequence).collect()
 }
 
 #[test]

@@ -261,7 +261,7 @@ fn what_is_left_of_a_cut_packet_is_not_taken_for_the_beginning_of_the_next() {
     }
 }
 
-/// Without a look for so long, nobody knows how often the channel went round.
+/// After so long without a look, the ring cannot tell how often the channel went round.
 #[test]
 fn a_pause_of_a_rounds_time_counts_as_an_overrun() {
     let round_us = BYTES / BYTES_PER_MICRO - LOOK.0;

@@ -188,20 +188,6 @@ impl Device {
     }
 }
 
-fn ended(made: u32, dropped: u32, lost: u32, corrupt: u32) -> EventKind {
-    EventKind::RunEnded {
-        run: 1,
-        frames_made: made,
-        frames_dropped: dropped,
-        fpga_frames_lost: lost,
-        fpga_frames_corrupt: corrupt,
-    }
-}
-
-fn sequences(heard: &[DeviceMessage<'static>]) -> Vec<u32> {
-    frames(heard).iter().map(|frame| frame.sequence).collect()
-}
-
 #[test]
 fn a_packet_goes_from_the_ring_to_the_host_as_the_fpga_made_it() {
     let mut device = Device::running(RunLength::Continuous);
@@ -468,7 +454,7 @@ impl Device {
 }
 
 /// The signal meter asks the FPGA for the level of the frame that is being sent, which is a later one; between two
-/// frames there is none, and the meter tries again at its next time.
+/// frames the level is 0, and the meter tries again at its next time.
 #[test]
 fn the_meter_shows_a_signal_while_frames_are_being_sent() {
     let mut device = Device::running(RunLength::Continuous);

@@ -270,3 +270,19 @@ pub fn frames(messages: &[DeviceMessage<'static>]) -> Vec<Frame<'static>> {
     };
     messages.iter().filter_map(frame).collect()
 }
+
+/// The event at the end of run 1.
+pub fn ended(made: u32, dropped: u32, lost: u32, corrupt: u32) -> EventKind {
+    EventKind::RunEnded {
+        run: 1,
+        frames_made: made,
+        frames_dropped: dropped,
+        fpga_frames_lost: lost,
+        fpga_frames_corrupt: corrupt,
+    }
+}
+
+/// Numbers of the frames among these messages.
+pub fn sequences(heard: &[DeviceMessage<'static>]) -> Vec<u32> {
+    frames(heard).iter().map(|frame| frame.sequence).collect()
+}

@@ -66,7 +66,7 @@ impl Memory {
     fn new(version: u32, has_port: bool) -> Self {
         let port = has_port.then(|| (Ring::new(&RING), 0));
         let mut registers = [0; 32];
-        // The signal meter asks for the level once in a tenth of a second, and again if there is none.
+        // With a level of 0, the signal meter would take this for a moment between two frames.
         registers[usize::from(Register::SumLow.address())] = 1;
         Self { version, registers, running: false, sequence: 0, writes: 0, port, now: Micros(0) }
     }
