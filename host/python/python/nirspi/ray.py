@@ -221,7 +221,7 @@ def run(
 
 
 def _version_here() -> Callable[[], tuple[str | None, str, str]]:
-    """A function that gives the version of nirspi in its process, or why it cannot be imported, and the interpreter.
+    """A function that gives its process's version of nirspi, or why the import failed, and the interpreter.
 
     A function inside a function, because Ray sends the code of such a function, and of another one only
     the module and the name, which a node without the package does not know.
