@@ -281,6 +281,16 @@ fn streamed(processor: Processor, is_narrow: bool) -> Stretch {
     seen
 }
 
+/// The frames a second that a row of `docs/firmware.md` has for the parallel port, samples of 32 and of 24 bits.
+fn told(row: &str) -> [f64; 2] {
+    let rows = table(&page("docs/firmware.md"), "## Packets by the parallel port");
+    let row = rows.iter().find(|cells| cells[0].starts_with(row)).expect("the page has this row");
+    [&row[1], &row[2]].map(|cell| {
+        let digits = cell.split(':').next().expect("a first part").replace(' ', "");
+        digits.parse().expect("frames a second")
+    })
+}
+
 /// What the project asks for: as many frames as USB carries, in simulated time.
 #[test]
 fn packets_of_the_parallel_port_reach_7900_frames_a_second_and_those_of_24_bits_10_500() {
@@ -288,8 +298,9 @@ fn packets_of_the_parallel_port_reach_7900_frames_a_second_and_those_of_24_bits_
     assert!(wide.frames_per_second >= 7900.0, "{wide:?}");
     let narrow = streamed(Processor::streaming(), true);
     assert!(narrow.frames_per_second >= 10_500.0, "{narrow:?}");
-    for seen in [wide, narrow] {
+    for (seen, told) in [wide, narrow].into_iter().zip(told("33 MB/s")) {
         assert!(seen.busy < 0.95, "{seen:?}");
+        assert!((seen.frames_per_second - told).abs() <= 5.0, "the page says {told}: {seen:?}");
     }
 }
 
@@ -305,4 +316,7 @@ fn to_a_host_that_is_fast_enough_the_ring_forwards_all_that_the_port_sends() {
     let narrow = streamed(processor, true);
     assert!((narrow.frames_per_second / 12_207.0 - 1.0).abs() < 0.01, "{narrow:?}");
     assert_eq!(narrow.lost, 0, "{narrow:?}");
+    for (seen, told) in [wide, narrow].into_iter().zip(told("all at once")) {
+        assert!((seen.frames_per_second - told).abs() <= 5.0, "the page says {told}: {seen:?}");
+    }
 }
