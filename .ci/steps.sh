@@ -33,6 +33,10 @@ steps=(
     "place-route     place and route of the gateware and of the bring-up design, one seed each; PyPI"
 )
 
+# Steps that mostly wait: for a page, for a link at its own pace, for downloads. A run of every step has them one after
+# another beside the steps behind them, and prints their output at its end.
+beside=(page web tcp recordings)
+
 # Run by name alone, by GitHub or for a release. Their tools and builds take an hour.
 by_name=(
     "seeds           place and route of the gateware with five seeds, the best of which is packed; PyPI"
@@ -58,11 +62,15 @@ by_name=(
 # that are gone.
 debian() {
     if [ "$(id -u)" != 0 ] || ! command -v apt-get >/dev/null; then return 1; fi
-    if [ ! -e "$out/lists" ]; then
-        apt-get update -qq || true
-        touch "$out/lists"
-    fi
-    apt-get install -y -qq --no-install-recommends "$@" >/dev/null
+    (
+        # Two steps may run side by side.
+        flock 9
+        if [ ! -e "$out/lists" ]; then
+            apt-get update -qq || true
+            touch "$out/lists"
+        fi
+        apt-get install -y -qq --no-install-recommends "$@" >/dev/null
+    ) 9>"$out/apt"
 }
 
 # A Python environment under target/ with these packages.
