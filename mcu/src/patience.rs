@@ -60,6 +60,11 @@ impl Patience {
         }
     }
 
+    /// The transfer has reached the host.
+    pub fn fetched(&mut self) {
+        (self.handed_over, self.stuck) = (true, false);
+    }
+
     /// What to do about a transfer that still waits; `None` if it may wait longer.
     pub fn judge(&mut self, now: Micros) -> Option<Remedy> {
         if now.since(self.began) < PATIENCE {

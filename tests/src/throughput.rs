@@ -34,9 +34,6 @@ const PLACES: usize = 32;
 /// ours has measured it.
 const USB_BYTES_PER_MICRO: u64 = 33;
 
-/// Instructions of the driver of USB for a transfer of 512 bytes (`docs/firmware.md`, USB on silicon).
-const DRIVER_INSTRUCTIONS: f64 = 650.0;
-
 const INPUTS: Inputs = Inputs { interlock_closed: true, temperature_centi_celsius: Some(2500) };
 
 /// A host port whose accesses take simulated time.
@@ -63,8 +60,30 @@ pub struct Processor {
     pub access_ps: u64,
     /// Setting up a transfer by DMA, its interrupt, and waking the camera's task.
     pub transfer_ps: u64,
-    /// The task that serves the host over USB, for each 512 bytes of a packet. 0: the host takes every packet at once.
-    pub usb_ps: u64,
+    /// The task that serves the host over USB.
+    pub usb: Usb,
+}
+
+/// How packets get from the link to a host on USB, and what of the processor's time that takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Usb {
+    /// The host takes every packet at once, and the processor has no part in it.
+    AtOnce,
+    /// The processor copies: so long for each 512 bytes.
+    Copied(u64),
+    /// The USB core reads by DMA: so long for each packet.
+    Whole(u64),
+}
+
+impl Usb {
+    /// The processor's time for a packet of this length.
+    fn packet_ps(self, length: usize) -> u64 {
+        match self {
+            Self::AtOnce => 0,
+            Self::Copied(ps) => length.div_ceil(512) as u64 * ps,
+            Self::Whole(ps) => ps,
+        }
+    }
 }
 
 /// The time that so many instructions take on the reference board, of 160 MHz.
@@ -88,22 +107,30 @@ impl Processor {
     #[must_use]
     pub fn reference() -> Self {
         let packet_ps = instructions_ps(instructions_of("packet_without_meter"));
-        Self { packet_ps, access_ps: 2_000_000, transfer_ps: 5_000_000, usb_ps: 0 }
+        Self { packet_ps, access_ps: 2_000_000, transfer_ps: 5_000_000, usb: Usb::AtOnce }
     }
 
-    /// The reference board where packets come by the parallel port, with USB behind it.
+    /// The reference board where packets come by the parallel port, with USB behind it, whose core reads them by DMA.
     ///
     /// # Panics
     /// If the page has no such rows.
     #[must_use]
     pub fn streaming() -> Self {
-        // Eight transfers of a packet of 32-bit samples are merged, and what is left.
-        let merging = instructions_of("packet_merging") / 8.0;
         Self {
             packet_ps: instructions_ps(instructions_of("streamed_packet")),
-            usb_ps: instructions_ps(merging + DRIVER_INSTRUCTIONS),
+            usb: Usb::Whole(instructions_ps(instructions_of("usb_whole_packet"))),
             ..Self::reference()
         }
+    }
+
+    /// The same without DMA of USB, as firmware before had it.
+    ///
+    /// # Panics
+    /// If the page has no such rows.
+    #[must_use]
+    pub fn copying() -> Self {
+        let usb = Usb::Copied(instructions_ps(instructions_of("usb_512_copied")));
+        Self { usb, ..Self::streaming() }
     }
 }
 
@@ -221,7 +248,7 @@ pub fn stretch<P: TimedPort>(
     let mut host = Host {
         room: vec![0; MAX_FRAME_BYTES],
         packets: Vec::new(),
-        is_usb: processor.usb_ps > 0,
+        is_usb: processor.usb != Usb::AtOnce,
         waiting: VecDeque::new(),
         carried_us: 0,
     };
@@ -320,7 +347,7 @@ fn turn<P: TimedPort>(
             if let [length] = host.packets[sent..] {
                 // The loop yields to the task that serves the host.
                 bus.port().port.pass(processor.packet_ps / 2);
-                bus.port().port.pass(length.div_ceil(512) as u64 * processor.usb_ps);
+                bus.port().port.pass(processor.usb.packet_ps(length));
             }
             // The line of a ready frame wakes the loop.
             let slept = bus.port().port.now_ps();

@@ -24,17 +24,38 @@ const PLACE_BYTES: usize =
 /// Transfers that a packet has to fill before a short one is sent ahead of it, so that it need not be copied.
 const LONG: usize = 4;
 
+/// DMA begins to read at multiples of so many bytes.
+const DMA_BYTES: usize = 4;
+
+/// The smallest packet of a bulk endpoint: at full speed (USB 2.0, 5.8.3).
+const USB_PACKET_BYTES: usize = 64;
+
 /// A place for one packet on its way to the host.
 #[derive(Debug, Clone, Copy)]
+#[repr(C)]
 pub struct Packet {
-    bytes: [u8; PLACE_BYTES],
     start: usize,
     end: usize,
+    /// At a multiple of [`DMA_BYTES`].
+    bytes: [u8; PLACE_BYTES],
 }
+
+const _: () = assert!(core::mem::offset_of!(Packet, bytes).is_multiple_of(DMA_BYTES));
+const _: () = assert!(align_of::<Packet>().is_multiple_of(DMA_BYTES));
 
 impl Packet {
     /// A place without a packet.
-    pub const EMPTY: Self = Self { bytes: [0; PLACE_BYTES], start: 0, end: 0 };
+    pub const EMPTY: Self = Self { start: 0, end: 0, bytes: [0; PLACE_BYTES] };
+
+    /// The packet from a place on that DMA can reach: up to three zeros come before its bytes, which mean nothing
+    /// between two packets.
+    fn whole(&mut self) -> &[u8] {
+        let begin = self.start - self.start % DMA_BYTES;
+        if let Some(gap) = self.bytes.get_mut(begin..self.start) {
+            gap.fill(0);
+        }
+        self.bytes.get(begin..self.end).unwrap_or(&[])
+    }
 
     fn after(&self, offset: usize) -> &[u8] {
         self.bytes.get(self.start..self.end).and_then(|bytes| bytes.get(offset..)).unwrap_or(&[])
@@ -115,7 +136,7 @@ pub struct HostOut<'l, const N: usize> {
     packets: zerocopy_channel::Receiver<'l, NoopRawMutex, Packet>,
     /// Bytes of the first packet that are already in transfers.
     sent: usize,
-    /// The last transfer was `N` bytes of the first packet itself.
+    /// The last transfer was `N` bytes of the first packet itself, or the whole of it.
     lent: bool,
     merger: Merger<N>,
 }
@@ -146,6 +167,26 @@ impl<const N: usize> HostOut<'_, N> {
             Some(packet) if self.lent => packet.after(self.sent).get(..N).unwrap_or(&[]),
             _ => self.merger.transfer(),
         }
+    }
+
+    /// Waits for a packet to send, whole and where it lies, from a multiple of four bytes on. An empty transfer comes
+    /// instead where the packet before has filled its last USB packet and no other packet follows: a read of the host
+    /// ends with a USB packet that is not full.
+    ///
+    /// The bytes that were returned before must have been sent. Of one link either this or
+    /// [`transfer`](Self::transfer) is called.
+    pub async fn packet(&mut self) -> &[u8] {
+        let sent = core::mem::take(&mut self.sent);
+        if core::mem::take(&mut self.lent) {
+            self.packets.receive_done();
+            if sent.is_multiple_of(USB_PACKET_BYTES) && self.packets.try_receive().is_none() {
+                return &[];
+            }
+        }
+        let bytes = self.packets.receive().await.whole();
+        self.lent = true;
+        self.sent = bytes.len();
+        bytes
     }
 
     /// Counts bytes of the first packet that went into transfers, and frees its place after the last of them.

@@ -388,3 +388,43 @@ fn a_host_that_goes_in_the_middle_of_a_packet_leaves_nothing_for_the_next() {
         }
     }
 }
+
+/// Packets of the firmware begin at 0, those of the FPGA anywhere, with bytes of the FPGA before them.
+#[test]
+fn a_packet_goes_out_whole_from_where_dma_can_reach_it() {
+    const USB_PACKET: usize = 64;
+    let link = Box::leak(Box::new(Link::new(std::vec![Packet::EMPTY; 4].leak())));
+    let (mut camera, _, mut to_host) = link.split::<TRANSFER>();
+    for (start, length, follows) in (0..9).flat_map(|start| {
+        let lengths = [1, 63, 64, 65, 124, 125, 126, 127, 128, 4132];
+        lengths.into_iter().flat_map(move |length| [(start, length, false), (start, length, true)])
+    }) {
+        let mut commit = |length: usize| {
+            let (_, sink) = camera.both();
+            let room = sink.claim(start + length).expect("room");
+            room[..start].fill(0xEE);
+            room[start..].fill(0x11);
+            sink.commit(start..start + length);
+        };
+        commit(length);
+        if follows {
+            commit(5);
+        }
+        for length in [length, 5].into_iter().take(1 + usize::from(follows)) {
+            let core::task::Poll::Ready(bytes) = poll_once(to_host.packet()) else {
+                panic!("bytes")
+            };
+            assert_eq!(bytes.as_ptr().addr() % 4, 0, "from {start}, {length} bytes");
+            assert_eq!(bytes, [std::vec![0; start % 4], std::vec![0x11; length]].concat());
+        }
+        // A read of the host ends with a USB packet that is not full.
+        let last = start % 4 + if follows { 5 } else { length };
+        if last.is_multiple_of(USB_PACKET) {
+            let core::task::Poll::Ready(bytes) = poll_once(to_host.packet()) else {
+                panic!("an end")
+            };
+            assert!(bytes.is_empty());
+        }
+        assert!(poll_once(to_host.packet()).is_pending(), "from {start}, {length} bytes");
+    }
+}

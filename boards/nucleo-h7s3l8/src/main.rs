@@ -32,7 +32,7 @@ use nirspi_app::link::{HostIn, HostOut, Link, Packet};
 use nirspi_app::{DepthMailbox, Device, board_info, run};
 use nirspi_mcu::Limits;
 use nirspi_nucleo::{crash, gateware, restart};
-use nirspi_usb::{Endpoints, Memory, OUT_BUFFER_BYTES, PACKET_BYTES, Presence, serve};
+use nirspi_usb::{Endpoints, Memory, OutBuffer, PACKET_BYTES, Presence, serve};
 use nirspi_wire::Capabilities;
 use nirspi_wire::fpga::MAX_FRAME_BYTES;
 use static_cell::{ConstStaticCell, StaticCell};
@@ -56,7 +56,7 @@ static FRAME: ConstStaticCell<[u8; MAX_FRAME_BYTES]> = ConstStaticCell::new([0; 
 static STAGING: ConstStaticCell<[u8; configuration::STAGING_BYTES]> = ConstStaticCell::new([0; _]);
 static PRESENCE: StaticCell<Presence> = StaticCell::new();
 static USB_MEMORY: StaticCell<Memory> = StaticCell::new();
-static USB_BUFFER: ConstStaticCell<[u8; OUT_BUFFER_BYTES]> = ConstStaticCell::new([0; _]);
+static USB_BUFFER: ConstStaticCell<OutBuffer> = ConstStaticCell::new(OutBuffer::new());
 
 #[embassy_executor::task]
 async fn usb_device(mut device: nirspi_usb::Device<UsbDriver>) -> ! {
@@ -139,7 +139,7 @@ async fn main(spawner: Spawner) {
         Interrupts,
         pins.usb_dp,
         pins.usb_dm,
-        USB_BUFFER.take(),
+        &mut USB_BUFFER.take().0,
         usb::Config::default(),
     );
     let presence = PRESENCE.init(Presence::new());

@@ -37,7 +37,7 @@ use nirspi_app::link::{HostIn, HostOut, Link, Packet};
 use nirspi_app::{Board, DepthMailbox, Device, board_info, measure_depth, run};
 use nirspi_mcu::{HostPort, Limits};
 use nirspi_nucleo::{crash, gateware, restart};
-use nirspi_usb::{Endpoints, Memory, OUT_BUFFER_BYTES, PACKET_BYTES, Presence, serve};
+use nirspi_usb::{Endpoints, Memory, OutBuffer, PACKET_BYTES, Presence, serve};
 use nirspi_wire::Capabilities;
 use nirspi_wire::fpga::MAX_FRAME_BYTES;
 use nirspi_wire::host_port::seal;
@@ -68,7 +68,7 @@ static SPARE: ConstStaticCell<[u8; MAX_FRAME_BYTES]> = ConstStaticCell::new([0; 
 static STAGING: ConstStaticCell<[u8; configuration::STAGING_BYTES]> = ConstStaticCell::new([0; _]);
 static PRESENCE: StaticCell<Presence> = StaticCell::new();
 static USB_MEMORY: StaticCell<Memory> = StaticCell::new();
-static USB_BUFFER: ConstStaticCell<[u8; OUT_BUFFER_BYTES]> = ConstStaticCell::new([0; _]);
+static USB_BUFFER: ConstStaticCell<OutBuffer> = ConstStaticCell::new(OutBuffer::new());
 
 #[embassy_executor::task]
 async fn usb_device(mut device: nirspi_usb::Device<UsbDriver>) -> ! {
@@ -169,13 +169,16 @@ async fn main(spawner: Spawner) {
         .can(Capabilities::DEPTH)
         .can(Capabilities::LOAD_GATEWARE)
         .can(Capabilities::BOOTLOADER);
+    let mut usb_config = usb::Config::default();
+    // The chip's data cache is for external memory alone, so core and processor see the same bytes.
+    usb_config.dma = true;
     let driver = Driver::new_hs(
         p.USB_OTG_HS,
         Interrupts,
         pins.usb_dp,
         pins.usb_dm,
-        USB_BUFFER.take(),
-        usb::Config::default(),
+        &mut USB_BUFFER.take().0,
+        usb_config,
     );
     let presence = PRESENCE.init(Presence::new());
     let memory = USB_MEMORY.init(Memory::new(presence));

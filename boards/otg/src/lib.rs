@@ -25,6 +25,8 @@ use crate::fmt::Bytes;
 
 pub mod otg_v1;
 
+#[cfg(feature = "dma")]
+mod dma;
 mod repair;
 #[cfg(feature = "simulated")]
 pub mod simulated;
@@ -34,6 +36,11 @@ use otg_v1::{Otg, regs, vals};
 /// Handle interrupts.
 pub unsafe fn on_interrupt<const MAX_EP_COUNT: usize>(r: Otg, state: &State<MAX_EP_COUNT>, ep_count: usize) {
     trace!("irq");
+
+    #[cfg(feature = "dma")]
+    if state.dma.is_on() {
+        return dma::on_interrupt(r, state);
+    }
 
     let ints = r.gintsts().read();
     if ints.wkupint() || ints.usbsusp() || ints.usbrst() || ints.enumdne() || ints.otgint() || ints.srqint() {
@@ -306,6 +313,8 @@ pub struct State<const EP_COUNT: usize> {
     cp_state: ControlPipeSetupState,
     ep_states: [EpState; EP_COUNT],
     bus_waker: AtomicWaker,
+    #[cfg(feature = "dma")]
+    dma: dma::Dma,
 }
 
 unsafe impl<const EP_COUNT: usize> Send for State<EP_COUNT> {}
@@ -329,6 +338,8 @@ impl<const EP_COUNT: usize> State<EP_COUNT> {
                 }
             }; EP_COUNT],
             bus_waker: AtomicWaker::new(),
+            #[cfg(feature = "dma")]
+            dma: dma::Dma::new(),
         }
     }
 }
@@ -367,6 +378,21 @@ pub struct Config {
     /// enumerates in FS mode. Some USB Link IP like those in the STM32H7 series support adding this delay to work with
     /// the affected PHYs.
     pub xcvrdly: bool,
+
+    /// The core reads and writes memory by its own DMA, and the processor copies nothing. For chips whose core has DMA
+    /// and whose memory needs no cleaning of a data cache. [`Endpoint::uses_dma`] states what `write` then asks for.
+    #[cfg(feature = "dma")]
+    pub dma: bool,
+}
+
+impl Config {
+    #[inline(always)]
+    fn uses_dma(&self) -> bool {
+        #[cfg(feature = "dma")]
+        return self.dma;
+        #[cfg(not(feature = "dma"))]
+        false
+    }
 }
 
 impl Default for Config {
@@ -374,6 +400,8 @@ impl Default for Config {
         Self {
             vbus_detection: false,
             xcvrdly: false,
+            #[cfg(feature = "dma")]
+            dma: false,
         }
     }
 }
@@ -399,6 +427,8 @@ impl<'d, const MAX_EP_COUNT: usize> Driver<'d, MAX_EP_COUNT> {
     /// * `instance` - The USB OTG peripheral instance and its configuration.
     /// * `config` - The USB driver configuration.
     pub fn new(ep_out_buffer: &'d mut [u8], instance: OtgInstance<'d, MAX_EP_COUNT>, config: Config) -> Self {
+        #[cfg(feature = "dma")]
+        instance.state.dma.turn(config.dma);
         Self {
             config,
             ep_in: [None; MAX_EP_COUNT],
@@ -437,13 +467,25 @@ impl<'d, const MAX_EP_COUNT: usize> Driver<'d, MAX_EP_COUNT> {
             }
         };
 
+        #[cfg(feature = "dma")]
+        if self.config.dma && !dma::can_serve(ep_type, &self.ep_out_buffer[self.ep_out_buffer_offset..]) {
+            error!("DMA serves no isochronous endpoint, and no buffer that is not at a multiple of 4 bytes");
+            return Err(EndpointAllocError);
+        }
+
         let fifo_size_words = match D::dir() {
             Direction::Out => (max_packet_size + 3) / 4,
             // INEPTXFD requires minimum size of 16 words
             Direction::In => u16::max((max_packet_size + 3) / 4, 16),
         };
+        #[cfg(feature = "dma")]
+        let fifo_size_words = dma::fifo_words(&self.config, D::dir(), ep_type, fifo_size_words);
+        #[cfg(feature = "dma")]
+        let reserved_words = dma::reserved_words(&self.config, self.instance.endpoint_count);
+        #[cfg(not(feature = "dma"))]
+        let reserved_words = 0;
 
-        if fifo_size_words + self.allocated_fifo_words() > self.instance.fifo_depth_words {
+        if fifo_size_words + self.allocated_fifo_words() + reserved_words > self.instance.fifo_depth_words {
             error!("Not enough FIFO capacity");
             return Err(EndpointAllocError);
         }
@@ -515,6 +557,8 @@ impl<'d, const MAX_EP_COUNT: usize> Driver<'d, MAX_EP_COUNT> {
                 max_packet_size,
                 interval_ms,
             },
+            #[cfg(feature = "dma")]
+            dma: self.config.dma.then_some(&self.instance.state.dma),
         })
     }
 }
@@ -596,7 +640,7 @@ impl<'d, const MAX_EP_COUNT: usize> Bus<'d, MAX_EP_COUNT> {
             w.set_wuim(true);
             w.set_iepint(true);
             w.set_oepint(true);
-            w.set_rxflvlm(true);
+            w.set_rxflvlm(!self.config.uses_dma());
             w.set_srqim(true);
             w.set_otgint(true);
         });
@@ -774,6 +818,10 @@ impl<'d, const MAX_EP_COUNT: usize> Bus<'d, MAX_EP_COUNT> {
         // Unmask SETUP received EP interrupt
         r.doepmsk().write(|w| {
             w.set_stupm(true);
+            #[cfg(feature = "dma")]
+            if self.config.dma {
+                dma::unmask_out(w);
+            }
         });
 
         // Unmask and clear core interrupts
@@ -783,6 +831,10 @@ impl<'d, const MAX_EP_COUNT: usize> Bus<'d, MAX_EP_COUNT> {
         // Unmask global interrupt
         r.gahbcfg().write(|w| {
             w.set_gint(true); // unmask global interrupt
+            #[cfg(feature = "dma")]
+            if self.config.dma {
+                dma::enable(w);
+            }
         });
 
         // Connect
@@ -882,6 +934,13 @@ impl<'d, const MAX_EP_COUNT: usize> Bus<'d, MAX_EP_COUNT> {
                         }
                     });
 
+                    #[cfg(feature = "dma")]
+                    if self.config.dma {
+                        if index == 0 {
+                            self.instance.state.dma.listen(regs);
+                        }
+                        return;
+                    }
                     regs.doeptsiz(index).modify(|w| {
                         w.set_xfrsiz(ep.max_packet_size as _);
                         if index == 0 {
@@ -975,6 +1034,10 @@ impl<'d, const MAX_EP_COUNT: usize> embassy_usb_driver::Bus for Bus<'d, MAX_EP_C
                         }
                     }
                 }
+                #[cfg(feature = "dma")]
+                if self.config.dma {
+                    (1..self.instance.endpoint_count).for_each(|index| dma::disarm_out(regs, index));
+                }
                 self.init_fifo();
                 self.configure_endpoints();
 
@@ -1053,6 +1116,10 @@ impl<'d, const MAX_EP_COUNT: usize> embassy_usb_driver::Bus for Bus<'d, MAX_EP_C
                 critical_section::with(|_| {
                     regs.doepctl(ep_addr.index()).modify(|w| {
                         w.set_stall(stalled);
+                        if self.config.uses_dma() {
+                            // A written 0 leaves EPENA, which the core may have cleared since it was read.
+                            w.set_epena(false);
+                        }
                         if let Some(ep) = &self.ep_out[ep_addr.index()] {
                             w.set_sd0pid_sevnfrm(!stalled && repair::starts_with_data0(ep.ep_type));
                         }
@@ -1102,6 +1169,12 @@ impl<'d, const MAX_EP_COUNT: usize> embassy_usb_driver::Bus for Bus<'d, MAX_EP_C
         let regs = self.instance.regs;
         let state = self.instance.state;
         match ep_addr.direction() {
+            #[cfg(feature = "dma")]
+            Direction::Out if self.config.dma => {
+                let index = ep_addr.index();
+                let ep = self.ep_out[index].as_ref().map(|ep| ep.ep_type);
+                dma::set_out_enabled(regs, index, &state.ep_states[index], ep.filter(|_| enabled));
+            }
             Direction::Out => {
                 critical_section::with(|_| {
                     // cancel transfer if active
@@ -1254,6 +1327,8 @@ pub struct Endpoint<'d, D> {
     regs: Otg,
     info: EndpointInfo,
     state: &'d EpState,
+    #[cfg(feature = "dma")]
+    dma: Option<&'d dma::Dma>,
 }
 
 impl<'d> embassy_usb_driver::Endpoint for Endpoint<'d, In> {
@@ -1301,6 +1376,11 @@ impl<'d> embassy_usb_driver::Endpoint for Endpoint<'d, Out> {
 impl<'d> embassy_usb_driver::EndpointOut for Endpoint<'d, Out> {
     async fn read(&mut self, buf: &mut [u8]) -> Result<usize, EndpointError> {
         trace!("read start len={}", buf.len());
+
+        #[cfg(feature = "dma")]
+        if self.dma.is_some() {
+            return dma::read(self.regs, self.info.addr.index(), self.state, buf).await;
+        }
 
         poll_fn(|cx| {
             let index = self.info.addr.index();
@@ -1372,11 +1452,26 @@ impl<'d> Endpoint<'d, In> {
             repair::disarm_in(self.regs, self.info.addr.index());
         }
     }
+
+    /// Whether the core itself reads what [`write`](embassy_usb_driver::EndpointIn::write) is given. Then `write` takes
+    /// up to 1023 packets at once, which begin at a multiple of four bytes in memory that the core reaches, and waits
+    /// until the host has fetched them all. A `write` that is dropped before takes back what the host has not fetched.
+    pub fn uses_dma(&self) -> bool {
+        #[cfg(feature = "dma")]
+        return self.dma.is_some();
+        #[cfg(not(feature = "dma"))]
+        false
+    }
 }
 
 impl<'d> embassy_usb_driver::EndpointIn for Endpoint<'d, In> {
     async fn write(&mut self, buf: &[u8]) -> Result<(), EndpointError> {
         trace!("write ep={:?} data={:?}", self.info.addr, Bytes(buf));
+
+        #[cfg(feature = "dma")]
+        if let Some(dma) = self.dma {
+            return dma.write(self.regs, self.info.addr.index(), self.state, buf).await;
+        }
 
         if buf.len() > self.info.max_packet_size as usize {
             return Err(EndpointError::BufferOverflow);
@@ -1535,6 +1630,12 @@ impl<'d> embassy_usb_driver::ControlPipe for ControlPipe<'d> {
                     self.ep_out.state.out_size.store(EP_OUT_BUFFER_EMPTY, Ordering::Release);
                 }
 
+                #[cfg(feature = "dma")]
+                if self.ep_out.dma.is_some() {
+                    dma::expect_data(self.regs, &data);
+                    return Poll::Ready(data);
+                }
+
                 // EP0 should not be controlled by `Bus` so this RMW does not need a critical section
                 self.regs.doeptsiz(self.ep_out.info.addr.index()).modify(|w| {
                     w.set_rxdpid_stupcnt(3);
@@ -1595,6 +1696,11 @@ impl<'d> embassy_usb_driver::ControlPipe for ControlPipe<'d> {
         });
         self.regs.doepctl(self.ep_out.info.addr.index()).modify(|w| {
             w.set_stall(true);
+            #[cfg(feature = "dma")]
+            if self.ep_out.dma.is_some() {
+                // As in `endpoint_set_stalled`.
+                w.set_epena(false);
+            }
         });
     }
 

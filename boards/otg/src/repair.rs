@@ -22,7 +22,7 @@ pub(crate) fn in_force() -> bool {
 /// time that Linux' dwc2 driver gives the core.
 const PATIENCE_READS: u32 = 10_000;
 
-fn wait(mut is_done: impl FnMut() -> bool) {
+pub(crate) fn wait(mut is_done: impl FnMut() -> bool) {
     if !(0..PATIENCE_READS).any(|_| is_done()) {
         error!("the USB core does not answer");
     }
@@ -43,6 +43,9 @@ pub(crate) fn disarm_in(r: Otg, index: usize) {
             wait(|| r.diepint(index).read().epdisd());
             r.diepint(index).write(|w| w.set_epdisd(true));
         }
+        // A FIFO is not emptied while the core's DMA may still write to it.
+        #[cfg(feature = "dma")]
+        wait(|| r.grstctl().read().ahbidl());
         r.grstctl().write(|w| {
             w.set_txfflsh(true);
             w.set_txfnum(index as _);

@@ -4,8 +4,12 @@
 //! device ── Microsoft OS 2.0: WINUSB, interface GUID; BOS: WebUSB
 //!  └ interface 0: class 0xFF, protocol = version of the wire protocol
 //!     ├ bulk OUT 0x01, 512 bytes: commands
-//!     └ bulk IN  0x81, 512 bytes: replies, events, frames, merged into full packets
+//!     └ bulk IN  0x81, 512 bytes: replies, events, frames
 //! ```
+//!
+//! Replies, events and frames are merged into full packets where the processor copies them for the chip's
+//! driver. Where the driver reads memory by DMA, each of them is one transfer, which the core cuts into
+//! packets.
 //!
 //! On a full-speed bus the packets have 64 bytes ([`Speeds`]).
 //!
@@ -37,15 +41,30 @@ use embassy_usb::msos::{self, PropertyData};
 use embassy_usb::{Builder, Config, Handler, UsbDevice};
 use nirspi_wire::{Version, usb};
 
-pub use serve::{Abort, serve};
+pub use serve::{ToHost, serve};
 pub use speeds::{BusSpeed, Speeds};
 
 /// Size of a high-speed bulk packet in bytes (USB 2.0, 5.8.3).
 pub const PACKET_BYTES: usize = 512;
 
-/// Number of bytes that the driver needs for packets from the host: one bulk packet and one control
-/// packet.
-pub const OUT_BUFFER_BYTES: usize = PACKET_BYTES + CONTROL_BYTES;
+/// The driver's memory for packets from the host: one bulk packet and one control packet, where the DMA
+/// of a USB core can write them.
+#[repr(C, align(4))]
+pub struct OutBuffer(pub [u8; PACKET_BYTES + CONTROL_BYTES]);
+
+impl OutBuffer {
+    /// Memory without packets.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self([0; _])
+    }
+}
+
+impl Default for OutBuffer {
+    fn default() -> Self {
+        Self::new()
+    }
+}
 
 const CONTROL_BYTES: usize = 64;
 

@@ -8,15 +8,29 @@ use embassy_usb_synopsys_otg::In;
 use nirspi_app::link::{HostIn, HostOut};
 use nirspi_mcu::{Micros, Patience, Remedy};
 
-/// An endpoint that can take back what it has handed to the core.
-pub trait Abort {
+/// Time that a host gets once the patience is over. A whole packet is nearly always under way, also when
+/// the camera's clock jumps ahead.
+#[cfg(any(test, feature = "dma"))]
+const MOMENT: embassy_time::Duration = embassy_time::Duration::from_millis(20);
+
+/// An endpoint to the host, beyond what embassy-usb asks of one.
+pub trait ToHost: EndpointIn {
     /// Takes back what the host has not fetched.
     fn abort(&mut self);
+
+    /// Whether a `write` takes a packet of the wire protocol whole, out of memory at a multiple of four
+    /// bytes, and ends when the host has fetched it. Otherwise a `write` copies at most [`PACKET_BYTES`],
+    /// and ends when the host has fetched the ones before. Without the feature `dma` nothing asks.
+    fn takes_whole(&self) -> bool;
 }
 
-impl Abort for embassy_usb_synopsys_otg::Endpoint<'_, In> {
+impl ToHost for embassy_usb_synopsys_otg::Endpoint<'_, In> {
     fn abort(&mut self) {
         Self::abort(self);
+    }
+
+    fn takes_whole(&self) -> bool {
+        self.uses_dma()
     }
 }
 
@@ -28,7 +42,7 @@ pub async fn serve<D>(
 ) -> !
 where
     D: Driver<'static>,
-    D::EndpointIn: Abort,
+    D::EndpointIn: ToHost,
 {
     let Endpoints { mut from_host, mut to_host, presence } = endpoints;
     let mut patience = Patience::new();
@@ -40,11 +54,18 @@ where
         // The core may have been asleep when the session before ended.
         to_host.abort();
         patience.session_begins();
-        let news = select3(
-            listen(&mut from_host, &mut commands),
-            talk(&mut to_host, &mut packets, &mut patience),
-            presence.session.wait(),
-        );
+        #[cfg(not(any(test, feature = "dma")))]
+        let talk = talk(&mut to_host, &mut packets, &mut patience);
+        #[cfg(any(test, feature = "dma"))]
+        let talk = async {
+            if to_host.takes_whole() {
+                talk_whole(&mut to_host, &mut packets, &mut patience).await
+            } else {
+                talk(&mut to_host, &mut packets, &mut patience).await
+            }
+        };
+        let listen = listen(&mut from_host, &mut commands);
+        let news = select3(listen, talk, presence.session.wait());
         session = match news.await {
             Either3::Third(next) => next,
             Either3::Second(Some(Remedy::EndSession)) => session,
@@ -72,7 +93,7 @@ async fn listen(endpoint: &mut impl EndpointOut, commands: &mut HostIn<'_>) {
 
 /// Returns when the endpoint is disabled, or with a remedy when the host fetches nothing.
 async fn talk(
-    endpoint: &mut impl EndpointIn,
+    endpoint: &mut impl ToHost,
     packets: &mut HostOut<'_, PACKET_BYTES>,
     patience: &mut Patience,
 ) -> Option<Remedy> {
@@ -83,6 +104,32 @@ async fn talk(
         let due = Timer::at(Instant::from_micros(due));
         match select(endpoint.write(bytes), due).await {
             Either::First(Ok(())) => patience.ends(),
+            Either::First(Err(_)) => return None,
+            Either::Second(()) => return patience.judge(now()),
+        }
+    }
+}
+
+/// The same for an endpoint that takes packets whole. A function of its own, because a board without
+/// such an endpoint has no flash for it.
+#[cfg(any(test, feature = "dma"))]
+async fn talk_whole(
+    endpoint: &mut impl ToHost,
+    packets: &mut HostOut<'_, PACKET_BYTES>,
+    patience: &mut Patience,
+) -> Option<Remedy> {
+    endpoint.wait_enabled().await;
+    loop {
+        let bytes = packets.packet().await;
+        let Micros(due) = patience.begins(now());
+        let due = Instant::from_micros(due);
+        let mut write = core::pin::pin!(endpoint.write(bytes));
+        let mut written = select(write.as_mut(), Timer::at(due)).await;
+        if let Either::Second(()) = written {
+            written = select(write.as_mut(), Timer::after(MOMENT)).await;
+        }
+        match written {
+            Either::First(Ok(())) => patience.fetched(),
             Either::First(Err(_)) => return None,
             Either::Second(()) => return patience.judge(now()),
         }

@@ -1,5 +1,6 @@
 //! Tests of what a host sees of the device, with requests as hosts make them, over a simulated bus.
 
+mod dma;
 mod fake;
 mod faults;
 mod otg_core;

@@ -5,7 +5,7 @@ const CAMERA = { vendorId: 0x1209, productId: 0x0001, classCode: 0xff, subclassC
 // The number of both bulk endpoints, one for each direction.
 const ENDPOINT = 1;
 // As nirspi's own USB link: enough transfers wait at all times that the camera never waits for the host.
-const TRANSFERS = 4, TRANSFER_BYTES = 65536;
+const TRANSFERS = 16, TRANSFER_BYTES = 16384;
 
 // Whether this browser has WebUSB, and lets a program wait for a promise.
 export const isOffered = () => "usb" in navigator && "Suspending" in WebAssembly;

@@ -27,6 +27,27 @@ fn the_first_transfer_of_a_session_says_nothing_of_the_link() {
 }
 
 proptest! {
+    /// Each session carries so many transfers, whose ends are those of the host, and then one that does not end.
+    #[test]
+    fn a_transfer_that_was_fetched_needs_no_other_to_tell(sessions in prop::collection::vec(0_u8..4, 1..20)) {
+        let mut patience = Patience::new();
+        let mut now = Micros(0);
+        let mut stuck_before = false;
+        for fetched in sessions {
+            patience.session_begins();
+            for _ in 0..fetched {
+                patience.begins(now);
+                patience.fetched();
+                prop_assert_eq!(patience.judge(now), None);
+            }
+            now = patience.begins(now);
+            let restart = stuck_before && fetched == 0;
+            let expected = if restart { Remedy::LeaveBus } else { Remedy::EndSession };
+            prop_assert_eq!(patience.judge(now), Some(expected));
+            stuck_before = !restart;
+        }
+    }
+
     /// Each session carries so many transfers and then one that does not end.
     #[test]
     fn only_a_link_that_carries_nothing_is_restarted(sessions in prop::collection::vec(0_u8..4, 1..20)) {

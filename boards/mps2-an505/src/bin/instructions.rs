@@ -9,6 +9,9 @@
 #![no_std]
 #![no_main]
 
+#[path = "instructions/usb.rs"]
+mod usb;
+
 use core::hint::black_box;
 use core::panic::PanicInfo;
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -378,6 +381,9 @@ fn main() -> ! {
     hprintln!("packet_without_meter {}", packets.least * GRAIN);
     hprintln!("packet_merging {}", packets.merging * GRAIN / FRAMES);
     hprintln!("streamed_packet {}", streamed.least * GRAIN);
+    let [copied, whole] = usb::count();
+    hprintln!("usb_512_copied {}", copied);
+    hprintln!("usb_whole_packet {}", whole);
     hprintln!("fpga_bytes {}", frame_bytes(PATTERNS));
     hprintln!("link_bytes {}", older.bytes / PACKED);
     hprintln!("between_transfers {}", older.between * GRAIN / FRAMES);

@@ -6,7 +6,7 @@
 //! `NIRSPI_BLESS=1` writes the column. The rows are those of `tests/tests/faults.rs`.
 
 use super::otg_core::Speed;
-use super::world::{Deaf, Host, Log, Way, World, tick};
+use super::world::{Chip, Deaf, Host, Log, Way, World, tick};
 use nirspi_app::bench;
 use nirspi_wire::{Fault, RunLength, Status};
 use std::collections::BTreeMap;
@@ -36,34 +36,36 @@ const ROUNDS_A_FRAME: u32 = 60;
 const HOUR_US: u64 = 3_600_000_000;
 
 /// A row of the page, and what tries it. The words of the cell begin with `-` where the fault cannot happen.
-type Row = (&'static str, fn() -> String);
+type Row = (&'static str, fn(Chip) -> String);
 
 const ROWS: [Row; 17] = [
-    ("a byte is lost in one frame of eight", || {
-        on_the_bus(Way::PacketLost, "the bus repeats the packet")
+    ("a byte is lost in one frame of eight", |chip| {
+        on_the_bus(chip, Way::PacketLost, "the bus repeats the packet")
     }),
     ("a bit flips in one frame of eight", a_bit_flips),
-    ("one frame of eight is lost", || on_the_bus(Way::PacketLost, "the bus repeats the packet")),
-    ("one frame of eight comes twice", || {
-        on_the_bus(Way::AcknowledgementLost, "the data toggle shows the copy")
+    ("one frame of eight is lost", |chip| {
+        on_the_bus(chip, Way::PacketLost, "the bus repeats the packet")
+    }),
+    ("one frame of eight comes twice", |chip| {
+        on_the_bus(chip, Way::AcknowledgementLost, "the data toggle shows the copy")
     }),
     ("one frame of eight comes later, in order", delay),
-    ("one frame of eight comes after its successor", || {
+    ("one frame of eight comes after its successor", |_| {
         "- (the bus keeps the order of packets)".into()
     }),
-    ("the link ends inside a frame", || unplugged(1, |host| host.begun > LONG)),
-    ("the link ends between two frames", || unplugged(1, |host| host.begun == 0)),
-    ("the link ends three times in a row", || unplugged(3, |_| true)),
+    ("the link ends inside a frame", |chip| unplugged(chip, 1, |host| host.begun > LONG)),
+    ("the link ends between two frames", |chip| unplugged(chip, 1, |host| host.begun == 0)),
+    ("the link ends three times in a row", |chip| unplugged(chip, 3, |_| true)),
     ("the host reads nothing until the run is over, and the camera does not wait", slow_reader),
     ("the camera's clock jumps an hour ahead in a run", clock_jump),
     ("the FPGA loses everything inside a frame", fpga_reset),
     ("the firmware crashes inside a frame", firmware_crash),
     ("the host's program ends in a run", program_ends),
     ("the host stays connected and says nothing more", host_hangs),
-    ("a second host connects in a run", || {
+    ("a second host connects in a run", |_| {
         "- (a bus has one host, whose system gives the camera to one program)".into()
     }),
-    ("the disk is full", || "- (the bus has no part in that)".into()),
+    ("the disk is full", |_| "- (the bus has no part in that)".into()),
 ];
 
 /// A camera, and a host that has greeted it.
@@ -74,8 +76,8 @@ struct Lab {
 }
 
 impl Lab {
-    fn new() -> Self {
-        let world = World::new(false);
+    fn new(chip: Chip) -> Self {
+        let world = World::new(chip);
         let log: Rc<Log> = Rc::default();
         let host = world.host(&log);
         let mut lab = Self { world, log, host };
@@ -169,8 +171,8 @@ fn is_next_to_hit(log: &Log, hits: usize) -> bool {
 }
 
 /// Packets that the bus carries again.
-fn on_the_bus(way: Way, told: &str) -> String {
-    let mut lab = Lab::new();
+fn on_the_bus(chip: Chip, way: Way, told: &str) -> String {
+    let mut lab = Lab::new(chip);
     let mut hits = 0;
     lab.run(RunLength::Frames(FRAMES), |host, log| {
         if is_next_to_hit(log, hits) {
@@ -189,9 +191,9 @@ fn on_the_bus(way: Way, told: &str) -> String {
 }
 
 /// On the bus, and in the core's memory, which no checksum of the bus protects.
-fn a_bit_flips() -> String {
-    let bus = on_the_bus(Way::PacketLost, "the bus repeats the packet");
-    let mut lab = Lab::new();
+fn a_bit_flips(chip: Chip) -> String {
+    let bus = on_the_bus(chip, Way::PacketLost, "the bus repeats the packet");
+    let mut lab = Lab::new(chip);
     lab.log.damaged.set(Some(0));
     let mut hits = 0;
     lab.run(RunLength::Frames(FRAMES), |host, log| {
@@ -208,8 +210,8 @@ fn a_bit_flips() -> String {
     format!("on the bus: {bus}; in the core's memory: {account}")
 }
 
-fn delay() -> String {
-    let mut lab = Lab::new();
+fn delay(chip: Chip) -> String {
+    let mut lab = Lab::new(chip);
     let (mut hits, mut held) = (0, 0);
     lab.run(RunLength::Frames(FRAMES), |host, log| {
         if held > 0 {
@@ -231,8 +233,8 @@ fn delay() -> String {
 }
 
 /// A cable that is pulled so often, each time at the first such moment after the frame.
-fn unplugged(times: u32, at: fn(&Host) -> bool) -> String {
-    let mut lab = Lab::new();
+fn unplugged(chip: Chip, times: u32, at: fn(&Host) -> bool) -> String {
+    let mut lab = Lab::new(chip);
     for _ in 0..times {
         lab.run(RunLength::Frames(FRAMES), |host, log| {
             host.read();
@@ -250,8 +252,8 @@ fn unplugged(times: u32, at: fn(&Host) -> bool) -> String {
     "the link to the camera was lost; LEDs off once the bus is silent for 3 ms".into()
 }
 
-fn slow_reader() -> String {
-    let mut lab = Lab::new();
+fn slow_reader(chip: Chip) -> String {
+    let mut lab = Lab::new(chip);
     lab.run(RunLength::Frames(FRAMES_OF_A_SLOW_READER), |_, _| true);
     assert!(!lab.world.pins.running.get(), "the run is over");
     // The link is full, so the status is asked for by a host that reads again.
@@ -264,8 +266,8 @@ fn slow_reader() -> String {
 
 /// A run without end in which something happens once, at the frame and inside it; and the fault that follows, after which
 /// the LEDs are off.
-fn fault_after(event: impl Fn(&World)) -> (Lab, Fault) {
-    let mut lab = Lab::new();
+fn fault_after(chip: Chip, event: impl Fn(&World)) -> (Lab, Fault) {
+    let mut lab = Lab::new(chip);
     lab.run(RunLength::Continuous, |host, log| {
         host.read();
         log.frames.borrow().len() < HIT || host.begun < LONG
@@ -287,20 +289,20 @@ fn fault_after(event: impl Fn(&World)) -> (Lab, Fault) {
     (lab, fault)
 }
 
-fn clock_jump() -> String {
-    let (lab, fault) = fault_after(|_| bench::advance(HOUR_US));
+fn clock_jump(chip: Chip) -> String {
+    let (lab, fault) = fault_after(chip, |_| bench::advance(HOUR_US));
     lab.recovers();
     format!("LEDs off: {fault}")
 }
 
-fn fpga_reset() -> String {
-    let (lab, fault) = fault_after(|world| world.pins.reset_fpga());
+fn fpga_reset(chip: Chip) -> String {
+    let (lab, fault) = fault_after(chip, |world| world.pins.reset_fpga());
     lab.recovers();
     format!("LEDs off: {fault}")
 }
 
-fn firmware_crash() -> String {
-    let mut lab = Lab::new();
+fn firmware_crash(chip: Chip) -> String {
+    let mut lab = Lab::new(chip);
     lab.run(RunLength::Continuous, |host, log| {
         host.read();
         log.frames.borrow().len() < HIT || host.begun < LONG
@@ -330,8 +332,8 @@ fn until_dark(lab: &mut Lab, mut round: impl FnMut(&mut Host)) -> u64 {
     bench::now_us() - began
 }
 
-fn program_ends() -> String {
-    let mut lab = Lab::new();
+fn program_ends(chip: Chip) -> String {
+    let mut lab = Lab::new(chip);
     lab.run(RunLength::Continuous, |host, log| {
         host.read();
         log.frames.borrow().len() < HIT || host.begun < LONG
@@ -349,8 +351,8 @@ fn program_ends() -> String {
     "the system keeps the device on the bus: LEDs off after 5 s of silence".into()
 }
 
-fn host_hangs() -> String {
-    let mut lab = Lab::new();
+fn host_hangs(chip: Chip) -> String {
+    let mut lab = Lab::new(chip);
     lab.run(RunLength::Continuous, |host, _| {
         host.read();
         true
@@ -366,12 +368,19 @@ fn host_hangs() -> String {
     format!("LEDs off: {}", Fault::HostSilent)
 }
 
+/// What a fault does to the camera, whichever way its packets take through the chip.
+fn with_each_chip(tried: fn(Chip) -> String) -> String {
+    let (copied, read) = (tried(Chip::Copying), tried(Chip::Dma));
+    if copied == read { copied } else { format!("copied: {copied}; by DMA: {read}") }
+}
+
 #[test]
 fn every_fault_is_counted_and_survived() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reliability.md");
     let page = std::fs::read_to_string(&path).unwrap();
     let (text, table) = page.split_once(HEADING).expect("the table");
-    let mut cells: BTreeMap<&str, String> = ROWS.map(|(fault, tried)| (fault, tried())).into();
+    let mut cells: BTreeMap<&str, String> =
+        ROWS.map(|(fault, tried)| (fault, with_each_chip(tried))).into();
     let mut column = None;
     let mut lines = Vec::new();
     for line in table.lines() {

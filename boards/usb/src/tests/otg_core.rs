@@ -16,9 +16,14 @@
 //! An OUT endpoint takes a packet when it is active and not set to NAK, whatever its `EPENA`: the
 //! driver arms only with `CNAK` after the first packet, and works so on silicon.
 //!
+//! With `GAHBCFG.DMAEN` the core reads and writes memory itself: [`engine`].
+//!
 //! What a driver must not do is kept in [`OtgCore::violations`].
 
+mod engine;
+
 use embassy_usb_synopsys_otg::simulated::Core;
+use engine::{Engine, GLOBAL_OUT_NAK};
 use std::collections::{BTreeMap, VecDeque};
 use std::format;
 use std::string::String;
@@ -89,6 +94,11 @@ struct Side {
     fifo: VecDeque<u32>,
     nak_in: u32,
     disabled_in: u32,
+    /// `DIEPDMA`, `DOEPDMA`.
+    address: u32,
+    /// Lengths of the packets that the DMA has put into the FIFO, and how many are left to put there.
+    lengths: VecDeque<usize>,
+    to_load: u32,
 }
 
 impl Side {
@@ -108,6 +118,15 @@ impl Side {
     fn is(&self, bits: u32) -> bool {
         self.ctl & bits != 0
     }
+
+    /// Length of the next packet to the host, if that is known.
+    fn next_length(&self, endpoint: usize, uses_dma: bool) -> Option<usize> {
+        if uses_dma {
+            self.lengths.front().copied()
+        } else {
+            Some(self.bytes().min(packet_bytes(endpoint, self.ctl)))
+        }
+    }
 }
 
 #[derive(Default)]
@@ -122,6 +141,7 @@ pub struct OtgCore {
     received: VecDeque<(u32, Vec<u32>)>,
     reading: VecDeque<u32>,
     plain: BTreeMap<usize, u32>,
+    engine: Engine,
 }
 
 const GAHBCFG: usize = 0x08;
@@ -155,6 +175,7 @@ impl OtgCore {
 
     /// What was told to the core some reads ago happens.
     fn tick(&mut self) {
+        self.engine_moves();
         let due = |count: &mut u32| {
             let was = *count;
             *count = was.saturating_sub(1);
@@ -172,6 +193,7 @@ impl OtgCore {
             for (index, side) in self.ins.iter_mut().enumerate() {
                 if bits & 1 << 5 != 0 && (number == 0x10 || number as usize == index) {
                     side.fifo.clear();
+                    side.lengths.clear();
                 }
             }
             if bits & 1 << 4 != 0 {
@@ -186,6 +208,7 @@ impl OtgCore {
             if due(&mut side.disabled_in) && side.is(EPENA) {
                 side.ctl &= !(EPENA | EPDIS);
                 side.int |= EPDISD;
+                side.to_load = 0;
             }
         }
     }
@@ -214,13 +237,15 @@ impl OtgCore {
     fn interrupts(&self) -> u32 {
         let level = |bit: u32, is: bool| if is { bit } else { 0 };
         self.latched
-            | level(RXFLVL, !self.received.is_empty())
+            | level(RXFLVL, !self.received.is_empty() && !self.uses_dma())
+            | level(GLOBAL_OUT_NAK, self.engine.is_nak_effective)
             | level(IEPINT, self.in_interrupts() != 0)
             | level(OEPINT, self.out_interrupts() != 0)
     }
 
     /// Whether the core asks for its interrupt.
-    pub fn interrupt(&self) -> bool {
+    pub fn interrupt(&mut self) -> bool {
+        self.engine_moves();
         self.plain(GAHBCFG) & 1 != 0 && self.interrupts() & self.plain(GINTMSK) != 0
     }
 
@@ -229,6 +254,7 @@ impl OtgCore {
         if value & SNAK != 0 && value & CNAK != 0 {
             self.violation(format!("{armed_at}{index}: SNAK and CNAK at once"));
         }
+        self.check_disable(is_in, index, value);
         let side = if is_in { &mut self.ins[index] } else { &mut self.outs[index] };
         let mut ctl = side.ctl & (EPENA | EPDIS | NAKSTS | DPID);
         ctl |= value & (MPSIZ | USBAEP | EPTYP | STALL | TXFNUM | EPENA);
@@ -254,7 +280,11 @@ impl OtgCore {
             ctl |= EPDIS;
             side.disabled_in = DELAY_READS;
         }
+        let begins = value & EPENA != 0 && !side.is(EPENA);
         side.ctl = ctl;
+        if begins {
+            self.engine_begins(is_in, index);
+        }
     }
 
     fn pop_status(&mut self) -> u32 {
@@ -279,13 +309,8 @@ impl OtgCore {
     }
 
     fn receive(&mut self, kind: u32, endpoint: usize, bytes: &[u8]) {
-        let words = bytes.chunks(4).map(|chunk| {
-            let mut word = [0; 4];
-            word[..chunk.len()].copy_from_slice(chunk);
-            u32::from_ne_bytes(word)
-        });
         let status = kind << 17 | (bytes.len() as u32) << 4 | endpoint as u32;
-        self.received.push_back((status, words.collect()));
+        self.received.push_back((status, words(bytes).collect()));
     }
 
     // The bus, as a host uses it.
@@ -321,15 +346,25 @@ impl OtgCore {
         self.latched |= WKUPINT;
     }
 
+    /// A request, and the token after it.
     pub fn setup(&mut self, address: u8, request: [u8; 8]) -> Answer {
+        let answer = self.setup_alone(address, request);
+        if answer != Answer::Silence {
+            self.receive(SETUP_DATA_DONE, 0, &[]);
+        }
+        answer
+    }
+
+    /// A request, which another one may follow.
+    pub fn setup_alone(&mut self, address: u8, request: [u8; 8]) -> Answer {
         if !self.hears(address) {
             return Answer::Silence;
         }
         for side in [&mut self.ins[0], &mut self.outs[0]] {
             side.ctl = side.ctl & !STALL | NAKSTS | DPID;
         }
+        self.engine.is_control_read = request[0] & 0x80 != 0 && request[6..] != [0, 0];
         self.receive(SETUP_DATA_RX, 0, &request);
-        self.receive(SETUP_DATA_DONE, 0, &[]);
         Answer::Data(Vec::new(), 0)
     }
 
@@ -350,9 +385,10 @@ impl OtgCore {
         if out.is(STALL) {
             return Answer::Stall;
         }
-        if out.is(NAKSTS) || !has_room {
+        if out.is(NAKSTS) || !has_room || !self.engine_takes(endpoint) {
             return Answer::Nak;
         }
+        let out = &mut self.outs[endpoint];
         if endpoint != 0 && u8::from(out.is(DPID)) != toggle {
             // Sent again: the host has missed the acknowledgement.
             return Answer::Data(Vec::new(), toggle);
@@ -365,7 +401,9 @@ impl OtgCore {
 
     /// A packet to the host, which hears it and whose acknowledgement arrives or not.
     pub fn fetch(&mut self, address: u8, endpoint: usize, acknowledged: bool) -> Answer {
+        self.engine_moves();
         let heard = self.hears(address);
+        let uses_dma = self.uses_dma();
         let side = &mut self.ins[endpoint];
         if !side.is(USBAEP) || !heard {
             return Answer::Silence;
@@ -373,7 +411,7 @@ impl OtgCore {
         if side.is(STALL) {
             return Answer::Stall;
         }
-        let length = side.bytes().min(packet_bytes(endpoint, side.ctl));
+        let Some(length) = side.next_length(endpoint, uses_dma) else { return Answer::Nak };
         if side.is(NAKSTS) || !side.is(EPENA) || side.fifo.len() < length.div_ceil(4) {
             return Answer::Nak;
         }
@@ -381,7 +419,12 @@ impl OtgCore {
         let answer = Answer::Data(words.take(length).collect(), u8::from(side.is(DPID)));
         if acknowledged {
             side.fifo.drain(..length.div_ceil(4));
-            side.take(length);
+            if uses_dma {
+                side.lengths.pop_front();
+                side.size -= 1 << 19;
+            } else {
+                side.take(length);
+            }
             side.ctl ^= DPID;
             if side.packets() == 0 {
                 side.ctl &= !EPENA;
@@ -394,8 +437,10 @@ impl OtgCore {
     /// Flips a bit, in the core's memory, of the packet that waits for the host. The byte is not 0 before or afterwards,
     /// and so many bytes without a 0 lie before it in the packet. Returns whether there is such a byte.
     pub fn damage(&mut self, endpoint: usize, before: usize) -> bool {
+        self.engine_moves();
+        let uses_dma = self.uses_dma();
         let side = &mut self.ins[endpoint];
-        let length = side.bytes().min(packet_bytes(endpoint, side.ctl));
+        let Some(length) = side.next_length(endpoint, uses_dma) else { return false };
         if !side.is(EPENA) || side.fifo.len() < length.div_ceil(4) {
             return false;
         }
@@ -427,6 +472,15 @@ impl OtgCore {
     }
 }
 
+/// Words of the FIFO that hold these bytes.
+fn words(bytes: &[u8]) -> impl Iterator<Item = u32> {
+    bytes.chunks(4).map(|chunk| {
+        let mut word = [0; 4];
+        word[..chunk.len()].copy_from_slice(chunk);
+        u32::from_ne_bytes(word)
+    })
+}
+
 fn packet_bytes(endpoint: usize, ctl: u32) -> usize {
     if endpoint == 0 { 64 >> (ctl & 3) } else { (ctl & MPSIZ) as usize }
 }
@@ -435,8 +489,12 @@ impl Core for OtgCore {
     fn read(&mut self, offset: usize) -> u32 {
         self.tick();
         match offset {
-            GRSTCTL => 1 << 31 | self.flushing.map_or(0, |(bits, _)| bits),
+            GRSTCTL => self.idle() | self.flushing.map_or(0, |(bits, _)| bits),
             GINTSTS => self.interrupts(),
+            GRXSTSP | FIFOS.. if self.uses_dma() => {
+                self.violation(format!("the processor reads {offset:#x} beside the DMA"));
+                0
+            }
             GRXSTSP => self.pop_status(),
             DSTS => self.speed << 1,
             DAINT => self.in_interrupts() | self.out_interrupts(),
@@ -450,6 +508,7 @@ impl Core for OtgCore {
                     0x08 if is_in && side.fifo.is_empty() => side.int | TXFE,
                     0x08 => side.int,
                     0x10 => side.size,
+                    0x14 => side.address,
                     0x18 if is_in => room as u32,
                     _ => 0,
                 }
@@ -469,9 +528,14 @@ impl Core for OtgCore {
         match offset {
             GRSTCTL => {
                 let bits = value & 0x7F0;
+                self.check_flush();
                 self.flushing = (bits & 0x30 != 0).then_some((bits, DELAY_READS));
             }
             GINTSTS => self.latched &= !value,
+            GINTMSK if self.uses_dma() && value & RXFLVL != 0 => {
+                self.violation("RXFLVL unmasked beside the DMA".into());
+            }
+            DCTL => self.control_device(value),
             IN..FIFOS if offset < OUT + 32 * ENDPOINTS => {
                 let is_in = offset < OUT;
                 let index = (offset - if is_in { IN } else { OUT }) / 32;
@@ -485,9 +549,18 @@ impl Core for OtgCore {
                         }
                         self.ins[index].size = value;
                     }
-                    0x10 => self.outs[index].size = value,
+                    0x10 => {
+                        if self.uses_dma() && self.outs[index].is(EPENA) {
+                            self.violation(format!("DOEPTSIZ{index} written while armed"));
+                        }
+                        self.outs[index].size = value;
+                    }
+                    0x14 => self.set_address(is_in, index, value),
                     _ => {}
                 }
+            }
+            FIFOS.. if self.uses_dma() => {
+                self.violation(format!("the processor writes {offset:#x} beside the DMA"));
             }
             FIFOS.. => {
                 let index = offset / FIFOS - 1;

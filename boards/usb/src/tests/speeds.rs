@@ -1,7 +1,7 @@
 //! High speed and full speed, with requests as hosts make them.
 
 use super::otg_core::Speed;
-use super::world::{Deaf, Log, World};
+use super::world::{CHIPS, Deaf, Log, World};
 use std::rc::Rc;
 use std::vec::Vec;
 
@@ -13,8 +13,11 @@ fn packet_sizes(descriptor: &[u8]) -> [u16; 2] {
 
 #[test]
 fn descriptors_follow_the_speed_of_the_bus() {
-    for (speed, here, other) in [(Speed::High, 512, 64), (Speed::Full, 64, 512)] {
-        let mut world = World::new(false);
+    let speeds = [(Speed::High, 512, 64), (Speed::Full, 64, 512)];
+    for (chip, (speed, here, other)) in
+        CHIPS.into_iter().flat_map(|chip| speeds.map(|of| (chip, of)))
+    {
+        let mut world = World::new(chip);
         world.plug(speed);
         let mut host = world.host(&Rc::default());
         let found: Result<Vec<_>, Deaf> = world
@@ -40,8 +43,9 @@ fn descriptors_follow_the_speed_of_the_bus() {
 
 #[test]
 fn a_full_speed_bus_carries_packets_of_64_bytes() {
-    for (speed, bytes) in [(Speed::High, 512), (Speed::Full, 64)] {
-        let mut world = World::new(false);
+    let speeds = [(Speed::High, 512), (Speed::Full, 64)];
+    for (chip, (speed, bytes)) in CHIPS.into_iter().flat_map(|chip| speeds.map(|of| (chip, of))) {
+        let mut world = World::new(chip);
         let log: Rc<Log> = Rc::default();
         world.plug(speed);
         let mut host = world.host(&log);

@@ -1,7 +1,7 @@
 //! Hosts that stop reading, and a link that is stuck.
 
 use super::otg_core::Speed;
-use super::world::{Deaf, Log, World, tick};
+use super::world::{CHIPS, Chip, Deaf, Log, World, tick};
 use nirspi_mcu::PATIENCE;
 use nirspi_wire::Command;
 use std::rc::Rc;
@@ -25,7 +25,11 @@ async fn talks_only(host: &mut super::world::Host, rounds: u32) -> Result<(), De
 
 #[test]
 fn a_host_that_stops_reading_ends_its_session_and_the_light() {
-    let mut world = World::new(false);
+    CHIPS.into_iter().for_each(a_host_stops_reading);
+}
+
+fn a_host_stops_reading(chip: Chip) {
+    let mut world = World::new(chip);
     let log: Rc<Log> = Rc::default();
     world.plug(Speed::High);
     let mut host = world.host(&log);
@@ -65,7 +69,11 @@ fn a_host_that_stops_reading_ends_its_session_and_the_light() {
 
 #[test]
 fn a_second_stuck_write_takes_the_device_off_the_bus() {
-    let mut world = World::new(false);
+    CHIPS.into_iter().for_each(a_second_stuck_write);
+}
+
+fn a_second_stuck_write(chip: Chip) {
+    let mut world = World::new(chip);
     let log: Rc<Log> = Rc::default();
     world.plug(Speed::High);
     let mut host = world.host(&log);

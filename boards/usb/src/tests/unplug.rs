@@ -1,10 +1,12 @@
 //! Cables that are pulled, hosts that sleep: the chip's driver on the simulated core.
 
 use super::otg_core::Speed;
-use super::world::{Deaf, Host, Log, World, tick};
+use super::world::{CHIPS, Chip, Deaf, Host, Log, World, tick};
 use nirspi_wire::Status;
 use std::rc::Rc;
 use std::vec::Vec;
+
+const ALL: [Chip; 3] = [Chip::Released, Chip::Copying, Chip::Dma];
 
 /// A host that goes from the first request to the stream, and reads for ever.
 async fn use_camera(mut host: Host) -> Result<(), Deaf> {
@@ -15,8 +17,8 @@ async fn use_camera(mut host: Host) -> Result<(), Deaf> {
 }
 
 /// A camera whose frames are on their way, with a packet armed that the host did not fetch.
-fn streaming(as_released: bool) -> (World, Rc<Log>) {
-    let mut world = World::new(as_released);
+fn streaming(chip: Chip) -> (World, Rc<Log>) {
+    let mut world = World::new(chip);
     let log: Rc<Log> = Rc::default();
     world.plug(Speed::High);
     let host = world.host(&log);
@@ -30,8 +32,9 @@ fn streaming(as_released: bool) -> (World, Rc<Log>) {
 
 #[test]
 fn the_release_loses_the_stream_and_the_repairs_bring_it_back() {
-    for as_released in [true, false] {
-        let (mut world, log) = streaming(as_released);
+    for chip in ALL {
+        let as_released = chip == Chip::Released;
+        let (mut world, log) = streaming(chip);
         world.falls_silent();
         assert!(world.is_dark());
         let before = log.frames.borrow().len();
@@ -79,7 +82,11 @@ fn check_counters(status: &Status, log: &Log) {
 
 #[test]
 fn a_hundred_unplugs_lose_nothing_that_is_not_counted() {
-    let mut world = World::new(false);
+    CHIPS.into_iter().for_each(a_hundred_unplugs);
+}
+
+fn a_hundred_unplugs(chip: Chip) {
+    let mut world = World::new(chip);
     let log: Rc<Log> = Rc::default();
     log.random.set(0x5EED);
     log.acknowledgements_lost.set(40);
@@ -118,8 +125,9 @@ fn a_hundred_unplugs_lose_nothing_that_is_not_counted() {
 
 #[test]
 fn a_suspend_latched_before_the_reset_is_over() {
-    for as_released in [true, false] {
-        let mut world = World::new(as_released);
+    for chip in ALL {
+        let as_released = chip == Chip::Released;
+        let mut world = World::new(chip);
         // The cable is out and in again before the device has looked.
         {
             let mut core = world.core.borrow_mut();
@@ -136,8 +144,9 @@ fn a_suspend_latched_before_the_reset_is_over() {
 
 #[test]
 fn a_cable_pulled_within_a_control_transfer_is_noticed() {
-    for as_released in [true, false] {
-        let mut world = World::new(as_released);
+    for chip in ALL {
+        let as_released = chip == Chip::Released;
+        let mut world = World::new(chip);
         let log: Rc<Log> = Rc::default();
         for rounds in 1..60 {
             world.plug(Speed::High);
@@ -157,8 +166,9 @@ fn a_cable_pulled_within_a_control_transfer_is_noticed() {
 
 #[test]
 fn a_cleared_halt_begins_with_data0() {
-    for as_released in [true, false] {
-        let mut world = World::new(as_released);
+    for chip in ALL {
+        let as_released = chip == Chip::Released;
+        let mut world = World::new(chip);
         let log: Rc<Log> = Rc::default();
         world.plug(Speed::High);
         let mut host = world.host(&log);
@@ -178,7 +188,11 @@ fn a_cleared_halt_begins_with_data0() {
 
 #[test]
 fn a_resumed_bus_carries_nothing_of_the_session_before() {
-    let (mut world, log) = streaming(false);
+    CHIPS.into_iter().for_each(a_resumed_bus);
+}
+
+fn a_resumed_bus(chip: Chip) {
+    let (mut world, log) = streaming(chip);
     let run = log.frames.borrow().last().expect("frames").0;
     world.falls_silent();
     assert!(world.is_dark());

@@ -3,7 +3,7 @@
 
 use super::SERIAL;
 use super::otg_core::{Answer, ENDPOINTS, OtgCore, Speed};
-use crate::{Memory, OUT_BUFFER_BYTES, Presence, device, serve};
+use crate::{Memory, OutBuffer, Presence, device, serve};
 use embassy_usb_synopsys_otg::otg_v1::Otg;
 use embassy_usb_synopsys_otg::{Config, Driver, OtgInstance, PhyType, State, simulated};
 use nirspi_app::bench::{self, FakeBoard, FakeFpga, Pins, configuration, packet};
@@ -34,6 +34,20 @@ pub const PATTERNS: u16 = 64;
 /// From one frame to the next, in microseconds.
 const FRAME_US: u64 = 400;
 
+/// The chip's driver, as the firmware of a board has it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Chip {
+    /// The release, without the fork's repairs. It copies.
+    Released,
+    /// The processor copies what goes to the host, 512 bytes at a time.
+    Copying,
+    /// The core reads whole packets out of memory.
+    Dma,
+}
+
+/// The drivers that boards have.
+pub const CHIPS: [Chip; 2] = [Chip::Copying, Chip::Dma];
+
 /// Longest time that a host waits for a device, in rounds of the world. A host of flesh waits for
 /// seconds.
 const HOST_PATIENCE: u32 = 20_000;
@@ -60,27 +74,29 @@ pub struct World {
     registers: Otg,
     state: &'static State<ENDPOINTS>,
     tasks: Vec<Task>,
+    chip: Chip,
 }
 
 impl World {
-    /// A camera that has just started, without a cable. With `as_released`, the driver is without
-    /// its repairs.
-    pub fn new(as_released: bool) -> Self {
-        Self::started(Rc::default(), None, as_released)
+    /// A camera that has just started, without a cable.
+    pub fn new(chip: Chip) -> Self {
+        Self::started(Rc::default(), None, chip)
     }
 
     /// The camera after its firmware has crashed: the chip starts anew, and the FPGA has noticed nothing.
     pub fn crashed(self, text: &str) -> Self {
-        let Self { pins, .. } = self;
+        let Self { pins, chip, core, tasks, .. } = self;
+        *core.borrow_mut() = OtgCore::default();
+        drop(tasks);
         // The chip's reset makes the pin an input, whose resistor switches the LED drivers off.
         pins.leds_enabled.set(false);
         let crash = Crash::new(Micros(bench::now_us()), format_args!("{text}"));
-        Self::started(pins, Some(crash), false)
+        Self::started(pins, Some(crash), chip)
     }
 
-    fn started(pins: Rc<Pins>, crash: Option<Crash>, as_released: bool) -> Self {
+    fn started(pins: Rc<Pins>, crash: Option<Crash>, chip: Chip) -> Self {
         let core: Rc<RefCell<OtgCore>> = Rc::default();
-        let registers = simulated::install(Rc::clone(&core) as Rc<_>, as_released);
+        let registers = simulated::install(Rc::clone(&core) as Rc<_>, chip == Chip::Released);
         let state: &'static State<ENDPOINTS> = Box::leak(Box::new(State::new()));
         let instance = OtgInstance {
             regs: registers,
@@ -91,8 +107,10 @@ impl World {
             extra_rx_fifo_words: 30,
             calculate_trdt_fn: |_| 9,
         };
-        let buffer = Box::leak(Box::new([0; OUT_BUFFER_BYTES]));
-        let driver = Driver::new(buffer, instance, Config::default());
+        let OutBuffer(buffer) = Box::leak(Box::new(OutBuffer::new()));
+        let mut config = Config::default();
+        config.dma = chip == Chip::Dma;
+        let driver = Driver::new(buffer, instance, config);
         let presence: &'static Presence = Box::leak(Box::new(Presence::new()));
         let memory = Box::leak(Box::new(Memory::new(presence)));
         let info = board_info("bench", SERIAL);
@@ -121,7 +139,7 @@ impl World {
             .into_iter()
             .map(|future| Task { future, woken: Arc::new(Flag(AtomicBool::new(true))) })
             .collect();
-        let mut world = Self { core, pins, registers, state, tasks };
+        let mut world = Self { core, pins, registers, state, tasks, chip };
         world.rounds(10);
         world
     }
@@ -129,7 +147,7 @@ impl World {
     /// Some twenty microseconds: interrupts, then each task that is woken.
     pub fn round(&mut self) {
         for _ in 0..100 {
-            if !self.core.borrow().interrupt() {
+            if !self.core.borrow_mut().interrupt() {
                 break;
             }
             simulated::interrupt(self.registers, self.state);

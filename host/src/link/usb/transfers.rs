@@ -15,10 +15,12 @@ use std::io;
 use std::ops::Deref;
 use std::time::{Duration, Instant};
 
-/// Bytes of one IN transfer: 32 high-speed packets, 4 ms of a 4 MB/s stream.
+/// Bytes of one IN transfer: 32 high-speed packets. A camera whose USB core reads packets by DMA ends a transfer with
+/// each packet of the wire protocol, of at most 4 KB of samples.
 pub const TRANSFER_BYTES: usize = 16 << 10;
-/// Number of IN transfers in flight. They hold 64 ms of a 4 MB/s stream while the host is busy.
-pub const TRANSFERS: usize = 16;
+/// Number of IN transfers in flight. While the host is busy they hold 64 frames of such a camera, 8 ms of 8000 frames a
+/// second; of another camera 1 MB.
+pub const TRANSFERS: usize = 64;
 /// The longest time in which a device must take a command.
 const SEND_TIMEOUT: Duration = Duration::from_secs(5);
 /// An endpoint counts as broken after this many stalls in a row without a byte.
