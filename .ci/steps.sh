@@ -45,6 +45,7 @@ by_name=(
     "mutants         deliberate faults in the Rust code are seen: in lines changed since main, or in MUTANTS='CRATE...'; crates.io"
     "miri            unit tests of the wire protocol in Rust's interpreter, which sees undefined behaviour; rustup's nightly with miri"
     "loom            the live page's hand-overs between threads, in every order of the threads; crates.io"
+    "page-faults     deliberate faults in the live page's JavaScript are seen; Debian's Chromium, PyPI"
     "coverage        lines of each reader that its tests with damaged bytes reach; rustup's llvm-tools"
     "crowd           nirspi serve among 1000 clients that misbehave, for CROWD_S seconds (600)"
     "zenoh           a camera over Zenoh: router, camera and host as processes; crates.io, 219 crates of which 95 are its own"
@@ -441,6 +442,17 @@ step_miri() {
 
 # A workspace of its own, so that loom is in no other build.
 step_loom() { CARGO_TARGET_DIR=$PWD/target/loom cargo test --locked --manifest-path tests/loom/Cargo.toml --test models; }
+
+step_page_faults() {
+    debian chromium || echo "no chromium installed here"
+    if [ -x /usr/bin/chromium ]; then
+        cargo build --locked --release
+        python_with browser playwright==1.65.2
+        target/browser/bin/python host/cli/tests/browser/faults.py target/release/nirspi
+    else
+        echo "skipped: faults in the page, no chromium"
+    fi
+}
 
 step_coverage() {
     if ! rustup component add llvm-tools >&2; then

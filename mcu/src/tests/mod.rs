@@ -1,6 +1,7 @@
 //! The camera against a scripted FPGA and a scripted link.
 
 mod access;
+mod bitstreams;
 mod channels;
 mod commands;
 mod configuring;

@@ -179,9 +179,8 @@ impl Device {
     fn end(&mut self) -> (Vec<DeviceMessage<'static>>, EventKind) {
         let mut heard = self.ask(Command::Stop);
         self.bus.port().transmit(|_| {});
-        self.turns(40);
-        self.after(100_001, &[]);
-        self.turns(2);
+        // In steps: a ring that nobody looks at for so long counts as overrun, and forgets what a test has left there.
+        self.turns(10_002);
         heard.extend(self.heard());
         let [event] = events(&heard)[..] else { panic!("{heard:?}") };
         (heard, event)
@@ -312,11 +311,13 @@ fn a_run_gets_no_packet_of_the_run_before() {
         // What was on its way comes after the start.
         device.after(10, &packet(2, Command::Start(RunLength::Frames(2))));
         device.bus.port().send(&[&last[cut.min(last.len())..], &[0; 3]].concat());
-        device.frame();
-        device.frame();
+        let made = [device.frame(), device.frame()];
         device.turns(9);
+        // Byte by byte: a packet of the run before has the same numbers of frames.
+        let mut frames = device.link.packets.clone();
+        frames.retain(|packet| is_intact(packet).is_some());
+        assert_eq!(frames, made);
         let heard = device.heard();
-        assert_eq!(sequences(&heard), [0, 1]);
         let [EventKind::RunEnded { run: 2, frames_made: 2, fpga_frames_corrupt: 0, .. }] =
             events(&heard)[..]
         else {

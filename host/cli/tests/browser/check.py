@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""The page of `nirspi serve` in a real browser: every control, the LEDs' switch, a fault, the token, a phone, the end.
+"""The page of `nirspi serve` in a real browser: every control, the LEDs' switch, a fault, states told by hand, the token, a
+phone, the end.
 
     python3 check.py target/release/nirspi [--screenshot docs/serve.png]
 
@@ -19,6 +20,7 @@ from playwright.sync_api import expect, sync_playwright
 
 # No compiled files beside the sources.
 sys.dont_write_bytecode = True
+import by_hand
 import controls
 from pictures import LEVELS, fits, levels, seen
 
@@ -203,6 +205,8 @@ def main():
             complaints = [said for said in complaints if "400 (Bad Request)" not in said]
             assert not complaints, complaints
             fault(browser, address)
+            for part in by_hand.PARTS:
+                part(browser, address)
             token(browser, arguments.nirspi)
             phone(browser, address)
             server.send_signal(signal.SIGINT)

@@ -51,12 +51,19 @@ def numbers(path):
     return side, values
 
 
-def png(side, level):
-    """A grey PNG of `side` x `side` whose pixels are `level(x, y)`, 0 to 255."""
-    rows = b"".join(b"\0" + bytes(level(x, y) for x in range(side)) for y in range(side))
+def rows(page, name):
+    """The rows of a list of facts: name, value, and how the value is marked."""
+    return page.locator(f"#{name}").evaluate("""list => Array.from({ length: list.children.length / 2 }, (_, at) =>
+      [list.children[2 * at].textContent, list.children[2 * at + 1].textContent, list.children[2 * at + 1].className])""")
+
+
+def png(width, level, height=None):
+    """A grey PNG whose pixels are `level(x, y)`, 0 to 255; as high as wide without a height."""
+    height = height or width
+    lines = b"".join(b"\0" + bytes(level(x, y) for x in range(width)) for y in range(height))
 
     def chunk(kind, data):
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
-    header = struct.pack(">IIBBBBB", side, side, 8, 0, 0, 0, 0)
-    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
+    header = struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(lines)) + chunk(b"IEND", b"")

@@ -1,0 +1,291 @@
+#!/usr/bin/env python3
+"""Faults that people make, planted in the page's JavaScript one at a time: does the page's check see them?
+
+    python3 faults.py target/release/nirspi [WORD...]
+
+Each fault is tried against the part of the check that looks at its place; words choose faults whose description has one of
+them. Prints a line for each fault, and exits 1 if one is missed. docs/mutants.md has the results.
+"""
+
+import pathlib
+import re
+import signal
+import subprocess
+import sys
+
+from playwright.sync_api import expect, sync_playwright
+
+# No compiled files beside the sources.
+sys.dont_write_bytecode = True
+import by_hand
+import check
+
+PAGE = pathlib.Path(__file__).parents[3] / "src/serve/page"
+# A part that passes takes less on a busy machine.
+LIMIT_MS = 8_000
+
+# Description; file; what the file has, once; what stands there instead; the part of the check.
+FAULTS = [
+    (
+        "the share of white under the cursor is not in percent",
+        "display.js",
+        "(100 * value / white)",
+        "(value / white)",
+        "pictures",
+    ),
+    ("distances in m are called mm", "display.js", 'unit: "m"', 'unit: "mm"', "pictures"),
+    (
+        "row and column under the cursor are exchanged",
+        "display.js",
+        "`row ${y}, column ${x}`",
+        "`row ${x}, column ${y}`",
+        "pictures",
+    ),
+    (
+        "the number of a pattern begins at 1",
+        "display.js",
+        "`pattern ${y * panel.side + x}`",
+        "`pattern ${y * panel.side + x + 1}`",
+        "pictures",
+    ),
+    ("the lower end of a fixed range is ignored", "display.js", '[$("low").value / 100 * white,', "[0,", "pictures"),
+    (
+        "warnings of the frames stand on the enhanced image",
+        "display.js",
+        "picture?.short_warnings",
+        "picture?.frame_warnings",
+        "facts",
+    ),
+    ("an image that is gone stays on the page", "display.js", "if (isNew) {", "if (isNew && message.image) {", "pictures"),
+    ("images on this page are counted per millisecond", "display.js", "1000 * drawn", "drawn", "pictures"),
+    (
+        "the row of late frames has the corrupt ones",
+        "facts.js",
+        '["late", whole(account.late)',
+        '["late", whole(account.corrupt)',
+        "facts",
+    ),
+    (
+        "median and 99 % of a delay are exchanged",
+        "facts.js",
+        "`${ms(of.p50_ms)}, ${ms(of.p99_ms)} ms`",
+        "`${ms(of.p99_ms)}, ${ms(of.p50_ms)} ms`",
+        "facts",
+    ),
+    ("the ADC's rate in kS/s is called MS/s", "facts.js", "identity.adc_hz / 1e6", "identity.adc_hz / 1e3", "facts"),
+    ("a refusal is not shown", "facts.js", "[answer.refused, state.problem,", "[state.problem,", "controls"),
+    ("why there is no image is not shown", "facts.js", "[answer.refused, state.problem,", "[answer.refused,", "facts"),
+    ("events come oldest first", "facts.js", "all.toReversed()", "all", "facts"),
+    (
+        "as many other events are not shown",
+        "facts.js",
+        "`${all.length} ${last.unix_ms} ${last.text}`",
+        "`${all.length}`",
+        "facts",
+    ),
+    ("an event is read as HTML", "facts.js", "span.textContent =", "span.innerHTML =", "fault"),
+    (
+        "notes may turn the direction of text",
+        "facts.js",
+        'foreign(notes.filter(Boolean).map(note => note.trim()).join("; "))',
+        'notes.filter(Boolean).map(note => note.trim()).join("; ")',
+        "facts",
+    ),
+    ("the age of an earlier image is in milliseconds", "history.js", " / 1000).toFixed(1)", ").toFixed(1)", "pictures"),
+    ("an earlier image moves on with newer ones", "history.js", "if (back > 0) back", "if (back < 0) back", "pictures"),
+    (
+        "the image after the one chosen is shown",
+        "history.js",
+        "newest : kept[kept.length - 1 - back]",
+        "newest : kept[kept.length - back]",
+        "pictures",
+    ),
+    ("images are kept without end", "history.js", "if (kept.length > MOST) kept.shift();", "", "pictures"),
+    ("the button that switches the LEDs off sends nothing", "light.js", '$("stop").onclick = stop;', "", "controls"),
+    ("Escape does not stop", "light.js", 'event.key !== "Escape" && ', "", "controls"),
+    (
+        "the button of a missing calibration sends nothing",
+        "light.js",
+        '$("resume").onclick = $("try-again").onclick = start',
+        '$("resume").onclick = start',
+        "controls",
+    ),
+    (
+        "a stop that does not arrive is not sent again",
+        "light.js",
+        "while (mine === wanted && !await",
+        "if (mine === wanted && !await",
+        "leds",
+    ),
+    (
+        "a page without a program offers to start",
+        "light.js",
+        'text($("leds"), `LEDs unknown: ${GONE.leds}`);\n  $("start").hidden = true;',
+        'text($("leds"), `LEDs unknown: ${GONE.leds}`);',
+        "stream",
+    ),
+    (
+        "a refusal stays after the next command",
+        "requests.js",
+        'answer.refused = got.ok ? "" : got.text;',
+        "if (!got.ok) answer.refused = got.text;",
+        "controls",
+    ),
+    ("a control is set back by a message under way", "requests.js", "touched = performance.now();", "", "controls"),
+    ("a stream that has ended is not opened again", "connection.js", "again = setTimeout(look, 1000); ", "", "stream"),
+    ("the server's reason is not shown", "connection.js", " explain(gone); };", " };", "stream"),
+    ("a hidden page keeps its connection", "connection.js", "if (document.hidden) return;", "", "stream"),
+    ("the sampling is sent in percent", "controls.js", 'number("sampling") / 100', 'number("sampling")', "controls"),
+    (
+        "the field of the sampling shows the share",
+        "controls.js",
+        "+(100 * settings.sampling).toFixed(2)",
+        "settings.sampling",
+        "controls",
+    ),
+    (
+        "the box of the recursive estimate sends that of enhancement",
+        "controls.js",
+        '{ warm_start: $("warm-start").checked }',
+        '{ warm_start: $("enhance").checked }',
+        "controls",
+    ),
+    (
+        "the slider of the sum stands at the number of frames",
+        "controls.js",
+        "Math.round(Math.log2(settings.frames))",
+        "settings.frames",
+        "controls",
+    ),
+    (
+        "a field is set back while a person types",
+        "controls.js",
+        "if (document.activeElement !== $(id)) $(id)",
+        "$(id)",
+        "controls",
+    ),
+    (
+        "a picture that could not be read is named for ever",
+        "scene.js",
+        'function apply(wish) {\n  unread = "";',
+        "function apply(wish) {",
+        "controls",
+    ),
+    (
+        "a wide picture is stretched",
+        "scene.js",
+        "[picture.width, picture.height].map(length => SIDE * length / side)",
+        "[SIDE, SIDE]",
+        "controls",
+    ),
+    ("the brush is always white", "scene.js", '255 * $("brush-level").value', "255", "controls"),
+    (
+        "the saved sheet exchanges lost and corrupt frames",
+        "save.js",
+        "${account.lost} lost, ${account.corrupt} corrupt",
+        "${account.corrupt} lost, ${account.lost} corrupt",
+        "pictures",
+    ),
+    (
+        "numbers of a saved array are big-endian",
+        "save.js",
+        "10 + head.length + 4 * at, value, true",
+        "10 + head.length + 4 * at, value",
+        "pictures",
+    ),
+    (
+        "a program that starts again shows as frames less than none",
+        "plots.js",
+        "Math.max(0, total - before)",
+        "total - before",
+        "stream",
+    ),
+    ("letting the line go makes it steady", "line.js", "now ? HELD : chosen()", "now ? HELD : 0", "controls"),
+    ("names of a camera may turn the direction of text", "dom.js", r"\u2028-\u202e", r"\u2028-\u2029", "fault"),
+    (
+        "a number that was bad news stays marked",
+        "dom.js",
+        'className = bad ? "loss" : "";',
+        'className += bad ? "loss" : "";',
+        "stream",
+    ),
+]
+
+
+class Faulty:
+    """A browser whose pages get the files of this source tree, one of them with a fault."""
+
+    def __init__(self, browser, file, content):
+        self.browser, self.file, self.content = browser, file, content
+
+    def new_page(self, **options):
+        page = self.browser.new_page(**options)
+        page.set_default_timeout(LIMIT_MS)
+        page.route("**/page/*", self.serve)
+        page.route(re.compile(r"^http://[^/]+/$"), self.serve)
+        return page
+
+    def serve(self, route):
+        """With the headers of the program, which keep scripts out of the page."""
+        name = route.request.url.rsplit("/", 1)[1] or "index.html"
+        content = self.content if name == self.file else (PAGE / name).read_text()
+        route.fulfill(response=route.fetch(), body=content)
+
+
+def leds(browser, address):
+    """The switch of the LEDs before the simulated camera, whose LEDs are on at the end."""
+    page = browser.new_page()
+    page.goto(address)
+    check.leds(page, browser, address)
+    page.close()
+
+
+PARTS = {part.__name__: part for part in [*by_hand.PARTS, leds, check.fault]}
+
+
+def seen(browser, address, part):
+    """What the check says of a fault; nothing if it passes."""
+    try:
+        PARTS[part](browser, address)
+    except Exception as said:
+        return next(line for line in str(said).splitlines() if line.strip()) if str(said) else "an assertion"
+    finally:
+        for context in browser.browser.contexts:
+            context.close()
+    return ""
+
+
+def main():
+    program, *words = sys.argv[1:]
+    chosen = [fault for fault in FAULTS if not words or any(word in fault[0] for word in words)]
+    server = subprocess.Popen([program, "serve", "--listen", "127.0.0.1:0"], stdout=subprocess.PIPE, text=True)
+    missed = []
+    try:
+        address = next(word for word in server.stdout.readline().split() if word.startswith("http://"))
+        with sync_playwright() as playwright:
+            browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=["--no-sandbox"])
+            expect.set_options(timeout=LIMIT_MS)
+            for part in dict.fromkeys(fault[4] for fault in chosen):
+                said = seen(Faulty(browser, "none", ""), address, part)
+                if said:
+                    sys.exit(f"{part}: fails without a fault: {said}")
+            for what, file, old, new, part in chosen:
+                content = (PAGE / file).read_text()
+                if content.count(old) != 1:
+                    sys.exit(f"{what}: found {content.count(old)} times in {file}, expected once: {old}")
+                said = seen(Faulty(browser, file, content.replace(old, new)), address, part)
+                print(f"{'caught by ' + part if said else 'MISSED'}: {what}{': ' + said[:120] if said else ''}", flush=True)
+                if not said:
+                    missed.append(what)
+                # A fault may have left the LEDs off.
+                browser.new_page().request.post(f"{address}/api/start")
+            browser.close()
+    finally:
+        server.send_signal(signal.SIGINT)
+        server.wait(10)
+    print(f"{len(chosen) - len(missed)} of {len(chosen)} faults caught")
+    sys.exit(bool(missed))
+
+
+if __name__ == "__main__":
+    main()
