@@ -460,7 +460,8 @@ mod tests {
 
     #[test]
     fn the_past_costs_the_learned_prior_no_scene_half_a_decibel_and_adds_to_slow_motion() {
-        for (shown, noise) in [(LOWEST, 0.1), (LOWEST, 0.01), (Shown::Turns, 0.1)] {
+        let half = Shown::Lowest(50);
+        for (shown, noise) in [(LOWEST, 0.1), (LOWEST, 0.01), (half, 0.03), (Shown::Turns, 0.1)] {
             let gains: Vec<(Motion, f64)> = Motion::ALL
                 .par_iter()
                 .map(|&motion| {

@@ -9,6 +9,7 @@ mod archive;
 mod arrays;
 mod camera;
 mod errors;
+mod loaded;
 mod measurement;
 mod metrics;
 mod networks;
@@ -33,7 +34,9 @@ mod _nirspi {
     #[pymodule_export]
     use crate::errors::Error;
     #[pymodule_export]
-    use crate::measurement::{FlatField, load, readings};
+    use crate::loaded::{Loaded, load};
+    #[pymodule_export]
+    use crate::measurement::{FlatField, readings};
     #[pymodule_export]
     use crate::metrics::{correlation, fit, psnr, scaled, ssim};
     #[pymodule_export]
@@ -49,7 +52,7 @@ mod _nirspi {
     #[pymodule_export]
     use crate::picture::{picture, sheet};
     #[pymodule_export]
-    use crate::reconstruct::{bases, methods, reconstruct, reconstruct_matrix};
+    use crate::reconstruct::{bases, methods, reconstruct, reconstruct_file, reconstruct_matrix};
     #[pymodule_export]
     use crate::recording::{export_zarr, read_recording};
     #[pymodule_export]

@@ -1,17 +1,15 @@
-//! Measurements from files and from readings.
+//! Measurements from readings, and how a file of measurements is read.
 
-use crate::arrays::{array, fill, room, rows, side, slice};
-use crate::errors::{of_source, refusal, refused};
+use crate::arrays::{array, rows, side, slice};
+use crate::errors::{refusal, refused};
 use crate::orders::named;
-use crate::work::{heavy, long};
+use crate::work::heavy;
 use nirspi::calibration;
 use nirspi::files::measurement::{Form, Selection};
-use nirspi::source::{Index, Part, Several, Source, SourceOptions};
+use nirspi::source::{Index, Part, SourceOptions};
 use nirspi_recon::{Dropout, Image, Measurements, Rows, Side};
-use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
+use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
-use std::path::PathBuf;
 use std::str::FromStr;
 
 /// The flat field of a camera, kept with a measurement of that camera.
@@ -105,107 +103,15 @@ impl Options {
     }
 }
 
-fn numbers(rows: &Rows) -> Vec<i64> {
+pub(crate) fn numbers(rows: &Rows) -> Vec<i64> {
     rows.iter().map(|&row| i64::from(row)).collect()
 }
 
-type Lost = (usize, usize, Vec<u32>);
+/// First reading, number of readings and rows of a drop-out.
+pub(crate) type Lost = (usize, usize, Vec<u32>);
 
-fn lost(dropouts: Vec<Dropout>) -> Vec<Lost> {
+pub(crate) fn lost(dropouts: Vec<Dropout>) -> Vec<Lost> {
     dropouts.into_iter().map(|d| (d.start, d.length, d.rows)).collect()
-}
-
-/// A measurement with the rows `shown`, which measurements of one file share.
-fn as_dict<'py>(
-    py: Python<'py>,
-    source: Source,
-    shown: &Bound<'py, PyArray1<i64>>,
-) -> PyResult<Bound<'py, PyDict>> {
-    let dict = PyDict::new(py);
-    dict.set_item("n", source.measurements.side().pixels())?;
-    dict.set_item("rows", shown)?;
-    dict.set_item("d", array(py, source.measurements.into_values()))?;
-    let imaginary = source.imaginary.map(|part| array(py, part.into_values()));
-    dict.set_item("imaginary", imaginary)?;
-    dict.set_item("dropouts", lost(source.dropouts))?;
-    dict.set_item("not_read", source.not_read)?;
-    let reference = source.reference.as_ref().map(|image| array(py, image.pixels().to_vec()));
-    dict.set_item("reference", reference)?;
-    let frames = source.frames.map(|c| (c.received, c.lost, c.corrupt, c.late));
-    dict.set_item("frames", frames)?;
-    dict.set_item("notes", source.notes)?;
-    let flat = source.flat_field.map(|flat| Py::new(py, FlatField(flat))).transpose()?;
-    dict.set_item("flat_field", flat)?;
-    Ok(dict)
-}
-
-/// The measurements of a file as one block of differences, NaN where a pattern was not read; `None` for a file whose
-/// measurements differ in their patterns or are no differences.
-fn block<'py>(py: Python<'py>, several: &mut Several<'_>) -> PyResult<Option<Bound<'py, PyDict>>> {
-    let Some(stack) = long(py, |_| several.stack().map_err(of_source))? else {
-        return Ok(None);
-    };
-    let d = room::<f64>(py, stack.count() * stack.rows().len())?;
-    {
-        let mut place = d.readwrite();
-        let values = fill(&mut place)?;
-        let read = long(py, |_| stack.read_into(values).map_err(|error| of_source(error.into())))?;
-        if !read {
-            return Ok(None);
-        }
-    }
-    let dict = PyDict::new(py);
-    dict.set_item("n", stack.side().pixels())?;
-    dict.set_item("rows", array(py, numbers(stack.rows())))?;
-    dict.set_item("count", stack.count())?;
-    dict.set_item("d", d)?;
-    dict.set_item("references", stack.references().map(|images| array(py, images)))?;
-    dict.set_item("notes", stack.notes())?;
-    Ok(Some(dict))
-}
-
-/// The measurements of a file or recording: one, or all with `index` or `detector` "all". The first part of the pair
-/// is all measurements in one block, if the file has them so; the second is then empty.
-#[pyfunction]
-#[expect(clippy::type_complexity, reason = "a tuple for Python")]
-pub fn load<'py>(
-    py: Python<'py>,
-    path: PathBuf,
-    options: &Bound<'py, PyDict>,
-) -> PyResult<(Option<Bound<'py, PyDict>>, Vec<Bound<'py, PyDict>>)> {
-    let options = options.extract::<Options>()?.checked()?;
-    let all = [options.index, options.detector].contains(&Some(Index::All));
-    let several = long(py, |_| match all {
-        true => Several::of(&path, &options).map_err(of_source),
-        false => Ok(None),
-    })?;
-    let sources = match several {
-        Some(mut several) => {
-            if let Some(block) = block(py, &mut several)? {
-                return Ok((Some(block), Vec::new()));
-            }
-            long(py, |_| several.each().map_err(of_source))?
-        }
-        None => long(py, |_| {
-            let read = match all {
-                true => Source::read_all(&path, &options),
-                false => Source::read(&path, &options).map(|source| vec![source]),
-            };
-            read.map_err(of_source)
-        })?,
-    };
-    let mut found = Vec::with_capacity(sources.len());
-    let mut known: Option<(Rows, Bound<'py, PyArray1<i64>>)> = None;
-    for source in sources {
-        let rows = source.measurements.rows();
-        let shown = match known.take() {
-            Some((before, shown)) if before == *rows => shown,
-            _ => array(py, numbers(rows)),
-        };
-        known = Some((rows.clone(), shown.clone()));
-        found.push(as_dict(py, source, &shown)?);
-    }
-    Ok((None, found))
 }
 
 /// The differences of readings in a form, one measurement: `(rows, d, dropouts, notes)`.

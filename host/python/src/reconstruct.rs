@@ -4,17 +4,18 @@
 //! An image is that of `nirspi reconstruct` on the same measurement, to the bit (`test_cli.py`).
 
 use crate::arrays::{array, fill, room, rows, side, slice, whole};
-use crate::errors::{refusal, refused};
+use crate::errors::{of_source, refusal, refused};
+use crate::measurement::{self, numbers};
 use crate::orders::named;
 use crate::work::{backend, long};
 use nirspi::imaging::MethodReport;
 use nirspi::reconstruct::Recipe;
-use nirspi::source::FirstPatterns;
+use nirspi::source::{FirstPatterns, Index, Several};
 use nirspi_recon::reconstruct::{
-    MatrixSettings, Method, MethodSettings, OwnAtoms, OwnMatrix, ReconstructError, Reconstruction,
+    MatrixSettings, Method, MethodSettings, OwnAtoms, OwnMatrix, Reconstruct, ReconstructError,
     Report, Setting, Sparsity, Strength,
 };
-use nirspi_recon::{Basis, Measurements, Rows, Sampling, SamplingError, Side};
+use nirspi_recon::{Basis, Measurements, Rows, Sampling, SamplingError, ShorterSweep, Side};
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -157,6 +158,63 @@ fn of_method(error: ReconstructError) -> PyErr {
     refusal(error)
 }
 
+/// A method made ready for measurements of the same rows.
+struct Ready {
+    method: Box<dyn Reconstruct>,
+    rows: Rows,
+    first: FirstPatterns,
+    sampling: f64,
+    /// Worked out once, for all measurements without a pattern that was not read.
+    whole: ShorterSweep,
+    order: String,
+}
+
+impl Ready {
+    fn new(
+        method: Method,
+        settings: &MethodSettings,
+        rows: Rows,
+        first: FirstPatterns,
+        sampling: f64,
+    ) -> PyResult<Self> {
+        let method = method.prepare(settings).map_err(of_method)?;
+        let (whole, order) = first.among(&rows, sampling).map_err(refusal)?;
+        Ok(Self { method, rows, first, sampling, whole, order })
+    }
+
+    /// The measurements that are used of these differences, and the name of the order that chose them.
+    fn taken(&self, d: &[f64]) -> PyResult<(Measurements, String)> {
+        let frame = frame(&self.rows, d)?;
+        if *frame.rows() == self.rows {
+            return Ok((self.whole.shorten(frame), self.order.clone()));
+        }
+        self.first.take(&frame, self.sampling).map_err(refusal)
+    }
+
+    /// Writes the image of these differences to `pixels`.
+    fn image(&self, d: &[f64], pixels: &mut [f32]) -> PyResult<Made> {
+        let (used, order) = self.taken(d)?;
+        let report = self.method.reconstruct_into(&used, pixels).map_err(of_method)?;
+        Made::new(report, &used, order, pixels)
+    }
+
+    /// The images of a video, each of which may start from those before.
+    fn video(&self, d: &[f64], pixels: &mut [f32]) -> PyResult<Vec<Made>> {
+        let frames = d.par_chunks_exact(self.rows.len());
+        let (used, orders): (Vec<Measurements>, Vec<String>) =
+            frames.map(|d| self.taken(d)).collect::<PyResult<Vec<_>>>()?.into_iter().unzip();
+        let made = self.method.reconstruct_video(&used).map_err(of_method)?;
+        let places = pixels.chunks_exact_mut(self.rows.side().area());
+        let parts = made.into_iter().zip(used.iter().zip(orders)).zip(places);
+        parts
+            .map(|((made, (used, order)), place)| {
+                place.copy_from_slice(made.image.pixels());
+                Made::new(made.report, used, order, place)
+            })
+            .collect()
+    }
+}
+
 /// What an image was made of.
 struct Made {
     report: Report,
@@ -165,19 +223,13 @@ struct Made {
 }
 
 impl Made {
-    /// Writes an image to its place. Refuses an image that 32-bit floats cannot hold.
-    fn new(
-        made: Reconstruction,
-        used: &Measurements,
-        order: String,
-        place: &mut [f32],
-    ) -> PyResult<Self> {
+    /// Refuses an image that 32-bit floats cannot hold.
+    fn new(report: Report, used: &Measurements, order: String, pixels: &[f32]) -> PyResult<Self> {
         // Without an early end, so that the compiler uses vectors.
-        if !made.image.pixels().iter().fold(true, |finite, pixel| finite & pixel.is_finite()) {
+        if !pixels.iter().fold(true, |finite, pixel| finite & pixel.is_finite()) {
             return Err(refused("the readings are too large for an image of 32-bit floats"));
         }
-        place.copy_from_slice(made.image.pixels());
-        Ok(Self { report: made.report, used: used.rows().clone(), order })
+        Ok(Self { report, used: used.rows().clone(), order })
     }
 
     fn has_report_of(&self, other: &Self) -> bool {
@@ -200,8 +252,33 @@ impl Made {
     }
 }
 
-/// The images of frames of differences; reports as JSON, each with the number of images in a row that it is of; and the
-/// rows used: of each image, or those of all if they are the same.
+/// How images were made: reports as JSON, each with the number of images in a row that it is of; and the rows used, of
+/// each image, or those of all if they are the same.
+struct Account {
+    reports: Vec<(String, usize)>,
+    rows: Vec<Rows>,
+}
+
+impl Account {
+    fn of(made: Vec<Made>, method: Method) -> PyResult<Self> {
+        // The reports of a simple method are all the same.
+        let alike = made.chunk_by(|one, next| next.has_report_of(one));
+        let reports = alike.map(|alike| Ok((alike[0].report(method)?, alike.len())));
+        let reports = reports.collect::<PyResult<Vec<_>>>()?;
+        let mut rows: Vec<Rows> = made.into_iter().map(|one| one.used).collect();
+        if rows.windows(2).all(|two| two[0] == two[1]) {
+            rows.truncate(1);
+        }
+        Ok(Self { reports, rows })
+    }
+
+    fn into_python(self, py: Python<'_>) -> (Vec<(String, usize)>, Vec<Bound<'_, PyArray1<i64>>>) {
+        let rows = self.rows.iter().map(|rows| array(py, numbers(rows))).collect();
+        (self.reports, rows)
+    }
+}
+
+/// The images of frames of differences, their reports, and the rows used: an [`Account`].
 #[pyfunction]
 #[expect(clippy::type_complexity, reason = "a tuple for Python")]
 pub fn reconstruct<'py>(
@@ -226,51 +303,76 @@ pub fn reconstruct<'py>(
     let pixels = room::<f32>(py, whole("d", d.len(), rows.len())? * area)?;
     let mut place = pixels.readwrite();
     let places = fill(&mut place)?;
-    let (reports, mut shown) = long(py, |stop| {
-        let ready = method.prepare(&settings).map_err(of_method)?;
-        // Worked out once, for all frames without a pattern that was not read.
-        let (whole, name) = first.among(&rows, sampling).map_err(refusal)?;
-        let taken = |d: &[f64]| {
-            let frame = frame(&rows, d)?;
-            if *frame.rows() == rows {
-                return Ok((whole.of(&frame), name.clone()));
-            }
-            first.take(&frame, sampling).map_err(refusal)
-        };
-        let frames = d.par_chunks_exact(rows.len());
-        let made: Vec<Made> = if warm {
-            let (used, orders): (Vec<Measurements>, Vec<String>) =
-                frames.map(taken).collect::<PyResult<Vec<_>>>()?.into_iter().unzip();
-            let made = ready.reconstruct_video(&used).map_err(of_method)?;
-            let parts = made.into_iter().zip(used.iter().zip(orders));
-            parts
-                .zip(places.chunks_exact_mut(area))
-                .map(|((made, (used, order)), place)| Made::new(made, used, order, place))
-                .collect::<PyResult<_>>()?
+    let account = long(py, |stop| {
+        let ready = Ready::new(method, &settings, rows, first, sampling)?;
+        let made = if warm {
+            ready.video(d, places)?
         } else {
             let one = |(d, place): (&[f64], &mut [f32])| match stop.load(Ordering::Relaxed) {
                 true => Err(stopped()),
-                false => {
-                    let (used, order) = taken(d)?;
-                    let made = ready.reconstruct(&used).map_err(of_method)?;
-                    Made::new(made, &used, order, place)
-                }
+                false => ready.image(d, place),
             };
+            let frames = d.par_chunks_exact(ready.rows.len());
             frames.zip(places.par_chunks_exact_mut(area)).map(one).collect::<PyResult<_>>()?
         };
-        // The reports of a simple method are all the same.
-        let alike = made.chunk_by(|one, next| next.has_report_of(one));
-        let reports = alike.map(|alike| Ok((alike[0].report(method)?, alike.len())));
-        let reports = reports.collect::<PyResult<Vec<_>>>()?;
-        let shown: Vec<Rows> = made.into_iter().map(|one| one.used).collect();
-        Ok((reports, shown))
+        Account::of(made, method)
     })?;
     drop(place);
-    if shown.windows(2).all(|two| two[0] == two[1]) {
-        shown.truncate(1);
+    let (reports, rows) = account.into_python(py);
+    Ok((pixels, reports, rows))
+}
+
+/// As [`reconstruct`], of all measurements of a file, which are read while they are reconstructed; before them the side
+/// of the images and their number. `None` for a file or options that need all measurements in memory first, and for a
+/// measurement that is refused.
+#[pyfunction]
+#[expect(clippy::type_complexity, reason = "a tuple for Python")]
+pub fn reconstruct_file<'py>(
+    py: Python<'py>,
+    path: PathBuf,
+    source: &Bound<'py, PyDict>,
+    options: &Bound<'py, PyDict>,
+) -> PyResult<
+    Option<(
+        usize,
+        usize,
+        Bound<'py, PyArray1<f32>>,
+        Vec<(String, usize)>,
+        Vec<Bound<'py, PyArray1<i64>>>,
+    )>,
+> {
+    let source = source.extract::<measurement::Options>()?.checked()?;
+    let options: Options<'_> = options.extract()?;
+    if options.warm_start || source.index != Some(Index::All) || source.detector.is_some() {
+        return Ok(None);
     }
-    let numbers = |rows: &Rows| array(py, rows.iter().map(|&row| i64::from(row)).collect());
-    Ok((pixels, reports, shown.iter().map(numbers).collect()))
+    let (method, settings) = (options.method()?, options.settings()?);
+    let (first, sampling) = (options.first()?, options.sampling()?);
+    settings.check(method).map_err(of_method)?;
+    let Some(mut several) = long(py, |_| Several::of(&path, &source).map_err(of_source))? else {
+        return Ok(None);
+    };
+    let Some(stack) = long(py, |_| several.stack().map_err(of_source))? else {
+        return Ok(None);
+    };
+    let (side, count) = (stack.side(), stack.count());
+    let pixels = room::<f32>(py, count * side.area())?;
+    let mut place = pixels.readwrite();
+    let places = fill(&mut place)?;
+    let account = long(py, |stop| {
+        let ready = Ready::new(method, &settings, stack.rows().clone(), first, sampling)?;
+        let one = |d: &[f64], place: &mut [f32]| match stop.load(Ordering::Relaxed) {
+            true => None,
+            false => ready.image(d, place).ok(),
+        };
+        let made = stack.map_into(places, one).map_err(|error| of_source(error.into()))?;
+        made.map(|made| Account::of(made, method)).transpose()
+    })?;
+    drop(place);
+    Ok(account.map(|account| {
+        let (reports, rows) = account.into_python(py);
+        (side.pixels(), count, pixels, reports, rows)
+    }))
 }
 
 /// The images of readings by patterns of one's own, and a report of each as JSON.

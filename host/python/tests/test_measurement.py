@@ -141,6 +141,28 @@ def test_measurements_of_a_file_with_different_gaps_share_their_rows(tmp_path):
     assert (found.rows == ns.order("zig-zag", N)).all()
 
 
+def test_a_file_is_one_kind_of_measurement_whatever_it_holds(tmp_path):
+    """Differences as they lie there, readings in pairs, complex numbers, gaps: the same types and shapes."""
+    scenes = np.stack([5 + asymmetric(N, seed) for seed in range(3)])
+    rows, d = ns.order("zig-zag", N), of(scenes)
+    gaps = d.copy()
+    gaps[0, 3] = gaps[:, 9] = np.nan
+    files = {"d": {"d": d}, "y": {"y": of(scenes, split=True)}, "complex": {"d": d + 1j}, "gaps": {"d": gaps}}
+    for name, fields in files.items():
+        path = tmp_path / f"{name}.npz"
+        np.savez(path, n=N, h_row=rows, recon=scenes, **fields)
+        every, one = ns.load(path, index="all"), ns.load(path, index=1)
+        shown = np.delete(rows, 9) if name == "gaps" else rows
+        assert every.rows.tolist() == shown.tolist() and every.rows.dtype == np.int64 and every.n == N, name
+        assert every.d.shape == (3, len(shown)) and one.d.shape == (len(shown),), name
+        assert every.d.dtype == (complex if name == "complex" else float), name
+        assert np.array_equal(every.reference, scenes.astype("f4")) and one.reference.shape == (N, N), name
+        assert every.dropouts == [[], [], []] and one.dropouts == [[]], name
+        assert every.not_read.tolist() == ([9] if name == "gaps" else []), name
+        assert every.frames is None and every.flat_field is None and every.notes == [], name
+        assert every.unit == ns.Measurement(d=d, rows=rows, n=N).unit and len(every[1:]) == 2, name
+
+
 def test_complex_readings_give_the_magnitude(tmp_path):
     scene = asymmetric(N) * np.exp(0.5j)
     m = ns.Measurement(d=of(scene), rows="zig-zag", n=N)

@@ -1,5 +1,7 @@
 """Reconstruction: every method, whole batches, other patterns."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -37,6 +39,86 @@ def test_an_image_of_a_batch_is_the_image_alone(method, random):
     for k in range(5):
         alone = ns.reconstruct(many, method=method, sampling=0.5, index=k)
         assert (together[k] == alone).all() and together[k].report == alone.report
+
+
+def stored(tmp_path, how):
+    """A file of measurements, some in a form that is read as it lies there, some in another one."""
+    path, rows = tmp_path / "many.npz", ns.order("cake-cutting", 16)
+    d = ns.Hadamard(16, rows=rows)(np.random.default_rng(5).normal(size=(300, 16, 16)))
+    if how == "gaps":
+        d[7, 3] = d[299, :40] = d[:, 9] = np.nan
+    shaped = {"Fortran": np.asfortranarray(d), "one": d[0], "32 bits": d.astype("f4")}.get(how, d)
+    fields = {"y": ns.Hadamard(16, rows=rows, split=True)(scene(16))} if how == "pairs" else {"d": shaped}
+    (np.savez_compressed if how == "compressed" else np.savez)(path, n=16, h_row=rows, **fields)
+    return path
+
+
+FORMS = ["as it lies there", "32 bits", "compressed", "Fortran", "gaps", "one", "pairs"]
+
+
+@pytest.mark.parametrize("how", FORMS)
+@pytest.mark.parametrize("options", [{"method": "hadamard"}, {"sampling": 0.3}])
+def test_a_file_that_is_read_while_it_is_reconstructed_gives_the_same(tmp_path, how, options):
+    path = stored(tmp_path, how)
+    expected = ns.reconstruct(ns.load(path, index="all", transpose=True), **options)
+    made = ns.reconstruct(path, index="all", transpose=True, **options)
+    assert np.array_equal(made, expected) and made.report == expected.report and made.unit == expected.unit
+    assert (
+        np.array_equal(np.asarray(made.rows), np.asarray(expected.rows))
+        if how != "gaps"
+        else all(map(np.array_equal, made.rows, expected.rows))
+    )
+    made.report[0]["note of mine"] = 1
+    assert len(made) == 1 or "note of mine" not in made.report[1]
+
+
+def test_one_measurement_of_a_file_is_that_of_load(tmp_path):
+    path = stored(tmp_path, "gaps")
+    made, expected = ns.reconstruct(str(path), index=7), ns.reconstruct(ns.load(path, index=7))
+    assert made.shape == (16, 16) and (made == expected).all() and made.report == expected.report
+    with pytest.raises(TypeError, match="an argument that needs the path of a file: side"):
+        ns.reconstruct(measured(), side=32)
+    with pytest.raises(TypeError, match="an unexpected keyword argument: sides"):
+        ns.reconstruct(path, index=7, sides=32)
+
+
+def test_a_file_is_refused_in_the_words_of_load(tmp_path):
+    d = np.ones((300, 256))
+    d[200, 5] = np.inf
+    np.savez(tmp_path / "inf.npz", n=16, h_row=ns.order("natural", 16), d=d)
+    d[200, 5] = 1e300
+    np.savez(tmp_path / "large.npz", n=16, h_row=ns.order("natural", 16), d=d)
+    (tmp_path / "cut.npz").write_bytes((tmp_path / "inf.npz").read_bytes()[:-1000])
+    for name in ["inf.npz", "large.npz", "cut.npz", "none.npz"]:
+        words = []
+        for call in (
+            lambda path: ns.reconstruct(ns.load(path, index="all"), method="hadamard"),
+            lambda path: ns.reconstruct(path, index="all", method="hadamard"),
+        ):
+            with pytest.raises((ns.Error, OSError)) as error:
+                call(tmp_path / name)
+            words.append((type(error.value), str(error.value)))
+        assert words[0] == words[1], words
+
+
+def test_a_file_that_is_read_while_it_is_reconstructed_is_never_whole_in_memory(tmp_path):
+    # NumPy tells tracemalloc of its arrays.
+    rows, n = ns.order("natural", 32)[:512], 32
+    d = np.random.default_rng(3).normal(size=(4000, 512))
+    np.savez(tmp_path / "d.npz", n=n, h_row=rows, d=d)
+
+    def peak(run):
+        tracemalloc.start()
+        try:
+            run()
+            return tracemalloc.get_traced_memory()[1]
+        finally:
+            tracemalloc.stop()
+
+    path, options = tmp_path / "d.npz", {"method": "hadamard", "keep": None}
+    pixels = 4 * 4000 * n * n
+    assert peak(lambda: ns.reconstruct(ns.load(path, index="all"), **options)) > d.nbytes + pixels
+    assert peak(lambda: ns.reconstruct(path, index="all", **options)) < pixels + d.nbytes / 4
 
 
 def test_sampling_is_read_as_people_write_it():

@@ -317,8 +317,6 @@ def load(
     >>> ns.load(path).rows[:4].tolist()
     [0, 2, 8, 12]
     """
-    from .camera import Account
-
     options = source_options(
         index=index,
         detector=detector,
@@ -333,74 +331,23 @@ def load(
         keep_leak=keep_leak,
         no_flat_field=no_flat_field,
     )
-    block, found = _nirspi.load(os.fspath(path), options)
-    if block is not None:
-        return _of_block(block)
-    first = found[0]
-    n, rows = first["n"], first["rows"]
-    if not all(one["rows"] is rows or np.array_equal(one["rows"], rows) for one in found):
-        rows = _merged([one["rows"] for one in found])
-    every = [_aligned(one, rows) for one in found]
-    several = "all" in (index, detector)
-    unread = [one["not_read"] for one in found]
-    reference = first["reference"]
-    notes: list[str] = []
-    for one in found:
-        notes.extend(note for note in one["notes"] if note not in notes)
-    frames = first["frames"]
-    references = [one["reference"] for one in found]
-    if several and all(reference is not None for reference in references):
-        reference = np.stack(references).reshape(-1, n, n)
-    elif reference is not None:
-        reference = reference.reshape(n, n)
-    return Measurement(
-        d=np.stack(every) if several else every[0],
-        rows=rows,
-        n=n,
-        copy=False,
-        unit="units of the readings" if frames is None else "ADC counts",
-        dropouts=[one["dropouts"] for one in found],
-        not_read=np.asarray(sorted(set.intersection(*map(set, unread))), np.int64),
-        reference=reference,
-        frames=None if frames is None else Account(*frames),
-        notes=notes,
-        flat_field=first["flat_field"],
-    )
+    return _of_loaded(_nirspi.load(os.fspath(path), options))
 
 
-def _of_block(block: dict[str, Any]) -> Measurement:
-    """Measurements that the compiled part has read and checked as one array, which is not checked again."""
-    n, rows, count = block["n"], block["rows"], block["count"]
-    references = block["references"]
+def _of_loaded(found: _nirspi.Loaded) -> Measurement:
+    """What the compiled part has read and checked, which is not checked again."""
+    from .camera import Account
+
+    leading = () if found.count is None else (found.count,)
+    imaginary, references, frames = found.imaginary, found.references, found.frames
+    d = found.d if imaginary is None else found.d + 1j * imaginary
     made = object.__new__(Measurement)
-    made.d = block["d"].reshape(count, len(rows))
-    made.rows, made.n = rows, n
-    made.unit = "units of the readings"
-    made.dropouts = [[] for _ in range(count)]
-    made.not_read = np.zeros(0, np.int64)
-    made.reference = None if references is None else references.reshape(count, n, n)
-    made.frames, made.flat_field, made.notes = None, None, list(block["notes"])
+    made.rows, made.n = found.rows, found.n
+    made.d = d.reshape(*leading, len(made.rows))
+    made.unit = "units of the readings" if frames is None else "ADC counts"
+    made.dropouts = found.dropouts
+    made.not_read = np.asarray(found.not_read, np.int64)
+    made.reference = None if references is None else references.reshape(*leading, made.n, made.n)
+    made.frames = None if frames is None else Account(*frames)
+    made.flat_field, made.notes = found.flat_field, found.notes
     return made
-
-
-def _aligned(one: dict[str, Any], rows: np.ndarray) -> np.ndarray:
-    d = one["d"] if one["imaginary"] is None else one["d"] + 1j * one["imaginary"]
-    if len(one["rows"]) == len(rows):
-        return d
-    whole = np.full(len(rows), np.nan, d.dtype)
-    whole[np.isin(rows, one["rows"])] = d
-    return whole
-
-
-def _merged(lists: list[np.ndarray]) -> np.ndarray:
-    """All rows of parts of one order, in an order of which each part is a part."""
-    merged = max(lists, key=len).tolist()
-    known = set(merged)
-    for rows in lists:
-        before = None
-        for row in rows.tolist():
-            if row not in known:
-                merged.insert(0 if before is None else merged.index(before) + 1, row)
-                known.add(row)
-            before = row
-    return np.asarray(merged, np.int64)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import json
+import os
 from typing import Any
 
 import numpy as np
@@ -10,7 +12,9 @@ import numpy as np
 from . import _arrays, _nirspi
 from ._nirspi import Error
 from .images import Image
-from .measurement import Measurement
+from .measurement import Measurement, load, source_options
+
+_OF_FILES = frozenset(source_options())
 
 
 def methods() -> dict[str, str]:
@@ -38,13 +42,13 @@ def bases() -> list[str]:
 
 
 def reconstruct(
-    measurement: Measurement,
+    measurement: Measurement | str | os.PathLike[str],
     *,
     method: str = "tikhonov",
     sampling: float | str = 1.0,
     order: str | None = None,
     basis: str | None = None,
-    index: int | None = None,
+    index: int | str | None = None,
     dictionary: Any = None,
     sparsity: int | None = None,
     residual: float | None = None,
@@ -57,13 +61,16 @@ def reconstruct(
     matrix: Any = None,
     n: int | None = None,
     device: str = "auto",
+    **source: Any,
 ) -> Image:
     """Reconstructs the image of a measurement, or the images of many.
 
     Parameters
     ----------
-    measurement : Measurement
-        Or, with ``matrix``, the readings ``(..., M)``.
+    measurement : Measurement or path
+        The path of a file stands for ``nirspi.load(path, index=index, **source)``. With
+        ``index="all"``, the measurements of a file are read while they are reconstructed: the memory
+        holds a few of them at a time. Or, with ``matrix``, the readings ``(..., M)``.
     method : str
         A name of :func:`methods`.
     sampling : float or str
@@ -73,8 +80,8 @@ def reconstruct(
         the lowest sequencies.
     basis : str, optional
         Of omp, tikhonov and fista: a name of :func:`bases`. Default "dct".
-    index : int, optional
-        Which of several measurements. Default: all of them.
+    index : int or "all", optional
+        Which of several measurements. Default: all of a ``Measurement``; of a file, the only one.
     dictionary : array_like, (N, n, n), optional
         OMP: images of your own as atoms.
     sparsity : int, optional
@@ -99,6 +106,8 @@ def reconstruct(
         With ``matrix``: side of the image, if it is not the root of the matrix's columns.
     device : str
         Where OMP computes: "auto", "cpu", or another name of :func:`devices`.
+    **source
+        With a path: the other options of :func:`load`.
 
     Returns
     -------
@@ -131,6 +140,18 @@ def reconstruct(
         warm_start=warm_start,
         device=device,
     )
+    is_path = isinstance(measurement, (str, os.PathLike))
+    unknown = ", ".join(name for name in source if not is_path or name not in _OF_FILES)
+    if unknown:
+        what = "an unexpected keyword argument" if is_path else "an argument that needs the path of a file"
+        raise TypeError(f"reconstruct() got {what}: {unknown}")
+    if isinstance(measurement, (str, os.PathLike)):
+        if index == "all" and matrix is None and dictionary is None:
+            images = _while_reading(measurement, source, options)
+            if images is not None:
+                return images
+        # These measurements are chosen when the file is read.
+        measurement, index = load(measurement, index=index, **source), None
     if matrix is not None:
         return _by_matrix(measurement, matrix, n, dictionary, options)
     if not isinstance(measurement, Measurement):
@@ -138,7 +159,7 @@ def reconstruct(
             f"found {type(measurement).__name__}, expected a Measurement: nirspi.Measurement(d=...,"
             " rows=..., n=...) or nirspi.load(path)"
         )
-    if index is not None:
+    if index is not None and index != "all":
         measurement = measurement[index]
     n = measurement.n
     if dictionary is not None:
@@ -202,11 +223,25 @@ def _run(
     pixels, reports, used = _nirspi.reconstruct(
         n, rows, np.ascontiguousarray(d, np.float64).reshape(-1), options
     )
+    return pixels, _each(reports), used
+
+
+def _each(reports: list[tuple[str, int]]) -> list[Any]:
+    """A report for each image, which a program may change without changing that of another image."""
     every: list[Any] = []
     for report, count in reports:
-        known = json.loads(report)
-        every.extend(dict(known) for _ in range(count))
-    return pixels, every, used
+        every.extend(map(dict.copy, itertools.repeat(json.loads(report), count)))
+    return every
+
+
+def _while_reading(path: Any, source: dict[str, Any], options: dict[str, Any]) -> Image | None:
+    """The images of all measurements of a file, if they can be made one by one while they are read. If
+    one of them is refused, :func:`load` says why."""
+    made = _nirspi.reconstruct_file(os.fspath(path), source_options(index="all", **source), options)
+    if made is None:
+        return None
+    n, count, pixels, reports, rows = made
+    return Image(pixels.reshape(count, n, n), report=_each(reports), rows=rows[0] if len(rows) == 1 else rows)
 
 
 def _atoms(dictionary: Any, n: int) -> np.ndarray:

@@ -8,11 +8,23 @@ from nirspi.bench import file, omp, total_variation
 
 def test_every_package_makes_the_same_images_of_a_file(tmp_path):
     pytest.importorskip("torch")
-    (contestants,) = file(str(tmp_path / "m.npz"), 5, 8, None).values()
+    contestants = file(str(tmp_path / "m.npz"), 5, 8, None)["load and reconstruct"]
+    assert len(contestants) > 2
     truth = np.random.default_rng(1).random((5, 8, 8), np.float32)
     for name, run in contestants.items():
         found = np.asarray(run()).reshape(truth.shape)
         assert np.allclose(found, truth, atol=1e-5), name
+
+
+def test_what_is_timed_as_the_file_alone_is_the_file(tmp_path):
+    path = tmp_path / "m.npz"
+    ways = file(str(path), 5, 8, None)["the file alone"]
+    bytes_of = path.read_bytes()
+    with np.load(path) as found:
+        d = found["d"]
+    assert all(np.array_equal(ways[name](), d) for name in ["nirspi, load", "numpy.load"])
+    assert ways["read, fresh memory"]() == bytes_of
+    assert ways["read, memory that is there"]() == len(bytes_of)
 
 
 def test_every_pursuit_finds_the_same_coefficients():

@@ -85,11 +85,23 @@ impl ShorterSweep {
     #[must_use]
     pub fn of(&self, measurements: &Measurements) -> Measurements {
         assert!(*measurements.rows() == self.measured, "measurements of other rows");
-        let values = measurements.values();
-        let values = match &self.positions {
-            None => values.to_vec(),
-            Some(positions) => positions.iter().map(|&k| values[k]).collect(),
+        let Some(positions) = &self.positions else {
+            return measurements.clone();
         };
+        let values = measurements.values();
+        let values = positions.iter().map(|&k| values[k]).collect();
         Measurements::trusted(self.shown.clone(), values)
+    }
+
+    /// As [`of`](Self::of), without a copy if the shorter sweep shows all patterns.
+    ///
+    /// # Panics
+    /// If the measurements have other rows.
+    #[must_use]
+    pub fn shorten(&self, measurements: Measurements) -> Measurements {
+        match self.positions {
+            None if *measurements.rows() == self.measured => measurements,
+            _ => self.of(&measurements),
+        }
     }
 }

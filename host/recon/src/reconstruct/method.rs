@@ -10,7 +10,7 @@
 //! lists from [`Method::ALL`].
 
 use super::prior::SharedNetwork;
-use super::report::Reconstruction;
+use super::report::{Reconstruction, Report};
 use super::{
     Completion, MatrixMethod, OmpSettings, ReconstructError, Recursive, Sparsity, Strength, methods,
 };
@@ -47,6 +47,25 @@ pub trait Reconstruct: Send + Sync {
     /// [`ReconstructError`] if there is no image. A user's own method gives its reason in
     /// [`ReconstructError::Failed`].
     fn reconstruct(&self, measurements: &Measurements) -> Result<Reconstruction, ReconstructError>;
+
+    /// As [`reconstruct`](Self::reconstruct), with the pixels written to `pixels`. A fast method
+    /// overrides this function: for a stack of thousands of images, memory of its own for each image
+    /// takes a large part of the time.
+    ///
+    /// # Errors
+    /// As [`Reconstruct::reconstruct`].
+    ///
+    /// # Panics
+    /// If `pixels` has not one place for each pixel.
+    fn reconstruct_into(
+        &self,
+        measurements: &Measurements,
+        pixels: &mut [f32],
+    ) -> Result<Report, ReconstructError> {
+        let made = self.reconstruct(measurements)?;
+        pixels.copy_from_slice(made.image.pixels());
+        Ok(made.report)
+    }
 
     /// What the frames of a video have shown before the first frame, for
     /// [`next_frame`](Self::next_frame); `None` for a method that makes each frame by itself, or

@@ -98,6 +98,9 @@ pub struct RecursiveFrame {
     /// The rows that are known nearly as well as by one reading, and their values: measurements
     /// of a still scene, for any other method. Without a past these are the frame's.
     pub fused: Measurements,
+    /// Of the [fused](Self::fused) rows, those that have been read at the scene's last position, and
+    /// those of which readings at earlier positions say far more than can be expected of any scene.
+    pub certain: Measurements,
     /// Norm of the difference between this frame's measurements and the image, relative to the
     /// measurements' norm.
     pub residual: f64,
@@ -161,7 +164,7 @@ pub fn believed_frame(
         note(&mut made, added.note());
         return Ok(made);
     }
-    let fused = method.reconstruct(&added.fused)?;
+    let fused = method.reconstruct(&added.certain)?;
     past.belief.remember(&made.image, &fused.image);
     if share == 0.0 {
         note(&mut made, Some("the readings do not support the frames before".to_owned()));
@@ -285,6 +288,7 @@ impl Recursive {
             shift_px: [0.0; 2],
             speed_px: 0.0,
             fused: frame.clone(),
+            certain: frame.clone(),
             residual: found.residual,
             noise: found.noise,
             strength: found.strength,
@@ -365,7 +369,7 @@ impl Recursive {
         // What the next frame is compared with has no less detail than the readings show.
         let share = past.share_of_last(noise, Some(prior));
         past.mean = past.with_readings(made.clone(), &share);
-        let fused = past.fused(noise);
+        let [fused, certain] = past.fused(noise, prior);
         if self.settings.completion == Completion::Measured {
             let known = &past.poses[0].known;
             if past.poses.len() > 1 {
@@ -391,6 +395,7 @@ impl Recursive {
             shift_px,
             speed_px: speed_px.into(),
             fused,
+            certain,
             residual,
             noise: f64::from(noise) * unit * side.pixels() as f64,
             strength,

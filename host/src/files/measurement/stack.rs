@@ -121,4 +121,36 @@ impl<'o> Stack<'o> {
         }
         Ok(read.into_iter().all(|read| read))
     }
+
+    /// Makes something of each measurement, on all threads: `make` gets the differences of a measurement and the places
+    /// of `out` that belong to this measurement. Numbers that lie in the file as they are are read piece by piece, so
+    /// that the memory never holds them all. `None` if a difference is not finite, or `make` gives nothing.
+    ///
+    /// # Errors
+    /// As [`read`](super::read).
+    ///
+    /// # Panics
+    /// If the measurements do not share `out` evenly.
+    pub fn map_into<T: Send, R: Send>(
+        &self,
+        out: &mut [T],
+        make: impl Fn(&[f64], &mut [T]) -> Option<R> + Sync,
+    ) -> Result<Option<Vec<R>>, FileError> {
+        let (count, patterns) = (self.count(), self.rows.len());
+        assert!(out.len().is_multiple_of(count), "places for the measurements");
+        match &self.numbers {
+            Numbers::File(stored) => stored.map_groups(patterns, out, make),
+            Numbers::Memory(numbers) => {
+                let each = numbers
+                    .par_chunks_exact(patterns)
+                    .zip(out.par_chunks_exact_mut(out.len() / count));
+                Ok(each
+                    .map(|(values, places)| match values.iter().all(|value| value.is_finite()) {
+                        true => make(values, places),
+                        false => None,
+                    })
+                    .collect())
+            }
+        }
+    }
 }

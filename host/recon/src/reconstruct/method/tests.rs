@@ -140,6 +140,17 @@ fn frames_of_a_video_start_warm_where_the_method_can() {
     }
 }
 
+#[test]
+fn an_image_in_memory_of_the_caller_is_the_same_image() {
+    for method in Method::ALL {
+        let ready = method.prepare(&MethodSettings::default()).unwrap();
+        let made = ready.reconstruct(&part()).unwrap();
+        let mut pixels = vec![7.0; made.image.pixels().len()];
+        let report = ready.reconstruct_into(&part(), &mut pixels).unwrap();
+        assert_eq!((&*pixels, &report), (made.image.pixels(), &made.report), "{method}");
+    }
+}
+
 /// A user's own method: every pixel is the mean.
 struct Flat;
 
@@ -154,7 +165,7 @@ impl Reconstruct for Flat {
         let side = measurements.side();
         let mean = measurements.values()[sum] / side.area() as f64;
         let image = crate::Image::new(side, vec![mean as f32; side.area()]);
-        Ok(Reconstruction { image, report: reconstruct::Report::new("flat") })
+        Ok(Reconstruction { image, report: Report::new("flat") })
     }
 }
 

@@ -27,6 +27,15 @@ impl Reconstruct for ZeroFilling {
     fn reconstruct(&self, measurements: &Measurements) -> Result<Reconstruction, ReconstructError> {
         Ok(Reconstruction { image: hadamard(measurements), report: Report::new(self.name) })
     }
+
+    fn reconstruct_into(
+        &self,
+        measurements: &Measurements,
+        pixels: &mut [f32],
+    ) -> Result<Report, ReconstructError> {
+        invert(measurements, pixels);
+        Ok(Report::new(self.name))
+    }
 }
 
 /// Inverts the Walsh-Hadamard transform, with zeros for rows that were not measured.
@@ -36,13 +45,23 @@ impl Reconstruct for ZeroFilling {
 #[must_use]
 pub fn hadamard(measurements: &Measurements) -> Image {
     let side = measurements.side();
-    let mut grid = vec![0.0_f64; side.area()];
+    let mut pixels = vec![0.0; side.area()];
+    invert(measurements, &mut pixels);
+    Image::new(side, pixels)
+}
+
+/// Writes the image of [`hadamard`] to `pixels`.
+fn invert(measurements: &Measurements, pixels: &mut [f32]) {
+    let area = measurements.side().area();
+    assert_eq!(pixels.len(), area, "places for the pixels");
+    let mut grid = vec![0.0_f64; area];
     for (&row, &value) in measurements.rows().iter().zip(measurements.values()) {
         grid[row as usize] = value;
     }
     fwht::transform(&mut grid);
     // Exact, as the number of pixels is a power of two.
-    let scale = 1.0 / side.area() as f64;
-    let pixels = grid.into_iter().map(|v| (v * scale) as f32).collect();
-    Image::new(side, pixels)
+    let scale = 1.0 / area as f64;
+    for (pixel, value) in pixels.iter_mut().zip(grid) {
+        *pixel = (value * scale) as f32;
+    }
 }

@@ -110,17 +110,29 @@ impl Past {
         rows
     }
 
-    /// The rows that are known nearly as well as by one reading, in the measurements' units.
-    pub fn fused(&self, noise: f32) -> Measurements {
+    /// The rows that are known nearly as well as by one reading, in the measurements' units; and those
+    /// of them that the last position has read, or that are known far better than by `prior`, the
+    /// expected square of each row.
+    pub fn fused(&self, noise: f32, prior: &[f32]) -> [Measurements; 2] {
         let unit = self.unit * self.side.pixels() as f64;
         let information = self.information(noise);
+        let last = self.poses[0].known.precision(noise);
         let values = match self.poses.len() {
             1 => self.poses[0].known.value.clone(),
             _ => self.with_readings(self.mean.clone(), &self.share_of_last(noise, None)),
         };
-        let rows = (0..values.len()).filter(|&row| information[row] * noise * noise >= LEAST_FUSED);
-        let (rows, values) = rows.map(|row| (row as u32, f64::from(values[row]) * unit)).unzip();
-        Measurements::trusted(Rows::trusted(self.side, rows), values)
+        let by_readings = |precision: f32| precision * noise * noise >= LEAST_FUSED;
+        let of = |rows: &[usize]| {
+            let values = rows.iter().map(|&row| f64::from(values[row]) * unit).collect();
+            let rows = rows.iter().map(|&row| row as u32).collect();
+            Measurements::trusted(Rows::trusted(self.side, rows), values)
+        };
+        let mut rows: Vec<usize> =
+            (0..values.len()).filter(|&row| by_readings(information[row])).collect();
+        let fused = of(&rows);
+        let beyond_prior = |row: usize| information[row] * prior[row] >= BEYOND_PRIOR;
+        rows.retain(|&row| by_readings(last[row]) || beyond_prior(row));
+        [fused, of(&rows)]
     }
 
     /// The noise of this frame: given, or the median of the last estimates. `predicted` are the
@@ -149,6 +161,11 @@ impl Past {
 /// Least weight of a row among the fused ones; one reading has weight 1. A method that takes all
 /// rows for equally good is led astray by rows with more noise than the others.
 const LEAST_FUSED: f32 = 0.5;
+
+/// How many times more the readings at earlier positions must say of a row than the prior does. What
+/// they say of one row is mixed with what they say of others, so the sum of it says too much: with
+/// much noise, a learned prior knows such a row better.
+const BEYOND_PRIOR: f32 = 15.0;
 
 /// The median of some estimates of the noise.
 pub(super) fn median(noises: &VecDeque<f32>) -> f32 {

@@ -187,6 +187,24 @@ fn a_moving_figure_is_followed_and_better_than_frame_by_frame() {
 }
 
 #[test]
+fn a_row_that_was_never_read_is_certain_only_where_readings_say_far_more_than_the_prior() {
+    let side = side(32);
+    let rows = Order::ZigZag.rows(side).unwrap().first(512);
+    for (noise, some) in [(0.001, true), (0.1, false)] {
+        let frames: Vec<Measurements> =
+            (0..6).map(|k| read(&rows, &figure(side, 0, k), noise, k as u64)).collect();
+        let last = estimate(RecursiveSettings::default(), &frames).pop().unwrap();
+        assert_eq!(last.shift_px, [0.0, 1.0], "noise {noise}");
+        let never_read =
+            |known: &Measurements| known.rows().iter().filter(|row| !rows.contains(row)).count();
+        let (fused, certain) = (never_read(&last.fused), never_read(&last.certain));
+        assert!(fused > 0 && certain <= fused, "noise {noise}: {certain} of {fused}");
+        assert_eq!(certain > 0, some, "noise {noise}: {certain} of {fused}");
+        assert_eq!(last.certain.rows().len(), rows.len() + certain, "noise {noise}");
+    }
+}
+
+#[test]
 fn frames_without_light_of_another_side_and_out_of_range_are_no_trouble() {
     let dark = |n: u64| read(&Rows::natural(side(n)), &vec![0.0; (n * n) as usize], 0.0, 0);
     let frames = [dark(16), dark(16), dark(32), dark(32)];

@@ -21,6 +21,21 @@ fn block(bytes: &[u8]) -> Result<Option<(Vec<f64>, bool)>, FileError> {
     Ok(Some((values, whole)))
 }
 
+/// What [`Stack::map_into`] makes of a file: the sum of each measurement, and a copy of all.
+fn mapped(bytes: &[u8]) -> Result<Option<(Vec<f64>, Vec<f64>)>, FileError> {
+    let (_guard, path) = file("lab.npz", bytes);
+    let mut several = Several::open(&path, &as_is())?;
+    let mut copy = vec![7.0; 3 * several.len()];
+    let Some(stack) = several.stack()? else {
+        return Ok(None);
+    };
+    let sums = stack.map_into(&mut copy, |values, places: &mut [f64]| {
+        places.copy_from_slice(values);
+        (values[0] < 1e6).then(|| values.iter().sum())
+    })?;
+    Ok(sums.map(|sums| (sums, copy)))
+}
+
 fn one_by_one(bytes: &[u8]) -> Result<Vec<MeasurementFile>, FileError> {
     let (_guard, path) = file("lab.npz", bytes);
     Several::open(&path, &as_is())?.each(Ok)
@@ -77,6 +92,9 @@ fn a_block_has_the_numbers_that_the_measurements_have_one_by_one() {
             apart.iter().flat_map(differences).copied().collect::<Vec<_>>(),
             "{descr} {shape}"
         );
+        let (sums, copy) = mapped(&bytes).unwrap().unwrap();
+        assert_eq!(copy, values, "{descr} {shape}");
+        assert!(sums.iter().copied().eq(values.chunks(3).map(|d| d.iter().sum::<f64>())));
     }
 }
 
@@ -94,8 +112,10 @@ fn a_changed_byte_of_a_stack_is_caught_by_the_checksum() {
     for at in [header, header + 1000, header + 600_000, header + 3 * many] {
         let mut bytes = good.clone();
         bytes[at] ^= if at == header { b' ' ^ b'\t' } else { 1 };
-        let line = line(&block(&bytes).unwrap_err(), "lab.npz");
-        assert!(line.contains("damaged or cut short (`d`: Invalid checksum)"), "{at}: {line}");
+        for error in [block(&bytes).unwrap_err(), mapped(&bytes).unwrap_err()] {
+            let line = line(&error, "lab.npz");
+            assert!(line.contains("damaged or cut short (`d`: Invalid checksum)"), "{at}: {line}");
+        }
     }
 }
 
@@ -118,6 +138,12 @@ fn a_block_is_refused_in_the_words_of_its_measurements_and_keeps_what_was_not_re
     let (values, whole) = block(&of(&[1.0, NAN, 3.0, 4.0, 5.0, 6.0])).unwrap().unwrap();
     assert!(whole && values[1].is_nan());
     assert_eq!([values[0], values[2], values[3], values[4], values[5]], [1.0, 3.0, 4.0, 5.0, 6.0]);
+    let refused = [1.0, 2.0, 3.0, 4e6, 5.0, 6.0];
+    for without in
+        [[1.0, NAN, 3.0, 4.0, 5.0, 6.0], [1.0, 2.0, 3.0, 4.0, 5.0, f64::INFINITY], refused]
+    {
+        assert!(mapped(&of(&without)).unwrap().is_none(), "{without:?}");
+    }
     // No measurement read row 3.
     assert!(!block(&of(&[1.0, NAN, 3.0, 4.0, NAN, 6.0])).unwrap().unwrap().1);
 }
