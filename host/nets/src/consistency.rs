@@ -23,7 +23,9 @@ mod measured;
 pub use measured::{MeasuredRows, MeasuredRowsError, SampledRows};
 
 use crate::cosine::Cosine;
+use crate::separable::Separable;
 use krylov::Krylov;
+use pulp::Arch;
 use std::f32::consts::PI;
 use std::sync::LazyLock;
 
@@ -53,11 +55,10 @@ static OF_READINGS: LazyLock<Cosine<f32>> = LazyLock::new(|| Cosine::new(SIDE / 
 /// The camera's model for one image, and the noise of its readings.
 #[derive(Debug)]
 pub struct Consistency {
-    /// Cosine transform of the sharp image and of the readings.
-    image: &'static Cosine<f32>,
+    /// From an image to the cosine transform of its readings: A.
+    camera: Separable,
+    /// Cosine transform of the readings.
     readings: &'static Cosine<f32>,
-    /// Attenuation of cosine k of the image.
-    gain: Vec<f32>,
     /// Diagonal of D D^T on one axis, D = pair means of the blur.
     power: Vec<f32>,
     noise: f32,
@@ -84,13 +85,22 @@ impl Consistency {
         for k in 1..SIDE - side {
             power[k] += gain[SIDE - k].powi(2);
         }
-        let noise = noise.max(NOISE_FLOOR);
+        // Pair means fold cosine 64 - k onto cosine k, with the other sign, and remove cosine 32.
+        let cosines: &Cosine<f32> = &OF_IMAGE;
+        let mut camera = Vec::with_capacity(side * SIDE);
+        for k in 0..side {
+            camera.extend(cosines.wave(k).iter().map(|value| gain[k] * value));
+            if halved && k > 0 {
+                let (folded, factor) = (cosines.wave(SIDE - k), gain[SIDE - k]);
+                let line = camera[k * SIDE..].iter_mut().zip(folded);
+                line.for_each(|(value, folded)| *value -= factor * folded);
+            }
+        }
         Self {
-            image: &OF_IMAGE,
+            camera: Separable::new(camera, SIDE),
             readings: if halved { &OF_READINGS } else { &OF_IMAGE },
-            gain,
             power,
-            noise,
+            noise: noise.max(NOISE_FLOOR),
             measured: MeasuredRows::All,
         }
     }
@@ -107,24 +117,23 @@ impl Consistency {
     /// Norm of the difference between `readings` and the model's readings of `image` ([`SIDE`]^2),
     /// over the norm expected from noise. Near 1 or below, they agree.
     pub fn residual_ratio(&self, readings: &[f32], image: &[f32]) -> f32 {
-        let residual = self.residual(readings, &self.image.forward(image));
+        let residual = self.residual(readings, image);
         norm(&residual) / (self.noise * (self.degrees() as f32).sqrt())
     }
 
     /// Moves `image` onto the ball, if the image is outside.
     pub fn project(&self, readings: &[f32], image: &mut [f32]) {
         let radius = TAU * self.noise * (self.degrees() as f32).sqrt();
-        let mut spectrum = self.image.forward(image);
-        let residual = self.residual(readings, &spectrum);
+        let residual = self.residual(readings, image);
         if norm(&residual) <= radius {
             return;
         }
         let dual = match &self.measured {
             MeasuredRows::All => self.solve(&residual, radius),
-            MeasuredRows::Rows(rows) => self.solve_sampled(rows, &residual, radius),
+            MeasuredRows::Rows(rows) => self.solve_sampled(rows, residual, radius),
         };
-        self.add_adjoint(&dual, &mut spectrum);
-        image.copy_from_slice(&self.image.inverse(&spectrum));
+        let change = self.camera.adjoint(&dual);
+        image.iter_mut().zip(change).for_each(|(pixel, change)| *pixel += change);
     }
 
     /// Number of readings that count.
@@ -136,78 +145,45 @@ impl Consistency {
     }
 
     /// Cosine transform of the measured part of y - A x.
-    fn residual(&self, readings: &[f32], spectrum: &[f32]) -> Vec<f32> {
+    fn residual(&self, readings: &[f32], image: &[f32]) -> Vec<f32> {
         let mut residual = self.readings.forward(readings);
-        let seen = self.apply(spectrum);
+        let seen = self.camera.forward(image);
         residual.iter_mut().zip(seen).for_each(|(r, seen)| *r -= seen);
-        if let MeasuredRows::Rows(rows) = &self.measured {
-            rows.keep_measured(self.readings, &mut residual);
-        }
-        residual
-    }
-
-    /// A in cosine space: attenuate, then fold.
-    fn apply(&self, spectrum: &[f32]) -> Vec<f32> {
-        let side = self.power.len();
-        let mut seen = vec![0.0; side * side];
-        for (row, values) in spectrum.chunks_exact(SIDE).enumerate() {
-            let Some((to_row, row_sign)) = folded(row, side) else { continue };
-            let row_gain = row_sign * self.gain[row];
-            let out = &mut seen[to_row * side..][..side];
-            for (column, value) in values.iter().enumerate() {
-                if let Some((to, sign)) = folded(column, side) {
-                    out[to] += row_gain * sign * self.gain[column] * value;
-                }
-            }
-        }
-        seen
-    }
-
-    /// `spectrum` += A^T `dual`.
-    fn add_adjoint(&self, dual: &[f32], spectrum: &mut [f32]) {
-        let side = self.power.len();
-        for (row, values) in spectrum.chunks_exact_mut(SIDE).enumerate() {
-            let Some((from_row, row_sign)) = folded(row, side) else { continue };
-            let row_gain = row_sign * self.gain[row];
-            let line = &dual[from_row * side..][..side];
-            for (column, value) in values.iter_mut().enumerate() {
-                if let Some((from, sign)) = folded(column, side) {
-                    *value += row_gain * sign * self.gain[column] * line[from];
-                }
-            }
+        match &self.measured {
+            MeasuredRows::All => residual,
+            MeasuredRows::Rows(rows) => rows.measured_part(&residual),
         }
     }
 
-    /// Element `index` of the diagonal of A A^T.
-    fn power_at(&self, index: usize) -> f32 {
-        let side = self.power.len();
-        self.power[index / side] * self.power[index % side]
+    /// The diagonal of A A^T.
+    fn powers(&self) -> Vec<f32> {
+        self.power
+            .iter()
+            .flat_map(|down| self.power.iter().map(move |across| down * across))
+            .collect()
     }
 
     /// (A A^T + lambda)^-1 of the residual, with lambda such that the new residual has the radius
     /// as its norm. Of each coefficient lambda / (mu + lambda) is left.
     fn solve(&self, residual: &[f32], radius: f32) -> Vec<f32> {
+        let powers = self.powers();
         let left = |lambda: f32| {
-            let squares = residual.iter().enumerate().map(|(index, r)| {
-                let left = r * lambda / (self.power_at(index) + lambda);
-                f64::from(left * left)
-            });
-            squares.sum::<f64>().sqrt() as f32
+            let left = |r: f32, power: f32| r * lambda / (power + lambda);
+            sum(residual, &powers, |r, power| f64::from(left(r, power)).powi(2)).sqrt() as f32
         };
         let lambda = bisect(BISECTIONS, |lambda| left(lambda) > radius);
-        residual.iter().enumerate().map(|(i, r)| r / (self.power_at(i) + lambda)).collect()
+        residual.iter().zip(&powers).map(|(r, power)| r / (power + lambda)).collect()
     }
 
     /// (P A A^T P + lambda)^-1 of the residual, where P projects onto the measured rows. Lambda is
     /// such that the new residual has the radius as its norm.
-    fn solve_sampled(&self, rows: &SampledRows, residual: &[f32], radius: f32) -> Vec<f32> {
+    fn solve_sampled(&self, rows: &SampledRows, residual: Vec<f32>, radius: f32) -> Vec<f32> {
+        let powers = self.powers();
         let mut krylov = Krylov::new(residual);
         loop {
             krylov.step(|v| {
-                let powers = v.iter().enumerate();
-                let mut image: Vec<f32> = powers.map(|(i, v)| self.power_at(i) * v).collect();
-                rows.keep_measured(self.readings, &mut image);
-                image
+                let seen: Vec<f32> = v.iter().zip(&powers).map(|(v, power)| power * v).collect();
+                rows.measured_part(&seen)
             });
             if !krylov.is_due() {
                 continue;
@@ -236,18 +212,24 @@ fn bisect(halvings: usize, mut outside: impl FnMut(f32) -> bool) -> f32 {
     10.0_f32.powf(inside)
 }
 
-/// The cosine of the readings onto which cosine `k` of the image folds, and its sign; `None` for
-/// the cosine that pair means remove.
-fn folded(k: usize, side: usize) -> Option<(usize, f32)> {
-    match k.cmp(&side) {
-        std::cmp::Ordering::Less => Some((k, 1.0)),
-        std::cmp::Ordering::Equal => None,
-        std::cmp::Ordering::Greater => Some((SIDE - k, -1.0)),
-    }
+fn norm(values: &[f32]) -> f32 {
+    sum(values, values, |a, b| f64::from(a) * f64::from(b)).sqrt() as f32
 }
 
-fn norm(values: &[f32]) -> f32 {
-    values.iter().map(|&v| f64::from(v).powi(2)).sum::<f64>().sqrt() as f32
+/// The sum of `term` over pairs of elements, as sixteen sums side by side: a single one would wait
+/// for each addition.
+fn sum(a: &[f32], b: &[f32], term: impl Fn(f32, f32) -> f64) -> f64 {
+    const SUMS: usize = 16;
+    Arch::new().dispatch(|| {
+        let mut sums = [0.0; SUMS];
+        let ((a, last_a), (b, last_b)) = (a.as_chunks::<SUMS>(), b.as_chunks::<SUMS>());
+        for (a, b) in a.iter().zip(b) {
+            let pairs = a.iter().zip(b);
+            sums.iter_mut().zip(pairs).for_each(|(sum, (&a, &b))| *sum += term(a, b));
+        }
+        let last = last_a.iter().zip(last_b).map(|(&a, &b)| term(a, b));
+        sums.into_iter().chain(last).sum()
+    })
 }
 
 #[cfg(test)]

@@ -23,6 +23,11 @@ impl<T: RealField + Copy> Cosine<T> {
         Self { down: Waves::new(height), across: Waves::new(width) }
     }
 
+    /// Wave `k` down the image.
+    pub(crate) fn wave(&self, k: usize) -> &[T] {
+        &self.down.matrix[k * self.down.length..][..self.down.length]
+    }
+
     /// C X C^T: the coefficient in row k and column l belongs to wave k down the image times wave l
     /// across it.
     pub(crate) fn forward(&self, image: &[T]) -> Vec<T> {
@@ -70,7 +75,7 @@ const TILE: (usize, usize) = (4, 16);
 /// The code is compiled for each vector width. Products are added in the order of the inner index
 /// for any width, without fused multiply-add, so every machine gives the same bits
 /// (`tests::a_product_has_the_bits_of_the_plain_sums`).
-fn product<T: RealField + Copy>(a: &[T], b: &[T], inner: usize) -> Vec<T> {
+pub(crate) fn product<T: RealField + Copy>(a: &[T], b: &[T], inner: usize) -> Vec<T> {
     let columns = b.len() / inner;
     let mut out = vec![T::zero(); a.len() / inner * columns];
     Arch::new().dispatch(Product { a, b, sizes: (inner, columns), out: &mut out });

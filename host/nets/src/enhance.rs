@@ -305,8 +305,13 @@ fn in_batches<const SIDE: usize>(
 
 /// Each pixel of (N, side, side) repeated twice in both directions.
 fn repeated(images: &[f32], side: usize) -> Vec<f32> {
-    let rows = images.chunks_exact(side).map(|row| row.iter().flat_map(|&v| [v, v]));
-    rows.flat_map(|row| row.clone().chain(row)).collect()
+    let mut out = Vec::with_capacity(4 * images.len());
+    for row in images.chunks_exact(side) {
+        let start = out.len();
+        out.extend(row.iter().flat_map(|&v| [v, v]));
+        out.extend_from_within(start..);
+    }
+    out
 }
 
 #[cfg(test)]

@@ -7,6 +7,8 @@
 //! input with the same functions
 //! (`train::examples::tests::training_and_inference_build_the_same_input`).
 
+use std::iter::repeat_n;
+
 use thiserror::Error;
 
 use crate::device::Device;
@@ -107,12 +109,18 @@ pub(crate) fn push_zones(
     planes: &mut Vec<f32>,
 ) {
     let pixels = SIDE / side;
-    let zone_of = |pixel: usize| pixel / SIDE / pixels * side + pixel % SIDE / pixels;
     let zones: Vec<(f32, f32)> = (0..side * side)
         .map(|zone| zone_m(zone).map_or((0.0, 0.0), |m| ((m / DEPTH_SCALE_M).min(1.0), 1.0)))
         .collect();
-    planes.extend((0..SIDE * SIDE).map(|pixel| zones[zone_of(pixel)].0));
-    planes.extend((0..SIDE * SIDE).map(|pixel| zones[zone_of(pixel)].1));
+    let mut push = |value: fn(&(f32, f32)) -> f32| {
+        for zones in zones.chunks_exact(side) {
+            let row = zones.iter().flat_map(|zone| repeat_n(value(zone), pixels));
+            let row: Vec<f32> = row.collect();
+            (0..pixels).for_each(|_| planes.extend_from_slice(&row));
+        }
+    };
+    push(|zone| zone.0);
+    push(|zone| zone.1);
 }
 
 /// FSRCNN with depth as its second input.

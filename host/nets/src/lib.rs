@@ -37,6 +37,7 @@ pub mod prior;
 mod random;
 pub mod reading;
 mod schema;
+mod separable;
 mod spread;
 #[cfg(feature = "train")]
 pub mod train;

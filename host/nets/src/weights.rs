@@ -323,13 +323,13 @@ impl Weights {
     /// SHA-256 of the tensors' names, shapes and numbers, in hexadecimal: the same for the same
     /// network, in whatever precision and order a file has it.
     pub fn fingerprint(&self) -> String {
-        let mut bytes = Vec::new();
+        let mut hash = Sha256::new();
         for (name, array) in &self.tensors {
-            bytes.extend(name.as_bytes());
-            bytes.extend(array.shape.iter().flat_map(|&length| (length as u64).to_le_bytes()));
-            bytes.extend(array.bytes(Precision::Single));
+            hash.update(name);
+            array.shape.iter().for_each(|&length| hash.update((length as u64).to_le_bytes()));
+            hash.update(array.bytes(Precision::Single));
         }
-        checksum(&bytes)
+        hexadecimal(&hash.finalize())
     }
 
     /// A text of the metadata.
@@ -510,7 +510,11 @@ fn numbers(view: &TensorView<'_>) -> Option<Vec<f32>> {
 }
 
 fn checksum(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().fold(String::new(), |mut text, byte| {
+    hexadecimal(&Sha256::digest(bytes))
+}
+
+fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().fold(String::new(), |mut text, byte| {
         // Writing to a string cannot fail.
         let _ = write!(text, "{byte:02x}");
         text

@@ -11,7 +11,7 @@
 //! For every lambda the solution agrees with that of the whole equation to within the tolerance
 //! (`tests::every_shift_is_solved_in_one_space`).
 
-use super::norm;
+use super::{norm, sum};
 
 /// Largest number of products with the matrix. The equation is well conditioned for the lambdas
 /// that matter.
@@ -37,10 +37,10 @@ pub(super) struct Krylov {
 
 impl Krylov {
     /// The space of `right`, which must not be 0.
-    pub(super) fn new(right: &[f32]) -> Self {
-        let length = f64::from(norm(right));
-        let first = right.iter().map(|v| (f64::from(*v) / length) as f32).collect();
-        Self { length, basis: vec![first], diagonal: Vec::new(), beside: Vec::new() }
+    pub(super) fn new(mut right: Vec<f32>) -> Self {
+        let length = f64::from(norm(&right));
+        right.iter_mut().for_each(|v| *v = (f64::from(*v) / length) as f32);
+        Self { length, basis: vec![right], diagonal: Vec::new(), beside: Vec::new() }
     }
 
     /// Does one step; `apply` multiplies by the matrix.
@@ -124,7 +124,7 @@ fn take_away(values: &mut [f32], factor: f64, other: &[f32]) {
 }
 
 fn dot(a: &[f32], b: &[f32]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| f64::from(a * b)).sum()
+    sum(a, b, |a, b| f64::from(a * b))
 }
 
 #[cfg(test)]
@@ -150,7 +150,7 @@ mod tests {
     #[test]
     fn every_shift_is_solved_in_one_space() {
         let right: Vec<f32> = (0..64).map(|i| (i as f32 * 1.3).cos()).collect();
-        let mut krylov = Krylov::new(&right);
+        let mut krylov = Krylov::new(right.clone());
         while !(krylov.is_due() && krylov.is_enough(0.01)) {
             krylov.step(multiply);
         }

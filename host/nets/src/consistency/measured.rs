@@ -2,7 +2,8 @@
 
 use super::SIDE;
 use crate::cosine::Cosine;
-use std::sync::Arc;
+use crate::separable::Separable;
+use std::sync::{Arc, LazyLock};
 use thiserror::Error;
 
 /// The measured rows of the natural-order Hadamard matrix.
@@ -102,29 +103,29 @@ impl SampledRows {
         self.count
     }
 
-    /// Removes the unmeasured part from readings given by their cosine transform.
-    pub(super) fn keep_measured(&self, cosine: &Cosine<f32>, spectrum: &mut [f32]) {
-        let mut readings = cosine.inverse(spectrum);
-        walsh_hadamard(&mut readings);
-        let scale = 1.0 / readings.len() as f32;
-        for (value, &measured) in readings.iter_mut().zip(&*self.measured) {
-            *value *= if measured { scale } else { 0.0 };
+    /// The measured part of readings; both are given by their cosine transform.
+    pub(super) fn measured_part(&self, spectrum: &[f32]) -> Vec<f32> {
+        let walsh = if self.side == SIDE { &*OF_IMAGE } else { &*OF_READINGS };
+        let mut coefficients = walsh.forward(spectrum);
+        for (value, &measured) in coefficients.iter_mut().zip(&*self.measured) {
+            *value *= if measured { 1.0 } else { 0.0 };
         }
-        walsh_hadamard(&mut readings);
-        spectrum.copy_from_slice(&cosine.forward(&readings));
+        walsh.adjoint(&coefficients)
     }
 }
 
-/// The Walsh-Hadamard transform in place, in natural order, unnormalised.
-fn walsh_hadamard(values: &mut [f32]) {
-    let mut half = 1;
-    while half < values.len() {
-        for pair in values.chunks_exact_mut(2 * half) {
-            let (low, high) = pair.split_at_mut(half);
-            for (a, b) in low.iter_mut().zip(high) {
-                (*a, *b) = (*a + *b, *a - *b);
-            }
-        }
-        half *= 2;
-    }
+/// From the cosine transform of readings to their orthonormal Walsh-Hadamard transform in natural
+/// order, for readings of either side.
+static OF_IMAGE: LazyLock<Separable> = LazyLock::new(|| walsh_of_cosines(SIDE));
+static OF_READINGS: LazyLock<Separable> = LazyLock::new(|| walsh_of_cosines(SIDE / 2));
+
+fn walsh_of_cosines(side: usize) -> Separable {
+    let cosine = Cosine::<f64>::new(side, side);
+    let element = |row: usize, k: usize| {
+        let sign = |x: usize| if (row & x).count_ones() % 2 == 0 { 1.0 } else { -1.0 };
+        let terms = cosine.wave(k).iter().enumerate().map(|(x, value)| sign(x) * value);
+        (terms.sum::<f64>() / (side as f64).sqrt()) as f32
+    };
+    let elements = (0..side * side).map(|i| element(i / side, i % side));
+    Separable::new(elements.collect(), side)
 }

@@ -55,7 +55,7 @@ fn the_model_in_cosine_space_is_blur_and_pair_means() {
     let image = numbers(SIDE * SIDE, 1);
     for (side, sigma_px) in [(32, 1.0), (32, 3.5), (64, 2.0)] {
         let model = Consistency::new(side, sigma_px, 0.01);
-        let seen = model.readings.inverse(&model.apply(&model.image.forward(&image)));
+        let seen = model.readings.inverse(&model.camera.forward(&image));
         let error = apart(&seen, &blurred(&image, sigma_px, side)) / side as f32;
         assert!(error < 1e-4, "{side} {sigma_px}: {error}");
     }
@@ -66,9 +66,8 @@ fn the_adjoint_is_the_adjoint() {
     let model = Consistency::new(32, 1.5, 0.01);
     let (image, dual) = (numbers(SIDE * SIDE, 2), numbers(32 * 32, 3));
     let dot = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| f64::from(a * b)).sum::<f64>();
-    let mut back = vec![0.0; SIDE * SIDE];
-    model.add_adjoint(&dual, &mut back);
-    let (left, right) = (dot(&model.apply(&image), &dual), dot(&image, &back));
+    let back = model.camera.adjoint(&dual);
+    let (left, right) = (dot(&model.camera.forward(&image), &dual), dot(&image, &back));
     assert!((left - right).abs() < 1e-4 * left.abs(), "{left} {right}");
 }
 
@@ -136,7 +135,7 @@ fn what_no_image_explains_is_not_amplified() {
     for rows in [MeasuredRows::All, every_other()] {
         let model = Consistency::new(32, 4.0, 0.004).of_rows(&rows).unwrap();
         let flat = vec![0.5; SIDE * SIDE];
-        let residual = norm(&model.residual(&readings, &model.image.forward(&flat)));
+        let residual = norm(&model.residual(&readings, &flat));
         let mut image = flat.clone();
         model.project(&readings, &mut image);
         let change = apart(&image, &flat);

@@ -1,10 +1,12 @@
 //! Activations between convolutions, over whole channels, written so that the compiler vectorises
 //! them.
 //!
-//! Every activation maps zero to zero, which keeps margins zero, except [`film_silu`], whose caller
-//! clears the margins.
+//! Every activation maps zero to zero, which keeps margins zero, except [`FilmSilu`], whose caller
+//! leaves the margins out.
 
-use pulp::Arch;
+use pulp::{Arch, Simd, WithSimd};
+
+use super::aligned::LINE_FLOATS;
 
 /// e^x for |x| <= 87, with a relative error below 2e-7: 2^n from the exponent's bits, the rest from
 /// the Taylor polynomial.
@@ -42,9 +44,31 @@ pub(super) fn silu_into(arch: Arch, values: &[f32], out: &mut [f32]) {
     arch.dispatch(|| values.iter().zip(out).for_each(|(x, out)| *out = silu_of(*x)));
 }
 
-/// SiLU of `gain * value + offset`: feature-wise modulation (Perez et al., FiLM, AAAI 2018).
-pub(super) fn film_silu(arch: Arch, values: &mut [f32], gain: f32, offset: f32) {
-    arch.dispatch(|| values.iter_mut().for_each(|x| *x = silu_of(*x * gain + offset)));
+/// SiLU of `gain * value + offset` of each pixel, with one gain and one offset for each of a pixel's
+/// floats: feature-wise modulation (Perez et al., FiLM, AAAI 2018).
+pub(super) struct FilmSilu<'a> {
+    /// Pixels of as many floats as there are gains, a multiple of [`LINE_FLOATS`].
+    pub pixels: &'a mut [f32],
+    pub gains: &'a [f32],
+    pub offsets: &'a [f32],
+}
+
+impl WithSimd for FilmSilu<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { pixels, gains, offsets } = self;
+        for pixel in pixels.chunks_exact_mut(gains.len()) {
+            let lines = gains.as_chunks::<LINE_FLOATS>().0.iter().zip(offsets.as_chunks().0);
+            for (x, (gain, offset)) in pixel.as_chunks_mut().0.iter_mut().zip(lines) {
+                let (x, offset): (&mut [f32; LINE_FLOATS], &[f32; LINE_FLOATS]) = (x, offset);
+                for ((x, gain), offset) in x.iter_mut().zip(gain).zip(offset) {
+                    *x = silu_of(*x * gain + offset);
+                }
+            }
+        }
+    }
 }
 
 /// Multiplies negative values by `slope`: PReLU; with slope 0, ReLU.
@@ -83,9 +107,14 @@ mod tests {
         let mut y = x;
         prelu(arch, &mut y, 0.25);
         assert_eq!(y, [-0.75, -0.125, 0.0, 0.7, 40.0]);
-        let mut y = x;
-        film_silu(arch, &mut y, 2.0, -1.0);
-        assert!((y[3] - 0.4 / (1.0 + (-0.4_f32).exp())).abs() < 1e-6);
+        let mut pixels = [0.7; 2 * LINE_FLOATS];
+        let (mut gains, mut offsets) = ([2.0; LINE_FLOATS], [-1.0; LINE_FLOATS]);
+        (gains[9], offsets[9]) = (0.0, 0.0);
+        arch.dispatch(FilmSilu { pixels: &mut pixels, gains: &gains, offsets: &offsets });
+        for (at, y) in pixels.iter().enumerate() {
+            let x: f32 = if at % LINE_FLOATS == 9 { 0.0 } else { 0.4 };
+            assert!((y - x / (1.0 + (-x).exp())).abs() < 1e-6, "{at}: {y}");
+        }
         assert!((softplus(0.0) - 2.0_f32.ln()).abs() < 1e-6);
         assert_eq!(softplus(100.0), 100.0);
     }

@@ -3,8 +3,7 @@
 
 use pulp::Arch;
 
-use super::conv::Conv;
-use super::layers::{Linear, conv, means, relu, single};
+use super::layers::{Linear, Rectified, means, single};
 use crate::schema;
 use crate::weights::{Weights, WeightsError};
 
@@ -15,7 +14,7 @@ const STRIDES: [usize; 6] = [2, 1, 2, 1, 2, 1];
 #[derive(Debug, Clone)]
 pub struct Classifier {
     arch: Arch,
-    convs: Vec<Conv>,
+    convs: Vec<Rectified>,
     fc: Linear,
 }
 
@@ -26,7 +25,8 @@ impl Classifier {
     /// [`WeightsError`] if a tensor is missing, of another shape, not finite, or unknown.
     pub fn new(weights: &Weights) -> Result<Self, WeightsError> {
         schema::classifier(weights)?;
-        let convs = (1..=STRIDES.len()).map(|i| conv(weights, &format!("conv{i}")));
+        let convs = (1..).zip(STRIDES);
+        let convs = convs.map(|(i, stride)| Rectified::new(weights, &format!("conv{i}"), stride));
         Ok(Self {
             arch: Arch::new(),
             convs: convs.collect::<Result<_, _>>()?,
@@ -36,17 +36,14 @@ impl Classifier {
 
     /// Number of features of an image.
     pub fn feature_count(&self) -> usize {
-        self.convs.last().map_or(0, Conv::outputs)
+        self.fc.inputs()
     }
 
     /// Features of an image of `height` x `width` pixels in [0, 1].
     pub fn features(&self, image: &[f32], (height, width): (usize, usize)) -> Vec<f32> {
         let mut h = single(image, (height, width));
-        for (conv, stride) in self.convs.iter().zip(STRIDES) {
-            let full = conv.apply(self.arch, &h);
-            // Pixels that a stride of 2 skips are computed and dropped, because that is cheap.
-            h = if stride == 1 { full } else { full.every_second() };
-            relu(self.arch, &mut h);
+        for conv in &self.convs {
+            h = conv.apply(self.arch, &h);
         }
         means(&h)
     }

@@ -1,4 +1,5 @@
-//! Convolution of [`Planes`], nearly all of the computation of these networks.
+//! Convolution of [`Planes`] by any kernel: all of FSRCNN. The UNets' convolutions are in
+//! [`winograd`](super::winograd).
 //!
 //! A tap is an offset into a channel (the margins supply zeros at the edges), so a convolution is a
 //! sum over channels and taps of a shifted run of floats times a weight. Four output channels by
@@ -21,7 +22,7 @@ const BLOCK: usize = 4;
 const VECTORS: usize = 3;
 
 /// Number of multiplications from which another thread is used.
-const THREAD_WORK: usize = 2_000_000;
+pub(super) const THREAD_WORK: usize = 2_000_000;
 
 /// Weights of a convolution with stride 1 that keeps the size of its input, in the order of the
 /// loop.

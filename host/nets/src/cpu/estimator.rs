@@ -3,8 +3,7 @@
 use pulp::Arch;
 
 use super::activation::softplus;
-use super::conv::Conv;
-use super::layers::{Linear, conv, means, relu, single};
+use super::layers::{Linear, Rectified, means, single};
 use crate::schema;
 use crate::weights::{Weights, WeightsError};
 
@@ -14,11 +13,14 @@ pub(crate) const LOG_FLOOR: f32 = 1e-3;
 /// Constant added to the logarithm, to centre it.
 pub(crate) const LOG_OFFSET: f32 = 3.0;
 
+/// Strides of the convolutions.
+const STRIDES: [usize; 4] = [1, 2, 2, 2];
+
 /// The network, with weights in the order of the loops.
 #[derive(Debug, Clone)]
 pub struct Estimator {
     arch: Arch,
-    convs: Vec<Conv>,
+    convs: Vec<Rectified>,
     fc1: Linear,
     fc2: Linear,
 }
@@ -30,9 +32,11 @@ impl Estimator {
     /// [`WeightsError`] if a tensor is missing, of another shape, not finite, or unknown.
     pub fn new(weights: &Weights) -> Result<Self, WeightsError> {
         schema::estimator(weights)?;
+        let convs = (1..).zip(STRIDES);
+        let convs = convs.map(|(i, stride)| Rectified::new(weights, &format!("conv{i}"), stride));
         Ok(Self {
             arch: Arch::new(),
-            convs: (1..=4).map(|i| conv(weights, &format!("conv{i}"))).collect::<Result<_, _>>()?,
+            convs: convs.collect::<Result<_, _>>()?,
             fc1: Linear::new(weights, "fc1")?,
             fc2: Linear::new(weights, "fc2")?,
         })
@@ -41,12 +45,8 @@ impl Estimator {
     /// The network's two outputs for an image of `height` x `width` pixels.
     pub fn forward(&self, image: &[f32], (height, width): (usize, usize)) -> [f32; 2] {
         let mut h = single(image, (height, width));
-        for (index, conv) in self.convs.iter().enumerate() {
-            let full = conv.apply(self.arch, &h);
-            // All convolutions except the first have stride 2; the skipped pixels are computed and
-            // dropped, because that is cheap.
-            h = if index == 0 { full } else { full.every_second() };
-            relu(self.arch, &mut h);
+        for conv in &self.convs {
+            h = conv.apply(self.arch, &h);
         }
         let features: Vec<f32> =
             means(&h).into_iter().map(|mean| (mean + LOG_FLOOR).ln() + LOG_OFFSET).collect();

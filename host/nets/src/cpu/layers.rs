@@ -3,7 +3,10 @@
 use pulp::Arch;
 
 use super::conv::Conv;
+use super::pixels::Pixels;
 use super::planes::Planes;
+use super::pointwise::Pointwise;
+use super::winograd::Winograd;
 use crate::filter::Filter;
 use crate::weights::{Weights, WeightsError};
 
@@ -18,14 +21,9 @@ pub(super) fn keeping(filter: &Filter) -> Conv {
     Conv::new(sizes, |o, i, ky, kx| filter.at(o, i, ky, kx), |o| filter.bias[o])
 }
 
-/// A 2 x 2 convolution with stride 2, as a 1 x 1 convolution over [`Planes::blocks`].
-pub(super) fn conv_blocks(weights: &Weights, name: &str) -> Result<Conv, WeightsError> {
-    let (key, bias) = (format!("{name}.weight"), format!("{name}.bias"));
-    let [outputs, inputs, _, _] = weights.shape(&key)?;
-    let kernels = weights.tensor(&key, &[outputs, inputs, 2, 2])?;
-    let bias = weights.tensor(&bias, &[outputs])?;
-    let at = |o: usize, i: usize, _: usize, _: usize| kernels.values[o * 4 * inputs + i];
-    Ok(Conv::new((outputs, 4 * inputs, 1, 0), at, |o| bias.values[o]))
+/// A convolution of 3 x 3 on [`Pixels`].
+pub(super) fn winograd(weights: &Weights, name: &str) -> Result<Winograd, WeightsError> {
+    Ok(Winograd::new(&Filter::convolution(weights, name)?))
 }
 
 /// A fully connected layer.
@@ -43,32 +41,66 @@ impl Linear {
         Ok(Self { rows, bias })
     }
 
+    /// Number of inputs.
+    pub fn inputs(&self) -> usize {
+        self.rows.first().map_or(0, Vec::len)
+    }
+
     pub fn apply(&self, input: &[f32]) -> Vec<f32> {
         let dot = |row: &[f32]| row.iter().zip(input).map(|(w, x)| w * x).sum::<f32>();
         self.rows.iter().zip(&self.bias).map(|(row, bias)| bias + dot(row)).collect()
     }
 }
 
-/// The mean of each channel.
-pub(super) fn means(planes: &Planes) -> Vec<f32> {
-    let (height, width) = planes.size();
-    let pixels = (height * width) as f32;
-    // Margins and slack are zero, so they add nothing.
-    planes.values().chunks_exact(planes.stride()).map(|c| c.iter().sum::<f32>() / pixels).collect()
+/// A convolution of 3 x 3 on [`Pixels`], with a ReLU after it.
+#[derive(Debug, Clone)]
+pub(super) enum Rectified {
+    /// With stride 1.
+    Same(Winograd),
+    /// With stride 2.
+    Halving(Pointwise),
 }
 
-/// One image as the input of a network whose convolutions reach one pixel.
-pub(super) fn single(image: &[f32], (height, width): (usize, usize)) -> Planes {
-    let mut planes = Planes::new(1, height, width, 1);
-    for (row, line) in image.chunks_exact(width).enumerate() {
-        planes.row_mut(0, row).copy_from_slice(line);
+impl Rectified {
+    pub fn new(weights: &Weights, name: &str, stride: usize) -> Result<Self, WeightsError> {
+        Ok(match stride {
+            1 => Self::Same(winograd(weights, name)?),
+            _ => Self::Halving(Pointwise::reducing(weights, name)?),
+        })
     }
-    planes
+
+    pub fn apply(&self, arch: Arch, input: &Pixels) -> Pixels {
+        let mut out;
+        match self {
+            Self::Same(conv) => {
+                out = input.like(conv.outputs());
+                conv.add_to(arch, input, &mut out);
+            }
+            Self::Halving(conv) => {
+                out = conv.output(input);
+                conv.add_to(arch, input, &mut out);
+            }
+        }
+        super::activation::prelu(arch, out.values_mut(), 0.0);
+        out
+    }
 }
 
-/// ReLU.
-pub(super) fn relu(arch: Arch, planes: &mut Planes) {
-    super::activation::prelu(arch, planes.values_mut(), 0.0);
+/// The mean of each channel.
+pub(super) fn means(pixels: &Pixels) -> Vec<f32> {
+    let (height, width) = pixels.size();
+    pixels.sums().into_iter().map(|sum| sum / (height * width) as f32).collect()
+}
+
+/// One image as the input of a network.
+pub(super) fn single(image: &[f32], (height, width): (usize, usize)) -> Pixels {
+    let mut pixels = Pixels::new(1, height, width);
+    let pitch = pixels.pitch();
+    for (row, line) in image.chunks_exact(width).enumerate() {
+        let to = pixels.row_mut(row).chunks_exact_mut(pitch);
+        to.zip(line).for_each(|(pixel, value)| pixel[0] = *value);
+    }
+    pixels
 }
 
 /// Slope of each channel's PReLU, by the layer's name.

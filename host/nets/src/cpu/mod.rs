@@ -9,14 +9,19 @@
 //! (`enhance::tests::an_image_is_enhanced_alike_alone_and_among_others`).
 
 mod activation;
+mod aligned;
 mod classifier;
 mod conv;
 pub(crate) mod estimator;
 mod fsrcnn;
 mod layers;
+mod pixels;
 mod planes;
+mod pointwise;
 mod prior;
+mod product;
 mod unet;
+mod winograd;
 
 pub use classifier::Classifier;
 pub use estimator::Estimator;

@@ -104,30 +104,8 @@ impl Planes {
         rows.flat_map(|(channel, row)| self.row(channel, row)).copied().collect()
     }
 
-    /// Adds `other`, pixel by pixel.
-    pub fn add(&mut self, other: &Self) {
-        debug_assert_eq!(self.values.len(), other.values.len());
-        for (value, other) in self.values.iter_mut().zip(&other.values) {
-            *value += other;
-        }
-    }
-
-    /// Stores an image of `2 height` x `2 width` in four channels: pixel (2r + dy, 2c + dx) goes to
-    /// (r, c) of channel `channel + 2 dy + dx`.
-    pub fn unshuffle(&mut self, channel: usize, image: &[f32]) {
-        let (height, width) = self.size();
-        for row in 0..2 * height {
-            let line = &image[row * 2 * width..][..2 * width];
-            for dx in 0..2 {
-                let out = self.row_mut(channel + 2 * (row % 2) + dx, row / 2);
-                for (value, pixel) in out.iter_mut().zip(line[dx..].iter().step_by(2)) {
-                    *value = *pixel;
-                }
-            }
-        }
-    }
-
-    /// The inverse: four channels become one of twice the size, with margin `margin`.
+    /// Each four channels become one of twice the size, with margin `margin`: channel
+    /// `4 c + 2 dy + dx` of pixel (row, column) becomes pixel (2 row + dy, 2 column + dx) of channel c.
     pub fn shuffle(&self, margin: usize) -> Self {
         let (height, width) = self.size();
         let mut out = Self::new(self.channels / 4, 2 * height, 2 * width, margin);
@@ -137,42 +115,6 @@ impl Planes {
                 let line = out.row_mut(channel / 4, 2 * row + dy);
                 for (value, pixel) in line[dx..].iter_mut().step_by(2).zip(self.row(channel, row)) {
                     *value = *pixel;
-                }
-            }
-        }
-        out
-    }
-
-    /// Every second pixel of every second row, beginning with the first.
-    pub fn every_second(&self) -> Self {
-        let (height, width) = (self.height.div_ceil(2), self.width.div_ceil(2));
-        let mut out = Self::new(self.channels, height, width, self.margin);
-        for channel in 0..self.channels {
-            for row in 0..height {
-                let line = self.row(channel, 2 * row);
-                for (value, pixel) in
-                    out.row_mut(channel, row).iter_mut().zip(line.iter().step_by(2))
-                {
-                    *value = *pixel;
-                }
-            }
-        }
-        out
-    }
-
-    /// Each block of 2 x 2 pixels as four channels, `4 channel + 2 dy + dx`: the input of a 2 x 2
-    /// convolution with stride 2.
-    pub fn blocks(&self) -> Self {
-        let (height, width) = (self.height / 2, self.width / 2);
-        let mut out = Self::new(4 * self.channels, height, width, self.margin);
-        for channel in 0..self.channels {
-            for row in 0..2 * height {
-                let line = self.row(channel, row);
-                for dx in 0..2 {
-                    let to = out.row_mut(4 * channel + 2 * (row % 2) + dx, row / 2);
-                    for (value, pixel) in to.iter_mut().zip(line[dx..].iter().step_by(2)) {
-                        *value = *pixel;
-                    }
                 }
             }
         }

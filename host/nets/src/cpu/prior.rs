@@ -5,19 +5,19 @@ use nirspi_recon::reconstruct::prior::Seen;
 use pulp::Arch;
 
 use super::activation::silu;
-use super::conv::Conv;
-use super::layers::{Linear, conv};
-use super::planes::Planes;
+use super::layers::{Linear, winograd};
+use super::pixels::Pixels;
 use super::unet::Block;
+use super::winograd::Winograd;
 use crate::schema::{self, GRID_BITS, PriorSizes};
 use crate::weights::{Weights, WeightsError};
 
 /// Blocks between two steps towards the measurements.
 #[derive(Debug, Clone)]
 struct Stage {
-    input: Conv,
+    input: Winograd,
     blocks: Vec<Block>,
-    output: Conv,
+    output: Winograd,
     /// How far the step goes: a level, and its slope over the fineness of the patterns.
     step: Linear,
 }
@@ -40,11 +40,11 @@ impl Prior {
         let PriorSizes { stages, blocks, .. } = schema::prior(weights)?;
         let stage = |stage: usize| {
             Ok(Stage {
-                input: conv(weights, &format!("input_conv.{stage}"))?,
+                input: winograd(weights, &format!("input_conv.{stage}"))?,
                 blocks: (0..blocks)
                     .map(|block| Block::new(weights, &format!("blocks.{stage}.{block}")))
                     .collect::<Result<_, WeightsError>>()?,
-                output: conv(weights, &format!("output_conv.{stage}"))?,
+                output: winograd(weights, &format!("output_conv.{stage}"))?,
                 step: Linear::new(weights, &format!("weight.{stage}"))?,
             })
         };
@@ -66,25 +66,24 @@ impl Prior {
         silu(arch, &mut embedding);
         let zero_filled = seen.image(seen.values());
         let mut coefficients = seen.start().to_vec();
-        let mut features: Option<Planes> = None;
+        let mut features: Option<Pixels> = None;
         for stage in &self.stages {
             let mut image = seen.image(&coefficients);
             let grid_bits = if features.is_none() { 2 * GRID_BITS } else { 0 };
-            let mut input = Planes::new(8 + grid_bits, n / 2, n / 2, 1);
+            let mut input = Pixels::new(8 + grid_bits, n / 2, n / 2);
             input.unshuffle(0, &image);
             input.unshuffle(4, &zero_filled);
             if features.is_none() {
                 add_grid(&mut input);
             }
-            let mut h = stage.input.apply(arch, &input);
-            if let Some(before) = &features {
-                h.add(before);
-            }
+            let mut h = features.take().unwrap_or_else(|| input.like(stage.input.outputs()));
+            stage.input.add_to(arch, &input, &mut h);
             for block in &stage.blocks {
                 block.add_to(arch, &mut h, &embedding);
             }
-            let change = stage.output.apply(arch, &h).shuffle(0).pixels();
-            image.iter_mut().zip(change).for_each(|(pixel, change)| *pixel += change);
+            let mut change = h.like(stage.output.outputs());
+            stage.output.add_to(arch, &h, &mut change);
+            image.iter_mut().zip(change.shuffled()).for_each(|(pixel, change)| *pixel += change);
             // The orthonormal transform is its own inverse.
             coefficients = seen.image(&image);
             step(&mut coefficients, seen, &stage.step.apply(&embedding));
@@ -96,15 +95,14 @@ impl Prior {
 
 /// Stores where each pixel is in the blocks of the Walsh functions: bits of its row, then of its
 /// column, as -1 and 1.
-fn add_grid(input: &mut Planes) {
-    let (height, width) = input.size();
+fn add_grid(input: &mut Pixels) {
+    let ((height, _), pitch) = (input.size(), input.pitch());
     let sign = |index: usize, bit: usize| if index >> bit & 1 == 1 { 1.0 } else { -1.0 };
-    for bit in 0..GRID_BITS {
-        for row in 0..height {
-            input.row_mut(8 + bit, row).fill(sign(row, bit));
-            let line = &mut input.row_mut(8 + GRID_BITS + bit, row)[..width];
-            for (column, pixel) in line.iter_mut().enumerate() {
-                *pixel = sign(column, bit);
+    for row in 0..height {
+        for (column, pixel) in input.row_mut(row).chunks_exact_mut(pitch).enumerate() {
+            for bit in 0..GRID_BITS {
+                pixel[8 + bit] = sign(row, bit);
+                pixel[8 + GRID_BITS + bit] = sign(column, bit);
             }
         }
     }

@@ -5,9 +5,13 @@ use proptest::prelude::*;
 use pulp::Arch;
 
 use super::conv::Conv;
+use super::pixels::Pixels;
 use super::planes::Planes;
+use super::pointwise::Pointwise;
+use super::winograd::Winograd;
 use super::*;
-use crate::weights::Weights;
+use crate::filter::Filter;
+use crate::weights::{Array, Weights};
 
 fn weights(bytes: &[u8]) -> Weights {
     Weights::parse("fixture", bytes).unwrap()
@@ -126,6 +130,18 @@ fn number(seed: &mut u64) -> f32 {
     (*seed >> 40) as f32 / (1 << 23) as f32 - 1.0
 }
 
+/// Pixels of reproducible numbers.
+fn random_pixels((channels, height, width): (usize, usize, usize), seed: &mut u64) -> Pixels {
+    let mut pixels = Pixels::new(channels, height, width);
+    let pitch = pixels.pitch();
+    for row in 0..height {
+        for pixel in pixels.row_mut(row).chunks_exact_mut(pitch) {
+            pixel[..channels].iter_mut().for_each(|x| *x = number(seed));
+        }
+    }
+    pixels
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
 
@@ -171,12 +187,133 @@ proptest! {
         prop_assert!((inside - all).abs() < 1e-9 * (1.0 + all), "margins hold {}", all - inside);
     }
 
+    /// Every image size, odd ones too, and every number of channels gives the result of the
+    /// definition, added to what is there, on every vector width; margins and padding stay zero.
+    #[test]
+    fn winograds_convolution_is_the_sum_over_channels_and_taps(
+        (inputs, outputs, height, width) in (1_usize..20, 1_usize..70, 1_usize..14, 1_usize..40),
+        mut seed in any::<u64>(),
+    ) {
+        let input = random_pixels((inputs, height, width), &mut seed);
+        let filter = Filter {
+            inputs,
+            outputs,
+            side: 3,
+            weights: (0..outputs * inputs * 9).map(|_| number(&mut seed)).collect(),
+            bias: (0..outputs).map(|_| number(&mut seed)).collect(),
+        };
+        let before = random_pixels((outputs, height, width), &mut seed);
+        let conv = Winograd::new(&filter);
+        for arch in [Arch::new(), Arch::Scalar] {
+            let mut out = before.like(outputs);
+            out.values_mut().copy_from_slice(before.values());
+            conv.add_to(arch, &input, &mut out);
+            let mut inside = 0.0;
+            for (row, column) in (0..height).flat_map(|r| (0..width).map(move |c| (r, c))) {
+                let at = |of: &Pixels| of.row(row)[column * of.pitch()..][..outputs].to_vec();
+                for (o, (found, start)) in at(&out).into_iter().zip(at(&before)).enumerate() {
+                    let mut sum = f64::from(start) + f64::from(filter.bias[o]);
+                    for (ky, kx) in (0..3).flat_map(|ky| (0..3).map(move |kx| (ky, kx))) {
+                        let (y, x) = ((row + ky).wrapping_sub(1), (column + kx).wrapping_sub(1));
+                        if y < height && x < width {
+                            let pixel = &input.row(y)[x * input.pitch()..][..inputs];
+                            sum += pixel.iter().enumerate().map(|(i, value)| {
+                                f64::from(filter.at(o, i, ky, kx)) * f64::from(*value)
+                            }).sum::<f64>();
+                        }
+                    }
+                    prop_assert!((f64::from(found) - sum).abs() < 2e-5, "{found}, expected {sum}");
+                    inside += f64::from(found).abs();
+                }
+            }
+            let all: f64 = out.values().iter().map(|&x| f64::from(x).abs()).sum();
+            prop_assert!((inside - all).abs() < 1e-9 * (1.0 + all), "margins hold {}", all - inside);
+        }
+    }
+
+    /// Convolutions to half the size and to twice the size give the result of their definitions,
+    /// added to what is there.
+    #[test]
+    fn windows_are_reduced_and_pixels_expanded_as_defined(
+        (inputs, outputs, height, width) in (1_usize..20, 1_usize..20, 1_usize..12, 1_usize..24),
+        side in 2_usize..4,
+        mut seed in any::<u64>(),
+    ) {
+        // Only a kernel of 3 x 3 has a margin, which an odd side needs.
+        let even = |pixels: usize| if side == 2 { 2 * pixels } else { pixels };
+        let (height, width) = (even(height), even(width));
+        let mut weights = Weights::new("levels");
+        let mut insert = |name: &str, shape: &[usize]| -> Vec<f32> {
+            let values: Vec<f32> =
+                (0..shape.iter().product()).map(|_| number(&mut seed)).collect();
+            let array = Array { shape: shape.to_vec(), values: values.clone() };
+            weights.insert(name.to_owned(), array);
+            values
+        };
+        let reduce = insert("reduce.weight", &[outputs, inputs, side, side]);
+        let reduce_bias = insert("reduce.bias", &[outputs]);
+        let expand = insert("expand.weight", &[4 * outputs, inputs, 1, 1]);
+        let expand_bias = insert("expand.bias", &[4 * outputs]);
+        let input = random_pixels((inputs, height, width), &mut seed);
+        let value = |of: &Pixels, row: usize, column: usize, channel: usize| {
+            f64::from(of.row(row)[column * of.pitch() + channel])
+        };
+        let arch = Arch::new();
+        let conv = Pointwise::reducing(&weights, "reduce").unwrap();
+        let mut reduced = conv.output(&input);
+        reduced.row_mut(0)[0] = 1.0;
+        conv.add_to(arch, &input, &mut reduced);
+        prop_assert_eq!(reduced.size(), (height.div_ceil(2), width.div_ceil(2)));
+        let conv = Pointwise::expanding(&weights, "expand").unwrap();
+        let mut expanded = conv.output(&input);
+        expanded.row_mut(0)[0] = 1.0;
+        conv.add_to(arch, &input, &mut expanded);
+        prop_assert_eq!(expanded.size(), (2 * height, 2 * width));
+        for (y, x) in (0..2 * height).flat_map(|y| (0..2 * width).map(move |x| (y, x))) {
+            for o in 0..outputs {
+                let row = 4 * o + y % 2 * 2 + x % 2;
+                let sum = (0..inputs).map(|i| {
+                    f64::from(expand[row * inputs + i]) * value(&input, y / 2, x / 2, i)
+                });
+                let there = if (y, x, o) == (0, 0, 0) { 1.0 } else { 0.0 };
+                let sum = sum.sum::<f64>() + f64::from(expand_bias[row]) + there;
+                prop_assert!((value(&expanded, y, x, o) - sum).abs() < 1e-5);
+            }
+        }
+        let (rows, columns) = reduced.size();
+        for (row, column) in (0..rows).flat_map(|r| (0..columns).map(move |c| (r, c))) {
+            for o in 0..outputs {
+                let mut sum = f64::from(reduce_bias[o]);
+                for (dy, dx) in (0..side).flat_map(|dy| (0..side).map(move |dx| (dy, dx))) {
+                    let (y, x) = (2 * row + dy + 2, 2 * column + dx + 2);
+                    let (y, x) = (y.wrapping_sub(side), x.wrapping_sub(side));
+                    if y < height && x < width {
+                        sum += (0..inputs).map(|i| {
+                            let weight = reduce[((o * inputs + i) * side + dy) * side + dx];
+                            f64::from(weight) * value(&input, y, x, i)
+                        }).sum::<f64>();
+                    }
+                }
+                let there = if (row, column, o) == (0, 0, 0) { 1.0 } else { 0.0 };
+                prop_assert!((value(&reduced, row, column, o) - sum - there).abs() < 2e-5);
+            }
+        }
+    }
+
     /// Shuffling an unshuffled image gives the image.
     #[test]
     fn a_shuffle_undoes_an_unshuffle((height, width) in (1_usize..9, 1_usize..9), mut seed in any::<u64>()) {
         let image: Vec<f32> = (0..4 * height * width).map(|_| number(&mut seed)).collect();
+        let mut pixels = Pixels::new(4, height, width);
+        pixels.unshuffle(0, &image);
+        prop_assert_eq!(pixels.shuffled(), &image[..]);
         let mut planes = Planes::new(4, height, width, 1);
-        planes.unshuffle(0, &image);
+        for (row, column) in (0..height).flat_map(|r| (0..width).map(move |c| (r, c))) {
+            for channel in 0..4 {
+                planes.row_mut(channel, row)[column] =
+                    pixels.row(row)[column * pixels.pitch() + channel];
+            }
+        }
         prop_assert_eq!(planes.shuffle(3).pixels(), image);
     }
 }

@@ -2,45 +2,51 @@
 
 use pulp::Arch;
 
-use super::activation::{film_silu, silu, silu_into};
-use super::conv::Conv;
-use super::layers::{Linear, conv, conv_blocks};
-use super::planes::Planes;
+use super::activation::{FilmSilu, silu, silu_into};
+use super::layers::{Linear, winograd};
+use super::pixels::Pixels;
+use super::pointwise::Pointwise;
+use super::winograd::Winograd;
 use crate::schema::{self, UNetSizes};
 use crate::weights::{Weights, WeightsError};
 
 /// A residual block: convolution, scale and shift by the conditions, convolution.
 #[derive(Debug, Clone)]
 pub(super) struct Block {
-    conv1: Conv,
+    conv1: Winograd,
     film: Linear,
-    conv2: Conv,
+    conv2: Winograd,
 }
 
 impl Block {
     pub fn new(weights: &Weights, name: &str) -> Result<Self, WeightsError> {
         Ok(Self {
-            conv1: conv(weights, &format!("{name}.conv1"))?,
+            conv1: winograd(weights, &format!("{name}.conv1"))?,
             film: Linear::new(weights, &format!("{name}.film"))?,
-            conv2: conv(weights, &format!("{name}.conv2"))?,
+            conv2: winograd(weights, &format!("{name}.conv2"))?,
         })
     }
 
     /// Adds the block's output to `x`.
-    pub fn add_to(&self, arch: Arch, x: &mut Planes, embedding: &[f32]) {
+    pub fn add_to(&self, arch: Arch, x: &mut Pixels, embedding: &[f32]) {
+        let mut active = x.like(x.channels());
+        for row in 0..x.size().0 {
+            silu_into(arch, x.row(row), active.row_mut(row));
+        }
         let mut h = x.like(x.channels());
-        silu_into(arch, x.values(), h.values_mut());
-        let mut h = self.conv1.apply(arch, &h);
+        self.conv1.add_to(arch, &active, &mut h);
         let film = self.film.apply(embedding);
         let (scales, shifts) = film.split_at(film.len() / 2);
-        let stride = h.stride();
-        for ((channel, scale), &shift) in
-            h.values_mut().chunks_exact_mut(stride).zip(scales).zip(shifts)
-        {
-            film_silu(arch, channel, 1.0 + scale, shift);
+        let mut gains: Vec<f32> = scales.iter().map(|scale| 1.0 + scale).collect();
+        let mut offsets = shifts.to_vec();
+        // The padding of a pixel stays zero.
+        gains.resize(h.pitch(), 0.0);
+        offsets.resize(h.pitch(), 0.0);
+        for row in 0..h.size().0 {
+            let pixels = h.row_mut(row);
+            arch.dispatch(FilmSilu { pixels, gains: &gains, offsets: &offsets });
         }
-        h.clear_margins();
-        x.add(&self.conv2.apply(arch, &h));
+        self.conv2.add_to(arch, &h, x);
     }
 }
 
@@ -50,12 +56,12 @@ pub struct UNet {
     arch: Arch,
     embed1: Linear,
     embed2: Linear,
-    input: Conv,
+    input: Winograd,
     encoder: Vec<Vec<Block>>,
-    reduce: Vec<Conv>,
-    expand: Vec<Conv>,
+    reduce: Vec<Pointwise>,
+    expand: Vec<Pointwise>,
     decoder: Vec<Vec<Block>>,
-    output: Conv,
+    output: Winograd,
 }
 
 impl UNet {
@@ -74,16 +80,16 @@ impl UNet {
             arch: Arch::new(),
             embed1: Linear::new(weights, "embed1")?,
             embed2: Linear::new(weights, "embed2")?,
-            input: conv(weights, "input_conv")?,
+            input: winograd(weights, "input_conv")?,
             encoder: (0..levels).map(|level| blocks("encoder", level)).collect::<Result<_, _>>()?,
             reduce: below()
-                .map(|i| conv_blocks(weights, &format!("reduce.{i}")))
+                .map(|i| Pointwise::reducing(weights, &format!("reduce.{i}")))
                 .collect::<Result<_, _>>()?,
             expand: below()
-                .map(|i| conv(weights, &format!("expand.{i}")))
+                .map(|i| Pointwise::expanding(weights, &format!("expand.{i}")))
                 .collect::<Result<_, _>>()?,
             decoder: below().map(|level| blocks("decoder", level)).collect::<Result<_, _>>()?,
-            output: conv(weights, "output_conv")?,
+            output: winograd(weights, "output_conv")?,
         })
     }
 
@@ -101,27 +107,31 @@ impl UNet {
         silu(arch, &mut embedding);
         let mut embedding = self.embed2.apply(&embedding);
         silu(arch, &mut embedding);
-        let mut input = Planes::new(8, height / 2, width / 2, 1);
+        let mut input = Pixels::new(8, height / 2, width / 2);
         input.unshuffle(0, current);
         input.unshuffle(4, degraded);
-        let mut h = self.input.apply(arch, &input);
+        let mut h = input.like(self.input.outputs());
+        self.input.add_to(arch, &input, &mut h);
         let mut skips = Vec::with_capacity(self.reduce.len());
         for (level, blocks) in self.encoder.iter().enumerate() {
             for block in blocks {
                 block.add_to(arch, &mut h, &embedding);
             }
             if let Some(reduce) = self.reduce.get(level) {
-                let coarse = reduce.apply(arch, &h.blocks());
+                let mut coarse = reduce.output(&h);
+                reduce.add_to(arch, &h, &mut coarse);
                 skips.push(std::mem::replace(&mut h, coarse));
             }
         }
         for ((expand, blocks), skip) in self.expand.iter().zip(&self.decoder).zip(skips).rev() {
-            h = expand.apply(arch, &h).shuffle(1);
-            h.add(&skip);
+            let coarse = std::mem::replace(&mut h, skip);
+            expand.add_to(arch, &coarse, &mut h);
             for block in blocks {
                 block.add_to(arch, &mut h, &embedding);
             }
         }
-        self.output.apply(arch, &h).shuffle(0).pixels()
+        let mut output = h.like(self.output.outputs());
+        self.output.add_to(arch, &h, &mut output);
+        output.shuffled()
     }
 }

@@ -29,7 +29,7 @@ impl<'a> DataConstraint<'a> {
         binding: bool,
     ) -> Result<Self, MeasuredRowsError> {
         let model = |e: &Estimate| Consistency::new(side, e.sigma_px, e.noise).of_rows(measured);
-        let models = estimates.iter().map(model).collect::<Result<_, _>>()?;
+        let models = estimates.par_iter().map(model).collect::<Result<_, _>>()?;
         Ok(Self { models, readings, area: side * side, binding })
     }
 
