@@ -122,7 +122,7 @@ static OF_READINGS: LazyLock<Separable> = LazyLock::new(|| walsh_of_cosines(SIDE
 fn walsh_of_cosines(side: usize) -> Separable {
     let cosine = Cosine::<f64>::new(side, side);
     let element = |row: usize, k: usize| {
-        let sign = |x: usize| if (row & x).count_ones() % 2 == 0 { 1.0 } else { -1.0 };
+        let sign = |x: usize| if (row & x).count_ones().is_multiple_of(2) { 1.0 } else { -1.0 };
         let terms = cosine.wave(k).iter().enumerate().map(|(x, value)| sign(x) * value);
         (terms.sum::<f64>() / (side as f64).sqrt()) as f32
     };

@@ -21,8 +21,11 @@ fn block(bytes: &[u8]) -> Result<Option<(Vec<f64>, bool)>, FileError> {
     Ok(Some((values, whole)))
 }
 
-/// What [`Stack::map_into`] makes of a file: the sum of each measurement, and a copy of all.
-fn mapped(bytes: &[u8]) -> Result<Option<(Vec<f64>, Vec<f64>)>, FileError> {
+/// The sum of each measurement, and a copy of all.
+type SumsAndCopy = (Vec<f64>, Vec<f64>);
+
+/// What [`Stack::map_into`] makes of a file.
+fn mapped(bytes: &[u8]) -> Result<Option<SumsAndCopy>, FileError> {
     let (_guard, path) = file("lab.npz", bytes);
     let mut several = Several::open(&path, &as_is())?;
     let mut copy = vec![7.0; 3 * several.len()];
