@@ -252,10 +252,12 @@ impl Made {
     }
 }
 
-/// How images were made: reports as JSON, each with the number of images in a row that it is of; and the rows used, of
-/// each image, or those of all if they are the same.
+/// Reports as JSON, each with the number of images in a row that it is of.
+type Reports = Vec<(String, usize)>;
+
+/// How images were made, and the rows used: of each image, or those of all if they are the same.
 struct Account {
-    reports: Vec<(String, usize)>,
+    reports: Reports,
     rows: Vec<Rows>,
 }
 
@@ -272,7 +274,7 @@ impl Account {
         Ok(Self { reports, rows })
     }
 
-    fn into_python(self, py: Python<'_>) -> (Vec<(String, usize)>, Vec<Bound<'_, PyArray1<i64>>>) {
+    fn into_python(self, py: Python<'_>) -> (Reports, Vec<Bound<'_, PyArray1<i64>>>) {
         let rows = self.rows.iter().map(|rows| array(py, numbers(rows))).collect();
         (self.reports, rows)
     }
