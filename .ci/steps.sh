@@ -319,16 +319,19 @@ step_stores() {
     (cd host/python && "$OLDPWD/target/python/bin/python" -X dev -m pytest tests/stores)
 }
 
-step_page() {
+# A script of the page's tests, on the program.
+in_browser() {
     debian chromium || echo "no chromium installed here"
     if [ -x /usr/bin/chromium ]; then
         cargo build --locked --release
         python_with browser playwright==1.65.2
-        target/browser/bin/python host/cli/tests/browser/check.py target/release/nirspi
+        target/browser/bin/python "host/cli/tests/browser/$1" target/release/nirspi
     else
-        echo "skipped: the page, no chromium"
+        echo "skipped: $1, no chromium"
     fi
 }
+
+step_page() { in_browser check.py; }
 
 # After the book, which would remove the page.
 step_web() {
@@ -449,16 +452,7 @@ step_miri() {
 # A workspace of its own, so that loom is in no other build.
 step_loom() { CARGO_TARGET_DIR=$PWD/target/loom cargo test --locked --manifest-path tests/loom/Cargo.toml --test models; }
 
-step_page_faults() {
-    debian chromium || echo "no chromium installed here"
-    if [ -x /usr/bin/chromium ]; then
-        cargo build --locked --release
-        python_with browser playwright==1.65.2
-        target/browser/bin/python host/cli/tests/browser/faults.py target/release/nirspi
-    else
-        echo "skipped: faults in the page, no chromium"
-    fi
-}
+step_page_faults() { in_browser faults.py; }
 
 step_coverage() {
     if ! rustup component add llvm-tools >&2; then

@@ -96,7 +96,6 @@ const TRAILER_BYTES: usize = 32;
 #[must_use]
 pub fn stored(region: &[u8]) -> Option<&[u8]> {
     let begins = region.starts_with(&[0xFF, 0x00]) || region.starts_with(&[0xFF, 0xFF, 0xBD, 0xB3]);
-    let end = region.iter().rposition(|&byte| byte != 0xFF)?.saturating_add(1);
-    let end = end.saturating_add(TRAILER_BYTES);
+    let end = region.iter().rposition(|&byte| byte != 0xFF)?.saturating_add(1 + TRAILER_BYTES);
     Some(region.get(..end).unwrap_or(region)).filter(|_| begins)
 }

@@ -177,7 +177,7 @@ proptest! {
             }
             let chip = bench.chip.0.borrow();
             let whole = chip.runs.is_none() || streams.iter().any(|s| chip.runs.as_ref() == Some(s));
-            prop_assert!(whole, "the chip runs what nobody sent");
+            prop_assert!(whole, "the chip runs a bitstream that the host has not sent");
             let known = bench.loader.running();
             prop_assert!(known.is_none() || known == chip.runs.as_deref().map(crc32));
         }

@@ -26,47 +26,42 @@ fn the_first_transfer_of_a_session_says_nothing_of_the_link() {
     }
 }
 
-proptest! {
-    /// Each session carries so many transfers, whose ends are those of the host, and then one that does not end.
-    #[test]
-    fn a_transfer_that_was_fetched_needs_no_other_to_tell(sessions in prop::collection::vec(0_u8..4, 1..20)) {
-        let mut patience = Patience::new();
-        let mut now = Micros(0);
-        let mut stuck_before = false;
-        for fetched in sessions {
-            patience.session_begins();
-            for _ in 0..fetched {
-                patience.begins(now);
-                patience.fetched();
-                prop_assert_eq!(patience.judge(now), None);
-            }
-            now = patience.begins(now);
-            let restart = stuck_before && fetched == 0;
-            let expected = if restart { Remedy::LeaveBus } else { Remedy::EndSession };
-            prop_assert_eq!(patience.judge(now), Some(expected));
-            stuck_before = !restart;
+/// Sessions of so many fetched transfers each, of which `more` are handed over besides, and then one that does not end.
+/// `end` tells of a transfer's end.
+fn sessions_get_their_remedies(
+    sessions: &[u8],
+    more: u8,
+    end: fn(&mut Patience),
+) -> Result<(), TestCaseError> {
+    let mut patience = Patience::new();
+    let mut now = Micros(0);
+    let mut stuck_before = false;
+    for &fetched in sessions {
+        patience.session_begins();
+        for _ in 0..fetched + more {
+            patience.begins(now);
+            end(&mut patience);
+            prop_assert_eq!(patience.judge(now), None);
         }
+        now = patience.begins(now);
+        let restart = stuck_before && fetched == 0;
+        let expected = if restart { Remedy::LeaveBus } else { Remedy::EndSession };
+        prop_assert_eq!(patience.judge(now), Some(expected));
+        stuck_before = !restart;
     }
+    Ok(())
+}
 
-    /// Each session carries so many transfers and then one that does not end.
+proptest! {
+    /// An endpoint that copies ends a transfer when the one before is fetched, so one more is handed over than is fetched.
     #[test]
     fn only_a_link_that_carries_nothing_is_restarted(sessions in prop::collection::vec(0_u8..4, 1..20)) {
-        let mut patience = Patience::new();
-        let mut now = Micros(0);
-        let mut stuck_before = false;
-        for fetched in sessions {
-            patience.session_begins();
-            // One more is handed over than is fetched.
-            for _ in 0..=fetched {
-                patience.begins(now);
-                patience.ends();
-                prop_assert_eq!(patience.judge(now), None);
-            }
-            now = patience.begins(now);
-            let restart = stuck_before && fetched == 0;
-            let expected = if restart { Remedy::LeaveBus } else { Remedy::EndSession };
-            prop_assert_eq!(patience.judge(now), Some(expected));
-            stuck_before = !restart;
-        }
+        sessions_get_their_remedies(&sessions, 1, Patience::ends)?;
+    }
+
+    /// An endpoint that takes packets whole ends a transfer when the host has it.
+    #[test]
+    fn a_transfer_that_was_fetched_needs_no_other_to_tell(sessions in prop::collection::vec(0_u8..4, 1..20)) {
+        sessions_get_their_remedies(&sessions, 0, Patience::fetched)?;
     }
 }

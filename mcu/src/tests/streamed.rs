@@ -179,7 +179,7 @@ impl Device {
     fn end(&mut self) -> (Vec<DeviceMessage<'static>>, EventKind) {
         let mut heard = self.ask(Command::Stop);
         self.bus.port().transmit(|_| {});
-        // In steps: a ring that nobody looks at for so long counts as overrun, and forgets what a test has left there.
+        // In short steps: a ring that the camera has not read for the whole time counts as overrun and is emptied.
         self.turns(10_002);
         heard.extend(self.heard());
         let [event] = events(&heard)[..] else { panic!("{heard:?}") };

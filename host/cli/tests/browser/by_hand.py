@@ -522,7 +522,7 @@ def scene(told, enters):
 
 
 def stream(browser, address):
-    """What a page does when its stream ends, when the program comes back, and when nobody looks."""
+    """What a page does when its stream ends, when the program comes back, and while its tab is hidden."""
     told = Told(browser, address)
     page = told.page
     told.tell(camera={"phase": "stopped", "leds": "off"}, light={"allowed": False})
@@ -554,7 +554,7 @@ def stream(browser, address):
     page.wait_for_timeout(600)
     told.tell()
     assert page.locator("#losses-plot").get_attribute("aria-label").startswith("frames not received: now 0.0, between 0.0 and 0.0 ")
-    # A page that nobody looks at keeps no connection, and has one again when somebody does.
+    # A hidden page closes its connection, and opens it again when it is shown.
     for is_hidden, is_open in [(True, [False, False]), (False, [False, False, True])]:
         page.evaluate(
             """is => { Object.defineProperty(document, "hidden", { value: is, configurable: true });

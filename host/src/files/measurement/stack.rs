@@ -123,7 +123,7 @@ impl<'o> Stack<'o> {
     }
 
     /// Makes something of each measurement, on all threads: `make` gets the differences of a measurement and the places
-    /// of `out` that belong to this measurement. Numbers that lie in the file as they are are read piece by piece, so
+    /// of `out` that belong to this measurement. Numbers that the file stores without compression are read piece by piece, so
     /// that the memory never holds them all. `None` if a difference is not finite, or `make` gives nothing.
     ///
     /// # Errors
