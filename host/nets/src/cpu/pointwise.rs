@@ -95,7 +95,7 @@ impl Pointwise {
         let rows = product.par_chunks_mut(ROWS * columns).zip(windows.par_chunks(ROWS * inner));
         rows.with_min_len(grain).for_each(|(out, left)| {
             let (right, start) = (&self.matrix, &self.bias);
-            arch.dispatch(Product { left, left_pitch: inner, inner, right, columns, start, out });
+            Product { left, left_pitch: inner, inner, right, columns, start, out }.compute(arch);
         });
         out.add_squares(self.square, &product, columns);
     }

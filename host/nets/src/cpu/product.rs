@@ -8,7 +8,7 @@
 //! A sum begins with its start and adds its products in the order of the inner index, fused. It
 //! does not depend on the other rows, so a row gives the same bits in every batch.
 
-use pulp::{Simd, WithSimd};
+use pulp::{Arch, Simd, WithSimd};
 
 /// Number of vectors of columns computed together.
 const VECTORS: usize = 3;
@@ -49,6 +49,13 @@ impl WithSimd for Product<'_> {
 }
 
 impl Product<'_> {
+    /// Computes the product. Never inlined, so that the loops are compiled once for each length of
+    /// vectors, and not once more for each caller.
+    #[inline(never)]
+    pub fn compute(self, arch: Arch) {
+        arch.dispatch(self);
+    }
+
     /// All rows of `V` vectors of columns, beginning with column `from`.
     #[inline(always)]
     fn panel<S: Simd, const V: usize>(&mut self, simd: S, from: usize) {

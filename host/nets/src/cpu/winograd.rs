@@ -125,7 +125,7 @@ impl Winograd {
         let elements = sums.par_chunks_exact_mut(count * columns).enumerate();
         let zeros = vec![0.0; columns];
         elements.with_min_len(grain).for_each(|(element, out)| {
-            arch.dispatch(Product {
+            Product {
                 left: &left[element * count * left_pitch..][..count * left_pitch],
                 left_pitch,
                 inner: self.inputs,
@@ -133,7 +133,8 @@ impl Winograd {
                 columns,
                 start: if element == CENTRE { &self.bias } else { &zeros },
                 out,
-            });
+            }
+            .compute(arch);
         });
         arch.dispatch(Added { tiles, sums, out, stride: out_stride });
         SCRATCH.set((before, after));
