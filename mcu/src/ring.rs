@@ -125,12 +125,28 @@ impl Loan {
         (self.words.get(at as usize / 4..).unwrap_or(&[]), length as usize)
     }
 
+    /// The bytes of the whole loan, in the pieces that [`next`](Self::next) gives one after the other.
+    pub fn pieces(&self) -> impl Iterator<Item = (&'static [AtomicU32], usize)> {
+        let mut rest = self.clone();
+        core::iter::from_fn(move || {
+            let (words, length) = rest.next();
+            rest.begin = rest.begin.wrapping_add(length as u32);
+            (length > 0).then_some((words, length))
+        })
+    }
+
     /// Gives back so many bytes, which have been sent: all that [`next`](Self::next) gave.
     pub fn sent(&mut self, bytes: usize) {
         self.begin = self.begin.wrapping_add(bytes as u32);
         // What was read of them was read before.
         fence(Ordering::SeqCst);
         self.returned.store(self.begin, Ordering::Release);
+    }
+
+    /// Bytes that have not been given back.
+    #[must_use]
+    pub const fn bytes(&self) -> usize {
+        self.end.wrapping_sub(self.begin) as usize
     }
 
     /// Whether all of it has been given back.
@@ -141,7 +157,7 @@ impl Loan {
 
     /// Gives back what has not been sent. Loans come back in the order in which they were made.
     pub fn give_back(&mut self) {
-        self.sent(self.end.wrapping_sub(self.begin) as usize);
+        self.sent(self.bytes());
     }
 }
 
@@ -257,9 +273,10 @@ impl Ring {
 
     /// The packet of this length that begins at `taken`.
     fn found(&self, length: u32) -> Found {
+        let words = [0, 4, 8].map(|at| self.four(self.taken.wrapping_add(at)).to_le_bytes());
         let mut beginning = [0; NUMBER_BYTES];
-        for (to, at) in beginning.iter_mut().zip(0..) {
-            *to = self.byte(self.taken.wrapping_add(at));
+        for (to, byte) in beginning.iter_mut().zip(words.as_flattened()) {
+            *to = *byte;
         }
         let (run, sequence) = ready::numbers(&beginning);
         Found { at: self.taken, length, follows: self.follows, run, sequence }
@@ -309,6 +326,14 @@ impl Ring {
     /// The word that has this byte.
     fn word(&self, at: u32) -> u32 {
         self.words.get(self.index(at)).map_or(0, |word| word.load(Ordering::Relaxed))
+    }
+
+    /// Four bytes from this one on.
+    fn four(&self, at: u32) -> u32 {
+        let shift = (at & 3) << 3;
+        let two = u64::from(self.word(at.wrapping_add(3))) << 32 | u64::from(self.word(at));
+        // The second word is the first again where `at` is a multiple of four, and is shifted out then.
+        two.wrapping_shr(shift) as u32
     }
 
     fn byte(&self, at: u32) -> u8 {

@@ -319,6 +319,14 @@ fn main() -> ! {
     static PLACES: ConstStaticCell<[Packet; 4]> = ConstStaticCell::new([Packet::EMPTY; 4]);
     static LINK: StaticCell<Link<'static>> = StaticCell::new();
 
+    #[expect(
+        unsafe_code,
+        reason = "a count is no firmware: cameras on the stack beside each other need more of it"
+    )]
+    // SAFETY: below the stack there is memory that nothing uses.
+    unsafe {
+        cortex_m::register::msplim::write(0);
+    }
     if let Some(mut peripherals) = Peripherals::take() {
         peripherals.SYST.set_clock_source(SystClkSource::Core);
         peripherals.SYST.set_reload(0x00FF_FFFF);
@@ -357,7 +365,6 @@ fn main() -> ! {
     hprintln!("streaming_millisecond {}", none.least);
     hprintln!("streaming_packet {}", some.least.saturating_sub(none.least) / STREAMED);
     hprintln!("streaming_meter {}", some.mean.saturating_sub(some.least));
-    hprintln!("streaming_transfers {}", some.transfers);
     let [copied, whole] = usb::count();
     hprintln!("usb_512_copied {}", copied);
     hprintln!("usb_whole_packet {}", whole);

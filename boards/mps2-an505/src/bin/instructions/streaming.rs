@@ -151,6 +151,7 @@ pub struct Cost {
 }
 
 /// Instructions of a millisecond in which so many packets come.
+#[inline(never)]
 pub fn count<const N: usize>(packets: [u32; N]) -> [Cost; N] {
     static STATE: State<ENDPOINTS> = State::new();
     static PRESENCE: StaticCell<Presence> = StaticCell::new();

@@ -9,7 +9,7 @@ use core::future::pending;
 use core::ops::Range;
 use core::pin::pin;
 use core::ptr::null_mut;
-use core::sync::atomic::{AtomicU32, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use core::task::Waker;
 use embassy_executor::raw::Executor;
 use embassy_futures::poll_once;
@@ -90,7 +90,12 @@ pub fn pass_millisecond() {
 
 #[expect(unsafe_code, reason = "embassy looks for this name")]
 #[unsafe(export_name = "__pender")]
-fn pender(_context: *mut ()) {}
+fn pender(_context: *mut ()) {
+    PENDS.store(true, Ordering::Relaxed);
+}
+
+/// A task has been woken that has not run yet.
+static PENDS: AtomicBool = AtomicBool::new(false);
 
 /// The chip's endpoints, and a host that has configured the device.
 pub struct Chip(pub embassy_usb_synopsys_otg::Driver<'static, ENDPOINTS>);
@@ -223,11 +228,18 @@ pub async fn host(
     serve(endpoints, commands, packets).await
 }
 
+/// Runs the tasks that are woken, until none is.
 pub fn poll(executor: &'static Executor) {
-    #[expect(unsafe_code, reason = "an executor is polled by its owner")]
-    // SAFETY: this is the only call, and the pender does not make it.
-    unsafe {
-        executor.poll();
+    loop {
+        PENDS.store(false, Ordering::Relaxed);
+        #[expect(unsafe_code, reason = "an executor is polled by its owner")]
+        // SAFETY: this is the only call, and the pender does not make it.
+        unsafe {
+            executor.poll();
+        }
+        if !PENDS.load(Ordering::Relaxed) {
+            break;
+        }
     }
 }
 
