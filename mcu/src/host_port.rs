@@ -42,7 +42,7 @@
 //! room, and needs no buffer of the bus. Whether the FPGA can clock such a read by `sck` itself
 //! ([`READ_PACKET`]), the bus learns from the reads of [`Register::Version`] that pass through it.
 //!
-//! Packets of the FPGA's parallel port come by no transfer: a board that has the port's wires lends the
+//! Packets of the FPGA's parallel port come by no transfer: a board that has the port's wires has the
 //! [`Ring`] into which its DMA writes them. A start makes the ring forget what came before.
 //!
 //! With a second buffer ([`PortBus::with_spare`]) a frame can be kept: the camera packs it while the
@@ -94,11 +94,15 @@ pub trait HostPort {
     /// Level of the line: a raw burst is ready.
     fn raw_ready(&mut self) -> bool;
 
-    /// The ring into which a DMA channel writes the bytes of the FPGA's parallel port, after [`Ring::came`] with the
-    /// channel's place of this moment. `None`: this board has no wires to that port.
+    /// The ring into which a DMA channel writes the bytes of the FPGA's parallel port. `None`: this board has no wires
+    /// to that port.
     fn ring(&mut self) -> Option<&mut Ring> {
         None
     }
+
+    /// Tells the ring the channel's place of this moment ([`Ring::came`]). From the moment before that place was read,
+    /// the line on which the FPGA sends stays high for [`Ring::grant`], and then falls by itself.
+    fn look(&mut self) {}
 }
 
 /// What the FPGA delivers in one long read.
@@ -334,6 +338,7 @@ impl<'b, P: HostPort> PortBus<'b, P> {
         }
         if starts {
             self.keeps = false;
+            self.port.look();
             if let Some(ring) = self.port.ring() {
                 ring.restart();
             }
@@ -416,6 +421,10 @@ impl<P: HostPort> FpgaBus for PortBus<'_, P> {
 
     fn ring(&mut self) -> Option<&mut Ring> {
         self.port.ring()
+    }
+
+    fn look(&mut self) {
+        self.port.look();
     }
 
     fn streams(&mut self) -> bool {

@@ -67,5 +67,5 @@ pub use ports::{
     BoardInfo, BusError, FpgaBus, GatewareLoader, Inputs, LoadError, NAME_BYTES, NoLoader,
     PacketSink, Ports, Progress,
 };
-pub use ring::Ring;
+pub use ring::{Loan, Ring, RingMemory};
 pub use time::{CLOCKS_PER_MICRO, Micros};

@@ -115,6 +115,11 @@ impl Meter {
         };
     }
 
+    /// Whether [`look`](Self::look) would read a packet now.
+    pub fn wants(&self, now: Micros) -> bool {
+        !matches!(self.pair, Pair::Due(at) if now < at)
+    }
+
     /// Looks at the packet of a frame that the FPGA still delivers, if a pair begins or ends with it. The samples of
     /// a pair's first frame lie in `scratch`.
     pub fn look(

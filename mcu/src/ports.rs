@@ -4,7 +4,7 @@
 //! No call waits. An operation that is not complete says so, and the firmware asks again on a later
 //! poll.
 
-use crate::{Micros, Ring};
+use crate::{Loan, Micros, Ring};
 use core::ops::Range;
 use heapless::String;
 use nirspi_wire::samples::Width;
@@ -93,11 +93,14 @@ pub trait FpgaBus {
         Ok(true)
     }
 
-    /// The ring of the FPGA's parallel port, with what has come until now. `None`: this board has no wires to that
-    /// port, and the code that serves the port is left out of its firmware.
+    /// The ring of the FPGA's parallel port, with what had come at the last [`look`](Self::look). `None`: this board has
+    /// no wires to that port, and the code that serves the port is left out of its firmware.
     fn ring(&mut self) -> Option<&mut Ring> {
         None
     }
+
+    /// Notes in that ring what has come until now, and lets the FPGA send for as long as the ring grants.
+    fn look(&mut self) {}
 
     /// Whether the packets of the run under way come by that ring.
     fn streams(&mut self) -> bool {
@@ -139,6 +142,13 @@ pub trait PacketSink {
 
     /// Sends this part of the claimed room.
     fn commit(&mut self, part: Range<usize>);
+
+    /// Sends bytes of a ring where they lie, after all that was sent before, and gives them back when the host has
+    /// them. False: the link is full, or it is one that cannot, and a board with a ring must have one that can. Room
+    /// that was claimed and not committed is taken back.
+    fn lend(&mut self, _loan: Loan) -> bool {
+        false
+    }
 }
 
 /// Why a bitstream could not be loaded.

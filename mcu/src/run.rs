@@ -549,6 +549,10 @@ impl Run {
                 return None;
             }
         }
+        // The FPGA keeps frames for which a slow host leaves no room.
+        if bus.streams() && bus.ring().is_some_and(|ring| ring.is_full()) {
+            counters.drop_missing();
+        }
         // Frames that the FPGA made and did not deliver count as damaged.
         counters.corrupt = counters.corrupt.wrapping_add(counters.missing());
         let Counters { run, made, dropped, lost, corrupt, .. } = *counters;

@@ -7,8 +7,8 @@
 
 use crate::pages::{page, table};
 use nirspi_mcu::{
-    BoardInfo, BusError, Camera, HostPort, Inputs, Limits, Micros, NoLoader, PacketSink, PortBus,
-    Ports, Ring, Target, Wanted,
+    BoardInfo, BusError, Camera, HostPort, Inputs, Limits, Loan, Micros, NoLoader, PacketSink,
+    PortBus, Ports, Ring, Target, Wanted,
 };
 use nirspi_wire::fpga::MAX_FRAME_BYTES;
 use nirspi_wire::host_port::SEALED_BYTES;
@@ -20,6 +20,7 @@ use nirspi_wire::{
 };
 use std::collections::VecDeque;
 use std::ops::Range;
+use std::sync::atomic::Ordering;
 
 /// Period of `sck` of the reference board, but for packets: 160 MHz / 11.
 pub const SCK_PS: u64 = 68_750;
@@ -54,36 +55,25 @@ pub trait TimedPort: HostPort {
 /// What a board's processor and its peripherals cost, beside the clocks of `sck`.
 #[derive(Debug, Clone, Copy)]
 pub struct Processor {
-    /// The camera's work with one packet.
+    /// The camera's work with one packet. By the parallel port all work with it, up to the end of its transfer by USB.
     pub packet_ps: u64,
+    /// A turn of the loop in which no packet comes. `None`: packets come by the host port, and wake the loop.
+    pub turn_ps: Option<u64>,
     /// Setting up one register access and waiting for its end.
     pub access_ps: u64,
     /// Setting up a transfer by DMA, its interrupt, and waking the camera's task.
     pub transfer_ps: u64,
-    /// The task that serves the host over USB.
-    pub usb: Usb,
+    /// The host.
+    pub host: Reader,
 }
 
-/// How packets get from the link to a host on USB, and what of the processor's time that takes.
+/// How fast the host takes what the link has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Usb {
-    /// The host takes every packet at once, and the processor has no part in it.
+pub enum Reader {
+    /// Every packet at once.
     AtOnce,
-    /// The processor copies: so long for each 512 bytes.
-    Copied(u64),
-    /// The USB core reads by DMA: so long for each packet.
-    Whole(u64),
-}
-
-impl Usb {
-    /// The processor's time for a packet of this length.
-    fn packet_ps(self, length: usize) -> u64 {
-        match self {
-            Self::AtOnce => 0,
-            Self::Copied(ps) => length.div_ceil(512) as u64 * ps,
-            Self::Whole(ps) => ps,
-        }
-    }
+    /// As fast as USB carries them.
+    Usb,
 }
 
 /// The time that so many instructions take on the reference board, of 160 MHz.
@@ -107,30 +97,28 @@ impl Processor {
     #[must_use]
     pub fn reference() -> Self {
         let packet_ps = instructions_ps(instructions_of("packet_without_meter"));
-        Self { packet_ps, access_ps: 2_000_000, transfer_ps: 5_000_000, usb: Usb::AtOnce }
+        Self {
+            packet_ps,
+            turn_ps: None,
+            access_ps: 2_000_000,
+            transfer_ps: 5_000_000,
+            host: Reader::AtOnce,
+        }
     }
 
-    /// The reference board where packets come by the parallel port, with USB behind it, whose core reads them by DMA.
+    /// The reference board where packets come by the parallel port, with USB behind it, whose core reads them out of the
+    /// ring.
     ///
     /// # Panics
     /// If the page has no such rows.
     #[must_use]
     pub fn streaming() -> Self {
         Self {
-            packet_ps: instructions_ps(instructions_of("streamed_packet")),
-            usb: Usb::Whole(instructions_ps(instructions_of("usb_whole_packet"))),
+            packet_ps: instructions_ps(instructions_of("streaming_packet")),
+            turn_ps: Some(instructions_ps(instructions_of("streaming_millisecond"))),
+            host: Reader::Usb,
             ..Self::reference()
         }
-    }
-
-    /// The same without DMA of USB, as firmware before had it.
-    ///
-    /// # Panics
-    /// If the page has no such rows.
-    #[must_use]
-    pub fn copying() -> Self {
-        let usb = Usb::Copied(instructions_ps(instructions_of("usb_512_copied")));
-        Self { usb, ..Self::streaming() }
     }
 }
 
@@ -168,6 +156,10 @@ impl<P: TimedPort> HostPort for Costly<P> {
     fn ring(&mut self) -> Option<&mut Ring> {
         self.port.ring()
     }
+
+    fn look(&mut self) {
+        self.port.look();
+    }
 }
 
 /// A link whose host takes every packet at once, or as fast as USB carries them.
@@ -175,9 +167,11 @@ struct Host {
     room: Vec<u8>,
     /// Lengths of the packets.
     packets: Vec<usize>,
-    is_usb: bool,
-    /// Bytes that wait of each packet in the link.
-    waiting: VecDeque<u64>,
+    reader: Reader,
+    /// What waits in the link: loans, and packets of so many bytes.
+    waiting: VecDeque<(Option<Loan>, u64)>,
+    /// Microseconds in which USB had nothing to carry.
+    idle_us: u64,
     /// Until when USB has carried bytes.
     carried_us: u64,
 }
@@ -188,13 +182,21 @@ impl Host {
         let micros = now.since(Micros(self.carried_us)).0;
         self.carried_us = now.0;
         let mut bytes = micros * USB_BYTES_PER_MICRO;
-        while let Some(first) = self.waiting.front_mut() {
+        while let Some((_, first)) = self.waiting.front_mut() {
             if *first > bytes {
                 *first -= bytes;
-                break;
+                return;
             }
             bytes -= *first;
-            self.waiting.pop_front();
+            self.fetch();
+        }
+        self.idle_us += bytes / USB_BYTES_PER_MICRO;
+    }
+
+    /// The host has the whole of what waits first.
+    fn fetch(&mut self) {
+        if let Some((Some(mut loan), _)) = self.waiting.pop_front() {
+            loan.give_back();
         }
     }
 }
@@ -205,10 +207,28 @@ impl PacketSink for Host {
     }
 
     fn commit(&mut self, part: Range<usize>) {
-        if self.is_usb {
-            self.waiting.push_back(part.len() as u64);
+        if self.reader == Reader::Usb {
+            self.waiting.push_back((None, part.len() as u64));
         }
         self.packets.push(part.len());
+    }
+
+    fn lend(&mut self, loan: Loan) -> bool {
+        if self.waiting.len() >= PLACES {
+            return false;
+        }
+        let mut bytes = Vec::new();
+        for (words, length) in loan.pieces() {
+            let found = words.iter().flat_map(|word| word.load(Ordering::Relaxed).to_le_bytes());
+            bytes.extend(found.take(length));
+        }
+        let packets = bytes.split_inclusive(|byte| *byte == 0).map(<[u8]>::len);
+        self.packets.extend(packets.filter(|length| *length > 1));
+        self.waiting.push_back((Some(loan), bytes.len() as u64));
+        if self.reader == Reader::AtOnce {
+            self.fetch();
+        }
+        true
     }
 }
 
@@ -227,6 +247,8 @@ pub struct Stretch {
     pub sent: u32,
     /// Share of the time in which the processor worked.
     pub busy: f64,
+    /// Share of the time in which USB had nothing to carry.
+    pub usb_idle: f64,
 }
 
 /// Runs a camera of this many patterns, one differential sweep a frame, and measures the stretch in which so many
@@ -248,8 +270,9 @@ pub fn stretch<P: TimedPort>(
     let mut host = Host {
         room: vec![0; MAX_FRAME_BYTES],
         packets: Vec::new(),
-        is_usb: processor.usb != Usb::AtOnce,
+        reader: processor.host,
         waiting: VecDeque::new(),
+        idle_us: 0,
         carried_us: 0,
     };
     let configuration = Configuration {
@@ -285,6 +308,7 @@ pub fn stretch<P: TimedPort>(
         assert!(at < deadline, "{sent} frames in a second");
         if sent >= before && began.is_none() {
             (began, moving_ps, idle_ps) = (Some((at, sent)), 0, 0);
+            host.idle_us = 0;
         }
         if let Some((since, first)) = began
             && sent >= first + frames
@@ -302,6 +326,7 @@ pub fn stretch<P: TimedPort>(
                 made,
                 sent,
                 busy: 1.0 - (moving_ps + idle_ps) as f64 * 1e-12 / seconds,
+                usb_idle: host.idle_us as f64 * 1e-6 / seconds,
             };
         }
         let (moving, idle) = turn(&mut camera, &mut bus, &mut host, processor);
@@ -321,7 +346,9 @@ fn turn<P: TimedPort>(
     host: &mut Host,
     processor: Processor,
 ) -> (u64, u64) {
-    bus.port().port.pass(processor.packet_ps / 2);
+    if processor.turn_ps.is_none() {
+        bus.port().port.pass(processor.packet_ps / 2);
+    }
     let at = now(bus);
     host.carry(at);
     let sent = host.packets.len();
@@ -344,10 +371,10 @@ fn turn<P: TimedPort>(
         }
         Some(wanted) => panic!("not a packet: {:?}", wanted.into),
         None => {
-            if let [length] = host.packets[sent..] {
-                // The loop yields to the task that serves the host.
-                bus.port().port.pass(processor.packet_ps / 2);
-                bus.port().port.pass(processor.usb.packet_ps(length));
+            if let Some(turn_ps) = processor.turn_ps {
+                let packets = (host.packets.len() - sent) as u64;
+                let turn_ps = if worked { 0 } else { turn_ps };
+                bus.port().port.pass(packets * processor.packet_ps + turn_ps);
             }
             // The line of a ready frame wakes the loop.
             let slept = bus.port().port.now_ps();

@@ -5,7 +5,7 @@
 use crate::{Board, FpgaPort};
 use core::cell::{Cell, RefCell};
 use core::task::Waker;
-use nirspi_mcu::{BusError, GatewareLoader, HostPort, Inputs, Lamps, LoadError, Micros};
+use nirspi_mcu::{BusError, GatewareLoader, HostPort, Inputs, Lamps, LoadError, Micros, Ring};
 use nirspi_wire::fpga::{Header, Sums};
 use nirspi_wire::host_port::{SEALED_BYTES, seal, unseal};
 use nirspi_wire::packet::{MAX_HOST_PACKET, seal as seal_packet};
@@ -16,6 +16,11 @@ use nirspi_wire::{
 };
 use std::rc::Rc;
 use std::vec::Vec;
+
+mod parallel;
+
+use parallel::Parallel;
+pub use parallel::ROUND_BYTES;
 
 std::thread_local! {
     static NOW: Cell<u64> = const { Cell::new(0) };
@@ -77,6 +82,8 @@ pub struct Pins {
     pub transfer_polls: Cell<u32>,
     /// Microseconds from one frame to the next. With 0 a frame is ready during every run.
     pub frame_us: Cell<u64>,
+    /// Bytes that have come by the FPGA's parallel port.
+    pub by_port: Cell<usize>,
     /// The FPGA is being loaded with gateware, and has no host port.
     pub loading: Cell<bool>,
     next_frame_us: Cell<u64>,
@@ -97,6 +104,7 @@ impl Default for Pins {
             fed: Cell::default(),
             transfer_polls: Cell::default(),
             frame_us: Cell::default(),
+            by_port: Cell::default(),
             loading: Cell::default(),
             next_frame_us: Cell::default(),
             registers_lost: Cell::default(),
@@ -166,19 +174,52 @@ impl GatewareLoader for FakeLoader {
 pub struct FakeFpga {
     pins: Rc<Pins>,
     registers: [u32; 32],
+    parallel: Option<Parallel>,
 }
 
 impl FakeFpga {
     /// An FPGA without a configuration.
     #[must_use]
     pub fn new(pins: Rc<Pins>) -> Self {
-        Self { pins, registers: [0; 32] }
+        Self { pins, registers: [0; 32], parallel: None }
+    }
+
+    /// The same with a parallel port, behind which a DMA channel fills a ring.
+    #[must_use]
+    pub fn with_ring(self) -> Self {
+        Self { parallel: Some(Parallel::new()), ..self }
+    }
+
+    /// What the parallel port has done until now, if frames leave by it.
+    fn follow(&mut self) {
+        let parallel = self.registers[usize::from(Register::Mode.address())] & mode::PARALLEL != 0;
+        let Some(port) = self.parallel.as_mut().filter(|_| parallel) else { return };
+        let frames = self.registers[usize::from(Register::Frames.address())];
+        let patterns = self.registers[usize::from(Register::Patterns.address())] as u16;
+        let run = self.registers[usize::from(Register::Run.address())] as u16;
+        let pins = &self.pins;
+        while pins.running.get() && pins.next_frame_us.get() <= now_us() {
+            port.send_until(pins.next_frame_us.get());
+            port.make(|sequence| frame_packet(run, sequence, patterns));
+            pins.running.set(frames != port.made);
+            pins.next_frame_us.set(pins.next_frame_us.get() + pins.frame_us.get().max(50));
+        }
+        port.send_until(now_us());
+        pins.by_port.set(port.written);
+    }
+
+    /// The parallel port, if frames leave by it.
+    fn streaming(&mut self) -> Option<&mut Parallel> {
+        self.follow();
+        let parallel = self.registers[usize::from(Register::Mode.address())] & mode::PARALLEL != 0;
+        self.parallel.as_mut().filter(|_| parallel)
     }
 }
 
 impl HostPort for FakeFpga {
     fn write(&mut self, address: u16, sealed: [u8; SEALED_BYTES]) -> Result<(), BusError> {
         self.notice_reset();
+        self.follow();
         let value = unseal(address, sealed).expect("no wire damages a write");
         self.registers[usize::from(Register::Writes.address())] += 1;
         if address == Register::Control.address() {
@@ -187,6 +228,9 @@ impl HostPort for FakeFpga {
             let pins = &self.pins;
             if bits(control::START) {
                 pins.sequence.set(0);
+                if let Some(port) = &mut self.parallel {
+                    port.start();
+                }
             }
             // A frame that is ready outlives a stop.
             pins.held.set(is_ready && !bits(control::START | control::RELEASE));
@@ -218,10 +262,29 @@ impl HostPort for FakeFpga {
             Some(Register::FramesMade) => self.pins.sequence.get() + u32::from(self.frame_ready()),
             _ => self.registers[usize::from(address)],
         };
+        let value = match (Register::at(address), self.streaming()) {
+            (Some(Register::FramesMade), Some(port)) => port.made,
+            (Some(Register::FramesLost), Some(port)) => port.lost,
+            _ => value,
+        };
         Ok(seal(address, value))
     }
 
+    fn ring(&mut self) -> Option<&mut Ring> {
+        Some(&mut self.parallel.as_mut()?.ring)
+    }
+
+    fn look(&mut self) {
+        self.follow();
+        if let Some(port) = &mut self.parallel {
+            port.look(now_us());
+        }
+    }
+
     fn frame_ready(&mut self) -> bool {
+        if self.streaming().is_some() {
+            return false;
+        }
         let pins = &self.pins;
         pins.held.get() || pins.running.get() && now_us() >= pins.next_frame_us.get()
     }
@@ -235,26 +298,36 @@ impl FakeFpga {
     fn notice_reset(&mut self) {
         if self.pins.registers_lost.take() {
             self.registers = [0; 32];
+            if let Some(port) = &mut self.parallel {
+                port.start();
+            }
         }
     }
 
-    /// The same frame as a packet, between zeros.
+    /// The frame that is ready as a packet, between zeros.
     fn packet(&self, patterns: u16, into: &mut [u8]) {
-        let head = ready::Head {
-            run: self.registers[usize::from(Register::Run.address())] as u16,
-            sequence: self.pins.sequence.get(),
-            device_time_us: now_us(),
-            sweeps: 1,
-            flags: FrameFlags::DIFFERENTIAL,
-            patterns,
-            width: nirspi_wire::samples::Width::Bits32,
-        };
-        let mut payload = head.to_bytes().to_vec();
-        payload.extend((0..i32::from(patterns)).flat_map(|k| (93 + k).to_le_bytes()));
+        let run = self.registers[usize::from(Register::Run.address())] as u16;
+        let packet = frame_packet(run, self.pins.sequence.get(), patterns);
         into.fill(0);
-        let (_, room) = into.split_at_mut(ready::LEAD_BYTES / 2);
-        seal_packet(&payload, room).expect("a packet fits its read");
+        into[ready::LEAD_BYTES / 2..][..packet.len()].copy_from_slice(&packet);
     }
+}
+
+/// A frame as the FPGA makes a packet of it.
+fn frame_packet(run: u16, sequence: u32, patterns: u16) -> Vec<u8> {
+    let head = ready::Head {
+        run,
+        sequence,
+        device_time_us: now_us(),
+        sweeps: 1,
+        flags: FrameFlags::DIFFERENTIAL,
+        patterns,
+        width: nirspi_wire::samples::Width::Bits32,
+    };
+    let mut payload = head.to_bytes().to_vec();
+    payload.extend((0..i32::from(patterns)).flat_map(|k| (93 + k).to_le_bytes()));
+    let mut room = std::vec![0; payload.len() + payload.len() / 254 + 8];
+    seal_packet(&payload, &mut room).expect("a packet has room").to_vec()
 }
 
 impl FpgaPort for FakeFpga {

@@ -13,6 +13,8 @@ use embassy_sync::pipe::{self, Pipe};
 use embassy_sync::signal::Signal;
 use embassy_sync::zerocopy_channel::{self, Channel};
 use embassy_time::{Duration, Timer};
+#[cfg(any(test, feature = "ring"))]
+use nirspi_mcu::Loan;
 use nirspi_mcu::{Merger, PacketSink};
 use nirspi_wire::packet::{MAX_DEVICE_PACKET, MAX_HOST_PACKET};
 use nirspi_wire::ready::MAX_READ_BYTES;
@@ -30,12 +32,14 @@ const DMA_BYTES: usize = 4;
 /// The smallest packet of a bulk endpoint: at full speed (USB 2.0, 5.8.3).
 const USB_PACKET_BYTES: usize = 64;
 
-/// A place for one packet on its way to the host.
-#[derive(Debug, Clone, Copy)]
+/// A place for one packet on its way to the host, or for the loan of a ring, whose packets stay where they are.
+#[derive(Debug, Clone)]
 #[repr(C)]
 pub struct Packet {
     start: usize,
     end: usize,
+    #[cfg(any(test, feature = "ring"))]
+    loan: Option<Loan>,
     /// At a multiple of [`DMA_BYTES`].
     bytes: [u8; PLACE_BYTES],
 }
@@ -45,11 +49,21 @@ const _: () = assert!(align_of::<Packet>().is_multiple_of(DMA_BYTES));
 
 impl Packet {
     /// A place without a packet.
-    pub const EMPTY: Self = Self { start: 0, end: 0, bytes: [0; PLACE_BYTES] };
+    pub const EMPTY: Self = Self {
+        start: 0,
+        end: 0,
+        #[cfg(any(test, feature = "ring"))]
+        loan: None,
+        bytes: [0; PLACE_BYTES],
+    };
 
     /// The packet from a place on that DMA can reach: up to three zeros come before its bytes, which mean nothing
-    /// between two packets.
+    /// between two packets. Of a loan, the bytes that lie together.
     fn whole(&mut self) -> &[u8] {
+        #[cfg(any(test, feature = "ring"))]
+        if let Some(loan) = &self.loan {
+            return lent(loan);
+        }
         let begin = self.start - self.start % DMA_BYTES;
         if let Some(gap) = self.bytes.get_mut(begin..self.start) {
             gap.fill(0);
@@ -57,8 +71,34 @@ impl Packet {
         self.bytes.get(begin..self.end).unwrap_or(&[])
     }
 
+    /// Notes that so many bytes have been sent, all that [`whole`](Self::whole) gave; true if nothing is left.
+    fn sent(&mut self, _bytes: usize) -> bool {
+        #[cfg(any(test, feature = "ring"))]
+        if let Some(loan) = &mut self.loan {
+            loan.sent(_bytes);
+            if !loan.is_over() {
+                return false;
+            }
+            self.loan = None;
+        }
+        true
+    }
+
     fn after(&self, offset: usize) -> &[u8] {
         self.bytes.get(self.start..self.end).and_then(|bytes| bytes.get(offset..)).unwrap_or(&[])
+    }
+}
+
+/// The bytes of a loan that are to be sent next.
+#[cfg(any(test, feature = "ring"))]
+fn lent(loan: &Loan) -> &[u8] {
+    let (words, length) = loan.next();
+    assert!(length <= size_of_val(words), "a loan lies in its ring");
+    #[expect(unsafe_code, reason = "words that only a DMA channel writes, as bytes")]
+    // SAFETY: these words are as long, and have no padding. Neither processor nor channel writes them until they are
+    // given back, and the link gives them back after the last use of these bytes, which borrow the link.
+    unsafe {
+        core::slice::from_raw_parts(words.as_ptr().cast(), length)
     }
 }
 
@@ -169,7 +209,8 @@ impl<const N: usize> HostOut<'_, N> {
         }
     }
 
-    /// Waits for a packet to send, whole and where it lies, from a multiple of four bytes on. An empty transfer comes
+    /// Waits for a packet to send, whole and where it lies, from a multiple of four bytes on; or for packets of a ring,
+    /// as many as were lent together, in two pieces where the ring's memory ends. An empty transfer comes
     /// instead where the packet before has filled its last USB packet and no other packet follows: a read of the host
     /// ends with a USB packet that is not full.
     ///
@@ -178,7 +219,9 @@ impl<const N: usize> HostOut<'_, N> {
     pub async fn packet(&mut self) -> &[u8] {
         let sent = core::mem::take(&mut self.sent);
         if core::mem::take(&mut self.lent) {
-            self.packets.receive_done();
+            if self.packets.try_receive().is_none_or(|packet| packet.sent(sent)) {
+                self.packets.receive_done();
+            }
             if sent.is_multiple_of(USB_PACKET_BYTES) && self.packets.try_receive().is_none() {
                 return &[];
             }
@@ -200,8 +243,15 @@ impl<const N: usize> HostOut<'_, N> {
         }
     }
 
-    /// Drops a half-sent packet, after [`HostIn::closed`].
+    /// Drops a half-sent packet, after [`HostIn::closed`], and gives back what a ring has lent.
     pub fn discard(&mut self) {
+        #[cfg(any(test, feature = "ring"))]
+        while let Some(packet) = self.packets.try_receive() {
+            if let Some(mut loan) = packet.loan.take() {
+                loan.give_back();
+            }
+            self.packets.receive_done();
+        }
         self.packets.clear();
         self.sent = 0;
         self.lent = false;
@@ -284,5 +334,13 @@ impl PacketSink for Sink<'_> {
             (packet.start, packet.end) = (part.start, part.end);
             self.sender.send_done();
         }
+    }
+
+    #[cfg(any(test, feature = "ring"))]
+    fn lend(&mut self, loan: Loan) -> bool {
+        let Some(packet) = self.sender.try_send() else { return false };
+        packet.loan = Some(loan);
+        self.sender.send_done();
+        true
     }
 }

@@ -100,6 +100,11 @@ impl HostPort for Fpga {
     fn ring(&mut self) -> Option<&mut nirspi_mcu::Ring> {
         Some(self.parallel.ring())
     }
+
+    #[cfg(feature = "parallel")]
+    fn look(&mut self) {
+        self.parallel.look();
+    }
 }
 
 impl FpgaPort for Fpga {

@@ -142,6 +142,7 @@ async fn main(spawner: Spawner) {
             (p.PC6, pins.lamp_ready, p.PC8, p.PC9, p.PC11, p.PD3, p.PE5, p.PE6),
             p.PD9,
             p.PD8,
+            p.TIM3,
             p.PE3,
         ),
     };

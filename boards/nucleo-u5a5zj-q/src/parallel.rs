@@ -2,9 +2,13 @@
 //!
 //! The PSSI takes the eight lines where the FPGA's clock rises while `valid` is high, and asks for the DMA channel when
 //! it has four bytes. The channel walks through a list of blocks, the last of which leads to the first, so it never
-//! stops and needs no interrupt; the register of its destination says where it writes next. The PSSI's own RDY is not
-//! used: at how many free bytes it falls is not known. `ready` is an output that is high from the moment when the
-//! channel runs.
+//! stops and needs no interrupt; the register of its destination says where it writes next.
+//!
+//! The FPGA sends while `ready` is high. The PSSI's own RDY is not used: at how many free bytes it falls is not known.
+//! `ready` is a channel of a timer, which lets it fall when the time is over that the ring grants, whatever the processor
+//! does then. The timer counts microseconds, and the line is high while the count is below the compare value (PWM mode
+//! 1). Its 32 bits last for 71 minutes, and the watchdog ends a loop that does not look for half a second; what remains
+//! is the FPGA of a run that is over, whose bytes nobody waits for.
 //!
 //! **Built only, never run on a board.** Registers as stm32-data has them; the order of an item of the list as RM0456
 //! and embassy-stm32 have it.
@@ -14,23 +18,27 @@ use embassy_stm32::Peri;
 use embassy_stm32::dcmi::{
     D0Pin, D1Pin, D2Pin, D3Pin, D4Pin, D5Pin, D6Pin, D7Pin, FrameDma, HSyncPin, PixClkPin,
 };
-use embassy_stm32::gpio::{AfType, Flex, Level, Output, Pin, Pull, Speed};
+use embassy_stm32::gpio::{AfType, Flex, OutputType, Pin, Pull, Speed};
 use embassy_stm32::pac::gpdma::vals::{Ap, Dreq, Dw, Prio};
 use embassy_stm32::pac::gpdma::{Channel, regs};
 use embassy_stm32::pac::pssi::vals::{Ckpol, Depol, Derdycfg, Edm, Outen};
 use embassy_stm32::pac::{GPDMA1, PSSI};
-use embassy_stm32::peripherals::{DCMI, GPDMA1_CH3};
+use embassy_stm32::peripherals::{DCMI, GPDMA1_CH3, TIM3};
 use embassy_stm32::rcc::enable_and_reset;
-use embassy_time::Instant;
-use nirspi_mcu::{Micros, Ring};
+use embassy_stm32::time::Hertz;
+use embassy_stm32::timer::low_level::{OutputCompareMode, Timer};
+use embassy_stm32::timer::{Ch1, Channel as Compare, TimerPin};
+use nirspi_mcu::{Micros, Ring, RingMemory};
 
 /// Blocks of the list. A block has at most 65 535 bytes.
 const BLOCKS: usize = 4;
 const BLOCK_BYTES: u16 = 32 * 1024;
 const WORDS: usize = BLOCKS * BLOCK_BYTES as usize / 4;
 
-/// 128 KB: the FPGA needs 3 ms for a round, and the camera's loop looks once in a millisecond.
-static RING: [AtomicU32; WORDS] = [const { AtomicU32::new(0) }; WORDS];
+/// 128 KB. The camera's loop looks once in a millisecond, in which the FPGA sends 42 KB at most and USB 40 KB: so much
+/// has to be lent already, and as much to be free. Beside both there is room for the transfer that is under way, 20 KB,
+/// and for a packet that has not come whole.
+static RING: RingMemory<WORDS> = RingMemory::new();
 
 /// The registers that an item loads, in the order in which the channel reads them: BR1, DAR, LLR.
 const ITEM_WORDS: usize = 3;
@@ -59,7 +67,7 @@ fn block() -> regs::ChBr1 {
 }
 
 fn address_of_block(number: usize) -> u32 {
-    RING.as_ptr() as u32 + number as u32 * u32::from(BLOCK_BYTES)
+    RING.words().as_ptr() as u32 + number as u32 * u32::from(BLOCK_BYTES)
 }
 
 const fn channel() -> Channel {
@@ -81,8 +89,9 @@ pub type Lines<P0, P1, P2, P3, P4, P5, P6, P7> = (
 /// The port, as it runs.
 pub struct Parallel {
     ring: Ring,
+    timer: Timer<'static, TIM3>,
     _inputs: [Flex<'static>; 10],
-    _ready: Output<'static>,
+    _ready: Flex<'static>,
 }
 
 fn input<P: Pin>(pin: Peri<'static, P>, function: u8) -> Flex<'static> {
@@ -92,7 +101,7 @@ fn input<P: Pin>(pin: Peri<'static, P>, function: u8) -> Flex<'static> {
 }
 
 impl Parallel {
-    /// Starts the channel, then the PSSI, then says that the receiver is ready.
+    /// Starts the channel, then the PSSI. The receiver is not ready until the first look.
     ///
     /// PSSI and DCMI share clock, pins and request of the DMA, so the driver's traits of the DCMI tell which pin can do
     /// what: DE is where HSYNC is, and the clock where the pixel clock is.
@@ -102,7 +111,8 @@ impl Parallel {
         (d0, d1, d2, d3, d4, d5, d6, d7): Lines<P0, P1, P2, P3, P4, P5, P6, P7>,
         clock: Peri<'static, impl PixClkPin<DCMI>>,
         valid: Peri<'static, impl HSyncPin<DCMI>>,
-        ready: Peri<'static, impl Pin>,
+        timer: Peri<'static, TIM3>,
+        ready: Peri<'static, impl TimerPin<TIM3, Ch1>>,
     ) -> Self
     where
         P0: D0Pin<DCMI>,
@@ -132,17 +142,42 @@ impl Parallel {
             port.set_dmaen(true);
         });
         PSSI.cr().modify(|port| port.set_enable(true));
-        let ready = Output::new(ready, Level::High, Speed::Low);
-        Self { ring: Ring::new(&RING), _inputs: inputs, _ready: ready }
+        let timer = start_timer(timer);
+        let function = ready.af_num();
+        let mut ready = Flex::new(ready);
+        ready.set_as_af_unchecked(function, AfType::output(OutputType::PushPull, Speed::Low));
+        Self { ring: Ring::new(&RING), timer, _inputs: inputs, _ready: ready }
     }
 
-    /// The ring, with what the channel has written until now.
+    /// The ring, as of the last look.
     pub fn ring(&mut self) -> &mut Ring {
-        let now = Micros(Instant::now().as_micros());
-        let place = channel().dar().read().wrapping_sub(address_of_block(0));
-        self.ring.came(now, place as usize);
         &mut self.ring
     }
+
+    /// Tells the ring where the channel writes now, and lets the FPGA send for as long as the ring grants from the
+    /// moment before. In between the line is low, for a microsecond.
+    pub fn look(&mut self) {
+        self.timer.set_compare_value(Compare::Ch1, 0);
+        self.timer.reset();
+        let place = channel().dar().read().wrapping_sub(address_of_block(0));
+        self.ring.came(place as usize);
+        let Micros(grant) = self.ring.grant();
+        self.timer.set_compare_value(Compare::Ch1, grant as u32);
+    }
+}
+
+/// A timer of microseconds, with the line low.
+fn start_timer(timer: Peri<'static, TIM3>) -> Timer<'static, TIM3> {
+    let mut timer = Timer::new(timer);
+    // A timer of 32 bits: of another this does not compile.
+    timer.set_max_compare_value(u32::MAX);
+    timer.set_tick_freq(Hertz(1_000_000));
+    timer.set_output_compare_preload(Compare::Ch1, false);
+    timer.set_compare_value(Compare::Ch1, 0);
+    timer.set_output_compare_mode(Compare::Ch1, OutputCompareMode::PwmMode1);
+    timer.enable_channel(Compare::Ch1, true);
+    timer.start();
+    timer
 }
 
 /// Lets the channel write words of the PSSI round and round.

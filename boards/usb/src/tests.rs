@@ -4,6 +4,7 @@ mod dma;
 mod fake;
 mod faults;
 mod otg_core;
+mod ring;
 mod speeds;
 mod stuck;
 mod unplug;

@@ -1,21 +1,52 @@
-//! Packets that come by the FPGA's parallel port: out of the ring, into the link, each counted once.
+//! Packets that come by the FPGA's parallel port: out of the ring to the host without a copy, each counted once.
 //!
-//! The FPGA takes its frames back by itself, so nothing is released. Frames that came to nothing on the way
-//! (overwritten in the ring, damaged, cut) show as numbers that are missing: those of them that the FPGA has not lost
-//! itself count as damaged.
+//! The FPGA takes its frames back by itself, so nothing is released. While the host is slower than the FPGA, the ring is
+//! full, the FPGA waits and loses frames, which it counts itself. Frames that came to nothing on the way (damaged, cut)
+//! show as numbers that are missing: those of them that the FPGA has not lost count as damaged.
 //!
 //! # Invariant
 //! Each packet of the run is sent or counted once, and no packet of another run is
 //! (`tests::streamed::whatever_happens_to_the_ring_every_frame_is_counted_once`).
 
 use super::{Counters, Path, Run};
+use crate::meter::Meter;
 use crate::ring::Found;
 use crate::{FpgaBus, Micros, PacketSink};
 use nirspi_wire::samples::Width;
 
+/// Most bytes of packets that go to the host in one transfer. With fewer the processor has more transfers to begin; with
+/// more the ring has less room, because a transfer's bytes are free when all of them have been sent.
+const LOAN_BYTES: u32 = 20 * 1024;
+
+/// Most packets that one poll takes, so that short ones do not keep the camera from its other work.
+const MOST_PACKETS: u32 = 64;
+
+/// Packets that follow each other in the ring, and will go to the host together. They count as sent.
+struct Stretch {
+    first: Found,
+    last: Found,
+    packets: u32,
+}
+
+impl Stretch {
+    fn takes(&self, found: &Found) -> bool {
+        found.follows && self.first.bytes_to(found) <= LOAN_BYTES
+    }
+
+    /// Lends the stretch to the link. Without room there, its packets are dropped.
+    fn send(self, counters: &mut Counters, bus: &mut impl FpgaBus, sink: &mut impl PacketSink) {
+        let Self { first, last, packets } = self;
+        let lend = |ring: &mut crate::Ring| ring.lend((&first, &last), |loan| sink.lend(loan));
+        if !bus.ring().is_some_and(lend) {
+            counters.sent = counters.sent.wrapping_sub(packets);
+            counters.dropped = counters.dropped.wrapping_add(packets);
+        }
+    }
+}
+
 impl Run {
-    /// Takes at most one packet out of the ring; true if there was one. A packet for which the link has no room is
-    /// dropped, so that the next one finds the ring with room.
+    /// Takes the packets that have come out of the ring; true if there was one. Packets for which the link has no room
+    /// are dropped.
     #[inline(never)]
     pub(super) fn take_streamed(
         &mut self,
@@ -26,34 +57,65 @@ impl Run {
         sink: &mut impl PacketSink,
     ) -> bool {
         let Path { counters, meter, scratch, may_send } = path;
-        let Some(found) = bus.ring().and_then(|ring| ring.next(self.patterns, width)) else {
-            return false;
-        };
-        let is_next = self.is_next(&found, counters, bus);
-        let mut room = if is_next && may_send { sink.claim(found.room_bytes()) } else { None };
-        let place = match (&mut room, bus.ring()) {
-            (Some(room), Some(ring)) => Some(ring.copy(&found, room)),
-            _ => None,
-        };
-        // A new look at the channel: it may have come round.
-        let is_there = bus.ring().is_some_and(|ring| ring.take(&found));
-        if !is_next || !is_there {
-            return true;
+        bus.look();
+        if bus.ring().is_some_and(|ring| ring.is_full()) {
+            // The FPGA waits for the host, and makes no progress that could be seen here.
+            self.last_frame = now;
         }
-        self.last_sequence = Some(found.sequence);
-        self.last_frame = now;
-        counters.advance(found.sequence.wrapping_add(1), counters.lost);
-        let count = match (room, place) {
-            (Some(room), Some(place)) => {
-                if let Some(packet) = room.get(place.clone()) {
-                    meter.look(now, (packet, self.patterns), scratch, bus);
-                }
-                sink.commit(place);
-                &mut counters.sent
+        let mut stretch: Option<Stretch> = None;
+        let mut packets = 0;
+        while packets < MOST_PACKETS
+            && let Some(found) = bus.ring().and_then(|ring| ring.next(self.patterns, width))
+        {
+            packets += 1;
+            let is_next = self.is_next(&found, counters, bus);
+            if let Some(ring) = bus.ring() {
+                ring.take(&found);
             }
-            _ => &mut counters.dropped,
-        };
-        *count = count.wrapping_add(1);
+            if let Some(whole) = stretch.take_if(|before| !is_next || !before.takes(&found)) {
+                whole.send(counters, bus, sink);
+            }
+            if !is_next {
+                continue;
+            }
+            self.last_sequence = Some(found.sequence);
+            self.last_frame = now;
+            counters.advance(found.sequence.wrapping_add(1), counters.lost);
+            if !may_send {
+                counters.dropped = counters.dropped.wrapping_add(1);
+                continue;
+            }
+            counters.sent = counters.sent.wrapping_add(1);
+            let is_looked_at =
+                meter.wants(now) && self.look(&found, now, (meter, scratch), bus, sink);
+            let before = stretch.take();
+            let packets = before.as_ref().map_or(0, |before| before.packets).wrapping_add(1);
+            let first = before.map_or(found, |before| before.first);
+            stretch = Some(Stretch { first, last: found, packets });
+            if is_looked_at {
+                // That took as long as many packets: the rest has time until the next poll.
+                break;
+            }
+        }
+        if let Some(stretch) = stretch {
+            stretch.send(counters, bus, sink);
+        }
+        packets > 0
+    }
+
+    /// Shows the signal meter a packet, copied into room that the link has just now; false if there is none.
+    fn look(
+        &self,
+        found: &Found,
+        now: Micros,
+        (meter, scratch): (&mut Meter, &mut [u8]),
+        bus: &mut impl FpgaBus,
+        sink: &mut impl PacketSink,
+    ) -> bool {
+        let Some(room) = sink.claim(found.room_bytes()) else { return false };
+        let place = bus.ring().map(|ring| ring.copy(found, room));
+        let Some(packet) = place.and_then(|place| room.get(place)) else { return false };
+        meter.look(now, (packet, self.patterns), scratch, bus);
         true
     }
 

@@ -1,4 +1,5 @@
-//! Tests of the ring against a simple model, with a DMA channel that moves at any moment.
+//! Tests of the ring against a list of packets, between an FPGA that keeps to its grants and a host that reads at any
+//! pace.
 
 use super::*;
 use nirspi_wire::packet::seal;
@@ -6,10 +7,13 @@ use nirspi_wire::ready::Head;
 use nirspi_wire::{FrameFlags, ready};
 use proptest::prelude::*;
 use std::boxed::Box;
+use std::collections::VecDeque;
 use std::vec::Vec;
 
 const WORDS: usize = 256;
-const BYTES: u64 = 4 * WORDS as u64;
+const BYTES: usize = 4 * WORDS;
+/// Packets that the link has room for.
+const PLACES: usize = 3;
 
 /// A packet of the FPGA with these samples.
 fn packet(sequence: u32, samples: &[i32]) -> Vec<u8> {
@@ -27,138 +31,167 @@ fn packet(sequence: u32, samples: &[i32]) -> Vec<u8> {
     seal(&payload, &mut [0; 1024]).unwrap().to_vec()
 }
 
-/// The channel: moves whole words into the ring.
-struct Dma {
-    ring: Ring,
-    words: &'static [AtomicU32; WORDS],
-    /// Bytes of an unfinished word.
-    fifo: Vec<u8>,
-    /// Bytes in memory since power-up, now and at the last look.
-    written: u64,
-    seen: u64,
-    now: Micros,
-}
-
-impl Dma {
-    /// A channel whose ring has counted so many bytes.
-    fn after(rounds: u32) -> Self {
-        let words: &'static [AtomicU32; WORDS] =
-            Box::leak(Box::new([const { AtomicU32::new(0x5555_5555) }; WORDS]));
-        let mut ring = Ring::new(words);
-        ring.written = rounds.wrapping_mul(BYTES as u32);
-        ring.taken = ring.written;
-        Self { ring, words, fifo: Vec::new(), written: 0, seen: 0, now: Micros(0) }
-    }
-
-    fn send(&mut self, bytes: &[u8]) {
-        self.fifo.extend(bytes);
-        let whole = self.fifo.len() / 4 * 4;
-        for word in self.fifo.drain(..whole).collect::<Vec<_>>().chunks(4) {
-            let value = u32::from_le_bytes(word.try_into().unwrap());
-            self.words[self.written as usize / 4 % WORDS].store(value, Ordering::Relaxed);
-            self.written += 4;
-        }
-    }
-
-    /// Time stands still, but for a round: its time is shorter than what a look may take in a ring as small as this.
-    fn look(&mut self) {
-        if self.written - self.seen >= BYTES {
-            self.now.0 += BYTES / BYTES_PER_MICRO;
-        }
-        self.seen = self.written;
-        self.ring.came(self.now, (self.written % BYTES) as usize);
-    }
-
-    /// What the firmware does with a packet, while bytes come between its steps.
-    fn take(&mut self, patterns: u16, meanwhile: [&[u8]; 2]) -> Option<(Found, Vec<u8>, bool)> {
-        self.look();
-        let found = self.ring.next(patterns, Width::Bits32)?;
-        self.send(meanwhile[0]);
-        let mut room = std::vec![0; found.room_bytes()];
-        let place = self.ring.copy(&found, &mut room);
-        self.send(meanwhile[1]);
-        self.look();
-        Some((found, room[place].to_vec(), self.ring.take(&found)))
-    }
-}
-
 /// The lines of the FPGA: what it sends, and where each packet begins and ends in that.
+#[derive(Default)]
 struct Lines {
     bytes: Vec<u8>,
-    packets: Vec<Range<u64>>,
-    sent: usize,
+    packets: Vec<Range<usize>>,
 }
 
 impl Lines {
     fn new(packets: impl Iterator<Item = Vec<u8>>) -> Self {
-        let mut lines = Self { bytes: Vec::new(), packets: Vec::new(), sent: 0 };
+        let mut lines = Self::default();
         for packet in packets {
-            let begin = lines.bytes.len() as u64 + 1;
-            lines.packets.push(begin..begin + packet.len() as u64);
+            let begin = lines.bytes.len() + 1;
+            lines.packets.push(begin..begin + packet.len());
             lines.bytes.extend([&[0], &packet[..], &[0; 3]].concat());
         }
         lines
     }
-
-    fn next(&mut self, bytes: usize) -> &[u8] {
-        let begin = self.sent;
-        self.sent = (begin + bytes).min(self.bytes.len());
-        &self.bytes[begin..self.sent]
-    }
 }
 
-/// The ring as a list of packets.
-#[derive(Default)]
-struct Model {
-    taken: u64,
-    is_between: bool,
-    next: usize,
-    seen: u64,
+/// The ring between the FPGA and the host.
+struct Bench {
+    ring: Ring,
+    memory: &'static RingMemory<WORDS>,
+    /// What the ring has counted before.
+    before: u32,
+    bytes: Vec<u8>,
+    /// Bytes that the FPGA has sent, and bytes in memory.
+    sent: usize,
+    written: usize,
+    /// Bytes that the FPGA may send.
+    granted: usize,
+    /// What is on its way to the host, and what it has to be.
+    loans: VecDeque<(Loan, Vec<u8>)>,
 }
 
-impl Model {
-    fn restart(&mut self, written: u64) {
-        (self.taken, self.is_between) = (written, false);
+impl Bench {
+    /// A ring that has counted so many rounds, with these bytes to come.
+    fn after(rounds: u32, bytes: Vec<u8>) -> Self {
+        let memory: &'static RingMemory<WORDS> = Box::leak(Box::new(RingMemory::new()));
+        memory.words.iter().for_each(|word| word.store(0x5555_5555, Ordering::Relaxed));
+        let before = rounds.wrapping_mul(BYTES as u32);
+        memory.returned.store(before, Ordering::Relaxed);
+        let ring = Ring { written: before, taken: before, lent: before, ..Ring::new(memory) };
+        let loans = VecDeque::new();
+        let mut bench =
+            Self { ring, memory, before, bytes, sent: 0, written: 0, granted: 0, loans };
+        bench.look();
+        bench
     }
 
-    /// An overrun forgets everything.
-    fn look(&mut self, written: u64) {
-        let is_round = written - self.seen >= BYTES;
-        self.seen = written;
-        if is_round || written - self.taken > BYTES - u64::from(IN_FLIGHT) {
-            self.restart(written);
+    fn of(bytes: &[u8]) -> Self {
+        Self::after(0, bytes.to_vec())
+    }
+
+    /// The FPGA sends so many bytes if it may, and all but the last few of them get into memory.
+    fn send(&mut self, bytes: usize, behind: usize) {
+        let bytes = bytes.min(self.granted).min(self.bytes.len() - self.sent);
+        self.granted -= bytes;
+        self.sent += bytes;
+        while self.sent - self.written >= 4.max(behind) {
+            let word = self.bytes[self.written..][..4].try_into().unwrap();
+            self.memory.words[self.written / 4 % WORDS]
+                .store(u32::from_le_bytes(word), Ordering::Relaxed);
+            self.written += 4;
         }
     }
 
-    /// The packet that is there whole. One that began before all was forgotten does not count.
-    fn find(&mut self, written: u64, packets: &[Range<u64>]) -> Option<usize> {
-        let first = |packet: &Range<u64>| packet.start >= self.taken + u64::from(!self.is_between);
-        self.next += packets[self.next..].iter().position(first)?;
-        let packet = &packets[self.next];
-        // Before the first packet and behind each there are zeros.
-        let zero = if self.next == 0 { 0 } else { packets[self.next - 1].end - 1 };
-        self.is_between |= zero.max(self.taken) < written && self.taken < packet.start;
-        self.taken = packet.start.min(written);
-        (packet.end <= written).then_some(self.next)
+    fn look(&mut self) {
+        self.ring.came(self.written % BYTES);
+        let Micros(grant) = self.ring.grant();
+        // The timer is exact to two microseconds, and some bytes come after the line has fallen.
+        self.granted =
+            if grant == 0 { 4 } else { (grant as usize + 2) * BYTES_PER_MICRO as usize + 4 };
+    }
+
+    /// Takes up to so many packets that follow each other; returns their numbers and whether the link got them.
+    fn take(&mut self, patterns: u16, most: usize) -> (Vec<u32>, bool) {
+        let mut found: Vec<Found> = Vec::new();
+        while found.len() < most
+            && let Some(next) = self.ring.next(patterns, Width::Bits32)
+            && (found.is_empty() || next.follows)
+        {
+            self.ring.take(&next);
+            found.push(next);
+        }
+        let numbers = found.iter().map(|found| found.sequence).collect();
+        let (Some(first), Some(last)) = (found.first(), found.last()) else {
+            return (numbers, false);
+        };
+        let place = |at: u32| at.wrapping_sub(self.before) as usize;
+        let (begin, at, end) =
+            (place(first.at & !3), place(first.at), place(last.at.wrapping_add(last.length)));
+        let expected = [&[0; 3][..at - begin], &self.bytes[at..end]].concat();
+        let loans = &mut self.loans;
+        let has_room = loans.len() < PLACES;
+        let is_lent = self.ring.lend((first, last), |loan| {
+            if has_room {
+                loans.push_back((loan, expected));
+            }
+            has_room
+        });
+        (numbers, is_lent)
+    }
+
+    /// The host has the next bytes of what was lent first. Whether they are what the FPGA has sent.
+    fn fetch(&mut self) -> bool {
+        let Some((loan, expected)) = self.loans.front_mut() else { return true };
+        let (words, length) = loan.next();
+        assert!(length > 0 && words.len() * 4 >= length);
+        let got = words.iter().flat_map(|word| word.load(Ordering::Relaxed).to_le_bytes());
+        let is_same = got.take(length).eq(expected.drain(..length));
+        loan.sent(length);
+        if loan.is_over() {
+            assert_eq!(expected, &[]);
+            self.loans.pop_front();
+        }
+        is_same
+    }
+
+    /// All of it comes and goes.
+    fn drain(&mut self, patterns: u16) -> Vec<u32> {
+        let mut numbers = Vec::new();
+        for _ in 0..10 + 40 * self.bytes.len() / BYTES {
+            self.send(usize::MAX, 0);
+            self.look();
+            loop {
+                let (more, _) = self.take(patterns, 2);
+                if more.is_empty() {
+                    break;
+                }
+                numbers.extend(more);
+            }
+            while !self.loans.is_empty() {
+                assert!(self.fetch());
+            }
+        }
+        numbers
     }
 }
 
 #[derive(Debug, Clone)]
 enum Step {
-    Send(usize),
-    Take(usize, usize),
+    Send(usize, usize),
+    Look,
+    Take(usize),
+    Fetch,
     Restart,
+    GiveBack,
 }
 
 fn steps() -> impl Strategy<Value = Vec<Step>> {
-    let bytes = || prop_oneof![8 => 0..150usize, 2 => 0..900usize, 1 => 900..1500usize];
-    let few = || prop_oneof![3 => Just(0usize), 3 => 1..100usize, 1 => 0..1200usize];
+    let bytes = prop_oneof![2 => 0..150usize, 2 => 0..900usize, 1 => 900..3000usize];
     let step = prop_oneof![
-        4 => bytes().prop_map(Step::Send),
-        6 => (few(), few()).prop_map(|(before, after)| Step::Take(before, after)),
+        6 => (bytes, 0..=IN_FLIGHT as usize).prop_map(|(bytes, behind)| Step::Send(bytes, behind)),
+        5 => Just(Step::Look),
+        6 => (1..5usize).prop_map(Step::Take),
+        5 => Just(Step::Fetch),
         1 => Just(Step::Restart),
+        1 => Just(Step::GiveBack),
     ];
-    prop::collection::vec(step, 1..150)
+    prop::collection::vec(step, 1..200)
 }
 
 fn samples() -> impl Strategy<Value = i32> {
@@ -167,49 +200,54 @@ fn samples() -> impl Strategy<Value = i32> {
 
 proptest! {
     #[test]
-    fn every_packet_comes_once_and_whole_and_only_an_overrun_loses_any(
+    fn every_packet_is_lent_once_and_stays_until_it_is_back(
         steps in steps(),
         frames in prop::collection::vec(prop::collection::vec(samples(), 20), 100..200),
         rounds in prop_oneof![Just(0u32), Just(0u32.wrapping_sub(1)), 4_194_302..4_194_304u32],
     ) {
         let packets: Vec<_> =
             frames.iter().zip(0..).map(|(samples, sequence)| packet(sequence, samples)).collect();
-        let mut lines = Lines::new(packets.iter().cloned());
-        let (mut dma, mut model) = (Dma::after(rounds), Model::default());
-        let mut taken = 0;
+        let lines = Lines::new(packets.iter().cloned());
+        let mut bench = Bench::after(rounds, lines.bytes.clone());
+        // The packet that comes next, and the place where that one begins at the earliest.
+        let (mut next, mut from) = (0, 0);
         for step in steps {
             match step {
-                Step::Send(bytes) => dma.send(lines.next(bytes)),
-                Step::Restart => {
-                    dma.look();
-                    model.look(dma.written);
-                    dma.ring.restart();
-                    model.restart(dma.written);
-                }
-                Step::Take(before, after) => {
-                    let meanwhile = [lines.next(before).to_vec(), lines.next(after).to_vec()];
-                    let written = dma.written;
-                    let got = dma.take(20, [&meanwhile[0], &meanwhile[1]]);
-                    model.look(written);
-                    let expected = model.find(written, &lines.packets);
-                    prop_assert_eq!(got.as_ref().map(|got| got.0.sequence as usize), expected);
-                    let Some((found, bytes, is_there)) = got else {
-                        // What came meanwhile was not looked at.
-                        dma.send(&meanwhile.concat());
-                        continue;
-                    };
-                    model.look(dma.written);
-                    let sequence = expected.unwrap();
-                    prop_assert_eq!(is_there, model.taken == lines.packets[sequence].start);
-                    if is_there {
-                        prop_assert_eq!((found.run, &bytes), (3, &packets[sequence]));
-                        (model.taken, model.next) = (lines.packets[sequence].end, sequence + 1);
-                        taken += 1;
+                Step::Send(bytes, behind) => bench.send(bytes, behind),
+                Step::Look => bench.look(),
+                Step::Take(most) => {
+                    let (numbers, _) = bench.take(20, most);
+                    for number in numbers {
+                        while lines.packets[next].start <= from && from > 0 {
+                            next += 1;
+                        }
+                        from = 0;
+                        prop_assert_eq!(number as usize, next);
+                        next += 1;
                     }
+                }
+                Step::Fetch => prop_assert!(bench.fetch(), "it has changed"),
+                Step::GiveBack => {
+                    bench.loans.iter_mut().for_each(|(loan, _)| loan.give_back());
+                    bench.loans.clear();
+                }
+                Step::Restart => {
+                    bench.look();
+                    bench.ring.restart();
+                    from = bench.written;
                 }
             }
         }
-        prop_assert!(taken <= packets.len());
+        // Nothing stands still: whatever has happened, the rest comes.
+        while !bench.loans.is_empty() {
+            prop_assert!(bench.fetch(), "it has changed");
+        }
+        while lines.packets.get(next).is_some_and(|packet| packet.start <= from && from > 0) {
+            next += 1;
+        }
+        let last = lines.bytes.len() / 4 * 4;
+        let whole = lines.packets.iter().take_while(|packet| packet.end <= last).count() as u32;
+        prop_assert_eq!(bench.drain(20), (next as u32..whole.max(next as u32)).collect::<Vec<_>>());
     }
 
     #[test]
@@ -220,29 +258,51 @@ proptest! {
         ),
         shift in 0..4usize,
     ) {
-        let mut dma = Dma::after(0);
-        dma.send(&[7; 4][..shift]);
-        let (mut intact, mut got) = (Vec::new(), Vec::new());
+        let mut bytes = [7; 4][..shift].to_vec();
+        let mut intact = Vec::new();
         for ((samples, damage), sequence) in frames.iter().zip(0..) {
-            let mut bytes = packet(sequence, samples);
+            let mut packet = packet(sequence, samples);
             match damage {
                 Some((at, lost)) => {
-                    let at = at.index(bytes.len() - 1);
-                    let end = (at + lost).min(bytes.len() - 1);
-                    bytes.drain(at..end);
+                    let at = at.index(packet.len() - 1);
+                    let end = (at + lost).min(packet.len() - 1);
+                    packet.drain(at..end);
                 }
-                None => intact.push(bytes.clone()),
+                None => intact.push(packet.clone()),
             }
             // A start cuts a packet without a zero behind it.
             let behind: &[u8] = if damage.is_some() && sequence % 2 == 0 { &[] } else { &[0; 3] };
-            dma.send(&[&[0], &bytes[..bytes.len() - usize::from(behind.is_empty())], behind].concat());
-            while let Some((_, bytes, is_there)) = dma.take(70, [&[], &[]]) {
-                prop_assert!(is_there);
+            let end = packet.len() - usize::from(behind.is_empty());
+            bytes.extend([&[0], &packet[..end], behind].concat());
+        }
+        bytes.extend([0; 4]);
+        let mut bench = Bench::after(0, bytes);
+        let mut got = Vec::new();
+        while bench.sent < bench.bytes.len() {
+            bench.send(300, 0);
+            bench.look();
+            while let Some(found) = bench.ring.next(70, Width::Bits32) {
+                let mut room = std::vec![0; found.room_bytes()];
+                let place = bench.ring.copy(&found, &mut room);
+                let bytes = room[place].to_vec();
+                bench.ring.take(&found);
+                let is_lent = bench.ring.lend((&found, &found), |mut loan| {
+                    // The host has nothing but the packet.
+                    let mut host = Vec::new();
+                    while !loan.is_over() {
+                        let (words, length) = loan.next();
+                        host.extend(words.iter().flat_map(|word| word.load(Ordering::Relaxed).to_le_bytes()).take(length));
+                        loan.sent(length);
+                    }
+                    let zeros = host.len() - bytes.len();
+                    assert!(zeros < 4 && host[..zeros].iter().all(|byte| *byte == 0));
+                    assert_eq!(&host[zeros..], bytes);
+                    true
+                });
+                prop_assert!(is_lent);
                 got.push(bytes);
             }
         }
-        dma.send(&[0; 4]);
-        got.extend(dma.take(70, [&[], &[]]).map(|(_, bytes, _)| bytes));
         got.retain(|bytes| intact.contains(bytes));
         prop_assert_eq!(got, intact);
     }
@@ -252,38 +312,87 @@ proptest! {
 #[test]
 fn what_is_left_of_a_cut_packet_is_not_taken_for_the_beginning_of_the_next() {
     for left in 1..=2 {
-        let (cut, whole) = (packet(0, &[5; 220]), packet(1, &[0; 220]));
-        let mut dma = Dma::after(0);
-        dma.send(&[&[0], &cut[..left], &[0], &whole[..], &[0; 7]].concat());
-        let (_, bytes, is_there) = dma.take(220, [&[], &[]]).unwrap();
-        assert!(is_there);
-        assert_eq!(bytes, whole, "{left} bytes left");
-    }
-}
-
-/// After so long without a look, the ring cannot tell how often the channel went round.
-#[test]
-fn a_pause_of_a_rounds_time_counts_as_an_overrun() {
-    let round_us = BYTES / BYTES_PER_MICRO - LOOK.0;
-    for (pause, is_found) in [(round_us - 1, true), (round_us + 1, false)] {
-        let mut dma = Dma::after(0);
-        dma.look();
-        let samples = [5; 4];
-        dma.send(&Lines::new([packet(0, &samples)].into_iter()).bytes);
-        dma.now.0 = pause;
-        assert_eq!(dma.take(4, [&[], &[]]).is_some(), is_found, "{pause} us");
+        let (cut, whole) = (packet(0, &[5; 150]), packet(1, &[0; 150]));
+        let mut bench = Bench::of(&[&[0], &cut[..left], &[0], &whole[..], &[0; 7]].concat());
+        bench.send(usize::MAX, 0);
+        bench.look();
+        let found = bench.ring.next(150, Width::Bits32).unwrap();
+        let mut room = std::vec![0; found.room_bytes()];
+        let place = bench.ring.copy(&found, &mut room);
+        assert_eq!(room[place], whole, "{left} bytes left");
     }
 }
 
 #[test]
 fn bytes_that_were_there_before_the_first_look_are_no_packet() {
-    let mut dma = Dma::after(0);
-    dma.send(&Lines::new([packet(0, &[5; 4])].into_iter()).bytes);
-    dma.look();
-    dma.ring.restart();
-    assert!(dma.take(4, [&[], &[]]).is_none());
-    dma.send(&Lines::new([packet(1, &[5; 4])].into_iter()).bytes);
-    assert_eq!(dma.take(4, [&[], &[]]).unwrap().0.sequence, 1);
+    let packets = [packet(0, &[5; 4]), packet(1, &[5; 4])];
+    let mut bench = Bench::of(&Lines::new(packets.iter().cloned()).bytes);
+    bench.send(packets[0].len() + 4, 0);
+    bench.look();
+    bench.ring.restart();
+    assert!(bench.take(4, 1).0.is_empty());
+    bench.send(usize::MAX, 0);
+    bench.look();
+    assert_eq!(bench.take(4, 1).0, [1]);
+}
+
+/// The FPGA may send until the ring is full but for the margin, and again what comes back.
+#[test]
+fn a_grant_ends_where_the_ring_would_be_full() {
+    let packets = (0..30).map(|sequence| packet(sequence, &[5; 20]));
+    let mut bench = Bench::of(&Lines::new(packets).bytes);
+    let free = |bench: &Bench| bench.ring.grant().0 * u64::from(BYTES_PER_MICRO);
+    let all = BYTES as u64 - u64::from(MARGIN);
+    assert!((all - 41..=all).contains(&free(&bench)));
+    while !bench.ring.is_full() {
+        bench.send(100, 0);
+        bench.look();
+        bench.take(20, 1);
+    }
+    assert!(bench.written + MARGIN as usize <= BYTES + 2 * 42 + 4);
+    assert!(bench.fetch());
+    bench.look();
+    // A packet and what surrounds it, if all that is sent was looked at.
+    let one = free(&bench);
+    assert!((70..=130).contains(&one), "{one}");
+    while !bench.loans.is_empty() {
+        assert!(bench.fetch());
+    }
+    bench.look();
+    let rest = free(&bench);
+    assert!(rest > 500, "what was dropped is free too: {rest}");
+}
+
+/// An FPGA that does not wait: what comes after that is right again.
+#[test]
+fn an_overrun_is_forgotten() {
+    let packets = (0..40).map(|sequence| packet(sequence, &[5; 20]));
+    let mut bench = Bench::of(&Lines::new(packets).bytes);
+    for _ in 0..9 {
+        bench.send(130, 0);
+        bench.granted = 1000;
+        bench.ring.came(bench.written % BYTES);
+    }
+    assert_eq!(bench.take(20, 1).0, []);
+    bench.look();
+    let got = bench.drain(20);
+    assert!(got.len() > 25 && got.is_sorted_by(|a, b| a + 1 == *b), "{got:?}");
+}
+
+/// Bytes have been lost between two packets, so that the second begins in a word that USB still reads.
+#[test]
+fn a_word_that_is_lent_is_left_alone() {
+    let both = [packet(0, &[5; 20]), packet(1, &[5; 20])];
+    for shift in 0..4 {
+        let bytes = [&[0; 4][..=shift], &both[0], &both[1], &[0; 7]].concat();
+        let shares = (shift + 1 + both[0].len()) % 4 != 0;
+        let mut bench = Bench::of(&bytes);
+        bench.send(usize::MAX, 0);
+        bench.look();
+        assert_eq!(bench.take(20, 1), (std::vec![0], true));
+        assert_eq!(bench.take(20, 1), (std::vec![1], !shares), "{shift}");
+        assert!(bench.fetch());
+    }
 }
 
 /// The longest packets have room in a ring of the reference board, and in a place of the link.
@@ -291,7 +400,7 @@ fn bytes_that_were_there_before_the_first_look_are_no_packet() {
 fn a_packet_needs_at_most_six_bytes_of_room_more_than_it_has() {
     for at in 0..4 {
         let length = *ready::packet_lengths(1024, Width::Bits32).end() as u32;
-        let found = Found { at, length, run: 0, sequence: 0 };
+        let found = Found { at, length, follows: false, run: 0, sequence: 0 };
         assert!(found.room_bytes() <= length as usize + 6);
         assert!(found.room_bytes() <= ready::MAX_READ_BYTES);
     }

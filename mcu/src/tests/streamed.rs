@@ -6,8 +6,9 @@ use super::host_port::Port;
 use super::support::*;
 use crate::{
     BoardInfo, BusError, Camera, FpgaBus, HostPort, Limits, Micros, NoLoader, PortBus, Ports, Ring,
+    RingMemory,
 };
-use core::sync::atomic::{AtomicU32, Ordering};
+use core::sync::atomic::Ordering;
 use nirspi_wire::fpga::MAX_FRAME_BYTES;
 use nirspi_wire::host_port::SEALED_BYTES;
 use nirspi_wire::packet::open;
@@ -18,6 +19,7 @@ use nirspi_wire::{
 };
 use proptest::prelude::*;
 use std::boxed::Box;
+use std::collections::VecDeque;
 use std::vec::Vec;
 
 const WORDS: usize = 1024;
@@ -26,19 +28,28 @@ const WORDS: usize = 1024;
 struct Wired {
     port: Port,
     ring: Ring,
-    words: &'static [AtomicU32; WORDS],
+    memory: &'static RingMemory<WORDS>,
+    /// What the FPGA still has to send of the frame that it sends, and how many bytes it may send.
+    outgoing: VecDeque<u8>,
+    granted: usize,
     fifo: Vec<u8>,
     written: usize,
-    now: Micros,
 }
 
 impl Wired {
     fn new() -> Self {
-        let words: &'static [AtomicU32; WORDS] =
-            Box::leak(Box::new([const { AtomicU32::new(0) }; WORDS]));
+        let memory: &'static RingMemory<WORDS> = Box::leak(Box::new(RingMemory::new()));
         let mut port = Port::default();
         port.fpga.make_packets();
-        Self { port, ring: Ring::new(words), words, fifo: Vec::new(), written: 0, now: Micros(0) }
+        Self {
+            port,
+            ring: Ring::new(memory),
+            memory,
+            outgoing: VecDeque::new(),
+            granted: 0,
+            fifo: Vec::new(),
+            written: 0,
+        }
     }
 
     fn fpga(&mut self) -> &mut FakeFpga {
@@ -51,30 +62,46 @@ impl Wired {
         let whole = self.fifo.len() / 4 * 4;
         for word in self.fifo.drain(..whole).collect::<Vec<_>>().chunks(4) {
             let value = u32::from_le_bytes(word.try_into().unwrap());
-            self.words[self.written / 4 % WORDS].store(value, Ordering::Relaxed);
+            self.memory.words()[self.written / 4 % WORDS].store(value, Ordering::Relaxed);
             self.written += 4;
         }
     }
 
-    /// The FPGA's port sends the frames that wait, after `spoil` has changed the first.
+    /// The FPGA's port sends what it may of the frames that wait, after `spoil` has changed the first. Returns those
+    /// that it has begun.
     fn transmit(&mut self, spoil: impl FnOnce(&mut Vec<u8>)) -> Vec<Vec<u8>> {
         let mut spoil = Some(spoil);
-        let mut sent = Vec::new();
-        while let Some(mut packet) = self.fpga().frame.clone() {
-            self.fpga().write(Register::Control.address(), control::RELEASE).unwrap();
-            sent.push(packet.clone());
-            if let Some(spoil) = spoil.take() {
-                spoil(&mut packet);
+        let mut begun = Vec::new();
+        loop {
+            if self.outgoing.is_empty() {
+                let Some(mut packet) = self.fpga().frame.clone() else { return begun };
+                begun.push(packet.clone());
+                if let Some(spoil) = spoil.take() {
+                    spoil(&mut packet);
+                }
+                self.outgoing.extend([&[0], &packet[..], &[0; 3]].concat());
             }
-            self.send(&[&[0], &packet[..], &[0; 3]].concat());
+            let bytes = self.outgoing.len().min(self.granted);
+            self.granted -= bytes;
+            let bytes: Vec<u8> = self.outgoing.drain(..bytes).collect();
+            self.send(&bytes);
+            if !self.outgoing.is_empty() {
+                return begun;
+            }
+            self.fpga().write(Register::Control.address(), control::RELEASE).unwrap();
         }
-        sent
     }
 }
 
 impl HostPort for Wired {
     fn write(&mut self, address: u16, sealed: [u8; SEALED_BYTES]) -> Result<(), BusError> {
-        self.port.write(address, sealed)
+        let begun = self.port.fpga.made;
+        self.port.write(address, sealed)?;
+        if self.port.fpga.running && self.port.fpga.made == 0 && begun > 0 {
+            // A start cuts what is under way.
+            self.outgoing.clear();
+        }
+        Ok(())
     }
 
     fn read(&mut self, address: u16) -> Result<[u8; SEALED_BYTES], BusError> {
@@ -92,8 +119,13 @@ impl HostPort for Wired {
     }
 
     fn ring(&mut self) -> Option<&mut Ring> {
-        self.ring.came(self.now, self.written % (4 * WORDS));
         Some(&mut self.ring)
+    }
+
+    fn look(&mut self) {
+        self.ring.came(self.written % (4 * WORDS));
+        let Micros(grant) = self.ring.grant();
+        self.granted = 42 * grant as usize;
     }
 }
 
@@ -138,11 +170,10 @@ impl Device {
         self.bus.port().fpga()
     }
 
-    /// So much time passes, in which no whole round of the ring can come.
+    /// So much time passes.
     fn after(&mut self, micros: u64, bytes: &[u8]) {
         self.now.0 += micros;
         let now = self.now;
-        self.bus.port().now = now;
         let ports = &mut Ports { bus: &mut self.bus, sink: &mut self.link, loader: &mut NoLoader };
         let taken = self.camera.receive(now, bytes, &GOOD_INPUTS, ports);
         assert_eq!(taken, bytes.len());
@@ -178,9 +209,12 @@ impl Device {
     /// Stops the run, lets the patience with missing frames pass, and returns the event of its end.
     fn end(&mut self) -> (Vec<DeviceMessage<'static>>, EventKind) {
         let mut heard = self.ask(Command::Stop);
-        self.bus.port().transmit(|_| {});
-        // In short steps: a ring that the camera has not read for the whole time counts as overrun and is emptied.
-        self.turns(10_002);
+        for _ in 0..9 {
+            self.bus.port().transmit(|_| {});
+            self.turn();
+        }
+        self.after(100_001, &[]);
+        self.turns(3);
         heard.extend(self.heard());
         let [event] = events(&heard)[..] else { panic!("{heard:?}") };
         (heard, event)
@@ -263,23 +297,107 @@ fn a_full_link_drops_whole_packets_and_the_ring_goes_on() {
     assert_eq!(device.end().1, ended(201, 198, 0, 0));
 }
 
-/// The loop stood still while the DMA went round: some packets are gone, and the next ones come.
+/// What comes at once goes out at once: one loan, and no byte of it is copied.
 #[test]
-fn packets_that_the_dma_has_overwritten_count_as_damaged() {
+fn packets_that_follow_each_other_go_out_together() {
+    let mut device = Device::running(RunLength::Continuous);
+    device.link.holds = true;
+    let mut made = Vec::new();
+    for _ in 0..5 {
+        for _ in 0..9 {
+            made.push(device.frame());
+        }
+        device.turn();
+    }
+    assert_eq!(device.link.loans.len(), 5);
+    while !device.link.loans.is_empty() {
+        device.link.fetch();
+    }
+    assert_eq!(device.link.packets, made);
+    device.link.packets.clear();
+    device.link.holds = false;
+    assert_eq!(device.end().1, ended(45, 0, 0, 0));
+}
+
+/// The ring fills, the FPGA waits and loses frames. That is no stalled FPGA, and nothing is overwritten.
+#[test]
+fn a_host_that_stops_reading_makes_the_fpga_lose_whole_frames() {
+    let mut device = Device::running(RunLength::Continuous);
+    device.fpga().two_wait = true;
+    let mut begun = Vec::new();
+    for round in 0..40 {
+        // For four seconds of eight.
+        device.link.holds = (10..30).contains(&round);
+        for _ in 0..30 {
+            device.fpga().make_frame();
+            begun.extend(device.bus.port().transmit(|_| {}));
+            device.turn();
+        }
+        device.after(200_000, &[]);
+        while !device.link.holds && !device.link.loans.is_empty() {
+            device.link.fetch();
+        }
+        if round % 5 == 4 {
+            device.after(10, &packet(9, Command::Status));
+        }
+        assert_eq!(device.camera.state(), State::Running, "round {round}");
+    }
+    let mut packets = core::mem::take(&mut device.link.packets);
+    let (
+        heard,
+        EventKind::RunEnded {
+            frames_made,
+            frames_dropped: 0,
+            fpga_frames_lost,
+            fpga_frames_corrupt: 0,
+            ..
+        },
+    ) = device.end()
+    else {
+        panic!()
+    };
+    packets.retain(|packet| is_intact(packet).is_some());
+    assert_eq!(packets, begun[..packets.len()], "whole and in order");
+    assert_eq!(frames_made, 1200);
+    assert!(fpga_frames_lost > 400, "{fpga_frames_lost}");
+    let got = packets.len() + sequences(&heard).len();
+    assert_eq!(got as u32, frames_made - fpga_frames_lost);
+}
+
+/// What the FPGA could not send counts as dropped at the end of the run, because the host took nothing.
+#[test]
+fn frames_that_wait_for_a_host_that_reads_nothing_are_dropped_at_the_end() {
+    let mut device = Device::running(RunLength::Continuous);
+    device.link.holds = true;
+    for _ in 0..200 {
+        device.fpga().make_frame();
+        device.bus.port().transmit(|_| {});
+        device.turn();
+    }
+    let sent: u32 = device.link.loans.len() as u32;
+    let lost = device.fpga().lost;
+    assert!(lost > 100);
+    assert_eq!(device.end().1, ended(200, 200 - lost - sent, lost, 0));
+}
+
+/// The line on which the FPGA should wait is broken: packets are overwritten, and each is still counted once.
+#[test]
+fn packets_of_an_fpga_that_does_not_wait_count_as_damaged() {
     let mut device = Device::running(RunLength::Continuous);
     device.frame();
     device.turn();
     for _ in 0..100 {
+        device.bus.port().granted = usize::MAX;
         device.frame();
     }
-    // As long as the FPGA takes to send more than a round.
-    device.after(150, &[]);
+    device.turns(3);
+    let first = sequences(&device.heard());
     device.frame();
-    device.turns(2);
-    assert_eq!(sequences(&device.heard()), [0, 101]);
-    let Ok(status) = device.status() else { panic!() };
-    assert_eq!((status.frames_sent, status.fpga_frames_corrupt), (2, 100), "at once");
-    assert_eq!(device.end().1, ended(102, 0, 0, 100));
+    device.turn();
+    assert_eq!(sequences(&device.heard()), [101]);
+    let damaged = 102 - 1 - first.len() as u32;
+    assert!(first[0] == 0 && damaged > 60, "{damaged}");
+    assert_eq!(device.end().1, ended(102, 0, 0, damaged));
 }
 
 #[test]
@@ -484,6 +602,8 @@ enum Step {
     Cut(prop::sample::Index),
     Turn,
     Room(usize),
+    Holds(bool),
+    Fetch,
     Pause,
     Status,
 }
@@ -499,6 +619,8 @@ proptest! {
                 1 => any::<prop::sample::Index>().prop_map(Step::Cut),
                 6 => Just(Step::Turn),
                 1 => (0..5usize).prop_map(Step::Room),
+                2 => any::<bool>().prop_map(Step::Holds),
+                4 => Just(Step::Fetch),
                 1 => Just(Step::Pause),
                 1 => Just(Step::Status),
             ],
@@ -522,6 +644,8 @@ proptest! {
                 })),
                 Step::Turn => device.turn(),
                 Step::Room(room) => device.link.room = room,
+                Step::Holds(holds) => device.link.holds = holds || !device.link.loans.is_empty(),
+                Step::Fetch => device.link.fetch(),
                 Step::Pause => device.after(200, &[]),
                 Step::Status => {
                     device.link.room = device.link.room.max(1);
@@ -531,16 +655,20 @@ proptest! {
             got.append(&mut device.link.packets);
         }
         device.link.room = usize::MAX;
+        device.link.holds = true;
         device.after(10, &packet(8, Command::Stop));
-        made.extend(device.bus.port().transmit(|_| {}));
-        device.turns(200);
+        for _ in 0..200 {
+            made.extend(device.bus.port().transmit(|_| {}));
+            device.turn();
+            device.link.fetch();
+        }
         device.after(100_001, &[]);
         device.turns(3);
         got.append(&mut device.link.packets);
 
         let fpga = device.fpga();
         let (frames_made, fpga_frames_lost) = (fpga.made, fpga.lost);
-        let mut sent = 0;
+        let (mut whole, mut damaged) = (0, 0);
         let mut last = None;
         let mut counts = None;
         for packet in got {
@@ -551,17 +679,19 @@ proptest! {
                     prop_assert!(last < Some(frame.sequence), "{last:?}, then {}", frame.sequence);
                     last = Some(frame.sequence);
                     prop_assert!(made.contains(&packet), "the FPGA has sent no such packet");
-                    sent += 1;
+                    whole += 1;
                 }
                 Ok(DeviceMessage::Event(event)) => counts = Some(event.kind),
                 Ok(_) => {}
-                // A damaged frame, which the host sees by its checksum.
-                Err(_) => sent += 1,
+                // A damaged frame, or a piece of one, which the host sees by its checksum.
+                Err(_) => damaged += 1,
             }
         }
         let Some(EventKind::RunEnded { run: 1, frames_made: told, frames_dropped, fpga_frames_lost: lost, fpga_frames_corrupt }) = counts
         else { panic!("{counts:?}") };
         prop_assert_eq!((told, lost), (frames_made, fpga_frames_lost));
-        prop_assert_eq!(told, sent + frames_dropped + lost + fpga_frames_corrupt);
+        let Ok(nirspi_wire::Status { frames_sent, .. }) = device.status() else { panic!() };
+        prop_assert_eq!(told, frames_sent + frames_dropped + lost + fpga_frames_corrupt);
+        prop_assert!((whole..=whole + damaged).contains(&frames_sent));
     }
 }

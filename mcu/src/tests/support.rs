@@ -3,16 +3,18 @@
 
 use super::fake_fpga::FakeFpga;
 use crate::{
-    BoardInfo, Camera, GatewareLoader, Inputs, Limits, LoadError, Micros, PacketSink, Ports,
+    BoardInfo, Camera, GatewareLoader, Inputs, Limits, LoadError, Loan, Micros, PacketSink, Ports,
     Progress,
 };
 use core::ops::Range;
+use core::sync::atomic::Ordering;
 use nirspi_wire::packet::{MAX_HOST_PACKET, encode, open};
 use nirspi_wire::{
     Answer, Capabilities, Command, Configuration, DeviceMessage, Event, EventKind, Frame,
     PatternOrder, Refusal, Reply, Request, RunLength, SampleSource, Status, Tail, Version, version,
 };
 use std::boxed::Box;
+use std::collections::VecDeque;
 use std::vec::Vec;
 
 /// A link that takes `room` more packets.
@@ -22,12 +24,40 @@ pub struct Link {
     /// Number of claims that find no room before the next claim succeeds.
     pub refusals: u32,
     pub packets: Vec<Vec<u8>>,
+    /// The host does not fetch what lies in a ring until [`fetch`](Self::fetch) is called.
+    pub holds: bool,
+    /// What it has not fetched.
+    pub loans: VecDeque<Loan>,
     staging: Vec<u8>,
 }
 
 impl Default for Link {
     fn default() -> Self {
-        Self { room: usize::MAX, refusals: 0, packets: Vec::new(), staging: Vec::new() }
+        Self {
+            room: usize::MAX,
+            refusals: 0,
+            packets: Vec::new(),
+            holds: false,
+            loans: VecDeque::new(),
+            staging: Vec::new(),
+        }
+    }
+}
+
+impl Link {
+    /// The host fetches the first loan, which must be packets with zeros between them.
+    pub fn fetch(&mut self) {
+        let Some(mut loan) = self.loans.pop_front() else { return };
+        let mut bytes = Vec::new();
+        while !loan.is_over() {
+            let (words, length) = loan.next();
+            let words = words.iter().flat_map(|word| word.load(Ordering::Relaxed).to_le_bytes());
+            bytes.extend(words.take(length));
+            loan.sent(length);
+        }
+        assert_eq!(bytes.last(), Some(&0), "a whole packet");
+        let packets = bytes.split_inclusive(|byte| *byte == 0);
+        self.packets.extend(packets.filter(|packet| packet.len() > 1).map(<[u8]>::to_vec));
     }
 }
 
@@ -47,6 +77,18 @@ impl PacketSink for Link {
     fn commit(&mut self, part: Range<usize>) {
         self.room -= 1;
         self.packets.push(self.staging[part].to_vec());
+    }
+
+    fn lend(&mut self, loan: Loan) -> bool {
+        if self.room == 0 {
+            return false;
+        }
+        self.room -= 1;
+        self.loans.push_back(loan);
+        if !self.holds {
+            self.fetch();
+        }
+        true
     }
 }
 

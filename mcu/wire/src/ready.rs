@@ -114,13 +114,14 @@ pub const NUMBER_BYTES: usize = 10;
 /// Number of the run, and number of the frame in the run, of a packet that begins with these bytes.
 #[must_use]
 pub fn numbers(beginning: &[u8; NUMBER_BYTES]) -> (u16, u32) {
-    let mut bytes = Unstuffed { bytes: beginning, left: 0, owes_zero: false };
-    let head: [u8; NUMBER_BYTES - 1] = bytes.array();
-    let [_, run @ .., s0, s1, s2, s3, s4] = head;
-    let number = |bytes: &[u8]| {
-        bytes.iter().rev().fold(0, |number, byte| number << 7 | u32::from(byte & 0x7F))
-    };
-    (number(&run) as u16, number(&[s0, s1, s2, s3, s4]))
+    // Each code of COBS says where the next one is, and stands in the place of a zero.
+    let mut bytes = *beginning;
+    let mut code = usize::from(bytes[0]);
+    while let Some(zero) = bytes.get_mut(code) {
+        code += usize::from(core::mem::take(zero)).max(1);
+    }
+    let [_, _, r0, r1, r2, s0, s1, s2, s3, s4] = bytes.map(|byte| u32::from(byte & 0x7F));
+    ((r2 << 14 | r1 << 7 | r0) as u16, s4 << 28 | s3 << 21 | s2 << 14 | s1 << 7 | s0)
 }
 
 /// The samples of a packet, one after the other, straight from its encoded bytes. They count only if the packet

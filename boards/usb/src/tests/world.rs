@@ -43,10 +43,12 @@ pub enum Chip {
     Copying,
     /// The core reads whole packets out of memory.
     Dma,
+    /// The same, and out of the ring into which the FPGA's parallel port sends them.
+    Ring,
 }
 
 /// The drivers that boards have.
-pub const CHIPS: [Chip; 2] = [Chip::Copying, Chip::Dma];
+pub const CHIPS: [Chip; 3] = [Chip::Copying, Chip::Dma, Chip::Ring];
 
 /// Longest time that a host waits for a device, in rounds of the world. A host of flesh waits for
 /// seconds.
@@ -109,7 +111,7 @@ impl World {
         };
         let OutBuffer(buffer) = Box::leak(Box::new(OutBuffer::new()));
         let mut config = Config::default();
-        config.dma = chip == Chip::Dma;
+        config.dma = matches!(chip, Chip::Dma | Chip::Ring);
         let driver = Driver::new(buffer, instance, config);
         let presence: &'static Presence = Box::leak(Box::new(Presence::new()));
         let memory = Box::leak(Box::new(Memory::new(presence)));
@@ -119,9 +121,10 @@ impl World {
         pins.frame_us.set(FRAME_US);
         let link = Box::leak(Box::new(Link::new(std::vec![Packet::EMPTY; 8].leak())));
         let (camera, commands, packets) = link.split();
+        let port = FakeFpga::new(Rc::clone(&pins));
         let firmware = nirspi_app::Device {
             board: FakeBoard(Rc::clone(&pins)),
-            port: FakeFpga::new(Rc::clone(&pins)),
+            port: if chip == Chip::Ring { port.with_ring() } else { port },
             frame: Box::leak(Box::new([0; MAX_FRAME_BYTES])),
             spare: Some(Box::leak(Box::new([0; MAX_FRAME_BYTES]))),
             loader: NoLoader,

@@ -9,7 +9,7 @@ use core::future::pending;
 use core::ops::Range;
 use core::pin::pin;
 use core::ptr::null_mut;
-use core::sync::atomic::{AtomicU32, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use core::task::Waker;
 use embassy_executor::raw::Executor;
 use embassy_futures::poll_once;
@@ -30,9 +30,9 @@ use nirspi_usb::{BusSpeed, Endpoints, Memory, OutBuffer, PACKET_BYTES, Presence,
 use nirspi_wire::Version;
 use static_cell::{ConstStaticCell, StaticCell};
 
-const ENDPOINTS: usize = 9;
+pub const ENDPOINTS: usize = 9;
 /// Packets that wait in the link.
-const PLACES: usize = 4;
+pub const PLACES: usize = 4;
 /// Where a packet of 1024 samples of 32 bits lies in its place.
 const PACKET: Range<usize> = 2..4134;
 
@@ -42,10 +42,13 @@ const DIEPCTL1: usize = 0x920;
 const DIEPINT1: usize = 0x928;
 const DTXFSTS1: usize = 0x938;
 const DOEPCTL1: usize = 0xB20;
+const DOEPINT1: usize = 0xB28;
+const DOEPTSIZ1: usize = 0xB30;
 const FIFO1: usize = 0x2000;
 
 const ENUMDNE: u32 = 1 << 13;
 const IEPINT: u32 = 1 << 18;
+const OEPINT: u32 = 1 << 19;
 const XFRC: u32 = 1;
 const USBAEP: u32 = 1 << 15;
 const EPENA: u32 = 1 << 31;
@@ -56,14 +59,17 @@ fn register(offset: usize) -> &'static AtomicU32 {
     &REGISTERS[offset / 4]
 }
 
-/// A clock that stands, with the queue that embassy's drivers of time have.
+/// The time of the clock.
+static NOW_US: AtomicU32 = AtomicU32::new(1);
+
+/// A clock that moves when it is told so, with the queue that embassy's drivers of time have.
 struct Clock(Mutex<CriticalSectionRawMutex, RefCell<Queue>>);
 
 embassy_time_driver::time_driver_impl!(static CLOCK: Clock = Clock(Mutex::new(RefCell::new(Queue::new()))));
 
 impl embassy_time_driver::Driver for Clock {
     fn now(&self) -> u64 {
-        1
+        NOW_US.load(Ordering::Relaxed).into()
     }
 
     fn schedule_wake(&self, at: u64, waker: &Waker) {
@@ -76,12 +82,23 @@ impl embassy_time_driver::Driver for Clock {
     }
 }
 
+/// A millisecond passes, and wakes the tasks whose time has come.
+pub fn pass_millisecond() {
+    NOW_US.fetch_add(1_000, Ordering::Relaxed);
+    CLOCK.0.lock(|queue| queue.borrow_mut().next_expiration(NOW_US.load(Ordering::Relaxed).into()));
+}
+
 #[expect(unsafe_code, reason = "embassy looks for this name")]
 #[unsafe(export_name = "__pender")]
-fn pender(_context: *mut ()) {}
+fn pender(_context: *mut ()) {
+    PENDS.store(true, Ordering::Relaxed);
+}
+
+/// A task has been woken that has not run yet.
+static PENDS: AtomicBool = AtomicBool::new(false);
 
 /// The chip's endpoints, and a host that has configured the device.
-struct Chip(embassy_usb_synopsys_otg::Driver<'static, ENDPOINTS>);
+pub struct Chip(pub embassy_usb_synopsys_otg::Driver<'static, ENDPOINTS>);
 
 impl Driver<'static> for Chip {
     type EndpointOut = Endpoint<'static, Out>;
@@ -126,7 +143,7 @@ impl Driver<'static> for Chip {
 }
 
 /// Resets the bus, and configures the device.
-struct Host;
+pub struct Host;
 
 /// What the host has done.
 static STEPS: AtomicU32 = AtomicU32::new(0);
@@ -202,8 +219,8 @@ impl ControlPipe for Host {
     async fn accept_set_address(&mut self, _addr: u8) {}
 }
 
-#[embassy_executor::task(pool_size = 2)]
-async fn host(
+#[embassy_executor::task(pool_size = 3)]
+pub async fn host(
     endpoints: Endpoints<Chip>,
     commands: HostIn<'static>,
     packets: HostOut<'static, PACKET_BYTES>,
@@ -211,19 +228,95 @@ async fn host(
     serve(endpoints, commands, packets).await
 }
 
-fn poll(executor: &'static Executor) {
-    #[expect(unsafe_code, reason = "an executor is polled by its owner")]
-    // SAFETY: this is the only call, and the pender does not make it.
-    unsafe {
-        executor.poll();
+/// Runs the tasks that are woken, until none is.
+pub fn poll(executor: &'static Executor) {
+    loop {
+        PENDS.store(false, Ordering::Relaxed);
+        #[expect(unsafe_code, reason = "an executor is polled by its owner")]
+        // SAFETY: this is the only call, and the pender does not make it.
+        unsafe {
+            executor.poll();
+        }
+        if !PENDS.load(Ordering::Relaxed) {
+            break;
+        }
     }
+}
+
+fn registers() -> Otg {
+    #[expect(unsafe_code, reason = "registers are at an address")]
+    // SAFETY: the memory is as long as the registers that the driver uses here, and atomic.
+    unsafe {
+        Otg::from_ptr(REGISTERS.as_ptr().cast_mut().cast())
+    }
+}
+
+/// The driver of the chip.
+pub fn driver(
+    buffer: &'static mut [u8],
+    state: &'static State<ENDPOINTS>,
+    dma: bool,
+) -> embassy_usb_synopsys_otg::Driver<'static, ENDPOINTS> {
+    let instance = OtgInstance {
+        regs: registers(),
+        state,
+        fifo_depth_words: 1024,
+        endpoint_count: ENDPOINTS,
+        phy_type: PhyType::InternalHighSpeed,
+        extra_rx_fifo_words: 30,
+        calculate_trdt_fn: |_| 9,
+    };
+    let mut config = Config::default();
+    config.dma = dma;
+    embassy_usb_synopsys_otg::Driver::new(buffer, instance, config)
+}
+
+/// The interrupt, which has these flags of the core.
+fn interrupt(state: &'static State<ENDPOINTS>) {
+    #[expect(unsafe_code, reason = "an interrupt handler is called by the processor alone")]
+    // SAFETY: no code of the driver runs now.
+    unsafe {
+        on_interrupt(registers(), state, ENDPOINTS);
+    }
+}
+
+/// The core's DMA writes these bytes of the host into the endpoint's buffer.
+pub fn receive(bytes: &[u8], buffer: *mut u8, state: &'static State<ENDPOINTS>) {
+    #[expect(unsafe_code, reason = "the core writes where the driver has said")]
+    // SAFETY: the buffer has room for a packet, and belongs to the core until the interrupt.
+    unsafe {
+        buffer.copy_from_nonoverlapping(bytes.as_ptr(), bytes.len().min(PACKET_BYTES));
+    }
+    register(DOEPTSIZ1).store((PACKET_BYTES - bytes.len()) as u32, Ordering::Relaxed);
+    register(DOEPINT1).store(XFRC, Ordering::Relaxed);
+    register(DAINT).store(1 << 17, Ordering::Relaxed);
+    register(GINTSTS).store(OEPINT, Ordering::Relaxed);
+    interrupt(state);
+    register(GINTSTS).store(0, Ordering::Relaxed);
+}
+
+/// The host fetches all that the driver has to send. Returns counts of SysTick, and the number of transfers.
+pub fn send_all(executor: &'static Executor, state: &'static State<ENDPOINTS>) -> (u32, u32) {
+    let (mut cost, mut transfers) = (0, 0);
+    while register(DIEPCTL1).load(Ordering::Relaxed) & EPENA != 0 {
+        register(DIEPCTL1).fetch_and(!EPENA, Ordering::Relaxed);
+        register(DIEPINT1).store(XFRC, Ordering::Relaxed);
+        register(DAINT).store(1 << 1, Ordering::Relaxed);
+        register(GINTSTS).store(IEPINT, Ordering::Relaxed);
+        cost += counts(|| {
+            interrupt(state);
+            poll(executor);
+        });
+        register(GINTSTS).store(0, Ordering::Relaxed);
+        transfers += 1;
+    }
+    (cost, transfers)
 }
 
 /// Puts packets into the link, lets the driver send them, and returns the instructions of a transfer.
 fn transfers(
     executor: &'static Executor,
     state: &'static State<ENDPOINTS>,
-    registers: Otg,
     camera: &mut CameraEnd<'_>,
 ) -> u32 {
     let (_, sink) = camera.both();
@@ -233,23 +326,7 @@ fn transfers(
         }
     }
     poll(executor);
-    let (mut cost, mut transfers) = (0, 0);
-    while register(DIEPCTL1).load(Ordering::Relaxed) & EPENA != 0 {
-        register(DIEPCTL1).fetch_and(!EPENA, Ordering::Relaxed);
-        register(DIEPINT1).store(XFRC, Ordering::Relaxed);
-        register(DAINT).store(1 << 1, Ordering::Relaxed);
-        register(GINTSTS).store(IEPINT, Ordering::Relaxed);
-        cost += counts(|| {
-            #[expect(unsafe_code, reason = "an interrupt handler is called by the processor alone")]
-            // SAFETY: no code of the driver runs now.
-            unsafe {
-                on_interrupt(registers, state, ENDPOINTS);
-            }
-            poll(executor);
-        });
-        register(GINTSTS).store(0, Ordering::Relaxed);
-        transfers += 1;
-    }
+    let (cost, transfers) = send_all(executor, state);
     cost * GRAIN / transfers.max(1)
 }
 
@@ -261,7 +338,7 @@ pub fn count() -> [u32; 2] {
     static BUFFERS: ConstStaticCell<[OutBuffer; 2]> =
         ConstStaticCell::new([const { OutBuffer::new() }; 2]);
     static ROOMS: ConstStaticCell<[[Packet; PLACES]; 2]> =
-        ConstStaticCell::new([[Packet::EMPTY; PLACES]; 2]);
+        ConstStaticCell::new([const { [Packet::EMPTY; PLACES] }; 2]);
     static LINKS: StaticCell<[Link<'static>; 2]> = StaticCell::new();
     static EXECUTOR: StaticCell<Executor> = StaticCell::new();
 
@@ -270,25 +347,10 @@ pub fn count() -> [u32; 2] {
     let memories = MEMORIES.init([Memory::new(first), Memory::new(second)]);
     let links = LINKS.init(ROOMS.take().each_mut().map(|places| Link::new(places)));
     let buffers = BUFFERS.take();
-    #[expect(unsafe_code, reason = "registers are at an address")]
-    // SAFETY: the memory is as long as the registers that the driver uses here, and atomic.
-    let registers = unsafe { Otg::from_ptr(REGISTERS.as_ptr().cast_mut().cast()) };
-
     let mut counted = [0; 2];
     let parts = memories.iter_mut().zip(links).zip(buffers).zip(&STATES).zip([false, true]);
     for (counted, ((((memory, link), buffer), state), dma)) in counted.iter_mut().zip(parts) {
-        let instance = OtgInstance {
-            regs: registers,
-            state,
-            fifo_depth_words: 1024,
-            endpoint_count: ENDPOINTS,
-            phy_type: PhyType::InternalHighSpeed,
-            extra_rx_fifo_words: 30,
-            calculate_trdt_fn: |_| 9,
-        };
-        let mut config = Config::default();
-        config.dma = dma;
-        let driver = embassy_usb_synopsys_otg::Driver::new(&mut buffer.0, instance, config);
+        let driver = driver(&mut buffer.0, state, dma);
         let (mut device, endpoints) = device(Chip(driver), "", Version(0, 0, 0), memory);
         let _ = poll_once(pin!(device.run()));
         let (mut camera, commands, packets) = link.split();
@@ -297,8 +359,8 @@ pub fn count() -> [u32; 2] {
         }
         poll(executor);
         // The first packets find caches of nothing, but a task that has just begun.
-        transfers(executor, state, registers, &mut camera);
-        *counted = transfers(executor, state, registers, &mut camera);
+        transfers(executor, state, &mut camera);
+        *counted = transfers(executor, state, &mut camera);
     }
     counted
 }
