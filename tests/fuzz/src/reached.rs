@@ -1,0 +1,54 @@
+//! Which edges of the program inputs reach, from the counters that the compiler has put there.
+
+use nirspi_fuzz::Law;
+use std::fmt::Write as _;
+use std::path::Path;
+
+// The linker sets these names around the sections of the compiler's counters and of the table of
+// places, two words for each counter: address and flags.
+#[expect(unsafe_code, reason = "the counters are the compiler's, and have no other names")]
+unsafe extern "C" {
+    #[link_name = "__start___sancov_cntrs"]
+    static mut COUNTERS: u8;
+    #[link_name = "__stop___sancov_cntrs"]
+    static mut COUNTERS_END: u8;
+    #[link_name = "__start___sancov_pcs"]
+    static PLACES: [usize; 2];
+    #[link_name = "__executable_start"]
+    static PROGRAM: u8;
+}
+
+/// Tries every file of the folders, and writes a line for each edge of the program: its address in
+/// the executable in hexadecimal, and 1 if an input has reached it.
+pub fn write(file: &Path, folders: &[String], law: &Law) {
+    let start = &raw mut COUNTERS;
+    let count = (&raw mut COUNTERS_END) as usize - start as usize;
+    let mut reached = vec![false; count];
+    let clear = || {
+        // SAFETY: the section has so many bytes, and no other thread needs their values.
+        #[expect(unsafe_code, reason = "the counters are the compiler's")]
+        unsafe { start.write_bytes(0, count) }
+    };
+    for folder in folders {
+        for entry in Path::new(folder).read_dir().expect("a folder of inputs") {
+            let bytes = std::fs::read(entry.expect("an input").path()).expect("its bytes");
+            clear();
+            law.check(&bytes);
+            for (at, reached) in reached.iter_mut().enumerate() {
+                // SAFETY: within the section.
+                #[expect(unsafe_code, reason = "the counters are the compiler's")]
+                let counter = unsafe { start.add(at).read_volatile() };
+                *reached |= counter != 0;
+            }
+        }
+    }
+    let (places, program) = (&raw const PLACES, &raw const PROGRAM as usize);
+    let mut lines = String::new();
+    for (at, reached) in reached.into_iter().enumerate() {
+        // SAFETY: the table has an entry for each counter.
+        #[expect(unsafe_code, reason = "the table is the compiler's")]
+        let [address, _] = unsafe { places.add(at).read() };
+        let _ = writeln!(lines, "{:#x} {}", address - program, u8::from(reached));
+    }
+    std::fs::write(file, lines).expect("the edges' file");
+}
