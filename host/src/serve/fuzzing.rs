@@ -34,6 +34,9 @@ const SCENE_PX: usize = 64;
 const PATIENCE: Duration = Duration::from_secs(5);
 /// The most bytes that are taken of an answer.
 const MOST: usize = 1 << 20;
+/// An event stream goes on for as long as its client reads. This one reads no longer than this.
+const STREAM: Duration = Duration::from_millis(5);
+const IS_STREAM: &[u8] = b"text/event-stream";
 
 /// Which server a client connects to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -120,7 +123,9 @@ impl Still {
         let stuck = |what: &str| Stuck(format!("{what} at {place:?}"));
         self.runtime.block_on(async {
             let talked = timeout(PATIENCE, talk(client, server, bytes)).await;
-            talked.map_err(|_| stuck("the connection does not end"))?.map_err(|error| stuck(&error.to_string()))
+            talked
+                .map_err(|_| stuck("the connection does not end"))?
+                .map_err(|error| stuck(&error.to_string()))
         })
     }
 
@@ -159,15 +164,22 @@ async fn talk(client: Ipv4Addr, server: SocketAddr, bytes: &[u8]) -> std::io::Re
     Ok(heard)
 }
 
-/// Reads to the end of the connection.
+/// Reads to the end of the connection. Of an event stream, reads what comes at once.
 async fn hear(stream: &TcpStream, heard: &mut Vec<u8>) {
     let mut room = [0; 1 << 14];
-    while heard.len() < MOST && stream.readable().await.is_ok() {
+    while heard.len() < MOST {
+        let streams = heard.windows(IS_STREAM.len()).any(|part| part == IS_STREAM);
+        let readable = match streams {
+            true => timeout(STREAM, stream.readable()).await.unwrap_or(Ok(())),
+            false => stream.readable().await,
+        };
         match stream.try_read(&mut room) {
-            Ok(0) => return,
-            Ok(length) => heard.extend_from_slice(room.get(..length).unwrap_or(&[])),
-            Err(error) if error.kind() == std::io::ErrorKind::WouldBlock => {}
-            Err(_) => return,
+            Ok(length @ 1..) => heard.extend_from_slice(room.get(..length).unwrap_or(&[])),
+            Err(error) if error.kind() == std::io::ErrorKind::WouldBlock && !streams => {}
+            _ => return,
+        }
+        if readable.is_err() {
+            return;
         }
     }
 }

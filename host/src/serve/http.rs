@@ -14,6 +14,7 @@ use super::server::Server;
 use super::state::Published;
 use super::token::{self, Token};
 use super::{Shared, commands, foxglove, guard, page};
+use crate::causes::printable;
 use crate::files::image::encode_grey;
 use crate::files::npy;
 use axum::Router;
@@ -200,9 +201,9 @@ fn refused(app: &App, request: &Request) -> Option<Response> {
     None
 }
 
-/// A response of one line.
+/// A response of one line, in which nothing of the request can steer a terminal.
 pub fn line(status: StatusCode, text: &impl ToString) -> Response {
-    (status, format!("{}\n", text.to_string())).into_response()
+    (status, format!("{}\n", printable(&text.to_string()))).into_response()
 }
 
 async fn nothing_there() -> Response {

@@ -5,29 +5,42 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 // The linker sets these names around the sections of the compiler's counters and of the table of
-// places, two words for each counter: address and flags.
+// places. Rust must not declare them: the pass that counts declares them too, and would call its own by
+// another name.
+std::arch::global_asm!(
+    ".pushsection .data.rel.ro,\"aw\"",
+    ".globl nirspi_fuzz_bounds",
+    ".p2align 3",
+    "nirspi_fuzz_bounds:",
+    ".quad __start___sancov_cntrs",
+    ".quad __stop___sancov_cntrs",
+    ".quad __start___sancov_pcs",
+    ".quad __executable_start",
+    ".popsection",
+);
+
 #[expect(unsafe_code, reason = "the counters are the compiler's, and have no other names")]
 unsafe extern "C" {
-    #[link_name = "__start___sancov_cntrs"]
-    static mut COUNTERS: u8;
-    #[link_name = "__stop___sancov_cntrs"]
-    static mut COUNTERS_END: u8;
-    #[link_name = "__start___sancov_pcs"]
-    static PLACES: [usize; 2];
-    #[link_name = "__executable_start"]
-    static PROGRAM: u8;
+    /// Begin and end of the counters, begin of the table of places, begin of the program.
+    #[link_name = "nirspi_fuzz_bounds"]
+    safe static BOUNDS: [usize; 4];
 }
 
 /// Tries every file of the folders, and writes a line for each edge of the program: its address in
 /// the executable in hexadecimal, and 1 if an input has reached it.
 pub fn write(file: &Path, folders: &[String], law: &Law) {
-    let start = &raw mut COUNTERS;
-    let count = (&raw mut COUNTERS_END) as usize - start as usize;
+    let [start, end, places, program] = BOUNDS;
+    let count = end - start;
+    let start = std::ptr::with_exposed_provenance_mut::<u8>(start);
+    // Two words for each counter: address and flags.
+    let places = std::ptr::with_exposed_provenance::<[usize; 2]>(places);
     let mut reached = vec![false; count];
     let clear = || {
         // SAFETY: the section has so many bytes, and no other thread needs their values.
         #[expect(unsafe_code, reason = "the counters are the compiler's")]
-        unsafe { start.write_bytes(0, count) }
+        unsafe {
+            start.write_bytes(0, count)
+        }
     };
     for folder in folders {
         for entry in Path::new(folder).read_dir().expect("a folder of inputs") {
@@ -42,7 +55,6 @@ pub fn write(file: &Path, folders: &[String], law: &Law) {
             }
         }
     }
-    let (places, program) = (&raw const PLACES, &raw const PROGRAM as usize);
     let mut lines = String::new();
     for (at, reached) in reached.into_iter().enumerate() {
         // SAFETY: the table has an entry for each counter.

@@ -39,7 +39,12 @@ pub const LAWS: &[Law] = &[
     Law {
         name: "answers-of-the-fpga",
         reads: "what an FPGA answers to the firmware: registers, frames, bursts, damaged or not",
-        readers: &["mcu/src/host_port.rs", "mcu/src/fpga.rs", "mcu/src/selftest.rs", "mcu/src/burst.rs"],
+        readers: &[
+            "mcu/src/host_port.rs",
+            "mcu/src/fpga.rs",
+            "mcu/src/selftest.rs",
+            "mcu/src/burst.rs",
+        ],
         holds: answers,
         seeds: answer_seeds,
         longest: 2048,
@@ -118,10 +123,14 @@ fn commands(bytes: &[u8]) {
         camera.set_interlock(closed);
         camera.set_temperature((what & 0x40 == 0).then_some(i16::from(what) * 50));
         // Noise on the line, or a command.
-        if what & 0x80 == 0 { camera.receive(&sealed(payload)) } else { camera.receive(payload) }
+        if what & 0x80 == 0 {
+            camera.receive(&sealed(payload))
+        } else {
+            camera.receive(payload)
+        }
         camera.step(u32::from(what >> 1 & 0xF) * 64);
         assert!(closed || !camera.fpga().leds_on(), "lit with an open interlock");
-        assert!(!camera.fpga().leds_on() || camera.state() == State::Running || closed);
+        assert!(closed || camera.state() != State::Running, "a run with an open interlock");
         let waiting = camera.packets_out().waiting();
         hears(waiting);
         let length = if what & 0x20 == 0 { waiting.len() } else { 0 };
@@ -152,9 +161,9 @@ fn command_seeds() -> Vec<Vec<u8>> {
         Command::Status,
         Command::Reboot(nirspi_wire::RebootInto::Application),
     ];
-    let more = more.into_iter().flat_map(|command| {
-        piece(0x1E, &seeds::payload(&seeds::packet(9, command)))
-    });
+    let more = more
+        .into_iter()
+        .flat_map(|command| piece(0x1E, &seeds::payload(&seeds::packet(9, command))));
     vec![run, more.collect()]
 }
 
@@ -285,7 +294,8 @@ fn transfer(bus: &mut PortBus<'_, AnyFpga<'_>>, camera: &mut Camera, sink: &mut 
 
 fn answer_seeds() -> Vec<Vec<u8>> {
     let quiet = vec![1; 400];
-    let sound: Vec<u8> = (0..600).map(|at| if at % 5 == 0 { 0xE0 } else { (at % 3) as u8 }).collect();
+    let sound: Vec<u8> =
+        (0..600).map(|at| if at % 5 == 0 { 0xE0 } else { (at % 3) as u8 }).collect();
     vec![quiet, sound]
 }
 
@@ -328,7 +338,8 @@ fn mended(packet: Vec<u8>) -> Vec<u8> {
     // The framing undone by hand: a zero for each code but the first.
     let (mut payload, mut rest) = (Vec::new(), &packet[..packet.len() - 1]);
     while let Some((&code, after)) = rest.split_first() {
-        let Some((block, after)) = after.split_at_checked(usize::from(code).saturating_sub(1)) else {
+        let Some((block, after)) = after.split_at_checked(usize::from(code).saturating_sub(1))
+        else {
             return packet;
         };
         payload.extend(block);
@@ -378,11 +389,8 @@ impl Subscribe for Published {
 
 fn relay(bytes: &[u8]) {
     let packets: VecDeque<_> = seeds::packets(bytes).into_iter().map(mended).collect();
-    let announced = Announcement {
-        identity: seeds::identity().clone(),
-        setup: seeds::setup(),
-        settling: None,
-    };
+    let announced =
+        Announcement { identity: seeds::identity().clone(), setup: seeds::setup(), settling: None };
     let link = RelayLink::new(announced, Box::new(Published(packets)));
     talk(Box::new(link));
 }

@@ -166,7 +166,11 @@ fn options() -> Options {
         names.iter().map(|(name, takes)| ((*name).to_owned(), *takes)).collect()
     };
     let capture = Options {
-        own: own(&[("frames", Takes::Value), ("distance-m", Takes::Value), ("json", Takes::Nothing)]),
+        own: own(&[
+            ("frames", Takes::Value),
+            ("distance-m", Takes::Value),
+            ("json", Takes::Nothing),
+        ]),
         commands: BTreeMap::new(),
     };
     let commands = BTreeMap::from([("capture".to_owned(), capture)]);

@@ -78,7 +78,8 @@ fn bitstreams(bytes: &[u8]) {
     let mut loader = StagingLoader::new(AnyChip { answers, sent: 0 }, &mut memory, None);
     let total = 2 * u32::from(total);
     assert_eq!(loader.begin(total).is_ok(), total as usize <= ROOM);
-    let taken = bitstream.chunks(usize::from(piece).max(1)).all(|piece| loader.write(piece).is_ok());
+    let taken =
+        bitstream.chunks(usize::from(piece).max(1)).all(|piece| loader.write(piece).is_ok());
     assert_eq!(taken, bitstream.len() <= ROOM, "{} bytes in {ROOM}", bitstream.len());
     if !taken {
         return;

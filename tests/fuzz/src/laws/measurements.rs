@@ -100,7 +100,13 @@ fn selections() -> [Selection; 4] {
     let shown = Selection { shown: Some(Order::Natural), side, ..Selection::default() };
     [
         Selection::default(),
-        Selection { index: Some(1), patterns_first: true, transpose: true, side, ..Selection::default() },
+        Selection {
+            index: Some(1),
+            patterns_first: true,
+            transpose: true,
+            side,
+            ..Selection::default()
+        },
         shown.clone(),
         Selection { decimal_comma: true, form: Some(measurement::Form::Single), ..shown },
     ]
@@ -127,7 +133,8 @@ fn one_file(path: &Path, want: &Selection) {
     let (count, patterns) = (several.len(), several.patterns());
     let index = want.index.unwrap_or(0);
     assert!(index < count);
-    let all = several.each(Ok::<_, nirspi::files::FileError>).map_err(|error| crate::refused(&error));
+    let all =
+        several.each(Ok::<_, nirspi::files::FileError>).map_err(|error| crate::refused(&error));
     if let Ok(all) = &all {
         assert_eq!(all.len(), count);
         // NaN in the file's own image differs from itself.
@@ -140,7 +147,9 @@ fn one_file(path: &Path, want: &Selection) {
         assert!(whole.is_some() || all.is_err(), "a block is refused and its parts are read");
         if let (Some(_), Ok(all)) = (whole, &all) {
             for (one, values) in all.iter().zip(block.chunks(patterns)) {
-                let Readings::Differential(found) = &one.readings else { panic!("{:?}", one.readings) };
+                let Readings::Differential(found) = &one.readings else {
+                    panic!("{:?}", one.readings)
+                };
                 let kept: Vec<f64> = one.places.iter().map(|&place| values[place]).collect();
                 assert_eq!(found, &kept, "another block");
             }
@@ -297,7 +306,8 @@ fn arrays(bytes: &[u8]) {
 fn array_seeds() -> Vec<Vec<u8>> {
     let values: [f32; 12] = std::array::from_fn(|at| at as f32 / 12.0);
     let header = |descr: &str, fortran: &str, shape: &str, data: &[u8]| {
-        let text = format!("{{'descr': '{descr}', 'fortran_order': {fortran}, 'shape': {shape}, }}\n");
+        let text =
+            format!("{{'descr': '{descr}', 'fortran_order': {fortran}, 'shape': {shape}, }}\n");
         let length = (text.len() as u16).to_le_bytes();
         [&b"\x93NUMPY\x01\x00"[..], &length, text.as_bytes(), data].concat()
     };

@@ -67,7 +67,9 @@ fn picture(bytes: &[u8]) {
         return;
     }
     let small = grey.resized(3);
-    assert!(small.values.len() == 9 && small.values.iter().all(|value| (0.0..=1.0).contains(value)));
+    assert!(
+        small.values.len() == 9 && small.values.iter().all(|value| (0.0..=1.0).contains(value))
+    );
     let again = place::file("again.png", &encode_grey(width, height, &grey.values));
     let back = read_grey(&again).expect("our own file");
     assert_eq!((back.width, back.height), (grey.width, grey.height));

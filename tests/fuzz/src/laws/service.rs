@@ -175,7 +175,8 @@ fn http_seeds() -> Vec<Vec<u8>> {
 }
 
 /// The opening of a viewer that says everything right.
-const OPENING: &[u8] = b"GET / HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n\
+const OPENING: &[u8] =
+    b"GET / HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n\
     Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\
     Sec-WebSocket-Protocol: foxglove.websocket.v1\r\n\r\n";
 
@@ -246,10 +247,12 @@ fn websocket_seeds() -> Vec<Vec<u8>> {
         [&[0x80 | operation][..], &length, &mask, body].concat()
     };
     let text = |json: &str| frame(1, json.as_bytes());
-    let subscribe = r#"{"op":"subscribe","subscriptions":[{"id":7,"channelId":1},{"id":8,"channelId":3}]}"#;
+    let subscribe =
+        r#"{"op":"subscribe","subscriptions":[{"id":7,"channelId":1},{"id":8,"channelId":3}]}"#;
     vec![
         [vec![0], text(subscribe), text(r#"{"op":"unsubscribe","subscriptionIds":[7]}"#)].concat(),
-        [vec![0], text(r#"{"op":"setParameters"}"#), frame(9, b"hello"), frame(8, &[3, 232])].concat(),
+        [vec![0], text(r#"{"op":"setParameters"}"#), frame(9, b"hello"), frame(8, &[3, 232])]
+            .concat(),
         [vec![0], frame(2, &[1, 2])].concat(),
         [vec![0], text(r#"{"op":"subscribe"}"#)].concat(),
         [&[1][..], OPENING].concat(),
