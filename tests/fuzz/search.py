@@ -89,7 +89,7 @@ class Law:
         what = f"{panicked[1]}: {panicked[2]}" if panicked else ended[1] if ended else log[-300:].replace("\n", " ")
         file = saved[1] if saved else "no file"
         again = f"python3 tests/fuzz/search.py --try {file} {self.name}"
-        return f"fuzz: law {self.name}: {what[:300]}; {file}; again: {again}"
+        return f"fuzz: law {self.name}, after {self.seconds:.0f} s: {what[:300]}; {file}; again: {again}"
 
     def edges(self) -> dict[str, bool]:
         """The program's edges by address, and whether an input of the corpus reaches them."""
