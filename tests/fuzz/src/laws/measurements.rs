@@ -144,7 +144,15 @@ fn one_file(path: &Path, want: &Selection) {
         assert_eq!((stack.count(), stack.rows().len()), (count, patterns));
         let mut block = vec![0.0; count * patterns];
         let whole = read(stack.read_into(&mut block));
-        assert!(whole.is_some() || all.is_err(), "a block is refused and its parts are read");
+        assert_eq!(whole.is_some(), all.is_ok(), "block and parts are not refused alike");
+        let mut copy = vec![0.0; count * patterns];
+        let mapped = stack.map_into(&mut copy, |values, places| {
+            places.copy_from_slice(values);
+            Some(())
+        });
+        if let Some(Some(_)) = read(mapped) {
+            assert!(whole.is_some() && copy == block, "another block piece by piece");
+        }
         if let (Some(_), Ok(all)) = (whole, &all) {
             for (one, values) in all.iter().zip(block.chunks(patterns)) {
                 let Readings::Differential(found) = &one.readings else {
@@ -263,6 +271,13 @@ fn field_seeds() -> Vec<Vec<u8>> {
         field("recon", npy::encode(&[3, 2, 2], &d.map(|value| value as f32))),
         field("simulated", npy::encode(&[], &[1_i64])),
     ];
+    let one_image = [
+        vec![0],
+        n(),
+        rows(),
+        field("d", npy::encode(&[3, 4], &d)),
+        field("recon", npy::encode(&[2, 2], &d[..4])),
+    ];
     let pairs = [vec![1], n(), rows(), field("y", npy::encode(&[8], &d[..8]))];
     let problem = [
         vec![0],
@@ -270,7 +285,7 @@ fn field_seeds() -> Vec<Vec<u8>> {
         field("Y", npy::encode(&[2, 3], &d[..6])),
         field("k", npy::encode(&[], &[2_i64])),
     ];
-    vec![differences.concat(), pairs.concat(), problem.concat()]
+    vec![differences.concat(), pairs.concat(), problem.concat(), one_image.concat()]
 }
 
 fn arrays(bytes: &[u8]) {
