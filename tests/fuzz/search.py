@@ -15,6 +15,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tempfile
 import time
 
 HERE = pathlib.Path(__file__).resolve().parent
@@ -56,7 +57,12 @@ class Law:
         """Runs the search of this law."""
         environment = os.environ | {"FUZZ_LAW": self.name, "RAYON_NUM_THREADS": "1"} | more
         command = [self.search, *arguments]
-        return subprocess.run(command, env=environment, capture_output=True, text=True, errors="replace")
+        memory = "/dev/shm" if os.path.isdir("/dev/shm") else None
+        with tempfile.TemporaryDirectory(prefix="nirspi-fuzz-", dir=memory) as place:
+            environment["FUZZ_PLACE"] = place
+            return subprocess.run(
+                command, check=False, env=environment, capture_output=True, text=True, errors="replace"
+            )
 
     def explore(self, seconds: int) -> None:
         """Tries seeds and known findings, then searches."""

@@ -299,12 +299,9 @@ fn answer_seeds() -> Vec<Vec<u8>> {
     vec![quiet, sound]
 }
 
-/// A link on which the camera sends these bytes and hangs up.
-struct Said {
-    bytes: VecDeque<u8>,
-    /// Bytes that come at once.
-    at_once: usize,
-}
+/// A link on which the camera sends these packets and hangs up. They come one at a time, so that an answer comes
+/// after its question.
+struct Said(VecDeque<Vec<u8>>);
 
 impl Link for Said {
     fn send(&mut self, _: &[u8]) -> io::Result<()> {
@@ -312,19 +309,24 @@ impl Link for Said {
     }
 
     fn receive(&mut self, buffer: &mut [u8], _: Duration) -> io::Result<Received> {
-        let length = self.at_once.min(buffer.len()).min(self.bytes.len());
-        for (to, byte) in buffer.iter_mut().zip(self.bytes.drain(..length)) {
+        let Some(packet) = self.0.front_mut() else { return Ok(Received::Closed) };
+        let length = packet.len().min(buffer.len());
+        for (to, byte) in buffer.iter_mut().zip(packet.drain(..length)) {
             *to = byte;
         }
-        Ok(if length == 0 { Received::Closed } else { Received::Bytes(length) })
+        if packet.is_empty() {
+            self.0.pop_front();
+        }
+        Ok(Received::Bytes(length))
     }
 }
 
 fn session(bytes: &[u8]) {
+    let as_they_come = seeds::packets(bytes);
     // Packets with a wrong checksum get a right one, which no search finds.
-    let mended: Vec<u8> = seeds::packets(bytes).into_iter().flat_map(mended).collect();
-    for (stream, at_once) in [(bytes, 4096), (&mended, 64)] {
-        talk(Box::new(Said { bytes: stream.iter().copied().collect(), at_once }));
+    let mended = as_they_come.iter().cloned().map(mended).collect();
+    for packets in [as_they_come.into(), mended] {
+        talk(Box::new(Said(packets)));
     }
 }
 

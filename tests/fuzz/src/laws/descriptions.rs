@@ -49,7 +49,7 @@ pub const LAWS: &[Law] = &[
     Law {
         name: "orders",
         reads: "an order table (text)",
-        readers: &["host/src/files/order_table.rs", "host/recon/src/order.rs"],
+        readers: &["host/src/files/order_table.rs", "host/recon/src/rows.rs"],
         holds: orders,
         seeds: order_seeds,
         longest: 6144,
