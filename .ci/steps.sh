@@ -46,6 +46,7 @@ by_name=(
     "miri            unit tests of the wire protocol in Rust's interpreter, which sees undefined behaviour; rustup's nightly with miri"
     "loom            the live page's hand-overs between threads, in every order of the threads; crates.io"
     "page-faults     deliberate faults in the live page's JavaScript are seen; Debian's Chromium, PyPI"
+    "fuzz            a search for bytes that break a reader's law, FUZZ_S seconds for each (4); a C++ compiler, crates.io"
     "coverage        lines of each reader that its tests with damaged bytes reach; rustup's llvm-tools"
     "crowd           nirspi serve among 1000 clients that misbehave, for CROWD_S seconds (600)"
     "zenoh           a camera over Zenoh: router, camera and host as processes; crates.io, 219 crates of which 95 are its own"
@@ -87,6 +88,7 @@ software_vulkan() { debian mesa-vulkan-drivers libvulkan1 || echo "no software V
 step_format() {
     cargo fmt --all --check
     (cd boards && RUSTUP_TOOLCHAIN=$toolchain cargo fmt --all --check)
+    cargo fmt --manifest-path tests/fuzz/Cargo.toml --check
 }
 
 step_typos() {
@@ -453,6 +455,12 @@ step_miri() {
 step_loom() { CARGO_TARGET_DIR=$PWD/target/loom cargo test --locked --manifest-path tests/loom/Cargo.toml --test models; }
 
 step_page_faults() { in_browser faults.py; }
+
+# libFuzzer is C++; the rest is stable Rust. A workspace of its own, with counters in every crate.
+step_fuzz() {
+    command -v c++ >/dev/null || debian g++
+    python3 tests/fuzz/search.py
+}
 
 step_coverage() {
     if ! rustup component add llvm-tools >&2; then

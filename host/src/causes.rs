@@ -3,11 +3,17 @@
 //! # Invariant
 //! An error of this workspace describes its own level. Its cause is its `source()` and not part of
 //! its message, so a printed chain tells every cause once
-//! (`tests::every_level_is_told_once_and_in_one_line`).
+//! (`tests::every_level_is_told_once_and_in_one_line`). Names and texts of a file cannot steer the
+//! terminal that shows the line (`tests::a_file_cannot_steer_the_terminal_that_shows_its_error`).
 
 use std::error::Error;
 
-/// The error's message, then each cause after a colon.
+/// The most characters of a line, and those that stay of the beginning and of the end of a longer one.
+const LONGEST: usize = 2000;
+const KEPT: [usize; 2] = [1500, 400];
+
+/// The error's message, then each cause after a colon, as one [`printable`] line. Of a line of more than
+/// 2000 characters the middle is left out, because a file can hold a name of any length.
 #[must_use]
 pub fn in_one_line(error: &(dyn Error + 'static)) -> String {
     let mut line = error.to_string();
@@ -17,10 +23,19 @@ pub fn in_one_line(error: &(dyn Error + 'static)) -> String {
         line.push_str(&error.to_string());
         cause = error.source();
     }
-    line.replace('\n', " ")
+    cut(printable(line.replace('\n', " ").trim_end()))
 }
 
-/// A text from a device as a part of one line: control characters, which could move a terminal's
+fn cut(line: String) -> String {
+    let count = line.chars().count();
+    if count <= LONGEST {
+        return line;
+    }
+    let [first, last] = KEPT;
+    line.chars().take(first).chain(" ... ".chars()).chain(line.chars().skip(count - last)).collect()
+}
+
+/// A text from a device, a file or a client as a part of one line: control characters, which could move a terminal's
 /// cursor or forge a line, are escaped.
 #[must_use]
 pub fn printable(text: &str) -> String {
@@ -50,5 +65,30 @@ mod tests {
         assert_eq!(in_one_line(&session), "the link to the camera failed: no cable");
         let recording = RecordingError::Io { path: "a.mcap".into(), source: cause() };
         assert_eq!(in_one_line(&recording), "a.mcap: cannot read the recording: no cable");
+    }
+
+    #[test]
+    fn a_file_cannot_steer_the_terminal_that_shows_its_error() {
+        let error = RecordingError::Damaged {
+            path: "a.mcap".into(),
+            part: "setup",
+            reason: "unknown field `\u{1b}[2J\r\u{2028}`\n".to_owned(),
+        };
+        let line = in_one_line(&error);
+        assert!(line.ends_with(r"unknown field `\u{1b}[2J\r\u{2028}`"), "{line:?}");
+        assert!(!line.contains(char::is_control), "{line:?}");
+    }
+
+    /// Found by `tests/fuzz`: the name of an unknown field fills a terminal.
+    #[test]
+    fn of_a_very_long_line_beginning_and_end_stay() {
+        let error = RecordingError::Damaged {
+            path: "a.mcap".into(),
+            part: "setup",
+            reason: format!("unknown field `{}`, expected `order`", "ä".repeat(1 << 20)),
+        };
+        let line = in_one_line(&error);
+        assert!(line.starts_with("a.mcap: the recording's setup does not read: unknown field `ää"));
+        assert!(line.ends_with("ää`, expected `order`") && line.chars().count() <= LONGEST);
     }
 }

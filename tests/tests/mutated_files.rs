@@ -1,7 +1,7 @@
 //! Files of every kind that the program reads, damaged in many ways: each is read, or refused in one line that
-//! is no panic, soon, whatever the bytes. The cases are few enough for every run and always the same; the fuzz
-//! targets under `tests/fuzz` search for longer, on nightly Rust. Damaged `.mat`, HDF5 and JPEG files are in the unit
-//! tests of their readers (`files::fields`, `files::image`).
+//! is no panic, soon, whatever the bytes. The cases are few enough for every run and always the same; `tests/fuzz`
+//! searches for others (`bash .ci/run fuzz`). Damaged `.mat`, HDF5 and JPEG files are in the unit tests of their
+//! readers (`files::fields`, `files::image`).
 
 #![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
 

@@ -14,6 +14,7 @@ use super::server::Server;
 use super::state::Published;
 use super::token::{self, Token};
 use super::{Shared, commands, foxglove, guard, page};
+use crate::causes::printable;
 use crate::files::image::encode_grey;
 use crate::files::npy;
 use axum::Router;
@@ -30,11 +31,12 @@ use nirspi_nets::{deblur, fusion};
 use serde::Serialize;
 use std::convert::Infallible;
 use std::io;
-use std::net::SocketAddr;
+use std::net::{SocketAddr, TcpListener};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 use tokio::sync::watch;
+use tokio::task::JoinHandle;
 
 /// Time between two checks whether the server stops.
 const TICK: Duration = Duration::from_millis(50);
@@ -77,26 +79,10 @@ pub fn run(
     published: watch::Receiver<Arc<Published>>,
     is_over: impl Fn() -> bool,
 ) -> io::Result<()> {
-    let Server { listener, token, address: listen, foxglove } = server;
-    let app = App { shared, published, listen, token };
-    let mut servers = Vec::new();
-    if let Some(foxglove) = foxglove {
-        let Server { listener, token, address: listen, .. } = *foxglove;
-        servers.push((listener, foxglove::routes(App { listen, token, ..app.clone() })));
-    }
-    servers.push((listener, routes(app)));
+    let routers = routers(server, &shared, &published);
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
     runtime.block_on(async move {
-        // The limits hold for both servers together.
-        let connections = Connections::default();
-        let mut serving = Vec::new();
-        for (listener, router) in servers {
-            listener.set_nonblocking(true)?;
-            let listener = tokio::net::TcpListener::from_std(listener)?;
-            let door = Door::new(listener, connections.clone());
-            let service = router.into_make_service_with_connect_info::<Peer>();
-            serving.push(tokio::spawn(async move { serve(door, service).await }));
-        }
+        let mut serving = begin(routers)?;
         loop {
             if let Some(ended) = serving.iter_mut().find(|serving| serving.is_finished()) {
                 return ended.await.map_err(io::Error::other)?;
@@ -107,6 +93,39 @@ pub fn run(
             tokio::time::sleep(TICK).await;
         }
     })
+}
+
+/// The listeners of a server, each with what it answers.
+pub(super) fn routers(
+    server: Server,
+    shared: &Arc<Shared>,
+    published: &watch::Receiver<Arc<Published>>,
+) -> Vec<(TcpListener, Router)> {
+    let Server { listener, token, address: listen, foxglove } = server;
+    let app = App { shared: Arc::clone(shared), published: published.clone(), listen, token };
+    let mut routers = Vec::new();
+    if let Some(foxglove) = foxglove {
+        let Server { listener, token, address: listen, .. } = *foxglove;
+        routers.push((listener, foxglove::routes(App { listen, token, ..app.clone() })));
+    }
+    routers.push((listener, routes(app)));
+    routers
+}
+
+/// Begins to serve on the runtime of this thread. The limits of connections hold for all listeners
+/// together.
+pub(super) fn begin(
+    routers: Vec<(TcpListener, Router)>,
+) -> io::Result<Vec<JoinHandle<io::Result<()>>>> {
+    let connections = Connections::default();
+    let mut serving = Vec::new();
+    for (listener, router) in routers {
+        listener.set_nonblocking(true)?;
+        let door = Door::new(tokio::net::TcpListener::from_std(listener)?, connections.clone());
+        let service = router.into_make_service_with_connect_info::<Peer>();
+        serving.push(tokio::spawn(async move { serve(door, service).await }));
+    }
+    Ok(serving)
 }
 
 /// The page and its interface for scripts.
@@ -182,9 +201,9 @@ fn refused(app: &App, request: &Request) -> Option<Response> {
     None
 }
 
-/// A response of one line.
+/// A response of one line, in which nothing of the request can steer a terminal.
 pub fn line(status: StatusCode, text: &impl ToString) -> Response {
-    (status, format!("{}\n", text.to_string())).into_response()
+    (status, format!("{}\n", printable(&text.to_string()))).into_response()
 }
 
 async fn nothing_there() -> Response {

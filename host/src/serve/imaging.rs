@@ -248,7 +248,7 @@ impl Picture {
     }
 }
 
-#[cfg(test)]
+#[cfg(any(test, fuzzing))]
 impl Picture {
     /// A picture of these counts, of which 2 are white.
     pub fn of_counts(number: u64, counts: Vec<f32>, enhanced: Option<Vec<f32>>) -> Self {

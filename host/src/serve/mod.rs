@@ -29,6 +29,8 @@ mod connections;
 mod delays;
 #[cfg(feature = "serve")]
 mod foxglove;
+#[cfg(all(fuzzing, feature = "serve"))]
+pub mod fuzzing;
 #[cfg(feature = "serve")]
 mod guard;
 #[cfg(feature = "serve")]

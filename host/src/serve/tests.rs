@@ -434,6 +434,24 @@ fn a_client_that_changes_settings_without_end_is_slowed_down_and_can_always_stop
     paper.end();
 }
 
+/// Found by `tests/fuzz`: the name of an unknown field came back as it was.
+#[test]
+fn what_a_client_sends_comes_back_in_one_plain_line() {
+    let paper = Paper::new();
+    let mut stream = TcpStream::connect(paper.address).unwrap();
+    stream.set_read_timeout(Some(LIMIT)).unwrap();
+    let (host, body) = (paper.address, r#"{"a\n\u001b[2Jb": 1}"#);
+    let length = body.len();
+    let head = format!("Host: {host}\r\nContent-Length: {length}\r\nConnection: close\r\n");
+    write!(stream, "POST /api/settings HTTP/1.1\r\n{head}\r\n{body}").unwrap();
+    let answer = io::read_to_string(stream).unwrap();
+    let (head, refused) = answer.split_once("\r\n\r\n").unwrap();
+    assert!(head.starts_with("HTTP/1.1 400 "), "{head}");
+    let line = refused.strip_suffix('\n').unwrap();
+    assert!(!line.contains(char::is_control), "{line:?}");
+    paper.end();
+}
+
 /// A method that takes its time.
 struct Slow(Duration);
 

@@ -1,0 +1,11 @@
+//! The laws, by what they read.
+
+pub mod camera;
+pub mod descriptions;
+pub mod gateware;
+pub mod measurements;
+pub mod pictures;
+pub mod recordings;
+pub mod service;
+pub mod weights;
+pub mod wire;

@@ -1,0 +1,108 @@
+//! PNG and JPEG.
+
+use crate::{Law, MIB, place, read};
+use image::codecs::jpeg::JpegEncoder;
+use image::{DynamicImage, GrayAlphaImage, GrayImage, ImageFormat, RgbImage};
+use nirspi::files::image::{encode_grey, is_picture, read_grey, read_reflectance, to_level};
+use nirspi_wire::crc32;
+use std::io::Cursor;
+
+pub const LAWS: &[Law] = &[
+    Law {
+        name: "png",
+        reads: "a PNG, the checksums of its chunks right or as they come",
+        readers: &["host/src/files/image.rs", "host/src/files/image/labelled.rs"],
+        holds: png,
+        seeds: png_seeds,
+        longest: 2048,
+        most_memory: MEMORY,
+    },
+    Law {
+        name: "jpeg",
+        reads: "a JPEG, with its note which side is up",
+        readers: &["host/src/files/image.rs"],
+        holds: picture,
+        seeds: jpeg_seeds,
+        longest: 2048,
+        most_memory: MEMORY,
+    },
+];
+
+/// Decoded bytes are 512 MiB at most; turning and greying copy them.
+const MEMORY: usize = 2048 * MIB;
+
+fn png(bytes: &[u8]) {
+    picture(bytes);
+    picture(&with_checksums(bytes));
+}
+
+/// The same PNG with right checksums.
+fn with_checksums(bytes: &[u8]) -> Vec<u8> {
+    let (mut made, mut at) = (bytes.to_vec(), 8);
+    while let Some(length) = made.get(at..).and_then(|rest| rest.first_chunk()) {
+        let end = at + 8 + u32::from_be_bytes(*length) as usize;
+        let Some(covered) = made.get(at + 4..end) else { break };
+        let crc = crc32(covered).to_be_bytes();
+        let Some(place) = made.get_mut(end..end + 4) else { break };
+        place.copy_from_slice(&crc);
+        at = end + 4;
+    }
+    made
+}
+
+fn picture(bytes: &[u8]) {
+    let path = place::file("input.png", bytes);
+    assert!(is_picture(&path));
+    let grey = read(read_grey(&path));
+    let reflectance = read(read_reflectance(&path));
+    assert_eq!(grey.is_some(), reflectance.is_some(), "read in one way and not in the other");
+    let (Some(grey), Some(reflectance)) = (grey, reflectance) else { return };
+    let (width, height) = (grey.width as usize, grey.height as usize);
+    assert!(width > 0 && height > 0);
+    assert_eq!(grey.values.len(), width * height);
+    assert!(grey.values.iter().all(|value| (0.0..=1.0).contains(value)), "outside 0 to 1");
+    assert_eq!(reflectance.size_px, width.min(height));
+    assert_eq!(reflectance.values.len(), reflectance.size_px * reflectance.size_px);
+    if width * height > 1 << 16 {
+        return;
+    }
+    let small = grey.resized(3);
+    assert!(
+        small.values.len() == 9 && small.values.iter().all(|value| (0.0..=1.0).contains(value))
+    );
+    let again = place::file("again.png", &encode_grey(width, height, &grey.values));
+    let back = read_grey(&again).expect("our own file");
+    assert_eq!((back.width, back.height), (grey.width, grey.height));
+    for (a, b) in grey.values.iter().zip(&back.values) {
+        assert_eq!(to_level(*a), to_level(*b), "another level");
+    }
+}
+
+fn encoded(picture: &DynamicImage, format: ImageFormat) -> Vec<u8> {
+    let mut bytes = Cursor::new(Vec::new());
+    picture.write_to(&mut bytes, format).expect("memory");
+    bytes.into_inner()
+}
+
+fn png_seeds() -> Vec<Vec<u8>> {
+    let grey = GrayImage::from_fn(5, 4, |x, y| image::Luma([(x * 50 + y * 9) as u8]));
+    let colours = RgbImage::from_fn(4, 3, |x, y| image::Rgb([x as u8 * 60, y as u8 * 80, 7]));
+    let clear = GrayAlphaImage::from_fn(3, 3, |x, y| image::LumaA([200, (x * 80 + y) as u8]));
+    let deep = DynamicImage::from(grey.clone()).into_luma16();
+    let all: [DynamicImage; 4] = [grey.into(), colours.into(), clear.into(), deep.into()];
+    let mut all: Vec<Vec<u8>> = all.iter().map(|one| encoded(one, ImageFormat::Png)).collect();
+    all.push(encode_grey(8, 8, &[0.25; 64]));
+    all
+}
+
+fn jpeg_seeds() -> Vec<Vec<u8>> {
+    let grey = GrayImage::from_fn(9, 6, |x, y| image::Luma([(x * 20 + y * 9) as u8]));
+    let colours = RgbImage::from_fn(8, 8, |x, y| image::Rgb([x as u8 * 30, y as u8 * 30, 7]));
+    let mut rough = Vec::new();
+    JpegEncoder::new_with_quality(&mut rough, 20).encode_image(&grey).expect("memory");
+    // Exif with one entry: the picture lies on its side.
+    let exif = b"\xff\xe1\x00\x22Exif\0\0MM\0\x2a\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0";
+    let turned = [&rough[..2], exif, &rough[2..]].concat();
+    let colours = encoded(&colours.into(), ImageFormat::Jpeg);
+    vec![rough, turned, colours]
+}
