@@ -50,8 +50,11 @@ CLOSE = 1e-5
 DEVICE = """
 {
   let last = Promise.resolve();
-  // Transfers of one direction end in their order.
-  const ask = (...given) => last = last.then(() => fetch(...given));
+  // Transfers of one direction end in their order, their bytes too.
+  const ask = (...given) => last = last.then(async () => {
+    const got = await fetch(...given);
+    return { ok: got.ok, bytes: await got.arrayBuffer() };
+  });
   const alternate = { interfaceClass: 0xff, interfaceSubclass: 0x53 };
   const device = {
     vendorId: 0x1209, productId: 1, configuration: null, claimed: [],
@@ -73,7 +76,7 @@ DEVICE = """
       if (endpoint !== 1 || !this.claimed.includes(2)) throw new Error("the interface is not claimed");
       const got = await ask(`/usb/in/${length}`, { cache: "no-store" });
       if (!got.ok) throw new DOMException("The device was disconnected.", "NetworkError");
-      return { status: "ok", data: new DataView(await got.arrayBuffer()) };
+      return { status: "ok", data: new DataView(got.bytes) };
     },
   };
   const usb = {

@@ -67,7 +67,7 @@ impl Run {
         while packets < MOST_PACKETS
             && let Some(found) = bus.ring().and_then(|ring| ring.next(self.patterns, width))
         {
-            packets += 1;
+            packets = packets.wrapping_add(1);
             let is_next = self.is_next(&found, counters, bus);
             if let Some(ring) = bus.ring() {
                 ring.take(&found);

@@ -385,7 +385,7 @@ fn a_word_that_is_lent_is_left_alone() {
     let both = [packet(0, &[5; 20]), packet(1, &[5; 20])];
     for shift in 0..4 {
         let bytes = [&[0; 4][..=shift], &both[0], &both[1], &[0; 7]].concat();
-        let shares = (shift + 1 + both[0].len()) % 4 != 0;
+        let shares = !(shift + 1 + both[0].len()).is_multiple_of(4);
         let mut bench = Bench::of(&bytes);
         bench.send(usize::MAX, 0);
         bench.look();

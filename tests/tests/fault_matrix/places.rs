@@ -69,7 +69,7 @@ impl Scripted {
         Self { inner, script, released: 0, ahead: 0, lit, debugger }
     }
 
-    fn look(&self) {
+    fn note_light(&self) {
         self.lit.store(self.inner.leds_on() || self.inner.running(), Ordering::SeqCst);
     }
 
@@ -81,7 +81,7 @@ impl Scripted {
 impl SimulatedFpga for Scripted {
     fn advance(&mut self, clocks: u32) {
         self.inner.advance(clocks);
-        self.look();
+        self.note_light();
         match self.script {
             Script::Reset { frame } if self.is_due(frame) => self.inner.reset(),
             Script::Jump { frame } if self.is_due(frame) => {
@@ -122,7 +122,7 @@ impl FpgaBus for Scripted {
             self.released += 1;
         }
         let written = self.inner.write(address, value);
-        self.look();
+        self.note_light();
         written
     }
 
