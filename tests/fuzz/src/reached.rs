@@ -1,5 +1,7 @@
 //! Which edges of the program inputs reach, from the counters that the compiler has put there.
 
+#![expect(unsafe_code, reason = "counters and table are the compiler's, and have no names in Rust")]
+
 use nirspi_fuzz::Law;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -19,7 +21,6 @@ std::arch::global_asm!(
     ".popsection",
 );
 
-#[expect(unsafe_code, reason = "the counters are the compiler's, and have no other names")]
 unsafe extern "C" {
     /// Begin and end of the counters, begin of the table of places, begin of the program.
     #[link_name = "nirspi_fuzz_bounds"]
@@ -37,10 +38,7 @@ pub fn write(file: &Path, folders: &[String], law: &Law) {
     let mut reached = vec![false; count];
     let clear = || {
         // SAFETY: the section has so many bytes, and no other thread needs their values.
-        #[expect(unsafe_code, reason = "the counters are the compiler's")]
-        unsafe {
-            start.write_bytes(0, count)
-        }
+        unsafe { start.write_bytes(0, count) }
     };
     for folder in folders {
         for entry in Path::new(folder).read_dir().expect("a folder of inputs") {
@@ -49,7 +47,6 @@ pub fn write(file: &Path, folders: &[String], law: &Law) {
             law.check(&bytes);
             for (at, reached) in reached.iter_mut().enumerate() {
                 // SAFETY: within the section.
-                #[expect(unsafe_code, reason = "the counters are the compiler's")]
                 let counter = unsafe { start.add(at).read_volatile() };
                 *reached |= counter != 0;
             }
@@ -58,7 +55,6 @@ pub fn write(file: &Path, folders: &[String], law: &Law) {
     let mut lines = String::new();
     for (at, reached) in reached.into_iter().enumerate() {
         // SAFETY: the table has an entry for each counter.
-        #[expect(unsafe_code, reason = "the table is the compiler's")]
         let [address, _] = unsafe { places.add(at).read() };
         // The linker leaves no address where it has left the function out.
         if let Some(place) = address.checked_sub(program) {
