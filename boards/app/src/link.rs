@@ -96,7 +96,9 @@ fn lent(loan: &Loan) -> &[u8] {
     assert!(length <= size_of_val(words), "a loan lies in its ring");
     #[expect(unsafe_code, reason = "words that only a DMA channel writes, as bytes")]
     // SAFETY: these words are as long, and have no padding. Neither processor nor channel writes them until they are
-    // given back, and the link gives them back after the last use of these bytes, which borrow the link.
+    // given back, and the link gives them back after the last use of these bytes, which borrow the link. Only an FPGA
+    // that does not wait (a broken wire) makes the channel write them before. The driver of USB passes their address on
+    // and reads none of them, and the host finds by CRC-32 what has changed.
     unsafe {
         core::slice::from_raw_parts(words.as_ptr().cast(), length)
     }
@@ -185,7 +187,8 @@ impl<const N: usize> HostOut<'_, N> {
     /// Waits for bytes to send. Returns a full transfer, or a short or empty transfer if no bytes
     /// follow now or a long packet does. The bytes of a long packet go out where they lie, without a copy.
     ///
-    /// The bytes of the transfer before must have been sent.
+    /// The bytes of the transfer before must have been sent. No loan may be on the link: [`packet`](Self::packet) sends
+    /// these.
     pub async fn transfer(&mut self) -> &[u8] {
         let lent = if core::mem::take(&mut self.lent) { N } else { 0 };
         self.pass(lent);
