@@ -44,7 +44,7 @@ by_name=(
     "flash           probe-rs knows every board's chip"
     "mutants         deliberate faults in the Rust code are seen: in lines changed since main, or in MUTANTS='CRATE...'; crates.io"
     "miri            unit tests of the wire protocol in Rust's interpreter, which sees undefined behaviour; rustup's nightly with miri"
-    "loom            the live page's hand-overs between threads, in every order of the threads; crates.io"
+    "loom            hand-overs between threads of the live page and of a recording, in every order of the threads; crates.io"
     "page-faults     deliberate faults in the live page's JavaScript are seen; Debian's Chromium, PyPI"
     "fuzz            a search for bytes that break a reader's law, FUZZ_S seconds for each (4); a C++ compiler, crates.io"
     "coverage        lines of each reader that its tests with damaged bytes reach; rustup's llvm-tools"

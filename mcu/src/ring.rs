@@ -19,11 +19,14 @@
 use crate::Micros;
 use core::ops::Range;
 use core::sync::atomic::{AtomicU32, Ordering, fence};
+use nirspi_wire::ADC_HZ;
 use nirspi_wire::ready::{self, NUMBER_BYTES};
 use nirspi_wire::samples::Width;
 
 /// The parallel port sends a byte in three clocks of 8 ns: 41.7 bytes in a microsecond at most.
 const BYTES_PER_MICRO: u32 = 42;
+
+const _: () = assert!(BYTES_PER_MICRO * 3_000_000 >= ADC_HZ);
 
 /// Bytes that may be on their way into memory when the channel says where it writes next.
 const IN_FLIGHT: u32 = 64;

@@ -30,6 +30,10 @@ const DRAIN_PATIENCE: Micros = Micros(100_000);
 /// long, so a longer wait gains nothing.
 const KEPT_PATIENCE: Micros = Micros(1_000);
 
+/// Longest time from the moment when a full ring has room again until the frames that waited in the FPGA are there: four
+/// of the longest packets take 0.4 ms, and the loop looks once in a millisecond.
+const ROOM_PATIENCE: Micros = Micros(3_000);
+
 /// Bytes of the samples of the longest frame.
 pub(crate) const SAMPLE_BYTES: usize = 4 * PATTERNS as usize;
 
@@ -147,6 +151,8 @@ pub(crate) struct Run {
     anchor: Anchor,
     stall_after: Micros,
     last_frame: Micros,
+    /// When the ring of the parallel port was full at a look, so that the FPGA had to wait.
+    last_full: Option<Micros>,
     last_sequence: Option<u32>,
     /// How the packet that was sent last began.
     last_beginning: [u8; BEGINNING_BYTES],
@@ -249,6 +255,7 @@ impl Run {
             anchor,
             stall_after: Micros(stall_after).max(limits.stall_min),
             last_frame: now,
+            last_full: None,
             last_sequence: None,
             last_beginning: [0; _],
             kept: None,
@@ -267,7 +274,7 @@ impl Run {
 
     /// What the rest of the run depends on, with ages for times.
     #[cfg(test)]
-    pub fn key(&self, age: impl Fn(Micros) -> u64) -> [u64; 11] {
+    pub fn key(&self, age: impl Fn(Micros) -> u64) -> [u64; 12] {
         let ending = self.ending.as_ref();
         let length = match self.length {
             RunLength::Continuous => 0,
@@ -277,6 +284,7 @@ impl Run {
             length,
             self.patterns.into(),
             age(self.last_frame),
+            self.last_full.map_or(u64::MAX, &age),
             self.kept.map_or(u64::MAX, &age),
             self.damaged.into(),
             self.last_sequence.map_or(0, |last| u64::from(last) + 1),
@@ -550,7 +558,7 @@ impl Run {
             }
         }
         // The FPGA keeps frames for which a slow host leaves no room.
-        if bus.streams() && bus.ring().is_some_and(|ring| ring.is_full()) {
+        if self.last_full.is_some_and(|full| now.since(full) <= ROOM_PATIENCE) {
             counters.drop_missing();
         }
         // Frames that the FPGA made and did not deliver count as damaged.

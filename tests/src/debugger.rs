@@ -129,4 +129,15 @@ impl Debugger {
         assert_eq!(self.ask(&format!("Pf={:08x}", address.swap_bytes())), "OK");
         self.go();
     }
+
+    /// Stops the machine and starts it anew. Its memory stays.
+    ///
+    /// # Panics
+    /// If QEMU does not speak the protocol.
+    pub fn power_up(&mut self) {
+        self.halt();
+        let command: String = b"system_reset".iter().map(|byte| format!("{byte:02x}")).collect();
+        assert_eq!(self.ask(&format!("qRcmd,{command}")), "OK");
+        self.go();
+    }
 }

@@ -1,4 +1,6 @@
-//! Shared parts of the end-to-end tests.
+//! Shared parts of the end-to-end tests, with the feature `library`.
+
+#![cfg(feature = "library")]
 
 pub mod debugger;
 pub mod elf;

@@ -7,8 +7,8 @@
 //! The FPGA sends while `ready` is high. The PSSI's own RDY is not used: at how many free bytes it falls is not known.
 //! `ready` is a channel of a timer, which lets it fall when the time is over that the ring grants, whatever the processor
 //! does then. The timer counts microseconds, and the line is high while the count is below the compare value (PWM mode
-//! 1). Its 32 bits last for 71 minutes, and the watchdog ends a loop that does not look for half a second; what remains
-//! is the FPGA of a run that is over, whose bytes nobody waits for.
+//! 1). Its 32 bits last for 71 minutes, and the watchdog ends a loop that does not look for half a second; after
+//! that only the FPGA of a run that is over can still send, and no run takes its bytes.
 //!
 //! **Built only, never run on a board.** Registers as stm32-data has them; the order of an item of the list as RM0456
 //! and embassy-stm32 have it.

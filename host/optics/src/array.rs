@@ -74,16 +74,19 @@ impl LedArray {
 
     /// Settled light in electrons per ADC sample. Bit r of `rows` and bit c of `cols` are the lines
     /// of LED (r, c). Without `enabled` no LED is lit.
+    #[inline]
     pub fn light(&mut self, rows: u32, cols: u32, enabled: bool) -> f32 {
-        if !enabled {
-            return 0.0;
-        }
         let lines = u64::from(rows) << 32 | u64::from(cols);
-        if let Some((held, light)) = self.last
-            && held == lines
-        {
-            return light;
+        match self.last {
+            _ if !enabled => 0.0,
+            Some((held, light)) if held == lines => light,
+            _ => self.changed(rows, cols),
         }
+    }
+
+    /// The light of lines that have changed.
+    fn changed(&mut self, rows: u32, cols: u32) -> f32 {
+        let lines = u64::from(rows) << 32 | u64::from(cols);
         if self.memo.len() >= MEMO_LIMIT {
             self.memo.clear();
             self.rows.clear();

@@ -346,6 +346,7 @@ pub struct Chain {
     noise_correlation: f64,
     /// Share of the pole's noise variance that is new in each sample.
     fresh: f64,
+    adc_noise_electrons: f64,
     led_electrons: f64,
     amplified_electrons: f64,
     noise_electrons: f64,
@@ -375,6 +376,7 @@ impl Chain {
             shot_bandwidth: settings.shot_bandwidth(),
             noise_correlation: settings.noise_correlation(),
             fresh: 1.0 - settings.noise_correlation().powi(2),
+            adc_noise_electrons: settings.adc_noise_counts * settings.electrons_per_count,
             led_electrons: 0.0,
             amplified_electrons: 0.0,
             noise_electrons: 0.0,
@@ -420,20 +422,24 @@ impl Chain {
     }
 
     /// The ADC's own noise, in electrons.
+    #[inline]
     fn adc_noise(&mut self) -> f64 {
-        if self.settings.adc_noise_counts == 0.0 {
+        if self.adc_noise_electrons == 0.0 {
             return 0.0;
         }
         let normal: f64 = self.rng.sample(StandardNormal);
-        self.settings.adc_noise_counts * self.settings.electrons_per_count * normal
+        self.adc_noise_electrons * normal
     }
 
+    #[inline]
     fn convert(&self, electrons: f64) -> AdcSample {
-        let code = (electrons * self.counts_per_electron + self.offset_counts + 0.5).floor();
-        let over_range = code > f64::from(FULL_SCALE_COUNTS);
-        AdcSample { counts: code.clamp(0.0, FULL_SCALE_COUNTS.into()) as u16, over_range }
+        let code = electrons * self.counts_per_electron + self.offset_counts + 0.5;
+        let over_range = code >= f64::from(FULL_SCALE_COUNTS) + 1.0;
+        // Rounds down: a number below 0 becomes 0 anyway.
+        AdcSample { counts: (code as u16).min(FULL_SCALE_COUNTS), over_range }
     }
 
+    #[inline]
     fn delay(&mut self, converted: AdcSample) -> AdcSample {
         let latency = usize::from(self.settings.adc_latency_clocks);
         if latency == 0 {

@@ -29,6 +29,7 @@ mod run;
 mod scan;
 pub(crate) mod schemas;
 mod spool;
+mod sync;
 mod writer;
 
 pub(crate) use book::{Book, Opening};

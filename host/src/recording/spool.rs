@@ -7,13 +7,14 @@
 //! The queue holds at most [`QUEUE`] buffers of [`BUFFER`] bytes, besides the one being filled and
 //! the one being written (`tests::a_disk_that_stands_still_stops_the_writer_when_the_queue_is_full`).
 //! Bytes reach the disk once and in order, or the writer learns why not
-//! (`tests::an_error_of_the_disk_reaches_the_writer`).
+//! (`tests::an_error_of_the_disk_reaches_the_writer`), in every order of the two threads (`tests/loom`, which checks this
+//! file).
 
+use super::sync::{Arc, Condvar, JoinHandle, Mutex, MutexGuard, ThreadBuilder};
+use std::collections::VecDeque;
 use std::io::{self, Write};
 use std::mem;
-use std::sync::mpsc::{self, Receiver, SyncSender};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::thread::JoinHandle;
+use std::sync::PoisonError;
 
 /// Bytes of a buffer.
 const BUFFER: usize = 1 << 20;
@@ -25,18 +26,39 @@ const KEPT: usize = 2;
 /// What both ends of the queue know.
 #[derive(Debug, Default)]
 struct Inner {
-    /// Buffers that wait for the disk, and the one being written.
-    waiting: usize,
+    /// Buffers that wait for the disk.
+    queue: VecDeque<Vec<u8>>,
+    /// Whether a buffer is being written.
+    writing: bool,
+    /// Empty buffers, for the next bytes.
+    empty: Vec<Vec<u8>>,
+    /// Whether nothing more comes.
+    closed: bool,
     /// Why the disk takes no more.
     problem: Option<io::Error>,
     /// Whether the disk takes no more.
     ended: bool,
 }
 
-#[derive(Debug, Default)]
+impl Inner {
+    /// Buffers that are not on the disk.
+    fn waiting(&self) -> usize {
+        self.queue.len() + usize::from(self.writing)
+    }
+
+    /// Why the disk takes no more. The system tells a reason once, and so does this function.
+    fn problem(&mut self) -> io::Error {
+        let gone = || io::Error::other("the recording takes no more after an earlier error");
+        self.problem.take().unwrap_or_else(gone)
+    }
+}
+
+#[derive(Debug)]
 struct Shared {
     inner: Mutex<Inner>,
     changed: Condvar,
+    /// Most buffers in the queue.
+    most: usize,
 }
 
 impl Shared {
@@ -49,10 +71,18 @@ impl Shared {
         self.changed.notify_all();
     }
 
-    /// Why the disk takes no more. The system tells a reason once, and so does this function.
-    fn problem(&self) -> io::Error {
-        let gone = || io::Error::other("the recording takes no more after an earlier error");
-        self.lock().problem.take().unwrap_or_else(gone)
+    fn wait_while(&self, waits: impl FnMut(&mut Inner) -> bool) -> MutexGuard<'_, Inner> {
+        self.changed.wait_while(self.lock(), waits).unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The next buffer for the disk. `None`: nothing more comes.
+    fn next(&self) -> Option<Vec<u8>> {
+        let mut inner = self.wait_while(|inner| inner.queue.is_empty() && !inner.closed);
+        let next = inner.queue.pop_front();
+        inner.writing = next.is_some();
+        drop(inner);
+        self.changed.notify_all();
+        next
     }
 }
 
@@ -60,8 +90,6 @@ impl Shared {
 #[derive(Debug)]
 pub(super) struct Spool {
     filling: Vec<u8>,
-    full: SyncSender<Vec<u8>>,
-    empty: Receiver<Vec<u8>>,
     shared: Arc<Shared>,
 }
 
@@ -70,7 +98,6 @@ pub(super) struct Spool {
 pub(super) struct Disk {
     thread: Option<JoinHandle<()>>,
     shared: Arc<Shared>,
-    most: usize,
 }
 
 /// A spool in front of this file, and the disk behind it.
@@ -81,51 +108,67 @@ pub(super) fn start(to: impl Write + Send + 'static) -> io::Result<(Spool, Disk)
     start_with(to, QUEUE)
 }
 
-fn start_with(to: impl Write + Send + 'static, most: usize) -> io::Result<(Spool, Disk)> {
-    let (full, queue) = mpsc::sync_channel(most);
-    let (give_back, empty) = mpsc::sync_channel(KEPT);
-    let shared = Arc::<Shared>::default();
+/// As [`start`], with at most so many buffers in the queue.
+pub(super) fn start_with(
+    to: impl Write + Send + 'static,
+    most: usize,
+) -> io::Result<(Spool, Disk)> {
+    let (inner, changed) = (Mutex::default(), Condvar::default());
+    let shared = Arc::new(Shared { inner, changed, most });
     let thread = {
         let shared = Arc::clone(&shared);
-        let work = move || write(to, &queue, &give_back, &shared);
-        std::thread::Builder::new().name("recording".to_owned()).spawn(work)?
+        let work = move || write(to, &shared);
+        ThreadBuilder::new().name("recording".to_owned()).spawn(work)?
     };
-    let spool = Spool { filling: Vec::new(), full, empty, shared: Arc::clone(&shared) };
-    Ok((spool, Disk { thread: Some(thread), shared, most }))
+    let spool = Spool { filling: Vec::new(), shared: Arc::clone(&shared) };
+    Ok((spool, Disk { thread: Some(thread), shared }))
+}
+
+/// Ends the queue where the thread panics, so that nothing waits for that thread.
+struct EndOfPanic<'s>(&'s Shared);
+
+impl Drop for EndOfPanic<'_> {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            self.0.change(|inner| inner.ended = true);
+        }
+    }
 }
 
 /// Writes the buffers of the queue until the spool is dropped or the disk fails.
-fn write(
-    mut to: impl Write,
-    queue: &Receiver<Vec<u8>>,
-    give_back: &SyncSender<Vec<u8>>,
-    shared: &Shared,
-) {
-    for mut buffer in queue {
+fn write(mut to: impl Write, shared: &Shared) {
+    let _end = EndOfPanic(shared);
+    while let Some(mut buffer) = shared.next() {
         if let Err(error) = to.write_all(&buffer).and_then(|()| to.flush()) {
             shared.change(|inner| (inner.problem, inner.ended) = (Some(error), true));
             return;
         }
-        shared.change(|inner| inner.waiting -= 1);
         buffer.clear();
-        // With enough empty buffers, this one is freed.
-        let _ = give_back.try_send(buffer);
+        shared.change(|inner| {
+            inner.writing = false;
+            if inner.empty.len() < KEPT {
+                inner.empty.push(buffer);
+            }
+        });
     }
 }
 
 impl Spool {
     /// Hands the bytes over. Waits while the queue is full.
     fn hand_over(&mut self) -> io::Result<()> {
-        if self.shared.lock().ended {
-            return Err(self.shared.problem());
+        let most = if self.filling.is_empty() { usize::MAX } else { self.shared.most };
+        let waits = |inner: &mut Inner| inner.queue.len() >= most && !inner.ended;
+        let mut inner = self.shared.wait_while(waits);
+        if inner.ended {
+            return Err(inner.problem());
         }
-        if self.filling.is_empty() {
-            return Ok(());
+        if !self.filling.is_empty() {
+            let empty = inner.empty.pop().unwrap_or_default();
+            inner.queue.push_back(mem::replace(&mut self.filling, empty));
+            drop(inner);
+            self.shared.changed.notify_all();
         }
-        let empty = self.empty.try_recv().unwrap_or_default();
-        let full = mem::replace(&mut self.filling, empty);
-        self.shared.change(|inner| inner.waiting += 1);
-        self.full.send(full).map_err(|_| self.shared.problem())
+        Ok(())
     }
 }
 
@@ -149,13 +192,14 @@ impl Drop for Spool {
     fn drop(&mut self) {
         // A drop cannot return an error. A writer that wants to know flushes first.
         let _ = self.hand_over();
+        self.shared.change(|inner| inner.closed = true);
     }
 }
 
 impl Disk {
     /// Share of the queue that waits for the disk, 0 to 1.
     pub(super) fn queued(&self) -> f64 {
-        (self.shared.lock().waiting as f64 / self.most as f64).min(1.0)
+        (self.shared.lock().waiting() as f64 / self.shared.most as f64).min(1.0)
     }
 
     /// Waits until the disk has taken everything that was handed over.
@@ -163,10 +207,8 @@ impl Disk {
     /// # Errors
     /// Why the disk takes no more.
     pub(super) fn settle(&self) -> io::Result<()> {
-        let waits = |inner: &mut Inner| inner.waiting > 0 && !inner.ended;
-        let waited = self.shared.changed.wait_while(self.shared.lock(), waits);
-        let ended = waited.unwrap_or_else(PoisonError::into_inner).ended;
-        if ended { Err(self.shared.problem()) } else { Ok(()) }
+        let mut inner = self.shared.wait_while(|inner| inner.waiting() > 0 && !inner.ended);
+        if inner.ended { Err(inner.problem()) } else { Ok(()) }
     }
 
     /// Waits until everything is written. The spool must be dropped before.
@@ -175,7 +217,8 @@ impl Disk {
     /// Why the disk took no more.
     pub(super) fn end(mut self) -> io::Result<()> {
         self.join()?;
-        if self.shared.lock().ended { Err(self.shared.problem()) } else { Ok(()) }
+        let mut inner = self.shared.lock();
+        if inner.ended { Err(inner.problem()) } else { Ok(()) }
     }
 
     fn join(&mut self) -> io::Result<()> {
@@ -195,6 +238,7 @@ impl Drop for Disk {
 mod tests {
     use super::*;
     use std::sync::atomic::{AtomicUsize, Ordering};
+    use std::sync::mpsc::{self, Receiver};
     use std::time::Duration;
 
     /// A disk that takes a buffer for each permission, and fails without room.
@@ -353,8 +397,9 @@ mod tests {
         assert_eq!(taken.lock().unwrap().len(), 2 * BUFFER);
     }
 
+    /// Nothing waits for a thread that has ended: not the writer in front of a full queue, and not who waits for the disk.
     #[test]
-    fn a_panic_of_the_disk_is_an_error_at_the_end() {
+    fn a_panic_of_the_disk_is_an_error_for_all_that_wait() {
         struct Broken;
         impl Write for Broken {
             fn write(&mut self, _: &[u8]) -> io::Result<usize> {
@@ -365,9 +410,15 @@ mod tests {
                 Ok(())
             }
         }
-        let (mut spool, disk) = start(Broken).unwrap();
+        let (mut spool, disk) = start_with(Broken, 1).unwrap();
         spool.write_all(b"frames").unwrap();
         drop(spool);
         assert!(disk.end().unwrap_err().to_string().contains("panicked"));
+
+        let (mut spool, disk) = start_with(Broken, 1).unwrap();
+        let mut hand_over = || spool.write_all(b"frames").and_then(|()| spool.flush());
+        let refused = (0..4).find_map(|_| hand_over().err()).unwrap();
+        assert!(refused.to_string().contains("earlier error"), "{refused}");
+        assert!(disk.settle().is_err());
     }
 }

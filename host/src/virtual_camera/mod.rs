@@ -250,8 +250,13 @@ impl<F: SimulatedFpga, G: GatewareLoader> VirtualCamera<F, G> {
     /// The firmware crashes and restarts, and its link with it. The FPGA notices nothing.
     pub fn crash(&mut self, text: &str) {
         let crash = Crash::new(self.now(), format_args!("{text}"));
-        self.camera = Camera::new(self.info.clone(), self.limits);
+        self.power_up();
         self.camera.restarted_after(crash);
+    }
+
+    /// The firmware starts as after power-up, and its link with it. The FPGA notices nothing.
+    pub fn power_up(&mut self) {
+        self.camera = Camera::new(self.info.clone(), self.limits);
         self.inbox.clear();
         self.packets.clear();
     }

@@ -60,7 +60,7 @@ impl Run {
         bus.look();
         if bus.ring().is_some_and(|ring| ring.is_full()) {
             // The FPGA waits for the host, and makes no progress that could be seen here.
-            self.last_frame = now;
+            (self.last_frame, self.last_full) = (now, Some(now));
         }
         let mut stretch: Option<Stretch> = None;
         let mut packets = 0;
@@ -103,7 +103,7 @@ impl Run {
         packets > 0
     }
 
-    /// Shows the signal meter a packet, copied into room that the link has just now; false if there is none.
+    /// Shows the signal meter a packet, copied into a free place of the link. False if the link has no free place.
     fn look(
         &self,
         found: &Found,

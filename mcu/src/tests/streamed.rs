@@ -319,6 +319,29 @@ fn packets_that_follow_each_other_go_out_together() {
     assert_eq!(device.end().1, ended(45, 0, 0, 0));
 }
 
+/// What lies between two packets that do not follow each other stays out of the host's link, where it would be a
+/// damaged packet.
+#[test]
+fn packets_with_other_bytes_between_them_go_out_apart() {
+    let mut device = Device::running(RunLength::Continuous);
+    // The signal meter looks at two packets, and a poll ends behind each of them.
+    let mut made = Vec::new();
+    for _ in 0..2 {
+        made.push(device.frame());
+        device.turn();
+    }
+    device.link.holds = true;
+    made.push(device.frame());
+    device.bus.port().send(&[7, 7, 7, 7, 7, 7, 7, 0]);
+    made.push(device.frame());
+    device.turn();
+    assert_eq!(device.link.loans.len(), 2);
+    while !device.link.loans.is_empty() {
+        device.link.fetch();
+    }
+    assert_eq!(device.link.packets, made);
+}
+
 /// The ring fills, the FPGA waits and loses frames. That is no stalled FPGA, and nothing is overwritten.
 #[test]
 fn a_host_that_stops_reading_makes_the_fpga_lose_whole_frames() {
@@ -378,6 +401,26 @@ fn frames_that_wait_for_a_host_that_reads_nothing_are_dropped_at_the_end() {
     let lost = device.fpga().lost;
     assert!(lost > 100);
     assert_eq!(device.end().1, ended(200, 200 - lost - sent, lost, 0));
+}
+
+/// The host takes a loan just before the patience with the last frames is over: these are on their way, and not damaged.
+#[test]
+fn frames_for_which_room_comes_too_late_are_dropped_and_not_damaged() {
+    let mut device = Device::running(RunLength::Continuous);
+    device.link.holds = true;
+    for _ in 0..200 {
+        device.fpga().make_frame();
+        device.bus.port().transmit(|_| {});
+        device.turn();
+    }
+    let (sent, lost) = (device.link.loans.len() as u32, device.fpga().lost);
+    device.ask(Command::Stop);
+    device.after(99_000, &[]);
+    device.link.fetch();
+    device.link.packets.clear();
+    device.after(1_001, &[]);
+    device.turns(3);
+    assert_eq!(events(&device.heard()), [ended(200, 200 - lost - sent, lost, 0)]);
 }
 
 /// The line on which the FPGA should wait is broken: packets are overwritten, and each is still counted once.

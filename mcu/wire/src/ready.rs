@@ -124,14 +124,23 @@ pub fn numbers(beginning: &[u8; NUMBER_BYTES]) -> (u16, u32) {
     ((r2 << 14 | r1 << 7 | r0) as u16, s4 << 28 | s3 << 21 | s2 << 14 | s1 << 7 | s0)
 }
 
+/// Bytes of samples that [`Reader`] decodes at once: whole samples of either width.
+const CHUNK_BYTES: usize = 192;
+
+const _: () = assert!(CHUNK_BYTES.is_multiple_of(12));
+
 /// The samples of a packet, one after the other, straight from its encoded bytes. They count only if the packet
 /// [is intact](Self::is_intact), which shows after the last.
 #[derive(Debug, Clone)]
 pub struct Reader<'p> {
     bytes: Unstuffed<'p>,
     crc: Crc32,
+    /// Samples that have not been read.
     left: u16,
     is_narrow: bool,
+    /// Decoded bytes, and where the next sample begins in them.
+    chunk: [u8; CHUNK_BYTES],
+    at: usize,
     /// Number of the frame in its run.
     pub sequence: u32,
     /// What happened to the frame.
@@ -150,22 +159,49 @@ impl<'p> Reader<'p> {
             bytes.iter().rev().fold(0u32, |number, byte| number << 7 | u32::from(byte & 0x7F))
         };
         let flags = FrameFlags(number(&head[24..27]) as u16);
-        let is_narrow = head[27] == NARROW;
-        Self { bytes, crc, left: patterns, is_narrow, sequence: number(&head[4..9]), flags }
+        Self {
+            bytes,
+            crc,
+            left: patterns,
+            is_narrow: head[27] == NARROW,
+            chunk: [0; CHUNK_BYTES],
+            at: CHUNK_BYTES,
+            sequence: number(&head[4..9]),
+            flags,
+        }
     }
 
     /// The next sample; 0 after the last.
-    #[inline(never)]
     pub fn sample(&mut self) -> i32 {
-        let Some(left) = self.left.checked_sub(1) else { return 0 };
-        self.left = left;
-        // Three bytes are read as the upper ones of a word, so that the shift brings the sign down.
-        let mut word = [0; 4];
-        let (low, shift) = if self.is_narrow { (1, 8) } else { (0, 0) };
-        let bytes = word.get_mut(low..).unwrap_or(&mut []);
+        if self.left == 0 {
+            return 0;
+        }
+        if self.at >= CHUNK_BYTES {
+            self.decode();
+        }
+        self.left -= 1;
+        let bytes = self.chunk.get(self.at..).unwrap_or_default();
+        if self.is_narrow {
+            self.at += 3;
+            // The upper bytes of a word, so that the shift brings the sign down.
+            bytes
+                .first_chunk()
+                .map_or(0, |&[low, middle, high]| i32::from_le_bytes([0, low, middle, high]) >> 8)
+        } else {
+            self.at += 4;
+            bytes.first_chunk().map_or(0, |word| i32::from_le_bytes(*word))
+        }
+    }
+
+    /// Decodes the next bytes of samples.
+    #[inline(never)]
+    fn decode(&mut self) {
+        let width = if self.is_narrow { 3 } else { 4 };
+        let length = CHUNK_BYTES.min(width * usize::from(self.left));
+        let bytes = self.chunk.get_mut(..length).unwrap_or_default();
         self.bytes.fill(bytes);
         self.crc.update(bytes);
-        i32::from_le_bytes(word) >> shift
+        self.at = 0;
     }
 
     /// Whether all samples have been read and the packet ends with the CRC-32 of its bytes.
@@ -193,24 +229,29 @@ impl Unstuffed<'_> {
     }
 
     #[inline(never)]
-    fn fill(&mut self, bytes: &mut [u8]) {
-        for byte in bytes {
-            *byte = self.next();
-        }
-    }
-
-    fn next(&mut self) -> u8 {
-        loop {
-            let Some((&byte, rest)) = self.bytes.split_first() else { return 0 };
-            self.bytes = rest;
-            if self.left > 0 {
-                self.left -= 1;
-                return byte;
-            }
-            self.left = byte.saturating_sub(1);
-            let owed = core::mem::replace(&mut self.owes_zero, byte < 0xFF);
-            if owed {
-                return 0;
+    fn fill(&mut self, mut to: &mut [u8]) {
+        while !to.is_empty() {
+            let length = usize::from(self.left).min(to.len());
+            if let Some((block, rest)) = self.bytes.split_at_checked(length)
+                && length > 0
+            {
+                let (filled, behind) = to.split_at_mut(length);
+                filled.copy_from_slice(block);
+                (self.bytes, to) = (rest, behind);
+                self.left -= length as u8;
+            } else if self.left == 0
+                && let Some((&code, rest)) = self.bytes.split_first()
+            {
+                self.bytes = rest;
+                self.left = code.saturating_sub(1);
+                if core::mem::replace(&mut self.owes_zero, code < 0xFF) {
+                    let (zero, behind) = to.split_at_mut(1);
+                    zero.fill(0);
+                    to = behind;
+                }
+            } else {
+                to.fill(0);
+                return;
             }
         }
     }

@@ -1,10 +1,12 @@
-//! What holds in every order in which the threads of the live page can run.
+//! What holds in every order in which the threads of the live page and of a recording can run.
 
 use loom::sync::Arc;
 use loom::thread;
 use nirspi_loom::account::LossCounters;
+use nirspi_loom::recording::Recording;
 use nirspi_loom::serve::light::LightSwitch;
 use nirspi_loom::serve::slot::{Ledger, Slot};
+use std::io::{self, Write};
 use std::time::Duration;
 
 const PATIENCE: Duration = Duration::from_secs(1);
@@ -153,5 +155,74 @@ fn of_two_commands_the_later_one_counts() {
             number => number == on,
         };
         assert_eq!(allowed, expected, "command {command}");
+    });
+}
+
+/// A disk with so much room.
+struct Disk {
+    room: usize,
+    taken: std::sync::Arc<std::sync::Mutex<Vec<u8>>>,
+}
+
+impl Write for Disk {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let mut taken = self.taken.lock().unwrap();
+        if taken.len() + bytes.len() > self.room {
+            return Err(io::ErrorKind::StorageFull.into());
+        }
+        taken.extend_from_slice(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// A recording on a disk with so much room, and what the disk has taken.
+fn recording(room: usize, most: usize) -> (Recording, std::sync::Arc<std::sync::Mutex<Vec<u8>>>) {
+    let taken = std::sync::Arc::default();
+    let disk = Disk { room, taken: std::sync::Arc::clone(&taken) };
+    (Recording::new(disk, most), taken)
+}
+
+#[test]
+fn what_is_recorded_reaches_the_disk_once_and_in_order() {
+    loom::model(|| {
+        let (mut recording, taken) = recording(usize::MAX, 1);
+        for bytes in [b"ab", b"cd"] {
+            recording.hand_over(bytes).unwrap();
+        }
+        recording.end().unwrap();
+        assert_eq!(*taken.lock().unwrap(), b"abcd");
+    });
+}
+
+#[test]
+fn what_was_recorded_before_a_wait_is_on_the_disk_after_it() {
+    loom::model(|| {
+        let (mut recording, taken) = recording(usize::MAX, 2);
+        recording.hand_over(b"ab").unwrap();
+        recording.settle().unwrap();
+        assert_eq!(*taken.lock().unwrap(), b"ab");
+        recording.end().unwrap();
+    });
+}
+
+/// The reason is told once, by what asks first; what asks later learns that there was one.
+#[test]
+fn a_full_disk_ends_every_wait_and_is_told_once() {
+    loom::model(|| {
+        let (mut recording, taken) = recording(3, 1);
+        let mut told = Vec::new();
+        for bytes in [b"ab", b"cd", b"ef"] {
+            told.extend(recording.hand_over(bytes).err());
+        }
+        told.extend(recording.settle().err());
+        told.extend(recording.end().err());
+        let full = |error: &io::Error| error.kind() == io::ErrorKind::StorageFull;
+        assert_eq!(told.iter().filter(|error| full(error)).count(), 1, "{told:?}");
+        assert!(told.len() >= 2, "{told:?}");
+        assert_eq!(*taken.lock().unwrap(), b"ab");
     });
 }

@@ -39,13 +39,14 @@ pub enum Fault {
     ClockJump,
     FpgaReset,
     McuReset,
+    BrownOut,
     HostCrash,
     HostHangs,
     TwoHosts,
     DiskFull,
 }
 
-pub const FAULTS: [Fault; 17] = [
+pub const FAULTS: [Fault; 18] = [
     Fault::ByteLost,
     Fault::BitFlipped,
     Fault::PacketLost,
@@ -59,6 +60,7 @@ pub const FAULTS: [Fault; 17] = [
     Fault::ClockJump,
     Fault::FpgaReset,
     Fault::McuReset,
+    Fault::BrownOut,
     Fault::HostCrash,
     Fault::HostHangs,
     Fault::TwoHosts,
@@ -83,6 +85,7 @@ impl Fault {
             Self::ClockJump => "the camera's clock jumps an hour ahead in a run",
             Self::FpgaReset => "the FPGA loses everything inside a frame",
             Self::McuReset => "the firmware crashes inside a frame",
+            Self::BrownOut => "the supply fails inside a frame: FPGA and firmware start anew",
             Self::HostCrash => "the host's program ends in a run",
             Self::HostHangs => "the host stays connected and says nothing more",
             Self::TwoHosts => "a second host connects in a run",
@@ -96,6 +99,7 @@ impl Fault {
             Self::FpgaReset => Script::Reset { frame: HIT },
             Self::ClockJump => Script::Jump { frame: HIT },
             Self::McuReset => Script::Crash { frame: HIT },
+            Self::BrownOut => Script::BrownOut { frame: HIT },
             Self::SlowReader => Script::Unread,
             _ => Script::None,
         }
@@ -244,15 +248,18 @@ pub fn tried(fault: Fault, place: Place) -> Cell {
 
 fn impossible(fault: Fault, place: Place) -> Option<&'static str> {
     match (fault, place) {
-        (Fault::ClockJump | Fault::FpgaReset | Fault::McuReset, Place::Replay) => {
-            Some("a recording has no camera")
-        }
+        (
+            Fault::ClockJump | Fault::FpgaReset | Fault::McuReset | Fault::BrownOut,
+            Place::Replay,
+        ) => Some("a recording has no camera"),
         (Fault::HostHangs, Place::Tcp) => {
             Some("the server's time stands still while the host reads nothing")
         }
         (Fault::HostHangs, Place::Replay) => Some("a recording has no light"),
         (Fault::SlowReader, Place::Replay) => Some("a replay waits for its reader"),
-        (Fault::McuReset, Place::Tcp) => Some("the server has no firmware of its own to restart"),
+        (Fault::McuReset | Fault::BrownOut, Place::Tcp) => {
+            Some("the server has no firmware of its own to restart")
+        }
         (Fault::SlowReader, Place::Tcp) => {
             Some("how many frames a socket holds is the system's choice")
         }
@@ -320,10 +327,10 @@ fn one_capture(fault: Fault, lab: &Lab) -> Result<String, String> {
 /// The capture after the fault.
 fn after(fault: Fault, lab: &Lab) -> Result<(), String> {
     let mut session = lab.session().map_err(|error| format!("no session after it: {error}"))?;
-    if fault == Fault::McuReset {
+    if matches!(fault, Fault::McuReset | Fault::BrownOut) {
         let reports = session.await_reports().map_err(|error| error.to_string())?;
-        if reports.crash.is_none() {
-            return Err(format!("the crash is not told: {reports:?}"));
+        if reports.crash.is_some() != (fault == Fault::McuReset) {
+            return Err(format!("told of the crash: {reports:?}"));
         }
     }
     let captured = measure(&mut session, lab.frames_after(), None)

@@ -46,6 +46,10 @@ pub enum Script {
     Crash {
         frame: u32,
     },
+    /// The supply fails for a moment.
+    BrownOut {
+        frame: u32,
+    },
     /// The link takes nothing until the run is over.
     Unread,
 }
@@ -58,7 +62,7 @@ struct Scripted {
     ahead: u64,
     /// Whether LEDs shine or the FPGA runs, for a test whose FPGA is served by another thread.
     lit: Arc<AtomicBool>,
-    /// The debugger that makes an emulated processor crash.
+    /// The debugger that makes an emulated processor crash or start anew.
     debugger: Arc<Mutex<Option<Debugger>>>,
 }
 
@@ -93,6 +97,14 @@ impl SimulatedFpga for Scripted {
                     Some(debugger) => debugger.derail(NOWHERE),
                     None => return,
                 }
+            }
+            Script::BrownOut { frame } if self.is_due(frame) => {
+                match &mut *self.debugger.lock().unwrap() {
+                    Some(debugger) => debugger.power_up(),
+                    None => return,
+                }
+                self.inner.reset();
+                self.note_light();
             }
             _ => return,
         }
@@ -166,7 +178,8 @@ impl Board {
     fn start(script: Script) -> Self {
         let fpga = Scripted::new(script);
         let (lit, debugger) = (Arc::clone(&fpga.lit), Arc::clone(&fpga.debugger));
-        let waiting = matches!(script, Script::Crash { .. }).then(Waiting::listen);
+        let needs_debugger = matches!(script, Script::Crash { .. } | Script::BrownOut { .. });
+        let waiting = needs_debugger.then(Waiting::listen);
         let arguments = waiting.iter().flat_map(Waiting::arguments).collect::<Vec<_>>();
         let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
         let emulated = Emulated::start_with(fpga, &arguments).unwrap();
@@ -227,11 +240,16 @@ impl Link for Cable {
             }
             camera.step(STEP_CLOCKS);
             let fpga = camera.fpga_mut();
-            if let Script::Crash { frame } = fpga.script
+            if let Script::Crash { frame } | Script::BrownOut { frame } = fpga.script
                 && fpga.is_due(frame)
             {
-                fpga.script = Script::None;
-                camera.crash("faults.rs: on purpose");
+                if matches!(std::mem::replace(&mut fpga.script, Script::None), Script::Crash { .. })
+                {
+                    camera.crash("faults.rs: on purpose");
+                } else {
+                    fpga.inner.reset();
+                    camera.power_up();
+                }
                 // The first poll of the new start.
                 camera.step(STEP_CLOCKS);
                 self.closed = true;

@@ -34,11 +34,12 @@ const LONG: usize = 120;
 /// Rounds of the world in which a frame is made and fetched.
 const ROUNDS_A_FRAME: u32 = 60;
 const HOUR_US: u64 = 3_600_000_000;
+const CRASH: &str = "faults.rs: on purpose";
 
 /// A row of the page, and what tries it. The words of the cell begin with `-` where the fault cannot happen.
 type Row = (&'static str, fn(Chip) -> String);
 
-const ROWS: [Row; 17] = [
+const ROWS: [Row; 18] = [
     ("a byte is lost in one frame of eight", |chip| {
         on_the_bus(chip, Way::PacketLost, "the bus repeats the packet")
     }),
@@ -59,7 +60,14 @@ const ROWS: [Row; 17] = [
     ("the host reads nothing until the run is over, and the camera does not wait", slow_reader),
     ("the camera's clock jumps an hour ahead in a run", clock_jump),
     ("the FPGA loses everything inside a frame", fpga_reset),
-    ("the firmware crashes inside a frame", firmware_crash),
+    ("the firmware crashes inside a frame", |chip| {
+        restart(chip, |world| world.crashed(CRASH), &[CRASH]);
+        "the link to the camera was lost; the next host is told of the crash".into()
+    }),
+    ("the supply fails inside a frame: FPGA and firmware start anew", |chip| {
+        restart(chip, World::powered_up, &[]);
+        "the link to the camera was lost".into()
+    }),
     ("the host's program ends in a run", program_ends),
     ("the host stays connected and says nothing more", host_hangs),
     ("a second host connects in a run", |_| {
@@ -301,7 +309,8 @@ fn fpga_reset(chip: Chip) -> String {
     format!("LEDs off: {fault}")
 }
 
-fn firmware_crash(chip: Chip) -> String {
+/// The chip starts anew inside a frame, in this way, and the next host is told of these crashes.
+fn restart(chip: Chip, restarted: fn(World) -> World, crashes: &[&str]) {
     let mut lab = Lab::new(chip);
     lab.run(RunLength::Continuous, |host, log| {
         host.read();
@@ -309,15 +318,14 @@ fn firmware_crash(chip: Chip) -> String {
     });
     let Lab { world, log, mut host } = lab;
     assert!(world.pins.running.get(), "in the run");
-    let mut world = world.crashed("faults.rs: on purpose");
+    let mut world = restarted(world);
     assert_eq!(world.beside(40_000, host.status()), Some(Err(Deaf)), "the device is gone");
     assert!(world.is_dark(), "the firmware has stopped the FPGA's run");
     let mut lab = Lab { world, log, host };
     lab.plug();
     lab.status();
-    assert_eq!(*lab.log.crashes.borrow(), ["faults.rs: on purpose"]);
+    assert_eq!(*lab.log.crashes.borrow(), crashes);
     lab.recovers();
-    "the link to the camera was lost; the next host is told of the crash".into()
 }
 
 /// Time until the LEDs are off, in which the host does this once a round.

@@ -87,13 +87,23 @@ impl World {
 
     /// The camera after its firmware has crashed: the chip starts anew, and the FPGA has noticed nothing.
     pub fn crashed(self, text: &str) -> Self {
+        let crash = Crash::new(Micros(bench::now_us()), format_args!("{text}"));
+        self.restarted(Some(crash))
+    }
+
+    /// The camera after its supply has failed for a moment: chip and FPGA start anew.
+    pub fn powered_up(self) -> Self {
+        self.pins.reset_fpga();
+        self.restarted(None)
+    }
+
+    fn restarted(self, crash: Option<Crash>) -> Self {
         let Self { pins, chip, core, tasks, .. } = self;
         *core.borrow_mut() = OtgCore::default();
         drop(tasks);
         // The chip's reset makes the pin an input, whose resistor switches the LED drivers off.
         pins.leds_enabled.set(false);
-        let crash = Crash::new(Micros(bench::now_us()), format_args!("{text}"));
-        Self::started(pins, Some(crash), chip)
+        Self::started(pins, crash, chip)
     }
 
     fn started(pins: Rc<Pins>, crash: Option<Crash>, chip: Chip) -> Self {

@@ -139,7 +139,7 @@ fn one_file(path: &Path, want: &Selection) {
     let (count, patterns) = (several.len(), several.patterns());
     let all = several.each(Ok::<_, FileError>).map_err(|error| crate::refused(&error));
     let index = want.index.or((count == 1).then_some(0)).filter(|index| *index < count);
-    assert!(file.is_none() || index.is_some(), "a measurement that nobody chose");
+    assert!(file.is_none() || index.is_some(), "read one of several measurements without an index");
     if let (Ok(all), Some(index)) = (&all, index) {
         assert_eq!(all.len(), count);
         // NaN in the file's own image differs from itself.

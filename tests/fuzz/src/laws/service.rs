@@ -112,7 +112,7 @@ fn is_plain(asked: &[u8], heard: &[u8]) {
     };
     // 500 is a fault of the program.
     assert!(status != 500 && (100..=599).contains(&status), "{head}");
-    // What the server says before any handler: a request that is none has no headers of ours.
+    // Bytes that are no HTTP request are answered by the HTTP library, without our headers.
     if !head.contains("content-security-policy") {
         assert!(matches!(status, 100 | 400 | 414 | 431), "no security headers: {head}");
         return;

@@ -432,7 +432,7 @@ fn answered(line: &[u8]) {
         assert_eq!(head[0], request.number, "the reply to another request");
         rest = after;
     }
-    assert!(rest.is_empty(), "{} bytes that nobody asked for", rest.len());
+    assert!(rest.is_empty(), "{} bytes after the last reply", rest.len());
 }
 
 fn tunnel_seeds() -> Vec<Vec<u8>> {
