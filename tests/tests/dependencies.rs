@@ -168,9 +168,9 @@ fn plain_cargo_test_leaves_out_simulator_and_browser_only_and_ci_runs_the_rest()
     let (default, left_out): (Vec<&Value>, Vec<&Value>) =
         packages.iter().partition(|package| default.contains(&&package["id"]));
     // The program for browsers has its own step, and a list of features has nothing to test.
-    let (apart, left_out): (Vec<&Value>, Vec<&Value>) = left_out.into_iter().partition(|package| {
-        matches!(&*name(package), "nirspi-web" | "nirspi-tests-features")
-    });
+    let (apart, left_out): (Vec<&Value>, Vec<&Value>) = left_out
+        .into_iter()
+        .partition(|package| matches!(&*name(package), "nirspi-web" | "nirspi-tests-features"));
     let uses_simulator = |package: &&Value| {
         let mut used = package["dependencies"].as_array().unwrap().iter().map(name);
         name(package) == "nirspi-hdl-sim" || used.any(|used| used == "nirspi-hdl-sim")

@@ -269,7 +269,10 @@ fn answers(bytes: &[u8]) {
         // Bytes that the FPGA calls a packet go to the host as they are; the host sees the damage.
         other += u32::from(open::<DeviceMessage<'_>>(&mut packet).is_err());
     }
-    assert!(other == 0 || sink.sent.len() > 100, "{other} packets of the firmware do not read as messages");
+    assert!(
+        other == 0 || sink.sent.len() > 100,
+        "{other} packets of the firmware do not read as messages"
+    );
     assert!(bus.port().accesses < 100_000, "accesses without end");
 }
 
