@@ -61,7 +61,7 @@ pub(crate) const ARCHIVE: [Field; 23] = [
 /// `DATASET`.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Row {
-    /// Name of the measurement, unlike that of any other.
+    /// Name of the measurement. No two measurements have the same.
     pub image_id: String,
     /// Side of the image in pixels.
     pub n: u32,

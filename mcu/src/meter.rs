@@ -1,7 +1,7 @@
 //! Signal meter: how strong the light is, how much of it depends on the pattern, and how much is
 //! noise. It helps to align the optics and to set the gain, without a reconstruction.
 //!
-//! Ten times a second the meter compares two successive frames of a run, reading by reading. What a
+//! Four times a second the meter compares two successive frames of a run, reading by reading. What a
 //! reading changes by from one frame to the next is noise; what the readings of one frame differ by
 //! is signal and noise. The meter adds up integers while frames pass; [`Tally::signal`] computes
 //! counts and decibels in floating point when the host asks for the status.
@@ -23,7 +23,7 @@ use nirspi_wire::register::{Register, mode};
 use nirspi_wire::{ADC_BITS, FrameFlags, Samples, Signal};
 
 /// Time between two comparisons.
-const PERIOD: Micros = Micros(100_000);
+const PERIOD: Micros = Micros(250_000);
 
 /// Bits of a reading as the meter keeps it, sign included: the squares of 1024 differences of two
 /// such readings fit in 64 bits.
@@ -205,7 +205,9 @@ impl Meter {
         let shift = self.exposure.shift();
         let (words, _) = packed.as_chunks();
         for word in words {
-            let before = i64::from(i32::from_le_bytes(*word)).wrapping_shl(of_packed.into());
+            let before = i64::from(i32::from_le_bytes(*word));
+            let before =
+                if of_packed == 0 { before } else { before.wrapping_shl(of_packed.into()) };
             let reading = shifted(next(), shift);
             let change = reading.wrapping_sub(shifted(before, shift));
             tally.readings = tally.readings.wrapping_add(1);

@@ -88,6 +88,16 @@ fn instructions_of(part: &str) -> f64 {
     row[1].replace(' ', "").parse().expect("a number")
 }
 
+/// Share of the reference board's processor that the signal meter takes while packets come by the parallel port.
+///
+/// # Panics
+/// If the page has no such row.
+#[must_use]
+pub fn meter_share() -> f64 {
+    const MILLISECOND_PS: f64 = 1e9;
+    instructions_ps(instructions_of("streaming_meter")) as f64 / MILLISECOND_PS
+}
+
 impl Processor {
     /// The reference board, of 160 MHz: the instructions that `docs/firmware.md` has from emulation, at 1.3 clocks
     /// each.

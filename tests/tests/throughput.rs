@@ -4,7 +4,7 @@ use nirspi_hdl_model::{AdcSample, Gateware};
 use nirspi_mcu::{BusError, HostPort, Micros, Ring, RingMemory};
 use nirspi_tests::pages::{page, table};
 use nirspi_tests::throughput::{
-    PACKET_SCK_PS, Processor, Reader, SCK_PS, Stretch, TimedPort, stretch,
+    PACKET_SCK_PS, Processor, Reader, SCK_PS, Stretch, TimedPort, meter_share, stretch,
 };
 use nirspi_wire::host_port::{DUMMY_CYCLES, READ_FRAME, READ_PACKET, SEALED_BYTES, seal, unseal};
 use nirspi_wire::ready::{FAST_LEAD_BYTES, LEAD_BYTES};
@@ -329,10 +329,12 @@ fn packets_of_the_parallel_port_reach_7900_frames_a_second_and_those_of_24_bits_
     let row = "33 MB/s, by USB";
     let seen = [wide, narrow].into_iter().zip(told(row)).zip(told_busy(row));
     for ((seen, told), busy) in seen {
-        assert!(seen.busy < 0.1, "the goal: {seen:?}");
+        let busy_at_all = seen.busy + meter_share();
+        println!("busy {:.4}, with the signal meter {busy_at_all:.4}", seen.busy);
+        assert!(busy_at_all < 0.1, "the goal: {busy_at_all}, {seen:?}");
         assert!(seen.usb_idle < 0.01, "the ring always has something to send: {seen:?}");
         assert!((seen.frames_per_second - told).abs() <= 5.0, "the page says {told}: {seen:?}");
-        assert!((100.0 * seen.busy - busy).abs() <= 1.0, "the page says {busy} %: {seen:?}");
+        assert!((100.0 * busy_at_all - busy).abs() <= 0.5, "the page says {busy} %: {busy_at_all}");
     }
 }
 

@@ -92,7 +92,7 @@ pub enum WeightsError {
     #[error(
         "{file}: no tensor {tensor}{}{}; are these weights of another network?",
         if .expected.is_empty() { String::new() } else { format!(", expected {}", by(.expected)) },
-        .unknown.as_ref().map_or_else(String::new, |name| format!("; the network has no tensor {name}, which is there"))
+        .unknown.as_ref().map_or_else(String::new, |name| format!("; the file has a tensor {name}, and the network has none"))
     )]
     Missing {
         /// The file.

@@ -8,9 +8,9 @@
 //! (`lines_light_the_leds_of_the_walsh_pattern_they_stand_for` in `host/optics/tests/array.rs`). A
 //! line that is stuck, swapped or inverted therefore shows in the light as with real hardware.
 
-use std::collections::HashMap;
-
 use crate::{Footprint, LEDS, SIDE};
+use foldhash::fast::FixedState;
+use std::collections::HashMap;
 
 /// The most line states kept. A sweep has 1024 patterns and their complements. Twice that number
 /// leaves room for an injected fault, and limits the table for any other driver.
@@ -25,9 +25,9 @@ pub struct LedArray {
     gains: Option<Vec<f32>>,
     /// Light of each row for a row line of 0 and of 1, by the state of the column lines. A sweep
     /// has few such states.
-    rows: HashMap<u32, [[f64; 2]; SIDE]>,
+    rows: HashMap<u32, [[f64; 2]; SIDE], FixedState>,
     /// Bit r of the rows in the high half, bit c of the columns in the low half.
-    memo: HashMap<u64, f32>,
+    memo: HashMap<u64, f32, FixedState>,
     last: Option<(u64, f32)>,
 }
 
@@ -41,8 +41,8 @@ impl LedArray {
         Self {
             electrons: electrons.collect(),
             gains: None,
-            rows: HashMap::new(),
-            memo: HashMap::new(),
+            rows: HashMap::default(),
+            memo: HashMap::default(),
             last: None,
         }
     }

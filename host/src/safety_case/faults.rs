@@ -99,7 +99,7 @@ pub struct SingleFault {
     pub lit: Lit,
     /// What ends the light, or what a builder can add where nothing does.
     pub ended_by: &'static str,
-    /// How soon; in seconds, `null` if nothing ends the light.
+    /// Time until the light ends, in seconds; `null` if nothing ends it.
     #[serde(rename = "dark_after_s")]
     pub dark_after: DarkAfter,
     /// Names of tests and proofs that show it.

@@ -628,8 +628,8 @@ fn the_meter_shows_a_signal_while_frames_are_being_sent() {
                 device.fpga().make_frame();
             }
             device.turns(3);
-            // The meter looks ten times a second.
-            device.after(30_000, &[]);
+            // The meter looks four times a second.
+            device.after(75_000, &[]);
         }
         device.heard();
         let signal = device.status().unwrap().signal;

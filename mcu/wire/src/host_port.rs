@@ -117,8 +117,8 @@ mod tests {
     use crate::register::{IDENTITY, ORDER_TABLE, Register};
     use proptest::prelude::*;
 
-    /// The check value of CRC-16/IBM-3740 in the catalogue of parametrised CRCs is that of nine
-    /// digits; its first six are an access too.
+    /// The catalogue of parametrised CRCs states the CRC-16/IBM-3740 of the nine digits from 1 to 9. The first six digits
+    /// have the length of an access, so [`check`] must agree on them.
     #[test]
     fn the_check_is_that_of_the_catalogue() {
         let crc = |bytes: &[u8]| {

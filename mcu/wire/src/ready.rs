@@ -228,32 +228,26 @@ impl Unstuffed<'_> {
         array
     }
 
+    /// Byte after byte, since dim light has many zeros and so blocks of few bytes. What changes with each byte is in
+    /// registers.
     #[inline(never)]
-    fn fill(&mut self, mut to: &mut [u8]) {
-        while !to.is_empty() {
-            let length = usize::from(self.left).min(to.len());
-            if let Some((block, rest)) = self.bytes.split_at_checked(length)
-                && length > 0
-            {
-                let (filled, behind) = to.split_at_mut(length);
-                filled.copy_from_slice(block);
-                (self.bytes, to) = (rest, behind);
-                self.left -= length as u8;
-            } else if self.left == 0
-                && let Some((&code, rest)) = self.bytes.split_first()
-            {
-                self.bytes = rest;
-                self.left = code.saturating_sub(1);
-                if core::mem::replace(&mut self.owes_zero, code < 0xFF) {
-                    let (zero, behind) = to.split_at_mut(1);
-                    zero.fill(0);
-                    to = behind;
+    fn fill(&mut self, to: &mut [u8]) {
+        let Self { mut bytes, mut left, mut owes_zero } = *self;
+        for to in to {
+            *to = loop {
+                let Some((&byte, rest)) = bytes.split_first() else { break 0 };
+                bytes = rest;
+                if left > 0 {
+                    left -= 1;
+                    break byte;
                 }
-            } else {
-                to.fill(0);
-                return;
-            }
+                left = byte.saturating_sub(1);
+                if core::mem::replace(&mut owes_zero, byte < 0xFF) {
+                    break 0;
+                }
+            };
         }
+        *self = Self { bytes, left, owes_zero };
     }
 }
 

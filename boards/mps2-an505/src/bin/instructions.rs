@@ -40,8 +40,8 @@ use nirspi_wire::{
 };
 use static_cell::{ConstStaticCell, StaticCell};
 
-/// A tenth of a second at 1000 frames a second: the signal meter compares one pair of frames.
-const FRAMES: u32 = 100;
+/// A quarter of a second at 1000 frames a second: the signal meter compares one pair of frames.
+const FRAMES: u32 = 250;
 /// Instructions in a count of SysTick.
 const GRAIN: u32 = 50;
 const TRANSFER_BYTES: usize = 512;
@@ -357,7 +357,8 @@ fn main() -> ! {
     hprintln!("packet_forwarding {}", packets.between * GRAIN / FRAMES);
     hprintln!("packet_without_meter {}", packets.least * GRAIN);
     hprintln!("packet_merging {}", packets.merging * GRAIN / FRAMES);
-    let [none, some] = streaming::count([0, STREAMED]);
+    // No packet for longer than that ends the run. In half a second the signal meter looks twice.
+    let [none, some] = streaming::count([(0, 200), (STREAMED, 500)]);
     if some.transfers == 0 {
         hprintln!("no packet came out of the ring");
         exit(EXIT_FAILURE);

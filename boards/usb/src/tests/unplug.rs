@@ -44,7 +44,7 @@ fn the_release_loses_the_stream_and_the_repairs_bring_it_back() {
             host.enumerate().await?;
             host.hello().await
         });
-        // The cable is in again, the device is configured: and the release's answer never comes.
+        // The cable is plugged in again and the device is configured, but the released driver never answers.
         assert_eq!(greeted, Some(if as_released { Err(Deaf) } else { Ok(()) }));
         assert_eq!(world.core.borrow().is_armed(1), as_released);
         if !as_released {

@@ -45,8 +45,8 @@ struct Tally {
 
 #[test]
 fn where_nearly_all_light_is_scattered_no_method_loses_against_zero_filling() {
-    // The most correlation that a method may lose: less than anybody sees. As measured, `tv` loses
-    // 0.00003 in 1 of 72 cases, and the others nothing.
+    // The most correlation that a method may lose; the eye does not see such a loss. As measured, `tv` loses 0.00003 in 1
+    // of 72 cases, and the other methods lose nothing.
     const MOST_LOST: f64 = 1e-4;
     let mut random = Pcg64::seed_from_u64(5);
     let mut tallies = METHODS.map(|_| Tally { lost: 0, worst: 0.0, sum: 0.0 });

@@ -35,9 +35,6 @@ static RING: RingMemory<RING_WORDS> = RingMemory::new();
 static SENT: AtomicU32 = AtomicU32::new(0);
 static MADE: AtomicU32 = AtomicU32::new(0);
 
-/// Milliseconds that are counted: the signal meter looks twice.
-const MILLISECONDS: u32 = 200;
-
 /// The FPGA with its parallel port.
 struct Port {
     memory: Memory,
@@ -150,9 +147,9 @@ pub struct Cost {
     pub transfers: u32,
 }
 
-/// Instructions of a millisecond in which so many packets come.
+/// Instructions of a millisecond in which so many packets come, from so many milliseconds.
 #[inline(never)]
-pub fn count<const N: usize>(packets: [u32; N]) -> [Cost; N] {
+pub fn count<const N: usize>(runs: [(u32, u32); N]) -> [Cost; N] {
     static STATE: State<ENDPOINTS> = State::new();
     static PRESENCE: StaticCell<Presence> = StaticCell::new();
     static MEMORY: StaticCell<UsbMemory> = StaticCell::new();
@@ -211,9 +208,9 @@ pub fn count<const N: usize>(packets: [u32; N]) -> [Cost; N] {
         payload: PAYLOAD.take(),
         room: ROOM.take(),
     };
-    packets.map(|packets| {
+    runs.map(|(packets, milliseconds)| {
         let (mut least, mut sum, mut transfers) = (u32::MAX, 0, 0);
-        for _ in 0..MILLISECONDS {
+        for _ in 0..milliseconds {
             for _ in 0..packets {
                 frames.transmit();
             }
@@ -224,6 +221,6 @@ pub fn count<const N: usize>(packets: [u32; N]) -> [Cost; N] {
             sum += woken + sending;
             transfers += count;
         }
-        Cost { least: least * GRAIN, mean: sum * GRAIN / MILLISECONDS, transfers }
+        Cost { least: least * GRAIN, mean: sum * GRAIN / milliseconds, transfers }
     })
 }

@@ -110,7 +110,7 @@ impl Rig {
         self.wait(20_000);
     }
 
-    /// The clocks of a read, as far as it goes; returns what came after the lead.
+    /// So many clocks of a read, which may end early. Returns the levels that the port drives after the lead.
     fn read(&mut self, opcode: u8, clocks: usize) -> Vec<Option<u8>> {
         let bits = (0..8).rev().map(|bit| opcode >> bit & 1).chain(std::iter::repeat(0));
         let lines: Vec<_> = bits.take(clocks).map(|line| self.sck(line)).collect();
