@@ -134,7 +134,8 @@ step_gpu() {
 step_rtl() { cargo test --locked -p nirspi-hdl-sim -p nirspi-tests-rtl; }
 
 # Warnings are errors: code that one feature alone uses must name it. The library alone has only those features of its
-# dependencies that it names; with more of its own, it has those of step `lints`, which then does not check them again.
+# dependencies that it names. With a feature of its own, its dependencies have the features of step `lints`, which then does
+# not check them again.
 step_features() {
     cargo clippy --locked -p nirspi --no-default-features -- -D warnings
     for feature in live serve training; do

@@ -205,9 +205,7 @@ impl Meter {
         let shift = self.exposure.shift();
         let (words, _) = packed.as_chunks();
         for word in words {
-            let before = i64::from(i32::from_le_bytes(*word));
-            let before =
-                if of_packed == 0 { before } else { before.wrapping_shl(of_packed.into()) };
+            let before = i64::from(i32::from_le_bytes(*word)).wrapping_shl(of_packed.into());
             let reading = shifted(next(), shift);
             let change = reading.wrapping_sub(shifted(before, shift));
             tally.readings = tally.readings.wrapping_add(1);

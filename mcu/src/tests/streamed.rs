@@ -202,6 +202,18 @@ impl Device {
         self.bus.port().transmit(|_| {}).remove(0)
     }
 
+    /// The FPGA makes so many frames, and the host reads nothing. Returns the number of loans, each of one frame, and of
+    /// frames that the FPGA has lost.
+    fn unread(&mut self, frames: u32) -> (u32, u32) {
+        self.link.holds = true;
+        for _ in 0..frames {
+            self.fpga().make_frame();
+            self.bus.port().transmit(|_| {});
+            self.turn();
+        }
+        (self.link.loans.len() as u32, self.fpga().lost)
+    }
+
     fn heard(&mut self) -> Vec<DeviceMessage<'static>> {
         self.link.packets.drain(..).map(|packet| message(&packet)).collect()
     }
@@ -391,14 +403,7 @@ fn a_host_that_stops_reading_makes_the_fpga_lose_whole_frames() {
 #[test]
 fn frames_that_wait_for_a_host_that_reads_nothing_are_dropped_at_the_end() {
     let mut device = Device::running(RunLength::Continuous);
-    device.link.holds = true;
-    for _ in 0..200 {
-        device.fpga().make_frame();
-        device.bus.port().transmit(|_| {});
-        device.turn();
-    }
-    let sent: u32 = device.link.loans.len() as u32;
-    let lost = device.fpga().lost;
+    let (sent, lost) = device.unread(200);
     assert!(lost > 100);
     assert_eq!(device.end().1, ended(200, 200 - lost - sent, lost, 0));
 }
@@ -407,13 +412,7 @@ fn frames_that_wait_for_a_host_that_reads_nothing_are_dropped_at_the_end() {
 #[test]
 fn frames_for_which_room_comes_too_late_are_dropped_and_not_damaged() {
     let mut device = Device::running(RunLength::Continuous);
-    device.link.holds = true;
-    for _ in 0..200 {
-        device.fpga().make_frame();
-        device.bus.port().transmit(|_| {});
-        device.turn();
-    }
-    let (sent, lost) = (device.link.loans.len() as u32, device.fpga().lost);
+    let (sent, lost) = device.unread(200);
     device.ask(Command::Stop);
     device.after(99_000, &[]);
     device.link.fetch();

@@ -240,11 +240,12 @@ impl Link for Cable {
             }
             camera.step(STEP_CLOCKS);
             let fpga = camera.fpga_mut();
-            if let Script::Crash { frame } | Script::BrownOut { frame } = fpga.script
+            let script = fpga.script;
+            if let Script::Crash { frame } | Script::BrownOut { frame } = script
                 && fpga.is_due(frame)
             {
-                if matches!(std::mem::replace(&mut fpga.script, Script::None), Script::Crash { .. })
-                {
+                fpga.script = Script::None;
+                if script == (Script::Crash { frame }) {
                     camera.crash("faults.rs: on purpose");
                 } else {
                     fpga.inner.reset();
