@@ -332,7 +332,9 @@ pub struct AdcSample {
 }
 
 /// The receiver, stepped once per ADC clock.
+// On lines of the cache: each sample reads what the one before wrote, and a write across two lines doubles its time.
 #[derive(Debug, Clone)]
+#[repr(align(64))]
 pub struct Chain {
     settings: ChainSettings,
     led_decay: f64,

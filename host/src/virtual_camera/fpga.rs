@@ -29,24 +29,58 @@ pub type Wiring = Box<dyn FnMut(&mut LedArray, Lines) -> f32 + Send>;
 
 /// The golden model of the gateware between an LED array and a photodiode's ADC.
 pub struct OpticalFpga {
-    gateware: Gateware,
-    array: LedArray,
-    wiring: Option<Wiring>,
-    chain: Chain,
+    first: Detector,
     /// Detectors beside the first one.
     further: Vec<Detector>,
+    wiring: Option<Wiring>,
     clock: u64,
     rain: Option<Rain>,
     /// The levels at the LED pins in the last clocks, of a bring-up design.
     loopback: Option<VecDeque<Lines>>,
 }
 
-/// A further detector behind an ADC of its own. Its gateware is a second copy of the model that gets every access of the
-/// first one, so both show the same patterns in the same clocks.
+/// A detector behind an ADC of its own. The gateware of each further detector is a copy of the model that gets every access
+/// of the first one, so all show the same patterns in the same clocks.
 struct Detector {
     gateware: Gateware,
     array: LedArray,
     chain: Chain,
+}
+
+impl Detector {
+    /// Powers up with the interlock closed.
+    fn new(array: LedArray, chain: Chain) -> Self {
+        let mut gateware = Gateware::new();
+        gateware.set_interlock(true);
+        Self { gateware, array, chain }
+    }
+
+    /// The sample of the light of these lines.
+    #[inline]
+    fn sample(&mut self, lines: Lines) -> AdcSample {
+        let light = self.array.light(lines.rows, lines.columns, lines.enable);
+        converted(&mut self.chain, light)
+    }
+
+    /// Advances a detector that sees the lines of its own gateware. Most of a simulation's time goes here.
+    fn advance(&mut self, clocks: u64) {
+        for _ in 0..clocks {
+            // The ADC is not read outside a run, and drawing its noise is most of the work.
+            let sample =
+                if self.gateware.running() { self.sample(self.gateware.lines()) } else { DARK };
+            self.gateware.tick(sample);
+        }
+    }
+}
+
+/// What the gateware gets of the ADC outside a run.
+const DARK: AdcSample = AdcSample { code: 0, over_range: false };
+
+/// The ADC's word for settled light in electrons a sample.
+#[inline]
+fn converted(chain: &mut Chain, light_electrons: f32) -> AdcSample {
+    let sample = chain.sample(light_electrons);
+    AdcSample { code: sample.counts, over_range: sample.over_range }
 }
 
 /// Clocks from the choice of the levels at the LED pins to the sample that `Design::BringUp` makes of them: two
@@ -65,18 +99,15 @@ impl OpticalFpga {
     /// Powers up in front of a scene, with the interlock closed.
     #[must_use]
     pub fn new(array: LedArray, chain: Chain) -> Self {
-        let mut gateware = Gateware::new();
-        gateware.set_interlock(true);
-        let (wiring, further, rain, loopback) = (None, Vec::new(), None, None);
-        Self { gateware, array, wiring, chain, further, clock: 0, rain, loopback }
+        let first = Detector::new(array, chain);
+        let (further, wiring, rain, loopback) = (Vec::new(), None, None, None);
+        Self { first, further, wiring, clock: 0, rain, loopback }
     }
 
     /// The same camera with a further detector, which has the light of `array`.
     #[must_use]
     pub fn with_detector(mut self, array: LedArray, chain: Chain) -> Self {
-        let mut gateware = Gateware::new();
-        gateware.set_interlock(true);
-        self.further.push(Detector { gateware, array, chain });
+        self.further.push(Detector::new(array, chain));
         self
     }
 
@@ -87,7 +118,8 @@ impl OpticalFpga {
         gateware.set_adc_clock(Some(BRING_UP_HZ));
         gateware.set_interlock(true);
         let loopback = Some(VecDeque::from([Lines::default(); LOOPBACK_CLOCKS]));
-        Self { gateware, loopback, further: Vec::new(), ..self }
+        let first = Detector { gateware, ..self.first };
+        Self { first, loopback, further: Vec::new(), rain: None, ..self }
     }
 
     /// Loses everything, as after a dip of the supply: registers, frames, LEDs off. The clock starts again at 0
@@ -99,9 +131,12 @@ impl OpticalFpga {
         }
     }
 
+    fn all(&mut self) -> impl Iterator<Item = &mut Detector> {
+        std::iter::once(&mut self.first).chain(&mut self.further)
+    }
+
     fn gatewares(&mut self) -> impl Iterator<Item = &mut Gateware> {
-        std::iter::once(&mut self.gateware)
-            .chain(self.further.iter_mut().map(|detector| &mut detector.gateware))
+        self.all().map(|detector| &mut detector.gateware)
     }
 
     /// Whether the FPGA lets LEDs shine now.
@@ -112,7 +147,7 @@ impl OpticalFpga {
 
     /// The levels at the LED pins. Each detector's gateware can switch the LEDs off.
     fn lines(&self) -> Lines {
-        let lines = self.gateware.lines();
+        let lines = self.first.gateware.lines();
         let all_enable = self.further.iter().all(|detector| detector.gateware.lines().enable);
         Lines { enable: lines.enable && all_enable, ..lines }
     }
@@ -125,7 +160,7 @@ impl OpticalFpga {
     }
 
     /// The sample of a clock in a run. The gateware of each further detector takes its own sample.
-    fn sample(&mut self, at: u64) -> AdcSample {
+    fn sample(&mut self) -> AdcSample {
         let lines = self.lines();
         if let Some(late) = &mut self.loopback {
             late.push_back(lines);
@@ -133,19 +168,28 @@ impl OpticalFpga {
             let code = loopback(seen.rows, seen.columns, seen.enable);
             return AdcSample { code, over_range: false };
         }
-        if self.rain.is_some() {
-            self.look_at_the_rain(at);
+        for detector in &mut self.further {
+            let sample = detector.sample(lines);
+            detector.gateware.tick(sample);
         }
-        for Detector { gateware, array, chain } in &mut self.further {
-            let sample = chain.sample(array.light(lines.rows, lines.columns, lines.enable));
-            gateware.tick(AdcSample { code: sample.counts, over_range: sample.over_range });
+        match &mut self.wiring {
+            None => self.first.sample(lines),
+            Some(wiring) => {
+                let light = wiring(&mut self.first.array, lines);
+                converted(&mut self.first.chain, light)
+            }
         }
-        let light = match &mut self.wiring {
-            None => self.array.light(lines.rows, lines.columns, lines.enable),
-            Some(wiring) => wiring(&mut self.array, lines),
+    }
+
+    /// One clock of all detectors.
+    fn tick(&mut self) {
+        let sample = if self.running() {
+            self.sample()
+        } else {
+            self.further.iter_mut().for_each(|detector| detector.gateware.tick(DARK));
+            DARK
         };
-        let sample = self.chain.sample(light);
-        AdcSample { code: sample.counts, over_range: sample.over_range }
+        self.first.gateware.tick(sample);
     }
 
     /// The same camera with other wiring between FPGA and LEDs.
@@ -166,43 +210,45 @@ impl OpticalFpga {
         self
     }
 
-    /// Updates the positions of the drops for `clock`, if the last update is long ago.
-    fn look_at_the_rain(&mut self, clock: u64) {
-        let Some(rain) = self.rain.as_mut().filter(|rain| clock - rain.seen >= WEATHER_CLOCKS)
-        else {
-            return;
-        };
-        rain.spots.advance((clock - rain.seen) as f64 / f64::from(nirspi_wire::ADC_HZ));
-        rain.seen = clock;
+    /// Updates the positions of the drops if the last update is long ago. Returns the clocks until the next update; outside a
+    /// run, and in dry air, nothing is to be updated.
+    fn look_at_the_rain(&mut self) -> u64 {
+        let (now, running) = (self.clock, self.running());
+        let Some(rain) = self.rain.as_mut().filter(|_| running) else { return u64::MAX };
+        let passed = now - rain.seen;
+        if passed < WEATHER_CLOCKS {
+            return WEATHER_CLOCKS - passed;
+        }
+        rain.spots.advance(passed as f64 / f64::from(nirspi_wire::ADC_HZ));
+        rain.seen = now;
         let (reflectance, electrons_per_led) = (rain.spots.reflectance(), rain.electrons_per_led);
         for array in self.arrays() {
             array.relight(&reflectance, electrons_per_led);
         }
+        WEATHER_CLOCKS
     }
 
     fn arrays(&mut self) -> impl Iterator<Item = &mut LedArray> {
-        std::iter::once(&mut self.array)
-            .chain(self.further.iter_mut().map(|detector| &mut detector.array))
+        self.all().map(|detector| &mut detector.array)
     }
 }
 
 impl SimulatedFpga for OpticalFpga {
     fn advance(&mut self, clocks: u32) {
-        let begun = self.clock;
-        self.clock += u64::from(clocks);
-        if !self.gateware.has_adc_clock() {
-            return;
+        let end = self.clock + u64::from(clocks);
+        if !self.first.gateware.has_adc_clock() {
+            self.clock = end;
         }
-        for passed in 0..clocks {
-            // The ADC is not read outside a run, and drawing its noise is most of the work.
-            let sample = if self.gateware.running() {
-                self.sample(begun + u64::from(passed))
+        // A camera without these needs none of their checks in each clock: docs/performance.md has its speed.
+        let plain = self.further.is_empty() && self.wiring.is_none() && self.loopback.is_none();
+        while self.clock < end {
+            let stretch = self.look_at_the_rain().min(end - self.clock);
+            if plain {
+                self.first.advance(stretch);
             } else {
-                let dark = AdcSample { code: 0, over_range: false };
-                self.further.iter_mut().for_each(|detector| detector.gateware.tick(dark));
-                dark
-            };
-            self.gateware.tick(sample);
+                (0..stretch).for_each(|_| self.tick());
+            }
+            self.clock += stretch;
         }
     }
 
@@ -211,7 +257,7 @@ impl SimulatedFpga for OpticalFpga {
     }
 
     fn running(&self) -> bool {
-        self.gateware.running()
+        self.first.gateware.running()
     }
 
     fn set_interlock(&mut self, closed: bool) {
@@ -222,7 +268,7 @@ impl SimulatedFpga for OpticalFpga {
 impl FpgaBus for OpticalFpga {
     fn read(&mut self, address: u16) -> Result<u32, BusError> {
         // An address without a register reads as zero, as on the real port.
-        let mut answer = self.gateware.read(address).unwrap_or(0);
+        let mut answer = self.first.gateware.read(address).unwrap_or(0);
         for detector in &mut self.further {
             let own = detector.gateware.read(address).unwrap_or(0);
             // A fault that one detector has found, such as light over its range, is a fault of the camera.
@@ -253,18 +299,18 @@ impl FpgaBus for OpticalFpga {
     }
 
     fn frame_ready(&mut self) -> bool {
-        self.gateware.frame_ready()
+        self.first.gateware.frame_ready()
     }
 
     fn raw_ready(&mut self) -> bool {
-        self.gateware.raw_ready()
+        self.first.gateware.raw_ready()
     }
 
     fn frame(&mut self) -> Result<Option<&[u8]>, BusError> {
-        Ok(self.gateware.frame())
+        Ok(self.first.gateware.frame())
     }
 
     fn raw(&mut self) -> Result<Option<&[u8]>, BusError> {
-        Ok(self.gateware.raw())
+        Ok(self.first.gateware.raw())
     }
 }
