@@ -184,6 +184,8 @@ struct Host {
     idle_us: u64,
     /// Until when USB has carried bytes.
     carried_us: u64,
+    /// The most bytes that waited in the link at once.
+    most_waiting: u64,
 }
 
 impl Host {
@@ -203,6 +205,13 @@ impl Host {
         self.idle_us += bytes / USB_BYTES_PER_MICRO;
     }
 
+    /// Puts something on the link.
+    fn queue(&mut self, loan: Option<Loan>, bytes: u64) {
+        self.waiting.push_back((loan, bytes));
+        let waiting = self.waiting.iter().map(|(_, bytes)| bytes).sum();
+        self.most_waiting = self.most_waiting.max(waiting);
+    }
+
     /// The host has the whole of what waits first.
     fn fetch(&mut self) {
         if let Some((Some(mut loan), _)) = self.waiting.pop_front() {
@@ -218,7 +227,7 @@ impl PacketSink for Host {
 
     fn commit(&mut self, part: Range<usize>) {
         if self.reader == Reader::Usb {
-            self.waiting.push_back((None, part.len() as u64));
+            self.queue(None, part.len() as u64);
         }
         self.packets.push(part.len());
     }
@@ -234,7 +243,7 @@ impl PacketSink for Host {
         }
         let packets = bytes.split_inclusive(|byte| *byte == 0).map(<[u8]>::len);
         self.packets.extend(packets.filter(|length| *length > 1));
-        self.waiting.push_back((Some(loan), bytes.len() as u64));
+        self.queue(Some(loan), bytes.len() as u64);
         if self.reader == Reader::AtOnce {
             self.fetch();
         }
@@ -259,6 +268,8 @@ pub struct Stretch {
     pub busy: f64,
     /// Share of the time in which USB had nothing to carry.
     pub usb_idle: f64,
+    /// Milliseconds that a reply waits at most behind what the link had before it.
+    pub reply_ms: f64,
 }
 
 /// Runs a camera of this many patterns, one differential sweep a frame, and measures the stretch in which so many
@@ -284,6 +295,7 @@ pub fn stretch<P: TimedPort>(
         waiting: VecDeque::new(),
         idle_us: 0,
         carried_us: 0,
+        most_waiting: 0,
     };
     let configuration = Configuration {
         order: PatternOrder::Natural,
@@ -318,7 +330,7 @@ pub fn stretch<P: TimedPort>(
         assert!(at < deadline, "{sent} frames in a second");
         if sent >= before && began.is_none() {
             (began, moving_ps, idle_ps) = (Some((at, sent)), 0, 0);
-            host.idle_us = 0;
+            (host.idle_us, host.most_waiting) = (0, 0);
         }
         if let Some((since, first)) = began
             && sent >= first + frames
@@ -337,6 +349,7 @@ pub fn stretch<P: TimedPort>(
                 sent,
                 busy: 1.0 - (moving_ps + idle_ps) as f64 * 1e-12 / seconds,
                 usb_idle: host.idle_us as f64 * 1e-6 / seconds,
+                reply_ms: host.most_waiting as f64 / USB_BYTES_PER_MICRO as f64 * 1e-3,
             };
         }
         let (moving, idle) = turn(&mut camera, &mut bus, &mut host, processor);

@@ -338,6 +338,18 @@ fn packets_of_the_parallel_port_reach_7900_frames_a_second_and_those_of_24_bits_
     }
 }
 
+/// Why replies and packets share one endpoint.
+#[test]
+fn a_reply_waits_behind_packets_for_no_longer_than_the_page_says() {
+    let text = page("docs/firmware.md").split_whitespace().collect::<Vec<_>>().join(" ");
+    let (_, told) = text.split_once("A reply waits behind them for at most ").expect("a figure");
+    let told: f64 = told.split(' ').next().and_then(|told| told.parse().ok()).expect("a number");
+    for is_narrow in [false, true] {
+        let seen = streamed(Processor::streaming(), is_narrow).reply_ms;
+        assert!((told - 0.5..=told).contains(&seen), "{seen} ms, the page says {told}");
+    }
+}
+
 /// With a host that takes everything at once the FPGA's port is the limit, and the ring loses nothing.
 #[test]
 fn to_a_host_that_is_fast_enough_the_ring_forwards_all_that_the_port_sends() {

@@ -5,8 +5,10 @@
 //! show as numbers that are missing: those of them that the FPGA has not lost count as damaged.
 //!
 //! # Invariant
-//! Each packet of the run is sent or counted once, and no packet of another run is
-//! (`tests::streamed::whatever_happens_to_the_ring_every_frame_is_counted_once`).
+//! - Each packet of the run is sent or counted once, and no packet of another run is
+//!   (`tests::streamed::whatever_happens_to_the_ring_every_frame_is_counted_once`).
+//! - No packet is dropped while the FPGA can wait: for those that the link has no place for, it does
+//!   (`tests::streamed::packets_wait_in_the_ring_for_a_place_of_the_link`).
 
 use super::{Counters, Path, Run};
 use crate::meter::Meter;
@@ -33,7 +35,7 @@ impl Stretch {
         found.follows && self.first.bytes_to(found) <= LOAN_BYTES
     }
 
-    /// Lends the stretch to the link. Without room there, its packets are dropped.
+    /// Lends the stretch to the link. One that begins in a word that is lent is dropped: bytes have been lost before it.
     fn send(self, counters: &mut Counters, bus: &mut impl FpgaBus, sink: &mut impl PacketSink) {
         let Self { first, last, packets } = self;
         let lend = |ring: &mut crate::Ring| ring.lend((&first, &last), |loan| sink.lend(loan));
@@ -45,8 +47,8 @@ impl Stretch {
 }
 
 impl Run {
-    /// Takes the packets that have come out of the ring; true if there was one. Packets for which the link has no room
-    /// are dropped.
+    /// Takes the packets that have come out of the ring; true if there was one. Packets stay there while the link has no
+    /// place for them, or a reply waits.
     #[inline(never)]
     pub(super) fn take_streamed(
         &mut self,
@@ -58,33 +60,33 @@ impl Run {
     ) -> bool {
         let Path { counters, meter, scratch, may_send } = path;
         bus.look();
-        if bus.ring().is_some_and(|ring| ring.is_full()) {
-            // The FPGA waits for the host, and makes no progress that could be seen here.
-            (self.last_frame, self.last_full) = (now, Some(now));
-        }
+        let mut waits = bus.ring().is_some_and(|ring| ring.is_full());
         let mut stretch: Option<Stretch> = None;
         let mut packets = 0;
         while packets < MOST_PACKETS
             && let Some(found) = bus.ring().and_then(|ring| ring.next(self.patterns, width))
         {
+            if let Some(whole) = stretch.take_if(|before| !before.takes(&found)) {
+                whole.send(counters, bus, sink);
+            }
+            if stretch.is_none() && (!may_send || sink.claim(0).is_none()) {
+                waits = true;
+                break;
+            }
             packets = packets.wrapping_add(1);
             let is_next = self.is_next(&found, counters, bus);
             if let Some(ring) = bus.ring() {
                 ring.take(&found);
             }
-            if let Some(whole) = stretch.take_if(|before| !is_next || !before.takes(&found)) {
-                whole.send(counters, bus, sink);
-            }
             if !is_next {
+                if let Some(whole) = stretch.take() {
+                    whole.send(counters, bus, sink);
+                }
                 continue;
             }
             self.last_sequence = Some(found.sequence);
             self.last_frame = now;
             counters.advance(found.sequence.wrapping_add(1), counters.lost);
-            if !may_send {
-                counters.dropped = counters.dropped.wrapping_add(1);
-                continue;
-            }
             counters.sent = counters.sent.wrapping_add(1);
             let is_looked_at =
                 meter.wants(now) && self.look(&found, now, (meter, scratch), bus, sink);
@@ -99,6 +101,10 @@ impl Run {
         }
         if let Some(stretch) = stretch {
             stretch.send(counters, bus, sink);
+        }
+        if waits {
+            // For the host, as the FPGA does or soon will, and without progress that could be seen here.
+            (self.last_frame, self.last_full) = (now, Some(now));
         }
         packets > 0
     }

@@ -294,19 +294,36 @@ fn frames_that_wait_at_a_stop_still_come() {
     assert_eq!(event, ended(3, 0, 0, 0));
 }
 
+/// Loans of one packet each take the link's places long before the ring is full.
 #[test]
-fn a_full_link_drops_whole_packets_and_the_ring_goes_on() {
+fn packets_wait_in_the_ring_for_a_place_of_the_link() {
     let mut device = Device::running(RunLength::Continuous);
     device.link.room = 2;
-    for _ in 0..200 {
-        device.frame();
-        device.turn();
+    let made: Vec<_> = (0..30)
+        .map(|_| {
+            let made = device.frame();
+            device.turn();
+            made
+        })
+        .collect();
+    assert_eq!(sequences(&device.heard()), [0, 1]);
+    // Nothing stalls meanwhile.
+    for _ in 0..10 {
+        device.after(100_000, &packet(9, Command::Status));
+        assert_eq!(device.camera.state(), State::Running);
     }
     device.link.room = usize::MAX;
-    device.frame();
+    device.link.holds = true;
     device.turn();
-    assert_eq!(sequences(&device.heard()), [0, 1, 200]);
-    assert_eq!(device.end().1, ended(201, 198, 0, 0));
+    assert_eq!(device.heard().len(), 10, "the replies come first");
+    device.turns(3);
+    // The signal meter looks at two packets, and a poll ends behind each of them.
+    assert_eq!(device.link.loans.len(), 3, "all that waited goes out together");
+    (0..3).for_each(|_| device.link.fetch());
+    assert_eq!(device.link.packets, made[2..]);
+    device.link.packets.clear();
+    device.link.holds = false;
+    assert_eq!(device.end().1, ended(30, 0, 0, 0));
 }
 
 /// What comes at once goes out at once: one loan, and no byte of it is copied.
@@ -439,6 +456,8 @@ fn packets_of_an_fpga_that_does_not_wait_count_as_damaged() {
     assert_eq!(sequences(&device.heard()), [101]);
     let damaged = 102 - 1 - first.len() as u32;
     assert!(first[0] == 0 && damaged > 60, "{damaged}");
+    let Ok(status) = device.status() else { panic!() };
+    assert_eq!(status.fpga_frames_corrupt, damaged, "while the run goes on");
     assert_eq!(device.end().1, ended(102, 0, 0, damaged));
 }
 
