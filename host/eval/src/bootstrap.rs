@@ -39,7 +39,7 @@ impl Interval {
     }
 }
 
-/// The draws: indices of items, some more than once, some not at all.
+/// Draws with replacement. Each draw is a list of items' indices, in which an item may come more than once or not at all.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Redraws(Vec<Vec<usize>>);
 

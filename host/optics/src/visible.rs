@@ -113,7 +113,7 @@ impl VisibleCamera {
         let field_mm = projector.field_mm(distance_mm);
         let hanging = air.hanging(WAVELENGTH_NM)?;
         let through = hanging.by_daylight(footprint.weights(), distance_mm, field_mm)?;
-        // Droplets that stay in the air are too many to simulate, and are already in `through`.
+        // Droplets that stay in the air are not simulated one by one: they are too many, and `through` has their effect.
         let drops = if air.drops().fall() { air.drops().clone() } else { Drops::none() };
         let mut falling = FallingDrops::new(&drops, beams, seed)?;
         let mut seen = vec![0.0; LEDS];

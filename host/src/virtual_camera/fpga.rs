@@ -62,7 +62,7 @@ impl Detector {
         converted(&mut self.chain, light)
     }
 
-    /// Advances a detector that sees the lines of its own gateware. Most of a simulation's time goes here.
+    /// Advances a detector that sees the lines of its own gateware. A simulation spends most of its time here.
     fn advance(&mut self, clocks: u64) {
         for _ in 0..clocks {
             // The ADC is not read outside a run, and drawing its noise is most of the work.
@@ -312,5 +312,55 @@ impl FpgaBus for OpticalFpga {
 
     fn raw(&mut self) -> Result<Option<&[u8]>, BusError> {
         Ok(self.first.gateware.raw())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::virtual_camera::VirtualOptics;
+    use nirspi_optics::Scene;
+    use nirspi_optics::rain::Air;
+    use nirspi_wire::register::{control, mode};
+
+    /// Frames of a run that is advanced in stretches of these lengths.
+    fn frames(mut fpga: OpticalFpga, stretches: &[u32]) -> Vec<Vec<u8>> {
+        for (register, value) in [
+            (Register::Mode, mode::DIFFERENTIAL),
+            (Register::Patterns, 64),
+            (Register::Frames, 60),
+            (Register::Control, control::START),
+        ] {
+            fpga.write(register.address(), value).unwrap();
+        }
+        let mut frames = Vec::new();
+        // Two frames take 1280 clocks, and three can wait.
+        for stretch in stretches.iter().cycle() {
+            if !fpga.running() && !fpga.frame_ready() {
+                break;
+            }
+            fpga.advance(*stretch);
+            while let Some(frame) = fpga.frame().unwrap() {
+                frames.push(frame.to_vec());
+                fpga.write(Register::Control.address(), control::RELEASE).unwrap();
+            }
+        }
+        frames
+    }
+
+    /// In rain the drops move three times within the run, in whichever stretches the time passes.
+    #[test]
+    fn the_same_light_comes_in_long_stretches_and_clock_by_clock() {
+        for air in ["none", "heavy"] {
+            let air: Air = air.parse().unwrap();
+            let optics = VirtualOptics::new(Scene::white(), 300.0).unwrap().in_air(&air).unwrap();
+            let fpga = || optics.fpga(1).unwrap();
+            let seen = frames(fpga(), &[1280]);
+            assert_eq!(seen.len(), 60);
+            assert_eq!(frames(fpga(), &[1, 7, 1023]), seen);
+            let wired =
+                fpga().wired(|array, lines| array.light(lines.rows, lines.columns, lines.enable));
+            assert_eq!(frames(wired, &[999]), seen, "by the loop of faulty wiring");
+        }
     }
 }

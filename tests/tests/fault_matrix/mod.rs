@@ -316,7 +316,7 @@ fn one_capture(fault: Fault, lab: &Lab) -> Result<String, String> {
         Ended::Fault(fault) => format!("LEDs off: {fault}"),
         ended => ended.in_words().to_owned(),
     };
-    // How many frames the link of a busy machine still delivers after a fault is not fixed.
+    // After a fault, the number of frames that still come depends on how busy the machine is.
     let counted = match captured.ended {
         Ended::Complete => format!("{counters}; "),
         _ => String::new(),

@@ -157,8 +157,7 @@ fn another_run_method_strength_or_sum_begins_a_new_estimate() {
         let begun = made.iter().filter(|warm| !**warm).count();
         assert_eq!((begun, made.last()), (1, Some(&true)), "{change}: {made:?}");
     }
-    // What comes after the estimate leaves the estimate as it is. Without the baselines there is no
-    // second model.
+    // A setting of a later stage does not end the estimate. A build without the feature `baselines` has one model only.
     if cfg!(feature = "baselines") {
         page.command("/api/settings", br#"{"model": "gan"}"#).unwrap();
         assert_eq!(warm(&mut page, 2), [true, true]);

@@ -70,7 +70,7 @@ impl Squares {
         self.expected += expected;
     }
 
-    /// Variance of a row that its expected variance leaves out.
+    /// By how much the variance of a row is larger than expected; 0 where that may be chance.
     fn excess(&self) -> f32 {
         let count = self.count as f32;
         let no_chance = 1.0 + NO_CHANCE * (2.0 / count).sqrt();
