@@ -255,7 +255,9 @@ step_examples() {
         run --example compare_methods
         run --example own_method
         run --example own_network
-        run --bin nirspi -- example wing --out wing.npz
+        # Beside an example, the program has the features with which step `test` has compiled it.
+        cargo build --quiet --locked --manifest-path "$root/Cargo.toml" --bin nirspi --example first_picture
+        "${CARGO_TARGET_DIR:-$root/target}/debug/nirspi" example wing --out wing.npz
         run --example your_measurements -- wing.npz
     )
 }
