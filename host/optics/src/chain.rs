@@ -332,7 +332,8 @@ pub struct AdcSample {
 }
 
 /// The receiver, stepped once per ADC clock.
-// On lines of the cache: each sample reads what the one before wrote, and a write across two lines doubles its time.
+// Aligned to lines of the cache: each sample reads what the sample before wrote, which takes half as long again where a
+// value lies across two lines.
 #[derive(Debug, Clone)]
 #[repr(align(64))]
 pub struct Chain {

@@ -7,7 +7,7 @@
 //! # Invariant
 //! - Each packet of the run is sent or counted once, and no packet of another run is
 //!   (`tests::streamed::whatever_happens_to_the_ring_every_frame_is_counted_once`).
-//! - No packet is dropped while the FPGA can wait: for those that the link has no place for, it does
+//! - A packet for which the link has no place stays in the ring. When the ring is full, the FPGA waits
 //!   (`tests::streamed::packets_wait_in_the_ring_for_a_place_of_the_link`).
 
 use super::{Counters, Path, Run};
@@ -103,7 +103,7 @@ impl Run {
             stretch.send(counters, bus, sink);
         }
         if waits {
-            // For the host, as the FPGA does or soon will, and without progress that could be seen here.
+            // The camera waits for the host: that no frame goes through does not mean that the FPGA has stalled.
             (self.last_frame, self.last_full) = (now, Some(now));
         }
         packets > 0
