@@ -105,7 +105,7 @@ def synthesise(board: Board, folder: Path, out: Path) -> Path:
     netlist = out / "top.json"
     sources = " ".join(str(p.relative_to(ROOT)) for p in sorted((HDL / "sv").glob("*.sv")))
     top = " ".join(str(p.relative_to(ROOT)) for p in files(board, folder, ".sv"))
-    roots = " ".join(f"--top {name}" for name in ("nirspi_core", "nirspi_loopback"))
+    roots = " ".join(f"--top {name}" for name in ("nirspi_core", "nirspi_loopback", "nirspi_phase_scan"))
     script = (
         f"read_slang --threads 1 {roots} {sources}; "
         f"read_verilog -sv {top}; "

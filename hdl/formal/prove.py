@@ -244,6 +244,12 @@ FAULTS = (
         (("shell", "alive && locked && reset_n", "alive && locked"),),
     ),
     Fault(
+        SHELL,
+        "the scan does not hold the core in reset",
+        "dark_in_scan",
+        (("shell", "assign healthy = clocked && scanned;", "assign healthy = clocked;"),),
+    ),
+    Fault(
         GUARD,
         "the guard counts twice as far",
         "dead_when_stopped",

@@ -1,5 +1,6 @@
 /// The LED enable at the pin is low at most 36 clocks of the watch after the ADC's clock has stopped, and at once
-/// without lock or with the reset button pressed, whatever the core does and whatever state everything is in.
+/// without lock, with the reset button pressed or while the sampling phase is scanned, whatever the core does and
+/// whatever state everything is in.
 ///
 /// The clock never ticks here, and everything begins in any state: that is the moment of the stop.
 module shell_proof (
@@ -19,6 +20,10 @@ module shell_proof (
         .over_range (1'b0),
         .rows       (),
         .columns    (),
+        .phase_step (),
+        .adc_select_n    (),
+        .adc_serial_clock(),
+        .adc_serial_data (),
         .led_enable,
         .interlock  (1'b1),
         .spi_sck    (1'b0),
@@ -41,6 +46,7 @@ module shell_proof (
     always_comb begin
         dark_when_stopped: assert (since < 36 || !led_enable);
         dark_at_once:      assert (locked && reset_n || !led_enable);
+        dark_in_scan:      assert (dut.scanned || !led_enable);
 `ifdef INDUCTION
         invariant_seen:   assert (since < 1 || dut.guard.beat[0] == dut.guard.divided[3]);
         invariant_seen_1: assert (since < 2 || dut.guard.beat[1] == dut.guard.divided[3]);
@@ -63,6 +69,7 @@ module nirspi_core (
     input  logic        adc_beat,
     input  logic        pll_locked,
     input  logic        clock_alive,
+    input  logic [31:0] sampling,
     input  logic [13:0] adc_code,
     input  logic        adc_over_range,
     output logic [31:0] led_rows,
@@ -82,4 +89,23 @@ module nirspi_core (
     output logic        parallel_enable,
     output logic        access
 );
+endmodule
+
+/// Stands for the scan of the sampling phase: it may be over in any clock.
+module nirspi_phase_scan (
+    input  logic        clk_host,
+    input  logic        rst_host,
+    input  logic        clk_adc,
+    input  logic        rst_adc,
+    input  logic [13:0] code,
+    output logic        serial_select_n,
+    output logic        serial_clock,
+    output logic        serial_data,
+    output logic        phase_step,
+    output logic        done,
+    output logic [31:0] sampling
+);
+    // Of any value; one that is read twice is to be the same for both.
+    logic next;
+    always_ff @(posedge clk_host) done <= next;
 endmodule

@@ -13,10 +13,11 @@ module nirspi_core (
     input var logic clk_sck   , /// `spi_sck`
     input var logic rst_sck   , /// `spi_cs_n`
     // What the board knows of itself and of the ADC's clock.
-    input var logic [8-1:0] design_id  , /// `Design` of `mcu/wire`
-    input var logic         adc_beat   , /// The ADC's clock, divided
-    input var logic         pll_locked ,
-    input var logic         clock_alive,
+    input var logic [8-1:0]  design_id  , /// `Design` of `mcu/wire`
+    input var logic          adc_beat   , /// The ADC's clock, divided
+    input var logic          pll_locked ,
+    input var logic          clock_alive,
+    input var logic [32-1:0] sampling   , /// The register `Sampling`
     // ADC, in step with `clk_adc`.
     input var logic [14-1:0] adc_code      ,
     input var logic          adc_over_range,
@@ -154,6 +155,7 @@ module nirspi_core (
         .alive     (clock_alive ),
         .ready     (ready       ),
         .beat      (adc_beat    ),
+        .sampling  (sampling    ),
         .send      (send        ),
         .address   (address_in  ),
         .back      (back        ),

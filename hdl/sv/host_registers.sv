@@ -5,13 +5,14 @@
 module nirspi_host_registers
     import nirspi_register_map::*;
 (
-    input var logic         clk      ,
-    input var logic         rst      ,
-    input var logic [8-1:0] design_id,
-    input var logic         locked   , /// The PLL of the ADC's clock
-    input var logic         alive    , /// The ADC's domain ticks
-    input var logic         ready    , /// The ADC's domain is out of reset
-    input var logic         beat     , /// The ADC's clock, divided by `CLOCKS_PRESCALER` and again by two
+    input var logic          clk      ,
+    input var logic          rst      ,
+    input var logic [8-1:0]  design_id,
+    input var logic          locked   , /// The PLL of the ADC's clock
+    input var logic          alive    , /// The ADC's domain ticks
+    input var logic          ready    , /// The ADC's domain is out of reset
+    input var logic          beat     , /// The ADC's clock, divided by `CLOCKS_PRESCALER` and again by two
+    input var logic [32-1:0] sampling , /// The register `Sampling`
     // From the host port.
     input var logic          send   ,
     input var logic [16-1:0] address,
@@ -27,7 +28,7 @@ module nirspi_host_registers
     logic          locked_here;
     logic [16-1:0] frequency  ;
     logic [32-1:0] clocks     ;
-    logic [4-1:0]  here       ;
+    logic [5-1:0]  here       ;
     logic          own        ;
 
     nirspi_synchroniser to_locked (
@@ -50,6 +51,7 @@ module nirspi_host_registers
         here[1] = 32'(address) == ADDRESS_VERSION;
         here[2] = 32'(address) == ADDRESS_CLOCKS;
         here[3] = 32'(address) == ADDRESS_DESIGN;
+        here[4] = 32'(address) == ADDRESS_SAMPLING;
     end
 
     always_ff @ (posedge clk) begin
@@ -64,7 +66,7 @@ module nirspi_host_registers
                 NO_CLOCK
             ) : (
                 (RESET_IDENTITY & {32{here[0]}}) | (RESET_VERSION & {32{here[1]}}) | (clocks & {32{here[2]}})
-                    | (32'(design_id) & {32{here[3]}})
+                    | (32'(design_id) & {32{here[3]}}) | (sampling & {32{here[4]}})
             ));
         end else begin
             answered <= back && !own;

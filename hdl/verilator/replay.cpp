@@ -14,6 +14,7 @@
 namespace {
 
 constexpr int INPUTS = 1 << 3, OUTPUTS = 1 << 4;
+constexpr uint32_t SAMPLING = 0x01280F11; // that of hdl/sim/src/pins.rs
 enum Edge { ADC, HOST, ADC_RESET, HOST_RESET, BRIDGE_RESET, SCK, DESELECTED };
 
 struct Outputs {
@@ -31,6 +32,7 @@ void drive(Vnirspi_core& core, uint32_t inputs) {
     core.pll_locked = core.clock_alive = inputs >> 23 & 1;
     core.design_id = inputs >> 24 & 127;
     core.parallel_ready = inputs >> 31;
+    core.sampling = SAMPLING;
 }
 
 // Inputs have settled before the clock rises, and outputs before it falls.

@@ -7,7 +7,9 @@
 use crate::session::{Listener, Session, SessionError};
 use crate::versions::of_register;
 use nirspi_wire::ADC_HZ;
-use nirspi_wire::register::{Design, IDENTITY, Register, clocks, has_this_map};
+use nirspi_wire::register::{
+    Design, IDENTITY, Register, clocks, has_this_map, sampling, scans_the_phase,
+};
 use std::fmt;
 use thiserror::Error;
 
@@ -19,6 +21,30 @@ pub struct Fpga {
     version: Option<u32>,
     design: Option<u32>,
     clocks: Option<u32>,
+    sampling: Option<u32>,
+}
+
+/// The result of a scan of the ADC's sampling phase ([`sampling`]).
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum Sampling {
+    /// The FPGA runs the bring-up design.
+    NoAdc,
+    /// The FPGA has made no scan: gateware before 0.3.7, or a simulated FPGA.
+    NoScan,
+    /// No phase showed the ADC's checkerboard. The clock stays at the phase at which the gateware was built.
+    NoPattern,
+    /// The clock stands in the middle of this window of phases in which every sample was right.
+    Window {
+        /// Width of the window.
+        width_steps: u32,
+        /// Steps from the phase at which the gateware was built.
+        phase_steps: u32,
+        /// Steps of a period of the ADC's clock.
+        period_steps: u32,
+        /// Duration of a step.
+        step_ns: f64,
+    },
 }
 
 /// Why an FPGA cannot be used.
@@ -134,6 +160,7 @@ impl Fpga {
             version: read(Register::Version)?,
             design: read(Register::Design)?,
             clocks: read(Register::Clocks)?,
+            sampling: read(Register::Sampling)?,
         })
     }
 
@@ -184,6 +211,26 @@ impl Fpga {
         if clocks::fit(found) { Ok(mhz(found)) } else { Err(FpgaProblem::Clock { found }) }
     }
 
+    /// What the FPGA's scan of the ADC's sampling phase has found.
+    #[must_use]
+    pub fn sampling(&self) -> Sampling {
+        let version = self.version().unwrap_or_default();
+        let word = self.sampling.filter(|_| scans_the_phase(version)).unwrap_or_default();
+        let width_steps = (word & sampling::WIDTH) >> sampling::WIDTH.trailing_zeros();
+        let period_steps = (word & sampling::PERIOD) >> sampling::PERIOD.trailing_zeros();
+        if self.design.and_then(Design::from_register) == Some(Design::BringUp) {
+            Sampling::NoAdc
+        } else if word & sampling::DONE == 0 || period_steps == 0 {
+            Sampling::NoScan
+        } else if width_steps == 0 {
+            Sampling::NoPattern
+        } else {
+            let phase_steps = word & sampling::PHASE;
+            let step_ns = 1e9 / f64::from(ADC_HZ) / f64::from(period_steps);
+            Sampling::Window { width_steps, phase_steps, period_steps, step_ns }
+        }
+    }
+
     /// The first problem, if there is one.
     ///
     /// # Errors
@@ -228,6 +275,7 @@ mod tests {
             version: Some(Register::Version.reset()),
             design: Some(1),
             clocks: Some(READY | 12_500),
+            sampling: Some(0),
         }
     }
 
@@ -251,7 +299,7 @@ mod tests {
             (Fpga { identity: Some(u32::MAX), ..good() }, ["0xffffffff", "DONE"]),
             (Fpga { identity: None, ..good() }, ["0x4e535049", "cs_n"]),
             (Fpga { identity: Some(0x1234), ..good() }, ["0x00001234", "another design"]),
-            (Fpga { version: Some(0x0100), ..good() }, ["0.1.0", "0.3.6"]),
+            (Fpga { version: Some(0x0100), ..good() }, ["0.1.0", "0.3.7"]),
             (Fpga { design: Some(9), ..good() }, ["design 9", "2 (bring-up)"]),
             (Fpga { clocks: Some(0), ..good() }, ["0.00 MHz, PLL not locked", "bring-up gateware"]),
             (Fpga { clocks: Some(8_000), ..good() }, ["80.00 MHz, PLL not locked", "sample clock"]),
@@ -268,6 +316,28 @@ mod tests {
                 "{told}"
             );
         }
+    }
+
+    #[test]
+    fn a_scan_of_the_sampling_phase_is_read() {
+        let word =
+            |width: u32, phase: u32| sampling::DONE | sampling::STEPS << 16 | width << 8 | phase;
+        let found = |word| Fpga { sampling: word, ..good() }.sampling();
+        assert_eq!(found(None), Sampling::NoScan);
+        assert_eq!(found(Some(word(15, 17) & !sampling::DONE)), Sampling::NoScan);
+        assert_eq!(found(Some(word(0, 0))), Sampling::NoPattern);
+        let Sampling::Window { width_steps, phase_steps, period_steps, step_ns } =
+            found(Some(word(15, 17)))
+        else {
+            panic!("no window");
+        };
+        assert_eq!((width_steps, phase_steps, period_steps), (15, 17, 40));
+        assert!((step_ns - 0.2).abs() < 1e-9);
+        // Older gateware has another register there, or none.
+        let older = Fpga { version: Some(0x0306), sampling: Some(word(15, 17)), ..good() };
+        assert_eq!(older.sampling(), Sampling::NoScan);
+        let bring_up = Fpga { design: Some(2), ..good() };
+        assert_eq!(bring_up.sampling(), Sampling::NoAdc);
     }
 
     #[test]

@@ -3,7 +3,8 @@
 /// Invariant: the LED enable at the pin falls by itself when the ADC's clock is lost, since everything
 /// else that could switch it off runs on that clock (`hdl/formal/shell_proof.sv`).
 module shell #(
-    parameter logic [7:0] DESIGN = 8'd1 /// `Design` of `mcu/wire`
+    parameter logic [7:0] DESIGN = 8'd1, /// `Design` of `mcu/wire`
+    parameter bit         SCANS  = 1'b1  /// There is an ADC whose sampling phase can be scanned
 ) (
     input  logic        clk_host,
     input  logic        clk_adc,
@@ -16,7 +17,12 @@ module shell #(
     input  logic        over_range,
     output logic [31:0] rows,
     output logic [31:0] columns,
+    // The PLL moves `clk_adc` by a step whenever this falls.
+    output logic        phase_step,
     // Pins.
+    output logic        adc_select_n,
+    output logic        adc_serial_clock,
+    output logic        adc_serial_data,
     output logic        led_enable,
     input  logic        interlock,
     input  logic        spi_sck,
@@ -41,7 +47,48 @@ module shell #(
         .alive,
         .restart
     );
-    assign healthy = alive && locked && reset_n;
+    // The ADC's clock can be used, though it may not stand where the lines are sampled best.
+    logic clocked;
+    assign clocked = alive && locked && reset_n;
+
+    // The core stays in reset until the scan is over, so the array is dark and nothing sees the checkerboard.
+    logic        scanned;
+    logic [31:0] sampling;
+    if (SCANS) begin : g_scan
+        logic rst_scan_host;
+        logic rst_scan_adc;
+        reset_synchroniser to_scan_host (
+            .clk  (clk_host),
+            .holds(!clocked),
+            .rst  (rst_scan_host)
+        );
+        reset_synchroniser to_scan_adc (
+            .clk  (clk_adc),
+            .holds(!clocked),
+            .rst  (rst_scan_adc)
+        );
+        nirspi_phase_scan scan (
+            .clk_host,
+            .rst_host       (rst_scan_host),
+            .clk_adc,
+            .rst_adc        (rst_scan_adc),
+            .code,
+            .serial_select_n(adc_select_n),
+            .serial_clock   (adc_serial_clock),
+            .serial_data    (adc_serial_data),
+            .phase_step,
+            .done           (scanned),
+            .sampling
+        );
+    end else begin : g_no_scan
+        assign adc_select_n     = 1'b1;
+        assign adc_serial_clock = 1'b0;
+        assign adc_serial_data  = 1'b0;
+        assign phase_step       = 1'b0;
+        assign scanned          = 1'b1;
+        assign sampling         = '0;
+    end
+    assign healthy = clocked && scanned;
 
     // Changes every four clocks of the one measured. Few flip-flops: nextpnr then leaves the pin's own way to the PLL.
     logic [2:0] divided = '0;
@@ -99,6 +146,7 @@ module shell #(
         .adc_beat      (divided[2]),
         .pll_locked    (locked),
         .clock_alive   (alive),
+        .sampling,
         .adc_code      (code),
         .adc_over_range(over_range),
         .led_rows      (rows_here),

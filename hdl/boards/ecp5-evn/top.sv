@@ -6,6 +6,10 @@ module top (
     input  logic        adc_dco,
     input  logic [13:0] adc_code,
     input  logic        adc_over_range,
+    // Its serial port, which is written to and never read.
+    output logic        adc_select_n,
+    output logic        adc_serial_clock,
+    output logic        adc_serial_data,
     // LED array.
     output logic [31:0] led_rows,
     output logic [31:0] led_columns,
@@ -36,15 +40,17 @@ module top (
     (* keep *) logic clk_host;
     logic locked;
     logic restart;
+    logic phase_step;
     logic healthy;
 
     OSCG #(.DIV(3)) oscillator (.OSC(clk_host)); // 310 MHz / 3
 
     adc_pll pll (
-        .dco    (adc_dco),
-        .restart(restart),
-        .clk    (clk_adc),
-        .locked (locked)
+        .dco   (adc_dco),
+        .restart,
+        .phase_step,
+        .clk   (clk_adc),
+        .locked
     );
 
     // One register in each input cell and each output cell.
@@ -111,6 +117,10 @@ module top (
         .over_range,
         .rows,
         .columns,
+        .phase_step,
+        .adc_select_n,
+        .adc_serial_clock,
+        .adc_serial_data,
         .led_enable,
         .interlock,
         .spi_sck,

@@ -41,6 +41,8 @@ struct Run {
 #[derive(Debug, Clone)]
 pub struct Gateware {
     design: Design,
+    /// The register `Sampling`.
+    sampling: u32,
     /// Frequency of the ADC's clock in Hz; `None` without a clock.
     adc_hz: Option<u32>,
     /// Clocks since reset.
@@ -63,6 +65,7 @@ impl Default for Gateware {
     fn default() -> Self {
         Self {
             design: Design::Camera,
+            sampling: Register::Sampling.reset(),
             adc_hz: Some(ADC_HZ),
             clock: 0,
             clock_read: 0,
@@ -93,15 +96,21 @@ impl Gateware {
     }
 
     /// Sets the frequency of the ADC's clock in Hz; `None` takes the clock away. Without a clock only
-    /// `Identity`, `Version`, `Clocks` and `Design` answer, and no clock may be ticked. A clock that comes back
+    /// `Identity`, `Version`, `Clocks`, `Design` and `Sampling` answer, and no clock may be ticked. A clock that comes back
     /// finds everything as after power-up but the level of the interlock input.
     pub fn set_adc_clock(&mut self, hz: Option<u32>) {
         if self.adc_hz.is_some() != hz.is_some() {
             let closed = self.safety.interlock_closed();
-            *self = Self { design: self.design, ..Self::default() };
+            *self = Self { design: self.design, sampling: self.sampling, ..Self::default() };
             self.set_interlock(closed);
         }
         self.adc_hz = hz;
+    }
+
+    /// Sets what the board says of the ADC's sampling phase: the register [`Register::Sampling`]. The model has no
+    /// phases; every sample is right.
+    pub fn set_sampling(&mut self, word: u32) {
+        self.sampling = word;
     }
 
     /// Whether the ADC's clock ticks.
@@ -123,6 +132,7 @@ impl Gateware {
         match Register::at(address) {
             Some(Register::Clocks) => return Some(self.clocks()),
             Some(Register::Design) => return Some(self.design as u32),
+            Some(Register::Sampling) => return Some(self.sampling),
             Some(Register::Identity | Register::Version) => {}
             _ if self.adc_hz.is_none() => return Some(NO_CLOCK),
             _ => {}

@@ -5,7 +5,7 @@
 use crate::project::Project;
 use crate::trace::{Edge, Levels, Trace};
 use nirspi_hdl_model::{AdcSample, Lines};
-use nirspi_wire::register::{Design, clocks};
+use nirspi_wire::register::{Design, clocks, sampling};
 use veryl_analyzer::ir::{VarId, VarPath};
 use veryl_analyzer::value::Value;
 use veryl_simulator::{Simulator, ir::Event};
@@ -21,6 +21,10 @@ struct Resets {
     adc: u8,
     bridge: u8,
 }
+
+/// What the board says of the ADC's sampling phase: step 17 of a period of 40, in the middle of 15 that are right.
+/// `hdl/verilator/replay.cpp` has it too.
+pub const SAMPLING: u32 = sampling::DONE | sampling::STEPS << 16 | 15 << 8 | 17;
 
 /// The core on its board; the caller drives both clocks.
 pub struct Pins {
@@ -55,6 +59,7 @@ struct Inputs {
     locked: VarId,
     alive: VarId,
     ready: VarId,
+    sampling: VarId,
 }
 
 /// Outputs of the parallel port in one clock of the ADC.
@@ -117,6 +122,7 @@ impl Pins {
             locked: input("pll_locked"),
             alive: input("clock_alive"),
             ready: input("parallel_ready"),
+            sampling: input("sampling"),
         };
         let reset_sck = sim.get_reset("rst_sck").unwrap();
         let reset_adc = sim.get_reset("rst_adc").unwrap();
@@ -143,6 +149,7 @@ impl Pins {
         pins.levels.selected = true;
         pins.select(false);
         pins.design(Design::Camera);
+        pins.set(pins.inputs.sampling, SAMPLING.into(), 32);
         pins.clock_levels(true);
         for _ in 0..4 {
             pins.adc_reset_edge();

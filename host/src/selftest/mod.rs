@@ -21,7 +21,7 @@ pub use check::{Check, Limit, Verdict};
 
 use crate::calibration::{CalibrationError, Settling, calibrate};
 use crate::causes;
-use crate::fpga::{Fpga, FpgaProblem, design_in_words};
+use crate::fpga::{Fpga, FpgaProblem, Sampling, design_in_words};
 use crate::session::{IgnorePackets, Session, SessionError};
 use crate::versions::of_register;
 use nirspi_wire::register::{IDENTITY, clocks};
@@ -40,6 +40,10 @@ const MIN_OWN_SHARE: f64 = 0.5;
 /// Without these, every later check would fail for the reason that they name.
 const NEEDED: u32 =
     SelfTestReport::FPGA_IDENTITY | SelfTestReport::GATEWARE | SelfTestReport::ADC_CLOCK;
+/// Least width of the window of phases in which the ADC's samples are right. The clock stands in its middle, so
+/// that the lines may move by half of it, as they do with temperature and supply.
+const MIN_SAMPLING_WINDOW_NS: f64 = 1.0;
+const SAMPLING: &str = "ADC sampling phase";
 const STEP: &str = "light of all LEDs";
 const OWN: &str = "settling at 25 MHz";
 
@@ -84,9 +88,11 @@ pub fn run(
 ) -> Result<SelfTest, SessionError> {
     begin(0);
     let report = session.self_test(&mut IgnorePackets)?;
-    let mut checks = device(report, &Fpga::ask(session, &mut IgnorePackets)?);
+    let fpga = Fpga::ask(session, &mut IgnorePackets)?;
+    let mut checks = device(report, &fpga);
     if report.failed & NEEDED != 0 {
         let later = [
+            SAMPLING,
             generator::NAME,
             STEP,
             OWN,
@@ -99,6 +105,7 @@ pub fn run(
         checks.extend(later.map(|name| Check::skipped(name, "needs the FPGA and its ADC clock")));
         return Ok(SelfTest { checks, settling: None });
     }
+    checks.push(sampling_phase(fpga.sampling()));
     begin(1);
     checks.extend(unless_refused(&[generator::NAME], generator::check(session))?);
     begin(2);
@@ -195,6 +202,28 @@ fn device(report: SelfTestReport, fpga: &Fpga) -> Vec<Check> {
         .collect()
 }
 
+/// The check of the phase at which the FPGA takes the ADC's samples.
+fn sampling_phase(found: Sampling) -> Check {
+    match found {
+        Sampling::NoAdc => Check::skipped(SAMPLING, "the bring-up design has no ADC"),
+        Sampling::NoScan => Check::skipped(SAMPLING, "this FPGA has made no scan"),
+        Sampling::NoPattern => Check::skipped(
+            SAMPLING,
+            "no phase shows the ADC's checkerboard. Wire the ADC's serial port, or compare a raw burst of its test \
+             pattern by hand (docs/gateware.md, ADC interface)",
+        ),
+        Sampling::Window { width_steps, phase_steps, period_steps, step_ns } => {
+            let ns = |steps: u32| f64::from(steps) * step_ns;
+            let limit = Limit::AtLeast(MIN_SAMPLING_WINDOW_NS);
+            Check::measured(SAMPLING, ns(width_steps), "ns wide", limit).noting(&format!(
+                "samples are right in {width_steps} of {period_steps} steps; the clock stands in the middle, \
+                 {:.1} ns after the phase of the build",
+                ns(phase_steps)
+            ))
+        }
+    }
+}
+
 /// The checks of the raw bursts.
 fn light_and_settling(settling: Result<&Settling, &String>) -> Vec<Check> {
     let settling = match settling {
@@ -230,6 +259,25 @@ fn light_and_settling(settling: Result<&Settling, &String>) -> Vec<Check> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_narrow_window_of_the_sampling_phase_fails_and_an_unknown_one_is_skipped() {
+        let window = |width_steps| {
+            sampling_phase(Sampling::Window {
+                width_steps,
+                phase_steps: 17,
+                period_steps: 40,
+                step_ns: 0.2,
+            })
+        };
+        assert_eq!(window(4).verdict(), Verdict::Failed);
+        let wide = window(15);
+        assert_eq!(wide.verdict(), Verdict::Passed);
+        assert!(wide.note().contains("15 of 40") && wide.note().contains("3.4 ns"), "{wide:?}");
+        for unknown in [Sampling::NoAdc, Sampling::NoScan, Sampling::NoPattern] {
+            assert_eq!(sampling_phase(unknown).verdict(), Verdict::Skipped);
+        }
+    }
 
     #[test]
     fn a_bit_that_only_a_newer_device_knows_is_shown_by_its_number() {

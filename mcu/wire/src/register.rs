@@ -23,9 +23,9 @@
 //!   [`control::RELEASE`] gives back raw bursts alone. A frame that the receiver does not take in time is lost and
 //!   counted like any other. A start cuts a packet that is under way.
 //! * The host port has a clock of its own. [`Register::Identity`], [`Register::Version`],
-//!   [`Register::Clocks`] and [`Register::Design`] are answered with or without the ADC's clock. Everything
+//!   [`Register::Clocks`], [`Register::Design`] and [`Register::Sampling`] are answered with or without the ADC's clock. Everything
 //!   else needs the ADC's clock: without it a read gives [`NO_CLOCK`], a write does nothing, and frames
-//!   and bursts are zeros. When the clock comes back, everything but these four is as after reset.
+//!   and bursts are zeros. When the clock comes back, everything but these five is as after reset.
 //! * LEDs are on only while a run or raw burst is under way, no fault is latched and the interlock
 //!   input is closed. A fault ends the run at once, discards the unfinished frame and latches its
 //!   first code.
@@ -82,7 +82,7 @@ registers! {
     /// Always [`IDENTITY`].
     Identity = 0x00, ReadOnly, IDENTITY;
     /// Gateware version, `major << 16 | minor << 8 | patch`.
-    Version = 0x01, ReadOnly, 0x0000_0306;
+    Version = 0x01, ReadOnly, 0x0000_0307;
     /// Holds what was written, for bus tests.
     Scratch = 0x02, ReadWrite, 0;
     /// See [`control`].
@@ -148,6 +148,9 @@ registers! {
     /// Samples of the delivered frame that were over range, blanked ones included. 0 while no frame is
     /// delivered.
     OverRange = 0x1D, ReadOnly, 0;
+    /// The result of the last scan of the ADC's sampling phase, see [`sampling`]. 0 before the first scan is
+    /// over, and on a board that has none. Since gateware 0.3.7.
+    Sampling = 0x1E, ReadOnly, 0;
 }
 
 /// `"NSPI"` in ASCII.
@@ -195,6 +198,12 @@ pub const fn narrows_packets(version: u32) -> bool {
 #[must_use]
 pub const fn has_parallel_port(version: u32) -> bool {
     has_this_map(version) && version & 0xFF >= 6
+}
+
+/// Whether gateware with this [`Register::Version`] has [`Register::Sampling`]: 0.3.7 and later of the same map.
+#[must_use]
+pub const fn scans_the_phase(version: u32) -> bool {
+    has_this_map(version) && version & 0xFF >= 7
 }
 
 /// Frames that can wait for the host, the delivered one included. Gateware before 0.3.3 has room for one.
@@ -279,6 +288,35 @@ pub mod clocks {
         let ready = LOCKED | ALIVE | READY;
         word & ready == ready && (word & FREQUENCY).abs_diff(EXPECTED) <= OFF
     }
+}
+
+/// Fields of [`Register::Sampling`].
+///
+/// Whenever the ADC's clock has come, and before anything else happens in its domain, the FPGA lets the ADC send
+/// its checkerboard (each sample is [`CHECKERBOARD`](sampling::CHECKERBOARD) or its complement, in turn), moves its
+/// sampling clock through one period in [`STEPS`](sampling::STEPS) steps, and stays in the middle of the longest
+/// window of steps in which every sample is right.
+pub mod sampling {
+    /// Steps from the phase at which the gateware was built to the phase in use.
+    pub const PHASE: u32 = 0xFF;
+    /// Width of the window in steps, bits 8 to 15. 0 if no step was right: the phase is then as built.
+    pub const WIDTH: u32 = 0xFF00;
+    /// Steps of a period, bits 16 to 23.
+    pub const PERIOD: u32 = 0x00FF_0000;
+    /// The scan is over.
+    pub const DONE: u32 = 1 << 24;
+    /// Steps of a period: eight for each period of the PLL's oscillator, which has 625 MHz.
+    pub const STEPS: u32 = 40;
+    /// Samples that are looked at in each step.
+    pub const SAMPLES: u32 = 256;
+    /// One of the two samples of the checkerboard of a converter with 14 bits (Analog Devices AN-877, register
+    /// 0x0D, value 4).
+    pub const CHECKERBOARD: u16 = 0x2AAA;
+    /// What is written to the ADC's serial port before the scan, 16 bits of address and 8 of data each: the
+    /// checkerboard, and the transfer that makes it take effect (AN-877, registers 0x0D and 0xFF).
+    pub const BEFORE: [u32; 2] = [0x0000_0D04, 0x0000_FF01];
+    /// What is written after the scan: the converter's own samples again.
+    pub const AFTER: [u32; 2] = [0x0000_0D00, 0x0000_FF01];
 }
 
 /// What gateware is built for: the value of [`Register::Design`].

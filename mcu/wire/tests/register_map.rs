@@ -5,20 +5,22 @@
 //! means. A new register at a free address is appended here, with a higher minor `Register::Version`: 0.2
 //! appended `Clocks` and `Design`, 0.3 `Writes` and the check of every access, 0.3.1 packets, 0.3.2 `SumLow`,
 //! `SumHigh` and `OverRange`, 0.3.3 a second frame that waits, 0.3.4 the opcode `READ_PACKET`, 0.3.5 samples
-//! of 24 bits, 0.3.6 the bit `PARALLEL`. Anything else needs a new `Register::Identity` or major `Register::Version`, and a
+//! of 24 bits, 0.3.6 the bit `PARALLEL`, 0.3.7 `Sampling`. Anything else needs a new `Register::Identity` or major `Register::Version`, and a
 //! new file beside this one.
 
 use nirspi_wire::{
     FrameFlags, SelfTestReport,
     fpga::{self, FpgaFrame, Header, Sums},
-    register::{self, Design, FaultCode, Register, clocks, control, mode, status, test_sample},
+    register::{
+        self, Design, FaultCode, Register, clocks, control, mode, sampling, status, test_sample,
+    },
     usb,
 };
 
 /// Address, name, access, value after reset.
 const REGISTERS: &str = "\
 0x0000 Identity      ReadOnly  0x4e535049
-0x0001 Version       ReadOnly  0x00000306
+0x0001 Version       ReadOnly  0x00000307
 0x0002 Scratch       ReadWrite 0x00000000
 0x0003 Control       Command   0x00000000
 0x0004 Status        ReadOnly  0x00000000
@@ -47,6 +49,7 @@ const REGISTERS: &str = "\
 0x001b SumLow        ReadOnly  0x00000000
 0x001c SumHigh       ReadOnly  0x00000000
 0x001d OverRange     ReadOnly  0x00000000
+0x001e Sampling      ReadOnly  0x00000000
 ";
 
 #[test]
@@ -155,6 +158,11 @@ fn bits_codes_and_limits_are_these() {
     let parallel = [0x0000_0206, 0x0000_0305, 0x0000_0306, 0x0000_0310, 0x0000_0406]
         .map(register::has_parallel_port);
     assert_eq!(parallel, [false, false, true, true, false]);
+    let scans = [0x0000_0207, 0x0000_0306, 0x0000_0307, 0x0000_0310, 0x0000_0407]
+        .map(register::scans_the_phase);
+    assert_eq!(scans, [false, false, true, true, false]);
+    let fields = [sampling::PHASE, sampling::WIDTH, sampling::PERIOD, sampling::DONE];
+    assert_eq!(fields, [0xFF, 0xFF00, 0x00FF_0000, 1 << 24]);
     let designs: Vec<_> = (0..=3).map(Design::from_register).collect();
     assert_eq!(designs, [None, Some(Design::Camera), Some(Design::BringUp), None]);
 }

@@ -123,7 +123,7 @@ module top (
         assign spi_io[i] = spi_drive[i] ? spi_out[i] : 1'bz;
     end
 
-    shell #(.DESIGN(8'd2)) camera (
+    shell #(.DESIGN(8'd2), .SCANS(1'b0)) camera (
         .clk_host,
         .clk_adc,
         .measured  (clk_adc),
@@ -134,6 +134,10 @@ module top (
         .over_range(1'b0),
         .rows,
         .columns,
+        .phase_step      (),
+        .adc_select_n    (),
+        .adc_serial_clock(),
+        .adc_serial_data (),
         .led_enable(enable),
         .interlock,
         .spi_sck,

@@ -6,7 +6,7 @@
 
 use nirspi_wire::{
     FrameFlags, PATTERNS, fpga, host_port,
-    register::{self, Design, FaultCode, Register, clocks, control, mode, status},
+    register::{self, Design, FaultCode, Register, clocks, control, mode, sampling, status},
     samples::NARROW,
 };
 use std::fmt::Write;
@@ -45,6 +45,14 @@ pub fn package() -> String {
         ("CLOCKS_LOCKED", clocks::LOCKED),
         ("CLOCKS_ALIVE", clocks::ALIVE),
         ("CLOCKS_READY", clocks::READY),
+        ("SAMPLING_DONE", sampling::DONE),
+        ("SAMPLING_STEPS", sampling::STEPS),
+        ("SAMPLING_SAMPLES", sampling::SAMPLES),
+        ("SAMPLING_CHECKERBOARD", sampling::CHECKERBOARD.into()),
+        ("SAMPLING_BEFORE_0", sampling::BEFORE[0]),
+        ("SAMPLING_BEFORE_1", sampling::BEFORE[1]),
+        ("SAMPLING_AFTER_0", sampling::AFTER[0]),
+        ("SAMPLING_AFTER_1", sampling::AFTER[1]),
         ("DESIGN_CAMERA", Design::Camera as u32),
         ("DESIGN_BRING_UP", Design::BringUp as u32),
         ("LOOPBACK_COUNTS", register::LOOPBACK_COUNTS.into()),

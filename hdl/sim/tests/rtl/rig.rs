@@ -10,7 +10,7 @@
 //! ready pins, every register read, every byte of a frame or burst.
 
 use crate::parallel::Receiver;
-use crate::pins::Pins;
+use crate::pins::{Pins, SAMPLING};
 use crate::project::Project;
 use nirspi_hdl_model::{AdcSample, Gateware, Lines};
 use nirspi_wire::{
@@ -194,11 +194,18 @@ fn sample(seed: u64, rate: u8, clock: u64) -> AdcSample {
     AdcSample { code: (z & 0x3FFF) as u16, over_range: (z >> 56) < rate.into() }
 }
 
+/// The golden model on the board of [`Pins`].
+fn model(design: Design) -> Gateware {
+    let mut model = Gateware::of(design);
+    model.set_sampling(SAMPLING);
+    model
+}
+
 impl Rig {
     pub fn new(project: &Project, seed: u64) -> Self {
         Self {
             pins: Pins::new(project),
-            model: Gateware::new(),
+            model: model(Design::Camera),
             port: Port { host_ps: 10_000, half: 3, quad: true, glitches: false },
             seed,
             over_range_rate: 0,
@@ -344,7 +351,7 @@ impl Rig {
 
     /// The ADC's domain has left its reset: RTL and model begin anew.
     fn restart(&mut self) {
-        self.model = Gateware::of(self.design);
+        self.model = model(self.design);
         self.clock = 0;
         self.written_twice = 0;
         self.seen.clear();

@@ -27,9 +27,10 @@ fn every_read_has_an_answer_of_its_own_or_says_that_there_is_no_clock(project: &
     let mut bench = Bench::new(project, "host_registers");
     let dice = &mut Dice::new(71);
     for _ in 0..200 {
-        let design = dice.range(1, 2) as u32;
+        let (design, sampling) = (dice.range(1, 2) as u32, dice.next() as u32);
         let [locked, alive, ready] = [(); 3].map(|()| dice.once_in(2));
         bench.set("design_id", design);
+        bench.set("sampling", sampling);
         for (port, level) in [("locked", locked), ("alive", alive), ("ready", ready)] {
             bench.set(port, level);
         }
@@ -42,6 +43,7 @@ fn every_read_has_an_answer_of_its_own_or_says_that_there_is_no_clock(project: &
         assert_eq!(send(&mut bench, R::Version.address()), R::Version.reset());
         assert_eq!(send(&mut bench, R::Design.address()), design);
         assert_eq!(send(&mut bench, R::Clocks.address()), flags);
+        assert_eq!(send(&mut bench, R::Sampling.address()), sampling);
         for address in [R::Scratch.address(), R::Status.address(), ORDER_TABLE, 0x8000, 0x1001] {
             assert_eq!(send(&mut bench, address), NO_CLOCK, "{address:#x}");
         }
