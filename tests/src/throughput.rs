@@ -12,7 +12,7 @@ use nirspi_mcu::{
 };
 use nirspi_wire::fpga::MAX_FRAME_BYTES;
 use nirspi_wire::host_port::SEALED_BYTES;
-use nirspi_wire::packet::MAX_HOST_PACKET;
+use nirspi_wire::packet::{MAX_HOST_PACKET, unseal};
 use nirspi_wire::register::Register;
 use nirspi_wire::{
     Command, Configuration, PatternOrder, Request, RunLength, SampleSource, Tail, Version, encode,
@@ -241,9 +241,11 @@ impl PacketSink for Host {
             let found = words.iter().flat_map(|word| word.load(Ordering::Relaxed).to_le_bytes());
             bytes.extend(found.take(length));
         }
-        let packets = bytes.split_inclusive(|byte| *byte == 0).map(<[u8]>::len);
-        self.packets.extend(packets.filter(|length| *length > 1));
         self.queue(Some(loan), bytes.len() as u64);
+        for packet in bytes.split_mut(|byte| *byte == 0).filter(|packet| !packet.is_empty()) {
+            self.packets.push(packet.len() + 1);
+            unseal(packet).expect("a packet as the FPGA made it");
+        }
         if self.reader == Reader::AtOnce {
             self.fetch();
         }

@@ -2,6 +2,7 @@
 //!
 //! The FPGA is accessed only through its pins, and both of its clocks run all the time.
 
+use crate::receiver::Receiver;
 use nirspi_hdl_model::{AdcSample, Lines};
 use nirspi_hdl_sim::{pins::Pins, project::Project};
 use nirspi_optics::{Chain, LedArray};
@@ -59,6 +60,9 @@ pub struct Board {
     pins: Pins,
     front: Front,
     at_pins: AdcSample,
+    /// What the wires of the parallel port lead to, if there are any.
+    receiver: Option<Receiver>,
+    is_ready: bool,
     /// ADC clocks since reset.
     clock: u64,
     next_adc_ps: u64,
@@ -92,6 +96,8 @@ impl Board {
             pins,
             front,
             at_pins: AdcSample::default(),
+            receiver: None,
+            is_ready: false,
             clock: 0,
             next_adc_ps: 0,
             next_host_ps: 1,
@@ -100,6 +106,16 @@ impl Board {
             mode: Register::Mode.reset(),
             patterns: Register::Patterns.reset(),
         }
+    }
+
+    /// Leads the parallel port to a ring.
+    pub fn wire_parallel_port(&mut self) {
+        self.receiver = Some(Receiver::new());
+    }
+
+    /// The microcontroller's end of the parallel port.
+    pub fn receiver(&mut self) -> Option<&mut Receiver> {
+        self.receiver.as_mut()
     }
 
     pub fn seen(&mut self) -> Seen {
@@ -125,7 +141,17 @@ impl Board {
             self.at_pins = sample;
             self.pins.sample(sample);
         }
+        if let Some(receiver) = &self.receiver {
+            let is_ready = receiver.is_ready(self.next_adc_ps);
+            if is_ready != self.is_ready {
+                self.is_ready = is_ready;
+                self.pins.receives(is_ready);
+            }
+        }
         self.pins.adc_edge();
+        if let Some(receiver) = &mut self.receiver {
+            receiver.clock(self.pins.parallel());
+        }
         self.clock += 1;
     }
 

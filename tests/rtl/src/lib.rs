@@ -5,6 +5,7 @@
 mod board;
 mod fpga;
 mod port;
+mod receiver;
 
 pub use fpga::RtlFpga;
 pub use port::RtlPort;

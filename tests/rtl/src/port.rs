@@ -1,7 +1,7 @@
 //! The pins of the RTL as the firmware's host port.
 
 use crate::board::{Board, Front, HOST_PS};
-use nirspi_mcu::{BusError, HostPort};
+use nirspi_mcu::{BusError, HostPort, Ring};
 use nirspi_tests::throughput::{PACKET_SCK_PS, SCK_PS, TimedPort};
 use nirspi_wire::host_port::{READ_FRAME, READ_PACKET, SCK_DIVIDER, SEALED_BYTES};
 
@@ -17,6 +17,15 @@ impl RtlPort {
     /// The same with the `sck` of the reference board, which is as fast as the slowest clock of the FPGA allows.
     pub fn bring_up_at_the_boards_sck() -> Self {
         Self(Board::new(Front::loopback(), SCK_PS / u64::from(SCK_DIVIDER)))
+    }
+}
+
+impl RtlPort {
+    /// The same with the wires of the parallel port.
+    pub fn with_parallel_port() -> Self {
+        let Self(mut board) = Self::bring_up_at_the_boards_sck();
+        board.wire_parallel_port();
+        Self(board)
     }
 }
 
@@ -36,6 +45,17 @@ impl HostPort for RtlPort {
 
     fn raw_ready(&mut self) -> bool {
         self.0.seen().raw_ready
+    }
+
+    fn ring(&mut self) -> Option<&mut Ring> {
+        self.0.receiver().map(|receiver| &mut receiver.ring)
+    }
+
+    fn look(&mut self) {
+        let now_ps = self.0.now_ps();
+        if let Some(receiver) = self.0.receiver() {
+            receiver.look(now_ps);
+        }
     }
 }
 
