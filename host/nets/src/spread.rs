@@ -28,7 +28,8 @@ pub(crate) fn measured_again(
     copy
 }
 
-/// The estimates of such copies, whose noise is that of two measurements.
+/// The estimates for copies with added noise: the noise of the measurement and as much again, so its standard deviation
+/// is larger by the square root of two.
 pub(crate) fn doubled(estimates: &[Estimate]) -> Vec<Estimate> {
     let twice = |e: &Estimate| Estimate { noise: e.noise * 2.0_f32.sqrt(), ..*e };
     estimates.iter().map(twice).collect()

@@ -332,7 +332,7 @@ fn a_request_comes_through_whatever_the_host_has_given_up() {
     lab.core.borrow_mut().setup_alone(NEW, READ);
     lab.request(NO_DATA);
     assert_eq!(lab.asked(), Some(NO_DATA));
-    // The host has the data, and begins anew without the status stage; then before it has the data.
+    // The host sends its next request before the status stage: first after it has fetched the data, then before.
     for fetches in [1, 0] {
         lab.request(READ);
         assert_eq!(lab.asked(), Some(READ));

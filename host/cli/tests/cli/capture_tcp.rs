@@ -216,7 +216,7 @@ fn tampered(camera: &str, mut tamper: impl FnMut(&mut Vec<u8>) -> bool + Send + 
     format!("tcp:{address}")
 }
 
-/// Without calibration, so that nearly all bytes are frames'.
+/// A capture without calibration, so that nearly all bytes on the link belong to frames.
 fn capture_through(bench: &Bench, camera: &str) -> crate::bench::Outcome {
     let plain = [
         "--no-calibration",

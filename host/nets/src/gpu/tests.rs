@@ -239,7 +239,7 @@ fn the_small_kernels_put_each_number_where_it_belongs() {
         let close = |ours: &Buffer, expected: &[f32], what: &str| {
             assert_close(&read(on, ours), expected, &format!("{backend}: {what}"));
         };
-        // 300 numbers are more than a workgroup has.
+        // 300 numbers need more than one workgroup.
         let images = numbers(400, 47);
         let expected: Vec<f32> = images[100..].iter().map(|v| (v / 0.75).clamp(0.0, 1.0)).collect();
         let readings = on.readings(&on.upload(&images), 100, 0.75, 300);

@@ -115,7 +115,8 @@ fn write_all(bench: &mut Bench, dice: &mut Dice) -> Settings {
     settings
 }
 
-/// Says what packets carry beside their frames; only a read of the clock's low word is a base.
+/// Writes the run's number and its time, which packets carry. The read of the clock's low word is the clock that the
+/// time belongs to; the read of the high word is not.
 fn write_stamp(bench: &mut Bench, run: u64, clock: u64, time: u64) {
     write(bench, R::Run.address(), run as u32);
     write(bench, R::TimeLow.address(), time as u32);
