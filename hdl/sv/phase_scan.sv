@@ -45,7 +45,6 @@ module nirspi_phase_scan
     logic [6-1:0]  run    ; // right steps up to this one
     logic [6-1:0]  longest;
     logic [6-1:0]  last   ; // step of the longest window
-    logic [6-1:0]  left   ; // steps to go
 
     logic look        ;
     logic checked     ;
@@ -72,8 +71,10 @@ module nirspi_phase_scan
     always_comb right_here = right;
 
     logic [6-1:0] run_here;
+    logic [6-1:0] next    ; // step
     logic [6-1:0] middle  ;
     always_comb run_here = ((!right_here) ? ( 0 ) : (run == 6'(SAMPLING_STEPS)) ? ( run ) : ( run + 1 ));
+    always_comb next     = ((phase == 6'(SAMPLING_STEPS) - 1) ? ( 0 ) : ( phase + 1 ));
     always_comb middle   = ((last >= longest >> 1) ? (
         last - (longest >> 1)
     ) : (
@@ -114,7 +115,6 @@ module nirspi_phase_scan
             run     <= 0;
             longest <= 0;
             last    <= 0;
-            left    <= 0;
         end else begin
             timer <= timer + 1;
             case (state)
@@ -157,17 +157,15 @@ module nirspi_phase_scan
                 end
                 // A step, and the time that the clock takes to follow.
                 State_Step: if (timer == 255) begin
-                    phase <= ((phase == 6'(SAMPLING_STEPS) - 1) ? ( 0 ) : ( phase + 1 ));
-                    left  <= left - 1;
+                    phase <= next;
                     state <= State_Look;
                     if (moves) begin
-                        state <= ((left == 1) ? ( State_Write ) : ( State_Step ));
-                    end else if (phase == 6'(SAMPLING_STEPS) - 1) begin
+                        state <= ((next == middle) ? ( State_Write ) : ( State_Step ));
+                    end else if (next == 0) begin
                         again <= 1;
                         if (again) begin
                             moves <= 1;
-                            left  <= middle;
-                            state <= ((middle == 0) ? ( State_Write ) : ( State_Step ));
+                            state <= State_Step;
                         end
                     end
                     shift <= 24'(SAMPLING_AFTER_0);

@@ -28,6 +28,9 @@ pub const SCK_PS: u64 = 68_750;
 /// Period of `sck` of the reference board for packets that `sck` clocks: 160 MHz / 3.
 pub const PACKET_SCK_PS: u64 = 18_750;
 
+/// Words of the reference board's ring: 128 KB.
+pub const RING_WORDS: usize = 32 * 1024;
+
 /// Packets that can wait for the host, as on the reference board.
 const PLACES: usize = 32;
 

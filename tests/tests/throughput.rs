@@ -4,7 +4,7 @@ use nirspi_hdl_model::{AdcSample, Gateware};
 use nirspi_mcu::{BusError, HostPort, Micros, Ring, RingMemory};
 use nirspi_tests::pages::{page, table};
 use nirspi_tests::throughput::{
-    PACKET_SCK_PS, Processor, Reader, SCK_PS, Stretch, TimedPort, meter_share, stretch,
+    PACKET_SCK_PS, Processor, RING_WORDS, Reader, SCK_PS, Stretch, TimedPort, meter_share, stretch,
 };
 use nirspi_wire::host_port::{DUMMY_CYCLES, READ_FRAME, READ_PACKET, SEALED_BYTES, seal, unseal};
 use nirspi_wire::ready::{FAST_LEAD_BYTES, LEAD_BYTES};
@@ -156,8 +156,6 @@ fn no_transfer_waits_for_the_end_of_a_sweep() {
     );
 }
 
-/// Words of the reference board's ring: 128 KB.
-const RING_WORDS: usize = 32 * 1024;
 /// Clocks of the ADC for a byte by the parallel port.
 const BYTE: u64 = 3;
 /// Clocks between two packets, while the FPGA makes the beginning of the next one: with these the RTL's own figure

@@ -3,10 +3,8 @@
 
 use nirspi_hdl_sim::pins::Parallel;
 use nirspi_mcu::{Micros, Ring, RingMemory};
+use nirspi_tests::throughput::RING_WORDS;
 use std::sync::atomic::Ordering;
-
-/// Words of the reference board's ring: 128 KB.
-const RING_WORDS: usize = 32 * 1024;
 
 pub struct Receiver {
     pub ring: Ring,

@@ -1,7 +1,7 @@
 //! Tests of a bring-up through the RTL: two boards without ADC, and an ADC without clock.
 
 use crate::ideal;
-use nirspi::fpga::Fpga;
+use nirspi::fpga::{Fpga, Sampling};
 use nirspi::selftest::{Check, LinkDemands, SelfTest, Verdict, run};
 use nirspi::session::{IgnorePackets, Session};
 use nirspi::virtual_camera::{MemoryLink, VirtualCamera};
@@ -57,7 +57,12 @@ fn without_the_adc_clock_the_rtl_says_so_and_nothing_else_fails() {
     let mut fpga = RtlFpga::new(&ideal(), 1);
     fpga.adc_clock(false);
     let mut session = session(fpga);
-    let told = Fpga::ask(&mut session, &mut IgnorePackets).unwrap().to_string();
+    let asked = Fpga::ask(&mut session, &mut IgnorePackets).unwrap();
+    let Sampling::Window { width_steps, phase_steps, .. } = asked.sampling() else {
+        panic!("{:?}", asked.sampling())
+    };
+    assert_eq!((width_steps, phase_steps), (15, 17), "as the board of these tests says");
+    let told = asked.to_string();
     assert!(told.contains("PLL not locked, ADC domain in reset"), "{told}");
     let found = self_test(&mut session);
     let failed = failures(&found);
