@@ -184,8 +184,8 @@ pub struct HostOut<'l, const N: usize> {
 }
 
 impl<const N: usize> HostOut<'_, N> {
-    /// Waits for bytes to send. Returns a full transfer, or a short or empty transfer if no bytes
-    /// follow now or a long packet does. The bytes of a long packet go out where they lie, without a copy.
+    /// Waits for bytes to send, and returns the next transfer. It is full, unless no more bytes wait or a long packet
+    /// comes next: then it is shorter, or empty. A long packet is not copied; it is sent from where it lies.
     ///
     /// The bytes of the transfer before must have been sent. No loan may be on the link: [`packet`](Self::packet) sends
     /// these.

@@ -51,7 +51,7 @@ fn over_time_single_drops_cost_what_the_mean_says() {
     let field = Projector::default().field_mm(1000.0);
     let out = blur.unscattered() + blur.scattered_within(field / 2.0);
     let expected = out * blur.returned(field / 1000.0);
-    // Of a loss of about 1 %: 20 % of it, by chance and for the corners of the field.
+    // About 1 % of the light is lost. A fifth of that may differ: by chance, and because the square field has corners.
     assert!((sum - expected).abs() < 0.2 * (1.0 - expected), "{sum} against {expected}");
 }
 

@@ -73,7 +73,7 @@ pub struct Run {
     last_intact: Instant,
     /// When the last turn ended.
     turned: Instant,
-    /// Time at which the observer wanted to stop.
+    /// When the observer asked for the end of the run; `None` before.
     stopped: Option<Instant>,
     kept_alive: Instant,
     kept_alive_us: u64,

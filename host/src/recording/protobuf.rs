@@ -29,7 +29,7 @@ impl Message {
         if value == 0 { self } else { self.number(field, value) }
     }
 
-    /// A number that is written if it is 0, too.
+    /// Writes a number, even if it is 0.
     fn number(mut self, field: u32, value: u64) -> Self {
         self.key(field, VARINT);
         self.varint(value);

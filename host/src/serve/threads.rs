@@ -229,8 +229,8 @@ fn rest(shared: &Shared, time: Duration) {
     }
 }
 
-/// Makes images and publishes them until the server stops. While the page gives up images, the thread
-/// rests after each image, and pages learn of news alone.
+/// Makes images and publishes them until the server stops. While images are left out to save work, the thread
+/// rests after each image for the time of those left out, and pages get only what else is new.
 pub(super) fn images(shared: &Shared, imaging: Imaging, publish: &watch::Sender<Arc<Published>>) {
     let mut studio = Studio::new(imaging);
     let mut next_image = Instant::now();
@@ -254,7 +254,7 @@ pub(super) fn images(shared: &Shared, imaging: Imaging, publish: &watch::Sender<
     }
 }
 
-/// The time of the images that are given up after an image that took so long.
+/// The time of the images that are left out after an image that took so long.
 fn given_up(shed: Shed, took: Duration) -> Duration {
     (shed.show_every - 1) * took.max(PACE)
 }

@@ -3,7 +3,7 @@
 use super::{Clock, Fit, Heard, Merge, Merged};
 use std::time::Duration;
 
-/// A frame in common time, with what its program wants of it.
+/// A frame of one of several cameras, with its time by the host's clock.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Timed<T> {
     /// Number of the camera, from 0.
@@ -15,7 +15,7 @@ pub struct Timed<T> {
     pub uncertainty_us: Option<f64>,
     /// Whether a frame with a later time went out before.
     pub late: bool,
-    /// The item.
+    /// What the caller gave with the frame, such as the frame itself.
     pub item: T,
 }
 

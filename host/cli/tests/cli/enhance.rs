@@ -104,7 +104,7 @@ fn a_folder_of_pictures_becomes_a_folder_of_the_same_names() {
         .collect();
     names.sort();
     assert_eq!(names, ["a.png", "b.png"]);
-    // The picture for people is beside the folder, and a folder is read without one.
+    // `*.picture.png` is written beside the folder, for people to look at. In a folder of images it is not read.
     std::fs::copy(bench.path("sharp.picture.png"), bench.path("in/sharp.picture.png")).unwrap();
     bench.run(&["deblur", "in", "--out", "sharper"]).succeeded();
     bench.write("in/c.png", &encode_grey(32, 32, &bar(32)));

@@ -42,7 +42,7 @@ pub struct Table {
     polynomial: Vec<f32>,
     /// Bounds between the bins of the expected error's logarithm.
     scale_bounds: Vec<f32>,
-    /// Bounds between the bins of the busyness of an image.
+    /// Bounds between the bins of the busyness of an image: how much its neighbouring pixels differ.
     busy_bounds: Vec<f32>,
     /// The levels.
     levels: Vec<f64>,

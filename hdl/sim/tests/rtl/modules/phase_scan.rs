@@ -137,7 +137,7 @@ const SCANS: [(&[Range<u32>], u32, u32); 5] = [
     (&[0..1], 0, 1),
     // Through the end of the period.
     (&[35..47], 0, 12),
-    // The second is longer; a part of the first is at the end of the period.
+    // Two windows: the longer second one counts, although the scan meets a part of the first again at its end.
     (&[36..42, 10..19], 14, 9),
     (&[2..5, 6..40], 22, 34),
 ];
