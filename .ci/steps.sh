@@ -147,7 +147,12 @@ step_features() {
 # Without building from the packages, which takes ten minutes: `publish` does that.
 step_package() { cargo publish --workspace --dry-run --no-verify --locked; }
 
-step_publish() { cargo publish --workspace --dry-run --locked; }
+# Cargo keeps the unpacked packages of a dry run under `src/-*`. It takes them again for the next dry
+# run in the same folder while the version is the same, even if the crate has changed.
+step_publish() {
+    rm -rf "${CARGO_HOME:-$HOME/.cargo}"/registry/src/-*
+    cargo publish --workspace --dry-run --locked
+}
 
 # A tool from crates.io, under target/.
 tool() {
