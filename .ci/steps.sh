@@ -147,11 +147,12 @@ step_features() {
 # Without building from the packages, which takes ten minutes: `publish` does that.
 step_package() { cargo publish --workspace --dry-run --no-verify --locked; }
 
-# Cargo keeps the unpacked packages of a dry run under `src/-*`. It takes them again for the next dry
-# run in the same folder while the version is the same, even if the crate has changed.
+# Cargo keeps the unpacked packages of a dry run under `src/-*`, and what it compiled of them under
+# `target`. While the version is the same, the next dry run in the same folder takes both again, even if
+# the crate has changed.
 step_publish() {
-    rm -rf "${CARGO_HOME:-$HOME/.cargo}"/registry/src/-*
-    cargo publish --workspace --dry-run --locked
+    rm -rf "${CARGO_HOME:-$HOME/.cargo}"/registry/src/-* target/publish/debug/.fingerprint/nirspi*
+    cargo publish --workspace --dry-run --locked --target-dir target/publish
 }
 
 # A tool from crates.io, under target/.
