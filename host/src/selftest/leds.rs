@@ -94,7 +94,10 @@ pub fn check(
     };
     let lines = Check::measured(LINES, dead.count() as f64, "without light", Limit::Exactly(0.0));
     if dead.count() > 0 {
-        let note = format!("{dead}: stuck, broken, or the target is dark there");
+        let note = format!(
+            "{dead}: stuck, broken, or the target is dark there; test with a white sheet before the \
+             camera (nirspi virtual --scene white)"
+        );
         return Ok(vec![lines.noting(&note), Check::skipped(SUPPLY, "needs all lines")]);
     }
     // Four readings: P and P - N, each of the pattern and of pattern 0.
