@@ -35,7 +35,12 @@ MEMORY_MIB = 4096
 def build() -> pathlib.Path:
     """The search, with counters in every crate but build scripts and macros."""
     host = re.search("host: (.*)", subprocess.check_output(["rustc", "-vV"], text=True))[1]
-    environment = os.environ | {"RUSTFLAGS": " ".join(FLAGS.split()), "CARGO_TARGET_DIR": str(TARGET / "build")}
+    environment = os.environ | {
+        "RUSTFLAGS": " ".join(FLAGS.split()),
+        "CARGO_TARGET_DIR": str(TARGET / "build"),
+        # Edges are told apart by their lines, which CI's own setting leaves out.
+        "CARGO_PROFILE_DEV_DEBUG": "line-tables-only",
+    }
     command = ["cargo", "build", "--locked", "--target", host, "--manifest-path", str(HERE / "Cargo.toml")]
     subprocess.run(command, env=environment, check=True)
     return TARGET / "build" / host / "debug" / "search"
