@@ -203,7 +203,12 @@ fn conditions() -> Vec<Condition> {
 
 /// The methods with a choice of steps, and the methods for comparison.
 fn stepped(most: u32) -> Vec<Method> {
-    let mut all = vec![Method::Lanczos, Method::Classical(charts::BEST_CLASSICAL), Method::Gan];
+    let mut all = vec![
+        Method::Lanczos,
+        Method::Classical(charts::BEST_CLASSICAL),
+        Method::Gan,
+        Method::Regression,
+    ];
     for steps in STEPS.into_iter().filter(|&steps| steps <= most) {
         if steps <= charts::MOST_BRIDGE_STEPS {
             all.push(Method::Diffusion(steps));

@@ -62,12 +62,13 @@ const SCENE_PX: usize = 512;
 /// radius of the lens's disc, so that only the edge affects its measurement.
 const SCENE_FIELDS: usize = 2;
 
-/// The paper's rows, in mm. The paper's diffusion model is the ancestral sampler, with which both
-/// of nirspi's samplers are compared.
-const PAPER: [(Picture, [f64; 3]); 5] = [
+/// The paper's rows, in mm. The paper's diffusion model is the ancestral sampler, with which
+/// nirspi's networks are compared.
+const PAPER: [(Picture, [f64; 3]); 6] = [
     (Picture::Vis, [45.0, 48.0, 60.0]),
     (Picture::NirSpi, [5.0, 25.0, 45.0]),
     (Picture::Gan, [5.0, 18.0, 40.0]),
+    (Picture::Regression, [5.0, 15.0, 25.0]),
     (Picture::Diffusion, [5.0, 15.0, 25.0]),
     (Picture::Ancestral, [5.0, 15.0, 25.0]),
 ];

@@ -4,7 +4,7 @@ use crate::weights::{CHECKSUM, VERSION, Weights, WeightsError, header};
 use serde::Serialize;
 
 /// Names of the networks whose weights come with the crate `nirspi-weights-baselines`.
-const BASELINES: [&str; 2] = ["gan", "ancestral"];
+const BASELINES: [&str; 3] = ["gan", "ancestral", "regression"];
 
 #[cfg(any(test, feature = "baselines"))]
 const BASELINE_FILES: &[(&str, &[u8])] = &nirspi_weights_baselines::FILES;
@@ -48,8 +48,7 @@ fn label(model: &str) -> String {
 
 impl Weights {
     /// The embedded weights of a network: `estimator`, `fsrcnn`, `diffusion`, `prior` or
-    /// `classifier`; with
-    /// the feature `baselines` also `gan` or `ancestral`.
+    /// `classifier`; with the feature `baselines` also `gan`, `ancestral` or `regression`.
     ///
     /// # Errors
     /// [`WeightsError::LeftOut`] for a baseline in a build without the feature;

@@ -30,7 +30,8 @@ pub use known::{Known, KnownEstimate};
 pub struct Options {
     /// Whether each step of the network is moved into agreement with the readings.
     pub consistency: bool,
-    /// Whether sharp and clean images stay unchanged.
+    /// Whether sharp and clean images of 64 x 64 stay unchanged. Images of 32 x 32 are always
+    /// enlarged by the networks: there is no sharp image of 64 x 64 to keep.
     pub gate: bool,
     /// Hadamard rows from which the readings of 32 x 32 were made.
     pub measured: MeasuredRows,
@@ -133,7 +134,11 @@ impl Sharpener {
             let sharp = |constraint: &DataConstraint<'_>, estimates: &[Estimate], seed| {
                 let readings = constraint.readings();
                 let job = stage.job(readings, readings, estimates, seed);
-                stage.sharpen(&job, constraint, |index| &readings[index * AREA..][..AREA])
+                let mut images = stage.deblurrer.run(&job, constraint)?;
+                if options.gate {
+                    gate::close(estimates, AREA, &mut images, |k| &readings[k * AREA..][..AREA]);
+                }
+                Ok::<_, EnhanceError>(images)
             };
             let estimates = known(options, &estimated);
             let constraint = DataConstraint::new(batch.values(), side, &estimates, all, binding)?;
@@ -191,9 +196,8 @@ impl Enhancer {
                 let readings = constraint.readings();
                 let start = self.fusion.upscale(Images::known(readings), depth.as_ref());
                 let seen = repeated(readings, SIDE);
-                let job = stage.job(&start, &seen, estimates, seed);
-                let plain = |index| agreeing(&start, index, constraint);
-                let images = stage.sharpen(&job, constraint, plain)?;
+                let images =
+                    deblurrer.run(&stage.job(&start, &seen, estimates, seed), constraint)?;
                 Ok::<_, EnhanceError>((start, images))
             };
             let estimates = known(options, &estimated);
@@ -221,14 +225,6 @@ fn constraint_on<'a>(
     DataConstraint::new(readings, side, estimates, &options.measured, options.consistency)
 }
 
-/// Image `index` of FSRCNN's output, moved into agreement with the readings. The gate uses this
-/// image instead of the sharpened one if the readings were sharp and clean.
-fn agreeing(start: &[f32], index: usize, constraint: &DataConstraint<'_>) -> Vec<f32> {
-    let mut plain = start[index * AREA..][..AREA].to_vec();
-    constraint.correct_one(index, &mut plain);
-    plain
-}
-
 /// One batch of the deblurring stage.
 struct Stage<'a> {
     deblurrer: &'a Deblurrer,
@@ -246,21 +242,6 @@ impl Stage<'_> {
         seed: u64,
     ) -> Job<'b> {
         Job { start, seen, estimates, seed, first: self.first }
-    }
-
-    /// Deblurs the images of a job. For an image that is sharp and clean already, the result is
-    /// `plain(index)` instead of the network's.
-    fn sharpen<I: AsRef<[f32]>>(
-        &self,
-        job: &Job<'_>,
-        constraint: &DataConstraint<'_>,
-        plain: impl Fn(usize) -> I + Sync,
-    ) -> Result<Vec<f32>, EnhanceError> {
-        let mut images = self.deblurrer.run(job, constraint)?;
-        if self.options.gate {
-            gate::close(job.estimates, AREA, &mut images, plain);
-        }
-        Ok(images)
     }
 
     /// Standard deviation over copies of the readings, each enhanced like the original.

@@ -217,7 +217,7 @@ impl Networks {
                 if steps.get() == 1 { "" } else { "s" }
             ));
         }
-        if !options.consistency || !options.gate {
+        if !options.consistency {
             return other("a result that is not held against the readings".to_owned());
         }
         let intervals = Intervals::shipped()?;

@@ -1,8 +1,9 @@
 """Builds train.npz and val.npz (64 x 64, 8 bit, by kind) and split.json, which names the groups that training never sees.
 
-usage: characters.py CHARS74K_FOLDER FONTS_FOLDER OUT_FOLDER
+usage: characters.py CHARS74K_FOLDER FONTS_FOLDER NATURAL_FILE OUT_FOLDER
 
-CHARS74K_FOLDER holds {fnt,hnd,img}_train.npz; FONTS_FOLDER a folder of .woff2, .ttf or .otf files for each family
+CHARS74K_FOLDER holds {fnt,hnd,img}_train.npz; NATURAL_FILE is bsds_train.npz, of which scenes 1, 4 and 8 of each ten are held out;
+FONTS_FOLDER a folder of .woff2, .ttf or .otf files for each family
 (the shipped weights: 829 families of @fontsource from npm, under the OFL). Characters keep Chars74K's own form: bright on dark, centred,
 48 pixels along their longer side. Everything is seeded.
 """
@@ -185,7 +186,19 @@ def no_letter():
     return np.asarray(page.resize((64, 64), Image.BOX))
 
 
-def main(chars74k, fonts, out):
+def natural(scenes, count):
+    """Random parts of natural scenes, as sharp as those are or made smaller."""
+    out = []
+    for _ in range(count):
+        scene = scenes[rng.integers(len(scenes))]
+        side = 64 if rng.random() < 0.5 else int(rng.uniform(64, 160))
+        row, column = (int(rng.integers(0, most - side + 1)) for most in scene.shape)
+        part = Image.fromarray(scene[row : row + side, column : column + side])
+        out.append(np.asarray(part if side == 64 else part.resize((64, 64), Image.BOX if rng.random() < 0.5 else Image.LANCZOS)))
+    return np.stack(out)
+
+
+def main(chars74k, fonts, natural_file, out):
     fnt, hnd, img = (np.load(f"{chars74k}/{kind}_train.npz") for kind in ("fnt", "hnd", "img"))
     families = np.sort(rng.permutation(np.unique(fnt["family"]))[:20])
     writers = np.sort(rng.permutation(np.unique(hnd["writer"]))[:5])
@@ -198,12 +211,16 @@ def main(chars74k, fonts, out):
     os.makedirs(out, exist_ok=True)
     names = [str(img["fname"][k]) for k in photos]
     split = dict(seed=SEED, fnt_families=families.tolist(), hnd_writers=writers.tolist(), img_files=names)
+    scenes = np.load(natural_file)["x"]
+    hidden = np.isin(np.arange(len(scenes)) % 10, (1, 4, 8))
+    split["natural"] = np.flatnonzero(hidden).tolist()
     with open(f"{out}/split.json", "w") as file:
         json.dump(split, file)
     sources = dict(fnt=fnt, hnd=hnd, img=img)
     val = {kind: source["x"][held[kind]] for kind, source in sources.items()}
     val |= {f"{kind}_label": source["label"][held[kind]] for kind, source in sources.items()}
-    np.savez(f"{out}/val.npz", **val)
+    # The middle of each held-out scene.
+    np.savez(f"{out}/val.npz", **val, nat=scenes[hidden, 48:112, 88:152])
     images = {kind: source["x"][~held[kind]] for kind, source in sources.items()}
     labels = {kind: source["label"][~held[kind]] for kind, source in sources.items()}
     images["fnt_aug"], labels["fnt_aug"] = variants(images["fnt"], labels["fnt"], 14000, 0.6)
@@ -212,6 +229,7 @@ def main(chars74k, fonts, out):
     glyphs = np.concatenate([images[kind] for kind in ("ren", "fnt", "fnt_aug", "hnd")])
     images["comp"] = np.stack([photograph(glyphs) for _ in range(12000)])
     images["other"] = np.stack([no_letter() for _ in range(8000)] + [page(glyphs) for _ in range(6000)])
+    images["nat"] = natural(scenes[~hidden], 24000)
     np.savez(f"{out}/train.npz", **images, **{f"{kind}_label": label for kind, label in labels.items()})
     print({kind: len(x) for kind, x in images.items()})
 

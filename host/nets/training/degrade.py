@@ -10,7 +10,9 @@ import torch
 import torch.nn.functional as F
 
 STEP_PX = 0.02
-TOP_PX = 6.8
+TOP_PX = 13.0
+# Pixels beyond each edge that a point of light reaches at most.
+REACH_PX = 32
 
 
 def blur_matrices(side=64):
@@ -60,6 +62,16 @@ class Optics:
         matrix = self.blur[(sigma_px / STEP_PX).round().clamp(0, len(self.blur) - 1).long()]
         return matrix @ x @ matrix.transpose(1, 2)
 
+    def spread(self, x, kernels):
+        """(B, 64, 64), edges reflected, each with its own kernel (B, 2 REACH_PX, 2 REACH_PX), whose middle is at REACH_PX."""
+        grid = torch.arange(-REACH_PX, 64 + REACH_PX, device=x.device)
+        grid = torch.where(grid < 0, -1 - grid, torch.where(grid > 63, 127 - grid, grid))
+        wide = x[:, grid][:, :, grid]
+        size = wide.shape[-1]
+        out = torch.fft.irfft2(torch.fft.rfft2(wide) * torch.fft.rfft2(kernels, s=(size, size)), s=(size, size))
+        # The kernel's middle lies at REACH_PX, so the image has moved by as much.
+        return out[:, 2 * REACH_PX :, 2 * REACH_PX :]
+
     def sampled(self, optical):
         """(B, 64, 64) to the camera's (B, 32, 32): means of 2 x 2."""
         return self.sample @ optical @ self.sample.T
@@ -71,11 +83,27 @@ class Optics:
         return h @ ((h @ y @ h) * shown) @ h / 1024
 
 
+def disc(radius_px, grid):
+    """Kernels of a lens out of focus, (B, n, n)."""
+    across, down = grid[None, None, :], grid[None, :, None]
+    weights = (radius_px[:, None, None] + 0.5 - (across.square() + down.square()).sqrt()).clamp(0, 1)
+    return weights / weights.sum((1, 2), keepdim=True)
+
+
+def streak(length_px, angle, grid):
+    """Kernels of a scene that moves along a line, (B, n, n)."""
+    across, down = grid[None, None, :], grid[None, :, None]
+    c, s = angle.cos()[:, None, None], angle.sin()[:, None, None]
+    weights = (1 - (across * s - down * c).abs()).clamp(0, 1)
+    weights = weights * (length_px[:, None, None] / 2 + 0.5 - (across * c + down * s).abs()).clamp(0, 1)
+    return weights / weights.sum((1, 2), keepdim=True)
+
+
 class Characters:
     """A seeded stream of sharp images and of their degradations."""
 
-    SHARE = dict(fnt=0.08, fnt_aug=0.09, ren=0.15, hnd=0.06, hnd_aug=0.17, img=0.30, comp=0.08, other=0.07)
-    PHOTOGRAPHS = ("img", "comp", "other")
+    SHARE = dict(fnt=0.08, fnt_aug=0.08, ren=0.11, hnd=0.06, hnd_aug=0.13, img=0.24, comp=0.06, other=0.06, nat=0.18)
+    PHOTOGRAPHS = ("img", "comp", "other", "nat")
 
     def __init__(self, seed, folder=".", device="cpu"):
         torch.manual_seed(seed)
@@ -146,22 +174,34 @@ class Characters:
         return F.grid_sample(x[:, None], grid, mode="bicubic", padding_mode="reflection", align_corners=False)[:, 0].clamp(0, 1)
 
     def levels(self, count):
-        """Blur (pixels) and noise (rms) of each image: blur 0 to 4.2, noise none to 10 %."""
+        """Blur (pixels) and noise (rms) of each image: blur 0 to 4.2, noise none to 25 %, more than 10 % in one of 16."""
         wide = torch.where(self.chance(0.4, count), self.uniform(0.3, 2.2, count), self.uniform(0.3, 4.2, count))
-        sigma = torch.where(self.chance(0.1, count), self.uniform(0, 0.4, count), wide)
+        sigma = torch.where(self.chance(0.12, count), self.uniform(0, 0.4, count), wide)
         u = torch.rand(count, device=self.device)
-        much = torch.where(u < 0.85, self.uniform(0, 0.06, count), self.uniform(0.05, 0.10, count))
+        much = torch.where(u < 0.80, self.uniform(0, 0.06, count), self.uniform(0.05, 0.10, count))
+        much = torch.where(u > 0.94, self.uniform(0.10, 0.25, count), much)
         return sigma, torch.where(u < 0.12, 0, much)
+
+    def blurred(self, x, sigma):
+        """A Gaussian for six of ten; a lens out of focus or a motion of as much variance for the others."""
+        count = len(x)
+        grid = torch.arange(-REACH_PX, REACH_PX, device=self.device, dtype=torch.float32)
+        # Variance of a disc: a fourth of its radius squared in each direction; of a line: a twelfth of its length squared in one.
+        moved = streak(24**0.5 * sigma, self.uniform(0, math.pi, count), grid)
+        kernels = torch.where((self.chance(0.3, count) & (sigma < 2.8))[:, None, None], moved, disc(2 * sigma, grid))
+        shaped = self.optics.blurred(self.optics.spread(x, kernels), self.uniform(0, 0.5, count))
+        return torch.where((self.chance(0.4, count) & (sigma > 0.3))[:, None, None], shaped, self.optics.blurred(x, sigma))
 
     def degrade(self, x, sampled):
         """(what is measured, the optical image before sampling, sigma, noise). `sampled`: on the camera's 32 x 32 grid, some with
         part of the patterns only; else on the 64 x 64 grid."""
         count = len(x)
         sigma, noise = self.levels(count)
-        optical = self.optics.blurred(x[:, 0], sigma)
-        # Rain and the projector's edge: a second, wider blur takes some of the light.
-        share = torch.where(self.chance(0.15, count), self.uniform(0.02, 0.25, count), 0)[:, None, None]
-        optical = (1 - share) * optical + share * self.optics.blurred(x[:, 0], sigma + self.uniform(1, 2.5, count))
+        optical = self.blurred(x[:, 0], sigma)
+        # Rain, fog and the projector's edge: a second, wider blur takes some of the light.
+        share = torch.where(self.chance(0.2, count), self.uniform(0.02, 0.25, count), 0)[:, None, None]
+        wider = torch.where(self.chance(0.6, count), self.uniform(1, 2.5, count), self.uniform(2.5, 8, count))
+        optical = (1 - share) * optical + share * self.optics.blurred(x[:, 0], sigma + wider)
         y = self.optics.sampled(optical) if sampled else optical
         y = y + torch.randn_like(y) * noise[:, None, None]
         if sampled:

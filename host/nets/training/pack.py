@@ -12,7 +12,7 @@ from safetensors import safe_open
 from safetensors.torch import save_file
 
 LARGE_BYTES = 1 << 20
-BASELINES = ("gan", "ancestral")
+BASELINES = ("gan", "ancestral", "regression")
 
 
 def main(source, out):

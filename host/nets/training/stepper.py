@@ -30,7 +30,7 @@ class Stepper:
         self.rates = {name: torch.tensor(0.0, device=device) for name in parts}
         cuda = device == "cuda"
         self.optimizers = {
-            name: torch.optim.AdamW(net.parameters(), self.rates[name], betas=betas, weight_decay=decay, fused=cuda or None, capturable=cuda)
+            name: torch.optim.AdamW(net.parameters(), self.rates[name], betas=betas, weight_decay=decay, fused=True, capturable=cuda)
             for name, net in self.nets.items()
         }
         self.mean = {name: copy.deepcopy(net) for name, net in self.nets.items()}

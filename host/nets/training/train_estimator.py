@@ -1,10 +1,10 @@
-"""The estimator of blur and noise, on both grids. usage: train_estimator.py FOLDER MINUTES [BATCH] [DEVICE]"""
+"""The estimator of blur and noise, on both grids. usage: train_estimator.py FOLDER MINUTES [BATCH] [DEVICE] [INIT]"""
 import sys
 
 import torch
 from degrade import Characters, held_out
 from networks import Estimator
-from safetensors.torch import save_file
+from safetensors.torch import load_file, save_file
 from stepper import Stepper, device_from
 
 SEED, RATE = 7, 2e-3
@@ -14,9 +14,11 @@ def relative(found, true, floor):
     return ((found - true).abs() / (floor + true)).mean()
 
 
-def main(folder, minutes, batch="40", device=None):
+def main(folder, minutes, batch="40", device=None, init=None):
     device, batch = device_from(device), int(batch)
     characters, net = Characters(SEED, folder, device), Estimator().to(device)
+    if init:
+        net.load_state_dict(load_file(init))
 
     def losses():
         loss = 0
@@ -34,7 +36,7 @@ def main(folder, minutes, batch="40", device=None):
     def report(step, spent, losses):
         seen = {}
         with torch.no_grad():
-            for kind in ("fnt", "hnd", "img"):
+            for kind in ("fnt", "hnd", "img", "nat"):
                 found = stepper.mean["estimator"](held_out(characters.optics, kind, 2.0, 0.03, folder=folder)[1])
                 sigma = 8 * found[:, 0]
                 seen[kind] = (round(float(sigma.mean()), 2), round(float(sigma.std()), 2), round(float(found[:, 1].mean()) / 10, 4))
@@ -43,7 +45,7 @@ def main(folder, minutes, batch="40", device=None):
     stepper.run(20, report)
     recipe = f"host/nets/training/train_estimator.py, seed {SEED}, {stepper.step} steps of {batch}"
     state = {name: tensor.contiguous().cpu() for name, tensor in stepper.mean["estimator"].state_dict().items()}
-    save_file(state, f"{folder}/out/estimator.safetensors", dict(model="estimator", version="2", recipe=recipe))
+    save_file(state, f"{folder}/out/estimator.safetensors", dict(model="estimator", version="3", recipe=recipe))
 
 
 if __name__ == "__main__":

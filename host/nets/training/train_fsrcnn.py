@@ -1,18 +1,20 @@
-"""FSRCNN: from what the camera measures to the optical image before sampling. usage: train_fsrcnn.py FOLDER MINUTES [BATCH] [DEVICE]"""
+"""FSRCNN: from what the camera measures to the optical image before sampling. usage: train_fsrcnn.py FOLDER MINUTES [BATCH] [DEVICE] [INIT]"""
 import sys
 
 import torch
 from degrade import Characters, psnr
 from networks import FSRCNN
-from safetensors.torch import save_file
+from safetensors.torch import load_file, save_file
 from stepper import Stepper, device_from
 
 SEED, RATE = 7, 2e-3
 
 
-def main(folder, minutes, batch="16", device=None):
+def main(folder, minutes, batch="16", device=None, init=None):
     device = device_from(device)
     characters, net = Characters(SEED, folder, device), FSRCNN().to(device)
+    if init:
+        net.load_state_dict(load_file(init))
 
     def example():
         x = characters.batch(int(batch))
@@ -35,7 +37,7 @@ def main(folder, minutes, batch="16", device=None):
     stepper.run(20, report)
     recipe = f"host/nets/training/train_fsrcnn.py, seed {SEED}, {stepper.step} steps of {batch}"
     state = {name: tensor.contiguous().cpu() for name, tensor in stepper.mean["fsrcnn"].state_dict().items()}
-    save_file(state, f"{folder}/out/fsrcnn.safetensors", dict(model="fsrcnn", version="2", recipe=recipe))
+    save_file(state, f"{folder}/out/fsrcnn.safetensors", dict(model="fsrcnn", version="3", recipe=recipe))
 
 
 if __name__ == "__main__":

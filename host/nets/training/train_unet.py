@@ -1,6 +1,6 @@
 """The UNet in one of its roles, on the outputs of trained FSRCNN and estimator.
 
-usage: train_unet.py bridge|ancestral|gan FOLDER MINUTES [--init FILE] [--stop-after MINUTES]
+usage: train_unet.py bridge|ancestral|gan|regression FOLDER MINUTES [--init FILE] [--stop-after MINUTES]
 
 The learning rate follows the clock, so a run ends when it was said to; a checkpoint every minute is resumed when there.
 The weights written are a running mean (EMA).
@@ -17,7 +17,7 @@ from networks import FSRCNN, Discriminator, Estimator, UNet
 from safetensors.torch import load_file, save_file
 from stepper import Stepper, device_from
 
-FILES = dict(bridge="diffusion", ancestral="ancestral", gan="gan")
+FILES = dict(bridge="diffusion", ancestral="ancestral", gan="gan", regression="regression")
 STEPS, BETA_START, BETA_END = 500, 2e-4, 0.025
 ALPHA_BAR = torch.cumprod(1 - torch.linspace(BETA_START, BETA_END, STEPS), 0)
 
@@ -66,7 +66,7 @@ def sample(characters, chain, count):
 def held_out_psnr(net, chain, optics, folder):
     """One step, noise 3 %, for blur 1, 2, 3 px."""
     out = {}
-    for kind in ("fnt", "hnd", "img"):
+    for kind in ("fnt", "hnd", "img", "nat"):
         row = []
         for sigma in (1.0, 2.0, 3.0):
             x, y = held_out(optics, kind, sigma, 0.03, folder=folder)
@@ -141,7 +141,7 @@ def main(args):
         os.replace(f"{checkpoint}.part", checkpoint)
         mean = stepper.mean["unet"]
         recipe = f"host/nets/training/train_unet.py {args.role}, seed {args.seed}, {step} steps of {args.batch}"
-        about = dict(model=name, version="2", recipe=recipe)
+        about = dict(model=name, version="3", recipe=recipe)
         if args.role == "ancestral":
             about |= dict(steps=str(STEPS), beta_start=str(BETA_START), beta_end=str(BETA_END))
         state = {key: tensor.contiguous().cpu() for key, tensor in mean.state_dict().items()}

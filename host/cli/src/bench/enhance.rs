@@ -49,7 +49,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         fusion: networks.fusion()?,
         enhancer: networks.enhancer(method)?,
     };
-    let options = Options { consistency: !run.no_consistency, gate: false, ..Options::default() };
+    let options = Options { consistency: !run.no_consistency, ..Options::default() };
     let timed = time(&stages, run.frames, &options, run.repeats, run.seed)?;
     print::json(&Report {
         device: networks.device().name().to_owned(),

@@ -39,8 +39,8 @@ fn every_row_is_measured_on_the_same_unseen_images() {
     assert_eq!(report["images"][0]["images"], 2, "{report}");
     assert_eq!(report["images"][0]["choice"], "of 4 held out");
     let conditions = report["conditions"].as_array().unwrap();
-    // 11 conditions, 9 rows, all stacks together and the one alone.
-    assert_eq!(conditions.len(), 11 * 9 * 2);
+    // 11 conditions, 10 rows, all stacks together and the one alone.
+    assert_eq!(conditions.len(), 11 * 10 * 2);
     assert!(conditions.iter().all(|row| row["images"] == 2), "{report}");
     let psnr = |row: &str, sigma: f64, noise: f64| {
         let near = |v: &serde_json::Value, x: f64| (v.as_f64().unwrap() - x).abs() < 1e-6;

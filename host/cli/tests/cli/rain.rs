@@ -186,8 +186,8 @@ fn table_3_has_both_cameras_at_every_distance_with_intervals() {
         "--json",
     ];
     let report = bench.run(&arguments).succeeded().json();
-    // Five pictures (both cameras, GAN, diffusion, ancestral) at three distances and at all.
-    assert_eq!(report["rows"].as_array().unwrap().len(), 20);
+    // Six pictures (both cameras, GAN, regression, diffusion, ancestral) at three distances and at all.
+    assert_eq!(report["rows"].as_array().unwrap().len(), 24);
     assert_eq!(report["simulated"], true);
     let psnr = &report["rows"][0]["psnr_db"];
     assert!(psnr["low"].as_f64().unwrap() <= psnr["high"].as_f64().unwrap(), "{psnr}");

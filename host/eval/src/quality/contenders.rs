@@ -28,6 +28,9 @@ pub enum Method {
     Fusion,
     /// FSRCNN, then the GAN's generator.
     Gan,
+    /// FSRCNN, then a network that minimises the error, trained as long as the GAN and the ancestral
+    /// sampler.
+    Regression,
     /// FSRCNN, then the bridge with this number of steps.
     Diffusion(u32),
     /// FSRCNN, then the ancestral sampler with this number of steps.
@@ -36,13 +39,14 @@ pub enum Method {
 
 impl Method {
     /// The methods that are measured at every condition.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Lanczos,
         Self::Classical(Classical::Wiener),
         Self::Classical(Classical::RichardsonLucy),
         Self::Classical(Classical::TotalVariation),
         Self::Fusion,
         Self::Gan,
+        Self::Regression,
         Self::Diffusion(1),
         Self::Diffusion(2),
         Self::Diffusion(4),
@@ -60,6 +64,7 @@ impl Method {
             Self::Classical(Classical::TotalVariation) => "total variation".to_owned(),
             Self::Fusion => "fusion alone".to_owned(),
             Self::Gan => "GAN".to_owned(),
+            Self::Regression => "regression".to_owned(),
             Self::Diffusion(n) => steps("diffusion", n),
             Self::Ancestral(n) => steps("ancestral", n),
         }
@@ -90,7 +95,7 @@ impl Version {
     /// # Errors
     /// `EvalError` for weights that cannot be read.
     pub fn all(networks: &mut Networks) -> Result<Vec<Self>> {
-        ["estimator", "fsrcnn", "diffusion", "ancestral", "gan", "classifier"]
+        ["estimator", "fsrcnn", "diffusion", "ancestral", "gan", "regression", "classifier"]
             .into_iter()
             .map(|model| {
                 let weights = networks.weights(model)?;
@@ -127,6 +132,7 @@ impl Contender {
                 return Ok(Self { method, runner: Runner::Fusion(networks.fusion()?) });
             }
             Method::Gan => (Model::GAN, 1),
+            Method::Regression => (Model::REGRESSION, 1),
             Method::Diffusion(steps) => (Model::DIFFUSION, steps),
             Method::Ancestral(steps) => (Model::ANCESTRAL, steps),
         };

@@ -96,7 +96,7 @@ pub struct Figures {
     /// SSIM, mean over the images.
     pub ssim: Interval,
     /// Difference to the GAN's PSNR, mean over the images; `null` for the GAN and for rows without
-    /// a sampler.
+    /// a network that deblurs.
     pub psnr_minus_gan_db: Option<Interval>,
     /// Difference to the GAN's SSIM, mean over the images.
     pub ssim_minus_gan: Option<Interval>,
@@ -180,7 +180,7 @@ impl Judges {
         each: &[One],
         gan: Option<&[One]>,
     ) -> Result<Vec<Figures>> {
-        let compared = gan.filter(|_| method.steps().is_some());
+        let compared = gan.filter(|_| method.steps().is_some() || method == Method::Regression);
         let of = |stack: Option<usize>| -> Result<Figures> {
             let taken = |c: &Character| stack.is_none_or(|stack| stack == c.stack);
             let (places, groups): (Vec<usize>, Vec<(usize, u32)>) = characters

@@ -68,13 +68,14 @@ pub struct Difference {
 const WITHOUT_RAIN: &str = "without rain";
 
 /// Pairs of kinds of interest: the first minus the second.
-const PAIRS: [(Picture, Picture); 6] = [
+const PAIRS: [(Picture, Picture); 7] = [
     (Picture::Gan, Picture::NirSpi),
+    (Picture::Regression, Picture::NirSpi),
     (Picture::Diffusion, Picture::NirSpi),
     (Picture::Ancestral, Picture::NirSpi),
-    (Picture::Diffusion, Picture::Gan),
+    (Picture::Regression, Picture::Gan),
     (Picture::Ancestral, Picture::Gan),
-    (Picture::Ancestral, Picture::Diffusion),
+    (Picture::Ancestral, Picture::Regression),
 ];
 
 /// One kind of image of every scene, distance after distance.

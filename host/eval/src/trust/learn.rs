@@ -16,11 +16,8 @@ const USUAL: f32 = 0.4;
 const USUAL_NOISE: f32 = 0.03;
 /// Number of conditions of each calibration image.
 const TIMES: usize = 3;
-/// Weight of a stack of scenes that are no characters, against 1 of a stack of characters. With as
-/// much weight as the others, natural scenes make the intervals of photographs of letters too wide.
-const SCENES_WEIGHT: f64 = 0.25;
-/// Numbers of bins of the table: of the expected error, and of the busyness.
-const BINS: (usize, usize) = (20, 8);
+/// Numbers of bins of the table: of the expected error, of the busyness, and of the blur.
+const BINS: (usize, usize, usize) = (20, 8, 6);
 
 /// Makes the calibration. `made_by` is the command, for the record; `done` is called with the
 /// number of images just enhanced.
@@ -42,12 +39,11 @@ pub fn calibrate(settings: &Settings, made_by: &str, done: &dyn Fn(usize)) -> Re
     for made in &rounds {
         for (image, seen) in images.iter().zip(made.seen().into_iter().flatten()) {
             let origin = &images.origins()[image.stack];
-            let stack = if image.label.is_some() { 1.0 } else { SCENES_WEIGHT };
-            let weight = stack / origin.images as f64;
+            let weight = 1.0 / origin.images as f64;
             samples.push(Sample { seen, truth: &image.sharp, weight });
         }
     }
-    let pixels = Table::learn(&samples, BINS.0, BINS.1)?;
+    let pixels = Table::learn(&samples, BINS.0, BINS.1, BINS.2)?;
     let characters = letters::calibrated(&mut networks, &images, &rounds)?;
     Ok(Calibration {
         made_by: made_by.to_owned(),

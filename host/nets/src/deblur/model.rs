@@ -34,7 +34,7 @@ const fn count(steps: u32) -> NonZeroU32 {
 
 impl Model {
     /// Every network that deblurs. The first is the recommended one.
-    pub const ALL: [Self; 3] = [Self::DIFFUSION, Self::ANCESTRAL, Self::GAN];
+    pub const ALL: [Self; 4] = [Self::DIFFUSION, Self::ANCESTRAL, Self::GAN, Self::REGRESSION];
 
     /// The bridge from the degraded image to the sharp one; 1 to 4 steps are useful.
     pub const DIFFUSION: Self = Self(&Entry {
@@ -58,6 +58,16 @@ impl Model {
     pub const GAN: Self = Self(&Entry {
         name: "gan",
         about: "The generator of a generative adversarial network",
+        path: PathKind::Bridge,
+        default_steps: count(1),
+        most_steps: count(1),
+    });
+
+    /// A network that minimises the error, trained as long as the GAN and the paper's diffusion, so
+    /// that the three can be compared.
+    pub const REGRESSION: Self = Self(&Entry {
+        name: "regression",
+        about: "A network that minimises the error, trained as long as gan and ancestral",
         path: PathKind::Bridge,
         default_steps: count(1),
         most_steps: count(1),
@@ -213,7 +223,8 @@ mod tests {
     #[test]
     fn unknown_names_and_too_many_steps_are_refused_with_what_is_there() {
         let error = "pixelise".parse::<Model>().unwrap_err().to_string();
-        let expected = r#"no network is called "pixelise", expected diffusion, ancestral, gan"#;
+        let expected =
+            r#"no network is called "pixelise", expected diffusion, ancestral, gan, regression"#;
         assert_eq!(error, expected);
         let steps = NonZeroU32::new(501).unwrap();
         let refused = |model| Method::new(model, Some(steps)).unwrap_err().to_string();

@@ -8,12 +8,10 @@
 use nirspi_recon::omp::gpu::DeviceImages;
 use thiserror::Error;
 
-use super::{Enhanced, Options, agreeing, constraint_on};
+use super::{Enhanced, Options, constraint_on};
 use crate::consistency::MeasuredRowsError;
-use crate::deblur::AREA;
 use crate::device::{Backend, Device};
 use crate::fusion::{self, DepthMaps, push_planes};
-use crate::gate;
 use crate::network::{Guess, RunChain};
 use crate::weights::{Weights, WeightsError};
 
@@ -57,8 +55,8 @@ pub enum DeviceEnhancerError {
 
 /// Both stages for images on a GPU, input 32 x 32 and output 64 x 64, with one step of the bridge.
 ///
-/// Images, FSRCNN's output and the UNet's input stay on the GPU. The last steps, agreement with the
-/// readings and the gate, run on the host.
+/// Images, FSRCNN's output and the UNet's input stay on the GPU. The last step, agreement with the
+/// readings, runs on the host.
 pub struct DeviceEnhancer {
     chain: Box<dyn RunChain>,
     backend: Backend,
@@ -129,9 +127,6 @@ fn finished(guess: Guess, options: &Options) -> Result<Enhanced, MeasuredRowsErr
     let Guess { readings, estimates, start, mut sharp } = guess;
     let constraint = constraint_on(&readings, &estimates, options)?;
     constraint.correct(&mut sharp);
-    if options.gate {
-        gate::close(&estimates, AREA, &mut sharp, |index| agreeing(&start, index, &constraint));
-    }
     let inconsistency = constraint.residual_ratios(&sharp);
     Ok(Enhanced {
         images: sharp,

@@ -29,7 +29,8 @@ const EVERY: usize = 2;
 /// Added to the diagonal of the normal equations, for features that are the same in all images.
 const RIDGE: f64 = 1e-4;
 
-/// Expected error and busyness give the bin, the bin gives the half-widths.
+/// Expected error, busyness and estimated blur give the bin, the bin gives the half-widths. A bin in
+/// which calibration images have few pixels has the half-widths of all blurs together.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Table {
     /// The features in order.
@@ -44,9 +45,11 @@ pub struct Table {
     scale_bounds: Vec<f32>,
     /// Bounds between the bins of the busyness of an image: how much its neighbouring pixels differ.
     busy_bounds: Vec<f32>,
+    /// Bounds between the bins of the estimated blur of an image, in pixels.
+    blur_bounds: Vec<f32>,
     /// The levels.
     levels: Vec<f64>,
-    /// Half-width by busyness, expected error and level.
+    /// Half-width by kind of image (busyness, then blur), expected error and level.
     half_widths: Vec<Vec<Vec<f32>>>,
 }
 
@@ -81,11 +84,15 @@ pub enum TableError {
     Form,
 }
 
+/// The least number of pixels of a bin with half-widths of its own: half an image's. Fewer pixels are
+/// of one or two images, whose errors say little about others.
+const ENOUGH: usize = AREA / 2;
+
 /// The least number of images of a calibration: with fewer, a bin has pixels of one image.
 const LEAST: usize = 20;
 
 impl Table {
-    /// Learns the table from images. `scales` and `busyness` are the numbers of bins.
+    /// Learns the table from images. `scales`, `busyness` and `blurs` are the numbers of bins.
     ///
     /// # Errors
     /// [`TableError`] if the images are too few or too much alike.
@@ -93,6 +100,7 @@ impl Table {
         samples: &[Sample<'_>],
         scales: usize,
         busyness: usize,
+        blurs: usize,
     ) -> Result<Self, TableError> {
         if samples.len() < LEAST {
             return Err(TableError::Few { found: samples.len(), least: LEAST });
@@ -101,18 +109,20 @@ impl Table {
         table.polynomial = table.fitted(samples).ok_or(TableError::Alike)?;
         let mut pixels = Vec::with_capacity(samples.len() * AREA);
         for sample in samples {
-            let (busy, scales) = table.places(&sample.seen);
+            let (image, scales) = table.places(&sample.seen);
             let errors = sample.seen.image.iter().zip(sample.truth).map(|(a, b)| (a - b).abs());
             let weight = sample.weight / AREA as f64;
             pixels.extend(scales.zip(errors).map(|(scale, error)| Pixel {
-                busy,
+                image,
                 scale,
                 error,
                 weight,
             }));
         }
-        pixels.sort_unstable_by(|a, b| a.busy.total_cmp(&b.busy));
-        table.busy_bounds = bounds(&pixels, |p| p.busy, &even(busyness));
+        pixels.sort_unstable_by(|a, b| a.image.busy.total_cmp(&b.image.busy));
+        table.busy_bounds = bounds(&pixels, |p| p.image.busy, &even(busyness));
+        pixels.sort_unstable_by(|a, b| a.image.blur_px.total_cmp(&b.image.blur_px));
+        table.blur_bounds = bounds(&pixels, |p| p.image.blur_px, &even(blurs));
         pixels.sort_unstable_by(|a, b| a.scale.total_cmp(&b.scale));
         // The bins are narrower where errors are large, because these pixels are few.
         let mut shares = even(scales);
@@ -120,24 +130,32 @@ impl Table {
         shares.sort_by(f64::total_cmp);
         table.scale_bounds = bounds(&pixels, |p| p.scale, &shares);
         pixels.sort_unstable_by(|a, b| a.error.total_cmp(&b.error));
-        let (busyness, scales) = (table.busy_bounds.len() + 1, table.scale_bounds.len() + 1);
-        let mut bins: Vec<Vec<Pixel>> = vec![Vec::new(); busyness * scales];
+        let (scales, blurs) = (table.scale_bounds.len() + 1, table.blur_bounds.len() + 1);
+        let mut bins: Vec<Vec<Pixel>> = vec![Vec::new(); table.kinds() * scales];
+        let mut of_all_blurs: Vec<Vec<Pixel>> = vec![Vec::new(); table.kinds() / blurs * scales];
         for pixel in pixels {
-            let (busy, scale) = table.bin(pixel.busy, pixel.scale);
-            bins[busy * scales + scale].push(pixel);
+            let (kind, scale) = table.bin(pixel.image, pixel.scale);
+            bins[kind * scales + scale].push(pixel);
+            of_all_blurs[kind / blurs * scales + scale].push(pixel);
         }
-        // A bin that no pixel is in takes the half-widths of the bin before.
+        // Where no image of any blur has a pixel, those of the next smaller expected error count.
         let mut before = vec![0.0; LEVELS.len()];
-        let widths: Vec<Vec<f32>> = bins
-            .into_iter()
+        let common: Vec<Vec<f32>> = of_all_blurs
+            .iter()
             .map(|bin| {
-                if let Some(widths) = quantiles(&bin) {
-                    before = widths;
-                }
+                before = quantiles(bin).unwrap_or_else(|| before.clone());
                 before.clone()
             })
             .collect();
-        table.half_widths = widths.chunks_exact(scales).map(<[_]>::to_vec).collect();
+        let widths = bins.chunks_exact(scales).enumerate().map(|(kind, bins)| {
+            let common = common[kind / blurs * scales..].iter();
+            let own = |bin: &[Pixel]| (bin.len() >= ENOUGH).then(|| quantiles(bin)).flatten();
+            bins.iter()
+                .zip(common)
+                .map(|(bin, all)| own(bin).unwrap_or_else(|| all.clone()))
+                .collect()
+        });
+        table.half_widths = widths.collect();
         Ok(table)
     }
 
@@ -165,6 +183,7 @@ impl Table {
             polynomial: vec![0.0; TERMS],
             scale_bounds: Vec::new(),
             busy_bounds: Vec::new(),
+            blur_bounds: Vec::new(),
             levels: LEVELS.to_vec(),
             half_widths: Vec::new(),
         }
@@ -209,28 +228,40 @@ impl Table {
         })
     }
 
-    /// The busyness of an image, and the logarithm of the expected error of each pixel.
-    fn places(&self, seen: &Seen<'_>) -> (f32, impl Iterator<Item = f32> + use<'_>) {
+    /// What the bin needs to know of the image, and the logarithm of the expected error of each
+    /// pixel.
+    fn places(&self, seen: &Seen<'_>) -> (OfImage, impl Iterator<Item = f32> + use<'_>) {
         let features = features(seen);
-        let busy = features.first().map_or(0.0, |first| first[BUSYNESS]);
+        let image = OfImage {
+            busy: features.first().map_or(0.0, |first| first[BUSYNESS]),
+            blur_px: seen.estimate.sigma_px,
+        };
         let scales = features.into_iter().map(|pixel| {
             let terms = terms(&self.normalised(&pixel));
             terms.iter().zip(&self.polynomial).map(|(term, weight)| term * weight).sum()
         });
-        (busy, scales)
+        (image, scales)
     }
 
-    fn bin(&self, busy: f32, scale: f32) -> (usize, usize) {
+    /// Number of kinds of images that the table tells apart.
+    fn kinds(&self) -> usize {
+        (self.busy_bounds.len() + 1) * (self.blur_bounds.len() + 1)
+    }
+
+    /// The kind of the image, and the bin of the expected error.
+    fn bin(&self, image: OfImage, scale: f32) -> (usize, usize) {
         let place = |bounds: &[f32], value| bounds.partition_point(|&bound| bound < value);
-        (place(&self.busy_bounds, busy), place(&self.scale_bounds, scale))
+        let (busy, blur) =
+            (place(&self.busy_bounds, image.busy), place(&self.blur_bounds, image.blur_px));
+        (busy * (self.blur_bounds.len() + 1) + blur, place(&self.scale_bounds, scale))
     }
 
     /// Half-width of each pixel's interval at a level of [`LEVELS`].
     pub fn half_widths(&self, seen: &Seen<'_>, level: usize) -> Vec<f32> {
-        let (busy, scales) = self.places(seen);
+        let (image, scales) = self.places(seen);
         let width = |scale| {
-            let (busy, scale) = self.bin(busy, scale);
-            self.half_widths[busy][scale][level]
+            let (kind, scale) = self.bin(image, scale);
+            self.half_widths[kind][scale][level]
         };
         scales.map(width).collect()
     }
@@ -244,17 +275,26 @@ impl Table {
         let right = self.features == NAMES
             && self.levels == LEVELS
             && self.polynomial.len() == TERMS
-            && self.half_widths.len() == self.busy_bounds.len() + 1
+            && self.half_widths.len() == self.kinds()
             && self.half_widths.iter().all(|bins| bins.len() == scales)
             && self.half_widths.iter().flatten().all(|widths| widths.len() == LEVELS.len());
         if right { Ok(self) } else { Err(TableError::Form) }
     }
 }
 
+/// What an image is as a whole, as far as the bin depends on it.
+#[derive(Debug, Clone, Copy)]
+struct OfImage {
+    /// How much neighbouring pixels differ.
+    busy: f32,
+    /// The estimated blur.
+    blur_px: f32,
+}
+
 /// One pixel of the calibration.
 #[derive(Debug, Clone, Copy)]
 struct Pixel {
-    busy: f32,
+    image: OfImage,
     scale: f32,
     error: f32,
     weight: f64,

@@ -54,7 +54,7 @@ fn drawn(numbers: std::ops::Range<usize>) -> Vec<Drawn> {
 
 fn learnt(images: &[Drawn]) -> Table {
     let samples: Vec<Sample<'_>> = images.iter().map(Drawn::sample).collect();
-    Table::learn(&samples, 8, 2).unwrap()
+    Table::learn(&samples, 8, 2, 2).unwrap()
 }
 
 /// The share of all pixels of these images within the half-width of a level.
@@ -91,14 +91,14 @@ fn a_higher_level_is_never_narrower() {
 fn too_few_images_give_no_table() {
     let images = drawn(0..19);
     let samples: Vec<Sample<'_>> = images.iter().map(Drawn::sample).collect();
-    let error = Table::learn(&samples, 8, 2).unwrap_err();
+    let error = Table::learn(&samples, 8, 2, 2).unwrap_err();
     assert_eq!(error.to_string(), "19 images for calibration, expected at least 20");
 }
 
 #[test]
 fn a_table_with_a_list_of_another_length_is_refused() {
     let shipped: serde_json::Value = serde_json::from_str(nirspi_weights::INTERVALS).unwrap();
-    for list in ["scale_bounds", "polynomial", "levels", "half_widths"] {
+    for list in ["scale_bounds", "blur_bounds", "polynomial", "levels", "half_widths"] {
         let mut other = shipped.clone();
         other["pixels"][list].as_array_mut().unwrap().pop();
         let error = Intervals::parse(&other.to_string()).unwrap_err();

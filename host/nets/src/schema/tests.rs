@@ -175,7 +175,7 @@ fn sound_weights_have_the_sizes_that_pytorch_made_them_with() {
 #[test]
 fn the_embedded_weights_are_whole() {
     let embedded = |model| Weights::embedded(model).unwrap();
-    for model in ["diffusion", "gan", "ancestral"] {
+    for model in ["diffusion", "gan", "ancestral", "regression"] {
         unet(&embedded(model)).unwrap();
     }
     fsrcnn(&embedded("fsrcnn")).unwrap();
