@@ -441,8 +441,8 @@ mod tests {
         let report = [report(), report()];
         assert_eq!(report[0], report[1]);
         let rows = report[0]["rows"].as_array().unwrap();
-        // Five kinds of image, at three distances and at all distances.
-        assert_eq!(rows.len(), 5 * 4);
+        // Six kinds of image, at three distances and at all distances.
+        assert_eq!(rows.len(), 6 * 4);
         for row in rows {
             let psnr = &row["psnr_db"];
             assert!(psnr["low"].as_f64() <= psnr["high"].as_f64(), "{row}");
@@ -454,9 +454,9 @@ mod tests {
             let mean = kind[..3].iter().map(value).sum::<f64>() / 3.0;
             assert!((value(&kind[3]) - mean).abs() < 1e-9, "{kind:?}");
         }
-        // The difference by rain of each kind, and six pairs of kinds.
+        // The difference by rain of each kind, and seven pairs of kinds.
         let differences = report[0]["differences"].as_array().unwrap();
-        assert_eq!(differences.len(), (5 + 6) * 4);
+        assert_eq!(differences.len(), (6 + 7) * 4);
         let first = &differences[0];
         let cost = rows[0]["psnr_db"]["value"].as_f64().unwrap()
             - rows[0]["dry_psnr_db"]["value"].as_f64().unwrap();

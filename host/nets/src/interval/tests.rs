@@ -88,6 +88,23 @@ fn a_higher_level_is_never_narrower() {
 }
 
 #[test]
+fn a_bin_of_few_pixels_has_the_half_widths_of_all_blurs() {
+    let mut images = drawn(0..40);
+    for (k, image) in images.iter_mut().enumerate() {
+        image.estimate.sigma_px = 1.0 + 0.05 * k as f32;
+    }
+    let samples: Vec<Sample<'_>> = images.iter().map(Drawn::sample).collect();
+    let together = Table::learn(&samples, 8, 2, 1).unwrap();
+    // A bin for the blur of each image: at the bar's edges it has less than half an image's pixels.
+    let apart = Table::learn(&samples, 8, 2, 40).unwrap();
+    for image in &images {
+        let edge = image.truth.iter().position(|&v| v == 0.8).unwrap();
+        let [together, apart] = [&together, &apart].map(|t| t.half_widths(&image.seen(), LEVEL));
+        assert_eq!(together[edge], apart[edge]);
+    }
+}
+
+#[test]
 fn too_few_images_give_no_table() {
     let images = drawn(0..19);
     let samples: Vec<Sample<'_>> = images.iter().map(Drawn::sample).collect();
