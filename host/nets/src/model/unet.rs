@@ -29,7 +29,7 @@ pub struct UNetConfig {
     pub embedding: usize,
 }
 
-/// The sizes of the shipped networks.
+/// The sizes of the shipped diffusion network.
 impl Default for UNetConfig {
     fn default() -> Self {
         Self { channels: Self::SHIPPED_CHANNELS.to_vec(), blocks: 2, embedding: 64 }
@@ -37,8 +37,11 @@ impl Default for UNetConfig {
 }
 
 impl UNetConfig {
-    /// Channels of the shipped networks.
+    /// Channels of the shipped diffusion network.
     pub const SHIPPED_CHANNELS: [usize; 3] = [48, 96, 192];
+
+    /// Channels of the shipped baselines: GAN, ancestral sampler and regression.
+    pub const BASELINE_CHANNELS: [usize; 3] = [32, 64, 128];
 
     /// The sizes of the network with these weights.
     ///

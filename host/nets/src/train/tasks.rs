@@ -1,9 +1,9 @@
 //! The task of each network: its loss, and its score on held-out examples.
 
-use super::Settings;
 use super::examples::{Batch, READING_AREA};
 use super::initial::Gains;
 use super::tensors::{columns, each, images, scenes};
+use super::{Model, Settings};
 use crate::data::{AREA_PX, SIDE_PX};
 use crate::deblur::Schedule;
 use crate::degrade::READING_PX;
@@ -88,12 +88,12 @@ fn bridge_time(t: f32) -> [f32; 2] {
 }
 
 pub(super) fn unet(settings: &Settings) -> UNetConfig {
-    let width = &settings.width;
-    let standard = UNetConfig::default();
-    match width.is_empty() {
-        true => standard,
-        false => UNetConfig { channels: width.clone(), ..standard },
-    }
+    let channels = match (settings.width.as_slice(), settings.model) {
+        ([], Model::Gan | Model::Ancestral) => &UNetConfig::BASELINE_CHANNELS[..],
+        ([], _) => &UNetConfig::SHIPPED_CHANNELS,
+        (width, _) => width,
+    };
+    UNetConfig { channels: channels.to_vec(), ..UNetConfig::default() }
 }
 
 /// FSRCNN's task: the scene after the optics, from readings and depth.
