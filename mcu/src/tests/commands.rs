@@ -274,6 +274,17 @@ fn status_counts_and_measures() {
     assert!(status.leds_on && status.interlock_closed && status.fault.is_none());
 }
 
+/// Whoever opens the enclosure goes by this word.
+#[test]
+fn leds_of_an_fpga_that_does_not_answer_count_as_on_in_a_run() {
+    for (mut bench, leds_on) in
+        [(Bench::running(RunLength::Continuous), true), (Bench::configured(), false)]
+    {
+        bench.fpga.dead = true;
+        assert_eq!(bench.status().leds_on, leds_on);
+    }
+}
+
 #[test]
 fn damaged_commands_are_counted_reported_and_done_with() {
     let mut bench = Bench::open();

@@ -4,7 +4,7 @@ use super::host_port::{Device, bus};
 use super::support::*;
 use crate::Micros;
 use nirspi_wire::host_port::READ_PACKET;
-use nirspi_wire::ready::{self, MAX_NARROW_SAMPLES};
+use nirspi_wire::ready::{self, MAX_NARROW_SAMPLES, MAX_SUMMED_SAMPLES};
 use nirspi_wire::register::{Register, mode};
 use nirspi_wire::samples::Width::{self, Bits24, Bits32};
 use nirspi_wire::{
@@ -111,6 +111,21 @@ fn a_run_whose_samples_can_leave_24_bits_has_samples_of_32() {
     }
     for sweeps in [10_000, u32::MAX] {
         assert_eq!(width_of(Configuration { sweeps, ..ASKING }), Bits32);
+    }
+}
+
+/// The packets of the FPGA have no shift, so its sums may have as many samples as always fit, and not one more.
+#[test]
+fn the_fpga_makes_packets_of_sums_that_always_fit() {
+    let makes = |blanked, sweeps| {
+        let configuration = Configuration { clocks_per_pattern: 6, blanked, sweeps, ..SMALL };
+        let bench = configured(version::CURRENT, 0x0305, configuration);
+        bench.fpga.get(Register::Mode) & mode::PACKETS != 0
+    };
+    for samples_a_sweep in [2, 4] {
+        let most = MAX_SUMMED_SAMPLES / u32::from(samples_a_sweep);
+        assert!(makes(6 - samples_a_sweep, most));
+        assert!(!makes(6 - samples_a_sweep, most + 1));
     }
 }
 

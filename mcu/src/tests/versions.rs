@@ -67,14 +67,18 @@ fn a_host_of_this_version_hears_what_the_camera_can_do() {
 
 #[test]
 fn a_command_of_a_later_version_is_refused_and_nothing_is_damaged() {
-    let mut bench = Bench::open();
-    bench.receive(&unknown(99));
-    bench.poll();
-    let refused = Err(Refusal::Unknown);
-    assert!(matches!(bench.heard()[..], [nirspi_wire::DeviceMessage::Reply(reply)]
-        if reply.id == 99 && reply.outcome == refused));
-    assert_eq!(bench.status().commands_damaged, 0);
-    assert_eq!(bench.camera.state(), State::Idle);
+    // Version 2 is the first that has the refusal.
+    for protocol in 2..=version::CURRENT {
+        let mut bench = Bench::new();
+        bench.ask(Command::Hello { protocol }).unwrap();
+        bench.receive(&unknown(99));
+        bench.poll();
+        let refused = Err(Refusal::Unknown);
+        assert!(matches!(bench.heard()[..], [nirspi_wire::DeviceMessage::Reply(reply)]
+            if reply.id == 99 && reply.outcome == refused));
+        assert_eq!(bench.status().commands_damaged, 0);
+        assert_eq!(bench.camera.state(), State::Idle);
+    }
 }
 
 #[test]

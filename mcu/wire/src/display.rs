@@ -83,6 +83,8 @@ impl Display for ConfigField {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Version;
+    use crate::packet::PacketError;
     use std::string::ToString;
 
     #[test]
@@ -102,6 +104,21 @@ mod tests {
         assert!(told(0x1234).contains("0x00001234"), "{}", told(0x1234));
         let all = [told(IDENTITY), told(0), told(NO_CLOCK), told(DAMAGED), told(7)];
         assert!(all.iter().enumerate().all(|(at, words)| !all[..at].contains(words)), "{all:?}");
+    }
+
+    #[test]
+    fn a_version_has_three_numbers_and_every_damage_its_own_words() {
+        assert_eq!(Version(0, 3, 7).to_string(), "0.3.7");
+        let all = [
+            PacketError::BufferTooSmall,
+            PacketError::TooLong,
+            PacketError::Cobs,
+            PacketError::Crc,
+            PacketError::Message,
+        ];
+        let all = all.map(|error| error.to_string());
+        assert!(all.iter().enumerate().all(|(at, words)| !all[..at].contains(words)), "{all:?}");
+        assert!(all.iter().all(|words| words.contains(' ')), "{all:?}");
     }
 
     #[test]

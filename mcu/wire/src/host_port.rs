@@ -172,6 +172,14 @@ mod tests {
         assert_eq!(unchecked(seal(Register::Identity.address(), IDENTITY)), None);
     }
 
+    #[test]
+    fn a_value_without_a_check_has_zeros_in_its_place_and_nothing_else() {
+        let [v0, v1, v2, v3] = 0x0002_0001u32.to_be_bytes();
+        assert_eq!(unchecked([v0, v1, v2, v3, 0, 0]), Some(0x0002_0001));
+        assert_eq!(unchecked([v0, v1, v2, v3, 0, 1]), None);
+        assert_eq!(unchecked([v0, v1, v2, v3, 1, 0]), None);
+    }
+
     /// One edge of `sck` too many repeats a bit, and one too few leaves a bit out.
     #[test]
     fn one_wrong_edge_or_three_wrong_bits_turn_no_opcode_into_a_read_of_a_packet() {
