@@ -18,8 +18,17 @@ fn bitstream(length: usize) -> Vec<u8> {
 /// Configures the chip with a poll every 100 us. The longest allowed configuration is far shorter
 /// than a second for each command.
 fn configure(chip: &mut FakeEcp5, bitstream: &[u8]) -> Result<(), ConfigureError> {
+    configure_with(chip, bitstream, 100)
+}
+
+/// Configures the chip with a poll after each of so many microseconds.
+fn configure_with(
+    chip: &mut FakeEcp5,
+    bitstream: &[u8],
+    step_us: usize,
+) -> Result<(), ConfigureError> {
     let mut configuration = Configuration::new(IDCODE_LFE5UM5G_85F);
-    for now in (0..10_000_000).step_by(100) {
+    for now in (0..10_000_000).step_by(step_us) {
         chip.pass(Micros(now));
         if let Some(result) = configuration.poll(Micros(now), chip, bitstream) {
             assert_eq!(
@@ -61,9 +70,24 @@ fn another_chip_or_none_is_left_to_its_own_configuration() {
 
 #[test]
 fn a_chip_that_stays_busy_is_given_up_and_restarted() {
-    let mut chip = FakeEcp5::ill(Illness::Stuck);
-    assert_eq!(configure(&mut chip, &bitstream(100)), Err(ConfigureError::Stuck));
-    assert_eq!(chip.restarts, 2);
+    // The second is not over at a poll, and the next one comes long after it.
+    for step_us in [100, 70_001, 300_000] {
+        let mut chip = FakeEcp5::ill(Illness::Stuck);
+        let result = configure_with(&mut chip, &bitstream(100), step_us);
+        assert_eq!((result, chip.restarts), (Err(ConfigureError::Stuck), 2), "{step_us} us");
+    }
+}
+
+/// Neither a chip that names no error and is not done, nor one that is done and names an error.
+#[test]
+fn a_chip_runs_a_bitstream_only_if_it_is_done_and_names_no_error() {
+    let done = 1 << 8;
+    assert_eq!(configure(&mut FakeEcp5::ill(Illness::Ends(done)), &bitstream(100)), Ok(()));
+    let errors = [1 << 13, 1 << 23, 1 << 24, 1 << 25];
+    for status in [0].into_iter().chain(errors.map(|error| done | error)) {
+        let result = configure(&mut FakeEcp5::ill(Illness::Ends(status)), &bitstream(100));
+        assert_eq!(result, Err(ConfigureError::Refused { status }), "{status:#x}");
+    }
 }
 
 #[test]

@@ -12,6 +12,8 @@ pub enum Illness {
     Stuck,
     /// Reports a damaged bitstream.
     BadCrc,
+    /// Has this status after the bitstream.
+    Ends(u32),
     /// Fails to erase itself.
     Fails,
     /// No transfer succeeds.
@@ -95,6 +97,8 @@ impl FakeEcp5 {
                 assert!(self.commands.ends_with(&[0x46, 0x7A]));
                 if self.illness == Some(Illness::BadCrc) {
                     self.status |= 3 << 23;
+                } else if let Some(Illness::Ends(status)) = self.illness {
+                    self.status |= status;
                 } else {
                     self.status |= 1 << 8;
                     self.runs = Some(rest.to_vec());

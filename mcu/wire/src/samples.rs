@@ -341,6 +341,18 @@ mod tests {
         assert_eq!(samples.len(), 5);
     }
 
+    /// With the shift that their bits ask for, these would round up to 2^31, which is no `i32`.
+    #[test]
+    fn a_sample_that_rounds_up_out_of_its_bits_gets_a_shift_more() {
+        for bits in 32..=48 {
+            let value = (1i64 << bits) - 1;
+            let mut buffer = [0; 8];
+            let samples = Samples::pack([value, 0].into_iter(), &mut buffer).unwrap();
+            assert_eq!(samples.shift(), bits - 30);
+            assert!(samples.iter().eq([value + 1, 0]), "{samples:?}");
+        }
+    }
+
     #[test]
     fn a_short_buffer_is_refused() {
         assert_eq!(Samples::pack([1i64, 2].into_iter(), &mut [0; 7]), Err(SamplesError));

@@ -139,7 +139,10 @@ fn bits_codes_and_limits_are_these() {
     let good = clocks::LOCKED | clocks::ALIVE | clocks::READY;
     let fit = |units: u32| clocks::fit(good | units);
     assert_eq!([10_624, 10_625, 12_500, 14_375, 14_376].map(fit), [false, true, true, true, false]);
-    assert!(!clocks::fit(12_500 | good & !clocks::READY) && !clocks::fit(0));
+    assert!(!clocks::fit(0));
+    for bit in [clocks::LOCKED, clocks::ALIVE, clocks::READY] {
+        assert!(!clocks::fit(12_500 | good & !bit) && !clocks::fit(12_500 | bit), "{bit:#x}");
+    }
     let fits = [0x0000_0200, 0x0000_0300, 0x0000_0303, 0x0000_0400, 0x0001_0300]
         .map(register::has_this_map);
     assert_eq!(fits, [false, true, true, false, false]);
