@@ -299,6 +299,20 @@ fn an_error_is_told_of_the_data_that_could_not_be_read_alone() {
     assert_eq!(bus.raw(), Ok(None), "no burst has failed");
 }
 
+/// The last bytes transferred, and the transfer that is wanted next, are of one kind of data.
+#[test]
+fn a_frame_is_never_given_for_a_burst_nor_a_burst_fetched_for_a_frame() {
+    let mut bus = bus();
+    start(&mut bus, 2);
+    assert_eq!(fetch(&mut bus), 0);
+    bus.port().fpga.raw = Some(std::vec![9; 64]);
+    assert_eq!(bus.raw(), Ok(None), "the buffer holds a frame");
+    assert_eq!(bus.frame(), Ok(None), "its place is given away");
+    assert!(serve(&mut bus));
+    assert_eq!(bus.frame().unwrap().map(sequence), Some(0));
+    assert_eq!(bus.port().transfers.last(), Some(&(READ_FRAME, frame_bytes(2))));
+}
+
 #[test]
 fn a_stop_leaves_the_last_frame_until_its_release() {
     let mut bus = bus();

@@ -109,6 +109,27 @@ proptest! {
     }
 }
 
+/// A block of 254 bytes is the only one that stands for no zero.
+#[test]
+fn bright_light_has_bytes_without_a_zero_for_longer_than_a_block() {
+    for width in [Width::Bits24, Width::Bits32] {
+        let head = Head {
+            run: 1,
+            sequence: 2,
+            device_time_us: 3,
+            sweeps: 4,
+            flags: FrameFlags(5),
+            patterns: 400,
+            width,
+        };
+        let packet = packet(&head, &[0x005A_A55A | 0x1B00_0000; 400]);
+        assert!(packet.contains(&0xFF), "a long block");
+        let mut reader = Reader::new(&packet, head.patterns);
+        let word = if width == Width::Bits24 { 0x005A_A55A } else { 0x1B5A_A55A };
+        assert!((0..400).all(|_| reader.sample() == word) && reader.is_intact(), "{width:?}");
+    }
+}
+
 /// Two frames are told apart by what is read of them.
 #[test]
 fn the_beginning_holds_the_numbers_and_the_time() {
