@@ -270,6 +270,18 @@ fn a_burst_is_as_long_as_asked_for_and_outlives_a_release() {
 }
 
 #[test]
+fn a_burst_and_a_frame_are_ready_when_their_lines_say_so() {
+    let mut bus = bus();
+    start(&mut bus, 2);
+    assert!(!bus.raw_ready() && !bus.frame_ready());
+    bus.port().fpga.raw = Some(std::vec![9; 64]);
+    assert!(bus.raw_ready() && !bus.frame_ready());
+    bus.port().fpga.raw = None;
+    bus.port().fpga.make_frame();
+    assert!(!bus.raw_ready() && bus.frame_ready());
+}
+
+#[test]
 fn a_failed_transfer_is_tried_again_and_given_up_after_three() {
     let mut bus = bus();
     start(&mut bus, 2);

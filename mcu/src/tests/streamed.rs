@@ -3,7 +3,7 @@
 
 use super::fake_fpga::FakeFpga;
 use super::support::*;
-use crate::{BoardInfo, Camera, Limits, Micros, NoLoader, PortBus, Ports};
+use crate::{BoardInfo, Camera, FpgaBus, Limits, Micros, NoLoader, PortBus, Ports};
 use nirspi_wire::fpga::MAX_FRAME_BYTES;
 use nirspi_wire::packet::open;
 use nirspi_wire::register::{Register, mode};
@@ -146,12 +146,14 @@ fn packets_leave_by_the_parallel_port_only_where_there_is_one_and_frames_are_fas
         device.start(Configuration { sweeps, ..SMALL }, RunLength::Continuous);
         let found = device.fpga().get(Register::Mode);
         assert_eq!(found & mode::PARALLEL != 0, streams, "{version:#x}, {sweeps} sweeps");
+        assert_eq!(device.bus.streams(), streams, "{version:#x}, {sweeps} sweeps");
         assert_ne!(found & mode::PACKETS, 0);
     }
     let mut bench = Bench::open();
     bench.fpga.make_packets();
     bench.ask(Command::Configure(SMALL)).unwrap();
     assert_eq!(bench.fpga.get(Register::Mode) & mode::PARALLEL, 0, "no ring");
+    assert!(!bench.fpga.streams());
     // Sums that a packet has no room for.
     let mut device = Device::new();
     device.start(Configuration { patterns: 1, sweeps: 1 << 17, ..SMALL }, RunLength::Continuous);
