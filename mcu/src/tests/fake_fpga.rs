@@ -36,6 +36,8 @@ pub struct FakeFpga {
     pub over_range: u32,
     /// What is added to the positive sums of a frame, by its sequence.
     pub noise_of: fn(u32, u64) -> u64,
+    /// What is added to every sum.
+    pub light: u64,
     /// After a read of this register, a frame is made, once.
     pub frame_after_read_of: Option<Register>,
     pub raw: Option<Vec<u8>>,
@@ -97,6 +99,7 @@ impl Default for FakeFpga {
             channels: Vec::new(),
             over_range: 0,
             noise_of: |_, _| 0,
+            light: 0,
             frame_after_read_of: None,
             raw: None,
             keeps: false,
@@ -168,7 +171,8 @@ impl FakeFpga {
         (0..patterns as u64)
             .map(|k| {
                 let noise = (self.noise_of)(sequence, k);
-                Sums { positive: 1000 * u64::from(sequence) + k + noise, negative: 7 }
+                let positive = 1000 * u64::from(sequence) + k + noise;
+                Sums { positive: self.light + positive, negative: self.light + 7 }
             })
             .collect()
     }

@@ -333,6 +333,30 @@ proptest! {
     }
 }
 
+/// All samples of a frame together do not fit a register of 32 bits.
+#[test]
+fn the_level_of_a_long_bright_frame_is_the_same_by_either_way() {
+    let signals = [false, true].map(|packets| {
+        let mut bench = Bench::open();
+        if packets {
+            bench.fpga.make_packets();
+        }
+        // Three samples a sweep.
+        let sweeps = ready::MAX_SUMMED_SAMPLES / 3;
+        bench.ask(Command::Configure(Configuration { sweeps, ..SMALL })).unwrap();
+        assert_eq!(bench.fpga.sends_packets(), packets);
+        bench.fpga.light = 1 << 30;
+        bench.ask(Command::Start(RunLength::Continuous)).unwrap();
+        bench.frame();
+        bench.frame();
+        signal(&mut bench).unwrap()
+    });
+    assert_eq!(signals[0], signals[1]);
+    // 2^30 in 2^17 samples.
+    let level = signals[0].mean_milli_counts;
+    assert!(level.abs_diff(1_000 << 13) < 1_000, "{level}");
+}
+
 #[test]
 fn the_meter_sees_no_packet_that_the_wires_have_damaged() {
     for damaged in 0..3 {
