@@ -92,6 +92,7 @@ mod tests {
         let told = |centi_celsius| Fault::OverTemperature { centi_celsius }.to_string();
         assert_eq!(told(6012), "the LED array's temperature of 60.1 °C is over the limit");
         assert!(told(5995).contains(" 60.0 °C"), "{}", told(5995));
+        assert!(told(0).contains(" 0.0 °C"), "{}", told(0));
         assert!(told(-1).contains(" -0.0 °C") && told(-1234).contains(" -12.3 °C"));
         assert!(told(i16::MIN).contains(" -327.7 °C"));
     }
@@ -124,11 +125,12 @@ mod tests {
     #[test]
     fn no_state_or_fault_is_shown_by_the_name_of_its_variant() {
         let states = [State::Idle, State::Configured, State::Running, State::Fault];
-        assert!(
-            states
-                .iter()
-                .all(|state| !std::format!("{state}").contains(&std::format!("{state:?}")))
-        );
+        for state in states {
+            let told = state.to_string();
+            assert!(told.len() > 3 && !told.contains(&std::format!("{state:?}")), "{told}");
+        }
+        let fields = [ConfigField::Patterns, ConfigField::OrderLength, ConfigField::Frames];
+        assert!(fields.iter().all(|field| field.to_string().starts_with("the ")));
         let faults = [
             Fault::Interlock,
             Fault::TemperatureSensor,

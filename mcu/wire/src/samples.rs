@@ -338,7 +338,9 @@ mod tests {
         let mut buffer = [0; 20];
         let samples = Samples::pack(extremes.iter().copied(), &mut buffer).unwrap();
         assert!(samples.shift() <= MAX_SHIFT);
-        assert_eq!(samples.len(), 5);
+        assert_eq!((samples.len(), samples.byte_len(), samples.is_empty()), (5, 20, false));
+        let none = Samples::pack([].into_iter(), &mut []).unwrap();
+        assert_eq!((none.len(), none.byte_len(), none.is_empty()), (0, 0, true));
     }
 
     /// With the shift that their bits ask for, these would round up to 2^31, which is no `i32`.

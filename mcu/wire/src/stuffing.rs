@@ -115,12 +115,16 @@ pub(crate) fn unstuff(packet: &mut [u8]) -> Option<usize> {
 fn move_down(bytes: &mut [u8], from: core::ops::Range<usize>, to: usize) {
     if cfg!(target_os = "none") {
         // The packets of a host are short, and the library's function takes 900 bytes of flash.
-        let down = from.start - to;
-        for at in from {
-            bytes[at - down] = bytes[at];
-        }
+        move_down_bytewise(bytes, from, to);
     } else {
         bytes.copy_within(from, to);
+    }
+}
+
+fn move_down_bytewise(bytes: &mut [u8], from: core::ops::Range<usize>, to: usize) {
+    let down = from.start - to;
+    for at in from {
+        bytes[at - down] = bytes[at];
     }
 }
 
@@ -154,6 +158,17 @@ mod tests {
         assert_eq!(unstuff(&mut [0]), None);
         assert_eq!(unstuff(&mut [2, 7, 0, 1]), None);
         assert_eq!(unstuff(&mut [1]), Some(0));
+    }
+
+    #[test]
+    fn bytes_move_down_on_a_microcontroller_as_elsewhere() {
+        for (from, to) in [(1..1, 0), (1..2, 0), (1..20, 0), (9..20, 2), (19..20, 19), (5..17, 4)] {
+            let mut here: Vec<u8> = (1..=20).collect();
+            let mut there = here.clone();
+            move_down_bytewise(&mut here, from.clone(), to);
+            there.copy_within(from, to);
+            assert_eq!(here, there);
+        }
     }
 
     proptest! {

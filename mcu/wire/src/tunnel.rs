@@ -173,6 +173,13 @@ mod tests {
     }
 
     #[test]
+    fn a_reply_has_a_registers_bytes_or_as_many_as_were_asked_for() {
+        let reply = |opcode| Request { opcode, number: 1, address: 2, argument: 30 }.reply_data();
+        let opcodes = [LOOK, WRITE_REGISTER, READ_REGISTER, READ_FRAME, READ_PACKET, READ_RAW];
+        assert_eq!(opcodes.map(reply), [0, 0, 4, 30, 30, 30]);
+    }
+
+    #[test]
     fn a_zeroed_line_is_no_request() {
         assert_eq!(Request::from_bytes(&[0; REQUEST_BYTES]), None);
     }
