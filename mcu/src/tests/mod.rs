@@ -18,6 +18,7 @@ mod model;
 mod narrow;
 mod packets;
 mod patience;
+mod ports;
 mod safety;
 mod selftest;
 mod silence;

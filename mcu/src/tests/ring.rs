@@ -409,3 +409,49 @@ fn a_packet_needs_at_most_six_bytes_of_room_more_than_it_has() {
         assert!(found.room_bytes() <= ready::MAX_READ_BYTES);
     }
 }
+
+#[test]
+fn room_and_distance_of_packets_are_counted_in_bytes_and_words() {
+    let found = |at, length| Found { at, length, follows: true, run: 3, sequence: 0 };
+    // Whole words, from the one in which the packet begins.
+    assert_eq!(found(1_000, 50).room_bytes(), 52);
+    assert_eq!(found(1_001, 50).room_bytes(), 52);
+    assert_eq!(found(1_003, 50).room_bytes(), 56);
+    assert_eq!(found(u32::MAX, 1).room_bytes(), 4);
+    assert_eq!(found(1_000, 50).bytes_to(&found(1_100, 60)), 160);
+    assert_eq!(found(u32::MAX - 9, 4).bytes_to(&found(10, 5)), 25);
+}
+
+#[test]
+fn a_loan_has_a_second_piece_where_the_memory_ends() {
+    let memory: &'static RingMemory<WORDS> = Box::leak(Box::new(RingMemory::new()));
+    let size = BYTES as u32;
+    for (begin, end, expected) in [
+        (8, 20, &[(2, 12)][..]),
+        (size - 8, size, &[(WORDS - 2, 8)][..]),
+        (size - 8, size + 13, &[(WORDS - 2, 8), (0, 13)][..]),
+        (16, 16, &[][..]),
+    ] {
+        let loan = Loan { words: &memory.words, returned: &memory.returned, begin, end };
+        let pieces = loan.pieces().map(|(words, length)| (WORDS - words.len(), length));
+        assert_eq!(pieces.take(3).collect::<Vec<_>>(), expected);
+    }
+}
+
+/// A link that says nothing of loans.
+struct Plain;
+
+impl crate::PacketSink for Plain {
+    fn claim(&mut self, _length: usize) -> Option<&mut [u8]> {
+        None
+    }
+
+    fn commit(&mut self, _part: Range<usize>) {}
+}
+
+#[test]
+fn a_link_that_says_nothing_of_loans_takes_none() {
+    let memory: &'static RingMemory<WORDS> = Box::leak(Box::new(RingMemory::new()));
+    let loan = Loan { words: &memory.words, returned: &memory.returned, begin: 0, end: 8 };
+    assert!(!crate::PacketSink::lend(&mut Plain, loan));
+}
