@@ -455,3 +455,36 @@ fn a_link_that_says_nothing_of_loans_takes_none() {
     let loan = Loan { words: &memory.words, returned: &memory.returned, begin: 0, end: 8 };
     assert!(!crate::PacketSink::lend(&mut Plain, loan));
 }
+
+/// Lengths of packets differ by their blocks, so a packet may be as long as the shortest and not be there whole.
+#[test]
+fn a_packet_is_waited_for_until_its_end_has_come() {
+    let whole = packet(7, &[0x0101_0101; 150]);
+    let lengths = ready::packet_lengths(150, Width::Bits32);
+    assert!(*lengths.start() + 1 < whole.len() && whole.len() <= *lengths.end());
+    for lead in 1..=4 {
+        let mut bench = Bench::of(&[&[0; 4][..lead], &whole[..], &[0; 7]].concat());
+        let mut numbers = Vec::new();
+        while bench.written + 4 <= bench.bytes.len() {
+            bench.send(4, 0);
+            bench.look();
+            numbers.extend(bench.take(150, 1).0);
+        }
+        assert_eq!(numbers, [7], "{lead} zeros before");
+    }
+}
+
+/// It would count as damaged at the host, and as forwarded here.
+#[test]
+fn a_packet_that_has_lost_bytes_is_passed_over_and_the_next_one_is_found() {
+    let shortest = *ready::packet_lengths(20, Width::Bits32).start();
+    for length in [shortest - 30, shortest - 4, shortest - 2, shortest - 1] {
+        let sound = packet(0, &[0x0101_0101; 20]);
+        let lost = sound.len() - length;
+        let cut = [&sound[..50], &sound[50 + lost..]].concat();
+        let mut bench = Bench::of(&Lines::new([cut, packet(1, &[5; 20])].into_iter()).bytes);
+        bench.send(usize::MAX, 0);
+        bench.look();
+        assert_eq!(bench.take(20, 1).0, [1], "{length} bytes");
+    }
+}
