@@ -92,9 +92,31 @@ fn every_bit_holds(bus: &mut impl FpgaBus) -> Result<bool, BusError> {
     Ok(true)
 }
 
+/// Memory under test. A trait, so that tests can give one with a fault.
+pub(crate) trait Cells {
+    /// Writes every byte with the value of its address.
+    fn fill(&mut self, pattern: impl Fn(usize) -> u8);
+    /// Whether every byte reads so.
+    fn reads(&mut self, pattern: impl Fn(usize) -> u8) -> bool;
+}
+
+impl Cells for [u8] {
+    fn fill(&mut self, pattern: impl Fn(usize) -> u8) {
+        for (at, byte) in self.iter_mut().enumerate() {
+            *byte = pattern(at);
+        }
+    }
+
+    fn reads(&mut self, pattern: impl Fn(usize) -> u8) -> bool {
+        // Without `black_box` the compiler knows the contents and removes the reads.
+        let memory = core::hint::black_box(self);
+        memory.iter().enumerate().all(|(at, &byte)| byte == pattern(at))
+    }
+}
+
 /// Writes and reads every bit as 0 and as 1 between neighbours of either kind, and every byte with
 /// a value of its own address.
-fn memory_holds(memory: &mut [u8]) -> bool {
+pub(crate) fn memory_holds(memory: &mut (impl Cells + ?Sized)) -> bool {
     let same = |byte: u8| move |_: usize| byte;
     // The factor is odd and above 256, so bytes that a stuck address line would confuse differ.
     let address = |at: usize| (at.wrapping_mul(0x9E37) >> 8) as u8;
@@ -105,13 +127,9 @@ fn memory_holds(memory: &mut [u8]) -> bool {
         && holds(memory, address)
 }
 
-fn holds(memory: &mut [u8], pattern: impl Fn(usize) -> u8) -> bool {
-    for (at, byte) in memory.iter_mut().enumerate() {
-        *byte = pattern(at);
-    }
-    // Without `black_box` the compiler knows the contents and removes the reads.
-    let memory = core::hint::black_box(memory);
-    memory.iter().enumerate().all(|(at, &byte)| byte == pattern(at))
+fn holds(memory: &mut (impl Cells + ?Sized), pattern: impl Fn(usize) -> u8) -> bool {
+    memory.fill(&pattern);
+    memory.reads(pattern)
 }
 
 /// The expected sums of the test frame.

@@ -12,6 +12,7 @@ use nirspi_wire::register::{
 use nirspi_wire::samples::Width;
 use nirspi_wire::{ADC_HZ, FrameFlags, crc32};
 use std::collections::BTreeMap;
+use std::rc::Rc;
 use std::vec::Vec;
 
 /// Register file and frame buffer. A run makes frames only when the test calls `make_frame`.
@@ -36,6 +37,8 @@ pub struct FakeFpga {
     pub over_range: u32,
     /// What is added to the positive sums of a frame, by its sequence.
     pub noise_of: fn(u32, u64) -> u64,
+    /// What the scratch register reads, by what it holds.
+    pub scratch_of: Rc<dyn Fn(u32) -> u32>,
     /// What is added to every sum.
     pub light: u64,
     /// After a read of this register, a frame is made, once.
@@ -99,6 +102,7 @@ impl Default for FakeFpga {
             channels: Vec::new(),
             over_range: 0,
             noise_of: |_, _| 0,
+            scratch_of: Rc::new(|word| word),
             light: 0,
             frame_after_read_of: None,
             raw: None,
@@ -358,6 +362,7 @@ impl FpgaBus for FakeFpga {
             Some(Register::Fault) => self.fault as u32,
             Some(Register::FramesMade) => self.made,
             Some(Register::FramesLost) => self.lost,
+            Some(Register::Scratch) => (self.scratch_of)(self.get(Register::Scratch)),
             Some(Register::ClockLow) => {
                 self.clock_read = self.clock;
                 self.clock as u32

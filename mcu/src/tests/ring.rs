@@ -488,3 +488,22 @@ fn a_packet_that_has_lost_bytes_is_passed_over_and_the_next_one_is_found() {
         assert_eq!(bench.take(20, 1).0, [1], "{length} bytes");
     }
 }
+
+/// Two packets whose zeros between them were lost, for example.
+#[test]
+fn a_packet_that_is_longer_than_any_is_passed_over() {
+    let longest = *ready::packet_lengths(20, Width::Bits32).end();
+    for extra in 1..=6 {
+        for lead in 1..=4 {
+            let sound = packet(0, &[0x0101_0101; 20]);
+            let more = longest + extra - sound.len();
+            let long = [&sound[..50], &[7; 6][..more], &sound[50..]].concat();
+            let next = packet(1, &[5; 20]);
+            let bytes = [&[0; 4][..lead], &long, &[0; 3], &next, &[0; 7]].concat();
+            let mut bench = Bench::of(&bytes);
+            bench.send(usize::MAX, 0);
+            bench.look();
+            assert_eq!(bench.take(20, 1).0, [1], "{extra} bytes, {lead} zeros before");
+        }
+    }
+}

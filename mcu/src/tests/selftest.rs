@@ -1,10 +1,14 @@
 //! Tests that each check passes on a good device and fails on a device with one matching fault.
 
 use super::support::*;
+use crate::selftest::{Cells, memory_holds};
 use nirspi_wire::register::{Register, clocks, mode};
 use nirspi_wire::{
     Answer, Command, EventKind, Fault, Refusal, RunLength, SelfTestReport as Report, State,
 };
+
+use std::rc::Rc;
+use std::vec::Vec;
 
 const ALL: u32 = 0b1_1011_1111;
 
@@ -144,4 +148,83 @@ fn a_standing_fault_forbids_the_light_of_the_test_frame() {
     let standing = Fault::OverTemperature { centi_celsius: 7_000 };
     let refused = bench.ask(Command::Start(RunLength::Continuous));
     assert_eq!(refused, Err(Refusal::Fault(standing)));
+}
+
+/// Whether the self-test finds a scratch register that reads so.
+fn bus_fails(scratch_of: impl Fn(u32) -> u32 + 'static) -> bool {
+    let mut bench = Bench::open();
+    bench.fpga.scratch_of = Rc::new(scratch_of);
+    let failed = self_test(&mut bench).failed;
+    assert_eq!(failed & !Report::FPGA_BUS, 0);
+    failed != 0
+}
+
+#[test]
+fn each_bit_of_the_bus_is_tried_as_0_and_as_1_alone_and_beside_another() {
+    assert!(!bus_fails(|word| word));
+    for bit in 0..32 {
+        assert!(bus_fails(move |word| word | 1 << bit), "bit {bit} is always 1");
+        assert!(bus_fails(move |word| word & !(1 << bit)), "bit {bit} is always 0");
+        // Bits that pull each other up or down.
+        let both = 1 << bit | 1 << ((bit + 1) % 32);
+        assert!(bus_fails(move |word| if word & both != 0 { word | both } else { word }));
+        assert!(bus_fails(move |word| if word & both != both { word & !both } else { word }));
+        // A bit that stays 0, or goes to 0, only where all others are 1; and the reverse.
+        assert!(bus_fails(move |word| if word == !(1 << bit) { word ^ both } else { word }));
+        assert!(bus_fails(move |word| if word == 1 << bit { word ^ both } else { word }));
+    }
+}
+
+/// Bytes, with a fault between what is written and what is read.
+struct Faulty<F> {
+    bytes: Vec<u8>,
+    /// What is read of a byte, from its address and all bytes.
+    reads: F,
+}
+
+impl<F: Fn(usize, &[u8]) -> u8> Cells for Faulty<F> {
+    fn fill(&mut self, pattern: impl Fn(usize) -> u8) {
+        self.bytes.iter_mut().enumerate().for_each(|(at, byte)| *byte = pattern(at));
+    }
+
+    fn reads(&mut self, pattern: impl Fn(usize) -> u8) -> bool {
+        (0..self.bytes.len()).all(|at| (self.reads)(at, &self.bytes) == pattern(at))
+    }
+}
+
+fn memory_fails(reads: impl Fn(usize, &[u8]) -> u8) -> bool {
+    !memory_holds(&mut Faulty { bytes: std::vec![0; 1024], reads })
+}
+
+#[test]
+fn a_bit_of_the_memory_that_is_stuck_and_an_address_line_that_is_are_found() {
+    assert!(!memory_fails(|at, bytes| bytes[at]));
+    for bit in 0..8 {
+        for place in [0, 1, 500, 1023] {
+            let here = move |at: usize| u8::from(at == place) << bit;
+            assert!(memory_fails(|at, bytes| bytes[at] | here(at)), "bit {bit} of {place}");
+            assert!(memory_fails(|at, bytes| bytes[at] & !here(at)), "bit {bit} of {place}");
+        }
+    }
+    for line in 0..10 {
+        assert!(memory_fails(|at, bytes| bytes[at | 1 << line]), "line {line} is always 1");
+        assert!(memory_fails(|at, bytes| bytes[at & !(1 << line)]), "line {line} is always 0");
+    }
+}
+
+/// A byte that fails between neighbours of one kind alone.
+#[test]
+fn each_pattern_of_the_memory_test_counts() {
+    for value in [0x00, 0xFF, 0x55, 0xAA] {
+        let all = |bytes: &[u8]| bytes.iter().all(|&byte| byte == value);
+        assert!(memory_fails(|at, bytes| bytes[at] ^ u8::from(at == 77 && all(bytes))));
+    }
+    let differ = |bytes: &[u8]| bytes.iter().any(|&byte| byte != bytes[0]);
+    assert!(memory_fails(|at, bytes| bytes[at] ^ u8::from(at == 77 && differ(bytes))));
+}
+
+/// A frame buffer without a fault, as a board has it.
+#[test]
+fn memory_without_a_fault_holds() {
+    assert!(memory_holds(&mut [0u8; 300][..]));
 }
