@@ -3,7 +3,7 @@
 
 use super::fake_fpga::FakeFpga;
 use super::support::*;
-use crate::{BoardInfo, Camera, FpgaBus, Limits, Micros, NoLoader, PortBus, Ports};
+use crate::{BoardInfo, Camera, FpgaBus, Limits, Micros, NoLoader, PortBus, Ports, Progress};
 use nirspi_wire::fpga::MAX_FRAME_BYTES;
 use nirspi_wire::packet::open;
 use nirspi_wire::register::{Register, mode};
@@ -66,7 +66,12 @@ impl Device {
         let ports = &mut Ports { bus: &mut self.bus, sink: &mut self.link, loader: &mut NoLoader };
         let taken = self.camera.receive(now, bytes, &GOOD_INPUTS, ports);
         assert_eq!(taken, bytes.len());
-        self.camera.poll(now, &GOOD_INPUTS, ports);
+        self.poll();
+    }
+
+    fn poll(&mut self) -> Progress {
+        let ports = &mut Ports { bus: &mut self.bus, sink: &mut self.link, loader: &mut NoLoader };
+        self.camera.poll(self.now, &GOOD_INPUTS, ports)
     }
 
     fn turn(&mut self) {
@@ -133,6 +138,18 @@ fn a_packet_goes_from_the_ring_to_the_host_as_the_fpga_made_it() {
     }
     assert_eq!(device.bus.port().port.transfers, [], "nothing goes by the host port");
     assert_eq!(device.end().1, ended(100, 0, 0, 0));
+}
+
+/// A board sleeps after a poll that has not worked.
+#[test]
+fn a_poll_has_worked_if_a_packet_has_come() {
+    let mut device = Device::running(RunLength::Continuous);
+    assert!(!device.poll().worked);
+    for _ in 0..3 {
+        device.frame();
+        assert!(device.poll().worked);
+        assert!(!device.poll().worked);
+    }
 }
 
 /// The FPGA of a board without wires to the port, older gateware, and frames that come slowly.
