@@ -1,4 +1,5 @@
 //! A packet that the FPGA has made, as the firmware reads it: by its first bytes, and sample by sample.
+#![expect(clippy::unwrap_used, reason = "a failed unwrap in a helper fails its test")]
 
 use nirspi_wire::packet::{overhead, seal};
 use nirspi_wire::ready::{
