@@ -144,6 +144,29 @@ fn a_damaged_frame_is_counted_released_and_not_sent() {
     assert_eq!(bench.status().fpga_frames_corrupt, 1);
 }
 
+/// Its number was not readable at first, and the bus has lost its release, so it comes again.
+#[test]
+fn a_frame_that_was_damaged_on_the_way_and_comes_again_whole_counts_once() {
+    let mut bench = Bench::running(RunLength::Continuous);
+    bench.fpga.make_frame();
+    let damage = |bench: &mut Bench| bench.fpga.frame.as_mut().unwrap()[0] ^= 1;
+    damage(&mut bench);
+    bench.fpga.lost_address = Some(Register::Control.address());
+    bench.after(10);
+    assert_eq!(bench.status().fpga_frames_corrupt, 1);
+    bench.after(10);
+    assert_eq!(bench.status().fpga_frames_corrupt, 1, "the same frame");
+    damage(&mut bench);
+    bench.fpga.lost_address = None;
+    bench.after(10);
+    assert_eq!(sequences(&bench.heard()), [0]);
+    let status = bench.status();
+    assert_eq!((status.frames_sent, status.fpga_frames_corrupt), (1, 0));
+    bench.frame();
+    let status = bench.status();
+    assert_eq!((status.frames_made, status.frames_sent, status.fpga_frames_corrupt), (2, 2, 0));
+}
+
 #[test]
 fn an_intact_frame_of_another_length_is_damaged_too() {
     let mut bench = Bench::running(RunLength::Continuous);
