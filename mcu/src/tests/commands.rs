@@ -274,7 +274,7 @@ fn status_counts_and_measures() {
     assert!(status.leds_on && status.interlock_closed && status.fault.is_none());
 }
 
-/// Whoever opens the enclosure goes by this word.
+/// Somebody may open the enclosure because the status says that the LEDs are off.
 #[test]
 fn leds_of_an_fpga_that_does_not_answer_count_as_on_in_a_run() {
     for (mut bench, leds_on) in

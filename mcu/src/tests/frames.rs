@@ -22,7 +22,7 @@ fn ended(run: u16, made: u32, dropped: u32, lost: u32, corrupt: u32) -> EventKin
 #[test]
 fn a_frame_carries_the_differences_of_its_sums() {
     let mut bench = Bench::configured();
-    // The lower word of the clock runs over each 34 s.
+    // The lower 32 bits of the clock run over every 34 s.
     bench.fpga.clock = (3 << 32) + 1_000_000;
     bench.now = Micros(50_000);
     assert_eq!(bench.ask(Command::Start(RunLength::Continuous)), Ok(Answer::Done));
@@ -144,7 +144,8 @@ fn a_damaged_frame_is_counted_released_and_not_sent() {
     assert_eq!(bench.status().fpga_frames_corrupt, 1);
 }
 
-/// Its number was not readable at first, and the bus has lost its release, so it comes again.
+/// The firmware could not read the frame's number at first, and the bus has lost the frame's release, so the FPGA
+/// delivers the frame again.
 #[test]
 fn a_frame_that_was_damaged_on_the_way_and_comes_again_whole_counts_once() {
     let mut bench = Bench::running(RunLength::Continuous);

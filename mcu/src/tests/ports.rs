@@ -79,7 +79,7 @@ fn a_loader_is_done_unless_it_says_otherwise_and_no_loader_takes_nothing() {
     assert_eq!(answers, [unsupported; 3]);
 }
 
-/// A write is for LEDs that are on and should not be.
+/// At rest the firmware writes to the FPGA only if LEDs are on.
 #[test]
 fn an_fpga_that_is_dark_at_rest_is_looked_at_and_not_written() {
     let mut bench = Bench::configured();

@@ -474,7 +474,7 @@ fn a_packet_is_waited_for_until_its_end_has_come() {
     }
 }
 
-/// It would count as damaged at the host, and as forwarded here.
+/// The firmware would count such a packet as forwarded, and the host as damaged.
 #[test]
 fn a_packet_that_has_lost_bytes_is_passed_over_and_the_next_one_is_found() {
     let shortest = *ready::packet_lengths(20, Width::Bits32).start();

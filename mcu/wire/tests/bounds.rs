@@ -1,7 +1,10 @@
 //! How long packets are: buffers and transfers are laid out by these numbers.
 
 use nirspi_wire::packet::{hello_of_any_version, overhead, parse, seal, unseal};
-use nirspi_wire::ready::{HEADER_BYTES, LEAD_BYTES, packet_in, read_bytes};
+use nirspi_wire::ready::{
+    FAST_LEAD_BYTES, HEADER_BYTES, LEAD_BYTES, MAX_READ_BYTES, fast_read_bytes, packet_in,
+    read_bytes,
+};
 use nirspi_wire::samples::{MAX_SHIFT, NARROW, Width, Words};
 use nirspi_wire::version::{self, speaks};
 use nirspi_wire::{Answer, DeviceMessage, PATTERNS, Reply, Samples, encode};
@@ -33,6 +36,17 @@ fn a_read_of_a_packet_ends_with_its_last_byte_if_the_packet_begins_as_late_as_it
             );
         }
     }
+}
+
+#[test]
+fn a_read_that_is_clocked_by_sck_has_room_for_a_longer_lead() {
+    for width in [Width::Bits24, Width::Bits32] {
+        for patterns in 1..=PATTERNS {
+            let packet = read_bytes(patterns, width) - LEAD_BYTES;
+            assert_eq!(fast_read_bytes(patterns, width), FAST_LEAD_BYTES + packet);
+        }
+    }
+    assert_eq!(MAX_READ_BYTES, fast_read_bytes(PATTERNS, Width::Bits32));
 }
 
 /// Two packets that run together, or a packet that is cut, are not taken for one.

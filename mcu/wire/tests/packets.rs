@@ -109,6 +109,7 @@ proptest! {
         // A packet of twice as many patterns has another length.
         prop_assert_eq!(ready::packet_in(&read, 2 * patterns, width), None);
 
+        prop_assert_eq!(ready::numbers(packet.first_chunk().unwrap()), (run, sequence));
         let mut reader = ready::Reader::new(&read[place.clone().unwrap()], patterns);
         prop_assert_eq!((reader.sequence, reader.flags), (sequence, flags));
         prop_assert!(!reader.is_intact(), "nothing has been read");
