@@ -319,6 +319,24 @@ mod tests {
     }
 
     #[test]
+    fn an_image_of_another_side_is_a_panic_in_every_basis() {
+        for basis in ALL {
+            let transform = Transform::new(basis, side(4));
+            let longer = || std::panic::catch_unwind(|| transform.analyse(&mut [0.0; 64]));
+            let shorter = || std::panic::catch_unwind(|| transform.synthesise(&mut [0.0; 4]));
+            assert!(longer().is_err() && shorter().is_err(), "{basis}");
+        }
+    }
+
+    #[test]
+    fn a_product_of_matrices_is_added() {
+        let mut out = [100.0; 6];
+        let (a, b) = ([1.0, 2.0, 3.0, 4.0], [5.0, 6.0, 7.0, 8.0, 9.0, 10.0]);
+        product(2, 3, &a, &b, &mut out);
+        assert_eq!(out, [121.0, 124.0, 127.0, 147.0, 154.0, 161.0]);
+    }
+
+    #[test]
     fn names_round_trip() {
         for basis in ALL {
             assert_eq!(basis.to_string().parse(), Ok(basis));

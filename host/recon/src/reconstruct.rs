@@ -508,6 +508,8 @@ fn check_prior(falloff: f64, noise: NoiseLevel) -> Result<(), ReconstructError> 
 }
 
 #[cfg(test)]
+mod same_images;
+#[cfg(test)]
 mod scatter_tests;
 #[cfg(test)]
 mod tests;

@@ -67,6 +67,12 @@ fn a_dark_level_under_single_readings_is_found_and_removed() {
         let mut found = Measurements::from_single(&rows, &lifted).unwrap();
         let level = found.remove_dark_level().unwrap();
         assert!((level / dark - 1.0).abs() < 0.01, "scene {kind}: {level} for {dark}");
+        // Picoamperes and sums of an ADC have the same level.
+        for unit in [1e-12, 1e12] {
+            let values: Vec<f64> = lifted.iter().map(|y| y * unit).collect();
+            let other = Measurements::from_single(&rows, &values).unwrap().remove_dark_level();
+            assert!((other.unwrap() / level / unit - 1.0).abs() < 1e-9, "scene {kind}, {unit}");
+        }
         let images = [&clean, &found].map(crate::reconstruct::hadamard);
         assert!(correlation_of(&images[0], &images[1]) > 0.999, "scene {kind}");
     }
@@ -92,6 +98,7 @@ fn a_share_keeps_the_first_rows_and_says_how_many() {
     assert_eq!(all.take(Some(&Order::Natural), 0.25).unwrap().values(), [0.0, 1.0, 2.0, 3.0]);
     assert_eq!(**all.take(None, 1e-9).unwrap().rows(), [15]);
     assert_eq!(all.take(None, 1.0).unwrap(), all);
+    assert_eq!(all.take(None, 0.3).unwrap().into_values(), [15.0, 14.0, 13.0, 12.0, 11.0]);
     let odd = all.subset((0..16).filter(|k| k % 2 == 0));
     assert_eq!(**odd.take(Some(&Order::Natural), 0.125).unwrap().rows(), [1, 3]);
     for found in [0.0, -0.1, 1.01, f64::INFINITY] {
@@ -113,4 +120,13 @@ proptest! {
             prop_assert_eq!(all.take(order.as_ref(), fraction).unwrap().rows().len(), expected);
         }
     }
+}
+
+#[test]
+fn a_shorter_sweep_takes_measurements_of_its_own_rows_alone() {
+    let of = |rows: &Rows| Measurements::from_differential(rows, &[0.5; 16]).unwrap();
+    let whole = ShorterSweep::new(&natural(4), None, 1.0).unwrap();
+    assert_eq!(whole.shorten(of(&natural(4))), of(&natural(4)));
+    let other = std::panic::catch_unwind(|| whole.shorten(of(&reversed(4))));
+    assert!(other.is_err());
 }

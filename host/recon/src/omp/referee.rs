@@ -176,3 +176,67 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
     sums.iter().sum::<f64>() + rest
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::omp::{Limits, Solver, reference};
+    use crate::testing::normal;
+    use rand::SeedableRng;
+    use rand_pcg::Pcg64;
+
+    /// Atoms that have much in common, whose coefficients single precision finds to a few digits.
+    #[test]
+    fn coefficients_and_choices_are_those_of_double_precision() {
+        let mut random = Pcg64::seed_from_u64(8);
+        let single = |v: f64| f64::from(v as f32);
+        let matrix = DMatrix::from_fn(48, 60, |_, k| {
+            single((1.0 + k as f64 / 9.0) * (normal(&mut random) + 15.0))
+        });
+        let y: Vec<f64> = (0..48).map(|_| single(normal(&mut random))).collect();
+        let exact = |atoms| reference::solve(&matrix, &y, &Limits::atoms(atoms)).unwrap();
+        let few = DenseDictionary::new(&matrix.map(|v| v as f32));
+        let y32: Vec<f32> = y.iter().map(|&y| y as f32).collect();
+        let path = |atoms| Solver::new(&few, &Limits::atoms(atoms)).unwrap().solve(&y32).unwrap();
+        assert_eq!(path(12).support, exact(12).support);
+        let worst = |found: &[f64]| {
+            let exact = exact(12).coefficients;
+            assert_eq!(found.len(), exact.len());
+            let errors = found.iter().zip(&exact).map(|(a, b)| (a - b).abs());
+            errors.fold(0.0, f64::max) / largest(&exact)
+        };
+        let rough = worst(&path(12).coefficients(12));
+        assert!(rough > 1e-5, "{rough}");
+        // With the Gram matrix and without it, in one go and after an earlier choice.
+        for bytes in [usize::MAX, 0] {
+            let double = DenseDictionary::with_gram_within(&matrix, bytes);
+            for before in [0, 5] {
+                let mut referee = DoubleReferee::new(&matrix, &double, &y);
+                referee.coefficients(&path(before));
+                let found = worst(&referee.coefficients(&path(12)));
+                assert!(found < 1e-11, "{found}, {bytes} bytes, after {before}");
+                assert_eq!(referee.believed(), BELIEVED);
+            }
+            let support = exact(13).support;
+            for (chosen, next) in support.iter().enumerate() {
+                let rivals: Vec<usize> =
+                    (0..60).filter(|k| !support[..chosen].contains(k)).collect();
+                let mut referee = DoubleReferee::new(&matrix, &double, &y);
+                assert_eq!(referee.choose(&path(chosen), &rivals), *next, "after {chosen}");
+            }
+        }
+    }
+
+    #[test]
+    fn of_equal_rivals_the_lowest_is_chosen() {
+        let mut matrix = DMatrix::identity(4, 6);
+        matrix[(1, 4)] = 1.0;
+        let double = DenseDictionary::new(&matrix).unnormalised();
+        let y = [0.5, 2.0, 1.0, 0.0];
+        let path = Solver::new(&DenseDictionary::new(&matrix.map(|v| v as f32)), &Limits::atoms(0))
+            .unwrap()
+            .solve(&y.map(|y| y as f32))
+            .unwrap();
+        assert_eq!(DoubleReferee::new(&matrix, &double, &y).choose(&path, &[0, 1, 2, 4]), 1);
+    }
+}

@@ -256,6 +256,9 @@ fn each_reason_to_stop_is_stated() {
     assert_eq!(both(&identity, &some, to_noise(0.6)), (Stop::Residual, vec![1, 3]));
     assert_eq!(both(&identity, &some, to_noise(0.4)), (Stop::Residual, vec![1, 3, 0]));
     assert_eq!(both(&identity, &[0.0; 4], Limits::atoms(4)), (Stop::Residual, vec![]));
+    // Of equal atoms the lowest is chosen.
+    let equal = [0.0, 2.0, 0.0, 2.0];
+    assert_eq!(both(&identity, &equal, Limits::atoms(1)), (Stop::Sparsity, vec![1]));
     let blind = DMatrix::from_diagonal(&DVector::from_vec(vec![1.0, 1.0, 0.0, 0.0]));
     let seen = both(&blind, &[2.0, 1.0, 1.0, 0.0], Limits::atoms(4));
     assert_eq!(seen, (Stop::NoAtomLeft, vec![0, 1]));

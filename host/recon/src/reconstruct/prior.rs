@@ -228,4 +228,6 @@ fn image(seen: &Seen, mut grid: Vec<f32>) -> Image {
 }
 
 #[cfg(test)]
+mod same_images;
+#[cfg(test)]
 mod tests;

@@ -289,3 +289,39 @@ fn geometric(largest: usize) -> Vec<usize> {
     numbers.dedup();
     numbers
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn line(pairs: &[(f64, f64)]) -> Line {
+        let mut line = Line::default();
+        pairs.iter().for_each(|&(prediction, measurement)| line.add(prediction, measurement));
+        line
+    }
+
+    #[test]
+    fn trust_is_the_slope_of_a_line_and_its_standard_error() {
+        // Two rows that agree: slope 1/2 without an error.
+        let exact = line(&[(2.0, 1.0), (4.0, 2.0)]);
+        assert_eq!((exact.most_trust(9.0), exact.least_trust(9.0)), (0.5, 0.5));
+        // Slope (0.2 + 0.6) / 2; what is left has the squares 0.04 + 0.04 over two predictions of 1.
+        let loose = line(&[(1.0, 0.2), (1.0, 0.6)]);
+        assert!((loose.most_trust(1.0) - 0.6).abs() < 1e-12, "{}", loose.most_trust(1.0));
+        assert!((loose.least_trust(1.0) - 0.2).abs() < 1e-12, "{}", loose.least_trust(1.0));
+        assert_eq!((loose.most_trust(5.0), loose.least_trust(5.0)), (1.0, 0.0));
+        // One row, and predictions of nothing, say nothing.
+        for nothing in [line(&[(1.0, 0.5)]), line(&[(0.0, 1.0), (0.0, 2.0)]), line(&[])] {
+            assert_eq!((nothing.most_trust(1.0), nothing.least_trust(1.0)), (1.0, 0.0));
+        }
+        let both = line(&[(1.0, 0.2)]).and(line(&[(1.0, 0.6)]));
+        assert_eq!(both.most_trust(1.0), loose.most_trust(1.0));
+    }
+
+    #[test]
+    fn numbers_of_atoms_are_evenly_spaced_in_their_logarithm() {
+        assert_eq!(geometric(1), [1]);
+        assert_eq!(geometric(5), [1, 2, 3, 4, 5]);
+        assert_eq!(geometric(512), [1, 2, 4, 8, 16, 32, 64, 128, 256, 512]);
+    }
+}

@@ -204,6 +204,21 @@ fn units_do_not_matter() {
 }
 
 #[test]
+fn noise_is_told_in_the_units_of_the_measurements() {
+    let all = measured(side(16), &scene(side(16), 1));
+    let rows = Order::ZigZag.rows(side(16)).unwrap();
+    let mut random = Pcg64::seed_from_u64(6);
+    let noisy: Vec<f64> =
+        rows.iter().map(|&r| all.values()[r as usize] + 0.7 * normal(&mut random)).collect();
+    let noisy = Measurements::from_differential(&rows, &noisy).unwrap();
+    let noise =
+        |noise| omp(&noisy, &OmpSettings { noise, ..OmpSettings::default() }).unwrap().noise;
+    let (known, estimated) = (noise(NoiseLevel::Known(0.7)), noise(NoiseLevel::Estimated));
+    assert!((known - 0.7).abs() < 1e-6, "{known}");
+    assert!((0.5..1.0).contains(&estimated), "{estimated}");
+}
+
+#[test]
 fn darkness_reconstructs_to_darkness() {
     let part = measured(side(8), &[0.0; 64]).take(None, 0.5).unwrap();
     for settings in [OmpSettings::default(), OmpSettings::as_printed(Basis::Haar, 9)] {
@@ -274,4 +289,7 @@ fn frames_with_other_rows_start_from_scratch() {
     let found = omp_video(&frames, &OmpSettings::default()).unwrap();
     assert_eq!(found.iter().map(|f| f.warm).collect::<Vec<_>>(), [false, true, false, false]);
     assert_eq!(omp_video(&[], &OmpSettings::default()).unwrap(), []);
+    let dark = vec![measured(side(8), &[0.0; 64]); 3];
+    let found = omp_video(&dark, &OmpSettings::default()).unwrap();
+    assert_eq!(found.iter().map(|f| f.warm).collect::<Vec<_>>(), [false, true, true]);
 }

@@ -1,6 +1,9 @@
 //! Tests that batches of any size, on any vector width, give the same bits.
 
 use super::*;
+use crate::omp::batch::solve_batch_with;
+use crate::omp::path::Path;
+use crate::omp::referee::Referee;
 use pulp::Arch;
 
 fn frames<T: Scalar>(problem: &Problem, count: usize) -> Vec<T> {
@@ -89,4 +92,37 @@ fn widths() -> Vec<Arch> {
     #[cfg(not(target_arch = "x86_64"))]
     let narrower = None;
     [Some(Arch::new()), narrower].into_iter().flatten().collect()
+}
+
+/// Takes the atom of its own number wherever it is asked, and is always asked.
+struct Favourite(usize);
+
+impl Referee<f32> for Favourite {
+    fn believed(&self) -> f64 {
+        f64::INFINITY
+    }
+
+    fn choose(&mut self, _: &Path<f32>, rivals: &[usize]) -> usize {
+        assert!(rivals.contains(&self.0), "{} is none of {rivals:?}", self.0);
+        self.0
+    }
+}
+
+#[test]
+fn each_frame_of_a_batch_has_a_referee_of_its_own() {
+    let problem = problem(Kind::Noisy, 48, 150, 6, 2);
+    let (dictionary, _) = dense::<f32>(&problem);
+    let limits = Limits::atoms(1);
+    let batch = super::super::Problem { dictionary: &dictionary, limits };
+    let y = frames::<f32>(&problem, 50);
+    let paths = solve_batch_with(&batch, &y, Favourite).unwrap();
+    let chosen: Vec<usize> = paths.iter().map(|path| path.support[0]).collect();
+    assert_eq!(chosen, (0..50).collect::<Vec<_>>());
+    // Frames without a referee take the atom with the largest score.
+    let some = |frame| (frame % 3 == 0).then_some(Favourite(frame));
+    let best = solve_batch(&batch, &y, Backend::Cpu).unwrap();
+    for (frame, path) in solve_batch_with(&batch, &y, some).unwrap().iter().enumerate() {
+        let expected = if frame % 3 == 0 { frame } else { best[frame].support[0] };
+        assert_eq!(path.support, [expected], "frame {frame}");
+    }
 }

@@ -108,3 +108,52 @@ fn a_start_spares_choices_in_a_video_and_keeps_to_the_laws() {
     let found = solver.solve_from(&y, &[0, 7, 9, 9]).unwrap();
     assert_eq!((found.support[0], found.support.len()), (9, 3));
 }
+
+#[test]
+fn a_power_of_two_in_the_measurement_is_one_in_the_coefficients_and_changes_nothing_else() {
+    fn scaled<T: Scalar>(gain: f64) {
+        let problem = problem(Kind::Noisy, 48, 150, 6, 2);
+        let (dictionary, y) = dense::<T>(&problem);
+        let other: Vec<T> = y.iter().map(|&y| T::from_f64(y.into() * gain)).collect();
+        let mut solver = Solver::new(&dictionary, &Limits::atoms(20)).unwrap();
+        let (one, two) = (solver.solve(&y).unwrap(), solver.solve(&other).unwrap());
+        assert_eq!(one.support, two.support);
+        assert_eq!(one.residual_norms, two.residual_norms);
+        assert_eq!(one.least_lead, two.least_lead);
+        let coefficients: Vec<f64> = one.coefficients(20).iter().map(|c| c * gain).collect();
+        assert_eq!(coefficients, two.coefficients(20));
+        // The same in the atoms, and in the reference.
+        let small = 2_f64.powi(if gain < 1.0 { -20 } else { 20 });
+        let atoms = Problem { dictionary: &problem.dictionary * small, ..problem };
+        let (dictionary, y) = dense::<T>(&atoms);
+        let three = Solver::new(&dictionary, &Limits::atoms(20)).unwrap().solve(&y).unwrap();
+        let coefficients: Vec<f64> = one.coefficients(20).iter().map(|c| c / small).collect();
+        assert_eq!(coefficients, three.coefficients(20));
+        assert_eq!((three.support, three.residual_norms), (one.support, one.residual_norms));
+        let exact = solve_exactly(&atoms, &Limits::atoms(20));
+        let light = Problem { y: atoms.y.iter().map(|y| y * gain).collect(), ..atoms };
+        let scaled: Vec<f64> = exact.coefficients.iter().map(|c| c * gain).collect();
+        let other = solve_exactly(&light, &Limits::atoms(20));
+        assert_eq!((other.support, other.coefficients), (exact.support, scaled));
+        assert_eq!((exact.unseen, exact.stop), (vec![], Stop::Sparsity));
+    }
+    for power in [-40, 40] {
+        scaled::<f32>(2_f64.powi(power));
+        scaled::<f64>(2_f64.powi(power));
+    }
+}
+
+#[test]
+fn the_least_lead_is_that_of_the_closest_choice_and_relative_to_the_measurement() {
+    let dictionary = DenseDictionary::new(&DMatrix::<f64>::identity(4, 4));
+    let mut solver = Solver::new(&dictionary, &Limits::atoms(2)).unwrap();
+    let found = solver.solve(&[8.0, 3.0, 2.0, 2.0]).unwrap();
+    assert_eq!(found.support, [0, 1]);
+    assert!((found.least_lead - 1.0 / 9.0).abs() < 1e-12, "{}", found.least_lead);
+}
+
+#[test]
+fn the_bound_of_the_error_is_the_stated_one() {
+    let bound = error_bound::<f64>(10, 3.0) / f64::EPSILON;
+    assert_eq!((bound, error_bound::<f32>(1, 2.0)), (120.0, 32.0 * f64::from(f32::EPSILON)));
+}

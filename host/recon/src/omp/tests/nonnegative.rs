@@ -58,11 +58,41 @@ proptest! {
             .map(|count| {
                 let found = nonnegative::solve(&dictionary, &y, &Limits::atoms(count)).unwrap();
                 assert!(found.support.len() <= count);
+                // However many atoms were given back, the search went on.
+                assert_eq!(found.stop == Stop::Sparsity, found.support.len() == count);
                 *found.residual_norms.last().unwrap()
             })
             .collect();
         prop_assert!(left.is_sorted_by(|a, b| a + 1e-9 >= *b), "{:?}", left);
     }
+}
+
+#[test]
+fn units_do_not_matter_and_of_equal_atoms_the_lowest_is_taken() {
+    let matrix = DMatrix::from_row_slice(3, 3, &[1.0, 0.2, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]);
+    let y = [1.0, 2.0, 2.0];
+    let solve = |gain: f64, light: f64, atoms| {
+        let y = y.map(|y| y * light);
+        let dictionary = DenseDictionary::new(&(&matrix * gain));
+        nonnegative::solve(&dictionary, &y, &Limits::atoms(atoms)).unwrap()
+    };
+    let found = solve(1.0, 1.0, 3);
+    assert_eq!(found.support, [1, 2, 0]);
+    for (gain, light) in [(1e-7, 1.0), (1e7, 1.0), (1.0, 1e-15), (1.0, 1e15)] {
+        let other = solve(gain, light, 3);
+        assert_eq!(other.support, found.support, "patterns {gain}, light {light}");
+        for (a, b) in found.coefficients.iter().zip(&other.coefficients) {
+            assert!((b * gain / light - a).abs() < 1e-9, "patterns {gain}, light {light}: {b}");
+        }
+    }
+    let equal = nonnegative::solve(
+        &DenseDictionary::new(&DMatrix::<f64>::identity(3, 3)),
+        &[1.0, 2.0, 2.0],
+        &Limits::atoms(1),
+    );
+    assert_eq!(equal.unwrap().support, [1]);
+    let none = solve(1.0, 1.0, 0);
+    assert_eq!((none.stop, none.support.len()), (Stop::Sparsity, 0));
 }
 
 #[test]

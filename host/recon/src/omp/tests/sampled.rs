@@ -3,7 +3,7 @@
 use super::{Problem, agreeing};
 use crate::basis::{Basis, Transform};
 use crate::omp::sampled::{Prior, SampledHadamard};
-use crate::omp::{Dictionary, Limits, Solver, padded, reference};
+use crate::omp::{self, Backend, Dictionary, Limits, Solver, padded, reference};
 use crate::testing::{normal, side};
 use crate::{Order, fwht};
 use nalgebra::DMatrix;
@@ -75,6 +75,7 @@ proptest! {
         prop_assert_eq!(&path.unseen, &exact.unseen);
         let problem = Problem { recipe: String::new(), dictionary, y, sparse: vec![] };
         let same = agreeing(&problem, &exact, &path, 1e-5);
+        prop_assert_eq!(exact.support.is_empty(), path.support.is_empty());
         if same == exact.support.len() && same == path.support.len() {
             for (a, b) in exact.coefficients.iter().zip(&path.coefficients) {
                 prop_assert!((a - b).abs() < 1e-3 * a.abs().max(1.0), "{} and {}", a, b);
@@ -99,4 +100,43 @@ fn dct_atoms_that_a_random_half_does_not_see_are_left_out() {
     assert_eq!(found.unseen, missed);
     assert!(found.coefficients.iter().all(|c| c.is_finite()));
     assert!(found.support.iter().all(|k| !missed.contains(k)));
+}
+
+#[test]
+fn cosines_are_projected_as_by_transforms_on_every_side() {
+    for n in [2, 4, 8, 16, 32, 64] {
+        let side = side(n);
+        let rows = Order::Random(2).rows(side).unwrap().first(side.area() / 2);
+        let transform = Transform::new(Basis::Dct, side);
+        let prior = Prior::none(side.area());
+        let dictionary = SampledHadamard::new(&transform, &rows, &prior);
+        let y: Vec<f32> = (0..rows.len()).map(|m| (1.0 + m as f32).sin()).collect();
+        let mut found = vec![9.0; padded(side.area())];
+        dictionary.project(&y, &mut found);
+        let mut grid = vec![0.0; side.area()];
+        rows.iter().zip(&y).for_each(|(&row, &y)| grid[row as usize] = y / n as f32);
+        fwht::transform(&mut grid);
+        transform.analyse(&mut grid);
+        for (atom, (a, b)) in found.iter().zip(&grid).enumerate() {
+            assert!((a - b).abs() < 1e-5, "atom {atom} of {n} x {n}: {a} and {b}");
+        }
+        assert!(found[side.area()..].iter().all(|&p| p == 0.0), "{n} x {n}");
+    }
+}
+
+#[test]
+fn a_batch_over_fast_transforms_is_a_loop() {
+    let side = side(16);
+    let rows = Order::Random(1).rows(side).unwrap().first(100);
+    let transform = Transform::new(Basis::Dct, side);
+    let prior = Prior::none(256);
+    let dictionary = SampledHadamard::new(&transform, &rows, &prior);
+    let limits = Limits::atoms(5);
+    let y: Vec<f32> = (0..100 * 7).map(|m| (m as f32).sin()).collect();
+    let batch = omp::Problem { dictionary: &dictionary, limits };
+    let together = omp::solve_batch(&batch, &y, Backend::Cpu).unwrap();
+    let mut solver = Solver::new(&dictionary, &limits).unwrap();
+    for (y, found) in y.chunks_exact(100).zip(&together) {
+        assert_eq!(&solver.solve(y).unwrap().solution(), found);
+    }
 }

@@ -12,12 +12,13 @@ fn frames(count: usize) -> (DenseDictionary<f32>, Vec<Vec<f32>>) {
 
 #[test]
 fn atoms_taken_over_with_their_columns_are_those_taken_over_without_to_the_bit() {
-    let (dictionary, frames) = frames(6);
+    let (dictionary, frames) = frames(7);
     let limits = Limits::atoms(16);
     let mut keeping = Solver::new(&dictionary, &limits).unwrap();
     let mut start = Vec::new();
-    // More atoms, fewer, none, and others than those whose columns the solver has.
-    for (y, kept) in frames.iter().zip([12, 16, 5, 0, 12, 16]) {
+    // More atoms, fewer, none, in another order, and others than those whose columns the solver
+    // has.
+    for (y, kept) in frames.iter().zip([12, 16, 5, 7, 0, 12, 16]) {
         let mut forgetful = Solver::new(&dictionary, &limits).unwrap();
         let found = keeping.solve_from(y, &start).unwrap();
         let fresh = forgetful.solve_from(y, &start).unwrap();
@@ -29,6 +30,9 @@ fn atoms_taken_over_with_their_columns_are_those_taken_over_without_to_the_bit()
         start.truncate(kept);
         if kept == 5 {
             start.swap(1, 3);
+        }
+        if kept == 7 {
+            start.reverse();
         }
     }
 }

@@ -16,6 +16,24 @@ fn words_are_read_as_they_are_written_and_stand_once() {
     assert!(error.starts_with("unknown method \"svd\", expected hadamard, omp, "), "{error}");
     assert!(error.ends_with(", tv or prior"), "{error}");
     assert_eq!(Method::default().argument(), "tikhonov");
+    assert_eq!(format!("{:?}", Method::OMP), "Method(omp)");
+    for completion in Completion::ALL {
+        assert_eq!(completion.name().parse(), Ok(completion));
+    }
+    let error = "dense".parse::<Completion>().unwrap_err().to_string();
+    assert_eq!(error, "unknown completion \"dense\", expected measured or sparse");
+}
+
+#[test]
+fn a_users_own_patterns_have_the_method_of_the_same_name() {
+    use reconstruct::Penalty::{Sparse, Tikhonov, TotalVariation};
+    let with = |word: &str| word.parse::<Method>().unwrap().with_matrix();
+    assert_eq!(with("omp"), Some(MatrixMethod::Omp));
+    assert_eq!(with("pseudo-inverse"), Some(MatrixMethod::PseudoInverse));
+    for (word, penalty) in [("tikhonov", Tikhonov), ("fista", Sparse), ("tv", TotalVariation)] {
+        assert_eq!(with(word), Some(MatrixMethod::Penalty(penalty)));
+    }
+    assert_eq!((with("hadamard"), with("prior")), (None, None));
 }
 
 #[test]
@@ -48,6 +66,18 @@ fn a_prepared_method_makes_the_image_of_the_function_that_it_wraps() {
     ] {
         let settings = reconstruct::RegularisedSettings::new(penalty);
         assert_eq!(image(word), reconstruct::regularised(&part, &settings).unwrap().image);
+        let (basis, strength) = (Basis::Haar, Strength::Fixed(0.2));
+        let completion = Completion::Sparse;
+        let asked = MethodSettings {
+            basis,
+            strength,
+            completion: Some(completion),
+            ..MethodSettings::default()
+        };
+        let method: Method = word.parse().unwrap();
+        let found = method.prepare(&asked).unwrap().reconstruct(&part).unwrap().image;
+        let settings = reconstruct::RegularisedSettings { basis, strength, completion, ..settings };
+        assert_eq!(found, reconstruct::regularised(&part, &settings).unwrap().image);
     }
 }
 

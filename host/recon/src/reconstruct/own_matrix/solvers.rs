@@ -92,7 +92,8 @@ pub(super) fn tikhonov(
         .collect()
 }
 
-/// FISTA. The first `free` coefficients have no penalty.
+/// FISTA. The first `free` coefficients have no penalty. The matrix may have any norm: atoms of a
+/// user's own share light, so their measurements can be larger than each atom's.
 pub(super) fn sparse(
     a: &DMatrix<f64>,
     y: &DVector<f64>,
@@ -100,6 +101,8 @@ pub(super) fn sparse(
     free: usize,
     strengths: &[f64],
 ) -> Vec<DVector<f64>> {
+    // A longer step than one over the squared norm diverges.
+    let step = norm(a).max(1.0).powi(-2);
     let mut c = DVector::<f64>::zeros(a.ncols());
     strengths
         .iter()
@@ -107,9 +110,9 @@ pub(super) fn sparse(
             let mut ahead = c.clone();
             let mut pace = 1.0_f64;
             for _ in 0..ITERATIONS {
-                let mut next = a.tr_mul(&(y - a * &ahead)) + &ahead;
+                let mut next = a.tr_mul(&(y - a * &ahead)) * step + &ahead;
                 for (j, v) in next.iter_mut().enumerate().skip(free) {
-                    let threshold = strength * std::f64::consts::SQRT_2 / scale[j];
+                    let threshold = step * strength * std::f64::consts::SQRT_2 / scale[j];
                     *v = v.signum() * (v.abs() - threshold).max(0.0);
                 }
                 let faster = 0.5 * (1.0 + (1.0 + 4.0 * pace * pace).sqrt());

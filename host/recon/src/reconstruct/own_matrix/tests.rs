@@ -148,6 +148,24 @@ fn atoms_of_ones_own_and_light_that_is_not_negative_work_with_a_matrix_too() {
     }
 }
 
+/// Wide spots measure up to 20 times what one of them measures, and a step of a descent that is
+/// right for cosines would overshoot further and further.
+#[test]
+fn atoms_of_ones_own_may_overlap_by_every_method() {
+    let (side, image) = (side(8), scene(side(8), 1));
+    let (own, y) = binary(side, 40, &image);
+    let near = |a: usize, b: usize| 0.7_f32.powi(a.abs_diff(b) as i32);
+    let spot = |at: usize, p: usize| near(at / 8, p / 8) * near(at % 8, p % 8);
+    let spots: Vec<f32> = (0..64 * 64).map(|at| spot(at / 64, at % 64)).collect();
+    let full = hadamard(&measured(side, &image));
+    for method in METHODS {
+        let settings = MatrixSettings { atoms: Some(spots.clone()), ..MatrixSettings::new(method) };
+        let found = own.reconstruct(&y, &settings).unwrap();
+        let correlation = correlation_of(&found.image, &full);
+        assert!(correlation > 0.7 && found.residual < 0.2, "{method:?}: {correlation}");
+    }
+}
+
 #[test]
 fn units_of_patterns_and_measurements_do_not_matter() {
     let (side, image) = (side(8), scene(side(8), 1));
@@ -186,6 +204,16 @@ fn what_is_wrong_with_a_matrix_is_named() {
     assert!(wrong.contains("1 measurements by 2 patterns"), "{wrong}");
     let wrong = own.reconstruct(&[1.0, f64::INFINITY], &sound).unwrap_err().to_string();
     assert!(wrong.contains("y is inf at [1, 0]"), "{wrong}");
+    let atoms = |count| MatrixSettings { atoms: Some(vec![1.0; count]), ..sound.clone() };
+    for count in [0, 6] {
+        let wrong = own.reconstruct(&[1.0, 1.0], &atoms(count)).unwrap_err();
+        assert_eq!(wrong, MatrixError::Shape { found: count, area: 4 });
+    }
+    for found in [0.0, -1.0, 1.1e6] {
+        let settings = MatrixSettings { strength: Some(found), ..sound.clone() };
+        let wrong = own.reconstruct(&[1.0, 1.0], &settings).unwrap_err().to_string();
+        assert!(wrong.ends_with("expected more than 0, at most 1e6"), "{wrong}");
+    }
     let settings = MatrixSettings { non_negative: true, ..sound };
     let wrong = own.reconstruct(&[1.0, 1.0], &settings).unwrap_err();
     assert_eq!(wrong, MatrixError::Signed { basis: Basis::Dct });

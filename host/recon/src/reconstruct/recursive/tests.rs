@@ -224,6 +224,17 @@ fn frames_without_light_of_another_side_and_out_of_range_are_no_trouble() {
     }
 }
 
+#[test]
+fn the_residual_is_what_an_image_misses_of_the_readings() {
+    let rows = Rows::natural(side(2));
+    let image = Image::new(side(2), vec![1.0, 2.0, 3.0, 4.0]);
+    // The rows of the image are 10, -2, -4 and 0.
+    let of =
+        |values: [f64; 4]| residual(&image, &Measurements::trusted(rows.clone(), values.into()));
+    assert_eq!((of([10.0, -2.0, -4.0, 0.0]), of([0.0; 4])), (0.0, 0.0));
+    assert!((of([10.0, -2.0, -4.0, 3.0]) - 3.0 / 129.0_f64.sqrt()).abs() < 1e-9);
+}
+
 /// A method whose image is that of the measured rows, and of zeros elsewhere.
 struct ZeroFilled;
 
