@@ -240,6 +240,14 @@ fn settings_that_make_no_sense_are_named() {
     assert!(refused(OmpSettings { noise, ..sound }).starts_with("noise is -0.5"));
     let sparsity = Sparsity::CrossValidated { most: 5, folds: 1 };
     assert!(refused(OmpSettings { sparsity, ..sound }).starts_with("folds is 1"));
+    let noise = NoiseLevel::Known(f64::INFINITY);
+    assert!(refused(OmpSettings { noise, ..sound }).starts_with("noise is inf"));
+    assert!(refused(OmpSettings { falloff: 8.1, ..sound }).starts_with("falloff is 8.1"));
+    assert!(refused(OmpSettings { visibility: -0.1, ..sound }).starts_with("visibility is -0.1"));
+    let sparsity = Sparsity::CrossValidated { most: 5, folds: 2 };
+    let (falloff, visibility, noise) = (8.0, 0.0, NoiseLevel::Known(0.0));
+    let last = OmpSettings { falloff, visibility, noise, sparsity, ..sound };
+    assert_eq!(last.check(), Ok(()));
 }
 
 /// Frames with noise: a square stands still, moves, and is replaced by a bar.

@@ -128,6 +128,9 @@ fn settings_that_make_no_sense_are_named() {
     assert!(refused(none).starts_with("iterations is 0"));
     let folds = Strength::CrossValidated { folds: 1 };
     assert!(refused(RegularisedSettings { strength: folds, ..sound }).starts_with("folds is 1"));
+    for strength in [Strength::CrossValidated { folds: 2 }, Strength::Fixed(1e6)] {
+        assert_eq!(RegularisedSettings { strength, ..sound }.check(), Ok(()));
+    }
     let falloff = RegularisedSettings { falloff: -1.0, ..sound };
     assert!(refused(falloff).starts_with("falloff is -1"));
 }
