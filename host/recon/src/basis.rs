@@ -342,5 +342,7 @@ mod tests {
             assert_eq!(basis.to_string().parse(), Ok(basis));
         }
         assert_eq!("DCT".parse::<Basis>(), Err(ParseBasisError { found: "DCT".into() }));
+        let error = "DCT".parse::<Basis>().unwrap_err().to_string();
+        assert_eq!(error, "unknown basis \"DCT\", expected pixel, dct, haar or daubechies4");
     }
 }

@@ -25,6 +25,18 @@ fn words_are_read_as_they_are_written_and_stand_once() {
 }
 
 #[test]
+fn methods_with_a_past_begin_a_video_with_it() {
+    for (word, has_a_past) in
+        [("tikhonov", true), ("fista", true), ("tv", true), ("prior", true), ("omp", false)]
+    {
+        let method: Method = word.parse().unwrap();
+        let ready = method.prepare(&MethodSettings::default()).unwrap();
+        assert_eq!(ready.begin_video().unwrap().is_some(), has_a_past, "{word}");
+        assert!(method.takes(Setting::WarmStart), "{word}");
+    }
+}
+
+#[test]
 fn a_users_own_patterns_have_the_method_of_the_same_name() {
     use reconstruct::Penalty::{Sparse, Tikhonov, TotalVariation};
     let with = |word: &str| word.parse::<Method>().unwrap().with_matrix();

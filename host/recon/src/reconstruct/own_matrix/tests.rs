@@ -35,6 +35,10 @@ fn the_pseudo_inverse_is_that_of_the_singular_values() {
         weights.copy_within(0..16, 32);
         let own = OwnMatrix::new(side, &weights).unwrap();
         assert_eq!(own.rank(), (rows - 1).min(16));
+        for unit in [1e-9, 1e9] {
+            let other: Vec<f64> = weights.iter().map(|w| w * unit).collect();
+            assert_eq!(OwnMatrix::new(side, &other).unwrap().rank(), own.rank(), "{unit}");
+        }
         let y: Vec<f64> = (0..rows).map(|_| normal(&mut random)).collect();
         let found = own.reconstruct(&y, &MatrixSettings::new(MatrixMethod::PseudoInverse)).unwrap();
         let inverse = own.patterns.clone().pseudo_inverse(1e-9).unwrap();

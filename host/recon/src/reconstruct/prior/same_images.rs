@@ -74,4 +74,5 @@ fn a_shared_network_is_itself_and_no_other() {
     let one = network();
     assert_eq!(one, one.clone());
     assert_ne!(one, network());
+    assert_eq!(format!("{one:?}"), "SharedNetwork(half)");
 }

@@ -89,3 +89,43 @@ fn deviation(values: impl Iterator<Item = f32>) -> Option<f32> {
     }
     Some(SIGMAS_PER_MEDIAN * *magnitudes.select_nth_unstable_by(middle, f32::total_cmp).1)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Order;
+    use crate::testing::{normal, side};
+    use rand::SeedableRng;
+    use rand_pcg::Pcg64;
+
+    /// Normal values for the lowest rows of an image, each with the deviation that its place has.
+    fn missed(count: usize, deviation_at: impl Fn(usize) -> f64) -> Missed {
+        let mut random = Pcg64::seed_from_u64(4);
+        let rows = Order::ZigZag.rows(side(32)).unwrap().first(count);
+        let values = (0..count).map(|at| (deviation_at(at) * normal(&mut random)) as f32);
+        Missed { values: values.collect(), rows: rows.to_vec() }
+    }
+
+    #[test]
+    fn few_rows_give_no_estimate_and_an_image_needs_more() {
+        let side = side(32);
+        assert_eq!(of_missed(side, missed(LEAST_ROWS - 1, |_| 0.01), 1.0), 1.0);
+        assert!(of_missed(side, missed(LEAST_ROWS, |_| 0.01), 1.0) < 0.03);
+        assert_eq!(of_missed(side, missed(1, |_| 0.01), 1.0), 1.0);
+        assert_eq!(in_pixels(side, &missed(LEAST_OF_A_PART - 1, |_| 0.3)), None);
+        let found = in_pixels(side, &missed(LEAST_OF_A_PART, |_| 0.3)).unwrap();
+        assert!((0.25..0.35).contains(&found), "{found}");
+    }
+
+    #[test]
+    fn the_part_of_the_rows_that_nothing_has_changed_in_tells_the_noise() {
+        // Coarse rows, fine rows, or those between.
+        for quiet in [0..150, 150..300, 450..600] {
+            let deviation_at = |at: usize| if quiet.contains(&at) { 0.1 } else { 5.0 };
+            let found = of_missed(side(32), missed(600, deviation_at), 10.0);
+            assert!((0.08..0.12).contains(&found), "{quiet:?}: {found}");
+        }
+        // An estimate that is hardly smaller changes nothing.
+        assert_eq!(of_missed(side(32), missed(600, |_| 0.9), 1.0), 1.0);
+    }
+}

@@ -283,3 +283,21 @@ fn a_past_that_misleads_a_method_is_not_believed_and_one_that_helps_is() {
         assert_eq!(past.belief.share(), 0.0);
     }
 }
+
+#[test]
+fn a_cut_ends_the_belief_in_the_scene_before() {
+    let side = side(32);
+    let rows = Rows::natural(side);
+    let mut past = Recursive::new(RecursiveSettings::default()).unwrap();
+    let mut shares = Vec::new();
+    for k in 0..9 {
+        let truth = if k < 7 { figure(side, 0, 0) } else { scene(side, 1) };
+        let frame = read(&rows, &truth, 0.05, 7 + k);
+        let made = believed_frame(&ZeroFilled, &mut past, &frame).unwrap();
+        shares.push(past.belief.share());
+        assert_eq!(made.report.note.is_some_and(|note| note.contains("another scene")), k == 7);
+    }
+    assert!(shares[6] > 0.3, "{shares:?}");
+    // The second frame of a scene is the first whose two images differ, and the third judges them.
+    assert_eq!(shares[7..], [0.0, 0.0]);
+}

@@ -51,8 +51,8 @@ fn frames_of_a_recursive_estimate_are_those_that_were_made() {
             ("default", base),
             ("still", RecursiveSettings { speed_px: Some(0.0), follow: false, ..base }),
             (
-                "speed 0.3, known noise",
-                RecursiveSettings { speed_px: Some(0.3), noise: known, ..base },
+                "speed 0.3, not followed, known noise",
+                RecursiveSettings { speed_px: Some(0.3), follow: false, noise: known, ..base },
             ),
             (
                 "strength 0.5, sparse",
