@@ -79,6 +79,22 @@ fn a_dark_level_under_single_readings_is_found_and_removed() {
 }
 
 #[test]
+fn a_dark_level_counts_from_four_standard_errors_on() {
+    let rows = natural(4);
+    let spread = |level: f64, by: f64| {
+        let mut values = [0.0; 16];
+        for (at, position) in order::positions_by_sequency(&rows).into_iter().enumerate() {
+            values[position] = level + if at % 2 == 0 { by } else { -by };
+        }
+        Measurements::from_differential(&rows, &values).unwrap().remove_dark_level()
+    };
+    // Of eight values that differ by 0.7, the standard error is 0.25.
+    assert_eq!(spread(2.0, 0.0), Some(2.0));
+    assert!(spread(1.1, 0.7).is_some_and(|level| (level - 1.1).abs() < 1e-12));
+    assert_eq!(spread(0.9, 0.7), None);
+}
+
+#[test]
 fn where_there_is_no_dark_level_nothing_is_changed() {
     let side = side(32);
     for kind in 0..5 {

@@ -11,6 +11,7 @@ fn words_are_read_as_they_are_written_and_stand_once() {
     for (at, method) in Method::ALL.iter().enumerate() {
         assert_eq!(method.to_string().parse(), Ok(*method));
         assert_eq!(Method::ALL.iter().position(|other| other == method), Some(at));
+        assert!(method.about().contains(' '), "{method}: {}", method.about());
     }
     let error = "svd".parse::<Method>().unwrap_err().to_string();
     assert!(error.starts_with("unknown method \"svd\", expected hadamard, omp, "), "{error}");

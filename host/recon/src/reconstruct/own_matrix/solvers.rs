@@ -138,10 +138,14 @@ pub(super) fn total_variation(
 ) -> Vec<DVector<f64>> {
     let n = side.pixels();
     let mut x = DVector::<f64>::zeros(side.area());
+    // No contrast to measure steps by: nothing was measured, or the mean alone.
+    if y.norm() == 0.0 {
+        return vec![x; strengths.len()];
+    }
     // The gradient has norm sqrt 8. Divided by it, both parts have norm 1, and steps of 1 / sqrt 2
     // converge.
     let gradient = 8.0_f64.sqrt();
-    let contrast = (y.norm() / (side.area() as f64).sqrt()).max(f64::MIN_POSITIVE);
+    let contrast = y.norm() / (side.area() as f64).sqrt();
     let (primal, dual) = (contrast / 2.0_f64.sqrt(), 1.0 / (contrast * 2.0_f64.sqrt()));
     let mut pull = DVector::<f64>::zeros(y.len());
     let (mut down, mut across) = (vec![0.0_f32; side.area()], vec![0.0_f32; side.area()]);

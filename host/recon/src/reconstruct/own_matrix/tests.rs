@@ -46,6 +46,12 @@ fn the_pseudo_inverse_is_that_of_the_singular_values() {
         for (a, b) in found.image.pixels().iter().zip(exact.iter()) {
             assert!((f64::from(*a) - b).abs() < 1e-5 * exact.norm(), "{rows} rows: {a} and {b}");
         }
+        let faint: Vec<f64> = y.iter().map(|y| y * 1e-12).collect();
+        let settings = MatrixSettings::new(MatrixMethod::PseudoInverse);
+        let faint = own.reconstruct(&faint, &settings).unwrap();
+        for (a, b) in faint.image.pixels().iter().zip(exact.iter()) {
+            assert!((f64::from(*a) * 1e12 - b).abs() < 1e-5 * exact.norm(), "{rows} rows: {a}");
+        }
     }
 }
 
@@ -81,6 +87,13 @@ fn orthogonal_patterns_of_any_norms_are_inverted_in_one_step() {
         let own = OwnMatrix::new(side, &weights).unwrap();
         assert!(own.orthogonal.is_some());
         assert_eq!(own.rank(), count);
+        for unit in [1e-6, 1e6] {
+            let mut other: Vec<f64> = weights.iter().map(|w| w * unit).collect();
+            assert!(OwnMatrix::new(side, &other).unwrap().orthogonal.is_some(), "{count}, {unit}");
+            other[3] *= 1.0 + 1e-4;
+            let orthogonal = OwnMatrix::new(side, &other).unwrap().orthogonal.is_some();
+            assert_eq!(orthogonal, count == 1, "{count}, {unit}");
+        }
         let y: Vec<f64> = (0..count).map(|_| normal(&mut random)).collect();
         let settings = MatrixSettings::new(MatrixMethod::PseudoInverse);
         let slow = OwnMatrix { orthogonal: None, ..own.clone() };
@@ -149,6 +162,22 @@ fn atoms_of_ones_own_and_light_that_is_not_negative_work_with_a_matrix_too() {
         let brightest = (0..64).max_by(|&a, &b| found.pixels()[a].total_cmp(&found.pixels()[b]));
         assert_eq!(brightest, Some(10));
         assert!((found.pixels()[10] - 2.0).abs() < 0.2 && (found.pixels()[37] - 1.0).abs() < 0.2);
+    }
+}
+
+#[test]
+fn darkness_and_the_fewest_patterns_have_an_image_by_every_method() {
+    let (side, image) = (side(4), scene(side(4), 1));
+    for count in 1..=5 {
+        let (own, y) = binary(side, count, &image);
+        for method in METHODS {
+            let settings = MatrixSettings::new(method);
+            let found = own.reconstruct(&y, &settings).unwrap();
+            assert!(found.image.pixels().iter().all(|p| p.is_finite()), "{count}, {method:?}");
+            let dark = own.reconstruct(&vec![0.0; count], &settings).unwrap();
+            assert!(dark.image.pixels().iter().all(|&p| p == 0.0), "{count}, {method:?}");
+            assert_eq!(dark.residual, 0.0, "{count}, {method:?}");
+        }
     }
 }
 

@@ -37,7 +37,7 @@ fn a_networks_images_are_those_that_it_made() {
     let mut table = Table::default();
     for (name, part) in parts() {
         let kind = if name == "blobs" || name == "in noise" { 1 } else { 2 };
-        for known in [0.3, 0.9, -2.0] {
+        for known in [0.3, 0.9, 3.0, -2.0] {
             let network = Half { truth: scene(side(16), kind), known };
             for completion in [None, Some(Completion::Measured), Some(Completion::Sparse)] {
                 let made = with_network(&part, Some(&network), completion, "half").unwrap();

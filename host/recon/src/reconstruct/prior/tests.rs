@@ -84,6 +84,10 @@ fn what_the_network_cannot_take_is_tikhonov_and_says_so() {
         assert_eq!(made.report.note, Some(format!("Tikhonov instead: {words}")));
         assert!(made.report.to_string().ends_with(words), "{}", made.report);
     }
+    // One pattern more than the fewest that are refused.
+    let least = ready(Oracle { truth: Some(scene(side(32), 1)), seed: 0 });
+    let made = least.reconstruct(&part(32, 40.0 / 1024.0)).unwrap();
+    assert!(!made.report.note.is_some_and(|note| note.contains("expected at least")));
     let alone = Method::PRIOR.prepare(&MethodSettings::default()).unwrap();
     let made = alone.reconstruct(&part(32, 0.3)).unwrap();
     assert!(made.report.to_string().ends_with("no network was given"), "{}", made.report);

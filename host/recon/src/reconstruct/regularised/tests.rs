@@ -117,6 +117,19 @@ fn measured_rows_are_kept_and_darkness_stays_dark() {
 }
 
 #[test]
+fn darkness_and_the_mean_alone_have_an_image_by_every_penalty() {
+    let dark = measured(side(8), &[0.0; 64]).take(None, 0.5).unwrap();
+    let mean = measured(side(8), &scene(side(8), 1)).take(Some(&Order::Natural), 1e-9).unwrap();
+    for penalty in ALL {
+        for (part, level) in [(&dark, 0.0), (&mean, mean.values()[0] / 64.0)] {
+            let found = regularised(part, &RegularisedSettings::new(penalty)).unwrap();
+            let even = |&pixel: &f32| (f64::from(pixel) - level).abs() < 1e-6;
+            assert!(found.image.pixels().iter().all(even), "{penalty:?}: {:?}", found.image);
+        }
+    }
+}
+
+#[test]
 fn settings_that_make_no_sense_are_named() {
     let part = measured(side(8), &scene(side(8), 0));
     let sound = RegularisedSettings::new(Penalty::Tikhonov);
