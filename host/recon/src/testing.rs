@@ -35,6 +35,45 @@ pub(crate) fn scene(side: Side, kind: u8) -> Vec<f64> {
         .collect()
 }
 
+/// The letter-like figure, moved by whole pixels.
+pub(crate) fn figure(side: Side, down: i64, right: i64) -> Vec<f64> {
+    let n = side.pixels() as i64;
+    let image = scene(side, 2);
+    let at = |r: i64, c: i64| image[(r.clamp(0, n - 1) * n + c.clamp(0, n - 1)) as usize];
+    (0..n * n).map(|p| at(p / n - down, p % n - right)).collect()
+}
+
+/// Measurements of a scene by some rows, each with normal noise of this deviation.
+pub(crate) fn noisy(rows: &Rows, scene: &[f64], sigma: f64, seed: u64) -> Measurements {
+    let mut d = scene.to_vec();
+    fwht(&mut d).unwrap();
+    let mut random = Pcg64::seed_from_u64(seed);
+    let values: Vec<f64> =
+        rows.iter().map(|&row| d[row as usize] + sigma * normal(&mut random)).collect();
+    Measurements::from_differential(rows, &values).unwrap()
+}
+
+/// Weights of patterns of zeros and ones, one after another, and their measurements of a scene with
+/// normal noise of this deviation.
+pub(crate) fn binary_patterns(
+    count: usize,
+    scene: &[f64],
+    sigma: f64,
+    seed: u64,
+) -> (Vec<f64>, Vec<f64>) {
+    let mut random = Pcg64::seed_from_u64(seed);
+    let weights: Vec<f64> =
+        (0..count * scene.len()).map(|_| f64::from(u8::from(random.random::<bool>()))).collect();
+    let y = weights
+        .chunks_exact(scene.len())
+        .map(|pattern| {
+            let light: f64 = pattern.iter().zip(scene).map(|(w, v)| w * v).sum();
+            light + sigma * normal(&mut random)
+        })
+        .collect();
+    (weights, y)
+}
+
 /// Readings of a perfect detector: pattern, complement, pattern, ...
 pub(crate) fn readings(side: Side, rows: &[u32], scene: &[f64]) -> Vec<f64> {
     let total: f64 = scene.iter().sum();

@@ -1,7 +1,7 @@
 //! Images and reports stay the same from one version to the next.
 //!
-//! The other tests state what an image must be worth; a change that makes every image a little
-//! worse passes them. Here each method makes images of fixed measurements, and sums over each image
+//! The other tests compare the quality of an image with a bound, and a change that makes every image
+//! slightly worse passes them. Here each method makes images of fixed measurements, and sums over each image
 //! are compared with those in `same_images/*.txt`. A change that is meant to make other images
 //! rewrites the tables with `NIRSPI_BLESS=1`, and its review sees by how much they differ.
 //!
@@ -15,27 +15,16 @@ mod penalties;
 mod video;
 
 use super::*;
-use crate::fwht as walsh;
-use crate::testing::{normal, scene, side};
-use rand::{RngExt, SeedableRng};
+use crate::testing::{noisy, normal, scene, side};
+use rand::SeedableRng;
 use rand_pcg::Pcg64;
 use std::fmt::Write;
-
-/// Measurements of a scene by some rows, with noise of this size.
-fn read(rows: &Rows, image: &[f64], noise: f64, seed: u64) -> Measurements {
-    let mut d = image.to_vec();
-    walsh(&mut d).unwrap();
-    let mut random = Pcg64::seed_from_u64(seed);
-    let values: Vec<f64> =
-        rows.iter().map(|&row| d[row as usize] + noise * normal(&mut random)).collect();
-    Measurements::from_differential(rows, &values).unwrap()
-}
 
 /// Scenes by a part of the patterns, with much noise and little.
 pub(super) fn parts() -> Vec<(&'static str, Measurements)> {
     let part = |n, kind, order: Order, count, noise| {
         let rows = order.rows(side(n)).unwrap().first(count);
-        read(&rows, &scene(side(n), kind), noise, count as u64)
+        noisy(&rows, &scene(side(n), kind), noise, count as u64)
     };
     vec![
         ("blobs", part(16, 1, Order::ZigZag, 80, 0.3)),
@@ -45,7 +34,7 @@ pub(super) fn parts() -> Vec<(&'static str, Measurements)> {
     ]
 }
 
-/// A line for a report, all but its words.
+/// The numbers of a report that the method has filled in.
 fn report(report: &Report) -> Vec<f64> {
     let numbers = [
         report.strength,

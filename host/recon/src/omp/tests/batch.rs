@@ -103,7 +103,7 @@ impl Referee<f32> for Favourite {
     }
 
     fn choose(&mut self, _: &Path<f32>, rivals: &[usize]) -> usize {
-        assert!(rivals.contains(&self.0), "{} is none of {rivals:?}", self.0);
+        assert!(rivals.contains(&self.0), "{} is not among {rivals:?}", self.0);
         self.0
     }
 }

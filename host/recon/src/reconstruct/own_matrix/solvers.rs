@@ -92,8 +92,8 @@ pub(super) fn tikhonov(
         .collect()
 }
 
-/// FISTA. The first `free` coefficients have no penalty. The matrix may have any norm: atoms of a
-/// user's own share light, so their measurements can be larger than each atom's.
+/// FISTA. The first `free` coefficients have no penalty. The matrix may have any norm: a user's own
+/// atoms may overlap, and then a sum of atoms has larger measurements than orthonormal atoms have.
 pub(super) fn sparse(
     a: &DMatrix<f64>,
     y: &DVector<f64>,
@@ -138,7 +138,7 @@ pub(super) fn total_variation(
 ) -> Vec<DVector<f64>> {
     let n = side.pixels();
     let mut x = DVector::<f64>::zeros(side.area());
-    // No contrast to measure steps by: nothing was measured, or the mean alone.
+    // Steps are proportional to the contrast, and there is none: the image is dark or even.
     if y.norm() == 0.0 {
         return vec![x; strengths.len()];
     }

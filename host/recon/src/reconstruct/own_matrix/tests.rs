@@ -1,7 +1,6 @@
 use super::*;
 use crate::reconstruct::hadamard;
-use crate::testing::{correlation_of, measured, normal, scene, side};
-use rand::RngExt;
+use crate::testing::{binary_patterns, correlation_of, measured, normal, scene, side};
 
 const METHODS: [MatrixMethod; 5] = [
     MatrixMethod::PseudoInverse,
@@ -13,15 +12,7 @@ const METHODS: [MatrixMethod; 5] = [
 
 /// Patterns of zeros and ones, and their measurements of an image, with some noise.
 fn binary(side: Side, patterns: usize, image: &[f64]) -> (OwnMatrix, Vec<f64>) {
-    let mut random = Pcg64::seed_from_u64(3);
-    let mut weights = Vec::new();
-    for _ in 0..patterns * side.area() {
-        weights.push(if random.random::<bool>() { 1.0 } else { 0.0 });
-    }
-    let y = weights
-        .chunks_exact(side.area())
-        .map(|p| p.iter().zip(image).map(|(w, v)| w * v).sum::<f64>() + 0.05 * normal(&mut random))
-        .collect();
+    let (weights, y) = binary_patterns(patterns, image, 0.05, 3);
     (OwnMatrix::new(side, &weights).unwrap(), y)
 }
 

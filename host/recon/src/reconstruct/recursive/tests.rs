@@ -1,9 +1,7 @@
 use super::*;
-use crate::testing::{normal, scene, side};
+use crate::testing::{figure, noisy, scene, side};
 use crate::{Order, Rows};
 use proptest::prelude::*;
-use rand::SeedableRng;
-use rand_pcg::Pcg64;
 
 /// The rows of a frame: the first of zig-zag order always, the others in turn.
 fn rows_of(side: Side, frame: usize, always: usize, of_others: usize) -> Rows {
@@ -13,28 +11,14 @@ fn rows_of(side: Side, frame: usize, always: usize, of_others: usize) -> Rows {
     Rows::trusted(side, (0..always).chain(others).map(|at| order[at]).collect())
 }
 
-/// Readings of an image by some rows, with noise of a pixel of the image of all patterns.
+/// Measurements of an image by some rows, with noise of a pixel of the image of all patterns.
 fn read(rows: &Rows, image: &[f64], noise: f64, seed: u64) -> Measurements {
-    let mut d = image.to_vec();
-    fwht::transform(&mut d);
-    let n = rows.side().pixels() as f64;
-    let mut random = Pcg64::seed_from_u64(seed);
-    let values =
-        rows.iter().map(|&row| d[row as usize] + n * noise * normal(&mut random)).collect();
-    Measurements::trusted(rows.clone(), values)
+    noisy(rows, image, rows.side().pixels() as f64 * noise, seed)
 }
 
 fn rms(image: &Image, truth: &[f64]) -> f64 {
     let squares = image.pixels().iter().zip(truth).map(|(a, b)| (f64::from(*a) - b).powi(2));
     (squares.sum::<f64>() / truth.len() as f64).sqrt()
-}
-
-/// A letter-like figure, moved by whole pixels.
-fn figure(side: Side, down: i64, right: i64) -> Vec<f64> {
-    let n = side.pixels() as i64;
-    let image = scene(side, 2);
-    let at = |r: i64, c: i64| image[(r.clamp(0, n - 1) * n + c.clamp(0, n - 1)) as usize];
-    (0..n * n).map(|p| at(p / n - down, p % n - right)).collect()
 }
 
 fn estimate(settings: RecursiveSettings, frames: &[Measurements]) -> Vec<RecursiveFrame> {

@@ -1,21 +1,7 @@
 //! Reconstruction from a user's own patterns.
 
 use super::*;
-
-/// Patterns of zeros and ones, and measurements of an image with noise.
-fn binary(count: usize, image: &[f64], noise: f64) -> (OwnMatrix, Vec<f64>) {
-    let mut random = Pcg64::seed_from_u64(count as u64);
-    let weights: Vec<f64> =
-        (0..count * 64).map(|_| f64::from(u8::from(random.random::<bool>()))).collect();
-    let y = weights
-        .chunks_exact(64)
-        .map(|pattern| {
-            let light: f64 = pattern.iter().zip(image).map(|(w, v)| w * v).sum();
-            light + noise * normal(&mut random)
-        })
-        .collect();
-    (OwnMatrix::new(side(8), &weights).unwrap(), y)
-}
+use crate::testing::binary_patterns;
 
 #[test]
 fn own_patterns_make_the_images_that_they_made() {
@@ -28,7 +14,8 @@ fn own_patterns_make_the_images_that_they_made() {
         })
         .collect();
     for (kind, count, noise) in [(1, 40, 0.05), (2, 25, 0.01), (1, 90, 0.5)] {
-        let (own, y) = binary(count, &scene(side(8), kind), noise);
+        let (weights, y) = binary_patterns(count, &scene(side(8), kind), noise, count as u64);
+        let own = OwnMatrix::new(side(8), &weights).unwrap();
         for (method, name) in [
             (MatrixMethod::PseudoInverse, "pseudo-inverse"),
             (MatrixMethod::Penalty(Penalty::Tikhonov), "Tikhonov"),

@@ -68,7 +68,7 @@ fn frames_of_a_video_by_omp_are_those_that_were_made() {
     let mut table = Table::default();
     let rows = Order::CakeCutting.rows(side(16)).unwrap().first(90);
     let frames: Vec<Measurements> = (0..6)
-        .map(|k| read(&rows, &scene(side(16), if k < 4 { 2 } else { 1 }), 0.4, 5 + k))
+        .map(|k| noisy(&rows, &scene(side(16), if k < 4 { 2 } else { 1 }), 0.4, 5 + k))
         .collect();
     for (what, settings) in settings() {
         for (k, frame) in omp_video(&frames, &settings).unwrap().iter().enumerate() {

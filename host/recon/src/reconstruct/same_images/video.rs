@@ -1,14 +1,7 @@
 //! The recursive estimate of a moving scene.
 
 use super::*;
-
-/// A letter-like figure that has moved by whole pixels.
-fn figure(side: Side, down: i64, right: i64) -> Vec<f64> {
-    let n = side.pixels() as i64;
-    let image = scene(side, 2);
-    let at = |r: i64, c: i64| image[(r.clamp(0, n - 1) * n + c.clamp(0, n - 1)) as usize];
-    (0..n * n).map(|p| at(p / n - down, p % n - right)).collect()
-}
+use crate::testing::figure;
 
 /// Frames of some rows each, in turn: a figure moves, then stands, a part of it changes, and at
 /// last another scene comes.
@@ -27,7 +20,7 @@ fn frames(n: u64, always: usize, turns: usize, noise: f64) -> Vec<Measurements> 
         }
         let others = (always..side.area()).filter(|at| at % turns == k % turns);
         let rows = (0..always).chain(others).map(|at| order[at]);
-        read(&Rows::new(side, rows).unwrap(), &truth, noise, k as u64)
+        noisy(&Rows::new(side, rows).unwrap(), &truth, noise, k as u64)
     };
     (0..10).map(frame).collect()
 }
