@@ -11,6 +11,7 @@ use cubecl::reader::read_sync;
 use cubecl::server::Handle;
 #[cfg(feature = "wgpu")]
 use cubecl::wgpu::WgpuRuntime;
+use half::f16;
 use std::fmt;
 use std::sync::Arc;
 use thiserror::Error;
@@ -114,6 +115,13 @@ pub fn open(gpu: &Gpu) -> Arc<dyn Kernels> {
         #[cfg(feature = "wgpu")]
         Gpu::Wgpu(found) => Arc::new(WgpuRuntime::client(&found.device)),
     }
+}
+
+/// A buffer with an even number of numbers in `f16`, two in each of its four-byte numbers.
+pub(crate) fn upload_halves<R: Runtime>(client: &ComputeClient<R>, numbers: &[f16]) -> Buffer {
+    assert!(numbers.len().is_multiple_of(2));
+    let handle = client.create_from_slice(f16::as_bytes(numbers));
+    Buffer { handle, count: numbers.len() / 2 }
 }
 
 impl<R: Runtime> Engine for ComputeClient<R> {

@@ -12,16 +12,23 @@
 //! activation, residual, pixel shuffle) are done in registers before the output is stored. Fully
 //! connected layers are convolutions of 1 x 1 over images of one pixel.
 
+mod finish;
 mod kernels;
 pub mod plan;
+mod tensor;
+pub mod tiles;
 
-pub use kernels::{Activation, Add};
+pub use finish::{Activation, Add};
+pub use tensor::Product;
 
 use crate::Buffer;
-use crate::engine::Engine;
+use crate::engine::{Engine, upload_halves};
 use cubecl::prelude::*;
+use half::f16;
+use finish::Ending;
 use kernels::{ROWS, Shape, UNITS};
 use plan::{COLUMNS, DEPTH, Geometry, pixels_a_unit};
+use tiles::{Columns, Tiles};
 
 /// A convolution whose weights are on a device, in the order of its kernel.
 #[derive(Debug)]
@@ -32,6 +39,28 @@ pub struct Layer {
     pixels: Option<usize>,
     weights: Buffer,
     table: Buffer,
+    products: Option<Products>,
+}
+
+/// The weights of a convolution for products of small matrices.
+#[derive(Debug, Clone)]
+pub struct Products {
+    /// What multiplies.
+    pub product: Product,
+    /// Number of terms of each activation: 1, a number in `f16`, or 2, whose sum has 22 bits.
+    pub planes: usize,
+    /// The output channels of a workgroup.
+    pub columns: Columns,
+    /// Number of products below each other in a warp, 2 or 4; `None` for what suits the number of
+    /// frames.
+    pub down: Option<usize>,
+    /// The weights, by [`Convolve::narrow`]. For each workgroup's output channels, each step of
+    /// [`STEP`](tiles::STEP) input channels and each tap, there is a row for each output channel;
+    /// [`half_at`](tiles::half_at) says where each half of a row lies.
+    pub weights: Buffer,
+    /// One number, 0. It becomes 1 as soon as an activation is not a number of `f16`: the results
+    /// are worthless then.
+    pub beyond: Buffer,
 }
 
 impl Layer {
@@ -48,7 +77,7 @@ impl Layer {
         let outputs = geometry.outputs.next_multiple_of(COLUMNS * channels);
         assert!(weights.count() >= outputs * geometry.steps() * DEPTH);
         assert!(table.count() >= 2 * geometry.outputs);
-        Self { geometry, channels, pixels: None, weights, table }
+        Self { geometry, channels, pixels: None, weights, table, products: None }
     }
 
     /// The same layer with this number of pixels for each unit, 2 or 8. Otherwise the number of
@@ -58,16 +87,41 @@ impl Layer {
         Self { pixels: Some(pixels), ..self }
     }
 
+    /// The same layer by products of small matrices, for those images that fit its tiles.
+    ///
+    /// # Panics
+    /// If the lengths do not fit the geometry.
+    #[must_use]
+    pub fn with_products(self, products: Products) -> Self {
+        let Geometry { inputs, outputs, kernel, .. } = self.geometry;
+        assert!(inputs.is_multiple_of(8) && outputs.is_multiple_of(products.columns.channels()));
+        let weights = inputs.next_multiple_of(tiles::STEP) * outputs * kernel * kernel;
+        assert_eq!(products.weights.count(), weights / 2);
+        Self { products: Some(products), ..self }
+    }
+
     /// The sizes of the convolution.
     #[must_use]
     pub fn geometry(&self) -> &Geometry {
         &self.geometry
     }
 
+    /// Whether the layer has weights for products of small matrices.
+    #[must_use]
+    pub fn has_products(&self) -> bool {
+        self.products.is_some()
+    }
+
     /// Number of channels that a workgroup computes.
     fn tile(&self) -> usize {
         COLUMNS * self.channels
     }
+}
+
+/// Whether a number is one of `f16`, so that rounding to it changes nothing.
+#[must_use]
+pub fn is_f16(number: f32) -> bool {
+    f16::from_f32(number).to_f32() == number
 }
 
 /// What is done with the sums of a convolution before they are stored.
@@ -86,6 +140,8 @@ pub struct Finish<'a> {
     pub clamp: bool,
     /// Also store SiLU of the output.
     pub activated: bool,
+    /// Leave the tensor cores alone.
+    pub plain: bool,
 }
 
 impl Default for Finish<'_> {
@@ -97,6 +153,7 @@ impl Default for Finish<'_> {
             shuffle: false,
             clamp: false,
             activated: false,
+            plain: false,
         }
     }
 }
@@ -135,6 +192,11 @@ pub trait Convolve: Engine {
         side: usize,
         finish: Finish<'_>,
     ) -> Made;
+    /// Whether the device can compute this product.
+    fn has(&self, product: Product) -> bool;
+    /// A buffer with these weights, an even number of them, rounded to `f16`: two in each of its
+    /// four-byte numbers.
+    fn narrow(&self, weights: &[f32]) -> Buffer;
     /// `count` numbers of `images` from number `first` on, divided by `white` and clamped to
     /// [0, 1].
     fn readings(&self, images: &Buffer, first: usize, white: f32, count: usize) -> Buffer;
@@ -151,6 +213,60 @@ pub trait Convolve: Engine {
     /// blur and noise on the scale of the networks, within their bounds, and their squares. `scale`
     /// converts blur to the grid of the UNet.
     fn conditions(&self, estimates: &Buffer, bounds: &Bounds, scale: f32) -> Buffer;
+}
+
+/// The buffers of one convolution, except the layer's own.
+struct Run<'a> {
+    input: &'a Buffer,
+    film: &'a Buffer,
+    addend: &'a Buffer,
+    out: &'a Buffer,
+    activated: &'a Buffer,
+}
+
+/// Launches a convolution by products of small matrices. [`Convolve::convolve`] has checked the
+/// lengths of `run`.
+#[expect(unsafe_code, reason = "bounds checks would double the loads of the inner loop")]
+fn multiply<R: Runtime>(
+    client: &ComputeClient<R>,
+    layer: &Layer,
+    products: &Products,
+    run: &Run<'_>,
+    (frames, film_width, film_first): (usize, usize, usize),
+    (tiles, ending): (Tiles, Ending),
+) {
+    let Geometry { inputs, outputs, .. } = layer.geometry;
+    let shape = tensor::Shape { tiles, product: products.product, ending };
+    let columns = outputs / products.columns.channels();
+    // SAFETY: the kernel reads pixels inside `frames` images and weights of `columns` workgroups of
+    // channels, all of which the layer has, and writes pixels of `frames` images. Barriers are
+    // outside every branch.
+    unsafe {
+        tensor::convolve::launch_unchecked::<R>(
+            client,
+            cubes(tiles.groups(frames), columns),
+            CubeDim::new_1d(tiles.units() as u32),
+            products.product.width(),
+            run.input.arg(),
+            products.weights.arg(),
+            layer.table.arg(),
+            run.film.arg(),
+            run.addend.arg(),
+            run.out.arg(),
+            run.activated.arg(),
+            products.beyond.arg(),
+            frames as u32,
+            inputs as u32,
+            outputs as u32,
+            film_width as u32,
+            film_first as u32,
+            shape,
+        );
+    }
+}
+
+fn cubes(x: usize, y: usize) -> CubeCount {
+    CubeCount::Static(x as u32, y as u32, 1)
 }
 
 fn units() -> CubeDim {
@@ -198,19 +314,35 @@ impl<R: Runtime> Convolve for ComputeClient<R> {
             }
         };
         assert_eq!(finish.film.is_some(), finish.activation == Activation::FilmSilu);
-        let shape = Shape {
-            pixels: layer.pixels.unwrap_or_else(|| pixels_a_unit(pixels, tiles)),
-            channels: layer.channels,
+        let ending = Ending {
             activation: finish.activation,
             add,
             shuffle: finish.shuffle,
             clamp: finish.clamp,
             activated: finish.activated,
         };
-        let groups =
-            CubeCount::Static(pixels.div_ceil(ROWS * shape.pixels) as u32, tiles as u32, 1);
         let out = Engine::empty(self, count);
         let activated = Engine::empty(self, if finish.activated { count } else { 1 });
+        let addend = addend.unwrap_or(&layer.table);
+        let tiled = layer.products.as_ref().filter(|_| !finish.plain).and_then(|products| {
+            let Products { columns, planes, down, .. } = *products;
+            let limits = Engine::limits(self);
+            let tiles = Tiles::new(&geometry, columns, (frames, side), planes, &limits)?;
+            Some((products, down.map_or(tiles, |down| tiles.with_down(down, &limits))))
+        });
+        if let Some((products, tiles)) = tiled {
+            let run = Run { input, film, addend, out: &out, activated: &activated };
+            let sizes = (frames, film_width, film_first);
+            multiply(self, layer, products, &run, sizes, (tiles, ending));
+            return Made { out, activated: finish.activated.then_some(activated) };
+        }
+        let shape = Shape {
+            pixels: layer.pixels.unwrap_or_else(|| pixels_a_unit(pixels, tiles)),
+            channels: layer.channels,
+            ending,
+        };
+        let groups =
+            CubeCount::Static(pixels.div_ceil(ROWS * shape.pixels) as u32, tiles as u32, 1);
         // SAFETY: the kernel reads pixels inside `frames` images and weights of `tiles` tiles, and
         // writes pixels below `pixels` and channels below `outputs`. All these lengths are checked
         // above or by the layer; barriers are outside every branch.
@@ -223,7 +355,7 @@ impl<R: Runtime> Convolve for ComputeClient<R> {
                 layer.weights.arg(),
                 layer.table.arg(),
                 film.arg(),
-                addend.unwrap_or(&layer.table).arg(),
+                addend.arg(),
                 out.arg(),
                 activated.arg(),
                 pixels as u32,
@@ -240,6 +372,15 @@ impl<R: Runtime> Convolve for ComputeClient<R> {
             );
         }
         Made { out, activated: finish.activated.then_some(activated) }
+    }
+
+    fn has(&self, product: Product) -> bool {
+        product.is_on(self.features())
+    }
+
+    fn narrow(&self, weights: &[f32]) -> Buffer {
+        let rounded: Vec<f16> = weights.iter().map(|&weight| f16::from_f32(weight)).collect();
+        upload_halves(self, &rounded)
     }
 
     #[expect(unsafe_code, reason = "the kernel checks its one index itself")]

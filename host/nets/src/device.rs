@@ -5,8 +5,17 @@
 //! (`tests::a_gpu_that_is_missing_is_one_plain_line`). [`Backend::Auto`] takes a real GPU if there
 //! is one, and never a software device (`tests::the_cpu_and_auto_are_always_there`).
 
+mod arithmetic;
+
+pub use arithmetic::{Arithmetic, Note, ParseArithmeticError};
 pub use nirspi_recon::backend::{Backend, ParseBackendError};
 
+pub(crate) use arithmetic::Notes;
+
+#[cfg(feature = "gpu")]
+use crate::gpu::Multiplier;
+#[cfg(feature = "gpu")]
+use nirspi_gpu::network::Product;
 #[cfg(feature = "gpu")]
 use nirspi_gpu::{Gpu, Kernels};
 #[cfg(not(feature = "gpu"))]
@@ -32,6 +41,11 @@ pub struct DeviceError {
 pub struct Device {
     pub(crate) kind: Kind,
     name: String,
+    arithmetic: Arithmetic,
+    notes: Notes,
+    /// Multiplies in place of the tensor cores, in tests.
+    #[cfg(all(test, feature = "gpu"))]
+    pub(crate) product: Option<Product>,
 }
 
 #[derive(Debug, Clone)]
@@ -44,7 +58,69 @@ pub(crate) enum Kind {
 impl Device {
     /// The CPU, which is always available.
     pub fn cpu() -> Self {
-        Self { kind: Kind::Cpu, name: "CPU".to_owned() }
+        Self::of(Kind::Cpu, "CPU".to_owned())
+    }
+
+    fn of(kind: Kind, name: String) -> Self {
+        Self {
+            kind,
+            name,
+            arithmetic: Arithmetic::default(),
+            notes: Notes::default(),
+            #[cfg(all(test, feature = "gpu"))]
+            product: None,
+        }
+    }
+
+    /// The same device with this arithmetic. Where the device does not have it, networks compute in
+    /// [`Arithmetic::F32`], and [`notes`](Self::notes) say so.
+    #[must_use]
+    pub fn with_arithmetic(self, arithmetic: Arithmetic) -> Self {
+        if arithmetic == Arithmetic::F16 && !self.has_tensor_cores() {
+            self.notes.add(Note::NoTensorCores { device: self.name.clone() });
+            return self;
+        }
+        Self { arithmetic, ..self }
+    }
+
+    /// The arithmetic of the UNet's convolutions.
+    #[must_use]
+    pub fn arithmetic(&self) -> Arithmetic {
+        self.arithmetic
+    }
+
+    /// What the networks of this device did in another way than asked or expected since the last
+    /// call, each once. The results are right in any case.
+    #[must_use]
+    pub fn notes(&self) -> Vec<Note> {
+        self.notes.take()
+    }
+
+    #[cfg(not(feature = "gpu"))]
+    fn has_tensor_cores(&self) -> bool {
+        false
+    }
+
+    #[cfg(feature = "gpu")]
+    fn has_tensor_cores(&self) -> bool {
+        self.engine().is_some_and(|engine| self.product(engine.as_ref()).is_some())
+    }
+
+    /// What multiplies small matrices on this device.
+    #[cfg(feature = "gpu")]
+    fn product(&self, engine: &dyn Kernels) -> Option<Product> {
+        #[cfg(test)]
+        if self.product.is_some() {
+            return self.product;
+        }
+        engine.has(Product::TensorCores).then_some(Product::TensorCores)
+    }
+
+    /// The tensor cores of this device, if it has any.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn multiplier(&self, engine: &dyn Kernels) -> Option<Multiplier> {
+        let product = self.product(engine)?;
+        Some(Multiplier::new(engine, product, self.arithmetic, self.notes.clone()))
     }
 
     /// The device of a backend.
@@ -97,7 +173,7 @@ fn find(backend: Backend) -> Result<Device, String> {
     let found = probe::find(backend).map_err(|missing| missing.to_string())?;
     Ok(found.map_or_else(Device::cpu, |gpu| {
         let name = gpu.name().to_owned();
-        Device { kind: Kind::Gpu(gpu), name }
+        Device::of(Kind::Gpu(gpu), name)
     }))
 }
 

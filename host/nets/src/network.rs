@@ -52,7 +52,8 @@ impl Device {
     pub(crate) fn unet(&self, weights: &Weights) -> Result<Box<dyn RunUNet>, WeightsError> {
         #[cfg(feature = "gpu")]
         if let Some(engine) = self.engine() {
-            return Ok(Box::new(gpu::UNet::new(&engine, weights)?));
+            let multiplier = self.multiplier(engine.as_ref());
+            return Ok(Box::new(gpu::UNet::new(&engine, weights, multiplier)?.compared()));
         }
         Ok(Box::new(OnCpu(cpu::UNet::new(weights)?)))
     }

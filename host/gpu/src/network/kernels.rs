@@ -8,6 +8,7 @@
 // arguments.
 #![allow(clippy::too_many_arguments)]
 
+use super::finish::{Ending, store};
 use super::plan::{COLUMNS, DEPTH};
 use cubecl::prelude::*;
 
@@ -28,46 +29,7 @@ pub(super) struct Shape {
     pub pixels: usize,
     /// Number of channels of a unit: `column + COLUMNS * j`.
     pub channels: usize,
-    pub activation: Activation,
-    pub add: Add,
-    /// Whether channel `place * C + c` is stored as channel `c` of one of four pixels of an
-    /// enlarged image.
-    pub shuffle: bool,
-    /// Whether the output is clamped to [0, 1].
-    pub clamp: bool,
-    /// Whether SiLU of the output is stored in a second buffer.
-    pub activated: bool,
-}
-
-/// The activation of a sum, before anything is added.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Activation {
-    /// None.
-    Nothing,
-    /// x / (1 + e^-x).
-    Silu,
-    /// SiLU of x (1 + scale) + shift, where scale and shift come from the conditions of the frame.
-    FilmSilu,
-    /// PReLU with the slope of the channel; ReLU where the slope is 0.
-    Prelu,
-    /// ln(1 + e^x).
-    Softplus,
-}
-
-/// What is added after the activation.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Add {
-    /// Nothing.
-    Nothing,
-    /// One number for each output.
-    Alike,
-    /// One number for each pixel of the convolution, the same for all channels.
-    Pixel,
-}
-
-#[cube]
-fn silu(x: f32) -> f32 {
-    x / (1.0f32 + f32::exp(-x))
+    pub ending: Ending,
 }
 
 /// A convolution: pixels of all frames as rows, channels as columns, one workgroup for a tile of
@@ -194,49 +156,25 @@ pub(super) fn convolve(
     for i in 0..mine {
         let pixel = first_pixel + ROWS * i;
         if pixel < pixels {
-            let frame = pixel / (out_side * out_side);
             #[unroll]
             for j in 0..own {
                 let channel = first_channel + COLUMNS * j;
                 if channel < outputs {
-                    let mut value = sums[i * own + j] + table[channel];
-                    if comptime!(shape.activation == Activation::Silu) {
-                        value = silu(value);
-                    }
-                    if comptime!(shape.activation == Activation::FilmSilu) {
-                        let told = frame * film_width as usize + film_first as usize + channel;
-                        value = silu(value * (1.0f32 + film[told]) + film[told + outputs]);
-                    }
-                    if comptime!(shape.activation == Activation::Prelu) {
-                        value = max(value, 0.0f32) + table[outputs + channel] * min(value, 0.0f32);
-                    }
-                    if comptime!(shape.activation == Activation::Softplus) {
-                        value = max(value, 0.0f32) + f32::ln(1.0f32 + f32::exp(-f32::abs(value)));
-                    }
-                    let mut to = pixel * outputs + channel;
-                    if comptime!(shape.shuffle) {
-                        let within = pixel % (out_side * out_side);
-                        let y = within / out_side;
-                        let x = within % out_side;
-                        let channels = outputs / 4;
-                        let place = channel / channels;
-                        let line = (frame * out_side + y) * 2 + place / 2;
-                        to = (line * 2 * out_side + 2 * x + place % 2) * channels
-                            + channel % channels;
-                    }
-                    if comptime!(shape.add == Add::Alike) {
-                        value += addend[to];
-                    }
-                    if comptime!(shape.add == Add::Pixel) {
-                        value += addend[pixel];
-                    }
-                    if comptime!(shape.clamp) {
-                        value = min(max(value, 0.0f32), 1.0f32);
-                    }
-                    out[to] = value;
-                    if comptime!(shape.activated) {
-                        activated[to] = silu(value);
-                    }
+                    store(
+                        sums[i * own + j],
+                        pixel,
+                        channel,
+                        outputs,
+                        out_side,
+                        table,
+                        film,
+                        film_width as usize,
+                        film_first as usize,
+                        addend,
+                        out,
+                        activated,
+                        comptime!(shape.ending),
+                    );
                 }
             }
         }

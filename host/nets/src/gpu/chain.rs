@@ -12,7 +12,7 @@ use nirspi_gpu::network::Degraded;
 use nirspi_gpu::{Buffer, Kernels};
 use nirspi_recon::omp::gpu::DeviceImages;
 
-use super::{Estimator, Fsrcnn, UNet};
+use super::{Estimator, Fsrcnn, Multiplier, UNet};
 use crate::deblur::SIDE;
 use crate::enhance::KnownEstimate;
 use crate::estimate::Estimate;
@@ -37,13 +37,13 @@ impl Chain {
         engine: &Arc<dyn Kernels>,
         fsrcnn: &Weights,
         estimator: &Weights,
-        bridge: &Weights,
+        (bridge, multiplier): (&Weights, Option<Multiplier>),
     ) -> Result<Self, WeightsError> {
         Ok(Self {
             engine: Arc::clone(engine),
             fsrcnn: Fsrcnn::new(engine, fsrcnn)?,
             estimator: Estimator::new(engine, estimator)?,
-            unet: UNet::new(engine, bridge)?,
+            unet: UNet::new(engine, bridge, multiplier)?.compared(),
         })
     }
 
@@ -67,10 +67,11 @@ impl Chain {
         let grid = (SIDE / fusion::SIDE) as f32;
         let conditions = on.conditions(&outputs, &bounds, grid);
         let seen = Degraded::Coarse(&readings);
-        let sharp = self.unet.forward((frames, SIDE), &start, seen, &conditions, Some(&start));
-        let read = super::read(on, &[&readings, &outputs, &start, &sharp]);
-        let [readings, outputs, start, sharp] =
-            <[Vec<f32>; 4]>::try_from(read).unwrap_or_else(|_| unreachable!("four were asked for"));
+        let size = (frames, SIDE);
+        let [readings, outputs, start, sharp] = self.unet.read_after(|| {
+            let sharp = self.unet.forward(size, &start, seen, &conditions, Some(&start));
+            [readings.clone(), outputs.clone(), start.clone(), sharp]
+        });
         let estimates = outputs.as_chunks().0.iter();
         let estimates =
             estimates.map(|&two| known.over(Estimate::of_outputs(two, fusion::SIDE))).collect();

@@ -1,5 +1,6 @@
 //! Convolutions whose weights are on a device, from the tensors of a file.
 
+use super::multiplier::Multiplier;
 use super::pack::{self, Order};
 use crate::filter::Filter;
 use crate::weights::{Weights, WeightsError};
@@ -24,24 +25,36 @@ pub(super) fn layer(
     Layer::new(geometry, channels, engine.upload(&packed), engine.upload(&table))
 }
 
-/// The convolution with this name, with stride 1, which keeps the size of its input.
-pub(super) fn named(
-    engine: &dyn Kernels,
-    weights: &Weights,
-    name: &str,
-) -> Result<Layer, WeightsError> {
-    let filter = checked(weights, name, Filter::convolution(weights, name)?)?;
-    Ok(layer(engine, &filter, (1, filter.side / 2), None, Order::AsStored))
+/// Makes convolutions of the tensors of a file, on tensor cores if there is a `multiplier`.
+#[derive(Clone, Copy)]
+pub(super) struct Maker<'a> {
+    pub(super) engine: &'a dyn Kernels,
+    pub(super) weights: &'a Weights,
+    pub(super) multiplier: Option<&'a Multiplier>,
 }
 
-/// The convolution with this name, before a pixel shuffle.
-pub(super) fn shuffled(
-    engine: &dyn Kernels,
-    weights: &Weights,
-    name: &str,
-) -> Result<Layer, WeightsError> {
-    let filter = checked(weights, name, Filter::convolution(weights, name)?)?;
-    Ok(layer(engine, &filter, (1, filter.side / 2), None, Order::Shuffled))
+impl Maker<'_> {
+    /// The convolution with this name, with stride 1, which keeps the size of its input.
+    pub(super) fn same(&self, name: &str, order: Order) -> Result<Layer, WeightsError> {
+        let side = Filter::convolution(self.weights, name)?.side;
+        self.layer(name, (1, side / 2), order)
+    }
+
+    /// The convolution with this name, stride, and number of zeros around the image.
+    pub(super) fn layer(
+        &self,
+        name: &str,
+        reach: (usize, usize),
+        order: Order,
+    ) -> Result<Layer, WeightsError> {
+        let filter = Filter::convolution(self.weights, name)?;
+        let filter = checked(self.weights, name, filter)?;
+        let plain = layer(self.engine, &filter, reach, None, order);
+        Ok(match self.multiplier {
+            Some(multiplier) => multiplier.equip(self.engine, plain, &filter, order),
+            None => plain,
+        })
+    }
 }
 
 /// The fully connected layer with this name.

@@ -8,6 +8,7 @@
 //! |---|---|
 //! | `pack` | weights in the order in which the kernel reads them: pure functions |
 //! | `layer` | a convolution whose weights are on a device |
+//! | `multiplier` | tensor cores for the UNet |
 //! | `unet`, `fsrcnn`, `estimator` | the networks |
 //! | `chain` | the three networks one after another, for images that are already on the device |
 //!
@@ -17,6 +18,7 @@ mod chain;
 mod estimator;
 mod fsrcnn;
 mod layer;
+mod multiplier;
 mod pack;
 mod unet;
 
@@ -28,6 +30,7 @@ use nirspi_gpu::{Buffer, Kernels};
 pub(crate) use chain::Chain;
 pub(crate) use estimator::Estimator;
 pub(crate) use fsrcnn::Fsrcnn;
+pub(crate) use multiplier::Multiplier;
 pub(crate) use unet::UNet;
 
 /// The numbers of each buffer.

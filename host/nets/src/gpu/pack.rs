@@ -2,10 +2,14 @@
 //!
 //! A workgroup computes a tile of channels. For each tile, each tap and each group of [`DEPTH`]
 //! input channels, the weights of the whole tile stand side by side. Weights beyond the last input
-//! or output channel are zero.
+//! or output channel are zero. [`products`] has the order for tensor cores.
 
 use crate::filter::Filter;
 use nirspi_gpu::network::plan::DEPTH;
+use nirspi_gpu::network::tiles::{Columns, STEP, half_at};
+
+/// Number of input channels in half a row of the weights for products.
+const HALF: usize = STEP / 2;
 
 /// The order in which the kernel stores its output channels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,6 +50,28 @@ pub(super) fn weights(filter: &Filter, tile: usize, order: Order) -> Vec<f32> {
                         0.0
                     }
                 }));
+            }
+        }
+    }
+    packed
+}
+
+/// The weights for products of small matrices. For each workgroup's output channels, each step of
+/// [`STEP`] input channels and each tap, there is a row for each output channel, in two halves.
+pub(super) fn products(filter: &Filter, columns: Columns, order: Order) -> Vec<f32> {
+    let Filter { inputs, outputs, side, .. } = *filter;
+    let channels = columns.channels();
+    let block = side * side * channels * STEP;
+    let mut packed = vec![0.0; outputs / channels * inputs.div_ceil(STEP) * block];
+    let places = (0..outputs).step_by(channels);
+    let places = places.flat_map(|first| (0..inputs).step_by(STEP).map(move |from| (first, from)));
+    for (block, (first, from)) in packed.chunks_exact_mut(block).zip(places) {
+        for row in 0..side * side * channels {
+            let (tap, channel) = (row / channels, first + row % channels);
+            for k in 0..STEP.min(inputs - from) {
+                let at = half_at(row, k / HALF) * HALF + k % HALF;
+                let stored = order.stored(channel, outputs);
+                block[at] = filter.at(stored, from + k, tap / side, tap % side);
             }
         }
     }
@@ -117,6 +143,40 @@ mod tests {
             assert_eq!(ours.len(), expected.len());
             for (a, b) in ours.iter().zip(&expected) {
                 assert!((a - b).abs() < 1e-4, "{inputs} {outputs}: {a} {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn weights_for_products_are_the_convolution() {
+        for (inputs, outputs, kernel, stride, centre) in
+            [(48, 48, 3, 1, 1), (8, 96, 3, 1, 1), (16, 192, 1, 1, 0), (40, 32, 2, 2, 0)]
+        {
+            let filter = random_filter(inputs, outputs, kernel, 7);
+            let columns = Columns::of(outputs).unwrap();
+            let packed = products(&filter, columns, Order::AsStored);
+            let side = 6;
+            let image: Vec<f32> = random_filter(inputs, side * side, 1, 3).weights;
+            let expected = definition(&filter, (stride, centre), &image, side);
+            let out = (side + 2 * centre - kernel) / stride + 1;
+            let (channels, steps) = (columns.channels(), inputs.div_ceil(STEP));
+            let block = kernel * kernel * channels * STEP;
+            for (at, expected) in expected.iter().enumerate() {
+                let (pixel, output) = (at / outputs, at % outputs);
+                let mut sum = filter.bias[output];
+                for (tap, input) in
+                    (0..kernel * kernel).flat_map(|tap| (0..inputs).map(move |i| (tap, i)))
+                {
+                    let y = (pixel / out * stride + tap / kernel).wrapping_sub(centre);
+                    let x = (pixel % out * stride + tap % kernel).wrapping_sub(centre);
+                    if y < side && x < side {
+                        let first = (output / channels * steps + input / STEP) * block;
+                        let row = tap * channels + output % channels;
+                        let at = half_at(row, input % STEP / HALF) * HALF + input % HALF;
+                        sum += packed[first + at] * image[(y * side + x) * inputs + input];
+                    }
+                }
+                assert!((sum - expected).abs() < 1e-4, "{inputs} {outputs}: {sum} {expected}");
             }
         }
     }

@@ -3,12 +3,14 @@
 //! buffers are full of NaN before a kernel writes them, so a test notices each number that the kernel left
 //! unwritten.
 
+mod products;
+
 use std::sync::Arc;
 
 use nirspi_gpu::network::{Activation, Add, Degraded, Finish};
 use nirspi_gpu::{Buffer, Kernels};
 
-use super::layer;
+use super::layer::{self, Maker};
 use super::pack::Order;
 use crate::Known;
 use crate::cpu;
@@ -326,7 +328,7 @@ fn the_shipped_networks_give_what_the_processor_gives() {
                 );
             }
         };
-        let unet = super::UNet::new(&engine, &weights("diffusion")).unwrap();
+        let unet = super::UNet::new(&engine, &weights("diffusion"), None).unwrap();
         let [current, degraded] = [71, 73].map(|seed| positive(64 * 64, seed));
         let told = [0.5, 0.25, 0.4, 0.16, 0.3, 0.09];
         let theirs = cpu::UNet::new(&weights("diffusion")).unwrap();
@@ -358,7 +360,8 @@ fn a_layer_that_is_too_wide_is_refused_by_name() {
     };
     weights.insert("conv.weight".to_owned(), array(&[1, 6000, 3, 3]));
     weights.insert("conv.bias".to_owned(), array(&[1]));
-    let error = layer::named(engine.as_ref(), &weights, "conv").err().unwrap();
+    let make = Maker { engine: engine.as_ref(), weights: &weights, multiplier: None };
+    let error = make.same("conv", Order::AsStored).err().unwrap();
     assert_eq!(
         error.to_string(),
         "wide: layer conv has 6000 input channels, expected at most 5920 on a GPU; use the processor (--backend cpu)"

@@ -1,15 +1,20 @@
 //! The UNet on a GPU.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use nirspi_gpu::network::plan::frames_at_once;
 use nirspi_gpu::network::{Activation, Add, Degraded, Finish, Layer, Made};
 use nirspi_gpu::{Buffer, Kernels};
 
-use super::layer::{self, checked};
+use super::layer::{self, Maker, checked};
+use super::multiplier::Multiplier;
 use super::pack::Order;
+use crate::deblur::SIDE;
+use crate::device::Note;
 use crate::filter::Filter;
 use crate::network::{CONDITIONS, Conditions, RunUNet};
+use crate::random::Noise;
 use crate::schema::{self, UNetSizes};
 use crate::weights::{Weights, WeightsError};
 
@@ -38,22 +43,31 @@ pub(crate) struct UNet {
     output: Layer,
     /// Largest number of channels of a pixel of the finest level.
     channels: usize,
+    multiplier: Option<Multiplier>,
+    /// Whether the tensor cores are no longer used.
+    plain: AtomicBool,
 }
 
 impl UNet {
-    /// Uploads the network with these weights to a device.
+    /// Uploads the network with these weights to a device; `multiplier` are the tensor cores, if
+    /// there are any.
     ///
     /// # Errors
     /// [`WeightsError`] if a tensor is missing, of another shape, not finite, unknown, or too wide.
-    pub(crate) fn new(engine: &Arc<dyn Kernels>, weights: &Weights) -> Result<Self, WeightsError> {
+    pub(crate) fn new(
+        engine: &Arc<dyn Kernels>,
+        weights: &Weights,
+        multiplier: Option<Multiplier>,
+    ) -> Result<Self, WeightsError> {
         let on = engine.as_ref();
+        let make = Maker { engine: on, weights, multiplier: multiplier.as_ref() };
         let UNetSizes { channels, blocks: count, .. } = schema::unet(weights)?;
         let levels = channels.len();
         let mut films = Films::default();
         let mut blocks = |side: &str, level: usize| -> Result<Vec<Block>, WeightsError> {
             let block = |j| {
                 let name = format!("{side}.{level}.{j}");
-                let conv = |which: &str| layer::named(on, weights, &format!("{name}.{which}"));
+                let conv = |which: &str| make.same(&format!("{name}.{which}"), Order::AsStored);
                 let film = films.push(Filter::linear(weights, &format!("{name}.film"))?);
                 Ok(Block { conv1: conv("conv1")?, conv2: conv("conv2")?, film })
             };
@@ -64,12 +78,8 @@ impl UNet {
             (0..levels).map(|level| blocks("encoder", level)).collect::<Result<Vec<_>, _>>()?;
         let decoder =
             (0..below).map(|level| blocks("decoder", level)).collect::<Result<Vec<_>, _>>()?;
-        let reduce = |i| {
-            let name = format!("reduce.{i}");
-            let filter = checked(weights, &name, Filter::convolution(weights, &name)?)?;
-            Ok(layer::layer(on, &filter, (2, 0), None, Order::AsStored))
-        };
-        let input = layer::named(on, weights, "input_conv")?;
+        let reduce = |i| make.layer(&format!("reduce.{i}"), (2, 0), Order::AsStored);
+        let input = make.same("input_conv", Order::AsStored)?;
         Ok(Self {
             engine: Arc::clone(engine),
             embed: [layer::linear(on, weights, "embed1")?, layer::linear(on, weights, "embed2")?],
@@ -85,11 +95,79 @@ impl UNet {
             encoder,
             reduce: (0..below).map(reduce).collect::<Result<_, _>>()?,
             expand: (0..below)
-                .map(|i| layer::shuffled(on, weights, &format!("expand.{i}")))
+                .map(|i| make.same(&format!("expand.{i}"), Order::Shuffled))
                 .collect::<Result<_, _>>()?,
             decoder,
-            output: layer::shuffled(on, weights, "output_conv")?,
+            output: make.same("output_conv", Order::Shuffled)?,
+            multiplier,
+            plain: AtomicBool::new(false),
         })
+    }
+
+    /// Whether convolutions leave the tensor cores alone.
+    fn is_plain(&self) -> bool {
+        self.plain.load(Ordering::Relaxed)
+    }
+
+    /// Runs `forward` and reads the buffers that it returns. If an activation in it was not a number
+    /// of `f16`, the tensor cores are given up and it runs again.
+    ///
+    /// # Panics
+    /// If the GPU or its driver fails while it computes.
+    pub(super) fn read_after<const N: usize>(
+        &self,
+        forward: impl Fn() -> [Buffer; N],
+    ) -> [Vec<f32>; N] {
+        let on = self.engine.as_ref();
+        if let (Some(multiplier), false) = (&self.multiplier, self.is_plain()) {
+            let made = forward();
+            let all: Vec<&Buffer> = made.iter().chain([multiplier.beyond()]).collect();
+            let mut read = super::read(on, &all);
+            if read.pop().is_some_and(|beyond| beyond == [0.0]) {
+                return read.try_into().unwrap_or_else(|_| unreachable!("as many as were made"));
+            }
+            multiplier.note(Note::BeyondF16);
+            self.plain.store(true, Ordering::Relaxed);
+        }
+        let read = super::read(on, &forward().each_ref());
+        read.try_into().unwrap_or_else(|_| unreachable!("as many as were made"))
+    }
+
+    /// The same network after a comparison: random images go through it by the tensor cores and
+    /// without them, one alone and as many as at once. If the outputs differ, or the device cannot
+    /// run the kernels, the tensor cores are given up.
+    pub(crate) fn compared(self) -> Self {
+        let Some(multiplier) = &self.multiplier else { return self };
+        let on = self.engine.as_ref();
+        let side = SIDE;
+        for frames in [1, self.at_once(side)] {
+            let area = side * side;
+            let images = |seed: u64| -> Vec<f32> {
+                let mut noise = Noise::of(seed, 0);
+                let pixel = || (0.5 + 0.2 * noise.draw()).clamp(0.0, 1.0);
+                std::iter::repeat_with(pixel).take(frames * area).collect()
+            };
+            let [current, degraded] = [1, 2].map(|seed| on.upload(&images(seed)));
+            let told = on.upload(&[1.0, 1.0, 0.5, 0.25, 0.1, 0.01].repeat(frames));
+            let run = || {
+                let seen = Degraded::Fine(&degraded);
+                self.forward((frames, side), &current, seen, &told, None)
+            };
+            let fast = run();
+            self.plain.store(true, Ordering::Relaxed);
+            let read = on.read(&[&fast, &run()]);
+            let agree = read.is_ok_and(|read| {
+                let pairs = read[0].floats().iter().zip(read[1].floats());
+                // NaN is not within the bound.
+                pairs.fold(true, |all, (a, b)| all && (a - b).abs() <= multiplier.bound())
+            });
+            if !agree {
+                multiplier.note(Note::TensorCoresDiffer);
+                return self;
+            }
+            self.plain.store(false, Ordering::Relaxed);
+        }
+        self
     }
 
     /// Number of images of `side` x `side` that the network processes at once.
@@ -109,20 +187,22 @@ impl UNet {
         start: Option<&Buffer>,
     ) -> Buffer {
         let on = self.engine.as_ref();
-        let silu = Finish { activation: Activation::Silu, ..Finish::default() };
+        let usual = Finish { plain: self.is_plain(), ..Finish::default() };
+        let silu = Finish { activation: Activation::Silu, ..usual };
         let [embed1, embed2] = &self.embed;
         let embedding = on.convolve(embed1, conditions, frames, 1, silu).out;
         let embedding = on.convolve(embed2, &embedding, frames, 1, silu).out;
-        let film = on.convolve(&self.film, &embedding, frames, 1, Finish::default()).out;
+        let film = on.convolve(&self.film, &embedding, frames, 1, usual).out;
 
         let mut side = side / 2;
         let input = on.paired(current, degraded, side);
-        let activated = Finish { activated: true, ..Finish::default() };
+        let activated = Finish { activated: true, ..usual };
         let mut h = on.convolve(&self.input, &input, frames, side, activated);
         let mut skips = Vec::with_capacity(self.reduce.len());
         for (level, blocks) in self.encoder.iter().enumerate() {
             for (j, block) in blocks.iter().enumerate() {
-                h = self.block(block, h, (frames, side), &film, j + 1 < blocks.len());
+                let activated = j + 1 < blocks.len();
+                h = self.block(block, h, (frames, side), &film, Finish { activated, ..usual });
             }
             if let Some(reduce) = self.reduce.get(level) {
                 let coarse = on.convolve(reduce, &h.out, frames, side, activated);
@@ -134,36 +214,38 @@ impl UNet {
             self.expand.iter().zip(&self.decoder).zip(skips).rev()
         {
             let add = Some((Add::Alike, &skip));
-            let finish = Finish { add, shuffle: true, activated: true, ..Finish::default() };
+            let finish = Finish { add, shuffle: true, activated: true, ..usual };
             h = on.convolve(expand, &h.out, frames, side, finish);
             side = fine;
             for (j, block) in blocks.iter().enumerate() {
-                h = self.block(block, h, (frames, side), &film, j + 1 < blocks.len());
+                let activated = j + 1 < blocks.len();
+                h = self.block(block, h, (frames, side), &film, Finish { activated, ..usual });
             }
         }
         let add = start.map(|start| (Add::Alike, start));
-        let finish = Finish { add, shuffle: true, ..Finish::default() };
+        let finish = Finish { add, shuffle: true, ..usual };
         on.convolve(&self.output, &h.out, frames, side, finish).out
     }
 
-    /// A block's output, with its SiLU if another block follows.
-    fn block(
+    /// A block's output; `last` is what is done at the end, besides the sum.
+    fn block<'a>(
         &self,
         block: &Block,
         h: Made,
         (frames, side): (usize, usize),
-        film: &Buffer,
-        activated: bool,
+        film: &'a Buffer,
+        last: Finish<'a>,
     ) -> Made {
         let on = self.engine.as_ref();
         let first = Finish {
             activation: Activation::FilmSilu,
             film: Some((film, block.film)),
-            ..Finish::default()
+            activated: false,
+            ..last
         };
         let seen = h.activated.as_ref().unwrap_or_else(|| unreachable!("blocks follow SiLU"));
         let inner = on.convolve(&block.conv1, seen, frames, side, first).out;
-        let last = Finish { add: Some((Add::Alike, &h.out)), activated, ..Finish::default() };
+        let last = Finish { add: Some((Add::Alike, &h.out)), ..last };
         on.convolve(&block.conv2, &inner, frames, side, last)
     }
 }
@@ -204,14 +286,15 @@ impl RunUNet for UNet {
         let on = self.engine.as_ref();
         let (area, frames) = (side * side, self.at_once(side));
         let images = current.chunks(frames * area).zip(degraded.chunks(frames * area));
-        let parts =
-            images.zip(conditions.chunks(frames)).map(|((current, degraded), conditions)| {
-                debug_assert_eq!(conditions.as_flattened().len(), CONDITIONS * conditions.len());
-                let [current, degraded, told] = [current, degraded, conditions.as_flattened()]
-                    .map(|numbers| on.upload(numbers));
-                let size = (conditions.len(), side);
-                self.forward(size, &current, Degraded::Fine(&degraded), &told, None)
-            });
-        parts.flat_map(|out| super::read(on, &[&out]).swap_remove(0)).collect()
+        let parts = images.zip(conditions.chunks(frames));
+        let parts = parts.flat_map(|((current, degraded), conditions)| {
+            debug_assert_eq!(conditions.as_flattened().len(), CONDITIONS * conditions.len());
+            let [current, degraded, told] = [current, degraded, conditions.as_flattened()]
+                .map(|numbers| on.upload(numbers));
+            let size = (conditions.len(), side);
+            let seen = Degraded::Fine(&degraded);
+            self.read_after(|| [self.forward(size, &current, seen, &told, None)])[0].clone()
+        });
+        parts.collect()
     }
 }

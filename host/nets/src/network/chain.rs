@@ -55,6 +55,7 @@ impl Device {
         bridge: &Weights,
     ) -> Result<Option<Box<dyn RunChain>>, WeightsError> {
         let Some(engine) = self.engine() else { return Ok(None) };
-        Ok(Some(Box::new(gpu::Chain::new(&engine, fsrcnn, estimator, bridge)?)))
+        let multiplier = self.multiplier(engine.as_ref());
+        Ok(Some(Box::new(gpu::Chain::new(&engine, fsrcnn, estimator, (bridge, multiplier))?)))
     }
 }
