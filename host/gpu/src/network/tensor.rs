@@ -91,7 +91,6 @@ fn eight<N: Size>(
 ) -> f32 {
     let width = N::value();
     let mut sum = 0.0f32;
-    #[unroll]
     for v in 0..comptime!(8 / width) {
         let p = pixels[pixel + v];
         let w = weights[weight + v];
@@ -126,6 +125,9 @@ pub(super) fn convolve<N: Size>(
 ) {
     let tiles = comptime!(shape.tiles);
     let product = comptime!(shape.product);
+    // An index that is not known when the kernel is compiled sends registers of a GPU to memory.
+    // Without tensor cores shorter code matters more: software Vulkan compiles it for seconds.
+    let in_registers = comptime!(shape.product == Product::TensorCores);
     // Numbers of a vector, and vectors of eight and of sixteen numbers.
     let width = N::value();
     let of_half = comptime!(8 / width);
@@ -170,7 +172,7 @@ pub(super) fn convolve<N: Size>(
     let items = comptime!(staged * of_row);
     let loads = comptime!((staged * of_row).div_ceil(tiles.units()));
     let mut from = Array::<u32>::new(loads);
-    #[unroll]
+    #[unroll(in_registers)]
     for i in 0..loads {
         let item = unit + units * i;
         let pixel = item / of_row;
@@ -196,7 +198,7 @@ pub(super) fn convolve<N: Size>(
 
     // The first number of the pixels under this unit's row of each product, for the first tap.
     let mut pixels = Array::<usize>::new(down);
-    #[unroll]
+    #[unroll(in_registers)]
     for i in 0..down {
         let pixel = (warp_down * down + i) * PIXELS + lane % PIXELS;
         let within = pixel % comptime!(rows * out_side);
@@ -222,7 +224,7 @@ pub(super) fn convolve<N: Size>(
     let copies = comptime!(of_lines.div_ceil(tiles.units()));
     let turns = comptime!(tiles.kernel / tiles.lines);
     for step in 0..steps {
-        #[unroll]
+        #[unroll(in_registers)]
         for i in 0..loads {
             let item = unit + units * i;
             if item < items {
@@ -257,7 +259,7 @@ pub(super) fn convolve<N: Size>(
         }
         for turn in 0..turns {
             let first = ((CUBE_POS_Y as usize * steps + step) * turns + turn) * of_lines;
-            #[unroll]
+            #[unroll(in_registers)]
             for i in 0..copies {
                 let item = unit + units * i;
                 if item < of_lines {
@@ -305,7 +307,7 @@ pub(super) fn convolve<N: Size>(
     // Of each product a unit has two neighbouring channels of two pixels.
     #[unroll]
     for i in 0..down {
-        #[unroll]
+        #[unroll(in_registers)]
         for part in 0..2usize {
             let pixel = (warp_down * down + i) * PIXELS + 8 * part + lane / 4;
             let within = pixel % comptime!(rows * out_side);
@@ -318,7 +320,7 @@ pub(super) fn convolve<N: Size>(
                     let channel = CUBE_POS_Y as usize * channels
                         + (warp_across * across + j) * CHANNELS
                         + lane % 4 * 2;
-                    #[unroll]
+                    #[unroll(in_registers)]
                     for k in 0..2usize {
                         store(
                             two[k],
@@ -429,7 +431,6 @@ fn imitate<N: Size>(
         let plane = half / 2 * comptime!(2 * tiles.staged());
         #[unroll]
         for i in 0..down {
-            #[unroll]
             for part in 0..2usize {
                 let pixel = (warp_down * down + i) * PIXELS + 8 * part + lane / 4;
                 let within = pixel % area;
@@ -442,7 +443,6 @@ fn imitate<N: Size>(
                 for j in 0..across {
                     let mut two = Vector::<f32, Const<2>>::empty();
                     let before = sums.index(i * across + j)[part];
-                    #[unroll]
                     for k in 0..2usize {
                         let channel =
                             (warp_across * across + j) * CHANNELS + lane % 4 * 2 + k;
