@@ -41,7 +41,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 #[derive(Debug, clap::Args)]
 struct RunArgs {
     /// Frames in the batch
-    #[arg(long, value_name = "B", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=65_536))]
+    #[arg(long, value_name = "B", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=131_072))]
     frames: u32,
     /// Do not correct the network's result where the readings contradict it
     #[arg(long)]

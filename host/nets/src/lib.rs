@@ -48,7 +48,7 @@ pub mod zones;
 pub use choice::{Networks, UsedWeights};
 pub use consistency::{MeasuredRows, MeasuredRowsError};
 pub use deblur::{Blurred, Deblurrer, Method, Sharpen};
-pub use device::{Backend, Device, DeviceError};
+pub use device::{Arithmetic, Backend, Device, DeviceError, Note, ParseArithmeticError};
 #[cfg(feature = "gpu")]
 pub use enhance::{DeviceEnhancer, DeviceEnhancerError};
 pub use enhance::{EnhanceError, Enhanced, Enhancer, Known, KnownEstimate, Options, Sharpener};

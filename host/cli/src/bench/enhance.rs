@@ -1,6 +1,7 @@
 //! `nirspi bench enhance`: times the learned stages.
 
 use super::RunArgs;
+use crate::networks::say_notes;
 use crate::deblur::in_steps;
 use crate::print;
 use anyhow::Result;
@@ -18,7 +19,7 @@ use std::process::ExitCode;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi bench enhance --frames 256\n\
-    \x20 nirspi bench enhance --frames 4096 --backend cuda --no-consistency")]
+    \x20 nirspi bench enhance --frames 4096 --backend cuda --precision f16")]
 pub struct Args {
     /// Steps along the bridge
     #[arg(long, value_name = "S", default_value = "1")]
@@ -35,6 +36,7 @@ struct Report {
     frames: u32,
     steps: u32,
     consistency: bool,
+    precision: String,
     repeats: u32,
     #[serde(flatten)]
     timed: Timed,
@@ -51,6 +53,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     };
     let options = Options { consistency: !run.no_consistency, ..Options::default() };
     let timed = time(&stages, run.frames, &options, run.repeats, run.seed)?;
+    say_notes(&networks);
     print::json(&Report {
         device: networks.device().name().to_owned(),
         weights: networks.used().to_vec(),
@@ -58,6 +61,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         frames: run.frames,
         steps: args.steps.get(),
         consistency: options.consistency,
+        precision: networks.device().arithmetic().to_string(),
         repeats: run.repeats,
         timed,
     })?;

@@ -1,6 +1,7 @@
 //! `nirspi bench pipeline`: times the path from measurements to enhanced images.
 
 use super::RunArgs;
+use crate::networks::say_notes;
 use crate::{print, refused};
 use anyhow::Result;
 use nirspi_eval::bench::pipeline::{Settings, Timed, Work, on_cpu};
@@ -16,7 +17,7 @@ use std::process::ExitCode;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi bench pipeline --frames 256\n\
-    \x20 nirspi bench pipeline --frames 4096 --backend cuda --no-consistency")]
+    \x20 nirspi bench pipeline --frames 4096 --backend cuda --precision f16")]
 pub struct Args {
     /// Measurements of a frame, of 1024
     #[arg(long, value_name = "M", default_value_t = 512, value_parser = clap::value_parser!(u32).range(1..=1024))]
@@ -39,6 +40,7 @@ struct Report {
     measurements: u32,
     sparsity: u32,
     consistency: bool,
+    precision: String,
     repeats: u32,
     #[serde(flatten)]
     timed: Timed,
@@ -57,6 +59,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let work = Work::new(settings).map_err(refused)?;
     let mut networks = run.networks.open(&["fsrcnn", "estimator", "diffusion"])?;
     let (timed, software) = time(&work, &mut networks)?;
+    say_notes(&networks);
     print::json(&Report {
         device: networks.device().name().to_owned(),
         software,
@@ -66,6 +69,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         measurements: args.measurements,
         sparsity: args.sparsity,
         consistency: settings.consistency,
+        precision: networks.device().arithmetic().to_string(),
         repeats: run.repeats,
         timed,
     })?;
