@@ -96,6 +96,12 @@ impl Device {
         self.notes.take()
     }
 
+    /// The notes, for a network on this device to add to.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn shared_notes(&self) -> Notes {
+        self.notes.clone()
+    }
+
     #[cfg(not(feature = "gpu"))]
     fn has_tensor_cores(&self) -> bool {
         false

@@ -55,8 +55,9 @@ pub enum DeviceEnhancerError {
 
 /// Both stages for images on a GPU, input 32 x 32 and output 64 x 64, with one step of the bridge.
 ///
-/// Images, FSRCNN's output and the UNet's input stay on the GPU. The last step, agreement with the
-/// readings, runs on the host.
+/// Nothing comes to the host between the images and the results. Where a device has too little
+/// memory for the kernel of the last step, agreement with the readings, that step runs on the host
+/// ([`Note::AgreementOnCpu`](crate::Note)).
 pub struct DeviceEnhancer {
     chain: Box<dyn RunChain>,
     backend: Backend,
@@ -103,6 +104,7 @@ impl DeviceEnhancer {
         if !(white > 0.0 && white.is_finite()) {
             return Err(DeviceEnhancerError::White { found: white });
         }
+        options.measured.expect_side(fusion::SIDE)?;
         if options.copies > 0 {
             return Err(DeviceEnhancerError::Copies);
         }
@@ -114,7 +116,7 @@ impl DeviceEnhancer {
                 planes.reserve(2 * part.len() * images.pixels());
                 part.clone().for_each(|image| push_planes(depth, image, &mut planes));
             }
-            let guess = self.chain.run(images, part, white, &planes, options.estimate);
+            let guess = self.chain.run(images, part, white, &planes, options);
             all.append(finished(guess, options)?);
             progress(all.estimates.len());
         }
@@ -122,17 +124,20 @@ impl DeviceEnhancer {
     }
 }
 
-/// The steps of [`Enhancer`](super::Enhancer) after the networks.
+/// The results, with the agreement that a device without room for its kernel leaves to the host.
 fn finished(guess: Guess, options: &Options) -> Result<Enhanced, MeasuredRowsError> {
-    let Guess { readings, estimates, start, mut sharp } = guess;
-    let constraint = constraint_on(&readings, &estimates, options)?;
-    constraint.correct(&mut sharp);
-    let inconsistency = constraint.residual_ratios(&sharp);
+    let Guess { estimated, start, mut images, mut inconsistency, readings } = guess;
+    let estimates = super::known(options, &estimated);
+    if !readings.is_empty() {
+        let constraint = constraint_on(&readings, &estimates, options)?;
+        constraint.correct(&mut images);
+        inconsistency = constraint.residual_ratios(&images);
+    }
     Ok(Enhanced {
-        images: sharp,
+        images,
         upscaled: Some(start),
         estimates,
-        estimated: None,
+        estimated: Some(estimated),
         inconsistency,
         spread: None,
     })

@@ -1,20 +1,24 @@
-//! Estimator, FSRCNN and one step of the bridge, one after another, for images that are already on
-//! the device.
+//! Estimator, FSRCNN, one step of the bridge and the agreement with the readings, one after another,
+//! for images that are already on the device.
 //!
-//! No data comes to the host between the images and the guess; one read at the end fetches all
+//! No data comes to the host between the images and the results; one read at the end fetches all
 //! results (`enhance::device::tests::images_that_are_there_become_what_the_processor_makes_of_them`
 //! checks the results).
 
 use std::ops::Range;
 use std::sync::Arc;
 
+use nirspi_gpu::agreement::Agreement;
 use nirspi_gpu::network::Degraded;
+use nirspi_gpu::network::plan::frames_at_once;
 use nirspi_gpu::{Buffer, Kernels};
 use nirspi_recon::omp::gpu::DeviceImages;
 
-use super::{Estimator, Fsrcnn, Multiplier, UNet};
+use super::{Estimator, Fsrcnn, UNet};
+use crate::consistency;
 use crate::deblur::SIDE;
-use crate::enhance::KnownEstimate;
+use crate::device::{Device, Note, Notes};
+use crate::enhance::{KnownEstimate, Options};
 use crate::estimate::Estimate;
 use crate::fusion;
 use crate::network::{Guess, RunChain};
@@ -26,6 +30,7 @@ pub(crate) struct Chain {
     fsrcnn: Fsrcnn,
     estimator: Estimator,
     unet: UNet,
+    notes: Notes,
 }
 
 impl Chain {
@@ -34,27 +39,28 @@ impl Chain {
     /// # Errors
     /// [`WeightsError`] if a tensor is missing, of another shape, not finite, unknown, or too wide.
     pub(crate) fn new(
+        device: &Device,
         engine: &Arc<dyn Kernels>,
-        fsrcnn: &Weights,
-        estimator: &Weights,
-        (bridge, multiplier): (&Weights, Option<Multiplier>),
+        [fsrcnn, estimator, bridge]: [&Weights; 3],
     ) -> Result<Self, WeightsError> {
+        let multiplier = device.multiplier(engine.as_ref());
         Ok(Self {
             engine: Arc::clone(engine),
             fsrcnn: Fsrcnn::new(engine, fsrcnn)?,
             estimator: Estimator::new(engine, estimator)?,
             unet: UNet::new(engine, bridge, multiplier)?.compared(),
+            notes: device.shared_notes(),
         })
     }
 
-    /// The guesses for `frames` images, beginning with number `first`.
+    /// The results for `frames` images, beginning with number `first`.
     fn part(
         &self,
         images: &Buffer,
         (first, frames): (usize, usize),
         white: f32,
         depth: &[f32],
-        known: KnownEstimate,
+        (known, agreement): (KnownEstimate, Option<&Agreement>),
     ) -> Guess {
         let on = self.engine.as_ref();
         let (coarse, area) = ((frames, fusion::SIDE), fusion::SIDE * fusion::SIDE);
@@ -68,14 +74,24 @@ impl Chain {
         let conditions = on.conditions(&outputs, &bounds, grid);
         let seen = Degraded::Coarse(&readings);
         let size = (frames, SIDE);
-        let [readings, outputs, start, sharp] = self.unet.read_after(|| {
-            let sharp = self.unet.forward(size, &start, seen, &conditions, Some(&start));
-            [readings.clone(), outputs.clone(), start.clone(), sharp]
+        let sharp = || self.unet.forward(size, &start, seen, &conditions, Some(&start));
+        let estimated = |outputs: &[f32]| {
+            let each = outputs.as_chunks().0.iter();
+            each.map(|&two| Estimate::of_outputs(two, fusion::SIDE)).collect()
+        };
+        let Some(agreement) = agreement else {
+            let [readings, outputs, start, images] = self
+                .unet
+                .read_after(|| [readings.clone(), outputs.clone(), start.clone(), sharp()]);
+            let estimated = estimated(&outputs);
+            return Guess { estimated, start, images, inconsistency: Vec::new(), readings };
+        };
+        let [outputs, start, images, inconsistency] = self.unet.read_after(|| {
+            let agreed = on.agree(agreement, &readings, &sharp(), &outputs, frames);
+            [outputs.clone(), start.clone(), agreed.images, agreed.ratios]
         });
-        let estimates = outputs.as_chunks().0.iter();
-        let estimates =
-            estimates.map(|&two| known.over(Estimate::of_outputs(two, fusion::SIDE))).collect();
-        Guess { readings, estimates, start, sharp }
+        let estimated = estimated(&outputs);
+        Guess { estimated, start, images, inconsistency, readings: Vec::new() }
     }
 }
 
@@ -86,11 +102,19 @@ impl RunChain for Chain {
         part: Range<usize>,
         white: f32,
         depth: &[f32],
-        known: KnownEstimate,
+        options: &Options,
     ) -> Guess {
         let images = images.buffer();
         let coarse = self.fsrcnn.at_once(fusion::SIDE).min(self.estimator.at_once(fusion::SIDE));
         let at_once = self.unet.at_once(SIDE).min(coarse);
+        let on = self.engine.as_ref();
+        let rows = &options.measured;
+        let agreement = consistency::agreement(on, rows, options.consistency, options.estimate);
+        let agreement = agreement
+            .map_err(|error| self.notes.add(Note::AgreementOnCpu { why: error.to_string() }))
+            .ok();
+        let scratch = agreement.as_ref().map_or(0, Agreement::scratch);
+        let at_once = frames_at_once(scratch, on.limits().buffer_bytes, at_once);
         let planes = 2 * fusion::SIDE * fusion::SIDE;
         let mut all = Guess::default();
         for first in part.clone().step_by(at_once) {
@@ -99,6 +123,7 @@ impl RunChain for Chain {
                 [] => &[],
                 _ => &depth[(first - part.start) * planes..][..frames * planes],
             };
+            let known = (options.estimate, agreement.as_ref());
             all.append(self.part(images, (first, frames), white, depth, known));
         }
         all
