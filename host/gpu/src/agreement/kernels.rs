@@ -258,7 +258,7 @@ fn lambda_of(
         }
         // The norm grows with lambda, so those inside are the first ones.
         low += width * total(inside, sums) / TRIED;
-        width = width / TRIED;
+        width /= TRIED;
     }
     low
 }
@@ -436,7 +436,7 @@ pub(super) fn agree(
             }
             sync_cube();
             let last = count >= comptime!(shape.steps) || coupling <= 0.0f32;
-            if last || count % comptime!(shape.look) == 0 {
+            if last || count.is_multiple_of(comptime!(shape.look)) {
                 log = lambda_of(
                     &diagonal,
                     &beside,
@@ -454,7 +454,7 @@ pub(super) fn agree(
                 for k in 1..count {
                     let factor = beside[k - 1] / pivot;
                     pivot = diagonal[k] + lambda - factor * beside[k - 1];
-                    value = factor * value;
+                    value *= factor;
                 }
                 more = !last && coupling * value / pivot > law[comptime!(SETTINGS.tolerance)];
             }

@@ -1,7 +1,7 @@
 //! The same agreement on a GPU, where one kernel makes it for many images.
 //!
 //! # Invariant
-//! The images are those of [`Consistency::project`](super::Consistency::project), to 1e-4
+//! The images are those of [`Consistency::project`](super::Consistency::project), to 2e-4
 //! (`gpu::tests::agreement::images_agree_as_on_the_processor`).
 
 use nirspi_gpu::agreement::{Agreement, Law, Matrices, Told};

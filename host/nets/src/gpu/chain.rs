@@ -11,7 +11,7 @@ use std::sync::Arc;
 use nirspi_gpu::agreement::Agreement;
 use nirspi_gpu::network::Degraded;
 use nirspi_gpu::network::plan::frames_at_once;
-use nirspi_gpu::{Buffer, Kernels};
+use nirspi_gpu::{Buffer, GpuError, Kernels};
 use nirspi_recon::omp::gpu::DeviceImages;
 
 use super::{Estimator, Fsrcnn, UNet};
@@ -53,7 +53,7 @@ impl Chain {
         })
     }
 
-    /// The results for `frames` images, beginning with number `first`.
+    /// Appends the results for `frames` images, beginning with number `first`.
     fn part(
         &self,
         images: &Buffer,
@@ -61,7 +61,8 @@ impl Chain {
         white: f32,
         depth: &[f32],
         (known, agreement): (KnownEstimate, Option<&Agreement>),
-    ) -> Guess {
+        all: &mut Guess,
+    ) -> Result<(), GpuError> {
         let on = self.engine.as_ref();
         let (coarse, area) = ((frames, fusion::SIDE), fusion::SIDE * fusion::SIDE);
         let readings = on.readings(images, first * area, white, frames * area);
@@ -75,23 +76,23 @@ impl Chain {
         let seen = Degraded::Coarse(&readings);
         let size = (frames, SIDE);
         let sharp = || self.unet.forward(size, &start, seen, &conditions, Some(&start));
-        let estimated = |outputs: &[f32]| {
-            let each = outputs.as_chunks().0.iter();
-            each.map(|&two| Estimate::of_outputs(two, fusion::SIDE)).collect()
+        let read = match agreement {
+            Some(agreement) => self.unet.read_after(|| {
+                let agreed = on.agree(agreement, &readings, &sharp(), &outputs, frames);
+                [outputs.clone(), start.clone(), agreed.images, agreed.ratios]
+            }),
+            None => {
+                self.unet.read_after(|| [outputs.clone(), start.clone(), sharp(), readings.clone()])
+            }
         };
-        let Some(agreement) = agreement else {
-            let [readings, outputs, start, images] = self
-                .unet
-                .read_after(|| [readings.clone(), outputs.clone(), start.clone(), sharp()]);
-            let estimated = estimated(&outputs);
-            return Guess { estimated, start, images, inconsistency: Vec::new(), readings };
-        };
-        let [outputs, start, images, inconsistency] = self.unet.read_after(|| {
-            let agreed = on.agree(agreement, &readings, &sharp(), &outputs, frames);
-            [outputs.clone(), start.clone(), agreed.images, agreed.ratios]
-        });
-        let estimated = estimated(&outputs);
-        Guess { estimated, start, images, inconsistency, readings: Vec::new() }
+        let [outputs, start, images, last] = read?;
+        let each = outputs.floats().as_chunks().0.iter();
+        all.estimated.extend(each.map(|&two| Estimate::of_outputs(two, fusion::SIDE)));
+        all.start.extend_from_slice(start.floats());
+        all.images.extend_from_slice(images.floats());
+        let rest = if agreement.is_some() { &mut all.inconsistency } else { &mut all.readings };
+        rest.extend_from_slice(last.floats());
+        Ok(())
     }
 }
 
@@ -103,7 +104,7 @@ impl RunChain for Chain {
         white: f32,
         depth: &[f32],
         options: &Options,
-    ) -> Guess {
+    ) -> Result<Guess, GpuError> {
         let images = images.buffer();
         let coarse = self.fsrcnn.at_once(fusion::SIDE).min(self.estimator.at_once(fusion::SIDE));
         let at_once = self.unet.at_once(SIDE).min(coarse);
@@ -116,7 +117,8 @@ impl RunChain for Chain {
         let scratch = agreement.as_ref().map_or(0, Agreement::scratch);
         let at_once = frames_at_once(scratch, on.limits().buffer_bytes, at_once);
         let planes = 2 * fusion::SIDE * fusion::SIDE;
-        let mut all = Guess::default();
+        let area = SIDE * SIDE;
+        let mut all = Guess::with_capacity(part.len() * area);
         for first in part.clone().step_by(at_once) {
             let frames = at_once.min(part.end - first);
             let depth = match depth {
@@ -124,8 +126,8 @@ impl RunChain for Chain {
                 _ => &depth[(first - part.start) * planes..][..frames * planes],
             };
             let known = (options.estimate, agreement.as_ref());
-            all.append(self.part(images, (first, frames), white, depth, known));
+            self.part(images, (first, frames), white, depth, known, &mut all)?;
         }
-        all
+        Ok(all)
     }
 }

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use nirspi_gpu::GpuError;
 use nirspi_recon::omp::gpu::DeviceImages;
 
 use crate::device::Device;
@@ -27,19 +28,17 @@ pub(crate) struct Guess {
 }
 
 impl Guess {
-    /// Appends the results for further images.
-    pub(crate) fn append(&mut self, mut other: Self) {
-        self.estimated.append(&mut other.estimated);
-        self.start.append(&mut other.start);
-        self.images.append(&mut other.images);
-        self.inconsistency.append(&mut other.inconsistency);
-        self.readings.append(&mut other.readings);
+    /// No results yet, and room for images with this number of pixels in all.
+    pub(crate) fn with_capacity(pixels: usize) -> Self {
+        let [start, images] = [(); 2].map(|()| Vec::with_capacity(pixels));
+        Self { start, images, ..Self::default() }
     }
 }
 
 /// The three networks and the agreement with the readings on one GPU.
-pub(crate) trait RunChain: Send {
-    /// The results for some of the images, with `white` scaled to 1. `depth` is (N, 2, 32, 32), see
+pub(crate) trait RunChain: Send + Sync {
+    /// The results for some of the images, with `white` scaled to 1. Fails if the GPU or its driver
+    /// fails. `depth` is (N, 2, 32, 32), see
     /// [`push_planes`](crate::fusion::push_planes); `None` without depth.
     fn run(
         &self,
@@ -48,7 +47,7 @@ pub(crate) trait RunChain: Send {
         white: f32,
         depth: &[f32],
         options: &Options,
-    ) -> Guess;
+    ) -> Result<Guess, GpuError>;
 }
 
 impl Device {
