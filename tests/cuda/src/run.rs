@@ -9,8 +9,8 @@ mod arithmetic;
 
 use crate::ptx::{Instruction, Kernel, Kind, Memory, Op, Place, Space, Unknown};
 use arithmetic::{compute, f16_at};
-use std::sync::{Mutex, PoisonError};
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::thread;
 
 /// Number of units of a warp.
