@@ -125,6 +125,12 @@ pub(crate) fn upload_halves<R: Runtime>(client: &ComputeClient<R>, numbers: &[f1
     Buffer { handle, count: numbers.len() / 2 }
 }
 
+/// A buffer with these numbers in `f64`; each counts as two of its four-byte numbers.
+pub(crate) fn upload_doubles<R: Runtime>(client: &ComputeClient<R>, numbers: &[f64]) -> Buffer {
+    let handle = client.create_from_slice(f64::as_bytes(numbers));
+    Buffer { handle, count: 2 * numbers.len() }
+}
+
 impl<R: Runtime> Engine for ComputeClient<R> {
     fn limits(&self) -> DeviceLimits {
         let properties = self.properties();

@@ -5,6 +5,7 @@
 //! | [`layout`] | the order of a pursuit's numbers in memory, which kernels and host share |
 //! | `budget` | distribution of a pursuit to workgroups and launches within a device's limits |
 //! | `kernels` | the kernels |
+//! | `referee` | choices in double precision |
 //!
 //! # How
 //! One workgroup pursues one frame, with its projections in registers: four atoms a unit for 1024
@@ -19,9 +20,10 @@
 mod budget;
 mod kernels;
 pub mod layout;
+mod referee;
 
 use crate::Buffer;
-use crate::engine::Engine;
+use crate::engine::{Engine, upload_doubles};
 use crate::limits::ROUNDS;
 use budget::row_launches;
 use cubecl::prelude::*;
@@ -52,6 +54,23 @@ pub struct Pursuit {
     pub state: Buffer,
     /// The coefficients of the chosen atoms, `frames x sparsity`.
     pub coefficients: Buffer,
+    /// What a referee needs, if there is to be one.
+    pub exact: Option<Exact>,
+}
+
+/// A dictionary and measurements in double precision, for choices that single precision cannot make.
+/// A number in `f64` counts as two of a buffer.
+#[derive(Clone, Debug)]
+pub struct Exact {
+    /// The Gram matrix, `width x width`.
+    pub gram: Buffer,
+    /// One over each norm (`width`), 0 for atoms that are never chosen.
+    pub norms: Buffer,
+    /// The measurements' inner products with the atoms, `frames x width`.
+    pub projection: Buffer,
+    /// Smallest lead over the next best atom, relative to the measurement's norm, that needs no
+    /// referee.
+    pub believed: f32,
 }
 
 impl Pursuit {
@@ -70,6 +89,11 @@ impl Pursuit {
             && self.state.count() >= self.frames * STATE
             && self.coefficients.count() >= chosen
             && self.sparsity <= self.shape.capacity
+            && self.exact.as_ref().is_none_or(|exact| {
+                exact.gram.count() == 2 * width * width
+                    && exact.norms.count() == 2 * width
+                    && exact.projection.count() >= 2 * self.frames * width
+            })
     }
 }
 
@@ -88,6 +112,21 @@ pub trait Pursue: Engine {
     /// `vectors * matrix`. A vector has `rows` numbers, and the number of vectors is a multiple of
     /// [`TOGETHER`]; `width`, the number of columns, is a multiple of 64.
     fn products(&self, vectors: &Buffer, matrix: &Buffer, rows: usize, width: usize) -> Buffer;
+    /// Whether the device has double precision.
+    fn has_doubles(&self) -> bool;
+    /// Whether the device has double precision, and shared memory for a referee of pursuits of this
+    /// shape.
+    fn has_referee(&self, shape: &Shape) -> bool;
+    /// A buffer with these numbers in `f64`.
+    fn upload_doubles(&self, numbers: &[f64]) -> Buffer;
+    /// [`products`](Self::products) in `f64`.
+    fn exact_products(
+        &self,
+        vectors: &Buffer,
+        matrix: &Buffer,
+        rows: usize,
+        width: usize,
+    ) -> Buffer;
     /// A 1 (`u32`) for each atom that is parallel to a lower one: the square of their cosine is at
     /// least `like`. 0 for the others.
     fn doubles(&self, gram: &Buffer, width: usize, like: f32) -> Buffer;
@@ -114,32 +153,117 @@ fn units(count: usize) -> CubeDim {
     CubeDim::new_1d(count as u32)
 }
 
-impl<R: Runtime> Pursue for ComputeClient<R> {
-    #[expect(unsafe_code, reason = "bounds checks would double the loads of the inner loop")]
-    fn products(&self, vectors: &Buffer, matrix: &Buffer, rows: usize, width: usize) -> Buffer {
-        let count = vectors.count() / rows;
-        assert!(count.is_multiple_of(TOGETHER) && width.is_multiple_of(UNITS));
-        assert_eq!(matrix.count(), rows * width);
-        let out = Engine::empty(self, count * width);
-        for (first, last) in row_launches(rows) {
-            // SAFETY: vectors are below `count`, rows below `rows` and columns below `width`, by
-            // the asserts above; a launch loops over at most `ROUNDS` rows.
-            unsafe {
-                kernels::products::launch_unchecked::<R>(
-                    self,
-                    cubes(width / UNITS, count / TOGETHER),
-                    units(UNITS),
-                    vectors.arg(),
-                    matrix.arg(),
-                    out.arg(),
-                    rows as u32,
-                    width as u32,
-                    first as u32,
-                    last as u32,
-                );
-            }
+/// Number of buffers of a pursuit with a referee.
+const REFEREED_BUFFERS: usize = 10;
+
+/// `vectors * matrix` in `F`.
+#[expect(unsafe_code, reason = "bounds checks would double the loads of the inner loop")]
+fn products<R: Runtime, F: Float>(
+    client: &ComputeClient<R>,
+    vectors: &Buffer,
+    matrix: &Buffer,
+    rows: usize,
+    width: usize,
+) -> Buffer {
+    let words = size_of::<F>() / size_of::<f32>();
+    let count = vectors.count() / words / rows;
+    assert!(count.is_multiple_of(TOGETHER) && width.is_multiple_of(UNITS));
+    assert_eq!(matrix.count(), words * rows * width);
+    let out = Engine::empty(client, words * count * width);
+    for (first, last) in row_launches(rows) {
+        // SAFETY: vectors are below `count`, rows below `rows` and columns below `width`, by the
+        // asserts above; a launch loops over at most `ROUNDS` rows.
+        unsafe {
+            kernels::products::launch_unchecked::<F, R>(
+                client,
+                cubes(width / UNITS, count / TOGETHER),
+                units(UNITS),
+                vectors.arg(),
+                matrix.arg(),
+                out.arg(),
+                rows as u32,
+                width as u32,
+                first as u32,
+                last as u32,
+            );
         }
-        out
+    }
+    out
+}
+
+/// Launches steps `first..last` of pursuits, with the referee's numbers in `D` if there is a referee.
+#[expect(unsafe_code, reason = "bounds checks would double the loads of the inner loop")]
+fn pursue<R: Runtime, D: Float>(
+    client: &ComputeClient<R>,
+    pursuit: &Pursuit,
+    (first, last): (usize, usize),
+    rounding: Rounding,
+) {
+    assert!(pursuit.is_whole() && last <= pursuit.sparsity);
+    let exact = pursuit.exact.as_ref();
+    let [gram, projection, norms] = match exact {
+        Some(exact) => [&exact.gram, &exact.projection, &exact.norms],
+        // The kernel does not read them.
+        None => [&pursuit.gram; 3],
+    };
+    // SAFETY: frames, atoms (chosen ones, too, are places of the projection) and steps are below the
+    // lengths that `is_whole` has checked; loops are bounded by `last`, and all units of a workgroup
+    // meet each barrier, because they branch by the same shared numbers.
+    unsafe {
+        kernels::pursue::launch_unchecked::<D, R>(
+            client,
+            cubes(pursuit.frames, 1),
+            units(pursuit.shape.units),
+            pursuit.gram.arg(),
+            pursuit.atoms.arg(),
+            pursuit.projection.arg(),
+            pursuit.rows.arg(),
+            pursuit.support.arg(),
+            pursuit.values.arg(),
+            pursuit.state.arg(),
+            gram.arg(),
+            projection.arg(),
+            norms.arg(),
+            pursuit.sparsity as u32,
+            first as u32,
+            last as u32,
+            rounding.score,
+            rounding.pivot,
+            exact.map_or(0.0, |exact| exact.believed),
+            pursuit.shape,
+            exact.is_some(),
+        );
+    }
+}
+
+impl<R: Runtime> Pursue for ComputeClient<R> {
+    fn products(&self, vectors: &Buffer, matrix: &Buffer, rows: usize, width: usize) -> Buffer {
+        products::<R, f32>(self, vectors, matrix, rows, width)
+    }
+
+    fn has_doubles(&self) -> bool {
+        self.features().supports_type(f64::as_type_native_unchecked())
+    }
+
+    fn has_referee(&self, shape: &Shape) -> bool {
+        let limits = Engine::limits(self);
+        self.has_doubles()
+            && shape.refereed_bytes() <= limits.shared_bytes
+            && limits.buffers >= REFEREED_BUFFERS
+    }
+
+    fn upload_doubles(&self, numbers: &[f64]) -> Buffer {
+        upload_doubles(self, numbers)
+    }
+
+    fn exact_products(
+        &self,
+        vectors: &Buffer,
+        matrix: &Buffer,
+        rows: usize,
+        width: usize,
+    ) -> Buffer {
+        products::<R, f64>(self, vectors, matrix, rows, width)
     }
 
     fn doubles(&self, gram: &Buffer, width: usize, like: f32) -> Buffer {
@@ -159,31 +283,10 @@ impl<R: Runtime> Pursue for ComputeClient<R> {
         out
     }
 
-    #[expect(unsafe_code, reason = "bounds checks would double the loads of the inner loop")]
-    fn pursue(&self, pursuit: &Pursuit, (first, last): (usize, usize), rounding: Rounding) {
-        assert!(pursuit.is_whole() && last <= pursuit.sparsity);
-        // SAFETY: frames, atoms (chosen ones, too, are places of the projection) and steps are
-        // below the lengths that `is_whole` has checked; loops are bounded by `last`, and barriers
-        // are outside every branch.
-        unsafe {
-            kernels::pursue::launch_unchecked::<R>(
-                self,
-                cubes(pursuit.frames, 1),
-                units(pursuit.shape.units),
-                pursuit.gram.arg(),
-                pursuit.atoms.arg(),
-                pursuit.projection.arg(),
-                pursuit.rows.arg(),
-                pursuit.support.arg(),
-                pursuit.values.arg(),
-                pursuit.state.arg(),
-                pursuit.sparsity as u32,
-                first as u32,
-                last as u32,
-                rounding.score,
-                rounding.pivot,
-                pursuit.shape,
-            );
+    fn pursue(&self, pursuit: &Pursuit, steps: (usize, usize), rounding: Rounding) {
+        match &pursuit.exact {
+            Some(_) => pursue::<R, f64>(self, pursuit, steps, rounding),
+            None => pursue::<R, f32>(self, pursuit, steps, rounding),
         }
     }
 

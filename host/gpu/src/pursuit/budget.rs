@@ -52,7 +52,7 @@ impl DeviceLimits {
 impl Shape {
     /// Splits the steps of a pursuit into launches `first..last`, none of which takes more than
     /// `rounds` rounds of loops. Step `k` takes `k` rounds over the rows and `k` over the units, to
-    /// fetch the weights. A launch starts with a pass over the atoms chosen before.
+    /// fetch the weights; with a referee, each step may need it. A launch starts with a pass over the atoms chosen before.
     ///
     /// # Errors
     /// [`GpuError`] if one step takes more rounds than allowed.
@@ -60,8 +60,12 @@ impl Shape {
         &self,
         sparsity: usize,
         rounds: usize,
+        refereed: bool,
     ) -> Result<Vec<(usize, usize)>, GpuError> {
-        let step = |k: usize| 1 + k + k.div_ceil(self.units);
+        let step = |k: usize| {
+            let referee = if refereed { self.referee_rounds(k) } else { 0 };
+            1 + k + k.div_ceil(self.units) + referee
+        };
         let mut launches = Vec::new();
         let mut first = 0;
         while first < sparsity {
@@ -78,6 +82,17 @@ impl Shape {
             first = last;
         }
         Ok(launches)
+    }
+}
+
+impl Shape {
+    /// Number of rounds that the referee of step `k` takes at most: to substitute back, to refine
+    /// five times, and to score the rivals.
+    fn referee_rounds(&self, k: usize) -> usize {
+        let own = k.div_ceil(self.units);
+        let substitution = k + k * own;
+        let refinement = own * (k + 2) + 2 * substitution;
+        2 * own + substitution + 5 * refinement + self.per_unit * k
     }
 }
 
@@ -121,7 +136,7 @@ mod tests {
     fn no_launch_takes_more_rounds_than_software_vulkan_finishes() {
         for (sparsity, units) in [(0, 64), (1, 64), (64, 256), (346, 256), (347, 256), (2000, 64)] {
             let shape = Shape { units, per_unit: 4, capacity: 1 };
-            let launches = shape.launches(sparsity, ROUNDS).unwrap();
+            let launches = shape.launches(sparsity, ROUNDS, false).unwrap();
             let mut next = 0;
             for &(first, last) in &launches {
                 assert_eq!(first, next);
@@ -134,7 +149,10 @@ mod tests {
             assert_eq!(launches.len() > 1, sparsity > 345, "{sparsity}: {launches:?}");
         }
         let shape = Shape { units: 64, per_unit: 4, capacity: 1 };
-        assert!(matches!(shape.launches(40_000, ROUNDS), Err(GpuError::TooLarge { .. })));
+        assert!(matches!(shape.launches(40_000, ROUNDS, false), Err(GpuError::TooLarge { .. })));
+        let shape = Shape { units: 256, per_unit: 4, capacity: 64 };
+        let with = shape.launches(64, ROUNDS, true).unwrap();
+        assert!(with.len() < 4 && with.last().unwrap().1 == 64, "{with:?}");
         assert_eq!(row_launches(0), []);
         assert_eq!(row_launches(ROUNDS + 1), [(0, ROUNDS), (ROUNDS, ROUNDS + 1)]);
     }

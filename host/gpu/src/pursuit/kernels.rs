@@ -12,9 +12,10 @@
 #![allow(clippy::too_many_arguments)]
 
 use super::layout::{
-    CLOSEST, COUNT, DEPENDENT, ENERGY, ENOUGH, EXPLAINED, FIRST_BEST, LEAD, LOOKING, NO_ATOM_LEFT,
-    REMAINING, STATE, STOP, Shape, TOGETHER,
+    CLOSEST, COUNT, DECIDED, DEPENDENT, ENERGY, ENOUGH, EXPLAINED, FIRST_BEST, LEAD, LOOKING,
+    NO_ATOM_LEFT, REMAINING, STATE, STOP, Shape, TOGETHER,
 };
+use super::referee::decide;
 use cubecl::prelude::*;
 
 /// Adds `vectors * matrix` over the rows from `first` to `last` to `out`: inner products of
@@ -23,10 +24,10 @@ use cubecl::prelude::*;
 /// atoms) and the initial projections. `count` is a multiple of [`TOGETHER`]. Each unit computes
 /// one column; workgroups form a grid.
 #[cube(launch_unchecked)]
-pub(super) fn products(
-    vectors: &Array<f32>,
-    matrix: &Array<f32>,
-    out: &mut Array<f32>,
+pub(super) fn products<F: Float>(
+    vectors: &Array<F>,
+    matrix: &Array<F>,
+    out: &mut Array<F>,
     rows: u32,
     width: u32,
     first: u32,
@@ -36,10 +37,13 @@ pub(super) fn products(
     let width = width as usize;
     let column = ABSOLUTE_POS_X as usize;
     let top = CUBE_POS_Y as usize * TOGETHER;
-    let mut sums = Array::<f32>::new(TOGETHER);
+    let mut sums = Array::<F>::new(TOGETHER);
     #[unroll]
     for v in 0..TOGETHER {
-        sums[v] = if first == 0 { 0.0f32.runtime() } else { out[(top + v) * width + column] };
+        sums[v] = F::cast_from(0.0f32);
+        if first > 0 {
+            sums[v] = out[(top + v) * width + column];
+        }
     }
     for row in first as usize..last as usize {
         let entry = matrix[row * width + column];
@@ -79,8 +83,12 @@ pub(super) fn doubles(gram: &Array<f32>, out: &mut Array<u32>, width: u32, like:
 /// support, so no triangular system is solved. `atoms` has one over each norm, then the squared
 /// norms. `values` of a frame has a step and one over the root of a pivot for each atom of the
 /// support.
+///
+/// With `refereed`, a choice whose lead over the next best atom is below `believed`, relative to the
+/// norm of the measurement, is left to [`decide`]; `exact_gram`, `exact_projection` and `exact_norms`
+/// are the numbers that it needs in `D`, which is `f64`. Otherwise these are not read.
 #[cube(launch_unchecked)]
-pub(super) fn pursue(
+pub(super) fn pursue<D: Float>(
     gram: &Array<f32>,
     atoms: &Array<f32>,
     projection: &mut Array<f32>,
@@ -88,12 +96,17 @@ pub(super) fn pursue(
     support: &mut Array<u32>,
     values: &mut Array<f32>,
     state: &mut Array<f32>,
+    exact_gram: &Array<D>,
+    exact_projection: &Array<D>,
+    exact_norms: &Array<D>,
     sparsity: u32,
     first: u32,
     last: u32,
     rounding: f32,
     dependent: f32,
+    believed: f32,
     #[comptime] shape: Shape,
+    #[comptime] refereed: bool,
 ) {
     let units = comptime!(shape.units);
     let per_unit = comptime!(shape.per_unit);
@@ -107,6 +120,9 @@ pub(super) fn pursue(
     let mut places = SharedMemory::<u32>::new(units);
     let mut weights = SharedMemory::<f32>::new(comptime!(shape.capacity));
     let mut chosen = SharedMemory::<f32>::new(1usize);
+    // The referee's numbers; without one, a single number each.
+    let mut x = SharedMemory::<D>::new(comptime!(if refereed { shape.capacity } else { 1 }));
+    let mut scores = SharedMemory::<D>::new(comptime!(if refereed { shape.units } else { 1 }));
 
     // The atoms of this unit.
     let mut p = Array::<f32>::new(per_unit);
@@ -135,6 +151,7 @@ pub(super) fn pursue(
     let mut stop = state[frame * STATE + STOP];
     let mut lead = state[frame * STATE + LEAD];
     let mut closest = state[frame * STATE + CLOSEST];
+    let mut decided = state[frame * STATE + DECIDED];
     // Every unit must have read the state before its owner writes it again.
     sync_storage();
 
@@ -185,7 +202,7 @@ pub(super) fn pursue(
         }
         let best = numbers[0];
         let second = seconds[0];
-        let atom = places[0] as usize;
+        let mut atom = places[0] as usize;
         sync_cube();
 
         if step == 0 {
@@ -195,7 +212,32 @@ pub(super) fn pursue(
         let more = best > rounding * first_best;
         if stop == LOOKING {
             if more {
-                lead = min(lead, best - second);
+                let margin = believed * f32::sqrt(energy);
+                if comptime!(refereed) && best - second < margin {
+                    decided += 1.0;
+                    atom = decide::<D>(
+                        exact_gram,
+                        exact_projection,
+                        exact_norms,
+                        rows,
+                        support,
+                        values,
+                        &p,
+                        &norms,
+                        &mut weights,
+                        &mut numbers,
+                        &mut places,
+                        &mut x,
+                        &mut scores,
+                        frame,
+                        frame * sparsity,
+                        step,
+                        best - margin,
+                        shape,
+                    );
+                } else {
+                    lead = min(lead, best - second);
+                }
             } else {
                 stop = NO_ATOM_LEFT.runtime();
             }
@@ -286,6 +328,7 @@ pub(super) fn pursue(
         state[frame * STATE + STOP] = stop;
         state[frame * STATE + LEAD] = lead;
         state[frame * STATE + CLOSEST] = closest;
+        state[frame * STATE + DECIDED] = decided;
     }
 }
 

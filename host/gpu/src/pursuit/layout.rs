@@ -4,7 +4,7 @@
 pub const TOGETHER: usize = 8;
 
 /// Number of state values of a frame.
-pub const STATE: usize = 8;
+pub const STATE: usize = 9;
 /// Energy of the measurement.
 pub const ENERGY: usize = 0;
 /// Energy of the residual at which the pursuit stops.
@@ -21,6 +21,9 @@ pub const STOP: usize = 5;
 pub const LEAD: usize = 6;
 /// Smallest distance of the residual's energy from the limit, over the steps that checked it.
 pub const CLOSEST: usize = 7;
+
+/// Number of choices that were made in double precision.
+pub const DECIDED: usize = 8;
 
 /// Whether a pursuit goes on, and if not, why. Kernels store it as a number of the state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -81,6 +84,14 @@ impl Shape {
     /// chosen atom's projection.
     pub fn shared_bytes(&self) -> usize {
         4 * (3 * self.units + self.capacity + 1)
+    }
+}
+
+impl Shape {
+    /// Bytes of shared memory of a pursuit with a referee: also two numbers in `f64` for each
+    /// coefficient or unit.
+    pub fn refereed_bytes(&self) -> usize {
+        self.shared_bytes() + 8 * (self.capacity + self.units)
     }
 }
 

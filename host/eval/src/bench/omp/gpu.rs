@@ -33,9 +33,11 @@ pub fn on_gpu(problem: &ProblemFile, settings: &Settings, device: &Device) -> Re
     }
     let frames = (problem.frames.len() / problem.measurements) as f64;
     // An index, a step, a pivot and a coefficient for each atom, and the result of the search.
-    let solution = 4 * problem.sparsity * 4 + 32;
+    let solution = 4 * problem.sparsity * 4 + 36;
+    // In double precision too, for the referee.
+    let of_measurement = if settings.precision == Precision::F32 { 4 } else { 12 };
     let transferred_bytes_per_frame =
-        (4 * problem.measurements + solution) as f64 + 4.0 * pixels as f64 / frames;
+        (of_measurement * problem.measurements + solution) as f64 + 4.0 * pixels as f64 / frames;
     let timed = Timed {
         backend: device.backend(),
         device: Some(device.name().to_owned()),
@@ -58,7 +60,11 @@ fn solve(
 ) -> Result<(Vec<Solution>, usize, usize)> {
     let limits = Limits::atoms(problem.sparsity);
     let solved = dictionary.in_turns(problem.sparsity, &problem.frames, |y| {
-        let there = dictionary.pursue(&limits, &dictionary.upload(y)?)?;
+        let there = match settings.precision {
+            Precision::F32 => dictionary.upload(y)?,
+            _ => dictionary.upload_exact(y)?,
+        };
+        let there = dictionary.pursue(&limits, &there)?;
         let images = dictionary.images(&there, pictures)?;
         let (found, doubtful) = dictionary.download_with_doubts(&there)?;
         Ok((found, doubtful, images.download()?.len()))

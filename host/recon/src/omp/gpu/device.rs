@@ -56,6 +56,11 @@ impl Device {
         self.software
     }
 
+    #[cfg(test)]
+    pub(in crate::omp) fn engine(&self) -> &dyn Kernels {
+        self.engine.as_ref()
+    }
+
     pub(super) fn limits(&self) -> DeviceLimits {
         self.engine.limits()
     }

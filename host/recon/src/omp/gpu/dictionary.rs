@@ -16,11 +16,13 @@ use super::gram::{DeviceGram, DeviceSolutions, FRAMES_A_THREAD, width};
 use super::images::DeviceImages;
 use crate::omp::dictionary::Atoms;
 use crate::omp::pursuit::energy;
+use crate::omp::referee::BELIEVED;
 use crate::omp::{
     BackendError, Dictionary, Limits, MixedDictionary, OmpError, Path, Scalar, Solution, finite,
 };
 use nalgebra::DMatrix;
-use nirspi_gpu::pursuit::layout::TOGETHER;
+use nirspi_gpu::pursuit::Exact;
+use nirspi_gpu::pursuit::layout::{Shape, TOGETHER};
 use nirspi_gpu::{Buffer, limits};
 use rayon::prelude::*;
 use std::sync::OnceLock;
@@ -43,12 +45,23 @@ pub struct DeviceDictionary {
     /// precision cannot decide.
     exact: (DMatrix<f64>, bool),
     mixed: OnceLock<MixedDictionary>,
+    referee: OnceLock<Referee>,
+}
+
+/// The dictionary in `f64` on the device, made when double precision is first asked for.
+#[derive(Debug)]
+struct Referee {
+    matrix: Buffer,
+    gram: Buffer,
+    norms: Buffer,
 }
 
 /// Measurements on a device.
 #[derive(Debug)]
 pub struct DeviceFrames {
     y: Buffer,
+    /// The same in `f64`, for a referee.
+    exact: Option<Buffer>,
     energies: Vec<f64>,
 }
 
@@ -96,7 +109,14 @@ impl DeviceDictionary {
         };
         let gram = DeviceGram::new(device, gram, atoms)?;
         let exact = (matrix, normalised);
-        Ok(Self { gram, matrix: matrix_there, measurements, exact, mixed: OnceLock::new() })
+        Ok(Self {
+            gram,
+            matrix: matrix_there,
+            measurements,
+            exact,
+            mixed: OnceLock::new(),
+            referee: OnceLock::new(),
+        })
     }
 
     /// The dictionary's device.
@@ -159,7 +179,51 @@ impl DeviceDictionary {
             finite("measurement", &single)?;
         }
         let y = self.device().engine.upload(&single);
-        Ok(DeviceFrames { y, energies })
+        Ok(DeviceFrames { y, exact: None, energies })
+    }
+
+    /// [`upload`](Self::upload), with the measurements in double precision too:
+    /// [`pursue`](Self::pursue) then leaves choices that single precision cannot make to a referee
+    /// in `f64`, if the device has it.
+    ///
+    /// # Errors
+    /// As [`upload`](Self::upload).
+    pub fn upload_exact(&self, y: &[f64]) -> Result<DeviceFrames, OmpError> {
+        let frames = self.upload(y)?;
+        let there = frames.y.count();
+        let limits = self.device().limits();
+        let fits = limits.fits("bytes of a buffer in f64", 2 * there).is_ok()
+            && limits.fits("bytes of the Gram matrix in f64", 2 * self.gram.width().pow(2)).is_ok();
+        if !fits || !self.device().engine.has_doubles() {
+            return Ok(frames);
+        }
+        let mut padded = y.to_vec();
+        padded.resize(there, 0.0);
+        let exact = Some(self.device().engine.upload_doubles(&padded));
+        Ok(DeviceFrames { exact, ..frames })
+    }
+
+    /// The dictionary in `f64` on the device.
+    fn referee(&self) -> &Referee {
+        self.referee.get_or_init(|| {
+            let (matrix, normalised) = &self.exact;
+            let (rows, atoms, width) = (self.measurements, matrix.ncols(), self.gram.width());
+            let mut columns = vec![0.0; width * rows];
+            columns[..atoms * rows].copy_from_slice(matrix.as_slice());
+            let mut lines = vec![0.0; rows * width];
+            for (line, values) in lines.chunks_exact_mut(width).zip(matrix.row_iter()) {
+                line.iter_mut().zip(values.iter()).for_each(|(line, &value)| *line = value);
+            }
+            let mut norms = vec![0.0; width];
+            for (norm, atom) in norms.iter_mut().zip(matrix.column_iter()) {
+                *norm = if *normalised { 1.0 / atom.norm() } else { 1.0 };
+            }
+            let engine = &self.device().engine;
+            let columns = engine.upload_doubles(&columns);
+            let matrix = engine.upload_doubles(&lines);
+            let gram = engine.exact_products(&columns, &matrix, rows, width);
+            Referee { matrix, gram, norms: engine.upload_doubles(&norms) }
+        })
     }
 
     /// Finds a sparse representation of each frame. Everything stays on the device.
@@ -175,7 +239,17 @@ impl DeviceDictionary {
         limits::check("frames at once", frames.energies.len(), limit)?;
         let (engine, width) = (&self.device().engine, self.gram.width());
         let projection = engine.products(&frames.y, &self.matrix, self.measurements, width);
-        self.gram.pursue(projection, frames.energies.clone(), self.measurements, limits)
+        let exact = |shape: &Shape| {
+            let y = frames.exact.as_ref().filter(|_| engine.has_referee(shape))?;
+            let Referee { matrix, gram, norms } = self.referee();
+            Some(Exact {
+                gram: gram.clone(),
+                norms: norms.clone(),
+                projection: engine.exact_products(y, matrix, self.measurements, width),
+                believed: BELIEVED as f32,
+            })
+        };
+        self.gram.pursue(projection, frames.energies.clone(), self.measurements, limits, exact)
     }
 
     /// Downloads the solutions that `f32` found.
@@ -195,9 +269,20 @@ impl DeviceDictionary {
         &self,
         solutions: &DeviceSolutions,
     ) -> Result<(Vec<Solution>, Vec<usize>), OmpError> {
+        let (solutions, doubtful, _) = self.download_decided(solutions)?;
+        Ok((solutions, doubtful))
+    }
+
+    /// Downloads the solutions, those that are still in doubt, and how many of the others have
+    /// choices of the referee.
+    fn download_decided(
+        &self,
+        solutions: &DeviceSolutions,
+    ) -> Result<(Vec<Solution>, Vec<usize>, usize), OmpError> {
         let found = self.gram.read(solutions)?;
         let doubtful = (0..found.len()).filter(|&i| found[i].doubtful).collect();
-        Ok((found.into_iter().map(|found| found.solution).collect(), doubtful))
+        let decided = found.iter().filter(|found| found.decided && !found.doubtful).count();
+        Ok((found.into_iter().map(|found| found.solution).collect(), doubtful, decided))
     }
 
     /// Solves the `doubtful` measurements of `y` again on the processor, with `f64` as the referee.
@@ -285,8 +370,10 @@ impl DeviceDictionary {
         Ok(self.in_turns(limits.sparsity, y, solve)?.into_iter().flatten().collect())
     }
 
-    /// Finds sparse representations of a batch; also returns how many of them `f32` could not
-    /// decide. The processor solves those again, with `f64` as the referee.
+    /// Finds sparse representations of a batch; also returns for how many of them double precision
+    /// was used. Choices that `f32` cannot make are made in `f64` on the device, if it has that.
+    /// Frames that are in doubt for another reason, or on a device without `f64`, are solved again
+    /// by the processor.
     ///
     /// # Errors
     /// [`OmpError`] if `y` does not fit the dictionary, is not finite, or the device fails.
@@ -295,14 +382,20 @@ impl DeviceDictionary {
         limits: &Limits,
         y: &[f64],
     ) -> Result<(Vec<Solution>, usize), OmpError> {
-        let solve = |y: &[f64]| self.download_with_doubts(&self.pursue(limits, &self.upload(y)?)?);
-        let (mut solutions, mut doubtful) = (Vec::new(), Vec::new());
-        for (mut found, doubts) in self.in_turns(limits.sparsity, y, solve)? {
+        // One thread makes the dictionary in f64, before the turns share it.
+        if self.device().engine.has_doubles() {
+            self.referee();
+        }
+        let solve =
+            |y: &[f64]| self.download_decided(&self.pursue(limits, &self.upload_exact(y)?)?);
+        let (mut solutions, mut doubtful, mut exact) = (Vec::new(), Vec::new(), 0);
+        for (mut found, doubts, decided) in self.in_turns(limits.sparsity, y, solve)? {
             doubtful.extend(doubts.into_iter().map(|i| solutions.len() + i));
             solutions.append(&mut found);
+            exact += decided;
         }
         self.settle(limits, y, &doubtful, &mut solutions)?;
-        Ok((solutions, doubtful.len()))
+        Ok((solutions, exact + doubtful.len()))
     }
 }
 
@@ -407,7 +500,7 @@ fn pursue_over<T: Scalar, D: Dictionary<T> + ?Sized>(
     }
     let projection = gram.device.engine.upload(&projection);
     let energies = y.chunks_exact(measurements).map(energy).collect();
-    gram.pursue(projection, energies, measurements, limits)
+    gram.pursue(projection, energies, measurements, limits, |_| None)
 }
 
 fn single<T: Scalar>(value: T) -> f32 {

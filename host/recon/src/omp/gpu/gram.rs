@@ -11,9 +11,10 @@ use crate::omp::dictionary::Atoms;
 use crate::omp::referee::{BELIEVED, BELIEVED_ENERGY};
 use crate::omp::{BackendError, Limits, OmpError, Path, Scalar, Solution, Stop};
 use nirspi_gpu::pursuit::layout::{
-    CLOSEST, COUNT, ENERGY, ENOUGH, LEAD, Progress, REMAINING, STATE, STOP, TOGETHER,
+    CLOSEST, COUNT, DECIDED, ENERGY, ENOUGH, LEAD, Progress, REMAINING, STATE, STOP, Shape,
+    TOGETHER,
 };
-use nirspi_gpu::pursuit::{Pursuit, Rounding};
+use nirspi_gpu::pursuit::{Exact, Pursuit, Rounding};
 use nirspi_gpu::{Buffer, limits};
 use rayon::prelude::*;
 
@@ -44,6 +45,8 @@ pub(super) struct Found {
     pub solution: Solution,
     pub steps: Vec<f32>,
     pub doubtful: bool,
+    /// Whether the device decided a choice in double precision.
+    pub decided: bool,
     pub least_lead: f64,
 }
 
@@ -84,18 +87,21 @@ impl DeviceGram {
     }
 
     /// Pursues frames whose initial projections are on the device: `width` numbers each, for at
-    /// least as many frames as there are energies. The projections are overwritten.
+    /// least as many frames as there are energies. The projections are overwritten. `exact` gives
+    /// what a referee in double precision needs, for choices that single precision cannot make.
     pub(super) fn pursue(
         &self,
         projection: Buffer,
         energies: Vec<f64>,
         measurements: usize,
         limits: &Limits,
+        exact: impl FnOnce(&Shape) -> Option<Exact>,
     ) -> Result<DeviceSolutions, OmpError> {
         limits.check()?;
         let engine = &self.device.engine;
         let sparsity = self.most(limits.sparsity);
         let shape = self.device.limits().shape(self.atoms.count(), sparsity)?;
+        let exact = exact(&shape);
         let frames = energies.len();
         let mut state = vec![0.0; frames.max(1) * STATE];
         for (state, &energy) in state.chunks_exact_mut(STATE).zip(&energies) {
@@ -118,11 +124,12 @@ impl DeviceGram {
             values: engine.empty(2 * chosen),
             state: engine.upload(&state),
             coefficients: engine.empty(chosen),
+            exact,
         };
         if frames > 0 {
             let rounding = Rounding { score: f32::ROUNDING as f32, pivot: f32::DEPENDENT as f32 };
             let steps = limits.sparsity.min(sparsity);
-            for launch in shape.launches(steps, limits::ROUNDS)? {
+            for launch in shape.launches(steps, limits::ROUNDS, pursuit.exact.is_some())? {
                 engine.pursue(&pursuit, launch, rounding);
             }
             engine.coefficients(&pursuit);
@@ -142,7 +149,7 @@ impl DeviceGram {
         let atoms = found.solution.support.len();
         factor.truncate(atoms * (atoms + 1) / 2);
         Ok(Path {
-            refereed: 0,
+            refereed: usize::from(found.decided),
             support: found.solution.support,
             residual_norms: found.solution.residual_norms,
             stop: found.solution.stop,
@@ -236,7 +243,8 @@ impl DeviceSolutions {
             stop,
             unseen: self.unseen.clone(),
         };
-        Found { solution, steps, doubtful, least_lead }
+        let decided = state[DECIDED] > 0.0;
+        Found { solution, steps, doubtful, decided, least_lead }
     }
 }
 

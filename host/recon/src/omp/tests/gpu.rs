@@ -194,18 +194,19 @@ fn a_dictionary_of_fast_transforms_has_the_same_path() {
     }
 }
 
-/// Cosines of a 16 x 16 image measured by `rows` Hadamard rows: atoms that are hard to distinguish.
-fn cosines(rows: &[usize]) -> DMatrix<f64> {
-    let side = side(16);
-    let transform = Transform::new(Basis::Dct, side);
-    let mut dictionary = DMatrix::zeros(rows.len(), 256);
-    for atom in 0..256 {
-        let mut image = vec![0.0_f32; 256];
+/// Cosines of an image of `pixels` x `pixels` measured by `rows` Hadamard rows: atoms that are hard
+/// to distinguish.
+fn cosines(rows: &[usize], pixels: usize) -> DMatrix<f64> {
+    let area = pixels * pixels;
+    let transform = Transform::new(Basis::Dct, side(pixels as u64));
+    let mut dictionary = DMatrix::zeros(rows.len(), area);
+    for atom in 0..area {
+        let mut image = vec![0.0_f32; area];
         image[atom] = 1.0;
         transform.synthesise(&mut image);
         crate::fwht::transform(&mut image);
         for (m, &row) in rows.iter().enumerate() {
-            dictionary[(m, atom)] = f64::from(image[row] / 16.0);
+            dictionary[(m, atom)] = f64::from(image[row] / pixels as f32);
         }
     }
     dictionary
@@ -217,7 +218,7 @@ fn few_of_many_frames_need_double_precision_and_all_have_its_support() {
     let mut random = Pcg64::seed_from_u64(4);
     let rows: Vec<usize> = (0..256).filter(|row| row * 37 % 16 < 7).collect();
     let random_atoms = problem(Kind::Noisy, 64, 256, 8, 11).dictionary;
-    for (matrix, most) in [(random_atoms, 20), (cosines(&rows), 100)] {
+    for (matrix, most) in [(random_atoms, 20), (cosines(&rows, 16), 100)] {
         let measurements = matrix.nrows();
         let y: Vec<f64> = (0..measurements * 200).map(|_| normal(&mut random)).collect();
         let limits = Limits::atoms(16);
@@ -229,6 +230,89 @@ fn few_of_many_frames_need_double_precision_and_all_have_its_support() {
         for (y, found) in y.chunks_exact(measurements).zip(&found) {
             assert_eq!(found.support, exact.solve(y).unwrap().support);
         }
+    }
+}
+
+/// Random orthonormal atoms, and frames in which pairs of them have the same coefficient but for a
+/// part in 10^9.
+fn tied(rows: usize, normalised: bool) -> (DMatrix<f64>, Vec<f64>) {
+    let mut random = Pcg64::seed_from_u64(21);
+    let mut matrix = DMatrix::from_fn(rows, rows, |_, _| normal(&mut random)).qr().q();
+    if !normalised {
+        // Longer atoms, all of one length.
+        matrix *= 3.0;
+    }
+    let mut y = Vec::new();
+    for frame in 0..30 {
+        let mut scene = DMatrix::zeros(rows, 1);
+        let mut free: Vec<usize> = (0..rows).collect();
+        for pair in 0..10 {
+            let coefficient = 1.0 + f64::from(pair) + normal(&mut random).abs();
+            for (more, place) in [(1e-9 * normal(&mut random), 0), (0.0, 1)] {
+                let atom = (frame * 7 + 2 * pair as usize + place * 41) % rows;
+                free.retain(|&other| other != atom);
+                scene += coefficient * (1.0 + more) * matrix.column(atom);
+            }
+        }
+        // Something is left at the end, by atoms that are not chosen.
+        free.iter().for_each(|&atom| scene += 0.1 * normal(&mut random) * matrix.column(atom));
+        y.extend_from_slice(scene.as_slice());
+    }
+    (matrix, y)
+}
+
+/// The camera's cosines behind half of its rows, and frames of a few cosines with noise.
+fn camera() -> (DMatrix<f64>, Vec<f64>) {
+    let mut random = Pcg64::seed_from_u64(4);
+    let rows: Vec<usize> = (0..1024).filter(|row| row * 389 % 1024 < 512).collect();
+    let matrix = cosines(&rows, 32);
+    let mut y = Vec::new();
+    for frame in 0..30 {
+        let mut scene = DMatrix::from_fn(rows.len(), 1, |_, _| 0.05 * normal(&mut random));
+        for k in 0..12 {
+            scene += normal(&mut random) * matrix.column((frame * 7 + k * k) % 1024);
+        }
+        y.extend_from_slice(scene.as_slice());
+    }
+    (matrix, y)
+}
+
+#[test]
+fn choices_that_single_precision_cannot_make_are_made_on_the_device() {
+    let Some(device) = device() else { return };
+    if !device.engine().has_doubles() {
+        let _ = writeln!(std::io::stderr(), "skipped: {} has no f64", device.name());
+        return;
+    }
+    for (what, (matrix, y), normalised, atoms) in [
+        ("the camera's rows and cosines", camera(), true, 40),
+        ("ties", tied(96, true), true, 20),
+        ("ties of atoms as they are", tied(96, false), false, 20),
+    ] {
+        let limits = Limits::atoms(atoms);
+        let measurements = matrix.nrows();
+        let dictionary = DeviceDictionary::new(device, matrix.clone(), normalised).unwrap();
+        let solve = |frames| {
+            let there = dictionary.pursue(&limits, &frames).unwrap();
+            dictionary.download_with_doubts(&there).unwrap()
+        };
+        let (alone, doubts_alone) = solve(dictionary.upload(&y).unwrap());
+        let (found, doubts) = solve(dictionary.upload_exact(&y).unwrap());
+        assert!(!doubts_alone.is_empty(), "{what}: single precision sees no doubt");
+        assert!(doubts.is_empty(), "{what}: {doubts:?}");
+        let exact = DenseDictionary::new(&matrix);
+        let exact = if normalised { exact } else { exact.unnormalised() };
+        let mut exact = Solver::new(&exact, &limits).unwrap();
+        let mut other = 0;
+        for ((y, found), alone) in y.chunks_exact(measurements).zip(&found).zip(&alone) {
+            let exact = exact.solve(y).unwrap().support;
+            assert_eq!(found.support, exact, "{what}");
+            other += usize::from(alone.support != exact);
+        }
+        // The camera's few frames may be right by chance.
+        assert!(other > 10 || what.contains("camera"), "{what}: single precision is enough");
+        let (_, in_double) = dictionary.solve_batch(&limits, &y).unwrap();
+        assert_eq!(in_double, doubts_alone.len(), "{what}: each doubt is told");
     }
 }
 
